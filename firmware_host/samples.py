@@ -1,0 +1,13 @@
+"""The shape of a received sample, shared by the link that decodes it and the recorder that keeps it."""
+
+import numpy as np
+
+SAMPLE_DTYPE = np.dtype(
+    [
+        ("sequence", "<u4"),  # counts every conversion the board saw, so a gap is a lost sample
+        ("board_time_us", "<u8"),  # the board's microsecond counter, read before the bus transfer
+        ("host_time_s", "<f8"),  # time.monotonic() when the frame's last byte was read
+        ("counts", "<i4", (3,)),  # x, y, z as the part reports them
+        ("temperature_counts", "<i2"),
+    ]
+)

@@ -1,0 +1,1 @@
+"""The procedures a technician runs: short scripts that read like the instruction on the wall."""

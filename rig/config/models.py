@@ -1,0 +1,114 @@
+"""What a configuration file may say. Every quantity carries its unit in its key; degrees live only here, at the edge."""
+
+from typing import Annotated, Literal
+
+import numpy as np
+from pydantic import BaseModel, ConfigDict, Field
+
+Joint = Literal["base", "shoulder", "elbow", "wrist_1", "wrist_2", "wrist_3"]
+Wrist = Literal["wrist_1", "wrist_2", "wrist_3"]
+Direction = Literal["cw", "ccw"]
+AxisName = Literal["+x", "-x", "+y", "-y", "+z", "-z"]
+Vector3 = tuple[float, float, float]
+Vector6 = tuple[float, float, float, float, float, float]
+Positive = Annotated[float, Field(gt=0)]
+
+
+class Section(BaseModel):
+    """A part of the file: unknown keys are refused, values are frozen."""
+
+    model_config = ConfigDict(extra="forbid", frozen=True, allow_inf_nan=False)
+
+
+class ArmSection(Section):
+    """The robot arm and what it carries."""
+
+    host: str
+    payload_kg: Annotated[float, Field(ge=0, le=12.5)]  # UR10e: 12.5 kg
+    payload_centre_mm: Vector3 = (0.0, 0.0, 0.0)
+    home_deg: Vector6 = (0.0, -90.0, 90.0, -90.0, -90.0, 0.0)
+    transfer_speed_deg_s: Annotated[float, Field(gt=0, le=180)] = 90.0
+    state_rate_hz: Annotated[float, Field(ge=125, le=500)] = 125.0
+
+
+class BoardSection(Section):
+    """The microcontroller board: a serial port name or `socket://host:port`."""
+
+    port: str
+    baud: Literal[115200, 230400, 460800, 921600] = 921600
+
+
+class MountingSection(Section):
+    """Which flange axis each sensor axis points along, nominally; the solver does not need it to be exact."""
+
+    x: AxisName = "+x"
+    y: AxisName = "+y"
+    z: AxisName = "+z"
+
+
+class SensorSection(Section):
+    """One gyroscope on the board."""
+
+    part: Literal["lsm9ds1"]
+    serial_number: str
+    rate_hz: Positive = 238.0
+    range_deg_s: Positive = 245.0
+    mounting: MountingSection = MountingSection()
+
+
+class ProcedureSection(Section):
+    """The movement: which wrists, in what order, how fast, how often."""
+
+    name: Literal["six_observation"] = "six_observation"
+    order: Annotated[tuple[Wrist, ...], Field(min_length=1)] = ("wrist_3", "wrist_1", "wrist_2")
+    directions: Annotated[tuple[Direction, ...], Field(min_length=1)] = ("cw", "ccw")
+    repeats: Annotated[int, Field(ge=1, le=100)] = 1
+    speed_deg_s: Annotated[float, Field(gt=0, le=180)] = 60.0
+    acceleration_deg_s2: Annotated[float, Field(gt=0, le=800)] = 80.0
+    rest_s: Annotated[float, Field(ge=0, le=3600)] = 3.0
+    margin_deg: Annotated[float, Field(gt=0, le=90)] = 2.0  # constant speed on each side of the revolution
+
+
+class ObservationSection(Section):
+    """What an averaged revolution must satisfy to be used."""
+
+    max_lost_fraction: Annotated[float, Field(ge=0, lt=1)] = 0.001
+    max_speed_deviation: Annotated[float, Field(gt=0, lt=1)] = 0.25  # of the joint's rate from its mean, smoothed over 50 ms
+    max_axis_deviation_deg: Annotated[float, Field(gt=0, lt=45)] = 20.0
+
+
+class LimitsSection(Section):
+    """The verdict's limits; a limit left out is a check that fails, so state all of them."""
+
+    scale_deviation: Positive
+    scale_std: Positive
+    bias_rad_s: Positive
+    bias_std_rad_s: Positive
+    condition: Positive
+
+
+class OutputSection(Section):
+    """Where run folders go."""
+
+    folder: str = "runs"
+
+
+class RigConfig(Section):
+    """Everything the rig reads. It has no knowledge of whether the far end is simulated."""
+
+    arm: ArmSection
+    board: BoardSection
+    sensors: Annotated[dict[str, SensorSection], Field(min_length=1)]
+    procedure: ProcedureSection = ProcedureSection()
+    observation: ObservationSection = ObservationSection()
+    limits: LimitsSection
+    output: OutputSection = OutputSection()
+
+
+def mounting_matrix(mounting: MountingSection) -> np.ndarray:
+    """(3, 3) rotation taking a flange-frame vector to the sensor's nominal frame: row i is sensor axis i."""
+    axes = {"x": 0, "y": 1, "z": 2}
+    rows = np.zeros((3, 3))
+    for row, name in enumerate((mounting.x, mounting.y, mounting.z)):
+        rows[row, axes[name[1]]] = 1.0 if name[0] == "+" else -1.0
+    return rows

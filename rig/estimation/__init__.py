@@ -1,0 +1,1 @@
+"""Calibration estimators: pure functions from arrays to results, no input or output."""

@@ -1,0 +1,1 @@
+"""The simulated laboratory, in a process of its own at the far end of the wire."""
