@@ -1,9 +1,9 @@
 """What a configuration file may say. Every quantity carries its unit in its key; degrees live only here, at the edge."""
 
-from typing import Annotated, Literal
+from typing import Annotated, Literal, Self
 
 import numpy as np
-from pydantic import BaseModel, ConfigDict, Field
+from pydantic import AfterValidator, BaseModel, ConfigDict, Field, model_validator
 
 Joint = Literal["base", "shoulder", "elbow", "wrist_1", "wrist_2", "wrist_3"]
 Wrist = Literal["wrist_1", "wrist_2", "wrist_3"]
@@ -12,6 +12,20 @@ AxisName = Literal["+x", "-x", "+y", "-y", "+z", "-z"]
 Vector3 = tuple[float, float, float]
 Vector6 = tuple[float, float, float, float, float, float]
 Positive = Annotated[float, Field(gt=0)]
+
+
+def one_of(*allowed: float) -> AfterValidator:
+    """A validator that accepts just these numbers and names the nearest of them otherwise."""
+
+    def check(value: float) -> float:
+        if value not in allowed:
+            nearest = min(allowed, key=lambda candidate: abs(candidate - value))
+            raise ValueError(
+                f"not available; the nearest is {nearest:g}; allowed: {', '.join(f'{a:g}' for a in allowed)}"
+            )
+        return value
+
+    return AfterValidator(check)
 
 
 class Section(BaseModel):
@@ -38,6 +52,15 @@ class BoardSection(Section):
     baud: Literal[115200, 230400, 460800, 921600] = 921600
 
 
+def mounting_matrix(mounting: "MountingSection") -> np.ndarray:
+    """(3, 3) rotation taking a flange-frame vector to the sensor's nominal frame: row i is sensor axis i."""
+    axes = {"x": 0, "y": 1, "z": 2}
+    rows = np.zeros((3, 3))
+    for row, name in enumerate((mounting.x, mounting.y, mounting.z)):
+        rows[row, axes[name[1]]] = 1.0 if name[0] == "+" else -1.0
+    return rows
+
+
 class MountingSection(Section):
     """Which flange axis each sensor axis points along, nominally; the solver does not need it to be exact."""
 
@@ -45,14 +68,21 @@ class MountingSection(Section):
     y: AxisName = "+y"
     z: AxisName = "+z"
 
+    @model_validator(mode="after")
+    def right_handed(self) -> Self:
+        """A mirrored or doubled axis is not a mounting."""
+        if not np.isclose(np.linalg.det(mounting_matrix(self)), 1.0):
+            raise ValueError("must name three different axes that form a right-handed frame, for example +x, +y, +z")
+        return self
+
 
 class SensorSection(Section):
     """One gyroscope on the board."""
 
     part: Literal["lsm9ds1"]
     serial_number: str
-    rate_hz: Positive = 238.0
-    range_deg_s: Positive = 245.0
+    rate_hz: Annotated[float, one_of(14.9, 59.5, 119, 238, 476, 952)] = 238  # LSM9DS1 datasheet, table 46
+    range_deg_s: Annotated[float, one_of(245, 500, 2000)] = 245
     mounting: MountingSection = MountingSection()
 
 
@@ -73,7 +103,9 @@ class ObservationSection(Section):
     """What an averaged revolution must satisfy to be used."""
 
     max_lost_fraction: Annotated[float, Field(ge=0, lt=1)] = 0.001
-    max_speed_deviation: Annotated[float, Field(gt=0, lt=1)] = 0.25  # of the joint's rate from its mean, smoothed over 50 ms
+    max_speed_deviation: Annotated[float, Field(gt=0, lt=1)] = (
+        0.25  # of the joint's rate from its mean, smoothed over 50 ms
+    )
     max_axis_deviation_deg: Annotated[float, Field(gt=0, lt=45)] = 20.0
 
 
@@ -104,11 +136,13 @@ class RigConfig(Section):
     limits: LimitsSection
     output: OutputSection = OutputSection()
 
-
-def mounting_matrix(mounting: MountingSection) -> np.ndarray:
-    """(3, 3) rotation taking a flange-frame vector to the sensor's nominal frame: row i is sensor axis i."""
-    axes = {"x": 0, "y": 1, "z": 2}
-    rows = np.zeros((3, 3))
-    for row, name in enumerate((mounting.x, mounting.y, mounting.z)):
-        rows[row, axes[name[1]]] = 1.0 if name[0] == "+" else -1.0
-    return rows
+    @model_validator(mode="after")
+    def sweeps_fit_the_ranges(self) -> Self:
+        """A sweep must stay well inside every sensor's range: scale error, bias, ripple and noise come on top."""
+        for name, sensor in self.sensors.items():
+            if self.procedure.speed_deg_s * 1.5 > sensor.range_deg_s:
+                raise ValueError(
+                    f"procedure.speed_deg_s {self.procedure.speed_deg_s:g} is too fast for sensors.{name}.range_deg_s "
+                    f"{sensor.range_deg_s:g}: the range must be at least 1.5 times the speed"
+                )
+        return self
