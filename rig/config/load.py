@@ -23,7 +23,8 @@ Model = TypeVar("Model", bound=BaseModel)
 class Loaded:
     """A valid configuration. `world` goes to the simulated laboratory and nowhere else.
 
-    `text` is the file as used (overrides applied), `rig_text` the same without its `world:` section: what a recording keeps.
+    `text` is the file as used (overrides applied), `rig_text` the same without its `world:` section: that is what a
+    recording keeps.
     """
 
     config: RigConfig
@@ -47,8 +48,8 @@ class ConfigurationRefused(Refused):
 def load(path: str | Path, overrides: Sequence[str] = ()) -> Loaded:
     """Read, override and validate a configuration file.
 
-    `overrides` are `path.to.key=value` with the value in YAML. Raises `ConfigurationRefused` listing every error with its
-    path, line, value, what is allowed and, for a misspelling, the nearest valid spelling.
+    `overrides` are `path.to.key=value` with the value in YAML. Raises `ConfigurationRefused` listing every error with
+    its path, line, value, what is allowed and, for a misspelling, the nearest valid spelling.
     """
     source = str(path)
     try:

@@ -1,4 +1,7 @@
-"""What a configuration file may say. Every quantity carries its unit in its key; degrees live only here, at the edge."""
+"""What a configuration file may say.
+
+Every quantity carries its unit in its key. Degrees live only here, at the edge; the rig works in SI units.
+"""
 
 from typing import Annotated, Literal, Self
 
@@ -97,6 +100,13 @@ class ProcedureSection(Section):
     acceleration_deg_s2: Annotated[float, Field(gt=0, le=800)] = 80.0
     rest_s: Annotated[float, Field(ge=0, le=3600)] = 3.0
     margin_deg: Annotated[float, Field(gt=0, le=90)] = 2.0  # constant speed on each side of the revolution
+
+    @model_validator(mode="after")
+    def every_direction_is_swept(self) -> Self:
+        """Six parameters need all six directions (SIX, section II-B); refuse before anything moves, not after."""
+        if len(set(self.order)) < 3 or len(self.order) > 3 or set(self.directions) != {"cw", "ccw"}:
+            raise ValueError("order must name wrist_1, wrist_2 and wrist_3 once each, and directions both cw and ccw")
+        return self
 
 
 class ObservationSection(Section):
