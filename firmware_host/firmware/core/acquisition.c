@@ -1,0 +1,217 @@
+#include "acquisition.h"
+
+#include <string.h>
+
+#include "clock.h"
+#include "link.h"
+#include "sensor.h"
+
+#define RING 64u              /* a power of two */
+#define BATCH_AGE_US 40000u   /* a sample waits no longer than this for company */
+#define SILENCE_PERIODS 10u   /* so many conversions missing in a row is a fault, not jitter */
+#define SILENCE_US 100000u    /* and time for a part that is just starting up */
+#define BATCH_MAX ((PAYLOAD_MAX - sizeof(struct samples_payload)) / sizeof(struct samples_item))
+
+struct sample {
+    uint64_t time_us;
+    uint32_t sequence;
+    struct reading reading;
+};
+
+struct stream {
+    volatile uint32_t edges; /* by the interrupt */
+    volatile uint32_t captured_us;
+    uint32_t edges_seen;
+    uint32_t period_us; /* 0: not configured */
+    uint64_t last_us;   /* latest conversion, or the start */
+    bool silence_reported;
+    uint32_t conversions, sent, dropped;
+    struct sample ring[RING];
+    uint32_t written, read;
+};
+
+static struct stream streams[SENSOR_COUNT];
+static bool running;
+static uint32_t bus_errors;
+
+void acquisition_reset(void)
+{
+    memset(streams, 0, sizeof streams);
+    running = false;
+    bus_errors = 0;
+}
+
+void acquisition_data_ready(unsigned sensor, uint32_t captured_us)
+{
+    streams[sensor].captured_us = captured_us;
+    streams[sensor].edges++;
+}
+
+void acquisition_set_rate(unsigned sensor, double rate_hz)
+{
+    streams[sensor].period_us = rate_hz > 0.0 ? (uint32_t)(1e6f / (float)rate_hz) : 0;
+}
+
+/* Lowers a data-ready line that is already high: without it no further edge would come. */
+static void rearm(unsigned sensor)
+{
+    struct stream *stream = &streams[sensor];
+    struct reading discarded;
+    do {
+        stream->edges_seen = stream->edges;
+        sensors[sensor].driver->read(sensors[sensor].device, &discarded);
+    } while (stream->edges != stream->edges_seen);
+}
+
+bool acquisition_start(void)
+{
+    bool any = false;
+    for (unsigned i = 0; i < SENSOR_COUNT; i++) {
+        struct stream *stream = &streams[i];
+        stream->conversions = stream->sent = stream->dropped = 0;
+        stream->written = stream->read = 0;
+        stream->silence_reported = false;
+        stream->last_us = clock_now();
+        if (stream->period_us != 0) {
+            rearm(i);
+            any = true;
+        }
+    }
+    running = any;
+    return any;
+}
+
+void acquisition_stop(void)
+{
+    running = false;
+}
+
+bool acquisition_is_running(void)
+{
+    return running;
+}
+
+bool acquisition_is_empty(void)
+{
+    for (unsigned i = 0; i < SENSOR_COUNT; i++)
+        if (streams[i].written != streams[i].read)
+            return false;
+    return true;
+}
+
+/* Conversions since the last one. A line held high by an unread conversion makes no edges, so time tells what edges cannot. */
+static uint32_t conversions_until(const struct stream *stream, uint32_t edges, uint64_t time_us)
+{
+    if (stream->conversions == 0)
+        return edges; /* the first may come late: the part is starting up */
+    uint32_t elapsed = ((uint32_t)(time_us - stream->last_us) + stream->period_us / 2) / stream->period_us;
+    return elapsed > edges ? elapsed : edges;
+}
+
+static void watch_silence(unsigned sensor)
+{
+    struct stream *stream = &streams[sensor];
+    if (clock_now() - stream->last_us < SILENCE_PERIODS * stream->period_us + SILENCE_US)
+        return;
+    rearm(sensor);
+    if (!stream->silence_reported) {
+        struct error_payload error = {.code = ERROR_SENSOR_SILENT, .sensor = (uint8_t)sensor};
+        stream->silence_reported = link_send(MESSAGE_ERROR, &error, sizeof error);
+    }
+}
+
+static void acquire(unsigned sensor)
+{
+    struct stream *stream = &streams[sensor];
+    uint32_t edges, captured_us;
+    do { /* an edge in between would pair one conversion's number with another's time */
+        edges = stream->edges;
+        captured_us = stream->captured_us;
+    } while (edges != stream->edges);
+    if (edges == stream->edges_seen) {
+        watch_silence(sensor);
+        return;
+    }
+    uint64_t time_us = clock_at(captured_us);
+    uint32_t conversions = conversions_until(stream, edges - stream->edges_seen, time_us);
+    stream->edges_seen = edges;
+    stream->last_us = time_us;
+    stream->conversions += conversions;
+    stream->dropped += conversions - 1;
+
+    struct sample *sample = &stream->ring[stream->written % RING];
+    struct reading reading;
+    bool fresh = sensors[sensor].driver->read(sensors[sensor].device, &reading);
+    bool full = stream->written - stream->read == RING;
+    bus_errors += !fresh;
+    if (!fresh || full) {
+        stream->dropped++;
+        return;
+    }
+    *sample = (struct sample){time_us, stream->conversions - 1, reading};
+    stream->written++;
+}
+
+/* Sends the oldest samples up to a gap in the sequence: a batch numbers its samples by the first. */
+static bool send_batch(unsigned sensor)
+{
+    struct {
+        struct samples_payload head;
+        struct samples_item items[BATCH_MAX];
+    } __attribute__((packed)) batch;
+    struct stream *stream = &streams[sensor];
+    const struct sample *first = &stream->ring[stream->read % RING];
+    uint8_t count = 0;
+    while (count < BATCH_MAX && stream->read + count != stream->written) {
+        const struct sample *sample = &stream->ring[(stream->read + count) % RING];
+        if (sample->sequence != first->sequence + count)
+            break;
+        struct samples_item *item = &batch.items[count++];
+        item->delta_us = (uint32_t)(sample->time_us - first->time_us);
+        memcpy(item->counts, sample->reading.counts, sizeof item->counts);
+        item->temperature_counts = sample->reading.temperature_counts;
+    }
+    batch.head = (struct samples_payload){
+        .sensor = (uint8_t)sensor,
+        .mode = MODE_RAW,
+        .sequence = first->sequence,
+        .dropped = stream->dropped,
+        .base_time_us = first->time_us,
+        .count = count,
+    };
+    if (!link_send(MESSAGE_SAMPLES, &batch, sizeof batch.head + count * sizeof batch.items[0]))
+        return false;
+    stream->read += count;
+    stream->sent += count;
+    return true;
+}
+
+static bool batch_is_due(const struct stream *stream)
+{
+    uint32_t waiting = stream->written - stream->read;
+    if (waiting == 0 || !link_has_room())
+        return false;
+    uint64_t age_us = stream->last_us - stream->ring[stream->read % RING].time_us;
+    return waiting >= BATCH_MAX || age_us >= BATCH_AGE_US || !running;
+}
+
+void acquisition_run(void)
+{
+    for (unsigned i = 0; i < SENSOR_COUNT; i++) {
+        if (running && streams[i].period_us != 0)
+            acquire(i);
+        while (batch_is_due(&streams[i]) && send_batch(i))
+            ;
+    }
+}
+
+void acquisition_report(unsigned sensor, struct report_item *item)
+{
+    const struct stream *stream = &streams[sensor];
+    *item = (struct report_item){.conversions = stream->conversions, .samples = stream->sent, .dropped = stream->dropped};
+}
+
+uint32_t acquisition_bus_errors(void)
+{
+    return bus_errors;
+}

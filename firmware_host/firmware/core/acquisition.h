@@ -1,0 +1,32 @@
+/* From data-ready edges to batches of samples, with every conversion accounted for. */
+#ifndef ACQUISITION_H
+#define ACQUISITION_H
+
+#include <stdbool.h>
+#include <stdint.h>
+
+#include "protocol.h"
+
+void acquisition_reset(void);
+
+/* Called from the data-ready interrupt with the counter value captured there. */
+void acquisition_data_ready(unsigned sensor, uint32_t captured_us);
+
+/* Sensor has been configured to this rate; 0 takes it out of the stream. */
+void acquisition_set_rate(unsigned sensor, double rate_hz);
+
+/* Starts counting at sequence 0; false when no sensor is configured. */
+bool acquisition_start(void);
+void acquisition_stop(void);
+bool acquisition_is_running(void);
+
+/* Nothing is left to send. */
+bool acquisition_is_empty(void);
+
+/* Reads what is ready, sends what is due. */
+void acquisition_run(void);
+
+void acquisition_report(unsigned sensor, struct report_item *item);
+uint32_t acquisition_bus_errors(void);
+
+#endif

@@ -1,0 +1,151 @@
+/* LSM9DS1 datasheet (DocID025715): register map section 6, gyroscope registers section 7, SPI section 5. */
+#include "lsm9ds1.h"
+
+#include <string.h>
+
+#include "port.h"
+
+#define READ 0x80u /* first bit of an SPI transfer */
+#define IDENTITY 0x68u
+
+enum register_address {
+    INT1_CTRL = 0x0C,
+    WHO_AM_I = 0x0F,
+    CTRL_REG1_G = 0x10,
+    CTRL_REG2_G = 0x11,
+    CTRL_REG3_G = 0x12,
+    ORIENT_CFG_G = 0x13,
+    OUT_TEMP_L = 0x15, /* then OUT_TEMP_H, STATUS_REG and the six bytes of OUT_X_G … OUT_Z_G */
+    CTRL_REG4 = 0x1E,
+    CTRL_REG8 = 0x22,
+    CTRL_REG9 = 0x23,
+};
+
+#define INT1_CTRL_DRDY_G 0x02u
+#define CTRL_REG4_AXES 0x38u       /* z, y, x on */
+#define CTRL_REG8_BDU 0x40u        /* low and high byte of one conversion */
+#define CTRL_REG8_IF_ADD_INC 0x04u /* the address counts up in a burst */
+#define CTRL_REG9_I2C_DISABLE 0x04u
+#define STATUS_GDA 0x02u
+#define STATUS_ALWAYS_0 0x80u /* reads 1 when nothing drives the wire */
+
+static const struct {
+    double hz;
+    uint8_t code;
+} rates[] = {{14.9, 1}, {59.5, 2}, {119.0, 3}, {238.0, 4}, {476.0, 5}, {952.0, 6}};
+
+/* Sensitivities are the datasheet's table 3, not range / 32768: that would be 15 % off. Code 2 is unused by the part. */
+static const struct {
+    double deg_s;
+    uint8_t code;
+    double sensitivity_rad_s;
+} ranges[] = {
+    {245.0, 0, 8.75e-3 * 3.14159265358979323846 / 180.0},
+    {500.0, 1, 17.5e-3 * 3.14159265358979323846 / 180.0},
+    {2000.0, 3, 70.0e-3 * 3.14159265358979323846 / 180.0},
+};
+
+#define COUNT(table) (sizeof(table) / sizeof(table)[0])
+
+static uint8_t read_register(unsigned device, uint8_t address)
+{
+    uint8_t bytes[2] = {(uint8_t)(address | READ), 0};
+    bus_xfer(device, bytes, sizeof bytes);
+    return bytes[1];
+}
+
+static bool write_register(unsigned device, uint8_t address, uint8_t value)
+{
+    uint8_t bytes[2] = {address, value};
+    bus_xfer(device, bytes, sizeof bytes);
+    return read_register(device, address) == value;
+}
+
+static bool identify(unsigned device, uint16_t *who_am_i)
+{
+    *who_am_i = read_register(device, WHO_AM_I);
+    return *who_am_i == IDENTITY;
+}
+
+static float distance(double a, float b)
+{
+    return __builtin_fabsf((float)a - b);
+}
+
+static size_t nearest_rate(float hz)
+{
+    size_t best = 0;
+    for (size_t i = 1; i < COUNT(rates); i++)
+        if (distance(rates[i].hz, hz) < distance(rates[best].hz, hz))
+            best = i;
+    return best;
+}
+
+/* The smallest range that holds `deg_s`, or COUNT(ranges). */
+static size_t next_range(float deg_s)
+{
+    size_t i = 0;
+    while (i < COUNT(ranges) && !(deg_s <= (float)ranges[i].deg_s))
+        i++;
+    return i;
+}
+
+/* Data rate last: with it the part starts, and nothing else changes under a running conversion. */
+static bool write_settings(unsigned device, uint8_t rate_code, uint8_t range_code)
+{
+    const struct {
+        uint8_t address, value;
+    } settings[] = {
+        {CTRL_REG9, CTRL_REG9_I2C_DISABLE},
+        {CTRL_REG8, CTRL_REG8_BDU | CTRL_REG8_IF_ADD_INC},
+        {CTRL_REG4, CTRL_REG4_AXES},
+        {CTRL_REG2_G, 0}, /* output before the second filter */
+        {CTRL_REG3_G, 0}, /* no high-pass: it would remove the bias that is to be measured */
+        {ORIENT_CFG_G, 0},
+        {INT1_CTRL, INT1_CTRL_DRDY_G},
+        {CTRL_REG1_G, (uint8_t)(rate_code << 5 | range_code << 3)},
+    };
+    for (size_t i = 0; i < COUNT(settings); i++)
+        if (!write_register(device, settings[i].address, settings[i].value))
+            return false;
+    return true;
+}
+
+static uint8_t configure(unsigned device, const struct configure_payload *wanted, struct setup_payload *setup)
+{
+    uint16_t who_am_i;
+    if (!(wanted->rate_hz > 0.0f && wanted->rate_hz < 1e6f))
+        return ERROR_BAD_RATE;
+    size_t range = next_range(wanted->range_deg_s);
+    if (range == COUNT(ranges) || !(wanted->range_deg_s > 0.0f))
+        return ERROR_BAD_RANGE;
+    if (!identify(device, &who_am_i))
+        return ERROR_SENSOR_ABSENT;
+    size_t rate = nearest_rate(wanted->rate_hz);
+    if (!write_settings(device, rates[rate].code, ranges[range].code))
+        return ERROR_SETUP_FAILED;
+    setup->rate_hz = rates[rate].hz;
+    setup->range_deg_s = ranges[range].deg_s;
+    setup->sensitivity_rad_s = ranges[range].sensitivity_rad_s;
+    setup->temperature_scale_c = 1.0 / 16.0;
+    setup->temperature_offset_c = 25.0;
+    return 0;
+}
+
+static int16_t int16_at(const uint8_t *bytes)
+{
+    return (int16_t)(bytes[0] | bytes[1] << 8);
+}
+
+/* One chip select for temperature, status and rates: they lie side by side, and one burst is one moment. */
+static bool read(unsigned device, struct reading *reading)
+{
+    uint8_t bytes[10] = {OUT_TEMP_L | READ};
+    bus_xfer(device, bytes, sizeof bytes);
+    reading->temperature_counts = int16_at(&bytes[1]);
+    for (unsigned axis = 0; axis < 3; axis++)
+        reading->counts[axis] = int16_at(&bytes[4 + 2 * axis]);
+    return (bytes[3] & (STATUS_GDA | STATUS_ALWAYS_0)) == STATUS_GDA;
+}
+
+const struct sensor_driver lsm9ds1_gyro = {"LSM9DS1", identify, configure, read};

@@ -1,0 +1,37 @@
+/* What the core asks of a sensor's driver. */
+#ifndef SENSOR_H
+#define SENSOR_H
+
+#include <stdbool.h>
+#include <stdint.h>
+
+#include "protocol.h"
+
+struct reading {
+    int16_t counts[3];
+    int16_t temperature_counts;
+};
+
+struct sensor_driver {
+    char part[12];
+
+    /* Reads the identity register; true when it is this part's. */
+    bool (*identify)(unsigned device, uint16_t *who_am_i);
+
+    /* Sets rate and range, reads every setting back; fills `setup` with what the part really does. 0, or why not. */
+    uint8_t (*configure)(unsigned device, const struct configure_payload *wanted, struct setup_payload *setup);
+
+    /* Reads one conversion, which also lowers the data-ready line; false when the part did not have a new one. */
+    bool (*read)(unsigned device, struct reading *reading);
+};
+
+/* The board's sensors: which driver, and which device of the port's bus. Data-ready lines are numbered alike. */
+struct sensor {
+    const struct sensor_driver *driver;
+    unsigned device;
+};
+
+#define SENSOR_COUNT 1u
+extern const struct sensor sensors[SENSOR_COUNT];
+
+#endif

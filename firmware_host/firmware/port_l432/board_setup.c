@@ -1,0 +1,133 @@
+/* Wiring: USART2 to the ST-LINK (TX PA2, RX PA15), SPI1 on PB3 PB4 PB5, LSM9DS1 select on PA11, its INT1 on PA8. */
+#include "board_setup.h"
+
+#include "protocol.h"
+#include "registers.h"
+
+#define CLOCK_HZ 80000000u
+#define TICK_HZ 20u
+
+enum pin_mode { PIN_INPUT = 0, PIN_OUTPUT = 1, PIN_ALTERNATE = 2 };
+enum pin_pull { PULL_UP = 1, PULL_DOWN = 2 };
+#define PER_PIN(pin, value) ((uint32_t)(value) << (2u * (pin)))
+#define PIN_MASK(pin) PER_PIN(pin, 3u)
+
+/* MSI 4 MHz × 40 / 2. The MSI, not the HSI: it can be locked to the board's crystal. Flash needs 4 wait states above 64 MHz. */
+static void setup_clock(void)
+{
+    FLASH_ACR = FLASH_ACR_LATENCY(4u) | FLASH_ACR_PRFTEN | FLASH_ACR_ICEN | FLASH_ACR_DCEN;
+    RCC_PLLCFGR = RCC_PLLCFGR_PLLSRC(1u) | RCC_PLLCFGR_PLLM(0u) | RCC_PLLCFGR_PLLN(40u) | RCC_PLLCFGR_PLLR(0u) |
+                  RCC_PLLCFGR_PLLREN;
+    RCC_CR |= RCC_CR_PLLON;
+    while (!(RCC_CR & RCC_CR_PLLRDY))
+        ;
+    RCC_CFGR = RCC_CFGR_SW(3u);
+    while ((RCC_CFGR & RCC_CFGR_SWS(3u)) != RCC_CFGR_SWS(3u))
+        ;
+}
+
+static void setup_power_to_peripherals(void)
+{
+    RCC_AHB1ENR |= RCC_AHB1ENR_DMA1EN;
+    RCC_AHB2ENR |= RCC_AHB2ENR_GPIOAEN | RCC_AHB2ENR_GPIOBEN;
+    RCC_APB1ENR1 |= RCC_APB1ENR1_TIM2EN | RCC_APB1ENR1_USART2EN | RCC_APB1ENR1_PWREN;
+    RCC_APB2ENR |= RCC_APB2ENR_SYSCFGEN | RCC_APB2ENR_SPI1EN;
+    (void)RCC_APB2ENR; /* the reading back lets the clocks start before the first access */
+}
+
+static void start_crystal(void)
+{
+    PWR_CR1 |= PWR_CR1_DBP;
+    RCC_BDCR |= RCC_BDCR_LSEON;
+}
+
+bool setup_lock_clock(void)
+{
+    if (!(RCC_BDCR & RCC_BDCR_LSERDY))
+        return false;
+    RCC_CR |= RCC_CR_MSIPLLEN;
+    return true;
+}
+
+/* Pulls give a disconnected wire a level: no data-ready edges, sensor bytes of 0xFF, a silent serial line. */
+static void setup_pins(void)
+{
+    GPIOA_BSRR = GPIOA_BSRR_BS11; /* deselected before it is an output */
+    GPIOA_AFRL |= GPIOA_AFRL_AFRL2(7u);
+    GPIOA_AFRH |= GPIOA_AFRH_AFRH15(3u);
+    GPIOA_PUPDR = (GPIOA_PUPDR & ~(PIN_MASK(8u) | PIN_MASK(15u))) | PER_PIN(8u, PULL_DOWN) | PER_PIN(15u, PULL_UP);
+    GPIOA_OSPEEDR |= PER_PIN(2u, 1u) | PER_PIN(11u, 1u);
+    GPIOA_MODER = (GPIOA_MODER & ~(PIN_MASK(2u) | PIN_MASK(8u) | PIN_MASK(11u) | PIN_MASK(15u))) |
+                  PER_PIN(2u, PIN_ALTERNATE) | PER_PIN(8u, PIN_INPUT) | PER_PIN(11u, PIN_OUTPUT) |
+                  PER_PIN(15u, PIN_ALTERNATE);
+
+    GPIOB_AFRL |= GPIOB_AFRL_AFRL3(5u) | GPIOB_AFRL_AFRL4(5u) | GPIOB_AFRL_AFRL5(5u);
+    GPIOB_PUPDR = (GPIOB_PUPDR & ~PIN_MASK(4u)) | PER_PIN(4u, PULL_UP);
+    GPIOB_OSPEEDR |= PER_PIN(3u, 1u) | PER_PIN(5u, 1u);
+    GPIOB_MODER = (GPIOB_MODER & ~(PIN_MASK(3u) | PIN_MASK(4u) | PIN_MASK(5u))) | PER_PIN(3u, PIN_ALTERNATE) |
+                  PER_PIN(4u, PIN_ALTERNATE) | PER_PIN(5u, PIN_ALTERNATE);
+}
+
+static void setup_microseconds(void)
+{
+    TIM2_PSC = CLOCK_HZ / 1000000u - 1u;
+    TIM2_EGR = TIM2_EGR_UG; /* loads the prescaler */
+    TIM2_CR1 = TIM2_CR1_CEN;
+}
+
+/* 5 MHz, half of what the LSM9DS1 allows; mode 3; eight bits, which the FIFO takes two at a time. */
+static void setup_spi(void)
+{
+    SPI1_CR2 = SPI1_CR2_DS(7u);
+    SPI1_CR1 = SPI1_CR1_CPHA | SPI1_CR1_CPOL | SPI1_CR1_MSTR | SPI1_CR1_BR(3u) | SPI1_CR1_SSM | SPI1_CR1_SSI;
+    SPI1_CR1 |= SPI1_CR1_SPE;
+}
+
+/* Without OVRDIS one late byte would stop the receiver; the CRC finds the hole anyway. */
+static void setup_serial(void)
+{
+    DMA1_CSELR |= DMA1_CSELR_C7S(2u);
+    DMA1_CPAR7 = (uint32_t)&USART2_TDR;
+    USART2_BRR = (CLOCK_HZ + BAUD_RATE / 2u) / BAUD_RATE;
+    USART2_CR3 = USART2_CR3_DMAT | USART2_CR3_OVRDIS;
+    USART2_CR1 = USART2_CR1_UE | USART2_CR1_RE | USART2_CR1_TE | USART2_CR1_RXNEIE;
+}
+
+static void setup_data_ready(void)
+{
+    SYSCFG_EXTICR3 = SYSCFG_EXTICR3_EXTI8(0u); /* port A */
+    EXTI_RTSR1 |= EXTI_RTSR1_TR8;
+    EXTI_IMR1 |= EXTI_IMR1_MR8;
+}
+
+static void setup_interrupts(void)
+{
+    NVIC_ISER0 = 1u << DMA1_CH7_IRQ | 1u << EXTI9_5_IRQ;
+    NVIC_ISER1 = 1u << (USART2_IRQ - 32u);
+    STK_LOAD = CLOCK_HZ / TICK_HZ - 1u;
+    STK_VAL = 0;
+    STK_CTRL = STK_CTRL_ENABLE | STK_CTRL_TICKINT | STK_CTRL_CLKSOURCE;
+}
+
+/* About one second of the 32 kHz oscillator; the main loop's tick answers it 20 times as often. */
+static void setup_watchdog(void)
+{
+    IWDG_KR = 0xCCCCu; /* start */
+    IWDG_KR = 0x5555u; /* unlock */
+    IWDG_PR = 3u;      /* / 32 */
+    IWDG_RLR = 1000u;
+}
+
+void setup_hardware(void)
+{
+    setup_clock();
+    setup_power_to_peripherals();
+    start_crystal();
+    setup_pins();
+    setup_microseconds();
+    setup_spi();
+    setup_serial();
+    setup_data_ready();
+    setup_interrupts();
+    setup_watchdog();
+}

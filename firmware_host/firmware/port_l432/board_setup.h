@@ -1,0 +1,12 @@
+/* Brings clock, pins and peripherals up. */
+#ifndef BOARD_SETUP_H
+#define BOARD_SETUP_H
+
+#include <stdbool.h>
+
+void setup_hardware(void);
+
+/* Lets the clock follow the 32768 Hz crystal once that runs, which takes up to two seconds; true from then on. */
+bool setup_lock_clock(void);
+
+#endif

@@ -1,0 +1,149 @@
+/* The chip behind core/port.h, its interrupts, and the main loop. */
+#include "port.h"
+
+#include <stdbool.h>
+
+#include "acquisition.h"
+#include "board.h"
+#include "board_setup.h"
+#include "link.h"
+#include "registers.h"
+#include "startup.h"
+
+#define SPI1_FIFO (*(volatile uint16_t *)&SPI1_DR) /* a 16-bit access moves two bytes */
+
+static volatile bool woken;
+static volatile bool ticked;
+static bool clock_locked;
+static uint32_t fault_pc;
+static uint8_t reset_cause;
+
+uint32_t port_time_us(void)
+{
+    return TIM2_CNT;
+}
+
+/* One sensor so far, so one chip select. Receiving two bytes at a time needs no wait for the bus to go idle. */
+void bus_xfer(unsigned device, uint8_t *bytes, size_t size)
+{
+    (void)device;
+    GPIOA_BSRR = GPIOA_BSRR_BR11;
+    for (size_t i = 0; i < size; i += 2) {
+        SPI1_FIFO = (uint16_t)(bytes[i] | bytes[i + 1] << 8);
+        while (!(SPI1_SR & SPI1_SR_RXNE))
+            ;
+        uint16_t received = SPI1_FIFO;
+        bytes[i] = (uint8_t)received;
+        bytes[i + 1] = (uint8_t)(received >> 8);
+    }
+    GPIOA_BSRR = GPIOA_BSRR_BS11;
+}
+
+void port_transmit(const uint8_t *bytes, size_t size)
+{
+    DMA1_CCR7 = 0; /* address and count can be set only while the channel is off */
+    DMA1_CMAR7 = (uint32_t)bytes;
+    DMA1_CNDTR7 = size;
+    DMA1_CCR7 = DMA1_CCR7_EN | DMA1_CCR7_TCIE | DMA1_CCR7_DIR | DMA1_CCR7_MINC;
+}
+
+void port_restart(void)
+{
+    while (!(USART2_ISR & USART2_ISR_TC))
+        ;
+    SCB_AIRCR = SCB_AIRCR_VECTKEYSTAT(0x05FAu) | SCB_AIRCR_SYSRESETREQ;
+    for (;;)
+        ;
+}
+
+void port_health(struct port_health *health)
+{
+    health->reset_cause = reset_cause;
+    health->clock_locked = clock_locked;
+    health->fault_pc = fault_pc;
+    health->stack_high_water = stack_high_water();
+}
+
+const uint8_t *port_unique_id(void)
+{
+    return UNIQUE_ID;
+}
+
+/* Every reset also pulls the reset pin, so that flag counts last. */
+static uint8_t cause_of_reset(uint32_t flags)
+{
+    if (fault_record.magic == FAULT_MAGIC)
+        return RESET_FAULT;
+    if (flags & RCC_CSR_IWDGRSTF)
+        return RESET_WATCHDOG;
+    if (flags & RCC_CSR_SFTRSTF)
+        return RESET_SOFTWARE;
+    if (flags & RCC_CSR_BORRSTF)
+        return RESET_POWER;
+    return flags & RCC_CSR_PINRSTF ? RESET_PIN : RESET_UNKNOWN;
+}
+
+static void remember_reset(void)
+{
+    reset_cause = cause_of_reset(RCC_CSR);
+    fault_pc = reset_cause == RESET_FAULT ? fault_record.pc : 0;
+    fault_record.magic = 0;
+    RCC_CSR |= RCC_CSR_RMVF;
+}
+
+void exti9_5_handler(void)
+{
+    acquisition_data_ready(0, TIM2_CNT);
+    EXTI_PR1 = EXTI_PR1_PR8;
+    woken = true;
+}
+
+void dma1_channel7_handler(void)
+{
+    DMA1_IFCR = DMA1_IFCR_CGIF7;
+    link_sent();
+    woken = true;
+}
+
+void usart2_handler(void)
+{
+    link_byte_received((uint8_t)USART2_RDR);
+    woken = true;
+}
+
+void systick_handler(void)
+{
+    ticked = true;
+    woken = true;
+}
+
+static void tick(void)
+{
+    ticked = false;
+    IWDG_KR = 0xAAAAu;
+    if (!clock_locked)
+        clock_locked = setup_lock_clock();
+}
+
+/* Interrupts are masked between looking and sleeping, or one in between would be slept through; a masked one still wakes. */
+static void sleep_until_woken(void)
+{
+    __asm volatile("cpsid i" ::: "memory");
+    if (!woken)
+        __asm volatile("wfi" ::: "memory");
+    __asm volatile("cpsie i\n isb" ::: "memory");
+}
+
+int main(void)
+{
+    remember_reset();
+    setup_hardware();
+    board_reset();
+    for (;;) {
+        woken = false;
+        if (ticked)
+            tick();
+        board_run();
+        sleep_until_woken();
+    }
+}
