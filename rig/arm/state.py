@@ -25,8 +25,8 @@ ARM_STATE_DTYPE = np.dtype(
     ]
 )
 
-# A joint slower than this stands still: above the noise of the velocity signal, 0.06 degrees a second.
-REST_SPEED_RAD_S = 1e-3
+# A joint slower than this stands still: above the noise of the velocity signal, 0.3° a second.
+REST_SPEED_RAD_S = 5e-3
 
 
 class RobotMode(IntEnum):

@@ -1,0 +1,268 @@
+"""The supervised process: the only place where the `ur_rtde` client lives.
+
+The client can block for minutes, loop or crash the interpreter when a connection is lost; here that harms nothing but
+this process. The main thread reads states and sends heartbeats; a second thread serves the parent's requests, so that
+a stop is heard while a move runs. When the parent is gone the arm is stopped and the process ends.
+"""
+
+import os
+import signal
+import sys
+import threading
+import time
+import traceback
+from multiprocessing.connection import Connection
+from pathlib import Path
+from typing import Any, NoReturn
+
+from rig.arm.dashboard import Dashboard
+from rig.arm.messages import (
+    Connected,
+    ControlTaken,
+    Failed,
+    Heartbeat,
+    Message,
+    Move,
+    MoveFinished,
+    Quit,
+    Request,
+    Stop,
+    TakeControl,
+)
+from rig.arm.state import ArmState
+from rig.arm.stopping import BRAKE_RAD_S2
+
+POLL_S = 0.0003  # packets come every 8 ms, or every 0.8 ms when the controller's clock runs ten times faster
+HEARTBEAT_S = 0.01
+FIRST_PACKET_S = 3.0
+PAYLOAD_S = 1.0  # the payload shows in the states within this
+PAYLOAD_TOLERANCE_KG = 0.01
+
+# The getters below read exactly these; asking for nothing else keeps the packets small.
+VARIABLES = [
+    "timestamp",
+    "actual_q",
+    "actual_qd",
+    "target_speed_fraction",
+    "speed_scaling",
+    "robot_mode",
+    "safety_mode",
+    "runtime_state",
+    "robot_status_bits",
+    "safety_status_bits",
+    "payload",
+    "payload_cog",
+]
+
+
+def main(pipe: "Connection[Message, Request]", host: str, state_rate_hz: float, log: str | None) -> None:
+    """Run until the parent says `Quit` or disappears. `log` names the file that takes the client's own output."""
+    _outlive_the_parent()
+    _send_output_to(log)
+    child = _Child(pipe, host)
+    signal.signal(signal.SIGTERM, lambda *_: child.abandon())
+    threading.Thread(target=child.serve, name="requests", daemon=True).start()
+    try:
+        child.connect(state_rate_hz)
+        child.stream()
+    except RuntimeError as error:
+        child.send(_connection_failure(host, str(error)))
+        _leave(1)
+    except BaseException:
+        traceback.print_exc()
+        child.abandon()
+
+
+class _Child:
+    def __init__(self, pipe: "Connection[Message, Request]", host: str) -> None:
+        self._pipe = pipe
+        self._host = host
+        self._sending = threading.Lock()
+        self._receive: Any = None
+        self._control: Any = None
+        self._operations_before: int | None = None  # change count before the running move; None when none runs
+
+    def send(self, message: Message) -> None:
+        with self._sending:
+            self._pipe.send(message)
+
+    def connect(self, state_rate_hz: float) -> None:
+        """Open the receive interface and wait for its first packet; `RuntimeError` when the client gives up."""
+        from rtde_receive import RTDEReceiveInterface
+
+        self._receive = RTDEReceiveInterface(self._host, state_rate_hz, VARIABLES)
+        deadline = time.monotonic() + FIRST_PACKET_S
+        while not (self._receive.isConnected() and self._receive.getTimestamp() > 0):
+            if time.monotonic() > deadline:
+                raise RuntimeError(f"no state came within {FIRST_PACKET_S:g} s")
+            time.sleep(POLL_S)
+        x, y, z = self._receive.getPayloadCog()
+        self.send(Connected(self._receive.getPayload(), (x, y, z)))
+
+    def stream(self) -> NoReturn:
+        """Send every state to the parent, in order, until the parent is gone."""
+        batch: list[ArmState] = []
+        last_s, beat_s = 0.0, time.monotonic()
+        while True:
+            state = self._read(last_s)
+            if state:
+                batch.append(state)
+                last_s = state.time_s
+            self._report_arrival()
+            if time.monotonic() - beat_s >= HEARTBEAT_S:
+                beat_s = time.monotonic()
+                try:
+                    self.send(Heartbeat(tuple(batch)))
+                except OSError:
+                    self.abandon()
+                batch.clear()
+            time.sleep(POLL_S)
+
+    def _read(self, last_s: float) -> ArmState | None:
+        """The newest packet, or None when it is the last one still, or was replaced while it was read."""
+        receive = self._receive
+        time_s = receive.getTimestamp()
+        if time_s == last_s:
+            return None
+        state = ArmState(
+            time_s=time_s,
+            host_time_s=time.monotonic(),
+            q_rad=tuple(receive.getActualQ()),
+            qd_rad_s=tuple(receive.getActualQd()),
+            target_speed_fraction=receive.getTargetSpeedFraction(),
+            speed_scaling=receive.getSpeedScaling(),
+            robot_mode=receive.getRobotMode(),
+            safety_mode=receive.getSafetyMode(),
+            runtime_state=receive.getRuntimeState(),
+            robot_status_bits=receive.getRobotStatus(),
+            safety_status_bits=receive.getSafetyStatusBits(),
+        )
+        return state if receive.getTimestamp() == time_s else None
+
+    def _report_arrival(self) -> None:
+        before = self._operations_before
+        if before is None:
+            return
+        status = self._control.getAsyncOperationProgressEx()
+        if status.changeCount() != before and not status.isAsyncOperationRunning():
+            self._operations_before = None
+            self.send(MoveFinished())
+
+    def serve(self) -> None:
+        """Serve the parent's requests one after the other."""
+        try:
+            while True:
+                self._handle(self._pipe.recv())
+        except (EOFError, OSError):  # the parent is gone
+            self.abandon()
+        except BaseException:  # without this thread nobody would hear a stop
+            traceback.print_exc()
+            self.abandon()
+
+    def _handle(self, request: Request) -> None:
+        match request:
+            case TakeControl():
+                self.send(self._take_control(request))
+            case Move():
+                self._move(request)
+            case Stop():
+                self._operations_before = None
+                if self._control is not None:
+                    self._control.stopJ(request.deceleration_rad_s2)
+                    self._control.stopScript()
+            case Quit():
+                _leave(0)
+
+    def _take_control(self, request: TakeControl) -> Message:
+        from rtde_control import RTDEControlInterface
+
+        try:
+            self._control = RTDEControlInterface(self._host)
+        except RuntimeError as error:
+            return _control_failure(self._host, str(error))
+        if not self._control.setPayload(request.payload_kg, list(request.payload_centre_m)):
+            return _payload_failure(f"the controller did not take the payload of {request.payload_kg:g} kg")
+        deadline = time.monotonic() + PAYLOAD_S
+        while abs(self._receive.getPayload() - request.payload_kg) > PAYLOAD_TOLERANCE_KG:
+            if time.monotonic() > deadline:
+                wrong = f"{self._receive.getPayload():g} kg instead of {request.payload_kg:g} kg"
+                return _payload_failure(f"the controller reckons with a payload of {wrong}")
+            time.sleep(HEARTBEAT_S)
+        return ControlTaken()
+
+    def _move(self, move: Move) -> None:
+        before = self._control.getAsyncOperationProgressEx().changeCount()
+        try:
+            started = self._control.moveJ(list(move.target_q_rad), move.speed_rad_s, move.acceleration_rad_s2, True)
+        except (RuntimeError, ValueError) as error:
+            return self.send(
+                Failed("move_refused", f"the client refused the move: {error}", "check speed and acceleration")
+            )
+        if not started:
+            return self.send(
+                Failed(
+                    "move_refused", "the controller did not start the move", "read the pendant's log, then start again"
+                )
+            )
+        self._operations_before = before
+        return None
+
+    def abandon(self) -> NoReturn:
+        """Nobody supervises any more: stop the arm, over the dashboard or else over the client, and leave."""
+        if self._control is not None:
+            try:
+                with Dashboard(self._host) as dashboard:
+                    dashboard.stop_program()
+            except OSError:
+                self._control.stopJ(BRAKE_RAD_S2)
+                self._control.stopScript()
+        _leave(1)
+
+
+def _leave(status: int) -> NoReturn:
+    """End at once: the client's destructors may block or abort after a lost connection; the system closes sockets."""
+    sys.stderr.flush()
+    os._exit(status)
+
+
+def _outlive_the_parent() -> None:
+    """Signals meant for the whole group must not end the process that has to stop the arm; a closed pipe does."""
+    for name in ("SIGINT", "SIGHUP"):
+        if hasattr(signal, name):  # SIGHUP is POSIX only
+            signal.signal(getattr(signal, name), signal.SIG_IGN)
+
+
+def _send_output_to(log: str | None) -> None:
+    """The client writes to stdout and stderr as it likes; stdout belongs to results."""
+    with Path(log or os.devnull).open("ab") as sink:
+        for stream in (sys.stdout, sys.stderr):
+            stream.flush()
+            os.dup2(sink.fileno(), stream.fileno())
+
+
+def _connection_failure(host: str, reason: str) -> Failed:
+    return Failed(
+        "no_arm_states",
+        f"the controller at {host} accepts connections but sends no states ({reason})",
+        "check that the arm has finished booting and that no firewall blocks port 30004",
+    )
+
+
+def _control_failure(host: str, reason: str) -> Failed:
+    if "remote control" in reason:
+        return Failed(
+            "not_in_remote_control",
+            f"the arm at {host} is not in remote control",
+            "switch the pendant to remote control (top right corner)",
+        )
+    if "already in use" in reason:
+        return Failed(
+            "registers_in_use",
+            f"another client or a fieldbus holds the input registers of the arm at {host}",
+            "close the other client, or disable EtherNet/IP, PROFINET and MODBUS in the installation",
+        )
+    return Failed(
+        "control_not_taken",
+        f"the arm at {host} did not start the control script ({reason})",
+        "clear any stop on the pendant, close other programs, then start again",
+    )

@@ -1,0 +1,66 @@
+"""The arm's dashboard server over plain TCP: the stop path that does not depend on `ur_rtde`."""
+
+import socket
+from types import TracebackType
+from typing import Self
+
+DASHBOARD_PORT = 29999
+
+
+class Dashboard:
+    """One connection to the dashboard server of the controller at `host`.
+
+    Every method raises `OSError` when the controller does not answer within `timeout_s`.
+    """
+
+    def __init__(self, host: str, timeout_s: float = 0.4) -> None:
+        self._socket = socket.create_connection((host, DASHBOARD_PORT), timeout=timeout_s)
+        self._lines = self._socket.makefile("rb")
+        try:
+            self._line()  # the greeting
+        except OSError:
+            self.close()
+            raise
+
+    def ask(self, command: str) -> str:
+        """Send one command and return the controller's answer, without the line end."""
+        self._socket.sendall(command.encode() + b"\n")
+        return self._line()
+
+    def stop_program(self) -> str:
+        """Stop the running program, and with it the arm."""
+        return self.ask("stop")
+
+    def program_running(self) -> bool:
+        """Whether any program runs on the controller."""
+        return self.ask("running").lower().endswith("true")
+
+    def in_remote_control(self) -> bool | None:
+        """Whether the pendant has handed control over; None when the controller does not know the question."""
+        return {"true": True, "false": False}.get(self.ask("is in remote control").lower())
+
+    def polyscope(self) -> str:
+        """The controller's software version, as it says it."""
+        return self.ask("PolyscopeVersion")
+
+    def serial_number(self) -> str:
+        """The arm's serial number."""
+        return self.ask("get serial number")
+
+    def close(self) -> None:
+        self._lines.close()
+        self._socket.close()
+
+    def __enter__(self) -> Self:
+        return self
+
+    def __exit__(
+        self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
+    ) -> None:
+        self.close()
+
+    def _line(self) -> str:
+        line = self._lines.readline()
+        if not line.endswith(b"\n"):
+            raise ConnectionError("the dashboard server closed the connection")
+        return line.decode(errors="replace").strip()

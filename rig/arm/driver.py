@@ -1,0 +1,296 @@
+"""The arm as the procedure sees it: supervised moves and rests, a stream of states, and a stop that always works."""
+
+import threading
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
+from pathlib import Path
+from types import TracebackType
+from typing import Self
+
+from rig.arm.condition import Problem, program_interruption, readiness
+from rig.arm.dashboard import Dashboard
+from rig.arm.link import ChildLink
+from rig.arm.messages import Connected, Failed, Heartbeat, Message, Move, MoveFinished, TakeControl
+from rig.arm.plan import Motion, travel
+from rig.arm.state import ArmReport, ArmState, RuntimeState
+from rig.arm.stopping import StopOutcome, Stopper
+from rig.errors import Fault, Refused
+
+WATCH_S = 0.02  # the caller's watch is called at least this often
+ARRIVAL_RAD = 0.01  # the joint servo's ripple and lag stay below this
+SLOWNESS = 1.1  # a move may take this much longer than planned …
+SLOWNESS_S = 1.0  # … plus this, in the controller's time
+INTERRUPTION_S = 0.05  # a stopped program waits so long for the safety bits that explain it
+REASON_S = 0.2  # a refused move waits so long (wall time) for a state that explains it
+
+
+NOT_HELD = StopOutcome(True, "the arm was not under control")
+
+
+def _nothing() -> None:
+    """Watch nothing but the arm."""
+
+
+class Arm:
+    """The arm at `host`; a context manager that starts receiving on entry and leaves the arm stopped.
+
+    `on_state` gets every state in order, from a thread of this class. `state_rate_hz` is in the controller's time.
+    `client_log` takes what the `ur_rtde` client itself prints. All methods raise `Fault` by name when the arm or its
+    driver fails: the arm is then stopped already. `Refused` means that nothing has moved.
+    """
+
+    def __init__(
+        self,
+        host: str,
+        on_state: Callable[[ArmState], None] = lambda state: None,
+        state_rate_hz: float = 125.0,
+        client_log: Path | None = None,
+    ) -> None:
+        self._host = host
+        self._on_state = on_state
+        self._period_s = 1 / state_rate_hz
+        self._link = ChildLink(host, state_rate_hz, client_log, self._take, self._fail)
+        self._stopper = Stopper(host, self._link.send, self._seen_at_rest)
+        self._changed = threading.Condition()  # notified when anything below changes
+        self._latest: ArmState | None = None
+        self._connected: Connected | None = None
+        self._answer: Message | None = None
+        self._problem: Problem | None = None
+        self._doing = "the arm was idle"
+        self._holds_arm = False  # a program of ours may run, so a stop is ours to make
+        self._supervising = False
+        self._interrupted_s = 0.0  # time stamp of the last state that showed our program running
+        self.missed_states = 0  # gaps in the stream, counted in states
+
+    # Looking ------------------------------------------------------------------------------------------------------
+
+    def start(self) -> None:
+        """Connect and receive; moves nothing and stops no program. Raises `Refused` when no arm answers."""
+        try:
+            Dashboard(self._host, timeout_s=2.0).close()
+        except OSError as error:
+            raise Refused(
+                "no_arm",
+                f"no arm answers at {self._host} ({error})",
+                "check arm.host in the configuration, the network cable, and that the arm is switched on",
+            ) from error
+        with self._link.patience():
+            self._link.start()
+            self._wait(lambda: self._latest is not None or self._answer is not None)
+        if isinstance(self._answer, Failed):
+            raise Refused(self._answer.name, self._answer.what, self._answer.remedy)
+
+    @property
+    def latest(self) -> ArmState:
+        """The newest state."""
+        if self._latest is None:
+            raise RuntimeError("start() comes first")
+        return self._latest
+
+    def report(self) -> ArmReport:
+        """What the arm says about itself, for pre-flight."""
+        if self._connected is None:
+            raise RuntimeError("start() comes first")
+        self.check()
+        try:
+            with Dashboard(self._host) as dashboard:
+                return ArmReport(
+                    host=self._host,
+                    polyscope=dashboard.polyscope(),
+                    serial_number=dashboard.serial_number(),
+                    remote_control=dashboard.in_remote_control(),
+                    program_running=dashboard.program_running(),
+                    payload_kg=self._connected.payload_kg,
+                    payload_centre_m=self._connected.payload_centre_m,
+                    state=self.latest,
+                )
+        except OSError as error:
+            raise Refused(
+                "no_dashboard",
+                f"the dashboard server at {self._host} does not answer ({error})",
+                "enable the dashboard server in the arm's security settings",
+            ) from error
+
+    def check(self) -> None:
+        """Raise what a supervising thread has met. The arm is stopped by then, if it was ours to stop."""
+        if self._problem is None and not self._stopper.begun:
+            return
+        problem = self._problem or Problem("arm_stopped", "the arm was stopped on request", "start again when ready")
+        if not self._holds_arm:
+            raise Refused(problem.name, problem.what, problem.remedy)
+        outcome = self.stop()
+        remedy = f"{outcome.remedy}; then {problem.remedy}" if outcome.remedy else problem.remedy
+        raise Fault(problem.name, f"{problem.what}; {outcome.what}", remedy)
+
+    # Moving -------------------------------------------------------------------------------------------------------
+
+    def take_control(self, payload_kg: float, payload_centre_m: tuple[float, float, float]) -> None:
+        """Upload the control script and set the payload (kg; m from the flange). Raises `Refused` by name.
+
+        The client would end a program that runs, so a running program is refused here.
+        """
+        self.check()
+        problem = readiness(self.latest)
+        if problem is None and self.latest.runtime_state != RuntimeState.STOPPED:
+            problem = Problem("program_running", f"a program runs on the arm at {self._host}", "stop it on the pendant")
+        if problem is not None:
+            raise Refused(problem.name, problem.what, problem.remedy)
+        with self._stopping_on_error(), self._link.patience():
+            self._holds_arm = True
+            self._request(TakeControl(payload_kg, payload_centre_m))
+            self._wait(lambda: self._answer is not None)
+            if isinstance(self._answer, Failed):
+                self._holds_arm = False
+                raise Refused(self._answer.name, self._answer.what, self._answer.remedy)
+            self._wait(lambda: self.latest.runtime_state == RuntimeState.PLAYING)
+            self._supervising = True
+
+    def move(self, motion: Motion, watch: Callable[[], None] = _nothing) -> None:
+        """Make one movement and return when the arm has arrived and stands still.
+
+        `watch` is called at least every 20 ms; whatever it raises, `KeyboardInterrupt` included, stops the arm and goes
+        on to the caller.
+        """
+        with self._stopping_on_error():
+            self._doing = motion.name
+            deadline_s = self.latest.time_s + motion.duration_s * SLOWNESS + SLOWNESS_S
+            self._request(Move(motion.target_q_rad, motion.speed_rad_s, motion.acceleration_rad_s2))
+            self._wait(lambda: self._has_ended(motion) or self.latest.time_s > deadline_s, watch)
+            if isinstance(self._answer, Failed):
+                self._wait_for_reason()
+                self._fail(Problem(self._answer.name, self._answer.what, self._answer.remedy))
+            elif not self._has_ended(motion):
+                self._fail(
+                    Problem(
+                        "arm_slower_than_planned",
+                        f"{motion.name} did not end within {motion.duration_s * SLOWNESS + SLOWNESS_S:.1f} s, "
+                        f"planned were {motion.duration_s:.1f} s",
+                        "look for a speed limit in the safety settings or a program that slows the arm down",
+                    )
+                )
+            self.check()
+
+    def rest(self, duration_s: float, watch: Callable[[], None] = _nothing) -> None:
+        """Stand still for a time of the controller's clock; `watch` as in `move`."""
+        with self._stopping_on_error():
+            end_s = self.latest.time_s + duration_s
+            self._wait(lambda: self.latest.time_s >= end_s, watch)
+
+    def stop(self) -> StopOutcome:
+        """Stop the arm and tell what is known about it; takes less than 1 s.
+
+        May be called at any time, again and again, from any thread; a second Ctrl-C does not undo it. Afterwards the
+        control script has ended and this object moves the arm no more.
+        """
+        if not self._holds_arm:
+            return NOT_HELD
+        return self._stopper.outcome()
+
+    def close(self) -> None:
+        """Stop the arm if it was under control, and end the child process."""
+        self.stop()
+        self._link.close()
+
+    def __enter__(self) -> Self:
+        try:
+            self.start()
+        except BaseException:
+            self.close()
+            raise
+        return self
+
+    def __exit__(
+        self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
+    ) -> None:
+        self.close()
+
+    # Inside -------------------------------------------------------------------------------------------------------
+
+    @contextmanager
+    def _stopping_on_error(self) -> Iterator[None]:
+        try:
+            yield
+        except BaseException:
+            self.stop()
+            raise
+
+    def _request(self, request: TakeControl | Move) -> None:
+        self.check()
+        self._answer = None
+        self._link.send(request)
+
+    def _wait(self, done: Callable[[], bool], watch: Callable[[], None] = _nothing) -> None:
+        """Block until `done`, looking at the arm's faults and the caller's watch all the time."""
+        finished = False
+        while not finished:
+            with self._changed:
+                self._changed.wait_for(lambda: self._problem is not None or done(), WATCH_S)
+                finished = done()
+            self.check()
+            watch()
+
+    def _wait_for_reason(self) -> None:
+        with self._changed:
+            self._changed.wait_for(lambda: self._problem is not None, REASON_S)
+
+    def _has_ended(self, motion: Motion) -> bool:
+        if isinstance(self._answer, Failed):
+            return True
+        away_rad = max(map(abs, travel(self.latest.q_rad, motion.target_q_rad)))
+        return isinstance(self._answer, MoveFinished) and self.latest.at_rest and away_rad < ARRIVAL_RAD
+
+    def _take(self, message: Message) -> None:
+        """Called by the link's reader thread with every message of the child."""
+        match message:
+            case Heartbeat():
+                for state in message.states:
+                    self._take_state(state)
+            case Connected():
+                self._connected = message
+            case _:
+                self._answer = message
+        with self._changed:
+            self._changed.notify_all()
+
+    def _take_state(self, state: ArmState) -> None:
+        if self._latest is not None:
+            self.missed_states += max(0, round((state.time_s - self._latest.time_s) / self._period_s) - 1)
+        self._latest = state
+        try:
+            self._on_state(state)
+        except Exception as error:
+            self._fail(Problem("arm_state_not_taken", f"an arm state could not be passed on ({error})", "see the log"))
+        if self._supervising and (problem := self._judge(state)):
+            self._fail(Problem(problem.name, f"{problem.what} during {self._doing}", problem.remedy))
+
+    def _judge(self, state: ArmState) -> Problem | None:
+        """Why the arm cannot go on. The safety bits that explain a stopped program may come a packet later than it."""
+        interruption = program_interruption(state)
+        if interruption is None:
+            self._interrupted_s = state.time_s
+        unexplained = state.time_s - self._interrupted_s > INTERRUPTION_S
+        return readiness(state) or (interruption if unexplained else None)
+
+    def _fail(self, problem: Problem) -> None:
+        """Keep the first problem and stop the arm; nothing is a problem after a stop on request."""
+        with self._changed:
+            if self._problem is not None or self._stopper.begun:
+                return
+            self._problem = problem
+            self._changed.notify_all()
+        if self._holds_arm:
+            self._stopper.begin()
+
+    def _seen_at_rest(self, since_s: float, timeout_s: float) -> bool:
+        def at_rest() -> bool:
+            state = self.latest
+            return state.host_time_s > since_s and state.at_rest and state.runtime_state == RuntimeState.STOPPED
+
+        with self._changed:
+            return self._changed.wait_for(at_rest, timeout_s)
+
+
+def look(host: str) -> ArmReport:
+    """Look at the arm: receive and ask only; nothing moves and no program is stopped. Raises `Refused` by name."""
+    with Arm(host) as arm:
+        return arm.report()

@@ -1,0 +1,147 @@
+"""The parent's end of the supervised child: starts it, passes messages on, and notices when it falls silent."""
+
+import multiprocessing
+import signal
+import threading
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
+from multiprocessing.connection import Connection
+from pathlib import Path
+
+from rig.arm import child
+from rig.arm.condition import Problem
+from rig.arm.messages import Heartbeat, Message, Quit, Request
+
+TICK_S = 0.05
+# Silence is counted in ticks of the guard, not in elapsed time: when this process itself was held up, nothing is late.
+SILENT_TICKS = 10  # 0.5 s without a heartbeat
+FROZEN_TICKS = 14  # 0.7 s of heartbeats without a new state
+PATIENT_TICKS = 240  # 12 s while a client's constructor holds the child's interpreter, at worst until its 5 s time-out
+
+
+class ChildLink:
+    """One child process. The reader thread calls `on_message`; reader or guard call `on_lost`, whose first call counts."""
+
+    def __init__(
+        self,
+        host: str,
+        state_rate_hz: float,
+        log: Path | None,
+        on_message: Callable[[Message], None],
+        on_lost: Callable[[Problem], None],
+    ) -> None:
+        self._host = host
+        self._on_message = on_message
+        self._on_lost = on_lost
+        self._closing = threading.Event()
+        self._sending = threading.Lock()
+        self._patient = False
+        self._silent_ticks = 0
+        self._frozen_ticks = 0
+        context = multiprocessing.get_context("spawn")
+        self._pipe: Connection[Request, Message]
+        self._pipe, self._child_pipe = context.Pipe()
+        self._process = context.Process(
+            target=child.main,
+            args=(self._child_pipe, host, state_rate_hz, str(log) if log else None),
+            name="arm",
+            daemon=True,
+        )
+        self._threads = (
+            threading.Thread(target=self._read, name="arm reader", daemon=True),
+            threading.Thread(target=self._guard, name="arm guard", daemon=True),
+        )
+
+    @property
+    def pid(self) -> int | None:
+        """The child's process id, for logs."""
+        return self._process.pid
+
+    def start(self) -> None:
+        """Start the child; `on_message` gets `Connected` or `Failed`."""
+        with _interrupts_held():
+            self._process.start()
+        self._child_pipe.close()
+        for thread in self._threads:
+            thread.start()
+
+    def send(self, request: Request) -> None:
+        """Pass a request to the child; a child that is gone is noticed by the reader, so that is no error here."""
+        with self._sending:
+            try:
+                self._pipe.send(request)
+            except OSError:
+                return
+
+    @contextmanager
+    def patience(self) -> Iterator[None]:
+        """Allow the child a long silence inside: it starts, or a constructor of the client holds its interpreter."""
+        self._patient = True
+        try:
+            yield
+        finally:
+            self._silent_ticks = self._frozen_ticks = 0
+            self._patient = False
+
+    def close(self) -> None:
+        """End the child, by force if it does not listen, and both threads."""
+        self._closing.set()
+        if self._process.pid is None:
+            self._pipe.close()
+            self._child_pipe.close()
+            return
+        self.send(Quit())
+        self._process.join(0.3)
+        self.kill()
+        for thread in self._threads:
+            if thread is not threading.current_thread():
+                thread.join(1.0)
+        self._pipe.close()
+        self._process.close()
+
+    def kill(self) -> None:
+        """End a child that may hang; the arm must have been stopped by other means."""
+        self._process.kill()
+        self._process.join(1.0)
+
+    def _read(self) -> None:
+        try:
+            while True:
+                message = self._pipe.recv()
+                self._silent_ticks = 0
+                if isinstance(message, Heartbeat) and message.states:
+                    self._frozen_ticks = 0
+                self._on_message(message)
+        except (EOFError, OSError):
+            if not self._closing.is_set():
+                self._process.join(1.0)
+                self._lose(
+                    "arm_driver_died", f"the process that talks to the arm ended (exit status {self._process.exitcode})"
+                )
+
+    def _guard(self) -> None:
+        while not self._closing.wait(TICK_S):
+            self._silent_ticks += 1
+            self._frozen_ticks += 1
+            if self._silent_ticks > (PATIENT_TICKS if self._patient else SILENT_TICKS):
+                self._lose("arm_driver_hung", "the process that talks to the arm no longer answers")
+                return self.kill()
+            if self._frozen_ticks > (PATIENT_TICKS if self._patient else FROZEN_TICKS):
+                return self._lose("arm_link_lost", f"no new state comes from the arm at {self._host}")
+        return None
+
+    def _lose(self, name: str, what: str) -> None:
+        self._on_lost(Problem(name, what, "look at the arm and its network cable, then start again"))
+
+
+@contextmanager
+def _interrupts_held() -> Iterator[None]:
+    """Hold Ctrl-C back, so that a child born inside never sees one; it is delivered here afterwards."""
+    if not hasattr(signal, "pthread_sigmask"):  # Windows: the child ignores Ctrl-C once it runs
+        yield
+        return
+    before = signal.pthread_sigmask(signal.SIG_BLOCK, {signal.SIGINT})
+    try:
+        yield
+    finally:
+        signal.pthread_sigmask(signal.SIG_SETMASK, before)

@@ -1,0 +1,78 @@
+"""What parent and child say to each other over the pipe: small frozen values, pickled."""
+
+from dataclasses import dataclass
+
+from rig.arm.state import ArmState, Joints
+
+# Parent to child ---------------------------------------------------------------------------------------------------
+
+
+@dataclass(frozen=True, slots=True)
+class TakeControl:
+    """Upload the control script and set the payload. Answered by `ControlTaken` or `Failed`."""
+
+    payload_kg: float
+    payload_centre_m: tuple[float, float, float]
+
+
+@dataclass(frozen=True, slots=True)
+class Move:
+    """Start a joint-space movement. Answered by `MoveFinished` when the arm has arrived, or by `Failed`."""
+
+    target_q_rad: Joints
+    speed_rad_s: float
+    acceleration_rad_s2: float
+
+
+@dataclass(frozen=True, slots=True)
+class Stop:
+    """Brake at once and end the control script; served while a movement runs. Not answered: the states show it."""
+
+    deceleration_rad_s2: float
+
+
+@dataclass(frozen=True, slots=True)
+class Quit:
+    """Leave. Whoever holds control sends `Stop` first."""
+
+
+Request = TakeControl | Move | Stop | Quit
+
+# Child to parent ---------------------------------------------------------------------------------------------------
+
+
+@dataclass(frozen=True, slots=True)
+class Connected:
+    """The controller sends states. The payload is what it reckons with; None when it does not tell."""
+
+    payload_kg: float | None
+    payload_centre_m: tuple[float, float, float] | None
+
+
+@dataclass(frozen=True, slots=True)
+class Heartbeat:
+    """The child lives; `states` are those that came since the last heartbeat, oldest first."""
+
+    states: tuple[ArmState, ...]
+
+
+@dataclass(frozen=True, slots=True)
+class ControlTaken:
+    """The control script runs and the payload is set."""
+
+
+@dataclass(frozen=True, slots=True)
+class MoveFinished:
+    """The controller reports the end of the movement."""
+
+
+@dataclass(frozen=True, slots=True)
+class Failed:
+    """The request, or the connection, failed: name, what and remedy as in `rig.errors`."""
+
+    name: str
+    what: str
+    remedy: str
+
+
+Message = Connected | Heartbeat | ControlTaken | MoveFinished | Failed

@@ -1,0 +1,138 @@
+"""Pre-flight: everything that can be known to go wrong before the arm moves. Pure: a plan and a report in, problems out."""
+
+import math
+from collections.abc import Sequence
+
+import numpy as np
+
+from rig.arm.condition import Problem, readiness
+from rig.arm.kinematics import flange_axes
+from rig.arm.plan import Motion, Plan, travel
+from rig.arm.state import JOINT_NAMES, ArmReport, Joints
+from rig.errors import Refused
+
+# UR10e limits, base to wrist 3 (maker's data sheet and ROS 2 description). `ur_rtde` itself accepts up to 3.14 rad/s.
+JOINT_LIMIT_RAD = 2 * math.pi
+SPEED_LIMIT_RAD_S = (math.radians(120), math.radians(120), 3.14, 3.14, 3.14, 3.14)
+ACCELERATION_LIMIT_RAD_S2 = math.radians(800)
+PAYLOAD_LIMIT_KG = 12.5
+
+# The swept axes must span space: the smallest singular value of their unit vectors, 1 when orthogonal.
+AXES_SPAN = 0.5
+# How far the first motion may swing the large joints through the room, and the wrists.
+FIRST_MOTION_LIMIT_RAD = tuple(math.radians(angle) for angle in (120, 120, 120, 360, 360, 360))
+
+
+def plan_problems(plan: Plan, payload_kg: float) -> list[Problem]:
+    """What is wrong with the plan itself: limits of position, speed, acceleration and payload, and the axes' span."""
+    problems = [problem for motion in plan.motions for problem in _motion_problems(motion)]
+    if not 0 <= payload_kg <= PAYLOAD_LIMIT_KG:
+        problems.append(
+            Problem(
+                "payload_too_heavy",
+                f"the payload of {payload_kg:g} kg is outside 0 to {PAYLOAD_LIMIT_KG:g} kg",
+                "weigh the fixture and correct arm.payload_kg",
+            )
+        )
+    swept = sorted({sweep.joint for sweep in plan.sweeps})
+    span = np.linalg.svd(flange_axes(plan.home_q_rad)[:, swept], compute_uv=False)
+    if len(span) < 3 or span[2] < AXES_SPAN:
+        problems.append(
+            Problem(
+                "axes_do_not_span",
+                "the swept wrists do not turn the flange about three independent axes",
+                "set wrist 2 in arm.home_deg near 90 or -90, and sweep all three wrists",
+            )
+        )
+    return list(dict.fromkeys(problems))
+
+
+def arm_problems(plan: Plan, report: ArmReport) -> list[Problem]:
+    """What is wrong with the arm as it stands, for this plan: modes, stops, control, the way to the start.
+
+    The payload is not compared here: `Arm.take_control` sets it and sees that the controller reckons with it.
+    """
+    problems = []
+    if unready := readiness(report.state):
+        problems.append(unready)
+    # On the loopback address of the robot's own simulator the client skips this check, and so does the pendant.
+    if report.remote_control is False and report.host not in ("127.0.0.1", "localhost"):
+        problems.append(
+            Problem(
+                "not_in_remote_control",
+                f"the arm at {report.host} is in local control",
+                "switch the pendant to remote control (top right corner)",
+            )
+        )
+    if report.program_running:
+        problems.append(
+            Problem("program_running", f"a program runs on the arm at {report.host}", "stop it on the pendant")
+        )
+    if not report.state.at_rest:
+        problems.append(Problem("arm_moves", "the arm is moving", "wait until it stands still"))
+    too_far = [
+        f"{name} {math.degrees(angle):+.0f}°"
+        for name, angle, limit in zip(
+            JOINT_NAMES, way_to_home(plan, report.state.q_rad), FIRST_MOTION_LIMIT_RAD, strict=True
+        )
+        if abs(angle) > limit
+    ]
+    if too_far:
+        problems.append(
+            Problem(
+                "far_from_home",
+                f"the way home is too long to take unseen ({', '.join(too_far)})",
+                "bring the arm near its home pose from the pendant, or correct arm.home_deg",
+            )
+        )
+    return problems
+
+
+def way_to_home(plan: Plan, q_rad: Joints) -> Joints:
+    """(6,) rad: how far each joint will turn in the first motion, from where the arm stands to the plan's home pose."""
+    return travel(q_rad, plan.home_q_rad)
+
+
+def refuse(problems: Sequence[Problem]) -> None:
+    """Raise `Refused` when there are problems: named after the first, with all of them and their remedies in the text."""
+    if not problems:
+        return
+    *others, last = problems
+    also = "".join(f"{problem.what} ({problem.name}): {problem.remedy}. " for problem in others)
+    raise Refused(problems[0].name, also + last.what, last.remedy)
+
+
+def _motion_problems(motion: Motion) -> list[Problem]:
+    problems = []
+    ends = (motion.start_q_rad, motion.target_q_rad)
+    for joint, name in enumerate(JOINT_NAMES):
+        if max(abs(end[joint]) for end in ends) > JOINT_LIMIT_RAD:
+            low, high = sorted(math.degrees(end[joint]) for end in ends)
+            problems.append(
+                Problem(
+                    "joint_limit",
+                    f"{motion.name} takes {name} from {low:.1f}° to {high:.1f}°, beyond ±360°",
+                    "raise procedure.acceleration_deg_s2, lower procedure.speed_deg_s, or bring arm.home_deg nearer to 0",
+                )
+            )
+    way = np.abs(travel(*ends))
+    speeds = motion.speed_rad_s * way / way.max()
+    for name, speed, limit in zip(JOINT_NAMES, speeds, SPEED_LIMIT_RAD_S, strict=True):
+        if speed > limit:
+            problems.append(
+                Problem(
+                    "joint_speed",
+                    f"{motion.name} turns {name} at {math.degrees(speed):.1f}°/s, its limit is {math.degrees(limit):.1f}°/s",
+                    "lower procedure.speed_deg_s or arm.transfer_speed_deg_s",
+                )
+            )
+    if motion.acceleration_rad_s2 > ACCELERATION_LIMIT_RAD_S2:
+        problems.append(
+            Problem(
+                "joint_acceleration",
+                f"{motion.name} accelerates with {math.degrees(motion.acceleration_rad_s2):.0f}°/s², "
+                f"the limit is {math.degrees(ACCELERATION_LIMIT_RAD_S2):.0f}°/s²",
+                "lower procedure.acceleration_deg_s2",
+            )
+        )
+    return problems

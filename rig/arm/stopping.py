@@ -1,0 +1,76 @@
+"""Stopping the arm once and for all: over the dashboard and over the client at the same time, in a thread of its own."""
+
+import threading
+import time
+from collections.abc import Callable
+from dataclasses import dataclass
+
+from rig.arm.dashboard import Dashboard
+from rig.arm.messages import Stop
+
+STOP_S = 0.9  # a stop is confirmed within this, or not at all
+BRAKE_RAD_S2 = 5.0
+
+
+@dataclass(frozen=True, slots=True)
+class StopOutcome:
+    """Whether the arm was seen at rest with its program ended, in words; `remedy` is empty when it was."""
+
+    at_rest: bool
+    what: str
+    remedy: str = ""
+
+
+class Stopper:
+    """Stops the arm at `host` when `begin` is first called; later calls change nothing.
+
+    `send` hands the child its request; `seen_at_rest(since_s, timeout_s)` waits for a state newer than `since_s`
+    (monotonic time) that shows the arm at rest and its program ended. No interrupt of the caller breaks a stop off: it
+    runs in its own thread.
+    """
+
+    def __init__(self, host: str, send: Callable[[Stop], None], seen_at_rest: Callable[[float, float], bool]) -> None:
+        self._host = host
+        self._send = send
+        self._seen_at_rest = seen_at_rest
+        self._starting = threading.Lock()
+        self._thread: threading.Thread | None = None
+        self._outcome = StopOutcome(False, "the stop has not ended", "look at the arm")
+
+    @property
+    def begun(self) -> bool:
+        """Whether a stop has been asked for."""
+        return self._thread is not None
+
+    def begin(self) -> None:
+        """Stop the arm; returns at once."""
+        with self._starting:
+            if self._thread is None:
+                thread = threading.Thread(target=self._stop, name="arm stop")
+                thread.start()
+                self._thread = thread
+
+    def outcome(self) -> StopOutcome:
+        """Stop the arm if that has not begun, and wait for the result; less than 1 s."""
+        self.begin()
+        assert self._thread is not None
+        self._thread.join()
+        return self._outcome
+
+    def _stop(self) -> None:
+        began_s = time.monotonic()
+        self._send(Stop(BRAKE_RAD_S2))
+        try:
+            with Dashboard(self._host) as dashboard:
+                dashboard.stop_program()
+            delivered = "the controller was told to stop"
+        except OSError as error:
+            delivered = f"the controller's dashboard did not take the stop ({error})"
+        if self._seen_at_rest(began_s, began_s + STOP_S - time.monotonic()):
+            self._outcome = StopOutcome(True, "the arm is stopped and at rest")
+        else:
+            self._outcome = StopOutcome(
+                False,
+                f"{delivered}, but no state confirms that the arm is at rest",
+                "look at the arm and press the emergency stop if it moves",
+            )
