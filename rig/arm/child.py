@@ -240,6 +240,10 @@ def _send_output_to(log: str | None) -> None:
             os.dup2(sink.fileno(), stream.fileno())
 
 
+def _payload_failure(what: str) -> Failed:
+    return Failed("payload_not_set", what, "read the pendant's log and the payload in the arm's installation")
+
+
 def _connection_failure(host: str, reason: str) -> Failed:
     return Failed(
         "no_arm_states",

@@ -20,7 +20,7 @@ PATIENT_TICKS = 240  # 12 s while a client's constructor holds the child's inter
 
 
 class ChildLink:
-    """One child process. The reader thread calls `on_message`; reader or guard call `on_lost`, whose first call counts."""
+    """One child process. The reader thread calls `on_message`; reader or guard calls `on_lost`; the first call counts."""
 
     def __init__(
         self,

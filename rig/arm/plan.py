@@ -1,7 +1,7 @@
 """The movement before it happens: every motion with its joints, limits and duration. Pure; connects to nothing."""
 
 import math
-from collections.abc import Iterable
+from collections.abc import Collection, Iterable
 from dataclasses import dataclass
 from typing import Protocol
 
@@ -118,15 +118,21 @@ def travel(start_q_rad: Joints, target_q_rad: Joints) -> Joints:
     return tuple(target - start for start, target in zip(start_q_rad, target_q_rad, strict=True))
 
 
-def plan_six_observation(arm: ArmSection, procedure: ProcedureSection, start_q_rad: Joints | None = None) -> Plan:
+def plan_six_observation(
+    arm: ArmSection,
+    procedure: ProcedureSection,
+    start_q_rad: Joints | None = None,
+    done: Collection[int] = (),
+) -> Plan:
     """The movement of SIX, Section III: each wrist in the configured order turns clockwise, rests, turns back, rests.
 
     `start_q_rad` is where the arm stands (home when None); from there the plan goes home first, and it ends at home.
+    `done` holds the indices of sweeps to leave out: those an interrupted run has finished.
     The whole series repeats `procedure.repeats` times. Limits are not judged here: see `rig.arm.preflight`.
     """
     home = _radians(arm.home_deg)
     start = home if start_q_rad is None else start_q_rad
-    sweeps = _sweeps(home, procedure)
+    sweeps = [sweep for sweep in _sweeps(home, procedure) if sweep.index not in done]
     steps = tuple(_connected(sweeps, start, home, arm, procedure))
     return Plan(steps, start_q_rad=start, home_q_rad=home)
 

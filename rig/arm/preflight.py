@@ -1,4 +1,4 @@
-"""Pre-flight: everything that can be known to go wrong before the arm moves. Pure: a plan and a report in, problems out."""
+"""Pre-flight: what can be known to go wrong before the arm moves. Pure: a plan and a report in, problems out."""
 
 import math
 from collections.abc import Sequence
@@ -94,7 +94,7 @@ def way_to_home(plan: Plan, q_rad: Joints) -> Joints:
 
 
 def refuse(problems: Sequence[Problem]) -> None:
-    """Raise `Refused` when there are problems: named after the first, with all of them and their remedies in the text."""
+    """Raise `Refused` when there are problems: named after the first, with all of them and their remedies."""
     if not problems:
         return
     *others, last = problems
@@ -112,7 +112,7 @@ def _motion_problems(motion: Motion) -> list[Problem]:
                 Problem(
                     "joint_limit",
                     f"{motion.name} takes {name} from {low:.1f}° to {high:.1f}°, beyond ±360°",
-                    "raise procedure.acceleration_deg_s2, lower procedure.speed_deg_s, or bring arm.home_deg nearer to 0",
+                    "raise procedure.acceleration_deg_s2, lower procedure.speed_deg_s, or bring arm.home_deg near 0",
                 )
             )
     way = np.abs(travel(*ends))
@@ -122,7 +122,8 @@ def _motion_problems(motion: Motion) -> list[Problem]:
             problems.append(
                 Problem(
                     "joint_speed",
-                    f"{motion.name} turns {name} at {math.degrees(speed):.1f}°/s, its limit is {math.degrees(limit):.1f}°/s",
+                    f"{motion.name} turns {name} at {math.degrees(speed):.1f}°/s, "
+                    f"the limit is {math.degrees(limit):.1f}°/s",
                     "lower procedure.speed_deg_s or arm.transfer_speed_deg_s",
                 )
             )

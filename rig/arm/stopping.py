@@ -1,4 +1,4 @@
-"""Stopping the arm once and for all: over the dashboard and over the client at the same time, in a thread of its own."""
+"""Stopping the arm for good: over the dashboard and over the client at the same time, in a thread of its own."""
 
 import threading
 import time
