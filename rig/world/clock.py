@@ -1,0 +1,62 @@
+"""The world's one clock: virtual time in ticks of 2 ms, paced against wall time but never made to jump."""
+
+from collections.abc import Callable
+
+TICKS_PER_SECOND = 500
+TICK_S = 1.0 / TICKS_PER_SECOND
+PATIENCE_S = 0.02  # wall time the world may be behind and still catch up
+
+
+class Clock:
+    """Says how many ticks are due. Virtual time runs at most `time_scale` times as fast as wall time.
+
+    When the machine cannot keep up, the lost wall time is forgotten: virtual time slows down instead of jumping.
+    `hold` stops it, `run` lets it go on, `advance` lets exactly so much pass and holds again.
+    """
+
+    def __init__(self, time_scale: float, wall: Callable[[], float]) -> None:
+        self.time_scale = time_scale
+        self.tick = 0
+        self._wall = wall
+        self._stop_at: int | None = None
+        self._anchor()
+
+    def _anchor(self) -> None:
+        self._anchor_wall_s, self._anchor_tick = self._wall(), self.tick
+
+    @property
+    def time_s(self) -> float:
+        """Virtual time since the world began."""
+        return self.tick * TICK_S
+
+    @property
+    def held(self) -> bool:
+        return self._stop_at is not None and self.tick >= self._stop_at
+
+    def hold(self) -> None:
+        self._stop_at = self.tick
+
+    def run(self) -> None:
+        self._stop_at = None
+        self._anchor()
+
+    def advance(self, duration_s: float) -> int:
+        """Let `duration_s` of virtual time pass, then hold; the tick at which it will hold."""
+        self._anchor()
+        self._stop_at = self.tick + max(1, round(duration_s * TICKS_PER_SECOND))
+        return self._stop_at
+
+    def wait_s(self) -> float:
+        """Wall time until the next tick is due: 0 when it is due now, infinity while held."""
+        if self.held:
+            return float("inf")
+        due_s = self._anchor_wall_s + (self.tick + 1 - self._anchor_tick) * TICK_S / self.time_scale
+        late_s = self._wall() - due_s
+        if late_s > PATIENCE_S:
+            self._anchor()
+            return 0.0
+        return max(0.0, -late_s)
+
+    def count(self) -> None:
+        """One tick has been made."""
+        self.tick += 1

@@ -1,0 +1,114 @@
+"""The control channel: JSON lines by which tests make the world misbehave. The rig never uses it.
+
+A request is `{"do": NAME, …}`; the reply is one line, `{"ok": true, …}` or `{"ok": false, "error": …}`.
+"""
+
+import json
+from collections.abc import Callable
+from typing import TYPE_CHECKING, Any
+
+if TYPE_CHECKING:
+    from rig.world.process import World
+
+Reply = dict[str, Any]
+FIELDBUS = "fieldbus"  # the owner of registers that `register_in_use` claims
+
+
+class ControlSession:
+    """One client of the control channel."""
+
+    closing = False
+
+    def __init__(self, world: "World") -> None:
+        self._world = world
+        self._buffer = bytearray()
+        self._reply_at: int | None = None  # the tick at which an `advance` is answered
+        robot = world.laboratory.robot
+        self._orders: dict[str, Callable[..., Reply | None]] = {
+            "state": self._state, "hold": self._hold, "run": self._run, "advance": self._advance,
+            "protective_stop": lambda: robot.protective_stop(), "emergency_stop": lambda: robot.emergency_stop(),
+            "release": lambda: robot.release(), "power_off": lambda: robot.power_off(), "power_on": lambda: robot.power_on(),
+            "brake_release": lambda: robot.brake_release(), "pause": lambda: {"done": robot.pause()},
+            "play": lambda: {"done": robot.resume()}, "stop_program": lambda: robot.stop_program("stopped on the pendant"),
+            "speed_slider": lambda fraction: robot.set_speed_slider(float(fraction)),
+            "remote_control": self._remote_control, "register_in_use": self._register_in_use,
+            "register_free": self._register_free, "close_arm": self._close_arm, "silence_arm": self._silence_arm,
+        }  # fmt: skip
+
+    def greeting(self) -> bytes:
+        return b""
+
+    def receive(self, data: bytes) -> bytes:
+        self._buffer += data
+        *lines, rest = self._buffer.split(b"\n")
+        self._buffer = bytearray(rest)
+        return b"".join(self._answer(bytes(line)) for line in lines if line.strip())
+
+    def _answer(self, line: bytes) -> bytes:
+        try:
+            request = json.loads(line)
+            name = request.pop("do")
+            order = self._orders[name]
+        except (ValueError, AttributeError, TypeError):
+            return _line({"ok": False, "error": 'a request is one line of JSON, {"do": NAME, …}'})
+        except KeyError as error:
+            return _line({"ok": False, "error": f"unknown request {error}", "known": sorted(self._orders)})
+        try:
+            reply = order(**request)
+        except (TypeError, ValueError) as error:
+            return _line({"ok": False, "error": f"{name}: {error}"})
+        if self._reply_at is not None:
+            return b""
+        return _line({"ok": True, "time_s": self._world.clock.time_s, **(reply or {})})
+
+    def tick(self) -> bytes:
+        if self._reply_at is None or self._world.clock.tick < self._reply_at:
+            return b""
+        self._reply_at = None
+        return _line({"ok": True, "time_s": self._world.clock.time_s})
+
+    def closed(self) -> None:
+        pass
+
+    # -- clock -------------------------------------------------------------------------------------------------
+    def _hold(self) -> None:
+        self._world.clock.hold()
+
+    def _run(self) -> None:
+        self._world.clock.run()
+
+    def _advance(self, duration_s: float) -> None:
+        self._reply_at = self._world.clock.advance(duration_s)
+
+    # -- arm ---------------------------------------------------------------------------------------------------
+    def _state(self) -> Reply:
+        robot = self._world.laboratory.robot
+        return {
+            "q_rad": robot.motion.q_rad, "qd_rad_s": robot.motion.qd_rad_s, "moving": robot.motion.moving,
+            "program_running": robot.robot_status_bits >> 1 & 1 == 1, "program": robot.program_name,
+            "runtime_state": robot.runtime_state.name, "robot_mode": robot.robot_mode.name,
+            "safety_mode": robot.safety_mode.name, "speed_slider": robot.speed_slider,
+            "speed_scaling": robot.motion.fraction, "remote_control": robot.remote_control,
+            "payload_kg": robot.payload_kg, "payload_centre_m": robot.payload_centre_m,
+            "claims": sorted(robot.claims), "messages": list(robot.messages), "held": self._world.clock.held,
+        }  # fmt: skip
+
+    def _remote_control(self, on: bool) -> None:
+        self._world.laboratory.robot.remote_control = bool(on)
+
+    def _register_in_use(self, name: str = "input_int_register_0") -> None:
+        self._world.laboratory.robot.claims[name] = FIELDBUS
+
+    def _register_free(self, name: str = "input_int_register_0") -> None:
+        self._world.laboratory.robot.claims.pop(name, None)
+
+    def _close_arm(self, listen: bool = True) -> None:
+        for listener in self._world.arm_listeners:
+            listener.hang_up() if listen else listener.close()
+
+    def _silence_arm(self, duration_s: float) -> None:
+        self._world.silence_arm(float(duration_s))
+
+
+def _line(reply: Reply) -> bytes:
+    return json.dumps(reply).encode() + b"\n"

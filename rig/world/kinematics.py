@@ -1,0 +1,80 @@
+"""How the simulated flange turns and where it is: the world's own few lines, apart from the rig's (independent evidence).
+
+Plain floats, because the sensors ask several hundred times a simulated second.
+"""
+
+from collections.abc import Sequence
+from math import acos, cos, pi, sin, sqrt
+
+Vector = tuple[float, float, float]
+
+# UR10e, maker's article 45257: link length a, offset d (m), twist in quarter turns.
+LINKS = (
+    (0.0, 0.1807, 1),
+    (-0.6127, 0.0, 0),
+    (-0.57155, 0.0, 0),
+    (0.0, 0.17415, 1),
+    (0.0, 0.11985, -1),
+    (0.0, 0.11655, 0),
+)
+
+
+def flange_rate(q_rad: Sequence[float], qd_rad_s: Sequence[float]) -> Vector:
+    """Angular velocity of the flange in its own frame, rad/s, carried outwards joint by joint."""
+    x = y = z = 0.0
+    for (_, _, twist), angle, speed in zip(LINKS, q_rad, qd_rad_s, strict=True):
+        z += speed
+        c, s = cos(angle), sin(angle)
+        x, y = c * x + s * y, c * y - s * x
+        if twist == 1:
+            y, z = z, -y
+        elif twist == -1:
+            y, z = -z, y
+    return x, y, z
+
+
+def flange_pose(q_rad: Sequence[float]) -> tuple[float, ...]:
+    """Position (m) and rotation vector (rad) of the flange in the base frame, the six numbers UR calls a pose."""
+    rotation = ((1.0, 0.0, 0.0), (0.0, 1.0, 0.0), (0.0, 0.0, 1.0))
+    position = (0.0, 0.0, 0.0)
+    for (a, d, twist), angle in zip(LINKS, q_rad, strict=True):
+        c, s = cos(angle), sin(angle)
+        ca, sa = (1.0, 0.0) if twist == 0 else (0.0, float(twist))
+        step = (a * c, a * s, d)
+        position = tuple(  # type: ignore[assignment]
+            p + sum(r * t for r, t in zip(row, step, strict=True)) for p, row in zip(position, rotation, strict=True)
+        )
+        link = ((c, -s * ca, s * sa), (s, c * ca, -c * sa), (0.0, sa, ca))
+        rotation = tuple(  # type: ignore[assignment]
+            tuple(sum(row[k] * link[k][j] for k in range(3)) for j in range(3)) for row in rotation
+        )
+    return (*position, *_rotation_vector(rotation))
+
+
+def _rotation_vector(r: tuple[Vector, Vector, Vector]) -> Vector:
+    cosine = max(-1.0, min(1.0, (r[0][0] + r[1][1] + r[2][2] - 1.0) / 2.0))
+    angle = acos(cosine)
+    x, y, z = r[2][1] - r[1][2], r[0][2] - r[2][0], r[1][0] - r[0][1]
+    if angle < 1e-9:
+        return x / 2.0, y / 2.0, z / 2.0
+    if pi - angle < 1e-6:  # half a turn: the antisymmetric part vanishes, the diagonal still holds the axis
+        axis = [sqrt(max(0.0, (r[i][i] + 1.0) / 2.0)) for i in range(3)]
+        largest = axis.index(max(axis))
+        signs = [1.0 if i == largest or r[largest][i] >= 0.0 else -1.0 for i in range(3)]
+        return angle * signs[0] * axis[0], angle * signs[1] * axis[1], angle * signs[2] * axis[2]
+    scale = angle / (2.0 * sin(angle))
+    return scale * x, scale * y, scale * z
+
+
+def rotation_from_vector(vector: Vector) -> tuple[Vector, Vector, Vector]:
+    """Rows of the rotation matrix of a rotation vector (rad), Rodrigues' formula."""
+    angle = sqrt(sum(component * component for component in vector))
+    if angle == 0.0:
+        return (1.0, 0.0, 0.0), (0.0, 1.0, 0.0), (0.0, 0.0, 1.0)
+    x, y, z = (component / angle for component in vector)
+    c, s, v = cos(angle), sin(angle), 1.0 - cos(angle)
+    return (
+        (c + x * x * v, x * y * v - z * s, x * z * v + y * s),
+        (y * x * v + z * s, c + y * y * v, y * z * v - x * s),
+        (z * x * v - y * s, z * y * v + x * s, c + z * z * v),
+    )

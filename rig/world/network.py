@@ -1,0 +1,203 @@
+"""Sockets around sessions: a listener for each port, a connection for each client, one selector for all."""
+
+import selectors
+import socket
+from collections.abc import Callable
+from contextlib import suppress
+from typing import Protocol
+
+from rig.errors import Refused
+
+BACKLOG_BYTES = 1 << 16  # a client that does not read loses packages beyond this
+
+
+class Session(Protocol):
+    """What one client talks to: bytes in, bytes out, and a turn at every tick."""
+
+    closing: bool  # close the connection once everything has been sent
+
+    def greeting(self) -> bytes: ...
+    def receive(self, data: bytes) -> bytes: ...
+    def tick(self) -> bytes: ...
+    def closed(self) -> None: ...
+
+
+class Connection:
+    """One accepted client."""
+
+    def __init__(self, network: "Network", peer: socket.socket, session: Session, listener: "Listener") -> None:
+        self._network, self._peer, self.session, self.listener = network, peer, session, listener
+        self._unsent = bytearray()
+        peer.setblocking(False)
+        with suppress(OSError):
+            peer.setsockopt(socket.IPPROTO_TCP, socket.TCP_NODELAY, 1)
+        self._watched = 0  # the events the selector looks for
+
+    def greet(self) -> None:
+        self.watch()
+        self.send(self.session.greeting())
+
+    def ready(self, events: int) -> None:
+        if events & selectors.EVENT_WRITE:
+            self._flush()
+        if events & selectors.EVENT_READ:
+            try:
+                data = self._peer.recv(65536)
+            except BlockingIOError:
+                return
+            except OSError:
+                data = b""
+            if not data:
+                self.close()
+                return
+            self.send(self.session.receive(data))
+
+    def send(self, data: bytes) -> None:
+        """Send as much as goes now, keep the rest; whole packages are dropped when the client does not read."""
+        if not data or self.listener.silent:
+            return
+        if not self._unsent:
+            try:
+                sent = self._peer.send(data)
+            except BlockingIOError:
+                sent = 0
+            except OSError:
+                self.close()
+                return
+            data = data[sent:]
+        if data and len(self._unsent) < BACKLOG_BYTES:
+            self._unsent += data
+        self.watch()
+
+    def _flush(self) -> None:
+        try:
+            sent = self._peer.send(self._unsent)
+        except BlockingIOError:
+            return
+        except OSError:
+            self.close()
+            return
+        del self._unsent[:sent]
+        self.watch()
+
+    def watch(self) -> None:
+        """Look for what this connection waits for now."""
+        if self.session.closing and not self._unsent:
+            self.close()
+            return
+        events = (selectors.EVENT_READ | (selectors.EVENT_WRITE if self._unsent else 0)) * (not self.listener.silent)
+        if events == self._watched:
+            return
+        selector = self._network.selector
+        if self._watched and events:
+            selector.modify(self._peer, events, self.ready)
+        elif events:
+            selector.register(self._peer, events, self.ready)
+        else:
+            selector.unregister(self._peer)
+        self._watched = events
+
+    def close(self) -> None:
+        if self in self.listener.connections:
+            self.listener.connections.remove(self)
+            if self._watched:
+                self._network.selector.unregister(self._peer)
+            self._peer.close()
+            self.session.closed()
+
+
+class Listener:
+    """One port. `limit` bounds the clients at a time: further ones are hung up on at once."""
+
+    def __init__(
+        self, network: "Network", host: str, port: int, new_session: Callable[[], Session], limit: int
+    ) -> None:
+        self._network, self.host, self.port = network, host, port
+        self._new_session, self._limit = new_session, limit
+        self.connections: list[Connection] = []
+        self.silent = False
+        self._socket: socket.socket | None = None
+        self.open()
+
+    def open(self) -> None:
+        """Start listening. Raises `Refused` when the address cannot be had."""
+        if self._socket is not None:
+            return
+        listening = socket.socket(socket.AF_INET, socket.SOCK_STREAM)
+        listening.setsockopt(socket.SOL_SOCKET, socket.SO_REUSEADDR, 1)
+        try:
+            listening.bind((self.host, self.port))
+            listening.listen(16)
+        except OSError as error:
+            listening.close()
+            raise Refused(
+                "port_in_use",
+                f"the simulated laboratory cannot listen on {self.host}:{self.port} ({error.strerror})",
+                "End the other simulation, or give this one another loopback address in arm.host and board.port",
+            ) from None
+        listening.setblocking(False)
+        self._network.selector.register(listening, selectors.EVENT_READ, self._accept)
+        self._socket = listening
+
+    def _accept(self, events: int) -> None:
+        assert self._socket is not None
+        try:
+            peer, _ = self._socket.accept()
+        except OSError:
+            return
+        if len(self.connections) >= self._limit:
+            peer.close()
+            return
+        connection = Connection(self._network, peer, self._new_session(), self)
+        self.connections.append(connection)
+        connection.greet()
+
+    def set_silent(self, silent: bool) -> None:
+        """While silent nothing is sent and nothing read; the connections stay open."""
+        self.silent = silent
+        for connection in tuple(self.connections):
+            connection.watch()
+
+    def hang_up(self) -> None:
+        """Close every connection; go on listening."""
+        for connection in list(self.connections):
+            connection.close()
+
+    def close(self) -> None:
+        """Close every connection and stop listening."""
+        self.hang_up()
+        if self._socket is not None:
+            self._network.selector.unregister(self._socket)
+            self._socket.close()
+            self._socket = None
+
+
+class Network:
+    """All listeners of the world."""
+
+    def __init__(self) -> None:
+        self.selector = selectors.DefaultSelector()
+        self.listeners: list[Listener] = []
+
+    def listen(self, host: str, port: int, new_session: Callable[[], Session], limit: int = 16) -> Listener:
+        listener = Listener(self, host, port, new_session, limit)
+        self.listeners.append(listener)
+        return listener
+
+    def poll(self, timeout_s: float | None) -> None:
+        """Serve whatever the sockets have; wait at most `timeout_s` for the first."""
+        for key, events in self.selector.select(timeout_s):
+            key.data(events)
+
+    def tick(self) -> None:
+        """Give every session its turn."""
+        for listener in self.listeners:
+            for connection in tuple(listener.connections):
+                data = connection.session.tick()
+                if data:
+                    connection.send(data)
+
+    def close(self) -> None:
+        for listener in self.listeners:
+            listener.close()
+        self.selector.close()

@@ -1,0 +1,68 @@
+"""Programs as cooperative threads: each a generator that gives way once a tick."""
+
+from collections.abc import Iterator
+
+from rig.world.robot import JOINT_LIMIT_RAD, ProgramError, Robot
+from rig.world.trajectory import Joints
+
+Steps = Iterator[None]
+
+HAND_OVER_RAD_S2 = 4.0  # a move that follows a killed one lets the joints come to rest first
+
+
+class Threads:
+    """The threads of one program. Only one at a time may move the robot."""
+
+    def __init__(self, robot: Robot) -> None:
+        self.robot = robot
+        self._threads: dict[str, Steps] = {}
+        self._mover: str | None = None
+
+    def run(self, name: str, steps: Steps) -> None:
+        self._threads[name] = steps
+
+    def kill(self, name: str) -> None:
+        self._threads.pop(name, None)
+        self.let_go(name)
+
+    def running(self, name: str) -> bool:
+        return name in self._threads
+
+    def step(self) -> None:
+        """One tick of every thread."""
+        for name, steps in list(self._threads.items()):
+            if next(steps, StopIteration) is StopIteration:
+                self.kill(name)
+
+    def take(self, name: str) -> None:
+        """Claim the joints. Raises `ProgramError` when another thread has them."""
+        if self._mover not in (None, name):
+            raise ProgramError("another thread is already controlling the robot")
+        self._mover = name
+
+    def let_go(self, name: str) -> None:
+        if self._mover == name:
+            self._mover = None
+
+    def movej(self, name: str, target_rad: Joints, speed_rad_s: float, acceleration_rad_s2: float) -> Steps:
+        """moveJ on behalf of the thread `name`: ends when the joints stand at the target."""
+        if any(abs(q) > JOINT_LIMIT_RAD for q in target_rad):
+            raise ProgramError("joint position out of limits: a target lies beyond ±360°")
+        if not (speed_rad_s > 0.0 and acceleration_rad_s2 > 0.0):
+            raise ProgramError("movej needs a speed and an acceleration above zero")
+        self.take(name)
+        yield from self.stopj(name, HAND_OVER_RAD_S2)
+        self.take(name)
+        self.robot.motion.move(target_rad, speed_rad_s, acceleration_rad_s2)
+        while not self.robot.motion.standing:
+            yield
+        self.let_go(name)
+
+    def stopj(self, name: str, deceleration_rad_s2: float) -> Steps:
+        """Bring the joints to rest."""
+        self.take(name)
+        if not self.robot.motion.standing:
+            self.robot.motion.stop(max(deceleration_rad_s2, 0.01))
+            while not self.robot.motion.standing:
+                yield
+        self.let_go(name)

@@ -1,0 +1,47 @@
+"""The servo's vibration: a position ripple locked to the joint's angle, so whole turns integrate exactly.
+
+q = u + Σ Aₙ sin(n u + φₙ), with u the smooth angle the joint is driven by and n whole cycles a turn. After a turn of u
+the joint has made a turn too, whatever the ripple; SIX, section on vibration, needs exactly that of the mean speed.
+"""
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from math import cos, pi, sin, sqrt
+from random import Random
+
+
+@dataclass(frozen=True, slots=True)
+class Ripple:
+    """One joint's ripple: (cycles a turn, amplitude rad, phase rad) of each component."""
+
+    components: tuple[tuple[int, float, float], ...] = ()
+
+    def angle(self, smooth_rad: float) -> float:
+        """The joint's angle at the smooth angle, rad."""
+        return smooth_rad + sum(a * sin(n * smooth_rad + phase) for n, a, phase in self.components)
+
+    def gain(self, smooth_rad: float) -> float:
+        """Exact derivative of the joint's angle with respect to the smooth angle."""
+        return 1.0 + sum(a * n * cos(n * smooth_rad + phase) for n, a, phase in self.components)
+
+    def smooth(self, angle_rad: float) -> float:
+        """A smooth angle at which the joint stands at `angle_rad` (bisection: it brackets a root for any amplitude)."""
+        if not self.components:
+            return angle_rad
+        reach = sum(a for _, a, _ in self.components)
+        low, high = angle_rad - reach, angle_rad + reach
+        for _ in range(60):
+            middle = 0.5 * (low + high)
+            if self.angle(middle) < angle_rad:
+                low = middle
+            else:
+                high = middle
+        return 0.5 * (low + high)
+
+
+def ripple(fraction: float, cycles_per_turn: Sequence[int], random: Random) -> Ripple:
+    """Components of equal rate, random phases; the RMS of the rate ripple over a turn is `fraction` of the rate."""
+    if fraction == 0.0:
+        return Ripple()
+    rate = fraction * sqrt(2.0 / len(cycles_per_turn))
+    return Ripple(tuple((n, rate / n, random.uniform(0.0, 2.0 * pi)) for n in cycles_per_turn))

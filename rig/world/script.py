@@ -1,0 +1,114 @@
+"""The script sockets, ports 30001 to 30003: take programs in, and recognise the one ur_rtde uploads.
+
+URScript manual of the maker. A text is a program once its blocks are closed; a line outside a block is a program by
+itself. The text of `rtde_control` is not interpreted but acted out (`control_program`); other programs may use the
+statements listed in `urscript`.
+"""
+
+import re
+from collections.abc import Iterator
+
+from rig.world.control_program import ControlProgram, PathStep
+from rig.world.robot import Program, ProgramError, Robot
+from rig.world.urscript import ScriptProgram, arguments, joints
+
+PRIMARY_PORT, SECONDARY_PORT, REALTIME_PORT = 30001, 30002, 30003
+BLOCK = re.compile(r"(def|sec|thread|if|while|for)\b.*:$")
+
+
+class ScriptReader:
+    """Cuts what arrives into whole programs."""
+
+    def __init__(self) -> None:
+        self._partial = b""
+        self._lines: list[str] = []
+        self._depth = 0
+
+    def feed(self, data: bytes) -> Iterator[list[str]]:
+        """The programs that `data` completes, each as its lines."""
+        *lines, self._partial = (self._partial + data).split(b"\n")
+        for raw in lines:
+            line = raw.decode(errors="replace").rstrip()
+            words = line.split("#", 1)[0].strip()
+            if not words and not self._lines:
+                continue
+            self._lines.append(line)
+            if BLOCK.match(words):
+                self._depth += 1
+            elif words == "end":
+                self._depth = max(0, self._depth - 1)
+            if self._depth == 0:
+                program, self._lines = self._lines, []
+                yield program
+
+
+def compile_program(robot: Robot, lines: list[str]) -> Program:
+    """The program to play for an uploaded text. Raises `ProgramError` for what the simulation does not know."""
+    text = "\n".join(lines)
+    if lines[0].startswith("def rtde_control()"):
+        return ControlProgram(robot, _register_offset(text), tuple(_path(lines)))
+    return ScriptProgram(robot, lines)
+
+
+def _register_offset(text: str) -> int:
+    """ur_rtde writes the offset of its integer registers on the line after this one."""
+    match = re.search(r"reg_offset_int\s*=[^\n]*\n\s*(\d+)", text)
+    return int(match.group(1)) if match else 0
+
+
+def _path(lines: list[str]) -> Iterator[PathStep]:
+    """The moves that ur_rtde injected into `exec_move_path`."""
+    start = next((i for i, line in enumerate(lines) if "# inject move path" in line), len(lines))
+    for line in lines[start + 1 :]:
+        statement = line.strip()
+        if statement == "end":
+            return
+        if statement.startswith("movej("):
+            values = arguments(statement)
+            yield joints(values["0"]), float(values.get("v", 1.05)), float(values.get("a", 1.4))
+        elif statement.startswith("move"):
+            raise ProgramError(f"not simulated: {statement.split('(')[0]} in a path")
+
+
+class ScriptSession:
+    """One connection to a script socket."""
+
+    closing = False
+
+    def __init__(self, robot: Robot) -> None:
+        self._robot = robot
+        self._reader = ScriptReader()
+
+    def greeting(self) -> bytes:
+        return b""
+
+    def receive(self, data: bytes) -> bytes:
+        for lines in self._reader.feed(data):
+            if not self._robot.remote_control:
+                self._robot.say("a program was ignored: the robot is in local control")
+                continue
+            try:
+                program = compile_program(self._robot, lines)
+            except ProgramError as error:
+                self._robot.say(str(error))
+                continue
+            if lines[0].lstrip().startswith("sec "):
+                run_beside(self._robot, program)
+            else:
+                self._robot.start_program(program)
+        return b""
+
+    def tick(self) -> bytes:
+        return b""
+
+    def closed(self) -> None:
+        pass
+
+
+def run_beside(robot: Robot, program: Program) -> None:
+    """A secondary program: it takes no time, moves nothing, and leaves the running program alone."""
+    try:
+        while program.step():
+            raise ProgramError("a secondary program may not take time")
+    except ProgramError as error:
+        robot.say(str(error))
