@@ -1,0 +1,45 @@
+# make demo   calibrate a gyroscope on a simulated robot arm, on a bare machine with Python 3.11 or 3.12
+# make test   everything CI checks: lint, types, import layers, tests (needs arm-none-eabi-gcc for the firmware)
+
+VENV := .venv
+BIN := $(VENV)/bin
+# ur-rtde has wheels for CPython 3.11 and 3.12; take the first interpreter that is one of them.
+FIND_PYTHON = for p in python3.12 python3.11 python3 python; do \
+  "$$p" -c 'import sys; sys.exit(sys.version_info[:2] not in [(3, 11), (3, 12)])' 2>/dev/null && echo "$$p" && break; done
+
+.PHONY: demo test lint firmware bench clean
+.DELETE_ON_ERROR:
+
+demo: $(VENV)/demo.installed
+	$(BIN)/rig run configs/demo.yaml
+
+test: $(VENV)/dev.installed lint
+	$(BIN)/pytest
+
+lint: $(VENV)/dev.installed
+	$(BIN)/ruff check .
+	$(BIN)/ruff format --check .
+	$(BIN)/mypy
+	$(BIN)/lint-imports
+
+bench: $(VENV)/dev.installed
+	$(BIN)/python benchmarks/solve.py
+
+firmware:
+	$(MAKE) -C firmware_host/firmware
+
+clean:
+	rm -rf $(VENV) *.egg-info
+
+$(BIN)/python:
+	@python="$$($(FIND_PYTHON))"; \
+	if [ -z "$$python" ]; then echo "make: Python 3.11 or 3.12 is needed (ur-rtde has no wheels for others); install one and run again" >&2; exit 1; fi; \
+	"$$python" -m venv $(VENV)
+
+$(VENV)/demo.installed: pyproject.toml | $(BIN)/python
+	$(BIN)/python -m pip install --quiet --disable-pip-version-check --editable '.[world]'
+	@touch $@
+
+$(VENV)/dev.installed: pyproject.toml | $(BIN)/python
+	$(BIN)/python -m pip install --quiet --disable-pip-version-check --editable '.[dev]'
+	@touch $@ $(VENV)/demo.installed

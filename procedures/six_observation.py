@@ -1,0 +1,35 @@
+"""Calibrate gyroscopes with six revolutions, as in SIX, Section IV-A.
+
+    python procedures/six_observation.py configs/demo.yaml
+
+Before you start:
+  1. The sensor board is fixed to the flange, its cable has slack for a whole turn either way.
+  2. Nobody and nothing is within the arm's reach.
+  3. The pendant shows Remote Control, the speed slider stands at 100 %, no program runs.
+
+What happens: the arm goes home; wrist 3 turns 360° clockwise, rests, turns back, rests; then wrist 1; then wrist 2.
+Ctrl-C stops the arm at any moment and keeps what was measured.
+"""
+
+from rig.arm.plan import Rest, Sweep, Transfer
+from rig.procedure import Rig
+from rig.script import main
+
+
+def six_observation(rig: Rig) -> None:
+    """The steps, in the order the plan has them (`rig plan CONFIG` prints it)."""
+    rig.preflight()  # refuses unless limits, payload, modes and the speed slider are right; asks before anything moves
+    rig.start_sampling()  # from here on every sample and every arm state is in run.h5
+
+    for step in rig.plan.steps:
+        match step:
+            case Transfer():
+                rig.move(step)  # to where the next sweep begins
+            case Sweep():
+                rig.sweep(step)  # ramp up, one revolution at constant speed, ramp down
+            case Rest():
+                rig.rest(step)  # stand still
+
+
+if __name__ == "__main__":
+    raise SystemExit(main(six_observation))

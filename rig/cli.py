@@ -1,0 +1,127 @@
+"""The command line. Heavy modules are imported by the command that needs them, so that help comes at once."""
+
+import argparse
+import json
+import os
+import signal
+import sys
+from collections.abc import Callable, Sequence
+from pathlib import Path
+from typing import Any
+
+from rig import __version__
+from rig.errors import RigError
+
+INTERRUPTED = 130
+
+
+def main(arguments: Sequence[str] | None = None) -> int:
+    """Entry point of `rig`; returns the exit status DESIGN promises (0, 1, 2, 3 or 130)."""
+    options = _parser().parse_args(arguments)
+    return guarded(lambda: options.command(options))
+
+
+def guarded(command: Callable[[], int]) -> int:
+    """Run a command; turn every named error into one message on stderr and its exit status."""
+    signal.signal(signal.SIGTERM, _interrupt)
+    try:
+        return command()
+    except RigError as error:
+        print(f"rig: {error}", file=sys.stderr)
+        return error.exit_status
+    except KeyboardInterrupt as interrupt:
+        print(f"rig: {interrupt or 'interrupted'}", file=sys.stderr)
+        return INTERRUPTED
+    except BrokenPipeError:
+        # The reader of our output went away (`rig plan … | head`); nothing more can be said to it.
+        os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
+        return 0
+
+
+def _interrupt(*_: Any) -> None:
+    raise KeyboardInterrupt
+
+
+def _parser() -> argparse.ArgumentParser:
+    parser = argparse.ArgumentParser(prog="rig", description="Calibrate inertial sensors on a robot arm.")
+    parser.add_argument("--version", action="version", version=f"rig {__version__}")
+    commands = parser.add_subparsers(title="commands", required=True, metavar="COMMAND")
+
+    def add(name: str, run: Callable[[argparse.Namespace], int], text: str) -> argparse.ArgumentParser:
+        command = commands.add_parser(name, help=text, description=text)
+        command.set_defaults(command=run)
+        return command
+
+    def add_config(command: argparse.ArgumentParser) -> None:
+        command.add_argument("config", type=Path, metavar="CONFIG", help="YAML configuration file")
+        command.add_argument(
+            "--set", action="append", default=[], metavar="PATH=VALUE", dest="overrides", help="change one value"
+        )
+
+    run = add("run", _run, "run the procedure the file names")
+    add_config(run)
+    add_run_options(run)
+    plan = add("plan", _plan, "dry run: every motion, its time and limits; connects to nothing")
+    add_config(plan)
+    plan.add_argument("--json", action="store_true", help="for machines")
+    check = add("check", _check, "connect and look; nothing moves, no program is stopped")
+    add_config(check)
+    resume = add("resume", _resume, "go on with an interrupted run")
+    resume.add_argument("run_folder", type=Path, metavar="RUN_DIR")
+    resume.add_argument("--yes", action="store_true", help="do not ask before the arm moves")
+    solve = add("solve", _solve, "recompute the calibration from a recording")
+    solve.add_argument("run", type=Path, metavar="RUN", help="a run folder or its run.h5")
+    solve.add_argument("--estimator", default="newton", metavar="NAME", help="newton, closed_form or algorithm_1")
+    solve.add_argument("--json", action="store_true", help="for machines")
+    world = add("world", _world, "only the simulated laboratory, in the foreground, for any client")
+    add_config(world)
+    return parser
+
+
+def add_run_options(parser: argparse.ArgumentParser) -> None:
+    """The options `rig run` shares with the scripts in procedures/."""
+    parser.add_argument("--out", type=Path, metavar="DIR", help="run folder (default: a new one under output.folder)")
+    parser.add_argument("--yes", action="store_true", help="do not ask before the arm moves")
+    parser.add_argument("--json", action="store_true", help="print result.json instead of tables")
+
+
+def _run(options: argparse.Namespace) -> int:
+    from rig.run import run
+
+    return run(options.config, options.overrides, options.out, assume_yes=options.yes, as_json=options.json)
+
+
+def _resume(options: argparse.Namespace) -> int:
+    from rig.run import resume
+
+    return resume(options.run_folder, assume_yes=options.yes)
+
+
+def _plan(options: argparse.Namespace) -> int:
+    from rig.config.load import load
+    from rig.report.plan import plan_document, print_plan
+
+    config = load(options.config, options.overrides).config
+    if options.json:
+        print(json.dumps(plan_document(config), indent=2))
+    else:
+        print_plan(config)
+    return 0
+
+
+def _check(options: argparse.Namespace) -> int:
+    from rig.check import check
+
+    return check(options.config, options.overrides)
+
+
+def _solve(options: argparse.Namespace) -> int:
+    from rig.run import solve
+
+    return solve(options.run, options.estimator, as_json=options.json)
+
+
+def _world(options: argparse.Namespace) -> int:
+    from rig.launch import foreground_laboratory
+
+    return foreground_laboratory(options.config, options.overrides)

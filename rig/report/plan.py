@@ -1,0 +1,55 @@
+"""The dry run: every motion the plan holds, with its time and its margin to the limits."""
+
+import math
+from dataclasses import asdict
+from typing import Any
+
+from rich.console import Console
+from rich.table import Table
+
+from rig.arm.plan import Plan, Rest, Step, Sweep, plan_six_observation, travel
+from rig.arm.preflight import plan_problems, refuse
+from rig.arm.state import JOINT_NAMES
+from rig.config.models import RigConfig
+
+
+def checked_plan(config: RigConfig) -> Plan:
+    """The plan from the home pose. Raises `Refused` when a motion breaks a limit."""
+    plan = plan_six_observation(config.arm, config.procedure)
+    refuse(plan_problems(plan, config.arm.payload_kg))
+    return plan
+
+
+def plan_document(plan: Plan) -> dict[str, Any]:
+    """The plan for machines: SI units, every field of every step."""
+    steps = [{"kind": type(step).__name__.lower(), **asdict(step)} for step in plan.steps]
+    return {"schema": "rig.plan/1", "duration_s": plan.duration_s, "steps": steps}
+
+
+def print_plan(plan: Plan, console: Console) -> None:
+    """The plan for people, in degrees."""
+    table = Table(title="plan, from the home pose", title_justify="left")
+    for heading in ("at s", "step", "for s", "motion", "speed °/s", "ramp °/s²"):
+        table.add_column(heading, justify="left" if heading in ("step", "motion") else "right")
+    at_s = 0.0
+    for step in plan.steps:
+        table.add_row(f"{at_s:.1f}", step.name, f"{step.duration_s:.2f}", *_motion(step))
+        at_s += step.duration_s
+    console.print(table)
+    console.print(f"{len(plan.sweeps)} sweeps, {len(plan.motions)} motions, {plan.duration_s:.1f} s; all within limits")
+
+
+def _motion(step: Step) -> tuple[str, str, str]:
+    if isinstance(step, Rest):
+        return "", "", ""
+    turns = [
+        f"{name} {math.degrees(start):.1f} → {math.degrees(target):.1f}"
+        for name, start, target, way in zip(
+            JOINT_NAMES, step.start_q_rad, step.target_q_rad, travel(step.start_q_rad, step.target_q_rad), strict=True
+        )
+        if abs(way) > 1e-9
+    ]
+    if isinstance(step, Sweep):
+        low, high = (math.degrees(angle) for angle in step.revolution_rad)
+        turns.append(f"(revolution {low:.0f} … {high:.0f})")
+    return ", ".join(turns), f"{math.degrees(step.speed_rad_s):g}", f"{math.degrees(step.acceleration_rad_s2):g}"
