@@ -24,7 +24,6 @@ from rig.arm.messages import (
     Message,
     Move,
     MoveFinished,
-    Quit,
     Request,
     Stop,
     TakeControl,
@@ -56,7 +55,7 @@ VARIABLES = [
 
 
 def main(pipe: "Connection[Message, Request]", host: str, state_rate_hz: float, log: str | None) -> None:
-    """Run until the parent says `Quit` or disappears. `log` names the file that takes the client's own output."""
+    """Run until the parent ends the process or disappears. `log` names the file that takes the client's own output."""
     _outlive_the_parent()
     _send_output_to(log)
     child = _Child(pipe, host)
@@ -170,8 +169,6 @@ class _Child:
                 if self._control is not None:
                     self._control.stopJ(request.deceleration_rad_s2)
                     self._control.stopScript()
-            case Quit():
-                _leave(0)
 
     def _take_control(self, request: TakeControl) -> Message:
         from rtde_control import RTDEControlInterface

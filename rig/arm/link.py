@@ -10,7 +10,7 @@ from pathlib import Path
 
 from rig.arm import child
 from rig.arm.condition import Problem
-from rig.arm.messages import Heartbeat, Message, Quit, Request
+from rig.arm.messages import Heartbeat, Message, Request
 
 TICK_S = 0.05
 # Silence is counted in ticks of the guard, not in elapsed time: when this process itself was held up, nothing is late.
@@ -20,7 +20,7 @@ PATIENT_TICKS = 240  # 12 s while a client's constructor holds the child's inter
 
 
 class ChildLink:
-    """One child process. The reader thread calls `on_message`; reader or guard calls `on_lost`; the first call counts."""
+    """One child process. The reader thread calls `on_message`, reader or guard `on_lost`; its first call counts."""
 
     def __init__(
         self,
@@ -84,14 +84,12 @@ class ChildLink:
             self._patient = False
 
     def close(self) -> None:
-        """End the child, by force if it does not listen, and both threads."""
+        """End the child and both threads; an arm that is held must have been stopped before."""
         self._closing.set()
         if self._process.pid is None:
             self._pipe.close()
             self._child_pipe.close()
             return
-        self.send(Quit())
-        self._process.join(0.3)
         self.kill()
         for thread in self._threads:
             if thread is not threading.current_thread():
@@ -100,7 +98,7 @@ class ChildLink:
         self._process.close()
 
     def kill(self) -> None:
-        """End a child that may hang; the arm must have been stopped by other means."""
+        """End the child by force: the client may hang, and its destructors may block or abort."""
         self._process.kill()
         self._process.join(1.0)
 

@@ -31,12 +31,7 @@ class Stop:
     deceleration_rad_s2: float
 
 
-@dataclass(frozen=True, slots=True)
-class Quit:
-    """Leave. Whoever holds control sends `Stop` first."""
-
-
-Request = TakeControl | Move | Stop | Quit
+Request = TakeControl | Move | Stop
 
 # Child to parent ---------------------------------------------------------------------------------------------------
 
