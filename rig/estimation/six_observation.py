@@ -108,7 +108,7 @@ def parameters(beta: Array) -> tuple[Array, Array]:
 def solve_linear(matrix: Array, right: Array) -> Array:
     """The solution of a square system. Raises Fault `rank_deficient`."""
     try:
-        return np.linalg.solve(matrix, right)
+        return np.asarray(np.linalg.solve(matrix, right), dtype=np.float64)
     except np.linalg.LinAlgError:
         raise rank_deficient("an axis") from None
 

@@ -1,0 +1,243 @@
+"""From a recording to averaged revolutions: what the estimators see.
+
+An observation is the mean reading over exactly one turn of a joint. Over a whole turn the mean speed is 2π/T whatever
+the servo's vibration, so the vibration is no noise either: the noise's variance comes from what is left of the readings
+once the arm's measured rate is taken out of them. The mean comes first; squaring is the estimator's business.
+
+Nothing doubtful is averaged: whatever does not belong into a calibration raises a Fault with a name of its own.
+"""
+
+from collections.abc import Iterator
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from rig.config.models import ObservationSection
+from rig.errors import Fault
+from rig.recording import RecordedSensor, RunData
+from rig.revolution import Revolution, describe, find_revolution
+from rig.timebase import ArmMotion, Array, TimeBase, estimate_time_base, widening
+
+STUCK_REPEATS = 10  # equal readings in a row, of a sensor whose noise exceeds a count
+REST_SETTLING_S = 0.2  # kept away from either end of a rest
+MAX_REST_TRAVEL_RAD = 1e-3
+MIN_REST_SAMPLES = 20
+
+
+@dataclass(frozen=True, slots=True)
+class Average:
+    """Readings averaged: mean (3,) rad/s, variance (3,) of that mean in (rad/s)², noise (3,) of one sample in rad/s."""
+
+    mean_rad_s: Array
+    variance_rad2_s2: Array
+    noise_rad_s: Array
+    samples: int
+    duration_s: float
+    temperature_c: float
+
+
+@dataclass(frozen=True, slots=True)
+class Observation:
+    """One revolution: sweep `sweep` of the plan turned `joint_name` in `direction` at the mean speed 2π/T.
+
+    `axis` ("x", "y", "z") and `sign` name the sensor axis nominally along the turn; `axis_flange` (3,) is the unit
+    vector of the turn in the flange frame by the measured joints; `lost` samples are missing from the average.
+    """
+
+    sweep: int
+    joint_name: str
+    direction: str
+    axis: str
+    sign: int
+    axis_flange: Array
+    speed_rad_s: float
+    lost: int
+    average: Average
+
+
+@dataclass(frozen=True, slots=True)
+class SensorObservations:
+    """What a recording tells of a sensor: its clock, its revolutions, its rests (mean readings at zero rate)."""
+
+    time_base: TimeBase
+    revolutions: tuple[Observation, ...]
+    rests: tuple[Average, ...]
+
+
+@dataclass(frozen=True, slots=True)
+class _Stream:
+    """A sensor's samples in physical units, on the controller's clock."""
+
+    sensor: RecordedSensor
+    clock: TimeBase
+    time_s: Array
+    board_time_s: Array
+    readings_rad_s: Array
+    raw: NDArray[Any]
+
+
+def observe(run: RunData, sensor: str, settings: ObservationSection) -> SensorObservations:
+    """Average every finished sweep of a recording. An interrupted sweep has no `sweep_finished` and is left out.
+
+    Raises Fault `incomplete_revolution`, `arm_states_lost`, `slider_below_100`, `speed_not_constant`,
+    `other_joint_moved`, `lost_samples`, `saturation`, `stuck_sensor`, `stuck_axis`, `wrong_axis`, `wrong_sign`,
+    `no_motion`, `time_base_not_found`, `board_clock_restarted`.
+    """
+    motion = ArmMotion(run.arm)
+    stream = _stream(run.samples[sensor], run.sensors[sensor], motion)
+    revolutions = []
+    for sweep, window in _finished(run, "sweep"):
+        turn = find_revolution(motion, sweep, window, settings)
+        revolutions.append(_observation(stream, motion, sweep, turn, settings))
+    rests = (_rest(stream, motion, window) for _, window in _finished(run, "rest"))
+    return SensorObservations(stream.clock, tuple(revolutions), tuple(rest for rest in rests if rest))
+
+
+def has_finished_sweeps(run: RunData) -> bool:
+    """Whether the recording holds anything to observe."""
+    return any(True for _ in _finished(run, "sweep"))
+
+
+def _finished(run: RunData, kind: str) -> Iterator[tuple[dict[str, Any], tuple[float, float]]]:
+    """(description, (start, end) in controller time) of every sweep or rest that was begun and finished."""
+    started = None
+    for event in run.events:
+        if event.name == f"{kind}_started":
+            started = event.controller_time_s
+        elif event.name == f"{kind}_finished" and started is not None and event.controller_time_s is not None:
+            yield event.detail.get(kind, {}), (started, event.controller_time_s)
+            started = None
+
+
+def _stream(raw: NDArray[Any], sensor: RecordedSensor, motion: ArmMotion) -> _Stream:
+    board_time_s = raw["board_time_us"] * 1e-6
+    readings = raw["counts"] * sensor.sensitivity_rad_s_per_count
+    clock = estimate_time_base(board_time_s, readings, motion)
+    return _Stream(sensor, clock, clock.controller_time_s(board_time_s), board_time_s, readings, raw)
+
+
+def _observation(
+    stream: _Stream, motion: ArmMotion, sweep: dict[str, Any], turn: Revolution, settings: ObservationSection
+) -> Observation:
+    where = describe(sweep)
+    inside = _between(stream, turn.start_s, turn.end_s)
+    lost = _lost(stream, inside, where, settings)
+    _check_saturation(stream, inside, where)
+    _check_stuck(stream, inside, where)
+    average = _average(stream, inside, motion.rate(stream.time_s[inside]) @ turn.axis_flange, turn.duration_s)
+    expected = np.array(stream.sensor.mounting) @ turn.axis_flange
+    _check_direction(average.mean_rad_s - stream.clock.zero_rate_rad_s, expected, where, settings)
+    nearest = int(np.argmax(np.abs(expected)))
+    return Observation(
+        sweep=sweep["index"],
+        joint_name=sweep["joint_name"],
+        direction=sweep["direction"],
+        axis="xyz"[nearest],
+        sign=1 if expected[nearest] > 0 else -1,
+        axis_flange=turn.axis_flange,
+        speed_rad_s=turn.speed_rad_s,
+        lost=lost,
+        average=average,
+    )
+
+
+def _rest(stream: _Stream, motion: ArmMotion, window: tuple[float, float]) -> Average | None:
+    """The mean reading of a rest; None where the arm did not stand still or the rest is too short to say anything."""
+    start, end = window[0] + REST_SETTLING_S, window[1] - REST_SETTLING_S
+    inside = _between(stream, start, end)
+    states = motion.states[(motion.time_s >= start) & (motion.time_s <= end)]
+    if inside.stop - inside.start < MIN_REST_SAMPLES or len(states) == 0:
+        return None
+    if np.ptp(states["q_rad"], axis=0).max() > MAX_REST_TRAVEL_RAD:
+        return None
+    return _average(stream, inside, None, end - start)
+
+
+def _between(stream: _Stream, start_s: float, end_s: float) -> slice:
+    return slice(*np.searchsorted(stream.time_s, [start_s, end_s]).tolist())
+
+
+def _average(stream: _Stream, inside: slice, rate: Array | None, duration_s: float) -> Average:
+    """Mean and its variance; `rate` (n,) is what the arm did meanwhile, None at rest.
+
+    The variance is that of the residuals of a straight line of reading against rate, never below that of rounding to
+    whole counts, divided by the number of samples and widened where the residuals are not white.
+    """
+    m = stream.readings_rad_s[inside]
+    columns = np.ones((len(m), 1)) if rate is None else np.column_stack([np.ones(len(m)), rate])
+    residual = m - columns @ np.linalg.lstsq(columns, m, rcond=None)[0]
+    scatter = np.sum(residual**2, axis=0) / (len(m) - columns.shape[1])
+    variance = np.maximum(scatter, stream.sensor.sensitivity_rad_s_per_count**2 / 12)
+    wider = np.array([widening(residual[:, axis]) for axis in range(3)])
+    temperature = stream.raw["temperature_counts"][inside].mean() * stream.sensor.temperature_c_per_count
+    return Average(
+        mean_rad_s=m.mean(axis=0),
+        variance_rad2_s2=variance * wider / len(m),
+        noise_rad_s=np.sqrt(variance),
+        samples=len(m),
+        duration_s=duration_s,
+        temperature_c=float(temperature) + stream.sensor.temperature_offset_c,
+    )
+
+
+def _lost(stream: _Stream, inside: slice, where: str, settings: ObservationSection) -> int:
+    """Samples missing in the revolution: by sequence number, and by time for those the board itself did not see."""
+    around = slice(max(inside.start - 1, 0), inside.stop + 1)
+    steps = np.diff(stream.raw["sequence"][around])  # modulo 2³², like the board's counter
+    intervals = np.diff(stream.board_time_s[around])
+    covered = inside.start > 0 and inside.stop < len(stream.raw) and len(steps) > 1
+    by_sequence = int(steps.astype(np.int64).sum()) - len(steps)
+    by_time = int(np.sum(np.round(intervals / np.median(intervals)) - 1)) if covered else 0
+    lost = max(by_sequence, by_time)
+    count = inside.stop - inside.start
+    if not covered or lost > settings.max_lost_fraction * (count + lost):
+        what = f"{lost} of {count + lost} samples are missing" if covered else "the samples do not cover the revolution"
+        raise Fault(
+            "lost_samples",
+            f"in {where} {what}, {100 * settings.max_lost_fraction:g} % may",
+            "Check the cable to the board and the load of this computer, then repeat the sweep",
+        )
+    return lost
+
+
+def _check_saturation(stream: _Stream, inside: slice, where: str) -> None:
+    full = stream.sensor.full_scale_counts
+    saturated = np.any(np.abs(stream.raw["counts"][inside].astype(np.int64)) >= full, axis=1)
+    if saturated.any():
+        raise Fault(
+            "saturation",
+            f"in {where} {int(saturated.sum())} samples stand at the end of the sensor's range",
+            "Choose a wider range or a slower sweep",
+        )
+
+
+def _check_stuck(stream: _Stream, inside: slice, where: str) -> None:
+    """A sensor with noise above one count does not repeat itself on all axes many times in a row."""
+    if np.abs(np.diff(stream.raw["counts"], axis=0)).mean(axis=0).min() < 1:
+        return
+    changes = np.flatnonzero(np.any(np.diff(stream.raw["counts"][inside], axis=0), axis=1))
+    longest = int(np.max(np.diff(changes, prepend=-1, append=inside.stop - inside.start - 1)))
+    if longest > STUCK_REPEATS:
+        raise Fault(
+            "stuck_sensor",
+            f"in {where} the gyroscope repeats one reading {longest} times",
+            "Check the sensor's supply and its bus wiring, then repeat the sweep",
+        )
+
+
+def _check_direction(turned: Array, expected: Array, where: str, settings: ObservationSection) -> None:
+    """The reading, less its value at rest, must point along the turn as the nominal mounting has it."""
+    cosine = float(turned @ expected / (np.linalg.norm(turned) * np.linalg.norm(expected)))
+    angle = float(np.degrees(np.arccos(np.clip(cosine, -1, 1))))
+    limit = settings.max_axis_deviation_deg
+    if angle <= limit:
+        return
+    opposite = angle >= 180 - limit
+    what = "opposite to the turn" if opposite else f"{angle:.0f}° away from the turn, {limit:g}° is allowed"
+    raise Fault(
+        "wrong_sign" if opposite else "wrong_axis",
+        f"in {where} the gyroscope reads {what}",
+        "Correct the sensor's mounting in the configuration, or how it is fixed to the flange",
+    )

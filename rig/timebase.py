@@ -1,0 +1,227 @@
+"""When a sample was taken, on the controller's clock: offset and drift of the board's clock, from the data alone.
+
+The gyroscope and the arm see the same turning. A coarse search correlates turn rate with joint rate over all data (the
+board may have been switched on at any time); a weighted least-squares fit of the vector readings to the flange's rate
+then finds the offset to a fraction of a millisecond. Rates come from the recorded joint angles rather than from the
+controller's velocity signal, which is filtered: what counts is when the joint was where. The delay of the sensor's own
+filter is part of the offset.
+"""
+
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from rig.arm.kinematics import flange_rate
+from rig.errors import Fault
+
+Array = NDArray[np.float64]
+
+COARSE_STEP_S = 0.02  # far below the ramps of a sweep, so that the fine fit starts inside its reach
+CANDIDATES = 12  # peaks of the correlation looked at: six equal sweeps give eleven
+MIN_EXPLAINED = 0.5  # share of the readings' variance that the arm's motion must explain
+MIN_RATE_RAD_S = 0.01
+MAX_DRIFT = 1e-3  # ten times worse than any crystal
+FINE_STEPS = 20
+WHITENESS_LAGS = 20
+WHITENESS_LIMIT = 45.3  # χ² of 20 degrees of freedom at 0.999
+
+
+@dataclass(frozen=True, slots=True)
+class TimeBase:
+    """Controller time = board time + `offset_s` + `drift` × (board time − `reference_s`), all in seconds.
+
+    `reference_s` is the board's time in the middle of the data, where offset and drift are nearly uncorrelated.
+    `covariance` (2, 2) is that of (`offset_s`, `drift`). `zero_rate_rad_s` (3,) is the reading at rest that fits the
+    whole run.
+    """
+
+    offset_s: float
+    drift: float
+    reference_s: float
+    covariance: Array
+    zero_rate_rad_s: Array
+
+    @property
+    def offset_std_s(self) -> float:
+        """Standard deviation of the offset."""
+        return float(np.sqrt(self.covariance[0, 0]))
+
+    @property
+    def drift_std(self) -> float:
+        """Standard deviation of the drift."""
+        return float(np.sqrt(self.covariance[1, 1]))
+
+    def controller_time_s(self, board_time_s: Array) -> Array:
+        """Board times on the controller's clock."""
+        return board_time_s + self.offset_s + self.drift * (board_time_s - self.reference_s)
+
+
+class ArmMotion:
+    """The recorded arm as functions of controller time: `angles(t)` (n, 6) rad, `rate(t)` (n, 3) flange rate rad/s.
+
+    `rate(t, 1)` is the flange's angular acceleration. `states` is (m,) ARM_STATE_DTYPE. Raises Fault `no_motion`.
+    """
+
+    def __init__(self, states: NDArray[Any]) -> None:
+        from scipy.interpolate import CubicSpline
+
+        self.time_s, first = np.unique(states["time_s"], return_index=True)
+        self.states = states[first]
+        if len(self.time_s) < 4:
+            raise Fault(
+                "no_motion", f"the recording holds {len(self.time_s)} arm states", "Record a run with the arm on"
+            )
+        self.angles = CubicSpline(self.time_s, self.states["q_rad"])
+        rates = flange_rate(self.states["q_rad"], self.angles(self.time_s, 1))
+        if not np.linalg.norm(rates, axis=1).max() > MIN_RATE_RAD_S:
+            raise Fault("no_motion", "the arm stands still in the whole recording", "Record a run with sweeps")
+        self.rate = CubicSpline(self.time_s, rates)
+
+
+def estimate_time_base(board_time_s: Array, readings_rad_s: Array, motion: ArmMotion) -> TimeBase:
+    """The board's clock against the controller's, from readings (n, 3) taken at board times (n,).
+
+    Raises Fault `board_clock_restarted`, `stuck_sensor`, `stuck_axis`, `time_base_not_found`.
+    """
+    _check_samples(board_time_s, readings_rad_s)
+    reference = float(board_time_s[0] + board_time_s[-1]) / 2
+    offset = _coarse_offset(board_time_s, readings_rad_s, motion)
+    clock = TimeBase(offset, 0.0, reference, np.zeros((2, 2)), np.zeros(3))
+    for _ in range(FINE_STEPS):
+        before, clock = clock.offset_s, _refined(clock, board_time_s, readings_rad_s, motion)
+        if abs(clock.offset_s - before) < 1e-3 * clock.offset_std_s:
+            break
+    else:
+        raise _not_found("the fit of the board's clock does not settle")
+    if not abs(clock.drift) < MAX_DRIFT or not clock.offset_std_s < COARSE_STEP_S:
+        raise _not_found(f"the board's clock would drift by {clock.drift * 1e6:.0f} ppm")
+    return clock
+
+
+def widening(residuals: Array) -> float:
+    """Factor ≥ 1 on the variance of a mean of these residuals (n,): 1 for white noise, 1 + 2 Σ ρ for coloured noise.
+
+    The lag correlations ρ count only if they are significant together (Box–Pierce), so that white noise is left alone.
+    """
+    count = len(residuals)
+    centred = residuals - residuals.mean()
+    power = float(centred @ centred)
+    if count <= 2 * WHITENESS_LAGS or power == 0:
+        return 1.0
+    rho = np.array([centred[lag:] @ centred[:-lag] for lag in range(1, WHITENESS_LAGS + 1)]) / power
+    coloured = count * float(rho @ rho) > WHITENESS_LIMIT
+    return max(1.0, 1 + 2 * float(rho.sum())) if coloured else 1.0
+
+
+def _check_samples(board_time_s: Array, readings: Array) -> None:
+    if len(board_time_s) < 100:
+        raise _not_found(f"the recording holds {len(board_time_s)} samples")
+    if np.any(np.diff(board_time_s) <= 0):
+        raise Fault(
+            "board_clock_restarted",
+            "the board's clock goes back within the recording: the board was reset",
+            "Check the board's power and cable, then record again",
+        )
+    still = np.ptp(readings, axis=0) == 0
+    if still.all():
+        raise Fault(
+            "stuck_sensor",
+            f"the gyroscope reads {_triple(readings[0])} rad/s throughout, whatever the arm does",
+            "Check the sensor's supply and its bus wiring",
+        )
+    if still.any():
+        raise Fault(
+            "stuck_axis",
+            f"axis {'xyz'[int(np.argmax(still))]} of the gyroscope never changes, whatever the arm does",
+            "The sensor is broken or wrongly configured; replace it",
+        )
+
+
+def _coarse_offset(board_time_s: Array, readings: Array, motion: ArmMotion) -> float:
+    """Offset (controller − board) to within a step: peaks of the correlation of |rate|, judged by the vector fit."""
+    bins = ((board_time_s - board_time_s[0]) / COARSE_STEP_S).astype(np.intp)
+    counts = np.bincount(bins)
+    seen = counts > 0
+    sums = np.stack([np.bincount(bins, readings[:, axis]) for axis in range(3)], axis=1)
+    board = np.where(seen[:, None], sums / np.maximum(counts, 1)[:, None], 0.0)
+    grid = np.arange(motion.time_s[0], motion.time_s[-1], COARSE_STEP_S)
+    arm = motion.rate(grid)
+
+    turning, moving = np.linalg.norm(board, axis=1), np.linalg.norm(arm, axis=1)
+    turning = np.where(seen, turning - turning[seen].mean(), 0.0)
+    moving = moving - moving.mean()
+    size = 1 << (len(turning) + len(moving)).bit_length()
+    spectrum = np.conj(np.fft.rfft(turning, size)) * np.fft.rfft(moving, size)
+    correlation = np.roll(np.fft.irfft(spectrum, size), len(turning))[: len(turning) + len(moving)]
+    peaks = np.flatnonzero((correlation[1:-1] > correlation[:-2]) & (correlation[1:-1] >= correlation[2:])) + 1
+    best = peaks[np.argsort(correlation[peaks])[::-1][:CANDIDATES]] - len(turning)
+
+    explained = [_explained(board, seen, arm, int(lag)) for lag in best]
+    if not explained or max(explained) < MIN_EXPLAINED:
+        raise _not_found(
+            f"the arm's motion explains {100 * max(explained, default=0.0):.0f} % of what the gyroscope reads"
+        )
+    lag = int(best[int(np.argmax(explained))])
+    # Bin j of the board, whose middle lies half a step after its start, stands beside point j + lag of the arm's grid.
+    return float(grid[0] + lag * COARSE_STEP_S - board_time_s[0] - COARSE_STEP_S / 2)
+
+
+def _explained(board: Array, seen: NDArray[np.bool_], arm: Array, lag: int) -> float:
+    """Share of the board's variance that a linear map of the arm's rate explains when shifted by `lag` bins."""
+    start, end = max(0, -lag), min(len(board), len(arm) - lag)
+    used = seen[start:end]
+    if used.sum() < 0.5 * min(len(board), len(arm)):
+        return 0.0
+    m = board[start:end][used]
+    columns = np.column_stack([arm[start + lag : end + lag][used], np.ones(len(m))])
+    residual = m - columns @ np.linalg.lstsq(columns, m, rcond=None)[0]
+    total = float(np.sum((m - m.mean(axis=0)) ** 2))
+    return 1 - float(np.sum(residual**2)) / total if total > 0 else 0.0
+
+
+def _refined(clock: TimeBase, board_time_s: Array, readings: Array, motion: ArmMotion) -> TimeBase:
+    """One Gauss–Newton step.
+
+    Model: m = A r(t) + c + noise, r the flange's rate at controller time t; A (3, 3) and c (3,) are fitted along.
+    """
+    time_s = clock.controller_time_s(board_time_s)
+    inside = (time_s >= motion.time_s[0]) & (time_s <= motion.time_s[-1])
+    if inside.sum() < 100:
+        raise _not_found("board and arm were hardly recorded at the same time")
+    t, since, m = time_s[inside], board_time_s[inside] - clock.reference_s, readings[inside]
+    columns = np.column_stack([motion.rate(t), np.ones(len(t))])
+    inverse = np.linalg.pinv(columns)
+    fitted = inverse @ m
+    residual = m - columns @ fitted
+    by_offset = motion.rate(t, 1) @ fitted[:3]
+    normal, right = np.zeros((2, 2)), np.zeros(2)
+    for axis in range(3):
+        noise = residual[:, axis]
+        weight = 1 / (np.mean(noise**2) * widening(noise) + np.finfo(np.float64).tiny)
+        by_clock = np.column_stack([by_offset[:, axis], by_offset[:, axis] * since])
+        by_clock -= columns @ (inverse @ by_clock)
+        normal += weight * by_clock.T @ by_clock
+        right += weight * by_clock.T @ noise
+    covariance = np.asarray(np.linalg.pinv(normal, hermitian=True), dtype=np.float64)
+    step = covariance @ right
+    return TimeBase(
+        clock.offset_s + float(step[0]),
+        clock.drift + float(step[1]),
+        clock.reference_s,
+        covariance,
+        np.asarray(fitted[3], dtype=np.float64),
+    )
+
+
+def _triple(values: Array) -> str:
+    return ", ".join(f"{value:.4g}" for value in values)
+
+
+def _not_found(what: str) -> Fault:
+    return Fault(
+        "time_base_not_found",
+        f"{what}, so board and arm cannot be put on one clock",
+        "Check that the sensor is fixed to the flange and read in the right range, then record again",
+    )

@@ -1,0 +1,56 @@
+"""Passed or failed: every limit beside what was measured. A measurement that is missing fails."""
+
+import math
+from collections.abc import Mapping, Sequence
+from dataclasses import asdict, dataclass
+from typing import Any, Literal
+
+import numpy as np
+
+from rig.config.models import LimitsSection
+from rig.estimation.accumulator import Solution
+
+
+@dataclass(frozen=True, slots=True)
+class Check:
+    """One limit: it passes when `value` is a number not above `limit`. `unit` belongs to both."""
+
+    name: str
+    value: float | None
+    limit: float
+    unit: str
+
+    @property
+    def passed(self) -> bool:
+        """False for a measurement that is missing or not a number."""
+        return self.value is not None and math.isfinite(self.value) and self.value <= self.limit
+
+    def document(self) -> dict[str, Any]:
+        """The check's entry in `result.json`."""
+        return {**asdict(self), "passed": self.passed}
+
+
+def judge(solutions: Mapping[str, Solution], limits: LimitsSection) -> tuple[Check, ...]:
+    """The checks of every sensor, by sensor name; what the limits mean is said in the names."""
+    return tuple(check for name, solution in solutions.items() for check in _checks(name, solution, limits))
+
+
+def verdict(checks: Sequence[Check]) -> Literal["pass", "fail"]:
+    """ "pass" when there are checks and all of them passed."""
+    return "pass" if checks and all(check.passed for check in checks) else "fail"
+
+
+def _checks(sensor: str, solution: Solution, limits: LimitsSection) -> tuple[Check, ...]:
+    std = np.sqrt(np.diag(solution.covariance))
+    return (
+        Check(f"{sensor}.scale_deviation", _largest(solution.scale - 1), limits.scale_deviation, "1"),
+        Check(f"{sensor}.scale_std", _largest(std[:3]), limits.scale_std, "1"),
+        Check(f"{sensor}.bias", _largest(solution.bias_rad_s), limits.bias_rad_s, "rad/s"),
+        Check(f"{sensor}.bias_std", _largest(std[3:]), limits.bias_std_rad_s, "rad/s"),
+        Check(f"{sensor}.condition", _largest(np.array([solution.condition])), limits.condition, "1"),
+    )
+
+
+def _largest(values: np.ndarray) -> float | None:
+    """The largest magnitude; None when any of them is not a number."""
+    return float(np.abs(values).max()) if np.isfinite(values).all() else None
