@@ -1,0 +1,162 @@
+"""Memory-mapped registers: which exist, what they do, and a named failure for everything else."""
+
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass
+from typing import Protocol
+
+Read = Callable[[], int]
+Write = Callable[[int], None]
+
+
+class Violation(Exception):
+    """The firmware did what the emulator does not model or the chip does not allow; the machine adds where."""
+
+    def __init__(self, name: str, what: str, remedy: str) -> None:
+        super().__init__(name, what, remedy)
+        self.name = name
+        self.what = what
+        self.remedy = remedy
+
+
+@dataclass(frozen=True, slots=True)
+class Register:
+    """One register at `offset` from its peripheral's base, for accesses of `size` bytes.
+
+    `read` None means write-only, `write` None read-only: the forbidden access fails the run.
+    """
+
+    offset: int
+    name: str
+    read: Read | None
+    write: Write | None
+    size: int = 4
+
+
+class Peripheral(Protocol):
+    """A block of registers. `reset` puts it into the state after a chip reset."""
+
+    @property
+    def name(self) -> str: ...
+    @property
+    def base(self) -> int: ...
+    def registers(self) -> Sequence[Register]: ...
+    def reset(self) -> None: ...
+
+
+class Stored:
+    """A register that keeps what is written. Writing a one outside `modelled` fails the run by name."""
+
+    __slots__ = ("_after", "_initial", "_modelled", "_name", "value")
+
+    def __init__(self, name: str, modelled: int, initial: int = 0, after: Callable[[], None] | None = None) -> None:
+        self.value = initial
+        self._name = name
+        self._initial = initial
+        self._modelled = modelled | initial
+        self._after = after
+
+    def at(self, offset: int, size: int = 4) -> Register:
+        return Register(offset, self._name, self.read, self.write, size)
+
+    def read(self) -> int:
+        return self.value
+
+    def write(self, value: int) -> None:
+        check_bits(self._name, value, self._modelled)
+        self.value = value
+        if self._after is not None:
+            self._after()
+
+    def reset(self) -> None:
+        self.value = self._initial
+
+
+def check_bits(name: str, value: int, modelled: int) -> None:
+    """Raise Violation when `value` sets a bit that has no model."""
+    if value & ~modelled:
+        raise Violation(
+            "unmodelled_bits",
+            f"{name} = 0x{value:08X} sets bits that are not modelled: 0x{value & ~modelled:08X}",
+            "clear them in the firmware, or model them in firmware_host/emulator",
+        )
+
+
+class RegisterBus:
+    """Routes accesses of one address range to registers.
+
+    The tables are keyed by offset and access size and hold only registers of peripherals that are clocked, so that
+    the common access costs one dictionary look-up.
+    """
+
+    def __init__(self, base: int) -> None:
+        self._base = base
+        self._reads: dict[int, Read] = {}
+        self._writes: dict[int, Write] = {}
+        self._known: dict[int, tuple[Peripheral, Register]] = {}
+        self._peripherals: list[tuple[int, Peripheral]] = []
+
+    def attach(self, peripheral: Peripheral, clocked: bool = True) -> None:
+        offset = peripheral.base - self._base
+        self._peripherals.append((offset, peripheral))
+        for register in peripheral.registers():
+            self._known[_key(offset + register.offset, register.size)] = (peripheral, register)
+        self.clock(peripheral, clocked)
+
+    def clock(self, peripheral: Peripheral, on: bool) -> None:
+        """Make the peripheral's registers reachable, or not."""
+        offset = peripheral.base - self._base
+        for register in peripheral.registers():
+            key = _key(offset + register.offset, register.size)
+            self._reads.pop(key, None)
+            self._writes.pop(key, None)
+            if on and register.read is not None:
+                self._reads[key] = register.read
+            if on and register.write is not None:
+                self._writes[key] = register.write
+
+    def read(self, offset: int, size: int) -> int:
+        try:
+            register = self._reads[offset << 3 | size]
+        except KeyError:
+            raise self._refusal("read", offset, size) from None
+        return register()
+
+    def write(self, offset: int, size: int, value: int) -> None:
+        try:
+            register = self._writes[offset << 3 | size]
+        except KeyError:
+            raise self._refusal("write", offset, size, value) from None
+        register(value)
+
+    def _refusal(self, verb: str, offset: int, size: int, value: int | None = None) -> Violation:
+        written = "" if value is None else f" of 0x{value:X}"
+        known = self._known.get(_key(offset, size))
+        if known is None:
+            return Violation(
+                "unmodelled_register",
+                f"{8 * size}-bit {verb}{written}: {self._name(offset)} is not modelled",
+                "leave the register alone in the firmware, or model it in firmware_host/emulator",
+            )
+        peripheral, register = known
+        if (register.read if verb == "read" else register.write) is None:
+            return Violation(
+                "register_access",
+                f"{verb}{written}: {peripheral.name} {register.name} does not allow it",
+                "correct the firmware",
+            )
+        return Violation(
+            "clock_off",
+            f"{verb}{written}: {peripheral.name} {register.name} has no clock",
+            f"enable {peripheral.name} in RCC first",
+        )
+
+    def _name(self, offset: int) -> str:
+        below = [(base, peripheral.name) for base, peripheral in self._peripherals if base <= offset < base + 0x400]
+        if not below:
+            return f"0x{self._base + offset:08X}"
+        base, name = max(below)
+        return f"{name}+0x{offset - base:02X}"
+
+
+def _key(offset: int, size: int) -> int:
+    return offset << 3 | size

@@ -1,0 +1,232 @@
+"""The LSM9DS1's gyroscope and thermometer at register level (datasheet DocID025715, sections 2, 5, 6 and 7)."""
+
+import math
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass
+
+import numpy as np
+
+from firmware_host.emulator.bus import Violation
+
+WHO_AM_I = 0x68
+_INT1_CTRL, _WHO_AM_I, _CTRL_REG1_G = 0x0C, 0x0F, 0x10
+_OUT_TEMP_L, _OUT_TEMP_H, _STATUS_REG, _OUT_X_L_G, _OUT_Z_H_G = 0x15, 0x16, 0x17, 0x18, 0x1D
+_CTRL_REG8 = 0x22
+# Registers of the accelerometer and gyroscope, with their values after reset and the bits that have a model. Writing
+# one to any other bit fails the run: it would switch on a filter, FIFO, sleep or format that is not simulated.
+_RESET_AND_BITS = {
+    _INT1_CTRL: (0x00, 0x02),  # INT_DRDY_G
+    0x0D: (0x00, 0x00),  # INT2_CTRL
+    _CTRL_REG1_G: (0x00, 0xFB),  # ODR_G, FS_G; BW_G acts on the second filter, which is not in the path
+    0x11: (0x00, 0x00),  # CTRL_REG2_G: output straight after the first filter
+    0x12: (0x00, 0x00),  # CTRL_REG3_G: no high-pass filter, no low-power mode
+    0x13: (0x00, 0x00),  # ORIENT_CFG_G
+    0x1E: (0x38, 0x38),  # CTRL_REG4: all three axes
+    0x1F: (0x38, 0x38),  # CTRL_REG5_XL
+    0x20: (0x00, 0x00),  # CTRL_REG6_XL: accelerometer off
+    0x21: (0x00, 0x00),  # CTRL_REG7_XL
+    _CTRL_REG8: (0x04, 0x45),  # BDU, IF_ADD_INC, SW_RESET
+    0x23: (0x00, 0x04),  # CTRL_REG9: I2C_DISABLE
+    0x24: (0x00, 0x00),  # CTRL_REG10
+    0x2E: (0x00, 0x00),  # FIFO_CTRL
+}
+_RATES_HZ = {1: 14.9, 2: 59.5, 3: 119.0, 4: 238.0, 5: 476.0, 6: 952.0}  # table 46
+_SENSITIVITIES_MDPS = {0: 8.75, 1: 17.5, 3: 70.0}  # table 3; 245, 500 and 2000 °/s
+_GDA, _TDA = 0x02, 0x04
+_BDU, _IF_ADD_INC, _SW_RESET = 0x40, 0x04, 0x01
+_NOISE_BLOCK = 3 * 256
+
+
+@dataclass(frozen=True, slots=True)
+class GyroTruth:
+    """What the simulated gyroscope really does, in the model g = K (m + b) with m the reading (SIX, Eq. (3)).
+
+    `scale`: diagonal of K; `bias_rad_s`: b, in the units of the reading; `noise_rad_s`: standard deviation of one
+    reading; `non_orthogonality_rad` (xy, xz, yz): the y axis leans by xy towards x, the z axis by xz towards x and
+    by yz towards y.
+    """
+
+    scale: Sequence[float] = (1.0, 1.0, 1.0)
+    bias_rad_s: Sequence[float] = (0.0, 0.0, 0.0)
+    noise_rad_s: float = 0.0
+    non_orthogonality_rad: Sequence[float] = (0.0, 0.0, 0.0)
+
+
+class Lsm9ds1:
+    """The accelerometer-gyroscope die on the SPI bus; the accelerometer stays off.
+
+    `rate_at(time_s)`: true angular rate in the part's own axes, 3 floats, rad/s; asked once for each conversion, at
+    the instant of the conversion. `temperature_c`: die temperature. `seed`: of the noise, which is drawn per
+    conversion, so that readings do not depend on when they are read. `oscillator_ppm`: how fast the part's own
+    oscillator makes its data rate.
+
+    The data-ready line stays high until the high byte of the z rate is read: a conversion that nobody read is
+    replaced by the next without a new edge.
+    """
+
+    name = "LSM9DS1"
+    spi_modes = (3,)
+    spi_max_hz = 10e6
+
+    def __init__(
+        self,
+        rate_at: Callable[[float], Sequence[float]],
+        truth: GyroTruth,
+        *,
+        temperature_c: float,
+        seed: int | np.random.SeedSequence,
+        oscillator_ppm: float = 0.0,
+        chip_select: str = "PA11",
+        interrupt: str = "PA8",
+    ) -> None:
+        self.chip_select = chip_select
+        self.interrupt = interrupt
+        self._rate_at = rate_at
+        self._inverse_scale = [1 / k for k in truth.scale]
+        self._bias = list(truth.bias_rad_s)
+        self._noise_rad_s = truth.noise_rad_s
+        xy, xz, yz = truth.non_orthogonality_rad
+        self._axes = (
+            (1.0, 0.0, 0.0),
+            (math.sin(xy), math.cos(xy), 0.0),
+            (math.sin(xz), math.sin(yz), math.sqrt(1 - math.sin(xz) ** 2 - math.sin(yz) ** 2)),
+        )
+        self._random = np.random.default_rng(seed)
+        self._noise: list[float] = []
+        self._speed = 1 + oscillator_ppm * 1e-6
+        self._temperature_raw = max(-2048, min(2047, round((temperature_c - 25) * 16)))
+        self._address: int | None = None  # None: the next byte is the address
+        self._reading = False
+        self._reset()
+
+    # --- what the board sees
+
+    @property
+    def next_event_s(self) -> float:
+        return self._next_conversion_s
+
+    @property
+    def interrupt_level(self) -> bool:
+        return bool(self._registers[_INT1_CTRL] & 0x02 and self._status & _GDA)
+
+    def advance(self, time_s: float) -> None:
+        while self._next_conversion_s <= time_s:
+            self._convert(self._next_conversion_s)
+            self._conversions += 1
+            self._next_conversion_s = self._started_s + (self._conversions + 1) * self._period_s
+
+    def select(self) -> None:
+        self._address = None
+
+    def deselect(self) -> None:
+        self._address = None
+
+    def transfer(self, byte: int, time_s: float) -> int:
+        if self._address is None:
+            self._reading = bool(byte & 0x80)
+            self._address = byte & 0x7F
+            return 0xFF
+        address = self._address
+        if self._registers[_CTRL_REG8] & _IF_ADD_INC:
+            self._address = address + 1 & 0x7F
+        if self._reading:
+            return self._read(address)
+        self._write(address, byte, time_s)
+        return 0xFF
+
+    # --- registers
+
+    def _reset(self) -> None:
+        self._registers = {address: initial for address, (initial, _bits) in _RESET_AND_BITS.items()}
+        self._status = 0
+        self._latest = bytes(6)
+        self._output = bytearray(6)
+        self._temperature = bytes(2)
+        self._held = [False, False, False]  # BDU: low byte read, high byte not yet
+        self._started_s = 0.0
+        self._conversions = 0
+        self._period_s = math.inf
+        self._next_conversion_s = math.inf
+
+    def _read(self, address: int) -> int:
+        if _OUT_X_L_G <= address <= _OUT_Z_H_G:
+            return self._read_output(address - _OUT_X_L_G)
+        if address in self._registers:
+            return self._registers[address]
+        if address == _WHO_AM_I:
+            return WHO_AM_I
+        if address == _STATUS_REG:
+            return self._status
+        if address in (_OUT_TEMP_L, _OUT_TEMP_H):
+            if address == _OUT_TEMP_H:
+                self._status &= ~_TDA
+            return self._temperature[address - _OUT_TEMP_L]
+        raise Violation("unmodelled_register", f"read of LSM9DS1 register 0x{address:02X}", "model it in lsm9ds1.py")
+
+    def _read_output(self, index: int) -> int:
+        axis, high = divmod(index, 2)
+        value = self._output[index]
+        if self._registers[_CTRL_REG8] & _BDU:
+            self._held[axis] = not high
+            if high:
+                self._output[index - 1 : index + 1] = self._latest[index - 1 : index + 1]
+        if axis == 2 and high:
+            self._status &= ~_GDA
+        return value
+
+    def _write(self, address: int, value: int, time_s: float) -> None:
+        if address not in _RESET_AND_BITS:
+            raise Violation(
+                "unmodelled_register", f"write to LSM9DS1 register 0x{address:02X}", "model it in lsm9ds1.py"
+            )
+        _initial, bits = _RESET_AND_BITS[address]
+        if value & ~bits:
+            raise Violation(
+                "unmodelled_bits",
+                f"LSM9DS1 register 0x{address:02X} = 0x{value:02X} sets bits that are not modelled",
+                "clear them in the firmware, or model them in lsm9ds1.py",
+            )
+        if address == _CTRL_REG8 and value & _SW_RESET:
+            self._reset()
+            return
+        changed = self._registers[address] != value
+        self._registers[address] = value
+        if address == _CTRL_REG1_G and changed:
+            self._start(value, time_s)
+
+    def _start(self, control: int, time_s: float) -> None:
+        """A new data rate or range: conversions begin anew."""
+        rate_code, range_code = control >> 5, control >> 3 & 3
+        if rate_code == 7 or range_code == 2:
+            raise Violation(
+                "sensor_setup",
+                f"LSM9DS1 CTRL_REG1_G = 0x{control:02X}: data rate or range that the part does not have",
+                "use rate codes 0–6 and range codes 0, 1, 3",
+            )
+        self._status &= ~_GDA
+        self._conversions = 0
+        self._started_s = time_s
+        self._period_s = 1 / (_RATES_HZ[rate_code] * self._speed) if rate_code else math.inf
+        self._next_conversion_s = time_s + self._period_s
+        self._per_count = math.radians(_SENSITIVITIES_MDPS[range_code] * 1e-3)
+
+    # --- measuring
+
+    def _convert(self, time_s: float) -> None:
+        """One conversion of all axes and the thermometer, as the output registers will show it."""
+        if len(self._noise) < 3:
+            self._noise = self._random.standard_normal(_NOISE_BLOCK).tolist()[::-1]
+        true = self._rate_at(time_s)
+        data = b""
+        for axis, inverse_scale, bias in zip(self._axes, self._inverse_scale, self._bias, strict=True):
+            along = axis[0] * true[0] + axis[1] * true[1] + axis[2] * true[2]
+            reading = along * inverse_scale - bias + self._noise_rad_s * self._noise.pop()
+            counts = max(-32768, min(32767, round(reading / self._per_count)))
+            data += counts.to_bytes(2, "little", signed=True)
+        self._latest = data
+        for axis_index in range(3):
+            if not self._held[axis_index]:
+                low = 2 * axis_index
+                self._output[low : low + 2] = data[low : low + 2]
+        self._temperature = self._temperature_raw.to_bytes(2, "little", signed=True)
+        self._status |= _GDA | _TDA

@@ -1,0 +1,55 @@
+"""The board's time: one counter of 80 MHz ticks, and what is due when."""
+
+from collections.abc import Callable
+
+TICK_HZ = 80_000_000  # the core clock the firmware sets; while it runs slower, an instruction takes several ticks
+NEVER = 1 << 62
+
+
+class Timeline:
+    """Now, the limit the board may run to, and one next due tick for each registered action.
+
+    The machine's block hook reads `now` and `deadline` on every block, so they are plain attributes: `deadline` is
+    the tick at which the core has to pause because something is due, the limit is reached, or `interrupt` was called.
+    """
+
+    __slots__ = ("_actions", "_due", "deadline", "limit", "next_due", "now")
+
+    def __init__(self) -> None:
+        self.now = 0
+        self.limit = 0
+        self.deadline = 0
+        self.next_due = NEVER
+        self._actions: list[Callable[[], None]] = []
+        self._due: list[int] = []
+
+    def register(self, action: Callable[[], None]) -> int:
+        """A slot for `action`; at equal ticks, slots registered first act first."""
+        self._actions.append(action)
+        self._due.append(NEVER)
+        return len(self._due) - 1
+
+    def schedule(self, slot: int, tick: int) -> None:
+        self._due[slot] = tick
+        self.next_due = min(self._due)
+        self.deadline = min(self.deadline, tick)
+
+    def cancel(self, slot: int) -> None:
+        self._due[slot] = NEVER
+        self.next_due = min(self._due)
+
+    def run_due(self) -> None:
+        """Do everything that is due by now, in the order of its ticks."""
+        while self.next_due <= self.now:
+            slot = self._due.index(self.next_due)
+            self._due[slot] = NEVER
+            self.next_due = min(self._due)
+            self._actions[slot]()
+
+    def interrupt(self) -> None:
+        """Have the core pause at the end of the current block: an exception may have become pending."""
+        self.deadline = 0
+
+    def wait_until(self, tick: int) -> None:
+        """Let time pass for a core that polls a flag which changes at `tick`, but not beyond the next event."""
+        self.now = max(self.now, min(tick, self.deadline))

@@ -1,0 +1,111 @@
+"""TIM2 as a free-running counter and the independent watchdog (RM0394, chapters 28 and 31)."""
+
+from collections.abc import Callable, Sequence
+
+from firmware_host.emulator.bus import Register, Stored, Violation, check_bits
+from firmware_host.emulator.clocks import Clocks
+from firmware_host.emulator.timeline import TICK_HZ, Timeline
+
+_LSI_HZ = 32_000
+_START, _KICK, _UNLOCK = 0xCCCC, 0xAAAA, 0x5555
+
+
+class Tim2:
+    """A 32-bit up-counter without interrupts. The prescaler acts from the next update event on, as on the chip."""
+
+    name = "TIM2"
+    base = 0x4000_0000
+
+    def __init__(self, timeline: Timeline, clocks: Clocks) -> None:
+        self._timeline = timeline
+        self._clocks = clocks
+        self._control = Stored("TIM2 CR1", 1, after=self._switch)
+        self._reload = Stored("TIM2 ARR", 0xFFFF_FFFF, initial=0xFFFF_FFFF)
+        self._prescaler = Stored("TIM2 PSC", 0xFFFF)
+        self.reset()
+
+    def reset(self) -> None:
+        for register in (self._control, self._reload, self._prescaler):
+            register.reset()
+        self._divider = 1  # the prescaler in effect, plus one
+        self._counted = 0  # the count at `_since`
+        self._since: int | None = None  # tick, None while stopped
+        self._updated = False
+
+    def registers(self) -> Sequence[Register]:
+        return (
+            self._control.at(0x00),
+            Register(0x10, "SR", lambda: int(self._updated), self._write_status),
+            Register(0x14, "EGR", None, self._generate),
+            Register(0x24, "CNT", self._count, self._set_count),
+            self._prescaler.at(0x28),
+            self._reload.at(0x2C),
+        )
+
+    def _count(self) -> int:
+        count = self._counted
+        if self._since is not None:
+            timer_hz = self._clocks.pclk1_hz * (1 if self._clocks.pclk1_hz == self._clocks.core_hz else 2)
+            count += (self._timeline.now - self._since) * timer_hz // (TICK_HZ * self._divider)
+        return count % (self._reload.value + 1)
+
+    def _set_count(self, value: int) -> None:
+        self._counted = value
+        if self._since is not None:
+            self._since = self._timeline.now
+
+    def _switch(self) -> None:
+        self._counted = self._count()
+        self._since = self._timeline.now if self._control.value & 1 else None
+
+    def _generate(self, value: int) -> None:
+        check_bits("TIM2 EGR", value, 1)
+        if value & 1:
+            self._divider = self._prescaler.value + 1
+            self._set_count(0)
+            self._updated = True
+
+    def _write_status(self, value: int) -> None:
+        self._updated = self._updated and bool(value & 1)
+
+
+class Watchdog:
+    """IWDG: calls `on_bite` when it is not kicked in time. Once started only a reset stops it."""
+
+    name = "IWDG"
+    base = 0x4000_3000
+
+    def __init__(self, timeline: Timeline, on_bite: Callable[[], None]) -> None:
+        self._timeline = timeline
+        self._slot = timeline.register(on_bite)
+        self._prescaler = Stored("IWDG PR", 7)
+        self._reload = Stored("IWDG RLR", 0xFFF, initial=0xFFF)
+        self.reset()
+
+    def reset(self) -> None:
+        self._prescaler.reset()
+        self._reload.reset()
+        self._started = False
+        self._unlocked = False
+        self._timeline.cancel(self._slot)
+
+    def registers(self) -> Sequence[Register]:
+        return (
+            Register(0x00, "KR", None, self._write_key),
+            Register(0x04, "PR", self._prescaler.read, lambda value: self._set(self._prescaler, value)),
+            Register(0x08, "RLR", self._reload.read, lambda value: self._set(self._reload, value)),
+            Register(0x0C, "SR", lambda: 0, None),
+        )
+
+    def _set(self, register: Stored, value: int) -> None:
+        if not self._unlocked:
+            raise Violation("iwdg_locked", "IWDG PR or RLR written while locked", "write 0x5555 to KR first")
+        register.write(value)
+
+    def _write_key(self, key: int) -> None:
+        self._unlocked = key == _UNLOCK
+        if key == _START:
+            self._started = True
+        if self._started and key in (_START, _KICK):
+            counts = (self._reload.value + 1) * (4 << min(self._prescaler.value, 6))
+            self._timeline.schedule(self._slot, self._timeline.now + counts * TICK_HZ // _LSI_HZ)
