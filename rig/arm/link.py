@@ -52,11 +52,6 @@ class ChildLink:
             threading.Thread(target=self._guard, name="arm guard", daemon=True),
         )
 
-    @property
-    def pid(self) -> int | None:
-        """The child's process id, for logs."""
-        return self._process.pid
-
     def start(self) -> None:
         """Start the child; `on_message` gets `Connected` or `Failed`."""
         with _interrupts_held():
