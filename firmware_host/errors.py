@@ -1,4 +1,4 @@
-"""How the board's half says no: the same three fields as the rig's own errors, so the rig can pass them on unchanged."""
+"""How the board's half says no, with the same three fields as the rig's own errors."""
 
 
 class BoardError(Exception):

@@ -57,7 +57,7 @@ static bool take_byte(uint8_t byte, struct frame *frame)
     bool too_long = rx.too_long;
     rx.filled = 0;
     rx.too_long = false;
-    if (size == 0)
+    if (size == 0 && !too_long)
         return false; /* the host's greeting zero, or two delimiters in a row */
     if (!too_long && frame_decode(rx.block, size, frame))
         return true;

@@ -1,0 +1,62 @@
+/* The core as a library on the host: the caller is the chip. */
+#include "port.h"
+
+#include <string.h>
+
+#include "protocol.h"
+
+typedef void (*bus_function)(unsigned device, uint8_t *bytes, size_t size);
+typedef void (*transmit_function)(const uint8_t *bytes, size_t size);
+typedef void (*restart_function)(void);
+
+static bus_function on_bus;
+static transmit_function on_transmit;
+static restart_function on_restart;
+static uint32_t time_us;
+static const uint8_t unique_id[12] = {0x01, 0x23, 0x45, 0x67, 0x89, 0xAB, 0xCD, 0xEF, 0x01, 0x23, 0x45, 0x67};
+
+void host_connect(bus_function bus, transmit_function transmit, restart_function restart);
+void host_set_time_us(uint32_t now_us);
+
+void host_connect(bus_function bus, transmit_function transmit, restart_function restart)
+{
+    on_bus = bus;
+    on_transmit = transmit;
+    on_restart = restart;
+}
+
+void host_set_time_us(uint32_t now_us)
+{
+    time_us = now_us;
+}
+
+uint32_t port_time_us(void)
+{
+    return time_us;
+}
+
+void bus_xfer(unsigned device, uint8_t *bytes, size_t size)
+{
+    on_bus(device, bytes, size);
+}
+
+void port_transmit(const uint8_t *bytes, size_t size)
+{
+    on_transmit(bytes, size);
+}
+
+void port_restart(void)
+{
+    on_restart();
+}
+
+void port_health(struct port_health *health)
+{
+    memset(health, 0, sizeof *health);
+    health->reset_cause = RESET_POWER;
+}
+
+const uint8_t *port_unique_id(void)
+{
+    return unique_id;
+}

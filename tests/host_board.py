@@ -1,0 +1,138 @@
+"""The firmware's core built for this machine, with a gyroscope's registers on its bus; tests play the chip."""
+
+import ctypes
+import functools
+import subprocess
+import tempfile
+from pathlib import Path
+
+from firmware_host.protocol import Frame, FrameReader, encode
+
+FIRMWARE = Path(__file__).parents[1] / "firmware_host" / "firmware"
+
+_BUS = ctypes.CFUNCTYPE(None, ctypes.c_uint, ctypes.POINTER(ctypes.c_uint8), ctypes.c_size_t)
+_TRANSMIT = ctypes.CFUNCTYPE(None, ctypes.POINTER(ctypes.c_uint8), ctypes.c_size_t)
+_RESTART = ctypes.CFUNCTYPE(None)
+
+
+class CFrame(ctypes.Structure):
+    """`struct frame` of core/frame.h."""
+
+    _fields_ = (
+        ("type", ctypes.c_uint8),
+        ("sequence", ctypes.c_uint8),
+        ("size", ctypes.c_uint8),
+        ("payload", ctypes.POINTER(ctypes.c_uint8)),
+    )
+
+
+@functools.cache
+def core() -> ctypes.CDLL:
+    """The core, built once a test run, with undefined behaviour ending the process."""
+    out = tempfile.mkdtemp(prefix="rig_host_")
+    subprocess.run(["make", "-s", "-C", FIRMWARE, "host", f"OUT={out}"], check=True)
+    library = ctypes.CDLL(f"{out}/rig_host.so")
+    library.frame_crc.restype = ctypes.c_uint16
+    library.frame_encode.restype = ctypes.c_size_t
+    library.frame_decode.restype = ctypes.c_bool
+    library.clock_now.restype = ctypes.c_uint64
+    return library
+
+
+class Registers:
+    """An SPI part with auto-incrementing registers: enough of an LSM9DS1 to see what the driver does to it."""
+
+    def __init__(self) -> None:
+        self.values = bytearray(128)
+        self.values[0x0F] = 0x68
+        self.values[0x22] = 0x04  # IF_ADD_INC, as after power-up
+        self.writes: list[tuple[int, int]] = []
+        self.stuck: set[int] = set()  # registers that ignore writes
+        self.transfers: list[int] = []
+        self.fresh = False
+
+    def transfer(self, data: bytes) -> bytes:
+        """One chip select: the bytes in, the bytes out."""
+        self.transfers.append(len(data))
+        address, reading = data[0] & 0x7F, data[0] & 0x80
+        if not reading:
+            for offset, value in enumerate(data[1:]):
+                self.writes.append((address + offset, value))
+                if address + offset not in self.stuck:
+                    self.values[address + offset] = value
+            return bytes(len(data))
+        self.values[0x17] = 0x02 if self.fresh else 0x00
+        answer = bytes(self.values[address : address + len(data) - 1])
+        if address + len(data) - 2 >= 0x1D:
+            self.fresh = False
+        return b"\0" + answer
+
+    def convert(self, counts: tuple[int, int, int], temperature: int) -> None:
+        """A new conversion in the output registers."""
+        for address, value in zip((0x15, 0x18, 0x1A, 0x1C), (temperature, *counts), strict=True):
+            self.values[address : address + 2] = value.to_bytes(2, "little", signed=True)
+        self.fresh = True
+
+
+class HostBoard:
+    """The core after a reset. There is one core in a process, so one HostBoard at a time."""
+
+    def __init__(self) -> None:
+        self.core = core()
+        self.gyro = Registers()
+        self.line_is_free = True  # False: the transmitter is busy until `sent()`
+        self.restarts = 0
+        self.wire = bytearray()
+        self._callbacks = (_BUS(self._bus), _TRANSMIT(self._transmit), _RESTART(self._restart))
+        self.core.host_connect(*self._callbacks)
+        self.set_time(0)
+        self.core.board_reset()
+
+    def _bus(self, device: int, pointer: "ctypes._Pointer[ctypes.c_uint8]", size: int) -> None:
+        assert device == 0 and size % 2 == 0
+        ctypes.memmove(pointer, self.gyro.transfer(ctypes.string_at(pointer, size)), size)
+
+    def _transmit(self, pointer: "ctypes._Pointer[ctypes.c_uint8]", size: int) -> None:
+        self.wire += ctypes.string_at(pointer, size)
+        if self.line_is_free:
+            self.core.link_sent()
+
+    def _restart(self) -> None:
+        self.restarts += 1
+        self.core.board_reset()
+
+    def set_time(self, time_us: int) -> None:
+        """The chip's counter, which wraps at 32 bits."""
+        self.core.host_set_time_us(ctypes.c_uint32(time_us & 0xFFFFFFFF))
+
+    def sent(self) -> None:
+        """The transmitter's interrupt."""
+        self.core.link_sent()
+
+    def receive(self, data: bytes) -> None:
+        """Bytes from the host, then one pass of the main loop."""
+        for byte in data:
+            self.core.link_byte_received(byte)
+        self.run()
+
+    def data_ready(self, captured_us: int) -> None:
+        """The gyroscope's interrupt."""
+        self.core.acquisition_data_ready(0, ctypes.c_uint32(captured_us & 0xFFFFFFFF))
+
+    def run(self, passes: int = 2) -> None:
+        """Passes of the main loop; two, because what the first queues behind a busy line the second sends."""
+        for _ in range(passes):
+            self.core.board_run()
+
+    def frames(self) -> list[Frame]:
+        """Whole frames sent since the last call."""
+        reader = FrameReader()
+        frames = reader.feed(bytes(self.wire))
+        assert reader.damaged == 0
+        self.wire.clear()
+        return frames
+
+    def ask(self, name: str, sequence: int = 1, **values: object) -> list[Frame]:
+        """Sends a request; what the board sent until it had answered."""
+        self.receive(encode(name, sequence, values))
+        return self.frames()
