@@ -107,13 +107,12 @@ class DashboardSession:
         return f"URSoftware {self._version()} (simulated)"
 
     def _robotmode(self) -> str:
-        return f"Robotmode: {self._robot.robot_mode.name.replace('POWER_ON', 'POWERING_ON')}"
+        return f"Robotmode: {self._robot.robot_mode.name}"
 
     def _program_state(self) -> str:
-        if self._playing:
-            return f"PLAYING {self._robot.program_name}"
+        name = PurePosixPath(self._robot.program_name).name or "<unnamed>"
         paused = self._robot.runtime_state in (RuntimeState.PAUSING, RuntimeState.PAUSED)
-        return f"{'PAUSED' if paused else 'STOPPED'} {self._robot.program_name}".rstrip()
+        return f"{'PLAYING' if self._playing else 'PAUSED' if paused else 'STOPPED'} {name}"
 
     # -- orders ------------------------------------------------------------------------------------------------
     def _stop(self) -> str:

@@ -40,7 +40,7 @@ class Motion:
     @property
     def standing(self) -> bool:
         """No trajectory is being played (a paused one still is)."""
-        return self._trajectory_s >= self._trajectory.duration_s
+        return self._trajectory.over(self._trajectory_s)
 
     @property
     def moving(self) -> bool:

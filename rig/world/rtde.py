@@ -43,7 +43,7 @@ class Output:
         self._struct = struct.Struct(layout)
         self._lead = [self._struct.size, ord("U"), *self._lead]
         self._per_tick = frequency_hz / TICKS_PER_SECOND
-        self._owed = 1.0  # the first package goes out with the first tick
+        self._owed = 1.0 - self._per_tick  # the first package goes out with the first tick
 
     def due(self) -> bool:
         """Whether this tick has a package; called once a tick."""

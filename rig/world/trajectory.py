@@ -6,6 +6,7 @@ from math import inf, sqrt
 
 Joints = tuple[float, ...]
 ZERO: Joints = (0.0,) * 6
+ROUNDING_S = 1e-9  # so many seconds before its end a trajectory counts as over
 
 
 @dataclass(frozen=True, slots=True)
@@ -38,9 +39,12 @@ class Trajectory:
             end_rad if end_rad is not None else last.at(last.duration_s)[0] if last.duration_s < inf else last.q_rad
         )
 
+    def over(self, time_s: float) -> bool:
+        return time_s >= self.duration_s - ROUNDING_S
+
     def at(self, time_s: float) -> tuple[Joints, Joints, Joints]:
         """Position, velocity, acceleration (six joints each) at `time_s` after the start."""
-        if time_s >= self.duration_s:
+        if self.over(time_s):
             return self.end_rad, ZERO, ZERO
         for piece in self._pieces:
             if time_s < piece.duration_s:
