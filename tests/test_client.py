@@ -12,6 +12,7 @@ from contextlib import closing
 import numpy as np
 import pytest
 from cobs import cobs
+from conftest import fresh_host
 from host_board import HostBoard
 
 from firmware_host import protocol
@@ -19,7 +20,7 @@ from firmware_host.client import Board, SampleBatch
 from firmware_host.errors import BoardError
 
 PERIOD_US = 4202  # 238 Hz
-HOST = f"127.0.{4 + os.getpid() % 200}.{1 + os.getpid() // 200 % 250}"
+HOST = fresh_host()
 
 
 class BoardOnAWire(threading.Thread):
