@@ -12,8 +12,8 @@ Ctrl-C stops the arm at any moment and keeps what was measured.
 """
 
 from rig.arm.plan import Rest, Sweep, Transfer
+from rig.cli import run_script
 from rig.procedure import Rig
-from rig.script import main
 
 
 def six_observation(rig: Rig) -> None:
@@ -32,4 +32,4 @@ def six_observation(rig: Rig) -> None:
 
 
 if __name__ == "__main__":
-    raise SystemExit(main(six_observation))
+    raise SystemExit(run_script(six_observation))

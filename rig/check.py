@@ -1,7 +1,6 @@
 """`rig check`: connect and look. Receives only, so nothing moves and no program on the arm is stopped."""
 
 import sys
-import tempfile
 from collections.abc import Callable, Sequence
 from contextlib import nullcontext
 from math import degrees
@@ -14,18 +13,15 @@ from rig.arm.preflight import arm_problems, plan_problems
 from rig.config.load import load
 from rig.config.models import RigConfig
 from rig.errors import RigError
-from rig.launch import simulated_laboratory
+from rig.launch import simulated_laboratory, written
 from rig.opening import find_sensor, refusing_board_errors
 
 
 def check(config_path: Path, overrides: Sequence[str]) -> int:
     """Look at the board and the arm; print what is there and what is missing. 0 when a run could start, else 2."""
     loaded = load(config_path, overrides)
-    with tempfile.TemporaryDirectory() as folder:
-        used = Path(folder) / "config.yaml"
-        used.write_text(loaded.text, encoding="utf-8")
-        with simulated_laboratory(used) if loaded.world else nullcontext():
-            missing = [*_named(_look_at_board, loaded.config), *_named(_look_at_arm, loaded.config)]
+    with written(loaded.text) as used, simulated_laboratory(used) if loaded.world else nullcontext():
+        missing = [*_named(_look_at_board, loaded.config), *_named(_look_at_arm, loaded.config)]
     for problem in missing:
         print(f"missing: {problem}", file=sys.stderr)
     print(f"not ready: {len(missing)} to mend" if missing else "ready")

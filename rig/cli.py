@@ -1,16 +1,18 @@
 """The command line. Heavy modules are imported by the command that needs them, so that help comes at once."""
 
 import argparse
-import json
 import os
 import signal
 import sys
 from collections.abc import Callable, Sequence
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 from rig import __version__
 from rig.errors import RigError
+
+if TYPE_CHECKING:
+    from rig.run import Script
 
 INTERRUPTED = 130
 
@@ -52,60 +54,76 @@ def _parser() -> argparse.ArgumentParser:
         command.set_defaults(command=run)
         return command
 
-    def add_config(command: argparse.ArgumentParser) -> None:
-        command.add_argument("config", type=Path, metavar="CONFIG", help="YAML configuration file")
-        command.add_argument(
-            "--set", action="append", default=[], metavar="PATH=VALUE", dest="overrides", help="change one value"
-        )
-
     run = add("run", _run, "run the procedure the file names")
-    add_config(run)
-    add_run_options(run)
+    _add_config(run)
+    _add_run(run)
     plan = add("plan", _plan, "dry run: every motion, its time and limits; connects to nothing")
-    add_config(plan)
+    _add_config(plan)
     plan.add_argument("--json", action="store_true", help="for machines")
     check = add("check", _check, "connect and look; nothing moves, no program is stopped")
-    add_config(check)
+    _add_config(check)
     resume = add("resume", _resume, "go on with an interrupted run")
     resume.add_argument("run_folder", type=Path, metavar="RUN_DIR")
-    resume.add_argument("--yes", action="store_true", help="do not ask before the arm moves")
+    _add_outcome(resume)
     solve = add("solve", _solve, "recompute the calibration from a recording")
     solve.add_argument("run", type=Path, metavar="RUN", help="a run folder or its run.h5")
     solve.add_argument("--estimator", default="newton", metavar="NAME", help="newton, closed_form or algorithm_1")
     solve.add_argument("--json", action="store_true", help="for machines")
     world = add("world", _world, "only the simulated laboratory, in the foreground, for any client")
-    add_config(world)
+    _add_config(world)
     return parser
 
 
-def add_run_options(parser: argparse.ArgumentParser) -> None:
-    """The options `rig run` shares with the scripts in procedures/."""
+def _add_config(parser: argparse.ArgumentParser) -> None:
+    parser.add_argument("config", type=Path, metavar="CONFIG", help="YAML configuration file")
+    parser.add_argument(
+        "--set",
+        action="append",
+        default=[],
+        metavar="PATH=VALUE",
+        dest="overrides",
+        help="change one value of the file",
+    )
+
+
+def _add_run(parser: argparse.ArgumentParser) -> None:
     parser.add_argument("--out", type=Path, metavar="DIR", help="run folder (default: a new one under output.folder)")
+    _add_outcome(parser)
+
+
+def _add_outcome(parser: argparse.ArgumentParser) -> None:
     parser.add_argument("--yes", action="store_true", help="do not ask before the arm moves")
     parser.add_argument("--json", action="store_true", help="print result.json instead of tables")
 
 
-def _run(options: argparse.Namespace) -> int:
+def run_script(script: "Script") -> int:
+    """Entry point of the scripts in procedures/: they take the arguments of `rig run`."""
+    parser = argparse.ArgumentParser(description=script.__doc__)
+    _add_config(parser)
+    _add_run(parser)
+    options = parser.parse_args()
+    return guarded(lambda: _run(options, script))
+
+
+def _run(options: argparse.Namespace, script: "Script | None" = None) -> int:
     from rig.run import run
 
-    return run(options.config, options.overrides, options.out, assume_yes=options.yes, as_json=options.json)
+    return run(
+        options.config, options.overrides, options.out, script=script, assume_yes=options.yes, as_json=options.json
+    )
 
 
 def _resume(options: argparse.Namespace) -> int:
     from rig.run import resume
 
-    return resume(options.run_folder, assume_yes=options.yes)
+    return resume(options.run_folder, assume_yes=options.yes, as_json=options.json)
 
 
 def _plan(options: argparse.Namespace) -> int:
     from rig.config.load import load
-    from rig.report.plan import plan_document, print_plan
+    from rig.report.plan import checked_plan, print_plan
 
-    config = load(options.config, options.overrides).config
-    if options.json:
-        print(json.dumps(plan_document(config), indent=2))
-    else:
-        print_plan(config)
+    print_plan(checked_plan(load(options.config, options.overrides).config), as_json=options.json)
     return 0
 
 
@@ -122,6 +140,7 @@ def _solve(options: argparse.Namespace) -> int:
 
 
 def _world(options: argparse.Namespace) -> int:
+    from rig.config.load import load
     from rig.launch import foreground_laboratory
 
-    return foreground_laboratory(options.config, options.overrides)
+    return foreground_laboratory(load(options.config, options.overrides).text)

@@ -3,6 +3,7 @@
 import json
 import subprocess
 import sys
+import tempfile
 from collections.abc import Iterator
 from contextlib import contextmanager
 from pathlib import Path
@@ -38,3 +39,18 @@ def simulated_laboratory(config_path: Path) -> Iterator[None]:
                 process.wait(STOP_TIMEOUT_S)
             except subprocess.TimeoutExpired:
                 process.kill()
+
+
+def foreground_laboratory(config_text: str) -> int:
+    """Run only the world of a configuration, given as text, until Ctrl-C; returns its exit status."""
+    with written(config_text) as config_path:
+        return subprocess.call([sys.executable, "-m", "rig.world", str(config_path)])
+
+
+@contextmanager
+def written(config_text: str) -> Iterator[Path]:
+    """The configuration as a file that is there for the length of the `with` block."""
+    with tempfile.TemporaryDirectory() as folder:
+        path = Path(folder) / "config.yaml"
+        path.write_text(config_text, encoding="utf-8")
+        yield path

@@ -1,7 +1,8 @@
 """The verbs a procedure script is written in.
 
 A script receives an open `Rig` and says what to do, in order. Every verb is supervised: while the arm moves or rests
-the board is watched, and whatever ends a verb early (an error, Ctrl-C, a lost link) stops the arm before it is reported.
+the board is watched, and whatever ends a verb early (an error, Ctrl-C, a lost link) stops the arm first and is reported
+then.
 """
 
 import time
@@ -115,7 +116,7 @@ class Rig:
         self.view.line(f"done: {step.name}, {self.arm.latest.time_s - self._step_started_s:.2f} s")
 
     def _watch(self, step: Step) -> None:
-        """Called many times a second while the arm is busy: look after the board and the recording, tell the operator."""
+        """Called many times a second while the arm is busy: look after board and recording, tell the operator."""
         self.board.check()
         self.recorder.check()
         state = self.arm.latest

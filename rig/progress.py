@@ -15,7 +15,7 @@ from rich.progress_bar import ProgressBar
 from rich.table import Table
 
 REFRESH_S = 0.1
-log = logging.getLogger("rig")
+logger = logging.getLogger("rig")
 
 
 @dataclass(frozen=True, slots=True)
@@ -33,9 +33,11 @@ class Status:
 
 
 class View(Protocol):
-    """Where a run reports to: `line` for what happened, `show` for how things stand."""
+    """Where a run reports to: `line` for what happened, `log` for the log only, `show` for how things stand."""
 
     def line(self, text: str) -> None: ...
+
+    def log(self, text: str) -> None: ...
 
     def show(self, status: Status) -> None: ...
 
@@ -44,8 +46,11 @@ class PlainView:
     """Lines on stderr, one for each thing that happened: for log files, CI and pipes."""
 
     def line(self, text: str) -> None:
-        log.info(text)
+        self.log(text)
         print(text, file=sys.stderr, flush=True)
+
+    def log(self, text: str) -> None:
+        logger.info(text)
 
     def show(self, status: Status) -> None:
         """Progress within a step is for people watching; a log does without."""
@@ -59,8 +64,11 @@ class LiveView:
         self._shown_at_s = 0.0
 
     def line(self, text: str) -> None:
-        log.info(text)
+        self.log(text)
         self._live.console.print(text, highlight=False)
+
+    def log(self, text: str) -> None:
+        logger.info(text)
 
     def show(self, status: Status) -> None:
         now_s = time.monotonic()
@@ -87,8 +95,8 @@ def view(log_path: Path) -> Iterator[View]:
     """The view that suits stderr, with everything it says also written to `log_path` with the time."""
     handler = logging.FileHandler(log_path, encoding="utf-8")
     handler.setFormatter(logging.Formatter("%(asctime)s %(levelname)s %(message)s"))
-    log.addHandler(handler)
-    log.setLevel(logging.INFO)
+    logger.addHandler(handler)
+    logger.setLevel(logging.INFO)
     try:
         if sys.stderr.isatty():
             with Live(console=Console(stderr=True), auto_refresh=False, transient=True) as live:
@@ -96,5 +104,5 @@ def view(log_path: Path) -> Iterator[View]:
         else:
             yield PlainView()
     finally:
-        log.removeHandler(handler)
+        logger.removeHandler(handler)
         handler.close()

@@ -96,15 +96,8 @@ class RunRecorder:
         self._pending = _Pending({name: [] for name in sensors}, [], [])
         self._closing = threading.Event()
         try:
-            self._file = h5py.File(path, "w-", libver="latest")
-            self._file.attrs.update(schema=SCHEMA, config=config, provenance=json.dumps(dict(provenance)))
-            self._arm = _growing(self._file, "arm", ARM_STATE_DTYPE, CHUNK_ROWS)
-            self._events = _growing(self._file, "events", np.dtype("u1"), CHUNK_BYTES)
-            self._samples = {
-                name: _growing(self._file, f"samples/{name}", SAMPLE_DTYPE, CHUNK_ROWS) for name in sensors
-            }
-            for name, sensor in sensors.items():
-                self._samples[name].attrs.update(asdict(sensor))
+            _create(path, config, provenance, sensors)
+            self._file = h5py.File(path, "r+", libver="latest")
             self._file.swmr_mode = True
             self._descriptor: int = self._file.id.get_vfd_handle()
         except (OSError, RuntimeError) as error:
@@ -179,12 +172,12 @@ class RunRecorder:
             self._pending = _Pending({name: [] for name in pending.samples}, [], [])
         for name, batches in pending.samples.items():
             if batches:
-                _append(self._samples[name], np.concatenate(batches))
+                _append(self._file["samples"][name], np.concatenate(batches))
         if pending.arm:
             records = [state.to_record() for state in pending.arm]
-            _append(self._arm, np.array(records, ARM_STATE_DTYPE))
+            _append(self._file["arm"], np.array(records, ARM_STATE_DTYPE))
         if pending.events:
-            _append(self._events, np.frombuffer(b"".join(pending.events), "u1"))
+            _append(self._file["events"], np.frombuffer(b"".join(pending.events), "u1"))
 
     def _fault(self, error: Exception) -> Fault:
         return Fault(
@@ -270,8 +263,23 @@ class _Pending:
     events: list[bytes]
 
 
-def _growing(file: Any, name: str, dtype: np.dtype[Any], chunk: int) -> Any:
-    return file.create_dataset(name, shape=(0,), maxshape=(None,), chunks=(chunk,), dtype=dtype)
+def _create(path: Path, config: str, provenance: Mapping[str, Any], sensors: Mapping[str, RecordedSensor]) -> None:
+    """Lay out an empty run file beside its place and move it there whole, so that a kill leaves all of it or nothing."""
+    import h5py
+
+    if path.exists():
+        raise FileExistsError(f"{path.name} is there already")
+    whole = path.with_name(path.name + ".part")
+    with h5py.File(whole, "w", libver="latest") as file:
+        file.attrs.update(schema=SCHEMA, config=config, provenance=json.dumps(dict(provenance)))
+        file.create_dataset("arm", shape=(0,), maxshape=(None,), chunks=(CHUNK_ROWS,), dtype=ARM_STATE_DTYPE)
+        file.create_dataset("events", shape=(0,), maxshape=(None,), chunks=(CHUNK_BYTES,), dtype="u1")
+        for name, sensor in sensors.items():
+            dataset = file.create_dataset(
+                f"samples/{name}", shape=(0,), maxshape=(None,), chunks=(CHUNK_ROWS,), dtype=SAMPLE_DTYPE
+            )
+            dataset.attrs.update(asdict(sensor))
+    whole.rename(path)
 
 
 def _append(dataset: Any, rows: NDArray[Any]) -> None:

@@ -44,7 +44,7 @@ class ArmSection(Section):
     payload_kg: Annotated[float, Field(ge=0, le=12.5)]  # UR10e: 12.5 kg
     payload_centre_mm: Vector3 = (0.0, 0.0, 0.0)
     home_deg: Vector6 = (0.0, -90.0, 90.0, -90.0, -90.0, 0.0)
-    transfer_speed_deg_s: Annotated[float, Field(gt=0, le=180)] = 90.0
+    transfer_speed_deg_s: Annotated[float, Field(gt=0, le=180)] = 120.0
     state_rate_hz: Annotated[float, Field(ge=125, le=500)] = 125.0
 
 
@@ -97,7 +97,7 @@ class ProcedureSection(Section):
     directions: Annotated[tuple[Direction, ...], Field(min_length=1)] = ("cw", "ccw")
     repeats: Annotated[int, Field(ge=1, le=100)] = 1
     speed_deg_s: Annotated[float, Field(gt=0, le=180)] = 60.0
-    acceleration_deg_s2: Annotated[float, Field(gt=0, le=800)] = 80.0
+    acceleration_deg_s2: Annotated[float, Field(gt=0, le=800)] = 240.0
     rest_s: Annotated[float, Field(ge=0, le=3600)] = 3.0
     margin_deg: Annotated[float, Field(gt=0, le=90)] = 2.0  # constant speed on each side of the revolution
 

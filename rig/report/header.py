@@ -11,7 +11,7 @@ def calibration_header(result: Mapping[str, Any]) -> str:
     """
     lines = [
         "/* Gyroscope calibration: rate_rad_s[i] = scale[i] * (reading_rad_s[i] + bias_rad_s[i]).",
-        f" * Verdict: {result['verdict']}. Finished {result['provenance']['finished_utc']}. */",
+        f" * Verdict: {result['verdict']}. Solved {result['provenance']['solved_utc']}. */",
         "#ifndef CALIBRATION_H",
         "#define CALIBRATION_H",
     ]
@@ -19,7 +19,7 @@ def calibration_header(result: Mapping[str, Any]) -> str:
         upper = "".join(c if c.isalnum() else "_" for c in name).lower()
         lines += [
             "",
-            f"/* {sensor['part']}, serial number {sensor['serial_number']}, {sensor['temperature_c']:.1f} degrees C. */",
+            f"/* {sensor['part']}, serial number {sensor['serial_number']}, at {sensor['temperature_c']:.1f} °C. */",
             f"static const float {upper}_scale[3] = {_array(sensor['scale'])};",
             f"static const float {upper}_bias_rad_s[3] = {_array(sensor['bias_rad_s'])};",
         ]

@@ -1,13 +1,15 @@
 """The dry run: every motion the plan holds, with its time and its margin to the limits."""
 
+import json
 import math
 from dataclasses import asdict
 from typing import Any
 
+from rich.box import SIMPLE
 from rich.console import Console
 from rich.table import Table
 
-from rig.arm.plan import Plan, Rest, Step, Sweep, plan_six_observation, travel
+from rig.arm.plan import SAME_PLACE_RAD, Plan, Rest, Step, Sweep, plan_six_observation
 from rig.arm.preflight import plan_problems, refuse
 from rig.arm.state import JOINT_NAMES
 from rig.config.models import RigConfig
@@ -26,14 +28,19 @@ def plan_document(plan: Plan) -> dict[str, Any]:
     return {"schema": "rig.plan/1", "duration_s": plan.duration_s, "steps": steps}
 
 
-def print_plan(plan: Plan, console: Console) -> None:
-    """The plan for people, in degrees."""
-    table = Table(title="plan, from the home pose", title_justify="left")
-    for heading in ("at s", "step", "for s", "motion", "speed °/s", "ramp °/s²"):
-        table.add_column(heading, justify="left" if heading in ("step", "motion") else "right")
+def print_plan(plan: Plan, *, as_json: bool) -> None:
+    """The plan on stdout: a table in degrees for people, JSON in SI units for machines."""
+    if as_json:
+        print(json.dumps(plan_document(plan), indent=2))
+        return
+    console = Console(highlight=False)
+    table = Table(title="plan, from the home pose", title_justify="left", box=SIMPLE)
+    for heading in ("at s", "step", "for s", "joints °", "°/s", "°/s²"):
+        table.add_column(heading, justify="left" if heading in ("step", "joints °") else "right", no_wrap=True)
     at_s = 0.0
     for step in plan.steps:
-        table.add_row(f"{at_s:.1f}", step.name, f"{step.duration_s:.2f}", *_motion(step))
+        name = step.name if isinstance(step, Sweep) else type(step).__name__.lower()
+        table.add_row(f"{at_s:.1f}", name, f"{step.duration_s:.2f}", *_motion(step))
         at_s += step.duration_s
     console.print(table)
     console.print(f"{len(plan.sweeps)} sweeps, {len(plan.motions)} motions, {plan.duration_s:.1f} s; all within limits")
@@ -43,13 +50,8 @@ def _motion(step: Step) -> tuple[str, str, str]:
     if isinstance(step, Rest):
         return "", "", ""
     turns = [
-        f"{name} {math.degrees(start):.1f} → {math.degrees(target):.1f}"
-        for name, start, target, way in zip(
-            JOINT_NAMES, step.start_q_rad, step.target_q_rad, travel(step.start_q_rad, step.target_q_rad), strict=True
-        )
-        if abs(way) > 1e-9
+        f"{name} {math.degrees(start):+.1f} → {math.degrees(target):+.1f}"
+        for name, start, target in zip(JOINT_NAMES, step.start_q_rad, step.target_q_rad, strict=True)
+        if abs(target - start) > SAME_PLACE_RAD
     ]
-    if isinstance(step, Sweep):
-        low, high = (math.degrees(angle) for angle in step.revolution_rad)
-        turns.append(f"(revolution {low:.0f} … {high:.0f})")
-    return ", ".join(turns), f"{math.degrees(step.speed_rad_s):g}", f"{math.degrees(step.acceleration_rad_s2):g}"
+    return "\n".join(turns), f"{math.degrees(step.speed_rad_s):g}", f"{math.degrees(step.acceleration_rad_s2):g}"

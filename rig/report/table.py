@@ -35,4 +35,6 @@ def print_result(result: Mapping[str, Any], console: Console) -> None:
             check["name"], value, f"{check['limit']:.4g}", check["unit"], "ok" if check["passed"] else "FAILED"
         )
     console.print(checks)
-    console.print(f"verdict: {result['verdict'].upper()}", style="bold green" if result["verdict"] == "pass" else "bold red")
+    console.print(
+        f"verdict: {result['verdict'].upper()}", style="bold green" if result["verdict"] == "pass" else "bold red"
+    )

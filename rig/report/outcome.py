@@ -1,0 +1,49 @@
+"""The outcome of a run: solved, judged, written into the run folder, and printed."""
+
+import json
+from collections.abc import Sequence
+from datetime import UTC, datetime
+from pathlib import Path
+from typing import Any
+
+from rich.console import Console
+
+from rig.config.load import parse
+from rig.recording import RunData
+from rig.report.header import calibration_header
+from rig.report.table import print_result
+from rig.solution import sensor_document, solve_runs
+from rig.verdict import judge, verdict
+
+SCHEMA = "rig.result/1"
+
+
+def solved_document(runs: Sequence[RunData], estimator: str = "newton") -> dict[str, Any]:
+    """The `result.json` document of a run's recordings: the same from a run that just ended and from its files.
+
+    Raises `Fault` or `Refused` by name when the recordings do not hold a calibration.
+    """
+    results = solve_runs(runs, estimator)
+    limits = parse(runs[0].config, "the recorded configuration").config.limits
+    checks = judge({name: result.solution for name, result in results.items()}, limits)
+    return {
+        "schema": SCHEMA,
+        "verdict": verdict(checks),
+        "checks": [check.document() for check in checks],
+        "provenance": {**runs[0].provenance, "solved_utc": datetime.now(UTC).isoformat(timespec="seconds")},
+        "sensors": {name: sensor_document(result) for name, result in results.items()},
+    }
+
+
+def write_outcome(folder: Path, document: dict[str, Any]) -> None:
+    """`result.json` and `calibration.h` into the run folder."""
+    (folder / "result.json").write_text(json.dumps(document, indent=2, allow_nan=False) + "\n", encoding="utf-8")
+    (folder / "calibration.h").write_text(calibration_header(document), encoding="utf-8")
+
+
+def print_outcome(document: dict[str, Any], *, as_json: bool) -> None:
+    """The document on stdout: tables for people, JSON for machines."""
+    if as_json:
+        print(json.dumps(document, indent=2, allow_nan=False))
+    else:
+        print_result(document, Console(highlight=False))
