@@ -16,15 +16,19 @@ from unicorn import (
     UC_HOOK_BLOCK,
     UC_HOOK_INTR,
     UC_HOOK_MEM_INVALID,
+    UC_MEM_FETCH_PROT,
+    UC_MEM_FETCH_UNMAPPED,
+    UC_MEM_READ_UNMAPPED,
+    UC_MEM_WRITE_PROT,
+    UC_MEM_WRITE_UNMAPPED,
     UC_MODE_MCLASS,
     UC_MODE_THUMB,
     UC_PROT_ALL,
     UC_PROT_EXEC,
     UC_PROT_READ,
-    UcError,
 )
 from unicorn.arm_const import UC_ARM_REG_PC, UC_CPU_ARM_CORTEX_M4
-from unicorn.unicorn_py3.unicorn import uclib
+from unicorn.unicorn_py3.unicorn import UcError, uclib
 
 from firmware_host.emulator.timeline import Timeline
 
@@ -39,6 +43,18 @@ _INVALID = ctypes.CFUNCTYPE(
     ctypes.c_bool, ctypes.c_void_p, ctypes.c_int, ctypes.c_uint64, ctypes.c_int, ctypes.c_int64, ctypes.c_void_p
 )
 _INTERRUPT = ctypes.CFUNCTYPE(None, ctypes.c_void_p, ctypes.c_uint32, ctypes.c_void_p)
+
+_ATTEMPTS = {
+    UC_MEM_READ_UNMAPPED: "read from",
+    UC_MEM_WRITE_UNMAPPED: "write to",
+    UC_MEM_FETCH_UNMAPPED: "execution at",
+    UC_MEM_WRITE_PROT: "write to read-only",
+    UC_MEM_FETCH_PROT: "execution at",
+}
+
+
+class EngineFault(Exception):
+    """The core cannot go on; the message is Unicorn's."""
 
 
 class Registers:
@@ -62,7 +78,7 @@ class Registers:
         return self._values[:]
 
     def write(self, values: Sequence[int]) -> None:
-        self._values[:] = values
+        self._values[:] = list(values)
         uclib.uc_reg_write_batch(self._handle, self._ids, self._pointers, self._count)
 
 
@@ -145,12 +161,12 @@ class Engine:
 
         self._hook(UC_HOOK_INTR, _INTERRUPT(on_interrupt))
 
-    def on_invalid(self, hook: Callable[[int, int], None]) -> None:
-        """Call `hook(kind, address)` (kind is one of Unicorn's UC_MEM_…) when an access meets no memory it may touch."""
+    def on_invalid(self, hook: Callable[[str, int], None]) -> None:
+        """Call `hook(attempt, address)` when an access meets no memory it may touch; attempt is such as "read from"."""
 
         def on_invalid(_handle: int, kind: int, address: int, _size: int, _value: int, _user: int) -> bool:
             try:
-                hook(kind, address)
+                hook(_ATTEMPTS[kind], address)
             except BaseException as error:
                 self._fail(error)
             return False
@@ -169,12 +185,13 @@ class Engine:
         _check(uclib.uc_mem_write(self._handle, address, data, len(data)))
 
     def run(self, address: int) -> None:
-        """Run from `address` until `stop`, WFI or a fault. Raises UcError, or what a callback raised."""
+        """Run from `address` until `stop`, WFI or a fault. Raises EngineFault, or what a callback raised."""
         status = uclib.uc_emu_start(self._handle, address | 1, _NO_END, 0, 0)
         if self._raised is not None:
             raised, self._raised = self._raised, None
             raise raised
-        _check(status)
+        if status != UC_ERR_OK:
+            raise EngineFault(uclib.uc_strerror(status).decode())
 
     def fault_address(self) -> int:
         """Where the core was when a callback raised; without one, where it is."""

@@ -11,11 +11,8 @@ _PORTS = {"A": 0, "B": 1}
 _MODE_AFTER_RESET = {"A": 0xABFF_FFFF, "B": 0xFFFF_FEBF}
 _SPEED_AFTER_RESET = {"A": 0x0C00_0000, "B": 0}
 _PULLS_AFTER_RESET = {"A": 0x6400_0000, "B": 0x0000_0100}
-_EXTI_IRQ = {
-    **{line: 6 + line for line in range(5)},
-    **dict.fromkeys(range(5, 10), 23),
-    **dict.fromkeys(range(10, 16), 40),
-}
+# Interrupt → mask of the EXTI lines that request it
+_EXTI_LINES = {**{6 + line: 1 << line for line in range(5)}, 23: 0x03E0, 40: 0xFC00}
 
 
 class Port:
@@ -150,9 +147,6 @@ class Exti:
         self._request()
 
     def _request(self) -> None:
-        requested: dict[int, bool] = dict.fromkeys(_EXTI_IRQ.values(), False)
         active = self._pending & self._mask.value
-        for line, irq in _EXTI_IRQ.items():
-            requested[irq] |= bool(active >> line & 1)
-        for irq, high in requested.items():
-            self._nvic.set_line(irq, high)
+        for irq, lines in _EXTI_LINES.items():
+            self._nvic.set_line(irq, bool(active & lines))

@@ -95,6 +95,7 @@ class Lsm9ds1:
         self._noise: list[float] = []
         self._speed = 1 + oscillator_ppm * 1e-6
         self._temperature_raw = max(-2048, min(2047, round((temperature_c - 25) * 16)))
+        self._next_conversion_s = math.inf
         self._address: int | None = None  # None: the next byte is the address
         self._reading = False
         self._reset()

@@ -3,25 +3,16 @@
 import struct
 from collections.abc import Sequence
 
-from unicorn import (
-    UC_MEM_FETCH_PROT,
-    UC_MEM_FETCH_UNMAPPED,
-    UC_MEM_READ_UNMAPPED,
-    UC_MEM_WRITE_PROT,
-    UC_MEM_WRITE_UNMAPPED,
-    UcError,
-)
-
 from firmware_host.emulator import rcc
 from firmware_host.emulator.bus import Peripheral, RegisterBus, Violation
 from firmware_host.emulator.clocks import Clocks
 from firmware_host.emulator.cortex import Cortex
 from firmware_host.emulator.dma import Channel, Dma1
-from firmware_host.emulator.engine import Engine
+from firmware_host.emulator.engine import Engine, EngineFault
 from firmware_host.emulator.gpio import Exti, Port, Syscfg
 from firmware_host.emulator.nvic import Nvic
 from firmware_host.emulator.spi import Spi1
-from firmware_host.emulator.spi_device import BoardClock, DeviceLink, SpiDevice
+from firmware_host.emulator.spi_device import BoardClock, DeviceLink, SpiBus, SpiDevice
 from firmware_host.emulator.symbols import Symbols
 from firmware_host.emulator.system_control import SystemControl, SysTick
 from firmware_host.emulator.timeline import Timeline
@@ -38,13 +29,6 @@ _EXCEPTION_RETURN = 8
 _CORE_EXCEPTIONS = {1: "undefined instruction", 2: "supervisor call", 3: "instruction fetch fault", 4: "data fault"}
 _CORE_EXCEPTIONS |= {7: "breakpoint", 17: "floating point without access", 18: "invalid execution state"}
 _CORRECT = "correct the firmware"
-_ACCESSES = {
-    UC_MEM_READ_UNMAPPED: "read from",
-    UC_MEM_WRITE_UNMAPPED: "write to",
-    UC_MEM_FETCH_UNMAPPED: "execution at",
-    UC_MEM_WRITE_PROT: "write to read-only",
-    UC_MEM_FETCH_PROT: "execution at",
-}
 
 
 class EmulatedBoard:
@@ -151,11 +135,26 @@ class EmulatedBoard:
         exti = Exti(nvic, syscfg)
         transmit = Channel(7, engine, nvic, TDR_ADDRESS, to_peripheral=True)
         receive = Channel(6, engine, nvic, RDR_ADDRESS, to_peripheral=False)
-        self._usart = Usart2(timeline, clocks, nvic, transmit, receive, self._serial_pins_connected)
-        self._spi = Spi1(timeline, clocks, self._exchange)
+        self._usart = Usart2(
+            timeline=timeline,
+            clocks=clocks,
+            nvic=nvic,
+            transmit=transmit,
+            receive=receive,
+            pins_connected=self._serial_pins_connected,
+        )
+        spi_bus = SpiBus(timeline, self._bus_pins_connected)
+        self._spi = Spi1(timeline, clocks, spi_bus.exchange)
         self._control = SystemControl(nvic, lambda: self._request_reset(rcc.RESET_SOFTWARE))
         flash, power = rcc.Flash(), rcc.Power()
-        self._rcc = rcc.Rcc(timeline, clocks, flash, power, self._gate, self._clock_changed)
+        self._rcc = rcc.Rcc(
+            timeline=timeline,
+            clocks=clocks,
+            flash=flash,
+            power=power,
+            on_gate=self._gate,
+            on_clock=self._clock_changed,
+        )
         watchdog = Watchdog(timeline, lambda: self._request_reset(rcc.RESET_WATCHDOG))
         gated: list[Peripheral] = [Dma1({6: receive, 7: transmit}), flash, Tim2(timeline, clocks), self._usart]
         gated += [power, syscfg, self._spi]
@@ -175,7 +174,8 @@ class EmulatedBoard:
         engine.map_io(_PERIPHERALS, 0x2_3000, peripherals.read, peripherals.write)
         engine.map_io(_PORTS, 0x2000, ports.read, ports.write)
         engine.map_io(_CORE, 0x1000, core.read, core.write)
-        self._links = [DeviceLink(device, timeline, self._clock, self._port_of, exti) for device in devices]
+        for device in devices:
+            DeviceLink(device, spi_bus, timeline=timeline, clock=self._clock, port_of=self._port_of, exti=exti)
 
     def _port_of(self, pin: str) -> Port:
         return self._ports[pin[1]]
@@ -186,23 +186,14 @@ class EmulatedBoard:
 
     def _clock_changed(self) -> None:
         self._costs.clear()
+        self._spi.retune()
 
     def _serial_pins_connected(self) -> bool:
         port = self._ports["A"]
         return port.function(2) == 7 and port.function(15) == 3
 
-    def _exchange(self, byte: int) -> int:
-        if [self._ports["B"].function(pin) for pin in (3, 4, 5)] != [5, 5, 5]:
-            raise Violation("spi_setup", "SPI1 is used with PB3, PB4, PB5 not all on AF5", "set MODER and AFRL first")
-        self._timeline.run_due()
-        answers = []
-        for link in self._links:
-            if link.selected:
-                link.check_bus(self._spi)
-                answers.append(link.exchange(byte))
-        if len(answers) > 1:
-            raise Violation("bus_contention", "two chip selects are low at once", "raise one before lowering the other")
-        return answers[0] if answers else 0xFF
+    def _bus_pins_connected(self) -> bool:
+        return all(self._ports["B"].function(pin) == 5 for pin in (3, 4, 5))
 
     # --- running
 
@@ -233,8 +224,8 @@ class EmulatedBoard:
         engine.paused = False
         try:
             engine.run(cortex.pc)
-        except UcError as error:
-            raise Violation("firmware_fault", f"{error}".lower(), _CORRECT) from error
+        except EngineFault as error:
+            raise Violation("firmware_fault", str(error), _CORRECT) from error
         cortex.paused()
         if self._return_code is not None:
             code, self._return_code = self._return_code, None
@@ -270,8 +261,8 @@ class EmulatedBoard:
         self._return_code = self._cortex.pc | 1
         self._engine.stop()
 
-    def _invalid_access(self, kind: int, address: int) -> None:
-        raise Violation("firmware_fault", f"{_ACCESSES.get(kind, 'access to')} address 0x{address:08X}", _CORRECT)
+    def _invalid_access(self, attempt: str, address: int) -> None:
+        raise Violation("firmware_fault", f"{attempt} address 0x{address:08X}", _CORRECT)
 
     def _located(self, violation: Violation) -> BoardError:
         where = self._symbols.where(self._engine.fault_address())

@@ -1,4 +1,4 @@
-"""The interrupt controller of the Cortex-M4 (ARMv7-M Architecture Reference Manual, B3.4): what is pending, who wins."""
+"""The Cortex-M4's interrupt controller (ARMv7-M Architecture Reference Manual, B3.4): what is pending, who wins."""
 
 from collections.abc import Iterator, Sequence
 from functools import partial

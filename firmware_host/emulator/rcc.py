@@ -6,8 +6,7 @@ from firmware_host.emulator.bus import Register, Stored, Violation, check_bits
 from firmware_host.emulator.clocks import Clocks
 from firmware_host.emulator.timeline import TICK_HZ, Timeline
 
-_MSI_HZ = (100_000, 200_000, 400_000, 800_000, 1_000_000, 2_000_000, 4_000_000, 8_000_000)
-_MSI_HZ += (16_000_000, 24_000_000, 32_000_000, 48_000_000)
+_MSI_KHZ = (100, 200, 400, 800, 1_000, 2_000, 4_000, 8_000, 16_000, 24_000, 32_000, 48_000)
 _HSI_HZ = 16_000_000
 _MSION, _MSIRGSEL, _HSION, _PLLON = 1 << 0, 1 << 3, 1 << 8, 1 << 24
 _MSIRANGE = 0xF << 4
@@ -77,6 +76,7 @@ class Rcc:
 
     def __init__(
         self,
+        *,
         timeline: Timeline,
         clocks: Clocks,
         flash: Flash,
@@ -187,7 +187,7 @@ class Rcc:
 
     def _msi_hz(self) -> int:
         control = self._control.value
-        return _MSI_HZ[(control & _MSIRANGE) >> 4] if control & _MSIRGSEL else 4_000_000
+        return 1000 * _MSI_KHZ[(control & _MSIRANGE) >> 4] if control & _MSIRGSEL else 4_000_000
 
     def _source_hz(self) -> int:
         control, pll = self._control.value, self._pll.value

@@ -14,16 +14,16 @@ _FIFO_BYTES = 4
 
 
 class Spi1:
-    """The bus master. `exchange(byte)` puts a byte on the bus and returns the one that comes back."""
+    """The bus master. `exchange(self, byte)` puts a byte on the bus and returns the one that comes back."""
 
     name = "SPI1"
     base = 0x4001_3000
 
-    def __init__(self, timeline: Timeline, clocks: Clocks, exchange: Callable[[int], int]) -> None:
+    def __init__(self, timeline: Timeline, clocks: Clocks, exchange: Callable[["Spi1", int], int]) -> None:
         self._timeline = timeline
         self._clocks = clocks
         self._exchange = exchange
-        self._control = Stored("SPI1 CR1", 0x037F)
+        self._control = Stored("SPI1 CR1", 0x037F, after=self.retune)
         self._control2 = Stored("SPI1 CR2", _FRXTH | 1 << 2, initial=0x0700)
         self._received: deque[tuple[int, int]] = deque()  # tick at which the byte is through, byte
         self.reset()
@@ -31,6 +31,7 @@ class Spi1:
     def reset(self) -> None:
         self._control.reset()
         self._control2.reset()
+        self.retune()
         self._received.clear()
         self._free = 0  # tick at which the bus has sent everything
         self._overrun = False
@@ -54,9 +55,9 @@ class Spi1:
     def clock_hz(self) -> float:
         return self._clocks.pclk2_hz / (2 << (self._control.value >> 3 & 7))
 
-    @property
-    def _byte_ticks(self) -> int:
-        return round(8 * TICK_HZ / self.clock_hz)
+    def retune(self) -> None:
+        """Take over a new bus clock or divider."""
+        self._byte_ticks = round(8 * TICK_HZ / self.clock_hz)
 
     def _write_byte(self, value: int) -> None:
         needed = _SPE | _MSTR
@@ -69,7 +70,7 @@ class Spi1:
             raise Violation("spi_overrun", "SPI1 DR written with the FIFO full", "wait for TXE")
         self._polled = False
         self._free = max(self._timeline.now, self._free) + step
-        answer = self._exchange(value & 0xFF)
+        answer = self._exchange(self, value & 0xFF)
         if len(self._received) > _FIFO_BYTES:
             self._overrun = True
         else:

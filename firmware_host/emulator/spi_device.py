@@ -64,61 +64,100 @@ class BoardClock:
         return self._boot_time_s + tick / self._ticks_per_s
 
 
+class SpiBus:
+    """The wires between SPI1 and the devices. `pins_connected()` tells whether the firmware has put SPI1 on its pins."""
+
+    def __init__(self, timeline: Timeline, pins_connected: Callable[[], bool]) -> None:
+        self._timeline = timeline
+        self._pins_connected = pins_connected
+        self._selected: list[DeviceLink] = []
+        self._checked = False
+
+    def chip_select(self, link: "DeviceLink", low: bool) -> None:
+        """A device's chip select goes down or up."""
+        if low:
+            self._selected.append(link)
+        else:
+            self._selected.remove(link)
+        self._checked = False
+
+    def exchange(self, spi: Spi1, byte: int) -> int:
+        """Pass one byte to the selected device. Raises Violation when the bus is not as the board and device need it."""
+        if not self._checked:
+            self._check(spi)
+            self._checked = True
+        if self._timeline.next_due <= self._timeline.now:
+            self._timeline.run_due()
+        return self._selected[0].exchange(byte) if self._selected else 0xFF
+
+    def _check(self, spi: Spi1) -> None:
+        if not self._pins_connected():
+            raise Violation("spi_setup", "SPI1 is used with PB3, PB4, PB5 not all on AF5", "set MODER and AFRL first")
+        if len(self._selected) > 1:
+            raise Violation("bus_contention", "two chip selects are low at once", "raise one before lowering the other")
+        for link in self._selected:
+            device = link.device
+            if spi.mode not in device.spi_modes or spi.clock_hz > device.spi_max_hz:
+                raise Violation(
+                    "spi_setup",
+                    f"SPI1 speaks mode {spi.mode} at {spi.clock_hz / 1e6:g} MHz to the {device.name}",
+                    f"it takes mode {' or '.join(map(str, device.spi_modes))} up to {device.spi_max_hz / 1e6:g} MHz",
+                )
+
+
 class DeviceLink:
     """Connects a device to its chip select, its interrupt pin, the bus and the board's time."""
 
     def __init__(
-        self, device: SpiDevice, timeline: Timeline, clock: BoardClock, port_of: Callable[[str], Port], exti: Exti
+        self,
+        device: SpiDevice,
+        bus: SpiBus,
+        *,
+        timeline: Timeline,
+        clock: BoardClock,
+        port_of: Callable[[str], Port],
+        exti: Exti,
     ) -> None:
-        self._device = device
+        self.device = device
+        self._bus = bus
         self._timeline = timeline
         self._clock = clock
         self._slot = timeline.register(self._event)
+        self._due_s = math.inf
         self._interrupt_port = port_of(device.interrupt)
         self._interrupt_letter, self._interrupt_pin = device.interrupt[1], int(device.interrupt[2:])
         self._exti = exti
         self._level = False
-        self.selected = False
         port_of(device.chip_select).watch(int(device.chip_select[2:]), self._chip_select)
         self._settle()
 
-    def check_bus(self, spi: Spi1) -> None:
-        """Raise Violation when the bus is not set up as the device needs it."""
-        device = self._device
-        if spi.mode not in device.spi_modes or spi.clock_hz > device.spi_max_hz:
-            raise Violation(
-                "spi_setup",
-                f"SPI1 speaks mode {spi.mode} at {spi.clock_hz / 1e6:g} MHz to the {device.name}",
-                f"it takes mode {' or '.join(map(str, device.spi_modes))} up to {device.spi_max_hz / 1e6:g} MHz",
-            )
-
     def exchange(self, byte: int) -> int:
-        answer = self._device.transfer(byte, self._now_s())
+        """Pass one byte to the device and return its answer."""
+        # The core may be a few instructions past the limit; the world knows its motion up to the limit only
+        answer = self.device.transfer(byte, self._clock.seconds(min(self._timeline.now, self._timeline.limit)))
         self._settle()
         return answer
 
     def _chip_select(self, high: bool) -> None:
-        self.selected = not high
+        self._bus.chip_select(self, not high)
         if high:
-            self._device.deselect()
+            self.device.deselect()
         else:
-            self._device.select()
+            self.device.select()
         self._settle()
 
     def _event(self) -> None:
-        self._device.advance(self._device.next_event_s)
+        self.device.advance(self._due_s)
         self._settle()
-
-    def _now_s(self) -> float:
-        # The core may be a few instructions past the limit; the world knows its motion up to the limit only
-        return self._clock.seconds(min(self._timeline.now, self._timeline.limit))
 
     def _settle(self) -> None:
         """Take over what the device may have changed: its interrupt line and its next event."""
-        level = self._device.interrupt_level
+        level = self.device.interrupt_level
         if level != self._level:
             self._level = level
             self._interrupt_port.drive(self._interrupt_pin, level)
             self._exti.edge(self._interrupt_letter, self._interrupt_pin, level)
-        due = self._device.next_event_s
-        self._timeline.schedule(self._slot, NEVER if math.isinf(due) else self._clock.first_tick(due))
+        due_s = self.device.next_event_s
+        if due_s != self._due_s:
+            self._due_s = due_s
+            self._timeline.schedule(self._slot, NEVER if math.isinf(due_s) else self._clock.first_tick(due_s))

@@ -1,6 +1,7 @@
 """The core's own registers: SysTick, system control block, floating-point enable (ARMv7-M, B3.2 and B3.3)."""
 
 from collections.abc import Callable, Sequence
+from functools import partial
 
 from firmware_host.emulator.bus import Register, Stored, Violation
 from firmware_host.emulator.clocks import Clocks
@@ -60,13 +61,9 @@ class SystemControl:
             Register(0x20, "SHPR3", self._read_shpr3, self._write_shpr3),
             *(
                 Register(
-                    0x20 + byte,
-                    "SHPR3",
-                    lambda n=number: self._nvic.priority(n),
-                    lambda value, n=number: self._nvic.set_system_priority(n, value),
-                    size=1,
+                    offset, "SHPR3", partial(self._nvic.priority, n), partial(self._nvic.set_system_priority, n), 1
                 )
-                for byte, number in ((2, PENDSV), (3, SYSTICK))
+                for offset, n in ((0x22, PENDSV), (0x23, SYSTICK))
             ),
             self._handlers.at(0x24),
             self._coprocessors.at(0x88),

@@ -27,6 +27,7 @@ class Usart2:
 
     def __init__(
         self,
+        *,
         timeline: Timeline,
         clocks: Clocks,
         nvic: Nvic,
