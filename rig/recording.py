@@ -264,7 +264,7 @@ class _Pending:
 
 
 def _create(path: Path, config: str, provenance: Mapping[str, Any], sensors: Mapping[str, RecordedSensor]) -> None:
-    """Lay out an empty run file beside its place and move it there whole, so that a kill leaves all of it or nothing."""
+    """Lay out an empty run file beside its place and move it there whole, so that a kill leaves all or nothing."""
     import h5py
 
     if path.exists():

@@ -1,4 +1,4 @@
-"""The solver of the six observations: exact where the paper's iteration fails, honest in its uncertainty, hard to fool."""
+"""The solver of the six observations: exact where the paper's iteration fails, honest in its uncertainty."""
 
 import numpy as np
 import pytest
