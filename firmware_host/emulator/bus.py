@@ -77,7 +77,7 @@ def check_bits(name: str, value: int, modelled: int) -> None:
         raise Violation(
             "unmodelled_bits",
             f"{name} = 0x{value:08X} sets bits that are not modelled: 0x{value & ~modelled:08X}",
-            "clear them in the firmware, or model them in firmware_host/emulator",
+            "Clear them in the firmware, or model them in firmware_host/emulator",
         )
 
 
@@ -135,19 +135,19 @@ class RegisterBus:
             return Violation(
                 "unmodelled_register",
                 f"{8 * size}-bit {verb}{written}: {self._name(offset)} is not modelled",
-                "leave the register alone in the firmware, or model it in firmware_host/emulator",
+                "Leave the register alone in the firmware, or model it in firmware_host/emulator",
             )
         peripheral, register = known
         if (register.read if verb == "read" else register.write) is None:
             return Violation(
                 "register_access",
                 f"{verb}{written}: {peripheral.name} {register.name} does not allow it",
-                "correct the firmware",
+                "Correct the firmware",
             )
         return Violation(
             "clock_off",
             f"{verb}{written}: {peripheral.name} {register.name} has no clock",
-            f"enable {peripheral.name} in RCC first",
+            f"Enable {peripheral.name} in RCC first",
         )
 
     def _name(self, offset: int) -> str:

@@ -72,7 +72,7 @@ class Cortex:
             return True
         if control & (_PROCESS_STACK | _UNPRIVILEGED):
             raise Violation(
-                "unmodelled_mode", "the firmware uses the process stack or unprivileged mode", "model it in cortex.py"
+                "unmodelled_mode", "the firmware uses the process stack or unprivileged mode", "Model it in cortex.py"
             )
         frame = _BASIC_FRAME.size
         return_code = _TO_HANDLER if self._nvic.running else _TO_THREAD
@@ -95,7 +95,7 @@ class Cortex:
     def return_from_exception(self, return_code: int) -> None:
         """Undo `enter_pending`, after the core branched to `return_code` (EXC_RETURN)."""
         if return_code not in _RETURNS:
-            raise Violation("bad_return", f"exception return to 0x{return_code:08X}", "correct the firmware")
+            raise Violation("bad_return", f"exception return to 0x{return_code:08X}", "Correct the firmware")
         _control, _xpsr, base = self._state.read()
         self._nvic.leave()
         *scratch, pc, xpsr = _BASIC_FRAME.unpack(self._engine.read(base, _BASIC_FRAME.size))
@@ -111,12 +111,12 @@ class Cortex:
             raise Violation(
                 "bad_return",
                 f"the stack frame returns to exception {xpsr & 0x1FF}, not to the one that was left",
-                "look for a stack overflow in the firmware",
+                "Look for a stack overflow in the firmware",
             )
         self._restored.write([control, xpsr & ~_REALIGNED, stack, *scratch])
         self.pc = pc
 
     def _jump(self, entry: int, source: str) -> None:
         if not entry & 1:
-            raise Violation("bad_vector", f"{source} is 0x{entry:08X}, not Thumb code", "correct the vector table")
+            raise Violation("bad_vector", f"{source} is 0x{entry:08X}, not Thumb code", "Correct the vector table")
         self.pc = entry & ~1

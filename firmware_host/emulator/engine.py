@@ -6,6 +6,7 @@ cuts a batch of eleven core registers from 16 µs to 0.7 µs; the emulator's pac
 """
 
 import ctypes
+import weakref
 from collections.abc import Callable, Mapping, Sequence
 from typing import Any
 
@@ -89,16 +90,12 @@ class Engine:
         self._handle = ctypes.c_void_p()
         _check(uclib.uc_open(UC_ARCH_ARM, UC_MODE_THUMB | UC_MODE_MCLASS, ctypes.byref(self._handle)))
         _check(uclib.uc_ctl(self._handle, _SET_CPU_MODEL, ctypes.c_int(UC_CPU_ARM_CORTEX_M4)))
+        weakref.finalize(self, uclib.uc_close, self._handle)
         self._callbacks: list[Any] = []  # ctypes callbacks live as long as the engine
         self._raised: BaseException | None = None
         self._fault_address: int | None = None
         self._program_counter = self.registers([UC_ARM_REG_PC])
         self.paused = False  # the last run ended at the deadline
-
-    def close(self) -> None:
-        if self._handle:
-            uclib.uc_close(self._handle)
-            self._handle = ctypes.c_void_p()
 
     def map_ram(self, address: int, size: int) -> None:
         _check(uclib.uc_mem_map(self._handle, address, size, UC_PROT_ALL))

@@ -162,7 +162,7 @@ class Lsm9ds1:
             if address == _OUT_TEMP_H:
                 self._status &= ~_TDA
             return self._temperature[address - _OUT_TEMP_L]
-        raise Violation("unmodelled_register", f"read of LSM9DS1 register 0x{address:02X}", "model it in lsm9ds1.py")
+        raise Violation("unmodelled_register", f"read of LSM9DS1 register 0x{address:02X}", "Model it in lsm9ds1.py")
 
     def _read_output(self, index: int) -> int:
         axis, high = divmod(index, 2)
@@ -178,14 +178,14 @@ class Lsm9ds1:
     def _write(self, address: int, value: int, time_s: float) -> None:
         if address not in _RESET_AND_BITS:
             raise Violation(
-                "unmodelled_register", f"write to LSM9DS1 register 0x{address:02X}", "model it in lsm9ds1.py"
+                "unmodelled_register", f"write to LSM9DS1 register 0x{address:02X}", "Model it in lsm9ds1.py"
             )
         _initial, bits = _RESET_AND_BITS[address]
         if value & ~bits:
             raise Violation(
                 "unmodelled_bits",
                 f"LSM9DS1 register 0x{address:02X} = 0x{value:02X} sets bits that are not modelled",
-                "clear them in the firmware, or model them in lsm9ds1.py",
+                "Clear them in the firmware, or model them in lsm9ds1.py",
             )
         if address == _CTRL_REG8 and value & _SW_RESET:
             self._reset()
@@ -202,7 +202,7 @@ class Lsm9ds1:
             raise Violation(
                 "sensor_setup",
                 f"LSM9DS1 CTRL_REG1_G = 0x{control:02X}: data rate or range that the part does not have",
-                "use rate codes 0–6 and range codes 0, 1, 3",
+                "Use rate codes 0–6 and range codes 0, 1, 3",
             )
         self._status &= ~_GDA
         self._conversions = 0

@@ -7,7 +7,7 @@ from firmware_host.emulator import rcc
 from firmware_host.emulator.bus import Peripheral, RegisterBus, Violation
 from firmware_host.emulator.clocks import Clocks
 from firmware_host.emulator.cortex import Cortex
-from firmware_host.emulator.dma import Channel, Dma1
+from firmware_host.emulator.dma import Dma1
 from firmware_host.emulator.engine import Engine, EngineFault
 from firmware_host.emulator.gpio import Exti, Port, Syscfg
 from firmware_host.emulator.nvic import Nvic
@@ -17,7 +17,7 @@ from firmware_host.emulator.symbols import Symbols
 from firmware_host.emulator.system_control import SystemControl, SysTick
 from firmware_host.emulator.timeline import Timeline
 from firmware_host.emulator.timers import Tim2, Watchdog
-from firmware_host.emulator.usart import RDR_ADDRESS, TDR_ADDRESS, Usart2
+from firmware_host.emulator.usart import TDR_ADDRESS, Usart2
 from firmware_host.errors import BoardError
 
 _FLASH, _FLASH_SIZE = 0x0800_0000, 256 * 1024
@@ -28,7 +28,7 @@ _WFI, _BRANCH_TO_SELF = 0xBF30, 0xE7FE
 _EXCEPTION_RETURN = 8
 _CORE_EXCEPTIONS = {1: "undefined instruction", 2: "supervisor call", 3: "instruction fetch fault", 4: "data fault"}
 _CORE_EXCEPTIONS |= {7: "breakpoint", 17: "floating point without access", 18: "invalid execution state"}
-_CORRECT = "correct the firmware"
+_CORRECT = "Correct the firmware"
 
 
 class EmulatedBoard:
@@ -108,10 +108,6 @@ class EmulatedBoard:
         self._reset_cause = rcc.RESET_PIN
         self._restart()
 
-    def close(self) -> None:
-        """Free the engine. Raises nothing."""
-        self._engine.close()
-
     # --- assembly
 
     def _load_memories(self, image: bytes, unique_id: bytes) -> None:
@@ -133,15 +129,9 @@ class EmulatedBoard:
         self._ports = {letter: Port(letter) for letter in "AB"}
         syscfg = Syscfg()
         exti = Exti(nvic, syscfg)
-        transmit = Channel(7, engine, nvic, TDR_ADDRESS, to_peripheral=True)
-        receive = Channel(6, engine, nvic, RDR_ADDRESS, to_peripheral=False)
+        dma = Dma1(engine, nvic, TDR_ADDRESS)
         self._usart = Usart2(
-            timeline=timeline,
-            clocks=clocks,
-            nvic=nvic,
-            transmit=transmit,
-            receive=receive,
-            pins_connected=self._serial_pins_connected,
+            timeline=timeline, clocks=clocks, nvic=nvic, dma=dma, pins_connected=self._serial_pins_connected
         )
         spi_bus = SpiBus(timeline, self._bus_pins_connected)
         self._spi = Spi1(timeline, clocks, spi_bus.exchange)
@@ -156,7 +146,7 @@ class EmulatedBoard:
             on_clock=self._clock_changed,
         )
         watchdog = Watchdog(timeline, lambda: self._request_reset(rcc.RESET_WATCHDOG))
-        gated: list[Peripheral] = [Dma1({6: receive, 7: transmit}), flash, Tim2(timeline, clocks), self._usart]
+        gated: list[Peripheral] = [dma, flash, Tim2(timeline, clocks), self._usart]
         gated += [power, syscfg, self._spi]
         self._gated: dict[str, tuple[RegisterBus, Peripheral]] = {}
         peripherals, ports, core = RegisterBus(_PERIPHERALS), RegisterBus(_PORTS), RegisterBus(_CORE)

@@ -78,7 +78,7 @@ class Nvic:
     def leave(self) -> int:
         """The running handler returns. Returns its exception number. Raises Violation when none is running."""
         if not self._active:
-            raise Violation("bad_return", "exception return with no handler running", "correct the firmware")
+            raise Violation("bad_return", "exception return with no handler running", "Correct the firmware")
         number = self._active.pop()
         if self._lines >> number & 1:
             self._pending |= 1 << number

@@ -150,7 +150,7 @@ class Rcc:
         check_bits("RCC BDCR", value, _LSEON | _LSERDY)
         if not self._power.backup_writable:
             raise Violation(
-                "backup_locked", "RCC BDCR written while the backup domain is locked", "set PWR CR1 DBP first"
+                "backup_locked", "RCC BDCR written while the backup domain is locked", "Set PWR CR1 DBP first"
             )
         if not value & _LSEON:
             self._crystal_since = None
@@ -178,7 +178,7 @@ class Rcc:
             raise Violation(
                 "core_too_fast",
                 f"RCC sets the core to {core_hz / 1e6:g} MHz with {self._flash.wait_states} flash wait states",
-                "set FLASH ACR first; 80 MHz is the most, with 4 wait states",
+                "Set FLASH ACR first; 80 MHz is the most, with 4 wait states",
             )
         self._clocks.core_hz = core_hz
         self._clocks.pclk1_hz = core_hz >> max(0, (self._configuration.value >> 8 & 7) - 3)
@@ -204,5 +204,5 @@ class Rcc:
         raise Violation(
             "no_system_clock",
             "RCC selects a clock for the core that is not running",
-            "start the oscillator or the PLL (with its R output) before switching to it",
+            "Start the oscillator or the PLL (with its R output) before switching to it",
         )

@@ -65,7 +65,7 @@ class BoardClock:
 
 
 class SpiBus:
-    """The wires between SPI1 and the devices. `pins_connected()` tells whether the firmware has put SPI1 on its pins."""
+    """The wires between SPI1 and the devices. `pins_connected()`: has the firmware put SPI1 on its pins?"""
 
     def __init__(self, timeline: Timeline, pins_connected: Callable[[], bool]) -> None:
         self._timeline = timeline
@@ -82,7 +82,7 @@ class SpiBus:
         self._checked = False
 
     def exchange(self, spi: Spi1, byte: int) -> int:
-        """Pass one byte to the selected device. Raises Violation when the bus is not as the board and device need it."""
+        """Pass one byte to the selected device. Raises Violation when the bus is not set up as it must be."""
         if not self._checked:
             self._check(spi)
             self._checked = True
@@ -92,16 +92,16 @@ class SpiBus:
 
     def _check(self, spi: Spi1) -> None:
         if not self._pins_connected():
-            raise Violation("spi_setup", "SPI1 is used with PB3, PB4, PB5 not all on AF5", "set MODER and AFRL first")
+            raise Violation("spi_setup", "SPI1 is used with PB3, PB4, PB5 not all on AF5", "Set MODER and AFRL first")
         if len(self._selected) > 1:
-            raise Violation("bus_contention", "two chip selects are low at once", "raise one before lowering the other")
+            raise Violation("bus_contention", "two chip selects are low at once", "Raise one before lowering the other")
         for link in self._selected:
             device = link.device
             if spi.mode not in device.spi_modes or spi.clock_hz > device.spi_max_hz:
                 raise Violation(
                     "spi_setup",
                     f"SPI1 speaks mode {spi.mode} at {spi.clock_hz / 1e6:g} MHz to the {device.name}",
-                    f"it takes mode {' or '.join(map(str, device.spi_modes))} up to {device.spi_max_hz / 1e6:g} MHz",
+                    f"It takes mode {' or '.join(map(str, device.spi_modes))} up to {device.spi_max_hz / 1e6:g} MHz",
                 )
 
 

@@ -89,7 +89,7 @@ class SystemControl:
             raise Violation(
                 "unmodelled_bits",
                 f"SCB AIRCR sets priority group {group}; only preemption by all four bits is modelled",
-                "use priority group 3 or lower",
+                "Use priority group 3 or lower",
             )
         self._priority_group = group
         if value >> 2 & 1:

@@ -99,7 +99,7 @@ class Watchdog:
 
     def _set(self, register: Stored, value: int) -> None:
         if not self._unlocked:
-            raise Violation("iwdg_locked", "IWDG PR or RLR written while locked", "write 0x5555 to KR first")
+            raise Violation("iwdg_locked", "IWDG PR or RLR written while locked", "Write 0x5555 to KR first")
         register.write(value)
 
     def _write_key(self, key: int) -> None:
