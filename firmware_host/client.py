@@ -164,8 +164,8 @@ class Board:
 
     def _ask(self, name: str, values: dict[str, Any] | None = None) -> Frame:
         """Sends a request until its answer comes; every request may safely arrive twice."""
-        self._sequence = self._sequence % 255 + 1
-        sequence = self._sequence
+        with self._sending:
+            self._sequence = sequence = self._sequence % 255 + 1
         request = self._requests[sequence] = _Request(name)
         try:
             for _ in range(_ATTEMPTS):
@@ -197,18 +197,23 @@ class Board:
             "board_link_lost", f"the port {self._name} closed: {error}", "Check the cable and the board's supply"
         )
 
+    def _receive(self) -> bytes:
+        try:
+            return bytes(self._port.read(_READ_SIZE))
+        except (serial.SerialException, OSError) as error:
+            raise self._link_closed(error) from error
+
     def _read(self) -> None:
         """The reader thread: bytes to frames until closing or the first fault."""
         try:
             while not self._closing.is_set():
-                data = self._port.read(_READ_SIZE)
+                data = self._receive()
+                host_time_s = time.monotonic()
                 for frame in self._frames.feed(data):
-                    self._last_frame_s = time.monotonic()
+                    self._last_frame_s = host_time_s
                     self._frames_seen += 1
                     self._take(frame)
-        except (serial.SerialException, OSError) as error:
-            self._fault = self._link_closed(error)
-        except Exception as error:  # a broken link or a broken consumer must reach check(), not end in a dead thread
+        except Exception as error:  # a lost link or a failing consumer must reach check(), not end in a dead thread
             self._fault = error
         for request in list(self._requests.values()):
             request.answered.set()
@@ -218,7 +223,7 @@ class Board:
             if self._streaming:
                 self._on_samples(SampleBatch.of(frame, self._last_frame_s))
             return
-        request = self._requests.get(frame.values["reply_to"])
+        request = self._requests.get(frame.values.get("reply_to", 0))
         if request is not None:
             if frame.name == "ack" and request.name in ("start", "stop"):
                 self._streaming = request.name == "start"

@@ -298,7 +298,7 @@ def test_a_sensor_that_falls_silent_is_reported(wire: tuple[BoardOnAWire, str]) 
 
 def test_an_error_in_the_consumer_reaches_the_caller(wire: tuple[BoardOnAWire, str]) -> None:
     def broken(batch: SampleBatch) -> None:
-        raise RuntimeError("the disk is full")
+        raise OSError("the disk is full")
 
     with Board(wire[1], protocol.BAUD_RATE, broken) as board:
         board.configure(0, 238, 245)
@@ -307,7 +307,7 @@ def test_an_error_in_the_consumer_reaches_the_caller(wire: tuple[BoardOnAWire, s
         def failed() -> bool:
             try:
                 board.check()
-            except RuntimeError:
+            except OSError:
                 return True
             return False
 

@@ -91,11 +91,14 @@ static void remember_reset(void)
     RCC_CSR |= RCC_CSR_RMVF;
 }
 
+/* The barrier: were the flag still set on return, the same edge would come again and count as a second conversion. */
 void exti9_5_handler(void)
 {
-    acquisition_data_ready(0, TIM2_CNT);
+    uint32_t captured_us = TIM2_CNT;
     EXTI_PR1 = EXTI_PR1_PR8;
+    acquisition_data_ready(0, captured_us);
     woken = true;
+    __asm volatile("dsb" ::: "memory");
 }
 
 void dma1_channel7_handler(void)
