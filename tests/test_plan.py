@@ -83,6 +83,12 @@ def test_from_elsewhere_the_first_motion_goes_home() -> None:
     assert (first.start_q_rad, first.target_q_rad) == (start, HOME)
 
 
+def test_a_run_that_goes_on_leaves_out_what_is_done() -> None:
+    rest_of_it = plan_six_observation(ARM, ProcedureSection(), done={0, 1, 2})
+    assert [sweep.index for sweep in rest_of_it.sweeps] == [3, 4, 5]
+    assert plan_six_observation(ARM, ProcedureSection(), done=range(6)).steps == ()
+
+
 def test_configuration_sets_order_directions_repeats_and_rests() -> None:
     made = plan(order=["wrist_2", "wrist_3", "wrist_1"], directions=["ccw", "cw"], repeats=2, rest_s=0)
     assert [sweep.index for sweep in made.sweeps] == list(range(12))

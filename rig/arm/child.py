@@ -60,13 +60,15 @@ def main(pipe: "Connection[Message, Request]", host: str, state_rate_hz: float, 
     _send_output_to(log)
     child = _Child(pipe, host)
     signal.signal(signal.SIGTERM, lambda *_: child.abandon())
-    threading.Thread(target=child.serve, name="requests", daemon=True).start()
+    requests = threading.Thread(target=child.serve, name="requests", daemon=True)
+    requests.start()
     try:
-        child.connect(state_rate_hz)
+        try:
+            child.connect(state_rate_hz)
+        except RuntimeError as error:
+            child.send(_connection_failure(host, str(error)))
+            requests.join()  # the parent reads this and ends the process
         child.stream()
-    except RuntimeError as error:
-        child.send(_connection_failure(host, str(error)))
-        _leave(1)
     except BaseException:
         traceback.print_exc()
         child.abandon()
@@ -193,12 +195,12 @@ class _Child:
             started = self._control.moveJ(list(move.target_q_rad), move.speed_rad_s, move.acceleration_rad_s2, True)
         except (RuntimeError, ValueError) as error:
             return self.send(
-                Failed("move_refused", f"the client refused the move: {error}", "check speed and acceleration")
+                Failed("move_refused", f"the client refused the move: {error}", "Check speed and acceleration")
             )
         if not started:
             return self.send(
                 Failed(
-                    "move_refused", "the controller did not start the move", "read the pendant's log, then start again"
+                    "move_refused", "the controller did not start the move", "Read the pendant's log, then start again"
                 )
             )
         self._operations_before = before
@@ -238,14 +240,14 @@ def _send_output_to(log: str | None) -> None:
 
 
 def _payload_failure(what: str) -> Failed:
-    return Failed("payload_not_set", what, "read the pendant's log and the payload in the arm's installation")
+    return Failed("payload_not_set", what, "Read the pendant's log and the payload in the arm's installation")
 
 
 def _connection_failure(host: str, reason: str) -> Failed:
     return Failed(
         "no_arm_states",
         f"the controller at {host} accepts connections but sends no states ({reason})",
-        "check that the arm has finished booting and that no firewall blocks port 30004",
+        "Check that the arm has finished booting and that no firewall blocks port 30004",
     )
 
 
@@ -254,16 +256,16 @@ def _control_failure(host: str, reason: str) -> Failed:
         return Failed(
             "not_in_remote_control",
             f"the arm at {host} is not in remote control",
-            "switch the pendant to remote control (top right corner)",
+            "Switch the pendant to remote control (top right corner)",
         )
     if "already in use" in reason:
         return Failed(
             "registers_in_use",
             f"another client or a fieldbus holds the input registers of the arm at {host}",
-            "close the other client, or disable EtherNet/IP, PROFINET and MODBUS in the installation",
+            "Close the other client, or disable EtherNet/IP, PROFINET and MODBUS in the installation",
         )
     return Failed(
         "control_not_taken",
         f"the arm at {host} did not start the control script ({reason})",
-        "clear any stop on the pendant, close other programs, then start again",
+        "Clear any stop on the pendant, close other programs, then start again",
     )

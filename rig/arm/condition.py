@@ -17,8 +17,8 @@ class Problem:
     remedy: str
 
 
-_UNLOCK = "find out what stopped the arm, clear it, unlock on the pendant (not before 5 s), then start again"
-_RELEASE = "make the cell safe, release the emergency stop, switch the arm on again, then start again"
+_UNLOCK = "Find out what stopped the arm, clear it, unlock on the pendant (not before 5 s), then start again"
+_RELEASE = "Make the cell safe, release the emergency stop, switch the arm on again, then start again"
 
 # Bits of `safety_status_bits` that mean the same as a safety mode; the bits may come one packet before the mode.
 _SAFETY_BITS: dict[int, int] = {
@@ -37,22 +37,22 @@ _SAFETY_PROBLEMS: dict[int, Problem] = {
     SafetyMode.REDUCED: Problem(
         "reduced_mode",
         "the arm is in reduced mode, which limits its speed",
-        "leave the reduced mode (safety input or plane) so that the sweeps run at the planned speed",
+        "Leave the reduced mode (safety input or plane) so that the sweeps run at the planned speed",
     ),
     SafetyMode.PROTECTIVE_STOP: Problem("protective_stop", "the arm is in a protective stop", _UNLOCK),
     SafetyMode.RECOVERY: Problem(
         "recovery_mode",
         "the arm is in recovery mode",
-        "move it back inside its limits from the pendant, then start again",
+        "Move it back inside its limits from the pendant, then start again",
     ),
     SafetyMode.SAFEGUARD_STOP: Problem(
-        "safeguard_stop", "a safeguard input has stopped the arm", "close the safeguard and reset it, then start again"
+        "safeguard_stop", "a safeguard input has stopped the arm", "Close the safeguard and reset it, then start again"
     ),
     SafetyMode.SYSTEM_EMERGENCY_STOP: Problem("emergency_stop", "the system's emergency stop is pressed", _RELEASE),
     SafetyMode.ROBOT_EMERGENCY_STOP: Problem("emergency_stop", "the arm's emergency stop is pressed", _RELEASE),
     SafetyMode.VIOLATION: Problem("safety_violation", "the safety system reports a violation", _UNLOCK),
     SafetyMode.FAULT: Problem(
-        "safety_fault", "the safety system reports a fault", "read the pendant's log, restart the arm"
+        "safety_fault", "the safety system reports a fault", "Read the pendant's log, restart the arm"
     ),
 }
 
@@ -65,13 +65,13 @@ def readiness(state: ArmState) -> Problem | None:
         return Problem(
             "arm_not_running",
             f"the arm's mode is {_mode_name(state.robot_mode)}, not RUNNING",
-            "switch the arm on and release its brakes on the pendant",
+            "Switch the arm on and release its brakes on the pendant",
         )
     if state.target_speed_fraction < FULL_SPEED_FRACTION:
         return Problem(
             "speed_slider",
             f"the speed slider stands at {100 * state.target_speed_fraction:.0f} %, so sweeps run slower than planned",
-            "set the speed slider on the pendant to 100 %",
+            "Set the speed slider on the pendant to 100 %",
         )
     return None
 
@@ -79,12 +79,12 @@ def readiness(state: ArmState) -> Problem | None:
 def program_interruption(state: ArmState) -> Problem | None:
     """Why the control program no longer runs, or None while it does."""
     if state.runtime_state in (RuntimeState.PAUSING, RuntimeState.PAUSED, RuntimeState.RESUMING):
-        return Problem("arm_paused", "the program was paused at the pendant", "start the procedure again when ready")
+        return Problem("arm_paused", "the program was paused at the pendant", "Start the procedure again when ready")
     if state.runtime_state != RuntimeState.PLAYING:
         return Problem(
             "program_stopped",
             "the control program on the arm was stopped (pendant, dashboard or another client)",
-            "make sure nobody else drives the arm, then start again",
+            "Make sure nobody else drives the arm, then start again",
         )
     return None
 
@@ -96,7 +96,7 @@ def _safety_problem(state: ArmState) -> Problem | None:
     if mode == SafetyMode.NORMAL:
         return None
     unknown = Problem(
-        "safety_not_normal", f"the arm's safety mode is {mode}, not NORMAL", "see the pendant's safety display"
+        "safety_not_normal", f"the arm's safety mode is {mode}, not NORMAL", "See the pendant's safety display"
     )
     return _SAFETY_PROBLEMS.get(mode, unknown)
 

@@ -1,31 +1,35 @@
 """The arm's dashboard server over plain TCP: the stop path that does not depend on `ur_rtde`."""
 
 import socket
+import time
 from types import TracebackType
 from typing import Self
 
 DASHBOARD_PORT = 29999
+GREETING = "Connected:"
 
 
 class Dashboard:
     """One connection to the dashboard server of the controller at `host`.
 
-    Every method raises `OSError` when the controller does not answer within `timeout_s`.
+    Every method raises `OSError` when the controller does not answer a command within `timeout_s`.
     """
 
     def __init__(self, host: str, timeout_s: float = 0.4) -> None:
         self._socket = socket.create_connection((host, DASHBOARD_PORT), timeout=timeout_s)
         self._lines = self._socket.makefile("rb")
-        try:
-            self._line()  # the greeting
-        except OSError:
-            self.close()
-            raise
+        self._timeout_s = timeout_s
 
     def ask(self, command: str) -> str:
-        """Send one command and return the controller's answer, without the line end."""
+        """Send one command and return the controller's answer, without the line end.
+
+        The first command does not wait for the greeting: a controller that is slow to greet still finds the `stop`.
+        """
+        deadline_s = time.monotonic() + self._timeout_s
         self._socket.sendall(command.encode() + b"\n")
-        return self._line()
+        while (line := self._line(deadline_s)).startswith(GREETING):
+            continue
+        return line
 
     def stop_program(self) -> str:
         """Stop the running program, and with it the arm."""
@@ -59,7 +63,8 @@ class Dashboard:
     ) -> None:
         self.close()
 
-    def _line(self) -> str:
+    def _line(self, deadline_s: float) -> str:
+        self._socket.settimeout(max(deadline_s - time.monotonic(), 1e-3))
         line = self._lines.readline()
         if not line.endswith(b"\n"):
             raise ConnectionError("the dashboard server closed the connection")

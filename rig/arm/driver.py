@@ -14,7 +14,7 @@ from rig.arm.messages import Connected, Failed, Heartbeat, Message, Move, MoveFi
 from rig.arm.plan import Motion, travel
 from rig.arm.state import ArmReport, ArmState, RuntimeState
 from rig.arm.stopping import StopOutcome, Stopper
-from rig.errors import Fault, Refused
+from rig.errors import Fault, Refused, RigError
 
 WATCH_S = 0.02  # the caller's watch is called at least this often
 ARRIVAL_RAD = 0.01  # the joint servo's ripple and lag stay below this
@@ -56,7 +56,7 @@ class Arm:
         self._connected: Connected | None = None
         self._answer: Message | None = None
         self._problem: Problem | None = None
-        self._doing = "the arm was idle"
+        self._doing = "the preparation"
         self._holds_arm = False  # a program of ours may run, so a stop is ours to make
         self._supervising = False
         self._interrupted_s = 0.0  # time stamp of the last state that showed our program running
@@ -72,7 +72,7 @@ class Arm:
             raise Refused(
                 "no_arm",
                 f"no arm answers at {self._host} ({error})",
-                "check arm.host in the configuration, the network cable, and that the arm is switched on",
+                "Check arm.host in the configuration, the network cable, and that the arm is switched on",
             ) from error
         with self._link.patience():
             self._link.start()
@@ -108,18 +108,18 @@ class Arm:
             raise Refused(
                 "no_dashboard",
                 f"the dashboard server at {self._host} does not answer ({error})",
-                "enable the dashboard server in the arm's security settings",
+                "Enable the dashboard server in the arm's security settings",
             ) from error
 
     def check(self) -> None:
         """Raise what a supervising thread has met. The arm is stopped by then, if it was ours to stop."""
         if self._problem is None and not self._stopper.begun:
             return
-        problem = self._problem or Problem("arm_stopped", "the arm was stopped on request", "start again when ready")
+        problem = self._problem or Problem("arm_stopped", "the arm was stopped on request", "Start again when ready")
         if not self._holds_arm:
             raise Refused(problem.name, problem.what, problem.remedy)
         outcome = self.stop()
-        remedy = f"{outcome.remedy}; then {problem.remedy}" if outcome.remedy else problem.remedy
+        remedy = f"{outcome.remedy}. {problem.remedy}" if outcome.remedy else problem.remedy
         raise Fault(problem.name, f"{problem.what}; {outcome.what}", remedy)
 
     # Moving -------------------------------------------------------------------------------------------------------
@@ -132,7 +132,7 @@ class Arm:
         self.check()
         problem = readiness(self.latest)
         if problem is None and self.latest.runtime_state != RuntimeState.STOPPED:
-            problem = Problem("program_running", f"a program runs on the arm at {self._host}", "stop it on the pendant")
+            problem = Problem("program_running", f"a program runs on the arm at {self._host}", "Stop it on the pendant")
         if problem is not None:
             raise Refused(problem.name, problem.what, problem.remedy)
         with self._stopping_on_error(), self._link.patience():
@@ -165,7 +165,7 @@ class Arm:
                         "arm_slower_than_planned",
                         f"{motion.name} did not end within {motion.duration_s * SLOWNESS + SLOWNESS_S:.1f} s, "
                         f"planned were {motion.duration_s:.1f} s",
-                        "look for a speed limit in the safety settings or a program that slows the arm down",
+                        "Look for a speed limit in the safety settings or a program that slows the arm down",
                     )
                 )
             self.check()
@@ -173,6 +173,7 @@ class Arm:
     def rest(self, duration_s: float, watch: Callable[[], None] = _nothing) -> None:
         """Stand still for a time of the controller's clock; `watch` as in `move`."""
         with self._stopping_on_error():
+            self._doing = "a rest"
             end_s = self.latest.time_s + duration_s
             self._wait(lambda: self.latest.time_s >= end_s, watch)
 
@@ -258,8 +259,10 @@ class Arm:
         self._latest = state
         try:
             self._on_state(state)
+        except RigError as error:
+            self._fail(Problem(error.name, error.what, error.remedy))
         except Exception as error:
-            self._fail(Problem("arm_state_not_taken", f"an arm state could not be passed on ({error})", "see the log"))
+            self._fail(Problem("arm_state_not_taken", f"an arm state could not be passed on ({error})", "See the log"))
         if self._supervising and (problem := self._judge(state)):
             self._fail(Problem(problem.name, f"{problem.what} during {self._doing}", problem.remedy))
 

@@ -16,6 +16,7 @@ TICK_S = 0.05
 # Silence is counted in ticks of the guard, not in elapsed time: when this process itself was held up, nothing is late.
 SILENT_TICKS = 10  # 0.5 s without a heartbeat
 FROZEN_TICKS = 14  # 0.7 s of heartbeats without a new state
+STALE_TICKS = 2  # a client that crashes when states have not come for 0.1 s has lost its connection
 PATIENT_TICKS = 240  # 12 s while a client's constructor holds the child's interpreter, at worst until its 5 s time-out
 
 
@@ -107,24 +108,29 @@ class ChildLink:
                 self._on_message(message)
         except (EOFError, OSError):
             if not self._closing.is_set():
-                self._process.join(1.0)
-                self._lose(
-                    "arm_driver_died", f"the process that talks to the arm ended (exit status {self._process.exitcode})"
-                )
+                name = "arm_link_lost" if self._frozen_ticks > STALE_TICKS else "arm_driver_died"
+                self._process.join(0.2)
+                status = self._process.exitcode
+                self._lose(name, f"the process that talks to the arm at {self._host} ended (exit status {status})")
 
     def _guard(self) -> None:
         while not self._closing.wait(TICK_S):
             self._silent_ticks += 1
             self._frozen_ticks += 1
             if self._silent_ticks > (PATIENT_TICKS if self._patient else SILENT_TICKS):
-                self._lose("arm_driver_hung", "the process that talks to the arm no longer answers")
-                return self.kill()
+                return self._give_up("arm_driver_hung", "the process that talks to the arm no longer answers")
             if self._frozen_ticks > (PATIENT_TICKS if self._patient else FROZEN_TICKS):
-                return self._lose("arm_link_lost", f"no new state comes from the arm at {self._host}")
+                return self._give_up("arm_link_lost", f"no new state comes from the arm at {self._host}")
         return None
 
+    def _give_up(self, name: str, what: str) -> None:
+        """End a child that cannot be trusted any more: a client that reconnects uploads its script again."""
+        self._closing.set()
+        self._process.kill()
+        self._lose(name, what)
+
     def _lose(self, name: str, what: str) -> None:
-        self._on_lost(Problem(name, what, "look at the arm and its network cable, then start again"))
+        self._on_lost(Problem(name, what, "Look at the arm and its network cable, then start again"))
 
 
 @contextmanager

@@ -31,7 +31,7 @@ def plan_problems(plan: Plan, payload_kg: float) -> list[Problem]:
             Problem(
                 "payload_too_heavy",
                 f"the payload of {payload_kg:g} kg is outside 0 to {PAYLOAD_LIMIT_KG:g} kg",
-                "weigh the fixture and correct arm.payload_kg",
+                "Weigh the fixture and correct arm.payload_kg",
             )
         )
     swept = sorted({sweep.joint for sweep in plan.sweeps})
@@ -41,7 +41,7 @@ def plan_problems(plan: Plan, payload_kg: float) -> list[Problem]:
             Problem(
                 "axes_do_not_span",
                 "the swept wrists do not turn the flange about three independent axes",
-                "set wrist 2 in arm.home_deg near 90 or -90, and sweep all three wrists",
+                "Set wrist 2 in arm.home_deg near 90 or -90, and sweep all three wrists",
             )
         )
     return list(dict.fromkeys(problems))
@@ -61,15 +61,15 @@ def arm_problems(plan: Plan, report: ArmReport) -> list[Problem]:
             Problem(
                 "not_in_remote_control",
                 f"the arm at {report.host} is in local control",
-                "switch the pendant to remote control (top right corner)",
+                "Switch the pendant to remote control (top right corner)",
             )
         )
     if report.program_running:
         problems.append(
-            Problem("program_running", f"a program runs on the arm at {report.host}", "stop it on the pendant")
+            Problem("program_running", f"a program runs on the arm at {report.host}", "Stop it on the pendant")
         )
     if not report.state.at_rest:
-        problems.append(Problem("arm_moves", "the arm is moving", "wait until it stands still"))
+        problems.append(Problem("arm_moves", "the arm is moving", "Wait until it stands still"))
     too_far = [
         f"{name} {math.degrees(angle):+.0f}°"
         for name, angle, limit in zip(
@@ -82,7 +82,7 @@ def arm_problems(plan: Plan, report: ArmReport) -> list[Problem]:
             Problem(
                 "far_from_home",
                 f"the way home is too long to take unseen ({', '.join(too_far)})",
-                "bring the arm near its home pose from the pendant, or correct arm.home_deg",
+                "Bring the arm near its home pose from the pendant, or correct arm.home_deg",
             )
         )
     return problems
@@ -112,7 +112,7 @@ def _motion_problems(motion: Motion) -> list[Problem]:
                 Problem(
                     "joint_limit",
                     f"{motion.name} takes {name} from {low:.1f}° to {high:.1f}°, beyond ±360°",
-                    "raise procedure.acceleration_deg_s2, lower procedure.speed_deg_s, or bring arm.home_deg near 0",
+                    "Raise procedure.acceleration_deg_s2, lower procedure.speed_deg_s, or bring arm.home_deg near 0",
                 )
             )
     way = np.abs(travel(*ends))
@@ -124,7 +124,7 @@ def _motion_problems(motion: Motion) -> list[Problem]:
                     "joint_speed",
                     f"{motion.name} turns {name} at {math.degrees(speed):.1f}°/s, "
                     f"the limit is {math.degrees(limit):.1f}°/s",
-                    "lower procedure.speed_deg_s or arm.transfer_speed_deg_s",
+                    "Lower procedure.speed_deg_s or arm.transfer_speed_deg_s",
                 )
             )
     if motion.acceleration_rad_s2 > ACCELERATION_LIMIT_RAD_S2:
@@ -133,7 +133,7 @@ def _motion_problems(motion: Motion) -> list[Problem]:
                 "joint_acceleration",
                 f"{motion.name} accelerates with {math.degrees(motion.acceleration_rad_s2):.0f}°/s², "
                 f"the limit is {math.degrees(ACCELERATION_LIMIT_RAD_S2):.0f}°/s²",
-                "lower procedure.acceleration_deg_s2",
+                "Lower procedure.acceleration_deg_s2",
             )
         )
     return problems

@@ -9,6 +9,7 @@ from rig.arm.dashboard import Dashboard
 from rig.arm.messages import Stop
 
 STOP_S = 0.9  # a stop is confirmed within this, or not at all
+DASHBOARD_S = 0.8  # the dashboard has so long to answer
 BRAKE_RAD_S2 = 5.0
 
 
@@ -35,7 +36,7 @@ class Stopper:
         self._seen_at_rest = seen_at_rest
         self._starting = threading.Lock()
         self._thread: threading.Thread | None = None
-        self._outcome = StopOutcome(False, "the stop has not ended", "look at the arm")
+        self._outcome = StopOutcome(False, "the stop has not ended", "Look at the arm")
 
     @property
     def begun(self) -> bool:
@@ -61,7 +62,7 @@ class Stopper:
         began_s = time.monotonic()
         self._send(Stop(BRAKE_RAD_S2))
         try:
-            with Dashboard(self._host) as dashboard:
+            with Dashboard(self._host, timeout_s=DASHBOARD_S) as dashboard:
                 dashboard.stop_program()
             delivered = "the controller was told to stop"
         except OSError as error:
@@ -72,5 +73,5 @@ class Stopper:
             self._outcome = StopOutcome(
                 False,
                 f"{delivered}, but no state confirms that the arm is at rest",
-                "look at the arm and press the emergency stop if it moves",
+                "Look at the arm and press the emergency stop if it moves",
             )
