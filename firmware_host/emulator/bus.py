@@ -44,7 +44,10 @@ class Peripheral(Protocol):
 
 
 class Stored:
-    """A register that keeps what is written. Writing a one outside `modelled` fails the run by name."""
+    """A register that keeps what is written. `name` begins with the peripheral's name.
+
+    Writing a one outside `modelled` fails the run by name.
+    """
 
     __slots__ = ("_after", "_initial", "_modelled", "_name", "value")
 
@@ -55,8 +58,8 @@ class Stored:
         self._modelled = modelled | initial
         self._after = after
 
-    def at(self, offset: int, size: int = 4) -> Register:
-        return Register(offset, self._name, self.read, self.write, size)
+    def at(self, offset: int) -> Register:
+        return Register(offset, self._name.partition(" ")[2], self.read, self.write)
 
     def read(self) -> int:
         return self.value

@@ -1,11 +1,11 @@
-"""GPIO ports, SYSCFG's selection of external interrupts, and EXTI (RM0394, chapters 8, 9 and 13)."""
+"""GPIO outputs and functions, SYSCFG's selection of external interrupts, and EXTI (RM0394, chapters 8, 9 and 13)."""
 
 from collections.abc import Callable, Sequence
 
 from firmware_host.emulator.bus import Register, Stored
 from firmware_host.emulator.nvic import Nvic
 
-_INPUT, _OUTPUT, _ALTERNATE = 0, 1, 2
+_OUTPUT, _ALTERNATE = 1, 2
 _PORTS = {"A": 0, "B": 1}
 # Mode, output, speed, pull-up and alternate function after reset: the debug pins PA13–15, PB3–4 are taken
 _MODE_AFTER_RESET = {"A": 0xABFF_FFFF, "B": 0xFFFF_FEBF}
@@ -16,39 +16,34 @@ _EXTI_LINES = {**{6 + line: 1 << line for line in range(5)}, 23: 0x03E0, 40: 0xF
 
 
 class Port:
-    """One GPIO port: pins the firmware drives, pins that devices drive."""
+    """One GPIO port: levels the firmware drives, functions it selects."""
 
     def __init__(self, letter: str) -> None:
         self.name = f"GPIO{letter}"
         self.base = 0x4800_0000 + 0x400 * _PORTS[letter]
         prefix = self.name
         self._mode = Stored(f"{prefix} MODER", 0xFFFF_FFFF, _MODE_AFTER_RESET[letter], self._outputs_changed)
-        self._type = Stored(f"{prefix} OTYPER", 0xFFFF)
         self._speed = Stored(f"{prefix} OSPEEDR", 0xFFFF_FFFF, _SPEED_AFTER_RESET[letter])
         self._pulls = Stored(f"{prefix} PUPDR", 0xFFFF_FFFF, _PULLS_AFTER_RESET[letter])
-        self._output = Stored(f"{prefix} ODR", 0xFFFF, after=self._outputs_changed)
+        self._output = 0
         self._alternate = [Stored(f"{prefix} AFR{half}", 0xFFFF_FFFF) for half in "LH"]
-        self._external = 0  # levels on pins that devices drive
         self._watched: list[tuple[int, Callable[[bool], None]]] = []
         self._watched_level: list[bool] = []
 
     def reset(self) -> None:
-        for register in (self._mode, self._type, self._speed, self._pulls, self._output, *self._alternate):
+        for register in (self._mode, self._speed, self._pulls, *self._alternate):
             register.reset()
+        self._output = 0
         self._outputs_changed()
 
     def registers(self) -> Sequence[Register]:
         return (
             self._mode.at(0x00),
-            self._type.at(0x04),
             self._speed.at(0x08),
             self._pulls.at(0x0C),
-            Register(0x10, "IDR", self._read_input, None),
-            self._output.at(0x14),
             Register(0x18, "BSRR", None, self._set_and_reset),
             self._alternate[0].at(0x20),
             self._alternate[1].at(0x24),
-            Register(0x28, "BRR", None, lambda value: self._set_and_reset(value << 16)),
         )
 
     def watch(self, pin: int, on_level: Callable[[bool], None]) -> None:
@@ -56,31 +51,20 @@ class Port:
         self._watched.append((pin, on_level))
         self._watched_level.append(True)
 
-    def drive(self, pin: int, high: bool) -> None:
-        """A device sets the level of `pin`."""
-        self._external = self._external & ~(1 << pin) | high << pin
-
     def function(self, pin: int) -> int | None:
         """The alternate function selected on `pin`, None when it is no alternate-function pin."""
         if self._mode.value >> 2 * pin & 3 != _ALTERNATE:
             return None
         return self._alternate[pin // 8].value >> 4 * (pin % 8) & 0xF
 
-    def _is_output(self, pin: int) -> bool:
-        return self._mode.value >> 2 * pin & 3 == _OUTPUT
-
     def _set_and_reset(self, value: int) -> None:
-        output = self._output.value & ~(value >> 16) | value & 0xFFFF
-        if output != self._output.value:
-            self._output.write(output)
-
-    def _read_input(self) -> int:
-        driven = sum(1 << pin for pin in range(16) if self._is_output(pin))
-        return self._output.value & driven | self._external & ~driven
+        self._output = self._output & ~(value >> 16) | value & 0xFFFF
+        self._outputs_changed()
 
     def _outputs_changed(self) -> None:
         for index, (pin, on_level) in enumerate(self._watched):
-            high = not self._is_output(pin) or bool(self._output.value >> pin & 1)
+            is_output = self._mode.value >> 2 * pin & 3 == _OUTPUT
+            high = not is_output or bool(self._output >> pin & 1)
             if high != self._watched_level[index]:
                 self._watched_level[index] = high
                 on_level(high)
@@ -107,7 +91,7 @@ class Syscfg:
 
 
 class Exti:
-    """External interrupts 0–15: edges on pins pend a line, a line that is not masked requests its interrupt."""
+    """External interrupts 0–15: rising edges on pins pend a line, a line that is not masked requests its interrupt."""
 
     name = "EXTI"
     base = 0x4001_0400
@@ -117,13 +101,11 @@ class Exti:
         self._syscfg = syscfg
         self._mask = Stored("EXTI IMR1", 0xFFFF, initial=0xFF82_0000, after=self._request)
         self._rising = Stored("EXTI RTSR1", 0xFFFF)
-        self._falling = Stored("EXTI FTSR1", 0xFFFF)
         self._pending = 0
 
     def reset(self) -> None:
         self._pending = 0
         self._rising.reset()
-        self._falling.reset()
         self._mask.reset()
         self._request()
 
@@ -131,14 +113,12 @@ class Exti:
         return (
             self._mask.at(0x00),
             self._rising.at(0x08),
-            self._falling.at(0x0C),
             Register(0x14, "PR1", lambda: self._pending, self._clear),
         )
 
-    def edge(self, port: str, pin: int, rising: bool) -> None:
-        """The level on a pin changed."""
-        selected = self._rising if rising else self._falling
-        if _PORTS[port] == self._syscfg.port(pin) and selected.value >> pin & 1:
+    def rising_edge(self, port: str, pin: int) -> None:
+        """The level on a pin rose."""
+        if _PORTS[port] == self._syscfg.port(pin) and self._rising.value >> pin & 1:
             self._pending |= 1 << pin
             self._request()
 

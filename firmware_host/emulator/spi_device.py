@@ -124,7 +124,6 @@ class DeviceLink:
         self._clock = clock
         self._slot = timeline.register(self._event)
         self._due_s = math.inf
-        self._interrupt_port = port_of(device.interrupt)
         self._interrupt_letter, self._interrupt_pin = device.interrupt[1], int(device.interrupt[2:])
         self._exti = exti
         self._level = False
@@ -155,8 +154,8 @@ class DeviceLink:
         level = self.device.interrupt_level
         if level != self._level:
             self._level = level
-            self._interrupt_port.drive(self._interrupt_pin, level)
-            self._exti.edge(self._interrupt_letter, self._interrupt_pin, level)
+            if level:
+                self._exti.rising_edge(self._interrupt_letter, self._interrupt_pin)
         due_s = self.device.next_event_s
         if due_s != self._due_s:
             self._due_s = due_s

@@ -23,18 +23,12 @@ class SystemControl:
         self._nvic = nvic
         self._on_reset = on_reset
         self._vtor = Stored("SCB VTOR", 0xFFFF_FF80)
-        self._configuration = Stored("SCB CCR", 1 << 4, initial=1 << 9)  # DIV_0_TRP; STKALIGN is on
-        self._handlers = Stored("SCB SHCSR", 7 << 16)
-        self._sleep = Stored("SCB SCR", 0)
         self._coprocessors = Stored("SCB CPACR", _FLOAT_ENABLED)
-        self._float_context = Stored("SCB FPCCR", 3 << 30, initial=3 << 30)
         self._priority_group = 0
 
     def reset(self) -> None:
-        for register in (self._vtor, self._configuration, self._handlers, self._sleep):
-            register.reset()
+        self._vtor.reset()
         self._coprocessors.reset()
-        self._float_context.reset()
         self._priority_group = 0
 
     @property
@@ -46,18 +40,11 @@ class SystemControl:
     def float_enabled(self) -> bool:
         return self._coprocessors.value == _FLOAT_ENABLED
 
-    @property
-    def traps_division_by_zero(self) -> bool:
-        return bool(self._configuration.value >> 4 & 1)
-
     def registers(self) -> Sequence[Register]:
         return (
-            Register(0x00, "CPUID", lambda: 0x410F_C241, None),
             Register(0x04, "ICSR", self._read_icsr, self._write_icsr),
             self._vtor.at(0x08),
             Register(0x0C, "AIRCR", lambda: 0xFA05_0000 | self._priority_group << 8, self._write_aircr),
-            self._sleep.at(0x10),
-            self._configuration.at(0x14),
             Register(0x20, "SHPR3", self._read_shpr3, self._write_shpr3),
             *(
                 Register(
@@ -65,9 +52,7 @@ class SystemControl:
                 )
                 for offset, n in ((0x22, PENDSV), (0x23, SYSTICK))
             ),
-            self._handlers.at(0x24),
             self._coprocessors.at(0x88),
-            self._float_context.at(0x234),
         )
 
     def _read_icsr(self) -> int:

@@ -11,7 +11,7 @@ _START, _KICK, _UNLOCK = 0xCCCC, 0xAAAA, 0x5555
 
 
 class Tim2:
-    """A 32-bit up-counter without interrupts. The prescaler acts from the next update event on, as on the chip."""
+    """A free-running 32-bit up-counter. The prescaler acts from the next update event on, as on the chip."""
 
     name = "TIM2"
     base = 0x4000_0000
@@ -20,39 +20,31 @@ class Tim2:
         self._timeline = timeline
         self._clocks = clocks
         self._control = Stored("TIM2 CR1", 1, after=self._switch)
-        self._reload = Stored("TIM2 ARR", 0xFFFF_FFFF, initial=0xFFFF_FFFF)
         self._prescaler = Stored("TIM2 PSC", 0xFFFF)
         self.reset()
 
     def reset(self) -> None:
-        for register in (self._control, self._reload, self._prescaler):
-            register.reset()
+        self._control.reset()
+        self._prescaler.reset()
         self._divider = 1  # the prescaler in effect, plus one
         self._counted = 0  # the count at `_since`
         self._since: int | None = None  # tick, None while stopped
-        self._updated = False
 
     def registers(self) -> Sequence[Register]:
         return (
             self._control.at(0x00),
-            Register(0x10, "SR", lambda: int(self._updated), self._write_status),
             Register(0x14, "EGR", None, self._generate),
-            Register(0x24, "CNT", self._count, self._set_count),
+            Register(0x24, "CNT", self._count, None),
             self._prescaler.at(0x28),
-            self._reload.at(0x2C),
         )
 
     def _count(self) -> int:
-        count = self._counted
-        if self._since is not None:
-            timer_hz = self._clocks.pclk1_hz * (1 if self._clocks.pclk1_hz == self._clocks.core_hz else 2)
-            count += (self._timeline.now - self._since) * timer_hz // (TICK_HZ * self._divider)
-        return count % (self._reload.value + 1)
-
-    def _set_count(self, value: int) -> None:
-        self._counted = value
-        if self._since is not None:
-            self._since = self._timeline.now
+        if self._since is None:
+            return self._counted
+        # RM0394, section 6.2.14: timers run at twice the bus clock when the bus is divided
+        timer_hz = self._clocks.pclk1_hz * (1 if self._clocks.pclk1_hz == self._clocks.core_hz else 2)
+        ticks = self._timeline.now - self._since
+        return (self._counted + ticks * timer_hz // (TICK_HZ * self._divider)) & 0xFFFF_FFFF
 
     def _switch(self) -> None:
         self._counted = self._count()
@@ -60,13 +52,10 @@ class Tim2:
 
     def _generate(self, value: int) -> None:
         check_bits("TIM2 EGR", value, 1)
-        if value & 1:
-            self._divider = self._prescaler.value + 1
-            self._set_count(0)
-            self._updated = True
-
-    def _write_status(self, value: int) -> None:
-        self._updated = self._updated and bool(value & 1)
+        self._divider = self._prescaler.value + 1
+        self._counted = 0
+        if self._since is not None:
+            self._since = self._timeline.now
 
 
 class Watchdog:
