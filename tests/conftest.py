@@ -7,6 +7,7 @@ import socket
 import subprocess
 import sys
 from collections.abc import Callable, Iterator, Mapping
+from contextlib import contextmanager
 from pathlib import Path
 from typing import Any
 
@@ -77,16 +78,16 @@ class WorldHandle:
 World = Callable[..., WorldHandle]
 
 
-@pytest.fixture
-def world(tmp_path: Path) -> Iterator[World]:
-    """Starts worlds: `world({"world": {"time_scale": 1}})` is demo.yaml with these changes, on a fresh address."""
+@contextmanager
+def worlds(folder: Path) -> Iterator[World]:
+    """A starter of worlds whose configurations lie in `folder`; every world has ended when the block does."""
     running: list[WorldHandle] = []
 
     def start(changes: Mapping[str, Any] | None = None) -> WorldHandle:
         host = fresh_host()
         address = {"arm": {"host": host}, "board": {"port": f"socket://{host}:7321"}}
         document = merge(merge(yaml.safe_load(DEMO.read_text(encoding="utf-8")), address), changes or {})
-        config_path = tmp_path / f"world-{len(running)}.yaml"
+        config_path = folder / f"world-{len(running)}.yaml"
         config_path.write_text(yaml.safe_dump(document, sort_keys=False, allow_unicode=True), encoding="utf-8")
         process = subprocess.Popen(
             [sys.executable, "-m", "rig.world", str(config_path), "--until-eof"],
@@ -106,6 +107,15 @@ def world(tmp_path: Path) -> Iterator[World]:
         running.append(handle)
         return handle
 
-    yield start
-    for handle in running:
-        handle.stop()
+    try:
+        yield start
+    finally:
+        for handle in running:
+            handle.stop()
+
+
+@pytest.fixture
+def world(tmp_path: Path) -> Iterator[World]:
+    """Starts worlds: `world({"world": {"time_scale": 1}})` is demo.yaml with these changes, on a fresh address."""
+    with worlds(tmp_path) as start:
+        yield start

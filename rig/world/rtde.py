@@ -170,8 +170,6 @@ class RtdeSession:
             return self._say("data package for an input recipe that was never set up")
         if len(payload) - 1 != recipe.layout.size:
             return self._say(f"data package of {len(payload) - 1} bytes where {recipe.layout.size} belong")
-        if not self._started:
-            return b""
         values = iter(recipe.layout.unpack_from(payload, 1))
         named: dict[str, Any] = {}
         for name, count, put in recipe.fields:
