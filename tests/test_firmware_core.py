@@ -350,24 +350,54 @@ def test_a_sensor_that_falls_silent_is_reported_once() -> None:
     assert errors[0].values["reply_to"] == 0
 
 
-@settings(max_examples=200)
-@given(st.lists(st.tuples(st.integers(1, 3), st.booleans(), st.booleans()), min_size=1, max_size=400))
-def test_every_conversion_is_either_received_or_counted_as_dropped(
-    steps: list[tuple[int, bool, bool]],
-) -> None:
+def test_a_line_that_does_not_keep_up_costs_the_newest_samples_and_stop_waits_for_the_others() -> None:
+    board = streaming_board()
+    board.line_is_free = False
+    for k in range(1, 301):
+        convert(board, k * PERIOD_US, (k, 0, 0))
+    board.receive(encode("stop", 2))
+    for _ in range(20):
+        board.sent()
+        board.run(1)
+    frames = board.frames()
+    sequences = sample_sequences(frames)
+    assert sequences == list(range(len(sequences))) and 64 < len(sequences) < 150
+    assert frames[-1].name == "ack" and frames[-2].name == "samples"
+    assert frames[-2].values["dropped"] == 300 - len(sequences)
+
+
+def test_answers_there_is_no_room_for_are_counted_and_the_question_can_be_asked_again(board: HostBoard) -> None:
+    board.line_is_free = False
+    for sequence in range(1, 101):
+        board.receive(encode("status", sequence))
+    board.line_is_free = True
+    board.sent()
+    board.run()
+    answered = [frame.values["reply_to"] for frame in board.frames()]
+    assert answered == list(range(1, len(answered) + 1))
+    (report,) = board.ask("status", 101)
+    assert report.values["tx_overruns"] == 100 - len(answered) > 0
+
+
+@settings(max_examples=100)
+@given(
+    st.lists(st.tuples(st.integers(1, 90), st.integers(1, 3), st.booleans(), st.booleans()), min_size=1, max_size=20)
+)
+def test_every_conversion_is_either_received_or_counted_as_dropped(steps: list[tuple[int, int, bool, bool]]) -> None:
     """Any mixture of missed edges, reads without new data and a transmitter that does not keep up."""
     board = streaming_board()
     conversion = 0
-    for skip, fresh, line_is_free in steps:
-        conversion += skip if conversion else 1
+    for length, skip, fresh, line_is_free in steps:
         board.line_is_free = line_is_free
         if line_is_free:
             board.sent()
-        if fresh:
-            convert(board, conversion * PERIOD_US, (conversion % 32000, 0, 0))
-        else:
-            board.data_ready(conversion * PERIOD_US)
-            board.run()
+        for _ in range(length):
+            conversion += skip if conversion else 1
+            if fresh:
+                convert(board, conversion * PERIOD_US, (conversion % 32000, 0, 0))
+            else:
+                board.data_ready(conversion * PERIOD_US)
+                board.run()
     board.line_is_free = True
     board.sent()
     board.receive(encode("stop", 200))
@@ -377,7 +407,8 @@ def test_every_conversion_is_either_received_or_counted_as_dropped(
     counts = [int(c[0]) for f in frames if f.name == "samples" for c in f.items["counts"]]
     assert counts == [(sequence + 1) % 32000 for sequence in sequences], "a sample under another one's number"
     assert sequences == sorted(set(sequences))
-    assert frames[-1].name == "ack"
+    names = [frame.name for frame in frames]
+    assert "samples" not in names[names.index("ack") :]
     item = board.ask("status", 201)[-1].items[0]
     assert int(item["conversions"]) == conversion
     assert int(item["samples"]) == len(sequences)

@@ -152,8 +152,8 @@ static void acquire(unsigned sensor)
     stream->written++;
 }
 
-/* Sends the oldest samples up to a gap in the sequence: a batch numbers its samples by the first. */
-static bool send_batch(unsigned sensor)
+/* Sends the oldest samples up to a gap in the sequence: a batch numbers its samples by the first. The link has room. */
+static void send_batch(unsigned sensor)
 {
     struct {
         struct samples_payload head;
@@ -179,11 +179,9 @@ static bool send_batch(unsigned sensor)
         .base_time_us = first->time_us,
         .count = count,
     };
-    if (!link_send(MESSAGE_SAMPLES, &batch, sizeof batch.head + count * sizeof batch.items[0]))
-        return false;
+    link_send(MESSAGE_SAMPLES, &batch, sizeof batch.head + count * sizeof batch.items[0]);
     stream->read += count;
     stream->sent += count;
-    return true;
 }
 
 static bool batch_is_due(const struct stream *stream)
@@ -200,8 +198,8 @@ void acquisition_run(void)
     for (unsigned i = 0; i < SENSOR_COUNT; i++) {
         if (running && streams[i].period_us != 0)
             acquire(i);
-        while (batch_is_due(&streams[i]) && send_batch(i))
-            ;
+        while (batch_is_due(&streams[i]))
+            send_batch(i);
     }
 }
 
