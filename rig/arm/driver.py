@@ -290,7 +290,8 @@ class Arm:
             return state.host_time_s > since_s and state.at_rest and state.runtime_state == RuntimeState.STOPPED
 
         with self._changed:
-            return self._changed.wait_for(at_rest, timeout_s)
+            self._changed.wait_for(lambda: at_rest() or self._link.ended, timeout_s)
+            return at_rest()
 
 
 def look(host: str) -> ArmReport:

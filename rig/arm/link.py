@@ -34,7 +34,7 @@ class ChildLink:
         self._host = host
         self._on_message = on_message
         self._on_lost = on_lost
-        self._closing = threading.Event()
+        self._ended = threading.Event()
         self._sending = threading.Lock()
         self._patient = False
         self._silent_ticks = 0
@@ -79,9 +79,14 @@ class ChildLink:
             self._silent_ticks = self._frozen_ticks = 0
             self._patient = False
 
+    @property
+    def ended(self) -> bool:
+        """Whether no message can come any more."""
+        return self._ended.is_set()
+
     def close(self) -> None:
         """End the child and both threads; an arm that is held must have been stopped before."""
-        self._closing.set()
+        self._ended.set()
         if self._process.pid is None:
             self._pipe.close()
             self._child_pipe.close()
@@ -107,14 +112,15 @@ class ChildLink:
                     self._frozen_ticks = 0
                 self._on_message(message)
         except (EOFError, OSError):
-            if not self._closing.is_set():
+            if not self._ended.is_set():
+                self._ended.set()
                 name = "arm_link_lost" if self._frozen_ticks > STALE_TICKS else "arm_driver_died"
                 self._process.join(0.2)
                 status = self._process.exitcode
                 self._lose(name, f"the process that talks to the arm at {self._host} ended (exit status {status})")
 
     def _guard(self) -> None:
-        while not self._closing.wait(TICK_S):
+        while not self._ended.wait(TICK_S):
             self._silent_ticks += 1
             self._frozen_ticks += 1
             if self._silent_ticks > (PATIENT_TICKS if self._patient else SILENT_TICKS):
@@ -125,7 +131,7 @@ class ChildLink:
 
     def _give_up(self, name: str, what: str) -> None:
         """End a child that cannot be trusted any more: a client that reconnects uploads its script again."""
-        self._closing.set()
+        self._ended.set()
         self._process.kill()
         self._lose(name, what)
 
