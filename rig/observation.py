@@ -162,19 +162,23 @@ def _between(stream: _Stream, start_s: float, end_s: float) -> slice:
 def _average(stream: _Stream, inside: slice, rate: Array | None, duration_s: float) -> Average:
     """Mean and its variance; `rate` (n,) is what the arm did meanwhile, None at rest.
 
-    The variance is that of the residuals of a straight line of reading against rate, never below that of rounding to
-    whole counts, divided by the number of samples and widened where the residuals are not white.
+    The noise is what is left of a straight line of reading against rate, and never below the rounding to counts. Its
+    variance is divided by the number of samples, and widened where the residuals are not white. Rounding averages out
+    only as far as noise carries the reading across counts: the part exp(−(2πσ/count)²) of its variance stays.
     """
     m = stream.readings_rad_s[inside]
     columns = np.ones((len(m), 1)) if rate is None else np.column_stack([np.ones(len(m)), rate])
     residual = m - columns @ np.linalg.lstsq(columns, m, rcond=None)[0]
     scatter = np.sum(residual**2, axis=0) / (len(m) - columns.shape[1])
-    variance = np.maximum(scatter, stream.sensor.sensitivity_rad_s_per_count**2 / 12)
+    count = stream.sensor.sensitivity_rad_s_per_count
+    rounding = count**2 / 12
+    variance = np.maximum(scatter, rounding)
+    staying = rounding * np.exp(-((2 * np.pi / count) ** 2) * (variance - rounding))
     wider = np.array([widening(residual[:, axis]) for axis in range(3)])
     temperature = stream.raw["temperature_counts"][inside].mean() * stream.sensor.temperature_c_per_count
     return Average(
         mean_rad_s=m.mean(axis=0),
-        variance_rad2_s2=variance * wider / len(m),
+        variance_rad2_s2=variance * wider / len(m) + staying,
         noise_rad_s=np.sqrt(variance),
         samples=len(m),
         duration_s=duration_s,
@@ -215,7 +219,7 @@ def _check_saturation(stream: _Stream, inside: slice, where: str) -> None:
 
 def _check_stuck(stream: _Stream, inside: slice, where: str) -> None:
     """A sensor with noise above one count does not repeat itself on all axes many times in a row."""
-    if np.abs(np.diff(stream.raw["counts"], axis=0)).mean(axis=0).min() < 1:
+    if np.median(np.abs(np.diff(stream.raw["counts"], axis=0)), axis=0).min() < 1:
         return
     changes = np.flatnonzero(np.any(np.diff(stream.raw["counts"][inside], axis=0), axis=1))
     longest = int(np.max(np.diff(changes, prepend=-1, append=inside.stop - inside.start - 1)))
