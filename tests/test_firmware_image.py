@@ -24,10 +24,19 @@ RAM, RAM_SIZE = 0x20000000, 16 * 1024
 # The image
 
 
+def compiler_of(elf_path: Path) -> str:
+    """What the compiler wrote about itself into the program."""
+    with elf_path.open("rb") as file:
+        return str(ELFFile(file).get_section_by_name(".comment").data().rstrip(b"\0").decode())
+
+
 def test_the_sources_build_the_committed_image_byte_for_byte_wherever_they_lie(tmp_path: Path) -> None:
     elsewhere = tmp_path / "a folder of another name"
     shutil.copytree(FIRMWARE, elsewhere, ignore=shutil.ignore_patterns("image"))
     subprocess.run(["make", "-C", elsewhere], check=True, capture_output=True)
+    assert compiler_of(elsewhere / "image" / "rig_l432.elf") == compiler_of(IMAGE / "rig_l432.elf"), (
+        "another compiler gives other bytes: build with the one the committed image names"
+    )
     for name in ("rig_l432.bin", "rig_l432.elf"):
         assert (elsewhere / "image" / name).read_bytes() == (IMAGE / name).read_bytes(), (
             f"{name}: run `make -C firmware_host/firmware` and commit the image"
