@@ -79,7 +79,9 @@ def test_no_joint_exceeds_its_limit_and_all_arrive_together() -> None:
 
 @settings(max_examples=25, deadline=None)
 @given(st.tuples(*[angles] * 6), st.floats(0.5, 3.1), st.floats(0.5, 20.0), st.sampled_from([0.0, 0.05, 0.2]))
-def test_any_move_ends_exactly_on_target_without_a_jump(target: Joints, speed: float, ramp: float, vibration: float) -> None:
+def test_any_move_ends_exactly_on_target_without_a_jump(
+    target: Joints, speed: float, ramp: float, vibration: float
+) -> None:
     player = Player(vibration)
     player.motion.move(target, speed, ramp)
     before, gain = player.motion.target_qd_rad_s, 1e-9 + ramp * TICK_S * 1.0001
@@ -115,7 +117,7 @@ def test_the_rate_is_the_derivative_of_the_angle_at_any_instant_of_a_tick() -> N
 
 
 def test_the_measured_turn_takes_the_time_of_the_smooth_speed() -> None:
-    """The time between two passes of the joint, a whole turn apart, gives the commanded speed whatever the vibration."""
+    """Two passes of the joint, a whole turn apart, give the commanded speed whatever the vibration."""
     player = Player(0.08, start=turned(HOME, 5, -3.6))
     player.motion.move(turned(HOME, 5, 3.6), 1.0, 2.0)
     times, angles_seen = [], []
@@ -190,7 +192,7 @@ def test_the_worlds_kinematics_agree_with_the_rigs(q: Joints, qd: Joints) -> Non
     assert kinematics.flange_rate(q, qd) == pytest.approx(rig_kinematics.flange_rate(q, qd), abs=1e-9)
     pose, matrix = kinematics.flange_pose(q), rig_kinematics.flange_pose(q)
     assert pose[:3] == pytest.approx(matrix[:3, 3], abs=1e-9)
-    assert np.asarray(kinematics.rotation_from_vector(pose[3:])) == pytest.approx(matrix[:3, :3], abs=1e-6)
+    assert np.array(kinematics.rotation_from_vector(pose[3:])) == pytest.approx(matrix[:3, :3], abs=1e-6)
 
 
 def test_wrist_axes_in_the_flange_frame() -> None:

@@ -25,15 +25,31 @@ class ControlSession:
         self._reply_at: int | None = None  # the tick at which an `advance` is answered
         robot = world.laboratory.robot
         self._orders: dict[str, Callable[..., Reply | None]] = {
-            "state": self._state, "hold": self._hold, "run": self._run, "advance": self._advance,
-            "protective_stop": lambda: robot.protective_stop(), "emergency_stop": lambda: robot.emergency_stop(),
-            "release": lambda: robot.release(), "power_off": lambda: robot.power_off(), "power_on": lambda: robot.power_on(),
-            "brake_release": lambda: robot.brake_release(), "pause": lambda: {"done": robot.pause()},
-            "play": lambda: {"done": robot.resume()}, "stop_program": lambda: robot.stop_program("stopped on the pendant"),
-            "speed_slider": lambda fraction: robot.set_speed_slider(float(fraction)),
-            "remote_control": self._remote_control, "register_in_use": self._register_in_use,
-            "register_free": self._register_free, "close_arm": self._close_arm, "silence_arm": self._silence_arm,
-        }  # fmt: skip
+            "state": self._state,
+            "hold": self._hold,
+            "run": self._run,
+            "advance": self._advance,
+            "protective_stop": robot.protective_stop,
+            "emergency_stop": robot.emergency_stop,
+            "release": robot.release,
+            "power_off": robot.power_off,
+            "power_on": robot.power_on,
+            "brake_release": robot.brake_release,
+            "pause": lambda: {"done": robot.pause()},
+            "play": lambda: {"done": robot.resume()},
+            "stop_program": lambda: robot.stop_program("stopped on the pendant"),
+            "speed_slider": robot.set_speed_slider,
+            "remote_control": self._remote_control,
+            "register_in_use": self._register_in_use,
+            "register_free": self._register_free,
+            "close_arm": self._close_arm,
+            "silence_arm": self._silence_arm,
+            "unplug_board": world.unplug_board,
+            "plug_in_board": world.plug_in_board,
+            "reset_board": self._reset_board,
+            "silence_board": self._silence_board,
+            "host_baud": self._host_baud,
+        }
 
     def greeting(self) -> bytes:
         return b""
@@ -84,14 +100,25 @@ class ControlSession:
     def _state(self) -> Reply:
         robot = self._world.laboratory.robot
         return {
-            "q_rad": robot.motion.q_rad, "qd_rad_s": robot.motion.qd_rad_s, "moving": robot.motion.moving,
-            "program_running": robot.robot_status_bits >> 1 & 1 == 1, "program": robot.program_name,
-            "runtime_state": robot.runtime_state.name, "robot_mode": robot.robot_mode.name,
-            "safety_mode": robot.safety_mode.name, "speed_slider": robot.speed_slider,
-            "speed_scaling": robot.motion.fraction, "remote_control": robot.remote_control,
-            "payload_kg": robot.payload_kg, "payload_centre_m": robot.payload_centre_m,
-            "claims": sorted(robot.claims), "messages": list(robot.messages), "held": self._world.clock.held,
-        }  # fmt: skip
+            "q_rad": robot.motion.q_rad,
+            "qd_rad_s": robot.motion.qd_rad_s,
+            "moving": robot.motion.moving,
+            "program_running": robot.robot_status_bits >> 1 & 1 == 1,
+            "program": robot.program_name,
+            "runtime_state": robot.runtime_state.name,
+            "robot_mode": robot.robot_mode.name,
+            "safety_mode": robot.safety_mode.name,
+            "speed_slider": robot.speed_slider,
+            "speed_scaling": robot.motion.fraction,
+            "remote_control": robot.remote_control,
+            "payload_kg": robot.payload_kg,
+            "payload_centre_m": robot.payload_centre_m,
+            "claims": sorted(robot.claims),
+            "messages": list(robot.messages),
+            "held": self._world.clock.held,
+            "board_powered": self._world.laboratory.board is not None,
+            "board_baud": self._world.line.baud,
+        }
 
     def _remote_control(self, on: bool) -> None:
         self._world.laboratory.robot.remote_control = bool(on)
@@ -108,6 +135,19 @@ class ControlSession:
 
     def _silence_arm(self, duration_s: float) -> None:
         self._world.silence_arm(float(duration_s))
+
+    # -- board -------------------------------------------------------------------------------------------------
+    def _reset_board(self) -> None:
+        if self._world.laboratory.board is not None:
+            self._world.laboratory.board.reset()
+
+    def _silence_board(self, on: bool) -> None:
+        """A cable that carries nothing, with its port still there."""
+        self._world.line.silent = bool(on)
+
+    def _host_baud(self, baud: float | None) -> None:
+        """The host reads and writes at another baud rate than the board: what TCP would not show."""
+        self._world.line.host_baud = baud
 
 
 def _line(reply: Reply) -> bytes:

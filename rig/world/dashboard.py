@@ -34,36 +34,49 @@ class DashboardSession:
         self._buffer = bytearray()
         self._role = "none"
         self._questions: dict[str, Callable[[], str]] = {
-            "polyscopeversion": self._polyscope, "version": self._version, "robotmode": self._robotmode,
+            "polyscopeversion": self._polyscope,
+            "version": self._version,
+            "robotmode": self._robotmode,
             "safetymode": lambda: f"Safetymode: {robot.safety_mode.name}",
             "safetystatus": lambda: f"Safetystatus: {robot.safety_mode.name}",
             "running": lambda: f"Program running: {str(self._playing).lower()}",
             "programstate": self._program_state,
-            "get loaded program": lambda: f"Loaded program: {robot.loaded_program}" if robot.loaded_program else "No program loaded",
+            "get loaded program": self._loaded_program,
             "isprogramsaved": lambda: f"true {robot.loaded_program}",
-            "get serial number": lambda: robot.identity.serial_number, "get robot model": lambda: "UR10",
+            "get serial number": lambda: robot.identity.serial_number,
+            "get robot model": lambda: "UR10",
             "is in remote control": lambda: str(robot.remote_control).lower(),
             "get operational mode": lambda: "AUTOMATIC" if robot.remote_control else "MANUAL",
-            "getuserrole": lambda: self._role.upper(),
-            "stop": self._stop, "pause": lambda: "Pausing program" if robot.pause() else "Failed to execute: pause",
-            "popup": lambda: "showing popup", "close popup": lambda: "closing popup",
-            "close safety popup": lambda: "closing safety popup", "addtolog": lambda: "Added log message",
+            "getuserrole": self._get_role,
+            "stop": self._stop,
+            "pause": lambda: "Pausing program" if robot.pause() else "Failed to execute: pause",
+            "popup": lambda: "showing popup",
+            "close popup": lambda: "closing popup",
+            "close safety popup": lambda: "closing safety popup",
+            "addtolog": lambda: "Added log message",
             "generate flight report": lambda: "Flight Report generated with id: 1",
             "generate support file": lambda: "Completed successfully: ur_support.zip",
-            "clear operational mode": lambda: "No longer controlling the operational mode. Current operational mode: AUTOMATIC",
-            "shutdown": self._shutdown, "power off": self._power_off,
-        }  # fmt: skip
+            "clear operational mode": lambda: "No longer controlling the operational mode.",
+            "shutdown": self._shutdown,
+            "power off": self._power_off,
+        }
         self._orders: dict[str, Callable[[], str]] = {
-            "play": self._play, "power on": self._power_on, "brake release": self._brake_release,
-            "unlock protective stop": self._unlock, "restart safety": self._restart_safety,
-        }  # fmt: skip
+            "play": self._play,
+            "power on": self._power_on,
+            "brake release": self._brake_release,
+            "unlock protective stop": self._unlock,
+            "restart safety": self._restart_safety,
+        }
         self._worded: dict[str, Callable[[str], str]] = {
-            "load installation": lambda name: f"Loading installation: {name}", "load": self._load,
-            "popup": lambda text: "showing popup", "addtolog": lambda text: "Added log message",
-            "set operational mode": lambda mode: f"Operational mode '{mode}' is set", "setuserrole": self._set_role,
+            "load installation": lambda name: f"Loading installation: {name}",
+            "load": self._load,
+            "popup": lambda text: "showing popup",
+            "addtolog": lambda text: "Added log message",
+            "set operational mode": lambda mode: f"Operational mode '{mode}' is set",
+            "setuserrole": self._set_role,
             "generate flight report": lambda kind: "Flight Report generated with id: 1",
             "generate support file": lambda folder: f"Completed successfully: {folder}/ur_support.zip",
-        }  # fmt: skip
+        }
 
     def greeting(self) -> bytes:
         return b"Connected: Universal Robots Dashboard Server\n"
@@ -114,6 +127,10 @@ class DashboardSession:
         paused = self._robot.runtime_state in (RuntimeState.PAUSING, RuntimeState.PAUSED)
         return f"{'PLAYING' if self._playing else 'PAUSED' if paused else 'STOPPED'} {name}"
 
+    def _loaded_program(self) -> str:
+        name = self._robot.loaded_program
+        return f"Loaded program: {name}" if name else "No program loaded"
+
     # -- orders ------------------------------------------------------------------------------------------------
     def _stop(self) -> str:
         self._robot.stop_program("stopped from the dashboard")
@@ -158,6 +175,9 @@ class DashboardSession:
         if self._robot.robot_mode != RobotMode.POWER_OFF:
             self._robot.power_off()
         return "Shutting down"
+
+    def _get_role(self) -> str:
+        return self._role.upper()
 
     def _set_role(self, role: str) -> str:
         self._role = role

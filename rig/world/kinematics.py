@@ -1,4 +1,4 @@
-"""How the simulated flange turns and where it is: the world's own few lines, apart from the rig's (independent evidence).
+"""How the simulated flange turns and where it is: the world's own few lines, independent of the rig's.
 
 Plain floats, because the sensors ask several hundred times a simulated second.
 """
@@ -66,7 +66,7 @@ def _rotation_vector(r: tuple[Vector, Vector, Vector]) -> Vector:
     return scale * x, scale * y, scale * z
 
 
-def rotation_from_vector(vector: Vector) -> tuple[Vector, Vector, Vector]:
+def rotation_from_vector(vector: Sequence[float]) -> tuple[Vector, Vector, Vector]:
     """Rows of the rotation matrix of a rotation vector (rad), Rodrigues' formula."""
     angle = sqrt(sum(component * component for component in vector))
     if angle == 0.0:

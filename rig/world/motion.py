@@ -1,4 +1,4 @@
-"""The simulated joints: a trajectory played with a time scaling (speed slider, pause), felt at any instant of a tick."""
+"""The simulated joints: a trajectory played with a time scaling (speed slider, pause), known at any instant."""
 
 from collections.abc import Sequence
 

@@ -1,22 +1,38 @@
 """The world's process: one thread, one loop, the laboratory in the middle and sockets around it."""
 
 import json
+import os
 import selectors
 import signal
 import sys
 import time
 from collections.abc import Callable
+from functools import partial
+from typing import TYPE_CHECKING
+from urllib.parse import urlsplit
 
+from firmware_host.errors import BoardError
 from rig.config.load import Loaded
 from rig.errors import Refused
 from rig.world import dashboard, rtde, script
 from rig.world.clock import Clock
 from rig.world.control import ControlSession
 from rig.world.laboratory import Laboratory
-from rig.world.network import Network
+from rig.world.network import Network, Session
 from rig.world.robot import Robot
+from rig.world.serial_line import SerialLine, SerialSession
+
+if TYPE_CHECKING:
+    from rig.world.pty_port import PtyPort
 
 IDLE_POLL_S = 0.2
+ARM_PORTS: dict[int, Callable[[Robot], Session]] = {
+    dashboard.PORT: dashboard.DashboardSession,
+    script.PRIMARY_PORT: script.ScriptSession,
+    script.SECONDARY_PORT: script.ScriptSession,
+    script.REALTIME_PORT: script.ScriptSession,
+    rtde.PORT: rtde.RtdeSession,
+}
 
 
 class World:
@@ -30,63 +46,96 @@ class World:
                 "Name a file with a world: section, for example configs/demo.yaml",
             )
         self.laboratory = Laboratory(loaded.config, loaded.world)
+        self.line = SerialLine(self.laboratory)
         self.network = Network()
         self._silent_until_s = 0.0
         self._ended = False
-        self._host, self._control_port = loaded.config.arm.host, loaded.world.control_port
-        self._board_url = loaded.config.board.port
+        host, board = loaded.config.arm.host, urlsplit(loaded.config.board.port)
         try:
-            robot, host = self.laboratory.robot, self._host
-            new_sessions: dict[
-                int, Callable[[Robot], rtde.RtdeSession | dashboard.DashboardSession | script.ScriptSession]
-            ]
-            new_sessions = {
-                dashboard.PORT: dashboard.DashboardSession,
-                script.PRIMARY_PORT: script.ScriptSession,
-                script.SECONDARY_PORT: script.ScriptSession,
-                script.REALTIME_PORT: script.ScriptSession,
-                rtde.PORT: rtde.RtdeSession,
-            }
             self.arm_listeners = [
-                self.network.listen(host, port, lambda new=new: new(robot))  # type: ignore[misc]
-                for port, new in new_sessions.items()
+                self.network.listen(host, port, partial(new_session, self.laboratory.robot))
+                for port, new_session in ARM_PORTS.items()
             ]
-            self.network.listen(host, self._control_port, lambda: ControlSession(self))
+            board_host, board_port = board.hostname or host, board.port or 0
+            self.board_listener = self.network.listen(board_host, board_port, self._new_serial_session, limit=1)
+            control_port = loaded.world.control_port
+            self.network.listen(host, control_port, lambda: ControlSession(self))
         except Refused:
             self.network.close()
             raise
+        self._pty = _open_pty(self.line, self.network.selector) if loaded.world.board.pty else None
+        self._description = {
+            "ready": True,
+            "arm": host,
+            "board": loaded.config.board.port,
+            "pty": self._pty.path if self._pty else None,
+            "control": f"{host}:{control_port}",
+        }
         self.clock = Clock(loaded.world.time_scale, time.monotonic)
 
+    def describe(self) -> str:
+        """The line that says where everything listens."""
+        return json.dumps(self._description)
+
+    def _new_serial_session(self) -> Session:
+        return SerialSession(self.line)
+
+    # -- faults that live in the wires -----------------------------------------------------------------------------
     def silence_arm(self, duration_s: float) -> None:
         """The controller neither sends nor reads for so long (wall time: a client's patience is wall time too)."""
         self._silent_until_s = time.monotonic() + duration_s
         for listener in self.arm_listeners:
             listener.set_silent(True)
 
+    def unplug_board(self) -> None:
+        """Pull the board's cable: no power, no port."""
+        self.board_listener.close()
+        self.laboratory.unplug()
+
+    def plug_in_board(self) -> None:
+        self.laboratory.plug_in()
+        self.board_listener.open()
+
+    # -- the loop ----------------------------------------------------------------------------------------------------
     def end(self) -> None:
         self._ended = True
-
-    def describe(self) -> str:
-        """The line that says where everything listens."""
-        control = f"{self._host}:{self._control_port}"
-        return json.dumps({"ready": True, "arm": self._host, "board": self._board_url, "pty": None, "control": control})
 
     def run(self) -> None:
         """Serve until `end`."""
         while not self._ended:
-            wait_s = self.clock.wait_s()
-            self.network.poll(min(wait_s, IDLE_POLL_S))
+            self.network.poll(min(self.clock.wait_s(), IDLE_POLL_S))
             if self._silent_until_s and time.monotonic() >= self._silent_until_s:
                 self._silent_until_s = 0.0
                 for listener in self.arm_listeners:
                     listener.set_silent(False)
             if not self._ended and self.clock.wait_s() <= 0.0:
-                self.laboratory.step()
-                self.clock.count()
-                self.network.tick()
+                self._tick()
+
+    def _tick(self) -> None:
+        try:
+            self.laboratory.step()
+        except BoardError as error:
+            # The firmware broke a rule of the chip: the board is dead, and its cable with it.
+            print(error, file=sys.stderr, flush=True)
+            self.unplug_board()
+        self.clock.count()
+        self.line.tick()
+        if self._pty is not None:
+            self._pty.tick()
+        self.network.tick()
 
     def close(self) -> None:
+        if self._pty is not None:
+            self._pty.close()
         self.network.close()
+
+
+def _open_pty(line: SerialLine, selector: selectors.BaseSelector) -> "PtyPort":
+    if os.name != "posix":
+        raise Refused("no_pty", "world.board.pty: this system has no pseudo-terminals", "Use the socket:// port")
+    from rig.world.pty_port import PtyPort  # its modules exist on POSIX only
+
+    return PtyPort(line, selector)
 
 
 def serve(loaded: Loaded, until_eof: bool) -> None:
@@ -96,7 +145,8 @@ def serve(loaded: Loaded, until_eof: bool) -> None:
         signal.signal(signal.SIGTERM, lambda *_: world.end())
         if until_eof:
             signal.signal(signal.SIGINT, signal.SIG_IGN)
-            world.network.selector.register(sys.stdin.buffer, selectors.EVENT_READ, lambda _: _read_input(world))
+            descriptor = sys.stdin.fileno()
+            world.network.selector.register(descriptor, selectors.EVENT_READ, partial(_read_input, world, descriptor))
         print(world.describe(), flush=True)
         world.run()
     except KeyboardInterrupt:
@@ -105,6 +155,6 @@ def serve(loaded: Loaded, until_eof: bool) -> None:
         world.close()
 
 
-def _read_input(world: World) -> None:
-    if not sys.stdin.buffer.raw.read(4096):  # type: ignore[attr-defined]
+def _read_input(world: World, descriptor: int, events: int) -> None:
+    if not os.read(descriptor, 4096):
         world.end()

@@ -15,7 +15,7 @@ FRAME = re.compile(r"^(def|sec)\s+(\w+)\s*\(\s*\)\s*:$")
 
 
 def arguments(statement: str) -> dict[str, Any]:
-    """The values a call gives, by keyword or by place ("0", "1", …). Raises `ProgramError` for anything but literals."""
+    """What a call gives, by keyword or by place ("0", "1", …). Raises `ProgramError` for anything but literals."""
     match = CALL.match(statement)
     if match is None:
         raise ProgramError(f"not simulated: {statement}")
@@ -49,7 +49,8 @@ class ScriptProgram:
         if frame:
             statements = statements[1:-1]
         for statement in statements:
-            if CALL.match(statement) is None or CALL.match(statement)[1] not in STATEMENTS:  # type: ignore[index]
+            call = CALL.match(statement)
+            if call is None or call.group(1) not in (*STATEMENTS, "textmsg"):
                 raise ProgramError(f"not simulated: {statement}")
         self._main = self._play(statements)
 
@@ -62,15 +63,20 @@ class ScriptProgram:
             if name == "textmsg":
                 self._robot.say(statement[len("textmsg(") : -1])
                 continue
-            values = arguments(statement)
+            yield from STATEMENTS[name](self._robot, self._threads, Arguments(statement).value)
 
-            def value(place: str, keyword: str, default: Any = None, values: dict[str, Any] = values) -> Any:
-                found = values.get(keyword, values.get(place, default))
-                if found is None:
-                    raise ProgramError(f"{name} needs {keyword}")
-                return found
 
-            yield from STATEMENTS[name](self._robot, self._threads, value)
+class Arguments:
+    """The arguments of one call, found by keyword or place."""
+
+    def __init__(self, statement: str) -> None:
+        self._statement, self._values = statement, arguments(statement)
+
+    def value(self, place: str, keyword: str, default: Any = None) -> Any:
+        found = self._values.get(keyword, self._values.get(place, default))
+        if found is None:
+            raise ProgramError(f"{self._statement} needs {keyword}")
+        return found
 
 
 Value = Callable[..., Any]
@@ -144,7 +150,7 @@ def _boolean_register(robot: Robot, value: Value) -> None:
 
 STATEMENTS: dict[str, Callable[[Robot, Threads, Value], Steps]] = {
     "movej": _movej, "speedj": _speedj, "stopj": _stopj, "sleep": _sleep, "sync": _sync,
-    "textmsg": _at_once(lambda robot, value: None), "popup": _at_once(lambda robot, value: robot.say(str(value("0", "s")))),
+    "popup": _at_once(lambda robot, value: robot.say(str(value("0", "s")))),
     "set_payload": _at_once(_payload), "set_target_payload": _at_once(_payload), "set_tcp": _at_once(_tcp),
     "set_gravity": _at_once(lambda robot, value: None),
     "set_digital_out": _at_once(_digital_out(0)), "set_standard_digital_out": _at_once(_digital_out(0)),

@@ -36,7 +36,7 @@ def _tcp_speed(robot: Robot) -> tuple[float, ...]:
     after = kinematics.flange_pose([a + v * step for a, v in zip(q, qd, strict=True)])
     linear = [(b - a) / (2.0 * step) for a, b in zip(before[:3], after[:3], strict=True)]
     rate = kinematics.flange_rate(q, qd)
-    rotation = kinematics.rotation_from_vector(kinematics.flange_pose(q)[3:])  # type: ignore[arg-type]
+    rotation = kinematics.rotation_from_vector(kinematics.flange_pose(q)[3:])
     return (*linear, *(sum(r * w for r, w in zip(row, rate, strict=True)) for row in rotation))
 
 
@@ -84,36 +84,33 @@ OUTPUTS: dict[str, tuple[str, Get]] = {
     "output_bit_registers32_to_63": ("UINT32", lambda r: _bits(r.outputs.bits, 32)),
     "input_bit_registers0_to_31": ("UINT32", lambda r: _bits(r.inputs.bits, 0)),
     "input_bit_registers32_to_63": ("UINT32", lambda r: _bits(r.inputs.bits, 32)),
-    "control_step": ("UINT64", lambda r: r.tick),
 }
 
 # Quantities the simulation has no physics for: constant, and plausible for an idle controller.
-_CONSTANTS: dict[str, tuple[str, Any]] = {
-    "target_current": ("VECTOR6D", ZERO6), "target_moment": ("VECTOR6D", ZERO6), "actual_current": ("VECTOR6D", ZERO6),
-    "actual_current_window": ("VECTOR6D", ZERO6), "actual_current_as_torque": ("VECTOR6D", ZERO6),
-    "joint_control_output": ("VECTOR6D", ZERO6), "actual_TCP_force": ("VECTOR6D", ZERO6),
-    "actual_TCP_acceleration": ("VECTOR6D", ZERO6), "target_TCP_acceleration": ("VECTOR6D", ZERO6),
-    "joint_temperatures": ("VECTOR6D", (28.0,) * 6), "actual_joint_voltage": ("VECTOR6D", (48.0,) * 6),
-    "joint_position_deviation_ratio": ("VECTOR6D", ZERO6), "ft_raw_wrench": ("VECTOR6D", ZERO6),
-    "wrench_calc_from_currents": ("VECTOR6D", ZERO6), "payload_inertia": ("VECTOR6D", ZERO6),
-    "actual_tool_accelerometer": ("VECTOR3D", (0.0, 0.0, 9.81)), "elbow_position": ("VECTOR3D", ZERO3),
-    "elbow_velocity": ("VECTOR3D", ZERO3), "target_gravity": ("VECTOR3D", (0.0, 0.0, 9.82)),
-    "actual_digital_input_bits": ("UINT64", 0), "actual_configurable_digital_input_bits": ("UINT8", 0),
-    "actual_configurable_digital_output_bits": ("UINT8", 0),
-    "actual_execution_time": ("DOUBLE", 0.3), "target_execution_time": ("DOUBLE", 1.0), "actual_momentum": ("DOUBLE", 0.0),
-    "actual_main_voltage": ("DOUBLE", 48.0), "actual_robot_voltage": ("DOUBLE", 48.0), "actual_robot_current": ("DOUBLE", 0.6),
-    "standard_analog_input0": ("DOUBLE", 0.0), "standard_analog_input1": ("DOUBLE", 0.0), "io_current": ("DOUBLE", 0.0),
-    "tcp_force_scalar": ("DOUBLE", 0.0), "collision_detection_ratio": ("DOUBLE", 0.0), "time_scale_source": ("INT32", 0),
-    "analog_io_types": ("UINT32", 0), "tool_mode": ("UINT32", 255), "tool_analog_input_types": ("UINT32", 0),
-    "tool_analog_input0": ("DOUBLE", 0.0), "tool_analog_input1": ("DOUBLE", 0.0), "tool_output_voltage": ("INT32", 0),
-    "tool_output_current": ("DOUBLE", 0.0), "tool_temperature": ("DOUBLE", 28.0), "tool_output_mode": ("UINT8", 0),
-    "tool_digital_output0_mode": ("UINT8", 0), "tool_digital_output1_mode": ("UINT8", 0),
-    "euromap67_input_bits": ("UINT32", 0), "euromap67_output_bits": ("UINT32", 0), "euromap67_24V_voltage": ("DOUBLE", 0.0),
-    "euromap67_24V_current": ("DOUBLE", 0.0), "script_control_line": ("UINT32", 0),
-    "actual_robot_energy_consumed": ("DOUBLE", 0.0), "actual_robot_braking_energy_dissipated": ("DOUBLE", 0.0),
-    "encoder0_raw": ("INT32", 0), "encoder1_raw": ("INT32", 0),
-}  # fmt: skip
-OUTPUTS |= {name: (kind, _constant(value)) for name, (kind, value) in _CONSTANTS.items()}
+_CONSTANTS: dict[tuple[str, Any], str] = {
+    ("VECTOR6D", ZERO6): """target_current target_moment actual_current actual_current_window actual_current_as_torque
+        joint_control_output actual_TCP_force actual_TCP_acceleration target_TCP_acceleration ft_raw_wrench
+        joint_position_deviation_ratio wrench_calc_from_currents payload_inertia""",
+    ("VECTOR6D", (28.0,) * 6): "joint_temperatures",
+    ("VECTOR6D", (48.0,) * 6): "actual_joint_voltage",
+    ("VECTOR3D", ZERO3): "elbow_position elbow_velocity",
+    ("VECTOR3D", (0.0, 0.0, 9.82)): "actual_tool_accelerometer target_gravity",
+    ("DOUBLE", 0.0): """actual_momentum standard_analog_input0 standard_analog_input1 io_current tcp_force_scalar
+        collision_detection_ratio tool_analog_input0 tool_analog_input1 tool_output_current euromap67_24V_voltage
+        euromap67_24V_current actual_robot_energy_consumed actual_robot_braking_energy_dissipated""",
+    ("DOUBLE", 1.0): "target_execution_time",
+    ("DOUBLE", 0.3): "actual_execution_time actual_robot_current",
+    ("DOUBLE", 28.0): "tool_temperature",
+    ("DOUBLE", 48.0): "actual_main_voltage actual_robot_voltage",
+    ("UINT64", 0): "actual_digital_input_bits",
+    ("UINT32", 0): """analog_io_types tool_analog_input_types euromap67_input_bits euromap67_output_bits
+        script_control_line""",
+    ("UINT32", 255): "tool_mode",
+    ("UINT8", 0): """actual_configurable_digital_input_bits actual_configurable_digital_output_bits tool_output_mode
+        tool_digital_output0_mode tool_digital_output1_mode""",
+    ("INT32", 0): "encoder0_raw encoder1_raw time_scale_source tool_output_voltage",
+}
+OUTPUTS |= {name: (kind, _constant(value)) for (kind, value), names in _CONSTANTS.items() for name in names.split()}
 
 
 def _register(side: str, kind: str, index: int) -> Get:
