@@ -27,7 +27,9 @@ RAM, RAM_SIZE = 0x20000000, 16 * 1024
 def compiler_of(elf_path: Path) -> str:
     """What the compiler wrote about itself into the program."""
     with elf_path.open("rb") as file:
-        return str(ELFFile(file).get_section_by_name(".comment").data().rstrip(b"\0").decode())
+        comment = ELFFile(file).get_section_by_name(".comment")
+        assert comment is not None
+        return str(comment.data().rstrip(b"\0").decode())
 
 
 def test_the_sources_build_the_committed_image_byte_for_byte_wherever_they_lie(tmp_path: Path) -> None:
