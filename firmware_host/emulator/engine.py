@@ -28,7 +28,7 @@ from unicorn import (
     UC_PROT_EXEC,
     UC_PROT_READ,
 )
-from unicorn.arm_const import UC_ARM_REG_PC, UC_CPU_ARM_CORTEX_M4
+from unicorn.arm_const import UC_ARM_REG_LR, UC_ARM_REG_PC, UC_CPU_ARM_CORTEX_M4
 from unicorn.unicorn_py3.unicorn import UcError, uclib
 
 from firmware_host.emulator.timeline import Timeline
@@ -93,8 +93,8 @@ class Engine:
         weakref.finalize(self, uclib.uc_close, self._handle)
         self._callbacks: list[Any] = []  # ctypes callbacks live as long as the engine
         self._raised: BaseException | None = None
-        self._fault_address: int | None = None
-        self._program_counter = self.registers([UC_ARM_REG_PC])
+        self._fault_place: list[int] | None = None
+        self._place = self.registers([UC_ARM_REG_PC, UC_ARM_REG_LR])
         self.paused = False  # the last run ended at the deadline
 
     def map_ram(self, address: int, size: int) -> None:
@@ -190,9 +190,9 @@ class Engine:
         if status != UC_ERR_OK:
             raise EngineFault(uclib.uc_strerror(status).decode())
 
-    def fault_address(self) -> int:
-        """Where the core was when a callback raised; without one, where it is."""
-        return self._program_counter.read()[0] if self._fault_address is None else self._fault_address
+    def fault_place(self) -> list[int]:
+        """Program counter and link register when a callback first raised; if none did, as they are."""
+        return self._place.read() if self._fault_place is None else self._fault_place
 
     def stop(self) -> None:
         """Stop before the next block; inside a block hook, before the block that the hook announces."""
@@ -201,7 +201,7 @@ class Engine:
     def _fail(self, error: BaseException) -> None:
         if self._raised is None:
             self._raised = error
-            self._fault_address = self._program_counter.read()[0]
+            self._fault_place = self._place.read()
         self.stop()
 
     def _hook(self, kind: int, callback: Any) -> None:

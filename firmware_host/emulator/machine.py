@@ -255,7 +255,10 @@ class EmulatedBoard:
         raise Violation("firmware_fault", f"{attempt} address 0x{address:08X}", _CORRECT)
 
     def _located(self, violation: Violation) -> BoardError:
-        where = self._symbols.where(self._engine.fault_address())
+        address, link = self._engine.fault_place()
+        where = self._symbols.where(address)
+        if not self._symbols.function(address):
+            where += f", called at {self._symbols.where(link)}"
         return BoardError(violation.name, f"{violation.what}, at {where}", violation.remedy)
 
     # --- reset

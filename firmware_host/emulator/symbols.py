@@ -21,11 +21,16 @@ class Symbols:
         self._starts = sorted(functions)
         self._functions = [functions[start] for start in self._starts]
 
+    def function(self, address: int) -> str | None:
+        """The function that `address` lies in."""
+        index = bisect_right(self._starts, address) - 1
+        if index < 0:
+            return None
+        size, name = self._functions[index]
+        return name if address < self._starts[index] + max(size, 2) else None
+
     def where(self, address: int) -> str:
         """For example `0x08000412 in function usart_init`."""
-        index = bisect_right(self._starts, address) - 1
-        if index >= 0:
-            size, name = self._functions[index]
-            if address < self._starts[index] + max(size, 2):
-                return f"0x{address:08X} in function {name}"
-        return f"0x{address:08X}, outside every function of the image"
+        name = self.function(address)
+        place = f"in function {name}" if name else "outside every function of the image"
+        return f"0x{address & ~1:08X} {place}"
