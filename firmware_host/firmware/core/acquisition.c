@@ -139,7 +139,6 @@ static void acquire(unsigned sensor)
     stream->conversions += conversions;
     stream->dropped += conversions - 1;
 
-    struct sample *sample = &stream->ring[stream->written % RING];
     struct reading reading;
     bool fresh = sensors[sensor].driver->read(sensors[sensor].device, &reading);
     bool full = stream->written - stream->read == RING;
@@ -148,7 +147,7 @@ static void acquire(unsigned sensor)
         stream->dropped++;
         return;
     }
-    *sample = (struct sample){time_us, stream->conversions - 1, reading};
+    stream->ring[stream->written % RING] = (struct sample){time_us, stream->conversions - 1, reading};
     stream->written++;
 }
 
