@@ -103,6 +103,11 @@ class EmulatedBoard:
         """Bits per second of the serial port as the firmware has set it, None while it is off."""
         return self._usart.baud_rate
 
+    @property
+    def peripherals(self) -> Sequence[Peripheral]:
+        """Every block of registers that has a model."""
+        return tuple(self._blocks)
+
     def reset(self) -> None:
         """Press the reset button. Flash and RAM keep their contents, the sensors stay powered."""
         self._reset_cause = rcc.RESET_PIN

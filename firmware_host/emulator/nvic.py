@@ -9,7 +9,8 @@ from firmware_host.emulator.timeline import Timeline
 PENDSV = 14
 SYSTICK = 15
 FIRST_IRQ = 16  # exception number of interrupt 0
-_WORDS = 3  # the STM32L432 has 83 interrupts
+_INTERRUPTS = 84  # RM0394, table 46: 0 … 82, rounded up to whole words of priorities
+_WORDS = 3
 _IDLE_PRIORITY = 256  # lower than every exception
 _PRIORITY_BITS = 0xF0  # the chip implements the upper four of eight
 
@@ -102,7 +103,7 @@ class Nvic:
             yield Register(0x080 + 4 * word, f"ICER{word}", read_enabled, partial(self._disable, shift))
             yield Register(0x100 + 4 * word, f"ISPR{word}", read_pending, partial(self._set_pending, shift))
             yield Register(0x180 + 4 * word, f"ICPR{word}", read_pending, partial(self._clear_pending, shift))
-        for irq in range(32 * _WORDS):
+        for irq in range(_INTERRUPTS):
             for size in (1, 4) if irq % 4 == 0 else (1,):
                 read, write = partial(self._read_priority, irq, size), partial(self._write_priority, irq, size)
                 yield Register(0x300 + irq, f"IPR{irq // 4}", read, write, size)

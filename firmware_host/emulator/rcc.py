@@ -25,6 +25,7 @@ _CRYSTAL_START_TICKS = TICK_HZ // 2  # a 32 kHz crystal needs some tenths of a s
 RESET_POWER, RESET_PIN, RESET_SOFTWARE, RESET_WATCHDOG = 1 << 27, 1 << 26, 1 << 28, 1 << 29
 _RESET_FLAGS = 0xFF << 24
 _REMOVE_RESET_FLAGS = 1 << 23
+_MSI_RANGE_AFTER_STANDBY = 6 << 8  # 4 MHz
 
 
 class Flash:
@@ -158,10 +159,10 @@ class Rcc:
             self._crystal_since = self._timeline.now
 
     def _read_status(self) -> int:
-        return self._reset_flags
+        return self._reset_flags | _MSI_RANGE_AFTER_STANDBY
 
     def _write_status(self, value: int) -> None:
-        check_bits("RCC CSR", value & ~_RESET_FLAGS, _REMOVE_RESET_FLAGS)
+        check_bits("RCC CSR", value & ~_RESET_FLAGS, _REMOVE_RESET_FLAGS | _MSI_RANGE_AFTER_STANDBY)
         if value & _REMOVE_RESET_FLAGS:
             self._reset_flags = 0
 
