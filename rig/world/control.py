@@ -64,11 +64,11 @@ class ControlSession:
         try:
             request = json.loads(line)
             name = request.pop("do")
-            order = self._orders[name]
-        except (ValueError, AttributeError, TypeError):
+        except (ValueError, AttributeError, TypeError, KeyError):
             return _line({"ok": False, "error": 'a request is one line of JSON, {"do": NAME, …}'})
-        except KeyError as error:
-            return _line({"ok": False, "error": f"unknown request {error}", "known": sorted(self._orders)})
+        order = self._orders.get(name)
+        if order is None:
+            return _line({"ok": False, "error": f"unknown request {name!r}", "known": sorted(self._orders)})
         try:
             reply = order(**request)
         except (TypeError, ValueError) as error:
