@@ -78,7 +78,8 @@ def refusing_board_errors() -> Iterator[None]:
 
 def find_sensor(identity: BoardIdentity, name: str, section: SensorSection) -> SensorInfo:
     """The board's entry for a configured sensor. Raises Refused `sensor_missing`."""
-    info = next((sensor for sensor in identity.sensors if sensor.part == section.part), None)
+    # The board names parts as their makers do, the configuration in lower case.
+    info = next((sensor for sensor in identity.sensors if sensor.part.lower() == section.part), None)
     if info is not None and info.present:
         return info
     seen = "no driver for it" if info is None else f"identity register reads 0x{info.who_am_i:02x}"
