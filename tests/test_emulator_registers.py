@@ -13,7 +13,9 @@ BEFORE_ANY_DATA = {"DR", "RDR"}  # reading them without data is an error here
 # Where the maker's file differs from the maker's manual (RM0394: pins start as analog) and from the core's (ARMv7-M)
 RESET_VALUES = {
     ("GPIOA", "MODER"): 0xABFF_FFFF,
+    ("GPIOA", "OSPEEDR"): 0x0C00_0000,
     ("GPIOB", "MODER"): 0xFFFF_FEBF,
+    ("GPIOB", "OSPEEDR"): 0,
     ("SPI1", "CR2"): 0x0700,
     ("SCB", "AIRCR"): 0xFA05_0000,
 }
