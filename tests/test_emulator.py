@@ -152,6 +152,13 @@ def test_an_unmodelled_register_fails_by_name(tmp_path: Path) -> None:
         ("no_system_clock", "REG(0x40021008) = 1;", "not running"),
         ("firmware_fault", "*(volatile int *)0x60000000 = 1;", "write to address 0x60000000"),
         ("firmware_fault", "*(volatile int *)0x08001000 = 1;", "write to read-only address 0x08001000"),
+        ("firmware_fault", '__asm volatile("ldrd r0, r1, [%0]" :: "r"(0x20000102) : "r0", "r1");', "0x20000102"),
+        ("firmware_fault", '__asm volatile("stmia %0!, {r0, r1}" :: "l"(0x20000101));', "unaligned access"),
+        (
+            "firmware_fault",
+            'ENABLE_FLOAT();\\n __asm volatile("vldr s0, [%0]" :: "r"(0x20000101));',
+            "unaligned access",
+        ),
         ("firmware_fault", '__asm volatile("udf #0");', "nvalid instruction"),
         ("firmware_fault", '__asm volatile("bkpt #0");', "breakpoint"),
         ("firmware_fault", "((void (*)(void))0x60000001)();\\n WFI();", "execution at address 0x60000000"),

@@ -15,6 +15,7 @@ from unicorn import (
     UC_CTL_CPU_MODEL,
     UC_ERR_OK,
     UC_HOOK_BLOCK,
+    UC_HOOK_CODE,
     UC_HOOK_INTR,
     UC_HOOK_MEM_INVALID,
     UC_MEM_FETCH_PROT,
@@ -147,6 +148,17 @@ class Engine:
 
         self._hook(UC_HOOK_BLOCK, _BLOCK(on_block))
 
+    def on_instruction(self, address: int, hook: Callable[[int], None]) -> None:
+        """Call `hook(address)` before the instruction at `address`."""
+
+        def on_instruction(_handle: int, address: int, _size: int, _user: int) -> None:
+            try:
+                hook(address)
+            except BaseException as error:
+                self._fail(error)
+
+        self._hook(UC_HOOK_CODE, _BLOCK(on_instruction), address, address)
+
     def on_interrupt(self, hook: Callable[[int], None]) -> None:
         """Call `hook(number)` when the core raises one of its own exceptions (supervisor call, exception return, …)."""
 
@@ -204,10 +216,11 @@ class Engine:
             self._fault_place = self._place.read()
         self.stop()
 
-    def _hook(self, kind: int, callback: Any) -> None:
+    def _hook(self, kind: int, callback: Any, begin: int = 1, end: int = 0) -> None:
+        """Add a hook for addresses from `begin` to `end`; the default is Unicorn's way to say everywhere."""
         self._callbacks.append(callback)
         handle = ctypes.c_size_t()
-        _check(uclib.uc_hook_add(self._handle, ctypes.byref(handle), kind, _pointer(callback), None, 1, 0))
+        _check(uclib.uc_hook_add(self._handle, ctypes.byref(handle), kind, _pointer(callback), None, begin, end))
 
 
 def _pointer(callback: Any) -> ctypes.c_void_p:

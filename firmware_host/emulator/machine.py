@@ -3,18 +3,21 @@
 import struct
 from collections.abc import Sequence
 
+from unicorn.arm_const import UC_ARM_REG_R0
+
 from firmware_host.emulator import rcc
 from firmware_host.emulator.bus import Peripheral, RegisterBus, Violation
 from firmware_host.emulator.clocks import Clocks
 from firmware_host.emulator.cortex import Cortex
 from firmware_host.emulator.dma import Dma1
-from firmware_host.emulator.engine import Engine, EngineFault
+from firmware_host.emulator.engine import Engine, EngineFault, Registers
 from firmware_host.emulator.gpio import Exti, Port, Syscfg
 from firmware_host.emulator.nvic import Nvic
 from firmware_host.emulator.spi import Spi1
 from firmware_host.emulator.spi_device import BoardClock, DeviceLink, SpiBus, SpiDevice
 from firmware_host.emulator.symbols import Symbols
 from firmware_host.emulator.system_control import SystemControl, SysTick
+from firmware_host.emulator.thumb import instructions, is_floating_point, word_accesses
 from firmware_host.emulator.timeline import Timeline
 from firmware_host.emulator.timers import Tim2, Watchdog
 from firmware_host.emulator.usart import TDR_ADDRESS, Usart2
@@ -61,6 +64,7 @@ class EmulatedBoard:
         self._engine.meter(self._timeline, self._costs, self._measure)
         self._engine.on_interrupt(self._core_exception)
         self._engine.on_invalid(self._invalid_access)
+        self._watch_alignment()
         self._sent = bytearray()
         self._failure: BoardError | None = None
         self._return_code: int | None = None
@@ -232,22 +236,26 @@ class EmulatedBoard:
 
     def _measure(self, address: int, size: int) -> int:
         """Ticks that a block takes that has not been met before; refuses floating point before it is enabled."""
-        halfwords = struct.unpack(f"<{size // 2}H", self._engine.read(address, size))
-        instructions = index = 0
-        while index < len(halfwords):
-            first = halfwords[index]
-            wide = first >> 11 in (0b11101, 0b11110, 0b11111)
-            if wide and first & 0xEC00 == 0xEC00 and index + 1 < len(halfwords):
-                coprocessor = halfwords[index + 1] >> 8 & 0xF
-                if coprocessor in (10, 11) and not self._control.float_enabled:
-                    raise Violation("firmware_fault", "floating point before CPACR enables it", _CORRECT)
-            index += 2 if wide else 1
-            instructions += 1
-        ticks = instructions * self._clocks.ticks_per_core_cycle
-        if halfwords[0] == _BRANCH_TO_SELF:
+        code = instructions(self._engine.read(address, size))
+        if not self._control.float_enabled and any(is_floating_point(instruction) for instruction in code):
+            raise Violation("firmware_fault", "floating point before CPACR enables it", _CORRECT)
+        ticks = len(code) * self._clocks.ticks_per_core_cycle
+        if code == [_BRANCH_TO_SELF]:
             return max(ticks, self._timeline.deadline - self._timeline.now)  # it turns until something happens
         self._costs[address] = ticks
         return ticks
+
+    def _watch_alignment(self) -> None:
+        self._bases: dict[int, Registers] = {}
+        for start, end in self._symbols.code():
+            for address, base in word_accesses(self._engine.read(start, end - start), start):
+                self._bases[address] = self._engine.registers([UC_ARM_REG_R0 + base])
+                self._engine.on_instruction(address, self._check_alignment)
+
+    def _check_alignment(self, address: int) -> None:
+        (base,) = self._bases[address].read()
+        if base & 3:
+            raise Violation("firmware_fault", f"unaligned access by address 0x{base:08X}", _CORRECT)
 
     def _core_exception(self, number: int) -> None:
         if number != _EXCEPTION_RETURN:
