@@ -123,7 +123,10 @@ class Board:
                 self._send("stop", 0, {})
         self._closing.set()
         self._reader.join()
+        sock = getattr(self._port, "_socket", None)
         self._port.close()
+        if sock is not None:
+            sock.close()  # pyserial leaves it open when the far end closed it first
 
     def _hello(self) -> BoardIdentity:
         before = self._frames.bytes_seen, self._frames_seen

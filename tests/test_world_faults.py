@@ -340,7 +340,11 @@ def test_wrong_requests_to_the_control_channel_are_answered(world: World) -> Non
 def test_a_taken_port_is_a_clear_error(world: World) -> None:
     running = world()
     second = subprocess.run(
-        [sys.executable, "-m", "rig.world", str(running.config_path)], capture_output=True, text=True, timeout=20
+        [sys.executable, "-m", "rig.world", str(running.config_path)],
+        capture_output=True,
+        text=True,
+        timeout=20,
+        check=False,
     )
     assert second.returncode == 2
     assert f"cannot listen on {running.host}:29999" in second.stderr and "Traceback" not in second.stderr
@@ -349,7 +353,11 @@ def test_a_taken_port_is_a_clear_error(world: World) -> None:
 
 def test_a_configuration_without_a_world_is_refused() -> None:
     result = subprocess.run(
-        [sys.executable, "-m", "rig.world", "configs/ur10e_lsm9ds1.yaml"], capture_output=True, text=True, timeout=20
+        [sys.executable, "-m", "rig.world", "configs/ur10e_lsm9ds1.yaml"],
+        capture_output=True,
+        text=True,
+        timeout=20,
+        check=False,
     )
     assert result.returncode == 2 and "Traceback" not in result.stderr
 
