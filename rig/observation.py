@@ -17,7 +17,7 @@ from numpy.typing import NDArray
 from rig.config.models import ObservationSection
 from rig.errors import Fault
 from rig.recording import RecordedSensor, RunData
-from rig.revolution import Revolution, describe, find_revolution
+from rig.revolution import Revolution, arm_states_lost, describe, find_revolution
 from rig.timebase import ArmMotion, Array, TimeBase, estimate_time_base, widening
 
 STUCK_REPEATS = 10  # equal readings in a row, of a sensor whose noise exceeds a count
@@ -43,7 +43,8 @@ class Observation:
     """One revolution: sweep `sweep` of the plan turned `joint_name` in `direction` at the mean speed 2π/T.
 
     `axis` ("x", "y", "z") and `sign` name the sensor axis nominally along the turn; `axis_flange` (3,) is the unit
-    vector of the turn in the flange frame by the measured joints; `lost` samples are missing from the average.
+    vector of the turn in the flange frame by the measured joints; `speed_std_rad_s` comes from arm states too far apart
+    to tell the turn's ends exactly; `lost` samples are missing from the average.
     """
 
     sweep: int
@@ -53,6 +54,7 @@ class Observation:
     sign: int
     axis_flange: Array
     speed_rad_s: float
+    speed_std_rad_s: float
     lost: int
     average: Average
 
@@ -126,7 +128,11 @@ def _observation(
     lost = _lost(stream, inside, where, settings)
     _check_saturation(stream, inside, where)
     _check_stuck(stream, inside, where)
-    average = _average(stream, inside, motion.rate(stream.time_s[inside]) @ turn.axis_flange, turn.duration_s)
+    covered = motion.covered(stream.time_s[inside])
+    if covered.mean() < 0.5:
+        raise arm_states_lost(where, "more than half the time")
+    rate = motion.rate(stream.time_s[inside]) @ turn.axis_flange
+    average = _average(stream, inside, turn.duration_s, rate, covered)
     expected = np.array(stream.sensor.mounting) @ turn.axis_flange
     _check_direction(average.mean_rad_s - stream.clock.zero_rate_rad_s, expected, where, settings)
     nearest = int(np.argmax(np.abs(expected)))
@@ -138,6 +144,7 @@ def _observation(
         sign=1 if expected[nearest] > 0 else -1,
         axis_flange=turn.axis_flange,
         speed_rad_s=turn.speed_rad_s,
+        speed_std_rad_s=turn.speed_std_rad_s,
         lost=lost,
         average=average,
     )
@@ -152,24 +159,26 @@ def _rest(stream: _Stream, motion: ArmMotion, window: tuple[float, float]) -> Av
         return None
     if np.ptp(states["q_rad"], axis=0).max() > MAX_REST_TRAVEL_RAD:
         return None
-    return _average(stream, inside, None, end - start)
+    count = inside.stop - inside.start
+    return _average(stream, inside, end - start, np.zeros(count), np.ones(count, dtype=np.bool_))
 
 
 def _between(stream: _Stream, start_s: float, end_s: float) -> slice:
     return slice(*np.searchsorted(stream.time_s, [start_s, end_s]).tolist())
 
 
-def _average(stream: _Stream, inside: slice, rate: Array | None, duration_s: float) -> Average:
-    """Mean and its variance; `rate` (n,) is what the arm did meanwhile, None at rest.
+def _average(stream: _Stream, inside: slice, duration_s: float, rate: Array, covered: NDArray[np.bool_]) -> Average:
+    """Mean and its variance; `rate` (n,) is what the arm did meanwhile, known where `covered` (n,).
 
     The noise is what is left of a straight line of reading against rate, and never below the rounding to counts. Its
     variance is divided by the number of samples, and widened where the residuals are not white. Rounding averages out
     only as far as noise carries the reading across counts: the part exp(−(2πσ/count)²) of its variance stays.
     """
     m = stream.readings_rad_s[inside]
-    columns = np.ones((len(m), 1)) if rate is None else np.column_stack([np.ones(len(m)), rate])
-    residual = m - columns @ np.linalg.lstsq(columns, m, rcond=None)[0]
-    scatter = np.sum(residual**2, axis=0) / (len(m) - columns.shape[1])
+    columns, known = np.column_stack([np.ones(int(covered.sum())), rate[covered]]), m[covered]
+    coefficients, _, rank, _ = np.linalg.lstsq(columns, known, rcond=None)
+    residual = known - columns @ coefficients
+    scatter = np.sum(residual**2, axis=0) / (len(known) - rank)
     count = stream.sensor.sensitivity_rad_s_per_count
     rounding = count**2 / 12
     variance = np.maximum(scatter, rounding)

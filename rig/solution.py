@@ -83,8 +83,13 @@ def solve_observations(observations: Sequence[Observation], estimator: Estimator
     accumulated = Accumulator.empty()
     for observation in observations:
         average = observation.average
-        weight = 1.0 if estimator == "algorithm_1" else None
-        accumulated = accumulated.add(average.mean_rad_s, average.variance_rad2_s2, observation.speed_rad_s, weight)
+        accumulated = accumulated.add(
+            average.mean_rad_s,
+            average.variance_rad2_s2,
+            observation.speed_rad_s,
+            observation.speed_std_rad_s,
+            weight=1.0 if estimator == "algorithm_1" else None,
+        )
     return accumulated.solve(estimator)
 
 
@@ -151,6 +156,7 @@ def _observation(observation: Observation) -> dict[str, Any]:
         "axis": observation.axis,
         "sign": observation.sign,
         "speed_rad_s": observation.speed_rad_s,
+        "speed_std_rad_s": observation.speed_std_rad_s,
         "lost": observation.lost,
         **_average(observation.average),
     }

@@ -22,6 +22,7 @@ COARSE_STEP_S = 0.02  # far below the ramps of a sweep, so that the fine fit sta
 CANDIDATES = 12  # peaks of the correlation looked at: six equal sweeps give eleven
 MIN_EXPLAINED = 0.5  # share of the readings' variance that the arm's motion must explain
 MIN_RATE_RAD_S = 0.01
+MAX_STATE_STEP_S = 0.02  # between arm states that still show the servo's vibration
 MAX_DRIFT = 1e-3  # ten times worse than any crystal
 FINE_STEPS = 20
 WHITENESS_LAGS = 20
@@ -78,6 +79,15 @@ class ArmMotion:
         if not np.linalg.norm(rates, axis=1).max() > MIN_RATE_RAD_S:
             raise Fault("no_motion", "the arm stands still in the whole recording", "Record a run with sweeps")
         self.rate = CubicSpline(self.time_s, rates)
+        close = np.diff(self.time_s) <= MAX_STATE_STEP_S
+        self._covered = close & np.append(close[1:], True) & np.append(True, close[:-1])
+
+    def covered(self, time_s: Array) -> NDArray[np.bool_]:
+        """Which of these times (n,) lie where states follow each other closely enough for `rate` to be true."""
+        interval = np.searchsorted(self.time_s, time_s, side="right") - 1
+        inside = (interval >= 0) & (interval < len(self._covered))
+        known: NDArray[np.bool_] = inside & self._covered[np.clip(interval, 0, len(self._covered) - 1)]
+        return known
 
 
 def estimate_time_base(board_time_s: Array, readings_rad_s: Array, motion: ArmMotion) -> TimeBase:
@@ -187,7 +197,7 @@ def _refined(clock: TimeBase, board_time_s: Array, readings: Array, motion: ArmM
     Model: m = A r(t) + c + noise, r the flange's rate at controller time t; A (3, 3) and c (3,) are fitted along.
     """
     time_s = clock.controller_time_s(board_time_s)
-    inside = (time_s >= motion.time_s[0]) & (time_s <= motion.time_s[-1])
+    inside = motion.covered(time_s)
     if inside.sum() < 100:
         raise _not_found("board and arm were hardly recorded at the same time")
     t, since, m = time_s[inside], board_time_s[inside] - clock.reference_s, readings[inside]

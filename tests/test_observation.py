@@ -272,7 +272,7 @@ def still(run: RunData) -> RunData:
 
 
 def gap_in_states(run: RunData) -> RunData:
-    return with_arm(run, lambda arm: np.delete(arm, slice(1000, 1040)))
+    return with_arm(run, lambda arm: np.delete(arm, slice(1000, 1070)))
 
 
 @pytest.mark.parametrize(
@@ -304,6 +304,31 @@ def test_what_does_not_belong_into_a_calibration_is_refused_by_name(
 ) -> None:
     with pytest.raises(Fault, match=name):
         look(spoilt(USUAL))
+
+
+def thinned(run: RunData, seed: int) -> RunData:
+    """What a busy computer leaves of the arm's states: one in fifty is followed by a hole of up to 0.12 s."""
+    rng = np.random.default_rng(seed)
+    kept = np.ones(len(run.arm), dtype=np.bool_)
+    for start in np.flatnonzero(rng.random(len(run.arm)) < 0.02):
+        kept[start + 1 : start + 1 + rng.integers(1, 15)] = False
+    return with_arm(run, lambda arm: arm[kept])
+
+
+def test_holes_between_arm_states_cost_certainty_not_truth() -> None:
+    errors, stds = [], []
+    for seed in range(12):
+        result = solve_runs([thinned(synthetic_run(Setup(seed=seed)), seed)])["gyro"]
+        found = np.concatenate([result.solution.scale, result.solution.bias_rad_s])
+        errors.append((found - truth(Setup())) / np.sqrt(np.diag(result.solution.covariance)))
+        for observation in result.observations:
+            stds.append(observation.speed_std_rad_s)
+            assert abs(observation.speed_rad_s - np.pi / 3) < 4 * observation.speed_std_rad_s + 1e-5
+            np.testing.assert_allclose(observation.average.noise_rad_s, 0.035, rtol=0.1)
+        assert abs(clock_errors(Setup(), look(thinned(synthetic_run(Setup(seed=seed)), seed)))[0]) < 1e-3
+    assert 0.7 < np.sqrt(np.mean(np.square(errors))) < 1.3
+    assert max(stds) > 1e-4
+    assert np.median(stds) < 3e-5
 
 
 def test_a_few_lost_samples_are_counted_and_allowed() -> None:

@@ -36,7 +36,7 @@ def sweeps(
 def gather(means: Array, speeds: Array, variance: Array = VARIANCE, weight: float | None = None) -> Accumulator:
     accumulated = Accumulator.empty()
     for mean, speed in zip(means, speeds, strict=True):
-        accumulated = accumulated.add(mean, variance, float(speed), weight)
+        accumulated = accumulated.add(mean, variance, float(speed), weight=weight)
     return accumulated
 
 

@@ -48,23 +48,29 @@ class Accumulator:
 
     With x̃ = [x 1]: `normal` (7, 7) = Σ w x̃ᵀx̃, `right` (7,) = Σ w ω² x̃. `moments` (3, 3, 6, 6) = Σ w² v_j m_j^a xᵀx
     for axis j and a = 0, 1, 2: the covariance needs them, because the variance of ω² − ‖K(m + b)‖² is
-    Σ_j 4 k_j⁴ (m_j + b_j)² v_j, and k and b are known only afterwards.
+    Σ_j 4 k_j⁴ (m_j + b_j)² v_j, and k and b are known only afterwards. `speed_noise` (6, 6) = Σ w² (2 ω σ_ω)² xᵀx.
     """
 
     normal: Array
     right: Array
     moments: Array
+    speed_noise: Array
     count: int
 
     @classmethod
     def empty(cls) -> Self:
         """No revolution yet."""
-        return cls(np.zeros((7, 7)), np.zeros(7), np.zeros((3, 3, 6, 6)), 0)
+        return cls(np.zeros((7, 7)), np.zeros(7), np.zeros((3, 3, 6, 6)), np.zeros((6, 6)), 0)
 
     def add(
-        self, mean_rad_s: ArrayLike, variance_rad2_s2: ArrayLike, speed_rad_s: float, weight: float | None = None
+        self,
+        mean_rad_s: ArrayLike,
+        variance_rad2_s2: ArrayLike,
+        speed_rad_s: float,
+        speed_std_rad_s: float = 0.0,
+        weight: float | None = None,
     ) -> Self:
-        """With one more revolution: mean reading (3,), variance of that mean (3,), mean speed 2π/T.
+        """With one more revolution: mean reading (3,), variance of that mean (3,), mean speed 2π/T and its deviation.
 
         The weight is the inverse variance of ω² − ‖m + b‖² at k = 1, b = 0 unless given (1 is what SIX uses).
         Raises Fault `not_finite`, `bad_speed`, `zero_reading`, `bad_variance`.
@@ -72,7 +78,8 @@ class Accumulator:
         mean = np.asarray(mean_rad_s, dtype=np.float64)
         variance = np.asarray(variance_rad2_s2, dtype=np.float64)
         _check(mean, variance, speed_rad_s)
-        w = 1 / float(np.sum(4 * mean**2 * variance)) if weight is None else weight
+        by_speed = (2 * speed_rad_s * speed_std_rad_s) ** 2
+        w = 1 / (float(np.sum(4 * mean**2 * variance)) + by_speed) if weight is None else weight
         row = np.append(design(mean), 1.0)
         square = np.outer(row, row)
         powers = variance[:, None] * mean[:, None] ** np.arange(3)
@@ -80,6 +87,7 @@ class Accumulator:
             self.normal + w * square,
             self.right + w * speed_rad_s**2 * row,
             self.moments + w**2 * powers[:, :, None, None] * square[:6, :6],
+            self.speed_noise + w**2 * by_speed * square[:6, :6],
             self.count + 1,
         )
 
@@ -89,6 +97,7 @@ class Accumulator:
             self.normal + other.normal,
             self.right + other.right,
             self.moments + other.moments,
+            self.speed_noise + other.speed_noise,
             self.count + other.count,
         )
 
@@ -134,7 +143,7 @@ class Accumulator:
     def _covariance(self, scale: Array, bias: Array) -> Array:
         """(6, 6), to first order in the means' errors e: δβ = (XᵀW X + XᵀW 1 ∂Γ/∂β)⁻¹ XᵀW e, then k and b from β."""
         powers = np.stack([bias**2, 2 * bias, np.ones(3)], axis=1) * 4 * scale[:, None] ** 4
-        noise = np.einsum("ja,jakl->kl", powers, self.moments)
+        noise = np.einsum("ja,jakl->kl", powers, self.moments) + self.speed_noise
         gamma_by_beta = np.concatenate([-(bias**2), bias])
         to_beta = np.linalg.inv(self.normal[:6, :6] + np.outer(self.normal[:6, 6], gamma_by_beta))
         squares, linear = np.arange(3), np.arange(3, 6)
