@@ -316,6 +316,14 @@ def test_control_is_refused_by_name_before_anything_moves(
     assert not laboratory.state()["program_running"]
 
 
+def test_a_payload_the_controller_does_not_take_is_refused(laboratory: WorldHandle) -> None:
+    with Arm(laboratory.host) as arm, pytest.raises(Refused) as refused:
+        arm.take_control(20.0, PAYLOAD[1])
+    assert refused.value.name == "payload_not_set"
+    assert "20 kg" in refused.value.what
+    assert stands(laboratory)
+
+
 def test_a_speed_slider_below_full_is_refused_in_preflight(laboratory: WorldHandle) -> None:
     laboratory.control({"do": "speed_slider", "fraction": 0.5})
     report = look(laboratory.host)

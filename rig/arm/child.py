@@ -15,6 +15,7 @@ from multiprocessing.connection import Connection
 from pathlib import Path
 from typing import Any, NoReturn
 
+from rig.arm.condition import Problem
 from rig.arm.dashboard import Dashboard
 from rig.arm.messages import (
     Connected,
@@ -66,7 +67,7 @@ def main(pipe: "Connection[Message, Request]", host: str, state_rate_hz: float, 
         try:
             child.connect(state_rate_hz)
         except RuntimeError as error:
-            child.send(_connection_failure(host, str(error)))
+            child.send(Failed(_connection_failure(host, str(error))))
             requests.join()  # the parent reads this and ends the process
         child.stream()
     except BaseException:
@@ -81,6 +82,7 @@ class _Child:
         self._sending = threading.Lock()
         self._receive: Any = None
         self._control: Any = None
+        self._holds_arm = False  # our program may run on the controller
         self._operations_before: int | None = None  # change count before the running move; None when none runs
 
     def send(self, message: Message) -> None:
@@ -120,7 +122,7 @@ class _Child:
             time.sleep(POLL_S)
 
     def _read(self, last_s: float) -> ArmState | None:
-        """The newest packet, or None when it is the last one still, or was replaced while it was read."""
+        """The newest packet, or None when it is the last one still; one replaced while it is read is read anew."""
         receive = self._receive
         time_s = receive.getTimestamp()
         if time_s == last_s:
@@ -138,7 +140,7 @@ class _Child:
             robot_status_bits=receive.getRobotStatus(),
             safety_status_bits=receive.getSafetyStatusBits(),
         )
-        return state if receive.getTimestamp() == time_s else None
+        return state if receive.getTimestamp() == time_s else self._read(last_s)
 
     def _report_arrival(self) -> None:
         before = self._operations_before
@@ -168,24 +170,23 @@ class _Child:
                 self._move(request)
             case Stop():
                 self._operations_before = None
-                if self._control is not None:
-                    self._control.stopJ(request.deceleration_rad_s2)
-                    self._control.stopScript()
+                self._brake(request.deceleration_rad_s2)
 
     def _take_control(self, request: TakeControl) -> Message:
         from rtde_control import RTDEControlInterface
 
+        self._holds_arm = True
         try:
             self._control = RTDEControlInterface(self._host)
         except RuntimeError as error:
-            return _control_failure(self._host, str(error))
-        if not self._control.setPayload(request.payload_kg, list(request.payload_centre_m)):
-            return _payload_failure(f"the controller did not take the payload of {request.payload_kg:g} kg")
+            self._holds_arm = False
+            return Failed(_control_failure(self._host, str(error)))
+        self._control.setPayload(request.payload_kg, list(request.payload_centre_m))
         deadline = time.monotonic() + PAYLOAD_S
         while abs(self._receive.getPayload() - request.payload_kg) > PAYLOAD_TOLERANCE_KG:
             if time.monotonic() > deadline:
-                wrong = f"{self._receive.getPayload():g} kg instead of {request.payload_kg:g} kg"
-                return _payload_failure(f"the controller reckons with a payload of {wrong}")
+                self._control.stopScript()
+                return Failed(_payload_failure(self._receive.getPayload(), request.payload_kg))
             time.sleep(HEARTBEAT_S)
         return ControlTaken()
 
@@ -194,27 +195,26 @@ class _Child:
         try:
             started = self._control.moveJ(list(move.target_q_rad), move.speed_rad_s, move.acceleration_rad_s2, True)
         except (RuntimeError, ValueError) as error:
-            return self.send(
-                Failed("move_refused", f"the client refused the move: {error}", "Check speed and acceleration")
-            )
-        if not started:
-            return self.send(
-                Failed(
-                    "move_refused", "the controller did not start the move", "Read the pendant's log, then start again"
-                )
-            )
-        self._operations_before = before
-        return None
+            self.send(Failed(_move_failure(f"the client refused the move ({error})")))
+            return
+        if started:
+            self._operations_before = before
+        else:
+            self.send(Failed(_move_failure("the controller did not start the move")))
+
+    def _brake(self, deceleration_rad_s2: float) -> None:
+        if self._control is not None:
+            self._control.stopJ(deceleration_rad_s2)
+            self._control.stopScript()
 
     def abandon(self) -> NoReturn:
         """Nobody supervises any more: stop the arm, over the dashboard or else over the client, and leave."""
-        if self._control is not None:
+        if self._holds_arm:
             try:
                 with Dashboard(self._host) as dashboard:
                     dashboard.stop_program()
             except OSError:
-                self._control.stopJ(BRAKE_RAD_S2)
-                self._control.stopScript()
+                self._brake(BRAKE_RAD_S2)
         _leave(1)
 
 
@@ -239,32 +239,40 @@ def _send_output_to(log: str | None) -> None:
             os.dup2(sink.fileno(), stream.fileno())
 
 
-def _payload_failure(what: str) -> Failed:
-    return Failed("payload_not_set", what, "Read the pendant's log and the payload in the arm's installation")
+def _move_failure(what: str) -> Problem:
+    return Problem("move_refused", what, "Read the pendant's log and check the configured speed and acceleration")
 
 
-def _connection_failure(host: str, reason: str) -> Failed:
-    return Failed(
+def _payload_failure(reported_kg: float, wanted_kg: float) -> Problem:
+    return Problem(
+        "payload_not_set",
+        f"the controller reckons with a payload of {reported_kg:g} kg instead of {wanted_kg:g} kg",
+        "Read the pendant's log, and correct the payload in the arm's installation",
+    )
+
+
+def _connection_failure(host: str, reason: str) -> Problem:
+    return Problem(
         "no_arm_states",
         f"the controller at {host} accepts connections but sends no states ({reason})",
         "Check that the arm has finished booting and that no firewall blocks port 30004",
     )
 
 
-def _control_failure(host: str, reason: str) -> Failed:
+def _control_failure(host: str, reason: str) -> Problem:
     if "remote control" in reason:
-        return Failed(
+        return Problem(
             "not_in_remote_control",
             f"the arm at {host} is not in remote control",
             "Switch the pendant to remote control (top right corner)",
         )
     if "already in use" in reason:
-        return Failed(
+        return Problem(
             "registers_in_use",
             f"another client or a fieldbus holds the input registers of the arm at {host}",
             "Close the other client, or disable EtherNet/IP, PROFINET and MODBUS in the installation",
         )
-    return Failed(
+    return Problem(
         "control_not_taken",
         f"the arm at {host} did not start the control script ({reason})",
         "Clear any stop on the pendant, close other programs, then start again",

@@ -3,6 +3,7 @@
 from dataclasses import dataclass
 
 from rig.arm.state import ArmState, RobotMode, RuntimeState, SafetyMode
+from rig.errors import Refused
 
 # The slider is reported as a fraction; anything below 99.9 % stretches a sweep measurably.
 FULL_SPEED_FRACTION = 0.999
@@ -15,6 +16,10 @@ class Problem:
     name: str
     what: str
     remedy: str
+
+    def refusal(self) -> Refused:
+        """The same as an exception for the time before anything moves."""
+        return Refused(self.name, self.what, self.remedy)
 
 
 _UNLOCK = "Find out what stopped the arm, clear it, unlock on the pendant (not before 5 s), then start again"

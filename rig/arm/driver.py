@@ -78,7 +78,7 @@ class Arm:
             self._link.start()
             self._wait(lambda: self._latest is not None or self._answer is not None)
         if isinstance(self._answer, Failed):
-            raise Refused(self._answer.name, self._answer.what, self._answer.remedy)
+            raise self._answer.problem.refusal()
 
     @property
     def latest(self) -> ArmState:
@@ -117,7 +117,7 @@ class Arm:
             return
         problem = self._problem or Problem("arm_stopped", "the arm was stopped on request", "Start again when ready")
         if not self._holds_arm:
-            raise Refused(problem.name, problem.what, problem.remedy)
+            raise problem.refusal()
         outcome = self.stop()
         remedy = f"{outcome.remedy}. {problem.remedy}" if outcome.remedy else problem.remedy
         raise Fault(problem.name, f"{problem.what}; {outcome.what}", remedy)
@@ -134,14 +134,14 @@ class Arm:
         if problem is None and self.latest.runtime_state != RuntimeState.STOPPED:
             problem = Problem("program_running", f"a program runs on the arm at {self._host}", "Stop it on the pendant")
         if problem is not None:
-            raise Refused(problem.name, problem.what, problem.remedy)
+            raise problem.refusal()
         with self._stopping_on_error(), self._link.patience():
             self._holds_arm = True
             self._request(TakeControl(payload_kg, payload_centre_m))
             self._wait(lambda: self._answer is not None)
             if isinstance(self._answer, Failed):
                 self._holds_arm = False
-                raise Refused(self._answer.name, self._answer.what, self._answer.remedy)
+                raise self._answer.problem.refusal()
             self._wait(lambda: self.latest.runtime_state == RuntimeState.PLAYING)
             self._supervising = True
 
@@ -158,7 +158,7 @@ class Arm:
             self._wait(lambda: self._has_ended(motion) or self.latest.time_s > deadline_s, watch)
             if isinstance(self._answer, Failed):
                 self._wait_for_reason()
-                self._fail(Problem(self._answer.name, self._answer.what, self._answer.remedy))
+                self._fail(self._answer.problem)
             elif not self._has_ended(motion):
                 self._fail(
                     Problem(

@@ -2,6 +2,7 @@
 
 from dataclasses import dataclass
 
+from rig.arm.condition import Problem
 from rig.arm.state import ArmState, Joints
 
 # Parent to child ---------------------------------------------------------------------------------------------------
@@ -63,11 +64,9 @@ class MoveFinished:
 
 @dataclass(frozen=True, slots=True)
 class Failed:
-    """The request, or the connection, failed: name, what and remedy as in `rig.errors`."""
+    """The request, or the connection, failed."""
 
-    name: str
-    what: str
-    remedy: str
+    problem: Problem
 
 
 Message = Connected | Heartbeat | ControlTaken | MoveFinished | Failed
