@@ -5,6 +5,7 @@ chip may do so lazily: the frame is the same, only the time differs.
 """
 
 import struct
+from enum import Enum, auto
 
 from unicorn import arm_const as arm
 
@@ -29,7 +30,14 @@ _RETURNS = {0xFFFF_FFF1, 0xFFFF_FFF9, 0xFFFF_FFE1, 0xFFFF_FFE9}  # handler or th
 _TO_HANDLER = 0xFFFF_FFF1
 _TO_THREAD = 0xFFFF_FFF9
 _WITH_FLOAT = 1 << 4  # in EXC_RETURN, cleared when the frame holds floating-point registers
-ENTRY_CYCLES = 12
+
+
+class Entry(Enum):
+    """What became of the exception that would preempt what runs."""
+
+    NONE = auto()  # there is none
+    MASKED = auto()  # PRIMASK, FAULTMASK or BASEPRI holds it off
+    TAKEN = auto()
 
 
 class Cortex:
@@ -59,17 +67,14 @@ class Cortex:
         """The engine stopped between two instructions: note where."""
         self.pc = self._program_counter.read()[0]
 
-    def enter_pending(self, vectors: int) -> bool:
-        """Enter the handler of the exception that preempts, if there is one.
-
-        Returns True when one would, were it not masked by PRIMASK, FAULTMASK or BASEPRI.
-        """
+    def enter_pending(self, vectors: int) -> Entry:
+        """Enter the handler of the exception that preempts, if there is one. `vectors`: address of the vector table."""
         number = self._nvic.candidate()
         if number is None:
-            return False
+            return Entry.NONE
         *scratch, control, xpsr, stack, primask, faultmask, basepri = self._everything.read()
         if primask or faultmask or (basepri and self._nvic.priority(number) >= basepri):
-            return True
+            return Entry.MASKED
         if control & (_PROCESS_STACK | _UNPRIVILEGED):
             raise Violation(
                 "unmodelled_mode", "the firmware uses the process stack or unprivileged mode", "Model it in cortex.py"
@@ -90,7 +95,7 @@ class Cortex:
         self._nvic.enter(number)
         (entry,) = struct.unpack("<I", self._engine.read(vectors + 4 * number, 4))
         self._jump(entry, f"the vector of exception {number} (interrupt {number - FIRST_IRQ})")
-        return False
+        return Entry.TAKEN
 
     def return_from_exception(self, return_code: int) -> None:
         """Undo `enter_pending`, after the core branched to `return_code` (EXC_RETURN)."""

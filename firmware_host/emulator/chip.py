@@ -1,0 +1,115 @@
+"""The STM32L432's peripherals and the rig's wiring, assembled."""
+
+from collections.abc import Callable, Sequence
+
+from firmware_host.emulator import rcc
+from firmware_host.emulator.bus import Peripheral, RegisterBus
+from firmware_host.emulator.clocks import Clocks
+from firmware_host.emulator.dma import Dma1
+from firmware_host.emulator.engine import Engine
+from firmware_host.emulator.gpio import Exti, Port, Syscfg
+from firmware_host.emulator.nvic import Nvic
+from firmware_host.emulator.spi import Spi1
+from firmware_host.emulator.spi_device import BoardClock, DeviceLink, SpiBus, SpiDevice
+from firmware_host.emulator.system_control import SystemControl, SysTick
+from firmware_host.emulator.timeline import Timeline
+from firmware_host.emulator.timers import Tim2, Watchdog
+from firmware_host.emulator.usart import TDR_ADDRESS, Usart2
+
+_PERIPHERALS, _PERIPHERALS_SIZE = 0x4000_0000, 0x2_3000
+_PORTS, _PORTS_SIZE = 0x4800_0000, 0x1000
+_CORE, _CORE_SIZE = 0xE000_E000, 0x1000
+_SERIAL_FUNCTIONS = {"PA2": 7, "PA15": 3}
+_SENSOR_BUS_FUNCTIONS = {"PB3": 5, "PB4": 5, "PB5": 5}
+
+
+class Chip:
+    """Everything around the core. `on_reset(cause)` is called when the chip wants to be reset, `on_clock` when its
+    clock changes. Cause is one of the RESET_… flags of `rcc`.
+    """
+
+    def __init__(
+        self,
+        engine: Engine,
+        timeline: Timeline,
+        *,
+        board_clock: BoardClock,
+        devices: Sequence[SpiDevice],
+        on_reset: Callable[[int], None],
+        on_clock: Callable[[], None],
+    ) -> None:
+        self._on_clock = on_clock
+        self.clocks = clocks = Clocks()
+        self.nvic = nvic = Nvic(timeline)
+        self._ports = {letter: Port(letter) for letter in "AB"}
+        syscfg = Syscfg()
+        exti = Exti(nvic, syscfg)
+        dma = Dma1(engine, nvic, TDR_ADDRESS)
+        self.usart = Usart2(
+            timeline=timeline,
+            clocks=clocks,
+            nvic=nvic,
+            dma=dma,
+            pins_connected=lambda: self._on_pins(_SERIAL_FUNCTIONS),
+        )
+        sensor_bus = SpiBus(timeline, lambda: self._on_pins(_SENSOR_BUS_FUNCTIONS))
+        self._spi = Spi1(timeline, clocks, sensor_bus.exchange)
+        self.control = SystemControl(nvic, lambda: on_reset(rcc.RESET_SOFTWARE))
+        flash, power = rcc.Flash(), rcc.Power()
+        self.rcc = rcc.Rcc(
+            timeline=timeline,
+            clocks=clocks,
+            flash=flash,
+            power=power,
+            on_gate=self._gate,
+            on_clock=self._clock_changed,
+        )
+        watchdog = Watchdog(timeline, lambda: on_reset(rcc.RESET_WATCHDOG))
+        peripherals, ports, core = RegisterBus(_PERIPHERALS), RegisterBus(_PORTS), RegisterBus(_CORE)
+        engine.map_io(_PERIPHERALS, _PERIPHERALS_SIZE, peripherals.read, peripherals.write)
+        engine.map_io(_PORTS, _PORTS_SIZE, ports.read, ports.write)
+        engine.map_io(_CORE, _CORE_SIZE, core.read, core.write)
+        self._gated: dict[str, tuple[RegisterBus, Peripheral]] = {}
+        self._blocks: list[Peripheral] = []
+        self._attach(core, SysTick(timeline, clocks, nvic), nvic, self.control)
+        self._attach(peripherals, exti, watchdog)
+        self._attach_gated(peripherals, dma, flash, Tim2(timeline, clocks), self.usart, power, syscfg, self._spi)
+        self._attach_gated(ports, *self._ports.values())
+        self._attach(peripherals, self.rcc)  # last: its reset switches the gates of the others
+        for device in devices:
+            DeviceLink(device, sensor_bus, timeline=timeline, clock=board_clock, port_of=self._port_of, exti=exti)
+
+    @property
+    def peripherals(self) -> Sequence[Peripheral]:
+        """Every block of registers that has a model."""
+        return tuple(self._blocks)
+
+    def reset(self) -> None:
+        for block in self._blocks:
+            block.reset()
+
+    def _attach(self, bus: RegisterBus, *blocks: Peripheral) -> None:
+        for block in blocks:
+            bus.attach(block)
+            self._blocks.append(block)
+
+    def _attach_gated(self, bus: RegisterBus, *blocks: Peripheral) -> None:
+        """Attach blocks that RCC has to clock first."""
+        for block in blocks:
+            bus.attach(block, clocked=False)
+            self._blocks.append(block)
+            self._gated[block.name] = bus, block
+
+    def _gate(self, peripheral: str, on: bool) -> None:
+        bus, block = self._gated[peripheral]
+        bus.clock(block, on)
+
+    def _clock_changed(self) -> None:
+        self._spi.retune()
+        self._on_clock()
+
+    def _port_of(self, pin: str) -> Port:
+        return self._ports[pin[1]]
+
+    def _on_pins(self, functions: dict[str, int]) -> bool:
+        return all(self._port_of(pin).function(int(pin[2:])) == function for pin, function in functions.items())
