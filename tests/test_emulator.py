@@ -105,6 +105,19 @@ def test_bytes_come_at_the_pace_of_the_line() -> None:
     np.testing.assert_allclose(np.diff(arrivals_s), byte_s, atol=1.1 * tick_s)
 
 
+def test_noise_on_the_line_harms_nothing() -> None:
+    session = Session()
+    session.run(0.2)
+    random = np.random.default_rng(1)
+    for _ in range(20):
+        session.board.receive(random.bytes(400))
+        session.run(0.01)
+    session.board.receive(b"\0")
+    session.run(0.01)
+    assert session.ask("hello").values["unique_id"] == UNIQUE_ID
+    assert session.ask("status").values["rx_errors"] > 20
+
+
 def test_reboot_starts_the_image_afresh() -> None:
     session = Session()
     session.run(0.2)
