@@ -84,11 +84,11 @@ def test_any_move_ends_exactly_on_target_without_a_jump(
 ) -> None:
     player = Player(vibration)
     player.motion.move(target, speed, ramp)
-    before, gain = player.motion.target_qd_rad_s, 1e-9 + ramp * TICK_S * 1.0001
+    before, gain = player.motion.now.target_qd_rad_s, 1e-9 + ramp * TICK_S * 1.0001
     while not player.motion.standing:
         player.tick()
-        assert max(abs(b - a) for a, b in zip(before, player.motion.target_qd_rad_s, strict=True)) <= gain
-        before = player.motion.target_qd_rad_s
+        assert max(abs(b - a) for a, b in zip(before, player.motion.now.target_qd_rad_s, strict=True)) <= gain
+        before = player.motion.now.target_qd_rad_s
     assert player.motion.q_rad == pytest.approx(target, abs=1e-9)
     assert not any(player.motion.qd_rad_s)
 

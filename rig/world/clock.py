@@ -5,6 +5,7 @@ from collections.abc import Callable
 TICKS_PER_SECOND = 500
 TICK_S = 1.0 / TICKS_PER_SECOND
 PATIENCE_S = 0.02  # wall time the world may be behind and still catch up
+HURRY = 1.25  # … so many times as fast as it should go: a burst of packets would overrun a client that polls
 
 
 class Clock:
@@ -22,7 +23,8 @@ class Clock:
         self._anchor()
 
     def _anchor(self) -> None:
-        self._anchor_wall_s, self._anchor_tick = self._wall(), self.tick
+        self._anchor_wall_s = self._counted_s = self._wall()
+        self._anchor_tick = self.tick
 
     @property
     def time_s(self) -> float:
@@ -50,13 +52,15 @@ class Clock:
         """Wall time until the next tick is due: 0 when it is due now, infinity while held."""
         if self.held:
             return float("inf")
-        due_s = self._anchor_wall_s + (self.tick + 1 - self._anchor_tick) * TICK_S / self.time_scale
-        late_s = self._wall() - due_s
-        if late_s > PATIENCE_S:
+        period_s = TICK_S / self.time_scale
+        due_s = self._anchor_wall_s + (self.tick + 1 - self._anchor_tick) * period_s
+        now_s = self._wall()
+        if now_s - due_s > PATIENCE_S:
             self._anchor()
             return 0.0
-        return max(0.0, -late_s)
+        return max(0.0, due_s - now_s, self._counted_s + period_s / HURRY - now_s)
 
     def count(self) -> None:
         """One tick has been made."""
         self.tick += 1
+        self._counted_s = self._wall()

@@ -30,7 +30,7 @@ class ControlProgram:
         self._offset = register_offset
         self._path = tuple(path)
         self._threads = Threads(robot)
-        self._servo_target: tuple[Joints, float] = (robot.motion.target_q_rad, 0.1)
+        self._servo_target: tuple[Joints, float] = (robot.motion.now.target_q_rad, 0.1)
         self._speed_target: tuple[Joints, float] = ((0.0,) * 6, 0.5)
         self._operation = self._writes = 0
         self._commands: dict[int, Command] = {
@@ -170,7 +170,7 @@ class ControlProgram:
         while True:
             self._threads.take("servo")
             target, lookahead_s = self._servo_target
-            here = self._robot.motion.target_q_rad
+            here = self._robot.motion.now.target_q_rad
             velocity = tuple((b - a) / lookahead_s for a, b in zip(here, target, strict=True))
             self._robot.motion.speed(velocity, 40.0)
             yield

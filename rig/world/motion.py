@@ -1,6 +1,8 @@
 """The simulated joints: a trajectory played with a time scaling (speed slider, pause), known at any instant."""
 
 from collections.abc import Sequence
+from dataclasses import dataclass
+from math import nan
 
 from rig.world.clock import TICK_S
 from rig.world.ripple import Ripple
@@ -9,6 +11,17 @@ from rig.world.trajectory import ZERO, Joints, Trajectory, change_speed, line, r
 # ROS 2 description of the UR10e, from the 5.8 manual: base and shoulder 120°/s, elbow and wrists 180°/s.
 JOINT_SPEED_LIMIT_RAD_S: Joints = (2.0943951, 2.0943951, 3.1415927, 3.1415927, 3.1415927, 3.1415927)
 SCALING_RATE_PER_S = 4.0  # the speed fraction follows the slider, and pause and play, in at most a quarter second
+
+
+@dataclass(frozen=True, slots=True)
+class Instant:
+    """The six joints at one time: what is asked of them, and what they do."""
+
+    target_q_rad: Joints
+    target_qd_rad_s: Joints
+    target_qdd_rad_s2: Joints
+    q_rad: Joints
+    qd_rad_s: Joints
 
 
 class Motion:
@@ -24,12 +37,13 @@ class Motion:
         self._start_s = 0.0
         self._trajectory = rest(tuple(start_rad))
         self._offset, self._gain = self._map(tuple(start_rad), tuple(start_rad))
+        self._smooth, self._angles = [nan] * 6, [0.0] * 6  # what was worked out last, joint by joint
         self.still = True  # nothing moved in the whole of the last tick
         self._scaled = True  # a stop is not stretched by the speed slider
         self._trajectory_s = self._begin_s = 0.0
         self._fraction = self._begin_fraction = 1.0
         self.fraction_wanted = 1.0
-        self._refresh()
+        self._now: Instant | None = None  # worked out when somebody asks: most ticks nobody does
 
     # -- what the joints do now ---------------------------------------------------------------------------------
     @property
@@ -43,8 +57,26 @@ class Motion:
         return self._trajectory.over(self._trajectory_s)
 
     @property
+    def now(self) -> Instant:
+        """The joints at the end of the last tick."""
+        if self._now is None:
+            target, velocity, acceleration = self._trajectory.at(self._trajectory_s)
+            fraction = self._fraction if self._scaled else 1.0
+            q, qd = self._joints(target, velocity, fraction)
+            self._now = Instant(target, tuple(v * fraction for v in velocity), acceleration, q, qd)
+        return self._now
+
+    @property
+    def q_rad(self) -> Joints:
+        return self.now.q_rad
+
+    @property
+    def qd_rad_s(self) -> Joints:
+        return self.now.qd_rad_s
+
+    @property
     def moving(self) -> bool:
-        return any(self.target_qd_rad_s)
+        return any(self.now.target_qd_rad_s)
 
     @property
     def actual_q_rad(self) -> Joints:
@@ -66,7 +98,10 @@ class Motion:
 
     def _joints(self, target: Joints, velocity: Joints, fraction: float) -> tuple[Joints, Joints]:
         smooth = [o + g * p for o, g, p in zip(self._offset, self._gain, target, strict=True)]
-        q = tuple(r.angle(u) for r, u in zip(self._ripples, smooth, strict=True))
+        for joint, u in enumerate(smooth):
+            if self._smooth[joint] != u:  # most moves turn few joints
+                self._smooth[joint], self._angles[joint] = u, self._ripples[joint].angle(u)
+        q = tuple(self._angles)
         qd = tuple(
             r.gain(u) * g * v * fraction if v else 0.0
             for r, u, g, v in zip(self._ripples, smooth, self._gain, velocity, strict=True)
@@ -85,15 +120,7 @@ class Motion:
         if not self.still:
             mean = 0.5 * (self._begin_fraction + self._fraction) if self._scaled else 1.0
             self._trajectory_s += mean * TICK_S
-            self._refresh()
-
-    def _refresh(self) -> None:
-        target, velocity, acceleration = self._trajectory.at(self._trajectory_s)
-        fraction = self._fraction if self._scaled else 1.0
-        self.target_q_rad = target
-        self.target_qd_rad_s = tuple(v * fraction for v in velocity)
-        self.target_qdd_rad_s2 = acceleration
-        self.q_rad, self.qd_rad_s = self._joints(target, velocity, fraction)
+            self._now = None
 
     # -- commands ------------------------------------------------------------------------------------------------
     def move(self, target_rad: Joints, speed_rad_s: float, acceleration_rad_s2: float) -> None:
@@ -106,19 +133,19 @@ class Motion:
         """A speedJ, from whatever the joints do now: to this velocity, and on."""
         wanted = tuple(max(-m, min(m, v)) for v, m in zip(qd_rad_s, JOINT_SPEED_LIMIT_RAD_S, strict=True))
         velocity = self._trajectory.at(self._trajectory_s)[1]
-        self._play(change_speed(self.target_q_rad, velocity, wanted, acceleration_rad_s2), scaled=True)
+        self._play(change_speed(self.now.target_q_rad, velocity, wanted, acceleration_rad_s2), scaled=True)
 
     def stop(self, deceleration_rad_s2: float) -> None:
         """Bring the joints to rest along their present direction."""
         if self.moving:
-            stopping = change_speed(self.target_q_rad, self.target_qd_rad_s, ZERO, deceleration_rad_s2)
+            stopping = change_speed(self.now.target_q_rad, self.now.target_qd_rad_s, ZERO, deceleration_rad_s2)
             self._play(stopping, scaled=False)
         else:
-            self._play(rest(self.target_q_rad), scaled=True)
+            self._play(rest(self.now.target_q_rad), scaled=True)
 
     def _play(self, trajectory: Trajectory, scaled: bool) -> None:
         self._trajectory, self._scaled, self._trajectory_s = trajectory, scaled, 0.0
-        self._refresh()
+        self._now = None
 
     def _map(self, start: Joints, end: Joints) -> tuple[Joints, Joints]:
         """Offset and gain from target to smooth angle, so that the joints stand exactly on both ends of the way."""

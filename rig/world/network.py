@@ -98,8 +98,8 @@ class Connection:
         self._watched = events
 
     def close(self) -> None:
-        if self in self.listener.connections:
-            self.listener.connections.remove(self)
+        if self in self._network.connections:
+            self._network.connections.remove(self)
             if self._watched:
                 self._network.selector.unregister(self._peer)
             self._peer.close()
@@ -114,10 +114,13 @@ class Listener:
     ) -> None:
         self._network, self.host, self.port = network, host, port
         self._new_session, self._limit = new_session, limit
-        self.connections: list[Connection] = []
         self.silent = False
         self._socket: socket.socket | None = None
         self.open()
+
+    @property
+    def connections(self) -> list[Connection]:
+        return [connection for connection in self._network.connections if connection.listener is self]
 
     def open(self) -> None:
         """Start listening. Raises `Refused` when the address cannot be had."""
@@ -140,7 +143,8 @@ class Listener:
         self._socket = listening
 
     def _accept(self, events: int) -> None:
-        assert self._socket is not None
+        if self._socket is None:  # closed while this event was waiting
+            return
         try:
             peer, _ = self._socket.accept()
         except OSError:
@@ -149,18 +153,18 @@ class Listener:
             peer.close()
             return
         connection = Connection(self._network, peer, self._new_session(), self)
-        self.connections.append(connection)
+        self._network.connections.append(connection)
         connection.greet()
 
     def set_silent(self, silent: bool) -> None:
         """While silent nothing is sent and nothing read; the connections stay open."""
         self.silent = silent
-        for connection in tuple(self.connections):
+        for connection in self.connections:
             connection.watch()
 
     def hang_up(self) -> None:
         """Close every connection; go on listening."""
-        for connection in list(self.connections):
+        for connection in self.connections:
             connection.close()
 
     def close(self) -> None:
@@ -180,6 +184,7 @@ class Network:
         # when virtual time runs faster, and a client that keeps only the newest packet then misses some.
         self.selector = selectors.SelectSelector()
         self.listeners: list[Listener] = []
+        self.connections: list[Connection] = []
 
     def listen(self, host: str, port: int, new_session: Callable[[], Session], limit: int = 16) -> Listener:
         listener = Listener(self, host, port, new_session, limit)
@@ -193,11 +198,10 @@ class Network:
 
     def tick(self) -> None:
         """Give every session its turn."""
-        for listener in self.listeners:
-            for connection in tuple(listener.connections):
-                data = connection.session.tick()
-                if data:
-                    connection.send(data)
+        for connection in tuple(self.connections):
+            data = connection.session.tick()
+            if data:
+                connection.send(data)
 
     def close(self) -> None:
         for listener in self.listeners:

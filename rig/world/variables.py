@@ -49,16 +49,16 @@ def _pose(robot: Robot) -> tuple[float, ...]:
 
 
 def _target_pose(robot: Robot) -> tuple[float, ...]:
-    return kinematics.flange_pose(robot.motion.target_q_rad)
+    return kinematics.flange_pose(robot.motion.now.target_q_rad)
 
 
 ZERO3, ZERO6 = (0.0,) * 3, (0.0,) * 6
 
 OUTPUTS: dict[str, tuple[str, Get]] = {
     "timestamp": ("DOUBLE", lambda r: r.time_s),
-    "target_q": ("VECTOR6D", lambda r: r.motion.target_q_rad),
-    "target_qd": ("VECTOR6D", lambda r: r.motion.target_qd_rad_s),
-    "target_qdd": ("VECTOR6D", lambda r: r.motion.target_qdd_rad_s2),
+    "target_q": ("VECTOR6D", lambda r: r.motion.now.target_q_rad),
+    "target_qd": ("VECTOR6D", lambda r: r.motion.now.target_qd_rad_s),
+    "target_qdd": ("VECTOR6D", lambda r: r.motion.now.target_qdd_rad_s2),
     "actual_q": ("VECTOR6D", lambda r: r.motion.actual_q_rad),
     "actual_qd": ("VECTOR6D", lambda r: r.motion.qd_rad_s),
     "actual_TCP_pose": ("VECTOR6D", _pose),
