@@ -18,6 +18,7 @@ from rig.errors import Fault
 
 Array = NDArray[np.float64]
 
+MIN_SAMPLES = 100
 COARSE_STEP_S = 0.02  # far below the ramps of a sweep, so that the fine fit starts inside its reach
 CANDIDATES = 12  # peaks of the correlation looked at: six equal sweeps give eleven
 MIN_EXPLAINED = 0.5  # share of the readings' variance that the arm's motion must explain
@@ -99,12 +100,11 @@ def estimate_time_base(board_time_s: Array, readings_rad_s: Array, motion: ArmMo
     reference = float(board_time_s[0] + board_time_s[-1]) / 2
     offset = _coarse_offset(board_time_s, readings_rad_s, motion)
     clock = TimeBase(offset, 0.0, reference, np.zeros((2, 2)), np.zeros(3))
-    for _ in range(FINE_STEPS):
-        before, clock = clock.offset_s, _refined(clock, board_time_s, readings_rad_s, motion)
-        if abs(clock.offset_s - before) < 1e-3 * clock.offset_std_s:
-            break
-    else:
-        raise _not_found("the fit of the board's clock does not settle")
+    for _ in range(2):  # which samples may be used depends on the clock, a little
+        used = motion.covered(clock.controller_time_s(board_time_s))
+        if used.sum() < MIN_SAMPLES:
+            raise _not_found("board and arm were hardly recorded at the same time")
+        clock = _settled(clock, board_time_s[used], readings_rad_s[used], motion)
     if not abs(clock.drift) < MAX_DRIFT or not clock.offset_std_s < COARSE_STEP_S:
         raise _not_found(f"the board's clock would drift by {clock.drift * 1e6:.0f} ppm")
     return clock
@@ -126,7 +126,7 @@ def widening(residuals: Array) -> float:
 
 
 def _check_samples(board_time_s: Array, readings: Array) -> None:
-    if len(board_time_s) < 100:
+    if len(board_time_s) < MIN_SAMPLES:
         raise _not_found(f"the recording holds {len(board_time_s)} samples")
     if np.any(np.diff(board_time_s) <= 0):
         raise Fault(
@@ -191,20 +191,24 @@ def _explained(board: Array, seen: NDArray[np.bool_], arm: Array, lag: int) -> f
     return 1 - float(np.sum(residual**2)) / total if total > 0 else 0.0
 
 
+def _settled(clock: TimeBase, board_time_s: Array, readings: Array, motion: ArmMotion) -> TimeBase:
+    for _ in range(FINE_STEPS):
+        before, clock = clock.offset_s, _refined(clock, board_time_s, readings, motion)
+        if abs(clock.offset_s - before) < 1e-3 * clock.offset_std_s:
+            return clock
+    raise _not_found("the fit of the board's clock does not settle")
+
+
 def _refined(clock: TimeBase, board_time_s: Array, readings: Array, motion: ArmMotion) -> TimeBase:
     """One Gauss–Newton step.
 
     Model: m = A r(t) + c + noise, r the flange's rate at controller time t; A (3, 3) and c (3,) are fitted along.
     """
-    time_s = clock.controller_time_s(board_time_s)
-    inside = motion.covered(time_s)
-    if inside.sum() < 100:
-        raise _not_found("board and arm were hardly recorded at the same time")
-    t, since, m = time_s[inside], board_time_s[inside] - clock.reference_s, readings[inside]
+    t, since = clock.controller_time_s(board_time_s), board_time_s - clock.reference_s
     columns = np.column_stack([motion.rate(t), np.ones(len(t))])
     inverse = np.linalg.pinv(columns)
-    fitted = inverse @ m
-    residual = m - columns @ fitted
+    fitted = inverse @ readings
+    residual = readings - columns @ fitted
     by_offset = motion.rate(t, 1) @ fitted[:3]
     normal, right = np.zeros((2, 2)), np.zeros(2)
     for axis in range(3):
