@@ -174,6 +174,8 @@ def test_an_unmodelled_register_fails_by_name(tmp_path: Path) -> None:
         ),
         ("firmware_fault", '__asm volatile("udf #0");', "nvalid instruction"),
         ("firmware_fault", '__asm volatile("bkpt #0");', "breakpoint"),
+        ("firmware_fault", '__asm volatile("svc #0");', "supervisor call"),
+        ("bad_vector", "REG(0xE000E100) = 1;\\n REG(0xE000E200) = 1;\\n WFI();", "exception 16"),
         ("firmware_fault", "((void (*)(void))0x60000001)();\\n WFI();", "execution at address 0x60000000"),
         ("firmware_fault", '__asm volatile("vmov.f32 s0, #1.0");', "floating point before CPACR enables it"),
         ("spi_setup", "REG(0x40013000) = 0x37C;\\n REG16(0x4001300C) = 0;", "PB3, PB4, PB5"),

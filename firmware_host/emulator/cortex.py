@@ -46,7 +46,6 @@ class Cortex:
     def __init__(self, engine: Engine, nvic: Nvic) -> None:
         self._engine = engine
         self._nvic = nvic
-        self._scratch = engine.registers(_CALLER_SAVED)
         self._state = engine.registers(_STATE)
         self._floats = engine.registers(_FLOATS)
         self._masks = engine.registers(_MASKS)
@@ -101,7 +100,7 @@ class Cortex:
         """Undo `enter_pending`, after the core branched to `return_code` (EXC_RETURN)."""
         if return_code not in _RETURNS:
             raise Violation("bad_return", f"exception return to 0x{return_code:08X}", "Correct the firmware")
-        _control, _xpsr, base = self._state.read()
+        base = self._state.read()[-1]
         self._nvic.leave()
         *scratch, pc, xpsr = _BASIC_FRAME.unpack(self._engine.read(base, _BASIC_FRAME.size))
         stack = base + _BASIC_FRAME.size

@@ -34,7 +34,6 @@ from unicorn.unicorn_py3.unicorn import UcError, uclib
 
 from firmware_host.emulator.timeline import Timeline
 
-PAGE = 0x1000
 _SET_CPU_MODEL = (1 << 30) | (1 << 26) | UC_CTL_CPU_MODEL  # uc_ctl: write, one argument
 _NO_END = 0xFFFF_FFFF  # an address the core never executes: only stop(), WFI and faults end a run
 
@@ -85,7 +84,7 @@ class Registers:
 
 
 class Engine:
-    """One Cortex-M4F core with its memories. Runs code; knows nothing of peripherals, interrupts or time."""
+    """One Cortex-M4F core with its memories. Runs code; knows nothing of peripherals and interrupts."""
 
     def __init__(self) -> None:
         self._handle = ctypes.c_void_p()

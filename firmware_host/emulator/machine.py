@@ -22,8 +22,7 @@ _SYSTEM_MEMORY, _UNIQUE_ID, _FLASH_KB = 0x1FFF_7000, 0x1FFF_7590, 0x1FFF_75E0
 _WFI, _BRANCH_TO_SELF = 0xBF30, 0xE7FE
 _CORE_REGISTERS = [*range(UC_ARM_REG_R0, UC_ARM_REG_R0 + 13), UC_ARM_REG_SP, UC_ARM_REG_LR]
 _EXCEPTION_RETURN = 8
-_CORE_EXCEPTIONS = {1: "undefined instruction", 2: "supervisor call", 3: "instruction fetch fault", 4: "data fault"}
-_CORE_EXCEPTIONS |= {7: "breakpoint", 17: "floating point without access", 18: "invalid execution state"}
+_CORE_EXCEPTIONS = {2: "supervisor call", 7: "breakpoint"}
 _CORRECT = "Correct the firmware"
 
 
@@ -75,12 +74,14 @@ class EmulatedBoard:
     # --- what the world sees
 
     def advance(self, until_s: float) -> None:
-        """Run to virtual time `until_s`. Raises BoardError, now and ever after, when the firmware breaks a rule."""
+        """Run to virtual time `until_s`, at most a few instructions (under a microsecond) beyond.
+
+        Raises BoardError, now and ever after, when the firmware breaks a rule.
+        """
         if self._failure is not None:
             raise self._failure
         limit = self._clock.last_tick(until_s)
         timeline = self._timeline
-        timeline.limit = limit
         if self._asleep and timeline.next_due > limit:  # the common case, made short
             timeline.now = max(limit, timeline.now)
             return
@@ -121,7 +122,7 @@ class EmulatedBoard:
 
     def _load_memories(self, image: bytes, unique_id: bytes) -> None:
         if len(image) > _FLASH_SIZE:
-            raise BoardError("image_too_big", f"the image has {len(image)} bytes", f"flash holds {_FLASH_SIZE}")
+            raise BoardError("image_too_big", f"the image has {len(image)} bytes", f"Flash holds {_FLASH_SIZE}")
         engine = self._engine
         engine.map_rom(_FLASH, _FLASH_SIZE)
         engine.write(_FLASH, image.ljust(_FLASH_SIZE, b"\xff"))

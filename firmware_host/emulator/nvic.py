@@ -76,14 +76,13 @@ class Nvic:
         self._pending &= ~(1 << number)
         self._active.append(number)
 
-    def leave(self) -> int:
-        """The running handler returns. Returns its exception number. Raises Violation when none is running."""
+    def leave(self) -> None:
+        """The running handler returns. Raises Violation when none is running."""
         if not self._active:
             raise Violation("bad_return", "exception return with no handler running", "Correct the firmware")
         number = self._active.pop()
         if self._lines >> number & 1:
             self._pending |= 1 << number
-        return number
 
     @property
     def running(self) -> int:

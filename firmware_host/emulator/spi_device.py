@@ -132,8 +132,7 @@ class DeviceLink:
 
     def exchange(self, byte: int) -> int:
         """Pass one byte to the device and return its answer."""
-        # The core may be a few instructions past the limit; the world knows its motion up to the limit only
-        answer = self.device.transfer(byte, self._clock.seconds(min(self._timeline.now, self._timeline.limit)))
+        answer = self.device.transfer(byte, self._clock.seconds(self._timeline.now))
         self._settle()
         return answer
 

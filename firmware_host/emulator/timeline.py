@@ -7,17 +7,16 @@ NEVER = 1 << 62
 
 
 class Timeline:
-    """Now, the limit the board may run to, and one next due tick for each registered action.
+    """Now, and one next due tick for each registered action.
 
     The machine's block hook reads `now` and `deadline` on every block, so they are plain attributes: `deadline` is
     the tick at which the core has to pause because something is due, the limit is reached, or `interrupt` was called.
     """
 
-    __slots__ = ("_actions", "_due", "deadline", "limit", "next_due", "now")
+    __slots__ = ("_actions", "_due", "deadline", "next_due", "now")
 
     def __init__(self) -> None:
         self.now = 0
-        self.limit = 0
         self.deadline = 0
         self.next_due = NEVER
         self._actions: list[Callable[[], None]] = []
