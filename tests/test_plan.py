@@ -68,7 +68,10 @@ def test_duration_is_the_sum_of_motions_and_rests() -> None:
     # 60°/s and 80°/s²: 22.5° of ramp and 2° of margin on each side of 360° take 409°/60 + 60/80 s.
     sweep_s = 409 / 60 + 0.75
     transfer_s = 204.5 / 90 + 90 / 80
-    assert plan().duration_s == pytest.approx(6 * (sweep_s + 3) + 4 * transfer_s)
+    slow = ArmSection(host="127.0.0.2", payload_kg=0.35, transfer_speed_deg_s=90)
+    procedure = ProcedureSection(speed_deg_s=60, acceleration_deg_s2=80, rest_s=3, margin_deg=2)
+    made = plan_six_observation(slow, procedure)
+    assert made.duration_s == pytest.approx(6 * (sweep_s + 3) + 4 * transfer_s)
 
 
 def test_a_short_move_never_reaches_its_speed() -> None:
@@ -76,11 +79,12 @@ def test_a_short_move_never_reaches_its_speed() -> None:
     assert trapezoid_duration(1.0, 1.0, 1.0) == pytest.approx(2.0)
 
 
-def test_from_elsewhere_the_first_motion_goes_home() -> None:
+def test_from_elsewhere_the_first_motion_goes_home_at_leisure() -> None:
     start = (0.1, *HOME[1:])
     first = plan_six_observation(ARM, ProcedureSection(), start).steps[0]
     assert isinstance(first, Transfer)
     assert (first.start_q_rad, first.target_q_rad) == (start, HOME)
+    assert math.degrees(first.speed_rad_s) <= 30
 
 
 def test_a_run_that_goes_on_leaves_out_what_is_done() -> None:

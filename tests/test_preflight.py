@@ -6,7 +6,7 @@ from dataclasses import replace
 import pytest
 
 from rig.arm.condition import Problem, program_interruption, readiness
-from rig.arm.plan import Plan, plan_six_observation
+from rig.arm.plan import Plan, Transfer, plan_six_observation
 from rig.arm.preflight import arm_problems, plan_problems, refuse, way_to_home
 from rig.arm.state import ArmReport, ArmState, Joints, RobotMode, RuntimeState, SafetyMode
 from rig.config.models import ArmSection, ProcedureSection
@@ -69,10 +69,10 @@ def test_wrists_stay_below_the_speed_that_the_client_accepts() -> None:
     assert "179.9°/s" in problems[0].what
 
 
-def test_a_base_that_leads_a_transfer_is_held_to_its_own_limit() -> None:
-    away = tuple(math.radians(angle) for angle in (90.0, *HOME_DEG[1:]))
-    arm = ArmSection(host="10.0.0.2", payload_kg=0.3, transfer_speed_deg_s=150)
-    problems = plan_problems(plan_six_observation(arm, ProcedureSection(), away), 0.3)
+def test_a_base_that_leads_a_motion_is_held_to_its_own_limit() -> None:
+    away = (math.radians(90), *HOME[1:])
+    swing = Transfer("swing", HOME, away, math.radians(150), 4.0, 1.0)
+    problems = plan_problems(replace(plan(), steps=(*plan().steps, swing)), 0.3)
     assert names(problems) == ["joint_speed"]
     assert "base" in problems[0].what
 

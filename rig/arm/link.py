@@ -16,7 +16,8 @@ TICK_S = 0.05
 # Silence is counted in ticks of the guard, not in elapsed time: when this process itself was held up, nothing is late.
 SILENT_TICKS = 10  # 0.5 s without a heartbeat
 FROZEN_TICKS = 14  # 0.7 s of heartbeats without a new state
-STALE_TICKS = 2  # a client that crashes when states have not come for 0.1 s has lost its connection
+STALE_TICKS = 2  # when the child ends after 0.1 s without a new state, it had lost the arm before
+CRASHES = (-signal.SIGSEGV, -signal.SIGABRT)  # how the client itself ends when the arm closes a connection
 PATIENT_TICKS = 240  # 12 s while a client's constructor holds the child's interpreter, at worst until its 5 s time-out
 
 
@@ -114,9 +115,10 @@ class ChildLink:
         except (EOFError, OSError):
             if not self._ended.is_set():
                 self._ended.set()
-                name = "arm_link_lost" if self._frozen_ticks > STALE_TICKS else "arm_driver_died"
+                stale = self._frozen_ticks > STALE_TICKS
                 self._process.join(0.2)
                 status = self._process.exitcode
+                name = "arm_link_lost" if stale or status in CRASHES else "arm_driver_died"
                 self._lose(name, f"the process that talks to the arm at {self._host} ended (exit status {status})")
 
     def _guard(self) -> None:

@@ -12,6 +12,10 @@ from rig.config.models import ArmSection, Direction, ProcedureSection, Vector3
 # Joint angles closer than this are the same place: well above the encoder's step, well below anything that matters.
 SAME_PLACE_RAD = 1e-4
 
+# The first motion may swing the large joints from wherever somebody left the arm, so it is made at leisure.
+APPROACH_SPEED_RAD_S = math.radians(30)
+APPROACH_ACCELERATION_RAD_S2 = math.radians(60)
+
 
 class Motion(Protocol):
     """One joint-space movement: the joint that travels farthest has this speed and acceleration; others keep pace."""
@@ -126,7 +130,8 @@ def plan_six_observation(
 ) -> Plan:
     """The movement of SIX, Section III: each wrist in the configured order turns clockwise, rests, turns back, rests.
 
-    `start_q_rad` is where the arm stands (home when None); from there the plan goes home first, and it ends at home.
+    `start_q_rad` is where the arm stands (home when None); from there the plan goes home first, slowly, and it ends
+    at home.
     `done` holds the indices of sweeps to leave out: those an interrupted run has finished.
     The whole series repeats `procedure.repeats` times. Limits are not judged here: see `rig.arm.preflight`.
     """
@@ -176,22 +181,25 @@ def _connected(
 ) -> Iterable[Step]:
     """Sweeps with the rests after them and a transfer wherever the arm is not yet where the next one begins."""
     speed, acceleration = math.radians(arm.transfer_speed_deg_s), math.radians(procedure.acceleration_deg_s2)
-
-    def transfer(name: str, origin: Joints, target: Joints) -> Iterable[Transfer]:
-        distance = max(map(abs, travel(origin, target)))
-        if distance > SAME_PLACE_RAD:
-            duration = trapezoid_duration(distance, speed, acceleration)
-            yield Transfer(name, origin, target, speed, acceleration, duration)
-
-    yield from transfer("transfer home", start, home)
+    leisure = min(speed, APPROACH_SPEED_RAD_S), min(acceleration, APPROACH_ACCELERATION_RAD_S2)
+    yield from _transfer("approach home", start, home, *leisure)
     here = home
     for sweep in sweeps:
-        yield from transfer(f"transfer to the start of {sweep.name}", here, sweep.start_q_rad)
+        yield from _transfer(f"transfer to the start of {sweep.name}", here, sweep.start_q_rad, speed, acceleration)
         yield sweep
         if procedure.rest_s > 0:
             yield Rest(f"rest after {sweep.name}", procedure.rest_s)
         here = sweep.end_q_rad
-    yield from transfer("transfer home", here, home)
+    yield from _transfer("transfer home", here, home, speed, acceleration)
+
+
+def _transfer(
+    name: str, start: Joints, target: Joints, speed_rad_s: float, acceleration_rad_s2: float
+) -> Iterable[Transfer]:
+    distance_rad = max(map(abs, travel(start, target)))
+    if distance_rad > SAME_PLACE_RAD:
+        duration_s = trapezoid_duration(distance_rad, speed_rad_s, acceleration_rad_s2)
+        yield Transfer(name, start, target, speed_rad_s, acceleration_rad_s2, duration_s)
 
 
 def _radians(degrees: Iterable[float]) -> Joints:
