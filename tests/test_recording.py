@@ -144,8 +144,8 @@ def reports(pipe: Connection) -> list[tuple[float, int]]:
 def test_a_killed_run_opens_and_holds_all_but_the_last_second(tmp_path: Path) -> None:
     processes = multiprocessing.get_context("forkserver")
     processes.set_forkserver_preload(["h5py", "rig.recording"])
-    lives = np.random.default_rng(50).uniform(0.0, 2.5, size=(5, 10))
-    for batch, batch_lives in enumerate(lives):
+    lives = np.random.default_rng(50).uniform(0.0, 2.5, 50)
+    for batch, batch_lives in enumerate(np.array_split(lives, 3)):
         writers = []
         for number in range(len(batch_lives)):
             ours, theirs = processes.Pipe(duplex=False)
