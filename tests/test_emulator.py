@@ -172,6 +172,11 @@ def test_an_unmodelled_register_fails_by_name(tmp_path: Path) -> None:
             'ENABLE_FLOAT();\\n __asm volatile("vldr s0, [%0]" :: "r"(0x20000101));',
             "unaligned access",
         ),
+        (
+            "firmware_fault",
+            '__asm volatile("msr msp, %0" :: "r"(0x1000));\\n REG(0xE000ED04) = 1u << 28;\\n WFI();',
+            "memory write",
+        ),
         ("firmware_fault", '__asm volatile("udf #0");', "nvalid instruction"),
         ("firmware_fault", '__asm volatile("bkpt #0");', "breakpoint"),
         ("firmware_fault", '__asm volatile("svc #0");', "supervisor call"),

@@ -30,7 +30,7 @@ from unicorn import (
     UC_PROT_READ,
 )
 from unicorn.arm_const import UC_ARM_REG_LR, UC_ARM_REG_PC, UC_CPU_ARM_CORTEX_M4
-from unicorn.unicorn_py3.unicorn import UcError, uclib
+from unicorn.unicorn_py3.unicorn import uclib
 
 from firmware_host.emulator.timeline import Timeline
 
@@ -55,7 +55,7 @@ _ATTEMPTS = {
 
 
 class EngineFault(Exception):
-    """The core cannot go on; the message is Unicorn's."""
+    """The core cannot go on, or there is no such memory; the message is Unicorn's."""
 
 
 class Registers:
@@ -185,11 +185,13 @@ class Engine:
         return Registers(self._handle, ids)
 
     def read(self, address: int, size: int) -> bytes:
+        """Read memory. Raises EngineFault where there is none."""
         buffer = ctypes.create_string_buffer(size)
         _check(uclib.uc_mem_read(self._handle, address, buffer, size))
         return buffer.raw
 
     def write(self, address: int, data: bytes) -> None:
+        """Write memory, read-only or not. Raises EngineFault where there is none."""
         _check(uclib.uc_mem_write(self._handle, address, data, len(data)))
 
     def run(self, address: int) -> None:
@@ -198,8 +200,7 @@ class Engine:
         if self._raised is not None:
             raised, self._raised = self._raised, None
             raise raised
-        if status != UC_ERR_OK:
-            raise EngineFault(uclib.uc_strerror(status).decode())
+        _check(status)
 
     def fault_place(self) -> list[int]:
         """Program counter and link register when a callback first raised; if none did, as they are."""
@@ -228,4 +229,4 @@ def _pointer(callback: Any) -> ctypes.c_void_p:
 
 def _check(status: int) -> None:
     if status != UC_ERR_OK:
-        raise UcError(status)
+        raise EngineFault(uclib.uc_strerror(status).decode())

@@ -90,6 +90,9 @@ class EmulatedBoard:
         except Violation as violation:
             self._failure = self._located(violation)
             raise self._failure from violation
+        except EngineFault as fault:
+            self._failure = self._located(Violation("firmware_fault", str(fault), _CORRECT))
+            raise self._failure from fault
 
     def receive(self, data: bytes) -> None:
         """Bytes from the host start arriving now, one after the other at the port's pace."""
@@ -160,10 +163,7 @@ class EmulatedBoard:
         """Run the core until the deadline, an exception return, WFI or a fault."""
         engine, cortex = self._engine, self._cortex
         engine.paused = False
-        try:
-            engine.run(cortex.pc)
-        except EngineFault as error:
-            raise Violation("firmware_fault", str(error), _CORRECT) from error
+        engine.run(cortex.pc)
         cortex.paused()
         if self._return_code is not None:
             code, self._return_code = self._return_code, None
