@@ -242,7 +242,7 @@ def test_a_program_sent_as_text_is_played(world: World) -> None:
         wait_for(lambda: receive.getActualQ()[0] > 0.19, "the move")
         wait_for(lambda: not running.state()["program_running"], "the program's end")
         state = running.state()
-        assert state["payload_kg"] == 1.5 and '"moving"' in state["messages"]
+        assert state["payload_kg"] == 1.5 and "moving" in state["messages"]
         script.sendall(b"set_standard_digital_out(2, True)\n")
         wait_for(lambda: receive.getDigitalOutState(2), "the statement outside a program")
 
@@ -310,3 +310,91 @@ def test_the_controller_takes_other_polyscope_versions(world: World) -> None:
         running = world({"world": {"arm": {"polyscope": polyscope}, "control_port": 7322}})
         with control_of(running) as control:
             assert control.moveJ(target(0.1), 1.0, 2.0)
+
+
+class Primary:
+    """A client of the primary interface, written from the maker's description of it."""
+
+    def __init__(self, world: WorldHandle, port: int = 30001) -> None:
+        self._socket = socket.create_connection((world.host, port), 5.0)
+        self._stream = self._socket.makefile("rb")
+        self.parts: dict[int, bytes] = {}  # the newest sub-package of each kind
+        self.messages: list[tuple[int, bytes]] = []
+
+    def read(self) -> None:
+        """Take in one package."""
+        size, kind = struct.unpack(">iB", self._stream.read(5))
+        payload = self._stream.read(size - 5)
+        if kind == 20:
+            self.messages.append((payload[9], payload[10:]))
+            return
+        assert kind == 16
+        while payload:
+            size, part = struct.unpack_from(">iB", payload)
+            self.parts[part], payload = payload[5:size], payload[size:]
+
+    def until(self, condition: Callable[[], Any]) -> None:
+        for _ in range(2000):
+            if condition():
+                return
+            self.read()
+        raise AssertionError("not seen in 2000 packages")
+
+    def send(self, text: str) -> None:
+        self._socket.sendall(text.encode() + b"\n")
+
+    @property
+    def robot_mode(self) -> int:
+        return self.parts[0][15]
+
+    @property
+    def flags(self) -> tuple[bool, ...]:
+        """Connected, enabled, powered, emergency stopped, protective stopped, program running, program paused."""
+        return struct.unpack(">7?", self.parts[0][8:15])
+
+    def __enter__(self) -> "Primary":
+        self.until(lambda: self.parts)
+        return self
+
+    def __exit__(self, *_: object) -> None:
+        self._stream.close()
+        self._socket.close()
+
+
+def test_the_primary_interface_shows_the_state_and_the_messages_of_a_program(world: World) -> None:
+    with Primary(world()) as client:
+        assert client.messages[0][0] == 3 and b"URControl" in client.messages[0][1]
+        assert [len(client.parts[kind]) for kind in (0, 1, 3, 4, 5, 6)] == [42, 246, 70, 96, 220, 440]
+        assert struct.unpack(">d", client.parts[1][41 * 4 : 41 * 4 + 8])[0] == pytest.approx(HOME[4], abs=1e-5)
+        assert client.robot_mode == 7 and client.flags == (True, True, True, False, False, False, False)
+        client.messages.clear()
+        client.send('def test_fun():\n  textmsg("still running")\n  sleep(0.1)\n  sync()\nend')
+        client.until(lambda: len(client.messages) == 3)
+        started, said, stopped = client.messages
+        assert started == (7, struct.pack(">iiB", 0, 0, 19) + b"PROGRAM_XXX_STARTED" + b"test_fun")
+        assert said == (0, b"still running")
+        assert stopped[0] == 7 and stopped[1].endswith(b"PROGRAM_XXX_STOPPED" + b"test_fun")
+        client.send("def odd():\n  calldoesntexist()\nend")
+        client.until(lambda: client.messages[-1][0] == 10)
+        assert struct.unpack(">ii", client.messages[-1][1][:8]) == (2, 3)  # line and column
+        assert b"calldoesntexist" in client.messages[-1][1]
+
+
+def test_orders_over_the_secondary_interface(world: World) -> None:
+    with Primary(world(), 30002) as client:
+        client.send("def forever():\n  while True:\n    sleep(1.0)\n    sync()\n  end\nend")
+        client.until(lambda: client.flags[5])
+        client.send("stop program")
+        client.until(lambda: not client.flags[5])
+        client.send("power off")
+        client.until(lambda: client.robot_mode == 3)
+        client.send("power on")
+        client.until(lambda: client.robot_mode == 5)
+        client.send("set robotmode run")
+        client.until(lambda: client.robot_mode == 7)
+        client.send("protective_stop()")
+        client.until(lambda: client.flags[4])
+        for _ in range(60):  # six seconds
+            client.read()
+        client.send("set unlock protective stop")
+        client.until(lambda: not client.flags[4])

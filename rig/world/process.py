@@ -14,7 +14,7 @@ from urllib.parse import urlsplit
 from firmware_host.errors import BoardError
 from rig.config.load import Loaded
 from rig.errors import Refused
-from rig.world import dashboard, rtde, script
+from rig.world import dashboard, primary, rtde, script
 from rig.world.clock import Clock
 from rig.world.control import ControlSession
 from rig.world.laboratory import Laboratory
@@ -28,8 +28,8 @@ if TYPE_CHECKING:
 IDLE_POLL_S = 0.2
 ARM_PORTS: dict[int, Callable[[Robot], Session]] = {
     dashboard.PORT: dashboard.DashboardSession,
-    script.PRIMARY_PORT: script.ScriptSession,
-    script.SECONDARY_PORT: script.ScriptSession,
+    script.PRIMARY_PORT: primary.PrimarySession,
+    script.SECONDARY_PORT: primary.PrimarySession,
     script.REALTIME_PORT: script.ScriptSession,
     rtde.PORT: rtde.RtdeSession,
 }

@@ -49,8 +49,31 @@ SAFETY_BITS = {
 }
 
 
+class MessageKind(IntEnum):
+    """Kinds of robot messages, as the primary interface numbers them."""
+
+    TEXT = 0
+    KEY = 7
+    EXCEPTION = 10
+
+
+@dataclass(frozen=True, slots=True)
+class Message:
+    """Something the controller tells everybody. `place`: line and column of the program, for an exception."""
+
+    number: int
+    kind: MessageKind
+    text: str
+    title: str = ""
+    place: tuple[int, int] = (0, 0)
+
+
 class ProgramError(Exception):
-    """A program did what the controller answers with a pop-up: it stops."""
+    """A program did what the controller answers with a pop-up: it stops. `place`: line and column, if known."""
+
+    def __init__(self, text: str, place: tuple[int, int] = (0, 0)) -> None:
+        super().__init__(text)
+        self.place = place
 
 
 class Program(Protocol):
@@ -100,7 +123,7 @@ class Robot:
         self.payload_centre_m: tuple[float, ...] = (0.0, 0.0, 0.0)
         self.tcp_offset: tuple[float, ...] = (0.0,) * 6
         self.loaded_program = ""
-        self.messages: deque[str] = deque(maxlen=200)
+        self.messages: deque[Message] = deque(maxlen=200)
         self.watchdog_s = 0.0  # a program stops when no input came for so long; 0: no watchdog
         self._last_input_tick = 0
         self._program: Program | None = None
@@ -123,6 +146,7 @@ class Robot:
             self.robot_mode = self._mode_changes.pop(0)[1]
         if self._start is not None and self._start[0] <= self.tick:
             self._program, self._start = self._start[1], None
+            self.say(self._program.name, MessageKind.KEY, "PROGRAM_XXX_STARTED")
             self.runtime_state = RuntimeState.PLAYING
         if self.runtime_state == RuntimeState.PLAYING:
             self._play()
@@ -139,7 +163,8 @@ class Robot:
         try:
             running = self._program.step()
         except ProgramError as error:
-            self.stop_program(str(error))
+            self.complain(error)
+            self.stop_program("")
             return
         if not running:
             self.stop_program("")
@@ -174,6 +199,8 @@ class Robot:
         """Stop the program, and the joints with it."""
         if reason:
             self.say(reason)
+        if self._program is not None:
+            self.say(self._program.name, MessageKind.KEY, "PROGRAM_XXX_STOPPED")
         self._start = None
         self._program = None
         self.watchdog_s = 0.0
@@ -198,8 +225,22 @@ class Robot:
         self.runtime_state = RuntimeState.RESUMING
         return True
 
-    def say(self, text: str) -> None:
-        self.messages.append(text)
+    def say(
+        self, text: str, kind: MessageKind = MessageKind.TEXT, title: str = "", place: tuple[int, int] = (0, 0)
+    ) -> None:
+        """Tell everybody who listens."""
+        number = self.messages[-1].number + 1 if self.messages else 1
+        self.messages.append(Message(number, kind, text, title, place))
+
+    def complain(self, error: ProgramError) -> None:
+        """Tell everybody what a program did wrong."""
+        self.say(str(error), MessageKind.EXCEPTION, place=error.place)
+
+    def messages_after(self, number: int) -> list[Message]:
+        """What has been said since the message `number`."""
+        if not self.messages or self.messages[-1].number <= number:
+            return []
+        return [message for message in self.messages if message.number > number]
 
     # -- safety and power ------------------------------------------------------------------------------------------
     def protective_stop(self) -> None:

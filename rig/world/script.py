@@ -6,7 +6,7 @@ statements listed in `urscript`.
 """
 
 import re
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 
 from rig.world.control_program import ControlProgram, PathStep
 from rig.world.robot import Program, ProgramError, Robot
@@ -70,6 +70,17 @@ def _path(lines: list[str]) -> Iterator[PathStep]:
             raise ProgramError(f"not simulated: {statement.split('(')[0]} in a path")
 
 
+ORDERS: dict[str, Callable[[Robot], object]] = {
+    "power on": Robot.power_on,
+    "power off": Robot.power_off,
+    "set robotmode run": Robot.brake_release,
+    "set unlock protective stop": Robot.unlock_protective_stop,
+    "stop program": lambda robot: robot.stop_program("stopped by a client"),
+    "pause program": Robot.pause,
+    "resume program": Robot.resume,
+}
+
+
 class ScriptSession:
     """One connection to a script socket."""
 
@@ -84,18 +95,10 @@ class ScriptSession:
 
     def receive(self, data: bytes) -> bytes:
         for lines in self._reader.feed(data):
-            if not self._robot.remote_control:
-                self._robot.say("a program was ignored: the robot is in local control")
-                continue
-            try:
-                program = compile_program(self._robot, lines)
-            except ProgramError as error:
-                self._robot.say(str(error))
-                continue
-            if lines[0].lstrip().startswith("sec "):
-                run_beside(self._robot, program)
+            if self._robot.remote_control:
+                self._obey(lines)
             else:
-                self._robot.start_program(program)
+                self._robot.say("a program was ignored: the robot is in local control")
         return b""
 
     def tick(self) -> bytes:
@@ -104,11 +107,22 @@ class ScriptSession:
     def closed(self) -> None:
         pass
 
+    def _obey(self, lines: list[str]) -> None:
+        order = ORDERS.get(lines[0].strip())
+        if order is not None:
+            order(self._robot)
+            return
+        try:
+            program = compile_program(self._robot, lines)
+            if lines[0].lstrip().startswith("sec "):
+                run_beside(program)
+            else:
+                self._robot.start_program(program)
+        except ProgramError as error:
+            self._robot.complain(error)
 
-def run_beside(robot: Robot, program: Program) -> None:
+
+def run_beside(program: Program) -> None:
     """A secondary program: it takes no time, moves nothing, and leaves the running program alone."""
-    try:
-        while program.step():
-            raise ProgramError("a secondary program may not take time")
-    except ProgramError as error:
-        robot.say(str(error))
+    if program.step():
+        raise ProgramError("a secondary program may not take time")

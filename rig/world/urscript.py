@@ -1,8 +1,9 @@
-"""Simple URScript programs: straight lines of statements, played one after another."""
+"""Simple URScript programs: statements and endless loops, played one after another."""
 
 import ast
 import re
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass
 from typing import Any
 
 from rig.world.clock import TICKS_PER_SECOND
@@ -36,34 +37,70 @@ def joints(value: Any) -> Joints:
     return tuple(float(angle) for angle in value)
 
 
-class ScriptProgram:
-    """A program of statements without variables, loops or conditions."""
+@dataclass(frozen=True, slots=True)
+class Call:
+    """One statement and where it stands in the program."""
 
-    def __init__(self, robot: Robot, lines: list[str]) -> None:
+    text: str
+    place: tuple[int, int]
+
+
+@dataclass(frozen=True, slots=True)
+class Loop:
+    """`while True:` and its body."""
+
+    body: "Block"
+
+
+Block = tuple[Call | Loop, ...]
+
+
+def parse(lines: Sequence[str]) -> tuple[str, Block]:
+    """The name and body of a program. Raises `ProgramError` at the first line the simulation does not know."""
+    name = "unnamed"
+    stack: list[list[Call | Loop]] = [[]]
+    for number, line in enumerate(lines, 1):
+        text = line.split("#", 1)[0].strip()
+        frame = FRAME.match(text)
+        call = CALL.match(text)
+        if not text:
+            continue
+        if frame and number == 1:
+            name = frame.group(2)
+        elif text == "while True:":
+            stack.append([])
+        elif text == "end" and len(stack) > 1:
+            body = stack.pop()
+            stack[-1].append(Loop(tuple(body)))
+        elif call and call.group(1) in STATEMENTS:
+            stack[-1].append(Call(text, (number, len(line) - len(line.lstrip()) + 1)))
+        elif text != "end":
+            raise ProgramError(f"not simulated: {text}", (number, len(line) - len(line.lstrip()) + 1))
+    return name, tuple(stack[0])
+
+
+class ScriptProgram:
+    """A program of the statements below and endless loops: no variables, no conditions."""
+
+    def __init__(self, robot: Robot, lines: Sequence[str]) -> None:
         self._robot = robot
         self._threads = Threads(robot)
-        statements = [line.split("#", 1)[0].strip() for line in lines]
-        statements = [statement for statement in statements if statement]
-        frame = FRAME.match(statements[0]) if statements else None
-        self.name = frame.group(2) if frame else "unnamed"
-        if frame:
-            statements = statements[1:-1]
-        for statement in statements:
-            call = CALL.match(statement)
-            if call is None or call.group(1) not in (*STATEMENTS, "textmsg"):
-                raise ProgramError(f"not simulated: {statement}")
-        self._main = self._play(statements)
+        self.name, body = parse(lines)
+        self._main = self._play(body)
 
     def step(self) -> bool:
         return next(self._main, StopIteration) is not StopIteration
 
-    def _play(self, statements: list[str]) -> Steps:
-        for statement in statements:
-            name = statement.split("(", 1)[0]
-            if name == "textmsg":
-                self._robot.say(statement[len("textmsg(") : -1])
-                continue
-            yield from STATEMENTS[name](self._robot, self._threads, Arguments(statement).value)
+    def _play(self, block: Block) -> Steps:
+        for item in block:
+            if isinstance(item, Loop):
+                while True:
+                    yield from self._play(item.body)
+                    yield  # a loop that takes no time would never give way
+            try:
+                yield from STATEMENTS[item.text.split("(", 1)[0]](self._robot, self._threads, Arguments(item.text))
+            except ProgramError as error:
+                raise ProgramError(str(error), item.place) from None
 
 
 class Arguments:
@@ -72,34 +109,34 @@ class Arguments:
     def __init__(self, statement: str) -> None:
         self._statement, self._values = statement, arguments(statement)
 
-    def value(self, place: str, keyword: str, default: Any = None) -> Any:
+    def all(self) -> list[Any]:
+        return list(self._values.values())
+
+    def __call__(self, place: str, keyword: str, default: Any = None) -> Any:
         found = self._values.get(keyword, self._values.get(place, default))
         if found is None:
             raise ProgramError(f"{self._statement} needs {keyword}")
         return found
 
 
-Value = Callable[..., Any]
-
-
-def _movej(robot: Robot, threads: Threads, value: Value) -> Steps:
+def _movej(robot: Robot, threads: Threads, value: Arguments) -> Steps:
     target = joints(value("0", "q"))
     speed, acceleration = float(value("2", "v", 1.05)), float(value("1", "a", 1.4))
     return threads.movej("main", target, speed, acceleration)
 
 
-def _speedj(robot: Robot, threads: Threads, value: Value) -> Steps:
+def _speedj(robot: Robot, threads: Threads, value: Arguments) -> Steps:
     threads.take("main")
     robot.motion.speed(joints(value("0", "qd")), float(value("1", "a")))
     yield from _wait(float(value("2", "t", 0.0)))
     threads.let_go("main")
 
 
-def _stopj(robot: Robot, threads: Threads, value: Value) -> Steps:
+def _stopj(robot: Robot, threads: Threads, value: Arguments) -> Steps:
     return threads.stopj("main", float(value("0", "a")))
 
 
-def _sleep(robot: Robot, threads: Threads, value: Value) -> Steps:
+def _sleep(robot: Robot, threads: Threads, value: Arguments) -> Steps:
     return _wait(float(value("0", "t")))
 
 
@@ -108,49 +145,53 @@ def _wait(duration_s: float) -> Steps:
         yield
 
 
-def _sync(robot: Robot, threads: Threads, value: Value) -> Steps:
+def _sync(robot: Robot, threads: Threads, value: Arguments) -> Steps:
     yield
 
 
-def _at_once(action: Callable[[Robot, Value], None]) -> Callable[[Robot, Threads, Value], Steps]:
-    def steps(robot: Robot, threads: Threads, value: Value) -> Steps:
+def _at_once(action: Callable[[Robot, Arguments], None]) -> Callable[[Robot, Threads, Arguments], Steps]:
+    def steps(robot: Robot, threads: Threads, value: Arguments) -> Steps:
         action(robot, value)
         return iter(())
 
     return steps
 
 
-def _payload(robot: Robot, value: Value) -> None:
+def _payload(robot: Robot, value: Arguments) -> None:
     robot.set_payload(float(value("0", "m")), value("1", "cog", [0.0, 0.0, 0.0]))
 
 
-def _tcp(robot: Robot, value: Value) -> None:
+def _tcp(robot: Robot, value: Arguments) -> None:
     robot.tcp_offset = tuple(float(x) for x in value("0", "pose"))
 
 
-def _digital_out(first: int) -> Callable[[Robot, Value], None]:
-    def put(robot: Robot, value: Value) -> None:
+def _digital_out(first: int) -> Callable[[Robot, Arguments], None]:
+    def put(robot: Robot, value: Arguments) -> None:
         bit = 1 << first + int(value("0", "n"))
         robot.digital_outputs = robot.digital_outputs | bit if value("1", "b") else robot.digital_outputs & ~bit
 
     return put
 
 
-def _integer_register(robot: Robot, value: Value) -> None:
+def _integer_register(robot: Robot, value: Arguments) -> None:
     robot.outputs.ints[int(value("0", "address"))] = int(value("1", "value"))
 
 
-def _float_register(robot: Robot, value: Value) -> None:
+def _float_register(robot: Robot, value: Arguments) -> None:
     robot.outputs.doubles[int(value("0", "address"))] = float(value("1", "value"))
 
 
-def _boolean_register(robot: Robot, value: Value) -> None:
+def _boolean_register(robot: Robot, value: Arguments) -> None:
     robot.outputs.bits[int(value("0", "address"))] = bool(value("1", "value"))
 
 
-STATEMENTS: dict[str, Callable[[Robot, Threads, Value], Steps]] = {
+def _say(robot: Robot, value: Arguments) -> None:
+    robot.say("".join(str(part) for part in value.all()))
+
+
+STATEMENTS: dict[str, Callable[[Robot, Threads, Arguments], Steps]] = {
     "movej": _movej, "speedj": _speedj, "stopj": _stopj, "sleep": _sleep, "sync": _sync,
-    "popup": _at_once(lambda robot, value: robot.say(str(value("0", "s")))),
+    "textmsg": _at_once(_say), "popup": _at_once(_say),
     "set_payload": _at_once(_payload), "set_target_payload": _at_once(_payload), "set_tcp": _at_once(_tcp),
     "set_gravity": _at_once(lambda robot, value: None),
     "set_digital_out": _at_once(_digital_out(0)), "set_standard_digital_out": _at_once(_digital_out(0)),

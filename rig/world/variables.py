@@ -40,7 +40,7 @@ def _tcp_speed(robot: Robot) -> tuple[float, ...]:
     return (*linear, *(sum(r * w for r, w in zip(row, rate, strict=True)) for row in rotation))
 
 
-def _joint_mode(robot: Robot) -> tuple[int, ...]:
+def joint_modes(robot: Robot) -> tuple[int, ...]:
     return (JOINT_MODE_RUNNING if robot.robot_mode == RobotMode.RUNNING else JOINT_MODE_OFF,) * 6
 
 
@@ -67,7 +67,7 @@ OUTPUTS: dict[str, tuple[str, Get]] = {
     "target_TCP_speed": ("VECTOR6D", _tcp_speed),
     "tcp_offset": ("VECTOR6D", lambda r: r.tcp_offset),
     "robot_mode": ("INT32", lambda r: r.robot_mode),
-    "joint_mode": ("VECTOR6INT32", _joint_mode),
+    "joint_mode": ("VECTOR6INT32", joint_modes),
     "safety_mode": ("INT32", lambda r: r.safety_mode),
     "safety_status": ("INT32", lambda r: r.safety_mode),
     "robot_status_bits": ("UINT32", lambda r: r.robot_status_bits),
