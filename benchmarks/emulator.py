@@ -29,6 +29,7 @@ def main(duration_s: float) -> None:
             board.receive(encode("configure", 1, settings) + encode("start", 2, {"mode": 0}))
         board.advance(0.2)
         reader, samples = FrameReader(), 0
+        reader.feed(board.transmitted())
         start = time.perf_counter()
         for step in range(1, round(duration_s / TICK_S) + 1):
             board.advance(0.2 + step * TICK_S)
