@@ -100,11 +100,11 @@ def estimate_time_base(board_time_s: Array, readings_rad_s: Array, motion: ArmMo
     reference = float(board_time_s[0] + board_time_s[-1]) / 2
     offset = _coarse_offset(board_time_s, readings_rad_s, motion)
     clock = TimeBase(offset, 0.0, reference, np.zeros((2, 2)), np.zeros(3))
-    for _ in range(2):  # which samples may be used depends on the clock, a little
-        used = motion.covered(clock.controller_time_s(board_time_s))
-        if used.sum() < MIN_SAMPLES:
-            raise _not_found("board and arm were hardly recorded at the same time")
-        clock = _settled(clock, board_time_s[used], readings_rad_s[used], motion)
+    # The coarse clock says which samples to use; a choice that followed the fine one might never settle.
+    used = motion.covered(clock.controller_time_s(board_time_s))
+    if used.sum() < MIN_SAMPLES:
+        raise _not_found("board and arm were hardly recorded at the same time")
+    clock = _settled(clock, board_time_s[used], readings_rad_s[used], motion)
     if not abs(clock.drift) < MAX_DRIFT or not clock.offset_std_s < COARSE_STEP_S:
         raise _not_found(f"the board's clock would drift by {clock.drift * 1e6:.0f} ppm")
     return clock

@@ -26,7 +26,7 @@ from rig.errors import Fault, Refused
 from rig.observation import SensorObservations, observe
 from rig.recording import RunData
 from rig.solution import sensor_document, solve_runs
-from rig.timebase import TimeBase, widening
+from rig.timebase import ArmMotion, TimeBase, estimate_time_base, widening
 
 Array = NDArray[np.float64]
 SETTINGS = ObservationSection()
@@ -65,6 +65,19 @@ def test_the_board_s_clock_is_found_within_its_uncertainty(setup: Setup) -> None
     assert abs(drift) < 4 * seen.time_base.drift_std
     assert seen.time_base.offset_std_s < 2e-3
     np.testing.assert_allclose(seen.time_base.zero_rate_rad_s, -np.array(setup.bias_rad_s), atol=0.02)
+
+
+@pytest.mark.parametrize("joint", ["wrist_3", "wrist_1", "wrist_2"])
+def test_a_board_that_was_heard_late_is_not_taken_for_an_earlier_sweep(joint: str) -> None:
+    """All sweeps turn equally fast; only the axis they turn about tells them apart."""
+    events = [event for event in USUAL.events if event.name == "sweep_started"]
+    begun = next(event.controller_time_s for event in events if event.detail["sweep"]["joint_name"] == joint) or 0.0
+    sensor, samples = USUAL.sensors["gyro"], USUAL.samples["gyro"]
+    board_s = samples["board_time_us"] * 1e-6
+    heard = np.abs(board_s * (1 + Setup().drift) + Setup().boot_s - begun - 10) < 12.5
+    readings_rad_s = samples["counts"][heard] * sensor.sensitivity_rad_s_per_count
+    clock = estimate_time_base(board_s[heard], readings_rad_s, ArmMotion(USUAL.arm))
+    assert abs(clock_errors(Setup(), clock)[0]) < 4 * clock.offset_std_s
 
 
 def test_the_demo_s_clock_is_known_to_half_a_millisecond() -> None:

@@ -132,6 +132,19 @@ def test_the_covariance_is_that_of_repeated_calibrations(repeats: int, bias: Arr
     assert np.all(np.abs(errors.mean(axis=0)) < 4 * std / np.sqrt(len(errors)))
 
 
+def test_speeds_known_badly_make_the_scale_uncertain() -> None:
+    rng = np.random.default_rng(6)
+    means, speeds = sweeps()
+    std = SPEED * np.array([1e-2, 1e-4, 3e-3, 3e-3, 1e-3, 1e-3])
+    accumulated = Accumulator.empty()
+    for mean, speed, deviation in zip(means, speeds, std, strict=True):
+        accumulated = accumulated.add(mean, VARIANCE / 100, float(speed), float(deviation))
+    reported = np.sqrt(np.diag(accumulated.solve().covariance))
+    draws = speeds + rng.normal(size=(1500, 6)) * std
+    errors = np.array([values(gather(means, draw, VARIANCE / 100).solve()) for draw in draws]) - [*SCALE, *BIAS]
+    np.testing.assert_allclose(errors.std(axis=0), reported, rtol=0.1)
+
+
 def test_sweeps_add_up_in_any_order_and_from_any_parts() -> None:
     means, speeds = sweeps(directions=np.tile(DIRECTIONS, (3, 1)))
     whole = gather(means, speeds).solve()
