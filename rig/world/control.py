@@ -114,7 +114,7 @@ class ControlSession:
             "payload_kg": robot.payload_kg,
             "payload_centre_m": robot.payload_centre_m,
             "claims": sorted(robot.claims),
-            "messages": [message.text for message in robot.messages],
+            "messages": [message.text for message in robot.messages.after(0)],
             "held": self._world.clock.held,
             "board_powered": self._world.laboratory.board is not None,
             "board_baud": self._world.line.baud,

@@ -8,8 +8,9 @@ from collections.abc import Callable, Iterator, Sequence
 
 from rig.world import kinematics
 from rig.world.clock import TICK_S
+from rig.world.messages import ProgramError
 from rig.world.program import Steps, Threads
-from rig.world.robot import JOINT_LIMIT_RAD, ProgramError, Robot
+from rig.world.robot import JOINT_LIMIT_RAD, Robot
 from rig.world.trajectory import Joints
 
 REALTIME = frozenset({6, 9, 10, 11, 24, 25, 26, 27, 38, 58, 66, 67, 68, 69, 70, 71})

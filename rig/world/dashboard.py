@@ -6,7 +6,8 @@ Dashboard Server manual of the maker, e-Series. In local control it answers ques
 from collections.abc import Callable
 from pathlib import PurePosixPath
 
-from rig.world.robot import Robot, RobotMode, RuntimeState, SafetyMode
+from rig.world.modes import RobotMode, RuntimeState, SafetyMode
+from rig.world.robot import Robot
 
 PORT = 29999
 PROGRAMS = ("wait_program.urp",)

@@ -10,8 +10,10 @@ from math import pi
 
 from rig.world.clock import TICKS_PER_SECOND
 from rig.world.kinematics import LINKS, flange_pose
+from rig.world.messages import Message, MessageKind
+from rig.world.modes import RobotMode, RuntimeState, SafetyMode
 from rig.world.motion import JOINT_SPEED_LIMIT_RAD_S
-from rig.world.robot import Message, MessageKind, Robot, RobotMode, RuntimeState, SafetyMode
+from rig.world.robot import Robot
 from rig.world.script import ScriptSession
 from rig.world.variables import joint_modes
 
@@ -34,7 +36,7 @@ class PrimarySession:
     def __init__(self, robot: Robot) -> None:
         self._robot = robot
         self._script = ScriptSession(robot)
-        self._seen = robot.messages[-1].number if robot.messages else 0
+        self._seen = robot.messages.last
 
     def greeting(self) -> bytes:
         major, minor, bugfix, build = self._robot.identity.polyscope
@@ -47,7 +49,7 @@ class PrimarySession:
 
     def tick(self) -> bytes:
         data = b""
-        for message in self._robot.messages_after(self._seen):
+        for message in self._robot.messages.after(self._seen):
             data += _message(self._robot, message.kind, _content(message))
             self._seen = message.number
         if self._robot.tick % (TICKS_PER_SECOND // STATE_HZ) == 0:

@@ -2,7 +2,8 @@
 
 from collections.abc import Iterator
 
-from rig.world.robot import JOINT_LIMIT_RAD, ProgramError, Robot
+from rig.world.messages import ProgramError
+from rig.world.robot import JOINT_LIMIT_RAD, Robot
 from rig.world.trajectory import Joints
 
 Steps = Iterator[None]

@@ -1,12 +1,12 @@
 """The simulated UR10e controller without its sockets: modes, safety, registers, programs, and the joints."""
 
-from collections import deque
 from collections.abc import Sequence
 from dataclasses import dataclass, field
-from enum import IntEnum
 from typing import Protocol
 
 from rig.world.clock import TICK_S, TICKS_PER_SECOND
+from rig.world.messages import MessageKind, Messages, ProgramError
+from rig.world.modes import SAFETY_BITS, RobotMode, RuntimeState, SafetyMode
 from rig.world.motion import Motion
 
 JOINT_LIMIT_RAD = 6.2831853072 + 1e-6  # every joint ±360°
@@ -16,64 +16,6 @@ BRAKE_RAD_S2 = 40.0
 UNLOCK_AFTER_S = 5.0
 START_DELAY_S = 0.02  # between the last byte of a program and its first line
 POWER_STEP_S = 0.5  # powering on, releasing the brakes
-
-
-class RobotMode(IntEnum):
-    POWER_OFF = 3
-    POWER_ON = 4
-    IDLE = 5
-    RUNNING = 7
-
-
-class SafetyMode(IntEnum):
-    NORMAL = 1
-    REDUCED = 2
-    PROTECTIVE_STOP = 3
-    ROBOT_EMERGENCY_STOP = 7
-
-
-class RuntimeState(IntEnum):
-    STOPPING = 0
-    STOPPED = 1
-    PLAYING = 2
-    PAUSING = 3
-    PAUSED = 4
-    RESUMING = 5
-
-
-SAFETY_BITS = {
-    SafetyMode.NORMAL: 1 << 0,
-    SafetyMode.REDUCED: 1 << 1,
-    SafetyMode.PROTECTIVE_STOP: 1 << 2 | 1 << 10,
-    SafetyMode.ROBOT_EMERGENCY_STOP: 1 << 6 | 1 << 7 | 1 << 10,
-}
-
-
-class MessageKind(IntEnum):
-    """Kinds of robot messages, as the primary interface numbers them."""
-
-    TEXT = 0
-    KEY = 7
-    EXCEPTION = 10
-
-
-@dataclass(frozen=True, slots=True)
-class Message:
-    """Something the controller tells everybody. `place`: line and column of the program, for an exception."""
-
-    number: int
-    kind: MessageKind
-    text: str
-    title: str = ""
-    place: tuple[int, int] = (0, 0)
-
-
-class ProgramError(Exception):
-    """A program did what the controller answers with a pop-up: it stops. `place`: line and column, if known."""
-
-    def __init__(self, text: str, place: tuple[int, int] = (0, 0)) -> None:
-        super().__init__(text)
-        self.place = place
 
 
 class Program(Protocol):
@@ -123,7 +65,7 @@ class Robot:
         self.payload_centre_m: tuple[float, ...] = (0.0, 0.0, 0.0)
         self.tcp_offset: tuple[float, ...] = (0.0,) * 6
         self.loaded_program = ""
-        self.messages: deque[Message] = deque(maxlen=200)
+        self.messages = Messages()
         self.watchdog_s = 0.0  # a program stops when no input came for so long; 0: no watchdog
         self._last_input_tick = 0
         self._program: Program | None = None
@@ -146,7 +88,7 @@ class Robot:
             self.robot_mode = self._mode_changes.pop(0)[1]
         if self._start is not None and self._start[0] <= self.tick:
             self._program, self._start = self._start[1], None
-            self.say(self._program.name, MessageKind.KEY, "PROGRAM_XXX_STARTED")
+            self.messages.say(self._program.name, MessageKind.KEY, "PROGRAM_XXX_STARTED")
             self.runtime_state = RuntimeState.PLAYING
         if self.runtime_state == RuntimeState.PLAYING:
             self._play()
@@ -163,7 +105,7 @@ class Robot:
         try:
             running = self._program.step()
         except ProgramError as error:
-            self.complain(error)
+            self.messages.complain(error)
             self.stop_program("")
             return
         if not running:
@@ -198,9 +140,9 @@ class Robot:
     def stop_program(self, reason: str) -> None:
         """Stop the program, and the joints with it."""
         if reason:
-            self.say(reason)
+            self.messages.say(reason)
         if self._program is not None:
-            self.say(self._program.name, MessageKind.KEY, "PROGRAM_XXX_STOPPED")
+            self.messages.say(self._program.name, MessageKind.KEY, "PROGRAM_XXX_STOPPED")
         self._start = None
         self._program = None
         self.watchdog_s = 0.0
@@ -224,23 +166,6 @@ class Robot:
         self.motion.fraction_wanted = self.speed_slider
         self.runtime_state = RuntimeState.RESUMING
         return True
-
-    def say(
-        self, text: str, kind: MessageKind = MessageKind.TEXT, title: str = "", place: tuple[int, int] = (0, 0)
-    ) -> None:
-        """Tell everybody who listens."""
-        number = self.messages[-1].number + 1 if self.messages else 1
-        self.messages.append(Message(number, kind, text, title, place))
-
-    def complain(self, error: ProgramError) -> None:
-        """Tell everybody what a program did wrong."""
-        self.say(str(error), MessageKind.EXCEPTION, place=error.place)
-
-    def messages_after(self, number: int) -> list[Message]:
-        """What has been said since the message `number`."""
-        if not self.messages or self.messages[-1].number <= number:
-            return []
-        return [message for message in self.messages if message.number > number]
 
     # -- safety and power ------------------------------------------------------------------------------------------
     def protective_stop(self) -> None:

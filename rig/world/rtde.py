@@ -183,7 +183,7 @@ class RtdeSession:
     def _message(self, payload: bytes) -> bytes:
         """A client's text message, for the controller's log."""
         length = payload[0] if payload else 0
-        self._robot.say(payload[1 : 1 + length].decode(errors="replace"))
+        self._robot.messages.say(payload[1 : 1 + length].decode(errors="replace"))
         return b""
 
     def _say(self, text: str) -> bytes:

@@ -9,7 +9,8 @@ import re
 from collections.abc import Callable, Iterator
 
 from rig.world.control_program import ControlProgram, PathStep
-from rig.world.robot import Program, ProgramError, Robot
+from rig.world.messages import ProgramError
+from rig.world.robot import Program, Robot
 from rig.world.urscript import ScriptProgram, arguments, joints
 
 PRIMARY_PORT, SECONDARY_PORT, REALTIME_PORT = 30001, 30002, 30003
@@ -98,7 +99,7 @@ class ScriptSession:
             if self._robot.remote_control:
                 self._obey(lines)
             else:
-                self._robot.say("a program was ignored: the robot is in local control")
+                self._robot.messages.say("a program was ignored: the robot is in local control")
         return b""
 
     def tick(self) -> bytes:
@@ -119,7 +120,7 @@ class ScriptSession:
             else:
                 self._robot.start_program(program)
         except ProgramError as error:
-            self._robot.complain(error)
+            self._robot.messages.complain(error)
 
 
 def run_beside(program: Program) -> None:

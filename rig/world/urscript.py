@@ -7,8 +7,9 @@ from dataclasses import dataclass
 from typing import Any
 
 from rig.world.clock import TICKS_PER_SECOND
+from rig.world.messages import ProgramError
 from rig.world.program import Steps, Threads
-from rig.world.robot import ProgramError, Robot
+from rig.world.robot import Robot
 from rig.world.trajectory import Joints
 
 CALL = re.compile(r"([a-z_][a-z_0-9]*)\((.*)\)$", re.IGNORECASE)
@@ -186,7 +187,7 @@ def _boolean_register(robot: Robot, value: Arguments) -> None:
 
 
 def _say(robot: Robot, value: Arguments) -> None:
-    robot.say("".join(str(part) for part in value.all()))
+    robot.messages.say("".join(str(part) for part in value.all()))
 
 
 STATEMENTS: dict[str, Callable[[Robot, Threads, Arguments], Steps]] = {

@@ -4,7 +4,8 @@ from collections.abc import Callable, Sequence
 from typing import Any
 
 from rig.world import kinematics
-from rig.world.robot import Robot, RobotMode
+from rig.world.modes import RobotMode
+from rig.world.robot import Robot
 
 Get = Callable[[Robot], Any]
 Put = Callable[[Robot, Any], None]
