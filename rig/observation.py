@@ -24,6 +24,7 @@ STUCK_REPEATS = 10  # equal readings in a row, of a sensor whose noise exceeds a
 REST_SETTLING_S = 0.2  # kept away from either end of a rest
 MAX_REST_TRAVEL_RAD = 1e-3
 MIN_REST_SAMPLES = 20
+MAX_READING_RATIO = 4.0  # reading over turn rate, either way: no gyroscope is that far off, a wrong unit or range is
 
 
 @dataclass(frozen=True, slots=True)
@@ -85,7 +86,7 @@ def observe(run: RunData, sensor: str, settings: ObservationSection) -> SensorOb
 
     Raises Fault `incomplete_revolution`, `arm_states_lost`, `slider_below_100`, `speed_not_constant`,
     `other_joint_moved`, `lost_samples`, `saturation`, `stuck_sensor`, `stuck_axis`, `wrong_axis`, `wrong_sign`,
-    `no_motion`, `time_base_not_found`, `board_clock_restarted`.
+    `wrong_unit`, `no_motion`, `not_finite`, `time_base_not_found`, `board_clock_restarted`.
     """
     motion = ArmMotion(run.arm)
     stream = _stream(run.samples[sensor], run.sensors[sensor], motion)
@@ -134,7 +135,9 @@ def _observation(
     rate = motion.rate(stream.time_s[inside]) @ turn.axis_flange
     average = _average(stream, inside, turn.duration_s, rate, covered)
     expected = np.array(stream.sensor.mounting) @ turn.axis_flange
-    _check_direction(average.mean_rad_s - stream.clock.zero_rate_rad_s, expected, where, settings)
+    turned = average.mean_rad_s - stream.clock.zero_rate_rad_s
+    _check_direction(turned, expected, where, settings)
+    _check_unit(float(np.linalg.norm(turned)) / turn.speed_rad_s, where)
     nearest = int(np.argmax(np.abs(expected)))
     return Observation(
         sweep=sweep["index"],
@@ -254,3 +257,12 @@ def _check_direction(turned: Array, expected: Array, where: str, settings: Obser
         f"in {where} the gyroscope reads {what}",
         "Correct the sensor's mounting in the configuration, or how it is fixed to the flange",
     )
+
+
+def _check_unit(ratio: float, where: str) -> None:
+    if not 1 / MAX_READING_RATIO < ratio < MAX_READING_RATIO:
+        raise Fault(
+            "wrong_unit",
+            f"in {where} the gyroscope reads {ratio:.3g} times the turn rate",
+            "Check the sensor's range and sensitivity, and that readings are in rad/s",
+        )

@@ -63,7 +63,8 @@ class TimeBase:
 class ArmMotion:
     """The recorded arm as functions of controller time: `angles(t)` (n, 6) rad, `rate(t)` (n, 3) flange rate rad/s.
 
-    `rate(t, 1)` is the flange's angular acceleration. `states` is (m,) ARM_STATE_DTYPE. Raises Fault `no_motion`.
+    `rate(t, 1)` is the flange's angular acceleration. `states` is (m,) ARM_STATE_DTYPE. Raises Fault `no_motion`,
+    `not_finite`.
     """
 
     def __init__(self, states: NDArray[Any]) -> None:
@@ -75,6 +76,8 @@ class ArmMotion:
             raise Fault(
                 "no_motion", f"the recording holds {len(self.time_s)} arm states", "Record a run with the arm on"
             )
+        if not (np.isfinite(self.time_s).all() and np.isfinite(self.states["q_rad"]).all()):
+            raise _not_finite("an arm state")
         self.angles = CubicSpline(self.time_s, self.states["q_rad"])
         rates = flange_rate(self.states["q_rad"], self.angles(self.time_s, 1))
         if not np.linalg.norm(rates, axis=1).max() > MIN_RATE_RAD_S:
@@ -94,7 +97,7 @@ class ArmMotion:
 def estimate_time_base(board_time_s: Array, readings_rad_s: Array, motion: ArmMotion) -> TimeBase:
     """The board's clock against the controller's, from readings (n, 3) taken at board times (n,).
 
-    Raises Fault `board_clock_restarted`, `stuck_sensor`, `stuck_axis`, `time_base_not_found`.
+    Raises Fault `not_finite`, `board_clock_restarted`, `stuck_sensor`, `stuck_axis`, `time_base_not_found`.
     """
     _check_samples(board_time_s, readings_rad_s)
     reference = float(board_time_s[0] + board_time_s[-1]) / 2
@@ -128,6 +131,8 @@ def widening(residuals: Array) -> float:
 def _check_samples(board_time_s: Array, readings: Array) -> None:
     if len(board_time_s) < MIN_SAMPLES:
         raise _not_found(f"the recording holds {len(board_time_s)} samples")
+    if not np.isfinite(readings).all():
+        raise _not_finite("a reading")
     if np.any(np.diff(board_time_s) <= 0):
         raise Fault(
             "board_clock_restarted",
@@ -231,6 +236,10 @@ def _refined(clock: TimeBase, board_time_s: Array, readings: Array, motion: ArmM
 
 def _triple(values: Array) -> str:
     return ", ".join(f"{value:.4g}" for value in values)
+
+
+def _not_finite(what: str) -> Fault:
+    return Fault("not_finite", f"{what} in the recording is not a number", "Do not use this recording; make a new one")
 
 
 def _not_found(what: str) -> Fault:

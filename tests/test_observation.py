@@ -283,6 +283,20 @@ def still(run: RunData) -> RunData:
     return with_arm(run, change)
 
 
+def scaled(run: RunData, factor: float) -> RunData:
+    sensor = run.sensors["gyro"]
+    changed = replace(sensor, sensitivity_rad_s_per_count=sensor.sensitivity_rad_s_per_count * factor)
+    return replace(run, sensors={"gyro": changed})
+
+
+def nowhere(run: RunData) -> RunData:
+    def change(arm: NDArray[Any]) -> NDArray[Any]:
+        arm["q_rad"][5000, 4] = np.nan
+        return arm
+
+    return with_arm(run, change)
+
+
 def gap_in_states(run: RunData) -> RunData:
     return with_arm(run, lambda arm: np.delete(arm, slice(1000, 1070)))
 
@@ -309,6 +323,9 @@ def gap_in_states(run: RunData) -> RunData:
         (still, "no_motion"),
         (lambda run: replace(run, arm=np.zeros(0, ARM_STATE_DTYPE)), "no_motion"),
         (gap_in_states, "arm_states_lost"),
+        (lambda run: scaled(run, 180 / np.pi), "wrong_unit: .* 49.* times"),
+        (lambda run: scaled(run, np.nan), "not_finite: a reading"),
+        (nowhere, "not_finite: an arm state"),
     ],
 )
 def test_what_does_not_belong_into_a_calibration_is_refused_by_name(
