@@ -323,7 +323,7 @@ def gap_in_states(run: RunData) -> RunData:
         (still, "no_motion"),
         (lambda run: replace(run, arm=np.zeros(0, ARM_STATE_DTYPE)), "no_motion"),
         (gap_in_states, "arm_states_lost"),
-        (lambda run: scaled(run, 180 / np.pi), "wrong_unit: .* 49.* times"),
+        (lambda run: scaled(run, 180 / np.pi), "wrong_unit: .* 50.1 times"),
         (lambda run: scaled(run, np.nan), "not_finite: a reading"),
         (nowhere, "not_finite: an arm state"),
     ],
