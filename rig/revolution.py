@@ -12,7 +12,7 @@ from rig.errors import Fault
 from rig.timebase import MAX_STATE_STEP_S, ArmMotion, Array
 
 SMOOTHING_S = 0.05  # of the joint's rate before it is judged constant or not
-MAX_STATE_GAP_S = 0.5  # an arm cannot halt and start again unseen in less
+MAX_STATE_GAP_S = 1.0  # over less, a halt shows in the angle that is missing afterwards
 MAX_OTHER_TRAVEL_RAD = 0.01
 MIN_SPEED_FRACTION = 0.995
 

@@ -298,7 +298,7 @@ def nowhere(run: RunData) -> RunData:
 
 
 def gap_in_states(run: RunData) -> RunData:
-    return with_arm(run, lambda arm: np.delete(arm, slice(1000, 1070)))
+    return with_arm(run, lambda arm: np.delete(arm, slice(1000, 1130)))
 
 
 @pytest.mark.parametrize(
