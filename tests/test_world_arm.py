@@ -12,7 +12,7 @@ from typing import Any
 
 import pytest
 from conftest import World, WorldHandle, worlds
-from rtde_control import RTDEControlInterface
+from rtde_control import Path, PathEntry, RTDEControlInterface
 from rtde_io import RTDEIOInterface
 from rtde_receive import RTDEReceiveInterface
 from third_party.rtde import rtde as makers
@@ -138,6 +138,26 @@ def test_stop_speed_and_servo_commands(home: Arm) -> None:
     control.servoStop()
 
 
+def test_moves_in_tool_space_as_ur_rtdes_own_tests_make_them(home: Arm) -> None:
+    control, receive = home.control, home.receive
+    tilted = [0.0, -1.5, 1.5, -1.5, -1.2, 0.3]  # at home the flange stands half a turn off, where signs are free
+    assert control.moveJ(tilted, 2.0, 10.0)
+    wait_for(lambda: receive.getActualQ() == pytest.approx(tilted, abs=1e-4), "the start")
+    start = receive.getActualTCPPose()
+    assert control.moveL(start, 3, 3)  # already there
+    up = [*start[:2], start[2] + 0.1, *start[3:]]
+    assert control.moveL(up, 0.25, 0.5)
+    wait_for(lambda: receive.getActualTCPPose() == pytest.approx(up, abs=1e-4), "the pose")
+    assert control.getInverseKinematics(start) == pytest.approx(tilted, abs=1e-4)
+    assert control.moveJ_IK(start, 1.0, 4.0)
+    wait_for(lambda: receive.getActualQ() == pytest.approx(tilted, abs=1e-4), "the start")
+    path = Path()
+    path.addEntry(PathEntry(PathEntry.MoveJ, PathEntry.PositionTcpPose, [*up, 1.0, 4.0, 0.0]))
+    path.addEntry(PathEntry(PathEntry.MoveL, PathEntry.PositionTcpPose, [*start, 0.5, 4.0, 0.099]))
+    assert control.movePath(path, False)
+    wait_for(lambda: receive.getActualTCPPose() == pytest.approx(start, abs=1e-4), "the end of the path")
+
+
 def test_settings_and_questions(home: Arm) -> None:
     control, receive = home.control, home.receive
     assert control.setPayload(0.35, [0.0, 0.0, 0.025])
@@ -250,8 +270,8 @@ def test_a_program_sent_as_text_is_played(world: World) -> None:
 def test_a_statement_the_simulation_does_not_know_is_named(world: World) -> None:
     running = world()
     with socket.create_connection((running.host, 30002), 5.0) as script:
-        script.sendall(b"def odd():\n  movel(p[0,0,0,0,0,0], a=1, v=1)\nend\n")
-        wait_for(lambda: any("not simulated: movel" in text for text in running.state()["messages"]), "the message")
+        script.sendall(b"def odd():\n  movec(p[0,0,0,0,0,0], p[0,0,0,0,0,0])\nend\n")
+        wait_for(lambda: any("not simulated: movec" in text for text in running.state()["messages"]), "the message")
 
 
 class Dashboard:

@@ -213,18 +213,23 @@ class Wall:
 def test_virtual_time_never_runs_faster_than_asked_and_never_jumps() -> None:
     wall = Wall()
     clock = Clock(10.0, wall)
-    made = 0
-    wall.now_s += 0.0101  # ten milliseconds of wall time are 50 ticks at ×10
-    while clock.wait_s() <= 0.0:
-        clock.count()
-        made += 1
-    assert made == 50
+
+    def play(duration_s: float) -> int:
+        """Ticks made in so much wall time, looking every microsecond or so."""
+        start, end = clock.tick, wall.now_s + duration_s
+        while wall.now_s < end:
+            wait_s = clock.wait_s()
+            if wait_s <= 0.0:
+                clock.count()
+            wall.now_s += max(wait_s, 1e-6)
+        return clock.tick - start
+
+    assert play(0.1) == pytest.approx(500, abs=2)
+    wall.now_s += 0.01  # a little late: it catches up, but not in one burst
+    assert 30 <= play(0.002) <= 32
+    assert play(0.1) == pytest.approx(500 + 50 - 20, abs=4)
     wall.now_s += 30.0  # the machine was busy: virtual time has waited
-    made = 0
-    while clock.wait_s() <= 0.0:
-        clock.count()
-        made += 1
-    assert made <= 2
+    assert play(0.1) <= 502
 
 
 def test_a_held_clock_stands_until_advanced() -> None:

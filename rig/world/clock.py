@@ -5,7 +5,7 @@ from collections.abc import Callable
 TICKS_PER_SECOND = 500
 TICK_S = 1.0 / TICKS_PER_SECOND
 PATIENCE_S = 0.02  # wall time the world may be behind and still catch up
-HURRY = 1.25  # … so many times as fast as it should go: a burst of packets would overrun a client that polls
+HURRY = 3.0  # … so many times as fast as it should go: a burst of packets would overrun a client that polls
 
 
 class Clock:
@@ -61,6 +61,6 @@ class Clock:
         return max(0.0, due_s - now_s, self._counted_s + period_s / HURRY - now_s)
 
     def count(self) -> None:
-        """One tick has been made."""
+        """A tick begins now: what it costs to make must not come on top of the wait for the next."""
         self.tick += 1
         self._counted_s = self._wall()

@@ -7,17 +7,17 @@ done, the client writes 0, the program answers 1 (ready). Real-time commands are
 from collections.abc import Callable, Iterator, Sequence
 
 from rig.world import kinematics
+from rig.world.cartesian import joints_for
 from rig.world.clock import TICK_S
 from rig.world.messages import ProgramError
-from rig.world.program import Steps, Threads
-from rig.world.robot import JOINT_LIMIT_RAD, Robot
+from rig.world.program import Move, Steps, Threads
+from rig.world.robot import JOINT_LIMIT_RAD, TCP_OFFSET, Robot
 from rig.world.trajectory import Joints
 
 REALTIME = frozenset({6, 9, 10, 11, 24, 25, 26, 27, 38, 58, 66, 67, 68, 69, 70, 71})
 STOP_SCRIPT = 255
 READY, DONE = 1, 2
 
-PathStep = tuple[Joints, float, float]  # target, speed, acceleration
 Command = Callable[[], Steps]
 
 
@@ -26,7 +26,7 @@ class ControlProgram:
 
     name = "rtde_control"
 
-    def __init__(self, robot: Robot, register_offset: int, path: Sequence[PathStep]) -> None:
+    def __init__(self, robot: Robot, register_offset: int, path: Sequence[Move]) -> None:
         self._robot = robot
         self._offset = register_offset
         self._path = tuple(path)
@@ -35,12 +35,30 @@ class ControlProgram:
         self._speed_target: tuple[Joints, float] = ((0.0,) * 6, 0.5)
         self._operation = self._writes = 0
         self._commands: dict[int, Command] = {
-            1: self._movej, 9: self._speedj, 11: self._servoj, 15: self._speed_stop, 16: self._servo_stop,
-            17: self._set_payload, 26: self._step_time, 29: self._set_tcp, 31: self._protective_stop,
-            33: self._stop, 34: self._stop, 35: self._set_watchdog, 37: self._within_limits, 38: self._torques,
-            40: self._tcp_offset, 43: self._forward_kinematics, 45: self._move_path, 47: self._is_steady,
-            58: self._flange_pose,
-        }  # fmt: skip
+            1: self._movej,
+            2: self._movej_ik,
+            3: self._movel,
+            4: self._movel_fk,
+            9: self._speedj,
+            11: self._servoj,
+            15: self._speed_stop,
+            16: self._servo_stop,
+            17: self._set_payload,
+            26: self._step_time,
+            29: self._set_tcp,
+            31: self._protective_stop,
+            33: self._stop,
+            34: self._stop,
+            35: self._set_watchdog,
+            37: self._within_limits,
+            38: self._torques,
+            40: self._tcp_offset,
+            43: self._forward_kinematics,
+            45: self._move_path,
+            46: self._inverse_kinematics,
+            47: self._is_steady,
+            58: self._forward_kinematics,  # of the flange, which is the tool centre point here
+        }
         self._main = self._loop()
 
     def step(self) -> bool:
@@ -99,25 +117,37 @@ class ControlProgram:
         self._robot.outputs.ints[self._offset + 2] = word
 
     # -- moves ---------------------------------------------------------------------------------------------------
-    def _movej(self) -> Steps:
+    def _asked(self, straight: bool, is_pose: bool) -> Steps:
         *target, speed, acceleration = self._doubles(0, 8)
-        return self._move([(tuple(target), speed, acceleration)])
+        return self._move([Move(tuple(target), speed, acceleration, straight, is_pose)])
+
+    def _movej(self) -> Steps:
+        return self._asked(straight=False, is_pose=False)
+
+    def _movej_ik(self) -> Steps:
+        return self._asked(straight=False, is_pose=True)
+
+    def _movel(self) -> Steps:
+        return self._asked(straight=True, is_pose=True)
+
+    def _movel_fk(self) -> Steps:
+        return self._asked(straight=True, is_pose=False)
 
     def _move_path(self) -> Steps:
         return self._move(self._path)
 
-    def _move(self, path: Sequence[PathStep]) -> Steps:
+    def _move(self, path: Sequence[Move]) -> Steps:
         self._kill_async("move")
         if self._int(1) == 1:
             self._threads.run("move", self._async_move(path))
             return
         for step in path:
-            yield from self._threads.movej("main", *step)
+            yield from self._threads.move("main", step)
 
-    def _async_move(self, path: Sequence[PathStep]) -> Steps:
+    def _async_move(self, path: Sequence[Move]) -> Steps:
         for index, step in enumerate(path):
             self._signal_async(index)
-            yield from self._threads.movej("move", *step)
+            yield from self._threads.move("move", step)
         self._signal_async(-1)
 
     def _kill_async(self, name: str) -> None:
@@ -187,11 +217,11 @@ class ControlProgram:
         return _nothing()
 
     def _set_tcp(self) -> Steps:
-        self._robot.tcp_offset = self._doubles(0, 6)
+        self._robot.set_tcp(self._doubles(0, 6))
         return _nothing()
 
     def _tcp_offset(self) -> Steps:
-        self._results(self._robot.tcp_offset)
+        self._results(TCP_OFFSET)
         return _nothing()
 
     def _step_time(self) -> Steps:
@@ -214,7 +244,9 @@ class ControlProgram:
         self._results(kinematics.flange_pose(self._robot.motion.actual_q_rad))
         return _nothing()
 
-    _flange_pose = _forward_kinematics
+    def _inverse_kinematics(self) -> Steps:
+        self._results(joints_for(self._doubles(0, 6), self._robot.motion.q_rad))
+        return _nothing()
 
     def _is_steady(self) -> Steps:
         self._result(int(self._robot.steady))

@@ -7,6 +7,7 @@ from collections.abc import Sequence
 from math import acos, cos, pi, sin, sqrt
 
 Vector = tuple[float, float, float]
+Rotation = tuple[Vector, Vector, Vector]
 
 # UR10e, maker's article 45257: link length a, offset d (m), twist in quarter turns.
 LINKS = (
@@ -33,8 +34,8 @@ def flange_rate(q_rad: Sequence[float], qd_rad_s: Sequence[float]) -> Vector:
     return x, y, z
 
 
-def flange_pose(q_rad: Sequence[float]) -> tuple[float, ...]:
-    """Position (m) and rotation vector (rad) of the flange in the base frame, the six numbers UR calls a pose."""
+def flange_frame(q_rad: Sequence[float]) -> tuple[Rotation, Vector]:
+    """Rotation (rows) and position (m) of the flange in the base frame."""
     rotation = ((1.0, 0.0, 0.0), (0.0, 1.0, 0.0), (0.0, 0.0, 1.0))
     position = (0.0, 0.0, 0.0)
     for (a, d, twist), angle in zip(LINKS, q_rad, strict=True):
@@ -48,10 +49,17 @@ def flange_pose(q_rad: Sequence[float]) -> tuple[float, ...]:
         rotation = tuple(  # type: ignore[assignment]
             tuple(sum(row[k] * link[k][j] for k in range(3)) for j in range(3)) for row in rotation
         )
-    return (*position, *_rotation_vector(rotation))
+    return rotation, position
 
 
-def _rotation_vector(r: tuple[Vector, Vector, Vector]) -> Vector:
+def flange_pose(q_rad: Sequence[float]) -> tuple[float, ...]:
+    """Position (m) and rotation vector (rad) of the flange in the base frame, the six numbers UR calls a pose."""
+    rotation, position = flange_frame(q_rad)
+    return (*position, *rotation_vector(rotation))
+
+
+def rotation_vector(r: Sequence[Sequence[float]]) -> Vector:
+    """The rotation vector (rad) of a rotation matrix."""
     cosine = max(-1.0, min(1.0, (r[0][0] + r[1][1] + r[2][2] - 1.0) / 2.0))
     angle = acos(cosine)
     x, y, z = r[2][1] - r[1][2], r[0][2] - r[2][0], r[1][0] - r[0][1]
@@ -66,7 +74,7 @@ def _rotation_vector(r: tuple[Vector, Vector, Vector]) -> Vector:
     return scale * x, scale * y, scale * z
 
 
-def rotation_from_vector(vector: Sequence[float]) -> tuple[Vector, Vector, Vector]:
+def rotation_from_vector(vector: Sequence[float]) -> Rotation:
     """Rows of the rotation matrix of a rotation vector (rad), Rodrigues' formula."""
     angle = sqrt(sum(component * component for component in vector))
     if angle == 0.0:

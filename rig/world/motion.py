@@ -125,9 +125,13 @@ class Motion:
     # -- commands ------------------------------------------------------------------------------------------------
     def move(self, target_rad: Joints, speed_rad_s: float, acceleration_rad_s2: float) -> None:
         """A moveJ from standstill."""
-        start = self.q_rad  # where the joint stands: after a stop that need not be where the program wanted it
-        self._offset, self._gain = self._map(start, target_rad)
-        self._play(line(start, target_rad, speed_rad_s, acceleration_rad_s2, JOINT_SPEED_LIMIT_RAD_S), scaled=True)
+        # From where the joints stand: after a stop that need not be where the program wanted them.
+        self.follow(line(self.q_rad, target_rad, speed_rad_s, acceleration_rad_s2, JOINT_SPEED_LIMIT_RAD_S))
+
+    def follow(self, trajectory: Trajectory) -> None:
+        """Any trajectory from standstill that begins where the joints are."""
+        self._offset, self._gain = self._map(self.q_rad, trajectory.end_rad)
+        self._play(trajectory, scaled=True)
 
     def speed(self, qd_rad_s: Joints, acceleration_rad_s2: float) -> None:
         """A speedJ, from whatever the joints do now: to this velocity, and on."""

@@ -13,7 +13,7 @@ from rig.world.kinematics import LINKS, flange_pose
 from rig.world.messages import Message, MessageKind
 from rig.world.modes import RobotMode, RuntimeState, SafetyMode
 from rig.world.motion import JOINT_SPEED_LIMIT_RAD_S
-from rig.world.robot import Robot
+from rig.world.robot import TCP_OFFSET, Robot
 from rig.world.script import ScriptSession
 from rig.world.variables import joint_modes
 
@@ -117,7 +117,7 @@ def _masterboard(robot: Robot) -> bytes:
 
 
 def _cartesian(robot: Robot) -> bytes:
-    return struct.pack(">12d", *flange_pose(robot.motion.actual_q_rad), *robot.tcp_offset)
+    return struct.pack(">12d", *flange_pose(robot.motion.actual_q_rad), *TCP_OFFSET)
 
 
 LENGTHS, OFFSETS = [a for a, _, _ in LINKS], [d for _, d, _ in LINKS]

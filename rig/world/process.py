@@ -112,13 +112,13 @@ class World:
                 self._tick()
 
     def _tick(self) -> None:
+        self.clock.count()
         try:
             self.laboratory.step()
         except BoardError as error:
             # The firmware broke a rule of the chip: the board is dead, and its cable with it.
             print(error, file=sys.stderr, flush=True)
             self.unplug_board()
-        self.clock.count()
         self.line.tick()
         if self._pty is not None:
             self._pty.tick()

@@ -1,14 +1,29 @@
 """Programs as cooperative threads: each a generator that gives way once a tick."""
 
 from collections.abc import Iterator
+from dataclasses import dataclass
 
+from rig.world.cartesian import joints_for, straight_line
+from rig.world.kinematics import flange_pose
 from rig.world.messages import ProgramError
+from rig.world.motion import JOINT_SPEED_LIMIT_RAD_S
 from rig.world.robot import JOINT_LIMIT_RAD, Robot
-from rig.world.trajectory import Joints
+from rig.world.trajectory import line
 
 Steps = Iterator[None]
 
 HAND_OVER_RAD_S2 = 4.0  # a move that follows a killed one lets the joints come to rest first
+
+
+@dataclass(frozen=True, slots=True)
+class Move:
+    """A movej or (`straight`) movel to joint angles or (`is_pose`) a pose; rad/s and rad/s², straight: m/s and m/s²."""
+
+    target: tuple[float, ...]
+    speed: float
+    acceleration: float
+    straight: bool = False
+    is_pose: bool = False
 
 
 class Threads:
@@ -45,17 +60,24 @@ class Threads:
         if self._mover == name:
             self._mover = None
 
-    def movej(self, name: str, target_rad: Joints, speed_rad_s: float, acceleration_rad_s2: float) -> Steps:
-        """moveJ on behalf of the thread `name`: ends when the joints stand at the target."""
-        if any(abs(q) > JOINT_LIMIT_RAD for q in target_rad):
-            raise ProgramError("joint position out of limits: a target lies beyond ±360°")
-        if not (speed_rad_s > 0.0 and acceleration_rad_s2 > 0.0):
-            raise ProgramError("movej needs a speed and an acceleration above zero")
+    def move(self, name: str, move: Move) -> Steps:
+        """A move on behalf of the thread `name`: ends when the joints stand at the target."""
+        if not (move.speed > 0.0 and move.acceleration > 0.0):
+            raise ProgramError("a move needs a speed and an acceleration above zero")
         self.take(name)
         yield from self.stopj(name, HAND_OVER_RAD_S2)
         self.take(name)
-        self.robot.motion.move(target_rad, speed_rad_s, acceleration_rad_s2)
-        while not self.robot.motion.standing:
+        motion = self.robot.motion
+        if move.straight:
+            pose = move.target if move.is_pose else flange_pose(move.target)
+            trajectory = straight_line(motion.q_rad, pose, move.speed, move.acceleration)
+        else:
+            target = joints_for(move.target, motion.q_rad) if move.is_pose else move.target
+            trajectory = line(motion.q_rad, target, move.speed, move.acceleration, JOINT_SPEED_LIMIT_RAD_S)
+        if any(abs(q) > JOINT_LIMIT_RAD for q in trajectory.end_rad):
+            raise ProgramError("joint position out of limits: a target lies beyond ±360°")
+        motion.follow(trajectory)
+        while not motion.standing:
             yield
         self.let_go(name)
 

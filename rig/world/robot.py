@@ -14,6 +14,7 @@ PROGRAM_STOP_RAD_S2 = 4.0
 PROTECTIVE_STOP_RAD_S2 = 15.0
 BRAKE_RAD_S2 = 40.0
 UNLOCK_AFTER_S = 5.0
+TCP_OFFSET = (0.0,) * 6  # the tool centre point is the flange
 START_DELAY_S = 0.02  # between the last byte of a program and its first line
 POWER_STEP_S = 0.5  # powering on, releasing the brakes
 
@@ -63,7 +64,6 @@ class Robot:
         self.analog_outputs = [0.0, 0.0]
         self.payload_kg = 0.0
         self.payload_centre_m: tuple[float, ...] = (0.0, 0.0, 0.0)
-        self.tcp_offset: tuple[float, ...] = (0.0,) * 6
         self.loaded_program = ""
         self.messages = Messages()
         self.watchdog_s = 0.0  # a program stops when no input came for so long; 0: no watchdog
@@ -223,6 +223,10 @@ class Robot:
         if not 0.0 <= mass_kg <= 12.5:
             raise ProgramError(f"payload {mass_kg} kg is outside 0 to 12.5 kg")
         self.payload_kg, self.payload_centre_m = mass_kg, tuple(centre_m)
+
+    def set_tcp(self, offset: Sequence[float]) -> None:
+        if tuple(offset) != TCP_OFFSET:
+            raise ProgramError("not simulated: a tool centre point other than the flange")
 
     def input_received(self) -> None:
         """An RTDE client wrote an input: feeds the watchdog."""

@@ -8,10 +8,11 @@ statements listed in `urscript`.
 import re
 from collections.abc import Callable, Iterator
 
-from rig.world.control_program import ControlProgram, PathStep
+from rig.world.control_program import ControlProgram
 from rig.world.messages import ProgramError
+from rig.world.program import Move
 from rig.world.robot import Program, Robot
-from rig.world.urscript import ScriptProgram, arguments, joints
+from rig.world.urscript import Arguments, ScriptProgram, move
 
 PRIMARY_PORT, SECONDARY_PORT, REALTIME_PORT = 30001, 30002, 30003
 BLOCK = re.compile(r"(def|sec|thread|if|while|for)\b.*:$")
@@ -57,18 +58,18 @@ def _register_offset(text: str) -> int:
     return int(match.group(1)) if match else 0
 
 
-def _path(lines: list[str]) -> Iterator[PathStep]:
+def _path(lines: list[str]) -> Iterator[Move]:
     """The moves that ur_rtde injected into `exec_move_path`."""
     start = next((i for i, line in enumerate(lines) if "# inject move path" in line), len(lines))
     for line in lines[start + 1 :]:
         statement = line.strip()
+        name = statement.split("(", 1)[0]
         if statement == "end":
             return
-        if statement.startswith("movej("):
-            values = arguments(statement)
-            yield joints(values["0"]), float(values.get("v", 1.05)), float(values.get("a", 1.4))
-        elif statement.startswith("move"):
-            raise ProgramError(f"not simulated: {statement.split('(')[0]} in a path")
+        if name in ("movej", "movel"):
+            yield move(name, Arguments(statement))
+        elif name != "signal_async_progress":
+            raise ProgramError(f"not simulated: {statement} in a path")
 
 
 ORDERS: dict[str, Callable[[Robot], object]] = {

@@ -8,7 +8,7 @@ from typing import Any
 
 from rig.world.clock import TICKS_PER_SECOND
 from rig.world.messages import ProgramError
-from rig.world.program import Steps, Threads
+from rig.world.program import Move, Steps, Threads
 from rig.world.robot import Robot
 from rig.world.trajectory import Joints
 
@@ -21,7 +21,7 @@ def arguments(statement: str) -> dict[str, Any]:
     match = CALL.match(statement)
     if match is None:
         raise ProgramError(f"not simulated: {statement}")
-    source = re.sub(r"\bp\[", "[", match.group(2))
+    source = re.sub(r"\bp\[([^\]]*)\]", r"(\1)", match.group(2))  # a pose becomes a tuple, joints stay a list
     try:
         call = ast.parse(f"f({source})", mode="eval").body
         assert isinstance(call, ast.Call)
@@ -120,10 +120,23 @@ class Arguments:
         return found
 
 
+def move(name: str, value: Arguments) -> Move:
+    """The move a `movej` or `movel` asks for; a blend radius is not used: it stops at every target."""
+    target = value("0", "pose" if name == "movel" else "q")
+    if not isinstance(target, list | tuple) or len(target) != 6:
+        raise ProgramError(f"{name}: six joint angles or a pose expected, got {target}")
+    speed, acceleration = (0.25, 1.2) if name == "movel" else (1.05, 1.4)
+    numbers = tuple(float(number) for number in target)
+    speed, acceleration = float(value("2", "v", speed)), float(value("1", "a", acceleration))
+    return Move(numbers, speed, acceleration, straight=name == "movel", is_pose=isinstance(target, tuple))
+
+
 def _movej(robot: Robot, threads: Threads, value: Arguments) -> Steps:
-    target = joints(value("0", "q"))
-    speed, acceleration = float(value("2", "v", 1.05)), float(value("1", "a", 1.4))
-    return threads.movej("main", target, speed, acceleration)
+    return threads.move("main", move("movej", value))
+
+
+def _movel(robot: Robot, threads: Threads, value: Arguments) -> Steps:
+    return threads.move("main", move("movel", value))
 
 
 def _speedj(robot: Robot, threads: Threads, value: Arguments) -> Steps:
@@ -163,7 +176,7 @@ def _payload(robot: Robot, value: Arguments) -> None:
 
 
 def _tcp(robot: Robot, value: Arguments) -> None:
-    robot.tcp_offset = tuple(float(x) for x in value("0", "pose"))
+    robot.set_tcp(value("0", "pose"))
 
 
 def _digital_out(first: int) -> Callable[[Robot, Arguments], None]:
@@ -191,7 +204,7 @@ def _say(robot: Robot, value: Arguments) -> None:
 
 
 STATEMENTS: dict[str, Callable[[Robot, Threads, Arguments], Steps]] = {
-    "movej": _movej, "speedj": _speedj, "stopj": _stopj, "sleep": _sleep, "sync": _sync,
+    "movej": _movej, "movel": _movel, "speedj": _speedj, "stopj": _stopj, "sleep": _sleep, "sync": _sync,
     "textmsg": _at_once(_say), "popup": _at_once(_say),
     "set_payload": _at_once(_payload), "set_target_payload": _at_once(_payload), "set_tcp": _at_once(_tcp),
     "set_gravity": _at_once(lambda robot, value: None),

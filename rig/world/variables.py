@@ -5,7 +5,7 @@ from typing import Any
 
 from rig.world import kinematics
 from rig.world.modes import RobotMode
-from rig.world.robot import Robot
+from rig.world.robot import TCP_OFFSET, Robot
 
 Get = Callable[[Robot], Any]
 Put = Callable[[Robot, Any], None]
@@ -66,7 +66,7 @@ OUTPUTS: dict[str, tuple[str, Get]] = {
     "actual_TCP_speed": ("VECTOR6D", _tcp_speed),
     "target_TCP_pose": ("VECTOR6D", _target_pose),
     "target_TCP_speed": ("VECTOR6D", _tcp_speed),
-    "tcp_offset": ("VECTOR6D", lambda r: r.tcp_offset),
+    "tcp_offset": ("VECTOR6D", _constant(TCP_OFFSET)),
     "robot_mode": ("INT32", lambda r: r.robot_mode),
     "joint_mode": ("VECTOR6INT32", joint_modes),
     "safety_mode": ("INT32", lambda r: r.safety_mode),
