@@ -67,7 +67,9 @@ def _parser() -> argparse.ArgumentParser:
     _add_outcome(resume)
     solve = add("solve", _solve, "recompute the calibration from a recording")
     solve.add_argument("run", type=Path, metavar="RUN", help="a run folder or its run.h5")
-    solve.add_argument("--estimator", default="newton", metavar="NAME", help="newton, closed_form or algorithm_1")
+    solve.add_argument(
+        "--estimator", default="newton", metavar="NAME", help="newton (default) or algorithm_1, as published"
+    )
     solve.add_argument("--json", action="store_true", help="for machines")
     world = add("world", _world, "only the simulated laboratory, in the foreground, for any client")
     _add_config(world)

@@ -14,7 +14,7 @@ from rig.launch import simulated_laboratory
 from rig.opening import open_rig
 from rig.procedure import Rig
 from rig.progress import View, view
-from rig.recording import read_run
+from rig.recording import make_plain, read_run
 from rig.report.outcome import print_outcome, solved_document, write_outcome
 
 Script = Callable[[Rig], None]
@@ -43,6 +43,8 @@ def resume(folder: Path, *, assume_yes: bool = False, as_json: bool = False) -> 
     if (folder / "result.json").exists():
         raise Refused("already_finished", f"{folder} has its result.json", "Start a new run with `rig run`")
     loaded = load(folder / "config.yaml")
+    for file in _recordings(folder):
+        make_plain(file)  # if the run was killed, only readers that know about it could open its file
     return _carry_out(folder, loaded, _named_script(loaded), assume_yes=assume_yes, as_json=as_json)
 
 

@@ -30,7 +30,11 @@ def solved_document(runs: Sequence[RunData], estimator: str = "newton") -> dict[
         "schema": SCHEMA,
         "verdict": verdict(checks),
         "checks": [check.document() for check in checks],
-        "provenance": {**runs[0].provenance, "solved_utc": datetime.now(UTC).isoformat(timespec="seconds")},
+        "provenance": {
+            **runs[0].provenance,
+            "resumed_utc": [run.provenance["started_utc"] for run in runs[1:]],
+            "solved_utc": datetime.now(UTC).isoformat(timespec="seconds"),
+        },
         "sensors": {name: sensor_document(result) for name, result in results.items()},
     }
 
