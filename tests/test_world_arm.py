@@ -3,7 +3,6 @@
 import math
 import socket
 import struct
-import time
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from dataclasses import dataclass
@@ -11,6 +10,7 @@ from itertools import pairwise
 from typing import Any
 
 import pytest
+from arm_client import client, wait_for
 from conftest import World, WorldHandle, worlds
 from rtde_control import Path, PathEntry, RTDEControlInterface
 from rtde_io import RTDEIOInterface
@@ -19,15 +19,6 @@ from third_party.rtde import rtde as makers
 
 HOME = [0.0, -math.pi / 2, math.pi / 2, -math.pi / 2, -math.pi / 2, 0.0]
 ENCODER_STEP_RAD = 6.0e-6
-
-
-def wait_for(condition: Callable[[], Any], what: str, limit_s: float = 10.0) -> Any:
-    """Wait until `condition` is true; the wait is wall time, as a client's would be."""
-    end = time.monotonic() + limit_s
-    while not (answer := condition()):
-        assert time.monotonic() < end, f"waited {limit_s} s for: {what}"
-        time.sleep(0.005)
-    return answer
 
 
 @contextmanager
@@ -185,9 +176,9 @@ def test_time_stamps_come_at_the_asked_rate(world: World) -> None:
 
 
 def test_the_makers_client_reads_every_variable_and_writes_registers(world: World) -> None:
-    client = makers.RTDE(world().host, 30004)
-    client.connect()
-    assert client.get_controller_version() == (5, 14, 0, 0)
+    connection = makers.RTDE(world().host, 30004)
+    connection.connect()
+    assert connection.get_controller_version() == (5, 14, 0, 0)
     names = [
         "timestamp",
         "actual_q",
@@ -197,21 +188,21 @@ def test_the_makers_client_reads_every_variable_and_writes_registers(world: Worl
         "output_bit_register_64",
     ]
     names += ["input_int_register_24", "input_double_register_24", "tool_output_mode", "input_bit_registers0_to_31"]
-    assert client.send_output_setup(names, frequency=125)
-    inputs = client.send_input_setup(
+    assert connection.send_output_setup(names, frequency=125)
+    inputs = connection.send_input_setup(
         ["input_int_register_24", "input_double_register_24", "input_bit_registers0_to_31"]
     )
-    assert client.send_start()
+    assert connection.send_start()
     inputs.input_int_register_24, inputs.input_double_register_24 = -5, 0.25
     inputs.input_bit_registers0_to_31 = 0b1010
-    client.send(inputs)
-    state = wait_for(lambda: (s := client.receive()) and s.input_int_register_24 == -5 and s, "the written register")
+    connection.send(inputs)
+    state = wait_for(lambda: (s := connection.receive()) and s.input_int_register_24 == -5 and s, "the register")
     assert state.input_double_register_24 == 0.25 and state.input_bit_registers0_to_31 == 0b1010
     assert state.actual_q == pytest.approx(HOME, abs=ENCODER_STEP_RAD) and len(state.joint_mode) == 6
-    assert client.send_pause()
+    assert connection.send_pause()
     with pytest.raises(ValueError, match="NOT_FOUND"):
-        client.send_output_setup(["no_such_variable"])
-    client.disconnect()
+        connection.send_output_setup(["no_such_variable"])
+    connection.disconnect()
 
 
 def test_version_1_of_the_protocol(world: World) -> None:
@@ -325,11 +316,31 @@ def test_the_dashboard_answers_in_the_makers_words(world: World) -> None:
         assert ask("quit") == "Disconnected"
 
 
-def test_the_controller_takes_other_polyscope_versions(world: World) -> None:
-    for polyscope in ("5.6.0.0", "5.23.1.0"):
-        running = world({"world": {"arm": {"polyscope": polyscope}, "control_port": 7322}})
-        with control_of(running) as control:
-            assert control.moveJ(target(0.1), 1.0, 2.0)
+@pytest.mark.parametrize("polyscope", ["5.6.0.0", "5.23.1.0"])
+def test_the_controller_takes_other_polyscope_versions(world: World, polyscope: str) -> None:
+    with client(world({"world": {"arm": {"polyscope": polyscope}}}), "say(control.moveJ([*home[:5], 0.1]))") as arm:
+        arm.says("True")
+
+
+def test_the_upper_range_of_registers(world: World) -> None:
+    script = """
+        control = RTDEControlInterface(host, -1.0, RTDEControlInterface.FLAG_UPLOAD_SCRIPT
+                                       | RTDEControlInterface.FLAG_UPPER_RANGE_REGISTERS)
+        say(control.moveJ([*home[:5], 0.1]))
+    """
+    with client(world(), script, connect=False) as arm:
+        arm.says("True")
+
+
+def test_connecting_stops_a_running_program_and_takes_its_place(world: World) -> None:
+    running = world()
+    with Dashboard(running) as ask:
+        assert ask("load wait_program.urp") and ask("play") == "Starting program"
+        wait_for(lambda: ask("programState") == "PLAYING wait_program.urp", "the program to play")
+        with client(running, "say(control.moveJ([*home[:5], 0.1])); say(control.reuploadScript())") as arm:
+            arm.says("True")
+            assert ask("programState") == "PLAYING rtde_control"
+            arm.says("True")
 
 
 class Primary:

@@ -5,6 +5,7 @@ import os
 import selectors
 import signal
 import sys
+import threading
 import time
 from collections.abc import Callable
 from functools import partial
@@ -145,8 +146,8 @@ def serve(loaded: Loaded, until_eof: bool) -> None:
         signal.signal(signal.SIGTERM, lambda *_: world.end())
         if until_eof:
             signal.signal(signal.SIGINT, signal.SIG_IGN)
-            descriptor = sys.stdin.fileno()
-            world.network.selector.register(descriptor, selectors.EVENT_READ, partial(_read_input, world, descriptor))
+            # A thread, because select() takes no pipe on Windows; it only waits.
+            threading.Thread(target=_await_end_of_input, args=(world,), daemon=True).start()
         print(world.describe(), flush=True)
         world.run()
     except KeyboardInterrupt:
@@ -155,6 +156,7 @@ def serve(loaded: Loaded, until_eof: bool) -> None:
         world.close()
 
 
-def _read_input(world: World, descriptor: int, events: int) -> None:
-    if not os.read(descriptor, 4096):
-        world.end()
+def _await_end_of_input(world: World) -> None:
+    while os.read(sys.stdin.fileno(), 4096):
+        pass
+    world.end()
