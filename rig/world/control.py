@@ -1,6 +1,14 @@
 """The control channel: JSON lines by which tests make the world misbehave. The rig never uses it.
 
-A request is `{"do": NAME, …}`; the reply is one line, `{"ok": true, …}` or `{"ok": false, "error": …}`.
+A request is `{"do": NAME, …}`; the reply is one line, `{"ok": true, "time_s": …, …}` or `{"ok": false, "error": …}`.
+
+    state                                       everything about arm, board and clock
+    hold · run · advance duration_s             the virtual clock; `advance` is answered when the time has passed
+    protective_stop · emergency_stop · release · power_off · power_on · brake_release
+    pause · play · stop_program · speed_slider fraction · remote_control on
+    register_in_use name · register_free name   an RTDE input that a fieldbus claims
+    close_arm listen · silence_arm duration_s   the controller's sockets (the silence is in wall time)
+    unplug_board · plug_in_board · reset_board · silence_board on · host_baud baud (null: the board's own)
 """
 
 import json
@@ -71,7 +79,7 @@ class ControlSession:
             return _line({"ok": False, "error": f"unknown request {name!r}", "known": sorted(self._orders)})
         try:
             reply = order(**request)
-        except (TypeError, ValueError) as error:
+        except (TypeError, ValueError, ArithmeticError) as error:
             return _line({"ok": False, "error": f"{name}: {error}"})
         if self._reply_at is not None:
             return b""

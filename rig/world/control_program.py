@@ -10,7 +10,7 @@ from rig.world import kinematics
 from rig.world.cartesian import joints_for
 from rig.world.clock import TICK_S
 from rig.world.messages import ProgramError
-from rig.world.program import Move, Steps, Threads
+from rig.world.program import Move, Steps, Threads, finite
 from rig.world.robot import JOINT_LIMIT_RAD, TCP_OFFSET, Robot
 from rig.world.trajectory import Joints
 
@@ -171,6 +171,7 @@ class ControlProgram:
 
     def _speedj(self) -> Steps:
         *velocity, acceleration, _ = self._doubles(0, 8)
+        finite([*velocity, acceleration])
         self._speed_target = (tuple(velocity), acceleration)
         if not self._threads.running("speed"):
             self._threads.run("speed", self._speed_thread())
@@ -191,6 +192,7 @@ class ControlProgram:
 
     def _servoj(self) -> Steps:
         values = self._doubles(0, 11)
+        finite(values)
         self._servo_target = (values[:6], max(values[9], 0.03))
         if not self._threads.running("servo"):
             self._threads.run("servo", self._servo_thread())

@@ -51,14 +51,13 @@ class World:
         self.network = Network()
         self._silent_until_s = 0.0
         self._ended = False
-        host, board = loaded.config.arm.host, urlsplit(loaded.config.board.port)
+        host, board_url = loaded.config.arm.host, loaded.config.board.port
         try:
             self.arm_listeners = [
                 self.network.listen(host, port, partial(new_session, self.laboratory.robot))
                 for port, new_session in ARM_PORTS.items()
             ]
-            board_host, board_port = board.hostname or host, board.port or 0
-            self.board_listener = self.network.listen(board_host, board_port, self._new_serial_session, limit=1)
+            self.board_listener = self.network.listen(*_board_address(board_url), self._new_serial_session, limit=1)
             control_port = loaded.world.control_port
             self.network.listen(host, control_port, lambda: ControlSession(self))
         except Refused:
@@ -68,7 +67,7 @@ class World:
         self._description = {
             "ready": True,
             "arm": host,
-            "board": loaded.config.board.port,
+            "board": board_url,
             "pty": self._pty.path if self._pty else None,
             "control": f"{host}:{control_port}",
         }
@@ -129,6 +128,21 @@ class World:
         if self._pty is not None:
             self._pty.close()
         self.network.close()
+
+
+def _board_address(url: str) -> tuple[str, int]:
+    """Host and port of `socket://host:port`. Raises `Refused` for any other port."""
+    parts = urlsplit(url)
+    try:
+        if parts.scheme == "socket" and parts.hostname and parts.port:
+            return parts.hostname, parts.port
+    except ValueError:
+        pass  # a port that is no number
+    raise Refused(
+        "board_port",
+        f"board.port {url!r} is no address to listen on",
+        "Write socket://host:port",
+    )
 
 
 def _open_pty(line: SerialLine, selector: selectors.BaseSelector) -> "PtyPort":

@@ -1,7 +1,8 @@
 """Programs as cooperative threads: each a generator that gives way once a tick."""
 
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
+from math import isfinite
 
 from rig.world.cartesian import joints_for, straight_line
 from rig.world.kinematics import flange_pose
@@ -24,6 +25,12 @@ class Move:
     acceleration: float
     straight: bool = False
     is_pose: bool = False
+
+
+def finite(values: Sequence[float]) -> None:
+    """Raises `ProgramError` for a number no joint can follow."""
+    if not all(isfinite(value) for value in values):
+        raise ProgramError(f"not a number among {list(values)}")
 
 
 class Threads:
@@ -64,6 +71,7 @@ class Threads:
         """A move on behalf of the thread `name`: ends when the joints stand at the target."""
         if not (move.speed > 0.0 and move.acceleration > 0.0):
             raise ProgramError("a move needs a speed and an acceleration above zero")
+        finite(move.target)
         self.take(name)
         yield from self.stopj(name, HAND_OVER_RAD_S2)
         self.take(name)

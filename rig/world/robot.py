@@ -2,6 +2,7 @@
 
 from collections.abc import Sequence
 from dataclasses import dataclass, field
+from math import isfinite
 from typing import Protocol
 
 from rig.world.clock import TICK_S, TICKS_PER_SECOND
@@ -215,6 +216,8 @@ class Robot:
 
     # -- what the operator and clients set ---------------------------------------------------------------------------
     def set_speed_slider(self, fraction: float) -> None:
+        if not isfinite(fraction):
+            return
         self.speed_slider = min(max(fraction, 0.0), 1.0)
         if self.runtime_state not in (RuntimeState.PAUSING, RuntimeState.PAUSED):
             self.motion.fraction_wanted = self.speed_slider

@@ -96,7 +96,10 @@ class RtdeSession:
             payload = bytes(self._buffer[HEADER.size : size])
             del self._buffer[:size]
             handler = self._answers.get(chr(kind))
-            answer += handler(payload) if handler else self._say(f"unknown package type {kind}")
+            try:
+                answer += handler(payload) if handler else self._say(f"unknown package type {kind}")
+            except struct.error:
+                answer += self._say(f"package of type {chr(kind)} with {len(payload)} bytes where others belong")
         return answer
 
     def tick(self) -> bytes:

@@ -120,8 +120,8 @@ class ScriptSession:
                 run_beside(program)
             else:
                 self._robot.start_program(program)
-        except ProgramError as error:
-            self._robot.messages.complain(error)
+        except (ProgramError, TypeError, ValueError) as error:
+            self._robot.messages.complain(ProgramError(str(error)))
 
 
 def run_beside(program: Program) -> None:

@@ -8,7 +8,7 @@ from typing import Any
 
 from rig.world.clock import TICKS_PER_SECOND
 from rig.world.messages import ProgramError
-from rig.world.program import Move, Steps, Threads
+from rig.world.program import Move, Steps, Threads, finite
 from rig.world.robot import Robot
 from rig.world.trajectory import Joints
 
@@ -100,7 +100,7 @@ class ScriptProgram:
                     yield  # a loop that takes no time would never give way
             try:
                 yield from STATEMENTS[item.text.split("(", 1)[0]](self._robot, self._threads, Arguments(item.text))
-            except ProgramError as error:
+            except (ProgramError, TypeError, ValueError, IndexError, OverflowError) as error:
                 raise ProgramError(str(error), item.place) from None
 
 
@@ -141,7 +141,9 @@ def _movel(robot: Robot, threads: Threads, value: Arguments) -> Steps:
 
 def _speedj(robot: Robot, threads: Threads, value: Arguments) -> Steps:
     threads.take("main")
-    robot.motion.speed(joints(value("0", "qd")), float(value("1", "a")))
+    velocity, acceleration = joints(value("0", "qd")), float(value("1", "a"))
+    finite([*velocity, acceleration])
+    robot.motion.speed(velocity, max(acceleration, 0.01))
     yield from _wait(float(value("2", "t", 0.0)))
     threads.let_go("main")
 
@@ -181,14 +183,20 @@ def _tcp(robot: Robot, value: Arguments) -> None:
 
 def _digital_out(first: int) -> Callable[[Robot, Arguments], None]:
     def put(robot: Robot, value: Arguments) -> None:
-        bit = 1 << first + int(value("0", "n"))
+        number = int(value("0", "n"))
+        if not 0 <= number < 8:
+            raise ProgramError(f"there is no output {number}")
+        bit = 1 << first + number
         robot.digital_outputs = robot.digital_outputs | bit if value("1", "b") else robot.digital_outputs & ~bit
 
     return put
 
 
 def _integer_register(robot: Robot, value: Arguments) -> None:
-    robot.outputs.ints[int(value("0", "address"))] = int(value("1", "value"))
+    number = int(value("1", "value"))
+    if not -(2**31) <= number < 2**31:
+        raise ProgramError(f"{number} does not fit an integer register")
+    robot.outputs.ints[int(value("0", "address"))] = number
 
 
 def _float_register(robot: Robot, value: Arguments) -> None:
