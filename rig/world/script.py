@@ -120,7 +120,9 @@ class ScriptSession:
                 run_beside(program)
             else:
                 self._robot.start_program(program)
-        except (ProgramError, TypeError, ValueError) as error:
+        except ProgramError as error:
+            self._robot.messages.complain(error)
+        except (TypeError, ValueError) as error:  # a value of a kind the statement cannot take
             self._robot.messages.complain(ProgramError(str(error)))
 
 
