@@ -27,8 +27,8 @@ settings.load_profile("rig")
 
 def fresh_host() -> str:
     """A loopback address nothing else uses: the ports of a robot are fixed, so every robot needs its own address."""
-    number = next(_addresses)
-    return f"127.{100 + number // 250}.{os.getpid() // 250 % 250 + 1}.{(os.getpid() + number) % 250 + 1}"
+    number, pid = next(_addresses), os.getpid()
+    return f"127.{20 + number % 200}.{pid // 250 % 250 + 1}.{pid % 250 + 1}"
 
 
 def merge(base: Any, changes: Any) -> Any:

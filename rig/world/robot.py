@@ -135,7 +135,9 @@ class Robot:
         """Play a program instead of what runs now."""
         if self.runtime_state != RuntimeState.STOPPED:
             self.stop_program("another program was started")
-        if self.ready:
+        if not self.ready:
+            self.messages.say(f"{program.name} was not started: {self.robot_mode.name}, {self.safety_mode.name}")
+        else:
             self._start = (self.tick + round(START_DELAY_S * TICKS_PER_SECOND), program)
 
     def stop_program(self, reason: str) -> None:
