@@ -1,5 +1,6 @@
-# make demo   calibrate a gyroscope on a simulated robot arm, on a bare machine with Python 3.11 or 3.12
-# make test   everything CI checks: lint, types, import layers, tests (needs arm-none-eabi-gcc for the firmware)
+# make demo    calibrate a gyroscope on a simulated robot arm, on a bare machine with Python 3.11 or 3.12
+# make test    everything CI checks: lint, types, import layers, tests (needs gcc and arm-none-eabi-gcc)
+# make bench   every benchmark, ratios measured side by side
 
 VENV := .venv
 BIN := $(VENV)/bin
@@ -23,7 +24,7 @@ lint: $(VENV)/dev.installed
 	$(BIN)/lint-imports
 
 bench: $(VENV)/dev.installed
-	$(BIN)/python benchmarks/solve.py
+	for benchmark in benchmarks/*.py; do $(BIN)/python $$benchmark || exit 1; done
 
 firmware:
 	$(MAKE) -C firmware_host/firmware
