@@ -5,7 +5,7 @@ from collections.abc import Callable
 TICKS_PER_SECOND = 500
 TICK_S = 1.0 / TICKS_PER_SECOND
 PATIENCE_S = 0.02  # wall time the world may be behind and still catch up
-HURRY = 3.0  # … so many times as fast as it should go: a burst of packets would overrun a client that polls
+HURRY = 1.5  # … so many times as fast as it should go: a burst of packets would overrun a client that polls
 
 
 class Clock:
