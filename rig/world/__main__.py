@@ -5,7 +5,6 @@ import sys
 
 from rig.config.load import load
 from rig.errors import Refused
-from rig.world.process import serve
 
 
 def main(arguments: list[str] | None = None) -> int:
@@ -14,7 +13,16 @@ def main(arguments: list[str] | None = None) -> int:
     parser.add_argument("--until-eof", action="store_true", help="ignore Ctrl-C and end when standard input closes")
     options = parser.parse_args(arguments)
     try:
-        serve(load(options.config), options.until_eof)
+        loaded = load(options.config)
+        try:
+            from rig.world.process import serve
+        except ModuleNotFoundError as error:
+            raise Refused(
+                "no_emulator",
+                f"the simulated laboratory needs the package {error.name}, which is not installed",
+                "Install the optional extra: pip install 'calibration-rig[world]'",
+            ) from error
+        serve(loaded, options.until_eof)
     except Refused as error:
         print(error, file=sys.stderr)
         return error.exit_status
