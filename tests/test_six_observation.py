@@ -111,6 +111,30 @@ def test_algorithm_1_says_that_it_diverges() -> None:
     np.testing.assert_allclose(accumulated.solve().bias_rad_s, bias, rtol=1e-10)
 
 
+@pytest.mark.parametrize("bias", [SPEED / SCALE / np.sqrt(3), SPEED / SCALE * [1, 0, 0], np.array([30.0, -20.0, 10.0])])
+def test_a_bias_as_large_as_the_turn_is_solved_with_its_uncertainty(bias: Array) -> None:
+    """‖K b‖ = ω makes Eq. (7) singular, and a sweep against such a bias reads almost zero."""
+    rng = np.random.default_rng(9)
+    means, speeds = sweeps(bias=bias)
+    solution = gather(means, speeds).solve()
+    np.testing.assert_allclose(values(solution), [*SCALE, *bias], rtol=1e-7, atol=1e-7)
+    assert solution.condition < 1.2
+    usual = gather(*sweeps()).solve().covariance
+    np.testing.assert_allclose(solution.covariance, usual, rtol=0.02, atol=1e-9)
+    draws = means + rng.normal(size=(500, 6, 3)) * np.sqrt(VARIANCE)
+    errors = np.array([values(gather(draw, speeds).solve()) for draw in draws]) - [*SCALE, *bias]
+    np.testing.assert_allclose(errors.std(axis=0), np.sqrt(np.diag(solution.covariance)), rtol=0.15)
+
+
+def test_one_sweep_with_a_badly_known_speed_does_not_make_the_design_a_bad_one() -> None:
+    accumulated = Accumulator.empty()
+    for sweep, (mean, speed) in enumerate(zip(*sweeps(), strict=True)):
+        accumulated = accumulated.add(mean, VARIANCE * 1e-4, float(speed), 1e-2 if sweep == 0 else 0.0)
+    solution = accumulated.solve()
+    assert solution.rank == 6 and solution.condition < 1.2
+    np.testing.assert_allclose(values(solution), [*SCALE, *BIAS], rtol=1e-7)
+
+
 def test_algorithm_1_needs_more_passes_for_a_closer_tolerance() -> None:
     means, speeds = sweeps()
     p, q = np.linalg.solve(design(means), np.stack([speeds**2, np.ones(6)], axis=1)).T
