@@ -1,20 +1,28 @@
 """The command line. Heavy modules are imported by the command that needs them, so that help comes at once."""
 
 import argparse
-import os
 import signal
 import sys
+import traceback
 from collections.abc import Callable, Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from rig import __version__
-from rig.errors import RigError
+from rig.errors import Fault, RigError
+from rig.streams import keep_streams_usable
 
 if TYPE_CHECKING:
     from rig.run import Script
 
-INTERRUPTED = 130
+FAULT, INTERRUPTED = Fault.exit_status, 130
+# Every way to end a command from outside. Left alone, a closed terminal, Ctrl-\ and Ctrl-Z would end or suspend this
+# process while the arm goes on moving.
+_ENDING_SIGNALS = tuple(
+    getattr(signal, name)
+    for name in ("SIGINT", "SIGTERM", "SIGHUP", "SIGQUIT", "SIGTSTP")
+    if hasattr(signal, name)  # Windows has the first two
+)
 
 
 def main(arguments: Sequence[str] | None = None) -> int:
@@ -25,19 +33,29 @@ def main(arguments: Sequence[str] | None = None) -> int:
 
 def guarded(command: Callable[[], int]) -> int:
     """Run a command; turn every named error into one message on stderr and its exit status."""
-    signal.signal(signal.SIGTERM, _interrupt)
+    keep_streams_usable()
+    for number in _ENDING_SIGNALS:
+        signal.signal(number, _interrupt)
     try:
-        return command()
+        status = command()
+        sys.stdout.flush()
+        return status
     except RigError as error:
-        print(f"rig: {error}", file=sys.stderr)
-        return error.exit_status
+        return _ended(str(error), error.exit_status)
     except KeyboardInterrupt as interrupt:
-        print(f"rig: {interrupt or 'interrupted'}", file=sys.stderr)
-        return INTERRUPTED
-    except BrokenPipeError:
-        # The reader of our output went away (`rig plan … | head`); nothing more can be said to it.
-        os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
-        return 0
+        for number in _ENDING_SIGNALS:
+            signal.signal(number, signal.SIG_IGN)  # all is stopped: an impatient second one has nothing left to end
+        return _ended(str(interrupt) or "interrupted", INTERRUPTED)
+    except OSError as error:
+        return _ended(str(Fault("system", f"the system refused ({error})", "Mend that, then try again")), FAULT)
+    except Exception:
+        traceback.print_exc()  # a defect of ours; Python's own status, 1, would mean a verdict
+        return FAULT
+
+
+def _ended(text: str, status: int) -> int:
+    print(f"rig: {text}", file=sys.stderr)
+    return status
 
 
 def _interrupt(*_: Any) -> None:

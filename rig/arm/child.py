@@ -226,9 +226,9 @@ def _leave(status: int) -> NoReturn:
 
 def _outlive_the_parent() -> None:
     """Signals meant for the whole group must not end the process that has to stop the arm; a closed pipe does."""
-    for name in ("SIGINT", "SIGHUP"):
-        if hasattr(signal, name):  # SIGHUP is POSIX only
-            signal.signal(getattr(signal, name), signal.SIG_IGN)
+    signal.signal(signal.SIGINT, signal.SIG_IGN)
+    if hasattr(os, "setsid"):  # POSIX: a session of its own, which no key and no closed terminal reaches
+        os.setsid()
 
 
 def _send_output_to(log: str | None) -> None:

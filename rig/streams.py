@@ -1,0 +1,55 @@
+"""Standard streams that cannot end a run: whoever reads our words may go away at any time; the work goes on."""
+
+import os
+import sys
+from typing import Any, TextIO
+
+
+class _Unbroken:
+    """A text stream whose loss is no error: what it refuses with one of `lost` is thrown away from then on."""
+
+    def __init__(self, stream: TextIO, lost: type[OSError]) -> None:
+        self._stream = stream
+        self._lost = lost
+
+    def write(self, text: str) -> int:
+        try:
+            return self._stream.write(text)
+        except self._lost:
+            self._throw_away()
+            return len(text)
+
+    def flush(self) -> None:
+        try:
+            self._stream.flush()
+        except self._lost:
+            self._throw_away()
+
+    def __getattr__(self, name: str) -> Any:
+        return getattr(self._stream, name)
+
+    def _throw_away(self) -> None:
+        # On the descriptor itself: what is still buffered would fail again when the interpreter ends.
+        nothing = os.open(os.devnull, os.O_WRONLY)
+        os.dup2(nothing, self._stream.fileno())
+        os.close(nothing)
+
+
+def keep_streams_usable() -> None:
+    """Make stdin, stdout and stderr usable whatever they are: closed, a pipe without a reader, a closed terminal.
+
+    A lost stderr carries only progress, so its loss is never an error. A full disk under stdout loses results, which
+    stays an `OSError`; a reader that has gone away (`rig plan … | head`) has what it wanted.
+    """
+    # A closed descriptor would go to the next file opened, and stray output into that file.
+    for descriptor, name in enumerate(("stdin", "stdout", "stderr")):
+        if getattr(sys, name) is None:
+            nothing = os.open(os.devnull, os.O_RDWR)  # the lowest free number, which is `descriptor`
+            os.set_inheritable(nothing, True)  # the processes we start need the same
+            setattr(sys, name, os.fdopen(descriptor, "r" if name == "stdin" else "w", encoding="utf-8"))
+    if isinstance(sys.stdout, _Unbroken) or isinstance(sys.stderr, _Unbroken):
+        return
+    reconfigure = getattr(sys.stdout, "reconfigure", None)
+    if reconfigure is not None:
+        reconfigure(errors="replace")  # a terminal that knows no ° shows a question mark
+    sys.stdout, sys.stderr = _Unbroken(sys.stdout, BrokenPipeError), _Unbroken(sys.stderr, OSError)
