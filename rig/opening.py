@@ -2,7 +2,7 @@
 
 import hashlib
 import platform
-from collections.abc import Collection, Iterator
+from collections.abc import Iterator, Mapping, Sequence
 from contextlib import ExitStack, contextmanager
 from datetime import UTC, datetime
 from importlib.metadata import version
@@ -16,27 +16,28 @@ from rig import __version__
 from rig.arm.driver import Arm
 from rig.arm.plan import plan_six_observation
 from rig.arm.state import ArmReport
-from rig.config.load import Loaded
-from rig.config.models import SensorSection, mounting_matrix
+from rig.config.load import Loaded, parse
+from rig.config.models import RigConfig, SensorSection, mounting_matrix
 from rig.errors import Refused
 from rig.monitor import Monitor, SensorCount
 from rig.procedure import Confirm, Rig
 from rig.progress import View
-from rig.recording import RecordedSensor, RunRecorder
+from rig.recording import RecordedSensor, RunData, RunRecorder
 
 FULL_SCALE_COUNTS = 32767  # every part the firmware drives reports 16 bits, two's complement
 
 
 @contextmanager
 def open_rig(
-    loaded: Loaded, recording: Path, view: View, confirm: Confirm, done: Collection[int] = ()
+    loaded: Loaded, recording: Path, view: View, confirm: Confirm, earlier: Sequence[RunData] = ()
 ) -> Iterator[Rig]:
     """Everything connected and recording, nothing moved yet; on the way out the arm stops and the file is closed.
 
-    `done` holds the sweeps an interrupted run has finished. Raises `Refused` by name when the arm, the board or a
-    sensor is not what the configuration says.
+    `earlier` holds the recordings of an interrupted run: the sweeps they have finished are left out. Raises `Refused`
+    by name when the arm, the board or a sensor is not what the configuration says, or not what was recorded earlier.
     """
     config = loaded.config
+    _refuse_another_procedure(config, earlier)
     with ExitStack() as stack:
         monitor = Monitor()
         with refusing_board_errors():
@@ -49,12 +50,12 @@ def open_rig(
         report = arm.report()
         view.line(f"arm: serial number {report.serial_number}, PolyScope {report.polyscope} at {report.host}")
 
-        recorder = RunRecorder(
-            recording, config=loaded.rig_text, provenance=_provenance(loaded, board.identity, report), sensors=sensors
-        )
+        provenance = _provenance(loaded, board.identity, report)
+        _refuse_other_instruments(provenance, sensors, earlier)
+        recorder = RunRecorder(recording, config=loaded.rig_text, provenance=provenance, sensors=sensors)
         monitor.recorder = stack.enter_context(recorder)
         yield Rig(
-            plan=plan_six_observation(config.arm, config.procedure, report.state.q_rad, done),
+            plan=plan_six_observation(config.arm, config.procedure, report.state.q_rad, _finished_sweeps(earlier)),
             whole_plan=plan_six_observation(config.arm, config.procedure),
             report=report,
             payload=config.arm,
@@ -65,6 +66,44 @@ def open_rig(
             view=view,
             confirm=confirm,
         )
+
+
+def _finished_sweeps(earlier: Sequence[RunData]) -> frozenset[int]:
+    """The indices of the sweeps the recordings hold from start to end."""
+    events = (event for run in earlier for event in run.events)
+    return frozenset(event.detail["sweep"]["index"] for event in events if event.name == "sweep_finished")
+
+
+def _refuse_another_procedure(config: RigConfig, earlier: Sequence[RunData]) -> None:
+    """Sweeps are counted by their place in the procedure, so the rest of a run must be the rest of the same one."""
+    for run in earlier:
+        recorded = parse(run.config, "the recorded configuration").config
+        if (recorded.procedure, recorded.arm.home_deg) != (config.procedure, config.arm.home_deg):
+            raise Refused(
+                "another_procedure",
+                "config.yaml in the run folder describes another procedure or home pose than the recording there",
+                "Undo the change in config.yaml, or start a new run with `rig run`",
+            )
+
+
+def _refuse_other_instruments(
+    provenance: Mapping[str, Any], sensors: Mapping[str, RecordedSensor], earlier: Sequence[RunData]
+) -> None:
+    """Readings of two boards, or at two settings, are not one calibration."""
+    for run in earlier:
+        for key, what in (("board_unique_id", "board"), ("arm_serial_number", "arm")):
+            if run.provenance[key] != provenance[key]:
+                raise Refused(
+                    f"another_{what}",
+                    f"the run was begun with the {what} {run.provenance[key]}, this is {provenance[key]}",
+                    f"Connect the {what} the run was begun with, or start a new run with `rig run`",
+                )
+        if run.sensors != sensors:
+            raise Refused(
+                "another_sensor",
+                "the sensors are not those of the recording, or set up differently",
+                "Undo the change in config.yaml, or start a new run with `rig run`",
+            )
 
 
 @contextmanager

@@ -4,7 +4,7 @@ import logging
 import sys
 import time
 from collections.abc import Iterator
-from contextlib import contextmanager
+from contextlib import contextmanager, suppress
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Protocol
@@ -65,7 +65,8 @@ class LiveView:
 
     def line(self, text: str) -> None:
         self.log(text)
-        self._live.console.print(text, highlight=False)
+        # Nothing in a path is markup, and a command that is to be copied must not be broken into lines.
+        self._live.console.print(text, highlight=False, markup=False, soft_wrap=True)
 
     def log(self, text: str) -> None:
         logger.info(text)
@@ -97,6 +98,7 @@ def view(log_path: Path) -> Iterator[View]:
     handler.setFormatter(logging.Formatter("%(asctime)s %(levelname)s %(message)s"))
     logger.addHandler(handler)
     logger.setLevel(logging.INFO)
+    logging.raiseExceptions = False  # a full disk is reported once, by the recording
     try:
         if sys.stderr.isatty():
             with Live(console=Console(stderr=True), auto_refresh=False, transient=True) as live:
@@ -105,4 +107,5 @@ def view(log_path: Path) -> Iterator[View]:
             yield PlainView()
     finally:
         logger.removeHandler(handler)
-        handler.close()
+        with suppress(OSError):
+            handler.close()

@@ -22,8 +22,6 @@ SLOWNESS = 1.1  # a move may take this much longer than planned …
 SLOWNESS_S = 1.0  # … plus this, in the controller's time
 INTERRUPTION_S = 0.05  # a stopped program waits so long for the safety bits that explain it
 REASON_S = 0.2  # a refused move waits so long (wall time) for a state that explains it
-
-
 NOT_HELD = StopOutcome(True, "the arm was not under control")
 
 
@@ -148,8 +146,7 @@ class Arm:
     def move(self, motion: Motion, watch: Callable[[], None] = _nothing) -> None:
         """Make one movement and return when the arm has arrived and stands still.
 
-        `watch` is called at least every 20 ms; whatever it raises, `KeyboardInterrupt` included, stops the arm and goes
-        on to the caller.
+        `watch` is called at least every 20 ms; what it raises stops the arm and goes on to the caller.
         """
         with self._stopping_on_error():
             self._doing = motion.name
@@ -203,6 +200,9 @@ class Arm:
     def __exit__(
         self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
     ) -> None:
+        if error is not None and self._problem is None:  # the arm's own problems tell of the stop themselves
+            outcome = self.stop()
+            error.add_note(". ".join(filter(None, (outcome.what, outcome.remedy))))
         self.close()
 
     # Inside -------------------------------------------------------------------------------------------------------

@@ -40,9 +40,11 @@ def solved_document(runs: Sequence[RunData], estimator: str = "newton") -> dict[
 
 
 def write_outcome(folder: Path, document: dict[str, Any]) -> None:
-    """`result.json` and `calibration.h` into the run folder."""
-    (folder / "result.json").write_text(json.dumps(document, indent=2, allow_nan=False) + "\n", encoding="utf-8")
+    """`calibration.h` and `result.json` into the run folder; the latter comes last and whole: it ends the run."""
     (folder / "calibration.h").write_text(calibration_header(document), encoding="utf-8")
+    part = folder / "result.json.part"
+    part.write_text(json.dumps(document, indent=2, allow_nan=False) + "\n", encoding="utf-8")
+    part.replace(folder / "result.json")
 
 
 def print_outcome(document: dict[str, Any], *, as_json: bool) -> None:
