@@ -9,11 +9,11 @@ import time
 from collections.abc import Callable, Iterator, Sequence
 from contextlib import contextmanager
 from dataclasses import asdict, dataclass
-from math import degrees
+from math import degrees, radians
 
 from firmware_host.client import Board
 from rig.arm.driver import Arm
-from rig.arm.plan import Plan, Rest, Step, Sweep, Transfer
+from rig.arm.plan import Plan, Rest, Step, Sweep, Transfer, travel
 from rig.arm.preflight import arm_problems, plan_problems, refuse, way_to_home
 from rig.arm.state import JOINT_NAMES, ArmReport
 from rig.config.models import ArmSection
@@ -24,6 +24,7 @@ from rig.recording import RunRecorder
 
 Confirm = Callable[[Sequence[str]], bool]
 FIRST_SAMPLE_TIMEOUT_S = 2.0
+SAME_POSE_RAD = radians(1)  # what was announced and agreed to still holds
 
 
 @dataclass(slots=True)
@@ -58,6 +59,13 @@ class Rig:
         )
         if not self.confirm(self._announcement()):
             raise Refused("not_confirmed", "nobody agreed to the movement", "Run again and agree, or give --yes")
+        moved_rad = max(map(abs, travel(self.plan.start_q_rad, self.arm.latest.q_rad)))
+        if moved_rad > SAME_POSE_RAD:
+            raise Refused(
+                "arm_moved",
+                f"the arm at {self.report.host} has moved by {degrees(moved_rad):.1f}° since its way was announced",
+                "Keep others off the arm and run again",
+            )
         x, y, z = (millimetres / 1000 for millimetres in self.payload.payload_centre_mm)
         self.arm.take_control(self.payload.payload_kg, (x, y, z))
 
