@@ -1,0 +1,181 @@
+"""What no estimator averages into a result: every refusal by name, shared by all of them.
+
+Each function looks at one thing and raises `rig.errors.Fault`. `conditioning` judges what a design can tell.
+"""
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from rig.errors import Fault
+
+Array = NDArray[np.float64]
+
+MAX_SCALE = 4.0  # either way: no sensor's scale factor is that far off, a wrong unit is
+MIN_ALIGNMENT = 0.7  # cosine between an axis and where it should point; beyond 45° it is another axis
+DEGREES = 180 / np.pi
+CONSISTENT = 3.0  # residuals larger than so many times what the variances explain are worth a warning
+
+
+def require_shape(name: str, array: Array, shape: tuple[int, ...]) -> None:
+    """Raises ValueError: a wrong shape is the caller's mistake, not the measurement's."""
+    if array.shape != shape:
+        raise ValueError(f"{name} must be {shape}, not {array.shape}")
+
+
+def check_finite(**arrays: Array) -> None:
+    """Raises Fault `not_finite` naming the first array that holds a NaN or an infinity, and its row."""
+    for name, array in arrays.items():
+        finite = np.isfinite(array)
+        if not finite.all():
+            row = int(np.argwhere(~finite)[0][0])
+            raise Fault(
+                "not_finite",
+                f"row {row} of {name} holds what is not a number",
+                "Look at the samples of that observation and record it again",
+            )
+
+
+def check_variances(variances: Array) -> None:
+    """Raises Fault `bad_variance` unless every variance is positive."""
+    if not (variances > 0).all():
+        raise Fault(
+            "bad_variance",
+            "the variance of a mean reading is not positive",
+            "Give the variance of each axis' mean in the squared unit of the reading",
+        )
+
+
+def check_count(observations: int, least: int, parameters: int) -> None:
+    """Raises Fault `too_few_observations`."""
+    if observations < least:
+        raise Fault(
+            "too_few_observations",
+            f"{observations} observations are too few for {parameters} parameters, {least} are the least",
+            "Record more sweeps or attitudes; resume the run if it was interrupted",
+        )
+
+
+def check_speeds(speeds_rad_s: Array) -> None:
+    """Raises Fault `bad_speed` unless every sweep's speed is positive."""
+    if not (speeds_rad_s > 0).all():
+        raise Fault(
+            "bad_speed",
+            f"a revolution's speed is {float(speeds_rad_s.min()):g} rad/s",
+            "Give the speed as positive; a rest is not a revolution",
+        )
+
+
+def check_signal(means: Array) -> None:
+    """Raises Fault `zero_reading` for a reading (…, 3) that is exactly zero on all three axes."""
+    if not means.any(axis=-1).all():
+        raise Fault(
+            "zero_reading",
+            "the sensor reads exactly zero in an observation",
+            "Check that the sensor is connected and awake",
+        )
+
+
+def check_duplicates(means: Array) -> None:
+    """Raises Fault `duplicated_observation` where two mean readings of (N, 3) agree to the last bit."""
+    unique, first = np.unique(means, axis=0, return_index=True)
+    if len(unique) < len(means):
+        again = int(np.setdiff1d(np.arange(len(means)), first)[0])
+        earlier = int(np.flatnonzero((means == means[again]).all(axis=1))[0])
+        raise Fault(
+            "duplicated_observation",
+            f"observations {earlier} and {again} hold the same readings",
+            "Give each recording once; one direction swept twice does not stand in for the other",
+        )
+
+
+def check_unit(scale: Array) -> None:
+    """Raises Fault `wrong_unit` for a scale factor (3,) beyond 4 or 1/4; at 57.3 and 1/57.3 it says which unit."""
+    if np.all((scale < MAX_SCALE) & (scale > 1 / MAX_SCALE)):
+        return
+    typical = float(np.exp(np.mean(np.log(scale))))
+    guess = "check the sensor's range and sensitivity"
+    if 0.7 < typical * DEGREES < 1.4:
+        guess = "the readings look like degrees per second given as rad/s"
+    elif 0.7 < typical / DEGREES < 1.4:
+        guess = "the rates look like degrees per second given as rad/s"
+    raise Fault(
+        "wrong_unit",
+        f"the scale factors come out near {typical:.3g}: {guess}",
+        "Give readings and rates in the same unit, rad/s",
+    )
+
+
+def check_axes(axes: Array, nominal: Array | None) -> None:
+    """Whether the sensor's axes, rows of (3, 3) in the flange frame, can be a sensor, and the one expected.
+
+    `nominal` (3, 3) holds the rows where they should point; without it only a left-handed sensor is refused. Raises
+    Fault `mirrored_axis`, `swapped_axes`, `wrong_mounting`.
+    """
+    remedy = "Correct the sensor's mounting in the configuration, the order of its axes, or how it is fixed"
+    if nominal is not None:
+        cosines = axes @ nominal.T
+        where = np.argmax(np.abs(cosines), axis=1)
+        if sorted(where) == [0, 1, 2] and np.any(where != np.arange(3)):
+            found = ", ".join(f"{'xyz'[i]} reads {'xyz'[where[i]]}" for i in range(3) if where[i] != i)
+            raise Fault("swapped_axes", f"the sensor's axes are swapped: {found}", remedy)
+        mirrored = [i for i in range(3) if cosines[i, i] < -MIN_ALIGNMENT]
+        if mirrored:
+            names = ", ".join("xyz"[i] for i in mirrored)
+            raise Fault("mirrored_axis", f"the sensor reads {names} with the wrong sign", remedy)
+        worst = int(np.argmin(np.diag(cosines)))
+        if cosines[worst, worst] < MIN_ALIGNMENT:
+            angle = float(np.degrees(np.arccos(cosines[worst, worst])))
+            raise Fault(
+                "wrong_mounting", f"the sensor's {'xyz'[worst]} axis lies {angle:.0f}° off its mounting", remedy
+            )
+    if np.linalg.det(axes) < 0:
+        raise Fault(
+            "mirrored_axis", "the sensor's axes form a left-handed frame: one is mirrored or two swapped", remedy
+        )
+
+
+@dataclass(frozen=True, slots=True)
+class Conditioning:
+    """Rank, condition number (largest over smallest singular value that should count), and the weakest column."""
+
+    rank: int
+    condition: float
+    weakest: int
+
+
+def conditioning(design: Array, needed: int, noise: float = 0.0) -> Conditioning:
+    """Of a design (n, p) whose columns are already in comparable units, of which `needed` directions must be told.
+
+    Singular values at rounding, or within three times `noise` (the norm that measurement noise gives a design which is
+    itself measured), do not count towards the rank. `weakest` is the column that dominates the direction least told.
+    """
+    _, singular, directions = np.linalg.svd(design, full_matrices=False)
+    floor = max(1e-10 * float(singular[0]), 3 * noise)
+    last = float(singular[needed - 1]) if len(singular) >= needed else 0.0
+    condition = float(singular[0]) / last if last > 0 else float("inf")
+    weakest = int(np.argmax(np.abs(directions[min(needed, len(directions)) - 1])))
+    return Conditioning(int(np.sum(singular > floor)), condition, weakest)
+
+
+def check_conditioning(found: Conditioning, needed: int, limit: float, what: str, remedy: str) -> None:
+    """Raises Fault `rank_deficient` below the `needed` rank, `ill_conditioned` above the `limit` of the condition."""
+    if found.rank < needed:
+        raise Fault("rank_deficient", f"the observations leave {what} undetermined ({found.rank} of {needed})", remedy)
+    if not found.condition <= limit:
+        raise Fault(
+            "ill_conditioned",
+            f"the observations hardly tell {what} (condition {found.condition:.3g}, {limit:g} is the most)",
+            remedy,
+        )
+
+
+def inconsistency(residuals: Array, variances: Array, freedom: int) -> tuple[str, ...]:
+    """A warning when residuals are much larger than their variances explain; `freedom` counts what the fit left."""
+    if freedom <= 0:
+        return ()
+    ratio = float(np.sqrt(np.sum(residuals**2 / variances) / freedom))
+    if ratio < CONSISTENT:
+        return ()
+    return (f"residuals are {ratio:.1f} times what the variances explain: something beside noise is in the readings",)

@@ -1,0 +1,249 @@
+"""The vector model: sweeps whose axes are known. The arm knows the direction it turns in, not only the speed.
+
+    m = F ω + c (+ G a),   F_i = a_i / k_i,   c = −b
+
+m is the mean reading (rad/s), ω the mean angular rate in the flange frame (unit axis × speed, zero for a rest), a_i the
+unit vector of sensor axis i in the flange frame. Of g = K (m + b), the convention of SIX, it is the version that knows
+the direction of g: k_i = 1 / ‖row i of F‖ and b = −c, so every sweep sees all three biases, and so does every rest.
+The mounting rotation and the non-orthogonality of the axes are found, not assumed. With gravity in the flange frame
+(m/s²) given, G (3×3, rad/s per m/s²) is the g-sensitivity.
+
+The equations are linear in F, c and G, one weighted regression for each axis: efficient when the noise is Gaussian.
+"""
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from rig.estimation.refusals import (
+    check_axes,
+    check_conditioning,
+    check_count,
+    check_duplicates,
+    check_finite,
+    check_signal,
+    check_unit,
+    check_variances,
+    conditioning,
+    inconsistency,
+    require_shape,
+)
+
+Array = NDArray[np.float64]
+
+MODEL = "m = F ω − b, k_i = 1/‖F_i‖"
+MAX_CONDITION = 100.0  # six sweeps stay below 3; with g-sensitivity, rests at three attitudes below 30
+REMEDY = "Sweep about three different axes, and turn the flange against gravity if g-sensitivity is wanted"
+
+
+@dataclass(frozen=True, slots=True)
+class VectorSolution:
+    """A gyroscope's calibration by the vector model, and how well it is known.
+
+    - `scale` (3,), `bias_rad_s` (3,): g = K (m + b); `covariance` (6, 6) in the order kx ky kz bx by bz.
+    - `matrix` (3, 3): F. `matrix_covariance` (12, 12): the rows of F, then c.
+    - `non_orthogonality_rad` (3,): by how much the angles between y and z, z and x, x and y fall short of 90°.
+    - `mounting` (3, 3): the rotation from the flange frame to the sensor frame nearest to the three axes.
+    - `angles_covariance_rad2` (6, 6): of `non_orthogonality_rad`, then of small turns of `mounting` about sensor x y z.
+    - `g_sensitivity` (3, 3) in rad/s per m/s² and its (9, 9) covariance (row by row), or None.
+    - `residuals_rad_s` (N, 3): reading less model. `rank` and `condition` are those of the scaled design.
+    """
+
+    scale: Array
+    bias_rad_s: Array
+    covariance: Array
+    matrix: Array
+    matrix_covariance: Array
+    non_orthogonality_rad: Array
+    mounting: Array
+    angles_covariance_rad2: Array
+    g_sensitivity: Array | None
+    g_sensitivity_covariance: Array | None
+    residuals_rad_s: Array
+    observations: int
+    rank: int
+    condition: float
+    iterations: int
+    warnings: tuple[str, ...]
+
+
+@dataclass(frozen=True, slots=True)
+class VectorBatch:
+    """The vector model of many runs: scale (R, 3), bias_rad_s (R, 3), matrix F (R, 3, 3)."""
+
+    scale: Array
+    bias_rad_s: Array
+    matrix: Array
+
+
+def solve_vector_model(
+    means_rad_s: ArrayLike,
+    rates_rad_s: ArrayLike,
+    variances_rad2_s2: ArrayLike,
+    *,
+    speed_std_rad_s: ArrayLike | None = None,
+    gravity_m_s2: ArrayLike | None = None,
+    nominal_mounting: ArrayLike | None = None,
+) -> VectorSolution:
+    """Solve m = F ω + c (+ G a) by weighted least squares.
+
+    `means_rad_s`, `variances_rad2_s2` (N, 3): mean readings and the variances of these means; `rates_rad_s` (N, 3):
+    the mean rate in the flange frame, zero for a rest; `speed_std_rad_s` (N,): how well its size is known;
+    `gravity_m_s2` (N, 3): mean gravity in the flange frame; `nominal_mounting` (3, 3): flange to sensor, to be held to.
+
+    Raises Fault `too_few_observations`, `not_finite`, `bad_variance`, `zero_reading`, `duplicated_observation`,
+    `rank_deficient`, `ill_conditioned`, `wrong_unit`, `mirrored_axis`, `swapped_axes`, `wrong_mounting`.
+    """
+    means, rates, variances = (np.asarray(a, dtype=np.float64) for a in (means_rad_s, rates_rad_s, variances_rad2_s2))
+    count = len(means)
+    speed_std = np.zeros(count) if speed_std_rad_s is None else np.asarray(speed_std_rad_s, dtype=np.float64)
+    design = _design(rates, None if gravity_m_s2 is None else np.asarray(gravity_m_s2, dtype=np.float64))
+    for name, array in (("means", means), ("rates", rates), ("variances", variances)):
+        require_shape(name, array, (count, 3))
+    require_shape("speed_std", speed_std, (count,))
+    columns = design.shape[1]
+    check_count(count, columns, 3 * columns)
+    check_finite(means=means, rates=rates, variances=variances, speed_std=speed_std, design=design)
+    check_variances(variances)
+    moving = rates.any(axis=1)
+    check_signal(means[moving])
+    check_duplicates(means[moving])
+    found = conditioning(design / _unit(design), columns)
+    check_conditioning(found, columns, MAX_CONDITION, "axis, bias or g-sensitivity", REMEDY)
+
+    speed_noise = np.zeros_like(means)
+    coefficients, inverse = _regress(design, means, variances)
+    if speed_std.any():
+        speed_noise = _speed_noise(rates, speed_std, coefficients)
+        coefficients, inverse = _regress(design, means, variances + speed_noise**2)
+        speed_noise = _speed_noise(rates, speed_std, coefficients)
+    raw = _raw_covariance(inverse, variances, speed_noise)
+
+    matrix = coefficients[:3].T
+    check_unit(1 / np.linalg.norm(matrix, axis=1))
+    scale = 1 / np.linalg.norm(matrix, axis=1)
+    axes = scale[:, None] * matrix
+    check_axes(axes, None if nominal_mounting is None else np.asarray(nominal_mounting, dtype=np.float64))
+    order = np.array([i * columns + j for i in range(3) for j in range(3)] + [i * columns + 3 for i in range(3)])
+    matrix_covariance = raw[np.ix_(order, order)]
+    to_parameters = _parameter_jacobian(matrix, scale)
+    to_angles = _angle_jacobian(axes, scale)
+    sensed = np.array([i * columns + j for i in range(3) for j in range(4, columns)], dtype=np.intp)
+    residuals = means - design @ coefficients
+    return VectorSolution(
+        scale=scale,
+        bias_rad_s=-coefficients[3],
+        covariance=to_parameters @ matrix_covariance @ to_parameters.T,
+        matrix=matrix,
+        matrix_covariance=matrix_covariance,
+        non_orthogonality_rad=non_orthogonality(axes),
+        mounting=nearest_rotation(axes),
+        angles_covariance_rad2=to_angles @ matrix_covariance[:9, :9] @ to_angles.T,
+        g_sensitivity=coefficients[4:].T if columns > 4 else None,
+        g_sensitivity_covariance=raw[np.ix_(sensed, sensed)] if columns > 4 else None,
+        residuals_rad_s=residuals,
+        observations=count,
+        rank=found.rank,
+        condition=found.condition,
+        iterations=2 if speed_std.any() else 1,
+        warnings=inconsistency(residuals, variances + speed_noise**2, 3 * (count - columns)),
+    )
+
+
+def solve_vector_batch(means_rad_s: ArrayLike, rates_rad_s: ArrayLike, variances_rad2_s2: ArrayLike) -> VectorBatch:
+    """The vector model of many runs at once, without gates: for studies whose design is known to be good.
+
+    `means_rad_s` (R, N, 3); `rates_rad_s` (N, 3) or (R, N, 3); `variances_rad2_s2` (N, 3), alike for all runs.
+    """
+    means, rates, variances = (np.asarray(a, dtype=np.float64) for a in (means_rad_s, rates_rad_s, variances_rad2_s2))
+    coefficients, _ = _regress(_design(rates, None), means, variances)
+    matrix = np.swapaxes(coefficients[..., :3, :], -1, -2)
+    return VectorBatch(1 / np.linalg.norm(matrix, axis=-1), -coefficients[..., 3, :], matrix)
+
+
+def non_orthogonality(axes: Array) -> Array:
+    """(3,) rad by which the angles between y and z, z and x, x and y fall short of 90°, from unit rows (3, 3)."""
+    angles: Array = np.arcsin(np.clip([axes[1] @ axes[2], axes[2] @ axes[0], axes[0] @ axes[1]], -1, 1))
+    return angles
+
+
+def nearest_rotation(axes: Array) -> Array:
+    """The rotation (3, 3) nearest to three axes (rows) in the sum of squares: the orthogonal factor of axes = S R."""
+    left, _, right = np.linalg.svd(axes)
+    rotation: Array = left @ right
+    return rotation
+
+
+def _design(rates: Array, gravity: Array | None) -> Array:
+    """Z (…, N, 4 or 7) = [ω 1 (a)]."""
+    blocks = [rates, np.ones((*rates.shape[:-1], 1))]
+    if gravity is not None:
+        require_shape("gravity", gravity, rates.shape)
+        blocks.append(gravity)
+    return np.concatenate(blocks, axis=-1)
+
+
+def _unit(design: Array) -> Array:
+    """(p,) the size of each block of columns, so that rate, one and gravity compare while a missing axis shows."""
+    speed = np.sqrt(np.mean(np.sum(design[:, :3] ** 2, axis=1))) or 1.0
+    gravity = np.sqrt(np.mean(np.sum(design[:, 4:] ** 2, axis=1))) or 1.0
+    return np.concatenate([np.full(3, speed), [1.0], np.full(design.shape[1] - 4, gravity)])
+
+
+def _regress(design: Array, means: Array, variances: Array) -> tuple[Array, Array]:
+    """Coefficients (…, p, 3) and the linear map (…, 3, p, N) that made them: one weighted regression for each axis."""
+    weights = 1 / np.swapaxes(variances, -1, -2)  # (…, 3, N)
+    weighted = np.swapaxes(design, -1, -2)[..., None, :, :] * weights[..., :, None, :]  # (…, 3, p, N)
+    inverse: Array = np.asarray(np.linalg.solve(weighted @ design[..., None, :, :], weighted), dtype=np.float64)
+    coefficients: Array = np.einsum("...ipn,...ni->...pi", inverse, means)
+    return coefficients, inverse
+
+
+def _speed_noise(rates: Array, speed_std: Array, coefficients: Array) -> Array:
+    """(N, 3) what one standard deviation of the speed does to the readings, F û σ."""
+    speed = np.linalg.norm(rates, axis=1)
+    axes = np.divide(rates, speed[:, None], out=np.zeros_like(rates), where=speed[:, None] > 0)
+    noise: Array = speed_std[:, None] * (axes @ coefficients[:3])
+    return noise
+
+
+def _raw_covariance(inverse: Array, variances: Array, speed_noise: Array) -> Array:
+    """(3 p, 3 p) covariance of the coefficients, axis by axis; a wrong speed moves all three axes at once."""
+    columns = inverse.shape[1]
+    covariance = np.einsum("in,jn,ipn,jqn->ipjq", speed_noise.T, speed_noise.T, inverse, inverse)
+    for axis in range(3):
+        covariance[axis, :, axis] += (inverse[axis] * variances[:, axis]) @ inverse[axis].T
+    return np.asarray(covariance.reshape(3 * columns, 3 * columns), dtype=np.float64)
+
+
+def _parameter_jacobian(matrix: Array, scale: Array) -> Array:
+    """(6, 12) derivative of k and b with respect to F (row by row) and c: δk = −k³ F_i·δF_i, δb = −δc."""
+    jacobian = np.zeros((6, 12))
+    for i in range(3):
+        jacobian[i, 3 * i : 3 * i + 3] = -(scale[i] ** 3) * matrix[i]
+    jacobian[3:, 9:] = -np.eye(3)
+    return jacobian
+
+
+def _angle_jacobian(axes: Array, scale: Array) -> Array:
+    """(6, 9) derivative of the non-orthogonality and of the mounting's rotation with respect to F, row by row.
+
+    With A = S R and δR = [δθ]× R: (tr S − S) δθ = the axial vector of M − Mᵀ, M = δA Rᵀ.
+    """
+    rotation = nearest_rotation(axes)
+    stretch = axes @ rotation.T
+    to_turn = np.linalg.inv(np.trace(stretch) * np.eye(3) - stretch)
+    sines = axes @ axes.T
+    jacobian = np.zeros((6, 9))
+    for i in range(3):
+        for j in range(3):
+            change = np.zeros((3, 3))  # of the unit rows, for a unit change of F[i, j]
+            change[i] = scale[i] * (np.eye(3)[j] - axes[i, j] * axes[i])
+            sine_change = change @ axes.T + axes @ change.T
+            moved = change @ rotation.T
+            skew = moved - moved.T
+            for row, (a, b) in enumerate(((1, 2), (2, 0), (0, 1))):
+                jacobian[row, 3 * i + j] = sine_change[a, b] / np.sqrt(1 - sines[a, b] ** 2)
+            jacobian[3:, 3 * i + j] = to_turn @ np.array([skew[2, 1], skew[0, 2], skew[1, 0]])
+    return jacobian
