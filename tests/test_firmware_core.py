@@ -15,6 +15,7 @@ from firmware_host.protocol import ERROR_BY_CODE, Frame, encode
 
 PERIOD_US = 4202  # 238 Hz
 BATCH_MAX = 18
+SETTLING = 8  # conversions thrown away after a configure
 
 
 @pytest.fixture
@@ -27,7 +28,14 @@ def streaming_board() -> HostBoard:
     board = HostBoard()
     assert [frame.name for frame in board.ask("configure", sensor=0, rate_hz=238, range_deg_s=245)] == ["setup"]
     assert [frame.name for frame in board.ask("start", mode=0)] == ["ack"]
+    settle(board)
     return board
+
+
+def settle(board: HostBoard, time_us: int = 0) -> None:
+    """The conversions after a configure that are no samples yet."""
+    for _ in range(SETTLING):
+        convert(board, time_us, (32767, 32767, 32767), late_us=0)
 
 
 def convert(board: HostBoard, time_us: int, counts: tuple[int, int, int] = (1, -2, 3), late_us: int = 20) -> None:
@@ -193,12 +201,13 @@ def test_the_next_range_up_is_set_with_its_own_sensitivity(
 
 
 def test_settings_that_decide_what_a_reading_means_are_written_whatever_they_were(board: HostBoard) -> None:
-    for address in (0x0C, 0x11, 0x12, 0x13, 0x1E, 0x22, 0x23):
+    addresses = (0x0C, 0x11, 0x12, 0x13, 0x1E, 0x22, 0x23, 0x24)
+    for address in addresses:
         board.gyro.values[address] = 0xFF & ~0x01
     board.ask("configure", sensor=0, rate_hz=238, range_deg_s=245)
-    registers = {address: board.gyro.values[address] for address in (0x0C, 0x11, 0x12, 0x13, 0x1E, 0x22, 0x23)}
-    # data-ready of the gyroscope alone; no filter, no sign change; three axes; BDU and address increment; no I2C
-    assert registers == {0x0C: 0x02, 0x11: 0, 0x12: 0, 0x13: 0, 0x1E: 0x38, 0x22: 0x44, 0x23: 0x04}
+    # data-ready of the gyroscope alone; no filter, no sign change; three axes; BDU, address increment; no I2C, no self-test
+    expected = {0x0C: 0x02, 0x11: 0, 0x12: 0, 0x13: 0, 0x1E: 0x38, 0x22: 0x44, 0x23: 0x04, 0x24: 0}
+    assert {address: board.gyro.values[address] for address in addresses} == expected
     assert board.gyro.writes[-1][0] == 0x10, "the part must start only when everything else is set"
 
 
@@ -247,6 +256,7 @@ def test_the_time_stamp_is_the_interrupts_and_counts_beyond_32_bits() -> None:
     board.core.board_reset()
     board.ask("configure", sensor=0, rate_hz=238, range_deg_s=245)
     board.ask("start", mode=0)
+    settle(board, start)
     times = [start + k * PERIOD_US for k in range(1, 60)]
     for time_us in times:
         convert(board, time_us, late_us=1500)
@@ -266,9 +276,21 @@ def test_a_batch_leaves_when_it_is_40_ms_old_or_full() -> None:
     board = HostBoard()
     board.ask("configure", sensor=0, rate_hz=952, range_deg_s=245)
     board.ask("start", mode=0)
+    settle(board)
     for k in range(1, 100):
         convert(board, k * 1050)
     assert {frame.values["count"] for frame in board.frames()} == {BATCH_MAX}
+
+
+def test_what_a_part_converts_while_it_settles_is_no_sample_and_no_loss() -> None:
+    board = HostBoard()
+    board.ask("configure", sensor=0, rate_hz=238, range_deg_s=245)
+    board.ask("start", mode=0)
+    for k in range(1, SETTLING + 4):
+        convert(board, k * PERIOD_US, (k, 0, 0))
+    (batch, _) = board.ask("stop", 2)
+    assert (batch.values["sequence"], batch.values["dropped"], batch.values["count"]) == (0, 0, 3)
+    assert batch.items["counts"][:, 0].tolist() == [SETTLING + 1, SETTLING + 2, SETTLING + 3]
 
 
 def test_stop_sends_what_is_left_before_its_ack() -> None:

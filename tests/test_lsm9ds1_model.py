@@ -54,6 +54,10 @@ class Bus:
     def start(self, rate_code: int = 4, range_deg_s: float = 245.0) -> None:
         self.write(CTRL_REG1_G, rate_code << 5 | RANGE_CODES[range_deg_s] << 3)
 
+    def settle(self) -> None:
+        """Let the conversions pass that the datasheet says to discard; 8 at most."""
+        self.counts(8)
+
     def next_counts(self) -> np.ndarray:
         """The next conversion. Returns (3,) counts."""
         self.advance(self.part.next_event_s)
@@ -105,6 +109,7 @@ def test_sensitivity_is_the_datasheet_s(range_deg_s: float) -> None:
     rate = np.radians(range_deg_s) * np.array([0.9, -0.5, 0.1])
     bus = Bus(lambda _time_s: rate)
     bus.start(range_deg_s=range_deg_s)
+    bus.settle()
     expected = rate / np.radians(SENSITIVITIES_MDPS[range_deg_s] * 1e-3)
     assert np.all(np.abs(bus.next_counts() - expected) <= 0.5)
 
@@ -112,6 +117,7 @@ def test_sensitivity_is_the_datasheet_s(range_deg_s: float) -> None:
 def test_too_much_saturates() -> None:
     bus = Bus(lambda _time_s: (10.0, -10.0, np.radians(286.0)))
     bus.start()
+    bus.settle()
     assert bus.next_counts().tolist() == [32767, -32768, round(286 / 8.75e-3)]
 
 
@@ -119,7 +125,16 @@ def test_small_rates_are_quantised() -> None:
     per_count = math.radians(8.75e-3)
     bus = Bus(lambda time_s: (0.6 * per_count, 0.4 * per_count, -1.6 * per_count))
     bus.start()
+    bus.settle()
     assert bus.next_counts().tolist() == [1, 0, -2]
+
+
+@pytest.mark.parametrize(("code", "discard"), [(1, 2), (2, 3), (3, 3), (4, 4), (5, 5), (6, 8)])
+def test_the_first_conversions_after_a_start_are_wrong(code: int, discard: int) -> None:
+    bus = Bus(lambda _time_s: (1.0, 1.0, 1.0))
+    bus.start(code)
+    right = bus.counts(20)[:, 0] == round(math.degrees(1.0) / 8.75e-3)
+    assert right.tolist() == [False] * discard + [True] * (20 - discard)
 
 
 vectors = st.tuples(*[st.floats(-3, 3)] * 3)
@@ -132,6 +147,7 @@ def test_the_truth_is_g_equals_k_times_m_plus_b(
 ) -> None:
     bus = Bus(lambda _time_s: rate, GyroTruth(scale, bias_rad_s))
     bus.start(range_deg_s=500.0)
+    bus.settle()
     per_count = math.radians(17.5e-3)
     recovered = np.array(scale) * (bus.next_counts() * per_count + np.array(bias_rad_s))
     assert np.all(np.abs(recovered - rate) <= 0.5001 * per_count * np.array(scale))
@@ -143,6 +159,7 @@ def test_non_orthogonal_axes_pick_up_their_neighbours() -> None:
     for axis in np.eye(3):
         bus = Bus(lambda _time_s, axis=axis: axis, GyroTruth(non_orthogonality_rad=(xy, xz, yz)))  # type: ignore[misc]
         bus.start()
+        bus.settle()
         columns.append(bus.next_counts() * math.radians(8.75e-3))
     axes = np.array(columns).T
     assert np.linalg.norm(axes, axis=1) == pytest.approx(1.0, abs=3e-4)
@@ -224,11 +241,12 @@ def test_block_data_update_keeps_both_bytes_of_one_conversion(control: int, torn
     bus = Bus(ramp)
     bus.write(CTRL_REG8, control)
     bus.start()
-    bus.advance(1.5 / 238)
+    bus.settle()
+    bus.advance(9.5 / 238)
     low = bus.read(OUT_G)
-    bus.advance(2.5 / 238)
+    bus.advance(10.5 / 238)
     high = bus.read(OUT_G + 1)
-    first, second = 0x101 - 1, 2 * 0x101 - 1
+    first, second = 9 * 0x101 - 1, 10 * 0x101 - 1
     value = int.from_bytes(low + high, "little")
     assert value == ((second & 0xFF00 | first & 0xFF) if torn else first)
     assert np.frombuffer(bus.read(OUT_G, 6), "<i2").tolist() == [second] * 3

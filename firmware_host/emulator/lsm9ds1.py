@@ -23,7 +23,7 @@ _RESET_AND_BITS = {
     0x13: (0x00, 0x00),  # ORIENT_CFG_G
     0x1E: (0x38, 0x38),  # CTRL_REG4: all three axes
     0x1F: (0x38, 0x38),  # CTRL_REG5_XL
-    0x20: (0x00, 0x00),  # CTRL_REG6_XL: accelerometer off
+    0x20: (0x00, 0x00),  # CTRL_REG6_XL: a write would leave the accelerometer alone running (section 3.1)
     0x21: (0x00, 0x00),  # CTRL_REG7_XL
     _CTRL_REG8: (0x04, 0x45),  # BDU, IF_ADD_INC, SW_RESET
     0x23: (0x00, 0x04),  # CTRL_REG9: I2C_DISABLE
@@ -31,6 +31,7 @@ _RESET_AND_BITS = {
     0x2E: (0x00, 0x00),  # FIFO_CTRL
 }
 _RATES_HZ = {1: 14.9, 2: 59.5, 3: 119.0, 4: 238.0, 5: 476.0, 6: 952.0}  # table 46
+_SETTLING = {1: 2, 2: 3, 3: 3, 4: 4, 5: 5, 6: 8}  # table 12: first conversions to discard, without the second filter
 _SENSITIVITIES_MDPS = {0: 8.75, 1: 17.5, 3: 70.0}  # table 3; 245, 500 and 2000 °/s
 _GDA, _TDA = 0x02, 0x04
 _BDU, _IF_ADD_INC, _SW_RESET = 0x40, 0x04, 0x01
@@ -53,7 +54,7 @@ class GyroTruth:
 
 
 class Lsm9ds1:
-    """The accelerometer-gyroscope die on the SPI bus; the accelerometer stays off.
+    """The accelerometer-gyroscope die on the SPI bus. The accelerometer, which runs along with the gyroscope, is left out.
 
     `rate_at(time_s)`: true angular rate in the part's own axes, 3 floats, rad/s; asked once for each conversion, at
     the instant of the conversion. `temperature_c`: die temperature. `seed`: of the noise, which is drawn per
@@ -61,7 +62,8 @@ class Lsm9ds1:
     oscillator makes its data rate.
 
     The data-ready line stays high until the high byte of the z rate is read: a conversion that nobody read is
-    replaced by the next without a new edge.
+    replaced by the next without a new edge. The datasheet says how many conversions after a start to discard, not how
+    wrong they are: here the turn rate comes in linearly over them.
     """
 
     name = "LSM9DS1"
@@ -112,8 +114,8 @@ class Lsm9ds1:
 
     def advance(self, time_s: float) -> None:
         while self._next_conversion_s <= time_s:
-            self._convert(self._next_conversion_s)
             self._conversions += 1
+            self._convert(self._next_conversion_s)
             self._next_conversion_s = self._started_s + (self._conversions + 1) * self._period_s
 
     def select(self) -> None:
@@ -146,6 +148,7 @@ class Lsm9ds1:
         self._held = [False, False, False]  # BDU: low byte read, high byte not yet
         self._started_s = 0.0
         self._conversions = 0
+        self._settling = 0
         self._period_s = math.inf
         self._next_conversion_s = math.inf
 
@@ -207,6 +210,7 @@ class Lsm9ds1:
         self._status &= ~_GDA
         self._conversions = 0
         self._started_s = time_s
+        self._settling = _SETTLING.get(rate_code, 0)
         self._period_s = 1 / (_RATES_HZ[rate_code] * self._speed) if rate_code else math.inf
         self._next_conversion_s = time_s + self._period_s
         self._per_count = math.radians(_SENSITIVITIES_MDPS[range_code] * 1e-3)
@@ -217,7 +221,8 @@ class Lsm9ds1:
         """One conversion of all axes and the thermometer, as the output registers will show it."""
         if len(self._noise) < 3:
             self._noise = self._random.standard_normal(_NOISE_BLOCK).tolist()[::-1]
-        true = self._rate_at(time_s)
+        settled = min(1.0, self._conversions / (self._settling + 1))
+        true = [settled * rate_rad_s for rate_rad_s in self._rate_at(time_s)]
         data = b""
         for axis, inverse_scale, bias in zip(self._axes, self._inverse_scale, self._bias, strict=True):
             along = axis[0] * true[0] + axis[1] * true[1] + axis[2] * true[2]

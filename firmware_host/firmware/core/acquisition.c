@@ -24,6 +24,7 @@ struct stream {
     uint32_t edges_seen;
     uint32_t period_us; /* 0: not configured */
     uint64_t last_us;   /* latest conversion, or the start */
+    uint32_t settling;  /* conversions still to throw away */
     bool silence_reported;
     uint32_t conversions, sent, dropped;
     struct sample ring[RING];
@@ -50,6 +51,7 @@ void acquisition_data_ready(unsigned sensor, uint32_t captured_us)
 void acquisition_set_rate(unsigned sensor, double rate_hz)
 {
     streams[sensor].period_us = rate_hz > 0.0 ? (uint32_t)(1e6f / (float)rate_hz) : 0;
+    streams[sensor].settling = sensors[sensor].driver->settling;
 }
 
 /* Lowers a data-ready line that is already high: without it no further edge would come. */
@@ -136,13 +138,17 @@ static void acquire(unsigned sensor)
     uint32_t conversions = conversions_until(stream, edges - stream->edges_seen, time_us);
     stream->edges_seen = edges;
     stream->last_us = time_us;
-    stream->conversions += conversions;
-    stream->dropped += conversions - 1;
 
     struct reading reading;
     bool fresh = sensors[sensor].driver->read(sensors[sensor].device, &reading);
-    bool full = stream->written - stream->read == RING;
     bus_errors += !fresh;
+    if (stream->settling != 0) {
+        stream->settling--;
+        return;
+    }
+    stream->conversions += conversions;
+    stream->dropped += conversions - 1;
+    bool full = stream->written - stream->read == RING;
     if (!fresh || full) {
         stream->dropped++;
         return;

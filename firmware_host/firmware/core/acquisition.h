@@ -12,10 +12,10 @@ void acquisition_reset(void);
 /* Called from the data-ready interrupt with the counter value captured there. */
 void acquisition_data_ready(unsigned sensor, uint32_t captured_us);
 
-/* Sensor has been configured to this rate; 0 takes it out of the stream. */
+/* Sensor has just been configured to this rate; 0 takes it out of the stream. */
 void acquisition_set_rate(unsigned sensor, double rate_hz);
 
-/* Starts counting at sequence 0; false when no sensor is configured. */
+/* Starts counting at sequence 0 with the first conversion of a settled part; false when no sensor is configured. */
 bool acquisition_start(void);
 void acquisition_stop(void);
 bool acquisition_is_running(void);

@@ -15,6 +15,9 @@ struct reading {
 struct sensor_driver {
     char part[12];
 
+    /* Conversions to throw away after a configure, while the part's filters settle. */
+    uint8_t settling;
+
     /* Reads the identity register; true when it is this part's. */
     bool (*identify)(unsigned device, uint16_t *who_am_i);
 

@@ -16,7 +16,8 @@ enum pin_pull { PULL_UP = 1, PULL_DOWN = 2 };
 static void setup_clock(void)
 {
     FLASH_ACR = FLASH_ACR_LATENCY(4u) | FLASH_ACR_PRFTEN | FLASH_ACR_ICEN | FLASH_ACR_DCEN;
-    (void)FLASH_ACR; /* the wait states hold once they read back */
+    while ((FLASH_ACR & FLASH_ACR_LATENCY(7u)) != FLASH_ACR_LATENCY(4u)) /* the wait states hold once they read back */
+        ;
     RCC_PLLCFGR = RCC_PLLCFGR_PLLSRC(1u) | RCC_PLLCFGR_PLLM(0u) | RCC_PLLCFGR_PLLN(40u) | RCC_PLLCFGR_PLLR(0u) |
                   RCC_PLLCFGR_PLLREN;
     RCC_CR |= RCC_CR_PLLON;
@@ -39,6 +40,8 @@ static void setup_power_to_peripherals(void)
 static void start_crystal(void)
 {
     PWR_CR1 |= PWR_CR1_DBP;
+    while (!(PWR_CR1 & PWR_CR1_DBP)) /* until then a write to BDCR is lost */
+        ;
     RCC_BDCR |= RCC_BDCR_LSEON;
 }
 

@@ -44,6 +44,7 @@ void port_transmit(const uint8_t *bytes, size_t size)
     DMA1_CCR7 = 0; /* address and count can be set only while the channel is off */
     DMA1_CMAR7 = (uint32_t)bytes;
     DMA1_CNDTR7 = size;
+    __asm volatile("dmb" ::: "memory"); /* the bytes are in memory before the channel reads them */
     DMA1_CCR7 = DMA1_CCR7_EN | DMA1_CCR7_TCIE | DMA1_CCR7_DIR | DMA1_CCR7_MINC;
 }
 
@@ -51,9 +52,7 @@ void port_restart(void)
 {
     while (!(USART2_ISR & USART2_ISR_TC))
         ;
-    SCB_AIRCR = SCB_AIRCR_VECTKEYSTAT(0x05FAu) | SCB_AIRCR_SYSRESETREQ;
-    for (;;)
-        ;
+    reset_chip();
 }
 
 void port_health(struct port_health *health)

@@ -48,14 +48,22 @@ void reset_handler(void)
     main();
 }
 
+/* The barriers: a store still under way would be lost, and the request takes some cycles to act. */
+_Noreturn void reset_chip(void)
+{
+    __asm volatile("dsb" ::: "memory");
+    SCB_AIRCR = SCB_AIRCR_VECTKEYSTAT(0x05FAu) | SCB_AIRCR_SYSRESETREQ;
+    __asm volatile("dsb");
+    for (;;)
+        ;
+}
+
 /* Writes down where it happened and starts afresh: a board that answers "fault at …" helps more than one that hangs. */
 __attribute__((used)) static void record_fault(const uint32_t *frame)
 {
     fault_record.magic = FAULT_MAGIC;
     fault_record.pc = frame[6]; /* r0 r1 r2 r3 r12 lr pc xpsr */
-    SCB_AIRCR = SCB_AIRCR_VECTKEYSTAT(0x05FAu) | SCB_AIRCR_SYSRESETREQ;
-    for (;;)
-        ;
+    reset_chip();
 }
 
 /* Naked: the stack pointer must still be the exception frame's. */

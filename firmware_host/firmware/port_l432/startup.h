@@ -16,4 +16,7 @@ extern struct fault_record fault_record;
 
 uint32_t stack_high_water(void);
 
+/* Everything written to memory before is there afterwards. */
+_Noreturn void reset_chip(void);
+
 #endif
