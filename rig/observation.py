@@ -86,7 +86,7 @@ def observe(run: RunData, sensor: str, settings: ObservationSection) -> SensorOb
 
     Raises Fault `incomplete_revolution`, `arm_states_lost`, `slider_below_100`, `speed_not_constant`,
     `other_joint_moved`, `lost_samples`, `saturation`, `stuck_sensor`, `stuck_axis`, `wrong_axis`, `wrong_sign`,
-    `wrong_unit`, `no_motion`, `not_finite`, `time_base_not_found`, `board_clock_restarted`.
+    `wrong_unit`, `no_motion`, `not_finite`, `time_base_not_found`, `board_clock_restarted`, `duplicated_samples`.
     """
     motion = ArmMotion(run.arm)
     stream = _stream(run.samples[sensor], run.sensors[sensor], motion)
@@ -132,8 +132,8 @@ def _observation(
     covered = motion.covered(stream.time_s[inside])
     if covered.mean() < 0.5:
         raise arm_states_lost(where, "more than half the time")
-    rate = motion.rate(stream.time_s[inside]) @ turn.axis_flange
-    average = _average(stream, inside, turn.duration_s, rate, covered)
+    excess = motion.rate(stream.time_s[inside]) @ turn.axis_flange - turn.speed_rad_s
+    average = _average(stream, inside, turn.duration_s, excess, covered)
     expected = np.array(stream.sensor.mounting) @ turn.axis_flange
     turned = average.mean_rad_s - stream.clock.zero_rate_rad_s
     _check_direction(turned, expected, where, settings)
@@ -170,15 +170,16 @@ def _between(stream: _Stream, start_s: float, end_s: float) -> slice:
     return slice(*np.searchsorted(stream.time_s, [start_s, end_s]).tolist())
 
 
-def _average(stream: _Stream, inside: slice, duration_s: float, rate: Array, covered: NDArray[np.bool_]) -> Average:
-    """Mean and its variance; `rate` (n,) is what the arm did meanwhile, known where `covered` (n,).
+def _average(stream: _Stream, inside: slice, duration_s: float, excess: Array, covered: NDArray[np.bool_]) -> Average:
+    """Mean and its variance; `excess` (n,) is the arm's rate less its mean 2π/T, known where `covered` (n,).
 
-    The noise is what is left of a straight line of reading against rate, and never below the rounding to counts. Its
+    The mean is where a straight line of reading against excess passes zero: few samples do not meet the vibration
+    evenly. The noise is what is left of that line, and never below the rounding to counts. Its
     variance is divided by the number of samples, and widened where the residuals are not white. Rounding averages out
     only as far as noise carries the reading across counts: the part exp(−(2πσ/count)²) of its variance stays.
     """
     m = stream.readings_rad_s[inside]
-    columns, known = np.column_stack([np.ones(int(covered.sum())), rate[covered]]), m[covered]
+    columns, known = np.column_stack([np.ones(int(covered.sum())), excess[covered]]), m[covered]
     coefficients, _, rank, _ = np.linalg.lstsq(columns, known, rcond=None)
     residual = known - columns @ coefficients
     scatter = np.sum(residual**2, axis=0) / (len(known) - rank)
@@ -188,8 +189,10 @@ def _average(stream: _Stream, inside: slice, duration_s: float, rate: Array, cov
     staying = rounding * np.exp(-((2 * np.pi / count) ** 2) * (variance - rounding))
     wider = np.array([widening(residual[:, axis]) for axis in range(3)])
     temperature = stream.raw["temperature_counts"][inside].mean() * stream.sensor.temperature_c_per_count
+    # What is missed in a hole between arm states would not average out of the excess.
+    mean = coefficients[0] if covered.all() else m.mean(axis=0)
     return Average(
-        mean_rad_s=m.mean(axis=0),
+        mean_rad_s=mean,
         variance_rad2_s2=variance * wider / len(m) + staying,
         noise_rad_s=np.sqrt(variance),
         samples=len(m),

@@ -20,12 +20,15 @@ Array = NDArray[np.float64]
 
 MIN_SAMPLES = 100
 COARSE_STEP_S = 0.02  # far below the ramps of a sweep, so that the fine fit starts inside its reach
+COARSE_REACH_S = 0.15  # what the clock may be off at either end of the data when the fine fit starts
 CANDIDATES = 12  # peaks of the correlation looked at: six equal sweeps give eleven
 MIN_EXPLAINED = 0.5  # share of the readings' variance that the arm's motion must explain
 MIN_RATE_RAD_S = 0.01
 MAX_STATE_STEP_S = 0.02  # between arm states that still show the servo's vibration
-MAX_DRIFT = 1e-3  # ten times worse than any crystal
-FINE_STEPS = 20
+MAX_DRIFT = 0.03  # an oscillator that no crystal holds is within 2 %
+MAX_DRIFT_LONG_RUN = 1e-3  # one that a crystal holds is within 600 ppm; in hours, a wider search would take minutes
+MAX_DRIFT_STEPS = 20  # to either side
+FINE_STEPS = 100
 WHITENESS_LAGS = 20
 WHITENESS_LIMIT = 45.3  # χ² of 20 degrees of freedom at 0.999
 
@@ -97,19 +100,20 @@ class ArmMotion:
 def estimate_time_base(board_time_s: Array, readings_rad_s: Array, motion: ArmMotion) -> TimeBase:
     """The board's clock against the controller's, from readings (n, 3) taken at board times (n,).
 
-    Raises Fault `not_finite`, `board_clock_restarted`, `stuck_sensor`, `stuck_axis`, `time_base_not_found`.
+    Raises Fault `not_finite`, `board_clock_restarted`, `duplicated_samples`, `stuck_sensor`, `stuck_axis`,
+    `time_base_not_found`.
     """
     _check_samples(board_time_s, readings_rad_s)
-    reference = float(board_time_s[0] + board_time_s[-1]) / 2
-    offset = _coarse_offset(board_time_s, readings_rad_s, motion)
-    clock = TimeBase(offset, 0.0, reference, np.zeros((2, 2)), np.zeros(3))
+    clock = _coarse(board_time_s, readings_rad_s, motion)
     # The coarse clock says which samples to use; a choice that followed the fine one might never settle.
     used = motion.covered(clock.controller_time_s(board_time_s))
     if used.sum() < MIN_SAMPLES:
         raise _not_found("board and arm were hardly recorded at the same time")
     clock = _settled(clock, board_time_s[used], readings_rad_s[used], motion)
     if not abs(clock.drift) < MAX_DRIFT or not clock.offset_std_s < COARSE_STEP_S:
-        raise _not_found(f"the board's clock would drift by {clock.drift * 1e6:.0f} ppm")
+        raise _not_found(
+            f"the board's clock would run {100 * clock.drift:+.2f} % off, to {clock.offset_std_s * 1e3:.1f} ms"
+        )
     return clock
 
 
@@ -133,7 +137,13 @@ def _check_samples(board_time_s: Array, readings: Array) -> None:
         raise _not_found(f"the recording holds {len(board_time_s)} samples")
     if not np.isfinite(readings).all():
         raise _not_finite("a reading")
-    if np.any(np.diff(board_time_s) <= 0):
+    if np.any(np.diff(board_time_s) == 0):
+        raise Fault(
+            "duplicated_samples",
+            "the recording holds two samples of the same moment",
+            "Record again; the board's firmware or the link has delivered samples twice",
+        )
+    if np.any(np.diff(board_time_s) < 0):
         raise Fault(
             "board_clock_restarted",
             "the board's clock goes back within the recording: the board was reset",
@@ -154,14 +164,33 @@ def _check_samples(board_time_s: Array, readings: Array) -> None:
         )
 
 
-def _coarse_offset(board_time_s: Array, readings: Array, motion: ArmMotion) -> float:
-    """Offset (controller − board) to within a step: peaks of the correlation of |rate|, judged by the vector fit."""
-    bins = ((board_time_s - board_time_s[0]) / COARSE_STEP_S).astype(np.intp)
+def _coarse(board_time_s: Array, readings: Array, motion: ArmMotion) -> TimeBase:
+    """The clock to within the fine fit's reach: of all offsets and drifts, the one under which most is explained."""
+    reference, half_s = (board_time_s[0] + board_time_s[-1]) / 2, (board_time_s[-1] - board_time_s[0]) / 2
+    spacing = 2 * COARSE_REACH_S / half_s
+    count = round(max(min(MAX_DRIFT, MAX_DRIFT_STEPS * spacing), MAX_DRIFT_LONG_RUN) / spacing)
+    found = (
+        (*_coarse_offset((board_time_s - reference) * (1 + drift), readings, motion), drift)
+        for drift in spacing * np.arange(-count, count + 1)
+    )
+    explained, offset, drift = max(found)
+    if explained < MIN_EXPLAINED:
+        raise _not_found(f"the arm's motion explains {100 * explained:.0f} % of what the gyroscope reads")
+    return TimeBase(float(offset - reference), float(drift), float(reference), np.zeros((2, 2)), np.zeros(3))
+
+
+def _coarse_offset(time_s: Array, readings: Array, motion: ArmMotion) -> tuple[float, float]:
+    """Share explained, and offset (controller − `time_s`) to within a step.
+
+    Looks at peaks of the correlation of |rate|, judged by the vector fit. A step holds at least one sample.
+    """
+    step_s = max(COARSE_STEP_S, 1.1 * float(np.median(np.diff(time_s))))
+    bins = ((time_s - time_s[0]) / step_s).astype(np.intp)
     counts = np.bincount(bins)
     seen = counts > 0
     sums = np.stack([np.bincount(bins, readings[:, axis]) for axis in range(3)], axis=1)
     board = np.where(seen[:, None], sums / np.maximum(counts, 1)[:, None], 0.0)
-    grid = np.arange(motion.time_s[0], motion.time_s[-1], COARSE_STEP_S)
+    grid = np.arange(motion.time_s[0], motion.time_s[-1], step_s)
     arm = motion.rate(grid)
 
     turning, moving = np.linalg.norm(board, axis=1), np.linalg.norm(arm, axis=1)
@@ -173,14 +202,9 @@ def _coarse_offset(board_time_s: Array, readings: Array, motion: ArmMotion) -> f
     peaks = np.flatnonzero((correlation[1:-1] > correlation[:-2]) & (correlation[1:-1] >= correlation[2:])) + 1
     best = peaks[np.argsort(correlation[peaks])[::-1][:CANDIDATES]] - len(turning)
 
-    explained = [_explained(board, seen, arm, int(lag)) for lag in best]
-    if not explained or max(explained) < MIN_EXPLAINED:
-        raise _not_found(
-            f"the arm's motion explains {100 * max(explained, default=0.0):.0f} % of what the gyroscope reads"
-        )
-    lag = int(best[int(np.argmax(explained))])
+    explained, lag = max(((_explained(board, seen, arm, int(lag)), int(lag)) for lag in best), default=(0.0, 0))
     # Bin j of the board, whose middle lies half a step after its start, stands beside point j + lag of the arm's grid.
-    return float(grid[0] + lag * COARSE_STEP_S - board_time_s[0] - COARSE_STEP_S / 2)
+    return explained, float(grid[0] + lag * step_s - time_s[0] - step_s / 2)
 
 
 def _explained(board: Array, seen: NDArray[np.bool_], arm: Array, lag: int) -> float:
