@@ -137,6 +137,16 @@ def test_an_interrupted_run_is_kept_and_resumed(start: Start, tmp_path: Path) ->
     assert f"rig resume {out}" in errors and "Traceback" not in errors
     assert not (out / "result.json").exists()
 
+    used = (out / "config.yaml").read_text(encoding="utf-8")
+    for change, name in (
+        ({"world": {"board": {"unique_id": "f" * 24}}}, "another_board"),
+        ({"procedure": {"order": ["wrist_1", "wrist_3", "wrist_2"]}}, "another_procedure"),
+    ):
+        (out / "config.yaml").write_text(yaml.safe_dump(merge(yaml.safe_load(used), change)), encoding="utf-8")
+        refused = rig("resume", out)
+        assert refused.returncode == 2 and f"rig: {name}: " in refused.stderr, refused.stderr
+    (out / "config.yaml").write_text(used, encoding="utf-8")
+
     resumed = rig("resume", out)
     assert resumed.returncode == 0, resumed.stderr
     result = json.loads((out / "result.json").read_text(encoding="utf-8"))
@@ -144,3 +154,26 @@ def test_an_interrupted_run_is_kept_and_resumed(start: Start, tmp_path: Path) ->
     assert len(result["sensors"]["gyro"]["time_bases"]) == 2
     assert resumed.stderr.count("done: sweep") == 4
     assert json.loads(rig("solve", out, "--json").stdout)["sensors"] == result["sensors"]
+
+
+def test_a_run_goes_on_when_nobody_reads_what_it_says(start: Start, tmp_path: Path) -> None:
+    out = tmp_path / "run"
+    process = start("run", configuration(tmp_path), "--out", out)
+    assert process.stderr is not None and process.stdout is not None
+    process.stderr.readline()
+    process.stderr.close()
+    process.stdout.close()
+    assert process.wait(50) == 0
+    assert json.loads((out / "result.json").read_text(encoding="utf-8"))["verdict"] == "pass"
+
+
+def test_a_run_that_was_refused_begins_with_resume(tmp_path: Path) -> None:
+    config = configuration(tmp_path)
+    document = yaml.safe_load(config.read_text(encoding="utf-8"))
+    del document["world"]
+    config.write_text(yaml.safe_dump(document), encoding="utf-8")
+    out = tmp_path / "a run"
+    assert "rig: no_port: " in rig("run", config, "--out", out).stderr
+    again = rig("run", config, "--out", out)
+    assert again.returncode == 2 and f"rig resume '{out}'" in again.stderr
+    assert "rig: no_port: " in rig("resume", out).stderr, "resume is what was advised, so it must go on to the board"

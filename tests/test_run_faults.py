@@ -1,10 +1,14 @@
 """A run that goes wrong: the arm stops, the data stay, the error has a name, the exit status is the promised one."""
 
+import os
+import pty
 import signal
+import socket
 import subprocess
 import sys
 import time
 from collections.abc import Callable, Iterator
+from contextlib import suppress
 from pathlib import Path
 from typing import Any
 
@@ -33,7 +37,12 @@ class RunningRig:
             stdout=subprocess.PIPE,
             stderr=subprocess.PIPE,
             text=True,
+            start_new_session=True,
         )
+
+    def send(self, number: signal.Signals) -> None:
+        """A signal to the command and all its processes in the foreground, as a terminal sends it."""
+        os.killpg(self.process.pid, number)
 
     def until(self, condition: Callable[[dict[str, Any]], bool], timeout_s: float = 30.0) -> dict[str, Any]:
         """Wait for a state of the world."""
@@ -79,18 +88,47 @@ def start(world: World, tmp_path: Path) -> Iterator[Start]:
         each.process.communicate()
 
 
-@pytest.mark.parametrize("number", [signal.SIGINT, signal.SIGTERM], ids=["Ctrl-C", "SIGTERM"])
+@pytest.mark.parametrize(
+    "number",
+    [signal.SIGINT, signal.SIGTERM, signal.SIGQUIT, signal.SIGTSTP],
+    ids=["Ctrl-C", "SIGTERM", "Ctrl-backslash", "Ctrl-Z"],
+)
 def test_an_interrupt_stops_the_arm_within_a_second(start: Start, number: signal.Signals) -> None:
     rig = start()
     rig.until_sweeping()
-    rig.process.send_signal(number)
+    rig.send(number)
     assert rig.stopped_after_s() < 1.0
     status, errors = rig.end()
     assert status == 130
+    assert "interrupted; the arm is stopped and at rest; " in errors
     assert f"rig resume {rig.out}" in errors
     assert not rig.world.state()["program_running"]
     run = read_run(rig.out / "run.h5")
     assert len(run.samples["gyro"]) > 0 and len(run.arm) > 0
+
+
+def test_killing_all_processes_at_once_stops_the_arm(start: Start) -> None:
+    rig = start()
+    rig.until_sweeping()
+    rig.send(signal.SIGKILL)
+    assert rig.stopped_after_s() < 1.0
+    rig.process.wait()
+    state = rig.world.state()
+    assert not state["program_running"] and abs(state["q_rad"][5]) < 3, "the arm went on to the end of its sweep"
+
+
+def test_resuming_a_run_that_still_goes_on_leaves_it_alone(start: Start) -> None:
+    rig = start()
+    rig.until_sweeping()
+    command = [sys.executable, "-m", "rig", "resume", str(rig.out), "--yes"]
+    second = subprocess.run(command, capture_output=True, text=True, timeout=30, check=False)
+    assert second.returncode == 2, second.stderr
+    time_s = rig.world.state()["time_s"]
+    rig.until(lambda state: state["time_s"] > time_s + 1.0)
+    rig.send(signal.SIGINT)
+    rig.end()
+    run = read_run(rig.out / "run.h5")
+    assert run.arm["time_s"][-1] > time_s + 0.5, "what came after the second command is lost"
 
 
 @pytest.mark.parametrize(
@@ -152,6 +190,33 @@ def test_nothing_moves_when_nobody_agrees(start: Start) -> None:
     assert status == 2
     assert "First it goes home" in errors and "rig: not_confirmed: " in errors
     assert rig.world.state()["q_rad"][5] == pytest.approx(0, abs=1e-6)
+
+
+def test_an_arm_that_was_moved_while_the_operator_thought_is_not_driven(world: World, tmp_path: Path) -> None:
+    handle = world()
+    document = yaml.safe_load(handle.config_path.read_text(encoding="utf-8"))
+    del document["world"]
+    config = tmp_path / "hardware.yaml"
+    config.write_text(yaml.safe_dump(document), encoding="utf-8")
+    operator, terminal = pty.openpty()
+    command = [sys.executable, "-m", "rig", "run", str(config), "--out", str(tmp_path / "run")]
+    with subprocess.Popen(command, stdin=terminal, stderr=terminal) as process:
+        os.close(terminal)
+        said = b""
+        while b"Type yes to start" not in said:
+            said += os.read(operator, 4096)
+        with socket.create_connection((handle.host, 30002)) as pendant:
+            pendant.sendall(b"def nudge():\n movej([0.2, -1.57, 1.57, -1.57, -1.57, 0], a=1.4, v=1.0)\nend\n")
+            while (state := handle.state())["program_running"] or state["q_rad"][0] < 0.19:
+                time.sleep(0.01)
+        os.write(operator, b"yes\n")
+        with suppress(OSError):  # a terminal whose other end has closed
+            while more := os.read(operator, 4096):
+                said += more
+        assert process.wait(20) == 2
+    os.close(operator)
+    assert b"rig: arm_moved: " in said, said
+    assert handle.state()["q_rad"][0] == pytest.approx(0.2, abs=1e-3)
 
 
 def test_check_looks_and_moves_nothing(world: World, tmp_path: Path) -> None:
