@@ -35,7 +35,8 @@ def guarded(command: Callable[[], int]) -> int:
     """Run a command; turn every named error into one message on stderr and its exit status."""
     keep_streams_usable()
     for number in _ENDING_SIGNALS:
-        signal.signal(number, _interrupt)
+        if signal.getsignal(number) != signal.SIG_IGN:  # ignored by who started us (nohup): so it stays
+            signal.signal(number, _interrupt)
     try:
         status = command()
         sys.stdout.flush()
