@@ -1,0 +1,120 @@
+"""The forward model of TRIAX, Eqs. (3), (9), (10): what a sensor reads in a known attitude, and the best fit to it.
+
+    v_m = F (s + φ s²) + b,   s = Rᵀ v_ref + v̄
+
+R takes the body frame to the table frame. θ holds F (row by row), v_ref, b, and φ (3,) where second-order terms are
+wanted: 15 or 18 numbers. The least-squares fit weighted by the readings' variances is the maximum of the likelihood;
+Gauss–Newton finds it from the paper's estimate in a few steps. With v̄ = 0, F and v_ref are known only up to a common
+factor, so there ‖v_ref‖ is held.
+
+All functions broadcast over runs: readings (…, N, 3), θ (…, 15 or 18).
+"""
+
+import numpy as np
+from numpy.typing import NDArray
+
+Array = NDArray[np.float64]
+
+F, REFERENCE, BIAS, SECOND = slice(0, 9), slice(9, 12), slice(12, 15), slice(15, 18)
+STEP_LIMIT = 30
+STEP_TOLERANCE = 1e-6
+
+
+def sensed(theta: Array, attitudes: Array, known: Array) -> Array:
+    """s = Rᵀ v_ref + v̄ (…, N, 3) from attitudes (N, 3, 3) and known parts v̄ (N, 3)."""
+    s: Array = np.einsum("nji,...j->...ni", attitudes, theta[..., REFERENCE]) + known
+    return s
+
+
+def predicted(theta: Array, attitudes: Array, known: Array) -> Array:
+    """The readings v_m (…, N, 3) of the model."""
+    s = sensed(theta, attitudes, known)
+    if theta.shape[-1] > 15:
+        s = s + theta[..., None, SECOND] * s**2
+    readings: Array = s @ np.swapaxes(matrix(theta), -1, -2) + theta[..., None, BIAS]
+    return readings
+
+
+def matrix(theta: Array) -> Array:
+    """F (…, 3, 3)."""
+    return theta[..., F].reshape(*theta.shape[:-1], 3, 3)
+
+
+def jacobian(theta: Array, attitudes: Array, known: Array) -> Array:
+    """(…, N, 3, 15 or 18) derivative of the readings with respect to θ."""
+    s, f = sensed(theta, attitudes, known), matrix(theta)[..., None, :, :]
+    slope, felt = np.ones_like(s), s
+    if theta.shape[-1] > 15:
+        second = theta[..., None, SECOND]
+        slope, felt = 1 + 2 * second * s, s + second * s**2
+    rows = np.zeros((*s.shape, theta.shape[-1]))
+    for i in range(3):
+        rows[..., i, 3 * i : 3 * i + 3] = felt
+        rows[..., i, 12 + i] = 1.0
+    rows[..., REFERENCE] = (f * slope[..., None, :]) @ np.swapaxes(attitudes, -1, -2)
+    if theta.shape[-1] > 15:
+        rows[..., SECOND] = f * (s**2)[..., None, :]
+    return rows
+
+
+def free_directions(theta: Array, *, norm_known: bool) -> Array:
+    """(…, p, q) columns: the ways θ may move. With the norm known, v_ref moves only across itself (q = p − 1)."""
+    p = theta.shape[-1]
+    free = np.zeros((*theta.shape[:-1], p, p))
+    free[...] = np.eye(p)
+    if not norm_known:
+        return free
+    reference = theta[..., REFERENCE]
+    unit = reference / np.linalg.norm(reference, axis=-1, keepdims=True)
+    # Householder: the reflection that takes v_ref to the first axis; its other columns lie across v_ref.
+    sign = np.where(unit[..., :1] < 0, -1.0, 1.0)
+    mirror = unit + sign * np.array([1.0, 0.0, 0.0])
+    mirror = mirror / np.linalg.norm(mirror, axis=-1, keepdims=True)
+    free[..., REFERENCE, REFERENCE] = np.eye(3) - 2 * mirror[..., :, None] * mirror[..., None, :]
+    return np.delete(free, 9, axis=-1)
+
+
+def weighted_jacobian(theta: Array, attitudes: Array, known: Array, variances: Array, *, norm_known: bool) -> Array:
+    """J (…, 3 N, q), weighted by 1/σ and reduced to the free directions: JᵀJ is the Fisher information."""
+    free = free_directions(theta, norm_known=norm_known)
+    rows = jacobian(theta, attitudes, known) / np.sqrt(variances)[..., None]
+    reduced: Array = rows.reshape(*rows.shape[:-3], -1, rows.shape[-1]) @ free
+    return reduced
+
+
+def covariance_bound(theta: Array, attitudes: Array, known: Array, variances: Array, *, norm_known: bool) -> Array:
+    """(…, p, p) inverse of the Fisher information: the covariance of the maximum-likelihood estimate to first order."""
+    reduced = weighted_jacobian(theta, attitudes, known, variances, norm_known=norm_known)
+    size = np.linalg.norm(reduced, axis=-2, keepdims=True)
+    scaled = reduced / size
+    inverse = np.linalg.inv(np.swapaxes(scaled, -1, -2) @ scaled) / (np.swapaxes(size, -1, -2) * size)
+    free = free_directions(theta, norm_known=norm_known)
+    bound: Array = free @ inverse @ np.swapaxes(free, -1, -2)
+    return bound
+
+
+def most_likely(
+    start: Array, readings: Array, attitudes: Array, known: Array, variances: Array, *, norm_known: bool
+) -> tuple[Array, int]:
+    """θ (…, p) of least weighted squares by Gauss–Newton from `start`, and the steps it took."""
+    theta = start.copy()
+    norm = np.linalg.norm(theta[..., REFERENCE], axis=-1, keepdims=True)
+    steps = 0
+    while steps < STEP_LIMIT:
+        steps += 1
+        reduced = weighted_jacobian(theta, attitudes, known, variances, norm_known=norm_known)
+        residuals = (readings - predicted(theta, attitudes, known)) / np.sqrt(variances)
+        size = np.linalg.norm(reduced, axis=-2)
+        scaled = reduced / size[..., None, :]
+        right = np.einsum("...rq,...r->...q", scaled, residuals.reshape(*residuals.shape[:-2], -1))
+        step = np.linalg.solve(np.swapaxes(scaled, -1, -2) @ scaled, right[..., None])[..., 0]
+        free = free_directions(theta, norm_known=norm_known)
+        theta = theta + np.einsum("...pq,...q->...p", free, step / size)
+        if norm_known:
+            reference = theta[..., REFERENCE]
+            theta[..., REFERENCE] = reference * (norm / np.linalg.norm(reference, axis=-1, keepdims=True))
+        # In standard deviations of a reading; beyond rounding, which small variances make large in this unit.
+        rounding = 1e-13 * np.linalg.norm(readings / np.sqrt(variances))
+        if np.max(np.linalg.norm(step, axis=-1)) <= STEP_TOLERANCE + rounding:
+            break
+    return theta, steps

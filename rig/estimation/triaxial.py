@@ -1,0 +1,181 @@
+"""Tri-axial calibration of the paper TRIAX: F, bias and the reference vector from readings in known attitudes.
+
+    v_m = F (Rᵀ v_ref + v̄) + b                                                             TRIAX, Eqs. (3), (9)
+
+R takes body coordinates to table coordinates; v_ref, in table coordinates, is found as well. v̄ is what the table itself
+adds: its rate for a gyroscope (v_ref is then the Earth's rate), nothing for an accelerometer or a magnetometer. With
+v̄ = 0 the factor between F and v_ref is unknown, so ‖v_ref‖ and the side it points to must be given.
+
+Two methods: "as_published" solves the stacked equations (`rig.estimation.stacked`); "maximum_likelihood" goes on from
+there to the weighted least squares in the readings (`rig.estimation.reference_model`), which has no bias from errors in
+X and depends neither on units nor on unequal noise.
+"""
+
+from dataclasses import dataclass
+from typing import Literal
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from rig.errors import Fault
+from rig.estimation import refusals
+from rig.estimation.reference_model import BIAS, REFERENCE, F, covariance_bound, most_likely, predicted, sensed
+from rig.estimation.stacked import column_sizes, published_covariance, published_estimate, stack
+
+Array = NDArray[np.float64]
+Method = Literal["as_published", "maximum_likelihood"]
+
+MAX_CONDITION = 1e4
+MIN_SIDE = 0.05  # cosine between the reference and the direction that says its sign
+REMEDY = "Take more attitudes, turned about at least two different axes"
+
+
+@dataclass(frozen=True, slots=True)
+class TriaxialSolution:
+    """What a tri-axial sensor's readings say, in the unit of the readings.
+
+    - `matrix` F (3, 3), `bias` b (3,), `reference` v_ref (3,) in table coordinates.
+    - `second_order` φ (3,), the diagonal of F̄ in 1/unit, or None.
+    - `covariance` (15, 15) or (18, 18): the rows of F, v_ref, b, φ.
+    - `residuals` (N, 3): reading less model. `rank` and `condition` are those of the scaled X; full is 15 (18), one
+      less where ‖v_ref‖ is given. `iterations` counts linear solutions or Gauss–Newton steps.
+    """
+
+    method: Method
+    matrix: Array
+    bias: Array
+    reference: Array
+    second_order: Array | None
+    covariance: Array
+    residuals: Array
+    observations: int
+    rank: int
+    condition: float
+    iterations: int
+    warnings: tuple[str, ...]
+
+
+def solve_triaxial(
+    readings: ArrayLike,
+    attitudes: ArrayLike,
+    variances: ArrayLike,
+    *,
+    known: ArrayLike | None = None,
+    reference_norm: float | None = None,
+    reference_side: ArrayLike | None = None,
+    second_order: bool = False,
+    method: Method = "as_published",
+) -> TriaxialSolution:
+    """Solve for F, v_ref and b, and φ with `second_order`.
+
+    `readings`, `variances` (N, 3): mean readings and the variances of these means; `attitudes` (N, 3, 3): R, body to
+    table; `known` (N, 3): v̄ in body coordinates, or None. Without it `reference_norm` and `reference_side` (3,), a
+    table vector whose product with v_ref is positive, must be given.
+
+    Raises Fault `too_few_observations`, `not_finite`, `bad_variance`, `zero_reading`, `duplicated_observation`,
+    `bad_attitude`, `rank_deficient`, `ill_conditioned`, `sign_unknown`, `mirrored_axis`.
+    """
+    m, r, v = (np.asarray(a, dtype=np.float64) for a in (readings, attitudes, variances))
+    v_bar = None if known is None else np.asarray(known, dtype=np.float64)
+    norm, side = reference_norm, np.zeros(3) if reference_side is None else np.asarray(reference_side, dtype=np.float64)
+    if (v_bar is None) != (norm is not None and reference_side is not None):
+        raise ValueError("give either known, or both reference_norm and reference_side")
+    parameters = 18 if second_order else 15
+    needed = parameters - (v_bar is None)
+    _check(m, r, v, v_bar, parameters)
+
+    start, solutions = published_estimate(m, r, v_bar, norm, side, second_order=second_order)
+    still = np.zeros_like(m) if v_bar is None else v_bar
+    squares = sensed(start, r, still) ** 2 if second_order else None
+    found = _conditioning(stack(m, r, squares) / column_sizes(m, squares), m, v, needed)
+    refusals.check_conditioning(found, needed, MAX_CONDITION, "some of F, reference and bias", REMEDY)
+    _check_side(start[REFERENCE], side)
+    if method == "as_published":
+        theta, iterations = start, solutions
+        covariance = published_covariance(theta, m, r, v_bar, v)
+    else:
+        theta, iterations = most_likely(start, m, r, still, v, norm_known=v_bar is None)
+        covariance = covariance_bound(theta, r, still, v, norm_known=v_bar is None)
+    f = theta[F].reshape(3, 3)
+    if np.linalg.det(f) < 0:
+        raise Fault(
+            "mirrored_axis",
+            "the sensor's axes form a left-handed frame: one is mirrored or two are swapped",
+            "Correct the order and signs of the sensor's axes, or the side the reference points to",
+        )
+    residuals = m - predicted(theta, r, still)
+    return TriaxialSolution(
+        method=method,
+        matrix=f,
+        bias=theta[BIAS],
+        reference=theta[REFERENCE],
+        second_order=theta[15:] if second_order else None,
+        covariance=covariance,
+        residuals=residuals,
+        observations=len(m),
+        rank=found.rank,
+        condition=found.condition,
+        iterations=iterations,
+        warnings=refusals.inconsistency(residuals, v, 3 * len(m) - needed),
+    )
+
+
+def solve_triaxial_batch(
+    readings: ArrayLike,
+    attitudes: ArrayLike,
+    variances: ArrayLike,
+    *,
+    known: ArrayLike | None = None,
+    reference_norm: float | None = None,
+    reference_side: ArrayLike | None = None,
+    second_order: bool = False,
+    method: Method = "as_published",
+) -> Array:
+    """θ (R, 15 or 18) = [rows of F, v_ref, b, φ] of many runs (R, N, 3) in the same attitudes, without gates."""
+    m, r, v = (np.asarray(a, dtype=np.float64) for a in (readings, attitudes, variances))
+    v_bar = None if known is None else np.asarray(known, dtype=np.float64)
+    side = np.zeros(3) if reference_side is None else np.asarray(reference_side, dtype=np.float64)
+    theta, _ = published_estimate(m, r, v_bar, reference_norm, side, second_order=second_order)
+    if method == "maximum_likelihood":
+        still = np.zeros(m.shape[-2:]) if v_bar is None else v_bar
+        theta, _ = most_likely(theta, m, r, still, v, norm_known=v_bar is None)
+    return theta
+
+
+def _check(m: Array, r: Array, v: Array, v_bar: Array | None, parameters: int) -> None:
+    count = len(m)
+    refusals.require_shape("readings", m, (count, 3))
+    refusals.require_shape("attitudes", r, (count, 3, 3))
+    refusals.require_shape("variances", v, (count, 3))
+    refusals.check_count(count, parameters // 3, parameters)
+    refusals.check_finite(readings=m, attitudes=r, variances=v)
+    if v_bar is not None:
+        refusals.require_shape("known", v_bar, (count, 3))
+        refusals.check_finite(known=v_bar)
+    refusals.check_variances(v)
+    refusals.check_signal(m)
+    if v_bar is None:
+        refusals.check_duplicates(m)  # averages never repeat; single samples of a turning sensor may
+    off = np.abs(r @ np.swapaxes(r, -1, -2) - np.eye(3)).max(axis=(1, 2))
+    if off.max() > 1e-6 or (np.linalg.det(r) < 0).any():
+        raise Fault(
+            "bad_attitude",
+            f"attitude {int(np.argmax(off))} is not a rotation (it misses by {off.max():.2g})",
+            "Give attitudes as rotation matrices from body to table coordinates",
+        )
+
+
+def _conditioning(scaled: Array, m: Array, v: Array, needed: int) -> refusals.Conditioning:
+    """Of the scaled X. Its readings are noisy, so directions that only noise tells do not count."""
+    noise = np.sqrt(v.max() / np.mean(m**2)) * (np.sqrt(len(m)) + np.sqrt(3))
+    return refusals.conditioning(scaled, needed, float(noise))
+
+
+def _check_side(reference: Array, side: Array) -> None:
+    """The sign of v_ref and F must be told by more than noise."""
+    if side.any() and abs(reference @ side) < MIN_SIDE * np.linalg.norm(reference) * np.linalg.norm(side):
+        raise Fault(
+            "sign_unknown",
+            "the reference lies across the direction that should tell its sign",
+            "Give a direction the reference points along, for example the vertical for gravity",
+        )
