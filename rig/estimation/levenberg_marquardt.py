@@ -1,0 +1,138 @@
+"""The six-observation model solved by Levenberg–Marquardt: what SIX compares Algorithm 1 with (Figs. 2 and 5).
+
+The residuals are ω² − ‖K (m + b)‖², Eqs. (2)–(4), weighted where weights are given, in the six parameters themselves,
+so that β0 needs no special care. With six sweeps the solution is that of `closed_form`, to rounding.
+"""
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from rig.errors import Fault
+from rig.estimation import refusals
+from rig.estimation.six_observation import design
+
+Array = NDArray[np.float64]
+
+MAX_CONDITION = 40.0  # as in `accumulator`
+REMEDY = "Sweep every wrist in both directions; a direction swept twice does not stand in for the other"
+
+
+@dataclass(frozen=True, slots=True)
+class LevenbergMarquardtSolution:
+    """Scale (3,), bias_rad_s (3,), covariance (6, 6) in the order kx ky kz bx by bz, of g = K (m + b).
+
+    `residuals_rad2_s2` (N,): ω² less the squared norm of the calibrated reading. `iterations` counts evaluations of the
+    model. `rank` and `condition` are those of the scaled design.
+    """
+
+    scale: Array
+    bias_rad_s: Array
+    covariance: Array
+    residuals_rad2_s2: Array
+    observations: int
+    rank: int
+    condition: float
+    iterations: int
+    warnings: tuple[str, ...]
+
+
+def solve_levenberg_marquardt(
+    means_rad_s: ArrayLike,
+    speeds_rad_s: ArrayLike,
+    variances_rad2_s2: ArrayLike,
+    *,
+    speed_std_rad_s: ArrayLike | None = None,
+    weighted: bool = True,
+) -> LevenbergMarquardtSolution:
+    """Least squares from k = 1, b = 0 by `scipy.optimize.least_squares(method="lm")` with the exact Jacobian.
+
+    `means_rad_s`, `variances_rad2_s2` (N, 3): mean readings of N ≥ 6 sweeps and the variances of these means;
+    `speeds_rad_s`, `speed_std_rad_s` (N,). Weights are the inverse variances of ω² at k = 1; SIX weighs all alike.
+
+    Raises Fault `too_few_observations`, `not_finite`, `bad_variance`, `bad_speed`, `zero_reading`,
+    `duplicated_observation`, `lm_did_not_converge`, `rank_deficient`, `ill_conditioned`, `wrong_unit`.
+    """
+    from scipy.optimize import least_squares
+
+    means, speeds, variances = (np.asarray(a, dtype=np.float64) for a in (means_rad_s, speeds_rad_s, variances_rad2_s2))
+    speed_std = np.zeros(len(means)) if speed_std_rad_s is None else np.asarray(speed_std_rad_s, dtype=np.float64)
+    _check(means, speeds, variances, speed_std)
+    centred = means - means.mean(axis=0)
+    length = float(np.sqrt(np.mean(np.sum(centred**2, axis=1))))
+    told = _conditioning(centred / length, float(np.sqrt(variances.max())) / length)
+    refusals.check_conditioning(told, 6, MAX_CONDITION, "scale or bias", REMEDY)
+    refusals.check_unit(np.full(3, np.sqrt(np.mean(speeds**2)) / length))
+    by_speed = (2 * speeds * speed_std) ** 2
+    std = np.sqrt(4 * speeds**2 * variances.mean(axis=1) + by_speed) if weighted else np.ones(len(means))
+
+    def residual(theta: Array) -> Array:
+        return (speeds**2 - squared_rate(theta, means)) / std
+
+    def slope(theta: Array) -> Array:
+        return -squared_rate_jacobian(theta, means) / std[:, None]
+
+    start = np.concatenate([np.ones(3), np.zeros(3)])
+    found = least_squares(
+        residual, start, slope, method="lm", x_scale="jac", ftol=1e-15, xtol=1e-15, gtol=1e-15, max_nfev=1000
+    )
+    if not found.success:
+        raise Fault(
+            "lm_did_not_converge",
+            "Levenberg–Marquardt did not find a minimum",
+            "Use the estimator newton; check that the readings fit the speeds",
+        )
+    theta = np.concatenate([np.abs(found.x[:3]), found.x[3:]])  # only k² is seen
+    refusals.check_unit(theta[:3])
+    weighted_jacobian = slope(theta)
+    gain = np.linalg.solve(weighted_jacobian.T @ weighted_jacobian, weighted_jacobian.T) / std
+    variance = squared_rate_variance(theta, means, variances) + by_speed
+    residuals = speeds**2 - squared_rate(theta, means)
+    return LevenbergMarquardtSolution(
+        scale=theta[:3],
+        bias_rad_s=theta[3:],
+        covariance=(gain * variance) @ gain.T,
+        residuals_rad2_s2=residuals,
+        observations=len(means),
+        rank=told.rank,
+        condition=told.condition,
+        iterations=int(found.nfev),
+        warnings=refusals.inconsistency(residuals, variance, len(means) - 6),
+    )
+
+
+def _conditioning(unit_means: Array, noise: float) -> refusals.Conditioning:
+    """Of the design of Eq. (7) for readings counted from their mean, in their length; squares double the noise."""
+    return refusals.conditioning(design(unit_means), 6, 2 * noise * float(np.sqrt(len(unit_means))))
+
+
+def squared_rate(theta: Array, means: Array) -> Array:
+    """‖K (m + b)‖² (N,) of mean readings (N, 3) for θ = [k b] (6,): SIX, Eqs. (1), (2)."""
+    return np.asarray(np.sum((theta[:3] * (means + theta[3:])) ** 2, axis=-1), dtype=np.float64)
+
+
+def squared_rate_jacobian(theta: Array, means: Array) -> Array:
+    """(N, 6) derivative of `squared_rate` with respect to k and b."""
+    k, shifted = theta[:3], means + theta[3:]
+    return np.concatenate([2 * k * shifted**2, 2 * k**2 * shifted], axis=-1)
+
+
+def squared_rate_variance(theta: Array, means: Array, variances: Array) -> Array:
+    """(N,) what the variances (N, 3) of the mean readings do to `squared_rate`, to first order."""
+    k, shifted = theta[:3], means + theta[3:]
+    return np.asarray(np.sum(4 * k**4 * shifted**2 * variances, axis=-1), dtype=np.float64)
+
+
+def _check(means: Array, speeds: Array, variances: Array, speed_std: Array) -> None:
+    count = len(means)
+    refusals.require_shape("means", means, (count, 3))
+    refusals.require_shape("speeds", speeds, (count,))
+    refusals.require_shape("variances", variances, (count, 3))
+    refusals.require_shape("speed_std", speed_std, (count,))
+    refusals.check_count(count, 6, 6)
+    refusals.check_finite(means=means, speeds=speeds, variances=variances, speed_std=speed_std)
+    refusals.check_variances(variances)
+    refusals.check_speeds(speeds)
+    refusals.check_signal(means)
+    refusals.check_duplicates(means)
