@@ -1,6 +1,7 @@
 /* Vector table, reset and faults. */
 #include "startup.h"
 
+#include <stdbool.h>
 #include <stddef.h>
 #include <string.h>
 
@@ -58,18 +59,22 @@ _Noreturn void reset_chip(void)
         ;
 }
 
-/* Writes down where it happened and starts afresh: a board that answers "fault at …" helps more than one that hangs. */
+#define FRAME_WORDS 8 /* r0 r1 r2 r3 r12 lr pc xpsr */
+
+/* Writes down where it happened and starts afresh: a board that answers "fault at …" helps more than one that hangs.
+   After a stack overflow there is no frame to read, and reading it would fault in here, which stops the core. */
 __attribute__((used)) static void record_fault(const uint32_t *frame)
 {
+    bool on_stack = frame >= stack_bottom && frame + FRAME_WORDS <= stack_top;
     fault_record.magic = FAULT_MAGIC;
-    fault_record.pc = frame[6]; /* r0 r1 r2 r3 r12 lr pc xpsr */
+    fault_record.pc = on_stack ? frame[6] : 0;
     reset_chip();
 }
 
-/* Naked: the stack pointer must still be the exception frame's. */
+/* Naked: the stack pointer must still be the exception frame's. It starts anew, for it may have left the stack. */
 __attribute__((naked)) void fault_handler(void)
 {
-    __asm volatile("mov r0, sp\n b record_fault");
+    __asm volatile("mov r0, sp\n ldr r1, =stack_top\n mov sp, r1\n b record_fault");
 }
 
 typedef void (*vector)(void);
