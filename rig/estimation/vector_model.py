@@ -127,7 +127,7 @@ def solve_vector_model(
     check_axes(axes, None if nominal_mounting is None else np.asarray(nominal_mounting, dtype=np.float64))
     order = np.array([i * columns + j for i in range(3) for j in range(3)] + [i * columns + 3 for i in range(3)])
     matrix_covariance = raw[np.ix_(order, order)]
-    to_parameters = _parameter_jacobian(matrix, scale)
+    to_parameters = parameter_jacobian(matrix, scale)
     to_angles = _angle_jacobian(axes, scale)
     sensed = np.array([i * columns + j for i in range(3) for j in range(4, columns)], dtype=np.intp)
     residuals = means - design @ coefficients
@@ -217,7 +217,7 @@ def _raw_covariance(inverse: Array, variances: Array, speed_noise: Array) -> Arr
     return np.asarray(covariance.reshape(3 * columns, 3 * columns), dtype=np.float64)
 
 
-def _parameter_jacobian(matrix: Array, scale: Array) -> Array:
+def parameter_jacobian(matrix: Array, scale: Array) -> Array:
     """(6, 12) derivative of k and b with respect to F (row by row) and c: δk = −k³ F_i·δF_i, δb = −δc."""
     jacobian = np.zeros((6, 12))
     for i in range(3):
