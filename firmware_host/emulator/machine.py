@@ -30,7 +30,7 @@ class EmulatedBoard:
     """An STM32L432KC with the rig's wiring, running `image`.
 
     `image`: the flash contents; `elf`: the same program with symbols; `devices`: what hangs on SPI1; `unique_id`:
-    12 bytes; `crystal_ppm`: how fast the board's clock runs; `boot_time_s`: virtual time of power-up. Instructions
+    12 bytes; `crystal_ppm`: how fast the board's crystal runs; `boot_time_s`: virtual time of power-up. Instructions
     are counted exactly and take one core cycle each; wait states and the entry of exceptions take no time.
     The same inputs at the same virtual times give the same bytes.
     """

@@ -45,12 +45,19 @@ class SpiDevice(Protocol):
         """Chip select rises."""
 
 
+# The MSI locked to the 32768 Hz crystal runs at 122 times its frequency, not at the 4 MHz it is meant to have
+LOCKED_MSI = 122 * 32_768 / 4_000_000
+
+
 class BoardClock:
-    """Virtual seconds ↔ board ticks: the board starts at `boot_time_s`, its crystal is `crystal_ppm` fast."""
+    """Virtual seconds ↔ board ticks: the board starts at `boot_time_s`, its crystal is `crystal_ppm` fast.
+
+    The clock counts as locked to the crystal from the start; on the chip it has its own error for the first seconds.
+    """
 
     def __init__(self, boot_time_s: float, crystal_ppm: float) -> None:
         self._boot_time_s = boot_time_s
-        self._ticks_per_s = TICK_HZ * (1 + crystal_ppm * 1e-6)
+        self._ticks_per_s = TICK_HZ * LOCKED_MSI * (1 + crystal_ppm * 1e-6)
 
     def last_tick(self, time_s: float) -> int:
         """The last tick at or before `time_s`."""
