@@ -14,7 +14,7 @@ from rig.config.load import load
 from rig.config.models import RigConfig
 from rig.errors import RigError
 from rig.launch import simulated_laboratory, written
-from rig.opening import find_sensor, refusing_board_errors
+from rig.opening import find_sensor, refusing
 
 
 def check(config_path: Path, overrides: Sequence[str]) -> int:
@@ -38,7 +38,7 @@ def _named(look_at: Callable[[RigConfig], list[str]], config: RigConfig) -> list
 
 def _look_at_board(config: RigConfig) -> list[str]:
     missing = []
-    with refusing_board_errors(), Board(config.board.port, config.board.baud, lambda batch: None) as board:
+    with refusing(), Board(config.board.port, config.board.baud, lambda batch: None) as board:
         identity = board.identity
         print(f"board at {config.board.port}: {identity.unique_id}, firmware {identity.firmware}")
         for name, section in config.sensors.items():

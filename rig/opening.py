@@ -18,7 +18,7 @@ from rig.arm.plan import plan_six_observation
 from rig.arm.state import ArmReport
 from rig.config.load import Loaded, parse
 from rig.config.models import RigConfig, SensorSection, mounting_matrix
-from rig.errors import Refused
+from rig.errors import Fault, Refused
 from rig.monitor import Monitor, SensorCount
 from rig.procedure import Confirm, Rig
 from rig.progress import View
@@ -40,7 +40,7 @@ def open_rig(
     _refuse_another_procedure(config, earlier)
     with ExitStack() as stack:
         monitor = Monitor()
-        with refusing_board_errors():
+        with refusing():
             board = stack.enter_context(Board(config.board.port, config.board.baud, monitor.on_samples))
             sensors = {name: _set_up(board, name, section, monitor) for name, section in config.sensors.items()}
         view.line(f"board: {board.identity.unique_id}, firmware {board.identity.firmware} at {config.board.port}")
@@ -52,7 +52,8 @@ def open_rig(
 
         provenance = _provenance(loaded, board.identity, report)
         _refuse_other_instruments(provenance, sensors, earlier)
-        recorder = RunRecorder(recording, config=loaded.rig_text, provenance=provenance, sensors=sensors)
+        with refusing():
+            recorder = RunRecorder(recording, config=loaded.rig_text, provenance=provenance, sensors=sensors)
         monitor.recorder = stack.enter_context(recorder)
         yield Rig(
             plan=plan_six_observation(config.arm, config.procedure, report.state.q_rad, _finished_sweeps(earlier)),
@@ -107,11 +108,11 @@ def _refuse_other_instruments(
 
 
 @contextmanager
-def refusing_board_errors() -> Iterator[None]:
-    """Before anything has moved, what is wrong with the board is a refusal."""
+def refusing() -> Iterator[None]:
+    """Before anything has moved, what is wrong with the board or the recording is a refusal."""
     try:
         yield
-    except BoardError as error:
+    except (BoardError, Fault) as error:
         raise Refused(error.name, error.what, error.remedy) from error
 
 
