@@ -7,8 +7,8 @@ once the arm's measured rate is taken out of them. The mean comes first; squarin
 Nothing doubtful is averaged: whatever does not belong into a calibration raises a Fault with a name of its own.
 """
 
-from collections.abc import Iterator
-from dataclasses import dataclass
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass, replace
 from typing import Any
 
 import numpy as np
@@ -24,12 +24,16 @@ STUCK_REPEATS = 10  # equal readings in a row, of a sensor whose noise exceeds a
 REST_SETTLING_S = 0.2  # kept away from either end of a rest
 MAX_REST_TRAVEL_RAD = 1e-3
 MIN_REST_SAMPLES = 20
+MIN_RESTS = 3  # to tell whether the bias drifts
 MAX_READING_RATIO = 4.0  # reading over turn rate, either way: no gyroscope is that far off, a wrong unit or range is
 
 
 @dataclass(frozen=True, slots=True)
 class Average:
-    """Readings averaged: mean (3,) rad/s, variance (3,) of that mean in (rad/s)², noise (3,) of one sample in rad/s."""
+    """Readings averaged: mean (3,) rad/s, variance (3,) of that mean in (rad/s)², noise (3,) of one sample in rad/s.
+
+    The variance of a revolution also holds the drift of the bias from rest to rest.
+    """
 
     mean_rad_s: Array
     variance_rad2_s2: Array
@@ -94,8 +98,32 @@ def observe(run: RunData, sensor: str, settings: ObservationSection) -> SensorOb
     for sweep, window in _finished(run, "sweep"):
         turn = find_revolution(motion, sweep, window, settings)
         revolutions.append(_observation(stream, motion, sweep, turn, settings))
-    rests = (_rest(stream, motion, window) for _, window in _finished(run, "rest"))
-    return SensorObservations(stream.clock, tuple(revolutions), tuple(rest for rest in rests if rest))
+    rests = tuple(rest for _, window in _finished(run, "rest") if (rest := _rest(stream, motion, window)))
+    drift = bias_drift(rests)
+    return SensorObservations(stream.clock, tuple(_drifting(o, drift) for o in revolutions), rests)
+
+
+def bias_drift(rests: Sequence[Average]) -> Array:
+    """(3,) variance in (rad/s)² by which the bias differs from rest to rest, beyond what the noise of a rest explains.
+
+    Zero unless that is significant over all axes (χ² at 0.99), so that a steady sensor is left alone.
+    """
+    from scipy.special import chdtri
+
+    if len(rests) < MIN_RESTS:
+        return np.zeros(3)
+    means = np.array([rest.mean_rad_s for rest in rests])
+    noise = np.array([rest.variance_rad2_s2 for rest in rests]).mean(axis=0)
+    scatter = means.var(axis=0, ddof=1)
+    freedom = len(rests) - 1
+    significant = freedom * float(np.sum(scatter / noise)) > chdtri(3 * freedom, 0.01)
+    return np.maximum(scatter - noise, 0.0) if significant else np.zeros(3)
+
+
+def _drifting(observation: Observation, drift: Array) -> Observation:
+    average = observation.average
+    wider = replace(average, variance_rad2_s2=average.variance_rad2_s2 + drift)
+    return replace(observation, average=wider)
 
 
 def has_finished_sweeps(run: RunData) -> bool:

@@ -164,6 +164,28 @@ def test_rests_show_the_reading_at_zero_rate() -> None:
         assert np.all(np.abs(rest.mean_rad_s + BIAS_RAD_S) < 4.5 * np.sqrt(rest.variance_rad2_s2))
 
 
+def drifting(run: RunData, change_rad_s: float) -> RunData:
+    """The bias changes evenly by so much from the first to the last sample."""
+
+    def change(values: NDArray[np.int32]) -> None:
+        values += np.round(np.linspace(-0.5, 0.5, len(values))[:, None] * change_rad_s / SENSITIVITY).astype(np.int32)
+
+    return counts(run, change)
+
+
+@pytest.mark.parametrize(("noise_rad_s", "change_rad_s"), [(0.035, 0.03), (0.003, 0.01)])
+def test_a_bias_that_drifts_makes_the_result_uncertain(noise_rad_s: float, change_rad_s: float) -> None:
+    """The rests show it. Without them the errors would be nine and thirty times what is reported."""
+    setups = [Setup(seed=seed, noise_rad_s=noise_rad_s) for seed in range(6)]
+    errors = []
+    for setup in setups:
+        solution = solve_runs([drifting(synthetic_run(setup), change_rad_s)])["gyro"].solution
+        found = np.concatenate([solution.scale, solution.bias_rad_s])
+        errors.append((found - truth(setup)) / np.sqrt(np.diag(solution.covariance)))
+        assert change_rad_s / 10 < np.sqrt(solution.covariance[3, 3]) < change_rad_s
+    assert 0.5 < np.sqrt(np.mean(np.square(errors))) < 1.3
+
+
 def between(run: RunData, start_s: float, end_s: float) -> NDArray[np.intp]:
     """Indices of the samples in a stretch of the first sweep, in seconds after its start."""
     begun = next(event.controller_time_s for event in run.events if event.name == "sweep_started") or 0.0

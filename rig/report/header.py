@@ -1,5 +1,6 @@
 """The calibration as a C header, for firmware that corrects its own readings."""
 
+import re
 from collections.abc import Mapping
 from typing import Any
 
@@ -7,24 +8,37 @@ from typing import Any
 def calibration_header(result: Mapping[str, Any]) -> str:
     """C source text for a `result.json` document (schema `rig.result/1`).
 
-    One pair of arrays a sensor, in the convention g = K (m + b): scale factors (no unit) and biases in rad/s.
+    One pair of arrays a sensor and the function that applies them, g = K (m + b): scale factors (no unit) and biases
+    in rad/s. Names are those of the sensors, with everything that C does not allow written as `_`.
     """
     lines = [
-        "/* Gyroscope calibration: rate_rad_s[i] = scale[i] * (reading_rad_s[i] + bias_rad_s[i]).",
+        "/* Gyroscope calibration, g = K (m + b): rate_rad_s[i] = scale[i] * (reading_rad_s[i] + bias_rad_s[i]).",
         f" * Verdict: {result['verdict']}. Solved {result['provenance']['solved_utc']}. */",
         "#ifndef CALIBRATION_H",
         "#define CALIBRATION_H",
     ]
     for name, sensor in result["sensors"].items():
-        upper = "".join(c if c.isalnum() else "_" for c in name).lower()
+        prefix = re.sub(r"^(?=[^a-z])", "sensor_", re.sub(r"[^a-z0-9]", "_", name.lower()))
+        about = f"{sensor['part']}, serial number {sensor['serial_number']}, at {sensor['temperature_c']:.1f} °C"
         lines += [
             "",
-            f"/* {sensor['part']}, serial number {sensor['serial_number']}, at {sensor['temperature_c']:.1f} °C. */",
-            f"static const float {upper}_scale[3] = {_array(sensor['scale'])};",
-            f"static const float {upper}_bias_rad_s[3] = {_array(sensor['bias_rad_s'])};",
+            f"/* {_comment(about)}. */",
+            f"static const float {prefix}_scale[3] = {_array(sensor['scale'])};",
+            f"static const float {prefix}_bias_rad_s[3] = {_array(sensor['bias_rad_s'])};",
+            "",
+            f"static inline void {prefix}_calibrate(const float reading_rad_s[3], float rate_rad_s[3])",
+            "{",
+            "    for (int i = 0; i < 3; i++)",
+            f"        rate_rad_s[i] = {prefix}_scale[i] * (reading_rad_s[i] + {prefix}_bias_rad_s[i]);",
+            "}",
         ]
     return "\n".join([*lines, "", "#endif", ""])
 
 
 def _array(values: list[float]) -> str:
     return "{" + ", ".join(f"{value:.9e}f" for value in values) + "}"
+
+
+def _comment(text: str) -> str:
+    """What a serial number may hold must not end the comment it stands in."""
+    return " ".join(text.replace("*/", "* /").replace("/*", "/ *").split())
