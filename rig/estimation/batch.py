@@ -101,9 +101,10 @@ def _solve(matrices: Array, right: Array) -> Array:
     try:
         return np.asarray(np.linalg.solve(matrices, right), dtype=np.float64)
     except np.linalg.LinAlgError:
-        singular = np.linalg.matrix_rank(matrices) < 6
+        usable = np.flatnonzero(np.isfinite(matrices).all(axis=(1, 2)))
+        usable = usable[np.linalg.matrix_rank(matrices[usable]) == 6]
         answers = np.full_like(right, np.nan)
-        answers[~singular] = np.linalg.solve(matrices[~singular], right[~singular])
+        answers[usable] = np.linalg.solve(matrices[usable], right[usable])
         return answers
 
 

@@ -46,7 +46,7 @@ def solve_levenberg_marquardt(
     speed_std_rad_s: ArrayLike | None = None,
     weighted: bool = True,
 ) -> LevenbergMarquardtSolution:
-    """Least squares from k = 1, b = 0 by `scipy.optimize.least_squares(method="lm")` with the exact Jacobian.
+    """Least squares by `scipy.optimize.least_squares(method="lm")` with the exact Jacobian, from k = 1, b = −(mean m).
 
     `means_rad_s`, `variances_rad2_s2` (N, 3): mean readings of N ≥ 6 sweeps and the variances of these means;
     `speeds_rad_s`, `speed_std_rad_s` (N,). Weights are the inverse variances of ω² at k = 1; SIX weighs all alike.
@@ -73,7 +73,8 @@ def solve_levenberg_marquardt(
     def slope(theta: Array) -> Array:
         return -squared_rate_jacobian(theta, means) / std[:, None]
 
-    start = np.concatenate([np.ones(3), np.zeros(3)])
+    # From b = 0 the search runs off to infinity once the bias is about as large as the speed.
+    start = np.concatenate([np.ones(3), -means.mean(axis=0)])
     found = least_squares(
         residual, start, slope, method="lm", x_scale="jac", ftol=1e-15, xtol=1e-15, gtol=1e-15, max_nfev=1000
     )
