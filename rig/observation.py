@@ -201,10 +201,10 @@ def _between(stream: _Stream, start_s: float, end_s: float) -> slice:
 def _average(stream: _Stream, inside: slice, duration_s: float, excess: Array, covered: NDArray[np.bool_]) -> Average:
     """Mean and its variance; `excess` (n,) is the arm's rate less its mean 2π/T, known where `covered` (n,).
 
-    The mean is where a straight line of reading against excess passes zero: few samples do not meet the vibration
-    evenly. The noise is what is left of that line, and never below the rounding to counts. Its
-    variance is divided by the number of samples, and widened where the residuals are not white. Rounding averages out
-    only as far as noise carries the reading across counts: the part exp(−(2πσ/count)²) of its variance stays.
+    A straight line of reading against excess says what is read at the mean speed: few samples do not meet the vibration
+    evenly. The noise is what is left of that line, and never below the rounding to counts; its variance is widened
+    where the residuals are not white. Rounding averages out only as far as noise carries the reading across counts: the
+    part exp(−(2πσ/count)²) of its variance stays.
     """
     m = stream.readings_rad_s[inside]
     columns, known = np.column_stack([np.ones(int(covered.sum())), excess[covered]]), m[covered]
@@ -217,13 +217,12 @@ def _average(stream: _Stream, inside: slice, duration_s: float, excess: Array, c
     staying = rounding * np.exp(-((2 * np.pi / count) ** 2) * (variance - rounding))
     wider = np.array([widening(residual[:, axis]) for axis in range(3)])
     temperature = stream.raw["temperature_counts"][inside].mean() * stream.sensor.temperature_c_per_count
-    # What is missed in a hole between arm states would not average out of the excess.
-    mean = coefficients[0] if covered.all() else m.mean(axis=0)
+    of_the_mean = np.linalg.pinv(columns.T @ columns, hermitian=True)[0, 0]  # 1/n where the excess averages out
     return Average(
-        mean_rad_s=mean,
-        variance_rad2_s2=variance * wider / len(m) + staying,
+        mean_rad_s=coefficients[0],
+        variance_rad2_s2=variance * wider * of_the_mean + staying,
         noise_rad_s=np.sqrt(variance),
-        samples=len(m),
+        samples=len(known),
         duration_s=duration_s,
         temperature_c=float(temperature) + stream.sensor.temperature_offset_c,
     )
