@@ -90,6 +90,14 @@ def _parser() -> argparse.ArgumentParser:
         "--estimator", default="newton", metavar="NAME", help="newton (default) or algorithm_1, as published"
     )
     solve.add_argument("--json", action="store_true", help="for machines")
+    study = add("study", _study, "Monte-Carlo studies of the papers' figures and tables; without a name, list them")
+    study.add_argument("name", nargs="?", metavar="NAME")
+    study.add_argument("--out", type=Path, default=Path("studies"), metavar="DIR", help="default: studies")
+    study.add_argument("--seed", type=int, default=1, metavar="N", help="default: 1")
+    study.add_argument("--runs", type=int, metavar="N", help="per parameter set (default: as many as the paper)")
+    study.add_argument("--jobs", type=int, metavar="N", help="processes; the results do not depend on it")
+    study.add_argument("--dask", metavar="ADDRESS", help="compute on the cluster of this Dask scheduler")
+    study.add_argument("--format", choices=("csv", "parquet"), default="csv", help="of the table (default: csv)")
     world = add("world", _world, "only the simulated laboratory, in the foreground, for any client")
     _add_config(world)
     return parser
@@ -158,6 +166,22 @@ def _solve(options: argparse.Namespace) -> int:
     from rig.run import solve
 
     return solve(options.run, options.estimator, as_json=options.json)
+
+
+def _study(options: argparse.Namespace) -> int:
+    from rig.study.command import list_studies, run_study
+
+    if options.name is None:
+        return list_studies()
+    return run_study(
+        options.name,
+        options.out,
+        seed=options.seed,
+        runs=options.runs,
+        jobs=options.jobs,
+        dask=options.dask,
+        table_format=options.format,
+    )
 
 
 def _world(options: argparse.Namespace) -> int:

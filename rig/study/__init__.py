@@ -1,0 +1,1 @@
+"""Monte-Carlo studies: the papers' figures and tables, made with the rig's own estimators."""

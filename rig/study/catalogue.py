@@ -1,0 +1,45 @@
+"""The studies by name. Each is a module with `study(settings) -> Report`, imported only when it is asked for."""
+
+import importlib
+from collections.abc import Callable
+from dataclasses import dataclass
+
+from rig.errors import Refused
+from rig.study.report import Report, Settings
+
+
+@dataclass(frozen=True, slots=True)
+class Entry:
+    """A study: what it shows, and the function `module:name` that makes it."""
+
+    summary: str
+    function: str
+
+    def run(self, settings: Settings) -> Report:
+        """Compute it."""
+        module, name = self.function.split(":")
+        study: Callable[[Settings], Report] = getattr(importlib.import_module(f"rig.study.{module}"), name)
+        return study(settings)
+
+
+STUDIES = {
+    "normal": Entry("SIX Fig. 2: error bands of Algorithm 1 and Levenberg–Marquardt, usual gyroscopes", "bands:normal"),
+    "extreme": Entry("SIX Fig. 5: the same for poor gyroscopes", "bands:extreme"),
+    "speed": Entry("SIX Fig. 4: mean squared error against the speed of the sweeps", "speed:study"),
+    "convergence": Entry("SIX Table I, and where Algorithm 1 stops converging", "convergence:study"),
+    "sine": Entry("SIX Fig. 3: readings before and after calibration in a swinging movement", "sine:study"),
+    "averaging": Entry("averaging before squaring against squaring before averaging", "averaging:study"),
+    "estimators": Entry("every estimator's mean squared error over its Cramér–Rao bound", "estimators:study"),
+    "misalignment": Entry("error against mounting error and non-orthogonality", "misalignment:study"),
+    "kvh-gyro": Entry("TRIAX III-A: fiber-optic gyroscope on a rate table, bias drift of Fig. 4", "kvh_gyro:study"),
+    "kvh-accelerometer": Entry(
+        "TRIAX III-B: accelerometer on a rate table, bias drift of Fig. 6", "kvh_accelerometer:study"
+    ),
+}
+
+
+def find(name: str) -> Entry:
+    """The study of that name. Raises Refused `unknown_study`."""
+    if name not in STUDIES:
+        raise Refused("unknown_study", f"there is no study {name!r}", f"Choose one of {', '.join(STUDIES)}")
+    return STUDIES[name]

@@ -1,0 +1,95 @@
+"""Writes a study's report: its table, its findings and its plot."""
+
+import csv
+from collections.abc import Sequence
+from pathlib import Path
+from typing import Any, Literal
+
+import numpy as np
+
+from rig.errors import Refused
+from rig.study.report import Columns, Finding, Report, table
+
+Format = Literal["csv", "parquet"]
+
+
+def write(report: Report, folder: Path, name: str, table_format: Format) -> tuple[Path, ...]:
+    """Write `name`.csv (or .parquet), `name`-findings.csv, `name`.svg and `name`.png; earlier ones are replaced.
+
+    Raises Refused `study_folder`, `missing_extra`.
+    """
+    try:
+        folder.mkdir(parents=True, exist_ok=True)
+    except OSError as error:
+        raise Refused("study_folder", f"{folder} cannot be made: {error}", "Choose another with --out") from error
+    paths = (
+        folder / f"{name}.{table_format}",
+        folder / f"{name}-findings.csv",
+        folder / f"{name}.svg",
+        folder / f"{name}.png",
+    )
+    if table_format == "parquet":
+        _write_parquet(report.columns, paths[0])
+    else:
+        _write_csv(report.columns, paths[0])
+    _write_csv(_findings(report.findings), paths[1])
+    _write_plots(report, paths[2:])
+    return paths
+
+
+def missing_extra(error: ImportError, extra: str) -> Refused:
+    """The error for a library that only an optional extra brings."""
+    return Refused(
+        "missing_extra",
+        f"the library {error.name} is not installed",
+        f"Install the extra: pip install 'calibration-rig[{extra}]'",
+    )
+
+
+def _findings(findings: Sequence[Finding]) -> Columns:
+    return table(
+        {
+            "quantity": finding.quantity,
+            "value": finding.value,
+            "published": finding.published,
+            "unit": finding.unit,
+            "ratio": finding.ratio,
+        }
+        for finding in findings
+    )
+
+
+def _write_csv(columns: Columns, path: Path) -> None:
+    with path.open("w", newline="", encoding="utf-8") as file:
+        writer = csv.writer(file)
+        writer.writerow(columns)
+        writer.writerows([_text(value) for value in row] for row in zip(*columns.values(), strict=True))
+
+
+def _text(value: Any) -> str:
+    """Numbers with ten digits: more than a study can mean, and the same on every machine."""
+    if value is None:
+        return ""
+    return f"{value:.10g}" if isinstance(value, float | np.floating) else str(value)
+
+
+def _write_parquet(columns: Columns, path: Path) -> None:
+    try:
+        import pyarrow
+        import pyarrow.parquet
+    except ImportError as error:
+        raise missing_extra(error, "parquet") from error
+    pyarrow.parquet.write_table(pyarrow.table(dict(columns)), path)
+
+
+def _write_plots(report: Report, paths: Sequence[Path]) -> None:
+    import matplotlib as mpl
+    from matplotlib.figure import Figure
+
+    with mpl.rc_context({"font.size": 9, "svg.hashsalt": "rig", "axes.grid": True, "grid.alpha": 0.3}):
+        figure = Figure(figsize=report.size_inches, layout="constrained")
+        report.draw(figure)
+        for path in paths:
+            # Without the date the same study gives the same file.
+            metadata = {"Date": None} if path.suffix == ".svg" else {}
+            figure.savefig(path, dpi=110, metadata=metadata)

@@ -1,0 +1,169 @@
+"""A simulated three-axis rate table with a KVH 1775 on it: the numbers of TRIAX, and its movements."""
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from rig.estimation.triaxial import solve_triaxial
+from rig.study.report import Array, table
+
+if TYPE_CHECKING:
+    from matplotlib.axes import Axes
+
+RATE_HZ = 25.0  # TRIAX, section III-A
+REPEATS, ATTITUDES, AVERAGED_S = 10, 10, 360.0  # TRIAX, section III-A: ten repeats of ten attitudes, six minutes each
+
+DEG_H = np.pi / 180 / 3600  # rad/s
+EARTH_RATE_RAD_S = 7.2921159e-5
+GYRO_MATRIX = np.array([[1.0004, 0.0007, 0.0007], [-0.0006, 1.0013, -0.0042], [-0.0013, 0.0044, 0.9997]])
+GYRO_REFERENCE_RAD_S = np.array([-1.0755, -11.5266, -10.1612]) * DEG_H
+GYRO_BIAS_RAD_S = np.array([-0.5434, 0.1925, -0.0279]) * DEG_H
+GYRO_RANDOM_WALK = 0.012 * np.pi / 180 / 60  # rad/√s, from 0.012 °/√h
+GYRO_RESIDUAL_RAD_S = 0.0475 * np.pi / 180
+
+MG = 9.80665e-3  # m/s²
+GRAVITY_M_S2 = 9.80061
+ACCELEROMETER_MATRIX = np.array(
+    [[1.000427, 0.000121, 0.001002], [-0.000196, 1.000291, -0.004034], [-0.001121, 0.004356, 1.000529]]
+)
+ACCELEROMETER_SECOND_ORDER = 1e-4 * np.array([0.0972, -0.9478, -0.1764])  # 1/(m/s²)
+ACCELEROMETER_BIAS_M_S2 = np.array([0.9664, -0.4173, 0.8803]) * MG
+ACCELEROMETER_REFERENCE_M_S2 = -np.array([0.015499, -0.004079, 9.800597])  # Eq. (11): what is felt is −g
+ACCELEROMETER_RANDOM_WALK = 0.070104 / 60  # m/s/√s, from 0.070104 m/s/√h
+ACCELEROMETER_RESIDUAL_M_S2 = 0.3901 * MG
+
+
+def attitudes(count: int) -> Array:
+    """Rotations (count, 3, 3), body to table: the same ones every time, spread over all directions."""
+    from scipy.spatial.transform import Rotation
+
+    quaternions = np.random.default_rng(1775).normal(size=(count, 4))
+    return np.asarray(Rotation.from_quat(quaternions).as_matrix(), dtype=np.float64)
+
+
+def swinging(duration_s: float) -> tuple[Array, Array]:
+    """Attitudes (N, 3, 3) and body rates (N, 3) in rad/s while all three axes swing by ±60°, each at its own pace.
+
+    TRIAX shows its movement only as a picture; what matters is that every axis turns and tilts.
+    """
+    from scipy.spatial.transform import Rotation
+
+    time_s = np.arange(round(duration_s * RATE_HZ)) / RATE_HZ
+    pace = 2 * np.pi / np.array([11.0, 17.0, 23.0])  # rad/s of phase, for yaw, pitch and roll
+    amplitude = np.pi / 3
+    yaw, pitch, roll = (amplitude * np.sin(pace[:, None] * time_s)).astype(np.float64)
+    yaw_rate, pitch_rate, roll_rate = amplitude * pace[:, None] * np.cos(pace[:, None] * time_s)
+    turned = Rotation.from_euler("ZYX", np.stack([yaw, pitch, roll], axis=1)).as_matrix()
+    rates = np.stack(
+        [
+            roll_rate - yaw_rate * np.sin(pitch),
+            pitch_rate * np.cos(roll) + yaw_rate * np.sin(roll) * np.cos(pitch),
+            -pitch_rate * np.sin(roll) + yaw_rate * np.cos(roll) * np.cos(pitch),
+        ],
+        axis=1,
+    )
+    return np.asarray(turned, dtype=np.float64), rates
+
+
+def felt(turned: Array, reference: Array) -> Array:
+    """Rᵀ v_ref (N, 3) from attitudes (N, 3, 3), body to table."""
+    return np.asarray(reference @ turned, dtype=np.float64)
+
+
+@dataclass(frozen=True, slots=True)
+class Drifting:
+    """A sensor whose bias moves from one repeat to the next.
+
+    F (3, 3), reference (3,), second-order terms (3,), the first bias (3,), the standard deviations of
+    its steps before each repeat, and the random walk that limits an average; all in the unit of the readings.
+    """
+
+    matrix: Array
+    reference: Array
+    second_order: Array
+    bias: Array
+    bias_steps: Array
+    random_walk: float
+
+    def repeats(self, rng: np.random.Generator, unit: float, unit_name: str) -> list[dict[str, Any]]:
+        """TRIAX, Figs. 4 and 6: one row for each repeat, with the bias in `unit`.
+
+        `held`: F and the reference are known from a calibration before, only the bias is found. `free`: all parameters
+        are found anew from the ten attitudes, with the reference's norm known.
+        """
+        turned = attitudes(ATTITUDES)
+        still = felt(turned, self.reference)
+        model = (still + self.second_order * still**2) @ self.matrix.T
+        variance = self.random_walk**2 / AVERAGED_S
+        biases = self.bias + np.cumsum(self.bias_steps[:, None] * rng.normal(size=(REPEATS, 3)), axis=0)
+        rows = []
+        for repeat, bias in enumerate(biases):
+            means = model + bias + np.sqrt(variance) * rng.normal(size=model.shape)
+            free = solve_triaxial(
+                means,
+                turned,
+                np.full(means.shape, variance),
+                reference_norm=float(np.linalg.norm(self.reference)),
+                reference_side=self.reference,
+                second_order=bool(self.second_order.any()),
+            )
+            held = np.mean(means - model, axis=0)
+            free_std = np.sqrt(np.diag(free.covariance)[12:15])
+            row: dict[str, Any] = {"repeat": repeat + 1}
+            for i, axis in enumerate("xyz"):
+                row[f"true_bias_{axis}_{unit_name}"] = bias[i] / unit
+                row[f"held_bias_{axis}_{unit_name}"] = held[i] / unit
+                row[f"free_bias_{axis}_{unit_name}"] = free.bias[i] / unit
+                row[f"free_bias_std_{axis}_{unit_name}"] = free_std[i] / unit
+            row[f"held_bias_std_{unit_name}"] = np.sqrt(variance / ATTITUDES) / unit
+            rows.append(row)
+        return rows
+
+
+def draw_drift(panel: "Axes", rows: list[dict[str, Any]], unit_name: str, limit: float, label: str) -> None:
+    """The bias by repeat: true, found with F held, and found anew."""
+    drift = table(rows)
+    for axis, colour in zip("xyz", ("tab:blue", "tab:orange", "tab:green"), strict=True):
+        panel.plot(drift["repeat"], drift[f"true_bias_{axis}_{unit_name}"], color=colour, label=f"{axis}, true")
+        panel.plot(drift["repeat"], drift[f"held_bias_{axis}_{unit_name}"], "o", color=colour)
+        panel.errorbar(
+            [repeat + 0.15 for repeat in drift["repeat"]],
+            drift[f"free_bias_{axis}_{unit_name}"],
+            drift[f"free_bias_std_{axis}_{unit_name}"],
+            fmt="x",
+            color=colour,
+            alpha=0.6,
+        )
+    for side in (-limit, limit):
+        panel.axhline(side, color="grey", linestyle="--")
+    panel.plot([], [], "ko", label="found, F and reference held")
+    panel.plot([], [], "kx", label="found, everything anew, ±1σ")
+    panel.plot([], [], color="grey", linestyle="--", label="the maker's limit")
+    panel.set(xlabel="repeat (ten attitudes, 6 min each)", ylabel=label)
+    panel.legend(fontsize=7, ncols=2)
+
+
+def drift_error(rows: list[dict[str, Any]], kind: str, unit_name: str) -> float:
+    """RMS error of the bias over repeats and axes."""
+    errors = [row[f"{kind}_bias_{a}_{unit_name}"] - row[f"true_bias_{a}_{unit_name}"] for row in rows for a in "xyz"]
+    return float(np.sqrt(np.mean(np.square(errors))))
+
+
+def parameter_rows(
+    kind: str, names: Mapping[str, tuple[str, float]], truth: Array, estimates: Array, stated: Array
+) -> list[dict[str, Any]]:
+    """One row for each parameter: `names` gives its unit and the size of it; `estimates` (runs, p), `stated` (p,) σ."""
+    return [
+        {
+            "noise": kind,
+            "parameter": name,
+            "unit": unit,
+            "true": truth[i] / size,
+            "mean_estimate": estimates[:, i].mean() / size,
+            "std_over_runs": estimates[:, i].std(ddof=1) / size,
+            "std_by_covariance": stated[i] / size,
+        }
+        for i, (name, (unit, size)) in enumerate(names.items())
+    ]

@@ -1,0 +1,130 @@
+"""Simulated gyroscopes and their averaged sweeps, vectorised over runs: SIX, section III.
+
+A sweep's mean reading is drawn directly. The mean of N samples with white noise σ is Gaussian with σ/√N, so no sample
+need be made; where a study squares the samples first, the mean of the squares is drawn exactly too.
+
+Two models of the servo's vibration, which SIX gives as "rotation noise" of 5 % of the speed:
+
+`whole_turns`
+    Vibration moves the arm to and fro about the even turn; it integrates to the whole turn that the joint makes. Its
+    mean over the turn is zero by geometry. This is what a servo with a position loop does.
+`white`
+    The speed of each sample is drawn independently. The mean speed of the sweep is then off by 5 % / √N, which is to
+    say that the joint misses its own end stop. SIX's wording reads like this one; its figures do not.
+"""
+
+from dataclasses import dataclass
+from typing import Literal
+
+import numpy as np
+
+from rig.study.report import Array
+
+Vibration = Literal["whole_turns", "white"]
+VIBRATIONS: tuple[Vibration, ...] = ("whole_turns", "white")
+
+RATE_HZ = 200.0  # SIX, section III-A
+NOISE_LEVELS_RAD_S = (0.035, 0.2)
+VIBRATION_FRACTION = 0.05
+LARGEST_MISALIGNMENT = 0.1
+FAST_RAD_S = 3.0  # the speed that the published bands fit
+ARM_RAD_S = np.pi / 3  # SIX, section IV: 60°/s
+SETS, RUNS = 30, 500
+
+# SIX, Fig. 1, in the order of Eq. (7): clockwise and counter-clockwise along x, y, z.
+DIRECTIONS: Array = np.array([[1, 0, 0], [-1, 0, 0], [0, 1, 0], [0, -1, 0], [0, 0, 1], [0, 0, -1]], dtype=np.float64)
+
+
+@dataclass(frozen=True, slots=True)
+class Population:
+    """Uniform ranges that gyroscopes are drawn from: scale factors, and magnitudes of the bias, whose sign is even."""
+
+    name: str
+    scale: tuple[float, float]
+    bias_rad_s: tuple[float, float]
+
+    def draw(self, rng: np.random.Generator) -> tuple[Array, Array]:
+        """Scale factors (3,) and biases (3,) in rad/s of one gyroscope."""
+        sign = rng.choice([-1.0, 1.0], size=3)
+        return rng.uniform(*self.scale, size=3), sign * rng.uniform(*self.bias_rad_s, size=3)
+
+
+NORMAL = Population("normal", (0.8, 1.2), (0.0, 0.1))
+EXTREME = Population("extreme", (1.2, 2.0), (0.1, 0.2))
+
+
+@dataclass(frozen=True, slots=True)
+class Sweep:
+    """What all six sweeps of a run share: turn rate, noise of one sample, samples averaged, kind of vibration."""
+
+    speed_rad_s: float
+    noise_rad_s: float
+    samples: int
+    vibration: Vibration = "whole_turns"
+
+    @property
+    def variance_rad2_s2(self) -> float:
+        """Variance of a mean reading by the sensor's noise alone."""
+        return self.noise_rad_s**2 / self.samples
+
+
+def samples_in_a_turn(speed_rad_s: float, rate_hz: float = RATE_HZ) -> int:
+    """How many samples fall into one revolution."""
+    return round(rate_hz * 2 * np.pi / speed_rad_s)
+
+
+def whole_turn(speed_rad_s: float, noise_rad_s: float, vibration: Vibration = "whole_turns") -> Sweep:
+    """A revolution sampled at 200 Hz."""
+    return Sweep(speed_rad_s, noise_rad_s, samples_in_a_turn(speed_rad_s), vibration)
+
+
+def mountings(rng: np.random.Generator, runs: int, largest: float = LARGEST_MISALIGNMENT) -> Array:
+    """Rotations (runs, 3, 3) that take flange to sensor axes, askew by a sine from U(0, largest) in any direction.
+
+    SIX says "misalignment U(0 %, 10 %)" and no more; here it is the part of the turn that falls on wrong axes.
+    """
+    from scipy.spatial.transform import Rotation
+
+    axis = rng.normal(size=(runs, 3))
+    axis /= np.linalg.norm(axis, axis=1, keepdims=True)
+    angle = np.arcsin(rng.uniform(0.0, largest, size=(runs, 1)))
+    return np.asarray(Rotation.from_rotvec(angle * axis).as_matrix(), dtype=np.float64)
+
+
+def sensitivity(scale: Array, mounting: Array, skew: Array | None = None) -> Array:
+    """F (…, 3, 3) of m = F ω − b, from scale factors (3,), mountings (…, 3, 3) and skewed unit axes (…, 3, 3)."""
+    intrinsic = np.diag(1 / scale) if skew is None else np.diag(1 / scale) @ skew
+    return np.asarray(intrinsic @ mounting, dtype=np.float64)
+
+
+def mean_readings(rng: np.random.Generator, F: Array, bias_rad_s: Array, sweep: Sweep) -> Array:
+    """Averaged readings (…, 6, 3) in rad/s of the six sweeps, for F (…, 3, 3), before anything is squared."""
+    return _mean_and_vibration(rng, F, bias_rad_s, sweep)[0]
+
+
+def mean_readings_and_squares(
+    rng: np.random.Generator, F: Array, bias_rad_s: Array, sweep: Sweep
+) -> tuple[Array, Array]:
+    """Averaged readings and averages of squared readings, both (…, 6, 3), of the same samples, drawn exactly.
+
+    With d = n + c v the deviation of a sample from the mean, n noise and v the vibration common to the axes: v enters
+    through Σ(v − v̄)² ~ χ²(N − 1), the noise along v through one Gaussian z, and its rest through χ²(N − 2), so that
+    Σ(d − d̄)² = (σ z + c √Σ(v − v̄)²)² + σ² χ²(N − 2).
+    """
+    mean, per_vibration = _mean_and_vibration(rng, F, bias_rad_s, sweep)
+    shape, count = mean.shape, sweep.samples
+    swing = VIBRATION_FRACTION * sweep.speed_rad_s * np.sqrt(rng.chisquare(count - 1, size=(*shape[:-1], 1)))
+    along = sweep.noise_rad_s * rng.normal(size=shape) + per_vibration * swing
+    scatter = along**2 + sweep.noise_rad_s**2 * rng.chisquare(count - 2, size=shape)
+    return mean, mean**2 + scatter / count
+
+
+def _mean_and_vibration(rng: np.random.Generator, F: Array, bias_rad_s: Array, sweep: Sweep) -> tuple[Array, Array]:
+    """Mean readings (…, 6, 3), and what each axis reads (…, 6, 3) of 1 rad/s along the turn."""
+    along = np.asarray(np.einsum("...ij,sj->...si", F, DIRECTIONS), dtype=np.float64)
+    speed: Array | float = sweep.speed_rad_s
+    if sweep.vibration == "white":
+        error = VIBRATION_FRACTION * sweep.speed_rad_s / np.sqrt(sweep.samples)
+        speed = sweep.speed_rad_s + error * rng.normal(size=(*along.shape[:-1], 1))
+    noise = np.sqrt(sweep.variance_rad2_s2) * rng.normal(size=along.shape)
+    return np.asarray(speed * along - bias_rad_s + noise, dtype=np.float64), along
