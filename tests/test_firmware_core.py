@@ -205,7 +205,7 @@ def test_settings_that_decide_what_a_reading_means_are_written_whatever_they_wer
     for address in addresses:
         board.gyro.values[address] = 0xFF & ~0x01
     board.ask("configure", sensor=0, rate_hz=238, range_deg_s=245)
-    # data-ready of the gyroscope alone; no filter, no sign change; three axes; BDU, address increment; no I2C, no self-test
+    # data-ready of the gyroscope alone; no filter, sign change, I2C or self-test; three axes; BDU, address increment
     expected = {0x0C: 0x02, 0x11: 0, 0x12: 0, 0x13: 0, 0x1E: 0x38, 0x22: 0x44, 0x23: 0x04, 0x24: 0}
     assert {address: board.gyro.values[address] for address in addresses} == expected
     assert board.gyro.writes[-1][0] == 0x10, "the part must start only when everything else is set"

@@ -54,7 +54,7 @@ class GyroTruth:
 
 
 class Lsm9ds1:
-    """The accelerometer-gyroscope die on the SPI bus. The accelerometer, which runs along with the gyroscope, is left out.
+    """The accelerometer-gyroscope die on the SPI bus; the accelerometer, which runs along, is left out.
 
     `rate_at(time_s)`: true angular rate in the part's own axes, 3 floats, rad/s; asked once for each conversion, at
     the instant of the conversion. `temperature_c`: die temperature. `seed`: of the noise, which is drawn per
