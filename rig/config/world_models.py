@@ -24,7 +24,7 @@ class SimulatedBoardSection(Section):
     """The emulated board: its crystal and its moment of power-up."""
 
     unique_id: Annotated[str, Field(pattern=r"^[0-9a-f]{24}$")] = "0123456789abcdef01234567"
-    crystal_ppm: Annotated[float, Field(ge=-500, le=500)] = 35.0
+    crystal_ppm: Annotated[float, Field(ge=-25_000, le=25_000)] = 35.0  # without its crystal a board may be 2 % off
     boot_time_s: Annotated[float, Field(ge=0, le=10)] = 0.137
     pty: bool = False  # also offer the serial port as a pseudo-terminal (POSIX)
 
