@@ -14,7 +14,11 @@ Array = NDArray[np.float64]
 
 MAX_SCALE = 4.0  # either way: no sensor's scale factor is that far off, a wrong unit is
 MIN_ALIGNMENT = 0.7  # cosine between an axis and where it should point; beyond 45° it is another axis
-DEGREES = 180 / np.pi
+CONFUSED = (  # scale factors that a wrong unit gives
+    (np.pi / 180, "the readings look like degrees per second given as rad/s"),
+    (180 / np.pi, "the rates look like degrees per second given as rad/s"),
+    (9.80665, "the readings look like g given as m/s²"),
+)
 CONSISTENT = 3.0  # residuals larger than so many times what the variances explain are worth a warning
 
 
@@ -91,19 +95,15 @@ def check_duplicates(means: Array) -> None:
 
 
 def check_unit(scale: Array) -> None:
-    """Raises Fault `wrong_unit` for a scale factor (3,) beyond 4 or 1/4; at 57.3 and 1/57.3 it says which unit."""
+    """Raises Fault `wrong_unit` for a scale factor (3,) beyond 4 or 1/4, with the likely unit if it knows one."""
     if np.all((scale < MAX_SCALE) & (scale > 1 / MAX_SCALE)):
         return
     typical = float(np.exp(np.mean(np.log(scale))))
-    guess = "check the sensor's range and sensitivity"
-    if 0.7 < typical * DEGREES < 1.4:
-        guess = "the readings look like degrees per second given as rad/s"
-    elif 0.7 < typical / DEGREES < 1.4:
-        guess = "the rates look like degrees per second given as rad/s"
+    guess = next((guess for ratio, guess in CONFUSED if 0.7 < typical / ratio < 1.4), "check range and sensitivity")
     raise Fault(
         "wrong_unit",
         f"the scale factors come out near {typical:.3g}: {guess}",
-        "Give readings and rates in the same unit, rad/s",
+        "Give readings and what they are compared with in the same SI unit",
     )
 
 

@@ -73,7 +73,8 @@ def solve_triaxial(
     table vector whose product with v_ref is positive, must be given.
 
     Raises Fault `too_few_observations`, `not_finite`, `bad_variance`, `zero_reading`, `duplicated_observation`,
-    `bad_attitude`, `rank_deficient`, `ill_conditioned`, `sign_unknown`, `mirrored_axis`.
+    `bad_attitude`, `rank_deficient`, `ill_conditioned`, `sign_unknown`, `wrong_unit`,
+    `mirrored_axis`.
     """
     m, r, v = (np.asarray(a, dtype=np.float64) for a in (readings, attitudes, variances))
     v_bar = None if known is None else np.asarray(known, dtype=np.float64)
@@ -97,6 +98,7 @@ def solve_triaxial(
         theta, iterations = most_likely(start, m, r, still, v, norm_known=v_bar is None)
         covariance = covariance_bound(theta, r, still, v, norm_known=v_bar is None)
     f = theta[F].reshape(3, 3)
+    refusals.check_unit(1 / np.linalg.norm(f, axis=1))
     if np.linalg.det(f) < 0:
         raise Fault(
             "mirrored_axis",
