@@ -11,11 +11,12 @@ from numpy.typing import ArrayLike, NDArray
 
 from rig.errors import Fault
 from rig.estimation import refusals
-from rig.estimation.six_observation import design
+from rig.estimation.six_observation import design, negative_square
 
 Array = NDArray[np.float64]
 
 MAX_CONDITION = 40.0  # as in `accumulator`
+VANISHED = 0.05  # of the largest scale factor
 REMEDY = "Sweep every wrist in both directions; a direction swept twice does not stand in for the other"
 
 
@@ -52,7 +53,8 @@ def solve_levenberg_marquardt(
     `speeds_rad_s`, `speed_std_rad_s` (N,). Weights are the inverse variances of ω² at k = 1; SIX weighs all alike.
 
     Raises Fault `too_few_observations`, `not_finite`, `bad_variance`, `bad_speed`, `zero_reading`,
-    `duplicated_observation`, `lm_did_not_converge`, `rank_deficient`, `ill_conditioned`, `wrong_unit`.
+    `duplicated_observation`, `lm_did_not_converge`, `rank_deficient`, `ill_conditioned`, `wrong_unit`,
+    `negative_square`.
     """
     from scipy.optimize import least_squares
 
@@ -85,6 +87,9 @@ def solve_levenberg_marquardt(
             "Use the estimator newton; check that the readings fit the speeds",
         )
     theta = np.concatenate([np.abs(found.x[:3]), found.x[3:]])  # only k² is seen
+    weakest = int(np.argmin(theta[:3]))
+    if theta[weakest] < VANISHED * theta[:3].max():
+        raise negative_square(weakest)  # the search ends at k = 0, as near as a square can come to being negative
     refusals.check_unit(theta[:3])
     weighted_jacobian = slope(theta)
     gain = np.linalg.solve(weighted_jacobian.T @ weighted_jacobian, weighted_jacobian.T) / std

@@ -62,7 +62,7 @@ def by_newton(p: Array, q: Array, square_rad2_s2: float) -> tuple[Array, int]:
         for s in range(3):
             beta_s, beta_l = ps[s] - gamma * qs[s], ps[s + 3] - gamma * qs[s + 3]
             if not beta_s > 0:
-                raise _negative_square(s)
+                raise negative_square(s)
             bias = beta_l / (2 * beta_s)
             value += beta_s * bias * bias
             slope += bias * (bias * qs[s] - qs[s + 3])
@@ -101,7 +101,7 @@ def parameters(beta: Array) -> tuple[Array, Array]:
     squares = beta[:3]
     for s, square in enumerate(squares.tolist()):
         if not square > 0:
-            raise _negative_square(s)
+            raise negative_square(s)
     return np.sqrt(squares), beta[3:] / (2 * squares)
 
 
@@ -126,12 +126,13 @@ def _gamma_at_one_speed(q: list[float], square: float) -> float:
     total = 0.0
     for s in range(3):
         if q[s] == 0:
-            raise _negative_square(s)
+            raise negative_square(s)
         total += q[s + 3] ** 2 / (4 * q[s])
     return square * total / (1 + total)
 
 
-def _negative_square(axis: int) -> Fault:
+def negative_square(axis: int) -> Fault:
+    """The error for readings that no scale factor of axis 0, 1 or 2 explains."""
     return Fault(
         "negative_square",
         f"the squared scale factor of {'xyz'[axis]} comes out as zero, negative or not a number",
