@@ -117,17 +117,6 @@ def test_killing_all_processes_at_once_stops_the_arm(start: Start) -> None:
     assert not state["program_running"] and abs(state["q_rad"][5]) < 3, "the arm went on to the end of its sweep"
 
 
-def test_an_arm_that_no_stop_can_reach_stops_by_itself(start: Start) -> None:
-    rig = start()
-    rig.until_sweeping()
-    rig.world.control({"do": "close_arm", "listen": False})
-    assert rig.stopped_after_s() < 1.0
-    status, errors = rig.end()
-    assert status == 3 and "rig: arm_link_lost: " in errors
-    state = rig.world.state()
-    assert not state["program_running"] and abs(state["q_rad"][5]) < 3, "the arm went on to the end of its sweep"
-
-
 def test_resuming_a_run_that_still_goes_on_leaves_it_alone(start: Start) -> None:
     rig = start()
     rig.until_sweeping()

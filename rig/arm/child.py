@@ -29,14 +29,12 @@ from rig.arm.messages import (
     Stop,
     TakeControl,
 )
-from rig.arm.state import ArmState, RuntimeState
+from rig.arm.state import ArmState
 from rig.arm.stopping import BRAKE_RAD_S2
 
 POLL_S = 0.0003  # packets come every 8 ms, or every 0.8 ms when the controller's clock runs ten times faster
 HEARTBEAT_S = 0.01
 FIRST_PACKET_S = 3.0
-WATCHDOG_S = 0.5  # the controller stops by itself when it has heard nothing for so long (wall time)
-KICK_S = 0.1
 PAYLOAD_S = 1.0  # the payload shows in the states within this
 PAYLOAD_TOLERANCE_KG = 0.01
 
@@ -86,9 +84,6 @@ class _Child:
         self._control: Any = None
         self._holds_arm = False  # our program may run on the controller
         self._operations_before: int | None = None  # change count before the running move; None when none runs
-        self._newest: ArmState | None = None
-        self._pace = 1.0  # seconds of the controller's clock in one of ours; more than 1 in a simulation
-        self._watched = False  # the controller's watchdog expects to hear from us
 
     def send(self, message: Message) -> None:
         with self._sending:
@@ -110,20 +105,13 @@ class _Child:
     def stream(self) -> NoReturn:
         """Send every state to the parent, in order, until the parent is gone."""
         batch: list[ArmState] = []
-        first: ArmState | None = None
-        last_s, beat_s, kick_s = 0.0, time.monotonic(), time.monotonic()
+        last_s, beat_s = 0.0, time.monotonic()
         while True:
             state = self._read(last_s)
             if state:
                 batch.append(state)
                 last_s = state.time_s
-                first = first or state
-                since_s = max(state.host_time_s - first.host_time_s, 1e-3)
-                self._newest, self._pace = state, max(1.0, (state.time_s - first.time_s) / since_s)
             self._report_arrival()
-            if time.monotonic() - kick_s >= KICK_S:
-                kick_s = time.monotonic()
-                self._kick()
             if time.monotonic() - beat_s >= HEARTBEAT_S:
                 beat_s = time.monotonic()
                 try:
@@ -153,11 +141,6 @@ class _Child:
             safety_status_bits=receive.getSafetyStatusBits(),
         )
         return state if receive.getTimestamp() == time_s else self._read(last_s)
-
-    def _kick(self) -> None:
-        """Let the controller know that somebody is there, as long as its program runs."""
-        if self._watched and self._newest and self._newest.runtime_state == RuntimeState.PLAYING:
-            self._control.kickWatchdog()
 
     def _report_arrival(self) -> None:
         before = self._operations_before
@@ -205,9 +188,6 @@ class _Child:
                 self._control.stopScript()
                 return Failed(_payload_failure(self._receive.getPayload(), request.payload_kg))
             time.sleep(HEARTBEAT_S)
-        # Without a network no stop reaches the arm: then it must stop by itself, not at the end of its movement.
-        self._control.setWatchdog(1 / (WATCHDOG_S * self._pace))
-        self._watched = True
         return ControlTaken()
 
     def _move(self, move: Move) -> None:
@@ -223,7 +203,6 @@ class _Child:
             self.send(Failed(_move_failure("the controller did not start the move")))
 
     def _brake(self, deceleration_rad_s2: float) -> None:
-        self._watched = False
         if self._control is not None:
             self._control.stopJ(deceleration_rad_s2)
             self._control.stopScript()
@@ -253,7 +232,7 @@ def _outlive_the_parent() -> None:
 
 
 def _send_output_to(log: str | None) -> None:
-    """The client writes where it likes; stdout belongs to results."""
+    """The client writes to stdout and stderr as it likes; stdout belongs to results."""
     with Path(log or os.devnull).open("ab") as sink:
         for stream in (sys.stdout, sys.stderr):
             stream.flush()
