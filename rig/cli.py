@@ -85,7 +85,10 @@ def _parser() -> argparse.ArgumentParser:
     resume.add_argument("run_folder", type=Path, metavar="RUN_DIR")
     _add_outcome(resume)
     solve = add("solve", _solve, "recompute the calibration from a recording")
-    solve.add_argument("run", type=Path, metavar="RUN", help="a run folder or its run.h5")
+    solve.add_argument(
+        "run", type=Path, metavar="RUN", help="a run folder or its run.h5; with --sweeps, samples as CSV"
+    )
+    solve.add_argument("--sweeps", type=Path, metavar="CSV", help="the sweeps, for samples recorded elsewhere")
     solve.add_argument(
         "--estimator", default="newton", metavar="NAME", help="newton (default) or algorithm_1, as published"
     )
@@ -163,6 +166,10 @@ def _check(options: argparse.Namespace) -> int:
 
 
 def _solve(options: argparse.Namespace) -> int:
+    if options.sweeps is not None:
+        from rig.solve_external import solve_external
+
+        return solve_external(options.run, options.sweeps, options.estimator, as_json=options.json)
     from rig.run import solve
 
     return solve(options.run, options.estimator, as_json=options.json)
