@@ -7,7 +7,8 @@ once the arm's measured rate is taken out of them. The mean comes first; squarin
 Nothing doubtful is averaged: whatever does not belong into a calibration raises a Fault with a name of its own.
 """
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Collection, Iterator, Sequence
+from contextlib import suppress
 from dataclasses import dataclass, replace
 from typing import Any
 
@@ -32,7 +33,7 @@ MAX_READING_RATIO = 4.0  # reading over turn rate, either way: no gyroscope is t
 class Average:
     """Readings averaged: mean (3,) rad/s, variance (3,) of that mean in (rad/s)², noise (3,) of one sample in rad/s.
 
-    The variance of a revolution also holds the drift of the bias from rest to rest.
+    The variance of a revolution or a rest also holds the drift of the bias from rest to rest.
     """
 
     mean_rad_s: Array
@@ -85,22 +86,64 @@ class _Stream:
     raw: NDArray[Any]
 
 
-def observe(run: RunData, sensor: str, settings: ObservationSection) -> SensorObservations:
+def observe(
+    run: RunData, sensor: str, settings: ObservationSection, superseded: Collection[int] = ()
+) -> SensorObservations:
     """Average every finished sweep of a recording. An interrupted sweep has no `sweep_finished` and is left out.
 
+    So are the sweeps whose index is in `superseded`: a later recording of the same run repeats them.
     Raises Fault `incomplete_revolution`, `arm_states_lost`, `slider_below_100`, `speed_not_constant`,
     `other_joint_moved`, `lost_samples`, `saturation`, `stuck_sensor`, `stuck_axis`, `wrong_axis`, `wrong_sign`,
     `wrong_unit`, `no_motion`, `not_finite`, `time_base_not_found`, `board_clock_restarted`, `duplicated_samples`.
     """
     motion = ArmMotion(run.arm)
     stream = _stream(run.samples[sensor], run.sensors[sensor], motion)
-    revolutions = []
-    for sweep, window in _finished(run, "sweep"):
-        turn = find_revolution(motion, sweep, window, settings)
-        revolutions.append(_observation(stream, motion, sweep, turn, settings))
+    revolutions = [
+        _revolution(stream, motion, sweep, window, settings)
+        for sweep, window in _finished(run, "sweep")
+        if sweep["index"] not in superseded
+    ]
     rests = tuple(rest for _, window in _finished(run, "rest") if (rest := _rest(stream, motion, window)))
     drift = bias_drift(rests)
-    return SensorObservations(stream.clock, tuple(_drifting(o, drift) for o in revolutions), rests)
+    return SensorObservations(
+        stream.clock,
+        tuple(replace(o, average=_drifting(o.average, drift)) for o in revolutions),
+        tuple(_drifting(rest, drift) for rest in rests),
+    )
+
+
+def finished_sweeps(run: RunData) -> frozenset[int]:
+    """The indices of the sweeps a recording holds from start to end."""
+    return frozenset(sweep["index"] for sweep, _ in _finished(run, "sweep"))
+
+
+def sound_sweeps(run: RunData, settings: ObservationSection) -> frozenset[int]:
+    """Those of the finished sweeps that `observe` accepts for every sensor: a resumed run need not repeat them."""
+    return frozenset.intersection(finished_sweeps(run), *(_sound_for(run, sensor, settings) for sensor in run.sensors))
+
+
+def _sound_for(run: RunData, sensor: str, settings: ObservationSection) -> frozenset[int]:
+    sound = set()
+    try:
+        motion = ArmMotion(run.arm)
+        stream = _stream(run.samples[sensor], run.sensors[sensor], motion)
+    except Fault:
+        return frozenset()
+    for sweep, window in _finished(run, "sweep"):
+        with suppress(Fault):
+            _revolution(stream, motion, sweep, window, settings)
+            sound.add(sweep["index"])
+    return frozenset(sound)
+
+
+def _revolution(
+    stream: _Stream,
+    motion: ArmMotion,
+    sweep: dict[str, Any],
+    window: tuple[float, float],
+    settings: ObservationSection,
+) -> Observation:
+    return _observation(stream, motion, sweep, find_revolution(motion, sweep, window, settings), settings)
 
 
 def bias_drift(rests: Sequence[Average]) -> Array:
@@ -120,15 +163,8 @@ def bias_drift(rests: Sequence[Average]) -> Array:
     return np.maximum(scatter - noise, 0.0) if significant else np.zeros(3)
 
 
-def _drifting(observation: Observation, drift: Array) -> Observation:
-    average = observation.average
-    wider = replace(average, variance_rad2_s2=average.variance_rad2_s2 + drift)
-    return replace(observation, average=wider)
-
-
-def has_finished_sweeps(run: RunData) -> bool:
-    """Whether the recording holds anything to observe."""
-    return any(True for _ in _finished(run, "sweep"))
+def _drifting(average: Average, drift: Array) -> Average:
+    return replace(average, variance_rad2_s2=average.variance_rad2_s2 + drift)
 
 
 def _finished(run: RunData, kind: str) -> Iterator[tuple[dict[str, Any], tuple[float, float]]]:

@@ -20,6 +20,7 @@ from rig.config.load import Loaded, parse
 from rig.config.models import RigConfig, SensorSection, mounting_matrix
 from rig.errors import Fault, Refused
 from rig.monitor import Monitor, SensorCount
+from rig.observation import sound_sweeps
 from rig.procedure import Confirm, Rig
 from rig.progress import View
 from rig.recording import RecordedSensor, RunData, RunRecorder
@@ -33,11 +34,14 @@ def open_rig(
 ) -> Iterator[Rig]:
     """Everything connected and recording, nothing moved yet; on the way out the arm stops and the file is closed.
 
-    `earlier` holds the recordings of an interrupted run: the sweeps they have finished are left out. Raises `Refused`
-    by name when the arm, the board or a sensor is not what the configuration says, or not what was recorded earlier.
+    `earlier` holds the recordings of an interrupted run: the sound sweeps they hold are left out. Raises `Refused` by
+    name when the arm, the board or a sensor is not what the configuration says, or not what was recorded earlier.
     """
     config = loaded.config
     _refuse_another_procedure(config, earlier)
+    done = frozenset[int]().union(*(sound_sweeps(run, config.observation) for run in earlier))
+    if earlier:
+        view.line(f"resuming: {len(done)} sweeps are recorded and sound, the others follow")
     with ExitStack() as stack:
         monitor = Monitor()
         with refusing():
@@ -56,7 +60,7 @@ def open_rig(
             recorder = RunRecorder(recording, config=loaded.rig_text, provenance=provenance, sensors=sensors)
         monitor.recorder = stack.enter_context(recorder)
         yield Rig(
-            plan=plan_six_observation(config.arm, config.procedure, report.state.q_rad, _finished_sweeps(earlier)),
+            plan=plan_six_observation(config.arm, config.procedure, report.state.q_rad, done),
             whole_plan=plan_six_observation(config.arm, config.procedure),
             report=report,
             payload=config.arm,
@@ -67,12 +71,6 @@ def open_rig(
             view=view,
             confirm=confirm,
         )
-
-
-def _finished_sweeps(earlier: Sequence[RunData]) -> frozenset[int]:
-    """The indices of the sweeps the recordings hold from start to end."""
-    events = (event for run in earlier for event in run.events)
-    return frozenset(event.detail["sweep"]["index"] for event in events if event.name == "sweep_finished")
 
 
 def _refuse_another_procedure(config: RigConfig, earlier: Sequence[RunData]) -> None:

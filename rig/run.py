@@ -100,7 +100,8 @@ def _carry_out(folder: Path, loaded: Loaded, script: Script, *, assume_yes: bool
             open_rig(loaded, recording, shown, confirm, [read_run(file) for file in earlier]) as rig,
         ):
             script(rig)
-        with _reported(shown, folder, f"the data are kept in {folder}; to measure anew, start another `rig run`"):
+        repeating = f"the data are kept in {folder}; to repeat refused sweeps: {_resuming(folder)}"
+        with _reported(shown, folder, repeating):
             for file in earlier:
                 make_plain(file)  # if the run was killed, only readers that know about it could open its file
             document = solved_document([read_run(file) for file in _recordings(folder)])
