@@ -131,6 +131,16 @@ def test_resuming_a_run_that_still_goes_on_leaves_it_alone(start: Start) -> None
     assert run.arm["time_s"][-1] > time_s + 0.5, "what came after the second command is lost"
 
 
+def test_the_arm_stops_when_the_program_freezes(start: Start) -> None:
+    rig = start({"world": {"time_scale": 0.5}})
+    rig.until_sweeping()
+    rig.process.send_signal(signal.SIGSTOP)
+    assert rig.stopped_after_s() < 5.0, "the sweep goes on for 6 s"
+    assert abs(rig.world.state()["q_rad"][5]) < 3.3, "the arm swept on to its end"
+    rig.process.send_signal(signal.SIGCONT)
+    assert rig.end()[0] == 3
+
+
 @pytest.mark.parametrize(
     ("fault", "name"),
     [

@@ -35,6 +35,8 @@ from rig.arm.stopping import BRAKE_RAD_S2
 POLL_S = 0.0003  # packets come every 8 ms, or every 0.8 ms when the controller's clock runs ten times faster
 HEARTBEAT_S = 0.01
 FIRST_PACKET_S = 3.0
+TICK_S = 0.1
+PARENT_TICKS = 20  # 2 s without a sign of the parent's life; ticks, because this process may be held up itself
 PAYLOAD_S = 1.0  # the payload shows in the states within this
 PAYLOAD_TOLERANCE_KG = 0.01
 
@@ -63,6 +65,7 @@ def main(pipe: "Connection[Message, Request]", host: str, state_rate_hz: float, 
     signal.signal(signal.SIGTERM, lambda *_: child.abandon())
     requests = threading.Thread(target=child.serve, name="requests", daemon=True)
     requests.start()
+    threading.Thread(target=child.watch_parent, name="parent watch", daemon=True).start()
     try:
         try:
             child.connect(state_rate_hz)
@@ -84,6 +87,8 @@ class _Child:
         self._control: Any = None
         self._holds_arm = False  # our program may run on the controller
         self._operations_before: int | None = None  # change count before the running move; None when none runs
+        self._serving = False  # a request is being served: others, and the parent's signs of life, wait in the pipe
+        self._silent_ticks = 0
 
     def send(self, message: Message) -> None:
         with self._sending:
@@ -155,12 +160,27 @@ class _Child:
         """Serve the parent's requests one after the other."""
         try:
             while True:
-                self._handle(self._pipe.recv())
+                request = self._pipe.recv()
+                self._serving = True
+                self._handle(request)
+                self._silent_ticks = 0
+                self._serving = False
         except (EOFError, OSError):  # the parent is gone
             self.abandon()
         except BaseException:  # without this thread nobody would hear a stop
             traceback.print_exc()
             self.abandon()
+
+    def watch_parent(self) -> None:
+        """Stop the arm when the parent has been silent for too long: it hangs, and nobody watches the arm.
+
+        A thread of its own, because sending states to a parent that does not read them blocks in the end.
+        """
+        while True:
+            time.sleep(TICK_S)
+            self._silent_ticks += 1
+            if self._holds_arm and not self._serving and self._silent_ticks > PARENT_TICKS:
+                self.abandon()
 
     def _handle(self, request: Request) -> None:
         match request:

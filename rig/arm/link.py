@@ -10,7 +10,7 @@ from pathlib import Path
 
 from rig.arm import child
 from rig.arm.condition import Problem
-from rig.arm.messages import Heartbeat, Message, Request
+from rig.arm.messages import Alive, Heartbeat, Message, Request
 
 TICK_S = 0.05
 # Silence is counted in ticks of the guard, not in elapsed time: when this process itself was held up, nothing is late.
@@ -123,6 +123,7 @@ class ChildLink:
 
     def _guard(self) -> None:
         while not self._ended.wait(TICK_S):
+            self.send(Alive())
             self._silent_ticks += 1
             self._frozen_ticks += 1
             if self._silent_ticks > (PATIENT_TICKS if self._patient else SILENT_TICKS):

@@ -32,7 +32,12 @@ class Stop:
     deceleration_rad_s2: float
 
 
-Request = TakeControl | Move | Stop
+@dataclass(frozen=True, slots=True)
+class Alive:
+    """The parent still runs; when these stop coming, the child stops the arm itself. Not answered."""
+
+
+Request = TakeControl | Move | Stop | Alive
 
 # Child to parent ---------------------------------------------------------------------------------------------------
 
