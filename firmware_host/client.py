@@ -60,7 +60,9 @@ class Board:
             self._port = serial.serial_for_url(port, baudrate=baud, timeout=_READ_TIMEOUT_S, exclusive=True)
         except (serial.SerialException, OSError, ValueError) as error:
             raise BoardError(
-                "no_port", f"the port {port} does not open: {error}", "Check board.port and the cable"
+                "no_port",
+                f"the port {port} does not open: {error}",
+                "Check board.port and the cable, and that no other program has the port",
             ) from error
         self._reader = threading.Thread(target=self._read, name=f"board {port}", daemon=True)
         self._reader.start()
@@ -197,7 +199,9 @@ class Board:
 
     def _link_closed(self, error: Exception) -> BoardError:
         return BoardError(
-            "board_link_lost", f"the port {self._name} closed: {error}", "Check the cable and the board's supply"
+            "board_link_lost",
+            f"the port {self._name} closed: {error}",
+            "Check the cable, the board's supply, and whether another program has the port",
         )
 
     def _receive(self) -> bytes:

@@ -116,6 +116,11 @@ class Rig:
             self.arm.rest(rest.duration_s, lambda: self._watch(rest))
             self.recorder.add_event("rest_finished")
 
+    def summary(self) -> str:
+        """What was recorded and what was missed, in one line."""
+        samples, lost, _ = self.monitor.totals()
+        return f"recorded: {samples} samples, {lost} lost; {self.arm.missed_states} arm states missed"
+
     @contextmanager
     def _step(self, step: Step) -> Iterator[None]:
         self._step_started_s = self.arm.latest.time_s

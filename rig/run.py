@@ -100,6 +100,7 @@ def _carry_out(folder: Path, loaded: Loaded, script: Script, *, assume_yes: bool
             open_rig(loaded, recording, shown, confirm, [read_run(file) for file in earlier]) as rig,
         ):
             script(rig)
+            shown.line(rig.summary())
         repeating = f"the data are kept in {folder}; to repeat refused sweeps: {_resuming(folder)}"
         with _reported(shown, folder, repeating):
             for file in earlier:
