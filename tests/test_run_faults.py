@@ -1,5 +1,6 @@
 """A run that goes wrong: the arm stops, the data stay, the error has a name, the exit status is the promised one."""
 
+import json
 import os
 import pty
 import signal
@@ -168,6 +169,25 @@ def test_a_fault_during_a_sweep_stops_the_arm_and_keeps_the_data(
     assert f"rig resume {rig.out}" in errors
     assert rig.stopped_after_s() == pytest.approx(0, abs=0.1)
     assert len(read_run(rig.out / "run.h5").arm) > 0
+
+
+def test_resume_repeats_the_sweep_that_was_refused(start: Start) -> None:
+    fast = {"speed_deg_s": 150, "acceleration_deg_s2": 400, "rest_s": 0.5}
+    rig = start({"world": {"time_scale": 4}, "procedure": fast, "limits": {"scale_std": 1, "bias_std_rad_s": 1}})
+    rig.until_sweeping()
+    rig.world.control({"do": "host_baud", "baud": 115200})
+    rig.until(lambda state: state["q_rad"][5] < -2)
+    rig.world.control({"do": "host_baud", "baud": None})
+    status, errors = rig.end()
+    assert status == 3 and "rig: lost_samples: " in errors, errors
+
+    command = [sys.executable, "-m", "rig", "resume", str(rig.out), "--yes"]
+    resumed = subprocess.run(command, capture_output=True, text=True, timeout=40, check=False)
+    assert resumed.returncode == 0, resumed.stderr
+    assert "resuming: 5 sweeps are recorded and sound" in resumed.stderr
+    assert resumed.stderr.count("done: sweep") == 1
+    observations = json.loads((rig.out / "result.json").read_text(encoding="utf-8"))["sensors"]["gyro"]["observations"]
+    assert sorted(o["sweep"] for o in observations) == [0, 1, 2, 3, 4, 5]
 
 
 @pytest.mark.parametrize(
