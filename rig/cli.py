@@ -90,7 +90,10 @@ def _parser() -> argparse.ArgumentParser:
     )
     solve.add_argument("--sweeps", type=Path, metavar="CSV", help="the sweeps, for samples recorded elsewhere")
     solve.add_argument(
-        "--estimator", default="newton", metavar="NAME", help="newton (default) or algorithm_1, as published"
+        "--estimator",
+        default="vector",
+        metavar="NAME",
+        help="vector (default), newton, levenberg_marquardt, or algorithm_1, as published",
     )
     solve.add_argument("--json", action="store_true", help="for machines")
     study = add("study", _study, "Monte-Carlo studies of the papers' figures and tables; without a name, list them")

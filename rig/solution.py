@@ -1,32 +1,44 @@
 """From recordings to a calibration: the one path that a run and `rig solve` share, pure from end to end."""
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
-from typing import Any, get_args
+from itertools import combinations
+from typing import Literal, TypeVar, get_args
 
 import numpy as np
 
 from rig.config.load import parse
 from rig.errors import Fault, Refused
-from rig.estimation.accumulator import Accumulator, Estimator, Solution
-from rig.estimation.six_observation import MODEL, PARAMETER_UNITS, PARAMETERS
-from rig.observation import Average, Observation, SensorObservations, has_finished_sweeps, observe
+from rig.estimation.accumulator import Accumulator, Solution
+from rig.estimation.accumulator import Estimator as SixObservation
+from rig.estimation.estimate import Array, Estimate
+from rig.estimation.levenberg_marquardt import LevenbergMarquardtSolution, solve_levenberg_marquardt
+from rig.estimation.refusals import check_duplicates
+from rig.estimation.vector_model import VectorSolution, solve_vector_model
+from rig.observation import Average, Observation, SensorObservations, finished_sweeps, observe
 from rig.recording import RecordedSensor, RunData
 from rig.timebase import TimeBase
 
+Estimator = Literal["vector", "newton", "algorithm_1", "levenberg_marquardt"]
 ESTIMATORS: tuple[Estimator, ...] = get_args(Estimator)
+DEFAULT_ESTIMATOR: Estimator = "vector"
+
+Result = TypeVar("Result")
 
 
 @dataclass(frozen=True, slots=True)
 class SensorResult:
     """One sensor's calibration and what it rests on.
 
-    `algorithm_1` is the paper's own estimate from the same observations, or the Fault it ends in. There is one time
-    base for each recording that took part.
+    `solution` is the chosen estimator's. Beside it stand the others from the same observations: `vector_model`,
+    `six_observation` (exact) and `algorithm_1`, the paper's own, or the Fault one ends in. There is one time base for
+    each recording that took part.
     """
 
     sensor: RecordedSensor
-    solution: Solution
+    solution: Estimate
+    vector_model: VectorSolution | Fault
+    six_observation: Solution
     algorithm_1: Solution | Fault
     observations: tuple[Observation, ...]
     rests: tuple[Average, ...]
@@ -39,18 +51,23 @@ class SensorResult:
         return float(np.average([a.temperature_c for a in averages], weights=[a.samples for a in averages]))
 
 
-def solve_runs(runs: Sequence[RunData], estimator: str = "newton") -> dict[str, SensorResult]:
+def known_estimator(name: str) -> Estimator:
+    """The estimator of that name. Raises Refused `unknown_estimator`."""
+    for known in ESTIMATORS:
+        if known == name:
+            return known
+    raise Refused("unknown_estimator", f"there is no estimator {name!r}", f"Choose one of {', '.join(ESTIMATORS)}")
+
+
+def solve_runs(runs: Sequence[RunData], estimator: str = DEFAULT_ESTIMATOR) -> dict[str, SensorResult]:
     """Calibrate every sensor from one recording, or from all recordings of a run that was resumed.
 
     The thresholds come from the configuration in the first recording. Recordings without a finished sweep add nothing.
-    Raises Refused `unknown_estimator`, `different_sensors`; Fault as `observe` and `Accumulator.solve` do, and
+    Whatever the estimator, the sweeps must bear the six-observation solution: a plan that lacks a direction is refused.
+    Raises Refused `unknown_estimator`, `different_sensors`; Fault as `observe` and the estimators do, and
     `duplicated_observation`.
     """
-    chosen = next((known for known in ESTIMATORS if known == estimator), None)
-    if chosen is None:
-        raise Refused(
-            "unknown_estimator", f"there is no estimator {estimator!r}", f"Choose one of {', '.join(ESTIMATORS)}"
-        )
+    chosen = known_estimator(estimator)
     if any(run.sensors != runs[0].sensors for run in runs):
         raise Refused(
             "different_sensors",
@@ -58,27 +75,67 @@ def solve_runs(runs: Sequence[RunData], estimator: str = "newton") -> dict[str, 
             "Solve them one by one",
         )
     settings = parse(runs[0].config, "the recorded configuration").config.observation
-    useful = [run for run in runs if has_finished_sweeps(run)]
+    _check_recordings(runs)
+    useful = [(run, _repeated(runs[place + 1 :])) for place, run in enumerate(runs) if finished_sweeps(run)]
     return {
-        name: _solve_sensor(sensor, [observe(run, name, settings) for run in useful], chosen)
+        name: _solve_sensor(sensor, [observe(run, name, settings, later) for run, later in useful], chosen)
         for name, sensor in runs[0].sensors.items()
     }
 
 
+def _repeated(later: Sequence[RunData]) -> frozenset[int]:
+    """The sweeps that later recordings of a run hold as well."""
+    return frozenset[int]().union(*map(finished_sweeps, later))
+
+
 def _solve_sensor(sensor: RecordedSensor, parts: Sequence[SensorObservations], estimator: Estimator) -> SensorResult:
     observations = tuple(observation for part in parts for observation in part.revolutions)
-    _check_duplicates(observations)
+    rests = tuple(rest for part in parts for rest in part.rests)
+    mounting = np.array(sensor.mounting)
+    check_duplicates(np.array([observation.average.mean_rad_s for observation in observations]))
+    six_observation = solve_six_observation(observations, "newton")
     return SensorResult(
         sensor=sensor,
-        solution=solve_observations(observations, estimator),
-        algorithm_1=_as_published(observations),
+        solution=solve_observations(observations, estimator, rests, mounting),
+        vector_model=_or_fault(lambda: solve_vector(observations, rests, mounting)),
+        six_observation=six_observation,
+        algorithm_1=_or_fault(lambda: solve_six_observation(observations, "algorithm_1")),
         observations=observations,
-        rests=tuple(rest for part in parts for rest in part.rests),
+        rests=rests,
         time_bases=tuple(part.time_base for part in parts),
     )
 
 
-def solve_observations(observations: Sequence[Observation], estimator: Estimator) -> Solution:
+def solve_observations(
+    observations: Sequence[Observation],
+    estimator: Estimator,
+    rests: Sequence[Average] = (),
+    nominal_mounting: Array | None = None,
+) -> Estimate:
+    """Scale and bias by any of the estimators; only the vector model makes use of rests and mounting."""
+    if estimator == "vector":
+        return solve_vector(observations, rests, nominal_mounting)
+    if estimator == "levenberg_marquardt":
+        return _solve_levenberg_marquardt(observations)
+    return solve_six_observation(observations, estimator)
+
+
+def solve_vector(
+    observations: Sequence[Observation], rests: Sequence[Average], nominal_mounting: Array | None = None
+) -> VectorSolution:
+    """The vector model of sweeps about known axes and of rests. Raises Fault as `solve_vector_model` does."""
+    averages = [*(observation.average for observation in observations), *rests]
+    rates = [observation.speed_rad_s * observation.axis_flange for observation in observations]
+    return solve_vector_model(
+        np.array([average.mean_rad_s for average in averages]),
+        np.array([*rates, *np.zeros((len(rests), 3))]),
+        np.array([average.variance_rad2_s2 for average in averages]),
+        speed_std_rad_s=[*(observation.speed_std_rad_s for observation in observations), *np.zeros(len(rests))],
+        nominal_mounting=nominal_mounting,
+    )
+
+
+def solve_six_observation(observations: Sequence[Observation], estimator: SixObservation) -> Solution:
     """Accumulate and solve: weighted by inverse variance, or all alike where the paper's algorithm is asked for."""
     accumulated = Accumulator.empty()
     for observation in observations:
@@ -93,91 +150,29 @@ def solve_observations(observations: Sequence[Observation], estimator: Estimator
     return accumulated.solve(estimator)
 
 
-def _as_published(observations: Sequence[Observation]) -> Solution | Fault:
+def _solve_levenberg_marquardt(observations: Sequence[Observation]) -> LevenbergMarquardtSolution:
+    return solve_levenberg_marquardt(
+        np.array([observation.average.mean_rad_s for observation in observations]),
+        [observation.speed_rad_s for observation in observations],
+        np.array([observation.average.variance_rad2_s2 for observation in observations]),
+        speed_std_rad_s=[observation.speed_std_rad_s for observation in observations],
+    )
+
+
+def _or_fault(solve: Callable[[], Result]) -> Result | Fault:
     try:
-        return solve_observations(observations, "algorithm_1")
+        return solve()
     except Fault as fault:
         return fault
 
 
-def _check_duplicates(observations: Sequence[Observation]) -> None:
-    seen: dict[bytes, int] = {}
-    for observation in observations:
-        mean = observation.average.mean_rad_s.tobytes()
-        if mean in seen:
+def _check_recordings(runs: Sequence[RunData]) -> None:
+    """The same recording given twice must not look like a run that repeats its sweeps."""
+    for run, other in combinations(runs, 2):
+        again = finished_sweeps(run) & finished_sweeps(other)
+        if again and all(np.array_equal(samples, other.samples[name]) for name, samples in run.samples.items()):
             raise Fault(
                 "duplicated_observation",
-                f"sweeps {seen[mean]} and {observation.sweep} hold the same readings",
+                f"two recordings hold the same samples of sweep {min(again)}",
                 "Give each recording once",
             )
-        seen[mean] = observation.sweep
-
-
-def sensor_document(result: SensorResult) -> dict[str, Any]:
-    """One sensor's entry in `result.json` (schema "rig.result/1"): plain numbers, lists and strings, SI units."""
-    solution = result.solution
-    return {
-        "part": result.sensor.part,
-        "serial_number": result.sensor.serial_number,
-        "model": MODEL,
-        **_estimate(solution),
-        "covariance_order": list(PARAMETERS),
-        "covariance_units": list(PARAMETER_UNITS),
-        "observations_used": solution.observations,
-        "rank": solution.rank,
-        "condition": solution.condition,
-        "temperature_c": result.temperature_c,
-        "observations": [_observation(observation) for observation in result.observations],
-        "rests": [_average(rest) for rest in result.rests],
-        "time_bases": [_time_base(time_base) for time_base in result.time_bases],
-        "algorithm_1": _published(result.algorithm_1),
-    }
-
-
-def _estimate(solution: Solution) -> dict[str, Any]:
-    return {
-        "estimator": solution.estimator,
-        "iterations": solution.iterations,
-        "scale": solution.scale.tolist(),
-        "bias_rad_s": solution.bias_rad_s.tolist(),
-        "covariance": solution.covariance.tolist(),
-    }
-
-
-def _published(outcome: Solution | Fault) -> dict[str, Any]:
-    return {"error": str(outcome)} if isinstance(outcome, Fault) else _estimate(outcome)
-
-
-def _observation(observation: Observation) -> dict[str, Any]:
-    return {
-        "sweep": observation.sweep,
-        "joint": observation.joint_name,
-        "direction": observation.direction,
-        "axis": observation.axis,
-        "sign": observation.sign,
-        "speed_rad_s": observation.speed_rad_s,
-        "speed_std_rad_s": observation.speed_std_rad_s,
-        "lost": observation.lost,
-        **_average(observation.average),
-    }
-
-
-def _average(average: Average) -> Mapping[str, Any]:
-    return {
-        "mean_rad_s": average.mean_rad_s.tolist(),
-        "mean_std_rad_s": np.sqrt(average.variance_rad2_s2).tolist(),
-        "noise_rad_s": average.noise_rad_s.tolist(),
-        "samples": average.samples,
-        "duration_s": average.duration_s,
-        "temperature_c": average.temperature_c,
-    }
-
-
-def _time_base(time_base: TimeBase) -> dict[str, float]:
-    return {
-        "offset_s": time_base.offset_s,
-        "offset_std_s": time_base.offset_std_s,
-        "drift": time_base.drift,
-        "drift_std": time_base.drift_std,
-        "reference_board_s": time_base.reference_s,
-    }

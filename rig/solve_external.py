@@ -11,10 +11,9 @@ import numpy as np
 from rich.console import Console
 from rich.table import Table
 
-from rig.errors import Refused
 from rig.estimation.six_observation import MODEL, PARAMETER_UNITS, PARAMETERS
 from rig.external import read
-from rig.solution import ESTIMATORS, solve_observations
+from rig.solution import known_estimator, solve_observations
 
 
 def solve_external(samples: Path, sweeps: Path, estimator: str, *, as_json: bool) -> int:
@@ -22,13 +21,9 @@ def solve_external(samples: Path, sweeps: Path, estimator: str, *, as_json: bool
 
     Raises Refused `unknown_estimator` and as `external.read` does; Fault as the estimator does.
     """
-    chosen = next((known for known in ESTIMATORS if known == estimator), None)
-    if chosen is None:
-        raise Refused(
-            "unknown_estimator", f"there is no estimator {estimator!r}", f"Choose one of {', '.join(ESTIMATORS)}"
-        )
+    chosen = known_estimator(estimator)
     data = read(samples, sweeps)
-    solution = solve_observations(data.sweeps, chosen)
+    solution = solve_observations(data.sweeps, chosen, data.rests)
     document = {
         "schema": "rig.external/1",
         "samples": str(samples),

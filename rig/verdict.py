@@ -8,7 +8,7 @@ from typing import Any, Literal
 import numpy as np
 
 from rig.config.models import LimitsSection
-from rig.estimation.accumulator import Solution
+from rig.estimation.estimate import Estimate
 
 
 @dataclass(frozen=True, slots=True)
@@ -30,7 +30,7 @@ class Check:
         return {**asdict(self), "passed": self.passed}
 
 
-def judge(solutions: Mapping[str, Solution], limits: LimitsSection) -> tuple[Check, ...]:
+def judge(solutions: Mapping[str, Estimate], limits: LimitsSection) -> tuple[Check, ...]:
     """The checks of every sensor, by sensor name; what the limits mean is said in the names."""
     return tuple(check for name, solution in solutions.items() for check in _checks(name, solution, limits))
 
@@ -40,7 +40,7 @@ def verdict(checks: Sequence[Check]) -> Literal["pass", "fail"]:
     return "pass" if checks and all(check.passed for check in checks) else "fail"
 
 
-def _checks(sensor: str, solution: Solution, limits: LimitsSection) -> tuple[Check, ...]:
+def _checks(sensor: str, solution: Estimate, limits: LimitsSection) -> tuple[Check, ...]:
     std = np.sqrt(np.diag(solution.covariance))
     return (
         Check(f"{sensor}.scale_deviation", _largest(solution.scale - 1), limits.scale_deviation, "1"),

@@ -5,6 +5,7 @@ so that β0 needs no special care. With six sweeps the solution is that of `clos
 """
 
 from dataclasses import dataclass
+from typing import Literal
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -37,6 +38,7 @@ class LevenbergMarquardtSolution:
     condition: float
     iterations: int
     warnings: tuple[str, ...]
+    estimator: Literal["levenberg_marquardt"] = "levenberg_marquardt"
 
 
 def solve_levenberg_marquardt(

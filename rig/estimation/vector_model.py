@@ -12,6 +12,7 @@ The equations are linear in F, c and G, one weighted regression for each axis: e
 """
 
 from dataclasses import dataclass
+from typing import Literal
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -33,6 +34,7 @@ from rig.estimation.refusals import (
 Array = NDArray[np.float64]
 
 MODEL = "m = F ω − b, k_i = 1/‖F_i‖"
+MATRIX_PARAMETERS = (*(f"f{i}{j}" for i in "xyz" for j in "xyz"), "cx", "cy", "cz")
 MAX_CONDITION = 100.0  # six sweeps stay below 3; with g-sensitivity, rests at three attitudes below 30
 REMEDY = "Sweep about three different axes, and turn the flange against gravity if g-sensitivity is wanted"
 
@@ -66,6 +68,7 @@ class VectorSolution:
     condition: float
     iterations: int
     warnings: tuple[str, ...]
+    estimator: Literal["vector"] = "vector"
 
 
 @dataclass(frozen=True, slots=True)

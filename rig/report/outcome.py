@@ -11,14 +11,15 @@ from rich.console import Console
 from rig.config.load import parse
 from rig.recording import RunData
 from rig.report.header import calibration_header
+from rig.report.sensor import sensor_document
 from rig.report.table import print_result
-from rig.solution import sensor_document, solve_runs
+from rig.solution import DEFAULT_ESTIMATOR, solve_runs
 from rig.verdict import judge, verdict
 
 SCHEMA = "rig.result/1"
 
 
-def solved_document(runs: Sequence[RunData], estimator: str = "newton") -> dict[str, Any]:
+def solved_document(runs: Sequence[RunData], estimator: str = DEFAULT_ESTIMATOR) -> dict[str, Any]:
     """The `result.json` document of a run's recordings: the same from a run that just ended and from its files.
 
     Raises `Fault` or `Refused` by name when the recordings do not hold a calibration.
@@ -40,8 +41,12 @@ def solved_document(runs: Sequence[RunData], estimator: str = "newton") -> dict[
 
 
 def write_outcome(folder: Path, document: dict[str, Any]) -> None:
-    """`calibration.h` and `result.json` into the run folder; the latter comes last and whole: it ends the run."""
-    (folder / "calibration.h").write_text(calibration_header(document), encoding="utf-8")
+    """`calibration.h` and `result.json` into the run folder; the latter comes last and whole: it ends the run.
+
+    A calibration that failed its limits gets no header: nobody should compile it in.
+    """
+    if document["verdict"] == "pass":
+        (folder / "calibration.h").write_text(calibration_header(document), encoding="utf-8")
     part = folder / "result.json.part"
     part.write_text(json.dumps(document, indent=2, allow_nan=False) + "\n", encoding="utf-8")
     part.replace(folder / "result.json")

@@ -1,8 +1,9 @@
 """The result as a person reads it in the terminal."""
 
-from collections.abc import Mapping
+from collections.abc import Iterable, Mapping
 from typing import Any
 
+import numpy as np
 from rich.console import Console
 from rich.table import Table
 
@@ -26,6 +27,8 @@ def print_result(result: Mapping[str, Any], console: Console) -> None:
                 f"{std[3 + i]:.5f}",
             )
         console.print(table)
+        for line in _beside(sensor):
+            console.print(line)
     checks = Table(title="checks", title_justify="left")
     for heading in ("check", "value", "limit", "unit", ""):
         checks.add_column(heading, justify="right" if heading in ("value", "limit") else "left")
@@ -38,3 +41,28 @@ def print_result(result: Mapping[str, Any], console: Console) -> None:
     console.print(
         f"verdict: {result['verdict'].upper()}", style="bold green" if result["verdict"] == "pass" else "bold red"
     )
+
+
+def _beside(sensor: Mapping[str, Any]) -> list[str]:
+    """What the other estimators make of the same sweeps, and what the vector model says about the axes."""
+    lines = []
+    for name in ("vector_model", "six_observation", "algorithm_1"):
+        other = sensor[name]
+        if other.get("estimator") == sensor["estimator"]:
+            continue
+        if "error" in other:
+            lines.append(f"{name}: {other['error']}")
+        else:
+            scale, bias = (_triple(other["scale"], ".5f"), _triple(other["bias_rad_s"], "+.5f"))
+            lines.append(f"{name}: scale {scale}, bias {bias} rad/s")
+    vector = sensor["vector_model"]
+    if "error" not in vector:
+        skew = _triple(np.degrees(vector["non_orthogonality_rad"]), "+.3f")
+        std = max(np.degrees(vector["non_orthogonality_std_rad"]))
+        lines.append(f"non-orthogonality yz zx xy: {skew} ° (± {std:.3f})")
+        lines += [f"warning: {warning}" for warning in vector["warnings"]]
+    return lines
+
+
+def _triple(values: Iterable[float], form: str) -> str:
+    return " ".join(f"{value:{form}}" for value in values)

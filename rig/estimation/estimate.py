@@ -1,0 +1,29 @@
+"""What every gyroscope estimator's result has in common."""
+
+from typing import Protocol
+
+import numpy as np
+from numpy.typing import NDArray
+
+Array = NDArray[np.float64]
+
+
+class Estimate(Protocol):
+    """Scale (3,), bias_rad_s (3,) and covariance (6, 6) in the order kx ky kz bx by bz, of g = K (m + b)."""
+
+    @property
+    def estimator(self) -> str: ...
+    @property
+    def scale(self) -> Array: ...
+    @property
+    def bias_rad_s(self) -> Array: ...
+    @property
+    def covariance(self) -> Array: ...
+    @property
+    def observations(self) -> int: ...
+    @property
+    def rank(self) -> int: ...
+    @property
+    def condition(self) -> float: ...
+    @property
+    def iterations(self) -> int: ...
