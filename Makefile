@@ -1,6 +1,7 @@
 # make demo    calibrate a gyroscope on a simulated robot arm, on a bare machine with Python 3.11 or 3.12
 # make test    everything CI checks: lint, types, import layers, tests (needs gcc and arm-none-eabi-gcc)
 # make bench   every benchmark, ratios measured side by side
+# make figures the pictures in docs/method.md, by the studies
 
 VENV := .venv
 BIN := $(VENV)/bin
@@ -8,7 +9,9 @@ BIN := $(VENV)/bin
 FIND_PYTHON = for p in python3.12 python3.11 python3 python; do \
   "$$p" -c 'import sys; sys.exit(sys.version_info[:2] not in [(3, 11), (3, 12)])' 2>/dev/null && echo "$$p" && break; done
 
-.PHONY: demo test lint firmware bench clean
+STUDIES := normal extreme speed convergence sine averaging estimators misalignment kvh-gyro kvh-accelerometer
+
+.PHONY: demo test lint firmware bench figures clean
 .DELETE_ON_ERROR:
 
 demo: $(VENV)/demo.installed
@@ -25,6 +28,10 @@ lint: $(VENV)/dev.installed
 
 bench: $(VENV)/dev.installed
 	for benchmark in benchmarks/*.py; do $(BIN)/python $$benchmark || exit 1; done
+
+figures: $(VENV)/dev.installed
+	for study in $(STUDIES); do $(BIN)/rig study $$study --jobs 2 --out build/studies || exit 1; \
+	  cp build/studies/$$study.png docs/figures/; done
 
 firmware:
 	$(MAKE) -C firmware_host/firmware

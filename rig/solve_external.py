@@ -4,20 +4,23 @@ There is no configuration, so there are no limits to judge it by.
 """
 
 import json
+from collections.abc import Sequence
 from pathlib import Path
 from typing import Any
 
-import numpy as np
 from rich.console import Console
-from rich.table import Table
 
+from rig.errors import Fault
+from rig.estimation.estimate import Estimate
 from rig.estimation.six_observation import MODEL, PARAMETER_UNITS, PARAMETERS
 from rig.external import read
-from rig.solution import known_estimator, solve_observations
+from rig.observation import Observation
+from rig.report.table import estimate_table
+from rig.solution import known_estimator, solve_observations, solve_six_observation
 
 
 def solve_external(samples: Path, sweeps: Path, estimator: str, *, as_json: bool) -> int:
-    """Solve two CSV files (see `rig.external`) and print the result; 0.
+    """Solve two CSV files (see `rig.external`) and print the result, the six-observation solution beside it; 0.
 
     Raises Refused `unknown_estimator` and as `external.read` does; Fault as the estimator does.
     """
@@ -29,31 +32,44 @@ def solve_external(samples: Path, sweeps: Path, estimator: str, *, as_json: bool
         "samples": str(samples),
         "sweeps": str(sweeps),
         "model": MODEL,
-        "estimator": solution.estimator,
-        "scale": solution.scale.tolist(),
-        "bias_rad_s": solution.bias_rad_s.tolist(),
-        "covariance": solution.covariance.tolist(),
+        **_estimate(solution),
         "covariance_order": list(PARAMETERS),
         "covariance_units": list(PARAMETER_UNITS),
-        "rank": solution.rank,
-        "condition": solution.condition,
-        "iterations": solution.iterations,
-        "observations_used": solution.observations,
         "rests": len(data.rests),
+        "six_observation": _six_observation(data.sweeps),
     }
     if as_json:
         print(json.dumps(document, indent=2))
     else:
-        _print(document)
+        _print(document, Console())
     return 0
 
 
-def _print(document: dict[str, Any]) -> None:
-    table = Table(title=f"{document['samples']}, {document['model']}, {document['estimator']}", title_justify="left")
-    for heading in ("axis", "scale factor", "± 1σ", "bias rad/s", "± 1σ rad/s"):
-        table.add_column(heading, justify="left" if heading == "axis" else "right")
-    std = np.sqrt(np.diag(document["covariance"]))
-    for i, axis in enumerate("xyz"):
-        scale, bias = document["scale"][i], document["bias_rad_s"][i]
-        table.add_row(axis, f"{scale:.5f}", f"{std[i]:.5f}", f"{bias:+.5f}", f"{std[3 + i]:.5f}")
-    Console().print(table)
+def _six_observation(sweeps: Sequence[Observation]) -> dict[str, Any]:
+    """The six-observation solution, or the error it ends in: three sweeps may do for the vector model, not for it."""
+    try:
+        return _estimate(solve_six_observation(sweeps, "newton"))
+    except Fault as fault:
+        return {"error": str(fault)}
+
+
+def _estimate(solution: Estimate) -> dict[str, Any]:
+    return {
+        "estimator": solution.estimator,
+        "scale": solution.scale.tolist(),
+        "bias_rad_s": solution.bias_rad_s.tolist(),
+        "covariance": solution.covariance.tolist(),
+        "observations_used": solution.observations,
+        "rank": solution.rank,
+        "condition": solution.condition,
+        "iterations": solution.iterations,
+    }
+
+
+def _print(document: dict[str, Any], console: Console) -> None:
+    console.print(estimate_table(f"{document['samples']}, {document['model']}, {document['estimator']}", document))
+    beside = document["six_observation"]
+    if "error" in beside:
+        console.print(f"six_observation: {beside['error']}")
+    elif beside["estimator"] != document["estimator"]:
+        console.print(estimate_table("six observations alone, the rests and the axes left out", beside))

@@ -50,10 +50,12 @@ def test_the_example_is_solved_within_its_uncertainty(capsys: pytest.CaptureFixt
     assert main(arguments) == 0
     result = json.loads(capsys.readouterr().out)
     assert result["model"] == "g = K (m + b)"
-    std = np.sqrt(np.diag(result["covariance"]))
-    errors = np.array(result["scale"] + result["bias_rad_s"]) - np.concatenate([SCALE, BIAS_RAD_S])
-    assert np.all(np.abs(errors) < 3.5 * std)
-    assert np.all(std < 1.5e-3)
+    assert (result["estimator"], result["six_observation"]["estimator"]) == ("vector", "newton")
+    for estimate in (result, result["six_observation"]):
+        std = np.sqrt(np.diag(estimate["covariance"]))
+        errors = np.array(estimate["scale"] + estimate["bias_rad_s"]) - np.concatenate([SCALE, BIAS_RAD_S])
+        assert np.all(np.abs(errors) < 3.5 * std)
+        assert np.all(std < 1.5e-3)
 
 
 def test_the_example_holds_six_turns_and_six_rests() -> None:
@@ -117,8 +119,27 @@ def test_a_gap_in_the_samples_is_named(tmp_path: Path) -> None:
         read_with(tmp_path, lambda lines: [*lines[:100], *lines[120:]])
 
 
-def test_a_missing_direction_is_refused_by_the_solver(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+def test_a_missing_direction_leaves_the_vector_model_alone(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    """With the rests, five sweeps about known axes are enough for it; the six-observation solvers refuse."""
     sweeps = edited(tmp_path, "sweeps.csv", lambda lines: [line for line in lines if ",0,-1,0," not in line])
     arguments = ["solve", str(EXAMPLES / "samples.csv"), "--sweeps", str(sweeps)]
+    assert main([*arguments, "--json"]) == 0
+    assert "too_few_observations" in json.loads(capsys.readouterr().out)["six_observation"]["error"]
     assert main([*arguments, "--estimator", "newton"]) == 3
     assert "too_few_observations" in capsys.readouterr().err
+
+
+def test_unknown_estimators_are_refused(capsys: pytest.CaptureFixture[str]) -> None:
+    files = [str(EXAMPLES / "samples.csv"), "--sweeps", str(EXAMPLES / "sweeps.csv")]
+    assert main(["solve", *files, "--estimator", "nosuch"]) == 2
+    assert "unknown_estimator" in capsys.readouterr().err
+
+
+def test_axes_with_a_wrong_sign_are_refused(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    def mirrored(lines: list[str]) -> list[str]:
+        rows = [line.split(",") for line in lines[1:]]
+        return [lines[0], *(",".join([*row[:2], str(-int(row[2])), *row[3:]]) for row in rows)]
+
+    sweeps = edited(tmp_path, "sweeps.csv", mirrored)
+    assert main(["solve", str(EXAMPLES / "samples.csv"), "--sweeps", str(sweeps)]) == 3
+    assert "mirrored_axis" in capsys.readouterr().err

@@ -165,21 +165,19 @@ def test_results_do_not_depend_on_the_number_of_processes() -> None:
     assert alone.columns == shared.columns
 
 
-def test_results_do_not_depend_on_a_dask_cluster() -> None:
-    from distributed import Client, LocalCluster
-    from joblib import parallel_config
+def test_results_do_not_depend_on_a_dask_cluster(tmp_path: Path) -> None:
+    from distributed import LocalCluster
 
+    arguments = ["study", "averaging", "--runs", "20"]
     local = {"n_workers": 1, "threads_per_worker": 2, "processes": False, "dashboard_address": None}
     with warnings.catch_warnings():
         warnings.simplefilter("ignore")  # distributed's own, about the loop it closes
-        with (
-            LocalCluster(**local) as cluster,  # type: ignore[no-untyped-call]
-            Client(cluster) as client,  # type: ignore[no-untyped-call]
-            parallel_config(backend="dask", client=client),
-        ):
-            there = find("averaging").run(Settings(seed=3, runs=20))
-    here = find("averaging").run(Settings(seed=3, runs=20))
-    assert there.columns == here.columns
+        with LocalCluster(**local) as cluster:  # type: ignore[no-untyped-call]
+            address = cluster.scheduler_address
+            assert main([*arguments, "--dask", address, "--out", str(tmp_path / "cluster")]) == 0
+    assert main([*arguments, "--out", str(tmp_path / "here")]) == 0
+    there, here = ((tmp_path / folder / "averaging.csv").read_text() for folder in ("cluster", "here"))
+    assert there == here
 
 
 def test_the_command_lists_studies_and_refuses_unknown_ones(capsys: pytest.CaptureFixture[str]) -> None:

@@ -11,22 +11,8 @@ from rich.table import Table
 def print_result(result: Mapping[str, Any], console: Console) -> None:
     """Print a `result.json` document (schema `rig.result/1`): six parameters with uncertainties, checks, verdict."""
     for name, sensor in result["sensors"].items():
-        table = Table(
-            title=f"{name}: {sensor['part']} {sensor['serial_number']}, {sensor['model']}, {sensor['estimator']}",
-            title_justify="left",
-        )
-        for heading in ("axis", "scale factor", "± 1σ", "bias rad/s", "± 1σ rad/s"):
-            table.add_column(heading, justify="left" if heading == "axis" else "right")
-        std = [sensor["covariance"][i][i] ** 0.5 for i in range(6)]
-        for i, axis in enumerate("xyz"):
-            table.add_row(
-                axis,
-                f"{sensor['scale'][i]:.5f}",
-                f"{std[i]:.5f}",
-                f"{sensor['bias_rad_s'][i]:+.5f}",
-                f"{std[3 + i]:.5f}",
-            )
-        console.print(table)
+        title = f"{name}: {sensor['part']} {sensor['serial_number']}, {sensor['model']}, {sensor['estimator']}"
+        console.print(estimate_table(title, sensor))
         for line in _beside(sensor):
             console.print(line)
     checks = Table(title="checks", title_justify="left")
@@ -43,6 +29,23 @@ def print_result(result: Mapping[str, Any], console: Console) -> None:
     )
 
 
+def estimate_table(title: str, estimate: Mapping[str, Any]) -> Table:
+    """Scale and bias of each axis with their uncertainties, from an estimate as `result.json` has it."""
+    table = Table(title=title, title_justify="left")
+    for heading in ("axis", "scale factor", "± 1σ", "bias rad/s", "± 1σ rad/s"):
+        table.add_column(heading, justify="left" if heading == "axis" else "right")
+    std = [estimate["covariance"][i][i] ** 0.5 for i in range(6)]
+    for i, axis in enumerate("xyz"):
+        table.add_row(
+            axis,
+            f"{estimate['scale'][i]:.5f}",
+            f"{std[i]:.5f}",
+            f"{estimate['bias_rad_s'][i]:+.5f}",
+            f"{std[3 + i]:.5f}",
+        )
+    return table
+
+
 def _beside(sensor: Mapping[str, Any]) -> list[str]:
     """What the other estimators make of the same sweeps, and what the vector model says about the axes."""
     lines = []
@@ -54,7 +57,7 @@ def _beside(sensor: Mapping[str, Any]) -> list[str]:
             lines.append(f"{name}: {other['error']}")
         else:
             scale, bias = (_triple(other["scale"], ".5f"), _triple(other["bias_rad_s"], "+.5f"))
-            lines.append(f"{name}: scale {scale}, bias {bias} rad/s")
+            lines.append(f"{name}: k {scale}, b {bias} rad/s")
     vector = sensor["vector_model"]
     if "error" not in vector:
         skew = _triple(np.degrees(vector["non_orthogonality_rad"]), "+.3f")

@@ -165,7 +165,7 @@ def _draw(population: sim.Population, rows: list[dict[str, Any]], figure: "Figur
     for row_of_panels, noise in zip(panels, sim.NOISE_LEVELS_RAD_S, strict=True):
         for panel, (speed, estimator, title) in zip(row_of_panels, kinds, strict=True):
             _draw_boxes(panel, _of(rows, _Condition(speed, noise, "whole_turns", estimator)))
-            panel.set_title(f"{title}, noise {noise:g} rad/s")
+            panel.set_title(f"{title}\nnoise {noise:g} rad/s")
         row_of_panels[0].set_ylabel("estimated − true\n(scale factors: 1, biases: rad/s)")
     panels[0, 0].legend(loc="upper left")
     figure.suptitle(f"{population.name} conditions: {sim.SETS} gyroscopes, boxes with whiskers at 1.5 boxes")

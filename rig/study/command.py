@@ -1,8 +1,8 @@
 """`rig study`: lists the studies, or runs one with a progress bar and writes what it found."""
 
 import sys
-from collections.abc import Iterable
-from contextlib import nullcontext
+from collections.abc import Iterable, Iterator
+from contextlib import contextmanager, nullcontext
 from pathlib import Path
 from typing import Any
 
@@ -57,7 +57,8 @@ def run_study(
     return 0
 
 
-def _cluster(address: str) -> Any:
+@contextmanager
+def _cluster(address: str) -> Iterator[None]:
     """Everything joblib does inside goes to the Dask scheduler at `address`."""
     try:
         from distributed import Client
@@ -66,12 +67,13 @@ def _cluster(address: str) -> Any:
     from joblib import parallel_config
 
     try:
-        client = Client(address, timeout="10s")  # type: ignore[no-untyped-call]
+        client = Client(address, timeout="5s")  # type: ignore[no-untyped-call]
     except (OSError, ValueError) as error:
         raise Refused(
             "no_cluster", f"no Dask scheduler answers at {address} ({error})", "Start one with `dask scheduler`"
         ) from error
-    return parallel_config(backend="dask", client=client)
+    with client, parallel_config(backend="dask", client=client):
+        yield
 
 
 def _bar(results: Iterable[Any], total: int) -> Iterable[Any]:

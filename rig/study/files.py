@@ -92,4 +92,4 @@ def _write_plots(report: Report, paths: Sequence[Path]) -> None:
         for path in paths:
             # Without the date the same study gives the same file.
             metadata = {"Date": None} if path.suffix == ".svg" else {}
-            figure.savefig(path, dpi=110, metadata=metadata)
+            figure.savefig(path, dpi=80, metadata=metadata)
