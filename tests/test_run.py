@@ -93,6 +93,7 @@ def test_a_run_leaves_everything_in_its_folder(finished: tuple[Path, dict[str, A
     ]  # fmt: skip
     assert "done: sweep wrist_2 ccw" in (out / "log.txt").read_text(encoding="utf-8")
     assert f"gyro_scale[3] = {{{result['sensors']['gyro']['scale'][0]:.9e}f" in (out / "calibration.h").read_text()
+    assert ", vector" in done.stdout and "six_observation: k" in done.stdout and "non-orthogonality" in done.stdout
     assert "verdict: PASS" in done.stdout and f"{result['sensors']['gyro']['scale'][0]:.5f}" in done.stdout
     with h5py.File(out / "run.h5", "r") as file:
         assert "scale: [" not in file.attrs["config"], "the recording must not hold the simulated truth"
@@ -113,7 +114,22 @@ def test_the_papers_algorithm_agrees(finished: tuple[Path, dict[str, Any], Any])
     out, result, _ = finished
     published = json.loads(rig("solve", out, "--estimator", "algorithm_1", "--json").stdout)["sensors"]["gyro"]
     assert published["estimator"] == "algorithm_1" and published["iterations"] >= 2
-    assert np.allclose(published["scale"], result["sensors"]["gyro"]["scale"], atol=1e-4)
+    beside = result["sensors"]["gyro"]
+    assert beside["estimator"] == "vector" and beside["six_observation"]["estimator"] == "newton"
+    assert np.allclose(published["scale"], beside["six_observation"]["scale"], atol=1e-4)
+    assert beside["algorithm_1"] == {name: published[name] for name in beside["algorithm_1"]}
+
+
+@pytest.mark.parametrize("estimator", ["vector", "newton", "levenberg_marquardt"])
+def test_every_estimator_recovers_the_truth(finished: tuple[Path, dict[str, Any], Any], estimator: str) -> None:
+    out, result, _ = finished
+    solved = json.loads(rig("solve", out, "--estimator", estimator, "--json").stdout)["sensors"]["gyro"]
+    assert (
+        solved["estimator"] == estimator and solved["six_observation"] == result["sensors"]["gyro"]["six_observation"]
+    )
+    truth = yaml.safe_load((out / "config.yaml").read_text(encoding="utf-8"))["world"]["sensors"]["gyro"]
+    error = np.array(solved["scale"] + solved["bias_rad_s"]) - np.array(truth["scale"] + truth["bias_rad_s"])
+    assert np.all(np.abs(error) < 4 * np.sqrt(np.diag(solved["covariance"])))
 
 
 def test_the_script_runs_as_the_command_does_and_limits_that_are_not_met_fail(tmp_path: Path) -> None:

@@ -85,6 +85,22 @@ def test_the_covariance_is_that_of_repeated_calibrations(method: Method, still: 
     assert np.all(np.abs(found.mean(axis=0) - THETA) < 0.1 * std)
 
 
+def test_noise_in_slow_readings_biases_the_published_estimate_and_only_that() -> None:
+    r, rates = turning(1000)
+    rates = 0.02 * rates  # ten times the noise that TRIAX reports of single samples
+    variances = np.full((1000, 3), np.radians(0.0475) ** 2)
+    exact = readings(r, rates)
+    ratios = {}
+    for method in METHODS:
+        solution = solve_triaxial(noisy(exact, variances), r, variances, known=rates, method=method)
+        draws = noisy(exact, variances, runs=20)
+        found = np.array([solve_triaxial_batch(d, r, variances, known=rates, method=method) for d in draws])
+        ratios[method] = np.abs(found.mean(axis=0) - THETA) / np.sqrt(np.diag(solution.covariance))
+        assert any("maximum_likelihood" in warning for warning in solution.warnings) == (method == "as_published")
+    assert ratios["as_published"][:9].max() > 3
+    assert ratios["maximum_likelihood"].max() < 1
+
+
 def test_maximum_likelihood_makes_more_of_uneven_noise() -> None:
     r = attitudes(30)
     variances = np.full((30, 3), (0.05 * DEG_H) ** 2) * np.array([100.0, 1.0, 1.0])

@@ -7,6 +7,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from rig.errors import Fault
+from rig.estimation.refusals import check_unit
 from rig.estimation.six_observation import (
     Array,
     by_algorithm_1,
@@ -111,7 +112,7 @@ class Accumulator:
 
         `newton` solves for readings counted from their mean, about −b: from zero, the design of Eq. (7) is singular
         where ‖K b‖ = ω. `algorithm_1` counts from zero, as published. Raises Fault `too_few_observations`,
-        `rank_deficient`, `negative_square`, `algorithm_1_diverged`.
+        `rank_deficient`, `negative_square`, `algorithm_1_diverged`, `wrong_unit`.
         """
         if self.count < 6:
             raise Fault(
@@ -134,6 +135,7 @@ class Accumulator:
         else:
             beta, iterations = by_algorithm_1(p, q)
         scale, bias = parameters(beta)
+        check_unit(scale)
         covariance = self._covariance(scale, bias, centre)
         return Solution(estimator, scale, bias - centre, covariance, self.count, rank, condition, iterations)
 

@@ -6,9 +6,11 @@ R takes body coordinates to table coordinates; v_ref, in table coordinates, is f
 adds: its rate for a gyroscope (v_ref is then the Earth's rate), nothing for an accelerometer or a magnetometer. With
 v̄ = 0 the factor between F and v_ref is unknown, so ‖v_ref‖ and the side it points to must be given.
 
-Two methods: "as_published" solves the stacked equations (`rig.estimation.stacked`); "maximum_likelihood" goes on from
-there to the weighted least squares in the readings (`rig.estimation.reference_model`), which has no bias from errors in
-X and depends neither on units nor on unequal noise.
+Two methods: "as_published" solves the stacked equations (`rig.estimation.stacked`). The readings stand in X, so their
+noise σ shrinks F⁻¹ by about (σ/v_rms)², however many readings there are; beside a standard deviation that falls with
+√N this shows once √N σ/v_rms nears one. Averages of minutes stay far below it, single samples at slow rates do not.
+"maximum_likelihood" goes on from there to the weighted least squares in the readings themselves
+(`rig.estimation.reference_model`): no such bias, no scaling of columns, and the most made of unequal noise.
 """
 
 from dataclasses import dataclass
@@ -26,6 +28,7 @@ Array = NDArray[np.float64]
 Method = Literal["as_published", "maximum_likelihood"]
 
 MAX_CONDITION = 1e4
+NOTICEABLE = 0.5  # √N σ/v_rms
 MIN_SIDE = 0.05  # cosine between the reference and the direction that says its sign
 REMEDY = "Take more attitudes, turned about at least two different axes"
 
@@ -118,7 +121,7 @@ def solve_triaxial(
         rank=found.rank,
         condition=found.condition,
         iterations=iterations,
-        warnings=refusals.inconsistency(residuals, v, 3 * len(m) - needed),
+        warnings=refusals.inconsistency(residuals, v, 3 * len(m) - needed) + _errors_in_x(m, v, method),
     )
 
 
@@ -171,6 +174,13 @@ def _conditioning(scaled: Array, m: Array, v: Array, needed: int) -> refusals.Co
     """Of the scaled X. Its readings are noisy, so directions that only noise tells do not count."""
     noise = np.sqrt(v.max() / np.mean(m**2)) * (np.sqrt(len(m)) + np.sqrt(3))
     return refusals.conditioning(scaled, needed, float(noise))
+
+
+def _errors_in_x(m: Array, v: Array, method: Method) -> tuple[str, ...]:
+    """A warning where noise in X biases the published estimate by what its standard deviation does not cover."""
+    if method != "as_published" or len(m) * v.mean() < NOTICEABLE**2 * np.mean(m**2):
+        return ()
+    return ("noise in the readings biases the published estimate; maximum_likelihood does not suffer from it",)
 
 
 def _check_side(reference: Array, side: Array) -> None:
