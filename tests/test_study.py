@@ -155,7 +155,8 @@ def test_every_study_writes_its_table_findings_and_plots(tmp_path: Path) -> None
 
 
 def test_a_table_as_parquet_reads_back(tmp_path: Path) -> None:
-    parquet = pytest.importorskip("pyarrow.parquet")
+    from pyarrow import parquet
+
     path = write(report("speed"), tmp_path, "speed", "parquet")[0]
     assert parquet.read_table(path)["scale_mse"].to_pylist() == report("speed").columns["scale_mse"]
 
