@@ -149,7 +149,7 @@ def _revolution(
 def bias_drift(rests: Sequence[Average]) -> Array:
     """(3,) variance in (rad/s)² by which the bias differs from rest to rest, beyond what the noise of a rest explains.
 
-    Zero unless that is significant over all axes (χ² at 0.99), so that a steady sensor is left alone.
+    Zero unless that is significant over all axes (χ² at 0.999), so that a steady sensor is left alone.
     """
     from scipy.special import chdtri
 
@@ -159,7 +159,7 @@ def bias_drift(rests: Sequence[Average]) -> Array:
     noise = np.array([rest.variance_rad2_s2 for rest in rests]).mean(axis=0)
     scatter = means.var(axis=0, ddof=1)
     freedom = len(rests) - 1
-    significant = freedom * float(np.sum(scatter / noise)) > chdtri(3 * freedom, 0.01)
+    significant = freedom * float(np.sum(scatter / noise)) > chdtri(3 * freedom, 0.001)
     return np.maximum(scatter - noise, 0.0) if significant else np.zeros(3)
 
 
