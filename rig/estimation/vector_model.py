@@ -124,8 +124,8 @@ def solve_vector_model(
     raw = _raw_covariance(inverse, variances, speed_noise)
 
     matrix = coefficients[:3].T
-    check_unit(1 / np.linalg.norm(matrix, axis=1))
     scale = 1 / np.linalg.norm(matrix, axis=1)
+    check_unit(scale)
     axes = scale[:, None] * matrix
     check_axes(axes, None if nominal_mounting is None else np.asarray(nominal_mounting, dtype=np.float64))
     order = np.array([i * columns + j for i in range(3) for j in range(3)] + [i * columns + 3 for i in range(3)])
@@ -236,17 +236,13 @@ def _angle_jacobian(axes: Array, scale: Array) -> Array:
     """
     rotation = nearest_rotation(axes)
     stretch = axes @ rotation.T
-    to_turn = np.linalg.inv(np.trace(stretch) * np.eye(3) - stretch)
-    sines = axes @ axes.T
-    jacobian = np.zeros((6, 9))
+    change = np.zeros((9, 3, 3))  # of the unit rows, for a unit change of each element of F
     for i in range(3):
-        for j in range(3):
-            change = np.zeros((3, 3))  # of the unit rows, for a unit change of F[i, j]
-            change[i] = scale[i] * (np.eye(3)[j] - axes[i, j] * axes[i])
-            sine_change = change @ axes.T + axes @ change.T
-            moved = change @ rotation.T
-            skew = moved - moved.T
-            for row, (a, b) in enumerate(((1, 2), (2, 0), (0, 1))):
-                jacobian[row, 3 * i + j] = sine_change[a, b] / np.sqrt(1 - sines[a, b] ** 2)
-            jacobian[3:, 3 * i + j] = to_turn @ np.array([skew[2, 1], skew[0, 2], skew[1, 0]])
-    return jacobian
+        change[3 * i : 3 * i + 3, i] = scale[i] * (np.eye(3) - np.outer(axes[i], axes[i]))
+    sines, sine_change = axes @ axes.T, change @ axes.T
+    skew = change @ rotation.T
+    skew = skew - np.swapaxes(skew, -1, -2)
+    pairs, others = [1, 2, 0], [2, 0, 1]
+    of_pairs = sine_change[:, pairs, others] + sine_change[:, others, pairs]
+    axial = np.linalg.solve(np.trace(stretch) * np.eye(3) - stretch, skew[:, others, pairs].T)
+    return np.concatenate([(of_pairs / np.sqrt(1 - sines[pairs, others] ** 2)).T, axial])
