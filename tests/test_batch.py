@@ -1,7 +1,5 @@
 """Fifteen thousand calibrations at once say what each of them says alone; and so does Levenberg–Marquardt."""
 
-import time
-
 import numpy as np
 import pytest
 from numpy.typing import NDArray
@@ -84,21 +82,15 @@ def test_one_bad_run_does_not_stop_the_others() -> None:
     np.testing.assert_allclose(solution.scale[[0, 3]], scale[[0, 3]], atol=0.01)
 
 
-def test_a_batch_is_a_hundred_times_faster_than_a_loop_of_scipy_and_agrees() -> None:
-    means, speeds, _, _ = runs(15000)
-    started_s = time.perf_counter()
+def test_a_batch_agrees_with_a_loop_of_scipy() -> None:
+    means, speeds, _, _ = runs(150)
     batch = newton_batch(means, speeds)
-    batch_s = time.perf_counter() - started_s
     start = np.concatenate([np.ones(3), np.zeros(3)])
-    started_s = time.perf_counter()
     loop = [
         least_squares(lambda x, m=m: speeds**2 - squared_rate(x, m), start, method="lm", xtol=1e-12, ftol=1e-12).x  # type: ignore[misc]
-        for m in means[:150]
+        for m in means
     ]
-    loop_s = (time.perf_counter() - started_s) * 100
-    found = np.concatenate([batch.scale, batch.bias_rad_s], axis=1)[:150]
-    np.testing.assert_allclose(found, loop, atol=1e-9)
-    assert loop_s > 50 * batch_s  # the benchmark measures it; here the machine may be busy with other things
+    np.testing.assert_allclose(np.concatenate([batch.scale, batch.bias_rad_s], axis=1), loop, atol=1e-9)
 
 
 @pytest.mark.parametrize("repeats", [1, 2])
@@ -140,6 +132,13 @@ def test_the_covariances_are_those_of_repeated_calibrations(repeats: int) -> Non
     for mean, variance, speed in zip(exact, variances, speeds, strict=True):
         accumulated = accumulated.add(mean, variance, float(speed))
     np.testing.assert_allclose(empirical, np.diag(accumulated.solve().covariance), rtol=0.1)
+    published = algorithm_1_batch(draws, speeds)
+    assert published.converged.all()
+    empirical = np.var(np.concatenate([published.scale, published.bias_rad_s], axis=1), axis=0)
+    accumulated = Accumulator.empty()
+    for mean, variance, speed in zip(exact, variances, speeds, strict=True):
+        accumulated = accumulated.add(mean, variance, float(speed), weight=1.0)
+    np.testing.assert_allclose(empirical, np.diag(accumulated.solve("algorithm_1").covariance), rtol=0.1)
     if repeats == 1:
         alone = [solve_levenberg_marquardt(draw, speeds, variances) for draw in draws[:20]]
         np.testing.assert_allclose([s.scale for s in alone], batch.scale[:20], rtol=1e-10)
