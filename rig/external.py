@@ -18,8 +18,9 @@ from pathlib import Path
 import numpy as np
 from numpy.typing import NDArray
 
+from rig.averaging import Average
 from rig.errors import Fault, Refused
-from rig.observation import Average, Observation
+from rig.observation import Observation
 from rig.timebase import widening
 
 Array = NDArray[np.float64]

@@ -13,13 +13,13 @@ from dataclasses import dataclass, replace
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
+from rig.averaging import Average, Stream, average, between, on_the_arms_clock
 from rig.config.models import ObservationSection
 from rig.errors import Fault
-from rig.recording import RecordedSensor, RunData
+from rig.recording import RunData
 from rig.revolution import Revolution, arm_states_lost, describe, find_revolution
-from rig.timebase import ArmMotion, Array, TimeBase, estimate_time_base, widening
+from rig.timebase import ArmMotion, Array, TimeBase
 
 STUCK_REPEATS = 10  # equal readings in a row, of a sensor whose noise exceeds a count
 REST_SETTLING_S = 0.2  # kept away from either end of a rest
@@ -27,21 +27,6 @@ MAX_REST_TRAVEL_RAD = 1e-3
 MIN_REST_SAMPLES = 20
 MIN_RESTS = 3  # to tell whether the bias drifts
 MAX_READING_RATIO = 4.0  # reading over turn rate, either way: no gyroscope is that far off, a wrong unit or range is
-
-
-@dataclass(frozen=True, slots=True)
-class Average:
-    """Readings averaged: mean (3,) rad/s, variance (3,) of that mean in (rad/s)², noise (3,) of one sample in rad/s.
-
-    The variance of a revolution or a rest also holds the drift of the bias from rest to rest.
-    """
-
-    mean_rad_s: Array
-    variance_rad2_s2: Array
-    noise_rad_s: Array
-    samples: int
-    duration_s: float
-    temperature_c: float
 
 
 @dataclass(frozen=True, slots=True)
@@ -74,18 +59,6 @@ class SensorObservations:
     rests: tuple[Average, ...]
 
 
-@dataclass(frozen=True, slots=True)
-class _Stream:
-    """A sensor's samples in physical units, on the controller's clock."""
-
-    sensor: RecordedSensor
-    clock: TimeBase
-    time_s: Array
-    board_time_s: Array
-    readings_rad_s: Array
-    raw: NDArray[Any]
-
-
 def observe(
     run: RunData, sensor: str, settings: ObservationSection, superseded: Collection[int] = ()
 ) -> SensorObservations:
@@ -97,7 +70,7 @@ def observe(
     `wrong_unit`, `no_motion`, `not_finite`, `time_base_not_found`, `board_clock_restarted`, `duplicated_samples`.
     """
     motion = ArmMotion(run.arm)
-    stream = _stream(run.samples[sensor], run.sensors[sensor], motion)
+    stream = on_the_arms_clock(run.samples[sensor], run.sensors[sensor], motion)
     revolutions = [
         _revolution(stream, motion, sweep, window, settings)
         for sweep, window in _finished(run, "sweep")
@@ -126,7 +99,7 @@ def _sound_for(run: RunData, sensor: str, settings: ObservationSection) -> froze
     sound = set()
     try:
         motion = ArmMotion(run.arm)
-        stream = _stream(run.samples[sensor], run.sensors[sensor], motion)
+        stream = on_the_arms_clock(run.samples[sensor], run.sensors[sensor], motion)
     except Fault:
         return frozenset()
     for sweep, window in _finished(run, "sweep"):
@@ -137,7 +110,7 @@ def _sound_for(run: RunData, sensor: str, settings: ObservationSection) -> froze
 
 
 def _revolution(
-    stream: _Stream,
+    stream: Stream,
     motion: ArmMotion,
     sweep: dict[str, Any],
     window: tuple[float, float],
@@ -178,18 +151,11 @@ def _finished(run: RunData, kind: str) -> Iterator[tuple[dict[str, Any], tuple[f
             started = None
 
 
-def _stream(raw: NDArray[Any], sensor: RecordedSensor, motion: ArmMotion) -> _Stream:
-    board_time_s = raw["board_time_us"] * 1e-6
-    readings = raw["counts"] * sensor.sensitivity_rad_s_per_count
-    clock = estimate_time_base(board_time_s, readings, motion)
-    return _Stream(sensor, clock, clock.controller_time_s(board_time_s), board_time_s, readings, raw)
-
-
 def _observation(
-    stream: _Stream, motion: ArmMotion, sweep: dict[str, Any], turn: Revolution, settings: ObservationSection
+    stream: Stream, motion: ArmMotion, sweep: dict[str, Any], turn: Revolution, settings: ObservationSection
 ) -> Observation:
     where = describe(sweep)
-    inside = _between(stream, turn.start_s, turn.end_s)
+    inside = between(stream, turn.start_s, turn.end_s)
     lost = _lost(stream, inside, where, settings)
     _check_saturation(stream, inside, where)
     _check_stuck(stream, inside, where)
@@ -197,9 +163,9 @@ def _observation(
     if covered.mean() < 0.5:
         raise arm_states_lost(where, "more than half the time")
     excess = motion.rate(stream.time_s[inside]) @ turn.axis_flange - turn.speed_rad_s
-    average = _average(stream, inside, turn.duration_s, excess, covered)
+    averaged = average(stream, inside, turn.duration_s, excess, covered)
     expected = np.array(stream.sensor.mounting) @ turn.axis_flange
-    turned = average.mean_rad_s - stream.clock.zero_rate_rad_s
+    turned = averaged.mean_rad_s - stream.clock.zero_rate_rad_s
     _check_direction(turned, expected, where, settings)
     _check_unit(float(np.linalg.norm(turned)) / turn.speed_rad_s, where)
     nearest = int(np.argmax(np.abs(expected)))
@@ -213,58 +179,24 @@ def _observation(
         speed_rad_s=turn.speed_rad_s,
         speed_std_rad_s=turn.speed_std_rad_s,
         lost=lost,
-        average=average,
+        average=averaged,
     )
 
 
-def _rest(stream: _Stream, motion: ArmMotion, window: tuple[float, float]) -> Average | None:
+def _rest(stream: Stream, motion: ArmMotion, window: tuple[float, float]) -> Average | None:
     """The mean reading of a rest; None where the arm did not stand still or the rest is too short to say anything."""
     start, end = window[0] + REST_SETTLING_S, window[1] - REST_SETTLING_S
-    inside = _between(stream, start, end)
+    inside = between(stream, start, end)
     states = motion.states[(motion.time_s >= start) & (motion.time_s <= end)]
     if inside.stop - inside.start < MIN_REST_SAMPLES or len(states) == 0:
         return None
     if np.ptp(states["q_rad"], axis=0).max() > MAX_REST_TRAVEL_RAD:
         return None
     count = inside.stop - inside.start
-    return _average(stream, inside, end - start, np.zeros(count), np.ones(count, dtype=np.bool_))
+    return average(stream, inside, end - start, np.zeros(count), np.ones(count, dtype=np.bool_))
 
 
-def _between(stream: _Stream, start_s: float, end_s: float) -> slice:
-    return slice(*np.searchsorted(stream.time_s, [start_s, end_s]).tolist())
-
-
-def _average(stream: _Stream, inside: slice, duration_s: float, excess: Array, covered: NDArray[np.bool_]) -> Average:
-    """Mean and its variance; `excess` (n,) is the arm's rate less its mean 2π/T, known where `covered` (n,).
-
-    A straight line of reading against excess says what is read at the mean speed: few samples do not meet the vibration
-    evenly. The noise is what is left of that line, and never below the rounding to counts; its variance is widened
-    where the residuals are not white. Rounding averages out only as far as noise carries the reading across counts: the
-    part exp(−(2πσ/count)²) of its variance stays.
-    """
-    m = stream.readings_rad_s[inside]
-    columns, known = np.column_stack([np.ones(int(covered.sum())), excess[covered]]), m[covered]
-    coefficients, _, rank, _ = np.linalg.lstsq(columns, known, rcond=None)
-    residual = known - columns @ coefficients
-    scatter = np.sum(residual**2, axis=0) / (len(known) - rank)
-    count = stream.sensor.sensitivity_rad_s_per_count
-    rounding = count**2 / 12
-    variance = np.maximum(scatter, rounding)
-    staying = rounding * np.exp(-((2 * np.pi / count) ** 2) * (variance - rounding))
-    wider = np.array([widening(residual[:, axis]) for axis in range(3)])
-    temperature = stream.raw["temperature_counts"][inside].mean() * stream.sensor.temperature_c_per_count
-    of_the_mean = np.linalg.pinv(columns.T @ columns, hermitian=True)[0, 0]  # 1/n where the excess averages out
-    return Average(
-        mean_rad_s=coefficients[0],
-        variance_rad2_s2=variance * wider * of_the_mean + staying,
-        noise_rad_s=np.sqrt(variance),
-        samples=len(known),
-        duration_s=duration_s,
-        temperature_c=float(temperature) + stream.sensor.temperature_offset_c,
-    )
-
-
-def _lost(stream: _Stream, inside: slice, where: str, settings: ObservationSection) -> int:
+def _lost(stream: Stream, inside: slice, where: str, settings: ObservationSection) -> int:
     """Samples missing in the revolution: by sequence number, and by time for those the board itself did not see."""
     around = slice(max(inside.start - 1, 0), inside.stop + 1)
     steps = np.diff(stream.raw["sequence"][around])  # modulo 2³², like the board's counter
@@ -284,7 +216,7 @@ def _lost(stream: _Stream, inside: slice, where: str, settings: ObservationSecti
     return lost
 
 
-def _check_saturation(stream: _Stream, inside: slice, where: str) -> None:
+def _check_saturation(stream: Stream, inside: slice, where: str) -> None:
     full = stream.sensor.full_scale_counts
     saturated = np.any(np.abs(stream.raw["counts"][inside].astype(np.int64)) >= full, axis=1)
     if saturated.any():
@@ -295,7 +227,7 @@ def _check_saturation(stream: _Stream, inside: slice, where: str) -> None:
         )
 
 
-def _check_stuck(stream: _Stream, inside: slice, where: str) -> None:
+def _check_stuck(stream: Stream, inside: slice, where: str) -> None:
     """A sensor with noise above one count does not repeat itself on all axes many times in a row."""
     if np.median(np.abs(np.diff(stream.raw["counts"], axis=0)), axis=0).min() < 1:
         return

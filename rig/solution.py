@@ -7,6 +7,7 @@ from typing import Literal, TypeVar, get_args
 
 import numpy as np
 
+from rig.averaging import Average
 from rig.config.load import parse
 from rig.errors import Fault, Refused
 from rig.estimation.accumulator import Accumulator, Solution
@@ -15,7 +16,7 @@ from rig.estimation.estimate import Array, Estimate
 from rig.estimation.levenberg_marquardt import LevenbergMarquardtSolution, solve_levenberg_marquardt
 from rig.estimation.refusals import check_duplicates
 from rig.estimation.vector_model import VectorSolution, solve_vector_model
-from rig.observation import Average, Observation, SensorObservations, finished_sweeps, observe
+from rig.observation import Observation, SensorObservations, finished_sweeps, observe
 from rig.recording import RecordedSensor, RunData
 from rig.timebase import TimeBase
 

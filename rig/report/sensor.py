@@ -5,11 +5,12 @@ from typing import Any
 
 import numpy as np
 
+from rig.averaging import Average
 from rig.errors import Fault
 from rig.estimation import vector_model
 from rig.estimation.estimate import Estimate
 from rig.estimation.six_observation import MODEL, PARAMETER_UNITS, PARAMETERS
-from rig.observation import Average, Observation
+from rig.observation import Observation
 from rig.solution import SensorResult
 from rig.timebase import TimeBase
 
