@@ -98,9 +98,9 @@ def _solve_sensor(sensor: RecordedSensor, parts: Sequence[SensorObservations], e
     return SensorResult(
         sensor=sensor,
         solution=solve_observations(observations, estimator, rests, mounting),
-        vector_model=_or_fault(lambda: solve_vector(observations, rests, mounting)),
+        vector_model=or_fault(lambda: solve_vector(observations, rests, mounting)),
         six_observation=six_observation,
-        algorithm_1=_or_fault(lambda: solve_six_observation(observations, "algorithm_1")),
+        algorithm_1=or_fault(lambda: solve_six_observation(observations, "algorithm_1")),
         observations=observations,
         rests=rests,
         time_bases=tuple(part.time_base for part in parts),
@@ -160,7 +160,8 @@ def _solve_levenberg_marquardt(observations: Sequence[Observation]) -> Levenberg
     )
 
 
-def _or_fault(solve: Callable[[], Result]) -> Result | Fault:
+def or_fault(solve: Callable[[], Result]) -> Result | Fault:
+    """What `solve` returns, or the Fault it ends in: for a result that stands beside another."""
     try:
         return solve()
     except Fault as fault:

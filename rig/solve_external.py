@@ -4,19 +4,16 @@ There is no configuration, so there are no limits to judge it by.
 """
 
 import json
-from collections.abc import Sequence
 from pathlib import Path
 from typing import Any
 
 from rich.console import Console
 
-from rig.errors import Fault
-from rig.estimation.estimate import Estimate
 from rig.estimation.six_observation import MODEL, PARAMETER_UNITS, PARAMETERS
 from rig.external import read
-from rig.observation import Observation
+from rig.report.sensor import estimate_document, outcome_document
 from rig.report.table import estimate_table
-from rig.solution import known_estimator, solve_observations, solve_six_observation
+from rig.solution import known_estimator, or_fault, solve_observations, solve_six_observation
 
 
 def solve_external(samples: Path, sweeps: Path, estimator: str, *, as_json: bool) -> int:
@@ -32,38 +29,18 @@ def solve_external(samples: Path, sweeps: Path, estimator: str, *, as_json: bool
         "samples": str(samples),
         "sweeps": str(sweeps),
         "model": MODEL,
-        **_estimate(solution),
+        **estimate_document(solution),
         "covariance_order": list(PARAMETERS),
         "covariance_units": list(PARAMETER_UNITS),
         "rests": len(data.rests),
-        "six_observation": _six_observation(data.sweeps),
+        # Three sweeps may do for the vector model, not for the six observations.
+        "six_observation": outcome_document(or_fault(lambda: solve_six_observation(data.sweeps, "newton"))),
     }
     if as_json:
         print(json.dumps(document, indent=2))
     else:
         _print(document, Console())
     return 0
-
-
-def _six_observation(sweeps: Sequence[Observation]) -> dict[str, Any]:
-    """The six-observation solution, or the error it ends in: three sweeps may do for the vector model, not for it."""
-    try:
-        return _estimate(solve_six_observation(sweeps, "newton"))
-    except Fault as fault:
-        return {"error": str(fault)}
-
-
-def _estimate(solution: Estimate) -> dict[str, Any]:
-    return {
-        "estimator": solution.estimator,
-        "scale": solution.scale.tolist(),
-        "bias_rad_s": solution.bias_rad_s.tolist(),
-        "covariance": solution.covariance.tolist(),
-        "observations_used": solution.observations,
-        "rank": solution.rank,
-        "condition": solution.condition,
-        "iterations": solution.iterations,
-    }
 
 
 def _print(document: dict[str, Any], console: Console) -> None:

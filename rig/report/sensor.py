@@ -26,7 +26,7 @@ def sensor_document(result: SensorResult) -> dict[str, Any]:
         "part": result.sensor.part,
         "serial_number": result.sensor.serial_number,
         "model": MODEL,
-        **_estimate(solution),
+        **estimate_document(solution),
         "covariance_order": list(PARAMETERS),
         "covariance_units": list(PARAMETER_UNITS),
         "temperature_c": result.temperature_c,
@@ -34,12 +34,13 @@ def sensor_document(result: SensorResult) -> dict[str, Any]:
         "rests": [_average(rest) for rest in result.rests],
         "time_bases": [_time_base(time_base) for time_base in result.time_bases],
         "vector_model": _vector(result.vector_model),
-        "six_observation": _estimate(result.six_observation),
-        "algorithm_1": _beside(result.algorithm_1),
+        "six_observation": estimate_document(result.six_observation),
+        "algorithm_1": outcome_document(result.algorithm_1),
     }
 
 
-def _estimate(solution: Estimate) -> dict[str, Any]:
+def estimate_document(solution: Estimate) -> dict[str, Any]:
+    """What every estimator's solution has, as plain numbers and lists."""
     return {
         "estimator": solution.estimator,
         "iterations": solution.iterations,
@@ -52,8 +53,9 @@ def _estimate(solution: Estimate) -> dict[str, Any]:
     }
 
 
-def _beside(outcome: Estimate | Fault) -> dict[str, Any]:
-    return {"error": str(outcome)} if isinstance(outcome, Fault) else _estimate(outcome)
+def outcome_document(outcome: Estimate | Fault) -> dict[str, Any]:
+    """The same for a solution that stands beside another, or the `error` it ended in."""
+    return {"error": str(outcome)} if isinstance(outcome, Fault) else estimate_document(outcome)
 
 
 def _vector(outcome: vector_model.VectorSolution | Fault) -> dict[str, Any]:
@@ -62,7 +64,7 @@ def _vector(outcome: vector_model.VectorSolution | Fault) -> dict[str, Any]:
     angles = np.sqrt(np.diag(outcome.angles_covariance_rad2))
     return {
         "model": vector_model.MODEL,
-        **_estimate(outcome),
+        **estimate_document(outcome),
         "matrix": outcome.matrix.tolist(),
         "matrix_covariance": outcome.matrix_covariance.tolist(),
         "matrix_covariance_order": list(vector_model.MATRIX_PARAMETERS),

@@ -21,7 +21,6 @@ import numpy as np
 from rig.study.report import Array
 
 Vibration = Literal["whole_turns", "white"]
-VIBRATIONS: tuple[Vibration, ...] = ("whole_turns", "white")
 
 RATE_HZ = 200.0  # SIX, section III-A
 NOISE_LEVELS_RAD_S = (0.035, 0.2)
