@@ -25,6 +25,7 @@ def c_header() -> str:
         "#include <stdint.h>",
         "",
         f"#define PROTOCOL_VERSION {protocol.PROTOCOL_VERSION}u",
+        f'#define FIRMWARE_VERSION "{protocol.FIRMWARE_VERSION}"',
         f"#define PAYLOAD_MAX {protocol.PAYLOAD_MAX}u",
         f"#define BAUD_RATE {protocol.BAUD_RATE}u",
         "",
@@ -32,6 +33,9 @@ def c_header() -> str:
         *_c_enum("error_code", "ERROR", [(error.name, error.code) for error in protocol.ERRORS]),
         *_c_enum("reset_cause", "RESET", [(cause, i) for i, cause in enumerate(protocol.RESET_CAUSES)]),
         *_c_enum("sample_mode", "MODE", [(mode, i) for i, mode in enumerate(protocol.MODES)]),
+        *_c_enum("calibration_model", "MODEL", [(model, i) for i, model in enumerate(protocol.MODELS)]),
+        *_c_enum("solve_method", "METHOD", [(method, i) for i, method in enumerate(protocol.METHODS)]),
+        *_c_enum("solution_status", "SOLUTION", [(status, i) for i, status in enumerate(protocol.SOLUTION_STATUSES)]),
     ]
     for message in protocol.MESSAGES:
         lines.append(f"/* {message.name}, from the {message.sender}: {message.meaning} */")

@@ -88,7 +88,7 @@ class Board:
 
     def start(self) -> None:
         """Streams every configured sensor, sequences from 0. Raises BoardError."""
-        self._ask("start", {"mode": protocol.MODES.index("raw")})
+        self._ask("start", {"sensors": 0})
 
     def stop(self) -> None:
         """Stops the stream; when it returns, every sample that was sent has been passed on. Raises BoardError."""

@@ -12,17 +12,22 @@ import struct
 from binascii import crc_hqx
 from dataclasses import dataclass
 from functools import cached_property
+from itertools import islice
 from typing import Any
 
 import numpy as np
 from cobs import cobs
 
-PROTOCOL_VERSION = 1
+PROTOCOL_VERSION = 2
+FIRMWARE_VERSION = "0.2.0"  # of the shipped image
 PAYLOAD_MAX = 240
 BAUD_RATE = 921600  # what the shipped image uses
 
 MODES = ("raw", "calibrated")
 RESET_CAUSES = ("unknown", "power", "pin", "software", "watchdog", "fault")
+MODELS = ("none", "k_times_m_plus_b")  # of a calibration; the second is g = K (m + b), SIX Eq. (3)
+METHODS = ("closed_form", "algorithm_1")
+SOLUTION_STATUSES = ("solved", "too_few_observations", "degenerate", "not_converged")
 
 # kind → (struct code, C type, C array suffix)
 KINDS = {
@@ -35,7 +40,10 @@ KINDS = {
     "f64": ("d", "double", ""),
     "bytes12": ("12s", "uint8_t", "[12]"),
     "text12": ("12s", "char", "[12]"),
+    "text24": ("24s", "char", "[24]"),
     "vector_i16": ("3h", "int16_t", "[3]"),
+    "vector_i32": ("3i", "int32_t", "[3]"),
+    "vector_f32": ("3f", "float", "[3]"),
 }
 
 
@@ -67,12 +75,37 @@ class Message:
     @cached_property
     def item_dtype(self) -> np.dtype[np.void]:
         """Layout of one item; without items, an empty one."""
-        codes = {"bytes12": "V12", "text12": "S12", "vector_i16": "(3,)<i2"}
-        return np.dtype([(f.name, codes.get(f.kind, "<" + KINDS[f.kind][0])) for f in self.items])
+        codes = {"bytes12": "V12", "text12": "S12", "text24": "S24"}
+        vectors = {"vector_i16": "(3,)<i2", "vector_i32": "(3,)<i4", "vector_f32": "(3,)<f4"}
+        return np.dtype([(f.name, (codes | vectors).get(f.kind, "<" + KINDS[f.kind][0])) for f in self.items])
+
+    def named(self, values: tuple[Any, ...]) -> dict[str, Any]:
+        """What `head` unpacks, by field name; a vector is a tuple of three."""
+        rest = iter(values)
+        return {f.name: tuple(islice(rest, 3)) if f.kind.startswith("vector") else next(rest) for f in self.fields}
 
 
 REPLY_TO = Field("reply_to", "u8", "sequence of the frame this answers, 0 = nobody asked")
 SENSOR = Field("sensor", "u8", "index in the identity's list")
+SENSORS = Field("sensors", "u8", "which sensors: bit i is the sensor of index i in the identity's list")
+BATCH = (  # what samples and rates begin with
+    SENSOR,
+    Field("mode", "u8", "enum sample_mode"),
+    Field("sequence", "u32", "of the first sample; counts every conversion of the part since start"),
+    Field("dropped", "u32", "conversions since start that never became a sample in a frame"),
+    Field("base_time_us", "u64", "board time of the first sample, read before the bus transfer"),
+    Field("count", "u8", "number of samples"),
+)
+DELTA = Field("delta_us", "u32", "board time after base_time_us")
+TEMPERATURE = Field("temperature_counts", "i16", "as the part reports it")
+CALIBRATION = (  # what the host knows of a calibration; the board adds which part it was measured on
+    Field("model", "u8", "enum calibration_model"),
+    Field("serial_number", "text24", "of the sensor, as the configuration names it"),
+    Field("written_unix_s", "u64", "when it was written, seconds since 1970 UTC"),
+    Field("temperature_c", "f32", "of the sensor during the calibration, degrees Celsius"),
+    Field("scale", "vector_f32", "diagonal of K"),
+    Field("bias_rad_s", "vector_f32", "b, in the units of the reading"),
+)
 
 MESSAGES = (
     Message(0x01, "hello", "host", "who is there? answered by identity"),
@@ -124,8 +157,8 @@ MESSAGES = (
         0x05,
         "start",
         "host",
-        "stream every configured sensor, sequences from 0; answered by ack",
-        (Field("mode", "u8", "enum sample_mode"),),
+        "stream every configured sensor, sequences from 0: those named calibrated, the others raw; answered by ack",
+        (SENSORS,),
     ),
     Message(0x06, "stop", "host", "stop streaming; the ack follows the last samples"),
     Message(0x07, "ack", "board", "done as asked", (REPLY_TO,)),
@@ -133,20 +166,9 @@ MESSAGES = (
         0x08,
         "samples",
         "board",
-        "a run of samples with consecutive sequence numbers",
-        (
-            SENSOR,
-            Field("mode", "u8", "enum sample_mode"),
-            Field("sequence", "u32", "of the first sample; counts every conversion of the part since start"),
-            Field("dropped", "u32", "conversions since start that never became a sample in a frame"),
-            Field("base_time_us", "u64", "board time of the first sample, read before the bus transfer"),
-            Field("count", "u8", "number of samples"),
-        ),
-        (
-            Field("delta_us", "u32", "board time after base_time_us"),
-            Field("counts", "vector_i16", "x, y, z as the part reports them"),
-            Field("temperature_counts", "i16", "as the part reports it"),
-        ),
+        "a run of raw samples with consecutive sequence numbers",
+        BATCH,
+        (DELTA, Field("counts", "vector_i16", "x, y, z as the part reports them"), TEMPERATURE),
     ),
     Message(0x09, "status", "host", "how is it going? answered by report"),
     Message(
@@ -180,6 +202,96 @@ MESSAGES = (
         (REPLY_TO, Field("code", "u8", "enum error_code"), SENSOR),
     ),
     Message(0x0C, "reboot", "host", "start afresh; the ack comes before"),
+    Message(
+        0x0D,
+        "rates",
+        "board",
+        "a run of calibrated samples with consecutive sequence numbers",
+        BATCH,
+        (DELTA, Field("rate_urad_s", "vector_i32", "x, y, z calibrated, microradians per second"), TEMPERATURE),
+    ),
+    Message(
+        0x0E,
+        "keep",
+        "host",
+        "keep the readings from now on, so that observe finds them; what was kept before goes; answered by ack",
+        (SENSORS, Field("duration_s", "f32", "for how long, at least")),
+    ),
+    Message(
+        0x0F,
+        "observe",
+        "host",
+        "average what was kept of a sensor between two board times and add it as an observation; answered by observed",
+        (
+            SENSOR,
+            Field("index", "u8", "0 begins anew; else the number of observations before; the last may be repeated"),
+            Field("start_us", "u64", "board time"),
+            Field("end_us", "u64", "board time"),
+            Field("speed_rad_s", "f32", "magnitude of the turn rate in between, rad/s"),
+        ),
+    ),
+    Message(
+        0x10,
+        "observed",
+        "board",
+        "what was averaged: the samples from start_us up to, not including, end_us",
+        (
+            REPLY_TO,
+            SENSOR,
+            Field("index", "u8", "of the observation"),
+            Field("start_us", "u64", "board time of the first sample used; within the span asked for"),
+            Field("end_us", "u64", "board time of the first sample after those used; within the span asked for"),
+            Field("samples", "u32", "number of samples used"),
+            Field("mean_rad_s", "vector_f32", "their mean, uncalibrated, rad/s"),
+        ),
+    ),
+    Message(
+        0x11,
+        "solve",
+        "host",
+        "calibrate a sensor from its observations; answered by solution",
+        (SENSOR, Field("method", "u8", "enum solve_method")),
+    ),
+    Message(
+        0x12,
+        "solution",
+        "board",
+        "a calibration g = K (m + b) in single precision",
+        (
+            REPLY_TO,
+            SENSOR,
+            Field("method", "u8", "enum solve_method"),
+            Field("status", "u8", "enum solution_status; unless solved, scale and bias are 0"),
+            Field("observations", "u8", "number of observations"),
+            Field("iterations", "u8", "steps taken"),
+            Field("scale", "vector_f32", "diagonal of K"),
+            Field("bias_rad_s", "vector_f32", "b, in the units of the reading"),
+        ),
+    ),
+    Message(0x13, "read_calibration", "host", "what is stored for a sensor? answered by calibration", (SENSOR,)),
+    Message(
+        0x14,
+        "calibration",
+        "board",
+        "the stored calibration of a sensor",
+        (
+            REPLY_TO,
+            SENSOR,
+            Field("sequence", "u32", "counts the calibrations ever stored for this sensor, from 1"),
+            Field("part", "text12", "part it was stored for"),
+            Field("who_am_i", "u16", "that part's identity register"),
+            Field("range_deg_s", "f32", "range it was stored for, degrees per second"),
+            *CALIBRATION,
+        ),
+    ),
+    Message(
+        0x15,
+        "write_calibration",
+        "host",
+        "store a calibration for a configured sensor; the old one stays until the new one is whole; answered by ack",
+        (SENSOR, *CALIBRATION),
+    ),
+    Message(0x16, "erase_calibration", "host", "forget the calibration of a sensor; answered by ack", (SENSOR,)),
 )
 
 
@@ -200,11 +312,22 @@ ERRORS = (
     ErrorKind(4, "sensor_absent", "the sensor does not answer on its bus", "Check its supply and its SPI wires"),
     ErrorKind(5, "bad_rate", "the data rate is not a positive number", "Correct rate_hz in the configuration"),
     ErrorKind(6, "bad_range", "the part has no such range", "Correct range_deg_s in the configuration"),
-    ErrorKind(7, "bad_mode", "it cannot send samples in this mode", "Ask for raw samples"),
+    ErrorKind(
+        7, "no_calibration", "it has no calibration stored for this sensor", "Store one: `rig board calibration`"
+    ),
     ErrorKind(8, "setup_failed", "a setting did not read back as written", "Check the sensor's SPI wires and supply"),
     ErrorKind(9, "not_configured", "no sensor is configured", "Configure a sensor before the start"),
     ErrorKind(10, "busy_streaming", "it is streaming and cannot change settings", "Stop the stream first"),
     ErrorKind(11, "sensor_silent", "the sensor stopped signalling new data", "Check its interrupt wire and supply"),
+    ErrorKind(
+        12, "sensor_mismatch", "another part answers in the sensor's place", "Check the part and its chip select"
+    ),
+    ErrorKind(13, "checksum_failed", "its data arrive damaged, again and again", "Check the sensor's SPI wires"),
+    ErrorKind(14, "other_sensor", "the stored calibration is of another part or range", "Calibrate in this range"),
+    ErrorKind(15, "not_kept", "it has not kept the readings of that time", "Ask it to keep them before the sweep"),
+    ErrorKind(16, "bad_observation", "the observation is out of order or not finite", "Begin anew with observation 0"),
+    ErrorKind(17, "bad_calibration", "the calibration is not finite or of no known model", "Calibrate again"),
+    ErrorKind(18, "flash_failed", "its flash did not take what was written", "Replace the microcontroller board"),
 )
 
 _BY_CODE = {message.code: message for message in MESSAGES}
@@ -229,7 +352,10 @@ def encode(name: str, sequence: int, values: dict[str, Any] | None = None, items
     flat: list[Any] = []
     for field in message.fields:
         value = values[field.name]
-        flat.append(value.encode("ascii") if isinstance(value, str) else value)
+        if field.kind.startswith("vector"):
+            flat.extend(value)
+        else:
+            flat.append(value.encode("ascii") if isinstance(value, str) else value)
     payload = message.head.pack(*flat)
     if items is not None:
         payload += np.ascontiguousarray(items, message.item_dtype).tobytes()
@@ -257,7 +383,7 @@ def decode(block: bytes) -> Frame | None:
     size, each = message.head.size, message.item_dtype.itemsize
     if len(payload) < size or (len(payload) - size) % each if each else len(payload) != size:
         return None
-    values = dict(zip((f.name for f in message.fields), message.head.unpack_from(payload), strict=True))
+    values = message.named(message.head.unpack_from(payload))
     items = np.frombuffer(payload, message.item_dtype, offset=size) if each else np.empty(0)
     if values.get("count", len(items)) != len(items):
         return None

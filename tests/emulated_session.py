@@ -63,7 +63,7 @@ class Session:
     def stream(self, duration_s: float, rate_hz: float = 238.0, range_deg_s: float = 245.0) -> np.ndarray:
         """Configure and start the gyroscope, then run. Returns what `samples` does."""
         assert self.ask("configure", sensor=0, rate_hz=rate_hz, range_deg_s=range_deg_s).name == "setup"
-        self.board.receive(encode("start", 78, {"mode": 0}))
+        self.board.receive(encode("start", 78, {"sensors": 0}))
         return samples(self.run(duration_s))
 
 

@@ -150,7 +150,7 @@ def test_a_stream_left_running_is_stopped_by_the_next_program_and_restarts_at_ze
 ) -> None:
     board = wire[0].board
     board.receive(protocol.encode("configure", 1, {"sensor": 0, "rate_hz": 238, "range_deg_s": 245}))
-    board.receive(protocol.encode("start", 2, {"mode": 0}))
+    board.receive(protocol.encode("start", 2, {"sensors": 0}))
     batches: list[SampleBatch] = []
     with Board(wire[1], protocol.BAUD_RATE, batches.append) as client:
         assert batches == [] and not client.status().streaming

@@ -27,7 +27,7 @@ def streaming_board() -> HostBoard:
     """A board that has just been started at 238 Hz, with nothing on the wire yet."""
     board = HostBoard()
     assert [frame.name for frame in board.ask("configure", sensor=0, rate_hz=238, range_deg_s=245)] == ["setup"]
-    assert [frame.name for frame in board.ask("start", mode=0)] == ["ack"]
+    assert [frame.name for frame in board.ask("start", sensors=0)] == ["ack"]
     settle(board)
     return board
 
@@ -117,7 +117,7 @@ def test_a_request_in_pieces_after_noise_is_answered(pieces: list[int], noise: b
 def test_identity_names_board_firmware_and_sensor(board: HostBoard) -> None:
     (identity,) = board.ask("hello")
     assert identity.values["protocol"] == protocol.PROTOCOL_VERSION
-    assert protocol.text(identity.values["firmware"]) == "0.1.0"
+    assert protocol.text(identity.values["firmware"]) == protocol.FIRMWARE_VERSION
     assert identity.values["unique_id"].hex() == "0123456789abcdef01234567"
     assert identity.items.tolist() == [(b"LSM9DS1", 0x68, 1)]
 
@@ -140,8 +140,8 @@ def test_a_burst_that_overruns_the_receive_ring_costs_only_itself(board: HostBoa
 
 
 def test_requests_that_cannot_be_met_are_refused_by_name(board: HostBoard) -> None:
-    assert error_of(board.ask("start", mode=0)) == "not_configured"
-    assert error_of(board.ask("start", mode=1)) == "bad_mode"
+    assert error_of(board.ask("start", sensors=0)) == "not_configured"
+    assert error_of(board.ask("start", sensors=1)) == "no_calibration"
     assert error_of(board.ask("configure", sensor=1, rate_hz=238, range_deg_s=245)) == "no_such_sensor"
     assert error_of(board.ask("ack", reply_to=0)) == "unknown_message"
     body = bytes((1, 5)) + b"hello takes no payload"
@@ -232,7 +232,7 @@ def test_a_setting_that_does_not_stick_is_refused_and_takes_the_sensor_out(board
     board.ask("configure", sensor=0, rate_hz=238, range_deg_s=245)
     board.gyro.stuck.add(0x10)
     assert error_of(board.ask("configure", sensor=0, rate_hz=476, range_deg_s=245)) == "setup_failed"
-    assert error_of(board.ask("start", mode=0)) == "not_configured"
+    assert error_of(board.ask("start", sensors=0)) == "not_configured"
 
 
 def test_one_sample_is_one_transfer_of_temperature_status_and_rates() -> None:
@@ -255,7 +255,7 @@ def test_the_time_stamp_is_the_interrupts_and_counts_beyond_32_bits() -> None:
     board.set_time(start)
     board.core.board_reset()
     board.ask("configure", sensor=0, rate_hz=238, range_deg_s=245)
-    board.ask("start", mode=0)
+    board.ask("start", sensors=0)
     settle(board, start)
     times = [start + k * PERIOD_US for k in range(1, 60)]
     for time_us in times:
@@ -275,7 +275,7 @@ def test_a_batch_leaves_when_it_is_40_ms_old_or_full() -> None:
 
     board = HostBoard()
     board.ask("configure", sensor=0, rate_hz=952, range_deg_s=245)
-    board.ask("start", mode=0)
+    board.ask("start", sensors=0)
     settle(board)
     for k in range(1, 100):
         convert(board, k * 1050)
@@ -285,7 +285,7 @@ def test_a_batch_leaves_when_it_is_40_ms_old_or_full() -> None:
 def test_what_a_part_converts_while_it_settles_is_no_sample_and_no_loss() -> None:
     board = HostBoard()
     board.ask("configure", sensor=0, rate_hz=238, range_deg_s=245)
-    board.ask("start", mode=0)
+    board.ask("start", sensors=0)
     for k in range(1, SETTLING + 4):
         convert(board, k * PERIOD_US, (k, 0, 0))
     (batch, _) = board.ask("stop", 2)
@@ -304,7 +304,7 @@ def test_a_start_that_arrives_twice_does_not_restart_the_sequence() -> None:
     board = streaming_board()
     for k in range(1, 6):
         convert(board, k * PERIOD_US)
-    assert [frame.name for frame in board.ask("start", 2, mode=0)] == ["ack"]
+    assert [frame.name for frame in board.ask("start", 2, sensors=0)] == ["ack"]
     assert sample_sequences(board.ask("stop", 3)) == [0, 1, 2, 3, 4]
 
 
@@ -314,7 +314,7 @@ def test_a_new_start_counts_from_zero_and_lowers_a_data_ready_line_left_high() -
     board.ask("stop", 2)
     board.gyro.convert((0, 0, 0), 0)  # nobody reads this one: the line stays high
     board.data_ready(2 * PERIOD_US)
-    board.ask("start", 3, mode=0)
+    board.ask("start", 3, sensors=0)
     assert not board.gyro.fresh
     convert(board, 9 * PERIOD_US)
     (batch, _) = board.ask("stop", 4)

@@ -32,7 +32,10 @@ def value_of(kind: str) -> st.SearchStrategy[Any]:
         return st.integers(*LIMITS[kind])
     if kind in ("f32", "f64"):
         return st.floats(width=32, allow_nan=False)
-    return st.binary(min_size=12, max_size=12)
+    if kind == "vector_f32":
+        return st.tuples(*[st.floats(width=32, allow_nan=False)] * 3)
+    size = int(protocol.KINDS[kind][0].removesuffix("s"))
+    return st.binary(min_size=size, max_size=size)
 
 
 @st.composite

@@ -58,7 +58,7 @@ def host(loaded: Loaded) -> Host:
     new.ticks(200)
     new.ask("configure", 1, {"sensor": 0, "rate_hz": 238.0, "range_deg_s": 245.0})
     new.ticks(20)
-    new.ask("start", 2, {"mode": 0})
+    new.ask("start", 2, {"sensors": 0})
     new.ticks(20)
     return new
 
@@ -258,7 +258,7 @@ def test_a_host_that_does_not_read_does_not_stop_the_world(world: World) -> None
     host_name, port = running.board_port.removeprefix("socket://").split(":")
     with socket.create_connection((host_name, int(port)), 5.0) as idle:
         idle.sendall(protocol.encode("configure", 1, {"sensor": 0, "rate_hz": 952.0, "range_deg_s": 245.0}))
-        idle.sendall(protocol.encode("start", 2, {"mode": 0}))
+        idle.sendall(protocol.encode("start", 2, {"sensors": 0}))
         before = running.state()["time_s"]
         time.sleep(0.5)  # at 952 Hz and ten times real time this fills every buffer on the way
         assert running.state()["time_s"] > before + 1.0

@@ -140,7 +140,7 @@ static void acquire(unsigned sensor)
     stream->last_us = time_us;
 
     struct reading reading;
-    bool fresh = sensors[sensor].driver->read(sensors[sensor].device, &reading);
+    bool fresh = sensors[sensor].driver->read(sensors[sensor].device, &reading) == READ_FRESH;
     bus_errors += !fresh;
     if (stream->settling != 0) {
         stream->settling--;

@@ -88,8 +88,8 @@ static void on_configure(const struct frame *request)
 /* A host that missed the ack asks again, so starting twice must not restart the sequence. */
 static void on_start(const struct frame *request)
 {
-    if (request->payload[0] != MODE_RAW)
-        refuse(request, ERROR_BAD_MODE, 0);
+    if (request->payload[0] != 0)
+        refuse(request, ERROR_NO_CALIBRATION, 0);
     else if (acquisition_is_running() || acquisition_start())
         acknowledge(request->sequence);
     else

@@ -2,8 +2,6 @@
 #ifndef BOARD_H
 #define BOARD_H
 
-#define FIRMWARE_VERSION "0.1.0"
-
 void board_reset(void);
 
 /* One pass of the main loop; call it after every interrupt and at least every 50 ms. */

@@ -7,6 +7,7 @@
 
 #define READ 0x80u /* first bit of an SPI transfer */
 #define IDENTITY 0x68u
+#define BUS_HZ 10000000u /* section 5.2.1 */
 
 enum register_address {
     INT1_CTRL = 0x0C,
@@ -52,14 +53,14 @@ static const struct {
 static uint8_t read_register(unsigned device, uint8_t address)
 {
     uint8_t bytes[2] = {(uint8_t)(address | READ), 0};
-    bus_xfer(device, bytes, sizeof bytes);
+    bus_xfer(device, BUS_HZ, bytes, sizeof bytes);
     return bytes[1];
 }
 
 static bool write_register(unsigned device, uint8_t address, uint8_t value)
 {
     uint8_t bytes[2] = {address, value};
-    bus_xfer(device, bytes, sizeof bytes);
+    bus_xfer(device, BUS_HZ, bytes, sizeof bytes);
     return read_register(device, address) == value;
 }
 
@@ -141,14 +142,14 @@ static int16_t int16_at(const uint8_t *bytes)
 }
 
 /* One chip select for temperature, status and rates: they lie side by side, and one burst is one moment. */
-static bool read(unsigned device, struct reading *reading)
+static enum read_result read(unsigned device, struct reading *reading)
 {
     uint8_t bytes[10] = {OUT_TEMP_L | READ};
-    bus_xfer(device, bytes, sizeof bytes);
+    bus_xfer(device, BUS_HZ, bytes, sizeof bytes);
     reading->temperature_counts = int16_at(&bytes[1]);
     for (unsigned axis = 0; axis < 3; axis++)
         reading->counts[axis] = int16_at(&bytes[4 + 2 * axis]);
-    return (bytes[3] & (STATUS_GDA | STATUS_ALWAYS_0)) == STATUS_GDA;
+    return (bytes[3] & (STATUS_GDA | STATUS_ALWAYS_0)) == STATUS_GDA ? READ_FRESH : READ_STALE;
 }
 
 const struct sensor_driver lsm9ds1_gyro = {"LSM9DS1", SETTLING, identify, configure, read};

@@ -2,20 +2,33 @@
 #ifndef PORT_H
 #define PORT_H
 
+#include <stdbool.h>
 #include <stddef.h>
 #include <stdint.h>
 
 /* Free-running microsecond counter; it wraps. */
 uint32_t port_time_us(void);
 
-/* Selects `device`, exchanges `size` bytes in place, deselects. `size` is even: the SPI FIFO takes two bytes an access. */
-void bus_xfer(unsigned device, uint8_t *bytes, size_t size);
+/* Lets so much time pass, busily: for pauses a part needs within one conversation. */
+void port_wait_us(uint32_t duration_us);
+
+/* Selects `device`, exchanges `size` bytes in place at `max_hz` or the next slower clock, deselects. `size` is even: the SPI
+   FIFO takes two bytes an access. */
+void bus_xfer(unsigned device, uint32_t max_hz, uint8_t *bytes, size_t size);
 
 /* Starts sending; the bytes stay untouched until the port calls link_sent(). */
 void port_transmit(const uint8_t *bytes, size_t size);
 
 /* Starts the board afresh once the last byte has left. */
 void port_restart(void);
+
+/* Pages of flash for what must survive a power loss. What an erase leaves reads as 0xFF. A doubleword can be programmed once
+   after an erase. Each returns false when the flash refuses; a read also when a doubleword is torn, cut off in its writing. */
+#define FLASH_PAGES 6u
+#define FLASH_PAGE_BYTES 2048u
+bool port_flash_read(unsigned page, size_t offset, void *bytes, size_t size);
+bool port_flash_erase(unsigned page);
+bool port_flash_program(unsigned page, size_t offset, uint64_t doubleword);
 
 struct port_health {
     uint8_t reset_cause; /* enum reset_cause */

@@ -4,7 +4,8 @@
 
 #include <stdint.h>
 
-#define PROTOCOL_VERSION 1u
+#define PROTOCOL_VERSION 2u
+#define FIRMWARE_VERSION "0.2.0"
 #define PAYLOAD_MAX 240u
 #define BAUD_RATE 921600u
 
@@ -21,6 +22,16 @@ enum message_type {
     MESSAGE_REPORT = 10,
     MESSAGE_ERROR = 11,
     MESSAGE_REBOOT = 12,
+    MESSAGE_RATES = 13,
+    MESSAGE_KEEP = 14,
+    MESSAGE_OBSERVE = 15,
+    MESSAGE_OBSERVED = 16,
+    MESSAGE_SOLVE = 17,
+    MESSAGE_SOLUTION = 18,
+    MESSAGE_READ_CALIBRATION = 19,
+    MESSAGE_CALIBRATION = 20,
+    MESSAGE_WRITE_CALIBRATION = 21,
+    MESSAGE_ERASE_CALIBRATION = 22,
 };
 
 enum error_code {
@@ -30,11 +41,18 @@ enum error_code {
     ERROR_SENSOR_ABSENT = 4,
     ERROR_BAD_RATE = 5,
     ERROR_BAD_RANGE = 6,
-    ERROR_BAD_MODE = 7,
+    ERROR_NO_CALIBRATION = 7,
     ERROR_SETUP_FAILED = 8,
     ERROR_NOT_CONFIGURED = 9,
     ERROR_BUSY_STREAMING = 10,
     ERROR_SENSOR_SILENT = 11,
+    ERROR_SENSOR_MISMATCH = 12,
+    ERROR_CHECKSUM_FAILED = 13,
+    ERROR_OTHER_SENSOR = 14,
+    ERROR_NOT_KEPT = 15,
+    ERROR_BAD_OBSERVATION = 16,
+    ERROR_BAD_CALIBRATION = 17,
+    ERROR_FLASH_FAILED = 18,
 };
 
 enum reset_cause {
@@ -49,6 +67,23 @@ enum reset_cause {
 enum sample_mode {
     MODE_RAW = 0,
     MODE_CALIBRATED = 1,
+};
+
+enum calibration_model {
+    MODEL_NONE = 0,
+    MODEL_K_TIMES_M_PLUS_B = 1,
+};
+
+enum solve_method {
+    METHOD_CLOSED_FORM = 0,
+    METHOD_ALGORITHM_1 = 1,
+};
+
+enum solution_status {
+    SOLUTION_SOLVED = 0,
+    SOLUTION_TOO_FEW_OBSERVATIONS = 1,
+    SOLUTION_DEGENERATE = 2,
+    SOLUTION_NOT_CONVERGED = 3,
 };
 
 /* hello, from the host: who is there? answered by identity */
@@ -89,9 +124,9 @@ struct setup_payload {
 } __attribute__((packed));
 _Static_assert(sizeof(struct setup_payload) == 42, "setup_payload");
 
-/* start, from the host: stream every configured sensor, sequences from 0; answered by ack */
+/* start, from the host: stream every configured sensor, sequences from 0: those named calibrated, the others raw; answered by ack */
 struct start_payload {
-    uint8_t mode; /* enum sample_mode */
+    uint8_t sensors; /* which sensors: bit i is the sensor of index i in the identity's list */
 } __attribute__((packed));
 _Static_assert(sizeof(struct start_payload) == 1, "start_payload");
 
@@ -102,7 +137,7 @@ struct ack_payload {
 } __attribute__((packed));
 _Static_assert(sizeof(struct ack_payload) == 1, "ack_payload");
 
-/* samples, from the board: a run of samples with consecutive sequence numbers */
+/* samples, from the board: a run of raw samples with consecutive sequence numbers */
 struct samples_payload {
     uint8_t sensor; /* index in the identity's list */
     uint8_t mode; /* enum sample_mode */
@@ -152,4 +187,112 @@ struct error_payload {
 _Static_assert(sizeof(struct error_payload) == 3, "error_payload");
 
 /* reboot, from the host: start afresh; the ack comes before */
+/* rates, from the board: a run of calibrated samples with consecutive sequence numbers */
+struct rates_payload {
+    uint8_t sensor; /* index in the identity's list */
+    uint8_t mode; /* enum sample_mode */
+    uint32_t sequence; /* of the first sample; counts every conversion of the part since start */
+    uint32_t dropped; /* conversions since start that never became a sample in a frame */
+    uint64_t base_time_us; /* board time of the first sample, read before the bus transfer */
+    uint8_t count; /* number of samples */
+} __attribute__((packed));
+_Static_assert(sizeof(struct rates_payload) == 19, "rates_payload");
+
+struct rates_item {
+    uint32_t delta_us; /* board time after base_time_us */
+    int32_t rate_urad_s[3]; /* x, y, z calibrated, microradians per second */
+    int16_t temperature_counts; /* as the part reports it */
+} __attribute__((packed));
+_Static_assert(sizeof(struct rates_item) == 18, "rates_item");
+
+/* keep, from the host: keep the readings from now on, so that observe finds them; what was kept before goes; answered by ack */
+struct keep_payload {
+    uint8_t sensors; /* which sensors: bit i is the sensor of index i in the identity's list */
+    float duration_s; /* for how long, at least */
+} __attribute__((packed));
+_Static_assert(sizeof(struct keep_payload) == 5, "keep_payload");
+
+/* observe, from the host: average what was kept of a sensor between two board times and add it as an observation; answered by observed */
+struct observe_payload {
+    uint8_t sensor; /* index in the identity's list */
+    uint8_t index; /* 0 begins anew; else the number of observations before; the last may be repeated */
+    uint64_t start_us; /* board time */
+    uint64_t end_us; /* board time */
+    float speed_rad_s; /* magnitude of the turn rate in between, rad/s */
+} __attribute__((packed));
+_Static_assert(sizeof(struct observe_payload) == 22, "observe_payload");
+
+/* observed, from the board: what was averaged: the samples from start_us up to, not including, end_us */
+struct observed_payload {
+    uint8_t reply_to; /* sequence of the frame this answers, 0 = nobody asked */
+    uint8_t sensor; /* index in the identity's list */
+    uint8_t index; /* of the observation */
+    uint64_t start_us; /* board time of the first sample used; within the span asked for */
+    uint64_t end_us; /* board time of the first sample after those used; within the span asked for */
+    uint32_t samples; /* number of samples used */
+    float mean_rad_s[3]; /* their mean, uncalibrated, rad/s */
+} __attribute__((packed));
+_Static_assert(sizeof(struct observed_payload) == 35, "observed_payload");
+
+/* solve, from the host: calibrate a sensor from its observations; answered by solution */
+struct solve_payload {
+    uint8_t sensor; /* index in the identity's list */
+    uint8_t method; /* enum solve_method */
+} __attribute__((packed));
+_Static_assert(sizeof(struct solve_payload) == 2, "solve_payload");
+
+/* solution, from the board: a calibration g = K (m + b) in single precision */
+struct solution_payload {
+    uint8_t reply_to; /* sequence of the frame this answers, 0 = nobody asked */
+    uint8_t sensor; /* index in the identity's list */
+    uint8_t method; /* enum solve_method */
+    uint8_t status; /* enum solution_status; unless solved, scale and bias are 0 */
+    uint8_t observations; /* number of observations */
+    uint8_t iterations; /* steps taken */
+    float scale[3]; /* diagonal of K */
+    float bias_rad_s[3]; /* b, in the units of the reading */
+} __attribute__((packed));
+_Static_assert(sizeof(struct solution_payload) == 30, "solution_payload");
+
+/* read_calibration, from the host: what is stored for a sensor? answered by calibration */
+struct read_calibration_payload {
+    uint8_t sensor; /* index in the identity's list */
+} __attribute__((packed));
+_Static_assert(sizeof(struct read_calibration_payload) == 1, "read_calibration_payload");
+
+/* calibration, from the board: the stored calibration of a sensor */
+struct calibration_payload {
+    uint8_t reply_to; /* sequence of the frame this answers, 0 = nobody asked */
+    uint8_t sensor; /* index in the identity's list */
+    uint32_t sequence; /* counts the calibrations ever stored for this sensor, from 1 */
+    char part[12]; /* part it was stored for */
+    uint16_t who_am_i; /* that part's identity register */
+    float range_deg_s; /* range it was stored for, degrees per second */
+    uint8_t model; /* enum calibration_model */
+    char serial_number[24]; /* of the sensor, as the configuration names it */
+    uint64_t written_unix_s; /* when it was written, seconds since 1970 UTC */
+    float temperature_c; /* of the sensor during the calibration, degrees Celsius */
+    float scale[3]; /* diagonal of K */
+    float bias_rad_s[3]; /* b, in the units of the reading */
+} __attribute__((packed));
+_Static_assert(sizeof(struct calibration_payload) == 85, "calibration_payload");
+
+/* write_calibration, from the host: store a calibration for a configured sensor; the old one stays until the new one is whole; answered by ack */
+struct write_calibration_payload {
+    uint8_t sensor; /* index in the identity's list */
+    uint8_t model; /* enum calibration_model */
+    char serial_number[24]; /* of the sensor, as the configuration names it */
+    uint64_t written_unix_s; /* when it was written, seconds since 1970 UTC */
+    float temperature_c; /* of the sensor during the calibration, degrees Celsius */
+    float scale[3]; /* diagonal of K */
+    float bias_rad_s[3]; /* b, in the units of the reading */
+} __attribute__((packed));
+_Static_assert(sizeof(struct write_calibration_payload) == 62, "write_calibration_payload");
+
+/* erase_calibration, from the host: forget the calibration of a sensor; answered by ack */
+struct erase_calibration_payload {
+    uint8_t sensor; /* index in the identity's list */
+} __attribute__((packed));
+_Static_assert(sizeof(struct erase_calibration_payload) == 1, "erase_calibration_payload");
+
 #endif

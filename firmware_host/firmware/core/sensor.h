@@ -12,6 +12,12 @@ struct reading {
     int16_t temperature_counts;
 };
 
+enum read_result {
+    READ_FRESH,   /* a new conversion */
+    READ_STALE,   /* nothing new, or nobody there */
+    READ_DAMAGED, /* the part's own checksum does not match */
+};
+
 struct sensor_driver {
     char part[12];
 
@@ -24,8 +30,8 @@ struct sensor_driver {
     /* Sets rate and range, reads every setting back; fills `setup` with what the part really does. 0, or why not. */
     uint8_t (*configure)(unsigned device, const struct configure_payload *wanted, struct setup_payload *setup);
 
-    /* Reads one conversion, which also lowers the data-ready line; false when the part did not have a new one. */
-    bool (*read)(unsigned device, struct reading *reading);
+    /* Reads one conversion, which also lowers the data-ready line. */
+    enum read_result (*read)(unsigned device, struct reading *reading);
 };
 
 /* The board's sensors: which driver, and which device of the port's bus. Data-ready lines are numbered alike. */

@@ -35,8 +35,9 @@ uint32_t port_time_us(void)
     return time_us;
 }
 
-void bus_xfer(unsigned device, uint8_t *bytes, size_t size)
+void bus_xfer(unsigned device, uint32_t max_hz, uint8_t *bytes, size_t size)
 {
+    (void)max_hz;
     on_bus(device, bytes, size);
 }
 

@@ -24,9 +24,10 @@ uint32_t port_time_us(void)
 }
 
 /* One sensor so far, so one chip select. Receiving two bytes at a time needs no wait for the bus to go idle. */
-void bus_xfer(unsigned device, uint8_t *bytes, size_t size)
+void bus_xfer(unsigned device, uint32_t max_hz, uint8_t *bytes, size_t size)
 {
     (void)device;
+    (void)max_hz;
     GPIOA_BSRR = GPIOA_BSRR_BR11;
     for (size_t i = 0; i < size; i += 2) {
         SPI1_FIFO = (uint16_t)(bytes[i] | bytes[i + 1] << 8);
