@@ -292,6 +292,18 @@ MESSAGES = (
         (SENSOR, *CALIBRATION),
     ),
     Message(0x16, "erase_calibration", "host", "forget the calibration of a sensor; answered by ack", (SENSOR,)),
+    Message(
+        0x17,
+        "recall",
+        "host",
+        "add an observation that this board made before it was reset; answered by observed, of no samples",
+        (
+            SENSOR,
+            Field("index", "u8", "as in observe"),
+            Field("mean_rad_s", "vector_f32", "as observed then, rad/s"),
+            Field("speed_rad_s", "f32", "magnitude of the turn rate then, rad/s"),
+        ),
+    ),
 )
 
 

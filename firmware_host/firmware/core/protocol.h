@@ -32,6 +32,7 @@ enum message_type {
     MESSAGE_CALIBRATION = 20,
     MESSAGE_WRITE_CALIBRATION = 21,
     MESSAGE_ERASE_CALIBRATION = 22,
+    MESSAGE_RECALL = 23,
 };
 
 enum error_code {
@@ -294,5 +295,14 @@ struct erase_calibration_payload {
     uint8_t sensor; /* index in the identity's list */
 } __attribute__((packed));
 _Static_assert(sizeof(struct erase_calibration_payload) == 1, "erase_calibration_payload");
+
+/* recall, from the host: add an observation that this board made before it was reset; answered by observed, of no samples */
+struct recall_payload {
+    uint8_t sensor; /* index in the identity's list */
+    uint8_t index; /* as in observe */
+    float mean_rad_s[3]; /* as observed then, rad/s */
+    float speed_rad_s; /* magnitude of the turn rate then, rad/s */
+} __attribute__((packed));
+_Static_assert(sizeof(struct recall_payload) == 18, "recall_payload");
 
 #endif
