@@ -224,7 +224,7 @@ MESSAGES = (
         "average what was kept of a sensor between two board times and add it as an observation; answered by observed",
         (
             SENSOR,
-            Field("index", "u8", "0 begins anew; else the number of observations before; the last may be repeated"),
+            Field("index", "u16", "0 begins anew; else the number of observations before; the last may be repeated"),
             Field("start_us", "u64", "board time"),
             Field("end_us", "u64", "board time"),
             Field("speed_rad_s", "f32", "magnitude of the turn rate in between, rad/s"),
@@ -238,7 +238,7 @@ MESSAGES = (
         (
             REPLY_TO,
             SENSOR,
-            Field("index", "u8", "of the observation"),
+            Field("index", "u16", "of the observation"),
             Field("start_us", "u64", "board time of the first sample used; within the span asked for"),
             Field("end_us", "u64", "board time of the first sample after those used; within the span asked for"),
             Field("samples", "u32", "number of samples used"),
@@ -262,7 +262,7 @@ MESSAGES = (
             SENSOR,
             Field("method", "u8", "enum solve_method"),
             Field("status", "u8", "enum solution_status; unless solved, scale and bias are 0"),
-            Field("observations", "u8", "number of observations"),
+            Field("observations", "u16", "number of observations"),
             Field("iterations", "u8", "steps taken"),
             Field("scale", "vector_f32", "diagonal of K"),
             Field("bias_rad_s", "vector_f32", "b, in the units of the reading"),
@@ -299,7 +299,7 @@ MESSAGES = (
         "add an observation that this board made before it was reset; answered by observed, of no samples",
         (
             SENSOR,
-            Field("index", "u8", "as in observe"),
+            Field("index", "u16", "as in observe"),
             Field("mean_rad_s", "vector_f32", "as observed then, rad/s"),
             Field("speed_rad_s", "f32", "magnitude of the turn rate then, rad/s"),
         ),

@@ -216,24 +216,24 @@ _Static_assert(sizeof(struct keep_payload) == 5, "keep_payload");
 /* observe, from the host: average what was kept of a sensor between two board times and add it as an observation; answered by observed */
 struct observe_payload {
     uint8_t sensor; /* index in the identity's list */
-    uint8_t index; /* 0 begins anew; else the number of observations before; the last may be repeated */
+    uint16_t index; /* 0 begins anew; else the number of observations before; the last may be repeated */
     uint64_t start_us; /* board time */
     uint64_t end_us; /* board time */
     float speed_rad_s; /* magnitude of the turn rate in between, rad/s */
 } __attribute__((packed));
-_Static_assert(sizeof(struct observe_payload) == 22, "observe_payload");
+_Static_assert(sizeof(struct observe_payload) == 23, "observe_payload");
 
 /* observed, from the board: what was averaged: the samples from start_us up to, not including, end_us */
 struct observed_payload {
     uint8_t reply_to; /* sequence of the frame this answers, 0 = nobody asked */
     uint8_t sensor; /* index in the identity's list */
-    uint8_t index; /* of the observation */
+    uint16_t index; /* of the observation */
     uint64_t start_us; /* board time of the first sample used; within the span asked for */
     uint64_t end_us; /* board time of the first sample after those used; within the span asked for */
     uint32_t samples; /* number of samples used */
     float mean_rad_s[3]; /* their mean, uncalibrated, rad/s */
 } __attribute__((packed));
-_Static_assert(sizeof(struct observed_payload) == 35, "observed_payload");
+_Static_assert(sizeof(struct observed_payload) == 36, "observed_payload");
 
 /* solve, from the host: calibrate a sensor from its observations; answered by solution */
 struct solve_payload {
@@ -248,12 +248,12 @@ struct solution_payload {
     uint8_t sensor; /* index in the identity's list */
     uint8_t method; /* enum solve_method */
     uint8_t status; /* enum solution_status; unless solved, scale and bias are 0 */
-    uint8_t observations; /* number of observations */
+    uint16_t observations; /* number of observations */
     uint8_t iterations; /* steps taken */
     float scale[3]; /* diagonal of K */
     float bias_rad_s[3]; /* b, in the units of the reading */
 } __attribute__((packed));
-_Static_assert(sizeof(struct solution_payload) == 30, "solution_payload");
+_Static_assert(sizeof(struct solution_payload) == 31, "solution_payload");
 
 /* read_calibration, from the host: what is stored for a sensor? answered by calibration */
 struct read_calibration_payload {
@@ -299,10 +299,10 @@ _Static_assert(sizeof(struct erase_calibration_payload) == 1, "erase_calibration
 /* recall, from the host: add an observation that this board made before it was reset; answered by observed, of no samples */
 struct recall_payload {
     uint8_t sensor; /* index in the identity's list */
-    uint8_t index; /* as in observe */
+    uint16_t index; /* as in observe */
     float mean_rad_s[3]; /* as observed then, rad/s */
     float speed_rad_s; /* magnitude of the turn rate then, rad/s */
 } __attribute__((packed));
-_Static_assert(sizeof(struct recall_payload) == 18, "recall_payload");
+_Static_assert(sizeof(struct recall_payload) == 19, "recall_payload");
 
 #endif
