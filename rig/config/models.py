@@ -92,7 +92,8 @@ class SensorSection(Section):
 class ProcedureSection(Section):
     """The movement: which wrists, in what order, how fast, how often."""
 
-    name: Literal["six_observation"] = "six_observation"
+    name: Literal["six_observation", "verify"] = "six_observation"
+    verify: bool = False  # store a calibration that passed on the board, then repeat the movement with its readings
     order: Annotated[tuple[Wrist, ...], Field(min_length=1)] = ("wrist_3", "wrist_1", "wrist_2")
     directions: Annotated[tuple[Direction, ...], Field(min_length=1)] = ("cw", "ccw")
     repeats: Annotated[int, Field(ge=1, le=100)] = 1
@@ -127,6 +128,8 @@ class LimitsSection(Section):
     bias_rad_s: Positive
     bias_std_rad_s: Positive
     condition: Positive
+    verification_rms_rad_s: Positive | None = None  # calibrated reading less the reference's, sample by sample
+    verification_mean_rad_s: Positive | None = None  # the same, averaged over each revolution
 
 
 class OutputSection(Section):
@@ -156,3 +159,16 @@ class RigConfig(Section):
                     f"{sensor.range_deg_s:g}: the range must be at least 1.5 times the speed"
                 )
         return self
+
+    @model_validator(mode="after")
+    def verification_has_limits(self) -> Self:
+        """A verification without limits could not pass; say so before the robot moves."""
+        limits = (self.limits.verification_rms_rad_s, self.limits.verification_mean_rad_s)
+        if self.verifies and None in limits:
+            raise ValueError("a verification needs limits.verification_rms_rad_s and limits.verification_mean_rad_s")
+        return self
+
+    @property
+    def verifies(self) -> bool:
+        """Whether calibrated readings are compared with a reference's."""
+        return self.procedure.verify or self.procedure.name == "verify"
