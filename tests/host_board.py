@@ -32,7 +32,7 @@ def core() -> ctypes.CDLL:
     out = tempfile.mkdtemp(prefix="rig_host_")
     subprocess.run(["make", "-s", "-C", FIRMWARE, "host", f"OUT={out}"], check=True)
     library = ctypes.CDLL(f"{out}/rig_host.so")
-    library.frame_crc.restype = ctypes.c_uint16
+    library.frame_crc.restype = ctypes.c_uint32
     library.frame_encode.restype = ctypes.c_size_t
     library.frame_decode.restype = ctypes.c_bool
     library.clock_now.restype = ctypes.c_uint64

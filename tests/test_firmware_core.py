@@ -2,7 +2,7 @@
 
 import ctypes
 import math
-from binascii import crc_hqx
+from zlib import crc32
 
 import pytest
 from cobs import cobs
@@ -62,13 +62,13 @@ def sample_sequences(frames: list[Frame]) -> list[int]:
 @given(st.integers(0, 255), st.integers(0, 255), st.binary(max_size=protocol.PAYLOAD_MAX))
 @example(1, 0, bytes(protocol.PAYLOAD_MAX))
 @example(255, 255, b"\xff" * protocol.PAYLOAD_MAX)
-def test_an_encoded_frame_is_what_cobs_and_binascii_make(kind: int, sequence: int, payload: bytes) -> None:
+def test_an_encoded_frame_is_what_cobs_and_zlib_make(kind: int, sequence: int, payload: bytes) -> None:
     buffer = (ctypes.c_uint8 * len(payload)).from_buffer_copy(payload)
     frame = CFrame(kind, sequence, len(payload), ctypes.cast(buffer, ctypes.POINTER(ctypes.c_uint8)))
     wire = ctypes.create_string_buffer(300)
     size = core().frame_encode(ctypes.byref(frame), wire)
     body = bytes((kind, sequence)) + payload
-    assert wire.raw[:size] == cobs.encode(body + crc_hqx(body, 0).to_bytes(2, "big")) + b"\0"
+    assert wire.raw[:size] == cobs.encode(body + crc32(body).to_bytes(4, "little")) + b"\0"
 
 
 def decode_in_c(block: bytes) -> bytes | None:
@@ -85,13 +85,14 @@ def test_noise_decodes_to_nothing(block: bytes) -> None:
         body = cobs.decode(block)
     except cobs.DecodeError:
         body = b""
-    expected = body[:-2] if 4 <= len(body) <= protocol.PAYLOAD_MAX + 4 and crc_hqx(body, 0) == 0 else None
+    whole = 6 <= len(body) <= protocol.PAYLOAD_MAX + 6 and crc32(body[:-4]).to_bytes(4, "little") == body[-4:]
+    expected = body[:-4] if whole else None
     assert decode_in_c(block) == expected
 
 
 @given(st.binary(min_size=2, max_size=242), st.data())
 def test_a_damaged_frame_is_dropped_and_a_sound_one_decodes(body: bytes, data: st.DataObject) -> None:
-    block = bytearray(cobs.encode(body + crc_hqx(body, 0).to_bytes(2, "big")))
+    block = bytearray(cobs.encode(body + crc32(body).to_bytes(4, "little")))
     assert decode_in_c(bytes(block)) == body
     bit = data.draw(st.integers(0, 8 * len(block) - 1))
     block[bit // 8] ^= 1 << bit % 8
@@ -145,7 +146,7 @@ def test_requests_that_cannot_be_met_are_refused_by_name(board: HostBoard) -> No
     assert error_of(board.ask("configure", sensor=1, rate_hz=238, range_deg_s=245)) == "no_such_sensor"
     assert error_of(board.ask("ack", reply_to=0)) == "unknown_message"
     body = bytes((1, 5)) + b"hello takes no payload"
-    board.receive(cobs.encode(body + crc_hqx(body, 0).to_bytes(2, "big")) + b"\0")
+    board.receive(cobs.encode(body + crc32(body).to_bytes(4, "little")) + b"\0")
     assert error_of(board.frames()) == "bad_length"
     streaming = streaming_board()
     assert error_of(streaming.ask("configure", sensor=0, rate_hz=238, range_deg_s=245)) == "busy_streaming"

@@ -8,7 +8,7 @@
 
 #include "protocol.h"
 
-#define FRAME_OVERHEAD 4u                           /* type, sequence, CRC */
+#define FRAME_OVERHEAD 6u                           /* type, sequence, CRC */
 #define FRAME_MAX (PAYLOAD_MAX + FRAME_OVERHEAD)    /* before COBS */
 #define WIRE_MAX (FRAME_MAX + 2u)                   /* COBS code byte and delimiter */
 
@@ -21,8 +21,8 @@ struct frame {
     const uint8_t *payload;
 };
 
-/* CRC-16/XMODEM of `size` bytes, going on from `crc`. */
-uint16_t frame_crc(uint16_t crc, const uint8_t *bytes, size_t size);
+/* CRC-32 as zlib's of `size` bytes, going on from `crc`; start with 0. */
+uint32_t frame_crc(uint32_t crc, const uint8_t *bytes, size_t size);
 
 /* Writes the frame, delimiter included, to `wire` (WIRE_MAX bytes); returns its length. */
 size_t frame_encode(const struct frame *frame, uint8_t *wire);
