@@ -1,7 +1,9 @@
 """What the board tells, as the rest of the program sees it: made from frames, no I/O."""
 
-from dataclasses import dataclass, fields
-from typing import Self
+import struct
+from dataclasses import dataclass, fields, replace
+from datetime import UTC, datetime
+from typing import Any, Self
 
 import numpy as np
 
@@ -9,12 +11,15 @@ from firmware_host import protocol
 from firmware_host.protocol import Frame
 from firmware_host.samples import SAMPLE_DTYPE
 
+Vector = tuple[float, float, float]
+
 
 @dataclass(frozen=True, slots=True)
 class SampleBatch:
     """Samples of one sensor in the order of their sequence numbers, which have no gap inside a batch.
 
     `dropped` is the board's count of conversions lost on its side since the start; `samples` is (n,) of `SAMPLE_DTYPE`.
+    In the mode "raw" their counts are the part's, in the mode "calibrated" they are microradians per second.
     """
 
     sensor: int
@@ -24,13 +29,13 @@ class SampleBatch:
 
     @classmethod
     def of(cls, frame: Frame, host_time_s: float) -> Self:
-        """A `samples` frame that came at `host_time_s`."""
+        """A `samples` or `rates` frame that came at `host_time_s`."""
         values, items = frame.values, frame.items
         samples = np.empty(len(items), SAMPLE_DTYPE)
         samples["sequence"] = values["sequence"] + np.arange(len(items), dtype=np.uint32)
         samples["board_time_us"] = values["base_time_us"] + items["delta_us"].astype(np.uint64)
         samples["host_time_s"] = host_time_s
-        samples["counts"] = items["counts"]
+        samples["counts"] = items["counts" if frame.name == "samples" else "rate_urad_s"]
         samples["temperature_counts"] = items["temperature_counts"]
         return cls(values["sensor"], protocol.MODES[values["mode"]], values["dropped"], samples)
 
@@ -125,6 +130,130 @@ class BoardStatus:
             clock_locked=bool(values["clock_locked"]),
             streaming=bool(values["streaming"]),
             sensors=tuple(SensorCounts(*item) for item in frame.items.tolist()),
+        )
+
+
+@dataclass(frozen=True, slots=True)
+class BoardObservation:
+    """An average the board took of what it had kept: of the samples from `start_us` up to, not including, `end_us`.
+
+    The times are the board's, in microseconds; `mean_rad_s` is uncalibrated; `index` counts the sensor's observations.
+    """
+
+    index: int
+    start_us: int
+    end_us: int
+    samples: int
+    mean_rad_s: Vector
+
+    @classmethod
+    def of(cls, frame: Frame) -> Self:
+        """An `observed` frame."""
+        return cls(**{field.name: frame.values[field.name] for field in fields(cls)})
+
+
+@dataclass(frozen=True, slots=True)
+class BoardSolution:
+    """What the board solved for, g = K (m + b), in single precision; unless `status` is "solved", scale and bias are 0.
+
+    `method` is one of `protocol.METHODS`, `status` of `protocol.SOLUTION_STATUSES`.
+    """
+
+    method: str
+    status: str
+    observations: int
+    iterations: int
+    scale: Vector
+    bias_rad_s: Vector
+
+    @classmethod
+    def of(cls, frame: Frame) -> Self:
+        """A `solution` frame."""
+        values = frame.values
+        return cls(
+            method=protocol.METHODS[values["method"]],
+            status=protocol.SOLUTION_STATUSES[values["status"]],
+            observations=values["observations"],
+            iterations=values["iterations"],
+            scale=values["scale"],
+            bias_rad_s=values["bias_rad_s"],
+        )
+
+
+@dataclass(frozen=True, slots=True)
+class Calibration:
+    """A calibration as the board keeps it; `model` is one of `protocol.MODELS`, `serial_number` the sensor's.
+
+    `temperature_c` is the sensor's during the calibration.
+    """
+
+    model: str
+    serial_number: str
+    written_utc: datetime
+    temperature_c: float
+    scale: Vector
+    bias_rad_s: Vector
+
+    @classmethod
+    def of(cls, values: dict[str, Any]) -> Self:
+        """The fields `protocol.CALIBRATION` of a frame."""
+        return cls(
+            model=dict(enumerate(protocol.MODELS)).get(values["model"], "unknown"),
+            serial_number=protocol.text(values["serial_number"]),
+            written_utc=datetime.fromtimestamp(values["written_unix_s"], UTC),
+            temperature_c=values["temperature_c"],
+            scale=values["scale"],
+            bias_rad_s=values["bias_rad_s"],
+        )
+
+    def values(self) -> dict[str, Any]:
+        """The same as those fields."""
+        return {
+            "model": protocol.MODELS.index(self.model),
+            "serial_number": self.serial_number,
+            "written_unix_s": int(self.written_utc.timestamp()),
+            "temperature_c": self.temperature_c,
+            "scale": self.scale,
+            "bias_rad_s": self.bias_rad_s,
+        }
+
+    def as_kept(self) -> Self:
+        """The same as it comes back from the board: single precision, whole seconds."""
+        temperature_c, kx, ky, kz, bx, by, bz = struct.unpack(
+            "<7f", struct.pack("<7f", self.temperature_c, *self.scale, *self.bias_rad_s)
+        )
+        return replace(
+            self,
+            written_utc=self.written_utc.replace(microsecond=0),
+            temperature_c=temperature_c,
+            scale=(kx, ky, kz),
+            bias_rad_s=(bx, by, bz),
+        )
+
+
+@dataclass(frozen=True, slots=True)
+class StoredCalibration:
+    """A calibration in the board's flash, and which part it was stored for, at which range.
+
+    `sequence` counts the calibrations ever stored for the sensor, from 1.
+    """
+
+    sequence: int
+    part: str
+    who_am_i: int
+    range_deg_s: float
+    calibration: Calibration
+
+    @classmethod
+    def of(cls, frame: Frame) -> Self:
+        """A `calibration` frame."""
+        values = frame.values
+        return cls(
+            sequence=values["sequence"],
+            part=protocol.text(values["part"]),
+            who_am_i=values["who_am_i"],
+            range_deg_s=values["range_deg_s"],
+            calibration=Calibration.of(values),
         )
 
 

@@ -1,71 +1,62 @@
 """The host end of the link: asks the board, and passes on the samples it streams."""
 
 import contextlib
-import threading
 import time
-from collections.abc import Callable
+from collections.abc import Callable, Collection, Sequence
 from types import TracebackType
 from typing import Any, Self
-
-import serial
 
 from firmware_host import protocol
 from firmware_host.answers import (
     BoardIdentity,
+    BoardObservation,
+    BoardSolution,
     BoardStatus,
+    Calibration,
     SampleBatch,
     SensorCounts,
     SensorInfo,
     SensorSetup,
+    StoredCalibration,
     reset_cause,
 )
 from firmware_host.errors import BoardError
+from firmware_host.link import BoardLink
 from firmware_host.protocol import Frame
 
-__all__ = ["Board", "BoardIdentity", "BoardStatus", "SampleBatch", "SensorCounts", "SensorInfo", "SensorSetup"]
+__all__ = [
+    "Board",
+    "BoardIdentity",
+    "BoardObservation",
+    "BoardSolution",
+    "BoardStatus",
+    "Calibration",
+    "SampleBatch",
+    "SensorCounts",
+    "SensorInfo",
+    "SensorSetup",
+    "StoredCalibration",
+]
 
-_READ_TIMEOUT_S = 0.005  # pyserial waits for all bytes asked for or this long, so it is the delay of every read
-_READ_SIZE = 65536
-_ATTEMPTS = 4  # times a request is sent before the board counts as gone
-
-
-class _Request:
-    """A question under way; the reader thread puts the answer in."""
-
-    def __init__(self, name: str) -> None:
-        self.name = name
-        self.answered = threading.Event()
-        self.answer: Frame | None = None
+# Erasing a flash page takes 22 ms, in which the microcontroller hears nothing: a request repeated meanwhile is lost.
+_FLASH_TIMEOUT_S = 4.0
+_ABOUT_THE_BOARD = ("unknown_message", "bad_length", "busy_streaming")  # errors that no sensor has a part in
 
 
 class Board:
-    """The board on a serial port or `socket://host:port`; a context manager. `on_samples` runs on the reader thread."""
+    """The board on a serial port or `socket://host:port`; a context manager. `on_samples` runs on the reader thread.
+
+    Sensors are named by their index in `identity.sensors`. Every call that asks the board raises BoardError: with the
+    name the board's refusal has in `protocol.ERRORS` (`sensor_absent`, `no_calibration`, …), or `board_link_lost`.
+    """
 
     def __init__(self, port: str, baud: int, on_samples: Callable[[SampleBatch], None], timeout_s: float = 1.0) -> None:
         """Opens the port and says hello. Raises BoardError: no_port, no_board, wrong_baud_rate, version_mismatch."""
-        self._name = port
-        self._baud = baud
         self._on_samples = on_samples
         self._timeout_s = timeout_s
-        self._frames = protocol.FrameReader()
-        self._frames_seen = 0
-        self._last_frame_s = time.monotonic()
         self._streaming = False
-        self._fault: Exception | None = None
-        self._requests: dict[int, _Request] = {}
-        self._sequence = 0
-        self._sending = threading.Lock()
-        self._closing = threading.Event()
-        try:
-            self._port = serial.serial_for_url(port, baudrate=baud, timeout=_READ_TIMEOUT_S, exclusive=True)
-        except (serial.SerialException, OSError, ValueError) as error:
-            raise BoardError(
-                "no_port",
-                f"the port {port} does not open: {error}",
-                "Check board.port and the cable, and that no other program has the port",
-            ) from error
-        self._reader = threading.Thread(target=self._read, name=f"board {port}", daemon=True)
-        self._reader.start()
+        self._parts: tuple[str, ...] = ()
+        self._link = BoardLink(port, baud, self._take)
         try:
             self.identity = self._hello()
             self.stop()  # whoever was here before may have left the stream running
@@ -82,182 +73,177 @@ class Board:
         self.close()
 
     def configure(self, sensor: int, rate_hz: float, range_deg_s: float) -> SensorSetup:
-        """Sets a sensor to the nearest data rate and the next range up. Raises BoardError."""
+        """Sets a sensor to the nearest data rate and the next range up."""
         values = {"sensor": sensor, "rate_hz": rate_hz, "range_deg_s": range_deg_s}
         return SensorSetup.of(self._ask("configure", values))
 
-    def start(self) -> None:
-        """Streams every configured sensor, sequences from 0. Raises BoardError."""
-        self._ask("start", {"sensors": 0})
+    def start(self, calibrated: Collection[int] = ()) -> None:
+        """Streams every configured sensor, sequences from 0; those in `calibrated` by their stored calibration."""
+        self._ask("start", {"sensors": _mask(calibrated)})
 
     def stop(self) -> None:
-        """Stops the stream; when it returns, every sample that was sent has been passed on. Raises BoardError."""
+        """Stops the stream; when it returns, every sample that was sent has been passed on."""
         self._ask("stop")
 
     def status(self) -> BoardStatus:
-        """The board's health. Raises BoardError."""
+        """The board's health."""
         return BoardStatus.of(self._ask("status"))
 
+    def keep(self, sensors: Collection[int], duration_s: float) -> None:
+        """Lets the board keep the readings of these sensors from now on, for at least so long, for `observe`."""
+        self._ask("keep", {"sensors": _mask(sensors), "duration_s": duration_s})
+
+    def observe(self, sensor: int, index: int, start_us: int, end_us: int, speed_rad_s: float) -> BoardObservation:
+        """Averages what was kept between two board times and adds it to the sensor's observations.
+
+        `index` is the number of observations before; 0 begins anew. `speed_rad_s` is the turn rate's magnitude in
+        between. Raises BoardError, among others not_kept and bad_observation.
+        """
+        values = {
+            "sensor": sensor,
+            "index": index,
+            "start_us": start_us,
+            "end_us": end_us,
+            "speed_rad_s": speed_rad_s,
+        }
+        return BoardObservation.of(self._ask("observe", values))
+
+    def recall(self, sensor: int, index: int, mean_rad_s: Sequence[float], speed_rad_s: float) -> BoardObservation:
+        """Adds an observation the board made before a reset: `mean_rad_s` as observed then; `index` as in `observe`."""
+        values = {"sensor": sensor, "index": index, "mean_rad_s": mean_rad_s, "speed_rad_s": speed_rad_s}
+        return BoardObservation.of(self._ask("recall", values))
+
+    def solve(self, sensor: int, method: str = "closed_form") -> BoardSolution:
+        """Lets the board calibrate a sensor from its observations by one of `protocol.METHODS`."""
+        return BoardSolution.of(self._ask("solve", {"sensor": sensor, "method": protocol.METHODS.index(method)}))
+
+    def read_calibration(self, sensor: int) -> StoredCalibration | None:
+        """The calibration stored on the board for a sensor; None when there is none."""
+        try:
+            return StoredCalibration.of(self._ask("read_calibration", {"sensor": sensor}))
+        except BoardError as error:
+            if error.name == "no_calibration":
+                return None
+            raise
+
+    def write_calibration(self, sensor: int, calibration: Calibration) -> None:
+        """Stores a calibration for a configured sensor; the range it is configured to belongs to the record.
+
+        The old record stays until the new one is whole. A repeated request stores the same once more: harmless.
+        """
+        self._ask("write_calibration", {"sensor": sensor, **calibration.values()}, _FLASH_TIMEOUT_S)
+
+    def erase_calibration(self, sensor: int) -> None:
+        """Lets the board forget a sensor's calibration; having none is no error."""
+        self._ask("erase_calibration", {"sensor": sensor}, _FLASH_TIMEOUT_S)
+
     def reboot(self) -> None:
-        """Starts the board afresh and waits until it answers again. Raises BoardError."""
+        """Starts the board afresh and waits until it answers again."""
         self._ask("reboot")
-        self._streaming = False
         self.identity = self._hello()
 
     def check(self) -> None:
-        """Raises what went wrong meanwhile: board_link_lost (closed, or silent while streaming) or board_error."""
-        if self._fault is not None:
-            raise self._fault
-        silent_s = time.monotonic() - self._last_frame_s
+        """Raises what went wrong meanwhile: the board's own error, or board_link_lost (closed, silent in a stream)."""
+        if self._link.fault is not None:
+            raise self._link.fault
+        silent_s = time.monotonic() - self._link.last_frame_s
         if self._streaming and silent_s > self._timeout_s:
             raise BoardError(
                 "board_link_lost",
-                f"no readable frame from the board on {self._name} for {silent_s:.1f} s while it should stream",
+                f"no readable frame from the board on {self._link.port} for {silent_s:.1f} s while it should stream",
                 "Check the board's supply and cable, and whether another program has the port",
             )
 
     def close(self) -> None:
         """Tells the board to stop if it streams, and closes the port. May be called twice."""
-        if self._closing.is_set():
+        if self._link.closed:
             return
-        if self._streaming and self._fault is None:
+        if self._streaming and self._link.fault is None:
             with contextlib.suppress(BoardError):  # the link may be gone, and closing is what was asked for
-                self._send("stop", 0, {})
-        self._closing.set()
-        self._reader.join()
-        sock = getattr(self._port, "_socket", None)
-        self._port.close()
-        if sock is not None:
-            sock.close()  # pyserial leaves it open when the far end closed it first
+                self._link.tell("stop")
+        self._link.close()
 
     def _hello(self) -> BoardIdentity:
-        before = self._frames.bytes_seen, self._frames_seen
+        before = self._link.bytes_seen, self._link.frames_seen
         try:
             answer = self._ask("hello")
         except BoardError as error:
-            if error.name != "board_link_lost" or self._fault is not None:
+            if error.name != "board_link_lost" or self._link.fault is not None:
                 raise
-            raise self._why_no_hello(self._frames.bytes_seen - before[0], self._frames_seen - before[1]) from error
+            raise self._why_no_hello(self._link.bytes_seen - before[0], self._link.frames_seen - before[1]) from error
         if answer.values["protocol"] != protocol.PROTOCOL_VERSION:
             raise BoardError(
                 "version_mismatch",
-                f"the board on {self._name} speaks protocol {answer.values['protocol']}, "
+                f"the board on {self._link.port} speaks protocol {answer.values['protocol']}, "
                 f"this program {protocol.PROTOCOL_VERSION}",
-                "Flash the image that comes with this program",
+                "Flash the image that comes with this program: `rig board flash`",
             )
-        return BoardIdentity.of(answer)
+        identity = BoardIdentity.of(answer)
+        self._parts = tuple(sensor.part for sensor in identity.sensors)
+        return identity
 
     def _why_no_hello(self, bytes_seen: int, frames_seen: int) -> BoardError:
         """An idle board speaks twice a second, so what was heard tells what is wrong."""
         if frames_seen:
             return BoardError(
                 "no_board",
-                f"the board on {self._name} sends, but does not answer",
+                f"the board on {self._link.port} sends, but does not answer",
                 "Check the wire to the board's RX pin",
             )
         if bytes_seen:
             return BoardError(
                 "wrong_baud_rate",
-                f"{bytes_seen} bytes came from {self._name} at {self._baud} Bd and none made a readable frame",
-                f"Set board.baud to {protocol.BAUD_RATE}, which the shipped image uses",
+                f"{bytes_seen} bytes came from {self._link.port} at {self._link.baud} Bd and none made a "
+                "readable frame",
+                f"Set board.baud to {protocol.BAUD_RATE}, which the shipped image uses, or flash that image",
             )
         return BoardError(
             "no_board",
-            f"nothing answers on {self._name} within {self._timeout_s:g} s",
-            "Check the board's supply, the port's name, and that the image is flashed",
+            f"nothing answers on {self._link.port} within {self._timeout_s:g} s",
+            "Check the board's supply, the port's name, and that the image is flashed: `rig board flash`",
         )
 
-    def _ask(self, name: str, values: dict[str, Any] | None = None) -> Frame:
-        """Sends a request until its answer comes; every request may safely arrive twice."""
-        with self._sending:
-            self._sequence = sequence = self._sequence % 255 + 1
-        request = self._requests[sequence] = _Request(name)
-        try:
-            for _ in range(_ATTEMPTS):
-                if self._fault is None:
-                    self._send(name, sequence, values or {})
-                    request.answered.wait(self._timeout_s / _ATTEMPTS)
-                if request.answer is not None:
-                    return _accepted(request.answer)
-                if self._fault is not None:
-                    raise self._fault
-        finally:
-            del self._requests[sequence]
-        raise BoardError(
-            "board_link_lost",
-            f"the board on {self._name} did not answer {name} within {self._timeout_s:g} s",
-            "Check the board's supply and cable",
-        )
+    def _ask(self, name: str, values: dict[str, Any] | None = None, timeout_s: float | None = None) -> Frame:
+        answer = self._link.ask(name, values, timeout_s or self._timeout_s)
+        if answer.name == "error":
+            raise self._refusal(answer)
+        return answer
 
-    def _send(self, name: str, sequence: int, values: dict[str, Any]) -> None:
-        """The leading zero ends whatever half a frame the board may have heard before."""
-        try:
-            with self._sending:
-                self._port.write(b"\0" + protocol.encode(name, sequence, values))
-        except (serial.SerialException, OSError) as error:
-            raise self._link_closed(error) from error
-
-    def _link_closed(self, error: Exception) -> BoardError:
-        return BoardError(
-            "board_link_lost",
-            f"the port {self._name} closed: {error}",
-            "Check the cable, the board's supply, and whether another program has the port",
-        )
-
-    def _receive(self) -> bytes:
-        try:
-            return bytes(self._port.read(_READ_SIZE))
-        except (serial.SerialException, OSError) as error:
-            raise self._link_closed(error) from error
-
-    def _read(self) -> None:
-        """The reader thread: bytes to frames until closing or the first fault."""
-        try:
-            while not self._closing.is_set():
-                data = self._receive()
-                host_time_s = time.monotonic()
-                for frame in self._frames.feed(data):
-                    self._last_frame_s = host_time_s
-                    self._frames_seen += 1
-                    self._take(frame)
-        except Exception as error:  # a lost link or a failing consumer must reach check(), not end in a dead thread
-            self._fault = error
-        for request in list(self._requests.values()):
-            request.answered.set()
-
-    def _take(self, frame: Frame) -> None:
-        if frame.name == "samples":
+    def _take(self, frame: Frame, host_time_s: float, request: str | None) -> None:
+        """On the reader thread: every frame as it comes."""
+        if frame.name in ("samples", "rates"):
             if self._streaming:
-                self._on_samples(SampleBatch.of(frame, self._last_frame_s))
-            return
-        request = self._requests.get(frame.values.get("reply_to", 0))
-        if request is not None:
-            if frame.name == "ack" and request.name in ("start", "stop"):
-                self._streaming = request.name == "start"
-                # Here and not in the caller's thread: the samples of a started stream may already be in the next frame.
-            request.answer = frame
-            request.answered.set()
+                self._on_samples(SampleBatch.of(frame, host_time_s))
+        elif frame.name == "ack" and request in ("start", "stop", "reboot"):
+            # Here and not in the caller's thread: the samples of a started stream may already be in the next frame.
+            self._streaming = request == "start"
         elif frame.name == "error" and frame.values["reply_to"] == 0:
-            self._fault = self._fault or _board_error(frame)
-        elif frame.name == "identity" and self._streaming:
-            self._fault = self._fault or BoardError(
-                "board_error",
-                f"the board on {self._name} restarted while streaming (reset by: {reset_cause(frame)})",
-                "Check its supply; a fault or watchdog is an error in the firmware: keep the run folder and report it",
+            self._link.fail(self._refusal(frame))
+        elif frame.name == "identity" and request is None and self._streaming:
+            self._link.fail(
+                BoardError(
+                    "board_error",
+                    f"the board on {self._link.port} restarted while streaming (reset by: {reset_cause(frame)})",
+                    "Check its supply; a fault or watchdog is an error in the firmware: "
+                    "keep the run folder and report it",
+                )
             )
 
+    def _refusal(self, frame: Frame) -> BoardError:
+        """An `error` frame as the error it is: named as in the table, and naming the part it is about."""
+        code, sensor = frame.values["code"], frame.values["sensor"]
+        kind = protocol.ERROR_BY_CODE.get(code)
+        if kind is None:
+            return BoardError(
+                "board_error",
+                f"the board on {self._link.port} reports error {code}",
+                "Flash the image that comes with this program: `rig board flash`",
+            )
+        part = self._parts[sensor] if sensor < len(self._parts) else f"sensor {sensor}"
+        about = "" if kind.name in _ABOUT_THE_BOARD else f", of its {part}"
+        return BoardError(kind.name, f"the board on {self._link.port} says{about}: {kind.what}", kind.remedy)
 
-def _accepted(answer: Frame) -> Frame:
-    if answer.name == "error":
-        raise _board_error(answer)
-    return answer
 
-
-def _board_error(frame: Frame) -> BoardError:
-    code, sensor = frame.values["code"], frame.values["sensor"]
-    kind = protocol.ERROR_BY_CODE.get(code)
-    if kind is None:
-        return BoardError(
-            "board_error", f"the board reports error {code}", "Flash the image that comes with this program"
-        )
-    return BoardError("board_error", f"the board says, of sensor {sensor}, {kind.name}: {kind.what}", kind.remedy)
+def _mask(sensors: Collection[int]) -> int:
+    """Bit i for the sensor of index i."""
+    return sum(1 << sensor for sensor in set(sensors))

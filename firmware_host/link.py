@@ -1,0 +1,152 @@
+"""The serial link to the board: sends requests until they are answered, hands on every frame that arrives."""
+
+import threading
+import time
+from collections.abc import Callable
+from typing import Any
+
+import serial
+
+from firmware_host import protocol
+from firmware_host.errors import BoardError
+from firmware_host.protocol import Frame
+
+_READ_TIMEOUT_S = 0.005  # pyserial waits for all bytes asked for or this long, so it is the delay of every read
+_READ_SIZE = 65536
+_ATTEMPTS = 4  # times a request is sent before the board counts as gone
+
+
+class _Request:
+    """A question under way; the reader thread puts the answer in."""
+
+    def __init__(self, name: str) -> None:
+        self.name = name
+        self.answered = threading.Event()
+        self.answer: Frame | None = None
+
+
+class BoardLink:
+    """An open serial port or `socket://host:port`, read by a thread of its own.
+
+    `on_frame(frame, host_time_s, request)` gets every frame on that thread, with the name of the request it answers or
+    None; it has returned before `ask` does. What it raises becomes `fault`, as a lost port does.
+    """
+
+    def __init__(self, port: str, baud: int, on_frame: Callable[[Frame, float, str | None], None]) -> None:
+        """Opens the port. Raises BoardError `no_port`."""
+        self.port = port
+        self.baud = baud
+        self.fault: Exception | None = None  # the first thing that went wrong; nothing works from then on
+        self.frames_seen = 0
+        self.last_frame_s = time.monotonic()
+        self._on_frame = on_frame
+        self._frames = protocol.FrameReader()
+        self._requests: dict[int, _Request] = {}
+        self._sequence = 0
+        self._sending = threading.Lock()
+        self._closing = threading.Event()
+        try:
+            self._serial = serial.serial_for_url(port, baudrate=baud, timeout=_READ_TIMEOUT_S, exclusive=True)
+        except (serial.SerialException, OSError, ValueError) as error:
+            raise BoardError(
+                "no_port",
+                f"the port {port} does not open: {error}",
+                "Check board.port and the cable, and that no other program has the port",
+            ) from error
+        self._reader = threading.Thread(target=self._read, name=f"board {port}", daemon=True)
+        self._reader.start()
+
+    @property
+    def bytes_seen(self) -> int:
+        """Bytes that ever came, readable or not."""
+        return self._frames.bytes_seen
+
+    @property
+    def closed(self) -> bool:
+        """Whether `close` was called."""
+        return self._closing.is_set()
+
+    def ask(self, name: str, values: dict[str, Any] | None, timeout_s: float) -> Frame:
+        """Sends a request until its answer comes, so every request must be one that may arrive twice.
+
+        Raises BoardError `board_link_lost` after `timeout_s`, and `fault` if there is one.
+        """
+        with self._sending:
+            self._sequence = sequence = self._sequence % 255 + 1
+        request = self._requests[sequence] = _Request(name)
+        try:
+            for _ in range(_ATTEMPTS):
+                if self.fault is None:
+                    self._send(name, sequence, values or {})
+                    request.answered.wait(timeout_s / _ATTEMPTS)
+                if request.answer is not None:
+                    return request.answer
+                if self.fault is not None:
+                    raise self.fault
+        finally:
+            del self._requests[sequence]
+        raise BoardError(
+            "board_link_lost",
+            f"the board on {self.port} did not answer {name} within {timeout_s:g} s",
+            "Check the board's supply and cable",
+        )
+
+    def tell(self, name: str) -> None:
+        """Sends a request without waiting for its answer. Raises BoardError `board_link_lost`."""
+        self._send(name, 0, {})
+
+    def fail(self, error: Exception) -> None:
+        """Makes `error` the fault, unless there is one already."""
+        self.fault = self.fault or error
+
+    def close(self) -> None:
+        """Ends the reader thread and closes the port."""
+        self._closing.set()
+        self._reader.join()
+        sock = getattr(self._serial, "_socket", None)
+        self._serial.close()
+        if sock is not None:
+            sock.close()  # pyserial leaves it open when the far end closed it first
+
+    def _send(self, name: str, sequence: int, values: dict[str, Any]) -> None:
+        """The leading zero ends whatever half a frame the board may have heard before."""
+        try:
+            with self._sending:
+                self._serial.write(b"\0" + protocol.encode(name, sequence, values))
+        except (serial.SerialException, OSError) as error:
+            raise self._port_closed(error) from error
+
+    def _port_closed(self, error: Exception) -> BoardError:
+        return BoardError(
+            "board_link_lost",
+            f"the port {self.port} closed: {error}",
+            "Check the cable, the board's supply, and whether another program has the port",
+        )
+
+    def _receive(self) -> bytes:
+        try:
+            return bytes(self._serial.read(_READ_SIZE))
+        except (serial.SerialException, OSError) as error:
+            raise self._port_closed(error) from error
+
+    def _read(self) -> None:
+        """The reader thread: bytes to frames until closing or the first fault."""
+        try:
+            while not self._closing.is_set():
+                data = self._receive()
+                host_time_s = time.monotonic()
+                for frame in self._frames.feed(data):
+                    self.last_frame_s = host_time_s
+                    self.frames_seen += 1
+                    self._take(frame, host_time_s)
+        except Exception as error:  # a lost link or a failing consumer must reach the caller, not end in a dead thread
+            self.fault = error
+        for request in list(self._requests.values()):
+            request.answered.set()
+
+    def _take(self, frame: Frame, host_time_s: float) -> None:
+        request = self._requests.get(frame.values.get("reply_to", 0))
+        self._on_frame(frame, host_time_s, request.name if request is not None else None)
+        if request is not None:
+            request.answer = frame
+            request.answered.set()
