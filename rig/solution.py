@@ -9,6 +9,7 @@ import numpy as np
 
 from rig.averaging import Average
 from rig.config.load import parse
+from rig.config.models import ObservationSection
 from rig.errors import Fault, Refused
 from rig.estimation.accumulator import Accumulator, Solution
 from rig.estimation.accumulator import Estimator as SixObservation
@@ -77,11 +78,19 @@ def solve_runs(runs: Sequence[RunData], estimator: str = DEFAULT_ESTIMATOR) -> d
         )
     settings = parse(runs[0].config, "the recorded configuration").config.observation
     _check_recordings(runs)
-    useful = [(run, _repeated(runs[place + 1 :])) for place, run in enumerate(runs) if finished_sweeps(run)]
     return {
-        name: _solve_sensor(sensor, [observe(run, name, settings, later) for run, later in useful], chosen)
+        name: _solve_sensor(sensor, observe_runs(runs, name, settings), chosen)
         for name, sensor in runs[0].sensors.items()
     }
+
+
+def observe_runs(runs: Sequence[RunData], sensor: str, settings: ObservationSection) -> list[SensorObservations]:
+    """What each recording with a finished sweep tells of a sensor; a sweep that several hold counts in the last one."""
+    return [
+        observe(run, sensor, settings, _repeated(runs[place + 1 :]))
+        for place, run in enumerate(runs)
+        if finished_sweeps(run)
+    ]
 
 
 def _repeated(later: Sequence[RunData]) -> frozenset[int]:
