@@ -73,10 +73,10 @@ def observe(
     stream = on_the_arms_clock(run.samples[sensor], run.sensors[sensor], motion)
     revolutions = [
         _revolution(stream, motion, sweep, window, settings)
-        for sweep, window in _finished(run, "sweep")
+        for sweep, window in finished(run, "sweep")
         if sweep["index"] not in superseded
     ]
-    rests = tuple(rest for _, window in _finished(run, "rest") if (rest := _rest(stream, motion, window)))
+    rests = tuple(rest for _, window in finished(run, "rest") if (rest := _rest(stream, motion, window)))
     drift = bias_drift(rests)
     return SensorObservations(
         stream.clock,
@@ -87,7 +87,7 @@ def observe(
 
 def finished_sweeps(run: RunData) -> frozenset[int]:
     """The indices of the sweeps a recording holds from start to end."""
-    return frozenset(sweep["index"] for sweep, _ in _finished(run, "sweep"))
+    return frozenset(sweep["index"] for sweep, _ in finished(run, "sweep"))
 
 
 def sound_sweeps(run: RunData, settings: ObservationSection) -> frozenset[int]:
@@ -102,7 +102,7 @@ def _sound_for(run: RunData, sensor: str, settings: ObservationSection) -> froze
         stream = on_the_arms_clock(run.samples[sensor], run.sensors[sensor], motion)
     except Fault:
         return frozenset()
-    for sweep, window in _finished(run, "sweep"):
+    for sweep, window in finished(run, "sweep"):
         with suppress(Fault):
             _revolution(stream, motion, sweep, window, settings)
             sound.add(sweep["index"])
@@ -140,7 +140,7 @@ def _drifting(average: Average, drift: Array) -> Average:
     return replace(average, variance_rad2_s2=average.variance_rad2_s2 + drift)
 
 
-def _finished(run: RunData, kind: str) -> Iterator[tuple[dict[str, Any], tuple[float, float]]]:
+def finished(run: RunData, kind: str) -> Iterator[tuple[dict[str, Any], tuple[float, float]]]:
     """(description, (start, end) in controller time) of every sweep or rest that was begun and finished."""
     started = None
     for event in run.events:
