@@ -1,5 +1,6 @@
 """Configuration files: what is accepted, and how everything wrong is said at once."""
 
+import re
 from pathlib import Path
 
 import pytest
@@ -67,6 +68,113 @@ wrold: {}
 
 def test_a_key_given_twice_is_refused() -> None:
     assert "rest_s: given twice, on lines 1 and 2" in problems_of("rest_s: 1\nrest_s: 2\n")[0]
+
+
+def sensors(**sections: str) -> list[str]:
+    """Overrides that give the demonstration these sensors, in the rig and in its world."""
+    truth = "{scale: [1, 1, 1], bias_rad_s: [0, 0, 0]}"
+    return [
+        f"sensors={{{', '.join(f'{name}: {{serial_number: a, {section}}}' for name, section in sections.items())}}}",
+        f"world.sensors={{{', '.join(f'{name}: {truth}' for name in sections)}}}",
+    ]
+
+
+@pytest.mark.parametrize(
+    ("part", "rate_hz", "range_deg_s"), [("lsm9ds1", 238, 245), ("mpu9250", 200, 250), ("adis16465", 200, 500)]
+)
+def test_a_part_has_its_usual_rate_and_range_unless_the_file_says_otherwise(
+    part: str, rate_hz: float, range_deg_s: float
+) -> None:
+    sensor = parse(demo_text(), overrides=sensors(gyro=f"part: {part}")).config.sensors["gyro"]
+    assert (sensor.rate_hz, sensor.range_deg_s) == (rate_hz, range_deg_s)
+
+
+def test_a_rate_may_be_rounded_as_people_write_it() -> None:
+    config = parse(demo_text(), overrides=sensors(gyro="part: mpu9250, rate_hz: 333.33, range_deg_s: 1000")).config
+    assert config.sensors["gyro"].rate_hz == 1000 / 3
+
+
+@pytest.mark.parametrize(
+    ("section", "problem"),
+    [
+        ("part: lsm9ds1, rate_hz: 200", "sensors.gyro.rate_hz: 200: not available; the nearest is 238; allowed: 14.9,"),
+        (
+            "part: mpu9250, rate_hz: 300",
+            "sensors.gyro.rate_hz: 300: not available; the nearest is 333.333; allowed: 10",
+        ),
+        (
+            "part: adis16465, rate_hz: 238",
+            "sensors.gyro.rate_hz: 238: not available; the nearest is 250; allowed: 2000/",
+        ),
+        ("part: mpu9250, rate_hz: 8000", "sensors.gyro.rate_hz: 8000: not available; the nearest is 1000;"),
+        ("part: adis16465, range_deg_s: 245", "sensors.gyro.range_deg_s: 245: not available; the nearest is 125;"),
+        ("part: mpu9250, range_deg_s: 245", "sensors.gyro.range_deg_s: 245: not available; the nearest is 250;"),
+        ("part: mpu6050, rate_hz: 7", "sensors.gyro.part: 'mpu6050' is not allowed, did you mean mpu9250?"),
+        ("part: lsm9ds1, turntable: {}", "sensors.gyro.turntable: only a sensor with role: reference has one"),
+        ("part: lsm9ds1, serial_number: Größe", "sensors.gyro.serial_number: 'Größe': must be 1 to 24 plain ASCII"),
+        ("part: lsm9ds1, role: reference", "sensors: at least one sensor must have role: calibrate"),
+    ],
+)
+def test_what_a_part_cannot_do_is_refused_with_the_nearest_it_can(section: str, problem: str) -> None:
+    (found,) = problems_of(demo_text(), *sensors(gyro=section))
+    assert re.sub(r" \(line \d+\)", "", found).startswith(problem)
+
+
+def test_a_reference_brings_its_own_calibration() -> None:
+    config = parse(
+        demo_text(),
+        overrides=sensors(
+            gyro="part: mpu9250", reference="part: adis16465, role: reference, turntable: {scale: [1.003, 0.997, 1]}"
+        ),
+    ).config
+    assert list(config.to_calibrate) == ["gyro"] and config.reference is not None
+    name, reference = config.reference
+    assert name == "reference" and reference.turntable.scale == (1.003, 0.997, 1)
+    assert reference.turntable.bias_rad_s == (0, 0, 0)
+    assert parse(demo_text()).config.reference is None
+
+
+@pytest.mark.parametrize(
+    ("sections", "problem"),
+    [
+        (
+            {"a": "part: mpu9250", "b": "part: mpu9250"},
+            "a and b are both mpu9250; the board has one place for each part",
+        ),
+        (
+            {f"r{part}": f"part: {part}, role: reference" for part in ("adis16465", "mpu9250")}
+            | {"g": "part: lsm9ds1"},
+            "radis16465 and rmpu9250 have role: reference; at most one sensor can",
+        ),
+    ],
+)
+def test_sensors_that_do_not_fit_together_are_refused(sections: dict[str, str], problem: str) -> None:
+    (found,) = problems_of(demo_text(), *sensors(**sections))
+    assert found.startswith("sensors (line") and found.endswith(problem), found
+
+
+ALL_AT_FULL_RATE = {
+    "one": "part: lsm9ds1, rate_hz: 952",
+    "two": "part: mpu9250, rate_hz: 1000",
+    "three": "part: adis16465, rate_hz: 1000, role: reference",
+}
+
+
+def test_rates_the_serial_link_cannot_carry_are_refused_with_the_arithmetic() -> None:
+    (found,) = problems_of(demo_text(), *sensors(**ALL_AT_FULL_RATE), "board.baud=460800")
+    # Of a frame's 27 bytes around its samples, 12 calibrated ones of 18 bytes each have a share, or 18 raw ones of 12.
+    assert "one 952 Hz × 20.2 bytes + two 1000 Hz × 20.2 bytes + three 1000 Hz × 13.5 bytes = 53028 bytes/s" in found
+    assert "board.baud 460800 / 10 bits a byte less 10% kept free = 41472 bytes/s" in found
+    assert "lower rate_hz or raise board.baud" in found
+
+
+def test_the_usual_link_carries_all_three_sensors_at_full_rate() -> None:
+    assert len(parse(demo_text(), overrides=sensors(**ALL_AT_FULL_RATE)).config.sensors) == 3
+
+
+def test_a_verification_needs_a_reference() -> None:
+    (found,) = problems_of(demo_text(), "procedure.verify=true")
+    assert "role: reference" in found
 
 
 @pytest.mark.parametrize("text", ["", "- a\n", "a: [1\n", "{a: 1", "a: !!python/object:os.system 1\n"])

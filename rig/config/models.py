@@ -3,10 +3,14 @@
 Every quantity carries its unit in its key. Degrees live only here, at the edge; the rig works in SI units.
 """
 
-from typing import Annotated, Literal, Self
+from collections.abc import Mapping
+from typing import Annotated, Any, Literal, Self
 
 import numpy as np
-from pydantic import AfterValidator, BaseModel, ConfigDict, Field, model_validator
+from pydantic import BaseModel, ConfigDict, Field, ValidationInfo, field_validator, model_validator
+
+from rig.config.link_budget import Stream, over_budget
+from rig.config.parts import PARTS
 
 Joint = Literal["base", "shoulder", "elbow", "wrist_1", "wrist_2", "wrist_3"]
 Wrist = Literal["wrist_1", "wrist_2", "wrist_3"]
@@ -15,20 +19,7 @@ AxisName = Literal["+x", "-x", "+y", "-y", "+z", "-z"]
 Vector3 = tuple[float, float, float]
 Vector6 = tuple[float, float, float, float, float, float]
 Positive = Annotated[float, Field(gt=0)]
-
-
-def one_of(*allowed: float) -> AfterValidator:
-    """A validator that accepts just these numbers and names the nearest of them otherwise."""
-
-    def check(value: float) -> float:
-        if value not in allowed:
-            nearest = min(allowed, key=lambda candidate: abs(candidate - value))
-            raise ValueError(
-                f"not available; the nearest is {nearest:g}; allowed: {', '.join(f'{a:g}' for a in allowed)}"
-            )
-        return value
-
-    return AfterValidator(check)
+SERIAL_NUMBER_MAX = 24  # of the kind "text24" in the board's protocol
 
 
 class Section(BaseModel):
@@ -79,14 +70,57 @@ class MountingSection(Section):
         return self
 
 
-class SensorSection(Section):
-    """One gyroscope on the board."""
+class TurntableSection(Section):
+    """A reference's own calibration, from a turntable: rate = scale · (reading + bias_rad_s)."""
 
-    part: Literal["lsm9ds1"]
+    scale: tuple[Positive, Positive, Positive] = (1.0, 1.0, 1.0)
+    bias_rad_s: Vector3 = (0.0, 0.0, 0.0)
+
+
+class SensorSection(Section):
+    """One gyroscope on the board. Left out, its data rate and range are the part's usual ones."""
+
+    part: Literal["lsm9ds1", "mpu9250", "adis16465"]
     serial_number: str
-    rate_hz: Annotated[float, one_of(14.9, 59.5, 119, 238, 476, 952)] = 238  # LSM9DS1 datasheet, table 46
-    range_deg_s: Annotated[float, one_of(245, 500, 2000)] = 245
+    role: Literal["calibrate", "reference"] = "calibrate"
+    rate_hz: float = Field(default=None, validate_default=True)
+    range_deg_s: float = Field(default=None, validate_default=True)
     mounting: MountingSection = MountingSection()
+    turntable: TurntableSection = TurntableSection()
+
+    @field_validator("serial_number")
+    @classmethod
+    def the_board_can_keep_it(cls, value: str) -> str:
+        """The board stores it beside the calibration, in a field of fixed width."""
+        if not (value.isascii() and value.isprintable() and 0 < len(value) <= SERIAL_NUMBER_MAX):
+            raise ValueError(f"must be 1 to {SERIAL_NUMBER_MAX} plain ASCII characters; the board keeps no others")
+        return value
+
+    @field_validator("rate_hz", "range_deg_s", mode="before")
+    @classmethod
+    def usual_of_the_part(cls, value: Any, info: ValidationInfo) -> Any:
+        """What is left out depends on the part."""
+        part = PARTS.get(info.data.get("part", ""))
+        if value is not None or part is None:
+            return 0.0 if value is None else value  # a part that is not known is an error of its own
+        return part.default_rate_hz if info.field_name == "rate_hz" else part.default_range_deg_s
+
+    @field_validator("rate_hz", "range_deg_s")
+    @classmethod
+    def the_part_has_it(cls, value: float, info: ValidationInfo) -> float:
+        """Only what the part can do, and never silently something else."""
+        part = PARTS.get(info.data.get("part", ""))
+        if part is None:
+            return value
+        return part.accept_rate(value) if info.field_name == "rate_hz" else part.accept_range(value)
+
+    @field_validator("turntable")
+    @classmethod
+    def only_of_a_reference(cls, value: TurntableSection, info: ValidationInfo) -> TurntableSection:
+        """A sensor that is to be calibrated has no calibration yet."""
+        if info.data.get("role") == "calibrate":
+            raise ValueError("only a sensor with role: reference has one; a sensor to calibrate gets its own here")
+        return value
 
 
 class ProcedureSection(Section):
@@ -149,6 +183,34 @@ class RigConfig(Section):
     limits: LimitsSection
     output: OutputSection = OutputSection()
 
+    @field_validator("sensors")
+    @classmethod
+    def sensors_fit_together(cls, sensors: dict[str, SensorSection]) -> dict[str, SensorSection]:
+        """The board has one place for each part, and a calibration one reference at most."""
+        places: dict[str, str] = {}
+        for name, sensor in sensors.items():
+            if sensor.part in places:
+                raise ValueError(
+                    f"{places[sensor.part]} and {name} are both {sensor.part}; the board has one place for each part"
+                )
+            places[sensor.part] = name
+        references = [name for name, sensor in sensors.items() if sensor.role == "reference"]
+        if len(references) > 1:
+            raise ValueError(f"{' and '.join(references)} have role: reference; at most one sensor can")
+        if len(references) == len(sensors):
+            raise ValueError("at least one sensor must have role: calibrate")
+        return sensors
+
+    @field_validator("sensors")
+    @classmethod
+    def the_link_carries_them(cls, sensors: dict[str, SensorSection], info: ValidationInfo) -> dict[str, SensorSection]:
+        """Rates for which the link is too slow would lose samples. Calibrated readings, the larger ones, must fit."""
+        streams = {name: Stream(s.rate_hz, calibrated=s.role == "calibrate") for name, s in sensors.items()}
+        problem = over_budget(streams, info.data["board"].baud) if "board" in info.data else None
+        if problem is not None:
+            raise ValueError(problem)
+        return sensors
+
     @model_validator(mode="after")
     def sweeps_fit_the_ranges(self) -> Self:
         """A sweep must stay well inside every sensor's range: scale error, bias, ripple and noise come on top."""
@@ -161,12 +223,24 @@ class RigConfig(Section):
         return self
 
     @model_validator(mode="after")
-    def verification_has_limits(self) -> Self:
-        """A verification without limits could not pass; say so before the robot moves."""
+    def verification_has_what_it_needs(self) -> Self:
+        """A verification without a reference or without limits could not pass; say so before the robot moves."""
+        if self.verifies and self.reference is None:
+            raise ValueError("a verification needs a sensor with role: reference to compare with")
         limits = (self.limits.verification_rms_rad_s, self.limits.verification_mean_rad_s)
         if self.verifies and None in limits:
             raise ValueError("a verification needs limits.verification_rms_rad_s and limits.verification_mean_rad_s")
         return self
+
+    @property
+    def to_calibrate(self) -> Mapping[str, SensorSection]:
+        """The sensors a calibration is for, by name."""
+        return {name: sensor for name, sensor in self.sensors.items() if sensor.role == "calibrate"}
+
+    @property
+    def reference(self) -> tuple[str, SensorSection] | None:
+        """The sensor whose calibration is known, with its name, if there is one."""
+        return next(((name, s) for name, s in self.sensors.items() if s.role == "reference"), None)
 
     @property
     def verifies(self) -> bool:

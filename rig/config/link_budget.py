@@ -1,0 +1,55 @@
+"""Whether the serial link carries what the sensors deliver: bytes a second, by the protocol's own table. Pure."""
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+
+from firmware_host.protocol import MESSAGES, OVERHEAD, PAYLOAD_MAX
+
+BITS_PER_BYTE = 10  # start bit, eight data bits, stop bit
+COBS_BYTES = 2  # the code byte and the delimiter
+BATCH_S = 0.04  # the firmware sends a batch when its first sample is this old, or the frame is full
+MARGIN = 0.1  # of the link stays free: answers, and a clock that is a little off
+
+_BY_NAME = {message.name: message for message in MESSAGES}
+
+
+@dataclass(frozen=True, slots=True)
+class Stream:
+    """What one sensor sends: samples a second, raw or calibrated."""
+
+    rate_hz: float
+    calibrated: bool
+
+    @property
+    def bytes_per_sample(self) -> float:
+        """A sample's bytes and its share of the frame around it."""
+        message = _BY_NAME["rates" if self.calibrated else "samples"]
+        item, head = message.item_dtype.itemsize, message.head.size
+        full_frame = (PAYLOAD_MAX - head) // item
+        samples = min(full_frame, 1 + int(BATCH_S * self.rate_hz))
+        return item + (head + OVERHEAD + COBS_BYTES) / samples
+
+    @property
+    def bytes_per_s(self) -> float:
+        """What the stream takes of the link."""
+        return self.rate_hz * self.bytes_per_sample
+
+
+def capacity_bytes_per_s(baud: int) -> float:
+    """What a link of this speed may be loaded with."""
+    return baud / BITS_PER_BYTE * (1 - MARGIN)
+
+
+def over_budget(streams: Mapping[str, Stream], baud: int) -> str | None:
+    """The arithmetic, when the link cannot carry all `streams` (by sensor name); None when it can."""
+    needed = sum(stream.bytes_per_s for stream in streams.values())
+    if needed <= capacity_bytes_per_s(baud):
+        return None
+    terms = " + ".join(
+        f"{name} {stream.rate_hz:.6g} Hz × {stream.bytes_per_sample:.1f} bytes" for name, stream in streams.items()
+    )
+    return (
+        f"the serial link cannot carry these rates: {terms} = {needed:.0f} bytes/s, but board.baud {baud} / "
+        f"{BITS_PER_BYTE} bits a byte less {MARGIN:.0%} kept free = {capacity_bytes_per_s(baud):.0f} bytes/s; "
+        "lower rate_hz or raise board.baud"
+    )

@@ -1,0 +1,60 @@
+"""The gyroscopes the board has drivers for: which data rates and ranges each can be set to."""
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+from types import MappingProxyType
+
+RATE_TOLERANCE = 2e-4  # relative: 333.33 stands for 1000/3, and the closest two rates of a part are 5e-4 apart
+
+
+@dataclass(frozen=True, slots=True)
+class Part:
+    """One kind of gyroscope: `rates_hz` and `ranges_deg_s` are all it can do, `rates_rule` says the rates in words."""
+
+    rates_hz: tuple[float, ...]
+    rates_rule: str
+    ranges_deg_s: tuple[float, ...]
+    default_rate_hz: float
+    default_range_deg_s: float
+
+    def accept_rate(self, rate_hz: float) -> float:
+        """The part's own rate that `rate_hz` means. Raises ValueError naming the nearest when there is none."""
+        nearest = min(self.rates_hz, key=lambda rate: abs(rate - rate_hz))
+        if abs(nearest - rate_hz) > RATE_TOLERANCE * nearest:
+            raise ValueError(f"not available; the nearest is {nearest:.6g}; allowed: {self.rates_rule}")
+        return nearest
+
+    def accept_range(self, range_deg_s: float) -> float:
+        """`range_deg_s` if the part has it. Raises ValueError naming the nearest otherwise."""
+        if range_deg_s not in self.ranges_deg_s:
+            nearest = min(self.ranges_deg_s, key=lambda candidate: abs(candidate - range_deg_s))
+            allowed = ", ".join(f"{candidate:g}" for candidate in self.ranges_deg_s)
+            raise ValueError(f"not available; the nearest is {nearest:g}; allowed: {allowed}")
+        return range_deg_s
+
+
+PARTS: Mapping[str, Part] = MappingProxyType(
+    {
+        "lsm9ds1": Part(  # datasheet DocID025715, tables 3 and 46
+            rates_hz=(14.9, 59.5, 119, 238, 476, 952),
+            rates_rule="14.9, 59.5, 119, 238, 476, 952",
+            ranges_deg_s=(245, 500, 2000),
+            default_rate_hz=238,
+            default_range_deg_s=245,
+        ),
+        "mpu9250": Part(  # register map RM-MPU-9250A-00, registers 25 (SMPLRT_DIV) and 27 (GYRO_CONFIG)
+            rates_hz=tuple(1000 / (1 + divider) for divider in range(250)),
+            rates_rule="1000/(n + 1) with n = 0 … 249",
+            ranges_deg_s=(250, 500, 1000, 2000),
+            default_rate_hz=200,
+            default_range_deg_s=250,
+        ),
+        "adis16465": Part(  # datasheet, register DEC_RATE; the range is the model's: -1, -2 and -3 have one each
+            rates_hz=tuple(2000 / (1 + divider) for divider in range(2000)),
+            rates_rule="2000/(n + 1) with n = 0 … 1999",
+            ranges_deg_s=(125, 500, 2000),
+            default_rate_hz=200,
+            default_range_deg_s=500,
+        ),
+    }
+)
