@@ -32,8 +32,8 @@ class SampleBatch:
         """A `samples` or `rates` frame that came at `host_time_s`."""
         values, items = frame.values, frame.items
         samples = np.empty(len(items), SAMPLE_DTYPE)
-        samples["sequence"] = values["sequence"] + np.arange(len(items), dtype=np.uint32)
-        samples["board_time_us"] = values["base_time_us"] + items["delta_us"].astype(np.uint64)
+        samples["sequence"] = np.arange(values["sequence"], values["sequence"] + len(items))
+        samples["board_time_us"] = items["delta_us"].astype(np.uint64) + values["base_time_us"]
         samples["host_time_s"] = host_time_s
         samples["counts"] = items["counts" if frame.name == "samples" else "rate_urad_s"]
         samples["temperature_counts"] = items["temperature_counts"]
@@ -255,6 +255,22 @@ class StoredCalibration:
             range_deg_s=values["range_deg_s"],
             calibration=Calibration.of(values),
         )
+
+    def document(self) -> dict[str, Any]:
+        """The same as plain numbers, strings and lists."""
+        calibration = self.calibration
+        return {
+            "sequence": self.sequence,
+            "part": self.part,
+            "who_am_i": self.who_am_i,
+            "range_deg_s": self.range_deg_s,
+            "model": calibration.model,
+            "serial_number": calibration.serial_number,
+            "written_utc": calibration.written_utc.isoformat(timespec="seconds"),
+            "temperature_c": calibration.temperature_c,
+            "scale": list(calibration.scale),
+            "bias_rad_s": list(calibration.bias_rad_s),
+        }
 
 
 def reset_cause(frame: Frame) -> str:

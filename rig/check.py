@@ -13,8 +13,8 @@ from rig.arm.preflight import arm_problems, plan_problems
 from rig.config.load import load
 from rig.config.models import RigConfig
 from rig.errors import RigError
+from rig.instruments import find_sensor, refuse_other_firmware, refusing
 from rig.launch import simulated_laboratory, written
-from rig.opening import find_sensor, refusing
 
 
 def check(config_path: Path, overrides: Sequence[str]) -> int:
@@ -41,6 +41,10 @@ def _look_at_board(config: RigConfig) -> list[str]:
     with refusing(), Board(config.board.port, config.board.baud, lambda batch: None) as board:
         identity = board.identity
         print(f"board at {config.board.port}: {identity.unique_id}, firmware {identity.firmware}")
+        try:
+            refuse_other_firmware(identity)
+        except RigError as error:
+            missing.append(str(error))
         for name, section in config.sensors.items():
             try:
                 info = find_sensor(identity, name, section)

@@ -1,0 +1,84 @@
+"""Whether the board and the sensors on it are what the configuration and this program expect."""
+
+from collections.abc import Iterator
+from contextlib import contextmanager
+
+from firmware_host.client import BoardIdentity, SensorInfo
+from firmware_host.errors import BoardError
+from firmware_host.protocol import FIRMWARE_VERSION
+from rig.config.models import SensorSection
+from rig.errors import Fault, Refused
+
+NOBODY = (0x00, 0xFF, 0x0000, 0xFFFF)  # what a bus reads where no part drives it
+
+# What answers in the place of another part, by the identity register where the firmware looks for that part.
+# Sources: the identities in Linux' drivers st_gyro_core.c and st_lsm6dsx_core.c (0x0F) and inv_mpu_iio.h (0x75).
+IMPOSTORS = {
+    "lsm9ds1": {
+        0x69: "an LSM6DS3",
+        0x6A: "an LSM6DSL or its like",
+        0x6C: "an LSM6DSO or its like",
+        0xD4: "an L3GD20 or LSM9DS0",
+        0xD7: "an L3GD20H",
+    },
+    "mpu9250": {
+        0x68: "an MPU-6050, MPU-6000 or MPU-9150",
+        0x70: "an MPU-6500",
+        0x73: "an MPU-9255",
+        0x74: "an MPU-6515",
+        0xAF: "an ICM-20608",
+    },
+}
+
+
+@contextmanager
+def refusing() -> Iterator[None]:
+    """Before anything has moved, what is wrong with the board or the recording is a refusal."""
+    try:
+        yield
+    except (BoardError, Fault) as error:
+        raise Refused(error.name, error.what, error.remedy) from error
+
+
+def refuse_other_firmware(identity: BoardIdentity) -> None:
+    """Raises Refused `firmware_version` unless the board runs the image that comes with this program."""
+    if identity.firmware != FIRMWARE_VERSION:
+        raise Refused(
+            "firmware_version",
+            f"the board {identity.unique_id} runs firmware {identity.firmware}, this program comes with "
+            f"{FIRMWARE_VERSION}",
+            "Flash the image that comes with this program: `rig board flash`",
+        )
+
+
+def find_sensor(identity: BoardIdentity, name: str, section: SensorSection) -> SensorInfo:
+    """The board's entry for a configured sensor. Raises Refused `sensor_missing` or `sensor_mismatch`."""
+    info = next((sensor for sensor in identity.sensors if configured_part(sensor.part) == section.part), None)
+    if info is not None and info.present:
+        return info
+    if info is None or info.who_am_i in NOBODY:
+        seen = "no driver for it" if info is None else f"nothing answers: its identity reads 0x{info.who_am_i:02x}"
+        raise Refused(
+            "sensor_missing",
+            f"sensors.{name}: the board finds no {section.part} ({seen})",
+            "Check the sensor's supply and SPI wires, and sensors.*.part in the configuration",
+        )
+    raise Refused(
+        "sensor_mismatch",
+        f"sensors.{name}: in the place of the {section.part} answers {impostor(section.part, info.who_am_i)}",
+        "Check which part is fitted, its chip select, and sensors.*.part in the configuration",
+    )
+
+
+def configured_part(part: str) -> str:
+    """A part as the configuration spells it; the board names parts as their makers do."""
+    return part.lower().replace("-", "")
+
+
+def impostor(part: str, who_am_i: int) -> str:
+    """What an unexpected identity would be."""
+    if part == "adis16465" and 16000 < who_am_i < 17000:  # this family's register holds the part's number
+        known: str | None = f"an ADIS{who_am_i}"
+    else:
+        known = IMPOSTORS.get(part, {}).get(who_am_i)
+    return f"{known or 'an unknown part'}, identity 0x{who_am_i:02x}"
