@@ -9,6 +9,7 @@ import numpy as np
 
 from rig.config.models import LimitsSection
 from rig.estimation.estimate import Estimate
+from rig.verification import Verification
 
 
 @dataclass(frozen=True, slots=True)
@@ -33,6 +34,22 @@ class Check:
 def judge(solutions: Mapping[str, Estimate], limits: LimitsSection) -> tuple[Check, ...]:
     """The checks of every sensor, by sensor name; what the limits mean is said in the names."""
     return tuple(check for name, solution in solutions.items() for check in _checks(name, solution, limits))
+
+
+def judge_verifications(verifications: Mapping[str, Verification], limits: LimitsSection) -> tuple[Check, ...]:
+    """The checks of calibrated readings against the reference, by sensor name: the worst axis, and revolution, of each.
+
+    A limit that was left out is zero, which nothing passes.
+    """
+    rms, mean = limits.verification_rms_rad_s or 0.0, limits.verification_mean_rad_s or 0.0
+    return tuple(
+        Check(f"{name}.{what}", _largest(values), limit, "rad/s")
+        for name, verification in verifications.items()
+        for what, values, limit in (
+            ("verification_rms", verification.after.movement.rms_rad_s, rms),
+            ("verification_mean", np.array([turn.error_rad_s for turn in verification.after.revolutions]), mean),
+        )
+    )
 
 
 def verdict(checks: Sequence[Check]) -> Literal["pass", "fail"]:

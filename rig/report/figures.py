@@ -1,0 +1,60 @@
+"""A verification's plots, in the manner of SIX, Figs. 7–10: sensor and reference over time, before and after."""
+
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from rig.verification import Comparison, Verification
+
+if TYPE_CHECKING:
+    from matplotlib.figure import Figure
+
+HOW_TO_GET_FIGURES = "no figures: install the extra with pip install 'calibration-rig[study]', then `rig report`"
+
+
+def write_figures(verification: Verification, folder: Path) -> tuple[Path, ...]:
+    """`verification_<sensor>_before` (where there is one) and `…_after`, each as PNG and SVG; the paths written.
+
+    Raises ImportError where matplotlib, which an extra brings, is not installed.
+    """
+    written: list[Path] = []
+    for when, comparison in (("before", verification.before), ("after", verification.after)):
+        if comparison is not None:
+            written += _write(verification, when, comparison, folder / f"verification_{verification.sensor}_{when}")
+    return tuple(written)
+
+
+def _write(verification: Verification, when: str, comparison: Comparison, path: Path) -> list[Path]:
+    import matplotlib as mpl
+    from matplotlib.figure import Figure
+
+    paths = [path.with_suffix(suffix) for suffix in (".png", ".svg")]
+    with mpl.rc_context({"font.size": 9, "svg.hashsalt": "rig", "axes.grid": True, "grid.alpha": 0.3}):
+        figure = Figure(figsize=(10.0, 7.5), layout="constrained")
+        _draw(figure, comparison, verification.sensor, verification.reference.name)
+        figure.suptitle(f"{verification.sensor} {when} calibration, beside {verification.reference.name}")
+        for file in paths:
+            figure.savefig(file, dpi=110, metadata={"Date": None} if file.suffix == ".svg" else {})
+    return paths
+
+
+def _draw(figure: "Figure", comparison: Comparison, sensor: str, reference: str) -> None:
+    """Rows x, y, z: readings on the left, their difference on the right, enlarged."""
+    rows = figure.subplots(3, 2, sharex=True, sharey="col", width_ratios=(3, 2))
+    since_s = comparison.time_s - comparison.time_s[0]
+    error = comparison.reading_rad_s - comparison.reference_rad_s
+    for i, (readings, difference) in enumerate(rows):
+        # Tens of thousands of points as vectors would make a heavy file: in an SVG the lines are a picture.
+        readings.plot(since_s, comparison.reading_rad_s[:, i], lw=0.7, color="C0", label=sensor, rasterized=True)
+        readings.plot(since_s, comparison.reference_rad_s[:, i], lw=0.7, color="C1", label=reference, rasterized=True)
+        readings.set_ylabel(f"{'xyz'[i]}   rad/s")
+        difference.plot(since_s, error[:, i], lw=0.5, color="C3", rasterized=True)
+        difference.set_title(f"RMS {comparison.movement.rms_rad_s[i]:.4f} rad/s", loc="right", fontsize=9)
+    reach = 1.05 * float(np.abs(error).max())
+    rows[0, 1].set_ylim(-reach, reach)
+    rows[0, 0].legend(loc="upper right", ncols=2)
+    rows[0, 0].set_title("readings", loc="left", fontsize=9)
+    rows[0, 1].set_title("reading − reference", loc="left", fontsize=9)
+    for axes in rows[2]:
+        axes.set_xlabel("time s")
