@@ -18,7 +18,8 @@ from typing import Any
 from zlib import crc32
 
 import numpy as np
-from cobs import cobs
+
+from firmware_host.stuffing import stuff, unstuff
 
 PROTOCOL_VERSION = 2
 FIRMWARE_VERSION = "0.2.0"  # of the shipped image
@@ -82,8 +83,16 @@ class Message:
         vectors = {"vector_i16": "(3,)<i2", "vector_i32": "(3,)<i4", "vector_f32": "(3,)<f4"}
         return np.dtype([(f.name, (codes | vectors).get(f.kind, "<" + KINDS[f.kind][0])) for f in self.items])
 
+    @cached_property
+    def _names(self) -> tuple[str, ...] | None:
+        """Names of what `head` unpacks, one for one; None when some of it is vectors."""
+        vectors = any(field.kind.startswith("vector") for field in self.fields)
+        return None if vectors else tuple(field.name for field in self.fields)
+
     def named(self, values: tuple[Any, ...]) -> dict[str, Any]:
         """What `head` unpacks, by field name; a vector is a tuple of three."""
+        if self._names is not None:  # the frequent frames, made short
+            return dict(zip(self._names, values, strict=True))
         rest = iter(values)
         return {f.name: tuple(islice(rest, 3)) if f.kind.startswith("vector") else next(rest) for f in self.fields}
 
@@ -343,6 +352,7 @@ ERRORS = (
     ErrorKind(16, "bad_observation", "the observation is out of order or not finite", "Begin anew with observation 0"),
     ErrorKind(17, "bad_calibration", "the calibration is not finite or of no known model", "Calibrate again"),
     ErrorKind(18, "flash_failed", "its flash did not take what was written", "Replace the microcontroller board"),
+    ErrorKind(19, "sensor_fault", "the sensor reports a fault of its own", "Check its supply; else replace the sensor"),
 )
 
 _CRC_OF_INTACT = 0x2144DF1C  # of any bytes followed by their own CRC
@@ -379,7 +389,7 @@ def encode(name: str, sequence: int, values: dict[str, Any] | None = None, items
     if len(payload) > PAYLOAD_MAX:
         raise ValueError(f"{name}: payload of {len(payload)} bytes, at most {PAYLOAD_MAX} fit a frame")
     body = bytes((message.code, sequence)) + payload
-    return bytes(cobs.encode(body + crc32(body).to_bytes(4, "little"))) + b"\0"
+    return stuff(body + crc32(body).to_bytes(4, "little")) + b"\0"
 
 
 def decode(block: bytes) -> Frame | None:
@@ -387,13 +397,10 @@ def decode(block: bytes) -> Frame | None:
 
     An identity of another protocol version comes back with only the two fields every version has.
     """
-    try:
-        body = cobs.decode(block)
-    except cobs.DecodeError:
+    body = unstuff(block)
+    if body is None or len(body) < OVERHEAD or crc32(body) != _CRC_OF_INTACT or body[0] not in _BY_CODE:
         return None
-    message = _BY_CODE.get(body[0]) if len(body) >= OVERHEAD and crc32(body) == _CRC_OF_INTACT else None
-    if message is None:
-        return None
+    message = _BY_CODE[body[0]]
     payload = body[2:-4]
     if message.name == "identity" and len(payload) >= 2 and payload[1] != PROTOCOL_VERSION:
         return Frame("identity", body[1], {"reply_to": payload[0], "protocol": payload[1]}, np.empty(0))
@@ -408,12 +415,21 @@ def decode(block: bytes) -> Frame | None:
 
 
 class FrameReader:
-    """Cuts a byte stream into frames, whatever the chunks it arrives in."""
+    """Cuts a byte stream into frames, whatever the chunks it arrives in, and counts what is missing.
+
+    `lost` is exact as long as fewer than 256 frames are lost in a row; the samples' own sequence tells any number.
+    """
 
     def __init__(self) -> None:
         self._rest = b""
+        self._expected: int | None = None  # sequence of the next frame
         self.damaged = 0  # blocks that did not decode
+        self.lost = 0  # frames missing between the first and the latest, by their sequence
         self.bytes_seen = 0
+
+    def expect_restart(self) -> None:
+        """The sender is about to start afresh: its next frame continues no sequence."""
+        self._expected = None
 
     def feed(self, data: bytes) -> list[Frame]:
         """The frames that `data` completes."""
@@ -429,8 +445,14 @@ class FrameReader:
                 if frame is None:
                     self.damaged += 1
                 else:
+                    self._count(frame.sequence)
                     frames.append(frame)
         return frames
+
+    def _count(self, sequence: int) -> None:
+        if self._expected is not None:
+            self.lost += (sequence - self._expected) & 0xFF
+        self._expected = sequence + 1
 
 
 def text(value: bytes) -> str:

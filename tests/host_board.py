@@ -1,4 +1,4 @@
-"""The firmware's core built for this machine, with a gyroscope's registers on its bus; tests play the chip."""
+"""The firmware's core built for this machine, with the three sensors on its bus; tests play the chip."""
 
 import ctypes
 import functools
@@ -6,11 +6,13 @@ import subprocess
 import tempfile
 from pathlib import Path
 
+from host_sensors import Adis16465Registers, Lsm9ds1Registers, Mpu9250Registers
+
 from firmware_host.protocol import Frame, FrameReader, encode
 
 FIRMWARE = Path(__file__).parents[1] / "firmware_host" / "firmware"
 
-_BUS = ctypes.CFUNCTYPE(None, ctypes.c_uint, ctypes.POINTER(ctypes.c_uint8), ctypes.c_size_t)
+_BUS = ctypes.CFUNCTYPE(None, ctypes.c_uint, ctypes.c_uint32, ctypes.POINTER(ctypes.c_uint8), ctypes.c_size_t)
 _TRANSMIT = ctypes.CFUNCTYPE(None, ctypes.POINTER(ctypes.c_uint8), ctypes.c_size_t)
 _RESTART = ctypes.CFUNCTYPE(None)
 
@@ -36,42 +38,8 @@ def core() -> ctypes.CDLL:
     library.frame_encode.restype = ctypes.c_size_t
     library.frame_decode.restype = ctypes.c_bool
     library.clock_now.restype = ctypes.c_uint64
+    library.port_time_us.restype = ctypes.c_uint32
     return library
-
-
-class Registers:
-    """An SPI part with auto-incrementing registers: enough of an LSM9DS1 to see what the driver does to it."""
-
-    def __init__(self) -> None:
-        self.values = bytearray(128)
-        self.values[0x0F] = 0x68
-        self.values[0x22] = 0x04  # IF_ADD_INC, as after power-up
-        self.writes: list[tuple[int, int]] = []
-        self.stuck: set[int] = set()  # registers that ignore writes
-        self.transfers: list[int] = []
-        self.fresh = False
-
-    def transfer(self, data: bytes) -> bytes:
-        """One chip select: the bytes in, the bytes out."""
-        self.transfers.append(len(data))
-        address, reading = data[0] & 0x7F, data[0] & 0x80
-        if not reading:
-            for offset, value in enumerate(data[1:]):
-                self.writes.append((address + offset, value))
-                if address + offset not in self.stuck:
-                    self.values[address + offset] = value
-            return bytes(len(data))
-        self.values[0x17] = 0x02 if self.fresh else 0x00
-        answer = bytes(self.values[address : address + len(data) - 1])
-        if address + len(data) - 2 >= 0x1D:
-            self.fresh = False
-        return b"\0" + answer
-
-    def convert(self, counts: tuple[int, int, int], temperature: int) -> None:
-        """A new conversion in the output registers."""
-        for address, value in zip((0x15, 0x18, 0x1A, 0x1C), (temperature, *counts), strict=True):
-            self.values[address : address + 2] = value.to_bytes(2, "little", signed=True)
-        self.fresh = True
 
 
 class HostBoard:
@@ -79,7 +47,10 @@ class HostBoard:
 
     def __init__(self) -> None:
         self.core = core()
-        self.gyro = Registers()
+        self.gyro = Lsm9ds1Registers()
+        self.mpu9250 = Mpu9250Registers()
+        self.adis16465 = Adis16465Registers()
+        self.sensors = (self.gyro, self.mpu9250, self.adis16465)
         self.line_is_free = True  # False: the transmitter is busy until `sent()`
         self.restarts = 0
         self.wire = bytearray()
@@ -88,9 +59,10 @@ class HostBoard:
         self.set_time(0)
         self.core.board_reset()
 
-    def _bus(self, device: int, pointer: "ctypes._Pointer[ctypes.c_uint8]", size: int) -> None:
-        assert device == 0 and size % 2 == 0
-        ctypes.memmove(pointer, self.gyro.transfer(ctypes.string_at(pointer, size)), size)
+    def _bus(self, device: int, max_hz: int, pointer: "ctypes._Pointer[ctypes.c_uint8]", size: int) -> None:
+        assert size % 2 == 0
+        answer = self.sensors[device].transfer(ctypes.string_at(pointer, size), max_hz, self.core.port_time_us())
+        ctypes.memmove(pointer, answer, size)
 
     def _transmit(self, pointer: "ctypes._Pointer[ctypes.c_uint8]", size: int) -> None:
         self.wire += ctypes.string_at(pointer, size)
@@ -115,9 +87,9 @@ class HostBoard:
             self.core.link_byte_received(byte)
         self.run()
 
-    def data_ready(self, captured_us: int) -> None:
-        """The gyroscope's interrupt."""
-        self.core.acquisition_data_ready(0, ctypes.c_uint32(captured_us & 0xFFFFFFFF))
+    def data_ready(self, captured_us: int, sensor: int = 0) -> None:
+        """A sensor's interrupt."""
+        self.core.acquisition_data_ready(sensor, ctypes.c_uint32(captured_us & 0xFFFFFFFF))
 
     def run(self, passes: int = 2) -> None:
         """Passes of the main loop; two, because what the first queues behind a busy line the second sends."""

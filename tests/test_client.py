@@ -122,7 +122,11 @@ def test_a_board_is_greeted_set_up_streams_and_stops(wire: tuple[BoardOnAWire, s
     batches: list[SampleBatch] = []
     with Board(wire[1], protocol.BAUD_RATE, batches.append) as board:
         assert board.identity.unique_id == "0123456789abcdef01234567"
-        assert [(s.part, s.who_am_i, s.present) for s in board.identity.sensors] == [("LSM9DS1", 0x68, True)]
+        assert [(s.part, s.who_am_i, s.present) for s in board.identity.sensors] == [
+            ("LSM9DS1", 0x68, True),
+            ("MPU-9250", 0x71, True),
+            ("ADIS16465", 0x4051, True),
+        ]
         setup = board.configure(0, rate_hz=200, range_deg_s=245)
         assert (setup.rate_hz, setup.range_deg_s) == (238.0, 245.0)
         board.start()

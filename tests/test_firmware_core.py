@@ -120,7 +120,7 @@ def test_identity_names_board_firmware_and_sensor(board: HostBoard) -> None:
     assert identity.values["protocol"] == protocol.PROTOCOL_VERSION
     assert protocol.text(identity.values["firmware"]) == protocol.FIRMWARE_VERSION
     assert identity.values["unique_id"].hex() == "0123456789abcdef01234567"
-    assert identity.items.tolist() == [(b"LSM9DS1", 0x68, 1)]
+    assert identity.items.tolist() == [(b"LSM9DS1", 0x68, 1), (b"MPU-9250", 0x71, 1), (b"ADIS16465", 0x4051, 1)]
 
 
 def test_a_frame_longer_than_any_request_is_counted_and_the_next_one_answered(board: HostBoard) -> None:
@@ -143,7 +143,7 @@ def test_a_burst_that_overruns_the_receive_ring_costs_only_itself(board: HostBoa
 def test_requests_that_cannot_be_met_are_refused_by_name(board: HostBoard) -> None:
     assert error_of(board.ask("start", sensors=0)) == "not_configured"
     assert error_of(board.ask("start", sensors=1)) == "no_calibration"
-    assert error_of(board.ask("configure", sensor=1, rate_hz=238, range_deg_s=245)) == "no_such_sensor"
+    assert error_of(board.ask("configure", sensor=3, rate_hz=238, range_deg_s=245)) == "no_such_sensor"
     assert error_of(board.ask("ack", reply_to=0)) == "unknown_message"
     body = bytes((1, 5)) + b"hello takes no payload"
     board.receive(cobs.encode(body + crc32(body).to_bytes(4, "little")) + b"\0")
@@ -225,7 +225,7 @@ def test_a_range_the_part_does_not_have_is_refused(board: HostBoard, range_deg_s
 def test_a_missing_sensor_is_named_in_identity_and_refused_in_configure(board: HostBoard) -> None:
     board.gyro.values[0x0F] = 0xFF
     (identity,) = board.ask("hello")
-    assert identity.items.tolist() == [(b"LSM9DS1", 0xFF, 0)]
+    assert identity.items.tolist()[0] == (b"LSM9DS1", 0xFF, 0)
     assert error_of(board.ask("configure", sensor=0, rate_hz=238, range_deg_s=245)) == "sensor_absent"
 
 
@@ -351,7 +351,7 @@ def test_a_read_without_new_data_is_a_bus_error_and_no_sample(status: str) -> No
         board.run()
     else:
         transfer = board.gyro.transfer
-        board.gyro.transfer = lambda data: b"\xff" * len(data)  # type: ignore[method-assign]
+        board.gyro.transfer = lambda data, *_: b"\xff" * len(data)  # type: ignore[method-assign]
         convert(board, 2 * PERIOD_US)
         board.gyro.transfer = transfer  # type: ignore[method-assign]
     convert(board, 3 * PERIOD_US)
@@ -424,7 +424,7 @@ def test_every_conversion_is_either_received_or_counted_as_dropped(steps: list[t
     board.line_is_free = True
     board.sent()
     board.receive(encode("stop", 200))
-    board.run(8)
+    board.run(16)  # with a gap after every sample a batch is one sample, and seven fit a pass
     frames = board.frames()
     sequences = sample_sequences(frames)
     counts = [int(c[0]) for f in frames if f.name == "samples" for c in f.items["counts"]]

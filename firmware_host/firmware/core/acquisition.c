@@ -10,6 +10,7 @@
 #define BATCH_AGE_US 40000u   /* a sample waits no longer than this for company */
 #define SILENCE_PERIODS 10u   /* so many conversions missing in a row is a fault, not jitter */
 #define SILENCE_US 100000u    /* and time for a part that is just starting up */
+#define BAD_READS 10u         /* so many in a row are worth a word */
 #define BATCH_MAX ((PAYLOAD_MAX - sizeof(struct samples_payload)) / sizeof(struct samples_item))
 
 struct sample {
@@ -24,8 +25,10 @@ struct stream {
     uint32_t edges_seen;
     uint32_t period_us; /* 0: not configured */
     uint64_t last_us;   /* latest conversion, or the start */
+    uint64_t watched_us; /* from when on silence counts */
     uint32_t settling;  /* conversions still to throw away */
-    bool silence_reported;
+    uint32_t bad_reads; /* in a row */
+    bool silence_reported, bad_reads_reported;
     uint32_t conversions, sent, dropped;
     struct sample ring[RING];
     uint32_t written, read;
@@ -50,19 +53,25 @@ void acquisition_data_ready(unsigned sensor, uint32_t captured_us)
 
 void acquisition_set_rate(unsigned sensor, double rate_hz)
 {
-    streams[sensor].period_us = rate_hz > 0.0 ? (uint32_t)(1e6f / (float)rate_hz) : 0;
-    streams[sensor].settling = sensors[sensor].driver->settling;
+    const struct sensor_driver *driver = sensors[sensor].driver;
+    struct stream *stream = &streams[sensor];
+    stream->period_us = rate_hz > 0.0 ? (uint32_t)(1e6f / (float)rate_hz) : 0;
+    stream->settling = driver->settling;
+    if (stream->period_us != 0 && stream->settling * stream->period_us < driver->settling_us)
+        stream->settling = driver->settling_us / stream->period_us + 1;
 }
 
-/* Lowers a data-ready line that is already high: without it no further edge would come. */
+/* Lowers a data-ready line that is already high: without it no further edge would come. A line that only rattles is left
+   alone after some tries. */
 static void rearm(unsigned sensor)
 {
     struct stream *stream = &streams[sensor];
     struct reading discarded;
+    unsigned tries = 3;
     do {
         stream->edges_seen = stream->edges;
         sensors[sensor].driver->read(sensors[sensor].device, &discarded);
-    } while (stream->edges != stream->edges_seen);
+    } while (stream->edges != stream->edges_seen && --tries != 0);
 }
 
 bool acquisition_start(void)
@@ -72,8 +81,9 @@ bool acquisition_start(void)
         struct stream *stream = &streams[i];
         stream->conversions = stream->sent = stream->dropped = 0;
         stream->written = stream->read = 0;
-        stream->silence_reported = false;
-        stream->last_us = clock_now();
+        stream->bad_reads = 0;
+        stream->silence_reported = stream->bad_reads_reported = false;
+        stream->last_us = stream->watched_us = clock_now();
         if (stream->period_us != 0) {
             rearm(i);
             any = true;
@@ -110,16 +120,41 @@ static uint32_t conversions_until(const struct stream *stream, uint32_t edges, u
     return elapsed > edges ? elapsed : edges;
 }
 
+static bool complain(unsigned sensor, enum error_code code)
+{
+    struct error_payload error = {.code = (uint8_t)code, .sensor = (uint8_t)sensor};
+    return link_send(MESSAGE_ERROR, &error, sizeof error);
+}
+
+/* Tries to wake a line that was left high, but not in every pass: the other sensors have to be read too. */
 static void watch_silence(unsigned sensor)
 {
     struct stream *stream = &streams[sensor];
-    if (clock_now() - stream->last_us < SILENCE_PERIODS * stream->period_us + SILENCE_US)
+    uint64_t now_us = clock_now();
+    if (now_us - stream->watched_us < SILENCE_PERIODS * stream->period_us + SILENCE_US)
         return;
+    stream->watched_us = now_us;
     rearm(sensor);
-    if (!stream->silence_reported) {
-        struct error_payload error = {.code = ERROR_SENSOR_SILENT, .sensor = (uint8_t)sensor};
-        stream->silence_reported = link_send(MESSAGE_ERROR, &error, sizeof error);
+    if (!stream->silence_reported)
+        stream->silence_reported = complain(sensor, ERROR_SENSOR_SILENT);
+}
+
+static void watch_reads(unsigned sensor, enum read_result result)
+{
+    static const enum error_code meaning[] = {
+        [READ_STALE] = ERROR_SENSOR_ABSENT, /* it signals, but does not answer */
+        [READ_DAMAGED] = ERROR_CHECKSUM_FAILED,
+        [READ_FAULTY] = ERROR_SENSOR_FAULT,
+    };
+    struct stream *stream = &streams[sensor];
+    if (result == READ_FRESH) {
+        stream->bad_reads = 0;
+        return;
     }
+    bus_errors++;
+    stream->bad_reads++;
+    if (stream->bad_reads >= BAD_READS && !stream->bad_reads_reported)
+        stream->bad_reads_reported = complain(sensor, meaning[result]);
 }
 
 static void acquire(unsigned sensor)
@@ -137,11 +172,11 @@ static void acquire(unsigned sensor)
     uint64_t time_us = clock_at(captured_us);
     uint32_t conversions = conversions_until(stream, edges - stream->edges_seen, time_us);
     stream->edges_seen = edges;
-    stream->last_us = time_us;
+    stream->last_us = stream->watched_us = time_us;
 
     struct reading reading;
-    bool fresh = sensors[sensor].driver->read(sensors[sensor].device, &reading) == READ_FRESH;
-    bus_errors += !fresh;
+    enum read_result result = sensors[sensor].driver->read(sensors[sensor].device, &reading);
+    watch_reads(sensor, result);
     if (stream->settling != 0) {
         stream->settling--;
         return;
@@ -149,7 +184,7 @@ static void acquire(unsigned sensor)
     stream->conversions += conversions;
     stream->dropped += conversions - 1;
     bool full = stream->written - stream->read == RING;
-    if (!fresh || full) {
+    if (result != READ_FRESH || full) {
         stream->dropped++;
         return;
     }

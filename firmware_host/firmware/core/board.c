@@ -3,14 +3,16 @@
 #include <string.h>
 
 #include "acquisition.h"
+#include "adis16465.h"
 #include "clock.h"
 #include "link.h"
 #include "lsm9ds1.h"
+#include "mpu9250.h"
 #include "port.h"
 
 #define BEACON_US 500000u
 
-const struct sensor sensors[SENSOR_COUNT] = {{&lsm9ds1_gyro, 0}};
+const struct sensor sensors[SENSOR_COUNT] = {{&lsm9ds1_gyro, 0}, {&mpu9250_gyro, 1}, {&adis16465_gyro, 2}};
 
 static uint64_t last_beacon_us;
 static uint8_t stop_to_acknowledge; /* sequence of a stop whose last samples are still waiting */

@@ -9,7 +9,7 @@
 /* Free-running microsecond counter; it wraps. */
 uint32_t port_time_us(void);
 
-/* Lets so much time pass, busily: for pauses a part needs within one conversation. */
+/* Lets at least so much time pass, busily: for pauses a part needs within one conversation. */
 void port_wait_us(uint32_t duration_us);
 
 /* Selects `device`, exchanges `size` bytes in place at `max_hz` or the next slower clock, deselects. `size` is even: the SPI

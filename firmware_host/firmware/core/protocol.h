@@ -54,6 +54,7 @@ enum error_code {
     ERROR_BAD_OBSERVATION = 16,
     ERROR_BAD_CALIBRATION = 17,
     ERROR_FLASH_FAILED = 18,
+    ERROR_SENSOR_FAULT = 19,
 };
 
 enum reset_cause {

@@ -16,12 +16,14 @@ enum read_result {
     READ_FRESH,   /* a new conversion */
     READ_STALE,   /* nothing new, or nobody there */
     READ_DAMAGED, /* the part's own checksum does not match */
+    READ_FAULTY,  /* the part itself says that something is wrong with it */
 };
 
 struct sensor_driver {
     char part[12];
 
-    /* Conversions to throw away after a configure, while the part's filters settle. */
+    /* What to throw away after a configure, while the part starts up and its filters settle: for so long, and so many. */
+    uint32_t settling_us;
     uint8_t settling;
 
     /* Reads the identity register; true when it is this part's. */
@@ -30,7 +32,7 @@ struct sensor_driver {
     /* Sets rate and range, reads every setting back; fills `setup` with what the part really does. 0, or why not. */
     uint8_t (*configure)(unsigned device, const struct configure_payload *wanted, struct setup_payload *setup);
 
-    /* Reads one conversion, which also lowers the data-ready line. */
+    /* Reads one conversion, which also lowers the data-ready line of a part that holds it. */
     enum read_result (*read)(unsigned device, struct reading *reading);
 };
 
@@ -40,7 +42,7 @@ struct sensor {
     unsigned device;
 };
 
-#define SENSOR_COUNT 1u
+#define SENSOR_COUNT 3u
 extern const struct sensor sensors[SENSOR_COUNT];
 
 #endif

@@ -5,7 +5,7 @@
 
 #include "protocol.h"
 
-typedef void (*bus_function)(unsigned device, uint8_t *bytes, size_t size);
+typedef void (*bus_function)(unsigned device, uint32_t max_hz, uint8_t *bytes, size_t size);
 typedef void (*transmit_function)(const uint8_t *bytes, size_t size);
 typedef void (*restart_function)(void);
 
@@ -35,10 +35,14 @@ uint32_t port_time_us(void)
     return time_us;
 }
 
+void port_wait_us(uint32_t duration_us)
+{
+    time_us += duration_us;
+}
+
 void bus_xfer(unsigned device, uint32_t max_hz, uint8_t *bytes, size_t size)
 {
-    (void)max_hz;
-    on_bus(device, bytes, size);
+    on_bus(device, max_hz, bytes, size);
 }
 
 void port_transmit(const uint8_t *bytes, size_t size)

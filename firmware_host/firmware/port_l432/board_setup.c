@@ -1,10 +1,10 @@
-/* Wiring: USART2 to the ST-LINK (TX PA2, RX PA15), SPI1 on PB3 PB4 PB5, LSM9DS1 select on PA11, its INT1 on PA8. */
+/* Wiring: USART2 to the ST-LINK (TX PA2, RX PA15), SPI1 on PB3 PB4 PB5; select and data-ready of the LSM9DS1 on PA11 and PA8,
+   of the MPU-9250 on PB0 and PA12, of the ADIS16465 on PA4 and PA1. */
 #include "board_setup.h"
 
 #include "protocol.h"
 #include "registers.h"
 
-#define CLOCK_HZ 80000000u
 #define TICK_HZ 20u
 
 enum pin_mode { PIN_INPUT = 0, PIN_OUTPUT = 1, PIN_ALTERNATE = 2 };
@@ -56,20 +56,25 @@ bool setup_lock_clock(void)
 /* Pulls give a disconnected wire a level: no data-ready edges, sensor bytes of 0xFF, a silent serial line. */
 static void setup_pins(void)
 {
-    GPIOA_BSRR = GPIOA_BSRR_BS11; /* deselected before it is an output */
+    GPIOA_BSRR = GPIOA_BSRR_BS4 | GPIOA_BSRR_BS11; /* deselected before they are outputs */
     GPIOA_AFRL |= GPIOA_AFRL_AFRL2(7u);
     GPIOA_AFRH |= GPIOA_AFRH_AFRH15(3u);
-    GPIOA_PUPDR = (GPIOA_PUPDR & ~(PIN_MASK(8u) | PIN_MASK(15u))) | PER_PIN(8u, PULL_DOWN) | PER_PIN(15u, PULL_UP);
-    GPIOA_OSPEEDR |= PER_PIN(2u, 1u) | PER_PIN(11u, 1u);
-    GPIOA_MODER = (GPIOA_MODER & ~(PIN_MASK(2u) | PIN_MASK(8u) | PIN_MASK(11u) | PIN_MASK(15u))) |
-                  PER_PIN(2u, PIN_ALTERNATE) | PER_PIN(8u, PIN_INPUT) | PER_PIN(11u, PIN_OUTPUT) |
+    GPIOA_PUPDR = (GPIOA_PUPDR & ~(PIN_MASK(1u) | PIN_MASK(8u) | PIN_MASK(12u) | PIN_MASK(15u))) |
+                  PER_PIN(1u, PULL_DOWN) | PER_PIN(8u, PULL_DOWN) | PER_PIN(12u, PULL_DOWN) | PER_PIN(15u, PULL_UP);
+    GPIOA_OSPEEDR |= PER_PIN(2u, 1u) | PER_PIN(4u, 1u) | PER_PIN(11u, 1u);
+    GPIOA_MODER = (GPIOA_MODER & ~(PIN_MASK(1u) | PIN_MASK(2u) | PIN_MASK(4u) | PIN_MASK(8u) | PIN_MASK(11u) |
+                                   PIN_MASK(12u) | PIN_MASK(15u))) |
+                  PER_PIN(1u, PIN_INPUT) | PER_PIN(2u, PIN_ALTERNATE) | PER_PIN(4u, PIN_OUTPUT) |
+                  PER_PIN(8u, PIN_INPUT) | PER_PIN(11u, PIN_OUTPUT) | PER_PIN(12u, PIN_INPUT) |
                   PER_PIN(15u, PIN_ALTERNATE);
 
+    GPIOB_BSRR = GPIOB_BSRR_BS0;
     GPIOB_AFRL |= GPIOB_AFRL_AFRL3(5u) | GPIOB_AFRL_AFRL4(5u) | GPIOB_AFRL_AFRL5(5u);
     GPIOB_PUPDR = (GPIOB_PUPDR & ~PIN_MASK(4u)) | PER_PIN(4u, PULL_UP);
-    GPIOB_OSPEEDR |= PER_PIN(3u, 1u) | PER_PIN(5u, 1u);
-    GPIOB_MODER = (GPIOB_MODER & ~(PIN_MASK(3u) | PIN_MASK(4u) | PIN_MASK(5u))) | PER_PIN(3u, PIN_ALTERNATE) |
-                  PER_PIN(4u, PIN_ALTERNATE) | PER_PIN(5u, PIN_ALTERNATE);
+    GPIOB_OSPEEDR |= PER_PIN(0u, 1u) | PER_PIN(3u, 1u) | PER_PIN(5u, 1u);
+    GPIOB_MODER = (GPIOB_MODER & ~(PIN_MASK(0u) | PIN_MASK(3u) | PIN_MASK(4u) | PIN_MASK(5u))) |
+                  PER_PIN(0u, PIN_OUTPUT) | PER_PIN(3u, PIN_ALTERNATE) | PER_PIN(4u, PIN_ALTERNATE) |
+                  PER_PIN(5u, PIN_ALTERNATE);
 }
 
 static void setup_microseconds(void)
@@ -79,11 +84,11 @@ static void setup_microseconds(void)
     TIM2_CR1 = TIM2_CR1_CEN;
 }
 
-/* 5 MHz, half of what the LSM9DS1 allows; mode 3; eight bits, which the FIFO takes two at a time. */
+/* Mode 3, which all the sensors take; eight bits, which the FIFO takes two at a time. The slowest clock until bus_xfer. */
 static void setup_spi(void)
 {
     SPI1_CR2 = SPI1_CR2_DS(7u);
-    SPI1_CR1 = SPI1_CR1_CPHA | SPI1_CR1_CPOL | SPI1_CR1_MSTR | SPI1_CR1_BR(3u) | SPI1_CR1_SSM | SPI1_CR1_SSI;
+    SPI1_CR1 = SPI1_CR1_CPHA | SPI1_CR1_CPOL | SPI1_CR1_MSTR | SPI1_CR1_BR(7u) | SPI1_CR1_SSM | SPI1_CR1_SSI;
     SPI1_CR1 |= SPI1_CR1_SPE;
 }
 
@@ -99,15 +104,17 @@ static void setup_serial(void)
 
 static void setup_data_ready(void)
 {
-    SYSCFG_EXTICR3 = SYSCFG_EXTICR3_EXTI8(0u); /* port A */
-    EXTI_RTSR1 |= EXTI_RTSR1_TR8;
-    EXTI_IMR1 |= EXTI_IMR1_MR8;
+    SYSCFG_EXTICR1 = SYSCFG_EXTICR1_EXTI1(0u); /* port A, all three */
+    SYSCFG_EXTICR3 = SYSCFG_EXTICR3_EXTI8(0u);
+    SYSCFG_EXTICR4 = SYSCFG_EXTICR4_EXTI12(0u);
+    EXTI_RTSR1 |= EXTI_RTSR1_TR1 | EXTI_RTSR1_TR8 | EXTI_RTSR1_TR12;
+    EXTI_IMR1 |= EXTI_IMR1_MR1 | EXTI_IMR1_MR8 | EXTI_IMR1_MR12;
 }
 
 static void setup_interrupts(void)
 {
-    NVIC_ISER0 = 1u << DMA1_CH7_IRQ | 1u << EXTI9_5_IRQ;
-    NVIC_ISER1 = 1u << (USART2_IRQ - 32u);
+    NVIC_ISER0 = 1u << EXTI1_IRQ | 1u << DMA1_CH7_IRQ | 1u << EXTI9_5_IRQ;
+    NVIC_ISER1 = 1u << (USART2_IRQ - 32u) | 1u << (EXTI15_10_IRQ - 32u);
     STK_LOAD = CLOCK_HZ / TICK_HZ - 1u;
     STK_VAL = 0;
     STK_CTRL = STK_CTRL_ENABLE | STK_CTRL_TICKINT | STK_CTRL_CLKSOURCE;

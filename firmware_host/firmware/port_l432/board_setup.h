@@ -4,6 +4,8 @@
 
 #include <stdbool.h>
 
+#define CLOCK_HZ 80000000u /* of the core, the timers and both peripheral buses */
+
 void setup_hardware(void);
 
 /* Lets the clock follow the 32768 Hz crystal once that runs, which takes up to two seconds; true from then on. */

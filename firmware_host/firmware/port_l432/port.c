@@ -8,6 +8,7 @@
 #include "board_setup.h"
 #include "link.h"
 #include "registers.h"
+#include "sensor.h"
 #include "startup.h"
 
 #define SPI1_FIFO (*(volatile uint16_t *)&SPI1_DR) /* a 16-bit access moves two bytes */
@@ -23,12 +24,43 @@ uint32_t port_time_us(void)
     return TIM2_CNT;
 }
 
-/* One sensor so far, so one chip select. Receiving two bytes at a time needs no wait for the bus to go idle. */
+/* The counter may tick just after the first look, so one more tick than asked for. */
+void port_wait_us(uint32_t duration_us)
+{
+    uint32_t start_us = TIM2_CNT;
+    while (TIM2_CNT - start_us <= duration_us)
+        ;
+}
+
+static const struct {
+    volatile uint32_t *set_reset;
+    uint32_t select, deselect;
+} chip_selects[SENSOR_COUNT] = {
+    {&GPIOA_BSRR, GPIOA_BSRR_BR11, GPIOA_BSRR_BS11},
+    {&GPIOB_BSRR, GPIOB_BSRR_BR0, GPIOB_BSRR_BS0},
+    {&GPIOA_BSRR, GPIOA_BSRR_BR4, GPIOA_BSRR_BS4},
+};
+
+static void set_bus_clock(uint32_t max_hz)
+{
+    uint32_t code = 0; /* CLOCK_HZ / 2, 4, … 256 */
+    while (code < 7u && CLOCK_HZ >> (code + 1u) > max_hz)
+        code++;
+    SPI1_CR1 = (SPI1_CR1 & ~SPI1_CR1_BR(7u)) | SPI1_CR1_BR(code);
+}
+
+/* The ADIS16465 wants 200 ns between its select and the first clock (its data sheet, table 2): 16 cycles. */
+static void wait_for_selected(void)
+{
+    __asm volatile(".rept 16\n nop\n .endr");
+}
+
+/* The last bit has its second half still to go when it has been received: no deselect and no other clock before. */
 void bus_xfer(unsigned device, uint32_t max_hz, uint8_t *bytes, size_t size)
 {
-    (void)device;
-    (void)max_hz;
-    GPIOA_BSRR = GPIOA_BSRR_BR11;
+    set_bus_clock(max_hz);
+    *chip_selects[device].set_reset = chip_selects[device].select;
+    wait_for_selected();
     for (size_t i = 0; i < size; i += 2) {
         SPI1_FIFO = (uint16_t)(bytes[i] | bytes[i + 1] << 8);
         while (!(SPI1_SR & SPI1_SR_RXNE))
@@ -37,7 +69,9 @@ void bus_xfer(unsigned device, uint32_t max_hz, uint8_t *bytes, size_t size)
         bytes[i] = (uint8_t)received;
         bytes[i + 1] = (uint8_t)(received >> 8);
     }
-    GPIOA_BSRR = GPIOA_BSRR_BS11;
+    while (SPI1_SR & SPI1_SR_BSY)
+        ;
+    *chip_selects[device].set_reset = chip_selects[device].deselect;
 }
 
 void port_transmit(const uint8_t *bytes, size_t size)
@@ -92,13 +126,28 @@ static void remember_reset(void)
 }
 
 /* The barrier: were the flag still set on return, the same edge would come again and count as a second conversion. */
-void exti9_5_handler(void)
+static inline void data_ready(unsigned sensor, uint32_t flag)
 {
-    uint32_t captured_us = TIM2_CNT;
-    EXTI_PR1 = EXTI_PR1_PR8;
-    acquisition_data_ready(0, captured_us);
+    uint32_t captured_us = TIM2_CNT; /* before anything else */
+    EXTI_PR1 = flag;
+    acquisition_data_ready(sensor, captured_us);
     woken = true;
     __asm volatile("dsb" ::: "memory");
+}
+
+void exti9_5_handler(void)
+{
+    data_ready(0, EXTI_PR1_PR8);
+}
+
+void exti15_10_handler(void)
+{
+    data_ready(1, EXTI_PR1_PR12);
+}
+
+void exti1_handler(void)
+{
+    data_ready(2, EXTI_PR1_PR1);
 }
 
 void dma1_channel7_handler(void)

@@ -17,9 +17,11 @@ struct fault_record fault_record __attribute__((section(".noinit")));
 int main(void);
 void reset_handler(void);
 void fault_handler(void);
+void exti1_handler(void);
 void exti9_5_handler(void);
 void dma1_channel7_handler(void);
 void usart2_handler(void);
+void exti15_10_handler(void);
 void systick_handler(void);
 
 static void paint_stack(void)
@@ -84,7 +86,7 @@ typedef void (*vector)(void);
 /* Only what is enabled has an entry; anything else would jump to 0, which faults. */
 __attribute__((section(".vectors"), used)) static const struct {
     const void *stack;
-    vector entries[INTERRUPT(USART2_IRQ) + 1u];
+    vector entries[INTERRUPT(EXTI15_10_IRQ) + 1u];
 } vectors = {
     stack_top,
     {
@@ -92,8 +94,10 @@ __attribute__((section(".vectors"), used)) static const struct {
         [1] = fault_handler, /* NMI */
         [2] = fault_handler, /* HardFault, to which all other faults lead while they are not enabled */
         [14] = systick_handler,
+        [INTERRUPT(EXTI1_IRQ)] = exti1_handler,
         [INTERRUPT(DMA1_CH7_IRQ)] = dma1_channel7_handler,
         [INTERRUPT(EXTI9_5_IRQ)] = exti9_5_handler,
         [INTERRUPT(USART2_IRQ)] = usart2_handler,
+        [INTERRUPT(EXTI15_10_IRQ)] = exti15_10_handler,
     },
 };

@@ -1,0 +1,141 @@
+/* ADIS16465 data sheet; the same registers, times and checksum in Linux's drivers/iio/imu/adis16475.c, which serves this
+   part, in PX4's src/drivers/imu/analog_devices/adis16470 and in ArduPilot's AP_InertialSensor_ADIS1647x.cpp. */
+#include "adis16465.h"
+
+#include "port.h"
+#include "settings.h"
+
+#define WRITE 0x80u /* first bit of a frame of 16 bits, the high byte first */
+#define IDENTITY 0x4051u /* 16465 */
+#define BUS_HZ 1000000u /* a burst's limit (data sheet, table 2; Linux's ADIS16475_BURST_MAX_SPEED); other frames take 2 MHz */
+#define STALL_US 16u /* between frames (table 2; Linux's cs_change_delay) */
+
+enum register_address {
+    FILT_CTRL = 0x5C,
+    RANG_MDL = 0x5E,
+    MSC_CTRL = 0x60,
+    DEC_RATE = 0x64,
+    GLOB_CMD = 0x68, /* reading it starts a burst */
+    PROD_ID = 0x72,
+};
+
+#define RANG_MDL_RANGE(value) ((value) >> 2 & 3u)
+#define MSC_CTRL_AS_DELIVERED 0x00C1u /* data-ready rises, own clock, corrected for acceleration and place */
+#define DIAG_STAT_UPDATE_FAILED 0x0004u /* a write to its flash, which nobody does here: no reading suffers */
+#define BASE_HZ 2000.0
+#define DIVIDER_MAX 2000u
+#define SETTLING 2u /* the conversion under way when the rate changed, and one more */
+
+/* A setting reads back only when the part has worked it in: more than 60 µs after its writing (Analog's EngineerZone,
+   thread 581040). Two conversions at its own rate are time enough. */
+#define TAKEN_WITHIN_US 1000u
+
+/* By what RANG_MDL says: the model decides the range. */
+static const struct gyro_range ranges[] = {
+    {125.0, 0, RADIANS(1.0 / 160.0)},
+    {500.0, 1, RADIANS(1.0 / 40.0)},
+    {2000.0, 3, RADIANS(1.0 / 10.0)},
+};
+
+static uint16_t word_at(const uint8_t *bytes)
+{
+    return (uint16_t)(bytes[0] << 8 | bytes[1]);
+}
+
+/* The pause comes first, so that it also parts this conversation from the one before. */
+static uint16_t exchange(unsigned device, uint8_t first, uint8_t second)
+{
+    uint8_t bytes[2] = {first, second};
+    port_wait_us(STALL_US);
+    bus_xfer(device, BUS_HZ, bytes, sizeof bytes);
+    return word_at(bytes);
+}
+
+/* The answer comes with the next frame. */
+static uint16_t read_register(unsigned device, uint8_t address)
+{
+    exchange(device, address, 0);
+    return exchange(device, address, 0);
+}
+
+static bool write_register(unsigned device, uint8_t address, uint16_t value)
+{
+    exchange(device, address | WRITE, (uint8_t)value);
+    exchange(device, (uint8_t)(address + 1) | WRITE, (uint8_t)(value >> 8));
+    uint32_t written_us = port_time_us();
+    do {
+        if (read_register(device, address) == value)
+            return true;
+    } while (port_time_us() - written_us < TAKEN_WITHIN_US);
+    return false;
+}
+
+static bool identify(unsigned device, uint16_t *who_am_i)
+{
+    *who_am_i = read_register(device, PROD_ID);
+    return *who_am_i == IDENTITY;
+}
+
+static const struct gyro_range *range_of_model(unsigned device)
+{
+    uint16_t code = RANG_MDL_RANGE(read_register(device, RANG_MDL));
+    for (size_t i = 0; i < COUNT(ranges); i++)
+        if (ranges[i].code == code)
+            return &ranges[i];
+    return NULL;
+}
+
+static uint8_t configure(unsigned device, const struct configure_payload *wanted, struct setup_payload *setup)
+{
+    uint8_t error = refuse_wanted(wanted);
+    if (error)
+        return error;
+    uint16_t who_am_i;
+    identify(device, &who_am_i);
+    error = refuse_identity(who_am_i, IDENTITY);
+    if (error)
+        return error;
+    const struct gyro_range *range = range_of_model(device);
+    if (range == NULL)
+        return ERROR_SENSOR_MISMATCH;
+    if (!(wanted->range_deg_s <= (float)range->deg_s))
+        return ERROR_BAD_RANGE;
+    uint16_t divider = nearest_divider(BASE_HZ, wanted->rate_hz, DIVIDER_MAX);
+    if (!write_register(device, FILT_CTRL, 0) || !write_register(device, MSC_CTRL, MSC_CTRL_AS_DELIVERED) ||
+        !write_register(device, DEC_RATE, (uint16_t)(divider - 1)))
+        return ERROR_SETUP_FAILED;
+    setup->rate_hz = BASE_HZ / divider;
+    setup->range_deg_s = range->deg_s;
+    setup->sensitivity_rad_s = range->sensitivity_rad_s;
+    setup->temperature_scale_c = 0.1;
+    setup->temperature_offset_c = 0.0;
+    return 0;
+}
+
+/* A burst: after the command, ten words, namely DIAG_STAT, rates, accelerations, temperature, a counter of conversions and
+   the sum of all bytes before. The sum is 0 only on a wire that is held low: gravity would show. */
+static enum read_result read(unsigned device, struct reading *reading)
+{
+    static uint16_t last_counter;
+    uint8_t bytes[22] = {GLOB_CMD};
+    port_wait_us(STALL_US);
+    bus_xfer(device, BUS_HZ, bytes, sizeof bytes);
+
+    uint16_t sum = 0;
+    for (unsigned i = 2; i < 20; i++)
+        sum = (uint16_t)(sum + bytes[i]);
+    if (sum == 0 || sum != word_at(&bytes[20]))
+        return READ_DAMAGED;
+    if (word_at(&bytes[2]) & ~DIAG_STAT_UPDATE_FAILED)
+        return READ_FAULTY;
+
+    for (unsigned axis = 0; axis < 3; axis++)
+        reading->counts[axis] = (int16_t)word_at(&bytes[4 + 2 * axis]);
+    reading->temperature_counts = (int16_t)word_at(&bytes[16]);
+    uint16_t counter = word_at(&bytes[18]);
+    bool fresh = counter != last_counter;
+    last_counter = counter;
+    return fresh ? READ_FRESH : READ_STALE;
+}
+
+const struct sensor_driver adis16465_gyro = {"ADIS16465", 0, SETTLING, identify, configure, read};

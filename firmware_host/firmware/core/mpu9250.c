@@ -1,0 +1,162 @@
+/* MPU-9250 register map (RM-MPU-9250A-00, "map") and product specification (PS-MPU-9250A-01, "specification"). Linux's
+   drivers/iio/imu/inv_mpu6050 and PX4's src/drivers/imu/invensense/mpu9250 have the same registers, bits and speeds. */
+#include "mpu9250.h"
+
+#include "port.h"
+#include "settings.h"
+
+#define READ 0x80u /* first bit of an SPI transfer: specification, section 7.5 */
+#define IDENTITY 0x71u /* the MPU-9255 says 0x73, the MPU-6500 0x70: other parts with other figures */
+#define REGISTERS_HZ 1000000u /* section 7.5 */
+#define DATA_HZ 5000000u /* sensor and interrupt registers take 20 MHz to read (section 3.6); loose wires do not */
+
+enum register_address {
+    XG_OFFSET_H = 0x13, /* and five more, to 0x18 */
+    ZG_OFFSET_L = 0x18,
+    SMPLRT_DIV = 0x19,
+    CONFIG = 0x1A,
+    GYRO_CONFIG = 0x1B,
+    FIFO_EN = 0x23,
+    INT_PIN_CFG = 0x37,
+    INT_ENABLE = 0x38,
+    INT_STATUS = 0x3A, /* then the seven words of acceleration, temperature and rates, high byte first */
+    USER_CTRL = 0x6A,
+    PWR_MGMT_1 = 0x6B,
+    PWR_MGMT_2 = 0x6C,
+    WHO_AM_I = 0x75,
+};
+
+#define INT_ENABLE_RAW_RDY 0x01u
+#define INT_STATUS_RAW_DATA_RDY 0x01u
+#define INT_STATUS_ALWAYS_0 0x80u /* reads 1 when nothing drives the wire */
+#define USER_CTRL_I2C_IF_DIS 0x10u
+#define PWR_MGMT_1_SLEEP 0x40u
+#define PWR_MGMT_1_CLKSEL_BEST 0x01u /* the gyroscope's own clock: what full performance needs (map, register 107) */
+
+/* The low-pass filter is always on: without it the part converts at 8 kHz whatever SMPLRT_DIV says (map, register 25),
+   which is more than the serial line carries. With it the divider acts on 1 kHz. */
+#define BASE_HZ 1000.0
+#define DIVIDER_MAX 250u /* 4 Hz, the slowest the specification has */
+
+/* Section 3.1: the gyroscope starts within 35 ms; Linux's INV_MPU6500_GYRO_STARTUP_TIME is 70 ms, which also holds the
+   slowest filter's 33 ms delay (map, register 26). */
+#define SETTLING_US 70000u
+#define WAKING_US 10000u /* until registers can be written: Linux's INV_MPU6050_REG_UP_TIME_MAX */
+
+/* Sensitivities are those of section 3.1, not range / 32768. FS_SEL: map, register 27. */
+static const struct gyro_range ranges[] = {
+    {250.0, 0, RADIANS(1.0 / 131.0)},
+    {500.0, 1, RADIANS(1.0 / 65.5)},
+    {1000.0, 2, RADIANS(1.0 / 32.8)},
+    {2000.0, 3, RADIANS(1.0 / 16.4)},
+};
+
+/* Bandwidth at DLPF_CFG 1 … 6: map, register 26. */
+static const float bandwidths_hz[] = {184.0f, 92.0f, 41.0f, 20.0f, 10.0f, 5.0f};
+
+static uint8_t read_register(unsigned device, uint8_t address)
+{
+    uint8_t bytes[2] = {(uint8_t)(address | READ), 0};
+    bus_xfer(device, REGISTERS_HZ, bytes, sizeof bytes);
+    return bytes[1];
+}
+
+static bool write_register(unsigned device, uint8_t address, uint8_t value)
+{
+    uint8_t bytes[2] = {address, value};
+    bus_xfer(device, REGISTERS_HZ, bytes, sizeof bytes);
+    return read_register(device, address) == value;
+}
+
+static bool identify(unsigned device, uint16_t *who_am_i)
+{
+    *who_am_i = read_register(device, WHO_AM_I);
+    return *who_am_i == IDENTITY;
+}
+
+/* The widest filter that keeps what it lets through below half the data rate. */
+static uint8_t filter_code(double rate_hz)
+{
+    uint8_t i = 0;
+    while (i < COUNT(bandwidths_hz) - 1 && 2.0f * bandwidths_hz[i] > (float)rate_hz)
+        i++;
+    return (uint8_t)(i + 1);
+}
+
+static bool wake(unsigned device)
+{
+    bool asleep = read_register(device, PWR_MGMT_1) & PWR_MGMT_1_SLEEP;
+    bool taken = write_register(device, PWR_MGMT_1, PWR_MGMT_1_CLKSEL_BEST);
+    if (asleep)
+        port_wait_us(WAKING_US);
+    return taken;
+}
+
+/* What an image flashed before left on, such as an offset or the self-test, goes off. Interrupts last.
+   The interrupt is a pulse for each conversion, not a level that a read lowers: a read that is missed costs no edge. */
+static bool write_settings(unsigned device, uint16_t divider, uint8_t filter, uint8_t range)
+{
+    const struct {
+        uint8_t address, value;
+    } settings[] = {
+        {USER_CTRL, USER_CTRL_I2C_IF_DIS}, /* or what is said to the others on the bus might look like I2C */
+        {INT_ENABLE, 0},
+        {PWR_MGMT_2, 0}, /* all axes on */
+        {FIFO_EN, 0},
+        {CONFIG, filter},
+        {SMPLRT_DIV, (uint8_t)(divider - 1)},
+        {GYRO_CONFIG, (uint8_t)(range << 3)}, /* FCHOICE_B 0: through the filter */
+        {INT_PIN_CFG, 0},                     /* active high, push-pull, 50 µs; reading the status clears it */
+        {INT_ENABLE, INT_ENABLE_RAW_RDY},
+    };
+    for (uint8_t address = XG_OFFSET_H; address <= ZG_OFFSET_L; address++)
+        if (!write_register(device, address, 0))
+            return false;
+    for (size_t i = 0; i < COUNT(settings); i++)
+        if (!write_register(device, settings[i].address, settings[i].value))
+            return false;
+    return true;
+}
+
+static uint8_t configure(unsigned device, const struct configure_payload *wanted, struct setup_payload *setup)
+{
+    uint8_t error = refuse_wanted(wanted);
+    if (error)
+        return error;
+    const struct gyro_range *range = next_range(ranges, COUNT(ranges), wanted->range_deg_s);
+    if (range == NULL)
+        return ERROR_BAD_RANGE;
+    uint16_t who_am_i;
+    identify(device, &who_am_i);
+    error = refuse_identity(who_am_i, IDENTITY);
+    if (error)
+        return error;
+    uint16_t divider = nearest_divider(BASE_HZ, wanted->rate_hz, DIVIDER_MAX);
+    setup->rate_hz = BASE_HZ / divider;
+    if (!wake(device) || !write_settings(device, divider, filter_code(setup->rate_hz), range->code))
+        return ERROR_SETUP_FAILED;
+    setup->range_deg_s = range->deg_s;
+    setup->sensitivity_rad_s = range->sensitivity_rad_s;
+    setup->temperature_scale_c = 1.0 / 333.87; /* section 3.4.2: not the MPU-6050's formula */
+    setup->temperature_offset_c = 21.0;
+    return 0;
+}
+
+static int16_t int16_at(const uint8_t *bytes)
+{
+    return (int16_t)(bytes[0] << 8 | bytes[1]);
+}
+
+/* One chip select for status, acceleration, temperature and rates: they lie side by side, and one burst is one moment. */
+static enum read_result read(unsigned device, struct reading *reading)
+{
+    uint8_t bytes[16] = {INT_STATUS | READ};
+    bus_xfer(device, DATA_HZ, bytes, sizeof bytes);
+    reading->temperature_counts = int16_at(&bytes[8]);
+    for (unsigned axis = 0; axis < 3; axis++)
+        reading->counts[axis] = int16_at(&bytes[10 + 2 * axis]);
+    uint8_t status = bytes[1] & (INT_STATUS_RAW_DATA_RDY | INT_STATUS_ALWAYS_0);
+    return status == INT_STATUS_RAW_DATA_RDY ? READ_FRESH : READ_STALE;
+}
+
+const struct sensor_driver mpu9250_gyro = {"MPU-9250", SETTLING_US, 1, identify, configure, read};

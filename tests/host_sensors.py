@@ -1,0 +1,133 @@
+"""The three parts as the drivers see them: registers behind a chip select, enough to tell what a driver does."""
+
+from collections.abc import Sequence
+
+
+class Lsm9ds1Registers:
+    """Registers that count up in a burst; a new conversion raises a flag that reading the last output lowers."""
+
+    device = 0
+    max_hz = 10e6
+
+    def __init__(self) -> None:
+        self.values = bytearray(128)
+        self.values[0x0F] = 0x68
+        self.values[0x22] = 0x04  # IF_ADD_INC, as after power-up
+        self.writes: list[tuple[int, int]] = []
+        self.stuck: set[int] = set()  # registers that ignore writes
+        self.transfers: list[int] = []
+        self.fresh = False
+
+    def transfer(self, data: bytes, max_hz: int, _time_us: int) -> bytes:
+        """One chip select: the bytes in, the bytes out."""
+        assert max_hz <= self.max_hz
+        self.transfers.append(len(data))
+        address, reading = data[0] & 0x7F, data[0] & 0x80
+        if not reading:
+            for offset, value in enumerate(data[1:]):
+                self.writes.append((address + offset, value))
+                if address + offset not in self.stuck:
+                    self.values[address + offset] = value
+            return bytes(len(data))
+        return b"\0" + self._read(address, len(data) - 1, max_hz)
+
+    def _read(self, address: int, size: int, _max_hz: int) -> bytes:
+        self.values[0x17] = 0x02 if self.fresh else 0x00
+        if address + size > 0x1D:
+            self.fresh = False
+        return bytes(self.values[address : address + size])
+
+    def convert(self, counts: Sequence[int], temperature: int) -> None:
+        """A new conversion in the output registers."""
+        for address, value in zip((0x15, 0x18, 0x1A, 0x1C), (temperature, *counts), strict=True):
+            self.values[address : address + 2] = value.to_bytes(2, "little", signed=True)
+        self.fresh = True
+
+
+class Mpu9250Registers(Lsm9ds1Registers):
+    """High byte first; only sensor and interrupt registers are read faster than 1 MHz; reading clears the status."""
+
+    device = 1
+    max_hz = 20e6
+
+    def __init__(self) -> None:
+        super().__init__()
+        self.values = bytearray(128)
+        self.values[0x75] = 0x71
+        self.values[0x6B] = 0x01
+
+    def transfer(self, data: bytes, max_hz: int, time_us: int) -> bytes:
+        first = data[0] & 0x7F
+        is_data = data[0] & 0x80 and first >= 0x3A and first + len(data) - 2 <= 0x48
+        assert is_data or max_hz <= 1e6
+        return super().transfer(data, max_hz, time_us)
+
+    def _read(self, address: int, size: int, _max_hz: int) -> bytes:
+        self.values[0x3A] = 0x01 if self.fresh else 0x00
+        if address <= 0x3A < address + size:
+            self.fresh = False
+        return bytes(self.values[address : address + size])
+
+    def convert(self, counts: Sequence[int], temperature: int) -> None:
+        words = (0x1111, -0x2222, 0x3333, temperature, *counts)  # acceleration first
+        self.values[0x3B:0x49] = b"".join(word.to_bytes(2, "big", signed=True) for word in words)
+        self.fresh = True
+
+
+class Adis16465Registers:
+    """Words of 16 bits, high byte first; an answer comes one frame later, a setting some time after its writing."""
+
+    device = 2
+
+    def __init__(self) -> None:
+        self.words = {0x5C: 0, 0x5E: 0x0007, 0x60: 0x00C1, 0x64: 0, 0x68: 0, 0x72: 0x4051}
+        self.writes: list[tuple[int, int]] = []
+        self.stuck: set[int] = set()  # registers that ignore writes
+        self.transfers: list[int] = []
+        self.status = 0
+        self.counter = 0
+        self.taking_us = 150
+        self.damage = 0  # added to the next bursts' last data byte
+        self._data = [0] * 7
+        self._answer = 0
+        self._pending: dict[int, tuple[int, int]] = {}  # register → when its new value can be read, the value
+        self._idle_since_us = -100
+
+    def transfer(self, data: bytes, max_hz: int, time_us: int) -> bytes:
+        """One chip select: the bytes in, the bytes out."""
+        assert max_hz <= 1e6
+        assert (time_us - self._idle_since_us) % 2**32 >= 16, "the part needs 16 µs between frames"
+        self._idle_since_us = time_us
+        self.transfers.append(len(data))
+        if data == b"\x68" + bytes(21):
+            return self._answer.to_bytes(2, "big") + self._burst()
+        assert len(data) == 2
+        answer, address = self._answer, data[0] & 0x7E
+        if data[0] & 0x80:
+            self._write(data[0] & 0x7F, data[1], time_us)
+        else:
+            due_us, value = self._pending.get(address, (0, 0))
+            if address in self._pending and time_us >= due_us:
+                self.words[address] = value
+            self._answer = self.words[address]
+        return answer.to_bytes(2, "big")
+
+    def _write(self, address: int, byte: int, time_us: int) -> None:
+        self.writes.append((address, byte))
+        word = address & 0x7E
+        if word not in self.stuck:
+            _, value = self._pending.get(word, (0, self.words[word]))
+            value = value & 0x00FF | byte << 8 if address & 1 else value & 0xFF00 | byte
+            self._pending[word] = (time_us + self.taking_us, value)
+
+    def _burst(self) -> bytes:
+        words = [self.status, *self._data, self.counter]
+        body = bytearray(b"".join((word & 0xFFFF).to_bytes(2, "big") for word in words))
+        total = sum(body)
+        body[-1] = (body[-1] + self.damage) & 0xFF
+        return bytes(body) + total.to_bytes(2, "big")
+
+    def convert(self, counts: Sequence[int], temperature: int) -> None:
+        """A new conversion in the output registers."""
+        self._data = [*counts, 0x0111, -0x0222, 0x0333, temperature]
+        self.counter = (self.counter + 1) & 0xFFFF
