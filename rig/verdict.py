@@ -36,19 +36,18 @@ def judge(solutions: Mapping[str, Estimate], limits: LimitsSection) -> tuple[Che
     return tuple(check for name, solution in solutions.items() for check in _checks(name, solution, limits))
 
 
-def judge_verifications(verifications: Mapping[str, Verification], limits: LimitsSection) -> tuple[Check, ...]:
-    """The checks of calibrated readings against the reference, by sensor name: the worst axis, and revolution, of each.
+def verification_checks(sensor: str, verification: Verification | None, limits: LimitsSection) -> tuple[Check, ...]:
+    """Calibrated readings against the reference: the worst axis, and the worst mean over a revolution.
 
-    A limit that was left out is zero, which nothing passes.
+    None is a verification that did not happen. A limit that was left out is zero, which nothing passes.
     """
-    rms, mean = limits.verification_rms_rad_s or 0.0, limits.verification_mean_rad_s or 0.0
-    return tuple(
-        Check(f"{name}.{what}", _largest(values), limit, "rad/s")
-        for name, verification in verifications.items()
-        for what, values, limit in (
-            ("verification_rms", verification.after.movement.rms_rad_s, rms),
-            ("verification_mean", np.array([turn.error_rad_s for turn in verification.after.revolutions]), mean),
-        )
+    rms = mean = None
+    if verification is not None:
+        rms = _largest(verification.after.movement.rms_rad_s)
+        mean = _largest(np.array([turn.error_rad_s for turn in verification.after.revolutions]))
+    return (
+        Check(f"{sensor}.verification_rms", rms, limits.verification_rms_rad_s or 0.0, "rad/s"),
+        Check(f"{sensor}.verification_mean", mean, limits.verification_mean_rad_s or 0.0, "rad/s"),
     )
 
 

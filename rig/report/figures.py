@@ -33,7 +33,9 @@ def _write(verification: Verification, when: str, comparison: Comparison, path: 
     with mpl.rc_context({"font.size": 9, "svg.hashsalt": "rig", "axes.grid": True, "grid.alpha": 0.3}):
         figure = Figure(figsize=(10.0, 7.5), layout="constrained")
         _draw(figure, comparison, verification.sensor, verification.reference.name)
-        figure.suptitle(f"{verification.sensor} {when} calibration, beside {verification.reference.name}")
+        figure.suptitle(
+            f"{verification.sensor} {when} calibration, beside {verification.reference.name}; RMS of sweeps and rests"
+        )
         for file in paths:
             figure.savefig(file, dpi=110, metadata={"Date": None} if file.suffix == ".svg" else {})
     return paths
@@ -53,7 +55,7 @@ def _draw(figure: "Figure", comparison: Comparison, sensor: str, reference: str)
         difference.set_title(f"RMS {comparison.movement.rms_rad_s[i]:.4f} rad/s", loc="right", fontsize=9)
     reach = 1.05 * float(np.abs(error).max())
     rows[0, 1].set_ylim(-reach, reach)
-    rows[0, 0].legend(loc="upper right", ncols=2)
+    rows[0, 0].legend(loc="lower right", bbox_to_anchor=(1, 1), borderaxespad=0, ncols=2, frameon=False)
     rows[0, 0].set_title("readings", loc="left", fontsize=9)
     rows[0, 1].set_title("reading − reference", loc="left", fontsize=9)
     for axes in rows[2]:
