@@ -4,7 +4,8 @@ import sys
 import time
 from pathlib import Path
 
-from firmware_host.emulator.lsm9ds1 import GyroTruth, Lsm9ds1
+from firmware_host.emulator.gyroscope import GyroTruth
+from firmware_host.emulator.lsm9ds1 import Lsm9ds1
 from firmware_host.emulator.machine import EmulatedBoard
 from firmware_host.protocol import FrameReader, encode
 

@@ -6,7 +6,8 @@ from typing import Any
 
 import numpy as np
 
-from firmware_host.emulator.lsm9ds1 import GyroTruth, Lsm9ds1
+from firmware_host.emulator.gyroscope import GyroTruth
+from firmware_host.emulator.lsm9ds1 import Lsm9ds1
 from firmware_host.emulator.machine import EmulatedBoard
 from firmware_host.protocol import Frame, FrameReader, encode
 

@@ -9,7 +9,8 @@ import pytest
 import tiny_firmware
 from emulated_session import CRYSTAL_PPM, UNIQUE_ID, Session
 
-from firmware_host.emulator.lsm9ds1 import GyroTruth, Lsm9ds1
+from firmware_host.emulator.gyroscope import GyroTruth
+from firmware_host.emulator.lsm9ds1 import Lsm9ds1
 from firmware_host.emulator.machine import EmulatedBoard
 from firmware_host.errors import BoardError
 from firmware_host.protocol import BAUD_RATE, RESET_CAUSES, encode

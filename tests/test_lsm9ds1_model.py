@@ -9,7 +9,8 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from firmware_host.emulator.bus import Violation
-from firmware_host.emulator.lsm9ds1 import GyroTruth, Lsm9ds1
+from firmware_host.emulator.gyroscope import GyroTruth
+from firmware_host.emulator.lsm9ds1 import Lsm9ds1
 
 INT1_CTRL, WHO_AM_I, CTRL_REG1_G, CTRL_REG8 = 0x0C, 0x0F, 0x10, 0x22
 OUT_TEMP, STATUS, OUT_G = 0x15, 0x17, 0x18
@@ -35,17 +36,17 @@ class Bus:
         self.time_s = 0.0
 
     def read(self, address: int, count: int = 1) -> bytes:
-        self.part.select()
+        self.part.select(self.time_s)
         self.part.transfer(0x80 | address, self.time_s)
         data = bytes(self.part.transfer(0, self.time_s) for _ in range(count))
-        self.part.deselect()
+        self.part.deselect(self.time_s)
         return data
 
     def write(self, address: int, value: int) -> None:
-        self.part.select()
+        self.part.select(self.time_s)
         self.part.transfer(address, self.time_s)
         self.part.transfer(value, self.time_s)
-        self.part.deselect()
+        self.part.deselect(self.time_s)
 
     def advance(self, time_s: float) -> None:
         self.part.advance(time_s)
@@ -98,7 +99,7 @@ def test_conversions_come_at_the_data_rate(code: int, rate_hz: float) -> None:
 
 def test_its_own_oscillator_sets_the_pace() -> None:
     part = Lsm9ds1(still, GyroTruth(), temperature_c=25.0, seed=1, oscillator_ppm=10_000.0)
-    part.select()
+    part.select(0.0)
     part.transfer(CTRL_REG1_G, 0.0)
     part.transfer(4 << 5, 0.0)
     assert part.next_event_s == pytest.approx(1 / (238 * 1.01))

@@ -5,7 +5,7 @@ from collections.abc import Callable, Sequence
 from firmware_host.emulator.bus import Register, Stored
 from firmware_host.emulator.nvic import Nvic
 
-_OUTPUT, _ALTERNATE = 1, 2
+_INPUT, _OUTPUT, _ALTERNATE = 0, 1, 2
 _PORTS = {"A": 0, "B": 1}
 # Mode, output, speed, pull-up and alternate function after reset: the debug pins PA13–15, PB3–4 are taken
 _MODE_AFTER_RESET = {"A": 0xABFF_FFFF, "B": 0xFFFF_FEBF}
@@ -20,6 +20,7 @@ class Port:
 
     def __init__(self, letter: str) -> None:
         self.name = f"GPIO{letter}"
+        self.number = _PORTS[letter]  # as SYSCFG counts
         self.base = 0x4800_0000 + 0x400 * _PORTS[letter]
         prefix = self.name
         self._mode = Stored(f"{prefix} MODER", 0xFFFF_FFFF, _MODE_AFTER_RESET[letter], self._outputs_changed)
@@ -56,6 +57,10 @@ class Port:
         if self._mode.value >> 2 * pin & 3 != _ALTERNATE:
             return None
         return self._alternate[pin // 8].value >> 4 * (pin % 8) & 0xF
+
+    def is_input(self, pin: int) -> bool:
+        """A pin left analog, as after a reset, does not see its level."""
+        return self._mode.value >> 2 * pin & 3 == _INPUT
 
     def _set_and_reset(self, value: int) -> None:
         self._output = self._output & ~(value >> 16) | value & 0xFFFF
@@ -116,9 +121,9 @@ class Exti:
             Register(0x14, "PR1", lambda: self._pending, self._clear),
         )
 
-    def rising_edge(self, port: str, pin: int) -> None:
+    def rising_edge(self, port: Port, pin: int) -> None:
         """The level on a pin rose."""
-        if _PORTS[port] == self._syscfg.port(pin) and self._rising.value >> pin & 1:
+        if port.number == self._syscfg.port(pin) and self._rising.value >> pin & 1:
             self._pending |= 1 << pin
             self._request()
 

@@ -2,13 +2,15 @@
 
 import math
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass
 
 import numpy as np
 
 from firmware_host.emulator.bus import Violation
+from firmware_host.emulator.gyroscope import Gyroscope, GyroTruth, saturated
+from firmware_host.emulator.spi_device import Fault
 
 WHO_AM_I = 0x68
+_LSM6DS3 = 0x69  # what another part of the maker answers
 _INT1_CTRL, _WHO_AM_I, _CTRL_REG1_G = 0x0C, 0x0F, 0x10
 _OUT_TEMP_L, _OUT_TEMP_H, _STATUS_REG, _OUT_X_L_G, _OUT_Z_H_G = 0x15, 0x16, 0x17, 0x18, 0x1D
 _CTRL_REG8 = 0x22
@@ -35,22 +37,6 @@ _SETTLING = {1: 2, 2: 3, 3: 3, 4: 4, 5: 5, 6: 8}  # table 12: first conversions 
 _SENSITIVITIES_MDPS = {0: 8.75, 1: 17.5, 3: 70.0}  # table 3; 245, 500 and 2000 °/s
 _GDA, _TDA = 0x02, 0x04
 _BDU, _IF_ADD_INC, _SW_RESET = 0x40, 0x04, 0x01
-_NOISE_BLOCK = 3 * 256
-
-
-@dataclass(frozen=True, slots=True)
-class GyroTruth:
-    """What the simulated gyroscope really does, in the model g = K (m + b) with m the reading (SIX, Eq. (3)).
-
-    `scale`: diagonal of K; `bias_rad_s`: b, in the units of the reading; `noise_rad_s`: standard deviation of one
-    reading; `non_orthogonality_rad` (xy, xz, yz): the y axis leans by xy towards x, the z axis by xz towards x and
-    by yz towards y.
-    """
-
-    scale: Sequence[float] = (1.0, 1.0, 1.0)
-    bias_rad_s: Sequence[float] = (0.0, 0.0, 0.0)
-    noise_rad_s: float = 0.0
-    non_orthogonality_rad: Sequence[float] = (0.0, 0.0, 0.0)
 
 
 class Lsm9ds1:
@@ -83,20 +69,10 @@ class Lsm9ds1:
     ) -> None:
         self.chip_select = chip_select
         self.interrupt = interrupt
-        self._rate_at = rate_at
-        self._inverse_scale = [1 / k for k in truth.scale]
-        self._bias = list(truth.bias_rad_s)
-        self._noise_rad_s = truth.noise_rad_s
-        xy, xz, yz = truth.non_orthogonality_rad
-        self._axes = (
-            (1.0, 0.0, 0.0),
-            (math.sin(xy), math.cos(xy), 0.0),
-            (math.sin(xz), math.sin(yz), math.sqrt(1 - math.sin(xz) ** 2 - math.sin(yz) ** 2)),
-        )
-        self._random = np.random.default_rng(seed)
-        self._noise: list[float] = []
+        self.fault: Fault | None = None
+        self._gyroscope = Gyroscope(rate_at, truth, seed)
         self._speed = 1 + oscillator_ppm * 1e-6
-        self._temperature_raw = max(-2048, min(2047, round((temperature_c - 25) * 16)))
+        self._temperature_raw = saturated(round((temperature_c - 25) * 16), bits=12)
         self._next_conversion_s = math.inf
         self._address: int | None = None  # None: the next byte is the address
         self._reading = False
@@ -118,10 +94,10 @@ class Lsm9ds1:
             self._convert(self._next_conversion_s)
             self._next_conversion_s = self._started_s + (self._conversions + 1) * self._period_s
 
-    def select(self) -> None:
+    def select(self, time_s: float) -> None:
         self._address = None
 
-    def deselect(self) -> None:
+    def deselect(self, time_s: float) -> None:
         self._address = None
 
     def transfer(self, byte: int, time_s: float) -> int:
@@ -158,7 +134,7 @@ class Lsm9ds1:
         if address in self._registers:
             return self._registers[address]
         if address == _WHO_AM_I:
-            return WHO_AM_I
+            return _LSM6DS3 if self.fault is Fault.OTHER_PART else WHO_AM_I
         if address == _STATUS_REG:
             return self._status
         if address in (_OUT_TEMP_L, _OUT_TEMP_H):
@@ -219,16 +195,11 @@ class Lsm9ds1:
 
     def _convert(self, time_s: float) -> None:
         """One conversion of all axes and the thermometer, as the output registers will show it."""
-        if len(self._noise) < 3:
-            self._noise = self._random.standard_normal(_NOISE_BLOCK).tolist()[::-1]
         settled = min(1.0, self._conversions / (self._settling + 1))
-        true = [settled * rate_rad_s for rate_rad_s in self._rate_at(time_s)]
-        data = b""
-        for axis, inverse_scale, bias in zip(self._axes, self._inverse_scale, self._bias, strict=True):
-            along = axis[0] * true[0] + axis[1] * true[1] + axis[2] * true[2]
-            reading = along * inverse_scale - bias + self._noise_rad_s * self._noise.pop()
-            counts = max(-32768, min(32767, round(reading / self._per_count)))
-            data += counts.to_bytes(2, "little", signed=True)
+        data = b"".join(
+            saturated(round(rate_rad_s / self._per_count)).to_bytes(2, "little", signed=True)
+            for rate_rad_s in self._gyroscope.read(time_s, settled)
+        )
         self._latest = data
         for axis_index in range(3):
             if not self._held[axis_index]:

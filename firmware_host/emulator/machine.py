@@ -82,6 +82,11 @@ class EmulatedBoard:
             raise self._failure
         limit = self._clock.last_tick(until_s)
         timeline = self._timeline
+        if limit < 0:  # before the board boots, its sensors live already
+            timeline.now = limit
+            timeline.run_due()
+            timeline.now = 0
+            return
         if self._asleep and timeline.next_due > limit:  # the common case, made short
             timeline.now = max(limit, timeline.now)
             return

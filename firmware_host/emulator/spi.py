@@ -22,6 +22,7 @@ class Spi1:
         self._timeline = timeline
         self._clocks = clocks
         self._exchange = exchange
+        self.setup_count = 0  # how often mode or clock have been set: what was checked before may no longer hold
         self._control = Stored("SPI1 CR1", 0x037F, after=self.retune)
         self._control2 = Stored("SPI1 CR2", 0, initial=0x0700)
         self._received: deque[tuple[int, int]] = deque()  # tick at which both bytes are through, the bytes
@@ -37,7 +38,7 @@ class Spi1:
 
     def registers(self) -> Sequence[Register]:
         return (
-            self._control.at(0x00),
+            Register(0x00, "CR1", self._control.read, self._write_control),
             self._control2.at(0x04),
             Register(0x08, "SR", self._read_status, None),
             Register(0x0C, "DR", self._read_data, self._write_data, size=2),
@@ -55,6 +56,12 @@ class Spi1:
     def retune(self) -> None:
         """Take over a new bus clock or divider."""
         self._pair_ticks = round(16 * TICK_HZ / self.clock_hz)
+        self.setup_count += 1
+
+    def _write_control(self, value: int) -> None:
+        if self._free > self._timeline.now:
+            raise Violation("spi_setup", "SPI1 CR1 written while the bus is busy", "Wait until BSY is clear")
+        self._control.write(value)
 
     def _write_data(self, value: int) -> None:
         needed = _SPE | _MSTR | _SSM | _SSI

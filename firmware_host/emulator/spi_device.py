@@ -2,6 +2,7 @@
 
 import math
 from collections.abc import Callable
+from enum import StrEnum
 from typing import Protocol
 
 from firmware_host.emulator.bus import Violation
@@ -10,12 +11,24 @@ from firmware_host.emulator.spi import Spi1
 from firmware_host.emulator.timeline import NEVER, TICK_HZ, Timeline
 
 
+class Fault(StrEnum):
+    """What can be wrong with a part on the bus."""
+
+    ABSENT = "absent"  # it is not there, or without supply: MISO and the interrupt line are left to their pulls
+    OTHER_PART = "other_part"  # its identity register reads as another part's
+    DAMAGED = "damaged"  # a bad contact: now and then a bit of what it sends is wrong
+
+
 class SpiDevice(Protocol):
     """A part on the SPI bus, at register level. Times are virtual seconds and never go backwards.
 
     `name`: the part, for messages. `chip_select`, `interrupt`: chip pins, such as "PA11". `spi_modes`, `spi_max_hz`:
-    what its bus interface accepts. `next_event_s`: when it next does something by itself, infinity for never.
+    what its bus interface accepts; the clock depends on what is accessed and is asked for after the first byte of
+    each access. `next_event_s`: when it next does something by itself, infinity for never. `fault`: what is wrong
+    with it; the wires see to all of it but the identity.
     """
+
+    fault: Fault | None
 
     @property
     def name(self) -> str: ...
@@ -35,13 +48,13 @@ class SpiDevice(Protocol):
     def advance(self, time_s: float) -> None:
         """Do everything due up to and including `time_s`."""
 
-    def select(self) -> None:
+    def select(self, time_s: float) -> None:
         """Chip select falls."""
 
     def transfer(self, byte: int, time_s: float) -> int:
         """Exchange one byte. Raises Violation for what the part does not allow or the model does not know."""
 
-    def deselect(self) -> None:
+    def deselect(self, time_s: float) -> None:
         """Chip select rises."""
 
 
@@ -71,6 +84,9 @@ class BoardClock:
         return self._boot_time_s + tick / self._ticks_per_s
 
 
+_UNCHECKED = -1
+
+
 class SpiBus:
     """The wires between SPI1 and the devices. `pins_connected()`: has the firmware put SPI1 on its pins?"""
 
@@ -78,7 +94,7 @@ class SpiBus:
         self._timeline = timeline
         self._pins_connected = pins_connected
         self._selected: list[DeviceLink] = []
-        self._checked = False
+        self._checked = _UNCHECKED
 
     def chip_select(self, link: "DeviceLink", low: bool) -> None:
         """A device's chip select goes down or up."""
@@ -86,30 +102,39 @@ class SpiBus:
             self._selected.append(link)
         else:
             self._selected.remove(link)
-        self._checked = False
+        self._checked = _UNCHECKED
 
     def exchange(self, spi: Spi1, byte: int) -> int:
         """Pass one byte to the selected device. Raises Violation when the bus is not set up as it must be."""
-        if not self._checked:
-            self._check(spi)
-            self._checked = True
         if self._timeline.next_due <= self._timeline.now:
             self._timeline.run_due()
-        return self._selected[0].exchange(byte) if self._selected else 0xFF
+        if self._checked == spi.setup_count:
+            return self._selected[0].exchange(byte) if self._selected else 0xFF
+        self._check_wires()
+        answer = self._selected[0].exchange(byte) if self._selected else 0xFF
+        self._check_clock(spi)  # not before: the clock that a part accepts depends on what it is asked for
+        self._checked = spi.setup_count
+        return answer
 
-    def _check(self, spi: Spi1) -> None:
+    def _check_wires(self) -> None:
         if not self._pins_connected():
             raise Violation("spi_setup", "SPI1 is used with PB3, PB4, PB5 not all on AF5", "Set MODER and AFRL first")
         if len(self._selected) > 1:
             raise Violation("bus_contention", "two chip selects are low at once", "Raise one before lowering the other")
+
+    def _check_clock(self, spi: Spi1) -> None:
         for link in self._selected:
             device = link.device
             if spi.mode not in device.spi_modes or spi.clock_hz > device.spi_max_hz:
                 raise Violation(
                     "spi_setup",
                     f"SPI1 speaks mode {spi.mode} at {spi.clock_hz / 1e6:g} MHz to the {device.name}",
-                    f"It takes mode {' or '.join(map(str, device.spi_modes))} up to {device.spi_max_hz / 1e6:g} MHz",
+                    f"This access takes mode {' or '.join(map(str, device.spi_modes))} "
+                    f"up to {device.spi_max_hz / 1e6:g} MHz",
                 )
+
+
+_DAMAGED_BYTE = 13  # of a part with a bad contact, one byte in so many has a wrong bit
 
 
 class DeviceLink:
@@ -131,24 +156,34 @@ class DeviceLink:
         self._clock = clock
         self._slot = timeline.register(self._event)
         self._due_s = math.inf
-        self._interrupt_letter, self._interrupt_pin = device.interrupt[1], int(device.interrupt[2:])
+        self._interrupt_port, self._interrupt_pin = port_of(device.interrupt), int(device.interrupt[2:])
         self._exti = exti
         self._level = False
+        self._sent = 0  # bytes
         port_of(device.chip_select).watch(int(device.chip_select[2:]), self._chip_select)
         self._settle()
 
     def exchange(self, byte: int) -> int:
         """Pass one byte to the device and return its answer."""
-        answer = self.device.transfer(byte, self._clock.seconds(self._timeline.now))
+        device = self.device
+        if device.fault is Fault.ABSENT:
+            return 0xFF
+        answer = device.transfer(byte, self._clock.seconds(self._timeline.now))
+        self._sent += 1
+        if device.fault is Fault.DAMAGED and self._sent % _DAMAGED_BYTE == 0:
+            answer ^= 0x01
         self._settle()
         return answer
 
     def _chip_select(self, high: bool) -> None:
+        timeline = self._timeline
+        if timeline.next_due <= timeline.now:
+            timeline.run_due()
         self._bus.chip_select(self, not high)
         if high:
-            self.device.deselect()
+            self.device.deselect(self._clock.seconds(timeline.now))
         else:
-            self.device.select()
+            self.device.select(self._clock.seconds(timeline.now))
         self._settle()
 
     def _event(self) -> None:
@@ -157,12 +192,13 @@ class DeviceLink:
 
     def _settle(self) -> None:
         """Take over what the device may have changed: its interrupt line and its next event."""
-        level = self.device.interrupt_level
+        device = self.device
+        level = device.interrupt_level and device.fault is not Fault.ABSENT
         if level != self._level:
             self._level = level
-            if level:
-                self._exti.rising_edge(self._interrupt_letter, self._interrupt_pin)
-        due_s = self.device.next_event_s
+            if level and self._interrupt_port.is_input(self._interrupt_pin):
+                self._exti.rising_edge(self._interrupt_port, self._interrupt_pin)
+        due_s = device.next_event_s
         if due_s != self._due_s:
             self._due_s = due_s
             self._timeline.schedule(self._slot, NEVER if math.isinf(due_s) else self._clock.first_tick(due_s))

@@ -1,14 +1,18 @@
 """The emulated board as the laboratory mounts it: the firmware image, and sensors that feel the flange turn."""
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Collection, Sequence
 from functools import cache
 from importlib import resources
 from math import radians
 
 import numpy as np
 
-from firmware_host.emulator.lsm9ds1 import GyroTruth, Lsm9ds1
+from firmware_host.emulator.adis16465 import Adis16465
+from firmware_host.emulator.gyroscope import GyroTruth
+from firmware_host.emulator.lsm9ds1 import Lsm9ds1
 from firmware_host.emulator.machine import EmulatedBoard
+from firmware_host.emulator.mpu9250 import Mpu9250
+from firmware_host.emulator.spi_device import SpiDevice
 from rig.config.models import RigConfig, SensorSection, mounting_matrix
 from rig.config.world_models import SimulatedSensorSection, WorldSection
 from rig.world.kinematics import Vector, rotation_from_vector
@@ -22,36 +26,63 @@ def firmware(suffix: str) -> bytes:
     return (resources.files("firmware_host") / "firmware" / "image" / f"rig_l432.{suffix}").read_bytes()
 
 
-def power_up(config: RigConfig, world: WorldSection, flange_rate_at: RateAt, time_s: float) -> EmulatedBoard:
-    """A board that gets power at the virtual time `time_s` and starts `boot_time_s` later."""
-    devices = [
-        _gyroscope(config.sensors[name], truth, flange_rate_at, np.random.SeedSequence([world.seed, index]))
+def mount_sensors(
+    config: RigConfig, world: WorldSection, flange_rate_at: RateAt, time_s: float
+) -> dict[str, SpiDevice]:
+    """The sensors of the `world:` section, by name, given power at the virtual time `time_s`."""
+    return {
+        name: _sensor(
+            config.sensors[name],
+            truth,
+            flange_rate_at,
+            np.random.SeedSequence([world.seed, index]),
+            time_s + world.board.boot_time_s,
+        )
         for index, (name, truth) in enumerate(sorted(world.sensors.items()))
-    ]
+    }
+
+
+def power_up(world: WorldSection, sensors: Collection[SpiDevice], time_s: float) -> EmulatedBoard:
+    """A board that gets power at the virtual time `time_s` and starts `boot_time_s` later."""
     return EmulatedBoard(
         image=firmware("bin"),
         elf=firmware("elf"),
-        devices=devices,
+        devices=list(sensors),
         unique_id=bytes.fromhex(world.board.unique_id),
         crystal_ppm=world.board.crystal_ppm,
         boot_time_s=time_s + world.board.boot_time_s,
     )
 
 
-def _gyroscope(
-    sensor: SensorSection, truth: SimulatedSensorSection, flange_rate_at: RateAt, seed: np.random.SeedSequence
-) -> Lsm9ds1:
-    return Lsm9ds1(
-        sensor_rate(sensor, truth.mounting_error_deg, flange_rate_at),
-        GyroTruth(
-            truth.scale,
-            truth.bias_rad_s,
-            truth.noise_rad_s,
-            [radians(angle) for angle in truth.non_orthogonality_deg],
-        ),
-        temperature_c=truth.temperature_c,
-        seed=seed,
+def _sensor(
+    sensor: SensorSection,
+    simulated: SimulatedSensorSection,
+    flange_rate_at: RateAt,
+    seed: np.random.SeedSequence,
+    ready_s: float,
+) -> SpiDevice:
+    rate_at = sensor_rate(sensor, simulated.mounting_error_deg, flange_rate_at)
+    truth = GyroTruth(
+        simulated.scale,
+        simulated.bias_rad_s,
+        simulated.noise_rad_s,
+        [radians(angle) for angle in simulated.non_orthogonality_deg],
     )
+    temperature_c = simulated.temperature_c
+    match sensor.part:
+        case "lsm9ds1":
+            return Lsm9ds1(rate_at, truth, temperature_c=temperature_c, seed=seed)
+        case "mpu9250":
+            return Mpu9250(rate_at, truth, temperature_c=temperature_c, seed=seed)
+        case "adis16465":  # it comes in three variants, one for each range
+            return Adis16465(
+                rate_at,
+                truth,
+                temperature_c=temperature_c,
+                seed=seed,
+                range_deg_s=int(sensor.range_deg_s),
+                ready_s=ready_s,
+            )
 
 
 def sensor_rate(sensor: SensorSection, mounting_error_deg: Sequence[float], flange_rate_at: RateAt) -> RateAt:

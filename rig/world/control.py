@@ -8,12 +8,15 @@ A request is `{"do": NAME, …}`; the reply is one line, `{"ok": true, "time_s":
     pause · play · stop_program · speed_slider fraction · remote_control on
     register_in_use name · register_free name   an RTDE input that a fieldbus claims
     close_arm listen · silence_arm duration_s   the controller's sockets (the silence is in wall time)
+    sensor_fault sensor fault   absent, other_part (its identity) or damaged (a bit now and then); null: it is well
     unplug_board · plug_in_board · reset_board · silence_board on · host_baud baud (null: the board's own)
 """
 
 import json
 from collections.abc import Callable
 from typing import TYPE_CHECKING, Any
+
+from firmware_host.emulator.spi_device import Fault
 
 if TYPE_CHECKING:
     from rig.world.process import World
@@ -55,6 +58,7 @@ class ControlSession:
             "unplug_board": world.unplug_board,
             "plug_in_board": world.plug_in_board,
             "reset_board": self._reset_board,
+            "sensor_fault": self._sensor_fault,
             "silence_board": self._silence_board,
             "host_baud": self._host_baud,
         }
@@ -148,6 +152,9 @@ class ControlSession:
     def _reset_board(self) -> None:
         if self._world.laboratory.board is not None:
             self._world.laboratory.board.reset()
+
+    def _sensor_fault(self, sensor: str, fault: str | None) -> None:
+        self._world.laboratory.set_sensor_fault(sensor, None if fault is None else Fault(fault))
 
     def _silence_board(self, on: bool) -> None:
         """A cable that carries nothing, with its port still there."""

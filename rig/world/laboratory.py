@@ -4,9 +4,10 @@ from math import radians
 from random import Random
 
 from firmware_host.emulator.machine import EmulatedBoard
+from firmware_host.emulator.spi_device import Fault, SpiDevice
 from rig.config.models import RigConfig
 from rig.config.world_models import WorldSection
-from rig.world.board import power_up
+from rig.world.board import mount_sensors, power_up
 from rig.world.kinematics import Vector, flange_rate
 from rig.world.motion import Motion
 from rig.world.ripple import ripple
@@ -35,16 +36,31 @@ class Laboratory:
             arm.speed_slider,
         )
         self.board: EmulatedBoard | None = None  # None: without power
+        self._sensors: dict[str, SpiDevice] = {}
+        self._faults: dict[str, Fault | None] = dict.fromkeys(world.sensors)
         self.plug_in()
 
     def plug_in(self) -> None:
         """Give the board power, if it has none."""
         if self.board is None:
-            self.board = power_up(self._config, self._world, self._flange_rate_at, self.robot.time_s)
+            time_s = self.robot.time_s
+            self._sensors = mount_sensors(self._config, self._world, self._flange_rate_at, time_s)
+            for name, fault in self._faults.items():
+                self._sensors[name].fault = fault
+            self.board = power_up(self._world, self._sensors.values(), time_s)
 
     def unplug(self) -> None:
         """Take the board's power away."""
         self.board = None
+
+    def set_sensor_fault(self, name: str, fault: Fault | None) -> None:
+        """Break the sensor called `name` in the configuration, or mend it. It stays so without power too.
+
+        Raises ValueError when there is no such sensor.
+        """
+        if name not in self._faults:
+            raise ValueError(f"no sensor {name!r}; there are {', '.join(self._faults)}")
+        self._faults[name] = self._sensors[name].fault = fault
 
     def step(self) -> None:
         """One tick of everything. Raises BoardError when the firmware broke a rule of the chip."""

@@ -1,0 +1,278 @@
+"""The ADIS16465's gyroscope and thermometer at register level (Analog Devices data sheet ADIS16465).
+
+What the data sheet leaves open is taken from the maker's own driver (no-OS, drivers/imu/adis1646x.c: update times,
+defaults) and from Linux (drivers/iio/imu/adis16475.c: 32-bit format, burst, checksum).
+"""
+
+import math
+from collections.abc import Callable, Sequence
+
+import numpy as np
+
+from firmware_host.emulator.bus import Violation
+from firmware_host.emulator.gyroscope import Gyroscope, GyroTruth, saturated
+from firmware_host.emulator.spi_device import Fault
+
+PROD_ID = 0x4051
+_ADIS16470 = 0x4056
+_DIAG_STAT, _X_GYRO_LOW, _X_ACCL_LOW, _TEMP_OUT, _DATA_CNTR = 0x02, 0x04, 0x10, 0x1C, 0x22
+_FILT_CTRL, _RANG_MDL, _MSC_CTRL, _DEC_RATE, _GLOB_CMD, _PROD_ID = 0x5C, 0x5E, 0x60, 0x64, 0x68, 0x72
+# Registers that can be written, with their values after reset and the bits that have a model. Writing a one to any
+# other bit that is zero after reset fails the run: it would switch on a correction or clock that is not simulated.
+_RESET_AND_BITS = {
+    **dict.fromkeys(range(0x40, 0x58, 2), (0x0000, 0x0000)),  # bias corrections
+    _FILT_CTRL: (0x0000, 0x0007),
+    _MSC_CTRL: (0x00C1, 0x00C1),  # data-ready polarity, alignment and acceleration compensation; no sync
+    0x62: (0x07D0, 0x07D0),  # UP_SCALE
+    _DEC_RATE: (0x0000, 0x07FF),
+    0x66: (0x070A, 0x070A),  # NULL_CNFG
+}
+# A setting acts, and reads back, only so long after its last byte was written (no-OS, adis1646x_timeouts)
+_UPDATE_S = {_FILT_CTRL: 30e-6, _DEC_RATE: 30e-6, _MSC_CTRL: 200e-6}
+_DR_ACTIVE_HIGH = 0x0001
+_SPI_ERROR = 1 << 3  # DIAG_STAT
+_SOFTWARE_RESET = 0x80
+_MAX_FILTER, _MAX_DEC_RATE = 6, 1999
+_RANGES = {125: (0x0003, 160), 500: (0x0007, 40), 2000: (0x000F, 10)}  # °/s: RANG_MDL, LSB per °/s
+_COUNTS_PER_G = 4000
+_RATE_HZ = 2000
+_STALL_S = 16e-6  # data sheet, table 2, tSTALL
+_RESET_S = 0.255  # no-OS: after a software reset
+_UPDATING_S = 20e-6  # the data-ready line rests so long while the registers change: the model's own, no figure known
+_BURST_WORDS = 10
+
+
+class Adis16465:
+    """The module on the SPI bus, in the variant of the range `range_deg_s`: 125 (-1), 500 (-2) or 2000 (-3).
+
+    `rate_at(time_s)`: true angular rate in the part's own axes, 3 floats, rad/s; asked once for each update of the
+    output registers, at the instant of the update. `temperature_c`: of the module. `seed`: of the noise, which is
+    drawn per update. `oscillator_ppm`: how fast its sample clock runs. `ready_s`: when it has started up (the maker's
+    driver allows 310 ms from power-up); before, it is silent.
+
+    The part samples from power-up on and cannot be told to be quiet. With averaging (DEC_RATE, FILT_CTRL) its rates
+    have 32 bits, and the upper 16 alone, which a burst carries, are rounded down. Averages and filters themselves are
+    not simulated: `truth` states the noise of an output. There is no gravity in the laboratory: the accelerometer
+    shows the part at rest with z up.
+    """
+
+    name = "ADIS16465"
+    spi_modes = (3,)
+
+    def __init__(
+        self,
+        rate_at: Callable[[float], Sequence[float]],
+        truth: GyroTruth,
+        *,
+        temperature_c: float,
+        seed: int | np.random.SeedSequence,
+        oscillator_ppm: float = 0.0,
+        chip_select: str = "PA4",
+        interrupt: str = "PA1",
+        range_deg_s: int = 500,
+        ready_s: float = 0.0,
+    ) -> None:
+        self.chip_select = chip_select
+        self.interrupt = interrupt
+        self.fault: Fault | None = None
+        self._range_model, counts_per_deg_s = _RANGES[range_deg_s]
+        self._per_count = math.radians(1 / counts_per_deg_s) / 65536  # of the 32-bit number
+        self._gyroscope = Gyroscope(rate_at, truth, seed)
+        self._speed = 1 + oscillator_ppm * 1e-6
+        self._temperature = saturated(round(temperature_c * 10)) & 0xFFFF
+        self._command: int | None = None  # first byte of the frame under way
+        self._burst: bytes | None = None  # what is left to be clocked out
+        self._answer = 0  # to the frame before
+        self._ended_s = -math.inf  # when chip select last rose
+        self._frames = 0  # since chip select fell
+        self._diagnosis = 0
+        self._counter = 0
+        self._data_valid = False
+        self._next_update_s = self._next_change_s = math.inf
+        self._reset(ready_s)
+
+    # --- what the board sees
+
+    @property
+    def spi_max_hz(self) -> float:
+        """A burst goes at 1 MHz, all else at 2 MHz (data sheet, table 2)."""
+        return 1e6 if self._burst is not None or self._command == _GLOB_CMD else 2e6
+
+    @property
+    def next_event_s(self) -> float:
+        return self._next_change_s
+
+    @property
+    def interrupt_level(self) -> bool:
+        active_high = bool(self._registers[_MSC_CTRL] & _DR_ACTIVE_HIGH)
+        return self._data_valid == active_high
+
+    def advance(self, time_s: float) -> None:
+        while self._next_change_s <= time_s:
+            now_s = self._next_change_s
+            self._settle_settings(now_s)
+            if self._data_valid:
+                self._data_valid = False
+                self._next_change_s = self._next_update_s
+            else:
+                self._update(now_s)
+
+    def select(self, time_s: float) -> None:
+        self._frames = 0
+        self._command = self._burst = None
+
+    def deselect(self, time_s: float) -> None:
+        if self._command is not None:  # in the middle of a frame (data sheet, table of DIAG_STAT's bits)
+            self._diagnosis |= _SPI_ERROR
+        self._command = self._burst = None
+        self._ended_s = time_s
+
+    def transfer(self, byte: int, time_s: float) -> int:
+        if time_s < self._usable_s:
+            return 0xFF
+        if self._burst is not None:
+            return self._continue_burst()
+        if self._command is None:
+            self._check_pause(time_s)
+            self._command = byte
+            return self._answer >> 8
+        answer, self._answer = self._answer & 0xFF, 0
+        address, self._command = self._command, None
+        self._frames += 1
+        self._settle_settings(time_s)
+        if address & 0x80:
+            self._write(address & 0x7F, byte, time_s)
+        elif address == _GLOB_CMD:
+            self._burst = self._burst_data()
+        else:
+            self._answer = self._read(address & ~1)
+        return answer
+
+    # --- frames
+
+    def _check_pause(self, time_s: float) -> None:
+        if self._frames or time_s - self._ended_s < _STALL_S:
+            pause = "no pause" if self._frames else f"{1e6 * (time_s - self._ended_s):.1f} µs"
+            raise Violation(
+                "spi_stall",
+                f"the ADIS16465 gets its next 16-bit frame {pause} after the last",
+                f"Raise chip select for {1e6 * _STALL_S:g} µs between frames",
+            )
+
+    def _burst_data(self) -> bytes:
+        words = [self._diagnosis, *(self._rate(axis) >> 16 for axis in range(3)), 0, 0, _COUNTS_PER_G]
+        data = b"".join((word & 0xFFFF).to_bytes(2, "big") for word in (*words, self._temperature, self._counter))
+        self._diagnosis = 0
+        return data + (sum(data) & 0xFFFF).to_bytes(2, "big")
+
+    def _continue_burst(self) -> int:
+        if not self._burst:
+            raise Violation(
+                "spi_frame",
+                f"the ADIS16465 is asked for more than the {_BURST_WORDS} words of a burst",
+                "Raise chip select after 22 bytes",
+            )
+        answer, self._burst = self._burst[0], self._burst[1:]
+        return answer
+
+    # --- registers
+
+    def _reset(self, time_s: float) -> None:
+        self._registers = {address: initial for address, (initial, _bits) in _RESET_AND_BITS.items()}
+        self._waiting: dict[int, tuple[float, int]] = {}  # address → when a setting acts, its value
+        self._diagnosis = self._counter = 0
+        self._counts = [0, 0, 0]  # 32 bits each
+        self._answer = 0
+        self._data_valid = False
+        self._usable_s = time_s
+        self._samples = 1  # of the internal 2000 Hz until the next update
+        self._next_update_s = time_s + self._sample_time(1)
+        self._next_change_s = self._next_update_s
+
+    def _read(self, address: int) -> int:
+        if address in self._registers:
+            return self._registers[address]
+        if address == _DIAG_STAT:
+            diagnosis, self._diagnosis = self._diagnosis, 0
+            return diagnosis
+        if _X_GYRO_LOW <= address < _X_ACCL_LOW:
+            axis, high = divmod(address - _X_GYRO_LOW, 4)
+            return self._rate(axis) >> (16 if high else 0) & 0xFFFF
+        fixed = {
+            **dict.fromkeys(range(_X_ACCL_LOW, _TEMP_OUT, 2), 0),
+            0x1A: _COUNTS_PER_G,  # Z_ACCL_OUT
+            _TEMP_OUT: self._temperature,
+            _DATA_CNTR: self._counter,
+            _RANG_MDL: self._range_model,
+            _PROD_ID: _ADIS16470 if self.fault is Fault.OTHER_PART else PROD_ID,
+        }
+        if address not in fixed:
+            raise Violation(
+                "unmodelled_register", f"read of ADIS16465 register 0x{address:02X}", "Model it in adis16465.py"
+            )
+        return fixed[address]
+
+    def _write(self, address: int, byte: int, time_s: float) -> None:
+        """One byte of a register; an odd address is its upper byte."""
+        register, shift = address & ~1, 8 * (address & 1)
+        if register == _GLOB_CMD:
+            self._command_part(byte << shift, time_s)
+            return
+        if register not in _RESET_AND_BITS:
+            raise Violation(
+                "unmodelled_register", f"write to ADIS16465 register 0x{address:02X}", "Model it in adis16465.py"
+            )
+        _when, before = self._waiting.get(register, (0.0, self._registers[register]))
+        value = before & ~(0xFF << shift) | byte << shift
+        if value & ~_RESET_AND_BITS[register][1]:
+            raise Violation(
+                "unmodelled_bits",
+                f"ADIS16465 register 0x{register:02X} = 0x{value:04X} sets bits that are not modelled",
+                "Clear them in the firmware, or model them in adis16465.py",
+            )
+        self._waiting[register] = time_s + _UPDATE_S.get(register, 0.0), value
+
+    def _command_part(self, value: int, time_s: float) -> None:
+        if value & ~_SOFTWARE_RESET:
+            raise Violation(
+                "unmodelled_bits",
+                f"ADIS16465 GLOB_CMD = 0x{value:04X}: only the software reset is modelled",
+                "Model it",
+            )
+        if value:
+            self._reset(time_s + _RESET_S)
+
+    def _settle_settings(self, time_s: float) -> None:
+        """Let the settings act whose time has come."""
+        for register, (when_s, value) in list(self._waiting.items()):
+            if when_s <= time_s:
+                del self._waiting[register]
+                self._registers[register] = value
+                self._check_setting(register, value)
+
+    def _check_setting(self, register: int, value: int) -> None:
+        limit = {_FILT_CTRL: _MAX_FILTER, _DEC_RATE: _MAX_DEC_RATE}.get(register, value)
+        if value > limit:
+            raise Violation(
+                "sensor_setup", f"ADIS16465 register 0x{register:02X} = {value}: the most is {limit}", "Use less"
+            )
+
+    # --- measuring
+
+    def _sample_time(self, samples: int) -> float:
+        return samples / (_RATE_HZ * self._speed)
+
+    def _update(self, time_s: float) -> None:
+        """New output registers; the data-ready line tells of them and rests shortly before the next."""
+        self._counts = [saturated(round(rate / self._per_count), bits=32) for rate in self._gyroscope.read(time_s)]
+        self._counter = self._counter + 1 & 0xFFFF
+        self._data_valid = True
+        self._samples += 1 + self._registers[_DEC_RATE]
+        self._next_update_s = self._usable_s + self._sample_time(self._samples)
+        self._next_change_s = self._next_update_s - _UPDATING_S
+
+    def _rate(self, axis: int) -> int:
+        """As the 32-bit register pair shows it: without averaging, the lower 16 bits are empty."""
+        if self._registers[_DEC_RATE] or self._registers[_FILT_CTRL]:
+            return self._counts[axis]
+        return saturated(self._counts[axis] + 0x8000 >> 16) << 16

@@ -1,0 +1,242 @@
+"""The MPU-9250's gyroscope and thermometer at register level (product specification PS-MPU-9250A-01, register map
+RM-MPU-9250A-00). Its magnetometer, FIFO, I2C master and motion processor are left out.
+"""
+
+import math
+from collections.abc import Callable, Sequence
+
+import numpy as np
+
+from firmware_host.emulator.bus import Violation
+from firmware_host.emulator.gyroscope import Gyroscope, GyroTruth, saturated
+from firmware_host.emulator.spi_device import Fault
+
+WHO_AM_I = 0x71
+_MPU6500 = 0x70  # what the part without magnetometer answers
+_SMPLRT_DIV, _CONFIG, _GYRO_CONFIG, _ACCEL_CONFIG = 0x19, 0x1A, 0x1B, 0x1C
+_INT_PIN_CFG, _INT_ENABLE, _INT_STATUS = 0x37, 0x38, 0x3A
+_ACCEL_XOUT_H, _GYRO_ZOUT_L = 0x3B, 0x48
+_PWR_MGMT_1, _WHO_AM_I = 0x6B, 0x75
+# Values after reset (register map, section 3) and the bits that have a model. Writing one to any other bit fails the
+# run: it would switch on a self-test, FIFO, filter or bus that is not simulated.
+_RESET_AND_BITS = {
+    **dict.fromkeys(range(0x13, 0x19), (0x00, 0x00)),  # gyroscope offsets, which would shift the bias
+    _SMPLRT_DIV: (0x00, 0xFF),
+    _CONFIG: (0x00, 0x07),  # DLPF_CFG
+    _GYRO_CONFIG: (0x00, 0x1B),  # GYRO_FS_SEL, FCHOICE_B
+    _ACCEL_CONFIG: (0x00, 0x18),  # ACCEL_FS_SEL
+    0x1D: (0x00, 0x0F),  # ACCEL_CONFIG2: its filter changes nothing about an accelerometer at rest
+    0x1E: (0x00, 0x00),  # LP_ACCEL_ODR
+    0x1F: (0x00, 0x00),  # WOM_THR
+    0x23: (0x00, 0x00),  # FIFO_EN
+    0x24: (0x00, 0x00),  # I2C_MST_CTRL
+    _INT_PIN_CFG: (0x00, 0x30),  # LATCH_INT_EN, INT_ANYRD_2CLEAR; active high, push-pull
+    _INT_ENABLE: (0x00, 0x01),  # RAW_RDY_EN
+    0x67: (0x00, 0x00),  # I2C_MST_DELAY_CTRL
+    0x69: (0x00, 0x00),  # MOT_DETECT_CTRL
+    0x6A: (0x00, 0x10),  # USER_CTRL: I2C_IF_DIS
+    _PWR_MGMT_1: (0x01, 0xC1),  # H_RESET, SLEEP, CLKSEL 0 and 1
+    0x6C: (0x00, 0x00),  # PWR_MGMT_2: all axes on
+}
+_H_RESET, _SLEEP = 0x80, 0x40
+_LATCH_INT_EN, _INT_ANYRD_2CLEAR, _RAW_RDY = 0x20, 0x10, 0x01
+_COUNTS_PER_DEG_S = (131.0, 65.5, 32.8, 16.4)  # specification, table 1; 250, 500, 1000, 2000 °/s
+_COUNTS_PER_G = (16384, 8192, 4096, 2048)  # specification, table 2
+_COUNTS_PER_DEG_C, _ROOM_C = 333.87, 21.0  # specification, table 3, and register map, section 4.23
+_PULSE_S = 50e-6  # of the interrupt line when it is not latched (register map, register 55)
+_RESET_S = 0.1  # specification, table 3: registers can be read and written after 11 ms, at most 100 ms
+_START_S = 0.035  # specification, table 1: the gyroscope after it left sleep
+
+
+class Mpu9250:
+    """The die with accelerometer and gyroscope on the SPI bus.
+
+    `rate_at(time_s)`: true angular rate in the part's own axes, 3 floats, rad/s; asked once for each conversion, at
+    the instant of the conversion. `temperature_c`: die temperature. `seed`: of the noise, which is drawn per
+    conversion. `oscillator_ppm`: how fast the part's own oscillator makes its data rate; the specification allows a
+    percent.
+
+    The part runs from power-up, but here it converts only while its data-ready interrupt is enabled; reading data
+    without it fails the run. Filters have neither effect nor delay, except that the turn rate comes in linearly while
+    the gyroscope starts. There is no gravity in the laboratory: the accelerometer shows the part at rest with z up.
+    """
+
+    name = "MPU-9250"
+    spi_modes = (0, 3)
+
+    def __init__(
+        self,
+        rate_at: Callable[[float], Sequence[float]],
+        truth: GyroTruth,
+        *,
+        temperature_c: float,
+        seed: int | np.random.SeedSequence,
+        oscillator_ppm: float = 0.0,
+        chip_select: str = "PB0",
+        interrupt: str = "PA12",
+    ) -> None:
+        self.chip_select = chip_select
+        self.interrupt = interrupt
+        self.fault: Fault | None = None
+        self._gyroscope = Gyroscope(rate_at, truth, seed)
+        self._speed = 1 + oscillator_ppm * 1e-6
+        temperature = saturated(round((temperature_c - _ROOM_C) * _COUNTS_PER_DEG_C))
+        self._temperature = temperature.to_bytes(2, "big", signed=True)
+        self._address: int | None = None  # None: the next byte is the address
+        self._reading = False
+        self._pin = False
+        self._latest = self._output = b""
+        self._next_conversion_s = self._pulse_end_s = math.inf
+        self._reset()
+        self._awake_s = -math.inf
+        self._usable_s = -math.inf
+
+    # --- what the board sees
+
+    @property
+    def spi_max_hz(self) -> float:
+        """Sensor and interrupt data may be read at 20 MHz, all else goes at 1 MHz (specification, section 7.5)."""
+        data = self._reading and self._first >= _INT_STATUS and self._first <= _GYRO_ZOUT_L
+        return 20e6 if data else 1e6
+
+    @property
+    def next_event_s(self) -> float:
+        return min(self._next_conversion_s, self._pulse_end_s)
+
+    @property
+    def interrupt_level(self) -> bool:
+        return self._pin
+
+    def advance(self, time_s: float) -> None:
+        while self.next_event_s <= time_s:
+            if self._pulse_end_s <= self._next_conversion_s:
+                self._pin = False
+                self._pulse_end_s = math.inf
+            else:
+                self._conversions += 1
+                self._convert(self._next_conversion_s)
+                self._next_conversion_s = self._started_s + (self._conversions + 1) * self._period_s
+
+    def select(self, time_s: float) -> None:
+        self._address = None
+        self._output = self._latest  # the registers stand still while the bus is in use (register map, section 4.22)
+
+    def deselect(self, time_s: float) -> None:
+        self._address = None
+
+    def transfer(self, byte: int, time_s: float) -> int:
+        if self._address is None:
+            self._reading = bool(byte & 0x80)
+            self._address = self._first = byte & 0x7F
+            return 0xFF
+        address = self._address
+        self._address = address + 1 & 0x7F
+        if time_s < self._usable_s:
+            raise Violation(
+                "sensor_setup",
+                f"MPU-9250 register 0x{address:02X} accessed {1e3 * (time_s - self._usable_s + _RESET_S):.1f} ms after "
+                f"its reset",
+                f"Wait {1e3 * _RESET_S:g} ms",
+            )
+        if self._reading:
+            return self._read(address)
+        self._write(address, byte, time_s)
+        return 0xFF
+
+    # --- registers
+
+    def _reset(self) -> None:
+        self._registers = {address: initial for address, (initial, _bits) in _RESET_AND_BITS.items()}
+        self._status = 0
+        self._pin = False
+        self._pulse_end_s = math.inf
+        self._first = 0  # register that the access under way began with
+        self._latest = self._output = bytes(14)  # ACCEL_XOUT_H … GYRO_ZOUT_L
+        self._stop()
+
+    def _read(self, address: int) -> int:
+        status = self._status
+        if address == _INT_STATUS or self._registers[_INT_PIN_CFG] & _INT_ANYRD_2CLEAR:
+            self._status = 0
+            if self._registers[_INT_PIN_CFG] & _LATCH_INT_EN:
+                self._pin = False
+        if address in self._registers:
+            return self._registers[address]
+        if address == _WHO_AM_I:
+            return _MPU6500 if self.fault is Fault.OTHER_PART else WHO_AM_I
+        if not _INT_STATUS <= address <= _GYRO_ZOUT_L:
+            raise Violation(
+                "unmodelled_register", f"read of MPU-9250 register 0x{address:02X}", "Model it in mpu9250.py"
+            )
+        if not self._registers[_INT_ENABLE] & _RAW_RDY:
+            raise Violation(
+                "sensor_setup",
+                f"MPU-9250 register 0x{address:02X} read while RAW_RDY_EN is clear: it converts only while that is set",
+                "Set INT_ENABLE first, or model conversions that nobody is told of in mpu9250.py",
+            )
+        return status if address == _INT_STATUS else self._output[address - _ACCEL_XOUT_H]
+
+    def _write(self, address: int, value: int, time_s: float) -> None:
+        if address not in _RESET_AND_BITS:
+            raise Violation(
+                "unmodelled_register", f"write to MPU-9250 register 0x{address:02X}", "Model it in mpu9250.py"
+            )
+        _initial, bits = _RESET_AND_BITS[address]
+        if value & ~bits:
+            raise Violation(
+                "unmodelled_bits",
+                f"MPU-9250 register 0x{address:02X} = 0x{value:02X} sets bits that are not modelled",
+                "Clear them in the firmware, or model them in mpu9250.py",
+            )
+        if address == _PWR_MGMT_1 and value & _H_RESET:
+            self._reset()
+            self._usable_s = time_s + _RESET_S
+            self._awake_s = time_s
+            return
+        before, self._registers[address] = self._registers[address], value
+        if value == before:
+            return
+        if address == _PWR_MGMT_1 and before & _SLEEP and not value & _SLEEP:
+            self._awake_s = time_s
+        if address in (_SMPLRT_DIV, _CONFIG, _GYRO_CONFIG, _INT_ENABLE, _PWR_MGMT_1):
+            self._start(time_s)
+
+    def _stop(self) -> None:
+        self._next_conversion_s = math.inf
+
+    def _start(self, time_s: float) -> None:
+        """Conversions begin anew, if the part is to convert at all."""
+        registers = self._registers
+        if registers[_PWR_MGMT_1] & _SLEEP or not registers[_INT_ENABLE] & _RAW_RDY:
+            self._stop()
+            return
+        self._conversions = 0
+        self._started_s = time_s
+        self._period_s = 1 / (self._rate_hz() * self._speed)
+        self._next_conversion_s = time_s + self._period_s
+        self._per_count = math.radians(1 / _COUNTS_PER_DEG_S[registers[_GYRO_CONFIG] >> 3 & 3])
+
+    def _rate_hz(self) -> float:
+        """Register map, registers 25 to 27: the divider acts on the output of the filters 1 to 6 only."""
+        registers = self._registers
+        if registers[_GYRO_CONFIG] & 0x03:  # FCHOICE_B: around the filters
+            return 32_000.0
+        if registers[_CONFIG] in (0, 7):
+            return 8_000.0
+        return 1_000.0 / (1 + registers[_SMPLRT_DIV])
+
+    # --- measuring
+
+    def _convert(self, time_s: float) -> None:
+        """One conversion of all axes, as the output registers will show it from the next access on."""
+        settled = min(1.0, (time_s - self._awake_s) / _START_S)
+        upright = _COUNTS_PER_G[self._registers[_ACCEL_CONFIG] >> 3 & 3]
+        rates = b"".join(
+            saturated(round(rate_rad_s / self._per_count)).to_bytes(2, "big", signed=True)
+            for rate_rad_s in self._gyroscope.read(time_s, settled)
+        )
+        self._latest = bytes(4) + upright.to_bytes(2, "big") + self._temperature + rates
+        self._status = _RAW_RDY
+        self._pin = True
+        if not self._registers[_INT_PIN_CFG] & _LATCH_INT_EN:
+            self._pulse_end_s = time_s + _PULSE_S
