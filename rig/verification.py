@@ -135,9 +135,8 @@ def compare(runs: Sequence[RunData], sensor: str, reference: Reference, rotation
 
     Raises Fault `nothing_to_compare`, `no_overlap`, `different_clocks`, and as `observe` does.
     """
+    turns, of_reference = _revolutions(runs, sensor), _revolutions(runs, reference.name)
     parts = [_part(run, sensor, reference, rotation) for run in runs if finished_sweeps(run)]
-    if not parts:
-        raise Fault("nothing_to_compare", "no sweep was finished in the recording", "Let the whole movement finish")
     return Comparison(
         time_s=np.concatenate([part.time_s for part in parts]),
         reading_rad_s=np.concatenate([part.reading for part in parts]),
@@ -145,9 +144,7 @@ def compare(runs: Sequence[RunData], sensor: str, reference: Reference, rotation
         movement=_deviation([part.error[part.sweeping | part.resting] for part in parts]),
         sweeps=_deviation([part.error[part.sweeping] for part in parts]),
         noise_rad_s=_noise([part.error[rest] for part in parts for rest in part.still]),
-        revolutions=_revolution_errors(
-            _revolutions(runs, sensor), _revolutions(runs, reference.name), reference, rotation
-        ),
+        revolutions=_revolution_errors(turns, of_reference, reference, rotation),
         delay_s=tuple(part.delay_s for part in parts),
         delay_std_s=tuple(part.delay_std_s for part in parts),
     )
@@ -262,7 +259,10 @@ def _noise(rests: Sequence[Array]) -> Array | None:
 
 def _revolutions(runs: Sequence[RunData], sensor: str) -> list[Observation]:
     settings = parse(runs[0].config, "the recorded configuration").config.observation
-    return [turn for part in observe_runs(runs, sensor, settings) for turn in part.revolutions]
+    turns = [turn for part in observe_runs(runs, sensor, settings) for turn in part.revolutions]
+    if not turns:
+        raise Fault("nothing_to_compare", "no sweep was finished in the recording", "Let the whole movement finish")
+    return turns
 
 
 def _revolution_errors(

@@ -30,18 +30,26 @@ class Stored:
 TRUTH = Stored(np.array(SCALE), np.array(BIAS_RAD_S))
 
 
-def recording(setup: Setup, *, stored: Stored | None = None, reference: Setup = REFERENCE, lag_s: float = 0.0) -> RunData:
-    """Sensors `gyro` and `reference`; `stored` is what the board corrects the gyro's readings with, None leaves them raw.
+def recording(
+    setup: Setup,
+    *,
+    stored: Stored | None = None,
+    reference: Setup = REFERENCE,
+    lag_s: float = 0.0,
+    axes: Array | None = None,
+) -> RunData:
+    """Sensors `gyro` and `reference`; the board corrects the gyro's readings by `stored`; None leaves them raw.
 
-    The gyro's filter lags the reference's by `lag_s`.
+    The gyro's filter lags the reference's by `lag_s`; `axes` (3, 3) are what it feels in place of the flange's.
     """
+    skew = {"gyro": np.eye(3) if axes is None else axes, "reference": np.eye(3)}
     rng = np.random.default_rng(setup.seed)
     motion = Motion(setup, rng)
     runs = {}
     for name, part in (("gyro", setup), ("reference", replace(reference, boot_s=setup.boot_s))):
         board_s, controller_s = sample_times(part, motion)
         felt = true_rate(motion, controller_s - (lag_s if name == "gyro" else 0.0))
-        runs[name] = run_data(setup, motion, board_s, readings(part, felt, rng))
+        runs[name] = run_data(setup, motion, board_s, readings(part, felt @ skew[name].T, rng))
     run = runs["gyro"]
     sensors = {**run.sensors, "reference": replace(run.sensors["gyro"], part="adis16465", rate_hz=200.0)}
     samples = {**run.samples, "reference": runs["reference"].samples["gyro"]}

@@ -1,5 +1,6 @@
 """A verification's plots, in the manner of SIX, Figs. 7–10: sensor and reference over time, before and after."""
 
+from collections.abc import Iterable
 from pathlib import Path
 from typing import TYPE_CHECKING
 
@@ -10,35 +11,39 @@ from rig.verification import Comparison, Verification
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
-HOW_TO_GET_FIGURES = "no figures: install the extra with pip install 'calibration-rig[study]', then `rig report`"
 
+def write_figures(verifications: Iterable[Verification], folder: Path) -> str:
+    """Draw `verification_<sensor>_before` (where there is one) and `…_after`, each as PNG and SVG, into `folder`.
 
-def write_figures(verification: Verification, folder: Path) -> tuple[Path, ...]:
-    """`verification_<sensor>_before` (where there is one) and `…_after`, each as PNG and SVG; the paths written.
-
-    Raises ImportError where matplotlib, which an extra brings, is not installed.
+    Returns what to tell the operator: the files, or how to get them where matplotlib, which an extra brings, is absent.
     """
-    written: list[Path] = []
-    for when, comparison in (("before", verification.before), ("after", verification.after)):
-        if comparison is not None:
-            written += _write(verification, when, comparison, folder / f"verification_{verification.sensor}_{when}")
-    return tuple(written)
+    try:
+        import matplotlib  # noqa: F401
+    except ImportError:
+        return "no plots: they need matplotlib, install the extra with pip install 'calibration-rig[study]'"
+    written = [
+        _write(verification, when, comparison, folder)
+        for verification in verifications
+        for when, comparison in (("before", verification.before), ("after", verification.after))
+        if comparison is not None
+    ]
+    return f"plotted: {', '.join(written)} (.png, .svg)"
 
 
-def _write(verification: Verification, when: str, comparison: Comparison, path: Path) -> list[Path]:
+def _write(verification: Verification, when: str, comparison: Comparison, folder: Path) -> str:
     import matplotlib as mpl
     from matplotlib.figure import Figure
 
-    paths = [path.with_suffix(suffix) for suffix in (".png", ".svg")]
+    name = f"verification_{verification.sensor}_{when}"
     with mpl.rc_context({"font.size": 9, "svg.hashsalt": "rig", "axes.grid": True, "grid.alpha": 0.3}):
         figure = Figure(figsize=(10.0, 7.5), layout="constrained")
         _draw(figure, comparison, verification.sensor, verification.reference.name)
         figure.suptitle(
             f"{verification.sensor} {when} calibration, beside {verification.reference.name}; RMS of sweeps and rests"
         )
-        for file in paths:
-            figure.savefig(file, dpi=110, metadata={"Date": None} if file.suffix == ".svg" else {})
-    return paths
+        figure.savefig(folder / f"{name}.png", dpi=110)
+        figure.savefig(folder / f"{name}.svg", dpi=110, metadata={"Date": None})
+    return name
 
 
 def _draw(figure: "Figure", comparison: Comparison, sensor: str, reference: str) -> None:
