@@ -40,6 +40,15 @@ def refusing() -> Iterator[None]:
         raise Refused(error.name, error.what, error.remedy) from error
 
 
+@contextmanager
+def changing() -> Iterator[None]:
+    """What goes wrong while the board is being changed is no refusal any more."""
+    try:
+        yield
+    except BoardError as error:
+        raise Fault(error.name, error.what, error.remedy) from error
+
+
 def refuse_other_firmware(identity: BoardIdentity) -> None:
     """Raises Refused `firmware_version` unless the board runs the image that comes with this program."""
     if identity.firmware != FIRMWARE_VERSION:

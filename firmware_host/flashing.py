@@ -1,0 +1,208 @@
+"""Puts the shipped image onto a Nucleo-L432KC: through its debug probe, or by a copy to the drive it shows over USB."""
+
+import contextlib
+import io
+import os
+import re
+import struct
+import sys
+import time
+from collections.abc import Iterable
+from importlib import resources
+from pathlib import Path
+from typing import Any
+
+from firmware_host.errors import BoardError
+from firmware_host.protocol import FIRMWARE_VERSION
+
+TARGET = "stm32l432kc"
+FLASH_START = 0x0800_0000
+FLASH_BYTES = 256 * 1024
+CALIBRATION_BYTES = 6 * 2048  # the last pages: an image that reached into them would erase the calibrations
+RAM_START, RAM_BYTES = 0x2000_0000, 64 * 1024
+
+IMAGE_NAME = "rig_l432.bin"
+NUCLEO_CODE = "0770"  # of the Nucleo-L432KC in the link of its MBED.HTM, as in mbed-ls' table of platforms
+DRIVE_TIMEOUT_S = 20.0
+_POLL_S = 0.05
+
+
+def shipped_image() -> bytes:
+    """The image that comes with this program. Raises BoardError `bad_image` when it cannot be that."""
+    image = (resources.files("firmware_host") / "firmware" / "image" / IMAGE_NAME).read_bytes()
+    check_image(image)
+    return image
+
+
+def check_image(image: bytes) -> None:
+    """Raises BoardError `bad_image` unless `image` is firmware for this microcontroller, of this program's version."""
+    if len(image) < 8 or len(image) > FLASH_BYTES - CALIBRATION_BYTES:
+        raise _bad_image(f"it has {len(image)} bytes")
+    stack, entry = struct.unpack_from("<II", image)
+    if not RAM_START < stack <= RAM_START + RAM_BYTES or not FLASH_START < entry < FLASH_START + len(image):
+        raise _bad_image("it does not begin with the vectors of an STM32L432")
+    if FIRMWARE_VERSION.encode() + b"\0" not in image:
+        raise _bad_image(f"it is not of version {FIRMWARE_VERSION}")
+
+
+def _bad_image(why: str) -> BoardError:
+    return BoardError(
+        "bad_image",
+        f"{IMAGE_NAME} is not the image this program needs: {why}",
+        "Install the program again, or rebuild the image: `make -C firmware_host/firmware`",
+    )
+
+
+def find_probe(probe_id: str | None = None) -> Any:
+    """The only connected debug probe, or the one whose id contains `probe_id`: a pyocd probe with its `unique_id`.
+
+    Raises BoardError: flash_extra_missing, no_probe, several_probes.
+    """
+    try:
+        from pyocd.core.helpers import ConnectHelper
+    except ImportError as error:
+        raise BoardError(
+            "flash_extra_missing",
+            f"the library for debug probes is not installed ({error})",
+            "Install it with `pip install 'calibration-rig[flash]'`, or copy to the board's drive with --drive",
+        ) from error
+    probes = ConnectHelper.get_all_connected_probes(blocking=False, unique_id=probe_id)
+    if not probes:
+        raise BoardError(
+            "no_probe",
+            "no debug probe is connected" + (f" whose id contains {probe_id}" if probe_id else ""),
+            "Connect the Nucleo by USB and allow its use (udev rules), or copy to its drive with --drive",
+        )
+    if len(probes) > 1:
+        found = ", ".join(f"{probe.unique_id} ({probe.description})" for probe in probes)
+        raise BoardError("several_probes", f"several debug probes are connected: {found}", "Choose one with --probe ID")
+    return probes[0]
+
+
+def flash_by_probe(image: bytes, probe: Any) -> None:
+    """Program, read back and start `image` through a probe `find_probe` found. Raises BoardError `flash_failed`.
+
+    Erases only the pages the image needs, so stored calibrations stay.
+    """
+    from pyocd.core.exceptions import Error
+    from pyocd.core.session import Session
+
+    options = {"target_override": TARGET, "hide_programming_progress": True}
+    try:
+        with Session(probe, options=options) as session:
+            _program(session, image)
+    except Error as error:
+        raise BoardError(
+            "flash_failed",
+            f"the probe {probe.unique_id} could not program the board: {error}",
+            "Check the board's supply and try again",
+        ) from error
+
+
+def _program(session: Any, image: bytes) -> None:
+    from pyocd.flash.file_programmer import FileProgrammer
+
+    programmer = FileProgrammer(session, chip_erase="sector", trust_crc=False)
+    programmer.program(io.BytesIO(image), file_format="bin", base_address=FLASH_START)
+    if bytes(session.target.read_memory_block8(FLASH_START, len(image))) != image:
+        raise BoardError(
+            "flash_failed",
+            "the board's flash reads back otherwise than it was written",
+            "Try again; if that does not help, replace the board",
+        )
+    session.target.reset()
+
+
+def flash_by_drive(image: bytes, drive: Path, timeout_s: float = DRIVE_TIMEOUT_S) -> None:
+    """Copy `image` to the Nucleo's USB drive and wait until the board has taken it.
+
+    The drive is none: the probe programs what is copied, restarts the target, and shows the drive anew, with a
+    FAIL.TXT when it failed. Raises BoardError: no_drive, not_a_nucleo_drive, flash_failed, flash_unconfirmed.
+    """
+    refuse_other_drive(drive)
+    copied, failure = drive / IMAGE_NAME, drive / "FAIL.TXT"
+    try:
+        failure.unlink(missing_ok=True)  # of an earlier attempt
+        with copied.open("wb") as file:
+            file.write(image)
+            file.flush()
+            with contextlib.suppress(OSError):  # the drive may be gone already: then the board has it all
+                os.fsync(file.fileno())
+    except OSError as error:
+        raise BoardError(
+            "flash_failed", f"{drive} does not take the image: {error}", "Unplug the board, plug it in, and try again"
+        ) from error
+    deadline_s = time.monotonic() + timeout_s
+    while time.monotonic() < deadline_s:
+        try:
+            if failure.exists():
+                raise BoardError(
+                    "flash_failed",
+                    f"the board did not take the image: {' '.join(failure.read_text(errors='replace').split())}",
+                    "Unplug the board, plug it in, and try again, or flash through the probe",
+                )
+            if _is_mounted(drive) and not copied.exists():
+                return
+        except OSError:
+            pass  # the drive is just going or coming
+        time.sleep(_POLL_S)
+    raise BoardError(
+        "flash_unconfirmed",
+        f"the drive {drive} did not show within {timeout_s:g} s that the board has taken the image",
+        "Unplug the board, plug it in, and look with `rig board info`",
+    )
+
+
+def find_drive(candidates: Iterable[Path] | None = None) -> Path:
+    """The only Nucleo-L432KC's drive among `candidates`, by default all drives mounted here.
+
+    Raises BoardError: no_drive, several_drives.
+    """
+    found = [
+        drive for drive in (_mounted_drives() if candidates is None else candidates) if _code(drive) == NUCLEO_CODE
+    ]
+    if not found:
+        raise BoardError(
+            "no_drive",
+            "no drive of a Nucleo-L432KC is mounted",
+            "Connect the board by USB and open its drive once, or name the drive: --drive PATH",
+        )
+    if len(found) > 1:
+        listed = ", ".join(map(str, found))
+        raise BoardError("several_drives", f"several Nucleo boards show a drive: {listed}", "Choose one: --drive PATH")
+    return found[0]
+
+
+def refuse_other_drive(drive: Path) -> None:
+    """Raises BoardError `no_drive` or `not_a_nucleo_drive` unless `drive` is a Nucleo-L432KC's."""
+    if not drive.is_dir():
+        raise BoardError("no_drive", f"there is no drive {drive}", "Connect the board by USB and open its drive once")
+    code = _code(drive)
+    if code != NUCLEO_CODE:
+        seen = "it has no MBED.HTM" if code is None else f"its board's code is {code}, not {NUCLEO_CODE}"
+        raise BoardError(
+            "not_a_nucleo_drive",
+            f"{drive} is not the drive of a Nucleo-L432KC: {seen}",
+            "Name the drive called NODE_L432KC",
+        )
+
+
+def _is_mounted(drive: Path) -> bool:
+    return _code(drive) is not None
+
+
+def _code(drive: Path) -> str | None:
+    """The kind of board a drive belongs to, by the link in its MBED.HTM; None when it is no such drive."""
+    try:
+        page = (drive / "MBED.HTM").read_text(errors="replace")
+    except OSError:
+        return None
+    found = re.search(r"code=(\w{4})", page)
+    return found[1].upper() if found else "unknown"
+
+
+def _mounted_drives() -> list[Path]:
+    if sys.platform == "win32":
+        return [Path(f"{letter}:/") for letter in "DEFGHIJKLMNOPQRSTUVWXYZ"]
+    roots = ("/Volumes/*",) if sys.platform == "darwin" else ("/media/*", "/media/*/*", "/run/media/*/*", "/mnt/*")
+    return sorted(path for pattern in roots for path in Path("/").glob(pattern[1:]))

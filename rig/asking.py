@@ -1,0 +1,22 @@
+"""Asks the operator before something is done that cannot be taken back."""
+
+import sys
+from collections.abc import Sequence
+
+from rig.errors import Refused
+
+
+def ask_operator(announcement: Sequence[str], to_do: str = "start") -> bool:
+    """Show what will be done and wait for a yes; where there is no terminal, there is nobody to say it."""
+    for line in announcement:
+        print(line, file=sys.stderr)
+    if not sys.stdin.isatty():
+        return False
+    print(f"Type yes to {to_do}: ", end="", file=sys.stderr, flush=True)
+    return sys.stdin.readline().strip().lower() == "yes"
+
+
+def agreed_or_refused(announcement: Sequence[str], to_do: str, assume_yes: bool) -> None:
+    """Go on only if the operator agrees. Raises Refused `not_confirmed`."""
+    if not assume_yes and not ask_operator(announcement, to_do):
+        raise Refused("not_confirmed", "nobody agreed to the change", "Run again and agree, or give --yes")
