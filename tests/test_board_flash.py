@@ -1,0 +1,160 @@
+"""`rig board flash`: the shipped image, the drive a Nucleo shows over USB, and what is missing said by name."""
+
+import subprocess
+import sys
+import threading
+import time
+from collections.abc import Callable
+from pathlib import Path
+
+import pytest
+
+from firmware_host import flashing
+from firmware_host.errors import BoardError
+from firmware_host.protocol import FIRMWARE_VERSION
+
+PAGE = '<html><head><meta http-equiv="refresh" content="0; url=http://mbed.org/device/?code=%s0221066DFF53"/></head></html>'
+
+
+def drive(folder: Path, code: str = "0770") -> Path:
+    """A folder with the files a Nucleo's drive shows."""
+    folder.mkdir(parents=True)
+    (folder / "MBED.HTM").write_text(PAGE % code)
+    (folder / "DETAILS.TXT").write_text("Version: 0221\r\nBuild: Mar 30 2015 16:07:31\r\n")
+    return folder
+
+
+class Probe(threading.Thread):
+    """What stands behind the drive: takes the file that is copied there, and lets the drive come back without it."""
+
+    def __init__(self, folder: Path, failure: str | None = None) -> None:
+        super().__init__(daemon=True)
+        self.taken = b""
+        self._folder = folder
+        self._failure = failure
+        self._copied = folder / flashing.IMAGE_NAME
+
+    def run(self) -> None:
+        size = len(flashing.shipped_image())
+        while not self._copied.exists() or self._copied.stat().st_size < size:
+            time.sleep(0.002)
+        self.taken = self._copied.read_bytes()
+        gone = self._folder.rename(self._folder.with_name("unplugged"))
+        time.sleep(0.1)
+        (gone / flashing.IMAGE_NAME).unlink()
+        if self._failure:
+            (gone / "FAIL.TXT").write_text(self._failure)
+        gone.rename(self._folder)
+
+
+def refused(action: Callable[[], object]) -> BoardError:
+    with pytest.raises(BoardError) as caught:
+        action()
+    return caught.value
+
+
+def rig_board_flash(*arguments: str) -> subprocess.CompletedProcess[str]:
+    return subprocess.run(
+        [sys.executable, "-m", "rig", "board", "flash", *arguments],
+        capture_output=True,
+        text=True,
+        timeout=30,
+        check=False,
+        stdin=subprocess.DEVNULL,
+    )
+
+
+def test_the_shipped_image_is_of_the_version_the_program_needs() -> None:
+    assert FIRMWARE_VERSION.encode() in flashing.shipped_image()
+
+
+@pytest.mark.parametrize(
+    ("change", "why"),
+    [
+        (lambda image: b"", "0 bytes"),
+        (lambda image: image + bytes(flashing.FLASH_BYTES), "bytes"),
+        (lambda image: b"\x7fELF" + image, "vectors of an STM32L432"),
+        (lambda image: image.replace(FIRMWARE_VERSION.encode() + b"\0", b"9.9.9\0"), f"version {FIRMWARE_VERSION}"),
+    ],
+)
+def test_another_image_is_refused(change: Callable[[bytes], bytes], why: str) -> None:
+    error = refused(lambda: flashing.check_image(change(flashing.shipped_image())))
+    assert error.name == "bad_image" and why in error.what
+
+
+def test_the_drive_takes_the_image(tmp_path: Path) -> None:
+    nucleo = drive(tmp_path / "NODE_L432KC")
+    probe = Probe(nucleo)
+    probe.start()
+    flashing.flash_by_drive(flashing.shipped_image(), nucleo)
+    probe.join()
+    assert probe.taken == flashing.shipped_image()
+
+
+def test_an_earlier_failure_does_not_count(tmp_path: Path) -> None:
+    nucleo = drive(tmp_path / "NODE_L432KC")
+    (nucleo / "FAIL.TXT").write_text("of yesterday")
+    Probe(nucleo).start()
+    flashing.flash_by_drive(flashing.shipped_image(), nucleo)
+
+
+def test_what_the_board_says_of_its_failure_is_passed_on(tmp_path: Path) -> None:
+    nucleo = drive(tmp_path / "NODE_L432KC")
+    Probe(nucleo, "The interface firmware FAILED to reset/halt the target MCU\r\n").start()
+    error = refused(lambda: flashing.flash_by_drive(flashing.shipped_image(), nucleo))
+    assert error.name == "flash_failed" and "FAILED to reset/halt" in error.what and "\n" not in str(error)
+
+
+def test_a_board_that_does_not_take_the_image_is_not_taken_for_flashed(tmp_path: Path) -> None:
+    nucleo = drive(tmp_path / "NODE_L432KC")
+    error = refused(lambda: flashing.flash_by_drive(flashing.shipped_image(), nucleo, timeout_s=0.2))
+    assert error.name == "flash_unconfirmed" and "rig board info" in error.remedy
+
+
+def test_a_drive_that_is_full(tmp_path: Path) -> None:
+    nucleo = drive(tmp_path / "NODE_L432KC")
+    (nucleo / flashing.IMAGE_NAME).symlink_to("/dev/full")
+    error = refused(lambda: flashing.flash_by_drive(flashing.shipped_image(), nucleo))
+    assert error.name == "flash_failed" and "No space left" in error.what
+
+
+def test_the_drive_is_found_among_others(tmp_path: Path) -> None:
+    stick, other = tmp_path / "stick", drive(tmp_path / "NODE_F302R8", code="0705")
+    stick.mkdir()
+    nothing = refused(lambda: flashing.find_drive([stick, other, tmp_path / "none"]))
+    assert nothing.name == "no_drive" and "--drive PATH" in nothing.remedy
+
+    nucleo = drive(tmp_path / "NODE_L432KC")
+    assert flashing.find_drive([stick, other, nucleo]) == nucleo
+    second = drive(tmp_path / "NODE_L432KC1")
+    assert refused(lambda: flashing.find_drive([nucleo, second])).name == "several_drives"
+
+
+def test_another_drive_is_refused_by_name_before_anybody_is_asked(tmp_path: Path) -> None:
+    (tmp_path / "stick").mkdir()
+    drive(tmp_path / "NODE_F302R8", code="0705")
+    for name, error in (("stick", "not_a_nucleo_drive"), ("NODE_F302R8", "not_a_nucleo_drive"), ("none", "no_drive")):
+        done = rig_board_flash("--drive", str(tmp_path / name))
+        assert done.returncode == 2 and done.stderr.startswith(f"rig: {error}: "), done
+        assert done.stderr.count("\n") == 1
+    assert list((tmp_path / "stick").iterdir()) == []
+
+
+def test_nobody_to_ask_is_a_refusal_and_yes_is_an_answer(tmp_path: Path) -> None:
+    nucleo = drive(tmp_path / "NODE_L432KC")
+    done = rig_board_flash("--drive", str(nucleo))
+    assert done.returncode == 2 and "not_confirmed" in done.stderr and FIRMWARE_VERSION in done.stderr
+    assert not (nucleo / flashing.IMAGE_NAME).exists()
+
+    Probe(nucleo).start()
+    done = rig_board_flash("--drive", str(nucleo), "--yes")
+    assert done.returncode == 0 and f"flashed: firmware {FIRMWARE_VERSION}" in done.stdout, done
+
+
+def test_a_probe_that_is_not_there_is_named(monkeypatch: pytest.MonkeyPatch) -> None:
+    error = refused(lambda: flashing.find_probe("no-such-probe"))
+    assert error.name == "no_probe" and "no-such-probe" in error.what and "--drive" in error.remedy
+
+    monkeypatch.setitem(sys.modules, "pyocd.core.helpers", None)  # as if the extra were not installed
+    error = refused(flashing.find_probe)
+    assert error.name == "flash_extra_missing" and "calibration-rig[flash]" in error.remedy
