@@ -4,6 +4,7 @@ import sys
 import time
 from pathlib import Path
 
+from firmware_host.emulator.flash_memory import FlashMemory
 from firmware_host.emulator.gyroscope import GyroTruth
 from firmware_host.emulator.lsm9ds1 import Lsm9ds1
 from firmware_host.emulator.machine import EmulatedBoard
@@ -17,7 +18,7 @@ def main(duration_s: float) -> None:
     for rate_hz in (0.0, 119.0, 238.0, 476.0, 952.0):
         gyro = Lsm9ds1(lambda _time_s: (0.1, 0.2, 0.3), GyroTruth(noise_rad_s=0.035), temperature_c=22.0, seed=1)
         board = EmulatedBoard(
-            image=(IMAGE / "rig_l432.bin").read_bytes(),
+            flash=FlashMemory((IMAGE / "rig_l432.bin").read_bytes()),
             elf=(IMAGE / "rig_l432.elf").read_bytes(),
             devices=[gyro],
             unique_id=bytes(12),

@@ -4,6 +4,7 @@ import subprocess
 from collections.abc import Sequence
 from pathlib import Path
 
+from firmware_host.emulator.flash_memory import FlashMemory
 from firmware_host.emulator.machine import EmulatedBoard
 from firmware_host.emulator.spi_device import SpiDevice
 
@@ -84,7 +85,16 @@ def build(source: str, folder: Path) -> tuple[bytes, bytes]:
     return (folder / "tiny.bin").read_bytes(), (folder / "tiny.elf").read_bytes()
 
 
-def board(source: str, folder: Path, devices: Sequence[SpiDevice] = ()) -> EmulatedBoard:
-    """A board with exact crystal, powered up at time 0, that runs `source`."""
+def board(
+    source: str, folder: Path, devices: Sequence[SpiDevice] = (), flash: FlashMemory | None = None
+) -> EmulatedBoard:
+    """A board with exact crystal, powered up at time 0, that runs `source`, or what `flash` holds of it already."""
     image, elf = build(source, folder)
-    return EmulatedBoard(image=image, elf=elf, devices=devices, unique_id=bytes(12), crystal_ppm=0.0, boot_time_s=0.0)
+    return EmulatedBoard(
+        flash=FlashMemory(image) if flash is None else flash,
+        elf=elf,
+        devices=devices,
+        unique_id=bytes(12),
+        crystal_ppm=0.0,
+        boot_time_s=0.0,
+    )

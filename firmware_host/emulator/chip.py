@@ -7,6 +7,8 @@ from firmware_host.emulator.bus import Peripheral, RegisterBus
 from firmware_host.emulator.clocks import Clocks
 from firmware_host.emulator.dma import Dma1
 from firmware_host.emulator.engine import Engine
+from firmware_host.emulator.flash import Flash
+from firmware_host.emulator.flash_memory import FLASH_BYTES, STORE_OFFSET, FlashMemory
 from firmware_host.emulator.gpio import Exti, Port, Syscfg
 from firmware_host.emulator.nvic import Nvic
 from firmware_host.emulator.spi import Spi1
@@ -18,6 +20,7 @@ from firmware_host.emulator.usart import TDR_ADDRESS, Usart2
 
 _PERIPHERALS, _PERIPHERALS_SIZE = 0x4000_0000, 0x2_3000
 _PORTS, _PORTS_SIZE = 0x4800_0000, 0x1000
+_STORE, _STORE_SIZE = 0x0800_0000 + STORE_OFFSET, FLASH_BYTES - STORE_OFFSET
 _CORE, _CORE_SIZE = 0xE000_E000, 0x1000
 _SERIAL_FUNCTIONS = {"PA2": 7, "PA15": 3}
 _SENSOR_BUS_FUNCTIONS = {"PB3": 5, "PB4": 5, "PB5": 5}
@@ -33,6 +36,7 @@ class Chip:
         engine: Engine,
         timeline: Timeline,
         *,
+        memory: FlashMemory,
         board_clock: BoardClock,
         devices: Sequence[SpiDevice],
         on_reset: Callable[[int], None],
@@ -55,7 +59,8 @@ class Chip:
         sensor_bus = SpiBus(timeline, lambda: self._on_pins(_SENSOR_BUS_FUNCTIONS))
         self._spi = Spi1(timeline, clocks, sensor_bus.exchange)
         self.control = SystemControl(nvic, lambda: on_reset(rcc.RESET_SOFTWARE))
-        flash, power = rcc.Flash(), rcc.Power()
+        self.flash = flash = Flash(timeline, memory, nvic)
+        power = rcc.Power()
         self.rcc = rcc.Rcc(
             timeline=timeline,
             clocks=clocks,
@@ -68,6 +73,7 @@ class Chip:
         peripherals, ports, core = RegisterBus(_PERIPHERALS), RegisterBus(_PORTS), RegisterBus(_CORE)
         engine.map_io(_PERIPHERALS, _PERIPHERALS_SIZE, peripherals.read, peripherals.write)
         engine.map_io(_PORTS, _PORTS_SIZE, ports.read, ports.write)
+        engine.map_io(_STORE, _STORE_SIZE, flash.read, flash.write)
         engine.map_io(_CORE, _CORE_SIZE, core.read, core.write)
         self._gated: dict[str, tuple[RegisterBus, Peripheral]] = {}
         self._blocks: list[Peripheral] = []

@@ -11,7 +11,7 @@ from unicorn import arm_const as arm
 
 from firmware_host.emulator.bus import Violation
 from firmware_host.emulator.engine import Engine
-from firmware_host.emulator.nvic import FIRST_IRQ, Nvic
+from firmware_host.emulator.nvic import FIRST_IRQ, NMI, Nvic
 
 _CALLER_SAVED = [arm.UC_ARM_REG_R0, arm.UC_ARM_REG_R1, arm.UC_ARM_REG_R2, arm.UC_ARM_REG_R3]
 _CALLER_SAVED += [arm.UC_ARM_REG_R12, arm.UC_ARM_REG_LR]
@@ -72,7 +72,8 @@ class Cortex:
         if number is None:
             return Entry.NONE
         *scratch, control, xpsr, stack, primask, faultmask, basepri = self._everything.read()
-        if primask or faultmask or (basepri and self._nvic.priority(number) >= basepri):
+        masked = primask or faultmask or (basepri and self._nvic.priority(number) >= basepri)
+        if masked and number != NMI:
             return Entry.MASKED
         if control & (_PROCESS_STACK | _UNPRIVILEGED):
             raise Violation(

@@ -10,13 +10,14 @@ from firmware_host.emulator.bus import Peripheral, Violation
 from firmware_host.emulator.chip import Chip
 from firmware_host.emulator.cortex import Cortex, Entry
 from firmware_host.emulator.engine import Engine, EngineFault, Registers
+from firmware_host.emulator.flash_memory import FLASH_BYTES, STORE_OFFSET, FlashMemory, PowerLost
 from firmware_host.emulator.spi_device import BoardClock, SpiDevice
 from firmware_host.emulator.symbols import Symbols
 from firmware_host.emulator.thumb import instructions, is_floating_point, word_accesses
 from firmware_host.emulator.timeline import Timeline
 from firmware_host.errors import BoardError
 
-_FLASH, _FLASH_SIZE = 0x0800_0000, 256 * 1024
+_FLASH = 0x0800_0000
 _RAM, _RAM_SIZE = 0x2000_0000, 64 * 1024  # SRAM1, then SRAM2 at its second address
 _SYSTEM_MEMORY, _UNIQUE_ID, _FLASH_KB = 0x1FFF_7000, 0x1FFF_7590, 0x1FFF_75E0
 _WFI, _BRANCH_TO_SELF = 0xBF30, 0xE7FE
@@ -27,18 +28,19 @@ _CORRECT = "Correct the firmware"
 
 
 class EmulatedBoard:
-    """An STM32L432KC with the rig's wiring, running `image`.
+    """An STM32L432KC with the rig's wiring, running the program in `flash`.
 
-    `image`: the flash contents; `elf`: the same program with symbols; `devices`: what hangs on SPI1; `unique_id`:
-    12 bytes; `crystal_ppm`: how fast the board's crystal runs; `boot_time_s`: virtual time of power-up. Instructions
-    are counted exactly and take one core cycle each; wait states and the entry of exceptions take no time.
+    `flash`: its contents, which outlive the board; `elf`: the same program with symbols; `devices`: what hangs on
+    SPI1; `unique_id`: 12 bytes; `crystal_ppm`: how fast the board's crystal runs; `boot_time_s`: virtual time of
+    power-up. Instructions are counted exactly and take one core cycle each; wait states and the entry of exceptions
+    take no time.
     The same inputs at the same virtual times give the same bytes.
     """
 
     def __init__(
         self,
         *,
-        image: bytes,
+        flash: FlashMemory,
         elf: bytes,
         devices: Sequence[SpiDevice],
         unique_id: bytes,
@@ -49,11 +51,12 @@ class EmulatedBoard:
         self._clock = BoardClock(boot_time_s, crystal_ppm)
         self._timeline = Timeline()
         self._engine = Engine()
-        self._load_memories(image, unique_id)
+        self._load_memories(flash, unique_id)
         self._costs: dict[int, int] = {}  # address of a block → its ticks
         self._chip = Chip(
             self._engine,
             self._timeline,
+            memory=flash,
             board_clock=self._clock,
             devices=devices,
             on_reset=self._request_reset,
@@ -64,6 +67,7 @@ class EmulatedBoard:
         self._engine.on_interrupt(self._core_exception)
         self._engine.on_invalid(self._invalid_access)
         self._watch_alignment()
+        self.powered = True  # until the supply fails, as the flash may be told to let it
         self._sent = bytearray()
         self._failure: BoardError | None = None
         self._return_code: int | None = None
@@ -80,6 +84,8 @@ class EmulatedBoard:
         """
         if self._failure is not None:
             raise self._failure
+        if not self.powered:
+            return
         limit = self._clock.last_tick(until_s)
         timeline = self._timeline
         if limit < 0:  # before the board boots, its sensors live already
@@ -92,6 +98,8 @@ class EmulatedBoard:
             return
         try:
             self._run(limit)
+        except PowerLost:
+            self.powered = False
         except Violation as violation:
             self._failure = self._located(violation)
             raise self._failure from violation
@@ -128,17 +136,15 @@ class EmulatedBoard:
 
     # --- assembly
 
-    def _load_memories(self, image: bytes, unique_id: bytes) -> None:
-        if len(image) > _FLASH_SIZE:
-            raise BoardError("image_too_big", f"the image has {len(image)} bytes", f"Flash holds {_FLASH_SIZE}")
+    def _load_memories(self, flash: FlashMemory, unique_id: bytes) -> None:
         engine = self._engine
-        engine.map_rom(_FLASH, _FLASH_SIZE)
-        engine.write(_FLASH, image.ljust(_FLASH_SIZE, b"\xff"))
+        engine.map_rom(_FLASH, STORE_OFFSET)
+        engine.write(_FLASH, bytes(flash.data[:STORE_OFFSET]))
         engine.map_ram(_RAM, _RAM_SIZE)
         engine.write(_RAM, b"\xa5" * _RAM_SIZE)  # memory after power-up is not zero
         engine.map_rom(_SYSTEM_MEMORY, 0x1000)
         engine.write(_UNIQUE_ID, unique_id)
-        engine.write(_FLASH_KB, struct.pack("<H", _FLASH_SIZE // 1024))
+        engine.write(_FLASH_KB, struct.pack("<H", FLASH_BYTES // 1024))
 
     # --- running
 
@@ -148,10 +154,11 @@ class EmulatedBoard:
             timeline.run_due()
             if self._reset_cause is not None:
                 self._restart()
-            entry = cortex.enter_pending(self._chip.control.vectors)
+            waits_for_flash = self._chip.flash.busy
+            entry = Entry.NONE if waits_for_flash else cortex.enter_pending(self._chip.control.vectors)
             if entry is not Entry.NONE:
                 self._asleep = False  # a masked interrupt wakes the core too
-            if self._asleep:
+            if self._asleep or waits_for_flash:
                 if timeline.next_due > limit:
                     timeline.now = max(timeline.now, limit)
                     return

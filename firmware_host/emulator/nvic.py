@@ -6,6 +6,7 @@ from functools import partial
 from firmware_host.emulator.bus import Register, Violation
 from firmware_host.emulator.timeline import Timeline
 
+NMI = 2
 PENDSV = 14
 SYSTICK = 15
 FIRST_IRQ = 16  # exception number of interrupt 0
@@ -29,7 +30,7 @@ class Nvic:
         self.reset()
 
     def reset(self) -> None:
-        self._enabled = 1 << PENDSV | 1 << SYSTICK  # system exceptions cannot be disabled
+        self._enabled = 1 << NMI | 1 << PENDSV | 1 << SYSTICK  # system exceptions cannot be disabled
         self._pending = 0
         self._lines = 0
         self._priorities = bytearray(FIRST_IRQ + 32 * _WORDS)
@@ -62,6 +63,10 @@ class Nvic:
         waiting = self._pending & self._enabled
         if not waiting:
             return None
+        if NMI in self._active:
+            return None
+        if waiting >> NMI & 1:  # above every priority that can be set
+            return NMI
         number = min(_bits(waiting), key=lambda n: (self._priorities[n], n))
         current = min((self._priorities[n] for n in self._active), default=_IDLE_PRIORITY)
         return number if self._priorities[number] < current else None

@@ -1,9 +1,10 @@
-"""RCC, PWR and FLASH_ACR of the STM32L432 (reference manual RM0394, chapters 6, 5 and 3): clocks and what they feed."""
+"""RCC and PWR of the STM32L432 (reference manual RM0394, chapters 6 and 5): clocks and what they feed."""
 
 from collections.abc import Callable, Sequence
 
 from firmware_host.emulator.bus import Register, Stored, Violation, check_bits
 from firmware_host.emulator.clocks import Clocks
+from firmware_host.emulator.flash import Flash
 from firmware_host.emulator.timeline import TICK_HZ, Timeline
 
 _MSI_KHZ = (100, 200, 400, 800, 1_000, 2_000, 4_000, 8_000, 16_000, 24_000, 32_000, 48_000)
@@ -26,26 +27,6 @@ RESET_POWER, RESET_PIN, RESET_SOFTWARE, RESET_WATCHDOG = 1 << 27, 1 << 26, 1 << 
 _RESET_FLAGS = 0xFF << 24
 _REMOVE_RESET_FLAGS = 1 << 23
 _MSI_RANGE_AFTER_STANDBY = 6 << 8  # 4 MHz
-
-
-class Flash:
-    """The flash interface, as far as running from flash goes: wait states and caches."""
-
-    name = "FLASH"
-    base = 0x4002_2000
-
-    def __init__(self) -> None:
-        self._access = Stored("FLASH ACR", 0x0000_0707, initial=0x0000_0600)
-
-    def reset(self) -> None:
-        self._access.reset()
-
-    def registers(self) -> Sequence[Register]:
-        return (self._access.at(0x00),)
-
-    @property
-    def wait_states(self) -> int:
-        return self._access.value & 7
 
 
 class Power:

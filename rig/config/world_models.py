@@ -1,5 +1,6 @@
 """The `world:` section: what the simulated laboratory simulates. Only the world reads the values given here."""
 
+from pathlib import Path
 from typing import Annotated
 
 from pydantic import Field
@@ -26,6 +27,7 @@ class SimulatedBoardSection(Section):
     unique_id: Annotated[str, Field(pattern=r"^[0-9a-f]{24}$")] = "0123456789abcdef01234567"
     crystal_ppm: Annotated[float, Field(ge=-25_000, le=25_000)] = 35.0  # without its crystal a board may be 2 % off
     boot_time_s: Annotated[float, Field(ge=0, le=10)] = 0.137
+    flash_file: Path | None = None  # keeps the board's flash from one run to the next; fresh each time without
     pty: bool = False  # also offer the serial port as a pseudo-terminal (POSIX)
 
 

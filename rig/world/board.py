@@ -8,6 +8,7 @@ from math import radians
 import numpy as np
 
 from firmware_host.emulator.adis16465 import Adis16465
+from firmware_host.emulator.flash_memory import FlashMemory
 from firmware_host.emulator.gyroscope import GyroTruth
 from firmware_host.emulator.lsm9ds1 import Lsm9ds1
 from firmware_host.emulator.machine import EmulatedBoard
@@ -42,10 +43,10 @@ def mount_sensors(
     }
 
 
-def power_up(world: WorldSection, sensors: Collection[SpiDevice], time_s: float) -> EmulatedBoard:
+def power_up(world: WorldSection, flash: FlashMemory, sensors: Collection[SpiDevice], time_s: float) -> EmulatedBoard:
     """A board that gets power at the virtual time `time_s` and starts `boot_time_s` later."""
     return EmulatedBoard(
-        image=firmware("bin"),
+        flash=flash,
         elf=firmware("elf"),
         devices=list(sensors),
         unique_id=bytes.fromhex(world.board.unique_id),

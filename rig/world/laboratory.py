@@ -8,6 +8,7 @@ from firmware_host.emulator.spi_device import Fault, SpiDevice
 from rig.config.models import RigConfig
 from rig.config.world_models import WorldSection
 from rig.world.board import mount_sensors, power_up
+from rig.world.flash_file import flash_of
 from rig.world.kinematics import Vector, flange_rate
 from rig.world.motion import Motion
 from rig.world.ripple import ripple
@@ -35,6 +36,7 @@ class Laboratory:
             arm.remote_control,
             arm.speed_slider,
         )
+        self._flash = flash_of(world.board.flash_file)
         self.board: EmulatedBoard | None = None  # None: without power
         self._sensors: dict[str, SpiDevice] = {}
         self._faults: dict[str, Fault | None] = dict.fromkeys(world.sensors)
@@ -47,10 +49,10 @@ class Laboratory:
             self._sensors = mount_sensors(self._config, self._world, self._flange_rate_at, time_s)
             for name, fault in self._faults.items():
                 self._sensors[name].fault = fault
-            self.board = power_up(self._world, self._sensors.values(), time_s)
+            self.board = power_up(self._world, self._flash, self._sensors.values(), time_s)
 
     def unplug(self) -> None:
-        """Take the board's power away."""
+        """Take the board's power away; its flash keeps what it holds."""
         self.board = None
 
     def set_sensor_fault(self, name: str, fault: Fault | None) -> None:

@@ -1,0 +1,59 @@
+"""The chip's flash as it is without power: what survives a reset, a power cut and, in a file, the simulation."""
+
+from collections.abc import Callable
+
+from firmware_host.errors import BoardError
+
+FLASH_BYTES = 256 * 1024
+PAGE_BYTES = 2048
+DOUBLEWORD_BYTES = 8
+STORE_PAGES = 6  # at the end: they belong to the calibrations, the others to the program
+STORE_OFFSET = FLASH_BYTES - STORE_PAGES * PAGE_BYTES
+
+
+class PowerLost(Exception):
+    """The supply failed, as `FlashMemory.fail_power` asked for."""
+
+
+class FlashMemory:
+    """Contents and state of the flash.
+
+    `image`: the program, from the start; `store`: the last pages, erased when left out; `torn`: offsets of doublewords
+    whose erasing or programming was cut off: reading one is an error that the chip detects. Raises BoardError when the
+    image does not fit. `on_change` is called after every change.
+    """
+
+    def __init__(self, image: bytes, store: bytes = b"", torn: frozenset[int] = frozenset()) -> None:
+        if len(image) > STORE_OFFSET:
+            raise BoardError("image_too_big", f"the image has {len(image)} bytes", f"Flash holds {STORE_OFFSET}")
+        self.data = bytearray(image.ljust(STORE_OFFSET, b"\xff") + store.ljust(FLASH_BYTES - STORE_OFFSET, b"\xff"))
+        self.torn = set(torn)
+        self.operations = 0  # erasures and programmings begun
+        self.on_change: Callable[[], None] = lambda: None
+        self._fails_at: int | None = None
+        self._fails_torn = False
+
+    def fail_power(self, operation: int, torn: bool) -> None:
+        """Let the power fail at an operation, counted as `operations` counts.
+
+        With `torn` it has begun and is cut off; without, it has not yet.
+        """
+        self._fails_at, self._fails_torn = operation, torn
+
+    def begin(self, offset: int, content: bytes) -> None:
+        """Start to write so many bytes at `offset`: until `finish` they are torn. Raises PowerLost if it is to be."""
+        self.operations += 1
+        fails = self.operations == self._fails_at
+        if not fails or self._fails_torn:
+            span = range(offset, offset + len(content))
+            self.torn.update(span[::DOUBLEWORD_BYTES])
+            self.data[span.start : span.stop] = bytes(byte ^ 0x5A for byte in content)  # what it reads as: nonsense
+            self.on_change()
+        if fails:
+            raise PowerLost
+
+    def finish(self, offset: int, content: bytes) -> None:
+        """What `begin` started is done."""
+        self.data[offset : offset + len(content)] = content
+        self.torn.difference_update(range(offset, offset + len(content), DOUBLEWORD_BYTES))
+        self.on_change()
