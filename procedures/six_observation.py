@@ -20,16 +20,21 @@ def six_observation(rig: Rig) -> None:
     """The steps, in the order the plan has them (`rig plan CONFIG` prints it)."""
     rig.preflight()  # refuses unless limits, payload, modes and the speed slider are right; asks before anything moves
     rig.start_sampling()  # from here on every sample and every arm state is in run.h5
+    movement(rig)
+    rig.solve_on_board()  # the board's own calibration, to be held against the computer's
 
+
+def movement(rig: Rig) -> None:
+    """Home, then every sweep with the rest after it."""
     for step in rig.plan.steps:
         match step:
             case Transfer():
                 rig.move(step)  # to where the next sweep begins
             case Sweep():
-                rig.sweep(step)  # ramp up, one revolution at constant speed, ramp down
+                rig.sweep(step)  # ramp up, one revolution at constant speed, ramp down; then the board averages it
             case Rest():
                 rig.rest(step)  # stand still
 
 
 if __name__ == "__main__":
-    raise SystemExit(run_script(six_observation))
+    raise SystemExit(run_script(six_observation, procedure="six_observation"))

@@ -1,9 +1,13 @@
 """Passes what arrives on to the recording and counts it, for the operator's view and to see that samples flow."""
 
 import threading
+from collections import defaultdict
 from dataclasses import dataclass, field
 
+import numpy as np
+
 from firmware_host.client import SampleBatch
+from firmware_host.samples import SAMPLE_DTYPE
 from rig.arm.state import ArmState
 from rig.recording import RunRecorder
 
@@ -36,11 +40,13 @@ class SensorCount:
 class Monitor:
     """Fed by the board's and the arm's reader threads, read by the procedure's. `counts` by the board's sensor index.
 
-    What comes before there is a `recorder` is not kept.
+    What comes before there is a `recorder` is not kept. From `keep` to `release` all that comes is
+    also held in memory.
     """
 
     counts: dict[int, SensorCount] = field(default_factory=dict)
     recorder: RunRecorder | None = None
+    _kept: tuple[defaultdict[int, list[np.ndarray]], list[ArmState]] | None = None
     _lock: threading.Lock = field(default_factory=threading.Lock)
 
     def on_samples(self, batch: SampleBatch) -> None:
@@ -48,13 +54,34 @@ class Monitor:
         with self._lock:
             count = self.counts[batch.sensor]
             count.add(batch)
+            if self._kept is not None:
+                self._kept[0][batch.sensor].append(batch.samples)
         if self.recorder is not None:
             self.recorder.add_samples(count.name, batch.samples)
 
     def on_state(self, state: ArmState) -> None:
         """Take a state of the arm."""
+        with self._lock:
+            if self._kept is not None:
+                self._kept[1].append(state)
         if self.recorder is not None:
             self.recorder.add_arm_state(state)
+
+    def keep(self) -> None:
+        """From now on hold what comes; what was held before goes."""
+        with self._lock:
+            self._kept = defaultdict(list), []
+
+    def kept(self, sensor: int) -> tuple[np.ndarray, list[ArmState]]:
+        """Samples (n,) SAMPLE_DTYPE of one sensor, and arm states, since `keep`; empty when nothing is held."""
+        with self._lock:
+            batches, states = self._kept or (defaultdict(list), [])
+            return np.concatenate(batches[sensor] or [np.empty(0, SAMPLE_DTYPE)]), list(states)
+
+    def release(self) -> None:
+        """Hold nothing any more."""
+        with self._lock:
+            self._kept = None
 
     def totals(self) -> tuple[int, int, Vector | None]:
         """Samples received, samples lost, and the newest mean reading of the first sensor in rad/s."""

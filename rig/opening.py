@@ -4,21 +4,23 @@ import hashlib
 import platform
 from collections.abc import Iterator, Mapping, Sequence
 from contextlib import ExitStack, contextmanager
+from dataclasses import replace
 from datetime import UTC, datetime
 from importlib.metadata import version
 from math import radians
 from pathlib import Path
 from typing import Any
 
-from firmware_host.client import Board, BoardIdentity, SensorInfo
-from firmware_host.errors import BoardError
+from firmware_host.client import Board, BoardIdentity, Calibration, StoredCalibration
 from rig import __version__
 from rig.arm.driver import Arm
 from rig.arm.plan import plan_six_observation
 from rig.arm.state import ArmReport
+from rig.board_calibration import BoardCalibration
 from rig.config.load import Loaded, parse
 from rig.config.models import RigConfig, SensorSection, mounting_matrix
-from rig.errors import Fault, Refused
+from rig.errors import Refused
+from rig.instruments import find_sensor, refuse_other_firmware, refusing
 from rig.monitor import Monitor, SensorCount
 from rig.observation import sound_sweeps
 from rig.procedure import Confirm, Rig
@@ -26,16 +28,25 @@ from rig.progress import View
 from rig.recording import RecordedSensor, RunData, RunRecorder
 
 FULL_SCALE_COUNTS = 32767  # every part the firmware drives reports 16 bits, two's complement
+CALIBRATED_RAD_S = 1e-6  # a count of calibrated readings, as the protocol has it
 
 
 @contextmanager
 def open_rig(
-    loaded: Loaded, recording: Path, view: View, confirm: Confirm, earlier: Sequence[RunData] = ()
+    loaded: Loaded,
+    recording: Path,
+    view: View,
+    confirm: Confirm,
+    *,
+    earlier: Sequence[RunData] = (),
+    calibrated: bool = False,
 ) -> Iterator[Rig]:
     """Everything connected and recording, nothing moved yet; on the way out the arm stops and the file is closed.
 
-    `earlier` holds the recordings of an interrupted run: the sound sweeps they hold are left out. Raises `Refused` by
-    name when the arm, the board or a sensor is not what the configuration says, or not what was recorded earlier.
+    `earlier` holds the recordings of an interrupted run: the sound sweeps they hold are left out. With `calibrated`
+    the sensors to calibrate stream readings that the board has corrected by what it has stored; without, raw ones, and
+    the board calibrates along. Raises `Refused` by name when the arm, the board or a sensor is not what the
+    configuration says, or not what was recorded earlier, or has no calibration to correct by.
     """
     config = loaded.config
     _refuse_another_procedure(config, earlier)
@@ -46,7 +57,18 @@ def open_rig(
         monitor = Monitor()
         with refusing():
             board = stack.enter_context(Board(config.board.port, config.board.baud, monitor.on_samples))
-            sensors = {name: _set_up(board, name, section, monitor) for name, section in config.sensors.items()}
+            refuse_other_firmware(board.identity)
+            set_up = {name: _set_up(board, name, section) for name, section in config.sensors.items()}
+            to_calibrate = {name: set_up[name] for name in config.to_calibrate}
+            stored = {}
+            if calibrated:
+                stored = {name: _stored(board, name, index) for name, (index, _) in to_calibrate.items()}
+                set_up |= {
+                    name: (index, _corrected(sensor, stored[name].calibration))
+                    for name, (index, sensor) in to_calibrate.items()
+                }
+            sensors = {name: sensor for name, (_, sensor) in set_up.items()}
+            monitor.counts |= {i: SensorCount(name, s.sensitivity_rad_s_per_count) for name, (i, s) in set_up.items()}
         view.line(f"board: {board.identity.unique_id}, firmware {board.identity.firmware} at {config.board.port}")
 
         client_log = recording.with_name("arm_client.log")
@@ -55,10 +77,16 @@ def open_rig(
         view.line(f"arm: serial number {report.serial_number}, PolyScope {report.polyscope} at {report.host}")
 
         provenance = _provenance(loaded, board.identity, report)
+        provenance["stored_calibrations"] = {name: calibration.document() for name, calibration in stored.items()}
         _refuse_other_instruments(provenance, sensors, earlier)
         with refusing():
             recorder = RunRecorder(recording, config=loaded.rig_text, provenance=provenance, sensors=sensors)
         monitor.recorder = stack.enter_context(recorder)
+        on_board = None
+        if not calibrated:
+            on_board = BoardCalibration(board, monitor, recorder, config.observation, to_calibrate)
+            with refusing():
+                on_board.recall(earlier, done)
         yield Rig(
             plan=plan_six_observation(config.arm, config.procedure, report.state.q_rad, done),
             whole_plan=plan_six_observation(config.arm, config.procedure),
@@ -70,6 +98,9 @@ def open_rig(
             monitor=monitor,
             view=view,
             confirm=confirm,
+            calibrated=tuple(index for index, _ in to_calibrate.values()) if calibrated else (),
+            on_board=on_board,
+            again=config.procedure.verify and not calibrated,
         )
 
 
@@ -105,35 +136,35 @@ def _refuse_other_instruments(
             )
 
 
-@contextmanager
-def refusing() -> Iterator[None]:
-    """Before anything has moved, what is wrong with the board or the recording is a refusal."""
-    try:
-        yield
-    except (BoardError, Fault) as error:
-        raise Refused(error.name, error.what, error.remedy) from error
+def _stored(board: Board, name: str, index: int) -> StoredCalibration:
+    stored = board.read_calibration(index)
+    if stored is None:
+        raise Refused(
+            "no_calibration",
+            f"sensors.{name}: the board has no calibration stored to correct its readings by",
+            "Calibrate it first, or store a calibration with `rig board calibration write`",
+        )
+    return stored
 
 
-def find_sensor(identity: BoardIdentity, name: str, section: SensorSection) -> SensorInfo:
-    """The board's entry for a configured sensor. Raises Refused `sensor_missing`."""
-    # The board names parts as their makers do, the configuration in lower case.
-    info = next((sensor for sensor in identity.sensors if sensor.part.lower() == section.part), None)
-    if info is not None and info.present:
-        return info
-    seen = "no driver for it" if info is None else f"identity register reads 0x{info.who_am_i:02x}"
-    raise Refused(
-        "sensor_missing",
-        f"sensors.{name}: the board finds no {section.part} ({seen})",
-        "Check the sensor's supply and SPI wires, and sensors.*.part in the configuration",
+def _corrected(sensor: RecordedSensor, calibration: Calibration) -> RecordedSensor:
+    """The same sensor when the board corrects its readings: a count is then a microradian per second."""
+    limit_rad_s = sensor.full_scale_counts * sensor.sensitivity_rad_s_per_count
+    both = zip(calibration.scale, calibration.bias_rad_s, strict=True)
+    lowest_rad_s = min(k * (limit_rad_s - abs(b)) for k, b in both)  # what a saturated reading becomes, at least
+    return replace(
+        sensor,
+        sensitivity_rad_s_per_count=CALIBRATED_RAD_S,
+        full_scale_counts=int(lowest_rad_s / CALIBRATED_RAD_S),
+        mode="calibrated",
     )
 
 
-def _set_up(board: Board, name: str, section: SensorSection, monitor: Monitor) -> RecordedSensor:
-    """Find the sensor on the board, set it up, and describe it for the recording."""
+def _set_up(board: Board, name: str, section: SensorSection) -> tuple[int, RecordedSensor]:
+    """Find the sensor on the board and set it up: its index there and its description for the recording."""
     info = find_sensor(board.identity, name, section)
     setup = board.configure(info.index, section.rate_hz, section.range_deg_s)
-    monitor.counts[info.index] = SensorCount(name, setup.sensitivity_rad_s)
-    return RecordedSensor(
+    return info.index, RecordedSensor(
         part=section.part,
         serial_number=section.serial_number,
         rate_hz=setup.rate_hz,

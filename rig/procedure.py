@@ -16,6 +16,7 @@ from rig.arm.driver import Arm
 from rig.arm.plan import Plan, Rest, Step, Sweep, Transfer, travel
 from rig.arm.preflight import arm_problems, plan_problems, refuse, way_to_home
 from rig.arm.state import JOINT_NAMES, ArmReport
+from rig.board_calibration import BoardCalibration
 from rig.config.models import ArmSection
 from rig.errors import Fault, Refused
 from rig.monitor import Monitor
@@ -32,6 +33,8 @@ class Rig:
     """An arm and a board, connected and recorded. Scripts call the verbs; `plan` says what the arm will do.
 
     `whole_plan` is the plan of the whole procedure: the same as `plan`, or more when an interrupted run goes on.
+    `calibrated` are the board's indices of the sensors that stream calibrated readings; `on_board` is there when the
+    board calibrates along; `again` says that the same movement is to follow once more.
     """
 
     plan: Plan
@@ -44,6 +47,9 @@ class Rig:
     monitor: Monitor
     view: View
     confirm: Confirm
+    calibrated: tuple[int, ...] = ()
+    on_board: BoardCalibration | None = None
+    again: bool = False
     _done_s: float = 0.0  # planned duration of the steps behind us
     _step_started_s: float = 0.0  # controller time
 
@@ -79,12 +85,13 @@ class Rig:
             f"The arm at {self.report.host} will move for {self.plan.duration_s:.0f} s.",
             f"First it goes home: {turns or 'it is there already'}.",
             f"Then {len(self.plan.sweeps)} sweeps turn the wrists by more than a whole turn each.",
+            *(["If the calibration passes, the same movement follows once more, to verify it."] if self.again else []),
             "Nobody and nothing may be within its reach; the sensor's cable needs slack for a whole turn either way.",
         ]
 
     def start_sampling(self) -> None:
         """Let the board stream; from here on every sample is recorded. Raises `Fault` when a sensor stays silent."""
-        self.board.start()
+        self.board.start(self.calibrated)
         deadline_s = time.monotonic() + FIRST_SAMPLE_TIMEOUT_S
         while silent := self.monitor.silent():
             self.board.check()
@@ -103,11 +110,18 @@ class Rig:
             self.arm.move(transfer, lambda: self._watch(transfer))
 
     def sweep(self, sweep: Sweep) -> None:
-        """Turn one wrist through a whole revolution at constant speed and note when it began and ended."""
+        """Turn one wrist through a whole revolution at constant speed and note when it began and ended.
+
+        Afterwards the board averages the revolution as well, when it calibrates along.
+        """
+        if self.on_board is not None:
+            self.on_board.keep(sweep)
         with self._step(sweep):
             self.recorder.add_event("sweep_started", sweep=asdict(sweep))
             self.arm.move(sweep, lambda: self._watch(sweep))
             self.recorder.add_event("sweep_finished", sweep=asdict(sweep))
+        if self.on_board is not None:
+            self.on_board.observe(sweep)
 
     def rest(self, rest: Rest) -> None:
         """Stand still: the readings here show the bias and the noise."""
@@ -115,6 +129,11 @@ class Rig:
             self.recorder.add_event("rest_started")
             self.arm.rest(rest.duration_s, lambda: self._watch(rest))
             self.recorder.add_event("rest_finished")
+
+    def solve_on_board(self) -> None:
+        """Let the board compute its own calibration from what it has averaged; it stands beside the host's."""
+        if self.on_board is not None:
+            self.on_board.solve()
 
     def summary(self) -> str:
         """What was recorded and what was missed, in one line."""

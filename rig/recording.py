@@ -39,7 +39,8 @@ class RecordedSensor:
 
     rate in rad/s = counts × `sensitivity_rad_s_per_count`; temperature in °C = counts × `temperature_c_per_count` +
     `temperature_offset_c`. `full_scale_counts` is the largest number the part reports: a reading there is saturated.
-    `mounting` (3 rows of 3) is the nominal rotation from the flange frame to the sensor's.
+    `mounting` (3 rows of 3) is the nominal rotation from the flange frame to the sensor's. `mode` is "calibrated" when
+    the board corrected the readings before it sent them.
     """
 
     part: str
@@ -51,6 +52,7 @@ class RecordedSensor:
     temperature_c_per_count: float
     temperature_offset_c: float
     mounting: tuple[tuple[float, ...], ...]
+    mode: str = "raw"
 
 
 @dataclass(frozen=True, slots=True)
@@ -235,7 +237,8 @@ def make_plain(path: Path) -> None:
 
 
 def _sensor(dataset: Any) -> RecordedSensor:
-    values = {field.name: dataset.attrs[field.name] for field in fields(RecordedSensor)}
+    values = {field.name: dataset.attrs[field.name] for field in fields(RecordedSensor) if field.name != "mode"}
+    values["mode"] = dataset.attrs.get("mode", "raw")  # files of before there were two modes
     values = {name: value.item() if isinstance(value, np.generic) else value for name, value in values.items()}
     mounting = tuple(tuple(row) for row in values.pop("mounting").tolist())
     return RecordedSensor(**values, mounting=mounting)

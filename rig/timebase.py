@@ -62,6 +62,11 @@ class TimeBase:
         """Board times on the controller's clock."""
         return board_time_s + self.offset_s + self.drift * (board_time_s - self.reference_s)
 
+    def board_time_s(self, controller_time_s: float) -> float:
+        """A time of the controller's on the board's clock."""
+        since_reference_s = (controller_time_s - self.offset_s - self.reference_s) / (1 + self.drift)
+        return self.reference_s + since_reference_s
+
 
 class ArmMotion:
     """The recorded arm as functions of controller time: `angles(t)` (n, 6) rad, `rate(t)` (n, 3) flange rate rad/s.

@@ -31,6 +31,7 @@ int main(void)
 def document(*names: str) -> dict[str, Any]:
     sensor = {
         "part": "lsm9ds1",
+        "role": "calibrate",
         "serial_number": "A-*/1\n#error /* µ",
         "temperature_c": 22.04,
         "scale": SCALE,

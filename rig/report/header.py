@@ -8,8 +8,8 @@ from typing import Any
 def calibration_header(result: Mapping[str, Any]) -> str:
     """C source text for a `result.json` document (schema `rig.result/1`).
 
-    One pair of arrays a sensor and the function that applies them, g = K (m + b): scale factors (no unit) and biases
-    in rad/s. Names are those of the sensors, with everything that C does not allow written as `_`.
+    One pair of arrays a calibrated sensor and the function that applies them, g = K (m + b): scale factors (no unit)
+    and biases in rad/s. Names are those of the sensors, with everything that C does not allow written as `_`.
     """
     lines = [
         "/* Gyroscope calibration, g = K (m + b): rate_rad_s[i] = scale[i] * (reading_rad_s[i] + bias_rad_s[i]).",
@@ -17,7 +17,8 @@ def calibration_header(result: Mapping[str, Any]) -> str:
         "#ifndef CALIBRATION_H",
         "#define CALIBRATION_H",
     ]
-    for name, sensor in result["sensors"].items():
+    calibrated = {name: sensor for name, sensor in result["sensors"].items() if sensor["role"] == "calibrate"}
+    for name, sensor in calibrated.items():
         prefix = re.sub(r"^(?=[^a-z])", "sensor_", re.sub(r"[^a-z0-9]", "_", name.lower()))
         about = f"{sensor['part']}, serial number {sensor['serial_number']}, at {sensor['temperature_c']:.1f} °C"
         lines += [

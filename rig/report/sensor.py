@@ -5,6 +5,7 @@ from typing import Any
 
 import numpy as np
 
+from rig.agreement import Agreement
 from rig.averaging import Average
 from rig.errors import Fault
 from rig.estimation import vector_model
@@ -15,16 +16,19 @@ from rig.solution import SensorResult
 from rig.timebase import TimeBase
 
 
-def sensor_document(result: SensorResult) -> dict[str, Any]:
+def sensor_document(result: SensorResult, role: str = "calibrate", agreed: Agreement | None = None) -> dict[str, Any]:
     """Plain numbers, lists and strings, in SI units, of schema "rig.result/1".
 
     Scale, bias and covariance are those of the chosen estimator; `vector_model`, `six_observation` and `algorithm_1`
-    stand beside them, each with its own, or with the `error` it ends in.
+    stand beside them, each with its own, or with the `error` it ends in. `board` is the board's own solution; a
+    reference sensor has none.
     """
     solution = result.solution
     return {
         "part": result.sensor.part,
         "serial_number": result.sensor.serial_number,
+        "range_rad_s": result.sensor.range_rad_s,
+        "role": role,
         "model": MODEL,
         **estimate_document(solution),
         "covariance_order": list(PARAMETERS),
@@ -36,6 +40,7 @@ def sensor_document(result: SensorResult) -> dict[str, Any]:
         "vector_model": _vector(result.vector_model),
         "six_observation": estimate_document(result.six_observation),
         "algorithm_1": outcome_document(result.algorithm_1),
+        **({} if agreed is None else {"board": _board(agreed)}),
     }
 
 
@@ -75,6 +80,17 @@ def _vector(outcome: vector_model.VectorSolution | Fault) -> dict[str, Any]:
         "mounting_std_rad": angles[3:].tolist(),
         "residuals_rad_s": outcome.residuals_rad_s.tolist(),
         "warnings": list(outcome.warnings),
+    }
+
+
+def _board(agreed: Agreement) -> dict[str, Any]:
+    """The board's solutions by method, and the closed form's distance from the same in double precision."""
+    return {
+        "solutions": {method: dict(solution) for method, solution in agreed.solutions.items()},
+        "host_scale": None if agreed.host_scale is None else agreed.host_scale.tolist(),
+        "host_bias_rad_s": None if agreed.host_bias_rad_s is None else agreed.host_bias_rad_s.tolist(),
+        "scale_difference": agreed.scale_difference,
+        "bias_difference_rad_s": agreed.bias_difference_rad_s,
     }
 
 

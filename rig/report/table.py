@@ -7,13 +7,20 @@ import numpy as np
 from rich.console import Console
 from rich.table import Table
 
+from rig.report.verification import verification_lines, verification_table
+
 
 def print_result(result: Mapping[str, Any], console: Console) -> None:
     """Print a `result.json` document (schema `rig.result/1`): six parameters with uncertainties, checks, verdict."""
     for name, sensor in result["sensors"].items():
-        title = f"{name}: {sensor['part']} {sensor['serial_number']}, {sensor['model']}, {sensor['estimator']}"
+        known = " (known)" if sensor["role"] == "reference" else ""
+        title = f"{name}{known}: {sensor['part']} {sensor['serial_number']}, {sensor['model']}, {sensor['estimator']}"
         console.print(estimate_table(title, sensor))
         for line in _beside(sensor):
+            console.print(line)
+    for name, verification in result["verification"].items():
+        console.print(verification_table(name, verification))
+        for line in verification_lines(verification):
             console.print(line)
     checks = Table(title="checks", title_justify="left")
     for heading in ("check", "value", "limit", "unit", ""):
@@ -58,6 +65,11 @@ def _beside(sensor: Mapping[str, Any]) -> list[str]:
         else:
             scale, bias = (_triple(other["scale"], ".5f"), _triple(other["bias_rad_s"], "+.5f"))
             lines.append(f"{name}: k {scale}, b {bias} rad/s")
+    board = sensor.get("board", {}).get("solutions", {}).get("closed_form")
+    if board is not None and board["status"] == "solved":
+        lines.append(
+            f"on the board: k {_triple(board['scale'], '.5f')}, b {_triple(board['bias_rad_s'], '+.5f')} rad/s"
+        )
     vector = sensor["vector_model"]
     if "error" not in vector:
         skew = _triple(np.degrees(vector["non_orthogonality_rad"]), "+.3f")

@@ -1,0 +1,26 @@
+"""Verify gyroscopes that are calibrated: the movement of the calibration again, as in SIX, Section IV-B.
+
+    python procedures/verify.py configs/lsm9ds1_adis16465.yaml
+
+Before you start: as for procedures/six_observation.py. The board has a calibration stored for each gyroscope
+(`rig board calibration read CONFIG` shows it), and a reference gyroscope that is known sits beside them.
+
+What happens: the board corrects its readings by what it has stored and streams rates; the arm repeats the six sweeps;
+the rates are compared with the reference's. `rig run` does this by itself after a calibration when the configuration
+says `verify: true`. Ctrl-C stops the arm at any moment and keeps what was measured.
+"""
+
+from procedures.six_observation import movement
+from rig.cli import run_script
+from rig.procedure import Rig
+
+
+def verify(rig: Rig) -> None:
+    """The same steps as the calibration's, without solving anything."""
+    rig.preflight()  # refuses unless limits, payload, modes and the speed slider are right; asks before anything moves
+    rig.start_sampling()  # the gyroscopes send corrected rates, the reference its raw readings
+    movement(rig)
+
+
+if __name__ == "__main__":
+    raise SystemExit(run_script(verify, procedure="verify"))

@@ -1,0 +1,101 @@
+"""Host and board solve the same observations: what the board found, held against double precision. Pure.
+
+Both average the very same samples (the board says which it used) and are told the same speeds, so what differs is only
+the board's arithmetic. The run's own calibration is another matter: it weighs, takes the vibration out and knows the
+rests (`rig.solution`).
+"""
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+
+from rig.board_calibration import observed_before
+from rig.errors import Fault
+from rig.estimation.accumulator import Accumulator
+from rig.recording import RunData
+from rig.timebase import Array
+from rig.verdict import Check
+
+SCALE_LIMIT = 1e-4  # relative
+BIAS_LIMIT_RAD_S = 1e-5
+
+
+@dataclass(frozen=True, slots=True)
+class Agreement:
+    """A sensor's calibration by the board beside the same in double precision; None where either has no solution.
+
+    `solutions` are the board's by method, as it sent them. `scale_difference` is relative, `bias_difference_rad_s`
+    absolute, each the largest of three axes, for the closed form.
+    """
+
+    solutions: Mapping[str, Mapping[str, Any]]
+    host_scale: Array | None
+    host_bias_rad_s: Array | None
+    scale_difference: float | None
+    bias_difference_rad_s: float | None
+
+    def checks(self, sensor: str) -> tuple[Check, ...]:
+        """The two checks of the verdict: no board may be trusted whose arithmetic was not seen to be right."""
+        return (
+            Check(f"{sensor}.board_scale", self.scale_difference, SCALE_LIMIT, "1"),
+            Check(f"{sensor}.board_bias", self.bias_difference_rad_s, BIAS_LIMIT_RAD_S, "rad/s"),
+        )
+
+
+def agreement(runs: Sequence[RunData], sensor: str) -> Agreement:
+    """Compare for one sensor over all recordings of a run, of which the last holds the board's solutions."""
+    solutions = {
+        event.detail["method"]: event.detail
+        for event in runs[-1].events
+        if event.name == "board_solved" and event.detail["sensor"] == sensor
+    }
+    host = _solve(_observations(runs, sensor))
+    board = solutions.get("closed_form")
+    if host is None or board is None or board["status"] != "solved":
+        scale, bias = (None, None) if host is None else host
+        return Agreement(solutions, scale, bias, None, None)
+    scale, bias = host
+    return Agreement(
+        solutions,
+        scale,
+        bias,
+        float(np.max(np.abs(np.array(board["scale"]) / scale - 1))),
+        float(np.max(np.abs(np.array(board["bias_rad_s"]) - bias))),
+    )
+
+
+def _observations(runs: Sequence[RunData], sensor: str) -> list[tuple[Array, float]]:
+    """(mean reading (3,), speed) of every observation the board solved from, by the recorded samples."""
+    found: list[tuple[Array, float]] = []
+    for event in runs[-1].events:
+        if event.detail.get("sensor") != sensor:
+            continue
+        if event.name == "board_observed":
+            found.append(_averaged(runs[-1], sensor, event.detail))
+        elif event.name == "board_recalled":
+            sweep = event.detail["sweep"]
+            run = next(run for run in reversed(runs[:-1]) if sweep in observed_before([run], sensor, (sweep,)))
+            found.append(_averaged(run, sensor, observed_before([run], sensor, (sweep,))[sweep]))
+    return found
+
+
+def _averaged(run: RunData, sensor: str, observed: Mapping[str, Any]) -> tuple[Array, float]:
+    samples = run.samples[sensor]
+    used = (samples["board_time_us"] >= observed["start_us"]) & (samples["board_time_us"] < observed["end_us"])
+    counts = samples["counts"][used]
+    mean = counts.mean(axis=0) if len(counts) else np.full(3, np.nan)
+    return np.asarray(mean * run.sensors[sensor].sensitivity_rad_s_per_count), float(observed["speed_rad_s"])
+
+
+def _solve(observations: Sequence[tuple[Array, float]]) -> tuple[Array, Array] | None:
+    """Scale and bias as the board computes them: every observation with the same weight."""
+    accumulated = Accumulator.empty()
+    try:
+        for mean_rad_s, speed_rad_s in observations:
+            accumulated = accumulated.add(mean_rad_s, np.ones(3), speed_rad_s, weight=1.0)
+        solution = accumulated.solve()
+    except Fault:
+        return None
+    return solution.scale, solution.bias_rad_s

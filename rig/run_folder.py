@@ -1,0 +1,44 @@
+"""What lies where in a run folder, and how to go on with one."""
+
+import shlex
+from datetime import UTC, datetime
+from pathlib import Path
+
+from rig.config.load import Loaded
+from rig.errors import Refused
+
+CALIBRATION, VERIFICATION = "run", "verify"  # the names of recordings begin so
+
+
+def new_folder(out: Path | None, loaded: Loaded) -> Path:
+    """A run folder that holds nothing but the configuration as used. Raises Refused `run_folder`."""
+    stamp = datetime.now(UTC).strftime("%Y-%m-%dT%H-%M-%SZ")
+    folder = out or Path(loaded.config.output.folder) / f"{stamp}-{loaded.config.procedure.name}"
+    try:
+        folder.mkdir(parents=True, exist_ok=True)
+        empty = not any(folder.iterdir())
+        if empty:
+            (folder / "config.yaml").write_text(loaded.text, encoding="utf-8")
+    except OSError as error:
+        raise Refused("run_folder", f"{folder} cannot be written: {error}", "Choose another with --out") from error
+    if not empty:
+        raise Refused(
+            "run_folder", f"{folder} is not empty", f"Choose another with --out, or go on with: {resuming(folder)}"
+        )
+    return folder
+
+
+def recordings(folder: Path, kind: str) -> list[Path]:
+    """The recordings of one kind in the order they were made: run.h5, run-2.h5, …"""
+    return sorted(folder.glob(f"{kind}*.h5"), key=lambda path: (len(path.name), path.name))
+
+
+def next_recording(folder: Path, kind: str) -> Path:
+    """Where the next one goes."""
+    count = len(recordings(folder, kind))
+    return folder / (f"{kind}-{count + 1}.h5" if count else f"{kind}.h5")
+
+
+def resuming(folder: Path) -> str:
+    """The command that goes on with an interrupted run."""
+    return f"rig resume {shlex.quote(str(folder))}"
