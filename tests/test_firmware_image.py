@@ -17,8 +17,8 @@ FIRMWARE = Path(__file__).parents[1] / "firmware_host" / "firmware"
 IMAGE = FIRMWARE / "image"
 PORT = FIRMWARE / "port_l432"
 
-FLASH, FLASH_SIZE = 0x08000000, 16 * 1024
-RAM, RAM_SIZE = 0x20000000, 16 * 1024
+FLASH, FLASH_SIZE = 0x08000000, 32 * 1024
+RAM, RAM_SIZE = 0x20000000, 32 * 1024
 
 
 # The image

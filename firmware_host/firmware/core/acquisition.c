@@ -3,6 +3,7 @@
 #include <string.h>
 
 #include "clock.h"
+#include "kept.h"
 #include "link.h"
 #include "sensor.h"
 
@@ -11,7 +12,10 @@
 #define SILENCE_PERIODS 10u   /* so many conversions missing in a row is a fault, not jitter */
 #define SILENCE_US 100000u    /* and time for a part that is just starting up */
 #define BAD_READS 10u         /* so many in a row are worth a word */
-#define BATCH_MAX ((PAYLOAD_MAX - sizeof(struct samples_payload)) / sizeof(struct samples_item))
+#define SAMPLES_MAX ((PAYLOAD_MAX - sizeof(struct samples_payload)) / sizeof(struct samples_item))
+#define RATES_MAX ((PAYLOAD_MAX - sizeof(struct rates_payload)) / sizeof(struct rates_item))
+
+_Static_assert(sizeof(struct samples_payload) == sizeof(struct rates_payload), "both begin alike");
 
 struct sample {
     uint64_t time_us;
@@ -32,6 +36,8 @@ struct stream {
     uint32_t conversions, sent, dropped;
     struct sample ring[RING];
     uint32_t written, read;
+    bool calibrated;
+    struct correction correction; /* if calibrated */
 };
 
 static struct stream streams[SENSOR_COUNT];
@@ -74,13 +80,16 @@ static void rearm(unsigned sensor)
     } while (stream->edges != stream->edges_seen && --tries != 0);
 }
 
-bool acquisition_start(void)
+bool acquisition_start(uint8_t calibrated, const struct correction corrections[SENSOR_COUNT])
 {
     bool any = false;
     for (unsigned i = 0; i < SENSOR_COUNT; i++) {
         struct stream *stream = &streams[i];
         stream->conversions = stream->sent = stream->dropped = 0;
         stream->written = stream->read = 0;
+        stream->calibrated = is_named(calibrated, i);
+        if (stream->calibrated)
+            stream->correction = corrections[i];
         stream->bad_reads = 0;
         stream->silence_reported = stream->bad_reads_reported = false;
         stream->last_us = stream->watched_us = clock_now();
@@ -183,6 +192,8 @@ static void acquire(unsigned sensor)
     }
     stream->conversions += conversions;
     stream->dropped += conversions - 1;
+    if (result == READ_FRESH)
+        kept_add(sensor, time_us, reading.counts);
     bool full = stream->written - stream->read == RING;
     if (result != READ_FRESH || full) {
         stream->dropped++;
@@ -192,34 +203,52 @@ static void acquire(unsigned sensor)
     stream->written++;
 }
 
+static unsigned batch_max(const struct stream *stream)
+{
+    return stream->calibrated ? RATES_MAX : SAMPLES_MAX;
+}
+
 /* Sends the oldest samples up to a gap in the sequence: a batch numbers its samples by the first. The link has room. */
 static void send_batch(unsigned sensor)
 {
     struct {
         struct samples_payload head;
-        struct samples_item items[BATCH_MAX];
+        union {
+            struct samples_item samples[SAMPLES_MAX];
+            struct rates_item rates[RATES_MAX];
+        };
     } __attribute__((packed)) batch;
     struct stream *stream = &streams[sensor];
     const struct sample *first = &stream->ring[stream->read % RING];
     uint8_t count = 0;
-    while (count < BATCH_MAX && stream->read + count != stream->written) {
+    while (count < batch_max(stream) && stream->read + count != stream->written) {
         const struct sample *sample = &stream->ring[(stream->read + count) % RING];
         if (sample->sequence != first->sequence + count)
             break;
-        struct samples_item *item = &batch.items[count++];
-        item->delta_us = (uint32_t)(sample->time_us - first->time_us);
-        memcpy(item->counts, sample->reading.counts, sizeof item->counts);
-        item->temperature_counts = sample->reading.temperature_counts;
+        uint32_t delta_us = (uint32_t)(sample->time_us - first->time_us);
+        const struct reading *reading = &sample->reading;
+        if (stream->calibrated) {
+            struct rates_item item = {.delta_us = delta_us, .temperature_counts = reading->temperature_counts};
+            int32_t rate_urad_s[3];
+            correction_apply(&stream->correction, reading->counts, rate_urad_s);
+            memcpy(item.rate_urad_s, rate_urad_s, sizeof item.rate_urad_s);
+            batch.rates[count++] = item;
+        } else {
+            struct samples_item item = {.delta_us = delta_us, .temperature_counts = reading->temperature_counts};
+            memcpy(item.counts, reading->counts, sizeof item.counts);
+            batch.samples[count++] = item;
+        }
     }
     batch.head = (struct samples_payload){
         .sensor = (uint8_t)sensor,
-        .mode = MODE_RAW,
+        .mode = stream->calibrated ? MODE_CALIBRATED : MODE_RAW,
         .sequence = first->sequence,
         .dropped = stream->dropped,
         .base_time_us = first->time_us,
         .count = count,
     };
-    link_send(MESSAGE_SAMPLES, &batch, sizeof batch.head + count * sizeof batch.items[0]);
+    size_t item_size = stream->calibrated ? sizeof batch.rates[0] : sizeof batch.samples[0];
+    link_send(stream->calibrated ? MESSAGE_RATES : MESSAGE_SAMPLES, &batch, sizeof batch.head + count * item_size);
     stream->read += count;
     stream->sent += count;
 }
@@ -230,7 +259,7 @@ static bool batch_is_due(const struct stream *stream)
     if (waiting == 0 || !link_has_room())
         return false;
     uint64_t age_us = stream->last_us - stream->ring[stream->read % RING].time_us;
-    return waiting >= BATCH_MAX || age_us >= BATCH_AGE_US || !running;
+    return waiting >= batch_max(stream) || age_us >= BATCH_AGE_US || !running;
 }
 
 void acquisition_run(void)

@@ -5,7 +5,8 @@
 #include <stdbool.h>
 #include <stdint.h>
 
-#include "protocol.h"
+#include "correction.h"
+#include "sensor.h"
 
 void acquisition_reset(void);
 
@@ -15,8 +16,9 @@ void acquisition_data_ready(unsigned sensor, uint32_t captured_us);
 /* Sensor has just been configured to this rate; 0 takes it out of the stream. */
 void acquisition_set_rate(unsigned sensor, double rate_hz);
 
-/* Starts counting at sequence 0 with the first conversion of a settled part; false when no sensor is configured. */
-bool acquisition_start(void);
+/* Starts counting at sequence 0 with the first conversion of a settled part; false when no sensor is configured. Those with
+   their bit in `calibrated` send rates by their correction, the others raw samples. */
+bool acquisition_start(uint8_t calibrated, const struct correction corrections[SENSOR_COUNT]);
 void acquisition_stop(void);
 bool acquisition_is_running(void);
 

@@ -4,11 +4,14 @@
 
 #include "acquisition.h"
 #include "adis16465.h"
+#include "calibrating.h"
 #include "clock.h"
 #include "link.h"
 #include "lsm9ds1.h"
 #include "mpu9250.h"
 #include "port.h"
+#include "reply.h"
+#include "stored.h"
 
 #define BEACON_US 500000u
 
@@ -17,27 +20,42 @@ const struct sensor sensors[SENSOR_COUNT] = {{&lsm9ds1_gyro, 0}, {&mpu9250_gyro,
 static uint64_t last_beacon_us;
 static uint8_t stop_to_acknowledge; /* sequence of a stop whose last samples are still waiting */
 static bool restart_wanted;
+static struct setup_payload setups[SENSOR_COUNT];
+static uint8_t calibrated; /* sensors, since the latest start */
 
 void board_reset(void)
 {
     clock_reset();
     link_reset();
     acquisition_reset();
+    calibrating_reset();
+    memset(setups, 0, sizeof setups);
     last_beacon_us = clock_now();
     stop_to_acknowledge = 0;
     restart_wanted = false;
 }
 
-static void acknowledge(uint8_t sequence)
+const struct setup_payload *board_setup_of(unsigned sensor)
 {
-    struct ack_payload ack = {.reply_to = sequence};
-    link_send(MESSAGE_ACK, &ack, sizeof ack);
+    return &setups[sensor];
 }
 
-static void refuse(const struct frame *request, enum error_code code, uint8_t sensor)
+enum error_code board_check_sensor(uint8_t sensor)
 {
-    struct error_payload error = {.reply_to = request->sequence, .code = (uint8_t)code, .sensor = sensor};
-    link_send(MESSAGE_ERROR, &error, sizeof error);
+    if (sensor >= SENSOR_COUNT)
+        return ERROR_NO_SUCH_SENSOR;
+    return setups[sensor].rate_hz > 0.0 ? 0 : ERROR_NOT_CONFIGURED;
+}
+
+enum error_code board_check_mask(uint8_t mask, uint8_t *wrong)
+{
+    enum error_code error = 0;
+    for (*wrong = 0; mask >> *wrong != 0; ++*wrong) {
+        error = is_named(mask, *wrong) ? board_check_sensor(*wrong) : 0;
+        if (error)
+            break;
+    }
+    return error;
 }
 
 static void send_identity(uint8_t reply_to)
@@ -70,32 +88,60 @@ static void on_configure(const struct frame *request)
     struct configure_payload wanted;
     memcpy(&wanted, request->payload, sizeof wanted);
     if (wanted.sensor >= SENSOR_COUNT) {
-        refuse(request, ERROR_NO_SUCH_SENSOR, wanted.sensor);
+        reply_refused(request, ERROR_NO_SUCH_SENSOR, wanted.sensor);
         return;
     }
     if (acquisition_is_running()) {
-        refuse(request, ERROR_BUSY_STREAMING, wanted.sensor);
+        reply_refused(request, ERROR_BUSY_STREAMING, wanted.sensor);
         return;
     }
-    struct setup_payload setup = {.reply_to = request->sequence, .sensor = wanted.sensor};
+    struct setup_payload *setup = &setups[wanted.sensor];
     const struct sensor *sensor = &sensors[wanted.sensor];
-    uint8_t error = sensor->driver->configure(sensor->device, &wanted, &setup);
-    acquisition_set_rate(wanted.sensor, error ? 0.0 : setup.rate_hz);
+    *setup = (struct setup_payload){.reply_to = request->sequence, .sensor = wanted.sensor};
+    uint8_t error = sensor->driver->configure(sensor->device, &wanted, setup);
     if (error)
-        refuse(request, (enum error_code)error, wanted.sensor);
+        setup->rate_hz = 0.0;
+    acquisition_set_rate(wanted.sensor, setup->rate_hz);
+    calibrating_forget(wanted.sensor);
+    if (error)
+        reply_refused(request, (enum error_code)error, wanted.sensor);
     else
-        link_send(MESSAGE_SETUP, &setup, sizeof setup);
+        link_send(MESSAGE_SETUP, setup, sizeof *setup);
+}
+
+/* Those with their bit in `mask` send calibrated rates. */
+static void start(const struct frame *request, uint8_t mask)
+{
+    uint8_t sensor;
+    struct correction corrections[SENSOR_COUNT];
+    enum error_code error = board_check_mask(mask, &sensor);
+    for (uint8_t i = 0; i < SENSOR_COUNT && !error; i++)
+        if (is_named(mask, i)) {
+            sensor = i;
+            error = stored_correction(i, &corrections[i]);
+        }
+    if (!error && !acquisition_start(mask, corrections)) {
+        sensor = 0;
+        error = ERROR_NOT_CONFIGURED;
+    }
+    if (error) {
+        reply_refused(request, error, sensor);
+        return;
+    }
+    calibrated = mask;
+    reply_done(request->sequence);
 }
 
 /* A host that missed the ack asks again, so starting twice must not restart the sequence. */
 static void on_start(const struct frame *request)
 {
-    if (request->payload[0] != 0)
-        refuse(request, ERROR_NO_CALIBRATION, 0);
-    else if (acquisition_is_running() || acquisition_start())
-        acknowledge(request->sequence);
+    uint8_t mask = request->payload[0];
+    if (!acquisition_is_running())
+        start(request, mask);
+    else if (mask == calibrated)
+        reply_done(request->sequence);
     else
-        refuse(request, ERROR_NOT_CONFIGURED, 0);
+        reply_refused(request, ERROR_BUSY_STREAMING, 0);
 }
 
 static void on_stop(const struct frame *request)
@@ -131,7 +177,7 @@ static void on_status(const struct frame *request)
 
 static void on_reboot(const struct frame *request)
 {
-    acknowledge(request->sequence);
+    reply_done(request->sequence);
     restart_wanted = true;
 }
 
@@ -145,6 +191,13 @@ static const struct {
     {MESSAGE_STOP, 0, on_stop},
     {MESSAGE_STATUS, 0, on_status},
     {MESSAGE_REBOOT, 0, on_reboot},
+    {MESSAGE_KEEP, sizeof(struct keep_payload), calibrating_on_keep},
+    {MESSAGE_OBSERVE, sizeof(struct observe_payload), calibrating_on_observe},
+    {MESSAGE_RECALL, sizeof(struct recall_payload), calibrating_on_recall},
+    {MESSAGE_SOLVE, sizeof(struct solve_payload), calibrating_on_solve},
+    {MESSAGE_READ_CALIBRATION, sizeof(struct read_calibration_payload), stored_on_read},
+    {MESSAGE_WRITE_CALIBRATION, sizeof(struct write_calibration_payload), stored_on_write},
+    {MESSAGE_ERASE_CALIBRATION, sizeof(struct erase_calibration_payload), stored_on_erase},
 };
 
 static void answer(const struct frame *request)
@@ -155,10 +208,10 @@ static void answer(const struct frame *request)
         if (requests[i].size == request->size)
             requests[i].handle(request);
         else
-            refuse(request, ERROR_BAD_LENGTH, 0);
+            reply_refused(request, ERROR_BAD_LENGTH, 0);
         return;
     }
-    refuse(request, ERROR_UNKNOWN_MESSAGE, 0);
+    reply_refused(request, ERROR_UNKNOWN_MESSAGE, 0);
 }
 
 static void send_beacon(void)
@@ -176,7 +229,7 @@ void board_run(void)
         answer(&request);
     acquisition_run();
     if (stop_to_acknowledge != 0 && acquisition_is_empty() && link_has_room()) {
-        acknowledge(stop_to_acknowledge);
+        reply_done(stop_to_acknowledge);
         stop_to_acknowledge = 0;
     }
     send_beacon();

@@ -45,4 +45,10 @@ struct sensor {
 #define SENSOR_COUNT 3u
 extern const struct sensor sensors[SENSOR_COUNT];
 
+/* Whether a message's bit mask names the sensor. */
+static inline bool is_named(uint8_t mask, unsigned sensor)
+{
+    return (mask >> sensor & 1) != 0;
+}
+
 #endif

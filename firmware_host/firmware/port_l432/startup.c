@@ -17,6 +17,7 @@ struct fault_record fault_record __attribute__((section(".noinit")));
 int main(void);
 void reset_handler(void);
 void fault_handler(void);
+void nmi_handler(void);
 void exti1_handler(void);
 void exti9_5_handler(void);
 void dma1_channel7_handler(void);
@@ -79,6 +80,13 @@ __attribute__((naked)) void fault_handler(void)
     __asm volatile("mov r0, sp\n ldr r1, =stack_top\n mov sp, r1\n b record_fault");
 }
 
+/* A doubleword that a power loss tore does no harm where the store is read; any other NMI is a fault. Naked for the same
+   reason; what it changes, the exception's return restores. */
+__attribute__((naked)) void nmi_handler(void)
+{
+    __asm volatile("push {r4, lr}\n bl flash_take_torn_read\n cmp r0, #0\n pop {r4, lr}\n beq fault_handler\n bx lr");
+}
+
 typedef void (*vector)(void);
 
 #define INTERRUPT(number) (15u + (number)) /* exceptions 1 … 15 come first */
@@ -91,7 +99,7 @@ __attribute__((section(".vectors"), used)) static const struct {
     stack_top,
     {
         [0] = reset_handler,
-        [1] = fault_handler, /* NMI */
+        [1] = nmi_handler,
         [2] = fault_handler, /* HardFault, to which all other faults lead while they are not enabled */
         [14] = systick_handler,
         [INTERRUPT(EXTI1_IRQ)] = exti1_handler,

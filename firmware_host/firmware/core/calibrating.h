@@ -1,0 +1,17 @@
+/* The board calibrates by itself: requests keep, observe, recall and solve. */
+#ifndef CALIBRATING_H
+#define CALIBRATING_H
+
+#include "frame.h"
+
+void calibrating_reset(void);
+
+/* A sensor is about to be set up: what was kept and observed of it belongs to the old setting. */
+void calibrating_forget(unsigned sensor);
+
+void calibrating_on_keep(const struct frame *request);
+void calibrating_on_observe(const struct frame *request);
+void calibrating_on_recall(const struct frame *request);
+void calibrating_on_solve(const struct frame *request);
+
+#endif

@@ -1,0 +1,31 @@
+/* Remembers the readings of a sweep, until the host knows which of them were the revolution.
+
+   There is not room for every reading, so a block is the sum of several in a row and the time of the first. */
+#ifndef KEPT_H
+#define KEPT_H
+
+#include <stdbool.h>
+#include <stdint.h>
+
+#include "sensor.h"
+
+/* What was kept goes. From now on, keeps the sensors whose data rate is not 0, for at least so long; then the room is full.
+   False, and nothing is kept, when the duration is no positive number or longer than KEPT_LONGEST_S. */
+#define KEPT_LONGEST_S 1800.0f
+bool kept_begin(const float rates_hz[SENSOR_COUNT], float duration_s);
+
+void kept_forget(unsigned sensor);
+
+void kept_add(unsigned sensor, uint64_t time_us, const int16_t counts[3]);
+
+struct kept_span {
+    uint64_t start_us; /* of the first reading in it */
+    uint64_t end_us;   /* of the first reading after it */
+    uint32_t samples;
+    int64_t sums[3];
+};
+
+/* Adds up the whole blocks between two board times; false unless all of that time was kept and holds a block. */
+bool kept_sum(unsigned sensor, uint64_t start_us, uint64_t end_us, struct kept_span *span);
+
+#endif

@@ -1,0 +1,245 @@
+#include "solver.h"
+
+#include <stdbool.h>
+#include <string.h>
+
+#define PARAMETERS 6u
+#define SPEED SOLVER_UNKNOWNS /* the column of ω² */
+
+/* The host refuses designs whose condition number is above 30. That of the Frobenius norm, which costs less, is at most three
+   times as large: what the host accepts is solved here too. A direction that was not swept gives hundreds. */
+#define MAX_CONDITION 100.0f
+
+#define NEWTON_LIMIT 20u
+#define NEWTON_TOLERANCE 1e-4f /* of ω²: a step this small leaves an error of its square */
+#define ALGORITHM_1_LIMIT 255u
+#define ALGORITHM_1_TOLERANCE 2e-6f /* of Σ|β|: SIX has 1e-6, absolute, which single precision does not always resolve */
+
+/* X β = ω² − γ for γ as yet unknown. X has the columns [m m²] and is given by its triangle and the inverse of that. */
+struct design {
+    float r[PARAMETERS][PARAMETERS];
+    float speeds[PARAMETERS], ones[PARAMETERS];
+    float inverse[PARAMETERS][PARAMETERS];
+    float centre[3]; /* what readings are counted from, rad/s */
+};
+
+void solver_begin(struct accumulator *accumulator)
+{
+    memset(accumulator, 0, sizeof *accumulator);
+}
+
+/* The Givens rotation that takes `b` into `a`. */
+struct rotation {
+    float c, s;
+};
+
+static struct rotation rotation_of(float a, float b)
+{
+    float inverse = 1.0f / __builtin_sqrtf(a * a + b * b);
+    return (struct rotation){a * inverse, b * inverse};
+}
+
+static void rotate(struct rotation by, float *a, float *b)
+{
+    float turned = by.c * *a + by.s * *b;
+    *b = by.c * *b - by.s * *a;
+    *a = turned;
+}
+
+void solver_add(struct accumulator *accumulator, const float mean_rad_s[3], float speed_rad_s)
+{
+    float row[SOLVER_UNKNOWNS + 1u] = {[0] = 1.0f, [SPEED] = speed_rad_s * speed_rad_s};
+    for (unsigned axis = 0; axis < 3; axis++) {
+        row[1 + axis] = mean_rad_s[axis];
+        row[4 + axis] = mean_rad_s[axis] * mean_rad_s[axis];
+    }
+    for (unsigned i = 0; i < SOLVER_UNKNOWNS; i++) {
+        if (row[i] == 0.0f)
+            continue;
+        struct rotation by = rotation_of(accumulator->r[i][i], row[i]);
+        for (unsigned j = i; j <= SPEED; j++)
+            rotate(by, &accumulator->r[i][j], &row[j]);
+    }
+    accumulator->count++;
+}
+
+/* Makes [m m²] out of [1 m m²]: the first row of R joins the others as one more revolution whose linear terms, for readings
+   counted from their mean, are zero. That also decouples 1 from m, so moving the origin leaves R a triangle. */
+static void reduce(const struct accumulator *accumulator, bool centred, struct design *design)
+{
+    const float(*r)[SOLVER_UNKNOWNS + 1u] = accumulator->r;
+    float row[PARAMETERS], speed = r[0][SPEED], one = r[0][0];
+    for (unsigned axis = 0; axis < 3; axis++) {
+        design->centre[axis] = centred ? r[0][1 + axis] / r[0][0] : 0.0f;
+        row[axis] = centred ? 0.0f : r[0][1 + axis];
+        row[3 + axis] = r[0][4 + axis] - design->centre[axis] * r[0][1 + axis];
+    }
+    for (unsigned i = 0; i < PARAMETERS; i++) {
+        for (unsigned j = i; j < PARAMETERS; j++)
+            design->r[i][j] = r[1 + i][1 + j];
+        for (unsigned axis = i; axis < 3; axis++)
+            design->r[i][3 + axis] -= 2.0f * design->centre[axis] * r[1 + i][1 + axis];
+        design->speeds[i] = r[1 + i][SPEED];
+        design->ones[i] = 0.0f;
+    }
+    for (unsigned i = centred ? 3 : 0; i < PARAMETERS; i++) {
+        struct rotation by = rotation_of(design->r[i][i], row[i]);
+        for (unsigned j = i; j < PARAMETERS; j++)
+            rotate(by, &design->r[i][j], &row[j]);
+        rotate(by, &design->speeds[i], &speed);
+        rotate(by, &design->ones[i], &one);
+    }
+}
+
+static void invert(struct design *design)
+{
+    for (unsigned j = 0; j < PARAMETERS; j++) {
+        design->inverse[j][j] = 1.0f / design->r[j][j];
+        for (unsigned i = j; i-- > 0;) {
+            float sum = 0.0f;
+            for (unsigned k = i + 1; k <= j; k++)
+                sum += design->r[i][k] * design->inverse[k][j];
+            design->inverse[i][j] = -sum * design->inverse[i][i];
+        }
+    }
+}
+
+/* Whether the revolutions tell all six parameters apart. Readings are measured in their own RMS length, so that squares and
+   linear terms compare. What is not a number is refused too. */
+static bool is_well_conditioned(const struct design *design, uint16_t count)
+{
+    float linear = 0.0f, squares = 0.0f, inverse_linear = 0.0f, inverse_squares = 0.0f;
+    for (unsigned i = 0; i < PARAMETERS; i++)
+        for (unsigned j = i; j < PARAMETERS; j++) {
+            *(j < 3 ? &linear : &squares) += design->r[i][j] * design->r[i][j];
+            *(i < 3 ? &inverse_linear : &inverse_squares) += design->inverse[i][j] * design->inverse[i][j];
+        }
+    float length2 = linear / count;
+    float norm2 = count + squares / (length2 * length2);
+    float inverse_norm2 = length2 * (inverse_linear + length2 * inverse_squares);
+    return norm2 * inverse_norm2 <= MAX_CONDITION * MAX_CONDITION;
+}
+
+/* β(γ) = p − γ q, with squares at 3 … 5: p solves X p = ω², q solves X q = 1. */
+struct line {
+    float p[PARAMETERS], q[PARAMETERS];
+};
+
+static void solve_line(const struct design *design, struct line *line)
+{
+    for (unsigned i = 0; i < PARAMETERS; i++) {
+        line->p[i] = line->q[i] = 0.0f;
+        for (unsigned k = i; k < PARAMETERS; k++) {
+            line->p[i] += design->inverse[i][k] * design->speeds[k];
+            line->q[i] += design->inverse[i][k] * design->ones[k];
+        }
+    }
+}
+
+static void beta_at(const struct line *line, float gamma, float beta[PARAMETERS])
+{
+    for (unsigned i = 0; i < PARAMETERS; i++)
+        beta[i] = line->p[i] - gamma * line->q[i];
+}
+
+/* Γ(β) = Σ β_l² / (4 β_s), which β0 has to be. */
+static float gamma_of(const float beta[PARAMETERS])
+{
+    float gamma = 0.0f;
+    for (unsigned axis = 0; axis < 3; axis++)
+        gamma += beta[axis] * beta[axis] / (4.0f * beta[3 + axis]);
+    return gamma;
+}
+
+/* Newton on γ = Γ(β(γ)), from the closed form for one speed, which is exact when all speeds are equal. */
+static enum solution_status by_newton(const struct line *line, float speed2, float beta[PARAMETERS], uint8_t *steps)
+{
+    float g = gamma_of(line->q);
+    float gamma = speed2 * g / (1.0f + g);
+    for (*steps = 1; *steps <= NEWTON_LIMIT; ++*steps) {
+        float value = -gamma, slope = -1.0f;
+        beta_at(line, gamma, beta);
+        for (unsigned axis = 0; axis < 3; axis++) {
+            float bias = beta[axis] / (2.0f * beta[3 + axis]);
+            value += beta[3 + axis] * bias * bias;
+            slope += bias * (bias * line->q[3 + axis] - line->q[axis]);
+        }
+        float step = value / slope;
+        gamma -= step;
+        beta_at(line, gamma, beta);
+        if (__builtin_fabsf(step) <= NEWTON_TOLERANCE * speed2)
+            return SOLUTION_SOLVED;
+    }
+    return SOLUTION_NOT_CONVERGED;
+}
+
+/* SIX, Algorithm 1, as published: γ ← Γ(β), β ← β(γ), from γ = 0, until β stays. Each pass changes β by β0 / (ω² − β0) times
+   what the pass before did, so it diverges when β0 > ω²/2. Held against the first change and not the last: in a slow
+   convergence two neighbours differ by less than rounding. */
+static enum solution_status by_algorithm_1(const struct line *line, float beta[PARAMETERS], uint8_t *passes)
+{
+    float first_change = __builtin_inff();
+    beta_at(line, 0.0f, beta);
+    for (*passes = 2; *passes < ALGORITHM_1_LIMIT; ++*passes) {
+        float improved[PARAMETERS], change = 0.0f, size = 0.0f;
+        beta_at(line, gamma_of(beta), improved);
+        for (unsigned i = 0; i < PARAMETERS; i++) {
+            change += __builtin_fabsf(improved[i] - beta[i]);
+            size += __builtin_fabsf(improved[i]);
+        }
+        memcpy(beta, improved, sizeof improved);
+        if (change <= ALGORITHM_1_TOLERANCE * size)
+            return SOLUTION_SOLVED;
+        if (!(change < first_change))
+            break;
+        if (*passes == 2)
+            first_change = change;
+    }
+    return SOLUTION_NOT_CONVERGED;
+}
+
+/* k = √β_s and b = β_l / (2 β_s), the last lines of Algorithm 1; false when a square is not one. */
+static bool to_parameters(const float beta[PARAMETERS], const float centre[3], struct solution *solution)
+{
+    for (unsigned axis = 0; axis < 3; axis++) {
+        if (!(beta[3 + axis] > 0.0f))
+            return false;
+        solution->scale[axis] = __builtin_sqrtf(beta[3 + axis]);
+        solution->bias_rad_s[axis] = beta[axis] / (2.0f * beta[3 + axis]) - centre[axis];
+    }
+    return true;
+}
+
+static enum solution_status solve(const struct accumulator *accumulator, enum solve_method method, struct solution *solution)
+{
+    struct design design;
+    struct line line;
+    float beta[PARAMETERS];
+    if (accumulator->count < PARAMETERS)
+        return SOLUTION_TOO_FEW_OBSERVATIONS;
+    reduce(accumulator, true, &design);
+    invert(&design);
+    if (!is_well_conditioned(&design, accumulator->count))
+        return SOLUTION_DEGENERATE;
+    if (method == METHOD_ALGORITHM_1) { /* counts readings from zero, as published */
+        reduce(accumulator, false, &design);
+        invert(&design);
+    }
+    solve_line(&design, &line);
+    float speed2 = accumulator->r[0][SPEED] / accumulator->r[0][0];
+    enum solution_status status = method == METHOD_ALGORITHM_1
+                                      ? by_algorithm_1(&line, beta, &solution->iterations)
+                                      : by_newton(&line, speed2, beta, &solution->iterations);
+    if (status == SOLUTION_SOLVED && !to_parameters(beta, design.centre, solution))
+        return SOLUTION_DEGENERATE;
+    return status;
+}
+
+void solver_solve(const struct accumulator *accumulator, enum solve_method method, struct solution *solution)
+{
+    memset(solution, 0, sizeof *solution);
+    enum solution_status status = solve(accumulator, method, solution);
+    if (status != SOLUTION_SOLVED)
+        memset(solution, 0, sizeof *solution);
+    solution->status = status;
+}

@@ -1,0 +1,128 @@
+#include "stored.h"
+
+#include <stdbool.h>
+#include <string.h>
+
+#include "acquisition.h"
+#include "board.h"
+#include "link.h"
+#include "reply.h"
+#include "store.h"
+
+void stored_on_read(const struct frame *request)
+{
+    uint8_t sensor = request->payload[0];
+    struct calibration_payload record;
+    if (sensor >= SENSOR_COUNT) {
+        reply_refused(request, ERROR_NO_SUCH_SENSOR, sensor);
+    } else if (!store_read(sensor, &record)) {
+        reply_refused(request, ERROR_NO_CALIBRATION, sensor);
+    } else {
+        record.reply_to = request->sequence;
+        link_send(MESSAGE_CALIBRATION, &record, sizeof record);
+    }
+}
+
+static bool is_usable(const struct write_calibration_payload *calibration)
+{
+    bool usable = calibration->model == MODEL_K_TIMES_M_PLUS_B;
+    for (unsigned axis = 0; axis < 3; axis++)
+        usable = usable && calibration->scale[axis] > 0.0f && __builtin_isfinite(calibration->scale[axis]) &&
+                 __builtin_isfinite(calibration->bias_rad_s[axis]);
+    return usable;
+}
+
+/* Which part a calibration is of: what the driver and the identity register say, and the range it is set to. */
+static enum error_code describe(unsigned sensor, struct calibration_payload *record)
+{
+    const struct sensor_driver *driver = sensors[sensor].driver;
+    uint16_t who_am_i;
+    if (!driver->identify(sensors[sensor].device, &who_am_i))
+        return ERROR_SENSOR_ABSENT;
+    *record = (struct calibration_payload){
+        .sensor = (uint8_t)sensor,
+        .who_am_i = who_am_i,
+        .range_deg_s = (float)board_setup_of(sensor)->range_deg_s,
+    };
+    memcpy(record->part, driver->part, sizeof record->part);
+    return 0;
+}
+
+/* A host that missed the ack asks again: what is already stored is not written twice, for the flash wears. */
+static bool is_stored(const struct calibration_payload *record)
+{
+    struct calibration_payload stored;
+    if (!store_read(record->sensor, &stored))
+        return false;
+    stored.sequence = record->sequence;
+    return memcmp(&stored, record, sizeof stored) == 0;
+}
+
+static enum error_code write(const struct write_calibration_payload *wanted)
+{
+    enum error_code error = board_check_sensor(wanted->sensor);
+    if (error)
+        return error;
+    if (acquisition_is_running())
+        return ERROR_BUSY_STREAMING; /* the flash stops the processor while it erases: samples would be lost */
+    if (!is_usable(wanted))
+        return ERROR_BAD_CALIBRATION;
+    struct calibration_payload record;
+    error = describe(wanted->sensor, &record);
+    if (error)
+        return error;
+    record.model = wanted->model;
+    memcpy(record.serial_number, wanted->serial_number, sizeof record.serial_number);
+    record.written_unix_s = wanted->written_unix_s;
+    record.temperature_c = wanted->temperature_c;
+    memcpy(record.scale, wanted->scale, sizeof record.scale);
+    memcpy(record.bias_rad_s, wanted->bias_rad_s, sizeof record.bias_rad_s);
+    return is_stored(&record) || store_write(wanted->sensor, &record) ? 0 : ERROR_FLASH_FAILED;
+}
+
+static enum error_code erase(uint8_t sensor)
+{
+    if (sensor >= SENSOR_COUNT)
+        return ERROR_NO_SUCH_SENSOR;
+    if (acquisition_is_running())
+        return ERROR_BUSY_STREAMING;
+    return store_erase(sensor) ? 0 : ERROR_FLASH_FAILED;
+}
+
+static void answer(const struct frame *request, enum error_code error)
+{
+    if (error)
+        reply_refused(request, error, request->payload[0]);
+    else
+        reply_done(request->sequence);
+}
+
+void stored_on_write(const struct frame *request)
+{
+    struct write_calibration_payload wanted;
+    memcpy(&wanted, request->payload, sizeof wanted);
+    answer(request, write(&wanted));
+}
+
+void stored_on_erase(const struct frame *request)
+{
+    answer(request, erase(request->payload[0]));
+}
+
+enum error_code stored_correction(unsigned sensor, struct correction *correction)
+{
+    struct calibration_payload record, present;
+    if (!store_read(sensor, &record))
+        return ERROR_NO_CALIBRATION;
+    enum error_code error = describe(sensor, &present);
+    if (error)
+        return error;
+    if (memcmp(record.part, present.part, sizeof record.part) != 0 || record.who_am_i != present.who_am_i ||
+        record.range_deg_s != present.range_deg_s)
+        return ERROR_OTHER_SENSOR;
+    float scale[3], bias_rad_s[3];
+    memcpy(scale, record.scale, sizeof scale);
+    memcpy(bias_rad_s, record.bias_rad_s, sizeof bias_rad_s);
+    *correction = correction_of(scale, bias_rad_s, (float)board_setup_of(sensor)->sensitivity_rad_s);
+    return 0;
+}

@@ -1,0 +1,91 @@
+/* The last six pages of the flash. RM0394, section 3.3: keys, page erase (3.3.5), standard programming (3.3.7), ECC (3.3.2).
+
+   While the flash is busy, every fetch from it waits: the processor stands still, 25 ms for a page, and interrupts with it. The
+   watchdog allows a second. Nothing here may run while sensors stream. */
+#include "flash.h"
+
+#include "port.h"
+#include "registers.h"
+
+#define FIRST_PAGE 122u
+#define ERRORS \
+    (FLASH_SR_OPERR | FLASH_SR_PROGERR | FLASH_SR_WRPERR | FLASH_SR_PGAERR | FLASH_SR_SIZERR | FLASH_SR_PGSERR)
+
+extern volatile uint8_t store_start[FLASH_PAGES][FLASH_PAGE_BYTES]; /* the linker script's */
+
+static volatile bool reading, torn;
+
+/* The data cache does not see what is erased and programmed, and may hold a doubleword whose error has been told already. */
+static void switch_cache_off(void)
+{
+    FLASH_ACR &= ~FLASH_ACR_DCEN;
+}
+
+static void switch_cache_on(void)
+{
+    FLASH_ACR |= FLASH_ACR_DCRST; /* only while it is off */
+    FLASH_ACR &= ~FLASH_ACR_DCRST;
+    FLASH_ACR |= FLASH_ACR_DCEN;
+}
+
+/* An error left over from before, such as by a stray write, would refuse the next operation. */
+static void begin(void)
+{
+    switch_cache_off();
+    FLASH_KEYR = 0x45670123u;
+    FLASH_KEYR = 0xCDEF89ABu;
+    FLASH_SR = ERRORS;
+}
+
+static bool finish(void)
+{
+    while (FLASH_SR & FLASH_SR_BSY)
+        ;
+    bool done = (FLASH_SR & ERRORS) == 0;
+    FLASH_CR = FLASH_CR_LOCK;
+    switch_cache_on();
+    return done;
+}
+
+bool port_flash_erase(unsigned page)
+{
+    begin();
+    FLASH_CR = FLASH_CR_PER | FLASH_CR_PNB(FIRST_PAGE + page);
+    FLASH_CR |= FLASH_CR_START;
+    return finish();
+}
+
+/* Two words in this order start it. The barrier keeps them apart in the write buffer, as ST's own library does. */
+bool port_flash_program(unsigned page, size_t offset, uint64_t doubleword)
+{
+    volatile uint32_t *words = (volatile uint32_t *)&store_start[page][offset];
+    begin();
+    FLASH_CR = FLASH_CR_PG;
+    words[0] = (uint32_t)doubleword;
+    __asm volatile("isb" ::: "memory");
+    words[1] = (uint32_t)(doubleword >> 32);
+    return finish();
+}
+
+bool port_flash_read(unsigned page, size_t offset, void *bytes, size_t size)
+{
+    uint8_t *to = bytes;
+    switch_cache_off();
+    torn = false;
+    reading = true;
+    for (size_t i = 0; i < size && !torn; i++)
+        to[i] = store_start[page][offset + i];
+    __asm volatile("dsb\n isb" ::: "memory"); /* an error of the last byte has come by now */
+    reading = false;
+    switch_cache_on();
+    return !torn;
+}
+
+bool flash_take_torn_read(void)
+{
+    if (!reading || !(FLASH_ECCR & FLASH_ECCR_ECCD))
+        return false;
+    FLASH_ECCR = FLASH_ECCR_ECCD; /* written 1 to clear; left standing it would bring the NMI again */
+    torn = true;
+    return true;
+}
