@@ -1,12 +1,31 @@
 """The three parts as the drivers see them: registers behind a chip select, enough to tell what a driver does."""
 
 from collections.abc import Sequence
+from typing import Protocol
+
+
+class Part(Protocol):
+    """What is at the other end of a chip select."""
+
+    def transfer(self, data: bytes, max_hz: int, time_us: int, /) -> bytes:
+        """One chip select: the bytes in, the bytes out."""
+
+
+class Nobody:
+    """A wire that nobody drives: all ones by the pull-up, or all zeros where it is shorted."""
+
+    def __init__(self, level: int = 0xFF) -> None:
+        self.level = level
+        self.transfers = 0
+
+    def transfer(self, data: bytes, _max_hz: int, _time_us: int) -> bytes:
+        self.transfers += 1
+        return bytes((self.level,)) * len(data)
 
 
 class Lsm9ds1Registers:
     """Registers that count up in a burst; a new conversion raises a flag that reading the last output lowers."""
 
-    device = 0
     max_hz = 10e6
 
     def __init__(self) -> None:
@@ -47,14 +66,13 @@ class Lsm9ds1Registers:
 class Mpu9250Registers(Lsm9ds1Registers):
     """High byte first; only sensor and interrupt registers are read faster than 1 MHz; reading clears the status."""
 
-    device = 1
     max_hz = 20e6
 
     def __init__(self) -> None:
         super().__init__()
         self.values = bytearray(128)
         self.values[0x75] = 0x71
-        self.values[0x6B] = 0x01
+        self.values[0x6B] = 0x01  # CLKSEL, as after power-up
 
     def transfer(self, data: bytes, max_hz: int, time_us: int) -> bytes:
         first = data[0] & 0x7F
@@ -76,8 +94,6 @@ class Mpu9250Registers(Lsm9ds1Registers):
 
 class Adis16465Registers:
     """Words of 16 bits, high byte first; an answer comes one frame later, a setting some time after its writing."""
-
-    device = 2
 
     def __init__(self) -> None:
         self.words = {0x5C: 0, 0x5E: 0x0007, 0x60: 0x00C1, 0x64: 0, 0x68: 0, 0x72: 0x4051}
