@@ -31,12 +31,13 @@ int main(void);
 static void start(void) { main(); for (;;); }
 static void unexpected(void) { for (;;); }
 #define HANDLER(name) void name(void) __attribute__((weak, alias("unexpected")))
+HANDLER(nmi);
 HANDLER(pendsv);
 HANDLER(systick);
 HANDLER(exti9_5);
 HANDLER(usart2);
 __attribute__((section(".vectors"), used)) static const void *const vectors[16 + 39] = {
-    (void *)0x2000C000, start, [14] = pendsv, [15] = systick, [16 + 23] = exti9_5, [16 + 38] = usart2,
+    (void *)0x2000C000, start, [2] = nmi, [14] = pendsv, [15] = systick, [16 + 23] = exti9_5, [16 + 38] = usart2,
 };
 """
 
@@ -85,16 +86,12 @@ def build(source: str, folder: Path) -> tuple[bytes, bytes]:
     return (folder / "tiny.bin").read_bytes(), (folder / "tiny.elf").read_bytes()
 
 
-def board(
-    source: str, folder: Path, devices: Sequence[SpiDevice] = (), flash: FlashMemory | None = None
-) -> EmulatedBoard:
-    """A board with exact crystal, powered up at time 0, that runs `source`, or what `flash` holds of it already."""
+def board(source: str, folder: Path, devices: Sequence[SpiDevice] = ()) -> EmulatedBoard:
+    """A board with exact crystal, powered up at time 0, that runs `source`."""
     image, elf = build(source, folder)
-    return EmulatedBoard(
-        flash=FlashMemory(image) if flash is None else flash,
-        elf=elf,
-        devices=devices,
-        unique_id=bytes(12),
-        crystal_ppm=0.0,
-        boot_time_s=0.0,
-    )
+    return power_up(FlashMemory(image), elf, devices)
+
+
+def power_up(flash: FlashMemory, elf: bytes, devices: Sequence[SpiDevice] = ()) -> EmulatedBoard:
+    """A board with exact crystal, powered up at time 0, that runs what is in `flash`."""
+    return EmulatedBoard(flash=flash, elf=elf, devices=devices, unique_id=bytes(12), crystal_ppm=0.0, boot_time_s=0.0)

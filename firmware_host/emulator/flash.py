@@ -138,7 +138,7 @@ class Flash:
             raise Violation("flash_locked", f"FLASH CR = 0x{value:X} while locked", "Write both keys to KEYR first")
         if self.busy:
             raise Violation("flash_busy", "FLASH CR written while an operation is under way", "Wait until BSY is clear")
-        self._control = value
+        self._control = value | self._control & _OPTLOCK  # which another key opens
         if value & _STRT:
             self._erase((value & _PNB) >> _PNB_SHIFT)
 
