@@ -355,6 +355,7 @@ ERRORS = (
     ErrorKind(19, "sensor_fault", "the sensor reports a fault of its own", "Check its supply; else replace the sensor"),
 )
 
+_BLOCK_MAX = PAYLOAD_MAX + OVERHEAD + 1
 _CRC_OF_INTACT = 0x2144DF1C  # of any bytes followed by their own CRC
 
 _BY_CODE = {message.code: message for message in MESSAGES}
@@ -397,7 +398,7 @@ def decode(block: bytes) -> Frame | None:
 
     An identity of another protocol version comes back with only the two fields every version has.
     """
-    body = unstuff(block)
+    body = unstuff(block) if len(block) <= _BLOCK_MAX else None
     if body is None or len(body) < OVERHEAD or crc32(body) != _CRC_OF_INTACT or body[0] not in _BY_CODE:
         return None
     message = _BY_CODE[body[0]]
@@ -434,10 +435,8 @@ class FrameReader:
     def feed(self, data: bytes) -> list[Frame]:
         """The frames that `data` completes."""
         self.bytes_seen += len(data)
-        *blocks, self._rest = (self._rest + data).split(b"\0")
-        if len(self._rest) > 2 * PAYLOAD_MAX:  # no frame is that long: noise, or another baud rate
-            blocks.append(self._rest)
-            self._rest = b""
+        *blocks, rest = (self._rest + data).split(b"\0")
+        self._rest = rest[: _BLOCK_MAX + 1]  # of noise, or of another baud rate, no more than tells that it is no frame
         frames = []
         for block in blocks:
             if block:

@@ -1,6 +1,6 @@
 """COBS for blocks shorter than 255 bytes, as fast as this machine can.
 
-Package `cobs` does it in C where it could be compiled; its Python part takes six times as long as the loop here.
+Package `cobs` does it in C where that could be compiled; its Python part takes six times as long as the loop here.
 """
 
 from types import BuiltinFunctionType
@@ -14,10 +14,12 @@ def stuff(body: bytes) -> bytes:
 
 
 def unstuff_in_python(block: bytes) -> bytes | None:
-    """What was stuffed into `block`, which has no zero and shorter than 255 bytes; None when it is damaged.
+    """What was stuffed into `block`, which is shorter than 255 bytes; None when it is damaged.
 
     Each code byte is the distance to the next one and stands for a zero; the first stands for nothing.
     """
+    if 0 in block:
+        return None
     body = bytearray(block)
     place = 0
     while place < len(block):
