@@ -21,7 +21,7 @@ from rig.report.table import print_result
 from rig.report.verification import verification_document
 from rig.results import SCHEMA
 from rig.solution import DEFAULT_ESTIMATOR, SensorResult, solve_runs
-from rig.verdict import judge, verdict, verification_checks, verification_checks
+from rig.verdict import judge, verdict, verification_checks
 from rig.verification import Reference, Verification, verify
 
 
