@@ -7,6 +7,7 @@ import threading
 import time
 from collections.abc import Callable, Iterator
 from contextlib import closing
+from datetime import UTC, datetime
 from zlib import crc32
 
 import numpy as np
@@ -16,7 +17,7 @@ from conftest import fresh_host
 from host_board import HostBoard
 
 from firmware_host import protocol
-from firmware_host.client import Board, SampleBatch
+from firmware_host.client import Board, Calibration, SampleBatch
 from firmware_host.errors import BoardError
 
 PERIOD_US = 4202  # 238 Hz
@@ -189,6 +190,94 @@ def test_the_boards_refusals_come_through_by_name(wire: tuple[BoardOnAWire, str]
         board.check()
 
 
+CALIBRATION = Calibration(
+    model="k_times_m_plus_b",
+    serial_number="LSM9DS1-001",
+    written_utc=datetime(2026, 11, 21, 12, 0, 0, 987654, UTC),
+    temperature_c=22.7,
+    scale=(1.1771, 1.1554, 1.1440),
+    bias_rad_s=(0.0077, -0.0100, -0.0051),
+)
+
+
+def test_a_stored_calibration_is_there_after_a_reset_until_it_is_erased(wire: tuple[BoardOnAWire, str]) -> None:
+    with Board(wire[1], protocol.BAUD_RATE, ignore) as board:
+        assert board.read_calibration(0) is None
+        with pytest.raises(BoardError) as refusal:
+            board.write_calibration(0, CALIBRATION)
+        assert refusal.value.name == "not_configured"
+        board.configure(0, 238, 245)
+        with pytest.raises(BoardError) as refusal:
+            board.start(calibrated=[0])
+        assert refusal.value.name == "no_calibration" and "of its LSM9DS1" in refusal.value.what
+
+        board.write_calibration(0, CALIBRATION)
+        board.reboot()
+        stored = board.read_calibration(0)
+        assert stored is not None and stored.calibration == CALIBRATION.as_kept()
+        assert (stored.sequence, stored.part, stored.who_am_i, stored.range_deg_s) == (1, "LSM9DS1", 0x68, 245)
+        assert stored.calibration.written_utc.microsecond == 0
+        assert stored.calibration.scale == pytest.approx(CALIBRATION.scale, rel=1e-7)
+
+        board.erase_calibration(0)
+        assert board.read_calibration(0) is None
+        board.erase_calibration(0)
+
+
+def test_calibrated_readings_come_in_microradians_per_second(wire: tuple[BoardOnAWire, str]) -> None:
+    batches: list[SampleBatch] = []
+    with Board(wire[1], protocol.BAUD_RATE, batches.append) as board:
+        sensitivity = board.configure(0, 238, 245).sensitivity_rad_s
+        board.write_calibration(0, CALIBRATION)
+        board.start(calibrated=[0])
+        wait_for(lambda: len(batches) > 0)
+        board.stop()
+    assert {batch.mode for batch in batches} == {"calibrated"}
+    z_rad_s = CALIBRATION.scale[2] * (7 * sensitivity + CALIBRATION.bias_rad_s[2])
+    assert batches[0].samples["counts"][:, 2] == pytest.approx(z_rad_s * 1e6, abs=1.0)
+
+
+def test_what_was_kept_is_averaged_between_two_board_times(wire: tuple[BoardOnAWire, str]) -> None:
+    batches: list[SampleBatch] = []
+    with Board(wire[1], protocol.BAUD_RATE, batches.append) as board:
+        sensitivity = board.configure(0, 238, 245).sensitivity_rad_s
+        board.start()
+        wait_for(lambda: len(batches) > 0)
+        with pytest.raises(BoardError) as refusal:
+            board.observe(0, 0, 0, 1_000_000, speed_rad_s=1.0)
+        assert refusal.value.name == "not_kept"
+        board.keep([0], duration_s=2)
+        first = len(batches)
+        wait_for(lambda: len(batches) > first + 8)
+        samples = np.concatenate([batch.samples for batch in batches[first + 1 : first + 6]])
+        start_us, end_us = (int(samples["board_time_us"][i]) for i in (0, -1))
+        observed = board.observe(0, 0, start_us, end_us, speed_rad_s=1.0)
+        assert board.observe(0, 0, start_us, end_us, speed_rad_s=1.0) == observed
+        with pytest.raises(BoardError) as refusal:
+            board.observe(0, 2, start_us, end_us, speed_rad_s=1.0)
+        assert refusal.value.name == "bad_observation"
+        assert board.solve(0).status == "too_few_observations"
+
+    used = (samples["board_time_us"] >= observed.start_us) & (samples["board_time_us"] < observed.end_us)
+    assert start_us <= observed.start_us < observed.end_us <= end_us and observed.samples == used.sum() > 10
+    mean_rad_s = samples["counts"][used].mean(axis=0) * sensitivity
+    assert np.array(observed.mean_rad_s) == pytest.approx(mean_rad_s, rel=1e-6)
+
+
+@pytest.mark.parametrize("method", protocol.METHODS)
+def test_the_board_solves_what_it_is_reminded_of(wire: tuple[BoardOnAWire, str], method: str) -> None:
+    scale, bias, speed = np.array(CALIBRATION.scale), np.array(CALIBRATION.bias_rad_s), 1.0472
+    with Board(wire[1], protocol.BAUD_RATE, ignore) as board:
+        board.configure(0, 238, 245)
+        for index, direction in enumerate([*np.eye(3), *-np.eye(3)]):
+            mean_rad_s = speed * direction / scale - bias
+            assert board.recall(0, index, mean_rad_s.tolist(), speed).index == index
+        solution = board.solve(0, method)
+    assert (solution.status, solution.method, solution.observations) == ("solved", method, 6)
+    assert np.array(solution.scale) == pytest.approx(scale, rel=1e-5)
+    assert np.array(solution.bias_rad_s) == pytest.approx(bias, abs=1e-5)
+
+
 def test_reboot_returns_when_the_board_answers_again(wire: tuple[BoardOnAWire, str]) -> None:
     with Board(wire[1], protocol.BAUD_RATE, ignore) as board:
         board.configure(0, 238, 245)
@@ -209,22 +298,49 @@ def test_a_port_that_is_not_there() -> None:
 def test_a_port_without_a_board(wire: tuple[BoardOnAWire, str]) -> None:
     wire[0].hold.set()
     with pytest.raises(BoardError) as failure:
-        Board(wire[1], protocol.BAUD_RATE, ignore)
-    assert failure.value.name == "no_board"
+        Board(wire[1], protocol.BAUD_RATE, ignore, timeout_s=0.3)
+    assert failure.value.name == "no_board" and "rig board flash" in failure.value.remedy
 
 
 def test_another_baud_rate_makes_noise_of_an_idle_board(wire: tuple[BoardOnAWire, str]) -> None:
     wire[0].on_send = lambda data: bytes(byte >> 1 | 0x80 for byte in data)
     with pytest.raises(BoardError) as failure:
-        Board(wire[1], 115200, ignore)
+        Board(wire[1], 115200, ignore, timeout_s=0.7)
     assert failure.value.name == "wrong_baud_rate" and "921600" in failure.value.remedy
 
 
 def test_a_board_that_sends_but_does_not_hear(wire: tuple[BoardOnAWire, str]) -> None:
     wire[0].board.receive = lambda data: wire[0].board.run()  # type: ignore[method-assign]
     with pytest.raises(BoardError, match="does not answer") as failure:
-        Board(wire[1], protocol.BAUD_RATE, ignore)
+        Board(wire[1], protocol.BAUD_RATE, ignore, timeout_s=0.7)
     assert failure.value.name == "no_board"
+
+
+def test_frames_lost_on_the_way_are_counted_and_a_reboot_loses_none(wire: tuple[BoardOnAWire, str]) -> None:
+    lost: list[bytes] = []
+
+    def losing(data: bytes) -> bytes:
+        if len(lost) < 3 and data:
+            lost.extend(data.split(b"\0")[:-1])
+            return b""
+        return data
+
+    batches: list[SampleBatch] = []
+    with Board(wire[1], protocol.BAUD_RATE, batches.append) as board:
+        board.configure(0, rate_hz=238, range_deg_s=245)
+        board.start()
+        wait_for(lambda: len(batches) >= 2)
+        wire[0].on_send = losing
+        wait_for(lambda: len(lost) >= 3)
+        received = len(batches)
+        wait_for(lambda: len(batches) >= received + 2)
+        board.stop()
+        assert board.status().frames_lost == len(lost)
+        sequences = np.concatenate([batch.samples["sequence"] for batch in batches])
+        frames = [protocol.decode(block) for block in lost]
+        assert sequences[-1] + 1 - len(sequences) == sum(len(frame.items) for frame in frames if frame is not None)
+        board.reboot()
+        assert board.status().frames_lost == len(lost)
 
 
 def test_an_image_of_another_protocol_version(wire: tuple[BoardOnAWire, str]) -> None:
@@ -240,7 +356,7 @@ def test_an_image_of_another_protocol_version(wire: tuple[BoardOnAWire, str]) ->
     wire[0].on_send = another_version
     with pytest.raises(BoardError) as failure:
         Board(wire[1], protocol.BAUD_RATE, ignore)
-    assert failure.value.name == "version_mismatch"
+    assert failure.value.name == "version_mismatch" and "rig board flash" in failure.value.remedy
 
 
 def streaming(wire: tuple[BoardOnAWire, str]) -> Board:
