@@ -13,8 +13,9 @@ from rig.errors import Fault, RigError
 from rig.streams import keep_streams_usable
 
 if TYPE_CHECKING:
-    from rig.run import Script
+    from rig.session import Script
 
+_BOARD = "look at the board, read and change its stored calibrations, flash its firmware"
 FAULT, INTERRUPTED = Fault.exit_status, 130
 # Every way to end a command from outside. Left alone, a closed terminal, Ctrl-\ and Ctrl-Z would end or suspend this
 # process while the arm goes on moving.
@@ -104,9 +105,44 @@ def _parser() -> argparse.ArgumentParser:
     study.add_argument("--jobs", type=int, metavar="N", help="processes; the results do not depend on it")
     study.add_argument("--dask", metavar="ADDRESS", help="compute on the cluster of this Dask scheduler")
     study.add_argument("--format", choices=("csv", "parquet"), default="csv", help="of the table (default: csv)")
+    _add_board(commands.add_parser("board", help=_BOARD, description=_BOARD))
     world = add("world", _world, "only the simulated laboratory, in the foreground, for any client")
     _add_config(world)
     return parser
+
+
+def _add_board(board: argparse.ArgumentParser) -> None:
+    commands = board.add_subparsers(title="commands", required=True, metavar="COMMAND")
+
+    def add(
+        to: Any, name: str, run: Callable[[argparse.Namespace], int], text: str, *, config: bool = True
+    ) -> argparse.ArgumentParser:
+        command: argparse.ArgumentParser = to.add_parser(name, help=text, description=text)
+        command.set_defaults(command=run)
+        if config:
+            _add_config(command)
+        return command
+
+    info = add(commands, "info", _board_info, "what the board is, how it fares, which sensors and calibrations it has")
+    info.add_argument("--json", action="store_true", help="for machines")
+    text = "the calibrations in the board's flash"
+    stored = commands.add_parser("calibration", help=text, description=text).add_subparsers(
+        title="commands", required=True, metavar="COMMAND"
+    )
+    read = add(stored, "read", _board_read, "print what is stored")
+    read.add_argument("--json", action="store_true", help="for machines")
+    write = add(stored, "write", _board_write, "store the calibration of a run that passed")
+    write.add_argument("result", type=Path, metavar="RESULT", help="a run folder or its result.json")
+    erase = add(stored, "erase", _board_erase, "forget what is stored")
+    for command in (read, write, erase):
+        command.add_argument("--sensor", metavar="NAME", help="only this one of the configuration's sensors")
+    flash = add(commands, "flash", _board_flash, "put the firmware that comes with this program on it", config=False)
+    flash.add_argument("--probe", metavar="ID", help="the debug probe's id or a part of it, if there are several")
+    flash.add_argument(
+        "--drive", nargs="?", const="", metavar="PATH", help="copy to the board's USB drive instead; default: find it"
+    )
+    for command in (write, erase, flash):
+        command.add_argument("--yes", action="store_true", help="do not ask before the board is changed")
 
 
 def _add_config(parser: argparse.ArgumentParser) -> None:
@@ -131,12 +167,16 @@ def _add_outcome(parser: argparse.ArgumentParser) -> None:
     parser.add_argument("--json", action="store_true", help="print result.json instead of tables")
 
 
-def run_script(script: "Script") -> int:
-    """Entry point of the scripts in procedures/: they take the arguments of `rig run`."""
+def run_script(script: "Script", *, procedure: str) -> int:
+    """Entry point of the scripts in procedures/: they take the arguments of `rig run`.
+
+    `procedure` is what kind it is, whatever the file says: `six_observation` calibrates, `verify` verifies.
+    """
     parser = argparse.ArgumentParser(description=script.__doc__)
     _add_config(parser)
     _add_run(parser)
     options = parser.parse_args()
+    options.overrides.append(f"procedure.name={procedure}")
     return guarded(lambda: _run(options, script))
 
 
@@ -158,7 +198,8 @@ def _plan(options: argparse.Namespace) -> int:
     from rig.config.load import load
     from rig.report.plan import checked_plan, print_plan
 
-    print_plan(checked_plan(load(options.config, options.overrides).config), as_json=options.json)
+    config = load(options.config, options.overrides).config
+    print_plan(checked_plan(config), repeated=config.procedure.verify, as_json=options.json)
     return 0
 
 
@@ -192,6 +233,37 @@ def _study(options: argparse.Namespace) -> int:
         dask=options.dask,
         table_format=options.format,
     )
+
+
+def _board_info(options: argparse.Namespace) -> int:
+    from rig.board_command import info
+
+    return info(options.config, options.overrides, as_json=options.json)
+
+
+def _board_read(options: argparse.Namespace) -> int:
+    from rig.board_command import read
+
+    return read(options.config, options.overrides, options.sensor, as_json=options.json)
+
+
+def _board_write(options: argparse.Namespace) -> int:
+    from rig.board_command import write
+
+    return write(options.config, options.overrides, options.result, options.sensor, assume_yes=options.yes)
+
+
+def _board_erase(options: argparse.Namespace) -> int:
+    from rig.board_command import erase
+
+    return erase(options.config, options.overrides, options.sensor, assume_yes=options.yes)
+
+
+def _board_flash(options: argparse.Namespace) -> int:
+    from rig.flash_command import flash
+
+    drive = Path(options.drive) if options.drive else None
+    return flash(options.probe, drive, by_drive=options.drive is not None, assume_yes=options.yes)
 
 
 def _world(options: argparse.Namespace) -> int:
