@@ -102,8 +102,9 @@ class SensorCounts:
 
 @dataclass(frozen=True, slots=True)
 class BoardStatus:
-    """The board's health; counts since its last reset."""
+    """The board's health; counts since its last reset. `frames_lost` is what this program did not get of what it sent."""
 
+    frames_lost: int
     uptime_s: float
     rx_errors: int
     tx_overruns: int
@@ -116,10 +117,11 @@ class BoardStatus:
     sensors: tuple[SensorCounts, ...]
 
     @classmethod
-    def of(cls, frame: Frame) -> Self:
+    def of(cls, frame: Frame, frames_lost: int) -> Self:
         """A `report` frame."""
         values = frame.values
         return cls(
+            frames_lost=frames_lost,
             uptime_s=values["uptime_us"] * 1e-6,
             rx_errors=values["rx_errors"],
             tx_overruns=values["tx_overruns"],

@@ -86,8 +86,8 @@ class Board:
         self._ask("stop")
 
     def status(self) -> BoardStatus:
-        """The board's health."""
-        return BoardStatus.of(self._ask("status"))
+        """The board's health, and the link's."""
+        return BoardStatus.of(self._ask("status"), self._link.frames_lost)
 
     def keep(self, sensors: Collection[int], duration_s: float) -> None:
         """Lets the board keep the readings of these sensors from now on, for at least so long, for `observe`."""
@@ -217,6 +217,8 @@ class Board:
         elif frame.name == "ack" and request in ("start", "stop", "reboot"):
             # Here and not in the caller's thread: the samples of a started stream may already be in the next frame.
             self._streaming = request == "start"
+            if request == "reboot":
+                self._link.expect_restart()
         elif frame.name == "error" and frame.values["reply_to"] == 0:
             self._link.fail(self._refusal(frame))
         elif frame.name == "identity" and request is None and self._streaming:

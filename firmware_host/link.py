@@ -62,6 +62,15 @@ class BoardLink:
         return self._frames.bytes_seen
 
     @property
+    def frames_lost(self) -> int:
+        """Frames the board sent and that did not come, by their sequence."""
+        return self._frames.lost
+
+    def expect_restart(self) -> None:
+        """The board is about to count its frames anew."""
+        self._frames.expect_restart()
+
+    @property
     def closed(self) -> bool:
         """Whether `close` was called."""
         return self._closing.is_set()

@@ -24,7 +24,7 @@ class Transmission:
 
 @dataclass(frozen=True, slots=True)
 class Received:
-    """What a receiver made of it. `wrong`: accepted and never sent; `missed`: not accepted though no fault touched it."""
+    """What a receiver made of it. `wrong`: accepted, never sent; `missed`: not accepted though no fault touched it."""
 
     accepted: int
     wrong: int
