@@ -102,7 +102,7 @@ class SensorCounts:
 
 @dataclass(frozen=True, slots=True)
 class BoardStatus:
-    """The board's health; counts since its last reset. `frames_lost` is what this program did not get of what it sent."""
+    """The board's health; counts since its last reset. `frames_lost` counts those this program never got."""
 
     frames_lost: int
     uptime_s: float
