@@ -31,12 +31,9 @@ def c_header() -> str:
         "",
         *_c_enum("message_type", "MESSAGE", [(message.name, message.code) for message in protocol.MESSAGES]),
         *_c_enum("error_code", "ERROR", [(error.name, error.code) for error in protocol.ERRORS]),
-        *_c_enum("reset_cause", "RESET", [(cause, i) for i, cause in enumerate(protocol.RESET_CAUSES)]),
-        *_c_enum("sample_mode", "MODE", [(mode, i) for i, mode in enumerate(protocol.MODES)]),
-        *_c_enum("calibration_model", "MODEL", [(model, i) for i, model in enumerate(protocol.MODELS)]),
-        *_c_enum("solve_method", "METHOD", [(method, i) for i, method in enumerate(protocol.METHODS)]),
-        *_c_enum("solution_status", "SOLUTION", [(status, i) for i, status in enumerate(protocol.SOLUTION_STATUSES)]),
     ]
+    for name, (prefix, values) in protocol.ENUMERATIONS.items():
+        lines += _c_enum(name, prefix, [(value, i) for i, value in enumerate(values)])
     for message in protocol.MESSAGES:
         lines.append(f"/* {message.name}, from the {message.sender}: {message.meaning} */")
         if message.fields:

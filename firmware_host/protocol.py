@@ -32,6 +32,13 @@ RESET_CAUSES = ("unknown", "power", "pin", "software", "watchdog", "fault")
 MODELS = ("none", "k_times_m_plus_b")  # of a calibration; the second is g = K (m + b), SIX Eq. (3)
 METHODS = ("closed_form", "algorithm_1")
 SOLUTION_STATUSES = ("solved", "too_few_observations", "degenerate", "not_converged")
+ENUMERATIONS = {  # name → prefix of its values in C, the values counted from 0
+    "reset_cause": ("RESET", RESET_CAUSES),
+    "sample_mode": ("MODE", MODES),
+    "calibration_model": ("MODEL", MODELS),
+    "solve_method": ("METHOD", METHODS),
+    "solution_status": ("SOLUTION", SOLUTION_STATUSES),
+}
 
 # kind → (struct code, C type, C array suffix)
 KINDS = {
