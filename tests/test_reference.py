@@ -4,6 +4,7 @@ from pathlib import Path
 
 from firmware_host import protocol
 from firmware_host.reference import reference
+from firmware_host.stuffing import unstuff
 
 PAGE = Path(__file__).parent.parent / "docs" / "protocol.md"
 
@@ -27,7 +28,7 @@ def test_the_places_of_the_fields_are_those_on_the_wire() -> None:
     """`sequence` of a batch stands at byte 2 of the payload, after sensor and mode."""
     batch = {"sensor": 1, "mode": 0, "sequence": 0xAABBCCDD, "dropped": 0, "base_time_us": 0, "count": 0}
     frame = protocol.encode("samples", 7, batch)
-    payload = protocol.unstuff(frame[:-1])
+    payload = unstuff(frame[:-1])
     assert payload is not None
     assert payload[2 + 2 : 2 + 6] == bytes.fromhex("ddccbbaa")
     section = reference().split("### samples")[1].split("###")[0]
