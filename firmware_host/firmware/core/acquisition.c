@@ -5,13 +5,15 @@
 #include "clock.h"
 #include "kept.h"
 #include "link.h"
+#include "port.h"
 #include "sensor.h"
 
 #define RING 64u              /* a power of two */
 #define BATCH_AGE_US 40000u   /* a sample waits no longer than this for company */
 #define SILENCE_PERIODS 10u   /* so many conversions missing in a row is a fault, not jitter */
 #define SILENCE_US 100000u    /* and time for a part that is just starting up */
-#define BAD_READS 10u         /* so many in a row are worth a word */
+#define BAD_READS 10u         /* so many in a row are worth a word, */
+#define GOOD_READS 8u         /* and as good as one less after so many good ones */
 #define SAMPLES_MAX ((PAYLOAD_MAX - sizeof(struct samples_payload)) / sizeof(struct samples_item))
 #define RATES_MAX ((PAYLOAD_MAX - sizeof(struct rates_payload)) / sizeof(struct rates_item))
 
@@ -31,7 +33,7 @@ struct stream {
     uint64_t last_us;   /* latest conversion, or the start */
     uint64_t watched_us; /* from when on silence counts */
     uint32_t settling;  /* conversions still to throw away */
-    uint32_t bad_reads; /* in a row */
+    uint32_t distrust;  /* grows by bad reads, shrinks by good ones */
     bool silence_reported, bad_reads_reported;
     uint32_t conversions, sent, dropped;
     struct sample ring[RING];
@@ -82,7 +84,10 @@ static void rearm(unsigned sensor)
 
 bool acquisition_start(uint8_t calibrated, const struct correction corrections[SENSOR_COUNT])
 {
-    bool any = false;
+    uint8_t configured = 0;
+    for (unsigned i = 0; i < SENSOR_COUNT; i++)
+        configured |= (uint8_t)((streams[i].period_us != 0) << i);
+    port_listen(configured);
     for (unsigned i = 0; i < SENSOR_COUNT; i++) {
         struct stream *stream = &streams[i];
         stream->conversions = stream->sent = stream->dropped = 0;
@@ -90,21 +95,20 @@ bool acquisition_start(uint8_t calibrated, const struct correction corrections[S
         stream->calibrated = is_named(calibrated, i);
         if (stream->calibrated)
             stream->correction = corrections[i];
-        stream->bad_reads = 0;
+        stream->distrust = 0;
         stream->silence_reported = stream->bad_reads_reported = false;
         stream->last_us = stream->watched_us = clock_now();
-        if (stream->period_us != 0) {
+        if (is_named(configured, i))
             rearm(i);
-            any = true;
-        }
     }
-    running = any;
-    return any;
+    running = configured != 0;
+    return running;
 }
 
 void acquisition_stop(void)
 {
     running = false;
+    port_listen(0); /* an ADIS16465 cannot be told to be quiet */
 }
 
 bool acquisition_is_running(void)
@@ -157,12 +161,13 @@ static void watch_reads(unsigned sensor, enum read_result result)
     };
     struct stream *stream = &streams[sensor];
     if (result == READ_FRESH) {
-        stream->bad_reads = 0;
+        stream->distrust -= stream->distrust != 0;
         return;
     }
     bus_errors++;
-    stream->bad_reads++;
-    if (stream->bad_reads >= BAD_READS && !stream->bad_reads_reported)
+    if (stream->distrust < BAD_READS * GOOD_READS)
+        stream->distrust += GOOD_READS;
+    if (stream->distrust >= BAD_READS * GOOD_READS && !stream->bad_reads_reported)
         stream->bad_reads_reported = complain(sensor, meaning[result]);
 }
 

@@ -26,8 +26,8 @@ enum register_address {
 #define DIVIDER_MAX 2000u
 #define SETTLING 2u /* the conversion under way when the rate changed, and one more */
 
-/* A setting reads back only when the part has worked it in: more than 60 µs after its writing (Analog's EngineerZone,
-   thread 581040). Two conversions at its own rate are time enough. */
+/* A setting reads back only when the part has worked it in, 30 µs after its writing, MSC_CTRL 200 µs (Analog's no-OS,
+   drivers/imu/adis1646x.c); more than 60 was seen (EngineerZone, thread 581040). Two conversions are time enough. */
 #define TAKEN_WITHIN_US 1000u
 
 /* By what RANG_MDL says: the model decides the range. */
@@ -42,12 +42,19 @@ static uint16_t word_at(const uint8_t *bytes)
     return (uint16_t)(bytes[0] << 8 | bytes[1]);
 }
 
-/* The pause comes first, so that it also parts this conversation from the one before. */
+static void transfer(unsigned device, uint8_t *bytes, size_t size)
+{
+    static uint32_t idle_since_us;
+    if (port_time_us() - idle_since_us <= STALL_US)
+        port_wait_us(STALL_US);
+    bus_xfer(device, BUS_HZ, bytes, size);
+    idle_since_us = port_time_us();
+}
+
 static uint16_t exchange(unsigned device, uint8_t first, uint8_t second)
 {
     uint8_t bytes[2] = {first, second};
-    port_wait_us(STALL_US);
-    bus_xfer(device, BUS_HZ, bytes, sizeof bytes);
+    transfer(device, bytes, sizeof bytes);
     return word_at(bytes);
 }
 
@@ -118,8 +125,7 @@ static enum read_result read(unsigned device, struct reading *reading)
 {
     static uint16_t last_counter;
     uint8_t bytes[22] = {GLOB_CMD};
-    port_wait_us(STALL_US);
-    bus_xfer(device, BUS_HZ, bytes, sizeof bytes);
+    transfer(device, bytes, sizeof bytes);
 
     uint16_t sum = 0;
     for (unsigned i = 2; i < 20; i++)

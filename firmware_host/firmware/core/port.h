@@ -16,6 +16,9 @@ void port_wait_us(uint32_t duration_us);
    FIFO takes two bytes an access. */
 void bus_xfer(unsigned device, uint32_t max_hz, uint8_t *bytes, size_t size);
 
+/* From now on only these sensors' data-ready lines interrupt: bit i is sensor i. What they did before is forgotten. */
+void port_listen(uint8_t mask);
+
 /* Starts sending; the bytes stay untouched until the port calls link_sent(). */
 void port_transmit(const uint8_t *bytes, size_t size);
 

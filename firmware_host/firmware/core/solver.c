@@ -10,6 +10,10 @@
    times as large: what the host accepts is solved here too. A direction that was not swept gives hundreds. */
 #define MAX_CONDITION 100.0f
 
+/* No sensor's scale factor is that far off, either way. Sweeps that are all alike leave only noise to compare, which looks like
+   readings of a sensor that is. */
+#define MAX_SCALE 4.0f
+
 #define NEWTON_LIMIT 20u
 #define NEWTON_TOLERANCE 1e-4f /* of ω²: a step this small leaves an error of its square */
 #define ALGORITHM_1_LIMIT 255u
@@ -28,14 +32,17 @@ void solver_begin(struct accumulator *accumulator)
     memset(accumulator, 0, sizeof *accumulator);
 }
 
-/* The Givens rotation that takes `b` into `a`. */
+/* The Givens rotation that takes `b` into `a`. Where squaring would leave too few digits, there is nothing to take. */
 struct rotation {
     float c, s;
 };
 
 static struct rotation rotation_of(float a, float b)
 {
-    float inverse = 1.0f / __builtin_sqrtf(a * a + b * b);
+    float square = a * a + b * b;
+    if (square < 1e-30f)
+        return (struct rotation){1.0f, 0.0f};
+    float inverse = 1.0f / __builtin_sqrtf(square);
     return (struct rotation){a * inverse, b * inverse};
 }
 
@@ -54,8 +61,6 @@ void solver_add(struct accumulator *accumulator, const float mean_rad_s[3], floa
         row[4 + axis] = mean_rad_s[axis] * mean_rad_s[axis];
     }
     for (unsigned i = 0; i < SOLVER_UNKNOWNS; i++) {
-        if (row[i] == 0.0f)
-            continue;
         struct rotation by = rotation_of(accumulator->r[i][i], row[i]);
         for (unsigned j = i; j <= SPEED; j++)
             rotate(by, &accumulator->r[i][j], &row[j]);
@@ -104,9 +109,9 @@ static void invert(struct design *design)
     }
 }
 
-/* Whether the revolutions tell all six parameters apart. Readings are measured in their own RMS length, so that squares and
-   linear terms compare. What is not a number is refused too. */
-static bool is_well_conditioned(const struct design *design, uint16_t count)
+/* Whether the revolutions tell all six parameters apart. Readings, counted from their mean, are measured in their own RMS
+   length, so that squares and linear terms compare. What is not a number is refused too. */
+static bool is_well_conditioned(const struct design *design, uint16_t count, float speed2)
 {
     float linear = 0.0f, squares = 0.0f, inverse_linear = 0.0f, inverse_squares = 0.0f;
     for (unsigned i = 0; i < PARAMETERS; i++)
@@ -115,6 +120,8 @@ static bool is_well_conditioned(const struct design *design, uint16_t count)
             *(i < 3 ? &inverse_linear : &inverse_squares) += design->inverse[i][j] * design->inverse[i][j];
         }
     float length2 = linear / count;
+    if (!(length2 < MAX_SCALE * MAX_SCALE * speed2 && speed2 < MAX_SCALE * MAX_SCALE * length2))
+        return false;
     float norm2 = count + squares / (length2 * length2);
     float inverse_norm2 = length2 * (inverse_linear + length2 * inverse_squares);
     return norm2 * inverse_norm2 <= MAX_CONDITION * MAX_CONDITION;
@@ -217,16 +224,16 @@ static enum solution_status solve(const struct accumulator *accumulator, enum so
     float beta[PARAMETERS];
     if (accumulator->count < PARAMETERS)
         return SOLUTION_TOO_FEW_OBSERVATIONS;
+    float speed2 = accumulator->r[0][SPEED] / accumulator->r[0][0]; /* the mean of ω² */
     reduce(accumulator, true, &design);
     invert(&design);
-    if (!is_well_conditioned(&design, accumulator->count))
+    if (!is_well_conditioned(&design, accumulator->count, speed2))
         return SOLUTION_DEGENERATE;
     if (method == METHOD_ALGORITHM_1) { /* counts readings from zero, as published */
         reduce(accumulator, false, &design);
         invert(&design);
     }
     solve_line(&design, &line);
-    float speed2 = accumulator->r[0][SPEED] / accumulator->r[0][0];
     enum solution_status status = method == METHOD_ALGORITHM_1
                                       ? by_algorithm_1(&line, beta, &solution->iterations)
                                       : by_newton(&line, speed2, beta, &solution->iterations);

@@ -108,7 +108,6 @@ static void setup_data_ready(void)
     SYSCFG_EXTICR3 = SYSCFG_EXTICR3_EXTI8(0u);
     SYSCFG_EXTICR4 = SYSCFG_EXTICR4_EXTI12(0u);
     EXTI_RTSR1 |= EXTI_RTSR1_TR1 | EXTI_RTSR1_TR8 | EXTI_RTSR1_TR12;
-    EXTI_IMR1 |= EXTI_IMR1_MR1 | EXTI_IMR1_MR8 | EXTI_IMR1_MR12;
 }
 
 static void setup_interrupts(void)

@@ -41,6 +41,21 @@ static const struct {
     {&GPIOA_BSRR, GPIOA_BSRR_BR4, GPIOA_BSRR_BS4},
 };
 
+/* An edge pends its line also while that is masked. */
+void port_listen(uint8_t mask)
+{
+    static const struct {
+        uint32_t enable, pending;
+    } lines[SENSOR_COUNT] = {
+        {EXTI_IMR1_MR8, EXTI_PR1_PR8}, {EXTI_IMR1_MR12, EXTI_PR1_PR12}, {EXTI_IMR1_MR1, EXTI_PR1_PR1}};
+    for (unsigned i = 0; i < SENSOR_COUNT; i++) {
+        EXTI_IMR1 &= ~lines[i].enable;
+        EXTI_PR1 = lines[i].pending;
+        if (is_named(mask, i))
+            EXTI_IMR1 |= lines[i].enable;
+    }
+}
+
 static void set_bus_clock(uint32_t max_hz)
 {
     uint32_t code = 0; /* CLOCK_HZ / 2, 4, … 256 */
