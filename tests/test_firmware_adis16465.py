@@ -101,3 +101,13 @@ def test_a_fault_the_adis16465_reports_is_named(status: int, name: str | None) -
         convert(board, 100_000 + 5000 * k, sensor=2)
     errors = [(f.values["sensor"], ERROR_BY_CODE[f.values["code"]].name) for f in board.frames() if f.name == "error"]
     assert errors == ([(2, name)] if name else [])
+
+
+@pytest.mark.parametrize(("every", "named"), [(3, True), (20, False)])
+def test_damage_again_and_again_is_named_but_not_a_burst_now_and_then(every: int, named: bool) -> None:
+    board, part = streaming_adis16465()
+    for k in range(300):
+        part.damage = k % every == 0
+        convert(board, 100_000 + 5000 * k, sensor=2)
+    errors = [ERROR_BY_CODE[f.values["code"]].name for f in board.frames() if f.name == "error"]
+    assert errors == ["checksum_failed"] * named
