@@ -17,6 +17,8 @@ from scipy.spatial.transform import Rotation
 CONFIGS = Path(__file__).parent.parent / "configs"
 EXPERIMENTS = ["lsm9ds1_adis16465", "mpu9250_adis16465"]
 
+pytestmark = pytest.mark.timeout(180)  # a whole experiment or two
+
 Finished = tuple[Path, dict[str, Any], dict[str, Any]]
 
 
@@ -36,7 +38,7 @@ def finished(request: pytest.FixtureRequest, tmp_path_factory: pytest.TempPathFa
     out = tmp_path_factory.mktemp(request.param) / "run"
     config = CONFIGS / f"{request.param}.yaml"
     done = subprocess.run(
-        command("run", config, "--out", out, *on_fresh_host()), capture_output=True, text=True, timeout=60, check=False
+        command("run", config, "--out", out, *on_fresh_host()), capture_output=True, text=True, timeout=90, check=False
     )
     assert done.returncode == 0, done.stdout + done.stderr
     world = yaml.safe_load(config.read_text(encoding="utf-8"))["world"]["sensors"]
@@ -97,10 +99,34 @@ def test_the_stored_calibration_is_the_one_that_was_found(finished: Finished) ->
     out, result, _ = finished
     log = (out / "log.txt").read_text(encoding="utf-8")
     assert "stored on the board: gyro" in log
-    again = subprocess.run(command("solve", out, "--json"), capture_output=True, text=True, timeout=60, check=False)
+    again = subprocess.run(command("solve", out, "--json"), capture_output=True, text=True, timeout=90, check=False)
     assert again.returncode == 0, again.stderr
     solved = json.loads(again.stdout)
     assert solved["sensors"] == result["sensors"] and solved["verification"] == result["verification"]
+
+
+@pytest.mark.parametrize("finished", EXPERIMENTS[:1], indirect=True)
+def test_a_stored_calibration_is_verified_later(finished: Finished, tmp_path: Path) -> None:
+    """The board remembers over a power cycle: another process, another laboratory, the same flash."""
+    out, result, _ = finished
+    config = out / "config.yaml"
+    addressed = [*on_fresh_host(), "--set", f"world.board.flash_file={tmp_path / 'flash.bin'}"]
+    script = CONFIGS.parent / "procedures" / "verify.py"
+    nothing = [sys.executable, str(script), str(config), *addressed, "--out", str(tmp_path / "nothing")]
+    refused = subprocess.run(nothing, capture_output=True, text=True, timeout=90, check=False)
+    assert refused.returncode == 2 and "no_calibration" in refused.stderr, refused.stderr
+    stored = subprocess.run(
+        command("board", "calibration", "write", config, out, "--yes", *addressed),
+        capture_output=True, text=True, timeout=90, check=False,
+    )  # fmt: skip
+    assert stored.returncode == 0, stored.stderr
+    again = [sys.executable, str(script), str(config), *addressed, "--out", str(tmp_path / "again"), "--json"]
+    verified = subprocess.run(again, capture_output=True, text=True, timeout=90, check=False)
+    assert verified.returncode == 0, verified.stdout + verified.stderr
+    document = json.loads(verified.stdout)
+    assert document["sensors"] == {} and document["verification"]["gyro"]["before"] is None
+    kept = document["provenance"]["stored_calibrations"]["gyro"]
+    assert np.allclose(kept["scale"], result["sensors"]["gyro"]["scale"], rtol=1e-6)
 
 
 def test_a_failed_calibration_is_neither_stored_nor_verified(tmp_path: Path) -> None:
@@ -108,7 +134,7 @@ def test_a_failed_calibration_is_neither_stored_nor_verified(tmp_path: Path) -> 
     strict = ["--set", "limits.scale_deviation=0.01", "--set", "world.time_scale=12"]
     done = subprocess.run(
         command("run", CONFIGS / "lsm9ds1_adis16465.yaml", "--out", out, *on_fresh_host(), *strict),
-        capture_output=True, text=True, timeout=60, check=False,
+        capture_output=True, text=True, timeout=90, check=False,
     )  # fmt: skip
     assert done.returncode == 1, done.stderr
     assert "not verified: the calibration failed its limits" in done.stderr and not (out / "verify.h5").exists()
@@ -129,6 +155,6 @@ def test_an_interrupted_verification_is_resumed(tmp_path: Path) -> None:
     process.send_signal(signal.SIGINT)
     _, errors = process.communicate(timeout=20)
     assert process.returncode == 130 and f"rig resume {out}" in errors
-    resumed = subprocess.run(command("resume", out), capture_output=True, text=True, timeout=60, check=False)
+    resumed = subprocess.run(command("resume", out), capture_output=True, text=True, timeout=90, check=False)
     assert resumed.returncode == 0, resumed.stdout + resumed.stderr
     assert json.loads((out / "result.json").read_text())["verification"]["gyro"]["before"] is not None

@@ -22,16 +22,16 @@ def checked_plan(config: RigConfig) -> Plan:
     return plan
 
 
-def plan_document(plan: Plan) -> dict[str, Any]:
-    """The plan for machines: SI units, every field of every step."""
+def plan_document(plan: Plan, *, repeated: bool) -> dict[str, Any]:
+    """The plan for machines: SI units, every field of every step; `repeated` if it is done once more, to verify."""
     steps = [{"kind": type(step).__name__.lower(), **asdict(step)} for step in plan.steps]
-    return {"schema": "rig.plan/1", "duration_s": plan.duration_s, "steps": steps}
+    return {"schema": "rig.plan/1", "duration_s": plan.duration_s, "repeated": repeated, "steps": steps}
 
 
-def print_plan(plan: Plan, *, as_json: bool) -> None:
+def print_plan(plan: Plan, *, repeated: bool, as_json: bool) -> None:
     """The plan on stdout: a table in degrees for people, JSON in SI units for machines."""
     if as_json:
-        print(json.dumps(plan_document(plan), indent=2))
+        print(json.dumps(plan_document(plan, repeated=repeated), indent=2))
         return
     console = Console(highlight=False)
     table = Table(title="plan, from the home pose", title_justify="left", box=SIMPLE)
@@ -44,6 +44,8 @@ def print_plan(plan: Plan, *, as_json: bool) -> None:
         at_s += step.duration_s
     console.print(table)
     console.print(f"{len(plan.sweeps)} sweeps, {len(plan.motions)} motions, {plan.duration_s:.1f} s; all within limits")
+    if repeated:
+        console.print(f"If the calibration passes, the same once more to verify it: {2 * plan.duration_s:.1f} s in all")
 
 
 def _motion(step: Step) -> tuple[str, str, str]:
