@@ -113,9 +113,11 @@ class BoardLink:
         self._closing.set()
         self._reader.join()
         sock = getattr(self._serial, "_socket", None)
-        self._serial.close()
         if sock is not None:
-            sock.close()  # pyserial leaves it open when the far end closed it first
+            # pyserial would leave it open when the far end closed it first, and else wait 0.3 s after closing it.
+            sock.close()
+            self._serial.is_open = False
+        self._serial.close()
 
     def _send(self, name: str, sequence: int, values: dict[str, Any]) -> None:
         """The leading zero ends whatever half a frame the board may have heard before."""
