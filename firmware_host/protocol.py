@@ -14,7 +14,7 @@ import struct
 from dataclasses import dataclass
 from functools import cached_property
 from itertools import islice
-from typing import Any
+from typing import Any, NamedTuple
 from zlib import crc32
 
 import numpy as np
@@ -370,8 +370,7 @@ _BY_NAME = {message.name: message for message in MESSAGES}
 ERROR_BY_CODE = {error.code: error for error in ERRORS}
 
 
-@dataclass(frozen=True, slots=True)
-class Frame:
+class Frame(NamedTuple):
     """A received frame: fixed fields by name, items as a structured array of the table's layout."""
 
     name: str

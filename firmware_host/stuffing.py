@@ -32,9 +32,10 @@ def unstuff_in_python(block: bytes) -> bytes | None:
 def unstuff_by_package(block: bytes) -> bytes | None:
     """The same by `cobs`, for any `block`."""
     try:
-        return bytes(cobs.decode(block))
+        body: bytes = cobs.decode(block)
     except cobs.DecodeError:
         return None
+    return body
 
 
 unstuff = unstuff_by_package if isinstance(cobs.decode, BuiltinFunctionType) else unstuff_in_python

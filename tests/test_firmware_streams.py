@@ -40,21 +40,20 @@ def test_the_time_stamp_is_the_interrupts_and_counts_beyond_32_bits() -> None:
     assert [f.values["base_time_us"] + d for f in batches for d in f.items["delta_us"].tolist()] == times
 
 
-def test_a_batch_leaves_when_it_is_40_ms_old_or_full() -> None:
-    board = streaming_board()
-    for k in range(1, 100):
-        convert(board, k * PERIOD_US)
-    batches = board.frames()
-    assert {frame.values["count"] for frame in batches} == {11}  # ten periods of 4.2 ms
-    assert [frame.sequence for frame in batches] == list(range(batches[0].sequence, batches[0].sequence + len(batches)))
-
+@pytest.mark.parametrize(
+    ("rate_hz", "period_us", "count"),
+    [(119, 8403, 11), (238, PERIOD_US, BATCH_MAX), (952, 1050, BATCH_MAX)],  # ten periods of 8.4 ms, or a full frame
+)
+def test_a_batch_leaves_when_it_is_80_ms_old_or_full(rate_hz: float, period_us: int, count: int) -> None:
     board = HostBoard()
-    board.ask("configure", sensor=0, rate_hz=952, range_deg_s=245)
+    board.ask("configure", sensor=0, rate_hz=rate_hz, range_deg_s=245)
     board.ask("start", sensors=0)
     settle(board)
     for k in range(1, 100):
-        convert(board, k * 1050)
-    assert {frame.values["count"] for frame in board.frames()} == {BATCH_MAX}
+        convert(board, k * period_us)
+    batches = board.frames()
+    assert {frame.values["count"] for frame in batches} == {count}
+    assert [frame.sequence for frame in batches] == list(range(batches[0].sequence, batches[0].sequence + len(batches)))
 
 
 def test_what_a_part_converts_while_it_settles_is_no_sample_and_no_loss() -> None:

@@ -7,7 +7,7 @@ from firmware_host.protocol import MESSAGES, OVERHEAD, PAYLOAD_MAX
 
 BITS_PER_BYTE = 10  # start bit, eight data bits, stop bit
 COBS_BYTES = 2  # the code byte and the delimiter
-BATCH_S = 0.04  # the firmware sends a batch when its first sample is this old, or the frame is full
+BATCH_S = 0.08  # the firmware sends a batch when its first sample is this old, or the frame is full
 MARGIN = 0.1  # of the link stays free: answers, and a clock that is a little off
 
 _BY_NAME = {message.name: message for message in MESSAGES}

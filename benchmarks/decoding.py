@@ -1,0 +1,148 @@
+"""How fast the host decodes what the board sends: `python benchmarks/decoding.py [megabytes]`.
+
+What the emulated board sends becomes batches of samples, on this machine and as on one where package `cobs` could not
+compile its fast part. Beside it, a decoder that takes one byte after the other, and pymavlink on as many RAW_IMU
+messages as there are samples. Fails under 20 MB/s.
+"""
+
+import sys
+import time
+from collections.abc import Callable
+from pathlib import Path
+from unittest.mock import patch
+from zlib import crc32
+
+from pymavlink.dialects.v20 import common as mavlink
+
+from firmware_host import protocol, stuffing
+from firmware_host.answers import SampleBatch
+from firmware_host.protocol import MESSAGES, FrameReader
+
+sys.path.insert(0, str(Path(__file__).parents[1] / "tests"))
+from emulated_session import Session
+
+STREAMS = {
+    "three sensors": {"lsm9ds1": 238.0, "mpu9250": 200.0, "adis16465": 200.0},
+    "one at 952 Hz": {"lsm9ds1": 952.0},
+}
+LIMIT_MB_S = 20.0
+CHUNK = 4096  # what a read from the port brings at most
+RECORDED_S = 4.0
+ROUNDS = 3
+SLOW_SHARE = 0.05  # of the stream is enough for the decoders beside ours
+
+_SAMPLES = next(message for message in MESSAGES if message.name == "samples")
+_CRC_OF_BYTE = [crc32(bytes((value,)), 0xFFFF_FFFF) ^ 0xFFFF_FFFF for value in range(256)]
+
+
+def recorded(rates_hz: dict[str, float]) -> bytes:
+    """What the board sends while these parts stream."""
+    session = Session(parts=list(rates_hz))
+    session.run(0.2)
+    for part, rate_hz in rates_hz.items():
+        session.configure(part, rate_hz)
+    session.ask("start", sensors=0)
+    before = len(session.sent)
+    session.run(RECORDED_S)
+    return session.sent[before:]
+
+
+def frames(stream: bytes) -> int:
+    """Samples in the frames that a FrameReader makes of `stream`."""
+    reader = FrameReader()
+    return sum(len(frame.items) for i in range(0, len(stream), CHUNK) for frame in reader.feed(stream[i : i + CHUNK]))
+
+
+def batches(stream: bytes) -> int:
+    """The same, each frame made a batch."""
+    reader, samples = FrameReader(), 0
+    for i in range(0, len(stream), CHUNK):
+        for frame in reader.feed(stream[i : i + CHUNK]):
+            samples += len(SampleBatch.of(frame, 0.0).samples)
+    return samples
+
+
+def batches_without_compiler(stream: bytes) -> int:
+    """The same by plain Python alone."""
+    with patch.object(protocol, "unstuff", stuffing.unstuff_in_python):
+        return batches(stream)
+
+
+def byte_loop(stream: bytes) -> int:
+    """Samples by a decoder as a small controller has it: COBS and CRC byte by byte, then the integers."""
+    samples, body, left, crc = 0, bytearray(), -1, 0xFFFF_FFFF
+    for byte in stream:
+        if byte == 0:
+            if crc == 0xDEBB_20E3 and body[0] == _SAMPLES.code:
+                samples += len(_counts(body))
+            body, left, crc = bytearray(), -1, 0xFFFF_FFFF
+            continue
+        if left > 0:
+            value = byte
+            left -= 1
+        else:
+            first, left = left < 0, byte - 1
+            if first:
+                continue
+            value = 0
+        body.append(value)
+        crc = crc >> 8 ^ _CRC_OF_BYTE[(crc ^ value) & 0xFF]
+    return samples
+
+
+def _counts(body: bytearray) -> list[list[int]]:
+    """x, y, z and temperature of every sample in a decoded `samples` frame."""
+    items = range(2 + _SAMPLES.head.size, len(body) - 4, _SAMPLES.item_dtype.itemsize)
+    return [[body[at + k] | body[at + k + 1] << 8 for k in range(4, 12, 2)] for at in items]
+
+
+def mavlink_of(samples: int) -> bytes:
+    """So many RAW_IMU messages."""
+    sender = mavlink.MAVLink(None)
+    messages = (
+        mavlink.MAVLink_raw_imu_message(4202 * k, 0, 0, 0, k % 400, -k % 400, 7, 0, 0, 0) for k in range(samples)
+    )
+    return b"".join(message.pack(sender) for message in messages)
+
+
+def by_pymavlink(stream: bytes) -> int:
+    """Messages in `stream`."""
+    receiver = mavlink.MAVLink(None)
+    return sum(len(receiver.parse_buffer(stream[i : i + CHUNK]) or ()) for i in range(0, len(stream), CHUNK))
+
+
+def measure(decode: Callable[[bytes], int], stream: bytes) -> tuple[float, int]:
+    """Megabytes a second, the best of some rounds, and what was decoded."""
+    best_s = float("inf")
+    for _ in range(ROUNDS):
+        began_s = time.perf_counter()
+        decoded = decode(stream)
+        best_s = min(best_s, time.perf_counter() - began_s)
+    return len(stream) / best_s * 1e-6, decoded
+
+
+def main(megabytes: float) -> int:
+    slow = []
+    print(f"package cobs has its compiled part: {stuffing.unstuff is stuffing.unstuff_by_package}")
+    for name, rates_hz in STREAMS.items():
+        once = recorded(rates_hz)
+        stream = once * round(megabytes * 1e6 / len(once))
+        few = stream[: int(len(stream) * SLOW_SHARE)]
+        print(f"{name}: {' + '.join(f'{rate_hz:g}' for rate_hz in rates_hz.values())} Hz")
+        for decode in (frames, batches, batches_without_compiler):
+            mb_s, samples = measure(decode, stream)
+            print(f"  {decode.__name__:26}{mb_s:7.1f} MB/s {mb_s * samples / len(stream):6.2f} million samples/s")
+            if mb_s < LIMIT_MB_S:
+                slow.append(f"{decode.__name__} of {name}")
+        mb_s, samples = measure(byte_loop, few)
+        print(f"  {'byte_loop':26}{mb_s:7.1f} MB/s {mb_s * samples / len(few):6.2f} million samples/s")
+        messages = mavlink_of(samples)
+        mb_s, samples = measure(by_pymavlink, messages)
+        print(f"  {'pymavlink':26}{mb_s:7.1f} MB/s {mb_s * samples / len(messages):6.2f} million samples/s")
+    if slow:
+        print(f"under {LIMIT_MB_S:g} MB/s: {', '.join(slow)}")
+    return 1 if slow else 0
+
+
+if __name__ == "__main__":
+    sys.exit(main(float(sys.argv[1]) if len(sys.argv) > 1 else 8.0))
