@@ -4,41 +4,55 @@ import sys
 import time
 from pathlib import Path
 
+from firmware_host.emulator.adis16465 import Adis16465
 from firmware_host.emulator.flash_memory import FlashMemory
 from firmware_host.emulator.gyroscope import GyroTruth
 from firmware_host.emulator.lsm9ds1 import Lsm9ds1
 from firmware_host.emulator.machine import EmulatedBoard
+from firmware_host.emulator.mpu9250 import Mpu9250
 from firmware_host.protocol import FrameReader, encode
 
 IMAGE = Path(__file__).parents[1] / "firmware_host" / "firmware" / "image"
 TICK_S = 0.002
 
 
+PARTS = (Lsm9ds1, Mpu9250, Adis16465)  # in the order of the board's sensor table
+RANGES_DEG_S = (245.0, 250.0, 500.0)
+RUNS_HZ = ((), (119.0,), (238.0,), (476.0,), (952.0,), (238.0, 200.0, 200.0))  # one data rate for each sensor
+
+
 def main(duration_s: float) -> None:
-    for rate_hz in (0.0, 119.0, 238.0, 476.0, 952.0):
-        gyro = Lsm9ds1(lambda _time_s: (0.1, 0.2, 0.3), GyroTruth(noise_rad_s=0.035), temperature_c=22.0, seed=1)
+    for rates_hz in RUNS_HZ:
+        truth = GyroTruth(noise_rad_s=0.035)
         board = EmulatedBoard(
             flash=FlashMemory((IMAGE / "rig_l432.bin").read_bytes()),
             elf=(IMAGE / "rig_l432.elf").read_bytes(),
-            devices=[gyro],
+            devices=[
+                part(lambda _time_s: (0.1, 0.2, 0.3), truth, temperature_c=22.0, seed=1)
+                for part in PARTS[: len(rates_hz)]
+            ],
             unique_id=bytes(12),
             crystal_ppm=35.0,
             boot_time_s=0.0,
         )
         board.advance(0.1)
-        if rate_hz:
-            settings = {"sensor": 0, "rate_hz": rate_hz, "range_deg_s": 245.0}
-            board.receive(encode("configure", 1, settings) + encode("start", 2, {"mode": 0}))
+        for sensor, rate_hz in enumerate(rates_hz):
+            settings = {"sensor": sensor, "rate_hz": rate_hz, "range_deg_s": RANGES_DEG_S[sensor]}
+            board.receive(encode("configure", 1, settings))
+        board.receive(encode("start", 2, {"sensors": 0}))
         board.advance(0.2)
         reader, samples = FrameReader(), 0
         reader.feed(board.transmitted())
-        start = time.perf_counter()
+        start_s, start_cpu_s = time.perf_counter(), time.process_time()
         for step in range(1, round(duration_s / TICK_S) + 1):
             board.advance(0.2 + step * TICK_S)
             frames = reader.feed(board.transmitted())
             samples += sum(len(frame.items) for frame in frames if frame.name == "samples")
-        elapsed_s = time.perf_counter() - start
-        print(f"{rate_hz:5g} Hz: {duration_s / elapsed_s:5.1f} times real time, {samples} samples in {duration_s:g} s")
+        elapsed_s, cpu_s = time.perf_counter() - start_s, time.process_time() - start_cpu_s
+        print(
+            f"{' + '.join(f'{rate_hz:g}' for rate_hz in rates_hz) or 'no'} Hz: {duration_s / elapsed_s:.1f} times real "
+            f"time, {duration_s / cpu_s:.1f} with a core to itself, {samples} samples in {duration_s:g} s"
+        )
 
 
 if __name__ == "__main__":

@@ -37,9 +37,10 @@ from firmware_host.emulator.timeline import Timeline
 _SET_CPU_MODEL = (1 << 30) | (1 << 26) | UC_CTL_CPU_MODEL  # uc_ctl: write, one argument
 _NO_END = 0xFFFF_FFFF  # an address the core never executes: only stop(), WFI and faults end a run
 
-_READ = ctypes.CFUNCTYPE(ctypes.c_uint64, ctypes.c_void_p, ctypes.c_uint64, ctypes.c_uint, ctypes.c_void_p)
-_WRITE = ctypes.CFUNCTYPE(None, ctypes.c_void_p, ctypes.c_uint64, ctypes.c_uint, ctypes.c_uint64, ctypes.c_void_p)
-_BLOCK = ctypes.CFUNCTYPE(None, ctypes.c_void_p, ctypes.c_uint64, ctypes.c_uint32, ctypes.c_void_p)
+# Unicorn passes one argument more to all of these, the user's data: what is not looked at need not be converted
+_READ = ctypes.CFUNCTYPE(ctypes.c_uint64, ctypes.c_void_p, ctypes.c_uint64, ctypes.c_uint)
+_WRITE = ctypes.CFUNCTYPE(None, ctypes.c_void_p, ctypes.c_uint64, ctypes.c_uint, ctypes.c_uint64)
+_BLOCK = ctypes.CFUNCTYPE(None, ctypes.c_void_p, ctypes.c_uint64, ctypes.c_uint32)
 _INVALID = ctypes.CFUNCTYPE(
     ctypes.c_bool, ctypes.c_void_p, ctypes.c_int, ctypes.c_uint64, ctypes.c_int, ctypes.c_int64, ctypes.c_void_p
 )
@@ -108,14 +109,14 @@ class Engine:
     ) -> None:
         """Route a range to `read(offset, size)` and `write(offset, size, value)`; what they raise ends `run`."""
 
-        def on_read(_handle: int, offset: int, width: int, _user: int) -> int:
+        def on_read(_handle: int, offset: int, width: int) -> int:
             try:
                 return read(offset, width)
             except BaseException as error:
                 self._fail(error)
                 return 0
 
-        def on_write(_handle: int, offset: int, width: int, value: int, _user: int) -> None:
+        def on_write(_handle: int, offset: int, width: int, value: int) -> None:
             try:
                 write(offset, width, value)
             except BaseException as error:
@@ -127,30 +128,30 @@ class Engine:
         _check(uclib.uc_mmio_map(self._handle, address, size, reader, None, writer, None))
 
     def meter(self, timeline: Timeline, ticks: Mapping[int, int], measure: Callable[[int, int], int]) -> None:
-        """Let time pass with the instructions: before each block add `ticks[address]`, or stop at the deadline.
+        """Let time pass with the instructions: before each block add `ticks[address]`, or stop if it must.
 
         A block not yet in `ticks` is given to `measure(address, size_bytes)`, which returns its ticks.
         """
 
-        def on_block(_handle: int, address: int, size: int, _user: int) -> None:
-            if timeline.now >= timeline.deadline:
-                self.paused = True
-                self.stop()
-                return
+        known = ticks.get
+
+        def on_block(_handle: int, address: int, size: int) -> None:
             try:
-                timeline.now += ticks[address]
-            except KeyError:
-                try:
-                    timeline.now += measure(address, size)
-                except BaseException as error:
-                    self._fail(error)
+                if timeline.now >= timeline.deadline and not timeline.go_on():
+                    self.paused = True
+                    self.stop()
+                    return
+                cost = known(address)
+                timeline.now += measure(address, size) if cost is None else cost
+            except BaseException as error:
+                self._fail(error)
 
         self._hook(UC_HOOK_BLOCK, _BLOCK(on_block))
 
     def on_instruction(self, address: int, hook: Callable[[int], None]) -> None:
         """Call `hook(address)` before the instruction at `address`."""
 
-        def on_instruction(_handle: int, address: int, _size: int, _user: int) -> None:
+        def on_instruction(_handle: int, address: int, _size: int) -> None:
             try:
                 hook(address)
             except BaseException as error:
@@ -183,6 +184,17 @@ class Engine:
 
     def registers(self, ids: Sequence[int]) -> Registers:
         return Registers(self._handle, ids)
+
+    def register(self, number: int) -> Callable[[], int]:
+        """A function that reads one core register of 32 bits, by Unicorn's number."""
+        read, handle, value = uclib.uc_reg_read, self._handle, ctypes.c_uint32()
+        pointer = ctypes.byref(value)
+
+        def read_register() -> int:
+            read(handle, number, pointer)
+            return value.value
+
+        return read_register
 
     def read(self, address: int, size: int) -> bytes:
         """Read memory. Raises EngineFault where there is none."""

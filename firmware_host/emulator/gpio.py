@@ -107,6 +107,7 @@ class Exti:
         self._mask = Stored("EXTI IMR1", 0xFFFF, initial=0xFF82_0000, after=self._request)
         self._rising = Stored("EXTI RTSR1", 0xFFFF)
         self._pending = 0
+        self._active = 0  # pending and not masked, at the last look
 
     def reset(self) -> None:
         self._pending = 0
@@ -133,5 +134,8 @@ class Exti:
 
     def _request(self) -> None:
         active = self._pending & self._mask.value
-        for irq, lines in _EXTI_LINES.items():
-            self._nvic.set_line(irq, bool(active & lines))
+        changed, self._active = active ^ self._active, active
+        if changed:
+            for irq, lines in _EXTI_LINES.items():
+                if changed & lines:
+                    self._nvic.set_line(irq, bool(active & lines))

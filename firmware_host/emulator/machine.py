@@ -1,7 +1,7 @@
 """The emulated board: the firmware image on a Cortex-M4F, its peripherals and its sensors, under one virtual clock."""
 
 import struct
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 
 from unicorn.arm_const import UC_ARM_REG_LR, UC_ARM_REG_R0, UC_ARM_REG_SP
 
@@ -9,7 +9,7 @@ from firmware_host.emulator import rcc
 from firmware_host.emulator.bus import Peripheral, Violation
 from firmware_host.emulator.chip import Chip
 from firmware_host.emulator.cortex import Cortex, Entry
-from firmware_host.emulator.engine import Engine, EngineFault, Registers
+from firmware_host.emulator.engine import Engine, EngineFault
 from firmware_host.emulator.flash_memory import FLASH_BYTES, STORE_OFFSET, FlashMemory, PowerLost
 from firmware_host.emulator.spi_device import BoardClock, SpiDevice
 from firmware_host.emulator.symbols import Symbols
@@ -53,6 +53,7 @@ class EmulatedBoard:
         self._engine = Engine()
         self._load_memories(flash, unique_id)
         self._costs: dict[int, int] = {}  # address of a block → its ticks
+        self._after_wfi: set[int] = set()  # addresses found to follow a WFI
         self._chip = Chip(
             self._engine,
             self._timeline,
@@ -168,7 +169,7 @@ class EmulatedBoard:
             else:
                 # Nothing tells when the firmware unmasks a waiting exception: look after every block
                 one_block = entry is Entry.MASKED
-                timeline.deadline = timeline.now + 1 if one_block else min(timeline.next_due, limit)
+                timeline.run_until(timeline.now + 1 if one_block else limit)
                 self._execute()
 
     def _execute(self) -> None:
@@ -181,8 +182,10 @@ class EmulatedBoard:
             code, self._return_code = self._return_code, None
             cortex.return_from_exception(code)
         elif not engine.paused:
-            if struct.unpack("<H", engine.read(cortex.pc - 2, 2))[0] != _WFI:
-                raise Violation("firmware_fault", "the core stopped for no known reason", _CORRECT)
+            if cortex.pc not in self._after_wfi:
+                if struct.unpack("<H", engine.read(cortex.pc - 2, 2))[0] != _WFI:
+                    raise Violation("firmware_fault", "the core stopped for no known reason", _CORRECT)
+                self._after_wfi.add(cortex.pc)
             self._asleep = True
 
     def _measure(self, address: int, size: int) -> int:
@@ -197,14 +200,14 @@ class EmulatedBoard:
         return ticks
 
     def _watch_alignment(self) -> None:
-        self._bases: dict[int, Registers] = {}
+        self._bases: dict[int, Callable[[], int]] = {}
         for start, end in self._symbols.code():
             for address, base in word_accesses(self._engine.read(start, end - start), start):
-                self._bases[address] = self._engine.registers([_CORE_REGISTERS[base]])
+                self._bases[address] = self._engine.register(_CORE_REGISTERS[base])
                 self._engine.on_instruction(address, self._check_alignment)
 
     def _check_alignment(self, address: int) -> None:
-        (base,) = self._bases[address].read()
+        base = self._bases[address]()
         if base & 3:
             raise Violation("firmware_fault", f"unaligned access by address 0x{base:08X}", _CORRECT)
 

@@ -13,12 +13,12 @@ _FIFO_PAIRS = 2
 
 
 class Spi1:
-    """The bus master. `exchange(self, byte)` puts a byte on the bus and returns the one that comes back."""
+    """The bus master. `exchange(self, low, high)` puts two bytes on the bus and returns those that come back."""
 
     name = "SPI1"
     base = 0x4001_3000
 
-    def __init__(self, timeline: Timeline, clocks: Clocks, exchange: Callable[["Spi1", int], int]) -> None:
+    def __init__(self, timeline: Timeline, clocks: Clocks, exchange: Callable[["Spi1", int, int], int]) -> None:
         self._timeline = timeline
         self._clocks = clocks
         self._exchange = exchange
@@ -70,7 +70,7 @@ class Spi1:
         if len(self._received) == _FIFO_PAIRS:
             raise Violation("spi_overrun", "SPI1 DR written more than two pairs ahead of reading", "Read DR in between")
         self._polled = False
-        answer = self._exchange(self, value & 0xFF) | self._exchange(self, value >> 8) << 8
+        answer = self._exchange(self, value & 0xFF, value >> 8)
         self._free = max(self._timeline.now, self._free) + self._pair_ticks
         self._received.append((self._free, answer))
 

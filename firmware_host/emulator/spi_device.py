@@ -104,14 +104,17 @@ class SpiBus:
             self._selected.remove(link)
         self._checked = _UNCHECKED
 
-    def exchange(self, spi: Spi1, byte: int) -> int:
-        """Pass one byte to the selected device. Raises Violation when the bus is not set up as it must be."""
+    def exchange(self, spi: Spi1, first: int, second: int) -> int:
+        """Pass two bytes to the selected device; its answers, the first one low.
+
+        Raises Violation when the bus is not set up as it must be.
+        """
         if self._timeline.next_due <= self._timeline.now:
             self._timeline.run_due()
         if self._checked == spi.setup_count:
-            return self._selected[0].exchange(byte) if self._selected else 0xFF
+            return self._selected[0].exchange(first, second) if self._selected else 0xFFFF
         self._check_wires()
-        answer = self._selected[0].exchange(byte) if self._selected else 0xFF
+        answer = self._selected[0].exchange(first, second) if self._selected else 0xFFFF
         self._check_clock(spi)  # not before: the clock that a part accepts depends on what it is asked for
         self._checked = spi.setup_count
         return answer
@@ -159,19 +162,20 @@ class DeviceLink:
         self._interrupt_port, self._interrupt_pin = port_of(device.interrupt), int(device.interrupt[2:])
         self._exti = exti
         self._level = False
-        self._sent = 0  # bytes
+        self._sent = 0  # bytes since the last damaged one
         port_of(device.chip_select).watch(int(device.chip_select[2:]), self._chip_select)
         self._settle()
 
-    def exchange(self, byte: int) -> int:
-        """Pass one byte to the device and return its answer."""
+    def exchange(self, first: int, second: int) -> int:
+        """Pass two bytes to the device and return its answers, the first one low."""
         device = self.device
         if device.fault is Fault.ABSENT:
-            return 0xFF
-        answer = device.transfer(byte, self._clock.seconds(self._timeline.now))
-        self._sent += 1
-        if device.fault is Fault.DAMAGED and self._sent % _DAMAGED_BYTE == 0:
-            answer ^= 0x01
+            return 0xFFFF
+        time_s = self._clock.seconds(self._timeline.now)
+        answer = device.transfer(first, time_s) | device.transfer(second, time_s) << 8
+        if device.fault is Fault.DAMAGED:
+            self._sent = (self._sent + 2) % _DAMAGED_BYTE
+            answer ^= 0x0001 if self._sent < 2 else 0
         self._settle()
         return answer
 

@@ -10,14 +10,15 @@ class Timeline:
     """Now, and one next due tick for each registered action.
 
     The machine's block hook reads `now` and `deadline` on every block, so they are plain attributes: `deadline` is
-    the tick at which the core has to pause because something is due, the limit is reached, or `interrupt` was called.
+    the tick at which something is due, the limit is reached, or `interrupt` was called.
     """
 
-    __slots__ = ("_actions", "_due", "deadline", "next_due", "now")
+    __slots__ = ("_actions", "_due", "_limit", "deadline", "next_due", "now")
 
     def __init__(self) -> None:
         self.now = 0
         self.deadline = 0
+        self._limit = 0
         self.next_due = NEVER
         self._actions: list[Callable[[], None]] = []
         self._due: list[int] = []
@@ -44,6 +45,20 @@ class Timeline:
             self._due[slot] = NEVER
             self.next_due = min(self._due)
             self._actions[slot]()
+
+    def run_until(self, limit: int) -> None:
+        """The core runs from now on, and is to pause at `limit`."""
+        self._limit = limit
+        self.deadline = min(self.next_due, limit)
+
+    def go_on(self) -> bool:
+        """Do what is due while the core runs. Whether it may run on: nothing interrupted, the limit is still ahead."""
+        if self.deadline:
+            self.run_due()
+        if not self.deadline or self.now >= self._limit:
+            return False
+        self.deadline = min(self.next_due, self._limit)
+        return True
 
     def interrupt(self) -> None:
         """Have the core pause at the end of the current block: an exception may have become pending."""

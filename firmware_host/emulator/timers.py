@@ -7,6 +7,8 @@ from firmware_host.emulator.clocks import Clocks
 from firmware_host.emulator.timeline import TICK_HZ, Timeline
 
 _LSI_HZ = 32_000
+_POLL_TICKS = 40  # reads of the counter closer together than this, so many in a row, are a wait
+_POLLS = 3
 _START, _KICK, _UNLOCK = 0xCCCC, 0xAAAA, 0x5555
 
 
@@ -29,22 +31,38 @@ class Tim2:
         self._divider = 1  # the prescaler in effect, plus one
         self._counted = 0  # the count at `_since`
         self._since: int | None = None  # tick, None while stopped
+        self._read_at = 0  # tick of the last read
+        self._polls = 0
 
     def registers(self) -> Sequence[Register]:
         return (
             self._control.at(0x00),
             Register(0x14, "EGR", None, self._generate),
-            Register(0x24, "CNT", self._count, None),
+            Register(0x24, "CNT", self._read_count, None),
             self._prescaler.at(0x28),
         )
+
+    @property
+    def _timer_hz(self) -> int:
+        """RM0394, section 6.2.14: timers run at twice the bus clock when the bus is divided."""
+        return self._clocks.pclk1_hz * (1 if self._clocks.pclk1_hz == self._clocks.core_hz else 2)
 
     def _count(self) -> int:
         if self._since is None:
             return self._counted
-        # RM0394, section 6.2.14: timers run at twice the bus clock when the bus is divided
-        timer_hz = self._clocks.pclk1_hz * (1 if self._clocks.pclk1_hz == self._clocks.core_hz else 2)
         ticks = self._timeline.now - self._since
-        return (self._counted + ticks * timer_hz // (TICK_HZ * self._divider)) & 0xFFFF_FFFF
+        return (self._counted + ticks * self._timer_hz // (TICK_HZ * self._divider)) & 0xFFFF_FFFF
+
+    def _read_count(self) -> int:
+        timeline = self._timeline
+        self._polls = self._polls + 1 if timeline.now - self._read_at < _POLL_TICKS else 0
+        if self._polls > _POLLS and self._since is not None:
+            # the firmware waits: so do we, until the next count, instead of counting its turns
+            scale = TICK_HZ * self._divider
+            counts = (timeline.now - self._since) * self._timer_hz // scale
+            timeline.wait_until(self._since - -(counts + 1) * scale // self._timer_hz)
+        self._read_at = timeline.now
+        return self._count()
 
     def _switch(self) -> None:
         self._counted = self._count()
