@@ -14,11 +14,12 @@ import numpy as np
 import pytest
 from cobs import cobs
 from conftest import fresh_host
-from host_board import HostBoard
+from host_board import HostBoard, configured, convert, settle
 
 from firmware_host import protocol
 from firmware_host.client import Board, Calibration, SampleBatch
 from firmware_host.errors import BoardError
+from rig.config.link_budget import Stream
 
 PERIOD_US = 4202  # 238 Hz
 HOST = fresh_host()
@@ -190,6 +191,7 @@ def test_the_boards_refusals_come_through_by_name(wire: tuple[BoardOnAWire, str]
         board.check()
 
 
+ON_ONE_WIRE = pytest.mark.parametrize("wire", ["pty"], indirect=True)  # what the wire is made of does not matter there
 CALIBRATION = Calibration(
     model="k_times_m_plus_b",
     serial_number="LSM9DS1-001",
@@ -200,6 +202,7 @@ CALIBRATION = Calibration(
 )
 
 
+@ON_ONE_WIRE
 def test_a_stored_calibration_is_there_after_a_reset_until_it_is_erased(wire: tuple[BoardOnAWire, str]) -> None:
     with Board(wire[1], protocol.BAUD_RATE, ignore) as board:
         assert board.read_calibration(0) is None
@@ -224,6 +227,7 @@ def test_a_stored_calibration_is_there_after_a_reset_until_it_is_erased(wire: tu
         board.erase_calibration(0)
 
 
+@ON_ONE_WIRE
 def test_calibrated_readings_come_in_microradians_per_second(wire: tuple[BoardOnAWire, str]) -> None:
     batches: list[SampleBatch] = []
     with Board(wire[1], protocol.BAUD_RATE, batches.append) as board:
@@ -237,6 +241,7 @@ def test_calibrated_readings_come_in_microradians_per_second(wire: tuple[BoardOn
     assert batches[0].samples["counts"][:, 2] == pytest.approx(z_rad_s * 1e6, abs=1.0)
 
 
+@ON_ONE_WIRE
 def test_what_was_kept_is_averaged_between_two_board_times(wire: tuple[BoardOnAWire, str]) -> None:
     batches: list[SampleBatch] = []
     with Board(wire[1], protocol.BAUD_RATE, batches.append) as board:
@@ -264,6 +269,7 @@ def test_what_was_kept_is_averaged_between_two_board_times(wire: tuple[BoardOnAW
     assert np.array(observed.mean_rad_s) == pytest.approx(mean_rad_s, rel=1e-6)
 
 
+@ON_ONE_WIRE
 @pytest.mark.parametrize("method", protocol.METHODS)
 def test_the_board_solves_what_it_is_reminded_of(wire: tuple[BoardOnAWire, str], method: str) -> None:
     scale, bias, speed = np.array(CALIBRATION.scale), np.array(CALIBRATION.bias_rad_s), 1.0472
@@ -286,6 +292,21 @@ def test_reboot_returns_when_the_board_answers_again(wire: tuple[BoardOnAWire, s
         assert wire[0].board.restarts == 1
         board.check()
         assert not board.status().streaming
+
+
+@pytest.mark.parametrize("calibrated", [False, True])
+@pytest.mark.parametrize("rate_hz", [59.5, 238, 952])
+def test_a_stream_takes_as_much_of_the_link_as_the_configuration_reckons_with(rate_hz: float, calibrated: bool) -> None:
+    board, conversions = HostBoard(), 400
+    configured(board, 0, rate_hz, 245)
+    board.ask("write_calibration", sensor=0, **CALIBRATION.values())
+    board.ask("start", sensors=int(calibrated))
+    settle(board)
+    for number in range(conversions):
+        convert(board, round((number + 1) * 1e6 / rate_hz), (-number, 2 * number, 12345))
+    bytes_per_sample = len(board.wire) / conversions
+    reckoned = Stream(rate_hz, calibrated).bytes_per_sample
+    assert 0.9 * reckoned < bytes_per_sample <= reckoned
 
 
 def test_a_port_that_is_not_there() -> None:
