@@ -20,6 +20,7 @@ FLASH_START = 0x0800_0000
 FLASH_BYTES = 256 * 1024
 CALIBRATION_BYTES = 6 * 2048  # the last pages: an image that reached into them would erase the calibrations
 RAM_START, RAM_BYTES = 0x2000_0000, 64 * 1024
+DEVICE_ID_REGISTER, DEVICE_ID = 0xE004_2000, 0x435  # DBGMCU_IDCODE of all STM32L43x and L44x (RM0394)
 
 IMAGE_NAME = "rig_l432.bin"
 NUCLEO_CODE = "0770"  # of the Nucleo-L432KC in the link of its MBED.HTM, as in mbed-ls' table of platforms
@@ -80,9 +81,10 @@ def find_probe(probe_id: str | None = None) -> Any:
 
 
 def flash_by_probe(image: bytes, probe: Any) -> None:
-    """Program, read back and start `image` through a probe `find_probe` found. Raises BoardError `flash_failed`.
+    """Program, read back and start `image` through a probe that `find_probe` found.
 
-    Erases only the pages the image needs, so stored calibrations stay.
+    Erases only the pages the image needs, so stored calibrations stay. Raises BoardError: other_microcontroller,
+    flash_failed.
     """
     from pyocd.core.exceptions import Error
     from pyocd.core.session import Session
@@ -91,7 +93,7 @@ def flash_by_probe(image: bytes, probe: Any) -> None:
     try:
         with Session(probe, options=options) as session:
             _program(session, image)
-    except Error as error:
+    except (Error, OSError) as error:
         raise BoardError(
             "flash_failed",
             f"the probe {probe.unique_id} could not program the board: {error}",
@@ -102,6 +104,13 @@ def flash_by_probe(image: bytes, probe: Any) -> None:
 def _program(session: Any, image: bytes) -> None:
     from pyocd.flash.file_programmer import FileProgrammer
 
+    device = session.target.read32(DEVICE_ID_REGISTER) & 0xFFF
+    if device != DEVICE_ID:
+        raise BoardError(
+            "other_microcontroller",
+            f"at the probe hangs a microcontroller of device code 0x{device:03x}, not an STM32L432 (0x{DEVICE_ID:03x})",
+            "Choose the Nucleo-L432KC's probe with --probe ID",
+        )
     programmer = FileProgrammer(session, chip_erase="sector", trust_crc=False)
     programmer.program(io.BytesIO(image), file_format="bin", base_address=FLASH_START)
     if bytes(session.target.read_memory_block8(FLASH_START, len(image))) != image:

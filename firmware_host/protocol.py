@@ -344,10 +344,10 @@ ERRORS = (
     ErrorKind(5, "bad_rate", "the data rate is not a positive number", "Correct rate_hz in the configuration"),
     ErrorKind(6, "bad_range", "the part has no such range", "Correct range_deg_s in the configuration"),
     ErrorKind(
-        7, "no_calibration", "it has no calibration stored for this sensor", "Store one: `rig board calibration`"
+        7, "no_calibration", "it has no calibration stored for this sensor", "Store one: `rig board calibration write`"
     ),
     ErrorKind(8, "setup_failed", "a setting did not read back as written", "Check the sensor's SPI wires and supply"),
-    ErrorKind(9, "not_configured", "no sensor is configured", "Configure a sensor before the start"),
+    ErrorKind(9, "not_configured", "the sensor is not configured", "Configure it first"),
     ErrorKind(10, "busy_streaming", "it is streaming and cannot change settings", "Stop the stream first"),
     ErrorKind(11, "sensor_silent", "the sensor stopped signalling new data", "Check its interrupt wire and supply"),
     ErrorKind(
