@@ -1,4 +1,4 @@
-"""Prints the message table for people: `python -m firmware_host.reference > docs/protocol.md`."""
+"""Prints the message table for people, docs/protocol.md: `make -C firmware_host/firmware header`."""
 
 import struct
 from collections.abc import Iterable, Iterator, Sequence
@@ -15,7 +15,7 @@ def reference() -> str:
         "# The protocol between host and board",
         "",
         "Generated from [`firmware_host/protocol.py`](../firmware_host/protocol.py) by",
-        "`python -m firmware_host.reference > docs/protocol.md`: change the table, not this page.",
+        "`make -C firmware_host/firmware header`: change the table, not this page.",
         "",
         f"Version {protocol.PROTOCOL_VERSION}, spoken by the shipped image {protocol.FIRMWARE_VERSION} at "
         f"{protocol.BAUD_RATE} Bd, 8 data bits, no parity, 1 stop bit.",
