@@ -151,6 +151,6 @@ def test_any_other_non_maskable_interrupt_is_a_fault() -> None:
     session = boot(shipped_flash())
     (nvic,) = [block for block in session.board.peripherals if isinstance(block, Nvic)]
     nvic.pend(NMI)
-    session.run(0.02)
+    session.run(0.2)
     report = session.ask("status").values
     assert report["fault_pc"] != 0 and report["reset_cause"] == 5
