@@ -7,7 +7,6 @@ from contextlib import ExitStack, contextmanager
 from dataclasses import dataclass
 from math import degrees, isclose
 from pathlib import Path
-from typing import Any
 
 from firmware_host.client import Board, Calibration, StoredCalibration
 from rig.asking import agreed_or_refused
@@ -17,7 +16,7 @@ from rig.errors import Fault, Refused
 from rig.instruments import changing, configured_part, find_sensor, refuse_other_firmware, refusing
 from rig.launch import simulated_laboratory, written
 from rig.report.board import info_document, print_info, print_stored
-from rig.results import passed_result
+from rig.results import Result, passed_result
 from rig.storing import calibration_of, store
 
 
@@ -110,6 +109,7 @@ def _connected(config_path: Path, overrides: Sequence[str]) -> Iterator[tuple[Ri
     with ExitStack() as stack:
         if loaded.world:
             stack.enter_context(simulated_laboratory(stack.enter_context(written(loaded.text))))
+            print("simulated laboratory: it lasts as long as this command, and its board's memory too", file=sys.stderr)
         with refusing():
             board = stack.enter_context(Board(loaded.config.board.port, loaded.config.board.baud, lambda batch: None))
         yield loaded.config, board
@@ -135,31 +135,33 @@ def _places(board: Board, config: RigConfig, sensor: str | None, among: Mapping[
     return places
 
 
-def _result_of(place: _Place, result: Mapping[str, Any], path: Path) -> Calibration:
+def _result_of(place: _Place, result: Result, path: Path) -> Calibration:
     """The run's calibration of a sensor. Raises Refused `not_in_result`, `another_sensor` or `another_range`."""
-    entry = result["sensors"].get(place.name)
-    if entry is None or entry["role"] == "reference":
+    entry = result.sensors.get(place.name)
+    if entry is None or entry.role == "reference":
         raise Refused(
             "not_in_result",
             f"{path} has no calibration for sensors.{place.name}",
-            f"It has: {', '.join(result['sensors']) or 'none'}; choose one with --sensor",
+            f"It has: {', '.join(result.sensors) or 'none'}; choose one with --sensor",
         )
-    for key, wanted in (("part", place.section.part), ("serial_number", place.section.serial_number)):
-        if entry[key] != wanted:
+    for what, found, wanted in (
+        ("part", entry.part, place.section.part),
+        ("serial_number", entry.serial_number, place.section.serial_number),
+    ):
+        if found != wanted:
             raise Refused(
                 "another_sensor",
-                f"{path}: {place.name}.{key} is {entry[key]}, the configuration says {wanted}",
+                f"{path}: {place.name}.{what} is {found}, the configuration says {wanted}",
                 "Store a calibration only on the sensor it was made for",
             )
-    range_deg_s = degrees(entry["range_rad_s"])
-    if not isclose(range_deg_s, place.section.range_deg_s, rel_tol=1e-6):
+    if not isclose(degrees(entry.range_rad_s), place.section.range_deg_s, rel_tol=1e-6):
         raise Refused(
             "another_range",
-            f"{path}: {place.name} was calibrated at {range_deg_s:g} °/s, the configuration says "
+            f"{path}: {place.name} was calibrated at {degrees(entry.range_rad_s):g} °/s, the configuration says "
             f"{place.section.range_deg_s:g} °/s",
             "Set range_deg_s to what it was calibrated at, or calibrate at this range",
         )
-    return calibration_of(entry)
+    return calibration_of(entry.model_dump())
 
 
 def _on(board: Board, changes: Iterable[str]) -> list[str]:

@@ -145,7 +145,9 @@ def failed(folder: Path) -> Path:
     ("make", "name", "words"),
     [
         (lambda folder: folder, "no_result", "result.json cannot be read"),
-        (lambda folder: Path(__file__), "not_a_result", "rig.result/1"),
+        (lambda folder: Path(__file__), "not_a_result", "JSON"),
+        (lambda folder: result(folder, scale=[1.1, 0.0, 1.1]), "not_a_result", "sensors.gyro.scale.1"),
+        (lambda folder: result(folder, bias_rad_s=[0.1, 0.2]), "not_a_result", "sensors.gyro.bias_rad_s"),
         (failed, "verdict_failed", "gyro.scale_std"),
         (lambda folder: result(folder, part="mpu9250"), "another_sensor", "gyro.part is mpu9250"),
         (lambda folder: result(folder, serial_number="A-2"), "another_sensor", "gyro.serial_number is A-2, the config"),
