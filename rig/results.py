@@ -1,12 +1,14 @@
 """Reads the `result.json` of a run for those who go on with it."""
 
 from pathlib import Path
-from typing import Literal
+from typing import Annotated, Literal
 
 from pydantic import BaseModel, ConfigDict, Field, ValidationError
 
 from rig.config.models import Positive, Vector3
 from rig.errors import Refused
+
+SCHEMA = "rig.result/1"
 
 
 class _Part(BaseModel):
@@ -35,7 +37,7 @@ class CheckResult(_Part):
 class Result(_Part):
     """The parts of a `result.json` that others go on with."""
 
-    schema_name: Literal["rig.result/1"] = Field(alias="schema")
+    schema_name: Annotated[Literal["rig.result/1"], Field(alias="schema")]  # as SCHEMA
     verdict: Literal["pass", "fail"]
     checks: tuple[CheckResult, ...]
     sensors: dict[str, SensorResult]

@@ -20,6 +20,7 @@ from firmware_host.protocol import FIRMWARE_VERSION
 from rig.config.models import SensorSection
 from rig.errors import Refused
 from rig.instruments import find_sensor, refuse_other_firmware
+from rig.results import passed_result
 
 SENSORS: dict[str, dict[str, Any]] = {
     "gyro": {"part": "lsm9ds1", "serial_number": "LSM9DS1-001", "rate_hz": 238, "range_deg_s": 245},
@@ -149,16 +150,29 @@ def failed(folder: Path) -> Path:
         (lambda folder: result(folder, scale=[1.1, 0.0, 1.1]), "not_a_result", "sensors.gyro.scale.1"),
         (lambda folder: result(folder, bias_rad_s=[0.1, 0.2]), "not_a_result", "sensors.gyro.bias_rad_s"),
         (failed, "verdict_failed", "gyro.scale_std"),
-        (lambda folder: result(folder, part="mpu9250"), "another_sensor", "gyro.part is mpu9250"),
-        (lambda folder: result(folder, serial_number="A-2"), "another_sensor", "gyro.serial_number is A-2, the config"),
-        (lambda folder: result(folder, range_rad_s=radians(500)), "another_range", "calibrated at 500 °/s"),
-        (lambda folder: result(folder, role="reference"), "not_in_result", "no calibration for sensors.gyro"),
+    ],
+)
+def test_what_is_no_calibration_that_passed_is_refused(
+    make: Callable[[Path], Path], name: str, words: str, tmp_path: Path
+) -> None:
+    with pytest.raises(Refused) as refusal:
+        passed_result(make(tmp_path))
+    assert refusal.value.name == name and words in refusal.value.what
+
+
+@pytest.mark.parametrize(
+    ("changes", "name", "words"),
+    [
+        ({"part": "mpu9250"}, "another_sensor", "gyro.part is mpu9250"),
+        ({"serial_number": "LSM9DS1-002"}, "another_sensor", "gyro.serial_number is LSM9DS1-002"),
+        ({"range_rad_s": radians(500)}, "another_range", "calibrated at 500 °/s"),
+        ({"role": "reference"}, "not_in_result", "no calibration for sensors.gyro"),
     ],
 )
 def test_what_is_not_this_sensors_calibration_is_not_stored(
-    make: Callable[[Path], Path], name: str, words: str, config: Path, tmp_path: Path
+    changes: dict[str, Any], name: str, words: str, config: Path, tmp_path: Path
 ) -> None:
-    done = rig("calibration", "write", config, make(tmp_path), "--yes")
+    done = rig("calibration", "write", config, result(tmp_path, **changes), "--yes")
     assert done.returncode == 2 and done.stderr.startswith(f"rig: {name}: ") and words in done.stderr, done
     assert done.stderr.count("\n") == 1
 
