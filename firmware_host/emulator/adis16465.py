@@ -199,6 +199,7 @@ class Adis16465:
             axis, high = divmod(address - _X_GYRO_LOW, 4)
             return self._rate(axis) >> (16 if high else 0) & 0xFFFF
         fixed = {
+            0x00: 0,  # reserved: what drivers ask for to clock an answer out
             **dict.fromkeys(range(_X_ACCL_LOW, _TEMP_OUT, 2), 0),
             0x1A: _COUNTS_PER_G,  # Z_ACCL_OUT
             _TEMP_OUT: self._temperature,
