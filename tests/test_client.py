@@ -97,6 +97,11 @@ def wire(request: pytest.FixtureRequest) -> Iterator[tuple[BoardOnAWire, str]]:
             connection.close()
 
 
+ON_ONE_WIRE = pytest.mark.parametrize(
+    "wire", ["pty"], indirect=True
+)  # where it does not matter what the wire is made of
+
+
 def ignore(batch: SampleBatch) -> None:
     """A consumer for tests that look at something else."""
 
@@ -165,6 +170,7 @@ def test_a_stream_left_running_is_stopped_by_the_next_program_and_restarts_at_ze
     assert batches[0].samples["sequence"][0] == 0
 
 
+@ON_ONE_WIRE
 def test_a_lossy_wire_costs_frames_but_no_request(wire: tuple[BoardOnAWire, str]) -> None:
     garbled = [0]
 
@@ -191,7 +197,6 @@ def test_the_boards_refusals_come_through_by_name(wire: tuple[BoardOnAWire, str]
         board.check()
 
 
-ON_ONE_WIRE = pytest.mark.parametrize("wire", ["pty"], indirect=True)  # what the wire is made of does not matter there
 CALIBRATION = Calibration(
     model="k_times_m_plus_b",
     serial_number="LSM9DS1-001",
@@ -323,6 +328,7 @@ def test_a_port_without_a_board(wire: tuple[BoardOnAWire, str]) -> None:
     assert failure.value.name == "no_board" and "rig board flash" in failure.value.remedy
 
 
+@ON_ONE_WIRE
 def test_another_baud_rate_makes_noise_of_an_idle_board(wire: tuple[BoardOnAWire, str]) -> None:
     wire[0].on_send = lambda data: bytes(byte >> 1 | 0x80 for byte in data)
     with pytest.raises(BoardError) as failure:
@@ -330,6 +336,7 @@ def test_another_baud_rate_makes_noise_of_an_idle_board(wire: tuple[BoardOnAWire
     assert failure.value.name == "wrong_baud_rate" and "921600" in failure.value.remedy
 
 
+@ON_ONE_WIRE
 def test_a_board_that_sends_but_does_not_hear(wire: tuple[BoardOnAWire, str]) -> None:
     wire[0].board.receive = lambda data: wire[0].board.run()  # type: ignore[method-assign]
     with pytest.raises(BoardError, match="does not answer") as failure:
@@ -364,6 +371,7 @@ def test_frames_lost_on_the_way_are_counted_and_a_reboot_loses_none(wire: tuple[
         assert board.status().frames_lost == len(lost)
 
 
+@ON_ONE_WIRE
 def test_an_image_of_another_protocol_version(wire: tuple[BoardOnAWire, str]) -> None:
     def another_version(data: bytes) -> bytes:
         out = b""
@@ -397,6 +405,7 @@ def test_a_board_that_falls_silent_while_streaming_is_noticed_within_a_second_an
     assert error.name == "board_link_lost" and 0.5 < after_s < 2.0
 
 
+@ON_ONE_WIRE
 def test_noise_instead_of_frames_while_streaming_is_a_lost_link(wire: tuple[BoardOnAWire, str]) -> None:
     with closing(streaming(wire)) as board:
         wire[0].on_send = lambda data: bytes(byte >> 1 | 0x80 for byte in data)
@@ -438,6 +447,7 @@ def test_a_sensor_that_falls_silent_is_reported(wire: tuple[BoardOnAWire, str]) 
     assert error.name == "sensor_silent" and "LSM9DS1" in error.what
 
 
+@ON_ONE_WIRE
 def test_an_error_in_the_consumer_reaches_the_caller(wire: tuple[BoardOnAWire, str]) -> None:
     def broken(batch: SampleBatch) -> None:
         raise OSError("the disk is full")
