@@ -12,18 +12,26 @@ from typing import Any
 import numpy as np
 import pytest
 from conftest import DEMO, World
+from scipy.spatial.transform import Rotation
 
 from firmware_host import protocol
 from firmware_host.client import Board, SampleBatch
+from firmware_host.emulator.flash_memory import DOUBLEWORD_BYTES, PAGE_BYTES, STORE_OFFSET
 from firmware_host.errors import BoardError
 from rig.arm.kinematics import flange_rate
 from rig.config.load import Loaded, load
 from rig.config.models import mounting_matrix
+from rig.errors import Refused
+from rig.world.board import firmware
 from rig.world.clock import TICKS_PER_SECOND
+from rig.world.flash_file import flash_of
 from rig.world.laboratory import Laboratory
 from rig.world.serial_line import SerialLine, misread
 
 COUNT_RAD_S = math.radians(8.75e-3)
+SENSORS = ("lsm9ds1", "mpu9250", "adis16465")  # the board's table
+PAIR = DEMO.with_name("mpu9250_adis16465.yaml")
+STILL = "world.arm.vibration_fraction=0"
 
 
 @dataclass
@@ -43,21 +51,39 @@ class Host:
             self.line.tick()
             self.received += self.line.to_host(None)
 
-    def samples(self) -> np.ndarray:
-        """(n, 3) counts of every sample received so far."""
+    def samples(self, sensor: int = 0) -> np.ndarray:
+        """(n, 3) counts of every sample of one sensor received so far."""
         frames = protocol.FrameReader().feed(bytes(self.received))
-        batches = [frame.items["counts"] for frame in frames if frame.name == "samples"]
-        return np.concatenate(batches)
+        samples = [frame for frame in frames if frame.name == "samples"]
+        return np.concatenate([frame.items["counts"] for frame in samples if frame.values["sensor"] == sensor])
+
+    def answer(self, name: str, values: dict[str, Any]) -> protocol.Frame:
+        """Ask, and wait for the answer."""
+        self.received.clear()
+        self.ask(name, 99, values)
+        self.ticks(100)
+        frames = protocol.FrameReader().feed(bytes(self.received))
+        (answer,) = [frame for frame in frames if frame.values.get("reply_to") == 99]
+        return answer
 
 
-def host(loaded: Loaded) -> Host:
-    """A laboratory whose board streams."""
+def booted(loaded: Loaded) -> Host:
+    """A laboratory whose board has started."""
     assert loaded.world is not None
     laboratory = Laboratory(loaded.config, loaded.world)
     new = Host(laboratory, SerialLine(laboratory), bytearray())
     new.ticks(200)
-    new.ask("configure", 1, {"sensor": 0, "rate_hz": 238.0, "range_deg_s": 245.0})
-    new.ticks(20)
+    return new
+
+
+def host(loaded: Loaded) -> Host:
+    """A laboratory whose board streams every sensor it has."""
+    new = booted(loaded)
+    for sensor in loaded.config.sensors.values():
+        index = SENSORS.index(sensor.part)
+        settings = {"sensor": index, "rate_hz": sensor.rate_hz, "range_deg_s": sensor.range_deg_s}
+        new.ask("configure", 1, settings)
+        new.ticks(20)
     new.ask("start", 2, {"sensors": 0})
     new.ticks(20)
     return new
@@ -67,13 +93,18 @@ def demo(*overrides: str) -> Loaded:
     return load(DEMO, overrides)
 
 
+def pair(*overrides: str) -> Loaded:
+    """A gyroscope to calibrate and a reference, on one bus."""
+    return load(PAIR, overrides)
+
+
 def digest_of_a_run(loaded: Loaded) -> tuple[str, tuple[float, ...]]:
     one = host(loaded)
     one.laboratory.robot.motion.move((0.1, -1.4, 1.5, -1.5, -1.2, 2.0), 1.0, 1.4)
     one.ticks(700)
     one.laboratory.robot.protective_stop()
     one.ticks(300)
-    assert len(one.samples()) > 400
+    assert len(one.received) > 5_000
     return hashlib.sha256(one.received).hexdigest(), one.laboratory.robot.motion.q_rad
 
 
@@ -102,6 +133,99 @@ def test_the_sensor_reads_the_flanges_rate_through_its_mounting_and_its_errors()
     expected = seen / np.array(truth.scale) - np.array(truth.bias_rad_s)
     assert one.samples()[-1] * COUNT_RAD_S == pytest.approx(expected, abs=COUNT_RAD_S)
     assert abs(expected).max() > 0.5
+
+
+def test_every_sensor_has_its_own_mounting_errors_and_noise() -> None:
+    def turned(*overrides: str) -> Host:
+        one = host(pair(STILL, "world.sensors.gyro.mounting_error_deg=[0, 0, 90]", *overrides))
+        one.laboratory.robot.motion.speed((0.0, 0.0, 0.0, 0.0, 0.7, 0.0), 100.0)
+        one.ticks(TICKS_PER_SECOND)
+        return one
+
+    quiet = turned("world.sensors.gyro.noise_rad_s=0", "world.sensors.reference.noise_rad_s=0")
+    loaded = pair("world.sensors.gyro.mounting_error_deg=[0, 0, 90]")
+    assert loaded.world is not None
+    motion = quiet.laboratory.robot.motion
+    flange = np.array(flange_rate(motion.q_rad, motion.qd_rad_s))
+    for name, index, count_rad_s in (("gyro", 1, 1 / 131), ("reference", 2, 1 / 40)):
+        truth = loaded.world.sensors[name]
+        error = Rotation.from_rotvec(truth.mounting_error_deg, degrees=True).as_matrix()
+        seen = error.T @ mounting_matrix(loaded.config.sensors[name].mounting) @ flange
+        x, y, z = np.radians(truth.non_orthogonality_deg)
+        axes = np.array([[1, 0, 0], [x, 1, 0], [y, z, 1]])  # to first order
+        expected = axes @ seen / np.array(truth.scale) - np.array(truth.bias_rad_s)
+        assert np.radians(quiet.samples(index)[-1] * count_rad_s) == pytest.approx(expected, abs=6e-4)
+    noisy = turned("world.sensors.gyro.noise_rad_s=0.05", "world.sensors.reference.noise_rad_s=0.05")
+    last = [np.radians(noisy.samples(index)[-50:] * c) for index, c in ((1, 1 / 131), (2, 1 / 40))]
+    assert np.all(np.abs(np.corrcoef(np.column_stack(last).T) - np.eye(6)) < 0.6)
+
+
+def test_two_sensors_too_give_the_same_bytes_from_the_same_seed() -> None:
+    first, again, other = (digest_of_a_run(pair(f"world.seed={seed}")) for seed in (5, 5, 6))
+    assert first == again
+    assert first[0] != other[0]
+
+
+CALIBRATION = {
+    "sensor": 1,
+    "model": 1,
+    "serial_number": "MPU-1",
+    "written_unix_s": 1_790_000_000,
+    "temperature_c": 22.0,
+    "scale": (1.25, 1.0, 0.75),
+    "bias_rad_s": (0.5, 0.25, 0.125),
+}
+
+
+def give_calibration(one: Host) -> None:
+    assert one.answer("configure", {"sensor": 1, "rate_hz": 200.0, "range_deg_s": 250.0}).name == "setup"
+    assert one.answer("write_calibration", CALIBRATION).name == "ack"
+
+
+def stored_scale(one: Host) -> tuple[float, ...] | None:
+    answer = one.answer("read_calibration", {"sensor": 1})
+    return answer.values["scale"] if answer.name == "calibration" else None
+
+
+def test_without_power_the_board_keeps_its_calibration_but_without_a_file_not_for_the_next_world() -> None:
+    one = booted(pair())
+    assert stored_scale(one) is None
+    give_calibration(one)
+    one.laboratory.unplug()
+    one.ticks(10)
+    one.laboratory.plug_in()
+    one.ticks(200)
+    assert stored_scale(one) == (1.25, 1.0, 0.75)
+    assert stored_scale(booted(pair())) is None
+
+
+def test_a_flash_file_keeps_the_calibration_for_the_next_world_but_never_the_program(tmp_path: Path) -> None:
+    file = tmp_path / "board.bin"
+    kept = pair(f"world.board.flash_file={file}")
+    give_calibration(booted(kept))
+    assert stored_scale(booted(kept)) == (1.25, 1.0, 0.75)
+    data = file.read_bytes()
+    assert data.startswith(firmware("bin"))
+    file.write_bytes(bytes(STORE_OFFSET) + data[STORE_OFFSET:])  # another program, long ago
+    assert stored_scale(booted(kept)) == (1.25, 1.0, 0.75)
+
+
+def test_a_flash_file_keeps_what_a_power_cut_tore(tmp_path: Path) -> None:
+    kept = pair(f"world.board.flash_file={tmp_path / 'board.bin'}")
+    one = booted(kept)
+    one.answer("configure", {"sensor": 1, "rate_hz": 200.0, "range_deg_s": 250.0})
+    one.ask("write_calibration", 9, CALIBRATION)
+    one.ticks(5)  # the erasing takes eleven
+    again = flash_of(tmp_path / "board.bin")
+    assert len(again.torn) == PAGE_BYTES // DOUBLEWORD_BYTES
+    assert stored_scale(booted(kept)) is None
+
+
+@pytest.mark.parametrize("name", ["short.bin", "nowhere/board.bin"])
+def test_a_flash_file_that_cannot_be_is_refused(name: str, tmp_path: Path) -> None:
+    (tmp_path / "short.bin").write_bytes(b"short")
+    with pytest.raises(Refused, match="flash_file"):
+        booted(pair(f"world.board.flash_file={tmp_path / name}"))
 
 
 def test_vibration_is_felt_and_averages_out_over_a_turn() -> None:
@@ -202,6 +326,29 @@ def test_a_wrong_baud_rate_is_named(world: World) -> None:
     running.control({"do": "host_baud", "baud": None})
     board, _ = connect(running.board_port)
     board.close()
+
+
+def test_a_sensor_can_be_broken_and_mended(world: World) -> None:
+    running = world()
+    running.control({"do": "sensor_fault", "sensor": "gyro", "fault": "absent"})
+    board, batches = connect(running.board_port)
+    with board:
+        with pytest.raises(BoardError, match="sensor_absent"):
+            board.configure(0, 238.0, 245.0)
+        running.control({"do": "unplug_board"})  # it stays broken without power
+    running.control({"do": "plug_in_board"})
+    board, batches = connect(running.board_port)
+    with board:
+        with pytest.raises(BoardError, match="sensor_absent"):
+            board.configure(0, 238.0, 245.0)
+        running.control({"do": "sensor_fault", "sensor": "gyro", "fault": "other_part"})
+        with pytest.raises(BoardError, match="sensor_mismatch"):
+            board.configure(0, 238.0, 245.0)
+        running.control({"do": "sensor_fault", "sensor": "gyro", "fault": None})
+        stream(board, batches, 100)
+    for wrong in ({"sensor": "giro", "fault": None}, {"sensor": "gyro", "fault": "tired"}):
+        with pytest.raises(AssertionError, match="sensor_fault"):
+            running.control({"do": "sensor_fault", **wrong})
 
 
 def test_the_reset_button(world: World) -> None:

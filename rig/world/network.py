@@ -97,6 +97,17 @@ class Connection:
             selector.unregister(self._peer)
         self._watched = events
 
+    def close_if_gone(self) -> None:
+        """Close when the client has hung up."""
+        try:
+            gone = not self._peer.recv(1, socket.MSG_PEEK)
+        except BlockingIOError:
+            gone = False
+        except OSError:
+            gone = True
+        if gone:
+            self.close()
+
     def close(self) -> None:
         if self in self._network.connections:
             self._network.connections.remove(self)
@@ -149,6 +160,8 @@ class Listener:
             peer, _ = self._socket.accept()
         except OSError:
             return
+        for connection in self.connections:
+            connection.close_if_gone()  # its end may be known only after this one's beginning
         if len(self.connections) >= self._limit:
             peer.close()
             return
