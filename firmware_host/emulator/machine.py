@@ -71,7 +71,6 @@ class EmulatedBoard:
         self.powered = True  # until the supply fails, as the flash may be told to let it
         self._sent = bytearray()
         self._failure: BoardError | None = None
-        self._return_code: int | None = None
         self._reset_cause: int | None = None
         self._asleep = False
         self._start()
@@ -173,20 +172,18 @@ class EmulatedBoard:
                 self._execute()
 
     def _execute(self) -> None:
-        """Run the core until the deadline, an exception return, WFI or a fault."""
+        """Run the core until the deadline, WFI or a fault."""
         engine, cortex = self._engine, self._cortex
         engine.paused = False
         engine.run(cortex.pc)
         cortex.paused()
-        if self._return_code is not None:
-            code, self._return_code = self._return_code, None
-            cortex.return_from_exception(code)
-        elif not engine.paused:
-            if cortex.pc not in self._after_wfi:
-                if struct.unpack("<H", engine.read(cortex.pc - 2, 2))[0] != _WFI:
-                    raise Violation("firmware_fault", "the core stopped for no known reason", _CORRECT)
-                self._after_wfi.add(cortex.pc)
-            self._asleep = True
+        if engine.paused:
+            return
+        if cortex.pc not in self._after_wfi:
+            if struct.unpack("<H", engine.read(cortex.pc - 2, 2))[0] != _WFI:
+                raise Violation("firmware_fault", "the core stopped for no known reason", _CORRECT)
+            self._after_wfi.add(cortex.pc)
+        self._asleep = True
 
     def _measure(self, address: int, size: int) -> int:
         """Ticks that a block takes that has not been met before; refuses floating point before it is enabled."""
@@ -214,9 +211,12 @@ class EmulatedBoard:
     def _core_exception(self, number: int) -> None:
         if number != _EXCEPTION_RETURN:
             raise Violation("firmware_fault", _CORE_EXCEPTIONS.get(number, f"core exception {number}"), _CORRECT)
-        self._cortex.paused()
-        self._return_code = self._cortex.pc | 1
-        self._engine.stop()
+        cortex = self._cortex
+        cortex.paused()
+        cortex.return_from_exception(cortex.pc | 1)
+        self._engine.go_on_at(cortex.pc)
+        if self._chip.nvic.candidate() is not None:  # another has waited, or the same again
+            self._timeline.interrupt()
 
     def _invalid_access(self, attempt: str, address: int) -> None:
         raise Violation("firmware_fault", f"{attempt} address 0x{address:08X}", _CORRECT)
