@@ -20,6 +20,7 @@ from rig.averaging import on_the_arms_clock
 from rig.config.models import ObservationSection
 from rig.errors import Fault
 from rig.monitor import Monitor
+from rig.observation import finished_sweeps
 from rig.recording import RecordedSensor, RunData, RunRecorder
 from rig.revolution import find_revolution
 from rig.timebase import ArmMotion
@@ -91,6 +92,12 @@ class BoardCalibration:
 
     def _count(self, name: str) -> int:
         return self._observed.setdefault(name, 0)
+
+
+def observed_sweeps(run: RunData, sensors: Collection[str]) -> frozenset[int]:
+    """The sweeps of a recording of which the board has an observation for every one of these sensors."""
+    everything = finished_sweeps(run)
+    return everything.intersection(*(observed_before([run], sensor, everything) for sensor in sensors))
 
 
 def observed_before(earlier: Sequence[RunData], sensor: str, done: Collection[int]) -> dict[int, dict[str, Any]]:

@@ -16,7 +16,7 @@ from rig import __version__
 from rig.arm.driver import Arm
 from rig.arm.plan import plan_six_observation
 from rig.arm.state import ArmReport
-from rig.board_calibration import BoardCalibration
+from rig.board_calibration import BoardCalibration, observed_sweeps
 from rig.config.load import Loaded, parse
 from rig.config.models import RigConfig, SensorSection, mounting_matrix
 from rig.errors import Refused
@@ -50,9 +50,11 @@ def open_rig(
     """
     config = loaded.config
     _refuse_another_procedure(config, earlier)
-    done = frozenset[int]().union(*(sound_sweeps(run, config.observation) for run in earlier))
+    done = frozenset[int]().union(
+        *(sound_sweeps(run, config.observation) & observed_sweeps(run, config.to_calibrate) for run in earlier)
+    )
     if earlier:
-        view.line(f"resuming: {len(done)} sweeps are recorded and sound, the others follow")
+        view.line(f"resuming: {len(done)} sweeps are recorded, sound and known to the board, the others follow")
     with ExitStack() as stack:
         monitor = Monitor()
         with refusing():

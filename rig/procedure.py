@@ -120,8 +120,8 @@ class Rig:
             self.recorder.add_event("sweep_started", sweep=asdict(sweep))
             self.arm.move(sweep, lambda: self._watch(sweep))
             self.recorder.add_event("sweep_finished", sweep=asdict(sweep))
-        if self.on_board is not None:
-            self.on_board.observe(sweep)
+            if self.on_board is not None:
+                self.on_board.observe(sweep)
 
     def rest(self, rest: Rest) -> None:
         """Stand still: the readings here show the bias and the noise."""
