@@ -39,9 +39,14 @@ class Stream:
 
 def on_the_arms_clock(raw: NDArray[Any], sensor: RecordedSensor, motion: ArmMotion) -> Stream:
     """Samples (n,) SAMPLE_DTYPE in rad/s at the controller's times. Raises Fault as `estimate_time_base` does."""
+    readings = raw["counts"] * sensor.sensitivity_rad_s_per_count
+    return on_clock(raw, sensor, estimate_time_base(raw["board_time_us"] * 1e-6, readings, motion))
+
+
+def on_clock(raw: NDArray[Any], sensor: RecordedSensor, clock: TimeBase) -> Stream:
+    """The same where the board's clock is known."""
     board_time_s = raw["board_time_us"] * 1e-6
     readings = raw["counts"] * sensor.sensitivity_rad_s_per_count
-    clock = estimate_time_base(board_time_s, readings, motion)
     return Stream(sensor, clock, clock.controller_time_s(board_time_s), board_time_s, readings, raw)
 
 

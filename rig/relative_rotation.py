@@ -58,7 +58,7 @@ class RelativeRotation:
         return vector
 
 
-def mean_rates(observations: Sequence[Observation], calibration: Calibration | None) -> MeanRates:
+def mean_rates(observations: Sequence[Observation], calibration: Calibration | None = None) -> MeanRates:
     """The mean rates of a sensor's revolutions, corrected; without a calibration, as the sensor read them."""
     means = np.array([observation.average.mean_rad_s for observation in observations])
     variances = np.array([observation.average.variance_rad2_s2 for observation in observations])

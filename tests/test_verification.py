@@ -12,6 +12,7 @@ from rich.console import Console
 from synthetic_run import SCALE, Setup
 from synthetic_verification import REFERENCE, TRUTH, Stored, recording
 
+from rig.comparison import Reference
 from rig.config.models import LimitsSection
 from rig.errors import Fault
 from rig.estimation.estimate import Array
@@ -20,7 +21,7 @@ from rig.report.figures import write_figures
 from rig.report.verification import verification_document, verification_lines, verification_table
 from rig.solution import solve_runs
 from rig.verdict import verdict, verification_checks
-from rig.verification import Reference, Verification, compare, verify
+from rig.verification import Verification, verify
 
 KNOWN = Reference("reference", np.array(REFERENCE.scale), np.array(REFERENCE.bias_rad_s))
 QUIET = Setup(noise_rad_s=0.002)
@@ -95,7 +96,10 @@ def before(scale: tuple[float, ...], bias_rad_s: tuple[float, ...]) -> Array:
         scale=scale, bias_rad_s=bias_rad_s, noise_rad_s=0.0, mounting_error_rad=(0.0, 0.0, 0.0), vibration=0.0
     )
     known = replace(REFERENCE, noise_rad_s=0.0, mounting_error_rad=(0.0, 0.0, 0.0))
-    found = compare([recording(plain, reference=known)], "gyro", KNOWN, np.eye(3))
+    true = Stored(np.array(scale), np.array(bias_rad_s))
+    after = recording(plain, reference=known, stored=true)
+    found = verify("gyro", KNOWN, [after], [recording(plain, reference=known)], true).before
+    assert found is not None
     return found.movement.mse_rad2_s2
 
 

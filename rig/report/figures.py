@@ -6,7 +6,8 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from rig.verification import Comparison, Verification
+from rig.comparison import Comparison
+from rig.verification import Verification
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure

@@ -11,6 +11,7 @@ import numpy as np
 from rich.console import Console
 
 from rig.agreement import agreement
+from rig.comparison import Reference
 from rig.config.load import parse
 from rig.config.models import RigConfig
 from rig.recording import RunData
@@ -22,7 +23,7 @@ from rig.report.verification import verification_document
 from rig.results import SCHEMA
 from rig.solution import DEFAULT_ESTIMATOR, SensorResult, solve_runs
 from rig.verdict import judge, verdict, verification_checks
-from rig.verification import Reference, Verification, verify
+from rig.verification import Verification, verify
 
 
 @dataclass(frozen=True, slots=True)

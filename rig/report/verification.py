@@ -6,8 +6,9 @@ from typing import Any
 import numpy as np
 from rich.table import Table
 
+from rig.comparison import Comparison, Deviation
 from rig.relative_rotation import RelativeRotation
-from rig.verification import Comparison, Deviation, Verification
+from rig.verification import Verification
 
 
 def verification_document(verification: Verification) -> dict[str, Any]:
