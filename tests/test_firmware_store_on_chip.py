@@ -128,7 +128,7 @@ def test_power_that_fails_at_any_moment_of_a_write_leaves_the_old_calibration_or
 ) -> None:
     rng = random.Random(1)
     found = []
-    for _ in range(40):
+    for _ in range(25):
         session = boot(copy(written))
         session.configure("lsm9ds1")
         session.board.receive(encode("write_calibration", 5, {"sensor": 0, **calibration(3)}))

@@ -6,9 +6,9 @@
 #define PARAMETERS 6u
 #define SPEED SOLVER_UNKNOWNS /* the column of ω² */
 
-/* The host refuses designs whose condition number is above 30. That of the Frobenius norm, which costs less, is at most three
-   times as large: what the host accepts is solved here too. A direction that was not swept gives hundreds. */
-#define MAX_CONDITION 100.0f
+/* The host refuses designs whose condition number is above 30. What is_well_conditioned() estimates is then below 110: what
+   the host accepts is solved here too. A direction that was not swept gives hundreds. */
+#define MAX_CONDITION 110.0f
 
 /* No sensor's scale factor is that far off, either way. Sweeps that are all alike leave only noise to compare, which looks like
    readings of a sensor that is. */
@@ -19,11 +19,14 @@
 #define ALGORITHM_1_LIMIT 255u
 #define ALGORITHM_1_TOLERANCE 2e-6f /* of Σ|β|: SIX has 1e-6, absolute, which single precision does not always resolve */
 
-/* X β = ω² − γ for γ as yet unknown. X has the columns [m m²] and is given by its triangle and the inverse of that. */
+/* Written out by the compiler, and small functions inlined: counting and indexing would be two thirds of all instructions. */
+#define EACH(i, from, to) _Pragma("GCC unroll 6") for (unsigned i = (from); i < (to); i++)
+
+/* X β = ω² − γ for γ as yet unknown. X has the columns [m m²] and is given by its triangle, in blocks of three:
+   [linear mixed; 0 squares]. The right-hand sides ω² and 1 are turned alike. */
 struct design {
-    float r[PARAMETERS][PARAMETERS];
+    float linear[3][3], mixed[3][3], squares[3][3];
     float speeds[PARAMETERS], ones[PARAMETERS];
-    float inverse[PARAMETERS][PARAMETERS];
     float centre[3]; /* what readings are counted from, rad/s */
 };
 
@@ -68,84 +71,106 @@ void solver_add(struct accumulator *accumulator, const float mean_rad_s[3], floa
     accumulator->count++;
 }
 
-/* Makes [m m²] out of [1 m m²]: the first row of R joins the others as one more revolution whose linear terms, for readings
-   counted from their mean, are zero. That also decouples 1 from m, so moving the origin leaves R a triangle. */
+/* Makes [m m²] out of [1 m m²]: the first row of R joins the others as one more revolution. Its linear terms, for readings
+   counted from their mean, are zero; that also decouples 1 from m, so moving the origin leaves R a triangle. */
 static void reduce(const struct accumulator *accumulator, bool centred, struct design *design)
 {
     const float(*r)[SOLVER_UNKNOWNS + 1u] = accumulator->r;
-    float row[PARAMETERS], speed = r[0][SPEED], one = r[0][0];
-    for (unsigned axis = 0; axis < 3; axis++) {
-        design->centre[axis] = centred ? r[0][1 + axis] / r[0][0] : 0.0f;
-        row[axis] = centred ? 0.0f : r[0][1 + axis];
-        row[3 + axis] = r[0][4 + axis] - design->centre[axis] * r[0][1 + axis];
+    float linear[3], squares[3], speed = r[0][SPEED], one = r[0][0], inverse = 1.0f / one;
+    EACH(k, 0, 3) {
+        design->centre[k] = centred ? r[0][1 + k] * inverse : 0.0f;
+        linear[k] = r[0][1 + k];
+        squares[k] = r[0][4 + k] - design->centre[k] * r[0][1 + k];
+        design->speeds[k] = r[1 + k][SPEED];
+        design->speeds[3 + k] = r[4 + k][SPEED];
+        design->ones[k] = design->ones[3 + k] = 0.0f;
     }
-    for (unsigned i = 0; i < PARAMETERS; i++) {
-        for (unsigned j = i; j < PARAMETERS; j++)
-            design->r[i][j] = r[1 + i][1 + j];
-        for (unsigned axis = i; axis < 3; axis++)
-            design->r[i][3 + axis] -= 2.0f * design->centre[axis] * r[1 + i][1 + axis];
-        design->speeds[i] = r[1 + i][SPEED];
-        design->ones[i] = 0.0f;
+    EACH(i, 0, 3) {
+        EACH(k, i, 3) {
+            design->linear[i][k] = r[1 + i][1 + k];
+            design->squares[i][k] = r[4 + i][4 + k];
+        }
+        EACH(k, 0, 3)
+            design->mixed[i][k] = r[1 + i][4 + k] - (k < i ? 0.0f : 2.0f * design->centre[k] * r[1 + i][1 + k]);
     }
-    for (unsigned i = centred ? 3 : 0; i < PARAMETERS; i++) {
-        struct rotation by = rotation_of(design->r[i][i], row[i]);
-        for (unsigned j = i; j < PARAMETERS; j++)
-            rotate(by, &design->r[i][j], &row[j]);
-        rotate(by, &design->speeds[i], &speed);
-        rotate(by, &design->ones[i], &one);
+    if (!centred)
+        EACH(i, 0, 3) {
+            struct rotation by = rotation_of(design->linear[i][i], linear[i]);
+            EACH(k, i, 3)
+                rotate(by, &design->linear[i][k], &linear[k]);
+            EACH(k, 0, 3)
+                rotate(by, &design->mixed[i][k], &squares[k]);
+            rotate(by, &design->speeds[i], &speed);
+            rotate(by, &design->ones[i], &one);
+        }
+    EACH(i, 0, 3) {
+        struct rotation by = rotation_of(design->squares[i][i], squares[i]);
+        EACH(k, i, 3)
+            rotate(by, &design->squares[i][k], &squares[k]);
+        rotate(by, &design->speeds[3 + i], &speed);
+        rotate(by, &design->ones[3 + i], &one);
     }
 }
 
-static void invert(struct design *design)
+/* The inverse of a triangle, in its place. */
+static inline void invert(float r[3][3])
 {
-    for (unsigned j = 0; j < PARAMETERS; j++) {
-        design->inverse[j][j] = 1.0f / design->r[j][j];
-        for (unsigned i = j; i-- > 0;) {
-            float sum = 0.0f;
-            for (unsigned k = i + 1; k <= j; k++)
-                sum += design->r[i][k] * design->inverse[k][j];
-            design->inverse[i][j] = -sum * design->inverse[i][i];
-        }
-    }
+    EACH(i, 0, 3)
+        r[i][i] = 1.0f / r[i][i];
+    float r01 = -r[0][0] * r[0][1] * r[1][1];
+    r[0][2] = -(r[0][0] * r[0][2] + r01 * r[1][2]) * r[2][2];
+    r[1][2] *= -r[1][1] * r[2][2];
+    r[0][1] = r01;
 }
 
-/* Whether the revolutions tell all six parameters apart. Readings, counted from their mean, are measured in their own RMS
-   length, so that squares and linear terms compare. What is not a number is refused too. */
-static bool is_well_conditioned(const struct design *design, uint16_t count, float speed2)
+static inline float norm2_of(float r[3][3])
 {
-    float linear = 0.0f, squares = 0.0f, inverse_linear = 0.0f, inverse_squares = 0.0f;
-    for (unsigned i = 0; i < PARAMETERS; i++)
-        for (unsigned j = i; j < PARAMETERS; j++) {
-            *(j < 3 ? &linear : &squares) += design->r[i][j] * design->r[i][j];
-            *(i < 3 ? &inverse_linear : &inverse_squares) += design->inverse[i][j] * design->inverse[i][j];
-        }
-    float length2 = linear / count;
+    float sum = 0.0f;
+    EACH(i, 0, 3)
+        EACH(k, i, 3)
+            sum += r[i][k] * r[i][k];
+    return sum;
+}
+
+/* Whether the revolutions tell all six parameters apart, from the inverses of the design's two triangles. Readings are measured
+   in their own RMS length, so that squares and linear terms compare and X is about √(2 N) long. `mixed`, whose columns are
+   no longer than that, does not make X singular. What is not a number is refused too. */
+static inline bool is_well_conditioned(struct design *inverted, float length2, uint16_t count, float speed2)
+{
     if (!(length2 < MAX_SCALE * MAX_SCALE * speed2 && speed2 < MAX_SCALE * MAX_SCALE * length2))
         return false;
-    float norm2 = count + squares / (length2 * length2);
-    float inverse_norm2 = length2 * (inverse_linear + length2 * inverse_squares);
-    return norm2 * inverse_norm2 <= MAX_CONDITION * MAX_CONDITION;
+    float inverse2 = length2 * (norm2_of(inverted->linear) + length2 * norm2_of(inverted->squares));
+    return 2.0f * count * inverse2 <= MAX_CONDITION * MAX_CONDITION;
 }
 
-/* β(γ) = p − γ q, with squares at 3 … 5: p solves X p = ω², q solves X q = 1. */
+/* β(γ) = p − γ q, with the squares last: p solves X p = ω², q solves X q = 1. */
 struct line {
     float p[PARAMETERS], q[PARAMETERS];
 };
 
-static void solve_line(const struct design *design, struct line *line)
+static inline void solve_for(const struct design *inverted, const float right[PARAMETERS], float found[PARAMETERS])
 {
-    for (unsigned i = 0; i < PARAMETERS; i++) {
-        line->p[i] = line->q[i] = 0.0f;
-        for (unsigned k = i; k < PARAMETERS; k++) {
-            line->p[i] += design->inverse[i][k] * design->speeds[k];
-            line->q[i] += design->inverse[i][k] * design->ones[k];
-        }
+    float rest[3];
+    EACH(i, 0, 3) {
+        found[3 + i] = 0.0f;
+        EACH(k, i, 3)
+            found[3 + i] += inverted->squares[i][k] * right[3 + k];
+    }
+    EACH(i, 0, 3) {
+        rest[i] = right[i];
+        EACH(k, 0, 3)
+            rest[i] -= inverted->mixed[i][k] * found[3 + k];
+    }
+    EACH(i, 0, 3) {
+        found[i] = 0.0f;
+        EACH(k, i, 3)
+            found[i] += inverted->linear[i][k] * rest[k];
     }
 }
 
 static void beta_at(const struct line *line, float gamma, float beta[PARAMETERS])
 {
-    for (unsigned i = 0; i < PARAMETERS; i++)
+    EACH(i, 0, PARAMETERS)
         beta[i] = line->p[i] - gamma * line->q[i];
 }
 
@@ -153,20 +178,20 @@ static void beta_at(const struct line *line, float gamma, float beta[PARAMETERS]
 static float gamma_of(const float beta[PARAMETERS])
 {
     float gamma = 0.0f;
-    for (unsigned axis = 0; axis < 3; axis++)
+    EACH(axis, 0, 3)
         gamma += beta[axis] * beta[axis] / (4.0f * beta[3 + axis]);
     return gamma;
 }
 
 /* Newton on γ = Γ(β(γ)), from the closed form for one speed, which is exact when all speeds are equal. */
-static enum solution_status by_newton(const struct line *line, float speed2, float beta[PARAMETERS], uint8_t *steps)
+static inline enum solution_status by_newton(const struct line *line, float speed2, float beta[PARAMETERS], uint8_t *steps)
 {
     float g = gamma_of(line->q);
     float gamma = speed2 * g / (1.0f + g);
     for (*steps = 1; *steps <= NEWTON_LIMIT; ++*steps) {
         float value = -gamma, slope = -1.0f;
         beta_at(line, gamma, beta);
-        for (unsigned axis = 0; axis < 3; axis++) {
+        EACH(axis, 0, 3) {
             float bias = beta[axis] / (2.0f * beta[3 + axis]);
             value += beta[3 + axis] * bias * bias;
             slope += bias * (bias * line->q[3 + axis] - line->q[axis]);
@@ -190,7 +215,7 @@ static enum solution_status by_algorithm_1(const struct line *line, float beta[P
     for (*passes = 2; *passes < ALGORITHM_1_LIMIT; ++*passes) {
         float improved[PARAMETERS], change = 0.0f, size = 0.0f;
         beta_at(line, gamma_of(beta), improved);
-        for (unsigned i = 0; i < PARAMETERS; i++) {
+        EACH(i, 0, PARAMETERS) {
             change += __builtin_fabsf(improved[i] - beta[i]);
             size += __builtin_fabsf(improved[i]);
         }
@@ -208,7 +233,7 @@ static enum solution_status by_algorithm_1(const struct line *line, float beta[P
 /* k = √β_s and b = β_l / (2 β_s), the last lines of Algorithm 1; false when a square is not one. */
 static bool to_parameters(const float beta[PARAMETERS], const float centre[3], struct solution *solution)
 {
-    for (unsigned axis = 0; axis < 3; axis++) {
+    EACH(axis, 0, 3) {
         if (!(beta[3 + axis] > 0.0f))
             return false;
         solution->scale[axis] = __builtin_sqrtf(beta[3 + axis]);
@@ -226,14 +251,18 @@ static enum solution_status solve(const struct accumulator *accumulator, enum so
         return SOLUTION_TOO_FEW_OBSERVATIONS;
     float speed2 = accumulator->r[0][SPEED] / accumulator->r[0][0]; /* the mean of ω² */
     reduce(accumulator, true, &design);
-    invert(&design);
-    if (!is_well_conditioned(&design, accumulator->count, speed2))
+    float length2 = norm2_of(design.linear) / accumulator->count;
+    invert(design.linear);
+    invert(design.squares);
+    if (!is_well_conditioned(&design, length2, accumulator->count, speed2))
         return SOLUTION_DEGENERATE;
     if (method == METHOD_ALGORITHM_1) { /* counts readings from zero, as published */
         reduce(accumulator, false, &design);
-        invert(&design);
+        invert(design.linear);
+        invert(design.squares);
     }
-    solve_line(&design, &line);
+    solve_for(&design, design.speeds, line.p);
+    solve_for(&design, design.ones, line.q);
     enum solution_status status = method == METHOD_ALGORITHM_1
                                       ? by_algorithm_1(&line, beta, &solution->iterations)
                                       : by_newton(&line, speed2, beta, &solution->iterations);
