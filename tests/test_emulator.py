@@ -204,6 +204,20 @@ def test_a_broken_rule_is_named_with_its_function(name: str, statement: str, wha
     assert "culprit" in error.what
 
 
+def test_an_access_may_be_right_many_times_before_it_is_wrong(tmp_path: Path) -> None:
+    error = failure(
+        """
+        __attribute__((noinline)) void culprit(uint32_t address)
+        {
+            __asm volatile("ldrd r0, r1, [%0]" :: "r"(address) : "r0", "r1");
+        }
+        int main(void) { setup(); for (int i = 0; i < 600; i++) culprit(0x20000100 + i / 599); for (;;); }
+        """,
+        tmp_path,
+    )
+    assert "unaligned access by address 0x20000101" in error.what
+
+
 def test_memory_is_not_zero_at_power_up(tmp_path: Path) -> None:
     source = "uint8_t bytes[8]; int main(void) { setup(); for (int i = 0; i < 8; i++) put(bytes[i]); for (;;); }"
     assert run(source, tmp_path) == b"\xa5" * 8

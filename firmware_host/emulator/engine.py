@@ -149,8 +149,8 @@ class Engine:
 
         self._hook(UC_HOOK_BLOCK, _BLOCK(on_block))
 
-    def on_instruction(self, address: int, hook: Callable[[int], None]) -> None:
-        """Call `hook(address)` before the instruction at `address`."""
+    def on_instruction(self, address: int, hook: Callable[[int], None]) -> Callable[[], None]:
+        """Call `hook(address)` before the instruction at `address`; what this returns ends that, between two runs."""
 
         def on_instruction(_handle: int, address: int, _size: int) -> None:
             try:
@@ -158,7 +158,8 @@ class Engine:
             except BaseException as error:
                 self._fail(error)
 
-        self._hook(UC_HOOK_CODE, _BLOCK(on_instruction), address, address)
+        hook_handle = self._hook(UC_HOOK_CODE, _BLOCK(on_instruction), address, address)
+        return lambda: _check(uclib.uc_hook_del(self._handle, hook_handle))
 
     def on_interrupt(self, hook: Callable[[int], None]) -> None:
         """Call `hook(number)` when the core raises one of its own exceptions (supervisor call, exception return, …)."""
@@ -233,11 +234,12 @@ class Engine:
             self._fault_place = self._place.read()
         self.stop()
 
-    def _hook(self, kind: int, callback: Any, begin: int = 1, end: int = 0) -> None:
+    def _hook(self, kind: int, callback: Any, begin: int = 1, end: int = 0) -> ctypes.c_size_t:
         """Add a hook for addresses from `begin` to `end`; the default is Unicorn's way to say everywhere."""
         self._callbacks.append(callback)
         handle = ctypes.c_size_t()
         _check(uclib.uc_hook_add(self._handle, ctypes.byref(handle), kind, _pointer(callback), None, begin, end))
+        return handle
 
 
 def _pointer(callback: Any) -> ctypes.c_void_p:

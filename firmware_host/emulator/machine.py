@@ -1,11 +1,10 @@
 """The emulated board: the firmware image on a Cortex-M4F, its peripherals and its sensors, under one virtual clock."""
 
 import struct
-from collections.abc import Callable, Sequence
-
-from unicorn.arm_const import UC_ARM_REG_LR, UC_ARM_REG_R0, UC_ARM_REG_SP
+from collections.abc import Sequence
 
 from firmware_host.emulator import rcc
+from firmware_host.emulator.alignment import AlignmentWatch
 from firmware_host.emulator.bus import Peripheral, Violation
 from firmware_host.emulator.chip import Chip
 from firmware_host.emulator.cortex import Cortex, Entry
@@ -13,7 +12,7 @@ from firmware_host.emulator.engine import Engine, EngineFault
 from firmware_host.emulator.flash_memory import FLASH_BYTES, STORE_OFFSET, FlashMemory, PowerLost
 from firmware_host.emulator.spi_device import BoardClock, SpiDevice
 from firmware_host.emulator.symbols import Symbols
-from firmware_host.emulator.thumb import instructions, is_floating_point, word_accesses
+from firmware_host.emulator.thumb import instructions, is_floating_point
 from firmware_host.emulator.timeline import Timeline
 from firmware_host.errors import BoardError
 
@@ -21,7 +20,6 @@ _FLASH = 0x0800_0000
 _RAM, _RAM_SIZE = 0x2000_0000, 64 * 1024  # SRAM1, then SRAM2 at its second address
 _SYSTEM_MEMORY, _UNIQUE_ID, _FLASH_KB = 0x1FFF_7000, 0x1FFF_7590, 0x1FFF_75E0
 _WFI, _BRANCH_TO_SELF = 0xBF30, 0xE7FE
-_CORE_REGISTERS = [*range(UC_ARM_REG_R0, UC_ARM_REG_R0 + 13), UC_ARM_REG_SP, UC_ARM_REG_LR]
 _EXCEPTION_RETURN = 8
 _CORE_EXCEPTIONS = {2: "supervisor call", 7: "breakpoint"}
 _CORRECT = "Correct the firmware"
@@ -67,7 +65,7 @@ class EmulatedBoard:
         self._engine.meter(self._timeline, self._costs, self._measure)
         self._engine.on_interrupt(self._core_exception)
         self._engine.on_invalid(self._invalid_access)
-        self._watch_alignment()
+        self._alignment = AlignmentWatch(self._engine, self._symbols)
         self.powered = True  # until the supply fails, as the flash may be told to let it
         self._sent = bytearray()
         self._failure: BoardError | None = None
@@ -177,6 +175,7 @@ class EmulatedBoard:
         engine.paused = False
         engine.run(cortex.pc)
         cortex.paused()
+        self._alignment.between_runs()
         if engine.paused:
             return
         if cortex.pc not in self._after_wfi:
@@ -195,18 +194,6 @@ class EmulatedBoard:
             return max(ticks, self._timeline.deadline - self._timeline.now)  # it turns until something happens
         self._costs[address] = ticks
         return ticks
-
-    def _watch_alignment(self) -> None:
-        self._bases: dict[int, Callable[[], int]] = {}
-        for start, end in self._symbols.code():
-            for address, base in word_accesses(self._engine.read(start, end - start), start):
-                self._bases[address] = self._engine.register(_CORE_REGISTERS[base])
-                self._engine.on_instruction(address, self._check_alignment)
-
-    def _check_alignment(self, address: int) -> None:
-        base = self._bases[address]()
-        if base & 3:
-            raise Violation("firmware_fault", f"unaligned access by address 0x{base:08X}", _CORRECT)
 
     def _core_exception(self, number: int) -> None:
         if number != _EXCEPTION_RETURN:
