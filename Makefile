@@ -18,7 +18,9 @@ demo: $(VENV)/demo.installed
 	$(BIN)/rig run configs/demo.yaml
 
 test: $(VENV)/dev.installed lint
-	$(BIN)/pytest
+	rm -rf build/coverage
+	RIG_COVERAGE=$(CURDIR)/build/coverage $(BIN)/pytest
+	$(MAKE) -C firmware_host/firmware coverage_table COVERED=$(CURDIR)/build/coverage PYTHON=$(CURDIR)/$(BIN)/python
 
 lint: $(VENV)/dev.installed
 	$(BIN)/ruff check .

@@ -2,6 +2,7 @@
 
 import ctypes
 import functools
+import os
 import subprocess
 import tempfile
 from collections.abc import Sequence
@@ -34,8 +35,11 @@ class CFrame(ctypes.Structure):
 
 @functools.cache
 def core() -> ctypes.CDLL:
-    """The core, built once a test run, with undefined behaviour ending the process."""
-    out = tempfile.mkdtemp(prefix="rig_host_")
+    """The core, built once a test run, with undefined behaviour ending the process.
+
+    With RIG_COVERAGE in the environment it is built there and notes which lines run: `make coverage` reads that.
+    """
+    out = os.environ.get("RIG_COVERAGE") or tempfile.mkdtemp(prefix="rig_host_")
     subprocess.run(["make", "-s", "-C", FIRMWARE, "host", f"OUT={out}"], check=True)
     library = ctypes.CDLL(f"{out}/rig_host.so")
     library.frame_crc.restype = ctypes.c_uint32

@@ -335,8 +335,10 @@ NAN, INFINITY = float("nan"), float("inf")
         {"scale": (1.0, -1.0, 1.0)},
         {"scale": (NAN, 1.0, 1.0)},
         {"scale": (1.0, 1.0, INFINITY)},
+        {"scale": (1e30, 1.0, 1.0)},
         {"bias_rad_s": (0.0, NAN, 0.0)},
         {"bias_rad_s": (0.0, 0.0, -INFINITY)},
+        {"bias_rad_s": (-1e30, 0.0, 0.0)},
     ],
 )
 def test_a_calibration_that_cannot_be_right_is_refused_and_the_stored_one_stays(wrong: dict[str, Any]) -> None:
@@ -420,8 +422,8 @@ def test_one_sensor_streams_calibrated_beside_another_that_streams_raw() -> None
 
 
 def test_rates_that_do_not_fit_are_the_largest_that_do() -> None:
-    board = calibrated_board(CALIBRATION | {"scale": (1e30, 1e30, 1.0), "bias_rad_s": (0.0, 0.0, 0.0)})
-    convert(board, PERIOD_US, (1, -1, 0))
+    board = calibrated_board(CALIBRATION | {"scale": (1e5, 1e5, 1.0), "bias_rad_s": (0.0, 0.0, 0.0)})
+    convert(board, PERIOD_US, (32767, -32768, 0))
     assert rates(board.ask("stop")) == pytest.approx(np.array([[2147.483647, -2147.483647, 0.0]]), abs=1e-9)
 
 

@@ -23,12 +23,14 @@ void stored_on_read(const struct frame *request)
     }
 }
 
+#define LARGEST 1e6f /* scale, or bias in rad/s: far beyond any sensor's, and no product of two overflows */
+
 static bool is_usable(const struct write_calibration_payload *calibration)
 {
     bool usable = calibration->model == MODEL_K_TIMES_M_PLUS_B;
     for (unsigned axis = 0; axis < 3; axis++)
-        usable = usable && calibration->scale[axis] > 0.0f && __builtin_isfinite(calibration->scale[axis]) &&
-                 __builtin_isfinite(calibration->bias_rad_s[axis]);
+        usable = usable && calibration->scale[axis] > 0.0f && calibration->scale[axis] < LARGEST &&
+                 __builtin_fabsf(calibration->bias_rad_s[axis]) < LARGEST;
     return usable;
 }
 

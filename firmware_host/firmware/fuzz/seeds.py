@@ -1,0 +1,76 @@
+"""Writes the fuzzer's first inputs: `python -m firmware_host.firmware.fuzz.seeds FOLDER`.
+
+Every request of the table once, as zeros and as the plays a board is made for: streams, observations, calibrations.
+"""
+
+import sys
+from pathlib import Path
+from typing import Any
+
+from firmware_host.protocol import MESSAGES, Message
+
+# What fuzz_board.c does at these bytes
+NOISE, FRAME, CONVERT, WAIT, DISTURB, LINE, FLASH = range(7)
+
+_BY_NAME = {message.name: message for message in MESSAGES}
+
+
+def frame(name: str, *values: Any) -> bytes:
+    """A request with these values, one for each place of its layout."""
+    message = _BY_NAME[name]
+    payload = message.head.pack(*values)
+    return bytes((FRAME, message.code, 1, len(payload))) + payload
+
+
+def convert(sensors: int, times: int, period_us: int) -> bytes:
+    """So many conversions of the sensors in the mask."""
+    return bytes((CONVERT, sensors, 7, times, period_us // 50))
+
+
+def zeros(message: Message) -> bytes:
+    """A request of zeros."""
+    return bytes((FRAME, message.code, 1, message.head.size)) + bytes(message.head.size)
+
+
+SETUP = b"".join(
+    frame("configure", sensor, rate_hz, range_deg_s)
+    for sensor, rate_hz, range_deg_s in ((0, 238.0, 245.0), (1, 200.0, 250.0), (2, 200.0, 500.0))
+)
+RECORD = (1, b"LSM9DS1-001", 1_700_000_000, 25.0, 1.1, 1.2, 1.3, 0.01, -0.02, 0.03)
+OBSERVATIONS = b"".join(
+    frame("recall", 0, index, *(speed_rad_s * (i == index // 2) + 0.01 for i in range(3)), abs(speed_rad_s))
+    for index, speed_rad_s in enumerate((0.5, -0.5, 0.5, -0.5, 0.5, -0.5))
+)
+PLAYS = {
+    "requests": b"".join(zeros(message) for message in MESSAGES if message.sender == "host"),
+    "stream": SETUP + frame("start", 0) + convert(7, 120, 4000) + frame("status") + frame("stop"),
+    "kept": SETUP
+    + frame("keep", 7, 0.5)
+    + frame("start", 0)
+    + convert(7, 250, 4000)
+    + frame("observe", 0, 0, 200_000, 900_000, 0.5),
+    "solved": SETUP + OBSERVATIONS + frame("solve", 0, 0) + frame("solve", 0, 1),
+    "stored": SETUP
+    + frame("write_calibration", 0, *RECORD)
+    + frame("read_calibration", 0)
+    + frame("start", 1)
+    + convert(1, 60, 4000)
+    + frame("stop")
+    + frame("erase_calibration", 0),
+    "power cut": SETUP + bytes((FLASH, 9)) + frame("write_calibration", 0, *RECORD) + frame("read_calibration", 0),
+    "broken parts": bytes((DISTURB, 0, 0x0F, 0xFF)) + SETUP + bytes((DISTURB, 2, 0x93, 1)) + convert(7, 40, 4000),
+    "silence": SETUP + frame("start", 0) + bytes((WAIT, 255, 4)) + frame("reboot"),
+    "busy line": SETUP + frame("start", 0) + bytes((LINE, 1)) + convert(7, 200, 4000) + bytes((LINE, 0)),
+    "noise": bytes((NOISE, 200)) + bytes(range(1, 201)) + bytes((NOISE, 1, 0)) + zeros(_BY_NAME["hello"]),
+}
+
+
+def main(folder: Path) -> None:
+    """One file for each play."""
+    folder.mkdir(parents=True, exist_ok=True)
+    for name, play in PLAYS.items():
+        (folder / name.replace(" ", "_")).write_bytes(play)
+
+
+if __name__ == "__main__":
+    main(Path(sys.argv[1]))
