@@ -1,5 +1,6 @@
 # make demo    calibrate a gyroscope on a simulated robot arm, on a bare machine with Python 3.11 or 3.12
 # make test    everything CI checks: lint, types, import layers, tests (needs gcc and arm-none-eabi-gcc)
+# make firmware builds the board's image (needs arm-none-eabi-gcc) and prints what it takes of the chip
 # make bench   every benchmark, ratios measured side by side
 # make figures the pictures in docs/method.md, by the studies
 
@@ -35,8 +36,9 @@ figures: $(VENV)/dev.installed
 	for study in $(STUDIES); do $(BIN)/rig study $$study --jobs 2 --out build/studies || exit 1; \
 	  cp build/studies/$$study.png docs/figures/; done
 
-firmware:
+firmware: $(VENV)/demo.installed
 	$(MAKE) -C firmware_host/firmware
+	$(BIN)/python -m firmware_host.footprint
 
 clean:
 	rm -rf $(VENV) *.egg-info

@@ -1,0 +1,133 @@
+"""What the image takes of the chip: `python -m firmware_host.footprint`, which `make firmware` runs after the build.
+
+Flash and RAM are the linker's. The stack is what the board itself reports after a session on the emulator that asks for
+everything it can do: three sensors streaming, observations kept and averaged, both solutions, a calibration written,
+read, streamed by and erased.
+"""
+
+import io
+import math
+import sys
+from pathlib import Path
+from typing import Any
+
+from elftools.elf.constants import SH_FLAGS
+from elftools.elf.elffile import ELFFile
+
+from firmware_host.emulator.adis16465 import Adis16465
+from firmware_host.emulator.flash_memory import FlashMemory
+from firmware_host.emulator.gyroscope import GyroTruth
+from firmware_host.emulator.lsm9ds1 import Lsm9ds1
+from firmware_host.emulator.machine import EmulatedBoard
+from firmware_host.emulator.mpu9250 import Mpu9250
+from firmware_host.protocol import METHODS, Frame, FrameReader, encode
+
+IMAGE = Path(__file__).parent / "firmware" / "image"
+LIMIT_BYTES = 32 * 1024  # of flash, and of RAM
+RAM = range(0x2000_0000, 0x2000_C000)
+SETUPS = ((238.0, 245.0), (200.0, 250.0), (200.0, 500.0))  # Hz and °/s, in the order of the board's sensors
+SENSORS = range(len(SETUPS))
+DIRECTIONS = ((0, 0, 1), (0, 0, -1), (1, 0, 0), (-1, 0, 0), (0, 1, 0), (0, -1, 0))
+SPEED_RAD_S = 1.0472
+STEP_S = 0.01
+
+
+class Session:
+    """A board with three sensors that turn about `direction`."""
+
+    def __init__(self, image: bytes, elf: bytes) -> None:
+        self.direction: tuple[float, ...] = DIRECTIONS[0]
+        truth = GyroTruth((1.1, 0.9, 1.2), (0.01, -0.02, 0.03), noise_rad_s=0.01)
+        self._board = EmulatedBoard(
+            flash=FlashMemory(image),
+            elf=elf,
+            devices=[part(self._rate_at, truth, temperature_c=25.0, seed=1) for part in (Lsm9ds1, Mpu9250, Adis16465)],
+            unique_id=bytes(12),
+            crystal_ppm=0.0,
+            boot_time_s=0.0,
+        )
+        self._reader = FrameReader()
+        self._steps = 0
+        self.run(0.1)
+
+    def _rate_at(self, _time_s: float) -> tuple[float, ...]:
+        return tuple(SPEED_RAD_S * part for part in self.direction)
+
+    def run(self, duration_s: float) -> list[Frame]:
+        """Let time pass. Returns what the board sent."""
+        frames = []
+        for _ in range(math.ceil(duration_s / STEP_S)):
+            self._steps += 1
+            self._board.advance(self._steps * STEP_S)
+            frames += self._reader.feed(self._board.transmitted())
+        return frames
+
+    def ask(self, name: str, **values: Any) -> dict[str, Any]:
+        """The fields of the answer. Raises RuntimeError when the board refuses."""
+        self._board.receive(encode(name, 9, values))
+        (answer,) = [frame for frame in self.run(0.1) if frame.values.get("reply_to") == 9]
+        if answer.name == "error":
+            raise RuntimeError(f"the board refuses {name}: {answer.values}")
+        return answer.values
+
+    def sweep(self, index: int) -> None:
+        """One direction: keep, turn, and let the board observe every sensor."""
+        self.direction = DIRECTIONS[index]
+        self.run(0.1)
+        self.ask("keep", sensors=0b111, duration_s=1.0)
+        start_us = self.ask("status")["uptime_us"]
+        self.run(0.4)
+        end_us = self.ask("status")["uptime_us"]
+        self.run(0.1)
+        span = {"start_us": start_us, "end_us": end_us, "speed_rad_s": SPEED_RAD_S}
+        for sensor in SENSORS:
+            self.ask("observe", sensor=sensor, index=index, **span)
+
+
+def stack_used(image: bytes, elf: bytes) -> int:
+    """The most stack ever used, bytes, as the board reports it after it has done everything."""
+    session = Session(image, elf)
+    for sensor, (rate_hz, range_deg_s) in enumerate(SETUPS):
+        session.ask("configure", sensor=sensor, rate_hz=rate_hz, range_deg_s=range_deg_s)
+    session.ask("start", sensors=0)
+    session.run(0.5)
+    for index in range(len(DIRECTIONS)):
+        session.sweep(index)
+    solutions = [session.ask("solve", sensor=s, method=m) for s in SENSORS for m in range(len(METHODS))]
+    if any(solution["status"] for solution in solutions):
+        raise RuntimeError(f"the board has not solved: {solutions}")
+    session.ask("stop")
+    for sensor in SENSORS:
+        solution = solutions[len(METHODS) * sensor]
+        found = {"scale": solution["scale"], "bias_rad_s": solution["bias_rad_s"]}
+        about = {"model": 1, "serial_number": "footprint", "written_unix_s": 0, "temperature_c": 25.0}
+        session.ask("write_calibration", sensor=sensor, **about, **found)
+        session.ask("read_calibration", sensor=sensor)
+    session.ask("start", sensors=0b111)
+    session.run(0.5)
+    session.ask("stop")
+    for sensor in SENSORS:
+        session.ask("erase_calibration", sensor=sensor)
+    return int(session.ask("status")["stack_high_water"])
+
+
+def ram_taken(elf: bytes) -> tuple[int, int]:
+    """RAM the linker gave away, and how much of it is room for the stack, bytes."""
+    sections = [s for s in ELFFile(io.BytesIO(elf)).iter_sections() if s["sh_flags"] & SH_FLAGS.SHF_ALLOC]
+    in_ram = {section.name: int(section["sh_size"]) for section in sections if section["sh_addr"] in RAM}
+    return sum(in_ram.values()), in_ram[".stack"]
+
+
+def main() -> int:
+    """Print the three numbers. 1 when one is over its limit."""
+    image, elf = (IMAGE / "rig_l432.bin").read_bytes(), (IMAGE / "rig_l432.elf").read_bytes()
+    ram, room = ram_taken(elf)
+    stack = stack_used(image, elf)
+    print(f"flash {len(image):6} B of {LIMIT_BYTES}")
+    print(f"RAM   {ram:6} B of {LIMIT_BYTES}, {room} of them for the stack")
+    print(f"stack {stack:6} B of {room} at most, as the board reports after a session of everything")
+    return 0 if len(image) < LIMIT_BYTES and ram < LIMIT_BYTES and stack < room else 1
+
+
+if __name__ == "__main__":
+    sys.exit(main())
