@@ -1,7 +1,7 @@
 #include "correction.h"
 
 #define URAD_S 1e6f
-#define LARGEST 2147483520.0f /* the largest float that fits int32_t: 2¹²⁸ would be, 128 less is */
+#define LARGEST 2147483520.0f /* the largest float below 2³¹ */
 
 struct correction correction_of(const float scale[3], const float bias_rad_s[3], float sensitivity_rad_s)
 {

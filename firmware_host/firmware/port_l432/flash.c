@@ -7,7 +7,7 @@
 #include "port.h"
 #include "registers.h"
 
-#define FIRST_PAGE 122u
+#define FLASH_START 0x08000000u
 #define ERRORS \
     (FLASH_SR_OPERR | FLASH_SR_PROGERR | FLASH_SR_WRPERR | FLASH_SR_PGAERR | FLASH_SR_SIZERR | FLASH_SR_PGSERR)
 
@@ -50,7 +50,7 @@ static bool finish(void)
 bool port_flash_erase(unsigned page)
 {
     begin();
-    FLASH_CR = FLASH_CR_PER | FLASH_CR_PNB(FIRST_PAGE + page);
+    FLASH_CR = FLASH_CR_PER | FLASH_CR_PNB(((uint32_t)store_start[page] - FLASH_START) / FLASH_PAGE_BYTES);
     FLASH_CR |= FLASH_CR_START;
     return finish();
 }
