@@ -216,7 +216,7 @@ static void answer(const struct frame *request)
 
 static void send_beacon(void)
 {
-    if (acquisition_is_running() || clock_now() - last_beacon_us < BEACON_US)
+    if (acquisition_is_running() || clock_now() - last_beacon_us < BEACON_US || !link_has_room())
         return;
     last_beacon_us = clock_now();
     send_identity(0);
