@@ -38,7 +38,8 @@ def shipped_flash() -> FlashMemory:
 class Session:
     """A board with the gyroscopes `parts`, and every frame it has sent. The virtual clock moves by `tick_s` at a time.
 
-    `sensors`: the simulated parts, by name, to break and to mend. `flash`: of another session, after a power cut.
+    `sensors`: the simulated parts, by name, to break and to mend; `readings`: how many conversions each has made.
+    `flash`: of another session, after a power cut.
     """
 
     def __init__(
@@ -53,8 +54,9 @@ class Session:
         boot_time_s: float = 0.137,
     ) -> None:
         truth = replace(TRUTH, noise_rad_s=noise_rad_s)
+        self.readings = dict.fromkeys(parts, 0)
         self.sensors: dict[str, SpiDevice] = {
-            part: PARTS[part](rate_at, truth, temperature_c=22.0, seed=seed) for part in parts
+            part: PARTS[part](self._counted(part, rate_at), truth, temperature_c=22.0, seed=seed) for part in parts
         }
         self.flash = flash or shipped_flash()
         self.board = EmulatedBoard(
@@ -65,11 +67,18 @@ class Session:
             crystal_ppm=CRYSTAL_PPM,
             boot_time_s=boot_time_s,
         )
-        self.sent = b""  # all the board has said
+        self.sent = bytearray()  # all the board has said
         self.time_s = 0.0
         self._tick_s = tick_s
-        self._reader = FrameReader()
+        self.reader = FrameReader()
         self._frames: list[Frame] = []
+
+    def _counted(self, part: str, rate_at: Callable[[float], Sequence[float]]) -> Callable[[float], Sequence[float]]:
+        def counted_rate_at(time_s: float) -> Sequence[float]:
+            self.readings[part] += 1
+            return rate_at(time_s)
+
+        return counted_rate_at
 
     def run(self, duration_s: float) -> list[Frame]:
         """Let time pass. Returns the frames that arrived in it."""
@@ -78,8 +87,8 @@ class Session:
             self.board.advance(self.time_s)
             data = self.board.transmitted()
             self.sent += data
-            self._frames += self._reader.feed(data)
-        assert self._reader.damaged == 0
+            self._frames += self.reader.feed(data)
+        assert self.reader.damaged == 0
         frames, self._frames = self._frames, []
         return frames
 
