@@ -78,7 +78,7 @@ def test_a_board_that_computes_wrongly_fails_by_name(
     run: RunData, factor: float, shift_rad_s: float, failing: str
 ) -> None:
     scale, bias = double_precision(run)
-    board = solved((scale * [1, factor, 1]).tolist(), (bias + [0, 0, shift_rad_s]).tolist())
+    board = solved((scale * np.array([1, factor, 1])).tolist(), (bias + np.array([0, 0, shift_rad_s])).tolist())
     found = agreement([with_events(run, [*observed(run, range(6)), board])], "gyro")
     assert [check.name for check in found.checks("gyro") if not check.passed] == [failing]
 
