@@ -3,7 +3,7 @@
 import struct
 from dataclasses import dataclass, fields, replace
 from datetime import UTC, datetime
-from typing import Any, Self
+from typing import Any, NamedTuple, Self
 
 import numpy as np
 
@@ -14,8 +14,7 @@ from firmware_host.samples import SAMPLE_DTYPE
 Vector = tuple[float, float, float]
 
 
-@dataclass(frozen=True, slots=True)
-class SampleBatch:
+class SampleBatch(NamedTuple):
     """Samples of one sensor in the order of their sequence numbers, which have no gap inside a batch.
 
     `dropped` is the board's count of conversions lost on its side since the start; `samples` is (n,) of `SAMPLE_DTYPE`.
@@ -32,7 +31,8 @@ class SampleBatch:
         """A `samples` or `rates` frame that came at `host_time_s`."""
         values, items = frame.values, frame.items
         samples = np.empty(len(items), SAMPLE_DTYPE)
-        samples["sequence"] = np.arange(values["sequence"], values["sequence"] + len(items))
+        first = values["sequence"]
+        samples["sequence"] = np.arange(first, first + len(items))
         samples["board_time_us"] = items["delta_us"].astype(np.uint64) + values["base_time_us"]
         samples["host_time_s"] = host_time_s
         samples["counts"] = items["counts" if frame.name == "samples" else "rate_urad_s"]

@@ -21,12 +21,13 @@ def unstuff_in_python(block: bytes) -> bytes | None:
     if 0 in block:
         return None
     body = bytearray(block)
-    place = 0
-    while place < len(block):
+    place, end = 0, len(block)
+    while place < end:
         distance = body[place]
         body[place] = 0
         place += distance
-    return bytes(memoryview(body)[1:]) if place == len(block) else None
+    del body[:1]
+    return bytes(body) if place == end else None
 
 
 def unstuff_by_package(block: bytes) -> bytes | None:
