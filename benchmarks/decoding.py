@@ -14,9 +14,11 @@ from zlib import crc32
 
 from pymavlink.dialects.v20 import common as mavlink
 
-from firmware_host import protocol, stuffing
+from firmware_host import frames as codec
+from firmware_host import stuffing
 from firmware_host.answers import SampleBatch
-from firmware_host.protocol import MESSAGES, FrameReader
+from firmware_host.frames import FrameReader
+from firmware_host.protocol import MESSAGES
 
 sys.path.insert(0, str(Path(__file__).parents[1] / "tests"))
 from emulated_session import Session
@@ -64,7 +66,7 @@ def batches(stream: bytes) -> int:
 
 def batches_without_compiler(stream: bytes) -> int:
     """The same by plain Python alone."""
-    with patch.object(protocol, "unstuff", stuffing.unstuff_in_python):
+    with patch.object(codec, "unstuff", stuffing.unstuff_in_python):
         return batches(stream)
 
 

@@ -10,7 +10,7 @@ from firmware_host.emulator.gyroscope import GyroTruth
 from firmware_host.emulator.lsm9ds1 import Lsm9ds1
 from firmware_host.emulator.machine import EmulatedBoard
 from firmware_host.emulator.mpu9250 import Mpu9250
-from firmware_host.protocol import FrameReader, encode
+from firmware_host.frames import FrameReader, encode
 
 IMAGE = Path(__file__).parents[1] / "firmware_host" / "firmware" / "image"
 TICK_S = 0.002

@@ -8,7 +8,7 @@ from typing import Any, NamedTuple, Self
 import numpy as np
 
 from firmware_host import protocol
-from firmware_host.protocol import Frame
+from firmware_host.frames import Frame
 from firmware_host.samples import SAMPLE_DTYPE
 
 Vector = tuple[float, float, float]

@@ -21,8 +21,8 @@ from firmware_host.answers import (
     reset_cause,
 )
 from firmware_host.errors import BoardError
+from firmware_host.frames import Frame
 from firmware_host.link import BoardLink
-from firmware_host.protocol import Frame
 
 __all__ = [
     "Board",

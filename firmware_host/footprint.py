@@ -20,7 +20,8 @@ from firmware_host.emulator.gyroscope import GyroTruth
 from firmware_host.emulator.lsm9ds1 import Lsm9ds1
 from firmware_host.emulator.machine import EmulatedBoard
 from firmware_host.emulator.mpu9250 import Mpu9250
-from firmware_host.protocol import METHODS, Frame, FrameReader, encode
+from firmware_host.frames import Frame, FrameReader, encode
+from firmware_host.protocol import METHODS
 
 IMAGE = Path(__file__).parent / "firmware" / "image"
 LIMIT_BYTES = 32 * 1024  # of flash, and of RAM

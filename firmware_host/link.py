@@ -7,9 +7,8 @@ from typing import Any
 
 import serial
 
-from firmware_host import protocol
 from firmware_host.errors import BoardError
-from firmware_host.protocol import Frame
+from firmware_host.frames import Frame, FrameReader, encode
 
 _READ_TIMEOUT_S = 0.005  # pyserial waits for all bytes asked for or this long, so it is the delay of every read
 _READ_SIZE = 65536
@@ -40,7 +39,7 @@ class BoardLink:
         self.frames_seen = 0
         self.last_frame_s = time.monotonic()
         self._on_frame = on_frame
-        self._frames = protocol.FrameReader()
+        self._frames = FrameReader()
         self._requests: dict[int, _Request] = {}
         self._sequence = 0
         self._sending = threading.Lock()
@@ -123,7 +122,7 @@ class BoardLink:
         """The leading zero ends whatever half a frame the board may have heard before."""
         try:
             with self._sending:
-                self._serial.write(b"\0" + protocol.encode(name, sequence, values))
+                self._serial.write(b"\0" + encode(name, sequence, values))
         except (serial.SerialException, OSError) as error:
             raise self._port_closed(error) from error
 

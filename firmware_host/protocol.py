@@ -14,12 +14,9 @@ import struct
 from dataclasses import dataclass
 from functools import cached_property
 from itertools import islice
-from typing import Any, NamedTuple
-from zlib import crc32
+from typing import Any
 
 import numpy as np
-
-from firmware_host.stuffing import stuff, unstuff
 
 PROTOCOL_VERSION = 2
 FIRMWARE_VERSION = "0.2.0"  # of the shipped image
@@ -362,102 +359,9 @@ ERRORS = (
     ErrorKind(19, "sensor_fault", "the sensor reports a fault of its own", "Check its supply; else replace the sensor"),
 )
 
-_BLOCK_MAX = PAYLOAD_MAX + OVERHEAD + 1
-_CRC_OF_INTACT = 0x2144DF1C  # of any bytes followed by their own CRC
-
-_BY_CODE = {message.code: message for message in MESSAGES}
-_BY_NAME = {message.name: message for message in MESSAGES}
+MESSAGE_BY_CODE = {message.code: message for message in MESSAGES}
+MESSAGE_BY_NAME = {message.name: message for message in MESSAGES}
 ERROR_BY_CODE = {error.code: error for error in ERRORS}
-
-
-class Frame(NamedTuple):
-    """A received frame: fixed fields by name, items as a structured array of the table's layout."""
-
-    name: str
-    sequence: int
-    values: dict[str, Any]
-    items: np.ndarray
-
-
-def encode(name: str, sequence: int, values: dict[str, Any] | None = None, items: np.ndarray | None = None) -> bytes:
-    """The bytes of one frame, delimiter included. Raises ValueError when the payload exceeds `PAYLOAD_MAX`."""
-    message = _BY_NAME[name]
-    values = values or {}
-    flat: list[Any] = []
-    for field in message.fields:
-        value = values[field.name]
-        if field.kind.startswith("vector"):
-            flat.extend(value)
-        else:
-            flat.append(value.encode("ascii") if isinstance(value, str) else value)
-    payload = message.head.pack(*flat)
-    if items is not None:
-        payload += np.ascontiguousarray(items, message.item_dtype).tobytes()
-    if len(payload) > PAYLOAD_MAX:
-        raise ValueError(f"{name}: payload of {len(payload)} bytes, at most {PAYLOAD_MAX} fit a frame")
-    body = bytes((message.code, sequence)) + payload
-    return stuff(body + crc32(body).to_bytes(4, "little")) + b"\0"
-
-
-def decode(block: bytes) -> Frame | None:
-    """One COBS block (without its delimiter) → frame; None when damaged or not in the table.
-
-    An identity of another protocol version comes back with only the two fields every version has.
-    """
-    body = unstuff(block) if len(block) <= _BLOCK_MAX else None
-    if body is None or len(body) < OVERHEAD or crc32(body) != _CRC_OF_INTACT or body[0] not in _BY_CODE:
-        return None
-    message = _BY_CODE[body[0]]
-    payload = body[2:-4]
-    if message.name == "identity" and len(payload) >= 2 and payload[1] != PROTOCOL_VERSION:
-        return Frame("identity", body[1], {"reply_to": payload[0], "protocol": payload[1]}, np.empty(0))
-    size, each = message.head.size, message.item_dtype.itemsize
-    if len(payload) < size or (len(payload) - size) % each if each else len(payload) != size:
-        return None
-    values = message.named(message.head.unpack_from(payload))
-    items = np.frombuffer(payload, message.item_dtype, offset=size) if each else np.empty(0)
-    if values.get("count", len(items)) != len(items):
-        return None
-    return Frame(message.name, body[1], values, items)
-
-
-class FrameReader:
-    """Cuts a byte stream into frames, whatever the chunks it arrives in, and counts what is missing.
-
-    `lost` is exact as long as fewer than 256 frames are lost in a row; the samples' own sequence tells any number.
-    """
-
-    def __init__(self) -> None:
-        self._rest = b""
-        self._expected: int | None = None  # sequence of the next frame
-        self.damaged = 0  # blocks that did not decode
-        self.lost = 0  # frames missing between the first and the latest, by their sequence
-        self.bytes_seen = 0
-
-    def expect_restart(self) -> None:
-        """The sender is about to start afresh: its next frame continues no sequence."""
-        self._expected = None
-
-    def feed(self, data: bytes) -> list[Frame]:
-        """The frames that `data` completes."""
-        self.bytes_seen += len(data)
-        *blocks, rest = (self._rest + data).split(b"\0")
-        self._rest = rest[: _BLOCK_MAX + 1]  # of noise, or of another baud rate, no more than tells that it is no frame
-        frames = []
-        for block in blocks:
-            if block:
-                frame = decode(block)
-                if frame is None:
-                    self.damaged += 1
-                else:
-                    self._count(frame.sequence)
-                    frames.append(frame)
-        return frames
-
-    def _count(self, sequence: int) -> None:
-        if self._expected is not None:
-            self.lost += (sequence - self._expected) & 0xFF
-        self._expected = sequence + 1
 
 
 def text(value: bytes) -> str:

@@ -4,6 +4,7 @@ import struct
 from collections.abc import Iterable, Iterator, Sequence
 
 from firmware_host import protocol
+from firmware_host.frames import encode
 from firmware_host.protocol import Field, Message
 
 LARGEST_BLOCK = protocol.PAYLOAD_MAX + protocol.OVERHEAD + 2  # with COBS' code byte and the delimiter
@@ -64,7 +65,7 @@ def _frame() -> list[str]:
         "- The board numbers its own frames 0 … 255 and again from 0: a missing number is a lost frame.",
         "- A receiver throws away what does not decode, up to the next 0x00, and counts it. The host repeats a request",
         "  that stays unanswered, so every request may arrive twice; the board repeats nothing.",
-        f"- Example: `hello` with sequence 1 is `{protocol.encode('hello', 1).hex(' ')}` on the wire.",
+        f"- Example: `hello` with sequence 1 is `{encode('hello', 1).hex(' ')}` on the wire.",
     ]
 
 

@@ -6,7 +6,8 @@ from dataclasses import dataclass
 import numpy as np
 from host_frames import CReceiver, encode_in_c
 
-from firmware_host.protocol import MESSAGES, FrameReader, encode
+from firmware_host.frames import FrameReader, encode
+from firmware_host.protocol import MESSAGES
 
 MEAN_FAULT_BYTES = 4
 CHUNK = 4096  # what a read from the port brings at most

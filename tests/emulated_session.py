@@ -14,7 +14,7 @@ from firmware_host.emulator.lsm9ds1 import Lsm9ds1
 from firmware_host.emulator.machine import EmulatedBoard
 from firmware_host.emulator.mpu9250 import Mpu9250
 from firmware_host.emulator.spi_device import SpiDevice
-from firmware_host.protocol import Frame, FrameReader, encode
+from firmware_host.frames import Frame, FrameReader, encode
 
 IMAGE = Path(__file__).parents[1] / "firmware_host" / "firmware" / "image"
 CRYSTAL_PPM = 35.0

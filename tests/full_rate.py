@@ -5,7 +5,7 @@ from dataclasses import dataclass
 
 from emulated_session import PARTS, Session
 
-from firmware_host.protocol import Frame, encode
+from firmware_host.frames import Frame, encode
 
 # name → each part's rate, and which are calibrated
 _USUAL = {"lsm9ds1": 238.0, "mpu9250": 200.0, "adis16465": 200.0}

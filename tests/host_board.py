@@ -11,7 +11,8 @@ from typing import Any
 
 from host_sensors import Adis16465Registers, Lsm9ds1Registers, Mpu9250Registers, Part
 
-from firmware_host.protocol import ERROR_BY_CODE, Frame, FrameReader, encode
+from firmware_host.frames import Frame, FrameReader, encode
+from firmware_host.protocol import ERROR_BY_CODE
 
 PERIOD_US = 4202  # 238 Hz
 SETTLING = 8  # conversions of the LSM9DS1 thrown away after a configure

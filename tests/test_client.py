@@ -19,6 +19,7 @@ from host_board import HostBoard, configured, convert, settle
 from firmware_host import protocol
 from firmware_host.client import Board, Calibration, SampleBatch
 from firmware_host.errors import BoardError
+from firmware_host.frames import decode, encode
 from rig.config.link_budget import Stream
 
 PERIOD_US = 4202  # 238 Hz
@@ -160,8 +161,8 @@ def test_a_stream_left_running_is_stopped_by_the_next_program_and_restarts_at_ze
     wire: tuple[BoardOnAWire, str],
 ) -> None:
     board = wire[0].board
-    board.receive(protocol.encode("configure", 1, {"sensor": 0, "rate_hz": 238, "range_deg_s": 245}))
-    board.receive(protocol.encode("start", 2, {"sensors": 0}))
+    board.receive(encode("configure", 1, {"sensor": 0, "rate_hz": 238, "range_deg_s": 245}))
+    board.receive(encode("start", 2, {"sensors": 0}))
     batches: list[SampleBatch] = []
     with Board(wire[1], protocol.BAUD_RATE, batches.append) as client:
         assert batches == [] and not client.status().streaming
@@ -365,7 +366,7 @@ def test_frames_lost_on_the_way_are_counted_and_a_reboot_loses_none(wire: tuple[
         board.stop()
         assert board.status().frames_lost == len(lost)
         sequences = np.concatenate([batch.samples["sequence"] for batch in batches])
-        frames = [protocol.decode(block) for block in lost]
+        frames = [decode(block) for block in lost]
         assert sequences[-1] + 1 - len(sequences) == sum(len(frame.items) for frame in frames if frame is not None)
         board.reboot()
         assert board.status().frames_lost == len(lost)

@@ -5,7 +5,8 @@ import pytest
 from emulated_session import PARTS, Session, samples
 
 from firmware_host.emulator.spi_device import Fault
-from firmware_host.protocol import ERROR_BY_CODE, Frame, encode
+from firmware_host.frames import Frame, encode
+from firmware_host.protocol import ERROR_BY_CODE
 
 NAMES = list(PARTS)
 RATES_HZ = {"lsm9ds1": 952.0, "mpu9250": 1000.0, "adis16465": 1000.0}

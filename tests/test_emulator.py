@@ -13,7 +13,8 @@ from firmware_host.emulator.gyroscope import GyroTruth
 from firmware_host.emulator.lsm9ds1 import Lsm9ds1
 from firmware_host.emulator.machine import EmulatedBoard
 from firmware_host.errors import BoardError
-from firmware_host.protocol import BAUD_RATE, RESET_CAUSES, encode
+from firmware_host.frames import encode
+from firmware_host.protocol import BAUD_RATE, RESET_CAUSES
 
 SETTLING = 8  # conversions the firmware throws away after a configure
 

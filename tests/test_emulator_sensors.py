@@ -12,7 +12,8 @@ from firmware_host.emulator.gyroscope import GyroTruth
 from firmware_host.emulator.mpu9250 import Mpu9250
 from firmware_host.emulator.spi_device import Fault
 from firmware_host.errors import BoardError
-from firmware_host.protocol import ERROR_BY_CODE, Frame, encode
+from firmware_host.frames import Frame, encode
+from firmware_host.protocol import ERROR_BY_CODE
 
 ALL = tuple(PARTS)
 RATE_RAD_S = (0.5, -0.3, 1.0)

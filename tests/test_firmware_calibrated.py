@@ -8,7 +8,8 @@ from host_board import PERIOD_US, HostBoard, configured, convert, error_of, sett
 from host_flash import HostFlash
 from numpy.typing import NDArray
 
-from firmware_host.protocol import Frame, text
+from firmware_host.frames import Frame
+from firmware_host.protocol import text
 
 Array = NDArray[np.float64]
 

@@ -10,7 +10,7 @@ from hypothesis import example, given, settings
 from hypothesis import strategies as st
 
 from firmware_host import protocol
-from firmware_host.protocol import encode
+from firmware_host.frames import encode
 
 
 @pytest.fixture

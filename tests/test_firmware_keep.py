@@ -9,7 +9,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from numpy.typing import ArrayLike, NDArray
 
-from firmware_host.protocol import Frame
+from firmware_host.frames import Frame
 from rig.estimation.accumulator import Accumulator
 
 Array = NDArray[np.float64]

@@ -8,7 +8,8 @@ from emulated_session import Session, shipped_flash
 
 from firmware_host.emulator.flash_memory import PAGE_BYTES, STORE_OFFSET, FlashMemory
 from firmware_host.emulator.nvic import NMI, Nvic
-from firmware_host.protocol import ERROR_BY_CODE, Frame, encode
+from firmware_host.frames import Frame, encode
+from firmware_host.protocol import ERROR_BY_CODE
 
 IMAGE_BYTES = STORE_OFFSET
 WRITE_OPERATIONS = 13  # one erase, twelve doublewords

@@ -14,7 +14,7 @@ from host_board import (
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from firmware_host.protocol import encode
+from firmware_host.frames import encode
 
 BATCH_MAX = 18
 

@@ -6,7 +6,8 @@ from host_sensors import Nobody
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from firmware_host.protocol import ERROR_BY_CODE, Frame, encode
+from firmware_host.frames import Frame, encode
+from firmware_host.protocol import ERROR_BY_CODE
 
 SETUPS = ((0, 238.0, 245.0), (1, 200.0, 250.0), (2, 400.0, 125.0))
 PERIODS_US = (4202, 5000, 2500)

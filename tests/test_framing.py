@@ -17,7 +17,8 @@ from hypothesis import example, given
 from hypothesis import strategies as st
 
 from firmware_host import protocol, stuffing
-from firmware_host.protocol import MESSAGES, FrameReader, Message, encode
+from firmware_host.frames import FrameReader, decode, encode
+from firmware_host.protocol import MESSAGES, Message
 
 LIMITS = {
     "u8": (0, 2**8 - 1),
@@ -117,7 +118,7 @@ def test_every_way_to_unstuff_gives_the_same(block: bytes) -> None:
 def test_noise_decodes_to_nothing(block: bytes) -> None:
     read = decode_in_c(block)
     assert read == by_packages(block)
-    assert read is not None or protocol.decode(block) is None
+    assert read is not None or decode(block) is None
 
 
 # The layout of every message in C, as a compiler sees it
@@ -226,7 +227,7 @@ def test_an_identity_of_another_version_still_tells_its_version() -> None:
     ],
 )
 def test_contents_the_table_does_not_know_are_damage(body: bytes) -> None:
-    assert protocol.decode(framed(body)) is None
+    assert decode(framed(body)) is None
 
 
 def test_a_payload_too_long_for_a_frame_is_refused() -> None:

@@ -10,6 +10,7 @@ from firmware_host import protocol
 from firmware_host.emulator.adis16465 import Adis16465
 from firmware_host.emulator.lsm9ds1 import Lsm9ds1
 from firmware_host.emulator.mpu9250 import Mpu9250
+from firmware_host.frames import encode
 from firmware_host.reference import reference
 from firmware_host.stuffing import unstuff
 
@@ -33,7 +34,7 @@ def test_every_message_field_and_error_is_on_the_page() -> None:
 def test_the_places_of_the_fields_are_those_on_the_wire() -> None:
     """`sequence` of a batch stands at byte 2 of the payload, after sensor and mode."""
     batch = {"sensor": 1, "mode": 0, "sequence": 0xAABBCCDD, "dropped": 0, "base_time_us": 0, "count": 0}
-    frame = protocol.encode("samples", 7, batch)
+    frame = encode("samples", 7, batch)
     payload = unstuff(frame[:-1])
     assert payload is not None
     assert payload[2 + 2 : 2 + 6] == bytes.fromhex("ddccbbaa")

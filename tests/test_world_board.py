@@ -14,10 +14,10 @@ import pytest
 from conftest import DEMO, World
 from scipy.spatial.transform import Rotation
 
-from firmware_host import protocol
 from firmware_host.client import Board, SampleBatch
 from firmware_host.emulator.flash_memory import DOUBLEWORD_BYTES, PAGE_BYTES, STORE_OFFSET
 from firmware_host.errors import BoardError
+from firmware_host.frames import Frame, FrameReader, encode
 from rig.arm.kinematics import flange_rate
 from rig.config.load import Loaded, load
 from rig.config.models import mounting_matrix
@@ -43,7 +43,7 @@ class Host:
     received: bytearray
 
     def ask(self, name: str, sequence: int, values: dict[str, Any] | None = None) -> None:
-        self.line.to_board(protocol.encode(name, sequence, values), None)
+        self.line.to_board(encode(name, sequence, values), None)
 
     def ticks(self, count: int) -> None:
         for _ in range(count):
@@ -53,16 +53,16 @@ class Host:
 
     def samples(self, sensor: int = 0) -> np.ndarray:
         """(n, 3) counts of every sample of one sensor received so far."""
-        frames = protocol.FrameReader().feed(bytes(self.received))
+        frames = FrameReader().feed(bytes(self.received))
         samples = [frame for frame in frames if frame.name == "samples"]
         return np.concatenate([frame.items["counts"] for frame in samples if frame.values["sensor"] == sensor])
 
-    def answer(self, name: str, values: dict[str, Any]) -> protocol.Frame:
+    def answer(self, name: str, values: dict[str, Any]) -> Frame:
         """Ask, and wait for the answer."""
         self.received.clear()
         self.ask(name, 99, values)
         self.ticks(100)
-        frames = protocol.FrameReader().feed(bytes(self.received))
+        frames = FrameReader().feed(bytes(self.received))
         (answer,) = [frame for frame in frames if frame.values.get("reply_to") == 99]
         return answer
 
@@ -246,10 +246,10 @@ def test_a_small_baud_difference_is_harmless(ratio: float) -> None:
 
 @pytest.mark.parametrize(("sent", "read"), [(921600, 115200), (115200, 921600), (921600, 460800)])
 def test_a_wrong_baud_rate_spoils_every_frame(sent: float, read: float) -> None:
-    frames = b"".join(protocol.encode("hello", i) for i in range(1, 50))
+    frames = b"".join(encode("hello", i) for i in range(1, 50))
     seen = misread(frames, sent, read)
     assert seen and seen != frames
-    assert not protocol.FrameReader().feed(seen)
+    assert not FrameReader().feed(seen)
 
 
 def connect(port: str, baud: int = 921600, timeout_s: float = 1.0) -> tuple[Board, list[SampleBatch]]:
@@ -404,8 +404,8 @@ def test_a_host_that_does_not_read_does_not_stop_the_world(world: World) -> None
     running = world()
     host_name, port = running.board_port.removeprefix("socket://").split(":")
     with socket.create_connection((host_name, int(port)), 5.0) as idle:
-        idle.sendall(protocol.encode("configure", 1, {"sensor": 0, "rate_hz": 952.0, "range_deg_s": 245.0}))
-        idle.sendall(protocol.encode("start", 2, {"sensors": 0}))
+        idle.sendall(encode("configure", 1, {"sensor": 0, "rate_hz": 952.0, "range_deg_s": 245.0}))
+        idle.sendall(encode("start", 2, {"sensors": 0}))
         before = running.state()["time_s"]
         time.sleep(0.5)  # at 952 Hz and ten times real time this fills every buffer on the way
         assert running.state()["time_s"] > before + 1.0
