@@ -216,10 +216,12 @@ static void answer(const struct frame *request)
 
 static void send_beacon(void)
 {
-    if (acquisition_is_running() || clock_now() - last_beacon_us < BEACON_US || !link_has_room())
+    bool idle = !acquisition_is_running();
+    if (idle && clock_now() - last_beacon_us < BEACON_US)
         return;
-    last_beacon_us = clock_now();
-    send_identity(0);
+    last_beacon_us = clock_now(); /* the first a while after a stop, when its last samples have left */
+    if (idle)
+        send_identity(0);
 }
 
 void board_run(void)
