@@ -187,7 +187,8 @@ def _coarse(board_time_s: Array, readings: Array, motion: ArmMotion) -> TimeBase
 def _coarse_offset(time_s: Array, readings: Array, motion: ArmMotion) -> tuple[float, float]:
     """Share explained, and offset (controller − `time_s`) to within a step.
 
-    Looks at peaks of the correlation of |rate|, judged by the vector fit. A step holds at least one sample.
+    Looks at peaks of the correlation, each axis with each (not of magnitudes, in which a bias can hide the turning),
+    judged by the vector fit. A step holds at least one sample.
     """
     step_s = max(COARSE_STEP_S, 1.1 * float(np.median(np.diff(time_s))))
     bins = ((time_s - time_s[0]) / step_s).astype(np.intp)
@@ -198,12 +199,12 @@ def _coarse_offset(time_s: Array, readings: Array, motion: ArmMotion) -> tuple[f
     grid = np.arange(motion.time_s[0], motion.time_s[-1], step_s)
     arm = motion.rate(grid)
 
-    turning, moving = np.linalg.norm(board, axis=1), np.linalg.norm(arm, axis=1)
-    turning = np.where(seen, turning - turning[seen].mean(), 0.0)
-    moving = moving - moving.mean()
+    turning = np.where(seen[:, None], board - board[seen].mean(axis=0), 0.0)
+    moving = arm - arm.mean(axis=0)
     size = 1 << (len(turning) + len(moving)).bit_length()
-    spectrum = np.conj(np.fft.rfft(turning, size)) * np.fft.rfft(moving, size)
-    correlation = np.roll(np.fft.irfft(spectrum, size), len(turning))[: len(turning) + len(moving)]
+    spectra = np.conj(np.fft.rfft(turning, size, axis=0)).T, np.fft.rfft(moving, size, axis=0).T
+    squares = sum(np.fft.irfft(one * other, size) ** 2 for one in spectra[0] for other in spectra[1])
+    correlation = np.roll(squares, len(turning))[: len(turning) + len(moving)]
     peaks = np.flatnonzero((correlation[1:-1] > correlation[:-2]) & (correlation[1:-1] >= correlation[2:])) + 1
     best = peaks[np.argsort(correlation[peaks])[::-1][:CANDIDATES]] - len(turning)
 

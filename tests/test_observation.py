@@ -23,7 +23,7 @@ from synthetic_run import (
 from rig.arm.state import ARM_STATE_DTYPE
 from rig.config.models import ObservationSection
 from rig.errors import Fault, Refused
-from rig.observation import SensorObservations, observe
+from rig.observation import SensorObservations, finished, observe
 from rig.recording import RunData
 from rig.report.sensor import sensor_document
 from rig.solution import solve_runs
@@ -85,6 +85,24 @@ def test_a_board_that_was_heard_late_is_not_taken_for_an_earlier_sweep(joint: st
     readings_rad_s = samples["counts"][heard] * sensor.sensitivity_rad_s_per_count
     clock = estimate_time_base(board_s[heard], readings_rad_s, ArmMotion(USUAL.arm))
     assert abs(clock_errors(Setup(), clock)[0]) < 4 * clock.offset_std_s
+
+
+@pytest.mark.parametrize("bias_rad_s", [0.45, -0.8])
+def test_a_single_sweep_tells_the_clock_whatever_the_bias(bias_rad_s: float) -> None:
+    """A bias about as large as the turn rate hides the turning in the readings' magnitude, or turns it upside down."""
+    setup = Setup(bias_rad_s=(bias_rad_s, -0.01, -0.005), noise_rad_s=0.005)
+    run = synthetic_run(setup)
+    sensor, samples = run.sensors["gyro"], run.samples["gyro"]
+    board_s = samples["board_time_us"] * 1e-6
+    for sweep, (start_s, end_s) in finished(run, "sweep"):
+        if sweep["joint_name"] != "wrist_1":  # which turns about x
+            continue
+        begun_s = board_s * (1 + setup.drift) + setup.boot_s - start_s
+        heard = (begun_s > -1) & (begun_s < end_s - start_s + 0.1)
+        arm = run.arm[(run.arm["time_s"] > start_s - 1) & (run.arm["time_s"] < end_s + 0.1)]
+        readings_rad_s = samples["counts"][heard] * sensor.sensitivity_rad_s_per_count
+        clock = estimate_time_base(board_s[heard], readings_rad_s, ArmMotion(arm))
+        assert abs(clock_errors(setup, clock)[0]) < 4 * clock.offset_std_s < 1e-3
 
 
 def test_the_demo_s_clock_is_known_to_half_a_millisecond() -> None:
