@@ -48,7 +48,7 @@ PLAYS = {
     + frame("keep", 7, 0.5)
     + frame("start", 0)
     + convert(7, 250, 4000)
-    + frame("observe", 0, 0, 200_000, 900_000, 0.5),
+    + frame("observe", 0, 0, 200_000, 400_000, 0.5),
     "solved": SETUP + OBSERVATIONS + frame("solve", 0, 0) + frame("solve", 0, 1),
     "stored": SETUP
     + frame("write_calibration", 0, *RECORD)
@@ -61,6 +61,7 @@ PLAYS = {
     "broken parts": bytes((DISTURB, 0, 0x0F, 0xFF)) + SETUP + bytes((DISTURB, 2, 0x93, 1)) + convert(7, 40, 4000),
     "silence": SETUP + frame("start", 0) + bytes((WAIT, 255, 4)) + frame("reboot"),
     "busy line": SETUP + frame("start", 0) + bytes((LINE, 1)) + convert(7, 200, 4000) + bytes((LINE, 0)),
+    "too much noise": 2 * (bytes((NOISE, 255)) + bytes(range(1, 256))) + bytes((NOISE, 1, 0)),
     "noise": bytes((NOISE, 200)) + bytes(range(1, 201)) + bytes((NOISE, 1, 0)) + zeros(_BY_NAME["hello"]),
 }
 
