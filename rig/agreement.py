@@ -1,8 +1,9 @@
 """Host and board solve the same observations: what the board found, held against double precision. Pure.
 
 Both average the very same samples (the board says which it used) and are told the same speeds, so what differs is only
-the board's arithmetic. The run's own calibration is another matter: it weighs, takes the vibration out and knows the
-rests (`rig.solution`).
+the board's arithmetic. Where a sample was lost on the way to the host, which would outweigh that, the board's own mean
+stands in. The run's own calibration is another matter: it weighs, takes the vibration out and knows the rests
+(`rig.solution`).
 """
 
 from collections.abc import Mapping, Sequence
@@ -10,6 +11,7 @@ from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
+from numpy.typing import NDArray
 
 from rig.board_calibration import observed_before
 from rig.errors import Fault
@@ -27,10 +29,12 @@ class Agreement:
     """A sensor's calibration by the board beside the same in double precision; None where either has no solution.
 
     `solutions` are the board's by method, as it sent them. `scale_difference` is relative, `bias_difference_rad_s`
-    absolute, each the largest of three axes, for the closed form.
+    absolute, each the largest of three axes, for the closed form. `not_observed` says which sweeps the board has no
+    observation of, and why.
     """
 
     solutions: Mapping[str, Mapping[str, Any]]
+    not_observed: tuple[str, ...]
     host_scale: Array | None
     host_bias_rad_s: Array | None
     scale_difference: float | None
@@ -51,14 +55,20 @@ def agreement(runs: Sequence[RunData], sensor: str) -> Agreement:
         for event in runs[-1].events
         if event.name == "board_solved" and event.detail["sensor"] == sensor
     }
+    not_observed = tuple(
+        f"sweep {event.detail['sweep']}: {event.detail['reason']}"
+        for event in runs[-1].events
+        if event.name == "board_not_observed" and event.detail["sensor"] == sensor
+    )
     host = _solve(_observations(runs, sensor))
     board = solutions.get("closed_form")
     if host is None or board is None or board["status"] != "solved":
         scale, bias = (None, None) if host is None else host
-        return Agreement(solutions, scale, bias, None, None)
+        return Agreement(solutions, not_observed, scale, bias, None, None)
     scale, bias = host
     return Agreement(
         solutions,
+        not_observed,
         scale,
         bias,
         float(np.max(np.abs(np.array(board["scale"]) / scale - 1))),
@@ -66,35 +76,59 @@ def agreement(runs: Sequence[RunData], sensor: str) -> Agreement:
     )
 
 
-def _observations(runs: Sequence[RunData], sensor: str) -> list[tuple[Array, float]]:
-    """(mean reading (3,), speed) of every observation the board solved from, by the recorded samples."""
-    found: list[tuple[Array, float]] = []
+@dataclass(frozen=True, slots=True)
+class _Observation:
+    """What the board solved from: mean reading (3,) and speed; `averaged` when the host averaged the reading itself."""
+
+    mean_rad_s: Array
+    speed_rad_s: float
+    averaged: bool
+
+
+def _observations(runs: Sequence[RunData], sensor: str) -> list[_Observation]:
+    """Every observation the board solved from, by the recorded samples."""
+    found: list[_Observation] = []
     for event in runs[-1].events:
         if event.detail.get("sensor") != sensor:
             continue
         if event.name == "board_observed":
-            found.append(_averaged(runs[-1], sensor, event.detail))
+            found.append(_observation(runs[-1], sensor, event.detail))
         elif event.name == "board_recalled":
             sweep = event.detail["sweep"]
             run = next(run for run in reversed(runs[:-1]) if sweep in observed_before([run], sensor, (sweep,)))
-            found.append(_averaged(run, sensor, observed_before([run], sensor, (sweep,))[sweep]))
+            found.append(_observation(run, sensor, observed_before([run], sensor, (sweep,))[sweep]))
     return found
 
 
-def _averaged(run: RunData, sensor: str, observed: Mapping[str, Any]) -> tuple[Array, float]:
+def _observation(run: RunData, sensor: str, observed: Mapping[str, Any]) -> _Observation:
     samples = run.samples[sensor]
-    used = (samples["board_time_us"] >= observed["start_us"]) & (samples["board_time_us"] < observed["end_us"])
-    counts = samples["counts"][used]
-    mean = counts.mean(axis=0) if len(counts) else np.full(3, np.nan)
-    return np.asarray(mean * run.sensors[sensor].sensitivity_rad_s_per_count), float(observed["speed_rad_s"])
+    times_us = samples["board_time_us"]
+    used = slice(*np.searchsorted(times_us, [observed["start_us"], observed["end_us"]]).tolist())
+    counts, missing = samples["counts"][used], observed["samples"] - (used.stop - used.start)
+    if 0 < missing <= _lost(samples["sequence"][max(used.start - 1, 0) : used.stop + 1]):
+        return _Observation(np.array(observed["mean_rad_s"]), observed["speed_rad_s"], averaged=False)
+    mean = counts.mean(axis=0) if missing == 0 and len(counts) else np.full(3, np.nan)
+    mean_rad_s = np.asarray(mean * run.sensors[sensor].sensitivity_rad_s_per_count)
+    return _Observation(mean_rad_s, observed["speed_rad_s"], averaged=True)
 
 
-def _solve(observations: Sequence[tuple[Array, float]]) -> tuple[Array, Array] | None:
-    """Scale and bias as the board computes them: every observation with the same weight."""
+def _lost(sequence: NDArray[np.uint32]) -> int:
+    """How many numbers are missing in a sequence, which is counted modulo 2³²."""
+    return int(np.sum(np.diff(sequence).astype(np.int64) - 1))
+
+
+def _solve(observations: Sequence[_Observation]) -> tuple[Array, Array] | None:
+    """Scale and bias as the board computes them, every observation with the same weight.
+
+    None where that cannot be: too few observations, other samples than the board says it used, or not one mean that
+    the host could check.
+    """
     accumulated = Accumulator.empty()
+    if not any(observation.averaged for observation in observations):
+        return None
     try:
-        for mean_rad_s, speed_rad_s in observations:
-            accumulated = accumulated.add(mean_rad_s, np.ones(3), speed_rad_s, weight=1.0)
+        for seen in observations:
+            accumulated = accumulated.add(seen.mean_rad_s, np.ones(3), seen.speed_rad_s, weight=1.0)
         solution = accumulated.solve()
     except Fault:
         return None

@@ -6,11 +6,15 @@ from typing import Any
 
 import numpy as np
 import pytest
+from rich.console import Console
 from synthetic_run import SENSITIVITY, Setup, synthetic_run
 
 from rig.agreement import agreement
 from rig.observation import finished
 from rig.recording import Event, RunData
+from rig.report.sensor import sensor_document
+from rig.report.table import print_result
+from rig.solution import solve_runs
 
 START_MARGIN_US = 300_000  # past the ramps
 
@@ -101,3 +105,41 @@ def test_a_resumed_run_recalls_what_was_observed_before(run: RunData) -> None:
     found = agreement([first, second], "gyro")
     assert all(check.passed for check in found.checks("gyro"))
     assert found.scale_difference == pytest.approx(0, abs=1e-12)
+
+
+def test_a_sample_lost_on_the_way_is_no_disagreement(run: RunData) -> None:
+    """One of a thousand may be missing; the mean of the rest is off by more than the board's arithmetic is."""
+    scale, bias = double_precision(run)
+    seen = with_events(run, [*observed(run, range(6)), solved(scale.tolist(), bias.tolist())])
+    samples = seen.samples["gyro"]
+    board_us = samples["board_time_us"]
+    starts_us = [event.detail["start_us"] for event in seen.events if event.name == "board_observed"]
+    inside = [int(np.searchsorted(board_us, start_us)) + 700 for start_us in starts_us]
+
+    def without(some: Sequence[int]) -> RunData:
+        return replace(seen, samples={"gyro": np.delete(samples, some)})
+
+    found = agreement([without(inside[:1])], "gyro")
+    assert found.scale_difference is not None and found.scale_difference < 1e-6
+    assert all(check.passed for check in found.checks("gyro"))
+    assert agreement([without(inside)], "gyro").scale_difference is None  # not one mean is left to check
+
+
+def test_a_board_that_averages_other_samples_than_it_says_fails(run: RunData) -> None:
+    scale, bias = double_precision(run)
+    claimed = [replace(one, detail={**one.detail, "samples": 1000}) for one in observed(run, range(6))]
+    found = agreement([with_events(run, [*claimed, solved(scale.tolist(), bias.tolist())])], "gyro")
+    assert not any(check.passed for check in found.checks("gyro"))
+
+
+def test_a_sweep_the_board_missed_is_told(run: RunData) -> None:
+    missed = event("board_not_observed", sweep=5, reason="not_kept: too late")
+    unsolved = event("board_solved", method="closed_form", status="too_few_observations", observations=5)
+    events = [*observed(run, range(5)), missed, unsolved]
+    result = solve_runs([run])["gyro"]
+    entry = sensor_document(result, "calibrate", agreement([with_events(run, events)], "gyro"))
+    console = Console(width=120, record=True)
+    print_result({"sensors": {"gyro": entry}, "verification": {}, "checks": [], "verdict": "fail"}, console)
+    shown = console.export_text()
+    assert "on the board: too_few_observations, from 5 sweeps" in shown
+    assert "not observed by the board: sweep 5: not_kept: too late" in shown

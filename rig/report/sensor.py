@@ -87,6 +87,7 @@ def _board(agreed: Agreement) -> dict[str, Any]:
     """The board's solutions by method, and the closed form's distance from the same in double precision."""
     return {
         "solutions": {method: dict(solution) for method, solution in agreed.solutions.items()},
+        "not_observed": list(agreed.not_observed),
         "host_scale": None if agreed.host_scale is None else agreed.host_scale.tolist(),
         "host_bias_rad_s": None if agreed.host_bias_rad_s is None else agreed.host_bias_rad_s.tolist(),
         "scale_difference": agreed.scale_difference,

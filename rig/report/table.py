@@ -65,11 +65,7 @@ def _beside(sensor: Mapping[str, Any]) -> list[str]:
         else:
             scale, bias = (_triple(other["scale"], ".5f"), _triple(other["bias_rad_s"], "+.5f"))
             lines.append(f"{name}: k {scale}, b {bias} rad/s")
-    board = sensor.get("board", {}).get("solutions", {}).get("closed_form")
-    if board is not None and board["status"] == "solved":
-        lines.append(
-            f"on the board: k {_triple(board['scale'], '.5f')}, b {_triple(board['bias_rad_s'], '+.5f')} rad/s"
-        )
+    lines += _on_the_board(sensor["board"]) if "board" in sensor else []
     vector = sensor["vector_model"]
     if "error" not in vector:
         skew = _triple(np.degrees(vector["non_orthogonality_rad"]), "+.3f")
@@ -77,6 +73,18 @@ def _beside(sensor: Mapping[str, Any]) -> list[str]:
         lines.append(f"non-orthogonality yz zx xy: {skew} ° (± {std:.3f})")
         lines += [f"warning: {warning}" for warning in vector["warnings"]]
     return lines
+
+
+def _on_the_board(board: Mapping[str, Any]) -> list[str]:
+    """The board's solution, or why it has none."""
+    found = board["solutions"].get("closed_form")
+    if found is None:
+        line = "nothing was solved"
+    elif found["status"] == "solved":
+        line = f"k {_triple(found['scale'], '.5f')}, b {_triple(found['bias_rad_s'], '+.5f')} rad/s"
+    else:
+        line = f"{found['status']}, from {found['observations']} sweeps"
+    return [f"on the board: {line}", *(f"not observed by the board: {sweep}" for sweep in board["not_observed"])]
 
 
 def _triple(values: Iterable[float], form: str) -> str:
