@@ -39,15 +39,18 @@ def judge(solutions: Mapping[str, Estimate], limits: LimitsSection) -> tuple[Che
 def verification_checks(sensor: str, verification: Verification | None, limits: LimitsSection) -> tuple[Check, ...]:
     """Calibrated readings against the reference: the worst axis, and the worst mean over a revolution.
 
+    The reference in its turn is held against the arm, by the limit of those means: it may be the one that is wrong.
     None is a verification that did not happen. A limit that was left out is zero, which nothing passes.
     """
-    rms = mean = None
+    rms = mean = known = None
     if verification is not None:
         rms = _largest(verification.after.movement.rms_rad_s)
         mean = _largest(np.array([turn.error_rad_s for turn in verification.after.revolutions]))
+        known = verification.reference_error_rad_s
     return (
         Check(f"{sensor}.verification_rms", rms, limits.verification_rms_rad_s or 0.0, "rad/s"),
         Check(f"{sensor}.verification_mean", mean, limits.verification_mean_rad_s or 0.0, "rad/s"),
+        Check(f"{sensor}.verification_reference", known, limits.verification_mean_rad_s or 0.0, "rad/s"),
     )
 
 

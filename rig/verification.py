@@ -20,10 +20,15 @@ from rig.solution import observe_runs
 
 @dataclass(frozen=True, slots=True)
 class Verification:
-    """The sensor before its calibration (None where that was not recorded) and with it, by one relative rotation."""
+    """The sensor before its calibration (None where that was not recorded) and with it, by one relative rotation.
+
+    `reference_error_rad_s` is the largest by which the reference itself misses the arm: the magnitude of its mean rate
+    over a revolution against 2π/T, and over a rest against zero.
+    """
 
     sensor: str
     reference: Reference
+    reference_error_rad_s: float
     rotation: RelativeRotation
     before: Comparison | None
     after: Comparison
@@ -55,6 +60,7 @@ def verify(
     return Verification(
         sensor,
         reference,
+        _against_the_arm(repeated, reference),
         rotation,
         compare(made, sensor, reference, rotation.matrix) if made else None,
         compare(repeated, sensor, reference, rotation.matrix),
@@ -72,6 +78,15 @@ def _observed(runs: Sequence[RunData], sensor: str, reference: Reference, mode: 
     settings = parse(runs[0].config, "the recorded configuration").config.observation
     tested, known = (observe_runs(runs, name, settings) for name in (sensor, reference.name))
     return [Observed(*seen) for seen in zip(useful, tested, known, strict=True)]
+
+
+def _against_the_arm(recordings: Sequence[Observed], reference: Reference) -> float:
+    """How far the reference is off at most, by what the arm did; magnitudes, for its mounting does not matter here."""
+    turns = turns_of_reference(recordings)
+    of_turns = np.linalg.norm(mean_rates(turns, reference).rate_rad_s, axis=1) - [turn.speed_rad_s for turn in turns]
+    means = [rest.mean_rad_s for seen in recordings for rest in seen.known.rests]
+    of_rests = np.linalg.norm(reference.scale * (np.reshape(means, (-1, 3)) + reference.bias_rad_s), axis=1)
+    return float(np.abs([*of_turns, *of_rests]).max())
 
 
 def _check_recorded(run: RunData, sensor: str, mode: str) -> None:

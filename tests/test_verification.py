@@ -269,6 +269,20 @@ def test_the_worst_axis_and_the_worst_revolution_are_judged() -> None:
     assert judged(None, limits(1.0, 1.0)) == "fail"
 
 
+@pytest.mark.parametrize(
+    ("scale", "bias_rad_s", "error_rad_s"),
+    [(1.0, 0.0, 0.0), (1.02, 0.0, 0.02 * TURN_RATE), (1.0, 0.015, 0.015)],
+    ids=["right", "scale off", "bias off"],
+)
+def test_a_reference_that_misses_the_arm_is_blamed_itself(scale: float, bias_rad_s: float, error_rad_s: float) -> None:
+    """A turntable's values mistyped, or a reference that has aged: the sensor differs from it, but not from the arm."""
+    reference = Reference("reference", KNOWN.scale * scale, KNOWN.bias_rad_s + np.array([bias_rad_s, 0.0, 0.0]))
+    found = verify("gyro", reference, [REPEATED], [MADE], CALIBRATION)
+    assert found.reference_error_rad_s == pytest.approx(error_rad_s, abs=5e-4)
+    checks = {check.name: check.passed for check in verification_checks("gyro", found, limits(1.0, 0.01))}
+    assert checks["gyro.verification_reference"] == (error_rad_s < 0.01)
+
+
 def test_the_result_names_its_statistics_and_a_person_can_read_them() -> None:
     document = json.loads(json.dumps(verification_document(FOUND), allow_nan=False))
     for when in ("before", "after"):

@@ -21,6 +21,7 @@ def verification_document(verification: Verification) -> dict[str, Any]:
         "reference": reference.name,
         "reference_scale": reference.scale.tolist(),
         "reference_bias_rad_s": reference.bias_rad_s.tolist(),
+        "reference_error_rad_s": verification.reference_error_rad_s,
         "rotation": _rotation(verification.rotation),
         "before": None if before is None else _comparison(before),
         "after": _comparison(verification.after),
@@ -46,12 +47,13 @@ def verification_table(name: str, document: Mapping[str, Any]) -> Table:
 
 
 def verification_lines(document: Mapping[str, Any]) -> Iterator[str]:
-    """What stands below the table: how the two sensors sit to each other, whole turns, the filters' delay."""
+    """What stands below the table: how the two sensors sit to each other, the reference, whole turns, the delay."""
     rotation = document["rotation"]
     turned = " ".join(f"{angle:+.3f}" for angle in np.degrees(rotation["from_nominal_rad"]))
     yield f"mounted off nominal to the reference by: {turned} ° (± {np.degrees(max(rotation['std_rad'])):.3f})"
     errors = [turn["error_rad_s"] for turn in document["after"]["revolutions"]]
     stds = [turn["std_rad_s"] for turn in document["after"]["revolutions"]]
+    yield f"the reference itself, against the arm: at most {document['reference_error_rad_s']:.5f} rad/s off"
     yield f"mean over a revolution after: at most {np.abs(errors).max():.5f} rad/s off (± {np.max(stds):.5f})"
     for delay, std in zip(document["after"]["delay_s"], document["after"]["delay_std_s"], strict=True):
         yield f"lags the reference by {1e3 * delay:.2f} ms (± {1e3 * std:.2f}), taken out"
