@@ -109,7 +109,11 @@ def _connected(config_path: Path, overrides: Sequence[str]) -> Iterator[tuple[Ri
     with ExitStack() as stack:
         if loaded.world:
             stack.enter_context(simulated_laboratory(stack.enter_context(written(loaded.text))))
-            print("simulated laboratory: it lasts as long as this command, and its board's memory too", file=sys.stderr)
+            kept = loaded.world.board.flash_file
+            memory = f"is kept in {kept}" if kept else "too, unless world.board.flash_file names a file that keeps it"
+            print(
+                f"simulated laboratory: it lasts as long as this command, its board's memory {memory}", file=sys.stderr
+            )
         with refusing():
             board = stack.enter_context(Board(loaded.config.board.port, loaded.config.board.baud, lambda batch: None))
         yield loaded.config, board

@@ -13,7 +13,7 @@ from rig.arm.preflight import arm_problems, plan_problems
 from rig.config.load import load
 from rig.config.models import RigConfig
 from rig.errors import RigError
-from rig.instruments import find_sensor, refuse_other_firmware, refusing
+from rig.instruments import find_sensor, refuse_other_firmware, refusing, stored_calibration
 from rig.launch import simulated_laboratory, written
 
 
@@ -49,6 +49,9 @@ def _look_at_board(config: RigConfig) -> list[str]:
             try:
                 info = find_sensor(identity, name, section)
                 print(f"sensor {name}: {info.part}, identity register 0x{info.who_am_i:02x}")
+                if config.procedure.name == "verify" and name in config.to_calibrate:
+                    stored = stored_calibration(board, name, section)
+                    print(f"sensor {name}: calibrated on {stored.calibration.written_utc:%Y-%m-%d}")
             except RigError as error:
                 missing.append(str(error))
     return missing

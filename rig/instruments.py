@@ -2,8 +2,9 @@
 
 from collections.abc import Iterator
 from contextlib import contextmanager
+from math import isclose
 
-from firmware_host.client import BoardIdentity, SensorInfo
+from firmware_host.client import Board, BoardIdentity, SensorInfo, StoredCalibration
 from firmware_host.errors import BoardError
 from firmware_host.protocol import FIRMWARE_VERSION
 from rig.config.models import SensorSection
@@ -77,6 +78,36 @@ def find_sensor(identity: BoardIdentity, name: str, section: SensorSection) -> S
         f"sensors.{name}: in the place of the {section.part} answers {impostor(section.part, info.who_am_i)}",
         "Check which part is fitted, its chip select, and sensors.*.part in the configuration",
     )
+
+
+def stored_calibration(board: Board, name: str, section: SensorSection) -> StoredCalibration:
+    """What the board has stored to correct a configured sensor's readings by.
+
+    Raises Refused `no_calibration`, `another_sensor`, `another_range`, and as `find_sensor`.
+    """
+    stored = board.read_calibration(find_sensor(board.identity, name, section).index)
+    if stored is None:
+        raise Refused(
+            "no_calibration",
+            f"sensors.{name}: the board has no calibration stored to correct its readings by",
+            "Calibrate it first, or store a calibration with `rig board calibration write`",
+        )
+    kept = stored.calibration
+    if kept.serial_number != section.serial_number:
+        raise Refused(
+            "another_sensor",
+            f"sensors.{name}: the board has the calibration of {kept.serial_number} stored, the configuration says "
+            f"{section.serial_number}",
+            "Calibrate this sensor, or correct serial_number",
+        )
+    if not isclose(stored.range_deg_s, section.range_deg_s, rel_tol=1e-6):
+        raise Refused(
+            "another_range",
+            f"sensors.{name}: the board's calibration holds for {stored.range_deg_s:g} °/s, the configuration says "
+            f"{section.range_deg_s:g} °/s",
+            "Set range_deg_s to what it was calibrated at, or calibrate at this range",
+        )
+    return stored
 
 
 def configured_part(part: str) -> str:

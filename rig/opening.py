@@ -11,7 +11,7 @@ from math import radians
 from pathlib import Path
 from typing import Any
 
-from firmware_host.client import Board, BoardIdentity, Calibration, StoredCalibration
+from firmware_host.client import Board, BoardIdentity, Calibration
 from rig import __version__
 from rig.arm.driver import Arm
 from rig.arm.plan import plan_six_observation
@@ -20,7 +20,7 @@ from rig.board_calibration import BoardCalibration, observed_sweeps
 from rig.config.load import Loaded, parse
 from rig.config.models import RigConfig, SensorSection, mounting_matrix
 from rig.errors import Refused
-from rig.instruments import find_sensor, refuse_other_firmware, refusing
+from rig.instruments import find_sensor, refuse_other_firmware, refusing, stored_calibration
 from rig.monitor import Monitor, SensorCount
 from rig.observation import sound_sweeps
 from rig.procedure import Confirm, Rig
@@ -40,13 +40,14 @@ def open_rig(
     *,
     earlier: Sequence[RunData] = (),
     calibrated: bool = False,
+    announced: bool = False,
 ) -> Iterator[Rig]:
     """Everything connected and recording, nothing moved yet; on the way out the arm stops and the file is closed.
 
     `earlier` holds the recordings of an interrupted run: the sound sweeps they hold are left out. With `calibrated`
     the sensors to calibrate stream readings that the board has corrected by what it has stored; without, raw ones, and
-    the board calibrates along. Raises `Refused` by name when the arm, the board or a sensor is not what the
-    configuration says, or not what was recorded earlier, or has no calibration to correct by.
+    the board calibrates along. `announced` as in `Rig`. Raises `Refused` by name when the arm, the board or a sensor
+    is not what the configuration says, or not what was recorded earlier, or has no calibration to correct by.
     """
     config = loaded.config
     _refuse_another_procedure(config, earlier)
@@ -64,7 +65,7 @@ def open_rig(
             to_calibrate = {name: set_up[name] for name in config.to_calibrate}
             stored = {}
             if calibrated:
-                stored = {name: _stored(board, name, index) for name, (index, _) in to_calibrate.items()}
+                stored = {name: stored_calibration(board, name, config.sensors[name]) for name in to_calibrate}
                 set_up |= {
                     name: (index, _corrected(sensor, stored[name].calibration))
                     for name, (index, sensor) in to_calibrate.items()
@@ -103,6 +104,7 @@ def open_rig(
             calibrated=tuple(index for index, _ in to_calibrate.values()) if calibrated else (),
             on_board=on_board,
             again=config.procedure.verify and not calibrated,
+            announced=announced,
         )
 
 
@@ -136,17 +138,6 @@ def _refuse_other_instruments(
                 "the sensors are not those of the recording, or set up differently",
                 "Undo the change in config.yaml, or start a new run with `rig run`",
             )
-
-
-def _stored(board: Board, name: str, index: int) -> StoredCalibration:
-    stored = board.read_calibration(index)
-    if stored is None:
-        raise Refused(
-            "no_calibration",
-            f"sensors.{name}: the board has no calibration stored to correct its readings by",
-            "Calibrate it first, or store a calibration with `rig board calibration write`",
-        )
-    return stored
 
 
 def _corrected(sensor: RecordedSensor, calibration: Calibration) -> RecordedSensor:

@@ -34,7 +34,8 @@ class Rig:
 
     `whole_plan` is the plan of the whole procedure: the same as `plan`, or more when an interrupted run goes on.
     `calibrated` are the board's indices of the sensors that stream calibrated readings; `on_board` is there when the
-    board calibrates along; `again` says that the same movement is to follow once more.
+    board calibrates along; `again` says that the whole movement is to follow once more, and `announced` that this is
+    that time, to which the operator has agreed already.
     """
 
     plan: Plan
@@ -50,12 +51,14 @@ class Rig:
     calibrated: tuple[int, ...] = ()
     on_board: BoardCalibration | None = None
     again: bool = False
+    announced: bool = False
     _done_s: float = 0.0  # planned duration of the steps behind us
     _step_started_s: float = 0.0  # controller time
 
     def preflight(self) -> None:
         """Check all that must be right before the arm moves, ask the operator, and take control of the arm.
 
+        A movement that was announced before begins without asking, unless the arm no longer stands where it was left.
         Raises `Refused` naming every problem found; nothing has moved then.
         """
         refuse([*plan_problems(self.whole_plan, self.payload.payload_kg), *arm_problems(self.plan, self.report)])
@@ -63,7 +66,8 @@ class Rig:
             f"pre-flight: arm {self.report.serial_number} at {self.report.host} is ready; "
             f"{len(self.plan.motions)} motions within limits, {self.plan.duration_s:.0f} s"
         )
-        if not self.confirm(self._announcement()):
+        away_rad = max(map(abs, way_to_home(self.plan, self.report.state.q_rad)))
+        if not (self.announced and away_rad <= SAME_POSE_RAD) and not self.confirm(self._announcement()):
             raise Refused("not_confirmed", "nobody agreed to the movement", "Run again and agree, or give --yes")
         moved_rad = max(map(abs, travel(self.plan.start_q_rad, self.arm.latest.q_rad)))
         if moved_rad > SAME_POSE_RAD:
@@ -81,11 +85,19 @@ class Rig:
         turns = ", ".join(
             f"{name} {degrees(angle):+.0f}°" for name, angle in zip(JOINT_NAMES, way, strict=True) if abs(angle) > 0.01
         )
-        return [
+        lines = [
             f"The arm at {self.report.host} will move for {self.plan.duration_s:.0f} s.",
             f"First it goes home: {turns or 'it is there already'}.",
-            f"Then {len(self.plan.sweeps)} sweeps turn the wrists by more than a whole turn each.",
-            *(["If the calibration passes, the same movement follows once more, to verify it."] if self.again else []),
+        ]
+        if self.plan.sweeps:
+            lines.append(f"Then {len(self.plan.sweeps)} sweeps turn the wrists by more than a whole turn each.")
+        if self.again:
+            lines.append(
+                f"If the calibration passes, {len(self.whole_plan.sweeps)} sweeps follow to verify it, without another "
+                f"question, for {self.whole_plan.duration_s:.0f} s."
+            )
+        return [
+            *lines,
             "Nobody and nothing may be within its reach; the sensor's cable needs slack for a whole turn either way.",
         ]
 

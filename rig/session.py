@@ -43,8 +43,8 @@ class Session:
         Writes the outcome into the folder and returns it.
         """
         files = recordings(self.folder, CALIBRATION)
-        self._record(script, CALIBRATION, self.confirm, earlier=[read_run(file) for file in files])
-        with self.reported(self._repeating):
+        self._record(script, CALIBRATION, earlier=[read_run(file) for file in files])
+        with self.reported(self._repeating, moved=True):
             for file in files:
                 make_plain(file)  # if the run was killed, only readers that know about it could open its file
             runs = [read_run(file) for file in recordings(self.folder, CALIBRATION)]
@@ -53,21 +53,20 @@ class Session:
                 return self._written(outcome)
         repeated: list[RunData] = []
         if outcome.passed:
-            with _moved_before(), self.reported(self._mended):
+            with self.reported(self._mended, moved=True):
                 for line in store_calibrations(self.loaded.config, outcome.document):
                     self.shown.line(line)
-            with _moved_before():
-                self._record(self.verification, VERIFICATION, agreed, calibrated=True)
+            self._record(self.verification, VERIFICATION, calibrated=True, moved=True)
             repeated = [self._newest_verification()]
         else:
             self.shown.line("not verified: the calibration failed its limits, so the board keeps what it had")
-        with self.reported(self._repeating):
+        with self.reported(self._repeating, moved=True):
             return self._written(outcome_of(runs, repeated))
 
     def verify(self, script: Script) -> Outcome:
         """Only the second half, with the calibration the board has stored. Returns the outcome."""
-        self._record(script, VERIFICATION, self.confirm, calibrated=True)
-        with self.reported(self._repeating):
+        self._record(script, VERIFICATION, calibrated=True)
+        with self.reported(self._repeating, moved=True):
             return self._written(outcome_of([], [self._newest_verification()]))
 
     @property
@@ -85,15 +84,23 @@ class Session:
         self,
         script: Script,
         kind: str,
-        confirm: Confirm,
         *,
         earlier: Sequence[RunData] = (),
         calibrated: bool = False,
+        moved: bool = False,
     ) -> None:
         recording = next_recording(self.folder, kind)
         with (
-            self.reported(self._mended),
-            open_rig(self.loaded, recording, self.shown, confirm, earlier=earlier, calibrated=calibrated) as rig,
+            self.reported(self._mended, moved=moved),
+            open_rig(
+                self.loaded,
+                recording,
+                self.shown,
+                self.confirm,
+                earlier=earlier,
+                calibrated=calibrated,
+                announced=moved,
+            ) as rig,
         ):
             script(rig)
             self.shown.line(rig.summary())
@@ -104,12 +111,15 @@ class Session:
         return outcome
 
     @contextmanager
-    def reported(self, advice: str) -> Iterator[None]:
-        """What ends a run early goes into its log too; a fault is followed by `advice`, an interruption by its own."""
+    def reported(self, advice: str, *, moved: bool = False) -> Iterator[None]:
+        """What ends a run early goes into its log too; a fault is followed by `advice`, an interruption by its own.
+
+        A refusal says that nothing has moved: after a half of the run (`moved`) it is a fault.
+        """
         try:
             yield
         except (RigError, BoardError) as error:
-            if isinstance(error, Refused):
+            if isinstance(error, Refused) and not moved:
                 self.shown.log(str(error))
                 raise
             fault = Fault(error.name, _with_notes(error.what, error), error.remedy)
@@ -131,17 +141,8 @@ class Session:
             raise
 
 
-@contextmanager
-def _moved_before() -> Iterator[None]:
-    """A refusal says that nothing has moved; in the second half that is no longer true, so there it is a fault."""
-    try:
-        yield
-    except Refused as refusal:
-        raise Fault(refusal.name, refusal.what, refusal.remedy) from refusal
-
-
 def agreed(announcement: Sequence[str]) -> bool:
-    """The answer where there is nobody to ask, or who was asked has agreed before."""
+    """The answer where there is nobody to ask."""
     return True
 
 

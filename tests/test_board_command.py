@@ -15,12 +15,13 @@ import pytest
 import yaml
 from conftest import World, WorldHandle, worlds
 
-from firmware_host.client import BoardIdentity, SensorInfo
+from firmware_host.client import Board, BoardIdentity, SensorInfo
 from firmware_host.protocol import FIRMWARE_VERSION
 from rig.config.models import SensorSection
 from rig.errors import Refused
-from rig.instruments import find_sensor, refuse_other_firmware
+from rig.instruments import find_sensor, refuse_other_firmware, stored_calibration
 from rig.results import passed_result
+from rig.storing import calibration_of, store
 
 SENSORS: dict[str, dict[str, Any]] = {
     "gyro": {"part": "lsm9ds1", "serial_number": "LSM9DS1-001", "rate_hz": 238, "range_deg_s": 245},
@@ -202,11 +203,50 @@ def test_a_missing_part_and_another_part_in_its_place_are_named(laboratory: Worl
     assert [sensor["configured_as"] for sensor in info["sensors"]] == ["gyro", "other", "reference"]
 
 
-def test_a_laboratory_of_its_own_is_started_for_the_command(world: World) -> None:
+def test_a_calibration_of_another_sensor_or_range_corrects_nothing(laboratory: WorldHandle, tmp_path: Path) -> None:
+    section = SensorSection.model_validate(SENSORS["gyro"])
+    found = json.loads((result(tmp_path) / "result.json").read_text())["sensors"]["gyro"]
+    with Board(laboratory.board_port, 921600, lambda batch: None) as board:
+        board.configure(0, section.rate_hz, section.range_deg_s)
+        store(board, 0, calibration_of(found))
+        for changes, name, words in (
+            ({"serial_number": "LSM9DS1-002"}, "another_sensor", "the calibration of LSM9DS1-001"),
+            ({"range_deg_s": 500.0}, "another_range", "holds for 245 °/s"),
+        ):
+            with pytest.raises(Refused) as refusal:
+                stored_calibration(board, "gyro", section.model_copy(update=changes))
+            assert refusal.value.name == name and words in refusal.value.what
+        assert stored_calibration(board, "gyro", section).calibration.scale == pytest.approx(SCALE["gyro"])
+        board.erase_calibration(0)
+
+
+def test_check_names_what_a_verification_lacks(config: Path) -> None:
+    limits = ("limits.verification_rms_rad_s=1", "limits.verification_mean_rad_s=1", "procedure.name=verify")
+    command = [
+        sys.executable,
+        "-m",
+        "rig",
+        "check",
+        str(config),
+        *(word for each in limits for word in ("--set", each)),
+    ]
+    done = subprocess.run(command, capture_output=True, text=True, timeout=50, check=False)
+    assert done.returncode == 2 and done.stdout.endswith("not ready: 2 to mend\n"), done
+    assert [line.split(": ")[1:3] for line in done.stderr.splitlines()] == [
+        ["no_calibration", "sensors.gyro"],
+        ["no_calibration", "sensors.other"],
+    ]
+
+
+def test_a_laboratory_of_its_own_is_started_for_the_command(world: World, tmp_path: Path) -> None:
     handle = world()
     handle.stop()
     done = rig("info", handle.config_path)
     assert done.returncode == 0 and "gyro" in done.stdout, done
+    assert "its board's memory too, unless world.board.flash_file" in done.stderr
+    file = tmp_path / "flash.bin"
+    done = rig("info", handle.config_path, "--set", f"world.board.flash_file={file}")
+    assert done.returncode == 0 and f"its board's memory is kept in {file}" in done.stderr, done
 
 
 IDENTITY = BoardIdentity(2, FIRMWARE_VERSION, "0123456789abcdef01234567", "power", ())
