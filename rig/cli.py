@@ -172,7 +172,8 @@ def run_script(script: "Script", *, procedure: str) -> int:
 
     `procedure` is what kind it is, whatever the file says: `six_observation` calibrates, `verify` verifies.
     """
-    parser = argparse.ArgumentParser(description=script.__doc__)
+    instruction = sys.modules[script.__module__].__doc__
+    parser = argparse.ArgumentParser(description=instruction, formatter_class=argparse.RawDescriptionHelpFormatter)
     _add_config(parser)
     _add_run(parser)
     options = parser.parse_args()
@@ -199,7 +200,8 @@ def _plan(options: argparse.Namespace) -> int:
     from rig.report.plan import checked_plan, print_plan
 
     config = load(options.config, options.overrides).config
-    print_plan(checked_plan(config), repeated=config.procedure.verify, as_json=options.json)
+    repeated = config.procedure.verify and config.procedure.name != "verify"
+    print_plan(checked_plan(config), repeated=repeated, as_json=options.json)
     return 0
 
 

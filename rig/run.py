@@ -6,11 +6,11 @@ from contextlib import ExitStack
 from pathlib import Path
 
 from rig.asking import ask_operator
-from rig.config.load import Loaded, load
+from rig.config.load import Loaded, load, parse
 from rig.errors import Refused
 from rig.launch import simulated_laboratory
 from rig.progress import view
-from rig.recording import read_run
+from rig.recording import RunData, read_run
 from rig.report.outcome import outcome_of, print_outcome
 from rig.run_folder import CALIBRATION, VERIFICATION, new_folder, recordings
 from rig.session import Script, Session, agreed
@@ -47,14 +47,23 @@ def resume(folder: Path, *, assume_yes: bool = False, as_json: bool = False) -> 
 
 def solve(path: Path, estimator: str, *, as_json: bool = False) -> int:
     """Recompute the calibration from a run folder or a run file; prints it, writes nothing. Returns as `run` does."""
-    files = recordings(path, CALIBRATION) if path.is_dir() else [path]
-    repeated = recordings(path, VERIFICATION)[-1:] if path.is_dir() else []
-    if not files and not repeated:
-        raise Refused("no_run", f"{path} holds no run.h5", "Give a run folder or a run file")
-    runs, again = ([read_run(file) for file in some] for some in (files, repeated))
-    outcome = outcome_of(runs, again or None, estimator)
+    runs, repeated = _recorded(path)
+    outcome = outcome_of(runs, repeated, estimator)
     print_outcome(outcome.document, as_json=as_json)
     return 0 if outcome.passed else 1
+
+
+def _recorded(path: Path) -> tuple[list[RunData], list[RunData] | None]:
+    """The recordings of the calibration, and those of the verification as `outcome_of` takes them."""
+    if not path.is_dir():
+        run = read_run(path)
+        verifies = any(sensor.mode == "calibrated" for sensor in run.sensors.values())
+        return ([], [run]) if verifies else ([run], None)
+    runs, repeated = ([read_run(file) for file in recordings(path, kind)] for kind in (CALIBRATION, VERIFICATION))
+    if not runs and not repeated:
+        raise Refused("no_run", f"{path} holds no run.h5", "Give a run folder or a run file")
+    asked = bool(repeated) or parse(runs[0].config, "the recorded configuration").config.procedure.verify
+    return runs, repeated[-1:] if asked else None
 
 
 def _named_script(name: str) -> Script:

@@ -8,7 +8,8 @@ from pathlib import Path
 
 import pytest
 
-CONFIG = Path(__file__).parent.parent / "configs" / "ci.yaml"
+ROOT = Path(__file__).parent.parent
+CONFIG = ROOT / "configs" / "ci.yaml"
 PLAN = f"{sys.executable} -m rig plan {CONFIG}"
 
 
@@ -46,3 +47,15 @@ def test_a_narrow_terminal_gets_every_step() -> None:
     done = shell(PLAN, COLUMNS="60")
     assert done.returncode == 0
     assert json.loads(shell(f"{PLAN} --json").stdout) and done.stdout.count("sweep") >= 6
+
+
+@pytest.mark.parametrize("procedure", ["six_observation", "verify"])
+def test_a_procedures_help_is_the_instruction_for_the_technician(procedure: str) -> None:
+    done = shell(f"{sys.executable} {ROOT / 'procedures' / procedure}.py --help")
+    assert done.returncode == 0 and "Before you start:" in done.stdout and "What happens:" in done.stdout, done
+
+
+def test_the_plan_of_a_verification_is_not_said_to_be_repeated() -> None:
+    plan = f"{sys.executable} -m rig plan {ROOT / 'configs' / 'lsm9ds1_adis16465.yaml'}"
+    assert "the same once more to verify it" in shell(plan).stdout
+    assert "once more" not in shell(f"{plan} --set procedure.name=verify").stdout

@@ -1,6 +1,7 @@
 """The paper's two experiments from end to end: calibrate, store on the board, verify against the reference."""
 
 import json
+import shutil
 import signal
 import subprocess
 import sys
@@ -16,6 +17,7 @@ from scipy.spatial.transform import Rotation
 
 CONFIGS = Path(__file__).parent.parent / "configs"
 EXPERIMENTS = ["lsm9ds1_adis16465", "mpu9250_adis16465"]
+VERIFIED = {"gyro.verification_rms", "gyro.verification_mean", "gyro.verification_reference"}
 
 pytestmark = pytest.mark.timeout(180)  # a whole experiment or two
 
@@ -103,6 +105,25 @@ def test_the_stored_calibration_is_the_one_that_was_found(finished: Finished) ->
     assert again.returncode == 0, again.stderr
     solved = json.loads(again.stdout)
     assert solved["sensors"] == result["sensors"] and solved["verification"] == result["verification"]
+
+
+def test_a_verifications_recording_alone_is_no_calibration(finished: Finished) -> None:
+    out, _, _ = finished
+    alone = subprocess.run(
+        command("solve", out / "verify.h5", "--json"), capture_output=True, text=True, timeout=90, check=False
+    )
+    document = json.loads(alone.stdout)
+    assert document["sensors"] == {} and document["verification"]["gyro"]["before"] is None
+    assert {check["name"] for check in document["checks"]} == VERIFIED
+
+
+def test_a_calibration_whose_verification_is_missing_has_not_passed(finished: Finished, tmp_path: Path) -> None:
+    out, _, _ = finished
+    shutil.copy(out / "run.h5", tmp_path)
+    half = subprocess.run(command("solve", tmp_path, "--json"), capture_output=True, text=True, timeout=90, check=False)
+    assert half.returncode == 1, half.stderr
+    missing = {check["name"] for check in json.loads(half.stdout)["checks"] if check["value"] is None}
+    assert missing == VERIFIED
 
 
 @pytest.mark.parametrize("finished", EXPERIMENTS[:1], indirect=True)
