@@ -10,7 +10,7 @@ import tiny_firmware
 from emulated_session import CRYSTAL_PPM, UNIQUE_ID, Session
 
 from firmware_host.emulator.gyroscope import GyroTruth
-from firmware_host.emulator.lsm9ds1 import Lsm9ds1
+from firmware_host.emulator.lsm9ds1 import WHO_AM_I, Lsm9ds1
 from firmware_host.emulator.machine import EmulatedBoard
 from firmware_host.errors import BoardError
 from firmware_host.frames import encode
@@ -391,23 +391,45 @@ def test_instructions_take_one_cycle_each(tmp_path: Path) -> None:
 # --- the sensor's bus
 
 
-def test_the_wrong_spi_mode_is_refused(tmp_path: Path) -> None:
-    source = """
-        int main(void)
-        {
-            setup();
-            REG(0x48000420) |= 5u << 12 | 5u << 16 | 5u << 20;
-            REG(0x48000400) = (REG(0x48000400) & ~(0x3Fu << 6)) | 0x2Au << 6;
-            REG(0x48000018) = 1u << 11;
-            REG(0x48000000) = (REG(0x48000000) & ~(3u << 22)) | 1u << 22;
-            REG(0x40013000) = 0x35C; /* mode 0 */
-            REG(0x48000018) = 1u << 27;
-            REG16(0x4001300C) = 0x8F;
-            for (;;);
-        }
-        """
+_ASK_THE_GYRO = """
+    int main(void)
+    {{
+        setup();
+        REG(0x48000420) |= 5u << 12 | 5u << 16 | 5u << 20;
+        REG(0x48000400) = (REG(0x48000400) & ~(0x3Fu << 6)) | 0x2Au << 6;
+        REG(0x48000018) = 1u << 11;
+        REG(0x48000000) = (REG(0x48000000) & ~(3u << 22)) | 1u << 22;
+        REG(0x40013000) = {control:#x};
+        REG(0x48000018) = 1u << 27;
+        REG16(0x4001300C) = 0x8F;
+        while (!(REG(0x40013008) & 1));
+        {after}
+        REG(0x48000018) = 1u << 11;
+        put(REG16(0x4001300C) >> 8);
+        for (;;);
+    }}
+    """
+_MODE_3_AT_625_KHZ = 0x377
+_AWAIT_QUIET = "while (REG(0x40013008) & 1u << 7);"
+
+
+def board_with_gyro(source: str, folder: Path) -> EmulatedBoard:
     gyro = Lsm9ds1(lambda _time_s: (0.0, 0.0, 0.0), GyroTruth(), temperature_c=25.0, seed=1)
-    board: EmulatedBoard = tiny_firmware.board(source, tmp_path, [gyro])
+    return tiny_firmware.board(source, folder, [gyro])
+
+
+def test_the_wrong_spi_mode_is_refused(tmp_path: Path) -> None:
+    board = board_with_gyro(_ASK_THE_GYRO.format(control=0x35C, after=""), tmp_path)
     with pytest.raises(BoardError, match="SPI1 speaks mode 0 at 5 MHz to the LSM9DS1") as caught:
         board.advance(0.001)
     assert caught.value.name == "spi_setup"
+
+
+def test_a_part_is_deselected_only_when_the_last_bit_is_over(tmp_path: Path) -> None:
+    board = board_with_gyro(_ASK_THE_GYRO.format(control=_MODE_3_AT_625_KHZ, after=_AWAIT_QUIET), tmp_path)
+    board.advance(0.001)
+    assert board.transmitted() == bytes([WHO_AM_I])
+    board = board_with_gyro(_ASK_THE_GYRO.format(control=_MODE_3_AT_625_KHZ, after=""), tmp_path)
+    with pytest.raises(BoardError) as caught:  # all bits are in, but the last one has half its time to go
+        board.advance(0.001)
+    assert caught.value.name == "spi_busy"

@@ -140,6 +140,7 @@ def test_mistakes_show_in_the_status(body: str, status: int, tmp_path: Path) -> 
         ("flash_page", "erase(0);"),
         ("flash_busy", "CR = PG; REG(STORE) = 1; REG(STORE + 4) = 2; CR = 0;"),
         ("flash_cache", "ACR |= 1u << 10; ACR |= 1u << 12;"),
+        ("flash_cache", "ACR |= 1u << 10; program(0, 1, 2); (void)REG(STORE);"),
         ("unmodelled_bits", "CR = 4;"),  # mass erase
         ("firmware_fault", "CR = PG; REG(0x08001000) = 1;"),
     ],

@@ -51,6 +51,7 @@ class Flash:
         self._keys: list[int] = []
         self._first_word: tuple[int, int] | None = None  # offset and value of half a doubleword
         self._operation: tuple[int, bytes] | None = None  # under way: offset and what will be there
+        self._cache_is_old = False  # what the data cache holds may have changed since
         self._timeline.cancel(self._slot)
         self._nvic.set_line(NMI - FIRST_IRQ, False)
 
@@ -75,6 +76,12 @@ class Flash:
     # --- the pages, by offset from the first of them
 
     def read(self, offset: int, size: int) -> int:
+        if self._cache_is_old and self._access.value & _DATA_CACHE:
+            raise Violation(
+                "flash_cache",
+                "a page read through the data cache, which does not know that it has changed",
+                "Reset the data cache after erasing and programming",
+            )
         offset += STORE_OFFSET
         first, last = (byte // DOUBLEWORD_BYTES * DOUBLEWORD_BYTES for byte in (offset, offset + size - 1))
         for doubleword in (first, last):
@@ -111,6 +118,8 @@ class Flash:
                 raise Violation(
                     "flash_cache", f"FLASH ACR = 0x{value:X} resets a cache that is on", "Switch it off first"
                 )
+        if value & _RESET_DATA_CACHE:
+            self._cache_is_old = False
 
     def _write_key(self, key: int) -> None:
         self._keys.append(key)
@@ -164,6 +173,7 @@ class Flash:
     def _start(self, offset: int, content: bytes, ticks: int) -> None:
         self._memory.begin(offset, content)
         self._operation = offset, content
+        self._cache_is_old = True
         self._timeline.schedule(self._slot, self._timeline.now + ticks)
         self._timeline.interrupt()
 

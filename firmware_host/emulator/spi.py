@@ -25,7 +25,7 @@ class Spi1:
         self.setup_count = 0  # how often mode or clock have been set: what was checked before may no longer hold
         self._control = Stored("SPI1 CR1", 0x037F, after=self.retune)
         self._control2 = Stored("SPI1 CR2", 0, initial=0x0700)
-        self._received: deque[tuple[int, int]] = deque()  # tick at which both bytes are through, the bytes
+        self._received: deque[tuple[int, int]] = deque()  # tick at which both bytes are in, the bytes
         self.reset()
 
     def reset(self) -> None:
@@ -56,10 +56,16 @@ class Spi1:
     def retune(self) -> None:
         """Take over a new bus clock or divider."""
         self._pair_ticks = round(16 * TICK_HZ / self.clock_hz)
+        self._half_bit_ticks = self._pair_ticks // 32
         self.setup_count += 1
 
+    @property
+    def busy(self) -> bool:
+        """Something is still on the bus."""
+        return self._free > self._timeline.now
+
     def _write_control(self, value: int) -> None:
-        if self._free > self._timeline.now:
+        if self.busy:
             raise Violation("spi_setup", "SPI1 CR1 written while the bus is busy", "Wait until BSY is clear")
         self._control.write(value)
 
@@ -72,7 +78,7 @@ class Spi1:
         self._polled = False
         answer = self._exchange(self, value & 0xFF, value >> 8)
         self._free = max(self._timeline.now, self._free) + self._pair_ticks
-        self._received.append((self._free, answer))
+        self._received.append((self._free - self._half_bit_ticks, answer))  # a bit is taken in its middle
 
     def _read_data(self) -> int:
         self._polled = False
@@ -81,9 +87,10 @@ class Spi1:
         return self._received.popleft()[1]
 
     def _read_status(self) -> int:
-        if self._received and self._received[0][0] > self._timeline.now:
+        awaited = self._received[0][0] if self._received else self._free
+        if awaited > self._timeline.now:
             if self._polled:  # the firmware waits: so do we, instead of counting its turns
-                self._timeline.wait_until(self._received[0][0])
+                self._timeline.wait_until(awaited)
             self._polled = True
         now = self._timeline.now
         status = _BSY if self._free > now else 0

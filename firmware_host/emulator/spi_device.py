@@ -95,9 +95,14 @@ class SpiBus:
         self._pins_connected = pins_connected
         self._selected: list[DeviceLink] = []
         self._checked = _UNCHECKED
+        self._spi: Spi1 | None = None  # who spoke last
 
     def chip_select(self, link: "DeviceLink", low: bool) -> None:
-        """A device's chip select goes down or up."""
+        """A device's chip select goes down or up. Raises Violation when the bus has not finished."""
+        if self._spi is not None and self._spi.busy:
+            raise Violation(
+                "spi_busy", f"the select of the {link.device.name} changes on a busy bus", "Wait until BSY is clear"
+            )
         if low:
             self._selected.append(link)
         else:
@@ -113,6 +118,7 @@ class SpiBus:
             self._timeline.run_due()
         if self._checked == spi.setup_count:
             return self._selected[0].exchange(first, second) if self._selected else 0xFFFF
+        self._spi = spi
         self._check_wires()
         answer = self._selected[0].exchange(first, second) if self._selected else 0xFFFF
         self._check_clock(spi)  # not before: the clock that a part accepts depends on what it is asked for

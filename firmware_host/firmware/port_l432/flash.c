@@ -85,7 +85,8 @@ bool flash_take_torn_read(void)
 {
     if (!reading || !(FLASH_ECCR & FLASH_ECCR_ECCD))
         return false;
-    FLASH_ECCR = FLASH_ECCR_ECCD; /* written 1 to clear; left standing it would bring the NMI again */
+    FLASH_ECCR = FLASH_ECCR_ECCD; /* written 1 to clear; still standing on return it would bring the NMI again */
+    __asm volatile("dsb" ::: "memory");
     torn = true;
     return true;
 }
