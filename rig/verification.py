@@ -46,10 +46,11 @@ def verify(
     `before` are the recordings of raw readings that the `calibration` was made from; they tell how the two sensors sit
     to each other. Without them `after` itself tells it. Thresholds come from the first recording's configuration.
 
-    Raises Fault `sensor_missing`, `wrong_mode`, `nothing_to_compare`, `no_overlap`, `different_clocks`, and as
-    `observe` and `relative_rotation` do.
+    Raises Fault `sensor_missing`, `wrong_mode`, `nothing_to_compare`, `incomplete_verification`, `no_overlap`,
+    `different_clocks`, and as `observe` and `relative_rotation` do.
     """
     repeated = _observed(after, sensor, reference, "calibrated")
+    _check_complete(after)
     made = _observed(before, sensor, reference, "raw") if before else []
     described = after[0].sensors
     rotation = relative_rotation(
@@ -78,6 +79,19 @@ def _observed(runs: Sequence[RunData], sensor: str, reference: Reference, mode: 
     settings = parse(runs[0].config, "the recorded configuration").config.observation
     tested, known = (observe_runs(runs, name, settings) for name in (sensor, reference.name))
     return [Observed(*seen) for seen in zip(useful, tested, known, strict=True)]
+
+
+def _check_complete(runs: Sequence[RunData]) -> None:
+    """A movement that was broken off has not verified the directions it never turned in."""
+    procedure = parse(runs[0].config, "the recorded configuration").config.procedure
+    planned = len(procedure.order) * len(procedure.directions) * procedure.repeats
+    done = len(frozenset[int]().union(*map(finished_sweeps, runs)))
+    if done < planned:
+        raise Fault(
+            "incomplete_verification",
+            f"{done} of {planned} sweeps were finished while the readings were calibrated",
+            "Go on with `rig resume RUN_DIR`, or run the verification again",
+        )
 
 
 def _against_the_arm(recordings: Sequence[Observed], reference: Reference) -> float:

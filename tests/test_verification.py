@@ -227,7 +227,7 @@ REFUSALS: dict[str, tuple[str, Callable[[RunData], RunData]]] = {
     "nothing finished": ("nothing_to_compare", lambda run: replace(run, events=run.events[:1])),
     "a silent reference": ("no_overlap", reference_asleep_in_rests),
     "another board": ("different_clocks", reference_of_another_board),
-    "one wrist": ("rank_deficient", one_wrist),
+    "one wrist": ("incomplete_verification", one_wrist),
 }
 
 
@@ -236,6 +236,11 @@ def test_recordings_that_cannot_be_compared_are_refused_by_name(name: str) -> No
     error, spoil = REFUSALS[name]
     with pytest.raises(Fault, match=error):
         verify("gyro", KNOWN, [spoil(REPEATED)])
+
+
+def test_one_wrist_does_not_tell_how_the_sensors_sit() -> None:
+    with pytest.raises(Fault, match="rank_deficient"):
+        verify("gyro", KNOWN, [REPEATED], [one_wrist(MADE)], TRUTH)
 
 
 def test_the_calibration_s_recording_must_be_raw() -> None:
