@@ -2,7 +2,7 @@
 # make test    everything CI checks: lint, types, import layers, tests (needs gcc and arm-none-eabi-gcc)
 # make firmware builds the board's image (needs arm-none-eabi-gcc) and prints what it takes of the chip
 # make bench   every benchmark, ratios measured side by side
-# make figures the pictures in docs/method.md, by the studies
+# make figures the pictures in docs/method.md, by the studies and the experiments
 
 VENV := .venv
 BIN := $(VENV)/bin
@@ -35,6 +35,10 @@ bench: $(VENV)/dev.installed
 figures: $(VENV)/dev.installed
 	for study in $(STUDIES); do $(BIN)/rig study $$study --jobs 2 --out build/studies || exit 1; \
 	  cp build/studies/$$study.png docs/figures/; done
+	for experiment in lsm9ds1 mpu9250; do rm -rf build/$$experiment; \
+	  $(BIN)/rig run configs/$${experiment}_adis16465.yaml --out build/$$experiment || exit 1; \
+	  for when in before after; do \
+	    cp build/$$experiment/verification_gyro_$$when.png docs/figures/$$experiment-$$when.png; done; done
 
 firmware: $(VENV)/demo.installed
 	$(MAKE) -C firmware_host/firmware
