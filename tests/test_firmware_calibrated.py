@@ -139,6 +139,17 @@ def test_calibrated_rates_are_k_times_m_plus_b_to_the_microradian() -> None:
     assert rates(frames) == pytest.approx(SCALE * (counts * RAD_S + BIAS_RAD_S), abs=1.5e-6)
 
 
+def test_calibrated_rates_are_rounded_not_cut_off() -> None:
+    urad_per_count = 1e6 * RAD_S  # 152.7
+    board = calibrated_board(CALIBRATION | {"scale": (1.0, 1.0, 1.0), "bias_rad_s": (0.0, 0.0, 0.0)})
+    for count in range(1, 30):
+        convert(board, count * PERIOD_US, (count, -count, 0))
+    exact = np.arange(1, 30) * urad_per_count
+    rounded = np.round(rates(board.ask("stop")) * 1e6)
+    assert rounded[:, 0].tolist() == np.round(exact).tolist()
+    assert rounded[:, 1].tolist() == np.round(-exact).tolist()
+
+
 def test_one_sensor_streams_calibrated_beside_another_that_streams_raw() -> None:
     board = HostBoard()
     configured(board, 0, 238, 245)

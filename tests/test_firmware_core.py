@@ -93,13 +93,15 @@ def test_a_frame_longer_than_any_request_is_counted_and_the_next_one_answered(bo
     assert report.values["rx_errors"] == 1
 
 
-def test_a_burst_that_overruns_the_receive_ring_costs_only_itself(board: HostBoard) -> None:
-    for byte in b"\x22" * 700:
+@pytest.mark.parametrize("burst", [b"\x22" * 700, encode("reboot", 3) * 40])
+def test_a_burst_that_overruns_the_receive_ring_costs_only_itself(board: HostBoard, burst: bytes) -> None:
+    for byte in burst:
         board.core.link_byte_received(byte)
     board.run()
     board.receive(b"\0")
     (report,) = board.ask("status")
     assert report.values["rx_errors"] == 1
+    assert board.restarts == 0, "what is left in the ring is a mixture"
 
 
 def test_requests_that_cannot_be_met_are_refused_by_name(board: HostBoard) -> None:

@@ -139,6 +139,23 @@ def test_what_was_not_kept_is_refused() -> None:
     assert error_of(frames) == "not_kept"
 
 
+def test_what_was_kept_of_another_setting_and_while_the_part_settles_is_not_used() -> None:
+    sweeps = Sweeps()
+    sweeps.keep()
+    span = sweeps.turn(100)
+    sweeps.ask("stop")
+    configured(sweeps.board, 0, 238, 500)
+    frames = sweeps.ask("observe", sensor=0, index=0, start_us=span[0], end_us=span[1] - PERIOD_US, speed_rad_s=1.0)
+    assert error_of(frames) == "not_kept"
+    sweeps.keep()
+    sweeps.ask("start", sensors=0)
+    settle(sweeps.board, sweeps.time_us)
+    start_us, end_us = sweeps.turn(50)
+    frames = sweeps.ask("observe", sensor=0, index=0, start_us=start_us - 1, end_us=end_us - PERIOD_US, speed_rad_s=1.0)
+    assert error_of(frames) == "not_kept"
+    assert sweeps.observe(0, start_us, end_us - PERIOD_US)["samples"] == 49
+
+
 @pytest.mark.parametrize("duration_s", [0.5, 3.0, 30.0])
 def test_three_sensors_share_the_room_and_each_has_its_duration(duration_s: float) -> None:
     board = HostBoard()

@@ -114,6 +114,27 @@ def test_two_interrupts_before_one_read_lose_one_sample() -> None:
     assert frames[-2].values["dropped"] == 1
 
 
+def test_a_part_that_runs_fast_has_every_interrupt_counted() -> None:
+    board = streaming_board()
+    convert(board, PERIOD_US)
+    for k in range(2, 9):  # seven between two reads, in the time of six
+        board.data_ready(PERIOD_US + (k - 1) * PERIOD_US * 9 // 10)
+    convert(board, PERIOD_US + 8 * PERIOD_US * 9 // 10)
+    frames = board.ask("stop", 2)
+    assert sample_sequences(frames) == [0, 8]
+
+
+def test_an_interrupt_of_a_moment_before_the_clock_was_read_keeps_its_time() -> None:
+    board = streaming_board()
+    convert(board, PERIOD_US)
+    board.set_time(2 * PERIOD_US + 5)
+    board.run()  # looks at the clock for another reason, just before it sees the interrupt
+    convert(board, 2 * PERIOD_US)
+    (batch, _ack) = board.ask("stop", 2)
+    assert batch.items["delta_us"].tolist() == [0, PERIOD_US]
+    assert batch.values["dropped"] == 0
+
+
 @pytest.mark.parametrize("status", ["stale", "disconnected"])
 def test_a_read_without_new_data_is_a_bus_error_and_no_sample(status: str) -> None:
     board = streaming_board()

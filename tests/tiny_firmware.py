@@ -73,13 +73,14 @@ __attribute__((noinline, unused)) static void put(uint8_t byte)
 """
 
 
-def build(source: str, folder: Path) -> tuple[bytes, bytes]:
+def build(source: str, folder: Path, includes: Sequence[Path] = ()) -> tuple[bytes, bytes]:
     """Compile `source` (which defines main) after the prelude. Returns the flash image and the ELF file."""
+    searched = [f"-I{path}" for path in includes]
     (folder / "tiny.ld").write_text(_LINKER_SCRIPT)
     (folder / "start.c").write_text(_START)
     (folder / "tiny.c").write_text(_PRELUDE + source)
     for command in (
-        ["arm-none-eabi-gcc", *_FLAGS.split(), "-T", "tiny.ld", "start.c", "tiny.c", "-o", "tiny.elf"],
+        ["arm-none-eabi-gcc", *_FLAGS.split(), *searched, "-T", "tiny.ld", "start.c", "tiny.c", "-o", "tiny.elf"],
         ["arm-none-eabi-objcopy", "-O", "binary", "tiny.elf", "tiny.bin"],
     ):
         subprocess.run(command, cwd=folder, check=True)
