@@ -106,6 +106,8 @@ def test_the_stored_calibration_is_the_one_that_was_found(finished: Finished) ->
     out, result, _ = finished
     log = (out / "log.txt").read_text(encoding="utf-8")
     assert "stored on the board: gyro" in log
+    kept = result["provenance"]["stored_calibrations"]["gyro"]
+    assert np.allclose(kept["scale"], result["sensors"]["gyro"]["scale"], rtol=1e-6)
     again = subprocess.run(command("solve", out, "--json"), capture_output=True, text=True, timeout=90, check=False)
     assert again.returncode == 0, again.stderr
     solved = json.loads(again.stdout)

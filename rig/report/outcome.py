@@ -64,7 +64,9 @@ def outcome_of(
         "checks": [check.document() for check in checks],
         "provenance": {
             **first.provenance,
+            "stored_calibrations": (repeated or runs)[-1].provenance.get("stored_calibrations", {}),
             "resumed_utc": [run.provenance["started_utc"] for run in runs[1:]],
+            "verified_utc": [run.provenance["started_utc"] for run in repeated or ()],
             "solved_utc": datetime.now(UTC).isoformat(timespec="seconds"),
         },
         "sensors": {
