@@ -10,6 +10,7 @@ from dataclasses import asdict, dataclass, field
 from typing import Any
 
 import numpy as np
+from numpy.typing import NDArray
 
 from firmware_host.client import Board, BoardObservation
 from firmware_host.errors import BoardError
@@ -48,6 +49,10 @@ class BoardCalibration:
                 self._observed[name] += 1
                 self.recorder.add_event("board_recalled", sensor=name, sweep=sweep)
 
+    def begin(self) -> None:
+        """Before the first sample: the host keeps what it sees, for the clock of the first sweep."""
+        self.monitor.keep()
+
     def keep(self, sweep: Sweep) -> None:
         """Just before a sweep: from now on board and host keep what they see."""
         self.monitor.keep()
@@ -67,7 +72,6 @@ class BoardCalibration:
             self.recorder.add_event(
                 "board_observed", sensor=name, sweep=sweep.index, speed_rad_s=speed_rad_s, **asdict(found)
             )
-        self.monitor.release()
 
     def solve(self) -> None:
         """After the last sweep: the board's solution by either method."""
@@ -77,21 +81,40 @@ class BoardCalibration:
                 self.recorder.add_event("board_solved", sensor=name, **asdict(solution))
 
     def _observe(self, name: str, sweep: Sweep) -> tuple[BoardObservation, float]:
-        """The board's observation and the speed it was told, rad/s: the revolution's, by the arm's joints."""
+        """The board's observation and the speed it was told, rad/s."""
         index, sensor = self.sensors[name]
-        samples, states = self.monitor.kept(index)
-        motion = ArmMotion(np.array([state.to_record() for state in states], ARM_STATE_DTYPE))
-        clock = on_the_arms_clock(samples, sensor, motion).clock
-        window = (states[0].time_s, states[-1].time_s)
-        revolution = find_revolution(motion, asdict(sweep), window, self.settings)
-        start_s, end_s = (clock.board_time_s(time_s) for time_s in (revolution.start_s, revolution.end_s))
-        found = self.board.observe(
-            index, self._count(name), round(start_s * 1e6), round(end_s * 1e6), revolution.speed_rad_s
+        samples, states, new = self.monitor.kept(index)
+        arm = np.array([state.to_record() for state in states], ARM_STATE_DTYPE)
+        start_us, end_us, speed_rad_s = revolution_on_the_board(
+            samples, sensor, arm, asdict(sweep), first=len(arm) - new, settings=self.settings
         )
-        return found, revolution.speed_rad_s
+        return self.board.observe(index, self._count(name), start_us, end_us, speed_rad_s), speed_rad_s
 
     def _count(self, name: str) -> int:
         return self._observed.setdefault(name, 0)
+
+
+def revolution_on_the_board(
+    samples: NDArray[Any],
+    sensor: RecordedSensor,
+    arm: NDArray[Any],
+    sweep: Mapping[str, Any],
+    *,
+    first: int,
+    settings: ObservationSection,
+) -> tuple[int, int, float]:
+    """When a sweep's revolution began and ended on the board's clock, µs, and its speed by the arm's joints, rad/s.
+
+    `samples` (n,) SAMPLE_DTYPE and `arm` (m,) ARM_STATE_DTYPE may reach further back than the sweep, which began after
+    the state `first`, and should: a slow sweep alone may not stand out from the noise or hold too few samples, where
+    a fast motion to where sweeps begin tells the time. Raises Fault as `estimate_time_base` and `find_revolution` do.
+    """
+    motion = ArmMotion(arm)
+    clock = on_the_arms_clock(samples, sensor, motion).clock
+    window = (float(arm["time_s"][min(first, len(arm) - 1)]), float(arm["time_s"][-1]))
+    revolution = find_revolution(motion, sweep, window, settings)
+    start_s, end_s = (clock.board_time_s(time_s) for time_s in (revolution.start_s, revolution.end_s))
+    return round(start_s * 1e6), round(end_s * 1e6), revolution.speed_rad_s
 
 
 def observed_sweeps(run: RunData, sensors: Collection[str]) -> frozenset[int]:

@@ -1,7 +1,7 @@
 """Passes what arrives on to the recording and counts it, for the operator's view and to see that samples flow."""
 
 import threading
-from collections import defaultdict
+from collections import defaultdict, deque
 from dataclasses import dataclass, field
 
 import numpy as np
@@ -12,6 +12,7 @@ from rig.arm.state import ArmState
 from rig.recording import RunRecorder
 
 Vector = tuple[float, float, float]
+KEPT_PARTS = 3
 
 
 @dataclass(slots=True)
@@ -36,17 +37,25 @@ class SensorCount:
         self.rate_rad_s = (x, y, z)
 
 
+@dataclass(frozen=True, slots=True)
+class _Part:
+    """What came between two calls of `keep`."""
+
+    batches: defaultdict[int, list[np.ndarray]]
+    states: list[ArmState]
+
+
 @dataclass(slots=True)
 class Monitor:
     """Fed by the board's and the arm's reader threads, read by the procedure's. `counts` by the board's sensor index.
 
-    What comes before there is a `recorder` is not kept. From `keep` to `release` all that comes is
-    also held in memory.
+    What comes before there is a `recorder` is not kept. From the first `keep` on, all that came since the last
+    `KEPT_PARTS` of them is also held in memory.
     """
 
     counts: dict[int, SensorCount] = field(default_factory=dict)
     recorder: RunRecorder | None = None
-    _kept: tuple[defaultdict[int, list[np.ndarray]], list[ArmState]] | None = None
+    _kept: deque[_Part] = field(default_factory=lambda: deque(maxlen=KEPT_PARTS))
     _lock: threading.Lock = field(default_factory=threading.Lock)
 
     def on_samples(self, batch: SampleBatch) -> None:
@@ -54,34 +63,34 @@ class Monitor:
         with self._lock:
             count = self.counts[batch.sensor]
             count.add(batch)
-            if self._kept is not None:
-                self._kept[0][batch.sensor].append(batch.samples)
+            if self._kept:
+                self._kept[-1].batches[batch.sensor].append(batch.samples)
         if self.recorder is not None:
             self.recorder.add_samples(count.name, batch.samples)
 
     def on_state(self, state: ArmState) -> None:
         """Take a state of the arm."""
         with self._lock:
-            if self._kept is not None:
-                self._kept[1].append(state)
+            if self._kept:
+                self._kept[-1].states.append(state)
         if self.recorder is not None:
             self.recorder.add_arm_state(state)
 
     def keep(self) -> None:
-        """From now on hold what comes; what was held before goes."""
+        """From now on hold what comes, as a part of its own; the oldest part goes when there are too many."""
         with self._lock:
-            self._kept = defaultdict(list), []
+            self._kept.append(_Part(defaultdict(list), []))
 
-    def kept(self, sensor: int) -> tuple[np.ndarray, list[ArmState]]:
-        """Samples (n,) SAMPLE_DTYPE of one sensor, and arm states, since `keep`; empty when nothing is held."""
-        with self._lock:
-            batches, states = self._kept or (defaultdict(list), [])
-            return np.concatenate(batches[sensor] or [np.empty(0, SAMPLE_DTYPE)]), list(states)
+    def kept(self, sensor: int) -> tuple[np.ndarray, list[ArmState], int]:
+        """All samples (n,) SAMPLE_DTYPE of one sensor and all arm states that are held, and how many of these are new.
 
-    def release(self) -> None:
-        """Hold nothing any more."""
+        New are those since the latest `keep`.
+        """
         with self._lock:
-            self._kept = None
+            batches = [batch for part in self._kept for batch in part.batches[sensor]]
+            states = [state for part in self._kept for state in part.states]
+            new = len(self._kept[-1].states) if self._kept else 0
+        return np.concatenate(batches or [np.empty(0, SAMPLE_DTYPE)]), states, new
 
     def totals(self) -> tuple[int, int, Vector | None]:
         """Samples received, samples lost, and the newest mean reading of the first sensor in rad/s."""

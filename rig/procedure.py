@@ -103,6 +103,8 @@ class Rig:
 
     def start_sampling(self) -> None:
         """Let the board stream; from here on every sample is recorded. Raises `Fault` when a sensor stays silent."""
+        if self.on_board is not None:
+            self.on_board.begin()
         self.board.start(self.calibrated)
         deadline_s = time.monotonic() + FIRST_SAMPLE_TIMEOUT_S
         while silent := self.monitor.silent():
