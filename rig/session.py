@@ -51,16 +51,15 @@ class Session:
             outcome = outcome_of(runs)
             if not self.loaded.config.procedure.verify:
                 return self._written(outcome)
-        repeated: list[RunData] = []
         if outcome.passed:
             with self.reported(self._mended, moved=True):
                 for line in store_calibrations(self.loaded.config, outcome.document):
                     self.shown.line(line)
             self._record(self.verification, VERIFICATION, calibrated=True, moved=True)
-            repeated = [self._newest_verification()]
         else:
             self.shown.line("not verified: the calibration failed its limits, so the board keeps what it had")
         with self.reported(self._repeating, moved=True):
+            repeated = [self._newest_verification()] if outcome.passed else []
             return self._written(outcome_of(runs, repeated))
 
     def verify(self, script: Script) -> Outcome:
