@@ -111,6 +111,8 @@ def _program(session: Any, image: bytes) -> None:
             f"at the probe hangs a microcontroller of device code 0x{device:03x}, not an STM32L432 (0x{DEVICE_ID:03x})",
             "Choose the Nucleo-L432KC's probe with --probe ID",
         )
+    # What runs there would be interrupted while its vectors are erased, and its watchdog would bite
+    session.target.reset_and_halt()
     programmer = FileProgrammer(session, chip_erase="sector", trust_crc=False)
     programmer.program(io.BytesIO(image), file_format="bin", base_address=FLASH_START)
     if bytes(session.target.read_memory_block8(FLASH_START, len(image))) != image:

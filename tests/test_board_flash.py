@@ -6,6 +6,8 @@ import threading
 import time
 from collections.abc import Callable
 from pathlib import Path
+from types import SimpleNamespace
+from typing import BinaryIO
 
 import pytest
 
@@ -158,3 +160,41 @@ def test_a_probe_that_is_not_there_is_named(monkeypatch: pytest.MonkeyPatch) -> 
     monkeypatch.setitem(sys.modules, "pyocd.core.helpers", None)  # as if the extra were not installed
     error = refused(flashing.find_probe)
     assert error.name == "flash_extra_missing" and "calibration-rig[flash]" in error.remedy
+
+
+class Chip:
+    """A microcontroller at a probe, as far as programming it goes: what was done to it, in order."""
+
+    def __init__(self) -> None:
+        self.done: list[str] = []
+        self.contents = b""
+
+    def read32(self, address: int) -> int:
+        return 0x1000_6435 if address == flashing.DEVICE_ID_REGISTER else 0
+
+    def read_memory_block8(self, address: int, size: int) -> list[int]:
+        return list(self.contents[:size])
+
+    def reset_and_halt(self) -> None:
+        self.done.append("halted after a reset")
+
+    def reset(self) -> None:
+        self.done.append("reset")
+
+
+def test_what_runs_on_the_board_is_stopped_by_a_reset_before_its_flash_is_erased(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    chip = Chip()
+
+    class Programmer:
+        def __init__(self, session: SimpleNamespace, **options: object) -> None:
+            assert options["chip_erase"] == "sector", "the calibrations stay"
+
+        def program(self, file: BinaryIO, **options: object) -> None:
+            chip.done.append("programmed")
+            chip.contents = file.read()
+
+    monkeypatch.setattr("pyocd.flash.file_programmer.FileProgrammer", Programmer)
+    flashing._program(SimpleNamespace(target=chip), flashing.shipped_image())
+    assert chip.done == ["halted after a reset", "programmed", "reset"]
