@@ -225,6 +225,7 @@ def test_a_sensor_must_stand_in_the_world_too() -> None:
         ("procedure.directions=[cw]", "procedure"),
         ("sensors.gyro.mounting.x=-x", "sensors.gyro.mounting"),
         ("procedure.speed_deg_s=170", "(file)"),
+        ("procedure.speed_deg_s=0.2", "procedure.speed_deg_s"),
         ("arm.host=[]", "arm.host"),
     ],
 )

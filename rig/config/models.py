@@ -131,7 +131,7 @@ class ProcedureSection(Section):
     order: Annotated[tuple[Wrist, ...], Field(min_length=1)] = ("wrist_3", "wrist_1", "wrist_2")
     directions: Annotated[tuple[Direction, ...], Field(min_length=1)] = ("cw", "ccw")
     repeats: Annotated[int, Field(ge=1, le=100)] = 1
-    speed_deg_s: Annotated[float, Field(gt=0, le=180)] = 60.0
+    speed_deg_s: Annotated[float, Field(ge=0.5, le=180)] = 60.0  # slower, and the board cannot keep a sweep's readings
     acceleration_deg_s2: Annotated[float, Field(gt=0, le=800)] = 240.0
     rest_s: Annotated[float, Field(ge=0, le=3600)] = 3.0
     margin_deg: Annotated[float, Field(gt=0, le=90)] = 2.0  # constant speed on each side of the revolution
