@@ -93,8 +93,9 @@ class Rig:
             lines.append(f"Then {len(self.plan.sweeps)} sweeps turn the wrists by more than a whole turn each.")
         if self.again:
             lines.append(
-                f"If the calibration passes, {len(self.whole_plan.sweeps)} sweeps follow to verify it, without another "
-                f"question, for {self.whole_plan.duration_s:.0f} s."
+                "If the calibration passes, the board stores it in the place of what it had, and without another "
+                f"question {len(self.whole_plan.sweeps)} sweeps follow to verify it, for "
+                f"{self.whole_plan.duration_s:.0f} s."
             )
         return [
             *lines,

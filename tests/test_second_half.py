@@ -48,7 +48,7 @@ def test_an_arm_that_was_moved_between_the_halves_goes_on_only_if_somebody_agree
         failed.callback(process.kill)
         os.close(terminal)
         read_until(b"Type yes to start")
-        assert b"6 sweeps follow to verify it, without another question, for " in said
+        assert b"without another question 6 sweeps follow to verify it, for " in said
         os.write(operator, b"yes\n")
         read_until(b"stored on the board: gyro")
         with socket.create_connection((handle.host, 30002)) as pendant:
