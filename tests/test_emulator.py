@@ -7,8 +7,9 @@ from pathlib import Path
 import numpy as np
 import pytest
 import tiny_firmware
-from emulated_session import CRYSTAL_PPM, UNIQUE_ID, Session
+from emulated_session import CRYSTAL_PPM, UNIQUE_ID, Session, shipped_flash
 
+from firmware_host.emulator.flash_memory import STORE_OFFSET, FlashMemory
 from firmware_host.emulator.gyroscope import GyroTruth
 from firmware_host.emulator.lsm9ds1 import WHO_AM_I, Lsm9ds1
 from firmware_host.emulator.machine import EmulatedBoard
@@ -141,6 +142,17 @@ def test_the_reset_button_starts_the_image_afresh() -> None:
     session.board.reset()
     session.run(0.1)
     assert RESET_CAUSES[session.ask("hello").values["reset_cause"]] == "pin"
+
+
+def test_an_image_whose_tick_fails_is_restarted_by_its_watchdog() -> None:
+    image = bytearray(shipped_flash().data[:STORE_OFFSET])
+    systick, usart2 = 4 * 15, 4 * (16 + 38)
+    image[systick : systick + 4] = image[usart2 : usart2 + 4]  # another's handler, so that nothing ever ticks
+    session = Session(flash=FlashMemory(bytes(image)))
+    session.run(0.4)
+    assert RESET_CAUSES[session.ask("hello").values["reset_cause"]] == "power"
+    session.run(0.9)
+    assert RESET_CAUSES[session.ask("hello").values["reset_cause"]] == "watchdog"
 
 
 # --- what firmware must not do

@@ -85,6 +85,18 @@ def test_a_start_by_the_stored_calibration_streams_calibrated_rates(written: Fla
     assert {(frame.name, frame.values["mode"]) for frame in batches} == {("rates", 1)}
 
 
+def test_what_is_said_while_the_flash_is_busy_is_lost_and_nothing_else(written: FlashMemory) -> None:
+    session = boot(copy(written))
+    session.configure("lsm9ds1")
+    session.board.receive(encode("write_calibration", 5, {"sensor": 0, **calibration(3)}))
+    session.run(0.005)  # of 25 ms
+    session.board.receive(encode("reboot", 6) * 20)
+    answers = [frame.values["reply_to"] for frame in session.run(0.06) if frame.name == "ack"]
+    assert answers == [5]
+    session.board.receive(b"\0")  # as the host begins each request
+    assert stored(session) == 3
+
+
 def test_an_erased_calibration_is_gone_for_good(written: FlashMemory) -> None:
     session = boot(copy(written))
     assert session.ask("erase_calibration", sensor=0).name == "ack"
