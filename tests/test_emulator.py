@@ -144,6 +144,19 @@ def test_the_reset_button_starts_the_image_afresh() -> None:
     assert RESET_CAUSES[session.ask("hello").values["reset_cause"]] == "pin"
 
 
+@pytest.mark.parametrize(
+    ("pin", "level"),
+    [("PB4", "up"), ("PA15", "up"), ("PA8", "down"), ("PA12", "down"), ("PA1", "down")],  # MISO, RX, data-ready
+)
+def test_what_nobody_drives_is_pulled_to_rest(pin: str, level: str) -> None:
+    session = Session()
+    session.run(0.2)
+    (port,) = [block for block in session.board.peripherals if block.name == f"GPIO{pin[1]}"]
+    (pulls,) = [register.read for register in port.registers() if register.name == "PUPDR"]
+    assert pulls is not None
+    assert pulls() >> 2 * int(pin[2:]) & 3 == {"up": 1, "down": 2}[level]
+
+
 def test_an_image_whose_tick_fails_is_restarted_by_its_watchdog() -> None:
     image = bytearray(shipped_flash().data[:STORE_OFFSET])
     systick, usart2 = 4 * 15, 4 * (16 + 38)
