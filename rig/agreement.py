@@ -6,7 +6,7 @@ stands in. The run's own calibration is another matter: it weighs, takes the vib
 (`rig.solution`).
 """
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any
 
@@ -55,11 +55,7 @@ def agreement(runs: Sequence[RunData], sensor: str) -> Agreement:
         for event in runs[-1].events
         if event.name == "board_solved" and event.detail["sensor"] == sensor
     }
-    not_observed = tuple(
-        f"sweep {event.detail['sweep']}: {event.detail['reason']}"
-        for event in runs[-1].events
-        if event.name == "board_not_observed" and event.detail["sensor"] == sensor
-    )
+    not_observed = _not_observed(runs[-1], sensor)
     host = _solve(_observations(runs, sensor))
     board = solutions.get("closed_form")
     if host is None or board is None or board["status"] != "solved":
@@ -73,6 +69,25 @@ def agreement(runs: Sequence[RunData], sensor: str) -> Agreement:
         bias,
         float(np.max(np.abs(np.array(board["scale"]) / scale - 1))),
         float(np.max(np.abs(np.array(board["bias_rad_s"]) - bias))),
+    )
+
+
+def check_observed(run: RunData, sensors: Iterable[str]) -> None:
+    """Raise Fault `board_missed_sweep` if the board has no observation of a sweep: a resumed run repeats it."""
+    for sensor in sensors:
+        if missed := _not_observed(run, sensor):
+            raise Fault(
+                "board_missed_sweep",
+                f"the board could not average, for {sensor}, {'; '.join(missed)}",
+                "Resume the run to repeat that",
+            )
+
+
+def _not_observed(run: RunData, sensor: str) -> tuple[str, ...]:
+    return tuple(
+        f"sweep {event.detail['sweep']}: {event.detail['reason']}"
+        for event in run.events
+        if event.name == "board_not_observed" and event.detail["sensor"] == sensor
     )
 
 

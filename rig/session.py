@@ -11,6 +11,7 @@ from dataclasses import dataclass
 from pathlib import Path
 
 from firmware_host.errors import BoardError
+from rig.agreement import check_observed
 from rig.config.load import Loaded
 from rig.errors import Fault, Refused, RigError
 from rig.opening import open_rig
@@ -49,6 +50,7 @@ class Session:
                 make_plain(file)  # if the run was killed, only readers that know about it could open its file
             runs = [read_run(file) for file in recordings(self.folder, CALIBRATION)]
             outcome = outcome_of(runs)
+            check_observed(runs[-1], self.loaded.config.to_calibrate)
             if not self.loaded.config.procedure.verify:
                 return self._written(outcome)
         if outcome.passed:

@@ -9,7 +9,9 @@ import pytest
 from rich.console import Console
 from synthetic_run import SENSITIVITY, Setup, synthetic_run
 
-from rig.agreement import agreement
+from rig.agreement import agreement, check_observed
+from rig.board_calibration import observed_sweeps
+from rig.errors import Fault
 from rig.observation import finished
 from rig.recording import Event, RunData
 from rig.report.sensor import sensor_document
@@ -95,6 +97,14 @@ def test_a_board_without_a_solution_is_not_measured_and_fails(run: RunData) -> N
     ):
         checks = agreement([with_events(run, events)], "gyro").checks("gyro")
         assert [(check.value, check.passed) for check in checks] == [(None, False)] * 2
+
+
+def test_a_sweep_the_board_missed_is_a_fault_that_a_resumed_run_repeats(run: RunData) -> None:
+    check_observed(with_events(run, observed(run, range(6))), ["gyro"])
+    missed = with_events(run, [*observed(run, range(5)), event("board_not_observed", sweep=5, reason="not_kept: late")])
+    with pytest.raises(Fault, match=r"board_missed_sweep: .*gyro, sweep 5: not_kept: late"):
+        check_observed(missed, ["gyro"])
+    assert observed_sweeps(missed, ["gyro"]) == {0, 1, 2, 3, 4}
 
 
 def test_a_resumed_run_recalls_what_was_observed_before(run: RunData) -> None:
