@@ -222,6 +222,16 @@ def test_a_missing_direction_is_degenerate_however_often_the_others_were_swept(
     assert not board.scale.any() and not board.bias_rad_s.any()
 
 
+@pytest.mark.parametrize(("angle_deg", "status"), [(5.0, "degenerate"), (20.0, "solved")])  # condition 326 and 19
+def test_a_direction_swept_at_too_small_an_angle_to_another_is_degenerate(angle_deg: float, status: str) -> None:
+    angle_rad = np.radians(angle_deg)
+    leaning = np.array([0.0, np.sin(angle_rad), np.cos(angle_rad)])
+    directions = np.vstack([DIRECTIONS[:4], leaning, -leaning, leaning * (1, -1, 1), (np.sqrt(0.5), 0.0, np.sqrt(0.5))])
+    speeds = np.full(len(directions), 1.0472)
+    means = readings(directions, speeds, np.array([1.1771, 1.1554, 1.1440]), np.array([0.0077, -0.0100, -0.0051]))
+    assert solve_on_board(means, speeds).status == status
+
+
 def test_readings_that_are_all_alike_or_zero_are_degenerate() -> None:
     for means in (np.zeros((6, 3)), np.full((8, 3), 0.7), np.outer(np.arange(1, 8), [0.1, 0.2, 0.3])):
         assert solve_on_board(means, np.full(len(means), 1.0)).status == "degenerate"

@@ -167,6 +167,16 @@ def test_a_sensor_that_falls_silent_is_reported_once() -> None:
     assert errors[0].values["reply_to"] == 0
 
 
+def test_a_line_that_was_left_high_is_lowered_so_that_edges_come_again() -> None:
+    board = streaming_board()
+    convert(board, PERIOD_US)
+    board.gyro.convert((1, 2, 3), 0)  # its edge was lost
+    for time_ms in range(50, 500, 50):
+        board.set_time(time_ms * 1000)
+        board.run()
+    assert not board.gyro.fresh
+
+
 def test_a_line_that_does_not_keep_up_costs_the_newest_samples_and_stop_waits_for_the_others() -> None:
     board = streaming_board()
     board.line_is_free = False
