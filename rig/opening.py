@@ -54,8 +54,11 @@ def open_rig(
     done = frozenset[int]().union(
         *(sound_sweeps(run, config.observation) & observed_sweeps(run, config.to_calibrate) for run in earlier)
     )
+    whole_plan = plan_six_observation(config.arm, config.procedure)
     if earlier:
-        view.line(f"resuming: {len(done)} sweeps are recorded, sound and known to the board, the others follow")
+        view.line(
+            f"resuming: {len(done)} of {len(whole_plan.sweeps)} sweeps are recorded, sound and known to the board"
+        )
     with ExitStack() as stack:
         monitor = Monitor()
         with refusing():
@@ -92,7 +95,7 @@ def open_rig(
                 on_board.recall(earlier, done)
         yield Rig(
             plan=plan_six_observation(config.arm, config.procedure, report.state.q_rad, done),
-            whole_plan=plan_six_observation(config.arm, config.procedure),
+            whole_plan=whole_plan,
             report=report,
             payload=config.arm,
             arm=arm,

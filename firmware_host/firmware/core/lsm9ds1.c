@@ -1,10 +1,10 @@
 /* LSM9DS1 datasheet (DocID025715): register map section 6, gyroscope registers section 7, SPI section 5. */
 #include "lsm9ds1.h"
 
+#include "byte_registers.h"
 #include "port.h"
 #include "settings.h"
 
-#define READ 0x80u /* first bit of an SPI transfer */
 #define IDENTITY 0x68u
 #define BUS_HZ 5000000u /* half of what section 5.2.1 allows: the wires are loose */
 
@@ -43,23 +43,9 @@ static const struct gyro_range ranges[] = {
     {2000.0, 3, RADIANS(70.0e-3)},
 };
 
-static uint8_t read_register(unsigned device, uint8_t address)
-{
-    uint8_t bytes[2] = {(uint8_t)(address | READ), 0};
-    bus_xfer(device, BUS_HZ, bytes, sizeof bytes);
-    return bytes[1];
-}
-
-static bool write_register(unsigned device, uint8_t address, uint8_t value)
-{
-    uint8_t bytes[2] = {address, value};
-    bus_xfer(device, BUS_HZ, bytes, sizeof bytes);
-    return read_register(device, address) == value;
-}
-
 static bool identify(unsigned device, uint16_t *who_am_i)
 {
-    *who_am_i = read_register(device, WHO_AM_I);
+    *who_am_i = byte_register_read(device, BUS_HZ, WHO_AM_I);
     return *who_am_i == IDENTITY;
 }
 
@@ -89,7 +75,7 @@ static bool write_settings(unsigned device, uint8_t rate_code, uint8_t range_cod
         {CTRL_REG1_G, (uint8_t)(rate_code << 5 | range_code << 3)},
     };
     for (size_t i = 0; i < COUNT(settings); i++)
-        if (!write_register(device, settings[i].address, settings[i].value))
+        if (!byte_register_write(device, BUS_HZ, settings[i].address, settings[i].value))
             return false;
     return true;
 }
@@ -126,7 +112,7 @@ static int16_t int16_at(const uint8_t *bytes)
 /* One chip select for temperature, status and rates: they lie side by side, and one burst is one moment. */
 static enum read_result read(unsigned device, struct reading *reading)
 {
-    uint8_t bytes[10] = {OUT_TEMP_L | READ};
+    uint8_t bytes[10] = {OUT_TEMP_L | BYTE_REGISTER_READ};
     bus_xfer(device, BUS_HZ, bytes, sizeof bytes);
     reading->temperature_counts = int16_at(&bytes[1]);
     for (unsigned axis = 0; axis < 3; axis++)

@@ -2,10 +2,10 @@
    drivers/iio/imu/inv_mpu6050 and PX4's src/drivers/imu/invensense/mpu9250 have the same registers, bits and speeds. */
 #include "mpu9250.h"
 
+#include "byte_registers.h"
 #include "port.h"
 #include "settings.h"
 
-#define READ 0x80u /* first bit of an SPI transfer: specification, section 7.5 */
 #define IDENTITY 0x71u /* the MPU-9255 says 0x73, the MPU-6500 0x70: other parts with other figures */
 #define REGISTERS_HZ 1000000u /* section 7.5 */
 #define DATA_HZ 5000000u /* sensor and interrupt registers take 20 MHz to read (section 3.6); loose wires do not */
@@ -54,23 +54,9 @@ static const struct gyro_range ranges[] = {
 /* Bandwidth at DLPF_CFG 1 … 6: map, register 26. */
 static const float bandwidths_hz[] = {184.0f, 92.0f, 41.0f, 20.0f, 10.0f, 5.0f};
 
-static uint8_t read_register(unsigned device, uint8_t address)
-{
-    uint8_t bytes[2] = {(uint8_t)(address | READ), 0};
-    bus_xfer(device, REGISTERS_HZ, bytes, sizeof bytes);
-    return bytes[1];
-}
-
-static bool write_register(unsigned device, uint8_t address, uint8_t value)
-{
-    uint8_t bytes[2] = {address, value};
-    bus_xfer(device, REGISTERS_HZ, bytes, sizeof bytes);
-    return read_register(device, address) == value;
-}
-
 static bool identify(unsigned device, uint16_t *who_am_i)
 {
-    *who_am_i = read_register(device, WHO_AM_I);
+    *who_am_i = byte_register_read(device, REGISTERS_HZ, WHO_AM_I);
     return *who_am_i == IDENTITY;
 }
 
@@ -85,8 +71,8 @@ static uint8_t filter_code(double rate_hz)
 
 static bool wake(unsigned device)
 {
-    bool asleep = read_register(device, PWR_MGMT_1) & PWR_MGMT_1_SLEEP;
-    bool taken = write_register(device, PWR_MGMT_1, PWR_MGMT_1_CLKSEL_BEST);
+    bool asleep = byte_register_read(device, REGISTERS_HZ, PWR_MGMT_1) & PWR_MGMT_1_SLEEP;
+    bool taken = byte_register_write(device, REGISTERS_HZ, PWR_MGMT_1, PWR_MGMT_1_CLKSEL_BEST);
     if (asleep)
         port_wait_us(WAKING_US);
     return taken;
@@ -110,10 +96,10 @@ static bool write_settings(unsigned device, uint16_t divider, uint8_t filter, ui
         {INT_ENABLE, INT_ENABLE_RAW_RDY},
     };
     for (uint8_t address = XG_OFFSET_H; address <= ZG_OFFSET_L; address++)
-        if (!write_register(device, address, 0))
+        if (!byte_register_write(device, REGISTERS_HZ, address, 0))
             return false;
     for (size_t i = 0; i < COUNT(settings); i++)
-        if (!write_register(device, settings[i].address, settings[i].value))
+        if (!byte_register_write(device, REGISTERS_HZ, settings[i].address, settings[i].value))
             return false;
     return true;
 }
@@ -150,7 +136,7 @@ static int16_t int16_at(const uint8_t *bytes)
 /* One chip select for status, acceleration, temperature and rates: they lie side by side, and one burst is one moment. */
 static enum read_result read(unsigned device, struct reading *reading)
 {
-    uint8_t bytes[16] = {INT_STATUS | READ};
+    uint8_t bytes[16] = {INT_STATUS | BYTE_REGISTER_READ};
     bus_xfer(device, DATA_HZ, bytes, sizeof bytes);
     reading->temperature_counts = int16_at(&bytes[8]);
     for (unsigned axis = 0; axis < 3; axis++)

@@ -1,0 +1,15 @@
+/* Parts whose registers are bytes at 7-bit addresses, the first bit of a transfer telling reading from writing. */
+#ifndef BYTE_REGISTERS_H
+#define BYTE_REGISTERS_H
+
+#include <stdbool.h>
+#include <stdint.h>
+
+#define BYTE_REGISTER_READ 0x80u
+
+uint8_t byte_register_read(unsigned device, uint32_t max_hz, uint8_t address);
+
+/* True when the register then reads back as written. */
+bool byte_register_write(unsigned device, uint32_t max_hz, uint8_t address, uint8_t value);
+
+#endif
