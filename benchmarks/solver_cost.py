@@ -240,7 +240,7 @@ def compare(population: Population, plain: Core, written_out: Core) -> list[Row]
 
 
 def main() -> None:
-    """Print a table for each population: instructions, their ratio to the closed form's, differences from double precision."""
+    """Print a table for each population: instructions, their ratio, differences from double precision."""
     with tempfile.TemporaryDirectory() as folder:
         plain, written_out = (Core(build(Path(folder), *defines)) for defines in ((), ("-DEXACTLY_SIX",)))
     for population in (NORMAL, EXTREME):
