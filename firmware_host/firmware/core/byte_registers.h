@@ -3,6 +3,7 @@
 #define BYTE_REGISTERS_H
 
 #include <stdbool.h>
+#include <stddef.h>
 #include <stdint.h>
 
 #define BYTE_REGISTER_READ 0x80u
@@ -11,5 +12,12 @@ uint8_t byte_register_read(unsigned device, uint32_t max_hz, uint8_t address);
 
 /* True when the register then reads back as written. */
 bool byte_register_write(unsigned device, uint32_t max_hz, uint8_t address, uint8_t value);
+
+struct byte_setting {
+    uint8_t address, value;
+};
+
+/* Writes them in their order, up to the first that does not read back; true when all do. */
+bool byte_registers_write(unsigned device, uint32_t max_hz, const struct byte_setting *settings, size_t count);
 
 #endif

@@ -61,9 +61,7 @@ static size_t nearest_rate(float hz)
 /* Data rate last: with it a part that was off starts. What an image flashed before left on, such as the self-test, goes off. */
 static bool write_settings(unsigned device, uint8_t rate_code, uint8_t range_code)
 {
-    const struct {
-        uint8_t address, value;
-    } settings[] = {
+    const struct byte_setting settings[] = {
         {CTRL_REG9, CTRL_REG9_I2C_DISABLE},
         {CTRL_REG8, CTRL_REG8_BDU | CTRL_REG8_IF_ADD_INC},
         {CTRL_REG4, CTRL_REG4_AXES},
@@ -74,20 +72,15 @@ static bool write_settings(unsigned device, uint8_t rate_code, uint8_t range_cod
         {INT1_CTRL, INT1_CTRL_DRDY_G},
         {CTRL_REG1_G, (uint8_t)(rate_code << 5 | range_code << 3)},
     };
-    for (size_t i = 0; i < COUNT(settings); i++)
-        if (!byte_register_write(device, BUS_HZ, settings[i].address, settings[i].value))
-            return false;
-    return true;
+    return byte_registers_write(device, BUS_HZ, settings, COUNT(settings));
 }
 
 static uint8_t configure(unsigned device, const struct configure_payload *wanted, struct setup_payload *setup)
 {
-    uint8_t error = refuse_wanted(wanted);
+    const struct gyro_range *range;
+    uint8_t error = choose_range(wanted, ranges, COUNT(ranges), &range);
     if (error)
         return error;
-    const struct gyro_range *range = next_range(ranges, COUNT(ranges), wanted->range_deg_s);
-    if (range == NULL)
-        return ERROR_BAD_RANGE;
     uint16_t who_am_i;
     identify(device, &who_am_i);
     error = refuse_identity(who_am_i, IDENTITY);

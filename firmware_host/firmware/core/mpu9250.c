@@ -82,9 +82,7 @@ static bool wake(unsigned device)
    The interrupt is a pulse for each conversion, not a level that a read lowers: a read that is missed costs no edge. */
 static bool write_settings(unsigned device, uint16_t divider, uint8_t filter, uint8_t range)
 {
-    const struct {
-        uint8_t address, value;
-    } settings[] = {
+    const struct byte_setting settings[] = {
         {USER_CTRL, USER_CTRL_I2C_IF_DIS}, /* or what is said to the others on the bus might look like I2C */
         {INT_ENABLE, 0},
         {PWR_MGMT_2, 0}, /* all axes on */
@@ -98,20 +96,15 @@ static bool write_settings(unsigned device, uint16_t divider, uint8_t filter, ui
     for (uint8_t address = XG_OFFSET_H; address <= ZG_OFFSET_L; address++)
         if (!byte_register_write(device, REGISTERS_HZ, address, 0))
             return false;
-    for (size_t i = 0; i < COUNT(settings); i++)
-        if (!byte_register_write(device, REGISTERS_HZ, settings[i].address, settings[i].value))
-            return false;
-    return true;
+    return byte_registers_write(device, REGISTERS_HZ, settings, COUNT(settings));
 }
 
 static uint8_t configure(unsigned device, const struct configure_payload *wanted, struct setup_payload *setup)
 {
-    uint8_t error = refuse_wanted(wanted);
+    const struct gyro_range *range;
+    uint8_t error = choose_range(wanted, ranges, COUNT(ranges), &range);
     if (error)
         return error;
-    const struct gyro_range *range = next_range(ranges, COUNT(ranges), wanted->range_deg_s);
-    if (range == NULL)
-        return ERROR_BAD_RANGE;
     uint16_t who_am_i;
     identify(device, &who_am_i);
     error = refuse_identity(who_am_i, IDENTITY);

@@ -14,12 +14,18 @@ uint8_t refuse_identity(uint16_t who_am_i, uint16_t expected)
     return who_am_i == 0 || who_am_i == 0xFFu || who_am_i == 0xFFFFu ? ERROR_SENSOR_ABSENT : ERROR_SENSOR_MISMATCH;
 }
 
-const struct gyro_range *next_range(const struct gyro_range *ranges, size_t count, float deg_s)
+uint8_t choose_range(const struct configure_payload *wanted, const struct gyro_range *ranges, size_t count,
+                     const struct gyro_range **range)
 {
+    uint8_t error = refuse_wanted(wanted);
+    if (error)
+        return error;
     for (size_t i = 0; i < count; i++)
-        if (deg_s <= (float)ranges[i].deg_s)
-            return &ranges[i];
-    return NULL;
+        if (wanted->range_deg_s <= (float)ranges[i].deg_s) {
+            *range = &ranges[i];
+            return 0;
+        }
+    return ERROR_BAD_RANGE;
 }
 
 static float distance(double a, float b)

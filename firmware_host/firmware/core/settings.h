@@ -19,11 +19,12 @@ struct gyro_range {
 /* Why what was asked for makes no sense for any part, or 0. */
 uint8_t refuse_wanted(const struct configure_payload *wanted);
 
+/* The same, and the smallest of the part's ranges that holds the wanted one; the table ascends. */
+uint8_t choose_range(const struct configure_payload *wanted, const struct gyro_range *ranges, size_t count,
+                     const struct gyro_range **range);
+
 /* Nobody there, another part, or 0. A wire that nobody drives reads as all zeros or all ones. */
 uint8_t refuse_identity(uint16_t who_am_i, uint16_t expected);
-
-/* The smallest range that holds `deg_s`, or NULL. The table ascends. */
-const struct gyro_range *next_range(const struct gyro_range *ranges, size_t count, float deg_s);
 
 /* Is `a` nearer to `wanted` than `b`? */
 bool is_nearer(double a, double b, float wanted);
