@@ -23,17 +23,6 @@ _TRANSMIT = ctypes.CFUNCTYPE(None, ctypes.POINTER(ctypes.c_uint8), ctypes.c_size
 _RESTART = ctypes.CFUNCTYPE(None)
 
 
-class CFrame(ctypes.Structure):
-    """`struct frame` of core/frame.h."""
-
-    _fields_ = (
-        ("type", ctypes.c_uint8),
-        ("sequence", ctypes.c_uint8),
-        ("size", ctypes.c_uint8),
-        ("payload", ctypes.POINTER(ctypes.c_uint8)),
-    )
-
-
 @functools.cache
 def core() -> ctypes.CDLL:
     """The core, built once a test run, with undefined behaviour ending the process.

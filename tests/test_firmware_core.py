@@ -1,12 +1,11 @@
-"""The firmware's core on this machine, undefined behaviour trapped: frames and requests."""
+"""The firmware's core on this machine, undefined behaviour trapped: its requests."""
 
-import ctypes
 from zlib import crc32
 
 import pytest
 from cobs import cobs
-from host_board import PERIOD_US, CFrame, HostBoard, convert, core, error_of, streaming_board
-from hypothesis import example, given, settings
+from host_board import PERIOD_US, HostBoard, convert, error_of, streaming_board
+from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from firmware_host import protocol
@@ -16,49 +15,6 @@ from firmware_host.frames import encode
 @pytest.fixture
 def board() -> HostBoard:
     return HostBoard()
-
-
-# Frames against the PyPI package and the standard library
-
-
-@given(st.integers(0, 255), st.integers(0, 255), st.binary(max_size=protocol.PAYLOAD_MAX))
-@example(1, 0, bytes(protocol.PAYLOAD_MAX))
-@example(255, 255, b"\xff" * protocol.PAYLOAD_MAX)
-def test_an_encoded_frame_is_what_cobs_and_zlib_make(kind: int, sequence: int, payload: bytes) -> None:
-    buffer = (ctypes.c_uint8 * len(payload)).from_buffer_copy(payload)
-    frame = CFrame(kind, sequence, len(payload), ctypes.cast(buffer, ctypes.POINTER(ctypes.c_uint8)))
-    wire = ctypes.create_string_buffer(300)
-    size = core().frame_encode(ctypes.byref(frame), wire)
-    body = bytes((kind, sequence)) + payload
-    assert wire.raw[:size] == cobs.encode(body + crc32(body).to_bytes(4, "little")) + b"\0"
-
-
-def decode_in_c(block: bytes) -> bytes | None:
-    buffer = ctypes.create_string_buffer(block, max(len(block), 1))
-    frame = CFrame()
-    if not core().frame_decode(buffer, ctypes.c_size_t(len(block)), ctypes.byref(frame)):
-        return None
-    return bytes((frame.type, frame.sequence)) + ctypes.string_at(frame.payload, frame.size)
-
-
-@given(st.binary(max_size=260))
-def test_noise_decodes_to_nothing(block: bytes) -> None:
-    try:
-        body = cobs.decode(block)
-    except cobs.DecodeError:
-        body = b""
-    whole = 6 <= len(body) <= protocol.PAYLOAD_MAX + 6 and crc32(body[:-4]).to_bytes(4, "little") == body[-4:]
-    expected = body[:-4] if whole else None
-    assert decode_in_c(block) == expected
-
-
-@given(st.binary(min_size=2, max_size=242), st.data())
-def test_a_damaged_frame_is_dropped_and_a_sound_one_decodes(body: bytes, data: st.DataObject) -> None:
-    block = bytearray(cobs.encode(body + crc32(body).to_bytes(4, "little")))
-    assert decode_in_c(bytes(block)) == body
-    bit = data.draw(st.integers(0, 8 * len(block) - 1))
-    block[bit // 8] ^= 1 << bit % 8
-    assert decode_in_c(bytes(block)) is None
 
 
 # Requests

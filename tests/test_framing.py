@@ -121,6 +121,15 @@ def test_noise_decodes_to_nothing(block: bytes) -> None:
     assert read is not None or decode(block) is None
 
 
+@given(st.binary(min_size=2, max_size=242), st.data())
+def test_a_damaged_frame_is_dropped_and_a_sound_one_decodes(body: bytes, data: st.DataObject) -> None:
+    block = bytearray(cobs.encode(body + crc32(body).to_bytes(4, "little")))
+    assert decode_in_c(bytes(block)) == (body[0], body[1], body[2:])
+    bit = data.draw(st.integers(0, 8 * len(block) - 1))
+    block[bit // 8] ^= 1 << bit % 8
+    assert decode_in_c(bytes(block)) is None
+
+
 # The layout of every message in C, as a compiler sees it
 
 
