@@ -28,9 +28,7 @@ def run(
     """Run the procedure a configuration names, or `script`, in a new run folder. Returns 0 passed, 1 verdict failed."""
     loaded = load(config_path, overrides)
     folder = new_folder(out, loaded)
-    return _carry_out(
-        folder, loaded, script or _named_script(loaded.config.procedure.name), assume_yes=assume_yes, as_json=as_json
-    )
+    return _carry_out(folder, loaded, script, assume_yes=assume_yes, as_json=as_json)
 
 
 def resume(folder: Path, *, assume_yes: bool = False, as_json: bool = False) -> int:
@@ -40,9 +38,7 @@ def resume(folder: Path, *, assume_yes: bool = False, as_json: bool = False) -> 
     if (folder / "result.json").exists():
         raise Refused("already_finished", f"{folder} has its result.json", "Start a new run with `rig run`")
     loaded = load(folder / "config.yaml")
-    return _carry_out(
-        folder, loaded, _named_script(loaded.config.procedure.name), assume_yes=assume_yes, as_json=as_json
-    )
+    return _carry_out(folder, loaded, None, assume_yes=assume_yes, as_json=as_json)
 
 
 def solve(path: Path, estimator: str, *, as_json: bool = False) -> int:

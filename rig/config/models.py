@@ -12,7 +12,6 @@ from pydantic import BaseModel, ConfigDict, Field, ValidationInfo, field_validat
 from rig.config.link_budget import Stream, over_budget
 from rig.config.parts import PARTS
 
-Joint = Literal["base", "shoulder", "elbow", "wrist_1", "wrist_2", "wrist_3"]
 Wrist = Literal["wrist_1", "wrist_2", "wrist_3"]
 Direction = Literal["cw", "ccw"]
 AxisName = Literal["+x", "-x", "+y", "-y", "+z", "-z"]
