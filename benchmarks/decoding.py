@@ -21,7 +21,7 @@ from firmware_host.frames import FrameReader
 from firmware_host.protocol import MESSAGES
 
 sys.path.insert(0, str(Path(__file__).parents[1] / "tests"))
-from emulated_session import Session
+from support.emulated_session import Session
 
 STREAMS = {
     "three sensors": {"lsm9ds1": 238.0, "mpu9250": 200.0, "adis16465": 200.0},

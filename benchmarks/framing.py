@@ -12,7 +12,7 @@ import time
 from pathlib import Path
 
 sys.path.insert(0, str(Path(__file__).parents[1] / "tests"))
-from damaged_stream import Outcome, carry
+from support.damaged_stream import Outcome, carry
 
 FAULTS_PER_FRAME = (0.01, 0.1, 1.0)
 ROUND = 50_000  # frames at a time

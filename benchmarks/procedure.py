@@ -12,9 +12,9 @@ from pathlib import Path
 
 import numpy as np
 
-from rig.arm.plan import plan_six_observation
 from rig.config.load import load
-from rig.recording import read_run
+from rig.data.run_file import read_run
+from rig.plans.six_sweeps import plan_six_observation
 
 DEMO = Path(__file__).parent.parent / "configs" / "demo.yaml"
 

@@ -11,9 +11,9 @@ What happens: the arm goes home; wrist 3 turns 360° clockwise, rests, turns bac
 Ctrl-C stops the arm at any moment and keeps what was measured.
 """
 
-from rig.arm.plan import Rest, Sweep, Transfer
+from rig.arm.motion import Rest, Sweep, Transfer
 from rig.cli import run_script
-from rig.procedure import Rig
+from rig.runner.procedure import Rig
 
 
 def six_observation(rig: Rig) -> None:

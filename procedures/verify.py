@@ -12,7 +12,7 @@ says `verify: true`. Ctrl-C stops the arm at any moment and keeps what was measu
 
 from procedures.six_observation import movement
 from rig.cli import run_script
-from rig.procedure import Rig
+from rig.runner.procedure import Rig
 
 
 def verify(rig: Rig) -> None:

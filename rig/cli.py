@@ -9,11 +9,11 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from rig import __version__
+from rig.commands.standard_streams import keep_streams_usable
 from rig.errors import Fault, RigError
-from rig.streams import keep_streams_usable
 
 if TYPE_CHECKING:
-    from rig.session import Script
+    from rig.runner.phases import Script
 
 _BOARD = "look at the board, read and change its stored calibrations, flash its firmware"
 FAULT, INTERRUPTED = Fault.exit_status, 130
@@ -182,7 +182,7 @@ def run_script(script: "Script", *, procedure: str) -> int:
 
 
 def _run(options: argparse.Namespace, script: "Script | None" = None) -> int:
-    from rig.run import run
+    from rig.commands.run import run
 
     return run(
         options.config, options.overrides, options.out, script=script, assume_yes=options.yes, as_json=options.json
@@ -190,14 +190,14 @@ def _run(options: argparse.Namespace, script: "Script | None" = None) -> int:
 
 
 def _resume(options: argparse.Namespace) -> int:
-    from rig.run import resume
+    from rig.commands.run import resume
 
     return resume(options.run_folder, assume_yes=options.yes, as_json=options.json)
 
 
 def _plan(options: argparse.Namespace) -> int:
     from rig.config.load import load
-    from rig.report.plan import checked_plan, print_plan
+    from rig.report.plan_table import checked_plan, print_plan
 
     config = load(options.config, options.overrides).config
     repeated = config.procedure.verify and config.procedure.name != "verify"
@@ -206,23 +206,23 @@ def _plan(options: argparse.Namespace) -> int:
 
 
 def _check(options: argparse.Namespace) -> int:
-    from rig.check import check
+    from rig.commands.check import check
 
     return check(options.config, options.overrides)
 
 
 def _solve(options: argparse.Namespace) -> int:
     if options.sweeps is not None:
-        from rig.solve_external import solve_external
+        from rig.commands.solve_csv import solve_external
 
         return solve_external(options.run, options.sweeps, options.estimator, as_json=options.json)
-    from rig.run import solve
+    from rig.commands.run import solve
 
     return solve(options.run, options.estimator, as_json=options.json)
 
 
 def _study(options: argparse.Namespace) -> int:
-    from rig.study.command import list_studies, run_study
+    from rig.commands.study import list_studies, run_study
 
     if options.name is None:
         return list_studies()
@@ -238,38 +238,38 @@ def _study(options: argparse.Namespace) -> int:
 
 
 def _board_info(options: argparse.Namespace) -> int:
-    from rig.board_command import info
+    from rig.commands.board import info
 
     return info(options.config, options.overrides, as_json=options.json)
 
 
 def _board_read(options: argparse.Namespace) -> int:
-    from rig.board_command import read
+    from rig.commands.board import read
 
     return read(options.config, options.overrides, options.sensor, as_json=options.json)
 
 
 def _board_write(options: argparse.Namespace) -> int:
-    from rig.board_command import write
+    from rig.commands.board import write
 
     return write(options.config, options.overrides, options.result, options.sensor, assume_yes=options.yes)
 
 
 def _board_erase(options: argparse.Namespace) -> int:
-    from rig.board_command import erase
+    from rig.commands.board import erase
 
     return erase(options.config, options.overrides, options.sensor, assume_yes=options.yes)
 
 
 def _board_flash(options: argparse.Namespace) -> int:
-    from rig.flash_command import flash
+    from rig.commands.flash import flash
 
     drive = Path(options.drive) if options.drive else None
     return flash(options.probe, drive, by_drive=options.drive is not None, assume_yes=options.yes)
 
 
 def _world(options: argparse.Namespace) -> int:
+    from rig.commands.laboratory import foreground_laboratory
     from rig.config.load import load
-    from rig.launch import foreground_laboratory
 
     return foreground_laboratory(load(options.config, options.overrides).text)

@@ -7,11 +7,11 @@ from pathlib import Path
 from types import TracebackType
 from typing import Self
 
+from rig.arm.child_link import ChildLink
 from rig.arm.condition import Problem, program_interruption, readiness
 from rig.arm.dashboard import Dashboard
-from rig.arm.link import ChildLink
 from rig.arm.messages import Connected, Failed, Heartbeat, Message, Move, MoveFinished, TakeControl
-from rig.arm.plan import Motion, travel
+from rig.arm.motion import Motion, travel
 from rig.arm.state import ArmReport, ArmState, RuntimeState
 from rig.arm.stopping import StopOutcome, Stopper
 from rig.errors import Fault, Refused, RigError

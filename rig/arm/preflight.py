@@ -7,7 +7,7 @@ import numpy as np
 
 from rig.arm.condition import Problem, readiness
 from rig.arm.kinematics import flange_axes
-from rig.arm.plan import Motion, Plan, travel
+from rig.arm.motion import Motion, Plan, travel
 from rig.arm.state import JOINT_NAMES, ArmReport, Joints
 from rig.errors import Refused
 

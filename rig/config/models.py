@@ -10,7 +10,7 @@ import numpy as np
 from pydantic import BaseModel, ConfigDict, Field, ValidationInfo, field_validator, model_validator
 
 from rig.config.link_budget import Stream, over_budget
-from rig.config.parts import PARTS
+from rig.config.sensor_catalogue import PARTS
 
 Wrist = Literal["wrist_1", "wrist_2", "wrist_3"]
 Direction = Literal["cw", "ccw"]

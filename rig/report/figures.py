@@ -6,8 +6,8 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from rig.comparison import Comparison
-from rig.verification import Verification
+from rig.analysis.comparison import Comparison
+from rig.analysis.verification import Verification
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure

@@ -5,15 +5,15 @@ from typing import Any
 
 import numpy as np
 
-from rig.agreement import Agreement
-from rig.averaging import Average
+from rig.analysis.calibration import SensorResult
+from rig.analysis.onboard_check import Agreement
 from rig.errors import Fault
 from rig.estimation import vector_model
 from rig.estimation.estimate import Estimate
 from rig.estimation.six_observation import MODEL, PARAMETER_UNITS, PARAMETERS
-from rig.observation import Observation
-from rig.solution import SensorResult
-from rig.timebase import TimeBase
+from rig.observation.average import Average
+from rig.observation.observe import Observation
+from rig.observation.timebase import TimeBase
 
 
 def sensor_document(result: SensorResult, role: str = "calibrate", agreed: Agreement | None = None) -> dict[str, Any]:

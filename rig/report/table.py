@@ -7,7 +7,7 @@ import numpy as np
 from rich.console import Console
 from rich.table import Table
 
-from rig.report.verification import verification_lines, verification_table
+from rig.report.verification_table import verification_lines, verification_table
 
 
 def print_result(result: Mapping[str, Any], console: Console) -> None:

@@ -7,12 +7,12 @@ from firmware_host.emulator.machine import EmulatedBoard
 from firmware_host.emulator.spi_device import Fault, SpiDevice
 from rig.config.models import RigConfig
 from rig.config.world_models import WorldSection
-from rig.world.board import mount_sensors, power_up
-from rig.world.flash_file import flash_of
-from rig.world.kinematics import Vector, flange_rate
-from rig.world.motion import Motion
-from rig.world.ripple import ripple
-from rig.world.robot import Identity, Robot
+from rig.world.board.flash_file import flash_of
+from rig.world.board.mounting import mount_sensors, power_up
+from rig.world.ur10e.forward_kinematics import Vector, flange_rate
+from rig.world.ur10e.joint_motion import Motion
+from rig.world.ur10e.ripple import ripple
+from rig.world.ur10e.robot import Identity, Robot
 
 JOINTS = 6
 STILL: Vector = (0.0, 0.0, 0.0)

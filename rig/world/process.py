@@ -15,23 +15,23 @@ from urllib.parse import urlsplit
 from firmware_host.errors import BoardError
 from rig.config.load import Loaded
 from rig.errors import Refused
-from rig.world import dashboard, primary, rtde, script
+from rig.world.board.serial_line import SerialLine, SerialSession
 from rig.world.clock import Clock
-from rig.world.control import ControlSession
+from rig.world.fault_channel import ControlSession
 from rig.world.laboratory import Laboratory
 from rig.world.network import Network, Session
-from rig.world.robot import Robot
-from rig.world.serial_line import SerialLine, SerialSession
+from rig.world.ur10e import dashboard_server, primary, rtde, script_socket
+from rig.world.ur10e.robot import Robot
 
 if TYPE_CHECKING:
-    from rig.world.pty_port import PtyPort
+    from rig.world.board.pty_port import PtyPort
 
 IDLE_POLL_S = 0.2
 ARM_PORTS: dict[int, Callable[[Robot], Session]] = {
-    dashboard.PORT: dashboard.DashboardSession,
-    script.PRIMARY_PORT: primary.PrimarySession,
-    script.SECONDARY_PORT: primary.PrimarySession,
-    script.REALTIME_PORT: script.ScriptSession,
+    dashboard_server.PORT: dashboard_server.DashboardSession,
+    script_socket.PRIMARY_PORT: primary.PrimarySession,
+    script_socket.SECONDARY_PORT: primary.PrimarySession,
+    script_socket.REALTIME_PORT: script_socket.ScriptSession,
     rtde.PORT: rtde.RtdeSession,
 }
 
@@ -148,7 +148,7 @@ def _board_address(url: str) -> tuple[str, int]:
 def _open_pty(line: SerialLine, selector: selectors.BaseSelector) -> "PtyPort":
     if os.name != "posix":
         raise Refused("no_pty", "world.board.pty: this system has no pseudo-terminals", "Use the socket:// port")
-    from rig.world.pty_port import PtyPort  # its modules exist on POSIX only
+    from rig.world.board.pty_port import PtyPort  # its modules exist on POSIX only
 
     return PtyPort(line, selector)
 

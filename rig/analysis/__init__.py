@@ -1,0 +1,1 @@
+"""Observations → typed result: calibration, verdict, verification, alignment, on-board check; pure."""

@@ -1,0 +1,189 @@
+"""From recordings to a calibration: the one path that a run and `rig solve` share, pure from end to end."""
+
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass
+from itertools import combinations
+from typing import Literal, TypeVar, get_args
+
+import numpy as np
+
+from rig.config.load import parse
+from rig.config.models import ObservationSection
+from rig.data.run_file import RecordedSensor, RunData
+from rig.errors import Fault, Refused
+from rig.estimation.accumulator import Accumulator, Solution
+from rig.estimation.accumulator import Estimator as SixObservation
+from rig.estimation.estimate import Array, Estimate
+from rig.estimation.levenberg_marquardt import LevenbergMarquardtSolution, solve_levenberg_marquardt
+from rig.estimation.refusals import check_duplicates
+from rig.estimation.vector_model import VectorSolution, solve_vector_model
+from rig.observation.average import Average
+from rig.observation.observe import Observation, SensorObservations, finished_sweeps, observe
+from rig.observation.timebase import TimeBase
+
+Estimator = Literal["vector", "newton", "algorithm_1", "levenberg_marquardt"]
+ESTIMATORS: tuple[Estimator, ...] = get_args(Estimator)
+DEFAULT_ESTIMATOR: Estimator = "vector"
+
+Result = TypeVar("Result")
+
+
+@dataclass(frozen=True, slots=True)
+class SensorResult:
+    """One sensor's calibration and what it rests on.
+
+    `solution` is the chosen estimator's. Beside it stand the others from the same observations: `vector_model`,
+    `six_observation` (exact) and `algorithm_1`, the paper's own, or the Fault one ends in. There is one time base for
+    each recording that took part.
+    """
+
+    sensor: RecordedSensor
+    solution: Estimate
+    vector_model: VectorSolution | Fault
+    six_observation: Solution
+    algorithm_1: Solution | Fault
+    observations: tuple[Observation, ...]
+    rests: tuple[Average, ...]
+    time_bases: tuple[TimeBase, ...]
+
+    @property
+    def temperature_c(self) -> float:
+        """Mean over all averaged samples."""
+        averages = [observation.average for observation in self.observations]
+        return float(np.average([a.temperature_c for a in averages], weights=[a.samples for a in averages]))
+
+
+def known_estimator(name: str) -> Estimator:
+    """The estimator of that name. Raises Refused `unknown_estimator`."""
+    for known in ESTIMATORS:
+        if known == name:
+            return known
+    raise Refused("unknown_estimator", f"there is no estimator {name!r}", f"Choose one of {', '.join(ESTIMATORS)}")
+
+
+def solve_runs(runs: Sequence[RunData], estimator: str = DEFAULT_ESTIMATOR) -> dict[str, SensorResult]:
+    """Calibrate every sensor from one recording, or from all recordings of a run that was resumed.
+
+    The thresholds come from the configuration in the first recording. Recordings without a finished sweep add nothing.
+    Whatever the estimator, the sweeps must bear the six-observation solution: a plan that lacks a direction is refused.
+    Raises Refused `unknown_estimator`, `different_sensors`; Fault as `observe` and the estimators do, and
+    `duplicated_observation`.
+    """
+    chosen = known_estimator(estimator)
+    if any(run.sensors != runs[0].sensors for run in runs):
+        raise Refused(
+            "different_sensors",
+            "the recordings do not describe the same sensors with the same settings",
+            "Solve them one by one",
+        )
+    settings = parse(runs[0].config, "the recorded configuration").config.observation
+    _check_recordings(runs)
+    return {
+        name: _solve_sensor(sensor, observe_runs(runs, name, settings), chosen)
+        for name, sensor in runs[0].sensors.items()
+    }
+
+
+def observe_runs(runs: Sequence[RunData], sensor: str, settings: ObservationSection) -> list[SensorObservations]:
+    """What each recording with a finished sweep tells of a sensor; a sweep that several hold counts in the last one."""
+    return [
+        observe(run, sensor, settings, _repeated(runs[place + 1 :]))
+        for place, run in enumerate(runs)
+        if finished_sweeps(run)
+    ]
+
+
+def _repeated(later: Sequence[RunData]) -> frozenset[int]:
+    """The sweeps that later recordings of a run hold as well."""
+    return frozenset[int]().union(*map(finished_sweeps, later))
+
+
+def _solve_sensor(sensor: RecordedSensor, parts: Sequence[SensorObservations], estimator: Estimator) -> SensorResult:
+    observations = tuple(observation for part in parts for observation in part.revolutions)
+    rests = tuple(rest for part in parts for rest in part.rests)
+    mounting = np.array(sensor.mounting)
+    check_duplicates(np.array([observation.average.mean_rad_s for observation in observations]))
+    six_observation = solve_six_observation(observations, "newton")
+    return SensorResult(
+        sensor=sensor,
+        solution=solve_observations(observations, estimator, rests, mounting),
+        vector_model=or_fault(lambda: solve_vector(observations, rests, mounting)),
+        six_observation=six_observation,
+        algorithm_1=or_fault(lambda: solve_six_observation(observations, "algorithm_1")),
+        observations=observations,
+        rests=rests,
+        time_bases=tuple(part.time_base for part in parts),
+    )
+
+
+def solve_observations(
+    observations: Sequence[Observation],
+    estimator: Estimator,
+    rests: Sequence[Average] = (),
+    nominal_mounting: Array | None = None,
+) -> Estimate:
+    """Scale and bias by any of the estimators; only the vector model makes use of rests and mounting."""
+    if estimator == "vector":
+        return solve_vector(observations, rests, nominal_mounting)
+    if estimator == "levenberg_marquardt":
+        return _solve_levenberg_marquardt(observations)
+    return solve_six_observation(observations, estimator)
+
+
+def solve_vector(
+    observations: Sequence[Observation], rests: Sequence[Average], nominal_mounting: Array | None = None
+) -> VectorSolution:
+    """The vector model of sweeps about known axes and of rests. Raises Fault as `solve_vector_model` does."""
+    averages = [*(observation.average for observation in observations), *rests]
+    rates = [observation.speed_rad_s * observation.axis_flange for observation in observations]
+    return solve_vector_model(
+        np.array([average.mean_rad_s for average in averages]),
+        np.array([*rates, *np.zeros((len(rests), 3))]),
+        np.array([average.variance_rad2_s2 for average in averages]),
+        speed_std_rad_s=[*(observation.speed_std_rad_s for observation in observations), *np.zeros(len(rests))],
+        nominal_mounting=nominal_mounting,
+    )
+
+
+def solve_six_observation(observations: Sequence[Observation], estimator: SixObservation) -> Solution:
+    """Accumulate and solve: weighted by inverse variance, or all alike where the paper's algorithm is asked for."""
+    accumulated = Accumulator.empty()
+    for observation in observations:
+        average = observation.average
+        accumulated = accumulated.add(
+            average.mean_rad_s,
+            average.variance_rad2_s2,
+            observation.speed_rad_s,
+            observation.speed_std_rad_s,
+            weight=1.0 if estimator == "algorithm_1" else None,
+        )
+    return accumulated.solve(estimator)
+
+
+def _solve_levenberg_marquardt(observations: Sequence[Observation]) -> LevenbergMarquardtSolution:
+    return solve_levenberg_marquardt(
+        np.array([observation.average.mean_rad_s for observation in observations]),
+        [observation.speed_rad_s for observation in observations],
+        np.array([observation.average.variance_rad2_s2 for observation in observations]),
+        speed_std_rad_s=[observation.speed_std_rad_s for observation in observations],
+    )
+
+
+def or_fault(solve: Callable[[], Result]) -> Result | Fault:
+    """What `solve` returns, or the Fault it ends in: for a result that stands beside another."""
+    try:
+        return solve()
+    except Fault as fault:
+        return fault
+
+
+def _check_recordings(runs: Sequence[RunData]) -> None:
+    """The same recording given twice must not look like a run that repeats its sweeps."""
+    for run, other in combinations(runs, 2):
+        again = finished_sweeps(run) & finished_sweeps(other)
+        if again and all(np.array_equal(samples, other.samples[name]) for name, samples in run.samples.items()):
+            raise Fault(
+                "duplicated_observation",
+                f"two recordings hold the same samples of sweep {min(again)}",
+                "Give each recording once",
+            )

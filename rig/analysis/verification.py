@@ -1,0 +1,114 @@
+"""Calibrated readings against a sensor that is known: SIX, Section IV-B, Tables IV and V.
+
+How the two sensors sit to each other comes from the calibration's revolutions, so that the verification stays a test of
+them. Only a rotation is taken out: axes that are not at right angles, and cross-axis errors of either part, stay in.
+"""
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+
+from rig.analysis.alignment import Calibration, RelativeRotation, mean_rates, relative_rotation
+from rig.analysis.calibration import observe_runs
+from rig.analysis.comparison import Comparison, Observed, Reference, compare, turns_of_reference, turns_of_sensor
+from rig.config.load import parse
+from rig.data.run_file import RunData
+from rig.errors import Fault
+from rig.observation.observe import finished_sweeps
+
+
+@dataclass(frozen=True, slots=True)
+class Verification:
+    """The sensor before its calibration (None where that was not recorded) and with it, by one relative rotation.
+
+    `reference_error_rad_s` is the largest by which the reference itself misses the arm: the magnitude of its mean rate
+    over a revolution against 2π/T, and over a rest against zero.
+    """
+
+    sensor: str
+    reference: Reference
+    reference_error_rad_s: float
+    rotation: RelativeRotation
+    before: Comparison | None
+    after: Comparison
+
+
+def verify(
+    sensor: str,
+    reference: Reference,
+    after: Sequence[RunData],
+    before: Sequence[RunData] = (),
+    calibration: Calibration | None = None,
+) -> Verification:
+    """Judge the readings that the board has calibrated (`after`) by the reference beside it.
+
+    `before` are the recordings of raw readings that the `calibration` was made from; they tell how the two sensors sit
+    to each other. Without them `after` itself tells it. Thresholds come from the first recording's configuration.
+
+    Raises Fault `sensor_missing`, `wrong_mode`, `nothing_to_compare`, `incomplete_verification`, `no_overlap`,
+    `different_clocks`, and as `observe` and `relative_rotation` do.
+    """
+    repeated = _observed(after, sensor, reference, "calibrated")
+    _check_complete(after)
+    made = _observed(before, sensor, reference, "raw") if before else []
+    described = after[0].sensors
+    rotation = relative_rotation(
+        mean_rates(turns_of_sensor(made or repeated), calibration if made else None),
+        mean_rates(turns_of_reference(made or repeated), reference),
+        np.array(described[sensor].mounting) @ np.array(described[reference.name].mounting).T,
+    )
+    return Verification(
+        sensor,
+        reference,
+        _against_the_arm(repeated, reference),
+        rotation,
+        compare(made, sensor, reference, rotation.matrix) if made else None,
+        compare(repeated, sensor, reference, rotation.matrix),
+    )
+
+
+def _observed(runs: Sequence[RunData], sensor: str, reference: Reference, mode: str) -> list[Observed]:
+    """The recordings that hold a finished sweep, of which there must be one."""
+    for run in runs:
+        _check_recorded(run, sensor, mode)
+        _check_recorded(run, reference.name, "raw")
+    useful = [run for run in runs if finished_sweeps(run)]
+    if not useful:
+        raise Fault("nothing_to_compare", "no sweep was finished in the recording", "Let the whole movement finish")
+    settings = parse(runs[0].config, "the recorded configuration").config.observation
+    tested, known = (observe_runs(runs, name, settings) for name in (sensor, reference.name))
+    return [Observed(*seen) for seen in zip(useful, tested, known, strict=True)]
+
+
+def _check_complete(runs: Sequence[RunData]) -> None:
+    """A movement that was broken off has not verified the directions it never turned in."""
+    procedure = parse(runs[0].config, "the recorded configuration").config.procedure
+    planned = len(procedure.order) * len(procedure.directions) * procedure.repeats
+    done = len(frozenset[int]().union(*map(finished_sweeps, runs)))
+    if done < planned:
+        raise Fault(
+            "incomplete_verification",
+            f"{done} of {planned} sweeps were finished while the readings were calibrated",
+            "Go on with `rig resume RUN_DIR`, or run the verification again",
+        )
+
+
+def _against_the_arm(recordings: Sequence[Observed], reference: Reference) -> float:
+    """How far the reference is off at most, by what the arm did; magnitudes, for its mounting does not matter here."""
+    turns = turns_of_reference(recordings)
+    of_turns = np.linalg.norm(mean_rates(turns, reference).rate_rad_s, axis=1) - [turn.speed_rad_s for turn in turns]
+    means = [rest.mean_rad_s for seen in recordings for rest in seen.known.rests]
+    of_rests = np.linalg.norm(reference.scale * (np.reshape(means, (-1, 3)) + reference.bias_rad_s), axis=1)
+    return float(np.abs([*of_turns, *of_rests]).max())
+
+
+def _check_recorded(run: RunData, sensor: str, mode: str) -> None:
+    if sensor not in run.sensors:
+        raise Fault("sensor_missing", f"the recording holds nothing of {sensor}", "Name it under sensors and run again")
+    if run.sensors[sensor].mode != mode:
+        raise Fault(
+            "wrong_mode",
+            f"{sensor} was recorded in {run.sensors[sensor].mode} mode where {mode} readings are needed",
+            "Give the recordings of a calibration and of its verification",
+        )

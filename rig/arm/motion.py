@@ -1,0 +1,116 @@
+"""What an arm can be told to do, step by step: motions with their joints, speed and duration, and rests. Pure."""
+
+import math
+from dataclasses import dataclass
+from typing import Protocol
+
+from rig.arm.state import Joints
+from rig.config.models import Direction, Vector3
+
+# Joint angles closer than this are the same place: well above the encoder's step, well below anything that matters.
+SAME_PLACE_RAD = 1e-4
+
+
+class Motion(Protocol):
+    """One joint-space movement: the joint that travels farthest has this speed and acceleration; others keep pace."""
+
+    @property
+    def name(self) -> str: ...
+    @property
+    def start_q_rad(self) -> Joints: ...
+    @property
+    def target_q_rad(self) -> Joints: ...
+    @property
+    def speed_rad_s(self) -> float: ...
+    @property
+    def acceleration_rad_s2(self) -> float: ...
+    @property
+    def duration_s(self) -> float: ...
+
+
+@dataclass(frozen=True, slots=True)
+class Sweep:
+    """One wrist through one revolution at constant speed, with ramps and margins outside the revolution.
+
+    `index` counts the plan's sweeps from 0. `joint` is 0 (base) to 5 (wrist 3). `direction` is "ccw" for a growing
+    joint angle, "cw" for a falling one. `axis_flange` is the unit vector of the flange's angular velocity in the
+    flange frame, sign included. `revolution_rad` is the (low, high) joint angle of the revolution: exactly 2π,
+    centred on the home pose.
+    """
+
+    index: int
+    joint: int
+    joint_name: str
+    direction: Direction
+    axis_flange: Vector3
+    start_q_rad: Joints
+    end_q_rad: Joints
+    speed_rad_s: float
+    acceleration_rad_s2: float
+    duration_s: float
+    revolution_rad: tuple[float, float]
+
+    @property
+    def name(self) -> str:
+        return f"sweep {self.joint_name} {self.direction}"
+
+    @property
+    def target_q_rad(self) -> Joints:
+        return self.end_q_rad
+
+
+@dataclass(frozen=True, slots=True)
+class Transfer:
+    """A movement between sweeps; nothing is measured during it."""
+
+    name: str
+    start_q_rad: Joints
+    target_q_rad: Joints
+    speed_rad_s: float
+    acceleration_rad_s2: float
+    duration_s: float
+
+
+@dataclass(frozen=True, slots=True)
+class Rest:
+    """The arm stands still, in the controller's time."""
+
+    name: str
+    duration_s: float
+
+
+Step = Sweep | Transfer | Rest
+
+
+@dataclass(frozen=True, slots=True)
+class Plan:
+    """Every step in order. `home_q_rad` is where the plan ends, `start_q_rad` where it expects the arm to begin."""
+
+    steps: tuple[Step, ...]
+    start_q_rad: Joints
+    home_q_rad: Joints
+
+    @property
+    def duration_s(self) -> float:
+        """The sum of all motions and rests."""
+        return sum(step.duration_s for step in self.steps)
+
+    @property
+    def sweeps(self) -> tuple[Sweep, ...]:
+        return tuple(step for step in self.steps if isinstance(step, Sweep))
+
+    @property
+    def motions(self) -> tuple[Sweep | Transfer, ...]:
+        return tuple(step for step in self.steps if not isinstance(step, Rest))
+
+
+def trapezoid_duration(distance_rad: float, speed_rad_s: float, acceleration_rad_s2: float) -> float:
+    """Seconds for a distance with equal ramps up and down; a short distance never reaches the speed."""
+    if distance_rad < speed_rad_s**2 / acceleration_rad_s2:
+        return 2 * math.sqrt(distance_rad / acceleration_rad_s2)
+    return distance_rad / speed_rad_s + speed_rad_s / acceleration_rad_s2
+
+
+def travel(start_q_rad: Joints, target_q_rad: Joints) -> Joints:
+    """The six signed joint travels from start to target, rad."""
+    return tuple(target - start for start, target in zip(start_q_rad, target_q_rad, strict=True))

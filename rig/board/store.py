@@ -1,0 +1,50 @@
+"""A calibration from `result.json` into the board's flash, and seen to be there."""
+
+from collections.abc import Iterator, Mapping
+from datetime import UTC, datetime
+from typing import Any
+
+from firmware_host.client import Board, Calibration, StoredCalibration
+from firmware_host.errors import BoardError
+from rig.board.identify import find_sensor
+from rig.config.models import RigConfig
+
+
+def store_calibrations(config: RigConfig, document: Mapping[str, Any]) -> Iterator[str]:
+    """Store the solutions of a `result.json` document for every sensor to calibrate; a line about each.
+
+    Raises BoardError as the board refuses, `not_stored` when it reads back otherwise; Refused as `find_sensor`.
+    """
+    with Board(config.board.port, config.board.baud, lambda batch: None) as board:
+        for name in config.to_calibrate:
+            section = config.sensors[name]
+            index = find_sensor(board.identity, name, section).index
+            board.configure(index, section.rate_hz, section.range_deg_s)  # the record says for which range it holds
+            stored = store(board, index, calibration_of(document["sensors"][name]))
+            yield f"stored on the board: {name}, {section.part} {section.serial_number}, record {stored.sequence}"
+
+
+def calibration_of(sensor: Mapping[str, Any]) -> Calibration:
+    """One sensor's entry of `result.json` as the board keeps it, dated now."""
+    (kx, ky, kz), (bx, by, bz) = sensor["scale"], sensor["bias_rad_s"]
+    return Calibration(
+        model="k_times_m_plus_b",
+        serial_number=sensor["serial_number"],
+        written_utc=datetime.now(UTC),
+        temperature_c=sensor["temperature_c"],
+        scale=(kx, ky, kz),
+        bias_rad_s=(bx, by, bz),
+    )
+
+
+def store(board: Board, index: int, calibration: Calibration) -> StoredCalibration:
+    """Write a calibration for a configured sensor and read it back. Raises BoardError, among others `not_stored`."""
+    board.write_calibration(index, calibration)
+    stored = board.read_calibration(index)
+    if stored is None or stored.calibration != calibration.as_kept():
+        raise BoardError(
+            "not_stored",
+            f"the board reads back another calibration for sensor {index} than was written",
+            "Write it again; if that does not help, replace the microcontroller board",
+        )
+    return stored

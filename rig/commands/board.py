@@ -1,0 +1,187 @@
+"""`rig board info` and `calibration`: look at the board, read and change the calibrations it has stored."""
+
+import json
+import sys
+from collections.abc import Iterable, Iterator, Mapping, Sequence
+from contextlib import ExitStack, contextmanager
+from dataclasses import dataclass
+from math import degrees, isclose
+from pathlib import Path
+
+from firmware_host.client import Board, Calibration, StoredCalibration
+from rig.board.identify import changing, configured_part, find_sensor, refuse_other_firmware, refusing
+from rig.board.store import calibration_of, store
+from rig.commands.laboratory import simulated_laboratory, written
+from rig.config.load import load
+from rig.config.models import RigConfig, SensorSection
+from rig.data.result_file import Result, passed_result
+from rig.errors import Fault, Refused
+from rig.report.board_info import info_document, print_info, print_stored
+from rig.station.confirm import agreed_or_refused
+
+
+@dataclass(frozen=True, slots=True)
+class _Place:
+    """A configured sensor's place on the board."""
+
+    name: str
+    section: SensorSection
+    index: int
+    stored: StoredCalibration | None
+
+
+def info(config_path: Path, overrides: Sequence[str], *, as_json: bool) -> int:
+    """Print the board's identity, health, sensors and stored calibrations."""
+    with _connected(config_path, overrides) as (config, board), refusing():
+        calibrations = [board.read_calibration(sensor.index) for sensor in board.identity.sensors]
+        names: dict[str, str] = {section.part: name for name, section in config.sensors.items()}
+        configured = [names.get(configured_part(sensor.part)) for sensor in board.identity.sensors]
+        document = info_document(config.board.port, board.identity, board.status(), configured, calibrations)
+    if as_json:
+        print(json.dumps(document, indent=2))
+    else:
+        print_info(document)
+    return 0
+
+
+def read(config_path: Path, overrides: Sequence[str], sensor: str | None, *, as_json: bool) -> int:
+    """Print the calibrations the board has stored, of one sensor or of all."""
+    with _connected(config_path, overrides) as (config, board):
+        places = _places(board, config, sensor, config.sensors)
+    for place in places:
+        if place.stored is not None and place.stored.calibration.serial_number != place.section.serial_number:
+            print(f"{place.name}: stored for another sensor than {place.section.serial_number}", file=sys.stderr)
+    documents = {place.name: None if place.stored is None else place.stored.document() for place in places}
+    if as_json:
+        print(json.dumps({"schema": "rig.board_calibration/1", "sensors": documents}, indent=2))
+    else:
+        print_stored(documents)
+    return 0
+
+
+def write(
+    config_path: Path, overrides: Sequence[str], result_path: Path, sensor: str | None, *, assume_yes: bool
+) -> int:
+    """Store a run's calibration on the board, of one sensor or of all that were to be calibrated."""
+    result = passed_result(result_path)
+    with _connected(config_path, overrides) as (config, board):
+        refuse_other_firmware(board.identity)
+        places = _places(board, config, sensor, config.to_calibrate)
+        found = {place.name: _result_of(place, result, result_path) for place in places}
+        for place in places:
+            find_sensor(board.identity, place.name, place.section)
+        agreed_or_refused(_on(board, (_replacing(place, found[place.name]) for place in places)), "store", assume_yes)
+        with changing():
+            for place in places:
+                board.configure(place.index, place.section.rate_hz, place.section.range_deg_s)
+                record = store(board, place.index, found[place.name])
+                print(f"stored: {place.name}, {_in_words(record)}")
+    return 0
+
+
+def erase(config_path: Path, overrides: Sequence[str], sensor: str | None, *, assume_yes: bool) -> int:
+    """Let the board forget the calibration of one sensor or of all that are configured."""
+    with _connected(config_path, overrides) as (config, board):
+        refuse_other_firmware(board.identity)
+        places = [place for place in _places(board, config, sensor, config.sensors) if place.stored is not None]
+        if not places:
+            print("nothing to erase: no calibration is stored")
+            return 0
+        losses = (f"{place.name}: erases {_in_words(place.stored)}" for place in places if place.stored is not None)
+        agreed_or_refused(_on(board, losses), "erase", assume_yes)
+        with changing():
+            for place in places:
+                board.erase_calibration(place.index)
+                if board.read_calibration(place.index) is not None:
+                    raise Fault(
+                        "not_erased",
+                        f"the board still has a calibration for {place.name} after it was erased",
+                        "Try again; if that does not help, replace the microcontroller board",
+                    )
+                print(f"erased: {place.name}")
+    return 0
+
+
+@contextmanager
+def _connected(config_path: Path, overrides: Sequence[str]) -> Iterator[tuple[RigConfig, Board]]:
+    """The board of a configuration, in its simulated laboratory if it has one."""
+    loaded = load(config_path, overrides)
+    with ExitStack() as stack:
+        if loaded.world:
+            stack.enter_context(simulated_laboratory(stack.enter_context(written(loaded.text))))
+            kept = loaded.world.board.flash_file
+            memory = f"is kept in {kept}" if kept else "too, unless world.board.flash_file names a file that keeps it"
+            print(
+                f"simulated laboratory: it lasts as long as this command, its board's memory {memory}", file=sys.stderr
+            )
+        with refusing():
+            board = stack.enter_context(Board(loaded.config.board.port, loaded.config.board.baud, lambda batch: None))
+        yield loaded.config, board
+
+
+def _places(board: Board, config: RigConfig, sensor: str | None, among: Mapping[str, SensorSection]) -> list[_Place]:
+    """The configured sensors a command is about, and what is stored for them."""
+    if sensor is not None and sensor not in among:
+        raise Refused(
+            "no_such_sensor",
+            f"--sensor {sensor}: the configuration has no such sensor for this",
+            f"Choose one of: {', '.join(among)}",
+        )
+    places = []
+    for name in [sensor] if sensor is not None else among:
+        section = config.sensors[name]
+        index = next((s.index for s in board.identity.sensors if configured_part(s.part) == section.part), None)
+        if index is None:
+            find_sensor(board.identity, name, section)
+            continue
+        with refusing():
+            places.append(_Place(name, section, index, board.read_calibration(index)))
+    return places
+
+
+def _result_of(place: _Place, result: Result, path: Path) -> Calibration:
+    """The run's calibration of a sensor. Raises Refused `not_in_result`, `another_sensor` or `another_range`."""
+    entry = result.sensors.get(place.name)
+    if entry is None or entry.role == "reference":
+        raise Refused(
+            "not_in_result",
+            f"{path} has no calibration for sensors.{place.name}",
+            f"It has: {', '.join(result.sensors) or 'none'}; choose one with --sensor",
+        )
+    for what, found, wanted in (
+        ("part", entry.part, place.section.part),
+        ("serial_number", entry.serial_number, place.section.serial_number),
+    ):
+        if found != wanted:
+            raise Refused(
+                "another_sensor",
+                f"{path}: {place.name}.{what} is {found}, the configuration says {wanted}",
+                "Store a calibration only on the sensor it was made for",
+            )
+    if not isclose(degrees(entry.range_rad_s), place.section.range_deg_s, rel_tol=1e-6):
+        raise Refused(
+            "another_range",
+            f"{path}: {place.name} was calibrated at {degrees(entry.range_rad_s):g} °/s, the configuration says "
+            f"{place.section.range_deg_s:g} °/s",
+            "Set range_deg_s to what it was calibrated at, or calibrate at this range",
+        )
+    return calibration_of(entry.model_dump())
+
+
+def _on(board: Board, changes: Iterable[str]) -> list[str]:
+    return [f"On the board {board.identity.unique_id}:", *(f"  {change}" for change in changes)]
+
+
+def _replacing(place: _Place, calibration: Calibration) -> str:
+    scale = " ".join(f"{value:.5f}" for value in calibration.scale)
+    bias = " ".join(f"{value:+.5f}" for value in calibration.bias_rad_s)
+    old = f"replaces {_in_words(place.stored)}" if place.stored is not None else "nothing was stored before"
+    return f"{place.name}: scale {scale}, bias {bias} rad/s; {old}"
+
+
+def _in_words(stored: StoredCalibration) -> str:
+    calibration = stored.calibration
+    return (
+        f"record {stored.sequence} of {calibration.written_utc:%Y-%m-%d %H:%M} UTC for {stored.part} "
+        f"{calibration.serial_number} at {stored.range_deg_s:g} °/s"
+    )

@@ -1,0 +1,68 @@
+"""`rig check`: connect and look. Receives only, so nothing moves and no program on the arm is stopped."""
+
+import sys
+from collections.abc import Callable, Sequence
+from contextlib import nullcontext
+from math import degrees
+from pathlib import Path
+
+from firmware_host.client import Board
+from rig.arm.driver import look
+from rig.arm.preflight import arm_problems, plan_problems
+from rig.board.identify import find_sensor, refuse_other_firmware, refusing, stored_calibration
+from rig.commands.laboratory import simulated_laboratory, written
+from rig.config.load import load
+from rig.config.models import RigConfig
+from rig.errors import RigError
+from rig.plans.six_sweeps import plan_six_observation
+
+
+def check(config_path: Path, overrides: Sequence[str]) -> int:
+    """Look at the board and the arm; print what is there and what is missing. 0 when a run could start, else 2."""
+    loaded = load(config_path, overrides)
+    with written(loaded.text) as used, simulated_laboratory(used) if loaded.world else nullcontext():
+        missing = [*_named(_look_at_board, loaded.config), *_named(_look_at_arm, loaded.config)]
+    for problem in missing:
+        print(f"missing: {problem}", file=sys.stderr)
+    print(f"not ready: {len(missing)} to mend" if missing else "ready")
+    return 2 if missing else 0
+
+
+def _named(look_at: Callable[[RigConfig], list[str]], config: RigConfig) -> list[str]:
+    """The problems found, including the one that ended the looking."""
+    try:
+        return look_at(config)
+    except RigError as error:
+        return [str(error)]
+
+
+def _look_at_board(config: RigConfig) -> list[str]:
+    missing = []
+    with refusing(), Board(config.board.port, config.board.baud, lambda batch: None) as board:
+        identity = board.identity
+        print(f"board at {config.board.port}: {identity.unique_id}, firmware {identity.firmware}")
+        try:
+            refuse_other_firmware(identity)
+        except RigError as error:
+            missing.append(str(error))
+        for name, section in config.sensors.items():
+            try:
+                info = find_sensor(identity, name, section)
+                print(f"sensor {name}: {info.part}, identity register 0x{info.who_am_i:02x}")
+                if config.procedure.name == "verify" and name in config.to_calibrate:
+                    stored = stored_calibration(board, name, section)
+                    print(f"sensor {name}: calibrated on {stored.calibration.written_utc:%Y-%m-%d}")
+            except RigError as error:
+                missing.append(str(error))
+    return missing
+
+
+def _look_at_arm(config: RigConfig) -> list[str]:
+    report = look(config.arm.host)
+    state = report.state
+    angles = " ".join(f"{degrees(angle):.1f}" for angle in state.q_rad)
+    print(f"arm at {report.host}: serial number {report.serial_number}, PolyScope {report.polyscope}")
+    print(f"arm joints: {angles} °, speed slider {100 * state.target_speed_fraction:.0f} %")
+    plan = plan_six_observation(config.arm, config.procedure, state.q_rad)
+    problems = [*plan_problems(plan, config.arm.payload_kg), *arm_problems(plan, report)]
+    return [f"{problem.name}: {problem.what}. {problem.remedy}." for problem in problems]

@@ -1,0 +1,36 @@
+"""`rig board flash`: the firmware that comes with this program onto the board."""
+
+from pathlib import Path
+
+from firmware_host import flashing
+from firmware_host.protocol import FIRMWARE_VERSION
+from rig.board.identify import changing, refusing
+from rig.station.confirm import agreed_or_refused
+
+
+def flash(probe_id: str | None, drive: Path | None, *, by_drive: bool, assume_yes: bool) -> int:
+    """Put the shipped image onto the board, through its debug probe or by a copy to its USB drive."""
+    with refusing():
+        image = flashing.shipped_image()
+        if by_drive:
+            target = drive or flashing.find_drive()
+            flashing.refuse_other_drive(target)
+            way, calibrations = f"the drive {target}", "may be lost: read them out first"
+        else:
+            probe = flashing.find_probe(probe_id)
+            way, calibrations = f"the debug probe {probe.unique_id}", "stay"
+    agreed_or_refused(
+        [
+            f"The board at {way} gets the firmware {FIRMWARE_VERSION} ({len(image)} bytes).",
+            f"Nothing else may use the board meanwhile. Calibrations it has stored {calibrations}.",
+        ],
+        "flash",
+        assume_yes,
+    )
+    with changing():
+        if by_drive:
+            flashing.flash_by_drive(image, target)
+        else:
+            flashing.flash_by_probe(image, probe)
+    print(f"flashed: firmware {FIRMWARE_VERSION}; see it with `rig board info CONFIG`")
+    return 0

@@ -1,0 +1,1 @@
+"""What lies on disk: the run file, the run folder, the result."""

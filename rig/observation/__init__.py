@@ -1,0 +1,1 @@
+"""Recording → averaged observations: time base, revolution, rest; pure."""

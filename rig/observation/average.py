@@ -1,0 +1,85 @@
+"""A sensor's samples on the controller's clock, and their averages with the variance of the mean."""
+
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from rig.data.run_file import RecordedSensor
+from rig.observation.timebase import ArmMotion, Array, TimeBase, estimate_time_base, widening
+
+
+@dataclass(frozen=True, slots=True)
+class Average:
+    """Readings averaged: mean (3,) rad/s, variance (3,) of that mean in (rad/s)², noise (3,) of one sample in rad/s.
+
+    The variance of a revolution or a rest also holds the drift of the bias from rest to rest.
+    """
+
+    mean_rad_s: Array
+    variance_rad2_s2: Array
+    noise_rad_s: Array
+    samples: int
+    duration_s: float
+    temperature_c: float
+
+
+@dataclass(frozen=True, slots=True)
+class Stream:
+    """A sensor's samples in physical units, on the controller's clock."""
+
+    sensor: RecordedSensor
+    clock: TimeBase
+    time_s: Array
+    board_time_s: Array
+    readings_rad_s: Array
+    raw: NDArray[Any]
+
+
+def on_the_arms_clock(raw: NDArray[Any], sensor: RecordedSensor, motion: ArmMotion) -> Stream:
+    """Samples (n,) SAMPLE_DTYPE in rad/s at the controller's times. Raises Fault as `estimate_time_base` does."""
+    readings = raw["counts"] * sensor.sensitivity_rad_s_per_count
+    return on_clock(raw, sensor, estimate_time_base(raw["board_time_us"] * 1e-6, readings, motion))
+
+
+def on_clock(raw: NDArray[Any], sensor: RecordedSensor, clock: TimeBase) -> Stream:
+    """The same where the board's clock is known."""
+    board_time_s = raw["board_time_us"] * 1e-6
+    readings = raw["counts"] * sensor.sensitivity_rad_s_per_count
+    return Stream(sensor, clock, clock.controller_time_s(board_time_s), board_time_s, readings, raw)
+
+
+def between(stream: Stream, start_s: float, end_s: float) -> slice:
+    """The samples taken between two controller times."""
+    return slice(*np.searchsorted(stream.time_s, [start_s, end_s]).tolist())
+
+
+def average(stream: Stream, inside: slice, duration_s: float, excess: Array, covered: NDArray[np.bool_]) -> Average:
+    """Mean and its variance; `excess` (n,) is the arm's rate less its mean 2π/T, known where `covered` (n,).
+
+    A straight line of reading against excess says what is read at the mean speed: few samples do not meet the vibration
+    evenly. The noise is what is left of that line, and never below the rounding to counts; its variance is widened
+    where the residuals are not white. Rounding averages out only as far as noise carries the reading across counts: the
+    part exp(−(2πσ/count)²) of its variance stays.
+    """
+    m = stream.readings_rad_s[inside]
+    columns, known = np.column_stack([np.ones(int(covered.sum())), excess[covered]]), m[covered]
+    coefficients, _, rank, _ = np.linalg.lstsq(columns, known, rcond=None)
+    residual = known - columns @ coefficients
+    scatter = np.sum(residual**2, axis=0) / (len(known) - rank)
+    count = stream.sensor.sensitivity_rad_s_per_count
+    rounding = count**2 / 12
+    variance = np.maximum(scatter, rounding)
+    staying = rounding * np.exp(-((2 * np.pi / count) ** 2) * (variance - rounding))
+    wider = np.array([widening(residual[:, axis]) for axis in range(3)])
+    temperature = stream.raw["temperature_counts"][inside].mean() * stream.sensor.temperature_c_per_count
+    of_the_mean = np.linalg.pinv(columns.T @ columns, hermitian=True)[0, 0]  # 1/n where the excess averages out
+    return Average(
+        mean_rad_s=coefficients[0],
+        variance_rad2_s2=variance * wider * of_the_mean + staying,
+        noise_rad_s=np.sqrt(variance),
+        samples=len(known),
+        duration_s=duration_s,
+        temperature_c=float(temperature) + stream.sensor.temperature_offset_c,
+    )

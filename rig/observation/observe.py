@@ -1,0 +1,266 @@
+"""From a recording to averaged revolutions: what the estimators see.
+
+An observation is the mean reading over exactly one turn of a joint. Over a whole turn the mean speed is 2π/T whatever
+the servo's vibration, so the vibration is no noise either: the noise's variance comes from what is left of the readings
+once the arm's measured rate is taken out of them. The mean comes first; squaring is the estimator's business.
+
+Nothing doubtful is averaged: whatever does not belong into a calibration raises a Fault with a name of its own.
+"""
+
+from collections.abc import Collection, Iterator, Sequence
+from contextlib import suppress
+from dataclasses import dataclass, replace
+from typing import Any
+
+import numpy as np
+
+from rig.config.models import ObservationSection
+from rig.data.run_file import RunData
+from rig.errors import Fault
+from rig.observation.average import Average, Stream, average, between, on_the_arms_clock
+from rig.observation.revolution import Revolution, arm_states_lost, describe, find_revolution
+from rig.observation.timebase import ArmMotion, Array, TimeBase
+
+STUCK_REPEATS = 10  # equal readings in a row, of a sensor whose noise exceeds a count
+REST_SETTLING_S = 0.2  # kept away from either end of a rest
+MAX_REST_TRAVEL_RAD = 1e-3
+MIN_REST_SAMPLES = 20
+MIN_RESTS = 3  # to tell whether the bias drifts
+MAX_READING_RATIO = 4.0  # reading over turn rate, either way: no gyroscope is that far off, a wrong unit or range is
+
+
+@dataclass(frozen=True, slots=True)
+class Observation:
+    """One revolution: sweep `sweep` of the plan turned `joint_name` in `direction` at the mean speed 2π/T.
+
+    `axis` ("x", "y", "z") and `sign` name the sensor axis nominally along the turn; `axis_flange` (3,) is the unit
+    vector of the turn in the flange frame by the measured joints; `speed_std_rad_s` comes from arm states too far apart
+    to tell the turn's ends exactly; `lost` samples are missing from the average.
+    """
+
+    sweep: int
+    joint_name: str
+    direction: str
+    axis: str
+    sign: int
+    axis_flange: Array
+    speed_rad_s: float
+    speed_std_rad_s: float
+    lost: int
+    average: Average
+
+
+@dataclass(frozen=True, slots=True)
+class SensorObservations:
+    """What a recording tells of a sensor: its clock, its revolutions, its rests (mean readings at zero rate)."""
+
+    time_base: TimeBase
+    revolutions: tuple[Observation, ...]
+    rests: tuple[Average, ...]
+
+
+def observe(
+    run: RunData, sensor: str, settings: ObservationSection, superseded: Collection[int] = ()
+) -> SensorObservations:
+    """Average every finished sweep of a recording. An interrupted sweep has no `sweep_finished` and is left out.
+
+    So are the sweeps whose index is in `superseded`: a later recording of the same run repeats them.
+    Raises Fault `incomplete_revolution`, `arm_states_lost`, `slider_below_100`, `speed_not_constant`,
+    `other_joint_moved`, `lost_samples`, `saturation`, `stuck_sensor`, `stuck_axis`, `wrong_axis`, `wrong_sign`,
+    `wrong_unit`, `no_motion`, `not_finite`, `time_base_not_found`, `board_clock_restarted`, `duplicated_samples`.
+    """
+    motion = ArmMotion(run.arm)
+    stream = on_the_arms_clock(run.samples[sensor], run.sensors[sensor], motion)
+    revolutions = [
+        _revolution(stream, motion, sweep, window, settings)
+        for sweep, window in finished(run, "sweep")
+        if sweep["index"] not in superseded
+    ]
+    rests = tuple(rest for _, window in finished(run, "rest") if (rest := _rest(stream, motion, window)))
+    drift = bias_drift(rests)
+    return SensorObservations(
+        stream.clock,
+        tuple(replace(o, average=_drifting(o.average, drift)) for o in revolutions),
+        tuple(_drifting(rest, drift) for rest in rests),
+    )
+
+
+def finished_sweeps(run: RunData) -> frozenset[int]:
+    """The indices of the sweeps a recording holds from start to end."""
+    return frozenset(sweep["index"] for sweep, _ in finished(run, "sweep"))
+
+
+def sound_sweeps(run: RunData, settings: ObservationSection) -> frozenset[int]:
+    """Those of the finished sweeps that `observe` accepts for every sensor: a resumed run need not repeat them."""
+    return frozenset.intersection(finished_sweeps(run), *(_sound_for(run, sensor, settings) for sensor in run.sensors))
+
+
+def _sound_for(run: RunData, sensor: str, settings: ObservationSection) -> frozenset[int]:
+    sound = set()
+    try:
+        motion = ArmMotion(run.arm)
+        stream = on_the_arms_clock(run.samples[sensor], run.sensors[sensor], motion)
+    except Fault:
+        return frozenset()
+    for sweep, window in finished(run, "sweep"):
+        with suppress(Fault):
+            _revolution(stream, motion, sweep, window, settings)
+            sound.add(sweep["index"])
+    return frozenset(sound)
+
+
+def _revolution(
+    stream: Stream,
+    motion: ArmMotion,
+    sweep: dict[str, Any],
+    window: tuple[float, float],
+    settings: ObservationSection,
+) -> Observation:
+    return _observation(stream, motion, sweep, find_revolution(motion, sweep, window, settings), settings)
+
+
+def bias_drift(rests: Sequence[Average]) -> Array:
+    """(3,) variance in (rad/s)² by which the bias differs from rest to rest, beyond what the noise of a rest explains.
+
+    Zero unless that is significant over all axes (χ² at 0.999), so that a steady sensor is left alone.
+    """
+    from scipy.special import chdtri
+
+    if len(rests) < MIN_RESTS:
+        return np.zeros(3)
+    means = np.array([rest.mean_rad_s for rest in rests])
+    noise = np.array([rest.variance_rad2_s2 for rest in rests]).mean(axis=0)
+    scatter = means.var(axis=0, ddof=1)
+    freedom = len(rests) - 1
+    significant = freedom * float(np.sum(scatter / noise)) > chdtri(3 * freedom, 0.001)
+    return np.maximum(scatter - noise, 0.0) if significant else np.zeros(3)
+
+
+def _drifting(average: Average, drift: Array) -> Average:
+    return replace(average, variance_rad2_s2=average.variance_rad2_s2 + drift)
+
+
+def finished(run: RunData, kind: str) -> Iterator[tuple[dict[str, Any], tuple[float, float]]]:
+    """(description, (start, end) in controller time) of every sweep or rest that was begun and finished."""
+    started = None
+    for event in run.events:
+        if event.name == f"{kind}_started":
+            started = event.controller_time_s
+        elif event.name == f"{kind}_finished" and started is not None and event.controller_time_s is not None:
+            yield event.detail.get(kind, {}), (started, event.controller_time_s)
+            started = None
+
+
+def _observation(
+    stream: Stream, motion: ArmMotion, sweep: dict[str, Any], turn: Revolution, settings: ObservationSection
+) -> Observation:
+    where = describe(sweep)
+    inside = between(stream, turn.start_s, turn.end_s)
+    lost = _lost(stream, inside, where, settings)
+    _check_saturation(stream, inside, where)
+    _check_stuck(stream, inside, where)
+    covered = motion.covered(stream.time_s[inside])
+    if covered.mean() < 0.5:
+        raise arm_states_lost(where, "more than half the time")
+    excess = motion.rate(stream.time_s[inside]) @ turn.axis_flange - turn.speed_rad_s
+    averaged = average(stream, inside, turn.duration_s, excess, covered)
+    expected = np.array(stream.sensor.mounting) @ turn.axis_flange
+    turned = averaged.mean_rad_s - stream.clock.zero_rate_rad_s
+    _check_direction(turned, expected, where, settings)
+    _check_unit(float(np.linalg.norm(turned)) / turn.speed_rad_s, where)
+    nearest = int(np.argmax(np.abs(expected)))
+    return Observation(
+        sweep=sweep["index"],
+        joint_name=sweep["joint_name"],
+        direction=sweep["direction"],
+        axis="xyz"[nearest],
+        sign=1 if expected[nearest] > 0 else -1,
+        axis_flange=turn.axis_flange,
+        speed_rad_s=turn.speed_rad_s,
+        speed_std_rad_s=turn.speed_std_rad_s,
+        lost=lost,
+        average=averaged,
+    )
+
+
+def _rest(stream: Stream, motion: ArmMotion, window: tuple[float, float]) -> Average | None:
+    """The mean reading of a rest; None where the arm did not stand still or the rest is too short to say anything."""
+    start, end = window[0] + REST_SETTLING_S, window[1] - REST_SETTLING_S
+    inside = between(stream, start, end)
+    states = motion.states[(motion.time_s >= start) & (motion.time_s <= end)]
+    if inside.stop - inside.start < MIN_REST_SAMPLES or len(states) == 0:
+        return None
+    if np.ptp(states["q_rad"], axis=0).max() > MAX_REST_TRAVEL_RAD:
+        return None
+    count = inside.stop - inside.start
+    return average(stream, inside, end - start, np.zeros(count), np.ones(count, dtype=np.bool_))
+
+
+def _lost(stream: Stream, inside: slice, where: str, settings: ObservationSection) -> int:
+    """Samples missing in the revolution: by sequence number, and by time for those the board itself did not see."""
+    around = slice(max(inside.start - 1, 0), inside.stop + 1)
+    steps = np.diff(stream.raw["sequence"][around])  # modulo 2³², like the board's counter
+    intervals = np.diff(stream.board_time_s[around])
+    covered = inside.start > 0 and inside.stop < len(stream.raw) and len(steps) > 1
+    by_sequence = int(steps.astype(np.int64).sum()) - len(steps)
+    by_time = int(np.sum(np.round(intervals / np.median(intervals)) - 1)) if covered else 0
+    lost = max(by_sequence, by_time)
+    count = inside.stop - inside.start
+    if not covered or lost > settings.max_lost_fraction * (count + lost):
+        what = f"{lost} of {count + lost} samples are missing" if covered else "the samples do not cover the revolution"
+        raise Fault(
+            "lost_samples",
+            f"in {where} {what}, {100 * settings.max_lost_fraction:g} % may",
+            "Check the cable to the board and the load of this computer, then repeat the sweep",
+        )
+    return lost
+
+
+def _check_saturation(stream: Stream, inside: slice, where: str) -> None:
+    full = stream.sensor.full_scale_counts
+    saturated = np.any(np.abs(stream.raw["counts"][inside].astype(np.int64)) >= full, axis=1)
+    if saturated.any():
+        raise Fault(
+            "saturation",
+            f"in {where} {int(saturated.sum())} samples stand at the end of the sensor's range",
+            "Choose a wider range or a slower sweep",
+        )
+
+
+def _check_stuck(stream: Stream, inside: slice, where: str) -> None:
+    """A sensor with noise above one count does not repeat itself on all axes many times in a row."""
+    if np.median(np.abs(np.diff(stream.raw["counts"], axis=0)), axis=0).min() < 1:
+        return
+    changes = np.flatnonzero(np.any(np.diff(stream.raw["counts"][inside], axis=0), axis=1))
+    longest = int(np.max(np.diff(changes, prepend=-1, append=inside.stop - inside.start - 1)))
+    if longest > STUCK_REPEATS:
+        raise Fault(
+            "stuck_sensor",
+            f"in {where} the gyroscope repeats one reading {longest} times",
+            "Check the sensor's supply and its bus wiring, then repeat the sweep",
+        )
+
+
+def _check_direction(turned: Array, expected: Array, where: str, settings: ObservationSection) -> None:
+    """The reading, less its value at rest, must point along the turn as the nominal mounting has it."""
+    cosine = float(turned @ expected / (np.linalg.norm(turned) * np.linalg.norm(expected)))
+    angle = float(np.degrees(np.arccos(np.clip(cosine, -1, 1))))
+    limit = settings.max_axis_deviation_deg
+    if angle <= limit:
+        return
+    opposite = angle >= 180 - limit
+    what = "opposite to the turn" if opposite else f"{angle:.0f}° away from the turn, {limit:g}° is allowed"
+    raise Fault(
+        "wrong_sign" if opposite else "wrong_axis",
+        f"in {where} the gyroscope reads {what}",
+        "Correct the sensor's mounting in the configuration, or how it is fixed to the flange",
+    )
+
+
+def _check_unit(ratio: float, where: str) -> None:
+    if not 1 / MAX_READING_RATIO < ratio < MAX_READING_RATIO:
+        raise Fault(
+            "wrong_unit",
+            f"in {where} the gyroscope reads {ratio:.3g} times the turn rate",
+            "Check the sensor's range and sensitivity, and that readings are in rad/s",
+        )

@@ -1,0 +1,160 @@
+"""The arm's side of an observation: when a joint turned through exactly one revolution, and whether properly."""
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from rig.config.models import ObservationSection
+from rig.errors import Fault
+from rig.observation.timebase import MAX_STATE_STEP_S, ArmMotion, Array
+
+SMOOTHING_S = 0.05  # of the joint's rate before it is judged constant or not
+MAX_STATE_GAP_S = 1.0  # over less, a halt shows in the angle that is missing afterwards
+MAX_OTHER_TRAVEL_RAD = 0.01
+MIN_SPEED_FRACTION = 0.995
+
+
+@dataclass(frozen=True, slots=True)
+class Revolution:
+    """Exactly 2π of joint travel between two controller times.
+
+    `duration_std_s` is what interpolating between arm states leaves uncertain; `axis_flange` (3,) is the unit vector of
+    the turn in the flange frame.
+    """
+
+    start_s: float
+    end_s: float
+    duration_std_s: float
+    axis_flange: Array
+
+    @property
+    def duration_s(self) -> float:
+        """T."""
+        return self.end_s - self.start_s
+
+    @property
+    def speed_rad_s(self) -> float:
+        """2π/T: the mean speed, whatever the vibration."""
+        return float(2 * np.pi / self.duration_s)
+
+    @property
+    def speed_std_rad_s(self) -> float:
+        """Standard deviation of the mean speed."""
+        return self.speed_rad_s * self.duration_std_s / self.duration_s
+
+
+def find_revolution(
+    motion: ArmMotion, sweep: Mapping[str, Any], window: tuple[float, float], settings: ObservationSection
+) -> Revolution:
+    """The revolution of one sweep (as its event describes it) between two controller times.
+
+    Its ends are where the recorded joint angle crosses the ends of `revolution_rad`. Raises Fault
+    `incomplete_revolution`, `arm_states_lost`, `slider_below_100`, `speed_not_constant`, `other_joint_moved`.
+    """
+    where, (low, high) = describe(sweep), sweep["revolution_rad"]
+    begin, end = np.searchsorted(motion.time_s, window)
+    states = motion.states[max(begin - 1, 0) : end + 1]
+    time_s, angle = states["time_s"], states["q_rad"][:, sweep["joint"]]
+    travelled = angle - low if sweep["direction"] == "ccw" else high - angle
+    first, last = _inside(travelled, high - low, where)
+    turning = states[first : last + 1]
+    gap = float(np.diff(time_s[first - 1 : last + 2]).max())
+    if gap > MAX_STATE_GAP_S:
+        raise arm_states_lost(where, f"for {gap:.2f} s")
+    _check_slider(turning, where)
+    _check_speed(time_s[first : last + 1], travelled[first : last + 1], where, settings)
+    _check_other_joints(turning, sweep["joint"], where)
+    start_s, end_s, deviation_s = _ends(time_s, travelled, first, last, high - low)
+    rate = motion.rate(turning["time_s"]).mean(axis=0)
+    return Revolution(start_s, end_s, deviation_s, rate / np.linalg.norm(rate))
+
+
+def describe(sweep: Mapping[str, Any]) -> str:
+    """How messages name a sweep."""
+    return f"sweep {sweep['index']} ({sweep['joint_name']} {sweep['direction']})"
+
+
+def arm_states_lost(where: str, extent: str) -> Fault:
+    """The error for a sweep whose motion is not known well enough."""
+    return Fault(
+        "arm_states_lost",
+        f"in {where} the arm's states are missing {extent}",
+        "Check the network to the robot and the load of this computer, then repeat the sweep",
+    )
+
+
+def _inside(travelled: Array, turn_rad: float, where: str) -> tuple[int, int]:
+    """Indices of the first and the last state within the revolution, which has states before and after it."""
+    entries = np.flatnonzero((travelled[:-1] < 0) & (travelled[1:] >= 0)) + 1
+    exits = np.flatnonzero((travelled[:-1] < turn_rad) & (travelled[1:] >= turn_rad))
+    if len(entries) and len(exits) and exits[0] > entries[0]:
+        return int(entries[0]), int(exits[0])
+    turned = float(np.ptp(travelled)) if len(travelled) else 0.0
+    raise Fault(
+        "incomplete_revolution",
+        f"in {where} the joint turned {np.degrees(turned):.0f}° and not through the whole revolution",
+        "Repeat the sweep; resume the run if it was interrupted",
+    )
+
+
+def _ends(time_s: Array, travelled: Array, first: int, last: int, turn_rad: float) -> tuple[float, float, float]:
+    """When the revolution begins and ends, and the standard deviation of the time between, s.
+
+    Between two neighbouring states the angle is interpolated. Where states are missing it might already be in a ramp,
+    so there the straight line through the whole revolution says when, but for the ripple about it.
+    """
+    t, angle = time_s[first : last + 1], travelled[first : last + 1]
+    speed, offset = np.polyfit(t - t[0], angle, 1)
+    ripple = float(np.std(angle - offset - speed * (t - t[0])))
+    unsteady = float(np.sqrt(np.mean((np.diff(angle) / np.diff(t) - speed) ** 2)))
+    ends, missed = [], []
+    for before, level in ((first - 1, 0.0), (last, turn_rad)):
+        step_s = time_s[before + 1] - time_s[before]
+        if step_s <= MAX_STATE_STEP_S:
+            share = (level - travelled[before]) / (travelled[before + 1] - travelled[before])
+            ends.append(time_s[before] + share * step_s)
+            # A ripple of RMS r whose rate has RMS v accelerates by about v²/r; a chord misses h²/8 times that.
+            missed.append(min(ripple, step_s**2 / 8 * unsteady**2 / ripple) if ripple > 0 else 0.0)
+        else:
+            ends.append(t[0] + (level - offset) / speed)
+            missed.append(ripple)
+    return float(ends[0]), float(ends[1]), float(np.linalg.norm(missed) / speed)
+
+
+def _check_slider(turning: NDArray[Any], where: str) -> None:
+    slowest = float(min(turning["target_speed_fraction"].min(), turning["speed_scaling"].min()))
+    if slowest < MIN_SPEED_FRACTION:
+        raise Fault(
+            "slider_below_100",
+            f"in {where} the controller ran at {100 * slowest:.0f} % of the programmed speed",
+            "Set the speed slider on the pendant to 100 %, then repeat the sweep",
+        )
+
+
+def _check_speed(time_s: Array, travelled: Array, where: str, settings: ObservationSection) -> None:
+    """The joint's rate, smoothed, must stay near its mean: vibration passes, a halt on the way does not."""
+    middles = np.arange(time_s[0] + SMOOTHING_S / 2, time_s[-1] - SMOOTHING_S / 2, SMOOTHING_S / 5)
+    ahead = np.interp(middles + SMOOTHING_S / 2, time_s, travelled)
+    behind = np.interp(middles - SMOOTHING_S / 2, time_s, travelled)
+    mean = (travelled[-1] - travelled[0]) / (time_s[-1] - time_s[0])
+    deviation = float(np.max(np.abs((ahead - behind) / SMOOTHING_S / mean - 1), initial=0.0))
+    if deviation > settings.max_speed_deviation:
+        raise Fault(
+            "speed_not_constant",
+            f"in {where} the joint's speed strayed {100 * deviation:.0f} % from its mean, "
+            f"{100 * settings.max_speed_deviation:.0f} % is allowed",
+            "Repeat the sweep without pausing it; if it happens again check payload and acceleration",
+        )
+
+
+def _check_other_joints(turning: NDArray[Any], joint: int, where: str) -> None:
+    others = np.delete(np.ptp(turning["q_rad"], axis=0), joint)
+    if others.max() > MAX_OTHER_TRAVEL_RAD:
+        raise Fault(
+            "other_joint_moved",
+            f"in {where} another joint moved by {np.degrees(others.max()):.1f}°",
+            "Let nothing else move the arm during a sweep, then repeat it",
+        )

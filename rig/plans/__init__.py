@@ -1,0 +1,1 @@
+"""Procedure → steps: what the arm will do, before it does it; pure."""

@@ -1,0 +1,104 @@
+"""Passes what arrives on to the recording and counts it, for the operator's view and to see that samples flow."""
+
+import threading
+from collections import defaultdict, deque
+from dataclasses import dataclass, field
+
+import numpy as np
+
+from firmware_host.client import SampleBatch
+from firmware_host.samples import SAMPLE_DTYPE
+from rig.arm.state import ArmState
+from rig.data.run_file import RunRecorder
+
+Vector = tuple[float, float, float]
+KEPT_PARTS = 3
+
+
+@dataclass(slots=True)
+class SensorCount:
+    """What one sensor has delivered so far. `lost` counts the gaps in its sequence numbers."""
+
+    name: str
+    sensitivity_rad_s_per_count: float
+    samples: int = 0
+    lost: int = 0
+    rate_rad_s: Vector | None = None
+    _next_sequence: int = 0
+
+    def add(self, batch: SampleBatch) -> None:
+        """Count one batch; its mean becomes `rate_rad_s`."""
+        sequence = batch.samples["sequence"]
+        last = int(sequence[-1])
+        self.lost += last + 1 - self._next_sequence - len(sequence)
+        self._next_sequence = last + 1
+        self.samples += len(sequence)
+        x, y, z = (batch.samples["counts"].mean(axis=0) * self.sensitivity_rad_s_per_count).tolist()
+        self.rate_rad_s = (x, y, z)
+
+
+@dataclass(frozen=True, slots=True)
+class _Part:
+    """What came between two calls of `keep`."""
+
+    batches: defaultdict[int, list[np.ndarray]]
+    states: list[ArmState]
+
+
+@dataclass(slots=True)
+class Monitor:
+    """Fed by the board's and the arm's reader threads, read by the procedure's. `counts` by the board's sensor index.
+
+    What comes before there is a `recorder` is not kept. From the first `keep` on, all that came since the last
+    `KEPT_PARTS` of them is also held in memory.
+    """
+
+    counts: dict[int, SensorCount] = field(default_factory=dict)
+    recorder: RunRecorder | None = None
+    _kept: deque[_Part] = field(default_factory=lambda: deque(maxlen=KEPT_PARTS))
+    _lock: threading.Lock = field(default_factory=threading.Lock)
+
+    def on_samples(self, batch: SampleBatch) -> None:
+        """Take a batch of samples of a sensor known in `counts`."""
+        with self._lock:
+            count = self.counts[batch.sensor]
+            count.add(batch)
+            if self._kept:
+                self._kept[-1].batches[batch.sensor].append(batch.samples)
+        if self.recorder is not None:
+            self.recorder.add_samples(count.name, batch.samples)
+
+    def on_state(self, state: ArmState) -> None:
+        """Take a state of the arm."""
+        with self._lock:
+            if self._kept:
+                self._kept[-1].states.append(state)
+        if self.recorder is not None:
+            self.recorder.add_arm_state(state)
+
+    def keep(self) -> None:
+        """From now on hold what comes, as a part of its own; the oldest part goes when there are too many."""
+        with self._lock:
+            self._kept.append(_Part(defaultdict(list), []))
+
+    def kept(self, sensor: int) -> tuple[np.ndarray, list[ArmState], int]:
+        """All samples (n,) SAMPLE_DTYPE of one sensor and all arm states that are held, and how many of these are new.
+
+        New are those since the latest `keep`.
+        """
+        with self._lock:
+            batches = [batch for part in self._kept for batch in part.batches[sensor]]
+            states = [state for part in self._kept for state in part.states]
+            new = len(self._kept[-1].states) if self._kept else 0
+        return np.concatenate(batches or [np.empty(0, SAMPLE_DTYPE)]), states, new
+
+    def totals(self) -> tuple[int, int, Vector | None]:
+        """Samples received, samples lost, and the newest mean reading of the first sensor in rad/s."""
+        with self._lock:
+            counts = list(self.counts.values())
+            return sum(c.samples for c in counts), sum(c.lost for c in counts), counts[0].rate_rad_s
+
+    def silent(self) -> list[str]:
+        """The sensors that have delivered nothing yet."""
+        with self._lock:
+            return [count.name for count in self.counts.values() if count.samples == 0]

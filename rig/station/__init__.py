@@ -1,0 +1,1 @@
+"""Whoever stands at the rig: what the operator sees and is asked."""

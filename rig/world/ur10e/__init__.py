@@ -1,0 +1,1 @@
+"""The simulated UR10e controller: its joints, its programs, its servers."""

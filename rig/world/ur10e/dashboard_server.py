@@ -1,0 +1,185 @@
+"""The dashboard server, port 29999: one line in, one line out.
+
+Dashboard Server manual of the maker, e-Series. In local control it answers questions and stops; it starts nothing.
+"""
+
+from collections.abc import Callable
+from pathlib import PurePosixPath
+
+from rig.world.ur10e.modes import RobotMode, RuntimeState, SafetyMode
+from rig.world.ur10e.robot import Robot
+
+PORT = 29999
+PROGRAMS = ("wait_program.urp",)
+TOO_EARLY = (
+    "Cannot unlock protective stop until 5s after occurrence. Always inspect cause of protective stop before unlocking"
+)
+
+
+class WaitProgram:
+    """The one program on the simulated controller's disk: it waits for ever."""
+
+    def __init__(self, name: str) -> None:
+        self.name = name
+
+    def step(self) -> bool:
+        return True
+
+
+class DashboardSession:
+    """One connection to the dashboard."""
+
+    def __init__(self, robot: Robot) -> None:
+        self._robot = robot
+        self.closing = False
+        self._buffer = bytearray()
+        self._role = "none"
+        self._questions: dict[str, Callable[[], str]] = {
+            "polyscopeversion": self._polyscope,
+            "version": self._version,
+            "robotmode": self._robotmode,
+            "safetymode": lambda: f"Safetymode: {robot.safety_mode.name}",
+            "safetystatus": lambda: f"Safetystatus: {robot.safety_mode.name}",
+            "running": lambda: f"Program running: {str(self._playing).lower()}",
+            "programstate": self._program_state,
+            "get loaded program": self._loaded_program,
+            "isprogramsaved": lambda: f"true {robot.loaded_program}",
+            "get serial number": lambda: robot.identity.serial_number,
+            "get robot model": lambda: "UR10",
+            "is in remote control": lambda: str(robot.remote_control).lower(),
+            "get operational mode": lambda: "AUTOMATIC" if robot.remote_control else "MANUAL",
+            "getuserrole": self._get_role,
+            "stop": self._stop,
+            "pause": lambda: "Pausing program" if robot.pause() else "Failed to execute: pause",
+            "popup": lambda: "showing popup",
+            "close popup": lambda: "closing popup",
+            "close safety popup": lambda: "closing safety popup",
+            "addtolog": lambda: "Added log message",
+            "generate flight report": lambda: "Flight Report generated with id: 1",
+            "generate support file": lambda: "Completed successfully: ur_support.zip",
+            "clear operational mode": lambda: "No longer controlling the operational mode.",
+            "shutdown": self._shutdown,
+            "power off": self._power_off,
+        }
+        self._orders: dict[str, Callable[[], str]] = {
+            "play": self._play,
+            "power on": self._power_on,
+            "brake release": self._brake_release,
+            "unlock protective stop": self._unlock,
+            "restart safety": self._restart_safety,
+        }
+        self._worded: dict[str, Callable[[str], str]] = {
+            "load installation": lambda name: f"Loading installation: {name}",
+            "load": self._load,
+            "popup": lambda text: "showing popup",
+            "addtolog": lambda text: "Added log message",
+            "set operational mode": lambda mode: f"Operational mode '{mode}' is set",
+            "setuserrole": self._set_role,
+            "generate flight report": lambda kind: "Flight Report generated with id: 1",
+            "generate support file": lambda folder: f"Completed successfully: {folder}/ur_support.zip",
+        }
+
+    def greeting(self) -> bytes:
+        return b"Connected: Universal Robots Dashboard Server\n"
+
+    def receive(self, data: bytes) -> bytes:
+        self._buffer += data
+        *lines, rest = self._buffer.split(b"\n")
+        self._buffer = bytearray(rest)
+        return b"".join(self.answer(line.decode(errors="replace").strip()).encode() + b"\n" for line in lines)
+
+    def tick(self) -> bytes:
+        return b""
+
+    def closed(self) -> None:
+        pass
+
+    def answer(self, line: str) -> str:
+        """The reply to one command."""
+        key = line.lower()
+        if key == "quit":
+            self.closing = True
+            return "Disconnected"
+        if key in self._questions:
+            return self._questions[key]()
+        if key in self._orders:
+            return self._orders[key]() if self._robot.remote_control else f"Failed to execute: {key}"
+        for words, handler in self._worded.items():
+            if key.startswith(words + " "):
+                return handler(line[len(words) :].strip())
+        return f"could not understand: '{line}'"
+
+    # -- questions ---------------------------------------------------------------------------------------------
+    @property
+    def _playing(self) -> bool:
+        return self._robot.runtime_state in (RuntimeState.PLAYING, RuntimeState.RESUMING)
+
+    def _version(self) -> str:
+        return ".".join(str(part) for part in self._robot.identity.polyscope)
+
+    def _polyscope(self) -> str:
+        return f"URSoftware {self._version()} (simulated)"
+
+    def _robotmode(self) -> str:
+        return f"Robotmode: {self._robot.robot_mode.name}"
+
+    def _program_state(self) -> str:
+        name = PurePosixPath(self._robot.program_name).name or "<unnamed>"
+        paused = self._robot.runtime_state in (RuntimeState.PAUSING, RuntimeState.PAUSED)
+        return f"{'PLAYING' if self._playing else 'PAUSED' if paused else 'STOPPED'} {name}"
+
+    def _loaded_program(self) -> str:
+        name = self._robot.loaded_program
+        return f"Loaded program: {name}" if name else "No program loaded"
+
+    # -- orders ------------------------------------------------------------------------------------------------
+    def _stop(self) -> str:
+        self._robot.stop_program("stopped from the dashboard")
+        return "Stopped"
+
+    def _play(self) -> str:
+        if self._robot.resume():
+            return "Starting program"
+        if self._robot.runtime_state == RuntimeState.STOPPED and self._robot.loaded_program and self._robot.ready:
+            self._robot.start_program(WaitProgram(self._robot.loaded_program))
+            return "Starting program"
+        return "Failed to execute: play"
+
+    def _load(self, name: str) -> str:
+        if PurePosixPath(name).name not in PROGRAMS:
+            return f"File not found: {name}"
+        self._robot.loaded_program = name
+        return f"Loading program: {name}"
+
+    def _power_on(self) -> str:
+        self._robot.power_on()
+        return "Powering on"
+
+    def _power_off(self) -> str:
+        self._robot.power_off()
+        return "Powering off"
+
+    def _brake_release(self) -> str:
+        self._robot.brake_release()
+        return "Brake releasing"
+
+    def _unlock(self) -> str:
+        return "Protective stop releasing" if self._robot.unlock_protective_stop() else TOO_EARLY
+
+    def _restart_safety(self) -> str:
+        self._robot.power_off()
+        if self._robot.safety_mode == SafetyMode.PROTECTIVE_STOP:
+            self._robot.safety_mode = SafetyMode.NORMAL
+        return "Restarting safety"
+
+    def _shutdown(self) -> str:
+        if self._robot.robot_mode != RobotMode.POWER_OFF:
+            self._robot.power_off()
+        return "Shutting down"
+
+    def _get_role(self) -> str:
+        return self._role.upper()
+
+    def _set_role(self, role: str) -> str:
+        self._role = role
+        return f"Setting user role: {role}"

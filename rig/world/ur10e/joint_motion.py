@@ -1,0 +1,161 @@
+"""The simulated joints: a trajectory played with a time scaling (speed slider, pause), known at any instant."""
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from math import nan
+
+from rig.world.clock import TICK_S
+from rig.world.ur10e.ripple import Ripple
+from rig.world.ur10e.trajectory import ZERO, Joints, Trajectory, change_speed, line, rest
+
+# ROS 2 description of the UR10e, from the 5.8 manual: base and shoulder 120°/s, elbow and wrists 180°/s.
+JOINT_SPEED_LIMIT_RAD_S: Joints = (2.0943951, 2.0943951, 3.1415927, 3.1415927, 3.1415927, 3.1415927)
+SCALING_RATE_PER_S = 4.0  # the speed fraction follows the slider, and pause and play, in at most a quarter second
+
+
+@dataclass(frozen=True, slots=True)
+class Instant:
+    """The six joints at one time: what is asked of them, and what they do."""
+
+    target_q_rad: Joints
+    target_qd_rad_s: Joints
+    target_qdd_rad_s2: Joints
+    q_rad: Joints
+    qd_rad_s: Joints
+
+
+class Motion:
+    """Positions and velocities of the six joints. `step` makes a tick; `at` answers for any time inside the last one.
+
+    Three angles are in play: `target` (what a program asked for), `smooth` (the same with the servo's static error
+    taken out, so that the joint comes to rest exactly on target) and the joint's own, with the ripple.
+    """
+
+    def __init__(self, start_rad: Sequence[float], ripples: Sequence[Ripple], encoder_step_rad: float = 0.0) -> None:
+        self._ripples = tuple(ripples)
+        self._encoder_step_rad = encoder_step_rad
+        self._start_s = 0.0
+        self._trajectory = rest(tuple(start_rad))
+        self._offset, self._gain = self._map(tuple(start_rad), tuple(start_rad))
+        self._smooth, self._angles = [nan] * 6, [0.0] * 6  # what was worked out last, joint by joint
+        self.still = True  # nothing moved in the whole of the last tick
+        self._scaled = True  # a stop is not stretched by the speed slider
+        self._trajectory_s = self._begin_s = 0.0
+        self._fraction = self._begin_fraction = 1.0
+        self.fraction_wanted = 1.0
+        self._now: Instant | None = None  # worked out when somebody asks: most ticks nobody does
+
+    # -- what the joints do now ---------------------------------------------------------------------------------
+    @property
+    def fraction(self) -> float:
+        """The time scaling in force: 1 at full speed, 0 when paused."""
+        return self._fraction
+
+    @property
+    def standing(self) -> bool:
+        """No trajectory is being played (a paused one still is)."""
+        return self._trajectory.over(self._trajectory_s)
+
+    @property
+    def now(self) -> Instant:
+        """The joints at the end of the last tick."""
+        if self._now is None:
+            target, velocity, acceleration = self._trajectory.at(self._trajectory_s)
+            fraction = self._fraction if self._scaled else 1.0
+            q, qd = self._joints(target, velocity, fraction)
+            self._now = Instant(target, tuple(v * fraction for v in velocity), acceleration, q, qd)
+        return self._now
+
+    @property
+    def q_rad(self) -> Joints:
+        return self.now.q_rad
+
+    @property
+    def qd_rad_s(self) -> Joints:
+        return self.now.qd_rad_s
+
+    @property
+    def moving(self) -> bool:
+        return any(self.now.target_qd_rad_s)
+
+    @property
+    def actual_q_rad(self) -> Joints:
+        """The joints' angles as the encoders see them, at the end of the last tick."""
+        step = self._encoder_step_rad
+        return tuple(round(q / step) * step for q in self.q_rad) if step else self.q_rad
+
+    def at(self, time_s: float) -> tuple[Joints, Joints]:
+        """True angles and speeds of the joints at a virtual time inside the last tick."""
+        elapsed = min(max(time_s - self._start_s, 0.0), TICK_S)
+        if self._scaled:
+            slope = (self._fraction - self._begin_fraction) / TICK_S
+            fraction = self._begin_fraction + slope * elapsed
+            along = self._begin_s + (self._begin_fraction + 0.5 * slope * elapsed) * elapsed
+        else:
+            fraction, along = 1.0, self._begin_s + elapsed
+        target, velocity, _ = self._trajectory.at(along)
+        return self._joints(target, velocity, fraction)
+
+    def _joints(self, target: Joints, velocity: Joints, fraction: float) -> tuple[Joints, Joints]:
+        smooth = [o + g * p for o, g, p in zip(self._offset, self._gain, target, strict=True)]
+        for joint, u in enumerate(smooth):
+            if self._smooth[joint] != u:  # most moves turn few joints
+                self._smooth[joint], self._angles[joint] = u, self._ripples[joint].angle(u)
+        q = tuple(self._angles)
+        qd = tuple(
+            r.gain(u) * g * v * fraction if v else 0.0
+            for r, u, g, v in zip(self._ripples, smooth, self._gain, velocity, strict=True)
+        )
+        return q, qd
+
+    # -- one tick ------------------------------------------------------------------------------------------------
+    def step(self, end_s: float) -> None:
+        """Play one tick, ending at the virtual time `end_s`."""
+        self._start_s = end_s - TICK_S
+        self._begin_s, self._begin_fraction = self._trajectory_s, self._fraction
+        change = self.fraction_wanted - self._fraction
+        limit = SCALING_RATE_PER_S * TICK_S
+        self._fraction += max(-limit, min(limit, change))
+        self.still = self.standing
+        if not self.still:
+            mean = 0.5 * (self._begin_fraction + self._fraction) if self._scaled else 1.0
+            self._trajectory_s += mean * TICK_S
+            self._now = None
+
+    # -- commands ------------------------------------------------------------------------------------------------
+    def move(self, target_rad: Joints, speed_rad_s: float, acceleration_rad_s2: float) -> None:
+        """A moveJ from standstill."""
+        # From where the joints stand: after a stop that need not be where the program wanted them.
+        self.follow(line(self.q_rad, target_rad, speed_rad_s, acceleration_rad_s2, JOINT_SPEED_LIMIT_RAD_S))
+
+    def follow(self, trajectory: Trajectory) -> None:
+        """Any trajectory from standstill that begins where the joints are."""
+        self._offset, self._gain = self._map(self.q_rad, trajectory.end_rad)
+        self._play(trajectory, scaled=True)
+
+    def speed(self, qd_rad_s: Joints, acceleration_rad_s2: float) -> None:
+        """A speedJ, from whatever the joints do now: to this velocity, and on."""
+        wanted = tuple(max(-m, min(m, v)) for v, m in zip(qd_rad_s, JOINT_SPEED_LIMIT_RAD_S, strict=True))
+        velocity = self._trajectory.at(self._trajectory_s)[1]
+        self._play(change_speed(self.now.target_q_rad, velocity, wanted, acceleration_rad_s2), scaled=True)
+
+    def stop(self, deceleration_rad_s2: float) -> None:
+        """Bring the joints to rest along their present direction."""
+        if self.moving:
+            stopping = change_speed(self.now.target_q_rad, self.now.target_qd_rad_s, ZERO, deceleration_rad_s2)
+            self._play(stopping, scaled=False)
+        else:
+            self._play(rest(self.now.target_q_rad), scaled=True)
+
+    def _play(self, trajectory: Trajectory, scaled: bool) -> None:
+        self._trajectory, self._scaled, self._trajectory_s = trajectory, scaled, 0.0
+        self._now = None
+
+    def _map(self, start: Joints, end: Joints) -> tuple[Joints, Joints]:
+        """Offset and gain from target to smooth angle, so that the joints stand exactly on both ends of the way."""
+        first = [r.smooth(q) for r, q in zip(self._ripples, start, strict=True)]
+        last = [r.smooth(q) for r, q in zip(self._ripples, end, strict=True)]
+        gain = tuple(
+            (v - u) / (b - a) if abs(b - a) > 1e-6 else 1.0 for u, v, a, b in zip(first, last, start, end, strict=True)
+        )
+        return tuple(u - g * a for u, g, a in zip(first, gain, start, strict=True)), gain

@@ -1,0 +1,140 @@
+"""The primary and secondary interfaces, ports 30001 and 30002: the robot's state ten times a second, and its messages.
+
+Client interface description of the maker for PolyScope 5: packages of a big-endian size (i32), a type (u8) and a
+payload; a robot state (16) holds sub-packages of the same form, a robot message (20) a time stamp, source and kind.
+"""
+
+import struct
+from collections.abc import Callable
+from math import pi
+
+from rig.world.clock import TICKS_PER_SECOND
+from rig.world.ur10e.controller_messages import Message, MessageKind
+from rig.world.ur10e.forward_kinematics import LINKS, flange_pose
+from rig.world.ur10e.joint_motion import JOINT_SPEED_LIMIT_RAD_S
+from rig.world.ur10e.modes import RobotMode, RuntimeState, SafetyMode
+from rig.world.ur10e.robot import TCP_OFFSET, Robot
+from rig.world.ur10e.script_socket import ScriptSession
+from rig.world.ur10e.variables import joint_modes
+
+STATE_HZ = 10
+ROBOT_STATE, ROBOT_MESSAGE = 16, 20
+VERSION_MESSAGE = 3
+UR10 = 2  # robot type
+PROJECT = b"URControl"
+
+
+def package(kind: int, payload: bytes) -> bytes:
+    return struct.pack(">iB", 5 + len(payload), kind) + payload
+
+
+class PrimarySession:
+    """One connection: programs come in, states and messages go out."""
+
+    closing = False
+
+    def __init__(self, robot: Robot) -> None:
+        self._robot = robot
+        self._script = ScriptSession(robot)
+        self._seen = robot.messages.last
+
+    def greeting(self) -> bytes:
+        major, minor, bugfix, build = self._robot.identity.polyscope
+        name = bytes([len(PROJECT)]) + PROJECT
+        version = name + struct.pack(">BBii", major, minor, bugfix, build) + b"01-01-2024, 00:00:00"
+        return _message(self._robot, VERSION_MESSAGE, version) + _state(self._robot, (*STATE, *CONFIGURATION))
+
+    def receive(self, data: bytes) -> bytes:
+        return self._script.receive(data)
+
+    def tick(self) -> bytes:
+        data = b""
+        for message in self._robot.messages.after(self._seen):
+            data += _message(self._robot, message.kind, _content(message))
+            self._seen = message.number
+        if self._robot.tick % (TICKS_PER_SECOND // STATE_HZ) == 0:
+            data += _state(self._robot, STATE)
+        return data
+
+    def closed(self) -> None:
+        pass
+
+
+def _message(robot: Robot, kind: int, payload: bytes) -> bytes:
+    return package(ROBOT_MESSAGE, struct.pack(">QbB", int(robot.time_s * 1e6), -1, kind) + payload)
+
+
+def _content(message: Message) -> bytes:
+    text = message.text.encode()
+    if message.kind == MessageKind.KEY:
+        title = message.title.encode()
+        return struct.pack(">iiB", 0, 0, len(title)) + title + text
+    if message.kind == MessageKind.EXCEPTION:
+        return struct.pack(">ii", *message.place) + text
+    return text
+
+
+Part = tuple[int, Callable[[Robot], bytes]]
+
+
+def _state(robot: Robot, parts: tuple[Part, ...]) -> bytes:
+    return package(ROBOT_STATE, b"".join(package(kind, content(robot)) for kind, content in parts))
+
+
+def _robot_mode(robot: Robot) -> bytes:
+    playing = robot.runtime_state in (RuntimeState.PLAYING, RuntimeState.RESUMING, RuntimeState.STOPPING)
+    return struct.pack(
+        ">Q7?BB3dB",
+        int(robot.time_s * 1e6),
+        True,
+        True,
+        robot.robot_mode != RobotMode.POWER_OFF,
+        robot.safety_mode == SafetyMode.ROBOT_EMERGENCY_STOP,
+        robot.safety_mode == SafetyMode.PROTECTIVE_STOP,
+        playing,
+        robot.runtime_state in (RuntimeState.PAUSING, RuntimeState.PAUSED),
+        robot.robot_mode,
+        0,  # control mode: position
+        robot.speed_slider,
+        robot.motion.fraction,
+        1.0,
+        0,
+    )
+
+
+def _joints(robot: Robot) -> bytes:
+    motion, modes = robot.motion, joint_modes(robot)
+    columns = zip(motion.actual_q_rad, motion.now.target_q_rad, motion.qd_rad_s, modes, strict=True)
+    return b"".join(
+        struct.pack(">3d4fB", q, target, qd, 0.0, 48.0, 28.0, 28.0, mode) for q, target, qd, mode in columns
+    )
+
+
+def _masterboard(robot: Robot) -> bytes:
+    inputs = struct.pack(">iiBBdd", 0, robot.digital_outputs, 0, 0, 0.0, 0.0)
+    outputs = struct.pack(">bbdd", 0, 0, *robot.analog_outputs)
+    return inputs + outputs + struct.pack(">4f3BIBBB", 30.0, 48.0, 0.6, 0.0, robot.safety_mode, 0, 0, 0, 0, 0, 0)
+
+
+def _cartesian(robot: Robot) -> bytes:
+    return struct.pack(">12d", *flange_pose(robot.motion.actual_q_rad), *TCP_OFFSET)
+
+
+LENGTHS, OFFSETS = [a for a, _, _ in LINKS], [d for _, d, _ in LINKS]
+TWISTS = [twist * pi / 2 for _, _, twist in LINKS]
+
+
+def _kinematics(robot: Robot) -> bytes:
+    return struct.pack(">6I24dI", *[1] * 6, *[0.0] * 6, *LENGTHS, *OFFSETS, *TWISTS, 0)
+
+
+def _configuration(robot: Robot) -> bytes:
+    positions = [-2 * pi, 2 * pi] * 6
+    speeds = [value for speed in JOINT_SPEED_LIMIT_RAD_S for value in (speed, 40.0)]
+    defaults = [1.05, 1.4, 0.25, 1.2, 0.5]  # joint speed and acceleration, tool speed and acceleration, radius
+    numbers = [*positions, *speeds, *defaults, *LENGTHS, *OFFSETS, *TWISTS, *[0.0] * 6]
+    return struct.pack(f">{len(numbers)}d4i", *numbers, 0, 0, UR10, 0)
+
+
+STATE: tuple[Part, ...] = ((0, _robot_mode), (1, _joints), (3, _masterboard), (4, _cartesian))
+CONFIGURATION: tuple[Part, ...] = ((5, _kinematics), (6, _configuration))

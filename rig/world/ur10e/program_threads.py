@@ -1,0 +1,99 @@
+"""Programs as cooperative threads: each a generator that gives way once a tick."""
+
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass
+from math import isfinite
+
+from rig.world.ur10e.cartesian import joints_for, straight_line
+from rig.world.ur10e.controller_messages import ProgramError
+from rig.world.ur10e.forward_kinematics import flange_pose
+from rig.world.ur10e.joint_motion import JOINT_SPEED_LIMIT_RAD_S
+from rig.world.ur10e.robot import JOINT_LIMIT_RAD, Robot
+from rig.world.ur10e.trajectory import line
+
+Steps = Iterator[None]
+
+HAND_OVER_RAD_S2 = 4.0  # a move that follows a killed one lets the joints come to rest first
+
+
+@dataclass(frozen=True, slots=True)
+class Move:
+    """A movej or (`straight`) movel to joint angles or (`is_pose`) a pose; rad/s and rad/s², straight: m/s and m/s²."""
+
+    target: tuple[float, ...]
+    speed: float
+    acceleration: float
+    straight: bool = False
+    is_pose: bool = False
+
+
+def finite(values: Sequence[float]) -> None:
+    """Raises `ProgramError` for a number no joint can follow."""
+    if not all(isfinite(value) for value in values):
+        raise ProgramError(f"not a number among {list(values)}")
+
+
+class Threads:
+    """The threads of one program. Only one at a time may move the robot."""
+
+    def __init__(self, robot: Robot) -> None:
+        self.robot = robot
+        self._threads: dict[str, Steps] = {}
+        self._mover: str | None = None
+
+    def run(self, name: str, steps: Steps) -> None:
+        self._threads[name] = steps
+
+    def kill(self, name: str) -> None:
+        self._threads.pop(name, None)
+        self.let_go(name)
+
+    def running(self, name: str) -> bool:
+        return name in self._threads
+
+    def step(self) -> None:
+        """One tick of every thread."""
+        for name, steps in list(self._threads.items()):
+            if next(steps, StopIteration) is StopIteration:
+                self.kill(name)
+
+    def take(self, name: str) -> None:
+        """Claim the joints. Raises `ProgramError` when another thread has them."""
+        if self._mover not in (None, name):
+            raise ProgramError("another thread is already controlling the robot")
+        self._mover = name
+
+    def let_go(self, name: str) -> None:
+        if self._mover == name:
+            self._mover = None
+
+    def move(self, name: str, move: Move) -> Steps:
+        """A move on behalf of the thread `name`: ends when the joints stand at the target."""
+        if not (move.speed > 0.0 and move.acceleration > 0.0):
+            raise ProgramError("a move needs a speed and an acceleration above zero")
+        finite(move.target)
+        self.take(name)
+        yield from self.stopj(name, HAND_OVER_RAD_S2)
+        self.take(name)
+        motion = self.robot.motion
+        if move.straight:
+            pose = move.target if move.is_pose else flange_pose(move.target)
+            trajectory = straight_line(motion.q_rad, pose, move.speed, move.acceleration)
+        else:
+            target = joints_for(move.target, motion.q_rad) if move.is_pose else move.target
+            trajectory = line(motion.q_rad, target, move.speed, move.acceleration, JOINT_SPEED_LIMIT_RAD_S)
+        if any(abs(q) > JOINT_LIMIT_RAD for q in trajectory.end_rad):
+            raise ProgramError("joint position out of limits: a target lies beyond ±360°")
+        motion.follow(trajectory)
+        while not motion.standing:
+            yield
+        self.let_go(name)
+
+    def stopj(self, name: str, deceleration_rad_s2: float) -> Steps:
+        """Bring the joints to rest."""
+        self.take(name)
+        if not self.robot.motion.standing:
+            self.robot.motion.stop(max(deceleration_rad_s2, 0.01))
+            while not self.robot.motion.standing:
+                yield
+        self.let_go(name)

@@ -1,0 +1,257 @@
+"""The simulated UR10e controller without its sockets: modes, safety, registers, programs, and the joints."""
+
+from collections.abc import Sequence
+from dataclasses import dataclass, field
+from math import isfinite
+from typing import Protocol
+
+from rig.world.clock import TICK_S, TICKS_PER_SECOND
+from rig.world.ur10e.controller_messages import MessageKind, Messages, ProgramError
+from rig.world.ur10e.joint_motion import Motion
+from rig.world.ur10e.modes import SAFETY_BITS, RobotMode, RuntimeState, SafetyMode
+
+JOINT_LIMIT_RAD = 6.2831853072 + 1e-6  # every joint ±360°
+PROGRAM_STOP_RAD_S2 = 4.0
+PROTECTIVE_STOP_RAD_S2 = 15.0
+BRAKE_RAD_S2 = 40.0
+UNLOCK_AFTER_S = 5.0
+TCP_OFFSET = (0.0,) * 6  # the tool centre point is the flange
+START_DELAY_S = 0.02  # between the last byte of a program and its first line
+POWER_STEP_S = 0.5  # powering on, releasing the brakes
+
+
+class Program(Protocol):
+    """Something the controller plays, a tick at a time."""
+
+    name: str
+
+    def step(self) -> bool:
+        """One tick; False when the program has ended. Raises `ProgramError`."""
+        ...
+
+
+@dataclass(slots=True)
+class Registers:
+    """General-purpose registers of one direction."""
+
+    bits: list[bool] = field(default_factory=lambda: [False] * 128)
+    ints: list[int] = field(default_factory=lambda: [0] * 48)
+    doubles: list[float] = field(default_factory=lambda: [0.0] * 48)
+
+
+@dataclass(frozen=True, slots=True)
+class Identity:
+    """What the controller says of itself."""
+
+    serial_number: str
+    polyscope: tuple[int, int, int, int]
+
+
+class Robot:
+    """The controller. Everything that changes it is a method here; `step` makes it 2 ms older."""
+
+    def __init__(self, identity: Identity, motion: Motion, remote_control: bool, speed_slider: float) -> None:
+        self.identity = identity
+        self.motion = motion
+        self.remote_control = remote_control
+        self.tick = 0
+        self.robot_mode = RobotMode.RUNNING
+        self.safety_mode = SafetyMode.NORMAL
+        self.runtime_state = RuntimeState.STOPPED
+        self.inputs = Registers()
+        self.outputs = Registers()
+        self.claims: dict[str, object] = {}  # RTDE input → the connection that writes it
+        self.digital_outputs = 0
+        self.analog_outputs = [0.0, 0.0]
+        self.payload_kg = 0.0
+        self.payload_centre_m: tuple[float, ...] = (0.0, 0.0, 0.0)
+        self.loaded_program = ""
+        self.messages = Messages()
+        self.watchdog_s = 0.0  # a program stops when no input came for so long; 0: no watchdog
+        self._last_input_tick = 0
+        self._program: Program | None = None
+        self._start: tuple[int, Program] | None = None
+        self._mode_changes: list[tuple[int, RobotMode]] = []
+        self._stopped_tick = 0
+        self._still_since_tick = 0
+        self.speed_slider = speed_slider
+        self.motion.fraction_wanted = speed_slider
+
+    # -- time ----------------------------------------------------------------------------------------------------
+    @property
+    def time_s(self) -> float:
+        return self.tick / TICKS_PER_SECOND
+
+    def step(self) -> None:
+        """Make one tick: modes due, the program's turn, the joints."""
+        self.tick += 1
+        if self._mode_changes and self._mode_changes[0][0] <= self.tick:
+            self.robot_mode = self._mode_changes.pop(0)[1]
+        if self._start is not None and self._start[0] <= self.tick:
+            self._program, self._start = self._start[1], None
+            self.messages.say(self._program.name, MessageKind.KEY, "PROGRAM_XXX_STARTED")
+            self.runtime_state = RuntimeState.PLAYING
+        if self.runtime_state == RuntimeState.PLAYING:
+            self._play()
+        self.motion.step(self.time_s)
+        if not self.motion.standing:
+            self._still_since_tick = self.tick
+        self._settle()
+
+    def _play(self) -> None:
+        if self.watchdog_s and (self.tick - self._last_input_tick) * TICK_S > self.watchdog_s:
+            self.stop_program("the RTDE watchdog stopped the program")
+            return
+        assert self._program is not None
+        try:
+            running = self._program.step()
+        except ProgramError as error:
+            self.messages.complain(error)
+            self.stop_program("")
+            return
+        if not running:
+            self.stop_program("")
+
+    def _settle(self) -> None:
+        """Finish the states that last until the joints have followed."""
+        if self.runtime_state == RuntimeState.PAUSING and (self.motion.standing or self.motion.fraction == 0.0):
+            self.runtime_state = RuntimeState.PAUSED
+        elif self.runtime_state == RuntimeState.RESUMING:
+            self.runtime_state = RuntimeState.PLAYING
+        elif self.runtime_state == RuntimeState.STOPPING and self.motion.standing:
+            self.runtime_state = RuntimeState.STOPPED
+
+    # -- programs ------------------------------------------------------------------------------------------------
+    @property
+    def program_name(self) -> str:
+        return self._program.name if self._program is not None else self.loaded_program
+
+    @property
+    def ready(self) -> bool:
+        """Powered, brakes released, no safety stop: a program may run."""
+        return self.robot_mode == RobotMode.RUNNING and self.safety_mode in (SafetyMode.NORMAL, SafetyMode.REDUCED)
+
+    def start_program(self, program: Program) -> None:
+        """Play a program instead of what runs now."""
+        if self.runtime_state != RuntimeState.STOPPED:
+            self.stop_program("another program was started")
+        if not self.ready:
+            self.messages.say(f"{program.name} was not started: {self.robot_mode.name}, {self.safety_mode.name}")
+        else:
+            self._start = (self.tick + round(START_DELAY_S * TICKS_PER_SECOND), program)
+
+    def stop_program(self, reason: str) -> None:
+        """Stop the program, and the joints with it."""
+        if reason:
+            self.messages.say(reason)
+        if self._program is not None:
+            self.messages.say(self._program.name, MessageKind.KEY, "PROGRAM_XXX_STOPPED")
+        self._start = None
+        self._program = None
+        self.watchdog_s = 0.0
+        if self.runtime_state != RuntimeState.STOPPED:
+            self.motion.stop(PROGRAM_STOP_RAD_S2)
+            self.motion.fraction_wanted = self.speed_slider
+            self.runtime_state = RuntimeState.STOPPED if self.motion.standing else RuntimeState.STOPPING
+
+    def pause(self) -> bool:
+        """Pause: the move is finished after play."""
+        if self.runtime_state != RuntimeState.PLAYING:
+            return False
+        self.motion.fraction_wanted = 0.0
+        self.runtime_state = RuntimeState.PAUSING
+        return True
+
+    def resume(self) -> bool:
+        """Go on after a pause."""
+        if not self.ready or self.runtime_state not in (RuntimeState.PAUSING, RuntimeState.PAUSED):
+            return False
+        self.motion.fraction_wanted = self.speed_slider
+        self.runtime_state = RuntimeState.RESUMING
+        return True
+
+    # -- safety and power ------------------------------------------------------------------------------------------
+    def protective_stop(self) -> None:
+        if self.safety_mode in (SafetyMode.NORMAL, SafetyMode.REDUCED):
+            self._safety_stop(SafetyMode.PROTECTIVE_STOP)
+
+    def emergency_stop(self) -> None:
+        self._safety_stop(SafetyMode.ROBOT_EMERGENCY_STOP)
+        self._mode_changes = [(self.tick + round(POWER_STEP_S * TICKS_PER_SECOND), RobotMode.POWER_OFF)]
+
+    def _safety_stop(self, mode: SafetyMode) -> None:
+        self.safety_mode = mode
+        self._stopped_tick = self.tick
+        self.stop_program(f"safety mode {mode.name}")
+        self.motion.stop(PROTECTIVE_STOP_RAD_S2)
+
+    def unlock_protective_stop(self) -> bool:
+        """Refused until 5 s after the stop."""
+        if self.safety_mode != SafetyMode.PROTECTIVE_STOP:
+            return True
+        if (self.tick - self._stopped_tick) * TICK_S < UNLOCK_AFTER_S:
+            return False
+        self.safety_mode = SafetyMode.NORMAL
+        return True
+
+    def release(self) -> None:
+        """Pull the emergency stop button out again; the robot stays without power."""
+        if self.safety_mode == SafetyMode.ROBOT_EMERGENCY_STOP:
+            self.safety_mode = SafetyMode.NORMAL
+
+    def power_off(self) -> None:
+        self.stop_program("the robot was powered off")
+        self.motion.stop(BRAKE_RAD_S2)
+        self._mode_changes = []
+        self.robot_mode = RobotMode.POWER_OFF
+
+    def power_on(self) -> None:
+        if self.robot_mode == RobotMode.POWER_OFF and self.safety_mode != SafetyMode.ROBOT_EMERGENCY_STOP:
+            self.robot_mode = RobotMode.POWER_ON
+            self._mode_changes = [(self.tick + round(POWER_STEP_S * TICKS_PER_SECOND), RobotMode.IDLE)]
+
+    def brake_release(self) -> None:
+        self.power_on()
+        if self.robot_mode in (RobotMode.POWER_ON, RobotMode.IDLE):
+            due = self._mode_changes[-1][0] if self._mode_changes else self.tick
+            self._mode_changes.append((due + round(POWER_STEP_S * TICKS_PER_SECOND), RobotMode.RUNNING))
+
+    # -- what the operator and clients set ---------------------------------------------------------------------------
+    def set_speed_slider(self, fraction: float) -> None:
+        if not isfinite(fraction):
+            return
+        self.speed_slider = min(max(fraction, 0.0), 1.0)
+        if self.runtime_state not in (RuntimeState.PAUSING, RuntimeState.PAUSED):
+            self.motion.fraction_wanted = self.speed_slider
+
+    def set_payload(self, mass_kg: float, centre_m: Sequence[float]) -> None:
+        if not 0.0 <= mass_kg <= 12.5:
+            raise ProgramError(f"payload {mass_kg} kg is outside 0 to 12.5 kg")
+        self.payload_kg, self.payload_centre_m = mass_kg, tuple(centre_m)
+
+    def set_tcp(self, offset: Sequence[float]) -> None:
+        if tuple(offset) != TCP_OFFSET:
+            raise ProgramError("not simulated: a tool centre point other than the flange")
+
+    def input_received(self) -> None:
+        """An RTDE client wrote an input: feeds the watchdog."""
+        self._last_input_tick = self.tick
+
+    def set_watchdog(self, minimum_hz: float) -> None:
+        self.watchdog_s = 1.0 / minimum_hz if minimum_hz > 0.0 else 0.0
+        self._last_input_tick = self.tick
+
+    # -- what RTDE reports -------------------------------------------------------------------------------------------
+    @property
+    def steady(self) -> bool:
+        """Standing still for half a second."""
+        return (self.tick - self._still_since_tick) * TICK_S >= 0.5
+
+    @property
+    def robot_status_bits(self) -> int:
+        powered = self.robot_mode >= RobotMode.POWER_ON
+        return int(powered) | (self.runtime_state == RuntimeState.PLAYING) << 1
+
+    @property
+    def safety_status_bits(self) -> int:
+        return SAFETY_BITS[self.safety_mode]

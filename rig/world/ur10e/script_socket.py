@@ -1,0 +1,132 @@
+"""The script sockets, ports 30001 to 30003: take programs in, and recognise the one ur_rtde uploads.
+
+URScript manual of the maker. A text is a program once its blocks are closed; a line outside a block is a program by
+itself. The text of `rtde_control` is not interpreted but acted out (`control_program`); other programs may use the
+statements listed in `urscript`.
+"""
+
+import re
+from collections.abc import Callable, Iterator
+
+from rig.world.ur10e.controller_messages import ProgramError
+from rig.world.ur10e.program_threads import Move
+from rig.world.ur10e.robot import Program, Robot
+from rig.world.ur10e.ur_rtde_program import ControlProgram
+from rig.world.ur10e.urscript import Arguments, ScriptProgram, move
+
+PRIMARY_PORT, SECONDARY_PORT, REALTIME_PORT = 30001, 30002, 30003
+BLOCK = re.compile(r"(def|sec|thread|if|while|for)\b.*:$")
+
+
+class ScriptReader:
+    """Cuts what arrives into whole programs."""
+
+    def __init__(self) -> None:
+        self._partial = b""
+        self._lines: list[str] = []
+        self._depth = 0
+
+    def feed(self, data: bytes) -> Iterator[list[str]]:
+        """The programs that `data` completes, each as its lines."""
+        *lines, self._partial = (self._partial + data).split(b"\n")
+        for raw in lines:
+            line = raw.decode(errors="replace").rstrip()
+            words = line.split("#", 1)[0].strip()
+            if not words and not self._lines:
+                continue
+            self._lines.append(line)
+            if BLOCK.match(words):
+                self._depth += 1
+            elif words == "end":
+                self._depth = max(0, self._depth - 1)
+            if self._depth == 0:
+                program, self._lines = self._lines, []
+                yield program
+
+
+def compile_program(robot: Robot, lines: list[str]) -> Program:
+    """The program to play for an uploaded text. Raises `ProgramError` for what the simulation does not know."""
+    text = "\n".join(lines)
+    if lines[0].startswith("def rtde_control()"):
+        return ControlProgram(robot, _register_offset(text), tuple(_path(lines)))
+    return ScriptProgram(robot, lines)
+
+
+def _register_offset(text: str) -> int:
+    """ur_rtde writes the offset of its integer registers on the line after this one."""
+    match = re.search(r"reg_offset_int\s*=[^\n]*\n\s*(\d+)", text)
+    return int(match.group(1)) if match else 0
+
+
+def _path(lines: list[str]) -> Iterator[Move]:
+    """The moves that ur_rtde injected into `exec_move_path`."""
+    start = next((i for i, line in enumerate(lines) if "# inject move path" in line), len(lines))
+    for line in lines[start + 1 :]:
+        statement = line.strip()
+        name = statement.split("(", 1)[0]
+        if statement == "end":
+            return
+        if name in ("movej", "movel"):
+            yield move(name, Arguments(statement))
+        elif name != "signal_async_progress":
+            raise ProgramError(f"not simulated: {statement} in a path")
+
+
+ORDERS: dict[str, Callable[[Robot], object]] = {
+    "power on": Robot.power_on,
+    "power off": Robot.power_off,
+    "set robotmode run": Robot.brake_release,
+    "set unlock protective stop": Robot.unlock_protective_stop,
+    "stop program": lambda robot: robot.stop_program("stopped by a client"),
+    "pause program": Robot.pause,
+    "resume program": Robot.resume,
+}
+
+
+class ScriptSession:
+    """One connection to a script socket."""
+
+    closing = False
+
+    def __init__(self, robot: Robot) -> None:
+        self._robot = robot
+        self._reader = ScriptReader()
+
+    def greeting(self) -> bytes:
+        return b""
+
+    def receive(self, data: bytes) -> bytes:
+        for lines in self._reader.feed(data):
+            if self._robot.remote_control:
+                self._obey(lines)
+            else:
+                self._robot.messages.say("a program was ignored: the robot is in local control")
+        return b""
+
+    def tick(self) -> bytes:
+        return b""
+
+    def closed(self) -> None:
+        pass
+
+    def _obey(self, lines: list[str]) -> None:
+        order = ORDERS.get(lines[0].strip())
+        if order is not None:
+            order(self._robot)
+            return
+        try:
+            program = compile_program(self._robot, lines)
+            if lines[0].lstrip().startswith("sec "):
+                run_beside(program)
+            else:
+                self._robot.start_program(program)
+        except ProgramError as error:
+            self._robot.messages.complain(error)
+        except (TypeError, ValueError) as error:  # a value of a kind the statement cannot take
+            self._robot.messages.complain(ProgramError(str(error)))
+
+
+def run_beside(program: Program) -> None:
+    """A secondary program: it takes no time, moves nothing, and leaves the running program alone."""
+    if program.step():
+        raise ProgramError("a secondary program may not take time")

@@ -1,0 +1,178 @@
+"""RTDE's variables: the name and type of each, where an output comes from and where an input goes."""
+
+from collections.abc import Callable, Sequence
+from typing import Any
+
+from rig.world.ur10e import forward_kinematics
+from rig.world.ur10e.modes import RobotMode
+from rig.world.ur10e.robot import TCP_OFFSET, Robot
+
+Get = Callable[[Robot], Any]
+Put = Callable[[Robot, Any], None]
+
+# RTDE type → (struct format, number of values)
+TYPES = {
+    "BOOL": ("?", 1), "UINT8": ("B", 1), "UINT32": ("I", 1), "UINT64": ("Q", 1), "INT32": ("i", 1), "DOUBLE": ("d", 1),
+    "VECTOR3D": ("3d", 3), "VECTOR6D": ("6d", 6), "VECTOR6INT32": ("6i", 6), "VECTOR6UINT32": ("6I", 6),
+}  # fmt: skip
+
+JOINT_MODE_RUNNING, JOINT_MODE_OFF = 253, 239
+
+
+def _constant(value: Any) -> Get:
+    return lambda robot: value
+
+
+def _bits(registers: Sequence[bool], first: int) -> int:
+    return sum(1 << i for i in range(32) if registers[first + i])
+
+
+def _tcp_speed(robot: Robot) -> tuple[float, ...]:
+    """Linear and angular velocity of the flange in the base frame, from the poses a tick apart."""
+    q, qd = robot.motion.q_rad, robot.motion.qd_rad_s
+    if not any(qd):
+        return (0.0,) * 6
+    step = 1e-4
+    before = forward_kinematics.flange_pose([a - v * step for a, v in zip(q, qd, strict=True)])
+    after = forward_kinematics.flange_pose([a + v * step for a, v in zip(q, qd, strict=True)])
+    linear = [(b - a) / (2.0 * step) for a, b in zip(before[:3], after[:3], strict=True)]
+    rate = forward_kinematics.flange_rate(q, qd)
+    rotation = forward_kinematics.rotation_from_vector(forward_kinematics.flange_pose(q)[3:])
+    return (*linear, *(sum(r * w for r, w in zip(row, rate, strict=True)) for row in rotation))
+
+
+def joint_modes(robot: Robot) -> tuple[int, ...]:
+    return (JOINT_MODE_RUNNING if robot.robot_mode == RobotMode.RUNNING else JOINT_MODE_OFF,) * 6
+
+
+def _pose(robot: Robot) -> tuple[float, ...]:
+    return forward_kinematics.flange_pose(robot.motion.actual_q_rad)
+
+
+def _target_pose(robot: Robot) -> tuple[float, ...]:
+    return forward_kinematics.flange_pose(robot.motion.now.target_q_rad)
+
+
+ZERO3, ZERO6 = (0.0,) * 3, (0.0,) * 6
+
+OUTPUTS: dict[str, tuple[str, Get]] = {
+    "timestamp": ("DOUBLE", lambda r: r.time_s),
+    "target_q": ("VECTOR6D", lambda r: r.motion.now.target_q_rad),
+    "target_qd": ("VECTOR6D", lambda r: r.motion.now.target_qd_rad_s),
+    "target_qdd": ("VECTOR6D", lambda r: r.motion.now.target_qdd_rad_s2),
+    "actual_q": ("VECTOR6D", lambda r: r.motion.actual_q_rad),
+    "actual_qd": ("VECTOR6D", lambda r: r.motion.qd_rad_s),
+    "actual_TCP_pose": ("VECTOR6D", _pose),
+    "actual_TCP_speed": ("VECTOR6D", _tcp_speed),
+    "target_TCP_pose": ("VECTOR6D", _target_pose),
+    "target_TCP_speed": ("VECTOR6D", _tcp_speed),
+    "tcp_offset": ("VECTOR6D", _constant(TCP_OFFSET)),
+    "robot_mode": ("INT32", lambda r: r.robot_mode),
+    "joint_mode": ("VECTOR6INT32", joint_modes),
+    "safety_mode": ("INT32", lambda r: r.safety_mode),
+    "safety_status": ("INT32", lambda r: r.safety_mode),
+    "robot_status_bits": ("UINT32", lambda r: r.robot_status_bits),
+    "safety_status_bits": ("UINT32", lambda r: r.safety_status_bits),
+    "runtime_state": ("UINT32", lambda r: r.runtime_state),
+    "speed_scaling": ("DOUBLE", lambda r: r.motion.fraction),
+    "target_speed_fraction": ("DOUBLE", lambda r: r.speed_slider),
+    "actual_digital_output_bits": ("UINT64", lambda r: r.digital_outputs),
+    "standard_analog_output0": ("DOUBLE", lambda r: r.analog_outputs[0]),
+    "standard_analog_output1": ("DOUBLE", lambda r: r.analog_outputs[1]),
+    "payload": ("DOUBLE", lambda r: r.payload_kg),
+    "payload_cog": ("VECTOR3D", lambda r: r.payload_centre_m),
+    "output_bit_registers0_to_31": ("UINT32", lambda r: _bits(r.outputs.bits, 0)),
+    "output_bit_registers32_to_63": ("UINT32", lambda r: _bits(r.outputs.bits, 32)),
+    "input_bit_registers0_to_31": ("UINT32", lambda r: _bits(r.inputs.bits, 0)),
+    "input_bit_registers32_to_63": ("UINT32", lambda r: _bits(r.inputs.bits, 32)),
+}
+
+# Quantities the simulation has no physics for: constant, and plausible for an idle controller.
+_CONSTANTS: dict[tuple[str, Any], str] = {
+    ("VECTOR6D", ZERO6): """target_current target_moment actual_current actual_current_window actual_current_as_torque
+        joint_control_output actual_TCP_force actual_TCP_acceleration target_TCP_acceleration ft_raw_wrench
+        joint_position_deviation_ratio wrench_calc_from_currents payload_inertia""",
+    ("VECTOR6D", (28.0,) * 6): "joint_temperatures",
+    ("VECTOR6D", (48.0,) * 6): "actual_joint_voltage",
+    ("VECTOR3D", ZERO3): "elbow_position elbow_velocity",
+    ("VECTOR3D", (0.0, 0.0, 9.82)): "actual_tool_accelerometer target_gravity",
+    ("DOUBLE", 0.0): """actual_momentum standard_analog_input0 standard_analog_input1 io_current tcp_force_scalar
+        collision_detection_ratio tool_analog_input0 tool_analog_input1 tool_output_current euromap67_24V_voltage
+        euromap67_24V_current actual_robot_energy_consumed actual_robot_braking_energy_dissipated""",
+    ("DOUBLE", 1.0): "target_execution_time",
+    ("DOUBLE", 0.3): "actual_execution_time actual_robot_current",
+    ("DOUBLE", 28.0): "tool_temperature",
+    ("DOUBLE", 48.0): "actual_main_voltage actual_robot_voltage",
+    ("UINT64", 0): "actual_digital_input_bits",
+    ("UINT32", 0): """analog_io_types tool_analog_input_types euromap67_input_bits euromap67_output_bits
+        script_control_line""",
+    ("UINT32", 255): "tool_mode",
+    ("UINT8", 0): """actual_configurable_digital_input_bits actual_configurable_digital_output_bits tool_output_mode
+        tool_digital_output0_mode tool_digital_output1_mode""",
+    ("INT32", 0): "encoder0_raw encoder1_raw time_scale_source tool_output_voltage",
+}
+OUTPUTS |= {name: (kind, _constant(value)) for (kind, value), names in _CONSTANTS.items() for name in names.split()}
+
+
+def _register(side: str, kind: str, index: int) -> Get:
+    return lambda robot: getattr(getattr(robot, side), kind)[index]
+
+
+for _side in ("input", "output"):
+    for _i in range(48):
+        OUTPUTS[f"{_side}_int_register_{_i}"] = ("INT32", _register(f"{_side}s", "ints", _i))
+        OUTPUTS[f"{_side}_double_register_{_i}"] = ("DOUBLE", _register(f"{_side}s", "doubles", _i))
+    for _i in range(64, 128):
+        OUTPUTS[f"{_side}_bit_register_{_i}"] = ("BOOL", _register(f"{_side}s", "bits", _i))
+
+
+# -- inputs ------------------------------------------------------------------------------------------------------
+def _put_register(kind: str, index: int) -> Put:
+    def put(robot: Robot, value: Any) -> None:
+        getattr(robot.inputs, kind)[index] = value
+
+    return put
+
+
+def _put_bits(first: int) -> Put:
+    def put(robot: Robot, value: int) -> None:
+        robot.inputs.bits[first : first + 32] = [bool(value >> i & 1) for i in range(32)]
+
+    return put
+
+
+def _ignore(robot: Robot, value: Any) -> None:
+    """A mask or an external force: it takes part in `apply_masked`, or has no physics here."""
+
+
+INPUTS: dict[str, tuple[str, Put]] = {
+    "speed_slider_mask": ("UINT32", _ignore), "speed_slider_fraction": ("DOUBLE", _ignore),
+    "standard_digital_output_mask": ("UINT8", _ignore), "standard_digital_output": ("UINT8", _ignore),
+    "configurable_digital_output_mask": ("UINT8", _ignore), "configurable_digital_output": ("UINT8", _ignore),
+    "tool_digital_output_mask": ("UINT8", _ignore), "tool_digital_output": ("UINT8", _ignore),
+    "standard_analog_output_mask": ("UINT8", _ignore), "standard_analog_output_type": ("UINT8", _ignore),
+    "standard_analog_output_0": ("DOUBLE", _ignore), "standard_analog_output_1": ("DOUBLE", _ignore),
+    "external_force_torque": ("VECTOR6D", _ignore),
+    "input_bit_registers0_to_31": ("UINT32", _put_bits(0)), "input_bit_registers32_to_63": ("UINT32", _put_bits(32)),
+}  # fmt: skip
+for _i in range(48):
+    INPUTS[f"input_int_register_{_i}"] = ("INT32", _put_register("ints", _i))
+    INPUTS[f"input_double_register_{_i}"] = ("DOUBLE", _put_register("doubles", _i))
+for _i in range(64, 128):
+    INPUTS[f"input_bit_register_{_i}"] = ("BOOL", _put_register("bits", _i))
+
+DIGITAL = (("standard", 0), ("configurable", 8), ("tool", 16))  # kind, first bit of actual_digital_output_bits
+
+
+def apply_masked(robot: Robot, values: dict[str, Any]) -> None:
+    """Apply the inputs that act only where their mask says so."""
+    if values.get("speed_slider_mask"):
+        robot.set_speed_slider(values.get("speed_slider_fraction", robot.speed_slider))
+    for kind, first in DIGITAL:
+        mask = values.get(f"{kind}_digital_output_mask", 0) << first
+        if mask:
+            wanted = values.get(f"{kind}_digital_output", 0) << first
+            robot.digital_outputs = robot.digital_outputs & ~mask | wanted & mask
+    for index in range(2):
+        if values.get("standard_analog_output_mask", 0) >> index & 1:
+            robot.analog_outputs[index] = values.get(f"standard_analog_output_{index}", 0.0)

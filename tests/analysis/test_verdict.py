@@ -1,0 +1,62 @@
+"""The verdict: every limit is checked, and what was not measured does not pass."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from rig.analysis.verdict import Check, judge, verdict
+from rig.config.models import LimitsSection
+from rig.estimation.accumulator import Solution
+
+LIMITS = LimitsSection(scale_deviation=0.3, scale_std=0.002, bias_rad_s=0.1, bias_std_rad_s=0.001, condition=100)
+GOOD = Solution(
+    estimator="newton",
+    scale=np.array([1.1771, 1.1554, 0.9]),
+    bias_rad_s=np.array([0.0077, -0.0100, -0.0051]),
+    covariance=np.diag(np.array([9e-4, 8e-4, 8e-4, 6e-4, 7e-4, 6e-4]) ** 2),
+    observations=6,
+    rank=6,
+    condition=1.07,
+    iterations=2,
+)
+
+
+def test_a_good_calibration_passes_with_every_value_beside_its_limit() -> None:
+    checks = judge({"gyro": GOOD}, LIMITS)
+    assert verdict(checks) == "pass"
+    assert [check.document() for check in checks] == [
+        {"name": "gyro.scale_deviation", "value": pytest.approx(0.1771), "limit": 0.3, "unit": "1", "passed": True},
+        {"name": "gyro.scale_std", "value": pytest.approx(9e-4), "limit": 0.002, "unit": "1", "passed": True},
+        {"name": "gyro.bias", "value": pytest.approx(0.01), "limit": 0.1, "unit": "rad/s", "passed": True},
+        {"name": "gyro.bias_std", "value": pytest.approx(7e-4), "limit": 0.001, "unit": "rad/s", "passed": True},
+        {"name": "gyro.condition", "value": 1.07, "limit": 100, "unit": "1", "passed": True},
+    ]
+
+
+@pytest.mark.parametrize(
+    ("solution", "name"),
+    [
+        (replace(GOOD, scale=np.array([1.0, 0.69, 1.0])), "gyro.scale_deviation"),
+        (replace(GOOD, bias_rad_s=np.array([0.0, -0.11, 0.0])), "gyro.bias"),
+        (replace(GOOD, covariance=np.diag([0, 0, 5e-6, 0, 0, 0])), "gyro.scale_std"),
+        (replace(GOOD, covariance=np.diag([0, 0, 0, 0, 0, 2e-6])), "gyro.bias_std"),
+        (replace(GOOD, condition=101.0), "gyro.condition"),
+        (replace(GOOD, condition=float("inf")), "gyro.condition"),
+        (replace(GOOD, scale=np.array([1.0, np.nan, 1.0])), "gyro.scale_deviation"),
+    ],
+)
+def test_one_value_beyond_its_limit_or_missing_fails_the_run(solution: Solution, name: str) -> None:
+    checks = judge({"reference": GOOD, "gyro": solution}, LIMITS)
+    assert [check.name for check in checks if not check.passed] == [name]
+    assert verdict(checks) == "fail"
+
+
+@pytest.mark.parametrize("value", [None, float("nan"), float("inf"), 1.0001])
+def test_a_measurement_that_is_missing_does_not_pass(value: float | None) -> None:
+    assert not Check("gyro.bias", value, 1.0, "rad/s").passed
+    assert Check("gyro.bias", 1.0, 1.0, "rad/s").passed
+
+
+def test_nothing_measured_is_not_a_pass() -> None:
+    assert verdict(judge({}, LIMITS)) == "fail"

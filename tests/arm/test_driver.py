@@ -1,0 +1,372 @@
+"""The arm driver with the real client against the simulated controller: moves, states, stops, faults by name."""
+
+import math
+import multiprocessing
+import os
+import signal
+import socket
+import subprocess
+import sys
+import threading
+import time
+from collections.abc import Callable
+from dataclasses import replace
+from itertools import pairwise
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+
+from rig.arm.driver import Arm, look
+from rig.arm.motion import Transfer, trapezoid_duration
+from rig.arm.preflight import arm_problems, plan_problems
+from rig.arm.state import ARM_STATE_DTYPE, ArmState, Joints
+from rig.config.models import ArmSection, ProcedureSection
+from rig.errors import Fault, Refused
+from rig.plans.six_sweeps import plan_six_observation
+from support.worlds import World, WorldHandle
+
+PAYLOAD = (0.35, (0.0, 0.0, 0.025))
+WRIST_3 = 5
+
+
+@pytest.fixture
+def laboratory(world: World) -> WorldHandle:
+    return world({"world": {"time_scale": 4}})
+
+
+def turn(start: Joints, angle_rad: float) -> Transfer:
+    """A move of wrist 3 alone at 1 rad/s."""
+    target = (*start[:WRIST_3], start[WRIST_3] + angle_rad)
+    return Transfer("test move", start, target, 1.0, 2.0, trapezoid_duration(abs(angle_rad), 1.0, 2.0))
+
+
+def until(condition: Callable[[], bool], timeout_s: float) -> None:
+    deadline_s = time.monotonic() + timeout_s
+    while not condition():
+        assert time.monotonic() < deadline_s, "the condition did not come true in time"
+        time.sleep(0.002)
+
+
+def stands(world: WorldHandle) -> bool:
+    state = world.state()
+    return not state["moving"] and state["runtime_state"] == "STOPPED"
+
+
+class AtSpeed:
+    """A watch that acts once, when the arm has reached its speed."""
+
+    def __init__(self, arm: Arm, act: Callable[[], object]) -> None:
+        self._arm, self._act, self.acted_s = arm, act, math.inf
+
+    def __call__(self) -> None:
+        if math.isinf(self.acted_s) and abs(self._arm.latest.qd_rad_s[WRIST_3]) > 0.8:
+            self.acted_s = time.monotonic()
+            self._act()
+
+
+def test_a_look_moves_nothing_and_stops_no_program(laboratory: WorldHandle) -> None:
+    with Arm(laboratory.host) as other:
+        other.take_control(*PAYLOAD)
+        report = look(laboratory.host)
+        assert report.program_running
+        assert report.remote_control
+        assert report.payload_kg == pytest.approx(PAYLOAD[0])
+        assert report.serial_number.isdigit()
+        with Arm(laboratory.host) as second, pytest.raises(Refused) as refused:
+            second.take_control(*PAYLOAD)
+        assert refused.value.name == "program_running"
+        assert laboratory.state()["program_running"]
+    assert stands(laboratory)
+
+
+def test_no_arm_at_the_address_is_refused_by_name() -> None:
+    with pytest.raises(Refused) as refused:
+        look("127.0.3.250")
+    assert refused.value.name == "no_arm"
+
+
+def test_an_arm_that_sends_no_states_is_refused_by_name() -> None:
+    def greet(listener: socket.socket) -> None:
+        client, _ = listener.accept()
+        client.sendall(b"Connected: Universal Robots Dashboard Server\n")
+        client.close()
+
+    with socket.create_server(("127.0.3.251", 29999)) as dashboard:
+        greeter = threading.Thread(target=greet, args=(dashboard,))
+        greeter.start()
+        with pytest.raises(Refused) as refused:
+            look("127.0.3.251")
+        greeter.join()
+    assert refused.value.name == "no_arm_states"
+
+
+def test_moves_arrive_in_time_and_states_come_without_gaps(world: World) -> None:
+    laboratory = world({"world": {"time_scale": 1}})
+    states: list[ArmState] = []
+    with Arm(laboratory.host, states.append, state_rate_hz=500) as arm:
+        arm.take_control(*PAYLOAD)
+        assert laboratory.state()["payload_kg"] == pytest.approx(PAYLOAD[0])
+        first, missed = len(states) - 1, arm.missed_states
+        out = turn(arm.latest.q_rad, 1.0)
+        began_s = arm.latest.time_s
+        arm.move(out)
+        arm.rest(0.2)
+        arm.move(turn(out.target_q_rad, -1.0))
+        took_s = arm.latest.time_s - began_s
+        np.testing.assert_allclose(laboratory.state()["q_rad"], out.start_q_rad, atol=1e-4)
+        outcome = arm.stop()
+        assert outcome.at_rest
+        assert arm.stop() == outcome
+    planned_s = 2 * out.duration_s + 0.2
+    assert planned_s - 0.02 <= took_s <= planned_s + 3 * 0.05  # three hand-overs
+    gaps_s = [after.time_s - before.time_s for before, after in pairwise(states[first:])]
+    # The client keeps only the newest packet: on a busy machine some are replaced unread, and counted.
+    assert sum(round(gap_s * 500) - 1 for gap_s in gaps_s) == arm.missed_states - missed
+    assert len(gaps_s) > 125 * planned_s
+    assert max(gaps_s) < 0.05
+    record = np.array([state.to_record() for state in states], ARM_STATE_DTYPE)
+    assert np.ptp(record["q_rad"][:, WRIST_3]) == pytest.approx(1.0, abs=1e-3)
+    assert np.all(np.diff(record["time_s"]) > 0)
+    assert np.all(np.diff(record["host_time_s"]) > 0)
+
+
+def test_a_planned_sweep_turns_a_whole_revolution_at_its_speed(laboratory: WorldHandle) -> None:
+    report = look(laboratory.host)
+    procedure = ProcedureSection(speed_deg_s=120, acceleration_deg_s2=400)
+    plan = plan_six_observation(ArmSection(host=laboratory.host, payload_kg=0.35), procedure, report.state.q_rad)
+    assert plan_problems(plan, 0.35) + arm_problems(plan, report) == []
+    states: list[ArmState] = []
+    sweep = plan.sweeps[0]
+    with Arm(laboratory.host, states.append) as arm:
+        arm.take_control(*PAYLOAD)
+        for motion in plan.motions[: plan.motions.index(sweep) + 1]:
+            began_s = arm.latest.time_s
+            arm.move(motion)
+    low, high = sweep.revolution_rad
+    inside = [s for s in states if s.time_s > began_s and low < s.q_rad[sweep.joint] < high]
+    turned_rad = inside[-1].q_rad[sweep.joint] - inside[0].q_rad[sweep.joint]
+    assert turned_rad == pytest.approx(-2 * math.pi, abs=0.1)
+    assert turned_rad / (inside[-1].time_s - inside[0].time_s) == pytest.approx(-sweep.speed_rad_s, rel=0.01)
+
+
+@pytest.mark.parametrize(
+    ("name", "order"),
+    [
+        ("protective_stop", {"do": "protective_stop"}),
+        ("emergency_stop", {"do": "emergency_stop"}),
+        ("arm_not_running", {"do": "power_off"}),
+        ("arm_paused", {"do": "pause"}),
+        ("program_stopped", {"do": "stop_program"}),
+        ("speed_slider", {"do": "speed_slider", "fraction": 0.5}),
+        ("arm_link_lost", {"do": "close_arm"}),
+        ("arm_link_lost", {"do": "silence_arm", "duration_s": 1.5}),
+        ("arm_link_lost", {"do": "hold"}),  # the controller's time stands still
+    ],
+)
+def test_a_fault_during_a_move_is_named_and_the_arm_stands_still(
+    laboratory: WorldHandle, name: str, order: dict[str, Any]
+) -> None:
+    with Arm(laboratory.host) as arm:
+        arm.take_control(*PAYLOAD)
+        watch = AtSpeed(arm, lambda: laboratory.control(order))
+        with pytest.raises(Fault) as fault:
+            arm.move(turn(arm.latest.q_rad, 6.0), watch)
+        assert time.monotonic() - watch.acted_s < 2.0
+        assert fault.value.name == name
+        assert "test move" in fault.value.what or "127." in fault.value.what
+        assert fault.value.remedy
+        laboratory.control({"do": "run"})
+        until(lambda: stands(laboratory), 3.0)
+
+
+@pytest.mark.parametrize(("name", "kind"), [("arm_driver_died", "SIGKILL"), ("arm_driver_hung", "SIGSTOP")])
+def test_a_child_that_dies_or_hangs_mid_move_leaves_a_standing_arm_within_a_second(
+    laboratory: WorldHandle, name: str, kind: str
+) -> None:
+    with Arm(laboratory.host) as arm:
+        arm.take_control(*PAYLOAD)
+        (child,) = multiprocessing.active_children()
+        assert child.pid is not None
+        stood_s: list[float] = []
+
+        def end_child_and_await_the_stop() -> None:
+            os.kill(child.pid or 0, getattr(signal, kind))
+            killed_s = time.monotonic()
+            until(lambda: stands(laboratory), 2.0)
+            stood_s.append(time.monotonic() - killed_s)
+
+        with pytest.raises(Fault) as fault:
+            arm.move(turn(arm.latest.q_rad, 6.0), AtSpeed(arm, end_child_and_await_the_stop))
+        assert fault.value.name == name
+        assert "no state confirms" in fault.value.what
+        assert "emergency stop" in fault.value.remedy
+        assert stood_s[0] < 1.0
+
+
+@pytest.mark.parametrize("where", ["move", "rest"])
+def test_ctrl_c_stops_the_arm_at_once_and_goes_on_to_the_caller(laboratory: WorldHandle, where: str) -> None:
+    with Arm(laboratory.host) as arm:
+        arm.take_control(*PAYLOAD)
+        interrupted_s = 0.0
+
+        def interrupt() -> None:
+            nonlocal interrupted_s
+            interrupted_s = time.monotonic()
+            os.kill(os.getpid(), signal.SIGINT)
+
+        with pytest.raises(KeyboardInterrupt):
+            if where == "move":
+                arm.move(turn(arm.latest.q_rad, 6.0), AtSpeed(arm, interrupt))
+            else:
+                arm.rest(60.0, interrupt)
+        assert time.monotonic() - interrupted_s < 1.0
+        assert stands(laboratory)
+        assert arm.stop().at_rest
+        with pytest.raises(Fault) as fault:
+            arm.move(turn(arm.latest.q_rad, 1.0))
+        assert fault.value.name == "arm_stopped"
+
+
+def test_an_error_of_the_watch_stops_the_arm_and_is_kept(laboratory: WorldHandle) -> None:
+    def complain() -> None:
+        raise Fault("board_link_lost", "the board is gone", "plug it in")
+
+    with Arm(laboratory.host) as arm:
+        arm.take_control(*PAYLOAD)
+        with pytest.raises(Fault) as fault:
+            arm.move(turn(arm.latest.q_rad, 6.0), AtSpeed(arm, complain))
+        assert fault.value.name == "board_link_lost"
+        assert stands(laboratory)
+
+
+def test_a_state_that_cannot_be_passed_on_stops_the_arm(laboratory: WorldHandle) -> None:
+    def full(state: ArmState) -> None:
+        if abs(state.qd_rad_s[WRIST_3]) > 0.8:
+            raise OSError("no space left on device")
+
+    with Arm(laboratory.host, full) as arm:
+        arm.take_control(*PAYLOAD)
+        with pytest.raises(Fault) as fault:
+            arm.move(turn(arm.latest.q_rad, 6.0))
+        assert "no space left on device" in fault.value.what
+        assert stands(laboratory)
+
+
+def test_an_arm_slower_than_planned_is_stopped(laboratory: WorldHandle) -> None:
+    with Arm(laboratory.host) as arm:
+        arm.take_control(*PAYLOAD)
+        move = turn(arm.latest.q_rad, 6.0)
+        hurried = Transfer(move.name, move.start_q_rad, move.target_q_rad, 1.0, 2.0, duration_s=1.0)
+        with pytest.raises(Fault) as fault:
+            arm.move(hurried)
+        assert fault.value.name == "arm_slower_than_planned"
+        assert stands(laboratory)
+
+
+def test_a_dashboard_that_is_gone_too_is_said_honestly(laboratory: WorldHandle) -> None:
+    with Arm(laboratory.host) as arm:
+        arm.take_control(*PAYLOAD)
+        cut = AtSpeed(arm, lambda: laboratory.control({"do": "close_arm", "listen": False}))
+        with pytest.raises(Fault) as fault:
+            arm.move(turn(arm.latest.q_rad, 6.0), cut)
+        assert time.monotonic() - cut.acted_s < 2.0
+    assert fault.value.name == "arm_link_lost"
+    assert "dashboard did not take the stop" in fault.value.what
+    assert "press the emergency stop" in fault.value.remedy
+
+
+def test_a_speed_the_client_refuses_is_named(laboratory: WorldHandle) -> None:
+    with Arm(laboratory.host) as arm:
+        arm.take_control(*PAYLOAD)
+        with pytest.raises(Fault) as fault:
+            arm.move(replace(turn(arm.latest.q_rad, 1.0), speed_rad_s=4.0))
+        assert fault.value.name == "move_refused"
+        assert stands(laboratory)
+
+
+def test_a_move_beyond_the_limits_is_refused_by_the_controller_and_named(laboratory: WorldHandle) -> None:
+    with Arm(laboratory.host) as arm:
+        arm.take_control(*PAYLOAD)
+        with pytest.raises(Fault) as fault:
+            arm.move(turn(arm.latest.q_rad, 7.0))
+        assert fault.value.name == "program_stopped"
+
+
+@pytest.mark.parametrize(
+    ("name", "orders"),
+    [
+        ("not_in_remote_control", [{"do": "remote_control", "on": False}]),
+        ("registers_in_use", [{"do": "register_in_use"}]),
+        ("protective_stop", [{"do": "protective_stop"}]),
+        ("emergency_stop", [{"do": "emergency_stop"}]),
+        ("speed_slider", [{"do": "speed_slider", "fraction": 0.5}]),
+    ],
+)
+def test_control_is_refused_by_name_before_anything_moves(
+    laboratory: WorldHandle, name: str, orders: list[dict[str, Any]]
+) -> None:
+    for order in orders:
+        laboratory.control(order)
+    with Arm(laboratory.host) as arm:
+        with pytest.raises(Refused) as refused:
+            arm.take_control(*PAYLOAD)
+        assert refused.value.name == name
+        assert refused.value.remedy
+    assert not laboratory.state()["program_running"]
+
+
+def test_a_payload_the_controller_does_not_take_is_refused(laboratory: WorldHandle) -> None:
+    with Arm(laboratory.host) as arm, pytest.raises(Refused) as refused:
+        arm.take_control(20.0, PAYLOAD[1])
+    assert refused.value.name == "payload_not_set"
+    assert "20 kg" in refused.value.what
+    assert stands(laboratory)
+
+
+def test_a_speed_slider_below_full_is_refused_in_preflight(laboratory: WorldHandle) -> None:
+    laboratory.control({"do": "speed_slider", "fraction": 0.5})
+    report = look(laboratory.host)
+    plan = plan_six_observation(ArmSection(host=laboratory.host, payload_kg=0.35), ProcedureSection())
+    (problem,) = arm_problems(plan, report)
+    assert problem.name == "speed_slider"
+    assert "50 %" in problem.what
+
+
+PARENT = """
+import sys
+from rig.arm.driver import Arm
+from rig.arm.motion import Transfer
+
+if __name__ == "__main__":
+    with Arm(sys.argv[1]) as arm:
+        arm.take_control(0.35, (0.0, 0.0, 0.025))
+        here = arm.latest.q_rad
+        print("moving", flush=True)
+        arm.move(Transfer("test move", here, (*here[:5], here[5] + 6.0), 1.0, 2.0, 6.5))
+"""
+
+
+@pytest.mark.parametrize("kind", ["SIGKILL", "SIGTERM", "SIGINT", "SIGINT twice"])
+def test_the_arm_is_stopped_when_the_program_itself_dies(laboratory: WorldHandle, tmp_path: Path, kind: str) -> None:
+    script = tmp_path / "parent.py"
+    script.write_text(PARENT)
+    with subprocess.Popen(
+        [sys.executable, str(script), laboratory.host],
+        stdout=subprocess.PIPE,
+        stderr=subprocess.DEVNULL,
+        start_new_session=True,
+    ) as parent:
+        assert parent.stdout is not None
+        assert parent.stdout.readline() == b"moving\n"
+        until(lambda: bool(laboratory.state()["moving"]), 5.0)
+        if kind.startswith("SIGINT"):  # Ctrl-C in a terminal reaches the whole group
+            os.killpg(parent.pid, signal.SIGINT)
+            if kind.endswith("twice"):
+                time.sleep(0.02)  # while the stop is under way
+                os.killpg(parent.pid, signal.SIGINT)
+        else:
+            parent.send_signal(getattr(signal, kind))
+        until(lambda: stands(laboratory), 1.0)
+        parent.wait(10.0)

@@ -1,0 +1,141 @@
+"""Pre-flight names each problem and its remedy before anything moves."""
+
+import math
+from dataclasses import replace
+
+import pytest
+
+from rig.arm.condition import Problem, program_interruption, readiness
+from rig.arm.motion import Plan, Transfer
+from rig.arm.preflight import arm_problems, plan_problems, refuse, way_to_home
+from rig.arm.state import ArmReport, ArmState, Joints, RobotMode, RuntimeState, SafetyMode
+from rig.config.models import ArmSection, ProcedureSection
+from rig.errors import Refused
+from rig.plans.six_sweeps import plan_six_observation
+
+HOME_DEG = (0.0, -90.0, 90.0, -90.0, -90.0, 0.0)
+HOME: Joints = tuple(math.radians(angle) for angle in HOME_DEG)
+
+READY = ArmState(
+    time_s=1.0,
+    host_time_s=1.0,
+    q_rad=HOME,
+    qd_rad_s=(0.0,) * 6,
+    target_speed_fraction=1.0,
+    speed_scaling=1.0,
+    robot_mode=RobotMode.RUNNING,
+    safety_mode=SafetyMode.NORMAL,
+    runtime_state=RuntimeState.STOPPED,
+    robot_status_bits=1,
+    safety_status_bits=1,
+)
+REPORT = ArmReport(
+    host="10.0.0.2",
+    polyscope="URSoftware 5.14.0.0",
+    serial_number="20265500123",
+    remote_control=True,
+    program_running=False,
+    payload_kg=0.0,
+    payload_centre_m=(0.0, 0.0, 0.0),
+    state=READY,
+)
+
+
+def plan(home_deg: tuple[float, ...] = HOME_DEG, transfer_speed_deg_s: float = 90.0, **procedure: object) -> Plan:
+    arm = ArmSection.model_validate(
+        {"host": "10.0.0.2", "payload_kg": 0.3, "home_deg": home_deg, "transfer_speed_deg_s": transfer_speed_deg_s}
+    )
+    return plan_six_observation(arm, ProcedureSection.model_validate(procedure))
+
+
+def names(problems: list[Problem]) -> list[str]:
+    assert all(problem.what and problem.remedy for problem in problems)
+    return sorted({problem.name for problem in problems})
+
+
+def test_the_default_plan_and_a_ready_arm_have_no_problems() -> None:
+    assert plan_problems(plan(), 0.3) == []
+    assert arm_problems(plan(), REPORT) == []
+
+
+def test_too_slow_an_acceleration_takes_the_wrist_beyond_its_joint_limit() -> None:
+    problems = plan_problems(plan(speed_deg_s=150, acceleration_deg_s2=80), 0.3)
+    assert names(problems) == ["joint_limit"]
+    assert "wrist_1" in problems[0].what
+
+
+def test_wrists_stay_below_the_speed_that_the_client_accepts() -> None:
+    problems = plan_problems(plan(speed_deg_s=180, acceleration_deg_s2=800), 0.3)
+    assert names(problems) == ["joint_speed"]
+    assert "179.9°/s" in problems[0].what
+
+
+def test_a_base_that_leads_a_motion_is_held_to_its_own_limit() -> None:
+    away = (math.radians(90), *HOME[1:])
+    swing = Transfer("swing", HOME, away, math.radians(150), 4.0, 1.0)
+    problems = plan_problems(replace(plan(), steps=(*plan().steps, swing)), 0.3)
+    assert names(problems) == ["joint_speed"]
+    assert "base" in problems[0].what
+
+
+def test_payload_beyond_the_arm_is_refused() -> None:
+    assert names(plan_problems(plan(), 13.0)) == ["payload_too_heavy"]
+
+
+def test_a_home_pose_with_parallel_wrists_is_refused() -> None:
+    assert names(plan_problems(plan(home_deg=(0, -90, 90, -90, 0, 0)), 0.3)) == ["axes_do_not_span"]
+
+
+@pytest.mark.parametrize(
+    ("change", "name"),
+    [
+        ({"robot_mode": RobotMode.POWER_OFF}, "arm_not_running"),
+        ({"robot_mode": 99}, "arm_not_running"),
+        ({"safety_mode": SafetyMode.REDUCED}, "reduced_mode"),
+        ({"safety_mode": SafetyMode.PROTECTIVE_STOP}, "protective_stop"),
+        ({"safety_mode": SafetyMode.ROBOT_EMERGENCY_STOP, "robot_mode": RobotMode.POWER_OFF}, "emergency_stop"),
+        ({"safety_mode": 99}, "safety_not_normal"),
+        ({"safety_status_bits": 1 << 2 | 1 << 10}, "protective_stop"),
+        ({"safety_status_bits": 1 << 6}, "emergency_stop"),
+        ({"target_speed_fraction": 0.5}, "speed_slider"),
+        ({"qd_rad_s": (0, 0, 0, 0, 0, 0.1)}, "arm_moves"),
+        ({"q_rad": (math.radians(170), *HOME[1:])}, "far_from_home"),
+    ],
+)
+def test_an_arm_that_is_not_ready_is_refused_by_name(change: dict[str, object], name: str) -> None:
+    state = replace(READY, **change)  # type: ignore[arg-type]
+    assert names(arm_problems(plan(), replace(REPORT, state=state))) == [name]
+
+
+def test_local_control_and_a_running_program_are_refused() -> None:
+    report = replace(REPORT, remote_control=False, program_running=True)
+    assert names(arm_problems(plan(), report)) == ["not_in_remote_control", "program_running"]
+
+
+def test_the_simulator_address_and_an_old_controller_need_no_remote_control() -> None:
+    assert arm_problems(plan(), replace(REPORT, host="127.0.0.1", remote_control=False)) == []
+    assert arm_problems(plan(), replace(REPORT, remote_control=None)) == []
+
+
+def test_the_way_home_is_told_for_each_joint() -> None:
+    start = (HOME[0] + 0.1, *HOME[1:5], HOME[5] - 0.2)
+    assert way_to_home(plan(), start) == pytest.approx((-0.1, 0, 0, 0, 0, 0.2))
+
+
+def test_refusal_carries_every_problem_and_is_named_after_the_first() -> None:
+    with pytest.raises(Refused) as refused:
+        refuse(arm_problems(plan(), replace(REPORT, remote_control=False, program_running=True)))
+    assert refused.value.name == "not_in_remote_control"
+    assert "(not_in_remote_control)" in str(refused.value)
+    assert "a program runs on the arm at 10.0.0.2" in str(refused.value)
+    refuse([])
+
+
+def test_paused_and_stopped_programs_are_told_apart() -> None:
+    paused = program_interruption(replace(READY, runtime_state=RuntimeState.PAUSED))
+    stopped = program_interruption(replace(READY, runtime_state=RuntimeState.STOPPED))
+    assert paused is not None
+    assert stopped is not None
+    assert (paused.name, stopped.name) == ("arm_paused", "program_stopped")
+    assert program_interruption(replace(READY, runtime_state=RuntimeState.PLAYING)) is None
+    assert readiness(READY) is None

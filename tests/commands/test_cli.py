@@ -1,0 +1,61 @@
+"""The command line where it is used: pipes, closed streams, terminals that know no special characters."""
+
+import json
+import os
+import subprocess
+import sys
+
+import pytest
+
+from support.paths import ROOT
+
+CONFIG = ROOT / "configs" / "ci.yaml"
+PLAN = f"{sys.executable} -m rig plan {CONFIG}"
+
+
+def shell(command: str, **environment: str) -> subprocess.CompletedProcess[str]:
+    return subprocess.run(
+        ["bash", "-o", "pipefail", "-c", command],
+        capture_output=True,
+        text=True,
+        timeout=30,
+        check=False,
+        env={**os.environ, **environment},
+    )
+
+
+@pytest.mark.parametrize(
+    "command", [f"{PLAN} | head -1", f"{PLAN} >&-", f"{PLAN} >&- 2>&- <&-", f"{PLAN} --json | true"]
+)
+def test_a_reader_that_is_not_there_is_no_error(command: str) -> None:
+    done = shell(command)
+    assert done.returncode == 0 and done.stderr == "", done
+
+
+def test_results_that_cannot_be_written_are_a_named_error() -> None:
+    done = shell(f"{PLAN} > /dev/full")
+    assert done.returncode == 3
+    assert done.stderr.startswith("rig: system: ") and "No space left" in done.stderr and done.stderr.count("\n") == 1
+
+
+def test_a_terminal_without_special_characters_gets_the_plan_too() -> None:
+    done = shell(PLAN, PYTHONIOENCODING="ascii")
+    assert done.returncode == 0 and "sweep wrist_3 cw" in done.stdout, done.stderr
+
+
+def test_a_narrow_terminal_gets_every_step() -> None:
+    done = shell(PLAN, COLUMNS="60")
+    assert done.returncode == 0
+    assert json.loads(shell(f"{PLAN} --json").stdout) and done.stdout.count("sweep") >= 6
+
+
+@pytest.mark.parametrize("procedure", ["six_observation", "verify"])
+def test_a_procedures_help_is_the_instruction_for_the_technician(procedure: str) -> None:
+    done = shell(f"{sys.executable} {ROOT / 'procedures' / procedure}.py --help")
+    assert done.returncode == 0 and "Before you start:" in done.stdout and "What happens:" in done.stdout, done
+
+
+def test_the_plan_of_a_verification_is_not_said_to_be_repeated() -> None:
+    plan = f"{sys.executable} -m rig plan {ROOT / 'configs' / 'lsm9ds1_adis16465.yaml'}"
+    assert "the same once more to verify it" in shell(plan).stdout
+    assert "once more" not in shell(f"{plan} --set procedure.name=verify").stdout

@@ -1,0 +1,241 @@
+"""The run file: what goes in comes out, whatever happens to the process that writes it."""
+
+import json
+import multiprocessing
+import signal
+import subprocess
+import sys
+import time
+from multiprocessing.connection import Connection
+from pathlib import Path
+from typing import Any
+
+import h5py
+import numpy as np
+import pytest
+
+from firmware_host.samples import SAMPLE_DTYPE
+from rig.arm.state import ARM_STATE_DTYPE, ArmState
+from rig.data.run_file import RecordedSensor, RunRecorder, make_plain, read_run
+from rig.errors import Fault, Refused
+from support.paths import ROOT
+
+SENSOR = RecordedSensor(
+    part="lsm9ds1",
+    serial_number="LSM9DS1-001",
+    rate_hz=238.0,
+    range_rad_s=4.276,
+    sensitivity_rad_s_per_count=1.527e-4,
+    full_scale_counts=32767,
+    temperature_c_per_count=0.0625,
+    temperature_offset_c=25.0,
+    mounting=((0.0, 1.0, 0.0), (-1.0, 0.0, 0.0), (0.0, 0.0, 1.0)),
+)
+CONFIG = "arm: {host: 192.0.2.1}\n# °\n"
+PROVENANCE = {"rig": "0.1.0", "board": {"unique_id": "0123"}}
+TICK_S = 0.01
+
+
+def recorder(path: Path, *sensors: str) -> RunRecorder:
+    return RunRecorder(path, config=CONFIG, provenance=PROVENANCE, sensors=dict.fromkeys(sensors or ("gyro",), SENSOR))
+
+
+def some_samples(first: int, count: int) -> np.ndarray[Any, Any]:
+    samples = np.zeros(count, SAMPLE_DTYPE)
+    samples["sequence"] = np.arange(first, first + count)
+    samples["board_time_us"] = 2**40 + samples["sequence"].astype("u8") * 4202
+    samples["host_time_s"] = time.monotonic()
+    samples["counts"] = samples["sequence"][:, None] * [1, -2, 3]
+    samples["temperature_counts"] = -48
+    return samples
+
+
+def some_state(number: int) -> ArmState:
+    q = tuple(0.001 * number + joint for joint in range(6))
+    return ArmState(100 + number * 0.002, time.monotonic(), q, (0.1,) * 6, 1.0, 0.99, 7, 1, 2, 3, 1)
+
+
+def test_everything_comes_back_as_it_was_added(tmp_path: Path) -> None:
+    path = tmp_path / "run.h5"
+    with recorder(path, "gyro", "reference") as recording:
+        recording.add_event("run_started")
+        recording.add_samples("gyro", some_samples(0, 3000))
+        recording.add_samples("reference", some_samples(7, 5))
+        states = [some_state(number) for number in range(1200)]
+        for state in states:
+            recording.add_arm_state(state)
+        recording.add_event("sweep_started", sweep={"index": 0, "axis_flange": (0.0, 0.0, -1.0), "name": "µ\n" * 400})
+        recording.add_event("sweep_finished", controller_time_s=123.5)
+        recording.check()
+    run = read_run(path)
+    assert (run.config, run.provenance) == (CONFIG, PROVENANCE)
+    assert run.sensors == {"gyro": SENSOR, "reference": SENSOR}
+    np.testing.assert_array_equal(run.samples["gyro"]["counts"], some_samples(0, 3000)["counts"])
+    assert run.samples["reference"]["board_time_us"][0] == 2**40 + 7 * 4202
+    np.testing.assert_array_equal(run.arm, np.array([state.to_record() for state in states], ARM_STATE_DTYPE))
+    started, sweep, finished = run.events
+    assert (started.name, started.controller_time_s) == ("run_started", None)
+    assert sweep.controller_time_s == states[-1].time_s  # the arm's time when it happened
+    assert sweep.detail == {"sweep": {"index": 0, "axis_flange": [0.0, 0.0, -1.0], "name": "µ\n" * 400}}
+    assert finished.controller_time_s == 123.5
+    with h5py.File(path, "r") as file:  # any HDF5 tool opens it
+        assert file.attrs["schema"] == "rig.run/1"
+
+
+def test_a_run_can_be_read_while_it_is_written(tmp_path: Path) -> None:
+    with recorder(tmp_path / "run.h5") as recording:
+        recording.add_samples("gyro", some_samples(0, 10))
+        deadline = time.monotonic() + 5
+        while len(read_run(tmp_path / "run.h5").samples["gyro"]) < 10:
+            assert time.monotonic() < deadline
+            time.sleep(0.02)
+
+
+def test_an_old_recording_is_never_overwritten(tmp_path: Path) -> None:
+    recorder(tmp_path / "run.h5").close()
+    with pytest.raises(Fault, match=r"recording_failed.*there already"):
+        recorder(tmp_path / "run.h5")
+    with pytest.raises(Fault, match="recording_failed"):
+        recorder(tmp_path / "no such folder" / "run.h5")
+
+
+@pytest.mark.parametrize("content", [b"", b"\x89HDF\r\n\x1a\nrubbish", b"a,b,c\n1,2,3\n"])
+def test_what_is_not_a_run_file_is_refused(tmp_path: Path, content: bytes) -> None:
+    path = tmp_path / "run.h5"
+    with pytest.raises(Refused, match="no_run_file"):
+        read_run(path)
+    path.write_bytes(content)
+    with pytest.raises(Refused, match="not_a_run_file"):
+        read_run(path)
+
+
+def test_another_schema_is_refused(tmp_path: Path) -> None:
+    path = tmp_path / "run.h5"
+    recorder(path).close()
+    with h5py.File(path, "r+") as file:
+        file.attrs["schema"] = "rig.run/9"
+    with pytest.raises(Refused, match=r"not_a_run_file.*rig\.run/9"):
+        read_run(path)
+
+
+def record_until_killed(path: Path, report: Connection) -> None:
+    """What a run writes, at a run's pace: 500 states and 1000 samples a second; tells the pipe how far it is."""
+    recording = recorder(path)
+    begun, tick = time.monotonic(), 0
+    while True:
+        recording.add_samples("gyro", some_samples(10 * tick, 10))
+        for number in range(5 * tick, 5 * tick + 5):
+            recording.add_arm_state(some_state(number))
+        recording.add_event("tick", number=tick)
+        tick += 1
+        report.send((time.monotonic(), tick))
+        time.sleep(max(0.0, begun + tick * TICK_S - time.monotonic()))
+
+
+def reports(pipe: Connection) -> list[tuple[float, int]]:
+    """All that was said before the end."""
+    said = []
+    try:
+        while True:
+            said.append(pipe.recv())
+    except EOFError:
+        return said
+
+
+def test_a_killed_run_opens_and_holds_all_but_the_last_second(tmp_path: Path) -> None:
+    processes = multiprocessing.get_context("forkserver")
+    processes.set_forkserver_preload(["h5py", "rig.data.run_file"])
+    lives = np.random.default_rng(50).uniform(0.0, 2.5, 50)
+    for batch, batch_lives in enumerate(np.array_split(lives, 3)):
+        writers = []
+        for number in range(len(batch_lives)):
+            ours, theirs = processes.Pipe(duplex=False)
+            path = tmp_path / f"{batch}-{number}.h5"
+            process = processes.Process(target=record_until_killed, args=(path, theirs))
+            process.start()
+            theirs.close()
+            writers.append((process, ours, path))
+        for _, pipe, _ in writers:
+            assert pipe.poll(20)  # it writes
+        begun = time.monotonic()
+        killed = {}
+        for life, (process, _, path) in sorted(zip(batch_lives, writers, strict=True), key=lambda pair: pair[0]):
+            time.sleep(max(0.0, begun + life - time.monotonic()))
+            process.kill()
+            killed[path] = time.monotonic()
+        for process, pipe, path in writers:
+            process.join()
+            assert process.exitcode == -signal.SIGKILL
+            handed_over = max((tick for said, tick in reports(pipe) if said < killed[path] - 1), default=0)
+            check_killed(path, handed_over)
+            process.close()
+            pipe.close()
+    make_plain(path)
+    with h5py.File(path, "r") as file:
+        assert len(file["arm"]) >= 5 * handed_over
+
+
+def check_killed(path: Path, ticks: int) -> None:
+    """The file opens, begins at the beginning, has no hole, and reaches as far as it must."""
+    run = read_run(path)
+    samples, arm = run.samples["gyro"], run.arm
+    assert len(samples) >= 10 * ticks
+    assert len(arm) >= 5 * ticks
+    assert len(run.events) >= ticks
+    np.testing.assert_array_equal(samples["sequence"], np.arange(len(samples)))
+    np.testing.assert_array_equal(samples["counts"], np.arange(len(samples))[:, None] * [1, -2, 3])
+    np.testing.assert_allclose(arm["time_s"], 100 + 0.002 * np.arange(len(arm)))
+    assert [event.detail["number"] for event in run.events] == list(range(len(run.events)))
+
+
+FULL_DISK = """
+import json, resource, signal, sys, time
+from pathlib import Path
+sys.path.insert(0, {tests!r})
+from test_recording import recorder, some_samples
+from rig.errors import Fault
+recording, added = recorder(Path({path!r})), 0
+signal.signal(signal.SIGXFSZ, signal.SIG_IGN)
+resource.setrlimit(resource.RLIMIT_FSIZE, (500_000, resource.RLIM_INFINITY))  # as a full disk: no byte beyond
+while True:
+    recording.add_samples("gyro", some_samples(added, 100))
+    added += 100
+    try:
+        recording.check()
+    except Fault as fault:
+        print(json.dumps([fault.name, fault.what, added]))
+        break
+    time.sleep(0.005)
+try:
+    recording.close()
+except Fault as fault:
+    sys.exit(fault.exit_status)
+"""
+
+
+def test_a_full_disk_is_a_named_fault_and_keeps_what_was_written(tmp_path: Path) -> None:
+    path = tmp_path / "run.h5"
+    script = FULL_DISK.format(tests=str(ROOT / "tests"), path=str(path))
+    done = subprocess.run([sys.executable, "-c", script], capture_output=True, text=True, timeout=30, check=False)
+    assert (done.returncode, done.stderr) == (3, "")  # no crash, no noise from the library
+    name, what, added = json.loads(done.stdout)
+    assert name == "recording_failed"
+    assert "File too large" in what
+    kept = read_run(path).samples["gyro"]
+    assert 0 < len(kept) <= added
+    np.testing.assert_array_equal(kept["sequence"], np.arange(len(kept)))
+
+
+def test_a_torn_end_is_left_out(tmp_path: Path) -> None:
+    path = tmp_path / "run.h5"
+    with recorder(path) as recording:
+        recording.add_samples("gyro", some_samples(0, 50))
+        recording.add_event("whole")
+    with h5py.File(path, "r+") as file:
+        samples, events = file["samples/gyro"], file["events"]
+        samples.resize((60,))  # rows that were announced and never written
+        events.resize((len(events) + 20,))
+        events[-20:-10] = np.frombuffer(b'{"name": "', "u1")
+    run = read_run(path)
+    assert len(run.samples["gyro"]) == 49  # the last row before the hole may be half a row
+    assert [event.name for event in run.events] == ["whole"]

@@ -1,0 +1,126 @@
+"""The accelerometer of TRIAX from static attitudes, with and without second-order terms."""
+
+from typing import Any
+
+import numpy as np
+import pytest
+from numpy.typing import NDArray
+
+from rig.errors import Fault
+from rig.estimation.accelerometer import AccelerometerSolution, solve_accelerometer, specific_force
+from rig.estimation.triaxial import Method, solve_triaxial_batch
+from support.rate_table import (
+    ACCELEROMETER_BIAS,
+    ACCELEROMETER_MATRIX,
+    ACCELEROMETER_RANDOM_WALK,
+    AVERAGING_S,
+    GRAVITY,
+    MILLI_G,
+    SECOND_ORDER,
+    attitudes,
+    noisy,
+)
+
+Array = NDArray[np.float64]
+
+METHODS: tuple[Method, ...] = ("as_published", "maximum_likelihood")
+NORM = float(np.linalg.norm(GRAVITY))
+FIRST = np.concatenate([ACCELEROMETER_MATRIX.ravel(), GRAVITY, ACCELEROMETER_BIAS])
+THETA = np.concatenate([FIRST, SECOND_ORDER])
+VARIANCES = np.full((30, 3), ACCELEROMETER_RANDOM_WALK**2 / AVERAGING_S) * np.array([1.0, 0.5, 2.0])
+
+
+def readings(r: Array, second_order: Array = SECOND_ORDER) -> Array:
+    """a_m (N, 3), m/s²: TRIAX, Eq. (11)."""
+    g = np.einsum("nji,j->ni", r, GRAVITY)
+    result: Array = (-g + second_order * g**2) @ ACCELEROMETER_MATRIX.T + ACCELEROMETER_BIAS
+    return result
+
+
+def values(solution: AccelerometerSolution) -> Array:
+    parts = [solution.matrix.ravel(), solution.gravity_table_m_s2, solution.bias_m_s2]
+    return np.concatenate(parts if solution.second_order_s2_m is None else [*parts, solution.second_order_s2_m])
+
+
+@pytest.mark.parametrize("method", METHODS)
+def test_the_published_accelerometer_is_found(method: Method) -> None:
+    r = attitudes(30)
+    m = noisy(readings(r), VARIANCES)
+    solution = solve_accelerometer(m, r, VARIANCES, gravity_m_s2=NORM, second_order=True, method=method)
+    std = np.sqrt(np.diag(solution.covariance))
+    assert np.all(np.abs(values(solution) - THETA) < 4 * std)
+    np.testing.assert_allclose(solution.matrix, ACCELEROMETER_MATRIX, atol=3e-5)
+    np.testing.assert_allclose(solution.bias_m_s2 / MILLI_G, [0.9664, -0.4173, 0.8803], atol=0.05)
+    np.testing.assert_allclose(solution.gravity_table_m_s2, GRAVITY, atol=2e-4)
+    assert solution.second_order_s2_m is not None
+    np.testing.assert_allclose(solution.second_order_s2_m, SECOND_ORDER, atol=2e-6)
+    assert (solution.fit.rank, solution.fit.warnings) == (17, ())
+    np.testing.assert_allclose(np.linalg.norm(solution.gravity_table_m_s2), NORM, rtol=1e-12)
+
+
+@pytest.mark.parametrize("method", METHODS)
+def test_first_order_is_exact_for_a_linear_sensor(method: Method) -> None:
+    r = attitudes(5)
+    exact = solve_accelerometer(readings(r, np.zeros(3)), r, VARIANCES[:5], gravity_m_s2=NORM, method=method)
+    np.testing.assert_allclose(values(exact), FIRST, atol=1e-11)
+    assert exact.fit.rank == 14 and exact.second_order_s2_m is None
+
+
+def test_the_iteration_settles_and_leaves_what_first_order_cannot_explain() -> None:
+    r = attitudes(30)
+    tiny = np.full((30, 3), 1e-10)
+    first = solve_accelerometer(readings(r), r, tiny, gravity_m_s2=NORM)
+    second = solve_accelerometer(readings(r), r, tiny, gravity_m_s2=NORM, second_order=True)
+    np.testing.assert_allclose(values(second), THETA, atol=1e-9)
+    assert 2 <= second.fit.iterations <= 10
+    assert np.abs(second.fit.residuals).max() < 1e-9
+    assert np.abs(first.fit.residuals).max() > 1e-4
+    assert "times what the variances explain" in first.fit.warnings[0] and not second.fit.warnings
+
+
+@pytest.mark.parametrize("method", METHODS)
+@pytest.mark.parametrize("second_order", [False, True])
+def test_the_covariance_is_that_of_repeated_calibrations(method: Method, second_order: bool) -> None:
+    r = attitudes(14)
+    variances = VARIANCES[:14] * 25  # loud enough that rounding is nowhere near
+    exact = readings(r, SECOND_ORDER if second_order else np.zeros(3))
+    options: dict[str, Any] = {"second_order": second_order, "method": method}
+    reported = solve_accelerometer(exact, r, variances, gravity_m_s2=NORM, **options).covariance
+    side = [0, 0, -1]
+    draws = noisy(exact, variances, runs=5000)
+    found = solve_triaxial_batch(draws, r, variances, reference_norm=NORM, reference_side=side, **options)
+    np.testing.assert_allclose(np.var(found, axis=0), np.diag(reported), rtol=0.1)
+    sign = np.ones(found.shape[1])
+    sign[9:12] = -1
+    std = np.sqrt(np.diag(reported))
+    np.testing.assert_allclose(np.corrcoef((found * sign).T), reported / np.outer(std, std), atol=0.08)
+
+
+def test_calibrated_readings_are_the_specific_force() -> None:
+    r = attitudes(30)
+    for second_order in (np.zeros(3), SECOND_ORDER):
+        m = readings(r, second_order)
+        solution = solve_accelerometer(m, r, VARIANCES, gravity_m_s2=NORM, second_order=bool(second_order.any()))
+        np.testing.assert_allclose(specific_force(m, solution), -np.einsum("nji,j->ni", r, GRAVITY), atol=1e-9)
+
+
+def test_a_frame_whose_z_axis_points_up_says_so() -> None:
+    r = attitudes(10)
+    over = np.diag([1.0, -1.0, -1.0])  # the same table, its frame turned over
+    solution = solve_accelerometer(
+        readings(r, np.zeros(3)), over @ r, VARIANCES[:10], gravity_m_s2=NORM, down=[0, 0, -1]
+    )
+    np.testing.assert_allclose(solution.gravity_table_m_s2, over @ GRAVITY, atol=1e-10)
+    np.testing.assert_allclose(solution.matrix, ACCELEROMETER_MATRIX, atol=1e-12)
+
+
+def test_second_order_asks_for_a_sixth_attitude() -> None:
+    r = attitudes(5)
+    with pytest.raises(Fault, match=r"too_few_observations: 5 .* 18 parameters, 6 are the least"):
+        solve_accelerometer(readings(r), r, VARIANCES[:5], gravity_m_s2=NORM, second_order=True)
+
+
+def test_readings_in_g_are_refused() -> None:
+    r = attitudes(30)
+    with pytest.raises(Fault, match=r"wrong_unit: .* look like g"):
+        solve_accelerometer(readings(r) / 9.80665, r, VARIANCES / 96, gravity_m_s2=NORM)

@@ -1,0 +1,72 @@
+"""Hard and soft iron from known attitudes: TRIAX, Eq. (7)."""
+
+import numpy as np
+import pytest
+from numpy.typing import NDArray
+
+from rig.errors import Fault
+from rig.estimation.magnetometer import field, solve_magnetometer
+from rig.estimation.triaxial import Method, solve_triaxial_batch
+from support.rate_table import attitudes, noisy
+
+Array = NDArray[np.float64]
+
+METHODS: tuple[Method, ...] = ("as_published", "maximum_likelihood")
+EARTH_FIELD = np.array([26.2, -0.9, 34.1]) * 1e-6  # T, north-east-down, near Lisbon
+SCALE = np.diag([1.1, 0.95, 1.02])
+NON_ORTHOGONALITY = np.array([[1.0, 0.02, -0.01], [0.0, 1.0, 0.03], [0.0, 0.0, 1.0]])
+SOFT_IRON = np.array([[1.05, 0.04, -0.02], [0.04, 0.97, 0.03], [-0.02, 0.03, 1.10]])
+HARD_IRON = np.array([12.0, -7.0, 20.0]) * 1e-6
+OFFSET = np.array([1.0, 2.0, -3.0]) * 1e-6
+MATRIX = SCALE @ NON_ORTHOGONALITY @ SOFT_IRON
+BIAS = SCALE @ NON_ORTHOGONALITY @ HARD_IRON + OFFSET
+NORM = float(np.linalg.norm(EARTH_FIELD))
+VARIANCES = np.full((20, 3), (0.1e-6) ** 2) * np.array([1.0, 2.0, 0.5])
+
+
+def readings(r: Array) -> Array:
+    """(N, 3) T: the iron bends the field, then the sensor reads it, as the text above Eq. (7) has it."""
+    bent = np.einsum("nji,j->ni", r, EARTH_FIELD) @ SOFT_IRON.T + HARD_IRON
+    result: Array = bent @ (SCALE @ NON_ORTHOGONALITY).T + OFFSET
+    return result
+
+
+@pytest.mark.parametrize("method", METHODS)
+def test_iron_field_and_offset_are_found(method: Method) -> None:
+    r = attitudes(20)
+    solution = solve_magnetometer(noisy(readings(r), VARIANCES), r, VARIANCES, field_t=NORM, method=method)
+    std = np.sqrt(np.diag(solution.covariance))
+    found = np.concatenate([solution.matrix.ravel(), solution.field_table_t, solution.bias_t])
+    assert np.all(np.abs(found - np.concatenate([MATRIX.ravel(), EARTH_FIELD, BIAS])) < 4 * std)
+    assert solution.fit.rank == 14 and not solution.fit.warnings
+    exact = solve_magnetometer(readings(r), r, VARIANCES, field_t=NORM, method=method)
+    np.testing.assert_allclose(exact.matrix, MATRIX, atol=1e-12)
+    np.testing.assert_allclose(exact.hard_iron_t, np.linalg.solve(MATRIX, BIAS), atol=1e-17)
+    np.testing.assert_allclose(field(readings(r), exact), np.einsum("nji,j->ni", r, EARTH_FIELD), atol=1e-16)
+
+
+@pytest.mark.parametrize("method", METHODS)
+def test_the_covariance_is_that_of_repeated_calibrations(method: Method) -> None:
+    r = attitudes(20)
+    reported = solve_magnetometer(readings(r), r, VARIANCES, field_t=NORM, method=method).covariance
+    found = solve_triaxial_batch(
+        noisy(readings(r), VARIANCES, runs=5000),
+        r,
+        VARIANCES,
+        reference_norm=NORM,
+        reference_side=[0, 0, 1],
+        method=method,
+    )
+    np.testing.assert_allclose(np.var(found, axis=0), np.diag(reported), rtol=0.1)
+
+
+def test_an_axis_of_the_other_hand_is_refused() -> None:
+    r = attitudes(20)
+    with pytest.raises(Fault, match="mirrored_axis"):
+        solve_magnetometer(readings(r) * np.array([-1.0, 1.0, 1.0]), r, VARIANCES, field_t=NORM)
+
+
+def test_microtesla_given_as_tesla_are_refused() -> None:
+    r = attitudes(20)
+    with pytest.raises(Fault, match="wrong_unit"):
+        solve_magnetometer(readings(r) * 1e6, r, VARIANCES * 1e12, field_t=NORM)

@@ -1,0 +1,113 @@
+"""The driver of the ADIS16465 against its registers."""
+
+import math
+
+import pytest
+
+from firmware_host.protocol import ERROR_BY_CODE
+from support.host_board import HostBoard, configured, convert, error_of, first_samples
+from support.host_sensors import Adis16465Registers, Nobody
+
+
+@pytest.fixture
+def board() -> HostBoard:
+    return HostBoard()
+
+
+@pytest.mark.parametrize(
+    ("model", "deg_s", "counts_per_deg_s"), [(0x0003, 125, 160), (0x0007, 500, 40), (0x000F, 2000, 10)]
+)
+def test_the_model_of_the_adis16465_has_its_range(
+    board: HostBoard, model: int, deg_s: float, counts_per_deg_s: float
+) -> None:
+    board.adis16465.words[0x5E] = model
+    setup = configured(board, 2, range_deg_s=100)
+    assert setup["range_deg_s"] == deg_s
+    assert setup["sensitivity_rad_s"] == pytest.approx(math.radians(1 / counts_per_deg_s), rel=1e-15)
+    assert (setup["temperature_scale_c"], setup["temperature_offset_c"]) == (0.1, 0.0)
+    assert error_of(board.ask("configure", sensor=2, rate_hz=200, range_deg_s=deg_s + 1)) == "bad_range"
+
+
+def test_a_model_of_the_adis16465_that_nobody_knows_is_another_part(board: HostBoard) -> None:
+    board.adis16465.words[0x5E] = 0x000B
+    assert error_of(board.ask("configure", sensor=2, rate_hz=200, range_deg_s=125)) == "sensor_mismatch"
+
+
+@pytest.mark.parametrize(
+    ("wanted_hz", "hz", "decimation"),
+    [(9000, 2000, 0), (1000, 1000, 1), (238, 250, 7), (400, 400, 4), (1.4, 2000 / 1429, 1428), (0.1, 1, 1999)],
+)
+def test_the_adis16465_decimates(board: HostBoard, wanted_hz: float, hz: float, decimation: int) -> None:
+    assert configured(board, 2, rate_hz=wanted_hz)["rate_hz"] == hz
+    assert board.adis16465.words[0x64] == decimation
+
+
+def test_settings_of_the_adis16465_are_written_by_bytes_and_believed_when_they_read_back(board: HostBoard) -> None:
+    board.adis16465.words |= {0x5C: 0x0004, 0x60: 0x0002}
+    configured(board, 2, rate_hz=2)
+    filter_off = [(0x5C, 0x00), (0x5D, 0x00)]
+    data_ready_rises = [(0x60, 0xC1), (0x61, 0x00)]
+    decimation = [(0x64, 0xE7), (0x65, 0x03)]  # 999
+    assert board.adis16465.writes == filter_off + data_ready_rises + decimation
+    board.adis16465.taking_us = 2000
+    assert error_of(board.ask("configure", sensor=2, rate_hz=200, range_deg_s=125)) == "setup_failed"
+
+
+def test_an_adis16465_sample_is_one_burst_with_a_checksum(board: HostBoard) -> None:
+    configured(board, 2)
+    board.adis16465.transfers.clear()
+    batch = first_samples(board, 2, (-32768, 258, 32767))
+    assert board.adis16465.transfers == [22] * 41
+    assert batch.items["counts"][0].tolist() == [-32768, 258, 32767]
+    assert batch.items["temperature_counts"][0] == -48
+
+
+def streaming_adis16465() -> tuple[HostBoard, Adis16465Registers]:
+    board = HostBoard()
+    configured(board, 2)
+    board.ask("start", 2, sensors=0)
+    for k in range(3):
+        convert(board, 50_000 + 5000 * k, sensor=2)
+    return board, board.adis16465
+
+
+@pytest.mark.parametrize("what", ["damaged", "supply too low", "repeated", "held low"])
+def test_a_burst_that_cannot_be_trusted_is_a_bus_error_and_no_sample(what: str) -> None:
+    board, part = streaming_adis16465()
+    part.damage = what == "damaged"
+    part.status = 0x10 if what == "supply too low" else 0
+    if what == "held low":
+        board.sensors[2] = Nobody(0x00)
+    if what == "repeated":
+        board.data_ready(100_000, 2)
+        board.wait_until(100_000)
+        board.run()
+    else:
+        convert(board, 100_000, sensor=2)
+    board.sensors[2] = part
+    part.damage = part.status = 0
+    convert(board, 105_000, sensor=2)
+    report = board.ask("status", 3)[-1]
+    assert report.values["bus_errors"] == 1
+    frames = board.ask("stop", 4)
+    assert [f.values["dropped"] for f in frames if f.name == "samples"][-1] == report.items["dropped"][2] > 0
+
+
+@pytest.mark.parametrize(("status", "name"), [(0x02, "sensor_fault"), (0x20, "sensor_fault"), (0x04, None)])
+def test_a_fault_the_adis16465_reports_is_named(status: int, name: str | None) -> None:
+    board, part = streaming_adis16465()
+    part.status = status
+    for k in range(30):
+        convert(board, 100_000 + 5000 * k, sensor=2)
+    errors = [(f.values["sensor"], ERROR_BY_CODE[f.values["code"]].name) for f in board.frames() if f.name == "error"]
+    assert errors == ([(2, name)] if name else [])
+
+
+@pytest.mark.parametrize(("every", "named"), [(3, True), (20, False)])
+def test_damage_again_and_again_is_named_but_not_a_burst_now_and_then(every: int, named: bool) -> None:
+    board, part = streaming_adis16465()
+    for k in range(300):
+        part.damage = k % every == 0
+        convert(board, 100_000 + 5000 * k, sensor=2)
+    errors = [ERROR_BY_CODE[f.values["code"]].name for f in board.frames() if f.name == "error"]
+    assert errors == ["checksum_failed"] * named

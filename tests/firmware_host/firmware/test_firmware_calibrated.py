@@ -1,0 +1,210 @@
+"""The board remembers calibrations and streams by them: the core on this machine."""
+
+from typing import Any
+
+import numpy as np
+import pytest
+from numpy.typing import NDArray
+
+from firmware_host.frames import Frame
+from firmware_host.protocol import text
+from support.host_board import PERIOD_US, HostBoard, configured, convert, error_of, settle, streaming_board
+from support.host_flash import HostFlash
+
+Array = NDArray[np.float64]
+
+RAD_S = np.radians(8.75e-3)  # per count of the LSM9DS1 at 245 °/s
+SCALE, BIAS_RAD_S = np.array([1.1771, 1.1554, 1.1440]), np.array([0.0077, -0.0100, -0.0051])
+CALIBRATION: dict[str, Any] = {
+    "model": 1,
+    "serial_number": "LSM-0042",
+    "written_unix_s": 1_790_000_000,
+    "temperature_c": 23.5,
+    "scale": tuple(SCALE),
+    "bias_rad_s": tuple(BIAS_RAD_S),
+}
+
+
+def test_a_calibration_is_read_back_as_written_with_the_part_it_belongs_to() -> None:
+    board = HostBoard()
+    assert error_of(board.ask("read_calibration", sensor=0)) == "no_calibration"
+    configured(board, 0, 238, 245)
+    (ack,) = board.ask("write_calibration", sensor=0, **CALIBRATION)
+    assert ack.name == "ack"
+    board.core.board_reset()
+    (stored,) = board.ask("read_calibration", sequence=9, sensor=0)
+    values = stored.values
+    assert (values["reply_to"], values["sensor"], values["sequence"], values["who_am_i"]) == (9, 0, 1, 0x68)
+    assert (text(values["part"]), text(values["serial_number"])) == ("LSM9DS1", "LSM-0042")
+    assert (values["range_deg_s"], values["written_unix_s"], values["temperature_c"]) == (245, 1_790_000_000, 23.5)
+    assert values["scale"] == pytest.approx(SCALE, rel=1e-7)
+    assert values["bias_rad_s"] == pytest.approx(BIAS_RAD_S, rel=1e-7)
+    (ack,) = board.ask("erase_calibration", sensor=0)
+    assert ack.name == "ack"
+    assert error_of(board.ask("read_calibration", sensor=0)) == "no_calibration"
+
+
+def test_a_write_that_comes_twice_is_stored_once() -> None:
+    board, flash = HostBoard(), HostFlash()
+    configured(board, 0, 238, 245)
+    board.ask("write_calibration", sensor=0, **CALIBRATION)
+    done = len(flash.operations)
+    (ack,) = board.ask("write_calibration", sensor=0, **CALIBRATION)
+    assert ack.name == "ack" and len(flash.operations) == done
+    board.ask("write_calibration", sensor=0, **CALIBRATION | {"written_unix_s": 1_790_000_001})
+    assert len(flash.operations) == 2 * done
+
+
+NAN, INFINITY = float("nan"), float("inf")
+
+
+@pytest.mark.parametrize(
+    "wrong",
+    [
+        {"model": 0},
+        {"model": 2},
+        {"scale": (1.0, 0.0, 1.0)},
+        {"scale": (1.0, -1.0, 1.0)},
+        {"scale": (NAN, 1.0, 1.0)},
+        {"scale": (1.0, 1.0, INFINITY)},
+        {"scale": (1e30, 1.0, 1.0)},
+        {"bias_rad_s": (0.0, NAN, 0.0)},
+        {"bias_rad_s": (0.0, 0.0, -INFINITY)},
+        {"bias_rad_s": (-1e30, 0.0, 0.0)},
+    ],
+)
+def test_a_calibration_that_cannot_be_right_is_refused_and_the_stored_one_stays(wrong: dict[str, Any]) -> None:
+    board = HostBoard()
+    configured(board, 0, 238, 245)
+    board.ask("write_calibration", sensor=0, **CALIBRATION)
+    assert error_of(board.ask("write_calibration", sensor=0, **CALIBRATION | wrong)) == "bad_calibration"
+    (stored,) = board.ask("read_calibration", sensor=0)
+    assert stored.values["sequence"] == 1
+
+
+def test_requests_about_calibrations_are_refused_by_name() -> None:
+    board = HostBoard()
+    for name, values in (("read_calibration", {}), ("write_calibration", CALIBRATION), ("erase_calibration", {})):
+        assert error_of(board.ask(name, sensor=3, **values)) == "no_such_sensor"
+    assert error_of(board.ask("write_calibration", sensor=0, **CALIBRATION)) == "not_configured"
+    configured(board, 0, 238, 245)
+    board.gyro.values[0x0F] = 0x00
+    assert error_of(board.ask("write_calibration", sensor=0, **CALIBRATION)) == "sensor_absent"
+    streaming = streaming_board()
+    assert error_of(streaming.ask("write_calibration", sensor=0, **CALIBRATION)) == "busy_streaming"
+    assert error_of(streaming.ask("erase_calibration", sensor=0)) == "busy_streaming"
+    assert error_of(streaming.ask("read_calibration", sensor=0)) == "no_calibration"
+
+
+def test_flash_that_fails_is_named() -> None:
+    board, flash = HostBoard(), HostFlash()
+    configured(board, 0, 238, 245)
+    flash.power_up(lasts=3)
+    assert error_of(board.ask("write_calibration", sensor=0, **CALIBRATION)) == "flash_failed"
+    assert error_of(board.ask("erase_calibration", sensor=0)) == "flash_failed"
+
+
+# Streaming calibrated
+
+
+def calibrated_board(calibration: dict[str, Any] = CALIBRATION) -> HostBoard:
+    """An LSM9DS1 that has just been started to send calibrated rates."""
+    board = HostBoard()
+    configured(board, 0, 238, 245)
+    board.ask("write_calibration", sensor=0, **calibration)
+    (ack,) = board.ask("start", sensors=1)
+    assert ack.name == "ack"
+    settle(board)
+    return board
+
+
+def rates(frames: list[Frame]) -> Array:
+    """(n, 3) rad/s of the calibrated batches."""
+    batches = [frame.items["rate_urad_s"] for frame in frames if frame.name == "rates"]
+    return np.concatenate(batches) * 1e-6
+
+
+def test_calibrated_rates_are_k_times_m_plus_b_to_the_microradian() -> None:
+    board = calibrated_board()
+    counts = np.random.default_rng(4).integers(-32768, 32768, (100, 3))
+    for k, row in enumerate(counts.tolist()):
+        convert(board, (k + 1) * PERIOD_US, row)
+    frames = board.ask("stop")
+    streamed = [frame for frame in frames if frame.name == "rates"]
+    assert {frame.values["mode"] for frame in streamed} == {1}
+    assert [frame.values["sequence"] for frame in streamed] == list(range(0, 100, 12))
+    assert {int(temperature) for frame in streamed for temperature in frame.items["temperature_counts"]} == {-48}
+    times = np.concatenate([f.values["base_time_us"] + f.items["delta_us"].astype(np.int64) for f in streamed])
+    assert times.tolist() == [(k + 1) * PERIOD_US for k in range(100)]
+    assert rates(frames) == pytest.approx(SCALE * (counts * RAD_S + BIAS_RAD_S), abs=1.5e-6)
+
+
+def test_calibrated_rates_are_rounded_not_cut_off() -> None:
+    urad_per_count = 1e6 * RAD_S  # 152.7
+    board = calibrated_board(CALIBRATION | {"scale": (1.0, 1.0, 1.0), "bias_rad_s": (0.0, 0.0, 0.0)})
+    for count in range(1, 30):
+        convert(board, count * PERIOD_US, (count, -count, 0))
+    exact = np.arange(1, 30) * urad_per_count
+    rounded = np.round(rates(board.ask("stop")) * 1e6)
+    assert rounded[:, 0].tolist() == np.round(exact).tolist()
+    assert rounded[:, 1].tolist() == np.round(-exact).tolist()
+
+
+def test_one_sensor_streams_calibrated_beside_another_that_streams_raw() -> None:
+    board = HostBoard()
+    configured(board, 0, 238, 245)
+    configured(board, 2)
+    board.ask("write_calibration", sensor=2, **CALIBRATION)
+    (ack,) = board.ask("start", sensors=4)
+    assert ack.name == "ack"
+    for k in range(1, 80):
+        convert(board, 10_000 * k)
+        convert(board, 10_000 * k + 5_000, sensor=2)
+    modes = {(frame.name, frame.values["sensor"], frame.values["mode"]) for frame in board.ask("stop")[:-1]}
+    assert modes == {("samples", 0, 0), ("rates", 2, 1)}
+
+
+def test_rates_that_do_not_fit_are_the_largest_that_do() -> None:
+    board = calibrated_board(CALIBRATION | {"scale": (1e5, 1e5, 1.0), "bias_rad_s": (0.0, 0.0, 0.0)})
+    convert(board, PERIOD_US, (32767, -32768, 0))
+    assert rates(board.ask("stop")) == pytest.approx(np.array([[2147.483647, -2147.483647, 0.0]]), abs=1e-9)
+
+
+def test_a_start_that_comes_twice_changes_nothing_and_another_mode_is_refused() -> None:
+    board = calibrated_board()
+    convert(board, PERIOD_US)
+    assert [frame.name for frame in board.ask("start", sensors=1)] == ["ack"]
+    assert error_of(board.ask("start", sensors=0)) == "busy_streaming"
+    convert(board, 2 * PERIOD_US)
+    frames = board.ask("stop")
+    assert [(frame.name, frame.values.get("sequence"), len(frame.items)) for frame in frames] == [
+        ("rates", 0, 2),
+        ("ack", None, 0),
+    ]
+
+
+def test_a_calibrated_start_without_a_fitting_calibration_is_refused() -> None:
+    board = HostBoard()
+    assert error_of(board.ask("start", sensors=8)) == "no_such_sensor"
+    configured(board, 0, 238, 245)
+    assert error_of(board.ask("start", sensors=1)) == "no_calibration"
+    assert error_of(board.ask("start", sensors=3)) == "not_configured"
+    board.ask("write_calibration", sensor=0, **CALIBRATION)
+    configured(board, 0, 238, 500)
+    assert error_of(board.ask("start", sensors=1)) == "other_sensor"
+    configured(board, 0, 238, 245)
+    board.gyro.values[0x0F] = 0xFF
+    assert error_of(board.ask("start", sensors=1)) == "sensor_absent"
+    board.gyro.values[0x0F] = 0x68
+    (ack,) = board.ask("start", sensors=1)
+    assert ack.name == "ack"
+
+
+def test_what_is_kept_is_uncalibrated_also_while_the_stream_is_calibrated() -> None:
+    board = calibrated_board()
+    assert [frame.name for frame in board.ask("keep", sensors=1, duration_s=1.0)] == ["ack"]
+    for k in range(1, 30):
+        convert(board, k * PERIOD_US, (1000, 0, 0))
+    frames = board.ask("observe", sensor=0, index=0, start_us=PERIOD_US, end_us=20 * PERIOD_US, speed_rad_s=1.0)
+    (observed,) = [frame for frame in frames if frame.name == "observed"]
+    assert observed.values["mean_rad_s"] == pytest.approx((1000 * RAD_S, 0, 0))

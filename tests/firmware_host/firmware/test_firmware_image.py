@@ -1,0 +1,146 @@
+"""The shipped image is what the sources build, and the register header is what the chip's maker describes."""
+
+import re
+import shutil
+import subprocess
+import xml.etree.ElementTree as ET
+import zipfile
+from collections.abc import Callable
+from pathlib import Path
+
+import pyocd
+import pytest
+from elftools.elf.elffile import ELFFile
+from elftools.elf.sections import SymbolTableSection
+
+from support.paths import FIRMWARE
+
+IMAGE = FIRMWARE / "image"
+PORT = FIRMWARE / "port_l432"
+
+FLASH, FLASH_SIZE = 0x08000000, 32 * 1024
+RAM, RAM_SIZE = 0x20000000, 32 * 1024
+
+
+# The image
+
+
+def compiler_of(elf_path: Path) -> str:
+    """What the compiler wrote about itself into the program."""
+    with elf_path.open("rb") as file:
+        comment = ELFFile(file).get_section_by_name(".comment")
+        assert comment is not None
+        return str(comment.data().rstrip(b"\0").decode())
+
+
+def test_the_sources_build_the_committed_image_byte_for_byte_wherever_they_lie(tmp_path: Path) -> None:
+    elsewhere = tmp_path / "a folder of another name"
+    shutil.copytree(FIRMWARE, elsewhere, ignore=shutil.ignore_patterns("image"))
+    subprocess.run(["make", "-C", elsewhere], check=True, capture_output=True)
+    assert compiler_of(elsewhere / "image" / "rig_l432.elf") == compiler_of(IMAGE / "rig_l432.elf"), (
+        "another compiler gives other bytes: build with the one the committed image names"
+    )
+    for name in ("rig_l432.bin", "rig_l432.elf"):
+        assert (elsewhere / "image" / name).read_bytes() == (IMAGE / name).read_bytes(), (
+            f"{name}: run `make -C firmware_host/firmware` and commit the image"
+        )
+
+
+def test_the_image_fits_and_starts_with_a_vector_table() -> None:
+    image = (IMAGE / "rig_l432.bin").read_bytes()
+    stack, reset = (int.from_bytes(image[i : i + 4], "little") for i in (0, 4))
+    assert len(image) <= FLASH_SIZE
+    assert RAM < stack <= RAM + RAM_SIZE
+    assert FLASH < reset < FLASH + len(image) and reset & 1, "the reset vector must be a Thumb address in the image"
+
+
+def test_the_elf_is_the_image_with_names_and_little_ram() -> None:
+    with (IMAGE / "rig_l432.elf").open("rb") as file:
+        elf = ELFFile(file)
+        flash = b"".join(s.data() for s in elf.iter_segments() if s["p_paddr"] >= FLASH and s["p_filesz"])
+        ram_end = max(s["sh_addr"] + s["sh_size"] for s in elf.iter_sections() if RAM <= s["sh_addr"] < RAM + 2**16)
+        symbols = elf.get_section_by_name(".symtab")
+        assert isinstance(symbols, SymbolTableSection)
+        names = {symbol.name for symbol in symbols.iter_symbols()}
+    assert (IMAGE / "rig_l432.bin").read_bytes() in flash
+    assert ram_end <= RAM + RAM_SIZE
+    assert {"reset_handler", "main", "board_run", "exti9_5_handler", "fault_handler"} <= names
+
+
+# The register header
+
+
+def svd() -> ET.Element:
+    """The maker's description of the STM32L4x2, as pyOCD's wheel carries it."""
+    archive = Path(pyocd.__file__).parent / "debug" / "svd" / "svd_data.zip"
+    with zipfile.ZipFile(archive) as data:
+        return ET.fromstring(data.read("STM32L4x2.svd"))
+
+
+DEVICE = svd()
+PERIPHERALS = {p.findtext("name"): p for p in DEVICE.iter("peripheral")}
+INTERRUPTS = {i.findtext("name"): int(i.findtext("value", "")) for i in DEVICE.iter("interrupt")}
+HEADER = (PORT / "registers.h").read_text()
+DEFINES = re.findall(r"^#define (\w+(?:\(\w+\))?) (.+?)(?: /\*.*)?$", HEADER, re.MULTILINE)
+
+
+def number(element: ET.Element, tag: str) -> int:
+    return int(element.findtext(tag, ""), 0)
+
+
+def register(peripheral: str, name: str) -> ET.Element:
+    """A register's description, also where one peripheral is described as a copy of another."""
+    element = PERIPHERALS[peripheral]
+    element = PERIPHERALS[element.get("derivedFrom", peripheral)]
+    return next(r for r in element.iter("register") if r.findtext("name") == name)
+
+
+def check_base(name: str, value: str) -> None:
+    assert int(value.rstrip("u"), 16) == number(PERIPHERALS[name.removesuffix("_BASE")], "baseAddress")
+
+
+def check_register(name: str, value: str) -> None:
+    match = re.fullmatch(r"REGISTER\((\w+)_BASE, (0x\w+)u\)", value)
+    assert match is not None and name.startswith(match[1] + "_")
+    element = register(match[1], name.removeprefix(match[1] + "_"))
+    assert int(match[2], 16) == number(element, "addressOffset")
+
+
+def check_field(name: str, value: str) -> None:
+    """A flag is one bit wide; a value shifted into place may be wider."""
+    match = re.fullmatch(r"\((1u|\(value\)) << (\d+)\)?", value)
+    assert match is not None
+    owner = next(r for r in REGISTERS if name.startswith(r + "_"))
+    peripheral = next(b for b in BASES if owner.startswith(b + "_"))
+    fields = register(peripheral, owner.removeprefix(peripheral + "_")).iter("field")
+    element = next(f for f in fields if f.findtext("name") == name.removeprefix(owner + "_").removesuffix("(value)"))
+    assert int(match[2]) == number(element, "bitOffset")
+    assert match[1] == "(value)" or number(element, "bitWidth") == 1
+
+
+def check_interrupt(name: str, value: str) -> None:
+    assert int(value.rstrip("u")) == INTERRUPTS[name.removesuffix("_IRQ")]
+
+
+BASES = [name.removesuffix("_BASE") for name, _ in DEFINES if name.endswith("_BASE")]
+REGISTERS = [name for name, value in DEFINES if value.startswith("REGISTER(")]
+
+
+def check_of(name: str) -> Callable[[str, str], None]:
+    if name.endswith("_BASE"):
+        return check_base
+    if name.endswith("_IRQ"):
+        return check_interrupt
+    return check_register if name in REGISTERS else check_field
+
+
+@pytest.mark.parametrize(("name", "value"), [define for define in DEFINES if define[0] != "UNIQUE_ID"])
+def test_every_line_of_the_register_header_is_the_makers(name: str, value: str) -> None:
+    check_of(name)(name, value)
+
+
+def test_the_register_header_has_nothing_the_port_does_not_use() -> None:
+    sources = "".join(path.read_text() for path in PORT.glob("*.c")) + HEADER
+    names = [name.split("(")[0] for name, _ in DEFINES]
+    assert [name for name in names if len(re.findall(rf"\b{name}\b", sources)) < 2] == []
+    assert len(names) > 100

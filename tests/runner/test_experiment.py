@@ -1,0 +1,189 @@
+"""The paper's two experiments from end to end: calibrate, store on the board, verify against the reference."""
+
+import json
+import shutil
+import signal
+import subprocess
+import sys
+import time
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+import yaml
+from scipy.spatial.transform import Rotation
+
+from support.paths import CONFIGS
+from support.worlds import fresh_host
+
+EXPERIMENTS = ["lsm9ds1_adis16465", "mpu9250_adis16465"]
+VERIFIED = {"gyro.verification_rms", "gyro.verification_mean", "gyro.verification_reference"}
+
+pytestmark = pytest.mark.timeout(180)  # a whole experiment or two
+
+Finished = tuple[Path, dict[str, Any], dict[str, Any]]
+
+
+def command(*arguments: str | Path) -> list[str]:
+    return [sys.executable, "-m", "rig", *map(str, arguments)]
+
+
+def on_fresh_host() -> list[str]:
+    """Arguments that give a configuration an address of its own."""
+    host = fresh_host()
+    return ["--set", f"arm.host={host}", "--set", f"board.port=socket://{host}:7321"]
+
+
+@pytest.fixture(scope="module", params=EXPERIMENTS)
+def finished(request: pytest.FixtureRequest, tmp_path_factory: pytest.TempPathFactory) -> Finished:
+    """The run folder, result.json and the simulated truth of a finished experiment."""
+    out = tmp_path_factory.mktemp(request.param) / "run"
+    config = CONFIGS / f"{request.param}.yaml"
+    done = subprocess.run(
+        command("run", config, "--out", out, *on_fresh_host()), capture_output=True, text=True, timeout=90, check=False
+    )
+    assert done.returncode == 0, done.stdout + done.stderr
+    world = yaml.safe_load(config.read_text(encoding="utf-8"))["world"]["sensors"]
+    return out, json.loads((out / "result.json").read_text(encoding="utf-8")), world
+
+
+def test_scale_and_bias_agree_with_the_turntable(finished: Finished) -> None:
+    """SIX, Tables II and III: below 1e-3 in scale; the bias within its uncertainty."""
+    _, result, truth = finished
+    gyro = result["sensors"]["gyro"]
+    std = np.sqrt(np.diag(gyro["covariance"]))
+    scale_error = np.array(gyro["scale"]) - truth["gyro"]["scale"]
+    bias_error = np.array(gyro["bias_rad_s"]) - truth["gyro"]["bias_rad_s"]
+    print(f"scale off by {scale_error}, bias by {bias_error / std[3:]} standard deviations")
+    assert np.abs(scale_error).max() < 1e-3
+    assert np.all(np.abs(bias_error) < 4 * std[3:])
+
+
+def test_the_board_solves_as_the_computer_does(finished: Finished) -> None:
+    _, result, truth = finished
+    board = result["sensors"]["gyro"]["board"]
+    print(f"board and host differ by {board['scale_difference']:.1e} and {board['bias_difference_rad_s']:.1e} rad/s")
+    assert board["scale_difference"] <= 1e-4 and board["bias_difference_rad_s"] <= 1e-5
+    assert board["solutions"]["closed_form"]["observations"] == 6
+    published = board["solutions"]["algorithm_1"]
+    assert published["status"] == "solved" and np.allclose(published["scale"], truth["gyro"]["scale"], atol=2e-3)
+    assert {check["name"] for check in result["checks"]} >= {"gyro.board_scale", "gyro.board_bias"}
+    assert "board" not in result["sensors"]["reference"]
+
+
+def test_calibrated_readings_follow_the_reference(finished: Finished) -> None:
+    """SIX, Tables IV and V."""
+    out, result, _ = finished
+    verification = result["verification"]["gyro"]
+    before, after = (np.array(verification[when]["movement"]["rms_rad_s"]) for when in ("before", "after"))
+    print(f"RMS before {before}, after {after} rad/s")
+    assert np.all(after < 0.01) and before.max() > 5 * after.max()
+    assert np.allclose(np.square(after), verification["after"]["movement"]["mse_rad2_s2"])
+    for when in ("before", "after"):
+        for suffix in (".png", ".svg"):
+            assert (out / f"verification_gyro_{when}{suffix}").stat().st_size > 10_000
+
+
+def test_the_references_mounting_is_found(finished: Finished) -> None:
+    """The simulated sensors sit askew by their own mounting errors; what is between them is reported.
+
+    Where axes are not at right angles, a sensor's frame is the right-angled one nearest to them.
+    """
+    _, result, truth = finished
+    rotation = result["verification"]["gyro"]["rotation"]
+    xy, xz, yz = np.sin(np.radians(truth["gyro"]["non_orthogonality_deg"]))
+    axes = np.array([[1, 0, 0], [xy, np.sqrt(1 - xy**2), 0], [xz, yz, np.sqrt(1 - xz**2 - yz**2)]])
+    left, _, right = np.linalg.svd(axes)
+    gyro, reference = (
+        Rotation.from_rotvec(truth[name]["mounting_error_deg"], degrees=True).as_matrix().T @ nominal
+        for name, nominal in (("gyro", np.eye(3)), ("reference", np.array([[0, 1, 0], [-1, 0, 0], [0, 0, 1]])))
+    )
+    off = Rotation.from_matrix(np.array(rotation["matrix"]) @ (left @ right @ gyro @ reference.T).T).as_rotvec()
+    assert np.all(np.abs(off) < 5 * np.array(rotation["std_rad"])) and max(rotation["std_rad"]) < 5e-5
+
+
+def test_the_stored_calibration_is_the_one_that_was_found(finished: Finished) -> None:
+    out, result, _ = finished
+    log = (out / "log.txt").read_text(encoding="utf-8")
+    assert "stored on the board: gyro" in log
+    kept = result["provenance"]["stored_calibrations"]["gyro"]
+    assert np.allclose(kept["scale"], result["sensors"]["gyro"]["scale"], rtol=1e-6)
+    again = subprocess.run(command("solve", out, "--json"), capture_output=True, text=True, timeout=90, check=False)
+    assert again.returncode == 0, again.stderr
+    solved = json.loads(again.stdout)
+    assert solved["sensors"] == result["sensors"] and solved["verification"] == result["verification"]
+
+
+def test_a_verifications_recording_alone_is_no_calibration(finished: Finished) -> None:
+    out, _, _ = finished
+    alone = subprocess.run(
+        command("solve", out / "verify.h5", "--json"), capture_output=True, text=True, timeout=90, check=False
+    )
+    document = json.loads(alone.stdout)
+    assert document["sensors"] == {} and document["verification"]["gyro"]["before"] is None
+    assert {check["name"] for check in document["checks"]} == VERIFIED
+
+
+def test_a_calibration_whose_verification_is_missing_has_not_passed(finished: Finished, tmp_path: Path) -> None:
+    out, _, _ = finished
+    shutil.copy(out / "run.h5", tmp_path)
+    half = subprocess.run(command("solve", tmp_path, "--json"), capture_output=True, text=True, timeout=90, check=False)
+    assert half.returncode == 1, half.stderr
+    missing = {check["name"] for check in json.loads(half.stdout)["checks"] if check["value"] is None}
+    assert missing == VERIFIED
+
+
+@pytest.mark.parametrize("finished", EXPERIMENTS[:1], indirect=True)
+def test_a_stored_calibration_is_verified_later(finished: Finished, tmp_path: Path) -> None:
+    """The board remembers over a power cycle: another process, another laboratory, the same flash."""
+    out, result, _ = finished
+    config = out / "config.yaml"
+    addressed = [*on_fresh_host(), "--set", f"world.board.flash_file={tmp_path / 'flash.bin'}"]
+    script = CONFIGS.parent / "procedures" / "verify.py"
+    nothing = [sys.executable, str(script), str(config), *addressed, "--out", str(tmp_path / "nothing")]
+    refused = subprocess.run(nothing, capture_output=True, text=True, timeout=90, check=False)
+    assert refused.returncode == 2 and "no_calibration" in refused.stderr, refused.stderr
+    stored = subprocess.run(
+        command("board", "calibration", "write", config, out, "--yes", *addressed),
+        capture_output=True, text=True, timeout=90, check=False,
+    )  # fmt: skip
+    assert stored.returncode == 0, stored.stderr
+    again = [sys.executable, str(script), str(config), *addressed, "--out", str(tmp_path / "again"), "--json"]
+    verified = subprocess.run(again, capture_output=True, text=True, timeout=90, check=False)
+    assert verified.returncode == 0, verified.stdout + verified.stderr
+    document = json.loads(verified.stdout)
+    assert document["sensors"] == {} and document["verification"]["gyro"]["before"] is None
+    kept = document["provenance"]["stored_calibrations"]["gyro"]
+    assert np.allclose(kept["scale"], result["sensors"]["gyro"]["scale"], rtol=1e-6)
+
+
+def test_a_failed_calibration_is_neither_stored_nor_verified(tmp_path: Path) -> None:
+    out = tmp_path / "run"
+    strict = ["--set", "limits.scale_deviation=0.01", "--set", "world.time_scale=12"]
+    done = subprocess.run(
+        command("run", CONFIGS / "lsm9ds1_adis16465.yaml", "--out", out, *on_fresh_host(), *strict),
+        capture_output=True, text=True, timeout=90, check=False,
+    )  # fmt: skip
+    assert done.returncode == 1, done.stderr
+    assert "not verified: the calibration failed its limits" in done.stderr and not (out / "verify.h5").exists()
+    checks = {check["name"]: check for check in json.loads((out / "result.json").read_text())["checks"]}
+    assert checks["gyro.verification_rms"]["value"] is None and not checks["gyro.verification_rms"]["passed"]
+
+
+def test_an_interrupted_verification_is_resumed(tmp_path: Path) -> None:
+    out = tmp_path / "run"
+    process = subprocess.Popen(
+        command("run", CONFIGS / "lsm9ds1_adis16465.yaml", "--out", out, *on_fresh_host()),
+        stdout=subprocess.DEVNULL, stderr=subprocess.PIPE, text=True,
+    )  # fmt: skip
+    deadline_s = time.monotonic() + 40
+    while not (out / "verify.h5").exists() or "stored on the board" not in (out / "log.txt").read_text():
+        assert time.monotonic() < deadline_s and process.poll() is None, process.communicate()[1]
+        time.sleep(0.05)
+    process.send_signal(signal.SIGINT)
+    _, errors = process.communicate(timeout=20)
+    assert process.returncode == 130 and f"rig resume {out}" in errors
+    resumed = subprocess.run(command("resume", out), capture_output=True, text=True, timeout=90, check=False)
+    assert resumed.returncode == 0, resumed.stdout + resumed.stderr
+    assert json.loads((out / "result.json").read_text())["verification"]["gyro"]["before"] is not None

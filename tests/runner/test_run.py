@@ -1,0 +1,196 @@
+"""The whole chain as a technician uses it: command line, real clients, real firmware, simulated laboratory."""
+
+import json
+import signal
+import subprocess
+import sys
+import time
+from collections.abc import Callable, Iterator
+from pathlib import Path
+from typing import Any
+
+import h5py
+import numpy as np
+import pytest
+import yaml
+
+from support.paths import ROOT
+from support.worlds import fresh_host, merge
+
+CI = ROOT / "configs" / "ci.yaml"
+
+Start = Callable[..., subprocess.Popen[str]]
+
+
+def rig(*arguments: str | Path) -> subprocess.CompletedProcess[str]:
+    return subprocess.run(
+        [sys.executable, "-m", "rig", *map(str, arguments)], capture_output=True, text=True, timeout=50, check=False
+    )
+
+
+def configuration(folder: Path, changes: dict[str, Any] | None = None) -> Path:
+    """ci.yaml on an address of its own, with changes."""
+    host = fresh_host()
+    address = {"arm": {"host": host}, "board": {"port": f"socket://{host}:7321"}}
+    document = merge(merge(yaml.safe_load(CI.read_text(encoding="utf-8")), address), changes or {})
+    path = folder / "config.yaml"
+    path.write_text(yaml.safe_dump(document, sort_keys=False), encoding="utf-8")
+    return path
+
+
+@pytest.fixture
+def start() -> Iterator[Start]:
+    """Starts `rig …` in the background; whatever still runs at the end of the test is killed."""
+    running: list[subprocess.Popen[str]] = []
+
+    def popen(*arguments: str | Path) -> subprocess.Popen[str]:
+        command = [sys.executable, "-m", "rig", *map(str, arguments)]
+        process = subprocess.Popen(command, stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True)
+        running.append(process)
+        return process
+
+    yield popen
+    for process in running:
+        process.kill()
+        process.communicate()
+
+
+def wait_for_log(folder: Path, words: str, timeout_s: float = 30.0) -> None:
+    """Until the run's log says so."""
+    log = folder / "log.txt"
+    deadline_s = time.monotonic() + timeout_s
+    while not (log.exists() and words in log.read_text(encoding="utf-8")):
+        assert time.monotonic() < deadline_s, f"{log} never said {words!r}"
+        time.sleep(0.01)
+
+
+@pytest.fixture(scope="module")
+def finished(tmp_path_factory: pytest.TempPathFactory) -> tuple[Path, dict[str, Any], subprocess.CompletedProcess[str]]:
+    """One finished run: its folder, result.json and what the command printed."""
+    folder = tmp_path_factory.mktemp("finished")
+    out = folder / "run"
+    done = rig("run", configuration(folder), "--out", out)
+    assert done.returncode == 0, done.stderr
+    return out, json.loads((out / "result.json").read_text(encoding="utf-8")), done
+
+
+def test_a_run_recovers_the_simulated_truth(finished: tuple[Path, dict[str, Any], Any]) -> None:
+    out, result, _ = finished
+    truth = yaml.safe_load((out / "config.yaml").read_text(encoding="utf-8"))["world"]["sensors"]["gyro"]
+    sensor = result["sensors"]["gyro"]
+    estimate = np.array(sensor["scale"] + sensor["bias_rad_s"])
+    std = np.sqrt(np.diag(sensor["covariance"]))
+    error = estimate - np.array(truth["scale"] + truth["bias_rad_s"])
+    assert np.all(np.abs(error) < 4 * std), error / std
+    assert np.all(std[:3] < 0.003) and np.all(std[3:] < 0.005)
+
+
+def test_a_run_leaves_everything_in_its_folder(finished: tuple[Path, dict[str, Any], Any]) -> None:
+    out, result, done = finished
+    assert result["schema"] == "rig.result/1" and result["verdict"] == "pass"
+    assert result["sensors"]["gyro"]["model"] == "g = K (m + b)"
+    assert [o["joint"] for o in result["sensors"]["gyro"]["observations"]] == [
+        "wrist_3", "wrist_3", "wrist_1", "wrist_1", "wrist_2", "wrist_2",
+    ]  # fmt: skip
+    assert "done: sweep wrist_2 ccw" in (out / "log.txt").read_text(encoding="utf-8")
+    assert f"gyro_scale[3] = {{{result['sensors']['gyro']['scale'][0]:.9e}f" in (out / "calibration.h").read_text()
+    assert ", vector" in done.stdout and "six_observation: k" in done.stdout and "non-orthogonality" in done.stdout
+    assert "verdict: PASS" in done.stdout and f"{result['sensors']['gyro']['scale'][0]:.5f}" in done.stdout
+    with h5py.File(out / "run.h5", "r") as file:
+        assert "scale: [" not in file.attrs["config"], "the recording must not hold the simulated truth"
+        states = file["arm"]["time_s"]
+        assert np.median(np.diff(states)) <= 1 / 125 + 1e-9
+        sequence = file["samples/gyro"]["sequence"]
+        assert np.array_equal(sequence, np.arange(len(sequence))), "samples are missing"
+
+
+def test_solve_gives_the_numbers_of_the_run(finished: tuple[Path, dict[str, Any], Any]) -> None:
+    out, result, _ = finished
+    again = rig("solve", out / "run.h5", "--json")
+    assert again.returncode == 0, again.stderr
+    assert json.loads(again.stdout)["sensors"] == result["sensors"]
+
+
+def test_the_papers_algorithm_agrees(finished: tuple[Path, dict[str, Any], Any]) -> None:
+    out, result, _ = finished
+    published = json.loads(rig("solve", out, "--estimator", "algorithm_1", "--json").stdout)["sensors"]["gyro"]
+    assert published["estimator"] == "algorithm_1" and published["iterations"] >= 2
+    beside = result["sensors"]["gyro"]
+    assert beside["estimator"] == "vector" and beside["six_observation"]["estimator"] == "newton"
+    assert np.allclose(published["scale"], beside["six_observation"]["scale"], atol=1e-4)
+    assert beside["algorithm_1"] == {name: published[name] for name in beside["algorithm_1"]}
+
+
+@pytest.mark.parametrize("estimator", ["vector", "newton", "levenberg_marquardt"])
+def test_every_estimator_recovers_the_truth(finished: tuple[Path, dict[str, Any], Any], estimator: str) -> None:
+    out, result, _ = finished
+    solved = json.loads(rig("solve", out, "--estimator", estimator, "--json").stdout)["sensors"]["gyro"]
+    assert (
+        solved["estimator"] == estimator and solved["six_observation"] == result["sensors"]["gyro"]["six_observation"]
+    )
+    truth = yaml.safe_load((out / "config.yaml").read_text(encoding="utf-8"))["world"]["sensors"]["gyro"]
+    error = np.array(solved["scale"] + solved["bias_rad_s"]) - np.array(truth["scale"] + truth["bias_rad_s"])
+    assert np.all(np.abs(error) < 4 * np.sqrt(np.diag(solved["covariance"])))
+
+
+def test_the_script_runs_as_the_command_does_and_limits_that_are_not_met_fail(tmp_path: Path) -> None:
+    script = [sys.executable, str(ROOT / "procedures" / "six_observation.py")]
+    config = configuration(tmp_path, {"limits": {"scale_deviation": 0.01}})
+    done = subprocess.run([*script, str(config)], cwd=tmp_path, capture_output=True, text=True, timeout=50, check=False)
+    assert done.returncode == 1, done.stderr
+    assert len(list((tmp_path / "runs").glob("*-six_observation/result.json"))) == 1
+    assert "verdict: FAIL" in done.stdout and "gyro.scale_deviation" in done.stdout
+
+
+def test_an_interrupted_run_is_kept_and_resumed(start: Start, tmp_path: Path) -> None:
+    out = tmp_path / "run"
+    process = start("run", configuration(tmp_path, {"world": {"time_scale": 4}}), "--out", out)
+    wait_for_log(out, "done: sweep wrist_3 ccw")
+    interrupted_s = time.monotonic()
+    process.send_signal(signal.SIGINT)
+    _, errors = process.communicate(timeout=20)
+    assert process.returncode == 130
+    assert time.monotonic() - interrupted_s < 4
+    assert f"rig resume {out}" in errors and "Traceback" not in errors
+    assert not (out / "result.json").exists()
+
+    used = (out / "config.yaml").read_text(encoding="utf-8")
+    for change, name in (
+        ({"world": {"board": {"unique_id": "f" * 24}}}, "another_board"),
+        ({"procedure": {"order": ["wrist_1", "wrist_3", "wrist_2"]}}, "another_procedure"),
+    ):
+        (out / "config.yaml").write_text(yaml.safe_dump(merge(yaml.safe_load(used), change)), encoding="utf-8")
+        refused = rig("resume", out)
+        assert refused.returncode == 2 and f"rig: {name}: " in refused.stderr, refused.stderr
+    (out / "config.yaml").write_text(used, encoding="utf-8")
+
+    resumed = rig("resume", out)
+    assert resumed.returncode == 0, resumed.stderr
+    result = json.loads((out / "result.json").read_text(encoding="utf-8"))
+    assert [o["sweep"] for o in result["sensors"]["gyro"]["observations"]] == [0, 1, 2, 3, 4, 5]
+    assert len(result["sensors"]["gyro"]["time_bases"]) == 2
+    assert resumed.stderr.count("done: sweep") == 4
+    assert json.loads(rig("solve", out, "--json").stdout)["sensors"] == result["sensors"]
+
+
+def test_a_run_goes_on_when_nobody_reads_what_it_says(start: Start, tmp_path: Path) -> None:
+    out = tmp_path / "run"
+    process = start("run", configuration(tmp_path), "--out", out)
+    assert process.stderr is not None and process.stdout is not None
+    process.stderr.readline()
+    process.stderr.close()
+    process.stdout.close()
+    assert process.wait(50) == 0
+    assert json.loads((out / "result.json").read_text(encoding="utf-8"))["verdict"] == "pass"
+
+
+def test_a_run_that_was_refused_begins_with_resume(tmp_path: Path) -> None:
+    config = configuration(tmp_path)
+    document = yaml.safe_load(config.read_text(encoding="utf-8"))
+    del document["world"]
+    config.write_text(yaml.safe_dump(document), encoding="utf-8")
+    out = tmp_path / "a run"
+    assert "rig: no_port: " in rig("run", config, "--out", out).stderr
+    again = rig("run", config, "--out", out)
+    assert again.returncode == 2 and f"rig resume '{out}'" in again.stderr
+    assert "rig: no_port: " in rig("resume", out).stderr, "resume is what was advised, so it must go on to the board"

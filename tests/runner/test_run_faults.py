@@ -1,0 +1,270 @@
+"""A run that goes wrong: the arm stops, the data stay, the error has a name, the exit status is the promised one."""
+
+import json
+import os
+import pty
+import signal
+import socket
+import subprocess
+import sys
+import time
+from collections.abc import Callable, Iterator
+from contextlib import suppress
+from pathlib import Path
+from typing import Any
+
+import pytest
+import yaml
+
+from rig.data.run_file import read_run
+from support.worlds import World, WorldHandle
+
+Start = Callable[..., "RunningRig"]
+
+
+class RunningRig:
+    """`rig run` on a world that stays when the run ends, so that a test can ask what the arm does."""
+
+    def __init__(self, world: WorldHandle, folder: Path, *arguments: str) -> None:
+        document = yaml.safe_load(world.config_path.read_text(encoding="utf-8"))
+        del document["world"]
+        config = folder / "hardware.yaml"
+        config.write_text(yaml.safe_dump(document), encoding="utf-8")
+        self.world = world
+        self.out = folder / "run"
+        self.process = subprocess.Popen(
+            [sys.executable, "-m", "rig", "run", str(config), "--out", str(self.out), *arguments],
+            stdin=subprocess.DEVNULL,
+            stdout=subprocess.PIPE,
+            stderr=subprocess.PIPE,
+            text=True,
+            start_new_session=True,
+        )
+
+    def send(self, number: signal.Signals) -> None:
+        """A signal to the command and all its processes in the foreground, as a terminal sends it."""
+        os.killpg(self.process.pid, number)
+
+    def until(self, condition: Callable[[dict[str, Any]], bool], timeout_s: float = 30.0) -> dict[str, Any]:
+        """Wait for a state of the world."""
+        deadline_s = time.monotonic() + timeout_s
+        while not condition(state := self.world.state()):
+            assert time.monotonic() < deadline_s and self.process.poll() is None, self.process.communicate()
+            time.sleep(0.005)
+        return state
+
+    def until_sweeping(self) -> None:
+        """Wait until wrist 3 turns clockwise through the middle of its first sweep."""
+        self.until(lambda state: state["qd_rad_s"][5] < -0.5 and abs(state["q_rad"][5]) < 1.0)
+
+    def stopped_after_s(self) -> float:
+        """How long the arm still moved, in wall time."""
+        began_s = time.monotonic()
+        while self.world.state()["moving"]:
+            assert time.monotonic() - began_s < 10, "the arm still moves"
+            time.sleep(0.005)
+        return time.monotonic() - began_s
+
+    def end(self) -> tuple[int, str]:
+        """Exit status and stderr."""
+        _, errors = self.process.communicate(timeout=30)
+        assert "Traceback" not in errors
+        return self.process.returncode, errors
+
+
+@pytest.fixture
+def start(world: World, tmp_path: Path) -> Iterator[Start]:
+    running: list[RunningRig] = []
+
+    def run(changes: dict[str, Any] | None = None, *arguments: str, before: Any = None) -> RunningRig:
+        handle = world({"world": {"time_scale": 2}, **(changes or {})})
+        if before is not None:
+            handle.control(before)
+        running.append(RunningRig(handle, tmp_path, *(arguments or ("--yes",))))
+        return running[-1]
+
+    yield run
+    for each in running:
+        each.process.kill()
+        each.process.communicate()
+
+
+@pytest.mark.parametrize(
+    "number",
+    [signal.SIGINT, signal.SIGTERM, signal.SIGQUIT, signal.SIGTSTP],
+    ids=["Ctrl-C", "SIGTERM", "Ctrl-backslash", "Ctrl-Z"],
+)
+def test_an_interrupt_stops_the_arm_within_a_second(start: Start, number: signal.Signals) -> None:
+    rig = start()
+    rig.until_sweeping()
+    rig.send(number)
+    assert rig.stopped_after_s() < 1.0
+    status, errors = rig.end()
+    assert status == 130
+    assert "interrupted; the arm is stopped and at rest; " in errors
+    assert f"rig resume {rig.out}" in errors
+    assert not rig.world.state()["program_running"]
+    run = read_run(rig.out / "run.h5")
+    assert len(run.samples["gyro"]) > 0 and len(run.arm) > 0
+
+
+def test_killing_all_processes_at_once_stops_the_arm(start: Start) -> None:
+    rig = start()
+    rig.until_sweeping()
+    rig.send(signal.SIGKILL)
+    assert rig.stopped_after_s() < 1.0
+    rig.process.wait()
+    state = rig.world.state()
+    assert not state["program_running"] and abs(state["q_rad"][5]) < 3, "the arm went on to the end of its sweep"
+
+
+def test_resuming_a_run_that_still_goes_on_leaves_it_alone(start: Start) -> None:
+    rig = start()
+    rig.until_sweeping()
+    command = [sys.executable, "-m", "rig", "resume", str(rig.out), "--yes"]
+    second = subprocess.run(command, capture_output=True, text=True, timeout=30, check=False)
+    assert second.returncode == 2, second.stderr
+    time_s = rig.world.state()["time_s"]
+    rig.until(lambda state: state["time_s"] > time_s + 1.0)
+    rig.send(signal.SIGINT)
+    rig.end()
+    run = read_run(rig.out / "run.h5")
+    assert run.arm["time_s"][-1] > time_s + 0.5, "what came after the second command is lost"
+
+
+def test_the_arm_stops_when_the_program_freezes(start: Start) -> None:
+    rig = start({"world": {"time_scale": 0.5}})
+    rig.until_sweeping()
+    rig.process.send_signal(signal.SIGSTOP)
+    assert rig.stopped_after_s() < 5.0, "the sweep goes on for 6 s"
+    assert abs(rig.world.state()["q_rad"][5]) < 3.3, "the arm swept on to its end"
+    rig.process.send_signal(signal.SIGCONT)
+    assert rig.end()[0] == 3
+
+
+@pytest.mark.parametrize(
+    ("fault", "name"),
+    [
+        ({"do": "protective_stop"}, "protective_stop"),
+        ({"do": "emergency_stop"}, "emergency_stop"),
+        ({"do": "pause"}, "arm_paused"),
+        ({"do": "stop_program"}, "program_stopped"),
+        ({"do": "speed_slider", "fraction": 0.5}, "speed_slider"),
+        ({"do": "close_arm"}, "arm_link_lost"),
+        ({"do": "unplug_board"}, "board_link_lost"),
+        ({"do": "silence_board", "on": True}, "board_link_lost"),
+        ({"do": "reset_board"}, "board_error"),
+    ],
+    ids=lambda value: value if isinstance(value, str) else "",
+)
+def test_a_fault_during_a_sweep_stops_the_arm_and_keeps_the_data(
+    start: Start, fault: dict[str, Any], name: str
+) -> None:
+    rig = start()
+    rig.until_sweeping()
+    rig.world.control(fault)
+    status, errors = rig.end()
+    assert status == 3
+    assert f"rig: {name}: " in errors, errors
+    assert f"rig resume {rig.out}" in errors
+    assert rig.stopped_after_s() == pytest.approx(0, abs=0.1)
+    assert len(read_run(rig.out / "run.h5").arm) > 0
+
+
+def test_resume_repeats_the_sweep_that_was_refused(start: Start) -> None:
+    fast = {"speed_deg_s": 150, "acceleration_deg_s2": 400, "rest_s": 0.5}
+    rig = start({"world": {"time_scale": 4}, "procedure": fast, "limits": {"scale_std": 1, "bias_std_rad_s": 1}})
+    rig.until_sweeping()
+    rig.world.control({"do": "host_baud", "baud": 115200})
+    rig.until(lambda state: state["q_rad"][5] < -2)
+    rig.world.control({"do": "host_baud", "baud": None})
+    status, errors = rig.end()
+    assert status == 3 and "rig: lost_samples: " in errors, errors
+
+    command = [sys.executable, "-m", "rig", "resume", str(rig.out), "--yes"]
+    resumed = subprocess.run(command, capture_output=True, text=True, timeout=40, check=False)
+    assert resumed.returncode == 0, resumed.stderr
+    assert "resuming: 5 of 6 sweeps are recorded, sound and known to the board" in resumed.stderr
+    assert resumed.stderr.count("done: sweep") == 1
+    observations = json.loads((rig.out / "result.json").read_text(encoding="utf-8"))["sensors"]["gyro"]["observations"]
+    assert sorted(o["sweep"] for o in observations) == [0, 1, 2, 3, 4, 5]
+
+
+@pytest.mark.parametrize(
+    ("fault", "name"),
+    [
+        ({"do": "speed_slider", "fraction": 0.5}, "speed_slider"),
+        ({"do": "remote_control", "on": False}, "not_in_remote_control"),
+        ({"do": "power_off"}, "arm_not_running"),
+        ({"do": "register_in_use"}, "registers_in_use"),
+        ({"do": "unplug_board"}, "no_"),
+        ({"do": "silence_board", "on": True}, "no_board"),
+        ({"do": "host_baud", "baud": 115200}, "wrong_baud_rate"),
+    ],
+    ids=lambda value: value if isinstance(value, str) else "",
+)
+def test_what_is_wrong_before_the_start_is_refused_and_nothing_moves(
+    start: Start, fault: dict[str, Any], name: str
+) -> None:
+    rig = start(before=fault)
+    status, errors = rig.end()
+    assert status == 2
+    assert f"rig: {name}" in errors, errors
+    state = rig.world.state()
+    assert not state["moving"] and state["q_rad"][5] == pytest.approx(0, abs=1e-6)
+
+
+def test_nothing_moves_when_nobody_agrees(start: Start) -> None:
+    rig = start(None, "--json")
+    status, errors = rig.end()
+    assert status == 2
+    assert "First it goes home" in errors and "rig: not_confirmed: " in errors
+    assert rig.world.state()["q_rad"][5] == pytest.approx(0, abs=1e-6)
+
+
+def test_an_arm_that_was_moved_while_the_operator_thought_is_not_driven(world: World, tmp_path: Path) -> None:
+    handle = world()
+    document = yaml.safe_load(handle.config_path.read_text(encoding="utf-8"))
+    del document["world"]
+    config = tmp_path / "hardware.yaml"
+    config.write_text(yaml.safe_dump(document), encoding="utf-8")
+    operator, terminal = pty.openpty()
+    command = [sys.executable, "-m", "rig", "run", str(config), "--out", str(tmp_path / "run")]
+    with subprocess.Popen(command, stdin=terminal, stderr=terminal) as process:
+        os.close(terminal)
+        said = b""
+        while b"Type yes to start" not in said:
+            said += os.read(operator, 4096)
+        with socket.create_connection((handle.host, 30002)) as pendant:
+            pendant.sendall(b"def nudge():\n movej([0.2, -1.57, 1.57, -1.57, -1.57, 0], a=1.4, v=1.0)\nend\n")
+            while (state := handle.state())["program_running"] or state["q_rad"][0] < 0.19:
+                time.sleep(0.01)
+        os.write(operator, b"yes\n")
+        with suppress(OSError):  # a terminal whose other end has closed
+            while more := os.read(operator, 4096):
+                said += more
+        assert process.wait(20) == 2
+    os.close(operator)
+    assert b"rig: arm_moved: " in said, said
+    assert handle.state()["q_rad"][0] == pytest.approx(0.2, abs=1e-3)
+
+
+def test_check_looks_and_moves_nothing(world: World, tmp_path: Path) -> None:
+    handle = world()
+    document = yaml.safe_load(handle.config_path.read_text(encoding="utf-8"))
+    del document["world"]
+    config = tmp_path / "hardware.yaml"
+    config.write_text(yaml.safe_dump(document), encoding="utf-8")
+    command = [sys.executable, "-m", "rig", "check", str(config)]
+
+    ready = subprocess.run(command, capture_output=True, text=True, timeout=30, check=False)
+    assert ready.returncode == 0 and ready.stdout.endswith("ready\n"), ready.stderr
+    assert "sensor gyro: LSM9DS1, identity register 0x68" in ready.stdout
+
+    handle.control({"do": "speed_slider", "fraction": 0.3})
+    handle.control({"do": "unplug_board"})
+    missing = subprocess.run(command, capture_output=True, text=True, timeout=30, check=False)
+    assert missing.returncode == 2 and "not ready: 2 to mend" in missing.stdout
+    assert "missing: speed_slider: the speed slider stands at 30 %" in missing.stderr
+    state = handle.state()
+    assert not state["program_running"] and not state["moving"] and state["claims"] == []

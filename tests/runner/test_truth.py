@@ -1,0 +1,43 @@
+"""The rig measures what it says: twenty seeds of the whole chain against the simulated truth."""
+
+import json
+import subprocess
+import sys
+from concurrent.futures import ThreadPoolExecutor
+from functools import partial
+from pathlib import Path
+
+import numpy as np
+import pytest
+import yaml
+
+from support.paths import DEMO
+from support.worlds import fresh_host
+
+SEEDS = range(1, 21)
+
+
+def normalised_errors(seed: int, folder: Path) -> np.ndarray:
+    """(6,) errors of scale and bias over their reported standard deviations, from one run of the demonstration."""
+    host = fresh_host()
+    out = folder / str(seed)
+    command = [sys.executable, "-m", "rig", "run", str(DEMO), "--json", "--out", str(out)]
+    changes = {"world.seed": seed, "arm.host": host, "board.port": f"socket://{host}:7321"}
+    for path, value in changes.items():
+        command += ["--set", f"{path}={value}"]
+    done = subprocess.run(command, capture_output=True, text=True, timeout=60, check=False)
+    assert done.returncode == 0, done.stderr
+    sensor = json.loads(done.stdout)["sensors"]["gyro"]
+    truth = yaml.safe_load(DEMO.read_text(encoding="utf-8"))["world"]["sensors"]["gyro"]
+    error = np.array(sensor["scale"] + sensor["bias_rad_s"]) - np.array(truth["scale"] + truth["bias_rad_s"])
+    return np.asarray(error / np.sqrt(np.diag(sensor["covariance"])))
+
+
+@pytest.mark.timeout(600)
+def test_errors_are_as_large_as_reported(tmp_path: Path) -> None:
+    with ThreadPoolExecutor(2) as two_at_once:  # each run is mostly one process that simulates, and waits for its arm
+        errors = np.array(list(two_at_once.map(partial(normalised_errors, folder=tmp_path), SEEDS)))
+    rms = float(np.sqrt(np.mean(errors**2)))
+    print(f"largest error {np.abs(errors).max():.2f} σ, RMS {rms:.3f} σ over {errors.size} errors")
+    assert np.abs(errors).max() < 4
+    assert 0.8 < rms < 1.2

@@ -1,0 +1,68 @@
+"""Between the halves of a run nobody is asked again, unless the arm was moved meanwhile."""
+
+import os
+import pty
+import socket
+import subprocess
+import sys
+from contextlib import ExitStack, suppress
+from pathlib import Path
+from typing import Any
+
+import yaml
+
+from support.worlds import World
+
+CHANGES: dict[str, Any] = {
+    "arm": {"transfer_speed_deg_s": 170},
+    "sensors": {
+        "gyro": {"rate_hz": 119},
+        "reference": {"part": "adis16465", "serial_number": "ADIS16465-001", "role": "reference"},
+    },
+    "procedure": {"verify": True, "speed_deg_s": 150, "acceleration_deg_s2": 400, "rest_s": 0.5},
+    "limits": {"scale_std": 1, "bias_std_rad_s": 1, "verification_rms_rad_s": 1, "verification_mean_rad_s": 1},
+    "world": {"time_scale": 12, "sensors": {"reference": {"scale": [1.0, 1.0, 1.0], "bias_rad_s": [0.0, 0.0, 0.0]}}},
+}
+NUDGE = b"def nudge():\n movej([0.2, -1.57, 1.57, -1.57, -1.57, 0], a=20, v=3)\nend\n"
+
+
+def test_an_arm_that_was_moved_between_the_halves_goes_on_only_if_somebody_agrees(world: World, tmp_path: Path) -> None:
+    handle = world(CHANGES)
+    document = yaml.safe_load(handle.config_path.read_text(encoding="utf-8"))
+    del document["world"]
+    config, out = tmp_path / "hardware.yaml", tmp_path / "run"
+    config.write_text(yaml.safe_dump(document), encoding="utf-8")
+    operator, terminal = pty.openpty()
+    said = b""
+
+    def read_until(words: bytes, times: int = 1) -> None:
+        nonlocal said
+        while said.count(words) < times:
+            said += os.read(operator, 4096)
+
+    command = [sys.executable, "-m", "rig", "run", str(config), "--out", str(out)]
+    wide = {**os.environ, "COLUMNS": "250"}
+    with (
+        subprocess.Popen(command, stdin=terminal, stdout=subprocess.DEVNULL, stderr=terminal, env=wide) as process,
+        ExitStack() as failed,
+    ):
+        failed.callback(process.kill)
+        os.close(terminal)
+        read_until(b"Type yes to start")
+        assert b"without another question 6 sweeps follow to verify it, for " in said
+        os.write(operator, b"yes\n")
+        read_until(b"stored on the board: gyro")
+        with socket.create_connection((handle.host, 30002)) as pendant:
+            pendant.sendall(NUDGE)
+            read_until(b"Type yes to start", times=2)
+        assert b"First it goes home: base -11" in said
+        os.write(operator, b"no\n")
+        with suppress(OSError):  # a terminal whose other end has closed
+            while more := os.read(operator, 4096):
+                said += more
+        assert process.wait(20) == 3
+        failed.pop_all()
+    os.close(operator)
+    assert b"rig: not_confirmed: " in said and b"go on with: rig resume" in said, said
+    state = handle.state()
+    assert not state["moving"] and abs(state["q_rad"][0] - 0.2) < 1e-3

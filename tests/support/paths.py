@@ -1,0 +1,10 @@
+"""Where the things lie that tests read."""
+
+from pathlib import Path
+
+ROOT = Path(__file__).parents[2]
+CONFIGS = ROOT / "configs"
+DEMO = CONFIGS / "demo.yaml"
+DOCS = ROOT / "docs"
+FIRMWARE = ROOT / "firmware_host" / "firmware"
+IMAGE = FIRMWARE / "image"

@@ -1,0 +1,198 @@
+"""Recordings computed rather than recorded: data for the pure functions behind the run file.
+
+The arm follows the rig's own plan with trapezoid ramps and a ripple locked to the joint angle; the board's clock has
+its own epoch and rate; readings follow g = K (m + b) with mounting error, noise, quantisation and saturation.
+"""
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from firmware_host.samples import SAMPLE_DTYPE
+from rig.arm.kinematics import flange_rate
+from rig.arm.motion import Plan, Rest, Sweep, Transfer
+from rig.arm.state import ARM_STATE_DTYPE
+from rig.config.load import parse
+from rig.data.run_file import Event, RecordedSensor, RunData
+from rig.plans.six_sweeps import plan_six_observation
+
+Array = NDArray[np.float64]
+
+CONFIG = """
+arm: {{host: 192.0.2.1, payload_kg: 0.35}}
+board: {{port: /dev/ttyACM0}}
+sensors: {{gyro: {{part: lsm9ds1, serial_number: LSM9DS1-001}}}}
+procedure: {{speed_deg_s: {speed_deg_s}, rest_s: {rest_s}, repeats: {repeats}}}
+limits: {{scale_deviation: 0.3, scale_std: 0.002, bias_rad_s: 0.1, bias_std_rad_s: 0.002, condition: 100}}
+"""
+SCALE = (1.1771, 1.1554, 1.1440)
+BIAS_RAD_S = (0.0077, -0.0100, -0.0051)
+SENSITIVITY = float(np.radians(8.75e-3))
+
+
+@dataclass(frozen=True, slots=True)
+class Setup:
+    """What a synthetic recording is made of."""
+
+    seed: int = 1
+    speed_deg_s: float = 60.0
+    rest_s: float = 3.0
+    repeats: int = 1
+    scale: tuple[float, ...] = SCALE
+    bias_rad_s: tuple[float, ...] = BIAS_RAD_S
+    noise_rad_s: float = 0.035
+    noise_correlation: float = 0.0  # from sample to sample
+    mounting_error_rad: tuple[float, ...] = (0.05, -0.035, 0.06)
+    vibration: float = 0.05  # RMS of the rate ripple over the rate
+    state_rate_hz: float = 125.0
+    sample_rate_hz: float = 238.0
+    boot_s: float = -4321.0  # controller time at which the board's clock stood at zero
+    drift: float = -35e-6  # of the controller against the board
+
+
+def truth(setup: Setup) -> Array:
+    """(6,) kx ky kz bx by bz."""
+    return np.array([*setup.scale, *setup.bias_rad_s])
+
+
+class Motion:
+    """Joint angles and speeds of a planned movement with its ripple, at any controller time. Begins at time 100 s."""
+
+    def __init__(self, setup: Setup, rng: np.random.Generator) -> None:
+        self.config = CONFIG.format(speed_deg_s=setup.speed_deg_s, rest_s=setup.rest_s, repeats=setup.repeats)
+        config = parse(self.config).config
+        self.plan: Plan = plan_six_observation(config.arm, config.procedure)
+        self.ends = 101.0 + np.cumsum([step.duration_s for step in self.plan.steps])
+        self.cycles = np.array([18, 31, 50])
+        self.rates = np.full(3, setup.vibration * np.sqrt(2 / 3))
+        self.phases = rng.uniform(0, 2 * np.pi, 3)
+        self.end_s = float(self.ends[-1]) + 1.0
+
+    def joints(self, time_s: Array) -> tuple[Array, Array]:
+        """q (n, 6) and its derivative with respect to time (n, 6)."""
+        smooth, speed = np.empty((len(time_s), 6)), np.zeros((len(time_s), 6))
+        smooth[:] = self.plan.home_q_rad
+        place = np.searchsorted(self.ends, time_s)
+        place[time_s < 101.0] = -1
+        here = np.array(self.plan.home_q_rad)
+        smooth[place == -1] = here
+        for index, step in enumerate(self.plan.steps):
+            inside = place == index
+            if isinstance(step, Rest):
+                smooth[inside] = here
+                continue
+            fraction, rate = _trapezoid(time_s[inside] - (self.ends[index] - step.duration_s), step)
+            start, target = np.array(step.start_q_rad), np.array(step.target_q_rad)
+            smooth[inside] = start + fraction[:, None] * (target - start)
+            speed[inside] = rate[:, None] * (target - start)
+            here = target
+        q, gain = smooth.copy(), np.ones_like(smooth)
+        for cycles, rate_share, phase in zip(self.cycles, self.rates, self.phases, strict=True):
+            q[:, 3:] += rate_share / cycles * np.sin(cycles * smooth[:, 3:] + phase)
+            gain[:, 3:] += rate_share * np.cos(cycles * smooth[:, 3:] + phase)
+        return q, gain * speed
+
+    def events(self) -> tuple[Event, ...]:
+        """As the procedure writes them."""
+        events = []
+        for step, end in zip(self.plan.steps, self.ends, strict=True):
+            name, detail = _event(step)
+            if name:
+                start = float(end - step.duration_s)
+                events.append(Event(f"{name}_started", start + 1e4, start, detail))
+                events.append(Event(f"{name}_finished", float(end) + 1e4, float(end), detail))
+        return tuple(events)
+
+
+def true_rate(motion: Motion, time_s: Array) -> Array:
+    """(n, 3) angular velocity of the flange in its frame, rad/s."""
+    q, qd = motion.joints(time_s)
+    return flange_rate(q, qd)
+
+
+def synthetic_run(setup: Setup) -> RunData:
+    """A whole recording."""
+    rng = np.random.default_rng(setup.seed)
+    motion = Motion(setup, rng)
+    board_s, controller_s = sample_times(setup, motion)
+    return run_data(setup, motion, board_s, readings(setup, true_rate(motion, controller_s), rng))
+
+
+def sample_times(setup: Setup, motion: Motion) -> tuple[Array, Array]:
+    """Board times (n,) and the controller times (n,) they stand for; sampling starts and ends with the recording."""
+    controller = np.arange(100.3, motion.end_s - 0.4, 1 / setup.sample_rate_hz)
+    return (controller - setup.boot_s) / (1 + setup.drift), controller
+
+
+def readings(setup: Setup, rate: Array, rng: np.random.Generator) -> Array:
+    """Counts (n, 3) of a sensor that feels the flange's rate (n, 3)."""
+    turned = rate @ _rotation(np.array(setup.mounting_error_rad)).T
+    noise = rng.normal(size=turned.shape)
+    if setup.noise_correlation:
+        fresh = np.sqrt(1 - setup.noise_correlation**2) * noise
+        for i in range(1, len(noise)):
+            noise[i] = setup.noise_correlation * noise[i - 1] + fresh[i]
+    m = turned / np.array(setup.scale) - np.array(setup.bias_rad_s) + setup.noise_rad_s * noise
+    counts: Array = np.clip(np.round(m / SENSITIVITY), -32768, 32767)
+    return counts
+
+
+def run_data(setup: Setup, motion: Motion, board_s: Array, counts: Array) -> RunData:
+    """The recording of given readings."""
+    samples = np.zeros(len(board_s), SAMPLE_DTYPE)
+    samples["sequence"] = 1000 + np.arange(len(board_s))
+    samples["board_time_us"] = np.round(board_s * 1e6)
+    samples["host_time_s"] = 1e4 + np.arange(len(board_s))
+    samples["counts"] = counts
+    samples["temperature_counts"] = -48  # 22 °C
+    times = np.arange(100.0, motion.end_s, 1 / setup.state_rate_hz)
+    arm = np.zeros(len(times), ARM_STATE_DTYPE)
+    q, qd = motion.joints(times)
+    arm["time_s"], arm["host_time_s"] = times, times + 1e4
+    arm["q_rad"], arm["qd_rad_s"] = np.round(q / 6e-6) * 6e-6, qd
+    arm["target_speed_fraction"] = arm["speed_scaling"] = 1.0
+    arm["robot_mode"], arm["safety_mode"], arm["runtime_state"] = 7, 1, 2
+    return RunData(motion.config, {}, {"gyro": SENSOR}, {"gyro": samples}, arm, motion.events())
+
+
+SENSOR = RecordedSensor(
+    part="lsm9ds1",
+    serial_number="LSM9DS1-001",
+    rate_hz=238.0,
+    range_rad_s=float(np.radians(245)),
+    sensitivity_rad_s_per_count=SENSITIVITY,
+    full_scale_counts=32767,
+    temperature_c_per_count=1 / 16,
+    temperature_offset_c=25.0,
+    mounting=((1.0, 0.0, 0.0), (0.0, 1.0, 0.0), (0.0, 0.0, 1.0)),
+)
+
+
+def _event(step: Sweep | Transfer | Rest) -> tuple[str, dict[str, object]]:
+    if isinstance(step, Sweep):
+        kept = ("index", "joint", "joint_name", "direction", "axis_flange", "speed_rad_s", "revolution_rad")
+        return "sweep", {"sweep": {name: getattr(step, name) for name in kept}}
+    return ("rest", {}) if isinstance(step, Rest) else ("", {})
+
+
+def _trapezoid(since_s: Array, step: Sweep | Transfer) -> tuple[Array, Array]:
+    """Fraction of the way (n,) and its rate (n,) in 1/s."""
+    way = float(np.max(np.abs(np.array(step.target_q_rad) - np.array(step.start_q_rad))))
+    ramp = min(step.speed_rad_s / step.acceleration_rad_s2, step.duration_s / 2)
+    top = step.acceleration_rad_s2 * ramp
+    left = np.minimum(since_s, step.duration_s - since_s)
+    rate = np.minimum(left / ramp, 1.0) * top
+    ramped = 0.5 * top * np.minimum(left, ramp) ** 2 / ramp
+    half = ramped + top * np.maximum(left - ramp, 0)
+    return np.where(since_s < step.duration_s / 2, half, way - half) / way, rate / way
+
+
+def _rotation(vector: Array) -> Array:
+    angle = float(np.linalg.norm(vector))
+    if angle == 0:
+        return np.eye(3)
+    x, y, z = vector / angle
+    cross = np.array([[0, -z, y], [z, 0, -x], [-y, x, 0]])
+    rotation: Array = np.eye(3) + np.sin(angle) * cross + (1 - np.cos(angle)) * cross @ cross
+    return rotation

@@ -1,0 +1,412 @@
+"""The emulated board in the simulated laboratory: it feels the arm, deterministically, over a port like a real one."""
+
+import hashlib
+import math
+import socket
+import time
+from collections.abc import Sequence
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+from scipy.spatial.transform import Rotation
+
+from firmware_host.client import Board, SampleBatch
+from firmware_host.emulator.flash_memory import DOUBLEWORD_BYTES, PAGE_BYTES, STORE_OFFSET
+from firmware_host.errors import BoardError
+from firmware_host.frames import Frame, FrameReader, encode
+from rig.arm.kinematics import flange_rate
+from rig.config.load import Loaded, load
+from rig.config.models import mounting_matrix
+from rig.errors import Refused
+from rig.world.board.flash_file import flash_of
+from rig.world.board.mounting import firmware
+from rig.world.board.serial_line import SerialLine, misread
+from rig.world.clock import TICKS_PER_SECOND
+from rig.world.laboratory import Laboratory
+from support.paths import DEMO
+from support.worlds import World
+
+COUNT_RAD_S = math.radians(8.75e-3)
+SENSORS = ("lsm9ds1", "mpu9250", "adis16465")  # the board's table
+PAIR = DEMO.with_name("mpu9250_adis16465.yaml")
+STILL = "world.arm.vibration_fraction=0"
+
+
+@dataclass
+class Host:
+    """A host written out in ticks: it asks the board in process, so every byte has its moment."""
+
+    laboratory: Laboratory
+    line: SerialLine
+    received: bytearray
+
+    def ask(self, name: str, sequence: int, values: dict[str, Any] | None = None) -> None:
+        self.line.to_board(encode(name, sequence, values), None)
+
+    def ticks(self, count: int) -> None:
+        for _ in range(count):
+            self.laboratory.step()
+            self.line.tick()
+            self.received += self.line.to_host(None)
+
+    def samples(self, sensor: int = 0) -> np.ndarray:
+        """(n, 3) counts of every sample of one sensor received so far."""
+        frames = FrameReader().feed(bytes(self.received))
+        samples = [frame for frame in frames if frame.name == "samples"]
+        return np.concatenate([frame.items["counts"] for frame in samples if frame.values["sensor"] == sensor])
+
+    def answer(self, name: str, values: dict[str, Any]) -> Frame:
+        """Ask, and wait for the answer."""
+        self.received.clear()
+        self.ask(name, 99, values)
+        self.ticks(100)
+        frames = FrameReader().feed(bytes(self.received))
+        (answer,) = [frame for frame in frames if frame.values.get("reply_to") == 99]
+        return answer
+
+
+def booted(loaded: Loaded) -> Host:
+    """A laboratory whose board has started."""
+    assert loaded.world is not None
+    laboratory = Laboratory(loaded.config, loaded.world)
+    new = Host(laboratory, SerialLine(laboratory), bytearray())
+    new.ticks(200)
+    return new
+
+
+def host(loaded: Loaded) -> Host:
+    """A laboratory whose board streams every sensor it has."""
+    new = booted(loaded)
+    for sensor in loaded.config.sensors.values():
+        index = SENSORS.index(sensor.part)
+        settings = {"sensor": index, "rate_hz": sensor.rate_hz, "range_deg_s": sensor.range_deg_s}
+        new.ask("configure", 1, settings)
+        new.ticks(20)
+    new.ask("start", 2, {"sensors": 0})
+    new.ticks(20)
+    return new
+
+
+def demo(*overrides: str) -> Loaded:
+    return load(DEMO, overrides)
+
+
+def pair(*overrides: str) -> Loaded:
+    """A gyroscope to calibrate and a reference, on one bus."""
+    return load(PAIR, overrides)
+
+
+def digest_of_a_run(loaded: Loaded) -> tuple[str, tuple[float, ...]]:
+    one = host(loaded)
+    one.laboratory.robot.motion.move((0.1, -1.4, 1.5, -1.5, -1.2, 2.0), 1.0, 1.4)
+    one.ticks(700)
+    one.laboratory.robot.protective_stop()
+    one.ticks(300)
+    assert len(one.received) > 5_000
+    return hashlib.sha256(one.received).hexdigest(), one.laboratory.robot.motion.q_rad
+
+
+def test_the_same_seed_and_inputs_give_the_same_bytes_and_states() -> None:
+    first, again, other = (digest_of_a_run(demo(f"world.seed={seed}")) for seed in (5, 5, 6))
+    assert first == again
+    assert first[0] != other[0]
+
+
+def test_the_sensor_reads_the_flanges_rate_through_its_mounting_and_its_errors() -> None:
+    """A wrist 2 turn: counts must be (axis rate / k − b) in the sensor's axes, g = K (m + b)."""
+    loaded = demo(
+        "world.arm.vibration_fraction=0",
+        "world.sensors.gyro.mounting_error_deg=[0, 0, 90]",
+        "world.sensors.gyro.noise_rad_s=0",
+        "sensors.gyro.mounting={x: +z, y: -y, z: +x}",
+    )
+    one = host(loaded)
+    motion = one.laboratory.robot.motion
+    motion.speed((0.0, 0.0, 0.0, 0.0, 0.7, 0.0), 100.0)
+    one.ticks(TICKS_PER_SECOND)
+    nominal = mounting_matrix(loaded.config.sensors["gyro"].mounting) @ flange_rate(motion.q_rad, motion.qd_rad_s)
+    seen = np.array([nominal[1], -nominal[0], nominal[2]])  # a quarter turn about the sensor's own z
+    assert loaded.world is not None
+    truth = loaded.world.sensors["gyro"]
+    expected = seen / np.array(truth.scale) - np.array(truth.bias_rad_s)
+    assert one.samples()[-1] * COUNT_RAD_S == pytest.approx(expected, abs=COUNT_RAD_S)
+    assert abs(expected).max() > 0.5
+
+
+def test_every_sensor_has_its_own_mounting_errors_and_noise() -> None:
+    def turned(*overrides: str) -> Host:
+        one = host(pair(STILL, "world.sensors.gyro.mounting_error_deg=[0, 0, 90]", *overrides))
+        one.laboratory.robot.motion.speed((0.0, 0.0, 0.0, 0.0, 0.7, 0.0), 100.0)
+        one.ticks(TICKS_PER_SECOND)
+        return one
+
+    quiet = turned("world.sensors.gyro.noise_rad_s=0", "world.sensors.reference.noise_rad_s=0")
+    loaded = pair("world.sensors.gyro.mounting_error_deg=[0, 0, 90]")
+    assert loaded.world is not None
+    motion = quiet.laboratory.robot.motion
+    flange = np.array(flange_rate(motion.q_rad, motion.qd_rad_s))
+    for name, index, count_rad_s in (("gyro", 1, 1 / 131), ("reference", 2, 1 / 40)):
+        truth = loaded.world.sensors[name]
+        error = Rotation.from_rotvec(truth.mounting_error_deg, degrees=True).as_matrix()
+        seen = error.T @ mounting_matrix(loaded.config.sensors[name].mounting) @ flange
+        x, y, z = np.radians(truth.non_orthogonality_deg)
+        axes = np.array([[1, 0, 0], [x, 1, 0], [y, z, 1]])  # to first order
+        expected = axes @ seen / np.array(truth.scale) - np.array(truth.bias_rad_s)
+        assert np.radians(quiet.samples(index)[-1] * count_rad_s) == pytest.approx(expected, abs=6e-4)
+    noisy = turned("world.sensors.gyro.noise_rad_s=0.05", "world.sensors.reference.noise_rad_s=0.05")
+    last = [np.radians(noisy.samples(index)[-50:] * c) for index, c in ((1, 1 / 131), (2, 1 / 40))]
+    assert np.all(np.abs(np.corrcoef(np.column_stack(last).T) - np.eye(6)) < 0.6)
+
+
+def test_two_sensors_too_give_the_same_bytes_from_the_same_seed() -> None:
+    first, again, other = (digest_of_a_run(pair(f"world.seed={seed}")) for seed in (5, 5, 6))
+    assert first == again
+    assert first[0] != other[0]
+
+
+CALIBRATION = {
+    "sensor": 1,
+    "model": 1,
+    "serial_number": "MPU-1",
+    "written_unix_s": 1_790_000_000,
+    "temperature_c": 22.0,
+    "scale": (1.25, 1.0, 0.75),
+    "bias_rad_s": (0.5, 0.25, 0.125),
+}
+
+
+def give_calibration(one: Host) -> None:
+    assert one.answer("configure", {"sensor": 1, "rate_hz": 200.0, "range_deg_s": 250.0}).name == "setup"
+    assert one.answer("write_calibration", CALIBRATION).name == "ack"
+
+
+def stored_scale(one: Host) -> tuple[float, ...] | None:
+    answer = one.answer("read_calibration", {"sensor": 1})
+    return answer.values["scale"] if answer.name == "calibration" else None
+
+
+def test_without_power_the_board_keeps_its_calibration_but_without_a_file_not_for_the_next_world() -> None:
+    one = booted(pair())
+    assert stored_scale(one) is None
+    give_calibration(one)
+    one.laboratory.unplug()
+    one.ticks(10)
+    one.laboratory.plug_in()
+    one.ticks(200)
+    assert stored_scale(one) == (1.25, 1.0, 0.75)
+    assert stored_scale(booted(pair())) is None
+
+
+def test_a_flash_file_keeps_the_calibration_for_the_next_world_but_never_the_program(tmp_path: Path) -> None:
+    file = tmp_path / "board.bin"
+    kept = pair(f"world.board.flash_file={file}")
+    give_calibration(booted(kept))
+    assert stored_scale(booted(kept)) == (1.25, 1.0, 0.75)
+    data = file.read_bytes()
+    assert data.startswith(firmware("bin"))
+    file.write_bytes(bytes(STORE_OFFSET) + data[STORE_OFFSET:])  # another program, long ago
+    assert stored_scale(booted(kept)) == (1.25, 1.0, 0.75)
+
+
+def test_a_flash_file_keeps_what_a_power_cut_tore(tmp_path: Path) -> None:
+    kept = pair(f"world.board.flash_file={tmp_path / 'board.bin'}")
+    one = booted(kept)
+    one.answer("configure", {"sensor": 1, "rate_hz": 200.0, "range_deg_s": 250.0})
+    one.ask("write_calibration", 9, CALIBRATION)
+    one.ticks(5)  # the erasing takes eleven
+    again = flash_of(tmp_path / "board.bin")
+    assert len(again.torn) == PAGE_BYTES // DOUBLEWORD_BYTES
+    assert stored_scale(booted(kept)) is None
+
+
+@pytest.mark.parametrize("name", ["short.bin", "nowhere/board.bin"])
+def test_a_flash_file_that_cannot_be_is_refused(name: str, tmp_path: Path) -> None:
+    (tmp_path / "short.bin").write_bytes(b"short")
+    with pytest.raises(Refused, match="flash_file"):
+        booted(pair(f"world.board.flash_file={tmp_path / name}"))
+
+
+def test_vibration_is_felt_and_averages_out_over_a_turn() -> None:
+    one = host(demo("world.sensors.gyro.noise_rad_s=0", "world.sensors.gyro.mounting_error_deg=[0, 0, 0]"))
+    one.laboratory.robot.motion.speed((0.0, 0.0, 0.0, 0.0, 0.0, 1.0), 100.0)
+    one.ticks(TICKS_PER_SECOND // 10)
+    before = len(one.samples())
+    one.ticks(round(2 * math.pi * TICKS_PER_SECOND))
+    z = one.samples()[before : before + round(2 * math.pi * 238.0), 2] * COUNT_RAD_S
+    assert z.std() == pytest.approx(0.05 / 1.1440, rel=0.02)
+    assert z.mean() == pytest.approx(1.0 / 1.1440 + 0.0051, abs=2e-4)
+
+
+@pytest.mark.parametrize("ratio", [0.98, 1.0, 1.02])
+def test_a_small_baud_difference_is_harmless(ratio: float) -> None:
+    assert misread(bytes(range(256)), 115200 * ratio, 115200) == bytes(range(256))
+
+
+@pytest.mark.parametrize(("sent", "read"), [(921600, 115200), (115200, 921600), (921600, 460800)])
+def test_a_wrong_baud_rate_spoils_every_frame(sent: float, read: float) -> None:
+    frames = b"".join(encode("hello", i) for i in range(1, 50))
+    seen = misread(frames, sent, read)
+    assert seen and seen != frames
+    assert not FrameReader().feed(seen)
+
+
+def connect(port: str, baud: int = 921600, timeout_s: float = 1.0) -> tuple[Board, list[SampleBatch]]:
+    batches: list[SampleBatch] = []
+    return Board(port, baud, batches.append, timeout_s), batches
+
+
+def stream(board: Board, batches: Sequence[SampleBatch], samples: int) -> None:
+    """Configure, start, and wait for so many samples."""
+    board.configure(0, 238.0, 245.0)
+    board.start()
+    end = time.monotonic() + 10.0
+    while sum(len(batch.samples) for batch in batches) < samples:
+        board.check()
+        assert time.monotonic() < end, "no samples"
+        time.sleep(0.005)
+
+
+def test_the_board_streams_over_tcp_and_takes_the_next_client(world: World) -> None:
+    running = world()
+    board, batches = connect(running.board_port)
+    with board:
+        assert board.identity.unique_id == "0123456789abcdef01234567"
+        stream(board, batches, 200)
+        with pytest.raises(BoardError):  # one client at a time
+            connect(running.board_port, timeout_s=0.3)
+        board.check()
+    board, batches = connect(running.board_port)
+    with board:
+        stream(board, batches, 200)
+
+
+def test_unplugging_loses_the_link_and_plugging_in_boots_afresh(world: World) -> None:
+    running = world()
+    board, batches = connect(running.board_port)
+    with board:
+        stream(board, batches, 100)
+        running.control({"do": "unplug_board"})
+        with pytest.raises(BoardError, match="board_link_lost"):
+            watch(board)
+    with pytest.raises(BoardError, match="no_port"):
+        connect(running.board_port)
+    running.control({"do": "plug_in_board"})
+    board, batches = connect(running.board_port)
+    with board:
+        assert board.identity.reset_cause == "power"
+        stream(board, batches, 100)
+
+
+def watch(board: Board, limit_s: float = 5.0) -> None:
+    """Check until the board's fault shows."""
+    end = time.monotonic() + limit_s
+    while time.monotonic() < end:
+        board.check()
+        time.sleep(0.005)
+
+
+def test_a_silent_line_is_noticed(world: World) -> None:
+    running = world()
+    board, batches = connect(running.board_port, timeout_s=0.5)
+    with board:
+        stream(board, batches, 100)
+        running.control({"do": "silence_board", "on": True})
+        with pytest.raises(BoardError, match="board_link_lost"):
+            watch(board)
+        running.control({"do": "silence_board", "on": False})
+
+
+def test_a_wrong_baud_rate_is_named(world: World) -> None:
+    running = world()
+    running.control({"do": "host_baud", "baud": 115200})
+    with pytest.raises(BoardError, match="wrong_baud_rate"):
+        connect(running.board_port)
+    running.control({"do": "host_baud", "baud": None})
+    board, _ = connect(running.board_port)
+    board.close()
+
+
+def test_a_sensor_can_be_broken_and_mended(world: World) -> None:
+    running = world()
+    running.control({"do": "sensor_fault", "sensor": "gyro", "fault": "absent"})
+    board, batches = connect(running.board_port)
+    with board:
+        with pytest.raises(BoardError, match="sensor_absent"):
+            board.configure(0, 238.0, 245.0)
+        running.control({"do": "unplug_board"})  # it stays broken without power
+    running.control({"do": "plug_in_board"})
+    board, batches = connect(running.board_port)
+    with board:
+        with pytest.raises(BoardError, match="sensor_absent"):
+            board.configure(0, 238.0, 245.0)
+        running.control({"do": "sensor_fault", "sensor": "gyro", "fault": "other_part"})
+        with pytest.raises(BoardError, match="sensor_mismatch"):
+            board.configure(0, 238.0, 245.0)
+        running.control({"do": "sensor_fault", "sensor": "gyro", "fault": None})
+        stream(board, batches, 100)
+    for wrong in ({"sensor": "giro", "fault": None}, {"sensor": "gyro", "fault": "tired"}):
+        with pytest.raises(AssertionError, match="sensor_fault"):
+            running.control({"do": "sensor_fault", **wrong})
+
+
+def test_the_reset_button(world: World) -> None:
+    running = world()
+    board, batches = connect(running.board_port)
+    with board:
+        stream(board, batches, 100)
+    running.control({"do": "reset_board"})
+    board, _ = connect(running.board_port)
+    with board:
+        assert board.identity.reset_cause == "pin"
+
+
+def test_the_pseudo_terminal_is_a_port_like_any_other(world: World) -> None:
+    running = world({"world": {"board": {"pty": True}}})
+    assert running.pty is not None and Path(running.pty).exists()
+    board, batches = connect(running.pty)
+    with board:
+        stream(board, batches, 200)
+    with pytest.raises(BoardError, match="wrong_baud_rate"):
+        connect(running.pty, baud=115200)
+    board, batches = connect(running.pty)
+    with board:
+        stream(board, batches, 50)
+
+
+def test_arm_and_board_run_on_one_clock(world: World) -> None:
+    """So many virtual seconds by the controller's time stamp are so many by the board's counter, 541 ppm apart."""
+    running = world()
+    board, batches = connect(running.board_port)
+    with board:
+        stream(board, batches, 10)
+        running.control({"do": "hold"})
+        start, uptime = running.state()["time_s"], board_time(batches)
+        running.control({"do": "advance", "duration_s": 2.0})
+        passed = running.state()["time_s"] - start
+        elapsed = board_time(batches) - uptime
+        running.control({"do": "run"})
+    assert passed == pytest.approx(2.0)
+    assert elapsed == pytest.approx(2.0 * (1 - 541e-6), abs=1.5 / 238 * 8)  # samples come in batches
+
+
+def board_time(batches: Sequence[SampleBatch]) -> float:
+    """The board's time of the newest sample."""
+    count = -1
+    while count != len(batches):  # the clock is held: once no batch comes, none is under way
+        count = len(batches)
+        time.sleep(0.05)
+    return float(batches[-1].samples["board_time_us"][-1]) * 1e-6
+
+
+def test_a_host_that_does_not_read_does_not_stop_the_world(world: World) -> None:
+    running = world()
+    host_name, port = running.board_port.removeprefix("socket://").split(":")
+    with socket.create_connection((host_name, int(port)), 5.0) as idle:
+        idle.sendall(encode("configure", 1, {"sensor": 0, "rate_hz": 952.0, "range_deg_s": 245.0}))
+        idle.sendall(encode("start", 2, {"sensors": 0}))
+        before = running.state()["time_s"]
+        time.sleep(0.5)  # at 952 Hz and ten times real time this fills every buffer on the way
+        assert running.state()["time_s"] > before + 1.0

@@ -1,0 +1,111 @@
+"""Nothing a client sends can end the simulated laboratory."""
+
+import struct
+from collections.abc import Callable
+
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+
+from rig.config.load import load
+from rig.errors import Refused
+from rig.world.laboratory import Laboratory
+from rig.world.network import Session
+from rig.world.process import World
+from rig.world.ur10e.dashboard_server import DashboardSession
+from rig.world.ur10e.primary import PrimarySession
+from rig.world.ur10e.robot import Robot
+from rig.world.ur10e.rtde import RtdeSession
+from rig.world.ur10e.variables import INPUTS, OUTPUTS
+from support.paths import DEMO
+
+LOADED = load(DEMO)
+assert LOADED.world is not None
+LABORATORY = Laboratory(LOADED.config, LOADED.world)
+LABORATORY.unplug()
+
+statements = st.sampled_from(
+    [
+        "movej([0,-1,1,0,0,0], a=1, v=1)",
+        "movej([0,-1,1,0,0,0,7])",
+        "movej([1e400,0,0,0,0,0], a=1, v=nan)",
+        "movej(p[9,9,9,0,0,0])",
+        "movel(p[0.1,0.2,0.3,0,0,0], a=1e9, v=1e9)",
+        "speedj([0,0,0,0,0,1], a=0)",
+        "speedj([0,0,0,0,0,1e400], 1)",
+        "stopj(0)",
+        "set_digital_out(99, True)",
+        "write_output_integer_register(99, 1)",
+        "write_output_integer_register(1, 99999999999)",
+        "write_output_float_register(1, [1])",
+        "set_payload(-1)",
+        "sleep(x)",
+        "textmsg(a, b",
+        "while True:",
+        "end",
+        "sec other():",
+        "def again():",
+        "set robotmode run",
+        "protective_stop()",
+    ]
+)
+
+
+def play(session: Session, data: bytes) -> None:
+    """Feed a session and let some time pass."""
+    assert isinstance(session.greeting(), bytes)
+    assert isinstance(session.receive(data), bytes)
+    for _ in range(60):
+        LABORATORY.step()
+        assert isinstance(session.tick(), bytes)
+    session.closed()
+    robot = LABORATORY.robot
+    robot.stop_program("")
+    robot.release()
+    robot.safety_mode = type(robot.safety_mode).NORMAL
+    robot.brake_release()
+    assert all(abs(q) < 100 for q in robot.motion.q_rad)
+
+
+@settings(max_examples=60, deadline=None)
+@given(st.sampled_from([RtdeSession, DashboardSession, PrimarySession]), st.binary(max_size=200))
+def test_noise(new_session: Callable[[Robot], Session], data: bytes) -> None:
+    play(new_session(LABORATORY.robot), data + b"\n")
+
+
+@settings(max_examples=100, deadline=None)
+@given(st.lists(statements, max_size=6))
+def test_programs_that_cannot_be_right(lines: list[str]) -> None:
+    text = "\n".join(["def odd():", *(f"  {line}" for line in lines), "end", ""])
+    play(PrimarySession(LABORATORY.robot), text.encode())
+
+
+@settings(max_examples=100, deadline=None)
+@given(
+    st.lists(st.sampled_from(sorted(OUTPUTS)), max_size=8),
+    st.lists(st.sampled_from(sorted(INPUTS)), max_size=4),
+    st.floats(),
+    st.binary(max_size=40),
+)
+def test_any_recipe_at_any_rate(outputs: list[str], inputs: list[str], rate_hz: float, data: bytes) -> None:
+    parts = [
+        (b"V", struct.pack(">H", 2)),
+        (b"O", struct.pack(">d", rate_hz) + ",".join(outputs).encode()),
+        (b"I", ",".join(inputs).encode()),
+        (b"S", b""),
+        (b"U", b"\1" + data),
+        (b"P", b""),
+        (b"V", b""),
+    ]
+    stream = b"".join(struct.pack(">HB", 3 + len(body), kind[0]) + body for kind, body in parts)
+    play(RtdeSession(LABORATORY.robot), stream)
+
+
+@pytest.mark.parametrize("port", ["socket://127.0.0.1", "socket://127.0.0.1:x", "/dev/ttyACM0"])
+def test_a_board_port_that_is_no_address_is_refused(port: str) -> None:
+    board = LOADED.config.board.model_copy(update={"port": port})
+    config = LOADED.config.model_copy(
+        update={"board": board, "arm": LOADED.config.arm.model_copy(update={"host": "127.9.9.9"})}
+    )
+    with pytest.raises(Refused, match="board_port"):
+        World(type(LOADED)(config, LOADED.world, "", ""))
