@@ -1,5 +1,7 @@
 # make demo    calibrate a gyroscope on a simulated robot arm, on a bare machine with Python 3.11 or 3.12
-# make test    everything CI checks: lint, types, import layers, tests (needs gcc and arm-none-eabi-gcc)
+# make check   lint, types, import layers and the fast tests
+# make test    everything CI checks: lint, types, import layers, all tests (needs gcc and arm-none-eabi-gcc)
+# make proof   statistical acceptance over all seeds, which takes longer than anybody waits for a change
 # make firmware builds the board's image (needs arm-none-eabi-gcc) and prints what it takes of the chip
 # make bench   every benchmark, ratios measured side by side
 # make figures the pictures in docs/method.md, by the studies and the experiments
@@ -12,16 +14,25 @@ FIND_PYTHON = for p in python3.12 python3.11 python3 python; do \
 
 STUDIES := normal extreme speed convergence sine averaging estimators misalignment kvh-gyro kvh-accelerometer
 
-.PHONY: demo test lint firmware bench figures clean
+.PHONY: demo check test proof lint firmware bench figures clean
 .DELETE_ON_ERROR:
 
 demo: $(VENV)/demo.installed
 	$(BIN)/rig run configs/demo.yaml
 
+# Tests run two at a time: every simulated laboratory has a loopback address of its own.
+PYTEST := $(BIN)/pytest -n 2 --dist worksteal
+
+check: $(VENV)/dev.installed lint
+	$(PYTEST) -m "not slow"
+
 test: $(VENV)/dev.installed lint
 	rm -rf build/coverage
-	RIG_COVERAGE=$(CURDIR)/build/coverage $(BIN)/pytest
+	RIG_COVERAGE=$(CURDIR)/build/coverage $(PYTEST)
 	$(MAKE) -C firmware_host/firmware coverage_table COVERED=$(CURDIR)/build/coverage PYTHON=$(CURDIR)/$(BIN)/python
+
+proof: $(VENV)/dev.installed
+	$(BIN)/pytest -m proof --proof -rP
 
 lint: $(VENV)/dev.installed
 	$(BIN)/ruff check .

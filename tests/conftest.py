@@ -1,5 +1,6 @@
 """What every test has: simulated laboratories, and a Hypothesis without a stopwatch."""
 
+import pytest
 from hypothesis import settings
 
 from support.worlds import world
@@ -8,3 +9,13 @@ __all__ = ["world"]
 
 settings.register_profile("rig", deadline=None)  # a shared machine stalls now and then, which is no failure
 settings.load_profile("rig")
+
+
+def pytest_addoption(parser: pytest.Parser) -> None:
+    parser.addoption("--proof", action="store_true", help="statistical acceptance over all seeds, not over a few")
+
+
+@pytest.fixture
+def thorough(request: pytest.FixtureRequest) -> bool:
+    """Whether a test marked `proof` goes through all its seeds (`make proof`) or through a few (`make test`)."""
+    return bool(request.config.getoption("--proof"))

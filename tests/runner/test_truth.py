@@ -1,4 +1,4 @@
-"""The rig measures what it says: twenty seeds of the whole chain against the simulated truth."""
+"""The rig measures what it says: seeds of the whole chain against the simulated truth."""
 
 import json
 import subprocess
@@ -15,6 +15,7 @@ from support.paths import DEMO
 from support.worlds import fresh_host
 
 SEEDS = range(1, 21)
+FEW = range(1, 6)
 
 
 def normalised_errors(seed: int, folder: Path) -> np.ndarray:
@@ -33,11 +34,15 @@ def normalised_errors(seed: int, folder: Path) -> np.ndarray:
     return np.asarray(error / np.sqrt(np.diag(sensor["covariance"])))
 
 
-@pytest.mark.timeout(600)
-def test_errors_are_as_large_as_reported(tmp_path: Path) -> None:
+@pytest.mark.slow
+@pytest.mark.proof
+@pytest.mark.timeout(900)
+def test_errors_are_as_large_as_reported(tmp_path: Path, thorough: bool) -> None:
     with ThreadPoolExecutor(2) as two_at_once:  # each run is mostly one process that simulates, and waits for its arm
-        errors = np.array(list(two_at_once.map(partial(normalised_errors, folder=tmp_path), SEEDS)))
+        seeds = SEEDS if thorough else FEW
+        errors = np.array(list(two_at_once.map(partial(normalised_errors, folder=tmp_path), seeds)))
     rms = float(np.sqrt(np.mean(errors**2)))
     print(f"largest error {np.abs(errors).max():.2f} σ, RMS {rms:.3f} σ over {errors.size} errors")
     assert np.abs(errors).max() < 4
-    assert 0.8 < rms < 1.2
+    # Three standard deviations of the RMS of so many independent errors, a little more than 0.2 for all seeds.
+    assert abs(rms - 1) < 3 / np.sqrt(2 * errors.size)

@@ -1,11 +1,13 @@
 """The firmware's core built for this machine, with the three sensors on its bus; tests play the chip."""
 
 import ctypes
+import fcntl
 import functools
 import os
 import subprocess
 import tempfile
 from collections.abc import Sequence
+from pathlib import Path
 from typing import Any
 
 from firmware_host.frames import Frame, FrameReader, encode
@@ -28,7 +30,10 @@ def core() -> ctypes.CDLL:
     With RIG_COVERAGE in the environment it is built there and notes which lines run: `make coverage` reads that.
     """
     out = os.environ.get("RIG_COVERAGE") or tempfile.mkdtemp(prefix="rig_host_")
-    subprocess.run(["make", "-s", "-C", FIRMWARE, "host", f"OUT={out}"], check=True)
+    Path(out).mkdir(parents=True, exist_ok=True)
+    with Path(out, "building").open("w") as lock:  # tests that run side by side build it once
+        fcntl.flock(lock, fcntl.LOCK_EX)
+        subprocess.run(["make", "-s", "-C", FIRMWARE, "host", f"OUT={out}"], check=True)
     library = ctypes.CDLL(f"{out}/rig_host.so")
     library.frame_crc.restype = ctypes.c_uint32
     library.frame_encode.restype = ctypes.c_size_t

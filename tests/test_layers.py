@@ -1,0 +1,66 @@
+"""The layers contract in pyproject.toml holds for what is there, and catches what does not belong."""
+
+import shutil
+import subprocess
+import sys
+from pathlib import Path
+
+import pytest
+
+from support.paths import ROOT
+
+LINT = [str(Path(sys.executable).with_name("lint-imports")), "--no-cache"]
+
+
+@pytest.fixture
+def copy(tmp_path: Path) -> Path:
+    """The packages' sources and the contracts in a folder of their own."""
+    for package in ("rig", "firmware_host", "procedures"):
+        for source in (ROOT / package).rglob("*.py"):
+            target = tmp_path / source.relative_to(ROOT)
+            target.parent.mkdir(parents=True, exist_ok=True)
+            shutil.copy(source, target)
+    shutil.copy(ROOT / "pyproject.toml", tmp_path)
+    return tmp_path
+
+
+def lint(folder: Path) -> subprocess.CompletedProcess[str]:
+    return subprocess.run(
+        LINT, cwd=folder, env={"PYTHONPATH": str(folder)}, capture_output=True, text=True, timeout=50, check=False
+    )
+
+
+def test_the_house_keeps_its_contracts(copy: Path) -> None:
+    found = lint(copy)
+    assert found.returncode == 0, found.stdout
+
+
+def test_a_module_that_stands_on_no_layer_is_refused(copy: Path) -> None:
+    (copy / "rig" / "history.py").write_text('"""A room nobody gave a place to."""\n', encoding="utf-8")
+    found = lint(copy)
+    assert found.returncode == 1
+    assert "rig.history" in found.stdout
+
+
+@pytest.mark.parametrize(
+    "room", ["rig/data/memory.py", "rig/analysis/peeking.py", "rig/commands/look.py", "rig/world_view.py"]
+)
+def test_nothing_but_the_world_imports_the_world(copy: Path, room: str) -> None:
+    (copy / room).write_text("from rig.world.laboratory import Laboratory\n\nTRUTH = Laboratory\n", encoding="utf-8")
+    found = lint(copy)
+    assert found.returncode == 1
+    assert "BROKEN" in found.stdout
+
+
+def test_a_room_does_not_import_from_the_rooms_after_it(copy: Path) -> None:
+    (copy / "rig" / "observation" / "early.py").write_text(
+        "from rig.analysis.verdict import Check\n\nEARLY = Check\n", encoding="utf-8"
+    )
+    found = lint(copy)
+    assert found.returncode == 1
+    assert "rig.observation is not allowed to import rig.analysis" in found.stdout
+
+
+def test_at_most_four_modules_lie_flat() -> None:
+    flat = sorted(path.name for path in (ROOT / "rig").glob("*.py"))
+    assert flat == ["__init__.py", "__main__.py", "cli.py", "errors.py"]
