@@ -200,8 +200,7 @@ def _plan(options: argparse.Namespace) -> int:
     from rig.report.plan_table import checked_plan, print_plan
 
     config = load(options.config, options.overrides).config
-    repeated = config.procedure.verify and config.procedure.name != "verify"
-    print_plan(checked_plan(config), repeated=repeated, as_json=options.json)
+    print_plan(checked_plan(config), repeated=config.procedure.then_verify, as_json=options.json)
     return 0
 
 

@@ -58,7 +58,7 @@ def _recorded(path: Path) -> tuple[list[RunData], list[RunData] | None]:
     runs, repeated = ([read_run(file) for file in recordings(path, kind)] for kind in (CALIBRATION, VERIFICATION))
     if not runs and not repeated:
         raise Refused("no_run", f"{path} holds no run.h5", "Give a run folder or a run file")
-    asked = bool(repeated) or parse(runs[0].config, "the recorded configuration").config.procedure.verify
+    asked = bool(repeated) or parse(runs[0].config, "the recorded configuration").config.procedure.then_verify
     return runs, repeated[-1:] if asked else None
 
 

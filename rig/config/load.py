@@ -11,12 +11,14 @@ from typing import Any, TypeVar
 import yaml
 from pydantic import BaseModel, ValidationError
 
-from rig.config.models import RigConfig
+from rig.config.models import ProcedureSection, RigConfig
+from rig.config.procedure_sections import DEFAULT_PROCEDURE, STOCK_SECTIONS
 from rig.config.world_models import WorldSection
 from rig.errors import Refused
 
 Location = tuple[int | str, ...]
 Model = TypeVar("Model", bound=BaseModel)
+Sections = Mapping[str, type[ProcedureSection]]
 
 
 @dataclass(frozen=True, slots=True)
@@ -45,10 +47,11 @@ class ConfigurationRefused(Refused):
         return "\n".join([super().__str__(), *(f"  {problem}" for problem in self.problems)])
 
 
-def load(path: str | Path, overrides: Sequence[str] = ()) -> Loaded:
+def load(path: str | Path, overrides: Sequence[str] = (), sections: Sections = STOCK_SECTIONS) -> Loaded:
     """Read, override and validate a configuration file.
 
-    `overrides` are `path.to.key=value` with the value in YAML. Raises `ConfigurationRefused` listing every error with
+    `overrides` are `path.to.key=value` with the value in YAML. `sections` are the procedures the file may name, each
+    with what its `procedure:` section holds. Raises `ConfigurationRefused` listing every error with
     its path, line, value, what is allowed and, for a misspelling, the nearest valid spelling.
     """
     source = str(path)
@@ -56,10 +59,15 @@ def load(path: str | Path, overrides: Sequence[str] = ()) -> Loaded:
         text = Path(path).read_text(encoding="utf-8")
     except (OSError, UnicodeDecodeError) as error:
         raise ConfigurationRefused(source, [f"cannot be read: {error}"]) from None
-    return parse(text, source, overrides)
+    return parse(text, source, overrides, sections)
 
 
-def parse(text: str, source: str = "configuration", overrides: Sequence[str] = ()) -> Loaded:
+def parse(
+    text: str,
+    source: str = "configuration",
+    overrides: Sequence[str] = (),
+    sections: Sections = STOCK_SECTIONS,
+) -> Loaded:
     """As `load`, from text."""
     try:
         lines, repeated = _survey(text)
@@ -71,7 +79,7 @@ def parse(text: str, source: str = "configuration", overrides: Sequence[str] = (
     problems = repeated + [problem for item in overrides for problem in _override(document, item)]
 
     rig_part = {key: value for key, value in document.items() if key != "world"}
-    config, rig_problems = _validate(RigConfig, rig_part, (), lines)
+    config, rig_problems = _validate_rig(rig_part, sections, lines)
     world: WorldSection | None = None
     world_problems: list[str] = []
     if "world" in document:
@@ -132,6 +140,34 @@ def _override(document: dict[str, Any], item: str) -> Iterator[str]:
     place[last] = yaml.safe_load(value)
 
 
+def _validate_rig(
+    document: Mapping[str, Any], sections: Sections, lines: Mapping[Location, int]
+) -> tuple[RigConfig | None, list[str]]:
+    """The rig's part: the procedure by the section its name chooses, and the rest."""
+    procedure, problems = _validate_procedure(document.get("procedure", {}), sections, lines)
+    rest = {**document, "procedure": procedure or ProcedureSection(name="")}
+    config, rest_problems = _validate(RigConfig, rest, (), lines)
+    if procedure is None or config is None:
+        return None, rest_problems + problems
+    problems = [f"(file): {problem}" for problem in procedure.problems(config)]
+    return (None if problems else config), problems
+
+
+def _validate_procedure(
+    data: Any, sections: Sections, lines: Mapping[Location, int]
+) -> tuple[ProcedureSection | None, list[str]]:
+    """A name that is not known is one problem; the other keys are then judged as those of the nearest name."""
+    name = data.get("name", DEFAULT_PROCEDURE) if isinstance(data, dict) else DEFAULT_PROCEDURE
+    if isinstance(name, str) and name in sections:
+        return _validate(sections[name], data, ("procedure",), lines)
+    place = ("procedure", "name")
+    problems = [_where(place, lines) + _not_allowed(name, list(sections))]
+    nearest = difflib.get_close_matches(str(name), list(sections), n=1)
+    if nearest:
+        problems += _validate(sections[nearest[0]], {**data, "name": nearest[0]}, ("procedure",), lines)[1]
+    return None, problems
+
+
 def _validate(
     model: type[Model], data: Any, prefix: Location, lines: Mapping[Location, int]
 ) -> tuple[Model | None, list[str]]:
@@ -146,9 +182,7 @@ def _validate(
 def _explain(model: type[BaseModel], item: Any, prefix: Location, lines: Mapping[Location, int]) -> str:
     """One validation error as: path (line): what is wrong, what is allowed, nearest spelling."""
     location: Location = item["loc"]
-    place = (*prefix, *location)
-    line = lines.get(place)
-    where = _dotted(place) + (f" (line {line})" if line else "")
+    where = _where((*prefix, *location), lines)
     kind, value = item["type"], item["input"]
     if kind == "extra_forbidden":
         allowed = [*_keys_at(model, location[:-1]), *(["world"] if not prefix and len(location) == 1 else [])]
@@ -157,10 +191,19 @@ def _explain(model: type[BaseModel], item: Any, prefix: Location, lines: Mapping
         return f"{where}: missing"
     if kind == "literal_error":
         allowed = [word.strip("'") for word in item["ctx"]["expected"].replace(" or ", ", ").split(", ")]
-        return f"{where}: {value!r} is not allowed{_nearest(str(value), allowed)}; allowed: {', '.join(allowed)}"
+        return where + _not_allowed(value, allowed)
     message = item["msg"].removeprefix("Value error, ")
     shown = "" if isinstance(value, dict) else f"{value!r}: "
     return f"{where}: {shown}{message[0].lower()}{message[1:]}"
+
+
+def _where(place: Location, lines: Mapping[Location, int]) -> str:
+    line = lines.get(place)
+    return _dotted(place) + (f" (line {line})" if line else "")
+
+
+def _not_allowed(value: Any, allowed: Sequence[str]) -> str:
+    return f": {value!r} is not allowed{_nearest(str(value), allowed)}; allowed: {', '.join(allowed)}"
 
 
 def _keys_at(model: type[BaseModel], location: Location) -> list[str]:

@@ -3,7 +3,7 @@
 Every quantity carries its unit in its key. Degrees live only here, at the edge; the rig works in SI units.
 """
 
-from collections.abc import Mapping
+from collections.abc import Iterable, Mapping
 from typing import Annotated, Any, Literal, Self
 
 import numpy as np
@@ -12,7 +12,6 @@ from pydantic import BaseModel, ConfigDict, Field, ValidationInfo, field_validat
 from rig.config.link_budget import Stream, over_budget
 from rig.config.sensor_catalogue import PARTS
 
-Wrist = Literal["wrist_1", "wrist_2", "wrist_3"]
 Direction = Literal["cw", "ccw"]
 AxisName = Literal["+x", "-x", "+y", "-y", "+z", "-z"]
 Vector3 = tuple[float, float, float]
@@ -123,24 +122,23 @@ class SensorSection(Section):
 
 
 class ProcedureSection(Section):
-    """The movement: which wrists, in what order, how fast, how often."""
+    """What every procedure's section has: its name. A procedure adds its own keys and says what else it needs."""
 
-    name: Literal["six_observation", "verify"] = "six_observation"
-    verify: bool = False  # store a calibration that passed on the board, then repeat the movement with its readings
-    order: Annotated[tuple[Wrist, ...], Field(min_length=1)] = ("wrist_3", "wrist_1", "wrist_2")
-    directions: Annotated[tuple[Direction, ...], Field(min_length=1)] = ("cw", "ccw")
-    repeats: Annotated[int, Field(ge=1, le=100)] = 1
-    speed_deg_s: Annotated[float, Field(ge=0.5, le=180)] = 60.0  # slower, and the board cannot keep a sweep's readings
-    acceleration_deg_s2: Annotated[float, Field(gt=0, le=800)] = 240.0
-    rest_s: Annotated[float, Field(ge=0, le=3600)] = 3.0
-    margin_deg: Annotated[float, Field(gt=0, le=90)] = 2.0  # constant speed on each side of the revolution
+    name: str
 
-    @model_validator(mode="after")
-    def every_direction_is_swept(self) -> Self:
-        """Six parameters need all six directions (SIX, section II-B); refuse before anything moves, not after."""
-        if len(set(self.order)) < 3 or len(self.order) > 3 or set(self.directions) != {"cw", "ccw"}:
-            raise ValueError("order must name wrist_1, wrist_2 and wrist_3 once each, and directions both cw and ccw")
-        return self
+    @property
+    def then_verify(self) -> bool:
+        """Whether a calibration that passed is stored on the board and verified by repeating the movement."""
+        return False
+
+    @property
+    def needs_reference(self) -> bool:
+        """Whether calibrated readings are compared with a reference's."""
+        return self.then_verify
+
+    def problems(self, config: "RigConfig") -> Iterable[str]:
+        """What of the rest of the configuration does not fit this procedure, a line each."""
+        return ()
 
 
 class ObservationSection(Section):
@@ -177,7 +175,7 @@ class RigConfig(Section):
     arm: ArmSection
     board: BoardSection
     sensors: Annotated[dict[str, SensorSection], Field(min_length=1)]
-    procedure: ProcedureSection = ProcedureSection()
+    procedure: ProcedureSection
     observation: ObservationSection = ObservationSection()
     limits: LimitsSection
     output: OutputSection = OutputSection()
@@ -210,27 +208,6 @@ class RigConfig(Section):
             raise ValueError(problem)
         return sensors
 
-    @model_validator(mode="after")
-    def sweeps_fit_the_ranges(self) -> Self:
-        """A sweep must stay well inside every sensor's range: scale error, bias, ripple and noise come on top."""
-        for name, sensor in self.sensors.items():
-            if self.procedure.speed_deg_s * 1.5 > sensor.range_deg_s:
-                raise ValueError(
-                    f"procedure.speed_deg_s {self.procedure.speed_deg_s:g} is too fast for sensors.{name}.range_deg_s "
-                    f"{sensor.range_deg_s:g}: the range must be at least 1.5 times the speed"
-                )
-        return self
-
-    @model_validator(mode="after")
-    def verification_has_what_it_needs(self) -> Self:
-        """A verification without a reference or without limits could not pass; say so before the robot moves."""
-        if self.verifies and self.reference is None:
-            raise ValueError("a verification needs a sensor with role: reference to compare with")
-        limits = (self.limits.verification_rms_rad_s, self.limits.verification_mean_rad_s)
-        if self.verifies and None in limits:
-            raise ValueError("a verification needs limits.verification_rms_rad_s and limits.verification_mean_rad_s")
-        return self
-
     @property
     def to_calibrate(self) -> Mapping[str, SensorSection]:
         """The sensors a calibration is for, by name."""
@@ -240,8 +217,3 @@ class RigConfig(Section):
     def reference(self) -> tuple[str, SensorSection] | None:
         """The sensor whose calibration is known, with its name, if there is one."""
         return next(((name, s) for name, s in self.sensors.items() if s.role == "reference"), None)
-
-    @property
-    def verifies(self) -> bool:
-        """Whether calibrated readings are compared with a reference's."""
-        return self.procedure.verify or self.procedure.name == "verify"

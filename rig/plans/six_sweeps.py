@@ -6,7 +6,8 @@ from collections.abc import Collection, Iterable
 from rig.arm.kinematics import flange_axes
 from rig.arm.motion import SAME_PLACE_RAD, Plan, Rest, Step, Sweep, Transfer, trapezoid_duration, travel
 from rig.arm.state import JOINT_NAMES, Joints
-from rig.config.models import ArmSection, ProcedureSection
+from rig.config.models import ArmSection
+from rig.config.procedure_sections import SixSweepsSection
 
 # The first motion may swing the large joints from wherever somebody left the arm, so it is made at leisure.
 APPROACH_SPEED_RAD_S = math.radians(30)
@@ -15,7 +16,7 @@ APPROACH_ACCELERATION_RAD_S2 = math.radians(60)
 
 def plan_six_observation(
     arm: ArmSection,
-    procedure: ProcedureSection,
+    procedure: SixSweepsSection,
     start_q_rad: Joints | None = None,
     done: Collection[int] = (),
 ) -> Plan:
@@ -33,7 +34,7 @@ def plan_six_observation(
     return Plan(steps, start_q_rad=start, home_q_rad=home)
 
 
-def _sweeps(home: Joints, procedure: ProcedureSection) -> list[Sweep]:
+def _sweeps(home: Joints, procedure: SixSweepsSection) -> list[Sweep]:
     """The sweeps in order, each around the home pose."""
     speed, acceleration = math.radians(procedure.speed_deg_s), math.radians(procedure.acceleration_deg_s2)
     half_travel = math.pi + math.radians(procedure.margin_deg) + speed**2 / (2 * acceleration)
@@ -68,7 +69,7 @@ def _sweeps(home: Joints, procedure: ProcedureSection) -> list[Sweep]:
 
 
 def _connected(
-    sweeps: list[Sweep], start: Joints, home: Joints, arm: ArmSection, procedure: ProcedureSection
+    sweeps: list[Sweep], start: Joints, home: Joints, arm: ArmSection, procedure: SixSweepsSection
 ) -> Iterable[Step]:
     """Sweeps with the rests after them and a transfer wherever the arm is not yet where the next one begins."""
     speed, acceleration = math.radians(arm.transfer_speed_deg_s), math.radians(procedure.acceleration_deg_s2)

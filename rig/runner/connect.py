@@ -106,7 +106,7 @@ def open_rig(
             confirm=confirm,
             calibrated=tuple(index for index, _ in to_calibrate.values()) if calibrated else (),
             on_board=on_board,
-            again=config.procedure.verify and not calibrated,
+            again=config.procedure.then_verify and not calibrated,
             announced=announced,
         )
 

@@ -51,7 +51,7 @@ class Session:
             runs = [read_run(file) for file in recordings(self.folder, CALIBRATION)]
             outcome = outcome_of(runs)
             check_observed(runs[-1], self.loaded.config.to_calibrate)
-            if not self.loaded.config.procedure.verify:
+            if not self.loaded.config.procedure.then_verify:
                 return self._written(outcome)
         if outcome.passed:
             with self.reported(self._mended, moved=True):

@@ -22,7 +22,8 @@ from rig.arm.driver import Arm, look
 from rig.arm.motion import Transfer, trapezoid_duration
 from rig.arm.preflight import arm_problems, plan_problems
 from rig.arm.state import ARM_STATE_DTYPE, ArmState, Joints
-from rig.config.models import ArmSection, ProcedureSection
+from rig.config.models import ArmSection
+from rig.config.procedure_sections import SixObservationSection
 from rig.errors import Fault, Refused
 from rig.plans.six_sweeps import plan_six_observation
 from support.worlds import World, WorldHandle
@@ -134,7 +135,7 @@ def test_moves_arrive_in_time_and_states_come_without_gaps(world: World) -> None
 
 def test_a_planned_sweep_turns_a_whole_revolution_at_its_speed(laboratory: WorldHandle) -> None:
     report = look(laboratory.host)
-    procedure = ProcedureSection(speed_deg_s=120, acceleration_deg_s2=400)
+    procedure = SixObservationSection(speed_deg_s=120, acceleration_deg_s2=400)
     plan = plan_six_observation(ArmSection(host=laboratory.host, payload_kg=0.35), procedure, report.state.q_rad)
     assert plan_problems(plan, 0.35) + arm_problems(plan, report) == []
     states: list[ArmState] = []
@@ -328,7 +329,7 @@ def test_a_payload_the_controller_does_not_take_is_refused(laboratory: WorldHand
 def test_a_speed_slider_below_full_is_refused_in_preflight(laboratory: WorldHandle) -> None:
     laboratory.control({"do": "speed_slider", "fraction": 0.5})
     report = look(laboratory.host)
-    plan = plan_six_observation(ArmSection(host=laboratory.host, payload_kg=0.35), ProcedureSection())
+    plan = plan_six_observation(ArmSection(host=laboratory.host, payload_kg=0.35), SixObservationSection())
     (problem,) = arm_problems(plan, report)
     assert problem.name == "speed_slider"
     assert "50 %" in problem.what

@@ -9,7 +9,8 @@ from rig.arm.condition import Problem, program_interruption, readiness
 from rig.arm.motion import Plan, Transfer
 from rig.arm.preflight import arm_problems, plan_problems, refuse, way_to_home
 from rig.arm.state import ArmReport, ArmState, Joints, RobotMode, RuntimeState, SafetyMode
-from rig.config.models import ArmSection, ProcedureSection
+from rig.config.models import ArmSection
+from rig.config.procedure_sections import SixObservationSection
 from rig.errors import Refused
 from rig.plans.six_sweeps import plan_six_observation
 
@@ -45,7 +46,7 @@ def plan(home_deg: tuple[float, ...] = HOME_DEG, transfer_speed_deg_s: float = 9
     arm = ArmSection.model_validate(
         {"host": "10.0.0.2", "payload_kg": 0.3, "home_deg": home_deg, "transfer_speed_deg_s": transfer_speed_deg_s}
     )
-    return plan_six_observation(arm, ProcedureSection.model_validate(procedure))
+    return plan_six_observation(arm, SixObservationSection.model_validate(procedure))
 
 
 def names(problems: list[Problem]) -> list[str]:

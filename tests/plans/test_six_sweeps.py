@@ -7,7 +7,8 @@ import pytest
 
 from rig.arm.kinematics import flange_rate
 from rig.arm.motion import Plan, Rest, Sweep, Transfer, trapezoid_duration, travel
-from rig.config.models import ArmSection, ProcedureSection
+from rig.config.models import ArmSection
+from rig.config.procedure_sections import SixObservationSection
 from rig.plans.six_sweeps import plan_six_observation
 
 ARM = ArmSection(host="127.0.0.2", payload_kg=0.35)
@@ -15,7 +16,7 @@ HOME = tuple(math.radians(angle) for angle in ARM.home_deg)
 
 
 def plan(**settings: object) -> Plan:
-    return plan_six_observation(ARM, ProcedureSection.model_validate(settings))
+    return plan_six_observation(ARM, SixObservationSection.model_validate(settings))
 
 
 def test_the_order_is_the_paper_s() -> None:
@@ -70,7 +71,7 @@ def test_duration_is_the_sum_of_motions_and_rests() -> None:
     sweep_s = 409 / 60 + 0.75
     transfer_s = 204.5 / 90 + 90 / 80
     slow = ArmSection(host="127.0.0.2", payload_kg=0.35, transfer_speed_deg_s=90)
-    procedure = ProcedureSection(speed_deg_s=60, acceleration_deg_s2=80, rest_s=3, margin_deg=2)
+    procedure = SixObservationSection(speed_deg_s=60, acceleration_deg_s2=80, rest_s=3, margin_deg=2)
     made = plan_six_observation(slow, procedure)
     assert made.duration_s == pytest.approx(6 * (sweep_s + 3) + 4 * transfer_s)
 
@@ -82,16 +83,16 @@ def test_a_short_move_never_reaches_its_speed() -> None:
 
 def test_from_elsewhere_the_first_motion_goes_home_at_leisure() -> None:
     start = (0.1, *HOME[1:])
-    first = plan_six_observation(ARM, ProcedureSection(), start).steps[0]
+    first = plan_six_observation(ARM, SixObservationSection(), start).steps[0]
     assert isinstance(first, Transfer)
     assert (first.start_q_rad, first.target_q_rad) == (start, HOME)
     assert math.degrees(first.speed_rad_s) <= 30
 
 
 def test_a_run_that_goes_on_leaves_out_what_is_done() -> None:
-    rest_of_it = plan_six_observation(ARM, ProcedureSection(), done={0, 1, 2})
+    rest_of_it = plan_six_observation(ARM, SixObservationSection(), done={0, 1, 2})
     assert [sweep.index for sweep in rest_of_it.sweeps] == [3, 4, 5]
-    assert plan_six_observation(ARM, ProcedureSection(), done=range(6)).steps == ()
+    assert plan_six_observation(ARM, SixObservationSection(), done=range(6)).steps == ()
 
 
 def test_configuration_sets_order_directions_repeats_and_rests() -> None:

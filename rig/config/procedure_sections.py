@@ -1,0 +1,92 @@
+"""The `procedure:` section of each stock procedure. A procedure of one's own brings a section like these."""
+
+from collections.abc import Iterator, Mapping
+from types import MappingProxyType
+from typing import Annotated, Literal, Self
+
+from pydantic import Field, model_validator
+
+from rig.config.models import Direction, ProcedureSection, RigConfig
+
+__all__ = [
+    "DEFAULT_PROCEDURE",
+    "STOCK_SECTIONS",
+    "ProcedureSection",
+    "SixObservationSection",
+    "SixSweepsSection",
+    "VerifySection",
+]
+
+Wrist = Literal["wrist_1", "wrist_2", "wrist_3"]
+DEFAULT_PROCEDURE = "six_observation"
+SPEED_TO_RANGE = 1.5  # scale error, bias, ripple and noise come on top of a sweep's speed
+
+
+class SixSweepsSection(ProcedureSection):
+    """The movement of SIX, Section III: which wrists, in what order, how fast, how often."""
+
+    order: Annotated[tuple[Wrist, ...], Field(min_length=1)] = ("wrist_3", "wrist_1", "wrist_2")
+    directions: Annotated[tuple[Direction, ...], Field(min_length=1)] = ("cw", "ccw")
+    repeats: Annotated[int, Field(ge=1, le=100)] = 1
+    speed_deg_s: Annotated[float, Field(ge=0.5, le=180)] = 60.0  # slower, and the board cannot keep a sweep's readings
+    acceleration_deg_s2: Annotated[float, Field(gt=0, le=800)] = 240.0
+    rest_s: Annotated[float, Field(ge=0, le=3600)] = 3.0
+    margin_deg: Annotated[float, Field(gt=0, le=90)] = 2.0  # constant speed on each side of the revolution
+
+    @model_validator(mode="after")
+    def every_direction_is_swept(self) -> Self:
+        """Six parameters need all six directions (SIX, section II-B); refuse before anything moves, not after."""
+        if len(set(self.order)) < 3 or len(self.order) > 3 or set(self.directions) != {"cw", "ccw"}:
+            raise ValueError("order must name wrist_1, wrist_2 and wrist_3 once each, and directions both cw and ccw")
+        return self
+
+    def problems(self, config: RigConfig) -> Iterator[str]:
+        """Sweeps beyond a sensor's range; a verification that could not pass."""
+        for name, sensor in config.sensors.items():
+            if self.speed_deg_s * SPEED_TO_RANGE > sensor.range_deg_s:
+                yield (
+                    f"procedure.speed_deg_s {self.speed_deg_s:g} is too fast for sensors.{name}.range_deg_s "
+                    f"{sensor.range_deg_s:g}: the range must be at least {SPEED_TO_RANGE} times the speed"
+                )
+        if self.needs_reference:
+            yield from verification_problems(config)
+
+
+class SixObservationSection(SixSweepsSection):
+    """Six sweeps that calibrate, and on demand the same once more to verify."""
+
+    name: Literal["six_observation"] = "six_observation"
+    verify: bool = False  # store a calibration that passed on the board, then repeat the movement with its readings
+
+    @property
+    def then_verify(self) -> bool:
+        """As the file says."""
+        return self.verify
+
+
+class VerifySection(SixSweepsSection):
+    """Six sweeps with calibrated readings, compared with a reference's."""
+
+    name: Literal["verify"] = "verify"
+    verify: bool = False  # means nothing here: allowed so that the file of a calibration serves its verification
+
+    @property
+    def needs_reference(self) -> bool:
+        """Always."""
+        return True
+
+
+STOCK_SECTIONS: Mapping[str, type[ProcedureSection]] = MappingProxyType(
+    {"six_observation": SixObservationSection, "verify": VerifySection}
+)
+
+
+def verification_problems(config: RigConfig) -> Iterator[str]:
+    """What a verification lacks: without a reference or without limits it could not pass."""
+    lacking = []
+    if config.reference is None:
+        lacking.append("a sensor with role: reference to compare with")
+    if None in (config.limits.verification_rms_rad_s, config.limits.verification_mean_rad_s):
+        lacking.append("limits.verification_rms_rad_s and limits.verification_mean_rad_s")
+    if lacking:
+        yield f"a verification needs {', and '.join(lacking)}"
