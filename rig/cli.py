@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING, Any
 
 from rig import __version__
 from rig.commands.standard_streams import keep_streams_usable
-from rig.errors import Fault, RigError
+from rig.errors import Fault, Refused, RigError
 
 if TYPE_CHECKING:
     from rig.runner.phases import Script
@@ -95,6 +95,14 @@ def _parser() -> argparse.ArgumentParser:
         default="vector",
         metavar="NAME",
         help="vector (default), newton, levenberg_marquardt, or algorithm_1, as published",
+    )
+    solve.add_argument(
+        "--set",
+        action="append",
+        default=[],
+        metavar="NAME=VALUE",
+        dest="overrides",
+        help="judge by another threshold or limit than was recorded, for example observation.max_lost_fraction=0.01",
     )
     solve.add_argument("--json", action="store_true", help="for machines")
     study = add("study", _study, "Monte-Carlo studies of the papers' figures and tables; without a name, list them")
@@ -212,12 +220,14 @@ def _check(options: argparse.Namespace) -> int:
 
 def _solve(options: argparse.Namespace) -> int:
     if options.sweeps is not None:
+        if options.overrides:
+            raise Refused("unknown_setting", "samples as CSV come without settings", "Leave out --set")
         from rig.commands.solve_csv import solve_external
 
         return solve_external(options.run, options.sweeps, options.estimator, as_json=options.json)
     from rig.commands.run import solve
 
-    return solve(options.run, options.estimator, as_json=options.json)
+    return solve(options.run, options.estimator, options.overrides, as_json=options.json)
 
 
 def _study(options: argparse.Namespace) -> int:

@@ -7,9 +7,8 @@ from typing import Literal, TypeVar, get_args
 
 import numpy as np
 
-from rig.config.load import parse
-from rig.config.models import ObservationSection
 from rig.data.run_file import RecordedSensor, RunData
+from rig.data.settings import ObservationThresholds
 from rig.errors import Fault, Refused
 from rig.estimation.accumulator import Accumulator, Solution
 from rig.estimation.accumulator import Estimator as SixObservation
@@ -64,7 +63,7 @@ def known_estimator(name: str) -> Estimator:
 def solve_runs(runs: Sequence[RunData], estimator: str = DEFAULT_ESTIMATOR) -> dict[str, SensorResult]:
     """Calibrate every sensor from one recording, or from all recordings of a run that was resumed.
 
-    The thresholds come from the configuration in the first recording. Recordings without a finished sweep add nothing.
+    The thresholds are those of the first recording. Recordings without a finished sweep add nothing.
     Whatever the estimator, the sweeps must bear the six-observation solution: a plan that lacks a direction is refused.
     Raises Refused `unknown_estimator`, `different_sensors`; Fault as `observe` and the estimators do, and
     `duplicated_observation`.
@@ -76,7 +75,7 @@ def solve_runs(runs: Sequence[RunData], estimator: str = DEFAULT_ESTIMATOR) -> d
             "the recordings do not describe the same sensors with the same settings",
             "Solve them one by one",
         )
-    settings = parse(runs[0].config, "the recorded configuration").config.observation
+    settings = runs[0].settings.observation
     _check_recordings(runs)
     return {
         name: _solve_sensor(sensor, observe_runs(runs, name, settings), chosen)
@@ -84,7 +83,7 @@ def solve_runs(runs: Sequence[RunData], estimator: str = DEFAULT_ESTIMATOR) -> d
     }
 
 
-def observe_runs(runs: Sequence[RunData], sensor: str, settings: ObservationSection) -> list[SensorObservations]:
+def observe_runs(runs: Sequence[RunData], sensor: str, settings: ObservationThresholds) -> list[SensorObservations]:
     """What each recording with a finished sweep tells of a sensor; a sweep that several hold counts in the last one."""
     return [
         observe(run, sensor, settings, _repeated(runs[place + 1 :]))

@@ -15,10 +15,9 @@ from rig.analysis.comparison import Reference
 from rig.analysis.onboard_check import agreement
 from rig.analysis.verdict import judge, verdict, verification_checks
 from rig.analysis.verification import Verification, verify
-from rig.config.load import parse
-from rig.config.models import RigConfig
 from rig.data.result_file import SCHEMA
 from rig.data.run_file import RunData
+from rig.data.settings import KnownReference
 from rig.report.figures import write_figures
 from rig.report.header import calibration_header
 from rig.report.sensor import sensor_document
@@ -49,15 +48,19 @@ def outcome_of(
     the recordings do not hold what they should.
     """
     first = [*runs, *(repeated or ())][0]
-    config = parse(first.config, "the recorded configuration").config
+    settings = first.settings
     results = solve_runs(runs, estimator) if runs else {}
-    agreements = {name: agreement(runs, name) for name in config.to_calibrate} if runs else {}
-    checks = list(judge({name: results[name].solution for name in agreements}, config.limits))
+    agreements = {name: agreement(runs, name) for name in settings.to_calibrate} if runs else {}
+    checks = list(judge({name: results[name].solution for name in agreements}, settings.limits))
     checks += [check for name, agreed in agreements.items() for check in agreed.checks(name)]
     verifications: dict[str, Verification | None] = {}
     if repeated is not None:
-        verifications = {name: _verified(name, config, runs, repeated, results) for name in config.to_calibrate}
-        checks += [c for name, found in verifications.items() for c in verification_checks(name, found, config.limits)]
+        verifications = {
+            name: _verified(name, settings.reference, runs, repeated, results) for name in settings.to_calibrate
+        }
+        checks += [
+            c for name, found in verifications.items() for c in verification_checks(name, found, settings.limits)
+        ]
     document = {
         "schema": SCHEMA,
         "verdict": verdict(checks),
@@ -70,7 +73,9 @@ def outcome_of(
             "solved_utc": datetime.now(UTC).isoformat(timespec="seconds"),
         },
         "sensors": {
-            name: sensor_document(result, config.sensors[name].role, agreements.get(name))
+            name: sensor_document(
+                result, "calibrate" if name in settings.to_calibrate else "reference", agreements.get(name)
+            )
             for name, result in results.items()
         },
         "verification": {n: verification_document(v) for n, v in verifications.items() if v is not None},
@@ -80,16 +85,15 @@ def outcome_of(
 
 def _verified(
     name: str,
-    config: RigConfig,
+    reference: KnownReference | None,
     runs: Sequence[RunData],
     repeated: Sequence[RunData],
     results: Mapping[str, SensorResult],
 ) -> Verification | None:
     """What the repeated movement says of one sensor; None when there was none, or nothing to compare with."""
-    if not repeated or config.reference is None:
+    if not repeated or reference is None:
         return None
-    reference, section = config.reference
-    known = Reference(reference, np.array(section.turntable.scale), np.array(section.turntable.bias_rad_s))
+    known = Reference(reference.name, np.array(reference.scale), np.array(reference.bias_rad_s))
     return verify(name, known, repeated, runs, results[name].solution if name in results else None)
 
 

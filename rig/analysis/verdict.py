@@ -8,7 +8,7 @@ from typing import Any, Literal
 import numpy as np
 
 from rig.analysis.verification import Verification
-from rig.config.models import LimitsSection
+from rig.data.settings import Limits
 from rig.estimation.estimate import Estimate
 
 
@@ -31,12 +31,12 @@ class Check:
         return {**asdict(self), "passed": self.passed}
 
 
-def judge(solutions: Mapping[str, Estimate], limits: LimitsSection) -> tuple[Check, ...]:
+def judge(solutions: Mapping[str, Estimate], limits: Limits) -> tuple[Check, ...]:
     """The checks of every sensor, by sensor name; what the limits mean is said in the names."""
     return tuple(check for name, solution in solutions.items() for check in _checks(name, solution, limits))
 
 
-def verification_checks(sensor: str, verification: Verification | None, limits: LimitsSection) -> tuple[Check, ...]:
+def verification_checks(sensor: str, verification: Verification | None, limits: Limits) -> tuple[Check, ...]:
     """Calibrated readings against the reference: the worst axis, and the worst mean over a revolution.
 
     The reference in its turn is held against the arm, by the limit of those means: it may be the one that is wrong.
@@ -59,7 +59,7 @@ def verdict(checks: Sequence[Check]) -> Literal["pass", "fail"]:
     return "pass" if checks and all(check.passed for check in checks) else "fail"
 
 
-def _checks(sensor: str, solution: Estimate, limits: LimitsSection) -> tuple[Check, ...]:
+def _checks(sensor: str, solution: Estimate, limits: Limits) -> tuple[Check, ...]:
     std = np.sqrt(np.diag(solution.covariance))
     return (
         Check(f"{sensor}.scale_deviation", _largest(solution.scale - 1), limits.scale_deviation, "1"),

@@ -12,7 +12,6 @@ import numpy as np
 from rig.analysis.alignment import Calibration, RelativeRotation, mean_rates, relative_rotation
 from rig.analysis.calibration import observe_runs
 from rig.analysis.comparison import Comparison, Observed, Reference, compare, turns_of_reference, turns_of_sensor
-from rig.config.load import parse
 from rig.data.run_file import RunData
 from rig.errors import Fault
 from rig.observation.observe import finished_sweeps
@@ -44,7 +43,7 @@ def verify(
     """Judge the readings that the board has calibrated (`after`) by the reference beside it.
 
     `before` are the recordings of raw readings that the `calibration` was made from; they tell how the two sensors sit
-    to each other. Without them `after` itself tells it. Thresholds come from the first recording's configuration.
+    to each other. Without them `after` itself tells it. The thresholds are those of the first recording.
 
     Raises Fault `sensor_missing`, `wrong_mode`, `nothing_to_compare`, `incomplete_verification`, `no_overlap`,
     `different_clocks`, and as `observe` and `relative_rotation` do.
@@ -76,15 +75,14 @@ def _observed(runs: Sequence[RunData], sensor: str, reference: Reference, mode: 
     useful = [run for run in runs if finished_sweeps(run)]
     if not useful:
         raise Fault("nothing_to_compare", "no sweep was finished in the recording", "Let the whole movement finish")
-    settings = parse(runs[0].config, "the recorded configuration").config.observation
+    settings = runs[0].settings.observation
     tested, known = (observe_runs(runs, name, settings) for name in (sensor, reference.name))
     return [Observed(*seen) for seen in zip(useful, tested, known, strict=True)]
 
 
 def _check_complete(runs: Sequence[RunData]) -> None:
     """A movement that was broken off has not verified the directions it never turned in."""
-    procedure = parse(runs[0].config, "the recorded configuration").config.procedure
-    planned = len(procedure.order) * len(procedure.directions) * procedure.repeats
+    planned = len(runs[0].settings.planned_sweeps)
     done = len(frozenset[int]().union(*map(finished_sweeps, runs)))
     if done < planned:
         raise Fault(

@@ -5,8 +5,9 @@ attributes exist before that mode begins, afterwards rows are only appended, and
 anything that points to it. SWMR forbids data of variable length, so the events are one stream of bytes, a line of JSON
 each: any detail fits, and a line cut off by a kill is seen by its missing end.
 
-Layout (schema "rig.run/1"): `/samples/<sensor>` (SAMPLE_DTYPE, the sensor's description as attributes), `/arm`
-(ARM_STATE_DTYPE), `/events` (bytes); `schema`, `config` (YAML) and `provenance` (JSON) as attributes of the file.
+Layout (schema "rig.run/2"): `/samples/<sensor>` (SAMPLE_DTYPE, the sensor's description as attributes), `/arm`
+(ARM_STATE_DTYPE), `/events` (bytes); `schema`, `config` (YAML), `settings` and `provenance` (JSON) as attributes of the
+file. Schema "rig.run/1" lacks `settings`.
 """
 
 import json
@@ -14,8 +15,8 @@ import os
 import re
 import threading
 import time
-from collections.abc import Iterator, Mapping
-from dataclasses import asdict, dataclass, fields
+from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import asdict, dataclass, fields, replace
 from pathlib import Path
 from types import TracebackType
 from typing import Any, Self
@@ -25,9 +26,12 @@ from numpy.typing import NDArray
 
 from firmware_host.samples import SAMPLE_DTYPE
 from rig.arm.state import ARM_STATE_DTYPE, ArmState
+from rig.data.settings import RunSettings, settings_from_json
+from rig.data.settings_of_run_1 import settings_of_configuration
 from rig.errors import Fault, Refused
 
-SCHEMA = "rig.run/1"
+SCHEMA = "rig.run/2"
+SCHEMA_BEFORE = "rig.run/1"
 FLUSH_PERIOD_S = 0.25  # half of what is promised, so that a slow flush still keeps the promise
 CHUNK_ROWS = 1024
 CHUNK_BYTES = 65536
@@ -67,14 +71,22 @@ class Event:
 
 @dataclass(frozen=True, slots=True)
 class RunData:
-    """A run file in memory: `samples` by sensor name (n,) SAMPLE_DTYPE, `arm` (n,) ARM_STATE_DTYPE, events in order."""
+    """A run file in memory: `samples` by sensor name (n,) SAMPLE_DTYPE, `arm` (n,) ARM_STATE_DTYPE, events in order.
+
+    `settings` say what it is judged by; `config` is the configuration's text, for people.
+    """
 
     config: str
+    settings: RunSettings
     provenance: dict[str, Any]
     sensors: dict[str, RecordedSensor]
     samples: dict[str, NDArray[Any]]
     arm: NDArray[Any]
     events: tuple[Event, ...]
+
+    def judged_by(self, overrides: Sequence[str]) -> "RunData":
+        """The same recording under other settings: see `RunSettings.with_overrides`."""
+        return replace(self, settings=self.settings.with_overrides(overrides)) if overrides else self
 
 
 class RunRecorder:
@@ -87,7 +99,13 @@ class RunRecorder:
     """
 
     def __init__(
-        self, path: Path, *, config: str, provenance: Mapping[str, Any], sensors: Mapping[str, RecordedSensor]
+        self,
+        path: Path,
+        *,
+        config: str,
+        settings: RunSettings,
+        provenance: Mapping[str, Any],
+        sensors: Mapping[str, RecordedSensor],
     ) -> None:
         import h5py
 
@@ -98,7 +116,7 @@ class RunRecorder:
         self._pending = _Pending({name: [] for name in sensors}, [], [])
         self._closing = threading.Event()
         try:
-            _create(path, config, provenance, sensors)
+            _create(path, config, settings, provenance, sensors)
             self._file = h5py.File(path, "r+", libver="latest")
             self._file.swmr_mode = True
             self._descriptor: int = self._file.id.get_vfd_handle()
@@ -202,10 +220,11 @@ def read_run(path: Path) -> RunData:
     try:
         # Opened as an SWMR reader even after the fact: a plain open refuses a file whose writer was killed.
         with h5py.File(path, "r", libver="latest", swmr=True) as file:
-            if file.attrs["schema"] != SCHEMA:
+            if file.attrs["schema"] not in (SCHEMA, SCHEMA_BEFORE):
                 raise ValueError(f"its schema is {file.attrs['schema']!r}, not {SCHEMA!r}")
             return RunData(
                 config=file.attrs["config"],
+                settings=_settings(file.attrs),
                 provenance=json.loads(file.attrs["provenance"]),
                 sensors={name: _sensor(dataset) for name, dataset in file["samples"].items()},
                 samples={name: _whole_rows(dataset[:]) for name, dataset in file["samples"].items()},
@@ -234,6 +253,12 @@ def make_plain(path: Path) -> None:
         for name in source:
             source.copy(name, target)
     whole.replace(path)
+
+
+def _settings(attributes: Mapping[str, Any]) -> RunSettings:
+    if attributes["schema"] == SCHEMA_BEFORE:
+        return settings_of_configuration(attributes["config"])
+    return settings_from_json(attributes["settings"])
 
 
 def _sensor(dataset: Any) -> RecordedSensor:
@@ -266,7 +291,13 @@ class _Pending:
     events: list[bytes]
 
 
-def _create(path: Path, config: str, provenance: Mapping[str, Any], sensors: Mapping[str, RecordedSensor]) -> None:
+def _create(
+    path: Path,
+    config: str,
+    settings: RunSettings,
+    provenance: Mapping[str, Any],
+    sensors: Mapping[str, RecordedSensor],
+) -> None:
     """Lay out an empty run file beside its place and move it there whole, so that a kill leaves all or nothing."""
     import h5py
 
@@ -274,7 +305,9 @@ def _create(path: Path, config: str, provenance: Mapping[str, Any], sensors: Map
         raise FileExistsError(f"{path.name} is there already")
     whole = path.with_name(path.name + ".part")
     with h5py.File(whole, "w", libver="latest") as file:
-        file.attrs.update(schema=SCHEMA, config=config, provenance=json.dumps(dict(provenance)))
+        file.attrs.update(
+            schema=SCHEMA, config=config, settings=settings.to_json(), provenance=json.dumps(dict(provenance))
+        )
         file.create_dataset("arm", shape=(0,), maxshape=(None,), chunks=(CHUNK_ROWS,), dtype=ARM_STATE_DTYPE)
         file.create_dataset("events", shape=(0,), maxshape=(None,), chunks=(CHUNK_BYTES,), dtype="u1")
         for name, sensor in sensors.items():

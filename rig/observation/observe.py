@@ -14,8 +14,8 @@ from typing import Any
 
 import numpy as np
 
-from rig.config.models import ObservationSection
 from rig.data.run_file import RunData
+from rig.data.settings import ObservationThresholds
 from rig.errors import Fault
 from rig.observation.average import Average, Stream, average, between, on_the_arms_clock
 from rig.observation.revolution import Revolution, arm_states_lost, describe, find_revolution
@@ -60,7 +60,7 @@ class SensorObservations:
 
 
 def observe(
-    run: RunData, sensor: str, settings: ObservationSection, superseded: Collection[int] = ()
+    run: RunData, sensor: str, settings: ObservationThresholds, superseded: Collection[int] = ()
 ) -> SensorObservations:
     """Average every finished sweep of a recording. An interrupted sweep has no `sweep_finished` and is left out.
 
@@ -90,12 +90,12 @@ def finished_sweeps(run: RunData) -> frozenset[int]:
     return frozenset(sweep["index"] for sweep, _ in finished(run, "sweep"))
 
 
-def sound_sweeps(run: RunData, settings: ObservationSection) -> frozenset[int]:
+def sound_sweeps(run: RunData, settings: ObservationThresholds) -> frozenset[int]:
     """Those of the finished sweeps that `observe` accepts for every sensor: a resumed run need not repeat them."""
     return frozenset.intersection(finished_sweeps(run), *(_sound_for(run, sensor, settings) for sensor in run.sensors))
 
 
-def _sound_for(run: RunData, sensor: str, settings: ObservationSection) -> frozenset[int]:
+def _sound_for(run: RunData, sensor: str, settings: ObservationThresholds) -> frozenset[int]:
     sound = set()
     try:
         motion = ArmMotion(run.arm)
@@ -114,7 +114,7 @@ def _revolution(
     motion: ArmMotion,
     sweep: dict[str, Any],
     window: tuple[float, float],
-    settings: ObservationSection,
+    settings: ObservationThresholds,
 ) -> Observation:
     return _observation(stream, motion, sweep, find_revolution(motion, sweep, window, settings), settings)
 
@@ -152,7 +152,7 @@ def finished(run: RunData, kind: str) -> Iterator[tuple[dict[str, Any], tuple[fl
 
 
 def _observation(
-    stream: Stream, motion: ArmMotion, sweep: dict[str, Any], turn: Revolution, settings: ObservationSection
+    stream: Stream, motion: ArmMotion, sweep: dict[str, Any], turn: Revolution, settings: ObservationThresholds
 ) -> Observation:
     where = describe(sweep)
     inside = between(stream, turn.start_s, turn.end_s)
@@ -196,7 +196,7 @@ def _rest(stream: Stream, motion: ArmMotion, window: tuple[float, float]) -> Ave
     return average(stream, inside, end - start, np.zeros(count), np.ones(count, dtype=np.bool_))
 
 
-def _lost(stream: Stream, inside: slice, where: str, settings: ObservationSection) -> int:
+def _lost(stream: Stream, inside: slice, where: str, settings: ObservationThresholds) -> int:
     """Samples missing in the revolution: by sequence number, and by time for those the board itself did not see."""
     around = slice(max(inside.start - 1, 0), inside.stop + 1)
     steps = np.diff(stream.raw["sequence"][around])  # modulo 2³², like the board's counter
@@ -241,7 +241,7 @@ def _check_stuck(stream: Stream, inside: slice, where: str) -> None:
         )
 
 
-def _check_direction(turned: Array, expected: Array, where: str, settings: ObservationSection) -> None:
+def _check_direction(turned: Array, expected: Array, where: str, settings: ObservationThresholds) -> None:
     """The reading, less its value at rest, must point along the turn as the nominal mounting has it."""
     cosine = float(turned @ expected / (np.linalg.norm(turned) * np.linalg.norm(expected)))
     angle = float(np.degrees(np.arccos(np.clip(cosine, -1, 1))))

@@ -7,7 +7,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from rig.config.models import ObservationSection
+from rig.data.settings import ObservationThresholds
 from rig.errors import Fault
 from rig.observation.timebase import MAX_STATE_STEP_S, ArmMotion, Array
 
@@ -47,7 +47,7 @@ class Revolution:
 
 
 def find_revolution(
-    motion: ArmMotion, sweep: Mapping[str, Any], window: tuple[float, float], settings: ObservationSection
+    motion: ArmMotion, sweep: Mapping[str, Any], window: tuple[float, float], settings: ObservationThresholds
 ) -> Revolution:
     """The revolution of one sweep (as its event describes it) between two controller times.
 
@@ -134,7 +134,7 @@ def _check_slider(turning: NDArray[Any], where: str) -> None:
         )
 
 
-def _check_speed(time_s: Array, travelled: Array, where: str, settings: ObservationSection) -> None:
+def _check_speed(time_s: Array, travelled: Array, where: str, settings: ObservationThresholds) -> None:
     """The joint's rate, smoothed, must stay near its mean: vibration passes, a halt on the way does not."""
     middles = np.arange(time_s[0] + SMOOTHING_S / 2, time_s[-1] - SMOOTHING_S / 2, SMOOTHING_S / 5)
     ahead = np.interp(middles + SMOOTHING_S / 2, time_s, travelled)

@@ -16,9 +16,10 @@ from rig import __version__
 from rig.arm.driver import Arm
 from rig.arm.state import ArmReport
 from rig.board.identify import find_sensor, refuse_other_firmware, refusing, stored_calibration
-from rig.config.load import Loaded, parse
-from rig.config.models import RigConfig, SensorSection, mounting_matrix
+from rig.config.load import Loaded
+from rig.config.models import SensorSection, mounting_matrix
 from rig.data.run_file import RecordedSensor, RunData, RunRecorder
+from rig.data.settings import RunSettings, settings_of
 from rig.errors import Refused
 from rig.observation.observe import sound_sweeps
 from rig.plans.six_sweeps import plan_six_observation
@@ -50,11 +51,12 @@ def open_rig(
     is not what the configuration says, or not what was recorded earlier, or has no calibration to correct by.
     """
     config = loaded.config
-    _refuse_another_procedure(config, earlier)
-    done = frozenset[int]().union(
-        *(sound_sweeps(run, config.observation) & observed_sweeps(run, config.to_calibrate) for run in earlier)
-    )
     whole_plan = plan_six_observation(config.arm, config.procedure)
+    settings = settings_of(config, whole_plan)
+    _refuse_another_procedure(settings, earlier)
+    done = frozenset[int]().union(
+        *(sound_sweeps(run, settings.observation) & observed_sweeps(run, settings.to_calibrate) for run in earlier)
+    )
     if earlier:
         view.line(
             f"resuming: {len(done)} of {len(whole_plan.sweeps)} sweeps are recorded, sound and known to the board"
@@ -86,11 +88,13 @@ def open_rig(
         provenance["stored_calibrations"] = {name: calibration.document() for name, calibration in stored.items()}
         _refuse_other_instruments(provenance, sensors, earlier)
         with refusing():
-            recorder = RunRecorder(recording, config=loaded.rig_text, provenance=provenance, sensors=sensors)
+            recorder = RunRecorder(
+                recording, config=loaded.rig_text, settings=settings, provenance=provenance, sensors=sensors
+            )
         monitor.recorder = stack.enter_context(recorder)
         on_board = None
         if not calibrated:
-            on_board = BoardCalibration(board, monitor, recorder, config.observation, to_calibrate)
+            on_board = BoardCalibration(board, monitor, recorder, settings.observation, to_calibrate)
             with refusing():
                 on_board.recall(earlier, done)
         yield Rig(
@@ -111,11 +115,10 @@ def open_rig(
         )
 
 
-def _refuse_another_procedure(config: RigConfig, earlier: Sequence[RunData]) -> None:
+def _refuse_another_procedure(settings: RunSettings, earlier: Sequence[RunData]) -> None:
     """Sweeps are counted by their place in the procedure, so the rest of a run must be the rest of the same one."""
     for run in earlier:
-        recorded = parse(run.config, "the recorded configuration").config
-        if (recorded.procedure, recorded.arm.home_deg) != (config.procedure, config.arm.home_deg):
+        if run.settings.movement != settings.movement:
             raise Refused(
                 "another_procedure",
                 "config.yaml in the run folder describes another procedure or home pose than the recording there",

@@ -17,8 +17,8 @@ from firmware_host.errors import BoardError
 from firmware_host.protocol import METHODS
 from rig.arm.motion import Sweep
 from rig.arm.state import ARM_STATE_DTYPE
-from rig.config.models import ObservationSection
 from rig.data.run_file import RecordedSensor, RunData, RunRecorder
+from rig.data.settings import ObservationThresholds
 from rig.errors import Fault
 from rig.observation.average import on_the_arms_clock
 from rig.observation.observe import finished_sweeps
@@ -37,7 +37,7 @@ class BoardCalibration:
     board: Board
     monitor: Monitor
     recorder: RunRecorder
-    settings: ObservationSection
+    settings: ObservationThresholds
     sensors: Mapping[str, tuple[int, RecordedSensor]]
     _observed: dict[str, int] = field(default_factory=dict)
 
@@ -101,7 +101,7 @@ def revolution_on_the_board(
     sweep: Mapping[str, Any],
     *,
     first: int,
-    settings: ObservationSection,
+    settings: ObservationThresholds,
 ) -> tuple[int, int, float]:
     """When a sweep's revolution began and ended on the board's clock, µs, and its speed by the arm's joints, rad/s.
 

@@ -6,10 +6,10 @@ import numpy as np
 import pytest
 
 from rig.analysis.verdict import Check, judge, verdict
-from rig.config.models import LimitsSection
+from rig.data.settings import Limits
 from rig.estimation.accumulator import Solution
 
-LIMITS = LimitsSection(scale_deviation=0.3, scale_std=0.002, bias_rad_s=0.1, bias_std_rad_s=0.001, condition=100)
+LIMITS = Limits(scale_deviation=0.3, scale_std=0.002, bias_rad_s=0.1, bias_std_rad_s=0.001, condition=100)
 GOOD = Solution(
     estimator="newton",
     scale=np.array([1.1771, 1.1554, 0.9]),

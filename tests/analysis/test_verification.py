@@ -14,8 +14,8 @@ from rig.analysis.calibration import solve_runs
 from rig.analysis.comparison import Reference
 from rig.analysis.verdict import verdict, verification_checks
 from rig.analysis.verification import Verification, verify
-from rig.config.models import LimitsSection
 from rig.data.run_file import RunData
+from rig.data.settings import Limits
 from rig.errors import Fault
 from rig.estimation.estimate import Array
 from rig.report.figures import write_figures
@@ -248,8 +248,8 @@ def test_the_calibration_s_recording_must_be_raw() -> None:
         verify("gyro", KNOWN, [REPEATED], [REPEATED], CALIBRATION)
 
 
-def limits(rms: float | None, mean: float | None) -> LimitsSection:
-    return LimitsSection(
+def limits(rms: float | None, mean: float | None) -> Limits:
+    return Limits(
         scale_deviation=1,
         scale_std=1,
         bias_rad_s=1,
@@ -261,7 +261,7 @@ def limits(rms: float | None, mean: float | None) -> LimitsSection:
 
 
 def test_the_worst_axis_and_the_worst_revolution_are_judged() -> None:
-    def judged(found: Verification | None, of: LimitsSection) -> str:
+    def judged(found: Verification | None, of: Limits) -> str:
         return verdict(verification_checks("gyro", found, of))
 
     after = FOUND.after

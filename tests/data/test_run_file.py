@@ -17,6 +17,7 @@ import pytest
 from firmware_host.samples import SAMPLE_DTYPE
 from rig.arm.state import ARM_STATE_DTYPE, ArmState
 from rig.data.run_file import RecordedSensor, RunRecorder, make_plain, read_run
+from rig.data.settings import KnownReference, Limits, ObservationThresholds, PlannedSweep, RunSettings
 from rig.errors import Fault, Refused
 from support.paths import ROOT
 
@@ -31,13 +32,24 @@ SENSOR = RecordedSensor(
     temperature_offset_c=25.0,
     mounting=((0.0, 1.0, 0.0), (-1.0, 0.0, 0.0), (0.0, 0.0, 1.0)),
 )
+SETTINGS = RunSettings(
+    procedure="six_observation",
+    then_verify=False,
+    observation=ObservationThresholds(0.001, 0.25, 20.0),
+    limits=Limits(0.3, 0.002, 0.1, 0.002, 100.0),
+    to_calibrate=("gyro",),
+    reference=KnownReference("reference", (1.0, 1.001, 0.999), (0.0, -1e-5, 2e-4)),
+    home_q_rad=(0.0, -1.5, 1.5, -1.5, -1.5, 0.0),
+    planned_sweeps=(PlannedSweep(0, "wrist_3", "cw", 1.0),),
+)
 CONFIG = "arm: {host: 192.0.2.1}\n# °\n"
 PROVENANCE = {"rig": "0.1.0", "board": {"unique_id": "0123"}}
 TICK_S = 0.01
 
 
 def recorder(path: Path, *sensors: str) -> RunRecorder:
-    return RunRecorder(path, config=CONFIG, provenance=PROVENANCE, sensors=dict.fromkeys(sensors or ("gyro",), SENSOR))
+    described = dict.fromkeys(sensors or ("gyro",), SENSOR)
+    return RunRecorder(path, config=CONFIG, settings=SETTINGS, provenance=PROVENANCE, sensors=described)
 
 
 def some_samples(first: int, count: int) -> np.ndarray[Any, Any]:
@@ -68,7 +80,7 @@ def test_everything_comes_back_as_it_was_added(tmp_path: Path) -> None:
         recording.add_event("sweep_finished", controller_time_s=123.5)
         recording.check()
     run = read_run(path)
-    assert (run.config, run.provenance) == (CONFIG, PROVENANCE)
+    assert (run.config, run.settings, run.provenance) == (CONFIG, SETTINGS, PROVENANCE)
     assert run.sensors == {"gyro": SENSOR, "reference": SENSOR}
     np.testing.assert_array_equal(run.samples["gyro"]["counts"], some_samples(0, 3000)["counts"])
     assert run.samples["reference"]["board_time_us"][0] == 2**40 + 7 * 4202
@@ -79,7 +91,7 @@ def test_everything_comes_back_as_it_was_added(tmp_path: Path) -> None:
     assert sweep.detail == {"sweep": {"index": 0, "axis_flange": [0.0, 0.0, -1.0], "name": "µ\n" * 400}}
     assert finished.controller_time_s == 123.5
     with h5py.File(path, "r") as file:  # any HDF5 tool opens it
-        assert file.attrs["schema"] == "rig.run/1"
+        assert file.attrs["schema"] == "rig.run/2"
 
 
 def test_a_run_can_be_read_while_it_is_written(tmp_path: Path) -> None:
@@ -192,7 +204,7 @@ FULL_DISK = """
 import json, resource, signal, sys, time
 from pathlib import Path
 sys.path.insert(0, {tests!r})
-from test_recording import recorder, some_samples
+from data.test_run_file import recorder, some_samples
 from rig.errors import Fault
 recording, added = recorder(Path({path!r})), 0
 signal.signal(signal.SIGXFSZ, signal.SIG_IGN)

@@ -10,8 +10,8 @@ from numpy.typing import NDArray
 
 from rig.analysis.calibration import solve_runs
 from rig.arm.state import ARM_STATE_DTYPE
-from rig.config.models import ObservationSection
 from rig.data.run_file import RunData
+from rig.data.settings import ObservationThresholds
 from rig.errors import Fault, Refused
 from rig.observation.observe import SensorObservations, finished, observe
 from rig.observation.timebase import ArmMotion, TimeBase, estimate_time_base, widening
@@ -30,11 +30,11 @@ from support.synthetic_run import (
 )
 
 Array = NDArray[np.float64]
-SETTINGS = ObservationSection()
 USUAL = synthetic_run(Setup())
+SETTINGS = USUAL.settings.observation
 
 
-def look(run: RunData, settings: ObservationSection = SETTINGS) -> SensorObservations:
+def look(run: RunData, settings: ObservationThresholds = SETTINGS) -> SensorObservations:
     return observe(run, "gyro", settings)
 
 
@@ -441,7 +441,7 @@ def test_few_samples_a_turn_do_not_take_vibration_for_speed(holes: bool) -> None
 
 def test_a_few_lost_samples_are_counted_and_allowed() -> None:
     gap = between(USUAL, 3.0, 3.05)
-    seen = look(lose(USUAL, gap), ObservationSection(max_lost_fraction=0.05))
+    seen = look(lose(USUAL, gap), replace(SETTINGS, max_lost_fraction=0.05))
     assert [observation.lost for observation in seen.revolutions] == [len(gap), 0, 0, 0, 0, 0]
     assert seen.revolutions[0].average.samples + len(gap) == look(USUAL).revolutions[0].average.samples
 

@@ -3,7 +3,6 @@
 import numpy as np
 import pytest
 
-from rig.config.models import ObservationSection
 from rig.data.run_file import RunData
 from rig.observation.observe import finished
 from rig.runner.onboard import revolution_on_the_board
@@ -24,7 +23,7 @@ def told(run: RunData, setup: Setup, sweep: int) -> tuple[float, float]:
     arm = arm[(arm["time_s"] > since_s) & (arm["time_s"] < end_s + 0.05)]
     first = int(np.searchsorted(arm["time_s"], start_s))
     start_us, end_us, speed_rad_s = revolution_on_the_board(
-        samples[held], run.sensors["gyro"], arm, detail, first=first, settings=ObservationSection()
+        samples[held], run.sensors["gyro"], arm, detail, first=first, settings=run.settings.observation
     )
     middle_s = (start_us + end_us) / 2e6 * (1 + setup.drift) + setup.boot_s
     return middle_s - (start_s + end_s) / 2, float(np.degrees(speed_rad_s))

@@ -15,6 +15,7 @@ from rig.arm.motion import Plan, Rest, Sweep, Transfer
 from rig.arm.state import ARM_STATE_DTYPE
 from rig.config.load import parse
 from rig.data.run_file import Event, RecordedSensor, RunData
+from rig.data.settings import settings_of
 from rig.plans.six_sweeps import plan_six_observation
 
 Array = NDArray[np.float64]
@@ -63,6 +64,7 @@ class Motion:
         self.config = CONFIG.format(speed_deg_s=setup.speed_deg_s, rest_s=setup.rest_s, repeats=setup.repeats)
         config = parse(self.config).config
         self.plan: Plan = plan_six_observation(config.arm, config.procedure)
+        self.settings = settings_of(config, self.plan)
         self.ends = 101.0 + np.cumsum([step.duration_s for step in self.plan.steps])
         self.cycles = np.array([18, 31, 50])
         self.rates = np.full(3, setup.vibration * np.sqrt(2 / 3))
@@ -153,7 +155,7 @@ def run_data(setup: Setup, motion: Motion, board_s: Array, counts: Array) -> Run
     arm["q_rad"], arm["qd_rad_s"] = np.round(q / 6e-6) * 6e-6, qd
     arm["target_speed_fraction"] = arm["speed_scaling"] = 1.0
     arm["robot_mode"], arm["safety_mode"], arm["runtime_state"] = 7, 1, 2
-    return RunData(motion.config, {}, {"gyro": SENSOR}, {"gyro": samples}, arm, motion.events())
+    return RunData(motion.config, motion.settings, {}, {"gyro": SENSOR}, {"gyro": samples}, arm, motion.events())
 
 
 SENSOR = RecordedSensor(

@@ -1,0 +1,180 @@
+"""What a recording is judged by: recorded beside it, typed, and with a version of its own.
+
+The configuration a run was made with is kept as text, for people. Its keys may change from one version of the rig to
+the next; these do not, so that an old recording is judged as it was, or by what `rig solve --set` says instead.
+"""
+
+import json
+from collections.abc import Mapping, Sequence
+from dataclasses import asdict, dataclass, fields
+from functools import cache
+from typing import TYPE_CHECKING, Annotated, Any
+
+from pydantic import Field, TypeAdapter, ValidationError
+
+from rig.errors import Refused
+
+if TYPE_CHECKING:
+    from rig.arm.motion import Plan
+    from rig.config.models import RigConfig
+
+SCHEMA = "rig.settings/1"
+QUOTED_CHARACTERS = 60
+
+Finite = Annotated[float, Field(allow_inf_nan=False)]
+Positive = Annotated[float, Field(gt=0, allow_inf_nan=False)]
+Vector3 = tuple[Finite, Finite, Finite]
+
+
+@dataclass(frozen=True, slots=True)
+class ObservationThresholds:
+    """What an averaged revolution must satisfy to be used.
+
+    Of its samples `max_lost_fraction` may be missing; the joint's rate, smoothed, may stray from its mean by the
+    fraction `max_speed_deviation`; the reading may point `max_axis_deviation_deg` away from the turn.
+    """
+
+    max_lost_fraction: Annotated[float, Field(ge=0, lt=1)]
+    max_speed_deviation: Annotated[float, Field(gt=0, lt=1)]
+    max_axis_deviation_deg: Annotated[float, Field(gt=0, lt=45)]
+
+
+@dataclass(frozen=True, slots=True)
+class Limits:
+    """The verdict's limits; those of a verification are None where none was asked for."""
+
+    scale_deviation: Positive
+    scale_std: Positive
+    bias_rad_s: Positive
+    bias_std_rad_s: Positive
+    condition: Positive
+    verification_rms_rad_s: Positive | None = None
+    verification_mean_rad_s: Positive | None = None
+
+
+@dataclass(frozen=True, slots=True)
+class KnownReference:
+    """The sensor `name` whose calibration is known, from a turntable: rate = scale · (reading + bias_rad_s)."""
+
+    name: str
+    scale: tuple[Positive, Positive, Positive]
+    bias_rad_s: Vector3
+
+
+@dataclass(frozen=True, slots=True)
+class PlannedSweep:
+    """A sweep the whole procedure has: its place in the plan, its joint, "cw" or "ccw", its speed."""
+
+    index: int
+    joint_name: str
+    direction: str
+    speed_rad_s: Positive
+
+
+@dataclass(frozen=True, slots=True)
+class RunSettings:
+    """What was to be done and how it is judged. `then_verify` says that a verification was to follow a calibration.
+
+    `to_calibrate` names the sensors the calibration is for, `planned_sweeps` are those of the whole procedure, however
+    often the run was interrupted.
+    """
+
+    procedure: str
+    then_verify: bool
+    observation: ObservationThresholds
+    limits: Limits
+    to_calibrate: Annotated[tuple[str, ...], Field(min_length=1)]
+    reference: KnownReference | None
+    home_q_rad: Annotated[tuple[Finite, ...], Field(min_length=6, max_length=6)]
+    planned_sweeps: tuple[PlannedSweep, ...]
+
+    @property
+    def movement(self) -> tuple[object, ...]:
+        """What two recordings must have in common for their sweeps to be those of one run."""
+        return self.procedure, self.then_verify, self.home_q_rad, self.planned_sweeps
+
+    def with_overrides(self, overrides: Sequence[str]) -> "RunSettings":
+        """The same with other thresholds or limits: `observation.max_lost_fraction=0.01`, `limits.scale_std=0.001`.
+
+        Raises Refused `unknown_setting` or `wrong_setting`, which say what can be set.
+        """
+        changed = self
+        for item in overrides:
+            changed = _overridden(changed, item)
+        return changed
+
+    def to_json(self) -> str:
+        """As it stands in a run file."""
+        return json.dumps({"schema": SCHEMA, **asdict(self)}, allow_nan=False)
+
+
+def settings_from_json(text: str) -> RunSettings:
+    """What `to_json` wrote. Raises ValueError naming what is wrong."""
+    document = json.loads(text)
+    schema = document.get("schema") if isinstance(document, dict) else None
+    if schema != SCHEMA:
+        raise ValueError(f"the schema of its settings is {_quoted(schema)}, not {SCHEMA!r}")
+    return checked(document)
+
+
+def checked(document: Mapping[str, Any]) -> RunSettings:
+    """Settings from plain values, if each is of the right type and range. Raises ValueError naming the first wrong."""
+    try:
+        return _adapter().validate_python(document)
+    except ValidationError as error:
+        first = error.errors()[0]
+        where = ".".join(map(str, ("settings", *first["loc"])))
+        raise ValueError(f"{where} is {_quoted(first['input'])}: {first['msg']}") from None
+
+
+def settings_of(config: "RigConfig", plan: "Plan") -> RunSettings:
+    """The settings of a new run; `plan` is that of the whole procedure."""
+    reference = None
+    if config.reference is not None:
+        name, section = config.reference
+        reference = KnownReference(name, section.turntable.scale, section.turntable.bias_rad_s)
+    return RunSettings(
+        procedure=config.procedure.name,
+        then_verify=config.procedure.verify,
+        observation=ObservationThresholds(**config.observation.model_dump()),
+        limits=Limits(**config.limits.model_dump()),
+        to_calibrate=tuple(config.to_calibrate),
+        reference=reference,
+        home_q_rad=plan.home_q_rad,
+        planned_sweeps=tuple(
+            PlannedSweep(sweep.index, sweep.joint_name, sweep.direction, sweep.speed_rad_s) for sweep in plan.sweeps
+        ),
+    )
+
+
+def _overridden(settings: RunSettings, item: str) -> RunSettings:
+    """With one `section.key=value` laid over it."""
+    path, _, value = item.partition("=")
+    section, _, key = path.strip().partition(".")
+    if path.strip() not in _settable():
+        raise Refused(
+            "unknown_setting",
+            f"a recording has no setting {_quoted(path.strip())} that could be changed",
+            f"Set one of {', '.join(_settable())}",
+        )
+    document = asdict(settings)
+    document[section][key] = value.strip()
+    try:
+        return checked(document)
+    except ValueError as error:
+        raise Refused("wrong_setting", str(error), f"Give a number, as in {path.strip()}=0.001") from None
+
+
+def _settable() -> tuple[str, ...]:
+    sections = {"observation": ObservationThresholds, "limits": Limits}
+    return tuple(f"{name}.{field.name}" for name, section in sections.items() for field in fields(section))
+
+
+def _quoted(value: object) -> str:
+    text = repr(value)
+    return text if len(text) <= QUOTED_CHARACTERS else text[: QUOTED_CHARACTERS - 1] + "…"
+
+
+@cache
+def _adapter() -> TypeAdapter[RunSettings]:
+    return TypeAdapter(RunSettings)

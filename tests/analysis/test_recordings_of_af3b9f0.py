@@ -1,0 +1,64 @@
+"""Recordings made at commit af3b9f0 still open and solve to the very numbers they gave then."""
+
+import json
+import math
+import shutil
+from collections.abc import Iterator
+from pathlib import Path
+from typing import Any
+
+import h5py
+import pytest
+
+from rig.analysis.outcome import outcome_of
+from rig.data.run_file import RunData, read_run
+from support.paths import ROOT
+
+FIXTURES = ROOT / "tests" / "fixtures" / "af3b9f0"
+RELATIVE = 1e-12
+
+
+def document_of(folder: Path) -> dict[str, Any]:
+    runs, repeated = [read_run(folder / "run.h5")], folder / "verify.h5"
+    document: dict[str, Any] = outcome_of(runs, [read_run(repeated)] if repeated.exists() else None).document
+    return document
+
+
+def expected_of(folder: Path) -> dict[str, Any]:
+    document: dict[str, Any] = json.loads((folder / "result.json").read_text(encoding="utf-8"))
+    return document
+
+
+def differences(expected: Any, found: Any, where: str = "") -> Iterator[str]:
+    """Every place where what was expected is not there; what was added since may be."""
+    if isinstance(expected, dict) and isinstance(found, dict):
+        for key, value in expected.items():
+            yield from differences(value, found.get(key), f"{where}.{key}")
+    elif isinstance(expected, list) and isinstance(found, list) and len(expected) == len(found):
+        for place, (one, other) in enumerate(zip(expected, found, strict=True)):
+            yield from differences(one, other, f"{where}[{place}]")
+    elif isinstance(expected, float) and isinstance(found, float | int):
+        if not math.isclose(expected, found, rel_tol=RELATIVE):
+            yield f"{where}: {expected!r} became {found!r}"
+    elif expected != found:
+        yield f"{where}: {expected!r} became {found!r}"
+
+
+@pytest.mark.parametrize("name", ["calibration", "verified"])
+def test_an_old_recording_solves_to_the_old_numbers(name: str) -> None:
+    expected, found = expected_of(FIXTURES / name), document_of(FIXTURES / name)
+    for part in ("verdict", "checks", "sensors", "verification"):
+        assert list(differences(expected[part], found[part], part)) == []
+
+
+def test_keys_the_configuration_no_longer_has_do_not_matter(tmp_path: Path) -> None:
+    folder = shutil.copytree(FIXTURES / "calibration", tmp_path / "run")
+    with h5py.File(folder / "run.h5", "r+") as file:
+        file.attrs["config"] = file.attrs["config"].replace("rest_s:", "pause_s:") + "\nlighting: {colour: red}\n"
+    assert document_of(folder)["checks"] == document_of(FIXTURES / "calibration")["checks"]
+
+
+def test_another_limit_gives_another_verdict() -> None:
+    run: RunData = read_run(FIXTURES / "calibration" / "run.h5")
+    assert outcome_of([run]).passed
+    assert not outcome_of([run.judged_by(["limits.scale_std=1e-6"])]).passed

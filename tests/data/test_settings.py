@@ -1,0 +1,94 @@
+"""The recorded settings: written and read alike, and changed by name or refused by name."""
+
+import json
+
+import pytest
+
+from rig.arm.motion import Plan
+from rig.config.load import parse
+from rig.data.settings import RunSettings, settings_from_json, settings_of
+from rig.data.settings_of_run_1 import settings_of_configuration
+from rig.errors import Refused
+from rig.plans.six_sweeps import plan_six_observation
+from support.paths import ROOT
+
+FIXTURES = ROOT / "tests" / "fixtures" / "af3b9f0"
+VERIFIED = (ROOT / "configs" / "lsm9ds1_adis16465.yaml").read_text(encoding="utf-8")
+
+
+def settings(text: str = VERIFIED) -> RunSettings:
+    config = parse(text).config
+    plan: Plan = plan_six_observation(config.arm, config.procedure)
+    return settings_of(config, plan)
+
+
+def test_what_is_recorded_comes_back() -> None:
+    made = settings()
+    assert made.then_verify
+    assert made.reference is not None
+    assert settings_from_json(made.to_json()) == made
+
+
+@pytest.mark.parametrize("name", ["calibration", "verified"])
+def test_a_configuration_of_commit_af3b9f0_reads_as_it_did_then(name: str) -> None:
+    text = (FIXTURES / name / "config.yaml").read_text(encoding="utf-8")
+    assert settings_of_configuration(text) == settings(text)  # nothing has changed its meaning so far
+
+
+@pytest.mark.parametrize(
+    "change",
+    [
+        {"schema": "rig.settings/9"},
+        {"limits": None},
+        {"home_q_rad": [0.0] * 5},
+        {"planned_sweeps": [{"index": 0}]},
+        {"to_calibrate": []},
+        {"observation": {"max_lost_fraction": 1.5, "max_speed_deviation": 0.1, "max_axis_deviation_deg": 5}},
+    ],
+    ids=str,
+)
+def test_other_settings_are_not_taken_for_these(change: dict[str, object]) -> None:
+    text = json.dumps({**json.loads(settings().to_json()), **change})
+    with pytest.raises(ValueError, match=next(iter(change))):
+        settings_from_json(text)
+
+
+@pytest.mark.parametrize(
+    "text",
+    ["", "a: [", "[]", "sensors: {gyro: 3}", "sensors: {}\nlimits: 3", "sensors: {}\nprocedure: {repeats: 1000000000}"],
+)
+def test_a_text_that_never_was_a_configuration_is_refused(text: str) -> None:
+    with pytest.raises(ValueError, match="configuration|settings"):
+        settings_of_configuration(text)
+
+
+def test_thresholds_and_limits_can_be_changed_for_another_judgement() -> None:
+    changed = settings().with_overrides(["observation.max_lost_fraction=0.01", "limits.scale_std = 1e-3"])
+    assert changed.observation.max_lost_fraction == 0.01
+    assert changed.limits.scale_std == 0.001
+    assert changed.limits.bias_rad_s == settings().limits.bias_rad_s
+
+
+@pytest.mark.parametrize(
+    ("override", "refusal"),
+    [
+        (
+            "observation.max_lost=0.01",
+            r"unknown_setting.*'observation\.max_lost'.*observation\.max_lost_fraction, .*limits",
+        ),
+        ("procedure.speed_deg_s=10", "unknown_setting"),
+        ("limits", "unknown_setting"),
+        ("limits.scale_std=small", r"wrong_setting.*limits\.scale_std is 'small'"),
+        ("limits.scale_std=-1", "wrong_setting.*greater than 0"),
+        ("limits.scale_std=nan", "wrong_setting"),
+        ("limits.scale_std", "wrong_setting"),
+        ("observation.max_lost_fraction=1", "wrong_setting.*less than 1"),
+        ("limits.scale_std=" + 5000 * "9", "wrong_setting"),
+        ("limits.\x1b[31m=1", r"unknown_setting.*x1b"),
+    ],
+)
+def test_what_cannot_be_changed_is_refused_with_what_can(override: str, refusal: str) -> None:
+    with pytest.raises(Refused, match=refusal) as refused:
+        settings().with_overrides([override])
+    assert len(str(refused.value)) < 600
+    assert "\x1b" not in str(refused.value)
