@@ -30,7 +30,7 @@ def c_header() -> str:
         f"#define BAUD_RATE {protocol.BAUD_RATE}u",
         "",
         *_c_enum("message_type", "MESSAGE", [(message.name, message.code) for message in protocol.MESSAGES]),
-        *_c_enum("error_code", "ERROR", [(error.name, error.code) for error in protocol.ERRORS]),
+        *_c_enum("error_code", "ERROR", [(error.name, code) for code, error in protocol.ERRORS.items()]),
     ]
     for name, (prefix, values) in protocol.ENUMERATIONS.items():
         lines += _c_enum(name, prefix, [(value, i) for i, value in enumerate(values)])

@@ -3,6 +3,7 @@
 import contextlib
 import time
 from collections.abc import Callable, Collection, Sequence
+from dataclasses import replace
 from types import TracebackType
 from typing import Any, Self
 
@@ -234,16 +235,16 @@ class Board:
     def _refusal(self, frame: Frame) -> BoardError:
         """An `error` frame as the error it is: named as in the table, and naming the part it is about."""
         code, sensor = frame.values["code"], frame.values["sensor"]
-        kind = protocol.ERROR_BY_CODE.get(code)
-        if kind is None:
+        problem = protocol.ERRORS.get(code)
+        if problem is None:
             return BoardError(
                 "board_error",
                 f"the board on {self._link.port} reports error {code}",
                 "Flash the image that comes with this program: `rig board flash`",
             )
         part = self._parts[sensor] if sensor < len(self._parts) else f"sensor {sensor}"
-        about = "" if kind.name in _ABOUT_THE_BOARD else f", of its {part}"
-        return BoardError(kind.name, f"the board on {self._link.port} says{about}: {kind.what}", kind.remedy)
+        about = "" if problem.name in _ABOUT_THE_BOARD else f", of its {part}"
+        return BoardError.of(replace(problem, what=f"the board on {self._link.port} says{about}: {problem.what}"))
 
 
 def _mask(sensors: Collection[int]) -> int:

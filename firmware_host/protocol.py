@@ -18,6 +18,8 @@ from typing import Any
 
 import numpy as np
 
+from firmware_host.problem import Problem
+
 PROTOCOL_VERSION = 2
 FIRMWARE_VERSION = "0.2.0"  # of the shipped image
 PAYLOAD_MAX = 240
@@ -323,45 +325,32 @@ MESSAGES = (
 )
 
 
-@dataclass(frozen=True, slots=True)
-class ErrorKind:
-    """An error the board can report: `what` follows "the board says that"."""
-
-    code: int
-    name: str
-    what: str
-    remedy: str
-
-
-ERRORS = (
-    ErrorKind(1, "unknown_message", "it does not know this request", "Flash the image that comes with this program"),
-    ErrorKind(2, "bad_length", "the request has the wrong length", "Flash the image that comes with this program"),
-    ErrorKind(3, "no_such_sensor", "it has no sensor of this number", "Check the sensors in the configuration"),
-    ErrorKind(4, "sensor_absent", "the sensor does not answer on its bus", "Check its supply and its SPI wires"),
-    ErrorKind(5, "bad_rate", "the data rate is not a positive number", "Correct rate_hz in the configuration"),
-    ErrorKind(6, "bad_range", "the part has no such range", "Correct range_deg_s in the configuration"),
-    ErrorKind(
-        7, "no_calibration", "it has no calibration stored for this sensor", "Store one: `rig board calibration write`"
+ERRORS = {  # code → what the board reports; `what` follows "the board says that"
+    1: Problem("unknown_message", "it does not know this request", "Flash the image that comes with this program"),
+    2: Problem("bad_length", "the request has the wrong length", "Flash the image that comes with this program"),
+    3: Problem("no_such_sensor", "it has no sensor of this number", "Check the sensors in the configuration"),
+    4: Problem("sensor_absent", "the sensor does not answer on its bus", "Check its supply and its SPI wires"),
+    5: Problem("bad_rate", "the data rate is not a positive number", "Correct rate_hz in the configuration"),
+    6: Problem("bad_range", "the part has no such range", "Correct range_deg_s in the configuration"),
+    7: Problem(
+        "no_calibration", "it has no calibration stored for this sensor", "Store one: `rig board calibration write`"
     ),
-    ErrorKind(8, "setup_failed", "a setting did not read back as written", "Check the sensor's SPI wires and supply"),
-    ErrorKind(9, "not_configured", "the sensor is not configured", "Configure it first"),
-    ErrorKind(10, "busy_streaming", "it is streaming and cannot change settings", "Stop the stream first"),
-    ErrorKind(11, "sensor_silent", "the sensor stopped signalling new data", "Check its interrupt wire and supply"),
-    ErrorKind(
-        12, "sensor_mismatch", "another part answers in the sensor's place", "Check the part and its chip select"
-    ),
-    ErrorKind(13, "checksum_failed", "its data arrive damaged, again and again", "Check the sensor's SPI wires"),
-    ErrorKind(14, "other_sensor", "the stored calibration is of another part or range", "Calibrate in this range"),
-    ErrorKind(15, "not_kept", "it has not kept the readings of that time", "Ask it to keep them before the sweep"),
-    ErrorKind(16, "bad_observation", "the observation is out of order or not finite", "Begin anew with observation 0"),
-    ErrorKind(17, "bad_calibration", "the calibration is not finite or of no known model", "Calibrate again"),
-    ErrorKind(18, "flash_failed", "its flash did not take what was written", "Replace the microcontroller board"),
-    ErrorKind(19, "sensor_fault", "the sensor reports a fault of its own", "Check its supply; else replace the sensor"),
-)
+    8: Problem("setup_failed", "a setting did not read back as written", "Check the sensor's SPI wires and supply"),
+    9: Problem("not_configured", "the sensor is not configured", "Configure it first"),
+    10: Problem("busy_streaming", "it is streaming and cannot change settings", "Stop the stream first"),
+    11: Problem("sensor_silent", "the sensor stopped signalling new data", "Check its interrupt wire and supply"),
+    12: Problem("sensor_mismatch", "another part answers in the sensor's place", "Check the part and its chip select"),
+    13: Problem("checksum_failed", "its data arrive damaged, again and again", "Check the sensor's SPI wires"),
+    14: Problem("other_sensor", "the stored calibration is of another part or range", "Calibrate in this range"),
+    15: Problem("not_kept", "it has not kept the readings of that time", "Ask it to keep them before the sweep"),
+    16: Problem("bad_observation", "the observation is out of order or not finite", "Begin anew with observation 0"),
+    17: Problem("bad_calibration", "the calibration is not finite or of no known model", "Calibrate again"),
+    18: Problem("flash_failed", "its flash did not take what was written", "Replace the microcontroller board"),
+    19: Problem("sensor_fault", "the sensor reports a fault of its own", "Check its supply; else replace the sensor"),
+}
 
 MESSAGE_BY_CODE = {message.code: message for message in MESSAGES}
 MESSAGE_BY_NAME = {message.name: message for message in MESSAGES}
-ERROR_BY_CODE = {error.code: error for error in ERRORS}
 
 
 def text(value: bytes) -> str:

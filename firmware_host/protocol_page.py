@@ -91,7 +91,7 @@ def _enumerations() -> Iterator[tuple[str, str]]:
 
 
 def _errors() -> Iterator[str]:
-    rows = ((str(error.code), error.name, error.what, error.remedy) for error in protocol.ERRORS)
+    rows = ((str(code), error.name, error.what, error.remedy) for code, error in protocol.ERRORS.items())
     return _table(("code", "error", "the board says that", "remedy"), rows)
 
 

@@ -4,18 +4,14 @@ from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from typing import Protocol
 
+from firmware_host.problem import ProblemError
+
 Read = Callable[[], int]
 Write = Callable[[int], None]
 
 
-class Violation(Exception):
+class Violation(ProblemError):
     """The firmware did what the emulator does not model or the chip does not allow; the machine adds where."""
-
-    def __init__(self, name: str, what: str, remedy: str) -> None:
-        super().__init__(name, what, remedy)
-        self.name = name
-        self.what = what
-        self.remedy = remedy
 
 
 @dataclass(frozen=True, slots=True)

@@ -2,6 +2,7 @@
 
 import struct
 from collections.abc import Sequence
+from dataclasses import replace
 
 from firmware_host.emulator import rcc
 from firmware_host.emulator.alignment import AlignmentWatch
@@ -213,7 +214,7 @@ class EmulatedBoard:
         where = self._symbols.where(address)
         if not self._symbols.function(address):
             where += f", called at {self._symbols.where(link)}"
-        return BoardError(violation.name, f"{violation.what}, at {where}", violation.remedy)
+        return BoardError.of(replace(violation.problem, what=f"{violation.what}, at {where}"))
 
     # --- reset
 

@@ -15,7 +15,6 @@ from multiprocessing.connection import Connection
 from pathlib import Path
 from typing import Any, NoReturn
 
-from rig.arm.condition import Problem
 from rig.arm.dashboard import Dashboard
 from rig.arm.messages import (
     Connected,
@@ -31,6 +30,7 @@ from rig.arm.messages import (
 )
 from rig.arm.state import ArmState
 from rig.arm.stopping import BRAKE_RAD_S2
+from rig.errors import Problem
 
 POLL_S = 0.0003  # packets come every 8 ms, or every 0.8 ms when the controller's clock runs ten times faster
 HEARTBEAT_S = 0.01

@@ -9,8 +9,8 @@ from multiprocessing.connection import Connection
 from pathlib import Path
 
 from rig.arm import child
-from rig.arm.condition import Problem
 from rig.arm.messages import Alive, Heartbeat, Message, Request
+from rig.errors import Problem
 
 TICK_S = 0.05
 # Silence is counted in ticks of the guard, not in elapsed time: when this process itself was held up, nothing is late.

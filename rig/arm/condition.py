@@ -1,25 +1,10 @@
 """What stands in the arm's way, read from one state: pure, shared by pre-flight and by the watch over a move."""
 
-from dataclasses import dataclass
-
 from rig.arm.state import ArmState, RobotMode, RuntimeState, SafetyMode
-from rig.errors import Refused
+from rig.errors import Problem
 
 # The slider is reported as a fraction; anything below 99.9 % stretches a sweep measurably.
 FULL_SPEED_FRACTION = 0.999
-
-
-@dataclass(frozen=True, slots=True)
-class Problem:
-    """A named hindrance: what is wrong and where, and what to do about it."""
-
-    name: str
-    what: str
-    remedy: str
-
-    def refusal(self) -> Refused:
-        """The same as an exception for the time before anything moves."""
-        return Refused(self.name, self.what, self.remedy)
 
 
 _UNLOCK = "Find out what stopped the arm, clear it, unlock on the pendant (not before 5 s), then start again"

@@ -3,18 +3,19 @@
 import threading
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
+from dataclasses import replace
 from pathlib import Path
 from types import TracebackType
 from typing import Self
 
 from rig.arm.child_link import ChildLink
-from rig.arm.condition import Problem, program_interruption, readiness
+from rig.arm.condition import program_interruption, readiness
 from rig.arm.dashboard import Dashboard
 from rig.arm.messages import Connected, Failed, Heartbeat, Message, Move, MoveFinished, TakeControl
 from rig.arm.motion import Motion, travel
 from rig.arm.state import ArmReport, ArmState, RuntimeState
 from rig.arm.stopping import StopOutcome, Stopper
-from rig.errors import Fault, Refused, RigError
+from rig.errors import Fault, Problem, Refused, RigError
 
 WATCH_S = 0.02  # the caller's watch is called at least this often
 ARRIVAL_RAD = 0.01  # the joint servo's ripple and lag stay below this
@@ -76,7 +77,7 @@ class Arm:
             self._link.start()
             self._wait(lambda: self._latest is not None or self._answer is not None)
         if isinstance(self._answer, Failed):
-            raise self._answer.problem.refusal()
+            raise Refused.of(self._answer.problem)
 
     @property
     def latest(self) -> ArmState:
@@ -115,10 +116,10 @@ class Arm:
             return
         problem = self._problem or Problem("arm_stopped", "the arm was stopped on request", "Start again when ready")
         if not self._holds_arm:
-            raise problem.refusal()
+            raise Refused.of(problem)
         outcome = self.stop()
         remedy = f"{outcome.remedy}. {problem.remedy}" if outcome.remedy else problem.remedy
-        raise Fault(problem.name, f"{problem.what}; {outcome.what}", remedy)
+        raise Fault.of(replace(problem, what=f"{problem.what}; {outcome.what}", remedy=remedy))
 
     # Moving -------------------------------------------------------------------------------------------------------
 
@@ -132,14 +133,14 @@ class Arm:
         if problem is None and self.latest.runtime_state != RuntimeState.STOPPED:
             problem = Problem("program_running", f"a program runs on the arm at {self._host}", "Stop it on the pendant")
         if problem is not None:
-            raise problem.refusal()
+            raise Refused.of(problem)
         with self._stopping_on_error(), self._link.patience():
             self._holds_arm = True
             self._request(TakeControl(payload_kg, payload_centre_m))
             self._wait(lambda: self._answer is not None)
             if isinstance(self._answer, Failed):
                 self._holds_arm = False
-                raise self._answer.problem.refusal()
+                raise Refused.of(self._answer.problem)
             self._wait(lambda: self.latest.runtime_state == RuntimeState.PLAYING)
             self._supervising = True
 
@@ -260,11 +261,11 @@ class Arm:
         try:
             self._on_state(state)
         except RigError as error:
-            self._fail(Problem(error.name, error.what, error.remedy))
+            self._fail(error.problem)
         except Exception as error:
             self._fail(Problem("arm_state_not_taken", f"an arm state could not be passed on ({error})", "See the log"))
         if self._supervising and (problem := self._judge(state)):
-            self._fail(Problem(problem.name, f"{problem.what} during {self._doing}", problem.remedy))
+            self._fail(replace(problem, what=f"{problem.what} during {self._doing}"))
 
     def _judge(self, state: ArmState) -> Problem | None:
         """Why the arm cannot go on. The safety bits that explain a stopped program may come a packet later than it."""

@@ -2,8 +2,8 @@
 
 from dataclasses import dataclass
 
-from rig.arm.condition import Problem
 from rig.arm.state import ArmState, Joints
+from rig.errors import Problem
 
 # Parent to child ---------------------------------------------------------------------------------------------------
 

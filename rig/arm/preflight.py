@@ -5,11 +5,11 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from rig.arm.condition import Problem, readiness
+from rig.arm.condition import readiness
 from rig.arm.kinematics import flange_axes
 from rig.arm.motion import Motion, Plan, travel
 from rig.arm.state import JOINT_NAMES, ArmReport, Joints
-from rig.errors import Refused
+from rig.errors import Problem, Refused
 
 # UR10e limits, base to wrist 3 (maker's data sheet and ROS 2 description). `ur_rtde` itself accepts up to 3.14 rad/s.
 JOINT_LIMIT_RAD = 2 * math.pi

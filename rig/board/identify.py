@@ -1,14 +1,12 @@
 """Whether the board and the sensors on it are what the configuration and this program expect."""
 
-from collections.abc import Iterator
-from contextlib import contextmanager
+from functools import partial
 from math import isclose
 
 from firmware_host.client import Board, BoardIdentity, SensorInfo, StoredCalibration
-from firmware_host.errors import BoardError
 from firmware_host.protocol import FIRMWARE_VERSION
 from rig.config.models import SensorSection
-from rig.errors import Fault, Refused
+from rig.errors import Fault, Refused, raised_as
 
 NOBODY = (0x00, 0xFF, 0x0000, 0xFFFF)  # what a bus reads where no part drives it
 
@@ -32,22 +30,8 @@ IMPOSTORS = {
 }
 
 
-@contextmanager
-def refusing() -> Iterator[None]:
-    """Before anything has moved, what is wrong with the board or the recording is a refusal."""
-    try:
-        yield
-    except (BoardError, Fault) as error:
-        raise Refused(error.name, error.what, error.remedy) from error
-
-
-@contextmanager
-def changing() -> Iterator[None]:
-    """What goes wrong while the board is being changed is no refusal any more."""
-    try:
-        yield
-    except BoardError as error:
-        raise Fault(error.name, error.what, error.remedy) from error
+refusing = partial(raised_as, Refused)  # before anything has moved
+changing = partial(raised_as, Fault)  # while the board is being changed: no refusal any more
 
 
 def refuse_other_firmware(identity: BoardIdentity) -> None:

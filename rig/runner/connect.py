@@ -134,7 +134,7 @@ def _refuse_other_instruments(
         for key, what in (("board_unique_id", "board"), ("arm_serial_number", "arm")):
             if run.provenance[key] != provenance[key]:
                 raise Refused(
-                    f"another_{what}",
+                    "another_board" if what == "board" else "another_arm",
                     f"the run was begun with the {what} {run.provenance[key]}, this is {provenance[key]}",
                     f"Connect the {what} the run was begun with, or start a new run with `rig run`",
                 )

@@ -5,13 +5,13 @@ from dataclasses import replace
 
 import pytest
 
-from rig.arm.condition import Problem, program_interruption, readiness
+from rig.arm.condition import program_interruption, readiness
 from rig.arm.motion import Plan, Transfer
 from rig.arm.preflight import arm_problems, plan_problems, refuse, way_to_home
 from rig.arm.state import ArmReport, ArmState, Joints, RobotMode, RuntimeState, SafetyMode
 from rig.config.models import ArmSection
 from rig.config.procedure_sections import SixObservationSection
-from rig.errors import Refused
+from rig.errors import Problem, Refused
 from rig.plans.six_sweeps import plan_six_observation
 
 HOME_DEG = (0.0, -90.0, 90.0, -90.0, -90.0, 0.0)

@@ -14,5 +14,5 @@ def test_the_committed_c_header_is_the_one_the_table_generates() -> None:
 
 
 def test_codes_and_names_are_unique() -> None:
-    for table in (MESSAGES, protocol.ERRORS):
-        assert len({entry.code for entry in table}) == len(table) == len({entry.name for entry in table})
+    assert len({entry.code for entry in MESSAGES}) == len(MESSAGES) == len({entry.name for entry in MESSAGES})
+    assert len({error.name for error in protocol.ERRORS.values()}) == len(protocol.ERRORS)

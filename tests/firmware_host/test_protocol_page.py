@@ -28,8 +28,8 @@ def test_every_message_field_and_error_is_on_the_page() -> None:
         assert f"| 0x{message.code:02x} |" in page
         for field in (*message.fields, *message.items):
             assert f"| {field.name} | {field.kind} | {field.meaning} |" in page
-    for error in protocol.ERRORS:
-        assert f"| {error.code} | {error.name} | {error.what} | {error.remedy} |" in page
+    for code, error in protocol.ERRORS.items():
+        assert f"| {code} | {error.name} | {error.what} | {error.remedy} |" in page
 
 
 def test_the_places_of_the_fields_are_those_on_the_wire() -> None:

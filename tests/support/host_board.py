@@ -11,7 +11,7 @@ from pathlib import Path
 from typing import Any
 
 from firmware_host.frames import Frame, FrameReader, encode
-from firmware_host.protocol import ERROR_BY_CODE
+from firmware_host.protocol import ERRORS
 from support.host_sensors import Adis16465Registers, Lsm9ds1Registers, Mpu9250Registers, Part
 from support.paths import FIRMWARE
 
@@ -146,7 +146,7 @@ def error_of(frames: list[Frame]) -> str:
     """The name of the error that is the only frame."""
     (frame,) = frames
     assert frame.name == "error"
-    return ERROR_BY_CODE[frame.values["code"]].name
+    return ERRORS[frame.values["code"]].name
 
 
 def sample_sequences(frames: list[Frame], sensor: int = 0) -> list[int]:

@@ -5,7 +5,7 @@ import pytest
 
 from firmware_host.emulator.spi_device import Fault
 from firmware_host.frames import Frame, encode
-from firmware_host.protocol import ERROR_BY_CODE
+from firmware_host.protocol import ERRORS
 from support.emulated_session import PARTS, Session, samples
 
 NAMES = list(PARTS)
@@ -24,7 +24,7 @@ def started(rates_hz: dict[str, float]) -> Session:
 
 def errors_of(frames: list[Frame]) -> list[tuple[str, str]]:
     errors = [frame.values for frame in frames if frame.name == "error"]
-    return [(NAMES[values["sensor"]], ERROR_BY_CODE[values["code"]].name) for values in errors]
+    return [(NAMES[values["sensor"]], ERRORS[values["code"]].name) for values in errors]
 
 
 def test_three_sensors_at_their_full_rates_lose_nothing() -> None:

@@ -11,7 +11,7 @@ from firmware_host.emulator.mpu9250 import Mpu9250
 from firmware_host.emulator.spi_device import Fault
 from firmware_host.errors import BoardError
 from firmware_host.frames import Frame, encode
-from firmware_host.protocol import ERROR_BY_CODE
+from firmware_host.protocol import ERRORS
 from support import tiny_firmware
 from support.emulated_session import CRYSTAL_PPM, PARTS, RATES_AND_RANGES, TRUTH, Session, samples
 
@@ -31,7 +31,7 @@ def streaming(noise_rad_s: float = 0.0, tick_s: float = 0.002) -> Session:
 
 def error(frame: Frame) -> str:
     assert frame.name == "error", frame
-    return ERROR_BY_CODE[frame.values["code"]].name
+    return ERRORS[frame.values["code"]].name
 
 
 def test_three_sensors_stream_each_at_its_own_pace_without_a_loss() -> None:

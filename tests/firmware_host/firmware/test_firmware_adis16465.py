@@ -4,7 +4,7 @@ import math
 
 import pytest
 
-from firmware_host.protocol import ERROR_BY_CODE
+from firmware_host.protocol import ERRORS
 from support.host_board import HostBoard, configured, convert, error_of, first_samples
 from support.host_sensors import Adis16465Registers, Nobody
 
@@ -99,7 +99,7 @@ def test_a_fault_the_adis16465_reports_is_named(status: int, name: str | None) -
     part.status = status
     for k in range(30):
         convert(board, 100_000 + 5000 * k, sensor=2)
-    errors = [(f.values["sensor"], ERROR_BY_CODE[f.values["code"]].name) for f in board.frames() if f.name == "error"]
+    errors = [(f.values["sensor"], ERRORS[f.values["code"]].name) for f in board.frames() if f.name == "error"]
     assert errors == ([(2, name)] if name else [])
 
 
@@ -109,5 +109,5 @@ def test_damage_again_and_again_is_named_but_not_a_burst_now_and_then(every: int
     for k in range(300):
         part.damage = k % every == 0
         convert(board, 100_000 + 5000 * k, sensor=2)
-    errors = [ERROR_BY_CODE[f.values["code"]].name for f in board.frames() if f.name == "error"]
+    errors = [ERRORS[f.values["code"]].name for f in board.frames() if f.name == "error"]
     assert errors == ["checksum_failed"] * named

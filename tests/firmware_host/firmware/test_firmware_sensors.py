@@ -4,7 +4,7 @@ import math
 
 import pytest
 
-from firmware_host.protocol import ERROR_BY_CODE
+from firmware_host.protocol import ERRORS
 from support.host_board import PERIOD_US, HostBoard, configured, convert, error_of, streaming_board
 from support.host_sensors import Nobody
 
@@ -40,7 +40,7 @@ def test_a_missing_part_is_told_in_the_identity_and_refused(
     assert identity.items["who_am_i"][sensor] == expected
     assert identity.items["present"].tolist() == [i != sensor for i in range(3)]
     (error,) = board.ask("configure", sensor=sensor, rate_hz=200, range_deg_s=100)
-    assert (ERROR_BY_CODE[error.values["code"]].name, error.values["sensor"]) == ("sensor_absent", sensor)
+    assert (ERRORS[error.values["code"]].name, error.values["sensor"]) == ("sensor_absent", sensor)
 
 
 @pytest.mark.parametrize(
@@ -58,7 +58,7 @@ def test_another_part_is_told_in_the_identity_and_refused(board: HostBoard, sens
     (answer,) = board.ask("hello")
     assert answer.items["who_am_i"][sensor] == identity and not answer.items["present"][sensor]
     (error,) = board.ask("configure", sensor=sensor, rate_hz=200, range_deg_s=100)
-    assert (ERROR_BY_CODE[error.values["code"]].name, error.values["sensor"]) == ("sensor_mismatch", sensor)
+    assert (ERRORS[error.values["code"]].name, error.values["sensor"]) == ("sensor_mismatch", sensor)
 
 
 @pytest.mark.parametrize(("sensor", "register"), [(0, 0x10), (0, 0x22), (1, 0x19), (1, 0x13), (1, 0x6B), (2, 0x64)])

@@ -8,7 +8,7 @@ import pytest
 from firmware_host.emulator.flash_memory import PAGE_BYTES, STORE_OFFSET, FlashMemory
 from firmware_host.emulator.nvic import NMI, Nvic
 from firmware_host.frames import Frame, encode
-from firmware_host.protocol import ERROR_BY_CODE
+from firmware_host.protocol import ERRORS
 from support.emulated_session import Session, shipped_flash
 
 IMAGE_BYTES = STORE_OFFSET
@@ -42,7 +42,7 @@ def stored(session: Session) -> int | None:
     """The number of the calibration the board has for its LSM9DS1."""
     answer = session.ask("read_calibration", sensor=0)
     if answer.name == "error":
-        assert ERROR_BY_CODE[answer.values["code"]].name == "no_calibration"
+        assert ERRORS[answer.values["code"]].name == "no_calibration"
         return None
     number: int = round(answer.values["temperature_c"] - 20)
     assert {key: answer.values[key] for key in ("scale", "bias_rad_s")} == {

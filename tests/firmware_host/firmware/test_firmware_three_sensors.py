@@ -5,7 +5,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from firmware_host.frames import Frame, encode
-from firmware_host.protocol import ERROR_BY_CODE
+from firmware_host.protocol import ERRORS
 from support.host_board import HostBoard, convert, sample_sequences
 from support.host_sensors import Nobody
 
@@ -86,7 +86,7 @@ def test_every_conversion_of_every_sensor_is_received_or_counted_as_dropped(fate
 
 
 def errors_of(frames: list[Frame]) -> list[tuple[int, str]]:
-    return [(f.values["sensor"], ERROR_BY_CODE[f.values["code"]].name) for f in frames if f.name == "error"]
+    return [(f.values["sensor"], ERRORS[f.values["code"]].name) for f in frames if f.name == "error"]
 
 
 def test_dead_sensors_are_named_once_and_cost_the_others_nothing() -> None:

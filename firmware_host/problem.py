@@ -1,0 +1,51 @@
+"""What is wrong, in three words' length: the one form in which every part of the program says no."""
+
+from dataclasses import dataclass
+from typing import Self
+
+
+@dataclass(frozen=True, slots=True)
+class Problem:
+    """Something that is not as it must be.
+
+    `name` is stable, for programs and for looking it up (`lost_samples`, `arm_link_lost`, …), `what` one clause saying
+    what happened and where, `remedy` one clause saying what to do.
+    """
+
+    name: str
+    what: str
+    remedy: str
+
+    def __str__(self) -> str:
+        return f"{self.name}: {self.what}. {self.remedy}."
+
+
+class ProblemError(Exception):
+    """An exception that carries a `Problem`; each part of the program has its own kinds of it."""
+
+    def __init__(self, name: str, what: str, remedy: str) -> None:
+        super().__init__(name, what, remedy)
+        self.problem = Problem(name, what, remedy)
+
+    @classmethod
+    def of(cls, problem: Problem) -> Self:
+        """The problem as an exception of this kind."""
+        return cls(problem.name, problem.what, problem.remedy)
+
+    @property
+    def name(self) -> str:
+        """The problem's stable name."""
+        return self.problem.name
+
+    @property
+    def what(self) -> str:
+        """One clause saying what happened and where."""
+        return self.problem.what
+
+    @property
+    def remedy(self) -> str:
+        """One clause saying what to do."""
+        return self.problem.remedy
+
+    def __str__(self) -> str:
+        return str(self.problem)

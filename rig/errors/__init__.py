@@ -1,0 +1,38 @@
+"""How the rig says no: every error has a name, says what and where, and says what to do.
+
+`catalogue` has every name in one table, from which docs/errors.md is made.
+"""
+
+from collections.abc import Iterator
+from contextlib import contextmanager
+
+from firmware_host.problem import Problem, ProblemError
+
+__all__ = ["Fault", "Problem", "ProblemError", "Refused", "RigError", "raised_as"]
+
+
+class RigError(ProblemError):
+    """Something the rig will not or cannot do. `exit_status` is what the command line returns for it."""
+
+    exit_status = 3
+
+
+class Refused(RigError):
+    """The configuration or the pre-flight check says no; nothing has moved (exit status 2)."""
+
+    exit_status = 2
+
+
+class Fault(RigError):
+    """Something failed during the run; the arm is stopped and the data kept (exit status 3)."""
+
+
+@contextmanager
+def raised_as(kind: type[RigError]) -> Iterator[None]:
+    """Whoever finds a problem inside, the board or the recording, it is raised as `kind`; a refusal stays one."""
+    try:
+        yield
+    except ProblemError as error:
+        if isinstance(error, (kind, Refused)):
+            raise
+        raise kind.of(error.problem) from error

@@ -1,0 +1,105 @@
+"""Which errors the source raises, read from its syntax: names stand written out where an error is made."""
+
+import ast
+import functools
+from collections import defaultdict
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass
+from pathlib import Path
+
+from support.paths import ROOT
+
+PACKAGES = ("rig", "firmware_host", "procedures")
+THE_FORM_ITSELF = ROOT / "firmware_host" / "problem.py"
+# What makes an error from name, what and remedy → how the catalogue calls that
+MAKERS = {
+    "Refused": "refused",
+    "Fault": "fault",
+    "RigError": "either",
+    "BoardError": "either",
+    "Problem": "either",
+    "Violation": "simulated",
+}
+FIELDS = 3  # name, what, remedy
+
+
+@dataclass(frozen=True, slots=True)
+class Raised:
+    """An error made at `place`, "file:line". `name` is None when it is not written out there."""
+
+    name: str | None
+    kind: str
+    place: str
+
+
+@functools.cache
+def raised_in_source() -> list[Raised]:
+    """Every error that is made anywhere in the packages, by file and line."""
+    files = sorted({file for package in PACKAGES for file in (ROOT / package).rglob("*.py")} - {THE_FORM_ITSELF})
+    return [found for file in files for found in raised_in(file.read_text(encoding="utf-8"), file.relative_to(ROOT))]
+
+
+def raised_in(source: str, file: Path) -> list[Raised]:
+    """The same of one file's text."""
+    module = _Module(ast.parse(source))
+    return [
+        Raised(name, kind, f"{file}:{call.lineno}")
+        for call, kind in module.errors()
+        for name in module.names(call.args[0], call)
+    ]
+
+
+def kind_of(raised: Sequence[Raised]) -> str:
+    """How the catalogue calls it when an error is made in all these places."""
+    kinds = {each.kind for each in raised}
+    return kinds.pop() if len(kinds) == 1 else "either"
+
+
+class _Module:
+    """A module's tree, where a name is looked for through parameters to callers and through variables to values."""
+
+    def __init__(self, tree: ast.Module) -> None:
+        self._functions: dict[ast.AST, ast.FunctionDef] = {}  # node → the innermost function it stands in
+        self._bases: dict[ast.AST, str] = {}  # node → the maker that its class derives from
+        self._calls: dict[str, list[ast.Call]] = defaultdict(list)
+        for node in ast.walk(tree):
+            if isinstance(node, ast.FunctionDef):
+                self._functions |= dict.fromkeys(ast.walk(node), node)
+            elif isinstance(node, ast.ClassDef):
+                maker = next((ast.unparse(base) for base in node.bases if ast.unparse(base) in MAKERS), None)
+                self._bases |= dict.fromkeys(ast.walk(node), maker) if maker else {}
+            elif isinstance(node, ast.Call):
+                self._calls[ast.unparse(node.func).removeprefix("self.")].append(node)
+
+    def errors(self) -> Iterator[tuple[ast.Call, str]]:
+        for name, calls in self._calls.items():
+            for call in calls:
+                maker = self._bases.get(call) if name == "super().__init__" else name
+                if maker in MAKERS and len(call.args) == FIELDS:
+                    yield call, MAKERS[maker]
+
+    def names(self, expression: ast.expr, call: ast.Call) -> set[str | None]:
+        """What the first argument of `call` can be; nothing for `problem.name`, an error made elsewhere."""
+        match expression:
+            case ast.Constant(value=str(name)):
+                return {name}
+            case ast.IfExp(body=body, orelse=other):
+                return self.names(body, call) | self.names(other, call)
+            case ast.Attribute(attr="name"):
+                return set()
+            case ast.Name(id=variable) if call in self._functions:
+                return self._values(variable, self._functions[call]) or {None}
+        return {None}
+
+    def _values(self, variable: str, function: ast.FunctionDef) -> set[str | None]:
+        parameters = [argument.arg for argument in function.args.args if argument.arg != "self"]
+        if variable in parameters:
+            at = parameters.index(variable)
+            given = [(call.args[at], call) for call in self._calls.get(function.name, ()) if len(call.args) > at]
+        else:
+            given = [
+                (node.value, next(each for each in ast.walk(function) if isinstance(each, ast.Call)))
+                for node in ast.walk(function)
+                if isinstance(node, ast.Assign) and ast.unparse(node.targets[0]) == variable
+            ]
+        return {name for value, call in given for name in self.names(value, call)}
