@@ -135,7 +135,7 @@ def settings_of(config: "RigConfig", plan: "Plan") -> RunSettings:
         reference = KnownReference(name, section.turntable.scale, section.turntable.bias_rad_s)
     return RunSettings(
         procedure=config.procedure.name,
-        then_verify=config.procedure.verify,
+        then_verify=config.procedure.then_verify,
         observation=ObservationThresholds(**config.observation.model_dump()),
         limits=Limits(**config.limits.model_dump()),
         to_calibrate=tuple(config.to_calibrate),

@@ -58,7 +58,7 @@ def test_other_settings_are_not_taken_for_these(change: dict[str, object]) -> No
     ["", "a: [", "[]", "sensors: {gyro: 3}", "sensors: {}\nlimits: 3", "sensors: {}\nprocedure: {repeats: 1000000000}"],
 )
 def test_a_text_that_never_was_a_configuration_is_refused(text: str) -> None:
-    with pytest.raises(ValueError, match="configuration|settings"):
+    with pytest.raises(ValueError, match=r"configuration|settings"):
         settings_of_configuration(text)
 
 
