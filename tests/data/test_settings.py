@@ -58,7 +58,7 @@ def test_other_settings_are_not_taken_for_these(change: dict[str, object]) -> No
     ["", "a: [", "[]", "sensors: {gyro: 3}", "sensors: {}\nlimits: 3", "sensors: {}\nprocedure: {repeats: 1000000000}"],
 )
 def test_a_text_that_never_was_a_configuration_is_refused(text: str) -> None:
-    with pytest.raises(ValueError, match="configuration|settings"):
+    with pytest.raises(ValueError, match=r"configuration|settings"):
         settings_of_configuration(text)
 
 
@@ -74,7 +74,7 @@ def test_thresholds_and_limits_can_be_changed_for_another_judgement() -> None:
     [
         (
             "observation.max_lost=0.01",
-            r"unknown_setting.*'observation\.max_lost'.*observation\.max_lost_fraction, .*limits",
+            r"unknown_setting.*'observation\.max_lost'.*max_lost_fraction, .*limits",
         ),
         ("procedure.speed_deg_s=10", "unknown_setting"),
         ("limits", "unknown_setting"),
