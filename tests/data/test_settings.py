@@ -74,7 +74,7 @@ def test_thresholds_and_limits_can_be_changed_for_another_judgement() -> None:
     [
         (
             "observation.max_lost=0.01",
-            r"unknown_setting.*'observation\.max_lost'.*observation\.max_lost_fraction, .*limits",
+            r"unknown_setting.*'observation\.max_lost'.*max_lost_fraction, .*limits",
         ),
         ("procedure.speed_deg_s=10", "unknown_setting"),
         ("limits", "unknown_setting"),
