@@ -21,10 +21,17 @@ import numpy as np
 from firmware_host.problem import Problem
 
 PROTOCOL_VERSION = 2
-FIRMWARE_VERSION = "0.2.0"  # of the shipped image
+FIRMWARE_VERSION = "0.2.1"  # of the shipped image
 PAYLOAD_MAX = 240
-OVERHEAD = 6  # bytes of a frame around its payload before COBS: type, sequence, CRC; COBS adds two
+OVERHEAD = 6  # bytes of a frame around its payload before COBS: type, sequence, CRC
+COBS_BYTES = 2  # that COBS adds: the code byte and the delimiter
 BAUD_RATE = 921600  # what the shipped image uses
+BATCH_AGE_US = 80_000  # a sample waits no longer than this for company; a full frame goes at once
+FULL_SCALE_COUNTS = 32767  # of raw readings: every part the firmware drives reports 16 bits, two's complement
+CALIBRATED_RAD_S = 1e-6  # a count of calibrated readings: they come in microradians per second
+# No sensor's scale factor is that far off, either way. Observations that are all alike leave only noise to compare,
+# which looks like readings of a sensor that is: the board calls that degenerate.
+MAX_SCALE = 4.0
 
 MODES = ("raw", "calibrated")
 RESET_CAUSES = ("unknown", "power", "pin", "software", "watchdog", "fault")

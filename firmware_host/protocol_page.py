@@ -7,7 +7,7 @@ from firmware_host import protocol
 from firmware_host.frames import encode
 from firmware_host.protocol import Field, Message
 
-LARGEST_BLOCK = protocol.PAYLOAD_MAX + protocol.OVERHEAD + 2  # with COBS' code byte and the delimiter
+LARGEST_BLOCK = protocol.PAYLOAD_MAX + protocol.OVERHEAD + protocol.COBS_BYTES
 
 
 def reference() -> str:

@@ -3,14 +3,10 @@
 from collections.abc import Mapping
 from dataclasses import dataclass
 
-from firmware_host.protocol import MESSAGES, OVERHEAD, PAYLOAD_MAX
+from firmware_host.protocol import BATCH_AGE_US, COBS_BYTES, MESSAGE_BY_NAME, OVERHEAD, PAYLOAD_MAX
 
 BITS_PER_BYTE = 10  # start bit, eight data bits, stop bit
-COBS_BYTES = 2  # the code byte and the delimiter
-BATCH_S = 0.08  # the firmware sends a batch when its first sample is this old, or the frame is full
 MARGIN = 0.1  # of the link stays free: answers, and a clock that is a little off
-
-_BY_NAME = {message.name: message for message in MESSAGES}
 
 
 @dataclass(frozen=True, slots=True)
@@ -23,10 +19,10 @@ class Stream:
     @property
     def bytes_per_sample(self) -> float:
         """A sample's bytes and its share of the frame around it."""
-        message = _BY_NAME["rates" if self.calibrated else "samples"]
+        message = MESSAGE_BY_NAME["rates" if self.calibrated else "samples"]
         item, head = message.item_dtype.itemsize, message.head.size
         full_frame = (PAYLOAD_MAX - head) // item
-        samples = min(full_frame, 1 + int(BATCH_S * self.rate_hz))
+        samples = min(full_frame, 1 + int(BATCH_AGE_US * 1e-6 * self.rate_hz))
         return item + (head + OVERHEAD + COBS_BYTES) / samples
 
     @property

@@ -12,6 +12,7 @@ from pathlib import Path
 from typing import Any
 
 from firmware_host.client import Board, BoardIdentity, Calibration
+from firmware_host.protocol import CALIBRATED_RAD_S, FULL_SCALE_COUNTS
 from rig import __version__
 from rig.arm.driver import Arm
 from rig.arm.state import ArmReport
@@ -27,9 +28,6 @@ from rig.runner.acquisition import Monitor, SensorCount
 from rig.runner.onboard import BoardCalibration, observed_sweeps
 from rig.runner.procedure import Confirm, Rig
 from rig.station.view import View
-
-FULL_SCALE_COUNTS = 32767  # every part the firmware drives reports 16 bits, two's complement
-CALIBRATED_RAD_S = 1e-6  # a count of calibrated readings, as the protocol has it
 
 
 @contextmanager

@@ -6,10 +6,9 @@
 #include "kept.h"
 #include "link.h"
 #include "port.h"
-#include "sensor.h"
+#include "sensors.h"
 
 #define RING 64u              /* a power of two */
-#define BATCH_AGE_US 80000u   /* a sample waits no longer than this for company */
 #define SILENCE_PERIODS 10u   /* so many conversions missing in a row is a fault, not jitter */
 #define SILENCE_US 100000u    /* and time for a part that is just starting up */
 #define BAD_READS 10u         /* so many in a row are worth a word, */

@@ -6,7 +6,7 @@
 #include <stdint.h>
 
 #include "correction.h"
-#include "sensor.h"
+#include "sensors.h"
 
 void acquisition_reset(void);
 

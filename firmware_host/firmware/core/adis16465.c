@@ -42,13 +42,23 @@ static uint16_t word_at(const uint8_t *bytes)
     return (uint16_t)(bytes[0] << 8 | bytes[1]);
 }
 
+static struct {
+    uint32_t idle_since_us; /* the latest frame's end */
+    uint16_t counter;       /* of conversions, at the latest reading */
+} states[BUS_DEVICES];
+
+static void reset(unsigned device)
+{
+    states[device].idle_since_us = port_time_us();
+    states[device].counter = 0;
+}
+
 static void transfer(unsigned device, uint8_t *bytes, size_t size)
 {
-    static uint32_t idle_since_us;
-    if (port_time_us() - idle_since_us <= STALL_US)
+    if (port_time_us() - states[device].idle_since_us <= STALL_US)
         port_wait_us(STALL_US);
     bus_xfer(device, BUS_HZ, bytes, size);
-    idle_since_us = port_time_us();
+    states[device].idle_since_us = port_time_us();
 }
 
 static uint16_t exchange(unsigned device, uint8_t first, uint8_t second)
@@ -77,10 +87,9 @@ static bool write_register(unsigned device, uint8_t address, uint16_t value)
     return false;
 }
 
-static bool identify(unsigned device, uint16_t *who_am_i)
+static uint16_t identify(unsigned device)
 {
-    *who_am_i = read_register(device, PROD_ID);
-    return *who_am_i == IDENTITY;
+    return read_register(device, PROD_ID);
 }
 
 static const struct gyro_range *range_of_model(unsigned device)
@@ -92,16 +101,8 @@ static const struct gyro_range *range_of_model(unsigned device)
     return NULL;
 }
 
-static uint8_t configure(unsigned device, const struct configure_payload *wanted, struct setup_payload *setup)
+static enum error_code configure(unsigned device, const struct configure_payload *wanted, struct setup_payload *setup)
 {
-    uint8_t error = refuse_wanted(wanted);
-    if (error)
-        return error;
-    uint16_t who_am_i;
-    identify(device, &who_am_i);
-    error = refuse_identity(who_am_i, IDENTITY);
-    if (error)
-        return error;
     const struct gyro_range *range = range_of_model(device);
     if (range == NULL)
         return ERROR_SENSOR_MISMATCH;
@@ -123,7 +124,6 @@ static uint8_t configure(unsigned device, const struct configure_payload *wanted
    the sum of all bytes before. The sum is 0 only on a wire that is held low: gravity would show. */
 static enum read_result read(unsigned device, struct reading *reading)
 {
-    static uint16_t last_counter;
     uint8_t bytes[22] = {GLOB_CMD};
     transfer(device, bytes, sizeof bytes);
 
@@ -139,9 +139,9 @@ static enum read_result read(unsigned device, struct reading *reading)
         reading->counts[axis] = (int16_t)word_at(&bytes[4 + 2 * axis]);
     reading->temperature_counts = (int16_t)word_at(&bytes[16]);
     uint16_t counter = word_at(&bytes[18]);
-    bool fresh = counter != last_counter;
-    last_counter = counter;
+    bool fresh = counter != states[device].counter;
+    states[device].counter = counter;
     return fresh ? READ_FRESH : READ_STALE;
 }
 
-const struct sensor_driver adis16465_gyro = {"ADIS16465", 0, SETTLING, identify, configure, read};
+const struct sensor_driver adis16465_gyro = {"ADIS16465", IDENTITY, 0, SETTLING, reset, identify, configure, read};

@@ -3,24 +3,20 @@
 #include <string.h>
 
 #include "acquisition.h"
-#include "adis16465.h"
 #include "calibrating.h"
 #include "clock.h"
 #include "link.h"
-#include "lsm9ds1.h"
-#include "mpu9250.h"
 #include "port.h"
 #include "reply.h"
+#include "sensors.h"
+#include "setups.h"
 #include "stored.h"
 
 #define BEACON_US 500000u
 
-const struct sensor sensors[SENSOR_COUNT] = {{&lsm9ds1_gyro, 0}, {&mpu9250_gyro, 1}, {&adis16465_gyro, 2}};
-
 static uint64_t last_beacon_us;
 static uint8_t stop_to_acknowledge; /* sequence of a stop whose last samples are still waiting */
 static bool restart_wanted;
-static struct setup_payload setups[SENSOR_COUNT];
 static uint8_t calibrated; /* sensors, since the latest start */
 
 void board_reset(void)
@@ -29,33 +25,11 @@ void board_reset(void)
     link_reset();
     acquisition_reset();
     calibrating_reset();
-    memset(setups, 0, sizeof setups);
+    sensors_reset();
+    setups_reset();
     last_beacon_us = clock_now();
     stop_to_acknowledge = 0;
     restart_wanted = false;
-}
-
-const struct setup_payload *board_setup_of(unsigned sensor)
-{
-    return &setups[sensor];
-}
-
-enum error_code board_check_sensor(uint8_t sensor)
-{
-    if (sensor >= SENSOR_COUNT)
-        return ERROR_NO_SUCH_SENSOR;
-    return setups[sensor].rate_hz > 0.0 ? 0 : ERROR_NOT_CONFIGURED;
-}
-
-enum error_code board_check_mask(uint8_t mask, uint8_t *wrong)
-{
-    enum error_code error = 0;
-    for (*wrong = 0; mask >> *wrong != 0; ++*wrong) {
-        error = is_named(mask, *wrong) ? board_check_sensor(*wrong) : 0;
-        if (error)
-            break;
-    }
-    return error;
 }
 
 static void send_identity(uint8_t reply_to)
@@ -71,7 +45,7 @@ static void send_identity(uint8_t reply_to)
     memcpy(identity.head.unique_id, port_unique_id(), sizeof identity.head.unique_id);
     for (unsigned i = 0; i < SENSOR_COUNT; i++) {
         uint16_t who_am_i;
-        identity.items[i].present = sensors[i].driver->identify(sensors[i].device, &who_am_i);
+        identity.items[i].present = sensors_identify(i, &who_am_i) == 0;
         identity.items[i].who_am_i = who_am_i;
         memcpy(identity.items[i].part, sensors[i].driver->part, sizeof identity.items[i].part);
     }
@@ -95,18 +69,16 @@ static void on_configure(const struct frame *request)
         reply_refused(request, ERROR_BUSY_STREAMING, wanted.sensor);
         return;
     }
-    struct setup_payload *setup = &setups[wanted.sensor];
-    const struct sensor *sensor = &sensors[wanted.sensor];
-    *setup = (struct setup_payload){.reply_to = request->sequence, .sensor = wanted.sensor};
-    uint8_t error = sensor->driver->configure(sensor->device, &wanted, setup);
-    if (error)
-        setup->rate_hz = 0.0;
-    acquisition_set_rate(wanted.sensor, setup->rate_hz);
+    enum error_code error = setups_configure(&wanted);
+    struct setup_payload setup = *setups_of(wanted.sensor);
+    acquisition_set_rate(wanted.sensor, setup.rate_hz);
     calibrating_forget(wanted.sensor);
-    if (error)
-        reply_refused(request, (enum error_code)error, wanted.sensor);
-    else
-        link_send(MESSAGE_SETUP, setup, sizeof *setup);
+    if (error) {
+        reply_refused(request, error, wanted.sensor);
+        return;
+    }
+    setup.reply_to = request->sequence;
+    link_send(MESSAGE_SETUP, &setup, sizeof setup);
 }
 
 /* Those with their bit in `mask` send calibrated rates. */
@@ -114,7 +86,7 @@ static void start(const struct frame *request, uint8_t mask)
 {
     uint8_t sensor;
     struct correction corrections[SENSOR_COUNT];
-    enum error_code error = board_check_mask(mask, &sensor);
+    enum error_code error = setups_check_mask(mask, &sensor);
     for (uint8_t i = 0; i < SENSOR_COUNT && !error; i++)
         if (is_named(mask, i)) {
             sensor = i;

@@ -3,10 +3,11 @@
 #include <stdbool.h>
 #include <string.h>
 
-#include "board.h"
 #include "kept.h"
 #include "link.h"
 #include "reply.h"
+#include "sensors.h"
+#include "setups.h"
 #include "solver.h"
 
 static struct session {
@@ -36,13 +37,13 @@ void calibrating_on_keep(const struct frame *request)
     memcpy(&wanted, request->payload, sizeof wanted);
     float rates_hz[SENSOR_COUNT];
     uint8_t sensor;
-    enum error_code error = board_check_mask(wanted.sensors, &sensor);
+    enum error_code error = setups_check_mask(wanted.sensors, &sensor);
     if (error) {
         reply_refused(request, error, sensor);
         return;
     }
     for (unsigned i = 0; i < SENSOR_COUNT; i++)
-        rates_hz[i] = is_named(wanted.sensors, i) ? (float)board_setup_of(i)->rate_hz : 0.0f;
+        rates_hz[i] = is_named(wanted.sensors, i) ? (float)setups_of(i)->rate_hz : 0.0f;
     if (kept_begin(rates_hz, wanted.duration_s))
         reply_done(request->sequence);
     else
@@ -53,7 +54,7 @@ void calibrating_on_keep(const struct frame *request)
 static struct session *session_of(const struct frame *request)
 {
     uint8_t sensor = request->payload[0];
-    enum error_code error = board_check_sensor(sensor);
+    enum error_code error = setups_check(sensor);
     if (error) {
         reply_refused(request, error, sensor);
         return NULL;
@@ -113,7 +114,7 @@ void calibrating_on_observe(const struct frame *request)
         .end_us = span.end_us,
         .samples = span.samples,
     };
-    float per_count = (float)board_setup_of(wanted.sensor)->sensitivity_rad_s / (float)span.samples;
+    float per_count = (float)setups_of(wanted.sensor)->sensitivity_rad_s / (float)span.samples;
     for (unsigned axis = 0; axis < 3; axis++)
         observed.mean_rad_s[axis] = (float)span.sums[axis] * per_count;
     take(session, request, &observed, wanted.speed_rad_s);

@@ -1,14 +1,15 @@
 #include "correction.h"
 
-#define URAD_S 1e6f
+#include "protocol.h"
+
 #define LARGEST 2147483520.0f /* the largest float below 2³¹ */
 
 struct correction correction_of(const float scale[3], const float bias_rad_s[3], float sensitivity_rad_s)
 {
     struct correction correction;
     for (unsigned axis = 0; axis < 3; axis++) {
-        correction.gain_urad_s[axis] = scale[axis] * sensitivity_rad_s * URAD_S;
-        correction.offset_urad_s[axis] = scale[axis] * bias_rad_s[axis] * URAD_S;
+        correction.gain_urad_s[axis] = scale[axis] * sensitivity_rad_s * CALIBRATED_PER_RAD_S;
+        correction.offset_urad_s[axis] = scale[axis] * bias_rad_s[axis] * CALIBRATED_PER_RAD_S;
     }
     return correction;
 }

@@ -8,9 +8,8 @@
 
 #include "protocol.h"
 
-#define FRAME_OVERHEAD 6u                           /* type, sequence, CRC */
-#define FRAME_MAX (PAYLOAD_MAX + FRAME_OVERHEAD)    /* before COBS */
-#define WIRE_MAX (FRAME_MAX + 2u)                   /* COBS code byte and delimiter */
+#define FRAME_MAX (PAYLOAD_MAX + FRAME_OVERHEAD) /* before COBS */
+#define WIRE_MAX (FRAME_MAX + COBS_BYTES)
 
 _Static_assert(FRAME_MAX < 254u, "a frame must fit one COBS block");
 

@@ -7,7 +7,7 @@
 #include <stdbool.h>
 #include <stdint.h>
 
-#include "sensor.h"
+#include "sensors.h"
 
 /* What was kept goes. From now on, keeps the sensors whose data rate is not 0, for at least so long; then the room is full.
    False, and nothing is kept, when the duration is no positive number or longer than KEPT_LONGEST_S. */

@@ -43,10 +43,9 @@ static const struct gyro_range ranges[] = {
     {2000.0, 3, RADIANS(70.0e-3)},
 };
 
-static bool identify(unsigned device, uint16_t *who_am_i)
+static uint16_t identify(unsigned device)
 {
-    *who_am_i = byte_register_read(device, BUS_HZ, WHO_AM_I);
-    return *who_am_i == IDENTITY;
+    return byte_register_read(device, BUS_HZ, WHO_AM_I);
 }
 
 static size_t nearest_rate(float hz)
@@ -75,17 +74,11 @@ static bool write_settings(unsigned device, uint8_t rate_code, uint8_t range_cod
     return byte_registers_write(device, BUS_HZ, settings, COUNT(settings));
 }
 
-static uint8_t configure(unsigned device, const struct configure_payload *wanted, struct setup_payload *setup)
+static enum error_code configure(unsigned device, const struct configure_payload *wanted, struct setup_payload *setup)
 {
-    const struct gyro_range *range;
-    uint8_t error = choose_range(wanted, ranges, COUNT(ranges), &range);
-    if (error)
-        return error;
-    uint16_t who_am_i;
-    identify(device, &who_am_i);
-    error = refuse_identity(who_am_i, IDENTITY);
-    if (error)
-        return error;
+    const struct gyro_range *range = choose_range(wanted->range_deg_s, ranges, COUNT(ranges));
+    if (range == NULL)
+        return ERROR_BAD_RANGE;
     size_t rate = nearest_rate(wanted->rate_hz);
     if (!write_settings(device, rates[rate].code, range->code))
         return ERROR_SETUP_FAILED;
@@ -113,4 +106,4 @@ static enum read_result read(unsigned device, struct reading *reading)
     return (bytes[3] & (STATUS_GDA | STATUS_ALWAYS_0)) == STATUS_GDA ? READ_FRESH : READ_STALE;
 }
 
-const struct sensor_driver lsm9ds1_gyro = {"LSM9DS1", 0, SETTLING, identify, configure, read};
+const struct sensor_driver lsm9ds1_gyro = {"LSM9DS1", IDENTITY, 0, SETTLING, NULL, identify, configure, read};

@@ -54,10 +54,9 @@ static const struct gyro_range ranges[] = {
 /* Bandwidth at DLPF_CFG 1 … 6: map, register 26. */
 static const float bandwidths_hz[] = {184.0f, 92.0f, 41.0f, 20.0f, 10.0f, 5.0f};
 
-static bool identify(unsigned device, uint16_t *who_am_i)
+static uint16_t identify(unsigned device)
 {
-    *who_am_i = byte_register_read(device, REGISTERS_HZ, WHO_AM_I);
-    return *who_am_i == IDENTITY;
+    return byte_register_read(device, REGISTERS_HZ, WHO_AM_I);
 }
 
 /* The widest filter that keeps what it lets through below half the data rate. */
@@ -99,17 +98,11 @@ static bool write_settings(unsigned device, uint16_t divider, uint8_t filter, ui
     return byte_registers_write(device, REGISTERS_HZ, settings, COUNT(settings));
 }
 
-static uint8_t configure(unsigned device, const struct configure_payload *wanted, struct setup_payload *setup)
+static enum error_code configure(unsigned device, const struct configure_payload *wanted, struct setup_payload *setup)
 {
-    const struct gyro_range *range;
-    uint8_t error = choose_range(wanted, ranges, COUNT(ranges), &range);
-    if (error)
-        return error;
-    uint16_t who_am_i;
-    identify(device, &who_am_i);
-    error = refuse_identity(who_am_i, IDENTITY);
-    if (error)
-        return error;
+    const struct gyro_range *range = choose_range(wanted->range_deg_s, ranges, COUNT(ranges));
+    if (range == NULL)
+        return ERROR_BAD_RANGE;
     uint16_t divider = nearest_divider(BASE_HZ, wanted->rate_hz, DIVIDER_MAX);
     setup->rate_hz = BASE_HZ / divider;
     if (!wake(device) || !write_settings(device, divider, filter_code(setup->rate_hz), range->code))
@@ -138,4 +131,4 @@ static enum read_result read(unsigned device, struct reading *reading)
     return status == INT_STATUS_RAW_DATA_RDY ? READ_FRESH : READ_STALE;
 }
 
-const struct sensor_driver mpu9250_gyro = {"MPU-9250", SETTLING_US, 1, identify, configure, read};
+const struct sensor_driver mpu9250_gyro = {"MPU-9250", IDENTITY, SETTLING_US, 1, NULL, identify, configure, read};

@@ -12,6 +12,9 @@ uint32_t port_time_us(void);
 /* Lets at least so much time pass, busily: for pauses a part needs within one conversation. */
 void port_wait_us(uint32_t duration_us);
 
+/* Parts the bus leads to, by their selects. */
+#define BUS_DEVICES 3u
+
 /* Selects `device`, exchanges `size` bytes in place at `max_hz` or the next slower clock, deselects. `size` is even: the SPI
    FIFO takes two bytes an access. */
 void bus_xfer(unsigned device, uint32_t max_hz, uint8_t *bytes, size_t size);

@@ -5,9 +5,14 @@
 #include <stdint.h>
 
 #define PROTOCOL_VERSION 2u
-#define FIRMWARE_VERSION "0.2.0"
+#define FIRMWARE_VERSION "0.2.1"
 #define PAYLOAD_MAX 240u
+#define FRAME_OVERHEAD 6u /* type, sequence, CRC */
+#define COBS_BYTES 2u /* code byte and delimiter */
 #define BAUD_RATE 921600u
+#define BATCH_AGE_US 80000u /* a sample waits no longer than this for company */
+#define CALIBRATED_PER_RAD_S 1000000.0f /* counts of calibrated readings */
+#define MAX_SCALE 4.0f /* no sensor's scale factor is that far off, either way */
 
 enum message_type {
     MESSAGE_HELLO = 1,

@@ -2,7 +2,6 @@
 #ifndef SENSOR_H
 #define SENSOR_H
 
-#include <stdbool.h>
 #include <stdint.h>
 
 #include "protocol.h"
@@ -21,34 +20,24 @@ enum read_result {
 
 struct sensor_driver {
     char part[12];
+    uint16_t identity; /* what `identify` reads of this part */
 
     /* What to throw away after a configure, while the part starts up and its filters settle: for so long, and so many. */
     uint32_t settling_us;
     uint8_t settling;
 
-    /* Reads the identity register; true when it is this part's. */
-    bool (*identify)(unsigned device, uint16_t *who_am_i);
+    /* Forgets what it remembers of the part; NULL when that is nothing. */
+    void (*reset)(unsigned device);
 
-    /* Sets rate and range, reads every setting back; fills `setup` with what the part really does. 0, or why not. */
-    uint8_t (*configure)(unsigned device, const struct configure_payload *wanted, struct setup_payload *setup);
+    /* Reads the identity register. */
+    uint16_t (*identify)(unsigned device);
+
+    /* Sets the part, which has been identified, to rate and range, both positive, and reads every setting back; fills
+       `setup` with what the part really does. 0, or why not. */
+    enum error_code (*configure)(unsigned device, const struct configure_payload *wanted, struct setup_payload *setup);
 
     /* Reads one conversion, which also lowers the data-ready line of a part that holds it. */
     enum read_result (*read)(unsigned device, struct reading *reading);
 };
-
-/* The board's sensors: which driver, and which device of the port's bus. Data-ready lines are numbered alike. */
-struct sensor {
-    const struct sensor_driver *driver;
-    unsigned device;
-};
-
-#define SENSOR_COUNT 3u
-extern const struct sensor sensors[SENSOR_COUNT];
-
-/* Whether a message's bit mask names the sensor. */
-static inline bool is_named(uint8_t mask, unsigned sensor)
-{
-    return (mask >> sensor & 1) != 0;
-}
 
 #endif

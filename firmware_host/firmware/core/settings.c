@@ -1,31 +1,11 @@
 #include "settings.h"
 
-uint8_t refuse_wanted(const struct configure_payload *wanted)
+const struct gyro_range *choose_range(float wanted_deg_s, const struct gyro_range *ranges, size_t count)
 {
-    if (!(wanted->rate_hz > 0.0f && wanted->rate_hz < 1e6f))
-        return ERROR_BAD_RATE;
-    return wanted->range_deg_s > 0.0f ? 0 : ERROR_BAD_RANGE;
-}
-
-uint8_t refuse_identity(uint16_t who_am_i, uint16_t expected)
-{
-    if (who_am_i == expected)
-        return 0;
-    return who_am_i == 0 || who_am_i == 0xFFu || who_am_i == 0xFFFFu ? ERROR_SENSOR_ABSENT : ERROR_SENSOR_MISMATCH;
-}
-
-uint8_t choose_range(const struct configure_payload *wanted, const struct gyro_range *ranges, size_t count,
-                     const struct gyro_range **range)
-{
-    uint8_t error = refuse_wanted(wanted);
-    if (error)
-        return error;
     for (size_t i = 0; i < count; i++)
-        if (wanted->range_deg_s <= (float)ranges[i].deg_s) {
-            *range = &ranges[i];
-            return 0;
-        }
-    return ERROR_BAD_RANGE;
+        if (wanted_deg_s <= (float)ranges[i].deg_s)
+            return &ranges[i];
+    return NULL;
 }
 
 static float distance(double a, float b)

@@ -10,10 +10,6 @@
    what the host accepts is solved here too. A direction that was not swept gives hundreds. */
 #define MAX_CONDITION 115.0f
 
-/* No sensor's scale factor is that far off, either way. Sweeps that are all alike leave only noise to compare, which looks like
-   readings of a sensor that is. */
-#define MAX_SCALE 4.0f
-
 #define NEWTON_LIMIT 20u
 #define NEWTON_TOLERANCE 1e-4f /* of ω²: a step this small leaves an error of its square */
 #define ALGORITHM_1_LIMIT 255u
@@ -134,7 +130,8 @@ static inline float norm2_of(float r[3][3])
 
 /* Whether the revolutions tell all six parameters apart, from the inverses of the design's two triangles. Readings are measured
    in their own RMS length, so that squares and linear terms compare and X is about √(2 N) long. `mixed`, whose columns are
-   no longer than that, does not make X singular. What is not a number is refused too. */
+   no longer than that, does not make X singular. Beyond MAX_SCALE the revolutions are all alike: only noise is left to compare.
+   What is not a number is refused too. */
 static inline bool is_well_conditioned(struct design *inverted, float length2, uint16_t count, float speed2)
 {
     if (!(length2 < MAX_SCALE * MAX_SCALE * speed2 && speed2 < MAX_SCALE * MAX_SCALE * length2))

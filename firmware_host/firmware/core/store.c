@@ -4,7 +4,7 @@
 
 #include "frame.h"
 #include "port.h"
-#include "sensor.h"
+#include "sensors.h"
 
 /* Each sensor has two pages, slots, and a write goes to the slot that does not hold the newest record: that one stays
    untouched until the new one is whole. The seal comes last and says that everything before it is there; its CRC also finds

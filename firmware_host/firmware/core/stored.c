@@ -4,9 +4,10 @@
 #include <string.h>
 
 #include "acquisition.h"
-#include "board.h"
 #include "link.h"
 #include "reply.h"
+#include "sensors.h"
+#include "setups.h"
 #include "store.h"
 
 void stored_on_read(const struct frame *request)
@@ -37,16 +38,16 @@ static bool is_usable(const struct write_calibration_payload *calibration)
 /* Which part a calibration is of: what the driver and the identity register say, and the range it is set to. */
 static enum error_code describe(unsigned sensor, struct calibration_payload *record)
 {
-    const struct sensor_driver *driver = sensors[sensor].driver;
     uint16_t who_am_i;
-    if (!driver->identify(sensors[sensor].device, &who_am_i))
-        return ERROR_SENSOR_ABSENT;
+    enum error_code error = sensors_identify(sensor, &who_am_i);
+    if (error)
+        return error;
     *record = (struct calibration_payload){
         .sensor = (uint8_t)sensor,
         .who_am_i = who_am_i,
-        .range_deg_s = (float)board_setup_of(sensor)->range_deg_s,
+        .range_deg_s = (float)setups_of(sensor)->range_deg_s,
     };
-    memcpy(record->part, driver->part, sizeof record->part);
+    memcpy(record->part, sensors[sensor].driver->part, sizeof record->part);
     return 0;
 }
 
@@ -62,7 +63,7 @@ static bool is_stored(const struct calibration_payload *record)
 
 static enum error_code write(const struct write_calibration_payload *wanted)
 {
-    enum error_code error = board_check_sensor(wanted->sensor);
+    enum error_code error = setups_check(wanted->sensor);
     if (error)
         return error;
     if (acquisition_is_running())
@@ -125,6 +126,6 @@ enum error_code stored_correction(unsigned sensor, struct correction *correction
     float scale[3], bias_rad_s[3];
     memcpy(scale, record.scale, sizeof scale);
     memcpy(bias_rad_s, record.bias_rad_s, sizeof bias_rad_s);
-    *correction = correction_of(scale, bias_rad_s, (float)board_setup_of(sensor)->sensitivity_rad_s);
+    *correction = correction_of(scale, bias_rad_s, (float)setups_of(sensor)->sensitivity_rad_s);
     return 0;
 }

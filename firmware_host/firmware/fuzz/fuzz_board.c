@@ -9,7 +9,7 @@
 #include "link.h"
 #include "parts.h"
 #include "port.h"
-#include "sensor.h"
+#include "sensors.h"
 
 typedef void (*bus_function)(unsigned device, uint32_t max_hz, uint8_t *bytes, size_t size);
 typedef bool (*flash_function)(unsigned page, size_t offset, const uint64_t *doubleword);

@@ -8,7 +8,7 @@
 #include "board_setup.h"
 #include "link.h"
 #include "registers.h"
-#include "sensor.h"
+#include "sensors.h"
 #include "startup.h"
 
 #define SPI1_FIFO (*(volatile uint16_t *)&SPI1_DR) /* a 16-bit access moves two bytes */
@@ -35,7 +35,7 @@ void port_wait_us(uint32_t duration_us)
 static const struct {
     volatile uint32_t *set_reset;
     uint32_t select, deselect;
-} chip_selects[SENSOR_COUNT] = {
+} chip_selects[BUS_DEVICES] = {
     {&GPIOA_BSRR, GPIOA_BSRR_BR11, GPIOA_BSRR_BS11},
     {&GPIOB_BSRR, GPIOB_BSRR_BR0, GPIOB_BSRR_BS0},
     {&GPIOA_BSRR, GPIOA_BSRR_BR4, GPIOA_BSRR_BS4},

@@ -1,5 +1,6 @@
 """The driver of the ADIS16465 against its registers."""
 
+import ctypes
 import math
 
 import pytest
@@ -111,3 +112,34 @@ def test_damage_again_and_again_is_named_but_not_a_burst_now_and_then(every: int
         convert(board, 100_000 + 5000 * k, sensor=2)
     errors = [ERRORS[f.values["code"]].name for f in board.frames() if f.name == "error"]
     assert errors == ["checksum_failed"] * named
+
+
+FRESH, STALE = range(2)  # enum read_result of core/sensor.h
+
+
+class Driver(ctypes.Structure):
+    """`struct sensor_driver` of core/sensor.h."""
+
+    _fields_ = (
+        ("part", ctypes.c_char * 12),
+        ("identity", ctypes.c_uint16),
+        ("settling_us", ctypes.c_uint32),
+        ("settling", ctypes.c_uint8),
+        ("reset", ctypes.CFUNCTYPE(None, ctypes.c_uint)),
+        ("identify", ctypes.CFUNCTYPE(ctypes.c_uint16, ctypes.c_uint)),
+        ("configure", ctypes.CFUNCTYPE(ctypes.c_int, ctypes.c_uint, ctypes.c_void_p, ctypes.c_void_p)),
+        ("read", ctypes.CFUNCTYPE(ctypes.c_int, ctypes.c_uint, ctypes.c_void_p)),
+    )
+
+
+def test_two_adis16465_on_one_bus_do_not_share_what_the_driver_remembers(board: HostBoard) -> None:
+    driver = Driver.in_dll(board.core, "adis16465_gyro")
+    reading = ctypes.create_string_buffer(8)
+    first, second = board.adis16465, Adis16465Registers()
+    board.sensors[1] = second
+    for part in (first, second):
+        part.convert((1, 2, 3), -48)
+    assert first.counter == second.counter == 1
+    assert [driver.read(device, reading) for device in (2, 1, 2, 1)] == [FRESH, FRESH, STALE, STALE]
+    board.core.board_reset()
+    assert [driver.read(device, reading) for device in (2, 1)] == [FRESH, STALE], "device 2 alone is on this board"

@@ -90,6 +90,8 @@ def test_requests_about_calibrations_are_refused_by_name() -> None:
     configured(board, 0, 238, 245)
     board.gyro.values[0x0F] = 0x00
     assert error_of(board.ask("write_calibration", sensor=0, **CALIBRATION)) == "sensor_absent"
+    board.gyro.values[0x0F] = 0x69
+    assert error_of(board.ask("write_calibration", sensor=0, **CALIBRATION)) == "sensor_mismatch"
     streaming = streaming_board()
     assert error_of(streaming.ask("write_calibration", sensor=0, **CALIBRATION)) == "busy_streaming"
     assert error_of(streaming.ask("erase_calibration", sensor=0)) == "busy_streaming"

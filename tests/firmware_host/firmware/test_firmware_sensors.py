@@ -61,6 +61,12 @@ def test_another_part_is_told_in_the_identity_and_refused(board: HostBoard, sens
     assert (ERRORS[error.values["code"]].name, error.values["sensor"]) == ("sensor_mismatch", sensor)
 
 
+@pytest.mark.parametrize("sensor", range(3))
+def test_a_part_is_identified_before_its_range_is_judged(board: HostBoard, sensor: int) -> None:
+    board.sensors[sensor] = Nobody()
+    assert error_of(board.ask("configure", sensor=sensor, rate_hz=238, range_deg_s=2001)) == "sensor_absent"
+
+
 @pytest.mark.parametrize(("sensor", "register"), [(0, 0x10), (0, 0x22), (1, 0x19), (1, 0x13), (1, 0x6B), (2, 0x64)])
 def test_a_setting_that_does_not_stick_is_refused_and_takes_the_sensor_out(
     board: HostBoard, sensor: int, register: int

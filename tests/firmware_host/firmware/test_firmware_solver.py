@@ -11,8 +11,9 @@ from hypothesis import strategies as st
 from numpy.typing import NDArray
 from scipy.spatial.transform import Rotation
 
-from firmware_host.protocol import METHODS, SOLUTION_STATUSES
+from firmware_host.protocol import MAX_SCALE, METHODS, SOLUTION_STATUSES
 from rig.errors import Fault
+from rig.estimation import refusals
 from rig.estimation.accumulator import Accumulator, Estimator, Solution
 from support.host_board import core
 
@@ -268,3 +269,8 @@ def test_what_is_not_a_number_is_degenerate() -> None:
     speeds = np.full(6, 1e30)
     means = readings(DIRECTIONS, speeds, np.ones(3), np.zeros(3))
     assert solve_on_board(means, speeds).status == "degenerate"
+
+
+def test_board_and_host_refuse_the_same_scale_factors() -> None:
+    """The estimators know no board, so each end has its own constant."""
+    assert MAX_SCALE == refusals.MAX_SCALE

@@ -1,0 +1,31 @@
+/* The board's sensors: which driver serves which device of the port's bus. */
+#ifndef SENSORS_H
+#define SENSORS_H
+
+#include <stdbool.h>
+#include <stdint.h>
+
+#include "sensor.h"
+
+/* Data-ready lines are numbered as the sensors are. */
+struct sensor {
+    const struct sensor_driver *driver;
+    unsigned device;
+};
+
+#define SENSOR_COUNT 3u
+extern const struct sensor sensors[SENSOR_COUNT];
+
+/* What the drivers remember of their parts goes. */
+void sensors_reset(void);
+
+/* Reads the identity register; 0 when it is the part's, or ERROR_SENSOR_ABSENT, or ERROR_SENSOR_MISMATCH. */
+enum error_code sensors_identify(unsigned sensor, uint16_t *who_am_i);
+
+/* Whether a message's bit mask names the sensor. */
+static inline bool is_named(uint8_t mask, unsigned sensor)
+{
+    return (mask >> sensor & 1) != 0;
+}
+
+#endif

@@ -1,0 +1,59 @@
+#include "setups.h"
+
+#include <string.h>
+
+#include "sensors.h"
+
+static struct setup_payload setups[SENSOR_COUNT];
+
+void setups_reset(void)
+{
+    memset(setups, 0, sizeof setups);
+}
+
+/* Why what was asked for makes no sense for any part, or 0. */
+static enum error_code refuse_wanted(const struct configure_payload *wanted)
+{
+    if (!(wanted->rate_hz > 0.0f && wanted->rate_hz < 1e6f))
+        return ERROR_BAD_RATE;
+    return wanted->range_deg_s > 0.0f ? 0 : ERROR_BAD_RANGE;
+}
+
+enum error_code setups_configure(const struct configure_payload *wanted)
+{
+    const struct sensor *sensor = &sensors[wanted->sensor];
+    struct setup_payload *setup = &setups[wanted->sensor];
+    uint16_t who_am_i;
+    *setup = (struct setup_payload){.sensor = wanted->sensor};
+    enum error_code error = refuse_wanted(wanted);
+    if (!error)
+        error = sensors_identify(wanted->sensor, &who_am_i);
+    if (!error)
+        error = sensor->driver->configure(sensor->device, wanted, setup);
+    if (error)
+        setup->rate_hz = 0.0;
+    return error;
+}
+
+const struct setup_payload *setups_of(unsigned sensor)
+{
+    return &setups[sensor];
+}
+
+enum error_code setups_check(uint8_t sensor)
+{
+    if (sensor >= SENSOR_COUNT)
+        return ERROR_NO_SUCH_SENSOR;
+    return setups[sensor].rate_hz > 0.0 ? 0 : ERROR_NOT_CONFIGURED;
+}
+
+enum error_code setups_check_mask(uint8_t mask, uint8_t *wrong)
+{
+    enum error_code error = 0;
+    for (*wrong = 0; mask >> *wrong != 0; ++*wrong) {
+        error = is_named(mask, *wrong) ? setups_check(*wrong) : 0;
+        if (error)
+            break;
+    }
+    return error;
+}
