@@ -23,11 +23,10 @@ def picture() -> str:
     """The page's drawing: scripts above the rooms in the contract's order, the board's half below."""
     layers = [[("procedures", "procedures")], *_layers(), [("firmware_host", "firmware_host")]]
     rows = ["".join(_row(name, _said(path)) for name, path in layer) for layer in layers]
-    return _rule("┌┬┐") + _rule("├┼┤").join(rows) + _rule("└┴┘")
+    return _rule("┌", "┬", "┐") + _rule("├", "┼", "┤").join(rows) + _rule("└", "┴", "┘")
 
 
-def _rule(corners: str) -> str:
-    left, middle, right = corners
+def _rule(left: str, middle: str, right: str) -> str:
     return f"{left}{'─' * (NAMES + 2)}{middle}{'─' * (WORDS + 2)}{right}\n"
 
 
