@@ -27,7 +27,7 @@ _ENDING_SIGNALS = tuple(
 
 
 def main(arguments: Sequence[str] | None = None) -> int:
-    """Entry point of `rig`; returns the exit status DESIGN promises (0, 1, 2, 3 or 130)."""
+    """Entry point of `rig`; returns the exit status docs/architecture.md promises (0, 1, 2, 3 or 130)."""
     options = _parser().parse_args(arguments)
     return guarded(lambda: options.command(options))
 

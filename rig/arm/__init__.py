@@ -1,1 +1,1 @@
-"""The arm: the real `ur_rtde` client in a supervised child process, kinematics, sweep planning, pre-flight."""
+"""The arm: the real `ur_rtde` client in a supervised child process, kinematics, pre-flight, the stop."""

@@ -1,0 +1,101 @@
+"""Every page's links lead somewhere, the paths it names exist, the commands it shows are commands."""
+
+import re
+import shlex
+from collections.abc import Iterator
+from pathlib import Path
+
+import pytest
+
+from rig.cli import main
+from support.paths import DOCS, ROOT
+
+PAGES = [
+    ROOT / "README.md",
+    ROOT / "CONTRIBUTING.md",
+    *sorted(DOCS.rglob("*.md")),
+    *sorted(ROOT.glob("firmware_host/**/README.md")),
+]
+FENCE = re.compile(r"^```(\w*)\n(.*?)^```$", re.MULTILINE | re.DOTALL)
+INLINE = re.compile(r"(`+)(.+?)\1", re.DOTALL)
+LINK = re.compile(r"!?\[[^\]]*\]\(([^)\s]+)\)")
+HEADING = re.compile(r"^#{1,6} (.+)$", re.MULTILINE)
+FOLDERS = "benchmarks|configs|docs|firmware_host|procedures|rig|tests"
+NAMED_PATH = re.compile(rf"(?<![\w./-])(?:{FOLDERS})/[\w./<>*-]*\w/?")
+LEFT_OUT = "--left-out"  # no command has it
+NUMBERS = {"N": "1"}  # what a page writes where the command wants a number
+
+
+def page_name(page: Path) -> str:
+    return str(page.relative_to(ROOT))
+
+
+def prose(page: Path) -> str:
+    """The page without its code."""
+    return INLINE.sub("", FENCE.sub("", page.read_text(encoding="utf-8")))
+
+
+def anchors(page: Path) -> set[str]:
+    """The names under which a page's headings can be linked, as GitHub makes them."""
+    text = FENCE.sub("", page.read_text(encoding="utf-8"))
+    return {re.sub(r"[^\w\- ]", "", heading.lower()).strip().replace(" ", "-") for heading in HEADING.findall(text)}
+
+
+def code(page: Path) -> Iterator[tuple[str, bool]]:
+    """Every line of the page's code blocks without its comment, and every inline code; whether it stood inline."""
+    text = page.read_text(encoding="utf-8")
+    for language, block in FENCE.findall(text):
+        if language in ("", "text", "sh"):
+            yield from ((re.split(r"\s#", line)[0].strip(), False) for line in block.splitlines())
+    for _, words in INLINE.findall(FENCE.sub("", text)):
+        yield " ".join(words.replace("\\|", "|").split()), True
+
+
+def commands(page: Path) -> Iterator[tuple[str, list[str], bool]]:
+    """Every `rig …` of the page: as written, its arguments with all that is optional, whether it stood inline."""
+    for written, inline in code(page):
+        if written == "rig" or not re.match(r"(?:\.venv/bin/)?rig\s", written) or written.startswith("rig: "):
+            continue
+        words = shlex.split(re.sub(r"[\[\]…]", " ", written.split(" > ")[0]))[1:]
+        if "--help" in words:  # ends everything else
+            continue
+        yield written, [NUMBERS.get(word, word) for word in words], inline
+
+
+@pytest.mark.parametrize("page", PAGES, ids=page_name)
+def test_every_link_and_anchor_leads_somewhere(page: Path) -> None:
+    for link in LINK.findall(prose(page)):
+        if link.startswith(("https://", "http://")):
+            continue
+        path, _, anchor = link.partition("#")
+        target = (page.parent / path).resolve() if path else page
+        assert target.exists(), f"{link} leads nowhere"
+        assert not anchor or anchor in anchors(target), f"{link}: no such heading; there are {sorted(anchors(target))}"
+
+
+@pytest.mark.parametrize("page", PAGES, ids=page_name)
+def test_every_path_a_page_names_exists(page: Path) -> None:
+    for written, _ in code(page):
+        for path in NAMED_PATH.findall(written):
+            pattern = re.sub(r"<\w+>", "*", path.rstrip("/"))
+            assert any(ROOT.glob(pattern)), f"{path} in {written!r} is not there"
+
+
+@pytest.mark.parametrize("page", PAGES, ids=page_name)
+def test_every_command_a_page_shows_is_one(page: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    """Nothing is run: each command line gets an argument that no command has, which must be all it is refused for."""
+    for written, arguments, inline in commands(page):
+        with pytest.raises(SystemExit):
+            main([*arguments, LEFT_OUT])
+        complaint = capsys.readouterr().err.splitlines()[-1]
+        only_named = inline and all(re.fullmatch("[a-z]+", word) for word in arguments)
+        missing = only_named and "the following arguments are required" in complaint
+        assert missing or complaint.endswith(f"unrecognized arguments: {LEFT_OUT}"), f"{written!r}: {complaint}"
+
+
+def test_the_readme_shows_every_command(capsys: pytest.CaptureFixture[str]) -> None:
+    with pytest.raises(SystemExit):
+        main(["--help"])
+    known = re.findall(r"^    ([a-z]+) ", capsys.readouterr().out, re.MULTILINE)
+    assert len(known) > 5
+    assert {arguments[0] for _, arguments, _ in commands(ROOT / "README.md") if arguments} >= set(known)
