@@ -15,6 +15,7 @@ import numpy as np
 from rig.config.load import load
 from rig.data.run_file import read_run
 from rig.plans.six_sweeps import plan_six_observation
+from rig.world.section import world_section
 
 DEMO = Path(__file__).parent.parent / "configs" / "demo.yaml"
 
@@ -33,12 +34,12 @@ def measure(config: Path, time_scale: float, out: Path) -> tuple[float, float]:
 def main() -> None:
     config = Path(sys.argv[1]) if len(sys.argv) > 1 else DEMO
     loaded = load(config)
-    if loaded.world is None:
+    if not loaded.simulated:
         sys.exit(f"{config} has no world: section; only a simulated procedure can be run here")
     planned_s = plan_six_observation(loaded.config.arm, loaded.config.procedure).duration_s
     print(f"planned motions and rests: {planned_s:.1f} s")
     with tempfile.TemporaryDirectory() as folder:
-        for time_scale in (loaded.world.time_scale, 1.0):
+        for time_scale in (world_section(loaded).time_scale, 1.0):
             wall_s, arm_s = measure(config, time_scale, Path(folder) / f"{time_scale:g}")
             print(
                 f"time_scale {time_scale:g}: command {wall_s:.1f} s, arm {arm_s:.1f} s, {arm_s / planned_s:.3f} of plan"

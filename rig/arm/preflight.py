@@ -9,13 +9,13 @@ from rig.arm.condition import readiness
 from rig.arm.kinematics import flange_axes
 from rig.arm.motion import Motion, Plan, travel
 from rig.arm.state import JOINT_NAMES, ArmReport, Joints
+from rig.config.ur10e_limits import (
+    ACCELERATION_LIMIT_RAD_S2,
+    JOINT_LIMIT_RAD,
+    PAYLOAD_LIMIT_KG,
+    SPEED_LIMIT_RAD_S,
+)
 from rig.errors import Problem, Refused
-
-# UR10e limits, base to wrist 3 (maker's data sheet and ROS 2 description). `ur_rtde` itself accepts up to 3.14 rad/s.
-JOINT_LIMIT_RAD = 2 * math.pi
-SPEED_LIMIT_RAD_S = (math.radians(120), math.radians(120), 3.14, 3.14, 3.14, 3.14)
-ACCELERATION_LIMIT_RAD_S2 = math.radians(800)
-PAYLOAD_LIMIT_KG = 12.5
 
 # The swept axes must span space: the smallest singular value of their unit vectors, 1 when orthogonal.
 AXES_SPAN = 0.5

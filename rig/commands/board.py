@@ -107,9 +107,9 @@ def _connected(config_path: Path, overrides: Sequence[str]) -> Iterator[tuple[Ri
     """The board of a configuration, in its simulated laboratory if it has one."""
     loaded = load(config_path, overrides)
     with ExitStack() as stack:
-        if loaded.world:
+        if loaded.simulated:
             stack.enter_context(simulated_laboratory(stack.enter_context(written(loaded.text))))
-            kept = loaded.world.board.flash_file
+            kept = loaded.flash_file
             memory = f"is kept in {kept}" if kept else "too, unless world.board.flash_file names a file that keeps it"
             print(
                 f"simulated laboratory: it lasts as long as this command, its board's memory {memory}", file=sys.stderr

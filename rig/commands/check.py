@@ -20,7 +20,7 @@ from rig.plans.six_sweeps import plan_six_observation
 def check(config_path: Path, overrides: Sequence[str]) -> int:
     """Look at the board and the arm; print what is there and what is missing. 0 when a run could start, else 2."""
     loaded = load(config_path, overrides)
-    with written(loaded.text) as used, simulated_laboratory(used) if loaded.world else nullcontext():
+    with written(loaded.text) as used, simulated_laboratory(used) if loaded.simulated else nullcontext():
         missing = [*_named(_look_at_board, loaded.config), *_named(_look_at_arm, loaded.config)]
     for problem in missing:
         print(f"missing: {problem}", file=sys.stderr)

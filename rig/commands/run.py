@@ -76,10 +76,10 @@ def _carry_out(folder: Path, loaded: Loaded, script: Script | None, *, assume_ye
     name = loaded.config.procedure.name
     carried_out = script or _named_script(name)
     # Nobody stands beside a laboratory that this process starts itself, so there nobody need be asked.
-    confirm = agreed if assume_yes or loaded.world else ask_operator
+    confirm = agreed if assume_yes or loaded.simulated else ask_operator
     with view(folder / "log.txt") as shown, ExitStack() as laboratory:
         session = Session(folder, loaded, shown, confirm, _named_script("verify"))
-        if loaded.world:
+        if loaded.simulated:
             with session.reported(""):
                 laboratory.enter_context(simulated_laboratory(folder / "config.yaml"))
         outcome = session.verify(carried_out) if name == "verify" else session.calibrate(carried_out)

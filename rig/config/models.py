@@ -1,23 +1,35 @@
 """What a configuration file may say.
 
-Every quantity carries its unit in its key. Degrees live only here, at the edge; the rig works in SI units.
+Every quantity carries its unit in its key. Degrees live only here, at the edge; the rig works in SI units. Every key
+says what it means: docs/configuration.md is made of these descriptions.
 """
 
 from collections.abc import Iterable, Mapping
 from typing import Annotated, Any, Literal, Self
+from urllib.parse import urlsplit
 
 import numpy as np
 from pydantic import BaseModel, ConfigDict, Field, ValidationInfo, field_validator, model_validator
 
 from rig.config.link_budget import Stream, over_budget
 from rig.config.sensor_catalogue import PARTS
+from rig.config.ur10e_limits import (
+    JOINT_LIMIT_DEG,
+    PAYLOAD_LIMIT_KG,
+    SPEED_LIMIT_DEG_S,
+)
 
 Direction = Literal["cw", "ccw"]
 AxisName = Literal["+x", "-x", "+y", "-y", "+z", "-z"]
 Vector3 = tuple[float, float, float]
-Vector6 = tuple[float, float, float, float, float, float]
 Positive = Annotated[float, Field(gt=0)]
+JointAngle = Annotated[float, Field(ge=-JOINT_LIMIT_DEG, le=JOINT_LIMIT_DEG)]
+Offset = Annotated[float, Field(ge=-1000, le=1000)]
+# A name becomes that of a dataset, of files and of C arrays.
+SensorName = Annotated[str, Field(pattern=r"^\w[\w -]*$", max_length=40)]
 SERIAL_NUMBER_MAX = 24  # of the kind "text24" in the board's protocol
+RATIO: dict[str, Any] = {"unit": "1"}  # a number without a unit, where the key cannot say so
+OF_THE_PART: dict[str, Any] = {"usual": "the part's usual one"}
 
 
 class Section(BaseModel):
@@ -29,19 +41,64 @@ class Section(BaseModel):
 class ArmSection(Section):
     """The robot arm and what it carries."""
 
-    host: str
-    payload_kg: Annotated[float, Field(ge=0, le=12.5)]  # UR10e: 12.5 kg
-    payload_centre_mm: Vector3 = (0.0, 0.0, 0.0)
-    home_deg: Vector6 = (0.0, -90.0, 90.0, -90.0, -90.0, 0.0)
-    transfer_speed_deg_s: Annotated[float, Field(gt=0, le=180)] = 120.0
-    state_rate_hz: Annotated[float, Field(ge=125, le=500)] = 125.0
+    host: str = Field(min_length=1, max_length=253, description="name or address of the arm's controller")
+    payload_kg: float = Field(
+        ge=0, le=PAYLOAD_LIMIT_KG, description="mass of all that the flange carries: fixture, board, cable"
+    )
+    payload_centre_mm: tuple[Offset, Offset, Offset] = Field(
+        (0.0, 0.0, 0.0), description="its centre of mass, x y z in the flange's frame"
+    )
+    home_deg: tuple[JointAngle, JointAngle, JointAngle, JointAngle, JointAngle, JointAngle] = Field(
+        (0.0, -90.0, 90.0, -90.0, -90.0, 0.0),
+        description="joint angles, base to wrist 3, of the pose around which everything turns; wrist 2 near ±90°, or "
+        "the wrists' axes do not span space",
+    )
+    transfer_speed_deg_s: float = Field(
+        120.0, ge=0.1, le=SPEED_LIMIT_DEG_S, description="speed of the ways between sweeps"
+    )
+    state_rate_hz: float = Field(125.0, ge=125, le=500, description="how often the arm tells its state")
+
+    @field_validator("host")
+    @classmethod
+    def can_be_looked_up(cls, value: str) -> str:
+        """What no name server could be asked for."""
+        return checked_host(value)
+
+
+def checked_host(name: str) -> str:
+    """A host's name or address. Raises ValueError when it cannot be one."""
+    try:
+        name.encode("idna")
+    except UnicodeError:
+        raise ValueError("no host's name; between its dots stand 1 to 63 characters each") from None
+    return name
 
 
 class BoardSection(Section):
-    """The microcontroller board: a serial port name or `socket://host:port`."""
+    """The microcontroller board."""
 
-    port: str
-    baud: Literal[115200, 230400, 460800, 921600] = 921600
+    port: str = Field(
+        min_length=1,
+        max_length=255,
+        description="serial port, such as `/dev/ttyACM0` or `COM3`, or `socket://host:port`",
+    )
+    baud: Literal[115200, 230400, 460800, 921600] = Field(
+        921600, description="speed of the serial line", json_schema_extra={"unit": "Bd"}
+    )
+
+    @field_validator("port")
+    @classmethod
+    def an_address_has_host_and_port(cls, value: str) -> str:
+        """Of `socket://host:port`; the name of a serial port is the system's affair."""
+        if value.startswith("socket://"):
+            try:
+                parts = urlsplit(value)
+                complete = bool(checked_host(parts.hostname or "") and parts.port)
+            except ValueError:
+                complete = False
+            if not complete:
+                raise ValueError("must be socket://host:port with a port from 1 to 65535")
+        return value
 
 
 def mounting_matrix(mounting: "MountingSection") -> np.ndarray:
@@ -54,11 +111,11 @@ def mounting_matrix(mounting: "MountingSection") -> np.ndarray:
 
 
 class MountingSection(Section):
-    """Which flange axis each sensor axis points along, nominally; the solver does not need it to be exact."""
+    """Which flange axis each sensor axis points along, nominally: a right-handed frame. It need not be exact."""
 
-    x: AxisName = "+x"
-    y: AxisName = "+y"
-    z: AxisName = "+z"
+    x: AxisName = Field("+x", description="the flange axis along which the sensor's x axis points")
+    y: AxisName = Field("+y", description="the same of its y axis")
+    z: AxisName = Field("+z", description="the same of its z axis")
 
     @model_validator(mode="after")
     def right_handed(self) -> Self:
@@ -69,22 +126,48 @@ class MountingSection(Section):
 
 
 class TurntableSection(Section):
-    """A reference's own calibration, from a turntable: rate = scale · (reading + bias_rad_s)."""
+    """A reference's own calibration, found before: rate = scale · (reading + bias_rad_s)."""
 
-    scale: tuple[Positive, Positive, Positive] = (1.0, 1.0, 1.0)
-    bias_rad_s: Vector3 = (0.0, 0.0, 0.0)
+    scale: tuple[Positive, Positive, Positive] = Field(
+        (1.0, 1.0, 1.0), description="scale factor of each axis", json_schema_extra=RATIO
+    )
+    bias_rad_s: Vector3 = Field((0.0, 0.0, 0.0), description="bias of each axis, added to the reading")
 
 
 class SensorSection(Section):
-    """One gyroscope on the board. Left out, its data rate and range are the part's usual ones."""
+    """One gyroscope on the board, under a name of your choice."""
 
-    part: Literal["lsm9ds1", "mpu9250", "adis16465"]
-    serial_number: str
-    role: Literal["calibrate", "reference"] = "calibrate"
-    rate_hz: float = Field(default=None, validate_default=True)
-    range_deg_s: float = Field(default=None, validate_default=True)
-    mounting: MountingSection = MountingSection()
-    turntable: TurntableSection = TurntableSection()
+    part: Literal["lsm9ds1", "mpu9250", "adis16465"] = Field(description="which gyroscope it is")
+    serial_number: str = Field(
+        description=f"which specimen it is: 1 to {SERIAL_NUMBER_MAX} plain ASCII characters, kept on the board and in "
+        "every result"
+    )
+    role: Literal["calibrate", "reference"] = Field(
+        "calibrate", description="what it is here for; at most one sensor is the reference others are compared with"
+    )
+    rate_hz: float = Field(
+        description="samples a second, one of the part's rates; 333.33 stands for 1000/3", json_schema_extra=OF_THE_PART
+    )
+    range_deg_s: float = Field(
+        description="full scale, one of the part's ranges; at least 1.5 times the fastest sweep",
+        json_schema_extra=OF_THE_PART,
+    )
+    mounting: MountingSection = Field(MountingSection(), description="how it sits on the flange")
+    turntable: TurntableSection = Field(
+        TurntableSection(), description="its own calibration, of a reference only; left out, it reads true"
+    )
+
+    @model_validator(mode="before")
+    @classmethod
+    def usual_of_the_part(cls, data: Any) -> Any:
+        """Left out, data rate and range are the part's usual ones."""
+        if not isinstance(data, Mapping):
+            return data
+        name = data.get("part")
+        # A part that is not known is an error of its own, whatever stands in for it here.
+        part = PARTS[name] if isinstance(name, str) and name in PARTS else next(iter(PARTS.values()))
+        usual = {"rate_hz": part.default_rate_hz, "range_deg_s": part.default_range_deg_s}
+        return {**data, **{key: value for key, value in usual.items() if data.get(key) is None}}
 
     @field_validator("serial_number")
     @classmethod
@@ -93,15 +176,6 @@ class SensorSection(Section):
         if not (value.isascii() and value.isprintable() and 0 < len(value) <= SERIAL_NUMBER_MAX):
             raise ValueError(f"must be 1 to {SERIAL_NUMBER_MAX} plain ASCII characters; the board keeps no others")
         return value
-
-    @field_validator("rate_hz", "range_deg_s", mode="before")
-    @classmethod
-    def usual_of_the_part(cls, value: Any, info: ValidationInfo) -> Any:
-        """What is left out depends on the part."""
-        part = PARTS.get(info.data.get("part", ""))
-        if value is not None or part is None:
-            return 0.0 if value is None else value  # a part that is not known is an error of its own
-        return part.default_rate_hz if info.field_name == "rate_hz" else part.default_range_deg_s
 
     @field_validator("rate_hz", "range_deg_s")
     @classmethod
@@ -124,7 +198,7 @@ class SensorSection(Section):
 class ProcedureSection(Section):
     """What every procedure's section has: its name. A procedure adds its own keys and says what else it needs."""
 
-    name: str
+    name: str = Field(description="which procedure is run")
 
     @property
     def then_verify(self) -> bool:
@@ -144,29 +218,45 @@ class ProcedureSection(Section):
 class ObservationSection(Section):
     """What an averaged revolution must satisfy to be used."""
 
-    max_lost_fraction: Annotated[float, Field(ge=0, lt=1)] = 0.001
-    max_speed_deviation: Annotated[float, Field(gt=0, lt=1)] = (
-        0.25  # of the joint's rate from its mean, smoothed over 50 ms
+    max_lost_fraction: float = Field(
+        0.001, ge=0, lt=1, description="share of a sweep's samples that may be missing", json_schema_extra=RATIO
     )
-    max_axis_deviation_deg: Annotated[float, Field(gt=0, lt=45)] = 20.0
+    max_speed_deviation: float = Field(
+        0.25,
+        gt=0,
+        lt=1,
+        description="how far the joint's rate, smoothed over 50 ms, may lie from its mean, as a share of it",
+        json_schema_extra=RATIO,
+    )
+    max_axis_deviation_deg: float = Field(
+        20.0, gt=0, lt=45, description="how far the measured rotation may lie from the nominal axis of the sensor"
+    )
 
 
 class LimitsSection(Section):
-    """The verdict's limits; a limit left out is a check that fails, so state all of them."""
+    """The verdict's limits, for every sensor that is calibrated. There are no usual ones: state them all."""
 
-    scale_deviation: Positive
-    scale_std: Positive
-    bias_rad_s: Positive
-    bias_std_rad_s: Positive
-    condition: Positive
-    verification_rms_rad_s: Positive | None = None  # calibrated reading less the reference's, sample by sample
-    verification_mean_rad_s: Positive | None = None  # the same, averaged over each revolution
+    scale_deviation: Positive = Field(description="of a scale factor from 1, |k − 1|", json_schema_extra=RATIO)
+    scale_std: Positive = Field(description="standard deviation of a scale factor", json_schema_extra=RATIO)
+    bias_rad_s: Positive = Field(description="magnitude of a bias")
+    bias_std_rad_s: Positive = Field(description="standard deviation of a bias")
+    condition: Positive = Field(
+        description="condition number of the equations: how well the sweeps tell the parameters apart",
+        json_schema_extra=RATIO,
+    )
+    verification_rms_rad_s: Positive | None = Field(
+        None,
+        description="RMS of the calibrated reading less the reference's, sample by sample; a verification needs it",
+    )
+    verification_mean_rad_s: Positive | None = Field(
+        None, description="the same difference averaged over each revolution; a verification needs it"
+    )
 
 
 class OutputSection(Section):
-    """Where run folders go."""
+    """Where results go."""
 
-    folder: str = "runs"
+    folder: str = Field("runs", min_length=1, max_length=1000, description="where each run gets a folder of its own")
 
 
 class RigConfig(Section):
@@ -174,7 +264,7 @@ class RigConfig(Section):
 
     arm: ArmSection
     board: BoardSection
-    sensors: Annotated[dict[str, SensorSection], Field(min_length=1)]
+    sensors: dict[SensorName, SensorSection] = Field(min_length=1)
     procedure: ProcedureSection
     observation: ObservationSection = ObservationSection()
     limits: LimitsSection

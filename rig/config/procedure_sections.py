@@ -2,11 +2,12 @@
 
 from collections.abc import Iterator, Mapping
 from types import MappingProxyType
-from typing import Annotated, Literal, Self
+from typing import Literal, Self
 
 from pydantic import Field, model_validator
 
-from rig.config.models import Direction, ProcedureSection, RigConfig
+from rig.config.models import RATIO, Direction, ProcedureSection, RigConfig
+from rig.config.ur10e_limits import ACCELERATION_LIMIT_DEG_S2, SPEED_LIMIT_DEG_S
 
 __all__ = [
     "DEFAULT_PROCEDURE",
@@ -25,13 +26,29 @@ SPEED_TO_RANGE = 1.5  # scale error, bias, ripple and noise come on top of a swe
 class SixSweepsSection(ProcedureSection):
     """The movement of SIX, Section III: which wrists, in what order, how fast, how often."""
 
-    order: Annotated[tuple[Wrist, ...], Field(min_length=1)] = ("wrist_3", "wrist_1", "wrist_2")
-    directions: Annotated[tuple[Direction, ...], Field(min_length=1)] = ("cw", "ccw")
-    repeats: Annotated[int, Field(ge=1, le=100)] = 1
-    speed_deg_s: Annotated[float, Field(ge=0.5, le=180)] = 60.0  # slower, and the board cannot keep a sweep's readings
-    acceleration_deg_s2: Annotated[float, Field(gt=0, le=800)] = 240.0
-    rest_s: Annotated[float, Field(ge=0, le=3600)] = 3.0
-    margin_deg: Annotated[float, Field(gt=0, le=90)] = 2.0  # constant speed on each side of the revolution
+    order: tuple[Wrist, ...] = Field(
+        ("wrist_3", "wrist_1", "wrist_2"), min_length=1, description="which wrist turns after which, each once"
+    )
+    directions: tuple[Direction, ...] = Field(
+        ("cw", "ccw"), min_length=1, description="which way each wrist turns first, and then"
+    )
+    repeats: int = Field(1, ge=1, le=100, description="how often all of it is done", json_schema_extra=RATIO)
+    speed_deg_s: float = Field(
+        60.0,
+        ge=0.5,  # slower, and the board cannot keep a sweep's readings
+        le=SPEED_LIMIT_DEG_S,
+        description=f"constant speed of a sweep; every sensor's range must be at least {SPEED_TO_RANGE} times as large",
+    )
+    acceleration_deg_s2: float = Field(
+        240.0,
+        ge=0.1,
+        le=ACCELERATION_LIMIT_DEG_S2,
+        description="of every motion; a sweep's ramps lie outside the revolution it is averaged over",
+    )
+    rest_s: float = Field(3.0, ge=0, le=3600, description="standing still after each sweep")
+    margin_deg: float = Field(
+        2.0, gt=0, le=90, description="constant speed before the revolution begins, and after it ends"
+    )
 
     @model_validator(mode="after")
     def every_direction_is_swept(self) -> Self:
@@ -55,8 +72,12 @@ class SixSweepsSection(ProcedureSection):
 class SixObservationSection(SixSweepsSection):
     """Six sweeps that calibrate, and on demand the same once more to verify."""
 
-    name: Literal["six_observation"] = "six_observation"
-    verify: bool = False  # store a calibration that passed on the board, then repeat the movement with its readings
+    name: Literal["six_observation"] = Field("six_observation", description="this procedure")
+    verify: bool = Field(
+        False,
+        description="store a calibration that passed on the board, then repeat the movement with the board's corrected "
+        "readings and compare them with the reference's",
+    )
 
     @property
     def then_verify(self) -> bool:
@@ -67,8 +88,10 @@ class SixObservationSection(SixSweepsSection):
 class VerifySection(SixSweepsSection):
     """Six sweeps with calibrated readings, compared with a reference's."""
 
-    name: Literal["verify"] = "verify"
-    verify: bool = False  # means nothing here: allowed so that the file of a calibration serves its verification
+    name: Literal["verify"] = Field("verify", description="this procedure")
+    verify: bool = Field(
+        False, description="means nothing here; allowed so that the file of a calibration serves its verification too"
+    )
 
     @property
     def needs_reference(self) -> bool:

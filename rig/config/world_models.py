@@ -1,53 +1,82 @@
-"""The `world:` section: what the simulated laboratory simulates. Only the world reads the values given here."""
+"""The `world:` section: what the simulated laboratory simulates. Only the world uses the values given here."""
 
 from pathlib import Path
 from typing import Annotated
 
 from pydantic import Field
 
-from rig.config.models import Positive, Section, Vector3
+from rig.config.models import RATIO, Section, SensorName, Vector3
+
+Cycles = Annotated[int, Field(ge=1, le=200)]
 
 
 class SimulatedArmSection(Section):
-    """The simulated UR10e."""
+    """The simulated UR10e. Its ripple is locked to the joint angle: it integrates to nothing over whole turns."""
 
-    serial_number: Annotated[str, Field(pattern=r"^\d+$")] = "20265500123"
-    polyscope: Annotated[str, Field(pattern=r"^\d+\.\d+\.\d+\.\d+$")] = "5.14.0.0"
-    remote_control: bool = True
-    speed_slider: Annotated[float, Field(gt=0, le=1)] = 1.0
-    # A position ripple locked to the joint angle: it integrates to nothing over whole turns.
-    vibration_fraction: Annotated[float, Field(ge=0, lt=0.5)] = 0.05  # RMS of the rate ripple over the rate
-    vibration_cycles_per_turn: tuple[Annotated[int, Field(ge=1, le=200)], ...] = (18, 31, 50)
-    encoder_step_rad: Annotated[float, Field(ge=0)] = 6.0e-6
+    serial_number: str = Field(
+        "20265500123", pattern=r"^[0-9]+$", max_length=24, description="what the controller says its number is"
+    )
+    polyscope: str = Field(
+        "5.14.0.0",
+        pattern=r"^[0-9]{1,5}\.[0-9]{1,5}\.[0-9]{1,5}\.[0-9]{1,5}$",
+        description="version of the controller's software",
+    )
+    remote_control: bool = Field(True, description="whether the pendant is switched to remote control")
+    speed_slider: float = Field(
+        1.0, gt=0, le=1, description="the pendant's speed slider, as a fraction", json_schema_extra=RATIO
+    )
+    vibration_fraction: float = Field(
+        0.05, ge=0, lt=0.5, description="RMS of the rate's ripple over the rate", json_schema_extra=RATIO
+    )
+    vibration_cycles_per_turn: tuple[Cycles, ...] = Field(
+        (18, 31, 50), max_length=100, description="how often each part of the ripple comes in one turn"
+    )
+    encoder_step_rad: float = Field(6.0e-6, ge=0, le=1, description="resolution of the joint angles it reports")
 
 
 class SimulatedBoardSection(Section):
-    """The emulated board: its crystal and its moment of power-up."""
+    """The emulated board: its crystal, its memory and its moment of power-up."""
 
-    unique_id: Annotated[str, Field(pattern=r"^[0-9a-f]{24}$")] = "0123456789abcdef01234567"
-    crystal_ppm: Annotated[float, Field(ge=-25_000, le=25_000)] = 35.0  # without its crystal a board may be 2 % off
-    boot_time_s: Annotated[float, Field(ge=0, le=10)] = 0.137
-    flash_file: Path | None = None  # keeps the board's flash from one run to the next; fresh each time without
-    pty: bool = False  # also offer the serial port as a pseudo-terminal (POSIX)
+    unique_id: str = Field(
+        "0123456789abcdef01234567", pattern=r"^[0-9a-f]{24}$", description="the microcontroller's own number"
+    )
+    crystal_ppm: float = Field(
+        35.0, ge=-25_000, le=25_000, description="how much too fast its clock runs; without its crystal up to 2 % off"
+    )
+    boot_time_s: float = Field(0.137, ge=0, le=10, description="how long it has run when the laboratory starts")
+    flash_file: Path | None = Field(
+        None, description="keeps the board's flash from one run to the next; without it the flash is fresh each time"
+    )
+    pty: bool = Field(False, description="also offer the serial port as a pseudo-terminal (POSIX)")
 
 
 class SimulatedSensorSection(Section):
     """The truth of one simulated gyroscope, in the model g = K (m + b)."""
 
-    scale: Vector3
-    bias_rad_s: Vector3
-    noise_rad_s: Annotated[float, Field(ge=0)] = 0.035  # per sample, standard deviation
-    mounting_error_deg: Vector3 = (0.0, 0.0, 0.0)  # rotation vector on top of the nominal mounting
-    non_orthogonality_deg: Vector3 = (0.0, 0.0, 0.0)  # xy, xz, yz
-    temperature_c: Annotated[float, Field(ge=-40, le=85)] = 22.0
+    scale: Vector3 = Field(description="scale factor of each axis, the diagonal of K", json_schema_extra=RATIO)
+    bias_rad_s: Vector3 = Field(description="bias b of each axis")
+    noise_rad_s: float = Field(0.035, ge=0, description="standard deviation of a sample's noise")
+    mounting_error_deg: Vector3 = Field(
+        (0.0, 0.0, 0.0), description="rotation vector by which it sits off its nominal mounting"
+    )
+    non_orthogonality_deg: Vector3 = Field(
+        (0.0, 0.0, 0.0), description="by how much the angles between its axes x y, x z, y z are off 90°"
+    )
+    temperature_c: float = Field(22.0, ge=-40, le=85, description="what its thermometer says")
 
 
 class WorldSection(Section):
     """The simulated laboratory."""
 
-    seed: Annotated[int, Field(ge=0)] = 1
-    time_scale: Positive = 1.0  # at most so many simulated seconds a second
-    control_port: Annotated[int, Field(ge=1, le=65535)] = 7322
+    seed: int = Field(
+        1, ge=0, description="of all that is random: the same seed, the same run", json_schema_extra=RATIO
+    )
+    time_scale: float = Field(
+        1.0, gt=0, description="at most so many simulated seconds in a second", json_schema_extra=RATIO
+    )
+    control_port: int = Field(
+        7322, ge=1, le=65535, description="TCP port on which tests cause faults", json_schema_extra=RATIO
+    )
     arm: SimulatedArmSection = SimulatedArmSection()
     board: SimulatedBoardSection = SimulatedBoardSection()
-    sensors: Annotated[dict[str, SimulatedSensorSection], Field(min_length=1)]
+    sensors: dict[SensorName, SimulatedSensorSection] = Field(min_length=1)

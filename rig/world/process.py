@@ -20,6 +20,7 @@ from rig.world.clock import Clock
 from rig.world.fault_channel import ControlSession
 from rig.world.laboratory import Laboratory
 from rig.world.network import Network, Session
+from rig.world.section import world_section
 from rig.world.ur10e import dashboard_server, primary, rtde, script_socket
 from rig.world.ur10e.robot import Robot
 
@@ -40,13 +41,8 @@ class World:
     """Laboratory, clock and sockets."""
 
     def __init__(self, loaded: Loaded) -> None:
-        if loaded.world is None:
-            raise Refused(
-                "no_world",
-                "the configuration has no world: section, so there is nothing to simulate",
-                "Name a file with a world: section, for example configs/demo.yaml",
-            )
-        self.laboratory = Laboratory(loaded.config, loaded.world)
+        section = world_section(loaded)
+        self.laboratory = Laboratory(loaded.config, section)
         self.line = SerialLine(self.laboratory)
         self.network = Network()
         self._silent_until_s = 0.0
@@ -58,12 +54,12 @@ class World:
                 for port, new_session in ARM_PORTS.items()
             ]
             self.board_listener = self.network.listen(*_board_address(board_url), self._new_serial_session, limit=1)
-            control_port = loaded.world.control_port
+            control_port = section.control_port
             self.network.listen(host, control_port, lambda: ControlSession(self))
         except Refused:
             self.network.close()
             raise
-        self._pty = _open_pty(self.line, self.network.selector) if loaded.world.board.pty else None
+        self._pty = _open_pty(self.line, self.network.selector) if section.board.pty else None
         self._description = {
             "ready": True,
             "arm": host,
@@ -71,7 +67,7 @@ class World:
             "pty": self._pty.path if self._pty else None,
             "control": f"{host}:{control_port}",
         }
-        self.clock = Clock(loaded.world.time_scale, time.monotonic)
+        self.clock = Clock(section.time_scale, time.monotonic)
 
     def describe(self) -> str:
         """The line that says where everything listens."""

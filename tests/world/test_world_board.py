@@ -26,6 +26,7 @@ from rig.world.board.mounting import firmware
 from rig.world.board.serial_line import SerialLine, misread
 from rig.world.clock import TICKS_PER_SECOND
 from rig.world.laboratory import Laboratory
+from rig.world.section import world_section
 from support.paths import DEMO
 from support.worlds import World
 
@@ -70,8 +71,7 @@ class Host:
 
 def booted(loaded: Loaded) -> Host:
     """A laboratory whose board has started."""
-    assert loaded.world is not None
-    laboratory = Laboratory(loaded.config, loaded.world)
+    laboratory = Laboratory(loaded.config, world_section(loaded))
     new = Host(laboratory, SerialLine(laboratory), bytearray())
     new.ticks(200)
     return new
@@ -129,8 +129,7 @@ def test_the_sensor_reads_the_flanges_rate_through_its_mounting_and_its_errors()
     one.ticks(TICKS_PER_SECOND)
     nominal = mounting_matrix(loaded.config.sensors["gyro"].mounting) @ flange_rate(motion.q_rad, motion.qd_rad_s)
     seen = np.array([nominal[1], -nominal[0], nominal[2]])  # a quarter turn about the sensor's own z
-    assert loaded.world is not None
-    truth = loaded.world.sensors["gyro"]
+    truth = world_section(loaded).sensors["gyro"]
     expected = seen / np.array(truth.scale) - np.array(truth.bias_rad_s)
     assert one.samples()[-1] * COUNT_RAD_S == pytest.approx(expected, abs=COUNT_RAD_S)
     assert abs(expected).max() > 0.5
@@ -145,11 +144,10 @@ def test_every_sensor_has_its_own_mounting_errors_and_noise() -> None:
 
     quiet = turned("world.sensors.gyro.noise_rad_s=0", "world.sensors.reference.noise_rad_s=0")
     loaded = pair("world.sensors.gyro.mounting_error_deg=[0, 0, 90]")
-    assert loaded.world is not None
     motion = quiet.laboratory.robot.motion
     flange = np.array(flange_rate(motion.q_rad, motion.qd_rad_s))
     for name, index, count_rad_s in (("gyro", 1, 1 / 131), ("reference", 2, 1 / 40)):
-        truth = loaded.world.sensors[name]
+        truth = world_section(loaded).sensors[name]
         error = Rotation.from_rotvec(truth.mounting_error_deg, degrees=True).as_matrix()
         seen = error.T @ mounting_matrix(loaded.config.sensors[name].mounting) @ flange
         x, y, z = np.radians(truth.non_orthogonality_deg)

@@ -2,6 +2,7 @@
 
 import struct
 from collections.abc import Callable
+from dataclasses import replace
 
 import pytest
 from hypothesis import given, settings
@@ -12,6 +13,7 @@ from rig.errors import Refused
 from rig.world.laboratory import Laboratory
 from rig.world.network import Session
 from rig.world.process import World
+from rig.world.section import world_section
 from rig.world.ur10e.dashboard_server import DashboardSession
 from rig.world.ur10e.primary import PrimarySession
 from rig.world.ur10e.robot import Robot
@@ -20,8 +22,7 @@ from rig.world.ur10e.variables import INPUTS, OUTPUTS
 from support.paths import DEMO
 
 LOADED = load(DEMO)
-assert LOADED.world is not None
-LABORATORY = Laboratory(LOADED.config, LOADED.world)
+LABORATORY = Laboratory(LOADED.config, world_section(LOADED))
 LABORATORY.unplug()
 
 statements = st.sampled_from(
@@ -108,4 +109,4 @@ def test_a_board_port_that_is_no_address_is_refused(port: str) -> None:
         update={"board": board, "arm": LOADED.config.arm.model_copy(update={"host": "127.9.9.9"})}
     )
     with pytest.raises(Refused, match="board_port"):
-        World(type(LOADED)(config, LOADED.world, "", ""))
+        World(replace(LOADED, config=config))
