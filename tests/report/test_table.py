@@ -59,6 +59,6 @@ def test_the_other_tables_show_names_as_they_are(capsys: pytest.CaptureFixture[s
 def test_a_path_is_no_markup(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
     folder = tmp_path / "[/nope]"
     folder.mkdir(parents=True)
-    samples, sweeps = (shutil.copy(DOCS / "examples" / name, folder) for name in ("samples.csv", "sweeps.csv"))
+    samples, sweeps = (Path(shutil.copy(DOCS / "examples" / name, folder)) for name in ("samples.csv", "sweeps.csv"))
     assert solve_external(samples, sweeps, "vector", as_json=False) == 0
     assert "[/nope]" in capsys.readouterr().out.replace("\n", "")
