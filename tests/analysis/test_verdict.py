@@ -5,13 +5,8 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-<<<<<<< HEAD
-from rig.analysis.verdict import Check, judge, verdict
-from rig.data.settings import Limits
-=======
 from rig.analysis.verdict import Check, judge, verdict, verification_checks
-from rig.config.models import LimitsSection
->>>>>>> 70a27c9 (The analysis returns a typed outcome; documents are made in report/, one model writes and reads result.json)
+from rig.data.settings import Limits
 from rig.estimation.accumulator import Solution
 
 LIMITS = Limits(scale_deviation=0.3, scale_std=0.002, bias_rad_s=0.1, bias_std_rad_s=0.001, condition=100)
@@ -65,7 +60,7 @@ def test_a_measurement_that_is_missing_does_not_pass(value: float | None) -> Non
 
 def test_without_a_limit_nothing_passes() -> None:
     """A limit that nobody set is no limit of zero, which a perfect reading would pass and `result.json` would state."""
-    unset = LIMITS.model_copy(update={"verification_rms_rad_s": 0.1})
+    unset = replace(LIMITS, verification_rms_rad_s=0.1)
     checks = verification_checks("gyro", None, unset)
     assert [check.limit for check in checks] == [0.1, None, None]
     assert not Check("gyro.verification_mean", 0.0, None, "rad/s").passed
