@@ -46,6 +46,21 @@ class SensorResult:
     time_bases: tuple[TimeBase, ...]
 
     @property
+    def serial_number(self) -> str:
+        """The sensor's."""
+        return self.sensor.serial_number
+
+    @property
+    def scale(self) -> Array:
+        """(3,) by the chosen estimator: rate = scale × (reading + bias)."""
+        return self.solution.scale
+
+    @property
+    def bias_rad_s(self) -> Array:
+        """(3,) by the chosen estimator."""
+        return self.solution.bias_rad_s
+
+    @property
     def temperature_c(self) -> float:
         """Mean over all averaged samples."""
         averages = [observation.average for observation in self.observations]
@@ -103,12 +118,18 @@ def _solve_sensor(sensor: RecordedSensor, parts: Sequence[SensorObservations], e
     mounting = np.array(sensor.mounting)
     check_duplicates(np.array([observation.average.mean_rad_s for observation in observations]))
     six_observation = solve_six_observation(observations, "newton")
+    vector_model = or_fault(lambda: solve_vector(observations, rests, mounting))
+    algorithm_1 = or_fault(lambda: solve_six_observation(observations, "algorithm_1"))
+    by_name = {"vector": vector_model, "newton": six_observation, "algorithm_1": algorithm_1}
+    solution = by_name[estimator] if estimator in by_name else solve_observations(observations, estimator)
+    if isinstance(solution, Fault):
+        raise solution
     return SensorResult(
         sensor=sensor,
-        solution=solve_observations(observations, estimator, rests, mounting),
-        vector_model=or_fault(lambda: solve_vector(observations, rests, mounting)),
+        solution=solution,
+        vector_model=vector_model,
         six_observation=six_observation,
-        algorithm_1=or_fault(lambda: solve_six_observation(observations, "algorithm_1")),
+        algorithm_1=algorithm_1,
         observations=observations,
         rests=rests,
         time_bases=tuple(part.time_base for part in parts),

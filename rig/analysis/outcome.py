@@ -1,41 +1,57 @@
-"""The outcome of a run: solved, judged, written into the run folder, and printed."""
+"""The outcome of a run: solved, verified, judged. The documents made of it are `rig.report`'s."""
 
-import json
-from collections.abc import Iterator, Mapping, Sequence
-from dataclasses import dataclass
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, replace
 from datetime import UTC, datetime
-from pathlib import Path
-from typing import Any
+from typing import Any, Literal
 
 import numpy as np
-from rich.console import Console
 
 from rig.analysis.calibration import DEFAULT_ESTIMATOR, SensorResult, solve_runs
 from rig.analysis.comparison import Reference
-from rig.analysis.onboard_check import agreement
-from rig.analysis.verdict import judge, verdict, verification_checks
+from rig.analysis.onboard_check import Agreement, agreement
+from rig.analysis.verdict import Check, judge, verdict, verification_checks
 from rig.analysis.verification import Verification, verify
-from rig.data.result_file import SCHEMA
 from rig.data.run_file import RunData
-from rig.data.settings import KnownReference
-from rig.report.figures import write_figures
-from rig.report.header import calibration_header
-from rig.report.sensor import sensor_document
-from rig.report.table import print_result
-from rig.report.verification_table import verification_document
+from rig.data.settings import RunSettings
+
+
+@dataclass(frozen=True, slots=True)
+class Provenance:
+    """What was measured with what, and when: `recorded` is that of the run's first recording."""
+
+    recorded: Mapping[str, Any]
+    stored_calibrations: Mapping[str, Any]
+    resumed_utc: tuple[str, ...]
+    verified_utc: tuple[str, ...]
+    solved_utc: datetime
 
 
 @dataclass(frozen=True, slots=True)
 class Outcome:
-    """What a run's recordings amount to: `document` is that of `result.json`, `verifications` hold the curves."""
+    """What a run's recordings amount to, by sensor name.
 
-    document: dict[str, Any]
+    `results` hold every recorded sensor's calibration and `onboard` the board's own of the sensors to calibrate; both
+    are empty where stored calibrations were verified. `verifications` hold those that could be made.
+    """
+
+    runs: tuple[RunData, ...]
+    settings: RunSettings
+    results: Mapping[str, SensorResult]
+    onboard: Mapping[str, Agreement]
     verifications: Mapping[str, Verification]
+    checks: tuple[Check, ...]
+    provenance: Provenance
+
+    @property
+    def verdict(self) -> Literal["pass", "fail"]:
+        """ "pass" when there are checks and all of them passed."""
+        return verdict(self.checks)
 
     @property
     def passed(self) -> bool:
         """Whether the verdict is a pass."""
-        return bool(self.document["verdict"] == "pass")
+        return self.verdict == "pass"
 
 
 def outcome_of(
@@ -47,74 +63,71 @@ def outcome_of(
     movement with calibrated readings, None where no verification is asked for. Raises `Fault` or `Refused` by name when
     the recordings do not hold what they should.
     """
-    first = [*runs, *(repeated or ())][0]
-    settings = first.settings
-    results = solve_runs(runs, estimator) if runs else {}
-    agreements = {name: agreement(runs, name) for name in settings.to_calibrate} if runs else {}
-    checks = list(judge({name: results[name].solution for name in agreements}, settings.limits))
-    checks += [check for name, agreed in agreements.items() for check in agreed.checks(name)]
-    verifications: dict[str, Verification | None] = {}
-    if repeated is not None:
-        verifications = {
-            name: _verified(name, settings.reference, runs, repeated, results) for name in settings.to_calibrate
-        }
-        checks += [
-            c for name, found in verifications.items() for c in verification_checks(name, found, settings.limits)
-        ]
-    document = {
-        "schema": SCHEMA,
-        "verdict": verdict(checks),
-        "checks": [check.document() for check in checks],
-        "provenance": {
-            **first.provenance,
-            "stored_calibrations": (repeated or runs)[-1].provenance.get("stored_calibrations", {}),
-            "resumed_utc": [run.provenance["started_utc"] for run in runs[1:]],
-            "verified_utc": [run.provenance["started_utc"] for run in repeated or ()],
-            "solved_utc": datetime.now(UTC).isoformat(timespec="seconds"),
-        },
-        "sensors": {
-            name: sensor_document(
-                result, "calibrate" if name in settings.to_calibrate else "reference", agreements.get(name)
-            )
-            for name, result in results.items()
-        },
-        "verification": {n: verification_document(v) for n, v in verifications.items() if v is not None},
-    }
-    return Outcome(document, {name: found for name, found in verifications.items() if found is not None})
+    outcome = _calibrated(runs, estimator) if runs else _nothing_calibrated(*repeated or ())
+    return outcome if repeated is None else verified(outcome, repeated)
 
 
-def _verified(
-    name: str,
-    reference: KnownReference | None,
-    runs: Sequence[RunData],
-    repeated: Sequence[RunData],
-    results: Mapping[str, SensorResult],
-) -> Verification | None:
+def verified(outcome: Outcome, repeated: Sequence[RunData]) -> Outcome:
+    """The same with what `repeated`, the movement with calibrated readings, says of it.
+
+    Without such a recording the checks of the verification fail. Raises Fault as `verify` does.
+    """
+    settings = outcome.settings
+    found = {name: _verification(name, outcome, repeated) for name in settings.to_calibrate}
+    checks = [check for name, each in found.items() for check in verification_checks(name, each, settings.limits)]
+    return replace(
+        outcome,
+        verifications={name: each for name, each in found.items() if each is not None},
+        checks=(*outcome.checks, *checks),
+        provenance=replace(
+            outcome.provenance,
+            stored_calibrations=_stored(repeated[-1]) if repeated else outcome.provenance.stored_calibrations,
+            verified_utc=tuple(run.provenance["started_utc"] for run in repeated),
+        ),
+    )
+
+
+def _calibrated(runs: Sequence[RunData], estimator: str) -> Outcome:
+    settings = runs[0].settings
+    results = solve_runs(runs, estimator)
+    onboard = {name: agreement(runs, name) for name in settings.to_calibrate}
+    checks = judge({name: results[name].solution for name in onboard}, settings.limits)
+    return Outcome(
+        runs=tuple(runs),
+        settings=settings,
+        results=results,
+        onboard=onboard,
+        verifications={},
+        checks=(*checks, *(check for name, agreed in onboard.items() for check in agreed.checks(name))),
+        provenance=_provenance(runs),
+    )
+
+
+def _nothing_calibrated(*repeated: RunData) -> Outcome:
+    """Where stored calibrations are verified there is nothing but what was recorded."""
+    return Outcome((), repeated[0].settings, {}, {}, {}, (), _provenance(repeated[:1]))
+
+
+def _provenance(runs: Sequence[RunData]) -> Provenance:
+    return Provenance(
+        recorded=runs[0].provenance,
+        stored_calibrations=_stored(runs[-1]),
+        resumed_utc=tuple(run.provenance["started_utc"] for run in runs[1:]),
+        verified_utc=(),
+        solved_utc=datetime.now(UTC),
+    )
+
+
+def _stored(run: RunData) -> Mapping[str, Any]:
+    """The calibrations by which the board corrected its readings."""
+    stored: Mapping[str, Any] = run.provenance.get("stored_calibrations", {})
+    return stored
+
+
+def _verification(name: str, outcome: Outcome, repeated: Sequence[RunData]) -> Verification | None:
     """What the repeated movement says of one sensor; None when there was none, or nothing to compare with."""
+    reference = outcome.settings.reference
     if not repeated or reference is None:
         return None
     known = Reference(reference.name, np.array(reference.scale), np.array(reference.bias_rad_s))
-    return verify(name, known, repeated, runs, results[name].solution if name in results else None)
-
-
-def write_outcome(folder: Path, outcome: Outcome) -> Iterator[str]:
-    """Figures, `calibration.h` and `result.json` into the run folder; yields what to tell the operator of the figures.
-
-    A calibration that failed its limits gets no header: nobody should compile it in. `result.json` comes last and
-    whole: it ends the run.
-    """
-    if outcome.verifications:
-        yield write_figures(outcome.verifications.values(), folder)
-    if outcome.passed and outcome.document["sensors"]:
-        (folder / "calibration.h").write_text(calibration_header(outcome.document), encoding="utf-8")
-    part = folder / "result.json.part"
-    part.write_text(json.dumps(outcome.document, indent=2, allow_nan=False) + "\n", encoding="utf-8")
-    part.replace(folder / "result.json")
-
-
-def print_outcome(document: dict[str, Any], *, as_json: bool) -> None:
-    """The document on stdout: tables for people, JSON for machines."""
-    if as_json:
-        print(json.dumps(document, indent=2, allow_nan=False))
-    else:
-        print_result(document, Console(highlight=False))
+    return verify(name, known, repeated, outcome.runs, outcome.results.get(name))

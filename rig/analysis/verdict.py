@@ -1,9 +1,9 @@
-"""Passed or failed: every limit beside what was measured. A measurement that is missing fails."""
+"""Passed or failed: every limit beside what was measured. A measurement or a limit that is missing fails."""
 
 import math
 from collections.abc import Mapping, Sequence
-from dataclasses import asdict, dataclass
-from typing import Any, Literal
+from dataclasses import dataclass
+from typing import Literal
 
 import numpy as np
 
@@ -14,21 +14,22 @@ from rig.estimation.estimate import Estimate
 
 @dataclass(frozen=True, slots=True)
 class Check:
-    """One limit: it passes when `value` is a number not above `limit`. `unit` belongs to both."""
+    """One limit: it passes when `value` is a number not above `limit`. `unit` belongs to both.
+
+    `value` is None where nothing was measured, `limit` where none was set.
+    """
 
     name: str
     value: float | None
-    limit: float
+    limit: float | None
     unit: str
 
     @property
     def passed(self) -> bool:
-        """False for a measurement that is missing or not a number."""
-        return self.value is not None and math.isfinite(self.value) and self.value <= self.limit
-
-    def document(self) -> dict[str, Any]:
-        """The check's entry in `result.json`."""
-        return {**asdict(self), "passed": self.passed}
+        """False for a measurement that is missing or not a number, and without a limit."""
+        if self.value is None or self.limit is None:
+            return False
+        return math.isfinite(self.value) and self.value <= self.limit
 
 
 def judge(solutions: Mapping[str, Estimate], limits: Limits) -> tuple[Check, ...]:
@@ -40,7 +41,7 @@ def verification_checks(sensor: str, verification: Verification | None, limits: 
     """Calibrated readings against the reference: the worst axis, and the worst mean over a revolution.
 
     The reference in its turn is held against the arm, by the limit of those means: it may be the one that is wrong.
-    None is a verification that did not happen. A limit that was left out is zero, which nothing passes.
+    None is a verification that did not happen.
     """
     rms = mean = known = None
     if verification is not None:
@@ -48,9 +49,9 @@ def verification_checks(sensor: str, verification: Verification | None, limits: 
         mean = _largest(np.array([turn.error_rad_s for turn in verification.after.revolutions]))
         known = verification.reference_error_rad_s
     return (
-        Check(f"{sensor}.verification_rms", rms, limits.verification_rms_rad_s or 0.0, "rad/s"),
-        Check(f"{sensor}.verification_mean", mean, limits.verification_mean_rad_s or 0.0, "rad/s"),
-        Check(f"{sensor}.verification_reference", known, limits.verification_mean_rad_s or 0.0, "rad/s"),
+        Check(f"{sensor}.verification_rms", rms, limits.verification_rms_rad_s, "rad/s"),
+        Check(f"{sensor}.verification_mean", mean, limits.verification_mean_rad_s, "rad/s"),
+        Check(f"{sensor}.verification_reference", known, limits.verification_mean_rad_s, "rad/s"),
     )
 
 

@@ -1,17 +1,31 @@
 """A calibration from `result.json` into the board's flash, and seen to be there."""
 
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterator, Mapping, Sequence
 from datetime import UTC, datetime
-from typing import Any
+from typing import Protocol
 
 from firmware_host.client import Board, Calibration, StoredCalibration
 from firmware_host.errors import BoardError
 from rig.board.identify import find_sensor
 from rig.config.models import RigConfig
+from rig.estimation.estimate import Array
 
 
-def store_calibrations(config: RigConfig, document: Mapping[str, Any]) -> Iterator[str]:
-    """Store the solutions of a `result.json` document for every sensor to calibrate; a line about each.
+class Solved(Protocol):
+    """A sensor's solution, g = K (m + b), just found or read from `result.json`."""
+
+    @property
+    def serial_number(self) -> str: ...
+    @property
+    def temperature_c(self) -> float: ...
+    @property
+    def scale(self) -> Array | Sequence[float]: ...
+    @property
+    def bias_rad_s(self) -> Array | Sequence[float]: ...
+
+
+def store_calibrations(config: RigConfig, results: Mapping[str, Solved]) -> Iterator[str]:
+    """Store the solution of every sensor to calibrate, by sensor name; yields a line about each.
 
     Raises BoardError as the board refuses, `not_stored` when it reads back otherwise; Refused as `find_sensor`.
     """
@@ -20,18 +34,18 @@ def store_calibrations(config: RigConfig, document: Mapping[str, Any]) -> Iterat
             section = config.sensors[name]
             index = find_sensor(board.identity, name, section).index
             board.configure(index, section.rate_hz, section.range_deg_s)  # the record says for which range it holds
-            stored = store(board, index, calibration_of(document["sensors"][name]))
+            stored = store(board, index, calibration_of(results[name]))
             yield f"stored on the board: {name}, {section.part} {section.serial_number}, record {stored.sequence}"
 
 
-def calibration_of(sensor: Mapping[str, Any]) -> Calibration:
-    """One sensor's entry of `result.json` as the board keeps it, dated now."""
-    (kx, ky, kz), (bx, by, bz) = sensor["scale"], sensor["bias_rad_s"]
+def calibration_of(solved: Solved) -> Calibration:
+    """A sensor's solution as the board keeps it, dated now."""
+    (kx, ky, kz), (bx, by, bz) = map(float, solved.scale), map(float, solved.bias_rad_s)
     return Calibration(
         model="k_times_m_plus_b",
-        serial_number=sensor["serial_number"],
+        serial_number=solved.serial_number,
         written_utc=datetime.now(UTC),
-        temperature_c=sensor["temperature_c"],
+        temperature_c=solved.temperature_c,
         scale=(kx, ky, kz),
         bias_rad_s=(bx, by, bz),
     )

@@ -14,7 +14,7 @@ from rig.board.store import calibration_of, store
 from rig.commands.laboratory import simulated_laboratory, written
 from rig.config.load import load
 from rig.config.models import RigConfig, SensorSection
-from rig.data.result_file import Result, passed_result
+from rig.data.result_file import ResultDocument, passed_result
 from rig.errors import Fault, Refused
 from rig.report.board_info import info_document, print_info, print_stored
 from rig.station.confirm import agreed_or_refused
@@ -139,7 +139,7 @@ def _places(board: Board, config: RigConfig, sensor: str | None, among: Mapping[
     return places
 
 
-def _result_of(place: _Place, result: Result, path: Path) -> Calibration:
+def _result_of(place: _Place, result: ResultDocument, path: Path) -> Calibration:
     """The run's calibration of a sensor. Raises Refused `not_in_result`, `another_sensor` or `another_range`."""
     entry = result.sensors.get(place.name)
     if entry is None or entry.role == "reference":
@@ -165,7 +165,7 @@ def _result_of(place: _Place, result: Result, path: Path) -> Calibration:
             f"{place.section.range_deg_s:g} °/s",
             "Set range_deg_s to what it was calibrated at, or calibrate at this range",
         )
-    return calibration_of(entry.model_dump())
+    return calibration_of(entry)
 
 
 def _on(board: Board, changes: Iterable[str]) -> list[str]:

@@ -5,12 +5,14 @@ from collections.abc import Sequence
 from contextlib import ExitStack
 from pathlib import Path
 
-from rig.analysis.outcome import outcome_of, print_outcome
+from rig.analysis.outcome import outcome_of
 from rig.commands.laboratory import simulated_laboratory
 from rig.config.load import Loaded, load
 from rig.data.run_file import RunData, read_run
 from rig.data.run_folder import CALIBRATION, VERIFICATION, new_folder, recordings
 from rig.errors import Refused
+from rig.report.document import document_of
+from rig.report.table import print_outcome
 from rig.runner.phases import Script, Session, agreed
 from rig.station.confirm import ask_operator
 from rig.station.view import view
@@ -48,7 +50,7 @@ def solve(path: Path, estimator: str, overrides: Sequence[str] = (), *, as_json:
     """
     runs, repeated = _recorded(path, overrides)
     outcome = outcome_of(runs, repeated, estimator)
-    print_outcome(outcome.document, as_json=as_json)
+    print_outcome(document_of(outcome), as_json=as_json)
     return 0 if outcome.passed else 1
 
 
@@ -84,5 +86,5 @@ def _carry_out(folder: Path, loaded: Loaded, script: Script | None, *, assume_ye
                 laboratory.enter_context(simulated_laboratory(folder / "config.yaml"))
         outcome = session.verify(carried_out) if name == "verify" else session.calibrate(carried_out)
         shown.line(f"written: {folder}")
-    print_outcome(outcome.document, as_json=as_json)
+    print_outcome(document_of(outcome), as_json=as_json)
     return 0 if outcome.passed else 1

@@ -1,56 +1,302 @@
-"""Reads the `result.json` of a run for those who go on with it."""
+"""`result.json`: one model that writes it, reads it, and is the source of its JSON schema (docs/result.schema.json).
 
+SI units, the unit in every name; vectors and matrices are lists, rows first. Keys stand in the order of the fields.
+"""
+
+import json
 from pathlib import Path
 from typing import Annotated, Literal
 
-from pydantic import BaseModel, ConfigDict, Field, ValidationError
+from pydantic import BaseModel, ConfigDict, Field, JsonValue, ValidationError
 
-from rig.config.models import Positive, Vector3
+from rig.config.models import Positive, Vector3, Vector6
 from rig.errors import Refused
 
 SCHEMA = "rig.result/1"
+NAME = "result.json"
+
+PositiveVector3 = tuple[Positive, Positive, Positive]
+Matrix3 = tuple[Vector3, Vector3, Vector3]
+Matrix6 = Annotated[tuple[Vector6, ...], Field(min_length=6, max_length=6)]
+Role = Literal["calibrate", "reference"]
 
 
-class _Part(BaseModel):
-    model_config = ConfigDict(frozen=True, allow_inf_nan=False)
+class _Entry(BaseModel):
+    model_config = ConfigDict(frozen=True, extra="forbid", allow_inf_nan=False)
 
 
-class SensorResult(_Part):
-    """What a sensor's entry says of its calibration, g = K (m + b)."""
-
-    part: str
-    serial_number: str
-    role: Literal["calibrate", "reference"]
-    range_rad_s: Positive
-    temperature_c: float
-    scale: tuple[Positive, Positive, Positive]
-    bias_rad_s: Vector3
-
-
-class CheckResult(_Part):
-    """A check of the verdict."""
+class CheckEntry(_Entry):
+    """One limit of the verdict; `value` is null where nothing was measured, `limit` where none was set."""
 
     name: str
+    value: float | None
+    limit: float | None
+    unit: str
     passed: bool
 
 
-class Result(_Part):
-    """The parts of a `result.json` that others go on with."""
+class StoredCalibrationEntry(_Entry):
+    """A calibration the board had stored, g = K (m + b), while it corrected its readings."""
+
+    sequence: int
+    part: str
+    who_am_i: int
+    range_deg_s: float
+    model: str
+    serial_number: str
+    written_utc: str
+    temperature_c: float
+    scale: Vector3
+    bias_rad_s: Vector3
+
+
+class ProvenanceEntry(_Entry):
+    """What was measured with what, and when. Later versions may add to it."""
+
+    model_config = ConfigDict(frozen=True, extra="allow")
+    __pydantic_extra__: dict[str, JsonValue] = Field(init=False)
+
+    started_utc: str
+    rig_version: str
+    python_version: str
+    package_versions: dict[str, str]
+    configuration_sha256: str
+    arm_serial_number: str
+    arm_software: str
+    board_unique_id: str
+    firmware_version: str
+    sensor_serial_numbers: dict[str, str]
+    stored_calibrations: dict[str, StoredCalibrationEntry]
+    resumed_utc: tuple[str, ...]
+    verified_utc: tuple[str, ...]
+    solved_utc: str
+
+
+class ErrorEntry(_Entry):
+    """Why an estimator that stands beside the chosen one has no solution."""
+
+    error: str
+
+
+class EstimateEntry(_Entry):
+    """One estimator's solution; `covariance` in the order kx ky kz bx by bz, its units 1 and rad/s."""
+
+    estimator: str
+    iterations: int
+    scale: PositiveVector3
+    bias_rad_s: Vector3
+    covariance: Matrix6
+    observations_used: int
+    rank: int
+    condition: float
+
+
+class VectorEntry(_Entry):
+    """The vector model's solution: the six parameters, and how the three axes lie to each other and to the flange."""
+
+    model: str
+    estimator: str
+    iterations: int
+    scale: PositiveVector3
+    bias_rad_s: Vector3
+    covariance: Matrix6
+    observations_used: int
+    rank: int
+    condition: float
+    matrix: Matrix3
+    matrix_covariance: tuple[tuple[float, ...], ...]
+    matrix_covariance_order: tuple[str, ...]
+    non_orthogonality_rad: Vector3
+    non_orthogonality_std_rad: Vector3
+    non_orthogonality_order: tuple[str, str, str]
+    mounting: Matrix3
+    mounting_std_rad: Vector3
+    residuals_rad_s: tuple[Vector3, ...]
+    warnings: tuple[str, ...]
+
+
+class AverageEntry(_Entry):
+    """A rest: the mean reading, the standard deviation of that mean, and of one sample."""
+
+    mean_rad_s: Vector3
+    mean_std_rad_s: Vector3
+    noise_rad_s: Vector3
+    samples: int
+    duration_s: float
+    temperature_c: float
+
+
+class ObservationEntry(_Entry):
+    """One revolution of a joint and the mean reading over it."""
+
+    sweep: int
+    joint: str
+    direction: str
+    axis: Literal["x", "y", "z"]
+    sign: Literal[1, -1]
+    axis_flange: Vector3
+    speed_rad_s: float
+    speed_std_rad_s: float
+    lost: int
+    mean_rad_s: Vector3
+    mean_std_rad_s: Vector3
+    noise_rad_s: Vector3
+    samples: int
+    duration_s: float
+    temperature_c: float
+
+
+class TimeBaseEntry(_Entry):
+    """The board's clock: controller time = board time + offset + drift × (board time − reference)."""
+
+    offset_s: float
+    offset_std_s: float
+    drift: float
+    drift_std: float
+    reference_board_s: float
+
+
+class BoardSolutionEntry(_Entry):
+    """What the board solved for by one method, in single precision."""
+
+    sensor: str
+    method: str
+    status: str
+    observations: int
+    iterations: int
+    scale: Vector3
+    bias_rad_s: Vector3
+
+
+class BoardEntry(_Entry):
+    """The board's solutions by method, and the closed form's distance from the same in double precision."""
+
+    solutions: dict[str, BoardSolutionEntry]
+    not_observed: tuple[str, ...]
+    host_scale: Vector3 | None
+    host_bias_rad_s: Vector3 | None
+    scale_difference: float | None
+    bias_difference_rad_s: float | None
+
+
+class SensorEntry(_Entry):
+    """A sensor's calibration by the chosen estimator, what it rests on, and what the other estimators say.
+
+    `temperature_c` is the mean over all averaged samples. A reference has no `board`: the board solves only for the
+    sensors that are to be calibrated.
+    """
+
+    part: str
+    serial_number: str
+    range_rad_s: Positive
+    role: Role
+    model: str
+    estimator: str
+    iterations: int
+    scale: PositiveVector3
+    bias_rad_s: Vector3
+    covariance: Matrix6
+    observations_used: int
+    rank: int
+    condition: float
+    covariance_order: tuple[str, ...]
+    covariance_units: tuple[str, ...]
+    temperature_c: float
+    observations: tuple[ObservationEntry, ...]
+    rests: tuple[AverageEntry, ...]
+    time_bases: tuple[TimeBaseEntry, ...]
+    vector_model: VectorEntry | ErrorEntry
+    six_observation: EstimateEntry | ErrorEntry
+    algorithm_1: EstimateEntry | ErrorEntry
+    board: BoardEntry | None = None
+
+
+class RotationEntry(_Entry):
+    """How two sensors sit to each other: `matrix` takes a vector of the reference's frame into the sensor's."""
+
+    matrix: Matrix3
+    vector_rad: Vector3
+    from_nominal_rad: Vector3
+    std_rad: Vector3
+    residuals_rad_s: tuple[Vector3, ...]
+
+
+class DeviationEntry(_Entry):
+    """Reading less reference over a number of samples, axis by axis."""
+
+    samples: int
+    mean_rad_s: Vector3
+    rms_rad_s: Vector3
+    mse_rad2_s2: Vector3
+    max_rad_s: Vector3
+
+
+class RevolutionErrorEntry(_Entry):
+    """Mean reading less mean reference over one revolution."""
+
+    sweep: int
+    joint: str
+    direction: str
+    error_rad_s: Vector3
+    std_rad_s: Vector3
+
+
+class ComparisonEntry(_Entry):
+    """A sensor's readings beside the reference's; `noise_rad_s` is null without rests; one delay a recording."""
+
+    movement: DeviationEntry
+    sweeps: DeviationEntry
+    noise_rad_s: Vector3 | None
+    revolutions: tuple[RevolutionErrorEntry, ...]
+    delay_s: tuple[float, ...]
+    delay_std_s: tuple[float, ...]
+
+
+class VerificationEntry(_Entry):
+    """A sensor against its reference, in the sensor's frame; `before` is null where only calibrated readings exist."""
+
+    reference: str
+    reference_scale: Vector3
+    reference_bias_rad_s: Vector3
+    reference_error_rad_s: float
+    rotation: RotationEntry
+    before: ComparisonEntry | None
+    after: ComparisonEntry
+
+
+class ResultDocument(_Entry):
+    """The result of a run, of schema "rig.result/1"; `sensors` is empty where stored calibrations were verified."""
 
     schema_name: Annotated[Literal["rig.result/1"], Field(alias="schema")]  # as SCHEMA
     verdict: Literal["pass", "fail"]
-    checks: tuple[CheckResult, ...]
-    sensors: dict[str, SensorResult]
+    checks: tuple[CheckEntry, ...]
+    provenance: ProvenanceEntry
+    sensors: dict[str, SensorEntry]
+    verification: dict[str, VerificationEntry]
+
+    def text(self) -> str:
+        """The JSON; what was left out stays out."""
+        return json.dumps(self.model_dump(by_alias=True, exclude_unset=True), indent=2, allow_nan=False)
 
 
-def passed_result(path: Path) -> Result:
-    """The `result.json` of a run folder or at `path` itself, if its verdict is a pass.
+def schema_text() -> str:
+    """The JSON schema of `result.json`, as docs/result.schema.json has it."""
+    schema = {"$schema": "https://json-schema.org/draft/2020-12/schema", **ResultDocument.model_json_schema()}
+    return json.dumps(schema, indent=2, ensure_ascii=False) + "\n"
 
-    Raises Refused: no_result, not_a_result, verdict_failed.
-    """
-    file = path / "result.json" if path.is_dir() else path
+
+def write_result(document: ResultDocument, folder: Path) -> None:
+    """`result.json` into a run folder, whole or not at all: it ends the run."""
+    part = folder / f"{NAME}.part"
+    part.write_text(document.text() + "\n", encoding="utf-8")
+    part.replace(folder / NAME)
+
+
+def read_result(path: Path) -> ResultDocument:
+    """The `result.json` of a run folder or at `path` itself. Raises Refused `no_result`, `not_a_result`."""
+    file = _file(path)
     try:
-        result = Result.model_validate_json(file.read_bytes())
+        return ResultDocument.model_validate_json(file.read_bytes())
     except OSError as error:
         raise Refused(
             "no_result", f"{file} cannot be read: {error.strerror}", "Give a run folder or its result.json"
@@ -63,9 +309,24 @@ def passed_result(path: Path) -> Result:
             f"{file} is no result of a run: {where}{': ' if where else ''}{first['msg']}",
             "Give a run folder or its result.json",
         ) from error
+
+
+def passed_result(path: Path) -> ResultDocument:
+    """The same if its verdict is a pass. Raises Refused `no_result`, `not_a_result`, `verdict_failed`."""
+    result = read_result(path)
     if result.verdict != "pass":
         failed = ", ".join(check.name for check in result.checks if not check.passed)
         raise Refused(
-            "verdict_failed", f"the run in {file} failed its verdict ({failed})", "Mend the cause and calibrate again"
+            "verdict_failed",
+            f"the run in {_file(path)} failed its verdict ({failed})",
+            "Mend the cause and calibrate again",
         )
     return result
+
+
+def _file(path: Path) -> Path:
+    return path / NAME if path.is_dir() else path
+
+
+if __name__ == "__main__":
+    print(schema_text(), end="")

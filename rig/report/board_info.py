@@ -10,6 +10,7 @@ from rich.table import Table
 
 from firmware_host.answers import BoardIdentity, BoardStatus, StoredCalibration
 from firmware_host.protocol import FIRMWARE_VERSION
+from rig.station.plain_text import plain
 
 
 def info_document(
@@ -67,18 +68,18 @@ def print_info(document: Mapping[str, Any]) -> None:
         "last fault": fault,
     }
     for name, value in facts.items():
-        console.print(f"{name + ':':12}{value}", soft_wrap=True)
+        console.print(plain(f"{name + ':':12}{value}"), soft_wrap=True)
     table = Table(box=SIMPLE)
     for heading in ("part", "fitted", "identity", "configured as", "stored calibration"):
         table.add_column(heading)
     for sensor in document["sensors"]:
         stored = sensor["calibration"]
         table.add_row(
-            sensor["part"],
+            plain(sensor["part"]),
             "yes" if sensor["present"] else "no",
             f"0x{sensor['who_am_i']:02x}",
-            sensor["configured_as"] or "",
-            "none" if stored is None else f"{stored['serial_number']}, {stored['written_utc']}",
+            plain(sensor["configured_as"] or ""),
+            plain("none" if stored is None else f"{stored['serial_number']}, {stored['written_utc']}"),
         )
     console.print(table)
 
@@ -88,11 +89,13 @@ def print_stored(documents: Mapping[str, Mapping[str, Any] | None]) -> None:
     console = Console(highlight=False)
     for name, stored in documents.items():
         if stored is None:
-            console.print(f"{name}: no calibration stored")
+            console.print(plain(f"{name}: no calibration stored"))
             continue
         console.print(
-            f"{name}: {stored['part']} {stored['serial_number']} at {stored['range_deg_s']:g} °/s, "
-            f"{stored['temperature_c']:.1f} °C; record {stored['sequence']} of {stored['written_utc']}",
+            plain(
+                f"{name}: {stored['part']} {stored['serial_number']} at {stored['range_deg_s']:g} °/s, "
+                f"{stored['temperature_c']:.1f} °C; record {stored['sequence']} of {stored['written_utc']}"
+            ),
             soft_wrap=True,
         )
         table = Table(box=SIMPLE)

@@ -7,13 +7,20 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from rig.analysis.comparison import Comparison
+from rig.analysis.outcome import Outcome
 from rig.analysis.verification import Verification
+from rig.data.result_file import ResultDocument
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
 
-def write_figures(verifications: Iterable[Verification], folder: Path) -> str:
+def write_figures(outcome: Outcome, document: ResultDocument, folder: Path) -> tuple[str, ...]:
+    """Those of all verifications of a run, if it has any."""
+    return (draw_verifications(outcome.verifications.values(), folder),) if outcome.verifications else ()
+
+
+def draw_verifications(verifications: Iterable[Verification], folder: Path) -> str:
     """Draw `verification_<sensor>_before` (where there is one) and `…_after`, each as PNG and SVG, into `folder`.
 
     Returns what to tell the operator: the files, or how to get them where matplotlib, which an extra brings, is absent.

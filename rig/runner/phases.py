@@ -12,12 +12,13 @@ from pathlib import Path
 
 from firmware_host.errors import BoardError
 from rig.analysis.onboard_check import check_observed
-from rig.analysis.outcome import Outcome, outcome_of, write_outcome
+from rig.analysis.outcome import Outcome, outcome_of, verified
 from rig.board.store import store_calibrations
 from rig.config.load import Loaded
 from rig.data.run_file import RunData, make_plain, read_run
 from rig.data.run_folder import CALIBRATION, VERIFICATION, next_recording, recordings, resuming
 from rig.errors import Fault, Refused, RigError
+from rig.report.writers import write_outcome
 from rig.runner.connect import open_rig
 from rig.runner.procedure import Confirm, Rig
 from rig.station.view import View
@@ -55,14 +56,14 @@ class Session:
                 return self._written(outcome)
         if outcome.passed:
             with self.reported(self._mended, moved=True):
-                for line in store_calibrations(self.loaded.config, outcome.document):
+                for line in store_calibrations(self.loaded.config, outcome.results):
                     self.shown.line(line)
             self._record(self.verification, VERIFICATION, calibrated=True, moved=True)
         else:
             self.shown.line("not verified: the calibration failed its limits, so the board keeps what it had")
         with self.reported(self._repeating, moved=True):
             repeated = [self._newest_verification()] if outcome.passed else []
-            return self._written(outcome_of(runs, repeated))
+            return self._written(verified(outcome, repeated))
 
     def verify(self, script: Script) -> Outcome:
         """Only the second half, with the calibration the board has stored. Returns the outcome."""

@@ -13,9 +13,10 @@ from rig.analysis.onboard_check import agreement, check_observed
 from rig.data.run_file import Event, RunData
 from rig.errors import Fault
 from rig.observation.observe import finished
-from rig.report.sensor import sensor_document
+from rig.report.sensor_entry import sensor_entry
 from rig.report.table import print_result
 from rig.runner.onboard import observed_sweeps
+from support.results import result_document
 from support.synthetic_run import SENSITIVITY, Setup, synthetic_run
 
 START_MARGIN_US = 300_000  # past the ramps
@@ -144,12 +145,20 @@ def test_a_board_that_averages_other_samples_than_it_says_fails(run: RunData) ->
 
 def test_a_sweep_the_board_missed_is_told(run: RunData) -> None:
     missed = event("board_not_observed", sweep=5, reason="not_kept: too late")
-    unsolved = event("board_solved", method="closed_form", status="too_few_observations", observations=5)
+    unsolved = event(
+        "board_solved",
+        method="closed_form",
+        status="too_few_observations",
+        observations=5,
+        iterations=0,
+        scale=[0.0] * 3,
+        bias_rad_s=[0.0] * 3,
+    )
     events = [*observed(run, range(5)), missed, unsolved]
     result = solve_runs([run])["gyro"]
-    entry = sensor_document(result, "calibrate", agreement([with_events(run, events)], "gyro"))
+    entry = sensor_entry(result, "calibrate", agreement([with_events(run, events)], "gyro"))
     console = Console(width=120, record=True)
-    print_result({"sensors": {"gyro": entry}, "verification": {}, "checks": [], "verdict": "fail"}, console)
+    print_result(result_document({"gyro": entry}, passed=False), console)
     shown = console.export_text()
     assert "on the board: too_few_observations, from 5 sweeps" in shown
     assert "not observed by the board: sweep 5: not_kept: too late" in shown

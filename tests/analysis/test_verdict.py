@@ -5,7 +5,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from rig.analysis.verdict import Check, judge, verdict
+from rig.analysis.verdict import Check, judge, verdict, verification_checks
 from rig.data.settings import Limits
 from rig.estimation.accumulator import Solution
 
@@ -25,12 +25,12 @@ GOOD = Solution(
 def test_a_good_calibration_passes_with_every_value_beside_its_limit() -> None:
     checks = judge({"gyro": GOOD}, LIMITS)
     assert verdict(checks) == "pass"
-    assert [check.document() for check in checks] == [
-        {"name": "gyro.scale_deviation", "value": pytest.approx(0.1771), "limit": 0.3, "unit": "1", "passed": True},
-        {"name": "gyro.scale_std", "value": pytest.approx(9e-4), "limit": 0.002, "unit": "1", "passed": True},
-        {"name": "gyro.bias", "value": pytest.approx(0.01), "limit": 0.1, "unit": "rad/s", "passed": True},
-        {"name": "gyro.bias_std", "value": pytest.approx(7e-4), "limit": 0.001, "unit": "rad/s", "passed": True},
-        {"name": "gyro.condition", "value": 1.07, "limit": 100, "unit": "1", "passed": True},
+    assert [(check.name, check.value, check.limit, check.unit, check.passed) for check in checks] == [
+        ("gyro.scale_deviation", pytest.approx(0.1771), 0.3, "1", True),
+        ("gyro.scale_std", pytest.approx(9e-4), 0.002, "1", True),
+        ("gyro.bias", pytest.approx(0.01), 0.1, "rad/s", True),
+        ("gyro.bias_std", pytest.approx(7e-4), 0.001, "rad/s", True),
+        ("gyro.condition", 1.07, 100, "1", True),
     ]
 
 
@@ -56,6 +56,14 @@ def test_one_value_beyond_its_limit_or_missing_fails_the_run(solution: Solution,
 def test_a_measurement_that_is_missing_does_not_pass(value: float | None) -> None:
     assert not Check("gyro.bias", value, 1.0, "rad/s").passed
     assert Check("gyro.bias", 1.0, 1.0, "rad/s").passed
+
+
+def test_without_a_limit_nothing_passes() -> None:
+    """A limit that nobody set is no limit of zero, which a perfect reading would pass and `result.json` would state."""
+    unset = replace(LIMITS, verification_rms_rad_s=0.1)
+    checks = verification_checks("gyro", None, unset)
+    assert [check.limit for check in checks] == [0.1, None, None]
+    assert not Check("gyro.verification_mean", 0.0, None, "rad/s").passed
 
 
 def test_nothing_measured_is_not_a_pass() -> None:

@@ -1,6 +1,5 @@
 """Calibrated readings beside a reference: relative rotation, errors as computed by hand, noise, refusals, plots."""
 
-import json
 import sys
 from collections.abc import Callable
 from dataclasses import replace
@@ -18,8 +17,9 @@ from rig.data.run_file import RunData
 from rig.data.settings import Limits
 from rig.errors import Fault
 from rig.estimation.arrays import Array
-from rig.report.figures import write_figures
-from rig.report.verification_table import verification_document, verification_lines, verification_table
+from rig.report.figures import draw_verifications
+from rig.report.verification_entry import verification_entry
+from rig.report.verification_table import verification_lines, verification_table
 from support.synthetic_run import SCALE, Setup
 from support.synthetic_verification import REFERENCE, TRUTH, Stored, recording
 
@@ -289,26 +289,26 @@ def test_a_reference_that_misses_the_arm_is_blamed_itself(scale: float, bias_rad
 
 
 def test_the_result_names_its_statistics_and_a_person_can_read_them() -> None:
-    document = json.loads(json.dumps(verification_document(FOUND), allow_nan=False))
-    for when in ("before", "after"):
-        moved = document[when]["movement"]
-        np.testing.assert_allclose(np.square(moved["rms_rad_s"]), moved["mse_rad2_s2"])
+    entry = verification_entry(FOUND)
+    assert entry.before is not None
+    for seen in (entry.before, entry.after):
+        np.testing.assert_allclose(np.square(seen.movement.rms_rad_s), seen.movement.mse_rad2_s2)
     console = Console(width=120, record=True)
-    console.print(verification_table("gyro", document), *verification_lines(document))
+    console.print(verification_table("gyro", entry), *verification_lines(entry))
     shown = console.export_text()
-    assert f"{document['before']['movement']['rms_rad_s'][0]:.4f}" in shown
+    assert f"{entry.before.movement.rms_rad_s[0]:.4f}" in shown
     assert "lags the reference by 4.0" in shown
-    alone = verification_document(replace(FOUND, before=None, after=replace(FOUND.after, noise_rad_s=None)))
+    alone = verification_entry(replace(FOUND, before=None, after=replace(FOUND.after, noise_rad_s=None)))
     console.print(verification_table("gyro", alone))
     assert "–" in console.export_text()
 
 
 def test_plots_of_before_and_after_are_written(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    told = write_figures([FOUND], tmp_path)
+    told = draw_verifications([FOUND], tmp_path)
     for when in ("before", "after"):
         name = f"verification_gyro_{when}"
         assert name in told
         assert (tmp_path / f"{name}.png").read_bytes().startswith(b"\x89PNG")
         assert (tmp_path / f"{name}.svg").stat().st_size < 500_000
     monkeypatch.setitem(sys.modules, "matplotlib", None)
-    assert "pip install 'calibration-rig[study]'" in write_figures([FOUND], tmp_path)
+    assert "pip install 'calibration-rig[study]'" in draw_verifications([FOUND], tmp_path)

@@ -19,8 +19,9 @@ from firmware_host.protocol import FIRMWARE_VERSION
 from rig.board.identify import find_sensor, refuse_other_firmware, stored_calibration
 from rig.board.store import calibration_of, store
 from rig.config.models import SensorSection
-from rig.data.result_file import passed_result
+from rig.data.result_file import passed_result, read_result, write_result
 from rig.errors import Refused
+from support.results import SENSOR, VERIFIED, result_document
 from support.worlds import World, WorldHandle, worlds
 
 SENSORS: dict[str, dict[str, Any]] = {
@@ -41,11 +42,11 @@ def rig(*arguments: str | Path, stdin: int = subprocess.DEVNULL) -> subprocess.C
 def result(folder: Path, **changes: Any) -> Path:
     """A result.json in a run folder, as a run leaves it; `changes` go into the entry of the sensor gyro."""
     entries = {
-        name: {
+        name: SENSOR.model_dump()
+        | {
             "part": SENSORS[name]["part"],
             "serial_number": SENSORS[name]["serial_number"],
             "range_rad_s": radians(245 if name == "gyro" else 250),
-            "role": "calibrate",
             "temperature_c": 22.5,
             "scale": SCALE[name],
             "bias_rad_s": BIAS[name],
@@ -54,7 +55,7 @@ def result(folder: Path, **changes: Any) -> Path:
     }
     entries["gyro"] |= changes
     folder.mkdir(exist_ok=True)
-    document = {"schema": "rig.result/1", "verdict": "pass", "checks": [], "sensors": entries}
+    document = json.loads(VERIFIED.text()) | {"sensors": entries}
     (folder / "result.json").write_text(json.dumps(document))
     return folder
 
@@ -137,10 +138,8 @@ def test_nothing_is_changed_unless_somebody_agrees(config: Path, tmp_path: Path)
 
 def failed(folder: Path) -> Path:
     """A run folder whose verdict failed."""
-    file = result(folder) / "result.json"
-    checks = [{"name": "gyro.scale_std", "passed": False}]
-    file.write_text(json.dumps(json.loads(file.read_text()) | {"verdict": "fail", "checks": checks}))
-    return file
+    write_result(result_document({"gyro": SENSOR}, passed=False), folder)
+    return folder / "result.json"
 
 
 @pytest.mark.parametrize(
@@ -150,7 +149,7 @@ def failed(folder: Path) -> Path:
         (lambda folder: Path(__file__), "not_a_result", "JSON"),
         (lambda folder: result(folder, scale=[1.1, 0.0, 1.1]), "not_a_result", "sensors.gyro.scale.1"),
         (lambda folder: result(folder, bias_rad_s=[0.1, 0.2]), "not_a_result", "sensors.gyro.bias_rad_s"),
-        (failed, "verdict_failed", "gyro.scale_std"),
+        (failed, "verdict_failed", "(gyro.verification_reference)"),
     ],
 )
 def test_what_is_no_calibration_that_passed_is_refused(
@@ -205,7 +204,7 @@ def test_a_missing_part_and_another_part_in_its_place_are_named(laboratory: Worl
 
 def test_a_calibration_of_another_sensor_or_range_corrects_nothing(laboratory: WorldHandle, tmp_path: Path) -> None:
     section = SensorSection.model_validate(SENSORS["gyro"])
-    found = json.loads((result(tmp_path) / "result.json").read_text())["sensors"]["gyro"]
+    found = read_result(result(tmp_path)).sensors["gyro"]
     with Board(laboratory.board_port, 921600, lambda batch: None) as board:
         board.configure(0, section.rate_hz, section.range_deg_s)
         store(board, 0, calibration_of(found))

@@ -15,7 +15,7 @@ from rig.data.settings import ObservationThresholds
 from rig.errors import Fault, Refused
 from rig.observation.observe import SensorObservations, finished, observe
 from rig.observation.timebase import ArmMotion, TimeBase, estimate_time_base, widening
-from rig.report.sensor import sensor_document
+from rig.report.sensor_entry import sensor_entry
 from support.synthetic_run import (
     BIAS_RAD_S,
     SENSITIVITY,
@@ -467,7 +467,7 @@ def test_one_calibration_recovers_the_truth() -> None:
     result = solve_runs([USUAL])["gyro"]
     found = np.concatenate([result.solution.scale, result.solution.bias_rad_s])
     assert np.all(np.abs(found - truth(Setup())) < 4 * np.sqrt(np.diag(result.solution.covariance)))
-    document = sensor_document(result)
+    document = sensor_entry(result).model_dump(mode="json")
     assert document["model"] == "g = K (m + b)"
     assert document["covariance_order"] == ["kx", "ky", "kz", "bx", "by", "bz"]
     assert document["estimator"] == document["vector_model"]["estimator"] == "vector"
@@ -528,7 +528,7 @@ def test_solving_refuses_what_it_cannot_mean() -> None:
 def test_a_bias_too_large_for_algorithm_1_is_reported_beside_the_result() -> None:
     result = solve_runs([synthetic_run(Setup(bias_rad_s=(0.5, -0.5, 0.5), noise_rad_s=0.01))])["gyro"]
     np.testing.assert_allclose(result.solution.bias_rad_s, [0.5, -0.5, 0.5], atol=0.005)
-    assert sensor_document(result)["algorithm_1"]["error"].startswith("algorithm_1_diverged")
+    assert sensor_entry(result).model_dump()["algorithm_1"]["error"].startswith("algorithm_1_diverged")
 
 
 def test_reported_uncertainties_are_those_of_many_sessions() -> None:

@@ -2,12 +2,13 @@
 
 import subprocess
 from pathlib import Path
-from typing import Any
 
 import numpy as np
 import pytest
 
+from rig.data.result_file import ResultDocument
 from rig.report.header import calibration_header
+from support.results import SENSOR, result_document
 
 SCALE = [1.1771, 1.1554, 0.5]
 BIAS_RAD_S = [0.0077, -0.0100, -2.5]
@@ -28,20 +29,16 @@ int main(void)
 """
 
 
-def document(*names: str) -> dict[str, Any]:
-    sensor = {
-        "part": "lsm9ds1",
-        "role": "calibrate",
-        "serial_number": "A-*/1\n#error /* µ",
-        "temperature_c": 22.04,
-        "scale": SCALE,
-        "bias_rad_s": BIAS_RAD_S,
-    }
-    return {
-        "verdict": "pass",
-        "provenance": {"solved_utc": "2026-11-21T10:00:00+00:00"},
-        "sensors": dict.fromkeys(names, sensor),
-    }
+def document(*names: str) -> ResultDocument:
+    sensor = SENSOR.model_copy(
+        update={
+            "serial_number": "A-*/1\n#error /* µ \x1b[31m\x07",
+            "temperature_c": 22.04,
+            "scale": tuple(SCALE),
+            "bias_rad_s": tuple(BIAS_RAD_S),
+        }
+    )
+    return result_document(dict.fromkeys(names, sensor))
 
 
 @pytest.mark.parametrize(("name", "prefix"), [("gyro", "gyro"), ("2nd gyro-µ", "sensor_2nd_gyro__")])
@@ -58,3 +55,9 @@ def test_the_header_compiles_and_corrects_a_reading(tmp_path: Path, name: str, p
 def test_the_header_says_how_to_use_it() -> None:
     text = calibration_header(document("gyro"))
     assert "g = K (m + b)" in text and "Verdict: pass" in text and "at 22.0 °C" in text
+
+
+def test_a_serial_number_brings_no_control_characters_into_the_header() -> None:
+    text = calibration_header(document("gyro"))
+    assert "A-* /1 #error / * µ \\x1b[31m\\x07, at" in text
+    assert all(character.isprintable() for character in text.replace("\n", ""))

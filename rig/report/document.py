@@ -1,0 +1,42 @@
+"""The typed outcome of a run as the document of `result.json`."""
+
+from rig.analysis.outcome import Outcome, Provenance
+from rig.analysis.verdict import Check
+from rig.data.result_file import SCHEMA, CheckEntry, ProvenanceEntry, ResultDocument
+from rig.report.sensor_entry import sensor_entry
+from rig.report.verification_entry import verification_entry
+
+
+def document_of(outcome: Outcome) -> ResultDocument:
+    """Plain numbers, texts and tuples, in SI units, of schema "rig.result/1"."""
+    return ResultDocument(
+        schema=SCHEMA,
+        verdict=outcome.verdict,
+        checks=tuple(map(_check, outcome.checks)),
+        provenance=_provenance(outcome.provenance),
+        sensors={
+            name: sensor_entry(
+                result,
+                "calibrate" if name in outcome.settings.to_calibrate else "reference",
+                outcome.onboard.get(name),
+            )
+            for name, result in outcome.results.items()
+        },
+        verification={name: verification_entry(found) for name, found in outcome.verifications.items()},
+    )
+
+
+def _check(check: Check) -> CheckEntry:
+    return CheckEntry(name=check.name, value=check.value, limit=check.limit, unit=check.unit, passed=check.passed)
+
+
+def _provenance(provenance: Provenance) -> ProvenanceEntry:
+    return ProvenanceEntry.model_validate(
+        {
+            **provenance.recorded,
+            "stored_calibrations": provenance.stored_calibrations,
+            "resumed_utc": provenance.resumed_utc,
+            "verified_utc": provenance.verified_utc,
+            "solved_utc": provenance.solved_utc.isoformat(timespec="seconds"),
+        }
+    )

@@ -1,0 +1,18 @@
+"""Texts from outside (serial numbers, names, paths) as they may be shown: nothing in them commands the terminal."""
+
+from typing import TYPE_CHECKING
+
+if TYPE_CHECKING:
+    from rich.text import Text
+
+
+def printable(text: str) -> str:
+    """The text with every control character, line ends too, written as an escape: `\\x1b`, `\\n`."""
+    return "".join(c if c.isprintable() else c.encode("unicode_escape").decode("ascii") for c in text)
+
+
+def plain(text: str, style: str = "") -> "Text":
+    """The same for rich, in which a string would be searched for markup such as `[red]`."""
+    from rich.text import Text
+
+    return Text(printable(text), style)

@@ -1,0 +1,52 @@
+"""One model writes and reads `result.json`; its schema is committed; files of earlier versions stay readable."""
+
+import json
+from pathlib import Path
+
+import jsonschema
+import pytest
+
+from rig.data.result_file import read_result, schema_text
+from rig.errors import Refused
+from support.paths import DOCS, FIXTURES
+from support.results import VERIFIED
+
+RUNS = ("calibration", "verified")
+
+
+@pytest.mark.parametrize("name", RUNS)
+def test_what_was_written_by_the_first_version_is_read_and_written_again_byte_by_byte(name: str) -> None:
+    file = FIXTURES / name / "result.json"
+    assert read_result(file).text() + "\n" == file.read_text(encoding="utf-8")
+
+
+def test_the_committed_schema_is_that_of_the_model() -> None:
+    committed = (DOCS / "result.schema.json").read_text(encoding="utf-8")
+    assert committed == schema_text(), "again: python -m rig.data.result_file > docs/result.schema.json"
+
+
+@pytest.mark.parametrize("name", RUNS)
+def test_results_satisfy_the_committed_schema(name: str) -> None:
+    schema = json.loads((DOCS / "result.schema.json").read_text(encoding="utf-8"))
+    jsonschema.Draft202012Validator.check_schema(schema)
+    document = json.loads((FIXTURES / name / "result.json").read_text(encoding="utf-8"))
+    jsonschema.validate(document, schema)
+    del document["checks"][0]["unit"]
+    with pytest.raises(jsonschema.ValidationError, match="unit"):
+        jsonschema.validate(document, schema)
+
+
+def test_a_key_nobody_knows_is_refused_by_its_place(tmp_path: Path) -> None:
+    document = json.loads(VERIFIED.text())
+    document["sensors"]["gyro"]["observations"][2]["spead_rad_s"] = 1.0
+    (tmp_path / "result.json").write_text(json.dumps(document), encoding="utf-8")
+    with pytest.raises(Refused, match=r"not_a_result: .*sensors\.gyro\.observations\.2\.spead_rad_s"):
+        read_result(tmp_path)
+
+
+def test_provenance_may_say_more_than_this_version_knows(tmp_path: Path) -> None:
+    document = json.loads(VERIFIED.text())
+    document["provenance"]["operator"] = {"name": "R. Feynman"}
+    (tmp_path / "result.json").write_text(json.dumps(document), encoding="utf-8")
+    again = json.loads(read_result(tmp_path).text())
+    assert again == document

@@ -1,0 +1,21 @@
+"""Documents of `result.json` for tests: those of a verified run, changed."""
+
+from collections.abc import Mapping
+
+from rig.data.result_file import ResultDocument, SensorEntry, read_result
+from support.paths import FIXTURES
+
+VERIFIED = read_result(FIXTURES / "verified")
+SENSOR, REFERENCE = VERIFIED.sensors["gyro"], VERIFIED.sensors["reference"]
+
+
+def result_document(sensors: Mapping[str, SensorEntry], *, passed: bool = True) -> ResultDocument:
+    """A result of these sensors whose last check passed or did not."""
+    last = VERIFIED.checks[-1].model_copy(update={"passed": passed})
+    return VERIFIED.model_copy(
+        update={
+            "verdict": "pass" if passed else "fail",
+            "checks": (*VERIFIED.checks[:-1], last),
+            "sensors": dict(sensors),
+        }
+    )
