@@ -9,12 +9,14 @@ from typing import Annotated, Final, Literal
 
 from pydantic import BaseModel, ConfigDict, Field, JsonValue, ValidationError
 
-from rig.config.models import Positive, Vector3, Vector6
 from rig.errors import Refused
 
 SCHEMA: Final = "rig.result/1"
 NAME = "result.json"
 
+Positive = Annotated[float, Field(gt=0)]
+Vector3 = tuple[float, float, float]
+Vector6 = tuple[float, float, float, float, float, float]
 PositiveVector3 = tuple[Positive, Positive, Positive]
 Matrix3 = tuple[Vector3, Vector3, Vector3]
 Matrix6 = Annotated[tuple[Vector6, ...], Field(min_length=6, max_length=6)]
