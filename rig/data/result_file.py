@@ -5,16 +5,18 @@ SI units, the unit in every name; vectors and matrices are lists, rows first. Ke
 
 import json
 from pathlib import Path
-from typing import Annotated, Literal
+from typing import Annotated, Final, Literal
 
 from pydantic import BaseModel, ConfigDict, Field, JsonValue, ValidationError
 
-from rig.config.models import Positive, Vector3, Vector6
 from rig.errors import Refused
 
-SCHEMA = "rig.result/1"
+SCHEMA: Final = "rig.result/1"
 NAME = "result.json"
 
+Positive = Annotated[float, Field(gt=0)]
+Vector3 = tuple[float, float, float]
+Vector6 = tuple[float, float, float, float, float, float]
 PositiveVector3 = tuple[Positive, Positive, Positive]
 Matrix3 = tuple[Vector3, Vector3, Vector3]
 Matrix6 = Annotated[tuple[Vector6, ...], Field(min_length=6, max_length=6)]
@@ -267,7 +269,7 @@ class VerificationEntry(_Entry):
 class ResultDocument(_Entry):
     """The result of a run, of schema "rig.result/1"; `sensors` is empty where stored calibrations were verified."""
 
-    schema_name: Annotated[Literal["rig.result/1"], Field(alias="schema")]  # as SCHEMA
+    schema_name: Literal["rig.result/1"] = Field(alias="schema")  # as SCHEMA
     verdict: Literal["pass", "fail"]
     checks: tuple[CheckEntry, ...]
     provenance: ProvenanceEntry

@@ -12,15 +12,16 @@ import pytest
 
 from rig.analysis.outcome import outcome_of
 from rig.data.run_file import RunData, read_run
-from support.paths import ROOT
+from rig.report.document import document_of
+from support.paths import FIXTURES
 
-FIXTURES = ROOT / "tests" / "fixtures" / "af3b9f0"
 RELATIVE = 1e-12
 
 
-def document_of(folder: Path) -> dict[str, Any]:
+def solved(folder: Path) -> dict[str, Any]:
     runs, repeated = [read_run(folder / "run.h5")], folder / "verify.h5"
-    document: dict[str, Any] = outcome_of(runs, [read_run(repeated)] if repeated.exists() else None).document
+    outcome = outcome_of(runs, [read_run(repeated)] if repeated.exists() else None)
+    document: dict[str, Any] = json.loads(document_of(outcome).text())
     return document
 
 
@@ -46,7 +47,7 @@ def differences(expected: Any, found: Any, where: str = "") -> Iterator[str]:
 
 @pytest.mark.parametrize("name", ["calibration", "verified"])
 def test_an_old_recording_solves_to_the_old_numbers(name: str) -> None:
-    expected, found = expected_of(FIXTURES / name), document_of(FIXTURES / name)
+    expected, found = expected_of(FIXTURES / name), solved(FIXTURES / name)
     for part in ("verdict", "checks", "sensors", "verification"):
         assert list(differences(expected[part], found[part], part)) == []
 
@@ -55,7 +56,7 @@ def test_keys_the_configuration_no_longer_has_do_not_matter(tmp_path: Path) -> N
     folder = shutil.copytree(FIXTURES / "calibration", tmp_path / "run")
     with h5py.File(folder / "run.h5", "r+") as file:
         file.attrs["config"] = file.attrs["config"].replace("rest_s:", "pause_s:") + "\nlighting: {colour: red}\n"
-    assert document_of(folder)["checks"] == document_of(FIXTURES / "calibration")["checks"]
+    assert solved(folder)["checks"] == solved(FIXTURES / "calibration")["checks"]
 
 
 def test_another_limit_gives_another_verdict() -> None:
