@@ -140,6 +140,7 @@ def _override(document: dict[str, Any], places: dict[Location, str], item: str) 
         section = below
     if said.data is None and last in section:
         del section[last]
+        places.pop(location, None)
     else:
         section[last] = said.data
     # What the override says stands in no line; only the key it was given to does.

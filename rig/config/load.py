@@ -22,7 +22,7 @@ from rig.errors import Refused
 
 Model = TypeVar("Model", bound=BaseModel)
 Sections = Mapping[str, type[ProcedureSection]]
-PROBLEMS_SHOWN = 40
+PROBLEMS_SHOWN = 25
 
 
 @dataclass(frozen=True, slots=True)

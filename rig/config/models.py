@@ -29,7 +29,7 @@ Offset = Annotated[float, Field(ge=-1000, le=1000)]
 SensorName = Annotated[str, Field(pattern=r"^\w[\w -]*$", max_length=40)]
 SERIAL_NUMBER_MAX = 24  # of the kind "text24" in the board's protocol
 RATIO: dict[str, Any] = {"unit": "1"}  # a number without a unit, where the key cannot say so
-OF_THE_PART: dict[str, Any] = {"usual": "the part's usual one"}
+OF_THE_PART: dict[str, Any] = {"allowed": "what the part has, see below", "usual": "the part's usual one"}
 
 
 class Section(BaseModel):
@@ -135,12 +135,12 @@ class TurntableSection(Section):
 
 
 class SensorSection(Section):
-    """One gyroscope on the board, under a name of your choice."""
+    """One gyroscope on the board, under a name of your choice: at most 40 letters, digits, `_`, `-` and spaces."""
 
     part: Literal["lsm9ds1", "mpu9250", "adis16465"] = Field(description="which gyroscope it is")
     serial_number: str = Field(
-        description=f"which specimen it is: 1 to {SERIAL_NUMBER_MAX} plain ASCII characters, kept on the board and in "
-        "every result"
+        description="which specimen it is; kept on the board and in every result",
+        json_schema_extra={"allowed": f"1 to {SERIAL_NUMBER_MAX} plain ASCII characters"},
     )
     role: Literal["calibrate", "reference"] = Field(
         "calibrate", description="what it is here for; at most one sensor is the reference others are compared with"
@@ -249,7 +249,9 @@ class LimitsSection(Section):
         description="RMS of the calibrated reading less the reference's, sample by sample; a verification needs it",
     )
     verification_mean_rad_s: Positive | None = Field(
-        None, description="the same difference averaged over each revolution; a verification needs it"
+        None,
+        description="the same difference averaged over each revolution, and the reference's from the arm; a "
+        "verification needs it",
     )
 
 

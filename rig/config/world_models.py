@@ -14,12 +14,17 @@ class SimulatedArmSection(Section):
     """The simulated UR10e. Its ripple is locked to the joint angle: it integrates to nothing over whole turns."""
 
     serial_number: str = Field(
-        "20265500123", pattern=r"^[0-9]+$", max_length=24, description="what the controller says its number is"
+        "20265500123",
+        pattern=r"^[0-9]+$",
+        max_length=24,
+        description="what the controller says its number is",
+        json_schema_extra={"allowed": "at most 24 digits"},
     )
     polyscope: str = Field(
         "5.14.0.0",
         pattern=r"^[0-9]{1,5}\.[0-9]{1,5}\.[0-9]{1,5}\.[0-9]{1,5}$",
         description="version of the controller's software",
+        json_schema_extra={"allowed": "four numbers with dots between them"},
     )
     remote_control: bool = Field(True, description="whether the pendant is switched to remote control")
     speed_slider: float = Field(
@@ -38,14 +43,18 @@ class SimulatedBoardSection(Section):
     """The emulated board: its crystal, its memory and its moment of power-up."""
 
     unique_id: str = Field(
-        "0123456789abcdef01234567", pattern=r"^[0-9a-f]{24}$", description="the microcontroller's own number"
+        "0123456789abcdef01234567",
+        pattern=r"^[0-9a-f]{24}$",
+        description="the microcontroller's own number",
+        json_schema_extra={"allowed": "24 hexadecimal digits, small letters"},
     )
     crystal_ppm: float = Field(
         35.0, ge=-25_000, le=25_000, description="how much too fast its clock runs; without its crystal up to 2 % off"
     )
-    boot_time_s: float = Field(0.137, ge=0, le=10, description="how long it has run when the laboratory starts")
+    boot_time_s: float = Field(0.137, ge=0, le=10, description="how long after it gets power the board starts")
     flash_file: Path | None = Field(
-        None, description="keeps the board's flash from one run to the next; without it the flash is fresh each time"
+        None,
+        description="file that keeps the board's flash from one run to the next; without it, it is fresh each time",
     )
     pty: bool = Field(False, description="also offer the serial port as a pseudo-terminal (POSIX)")
 

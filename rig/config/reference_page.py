@@ -1,0 +1,231 @@
+"""Prints every key of a configuration for people: `python -m rig.config.reference_page > docs/configuration.md`."""
+
+import json
+from collections.abc import Iterable, Iterator, Mapping, Sequence
+from typing import Any
+
+from rig.config import layers, yaml_text
+from rig.config.models import RigConfig
+from rig.config.procedure_sections import DEFAULT_PROCEDURE, STOCK_SECTIONS
+from rig.config.sensor_catalogue import PARTS
+from rig.config.world_models import WorldSection
+
+Schema = Mapping[str, Any]
+
+# A key ends in its unit. The longer endings come first.
+UNITS = {
+    "_deg_s2": "°/s²",
+    "_deg_s": "°/s",
+    "_rad_s": "rad/s",
+    "_deg": "°",
+    "_rad": "rad",
+    "_per_turn": "1/turn",
+    "_mm": "mm",
+    "_kg": "kg",
+    "_hz": "Hz",
+    "_ppm": "ppm",
+    "_c": "°C",
+    "_s": "s",
+}
+
+REPEAT = """\
+# The next LSM9DS1 on the same rig: a repeat calibration says only what differs.
+base: ur10e_lsm9ds1.yaml
+sensors: {gyro: {serial_number: LSM9DS1-002}}
+procedure: {repeats: 2}
+output: {folder: runs/LSM9DS1-002}
+"""
+
+INTRODUCTION = f"""\
+# The configuration file
+
+Generated from the models in [`rig/config/`](../rig/config) by
+`python -m rig.config.reference_page > docs/configuration.md`: change the models, not this page.
+
+One YAML file is one repeatable calibration: the rig, its sensors, the procedure, the verdict's limits. Every quantity
+has its unit in its key. A file is judged whole before anything is connected: every error is told at once, with its
+path, its line, what is allowed and, for a misspelling, the nearest key (error `configuration`, exit status 2). A key
+that this page does not name is an error.
+
+## Building on another file
+
+`base:` names a file that says the rest, by a path relative to the file it stands in. This is the whole of
+[repeat_lsm9ds1.yaml](../configs/repeat_lsm9ds1.yaml):
+
+```yaml
+{REPEAT}```
+
+- Sections merge key by key; lists and single values replace what the base says.
+- `null` leaves out what the base says: `world: null` takes the simulated laboratory away, `range_deg_s: null` goes back
+  to the usual range. Where the base says nothing, `null` is an error like any other wrong value.
+- A base may have a base itself, up to {layers.FILES_MAX} files one on another; a circle is refused.
+- An error names the file and the line it comes from: `arm.payload_kg (demo.yaml, line 4)`.
+- The run folder's `config.yaml` holds everything put together and needs no base: a run can be resumed where the files
+  it was made of are not.
+
+## Changing a value for one run
+
+`--set path.to.key=value`, as often as needed, with the value in YAML: `--set procedure.speed_deg_s=30`,
+`--set 'sensors.gyro.mounting={{x: +y, y: -x, z: +z}}'`. It replaces what the file says at that place, whole sections
+too; `null` leaves it out. What is set so stands in the run folder's `config.yaml`.
+
+## What a file may hold
+
+Plain YAML in UTF-8, in a regular file of at most {yaml_text.SIZE_MAX_BYTES // 1024} KiB: at most {yaml_text.NODES_MAX}
+keys and values, an alias counted as all it stands for, and {yaml_text.DEPTH_MAX} sections or lists within one another.
+Keys are words. Tags (`!!…`) and control characters are refused, and so is a key that stands twice.
+"""
+
+
+def reference() -> str:
+    """The page as Markdown."""
+    return "\n".join([INTRODUCTION, *_keys(), *_parts(), *_world()]) + "\n"
+
+
+def _keys() -> Iterator[str]:
+    yield from (
+        "## Keys",
+        "",
+        "`arm`, `board`, `sensors` and `limits` must be there; the other sections may be left out.",
+        "",
+    )
+    schema = RigConfig.model_json_schema()
+    for name in schema["properties"]:
+        if name == "procedure":
+            yield from _procedures()
+        else:
+            yield from _section(name, schema["properties"][name], schema["$defs"])
+
+
+def _procedures() -> Iterator[str]:
+    yield from (
+        "### `procedure`",
+        "",
+        f"`name` says which procedure is run, `{DEFAULT_PROCEDURE}` when it is left out, and with it which keys this "
+        "section has.",
+        "A procedure of one's own brings its own section.",
+        "",
+    )
+    for name, section in STOCK_SECTIONS.items():
+        schema = section.model_json_schema()
+        yield from _section("procedure", schema, schema.get("$defs", {}), f"### `procedure` with `name: {name}`")
+
+
+def _parts() -> Iterator[str]:
+    rows = (
+        (
+            f"`{name}`",
+            part.rates_rule,
+            f"{part.default_rate_hz:g}",
+            ", ".join(f"{range_deg_s:g}" for range_deg_s in part.ranges_deg_s),
+            f"{part.default_range_deg_s:g}",
+        )
+        for name, part in PARTS.items()
+    )
+    yield from ("### The parts' rates and ranges", "")
+    yield from _table(("part", "`rate_hz` in Hz", "usual", "`range_deg_s` in °/s", "usual"), rows)
+    yield ""
+
+
+def _world() -> Iterator[str]:
+    schema = WorldSection.model_json_schema()
+    yield from (
+        "## The simulated laboratory",
+        "",
+        "With a `world:` section a simulated UR10e and an emulated board answer at `arm.host` and `board.port`, on",
+        "this machine only: the host must be a loopback address (127.x.y.z), the port `socket://host:port`.",
+        "Without one the rig connects to what is there. Only the laboratory uses what stands here: neither a recording",
+        "nor a result holds it.",
+        "",
+    )
+    yield from _section("world", schema, schema["$defs"])
+
+
+def _section(path: str, schema: Schema, definitions: Schema, heading: str | None = None) -> Iterator[str]:
+    """A section's heading, its keys in a table, and the sections within it."""
+    if "patternProperties" in schema:  # one section for each name
+        (each,) = schema["patternProperties"].values()
+        yield from _section(f"{path}.<name>", each, definitions)
+        return
+    section = _resolved(schema, definitions)
+    properties = section["properties"]
+    inner = {key: it for key, it in properties.items() if "$ref" in it or "patternProperties" in it}
+    required = section.get("required", ())
+    yield from (heading or f"### `{path}`", "", " ".join(section["description"].split()), "")
+    rows = (_row(key, it, key in required) for key, it in properties.items() if key not in inner)
+    yield from _table(("key", "meaning", "unit", "allowed", "left out"), rows)
+    yield ""
+    for key, it in inner.items():
+        yield from _section(f"{path}.{key}", it, definitions)
+
+
+def _resolved(schema: Schema, definitions: Schema) -> Schema:
+    return definitions[schema["$ref"].rpartition("/")[2]] if "$ref" in schema else schema
+
+
+def _row(key: str, schema: Schema, required: bool) -> tuple[str, ...]:
+    value = next((it for it in schema.get("anyOf", ()) if it != {"type": "null"}), schema)
+    return f"`{key}`", schema["description"], unit_of(key, schema), _allowed(value), _left_out(schema, required)
+
+
+def unit_of(key: str, schema: Schema) -> str:
+    """The unit of a key's value, by its name or its model; nothing for words and switches."""
+    return schema.get("unit") or next((unit for ending, unit in UNITS.items() if key.endswith(ending)), "")
+
+
+def _allowed(schema: Schema) -> str:
+    """What a value may be, in words."""
+    if "allowed" in schema:
+        return str(schema["allowed"])
+    if "prefixItems" in schema:
+        first, *others = schema["prefixItems"]
+        return f"{1 + len(others)} numbers{_each(first)}"
+    if "items" in schema:
+        return f"list{_each(schema['items'])}"
+    return _single(schema)
+
+
+def _each(schema: Schema) -> str:
+    words = _single(schema).removeprefix("number").strip()
+    return f", each {words}" if words else ""
+
+
+def _single(schema: Schema) -> str:
+    if "enum" in schema or "const" in schema:
+        return " or ".join(f"`{value}`" for value in schema.get("enum", [schema.get("const")]))
+    if schema["type"] in ("number", "integer"):
+        return ("whole number" if schema["type"] == "integer" else "number") + _range(schema)
+    if schema["type"] == "boolean":
+        return "`true` or `false`"
+    return f"text of at most {schema['maxLength']} characters" if "maxLength" in schema else "text"
+
+
+def _range(schema: Schema) -> str:
+    low, above = schema.get("minimum"), schema.get("exclusiveMinimum")
+    high, below = schema.get("maximum"), schema.get("exclusiveMaximum")
+    if low is not None and high is not None:
+        return f" {low:g} to {high:g}"
+    bounds = (("at least", low), ("above", above), ("at most", high), ("below", below))
+    said = ", ".join(f"{word} {bound:g}" for word, bound in bounds if bound is not None)
+    return f" {said}" if said else ""
+
+
+def _left_out(schema: Schema, required: bool) -> str:
+    """What holds when the key is left out."""
+    if "usual" in schema:
+        return str(schema["usual"])
+    if required:
+        return "**must be given**"
+    default = schema["default"]
+    return "nothing" if default is None else f"`{default if isinstance(default, str) else json.dumps(default)}`"
+
+
+def _table(headings: Sequence[str], rows: Iterable[Sequence[str]]) -> Iterator[str]:
+    yield f"| {' | '.join(headings)} |"
+    yield "|" + " --- |" * len(headings)
+    for row in rows:
+        yield f"| {' | '.join(cell.replace('|', chr(92) + '|') for cell in row)} |"
+
+
+if __name__ == "__main__":
+    print(reference(), end="")

@@ -1,0 +1,57 @@
+"""The page about the configuration says what the models say, of every key."""
+
+import re
+from collections.abc import Iterator, Mapping
+from typing import Any
+
+import pytest
+
+from rig.config.models import RigConfig
+from rig.config.procedure_sections import STOCK_SECTIONS
+from rig.config.reference_page import REPEAT, reference, unit_of
+from rig.config.world_models import WorldSection
+from support.paths import CONFIGS, DOCS
+
+MODELS = (RigConfig, WorldSection, *STOCK_SECTIONS.values())
+
+
+def keys() -> Iterator[tuple[str, str, Mapping[str, Any]]]:
+    """Section, key and schema of all that is no section itself."""
+    for model in MODELS:
+        schema = model.model_json_schema()
+        for section in (schema, *schema.get("$defs", {}).values()):
+            for key, value in section["properties"].items():
+                if section["title"] != "ProcedureSection" and not {"$ref", "patternProperties"} & set(value):
+                    yield section["title"], key, value
+
+
+KEYS = list(keys())
+PAGE = reference()
+
+
+def test_the_committed_page_is_what_the_models_generate() -> None:
+    page = (DOCS / "configuration.md").read_text(encoding="utf-8")
+    assert page == reference(), "again: python -m rig.config.reference_page > docs/configuration.md"
+
+
+@pytest.mark.parametrize(("section", "key", "schema"), KEYS, ids=[f"{section}.{key}" for section, key, _ in KEYS])
+def test_every_key_says_what_it_means_and_its_unit(section: str, key: str, schema: Mapping[str, Any]) -> None:
+    assert f"| `{key}` | {schema['description'].replace('|', chr(92) + '|')} | " in PAGE
+    assert not re.search("'type': '(number|integer)'", str(schema)) or unit_of(key, schema), "a number has a unit"
+    assert "pattern" not in schema or "allowed" in schema, "nobody should have to read a pattern"
+
+
+def test_every_section_of_the_world_stands_in_its_own_part() -> None:
+    rig, world = PAGE.split("## The simulated laboratory")
+    assert "`world.sensors.<name>`" in world and "### `sensors.<name>`" in rig and "### `world" not in rig
+
+
+def test_what_holds_when_a_key_is_left_out() -> None:
+
+    assert "| number 0.5 to 180 | `60.0` |" in PAGE
+    assert "| what the part has, see below | the part's usual one |" in PAGE
+    assert "| `host` | name or address of the arm's controller |  | text of at most 253 characters | **must be" in PAGE
+
+
+def test_the_example_is_the_shipped_file() -> None:
+    assert (CONFIGS / "repeat_lsm9ds1.yaml").read_text(encoding="utf-8") == REPEAT
