@@ -8,13 +8,11 @@ The loop goes through every thirtieth run and its time is scaled; both see the s
 import time
 
 import numpy as np
-from numpy.typing import NDArray
 from scipy.optimize import least_squares
 
+from rig.estimation.arrays import Array
 from rig.estimation.batch import algorithm_1_batch, newton_batch
 from rig.study import simulation as sim
-
-Array = NDArray[np.float64]
 
 EVERY = 30  # of the runs go through the loop
 

@@ -12,12 +12,11 @@ from collections.abc import Callable
 
 import numpy as np
 from imucal import FerrarisCalibration, FerrarisSignalRegions
-from numpy.typing import NDArray
 
+from rig.estimation.arrays import Array
 from rig.estimation.vector_model import solve_vector_model
 from rig.study import simulation as sim
 
-Array = NDArray[np.float64]
 Session = dict[str, Array]
 
 RATE_HZ, HELD, TURNED = 100.0, 1000, 600

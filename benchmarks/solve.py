@@ -7,13 +7,11 @@ import timeit
 from collections.abc import Callable
 
 import numpy as np
-from numpy.typing import NDArray
 from scipy.optimize import least_squares
 
 from rig.estimation.accumulator import Accumulator
+from rig.estimation.arrays import Array
 from rig.estimation.six_observation import closed_form
-
-Array = NDArray[np.float64]
 
 SPEED_RAD_S = np.pi / 3
 DIRECTIONS = np.array([[0, 0, -1], [0, 0, 1], [1, 0, 0], [-1, 0, 0], [0, 1, 0], [0, -1, 0]], dtype=np.float64)

@@ -38,9 +38,8 @@ from firmware_host.emulator.thumb import instructions
 from firmware_host.emulator.timeline import NEVER, Timeline
 from firmware_host.protocol import METHODS
 from rig.estimation.accumulator import Accumulator
+from rig.estimation.arrays import Array
 from rig.study.simulation import ARM_RAD_S, DIRECTIONS, EXTREME, NORMAL, Population
-
-Array = NDArray[np.float64]
 
 FIRMWARE = Path(__file__).parents[1] / "firmware_host" / "firmware"
 SOURCES = (FIRMWARE / "core" / "solver.c", Path(__file__).parent / "levenberg_marquardt.c")

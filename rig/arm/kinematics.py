@@ -4,9 +4,9 @@ Every function takes arrays whose last axis holds the six joints, base to wrist 
 """
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 
-Array = NDArray[np.float64]
+from rig.estimation.arrays import Array
 
 # Denavit–Hartenberg parameters (maker's article 45257): (a in m, d in m, cos α, sin α); every α is a multiple of 90°.
 DH = (

@@ -9,11 +9,11 @@ Eq. (11) −Rᵀ g in the first-order term; in the second-order term the sign do
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 
+from rig.estimation.arrays import Array
+from rig.estimation.reference_model import KnownNorm
 from rig.estimation.triaxial import Method, TriaxialSolution, solve_triaxial
-
-Array = NDArray[np.float64]
 
 MODEL = "a_m = F (s + φ s²) + b, s = −Rᵀ g"
 
@@ -53,8 +53,7 @@ def solve_accelerometer(
         readings_m_s2,
         attitudes,
         variances_m2_s4,
-        reference_norm=gravity_m_s2,
-        reference_side=-np.asarray(down, dtype=np.float64),
+        KnownNorm(gravity_m_s2, -np.asarray(down, dtype=np.float64)),
         second_order=second_order,
         method=method,
     )

@@ -6,10 +6,9 @@ from typing import Literal, Self
 import numpy as np
 from numpy.typing import ArrayLike
 
-from rig.errors import Fault
-from rig.estimation.refusals import check_unit
+from rig.estimation.arrays import Array
+from rig.estimation.refusals import check_count, check_revolutions, check_unit
 from rig.estimation.six_observation import (
-    Array,
     by_algorithm_1,
     by_newton,
     design,
@@ -18,7 +17,7 @@ from rig.estimation.six_observation import (
     solve_linear,
 )
 
-Estimator = Literal["newton", "algorithm_1"]
+SixObservationEstimator = Literal["newton", "algorithm_1"]
 
 # Six sweeps over all directions stay below 25 for scale factors from 0.5 to 2, 20° of mounting error and any bias; with
 # one direction missing, the noise alone keeps the number finite, usually at hundreds.
@@ -33,7 +32,7 @@ class Solution:
     `condition` are those of the scaled design; `iterations` counts Newton steps or passes of Algorithm 1.
     """
 
-    estimator: Estimator
+    estimator: SixObservationEstimator
     scale: Array
     bias_rad_s: Array
     covariance: Array
@@ -81,7 +80,8 @@ class Accumulator:
         """
         mean = np.asarray(mean_rad_s, dtype=np.float64)
         variance = np.asarray(variance_rad2_s2, dtype=np.float64)
-        _check(mean, variance, speed_rad_s)
+        speed, speed_std = np.array([speed_rad_s], dtype=np.float64), np.array([speed_std_rad_s], dtype=np.float64)
+        check_revolutions(mean[None], speed, variance[None], speed_std)
         by_speed = (2 * speed_rad_s * speed_std_rad_s) ** 2
         w = 1 / (4 * speed_rad_s**2 * float(variance.mean()) + by_speed) if weight is None else weight
         row = np.append(design(mean), 1.0)
@@ -97,7 +97,7 @@ class Accumulator:
         )
 
     def combine(self, other: Self) -> Self:
-        """As if all of both had been added to one."""
+        """The accumulator of the revolutions of both, as if each had been added to one."""
         return type(self)(
             self.geometry + other.geometry,
             self.normal + other.normal,
@@ -107,19 +107,14 @@ class Accumulator:
             self.count + other.count,
         )
 
-    def solve(self, estimator: Estimator = "newton") -> Solution:
+    def solve(self, estimator: SixObservationEstimator = "newton") -> Solution:
         """The parameters with their covariance.
 
         `newton` solves for readings counted from their mean, about −b: from zero, the design of Eq. (7) is singular
         where ‖K b‖ = ω. `algorithm_1` counts from zero, as published. Raises Fault `too_few_observations`,
         `rank_deficient`, `negative_square`, `algorithm_1_diverged`, `wrong_unit`.
         """
-        if self.count < 6:
-            raise Fault(
-                "too_few_observations",
-                f"{self.count} averaged revolutions are too few for six parameters",
-                "Sweep every wrist in both directions; resume the run if it was interrupted",
-            )
+        check_count(self.count, 6, 6)
         centre = self.geometry[6, 3:6] / self.count
         rank, condition, weakest_axis = self._condition(_translation(centre))
         if rank < 6:
@@ -184,32 +179,3 @@ def _translation(centre: Array) -> Array:
     move[:3, 6] = centre**2
     move[3:6, 6] = -centre
     return move
-
-
-def _check(mean: Array, variance: Array, speed_rad_s: float) -> None:
-    if mean.shape != (3,) or variance.shape != (3,):
-        raise ValueError(f"mean and variance must be (3,), not {mean.shape} and {variance.shape}")
-    if not np.isfinite([*mean, *variance, speed_rad_s]).all():
-        raise Fault(
-            "not_finite",
-            "a revolution's mean reading, variance or speed is not a number",
-            "Look at the samples of that sweep and record it again",
-        )
-    if speed_rad_s <= 0:
-        raise Fault(
-            "bad_speed",
-            f"a revolution's speed is {speed_rad_s:g} rad/s",
-            "Give the speed as positive; a rest is not a revolution",
-        )
-    if not mean.any():
-        raise Fault(
-            "zero_reading",
-            "the gyroscope reads exactly zero during a revolution",
-            "Check that the sensor is connected and awake",
-        )
-    if not (variance > 0).all():
-        raise Fault(
-            "bad_variance",
-            "the variance of a mean reading is not positive",
-            "Give the variance of each axis' mean in (rad/s)²",
-        )

@@ -9,9 +9,8 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from rig.estimation.arrays import Array
 from rig.estimation.six_observation import ALGORITHM_1_LIMIT, ALGORITHM_1_TOLERANCE, NEWTON_LIMIT, design
-
-Array = NDArray[np.float64]
 
 
 @dataclass(frozen=True, slots=True)
@@ -58,7 +57,10 @@ def algorithm_1_batch(
     weights: ArrayLike | None = None,
     tolerance: float = ALGORITHM_1_TOLERANCE,
 ) -> BatchSolution:
-    """SIX, Algorithm 1, as published, for every run; `iterations` counts as `by_algorithm_1` does. Shapes as above."""
+    """SIX, Algorithm 1, as published, for every run; `iterations` counts as `by_algorithm_1` does.
+
+    Shapes as in `newton_batch`: `means_rad_s` (R, N, 3), `speeds_rad_s` and `weights` (N,) or (R, N).
+    """
     means = np.asarray(means_rad_s, dtype=np.float64)
     p, q, _ = _responses(means, speeds_rad_s, weights)
     beta, last_change = p.copy(), np.full(len(p), np.inf)

@@ -5,13 +5,12 @@ has to leave open (directions of turning, mounting) is in it as a nuisance. `eff
 """
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 
+from rig.estimation.arrays import Array
 from rig.estimation.levenberg_marquardt import squared_rate_jacobian, squared_rate_variance
 from rig.estimation.reference_model import covariance_bound
 from rig.estimation.vector_model import parameter_jacobian
-
-Array = NDArray[np.float64]
 
 
 def six_observation_bound(scale: ArrayLike, rates_rad_s: ArrayLike, variances_rad2_s2: ArrayLike) -> Array:

@@ -8,15 +8,14 @@ from dataclasses import dataclass
 from typing import Literal
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 
 from rig.errors import Fault
 from rig.estimation import refusals
+from rig.estimation.arrays import Array
 from rig.estimation.six_observation import design, negative_square
 
-Array = NDArray[np.float64]
-
-MAX_CONDITION = 40.0  # as in `accumulator`
+MAX_CONDITION = 40.0  # above `accumulator`'s 30: what only noise tells is left out before
 VANISHED = 0.05  # of the largest scale factor
 REMEDY = "Sweep every wrist in both directions; a direction swept twice does not stand in for the other"
 
@@ -62,7 +61,9 @@ def solve_levenberg_marquardt(
 
     means, speeds, variances = (np.asarray(a, dtype=np.float64) for a in (means_rad_s, speeds_rad_s, variances_rad2_s2))
     speed_std = np.zeros(len(means)) if speed_std_rad_s is None else np.asarray(speed_std_rad_s, dtype=np.float64)
-    _check(means, speeds, variances, speed_std)
+    refusals.check_revolutions(means, speeds, variances, speed_std)
+    refusals.check_count(len(means), 6, 6)
+    refusals.check_duplicates(means)
     centred = means - means.mean(axis=0)
     length = float(np.sqrt(np.mean(np.sum(centred**2, axis=1))))
     told = _conditioning(centred / length, float(np.sqrt(variances.max())) / length)
@@ -130,17 +131,3 @@ def squared_rate_variance(theta: Array, means: Array, variances: Array) -> Array
     """(N,) what the variances (N, 3) of the mean readings do to `squared_rate`, to first order."""
     k, shifted = theta[:3], means + theta[3:]
     return np.asarray(np.sum(4 * k**4 * shifted**2 * variances, axis=-1), dtype=np.float64)
-
-
-def _check(means: Array, speeds: Array, variances: Array, speed_std: Array) -> None:
-    count = len(means)
-    refusals.require_shape("means", means, (count, 3))
-    refusals.require_shape("speeds", speeds, (count,))
-    refusals.require_shape("variances", variances, (count, 3))
-    refusals.require_shape("speed_std", speed_std, (count,))
-    refusals.check_count(count, 6, 6)
-    refusals.check_finite(means=means, speeds=speeds, variances=variances, speed_std=speed_std)
-    refusals.check_variances(variances)
-    refusals.check_speeds(speeds)
-    refusals.check_signal(means)
-    refusals.check_duplicates(means)

@@ -10,11 +10,11 @@ readings: iron and sensor are not told apart, and need not be, because the corre
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 
+from rig.estimation.arrays import Array
+from rig.estimation.reference_model import KnownNorm
 from rig.estimation.triaxial import Method, TriaxialSolution, solve_triaxial
-
-Array = NDArray[np.float64]
 
 MODEL = "m_m = F Rᵀ m + b"
 
@@ -49,9 +49,7 @@ def solve_magnetometer(
     `field_t` is the known size of the field; `side` (3,) a table vector with which it makes less than a right angle
     (down, in the northern hemisphere). Needs 5 attitudes (rank 14). Raises what `solve_triaxial` raises.
     """
-    fit = solve_triaxial(
-        readings_t, attitudes, variances_t2, reference_norm=field_t, reference_side=side, method=method
-    )
+    fit = solve_triaxial(readings_t, attitudes, variances_t2, KnownNorm(field_t, side), method=method)
     hard_iron = np.asarray(np.linalg.solve(fit.matrix, fit.bias), dtype=np.float64)
     return MagnetometerSolution(fit.matrix, fit.bias, fit.reference, hard_iron, fit.covariance, fit)
 

@@ -13,11 +13,11 @@ from itertools import product
 from typing import Literal
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 
+from rig.estimation.arrays import Array
 from rig.estimation.six_observation import design
 
-Array = NDArray[np.float64]
 Model = Literal["squared", "vector"]
 
 PARAMETER_COUNT: Mapping[Model, int] = {"squared": 6, "vector": 4}

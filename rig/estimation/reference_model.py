@@ -10,25 +10,53 @@ factor, so there ‖v_ref‖ is held.
 All functions broadcast over runs: readings (…, N, 3), θ (…, 15 or 18).
 """
 
-import numpy as np
-from numpy.typing import NDArray
+from dataclasses import dataclass
 
-Array = NDArray[np.float64]
+import numpy as np
+from numpy.typing import ArrayLike
+
+from rig.estimation.arrays import Array
 
 F, REFERENCE, BIAS, SECOND = slice(0, 9), slice(9, 12), slice(12, 15), slice(15, 18)
 STEP_LIMIT = 30
 STEP_TOLERANCE = 1e-6
 
 
-def sensed(theta: Array, attitudes: Array, known: Array) -> Array:
-    """s = Rᵀ v_ref + v̄ (…, N, 3) from attitudes (N, 3, 3) and known parts v̄ (N, 3)."""
-    s: Array = np.einsum("nji,...j->...ni", attitudes, theta[..., REFERENCE]) + known
+@dataclass(frozen=True, slots=True)
+class KnownVector:
+    """v̄ (N, 3) in body coordinates, what the table itself adds in each attitude: its rate, for a gyroscope."""
+
+    added: ArrayLike
+
+    def v_bar(self, count: int) -> Array:
+        """v̄ (N, 3) for `count` attitudes."""
+        return np.asarray(self.added, dtype=np.float64)
+
+
+@dataclass(frozen=True, slots=True)
+class KnownNorm:
+    """v̄ = 0, so ‖v_ref‖ = `norm` must be known, and a table vector `side` (3,) whose product with v_ref is positive."""
+
+    norm: float
+    side: ArrayLike
+
+    def v_bar(self, count: int) -> Array:
+        """v̄ (N, 3) for `count` attitudes: zero."""
+        return np.zeros((count, 3))
+
+
+Known = KnownVector | KnownNorm
+
+
+def sensed(theta: Array, attitudes: Array, v_bar: Array) -> Array:
+    """s = Rᵀ v_ref + v̄ (…, N, 3) from attitudes (N, 3, 3) and v̄ (N, 3)."""
+    s: Array = np.einsum("nji,...j->...ni", attitudes, theta[..., REFERENCE]) + v_bar
     return s
 
 
-def predicted(theta: Array, attitudes: Array, known: Array) -> Array:
+def predicted(theta: Array, attitudes: Array, v_bar: Array) -> Array:
     """The readings v_m (…, N, 3) of the model."""
-    s = sensed(theta, attitudes, known)
+    s = sensed(theta, attitudes, v_bar)
     if theta.shape[-1] > 15:
         s = s + theta[..., None, SECOND] * s**2
     readings: Array = s @ np.swapaxes(matrix(theta), -1, -2) + theta[..., None, BIAS]
@@ -40,9 +68,9 @@ def matrix(theta: Array) -> Array:
     return theta[..., F].reshape(*theta.shape[:-1], 3, 3)
 
 
-def jacobian(theta: Array, attitudes: Array, known: Array) -> Array:
+def jacobian(theta: Array, attitudes: Array, v_bar: Array) -> Array:
     """(…, N, 3, 15 or 18) derivative of the readings with respect to θ."""
-    s, f = sensed(theta, attitudes, known), matrix(theta)[..., None, :, :]
+    s, f = sensed(theta, attitudes, v_bar), matrix(theta)[..., None, :, :]
     slope, felt = np.ones_like(s), s
     if theta.shape[-1] > 15:
         second = theta[..., None, SECOND]
@@ -74,17 +102,17 @@ def free_directions(theta: Array, *, norm_known: bool) -> Array:
     return np.delete(free, 9, axis=-1)
 
 
-def weighted_jacobian(theta: Array, attitudes: Array, known: Array, variances: Array, *, norm_known: bool) -> Array:
+def weighted_jacobian(theta: Array, attitudes: Array, v_bar: Array, variances: Array, *, norm_known: bool) -> Array:
     """J (…, 3 N, q), weighted by 1/σ and reduced to the free directions: JᵀJ is the Fisher information."""
     free = free_directions(theta, norm_known=norm_known)
-    rows = jacobian(theta, attitudes, known) / np.sqrt(variances)[..., None]
+    rows = jacobian(theta, attitudes, v_bar) / np.sqrt(variances)[..., None]
     reduced: Array = rows.reshape(*rows.shape[:-3], -1, rows.shape[-1]) @ free
     return reduced
 
 
-def covariance_bound(theta: Array, attitudes: Array, known: Array, variances: Array, *, norm_known: bool) -> Array:
+def covariance_bound(theta: Array, attitudes: Array, v_bar: Array, variances: Array, *, norm_known: bool) -> Array:
     """(…, p, p) inverse of the Fisher information: the covariance of the maximum-likelihood estimate to first order."""
-    reduced = weighted_jacobian(theta, attitudes, known, variances, norm_known=norm_known)
+    reduced = weighted_jacobian(theta, attitudes, v_bar, variances, norm_known=norm_known)
     size = np.linalg.norm(reduced, axis=-2, keepdims=True)
     scaled = reduced / size
     inverse = np.linalg.inv(np.swapaxes(scaled, -1, -2) @ scaled) / (np.swapaxes(size, -1, -2) * size)
@@ -94,7 +122,7 @@ def covariance_bound(theta: Array, attitudes: Array, known: Array, variances: Ar
 
 
 def most_likely(
-    start: Array, readings: Array, attitudes: Array, known: Array, variances: Array, *, norm_known: bool
+    start: Array, readings: Array, attitudes: Array, v_bar: Array, variances: Array, *, norm_known: bool
 ) -> tuple[Array, int]:
     """θ (…, p) of least weighted squares by Gauss–Newton from `start`, and the steps it took."""
     theta = start.copy()
@@ -102,8 +130,8 @@ def most_likely(
     steps = 0
     while steps < STEP_LIMIT:
         steps += 1
-        reduced = weighted_jacobian(theta, attitudes, known, variances, norm_known=norm_known)
-        residuals = (readings - predicted(theta, attitudes, known)) / np.sqrt(variances)
+        reduced = weighted_jacobian(theta, attitudes, v_bar, variances, norm_known=norm_known)
+        residuals = (readings - predicted(theta, attitudes, v_bar)) / np.sqrt(variances)
         size = np.linalg.norm(reduced, axis=-2)
         scaled = reduced / size[..., None, :]
         right = np.einsum("...rq,...r->...q", scaled, residuals.reshape(*residuals.shape[:-2], -1))

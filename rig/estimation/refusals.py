@@ -6,18 +6,17 @@ Each function looks at one thing and raises `rig.errors.Fault`. `conditioning` j
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
+from numpy.typing import ArrayLike
 
 from rig.errors import Fault
-
-Array = NDArray[np.float64]
+from rig.estimation.arrays import Array
 
 MAX_SCALE = 4.0  # either way: no sensor's scale factor is that far off, a wrong unit is
 MIN_ALIGNMENT = 0.7  # cosine between an axis and where it should point; beyond 45° it is another axis
-CONFUSED = (  # scale factors that a wrong unit gives
-    (np.pi / 180, "the readings look like degrees per second given as rad/s"),
-    (180 / np.pi, "the rates look like degrees per second given as rad/s"),
-    (9.80665, "the readings look like g given as m/s²"),
+CONFUSED = (  # ratios of reading over what is felt that a wrong unit gives
+    (180 / np.pi, "the readings look like degrees per second given as rad/s"),
+    (np.pi / 180, "the rates look like degrees per second given as rad/s"),
+    (1 / 9.80665, "the readings look like g given as m/s²"),
 )
 CONSISTENT = 3.0  # residuals larger than so many times what the variances explain are worth a warning
 
@@ -29,14 +28,14 @@ def require_shape(name: str, array: Array, shape: tuple[int, ...]) -> None:
 
 
 def check_finite(**arrays: Array) -> None:
-    """Raises Fault `not_finite` naming the first array that holds a NaN or an infinity, and its row."""
+    """Raises Fault `not_finite` naming the first array that holds a NaN or an infinity, and its row if it has more."""
     for name, array in arrays.items():
         finite = np.isfinite(array)
         if not finite.all():
             row = int(np.argwhere(~finite)[0][0])
             raise Fault(
                 "not_finite",
-                f"row {row} of {name} holds what is not a number",
+                f"what is not a number stands in {name}" + (f", row {row}" if len(array) > 1 else ""),
                 "Look at the samples of that observation and record it again",
             )
 
@@ -81,6 +80,22 @@ def check_signal(means: Array) -> None:
         )
 
 
+def check_revolutions(means: Array, speeds_rad_s: Array, variances: Array, speed_std_rad_s: Array) -> None:
+    """What every averaged revolution must be: means, variances (N, 3), speeds and their deviations (N,).
+
+    Raises Fault `not_finite`, `bad_variance`, `bad_speed`, `zero_reading`; ValueError for a wrong shape.
+    """
+    count = len(means)
+    require_shape("means", means, (count, 3))
+    require_shape("speeds", speeds_rad_s, (count,))
+    require_shape("variances", variances, (count, 3))
+    require_shape("speed_std", speed_std_rad_s, (count,))
+    check_finite(means=means, speeds=speeds_rad_s, variances=variances, speed_std=speed_std_rad_s)
+    check_variances(variances)
+    check_speeds(speeds_rad_s)
+    check_signal(means)
+
+
 def check_duplicates(means: Array) -> None:
     """Raises Fault `duplicated_observation` where two mean readings of (N, 3) agree to the last bit."""
     unique, first = np.unique(means, axis=0, return_index=True)
@@ -96,13 +111,28 @@ def check_duplicates(means: Array) -> None:
 
 def check_unit(scale: Array) -> None:
     """Raises Fault `wrong_unit` for a scale factor (3,) beyond 4 or 1/4, with the likely unit if it knows one."""
-    if np.all((scale < MAX_SCALE) & (scale > 1 / MAX_SCALE)):
-        return
-    typical = float(np.exp(np.mean(np.log(scale))))
-    guess = next((guess for ratio, guess in CONFUSED if 0.7 < typical / ratio < 1.4), "check range and sensitivity")
-    raise Fault(
+    if not _believable(scale):
+        typical = float(np.exp(np.mean(np.log(scale))))
+        raise _wrong_unit(f"the scale factors come out near {typical:.3g}", 1 / typical)
+
+
+def check_reading_ratio(ratio: float, where: str) -> None:
+    """Raises Fault `wrong_unit` where readings are `ratio` times the turn rate, beyond 4 or 1/4, as `check_unit`."""
+    if not _believable(ratio):
+        raise _wrong_unit(f"in {where} the gyroscope reads {ratio:.3g} times the turn rate", ratio)
+
+
+def _believable(ratio: ArrayLike) -> bool:
+    """Whether ratios of reading over what is felt, or their inverses, can be a sensor's."""
+    ratios = np.asarray(ratio, dtype=np.float64)
+    return bool(np.all((ratios < MAX_SCALE) & (ratios > 1 / MAX_SCALE)))
+
+
+def _wrong_unit(what: str, ratio: float) -> Fault:
+    likely = (guess for confused, guess in CONFUSED if 0.7 < ratio / confused < 1.4)
+    return Fault(
         "wrong_unit",
-        f"the scale factors come out near {typical:.3g}: {guess}",
+        f"{what}: {next(likely, 'check range and sensitivity')}",
         "Give readings and what they are compared with in the same SI unit",
     )
 

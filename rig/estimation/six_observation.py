@@ -15,11 +15,10 @@ squares). Both solvers look for the γ that reproduces itself: `by_newton`, and 
 """
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 
 from rig.errors import Fault
-
-Array = NDArray[np.float64]
+from rig.estimation.arrays import Array
 
 MODEL = "g = K (m + b)"
 PARAMETERS = ("kx", "ky", "kz", "bx", "by", "bz")

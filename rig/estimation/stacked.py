@@ -12,11 +12,9 @@ Everything broadcasts over runs: readings (…, N, 3). θ is that of `reference_
 """
 
 import numpy as np
-from numpy.typing import NDArray
 
-from rig.estimation.reference_model import BIAS, REFERENCE, SECOND, F, matrix, sensed
-
-Array = NDArray[np.float64]
+from rig.estimation.arrays import Array
+from rig.estimation.reference_model import BIAS, REFERENCE, SECOND, F, Known, KnownNorm, matrix, sensed
 
 
 def stack(readings: Array, attitudes: Array, squares: Array | None) -> Array:
@@ -41,10 +39,10 @@ def column_sizes(readings: Array, squares: Array | None) -> Array:
     return sizes
 
 
-def least_squares(x: Array, sizes: Array, known: Array) -> Array:
+def least_squares(x: Array, sizes: Array, v_bar: Array) -> Array:
     """β (…, p) of Eq. (6) for v̄ (N, 3)."""
     scaled = x / sizes[..., None, :]
-    beta: Array = (np.linalg.pinv(scaled) @ known.reshape(-1)) / sizes
+    beta: Array = (np.linalg.pinv(scaled) @ v_bar.reshape(-1)) / sizes
     return beta
 
 
@@ -67,40 +65,35 @@ def to_theta(beta: Array) -> Array:
     return theta
 
 
-def published_estimate(
-    readings: Array, attitudes: Array, known: Array | None, norm: float | None, side: Array, *, second_order: bool
-) -> tuple[Array, int]:
+def published_estimate(readings: Array, attitudes: Array, known: Known, *, second_order: bool) -> tuple[Array, int]:
     """θ (…, 15 or 18) as TRIAX publishes it, and the number of linear solutions it took.
 
     With second-order terms the linear solution repeats, with s² from the last v_ref, until it stands still.
     """
     x = stack(readings, attitudes, None)
-    theta = to_theta(_solve(x, column_sizes(readings, None), known, norm, side))
+    theta = to_theta(_solve(x, column_sizes(readings, None), known))
     if not second_order:
         return theta, 1
-    still = np.zeros_like(readings[0, :1]) if known is None else known
+    v_bar = known.v_bar(len(attitudes))
     solutions = 1
     change = np.inf
     while change > 1e-12 and solutions < 50:
-        squares = sensed(theta, attitudes, still) ** 2
+        squares = sensed(theta, attitudes, v_bar) ** 2
         x = stack(readings, attitudes, squares)
         last = theta[..., REFERENCE]
-        theta = to_theta(_solve(x, column_sizes(readings, squares), known, norm, side))
+        theta = to_theta(_solve(x, column_sizes(readings, squares), known))
         moved = np.linalg.norm(theta[..., REFERENCE] - last, axis=-1) / np.linalg.norm(last, axis=-1)
         change, solutions = float(np.max(moved)), solutions + 1
     return theta, solutions
 
 
-def _solve(x: Array, sizes: Array, known: Array | None, norm: float | None, side: Array) -> Array:
-    if known is not None:
-        return least_squares(x, sizes, known)
-    assert norm is not None
-    return null_vector(x, sizes, norm, side)
+def _solve(x: Array, sizes: Array, known: Known) -> Array:
+    if isinstance(known, KnownNorm):
+        return null_vector(x, sizes, known.norm, np.asarray(known.side, dtype=np.float64))
+    return least_squares(x, sizes, known.v_bar(x.shape[-2] // 3))
 
 
-def published_covariance(
-    theta: Array, readings: Array, attitudes: Array, known: Array | None, variances: Array
-) -> Array:
+def published_covariance(theta: Array, readings: Array, attitudes: Array, known: Known, variances: Array) -> Array:
     """(p, p) covariance of one published θ, to first order in the readings' errors e (variances (N, 3)).
 
     An error enters equation k as F⁻¹ e_k, because the readings stand in X: δβ = −X⁺ F⁻¹ e, within what the
@@ -108,17 +101,18 @@ def published_covariance(
     follow from β.
     """
     second_order = len(theta) > 15
-    s = sensed(theta, attitudes, np.zeros((1, 3)) if known is None else known)
+    norm_known = isinstance(known, KnownNorm)
+    s = sensed(theta, attitudes, known.v_bar(len(attitudes)))
     squares = s**2 if second_order else None
     x, sizes = stack(readings, attitudes, squares), column_sizes(readings, squares)
     f = matrix(theta)
     inverse = np.linalg.inv(f)
     p = len(theta)
     left, singular, right = np.linalg.svd(x / sizes, full_matrices=False)
-    kept = p if known is not None else p - 1
+    kept = p - norm_known
     pseudo = ((right[:kept].T / singular[:kept]) @ left[:, :kept].T) / sizes[:, None]
     project = np.eye(p)
-    if known is None:
+    if norm_known:
         beta = theta.copy()
         beta[F], beta[BIAS] = inverse.ravel(), inverse @ theta[BIAS]
         reference = theta[REFERENCE]

@@ -17,14 +17,25 @@ from dataclasses import dataclass
 from typing import Literal
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 
 from rig.errors import Fault
 from rig.estimation import refusals
-from rig.estimation.reference_model import BIAS, REFERENCE, F, covariance_bound, most_likely, predicted, sensed
+from rig.estimation.arrays import Array
+from rig.estimation.reference_model import (
+    BIAS,
+    REFERENCE,
+    F,
+    Known,
+    KnownNorm,
+    KnownVector,
+    covariance_bound,
+    most_likely,
+    predicted,
+    sensed,
+)
 from rig.estimation.stacked import column_sizes, published_covariance, published_estimate, stack
 
-Array = NDArray[np.float64]
 Method = Literal["as_published", "maximum_likelihood"]
 
 MAX_CONDITION = 1e4
@@ -62,44 +73,38 @@ def solve_triaxial(
     readings: ArrayLike,
     attitudes: ArrayLike,
     variances: ArrayLike,
+    known: Known,
     *,
-    known: ArrayLike | None = None,
-    reference_norm: float | None = None,
-    reference_side: ArrayLike | None = None,
     second_order: bool = False,
     method: Method = "as_published",
 ) -> TriaxialSolution:
     """Solve for F, v_ref and b, and φ with `second_order`.
 
     `readings`, `variances` (N, 3): mean readings and the variances of these means; `attitudes` (N, 3, 3): R, body to
-    table; `known` (N, 3): v̄ in body coordinates, or None. Without it `reference_norm` and `reference_side` (3,), a
-    table vector whose product with v_ref is positive, must be given.
+    table; `known`: v̄ as a `KnownVector`, or what is known of v_ref where v̄ = 0 as a `KnownNorm`.
 
     Raises Fault `too_few_observations`, `not_finite`, `bad_variance`, `zero_reading`, `duplicated_observation`,
-    `bad_attitude`, `rank_deficient`, `ill_conditioned`, `sign_unknown`, `wrong_unit`,
-    `mirrored_axis`.
+    `bad_attitude`, `rank_deficient`, `ill_conditioned`, `sign_unknown`, `wrong_unit`, `mirrored_axis`; ValueError for
+    a wrong shape.
     """
     m, r, v = (np.asarray(a, dtype=np.float64) for a in (readings, attitudes, variances))
-    v_bar = None if known is None else np.asarray(known, dtype=np.float64)
-    norm, side = reference_norm, np.zeros(3) if reference_side is None else np.asarray(reference_side, dtype=np.float64)
-    if (v_bar is None) != (norm is not None and reference_side is not None):
-        raise ValueError("give either known, or both reference_norm and reference_side")
+    v_bar, norm_known = known.v_bar(len(m)), isinstance(known, KnownNorm)
     parameters = 18 if second_order else 15
-    needed = parameters - (v_bar is None)
-    _check(m, r, v, v_bar, parameters)
+    needed = parameters - norm_known
+    _check(m, r, v, known, parameters)
 
-    start, solutions = published_estimate(m, r, v_bar, norm, side, second_order=second_order)
-    still = np.zeros_like(m) if v_bar is None else v_bar
-    squares = sensed(start, r, still) ** 2 if second_order else None
+    start, solutions = published_estimate(m, r, known, second_order=second_order)
+    squares = sensed(start, r, v_bar) ** 2 if second_order else None
     found = _conditioning(stack(m, r, squares) / column_sizes(m, squares), m, v, needed)
     refusals.check_conditioning(found, needed, MAX_CONDITION, "some of F, reference and bias", REMEDY)
-    _check_side(start[REFERENCE], side)
+    if isinstance(known, KnownNorm):
+        _check_side(start[REFERENCE], np.asarray(known.side, dtype=np.float64))
     if method == "as_published":
         theta, iterations = start, solutions
-        covariance = published_covariance(theta, m, r, v_bar, v)
+        covariance = published_covariance(theta, m, r, known, v)
     else:
-        theta, iterations = most_likely(start, m, r, still, v, norm_known=v_bar is None)
-        covariance = covariance_bound(theta, r, still, v, norm_known=v_bar is None)
+        theta, iterations = most_likely(start, m, r, v_bar, v, norm_known=norm_known)
+        covariance = covariance_bound(theta, r, v_bar, v, norm_known=norm_known)
     f = theta[F].reshape(3, 3)
     refusals.check_unit(1 / np.linalg.norm(f, axis=1))
     if np.linalg.det(f) < 0:
@@ -108,7 +113,7 @@ def solve_triaxial(
             "the sensor's axes form a left-handed frame: one is mirrored or two are swapped",
             "Correct the order and signs of the sensor's axes, or the side the reference points to",
         )
-    residuals = m - predicted(theta, r, still)
+    residuals = m - predicted(theta, r, v_bar)
     return TriaxialSolution(
         method=method,
         matrix=f,
@@ -129,37 +134,35 @@ def solve_triaxial_batch(
     readings: ArrayLike,
     attitudes: ArrayLike,
     variances: ArrayLike,
+    known: Known,
     *,
-    known: ArrayLike | None = None,
-    reference_norm: float | None = None,
-    reference_side: ArrayLike | None = None,
     second_order: bool = False,
     method: Method = "as_published",
 ) -> Array:
-    """θ (R, 15 or 18) = [rows of F, v_ref, b, φ] of many runs (R, N, 3) in the same attitudes, without gates."""
+    """θ (R, 15 or 18) = [rows of F, v_ref, b, φ] of many runs (R, N, 3) in the same attitudes, without gates.
+
+    `attitudes` (N, 3, 3), `variances` (N, 3) and `known` are those of every run, as in `solve_triaxial`.
+    """
     m, r, v = (np.asarray(a, dtype=np.float64) for a in (readings, attitudes, variances))
-    v_bar = None if known is None else np.asarray(known, dtype=np.float64)
-    side = np.zeros(3) if reference_side is None else np.asarray(reference_side, dtype=np.float64)
-    theta, _ = published_estimate(m, r, v_bar, reference_norm, side, second_order=second_order)
+    theta, _ = published_estimate(m, r, known, second_order=second_order)
     if method == "maximum_likelihood":
-        still = np.zeros(m.shape[-2:]) if v_bar is None else v_bar
-        theta, _ = most_likely(theta, m, r, still, v, norm_known=v_bar is None)
+        theta, _ = most_likely(theta, m, r, known.v_bar(len(r)), v, norm_known=isinstance(known, KnownNorm))
     return theta
 
 
-def _check(m: Array, r: Array, v: Array, v_bar: Array | None, parameters: int) -> None:
+def _check(m: Array, r: Array, v: Array, known: Known, parameters: int) -> None:
     count = len(m)
     refusals.require_shape("readings", m, (count, 3))
     refusals.require_shape("attitudes", r, (count, 3, 3))
     refusals.require_shape("variances", v, (count, 3))
     refusals.check_count(count, parameters // 3, parameters)
     refusals.check_finite(readings=m, attitudes=r, variances=v)
-    if v_bar is not None:
-        refusals.require_shape("known", v_bar, (count, 3))
-        refusals.check_finite(known=v_bar)
+    if isinstance(known, KnownVector):
+        refusals.require_shape("known", known.v_bar(count), (count, 3))
+        refusals.check_finite(known=known.v_bar(count))
     refusals.check_variances(v)
     refusals.check_signal(m)
-    if v_bar is None:
+    if isinstance(known, KnownNorm):
         refusals.check_duplicates(m)  # averages never repeat; single samples of a turning sensor may
     off = np.abs(r @ np.swapaxes(r, -1, -2) - np.eye(3)).max(axis=(1, 2))
     if off.max() > 1e-6 or (np.linalg.det(r) < 0).any():
@@ -185,7 +188,7 @@ def _errors_in_x(m: Array, v: Array, method: Method) -> tuple[str, ...]:
 
 def _check_side(reference: Array, side: Array) -> None:
     """The sign of v_ref and F must be told by more than noise."""
-    if side.any() and abs(reference @ side) < MIN_SIDE * np.linalg.norm(reference) * np.linalg.norm(side):
+    if abs(reference @ side) < MIN_SIDE * np.linalg.norm(reference) * np.linalg.norm(side):
         raise Fault(
             "sign_unknown",
             "the reference lies across the direction that should tell its sign",

@@ -15,8 +15,9 @@ from dataclasses import dataclass
 from typing import Literal
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 
+from rig.estimation.arrays import Array
 from rig.estimation.refusals import (
     check_axes,
     check_conditioning,
@@ -30,8 +31,6 @@ from rig.estimation.refusals import (
     inconsistency,
     require_shape,
 )
-
-Array = NDArray[np.float64]
 
 MODEL = "m = F ω − b, k_i = 1/‖F_i‖"
 MATRIX_PARAMETERS = (*(f"f{i}{j}" for i in "xyz" for j in "xyz"), "cx", "cy", "cz")

@@ -10,9 +10,10 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
+from rig.estimation.arrays import Array
 from rig.estimation.six_observation import design
 from rig.study import simulation as sim
-from rig.study.report import Array, Finding, Report, Settings, table
+from rig.study.report import Finding, Report, Settings, table
 from rig.study.work import in_parallel
 
 if TYPE_CHECKING:

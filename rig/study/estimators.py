@@ -10,15 +10,17 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from rig.estimation.batch import algorithm_1_batch, newton_batch
+from rig.estimation.arrays import Array
+from rig.estimation.batch import BatchSolution, algorithm_1_batch, newton_batch
 from rig.estimation.bounds import efficiency, six_observation_bound, triaxial_bound, vector_bound
-from rig.estimation.levenberg_marquardt import solve_levenberg_marquardt
+from rig.estimation.levenberg_marquardt import LevenbergMarquardtSolution, solve_levenberg_marquardt
+from rig.estimation.reference_model import KnownNorm, KnownVector
 from rig.estimation.six_observation import PARAMETERS
 from rig.estimation.triaxial import Method, solve_triaxial_batch
-from rig.estimation.vector_model import solve_vector_batch
+from rig.estimation.vector_model import VectorBatch, solve_vector_batch
 from rig.study import rate_table as rt
 from rig.study import simulation as sim
-from rig.study.report import Array, Finding, Report, Settings, table
+from rig.study.report import Finding, Report, Settings, table
 from rig.study.work import in_parallel
 
 if TYPE_CHECKING:
@@ -60,21 +62,21 @@ def _gyroscope(runs: int, rng: np.random.Generator, _: int) -> Array:
         all_variances = np.concatenate([variances, np.full((RESTS, 3), rest_std**2)])
         marquardt = [solve_levenberg_marquardt(mean, np.full(6, speed), variances, weighted=False) for mean in turns]
         estimates = (
-            newton_batch(turns, speed),
-            algorithm_1_batch(turns, speed),
-            None,
-            solve_vector_batch(turns, rates, variances),
-            solve_vector_batch(all_means, all_rates, all_variances),
+            _parameters(newton_batch(turns, speed)),
+            _parameters(algorithm_1_batch(turns, speed)),
+            np.array([_parameters(each) for each in marquardt]),
+            _parameters(solve_vector_batch(turns, rates, variances)),
+            _parameters(solve_vector_batch(all_means, all_rates, all_variances)),
         )
         six = six_observation_bound(scale, rates @ mounting.T, variances)
         bounds = (six, six, six, vector_bound(F, rates, variances), vector_bound(F, all_rates, all_variances))
-        for estimate, bound in zip(estimates, bounds, strict=True):
-            if estimate is None:
-                parameters = np.array([np.concatenate([each.scale, each.bias_rad_s]) for each in marquardt])
-            else:
-                parameters = np.concatenate([estimate.scale, estimate.bias_rad_s], axis=1)
-            found.append([efficiency(parameters - truth, bound), np.mean((parameters - truth) ** 2, axis=0)])
+        found += [_ratios(estimate - truth, bound) for estimate, bound in zip(estimates, bounds, strict=True)]
     return np.array(found).reshape(len(SPEEDS), len(GYRO_ESTIMATORS), 2, 6)
+
+
+def _parameters(solution: BatchSolution | VectorBatch | LevenbergMarquardtSolution) -> Array:
+    """(…, 6) kx ky kz bx by bz."""
+    return np.concatenate([solution.scale, solution.bias_rad_s], axis=-1)
 
 
 def _gyroscope_rows(ratios: Array) -> Iterator[dict[str, Any]]:
@@ -95,7 +97,7 @@ def _rate_table(runs: int, rng: np.random.Generator, _: int) -> dict[str, Array]
     truth = np.concatenate([rt.GYRO_MATRIX.ravel(), rt.GYRO_REFERENCE_RAD_S, rt.GYRO_BIAS_RAD_S])
     bound = triaxial_bound(rt.GYRO_MATRIX, rt.GYRO_REFERENCE_RAD_S, rt.GYRO_BIAS_RAD_S, turned, noise**2, known=rates)
     for method in METHODS:
-        theta = solve_triaxial_batch(readings, turned, noise**2, known=rates, method=method)
+        theta = solve_triaxial_batch(readings, turned, noise**2, KnownVector(rates), method=method)
         found[f"TRIAX gyroscope, {method}"] = _ratios(theta - truth, bound)
     reference = rt.ACCELEROMETER_REFERENCE_M_S2
     for order in (1, 2):
@@ -120,8 +122,7 @@ def _rate_table(runs: int, rng: np.random.Generator, _: int) -> dict[str, Array]
                 readings,
                 turned,
                 noise**2,
-                reference_norm=float(np.linalg.norm(reference)),
-                reference_side=reference,
+                KnownNorm(float(np.linalg.norm(reference)), reference),
                 second_order=order == 2,
                 method=method,
             )
@@ -130,6 +131,7 @@ def _rate_table(runs: int, rng: np.random.Generator, _: int) -> dict[str, Array]
 
 
 def _ratios(errors: Array, bound: Array) -> Array:
+    """(2, p) mean squared error of R runs (R, p) over the bound's diagonal, and itself."""
     return np.array([efficiency(errors, bound), np.mean(errors**2, axis=0)])
 
 

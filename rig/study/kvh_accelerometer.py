@@ -5,9 +5,11 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
+from rig.estimation.arrays import Array
+from rig.estimation.reference_model import KnownNorm
 from rig.estimation.triaxial import TriaxialSolution, solve_triaxial
 from rig.study import rate_table as rt
-from rig.study.report import Array, Finding, Report, Settings, table
+from rig.study.report import Finding, Report, Settings, table
 from rig.study.work import in_parallel
 
 if TYPE_CHECKING:
@@ -81,8 +83,7 @@ def _solve(means: Array, turned: Array, *, second_order: bool) -> TriaxialSoluti
         means,
         turned,
         np.full(means.shape, rt.ACCELEROMETER_RESIDUAL_M_S2**2 / SAMPLES),
-        reference_norm=float(np.linalg.norm(rt.ACCELEROMETER_REFERENCE_M_S2)),
-        reference_side=[0.0, 0.0, -1.0],
+        KnownNorm(float(np.linalg.norm(rt.ACCELEROMETER_REFERENCE_M_S2)), (0.0, 0.0, -1.0)),
         second_order=second_order,
     )
 

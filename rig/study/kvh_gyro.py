@@ -10,9 +10,11 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
+from rig.estimation.arrays import Array
+from rig.estimation.reference_model import KnownVector
 from rig.estimation.triaxial import solve_triaxial
 from rig.study import rate_table as rt
-from rig.study.report import Array, Finding, Report, Settings, table
+from rig.study.report import Finding, Report, Settings, table
 from rig.study.work import in_parallel
 
 if TYPE_CHECKING:
@@ -69,7 +71,7 @@ def _calibrate(noise_rad_s: float, rng: np.random.Generator, _: int) -> tuple[Ar
     turned, rates = rt.swinging(DURATION_S)
     truth = rt.felt(turned, rt.GYRO_REFERENCE_RAD_S) + rates
     readings = truth @ rt.GYRO_MATRIX.T + rt.GYRO_BIAS_RAD_S + noise_rad_s * rng.normal(size=truth.shape)
-    solved = solve_triaxial(readings, turned, np.full(readings.shape, noise_rad_s**2), known=rates)
+    solved = solve_triaxial(readings, turned, np.full(readings.shape, noise_rad_s**2), KnownVector(rates))
     corrected = (readings - solved.bias) @ np.linalg.inv(solved.matrix).T
     theta = np.concatenate([solved.matrix.ravel(), solved.reference, solved.bias])
     return theta, np.sqrt(np.diag(solved.covariance)), float((corrected - truth).std(axis=0).max())

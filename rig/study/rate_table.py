@@ -6,8 +6,10 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
+from rig.estimation.arrays import Array
+from rig.estimation.reference_model import KnownNorm
 from rig.estimation.triaxial import solve_triaxial
-from rig.study.report import Array, table
+from rig.study.report import table
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
@@ -105,8 +107,7 @@ class Drifting:
                 means,
                 turned,
                 np.full(means.shape, variance),
-                reference_norm=float(np.linalg.norm(self.reference)),
-                reference_side=self.reference,
+                KnownNorm(float(np.linalg.norm(self.reference)), self.reference),
                 second_order=bool(self.second_order.any()),
             )
             held = np.mean(means - model, axis=0)

@@ -18,7 +18,7 @@ from typing import Literal
 
 import numpy as np
 
-from rig.study.report import Array
+from rig.estimation.arrays import Array
 
 Vibration = Literal["whole_turns", "white"]
 

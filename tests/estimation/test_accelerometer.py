@@ -4,36 +4,35 @@ from typing import Any
 
 import numpy as np
 import pytest
-from numpy.typing import NDArray
 
 from rig.errors import Fault
 from rig.estimation.accelerometer import AccelerometerSolution, solve_accelerometer, specific_force
+from rig.estimation.arrays import Array
+from rig.estimation.reference_model import KnownNorm
 from rig.estimation.triaxial import Method, solve_triaxial_batch
-from support.rate_table import (
-    ACCELEROMETER_BIAS,
+from rig.study.rate_table import (
+    ACCELEROMETER_BIAS_M_S2,
     ACCELEROMETER_MATRIX,
     ACCELEROMETER_RANDOM_WALK,
-    AVERAGING_S,
-    GRAVITY,
-    MILLI_G,
-    SECOND_ORDER,
-    attitudes,
-    noisy,
+    ACCELEROMETER_REFERENCE_M_S2,
+    ACCELEROMETER_SECOND_ORDER,
+    AVERAGED_S,
+    MG,
 )
-
-Array = NDArray[np.float64]
+from support.rate_table import attitudes, noisy
 
 METHODS: tuple[Method, ...] = ("as_published", "maximum_likelihood")
+GRAVITY = -ACCELEROMETER_REFERENCE_M_S2
 NORM = float(np.linalg.norm(GRAVITY))
-FIRST = np.concatenate([ACCELEROMETER_MATRIX.ravel(), GRAVITY, ACCELEROMETER_BIAS])
-THETA = np.concatenate([FIRST, SECOND_ORDER])
-VARIANCES = np.full((30, 3), ACCELEROMETER_RANDOM_WALK**2 / AVERAGING_S) * np.array([1.0, 0.5, 2.0])
+FIRST = np.concatenate([ACCELEROMETER_MATRIX.ravel(), GRAVITY, ACCELEROMETER_BIAS_M_S2])
+THETA = np.concatenate([FIRST, ACCELEROMETER_SECOND_ORDER])
+VARIANCES = np.full((30, 3), ACCELEROMETER_RANDOM_WALK**2 / AVERAGED_S) * np.array([1.0, 0.5, 2.0])
 
 
-def readings(r: Array, second_order: Array = SECOND_ORDER) -> Array:
+def readings(r: Array, second_order: Array = ACCELEROMETER_SECOND_ORDER) -> Array:
     """a_m (N, 3), m/s²: TRIAX, Eq. (11)."""
     g = np.einsum("nji,j->ni", r, GRAVITY)
-    result: Array = (-g + second_order * g**2) @ ACCELEROMETER_MATRIX.T + ACCELEROMETER_BIAS
+    result: Array = (-g + second_order * g**2) @ ACCELEROMETER_MATRIX.T + ACCELEROMETER_BIAS_M_S2
     return result
 
 
@@ -50,10 +49,10 @@ def test_the_published_accelerometer_is_found(method: Method) -> None:
     std = np.sqrt(np.diag(solution.covariance))
     assert np.all(np.abs(values(solution) - THETA) < 4 * std)
     np.testing.assert_allclose(solution.matrix, ACCELEROMETER_MATRIX, atol=3e-5)
-    np.testing.assert_allclose(solution.bias_m_s2 / MILLI_G, [0.9664, -0.4173, 0.8803], atol=0.05)
+    np.testing.assert_allclose(solution.bias_m_s2 / MG, [0.9664, -0.4173, 0.8803], atol=0.05)
     np.testing.assert_allclose(solution.gravity_table_m_s2, GRAVITY, atol=2e-4)
     assert solution.second_order_s2_m is not None
-    np.testing.assert_allclose(solution.second_order_s2_m, SECOND_ORDER, atol=2e-6)
+    np.testing.assert_allclose(solution.second_order_s2_m, ACCELEROMETER_SECOND_ORDER, atol=2e-6)
     assert (solution.fit.rank, solution.fit.warnings) == (17, ())
     np.testing.assert_allclose(np.linalg.norm(solution.gravity_table_m_s2), NORM, rtol=1e-12)
 
@@ -83,12 +82,11 @@ def test_the_iteration_settles_and_leaves_what_first_order_cannot_explain() -> N
 def test_the_covariance_is_that_of_repeated_calibrations(method: Method, second_order: bool) -> None:
     r = attitudes(14)
     variances = VARIANCES[:14] * 25  # loud enough that rounding is nowhere near
-    exact = readings(r, SECOND_ORDER if second_order else np.zeros(3))
+    exact = readings(r, ACCELEROMETER_SECOND_ORDER if second_order else np.zeros(3))
     options: dict[str, Any] = {"second_order": second_order, "method": method}
     reported = solve_accelerometer(exact, r, variances, gravity_m_s2=NORM, **options).covariance
-    side = [0, 0, -1]
     draws = noisy(exact, variances, runs=5000)
-    found = solve_triaxial_batch(draws, r, variances, reference_norm=NORM, reference_side=side, **options)
+    found = solve_triaxial_batch(draws, r, variances, KnownNorm(NORM, [0, 0, -1]), **options)
     np.testing.assert_allclose(np.var(found, axis=0), np.diag(reported), rtol=0.1)
     sign = np.ones(found.shape[1])
     sign[9:12] = -1
@@ -98,7 +96,7 @@ def test_the_covariance_is_that_of_repeated_calibrations(method: Method, second_
 
 def test_calibrated_readings_are_the_specific_force() -> None:
     r = attitudes(30)
-    for second_order in (np.zeros(3), SECOND_ORDER):
+    for second_order in (np.zeros(3), ACCELEROMETER_SECOND_ORDER):
         m = readings(r, second_order)
         solution = solve_accelerometer(m, r, VARIANCES, gravity_m_s2=NORM, second_order=bool(second_order.any()))
         np.testing.assert_allclose(specific_force(m, solution), -np.einsum("nji,j->ni", r, GRAVITY), atol=1e-9)

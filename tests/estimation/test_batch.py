@@ -2,15 +2,13 @@
 
 import numpy as np
 import pytest
-from numpy.typing import NDArray
 from scipy.optimize import least_squares
 
 from rig.errors import Fault
 from rig.estimation.accumulator import Accumulator, Solution
+from rig.estimation.arrays import Array
 from rig.estimation.batch import algorithm_1_batch, newton_batch
 from rig.estimation.levenberg_marquardt import solve_levenberg_marquardt, squared_rate, squared_rate_jacobian
-
-Array = NDArray[np.float64]
 
 SPEED = np.pi / 3
 DIRECTIONS = np.kron(np.eye(3), [[1.0], [-1.0]])

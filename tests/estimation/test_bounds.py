@@ -2,9 +2,9 @@
 
 import numpy as np
 import pytest
-from numpy.typing import NDArray
 from scipy.spatial.transform import Rotation
 
+from rig.estimation.arrays import Array
 from rig.estimation.batch import algorithm_1_batch, newton_batch
 from rig.estimation.bounds import efficiency, six_observation_bound, triaxial_bound, vector_bound, vector_matrix_bound
 from rig.estimation.optimality import (
@@ -15,12 +15,11 @@ from rig.estimation.optimality import (
     named_designs,
     prediction_variance,
 )
-from rig.estimation.reference_model import predicted
+from rig.estimation.reference_model import KnownNorm, predicted
 from rig.estimation.triaxial import solve_triaxial_batch
 from rig.estimation.vector_model import solve_vector_batch, solve_vector_model
-from support.rate_table import ACCELEROMETER_MATRIX, GRAVITY, SECOND_ORDER, attitudes, noisy
-
-Array = NDArray[np.float64]
+from rig.study.rate_table import ACCELEROMETER_MATRIX, ACCELEROMETER_REFERENCE_M_S2, ACCELEROMETER_SECOND_ORDER
+from support.rate_table import attitudes, noisy
 
 SCALE = np.array([1.1771, 1.1554, 1.1440])
 BIAS = np.array([0.0077, -0.0100, -0.0051])
@@ -78,24 +77,30 @@ def test_the_bound_of_six_observations_is_the_theory_of_one_axis() -> None:
     np.testing.assert_allclose(np.sqrt(np.diag(bound)), [*SCALE**2 * bias / speed, *[bias] * 3], rtol=1e-12)
 
 
-@pytest.mark.parametrize("second_order", [None, SECOND_ORDER])
+@pytest.mark.parametrize("second_order", [None, ACCELEROMETER_SECOND_ORDER])
 def test_maximum_likelihood_reaches_the_triaxial_bound(second_order: Array | None) -> None:
     r, bias = attitudes(14), np.array([0.01, -0.004, 0.009])
     variances = np.full((14, 3), 1e-8) * np.array([1.0, 4.0, 0.25])
     theta = np.concatenate(
-        [ACCELEROMETER_MATRIX.ravel(), -GRAVITY, bias, *([] if second_order is None else [second_order])]
+        [
+            ACCELEROMETER_MATRIX.ravel(),
+            ACCELEROMETER_REFERENCE_M_S2,
+            bias,
+            *([] if second_order is None else [second_order]),
+        ]
     )
     draws = noisy(predicted(theta, r, np.zeros((14, 3))), variances, runs=5000)
     found = solve_triaxial_batch(
         draws,
         r,
         variances,
-        reference_norm=float(np.linalg.norm(GRAVITY)),
-        reference_side=[0, 0, -1],
+        KnownNorm(float(np.linalg.norm(ACCELEROMETER_REFERENCE_M_S2)), [0, 0, -1]),
         second_order=second_order is not None,
         method="maximum_likelihood",
     )
-    bound = triaxial_bound(ACCELEROMETER_MATRIX, -GRAVITY, bias, r, variances, second_order=second_order)
+    bound = triaxial_bound(
+        ACCELEROMETER_MATRIX, ACCELEROMETER_REFERENCE_M_S2, bias, r, variances, second_order=second_order
+    )
     ratio = efficiency(found - theta, bound)
     assert np.all((ratio > 0.9) & (ratio < 1.1)), ratio
 

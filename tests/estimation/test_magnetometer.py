@@ -2,14 +2,13 @@
 
 import numpy as np
 import pytest
-from numpy.typing import NDArray
 
 from rig.errors import Fault
+from rig.estimation.arrays import Array
 from rig.estimation.magnetometer import field, solve_magnetometer
+from rig.estimation.reference_model import KnownNorm
 from rig.estimation.triaxial import Method, solve_triaxial_batch
 from support.rate_table import attitudes, noisy
-
-Array = NDArray[np.float64]
 
 METHODS: tuple[Method, ...] = ("as_published", "maximum_likelihood")
 EARTH_FIELD = np.array([26.2, -0.9, 34.1]) * 1e-6  # T, north-east-down, near Lisbon
@@ -53,8 +52,7 @@ def test_the_covariance_is_that_of_repeated_calibrations(method: Method) -> None
         noisy(readings(r), VARIANCES, runs=5000),
         r,
         VARIANCES,
-        reference_norm=NORM,
-        reference_side=[0, 0, 1],
+        KnownNorm(NORM, [0, 0, 1]),
         method=method,
     )
     np.testing.assert_allclose(np.var(found, axis=0), np.diag(reported), rtol=0.1)

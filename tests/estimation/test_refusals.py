@@ -5,19 +5,25 @@ from typing import Any
 
 import numpy as np
 import pytest
-from numpy.typing import NDArray
 from scipy.spatial.transform import Rotation
 
 from rig.errors import Fault
 from rig.estimation.accumulator import Accumulator
+from rig.estimation.arrays import Array
 from rig.estimation.levenberg_marquardt import solve_levenberg_marquardt
-from rig.estimation.refusals import check_axes, check_conditioning, conditioning, inconsistency
+from rig.estimation.reference_model import KnownNorm
+from rig.estimation.refusals import (
+    check_axes,
+    check_conditioning,
+    check_reading_ratio,
+    check_unit,
+    conditioning,
+    inconsistency,
+)
 from rig.estimation.six_observation import closed_form
 from rig.estimation.triaxial import solve_triaxial
 from rig.estimation.vector_model import solve_vector_model
 from support.rate_table import attitudes
-
-Array = NDArray[np.float64]
 
 SPEED = np.pi / 3
 SCALE, BIAS = np.array([1.1771, 1.1554, 1.1440]), np.array([0.0077, -0.0100, -0.0051])
@@ -168,10 +174,42 @@ def test_triaxial_readings_are_refused_alike() -> None:
     for readings_, attitudes_, name in cases:
         count = len(readings_)
         with pytest.raises(Fault, match=name):
-            solve_triaxial(readings_, attitudes_, variances[:count], reference_norm=1, reference_side=[0, 0, 1])
+            solve_triaxial(readings_, attitudes_, variances[:count], KnownNorm(1, [0, 0, 1]))
 
 
 def test_residuals_are_compared_with_what_their_variances_explain() -> None:
     assert inconsistency(np.ones((4, 3)), np.ones((4, 3)), 6) == ()
     assert "5.7 times" in inconsistency(4 * np.ones((4, 3)), np.ones((4, 3)), 6)[0]
     assert inconsistency(np.ones((4, 3)), np.ones((4, 3)), 0) == ()
+
+
+def test_one_name_has_one_wording_whichever_estimator_refuses() -> None:
+    """A revolution added alone has no row; everything else reads alike, gathered or solved at once."""
+    spoiled: list[tuple[Array, Array, Array]] = [
+        (np.full((6, 3), np.nan), RATES, np.full((6, 3), VARIANCE)),
+        (np.zeros((6, 3)), RATES, np.full((6, 3), VARIANCE)),
+        (readings(), RATES, np.zeros((6, 3))),
+        (readings(), 0 * RATES, np.full((6, 3), VARIANCE)),
+        (readings()[:5], RATES[:5], np.full((5, 3), VARIANCE)),
+    ]
+    for means, rates, variances in spoiled:
+        speeds = np.linalg.norm(rates, axis=1)
+        with pytest.raises(Fault) as at_once:
+            solve_levenberg_marquardt(means, speeds, variances)
+        with pytest.raises(Fault) as gathered:
+            accumulated = Accumulator.empty()
+            for mean, speed, variance in zip(means, speeds, variances, strict=True):
+                accumulated = accumulated.add(mean, variance, float(speed))
+            accumulated.solve()
+        assert str(gathered.value) == str(at_once.value).replace(", row 0", "")
+
+
+def test_a_wrong_unit_is_named_alike_by_scale_factor_and_by_turn_rate() -> None:
+    for degrees_read in (lambda: check_unit(np.full(3, np.pi / 180)), lambda: check_reading_ratio(57.3, "sweep 1")):
+        with pytest.raises(Fault, match=r"wrong_unit: .*: the readings look like degrees per second given as rad/s"):
+            degrees_read()
+    with pytest.raises(Fault, match=r"wrong_unit: in sweep 1 the gyroscope reads 5 times .*: check range"):
+        check_reading_ratio(5.0, "sweep 1")
+    with pytest.raises(Fault, match="wrong_unit"):
+        check_reading_ratio(0.25, "sweep 1")
+    check_reading_ratio(3.9, "sweep 1")

@@ -2,13 +2,11 @@
 
 import numpy as np
 import pytest
-from numpy.typing import NDArray
 
 from rig.errors import Fault
 from rig.estimation.accumulator import Accumulator, Solution
+from rig.estimation.arrays import Array
 from rig.estimation.six_observation import by_algorithm_1, closed_form, design
-
-Array = NDArray[np.float64]
 
 SPEED = np.pi / 3
 DIRECTIONS = np.array([[0, 0, -1], [0, 0, 1], [1, 0, 0], [-1, 0, 0], [0, 1, 0], [0, -1, 0]], dtype=np.float64)

@@ -1,31 +1,28 @@
 """Tri-axial calibration on a simulated rate table: truth found, uncertainty honest, blind spots refused."""
 
-from typing import Any
-
 import numpy as np
 import pytest
-from numpy.typing import NDArray
 from scipy.spatial.transform import Rotation
 
 from rig.errors import Fault
-from rig.estimation.reference_model import jacobian, predicted
+from rig.estimation.arrays import Array
+from rig.estimation.reference_model import KnownNorm, KnownVector, jacobian, predicted
 from rig.estimation.triaxial import Method, TriaxialSolution, solve_triaxial, solve_triaxial_batch
-from support.rate_table import (
-    AVERAGING_S,
+from rig.study.rate_table import (
+    AVERAGED_S,
     DEG_H,
-    EARTH_RATE,
-    GYRO_BIAS,
+    GYRO_BIAS_RAD_S,
     GYRO_MATRIX,
     GYRO_RANDOM_WALK,
-    attitudes,
-    noisy,
-    turning,
+    GYRO_REFERENCE_RAD_S,
+    swinging,
 )
-
-Array = NDArray[np.float64]
+from support.rate_table import attitudes, noisy
 
 METHODS: tuple[Method, ...] = ("as_published", "maximum_likelihood")
-THETA = np.concatenate([GYRO_MATRIX.ravel(), EARTH_RATE, GYRO_BIAS])
+THETA = np.concatenate([GYRO_MATRIX.ravel(), GYRO_REFERENCE_RAD_S, GYRO_BIAS_RAD_S])
+UP = np.array([0.0, 0.0, -1.0])  # north-east-down; in the north the Earth's rate has a part upwards
+EARTH = KnownNorm(float(np.linalg.norm(GYRO_REFERENCE_RAD_S)), UP)
 UNEVEN = np.array([1.0, 2.0, 0.5])  # Fig. 3: one axis is noisier than the others
 
 
@@ -39,9 +36,9 @@ def readings(r: Array, rates: Array | None = None, theta: Array = THETA) -> Arra
 
 @pytest.mark.parametrize("method", METHODS)
 def test_the_published_gyroscope_is_found_from_25_hz_samples(method: Method) -> None:
-    r, rates = turning(15000)  # ten minutes
+    r, rates = swinging(600)  # ten minutes
     variances = np.full((len(r), 3), GYRO_RANDOM_WALK**2 * 25)
-    solution = solve_triaxial(noisy(readings(r, rates), variances), r, variances, known=rates, method=method)
+    solution = solve_triaxial(noisy(readings(r, rates), variances), r, variances, KnownVector(rates), method=method)
     std = np.sqrt(np.diag(solution.covariance))
     assert np.all(np.abs(values(solution) - THETA) < 4 * std)
     np.testing.assert_allclose(solution.matrix, GYRO_MATRIX, atol=2e-6)
@@ -55,14 +52,12 @@ def test_the_published_gyroscope_is_found_from_25_hz_samples(method: Method) -> 
 @pytest.mark.parametrize("method", METHODS)
 def test_a_still_gyroscope_knows_the_earth_from_its_norm(method: Method) -> None:
     r = attitudes(10)
-    variances = np.full((10, 3), GYRO_RANDOM_WALK**2 / AVERAGING_S)
-    norm = float(np.linalg.norm(EARTH_RATE))
-    up = [0, 0, -1]  # north-east-down; in the north the Earth's rate has a part upwards
-    exact = solve_triaxial(readings(r), r, variances, reference_norm=norm, reference_side=up, method=method)
+    variances = np.full((10, 3), GYRO_RANDOM_WALK**2 / AVERAGED_S)
+    exact = solve_triaxial(readings(r), r, variances, EARTH, method=method)
     np.testing.assert_allclose(values(exact), THETA, rtol=1e-9, atol=1e-17)
     assert (exact.rank, exact.observations) == (14, 10)
     with pytest.raises(Fault, match="mirrored_axis"):  # the wrong side turns F as well
-        solve_triaxial(readings(r), r, variances, reference_norm=norm, reference_side=[0, 0, 1], method=method)
+        solve_triaxial(readings(r), r, variances, KnownNorm(EARTH.norm, [0, 0, 1]), method=method)
 
 
 @pytest.mark.parametrize("method", METHODS)
@@ -70,14 +65,12 @@ def test_a_still_gyroscope_knows_the_earth_from_its_norm(method: Method) -> None
 def test_the_covariance_is_that_of_repeated_calibrations(method: Method, still: bool) -> None:
     r = attitudes(16)
     rates = None if still else np.random.default_rng(3).normal(size=(16, 3)) * 1e-3
-    options: dict[str, Any] = (
-        {"reference_norm": float(np.linalg.norm(EARTH_RATE)), "reference_side": [0, 0, -1]} if still else {}
-    )
-    variances = np.full((16, 3), GYRO_RANDOM_WALK**2 / AVERAGING_S) * UNEVEN
+    known = EARTH if rates is None else KnownVector(rates)
+    variances = np.full((16, 3), GYRO_RANDOM_WALK**2 / AVERAGED_S) * UNEVEN
     exact = readings(r, rates)
-    reported = solve_triaxial(exact, r, variances, known=rates, method=method, **options).covariance
+    reported = solve_triaxial(exact, r, variances, known, method=method).covariance
     draws = noisy(exact, variances, runs=6000)
-    found = solve_triaxial_batch(draws, r, variances, known=rates, method=method, **options)
+    found = solve_triaxial_batch(draws, r, variances, known, method=method)
     std = np.sqrt(np.diag(reported))
     np.testing.assert_allclose(np.var(found, axis=0), std**2, rtol=0.1)
     np.testing.assert_allclose(np.cov(found.T) / np.outer(std, std), reported / np.outer(std, std), atol=0.1)
@@ -86,15 +79,15 @@ def test_the_covariance_is_that_of_repeated_calibrations(method: Method, still: 
 
 
 def test_noise_in_slow_readings_biases_the_published_estimate_and_only_that() -> None:
-    r, rates = turning(1000)
+    r, rates = swinging(40)
     rates = 0.02 * rates  # ten times the noise that TRIAX reports of single samples
     variances = np.full((1000, 3), np.radians(0.0475) ** 2)
     exact = readings(r, rates)
     ratios = {}
     for method in METHODS:
-        solution = solve_triaxial(noisy(exact, variances), r, variances, known=rates, method=method)
+        solution = solve_triaxial(noisy(exact, variances), r, variances, KnownVector(rates), method=method)
         draws = noisy(exact, variances, runs=20)
-        found = np.array([solve_triaxial_batch(d, r, variances, known=rates, method=method) for d in draws])
+        found = np.array([solve_triaxial_batch(d, r, variances, KnownVector(rates), method=method) for d in draws])
         ratios[method] = np.abs(found.mean(axis=0) - THETA) / np.sqrt(np.diag(solution.covariance))
         assert any("maximum_likelihood" in warning for warning in solution.warnings) == (method == "as_published")
     assert ratios["as_published"][:9].max() > 3
@@ -104,8 +97,7 @@ def test_noise_in_slow_readings_biases_the_published_estimate_and_only_that() ->
 def test_maximum_likelihood_makes_more_of_uneven_noise() -> None:
     r = attitudes(30)
     variances = np.full((30, 3), (0.05 * DEG_H) ** 2) * np.array([100.0, 1.0, 1.0])
-    options: dict[str, Any] = {"reference_norm": float(np.linalg.norm(EARTH_RATE)), "reference_side": [0, 0, -1]}
-    plain, best = (solve_triaxial(readings(r), r, variances, method=method, **options) for method in METHODS)
+    plain, best = (solve_triaxial(readings(r), r, variances, EARTH, method=method) for method in METHODS)
     gain = np.diag(plain.covariance) / np.diag(best.covariance)
     assert np.all(gain > 0.999) and gain.max() > 5
 
@@ -115,15 +107,12 @@ def test_the_table_frame_and_the_units_are_a_matter_of_naming(method: Method) ->
     r, turn = attitudes(12), Rotation.from_rotvec([0.4, -0.3, 0.9]).as_matrix()
     variances = np.full((12, 3), (0.05 * DEG_H) ** 2)
     m = noisy(readings(r), variances)
-    norm, side = float(np.linalg.norm(EARTH_RATE)), np.array([0.0, 0.0, -1.0])
-    one = solve_triaxial(m, r, variances, reference_norm=norm, reference_side=side, method=method)
-    turned = solve_triaxial(m, turn @ r, variances, reference_norm=norm, reference_side=turn @ side, method=method)
+    one = solve_triaxial(m, r, variances, EARTH, method=method)
+    turned = solve_triaxial(m, turn @ r, variances, KnownNorm(EARTH.norm, turn @ UP), method=method)
     np.testing.assert_allclose(turned.matrix, one.matrix, atol=1e-9)
     np.testing.assert_allclose(turned.reference, turn @ one.reference, rtol=1e-7)
     unit = 1 / DEG_H
-    scaled = solve_triaxial(
-        m * unit, r, variances * unit**2, reference_norm=norm * unit, reference_side=side, method=method
-    )
+    scaled = solve_triaxial(m * unit, r, variances * unit**2, KnownNorm(EARTH.norm * unit, UP), method=method)
     np.testing.assert_allclose(scaled.matrix, one.matrix, atol=1e-9)
     np.testing.assert_allclose(scaled.bias, one.bias * unit, atol=1e-7)
     assert scaled.condition == pytest.approx(one.condition)
@@ -154,30 +143,28 @@ def test_turns_about_one_axis_are_not_enough(axis: str, noise: float) -> None:
     variances = np.full((12, 3), (0.05 * DEG_H) ** 2)
     m = noisy(readings(about(axis)), np.full((12, 3), noise**2))
     with pytest.raises(Fault, match=r"rank_deficient: .* of 14\).*more attitudes"):
-        solve_triaxial(m, about(axis), variances, reference_norm=15 * DEG_H, reference_side=[0, 0, -1])
+        solve_triaxial(m, about(axis), variances, KnownNorm(15 * DEG_H, [0, 0, -1]))
 
 
 def test_rates_about_one_axis_are_not_enough() -> None:
     r, rates = about("z"), np.linspace(-1, 1, 12)[:, None] * np.array([0.0, 0.0, 1.0])
     variances = np.full((12, 3), 1e-12)
     with pytest.raises(Fault, match=r"rank_deficient: .* of 15\)"):
-        solve_triaxial(noisy(readings(r, rates), variances), r, variances, known=rates)
+        solve_triaxial(noisy(readings(r, rates), variances), r, variances, KnownVector(rates))
 
 
 def test_a_few_attitudes_close_together_are_not_enough() -> None:
     r = Rotation.from_rotvec(0.001 * np.random.default_rng(1).normal(size=(12, 3))).as_matrix()
     variances = np.full((12, 3), (0.05 * DEG_H) ** 2)
     with pytest.raises(Fault, match=r"rank_deficient|ill_conditioned"):
-        solve_triaxial(
-            noisy(readings(r), variances), r, variances, reference_norm=15 * DEG_H, reference_side=[0, 0, -1]
-        )
+        solve_triaxial(noisy(readings(r), variances), r, variances, KnownNorm(15 * DEG_H, [0, 0, -1]))
 
 
 def test_a_reference_across_the_given_side_has_no_sign() -> None:
     theta = np.concatenate([np.eye(3).ravel(), [1.0, 0.0, 0.01], np.zeros(3)])
     r = attitudes(10)
     with pytest.raises(Fault, match="sign_unknown"):
-        solve_triaxial(readings(r, theta=theta), r, np.full((10, 3), 1e-8), reference_norm=1, reference_side=[0, 0, 1])
+        solve_triaxial(readings(r, theta=theta), r, np.full((10, 3), 1e-8), KnownNorm(1, [0, 0, 1]))
 
 
 def test_what_is_no_attitude_is_refused() -> None:
@@ -185,6 +172,6 @@ def test_what_is_no_attitude_is_refused() -> None:
     m, variances = readings(r), np.full((10, 3), 1e-14)
     for wrong in (2 * r, -r, r + 0.01):
         with pytest.raises(Fault, match="bad_attitude"):
-            solve_triaxial(m, wrong, variances, reference_norm=1, reference_side=[0, 0, -1])
-    with pytest.raises(ValueError, match="known"):
-        solve_triaxial(m, r, variances)
+            solve_triaxial(m, wrong, variances, KnownNorm(1, [0, 0, -1]))
+    with pytest.raises(ValueError, match="known must be"):
+        solve_triaxial(m, r, variances, KnownVector(m[:9]))

@@ -2,13 +2,11 @@
 
 import numpy as np
 import pytest
-from numpy.typing import NDArray
 from scipy.spatial.transform import Rotation
 
 from rig.errors import Fault
+from rig.estimation.arrays import Array
 from rig.estimation.vector_model import VectorSolution, non_orthogonality, solve_vector_batch, solve_vector_model
-
-Array = NDArray[np.float64]
 
 SPEED = np.pi / 3
 SWEEPS = SPEED * np.kron(np.eye(3), [[1.0], [-1.0]])

@@ -14,7 +14,7 @@ from scipy.spatial.transform import Rotation
 from firmware_host.protocol import MAX_SCALE, METHODS, SOLUTION_STATUSES
 from rig.errors import Fault
 from rig.estimation import refusals
-from rig.estimation.accumulator import Accumulator, Estimator, Solution
+from rig.estimation.accumulator import Accumulator, SixObservationEstimator, Solution
 from support.host_board import core
 
 Array = NDArray[np.float64]
@@ -63,7 +63,7 @@ def solve_on_board(means_rad_s: Array, speeds_rad_s: Array, method: str = "close
     )
 
 
-def solve_on_host(means_rad_s: Array, speeds_rad_s: Array, estimator: Estimator = "newton") -> Solution:
+def solve_on_host(means_rad_s: Array, speeds_rad_s: Array, estimator: SixObservationEstimator = "newton") -> Solution:
     """In double precision, from what single precision holds of the observations, all with the same weight."""
     accumulated = Accumulator.empty()
     for mean, speed in zip(means_rad_s.astype(np.float32), speeds_rad_s.astype(np.float32), strict=True):
