@@ -7,7 +7,7 @@ from typing import Protocol
 import numpy as np
 
 from rig.errors import Fault
-from rig.estimation.estimate import Array
+from rig.estimation.arrays import Array
 from rig.observation.observe import Observation
 
 MIN_INDEPENDENCE = 1e-3  # least over greatest information about a turn; revolutions about one axis alone have none

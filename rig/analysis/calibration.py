@@ -10,9 +10,9 @@ import numpy as np
 from rig.data.run_file import RecordedSensor, RunData
 from rig.data.settings import ObservationThresholds
 from rig.errors import Fault, Refused
-from rig.estimation.accumulator import Accumulator, Solution
-from rig.estimation.accumulator import Estimator as SixObservation
-from rig.estimation.estimate import Array, Estimate
+from rig.estimation.accumulator import Accumulator, SixObservationEstimator, Solution
+from rig.estimation.arrays import Array
+from rig.estimation.estimate import Estimate
 from rig.estimation.levenberg_marquardt import LevenbergMarquardtSolution, solve_levenberg_marquardt
 from rig.estimation.refusals import check_duplicates
 from rig.estimation.vector_model import VectorSolution, solve_vector_model
@@ -144,7 +144,7 @@ def solve_vector(
     )
 
 
-def solve_six_observation(observations: Sequence[Observation], estimator: SixObservation) -> Solution:
+def solve_six_observation(observations: Sequence[Observation], estimator: SixObservationEstimator) -> Solution:
     """Accumulate and solve: weighted by inverse variance, or all alike where the paper's algorithm is asked for."""
     accumulated = Accumulator.empty()
     for observation in observations:

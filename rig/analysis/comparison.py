@@ -14,7 +14,7 @@ from numpy.typing import NDArray
 from rig.analysis.alignment import mean_rates
 from rig.data.run_file import RunData
 from rig.errors import Fault
-from rig.estimation.estimate import Array
+from rig.estimation.arrays import Array
 from rig.observation.average import Stream, on_clock
 from rig.observation.observe import MIN_REST_SAMPLES, REST_SETTLING_S, Observation, SensorObservations, finished
 from rig.observation.timebase import TimeBase

@@ -10,6 +10,7 @@ from typing import Any
 from rich.console import Console
 
 from rig.analysis.calibration import known_estimator, or_fault, solve_observations, solve_six_observation
+from rig.errors import Refused, raised_as
 from rig.estimation.six_observation import MODEL, PARAMETER_UNITS, PARAMETERS
 from rig.observation.csv_import import read
 from rig.report.sensor import estimate_document, outcome_document
@@ -19,11 +20,12 @@ from rig.report.table import estimate_table
 def solve_external(samples: Path, sweeps: Path, estimator: str, *, as_json: bool) -> int:
     """Solve two CSV files and print the result, the six-observation solution beside it; returns 0.
 
-    Raises Refused `unknown_estimator` and as `csv_import.read` does; Fault as the estimator does.
+    Raises Refused `unknown_estimator`, and whatever `csv_import.read` and the estimator find wrong.
     """
     chosen = known_estimator(estimator)
-    data = read(samples, sweeps)
-    solution = solve_observations(data.sweeps, chosen, data.rests)
+    with raised_as(Refused):  # nothing runs here: whatever is wrong with the data, no arm had to be stopped for it
+        data = read(samples, sweeps)
+        solution = solve_observations(data.sweeps, chosen, data.rests)
     document = {
         "schema": "rig.external/1",
         "samples": str(samples),

@@ -17,6 +17,7 @@ import numpy as np
 from rig.data.run_file import RunData
 from rig.data.settings import ObservationThresholds
 from rig.errors import Fault
+from rig.estimation.refusals import check_reading_ratio
 from rig.observation.average import Average, Stream, average, between, on_the_arms_clock
 from rig.observation.revolution import Revolution, arm_states_lost, describe, find_revolution
 from rig.observation.timebase import ArmMotion, Array, TimeBase
@@ -26,21 +27,21 @@ REST_SETTLING_S = 0.2  # kept away from either end of a rest
 MAX_REST_TRAVEL_RAD = 1e-3
 MIN_REST_SAMPLES = 20
 MIN_RESTS = 3  # to tell whether the bias drifts
-MAX_READING_RATIO = 4.0  # reading over turn rate, either way: no gyroscope is that far off, a wrong unit or range is
 
 
 @dataclass(frozen=True, slots=True)
 class Observation:
     """One revolution: sweep `sweep` of the plan turned `joint_name` in `direction` at the mean speed 2π/T.
 
+    What turned the sensor is not known (None) of data recorded elsewhere.
     `axis` ("x", "y", "z") and `sign` name the sensor axis nominally along the turn; `axis_flange` (3,) is the unit
     vector of the turn in the flange frame by the measured joints; `speed_std_rad_s` comes from arm states too far apart
     to tell the turn's ends exactly; `lost` samples are missing from the average.
     """
 
     sweep: int
-    joint_name: str
-    direction: str
+    joint_name: str | None
+    direction: str | None
     axis: str
     sign: int
     axis_flange: Array
@@ -83,6 +84,12 @@ def observe(
         tuple(replace(o, average=_drifting(o.average, drift)) for o in revolutions),
         tuple(_drifting(rest, drift) for rest in rests),
     )
+
+
+def nearest_axis(vector: Array) -> tuple[str, int]:
+    """The axis, "x", "y" or "z", nearest to a direction (3,), and the sign (1, −1) of the direction along it."""
+    nearest = int(np.argmax(np.abs(vector)))
+    return "xyz"[nearest], 1 if vector[nearest] > 0 else -1
 
 
 def finished_sweeps(run: RunData) -> frozenset[int]:
@@ -167,14 +174,14 @@ def _observation(
     expected = np.array(stream.sensor.mounting) @ turn.axis_flange
     turned = averaged.mean_rad_s - stream.clock.zero_rate_rad_s
     _check_direction(turned, expected, where, settings)
-    _check_unit(float(np.linalg.norm(turned)) / turn.speed_rad_s, where)
-    nearest = int(np.argmax(np.abs(expected)))
+    check_reading_ratio(float(np.linalg.norm(turned)) / turn.speed_rad_s, where)
+    axis, sign = nearest_axis(expected)
     return Observation(
         sweep=sweep["index"],
         joint_name=sweep["joint_name"],
         direction=sweep["direction"],
-        axis="xyz"[nearest],
-        sign=1 if expected[nearest] > 0 else -1,
+        axis=axis,
+        sign=sign,
         axis_flange=turn.axis_flange,
         speed_rad_s=turn.speed_rad_s,
         speed_std_rad_s=turn.speed_std_rad_s,
@@ -255,12 +262,3 @@ def _check_direction(turned: Array, expected: Array, where: str, settings: Obser
         f"in {where} the gyroscope reads {what}",
         "Correct the sensor's mounting in the configuration, or how it is fixed to the flange",
     )
-
-
-def _check_unit(ratio: float, where: str) -> None:
-    if not 1 / MAX_READING_RATIO < ratio < MAX_READING_RATIO:
-        raise Fault(
-            "wrong_unit",
-            f"in {where} the gyroscope reads {ratio:.3g} times the turn rate",
-            "Check the sensor's range and sensitivity, and that readings are in rad/s",
-        )

@@ -17,7 +17,7 @@ from rig.analysis.verification import Verification, verify
 from rig.data.run_file import RunData
 from rig.data.settings import Limits
 from rig.errors import Fault
-from rig.estimation.estimate import Array
+from rig.estimation.arrays import Array
 from rig.report.figures import write_figures
 from rig.report.verification_table import verification_document, verification_lines, verification_table
 from support.synthetic_run import SCALE, Setup

@@ -1,6 +1,7 @@
 """Data recorded elsewhere, as CSV files: solved like the rig's own, refused by name where they cannot be right."""
 
 import json
+import os
 from collections.abc import Callable
 from pathlib import Path
 
@@ -8,7 +9,7 @@ import numpy as np
 import pytest
 
 from rig.cli import main
-from rig.errors import Fault, Refused
+from rig.errors import Fault, Refused, RigError
 from rig.observation.csv_import import ExternalData, read
 from support.paths import DOCS
 
@@ -69,6 +70,7 @@ def test_the_example_holds_six_turns_and_six_rests() -> None:
         ("y", 1),
         ("y", -1),
     ]
+    assert {(turn.joint_name, turn.direction) for turn in data.sweeps} == {(None, None)}
     assert len(data.rests) == 6
     assert all(turn.speed_rad_s == pytest.approx(np.pi / 3) for turn in data.sweeps)
 
@@ -100,14 +102,47 @@ def test_speeds_may_stand_in_place_of_angles(tmp_path: Path) -> None:
         ("bad_sweep", list, lambda lines: [lines[0], "7,1,0,0,-1,6.28", *lines[2:]]),
         ("bad_sweep", list, lambda lines: [lines[0], "1,7,0,0,-2,6.28", *lines[2:]]),
         ("overlapping_sweeps", list, lambda lines: [*lines, lines[1]]),
+        # What NumPy would warn of on its way to a refusal, and what it could not have computed at all.
+        ("bad_sweep", list, lambda lines: [lines[0], "1,1.000000000001,0,0,-1,6.28"]),
+        ("not_a_number", list, lambda lines: [lines[0], "1,7,0,0,-1,1e300"]),
+        ("not_a_number", lambda lines: [*lines[:100], "1.98,1e200,0,0", *lines[101:]], list),
+        ("too_few_observations", list, lambda lines: lines[:1]),
+        ("lost_samples", list, lambda lines: [*lines, "80,86,0,0,1,6.28"]),
+        ("wrong_columns", list, lambda lines: []),
+        ("wrong_columns", lambda lines: [], list),
+        ("no_file", list, lambda lines: [*lines[:2], "1" * 200_000]),
+        ("no_file", lambda lines: [lines[0], "1" * 200_000], list),
     ],
 )
 def test_files_that_cannot_be_right_are_refused_by_name(
     tmp_path: Path, name: str, samples: Callable[[list[str]], list[str]], sweeps: Callable[[list[str]], list[str]]
 ) -> None:
-    with pytest.raises(Refused) as refusal:
+    with pytest.raises(RigError) as refusal:
         read_with(tmp_path, samples, sweeps)
     assert refusal.value.name == name
+    assert len(str(refusal.value)) < 500
+    # Nothing ran, whatever is wrong.
+    assert main(["solve", str(tmp_path / "samples.csv"), "--sweeps", str(tmp_path / "sweeps.csv")]) == 2
+
+
+def test_only_regular_files_of_a_sensible_size_are_opened(tmp_path: Path) -> None:
+    """A pipe nobody writes to and a device without an end would be read for ever."""
+    pipe, endless, huge = tmp_path / "pipe.csv", Path("/dev/zero"), tmp_path / "huge.csv"
+    os.mkfifo(pipe)
+    with huge.open("wb") as file:
+        file.truncate(300_000_000)
+    sweeps = EXAMPLES / "sweeps.csv"
+    for path, why in ((pipe, "no regular file"), (endless, "no regular file"), (huge, "larger than 256 MB")):
+        with pytest.raises(Refused, match=f"no_file: .*{why}"):
+            read(path, sweeps)
+    with pytest.raises(Refused, match=r"no_file: .*no regular file"):
+        read(EXAMPLES / "samples.csv", pipe)
+
+
+def test_what_a_message_quotes_is_short_and_harmless(tmp_path: Path) -> None:
+    with pytest.raises(Refused) as refusal:
+        read_with(tmp_path, lambda lines: [*lines[:100], "1.98,\x1b[2J" + "9" * 10_000, *lines[101:]])
+    assert "\x1b" not in str(refusal.value) and len(str(refusal.value)) < 500
 
 
 def test_the_refusal_names_the_column_to_convert(tmp_path: Path) -> None:
@@ -126,7 +161,7 @@ def test_a_missing_direction_leaves_the_vector_model_alone(tmp_path: Path, capsy
     arguments = ["solve", str(EXAMPLES / "samples.csv"), "--sweeps", str(sweeps)]
     assert main([*arguments, "--json"]) == 0
     assert "too_few_observations" in json.loads(capsys.readouterr().out)["six_observation"]["error"]
-    assert main([*arguments, "--estimator", "newton"]) == 3
+    assert main([*arguments, "--estimator", "newton"]) == 2
     assert "too_few_observations" in capsys.readouterr().err
 
 
@@ -142,5 +177,5 @@ def test_axes_with_a_wrong_sign_are_refused(tmp_path: Path, capsys: pytest.Captu
         return [lines[0], *(",".join([*row[:2], str(-int(row[2])), *row[3:]]) for row in rows)]
 
     sweeps = edited(tmp_path, "sweeps.csv", mirrored)
-    assert main(["solve", str(EXAMPLES / "samples.csv"), "--sweeps", str(sweeps)]) == 3
+    assert main(["solve", str(EXAMPLES / "samples.csv"), "--sweeps", str(sweeps)]) == 2
     assert "mirrored_axis" in capsys.readouterr().err
