@@ -45,18 +45,21 @@ def refuse_other_firmware(identity: BoardIdentity) -> None:
         )
 
 
+def sensor_entry(identity: BoardIdentity, name: str, section: SensorSection) -> SensorInfo:
+    """The board's entry for a configured sensor, whatever answers in its place. Raises Refused `sensor_missing`."""
+    for info in identity.sensors:
+        if configured_part(info.part) == section.part:
+            return info
+    raise _missing(name, section, "no driver for it")
+
+
 def find_sensor(identity: BoardIdentity, name: str, section: SensorSection) -> SensorInfo:
-    """The board's entry for a configured sensor. Raises Refused `sensor_missing` or `sensor_mismatch`."""
-    info = next((sensor for sensor in identity.sensors if configured_part(sensor.part) == section.part), None)
-    if info is not None and info.present:
+    """The board's entry for a configured sensor that answers. Raises Refused `sensor_missing` or `sensor_mismatch`."""
+    info = sensor_entry(identity, name, section)
+    if info.present:
         return info
-    if info is None or info.who_am_i in NOBODY:
-        seen = "no driver for it" if info is None else f"nothing answers: its identity reads 0x{info.who_am_i:02x}"
-        raise Refused(
-            "sensor_missing",
-            f"sensors.{name}: the board finds no {section.part} ({seen})",
-            "Check the sensor's supply and SPI wires, and sensors.*.part in the configuration",
-        )
+    if info.who_am_i in NOBODY:
+        raise _missing(name, section, f"nothing answers: its identity reads 0x{info.who_am_i:02x}")
     raise Refused(
         "sensor_mismatch",
         f"sensors.{name}: in the place of the {section.part} answers {impostor(section.part, info.who_am_i)}",
@@ -64,10 +67,18 @@ def find_sensor(identity: BoardIdentity, name: str, section: SensorSection) -> S
     )
 
 
+def _missing(name: str, section: SensorSection, seen: str) -> Refused:
+    return Refused(
+        "sensor_missing",
+        f"sensors.{name}: the board finds no {section.part} ({seen})",
+        "Check the sensor's supply and SPI wires, and sensors.*.part in the configuration",
+    )
+
+
 def stored_calibration(board: Board, name: str, section: SensorSection) -> StoredCalibration:
     """What the board has stored to correct a configured sensor's readings by.
 
-    Raises Refused `no_calibration`, `another_sensor`, `another_range`, and as `find_sensor`.
+    Raises Refused `no_calibration`, and as `find_sensor` and `refuse_other_sensor`.
     """
     stored = board.read_calibration(find_sensor(board.identity, name, section).index)
     if stored is None:
@@ -76,22 +87,36 @@ def stored_calibration(board: Board, name: str, section: SensorSection) -> Store
             f"sensors.{name}: the board has no calibration stored to correct its readings by",
             "Calibrate it first, or store a calibration with `rig board calibration write`",
         )
-    kept = stored.calibration
-    if kept.serial_number != section.serial_number:
+    refuse_other_sensor(
+        f"sensors.{name}: the calibration stored on the board",
+        configured_part(stored.part),
+        stored.calibration.serial_number,
+        stored.range_deg_s,
+        section,
+    )
+    return stored
+
+
+def refuse_other_sensor(
+    calibration: str, part: str, serial_number: str, range_deg_s: float, section: SensorSection
+) -> None:
+    """Raises Refused `another_sensor`, `another_range` unless a calibration is of the configured sensor and range.
+
+    `calibration` says which calibration it is; `part`, `serial_number` and `range_deg_s` what it was made for.
+    """
+    if (part, serial_number) != (section.part, section.serial_number):
         raise Refused(
             "another_sensor",
-            f"sensors.{name}: the board has the calibration of {kept.serial_number} stored, the configuration says "
+            f"{calibration} is of {part} {serial_number}, the configuration says {section.part} "
             f"{section.serial_number}",
-            "Calibrate this sensor, or correct serial_number",
+            "Calibrate this sensor, or correct part and serial_number in the configuration",
         )
-    if not isclose(stored.range_deg_s, section.range_deg_s, rel_tol=1e-6):
+    if not isclose(range_deg_s, section.range_deg_s, rel_tol=1e-6):
         raise Refused(
             "another_range",
-            f"sensors.{name}: the board's calibration holds for {stored.range_deg_s:g} °/s, the configuration says "
-            f"{section.range_deg_s:g} °/s",
+            f"{calibration} holds for {range_deg_s:g} °/s, the configuration says {section.range_deg_s:g} °/s",
             "Set range_deg_s to what it was calibrated at, or calibrate at this range",
         )
-    return stored
 
 
 def configured_part(part: str) -> str:

@@ -5,11 +5,19 @@ import sys
 from collections.abc import Iterable, Iterator, Mapping, Sequence
 from contextlib import ExitStack, contextmanager
 from dataclasses import dataclass
-from math import degrees, isclose
+from math import degrees
 from pathlib import Path
 
 from firmware_host.client import Board, Calibration, StoredCalibration
-from rig.board.identify import changing, configured_part, find_sensor, refuse_other_firmware, refusing
+from rig.board.identify import (
+    changing,
+    configured_part,
+    find_sensor,
+    refuse_other_firmware,
+    refuse_other_sensor,
+    refusing,
+    sensor_entry,
+)
 from rig.board.store import calibration_of, store
 from rig.commands.laboratory import simulated_laboratory, written
 from rig.config.load import load
@@ -120,7 +128,10 @@ def _connected(config_path: Path, overrides: Sequence[str]) -> Iterator[tuple[Ri
 
 
 def _places(board: Board, config: RigConfig, sensor: str | None, among: Mapping[str, SensorSection]) -> list[_Place]:
-    """The configured sensors a command is about, and what is stored for them."""
+    """The configured sensors a command is about, and what is stored for them.
+
+    Raises Refused `no_such_sensor`, `sensor_missing`.
+    """
     if sensor is not None and sensor not in among:
         raise Refused(
             "no_such_sensor",
@@ -130,17 +141,14 @@ def _places(board: Board, config: RigConfig, sensor: str | None, among: Mapping[
     places = []
     for name in [sensor] if sensor is not None else among:
         section = config.sensors[name]
-        index = next((s.index for s in board.identity.sensors if configured_part(s.part) == section.part), None)
-        if index is None:
-            find_sensor(board.identity, name, section)
-            continue
+        index = sensor_entry(board.identity, name, section).index
         with refusing():
             places.append(_Place(name, section, index, board.read_calibration(index)))
     return places
 
 
 def _result_of(place: _Place, result: ResultDocument, path: Path) -> Calibration:
-    """The run's calibration of a sensor. Raises Refused `not_in_result`, `another_sensor` or `another_range`."""
+    """The run's calibration of a sensor. Raises Refused `not_in_result`, and as `refuse_other_sensor`."""
     entry = result.sensors.get(place.name)
     if entry is None or entry.role == "reference":
         raise Refused(
@@ -148,23 +156,8 @@ def _result_of(place: _Place, result: ResultDocument, path: Path) -> Calibration
             f"{path} has no calibration for sensors.{place.name}",
             f"It has: {', '.join(result.sensors) or 'none'}; choose one with --sensor",
         )
-    for what, found, wanted in (
-        ("part", entry.part, place.section.part),
-        ("serial_number", entry.serial_number, place.section.serial_number),
-    ):
-        if found != wanted:
-            raise Refused(
-                "another_sensor",
-                f"{path}: {place.name}.{what} is {found}, the configuration says {wanted}",
-                "Store a calibration only on the sensor it was made for",
-            )
-    if not isclose(degrees(entry.range_rad_s), place.section.range_deg_s, rel_tol=1e-6):
-        raise Refused(
-            "another_range",
-            f"{path}: {place.name} was calibrated at {degrees(entry.range_rad_s):g} °/s, the configuration says "
-            f"{place.section.range_deg_s:g} °/s",
-            "Set range_deg_s to what it was calibrated at, or calibrate at this range",
-        )
+    calibration, range_deg_s = f"{path}: the calibration of {place.name}", degrees(entry.range_rad_s)
+    refuse_other_sensor(calibration, entry.part, entry.serial_number, range_deg_s, place.section)
     return calibration_of(entry)
 
 

@@ -11,7 +11,7 @@ from numpy.typing import ArrayLike
 from rig.errors import Fault
 from rig.estimation.arrays import Array
 
-MAX_READING_RATIO = 4.0  # reading over what is felt, either way: no sensor is that far off, a wrong unit is
+MAX_SCALE = 4.0  # either way: no sensor's scale factor is that far off, a wrong unit is
 MIN_ALIGNMENT = 0.7  # cosine between an axis and where it should point; beyond 45° it is another axis
 CONFUSED = (  # ratios of reading over what is felt that a wrong unit gives
     (180 / np.pi, "the readings look like degrees per second given as rad/s"),
@@ -125,7 +125,7 @@ def check_reading_ratio(ratio: float, where: str) -> None:
 def _believable(ratio: ArrayLike) -> bool:
     """Whether ratios of reading over what is felt, or their inverses, can be a sensor's."""
     ratios = np.asarray(ratio, dtype=np.float64)
-    return bool(np.all((ratios < MAX_READING_RATIO) & (ratios > 1 / MAX_READING_RATIO)))
+    return bool(np.all((ratios < MAX_SCALE) & (ratios > 1 / MAX_SCALE)))
 
 
 def _wrong_unit(what: str, ratio: float) -> Fault:

@@ -163,9 +163,9 @@ def test_what_is_no_calibration_that_passed_is_refused(
 @pytest.mark.parametrize(
     ("changes", "name", "words"),
     [
-        ({"part": "mpu9250"}, "another_sensor", "gyro.part is mpu9250"),
-        ({"serial_number": "LSM9DS1-002"}, "another_sensor", "gyro.serial_number is LSM9DS1-002"),
-        ({"range_rad_s": radians(500)}, "another_range", "calibrated at 500 °/s"),
+        ({"part": "mpu9250"}, "another_sensor", "gyro is of mpu9250 LSM9DS1-001"),
+        ({"serial_number": "LSM9DS1-002"}, "another_sensor", "gyro is of lsm9ds1 LSM9DS1-002"),
+        ({"range_rad_s": radians(500)}, "another_range", "gyro holds for 500 °/s"),
         ({"role": "reference"}, "not_in_result", "no calibration for sensors.gyro"),
     ],
 )
@@ -209,7 +209,7 @@ def test_a_calibration_of_another_sensor_or_range_corrects_nothing(laboratory: W
         board.configure(0, section.rate_hz, section.range_deg_s)
         store(board, 0, calibration_of(found))
         for changes, name, words in (
-            ({"serial_number": "LSM9DS1-002"}, "another_sensor", "the calibration of LSM9DS1-001"),
+            ({"serial_number": "LSM9DS1-002"}, "another_sensor", "on the board is of lsm9ds1 LSM9DS1-001"),
             ({"range_deg_s": 500.0}, "another_range", "holds for 245 °/s"),
         ):
             with pytest.raises(Refused) as refusal:
