@@ -102,9 +102,13 @@ class SensorCounts:
 
 @dataclass(frozen=True, slots=True)
 class BoardStatus:
-    """The board's health; counts since its last reset. `frames_lost` counts those this program never got."""
+    """The board's health; counts since its last reset.
+
+    `frames_lost` counts those this program never got, `frames_repeated` those it got twice and took once.
+    """
 
     frames_lost: int
+    frames_repeated: int
     uptime_s: float
     rx_errors: int
     tx_overruns: int
@@ -117,11 +121,12 @@ class BoardStatus:
     sensors: tuple[SensorCounts, ...]
 
     @classmethod
-    def of(cls, frame: Frame, frames_lost: int) -> Self:
+    def of(cls, frame: Frame, frames_lost: int, frames_repeated: int) -> Self:
         """A `report` frame."""
         values = frame.values
         return cls(
             frames_lost=frames_lost,
+            frames_repeated=frames_repeated,
             uptime_s=values["uptime_us"] * 1e-6,
             rx_errors=values["rx_errors"],
             tx_overruns=values["tx_overruns"],

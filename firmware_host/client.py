@@ -88,7 +88,7 @@ class Board:
 
     def status(self) -> BoardStatus:
         """The board's health, and the link's."""
-        return BoardStatus.of(self._ask("status"), self._link.frames_lost)
+        return BoardStatus.of(self._ask("status"), self._link.frames_lost, self._link.frames_repeated)
 
     def keep(self, sensors: Collection[int], duration_s: float) -> None:
         """Lets the board keep the readings of these sensors from now on, for at least so long, for `observe`."""

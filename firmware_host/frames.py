@@ -1,5 +1,6 @@
 """Frames to bytes and back, as `protocol.py` describes them."""
 
+from collections import OrderedDict
 from typing import Any, NamedTuple
 from zlib import crc32
 
@@ -9,6 +10,7 @@ from firmware_host.protocol import MESSAGE_BY_CODE, MESSAGE_BY_NAME, OVERHEAD, P
 from firmware_host.stuffing import stuff, unstuff
 
 _BLOCK_MAX = PAYLOAD_MAX + OVERHEAD + 1
+_REMEMBERED = 1024  # frames: more than a buffer on the way holds and may hand on twice
 _CRC_OF_INTACT = 0x2144DF1C  # of any bytes followed by their own CRC
 
 
@@ -64,24 +66,30 @@ def decode(block: bytes) -> Frame | None:
 
 
 class FrameReader:
-    """Cuts a byte stream into frames, whatever the chunks it arrives in, and counts what is missing.
+    """Cuts a byte stream into frames, whatever the chunks it arrives in, and counts what is missing or came twice.
 
-    `lost` is exact as long as fewer than 256 frames are lost in a row; the samples' own sequence tells any number.
+    `lost` is exact as long as fewer than 256 frames are lost in a row; the samples' own sequence tells any number. A
+    frame that equals one of the latest, sequence, CRC and all, is that one again: the line has delivered it twice.
     """
 
     def __init__(self) -> None:
         self._rest = b""
         self._expected: int | None = None  # sequence of the next frame
+        self._recent: OrderedDict[bytes, None] = OrderedDict()  # the latest frames' blocks, but for identities
+        self._identity = b""  # the latest identity's block
         self.damaged = 0  # blocks that did not decode
         self.lost = 0  # frames missing between the first and the latest, by their sequence
+        self.repeated = 0  # frames that had come before
         self.bytes_seen = 0
 
     def expect_restart(self) -> None:
         """The sender is about to start afresh: its next frame continues no sequence."""
         self._expected = None
+        self._recent.clear()
+        self._identity = b""
 
     def feed(self, data: bytes) -> list[Frame]:
-        """The frames that `data` completes."""
+        """The frames that `data` completes, each once."""
         self.bytes_seen += len(data)
         *blocks, rest = (self._rest + data).split(b"\0")
         self._rest = rest[: _BLOCK_MAX + 1]  # of noise, or of another baud rate, no more than tells that it is no frame
@@ -91,12 +99,31 @@ class FrameReader:
                 frame = decode(block)
                 if frame is None:
                     self.damaged += 1
+                elif self._came_before(block, frame):
+                    self.repeated += 1
                 else:
                     self._count(frame.sequence)
                     frames.append(frame)
         return frames
 
+    def _came_before(self, block: bytes, frame: Frame) -> bool:
+        """Whether the line delivers a frame again.
+
+        An idle board says the same again every 256 frames, and after a reset; so an identity is held against the
+        latest one alone, and is new when its sequence has come round.
+        """
+        if frame.name == "identity":
+            again = block == self._identity and frame.sequence != self._expected
+            self._identity = block
+            return again
+        if block in self._recent:
+            return True
+        self._recent[block] = None
+        if len(self._recent) > _REMEMBERED:
+            self._recent.popitem(last=False)
+        return False
+
     def _count(self, sequence: int) -> None:
         if self._expected is not None:
             self.lost += (sequence - self._expected) & 0xFF
-        self._expected = sequence + 1
+        self._expected = sequence + 1 & 0xFF

@@ -65,6 +65,11 @@ class BoardLink:
         """Frames the board sent and that did not come, by their sequence."""
         return self._frames.lost
 
+    @property
+    def frames_repeated(self) -> int:
+        """Frames that came twice; they are handed on once."""
+        return self._frames.repeated
+
     def expect_restart(self) -> None:
         """The board is about to count its frames anew."""
         self._frames.expect_restart()

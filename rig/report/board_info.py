@@ -62,7 +62,7 @@ def print_info(document: Mapping[str, Any]) -> None:
         "up": f"{health['uptime_s']:.1f} s, last started by: {health['reset_cause']}",
         "clock": "follows the crystal" if health["clock_locked"] else "NOT locked to the crystal: time stamps drift",
         "link": f"{health['rx_errors']} damaged requests, {health['tx_overruns']} frames without room, "
-        f"{health['frames_lost']} lost on the way",
+        f"{health['frames_lost']} lost on the way, {health['frames_repeated']} came twice",
         "sensor bus": f"{health['bus_errors']} failed reads",
         "stack": f"{health['stack_high_water_bytes']} bytes at most",
         "last fault": fault,

@@ -372,6 +372,86 @@ def test_frames_lost_on_the_way_are_counted_and_a_reboot_loses_none(wire: tuple[
         assert board.status().frames_lost == len(lost)
 
 
+def doubling(share: float, seed: int) -> tuple[Callable[[bytes], bytes], list[int]]:
+    """A wire that delivers this share of its frames twice, alone or with those before; and how many those were."""
+    random, doubled = np.random.default_rng(seed), [0]
+
+    def twice(data: bytes) -> bytes:
+        frames = [block + b"\0" for block in data.split(b"\0")[:-1]]
+        arriving = b""
+        for number, frame in enumerate(frames):
+            arriving += frame
+            if random.random() < share:
+                again = frames[max(0, number - 2) : number + 1]
+                doubled[0] += len(again)
+                arriving += b"".join(again)
+        return arriving
+
+    return twice, doubled
+
+
+@pytest.mark.parametrize("share", [0.05, 1.0])
+def test_frames_that_come_twice_are_taken_once_and_counted(wire: tuple[BoardOnAWire, str], share: float) -> None:
+    wire[0].on_send, doubled = doubling(share, seed=1)
+    batches: list[SampleBatch] = []
+    with Board(wire[1], protocol.BAUD_RATE, batches.append) as board:
+        board.configure(0, rate_hz=238, range_deg_s=245)
+        board.start()
+        wait_for(lambda: sum(len(batch.samples) for batch in batches) >= 200 and doubled[0] > 0)
+        board.check()
+        board.stop()
+        wire[0].on_send = bytes
+        status = board.status()
+    samples = np.concatenate([batch.samples for batch in batches])
+    assert samples["sequence"].tolist() == list(range(len(samples)))
+    assert (np.diff(samples["board_time_us"].astype(np.int64)) == PERIOD_US).all(), "no clock went back"
+    assert status.sensors[0].samples == len(samples)
+    assert (status.frames_lost, status.frames_repeated) == (0, doubled[0])
+
+
+@ON_ONE_WIRE
+def test_bytes_that_come_twice_cost_the_frames_they_damage_and_no_others(wire: tuple[BoardOnAWire, str]) -> None:
+    random = np.random.default_rng(2)
+    sent, arrived = bytearray(), bytearray()
+
+    def twice(data: bytes) -> bytes:
+        sent.extend(data)
+        if data and random.random() < 0.5:
+            begin, end = sorted(random.integers(0, len(data) + 1, 2).tolist())
+            data = data[:end] + data[begin:]
+        elif data and random.random() < 0.2:
+            data += data
+        arrived.extend(data)
+        return data
+
+    batches: list[SampleBatch] = []
+    with Board(wire[1], protocol.BAUD_RATE, batches.append, timeout_s=4.0) as board:
+        board.configure(0, rate_hz=238, range_deg_s=245)
+        board.start()
+        wire[0].on_send = twice
+        wait_for(lambda: sent.count(0) >= 40)
+        wire[0].on_send = bytes
+        board.check()
+        board.stop()
+        status = board.status()
+    blocks, seen = bytes(sent).split(b"\0")[:-1], bytes(arrived).split(b"\0")
+    lost = [decode(block) for block in blocks if block not in seen]
+    assert status.frames_lost == len(lost) > 0
+    assert status.frames_repeated == sum(seen.count(block) - 1 for block in blocks if block in seen) > 0
+    sequences = np.concatenate([batch.samples["sequence"] for batch in batches]).tolist()
+    assert sequences == sorted(set(sequences))
+    assert sequences[-1] + 1 - len(sequences) == sum(len(frame.items) for frame in lost if frame is not None)
+
+
+def test_a_board_that_restarts_is_reported_where_every_frame_comes_twice(wire: tuple[BoardOnAWire, str]) -> None:
+    wire[0].on_send, _ = doubling(1.0, seed=3)
+    with closing(streaming(wire)) as board:
+        board.check()
+        wire[0].reset.set()
+        error, _ = fault_of(board)
+    assert error.name == "board_error" and "restarted" in error.what
+
+
 @ON_ONE_WIRE
 def test_an_image_of_another_protocol_version(wire: tuple[BoardOnAWire, str]) -> None:
     def another_version(data: bytes) -> bytes:

@@ -16,7 +16,7 @@ from hypothesis import strategies as st
 from firmware_host import protocol, stuffing
 from firmware_host.frames import FrameReader, decode, encode
 from firmware_host.protocol import MESSAGES, Message
-from support.damaged_stream import carry
+from support.damaged_stream import carry, transmission
 from support.host_frames import CReceiver, decode_in_c, encode_in_c
 from support.paths import FIRMWARE
 
@@ -154,7 +154,10 @@ def test_the_c_structures_lie_as_the_table_says(tmp_path: Path) -> None:
 # Streams
 
 
-@given(st.lists(messages(), min_size=1, max_size=5), st.lists(st.integers(0, 2000), max_size=8))
+@given(
+    st.lists(messages(), min_size=1, max_size=5, unique_by=lambda one: one[1]),
+    st.lists(st.integers(0, 2000), max_size=8),
+)
 def test_frames_survive_any_chopping_of_the_stream(sent: list[Sent], cuts: list[int]) -> None:
     stream = b"".join(wire_of(one) for one in sent)
     edges = [0, *sorted(min(cut, len(stream)) for cut in cuts), len(stream)]
@@ -201,6 +204,49 @@ def test_a_count_that_starts_afresh_is_no_loss_when_it_was_announced() -> None:
     reader.expect_restart()
     reader.feed(encode("ack", 0, {"reply_to": 1}) + encode("ack", 2, {"reply_to": 1}))
     assert reader.lost == 7
+
+
+@pytest.mark.parametrize("mean_run", [30, 300, 3000])
+def test_runs_of_bytes_that_come_twice_leave_every_frame_once_and_the_counts_exact(mean_run: int) -> None:
+    """A twentieth of the bytes comes twice, in runs of less than a frame or of many."""
+    random = np.random.default_rng(mean_run)
+    sent = transmission(random, 5000)
+    stream, arrived, at = b"".join(sent.wires), bytearray(), 0
+    while at < len(stream):
+        plain, run = (int(random.geometric(1 / mean)) for mean in (19 * mean_run, mean_run))
+        arrived += stream[at : at + plain + run] + stream[at + plain : at + plain + run]
+        at += plain + run
+    reader = FrameReader()
+    frames = [
+        frame for begin in range(0, len(arrived), 700) for frame in reader.feed(bytes(arrived[begin : begin + 700]))
+    ]
+    blocks, whole = bytes(arrived).split(b"\0"), {wire[:-1] for wire in sent.wires}
+    arrived_whole = whole.intersection(blocks)
+    intact = [wire for wire in sent.wires if wire[:-1] in arrived_whole]
+    assert [encode(*frame) for frame in frames] == intact
+    assert reader.lost == len(sent.wires) - len(intact)
+    assert reader.repeated == sum(block in whole for block in blocks) - len(intact) > 0
+
+
+def identity(sequence: int, reply_to: int = 0) -> bytes:
+    values = {"protocol": protocol.PROTOCOL_VERSION, "firmware": "1", "unique_id": bytes(12), "reset_cause": 1}
+    return encode("identity", sequence, {"reply_to": reply_to, **values})
+
+
+def test_an_idle_board_s_sign_of_life_is_the_same_again_after_256_frames_and_no_repetition() -> None:
+    reader = FrameReader()
+    for number in range(600):
+        assert len(reader.feed(identity(number % 256))) == 1
+    assert (reader.lost, reader.repeated) == (0, 0)
+    assert reader.feed(identity(599 % 256)) == []
+    assert (reader.lost, reader.repeated) == (0, 1)
+
+
+def test_a_reset_board_s_first_words_are_no_repetition_of_those_it_greeted_with() -> None:
+    reader = FrameReader()
+    reader.feed(identity(0) + identity(1, reply_to=1) + encode("ack", 2, {"reply_to": 2}))
+    assert [frame.sequence for frame in reader.feed(identity(0))] == [0]
+    assert reader.repeated == 0
 
 
 def test_noise_without_a_delimiter_does_not_pile_up() -> None:
