@@ -73,8 +73,8 @@ class RevolutionError:
     """Mean reading less mean reference over one whole turn, (3,) rad/s, and what noise leaves uncertain of it."""
 
     sweep: int
-    joint_name: str
-    direction: str
+    joint_name: str | None
+    direction: str | None
     error_rad_s: Array
     std_rad_s: Array
 

@@ -8,7 +8,7 @@ from firmware_host.client import Board, Calibration, StoredCalibration
 from firmware_host.errors import BoardError
 from rig.board.identify import find_sensor
 from rig.config.models import RigConfig
-from rig.estimation.estimate import Array
+from rig.estimation.arrays import Array
 
 
 class Solved(Protocol):

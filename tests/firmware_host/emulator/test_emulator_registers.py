@@ -1,10 +1,10 @@
 """The emulator's registers are where the chip's maker says, are called so, and hold the same after a reset."""
 
 import pytest
-from test_firmware_image import PERIPHERALS, number
 
 from firmware_host.emulator.bus import Peripheral
 from support.emulated_session import Session
+from support.svd import PERIPHERALS, number
 
 MODELLED = {peripheral.name: peripheral for peripheral in Session().board.peripherals}
 MAKERS_NAMES = {"SysTick": "STK"}

@@ -3,17 +3,15 @@
 import re
 import shutil
 import subprocess
-import xml.etree.ElementTree as ET
-import zipfile
 from collections.abc import Callable
 from pathlib import Path
 
-import pyocd
 import pytest
 from elftools.elf.elffile import ELFFile
 from elftools.elf.sections import SymbolTableSection
 
 from support.paths import FIRMWARE
+from support.svd import INTERRUPTS, PERIPHERALS, number, register
 
 IMAGE = FIRMWARE / "image"
 PORT = FIRMWARE / "port_l432"
@@ -70,29 +68,8 @@ def test_the_elf_is_the_image_with_names_and_little_ram() -> None:
 # The register header
 
 
-def svd() -> ET.Element:
-    """The maker's description of the STM32L4x2, as pyOCD's wheel carries it."""
-    archive = Path(pyocd.__file__).parent / "debug" / "svd" / "svd_data.zip"
-    with zipfile.ZipFile(archive) as data:
-        return ET.fromstring(data.read("STM32L4x2.svd"))
-
-
-DEVICE = svd()
-PERIPHERALS = {p.findtext("name"): p for p in DEVICE.iter("peripheral")}
-INTERRUPTS = {i.findtext("name"): int(i.findtext("value", "")) for i in DEVICE.iter("interrupt")}
 HEADER = (PORT / "registers.h").read_text()
 DEFINES = re.findall(r"^#define (\w+(?:\(\w+\))?) (.+?)(?: /\*.*)?$", HEADER, re.MULTILINE)
-
-
-def number(element: ET.Element, tag: str) -> int:
-    return int(element.findtext(tag, ""), 0)
-
-
-def register(peripheral: str, name: str) -> ET.Element:
-    """A register's description, also where one peripheral is described as a copy of another."""
-    element = PERIPHERALS[peripheral]
-    element = PERIPHERALS[element.get("derivedFrom", peripheral)]
-    return next(r for r in element.iter("register") if r.findtext("name") == name)
 
 
 def check_base(name: str, value: str) -> None:
