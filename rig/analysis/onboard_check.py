@@ -12,7 +12,6 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from firmware_host.answers import BoardSolution
 from rig.analysis.verdict import Check
 from rig.data.events import BoardNotObserved, BoardObserved, BoardRecalled, BoardSolved, OfTheBoard
 from rig.data.run_file import RunData
@@ -34,7 +33,7 @@ class Agreement:
     observation of, and why.
     """
 
-    solutions: Mapping[str, BoardSolution]
+    solutions: Mapping[str, BoardSolved]
     not_observed: tuple[str, ...]
     host_scale: Array | None
     host_bias_rad_s: Array | None
@@ -51,15 +50,11 @@ class Agreement:
 
 def agreement(runs: Sequence[RunData], sensor: str) -> Agreement:
     """Compare for one sensor over all recordings of a run, of which the last holds the board's solutions."""
-    solutions = {
-        event.solution.method: event.solution
-        for event in _of(runs[-1], sensor)
-        if isinstance(event, BoardSolved)
-    }
+    solutions = {event.solution.method: event for event in _of(runs[-1], sensor) if isinstance(event, BoardSolved)}
     not_observed = _not_observed(runs[-1], sensor)
     host = _solve(_observations(runs, sensor))
     board = solutions.get("closed_form")
-    if host is None or board is None or board.status != "solved":
+    if host is None or board is None or board.solution.status != "solved":
         scale, bias = (None, None) if host is None else host
         return Agreement(solutions, not_observed, scale, bias, None, None)
     scale, bias = host
@@ -68,8 +63,8 @@ def agreement(runs: Sequence[RunData], sensor: str) -> Agreement:
         not_observed,
         scale,
         bias,
-        float(np.max(np.abs(np.array(board.scale) / scale - 1))),
-        float(np.max(np.abs(np.array(board.bias_rad_s) - bias))),
+        float(np.max(np.abs(np.array(board.solution.scale) / scale - 1))),
+        float(np.max(np.abs(np.array(board.solution.bias_rad_s) - bias))),
     )
 
 

@@ -112,9 +112,7 @@ def _sound_for(run: RunData, sensor: str, settings: ObservationThresholds) -> fr
     return frozenset(sound)
 
 
-def _revolution(
-    stream: Stream, motion: ArmMotion, finished: Finished, settings: ObservationThresholds
-) -> Observation:
+def _revolution(stream: Stream, motion: ArmMotion, finished: Finished, settings: ObservationThresholds) -> Observation:
     turn = find_revolution(motion, finished.sweep, finished.window, settings)
     return _observation(stream, motion, finished.sweep, turn, settings)
 

@@ -47,9 +47,7 @@ class Revolution:
         return self.speed_rad_s * self.duration_std_s / self.duration_s
 
 
-def find_revolution(
-    motion: ArmMotion, sweep: Sweep, window: Window, settings: ObservationThresholds
-) -> Revolution:
+def find_revolution(motion: ArmMotion, sweep: Sweep, window: Window, settings: ObservationThresholds) -> Revolution:
     """The revolution of one sweep, which was made between two controller times.
 
     Its ends are where the recorded joint angle crosses the ends of `revolution_rad`. Raises Fault
