@@ -17,8 +17,9 @@ from rig.estimation.levenberg_marquardt import LevenbergMarquardtSolution, solve
 from rig.estimation.refusals import check_duplicates
 from rig.estimation.vector_model import VectorSolution, solve_vector_model
 from rig.observation.average import Average
-from rig.observation.observe import Observation, SensorObservations, finished_sweeps, observe
+from rig.observation.observe import Observation, SensorObservations, observe
 from rig.observation.timebase import TimeBase
+from rig.observation.windows import finished_sweeps
 
 Estimator = Literal["vector", "newton", "algorithm_1", "levenberg_marquardt"]
 ESTIMATORS: tuple[Estimator, ...] = get_args(Estimator)

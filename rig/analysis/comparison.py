@@ -16,8 +16,9 @@ from rig.data.run_file import RunData
 from rig.errors import Fault
 from rig.estimation.arrays import Array
 from rig.observation.average import Stream, on_clock
-from rig.observation.observe import MIN_REST_SAMPLES, REST_SETTLING_S, Observation, SensorObservations, finished
+from rig.observation.observe import MIN_REST_SAMPLES, REST_SETTLING_S, Observation, SensorObservations
 from rig.observation.timebase import TimeBase
+from rig.observation.windows import Window, rested, swept
 
 MAX_DELAY_S = 0.2  # between the filters of two sensors; more means that their time stamps do not belong together
 MAX_GAP = 2.5  # sampling intervals of the reference across which it is interpolated
@@ -143,8 +144,8 @@ def _part(seen: Observed, sensor: str, reference: Reference, rotation: Array) ->
     delay_s, delay_std_s = _delay(seen.tested.time_base, seen.known.time_base)
     tested = on_clock(run.samples[sensor], run.sensors[sensor], seen.tested.time_base)
     known = on_clock(run.samples[reference.name], run.sensors[reference.name], seen.known.time_base)
-    sweeps, rests = ([window for _, window in finished(run, kind)] for kind in ("sweep", "rest"))
-    moving = _within(tested.time_s, (sweeps[0][0], max(end for _, end in [*sweeps, *rests])))
+    sweeps, rests = [finished.window for finished in swept(run)], list(rested(run))
+    moving = _within(tested.time_s, Window(sweeps[0].start_s, max(window.end_s for window in [*sweeps, *rests])))
     used = moving & _surrounded(tested.time_s, known.time_s)
     if not used.sum() > MIN_COVERED * moving.sum():
         raise Fault(
@@ -159,7 +160,9 @@ def _part(seen: Observed, sensor: str, reference: Reference, rotation: Array) ->
         reference=_interpolated(known, reference, time_s) @ rotation.T,
         sweeping=_within(time_s, *sweeps),
         resting=_within(time_s, *rests),
-        still=tuple(_within(time_s, (start + REST_SETTLING_S, end - REST_SETTLING_S)) for start, end in rests),
+        still=tuple(
+            _within(time_s, Window(rest.start_s + REST_SETTLING_S, rest.end_s - REST_SETTLING_S)) for rest in rests
+        ),
         delay_s=delay_s,
         delay_std_s=delay_std_s,
     )
@@ -181,11 +184,11 @@ def _delay(tested: TimeBase, known: TimeBase) -> tuple[float, float]:
     return delay_s, float(np.hypot(known.offset_std_s, tested.offset_std_s))
 
 
-def _within(time_s: Array, *windows_s: tuple[float, float]) -> NDArray[np.bool_]:
-    """Which times (n,) lie in any of the windows (start, end)."""
+def _within(time_s: Array, *windows: Window) -> NDArray[np.bool_]:
+    """Which times (n,) lie in any of the windows."""
     inside = np.zeros(len(time_s), dtype=np.bool_)
-    for start_s, end_s in windows_s:
-        inside |= (time_s >= start_s) & (time_s <= end_s)
+    for window in windows:
+        inside |= (time_s >= window.start_s) & (time_s <= window.end_s)
     return inside
 
 

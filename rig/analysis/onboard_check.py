@@ -6,19 +6,19 @@ stands in. The run's own calibration is another matter: it weighs, takes the vib
 (`rig.analysis.calibration`).
 """
 
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
-from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
 from rig.analysis.verdict import Check
+from rig.data.events import BoardNotObserved, BoardObserved, BoardRecalled, BoardSolved, OfTheBoard
 from rig.data.run_file import RunData
 from rig.errors import Fault
 from rig.estimation.accumulator import Accumulator
+from rig.observation.onboard_window import observed_before
 from rig.observation.timebase import Array
-from rig.runner.onboard import observed_before
 
 SCALE_LIMIT = 1e-4  # relative
 BIAS_LIMIT_RAD_S = 1e-5
@@ -28,12 +28,12 @@ BIAS_LIMIT_RAD_S = 1e-5
 class Agreement:
     """A sensor's calibration by the board beside the same in double precision; None where either has no solution.
 
-    `solutions` are the board's by method, as it sent them. `scale_difference` is relative, `bias_difference_rad_s`
+    `solutions` are the board's by method. `scale_difference` is relative, `bias_difference_rad_s`
     absolute, each the largest of three axes, for the closed form. `not_observed` says which sweeps the board has no
     observation of, and why.
     """
 
-    solutions: Mapping[str, Mapping[str, Any]]
+    solutions: Mapping[str, BoardSolved]
     not_observed: tuple[str, ...]
     host_scale: Array | None
     host_bias_rad_s: Array | None
@@ -50,15 +50,11 @@ class Agreement:
 
 def agreement(runs: Sequence[RunData], sensor: str) -> Agreement:
     """Compare for one sensor over all recordings of a run, of which the last holds the board's solutions."""
-    solutions = {
-        event.detail["method"]: event.detail
-        for event in runs[-1].events
-        if event.name == "board_solved" and event.detail["sensor"] == sensor
-    }
+    solutions = {event.solution.method: event for event in _of(runs[-1], sensor) if isinstance(event, BoardSolved)}
     not_observed = _not_observed(runs[-1], sensor)
     host = _solve(_observations(runs, sensor))
     board = solutions.get("closed_form")
-    if host is None or board is None or board["status"] != "solved":
+    if host is None or board is None or board.solution.status != "solved":
         scale, bias = (None, None) if host is None else host
         return Agreement(solutions, not_observed, scale, bias, None, None)
     scale, bias = host
@@ -67,8 +63,8 @@ def agreement(runs: Sequence[RunData], sensor: str) -> Agreement:
         not_observed,
         scale,
         bias,
-        float(np.max(np.abs(np.array(board["scale"]) / scale - 1))),
-        float(np.max(np.abs(np.array(board["bias_rad_s"]) - bias))),
+        float(np.max(np.abs(np.array(board.solution.scale) / scale - 1))),
+        float(np.max(np.abs(np.array(board.solution.bias_rad_s) - bias))),
     )
 
 
@@ -85,9 +81,7 @@ def check_observed(run: RunData, sensors: Iterable[str]) -> None:
 
 def _not_observed(run: RunData, sensor: str) -> tuple[str, ...]:
     return tuple(
-        f"sweep {event.detail['sweep']}: {event.detail['reason']}"
-        for event in run.events
-        if event.name == "board_not_observed" and event.detail["sensor"] == sensor
+        f"sweep {event.sweep}: {event.reason}" for event in _of(run, sensor) if isinstance(event, BoardNotObserved)
     )
 
 
@@ -103,28 +97,39 @@ class _Observation:
 def _observations(runs: Sequence[RunData], sensor: str) -> list[_Observation]:
     """Every observation the board solved from, by the recorded samples."""
     found: list[_Observation] = []
-    for event in runs[-1].events:
-        if event.detail.get("sensor") != sensor:
-            continue
-        if event.name == "board_observed":
-            found.append(_observation(runs[-1], sensor, event.detail))
-        elif event.name == "board_recalled":
-            sweep = event.detail["sweep"]
-            run = next(run for run in reversed(runs[:-1]) if sweep in observed_before([run], sensor, (sweep,)))
-            found.append(_observation(run, sensor, observed_before([run], sensor, (sweep,))[sweep]))
+    for event in _of(runs[-1], sensor):
+        if isinstance(event, BoardObserved):
+            found.append(_observation(runs[-1], event))
+        elif isinstance(event, BoardRecalled):
+            found.append(_recalled(runs[:-1], event))
     return found
 
 
-def _observation(run: RunData, sensor: str, observed: Mapping[str, Any]) -> _Observation:
-    samples = run.samples[sensor]
+def _recalled(earlier: Sequence[RunData], recalled: BoardRecalled) -> _Observation:
+    """What the newest of the earlier recordings says of it; a mean that is not a number where none does."""
+    for run in reversed(earlier):
+        if seen := observed_before([run], recalled.sensor, (recalled.sweep,)):
+            return _observation(run, seen[recalled.sweep])
+    return _Observation(np.full(3, np.nan), np.nan, averaged=False)
+
+
+def _observation(run: RunData, seen: BoardObserved) -> _Observation:
+    samples, observed = run.samples[seen.sensor], seen.observation
     times_us = samples["board_time_us"]
-    used = slice(*np.searchsorted(times_us, [observed["start_us"], observed["end_us"]]).tolist())
-    counts, missing = samples["counts"][used], observed["samples"] - (used.stop - used.start)
+    used = slice(*np.searchsorted(times_us, [observed.start_us, observed.end_us]).tolist())
+    counts, missing = samples["counts"][used], observed.samples - (used.stop - used.start)
     if 0 < missing <= _lost(samples["sequence"][max(used.start - 1, 0) : used.stop + 1]):
-        return _Observation(np.array(observed["mean_rad_s"]), observed["speed_rad_s"], averaged=False)
+        return _Observation(np.array(observed.mean_rad_s), seen.speed_rad_s, averaged=False)
     mean = counts.mean(axis=0) if missing == 0 and len(counts) else np.full(3, np.nan)
-    mean_rad_s = np.asarray(mean * run.sensors[sensor].sensitivity_rad_s_per_count)
-    return _Observation(mean_rad_s, observed["speed_rad_s"], averaged=True)
+    mean_rad_s = np.asarray(mean * run.sensors[seen.sensor].sensitivity_rad_s_per_count)
+    return _Observation(mean_rad_s, seen.speed_rad_s, averaged=True)
+
+
+def _of(run: RunData, sensor: str) -> Iterator[OfTheBoard]:
+    """What a recording says of the board's own calibration of a sensor, in order."""
+    for recorded in run.events:
+        if isinstance(recorded.event, OfTheBoard) and recorded.event.sensor == sensor:
+            yield recorded.event
 
 
 def _lost(sequence: NDArray[np.uint32]) -> int:

@@ -14,7 +14,7 @@ from rig.analysis.calibration import observe_runs
 from rig.analysis.comparison import Comparison, Observed, Reference, compare, turns_of_reference, turns_of_sensor
 from rig.data.run_file import RunData
 from rig.errors import Fault
-from rig.observation.observe import finished_sweeps
+from rig.observation.windows import finished_sweeps
 
 
 @dataclass(frozen=True, slots=True)

@@ -2,39 +2,43 @@
 
 The file survives `kill -9` because it is written in HDF5's single-writer/multiple-reader (SWMR) mode: all datasets and
 attributes exist before that mode begins, afterwards rows are only appended, and the library writes every piece before
-anything that points to it. SWMR forbids data of variable length, so the events are one stream of bytes, a line of JSON
-each: any detail fits, and a line cut off by a kill is seen by its missing end.
-
-Layout (schema "rig.run/2"): `/samples/<sensor>` (SAMPLE_DTYPE, the sensor's description as attributes), `/arm`
-(ARM_STATE_DTYPE), `/events` (bytes); `schema`, `config` (YAML), `settings` and `provenance` (JSON) as attributes of the
-file. Schema "rig.run/1" lacks `settings`.
+anything that points to it. What lies where is said in `rig.data.layout`.
 """
 
 import json
 import os
-import re
+import subprocess
+import sys
+import tempfile
 import threading
 import time
-from collections.abc import Iterator, Mapping, Sequence
-from dataclasses import asdict, dataclass, fields, replace
+from collections.abc import Mapping, Sequence
+from dataclasses import asdict, dataclass, replace
 from pathlib import Path
 from types import TracebackType
-from typing import Any, Self
+from typing import Annotated, Any, Literal, Self
 
 import numpy as np
 from numpy.typing import NDArray
+from pydantic import Field
 
-from firmware_host.samples import SAMPLE_DTYPE
 from rig.arm.state import ARM_STATE_DTYPE, ArmState
+from rig.data.checked import Finite, Positive, checked, quoted
+from rig.data.events import Event, Recorded, from_lines, to_line
+from rig.data.extract import reason
+from rig.data.layout import EVENTS_DTYPE, SCHEMA, Contents, append, empty, lay_out
 from rig.data.settings import RunSettings, settings_from_json
 from rig.data.settings_of_run_1 import settings_of_configuration
 from rig.errors import Fault, Refused
 
-SCHEMA = "rig.run/2"
-SCHEMA_BEFORE = "rig.run/1"
 FLUSH_PERIOD_S = 0.25  # half of what is promised, so that a slow flush still keeps the promise
-CHUNK_ROWS = 1024
-CHUNK_BYTES = 65536
+READ_TIMEOUT_S, READ_BYTES_PER_S = 20.0, 5e6  # for a file of no size, and more for each byte: a busy machine's
+
+
+MOUNTING_TOLERANCE = 1e-6
+PROVENANCE_KEYS = ("started_utc", "board_unique_id", "arm_serial_number")  # what a resumed run is recognised by
+
+Axis = Annotated[tuple[Finite, ...], Field(min_length=3, max_length=3)]
 
 
 @dataclass(frozen=True, slots=True)
@@ -49,24 +53,14 @@ class RecordedSensor:
 
     part: str
     serial_number: str
-    rate_hz: float
-    range_rad_s: float
-    sensitivity_rad_s_per_count: float
-    full_scale_counts: int
-    temperature_c_per_count: float
-    temperature_offset_c: float
-    mounting: tuple[tuple[float, ...], ...]
-    mode: str = "raw"
-
-
-@dataclass(frozen=True, slots=True)
-class Event:
-    """Something that happened: when (host's monotonic clock; controller's, if it was heard by then) and its details."""
-
-    name: str
-    host_time_s: float
-    controller_time_s: float | None
-    detail: dict[str, Any]
+    rate_hz: Positive
+    range_rad_s: Positive
+    sensitivity_rad_s_per_count: Positive
+    full_scale_counts: Annotated[int, Field(gt=0)]
+    temperature_c_per_count: Finite
+    temperature_offset_c: Finite
+    mounting: Annotated[tuple[Axis, ...], Field(min_length=3, max_length=3)]
+    mode: Literal["raw", "calibrated"] = "raw"  # files of before there were two modes say nothing
 
 
 @dataclass(frozen=True, slots=True)
@@ -82,7 +76,7 @@ class RunData:
     sensors: dict[str, RecordedSensor]
     samples: dict[str, NDArray[Any]]
     arm: NDArray[Any]
-    events: tuple[Event, ...]
+    events: tuple[Recorded, ...]
 
     def judged_by(self, overrides: Sequence[str]) -> "RunData":
         """The same recording under other settings: see `RunSettings.with_overrides`."""
@@ -116,7 +110,11 @@ class RunRecorder:
         self._pending = _Pending({name: [] for name in sensors}, [], [])
         self._closing = threading.Event()
         try:
-            _create(path, config, settings, provenance, sensors)
+            if path.exists():
+                raise FileExistsError(f"{path.name} is there already")
+            texts = {"config": config, "settings": settings.to_json(), "provenance": json.dumps(dict(provenance))}
+            described = {name: asdict(sensor) for name, sensor in sensors.items()}
+            lay_out(path, empty(SCHEMA, texts, described), swmr=True)
             self._file = h5py.File(path, "r+", libver="latest")
             self._file.swmr_mode = True
             self._descriptor: int = self._file.id.get_vfd_handle()
@@ -144,14 +142,11 @@ class RunRecorder:
             self._controller_time_s = state.time_s
             self._pending.arm.append(state)
 
-    def add_event(self, name: str, *, controller_time_s: float | None = None, **detail: Any) -> None:
-        """Append an event, now; its controller time is the newest arm state's unless given. Details fit into JSON."""
+    def add(self, event: Event, *, controller_time_s: float | None = None) -> None:
+        """Append an event, now; its controller time is the newest arm state's unless given."""
         with self._lock:
             known = self._controller_time_s if controller_time_s is None else controller_time_s
-            line = json.dumps(
-                {"name": name, "host_time_s": time.monotonic(), "controller_time_s": known, "detail": detail}
-            )
-            self._pending.events.append(line.encode() + b"\n")
+            self._pending.events.append(to_line(Recorded(event, time.monotonic(), known)))
 
     def check(self) -> None:
         """Raise Fault `recording_failed` if the file could not be written."""
@@ -192,51 +187,41 @@ class RunRecorder:
             self._pending = _Pending({name: [] for name in pending.samples}, [], [])
         for name, batches in pending.samples.items():
             if batches:
-                _append(self._file["samples"][name], np.concatenate(batches))
+                append(self._file["samples"][name], np.concatenate(batches))
         if pending.arm:
             records = [state.to_record() for state in pending.arm]
-            _append(self._file["arm"], np.array(records, ARM_STATE_DTYPE))
+            append(self._file["arm"], np.array(records, ARM_STATE_DTYPE))
         if pending.events:
-            _append(self._file["events"], np.frombuffer(b"".join(pending.events), "u1"))
+            append(self._file["events"], np.frombuffer(b"".join(pending.events), EVENTS_DTYPE))
 
     def _fault(self, error: Exception) -> Fault:
         return Fault(
             "recording_failed",
-            f"{self.path} cannot be written ({_reason(error)})",
+            f"{self.path} cannot be written ({reason(error)})",
             "Free space on the disk or choose another output folder, then resume the run",
         )
 
 
-def read_run(path: Path) -> RunData:
+def read_run(path: Path, timeout_s: float | None = None) -> RunData:
     """Read a run file: finished, still being written, or left behind by a killed process.
 
     Rows that the kill left unwritten or torn at the end are dropped. Raises Refused: `no_run_file` when there is none,
-    `not_a_run_file` when it is something else, damaged, or of another schema.
+    `not_a_run_file` when it is something else, damaged, of another schema, or cannot be read within `timeout_s` (None:
+    by its size).
     """
-    import h5py
-
-    if not path.is_file():
-        raise Refused("no_run_file", f"there is no file {path}", "Give the path of a run.h5")
+    contents = _contents(path, timeout_s)
     try:
-        # Opened as an SWMR reader even after the fact: a plain open refuses a file whose writer was killed.
-        with h5py.File(path, "r", libver="latest", swmr=True) as file:
-            if file.attrs["schema"] not in (SCHEMA, SCHEMA_BEFORE):
-                raise ValueError(f"its schema is {file.attrs['schema']!r}, not {SCHEMA!r}")
-            return RunData(
-                config=file.attrs["config"],
-                settings=_settings(file.attrs),
-                provenance=json.loads(file.attrs["provenance"]),
-                sensors={name: _sensor(dataset) for name, dataset in file["samples"].items()},
-                samples={name: _whole_rows(dataset[:]) for name, dataset in file["samples"].items()},
-                arm=_whole_rows(file["arm"][:]),
-                events=tuple(_events(file["events"][:].tobytes())),
-            )
-    except (OSError, RuntimeError, KeyError, ValueError) as error:
-        raise Refused(
-            "not_a_run_file",
-            f"{path} cannot be read as a run ({_reason(error)})",
-            "Give the path of a run.h5 the rig has written",
-        ) from error
+        return RunData(
+            config=contents.texts["config"],
+            settings=_settings(contents),
+            provenance=_provenance(contents.texts["provenance"]),
+            sensors={name: _sensor(attributes) for name, attributes in contents.described.items()},
+            samples={name: _whole_rows(rows) for name, rows in contents.samples.items()},
+            arm=_whole_rows(contents.arm),
+            events=tuple(from_lines(contents.events.tobytes())),
+        )
+    except ValueError as error:
+        raise _not_a_run_file(path, str(error)) from None
 
 
 def make_plain(path: Path) -> None:
@@ -244,29 +229,66 @@ def make_plain(path: Path) -> None:
 
     Call it only when nobody writes the file any more. Raises Refused as `read_run` does.
     """
-    import h5py
-
-    read_run(path)
-    whole = path.with_name(path.name + ".part")
-    with h5py.File(path, "r", libver="latest", swmr=True) as source, h5py.File(whole, "w") as target:
-        target.attrs.update(source.attrs)
-        for name in source:
-            source.copy(name, target)
-    whole.replace(path)
+    contents = _contents(path, None)
+    samples = {name: _whole_rows(rows) for name, rows in contents.samples.items()}
+    lay_out(path, replace(contents, samples=samples, arm=_whole_rows(contents.arm)), swmr=False)
 
 
-def _settings(attributes: Mapping[str, Any]) -> RunSettings:
-    if attributes["schema"] == SCHEMA_BEFORE:
-        return settings_of_configuration(attributes["config"])
-    return settings_from_json(attributes["settings"])
+def _contents(path: Path, timeout_s: float | None) -> Contents:
+    """What the file holds, read by a process that can be ended: see `rig.data.extract`."""
+    if not path.is_file():
+        raise Refused("no_run_file", f"there is no file {path}", "Give the path of a run.h5")
+    if timeout_s is None:
+        timeout_s = READ_TIMEOUT_S + path.stat().st_size / READ_BYTES_PER_S
+    command = [sys.executable, "-m", "rig.data.extract", str(path)]
+    with tempfile.TemporaryFile() as out:
+        try:
+            done = subprocess.run(
+                command, stdin=subprocess.DEVNULL, stdout=out, stderr=subprocess.PIPE, timeout=timeout_s, check=False
+            )
+        except subprocess.TimeoutExpired:
+            raise _not_a_run_file(path, f"the HDF5 library found no end of it in {timeout_s:.0f} s") from None
+        if done.returncode != 0:
+            said = done.stderr.decode(errors="replace").strip().splitlines() or ["reading it ended the HDF5 library"]
+            raise _not_a_run_file(path, said[-1])
+        out.seek(0)
+        header = json.loads(out.readline())
+        samples = {name: np.load(out) for name in header["described"]}
+        return Contents(**header, samples=samples, arm=np.load(out), events=np.load(out))
 
 
-def _sensor(dataset: Any) -> RecordedSensor:
-    values = {field.name: dataset.attrs[field.name] for field in fields(RecordedSensor) if field.name != "mode"}
-    values["mode"] = dataset.attrs.get("mode", "raw")  # files of before there were two modes
-    values = {name: value.item() if isinstance(value, np.generic) else value for name, value in values.items()}
-    mounting = tuple(tuple(row) for row in values.pop("mounting").tolist())
-    return RecordedSensor(**values, mounting=mounting)
+def _not_a_run_file(path: Path, why: str) -> Refused:
+    return Refused(
+        "not_a_run_file",
+        f"{path} cannot be read as a run ({why})",
+        "Give the path of a run.h5 the rig has written, and that nothing has damaged since",
+    )
+
+
+def _settings(contents: Contents) -> RunSettings:
+    if contents.schema == SCHEMA:
+        settings = settings_from_json(contents.texts["settings"])
+    else:
+        settings = settings_of_configuration(contents.texts["config"])
+    named = (*settings.to_calibrate, *([settings.reference.name] if settings.reference else []))
+    if missing := [name for name in named if name not in contents.described]:
+        raise ValueError(f"it holds no samples of {', '.join(missing)}, a sensor of its settings")
+    return settings
+
+
+def _provenance(text: str) -> dict[str, Any]:
+    provenance = json.loads(text)
+    if not isinstance(provenance, dict) or not all(isinstance(provenance.get(key), str) for key in PROVENANCE_KEYS):
+        raise ValueError(f"its provenance does not say {', '.join(PROVENANCE_KEYS)}")
+    return provenance
+
+
+def _sensor(attributes: Mapping[str, Any]) -> RecordedSensor:
+    sensor = checked(RecordedSensor, attributes, "sensor")
+    mounting = np.array(sensor.mounting)
+    if not np.allclose(mounting @ mounting.T, np.eye(3), atol=MOUNTING_TOLERANCE):
+        raise ValueError(f"the mounting of {sensor.part} is no rotation: {quoted(sensor.mounting)}")
+    return sensor
 
 
 def _whole_rows(rows: NDArray[Any]) -> NDArray[Any]:
@@ -276,12 +298,6 @@ def _whole_rows(rows: NDArray[Any]) -> NDArray[Any]:
     return rows if count == len(rows) else rows[: max(count - 1, 0)]  # the last one may be torn
 
 
-def _events(stream: bytes) -> Iterator[Event]:
-    for line in stream.split(b"\n")[:-1]:  # what follows the last line's end was cut off
-        if line.strip(b"\0"):
-            yield Event(**json.loads(line))
-
-
 @dataclass(slots=True)
 class _Pending:
     """What waits for the writer thread."""
@@ -289,43 +305,3 @@ class _Pending:
     samples: dict[str, list[NDArray[Any]]]
     arm: list[ArmState]
     events: list[bytes]
-
-
-def _create(
-    path: Path,
-    config: str,
-    settings: RunSettings,
-    provenance: Mapping[str, Any],
-    sensors: Mapping[str, RecordedSensor],
-) -> None:
-    """Lay out an empty run file beside its place and move it there whole, so that a kill leaves all or nothing."""
-    import h5py
-
-    if path.exists():
-        raise FileExistsError(f"{path.name} is there already")
-    whole = path.with_name(path.name + ".part")
-    with h5py.File(whole, "w", libver="latest") as file:
-        file.attrs.update(
-            schema=SCHEMA, config=config, settings=settings.to_json(), provenance=json.dumps(dict(provenance))
-        )
-        file.create_dataset("arm", shape=(0,), maxshape=(None,), chunks=(CHUNK_ROWS,), dtype=ARM_STATE_DTYPE)
-        file.create_dataset("events", shape=(0,), maxshape=(None,), chunks=(CHUNK_BYTES,), dtype="u1")
-        for name, sensor in sensors.items():
-            dataset = file.create_dataset(
-                f"samples/{name}", shape=(0,), maxshape=(None,), chunks=(CHUNK_ROWS,), dtype=SAMPLE_DTYPE
-            )
-            dataset.attrs.update(asdict(sensor))
-    whole.rename(path)
-
-
-def _append(dataset: Any, rows: NDArray[Any]) -> None:
-    start = dataset.shape[0]
-    dataset.resize((start + len(rows),))
-    dataset[start:] = rows
-    dataset.flush()
-
-
-def _reason(error: Exception) -> str:
-    """HDF5 buries the system's words in several lines of its own."""
-    found = re.search(r"error message = '([^']*)'", str(error))
-    return found[1] if found else " ".join(str(error).split())

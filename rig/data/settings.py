@@ -5,13 +5,13 @@ the next; these do not, so that an old recording is judged as it was, or by what
 """
 
 import json
-from collections.abc import Mapping, Sequence
+from collections.abc import Sequence
 from dataclasses import asdict, dataclass, fields
-from functools import cache
-from typing import TYPE_CHECKING, Annotated, Any
+from typing import TYPE_CHECKING, Annotated
 
-from pydantic import Field, TypeAdapter, ValidationError
+from pydantic import Field
 
+from rig.data.checked import Finite, Positive, checked, quoted
 from rig.errors import Refused
 
 if TYPE_CHECKING:
@@ -19,10 +19,7 @@ if TYPE_CHECKING:
     from rig.config.models import RigConfig
 
 SCHEMA = "rig.settings/1"
-QUOTED_CHARACTERS = 60
 
-Finite = Annotated[float, Field(allow_inf_nan=False)]
-Positive = Annotated[float, Field(gt=0, allow_inf_nan=False)]
 Vector3 = tuple[Finite, Finite, Finite]
 
 
@@ -113,18 +110,8 @@ def settings_from_json(text: str) -> RunSettings:
     document = json.loads(text)
     schema = document.get("schema") if isinstance(document, dict) else None
     if schema != SCHEMA:
-        raise ValueError(f"the schema of its settings is {_quoted(schema)}, not {SCHEMA!r}")
-    return checked(document)
-
-
-def checked(document: Mapping[str, Any]) -> RunSettings:
-    """Settings from plain values, if each is of the right type and range. Raises ValueError naming the first wrong."""
-    try:
-        return _adapter().validate_python(document)
-    except ValidationError as error:
-        first = error.errors()[0]
-        where = ".".join(map(str, ("settings", *first["loc"])))
-        raise ValueError(f"{where} is {_quoted(first['input'])}: {first['msg']}") from None
+        raise ValueError(f"the schema of its settings is {quoted(schema)}, not {SCHEMA!r}")
+    return checked(RunSettings, document, "settings")
 
 
 def settings_of(config: "RigConfig", plan: "Plan") -> RunSettings:
@@ -154,13 +141,13 @@ def _overridden(settings: RunSettings, item: str) -> RunSettings:
     if path.strip() not in _settable():
         raise Refused(
             "unknown_setting",
-            f"a recording has no setting {_quoted(path.strip())} that could be changed",
+            f"a recording has no setting {quoted(path.strip())} that could be changed",
             f"Set one of {', '.join(_settable())}",
         )
     document = asdict(settings)
     document[section][key] = value.strip()
     try:
-        return checked(document)
+        return checked(RunSettings, document, "settings")
     except ValueError as error:
         raise Refused("wrong_setting", str(error), f"Give a number, as in {path.strip()}=0.001") from None
 
@@ -168,13 +155,3 @@ def _overridden(settings: RunSettings, item: str) -> RunSettings:
 def _settable() -> tuple[str, ...]:
     sections = {"observation": ObservationThresholds, "limits": Limits}
     return tuple(f"{name}.{field.name}" for name, section in sections.items() for field in fields(section))
-
-
-def _quoted(value: object) -> str:
-    text = repr(value)
-    return text if len(text) <= QUOTED_CHARACTERS else text[: QUOTED_CHARACTERS - 1] + "…"
-
-
-@cache
-def _adapter() -> TypeAdapter[RunSettings]:
-    return TypeAdapter(RunSettings)

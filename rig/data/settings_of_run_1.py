@@ -8,7 +8,8 @@ import math
 from collections.abc import Mapping
 from typing import Any
 
-from rig.data.settings import RunSettings, checked
+from rig.data.checked import checked
+from rig.data.settings import RunSettings
 
 PROCEDURE = {
     "name": "six_observation",
@@ -30,7 +31,7 @@ def settings_of_configuration(text: str) -> RunSettings:
 
     try:
         document = yaml.safe_load(text)
-        return checked(_settings(document))
+        return checked(RunSettings, _settings(document), "settings")
     except (yaml.YAMLError, RecursionError, AttributeError, KeyError, TypeError, OverflowError) as error:
         raise ValueError(f"its configuration cannot be understood: {' '.join(str(error).split())}") from None
 

@@ -7,13 +7,13 @@ once the arm's measured rate is taken out of them. The mean comes first; squarin
 Nothing doubtful is averaged: whatever does not belong into a calibration raises a Fault with a name of its own.
 """
 
-from collections.abc import Collection, Iterator, Sequence
+from collections.abc import Collection, Sequence
 from contextlib import suppress
 from dataclasses import dataclass, replace
-from typing import Any
 
 import numpy as np
 
+from rig.arm.motion import Sweep
 from rig.data.run_file import RunData
 from rig.data.settings import ObservationThresholds
 from rig.errors import Fault
@@ -21,6 +21,7 @@ from rig.estimation.refusals import check_reading_ratio
 from rig.observation.average import Average, Stream, average, between, on_the_arms_clock
 from rig.observation.revolution import Revolution, arm_states_lost, describe, find_revolution
 from rig.observation.timebase import ArmMotion, Array, TimeBase
+from rig.observation.windows import Finished, Window, finished_sweeps, rested, swept
 
 STUCK_REPEATS = 10  # equal readings in a row, of a sensor whose noise exceeds a count
 REST_SETTLING_S = 0.2  # kept away from either end of a rest
@@ -73,11 +74,11 @@ def observe(
     motion = ArmMotion(run.arm)
     stream = on_the_arms_clock(run.samples[sensor], run.sensors[sensor], motion)
     revolutions = [
-        _revolution(stream, motion, sweep, window, settings)
-        for sweep, window in finished(run, "sweep")
-        if sweep["index"] not in superseded
+        _revolution(stream, motion, finished, settings)
+        for finished in swept(run)
+        if finished.sweep.index not in superseded
     ]
-    rests = tuple(rest for _, window in finished(run, "rest") if (rest := _rest(stream, motion, window)))
+    rests = tuple(rest for window in rested(run) if (rest := _rest(stream, motion, window)))
     drift = bias_drift(rests)
     return SensorObservations(
         stream.clock,
@@ -92,11 +93,6 @@ def nearest_axis(vector: Array) -> tuple[str, int]:
     return "xyz"[nearest], 1 if vector[nearest] > 0 else -1
 
 
-def finished_sweeps(run: RunData) -> frozenset[int]:
-    """The indices of the sweeps a recording holds from start to end."""
-    return frozenset(sweep["index"] for sweep, _ in finished(run, "sweep"))
-
-
 def sound_sweeps(run: RunData, settings: ObservationThresholds) -> frozenset[int]:
     """Those of the finished sweeps that `observe` accepts for every sensor: a resumed run need not repeat them."""
     return frozenset.intersection(finished_sweeps(run), *(_sound_for(run, sensor, settings) for sensor in run.sensors))
@@ -109,21 +105,16 @@ def _sound_for(run: RunData, sensor: str, settings: ObservationThresholds) -> fr
         stream = on_the_arms_clock(run.samples[sensor], run.sensors[sensor], motion)
     except Fault:
         return frozenset()
-    for sweep, window in finished(run, "sweep"):
+    for finished in swept(run):
         with suppress(Fault):
-            _revolution(stream, motion, sweep, window, settings)
-            sound.add(sweep["index"])
+            _revolution(stream, motion, finished, settings)
+            sound.add(finished.sweep.index)
     return frozenset(sound)
 
 
-def _revolution(
-    stream: Stream,
-    motion: ArmMotion,
-    sweep: dict[str, Any],
-    window: tuple[float, float],
-    settings: ObservationThresholds,
-) -> Observation:
-    return _observation(stream, motion, sweep, find_revolution(motion, sweep, window, settings), settings)
+def _revolution(stream: Stream, motion: ArmMotion, finished: Finished, settings: ObservationThresholds) -> Observation:
+    turn = find_revolution(motion, finished.sweep, finished.window, settings)
+    return _observation(stream, motion, finished.sweep, turn, settings)
 
 
 def bias_drift(rests: Sequence[Average]) -> Array:
@@ -147,19 +138,8 @@ def _drifting(average: Average, drift: Array) -> Average:
     return replace(average, variance_rad2_s2=average.variance_rad2_s2 + drift)
 
 
-def finished(run: RunData, kind: str) -> Iterator[tuple[dict[str, Any], tuple[float, float]]]:
-    """(description, (start, end) in controller time) of every sweep or rest that was begun and finished."""
-    started = None
-    for event in run.events:
-        if event.name == f"{kind}_started":
-            started = event.controller_time_s
-        elif event.name == f"{kind}_finished" and started is not None and event.controller_time_s is not None:
-            yield event.detail.get(kind, {}), (started, event.controller_time_s)
-            started = None
-
-
 def _observation(
-    stream: Stream, motion: ArmMotion, sweep: dict[str, Any], turn: Revolution, settings: ObservationThresholds
+    stream: Stream, motion: ArmMotion, sweep: Sweep, turn: Revolution, settings: ObservationThresholds
 ) -> Observation:
     where = describe(sweep)
     inside = between(stream, turn.start_s, turn.end_s)
@@ -177,9 +157,9 @@ def _observation(
     check_reading_ratio(float(np.linalg.norm(turned)) / turn.speed_rad_s, where)
     axis, sign = nearest_axis(expected)
     return Observation(
-        sweep=sweep["index"],
-        joint_name=sweep["joint_name"],
-        direction=sweep["direction"],
+        sweep=sweep.index,
+        joint_name=sweep.joint_name,
+        direction=sweep.direction,
         axis=axis,
         sign=sign,
         axis_flange=turn.axis_flange,
@@ -190,9 +170,9 @@ def _observation(
     )
 
 
-def _rest(stream: Stream, motion: ArmMotion, window: tuple[float, float]) -> Average | None:
+def _rest(stream: Stream, motion: ArmMotion, window: Window) -> Average | None:
     """The mean reading of a rest; None where the arm did not stand still or the rest is too short to say anything."""
-    start, end = window[0] + REST_SETTLING_S, window[1] - REST_SETTLING_S
+    start, end = window.start_s + REST_SETTLING_S, window.end_s - REST_SETTLING_S
     inside = between(stream, start, end)
     states = motion.states[(motion.time_s >= start) & (motion.time_s <= end)]
     if inside.stop - inside.start < MIN_REST_SAMPLES or len(states) == 0:

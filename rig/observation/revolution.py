@@ -1,15 +1,16 @@
 """The arm's side of an observation: when a joint turned through exactly one revolution, and whether properly."""
 
-from collections.abc import Mapping
 from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
+from rig.arm.motion import Sweep
 from rig.data.settings import ObservationThresholds
 from rig.errors import Fault
 from rig.observation.timebase import MAX_STATE_STEP_S, ArmMotion, Array
+from rig.observation.windows import Window
 
 SMOOTHING_S = 0.05  # of the joint's rate before it is judged constant or not
 MAX_STATE_GAP_S = 1.0  # over less, a halt shows in the angle that is missing afterwards
@@ -46,19 +47,17 @@ class Revolution:
         return self.speed_rad_s * self.duration_std_s / self.duration_s
 
 
-def find_revolution(
-    motion: ArmMotion, sweep: Mapping[str, Any], window: tuple[float, float], settings: ObservationThresholds
-) -> Revolution:
-    """The revolution of one sweep (as its event describes it) between two controller times.
+def find_revolution(motion: ArmMotion, sweep: Sweep, window: Window, settings: ObservationThresholds) -> Revolution:
+    """The revolution of one sweep, which was made between two controller times.
 
     Its ends are where the recorded joint angle crosses the ends of `revolution_rad`. Raises Fault
     `incomplete_revolution`, `arm_states_lost`, `slider_below_100`, `speed_not_constant`, `other_joint_moved`.
     """
-    where, (low, high) = describe(sweep), sweep["revolution_rad"]
-    begin, end = np.searchsorted(motion.time_s, window)
+    where, (low, high) = describe(sweep), sweep.revolution_rad
+    begin, end = np.searchsorted(motion.time_s, [window.start_s, window.end_s])
     states = motion.states[max(begin - 1, 0) : end + 1]
-    time_s, angle = states["time_s"], states["q_rad"][:, sweep["joint"]]
-    travelled = angle - low if sweep["direction"] == "ccw" else high - angle
+    time_s, angle = states["time_s"], states["q_rad"][:, sweep.joint]
+    travelled = angle - low if sweep.direction == "ccw" else high - angle
     first, last = _inside(travelled, high - low, where)
     turning = states[first : last + 1]
     gap = float(np.diff(time_s[first - 1 : last + 2]).max())
@@ -66,15 +65,15 @@ def find_revolution(
         raise arm_states_lost(where, f"for {gap:.2f} s")
     _check_slider(turning, where)
     _check_speed(time_s[first : last + 1], travelled[first : last + 1], where, settings)
-    _check_other_joints(turning, sweep["joint"], where)
+    _check_other_joints(turning, sweep.joint, where)
     start_s, end_s, deviation_s = _ends(time_s, travelled, first, last, high - low)
     rate = motion.rate(turning["time_s"]).mean(axis=0)
     return Revolution(start_s, end_s, deviation_s, rate / np.linalg.norm(rate))
 
 
-def describe(sweep: Mapping[str, Any]) -> str:
+def describe(sweep: Sweep) -> str:
     """How messages name a sweep."""
-    return f"sweep {sweep['index']} ({sweep['joint_name']} {sweep['direction']})"
+    return f"sweep {sweep.index} ({sweep.joint_name} {sweep.direction})"
 
 
 def arm_states_lost(where: str, extent: str) -> Fault:

@@ -1,5 +1,7 @@
 """One sensor's entry in `result.json`."""
 
+from dataclasses import asdict
+
 import numpy as np
 
 from rig.analysis.calibration import SensorResult
@@ -88,7 +90,10 @@ def _vector(outcome: vector_model.VectorSolution | Fault) -> VectorEntry | Error
 def _board(agreed: Agreement) -> BoardEntry:
     return BoardEntry.model_validate(
         {
-            "solutions": {method: dict(solution) for method, solution in agreed.solutions.items()},
+            "solutions": {
+                method: {"sensor": solved.sensor, **asdict(solved.solution)}
+                for method, solved in agreed.solutions.items()
+            },
             "not_observed": agreed.not_observed,
             "host_scale": None if agreed.host_scale is None else agreed.host_scale.tolist(),
             "host_bias_rad_s": None if agreed.host_bias_rad_s is None else agreed.host_bias_rad_s.tolist(),

@@ -23,9 +23,10 @@ from rig.data.run_file import RecordedSensor, RunData, RunRecorder
 from rig.data.settings import RunSettings, settings_of
 from rig.errors import Refused
 from rig.observation.observe import sound_sweeps
+from rig.observation.onboard_window import observed_sweeps
 from rig.plans.six_sweeps import plan_six_observation
 from rig.runner.acquisition import Monitor, SensorCount
-from rig.runner.onboard import BoardCalibration, observed_sweeps
+from rig.runner.onboard import BoardCalibration
 from rig.runner.procedure import Confirm, Rig
 from rig.station.view import View
 

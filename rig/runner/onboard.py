@@ -6,24 +6,20 @@ answers goes into the recording, where `rig.analysis.onboard_check` holds it aga
 """
 
 from collections.abc import Collection, Mapping, Sequence
-from dataclasses import asdict, dataclass, field
-from typing import Any
+from dataclasses import dataclass, field
 
 import numpy as np
-from numpy.typing import NDArray
 
 from firmware_host.client import Board, BoardObservation
 from firmware_host.errors import BoardError
 from firmware_host.protocol import METHODS
 from rig.arm.motion import Sweep
 from rig.arm.state import ARM_STATE_DTYPE
+from rig.data.events import BoardNotObserved, BoardObserved, BoardRecalled, BoardSolved
 from rig.data.run_file import RecordedSensor, RunData, RunRecorder
 from rig.data.settings import ObservationThresholds
 from rig.errors import Fault
-from rig.observation.average import on_the_arms_clock
-from rig.observation.observe import finished_sweeps
-from rig.observation.revolution import find_revolution
-from rig.observation.timebase import ArmMotion
+from rig.observation.onboard_window import observed_before, revolution_on_the_board
 from rig.runner.acquisition import Monitor
 
 # From asking the board to keep its readings to the arm's first motion, and how late that may be on a busy machine.
@@ -44,10 +40,10 @@ class BoardCalibration:
     def recall(self, earlier: Sequence[RunData], done: Collection[int]) -> None:
         """Give the board back what it observed of the sweeps `done` before the run was interrupted."""
         for name, (index, _) in self.sensors.items():
-            for sweep, observation in observed_before(earlier, name, done).items():
-                self.board.recall(index, self._count(name), observation["mean_rad_s"], observation["speed_rad_s"])
+            for sweep, seen in observed_before(earlier, name, done).items():
+                self.board.recall(index, self._count(name), seen.observation.mean_rad_s, seen.speed_rad_s)
                 self._observed[name] += 1
-                self.recorder.add_event("board_recalled", sensor=name, sweep=sweep)
+                self.recorder.add(BoardRecalled(name, sweep))
 
     def begin(self) -> None:
         """Before the first sample: the host keeps what it sees, for the clock of the first sweep."""
@@ -66,19 +62,16 @@ class BoardCalibration:
             except (Fault, BoardError) as error:
                 if error.name == "board_link_lost":
                     raise
-                self.recorder.add_event("board_not_observed", sensor=name, sweep=sweep.index, reason=str(error))
+                self.recorder.add(BoardNotObserved(name, sweep.index, str(error)))
                 continue
             self._observed[name] += 1
-            self.recorder.add_event(
-                "board_observed", sensor=name, sweep=sweep.index, speed_rad_s=speed_rad_s, **asdict(found)
-            )
+            self.recorder.add(BoardObserved(name, sweep.index, speed_rad_s, found))
 
     def solve(self) -> None:
         """After the last sweep: the board's solution by either method."""
         for name, (index, _) in self.sensors.items():
             for method in METHODS:
-                solution = self.board.solve(index, method)
-                self.recorder.add_event("board_solved", sensor=name, **asdict(solution))
+                self.recorder.add(BoardSolved(name, self.board.solve(index, method)))
 
     def _observe(self, name: str, sweep: Sweep) -> tuple[BoardObservation, float]:
         """The board's observation and the speed it was told, rad/s."""
@@ -86,48 +79,9 @@ class BoardCalibration:
         samples, states, new = self.monitor.kept(index)
         arm = np.array([state.to_record() for state in states], ARM_STATE_DTYPE)
         start_us, end_us, speed_rad_s = revolution_on_the_board(
-            samples, sensor, arm, asdict(sweep), first=len(arm) - new, settings=self.settings
+            samples, sensor, arm, sweep, first=len(arm) - new, settings=self.settings
         )
         return self.board.observe(index, self._count(name), start_us, end_us, speed_rad_s), speed_rad_s
 
     def _count(self, name: str) -> int:
         return self._observed.setdefault(name, 0)
-
-
-def revolution_on_the_board(
-    samples: NDArray[Any],
-    sensor: RecordedSensor,
-    arm: NDArray[Any],
-    sweep: Mapping[str, Any],
-    *,
-    first: int,
-    settings: ObservationThresholds,
-) -> tuple[int, int, float]:
-    """When a sweep's revolution began and ended on the board's clock, µs, and its speed by the arm's joints, rad/s.
-
-    `samples` (n,) SAMPLE_DTYPE and `arm` (m,) ARM_STATE_DTYPE may reach further back than the sweep, which began after
-    the state `first`, and should: a slow sweep alone may not stand out from the noise or hold too few samples, where
-    a fast motion to where sweeps begin tells the time. Raises Fault as `estimate_time_base` and `find_revolution` do.
-    """
-    motion = ArmMotion(arm)
-    clock = on_the_arms_clock(samples, sensor, motion).clock
-    window = (float(arm["time_s"][min(first, len(arm) - 1)]), float(arm["time_s"][-1]))
-    revolution = find_revolution(motion, sweep, window, settings)
-    start_s, end_s = (clock.board_time_s(time_s) for time_s in (revolution.start_s, revolution.end_s))
-    return round(start_s * 1e6), round(end_s * 1e6), revolution.speed_rad_s
-
-
-def observed_sweeps(run: RunData, sensors: Collection[str]) -> frozenset[int]:
-    """The sweeps of a recording of which the board has an observation for every one of these sensors."""
-    everything = finished_sweeps(run)
-    return everything.intersection(*(observed_before([run], sensor, everything) for sensor in sensors))
-
-
-def observed_before(earlier: Sequence[RunData], sensor: str, done: Collection[int]) -> dict[int, dict[str, Any]]:
-    """What the board observed of a sensor in earlier recordings, by sweep: the newest of each sweep in `done`."""
-    return {
-        event.detail["sweep"]: event.detail
-        for run in earlier
-        for event in run.events
-        if event.name == "board_observed" and event.detail["sensor"] == sensor and event.detail["sweep"] in done
-    }

@@ -8,7 +8,7 @@ then.
 import time
 from collections.abc import Callable, Iterator, Sequence
 from contextlib import contextmanager
-from dataclasses import asdict, dataclass
+from dataclasses import dataclass
 from math import degrees, radians
 
 from firmware_host.client import Board
@@ -17,6 +17,7 @@ from rig.arm.motion import Plan, Rest, Step, Sweep, Transfer, travel
 from rig.arm.preflight import arm_problems, plan_problems, refuse, way_to_home
 from rig.arm.state import JOINT_NAMES, ArmReport
 from rig.config.models import ArmSection
+from rig.data.events import RestFinished, RestStarted, SweepFinished, SweepStarted
 from rig.data.run_file import RunRecorder
 from rig.errors import Fault, Refused
 from rig.runner.acquisition import Monitor
@@ -132,18 +133,18 @@ class Rig:
         if self.on_board is not None:
             self.on_board.keep(sweep)
         with self._step(sweep):
-            self.recorder.add_event("sweep_started", sweep=asdict(sweep))
+            self.recorder.add(SweepStarted(sweep))
             self.arm.move(sweep, lambda: self._watch(sweep))
-            self.recorder.add_event("sweep_finished", sweep=asdict(sweep))
+            self.recorder.add(SweepFinished(sweep))
             if self.on_board is not None:
                 self.on_board.observe(sweep)
 
     def rest(self, rest: Rest) -> None:
         """Stand still: the readings here show the bias and the noise."""
         with self._step(rest):
-            self.recorder.add_event("rest_started")
+            self.recorder.add(RestStarted())
             self.arm.rest(rest.duration_s, lambda: self._watch(rest))
-            self.recorder.add_event("rest_finished")
+            self.recorder.add(RestFinished())
 
     def solve_on_board(self) -> None:
         """Let the board compute its own calibration from what it has averaged; it stands beside the host's."""

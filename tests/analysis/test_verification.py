@@ -13,10 +13,12 @@ from rig.analysis.calibration import solve_runs
 from rig.analysis.comparison import Reference
 from rig.analysis.verdict import verdict, verification_checks
 from rig.analysis.verification import Verification, verify
+from rig.data.events import SweepStarted
 from rig.data.run_file import RunData
 from rig.data.settings import Limits
 from rig.errors import Fault
 from rig.estimation.arrays import Array
+from rig.observation.windows import rested
 from rig.report.figures import draw_verifications
 from rig.report.verification_entry import verification_entry
 from rig.report.verification_table import verification_lines, verification_table
@@ -181,9 +183,9 @@ def test_axes_that_are_not_at_right_angles_stay_an_error() -> None:
 def test_the_recordings_of_a_resumed_run_count_together() -> None:
     def part(sweeps: range) -> RunData:
         kept, current = [], 0
-        for event in MADE.events:  # a rest follows its sweep and carries no number
-            current = event.detail["sweep"]["index"] if "sweep" in event.detail else current
-            kept += [event] if current in sweeps else []
+        for recorded in MADE.events:  # a rest follows its sweep and carries no number
+            current = recorded.event.sweep.index if isinstance(recorded.event, SweepStarted) else current
+            kept += [recorded] if current in sweeps else []
         return replace(MADE, events=tuple(kept))
 
     assert FOUND.before is not None
@@ -198,10 +200,9 @@ def test_the_recordings_of_a_resumed_run_count_together() -> None:
 def reference_asleep_in_rests(run: RunData) -> RunData:
     board_s = run.samples["reference"]["board_time_us"] * 1e-6
     asleep = np.zeros(len(board_s), dtype=bool)
-    for event in run.events:
-        if event.name == "rest_started" and event.controller_time_s is not None:
-            since = board_s * (1 + QUIET.drift) + 33.0 - event.controller_time_s
-            asleep |= (since > 0.3) & (since < 2.7)
+    for rest in rested(run):
+        since = board_s * (1 + QUIET.drift) + 33.0 - rest.start_s
+        asleep |= (since > 0.3) & (since < 2.7)
     return replace(run, samples={**run.samples, "reference": run.samples["reference"][~asleep]})
 
 

@@ -10,11 +10,13 @@ from numpy.typing import NDArray
 
 from rig.analysis.calibration import solve_runs
 from rig.arm.state import ARM_STATE_DTYPE
+from rig.data.events import Event, SweepFinished, SweepStarted
 from rig.data.run_file import RunData
 from rig.data.settings import ObservationThresholds
 from rig.errors import Fault, Refused
-from rig.observation.observe import SensorObservations, finished, observe
+from rig.observation.observe import SensorObservations, observe
 from rig.observation.timebase import ArmMotion, TimeBase, estimate_time_base, widening
+from rig.observation.windows import swept
 from rig.report.sensor_entry import sensor_entry
 from support.synthetic_run import (
     BIAS_RAD_S,
@@ -77,8 +79,7 @@ def test_the_board_s_clock_is_found_within_its_uncertainty(setup: Setup) -> None
 @pytest.mark.parametrize("joint", ["wrist_3", "wrist_1", "wrist_2"])
 def test_a_board_that_was_heard_late_is_not_taken_for_an_earlier_sweep(joint: str) -> None:
     """All sweeps turn equally fast; only the axis they turn about tells them apart."""
-    events = [event for event in USUAL.events if event.name == "sweep_started"]
-    begun = next(event.controller_time_s for event in events if event.detail["sweep"]["joint_name"] == joint) or 0.0
+    begun = next(made.window.start_s for made in swept(USUAL) if made.sweep.joint_name == joint)
     sensor, samples = USUAL.sensors["gyro"], USUAL.samples["gyro"]
     board_s = samples["board_time_us"] * 1e-6
     heard = np.abs(board_s * (1 + Setup().drift) + Setup().boot_s - begun - 10) < 12.5
@@ -94,9 +95,10 @@ def test_a_single_sweep_tells_the_clock_whatever_the_bias(bias_rad_s: float) -> 
     run = synthetic_run(setup)
     sensor, samples = run.sensors["gyro"], run.samples["gyro"]
     board_s = samples["board_time_us"] * 1e-6
-    for sweep, (start_s, end_s) in finished(run, "sweep"):
-        if sweep["joint_name"] != "wrist_1":  # which turns about x
+    for made in swept(run):
+        if made.sweep.joint_name != "wrist_1":  # which turns about x
             continue
+        start_s, end_s = made.window.start_s, made.window.end_s
         begun_s = board_s * (1 + setup.drift) + setup.boot_s - start_s
         heard = (begun_s > -1) & (begun_s < end_s - start_s + 0.1)
         arm = run.arm[(run.arm["time_s"] > start_s - 1) & (run.arm["time_s"] < end_s + 0.1)]
@@ -200,7 +202,7 @@ def test_a_bias_that_drifts_makes_the_result_uncertain(noise_rad_s: float, chang
 
 def between(run: RunData, start_s: float, end_s: float) -> NDArray[np.intp]:
     """Indices of the samples in a stretch of the first sweep, in seconds after its start."""
-    begun = next(event.controller_time_s for event in run.events if event.name == "sweep_started") or 0.0
+    begun = next(swept(run)).window.start_s
     time_s = run.samples["gyro"]["board_time_us"] * 1e-6 * (1 + Setup().drift) + Setup().boot_s
     return np.flatnonzero((time_s >= begun + start_s) & (time_s < begun + end_s))
 
@@ -279,7 +281,7 @@ def halt(run: RunData) -> RunData:
     """The arm pauses for a second in the middle of the first sweep, and so does the whole plan after it."""
 
     def change(arm: NDArray[Any]) -> NDArray[Any]:
-        begun = next(event.controller_time_s for event in run.events if event.name == "sweep_started") or 0.0
+        begun = next(swept(run)).window.start_s
         before = arm["time_s"] < begun + 3.5
         held = np.repeat(arm[before][-1:], 125)
         held["time_s"] += 0.008 * np.arange(1, 126)
@@ -287,12 +289,12 @@ def halt(run: RunData) -> RunData:
         after["time_s"] += 1.0
         return np.concatenate([arm[before], held, after])
 
-    begun = next(event.controller_time_s for event in run.events if event.name == "sweep_started") or 0.0
+    begun = next(swept(run)).window.start_s
     index = int(between(run, 3.5, 3.6)[0])
     events = tuple(
-        replace(event, controller_time_s=event.controller_time_s + (event.controller_time_s > begun))
-        for event in run.events
-        if event.controller_time_s is not None
+        replace(recorded, controller_time_s=recorded.controller_time_s + (recorded.controller_time_s > begun))
+        for recorded in run.events
+        if recorded.controller_time_s is not None
     )
 
     def later(samples: NDArray[Any]) -> NDArray[Any]:
@@ -325,15 +327,14 @@ def another_joint(run: RunData) -> RunData:
 
 def short(run: RunData) -> RunData:
     """The plan wanted more than the joint travelled."""
-    detail = run.events[0].detail
-    low, high = detail["sweep"]["revolution_rad"]
-    events = [
-        replace(event, detail={"sweep": {**event.detail["sweep"], "revolution_rad": (low - 1, high + 1)}})
-        if event.name.startswith("sweep")
-        else event
-        for event in run.events
-    ]
-    return replace(run, events=tuple(events))
+
+    def longer(event: Event) -> Event:
+        if not isinstance(event, SweepStarted | SweepFinished):
+            return event
+        low, high = event.sweep.revolution_rad
+        return replace(event, sweep=replace(event.sweep, revolution_rad=(low - 1, high + 1)))
+
+    return replace(run, events=tuple(replace(recorded, event=longer(recorded.event)) for recorded in run.events))
 
 
 def still(run: RunData) -> RunData:
@@ -485,8 +486,14 @@ def test_one_calibration_recovers_the_truth() -> None:
 
 def part(run: RunData, sweeps: range) -> RunData:
     """What a run that was interrupted and resumed has in one of its files: the events of some sweeps."""
-    events = [event for event in run.events if event.name.startswith("sweep")]
-    return replace(run, events=tuple(event for event in events if event.detail["sweep"]["index"] in sweeps))
+    return replace(
+        run,
+        events=tuple(
+            recorded
+            for recorded in run.events
+            if isinstance(recorded.event, SweepStarted | SweepFinished) and recorded.event.sweep.index in sweeps
+        ),
+    )
 
 
 def test_a_sensor_without_noise_is_known_to_a_part_of_a_count() -> None:
@@ -510,7 +517,7 @@ def test_a_resumed_run_is_solved_from_all_its_recordings() -> None:
 
 def test_an_interrupted_run_alone_says_what_is_missing() -> None:
     interrupted = part(USUAL, range(4))
-    begun = [event for event in USUAL.events if event.name == "sweep_started"][4]
+    begun = [recorded for recorded in USUAL.events if isinstance(recorded.event, SweepStarted)][4]
     with pytest.raises(Fault, match=r"too_few_observations.*resume"):
         solve_runs([replace(interrupted, events=(*interrupted.events, begun))])
 

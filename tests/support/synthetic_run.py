@@ -14,7 +14,8 @@ from rig.arm.kinematics import flange_rate
 from rig.arm.motion import Plan, Rest, Sweep, Transfer
 from rig.arm.state import ARM_STATE_DTYPE
 from rig.config.load import parse
-from rig.data.run_file import Event, RecordedSensor, RunData
+from rig.data.events import Event, Recorded, RestFinished, RestStarted, SweepFinished, SweepStarted
+from rig.data.run_file import RecordedSensor, RunData
 from rig.data.settings import settings_of
 from rig.plans.six_sweeps import plan_six_observation
 
@@ -95,15 +96,12 @@ class Motion:
             gain[:, 3:] += rate_share * np.cos(cycles * smooth[:, 3:] + phase)
         return q, gain * speed
 
-    def events(self) -> tuple[Event, ...]:
+    def events(self) -> tuple[Recorded, ...]:
         """As the procedure writes them."""
         events = []
         for step, end in zip(self.plan.steps, self.ends, strict=True):
-            name, detail = _event(step)
-            if name:
-                start = float(end - step.duration_s)
-                events.append(Event(f"{name}_started", start + 1e4, start, detail))
-                events.append(Event(f"{name}_finished", float(end) + 1e4, float(end), detail))
+            for event, time_s in zip(_events(step), (float(end - step.duration_s), float(end)), strict=False):
+                events.append(Recorded(event, time_s + 1e4, time_s))
         return tuple(events)
 
 
@@ -171,11 +169,11 @@ SENSOR = RecordedSensor(
 )
 
 
-def _event(step: Sweep | Transfer | Rest) -> tuple[str, dict[str, object]]:
+def _events(step: Sweep | Transfer | Rest) -> tuple[Event, ...]:
+    """At the beginning and at the end of a step."""
     if isinstance(step, Sweep):
-        kept = ("index", "joint", "joint_name", "direction", "axis_flange", "speed_rad_s", "revolution_rad")
-        return "sweep", {"sweep": {name: getattr(step, name) for name in kept}}
-    return ("rest", {}) if isinstance(step, Rest) else ("", {})
+        return SweepStarted(step), SweepFinished(step)
+    return (RestStarted(), RestFinished()) if isinstance(step, Rest) else ()
 
 
 def _trapezoid(since_s: Array, step: Sweep | Transfer) -> tuple[Array, Array]:

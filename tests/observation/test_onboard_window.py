@@ -4,8 +4,8 @@ import numpy as np
 import pytest
 
 from rig.data.run_file import RunData
-from rig.observation.observe import finished
-from rig.runner.onboard import revolution_on_the_board
+from rig.observation.onboard_window import revolution_on_the_board
+from rig.observation.windows import swept
 from support.synthetic_run import Setup, synthetic_run
 
 
@@ -14,16 +14,16 @@ def told(run: RunData, setup: Setup, sweep: int) -> tuple[float, float]:
 
     The host holds what came since the beginning of the sweep before the last, or since sampling began.
     """
-    sweeps = list(finished(run, "sweep"))
-    detail, (start_s, end_s) = sweeps[sweep]
-    since_s = sweeps[sweep - 2][1][0] if sweep >= 2 else 0.0
+    sweeps = list(swept(run))
+    start_s, end_s = sweeps[sweep].window.start_s, sweeps[sweep].window.end_s
+    since_s = sweeps[sweep - 2].window.start_s if sweep >= 2 else 0.0
     samples, arm = run.samples["gyro"], run.arm
     at_s = samples["board_time_us"] * 1e-6 * (1 + setup.drift) + setup.boot_s
     held = (at_s > since_s) & (at_s < end_s + 0.05)
     arm = arm[(arm["time_s"] > since_s) & (arm["time_s"] < end_s + 0.05)]
     first = int(np.searchsorted(arm["time_s"], start_s))
     start_us, end_us, speed_rad_s = revolution_on_the_board(
-        samples[held], run.sensors["gyro"], arm, detail, first=first, settings=run.settings.observation
+        samples[held], run.sensors["gyro"], arm, sweeps[sweep].sweep, first=first, settings=run.settings.observation
     )
     middle_s = (start_us + end_us) / 2e6 * (1 + setup.drift) + setup.boot_s
     return middle_s - (start_s + end_s) / 2, float(np.degrees(speed_rad_s))

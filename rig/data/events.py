@@ -1,0 +1,165 @@
+"""What happens in a run, as its recording keeps it: one type for each kind of event, written and read here alone.
+
+In the file an event is a line of JSON: its kind's name, when it happened, and the fields of its type.
+"""
+
+import json
+import math
+from collections.abc import Iterator
+from dataclasses import asdict, dataclass
+from typing import Any
+
+from firmware_host.answers import BoardObservation, BoardSolution
+from rig.arm.motion import Sweep
+from rig.arm.state import JOINT_NAMES
+from rig.data.checked import Finite, checked, quoted
+
+LARGEST_INTEGER = 2**63 - 1
+
+
+@dataclass(frozen=True, slots=True)
+class SweepStarted:
+    """The arm is told to make a sweep."""
+
+    sweep: Sweep
+
+
+@dataclass(frozen=True, slots=True)
+class SweepFinished:
+    """The arm has made it."""
+
+    sweep: Sweep
+
+
+@dataclass(frozen=True, slots=True)
+class RestStarted:
+    """The arm stands still from now on."""
+
+
+@dataclass(frozen=True, slots=True)
+class RestFinished:
+    """It has stood still until now."""
+
+
+@dataclass(frozen=True, slots=True)
+class BoardObserved:
+    """The board has averaged a sensor's readings over the revolution of sweep `sweep`, told its mean speed."""
+
+    sensor: str
+    sweep: int
+    speed_rad_s: float
+    observation: BoardObservation
+
+
+@dataclass(frozen=True, slots=True)
+class BoardNotObserved:
+    """The board has no average of that sweep, for `reason`."""
+
+    sensor: str
+    sweep: int
+    reason: str
+
+
+@dataclass(frozen=True, slots=True)
+class BoardRecalled:
+    """The board was given back what it had observed of that sweep before the run was interrupted."""
+
+    sensor: str
+    sweep: int
+
+
+@dataclass(frozen=True, slots=True)
+class BoardSolved:
+    """The board's own calibration of a sensor, by one method."""
+
+    sensor: str
+    solution: BoardSolution
+
+
+OfTheBoard = BoardObserved | BoardNotObserved | BoardRecalled | BoardSolved
+Event = SweepStarted | SweepFinished | RestStarted | RestFinished | OfTheBoard
+
+_KINDS: dict[str, type[Event]] = {
+    "sweep_started": SweepStarted,
+    "sweep_finished": SweepFinished,
+    "rest_started": RestStarted,
+    "rest_finished": RestFinished,
+    "board_observed": BoardObserved,
+    "board_not_observed": BoardNotObserved,
+    "board_recalled": BoardRecalled,
+    "board_solved": BoardSolved,
+}
+_NAMES = {kind: name for name, kind in _KINDS.items()}
+
+
+@dataclass(frozen=True, slots=True)
+class Recorded:
+    """An event and when it was: on the host's monotonic clock, and on the controller's if that was heard by then."""
+
+    event: Event
+    host_time_s: float
+    controller_time_s: float | None
+
+
+def to_line(recorded: Recorded) -> bytes:
+    """A line of a run file's events, with its end."""
+    document = {
+        "name": _NAMES[type(recorded.event)],
+        "host_time_s": recorded.host_time_s,
+        "controller_time_s": recorded.controller_time_s,
+        "detail": asdict(recorded.event),
+    }
+    return json.dumps(document).encode() + b"\n"
+
+
+def from_lines(stream: bytes) -> Iterator[Recorded]:
+    """The events of a run file. What follows the last line's end was cut off by a kill and is left out.
+
+    Raises ValueError naming the first line that is no event, or not of the shape its kind has.
+    """
+    for number, line in enumerate(stream.split(b"\n")[:-1], start=1):
+        if line.strip(b"\0"):
+            try:
+                yield _from_document(json.loads(line))
+            except (ValueError, RecursionError) as error:
+                raise ValueError(f"event {number} cannot be understood: {' '.join(str(error).split())}") from None
+
+
+def _from_document(document: Any) -> Recorded:
+    if not isinstance(document, dict) or not isinstance(document.get("detail"), dict):
+        raise ValueError("it has no name and no details")
+    name, detail = document.get("name"), document["detail"]
+    if name not in _KINDS:
+        raise ValueError(f"there is no event {quoted(name)}")
+    event = checked(_KINDS[name], _nested(name, detail), name)
+    if isinstance(event, SweepStarted | SweepFinished):
+        _check_sweep(event.sweep)
+    if isinstance(event, BoardObserved):
+        _check_observation(event.observation)
+    times = checked(_Times, document, name)
+    return Recorded(event, times.host_time_s, times.controller_time_s)
+
+
+def _nested(name: str, detail: dict[str, Any]) -> dict[str, Any]:
+    """Schema "rig.run/1" kept what the board answered beside the rest, and not as a value of its own."""
+    answer = {"board_observed": "observation", "board_solved": "solution"}.get(name)
+    return {**detail, answer: detail} if answer is not None and answer not in detail else detail
+
+
+@dataclass(frozen=True, slots=True)
+class _Times:
+    host_time_s: Finite
+    controller_time_s: Finite | None = None
+
+
+def _check_sweep(sweep: Sweep) -> None:
+    """A sweep that could be planned: what reads it relies on its numbers."""
+    low, high = sweep.revolution_rad
+    numbers = (*sweep.axis_flange, *sweep.start_q_rad, *sweep.end_q_rad, low, high, sweep.speed_rad_s, sweep.duration_s)
+    if not (0 <= sweep.joint < len(JOINT_NAMES) and low < high and all(map(math.isfinite, numbers))):
+        raise ValueError(f"there is no such sweep as {quoted(sweep)}")
+
+
+def _check_observation(observation: BoardObservation) -> None:
+    if not all(0 <= n <= LARGEST_INTEGER for n in (observation.start_us, observation.end_us, observation.samples)):
+        raise ValueError(f"there is no such observation as {quoted(observation)}")

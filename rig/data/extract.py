@@ -1,0 +1,133 @@
+"""Takes a run file apart, as a process of its own: `python -m rig.data.extract FILE` writes its contents to stdout.
+
+The HDF5 library does not come back from some damaged files, and nothing in a process can end it then, no signal
+either. So a file is read where it can be ended from outside, and only what proved whole reaches the rig: a line of JSON
+(schema, texts, descriptions of the sensors), then the arrays in NumPy's format: each sensor's samples, arm, events.
+What is of another shape ends in one line on stderr and exit status 1.
+"""
+
+import json
+import os
+import re
+import sys
+from pathlib import Path
+from typing import Any, BinaryIO
+
+import numpy as np
+from numpy.typing import NDArray
+
+from firmware_host.samples import SAMPLE_DTYPE
+from rig.arm.state import ARM_STATE_DTYPE
+from rig.data.layout import EVENTS_DTYPE, SCHEMA, TEXTS
+
+OPEN_FOR_WRITING = 0x01  # of the superblock's consistency flags
+MAX_UNWRITTEN_ROWS = 100_000  # announced and not there: what a kill leaves of one flush, and more
+
+
+def extract(path: Path, out: BinaryIO) -> None:
+    """Write the contents of a run file to `out`. Raises OSError, ValueError and whatever else h5py does."""
+    import h5py
+
+    # A plain open refuses a file whose writer was killed; an SWMR reader trusts one that is cut short, and waits for
+    # torn metadata to become whole. So each where it belongs.
+    mode = {"libver": "latest", "swmr": True} if _left_open(path) else {}
+    with h5py.File(path, "r", **mode) as file:
+        schema = _text(file, "schema")
+        if schema not in TEXTS:
+            raise ValueError(f"its schema is {schema!r:.60}, not {SCHEMA!r}")
+        sensors = _member(file, "samples", h5py.Group)
+        samples = {name: _member(sensors, name, h5py.Dataset) for name in sensors}
+        header = {
+            "schema": schema,
+            "texts": {name: _text(file, name) for name in TEXTS[schema]},
+            "described": {name: _attributes(dataset) for name, dataset in samples.items()},
+        }
+        out.write(json.dumps(header).encode() + b"\n")
+        for name, dataset in samples.items():
+            np.save(out, _rows(dataset, f"samples/{name}", SAMPLE_DTYPE))
+        for name, dtype in (("arm", ARM_STATE_DTYPE), ("events", EVENTS_DTYPE)):
+            np.save(out, _rows(_member(file, name, h5py.Dataset), name, dtype))
+
+
+def reason(error: Exception) -> str:
+    """In one line; HDF5 buries the system's words in several lines of its own."""
+    text = " ".join(str(error).split())
+    if cut := re.search(r"truncated file: eof = (\d+),.* stored_eof = (\d+)", text):
+        return f"it is cut short: {cut[1]} of its {cut[2]} bytes are there"
+    if "file signature not found" in text:
+        return "it is not an HDF5 file"
+    if "checksum" in text:
+        return f"it is damaged: {text}"
+    system = re.search(r"error message = '([^']*)'", text)
+    return system[1] if system else text or type(error).__name__
+
+
+def _left_open(path: Path) -> bool:
+    """Whether somebody writes the file, or was killed while he did."""
+    with path.open("rb") as file:
+        start = file.read(12)
+    return len(start) == 12 and start[8] >= 3 and bool(start[11] & OPEN_FOR_WRITING)
+
+
+def _member(group: Any, name: str, kind: type) -> Any:
+    """A group or dataset that lies in this very file."""
+    import h5py
+
+    if name not in group:
+        raise ValueError(f"it has no {name}")
+    if not isinstance(group.get(name, getlink=True), h5py.HardLink):
+        raise ValueError(f"{name} is a link to somewhere else")
+    member = group[name]
+    if not isinstance(member, kind):
+        raise ValueError(f"{name} is not a {kind.__name__.lower()}")
+    return member
+
+
+def _rows(dataset: Any, name: str, dtype: np.dtype[Any]) -> NDArray[Any]:
+    if dataset.dtype != dtype or dataset.ndim != 1:
+        raise ValueError(f"{name} holds {dataset.dtype} in {dataset.ndim} dimensions, not rows of {dtype}")
+    if dataset.external or dataset.is_virtual:
+        raise ValueError(f"the rows of {name} lie somewhere else")
+    stored = _stored_rows(dataset)
+    if len(dataset) > stored + MAX_UNWRITTEN_ROWS:
+        raise ValueError(f"{name} announces {len(dataset)} rows and holds {stored}")
+    rows: NDArray[Any] = dataset[:]
+    return rows
+
+
+def _stored_rows(dataset: Any) -> int:
+    """For how many rows the file has room, at most."""
+    if dataset.chunks is None:
+        return int(dataset.id.get_storage_size() // dataset.dtype.itemsize)
+    return int(dataset.id.get_num_chunks() * dataset.chunks[0])
+
+
+def _attributes(dataset: Any) -> dict[str, Any]:
+    return {name: _plain(value) for name, value in dataset.attrs.items()}
+
+
+def _text(file: Any, name: str) -> str:
+    value = _plain(file.attrs.get(name))
+    if not isinstance(value, str):
+        raise ValueError(f"its {name} is not a text")
+    return value
+
+
+def _plain(value: Any) -> Any:
+    """An attribute in Python's own types; one that JSON does not have ends in the TypeError of `json.dumps`."""
+    return value.tolist() if isinstance(value, np.ndarray | np.generic) else value
+
+
+def _main() -> int:
+    try:
+        extract(Path(sys.argv[1]), sys.stdout.buffer)
+        sys.stdout.flush()
+    except Exception as error:  # of whatever kind: what it is damaged into is up to chance
+        sys.stderr.write(reason(error) + "\n")
+        sys.stderr.flush()
+        os._exit(1)  # HDF5 may not close what it could not open
+    return 0
+
+
+if __name__ == "__main__":
+    sys.exit(_main())

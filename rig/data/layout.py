@@ -1,0 +1,75 @@
+"""How a run lies in HDF5 (schema "rig.run/2").
+
+`/samples/<sensor>` (SAMPLE_DTYPE, the sensor's description as attributes), `/arm` (ARM_STATE_DTYPE), `/events` (bytes:
+SWMR forbids data of variable length, so an event is a line of JSON); `schema`, `config` (YAML), `settings` and
+`provenance` (JSON) as attributes of the file. Schema "rig.run/1" lacks `settings`.
+"""
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from firmware_host.samples import SAMPLE_DTYPE
+from rig.arm.state import ARM_STATE_DTYPE
+
+SCHEMA = "rig.run/2"
+SCHEMA_BEFORE = "rig.run/1"
+TEXTS = {SCHEMA: ("config", "settings", "provenance"), SCHEMA_BEFORE: ("config", "provenance")}
+EVENTS_DTYPE = np.dtype("u1")
+CHUNK_ROWS = 1024
+CHUNK_BYTES = 65536
+
+
+@dataclass(frozen=True, slots=True)
+class Contents:
+    """What a run file holds, as it stands there: nothing of it is judged yet.
+
+    `texts` are the attributes named in `TEXTS`, `described` the attributes of each sensor; `samples` (n,) SAMPLE_DTYPE
+    by sensor, `arm` (n,) ARM_STATE_DTYPE, `events` (n,) bytes.
+    """
+
+    schema: str
+    texts: Mapping[str, str]
+    described: Mapping[str, Mapping[str, Any]]
+    samples: Mapping[str, NDArray[Any]]
+    arm: NDArray[Any]
+    events: NDArray[Any]
+
+
+def empty(schema: str, texts: Mapping[str, str], described: Mapping[str, Mapping[str, Any]]) -> Contents:
+    """The contents of a run that begins."""
+    samples = {name: np.empty(0, SAMPLE_DTYPE) for name in described}
+    return Contents(schema, texts, described, samples, np.empty(0, ARM_STATE_DTYPE), np.empty(0, EVENTS_DTYPE))
+
+
+def lay_out(path: Path, contents: Contents, *, swmr: bool) -> None:
+    """Write a whole run file beside its place and move it there, so that a kill leaves all or nothing.
+
+    With `swmr` it can be opened for appending in that mode; without, any HDF5 tool opens it.
+    """
+    import h5py
+
+    whole = path.with_name(path.name + ".part")
+    with h5py.File(whole, "w", libver="latest" if swmr else None) as file:
+        file.attrs.update(schema=contents.schema, **contents.texts)
+        _dataset(file, "arm", contents.arm, CHUNK_ROWS)
+        _dataset(file, "events", contents.events, CHUNK_BYTES)
+        for name, rows in contents.samples.items():
+            _dataset(file, f"samples/{name}", rows, CHUNK_ROWS).attrs.update(contents.described[name])
+    whole.replace(path)
+
+
+def append(dataset: Any, rows: NDArray[Any]) -> None:
+    """Add rows to a dataset of a file that is open for appending."""
+    start = dataset.shape[0]
+    dataset.resize((start + len(rows),))
+    dataset[start:] = rows
+    dataset.flush()
+
+
+def _dataset(file: Any, name: str, rows: NDArray[Any], chunk: int) -> Any:
+    return file.create_dataset(name, data=rows, maxshape=(None,), chunks=(chunk,), dtype=rows.dtype)

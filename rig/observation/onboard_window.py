@@ -1,0 +1,54 @@
+"""What the board is told of a sweep, and which sweeps it has told of: its own averages, beside the host's. Pure."""
+
+from collections.abc import Collection, Sequence
+from typing import Any
+
+from numpy.typing import NDArray
+
+from rig.arm.motion import Sweep
+from rig.data.events import BoardObserved
+from rig.data.run_file import RecordedSensor, RunData
+from rig.data.settings import ObservationThresholds
+from rig.observation.average import on_the_arms_clock
+from rig.observation.revolution import find_revolution
+from rig.observation.timebase import ArmMotion
+from rig.observation.windows import Window, finished_sweeps
+
+
+def revolution_on_the_board(
+    samples: NDArray[Any],
+    sensor: RecordedSensor,
+    arm: NDArray[Any],
+    sweep: Sweep,
+    *,
+    first: int,
+    settings: ObservationThresholds,
+) -> tuple[int, int, float]:
+    """When a sweep's revolution began and ended on the board's clock, µs, and its speed by the arm's joints, rad/s.
+
+    `samples` (n,) SAMPLE_DTYPE and `arm` (m,) ARM_STATE_DTYPE may reach further back than the sweep, which began after
+    the state `first`, and should: a slow sweep alone may not stand out from the noise or hold too few samples, where
+    a fast motion to where sweeps begin tells the time. Raises Fault as `estimate_time_base` and `find_revolution` do.
+    """
+    motion = ArmMotion(arm)
+    clock = on_the_arms_clock(samples, sensor, motion).clock
+    window = Window(float(arm["time_s"][min(first, len(arm) - 1)]), float(arm["time_s"][-1]))
+    revolution = find_revolution(motion, sweep, window, settings)
+    start_s, end_s = (clock.board_time_s(time_s) for time_s in (revolution.start_s, revolution.end_s))
+    return round(start_s * 1e6), round(end_s * 1e6), revolution.speed_rad_s
+
+
+def observed_sweeps(run: RunData, sensors: Collection[str]) -> frozenset[int]:
+    """The sweeps of a recording of which the board has an observation for every one of these sensors."""
+    everything = finished_sweeps(run)
+    return everything.intersection(*(observed_before([run], sensor, everything) for sensor in sensors))
+
+
+def observed_before(earlier: Sequence[RunData], sensor: str, done: Collection[int]) -> dict[int, BoardObserved]:
+    """What the board observed of a sensor in earlier recordings, by sweep: the newest of each sweep in `done`."""
+    return {
+        event.sweep: event
+        for run in earlier
+        for event in (recorded.event for recorded in run.events)
+        if isinstance(event, BoardObserved) and event.sensor == sensor and event.sweep in done
+    }

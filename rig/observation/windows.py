@@ -1,0 +1,56 @@
+"""When the sweeps and rests of a recording were, on the controller's clock. Pure."""
+
+from collections.abc import Iterator
+from dataclasses import dataclass
+from typing import TypeVar
+
+from rig.arm.motion import Sweep
+from rig.data.events import Event, RestFinished, RestStarted, SweepFinished, SweepStarted
+from rig.data.run_file import RunData
+
+Ending = TypeVar("Ending", SweepFinished, RestFinished)
+
+
+@dataclass(frozen=True, slots=True)
+class Window:
+    """From one controller time to another, s."""
+
+    start_s: float
+    end_s: float
+
+
+@dataclass(frozen=True, slots=True)
+class Finished:
+    """A sweep that was begun and finished, and when."""
+
+    sweep: Sweep
+    window: Window
+
+
+def swept(run: RunData) -> Iterator[Finished]:
+    """The sweeps of a recording that were begun and finished, in order; an interrupted one is left out."""
+    for event, window in _between(run, SweepStarted, SweepFinished):
+        yield Finished(event.sweep, window)
+
+
+def rested(run: RunData) -> Iterator[Window]:
+    """The rests that were begun and finished, in order."""
+    for _, window in _between(run, RestStarted, RestFinished):
+        yield window
+
+
+def finished_sweeps(run: RunData) -> frozenset[int]:
+    """The indices of the sweeps a recording holds from start to end."""
+    return frozenset(finished.sweep.index for finished in swept(run))
+
+
+def _between(run: RunData, begin: type[Event], end: type[Ending]) -> Iterator[tuple[Ending, Window]]:
+    """Every event of type `end` that has one of type `begin` before it, both at a known time of the controller's."""
+    started_s = None
+    for recorded in run.events:
+        event, time_s = recorded.event, recorded.controller_time_s
+        if isinstance(event, begin):
+            started_s = time_s
+        elif isinstance(event, end) and started_s is not None and time_s is not None:
+            yield event, Window(started_s, time_s)
+            started_s = None
