@@ -8,7 +8,7 @@ from collections.abc import Iterator
 from contextlib import contextmanager
 from pathlib import Path
 
-from rig.errors import Refused
+from rig.errors import Problem, Refused
 
 STOP_TIMEOUT_S = 5.0
 
@@ -18,19 +18,21 @@ def simulated_laboratory(config_path: Path) -> Iterator[None]:
     """Run the world of `config_path` for the length of the `with` block.
 
     The world ends when its standard input closes, so it cannot outlive this process, however this process ends.
-    Raises `Refused` when it does not come up (it has then said why on stderr).
+    Raises Refused: what the world refused, or `world_not_ready` when it ends without a word of its own.
     """
     command = [sys.executable, "-m", "rig.world", str(config_path), "--until-eof"]
     # A session of its own: Ctrl-C in the terminal must stop the arm first, not the laboratory under it.
     with subprocess.Popen(command, stdin=subprocess.PIPE, stdout=subprocess.PIPE, start_new_session=True) as process:
         assert process.stdin is not None and process.stdout is not None
         try:
-            answer = process.stdout.readline()
-            if not answer or not json.loads(answer).get("ready"):
+            answer = json.loads(process.stdout.readline() or "{}")
+            if "problem" in answer:
+                raise Refused.of(Problem(**answer["problem"]))
+            if not answer.get("ready"):
                 raise Refused(
                     "world_not_ready",
-                    f"the simulated laboratory of {config_path} did not start",
-                    "Its own message stands above; `rig world CONFIG` runs it alone",
+                    f"the simulated laboratory of {config_path} ended with status {process.wait()} before it was ready",
+                    "What it said stands above; `rig world CONFIG` runs it alone",
                 )
             yield
         finally:

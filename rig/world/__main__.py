@@ -1,7 +1,13 @@
-"""`python -m rig.world CONFIG [--until-eof]`: the simulated laboratory in the foreground, for any client."""
+"""`python -m rig.world CONFIG [--until-eof]`: the simulated laboratory in the foreground, for any client.
+
+Its first line on stdout is JSON: `ready` and where everything listens. With --until-eof whoever started it reads that
+line, so a refusal is said there too: `ready` false and the `problem`.
+"""
 
 import argparse
+import json
 import sys
+from dataclasses import asdict
 
 from rig.config.load import load
 from rig.errors import Refused
@@ -24,7 +30,10 @@ def main(arguments: list[str] | None = None) -> int:
             ) from error
         serve(loaded, options.until_eof)
     except Refused as error:
-        print(error, file=sys.stderr)
+        if options.until_eof:
+            print(json.dumps({"ready": False, "problem": asdict(error.problem)}), flush=True)
+        else:
+            print(error, file=sys.stderr)
         return error.exit_status
     return 0
 

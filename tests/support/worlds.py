@@ -96,7 +96,9 @@ def worlds(folder: Path) -> Iterator[World]:
             assert process.stdout is not None
             line = process.stdout.readline()
             assert line, f"the world of {config_path} did not start, exit status {process.wait(START_TIMEOUT_S)}"
-            handle = WorldHandle(config_path, process, json.loads(line))
+            description = json.loads(line)
+            assert description["ready"], description
+            handle = WorldHandle(config_path, process, description)
         except BaseException:
             process.kill()
             process.communicate()

@@ -1,0 +1,39 @@
+"""The simulated laboratory as a command starts it: when it does not come up, the command says why."""
+
+import os
+import subprocess
+import sys
+from pathlib import Path
+
+import pytest
+
+from rig.commands.laboratory import simulated_laboratory
+from rig.errors import Refused
+from support.paths import DEMO
+from support.worlds import World
+
+
+def test_a_laboratory_whose_port_is_taken_is_refused_by_the_worlds_own_words(world: World) -> None:
+    running = world()
+    with (
+        pytest.raises(Refused, match=f"port_in_use: .*cannot listen on {running.host}:29999"),
+        simulated_laboratory(running.config_path),
+    ):
+        pass
+    command = [sys.executable, "-m", "rig", "check", str(running.config_path)]
+    done = subprocess.run(command, capture_output=True, text=True, timeout=50, check=False)
+    assert done.returncode == 2 and done.stderr.startswith("rig: port_in_use: "), done
+    assert done.stderr.count("\n") == 1
+
+
+def test_a_laboratory_that_breaks_before_it_is_ready_says_how_it_ended(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """An emulator's engine that cannot be loaded."""
+    (tmp_path / "unicorn.py").write_text("raise SystemExit(7)\n")
+    monkeypatch.setenv("PYTHONPATH", os.pathsep.join([str(tmp_path), *sys.path]))
+    with (
+        pytest.raises(Refused, match=r"world_not_ready: .* ended with status 7"),
+        simulated_laboratory(DEMO),
+    ):
+        pass
