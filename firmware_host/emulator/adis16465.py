@@ -11,6 +11,7 @@ import numpy as np
 
 from firmware_host.emulator.bus import Violation
 from firmware_host.emulator.gyroscope import Gyroscope, GyroTruth, saturated
+from firmware_host.emulator.part_registers import PartRegisters
 from firmware_host.emulator.spi_device import Fault
 
 PROD_ID = 0x4051
@@ -79,6 +80,7 @@ class Adis16465:
         self._per_count = math.radians(1 / counts_per_deg_s) / 65536  # of the 32-bit number
         self._gyroscope = Gyroscope(rate_at, truth, seed)
         self._speed = 1 + oscillator_ppm * 1e-6
+        self._registers = PartRegisters(self.name, "adis16465.py", _RESET_AND_BITS, digits=4)
         self._temperature = saturated(round(temperature_c * 10)) & 0xFFFF
         self._command: int | None = None  # first byte of the frame under way
         self._burst: bytes | None = None  # what is left to be clocked out
@@ -104,7 +106,7 @@ class Adis16465:
 
     @property
     def interrupt_level(self) -> bool:
-        active_high = bool(self._registers[_MSC_CTRL] & _DR_ACTIVE_HIGH)
+        active_high = bool(self._registers.values[_MSC_CTRL] & _DR_ACTIVE_HIGH)
         return self._data_valid == active_high
 
     def advance(self, time_s: float) -> None:
@@ -178,7 +180,7 @@ class Adis16465:
     # --- registers
 
     def _reset(self, time_s: float) -> None:
-        self._registers = {address: initial for address, (initial, _bits) in _RESET_AND_BITS.items()}
+        self._registers.reset()
         self._waiting: dict[int, tuple[float, int]] = {}  # address → when a setting acts, its value
         self._diagnosis = self._counter = 0
         self._counts = [0, 0, 0]  # 32 bits each
@@ -190,8 +192,8 @@ class Adis16465:
         self._next_change_s = self._next_update_s
 
     def _read(self, address: int) -> int:
-        if address in self._registers:
-            return self._registers[address]
+        if address in self._registers.values:
+            return self._registers.values[address]
         if address == _DIAG_STAT:
             diagnosis, self._diagnosis = self._diagnosis, 0
             return diagnosis
@@ -208,9 +210,7 @@ class Adis16465:
             _PROD_ID: _ADIS16470 if self.fault is Fault.OTHER_PART else PROD_ID,
         }
         if address not in fixed:
-            raise Violation(
-                "unmodelled_register", f"read of ADIS16465 register 0x{address:02X}", "Model it in adis16465.py"
-            )
+            raise self._registers.unmodelled("read of", address)
         return fixed[address]
 
     def _write(self, address: int, byte: int, time_s: float) -> None:
@@ -219,18 +219,11 @@ class Adis16465:
         if register == _GLOB_CMD:
             self._command_part(byte << shift, time_s)
             return
-        if register not in _RESET_AND_BITS:
-            raise Violation(
-                "unmodelled_register", f"write to ADIS16465 register 0x{address:02X}", "Model it in adis16465.py"
-            )
-        _when, before = self._waiting.get(register, (0.0, self._registers[register]))
+        if register not in self._registers.values:
+            raise self._registers.unmodelled("write to", address)
+        _when, before = self._waiting.get(register, (0.0, self._registers.values[register]))
         value = before & ~(0xFF << shift) | byte << shift
-        if value & ~_RESET_AND_BITS[register][1]:
-            raise Violation(
-                "unmodelled_bits",
-                f"ADIS16465 register 0x{register:02X} = 0x{value:04X} sets bits that are not modelled",
-                "Clear them in the firmware, or model them in adis16465.py",
-            )
+        self._registers.check(register, value)
         self._waiting[register] = time_s + _UPDATE_S.get(register, 0.0), value
 
     def _command_part(self, value: int, time_s: float) -> None:
@@ -248,7 +241,7 @@ class Adis16465:
         for register, (when_s, value) in list(self._waiting.items()):
             if when_s <= time_s:
                 del self._waiting[register]
-                self._registers[register] = value
+                self._registers.values[register] = value
                 self._check_setting(register, value)
 
     def _check_setting(self, register: int, value: int) -> None:
@@ -268,12 +261,12 @@ class Adis16465:
         self._counts = [saturated(round(rate / self._per_count), bits=32) for rate in self._gyroscope.read(time_s)]
         self._counter = self._counter + 1 & 0xFFFF
         self._data_valid = True
-        self._samples += 1 + self._registers[_DEC_RATE]
+        self._samples += 1 + self._registers.values[_DEC_RATE]
         self._next_update_s = self._usable_s + self._sample_time(self._samples)
         self._next_change_s = self._next_update_s - _UPDATING_S
 
     def _rate(self, axis: int) -> int:
         """As the 32-bit register pair shows it: without averaging, the lower 16 bits are empty."""
-        if self._registers[_DEC_RATE] or self._registers[_FILT_CTRL]:
+        if self._registers.values[_DEC_RATE] or self._registers.values[_FILT_CTRL]:
             return self._counts[axis]
         return saturated(self._counts[axis] + 0x8000 >> 16) << 16

@@ -7,6 +7,7 @@ import numpy as np
 
 from firmware_host.emulator.bus import Violation
 from firmware_host.emulator.gyroscope import Gyroscope, GyroTruth, saturated
+from firmware_host.emulator.part_registers import Conversions, PartRegisters
 from firmware_host.emulator.spi_device import Fault
 
 WHO_AM_I = 0x68
@@ -71,9 +72,9 @@ class Lsm9ds1:
         self.interrupt = interrupt
         self.fault: Fault | None = None
         self._gyroscope = Gyroscope(rate_at, truth, seed)
-        self._speed = 1 + oscillator_ppm * 1e-6
+        self._registers = PartRegisters(self.name, "lsm9ds1.py", _RESET_AND_BITS)
+        self._conversions = Conversions(oscillator_ppm)
         self._temperature_raw = saturated(round((temperature_c - 25) * 16), bits=12)
-        self._next_conversion_s = math.inf
         self._address: int | None = None  # None: the next byte is the address
         self._reading = False
         self._reset()
@@ -82,17 +83,15 @@ class Lsm9ds1:
 
     @property
     def next_event_s(self) -> float:
-        return self._next_conversion_s
+        return self._conversions.next_s
 
     @property
     def interrupt_level(self) -> bool:
-        return bool(self._registers[_INT1_CTRL] & 0x02 and self._status & _GDA)
+        return bool(self._registers.values[_INT1_CTRL] & 0x02 and self._status & _GDA)
 
     def advance(self, time_s: float) -> None:
-        while self._next_conversion_s <= time_s:
-            self._conversions += 1
-            self._convert(self._next_conversion_s)
-            self._next_conversion_s = self._started_s + (self._conversions + 1) * self._period_s
+        while self._conversions.next_s <= time_s:
+            self._convert(self._conversions.take())
 
     def select(self, time_s: float) -> None:
         self._address = None
@@ -106,7 +105,7 @@ class Lsm9ds1:
             self._address = byte & 0x7F
             return 0xFF
         address = self._address
-        if self._registers[_CTRL_REG8] & _IF_ADD_INC:
+        if self._registers.values[_CTRL_REG8] & _IF_ADD_INC:
             self._address = address + 1 & 0x7F
         if self._reading:
             return self._read(address)
@@ -116,23 +115,20 @@ class Lsm9ds1:
     # --- registers
 
     def _reset(self) -> None:
-        self._registers = {address: initial for address, (initial, _bits) in _RESET_AND_BITS.items()}
+        self._registers.reset()
         self._status = 0
         self._latest = bytes(6)
         self._output = bytearray(6)
         self._temperature = bytes(2)
         self._held = [False, False, False]  # BDU: low byte read, high byte not yet
-        self._started_s = 0.0
-        self._conversions = 0
         self._settling = 0
-        self._period_s = math.inf
-        self._next_conversion_s = math.inf
+        self._conversions.stop()
 
     def _read(self, address: int) -> int:
         if _OUT_X_L_G <= address <= _OUT_Z_H_G:
             return self._read_output(address - _OUT_X_L_G)
-        if address in self._registers:
-            return self._registers[address]
+        if address in self._registers.values:
+            return self._registers.values[address]
         if address == _WHO_AM_I:
             return _LSM6DS3 if self.fault is Fault.OTHER_PART else WHO_AM_I
         if address == _STATUS_REG:
@@ -141,12 +137,12 @@ class Lsm9ds1:
             if address == _OUT_TEMP_H:
                 self._status &= ~_TDA
             return self._temperature[address - _OUT_TEMP_L]
-        raise Violation("unmodelled_register", f"read of LSM9DS1 register 0x{address:02X}", "Model it in lsm9ds1.py")
+        raise self._registers.unmodelled("read of", address)
 
     def _read_output(self, index: int) -> int:
         axis, high = divmod(index, 2)
         value = self._output[index]
-        if self._registers[_CTRL_REG8] & _BDU:
+        if self._registers.values[_CTRL_REG8] & _BDU:
             self._held[axis] = not high
             if high:
                 self._output[index - 1 : index + 1] = self._latest[index - 1 : index + 1]
@@ -155,22 +151,12 @@ class Lsm9ds1:
         return value
 
     def _write(self, address: int, value: int, time_s: float) -> None:
-        if address not in _RESET_AND_BITS:
-            raise Violation(
-                "unmodelled_register", f"write to LSM9DS1 register 0x{address:02X}", "Model it in lsm9ds1.py"
-            )
-        _initial, bits = _RESET_AND_BITS[address]
-        if value & ~bits:
-            raise Violation(
-                "unmodelled_bits",
-                f"LSM9DS1 register 0x{address:02X} = 0x{value:02X} sets bits that are not modelled",
-                "Clear them in the firmware, or model them in lsm9ds1.py",
-            )
+        self._registers.check(address, value)
         if address == _CTRL_REG8 and value & _SW_RESET:
             self._reset()
             return
-        changed = self._registers[address] != value
-        self._registers[address] = value
+        changed = self._registers.values[address] != value
+        self._registers.values[address] = value
         if address == _CTRL_REG1_G and changed:
             self._start(value, time_s)
 
@@ -184,18 +170,18 @@ class Lsm9ds1:
                 "Use rate codes 0–6 and range codes 0, 1, 3",
             )
         self._status &= ~_GDA
-        self._conversions = 0
-        self._started_s = time_s
         self._settling = _SETTLING.get(rate_code, 0)
-        self._period_s = 1 / (_RATES_HZ[rate_code] * self._speed) if rate_code else math.inf
-        self._next_conversion_s = time_s + self._period_s
+        if rate_code:
+            self._conversions.start(time_s, _RATES_HZ[rate_code])
+        else:
+            self._conversions.stop()
         self._per_count = math.radians(_SENSITIVITIES_MDPS[range_code] * 1e-3)
 
     # --- measuring
 
     def _convert(self, time_s: float) -> None:
         """One conversion of all axes and the thermometer, as the output registers will show it."""
-        settled = min(1.0, self._conversions / (self._settling + 1))
+        settled = min(1.0, self._conversions.count / (self._settling + 1))
         data = b"".join(
             saturated(round(rate_rad_s / self._per_count)).to_bytes(2, "little", signed=True)
             for rate_rad_s in self._gyroscope.read(time_s, settled)

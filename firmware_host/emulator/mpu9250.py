@@ -9,6 +9,7 @@ import numpy as np
 
 from firmware_host.emulator.bus import Violation
 from firmware_host.emulator.gyroscope import Gyroscope, GyroTruth, saturated
+from firmware_host.emulator.part_registers import Conversions, PartRegisters
 from firmware_host.emulator.spi_device import Fault
 
 WHO_AM_I = 0x71
@@ -79,14 +80,15 @@ class Mpu9250:
         self.interrupt = interrupt
         self.fault: Fault | None = None
         self._gyroscope = Gyroscope(rate_at, truth, seed)
-        self._speed = 1 + oscillator_ppm * 1e-6
+        self._registers = PartRegisters(self.name, "mpu9250.py", _RESET_AND_BITS)
+        self._conversions = Conversions(oscillator_ppm)
         temperature = saturated(round((temperature_c - _ROOM_C) * _COUNTS_PER_DEG_C))
         self._temperature = temperature.to_bytes(2, "big", signed=True)
         self._address: int | None = None  # None: the next byte is the address
         self._reading = False
         self._pin = False
         self._latest = self._output = b""
-        self._next_conversion_s = self._pulse_end_s = math.inf
+        self._pulse_end_s = math.inf
         self._reset()
         self._awake_s = -math.inf
         self._usable_s = -math.inf
@@ -101,7 +103,7 @@ class Mpu9250:
 
     @property
     def next_event_s(self) -> float:
-        return min(self._next_conversion_s, self._pulse_end_s)
+        return min(self._conversions.next_s, self._pulse_end_s)
 
     @property
     def interrupt_level(self) -> bool:
@@ -109,13 +111,11 @@ class Mpu9250:
 
     def advance(self, time_s: float) -> None:
         while self.next_event_s <= time_s:
-            if self._pulse_end_s <= self._next_conversion_s:
+            if self._pulse_end_s <= self._conversions.next_s:
                 self._pin = False
                 self._pulse_end_s = math.inf
             else:
-                self._conversions += 1
-                self._convert(self._next_conversion_s)
-                self._next_conversion_s = self._started_s + (self._conversions + 1) * self._period_s
+                self._convert(self._conversions.take())
 
     def select(self, time_s: float) -> None:
         self._address = None
@@ -146,29 +146,27 @@ class Mpu9250:
     # --- registers
 
     def _reset(self) -> None:
-        self._registers = {address: initial for address, (initial, _bits) in _RESET_AND_BITS.items()}
+        self._registers.reset()
         self._status = 0
         self._pin = False
         self._pulse_end_s = math.inf
         self._first = 0  # register that the access under way began with
         self._latest = self._output = bytes(14)  # ACCEL_XOUT_H … GYRO_ZOUT_L
-        self._stop()
+        self._conversions.stop()
 
     def _read(self, address: int) -> int:
         status = self._status
-        if address == _INT_STATUS or self._registers[_INT_PIN_CFG] & _INT_ANYRD_2CLEAR:
+        if address == _INT_STATUS or self._registers.values[_INT_PIN_CFG] & _INT_ANYRD_2CLEAR:
             self._status = 0
-            if self._registers[_INT_PIN_CFG] & _LATCH_INT_EN:
+            if self._registers.values[_INT_PIN_CFG] & _LATCH_INT_EN:
                 self._pin = False
-        if address in self._registers:
-            return self._registers[address]
+        if address in self._registers.values:
+            return self._registers.values[address]
         if address == _WHO_AM_I:
             return _MPU6500 if self.fault is Fault.OTHER_PART else WHO_AM_I
         if not _INT_STATUS <= address <= _GYRO_ZOUT_L:
-            raise Violation(
-                "unmodelled_register", f"read of MPU-9250 register 0x{address:02X}", "Model it in mpu9250.py"
-            )
-        if not self._registers[_INT_ENABLE] & _RAW_RDY:
+            raise self._registers.unmodelled("read of", address)
+        if not self._registers.values[_INT_ENABLE] & _RAW_RDY:
             raise Violation(
                 "sensor_setup",
                 f"MPU-9250 register 0x{address:02X} read while RAW_RDY_EN is clear: it converts only while that is set",
@@ -177,23 +175,13 @@ class Mpu9250:
         return status if address == _INT_STATUS else self._output[address - _ACCEL_XOUT_H]
 
     def _write(self, address: int, value: int, time_s: float) -> None:
-        if address not in _RESET_AND_BITS:
-            raise Violation(
-                "unmodelled_register", f"write to MPU-9250 register 0x{address:02X}", "Model it in mpu9250.py"
-            )
-        _initial, bits = _RESET_AND_BITS[address]
-        if value & ~bits:
-            raise Violation(
-                "unmodelled_bits",
-                f"MPU-9250 register 0x{address:02X} = 0x{value:02X} sets bits that are not modelled",
-                "Clear them in the firmware, or model them in mpu9250.py",
-            )
+        self._registers.check(address, value)
         if address == _PWR_MGMT_1 and value & _H_RESET:
             self._reset()
             self._usable_s = time_s + _RESET_S
             self._awake_s = time_s
             return
-        before, self._registers[address] = self._registers[address], value
+        before, self._registers.values[address] = self._registers.values[address], value
         if value == before:
             return
         if address == _PWR_MGMT_1 and before & _SLEEP and not value & _SLEEP:
@@ -201,24 +189,18 @@ class Mpu9250:
         if address in (_SMPLRT_DIV, _CONFIG, _GYRO_CONFIG, _INT_ENABLE, _PWR_MGMT_1):
             self._start(time_s)
 
-    def _stop(self) -> None:
-        self._next_conversion_s = math.inf
-
     def _start(self, time_s: float) -> None:
         """Conversions begin anew, if the part is to convert at all."""
-        registers = self._registers
+        registers = self._registers.values
         if registers[_PWR_MGMT_1] & _SLEEP or not registers[_INT_ENABLE] & _RAW_RDY:
-            self._stop()
+            self._conversions.stop()
             return
-        self._conversions = 0
-        self._started_s = time_s
-        self._period_s = 1 / (self._rate_hz() * self._speed)
-        self._next_conversion_s = time_s + self._period_s
+        self._conversions.start(time_s, self._rate_hz())
         self._per_count = math.radians(1 / _COUNTS_PER_DEG_S[registers[_GYRO_CONFIG] >> 3 & 3])
 
     def _rate_hz(self) -> float:
         """Register map, registers 25 to 27: the divider acts on the output of the filters 1 to 6 only."""
-        registers = self._registers
+        registers = self._registers.values
         if registers[_GYRO_CONFIG] & 0x03:  # FCHOICE_B: around the filters
             return 32_000.0
         if registers[_CONFIG] in (0, 7):
@@ -230,7 +212,7 @@ class Mpu9250:
     def _convert(self, time_s: float) -> None:
         """One conversion of all axes, as the output registers will show it from the next access on."""
         settled = min(1.0, (time_s - self._awake_s) / _START_S)
-        upright = _COUNTS_PER_G[self._registers[_ACCEL_CONFIG] >> 3 & 3]
+        upright = _COUNTS_PER_G[self._registers.values[_ACCEL_CONFIG] >> 3 & 3]
         rates = b"".join(
             saturated(round(rate_rad_s / self._per_count)).to_bytes(2, "big", signed=True)
             for rate_rad_s in self._gyroscope.read(time_s, settled)
@@ -238,5 +220,5 @@ class Mpu9250:
         self._latest = bytes(4) + upright.to_bytes(2, "big") + self._temperature + rates
         self._status = _RAW_RDY
         self._pin = True
-        if not self._registers[_INT_PIN_CFG] & _LATCH_INT_EN:
+        if not self._registers.values[_INT_PIN_CFG] & _LATCH_INT_EN:
             self._pulse_end_s = time_s + _PULSE_S

@@ -1,0 +1,19 @@
+"""The emulator's README says what is so."""
+
+import doctest
+
+from support.paths import ROOT
+
+EMULATOR = ROOT / "firmware_host" / "emulator"
+README = EMULATOR / "README.md"
+
+
+def test_the_readme_s_example_runs() -> None:
+    result = doctest.testfile(str(README), module_relative=False, encoding="utf-8")
+    assert result.failed == 0 < result.attempted
+
+
+def test_the_readme_names_every_module() -> None:
+    text = README.read_text(encoding="utf-8")
+    modules = {file.name for file in EMULATOR.glob("*.py")} - {"__init__.py"}
+    assert {name for name in modules if f"`{name}`" not in text} == set()
