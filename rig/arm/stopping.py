@@ -35,26 +35,23 @@ class Stopper:
         self._send = send
         self._seen_at_rest = seen_at_rest
         self._starting = threading.Lock()
-        self._thread: threading.Thread | None = None
+        self._thread = threading.Thread(target=self._stop, name="arm stop")
         self._outcome = StopOutcome(False, "the stop has not ended", "Look at the arm")
 
     @property
     def begun(self) -> bool:
         """Whether a stop has been asked for."""
-        return self._thread is not None
+        return self._thread.ident is not None
 
     def begin(self) -> None:
         """Stop the arm; returns at once."""
         with self._starting:
-            if self._thread is None:
-                thread = threading.Thread(target=self._stop, name="arm stop")
-                thread.start()
-                self._thread = thread
+            if not self.begun:
+                self._thread.start()
 
     def outcome(self) -> StopOutcome:
         """Stop the arm if that has not begun, and wait for the result; less than 1 s."""
         self.begin()
-        assert self._thread is not None
         self._thread.join()
         return self._outcome
 

@@ -44,7 +44,7 @@ def on_the_arms_clock(raw: NDArray[Any], sensor: RecordedSensor, motion: ArmMoti
 
 
 def on_clock(raw: NDArray[Any], sensor: RecordedSensor, clock: TimeBase) -> Stream:
-    """The same where the board's clock is known."""
+    """Samples (n,) SAMPLE_DTYPE in rad/s at the controller's times, by a board's clock that is known."""
     board_time_s = raw["board_time_us"] * 1e-6
     readings = raw["counts"] * sensor.sensitivity_rad_s_per_count
     return Stream(sensor, clock, clock.controller_time_s(board_time_s), board_time_s, readings, raw)
@@ -60,8 +60,7 @@ def average(stream: Stream, inside: slice, duration_s: float, excess: Array, cov
 
     A straight line of reading against excess says what is read at the mean speed: few samples do not meet the vibration
     evenly. The noise is what is left of that line, and never below the rounding to counts; its variance is widened
-    where the residuals are not white. Rounding averages out only as far as noise carries the reading across counts: the
-    part exp(−(2πσ/count)²) of its variance stays.
+    where the residuals are not white. What rounding leaves in a mean however many samples there are is added.
     """
     m = stream.readings_rad_s[inside]
     columns, known = np.column_stack([np.ones(int(covered.sum())), excess[covered]]), m[covered]
@@ -69,17 +68,29 @@ def average(stream: Stream, inside: slice, duration_s: float, excess: Array, cov
     residual = known - columns @ coefficients
     scatter = np.sum(residual**2, axis=0) / (len(known) - rank)
     count = stream.sensor.sensitivity_rad_s_per_count
-    rounding = count**2 / 12
-    variance = np.maximum(scatter, rounding)
-    staying = rounding * np.exp(-((2 * np.pi / count) ** 2) * (variance - rounding))
+    variance = np.maximum(scatter, count**2 / 12)
     wider = np.array([widening(residual[:, axis]) for axis in range(3)])
     temperature = stream.raw["temperature_counts"][inside].mean() * stream.sensor.temperature_c_per_count
     of_the_mean = np.linalg.pinv(columns.T @ columns, hermitian=True)[0, 0]  # 1/n where the excess averages out
     return Average(
         mean_rad_s=coefficients[0],
-        variance_rad2_s2=variance * wider * of_the_mean + staying,
+        variance_rad2_s2=variance * wider * of_the_mean + rounding_left(variance, count),
         noise_rad_s=np.sqrt(variance),
         samples=len(known),
         duration_s=duration_s,
         temperature_c=float(temperature) + stream.sensor.temperature_offset_c,
     )
+
+
+def rounding_left(variance: Array, count: float) -> Array:
+    """The variance that rounding to multiples of `count` leaves in a mean over any number of samples, at most.
+
+    `variance` is that of a rounded sample, its own noise σ² and the rounding's count²/12 together (Sheppard). Rounding
+    averages out only as far as the noise carries the reading across counts. The mean of x + noise, rounded, is off by
+    Σ (−1)ⁿ count/(πn) exp(−2(πnσ/count)²) sin(2πnx/count): the sawtooth of the rounding error, each of its harmonics
+    damped by the noise's characteristic function (Widrow and Kollár, Quantization Noise, 2008). Over all x its square
+    is Σ count²/(2π²n²) exp(−(2πnσ/count)²), which the first exponential bounds: Σ count²/(2π²n²) = count²/12.
+    """
+    rounding = count**2 / 12
+    left: Array = rounding * np.exp(-((2 * np.pi / count) ** 2) * (variance - rounding))
+    return left

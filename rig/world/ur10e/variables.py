@@ -113,17 +113,24 @@ _CONSTANTS: dict[tuple[str, Any], str] = {
 }
 OUTPUTS |= {name: (kind, _constant(value)) for (kind, value), names in _CONSTANTS.items() for name in names.split()}
 
+# General purpose registers, each a variable of its own: name in RTDE, type, name in `Registers`, which of them.
+_REGISTERS = (
+    ("int", "INT32", "ints", range(48)),
+    ("double", "DOUBLE", "doubles", range(48)),
+    ("bit", "BOOL", "bits", range(64, 128)),
+)
+
 
 def _register(side: str, kind: str, index: int) -> Get:
     return lambda robot: getattr(getattr(robot, side), kind)[index]
 
 
-for _side in ("input", "output"):
-    for _i in range(48):
-        OUTPUTS[f"{_side}_int_register_{_i}"] = ("INT32", _register(f"{_side}s", "ints", _i))
-        OUTPUTS[f"{_side}_double_register_{_i}"] = ("DOUBLE", _register(f"{_side}s", "doubles", _i))
-    for _i in range(64, 128):
-        OUTPUTS[f"{_side}_bit_register_{_i}"] = ("BOOL", _register(f"{_side}s", "bits", _i))
+OUTPUTS |= {
+    f"{side}_{name}_register_{i}": (rtde_type, _register(f"{side}s", kind, i))
+    for side in ("input", "output")
+    for name, rtde_type, kind, numbers in _REGISTERS
+    for i in numbers
+}
 
 
 # -- inputs ------------------------------------------------------------------------------------------------------
@@ -155,11 +162,11 @@ INPUTS: dict[str, tuple[str, Put]] = {
     "external_force_torque": ("VECTOR6D", _ignore),
     "input_bit_registers0_to_31": ("UINT32", _put_bits(0)), "input_bit_registers32_to_63": ("UINT32", _put_bits(32)),
 }  # fmt: skip
-for _i in range(48):
-    INPUTS[f"input_int_register_{_i}"] = ("INT32", _put_register("ints", _i))
-    INPUTS[f"input_double_register_{_i}"] = ("DOUBLE", _put_register("doubles", _i))
-for _i in range(64, 128):
-    INPUTS[f"input_bit_register_{_i}"] = ("BOOL", _put_register("bits", _i))
+INPUTS |= {
+    f"input_{name}_register_{i}": (rtde_type, _put_register(kind, i))
+    for name, rtde_type, kind, numbers in _REGISTERS
+    for i in numbers
+}
 
 DIGITAL = (("standard", 0), ("configurable", 8), ("tool", 16))  # kind, first bit of actual_digital_output_bits
 
