@@ -61,14 +61,14 @@ def main(pipe: "Connection[Message, Request]", host: str, state_rate_hz: float, 
     """Run until the parent ends the process or disappears. `log` names the file that takes the client's own output."""
     _outlive_the_parent()
     _send_output_to(log)
-    child = _Child(pipe, host)
+    child = _Child(pipe, host, state_rate_hz)
     signal.signal(signal.SIGTERM, lambda *_: child.abandon())
     requests = threading.Thread(target=child.serve, name="requests", daemon=True)
     requests.start()
     threading.Thread(target=child.watch_parent, name="parent watch", daemon=True).start()
     try:
         try:
-            child.connect(state_rate_hz)
+            child.connect()
         except RuntimeError as error:
             child.send(Failed(_connection_failure(host, str(error))))
             requests.join()  # the parent reads this and ends the process
@@ -79,9 +79,10 @@ def main(pipe: "Connection[Message, Request]", host: str, state_rate_hz: float, 
 
 
 class _Child:
-    def __init__(self, pipe: "Connection[Message, Request]", host: str) -> None:
+    def __init__(self, pipe: "Connection[Message, Request]", host: str, state_rate_hz: float) -> None:
         self._pipe = pipe
         self._host = host
+        self._state_rate_hz = state_rate_hz
         self._sending = threading.Lock()
         self._receive: Any = None
         self._control: Any = None
@@ -94,11 +95,11 @@ class _Child:
         with self._sending:
             self._pipe.send(message)
 
-    def connect(self, state_rate_hz: float) -> None:
+    def connect(self) -> None:
         """Open the receive interface and wait for its first packet; `RuntimeError` when the client gives up."""
         from rtde_receive import RTDEReceiveInterface
 
-        self._receive = RTDEReceiveInterface(self._host, state_rate_hz, VARIABLES)
+        self._receive = RTDEReceiveInterface(self._host, self._state_rate_hz, VARIABLES)
         deadline = time.monotonic() + FIRST_PACKET_S
         while not (self._receive.isConnected() and self._receive.getTimestamp() > 0):
             if time.monotonic() > deadline:
@@ -197,7 +198,7 @@ class _Child:
 
         self._holds_arm = True
         try:
-            self._control = RTDEControlInterface(self._host)
+            self._control = RTDEControlInterface(self._host, self._state_rate_hz)
         except RuntimeError as error:
             self._holds_arm = False
             return Failed(_control_failure(self._host, str(error)))

@@ -5,6 +5,7 @@ from collections.abc import Callable
 TICKS_PER_SECOND = 500
 TICK_S = 1.0 / TICKS_PER_SECOND
 PATIENCE_S = 0.02  # wall time the world may be behind and still catch up
+DIALOGUE_S = 0.1  # wall time after a client's question in which a second lasts a second: clients wait in wall time
 HURRY = 1.5  # … so many times as fast as it should go: a burst of packets would overrun a client that polls
 
 
@@ -12,6 +13,7 @@ class Clock:
     """Says how many ticks are due. Virtual time runs at most `time_scale` times as fast as wall time.
 
     When the machine cannot keep up, the lost wall time is forgotten: virtual time slows down instead of jumping.
+    While a client asks and is answered (`dialogue`) it runs no faster than wall time, as on a real controller.
     `hold` stops it, `run` lets it go on, `advance` lets exactly so much pass and holds again.
     """
 
@@ -20,6 +22,7 @@ class Clock:
         self.tick = 0
         self._wall = wall
         self._stop_at: int | None = None
+        self._dialogue_until_s = 0.0
         self._anchor()
 
     def _anchor(self) -> None:
@@ -48,6 +51,10 @@ class Clock:
         self._stop_at = self.tick + max(1, round(duration_s * TICKS_PER_SECOND))
         return self._stop_at
 
+    def dialogue(self) -> None:
+        """A client has asked something, and its next question depends on the answer."""
+        self._dialogue_until_s = self._wall() + DIALOGUE_S
+
     def wait_s(self) -> float:
         """Wall time until the next tick is due: 0 when it is due now, infinity while held."""
         if self.held:
@@ -58,7 +65,8 @@ class Clock:
         if now_s - due_s > PATIENCE_S:
             self._anchor()
             return 0.0
-        return max(0.0, due_s - now_s, self._counted_s + period_s / HURRY - now_s)
+        pace_s = max(period_s, TICK_S) if now_s < self._dialogue_until_s else period_s / HURRY
+        return max(0.0, due_s - now_s, self._counted_s + pace_s - now_s)
 
     def count(self) -> None:
         """A tick begins now: what it costs to make must not come on top of the wait for the next."""

@@ -29,6 +29,7 @@ class ControlSession:
     """One client of the control channel."""
 
     closing = False
+    dialogue = False
 
     def __init__(self, world: "World") -> None:
         self._world = world

@@ -2,19 +2,25 @@
 
 import selectors
 import socket
+import time
 from collections.abc import Callable
 from contextlib import suppress
 from typing import Protocol
 
 from rig.errors import Refused
+from rig.world.wire import SocketTable, Wire
 
 BACKLOG_BYTES = 1 << 16  # a client that does not read loses packages beyond this
+
+
+UNPACED = 1 << 30  # the allowance of a client that nobody waits for
 
 
 class Session(Protocol):
     """What one client talks to: bytes in, bytes out, and a turn at every tick."""
 
     closing: bool  # close the connection once everything has been sent
+    dialogue: bool  # a client speaks with it by question and answer, each waiting for the one before
 
     def greeting(self) -> bytes: ...
     def receive(self, data: bytes) -> bytes: ...
@@ -28,6 +34,8 @@ class Connection:
     def __init__(self, network: "Network", peer: socket.socket, session: Session, listener: "Listener") -> None:
         self._network, self._peer, self.session, self.listener = network, peer, session, listener
         self._unsent = bytearray()
+        self._due = b""  # what the last tick made for this client and its wire does not take yet
+        self._wire = Wire(network.sockets.unread(peer), listener.allowance, time.monotonic)
         peer.setblocking(False)
         with suppress(OSError):
             peer.setsockopt(socket.IPPROTO_TCP, socket.TCP_NODELAY, 1)
@@ -50,12 +58,29 @@ class Connection:
             if not data:
                 self.close()
                 return
+            if self.session.dialogue:
+                self._network.on_dialogue()
             self.send(self.session.receive(data))
+
+    def tick(self) -> None:
+        """The session's turn; what it has to say goes out as soon as `deliver` finds the wire free."""
+        self._due = self.session.tick()
+
+    def deliver(self) -> float:
+        """Send what the last tick made if the client has taken what came before; else the wall time to wait."""
+        if not self._due or self.listener.silent:
+            return 0.0
+        wait_s = 0.0 if self.listener.allowance == UNPACED else self._wire.wait_s()
+        if wait_s <= 0.0:
+            due, self._due = self._due, b""
+            self.send(due)
+        return wait_s
 
     def send(self, data: bytes) -> None:
         """Send as much as goes now, keep the rest; whole packages are dropped when the client does not read."""
         if not data or self.listener.silent:
             return
+        self._wire.sent()
         if not self._unsent:
             try:
                 sent = self._peer.send(data)
@@ -118,13 +143,16 @@ class Connection:
 
 
 class Listener:
-    """One port. `limit` bounds the clients at a time: further ones are hung up on at once."""
+    """One port. `limit` bounds the clients at a time: further ones are hung up on at once.
+
+    A client may have `allowance` bytes unread before the world waits for it.
+    """
 
     def __init__(
-        self, network: "Network", host: str, port: int, new_session: Callable[[], Session], limit: int
+        self, network: "Network", host: str, port: int, new_session: Callable[[], Session], limit: int, allowance: int
     ) -> None:
         self._network, self.host, self.port = network, host, port
-        self._new_session, self._limit = new_session, limit
+        self._new_session, self._limit, self.allowance = new_session, limit, allowance
         self.silent = False
         self._socket: socket.socket | None = None
         self.open()
@@ -190,17 +218,21 @@ class Listener:
 
 
 class Network:
-    """All listeners of the world."""
+    """All listeners of the world. `on_dialogue` is called whenever a client has asked something."""
 
-    def __init__(self) -> None:
+    def __init__(self, on_dialogue: Callable[[], None]) -> None:
+        self.on_dialogue = on_dialogue
         # select() waits to the microsecond; epoll rounds up to whole milliseconds, which sends packets in bursts
         # when virtual time runs faster, and a client that keeps only the newest packet then misses some.
         self.selector = selectors.SelectSelector()
+        self.sockets = SocketTable()
         self.listeners: list[Listener] = []
         self.connections: list[Connection] = []
 
-    def listen(self, host: str, port: int, new_session: Callable[[], Session], limit: int = 16) -> Listener:
-        listener = Listener(self, host, port, new_session, limit)
+    def listen(
+        self, host: str, port: int, new_session: Callable[[], Session], limit: int = 16, allowance: int = UNPACED
+    ) -> Listener:
+        listener = Listener(self, host, port, new_session, limit, allowance)
         self.listeners.append(listener)
         return listener
 
@@ -212,11 +244,17 @@ class Network:
     def tick(self) -> None:
         """Give every session its turn."""
         for connection in tuple(self.connections):
-            data = connection.session.tick()
-            if data:
-                connection.send(data)
+            connection.tick()
+
+    def deliver(self) -> float:
+        """Send what the last tick made to every client whose wire is free; the wall time to wait for the others.
+
+        A tick is over when this returns 0.
+        """
+        return max((connection.deliver() for connection in tuple(self.connections)), default=0.0)
 
     def close(self) -> None:
         for listener in self.listeners:
             listener.close()
         self.selector.close()
+        self.sockets.close()

@@ -19,7 +19,7 @@ from rig.world.board.serial_line import SerialLine, SerialSession
 from rig.world.clock import Clock
 from rig.world.fault_channel import ControlSession
 from rig.world.laboratory import Laboratory
-from rig.world.network import Network, Session
+from rig.world.network import UNPACED, Network, Session
 from rig.world.section import world_section
 from rig.world.ur10e import dashboard_server, primary, rtde, script_socket
 from rig.world.ur10e.robot import Robot
@@ -28,12 +28,15 @@ if TYPE_CHECKING:
     from rig.world.board.pty_port import PtyPort
 
 IDLE_POLL_S = 0.2
-ARM_PORTS: dict[int, Callable[[Robot], Session]] = {
-    dashboard_server.PORT: dashboard_server.DashboardSession,
-    script_socket.PRIMARY_PORT: primary.PrimarySession,
-    script_socket.SECONDARY_PORT: primary.PrimarySession,
-    script_socket.REALTIME_PORT: script_socket.ScriptSession,
-    rtde.PORT: rtde.RtdeSession,
+SERIAL_BYTES = 1024  # on their way from the board to the host: 11 ms at 921600 Bd
+# What answers on a port, and how many bytes a client may have unread before the world waits for it. Of RTDE packets
+# clients keep only the newest.
+ARM_PORTS: dict[int, tuple[Callable[[Robot], Session], int]] = {
+    dashboard_server.PORT: (dashboard_server.DashboardSession, UNPACED),
+    script_socket.PRIMARY_PORT: (primary.PrimarySession, UNPACED),
+    script_socket.SECONDARY_PORT: (primary.PrimarySession, UNPACED),
+    script_socket.REALTIME_PORT: (script_socket.ScriptSession, UNPACED),
+    rtde.PORT: (rtde.RtdeSession, 0),
 }
 
 
@@ -44,16 +47,19 @@ class World:
         section = world_section(loaded)
         self.laboratory = Laboratory(loaded.config, section)
         self.line = SerialLine(self.laboratory)
-        self.network = Network()
+        self.clock = Clock(section.time_scale, time.monotonic)
+        self.network = Network(self.clock.dialogue)
         self._silent_until_s = 0.0
         self._ended = False
         host, board_url = loaded.config.arm.host, loaded.config.board.port
         try:
             self.arm_listeners = [
-                self.network.listen(host, port, partial(new_session, self.laboratory.robot))
-                for port, new_session in ARM_PORTS.items()
+                self.network.listen(host, port, partial(new_session, self.laboratory.robot), allowance=allowance)
+                for port, (new_session, allowance) in ARM_PORTS.items()
             ]
-            self.board_listener = self.network.listen(*_board_address(board_url), self._new_serial_session, limit=1)
+            self.board_listener = self.network.listen(
+                *_board_address(board_url), self._new_serial_session, limit=1, allowance=SERIAL_BYTES
+            )
             control_port = section.control_port
             self.network.listen(host, control_port, lambda: ControlSession(self))
         except Refused:
@@ -67,7 +73,6 @@ class World:
             "pty": self._pty.path if self._pty else None,
             "control": f"{host}:{control_port}",
         }
-        self.clock = Clock(section.time_scale, time.monotonic)
 
     def describe(self) -> str:
         """The line that says where everything listens."""
@@ -97,14 +102,15 @@ class World:
         self._ended = True
 
     def run(self) -> None:
-        """Serve until `end`."""
+        """Serve until `end`. A tick ends when its clients have been given theirs, and they have their own pace."""
         while not self._ended:
-            self.network.poll(min(self.clock.wait_s(), IDLE_POLL_S))
+            behind_s = self.network.deliver()
+            self.network.poll(behind_s or min(self.clock.wait_s(), IDLE_POLL_S))
             if self._silent_until_s and time.monotonic() >= self._silent_until_s:
                 self._silent_until_s = 0.0
                 for listener in self.arm_listeners:
                     listener.set_silent(False)
-            if not self._ended and self.clock.wait_s() <= 0.0:
+            if not behind_s and not self._ended and self.clock.wait_s() <= 0.0:
                 self._tick()
 
     def _tick(self) -> None:

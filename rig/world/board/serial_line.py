@@ -71,6 +71,7 @@ class SerialSession:
     """The line over TCP, which carries no baud rate."""
 
     closing = False
+    dialogue = False
 
     def __init__(self, line: SerialLine) -> None:
         self._line = line

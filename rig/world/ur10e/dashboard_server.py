@@ -29,6 +29,8 @@ class WaitProgram:
 class DashboardSession:
     """One connection to the dashboard."""
 
+    dialogue = True
+
     def __init__(self, robot: Robot) -> None:
         self._robot = robot
         self.closing = False

@@ -32,6 +32,7 @@ class PrimarySession:
     """One connection: programs come in, states and messages go out."""
 
     closing = False
+    dialogue = True
 
     def __init__(self, robot: Robot) -> None:
         self._robot = robot

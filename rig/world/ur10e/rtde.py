@@ -80,6 +80,11 @@ class RtdeSession:
             "S": self._start, "P": self._pause, "U": self._data, "M": self._message,
         }  # fmt: skip
 
+    @property
+    def dialogue(self) -> bool:
+        """A client asks until its recipes are set up; then it reads, and writes registers."""
+        return not self._started
+
     def greeting(self) -> bytes:
         return b""
 

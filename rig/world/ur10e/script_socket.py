@@ -87,6 +87,7 @@ class ScriptSession:
     """One connection to a script socket."""
 
     closing = False
+    dialogue = True
 
     def __init__(self, robot: Robot) -> None:
         self._robot = robot

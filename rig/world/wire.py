@@ -1,0 +1,107 @@
+"""How far a client is behind: what it was sent and has not taken, and how much time it needs before the next packet.
+
+The world's clock is paced by this, as a sender is by a wire that carries one packet at a time. Nothing is asked of the
+client: where both ends are on one Linux machine, the system knows how many bytes wait in the other end's socket
+(sock_diag(7)). Elsewhere they count as taken.
+"""
+
+import socket
+import struct
+from collections.abc import Callable
+
+PATIENCE_S = 1.5  # a client that takes nothing for so long is not waited for until it has caught up: it is dead or hangs
+# A client that keeps only the newest packet must look at one before the next comes, so it is given some time after it
+# has taken one: so many times as long as it took of late, which grows with the load of the machine.
+LATENESS = 2.0
+GAP_S = (0.0004, 0.003)  # … but at least and at most this
+FORGETTING = 0.995  # of how late a client was, at every packet
+LOOK_S = (0.0001, 0.001)  # time between two looks at a client that is waited for: a quarter of its delay, within these
+
+Unread = Callable[[], int]
+
+_REQUEST = struct.Struct("=IHHIIBBBBI")  # struct nlmsghdr and the start of struct inet_diag_req_v2
+_SOCKET_ID = struct.Struct(">HH4s12x4s12x")  # struct inet_diag_sockid without interface and cookie
+_ANY = struct.pack("=III", 0, 0xFFFFFFFF, 0xFFFFFFFF)
+_SOCK_DIAG_BY_FAMILY, _NLM_F_REQUEST, _ALL_STATES = 20, 1, 0xFFFFFFFF
+_NETLINK_SOCK_DIAG = 4
+_TYPE_AT, _UNREAD_AT = 4, 16 + 4 + 48 + 4  # in the answer: nlmsghdr.nlmsg_type, inet_diag_msg.idiag_rqueue
+
+
+class SocketTable:
+    """Asks the system about the other ends of connections."""
+
+    def __init__(self) -> None:
+        self._netlink: socket.socket | None = None
+        if hasattr(socket, "AF_NETLINK"):
+            try:
+                self._netlink = socket.socket(socket.AF_NETLINK, socket.SOCK_RAW, _NETLINK_SOCK_DIAG)
+                self._netlink.setblocking(False)  # the answer is there when `send` returns
+            except OSError:
+                self._netlink = None
+
+    def unread(self, connection: socket.socket) -> Unread:
+        """A function that says how many bytes sent over `connection` its other end has not read, as far as known."""
+        netlink = self._netlink
+        if netlink is None:
+            return lambda: 0
+        (far_host, far_port), (near_host, near_port) = connection.getpeername(), connection.getsockname()
+        sockets = _SOCKET_ID.pack(far_port, near_port, socket.inet_aton(far_host), socket.inet_aton(near_host)) + _ANY
+        length = _REQUEST.size + len(sockets)
+        header = _REQUEST.pack(
+            *(length, _SOCK_DIAG_BY_FAMILY, _NLM_F_REQUEST, 0, 0),
+            *(socket.AF_INET, socket.IPPROTO_TCP, 0, 0, _ALL_STATES),
+        )
+        request = header + sockets
+
+        def ask() -> int:
+            try:
+                netlink.send(request)
+                answer = netlink.recv(1024)
+            except OSError:
+                return 0
+            known = struct.unpack_from("=H", answer, _TYPE_AT)[0] == _SOCK_DIAG_BY_FAMILY
+            return int(struct.unpack_from("=I", answer, _UNREAD_AT)[0]) if known else 0
+
+        return ask
+
+    def close(self) -> None:
+        if self._netlink is not None:
+            self._netlink.close()
+
+
+class Wire:
+    """One client's pace. `wait_s` says how long the next packet has to wait; 0 when it may go.
+
+    The wire is free while at most `allowance` bytes are unread; a client with an allowance reads every byte in the end
+    and needs no time of its own after it.
+    """
+
+    def __init__(self, unread: Unread, allowance: int, wall: Callable[[], float]) -> None:
+        self._unread, self._allowance, self._wall = unread, allowance, wall
+        self._sent_s: float | None = None  # when the first packet went that is not known to be taken
+        self._taken_s = -1.0e9
+        self._late_s = 0.0
+        self._given_up = False
+
+    def sent(self) -> None:
+        """Something was sent."""
+        if self._sent_s is None:
+            self._sent_s = self._wall()
+
+    def wait_s(self) -> float:
+        """Wall time to wait before the next look; 0 when the next packet may go."""
+        now_s = self._wall()
+        if self._sent_s is not None:
+            delay_s = now_s - self._sent_s
+            if self._unread() > self._allowance:
+                self._given_up |= delay_s > PATIENCE_S
+                return 0.0 if self._given_up else _within(LOOK_S, delay_s / 4)
+            self._late_s = max(min(delay_s, GAP_S[1]), self._late_s * FORGETTING)
+            self._taken_s, self._sent_s, self._given_up = now_s, None, False
+        if self._allowance:
+            return 0.0
+        return max(0.0, self._taken_s + _within(GAP_S, self._late_s * LATENESS) - now_s)
+
+
+def _within(bounds: tuple[float, float], value: float) -> float:
+    return min(max(value, bounds[0]), bounds[1])
