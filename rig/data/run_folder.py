@@ -7,18 +7,20 @@ from pathlib import Path
 from rig.config.load import Loaded
 from rig.errors import Refused
 
+CONFIG, SCRIPT, RESULT = "config.yaml", "script.py", "result.json"
 CALIBRATION, VERIFICATION = "run", "verify"  # the names of recordings begin so
 
 
-def new_folder(out: Path | None, loaded: Loaded) -> Path:
-    """A run folder that holds nothing but the configuration as used. Raises Refused `run_folder`."""
+def new_folder(out: Path | None, loaded: Loaded, script: str) -> Path:
+    """A run folder with the configuration as used and the script's text, nothing else. Raises Refused `run_folder`."""
     stamp = datetime.now(UTC).strftime("%Y-%m-%dT%H-%M-%SZ")
     folder = out or Path(loaded.config.output.folder) / f"{stamp}-{loaded.config.procedure.name}"
     try:
         folder.mkdir(parents=True, exist_ok=True)
         empty = not any(folder.iterdir())
         if empty:
-            (folder / "config.yaml").write_text(loaded.text, encoding="utf-8")
+            (folder / SCRIPT).write_text(script, encoding="utf-8")
+            (folder / CONFIG).write_text(loaded.text, encoding="utf-8")
     except OSError as error:
         raise Refused("run_folder", f"{folder} cannot be written: {error}", "Choose another with --out") from error
     if not empty:

@@ -24,7 +24,7 @@ from rig.observation.average import on_the_arms_clock
 from rig.observation.observe import finished_sweeps
 from rig.observation.revolution import find_revolution
 from rig.observation.timebase import ArmMotion
-from rig.runner.acquisition import Monitor
+from rig.runner.acquisition import Acquisition
 
 # From asking the board to keep its readings to the arm's first motion, and how late that may be on a busy machine.
 KEEP_LONGER_S = 4.0
@@ -35,7 +35,7 @@ class BoardCalibration:
     """Takes the board through a calibration of `sensors` (name → its index on the board and its description)."""
 
     board: Board
-    monitor: Monitor
+    acquisition: Acquisition
     recorder: RunRecorder
     settings: ObservationThresholds
     sensors: Mapping[str, tuple[int, RecordedSensor]]
@@ -51,11 +51,11 @@ class BoardCalibration:
 
     def begin(self) -> None:
         """Before the first sample: the host keeps what it sees, for the clock of the first sweep."""
-        self.monitor.keep()
+        self.acquisition.keep()
 
     def keep(self, sweep: Sweep) -> None:
         """Just before a sweep: from now on board and host keep what they see."""
-        self.monitor.keep()
+        self.acquisition.keep()
         self.board.keep([index for index, _ in self.sensors.values()], sweep.duration_s + KEEP_LONGER_S)
 
     def observe(self, sweep: Sweep) -> None:
@@ -83,7 +83,7 @@ class BoardCalibration:
     def _observe(self, name: str, sweep: Sweep) -> tuple[BoardObservation, float]:
         """The board's observation and the speed it was told, rad/s."""
         index, sensor = self.sensors[name]
-        samples, states, new = self.monitor.kept(index)
+        samples, states, new = self.acquisition.kept(index)
         arm = np.array([state.to_record() for state in states], ARM_STATE_DTYPE)
         start_us, end_us, speed_rad_s = revolution_on_the_board(
             samples, sensor, arm, asdict(sweep), first=len(arm) - new, settings=self.settings

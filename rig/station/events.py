@@ -147,7 +147,7 @@ class Checked:
 
 
 @dataclass(frozen=True, slots=True)
-class Judged:
+class VerdictReached:
     """The run's verdict; its checks came before it."""
 
     passed: bool
@@ -190,7 +190,7 @@ RunEvent = (
     | StepFinished
     | PhaseRecorded
     | Checked
-    | Judged
+    | VerdictReached
     | Failed
     | Interrupted
     | Crashed

@@ -18,29 +18,31 @@ from rig.station.events import (
 
 def line(event: RunEvent) -> str | None:
     """What to say of it in one line; None for what only an instrument shows, or what others say."""
+    text: str | None
     match event:
-        case Message(text):
-            return text
+        case Message(said):
+            text = said
         case RunResumed(done, planned):
-            return f"resuming: {done} of {planned} sweeps are recorded, sound and known to the board"
+            text = f"resuming: {done} of {planned} sweeps are recorded, sound and known to the board"
         case BoardConnected(port, identity):
-            return f"board: {identity.unique_id}, firmware {identity.firmware} at {port}"
+            text = f"board: {identity.unique_id}, firmware {identity.firmware} at {port}"
         case ArmConnected(report):
-            return f"arm: serial number {report.serial_number}, PolyScope {report.polyscope} at {report.host}"
+            text = f"arm: serial number {report.serial_number}, PolyScope {report.polyscope} at {report.host}"
         case PreflightPassed(plan, report):
-            return (
+            text = (
                 f"pre-flight: arm {report.serial_number} at {report.host} is ready; "
                 f"{len(plan.motions)} motions within limits, {plan.duration_s:.0f} s"
             )
         case SamplingStarted():
-            return "sampling: every sensor delivers"
+            text = "sampling: every sensor delivers"
         case StepFinished(_, _, step, took_s):
-            return f"done: {step.name}, {took_s:.2f} s"
+            text = f"done: {step.name}, {took_s:.2f} s"
         case PhaseRecorded(sensors, missed_states):
             samples, lost = (sum(counts) for counts in zip(*((s.samples, s.lost) for s in sensors), strict=True))
-            return f"recorded: {samples} samples, {lost} lost; {missed_states} arm states missed"
+            text = f"recorded: {samples} samples, {lost} lost; {missed_states} arm states missed"
         case _:
-            return None
+            text = None
+    return text
 
 
 def reason(event: RunEvent) -> str | None:
