@@ -292,4 +292,4 @@ def _world(options: argparse.Namespace) -> int:
     from rig.commands.laboratory import foreground_laboratory
     from rig.config.load import load
 
-    return foreground_laboratory(load(options.config, options.overrides).text)
+    return foreground_laboratory(load(options.config, options.overrides, sections=None).text)

@@ -5,7 +5,7 @@ early (an error, Ctrl-C, a lost link) stops the arm first and is reported then.
 """
 
 import time
-from collections.abc import Iterator, Mapping
+from collections.abc import Callable, Iterator, Mapping
 from contextlib import contextmanager
 from dataclasses import asdict, dataclass
 from math import degrees, radians
@@ -149,12 +149,14 @@ class Rig:
         recorder, along = self.recording.recorder, self.recording.along
         if along is not None:
             along.keep(sweep)
-        with self._step(sweep):
+        with self._step(sweep, then=lambda: self._observe(sweep)):
             recorder.add_event("sweep_started", sweep=asdict(sweep))
             self.devices.arm.move(sweep, lambda: self._watch(sweep))
             recorder.add_event("sweep_finished", sweep=asdict(sweep))
-        if along is not None:
-            along.observe(sweep)
+
+    def _observe(self, sweep: Sweep) -> None:
+        if self.recording.along is not None:
+            self.recording.along.observe(sweep)
 
     def rest(self, rest: Rest) -> None:
         """Stand still: the readings here show the bias and the noise."""
@@ -178,15 +180,18 @@ class Rig:
         return PhaseRecorded(self.devices.acquisition.samples(), self.devices.arm.missed_states)
 
     @contextmanager
-    def _step(self, step: Step) -> Iterator[None]:
+    def _step(self, step: Step, then: Callable[[], None] = lambda: None) -> Iterator[None]:
+        """One step from its first event to its last; what happens `then` belongs to it, but not to its time."""
         self._number += 1
         place = self._number, len(self.plan.steps), step
         arm = self.devices.arm
         self._step_started_s = arm.latest.time_s
         self.station.event(StepStarted(*place))
         yield
+        took_s = arm.latest.time_s - self._step_started_s
+        then()
         self._done_s += step.duration_s
-        self.station.event(StepFinished(*place, arm.latest.time_s - self._step_started_s))
+        self.station.event(StepFinished(*place, took_s))
 
     def _watch(self, step: Step) -> None:
         """Called many times a second while the arm is busy: look after board and recording, tell the operator."""
