@@ -44,7 +44,8 @@ class Run:
         """Carry out `phase` and what follows it; writes the outcome into the folder and returns it."""
         outcome = self._judged(phase, self._recorded(phase, self._resumed(phase), moved=False), None)
         while (follows := phase.follows) is not None:
-            phase, runs = follows, ()
+            phase = follows
+            runs: tuple[RunData, ...] = ()
             if outcome.passed:
                 self._store(outcome)
                 runs = self._recorded(phase, Resumption(), moved=True)

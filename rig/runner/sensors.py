@@ -10,6 +10,7 @@ from rig.board.identify import find_sensor, stored_calibration
 from rig.config.models import RigConfig, SensorSection, mounting_matrix
 from rig.data.run_file import RecordedSensor
 
+
 @dataclass(frozen=True, slots=True)
 class BoardSensor:
     """A sensor that is set up: its index on the board, and what a reader of its samples must know.
