@@ -13,9 +13,9 @@ import pytest
 import yaml
 
 from support.commands import configuration, python, rig, wait_for_log
-from support.paths import FIXTURES
+from support.paths import ROOT
 
-OWN = FIXTURES / "unequal_sweeps.py"
+OWN = ROOT / "tests" / "support" / "unequal_sweeps.py"
 SECTION = {"procedure": {"name": "unequal_sweeps", "wrist_2_deg_s": 100}}
 
 pytestmark = pytest.mark.slow
