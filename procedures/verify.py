@@ -42,7 +42,6 @@ PROCEDURE = Procedure(
     script=verify,
     analyse=comparison,
     readings="calibrated",
-    recording="verify",
 )
 
 if __name__ == "__main__":

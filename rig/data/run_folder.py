@@ -8,7 +8,7 @@ from rig.config.load import Loaded
 from rig.errors import Refused
 
 CONFIG, SCRIPT, RESULT = "config.yaml", "script.py", "result.json"
-CALIBRATION, VERIFICATION = "run", "verify"  # the names of recordings begin so
+_BEGINNINGS = {"raw": "run", "calibrated": "verify"}  # of the names of recordings, by what is streamed
 
 
 def new_folder(out: Path | None, loaded: Loaded, script: str) -> Path:
@@ -30,15 +30,15 @@ def new_folder(out: Path | None, loaded: Loaded, script: str) -> Path:
     return folder
 
 
-def recordings(folder: Path, kind: str) -> list[Path]:
-    """The recordings of one kind in the order they were made: run.h5, run-2.h5, …"""
-    return sorted(folder.glob(f"{kind}*.h5"), key=lambda path: (len(path.name), path.name))
+def recordings(folder: Path, readings: str) -> list[Path]:
+    """The recordings of "raw" or of "calibrated" readings, in the order they were made: run.h5, run-2.h5, …"""
+    return sorted(folder.glob(f"{_BEGINNINGS[readings]}*.h5"), key=lambda path: (len(path.name), path.name))
 
 
-def next_recording(folder: Path, kind: str) -> Path:
+def next_recording(folder: Path, readings: str) -> Path:
     """Where the next one goes."""
-    count = len(recordings(folder, kind))
-    return folder / (f"{kind}-{count + 1}.h5" if count else f"{kind}.h5")
+    count = len(recordings(folder, readings))
+    return folder / f"{_BEGINNINGS[readings]}{f'-{count + 1}' if count else ''}.h5"
 
 
 def resuming(folder: Path) -> str:

@@ -55,8 +55,8 @@ class Procedure(Generic[SectionT]):
     """A procedure: its name and section in the configuration, how it plans, what it does, how it is judged.
 
     `readings` is what the sensors to calibrate stream: raw counts, which the board averages as well, or what the board
-    has corrected by the calibration it has stored. `recording` begins the names of its run files. `then` names the
-    procedure that follows with the same movement when the section says `then_verify`.
+    has corrected by the calibration it has stored. `then` names the procedure that follows with the same movement when
+    the section says `then_verify`.
     """
 
     name: str
@@ -65,7 +65,6 @@ class Procedure(Generic[SectionT]):
     script: Script
     analyse: Analysis = calibration
     readings: Readings = "raw"
-    recording: str = "run"
     then: str | None = None
 
 

@@ -59,20 +59,20 @@ class Run:
         if phase.procedure.readings == "calibrated":
             return Resumption()
         with self.reported(self._mended, moved=False):
-            earlier = [read_run(file) for file in recordings(self.folder, phase.procedure.recording)]
+            earlier = [read_run(file) for file in recordings(self.folder, phase.procedure.readings)]
             return resumption(earlier, self._settings(phase), self.script)
 
     def _recorded(self, phase: Phase, resumed: Resumption, *, moved: bool) -> tuple[RunData, ...]:
         """Carry out the phase's script; all recordings of the phase."""
-        kind = phase.procedure.recording
-        path = next_recording(self.folder, kind)
+        readings = phase.procedure.readings
+        path = next_recording(self.folder, readings)
         connector = Connector(phase, self.loaded, self._settings(phase), self.script, path, self.station, resumed)
         with self.reported(self._mended, moved=moved), connector.open() as rig:
             self.station.event(PhaseStarted(phase.procedure.name, rig.plan, rig.readings()))
             phase.procedure.script(rig)
             self.station.event(rig.recorded())
         with self.reported(self._repeating, moved=True):
-            files = recordings(self.folder, kind)
+            files = recordings(self.folder, readings)
             if path not in files:
                 raise Fault(
                     "run_folder_removed",
