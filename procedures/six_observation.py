@@ -13,10 +13,13 @@ Ctrl-C stops the arm at any moment and keeps what was measured.
 
 from rig.arm.motion import Rest, Sweep, Transfer
 from rig.cli import run_script
-from rig.runner.procedure import Rig
+from rig.config.procedure_sections import SixObservationSection
+from rig.plans.registry import Procedure
+from rig.plans.six_sweeps import plan_six_observation
+from rig.plans.verbs import Verbs
 
 
-def six_observation(rig: Rig) -> None:
+def six_observation(rig: Verbs) -> None:
     """The steps, in the order the plan has them (`rig plan CONFIG` prints it)."""
     rig.preflight()  # refuses unless limits, payload, modes and the speed slider are right; asks before anything moves
     rig.start_sampling()  # from here on every sample and every arm state is in run.h5
@@ -24,17 +27,27 @@ def six_observation(rig: Rig) -> None:
     rig.solve_on_board()  # the board's own calibration, to be held against the computer's
 
 
-def movement(rig: Rig) -> None:
+def movement(rig: Verbs) -> None:
     """Home, then every sweep with the rest after it."""
     for step in rig.plan.steps:
         match step:
             case Transfer():
                 rig.move(step)  # to where the next sweep begins
             case Sweep():
-                rig.sweep(step)  # ramp up, one revolution at constant speed, ramp down; then the board averages it
+                rig.sweep(
+                    step
+                )  # ramp up, one revolution at constant speed, ramp down; the board averages it while it rests
             case Rest():
                 rig.rest(step)  # stand still
 
 
+PROCEDURE = Procedure(
+    name="six_observation",
+    section=SixObservationSection,
+    plan=plan_six_observation,
+    script=six_observation,
+    then="verify",  # if the configuration says `verify: true` and the calibration passes
+)
+
 if __name__ == "__main__":
-    raise SystemExit(run_script(six_observation, procedure="six_observation"))
+    raise SystemExit(run_script(PROCEDURE))

@@ -10,17 +10,39 @@ the rates are compared with the reference's. `rig run` does this by itself after
 says `verify: true`. Ctrl-C stops the arm at any moment and keeps what was measured.
 """
 
+from collections.abc import Sequence
+
 from procedures.six_observation import movement
+from rig.analysis.outcome import Outcome, outcome_of, verified
 from rig.cli import run_script
-from rig.runner.procedure import Rig
+from rig.config.procedure_sections import VerifySection
+from rig.data.run_file import RunData
+from rig.plans.registry import Procedure
+from rig.plans.six_sweeps import plan_six_observation
+from rig.plans.verbs import Verbs
 
 
-def verify(rig: Rig) -> None:
+def verify(rig: Verbs) -> None:
     """The same steps as the calibration's, without solving anything."""
     rig.preflight()  # refuses unless limits, payload, modes and the speed slider are right; asks before anything moves
     rig.start_sampling()  # the gyroscopes send corrected rates, the reference its raw readings
     movement(rig)
 
 
+def comparison(runs: Sequence[RunData], before: Outcome | None, estimator: str) -> Outcome:
+    """The newest movement against the reference; with the calibration it followed, if there was one."""
+    newest = runs[-1:]
+    return outcome_of([], newest, estimator) if before is None else verified(before, newest)
+
+
+PROCEDURE = Procedure(
+    name="verify",
+    section=VerifySection,
+    plan=plan_six_observation,
+    script=verify,
+    analyse=comparison,
+    readings="calibrated",
+)
+
 if __name__ == "__main__":
-    raise SystemExit(run_script(verify, procedure="verify"))
+    raise SystemExit(run_script(PROCEDURE))

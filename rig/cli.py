@@ -13,7 +13,7 @@ from rig.commands.standard_streams import keep_streams_usable
 from rig.errors import Fault, Refused, RigError
 
 if TYPE_CHECKING:
-    from rig.runner.phases import Script
+    from rig.plans.registry import AnyProcedure
 
 _BOARD = "look at the board, read and change its stored calibrations, flash its firmware"
 FAULT, INTERRUPTED = Fault.exit_status, 130
@@ -76,12 +76,15 @@ def _parser() -> argparse.ArgumentParser:
 
     run = add("run", _run, "run the procedure the file names")
     _add_config(run)
+    _add_script(run)
     _add_run(run)
     plan = add("plan", _plan, "dry run: every motion, its time and limits; connects to nothing")
     _add_config(plan)
+    _add_script(plan)
     plan.add_argument("--json", action="store_true", help="for machines")
     check = add("check", _check, "connect and look; nothing moves, no program is stopped")
     _add_config(check)
+    _add_script(check)
     resume = add("resume", _resume, "go on with an interrupted run")
     resume.add_argument("run_folder", type=Path, metavar="RUN_DIR")
     _add_outcome(resume)
@@ -165,6 +168,10 @@ def _add_config(parser: argparse.ArgumentParser) -> None:
     )
 
 
+def _add_script(parser: argparse.ArgumentParser) -> None:
+    parser.add_argument("--script", type=Path, metavar="FILE", help="a procedure of your own, in place of the file's")
+
+
 def _add_run(parser: argparse.ArgumentParser) -> None:
     parser.add_argument("--out", type=Path, metavar="DIR", help="run folder (default: a new one under output.folder)")
     _add_outcome(parser)
@@ -175,25 +182,32 @@ def _add_outcome(parser: argparse.ArgumentParser) -> None:
     parser.add_argument("--json", action="store_true", help="print result.json instead of tables")
 
 
-def run_script(script: "Script", *, procedure: str) -> int:
-    """Entry point of the scripts in procedures/: they take the arguments of `rig run`.
+def run_script(procedure: "AnyProcedure") -> int:
+    """Entry point of a script that defines `procedure`: it takes the arguments of `rig run`.
 
-    `procedure` is what kind it is, whatever the file says: `six_observation` calibrates, `verify` verifies.
+    It is this procedure that runs, whatever the configuration names.
     """
-    instruction = sys.modules[script.__module__].__doc__
+    from rig.plans.script_file import script_file
+
+    instruction = sys.modules[procedure.script.__module__].__doc__
     parser = argparse.ArgumentParser(description=instruction, formatter_class=argparse.RawDescriptionHelpFormatter)
     _add_config(parser)
     _add_run(parser)
     options = parser.parse_args()
-    options.overrides.append(f"procedure.name={procedure}")
-    return guarded(lambda: _run(options, script))
+    options.script = script_file(procedure)
+    return guarded(lambda: _run(options))
 
 
-def _run(options: argparse.Namespace, script: "Script | None" = None) -> int:
+def _run(options: argparse.Namespace) -> int:
     from rig.commands.run import run
 
     return run(
-        options.config, options.overrides, options.out, script=script, assume_yes=options.yes, as_json=options.json
+        options.config,
+        options.overrides,
+        options.out,
+        script=options.script,
+        assume_yes=options.yes,
+        as_json=options.json,
     )
 
 
@@ -204,18 +218,15 @@ def _resume(options: argparse.Namespace) -> int:
 
 
 def _plan(options: argparse.Namespace) -> int:
-    from rig.config.load import load
-    from rig.report.plan_table import checked_plan, print_plan
+    from rig.commands.plan import plan
 
-    config = load(options.config, options.overrides).config
-    print_plan(checked_plan(config), repeated=config.procedure.then_verify, as_json=options.json)
-    return 0
+    return plan(options.config, options.overrides, options.script, as_json=options.json)
 
 
 def _check(options: argparse.Namespace) -> int:
     from rig.commands.check import check
 
-    return check(options.config, options.overrides)
+    return check(options.config, options.overrides, options.script)
 
 
 def _solve(options: argparse.Namespace) -> int:
@@ -225,7 +236,7 @@ def _solve(options: argparse.Namespace) -> int:
         from rig.commands.solve_csv import solve_external
 
         return solve_external(options.run, options.sweeps, options.estimator, as_json=options.json)
-    from rig.commands.run import solve
+    from rig.commands.solve import solve
 
     return solve(options.run, options.estimator, options.overrides, as_json=options.json)
 
@@ -281,4 +292,4 @@ def _world(options: argparse.Namespace) -> int:
     from rig.commands.laboratory import foreground_laboratory
     from rig.config.load import load
 
-    return foreground_laboratory(load(options.config, options.overrides).text)
+    return foreground_laboratory(load(options.config, options.overrides, sections=None).text)

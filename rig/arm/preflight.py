@@ -6,7 +6,6 @@ from collections.abc import Sequence
 import numpy as np
 
 from rig.arm.condition import readiness
-from rig.arm.kinematics import flange_axes
 from rig.arm.motion import Motion, Plan, travel
 from rig.arm.state import JOINT_NAMES, ArmReport, Joints
 from rig.config.ur10e_limits import (
@@ -17,14 +16,12 @@ from rig.config.ur10e_limits import (
 )
 from rig.errors import Problem, Refused
 
-# The swept axes must span space: the smallest singular value of their unit vectors, 1 when orthogonal.
-AXES_SPAN = 0.5
 # How far the first motion may swing the large joints through the room, and the wrists.
 FIRST_MOTION_LIMIT_RAD = tuple(math.radians(angle) for angle in (120, 120, 120, 360, 360, 360))
 
 
 def plan_problems(plan: Plan, payload_kg: float) -> list[Problem]:
-    """What is wrong with the plan itself: limits of position, speed, acceleration and payload, and the axes' span."""
+    """What is wrong with the plan itself: limits of position, speed, acceleration and payload."""
     problems = [problem for motion in plan.motions for problem in _motion_problems(motion)]
     if not 0 <= payload_kg <= PAYLOAD_LIMIT_KG:
         problems.append(
@@ -32,16 +29,6 @@ def plan_problems(plan: Plan, payload_kg: float) -> list[Problem]:
                 "payload_too_heavy",
                 f"the payload of {payload_kg:g} kg is outside 0 to {PAYLOAD_LIMIT_KG:g} kg",
                 "Weigh the fixture and correct arm.payload_kg",
-            )
-        )
-    swept = sorted({sweep.joint for sweep in plan.sweeps})
-    span = np.linalg.svd(flange_axes(plan.home_q_rad)[:, swept], compute_uv=False)
-    if len(span) < 3 or span[2] < AXES_SPAN:
-        problems.append(
-            Problem(
-                "axes_do_not_span",
-                "the swept wrists do not turn the flange about three independent axes",
-                "Set wrist 2 in arm.home_deg near 90 or -90, and sweep all three wrists",
             )
         )
     return list(dict.fromkeys(problems))

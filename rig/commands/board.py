@@ -113,7 +113,7 @@ def erase(config_path: Path, overrides: Sequence[str], sensor: str | None, *, as
 @contextmanager
 def _connected(config_path: Path, overrides: Sequence[str]) -> Iterator[tuple[RigConfig, Board]]:
     """The board of a configuration, in its simulated laboratory if it has one."""
-    loaded = load(config_path, overrides)
+    loaded = load(config_path, overrides, sections=None)
     with ExitStack() as stack:
         if loaded.simulated:
             stack.enter_context(simulated_laboratory(stack.enter_context(written(loaded.text))))

@@ -10,34 +10,32 @@ from firmware_host.client import Board
 from rig.arm.driver import look
 from rig.arm.preflight import arm_problems, plan_problems
 from rig.board.identify import find_sensor, refuse_other_firmware, refusing, stored_calibration
+from rig.commands.configured import Configured, configured
 from rig.commands.laboratory import simulated_laboratory, written
-from rig.config.load import load
-from rig.config.models import RigConfig
 from rig.errors import RigError
-from rig.plans.six_sweeps import plan_six_observation
 
 
-def check(config_path: Path, overrides: Sequence[str]) -> int:
+def check(config_path: Path, overrides: Sequence[str], script: Path | None = None) -> int:
     """Look at the board and the arm; print what is there and what is missing. 0 when a run could start, else 2."""
-    loaded = load(config_path, overrides)
-    with written(loaded.text) as used, simulated_laboratory(used) if loaded.simulated else nullcontext():
-        missing = [*_named(_look_at_board, loaded.config), *_named(_look_at_arm, loaded.config)]
+    found = configured(config_path, overrides, script)
+    with written(found.loaded.text) as used, simulated_laboratory(used) if found.loaded.simulated else nullcontext():
+        missing = [*_named(_look_at_board, found), *_named(_look_at_arm, found)]
     for problem in missing:
         print(f"missing: {problem}", file=sys.stderr)
     print(f"not ready: {len(missing)} to mend" if missing else "ready")
     return 2 if missing else 0
 
 
-def _named(look_at: Callable[[RigConfig], list[str]], config: RigConfig) -> list[str]:
+def _named(look_at: Callable[[Configured], list[str]], found: Configured) -> list[str]:
     """The problems found, including the one that ended the looking."""
     try:
-        return look_at(config)
+        return look_at(found)
     except RigError as error:
         return [str(error)]
 
 
-def _look_at_board(config: RigConfig) -> list[str]:
-    missing = []
+def _look_at_board(found: Configured) -> list[str]:
+    config, missing = found.loaded.config, []
     with refusing(), Board(config.board.port, config.board.baud, lambda batch: None) as board:
         identity = board.identity
         print(f"board at {config.board.port}: {identity.unique_id}, firmware {identity.firmware}")
@@ -49,7 +47,7 @@ def _look_at_board(config: RigConfig) -> list[str]:
             try:
                 info = find_sensor(identity, name, section)
                 print(f"sensor {name}: {info.part}, identity register 0x{info.who_am_i:02x}")
-                if config.procedure.name == "verify" and name in config.to_calibrate:
+                if found.phase.procedure.readings == "calibrated" and name in config.to_calibrate:
                     stored = stored_calibration(board, name, section)
                     print(f"sensor {name}: calibrated on {stored.calibration.written_utc:%Y-%m-%d}")
             except RigError as error:
@@ -57,12 +55,13 @@ def _look_at_board(config: RigConfig) -> list[str]:
     return missing
 
 
-def _look_at_arm(config: RigConfig) -> list[str]:
-    report = look(config.arm.host)
+def _look_at_arm(found: Configured) -> list[str]:
+    section = found.loaded.config.arm
+    report = look(section.host)
     state = report.state
     angles = " ".join(f"{degrees(angle):.1f}" for angle in state.q_rad)
     print(f"arm at {report.host}: serial number {report.serial_number}, PolyScope {report.polyscope}")
     print(f"arm joints: {angles} °, speed slider {100 * state.target_speed_fraction:.0f} %")
-    plan = plan_six_observation(config.arm, config.procedure, state.q_rad)
-    problems = [*plan_problems(plan, config.arm.payload_kg), *arm_problems(plan, report)]
+    plan = found.phase.plan(state.q_rad)
+    problems = [*plan_problems(plan, section.payload_kg), *arm_problems(plan, report)]
     return [f"{problem.name}: {problem.what}. {problem.remedy}." for problem in problems]

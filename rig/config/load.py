@@ -21,7 +21,7 @@ from rig.config.yaml_text import Location, Unreadable, dotted
 from rig.errors import Refused
 
 Model = TypeVar("Model", bound=BaseModel)
-Sections = Mapping[str, type[ProcedureSection]]
+Sections = Mapping[str, type[ProcedureSection]] | None  # None: the procedure is no matter of the reader's
 PROBLEMS_SHOWN = 25
 
 
@@ -127,6 +127,8 @@ def _validate_rig(
 def _validate_procedure(data: Any, sections: Sections, places: Places) -> tuple[ProcedureSection | None, list[str]]:
     """A name that is not known is one problem; the other keys are then judged as those of the nearest name."""
     name = data.get("name", DEFAULT_PROCEDURE) if isinstance(data, dict) else DEFAULT_PROCEDURE
+    if sections is None:
+        return ProcedureSection(name=str(name)), []
     if isinstance(name, str) and name in sections:
         return _validate(sections[name], data, ("procedure",), places)
     place = ("procedure", "name")

@@ -7,18 +7,20 @@ from pathlib import Path
 from rig.config.load import Loaded
 from rig.errors import Refused
 
-CALIBRATION, VERIFICATION = "run", "verify"  # the names of recordings begin so
+CONFIG, SCRIPT, RESULT = "config.yaml", "script.py", "result.json"
+_BEGINNINGS = {"raw": "run", "calibrated": "verify"}  # of the names of recordings, by what is streamed
 
 
-def new_folder(out: Path | None, loaded: Loaded) -> Path:
-    """A run folder that holds nothing but the configuration as used. Raises Refused `run_folder`."""
+def new_folder(out: Path | None, loaded: Loaded, script: str) -> Path:
+    """A run folder with the configuration as used and the script's text, nothing else. Raises Refused `run_folder`."""
     stamp = datetime.now(UTC).strftime("%Y-%m-%dT%H-%M-%SZ")
     folder = out or Path(loaded.config.output.folder) / f"{stamp}-{loaded.config.procedure.name}"
     try:
         folder.mkdir(parents=True, exist_ok=True)
         empty = not any(folder.iterdir())
         if empty:
-            (folder / "config.yaml").write_text(loaded.text, encoding="utf-8")
+            (folder / SCRIPT).write_text(script, encoding="utf-8")
+            (folder / CONFIG).write_text(loaded.text, encoding="utf-8")
     except OSError as error:
         raise Refused("run_folder", f"{folder} cannot be written: {error}", "Choose another with --out") from error
     if not empty:
@@ -28,15 +30,15 @@ def new_folder(out: Path | None, loaded: Loaded) -> Path:
     return folder
 
 
-def recordings(folder: Path, kind: str) -> list[Path]:
-    """The recordings of one kind in the order they were made: run.h5, run-2.h5, …"""
-    return sorted(folder.glob(f"{kind}*.h5"), key=lambda path: (len(path.name), path.name))
+def recordings(folder: Path, readings: str) -> list[Path]:
+    """The recordings of "raw" or of "calibrated" readings, in the order they were made: run.h5, run-2.h5, …"""
+    return sorted(folder.glob(f"{_BEGINNINGS[readings]}*.h5"), key=lambda path: (len(path.name), path.name))
 
 
-def next_recording(folder: Path, kind: str) -> Path:
+def next_recording(folder: Path, readings: str) -> Path:
     """Where the next one goes."""
-    count = len(recordings(folder, kind))
-    return folder / (f"{kind}-{count + 1}.h5" if count else f"{kind}.h5")
+    count = len(recordings(folder, readings))
+    return folder / f"{_BEGINNINGS[readings]}{f'-{count + 1}' if count else ''}.h5"
 
 
 def resuming(folder: Path) -> str:

@@ -3,15 +3,20 @@
 import math
 from collections.abc import Collection, Iterable
 
+import numpy as np
+
 from rig.arm.kinematics import flange_axes
 from rig.arm.motion import SAME_PLACE_RAD, Plan, Rest, Step, Sweep, Transfer, trapezoid_duration, travel
 from rig.arm.state import JOINT_NAMES, Joints
 from rig.config.models import ArmSection
 from rig.config.procedure_sections import SixSweepsSection
+from rig.errors import Refused
 
 # The first motion may swing the large joints from wherever somebody left the arm, so it is made at leisure.
 APPROACH_SPEED_RAD_S = math.radians(30)
 APPROACH_ACCELERATION_RAD_S2 = math.radians(60)
+# The swept axes must span space: the smallest singular value of their unit vectors, 1 when orthogonal.
+AXES_SPAN = 0.5
 
 
 def plan_six_observation(
@@ -26,12 +31,26 @@ def plan_six_observation(
     at home.
     `done` holds the indices of sweeps to leave out: those an interrupted run has finished.
     The whole series repeats `procedure.repeats` times. Limits are not judged here: see `rig.arm.preflight`.
+    Raises Refused `axes_do_not_span`.
     """
     home = _radians(arm.home_deg)
+    _check_span(home, procedure)
     start = home if start_q_rad is None else start_q_rad
     sweeps = [sweep for sweep in _sweeps(home, procedure) if sweep.index not in done]
     steps = tuple(_connected(sweeps, start, home, arm, procedure))
     return Plan(steps, start_q_rad=start, home_q_rad=home)
+
+
+def _check_span(home: Joints, procedure: SixSweepsSection) -> None:
+    """Six parameters can be told only from turns about three independent axes."""
+    swept = sorted(JOINT_NAMES.index(wrist) for wrist in set(procedure.order))
+    span = np.linalg.svd(flange_axes(home)[:, swept], compute_uv=False)
+    if len(span) < 3 or span[2] < AXES_SPAN:
+        raise Refused(
+            "axes_do_not_span",
+            "the swept wrists do not turn the flange about three independent axes",
+            "Set wrist 2 in arm.home_deg near 90 or -90, and sweep all three wrists",
+        )
 
 
 def _sweeps(home: Joints, procedure: SixSweepsSection) -> list[Sweep]:

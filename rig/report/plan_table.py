@@ -10,17 +10,7 @@ from rich.console import Console
 from rich.table import Table
 
 from rig.arm.motion import SAME_PLACE_RAD, Plan, Rest, Step, Sweep
-from rig.arm.preflight import plan_problems, refuse
 from rig.arm.state import JOINT_NAMES
-from rig.config.models import RigConfig
-from rig.plans.six_sweeps import plan_six_observation
-
-
-def checked_plan(config: RigConfig) -> Plan:
-    """The plan from the home pose. Raises `Refused` when a motion breaks a limit."""
-    plan = plan_six_observation(config.arm, config.procedure)
-    refuse(plan_problems(plan, config.arm.payload_kg))
-    return plan
 
 
 def plan_document(plan: Plan, *, repeated: bool) -> dict[str, Any]:

@@ -1,4 +1,4 @@
-"""Passes what arrives on to the recording and counts it, for the operator's view and to see that samples flow."""
+"""Passes what arrives on to the recording and counts it, for who looks on and to see that samples flow."""
 
 import threading
 from collections import defaultdict, deque
@@ -10,8 +10,8 @@ from firmware_host.client import SampleBatch
 from firmware_host.samples import SAMPLE_DTYPE
 from rig.arm.state import ArmState
 from rig.data.run_file import RunRecorder
+from rig.station.events import SensorSamples, Vector
 
-Vector = tuple[float, float, float]
 KEPT_PARTS = 3
 
 
@@ -46,8 +46,8 @@ class _Part:
 
 
 @dataclass(slots=True)
-class Monitor:
-    """Fed by the board's and the arm's reader threads, read by the procedure's. `counts` by the board's sensor index.
+class Acquisition:
+    """Fed by the board's and the arm's reader threads, read by the script's. `counts` by the board's sensor index.
 
     What comes before there is a `recorder` is not kept. From the first `keep` on, all that came since the last
     `KEPT_PARTS` of them is also held in memory.
@@ -57,6 +57,10 @@ class Monitor:
     recorder: RunRecorder | None = None
     _kept: deque[_Part] = field(default_factory=lambda: deque(maxlen=KEPT_PARTS))
     _lock: threading.Lock = field(default_factory=threading.Lock)
+
+    def expect(self, index: int, name: str, sensitivity_rad_s_per_count: float) -> None:
+        """Count the samples of a sensor by its index on the board, before the stream begins."""
+        self.counts[index] = SensorCount(name, sensitivity_rad_s_per_count)
 
     def on_samples(self, batch: SampleBatch) -> None:
         """Take a batch of samples of a sensor known in `counts`."""
@@ -92,11 +96,10 @@ class Monitor:
             new = len(self._kept[-1].states) if self._kept else 0
         return np.concatenate(batches or [np.empty(0, SAMPLE_DTYPE)]), states, new
 
-    def totals(self) -> tuple[int, int, Vector | None]:
-        """Samples received, samples lost, and the newest mean reading of the first sensor in rad/s."""
+    def samples(self) -> tuple[SensorSamples, ...]:
+        """What every sensor has delivered so far."""
         with self._lock:
-            counts = list(self.counts.values())
-            return sum(c.samples for c in counts), sum(c.lost for c in counts), counts[0].rate_rad_s
+            return tuple(SensorSamples(c.name, c.samples, c.lost, c.rate_rad_s) for c in self.counts.values())
 
     def silent(self) -> list[str]:
         """The sensors that have delivered nothing yet."""

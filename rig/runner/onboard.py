@@ -20,7 +20,7 @@ from rig.data.run_file import RecordedSensor, RunData, RunRecorder
 from rig.data.settings import ObservationThresholds
 from rig.errors import Fault
 from rig.observation.onboard_window import observed_before, revolution_on_the_board
-from rig.runner.acquisition import Monitor
+from rig.runner.acquisition import Acquisition
 
 # From asking the board to keep its readings to the arm's first motion, and how late that may be on a busy machine.
 KEEP_LONGER_S = 4.0
@@ -31,7 +31,7 @@ class BoardCalibration:
     """Takes the board through a calibration of `sensors` (name → its index on the board and its description)."""
 
     board: Board
-    monitor: Monitor
+    acquisition: Acquisition
     recorder: RunRecorder
     settings: ObservationThresholds
     sensors: Mapping[str, tuple[int, RecordedSensor]]
@@ -47,11 +47,11 @@ class BoardCalibration:
 
     def begin(self) -> None:
         """Before the first sample: the host keeps what it sees, for the clock of the first sweep."""
-        self.monitor.keep()
+        self.acquisition.keep()
 
     def keep(self, sweep: Sweep) -> None:
         """Just before a sweep: from now on board and host keep what they see."""
-        self.monitor.keep()
+        self.acquisition.keep()
         self.board.keep([index for index, _ in self.sensors.values()], sweep.duration_s + KEEP_LONGER_S)
 
     def observe(self, sweep: Sweep) -> None:
@@ -76,7 +76,7 @@ class BoardCalibration:
     def _observe(self, name: str, sweep: Sweep) -> tuple[BoardObservation, float]:
         """The board's observation and the speed it was told, rad/s."""
         index, sensor = self.sensors[name]
-        samples, states, new = self.monitor.kept(index)
+        samples, states, new = self.acquisition.kept(index)
         arm = np.array([state.to_record() for state in states], ARM_STATE_DTYPE)
         start_us, end_us, speed_rad_s = revolution_on_the_board(
             samples, sensor, arm, sweep, first=len(arm) - new, settings=self.settings

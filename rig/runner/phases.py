@@ -1,75 +1,114 @@
-"""The halves of a run: the calibration, and the same movement again to verify what the board made of it.
+"""One run in its folder: record a phase, judge it; if it passed, store and go on to the phase that follows.
 
-Each half is recorded into a file of its own. Nothing ends a half without its reason in the run's log and, where data
+Each phase is recorded into files of its own. Nothing ends a phase without its reason in the run's log and, where data
 were kept, the command to go on with.
 """
 
 import traceback
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Iterator
 from contextlib import contextmanager
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 
 from firmware_host.errors import BoardError
+from rig.analysis.calibration import DEFAULT_ESTIMATOR
 from rig.analysis.onboard_check import check_observed
-from rig.analysis.outcome import Outcome, outcome_of, verified
+from rig.analysis.outcome import Outcome
 from rig.board.store import store_calibrations
 from rig.config.load import Loaded
 from rig.data.run_file import RunData, make_plain, read_run
-from rig.data.run_folder import CALIBRATION, VERIFICATION, next_recording, recordings, resuming
+from rig.data.run_folder import next_recording, recordings, resuming
+from rig.data.settings import RunSettings, settings_of
 from rig.errors import Fault, Refused, RigError
+from rig.plans.phase import Phase
+from rig.plans.script_file import ScriptFile
 from rig.report.writers import write_outcome
-from rig.runner.connect import open_rig
-from rig.runner.procedure import Confirm, Rig
-from rig.station.view import View
+from rig.runner.connect import Connector
+from rig.runner.resumption import Resumption, resumption
+from rig.station.events import Checked, Crashed, Failed, Interrupted, Message, PhaseStarted, RunEvent, VerdictReached
+from rig.station.station import Station
 
-Script = Callable[[Rig], None]
+NOT_VERIFIED = "not verified: the calibration failed its limits, so the board keeps what it had"
 
 
 @dataclass(frozen=True, slots=True)
-class Session:
-    """One run in its folder; the laboratory, if it is a simulated one, is there already.
-
-    `verification` is the script of the second half.
-    """
+class Run:
+    """A run; the laboratory, if it is a simulated one, is there already. `script` is that of its first phase."""
 
     folder: Path
     loaded: Loaded
-    shown: View
-    confirm: Confirm
-    verification: Script
+    script: ScriptFile
+    station: Station
 
-    def calibrate(self, script: Script) -> Outcome:
-        """Calibrate by `script`; if the configuration asks for it and the limits are met, store and verify.
+    def carry_out(self, phase: Phase) -> Outcome:
+        """Carry out `phase` and what follows it; writes the outcome into the folder and returns it."""
+        outcome = self._judged(phase, self._recorded(phase, self._resumed(phase), moved=False), None)
+        while (follows := phase.follows) is not None:
+            phase = follows
+            runs: tuple[RunData, ...] = ()
+            if outcome.passed:
+                self._store(outcome)
+                runs = self._recorded(phase, Resumption(), moved=True)
+            else:
+                self.station.event(Message(NOT_VERIFIED))
+            outcome = self._judged(phase, runs, outcome)
+        return self._written(outcome)
 
-        Writes the outcome into the folder and returns it.
-        """
-        files = recordings(self.folder, CALIBRATION)
-        self._record(script, CALIBRATION, earlier=[read_run(file) for file in files])
+    def _resumed(self, phase: Phase) -> Resumption:
+        """What counts of the phase's recordings before. Corrected readings are compared as one movement: none do."""
+        if phase.procedure.readings == "calibrated":
+            return Resumption()
+        with self.reported(self._mended, moved=False):
+            earlier = [read_run(file) for file in recordings(self.folder, phase.procedure.readings)]
+            return resumption(earlier, self._settings(phase), self.script)
+
+    def _recorded(self, phase: Phase, resumed: Resumption, *, moved: bool) -> tuple[RunData, ...]:
+        """Carry out the phase's script; all recordings of the phase."""
+        readings = phase.procedure.readings
+        path = next_recording(self.folder, readings)
+        connector = Connector(phase, self.loaded, self._settings(phase), self.script, path, self.station, resumed)
+        with self.reported(self._mended, moved=moved), connector.open() as rig:
+            self.station.event(PhaseStarted(phase.procedure.name, rig.plan, rig.readings()))
+            phase.procedure.script(rig)
+            self.station.event(rig.recorded())
         with self.reported(self._repeating, moved=True):
-            for file in files:
+            files = recordings(self.folder, readings)
+            if path not in files:
+                raise Fault(
+                    "run_folder_removed",
+                    f"{path} is not there any more",
+                    "Start a new run, and leave its folder in its place until it has ended",
+                )
+            for file in files[:-1]:
                 make_plain(file)  # if the run was killed, only readers that know about it could open its file
-            runs = [read_run(file) for file in recordings(self.folder, CALIBRATION)]
-            outcome = outcome_of(runs)
-            check_observed(runs[-1], self.loaded.config.to_calibrate)
-            if not self.loaded.config.procedure.then_verify:
-                return self._written(outcome)
-        if outcome.passed:
-            with self.reported(self._mended, moved=True):
-                for line in store_calibrations(self.loaded.config, outcome.results):
-                    self.shown.line(line)
-            self._record(self.verification, VERIFICATION, calibrated=True, moved=True)
-        else:
-            self.shown.line("not verified: the calibration failed its limits, so the board keeps what it had")
-        with self.reported(self._repeating, moved=True):
-            repeated = [self._newest_verification()] if outcome.passed else []
-            return self._written(verified(outcome, repeated))
+            return tuple(read_run(file) for file in files)
 
-    def verify(self, script: Script) -> Outcome:
-        """Only the second half, with the calibration the board has stored. Returns the outcome."""
-        self._record(script, VERIFICATION, calibrated=True)
+    def _settings(self, phase: Phase) -> RunSettings:
+        """What the phase is judged by, recorded beside it."""
+        then = phase.follows is not None
+        settings = settings_of(self.loaded.config, phase.plan())
+        return replace(settings, procedure=phase.procedure.name, then_verify=then)
+
+    def _judged(self, phase: Phase, runs: tuple[RunData, ...], before: Outcome | None) -> Outcome:
         with self.reported(self._repeating, moved=True):
-            return self._written(outcome_of([], [self._newest_verification()]))
+            outcome = phase.procedure.analyse(runs, before, DEFAULT_ESTIMATOR)
+            if runs and phase.procedure.readings == "raw":
+                check_observed(runs[-1], self.loaded.config.to_calibrate)
+            return outcome
+
+    def _store(self, outcome: Outcome) -> None:
+        with self.reported(self._mended, moved=True):
+            for text in store_calibrations(self.loaded.config, outcome.results):
+                self.station.event(Message(text))
+
+    def _written(self, outcome: Outcome) -> Outcome:
+        with self.reported(self._repeating, moved=True):
+            for text in write_outcome(self.folder, outcome):
+                self.station.event(Message(text))
+        for check in outcome.checks:
+            self.station.event(Checked(check))
+        self.station.event(VerdictReached(outcome.passed))
+        return outcome
 
     @property
     def _mended(self) -> str:
@@ -79,73 +118,39 @@ class Session:
     def _repeating(self) -> str:
         return f"the data are kept in {self.folder}; to repeat refused sweeps: {resuming(self.folder)}"
 
-    def _newest_verification(self) -> RunData:
-        return read_run(recordings(self.folder, VERIFICATION)[-1])
-
-    def _record(
-        self,
-        script: Script,
-        kind: str,
-        *,
-        earlier: Sequence[RunData] = (),
-        calibrated: bool = False,
-        moved: bool = False,
-    ) -> None:
-        recording = next_recording(self.folder, kind)
-        with (
-            self.reported(self._mended, moved=moved),
-            open_rig(
-                self.loaded,
-                recording,
-                self.shown,
-                self.confirm,
-                earlier=earlier,
-                calibrated=calibrated,
-                announced=moved,
-            ) as rig,
-        ):
-            script(rig)
-            self.shown.line(rig.summary())
-
-    def _written(self, outcome: Outcome) -> Outcome:
-        for line in write_outcome(self.folder, outcome):
-            self.shown.line(line)
-        return outcome
-
     @contextmanager
     def reported(self, advice: str, *, moved: bool = False) -> Iterator[None]:
         """What ends a run early goes into its log too; a fault is followed by `advice`, an interruption by its own.
 
-        A refusal says that nothing has moved: after a half of the run (`moved`) it is a fault.
+        A refusal says that nothing has moved: after a phase of the run (`moved`) it is a fault.
         """
         try:
             yield
         except (RigError, BoardError) as error:
             if isinstance(error, Refused) and not moved:
-                self.shown.log(str(error))
+                self.station.event(Failed(error))
                 raise
             fault = Fault(error.name, _with_notes(error.what, error), error.remedy)
-            self.shown.log(str(fault))
-            self.shown.line(advice)
+            self._ended(Failed(fault), advice)
             raise fault from error
         except OSError as error:
             remedy = f"Mend that, then go on with: {resuming(self.folder)}"
             fault = Fault("system", f"{self.folder} cannot be used ({error})", remedy)
-            self.shown.log(str(fault))
+            self._ended(Failed(fault))
             raise fault from error
         except KeyboardInterrupt as interrupt:
             stopped = _with_notes("interrupted", interrupt)
             text = f"{stopped}; the data are kept in {self.folder}. Go on with: {resuming(self.folder)}"
-            self.shown.log(text)
+            self._ended(Interrupted(text))
             raise KeyboardInterrupt(text) from None
         except Exception:
-            self.shown.log(traceback.format_exc())
+            self._ended(Crashed(traceback.format_exc()))
             raise
 
-
-def agreed(announcement: Sequence[str]) -> bool:
-    """The answer where there is nobody to ask."""
-    return True
+    def _ended(self, event: RunEvent, advice: str = "") -> None:
+        self.station.event(event)
+        if advice and self.folder.exists():
+            self.station.event(Message(advice))
 
 
 def _with_notes(what: str, error: BaseException) -> str:

@@ -1,12 +1,11 @@
-"""The verbs a procedure script is written in.
+"""Carries out the verbs of a script (`rig.plans.verbs`).
 
-A script receives an open `Rig` and says what to do, in order. Every verb is supervised: while the arm moves or rests
-the board is watched, and whatever ends a verb early (an error, Ctrl-C, a lost link) stops the arm first and is reported
-then.
+Every verb is supervised: while the arm moves or rests the board and the recording are watched, and whatever ends a verb
+early (an error, Ctrl-C, a lost link) stops the arm first and is reported then.
 """
 
 import time
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Callable, Iterator, Mapping
 from contextlib import contextmanager
 from dataclasses import dataclass
 from math import degrees, radians
@@ -15,102 +14,120 @@ from firmware_host.client import Board
 from rig.arm.driver import Arm
 from rig.arm.motion import Plan, Rest, Step, Sweep, Transfer, travel
 from rig.arm.preflight import arm_problems, plan_problems, refuse, way_to_home
-from rig.arm.state import JOINT_NAMES, ArmReport
+from rig.arm.state import ArmReport
 from rig.config.models import ArmSection
 from rig.data.events import RestFinished, RestStarted, SweepFinished, SweepStarted
-from rig.data.run_file import RunRecorder
+from rig.data.run_file import RecordedSensor, RunRecorder
 from rig.errors import Fault, Refused
-from rig.runner.acquisition import Monitor
+from rig.plans.phase import Phase
+from rig.runner.acquisition import Acquisition
+from rig.runner.announcement import announcement
 from rig.runner.onboard import BoardCalibration
-from rig.station.view import Status, View
+from rig.station.events import (
+    PhaseRecorded,
+    PreflightPassed,
+    Progress,
+    SamplesTaken,
+    SamplingStarted,
+    StepFinished,
+    StepStarted,
+)
+from rig.station.station import Station
 
-Confirm = Callable[[Sequence[str]], bool]
 FIRST_SAMPLE_TIMEOUT_S = 2.0
 SAME_POSE_RAD = radians(1)  # what was announced and agreed to still holds
 
 
-@dataclass(slots=True)
-class Rig:
-    """An arm and a board, connected and recorded. Scripts call the verbs; `plan` says what the arm will do.
+@dataclass(frozen=True, slots=True)
+class Devices:
+    """What is connected.
 
-    `whole_plan` is the plan of the whole procedure: the same as `plan`, or more when an interrupted run goes on.
-    `calibrated` are the board's indices of the sensors that stream calibrated readings; `on_board` is there when the
-    board calibrates along; `again` says that the whole movement is to follow once more, and `announced` that this is
-    that time, to which the operator has agreed already.
+    `report` is the arm as it stood, `payload` what it carries. `corrected` are the board's indices of the sensors that
+    stream corrected readings.
     """
 
-    plan: Plan
-    whole_plan: Plan
+    arm: Arm
     report: ArmReport
     payload: ArmSection
-    arm: Arm
     board: Board
+    corrected: tuple[int, ...]
+    acquisition: Acquisition
+
+
+@dataclass(frozen=True, slots=True)
+class Recording:
+    """Where everything goes, and what of (`sensors` by name); `along` is there when the board calibrates along."""
+
     recorder: RunRecorder
-    monitor: Monitor
-    view: View
-    confirm: Confirm
-    calibrated: tuple[int, ...] = ()
-    on_board: BoardCalibration | None = None
-    again: bool = False
-    announced: bool = False
+    sensors: Mapping[str, RecordedSensor]
+    along: BoardCalibration | None
+
+    def check(self) -> None:
+        """Raise Fault `recording_failed`, or `run_folder_removed` when the file is no longer in its place."""
+        self.recorder.check()
+        if not self.recorder.path.exists():
+            raise Fault(
+                "run_folder_removed",
+                f"{self.recorder.path} was removed or moved away while it was recorded",
+                "Start a new run, and leave its folder in its place until it has ended",
+            )
+
+
+@dataclass(slots=True)
+class Rig:
+    """The verbs of one phase. `whole_plan` is the same as `plan`, or more when an interrupted run goes on."""
+
+    devices: Devices
+    plan: Plan
+    whole_plan: Plan
+    recording: Recording
+    station: Station
+    phase: Phase
+    _number: int = 0  # of the step that goes on, or the last one
     _done_s: float = 0.0  # planned duration of the steps behind us
     _step_started_s: float = 0.0  # controller time
 
     def preflight(self) -> None:
         """Check all that must be right before the arm moves, ask the operator, and take control of the arm.
 
-        A movement that was announced before begins without asking, unless the arm no longer stands where it was left.
+        A movement that was agreed to before begins without asking, unless the arm no longer stands where it was left.
         Raises `Refused` naming every problem found; nothing has moved then.
         """
-        refuse([*plan_problems(self.whole_plan, self.payload.payload_kg), *arm_problems(self.plan, self.report)])
-        self.view.line(
-            f"pre-flight: arm {self.report.serial_number} at {self.report.host} is ready; "
-            f"{len(self.plan.motions)} motions within limits, {self.plan.duration_s:.0f} s"
-        )
-        away_rad = max(map(abs, way_to_home(self.plan, self.report.state.q_rad)))
-        if not (self.announced and away_rad <= SAME_POSE_RAD) and not self.confirm(self._announcement()):
+        report, payload = self.devices.report, self.devices.payload
+        refuse([*plan_problems(self.whole_plan, payload.payload_kg), *arm_problems(self.plan, report)])
+        self.station.event(PreflightPassed(self.plan, report))
+        away_rad = max(map(abs, way_to_home(self.plan, report.state.q_rad)))
+        if not (self.phase.agreed and away_rad <= SAME_POSE_RAD):
+            self._agree()
+        self._refuse_moved()
+        x, y, z = (millimetres / 1000 for millimetres in payload.payload_centre_mm)
+        self.devices.arm.take_control(payload.payload_kg, (x, y, z))
+
+    def _agree(self) -> None:
+        prompt = announcement(self.plan, self.devices.report, self.whole_plan if self.phase.follows else None)
+        if not self.station.ask(prompt):
             raise Refused("not_confirmed", "nobody agreed to the movement", "Run again and agree, or give --yes")
-        moved_rad = max(map(abs, travel(self.plan.start_q_rad, self.arm.latest.q_rad)))
+
+    def _refuse_moved(self) -> None:
+        """While the operator thought, somebody may have moved the arm: it would take another way than announced."""
+        moved_rad = max(map(abs, travel(self.plan.start_q_rad, self.devices.arm.latest.q_rad)))
         if moved_rad > SAME_POSE_RAD:
             raise Refused(
                 "arm_moved",
-                f"the arm at {self.report.host} has moved by {degrees(moved_rad):.1f}° since its way was announced",
+                f"the arm at {self.devices.report.host} has moved by {degrees(moved_rad):.1f}° since its way was "
+                "announced",
                 "Keep others off the arm and run again",
             )
-        x, y, z = (millimetres / 1000 for millimetres in self.payload.payload_centre_mm)
-        self.arm.take_control(self.payload.payload_kg, (x, y, z))
-
-    def _announcement(self) -> list[str]:
-        """What an operator must know before agreeing: the first motion depends on where the arm stands."""
-        way = way_to_home(self.plan, self.report.state.q_rad)
-        turns = ", ".join(
-            f"{name} {degrees(angle):+.0f}°" for name, angle in zip(JOINT_NAMES, way, strict=True) if abs(angle) > 0.01
-        )
-        lines = [
-            f"The arm at {self.report.host} will move for {self.plan.duration_s:.0f} s.",
-            f"First it goes home: {turns or 'it is there already'}.",
-        ]
-        if self.plan.sweeps:
-            lines.append(f"Then {len(self.plan.sweeps)} sweeps turn the wrists by more than a whole turn each.")
-        if self.again:
-            lines.append(
-                "If the calibration passes, the board stores it in the place of what it had, and without another "
-                f"question {len(self.whole_plan.sweeps)} sweeps follow to verify it, for "
-                f"{self.whole_plan.duration_s:.0f} s."
-            )
-        return [
-            *lines,
-            "Nobody and nothing may be within its reach; the sensor's cable needs slack for a whole turn either way.",
-        ]
 
     def start_sampling(self) -> None:
         """Let the board stream; from here on every sample is recorded. Raises `Fault` when a sensor stays silent."""
-        if self.on_board is not None:
-            self.on_board.begin()
-        self.board.start(self.calibrated)
+        board, along = self.devices.board, self.recording.along
+        if along is not None:
+            along.begin()
+        board.start(self.devices.corrected)
         deadline_s = time.monotonic() + FIRST_SAMPLE_TIMEOUT_S
-        while silent := self.monitor.silent():
-            self.board.check()
+        while silent := self.devices.acquisition.silent():
+            board.check()
             if time.monotonic() > deadline_s:
                 raise Fault(
                     "no_samples",
@@ -118,67 +135,80 @@ class Rig:
                     "Check the sensor's wiring and its data-ready line, then run `rig check`",
                 )
             time.sleep(0.005)
-        self.view.line("sampling: every sensor delivers")
+        self.station.event(SamplingStarted())
 
     def move(self, transfer: Transfer) -> None:
         """Bring the arm to where the next sweep starts, or home."""
         with self._step(transfer):
-            self.arm.move(transfer, lambda: self._watch(transfer))
+            self.devices.arm.move(transfer, lambda: self._watch(transfer))
 
     def sweep(self, sweep: Sweep) -> None:
         """Turn one wrist through a whole revolution at constant speed and note when it began and ended.
 
-        Afterwards the board averages the revolution as well, when it calibrates along.
+        Afterwards, while the arm stands still, the board averages the revolution as well when it calibrates along.
         """
-        if self.on_board is not None:
-            self.on_board.keep(sweep)
-        with self._step(sweep):
-            self.recorder.add(SweepStarted(sweep))
-            self.arm.move(sweep, lambda: self._watch(sweep))
-            self.recorder.add(SweepFinished(sweep))
-            if self.on_board is not None:
-                self.on_board.observe(sweep)
+        recorder, along = self.recording.recorder, self.recording.along
+        if along is not None:
+            along.keep(sweep)
+        with self._step(sweep, then=lambda: self._observe(sweep)):
+            recorder.add(SweepStarted(sweep))
+            self.devices.arm.move(sweep, lambda: self._watch(sweep))
+            recorder.add(SweepFinished(sweep))
+
+    def _observe(self, sweep: Sweep) -> None:
+        if self.recording.along is not None:
+            self.recording.along.observe(sweep)
 
     def rest(self, rest: Rest) -> None:
         """Stand still: the readings here show the bias and the noise."""
+        recorder = self.recording.recorder
         with self._step(rest):
-            self.recorder.add(RestStarted())
-            self.arm.rest(rest.duration_s, lambda: self._watch(rest))
-            self.recorder.add(RestFinished())
+            recorder.add(RestStarted())
+            self.devices.arm.rest(rest.duration_s, lambda: self._watch(rest))
+            recorder.add(RestFinished())
 
     def solve_on_board(self) -> None:
         """Let the board compute its own calibration from what it has averaged; it stands beside the host's."""
-        if self.on_board is not None:
-            self.on_board.solve()
+        if self.recording.along is not None:
+            self.recording.along.solve()
 
-    def summary(self) -> str:
-        """What was recorded and what was missed, in one line."""
-        samples, lost, _ = self.monitor.totals()
-        return f"recorded: {samples} samples, {lost} lost; {self.arm.missed_states} arm states missed"
+    def readings(self) -> dict[str, str]:
+        """What every sensor streams, "raw" or "calibrated", by its name."""
+        return {name: sensor.mode for name, sensor in self.recording.sensors.items()}
+
+    def recorded(self) -> PhaseRecorded:
+        """What was recorded and what was missed."""
+        return PhaseRecorded(self.devices.acquisition.samples(), self.devices.arm.missed_states)
 
     @contextmanager
-    def _step(self, step: Step) -> Iterator[None]:
-        self._step_started_s = self.arm.latest.time_s
+    def _step(self, step: Step, then: Callable[[], None] = lambda: None) -> Iterator[None]:
+        """One step from its first event to its last; what happens `then` belongs to it, but not to its time."""
+        self._number += 1
+        place = self._number, len(self.plan.steps), step
+        arm = self.devices.arm
+        self._step_started_s = arm.latest.time_s
+        self.station.event(StepStarted(*place))
         yield
+        took_s = arm.latest.time_s - self._step_started_s
+        then()
         self._done_s += step.duration_s
-        self.view.line(f"done: {step.name}, {self.arm.latest.time_s - self._step_started_s:.2f} s")
+        self.station.event(StepFinished(*place, took_s))
 
     def _watch(self, step: Step) -> None:
         """Called many times a second while the arm is busy: look after board and recording, tell the operator."""
-        self.board.check()
-        self.recorder.check()
-        state = self.arm.latest
+        self.devices.board.check()
+        self.recording.check()
+        state = self.devices.arm.latest
         within_s = min(state.time_s - self._step_started_s, step.duration_s)
-        samples, lost, rate_rad_s = self.monitor.totals()
-        self.view.show(
-            Status(
-                step=step.name,
+        self.station.event(SamplesTaken(self.devices.acquisition.samples()))
+        self.station.event(
+            Progress(
+                number=self._number,
+                count=len(self.plan.steps),
+                step=step,
                 fraction=within_s / step.duration_s,
                 elapsed_s=self._done_s + within_s,
                 remaining_s=self.plan.duration_s - self._done_s - within_s,
                 arm_speed_rad_s=max(map(abs, state.qd_rad_s)),
-                samples=samples,
-                lost=lost,
-                rate_rad_s=rate_rad_s,
             )
         )

@@ -19,7 +19,7 @@ def main(arguments: list[str] | None = None) -> int:
     parser.add_argument("--until-eof", action="store_true", help="ignore Ctrl-C and end when standard input closes")
     options = parser.parse_args(arguments)
     try:
-        loaded = load(options.config)
+        loaded = load(options.config, sections=None)
         try:
             from rig.world.process import serve
         except ModuleNotFoundError as error:

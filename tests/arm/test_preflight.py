@@ -83,10 +83,6 @@ def test_payload_beyond_the_arm_is_refused() -> None:
     assert names(plan_problems(plan(), 13.0)) == ["payload_too_heavy"]
 
 
-def test_a_home_pose_with_parallel_wrists_is_refused() -> None:
-    assert names(plan_problems(plan(home_deg=(0, -90, 90, -90, 0, 0)), 0.3)) == ["axes_do_not_span"]
-
-
 @pytest.mark.parametrize(
     ("change", "name"),
     [

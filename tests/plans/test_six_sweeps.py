@@ -9,6 +9,7 @@ from rig.arm.kinematics import flange_rate
 from rig.arm.motion import Plan, Rest, Sweep, Transfer, trapezoid_duration, travel
 from rig.config.models import ArmSection
 from rig.config.procedure_sections import SixObservationSection
+from rig.errors import Refused
 from rig.plans.six_sweeps import plan_six_observation
 
 ARM = ArmSection(host="127.0.0.2", payload_kg=0.35)
@@ -93,6 +94,12 @@ def test_a_run_that_goes_on_leaves_out_what_is_done() -> None:
     rest_of_it = plan_six_observation(ARM, SixObservationSection(), done={0, 1, 2})
     assert [sweep.index for sweep in rest_of_it.sweeps] == [3, 4, 5]
     assert plan_six_observation(ARM, SixObservationSection(), done=range(6)).steps == ()
+
+
+def test_a_home_pose_with_parallel_wrists_is_refused() -> None:
+    parallel = ArmSection(host="127.0.0.2", payload_kg=0.35, home_deg=(0, -90, 90, -90, 0, 0))
+    with pytest.raises(Refused, match="axes_do_not_span"):
+        plan_six_observation(parallel, SixObservationSection())
 
 
 def test_configuration_sets_order_directions_repeats_and_rests() -> None:

@@ -3,6 +3,7 @@
 import json
 import os
 import pty
+import shutil
 import signal
 import socket
 import subprocess
@@ -169,6 +170,16 @@ def test_a_fault_during_a_sweep_stops_the_arm_and_keeps_the_data(
     assert f"rig resume {rig.out}" in errors
     assert rig.stopped_after_s() == pytest.approx(0, abs=0.1)
     assert len(read_run(rig.out / "run.h5").arm) > 0
+
+
+def test_a_run_folder_that_is_removed_during_the_run_is_a_named_fault(start: Start) -> None:
+    rig = start()
+    rig.until_sweeping()
+    shutil.rmtree(rig.out)
+    status, errors = rig.end()
+    assert status == 3 and "rig: run_folder_removed: " in errors, errors
+    assert "rig resume" not in errors, "there is nothing to go on with"
+    assert rig.stopped_after_s() == pytest.approx(0, abs=0.1)
 
 
 def test_resume_repeats_the_sweep_that_was_refused(start: Start) -> None:

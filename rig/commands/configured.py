@@ -1,0 +1,36 @@
+"""The configuration and the procedure a command is about: the one the file names, or one in a file of its own."""
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from pathlib import Path
+
+from rig.config.load import Loaded, load
+from rig.plans.phase import Phase, first_phase
+from rig.plans.registry import Procedures, installed, sections
+from rig.plans.script_file import ScriptFile, load_script, script_file
+
+
+@dataclass(frozen=True, slots=True)
+class Configured:
+    """A valid configuration, its procedure with the file it stands in, and the first phase of a run of it."""
+
+    loaded: Loaded
+    script: ScriptFile
+    phase: Phase
+
+
+def configured(config_path: Path, overrides: Sequence[str] = (), script: ScriptFile | Path | None = None) -> Configured:
+    """Load a configuration, for `script` (a file or one that is loaded) if it is given, whatever procedure it names.
+
+    Raises Refused as `load`, `installed` and `load_script` do.
+    """
+    if isinstance(script, Path):
+        script = load_script(script)
+    procedures: Procedures = installed()
+    if script is not None:
+        procedures = {**procedures, script.procedure.name: script.procedure}
+        overrides = [*overrides, f"procedure.name={script.procedure.name}"]
+    loaded = load(config_path, overrides, sections(procedures))
+    if script is None:
+        script = script_file(procedures[loaded.config.procedure.name])
+    return Configured(loaded, script, first_phase(script.procedure, loaded.config, procedures))

@@ -1,0 +1,94 @@
+"""The procedures by name. A package adds its own through the entry-point group `rig.procedures`.
+
+Nothing in the rig knows a procedure except through its `Procedure`; one that is not installed comes from a file of its
+own (`rig.plans.script_file`).
+"""
+
+from collections.abc import Callable, Collection, Mapping, Sequence
+from dataclasses import dataclass
+from functools import cache
+from importlib.metadata import entry_points
+from typing import Any, Generic, Literal, Protocol, TypeVar
+
+from rig.analysis.outcome import Outcome, outcome_of
+from rig.arm.motion import Plan
+from rig.arm.state import Joints
+from rig.config.models import ArmSection, ProcedureSection
+from rig.data.run_file import RunData
+from rig.errors import Refused
+from rig.plans.verbs import Script
+
+GROUP = "rig.procedures"
+Readings = Literal["raw", "calibrated"]
+SectionT = TypeVar("SectionT", bound=ProcedureSection)
+SectionT_contra = TypeVar("SectionT_contra", bound=ProcedureSection, contravariant=True)
+
+
+class Planner(Protocol[SectionT_contra]):
+    """Makes the steps; pure. `start_q_rad` is where the arm stands (at home when None), `done` the sweeps to leave out.
+
+    The sweeps' `index` is their place in the whole procedure. Raises `Refused` by name when there is no such movement.
+    """
+
+    def __call__(
+        self,
+        arm: ArmSection,
+        procedure: SectionT_contra,
+        start_q_rad: Joints | None = None,
+        done: Collection[int] = (),
+        /,
+    ) -> Plan: ...
+
+
+# The recordings of this phase (none when it did not happen), what the phase before amounts to (None for the first one),
+# the estimator's name.
+Analysis = Callable[[Sequence[RunData], Outcome | None, str], Outcome]
+
+
+def calibration(runs: Sequence[RunData], before: Outcome | None, estimator: str) -> Outcome:
+    """The usual analysis: scale and bias of every sensor from averaged revolutions, held against the limits."""
+    return outcome_of(runs, None, estimator)
+
+
+@dataclass(frozen=True, slots=True)
+class Procedure(Generic[SectionT]):
+    """A procedure: its name and section in the configuration, how it plans, what it does, how it is judged.
+
+    `readings` is what the sensors to calibrate stream: raw counts, which the board averages as well, or what the board
+    has corrected by the calibration it has stored. `then` names the procedure that follows with the same movement when
+    the section says `then_verify`.
+    """
+
+    name: str
+    section: type[SectionT]
+    plan: Planner[SectionT]
+    script: Script
+    analyse: Analysis = calibration
+    readings: Readings = "raw"
+    then: str | None = None
+
+
+AnyProcedure = Procedure[Any]
+Procedures = Mapping[str, AnyProcedure]
+
+
+@cache
+def installed() -> Procedures:
+    """The procedures of the packages installed here. Raises Refused `procedure_not_loaded`."""
+    found = {}
+    for entry in entry_points(group=GROUP):
+        try:
+            procedure = entry.load()
+        except (ImportError, AttributeError) as error:
+            raise Refused(
+                "procedure_not_loaded",
+                f"the procedure {entry.name} is installed but cannot be loaded ({error})",
+                f"Install the package of {entry.value} again, or remove it",
+            ) from error
+        found[procedure.name] = procedure
+    return found
+
+
+def sections(procedures: Procedures) -> Mapping[str, type[ProcedureSection]]:
+    """What the `procedure:` section of a configuration may be, by its name."""
+    return {name: procedure.section for name, procedure in procedures.items()}

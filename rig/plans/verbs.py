@@ -1,0 +1,42 @@
+"""The verbs a procedure's script is written in. What carries them out is `rig.runner.procedure.Rig`."""
+
+from collections.abc import Callable
+from typing import Protocol
+
+from rig.arm.motion import Plan, Rest, Sweep, Transfer
+
+
+class Verbs(Protocol):
+    """An arm and a board, connected and recorded. Whatever ends a verb early stops the arm first."""
+
+    @property
+    def plan(self) -> Plan:
+        """What is to be done, step by step; less than the whole when an interrupted run goes on."""
+        ...
+
+    def preflight(self) -> None:
+        """Check all that must be right before the arm moves, ask the operator, and take control of the arm."""
+        ...
+
+    def start_sampling(self) -> None:
+        """Let the board stream; from here on every sample is recorded."""
+        ...
+
+    def move(self, transfer: Transfer) -> None:
+        """Bring the arm somewhere; nothing is measured."""
+        ...
+
+    def sweep(self, sweep: Sweep) -> None:
+        """Turn one wrist through a whole revolution at constant speed."""
+        ...
+
+    def rest(self, rest: Rest) -> None:
+        """Stand still."""
+        ...
+
+    def solve_on_board(self) -> None:
+        """Let the board compute its own calibration; nothing where it does not calibrate along."""
+        ...
+
+
+Script = Callable[[Verbs], None]

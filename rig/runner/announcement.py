@@ -1,0 +1,34 @@
+"""What an operator must know before agreeing to a movement. Pure."""
+
+from math import degrees
+
+from rig.arm.motion import Plan
+from rig.arm.preflight import way_to_home
+from rig.arm.state import JOINT_NAMES, ArmReport
+from rig.station.events import Prompt
+
+
+def announcement(plan: Plan, report: ArmReport, repeated: Plan | None) -> Prompt:
+    """The question before the first motion, which depends on where the arm stands.
+
+    `repeated` is the movement that follows without another question if the calibration passes.
+    """
+    way = way_to_home(plan, report.state.q_rad)
+    turns = ", ".join(
+        f"{name} {degrees(angle):+.0f}°" for name, angle in zip(JOINT_NAMES, way, strict=True) if abs(angle) > 0.01
+    )
+    lines = [
+        f"The arm at {report.host} will move for {plan.duration_s:.0f} s.",
+        f"First it goes home: {turns or 'it is there already'}.",
+    ]
+    if plan.sweeps:
+        lines.append(f"Then {len(plan.sweeps)} sweeps turn the wrists by more than a whole turn each.")
+    if repeated is not None:
+        lines.append(
+            "If the calibration passes, the board stores it in the place of what it had, and without another "
+            f"question {len(repeated.sweeps)} sweeps follow to verify it, for {repeated.duration_s:.0f} s."
+        )
+    lines.append(
+        "Nobody and nothing may be within its reach; the sensor's cable needs slack for a whole turn either way."
+    )
+    return Prompt(tuple(lines))

@@ -1,0 +1,65 @@
+"""What an interrupted run has done already, and that the rest of it is the rest of the same run."""
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from typing import Any
+
+from rig.data.run_file import RecordedSensor, RunData
+from rig.data.settings import RunSettings
+from rig.errors import Refused
+from rig.observation.observe import sound_sweeps
+from rig.plans.script_file import ScriptFile
+from rig.runner.onboard import observed_sweeps
+
+REMEDY = "Undo the change in config.yaml, or start a new run with `rig run`"
+
+
+@dataclass(frozen=True, slots=True)
+class Resumption:
+    """The recordings so far, oldest first, and the indices of the sweeps in them that count; none in a new run."""
+
+    earlier: Sequence[RunData] = ()
+    done: frozenset[int] = frozenset()
+
+    def refuse_other_instruments(self, provenance: Mapping[str, Any], sensors: Mapping[str, RecordedSensor]) -> None:
+        """Readings of two boards, or at two settings, are not one calibration.
+
+        Raises Refused `another_board`, `another_arm`, `another_sensor`.
+        """
+        for run in self.earlier:
+            for key, what in (("board_unique_id", "board"), ("arm_serial_number", "arm")):
+                if run.provenance[key] != provenance[key]:
+                    raise Refused(
+                        "another_board" if what == "board" else "another_arm",
+                        f"the run was begun with the {what} {run.provenance[key]}, this is {provenance[key]}",
+                        f"Connect the {what} the run was begun with, or start a new run with `rig run`",
+                    )
+            if run.sensors != sensors:
+                raise Refused(
+                    "another_sensor",
+                    "the sensors are not those of the recording, or set up differently",
+                    REMEDY,
+                )
+
+
+def resumption(earlier: Sequence[RunData], settings: RunSettings, script: ScriptFile) -> Resumption:
+    """What counts of the recordings of an interrupted run: sound sweeps that the board has averaged as well.
+
+    Sweeps are counted by their place in the procedure, so the rest of a run must be the rest of the same one. Raises
+    Refused `another_script`, `another_procedure`.
+    """
+    for run in earlier:
+        if run.provenance.get("script_sha256") != script.sha256:
+            raise Refused(
+                "another_script",
+                f"{script.name} in the run folder is not the script the run was begun with",
+                "Undo the change in it, or start a new run with `rig run`",
+            )
+        if run.settings.movement != settings.movement:
+            raise Refused(
+                "another_procedure",
+                "config.yaml in the run folder describes another procedure or home pose than the recording there",
+                REMEDY,
+            )
+    done = (sound_sweeps(run, settings.observation) & observed_sweeps(run, settings.to_calibrate) for run in earlier)
+    return Resumption(earlier, frozenset[int]().union(*done))

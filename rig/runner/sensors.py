@@ -1,0 +1,72 @@
+"""Sets the configured sensors up on the board, and describes them for the recording."""
+
+from collections.abc import Mapping
+from dataclasses import dataclass, replace
+from math import radians
+
+from firmware_host.client import Board, Calibration, StoredCalibration
+from firmware_host.protocol import CALIBRATED_RAD_S, FULL_SCALE_COUNTS
+from rig.board.identify import find_sensor, stored_calibration
+from rig.config.models import RigConfig, SensorSection, mounting_matrix
+from rig.data.run_file import RecordedSensor
+
+
+@dataclass(frozen=True, slots=True)
+class BoardSensor:
+    """A sensor that is set up: its index on the board, and what a reader of its samples must know.
+
+    `stored` is the calibration its readings are corrected by, None where they come raw.
+    """
+
+    index: int
+    described: RecordedSensor
+    stored: StoredCalibration | None = None
+
+
+def set_up_sensors(board: Board, config: RigConfig, *, calibrated: bool) -> Mapping[str, BoardSensor]:
+    """Every configured sensor by its name; those to calibrate stream corrected readings when `calibrated`.
+
+    Raises Refused as `find_sensor` and `stored_calibration`.
+    """
+    return {
+        name: _corrected(board, name, section)
+        if calibrated and name in config.to_calibrate
+        else _raw(board, name, section)
+        for name, section in config.sensors.items()
+    }
+
+
+def _raw(board: Board, name: str, section: SensorSection) -> BoardSensor:
+    info = find_sensor(board.identity, name, section)
+    setup = board.configure(info.index, section.rate_hz, section.range_deg_s)
+    described = RecordedSensor(
+        part=section.part,
+        serial_number=section.serial_number,
+        rate_hz=setup.rate_hz,
+        range_rad_s=radians(setup.range_deg_s),
+        sensitivity_rad_s_per_count=setup.sensitivity_rad_s,
+        full_scale_counts=FULL_SCALE_COUNTS,
+        temperature_c_per_count=setup.temperature_scale_c,
+        temperature_offset_c=setup.temperature_offset_c,
+        mounting=tuple(tuple(row) for row in mounting_matrix(section.mounting).tolist()),
+    )
+    return BoardSensor(info.index, described)
+
+
+def _corrected(board: Board, name: str, section: SensorSection) -> BoardSensor:
+    raw = _raw(board, name, section)
+    stored = stored_calibration(board, name, section)
+    return BoardSensor(raw.index, corrected(raw.described, stored.calibration), stored)
+
+
+def corrected(sensor: RecordedSensor, calibration: Calibration) -> RecordedSensor:
+    """The same sensor when the board corrects its readings: a count is then a microradian per second."""
+    limit_rad_s = sensor.full_scale_counts * sensor.sensitivity_rad_s_per_count
+    both = zip(calibration.scale, calibration.bias_rad_s, strict=True)
+    lowest_rad_s = min(k * (limit_rad_s - abs(b)) for k, b in both)  # what a saturated reading becomes, at least
+    return replace(
+        sensor,
+        sensitivity_rad_s_per_count=CALIBRATED_RAD_S,
+        full_scale_counts=int(lowest_rad_s / CALIBRATED_RAD_S),
+        mode="calibrated",
+    )

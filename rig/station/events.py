@@ -1,0 +1,197 @@
+"""What happens in a run, as typed events. Words are made of them where they are read; nothing parses sentences.
+
+All events of a run come in order, from the thread that runs the procedure.
+"""
+
+from dataclasses import dataclass
+
+from firmware_host.client import BoardIdentity
+from rig.analysis.verdict import Check
+from rig.arm.motion import Plan, Step
+from rig.arm.state import ArmReport
+from rig.errors import RigError
+
+Vector = tuple[float, float, float]
+
+
+@dataclass(frozen=True, slots=True)
+class Message:
+    """Something worth a line for which there is no event of its own."""
+
+    text: str
+
+
+@dataclass(frozen=True, slots=True)
+class BoardConnected:
+    """The board answered at `port`, and its firmware is the right one."""
+
+    port: str
+    identity: BoardIdentity
+
+
+@dataclass(frozen=True, slots=True)
+class ArmConnected:
+    """The arm answered and said how it stands; nothing has moved."""
+
+    report: ArmReport
+
+
+@dataclass(frozen=True, slots=True)
+class RunResumed:
+    """An interrupted run goes on: `done` of the `planned` sweeps count already."""
+
+    done: int
+    planned: int
+
+
+@dataclass(frozen=True, slots=True)
+class PhaseStarted:
+    """A movement is about to be recorded: by which procedure, the steps it has, the sensors (name → "raw" or
+    "calibrated" readings)."""
+
+    procedure: str
+    plan: Plan
+    sensors: dict[str, str]
+
+
+@dataclass(frozen=True, slots=True)
+class PreflightPassed:
+    """All that can be known beforehand is right with the plan and the arm."""
+
+    plan: Plan
+    report: ArmReport
+
+
+@dataclass(frozen=True, slots=True)
+class Prompt:
+    """The operator is told `announcement` and asked to agree `to_do` it."""
+
+    announcement: tuple[str, ...]
+    to_do: str = "start"
+
+
+@dataclass(frozen=True, slots=True)
+class Answered:
+    """What came of the last `Prompt`."""
+
+    agreed: bool
+
+
+@dataclass(frozen=True, slots=True)
+class SamplingStarted:
+    """Every sensor delivers."""
+
+
+@dataclass(frozen=True, slots=True)
+class StepStarted:
+    """Step `number` (from 1) of `count` begins."""
+
+    number: int
+    count: int
+    step: Step
+
+
+@dataclass(frozen=True, slots=True)
+class Progress:
+    """How far the run is, many times in each step: the `fraction` of the step from 0 to 1, times of the whole plan."""
+
+    number: int
+    count: int
+    step: Step
+    fraction: float
+    elapsed_s: float
+    remaining_s: float
+    arm_speed_rad_s: float
+
+
+@dataclass(frozen=True, slots=True)
+class SensorSamples:
+    """What one sensor has delivered so far: samples, gaps in their numbers, the newest mean reading in rad/s."""
+
+    sensor: str
+    samples: int
+    lost: int
+    rate_rad_s: Vector | None
+
+
+@dataclass(frozen=True, slots=True)
+class SamplesTaken:
+    """The samples of every sensor so far; comes with every `Progress`."""
+
+    sensors: tuple[SensorSamples, ...]
+
+
+@dataclass(frozen=True, slots=True)
+class StepFinished:
+    """Step `number` of `count` has ended; it took `took_s` of the controller's time."""
+
+    number: int
+    count: int
+    step: Step
+    took_s: float
+
+
+@dataclass(frozen=True, slots=True)
+class PhaseRecorded:
+    """A movement is done and recorded; `missed_states` are gaps in what the arm said of itself."""
+
+    sensors: tuple[SensorSamples, ...]
+    missed_states: int
+
+
+@dataclass(frozen=True, slots=True)
+class Checked:
+    """One limit beside what was measured."""
+
+    check: Check
+
+
+@dataclass(frozen=True, slots=True)
+class VerdictReached:
+    """The run's verdict; its checks came before it."""
+
+    passed: bool
+
+
+@dataclass(frozen=True, slots=True)
+class Failed:
+    """The run was refused or ended in a fault, named. The data are kept if there are any."""
+
+    error: RigError
+
+
+@dataclass(frozen=True, slots=True)
+class Interrupted:
+    """Somebody ended the run; the text says how the arm was left and how to go on."""
+
+    text: str
+
+
+@dataclass(frozen=True, slots=True)
+class Crashed:
+    """A defect of the program ended the run."""
+
+    traceback: str
+
+
+RunEvent = (
+    Message
+    | BoardConnected
+    | ArmConnected
+    | RunResumed
+    | PhaseStarted
+    | PreflightPassed
+    | Prompt
+    | Answered
+    | SamplingStarted
+    | StepStarted
+    | Progress
+    | SamplesTaken
+    | StepFinished
+    | PhaseRecorded
+    | Checked
+    | VerdictReached
+    | Failed
+    | Interrupted
+    | Crashed
+)

@@ -1,0 +1,56 @@
+"""The line an event is worth, for a terminal and for the log."""
+
+from rig.station.events import (
+    ArmConnected,
+    BoardConnected,
+    Crashed,
+    Failed,
+    Interrupted,
+    Message,
+    PhaseRecorded,
+    PreflightPassed,
+    RunEvent,
+    RunResumed,
+    SamplingStarted,
+    StepFinished,
+)
+
+
+def line(event: RunEvent) -> str | None:
+    """What to say of it in one line; None for what only an instrument shows, or what others say."""
+    text: str | None
+    match event:
+        case Message(said):
+            text = said
+        case RunResumed(done, planned):
+            text = f"resuming: {done} of {planned} sweeps are recorded, sound and known to the board"
+        case BoardConnected(port, identity):
+            text = f"board: {identity.unique_id}, firmware {identity.firmware} at {port}"
+        case ArmConnected(report):
+            text = f"arm: serial number {report.serial_number}, PolyScope {report.polyscope} at {report.host}"
+        case PreflightPassed(plan, report):
+            text = (
+                f"pre-flight: arm {report.serial_number} at {report.host} is ready; "
+                f"{len(plan.motions)} motions within limits, {plan.duration_s:.0f} s"
+            )
+        case SamplingStarted():
+            text = "sampling: every sensor delivers"
+        case StepFinished(_, _, step, took_s):
+            text = f"done: {step.name}, {took_s:.2f} s"
+        case PhaseRecorded(sensors, missed_states):
+            samples, lost = (sum(counts) for counts in zip(*((s.samples, s.lost) for s in sensors), strict=True))
+            text = f"recorded: {samples} samples, {lost} lost; {missed_states} arm states missed"
+        case _:
+            text = None
+    return text
+
+
+def reason(event: RunEvent) -> str | None:
+    """Why a run ended early. The log keeps it; on a terminal the command says it last."""
+    match event:
+        case Failed(error):
+            return str(error)
+        case Interrupted(text) | Crashed(text):
+            return text
+        case _:
+            return None

@@ -1,0 +1,155 @@
+"""Whoever listens to a run gets all of it as typed events, in order: enough for a page that shows nothing else."""
+
+import subprocess
+import sys
+from collections.abc import Iterator
+from itertools import pairwise
+from pathlib import Path
+from typing import Any
+
+import pytest
+
+from rig.commands.configured import configured
+from rig.runner.phases import Run
+from rig.station.events import (
+    Answered,
+    ArmConnected,
+    BoardConnected,
+    Checked,
+    Message,
+    PhaseRecorded,
+    PhaseStarted,
+    PreflightPassed,
+    Progress,
+    Prompt,
+    RunEvent,
+    SamplesTaken,
+    SamplingStarted,
+    StepFinished,
+    StepStarted,
+    VerdictReached,
+)
+from rig.station.station import Stations, always_yes
+from support.worlds import worlds
+
+CHANGES: dict[str, Any] = {
+    "arm": {"transfer_speed_deg_s": 170},
+    "sensors": {
+        "gyro": {"rate_hz": 119},
+        "reference": {"part": "adis16465", "serial_number": "ADIS16465-001", "role": "reference"},
+    },
+    "procedure": {"verify": True, "speed_deg_s": 150, "acceleration_deg_s2": 400, "rest_s": 0.5},
+    "limits": {"scale_std": 1, "bias_std_rad_s": 1, "verification_rms_rad_s": 1, "verification_mean_rad_s": 1},
+    "world": {"time_scale": 12, "sensors": {"reference": {"scale": [1.0, 1.0, 1.0], "bias_rad_s": [0.0, 0.0, 0.0]}}},
+}
+pytestmark = [pytest.mark.slow, pytest.mark.timeout(120)]
+
+
+class Everything:
+    """Remembers all it is told."""
+
+    def __init__(self) -> None:
+        self.events: list[RunEvent] = []
+
+    def event(self, event: RunEvent) -> None:
+        self.events.append(event)
+
+
+@pytest.fixture(scope="module")
+def events(tmp_path_factory: pytest.TempPathFactory) -> Iterator[list[RunEvent]]:
+    """All events of a calibration and its verification."""
+    folder = tmp_path_factory.mktemp("events")
+    listener = Everything()
+    with worlds(folder) as start:
+        found = configured(start(CHANGES).config_path)
+        run = Run(folder, found.loaded, found.script, Stations((listener,), always_yes))
+        assert run.carry_out(found.phase).passed
+    yield listener.events
+
+
+def phases(events: list[RunEvent]) -> list[list[RunEvent]]:
+    """The events of each phase from its start to what it recorded."""
+    starts = [place for place, event in enumerate(events) if isinstance(event, PhaseStarted)]
+    ends = [place for place, event in enumerate(events) if isinstance(event, PhaseRecorded)]
+    return [events[start : end + 1] for start, end in zip(starts, ends, strict=True)]
+
+
+def test_the_phases_come_one_after_the_other(events: list[RunEvent]) -> None:
+    told = [type(event) for event in events if not isinstance(event, Message)]
+    steps = (StepStarted, Progress, SamplesTaken, StepFinished)
+    around = [kind for kind in told if kind not in steps and kind.__name__ not in ("BoardObserved", "BoardSolved")]
+    connected = [BoardConnected, ArmConnected, PhaseStarted, PreflightPassed]
+    checks = around.count(Checked)
+    assert around == [
+        *connected, Prompt, Answered, SamplingStarted, PhaseRecorded,
+        *connected, SamplingStarted, PhaseRecorded,
+        *[Checked] * checks, VerdictReached,
+    ]  # fmt: skip
+    first, second = (event for event in events if isinstance(event, PhaseStarted))
+    assert first.procedure == "six_observation" and first.sensors == {"gyro": "raw", "reference": "raw"}
+    assert second.procedure == "verify" and second.sensors == {"gyro": "calibrated", "reference": "raw"}
+    assert checks == 10 and events[-1] == VerdictReached(passed=True)
+
+
+def test_every_step_of_the_plan_starts_goes_on_and_finishes(events: list[RunEvent]) -> None:
+    for phase in phases(events):
+        started = phase[0]
+        assert isinstance(started, PhaseStarted)
+        plan = started.plan
+        steps = [event for event in phase if isinstance(event, StepStarted | Progress | StepFinished)]
+        numbers = [event.number for event in steps]
+        assert numbers == sorted(numbers) and set(numbers) == set(range(1, len(plan.steps) + 1))
+        for number, step in enumerate(plan.steps, start=1):
+            begun, *within, ended = (event for event in steps if event.number == number)
+            assert begun == StepStarted(number, len(plan.steps), step)
+            assert isinstance(ended, StepFinished) and ended.step == step
+            assert ended.took_s == pytest.approx(step.duration_s, abs=1.0)
+            assert within and all(isinstance(event, Progress) and event.step == step for event in within)
+        progress = [event for event in steps if isinstance(event, Progress)]
+        for one, other in pairwise(progress):
+            assert other.elapsed_s >= one.elapsed_s and other.remaining_s <= one.remaining_s
+        for one in progress:
+            assert 0 <= one.fraction <= 1
+            assert one.elapsed_s + one.remaining_s == pytest.approx(plan.duration_s)
+
+
+def test_every_sensors_samples_are_counted(events: list[RunEvent]) -> None:
+    for phase in phases(events):
+        taken = [event for event in phase if isinstance(event, SamplesTaken)]
+        assert all([sensor.sensor for sensor in event.sensors] == ["gyro", "reference"] for event in taken)
+        for name in range(2):
+            counts = [event.sensors[name].samples for event in taken]
+            assert counts == sorted(counts) and counts[-1] > 1000
+            assert all(event.sensors[name].lost == 0 for event in taken)
+        spinning = max(abs(rate) for event in taken for s in event.sensors if s.rate_rad_s for rate in s.rate_rad_s)
+        assert spinning > 2.0
+        recorded = phase[-1]
+        assert isinstance(recorded, PhaseRecorded) and recorded.sensors[0].samples >= taken[-1].sensors[0].samples
+
+
+IMPORTS = """
+import sys
+from pathlib import Path
+from rig.commands.configured import configured
+from rig.runner.phases import Run
+from rig.station.events import PhaseRecorded, PreflightPassed
+from rig.station.station import Stations, always_yes
+
+class Imports:
+    def event(self, event):
+        if isinstance(event, PreflightPassed):
+            self.before = set(sys.modules)
+        if isinstance(event, PhaseRecorded):
+            print(sorted(set(sys.modules) - self.before))
+
+found = configured(Path(sys.argv[1]))
+Run(Path(sys.argv[2]), found.loaded, found.script, Stations((Imports(),), always_yes)).carry_out(found.phase)
+"""
+
+
+def test_nothing_is_imported_while_the_arm_is_under_way(tmp_path: Path) -> None:
+    once = {**CHANGES, "procedure": {**CHANGES["procedure"], "verify": False}}
+    with worlds(tmp_path) as start:
+        command = [sys.executable, "-c", IMPORTS, str(start(once).config_path), str(tmp_path)]
+        done = subprocess.run(command, capture_output=True, text=True, timeout=60, check=False)
+    assert done.returncode == 0 and done.stdout == "[]\n", done.stdout + done.stderr

@@ -1,0 +1,44 @@
+"""The command line as somebody types it, on fast simulated laboratories of their own."""
+
+import subprocess
+import sys
+import time
+from pathlib import Path
+from typing import Any
+
+import yaml
+
+from support.paths import CONFIGS
+from support.worlds import fresh_host, merge
+
+CI = CONFIGS / "ci.yaml"
+
+
+def rig(*arguments: str | Path) -> subprocess.CompletedProcess[str]:
+    """`rig …`, until it has ended."""
+    return python("-m", "rig", *arguments)
+
+
+def python(*arguments: str | Path) -> subprocess.CompletedProcess[str]:
+    """`python …`, until it has ended."""
+    command = [sys.executable, *map(str, arguments)]
+    return subprocess.run(command, capture_output=True, text=True, timeout=50, check=False)
+
+
+def configuration(folder: Path, changes: dict[str, Any] | None = None) -> Path:
+    """ci.yaml on an address of its own, with changes."""
+    host = fresh_host()
+    address = {"arm": {"host": host}, "board": {"port": f"socket://{host}:7321"}}
+    document = merge(merge(yaml.safe_load(CI.read_text(encoding="utf-8")), address), changes or {})
+    path = folder / "config.yaml"
+    path.write_text(yaml.safe_dump(document, sort_keys=False), encoding="utf-8")
+    return path
+
+
+def wait_for_log(folder: Path, words: str, timeout_s: float = 30.0) -> None:
+    """Until the run's log says so."""
+    log = folder / "log.txt"
+    deadline_s = time.monotonic() + timeout_s
+    while not (log.exists() and words in log.read_text(encoding="utf-8")):
+        assert time.monotonic() < deadline_s, f"{log} never said {words!r}"
+        time.sleep(0.01)
