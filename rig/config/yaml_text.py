@@ -93,9 +93,10 @@ class _Loader(yaml.SafeLoader):
     def compose_node(self, parent: yaml.Node | None, index: int) -> yaml.Node | None:
         event: Any = self.peek_event()  # type: ignore[no-untyped-call]
         if isinstance(event, yaml.AliasEvent):
-            if event.anchor in self.anchors and event.anchor not in self._size_of:
-                raise _refusal(f"*{shorten(event.anchor)} stands inside what it stands for", event.start_mark)
-            self._count(self._size_of.get(event.anchor, 0), event.start_mark)
+            anchor = str(event.anchor)
+            if anchor in self.anchors and anchor not in self._size_of:
+                raise _refusal(f"*{shorten(anchor)} stands inside what it stands for", event.start_mark)
+            self._count(self._size_of.get(anchor, 0), event.start_mark)
             return super().compose_node(parent, index)
         if getattr(event, "tag", None) is not None:
             raise _refusal(f"{shorten(event.tag)}: tags are not used in a configuration", event.start_mark)

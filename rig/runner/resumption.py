@@ -8,8 +8,8 @@ from rig.data.run_file import RecordedSensor, RunData
 from rig.data.settings import RunSettings
 from rig.errors import Refused
 from rig.observation.observe import sound_sweeps
+from rig.observation.onboard_window import observed_sweeps
 from rig.plans.script_file import ScriptFile
-from rig.runner.onboard import observed_sweeps
 
 REMEDY = "Undo the change in config.yaml, or start a new run with `rig run`"
 

@@ -9,7 +9,9 @@ import socket
 import struct
 from collections.abc import Callable
 
-PATIENCE_S = 1.5  # a client that takes nothing for so long is not waited for until it has caught up: it is dead or hangs
+PATIENCE_S = (
+    1.5  # a client that takes nothing for so long is not waited for until it has caught up: it is dead or hangs
+)
 # A client that keeps only the newest packet must look at one before the next comes, so it is given some time after it
 # has taken one: so many times as long as it took of late, which grows with the load of the machine.
 LATENESS = 2.0

@@ -86,11 +86,12 @@ def test_a_board_that_computes_wrongly_fails_by_name(
 
 
 def test_a_board_without_a_solution_is_not_measured_and_fails(run: RunData) -> None:
-    for events in (
+    without: list[list[Event]] = [
         [],
-        observed(run, range(6)),
+        [*observed(run, range(6))],
         [*observed(run, range(6)), solved((0, 0, 0), (0, 0, 0), "not_converged")],
-    ):
+    ]
+    for events in without:
         checks = agreement([with_events(run, events)], "gyro").checks("gyro")
         assert [(check.value, check.passed) for check in checks] == [(None, False)] * 2
 
@@ -149,7 +150,7 @@ def test_a_board_that_averages_other_samples_than_it_says_fails(run: RunData) ->
 def test_a_sweep_the_board_missed_is_told(run: RunData) -> None:
     missed = BoardNotObserved("gyro", 5, "not_kept: too late")
     unsolved = solved((0.0, 0.0, 0.0), (0.0, 0.0, 0.0), "too_few_observations", sweeps=5)
-    events = [*observed(run, range(5)), missed, unsolved]
+    events: list[Event] = [*observed(run, range(5)), missed, unsolved]
     result = solve_runs([run])["gyro"]
     entry = sensor_entry(result, "calibrate", agreement([with_events(run, events)], "gyro"))
     console = Console(width=120, record=True)

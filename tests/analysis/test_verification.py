@@ -154,7 +154,7 @@ def test_a_wrong_calibration_is_seen_axis_by_axis() -> None:
     setup = replace(QUIET, mounting_error_rad=(0.0, 0.0, 0.0), rest_s=1.0)
     after = verify("gyro", KNOWN, [recording(setup, stored=wrong)]).after
     for turn in after.revolutions:
-        along = {"wrist_1": 1.0, "wrist_2": 0.0, "wrist_3": 0.0}[turn.joint_name]
+        along = {"wrist_1": 1.0, "wrist_2": 0.0, "wrist_3": 0.0}[str(turn.joint_name)]
         assert abs(turn.error_rad_s[0]) == pytest.approx(0.01 * TURN_RATE * along, abs=4e-4)
         assert turn.error_rad_s[1] == pytest.approx(0.003 * SCALE[1], abs=4e-4)
     assert after.movement.mean_rad_s[1] == pytest.approx(0.003 * SCALE[1], abs=2e-4)
@@ -177,7 +177,7 @@ def test_axes_that_are_not_at_right_angles_stay_an_error() -> None:
     expected = {"wrist_1": (0.0, 1.0), "wrist_2": (1.0, 0.0), "wrist_3": (0.0, 0.0)}
     for turn in found.after.revolutions:
         shares = np.abs(turn.error_rad_s[:2]) / (share / 2 * TURN_RATE)
-        np.testing.assert_allclose(shares, expected[turn.joint_name], atol=0.06)
+        np.testing.assert_allclose(shares, expected[str(turn.joint_name)], atol=0.06)
 
 
 def test_the_recordings_of_a_resumed_run_count_together() -> None:

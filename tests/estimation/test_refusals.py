@@ -205,7 +205,11 @@ def test_one_name_has_one_wording_whichever_estimator_refuses() -> None:
 
 
 def test_a_wrong_unit_is_named_alike_by_scale_factor_and_by_turn_rate() -> None:
-    for degrees_read in (lambda: check_unit(np.full(3, np.pi / 180)), lambda: check_reading_ratio(57.3, "sweep 1")):
+    doubtful: tuple[Callable[[], None], ...] = (
+        lambda: check_unit(np.full(3, np.pi / 180)),
+        lambda: check_reading_ratio(57.3, "sweep 1"),
+    )
+    for degrees_read in doubtful:
         with pytest.raises(Fault, match=r"wrong_unit: .*: the readings look like degrees per second given as rad/s"):
             degrees_read()
     with pytest.raises(Fault, match=r"wrong_unit: in sweep 1 the gyroscope reads 5 times .*: check range"):
