@@ -1,3 +1,39 @@
-"""A driver for a calibration rig: a robot arm turns a board of inertial sensors and solves for their calibration."""
+"""A driver for a calibration rig: a robot arm turns a board of inertial sensors and solves for their calibration.
+
+In a notebook:
+
+    import rig
+    run = rig.load("runs/2026-11-21T10-00-00Z-six_observation")   # a run folder or a run.h5
+    t, rate = run["gyro"].on_arm_clock()                          # (n,) s, (n, 3) rad/s
+    result = rig.solve(run)
+    result["gyro"].scale, result["gyro"].std
+    result.plot()
+    rig.compare(run, "gyro", "reference").plot()
+
+These names are the public ones; where they are made may change. To import them loads no arm driver.
+"""
+
+from typing import TYPE_CHECKING, Any
+
+if TYPE_CHECKING:
+    from rig.notebook.beside import compare
+    from rig.notebook.results import solve
+    from rig.notebook.runs import load
 
 __version__ = "0.1.0"
+__all__ = ["__version__", "compare", "load", "solve"]
+
+_PLACES = {"compare": "rig.notebook.beside", "load": "rig.notebook.runs", "solve": "rig.notebook.results"}
+
+
+def __getattr__(name: str) -> Any:
+    """The public functions, each imported when it is first asked for: the command line starts without them."""
+    if name not in _PLACES:
+        raise AttributeError(f"module {__name__!r} has no attribute {name!r}")
+    from importlib import import_module
+
+    return getattr(import_module(_PLACES[name]), name)
+
+
+def __dir__() -> list[str]:
+    return __all__

@@ -152,6 +152,11 @@ def _overridden(settings: RunSettings, item: str) -> RunSettings:
         raise Refused("wrong_setting", str(error), f"Give a number, as in {path.strip()}=0.001") from None
 
 
+def setting(key: str) -> str:
+    """The full path of a threshold or limit: `max_lost_fraction` is `observation.max_lost_fraction`."""
+    return next((path for path in _settable() if path.partition(".")[2] == key), key)
+
+
 def _settable() -> tuple[str, ...]:
     sections = {"observation": ObservationThresholds, "limits": Limits}
     return tuple(f"{name}.{field.name}" for name, section in sections.items() for field in fields(section))

@@ -1,12 +1,68 @@
-"""Which procedure a recording is of: what judges it again is what judged it when the run ended."""
+"""A run as it was recorded, and judged again by the procedure that judged it when it ended."""
 
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
 from pathlib import Path
 
-from rig.data.run_file import RunData
-from rig.data.run_folder import SCRIPT
+from rig.analysis.outcome import Outcome
+from rig.data.run_file import RunData, read_run
+from rig.data.run_folder import SCRIPT, recordings
 from rig.errors import Refused
 from rig.plans.registry import AnyProcedure, Readings, installed
 from rig.plans.script_file import load_script
+
+
+@dataclass(frozen=True, slots=True)
+class RecordedRun:
+    """The recordings of a run, oldest first: of `raw` readings, and of those the board `corrected`.
+
+    `path` is the run folder, or the run file when a recording stands `alone`.
+    """
+
+    path: Path
+    raw: tuple[RunData, ...]
+    corrected: tuple[RunData, ...]
+    alone: bool = False
+
+    @property
+    def movement(self) -> tuple[RunData, ...]:
+        """The recordings of the first movement."""
+        return self.raw or self.corrected
+
+    def judged_by(self, overrides: Sequence[str]) -> "RecordedRun":
+        """The same with other thresholds or limits, see `RunSettings.with_overrides`."""
+        raw, corrected = (tuple(run.judged_by(overrides) for run in runs) for runs in (self.raw, self.corrected))
+        return replace(self, raw=raw, corrected=corrected)
+
+
+def open_run(path: Path) -> RecordedRun:
+    """The recordings in a run folder, or a run file. Raises Refused `no_run`, and as `read_run`."""
+    if not path.is_dir():
+        run = read_run(path)
+        raw = readings_of(run) == "raw"
+        return RecordedRun(path, (run,) if raw else (), () if raw else (run,), alone=True)
+    raw_runs, corrected = (
+        tuple(read_run(file) for file in recordings(path, readings)) for readings in ("raw", "calibrated")
+    )
+    if not raw_runs and not corrected:
+        raise Refused("no_run", f"{path} holds no run.h5", "Give a run folder or a run file")
+    return RecordedRun(path, raw_runs, corrected)
+
+
+def judged(run: RecordedRun, estimator: str) -> Outcome:
+    """What a run says, phase after phase; one that was to follow and is missing has not passed.
+
+    Of a recording that stands alone it is what that recording says. Raises Fault and Refused by name as the
+    procedure's analysis does.
+    """
+    folder = run.path if run.path.is_dir() else run.path.parent
+    procedure = procedure_of(run.movement[0], folder)
+    outcome = procedure.analyse(run.movement, None, estimator)
+    if run.raw and run.corrected:
+        return procedure_of(run.corrected[0], folder).analyse(run.corrected, outcome, estimator)
+    if run.raw and not run.alone and run.raw[0].settings.then_verify and procedure.then is not None:
+        return installed()[procedure.then].analyse([], outcome, estimator)
+    return outcome
 
 
 def readings_of(run: RunData) -> Readings:
