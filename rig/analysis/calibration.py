@@ -1,6 +1,6 @@
 """From recordings to a calibration: the one path that a run and `rig solve` share, pure from end to end."""
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 from itertools import combinations
 from typing import Literal, TypeVar, get_args
@@ -8,7 +8,6 @@ from typing import Literal, TypeVar, get_args
 import numpy as np
 
 from rig.data.run_file import RecordedSensor, RunData
-from rig.data.settings import ObservationThresholds
 from rig.errors import Fault, Refused
 from rig.estimation.accumulator import Accumulator, SixObservationEstimator, Solution
 from rig.estimation.arrays import Array
@@ -17,7 +16,8 @@ from rig.estimation.levenberg_marquardt import LevenbergMarquardtSolution, solve
 from rig.estimation.refusals import check_duplicates
 from rig.estimation.vector_model import VectorSolution, solve_vector_model
 from rig.observation.average import Average
-from rig.observation.observe import Observation, SensorObservations, observe
+from rig.observation.observe import Observation, SensorObservations
+from rig.observation.observed_run import ObservedRun, observe_runs
 from rig.observation.timebase import TimeBase
 from rig.observation.windows import finished_sweeps
 
@@ -79,38 +79,41 @@ def known_estimator(name: str) -> Estimator:
 def solve_runs(runs: Sequence[RunData], estimator: str = DEFAULT_ESTIMATOR) -> dict[str, SensorResult]:
     """Calibrate every sensor from one recording, or from all recordings of a run that was resumed.
 
-    The thresholds are those of the first recording. Recordings without a finished sweep add nothing.
-    Whatever the estimator, the sweeps must bear the six-observation solution: a plan that lacks a direction is refused.
-    Raises Refused `unknown_estimator`, `different_sensors`; Fault as `observe` and the estimators do, and
-    `duplicated_observation`.
+    Raises as `observe_recordings` and `solve_observed` do.
     """
-    chosen = known_estimator(estimator)
+    chosen = known_estimator(estimator)  # before the work of observing
+    return solve_observed(runs[0].sensors, observe_recordings(runs), chosen)
+
+
+def observe_recordings(runs: Sequence[RunData]) -> tuple[ObservedRun, ...]:
+    """All recordings of one calibration; those without a finished sweep add nothing.
+
+    The thresholds are those of the first recording. Raises Refused `different_sensors`; Fault `duplicated_observation`
+    and as `observe_run` does.
+    """
     if any(run.sensors != runs[0].sensors for run in runs):
         raise Refused(
             "different_sensors",
             "the recordings do not describe the same sensors with the same settings",
             "Solve them one by one",
         )
-    settings = runs[0].settings.observation
     _check_recordings(runs)
+    return observe_runs(runs)
+
+
+def solve_observed(
+    sensors: Mapping[str, RecordedSensor], recordings: Sequence[ObservedRun], estimator: str = DEFAULT_ESTIMATOR
+) -> dict[str, SensorResult]:
+    """Calibrate each of `sensors` from all recordings.
+
+    Whatever the estimator, the sweeps must bear the six-observation solution: a plan that lacks a direction is refused.
+    Raises Refused `unknown_estimator`; Fault `duplicated_observation` and as the estimators do.
+    """
+    chosen = known_estimator(estimator)
     return {
-        name: _solve_sensor(sensor, observe_runs(runs, name, settings), chosen)
-        for name, sensor in runs[0].sensors.items()
+        name: _solve_sensor(sensor, [recording.sensors[name] for recording in recordings], chosen)
+        for name, sensor in sensors.items()
     }
-
-
-def observe_runs(runs: Sequence[RunData], sensor: str, settings: ObservationThresholds) -> list[SensorObservations]:
-    """What each recording with a finished sweep tells of a sensor; a sweep that several hold counts in the last one."""
-    return [
-        observe(run, sensor, settings, _repeated(runs[place + 1 :]))
-        for place, run in enumerate(runs)
-        if finished_sweeps(run)
-    ]
-
-
-def _repeated(later: Sequence[RunData]) -> frozenset[int]:
-    """The sweeps that later recordings of a run hold as well."""
-    return frozenset[int]().union(*map(finished_sweeps, later))
 
 
 def _solve_sensor(sensor: RecordedSensor, parts: Sequence[SensorObservations], estimator: Estimator) -> SensorResult:

@@ -12,12 +12,11 @@ import numpy as np
 from numpy.typing import NDArray
 
 from rig.analysis.alignment import mean_rates
-from rig.data.run_file import RunData
 from rig.errors import Fault
 from rig.estimation.arrays import Array
-from rig.observation.average import Stream, on_clock
-from rig.observation.observe import MIN_REST_SAMPLES, REST_SETTLING_S, Observation, SensorObservations
-from rig.observation.timebase import TimeBase
+from rig.observation.average import Stream
+from rig.observation.observe import MIN_REST_SAMPLES, REST_SETTLING_S, Observation
+from rig.observation.observed_run import Delay, ObservedRun
 from rig.observation.windows import Window, rested, swept
 
 MAX_DELAY_S = 0.2  # between the filters of two sensors; more means that their time stamps do not belong together
@@ -34,23 +33,9 @@ class Reference:
     bias_rad_s: Array
 
 
-@dataclass(frozen=True, slots=True)
-class Observed:
-    """One recording, and what it tells of the sensor under test and of the reference."""
-
-    run: RunData
-    tested: SensorObservations
-    known: SensorObservations
-
-
-def turns_of_sensor(recordings: Sequence[Observed]) -> list[Observation]:
-    """All revolutions as the sensor under test saw them."""
-    return [turn for seen in recordings for turn in seen.tested.revolutions]
-
-
-def turns_of_reference(recordings: Sequence[Observed]) -> list[Observation]:
-    """The same revolutions as the reference saw them."""
-    return [turn for seen in recordings for turn in seen.known.revolutions]
+def turns_of(sensor: str, recordings: Sequence[ObservedRun]) -> list[Observation]:
+    """All revolutions as a sensor saw them."""
+    return [turn for recording in recordings for turn in recording.sensors[sensor].revolutions]
 
 
 @dataclass(frozen=True, slots=True)
@@ -101,12 +86,12 @@ class Comparison:
     delay_std_s: tuple[float, ...]
 
 
-def compare(recordings: Sequence[Observed], sensor: str, reference: Reference, rotation: Array) -> Comparison:
+def compare(recordings: Sequence[ObservedRun], sensor: str, reference: Reference, rotation: Array) -> Comparison:
     """The readings of `sensor` as they were recorded beside the reference's; `rotation` (3, 3) turns the latter.
 
     Raises Fault `no_overlap`, `different_clocks`.
     """
-    parts = [_part(seen, sensor, reference, rotation) for seen in recordings]
+    parts = [_part(recording, sensor, reference, rotation) for recording in recordings]
     return Comparison(
         time_s=np.concatenate([part.time_s for part in parts]),
         reading_rad_s=np.concatenate([part.reading for part in parts]),
@@ -114,9 +99,9 @@ def compare(recordings: Sequence[Observed], sensor: str, reference: Reference, r
         movement=_deviation([part.error[part.sweeping | part.resting] for part in parts]),
         sweeps=_deviation([part.error[part.sweeping] for part in parts]),
         noise_rad_s=_noise([part.error[rest] for part in parts for rest in part.still]),
-        revolutions=_revolution_errors(recordings, reference, rotation),
-        delay_s=tuple(part.delay_s for part in parts),
-        delay_std_s=tuple(part.delay_std_s for part in parts),
+        revolutions=_revolution_errors(recordings, sensor, reference, rotation),
+        delay_s=tuple(part.delay.delay_s for part in parts),
+        delay_std_s=tuple(part.delay.std_s for part in parts),
     )
 
 
@@ -130,8 +115,7 @@ class _Part:
     sweeping: NDArray[np.bool_]
     resting: NDArray[np.bool_]
     still: tuple[NDArray[np.bool_], ...]
-    delay_s: float
-    delay_std_s: float
+    delay: Delay
 
     @property
     def error(self) -> Array:
@@ -139,12 +123,10 @@ class _Part:
         return difference
 
 
-def _part(seen: Observed, sensor: str, reference: Reference, rotation: Array) -> _Part:
-    run = seen.run
-    delay_s, delay_std_s = _delay(seen.tested.time_base, seen.known.time_base)
-    tested = on_clock(run.samples[sensor], run.sensors[sensor], seen.tested.time_base)
-    known = on_clock(run.samples[reference.name], run.sensors[reference.name], seen.known.time_base)
-    sweeps, rests = [finished.window for finished in swept(run)], list(rested(run))
+def _part(recording: ObservedRun, sensor: str, reference: Reference, rotation: Array) -> _Part:
+    delay = _delay(recording, sensor, reference.name)
+    tested, known = recording.stream(sensor), recording.stream(reference.name)
+    sweeps, rests = [finished.window for finished in swept(recording.run)], list(rested(recording.run))
     moving = _within(tested.time_s, Window(sweeps[0].start_s, max(window.end_s for window in [*sweeps, *rests])))
     used = moving & _surrounded(tested.time_s, known.time_s)
     if not used.sum() > MIN_COVERED * moving.sum():
@@ -163,25 +145,19 @@ def _part(seen: Observed, sensor: str, reference: Reference, rotation: Array) ->
         still=tuple(
             _within(time_s, Window(rest.start_s + REST_SETTLING_S, rest.end_s - REST_SETTLING_S)) for rest in rests
         ),
-        delay_s=delay_s,
-        delay_std_s=delay_std_s,
+        delay=delay,
     )
 
 
-def _delay(tested: TimeBase, known: TimeBase) -> tuple[float, float]:
-    """By how much the sensor lags the reference, and the standard deviation of that, s.
-
-    One clock stamps both, so what their time bases differ by is the filters' doing.
-    """
-    middle = np.array([known.reference_s])
-    delay_s = float(known.controller_time_s(middle)[0] - tested.controller_time_s(middle)[0])
-    if abs(delay_s) > MAX_DELAY_S:
+def _delay(recording: ObservedRun, sensor: str, reference: str) -> Delay:
+    found = recording.delay(sensor, behind=reference)
+    if abs(found.delay_s) > MAX_DELAY_S:
         raise Fault(
             "different_clocks",
-            f"the time stamps of sensor and reference are {abs(delay_s):.2f} s apart for one movement",
+            f"the time stamps of sensor and reference are {abs(found.delay_s):.2f} s apart for one movement",
             "Record both with the same board",
         )
-    return delay_s, float(np.hypot(known.offset_std_s, tested.offset_std_s))
+    return found
 
 
 def _within(time_s: Array, *windows: Window) -> NDArray[np.bool_]:
@@ -229,10 +205,10 @@ def _noise(rests: Sequence[Array]) -> Array | None:
 
 
 def _revolution_errors(
-    recordings: Sequence[Observed], reference: Reference, rotation: Array
+    recordings: Sequence[ObservedRun], sensor: str, reference: Reference, rotation: Array
 ) -> tuple[RevolutionError, ...]:
-    turns = turns_of_sensor(recordings)
-    tested, known = mean_rates(turns), mean_rates(turns_of_reference(recordings), reference).turned(rotation)
+    turns = turns_of(sensor, recordings)
+    tested, known = mean_rates(turns), mean_rates(turns_of(reference.name, recordings), reference).turned(rotation)
     errors = tested.rate_rad_s - known.rate_rad_s
     stds = np.sqrt(np.diagonal(tested.covariance_rad2_s2 + known.covariance_rad2_s2, axis1=1, axis2=2))
     return tuple(

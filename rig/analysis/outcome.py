@@ -7,13 +7,20 @@ from typing import Any, Literal
 
 import numpy as np
 
-from rig.analysis.calibration import DEFAULT_ESTIMATOR, SensorResult, solve_runs
+from rig.analysis.calibration import (
+    DEFAULT_ESTIMATOR,
+    SensorResult,
+    known_estimator,
+    observe_recordings,
+    solve_observed,
+)
 from rig.analysis.comparison import Reference
 from rig.analysis.onboard_check import Agreement, agreement
 from rig.analysis.verdict import Check, judge, verdict, verification_checks
 from rig.analysis.verification import Verification, verify
 from rig.data.run_file import RunData
 from rig.data.settings import RunSettings
+from rig.observation.observed_run import ObservedRun, observe_runs
 
 
 @dataclass(frozen=True, slots=True)
@@ -31,11 +38,12 @@ class Provenance:
 class Outcome:
     """What a run's recordings amount to, by sensor name.
 
-    `results` hold every recorded sensor's calibration and `onboard` the board's own of the sensors to calibrate; both
-    are empty where stored calibrations were verified. `verifications` hold those that could be made.
+    `recordings` are those of the calibration with a finished sweep. `results` hold every recorded sensor's calibration
+    and `onboard` the board's own of the sensors to calibrate; all three are empty where stored calibrations were
+    verified. `verifications` hold those that could be made.
     """
 
-    runs: tuple[RunData, ...]
+    recordings: tuple[ObservedRun, ...]
     settings: RunSettings
     results: Mapping[str, SensorResult]
     onboard: Mapping[str, Agreement]
@@ -70,10 +78,18 @@ def outcome_of(
 def verified(outcome: Outcome, repeated: Sequence[RunData]) -> Outcome:
     """The same with what `repeated`, the movement with calibrated readings, says of it.
 
-    Without such a recording the checks of the verification fail. Raises Fault as `verify` does.
+    Without such a recording the checks of the verification fail. Raises Fault as `observe_runs` and `verify` do.
     """
     settings = outcome.settings
-    found = {name: _verification(name, outcome, repeated) for name in settings.to_calibrate}
+    known = settings.reference
+    found: dict[str, Verification | None] = dict.fromkeys(settings.to_calibrate)
+    if repeated and known is not None:
+        after = observe_runs(repeated)
+        reference = Reference(known.name, np.array(known.scale), np.array(known.bias_rad_s))
+        found = {
+            name: verify(name, reference, after, outcome.recordings, outcome.results.get(name))
+            for name in settings.to_calibrate
+        }
     checks = [check for name, each in found.items() for check in verification_checks(name, each, settings.limits)]
     return replace(
         outcome,
@@ -89,11 +105,13 @@ def verified(outcome: Outcome, repeated: Sequence[RunData]) -> Outcome:
 
 def _calibrated(runs: Sequence[RunData], estimator: str) -> Outcome:
     settings = runs[0].settings
-    results = solve_runs(runs, estimator)
+    chosen = known_estimator(estimator)
+    recordings = observe_recordings(runs)
+    results = solve_observed(runs[0].sensors, recordings, chosen)
     onboard = {name: agreement(runs, name) for name in settings.to_calibrate}
     checks = judge({name: results[name].solution for name in onboard}, settings.limits)
     return Outcome(
-        runs=tuple(runs),
+        recordings=recordings,
         settings=settings,
         results=results,
         onboard=onboard,
@@ -122,12 +140,3 @@ def _stored(run: RunData) -> Mapping[str, Any]:
     """The calibrations by which the board corrected its readings."""
     stored: Mapping[str, Any] = run.provenance.get("stored_calibrations", {})
     return stored
-
-
-def _verification(name: str, outcome: Outcome, repeated: Sequence[RunData]) -> Verification | None:
-    """What the repeated movement says of one sensor; None when there was none, or nothing to compare with."""
-    reference = outcome.settings.reference
-    if not repeated or reference is None:
-        return None
-    known = Reference(reference.name, np.array(reference.scale), np.array(reference.bias_rad_s))
-    return verify(name, known, repeated, outcome.runs, outcome.results.get(name))

@@ -10,10 +10,10 @@ from dataclasses import dataclass
 import numpy as np
 
 from rig.analysis.alignment import Calibration, RelativeRotation, mean_rates, relative_rotation
-from rig.analysis.calibration import observe_runs
-from rig.analysis.comparison import Comparison, Observed, Reference, compare, turns_of_reference, turns_of_sensor
+from rig.analysis.comparison import Comparison, Reference, compare, turns_of
 from rig.data.run_file import RunData
 from rig.errors import Fault
+from rig.observation.observed_run import ObservedRun
 from rig.observation.windows import finished_sweeps
 
 
@@ -36,48 +36,39 @@ class Verification:
 def verify(
     sensor: str,
     reference: Reference,
-    after: Sequence[RunData],
-    before: Sequence[RunData] = (),
+    after: Sequence[ObservedRun],
+    before: Sequence[ObservedRun] = (),
     calibration: Calibration | None = None,
 ) -> Verification:
     """Judge the readings that the board has calibrated (`after`) by the reference beside it.
 
     `before` are the recordings of raw readings that the `calibration` was made from; they tell how the two sensors sit
-    to each other. Without them `after` itself tells it. The thresholds are those of the first recording.
+    to each other. Without them `after` itself tells it.
 
     Raises Fault `sensor_missing`, `wrong_mode`, `nothing_to_compare`, `incomplete_verification`, `no_overlap`,
-    `different_clocks`, and as `observe` and `relative_rotation` do.
+    `different_clocks`, and as `relative_rotation` does.
     """
-    repeated = _observed(after, sensor, reference, "calibrated")
-    _check_complete(after)
-    made = _observed(before, sensor, reference, "raw") if before else []
-    described = after[0].sensors
+    if not after:
+        raise Fault("nothing_to_compare", "no sweep was finished in the recording", "Let the whole movement finish")
+    for recordings, readings in ((after, "calibrated"), (before, "raw")):
+        for recording in recordings:
+            _check_recorded(recording.run, sensor, readings)
+            _check_recorded(recording.run, reference.name, "raw")
+    _check_complete([recording.run for recording in after])
+    described = after[0].run.sensors
     rotation = relative_rotation(
-        mean_rates(turns_of_sensor(made or repeated), calibration if made else None),
-        mean_rates(turns_of_reference(made or repeated), reference),
+        mean_rates(turns_of(sensor, before or after), calibration if before else None),
+        mean_rates(turns_of(reference.name, before or after), reference),
         np.array(described[sensor].mounting) @ np.array(described[reference.name].mounting).T,
     )
     return Verification(
         sensor,
         reference,
-        _against_the_arm(repeated, reference),
+        _against_the_arm(after, reference),
         rotation,
-        compare(made, sensor, reference, rotation.matrix) if made else None,
-        compare(repeated, sensor, reference, rotation.matrix),
+        compare(before, sensor, reference, rotation.matrix) if before else None,
+        compare(after, sensor, reference, rotation.matrix),
     )
-
-
-def _observed(runs: Sequence[RunData], sensor: str, reference: Reference, mode: str) -> list[Observed]:
-    """The recordings that hold a finished sweep, of which there must be one."""
-    for run in runs:
-        _check_recorded(run, sensor, mode)
-        _check_recorded(run, reference.name, "raw")
-    useful = [run for run in runs if finished_sweeps(run)]
-    if not useful:
-        raise Fault("nothing_to_compare", "no sweep was finished in the recording", "Let the whole movement finish")
-    settings = runs[0].settings.observation
-    tested, known = (observe_runs(runs, name, settings) for name in (sensor, reference.name))
-    return [Observed(*seen) for seen in zip(useful, tested, known, strict=True)]
 
 
 def _check_complete(runs: Sequence[RunData]) -> None:
@@ -92,11 +83,11 @@ def _check_complete(runs: Sequence[RunData]) -> None:
         )
 
 
-def _against_the_arm(recordings: Sequence[Observed], reference: Reference) -> float:
+def _against_the_arm(recordings: Sequence[ObservedRun], reference: Reference) -> float:
     """How far the reference is off at most, by what the arm did; magnitudes, for its mounting does not matter here."""
-    turns = turns_of_reference(recordings)
+    turns = turns_of(reference.name, recordings)
     of_turns = np.linalg.norm(mean_rates(turns, reference).rate_rad_s, axis=1) - [turn.speed_rad_s for turn in turns]
-    means = [rest.mean_rad_s for seen in recordings for rest in seen.known.rests]
+    means = [rest.mean_rad_s for seen in recordings for rest in seen.sensors[reference.name].rests]
     of_rests = np.linalg.norm(reference.scale * (np.reshape(means, (-1, 3)) + reference.bias_rad_s), axis=1)
     return float(np.abs([*of_turns, *of_rests]).max())
 

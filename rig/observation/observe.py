@@ -61,17 +61,17 @@ class SensorObservations:
     rests: tuple[Average, ...]
 
 
-def observe(
-    run: RunData, sensor: str, settings: ObservationThresholds, superseded: Collection[int] = ()
+def observe_sensor(
+    run: RunData, sensor: str, motion: ArmMotion, settings: ObservationThresholds, superseded: Collection[int] = ()
 ) -> SensorObservations:
-    """Average every finished sweep of a recording. An interrupted sweep has no `sweep_finished` and is left out.
+    """Average every finished sweep of a recording, in which the arm moved by `motion`.
 
-    So are the sweeps whose index is in `superseded`: a later recording of the same run repeats them.
+    An interrupted sweep has no end in the recording and is left out. So are the sweeps whose index is in `superseded`:
+    a later recording of the same run repeats them.
     Raises Fault `incomplete_revolution`, `arm_states_lost`, `slider_below_100`, `speed_not_constant`,
     `other_joint_moved`, `lost_samples`, `saturation`, `stuck_sensor`, `stuck_axis`, `wrong_axis`, `wrong_sign`,
-    `wrong_unit`, `no_motion`, `not_finite`, `time_base_not_found`, `board_clock_restarted`, `duplicated_samples`.
+    `wrong_unit`, `not_finite`, `time_base_not_found`, `board_clock_restarted`, `duplicated_samples`.
     """
-    motion = ArmMotion(run.arm)
     stream = on_the_arms_clock(run.samples[sensor], run.sensors[sensor], motion)
     revolutions = [
         _revolution(stream, motion, finished, settings)
@@ -94,14 +94,18 @@ def nearest_axis(vector: Array) -> tuple[str, int]:
 
 
 def sound_sweeps(run: RunData, settings: ObservationThresholds) -> frozenset[int]:
-    """Those of the finished sweeps that `observe` accepts for every sensor: a resumed run need not repeat them."""
-    return frozenset.intersection(finished_sweeps(run), *(_sound_for(run, sensor, settings) for sensor in run.sensors))
-
-
-def _sound_for(run: RunData, sensor: str, settings: ObservationThresholds) -> frozenset[int]:
-    sound = set()
+    """The finished sweeps that `observe_sensor` accepts for every sensor: a resumed run need not repeat them."""
     try:
         motion = ArmMotion(run.arm)
+    except Fault:
+        return frozenset()
+    sound = (_sound_for(run, sensor, motion, settings) for sensor in run.sensors)
+    return frozenset.intersection(finished_sweeps(run), *sound)
+
+
+def _sound_for(run: RunData, sensor: str, motion: ArmMotion, settings: ObservationThresholds) -> frozenset[int]:
+    sound = set()
+    try:
         stream = on_the_arms_clock(run.samples[sensor], run.sensors[sensor], motion)
     except Fault:
         return frozenset()

@@ -18,6 +18,7 @@ from rig.data.run_file import RunData
 from rig.data.settings import Limits
 from rig.errors import Fault
 from rig.estimation.arrays import Array
+from rig.observation.observed_run import observe_runs
 from rig.observation.windows import rested
 from rig.report.figures import draw_verifications
 from rig.report.verification_entry import verification_entry
@@ -34,7 +35,8 @@ CALIBRATION = solve_runs([MADE])["gyro"].solution
 REPEATED = recording(
     replace(QUIET, seed=2, boot_s=33.0), stored=Stored(CALIBRATION.scale, CALIBRATION.bias_rad_s), lag_s=0.004
 )
-FOUND = verify("gyro", KNOWN, [REPEATED], [MADE], CALIBRATION)
+SEEN_BEFORE, SEEN = observe_runs([MADE]), observe_runs([REPEATED])
+FOUND = verify("gyro", KNOWN, SEEN, SEEN_BEFORE, CALIBRATION)
 
 
 def rotation(vector: tuple[float, ...]) -> Array:
@@ -58,7 +60,7 @@ def test_how_the_two_sensors_sit_to_each_other_is_found_within_its_uncertainty()
     for seed in range(6):
         setup = replace(QUIET, seed=seed, noise_rad_s=0.02, rest_s=0.5, speed_deg_s=120.0)
         run = recording(setup, stored=TRUTH)
-        found = verify("gyro", KNOWN, [run]).rotation
+        found = verify("gyro", KNOWN, observe_runs([run])).rotation
         deviations.append(departure(found.matrix) / found.std_rad)
         assert np.linalg.norm(found.vector_rad) == pytest.approx(np.linalg.norm(found.from_nominal_rad))
     assert 0.6 < np.sqrt(np.mean(np.square(deviations))) < 1.5
@@ -69,11 +71,11 @@ def test_the_rotation_is_told_by_the_calibration_where_there_is_one() -> None:
     """Its revolutions, corrected, fit the reference's to within their noise; nothing is taken from the repetition."""
     assert np.all(np.abs(departure(FOUND.rotation.matrix)) < 4 * FOUND.rotation.std_rad)
     assert np.abs(FOUND.rotation.residuals_rad_s).max() < 4e-4
-    assert not np.array_equal(FOUND.rotation.matrix, verify("gyro", KNOWN, [REPEATED]).rotation.matrix)
+    assert not np.array_equal(FOUND.rotation.matrix, verify("gyro", KNOWN, SEEN).rotation.matrix)
 
 
 def test_a_verification_without_its_calibration_has_no_before() -> None:
-    alone = verify("gyro", KNOWN, [REPEATED])
+    alone = verify("gyro", KNOWN, SEEN)
     assert alone.before is None
     np.testing.assert_allclose(alone.after.movement.rms_rad_s, FOUND.after.movement.rms_rad_s, rtol=1e-3)
 
@@ -100,7 +102,7 @@ def before(scale: tuple[float, ...], bias_rad_s: tuple[float, ...]) -> Array:
     known = replace(REFERENCE, noise_rad_s=0.0, mounting_error_rad=(0.0, 0.0, 0.0))
     true = Stored(np.array(scale), np.array(bias_rad_s))
     after = recording(plain, reference=known, stored=true)
-    found = verify("gyro", KNOWN, [after], [recording(plain, reference=known)], true).before
+    found = verify("gyro", KNOWN, observe_runs([after]), observe_runs([recording(plain, reference=known)]), true).before
     assert found is not None
     return found.movement.mse_rad2_s2
 
@@ -152,7 +154,7 @@ def test_over_whole_turns_the_noise_averages_out() -> None:
 def test_a_wrong_calibration_is_seen_axis_by_axis() -> None:
     wrong = Stored(TRUTH.scale * [1.01, 1.0, 1.0], TRUTH.bias_rad_s + np.array([0.0, 0.003, 0.0]))
     setup = replace(QUIET, mounting_error_rad=(0.0, 0.0, 0.0), rest_s=1.0)
-    after = verify("gyro", KNOWN, [recording(setup, stored=wrong)]).after
+    after = verify("gyro", KNOWN, observe_runs([recording(setup, stored=wrong)])).after
     for turn in after.revolutions:
         along = {"wrist_1": 1.0, "wrist_2": 0.0, "wrist_3": 0.0}[str(turn.joint_name)]
         assert abs(turn.error_rad_s[0]) == pytest.approx(0.01 * TURN_RATE * along, abs=4e-4)
@@ -173,7 +175,7 @@ def test_axes_that_are_not_at_right_angles_stay_an_error() -> None:
     share = 0.01
     askew = np.array([[1.0, share, 0.0], [0.0, 1.0, 0.0], [0.0, 0.0, 1.0]])
     setup = replace(QUIET, mounting_error_rad=(0.0, 0.0, 0.0), rest_s=1.0)
-    found = verify("gyro", KNOWN, [recording(setup, stored=TRUTH, axes=askew)])
+    found = verify("gyro", KNOWN, observe_runs([recording(setup, stored=TRUTH, axes=askew)]))
     expected = {"wrist_1": (0.0, 1.0), "wrist_2": (1.0, 0.0), "wrist_3": (0.0, 0.0)}
     for turn in found.after.revolutions:
         shares = np.abs(turn.error_rad_s[:2]) / (share / 2 * TURN_RATE)
@@ -189,7 +191,8 @@ def test_the_recordings_of_a_resumed_run_count_together() -> None:
         return replace(MADE, events=tuple(kept))
 
     assert FOUND.before is not None
-    resumed = verify("gyro", KNOWN, [REPEATED], [part(range(2)), part(range(0)), part(range(2, 6))], CALIBRATION)
+    parts = observe_runs([part(range(2)), part(range(0)), part(range(2, 6))])
+    resumed = verify("gyro", KNOWN, SEEN, parts, CALIBRATION)
     assert resumed.before is not None
     assert len(resumed.before.delay_s) == 2
     assert resumed.before.movement.samples == FOUND.before.movement.samples
@@ -236,17 +239,17 @@ REFUSALS: dict[str, tuple[str, Callable[[RunData], RunData]]] = {
 def test_recordings_that_cannot_be_compared_are_refused_by_name(name: str) -> None:
     error, spoil = REFUSALS[name]
     with pytest.raises(Fault, match=error):
-        verify("gyro", KNOWN, [spoil(REPEATED)])
+        verify("gyro", KNOWN, observe_runs([spoil(REPEATED)]))
 
 
 def test_one_wrist_does_not_tell_how_the_sensors_sit() -> None:
     with pytest.raises(Fault, match="rank_deficient"):
-        verify("gyro", KNOWN, [REPEATED], [one_wrist(MADE)], TRUTH)
+        verify("gyro", KNOWN, SEEN, observe_runs([one_wrist(MADE)]), TRUTH)
 
 
 def test_the_calibration_s_recording_must_be_raw() -> None:
     with pytest.raises(Fault, match="wrong_mode"):
-        verify("gyro", KNOWN, [REPEATED], [REPEATED], CALIBRATION)
+        verify("gyro", KNOWN, SEEN, SEEN, CALIBRATION)
 
 
 def limits(rms: float | None, mean: float | None) -> Limits:
@@ -283,7 +286,7 @@ def test_the_worst_axis_and_the_worst_revolution_are_judged() -> None:
 def test_a_reference_that_misses_the_arm_is_blamed_itself(scale: float, bias_rad_s: float, error_rad_s: float) -> None:
     """A turntable's values mistyped, or a reference that has aged: the sensor differs from it, but not from the arm."""
     reference = Reference("reference", KNOWN.scale * scale, KNOWN.bias_rad_s + np.array([bias_rad_s, 0.0, 0.0]))
-    found = verify("gyro", reference, [REPEATED], [MADE], CALIBRATION)
+    found = verify("gyro", reference, SEEN, SEEN_BEFORE, CALIBRATION)
     assert found.reference_error_rad_s == pytest.approx(error_rad_s, abs=5e-4)
     checks = {check.name: check.passed for check in verification_checks("gyro", found, limits(1.0, 0.01))}
     assert checks["gyro.verification_reference"] == (error_rad_s < 0.01)

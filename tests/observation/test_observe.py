@@ -14,7 +14,8 @@ from rig.data.events import Event, SweepFinished, SweepStarted
 from rig.data.run_file import RunData
 from rig.data.settings import ObservationThresholds
 from rig.errors import Fault, Refused
-from rig.observation.observe import SensorObservations, observe
+from rig.observation.observe import SensorObservations
+from rig.observation.observed_run import observe_run
 from rig.observation.timebase import ArmMotion, TimeBase, estimate_time_base, widening
 from rig.observation.windows import swept
 from rig.report.sensor_entry import sensor_entry
@@ -37,7 +38,7 @@ SETTINGS = USUAL.settings.observation
 
 
 def look(run: RunData, settings: ObservationThresholds = SETTINGS) -> SensorObservations:
-    return observe(run, "gyro", settings)
+    return observe_run(run, settings).sensors["gyro"]
 
 
 def clock_errors(setup: Setup, clock: TimeBase) -> tuple[float, float]:

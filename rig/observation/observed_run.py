@@ -1,0 +1,68 @@
+"""A recording and all it tells: the arm's motion, and of each sensor its time, its revolutions and its rests."""
+
+from collections.abc import Collection, Mapping, Sequence
+from dataclasses import dataclass
+
+import numpy as np
+
+from rig.data.run_file import RunData
+from rig.data.settings import ObservationThresholds
+from rig.observation.average import Stream, on_clock
+from rig.observation.observe import SensorObservations, observe_sensor
+from rig.observation.timebase import ArmMotion
+from rig.observation.windows import finished_sweeps
+
+
+@dataclass(frozen=True, slots=True)
+class Delay:
+    """By how much one sensor's filter lags another's, s, and the standard deviation of that."""
+
+    delay_s: float
+    std_s: float
+
+
+@dataclass(frozen=True, slots=True)
+class ObservedRun:
+    """One recording, observed once; `sensors` by name."""
+
+    run: RunData
+    motion: ArmMotion
+    sensors: Mapping[str, SensorObservations]
+
+    def stream(self, sensor: str) -> Stream:
+        """A sensor's samples in rad/s on the arm's clock."""
+        return on_clock(self.run.samples[sensor], self.run.sensors[sensor], self.sensors[sensor].time_base)
+
+    def delay(self, sensor: str, behind: str) -> Delay:
+        """By how much `sensor` lags the sensor `behind`.
+
+        The board's one clock stamps the samples of both, so what their time bases differ by is their filters' doing.
+        """
+        late, known = self.sensors[sensor].time_base, self.sensors[behind].time_base
+        middle = np.array([known.reference_s])
+        delay_s = float(known.controller_time_s(middle)[0] - late.controller_time_s(middle)[0])
+        return Delay(delay_s, float(np.hypot(known.offset_std_s, late.offset_std_s)))
+
+
+def observe_run(run: RunData, thresholds: ObservationThresholds, superseded: Collection[int] = ()) -> ObservedRun:
+    """Observe every sensor of a recording; raises Fault as `ArmMotion` and `observe_sensor` do."""
+    motion = ArmMotion(run.arm)
+    sensors = {name: observe_sensor(run, name, motion, thresholds, superseded) for name in run.sensors}
+    return ObservedRun(run, motion, sensors)
+
+
+def observe_runs(runs: Sequence[RunData]) -> tuple[ObservedRun, ...]:
+    """Every recording of one run that holds a finished sweep; a sweep that several hold counts in the last one.
+
+    The thresholds are those of the first recording. Raises Fault as `observe_run` does.
+    """
+    return tuple(
+        observe_run(run, runs[0].settings.observation, _repeated(runs[place + 1 :]))
+        for place, run in enumerate(runs)
+        if finished_sweeps(run)
+    )
+
+
+def _repeated(later: Sequence[RunData]) -> frozenset[int]:
+    """The sweeps that later recordings of a run hold as well."""
+    return frozenset[int]().union(*map(finished_sweeps, later))
