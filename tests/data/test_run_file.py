@@ -14,10 +14,23 @@ import h5py
 import numpy as np
 import pytest
 
+from firmware_host.answers import BoardObservation, BoardSolution
 from firmware_host.samples import SAMPLE_DTYPE
+from rig.arm.motion import Sweep
 from rig.arm.state import ARM_STATE_DTYPE, ArmState
+from rig.data.events import (
+    BoardNotObserved,
+    BoardObserved,
+    BoardRecalled,
+    BoardSolved,
+    Event,
+    RestFinished,
+    RestStarted,
+    SweepFinished,
+    SweepStarted,
+)
 from rig.data.run_file import RecordedSensor, RunRecorder, make_plain, read_run
-from rig.data.settings import KnownReference, Limits, ObservationThresholds, PlannedSweep, RunSettings
+from rig.data.settings import Limits, ObservationThresholds, PlannedSweep, RunSettings
 from rig.errors import Fault, Refused
 from support.paths import ROOT
 
@@ -38,12 +51,38 @@ SETTINGS = RunSettings(
     observation=ObservationThresholds(0.001, 0.25, 20.0),
     limits=Limits(0.3, 0.002, 0.1, 0.002, 100.0),
     to_calibrate=("gyro",),
-    reference=KnownReference("reference", (1.0, 1.001, 0.999), (0.0, -1e-5, 2e-4)),
+    reference=None,
     home_q_rad=(0.0, -1.5, 1.5, -1.5, -1.5, 0.0),
     planned_sweeps=(PlannedSweep(0, "wrist_3", "cw", 1.0),),
 )
+SWEEP = Sweep(
+    index=0,
+    joint=5,
+    joint_name="wrist_3",
+    direction="cw",
+    axis_flange=(0.0, 0.0, -1.0),
+    start_q_rad=(0.0, -1.5, 1.5, -1.5, -1.5, 3.6),
+    end_q_rad=(0.0, -1.5, 1.5, -1.5, -1.5, -3.6),
+    speed_rad_s=1.0,
+    acceleration_rad_s2=4.0,
+    duration_s=7.6,
+    revolution_rad=(-np.pi, np.pi),
+)
+EVENTS: tuple[Event, ...] = (
+    SweepStarted(SWEEP),
+    SweepFinished(SWEEP),
+    BoardObserved("gyro", 0, 1.001, BoardObservation(0, 1_000_000, 7_000_000, 1400, (0.1, -0.2, -1.0))),
+    BoardNotObserved("gyro", 1, "µ\n" * 400),
+    BoardRecalled("gyro", 2),
+    BoardSolved("gyro", BoardSolution("closed_form", "solved", 6, 1, (1.1, 1.2, 0.9), (0.01, 0.0, -0.02))),
+)
 CONFIG = "arm: {host: 192.0.2.1}\n# °\n"
-PROVENANCE = {"rig": "0.1.0", "board": {"unique_id": "0123"}}
+PROVENANCE = {
+    "started_utc": "2026-11-21T00:00:00+00:00",
+    "board_unique_id": "0123",
+    "arm_serial_number": "2026",
+    "sensor_serial_numbers": {"gyro": "LSM9DS1-001"},
+}
 TICK_S = 0.01
 
 
@@ -70,14 +109,15 @@ def some_state(number: int) -> ArmState:
 def test_everything_comes_back_as_it_was_added(tmp_path: Path) -> None:
     path = tmp_path / "run.h5"
     with recorder(path, "gyro", "reference") as recording:
-        recording.add_event("run_started")
+        recording.add(RestStarted())
         recording.add_samples("gyro", some_samples(0, 3000))
         recording.add_samples("reference", some_samples(7, 5))
         states = [some_state(number) for number in range(1200)]
         for state in states:
             recording.add_arm_state(state)
-        recording.add_event("sweep_started", sweep={"index": 0, "axis_flange": (0.0, 0.0, -1.0), "name": "µ\n" * 400})
-        recording.add_event("sweep_finished", controller_time_s=123.5)
+        for event in EVENTS:
+            recording.add(event)
+        recording.add(RestFinished(), controller_time_s=123.5)
         recording.check()
     run = read_run(path)
     assert (run.config, run.settings, run.provenance) == (CONFIG, SETTINGS, PROVENANCE)
@@ -85,10 +125,10 @@ def test_everything_comes_back_as_it_was_added(tmp_path: Path) -> None:
     np.testing.assert_array_equal(run.samples["gyro"]["counts"], some_samples(0, 3000)["counts"])
     assert run.samples["reference"]["board_time_us"][0] == 2**40 + 7 * 4202
     np.testing.assert_array_equal(run.arm, np.array([state.to_record() for state in states], ARM_STATE_DTYPE))
-    started, sweep, finished = run.events
-    assert (started.name, started.controller_time_s) == ("run_started", None)
-    assert sweep.controller_time_s == states[-1].time_s  # the arm's time when it happened
-    assert sweep.detail == {"sweep": {"index": 0, "axis_flange": [0.0, 0.0, -1.0], "name": "µ\n" * 400}}
+    assert [recorded.event for recorded in run.events] == [RestStarted(), *EVENTS, RestFinished()]
+    started, *others, finished = run.events
+    assert started.controller_time_s is None
+    assert {other.controller_time_s for other in others} == {states[-1].time_s}  # the arm's time when it happened
     assert finished.controller_time_s == 123.5
     with h5py.File(path, "r") as file:  # any HDF5 tool opens it
         assert file.attrs["schema"] == "rig.run/2"
@@ -138,7 +178,7 @@ def record_until_killed(path: Path, report: Connection) -> None:
         recording.add_samples("gyro", some_samples(10 * tick, 10))
         for number in range(5 * tick, 5 * tick + 5):
             recording.add_arm_state(some_state(number))
-        recording.add_event("tick", number=tick)
+        recording.add(BoardRecalled("gyro", tick))
         tick += 1
         report.send((time.monotonic(), tick))
         time.sleep(max(0.0, begun + tick * TICK_S - time.monotonic()))
@@ -197,7 +237,8 @@ def check_killed(path: Path, ticks: int) -> None:
     np.testing.assert_array_equal(samples["sequence"], np.arange(len(samples)))
     np.testing.assert_array_equal(samples["counts"], np.arange(len(samples))[:, None] * [1, -2, 3])
     np.testing.assert_allclose(arm["time_s"], 100 + 0.002 * np.arange(len(arm)))
-    assert [event.detail["number"] for event in run.events] == list(range(len(run.events)))
+    expected = [BoardRecalled("gyro", tick) for tick in range(len(run.events))]
+    assert [recorded.event for recorded in run.events] == expected
 
 
 FULL_DISK = """
@@ -242,7 +283,7 @@ def test_a_torn_end_is_left_out(tmp_path: Path) -> None:
     path = tmp_path / "run.h5"
     with recorder(path) as recording:
         recording.add_samples("gyro", some_samples(0, 50))
-        recording.add_event("whole")
+        recording.add(RestStarted())
     with h5py.File(path, "r+") as file:
         samples, events = file["samples/gyro"], file["events"]
         samples.resize((60,))  # rows that were announced and never written
@@ -250,4 +291,4 @@ def test_a_torn_end_is_left_out(tmp_path: Path) -> None:
         events[-20:-10] = np.frombuffer(b'{"name": "', "u1")
     run = read_run(path)
     assert len(run.samples["gyro"]) == 49  # the last row before the hole may be half a row
-    assert [event.name for event in run.events] == ["whole"]
+    assert [recorded.event for recorded in run.events] == [RestStarted()]

@@ -1,0 +1,199 @@
+"""Whatever has become of a run file: it is read, or refused by name. Nothing hangs, nothing ends in a traceback."""
+
+import json
+import re
+import shutil
+import subprocess
+import sys
+import time
+from collections.abc import Callable
+from pathlib import Path
+from typing import Any
+
+import h5py
+import numpy as np
+import pytest
+
+from rig.analysis.outcome import outcome_of
+from rig.data.run_file import read_run
+from rig.errors import Fault, Refused
+from support.paths import ROOT
+
+RECORDING = ROOT / "tests" / "fixtures" / "af3b9f0" / "calibration" / "run.h5"
+TIMEOUT_S = 5.0
+METADATA_BYTES = 12_000  # where a run file's first structures lie
+DAMAGES = 24
+
+
+@pytest.fixture
+def recording(tmp_path: Path) -> Path:
+    return Path(shutil.copy(RECORDING, tmp_path / "run.h5"))
+
+
+def refused(path: Path) -> str:
+    with pytest.raises(Refused) as refusal:
+        read_run(path, TIMEOUT_S)
+    assert refusal.value.name == "not_a_run_file"
+    assert "\n" not in str(refusal.value)
+    assert len(str(refusal.value)) < 700
+    return str(refusal.value)
+
+
+def cut(data: bytearray, random: np.random.Generator) -> bytearray:
+    return data[: int(random.integers(1, len(data)))]
+
+
+def scratched(data: bytearray, random: np.random.Generator) -> bytearray:
+    for place in random.integers(0, len(data), 20):
+        data[place] = int(random.integers(256))
+    return data
+
+
+def scratched_structures(data: bytearray, random: np.random.Generator) -> bytearray:
+    for place in random.integers(0, METADATA_BYTES, 3):
+        data[place] ^= 1 << int(random.integers(8))
+    return data
+
+
+def overwritten(data: bytearray, random: np.random.Generator) -> bytearray:
+    start = int(random.integers(len(data)))
+    data[start : start + 4096] = bytes(min(4096, len(data) - start))
+    return data
+
+
+@pytest.mark.parametrize("damage", [cut, scratched, scratched_structures, overwritten])
+@pytest.mark.parametrize("seed", range(DAMAGES // 4))
+@pytest.mark.filterwarnings("ignore::RuntimeWarning")  # of NumPy, about numbers that never were any
+def test_a_damaged_recording_is_refused_by_name_or_solved(
+    tmp_path: Path, damage: Callable[[bytearray, np.random.Generator], bytearray], seed: int
+) -> None:
+    path = tmp_path / "run.h5"
+    path.write_bytes(damage(bytearray(RECORDING.read_bytes()), np.random.default_rng(seed)))
+    try:
+        outcome_of([read_run(path, TIMEOUT_S)])
+    except (Refused, Fault) as error:
+        assert error.name
+
+
+def test_a_recording_cut_short_is_said_to_be(recording: Path) -> None:
+    size = recording.stat().st_size
+    recording.write_bytes(recording.read_bytes()[:100])
+    assert f"cut short: 100 of its {size} bytes" in refused(recording)
+
+
+def test_a_recording_whose_reading_does_not_end_is_given_up(recording: Path) -> None:
+    """A file that nobody closed is read as one that grows, where the library waits for torn structures to be whole."""
+    data = bytearray(recording.read_bytes())
+    data[11] |= 0x05  # as if its writer had been killed
+    recording.write_bytes(data[:5000])
+    begun = time.monotonic()
+    with pytest.raises(Refused, match="not_a_run_file"):
+        read_run(recording, 1.0)
+    assert time.monotonic() - begun < 10
+
+
+def test_a_signal_ends_the_reading(recording: Path) -> None:
+    data = bytearray(recording.read_bytes())
+    data[11] |= 0x05
+    recording.write_bytes(data[:5000])
+    process = subprocess.Popen([sys.executable, "-m", "rig", "solve", str(recording)], stderr=subprocess.PIPE)
+    time.sleep(1.5)
+    process.terminate()
+    _, said = process.communicate(timeout=10)
+    assert (process.returncode, said) == (130, b"rig: interrupted\n")
+
+
+def attribute(name: str, value: object, place: str = "/") -> Callable[[h5py.File], None]:
+    def change(file: h5py.File) -> None:
+        file[place].attrs[name] = value
+
+    return change
+
+
+def without(name: str) -> Callable[[h5py.File], None]:
+    def change(file: h5py.File) -> None:
+        del file[name]
+
+    return change
+
+
+def instead(name: str, make: Callable[[h5py.File, str], object]) -> Callable[[h5py.File], None]:
+    def change(file: h5py.File) -> None:
+        del file[name]
+        make(file, name)
+
+    return change
+
+
+def rows(dtype: object, shape: tuple[int, ...] = (10,)) -> Callable[[h5py.File, str], object]:
+    return lambda file, name: file.create_dataset(name, shape, dtype)
+
+
+def linked(file: h5py.File, name: str) -> None:
+    file[name] = h5py.ExternalLink("/dev/zero", "/arm")
+
+
+def announced(file: h5py.File) -> None:
+    file["arm"].resize((10**12,))
+
+
+def events(change: Callable[[dict[str, Any]], object]) -> Callable[[h5py.File], None]:
+    """Every event changed alike."""
+
+    def rewrite(file: h5py.File) -> None:
+        lines = [json.loads(line) for line in file["events"][:].tobytes().splitlines()]
+        for line in lines:
+            change(line)
+        data = np.frombuffer(b"".join(json.dumps(line).encode() + b"\n" for line in lines), "u1")
+        del file["events"]
+        file["events"] = data
+
+    return rewrite
+
+
+def sweep(**changes: object) -> Callable[[h5py.File], None]:
+    return events(lambda line: line["detail"].get("sweep") and line["detail"].update(sweep=changes))
+
+
+SHAPES: dict[str, tuple[Callable[[h5py.File], None], str]] = {
+    "a sensor without samples": (instead("samples/gyro", lambda file, name: None), "no samples of gyro"),
+    "no sensors": (without("samples"), "it has no samples"),
+    "no arm": (without("arm"), "it has no arm"),
+    "another schema": (attribute("schema", "rig.run/9"), r"schema is 'rig\.run/9'"),
+    "a number for a schema": (attribute("schema", 3), "its schema is not a text"),
+    "a number for a configuration": (attribute("config", 3), "its config is not a text"),
+    "settings of a configuration": (attribute("config", "limits: 3"), "its configuration cannot be understood"),
+    "provenance that is a list": (attribute("provenance", "[]"), "its provenance does not say"),
+    "provenance that is no JSON": (attribute("provenance", "{"), "not_a_run_file"),
+    "provenance of bytes": (attribute("provenance", np.void(b"\xff\x00")), "not_a_run_file"),
+    "mounting of one row": (attribute("mounting", [1.0, 0.0, 0.0], "samples/gyro"), r"sensor\.mounting"),
+    "mounting of zeros": (attribute("mounting", np.zeros((3, 3)), "samples/gyro"), "no rotation"),
+    "mounting of text": (attribute("mounting", "+x", "samples/gyro"), r"sensor\.mounting"),
+    "a negative sensitivity": (attribute("sensitivity_rad_s_per_count", -1.0, "samples/gyro"), r"sensor\.sensitivity"),
+    "a sensitivity of text": (attribute("sensitivity_rad_s_per_count", "small", "samples/gyro"), r"sensor\.sensitivity"),
+    "a sensitivity that is no number": (attribute("sensitivity_rad_s_per_count", np.nan, "samples/gyro"), "sensitiv"),
+    "an unknown mode": (attribute("mode", "cooked", "samples/gyro"), r"sensor\.mode"),
+    "a part of nothing": (attribute("part", h5py.Empty("f8"), "samples/gyro"), "not_a_run_file"),
+    "samples of numbers": (instead("samples/gyro", rows("f8")), "samples/gyro holds float64"),
+    "arm states in two dimensions": (instead("arm", rows("f8", (2, 3))), "arm holds float64 in 2 dimensions"),
+    "a group for the arm": (instead("arm", lambda file, name: file.create_group(name)), "arm is not a dataset"),
+    "a dataset for the samples": (instead("samples", rows("u1")), "samples is not a group"),
+    "events of text": (instead("events", rows("f4")), "events holds float32"),
+    "an external link": (instead("arm", linked), "arm is a link to somewhere else"),
+    "10^12 rows": (announced, "arm announces 1000000000000 rows and holds"),
+    "an event that is a number": (instead("events", lambda f, n: f.create_dataset(n, data=np.array([51, 10], "u1"))), "event 1"),
+    "an unknown event": (events(lambda line: line.update(name="sweep_danced")), "no event 'sweep_danced'"),
+    "an event without a time": (events(lambda line: line.pop("host_time_s")), "host_time_s"),
+    "an event at no time": (events(lambda line: line.update(controller_time_s=np.nan)), "controller_time_s"),
+    "details that are a list": (events(lambda line: line.update(detail=[])), "no name and no details"),
+    "a sweep of nothing": (sweep(), r"sweep_started\.sweep\.index"),
+}  # fmt: skip
+
+
+@pytest.mark.parametrize("shape", SHAPES)
+def test_a_file_of_another_shape_is_refused_with_what_is_wrong(recording: Path, shape: str) -> None:
+    change, complaint = SHAPES[shape]
+    with h5py.File(recording, "r+") as file:
+        change(file)
+    said = refused(recording)
+    assert re.search(complaint, said), said
