@@ -13,6 +13,7 @@ from pathlib import Path
 import numpy as np
 
 from rig.config.load import load
+from rig.config.procedure_sections import SixSweepsSection
 from rig.data.run_file import read_run
 from rig.plans.six_sweeps import plan_six_observation
 from rig.world.section import world_section
@@ -36,6 +37,7 @@ def main() -> None:
     loaded = load(config)
     if not loaded.simulated:
         sys.exit(f"{config} has no world: section; only a simulated procedure can be run here")
+    assert isinstance(loaded.config.procedure, SixSweepsSection)
     planned_s = plan_six_observation(loaded.config.arm, loaded.config.procedure).duration_s
     print(f"planned motions and rests: {planned_s:.1f} s")
     with tempfile.TemporaryDirectory() as folder:

@@ -22,6 +22,7 @@ from rig.config.ur10e_limits import (
 Direction = Literal["cw", "ccw"]
 AxisName = Literal["+x", "-x", "+y", "-y", "+z", "-z"]
 Vector3 = tuple[float, float, float]
+Vector6 = tuple[float, float, float, float, float, float]
 Positive = Annotated[float, Field(gt=0)]
 JointAngle = Annotated[float, Field(ge=-JOINT_LIMIT_DEG, le=JOINT_LIMIT_DEG)]
 Offset = Annotated[float, Field(ge=-1000, le=1000)]
@@ -46,17 +47,17 @@ class ArmSection(Section):
         ge=0, le=PAYLOAD_LIMIT_KG, description="mass of all that the flange carries: fixture, board, cable"
     )
     payload_centre_mm: tuple[Offset, Offset, Offset] = Field(
-        (0.0, 0.0, 0.0), description="its centre of mass, x y z in the flange's frame"
+        default=(0.0, 0.0, 0.0), description="its centre of mass, x y z in the flange's frame"
     )
     home_deg: tuple[JointAngle, JointAngle, JointAngle, JointAngle, JointAngle, JointAngle] = Field(
-        (0.0, -90.0, 90.0, -90.0, -90.0, 0.0),
+        default=(0.0, -90.0, 90.0, -90.0, -90.0, 0.0),
         description="joint angles, base to wrist 3, of the pose around which everything turns; wrist 2 near ±90°, or "
         "the wrists' axes do not span space",
     )
     transfer_speed_deg_s: float = Field(
-        120.0, ge=0.1, le=SPEED_LIMIT_DEG_S, description="speed of the ways between sweeps"
+        default=120.0, ge=0.1, le=SPEED_LIMIT_DEG_S, description="speed of the ways between sweeps"
     )
-    state_rate_hz: float = Field(125.0, ge=125, le=500, description="how often the arm tells its state")
+    state_rate_hz: float = Field(default=125.0, ge=125, le=500, description="how often the arm tells its state")
 
     @field_validator("host")
     @classmethod
@@ -83,7 +84,7 @@ class BoardSection(Section):
         description="serial port, such as `/dev/ttyACM0` or `COM3`, or `socket://host:port`",
     )
     baud: Literal[115200, 230400, 460800, 921600] = Field(
-        921600, description="speed of the serial line", json_schema_extra={"unit": "Bd"}
+        default=921600, description="speed of the serial line", json_schema_extra={"unit": "Bd"}
     )
 
     @field_validator("port")
@@ -113,9 +114,9 @@ def mounting_matrix(mounting: "MountingSection") -> np.ndarray:
 class MountingSection(Section):
     """Which flange axis each sensor axis points along, nominally: a right-handed frame. It need not be exact."""
 
-    x: AxisName = Field("+x", description="the flange axis along which the sensor's x axis points")
-    y: AxisName = Field("+y", description="the same of its y axis")
-    z: AxisName = Field("+z", description="the same of its z axis")
+    x: AxisName = Field(default="+x", description="the flange axis along which the sensor's x axis points")
+    y: AxisName = Field(default="+y", description="the same of its y axis")
+    z: AxisName = Field(default="+z", description="the same of its z axis")
 
     @model_validator(mode="after")
     def right_handed(self) -> Self:
@@ -129,9 +130,9 @@ class TurntableSection(Section):
     """A reference's own calibration, found before: rate = scale · (reading + bias_rad_s)."""
 
     scale: tuple[Positive, Positive, Positive] = Field(
-        (1.0, 1.0, 1.0), description="scale factor of each axis", json_schema_extra=RATIO
+        default=(1.0, 1.0, 1.0), description="scale factor of each axis", json_schema_extra=RATIO
     )
-    bias_rad_s: Vector3 = Field((0.0, 0.0, 0.0), description="bias of each axis, added to the reading")
+    bias_rad_s: Vector3 = Field(default=(0.0, 0.0, 0.0), description="bias of each axis, added to the reading")
 
 
 class SensorSection(Section):
@@ -143,7 +144,8 @@ class SensorSection(Section):
         json_schema_extra={"allowed": f"1 to {SERIAL_NUMBER_MAX} plain ASCII characters"},
     )
     role: Literal["calibrate", "reference"] = Field(
-        "calibrate", description="what it is here for; at most one sensor is the reference others are compared with"
+        default="calibrate",
+        description="what it is here for; at most one sensor is the reference others are compared with",
     )
     rate_hz: float = Field(
         description="samples a second, one of the part's rates; 333.33 stands for 1000/3", json_schema_extra=OF_THE_PART
@@ -152,9 +154,9 @@ class SensorSection(Section):
         description="full scale, one of the part's ranges; at least 1.5 times the fastest sweep",
         json_schema_extra=OF_THE_PART,
     )
-    mounting: MountingSection = Field(MountingSection(), description="how it sits on the flange")
+    mounting: MountingSection = Field(default=MountingSection(), description="how it sits on the flange")
     turntable: TurntableSection = Field(
-        TurntableSection(), description="its own calibration, of a reference only; left out, it reads true"
+        default=TurntableSection(), description="its own calibration, of a reference only; left out, it reads true"
     )
 
     @model_validator(mode="before")
@@ -219,17 +221,20 @@ class ObservationSection(Section):
     """What an averaged revolution must satisfy to be used."""
 
     max_lost_fraction: float = Field(
-        0.001, ge=0, lt=1, description="share of a sweep's samples that may be missing", json_schema_extra=RATIO
+        default=0.001, ge=0, lt=1, description="share of a sweep's samples that may be missing", json_schema_extra=RATIO
     )
     max_speed_deviation: float = Field(
-        0.25,
+        default=0.25,
         gt=0,
         lt=1,
         description="how far the joint's rate, smoothed over 50 ms, may lie from its mean, as a share of it",
         json_schema_extra=RATIO,
     )
     max_axis_deviation_deg: float = Field(
-        20.0, gt=0, lt=45, description="how far the measured rotation may lie from the nominal axis of the sensor"
+        default=20.0,
+        gt=0,
+        lt=45,
+        description="how far the measured rotation may lie from the nominal axis of the sensor",
     )
 
 
@@ -245,11 +250,11 @@ class LimitsSection(Section):
         json_schema_extra=RATIO,
     )
     verification_rms_rad_s: Positive | None = Field(
-        None,
+        default=None,
         description="RMS of the calibrated reading less the reference's, sample by sample; a verification needs it",
     )
     verification_mean_rad_s: Positive | None = Field(
-        None,
+        default=None,
         description="the same difference averaged over each revolution, and the reference's from the arm; a "
         "verification needs it",
     )
@@ -258,7 +263,9 @@ class LimitsSection(Section):
 class OutputSection(Section):
     """Where results go."""
 
-    folder: str = Field("runs", min_length=1, max_length=1000, description="where each run gets a folder of its own")
+    folder: str = Field(
+        default="runs", min_length=1, max_length=1000, description="where each run gets a folder of its own"
+    )
 
 
 class RigConfig(Section):

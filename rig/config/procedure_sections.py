@@ -27,27 +27,27 @@ class SixSweepsSection(ProcedureSection):
     """The movement of SIX, Section III: which wrists, in what order, how fast, how often."""
 
     order: tuple[Wrist, ...] = Field(
-        ("wrist_3", "wrist_1", "wrist_2"), min_length=1, description="which wrist turns after which, each once"
+        default=("wrist_3", "wrist_1", "wrist_2"), min_length=1, description="which wrist turns after which, each once"
     )
     directions: tuple[Direction, ...] = Field(
-        ("cw", "ccw"), min_length=1, description="which way each wrist turns first, and then"
+        default=("cw", "ccw"), min_length=1, description="which way each wrist turns first, and then"
     )
-    repeats: int = Field(1, ge=1, le=100, description="how often all of it is done", json_schema_extra=RATIO)
+    repeats: int = Field(default=1, ge=1, le=100, description="how often all of it is done", json_schema_extra=RATIO)
     speed_deg_s: float = Field(
-        60.0,
+        default=60.0,
         ge=0.5,  # slower, and the board cannot keep a sweep's readings
         le=SPEED_LIMIT_DEG_S,
         description=f"constant speed of a sweep; every sensor's range must be at least {SPEED_TO_RANGE} times as large",
     )
     acceleration_deg_s2: float = Field(
-        240.0,
+        default=240.0,
         ge=0.1,
         le=ACCELERATION_LIMIT_DEG_S2,
         description="of every motion; a sweep's ramps lie outside the revolution it is averaged over",
     )
-    rest_s: float = Field(3.0, ge=0, le=3600, description="standing still after each sweep")
+    rest_s: float = Field(default=3.0, ge=0, le=3600, description="standing still after each sweep")
     margin_deg: float = Field(
-        2.0, gt=0, le=90, description="constant speed before the revolution begins, and after it ends"
+        default=2.0, gt=0, le=90, description="constant speed before the revolution begins, and after it ends"
     )
 
     @model_validator(mode="after")
@@ -72,9 +72,9 @@ class SixSweepsSection(ProcedureSection):
 class SixObservationSection(SixSweepsSection):
     """Six sweeps that calibrate, and on demand the same once more to verify."""
 
-    name: Literal["six_observation"] = Field("six_observation", description="this procedure")
+    name: Literal["six_observation"] = Field(default="six_observation", description="this procedure")
     verify: bool = Field(
-        False,
+        default=False,
         description="store a calibration that passed on the board, then repeat the movement with the board's corrected "
         "readings and compare them with the reference's",
     )
@@ -88,9 +88,10 @@ class SixObservationSection(SixSweepsSection):
 class VerifySection(SixSweepsSection):
     """Six sweeps with calibrated readings, compared with a reference's."""
 
-    name: Literal["verify"] = Field("verify", description="this procedure")
+    name: Literal["verify"] = Field(default="verify", description="this procedure")
     verify: bool = Field(
-        False, description="means nothing here; allowed so that the file of a calibration serves its verification too"
+        default=False,
+        description="means nothing here; allowed so that the file of a calibration serves its verification too",
     )
 
     @property

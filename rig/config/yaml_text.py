@@ -91,7 +91,7 @@ class _Loader(yaml.SafeLoader):
         self._size_of: dict[str, int] = {}  # nodes that an alias stands for, once all of them are known
 
     def compose_node(self, parent: yaml.Node | None, index: int) -> yaml.Node | None:
-        event = self.peek_event()
+        event: Any = self.peek_event()  # type: ignore[no-untyped-call]
         if isinstance(event, yaml.AliasEvent):
             if event.anchor in self.anchors and event.anchor not in self._size_of:
                 raise _refusal(f"*{shorten(event.anchor)} stands inside what it stands for", event.start_mark)
@@ -119,7 +119,7 @@ class _Loader(yaml.SafeLoader):
         if node.tag in NUMBERS and len(node.value) > NUMBER_MAX_CHARACTERS:
             raise _refusal(f"{shorten(node.value)} is too long for a number", node.start_mark)
         try:
-            return super().construct_object(node, deep)  # type: ignore[no-untyped-call]
+            return super().construct_object(node, deep)
         except (ValueError, OverflowError) as error:  # the 31st of February, a number without digits
             raise _refusal(f"{shorten(str(node.value))} cannot be: {error}", node.start_mark) from None
 

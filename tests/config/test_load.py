@@ -1,12 +1,16 @@
 """Configuration files: what is accepted, and how everything wrong is said at once."""
 
+import math
 import re
 from pathlib import Path
 
 import pytest
 import yaml
 
+from rig.config import ur10e_limits
 from rig.config.load import ConfigurationRefused, load, parse
+from rig.config.models import SensorSection
+from rig.config.procedure_sections import SixObservationSection
 from rig.world.section import world_section
 from support.paths import CONFIGS
 
@@ -193,7 +197,7 @@ def test_a_missing_file_is_refused_by_name(tmp_path: Path) -> None:
 
 def test_overrides_change_values_and_the_text_that_is_kept() -> None:
     loaded = parse(demo_text(), overrides=["procedure.rest_s=1.5", "world.seed=9"])
-    assert loaded.config.procedure.rest_s == 1.5
+    assert isinstance(loaded.config.procedure, SixObservationSection) and loaded.config.procedure.rest_s == 1.5
     assert world_section(loaded).seed == 9
     assert parse(loaded.text).config == loaded.config
 
@@ -236,3 +240,35 @@ def test_a_sensor_must_stand_in_the_world_too() -> None:
 def test_values_that_cannot_calibrate_are_refused_before_anything_moves(override: str, path: str) -> None:
     (problem,) = problems_of(demo_text(), override)
     assert problem.startswith(path)
+
+
+def test_what_is_wrong_with_the_world_is_told_with_the_rest() -> None:
+    found = problems_of(demo_text(), "arm.payload_kg=20", "world.sensors.gyro.scale=3", "world.seeed=1")
+    assert [problem.split(":")[0].split(" ")[0] for problem in found] == [
+        "arm.payload_kg",
+        "world.sensors.gyro.scale",
+        "world.seeed",
+    ]
+
+
+@pytest.mark.parametrize(
+    ("key", "limit"),
+    [
+        ("arm.payload_kg", ur10e_limits.PAYLOAD_LIMIT_KG),
+        ("procedure.acceleration_deg_s2", math.degrees(ur10e_limits.ACCELERATION_LIMIT_RAD_S2)),
+        ("arm.transfer_speed_deg_s", ur10e_limits.SPEED_LIMIT_DEG_S),
+        ("arm.home_deg", math.degrees(ur10e_limits.JOINT_LIMIT_RAD)),
+    ],
+)
+def test_the_arm_s_limits_are_those_of_one_table(key: str, limit: float) -> None:
+    def value(number: float) -> str:
+        return f"{key}=[{number}, 0, 0, 0, -90, 0]" if key == "arm.home_deg" else f"{key}={number}"
+
+    parse(demo_text(), overrides=[value(limit)])
+    (found,) = problems_of(demo_text(), value(limit * 1.001))
+    assert found.startswith(key) and f"less than or equal to {limit:g}" in found
+
+
+def test_a_data_rate_is_a_number_even_where_it_was_left_out() -> None:
+    assert all(SensorSection.model_fields[key].annotation is float for key in ("rate_hz", "range_deg_s"))
+    assert all(SensorSection.model_fields[key].is_required() for key in ("rate_hz", "range_deg_s"))

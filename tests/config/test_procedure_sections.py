@@ -32,7 +32,7 @@ class NodSection(ProcedureSection):
             yield "a nod needs an lsm9ds1"
 
 
-WITH_NODS = {**STOCK_SECTIONS, "nod": NodSection}
+WITH_NODS: dict[str, type[ProcedureSection]] = {**STOCK_SECTIONS, "nod": NodSection}
 
 
 def problems_of(*overrides: str, text: str = DEMO.read_text(encoding="utf-8")) -> tuple[str, ...]:

@@ -5,7 +5,8 @@ import json
 import pytest
 
 from rig.arm.motion import Plan
-from rig.config.load import parse
+from rig.config.load import load, parse
+from rig.config.procedure_sections import SixSweepsSection
 from rig.data.settings import RunSettings, settings_from_json, settings_of
 from rig.data.settings_of_run_1 import settings_of_configuration
 from rig.errors import Refused
@@ -13,11 +14,12 @@ from rig.plans.six_sweeps import plan_six_observation
 from support.paths import ROOT
 
 FIXTURES = ROOT / "tests" / "fixtures" / "af3b9f0"
-VERIFIED = (ROOT / "configs" / "lsm9ds1_adis16465.yaml").read_text(encoding="utf-8")
+VERIFIED = load(ROOT / "configs" / "lsm9ds1_adis16465.yaml").text
 
 
 def settings(text: str = VERIFIED) -> RunSettings:
     config = parse(text).config
+    assert isinstance(config.procedure, SixSweepsSection)
     plan: Plan = plan_six_observation(config.arm, config.procedure)
     return settings_of(config, plan)
 

@@ -14,6 +14,7 @@ from rig.arm.kinematics import flange_rate
 from rig.arm.motion import Plan, Rest, Sweep, Transfer
 from rig.arm.state import ARM_STATE_DTYPE
 from rig.config.load import parse
+from rig.config.procedure_sections import SixSweepsSection
 from rig.data.events import Event, Recorded, RestFinished, RestStarted, SweepFinished, SweepStarted
 from rig.data.run_file import RecordedSensor, RunData
 from rig.data.settings import settings_of
@@ -64,6 +65,7 @@ class Motion:
     def __init__(self, setup: Setup, rng: np.random.Generator) -> None:
         self.config = CONFIG.format(speed_deg_s=setup.speed_deg_s, rest_s=setup.rest_s, repeats=setup.repeats)
         config = parse(self.config).config
+        assert isinstance(config.procedure, SixSweepsSection)
         self.plan: Plan = plan_six_observation(config.arm, config.procedure)
         self.settings = settings_of(config, self.plan)
         self.ends = 101.0 + np.cumsum([step.duration_s for step in self.plan.steps])
