@@ -14,6 +14,7 @@ from rig.data.events import Event, SweepFinished, SweepStarted
 from rig.data.run_file import RunData
 from rig.data.settings import ObservationThresholds
 from rig.errors import Fault, Refused
+from rig.estimation.arrays import Array
 from rig.observation.observe import SensorObservations, observe
 from rig.observation.timebase import ArmMotion, TimeBase, estimate_time_base, widening
 from rig.observation.windows import swept
@@ -31,7 +32,6 @@ from support.synthetic_run import (
     truth,
 )
 
-Array = NDArray[np.float64]
 USUAL = synthetic_run(Setup())
 SETTINGS = USUAL.settings.observation
 
