@@ -17,8 +17,8 @@ from rig.data.events import BoardNotObserved, BoardObserved, BoardRecalled, Boar
 from rig.data.run_file import RunData
 from rig.errors import Fault
 from rig.estimation.accumulator import Accumulator
+from rig.estimation.arrays import Array
 from rig.observation.onboard_window import observed_before
-from rig.observation.timebase import Array
 
 SCALE_LIMIT = 1e-4  # relative
 BIAS_LIMIT_RAD_S = 1e-5

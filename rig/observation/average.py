@@ -7,7 +7,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from rig.data.run_file import RecordedSensor
-from rig.observation.timebase import ArmMotion, Array, TimeBase, estimate_time_base, widening
+from rig.estimation.arrays import Array
+from rig.observation.timebase import ArmMotion, TimeBase, estimate_time_base, widening
 
 
 @dataclass(frozen=True, slots=True)

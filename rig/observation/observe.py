@@ -17,10 +17,11 @@ from rig.arm.motion import Sweep
 from rig.data.run_file import RunData
 from rig.data.settings import ObservationThresholds
 from rig.errors import Fault
+from rig.estimation.arrays import Array
 from rig.estimation.refusals import check_reading_ratio
 from rig.observation.average import Average, Stream, average, between, on_the_arms_clock
 from rig.observation.revolution import Revolution, arm_states_lost, describe, find_revolution
-from rig.observation.timebase import ArmMotion, Array, TimeBase
+from rig.observation.timebase import ArmMotion, TimeBase
 from rig.observation.windows import Finished, Window, finished_sweeps, rested, swept
 
 STUCK_REPEATS = 10  # equal readings in a row, of a sensor whose noise exceeds a count

@@ -9,7 +9,8 @@ from numpy.typing import NDArray
 from rig.arm.motion import Sweep
 from rig.data.settings import ObservationThresholds
 from rig.errors import Fault
-from rig.observation.timebase import MAX_STATE_STEP_S, ArmMotion, Array
+from rig.estimation.arrays import Array
+from rig.observation.timebase import MAX_STATE_STEP_S, ArmMotion
 from rig.observation.windows import Window
 
 SMOOTHING_S = 0.05  # of the joint's rate before it is judged constant or not

@@ -15,8 +15,7 @@ from numpy.typing import NDArray
 
 from rig.arm.kinematics import flange_rate
 from rig.errors import Fault
-
-Array = NDArray[np.float64]
+from rig.estimation.arrays import Array
 
 MIN_SAMPLES = 100
 COARSE_STEP_S = 0.02  # far below the ramps of a sweep, so that the fine fit starts inside its reach

@@ -16,6 +16,8 @@ from rig.data.settings import ObservationThresholds
 from rig.errors import Fault, Refused
 from rig.observation.observe import SensorObservations
 from rig.observation.observed_run import observe_run
+from rig.estimation.arrays import Array
+
 from rig.observation.timebase import ArmMotion, TimeBase, estimate_time_base, widening
 from rig.observation.windows import swept
 from rig.report.sensor_entry import sensor_entry
@@ -32,7 +34,6 @@ from support.synthetic_run import (
     truth,
 )
 
-Array = NDArray[np.float64]
 USUAL = synthetic_run(Setup())
 SETTINGS = USUAL.settings.observation
 

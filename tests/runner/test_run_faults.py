@@ -15,10 +15,9 @@ from pathlib import Path
 from typing import Any
 
 import pytest
-import yaml
 
 from rig.data.run_file import read_run
-from support.worlds import World, WorldHandle
+from support.worlds import World, WorldHandle, hardware
 
 Start = Callable[..., "RunningRig"]
 
@@ -27,10 +26,7 @@ class RunningRig:
     """`rig run` on a world that stays when the run ends, so that a test can ask what the arm does."""
 
     def __init__(self, world: WorldHandle, folder: Path, *arguments: str) -> None:
-        document = yaml.safe_load(world.config_path.read_text(encoding="utf-8"))
-        del document["world"]
-        config = folder / "hardware.yaml"
-        config.write_text(yaml.safe_dump(document), encoding="utf-8")
+        config = hardware(world.config_path, folder)
         self.world = world
         self.out = folder / "run"
         self.process = subprocess.Popen(
@@ -235,10 +231,7 @@ def test_nothing_moves_when_nobody_agrees(start: Start) -> None:
 
 def test_an_arm_that_was_moved_while_the_operator_thought_is_not_driven(world: World, tmp_path: Path) -> None:
     handle = world()
-    document = yaml.safe_load(handle.config_path.read_text(encoding="utf-8"))
-    del document["world"]
-    config = tmp_path / "hardware.yaml"
-    config.write_text(yaml.safe_dump(document), encoding="utf-8")
+    config = hardware(handle.config_path, tmp_path)
     operator, terminal = pty.openpty()
     command = [sys.executable, "-m", "rig", "run", str(config), "--out", str(tmp_path / "run")]
     with subprocess.Popen(command, stdin=terminal, stderr=terminal) as process:
@@ -262,10 +255,7 @@ def test_an_arm_that_was_moved_while_the_operator_thought_is_not_driven(world: W
 
 def test_check_looks_and_moves_nothing(world: World, tmp_path: Path) -> None:
     handle = world()
-    document = yaml.safe_load(handle.config_path.read_text(encoding="utf-8"))
-    del document["world"]
-    config = tmp_path / "hardware.yaml"
-    config.write_text(yaml.safe_dump(document), encoding="utf-8")
+    config = hardware(handle.config_path, tmp_path)
     command = [sys.executable, "-m", "rig", "check", str(config)]
 
     ready = subprocess.run(command, capture_output=True, text=True, timeout=30, check=False)

@@ -9,9 +9,7 @@ from contextlib import ExitStack, suppress
 from pathlib import Path
 from typing import Any
 
-import yaml
-
-from support.worlds import World
+from support.worlds import World, hardware
 
 CHANGES: dict[str, Any] = {
     "arm": {"transfer_speed_deg_s": 170},
@@ -28,10 +26,7 @@ NUDGE = b"def nudge():\n movej([0.2, -1.57, 1.57, -1.57, -1.57, 0], a=20, v=3)\n
 
 def test_an_arm_that_was_moved_between_the_halves_goes_on_only_if_somebody_agrees(world: World, tmp_path: Path) -> None:
     handle = world(CHANGES)
-    document = yaml.safe_load(handle.config_path.read_text(encoding="utf-8"))
-    del document["world"]
-    config, out = tmp_path / "hardware.yaml", tmp_path / "run"
-    config.write_text(yaml.safe_dump(document), encoding="utf-8")
+    config, out = hardware(handle.config_path, tmp_path), tmp_path / "run"
     operator, terminal = pty.openpty()
     said = b""
 

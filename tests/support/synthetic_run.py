@@ -7,7 +7,6 @@ its own epoch and rate; readings follow g = K (m + b) with mounting error, noise
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 
 from firmware_host.samples import SAMPLE_DTYPE
 from rig.arm.kinematics import flange_rate
@@ -18,9 +17,8 @@ from rig.config.procedure_sections import SixSweepsSection
 from rig.data.events import Event, Recorded, RestFinished, RestStarted, SweepFinished, SweepStarted
 from rig.data.run_file import RecordedSensor, RunData
 from rig.data.settings import settings_of
+from rig.estimation.arrays import Array
 from rig.plans.six_sweeps import plan_six_observation
-
-Array = NDArray[np.float64]
 
 CONFIG = """
 arm: {{host: 192.0.2.1, payload_kg: 0.35}}

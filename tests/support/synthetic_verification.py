@@ -3,9 +3,9 @@
 from dataclasses import dataclass, replace
 
 import numpy as np
-from numpy.typing import NDArray
 
 from rig.data.run_file import RunData
+from rig.estimation.arrays import Array
 from support.synthetic_run import (
     BIAS_RAD_S,
     SCALE,
@@ -17,8 +17,6 @@ from support.synthetic_run import (
     sample_times,
     true_rate,
 )
-
-Array = NDArray[np.float64]
 
 REFERENCE = Setup(
     scale=(1.002, 0.998, 1.001),

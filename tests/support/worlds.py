@@ -35,6 +35,15 @@ def merge(base: Any, changes: Any) -> Any:
     return changes
 
 
+def hardware(config: Path, folder: Path) -> Path:
+    """`folder`/hardware.yaml: a configuration without its world, as of a rig that finds its devices there."""
+    document = yaml.safe_load(config.read_text(encoding="utf-8"))
+    del document["world"]
+    path = folder / "hardware.yaml"
+    path.write_text(yaml.safe_dump(document), encoding="utf-8")
+    return path
+
+
 class WorldHandle:
     """A running world. `control` asks its control channel, so that tests can make the laboratory misbehave."""
 

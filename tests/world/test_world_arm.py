@@ -4,10 +4,10 @@ import math
 import socket
 import struct
 from collections.abc import Callable, Iterator
-from contextlib import contextmanager
+from contextlib import AbstractContextManager, contextmanager
 from dataclasses import dataclass
 from itertools import pairwise
-from typing import Any
+from typing import Any, Protocol, TypeVar
 
 import pytest
 from rtde_control import Path, PathEntry, RTDEControlInterface
@@ -22,31 +22,33 @@ HOME = [0.0, -math.pi / 2, math.pi / 2, -math.pi / 2, -math.pi / 2, 0.0]
 ENCODER_STEP_RAD = 6.0e-6
 
 
-@contextmanager
-def control_of(world: WorldHandle) -> Iterator[RTDEControlInterface]:
-    control = RTDEControlInterface(world.host)
-    try:
-        yield control
-    finally:
-        control.disconnect()
+class Client(Protocol):
+    """What the maker's three interfaces have in common."""
+
+    def disconnect(self) -> None: ...
+
+
+C = TypeVar("C", bound=Client)
 
 
 @contextmanager
-def reports_of(world: WorldHandle, rate_hz: float = 500.0) -> Iterator[RTDEReceiveInterface]:
-    receive = RTDEReceiveInterface(world.host, rate_hz)
+def disconnecting(interface: C) -> Iterator[C]:
     try:
-        yield receive
+        yield interface
     finally:
-        receive.disconnect()
+        interface.disconnect()
 
 
-@contextmanager
-def outputs_of(world: WorldHandle) -> Iterator[RTDEIOInterface]:
-    io = RTDEIOInterface(world.host)
-    try:
-        yield io
-    finally:
-        io.disconnect()
+def control_of(world: WorldHandle) -> AbstractContextManager[RTDEControlInterface]:
+    return disconnecting(RTDEControlInterface(world.host))
+
+
+def reports_of(world: WorldHandle, rate_hz: float = 500.0) -> AbstractContextManager[RTDEReceiveInterface]:
+    return disconnecting(RTDEReceiveInterface(world.host, rate_hz))
+
+
+def outputs_of(world: WorldHandle) -> AbstractContextManager[RTDEIOInterface]:
+    return disconnecting(RTDEIOInterface(world.host))
 
 
 @dataclass(frozen=True)

@@ -1,5 +1,5 @@
 /* The registers of the STM32L432 and its core that the port uses, and no others. Names, addresses, offsets, bits and interrupt
-   numbers are the SVD's; tests/test_firmware_image.py compares every line. Reference manual RM0394. */
+   numbers are the SVD's; tests/firmware_host/firmware/test_firmware_image.py compares every line. Reference manual RM0394. */
 #ifndef REGISTERS_H
 #define REGISTERS_H
 

@@ -1,7 +1,7 @@
 """The script sockets, ports 30001 to 30003: take programs in, and recognise the one ur_rtde uploads.
 
 URScript manual of the maker. A text is a program once its blocks are closed; a line outside a block is a program by
-itself. The text of `rtde_control` is not interpreted but acted out (`control_program`); other programs may use the
+itself. The text of `rtde_control` is not interpreted but acted out (`ur_rtde_program`); other programs may use the
 statements listed in `urscript`.
 """
 

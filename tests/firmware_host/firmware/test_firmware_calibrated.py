@@ -4,14 +4,12 @@ from typing import Any
 
 import numpy as np
 import pytest
-from numpy.typing import NDArray
 
 from firmware_host.frames import Frame
 from firmware_host.protocol import text
+from rig.estimation.arrays import Array
 from support.host_board import PERIOD_US, HostBoard, configured, convert, error_of, settle, streaming_board
 from support.host_flash import HostFlash
-
-Array = NDArray[np.float64]
 
 RAD_S = np.radians(8.75e-3)  # per count of the LSM9DS1 at 245 °/s
 SCALE, BIAS_RAD_S = np.array([1.1771, 1.1554, 1.1440]), np.array([0.0077, -0.0100, -0.0051])

@@ -6,13 +6,12 @@ import numpy as np
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 
 from firmware_host.frames import Frame
 from rig.estimation.accumulator import Accumulator
+from rig.estimation.arrays import Array
 from support.host_board import PERIOD_US, HostBoard, configured, convert, error_of, settle
-
-Array = NDArray[np.float64]
 
 RAD_S = np.radians(8.75e-3)  # per count of the LSM9DS1 at 245 °/s
 SPEED_RAD_S = 1.0472

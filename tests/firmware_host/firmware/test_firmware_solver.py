@@ -8,16 +8,14 @@ import numpy as np
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
-from numpy.typing import NDArray
 from scipy.spatial.transform import Rotation
 
 from firmware_host.protocol import MAX_SCALE, METHODS, SOLUTION_STATUSES
 from rig.errors import Fault
 from rig.estimation import refusals
 from rig.estimation.accumulator import Accumulator, SixObservationEstimator, Solution
+from rig.estimation.arrays import Array
 from support.host_board import core
-
-Array = NDArray[np.float64]
 
 DIRECTIONS = np.array([[0, 0, -1], [0, 0, 1], [1, 0, 0], [-1, 0, 0], [0, 1, 0], [0, -1, 0]], dtype=np.float64)
 SCALE_AGREEMENT = 1e-4  # relative
