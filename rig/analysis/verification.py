@@ -55,12 +55,7 @@ def verify(
             _check_recorded(recording.run, sensor, readings)
             _check_recorded(recording.run, reference.name, "raw")
     _check_complete([recording.run for recording in after])
-    described = after[0].run.sensors
-    rotation = relative_rotation(
-        mean_rates(turns_of(sensor, before or after), calibration if before else None),
-        mean_rates(turns_of(reference.name, before or after), reference),
-        np.array(described[sensor].mounting) @ np.array(described[reference.name].mounting).T,
-    )
+    rotation = relative_mounting(sensor, reference, before or after, calibration if before else None)
     return Verification(
         sensor,
         reference,
@@ -68,6 +63,21 @@ def verify(
         rotation,
         compare(before, sensor, reference, rotation.matrix) if before else None,
         compare(after, sensor, reference, rotation.matrix),
+    )
+
+
+def relative_mounting(
+    sensor: str, reference: Reference, recordings: Sequence[ObservedRun], calibration: Calibration | None
+) -> RelativeRotation:
+    """How a sensor sits to the reference, by the revolutions of these recordings; None is for calibrated readings.
+
+    Raises Fault as `relative_rotation` does.
+    """
+    described = recordings[0].run.sensors
+    return relative_rotation(
+        mean_rates(turns_of(sensor, recordings), calibration),
+        mean_rates(turns_of(reference.name, recordings), reference),
+        np.array(described[sensor].mounting) @ np.array(described[reference.name].mounting).T,
     )
 
 

@@ -29,6 +29,10 @@ class RecordedRun:
         """The recordings of the first movement."""
         return self.raw or self.corrected
 
+    def only_raw(self) -> "RecordedRun":
+        """The calibration alone."""
+        return replace(self, corrected=(), alone=True)
+
     def judged_by(self, overrides: Sequence[str]) -> "RecordedRun":
         """The same with other thresholds or limits, see `RunSettings.with_overrides`."""
         raw, corrected = (tuple(run.judged_by(overrides) for run in runs) for runs in (self.raw, self.corrected))

@@ -50,7 +50,7 @@ def _write(verification: Verification, when: str, comparison: Comparison, folder
     name = f"verification_{verification.sensor}_{when}"
     with mpl.rc_context({"font.size": 9, "svg.hashsalt": "rig", "axes.grid": True, "grid.alpha": 0.3}):
         figure = Figure(figsize=(10.0, 7.5))
-        _draw(figure, comparison, verification.sensor, verification.reference.name)
+        draw_comparison(figure, comparison, verification.sensor, verification.reference.name)
         figure.suptitle(
             f"{verification.sensor} {when} calibration, beside {verification.reference.name}; RMS of sweeps and rests"
         )
@@ -59,7 +59,7 @@ def _write(verification: Verification, when: str, comparison: Comparison, folder
     return name
 
 
-def _draw(figure: "Figure", comparison: Comparison, sensor: str, reference: str) -> None:
+def draw_comparison(figure: "Figure", comparison: Comparison, sensor: str, reference: str) -> None:
     """Rows x, y, z: readings on the left, their difference on the right, enlarged."""
     rows = figure.subplots(3, 2, sharex=True, sharey="col", width_ratios=(3, 2), gridspec_kw=MARGINS)
     since_s = comparison.time_s - comparison.time_s[0]

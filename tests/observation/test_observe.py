@@ -14,10 +14,9 @@ from rig.data.events import Event, SweepFinished, SweepStarted
 from rig.data.run_file import RunData
 from rig.data.settings import ObservationThresholds
 from rig.errors import Fault, Refused
+from rig.estimation.arrays import Array
 from rig.observation.observe import SensorObservations
 from rig.observation.observed_run import observe_run
-from rig.estimation.arrays import Array
-
 from rig.observation.timebase import ArmMotion, TimeBase, estimate_time_base, widening
 from rig.observation.windows import swept
 from rig.report.sensor_entry import sensor_entry

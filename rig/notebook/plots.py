@@ -1,0 +1,99 @@
+"""Pictures of readings, residuals and comparisons. Needs matplotlib, which the extra `study` brings."""
+
+from dataclasses import dataclass
+from io import BytesIO
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from rig.analysis.comparison import Comparison
+from rig.errors import Fault, Refused
+from rig.notebook.results import Result
+from rig.notebook.runs import Readings
+from rig.observation.windows import swept
+from rig.report.figures import draw_comparison
+
+if TYPE_CHECKING:
+    from matplotlib.figure import Figure
+
+DPI = 110
+
+
+@dataclass(frozen=True)
+class Plot:
+    """A picture that a notebook shows by itself; `figure` is matplotlib's, to go on with."""
+
+    figure: "Figure"
+
+    def save(self, path: str | Path) -> None:
+        """Into a file; its ending says which format."""
+        self.figure.savefig(path, dpi=DPI)
+
+    def _repr_png_(self) -> bytes:
+        picture = BytesIO()
+        self.figure.savefig(picture, format="png", dpi=DPI)
+        return picture.getvalue()
+
+
+def plot_readings(readings: Readings) -> Plot:
+    """The three axes of a sensor over the arm's time, the sweeps shaded."""
+    time_s, rate_rad_s = readings.on_arm_clock()
+    figure = _figure(10, 3.5)
+    axes = figure.subplots()
+    for run in readings.recorded.movement:
+        for finished in swept(run):
+            axes.axvspan(finished.window.start_s - time_s[0], finished.window.end_s - time_s[0], color="0.92", lw=0)
+    for i, axis in enumerate("xyz"):
+        axes.plot(time_s - time_s[0], rate_rad_s[:, i], lw=0.7, label=axis)
+    axes.set(xlabel="time s", ylabel="reading rad/s", title=f"{readings.name}, {readings.sensor.mode} readings")
+    axes.legend(loc="upper right", ncols=3, frameon=False)
+    return Plot(figure)
+
+
+def plot_residuals(result: Result) -> Plot:
+    """Reading less vector model of every sweep and rest, with the standard deviation of each mean."""
+    sensors = {
+        name: (each.found, each.found.vector_model)
+        for name, each in result.items()
+        if not isinstance(each.found.vector_model, Fault)
+    }
+    if not sensors:
+        raise Refused(
+            "nothing_to_plot", "the vector model has no solution here", "Read in result.outcome why, sensor by sensor"
+        )
+    figure = _figure(10, 3 * len(sensors))
+    panels = figure.subplots(len(sensors), sharex=True, squeeze=False)[:, 0]
+    for axes, (name, (found, model)) in zip(panels, sensors.items(), strict=True):
+        averages = [*(observation.average for observation in found.observations), *found.rests]
+        std = np.sqrt([average.variance_rad2_s2 for average in averages])
+        for i, axis in enumerate("xyz"):
+            places = np.arange(len(averages)) + (i - 1) * 0.15
+            axes.errorbar(places, model.residuals_rad_s[:, i], std[:, i], fmt="o", ms=3, lw=0.8, label=axis)
+        axes.axhline(0, color="0.5", lw=0.8)
+        axes.set(ylabel="residual rad/s", title=f"{name}: reading − model, ± 1σ")
+        axes.set_xticks(
+            range(len(averages)),
+            [f"{o.joint_name} {o.direction}" for o in found.observations] + ["rest"] * len(found.rests),
+            rotation=60,
+            ha="right",
+        )
+        axes.legend(loc="upper right", ncols=3, frameon=False)
+    return Plot(figure)
+
+
+def plot_comparison(comparison: Comparison, sensor: str, reference: str) -> Plot:
+    """Readings of both on the left, their difference on the right."""
+    figure = _figure(10, 7.5)
+    draw_comparison(figure, comparison, sensor, reference)
+    return Plot(figure)
+
+
+def _figure(width: float, height: float) -> "Figure":
+    try:
+        from matplotlib.figure import Figure
+    except ImportError as error:
+        raise Refused(
+            "missing_extra", f"plots need {error.name}", "Install it with pip install 'calibration-rig[study]'"
+        ) from error
+    return Figure(figsize=(width, height), layout="constrained")
