@@ -1,0 +1,68 @@
+"""A verified run is observed and solved once, phase after phase as a run has them."""
+
+import sys
+from collections import Counter
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
+from types import FrameType
+from typing import Any
+
+import pytest
+
+from rig.analysis.outcome import outcome_of, verified
+from rig.data.run_file import RunData, read_run
+from rig.errors import Refused
+from rig.estimation.vector_model import solve_vector_model
+from rig.observation.observe import observe_sensor
+from rig.observation.timebase import ArmMotion, estimate_time_base
+from support.paths import FIXTURES
+
+
+def recorded(name: str) -> RunData:
+    return read_run(FIXTURES / "verified" / name)
+
+
+@contextmanager
+def calls(*functions: Callable[..., Any]) -> Iterator[Counter[str]]:
+    """How often each of these functions is entered."""
+    names = {function.__code__: function.__qualname__ for function in functions}
+    counted: Counter[str] = Counter()
+
+    def count(frame: FrameType, event: str, argument: object) -> None:
+        if event == "call" and frame.f_code in names:
+            counted[names[frame.f_code]] += 1
+
+    before = sys.getprofile()
+    sys.setprofile(count)
+    try:
+        yield counted
+    finally:
+        sys.setprofile(before)
+
+
+def test_two_recordings_of_two_sensors_are_four_observations() -> None:
+    runs, repeated = [recorded("run.h5")], [recorded("verify.h5")]
+    with calls(ArmMotion.__init__, estimate_time_base, observe_sensor, solve_vector_model) as counted:
+        calibration = outcome_of(runs)
+        outcome = verified(calibration, repeated)
+    assert calibration.passed and outcome.passed
+    assert counted == {
+        "ArmMotion.__init__": 2,  # one for each recording
+        "estimate_time_base": 4,
+        "observe_sensor": 4,
+        "solve_vector_model": 2,  # one for each sensor
+    }
+    assert outcome.results is calibration.results
+
+
+def test_the_board_has_one_clock_and_each_sensor_its_delay() -> None:
+    (recording,) = outcome_of([recorded("run.h5")]).recordings
+    late = recording.delay("gyro", behind="reference")
+    assert abs(late.delay_s) < 5 * late.std_s < 1e-4  # simulated sensors without filters
+    assert recording.delay("gyro", behind="gyro").delay_s == 0.0
+
+
+def test_an_estimator_nobody_knows_is_refused_before_anything_is_observed() -> None:
+    with calls(observe_sensor) as counted, pytest.raises(Refused, match="unknown_estimator"):
+        outcome_of([recorded("run.h5")], estimator="newtun")
+    assert not counted
