@@ -71,7 +71,8 @@ def observe_sensor(
     a later recording of the same run repeats them.
     Raises Fault `incomplete_revolution`, `arm_states_lost`, `slider_below_100`, `speed_not_constant`,
     `other_joint_moved`, `lost_samples`, `saturation`, `stuck_sensor`, `stuck_axis`, `wrong_axis`, `wrong_sign`,
-    `wrong_unit`, `not_finite`, `time_base_not_found`, `board_clock_restarted`, `duplicated_samples`.
+    `wrong_unit`, `not_finite`, `time_base_not_found`, `board_clock_restarted`, `duplicated_samples`,
+    `impossible_times`.
     """
     stream = on_the_arms_clock(run.samples[sensor], run.sensors[sensor], motion)
     revolutions = [

@@ -18,6 +18,7 @@ from rig.errors import Fault
 from rig.estimation.arrays import Array
 
 MIN_SAMPLES = 100
+MAX_SPAN_S = 48 * 3600.0  # of a recording; what lies farther apart is damage, and would fill the memory
 COARSE_STEP_S = 0.02  # far below the ramps of a sweep, so that the fine fit starts inside its reach
 COARSE_REACH_S = 0.15  # what the clock may be off at either end of the data when the fine fit starts
 CANDIDATES = 12  # peaks of the correlation looked at: six equal sweeps give eleven
@@ -71,7 +72,7 @@ class ArmMotion:
     """The recorded arm as functions of controller time: `angles(t)` (n, 6) rad, `rate(t)` (n, 3) flange rate rad/s.
 
     `rate(t, 1)` is the flange's angular acceleration. `states` is (m,) ARM_STATE_DTYPE. Raises Fault `no_motion`,
-    `not_finite`.
+    `not_finite`, `impossible_times`.
     """
 
     def __init__(self, states: NDArray[Any]) -> None:
@@ -85,6 +86,7 @@ class ArmMotion:
             )
         if not (np.isfinite(self.time_s).all() and np.isfinite(self.states["q_rad"]).all()):
             raise _not_finite("an arm state")
+        _check_span(self.time_s, "the arm's states")
         self.angles = CubicSpline(self.time_s, self.states["q_rad"])
         rates = flange_rate(self.states["q_rad"], self.angles(self.time_s, 1))
         if not np.linalg.norm(rates, axis=1).max() > MIN_RATE_RAD_S:
@@ -104,8 +106,8 @@ class ArmMotion:
 def estimate_time_base(board_time_s: Array, readings_rad_s: Array, motion: ArmMotion) -> TimeBase:
     """The board's clock against the controller's, from readings (n, 3) taken at board times (n,).
 
-    Raises Fault `not_finite`, `board_clock_restarted`, `duplicated_samples`, `stuck_sensor`, `stuck_axis`,
-    `time_base_not_found`.
+    Raises Fault `not_finite`, `impossible_times`, `board_clock_restarted`, `duplicated_samples`, `stuck_sensor`,
+    `stuck_axis`, `time_base_not_found`.
     """
     _check_samples(board_time_s, readings_rad_s)
     clock = _coarse(board_time_s, readings_rad_s, motion)
@@ -153,6 +155,7 @@ def _check_samples(board_time_s: Array, readings: Array) -> None:
             "the board's clock goes back within the recording: the board was reset",
             "Check the board's power and cable, then record again",
         )
+    _check_span(board_time_s, "the samples")
     still = np.ptp(readings, axis=0) == 0
     if still.all():
         raise Fault(
@@ -261,6 +264,16 @@ def _refined(clock: TimeBase, board_time_s: Array, readings: Array, motion: ArmM
         covariance,
         np.asarray(fitted[3], dtype=np.float64),
     )
+
+
+def _check_span(time_s: Array, what: str) -> None:
+    span_s = time_s[-1] - time_s[0]
+    if span_s > MAX_SPAN_S:
+        raise Fault(
+            "impossible_times",
+            f"{what} in the recording reach over {span_s / 3600:.3g} h",
+            "Do not use this recording, which is damaged; make a new one",
+        )
 
 
 def _triple(values: Array) -> str:

@@ -129,6 +129,10 @@ def rows(dtype: object, shape: tuple[int, ...] = (10,)) -> Callable[[h5py.File, 
     return lambda file, name: file.create_dataset(name, shape, dtype)
 
 
+def number(file: h5py.File, name: str) -> None:
+    file[name] = np.frombuffer(b"3\n", "u1")
+
+
 def linked(file: h5py.File, name: str) -> None:
     file[name] = h5py.ExternalLink("/dev/zero", "/arm")
 
@@ -170,7 +174,7 @@ SHAPES: dict[str, tuple[Callable[[h5py.File], None], str]] = {
     "mounting of zeros": (attribute("mounting", np.zeros((3, 3)), "samples/gyro"), "no rotation"),
     "mounting of text": (attribute("mounting", "+x", "samples/gyro"), r"sensor\.mounting"),
     "a negative sensitivity": (attribute("sensitivity_rad_s_per_count", -1.0, "samples/gyro"), r"sensor\.sensitivity"),
-    "a sensitivity of text": (attribute("sensitivity_rad_s_per_count", "small", "samples/gyro"), r"sensor\.sensitivity"),
+    "a sensitivity of text": (attribute("sensitivity_rad_s_per_count", "low", "samples/gyro"), r"sensor\.sensitivity"),
     "a sensitivity that is no number": (attribute("sensitivity_rad_s_per_count", np.nan, "samples/gyro"), "sensitiv"),
     "an unknown mode": (attribute("mode", "cooked", "samples/gyro"), r"sensor\.mode"),
     "a part of nothing": (attribute("part", h5py.Empty("f8"), "samples/gyro"), "not_a_run_file"),
@@ -181,7 +185,7 @@ SHAPES: dict[str, tuple[Callable[[h5py.File], None], str]] = {
     "events of text": (instead("events", rows("f4")), "events holds float32"),
     "an external link": (instead("arm", linked), "arm is a link to somewhere else"),
     "10^12 rows": (announced, "arm announces 1000000000000 rows and holds"),
-    "an event that is a number": (instead("events", lambda f, n: f.create_dataset(n, data=np.array([51, 10], "u1"))), "event 1"),
+    "an event that is a number": (instead("events", number), "event 1 cannot be understood"),
     "an unknown event": (events(lambda line: line.update(name="sweep_danced")), "no event 'sweep_danced'"),
     "an event without a time": (events(lambda line: line.pop("host_time_s")), "host_time_s"),
     "an event at no time": (events(lambda line: line.update(controller_time_s=np.nan)), "controller_time_s"),

@@ -360,6 +360,11 @@ def nowhere(run: RunData) -> RunData:
     return with_arm(run, change)
 
 
+def late(rows: NDArray[Any], time: str, value: float) -> NDArray[Any]:
+    rows[time][-1] = value
+    return rows
+
+
 def gap_in_states(run: RunData) -> RunData:
     return with_arm(run, lambda arm: np.delete(arm, slice(1000, 1130)))
 
@@ -390,6 +395,11 @@ def gap_in_states(run: RunData) -> RunData:
         (lambda run: scaled(run, 180 / np.pi), "wrong_unit: .* 50.1 times"),
         (lambda run: scaled(run, np.nan), "not_finite: a reading"),
         (nowhere, "not_finite: an arm state"),
+        (lambda run: with_arm(run, lambda arm: late(arm, "time_s", 1e12)), "impossible_times: the arm's states"),
+        (
+            lambda run: with_samples(run, lambda rows: late(rows, "board_time_us", 2**62)),
+            "impossible_times: the samples",
+        ),
     ],
 )
 def test_what_does_not_belong_into_a_calibration_is_refused_by_name(
