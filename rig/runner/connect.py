@@ -12,7 +12,7 @@ from rig.arm.state import ArmReport
 from rig.board.identify import refuse_other_firmware, refusing
 from rig.config.load import Loaded
 from rig.data.provenance import provenance
-from rig.data.run_file import RecordedSensor, RunRecorder
+from rig.data.run_file import RunRecorder
 from rig.data.settings import RunSettings
 from rig.plans.phase import Phase
 from rig.plans.script_file import ScriptFile
@@ -56,15 +56,14 @@ class Connector:
         with ExitStack() as stack:
             board, sensors = self._connect_board(stack, acquisition)
             arm, report = self._connect_arm(stack, acquisition)
-            described = {name: sensor.described for name, sensor in sensors.items()}
-            recorder = self._record(stack, board, sensors, described, report)
-            acquisition.recorder = recorder
-            along = self._calibrating_along(board, acquisition, recorder, sensors)
+            recording = self._record(stack, board, sensors, report)
+            acquisition.recorder = recording.recorder
             yield Rig(
                 devices=Devices(arm, report, self.loaded.config.arm, board, _streaming_corrected(sensors), acquisition),
                 plan=self.phase.plan(report.state.q_rad, self.resumed.done),
                 whole_plan=whole_plan,
-                recording=Recording(recorder, described, along),
+                recording=recording,
+                along=self._calibrating_along(board, acquisition, recording, sensors),
                 station=self.station,
                 phase=self.phase,
             )
@@ -94,33 +93,32 @@ class Connector:
         stack: ExitStack,
         board: Board,
         sensors: Mapping[str, BoardSensor],
-        described: Mapping[str, RecordedSensor],
         report: ArmReport,
-    ) -> RunRecorder:
+    ) -> Recording:
+        described = {name: sensor.described for name, sensor in sensors.items()}
         stored = {name: sensor.stored for name, sensor in sensors.items() if sensor.stored is not None}
         made_with = provenance(
             self.loaded, board.identity, report, stored, script=self.script.name, script_sha256=self.script.sha256
         )
         self.resumed.refuse_other_instruments(made_with, described)
         with refusing():
-            return stack.enter_context(
-                RunRecorder(
-                    self.path,
-                    config=self.loaded.rig_text,
-                    settings=self.settings,
-                    provenance=made_with,
-                    sensors=described,
-                )
+            recorder = RunRecorder(
+                self.path,
+                config=self.loaded.rig_text,
+                settings=self.settings,
+                provenance=made_with,
+                sensors=described,
             )
+        return Recording(stack.enter_context(recorder), described, self.station)
 
     def _calibrating_along(
-        self, board: Board, acquisition: Acquisition, recorder: RunRecorder, sensors: Mapping[str, BoardSensor]
+        self, board: Board, acquisition: Acquisition, recording: Recording, sensors: Mapping[str, BoardSensor]
     ) -> BoardCalibration | None:
         """The board's own calibration from raw readings; it is given back what it observed before an interruption."""
         if self.phase.procedure.readings == "calibrated":
             return None
         to_calibrate = {name: (sensors[name].index, sensors[name].described) for name in self.settings.to_calibrate}
-        along = BoardCalibration(board, acquisition, recorder, self.settings.observation, to_calibrate)
+        along = BoardCalibration(board, acquisition, recording.note, self.settings.observation, to_calibrate)
         with refusing():
             along.recall(self.resumed.earlier, self.resumed.done)
         return along

@@ -5,7 +5,7 @@ each sweep the host names two board times and the measured speed, and at the end
 answers goes into the recording, where `rig.analysis.onboard_check` holds it against the host's own arithmetic.
 """
 
-from collections.abc import Collection, Mapping, Sequence
+from collections.abc import Callable, Collection, Mapping, Sequence
 from dataclasses import dataclass, field
 
 import numpy as np
@@ -15,8 +15,8 @@ from firmware_host.errors import BoardError
 from firmware_host.protocol import METHODS
 from rig.arm.motion import Sweep
 from rig.arm.state import ARM_STATE_DTYPE
-from rig.data.events import BoardNotObserved, BoardObserved, BoardRecalled, BoardSolved
-from rig.data.run_file import RecordedSensor, RunData, RunRecorder
+from rig.data.events import BoardNotObserved, BoardObserved, BoardRecalled, BoardSolved, Event
+from rig.data.run_file import RecordedSensor, RunData
 from rig.data.settings import ObservationThresholds
 from rig.errors import Fault
 from rig.observation.onboard_window import observed_before, revolution_on_the_board
@@ -28,11 +28,14 @@ KEEP_LONGER_S = 4.0
 
 @dataclass(slots=True)
 class BoardCalibration:
-    """Takes the board through a calibration of `sensors` (name → its index on the board and its description)."""
+    """Takes the board through a calibration of `sensors` (name → its index on the board and its description).
+
+    What the board answers is given to `note`, for the recording and for who listens.
+    """
 
     board: Board
     acquisition: Acquisition
-    recorder: RunRecorder
+    note: Callable[[Event], None]
     settings: ObservationThresholds
     sensors: Mapping[str, tuple[int, RecordedSensor]]
     _observed: dict[str, int] = field(default_factory=dict)
@@ -43,7 +46,7 @@ class BoardCalibration:
             for sweep, seen in observed_before(earlier, name, done).items():
                 self.board.recall(index, self._count(name), seen.observation.mean_rad_s, seen.speed_rad_s)
                 self._observed[name] += 1
-                self.recorder.add(BoardRecalled(name, sweep))
+                self.note(BoardRecalled(name, sweep))
 
     def begin(self) -> None:
         """Before the first sample: the host keeps what it sees, for the clock of the first sweep."""
@@ -62,16 +65,16 @@ class BoardCalibration:
             except (Fault, BoardError) as error:
                 if error.name == "board_link_lost":
                     raise
-                self.recorder.add(BoardNotObserved(name, sweep.index, str(error)))
+                self.note(BoardNotObserved(name, sweep.index, str(error)))
                 continue
             self._observed[name] += 1
-            self.recorder.add(BoardObserved(name, sweep.index, speed_rad_s, found))
+            self.note(BoardObserved(name, sweep.index, speed_rad_s, found))
 
     def solve(self) -> None:
         """After the last sweep: the board's solution by either method."""
         for name, (index, _) in self.sensors.items():
             for method in METHODS:
-                self.recorder.add(BoardSolved(name, self.board.solve(index, method)))
+                self.note(BoardSolved(name, self.board.solve(index, method)))
 
     def _observe(self, name: str, sweep: Sweep) -> tuple[BoardObservation, float]:
         """The board's observation and the speed it was told, rad/s."""

@@ -16,7 +16,7 @@ from rig.arm.motion import Plan, Rest, Step, Sweep, Transfer, travel
 from rig.arm.preflight import arm_problems, plan_problems, refuse, way_to_home
 from rig.arm.state import ArmReport
 from rig.config.models import ArmSection
-from rig.data.events import RestFinished, RestStarted, SweepFinished, SweepStarted
+from rig.data.events import Event, RestFinished, RestStarted, SweepFinished, SweepStarted
 from rig.data.run_file import RecordedSensor, RunRecorder
 from rig.errors import Fault, Refused
 from rig.plans.phase import Phase
@@ -56,11 +56,16 @@ class Devices:
 
 @dataclass(frozen=True, slots=True)
 class Recording:
-    """Where everything goes, and what of (`sensors` by name); `along` is there when the board calibrates along."""
+    """Where everything goes, and what of (`sensors` by name); what happens is told at the `station` as well."""
 
     recorder: RunRecorder
     sensors: Mapping[str, RecordedSensor]
-    along: BoardCalibration | None
+    station: Station
+
+    def note(self, event: Event) -> None:
+        """Record what happens, and tell it."""
+        self.recorder.add(event)
+        self.station.event(event)
 
     def check(self) -> None:
         """Raise Fault `recording_failed`, or `run_folder_removed` when the file is no longer in its place."""
@@ -75,12 +80,17 @@ class Recording:
 
 @dataclass(slots=True)
 class Rig:
-    """The verbs of one phase. `whole_plan` is the same as `plan`, or more when an interrupted run goes on."""
+    """The verbs of one phase.
+
+    `whole_plan` is the same as `plan`, or more when an interrupted run goes on; `along` is there when the board
+    calibrates along.
+    """
 
     devices: Devices
     plan: Plan
     whole_plan: Plan
     recording: Recording
+    along: BoardCalibration | None
     station: Station
     phase: Phase
     _number: int = 0  # of the step that goes on, or the last one
@@ -121,9 +131,9 @@ class Rig:
 
     def start_sampling(self) -> None:
         """Let the board stream; from here on every sample is recorded. Raises `Fault` when a sensor stays silent."""
-        board, along = self.devices.board, self.recording.along
-        if along is not None:
-            along.begin()
+        board = self.devices.board
+        if self.along is not None:
+            self.along.begin()
         board.start(self.devices.corrected)
         deadline_s = time.monotonic() + FIRST_SAMPLE_TIMEOUT_S
         while silent := self.devices.acquisition.silent():
@@ -147,30 +157,28 @@ class Rig:
 
         Afterwards, while the arm stands still, the board averages the revolution as well when it calibrates along.
         """
-        recorder, along = self.recording.recorder, self.recording.along
-        if along is not None:
-            along.keep(sweep)
+        if self.along is not None:
+            self.along.keep(sweep)
         with self._step(sweep, then=lambda: self._observe(sweep)):
-            recorder.add(SweepStarted(sweep))
+            self.recording.note(SweepStarted(sweep))
             self.devices.arm.move(sweep, lambda: self._watch(sweep))
-            recorder.add(SweepFinished(sweep))
+            self.recording.note(SweepFinished(sweep))
 
     def _observe(self, sweep: Sweep) -> None:
-        if self.recording.along is not None:
-            self.recording.along.observe(sweep)
+        if self.along is not None:
+            self.along.observe(sweep)
 
     def rest(self, rest: Rest) -> None:
         """Stand still: the readings here show the bias and the noise."""
-        recorder = self.recording.recorder
         with self._step(rest):
-            recorder.add(RestStarted())
+            self.recording.note(RestStarted())
             self.devices.arm.rest(rest.duration_s, lambda: self._watch(rest))
-            recorder.add(RestFinished())
+            self.recording.note(RestFinished())
 
     def solve_on_board(self) -> None:
         """Let the board compute its own calibration from what it has averaged; it stands beside the host's."""
-        if self.recording.along is not None:
-            self.recording.along.solve()
+        if self.along is not None:
+            self.along.solve()
 
     def readings(self) -> dict[str, str]:
         """What every sensor streams, "raw" or "calibrated", by its name."""

@@ -9,6 +9,7 @@ from firmware_host.client import BoardIdentity
 from rig.analysis.verdict import Check
 from rig.arm.motion import Plan, Step
 from rig.arm.state import ArmReport
+from rig.data.events import Event
 from rig.errors import RigError
 
 Vector = tuple[float, float, float]
@@ -174,8 +175,10 @@ class Crashed:
     traceback: str
 
 
+# What the recording keeps is told as well: sweeps, rests, and what the board observed and solved.
 RunEvent = (
-    Message
+    Event
+    | Message
     | BoardConnected
     | ArmConnected
     | RunResumed

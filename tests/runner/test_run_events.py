@@ -9,7 +9,9 @@ from typing import Any
 
 import pytest
 
+from rig.arm.motion import Sweep
 from rig.commands.configured import configured
+from rig.data.events import BoardObserved, BoardSolved, RestFinished, RestStarted, SweepFinished, SweepStarted
 from rig.runner.phases import Run
 from rig.station.events import (
     Answered,
@@ -77,7 +79,8 @@ def phases(events: list[RunEvent]) -> list[list[RunEvent]]:
 def test_the_phases_come_one_after_the_other(events: list[RunEvent]) -> None:
     told = [type(event) for event in events if not isinstance(event, Message)]
     steps = (StepStarted, Progress, SamplesTaken, StepFinished)
-    around = [kind for kind in told if kind not in steps and kind.__name__ not in ("BoardObserved", "BoardSolved")]
+    recorded = (SweepStarted, SweepFinished, RestStarted, RestFinished, BoardObserved, BoardSolved)
+    around = [kind for kind in told if kind not in (*steps, *recorded)]
     connected = [BoardConnected, ArmConnected, PhaseStarted, PreflightPassed]
     checks = around.count(Checked)
     assert around == [
@@ -125,6 +128,21 @@ def test_every_sensors_samples_are_counted(events: list[RunEvent]) -> None:
         assert spinning > 2.0
         recorded = phase[-1]
         assert isinstance(recorded, PhaseRecorded) and recorded.sensors[0].samples >= taken[-1].sensors[0].samples
+
+
+def test_the_observations_come_as_they_are_made(events: list[RunEvent]) -> None:
+    calibration, verification = phases(events)
+    place: StepStarted | None = None
+    for event in calibration:
+        if isinstance(event, StepStarted):
+            place = event
+        if isinstance(event, BoardObserved):
+            assert place is not None and isinstance(place.step, Sweep) and place.step.index == event.sweep
+            assert max(map(abs, event.observation.mean_rad_s)) == pytest.approx(event.speed_rad_s, rel=0.3)
+    observed = [event for event in calibration if isinstance(event, BoardObserved)]
+    assert [(event.sensor, event.sweep) for event in observed] == [("gyro", sweep) for sweep in range(6)]
+    assert {event.solution.method for event in calibration if isinstance(event, BoardSolved)} >= {"closed_form"}
+    assert not any(isinstance(event, BoardObserved) for event in verification)
 
 
 IMPORTS = """
