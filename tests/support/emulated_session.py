@@ -71,6 +71,7 @@ class Session:
         self._tick_s = tick_s
         self.reader = FrameReader()
         self._frames: list[Frame] = []
+        self._asked = 0  # number of the latest request
 
     def _counted(self, part: str, rate_at: Callable[[float], Sequence[float]]) -> Callable[[float], Sequence[float]]:
         def counted_rate_at(time_s: float) -> Sequence[float]:
@@ -93,8 +94,9 @@ class Session:
 
     def ask(self, name: str, **values: Any) -> Frame:
         """Send a request. Returns its answer, which comes within 50 ms."""
-        self.board.receive(encode(name, 77, values))
-        (answer,) = [frame for frame in self.run(0.05) if frame.values.get("reply_to") == 77]
+        self._asked = self._asked % 255 + 1
+        self.board.receive(encode(name, self._asked, values))
+        (answer,) = [frame for frame in self.run(0.05) if frame.values.get("reply_to") == self._asked]
         return answer
 
     def configure(self, part: str, rate_hz: float | None = None, range_deg_s: float | None = None) -> Frame:
