@@ -46,8 +46,9 @@ def plot_readings(readings: Readings) -> Plot:
             axes.axvspan(finished.window.start_s - time_s[0], finished.window.end_s - time_s[0], color="0.92", lw=0)
     for i, axis in enumerate("xyz"):
         axes.plot(time_s - time_s[0], rate_rad_s[:, i], lw=0.7, label=axis)
-    axes.set(xlabel="time s", ylabel="reading rad/s", title=f"{readings.name}, {readings.sensor.mode} readings")
-    axes.legend(loc="upper right", ncols=3, frameon=False)
+    axes.set(xlabel="time s", ylabel="reading rad/s")
+    axes.set_title(f"{readings.name}, {readings.sensor.mode} readings", loc="left")
+    axes.legend(loc="lower right", bbox_to_anchor=(1, 1), borderaxespad=0, ncols=3, frameon=False)
     return Plot(figure)
 
 
@@ -71,14 +72,15 @@ def plot_residuals(result: Result) -> Plot:
             places = np.arange(len(averages)) + (i - 1) * 0.15
             axes.errorbar(places, model.residuals_rad_s[:, i], std[:, i], fmt="o", ms=3, lw=0.8, label=axis)
         axes.axhline(0, color="0.5", lw=0.8)
-        axes.set(ylabel="residual rad/s", title=f"{name}: reading − model, ± 1σ")
+        axes.set(ylabel="residual rad/s")
+        axes.set_title(f"{name}: reading − model, ± 1σ", loc="left")
         axes.set_xticks(
             range(len(averages)),
             [f"{o.joint_name} {o.direction}" for o in found.observations] + ["rest"] * len(found.rests),
             rotation=60,
             ha="right",
         )
-        axes.legend(loc="upper right", ncols=3, frameon=False)
+        axes.legend(loc="lower right", bbox_to_anchor=(1, 1), borderaxespad=0, ncols=3, frameon=False)
     return Plot(figure)
 
 
