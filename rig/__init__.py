@@ -16,14 +16,18 @@ These names are the public ones; where they are made may change. To import them 
 from typing import TYPE_CHECKING, Any
 
 if TYPE_CHECKING:
-    from rig.notebook.beside import compare
-    from rig.notebook.results import solve
-    from rig.notebook.runs import load
+    from rig.notebook.beside import Beside, compare
+    from rig.notebook.results import Calibration, Result, solve
+    from rig.notebook.runs import Readings, Run, load
 
 __version__ = "0.1.0"
-__all__ = ["__version__", "compare", "load", "solve"]
+__all__ = ["Beside", "Calibration", "Readings", "Result", "Run", "__version__", "compare", "load", "solve"]
 
-_PLACES = {"compare": "rig.notebook.beside", "load": "rig.notebook.runs", "solve": "rig.notebook.results"}
+_PLACES = {
+    **dict.fromkeys(("Beside", "compare"), "rig.notebook.beside"),
+    **dict.fromkeys(("Calibration", "Result", "solve"), "rig.notebook.results"),
+    **dict.fromkeys(("Readings", "Run", "load"), "rig.notebook.runs"),
+}
 
 
 def __getattr__(name: str) -> Any:

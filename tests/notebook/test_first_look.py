@@ -1,0 +1,24 @@
+"""The notebook in the docs runs from its first cell to its last, and shows what it says."""
+
+import nbformat
+import pytest
+from nbclient import NotebookClient
+
+from support.paths import DOCS
+
+NOTEBOOK = DOCS / "notebooks" / "first_look.ipynb"
+
+
+@pytest.mark.slow
+@pytest.mark.filterwarnings("ignore::DeprecationWarning")  # of Jupyter's own packages
+def test_the_notebook_runs_and_shows_tables_and_pictures() -> None:
+    notebook = nbformat.read(NOTEBOOK, as_version=4)
+    NotebookClient(notebook, timeout=100, resources={"metadata": {"path": NOTEBOOK.parent}}).execute()
+    shown = [output.get("data", {}) for cell in notebook.cells if cell.cell_type == "code" for output in cell.outputs]
+    assert sum("image/png" in data for data in shown) == 3
+    assert sum("text/html" in data for data in shown) == 4
+    assert any("verdict: pass" in data.get("text/html", "") for data in shown)
+
+
+def test_no_output_is_kept_in_the_notebook() -> None:
+    assert not any(cell.get("outputs") for cell in nbformat.read(NOTEBOOK, as_version=4).cells)
