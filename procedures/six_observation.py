@@ -11,8 +11,10 @@ What happens: the arm goes home; wrist 3 turns 360° clockwise, rests, turns bac
 Ctrl-C stops the arm at any moment and keeps what was measured.
 """
 
+from rig.cli import run_script  # first: it keeps linear algebra to one thread
+
+# isort: split
 from rig.arm.motion import Rest, Sweep, Transfer
-from rig.cli import run_script
 from rig.config.procedure_sections import SixObservationSection
 from rig.plans.registry import Procedure
 from rig.plans.six_sweeps import plan_six_observation

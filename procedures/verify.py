@@ -12,9 +12,11 @@ says `verify: true`. Ctrl-C stops the arm at any moment and keeps what was measu
 
 from collections.abc import Sequence
 
+from rig.cli import run_script  # first: it keeps linear algebra to one thread
+
+# isort: split
 from procedures.six_observation import movement
 from rig.analysis.outcome import Outcome, outcome_of, verified
-from rig.cli import run_script
 from rig.config.procedure_sections import VerifySection
 from rig.data.run_file import RunData
 from rig.plans.registry import Procedure

@@ -1,6 +1,7 @@
 """The command line. Heavy modules are imported by the command that needs them, so that help comes at once."""
 
 import argparse
+import os
 import signal
 import sys
 import traceback
@@ -14,6 +15,11 @@ from rig.errors import Fault, Refused, RigError
 
 if TYPE_CHECKING:
     from rig.plans.registry import AnyProcedure
+
+# The rig's linear algebra is small: threads only get in its way, most of all on a busy machine. NumPy asks when it is
+# loaded, so this must be said before; whoever has said otherwise is heeded.
+for _library in ("OPENBLAS", "OMP", "MKL"):
+    os.environ.setdefault(f"{_library}_NUM_THREADS", "1")
 
 _BOARD = "look at the board, read and change its stored calibrations, flash its firmware"
 FAULT, INTERRUPTED = Fault.exit_status, 130

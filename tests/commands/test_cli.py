@@ -4,6 +4,7 @@ import json
 import os
 import subprocess
 import sys
+from pathlib import Path
 
 import pytest
 
@@ -59,3 +60,16 @@ def test_the_plan_of_a_verification_is_not_said_to_be_repeated() -> None:
     plan = f"{sys.executable} -m rig plan {ROOT / 'configs' / 'lsm9ds1_adis16465.yaml'}"
     assert "the same once more to verify it" in shell(plan).stdout
     assert "once more" not in shell(f"{plan} --set procedure.name=verify").stdout
+
+
+THREADS = "import os, numpy; numpy.ones((900, 900)) @ numpy.ones((900, 900)); print(len(os.listdir('/proc/self/task')))"
+
+
+@pytest.mark.skipif((os.cpu_count() or 1) < 2 or not Path("/proc/self/task").exists(), reason="needs two cores, Linux")
+def test_the_rigs_linear_algebra_runs_on_one_thread_unless_told_otherwise() -> None:
+    def threads(first: str, told: str = "-u OPENBLAS_NUM_THREADS") -> str:
+        return shell(f'env {told} {sys.executable} -c "import {first}; {THREADS}"').stdout
+
+    assert threads("rig.cli") == threads("procedures.six_observation") == "1\n"
+    assert threads("rig") != "1\n"  # a notebook's own business
+    assert threads("rig.cli", told="OPENBLAS_NUM_THREADS=2") == "2\n"

@@ -1,0 +1,99 @@
+"""What the end of a run costs: `python benchmarks/end_of_run.py [RUN_FOLDER] [--rounds N]`.
+
+Observe, solve, judge, compare and write, of a verified run recorded at commit af3b9f0 (left out: the fixture of the
+tests), by the rig of that commit and by this one, in turn, each in a process of its own. Printed is CPU time, user and
+system, child processes included: the least of all rounds, and the ratio. Both have read the recordings and loaded
+SciPy's interpolation before, as a run has; matplotlib they load themselves. Reading is told apart.
+
+For the paper's experiment give a folder that `rig run configs/lsm9ds1_adis16465.yaml` of that commit has made.
+"""
+
+import argparse
+import io
+import json
+import os
+import subprocess
+import sys
+import tarfile
+import tempfile
+from pathlib import Path
+
+ROOT = Path(__file__).parents[1]
+FIXTURE = ROOT / "tests" / "fixtures" / "af3b9f0" / "verified"
+BEFORE = "af3b9f0"
+
+# As `Session.calibrate` of that commit ended a run, and as `Run.carry_out` of this one does.
+OLD = """
+from rig.recording import read_run
+from rig.report.outcome import outcome_of, write_outcome
+
+def end(runs, repeated, folder):
+    outcome_of(runs)
+    list(write_outcome(folder, outcome_of(runs, repeated)))
+"""
+NEW = """
+import rig.cli
+from rig.analysis.outcome import outcome_of, verified
+from rig.data.run_file import read_run
+from rig.report.writers import write_outcome
+
+def end(runs, repeated, folder):
+    list(write_outcome(folder, verified(outcome_of(runs), repeated)))
+"""
+MEASURE = """
+import json, resource, sys
+from pathlib import Path
+import scipy.interpolate
+
+def cpu_s():
+    used = [resource.getrusage(who) for who in (resource.RUSAGE_SELF, resource.RUSAGE_CHILDREN)]
+    return sum(each.ru_utime + each.ru_stime for each in used)
+
+recorded, folder = map(Path, sys.argv[1:])
+began_s = cpu_s()
+runs, repeated = [read_run(recorded / "run.h5")], [read_run(recorded / "verify.h5")]
+read_s = cpu_s()
+end(runs, repeated, folder)
+print(json.dumps([cpu_s() - read_s, read_s - began_s]))
+"""
+
+
+def measure(program: str, house: Path, recorded: Path) -> tuple[float, float]:
+    """CPU seconds of the end of a run and of reading its recordings, by the rig that lies in `house`."""
+    with tempfile.TemporaryDirectory() as folder:
+        done = subprocess.run(
+            [sys.executable, "-c", program + MEASURE, str(recorded), folder],
+            env={**os.environ, "PYTHONPATH": str(house)},
+            cwd=house,
+            stdout=subprocess.PIPE,
+            check=True,
+        )
+        assert (Path(folder) / "result.json").exists()
+    end_s, read_s = json.loads(done.stdout)
+    return end_s, read_s
+
+
+def main() -> None:
+    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
+    parser.add_argument("run_folder", nargs="?", type=Path, default=FIXTURE)
+    parser.add_argument("--rounds", type=int, default=3)
+    options = parser.parse_args()
+    recorded = options.run_folder.resolve()
+    with tempfile.TemporaryDirectory() as earlier:
+        archive = subprocess.run(["git", "archive", BEFORE], cwd=ROOT, stdout=subprocess.PIPE, check=True).stdout
+        with tarfile.open(fileobj=io.BytesIO(archive)) as files:
+            files.extractall(earlier, filter="data")
+        houses = {BEFORE: (OLD, Path(earlier)), "now": (NEW, ROOT)}
+        rounds = [
+            {name: measure(program, house, recorded) for name, (program, house) in houses.items()}
+            for _ in range(options.rounds)
+        ]
+    least_s = {name: min(each[name][0] for each in rounds) for name in houses}
+    for name in houses:
+        told = ", ".join(f"{each[name][0]:.2f}" for each in rounds)
+        print(f"{name:8} end of run {least_s[name]:.2f} s CPU (rounds: {told}); reading {rounds[0][name][1]:.2f} s")
+    print(f"ratio {least_s['now'] / least_s[BEFORE]:.2f}")
+
+
+if __name__ == "__main__":
+    main()
