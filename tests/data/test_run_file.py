@@ -194,6 +194,7 @@ def reports(pipe: Connection) -> list[tuple[float, int]]:
         return said
 
 
+@pytest.mark.slow
 def test_a_killed_run_opens_and_holds_all_but_the_last_second(tmp_path: Path) -> None:
     processes = multiprocessing.get_context("forkserver")
     processes.set_forkserver_preload(["h5py", "rig.data.run_file"])
