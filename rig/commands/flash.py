@@ -1,5 +1,7 @@
 """`rig board flash`: the firmware that comes with this program onto the board."""
 
+from collections.abc import Callable
+from functools import partial
 from pathlib import Path
 
 from firmware_host import flashing
@@ -12,12 +14,15 @@ def flash(probe_id: str | None, drive: Path | None, *, by_drive: bool, assume_ye
     """Put the shipped image onto the board, through its debug probe or by a copy to its USB drive."""
     with refusing():
         image = flashing.shipped_image()
+        put: Callable[[], object]
         if by_drive:
             target = drive or flashing.find_drive()
             flashing.refuse_other_drive(target)
+            put = partial(flashing.flash_by_drive, image, target)
             way, calibrations = f"the drive {target}", "may be lost: read them out first"
         else:
             probe = flashing.find_probe(probe_id)
+            put = partial(flashing.flash_by_probe, image, probe)
             way, calibrations = f"the debug probe {probe.unique_id}", "stay"
     agreed_or_refused(
         [
@@ -28,9 +33,6 @@ def flash(probe_id: str | None, drive: Path | None, *, by_drive: bool, assume_ye
         assume_yes,
     )
     with changing():
-        if by_drive:
-            flashing.flash_by_drive(image, target)
-        else:
-            flashing.flash_by_probe(image, probe)
+        put()
     print(f"flashed: firmware {FIRMWARE_VERSION}; see it with `rig board info CONFIG`")
     return 0
