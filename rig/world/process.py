@@ -77,6 +77,7 @@ class World:
             "pty": self._pty.path if self._pty else None,
             "control": f"{host}:{control_port}",
         }
+
     def describe(self) -> str:
         """The line that says where everything listens."""
         return json.dumps(self._description)
