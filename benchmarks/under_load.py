@@ -33,7 +33,7 @@ VERDICTS = {0: "pass", 1: "fail"}
 
 @dataclass(frozen=True, slots=True)
 class Demo:
-    """How one run ended: `verdict`, or the name of the error; its wall time, its arm states and how many are missing."""
+    """How one run ended: `verdict`, or the name of the error; its wall time, its arm states and those missing."""
 
     ending: str
     exit_status: int

@@ -1,7 +1,6 @@
 """The host end of the link: asks the board, and passes on the samples it streams."""
 
 import contextlib
-import time
 from collections.abc import Callable, Collection, Sequence
 from dataclasses import replace
 from types import TracebackType
@@ -41,6 +40,7 @@ __all__ = [
 
 # Erasing a flash page takes 22 ms, in which the microcontroller hears nothing: a request repeated meanwhile is lost.
 _FLASH_TIMEOUT_S = 4.0
+_SILENCE_S = 1.0  # without a frame in a stream, and the link is lost
 _ABOUT_THE_BOARD = ("unknown_message", "bad_length", "busy_streaming")  # errors that no sensor has a part in
 
 
@@ -51,7 +51,7 @@ class Board:
     name the board's refusal has in `protocol.ERRORS` (`sensor_absent`, `no_calibration`, …), or `board_link_lost`.
     """
 
-    def __init__(self, port: str, baud: int, on_samples: Callable[[SampleBatch], None], timeout_s: float = 1.0) -> None:
+    def __init__(self, port: str, baud: int, on_samples: Callable[[SampleBatch], None], timeout_s: float = 4.0) -> None:
         """Opens the port and says hello. Raises BoardError: no_port, no_board, wrong_baud_rate, version_mismatch."""
         self._on_samples = on_samples
         self._timeout_s = timeout_s
@@ -147,11 +147,11 @@ class Board:
         """Raises what went wrong meanwhile: the board's own error, or board_link_lost (closed, silent in a stream)."""
         if self._link.fault is not None:
             raise self._link.fault
-        silent_s = time.monotonic() - self._link.last_frame_s
-        if self._streaming and silent_s > self._timeout_s:
+        if self._streaming and self._link.silent_s > min(self._timeout_s, _SILENCE_S):
             raise BoardError(
                 "board_link_lost",
-                f"no readable frame from the board on {self._link.port} for {silent_s:.1f} s while it should stream",
+                f"no readable frame from the board on {self._link.port} for {self._link.silent_s:.1f} s "
+                "while it should stream",
                 "Check the board's supply and cable, and whether another program has the port",
             )
 

@@ -12,7 +12,7 @@ from firmware_host.frames import Frame, FrameReader, encode
 
 _READ_TIMEOUT_S = 0.005  # pyserial waits for all bytes asked for or this long, so it is the delay of every read
 _READ_SIZE = 65536
-_ATTEMPTS = 4  # times a request is sent before the board counts as gone
+_ATTEMPTS = 4  # times a request is sent before the board counts as gone; each waits twice as long as the one before
 
 
 class _Request:
@@ -37,7 +37,7 @@ class BoardLink:
         self.baud = baud
         self.fault: Exception | None = None  # the first thing that went wrong; nothing works from then on
         self.frames_seen = 0
-        self.last_frame_s = time.monotonic()
+        self._reads_without_frame = 0
         self._on_frame = on_frame
         self._frames = FrameReader()
         self._requests: dict[int, _Request] = {}
@@ -59,6 +59,11 @@ class BoardLink:
     def bytes_seen(self) -> int:
         """Bytes that ever came, readable or not."""
         return self._frames.bytes_seen
+
+    @property
+    def silent_s(self) -> float:
+        """How long no frame has come, in time spent reading: when the reader was held up, nobody was silent."""
+        return self._reads_without_frame * _READ_TIMEOUT_S
 
     @property
     def frames_lost(self) -> int:
@@ -88,10 +93,10 @@ class BoardLink:
             self._sequence = sequence = self._sequence % 255 + 1
         request = self._requests[sequence] = _Request(name)
         try:
-            for _ in range(_ATTEMPTS):
+            for attempt in range(_ATTEMPTS):
                 if self.fault is None:
                     self._send(name, sequence, values or {})
-                    request.answered.wait(timeout_s / _ATTEMPTS)
+                    request.answered.wait(timeout_s * 2**attempt / (2**_ATTEMPTS - 1))
                 if request.answer is not None:
                     return request.answer
                 if self.fault is not None:
@@ -150,8 +155,9 @@ class BoardLink:
             while not self._closing.is_set():
                 data = self._receive()
                 host_time_s = time.monotonic()
+                self._reads_without_frame += 1
                 for frame in self._frames.feed(data):
-                    self.last_frame_s = host_time_s
+                    self._reads_without_frame = 0
                     self.frames_seen += 1
                     self._take(frame, host_time_s)
         except Exception as error:  # a lost link or a failing consumer must reach the caller, not end in a dead thread

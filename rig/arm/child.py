@@ -11,6 +11,7 @@ import sys
 import threading
 import time
 import traceback
+from contextlib import suppress
 from multiprocessing.connection import Connection
 from pathlib import Path
 from typing import Any, NoReturn
@@ -24,10 +25,12 @@ from rig.arm.messages import (
     Message,
     Move,
     MoveFinished,
+    MoveStarted,
     Request,
     Stop,
     TakeControl,
 )
+from rig.arm.silence import Silence
 from rig.arm.state import ArmState
 from rig.arm.stopping import BRAKE_RAD_S2
 from rig.errors import Problem
@@ -36,7 +39,8 @@ POLL_S = 0.0003  # packets come every 8 ms, or every 0.8 ms when the controller'
 HEARTBEAT_S = 0.01
 FIRST_PACKET_S = 3.0
 TICK_S = 0.1
-PARENT_TICKS = 20  # 2 s without a sign of the parent's life; ticks, because this process may be held up itself
+PARENT_TICKS = 20  # 2 s without a sign of the parent's life
+NICENESS = -10  # where no real-time priority is to be had
 PAYLOAD_S = 1.0  # the payload shows in the states within this
 PAYLOAD_TOLERANCE_KG = 0.01
 
@@ -60,6 +64,7 @@ VARIABLES = [
 def main(pipe: "Connection[Message, Request]", host: str, state_rate_hz: float, log: str | None) -> None:
     """Run until the parent ends the process or disappears. `log` names the file that takes the client's own output."""
     _outlive_the_parent()
+    _be_urgent()
     _send_output_to(log)
     child = _Child(pipe, host, state_rate_hz)
     signal.signal(signal.SIGTERM, lambda *_: child.abandon())
@@ -89,7 +94,7 @@ class _Child:
         self._holds_arm = False  # our program may run on the controller
         self._operations_before: int | None = None  # change count before the running move; None when none runs
         self._serving = False  # a request is being served: others, and the parent's signs of life, wait in the pipe
-        self._silent_ticks = 0
+        self._parent = Silence(os.getppid())
 
     def send(self, message: Message) -> None:
         with self._sending:
@@ -164,7 +169,7 @@ class _Child:
                 request = self._pipe.recv()
                 self._serving = True
                 self._handle(request)
-                self._silent_ticks = 0
+                self._parent.heard()
                 self._serving = False
         except (EOFError, OSError):  # the parent is gone
             self.abandon()
@@ -179,8 +184,8 @@ class _Child:
         """
         while True:
             time.sleep(TICK_S)
-            self._silent_ticks += 1
-            if self._holds_arm and not self._serving and self._silent_ticks > PARENT_TICKS:
+            self._parent.tick()
+            if self._holds_arm and not self._serving and self._parent.lasts_over(PARENT_TICKS):
                 self.abandon()
 
     def _handle(self, request: Request) -> None:
@@ -219,6 +224,7 @@ class _Child:
             self.send(Failed(_move_failure(f"the client refused the move ({error})")))
             return
         if started:
+            self.send(MoveStarted())
             self._operations_before = before
         else:
             self.send(Failed(_move_failure("the controller did not start the move")))
@@ -250,6 +256,17 @@ def _outlive_the_parent() -> None:
     signal.signal(signal.SIGINT, signal.SIG_IGN)
     if hasattr(os, "setsid"):  # POSIX: a session of its own, which no key and no closed terminal reaches
         os.setsid()
+
+
+def _be_urgent() -> None:
+    """Run before others where that is allowed: a state that is not read before the next one comes is lost.
+
+    The threads that are started afterwards, the client's among them, inherit it.
+    """
+    with suppress(OSError, AttributeError):  # not permitted; not on this system
+        os.nice(NICENESS)
+    with suppress(OSError, AttributeError):
+        os.sched_setscheduler(0, os.SCHED_RR, os.sched_param(os.sched_get_priority_min(os.SCHED_RR)))
 
 
 def _send_output_to(log: str | None) -> None:

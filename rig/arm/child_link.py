@@ -10,12 +10,12 @@ from pathlib import Path
 
 from rig.arm import child
 from rig.arm.messages import Alive, Heartbeat, Message, Request
+from rig.arm.silence import Silence
 from rig.errors import Problem
 
 TICK_S = 0.05
-# Silence is counted in ticks of the guard, not in elapsed time: when this process itself was held up, nothing is late.
 SILENT_TICKS = 10  # 0.5 s without a heartbeat
-FROZEN_TICKS = 14  # 0.7 s of heartbeats without a new state
+FROZEN_TICKS = 16  # 0.8 s with heartbeats but no new state
 STALE_TICKS = 2  # when the child ends after 0.1 s without a new state, it had lost the arm before
 CRASHES = (-signal.SIGSEGV, -signal.SIGABRT)  # how the client itself ends when the arm closes a connection
 PATIENT_TICKS = 240  # 12 s while a client's constructor holds the child's interpreter, at worst until its 5 s time-out
@@ -38,8 +38,9 @@ class ChildLink:
         self._ended = threading.Event()
         self._sending = threading.Lock()
         self._patient = False
-        self._silent_ticks = 0
-        self._frozen_ticks = 0
+        self._silent = Silence(0)  # no message; counted once the child runs
+        self._beaten = False  # there was a heartbeat since the guard's last tick
+        self._frozen_ticks = 0  # with a heartbeat, without a new state
         context = multiprocessing.get_context("spawn")
         self._pipe: Connection[Request, Message]
         self._pipe, self._child_pipe = context.Pipe()
@@ -59,6 +60,8 @@ class ChildLink:
         with _interrupts_held():
             self._process.start()
         self._child_pipe.close()
+        assert self._process.pid is not None
+        self._silent = Silence(self._process.pid)
         for thread in self._threads:
             thread.start()
 
@@ -77,7 +80,8 @@ class ChildLink:
         try:
             yield
         finally:
-            self._silent_ticks = self._frozen_ticks = 0
+            self._silent.heard()
+            self._frozen_ticks = 0
             self._patient = False
 
     @property
@@ -108,9 +112,10 @@ class ChildLink:
         try:
             while True:
                 message = self._pipe.recv()
-                self._silent_ticks = 0
-                if isinstance(message, Heartbeat) and message.states:
-                    self._frozen_ticks = 0
+                self._silent.heard()
+                if isinstance(message, Heartbeat):
+                    self._beaten = True
+                    self._frozen_ticks *= not message.states
                 self._on_message(message)
         except (EOFError, OSError):
             if not self._ended.is_set():
@@ -124,9 +129,10 @@ class ChildLink:
     def _guard(self) -> None:
         while not self._ended.wait(TICK_S):
             self.send(Alive())
-            self._silent_ticks += 1
-            self._frozen_ticks += 1
-            if self._silent_ticks > (PATIENT_TICKS if self._patient else SILENT_TICKS):
+            self._silent.tick()
+            self._frozen_ticks += self._beaten
+            self._beaten = False
+            if self._silent.lasts_over(PATIENT_TICKS if self._patient else SILENT_TICKS):
                 return self._give_up("arm_driver_hung", "the process that talks to the arm no longer answers")
             if self._frozen_ticks > (PATIENT_TICKS if self._patient else FROZEN_TICKS):
                 return self._give_up("arm_link_lost", f"no new state comes from the arm at {self._host}")

@@ -1,6 +1,7 @@
 """The arm as the procedure sees it: supervised moves and rests, a stream of states, and a stop that always works."""
 
 import threading
+import time
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from dataclasses import replace
@@ -19,6 +20,8 @@ from rig.errors import Fault, Problem, Refused, RigError
 
 WATCH_S = 0.02  # the caller's watch is called at least this often
 ARRIVAL_RAD = 0.01  # the joint servo's ripple and lag stay below this
+START_S = 5.0  # a move begins within this (wall time), or not at all
+ANSWER_S = 5.0  # the dashboard has so long to answer while nothing moves
 SLOWNESS = 1.1  # a move may take this much longer than planned …
 SLOWNESS_S = 1.0  # … plus this, in the controller's time
 INTERRUPTION_S = 0.05  # a stopped program waits so long for the safety bits that explain it
@@ -92,7 +95,7 @@ class Arm:
             raise RuntimeError("start() comes first")
         self.check()
         try:
-            with Dashboard(self._host) as dashboard:
+            with Dashboard(self._host, ANSWER_S) as dashboard:
                 return ArmReport(
                     host=self._host,
                     polyscope=dashboard.polyscope(),
@@ -151,8 +154,12 @@ class Arm:
         """
         with self._stopping_on_error():
             self._doing = motion.name
-            deadline_s = self.latest.time_s + motion.duration_s * SLOWNESS + SLOWNESS_S
             self._request(Move(motion.target_q_rad, motion.speed_rad_s, motion.acceleration_rad_s2))
+            asked_s = time.monotonic()
+            self._wait(lambda: self._answer is not None or time.monotonic() > asked_s + START_S, watch)
+            deadline_s = self.latest.time_s + motion.duration_s * SLOWNESS + SLOWNESS_S
+            if self._answer is None:
+                self._fail(_not_started(motion))
             self._wait(lambda: self._has_ended(motion) or self.latest.time_s > deadline_s, watch)
             if isinstance(self._answer, Failed):
                 self._wait_for_reason()
@@ -293,6 +300,14 @@ class Arm:
         with self._changed:
             self._changed.wait_for(lambda: at_rest() or self._link.ended, timeout_s)
             return at_rest()
+
+
+def _not_started(motion: Motion) -> Problem:
+    return Problem(
+        "move_refused",
+        f"{motion.name} was not begun within {START_S:g} s",
+        "Read the pendant's log, then start again",
+    )
 
 
 def look(host: str) -> ArmReport:

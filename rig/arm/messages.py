@@ -18,7 +18,7 @@ class TakeControl:
 
 @dataclass(frozen=True, slots=True)
 class Move:
-    """Start a joint-space movement. Answered by `MoveFinished` when the arm has arrived, or by `Failed`."""
+    """Start a joint-space movement. Answered by `MoveStarted` and `MoveFinished`, or by `Failed`."""
 
     target_q_rad: Joints
     speed_rad_s: float
@@ -63,6 +63,11 @@ class ControlTaken:
 
 
 @dataclass(frozen=True, slots=True)
+class MoveStarted:
+    """The controller has taken the movement on."""
+
+
+@dataclass(frozen=True, slots=True)
 class MoveFinished:
     """The controller reports the end of the movement."""
 
@@ -74,4 +79,4 @@ class Failed:
     problem: Problem
 
 
-Message = Connected | Heartbeat | ControlTaken | MoveFinished | Failed
+Message = Connected | Heartbeat | ControlTaken | MoveStarted | MoveFinished | Failed

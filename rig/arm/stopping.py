@@ -10,6 +10,7 @@ from rig.arm.messages import Stop
 
 STOP_S = 0.9  # a stop is confirmed within this, or not at all
 DASHBOARD_S = 0.8  # the dashboard has so long to answer
+ASK_S = 0.05  # … and is asked so often whether the program has ended
 BRAKE_RAD_S2 = 5.0
 
 
@@ -66,9 +67,27 @@ class Stopper:
             delivered = f"the controller's dashboard did not take the stop ({error})"
         if self._seen_at_rest(began_s, began_s + STOP_S - time.monotonic()):
             self._outcome = StopOutcome(True, "the arm is stopped and at rest")
+        elif self._program_ended(began_s + STOP_S):
+            self._outcome = StopOutcome(
+                False,
+                "the controller says that its program has ended, but no state shows that the arm is at rest",
+                "Look at the arm: nothing drives it any more",
+            )
         else:
             self._outcome = StopOutcome(
                 False,
                 f"{delivered}, but no state confirms that the arm is at rest",
                 "Look at the arm and press the emergency stop if it moves",
             )
+
+    def _program_ended(self, deadline_s: float) -> bool:
+        """Whether the controller says so itself by then: what is left to ask when no states come."""
+        try:
+            while (left_s := deadline_s - time.monotonic()) > 0.0:
+                with Dashboard(self._host, timeout_s=left_s) as dashboard:
+                    if not dashboard.program_running():
+                        return True
+                time.sleep(ASK_S)
+        except OSError:
+            return False
+        return False

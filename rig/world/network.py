@@ -68,9 +68,10 @@ class Connection:
 
     def deliver(self) -> float:
         """Send what the last tick made if the client has taken what came before; else the wall time to wait."""
+        self._wire.look()
         if not self._due or self.listener.silent:
             return 0.0
-        wait_s = 0.0 if self.listener.allowance == UNPACED else self._wire.wait_s()
+        wait_s = self._wire.wait_s()
         if wait_s <= 0.0:
             due, self._due = self._due, b""
             self.send(due)
@@ -149,9 +150,15 @@ class Listener:
     """
 
     def __init__(
-        self, network: "Network", host: str, port: int, new_session: Callable[[], Session], limit: int, allowance: int
+        self,
+        network: "Network",
+        address: tuple[str, int],
+        new_session: Callable[[], Session],
+        *,
+        limit: int,
+        allowance: int,
     ) -> None:
-        self._network, self.host, self.port = network, host, port
+        self._network, self._address = network, address
         self._new_session, self._limit, self.allowance = new_session, limit, allowance
         self.silent = False
         self._socket: socket.socket | None = None
@@ -165,16 +172,17 @@ class Listener:
         """Start listening. Raises `Refused` when the address cannot be had."""
         if self._socket is not None:
             return
+        host, port = self._address
         listening = socket.socket(socket.AF_INET, socket.SOCK_STREAM)
         listening.setsockopt(socket.SOL_SOCKET, socket.SO_REUSEADDR, 1)
         try:
-            listening.bind((self.host, self.port))
+            listening.bind(self._address)
             listening.listen(16)
         except OSError as error:
             listening.close()
             raise Refused(
                 "port_in_use",
-                f"the simulated laboratory cannot listen on {self.host}:{self.port} ({error.strerror})",
+                f"the simulated laboratory cannot listen on {host}:{port} ({error.strerror})",
                 "End the other simulation, or give this one another loopback address in arm.host and board.port",
             ) from None
         listening.setblocking(False)
@@ -230,9 +238,9 @@ class Network:
         self.connections: list[Connection] = []
 
     def listen(
-        self, host: str, port: int, new_session: Callable[[], Session], limit: int = 16, allowance: int = UNPACED
+        self, host: str, port: int, new_session: Callable[[], Session], *, limit: int = 16, allowance: int = UNPACED
     ) -> Listener:
-        listener = Listener(self, host, port, new_session, limit, allowance)
+        listener = Listener(self, (host, port), new_session, limit=limit, allowance=allowance)
         self.listeners.append(listener)
         return listener
 

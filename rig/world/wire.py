@@ -9,13 +9,11 @@ import socket
 import struct
 from collections.abc import Callable
 
-PATIENCE_S = (
-    1.5  # a client that takes nothing for so long is not waited for until it has caught up: it is dead or hangs
-)
+PATIENCE_S = 1.5  # a client that takes nothing for so long is not waited for until it has caught up: it hangs
 # A client that keeps only the newest packet must look at one before the next comes, so it is given some time after it
 # has taken one: so many times as long as it took of late, which grows with the load of the machine.
 LATENESS = 2.0
-GAP_S = (0.0004, 0.003)  # … but at least and at most this
+GAP_S = (0.0004, 0.01)  # … but at least and at most this
 FORGETTING = 0.995  # of how late a client was, at every packet
 LOOK_S = (0.0001, 0.001)  # time between two looks at a client that is waited for: a quarter of its delay, within these
 
@@ -72,7 +70,7 @@ class SocketTable:
 
 
 class Wire:
-    """One client's pace. `wait_s` says how long the next packet has to wait; 0 when it may go.
+    """One client's pace: `look` at it often, and send the next packet when `wait_s` is 0.
 
     The wire is free while at most `allowance` bytes are unread; a client with an allowance reads every byte in the end
     and needs no time of its own after it.
@@ -81,28 +79,36 @@ class Wire:
     def __init__(self, unread: Unread, allowance: int, wall: Callable[[], float]) -> None:
         self._unread, self._allowance, self._wall = unread, allowance, wall
         self._sent_s: float | None = None  # when the first packet went that is not known to be taken
-        self._taken_s = -1.0e9
+        self._free_s = 0.0  # from when on the next packet may go
         self._late_s = 0.0
-        self._given_up = False
+        self._seen_waiting = False
 
     def sent(self) -> None:
         """Something was sent."""
         if self._sent_s is None:
-            self._sent_s = self._wall()
+            self._sent_s, self._seen_waiting = self._wall(), False
+
+    def look(self) -> None:
+        """See whether the client has taken what was sent."""
+        if self._sent_s is None:
+            return
+        if self._unread() > self._allowance:
+            self._seen_waiting = True
+            return
+        now_s = self._wall()
+        # What is taken at the first look may have been for long: then it was this process that was late.
+        late_s = min(now_s - self._sent_s, GAP_S[1]) * self._seen_waiting
+        self._late_s = max(late_s, self._late_s * FORGETTING)
+        self._free_s = now_s + (0.0 if self._allowance else _within(GAP_S, self._late_s * LATENESS))
+        self._sent_s = None
 
     def wait_s(self) -> float:
-        """Wall time to wait before the next look; 0 when the next packet may go."""
+        """Wall time until the next look; 0 when the next packet may go, as to a client that was waited for in vain."""
         now_s = self._wall()
-        if self._sent_s is not None:
-            delay_s = now_s - self._sent_s
-            if self._unread() > self._allowance:
-                self._given_up |= delay_s > PATIENCE_S
-                return 0.0 if self._given_up else _within(LOOK_S, delay_s / 4)
-            self._late_s = max(min(delay_s, GAP_S[1]), self._late_s * FORGETTING)
-            self._taken_s, self._sent_s, self._given_up = now_s, None, False
-        if self._allowance:
-            return 0.0
-        return max(0.0, self._taken_s + _within(GAP_S, self._late_s * LATENESS) - now_s)
+        if self._sent_s is None:
+            return max(0.0, self._free_s - now_s)
+        delay_s = now_s - self._sent_s
+        return 0.0 if delay_s > PATIENCE_S else _within(LOOK_S, delay_s / 4)
 
 
 def _within(bounds: tuple[float, float], value: float) -> float:

@@ -1,0 +1,74 @@
+"""How long another process has been silent, counted so that a busy machine does not look like a process that hangs."""
+
+import time
+from pathlib import Path
+
+STARVED = 0.5  # of a tick spent waiting for a processor: more, and a silence in it says nothing about the process
+SPARED = 10  # so many times its limit a silence may last, however busy the machine: the arm is not to be left alone
+NS_PER_S = 1e9
+
+_Times = dict[str, tuple[float, float]]  # by thread: seconds on a processor, seconds waiting for one
+
+
+class Silence:
+    """Counts the ticks without a sign of life from the process `pid`.
+
+    Ticks and not seconds, because the one who counts may be held up itself; and no ticks in which a thread of the other
+    process spent most of the time waiting for a processor. Where the system does not tell (proc(5) of Linux does) all
+    ticks count.
+    """
+
+    def __init__(self, pid: int) -> None:
+        self._tasks = Path(f"/proc/{pid}/task")
+        self.ticks = 0
+        self._all_ticks = 0
+        self._times: _Times = {}
+        self._looked_s = 0.0
+
+    def heard(self) -> None:
+        """A sign of life."""
+        self.ticks = self._all_ticks = 0
+
+    def tick(self) -> None:
+        """Once more nothing was heard, or not yet: call this at even intervals."""
+        self._all_ticks += 1
+        # The first tick of a silence is nothing yet; only then is it worth a look at what the process does.
+        starved = self._all_ticks > 1 and self._starved(known=self._all_ticks > 2)
+        self.ticks += not starved
+
+    def lasts_over(self, limit: int) -> bool:
+        """Whether there were more than `limit` silent ticks, or far more when the machine was too busy to tell."""
+        return self.ticks > limit or self._all_ticks > SPARED * limit
+
+    def _starved(self, known: bool) -> bool:
+        """Whether the process waited for a processor since the last call; False when that is not `known`.
+
+        A thread that still waits is not counted as waiting by the system, but as ready to run without having run.
+        """
+        now_s = time.monotonic()
+        elapsed_s, before = now_s - self._looked_s, self._times
+        self._looked_s, self._times = now_s, _times(self._tasks)
+        return known and any(
+            waited_s - before[thread][1] > STARVED * elapsed_s
+            or (ran_s - before[thread][0] < (1.0 - STARVED) * elapsed_s and _ready(self._tasks / thread))
+            for thread, (ran_s, waited_s) in self._times.items()
+            if thread in before
+        )
+
+
+def _times(tasks: Path) -> _Times:
+    times: _Times = {}
+    try:
+        for task in tasks.iterdir():
+            ran_ns, waited_ns, _ = (task / "schedstat").read_text().split()
+            times[task.name] = int(ran_ns) / NS_PER_S, int(waited_ns) / NS_PER_S
+    except (OSError, ValueError):
+        pass  # not Linux, or a thread that has ended meanwhile
+    return times
+
+
+def _ready(task: Path) -> bool:
+    try:
+        return (task / "stat").read_text(errors="replace").rpartition(")")[2].split()[0] == "R"
+    except (OSError, IndexError):
+        return False
