@@ -14,28 +14,11 @@ import numpy as np
 import pytest
 import yaml
 
+from support.commands import configuration, rig, wait_for_log
 from support.paths import ROOT
-from support.worlds import fresh_host, merge
-
-CI = ROOT / "configs" / "ci.yaml"
+from support.worlds import merge
 
 Start = Callable[..., subprocess.Popen[str]]
-
-
-def rig(*arguments: str | Path) -> subprocess.CompletedProcess[str]:
-    return subprocess.run(
-        [sys.executable, "-m", "rig", *map(str, arguments)], capture_output=True, text=True, timeout=50, check=False
-    )
-
-
-def configuration(folder: Path, changes: dict[str, Any] | None = None) -> Path:
-    """ci.yaml on an address of its own, with changes."""
-    host = fresh_host()
-    address = {"arm": {"host": host}, "board": {"port": f"socket://{host}:7321"}}
-    document = merge(merge(yaml.safe_load(CI.read_text(encoding="utf-8")), address), changes or {})
-    path = folder / "config.yaml"
-    path.write_text(yaml.safe_dump(document, sort_keys=False), encoding="utf-8")
-    return path
 
 
 @pytest.fixture
@@ -53,15 +36,6 @@ def start() -> Iterator[Start]:
     for process in running:
         process.kill()
         process.communicate()
-
-
-def wait_for_log(folder: Path, words: str, timeout_s: float = 30.0) -> None:
-    """Until the run's log says so."""
-    log = folder / "log.txt"
-    deadline_s = time.monotonic() + timeout_s
-    while not (log.exists() and words in log.read_text(encoding="utf-8")):
-        assert time.monotonic() < deadline_s, f"{log} never said {words!r}"
-        time.sleep(0.01)
 
 
 @pytest.fixture(scope="module")

@@ -44,7 +44,7 @@ CHANGES: dict[str, Any] = {
     "limits": {"scale_std": 1, "bias_std_rad_s": 1, "verification_rms_rad_s": 1, "verification_mean_rad_s": 1},
     "world": {"time_scale": 12, "sensors": {"reference": {"scale": [1.0, 1.0, 1.0], "bias_rad_s": [0.0, 0.0, 0.0]}}},
 }
-pytestmark = [pytest.mark.slow, pytest.mark.timeout(120)]
+pytestmark = [pytest.mark.slow, pytest.mark.timeout(180)]  # a whole experiment
 
 
 class Everything:
