@@ -12,6 +12,7 @@ from typing import TYPE_CHECKING, Any
 from rig import __version__
 from rig.commands.standard_streams import keep_streams_usable
 from rig.errors import Fault, Refused, RigError
+from rig.station.plain_text import printable_lines
 
 if TYPE_CHECKING:
     from rig.plans.registry import AnyProcedure
@@ -62,7 +63,7 @@ def guarded(command: Callable[[], int]) -> int:
 
 
 def _ended(text: str, status: int) -> int:
-    print(f"rig: {text}", file=sys.stderr)
+    print(f"rig: {printable_lines(text)}", file=sys.stderr)
     return status
 
 

@@ -221,11 +221,13 @@ def _explained(board: Array, seen: NDArray[np.bool_], arm: Array, lag: int) -> f
     used = seen[start:end]
     if used.sum() < 0.5 * min(len(board), len(arm)):
         return 0.0
-    m = board[start:end][used]
-    columns = np.column_stack([arm[start + lag : end + lag][used], np.ones(len(m))])
-    residual = m - columns @ np.linalg.lstsq(columns, m, rcond=None)[0]
-    total = float(np.sum((m - m.mean(axis=0)) ** 2))
-    return 1 - float(np.sum(residual**2)) / total if total > 0 else 0.0
+    m, rate = board[start:end][used], arm[start + lag : end + lag][used]
+    m, rate = m - m.mean(axis=0), rate - rate.mean(axis=0)
+    total = float(np.sum(m**2))
+    # By the normal equations: the fine fit starts from whatever is best, so its precision is not needed here.
+    seen_together = rate.T @ m
+    inverse = np.linalg.pinv(rate.T @ rate, rcond=1e-10, hermitian=True)
+    return float(np.sum(seen_together * (inverse @ seen_together))) / total if total > 0 else 0.0
 
 
 def _settled(clock: TimeBase, board_time_s: Array, readings: Array, motion: ArmMotion) -> TimeBase:

@@ -4,12 +4,13 @@ import sys
 from collections.abc import Sequence
 
 from rig.errors import Refused
+from rig.station.plain_text import printable_lines
 
 
 def ask_operator(announcement: Sequence[str], to_do: str = "start") -> bool:
     """Show what will be done and wait for a yes; where there is no terminal, there is nobody to say it."""
     for line in announcement:
-        print(line, file=sys.stderr)
+        print(printable_lines(line), file=sys.stderr)
     if not sys.stdin.isatty():
         return False
     print(f"Type yes to {to_do}: ", end="", file=sys.stderr, flush=True)

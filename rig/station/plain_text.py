@@ -11,8 +11,13 @@ def printable(text: str) -> str:
     return "".join(c if c.isprintable() else c.encode("unicode_escape").decode("ascii") for c in text)
 
 
+def printable_lines(text: str) -> str:
+    """The same for a message of several lines, which keeps them."""
+    return "\n".join(map(printable, text.split("\n")))
+
+
 def plain(text: str, style: str = "") -> "Text":
-    """The same for rich, in which a string would be searched for markup such as `[red]`."""
+    """The printable text for rich, which searches a string for markup such as `[red]` and for `:smileys:`."""
     from rich.text import Text
 
     return Text(printable(text), style)

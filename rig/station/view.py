@@ -12,6 +12,7 @@ from rich.progress_bar import ProgressBar
 from rich.table import Table
 
 from rig.station.events import Progress, RunEvent, SamplesTaken, SensorSamples
+from rig.station.plain_text import plain, printable_lines
 from rig.station.station import Listener
 from rig.station.words import line
 
@@ -25,7 +26,7 @@ class PlainView:
         """Progress within a step is for people watching; it has no line."""
         text = line(event)
         if text is not None:
-            print(text, file=sys.stderr, flush=True)
+            print(printable_lines(text), file=sys.stderr, flush=True)
 
 
 class LiveView:
@@ -47,7 +48,8 @@ class LiveView:
                 text = line(event)
                 if text is not None:
                     # Nothing in a path is markup, and a command that is to be copied must not be broken into lines.
-                    self._live.console.print(text, highlight=False, markup=False, soft_wrap=True)
+                    shown = printable_lines(text)
+                    self._live.console.print(shown, highlight=False, markup=False, emoji=False, soft_wrap=True)
 
     def _show(self, progress: Progress) -> None:
         now_s = time.monotonic()
@@ -62,7 +64,7 @@ def _panel(progress: Progress, samples: SamplesTaken) -> Table:
     table.add_row("progress", ProgressBar(total=1.0, completed=progress.fraction, width=40))
     table.add_row("arm speed", f"{degrees(progress.arm_speed_rad_s):6.2f} °/s")
     for sensor in samples.sensors:
-        table.add_row(sensor.sensor, _readings(sensor))
+        table.add_row(plain(sensor.sensor), _readings(sensor))
     table.add_row("time", f"{progress.elapsed_s:5.1f} s gone, {progress.remaining_s:5.1f} s left")
     return table
 
