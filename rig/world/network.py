@@ -8,6 +8,7 @@ from contextlib import suppress
 from typing import Protocol
 
 from rig.errors import Refused
+from rig.world.clock import TICK_S
 from rig.world.wire import SocketTable, Wire
 
 BACKLOG_BYTES = 1 << 16  # a client that does not read loses packages beyond this
@@ -35,6 +36,7 @@ class Connection:
         self._network, self._peer, self.session, self.listener = network, peer, session, listener
         self._unsent = bytearray()
         self._due = b""  # what the last tick made for this client and its wire does not take yet
+        self._ticks = 0  # since something was sent at a tick
         self._wire = Wire(network.sockets.unread(peer), listener.allowance, time.monotonic)
         peer.setblocking(False)
         with suppress(OSError):
@@ -64,6 +66,7 @@ class Connection:
 
     def tick(self) -> None:
         """The session's turn; what it has to say goes out as soon as `deliver` finds the wire free."""
+        self._ticks += 1
         self._due = self.session.tick()
 
     def deliver(self) -> float:
@@ -71,9 +74,10 @@ class Connection:
         self._wire.look()
         if not self._due or self.listener.silent:
             return 0.0
-        wait_s = self._wire.wait_s()
+        wait_s = self._wire.wait_s(self._ticks * TICK_S)
         if wait_s <= 0.0:
             due, self._due = self._due, b""
+            self._ticks = 0
             self.send(due)
         return wait_s
 

@@ -13,8 +13,9 @@ PATIENCE_S = 1.5  # a client that takes nothing for so long is not waited for un
 # A client that keeps only the newest packet must look at one before the next comes, so it is given some time after it
 # has taken one: so many times as long as it took of late, which grows with the load of the machine.
 LATENESS = 2.0
-GAP_S = (0.0004, 0.01)  # … but at least and at most this
-FORGETTING = 0.995  # of how late a client was, at every packet
+LEAST_S = 0.0004  # … and at least this
+LATEST_S = 0.01  # a client that once was later than this is not given more for it
+FORGETTING = 0.99  # of how late a client was, at every packet
 LOOK_S = (0.0001, 0.001)  # time between two looks at a client that is waited for: a quarter of its delay, within these
 
 Unread = Callable[[], int]
@@ -79,36 +80,39 @@ class Wire:
     def __init__(self, unread: Unread, allowance: int, wall: Callable[[], float]) -> None:
         self._unread, self._allowance, self._wall = unread, allowance, wall
         self._sent_s: float | None = None  # when the first packet went that is not known to be taken
-        self._free_s = 0.0  # from when on the next packet may go
-        self._late_s = 0.0
-        self._seen_waiting = False
+        self._seen_unread = False
+        self._taken_s = self._late_s = 0.0
 
     def sent(self) -> None:
         """Something was sent."""
         if self._sent_s is None:
-            self._sent_s, self._seen_waiting = self._wall(), False
+            self._sent_s, self._seen_unread = self._wall(), False
 
     def look(self) -> None:
         """See whether the client has taken what was sent."""
         if self._sent_s is None:
             return
         if self._unread() > self._allowance:
-            self._seen_waiting = True
+            self._seen_unread = True
             return
-        now_s = self._wall()
-        # What is taken at the first look may have been for long: then it was this process that was late.
-        late_s = min(now_s - self._sent_s, GAP_S[1]) * self._seen_waiting
-        self._late_s = max(late_s, self._late_s * FORGETTING)
-        self._free_s = now_s + (0.0 if self._allowance else _within(GAP_S, self._late_s * LATENESS))
+        self._taken_s = self._wall()
+        # What is gone at the first look may have been for long: then it was this process that was late.
+        late_s = (self._taken_s - self._sent_s) * self._seen_unread
+        self._late_s = max(min(late_s, LATEST_S), self._late_s * FORGETTING)
         self._sent_s = None
 
-    def wait_s(self) -> float:
-        """Wall time until the next look; 0 when the next packet may go, as to a client that was waited for in vain."""
+    def wait_s(self, interval_s: float) -> float:
+        """Wall time until the next look; 0 when the next packet may go, as to a client that was waited for in vain.
+
+        `interval_s` is the virtual time since the last packet: a real controller gives its clients no more than that.
+        """
         now_s = self._wall()
-        if self._sent_s is None:
-            return max(0.0, self._free_s - now_s)
-        delay_s = now_s - self._sent_s
-        return 0.0 if delay_s > PATIENCE_S else _within(LOOK_S, delay_s / 4)
+        if self._sent_s is not None:
+            delay_s = now_s - self._sent_s
+            return 0.0 if delay_s > PATIENCE_S else _within(LOOK_S, delay_s / 4)
+        if self._allowance:
+            return 0.0
+        return max(0.0, self._taken_s + min(max(self._late_s * LATENESS, LEAST_S), interval_s) - now_s)
 
 
 def _within(bounds: tuple[float, float], value: float) -> float:

@@ -19,7 +19,7 @@ home = [0.0, -1.5707963, 1.5707963, -1.5707963, -1.5707963, 0.0]
 there = [*home[:5], 3.0]
 def say(*words): print(">", *words, flush=True)
 def until(condition):
-    end = time.monotonic() + 8.0
+    end = time.monotonic() + 30.0
     while not condition():
         if time.monotonic() > end: say("waited in vain"); os._exit(1)
         time.sleep(0.002)
