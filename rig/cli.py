@@ -190,18 +190,18 @@ def _add_outcome(parser: argparse.ArgumentParser) -> None:
 
 
 def run_script(procedure: "AnyProcedure") -> int:
-    """Entry point of a script that defines `procedure`: it takes the arguments of `rig run`.
+    """Entry point of a script that is run as `python FILE.py` and defines `procedure`; arguments as of `rig run`.
 
     It is this procedure that runs, whatever the configuration names.
     """
-    from rig.plans.script_file import script_file
+    from rig.plans.script_file import script_in
 
-    instruction = sys.modules[procedure.script.__module__].__doc__
-    parser = argparse.ArgumentParser(description=instruction, formatter_class=argparse.RawDescriptionHelpFormatter)
+    script = sys.modules["__main__"]
+    parser = argparse.ArgumentParser(description=script.__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
     _add_config(parser)
     _add_run(parser)
     options = parser.parse_args()
-    options.script = script_file(procedure)
+    options.script = script_in(script, procedure)
     return guarded(lambda: _run(options))
 
 

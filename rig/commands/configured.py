@@ -7,7 +7,7 @@ from pathlib import Path
 from rig.config.load import Loaded, load
 from rig.plans.phase import Phase, first_phase
 from rig.plans.registry import Procedures, installed, sections
-from rig.plans.script_file import ScriptFile, load_script, script_file
+from rig.plans.script_file import ScriptFile, installed_script, load_script
 
 
 @dataclass(frozen=True, slots=True)
@@ -32,5 +32,5 @@ def configured(config_path: Path, overrides: Sequence[str] = (), script: ScriptF
         overrides = [*overrides, f"procedure.name={script.procedure.name}"]
     loaded = load(config_path, overrides, sections(procedures))
     if script is None:
-        script = script_file(procedures[loaded.config.procedure.name])
+        script = installed_script(loaded.config.procedure.name)
     return Configured(loaded, script, first_phase(script.procedure, loaded.config, procedures))

@@ -20,13 +20,11 @@ def provenance(
     board: BoardIdentity,
     arm: ArmReport,
     stored: Mapping[str, StoredCalibration],
-    *,
-    script: str,
-    script_sha256: str,
+    script: Mapping[str, str | bool],
 ) -> dict[str, Any]:
     """Versions, serial numbers, the configuration's and the script's hashes, the time; fits into JSON.
 
-    `stored` are the calibrations by which the board corrects what it streams.
+    `stored` are the calibrations by which the board corrects what it streams, `script` says by which script it was.
     """
     return {
         "started_utc": datetime.now(UTC).isoformat(timespec="seconds"),
@@ -34,8 +32,7 @@ def provenance(
         "python_version": platform.python_version(),
         "package_versions": {name: version(name) for name in PACKAGES},
         "configuration_sha256": hashlib.sha256(loaded.rig_text.encode()).hexdigest(),
-        "script": script,
-        "script_sha256": script_sha256,
+        **script,
         "arm_serial_number": arm.serial_number,
         "arm_software": arm.polyscope,
         "board_unique_id": board.unique_id,

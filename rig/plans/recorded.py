@@ -81,7 +81,7 @@ def procedure_of(run: RunData, folder: Path) -> AnyProcedure:
     """
     name = run.settings.procedure
     procedures = installed()
-    if name not in procedures:
+    if name not in procedures or not run.provenance.get("script_installed", True):
         script = load_script(folder / SCRIPT)
         if run.provenance.get("script_sha256") != script.sha256:
             raise Refused(

@@ -73,8 +73,8 @@ Procedures = Mapping[str, AnyProcedure]
 
 
 @cache
-def installed() -> Procedures:
-    """The procedures of the packages installed here. Raises Refused `procedure_not_loaded`."""
+def _found() -> Mapping[str, tuple[AnyProcedure, str]]:
+    """The installed procedures by name, each with the module it stands in."""
     found = {}
     for entry in entry_points(group=GROUP):
         try:
@@ -85,8 +85,18 @@ def installed() -> Procedures:
                 f"the procedure {entry.name} is installed but cannot be loaded ({error})",
                 f"Install the package of {entry.value} again, or remove it",
             ) from error
-        found[procedure.name] = procedure
+        found[procedure.name] = procedure, entry.module
     return found
+
+
+def installed() -> Procedures:
+    """The procedures of the packages installed here. Raises Refused `procedure_not_loaded`."""
+    return {name: procedure for name, (procedure, _) in _found().items()}
+
+
+def module_of(name: str) -> str:
+    """The module an installed procedure stands in."""
+    return _found()[name][1]
 
 
 def sections(procedures: Procedures) -> Mapping[str, type[ProcedureSection]]:

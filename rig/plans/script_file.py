@@ -7,9 +7,10 @@ from dataclasses import dataclass
 from importlib.machinery import ModuleSpec
 from importlib.util import module_from_spec
 from pathlib import Path
+from types import ModuleType
 
 from rig.errors import Refused
-from rig.plans.registry import AnyProcedure, Procedure
+from rig.plans.registry import AnyProcedure, Procedure, installed, module_of
 
 
 @dataclass(frozen=True, slots=True)
@@ -25,11 +26,26 @@ class ScriptFile:
         """Of the text, in hexadecimal."""
         return hashlib.sha256(self.text.encode()).hexdigest()
 
+    @property
+    def is_installed(self) -> bool:
+        """Whether it is the very script that is installed under its procedure's name."""
+        name = self.procedure.name
+        return name in installed() and installed_script(name).sha256 == self.sha256
 
-def script_file(procedure: AnyProcedure) -> ScriptFile:
-    """A procedure that is imported already, with the file it came from."""
-    path = Path(inspect.getfile(procedure.script))
+    def provenance(self) -> dict[str, str | bool]:
+        """What a recording keeps of it."""
+        return {"script": self.name, "script_sha256": self.sha256, "script_installed": self.is_installed}
+
+
+def script_in(module: ModuleType, procedure: AnyProcedure) -> ScriptFile:
+    """The procedure a module that is imported already defines, with the module's file."""
+    path = Path(inspect.getfile(module))
     return ScriptFile(procedure, path.name, path.read_text(encoding="utf-8"))
+
+
+def installed_script(name: str) -> ScriptFile:
+    """An installed procedure with its file."""
+    return script_in(sys.modules[module_of(name)], installed()[name])
 
 
 def load_script(path: Path, name: str | None = None) -> ScriptFile:

@@ -97,9 +97,7 @@ class Connector:
     ) -> Recording:
         described = {name: sensor.described for name, sensor in sensors.items()}
         stored = {name: sensor.stored for name, sensor in sensors.items() if sensor.stored is not None}
-        made_with = provenance(
-            self.loaded, board.identity, report, stored, script=self.script.name, script_sha256=self.script.sha256
-        )
+        made_with = provenance(self.loaded, board.identity, report, stored, self.script.provenance())
         self.resumed.refuse_other_instruments(made_with, described)
         with refusing():
             recorder = RunRecorder(

@@ -21,7 +21,7 @@ from rig.data.run_folder import next_recording, recordings, resuming
 from rig.data.settings import RunSettings, settings_of
 from rig.errors import Fault, Refused, RigError
 from rig.plans.phase import Phase
-from rig.plans.script_file import ScriptFile
+from rig.plans.script_file import ScriptFile, installed_script
 from rig.report.writers import write_outcome
 from rig.runner.connect import Connector
 from rig.runner.resumption import Resumption, resumption
@@ -66,7 +66,9 @@ class Run:
         """Carry out the phase's script; all recordings of the phase."""
         readings = phase.procedure.readings
         path = next_recording(self.folder, readings)
-        connector = Connector(phase, self.loaded, self._settings(phase), self.script, path, self.station, resumed)
+        own = phase.procedure is self.script.procedure
+        script = self.script if own else installed_script(phase.procedure.name)
+        connector = Connector(phase, self.loaded, self._settings(phase), script, path, self.station, resumed)
         with self.reported(self._mended, moved=moved), connector.open() as rig:
             self.station.event(PhaseStarted(phase.procedure.name, rig.plan, rig.readings()))
             phase.procedure.script(rig)

@@ -5,14 +5,26 @@ import subprocess
 import sys
 from pathlib import Path
 
+import yaml
+
 from procedures import six_observation, verify
 from rig.config.load import load
 from rig.config.procedure_sections import STOCK_SECTIONS
 from rig.plans.phase import first_phase
 from rig.plans.registry import installed, sections
-from rig.plans.script_file import script_file
+from rig.plans.script_file import installed_script, load_script
 from support.paths import CONFIGS, ROOT
 
+OWN = """
+from dataclasses import replace
+from procedures.six_observation import PROCEDURE as STOCK
+from rig.cli import run_script
+
+PROCEDURE = replace(STOCK, then=None)
+
+if __name__ == "__main__":
+    raise SystemExit(run_script(PROCEDURE))
+"""
 VERIFIED = CONFIGS / "lsm9ds1_adis16465.yaml"
 
 
@@ -37,8 +49,22 @@ def test_a_calibration_is_followed_by_its_verification_only_when_asked() -> None
 
 
 def test_the_kept_script_is_the_file_the_procedure_came_from() -> None:
-    kept = script_file(verify.PROCEDURE)
+    kept = installed_script("verify")
+    assert kept.procedure is verify.PROCEDURE and kept.is_installed
     assert kept.name == "verify.py" and "PROCEDURE = Procedure(" in kept.text and len(kept.sha256) == 64
+
+
+def test_an_own_script_may_borrow_all_but_its_name_and_is_kept_itself(tmp_path: Path) -> None:
+    own, config = tmp_path / "own.py", tmp_path / "hardware.yaml"
+    own.write_text(OWN, encoding="utf-8")
+    assert not load_script(own).is_installed
+    hardware = yaml.safe_load((CONFIGS / "ci.yaml").read_text(encoding="utf-8"))
+    del hardware["world"]
+    config.write_text(yaml.safe_dump({**hardware, "board": {"port": "socket://127.9.9.9:1"}}), encoding="utf-8")
+    command = [sys.executable, str(own), str(config), "--out", str(tmp_path / "run")]
+    done = subprocess.run(command, capture_output=True, text=True, timeout=50, check=False)
+    assert done.returncode == 2 and "rig: no_port: " in done.stderr, done.stderr
+    assert (tmp_path / "run" / "script.py").read_text(encoding="utf-8") == OWN
 
 
 def test_an_installed_procedure_that_cannot_be_loaded_has_a_name(tmp_path: Path) -> None:
