@@ -4,7 +4,7 @@
 # make proof   statistical acceptance over all seeds, which takes longer than anybody waits for a change
 # make firmware builds the board's image (needs arm-none-eabi-gcc) and prints what it takes of the chip
 # make bench   every benchmark, ratios measured side by side
-# make figures the pictures in docs/method.md, by the studies and the experiments
+# make figures the pictures in docs/results.md, by the studies and the experiments
 
 VENV := .venv
 BIN := $(VENV)/bin
