@@ -2,7 +2,6 @@
 
 import contextlib
 from collections.abc import Callable, Collection, Sequence
-from dataclasses import replace
 from types import TracebackType
 from typing import Any, Self
 
@@ -244,7 +243,7 @@ class Board:
             )
         part = self._parts[sensor] if sensor < len(self._parts) else f"sensor {sensor}"
         about = "" if problem.name in _ABOUT_THE_BOARD else f", of its {part}"
-        return BoardError.of(replace(problem, what=f"the board on {self._link.port} says{about}: {problem.what}"))
+        return BoardError.of(problem._replace(what=f"the board on {self._link.port} says{about}: {problem.what}"))
 
 
 def _mask(sensors: Collection[int]) -> int:

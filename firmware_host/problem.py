@@ -1,11 +1,9 @@
 """What is wrong, in three words' length: the one form in which every part of the program says no."""
 
-from dataclasses import dataclass
-from typing import Self
+from typing import NamedTuple, Self
 
 
-@dataclass(frozen=True, slots=True)
-class Problem:
+class Problem(NamedTuple):  # no dataclass: the command line imports this, and must start at once
     """Something that is not as it must be.
 
     `name` is stable, for programs and for looking it up (`lost_samples`, `arm_link_lost`, …), `what` one clause saying

@@ -4,7 +4,6 @@ import argparse
 import os
 import signal
 import sys
-import traceback
 from collections.abc import Callable, Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -58,6 +57,8 @@ def guarded(command: Callable[[], int]) -> int:
     except OSError as error:
         return _ended(str(Fault("system", f"the system refused ({error})", "Mend that, then try again")), FAULT)
     except Exception:
+        import traceback
+
         traceback.print_exc()  # a defect of ours; Python's own status, 1, would mean a verdict
         return FAULT
 

@@ -2,7 +2,6 @@
 
 import struct
 from collections.abc import Sequence
-from dataclasses import replace
 
 from firmware_host.emulator import rcc
 from firmware_host.emulator.alignment import AlignmentWatch
@@ -214,7 +213,7 @@ class EmulatedBoard:
         where = self._symbols.where(address)
         if not self._symbols.function(address):
             where += f", called at {self._symbols.where(link)}"
-        return BoardError.of(replace(violation.problem, what=f"{violation.what}, at {where}"))
+        return BoardError.of(violation.problem._replace(what=f"{violation.what}, at {where}"))
 
     # --- reset
 

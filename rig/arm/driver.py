@@ -4,7 +4,6 @@ import threading
 import time
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
-from dataclasses import replace
 from pathlib import Path
 from types import TracebackType
 from typing import Self
@@ -122,7 +121,7 @@ class Arm:
             raise Refused.of(problem)
         outcome = self.stop()
         remedy = f"{outcome.remedy}. {problem.remedy}" if outcome.remedy else problem.remedy
-        raise Fault.of(replace(problem, what=f"{problem.what}; {outcome.what}", remedy=remedy))
+        raise Fault.of(problem._replace(what=f"{problem.what}; {outcome.what}", remedy=remedy))
 
     # Moving -------------------------------------------------------------------------------------------------------
 
@@ -272,7 +271,7 @@ class Arm:
         except Exception as error:
             self._fail(Problem("arm_state_not_taken", f"an arm state could not be passed on ({error})", "See the log"))
         if self._supervising and (problem := self._judge(state)):
-            self._fail(replace(problem, what=f"{problem.what} during {self._doing}"))
+            self._fail(problem._replace(what=f"{problem.what} during {self._doing}"))
 
     def _judge(self, state: ArmState) -> Problem | None:
         """Why the arm cannot go on. The safety bits that explain a stopped program may come a packet later than it."""

@@ -7,7 +7,6 @@ line, so a refusal is said there too: `ready` false and the `problem`.
 import argparse
 import json
 import sys
-from dataclasses import asdict
 
 from rig.config.load import load
 from rig.errors import Refused
@@ -31,7 +30,7 @@ def main(arguments: list[str] | None = None) -> int:
         serve(loaded, options.until_eof)
     except Refused as error:
         if options.until_eof:
-            print(json.dumps({"ready": False, "problem": asdict(error.problem)}), flush=True)
+            print(json.dumps({"ready": False, "problem": error.problem._asdict()}), flush=True)
         else:
             print(error, file=sys.stderr)
         return error.exit_status
