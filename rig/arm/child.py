@@ -102,6 +102,7 @@ class _Child:
         """Open the receive interface and wait for its first packet; `RuntimeError` when the client gives up."""
         from rtde_receive import RTDEReceiveInterface
 
+        _be_urgent()
         self._receive = RTDEReceiveInterface(self._host, self._state_rate_hz, VARIABLES)
         deadline = time.monotonic() + FIRST_PACKET_S
         while not (self._receive.isConnected() and self._receive.getTimestamp() > 0):
@@ -113,7 +114,6 @@ class _Child:
 
     def stream(self) -> NoReturn:
         """Send every state to the parent, in order, until the parent is gone."""
-        _be_urgent()
         batch: list[ArmState] = []
         last_s, beat_s = 0.0, time.monotonic()
         while True:
@@ -260,7 +260,8 @@ def _outlive_the_parent() -> None:
 def _be_urgent() -> None:
     """Run this thread before others where that is allowed: a state not read before the next one comes is lost.
 
-    This thread alone: the client waits for some things without sleeping, and would keep all others from running.
+    The threads it starts inherit that; those that make requests must not have it, for there the client waits for some
+    things without sleeping, and would keep all others from running.
     """
     with suppress(OSError, AttributeError):  # not permitted; not on this system
         os.sched_setscheduler(0, os.SCHED_RR, os.sched_param(os.sched_get_priority_min(os.SCHED_RR)))
