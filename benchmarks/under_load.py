@@ -33,9 +33,10 @@ VERDICTS = {0: "pass", 1: "fail"}
 
 @dataclass(frozen=True, slots=True)
 class Demo:
-    """How one run ended: `verdict`, or the name of the error; its wall time, its arm states and those missing."""
+    """How one run ended: its verdict, or the name of the error and all it said; its arm states and those missing."""
 
     ending: str
+    said: str
     exit_status: int
     wall_s: float
     states: int
@@ -57,9 +58,12 @@ def run_demo(config: Path, folder: Path, number: int) -> Demo:
         check=False,
     )
     wall_s = time.perf_counter() - began_s
-    names = re.findall(r"^rig: (\w+): ", ended.stderr, re.MULTILINE)
-    ending = VERDICTS.get(ended.returncode) or (names[-1] if names else ended.stderr[-200:])
-    return Demo(ending, ended.returncode, wall_s, *count_states(out / "run.h5", load(config).config.arm.state_rate_hz))
+    errors = re.findall(r"^rig: (\w+): (.*)", ended.stderr, re.MULTILINE)
+    name, said = errors[-1] if errors else ("no error", ended.stderr[-200:])
+    ending, said = (VERDICTS[ended.returncode], "") if ended.returncode in VERDICTS else (name, f": {said}")
+    return Demo(
+        ending, said, ended.returncode, wall_s, *count_states(out / "run.h5", load(config).config.arm.state_rate_hz)
+    )
 
 
 def count_states(recording: Path, state_rate_hz: float) -> tuple[int, int]:
@@ -98,7 +102,9 @@ def main() -> int:
             demos: list[Demo] = []
             for demo in pool.map(run, range(1, options.demos + 1)):
                 demos.append(demo)
-                print(f"{len(demos):3}: {demo.ending}, {demo.wall_s:.1f} s, {demo.missed} missed", flush=True)
+                print(
+                    f"{len(demos):3}: {demo.ending}, {demo.wall_s:.1f} s, {demo.missed} missed{demo.said}", flush=True
+                )
     endings = Counter(demo.ending for demo in demos)
     verdicts = sum(demo.exit_status in VERDICTS for demo in demos)
     states, missed = sum(demo.states for demo in demos), sum(demo.missed for demo in demos)

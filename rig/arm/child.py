@@ -40,7 +40,6 @@ HEARTBEAT_S = 0.01
 FIRST_PACKET_S = 3.0
 TICK_S = 0.1
 PARENT_TICKS = 20  # 2 s without a sign of the parent's life
-NICENESS = -10  # where no real-time priority is to be had
 PAYLOAD_S = 1.0  # the payload shows in the states within this
 PAYLOAD_TOLERANCE_KG = 0.01
 
@@ -64,7 +63,6 @@ VARIABLES = [
 def main(pipe: "Connection[Message, Request]", host: str, state_rate_hz: float, log: str | None) -> None:
     """Run until the parent ends the process or disappears. `log` names the file that takes the client's own output."""
     _outlive_the_parent()
-    _be_urgent()
     _send_output_to(log)
     child = _Child(pipe, host, state_rate_hz)
     signal.signal(signal.SIGTERM, lambda *_: child.abandon())
@@ -104,6 +102,7 @@ class _Child:
         """Open the receive interface and wait for its first packet; `RuntimeError` when the client gives up."""
         from rtde_receive import RTDEReceiveInterface
 
+        _be_urgent()
         self._receive = RTDEReceiveInterface(self._host, self._state_rate_hz, VARIABLES)
         deadline = time.monotonic() + FIRST_PACKET_S
         while not (self._receive.isConnected() and self._receive.getTimestamp() > 0):
@@ -259,13 +258,12 @@ def _outlive_the_parent() -> None:
 
 
 def _be_urgent() -> None:
-    """Run before others where that is allowed: a state that is not read before the next one comes is lost.
+    """Run this thread before others where that is allowed: a state not read before the next one comes is lost.
 
-    The threads that are started afterwards, the client's among them, inherit it.
+    The threads it starts inherit that; those that make requests must not have it, for there the client waits for some
+    things without sleeping, and would keep all others from running.
     """
     with suppress(OSError, AttributeError):  # not permitted; not on this system
-        os.nice(NICENESS)
-    with suppress(OSError, AttributeError):
         os.sched_setscheduler(0, os.SCHED_RR, os.sched_param(os.sched_get_priority_min(os.SCHED_RR)))
 
 

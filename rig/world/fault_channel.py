@@ -14,15 +14,28 @@ A request is `{"do": NAME, …}`; the reply is one line, `{"ok": true, "time_s":
 
 import json
 from collections.abc import Callable
-from typing import TYPE_CHECKING, Any
+from typing import Any, Protocol
 
 from firmware_host.emulator.spi_device import Fault
-
-if TYPE_CHECKING:
-    from rig.world.process import World
+from rig.world.board.serial_line import SerialLine
+from rig.world.clock import Clock
+from rig.world.laboratory import Laboratory
 
 Reply = dict[str, Any]
 FIELDBUS = "fieldbus"  # the owner of registers that `register_in_use` claims
+
+
+class World(Protocol):
+    """What can be made to misbehave."""
+
+    laboratory: Laboratory
+    line: SerialLine
+    clock: Clock
+
+    def close_arm(self, *, listen: bool) -> None: ...
+    def silence_arm(self, duration_s: float) -> None: ...
+    def unplug_board(self) -> None: ...
+    def plug_in_board(self) -> None: ...
 
 
 class ControlSession:
@@ -30,8 +43,9 @@ class ControlSession:
 
     closing = False
     dialogue = False
+    newest_only = False
 
-    def __init__(self, world: "World") -> None:
+    def __init__(self, world: World) -> None:
         self._world = world
         self._buffer = bytearray()
         self._reply_at: int | None = None  # the tick at which an `advance` is answered
@@ -143,8 +157,7 @@ class ControlSession:
         self._world.laboratory.robot.claims.pop(name, None)
 
     def _close_arm(self, listen: bool = True) -> None:
-        for listener in self._world.arm_listeners:
-            listener.hang_up() if listen else listener.close()
+        self._world.close_arm(listen=bool(listen))
 
     def _silence_arm(self, duration_s: float) -> None:
         self._world.silence_arm(float(duration_s))

@@ -12,8 +12,6 @@ from rig.world.clock import TICK_S
 from rig.world.wire import SocketTable, Wire
 
 BACKLOG_BYTES = 1 << 16  # a client that does not read loses packages beyond this
-
-
 UNPACED = 1 << 30  # the allowance of a client that nobody waits for
 
 
@@ -22,6 +20,7 @@ class Session(Protocol):
 
     closing: bool  # close the connection once everything has been sent
     dialogue: bool  # a client speaks with it by question and answer, each waiting for the one before
+    newest_only: bool  # a client overlooks what it sends when the next comes at once
 
     def greeting(self) -> bytes: ...
     def receive(self, data: bytes) -> bytes: ...
@@ -74,7 +73,8 @@ class Connection:
         self._wire.look()
         if not self._due or self.listener.silent:
             return 0.0
-        wait_s = self._wire.wait_s(self._ticks * TICK_S)
+        # Time to look at the last packet, at most as much as a real controller gives.
+        wait_s = self._wire.wait_s(self._ticks * TICK_S * self.session.newest_only)
         if wait_s <= 0.0:
             due, self._due = self._due, b""
             self._ticks = 0

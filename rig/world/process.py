@@ -28,7 +28,7 @@ if TYPE_CHECKING:
     from rig.world.board.pty_port import PtyPort
 
 IDLE_POLL_S = 0.2
-SERIAL_BYTES = 1024  # on their way from the board to the host: 11 ms at 921600 Bd
+SERIAL_BYTES = 1 << 15  # on their way from the board to the host: more would be lost in the end
 # What answers on a port, and how many bytes a client may have unread before the world waits for it. Of RTDE packets
 # clients keep only the newest.
 ARM_PORTS: dict[int, tuple[Callable[[Robot], Session], int]] = {
@@ -87,6 +87,11 @@ class World:
         self._silent_until_s = time.monotonic() + duration_s
         for listener in self.arm_listeners:
             listener.set_silent(True)
+
+    def close_arm(self, *, listen: bool) -> None:
+        """The controller closes every connection; with `listen` it takes new ones."""
+        for listener in self.arm_listeners:
+            listener.hang_up() if listen else listener.close()
 
     def unplug_board(self) -> None:
         """Pull the board's cable: no power, no port."""

@@ -5,11 +5,15 @@ client: where both ends are on one Linux machine, the system knows how many byte
 (sock_diag(7)). Elsewhere they count as taken.
 """
 
+import itertools
 import socket
 import struct
 from collections.abc import Callable
 
-PATIENCE_S = 1.5  # a client that takes nothing for so long is not waited for until it has caught up: it hangs
+# So long a client is waited for, until it has caught up: less than other clients bear a silence. One that often lets
+# the world wait longer than the least is waited for less, for a real controller would not wait at all.
+LEAST_PATIENCE_S, PATIENCE_S = 0.05, 0.7
+REGAINED = 0.05  # of the time that passes, in patience
 # A client that keeps only the newest packet must look at one before the next comes, so it is given some time after it
 # has taken one: so many times as long as it took of late, which grows with the load of the machine.
 LATENESS = 2.0
@@ -25,7 +29,8 @@ _SOCKET_ID = struct.Struct(">HH4s12x4s12x")  # struct inet_diag_sockid without i
 _ANY = struct.pack("=III", 0, 0xFFFFFFFF, 0xFFFFFFFF)
 _SOCK_DIAG_BY_FAMILY, _NLM_F_REQUEST, _ALL_STATES = 20, 1, 0xFFFFFFFF
 _NETLINK_SOCK_DIAG = 4
-_TYPE_AT, _UNREAD_AT = 4, 16 + 4 + 48 + 4  # in the answer: nlmsghdr.nlmsg_type, inet_diag_msg.idiag_rqueue
+# In the answer: nlmsghdr.nlmsg_type and .nlmsg_seq, inet_diag_msg.idiag_rqueue.
+_TYPE_AT, _NUMBER_AT, _UNREAD_AT = 4, 8, 16 + 4 + 48 + 4
 
 
 class SocketTable:
@@ -33,6 +38,7 @@ class SocketTable:
 
     def __init__(self) -> None:
         self._netlink: socket.socket | None = None
+        self._numbers = itertools.count(1)
         if hasattr(socket, "AF_NETLINK"):
             try:
                 self._netlink = socket.socket(socket.AF_NETLINK, socket.SOCK_RAW, _NETLINK_SOCK_DIAG)
@@ -47,17 +53,21 @@ class SocketTable:
             return lambda: 0
         (far_host, far_port), (near_host, near_port) = connection.getpeername(), connection.getsockname()
         sockets = _SOCKET_ID.pack(far_port, near_port, socket.inet_aton(far_host), socket.inet_aton(near_host)) + _ANY
-        length = _REQUEST.size + len(sockets)
-        header = _REQUEST.pack(
-            *(length, _SOCK_DIAG_BY_FAMILY, _NLM_F_REQUEST, 0, 0),
-            *(socket.AF_INET, socket.IPPROTO_TCP, 0, 0, _ALL_STATES),
+        number = next(self._numbers) & 0xFFFFFFFF  # so that nobody takes another's late answer for his own
+        request = (
+            _REQUEST.pack(
+                *(_REQUEST.size + len(sockets), _SOCK_DIAG_BY_FAMILY, _NLM_F_REQUEST, number, 0),
+                *(socket.AF_INET, socket.IPPROTO_TCP, 0, 0, _ALL_STATES),
+            )
+            + sockets
         )
-        request = header + sockets
 
         def ask() -> int:
             try:
                 netlink.send(request)
                 answer = netlink.recv(1024)
+                while struct.unpack_from("=I", answer, _NUMBER_AT)[0] != number:
+                    answer = netlink.recv(1024)
             except OSError:
                 return 0
             known = struct.unpack_from("=H", answer, _TYPE_AT)[0] == _SOCK_DIAG_BY_FAMILY
@@ -73,15 +83,16 @@ class SocketTable:
 class Wire:
     """One client's pace: `look` at it often, and send the next packet when `wait_s` is 0.
 
-    The wire is free while at most `allowance` bytes are unread; a client with an allowance reads every byte in the end
-    and needs no time of its own after it.
+    The wire is free while at most `allowance` bytes are unread.
     """
 
     def __init__(self, unread: Unread, allowance: int, wall: Callable[[], float]) -> None:
         self._unread, self._allowance, self._wall = unread, allowance, wall
         self._sent_s: float | None = None  # when the first packet went that is not known to be taken
         self._seen_unread = False
-        self._taken_s = self._late_s = 0.0
+        self._taken_s = wall()
+        self._late_s = 0.0
+        self._patience_s = PATIENCE_S
 
     def sent(self) -> None:
         """Something was sent."""
@@ -95,25 +106,22 @@ class Wire:
         if self._unread() > self._allowance:
             self._seen_unread = True
             return
-        self._taken_s = self._wall()
+        now_s = self._wall()
         # What is gone at the first look may have been for long: then it was this process that was late.
-        late_s = (self._taken_s - self._sent_s) * self._seen_unread
+        late_s = (now_s - self._sent_s) * self._seen_unread
         self._late_s = max(min(late_s, LATEST_S), self._late_s * FORGETTING)
-        self._sent_s = None
+        spent_s = max(0.0, min(late_s, self._patience_s) - LEAST_PATIENCE_S)
+        regained_s = REGAINED * (now_s - self._taken_s)
+        self._patience_s = min(self._patience_s - spent_s + regained_s, PATIENCE_S)
+        self._taken_s, self._sent_s = now_s, None
 
-    def wait_s(self, interval_s: float) -> float:
+    def wait_s(self, most_s: float) -> float:
         """Wall time until the next look; 0 when the next packet may go, as to a client that was waited for in vain.
 
-        `interval_s` is the virtual time since the last packet: a real controller gives its clients no more than that.
+        `most_s` is the time the client is given at most to look at what it has taken: 0 when it overlooks nothing.
         """
         now_s = self._wall()
         if self._sent_s is not None:
             delay_s = now_s - self._sent_s
-            return 0.0 if delay_s > PATIENCE_S else _within(LOOK_S, delay_s / 4)
-        if self._allowance:
-            return 0.0
-        return max(0.0, self._taken_s + min(max(self._late_s * LATENESS, LEAST_S), interval_s) - now_s)
-
-
-def _within(bounds: tuple[float, float], value: float) -> float:
-    return min(max(value, bounds[0]), bounds[1])
+            return 0.0 if delay_s > self._patience_s else min(max(LOOK_S[0], delay_s / 4), LOOK_S[1])
+        return max(0.0, self._taken_s + min(max(self._late_s * LATENESS, LEAST_S), most_s) - now_s)

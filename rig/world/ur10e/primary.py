@@ -33,6 +33,7 @@ class PrimarySession:
 
     closing = False
     dialogue = True
+    newest_only = False
 
     def __init__(self, robot: Robot) -> None:
         self._robot = robot

@@ -88,6 +88,7 @@ class ScriptSession:
 
     closing = False
     dialogue = True
+    newest_only = False
 
     def __init__(self, robot: Robot) -> None:
         self._robot = robot

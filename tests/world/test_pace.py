@@ -1,0 +1,211 @@
+"""The world's clock does not run ahead of the programs it serves."""
+
+import multiprocessing
+import os
+import signal
+import sys
+import threading
+import time
+from itertools import pairwise
+
+import pytest
+
+from rig.arm.driver import Arm
+from rig.arm.motion import Transfer, trapezoid_duration
+from rig.world.clock import DIALOGUE_S, TICK_S, Clock
+from rig.world.wire import LATEST_S, LEAST_PATIENCE_S, LEAST_S, PATIENCE_S, Wire
+from support.arm_client import wait_for
+from support.arm_relay import relay
+from support.rtde_reader import RtdeReader
+from support.worlds import World
+
+PERIOD_S = 0.008  # between packets at 125 Hz
+FAST = {"world": {"time_scale": 50}}
+linux = pytest.mark.skipif(sys.platform != "linux", reason="only Linux tells what another program has not read")
+
+
+class Wall:
+    """Wall time that passes when a test says so."""
+
+    def __init__(self) -> None:
+        self.now_s = 100.0
+
+    def __call__(self) -> float:
+        return self.now_s
+
+    def passes(self, duration_s: float) -> None:
+        self.now_s += duration_s
+
+
+class Client:
+    """The bytes a client has not read, and the wire to it."""
+
+    def __init__(self, allowance: int = 0) -> None:
+        self.wall, self.unread = Wall(), 0
+        self.wire = Wire(lambda: self.unread, allowance, self.wall)
+
+    def is_sent(self, size: int) -> None:
+        self.wire.sent()
+        self.unread += size
+        self.wire.look()
+
+    def takes_all(self, after_s: float) -> None:
+        self.wall.passes(after_s)
+        self.unread = 0
+        self.wire.look()
+
+
+def test_the_next_packet_waits_until_the_last_one_is_taken() -> None:
+    client = Client()
+    client.is_sent(100)
+    client.wall.passes(PATIENCE_S / 2)
+    assert client.wire.wait_s(PERIOD_S) > 0.0
+    client.takes_all(after_s=0.0)
+    client.wall.passes(PERIOD_S)
+    assert client.wire.wait_s(PERIOD_S) == 0.0
+
+
+def test_a_client_has_time_to_look_at_a_packet_and_a_late_one_has_more() -> None:
+    client = Client()
+    client.is_sent(100)
+    client.takes_all(after_s=LEAST_S / 10)
+    assert client.wire.wait_s(PERIOD_S) == pytest.approx(LEAST_S)
+    client.is_sent(100)
+    client.takes_all(after_s=LATEST_S / 5)
+    assert LEAST_S < client.wire.wait_s(PERIOD_S) < PERIOD_S
+
+
+def test_no_client_has_more_time_than_a_real_controller_gives_it() -> None:
+    client = Client()
+    client.is_sent(100)
+    client.takes_all(after_s=PATIENCE_S / 2)
+    assert client.wire.wait_s(PERIOD_S) == pytest.approx(PERIOD_S)
+
+
+def test_a_client_that_hangs_is_waited_for_in_vain_only_so_long() -> None:
+    client = Client()
+    client.is_sent(100)
+    client.wall.passes(PATIENCE_S * 1.01)
+    assert client.wire.wait_s(PERIOD_S) == 0.0
+    client.is_sent(100)
+    client.wire.look()
+    assert client.wire.wait_s(PERIOD_S) == 0.0, "it has not caught up"
+
+
+def test_a_client_that_is_slow_again_and_again_is_not_waited_for_each_time() -> None:
+    client = Client()
+    for _ in range(3):
+        client.is_sent(100)
+        client.takes_all(after_s=0.5)
+    client.is_sent(100)
+    client.wall.passes(4 * LEAST_PATIENCE_S)
+    assert client.wire.wait_s(PERIOD_S) == 0.0
+
+
+def test_a_client_that_reads_every_byte_may_be_some_behind() -> None:
+    client = Client(allowance=1000)
+    client.is_sent(900)
+    assert client.wire.wait_s(most_s=0.0) == 0.0
+    client.is_sent(900)
+    assert client.wire.wait_s(most_s=0.0) > 0.0
+
+
+def test_a_second_lasts_a_second_while_a_client_asks() -> None:
+    wall = Wall()
+    clock = Clock(10.0, wall)
+
+    def ticks_in(duration_s: float) -> int:
+        before, end_s = clock.tick, wall.now_s + duration_s
+        while wall.now_s < end_s:
+            wall.passes(max(clock.wait_s(), 1e-5))
+            if clock.wait_s() <= 0.0:
+                clock.count()
+        return clock.tick - before
+
+    assert ticks_in(DIALOGUE_S) == pytest.approx(10 * DIALOGUE_S / TICK_S, rel=0.05)
+    clock.dialogue()
+    assert ticks_in(DIALOGUE_S * 0.99) == pytest.approx(DIALOGUE_S / TICK_S, rel=0.05)
+
+
+@linux
+@pytest.mark.parametrize("pause_s", [0.003, 0.02])
+def test_a_slow_client_that_keeps_only_the_newest_packet_misses_none(world: World, pause_s: float) -> None:
+    reader = RtdeReader(world(FAST).host)
+    times_s = []
+    for _ in range(100):
+        times_s.append(reader.newest_s())
+        time.sleep(pause_s)
+    reader.close()
+    assert max(after - before for before, after in pairwise(times_s)) == pytest.approx(PERIOD_S)
+
+
+@linux
+def test_a_client_that_stalls_for_half_a_second_misses_nothing(world: World) -> None:
+    reader = RtdeReader(world(FAST).host)
+    before_s = reader.newest_s()
+    time.sleep(0.5)
+    assert reader.newest_s() - before_s == pytest.approx(PERIOD_S)
+    reader.close()
+
+
+def test_a_client_that_never_reads_again_does_not_stop_the_world_for_others(world: World) -> None:
+    running = world(FAST)
+    deaf = RtdeReader(running.host)
+    reader = RtdeReader(running.host)
+    began_s, wall_s = reader.newest_s(), time.monotonic()
+    wait_for(lambda: reader.newest_s() > began_s + 10.0, "ten seconds of the world")
+    reader.close()
+    deaf.close()
+    assert time.monotonic() - wall_s < 10.0, "slower than real time"
+
+
+def test_a_client_that_comes_back_after_long_is_waited_for_again(world: World) -> None:
+    running = world(FAST)
+    reader = RtdeReader(running.host)
+    before_s = reader.newest_s()
+    time.sleep(2 * PATIENCE_S)
+    assert reader.newest_s() - before_s > 1.0, "the world waited all the time"
+    reader.close()
+
+
+def turn(arm: Arm) -> Transfer:
+    start = arm.latest.q_rad
+    return Transfer("test move", start, (*start[:5], start[5] + 4.0), 1.0, 2.0, trapezoid_duration(4.0, 1.0, 2.0))
+
+
+@linux
+def test_a_stalled_wire_does_not_end_a_move(world: World) -> None:
+    with relay(world({"world": {"time_scale": 8}}).host) as wire, Arm(wire.host) as arm:
+        arm.take_control(0.35, (0.0, 0.0, 0.025))
+        missed = arm.missed_states
+        ends = threading.Timer(0.5, wire.stalled.clear)
+
+        def stall() -> None:
+            if abs(arm.latest.qd_rad_s[5]) > 0.8 and not ends.is_alive() and not ends.finished.is_set():
+                wire.stalled.set()
+                ends.start()
+
+        arm.move(turn(arm), stall)
+        assert ends.finished.is_set(), "nothing stalled"
+        assert arm.missed_states - missed < 10  # the relay's own buffer
+        ends.join()
+
+
+@linux
+def test_a_driver_that_stalls_for_a_moment_misses_no_state(world: World) -> None:
+    with Arm(world({"world": {"time_scale": 8}}).host) as arm:
+        arm.take_control(0.35, (0.0, 0.0, 0.025))
+        (child,) = multiprocessing.active_children()
+        assert child.pid is not None
+        pid, missed = child.pid, arm.missed_states
+        stalls = iter([0.3])
+
+        def stall() -> None:
+            if abs(arm.latest.qd_rad_s[5]) > 0.8 and (duration_s := next(stalls, None)):
+                os.kill(pid, signal.SIGSTOP)
+                time.sleep(duration_s)
+                os.kill(pid, signal.SIGCONT)
+
+        arm.move(turn(arm), stall)
+        assert next(stalls, None) is None, "nothing stalled"
+        assert arm.missed_states - missed <= 3
