@@ -16,15 +16,29 @@ These names are the public ones; where they are made may change. To import them 
 from typing import TYPE_CHECKING, Any
 
 if TYPE_CHECKING:
-    from rig.notebook.beside import Beside, compare
+    from rig.errors import Fault, Refused
+    from rig.notebook.comparisons import SensorComparison, compare
     from rig.notebook.results import Calibration, Result, solve
     from rig.notebook.runs import Readings, Run, load
 
 __version__ = "0.1.0"
-__all__ = ["Beside", "Calibration", "Readings", "Result", "Run", "__version__", "compare", "load", "solve"]
+__all__ = [
+    "Calibration",
+    "Fault",
+    "Readings",
+    "Refused",
+    "Result",
+    "Run",
+    "SensorComparison",
+    "__version__",
+    "compare",
+    "load",
+    "solve",
+]
 
 _PLACES = {
-    **dict.fromkeys(("Beside", "compare"), "rig.notebook.beside"),
+    **dict.fromkeys(("Fault", "Refused"), "rig.errors"),
+    **dict.fromkeys(("SensorComparison", "compare"), "rig.notebook.comparisons"),
     **dict.fromkeys(("Calibration", "Result", "solve"), "rig.notebook.results"),
     **dict.fromkeys(("Readings", "Run", "load"), "rig.notebook.runs"),
 }

@@ -17,9 +17,10 @@ if TYPE_CHECKING:
     from rig.plans.registry import AnyProcedure
 
 # The rig's linear algebra is small: threads only get in its way, most of all on a busy machine. NumPy asks when it is
-# loaded, so this must be said before; whoever has said otherwise is heeded.
-for _library in ("OPENBLAS", "OMP", "MKL"):
-    os.environ.setdefault(f"{_library}_NUM_THREADS", "1")
+# loaded, so this must be said before; whoever has said otherwise is heeded, and so is a program that has NumPy already.
+if "numpy" not in sys.modules:
+    for _library in ("OPENBLAS", "OMP", "MKL"):
+        os.environ.setdefault(f"{_library}_NUM_THREADS", "1")
 
 _BOARD = "look at the board, read and change its stored calibrations, flash its firmware"
 FAULT, INTERRUPTED = Fault.exit_status, 130

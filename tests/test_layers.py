@@ -1,5 +1,7 @@
 """The layers contract in pyproject.toml holds for what is there, and catches what does not belong."""
 
+import ast
+import graphlib
 import shutil
 import subprocess
 import sys
@@ -52,6 +54,16 @@ def test_nothing_but_the_world_imports_the_world(copy: Path, room: str) -> None:
     assert "BROKEN" in found.stdout
 
 
+@pytest.mark.parametrize(
+    "room", ["rig/notebook/peek.py", "rig/board/peek.py", "firmware_host/peek.py", "procedures/peek.py"]
+)
+def test_nothing_but_the_world_imports_the_emulator(copy: Path, room: str) -> None:
+    (copy / room).write_text("from firmware_host.emulator.machine import EmulatedBoard\n\nBOARD = EmulatedBoard\n")
+    found = lint(copy)
+    assert found.returncode == 1
+    assert "Only the world knows the emulator BROKEN" in found.stdout
+
+
 def test_a_room_does_not_import_from_the_rooms_after_it(copy: Path) -> None:
     (copy / "rig" / "observation" / "early.py").write_text(
         "from rig.analysis.verdict import Check\n\nEARLY = Check\n", encoding="utf-8"
@@ -64,3 +76,26 @@ def test_a_room_does_not_import_from_the_rooms_after_it(copy: Path) -> None:
 def test_at_most_four_modules_lie_flat() -> None:
     flat = sorted(path.name for path in (ROOT / "rig").glob("*.py"))
     assert len(flat) <= 4, flat
+
+
+def imports_of(source: Path, known: set[str]) -> set[str]:
+    """The modules among `known` that a file imports, wherever in it the import stands."""
+    found = set()
+    for node in ast.walk(ast.parse(source.read_text(encoding="utf-8"))):
+        if isinstance(node, ast.Import):
+            found |= {alias.name for alias in node.names}
+        elif isinstance(node, ast.ImportFrom) and node.module:
+            found |= {f"{node.module}.{alias.name}" for alias in node.names} | {node.module}
+    return found & known
+
+
+def test_no_imports_go_round_in_a_circle() -> None:
+    """Not even those inside functions or for types alone; packages themselves hold only what they say of themselves."""
+    sources = {
+        ".".join(source.relative_to(ROOT).with_suffix("").parts): source
+        for package in ("rig", "firmware_host", "procedures")
+        for source in (ROOT / package).rglob("*.py")
+        if source.name != "__init__.py"
+    }
+    graph = {name: imports_of(source, set(sources)) - {name} for name, source in sources.items()}
+    tuple(graphlib.TopologicalSorter(graph).static_order())  # raises CycleError, which names the circle

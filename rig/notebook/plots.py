@@ -1,5 +1,6 @@
 """Pictures of readings, residuals and comparisons. Needs matplotlib, which the extra `study` brings."""
 
+from collections.abc import Iterable, Mapping
 from dataclasses import dataclass
 from io import BytesIO
 from pathlib import Path
@@ -7,14 +8,15 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
+from rig.analysis.calibration import SensorResult
 from rig.analysis.comparison import Comparison
 from rig.errors import Fault, Refused
-from rig.notebook.results import Result
-from rig.notebook.runs import Readings
-from rig.observation.windows import swept
+from rig.estimation.arrays import Array
+from rig.observation.windows import Window
 from rig.report.figures import draw_comparison
 
 if TYPE_CHECKING:
+    from matplotlib.axes import Axes
     from matplotlib.figure import Figure
 
 DPI = 110
@@ -36,32 +38,29 @@ class Plot:
         return picture.getvalue()
 
 
-def plot_readings(readings: Readings) -> Plot:
-    """The three axes of a sensor over the arm's time, the sweeps shaded."""
-    time_s, rate_rad_s = readings.on_arm_clock()
+def plot_readings(time_s: Array, rate_rad_s: Array, sweeps: Iterable[Window], title: str) -> Plot:
+    """Three axes (n, 3) over the arm's time (n,), the sweeps shaded."""
     figure = _figure(10, 3.5)
     axes = figure.subplots()
-    for run in readings.recorded.movement:
-        for finished in swept(run):
-            axes.axvspan(finished.window.start_s - time_s[0], finished.window.end_s - time_s[0], color="0.92", lw=0)
+    for window in sweeps:
+        axes.axvspan(window.start_s - time_s[0], window.end_s - time_s[0], color="0.92", lw=0)
     for i, axis in enumerate("xyz"):
         axes.plot(time_s - time_s[0], rate_rad_s[:, i], lw=0.7, label=axis)
     axes.set(xlabel="time s", ylabel="reading rad/s")
-    axes.set_title(f"{readings.name}, {readings.sensor.mode} readings", loc="left")
-    axes.legend(loc="lower right", bbox_to_anchor=(1, 1), borderaxespad=0, ncols=3, frameon=False)
+    _finish(axes, title)
     return Plot(figure)
 
 
-def plot_residuals(result: Result) -> Plot:
+def plot_residuals(results: Mapping[str, SensorResult]) -> Plot:
     """Reading less vector model of every sweep and rest, with the standard deviation of each mean."""
     sensors = {
-        name: (each.found, each.found.vector_model)
-        for name, each in result.items()
-        if not isinstance(each.found.vector_model, Fault)
+        name: (found, found.vector_model)
+        for name, found in results.items()
+        if not isinstance(found.vector_model, Fault)
     }
     if not sensors:
         raise Refused(
-            "nothing_to_plot", "the vector model has no solution here", "Read in result.outcome why, sensor by sensor"
+            "nothing_to_plot", "the vector model has no solution here", "Read in the result why, sensor by sensor"
         )
     figure = _figure(10, 3 * len(sensors))
     panels = figure.subplots(len(sensors), sharex=True, squeeze=False)[:, 0]
@@ -73,14 +72,13 @@ def plot_residuals(result: Result) -> Plot:
             axes.errorbar(places, model.residuals_rad_s[:, i], std[:, i], fmt="o", ms=3, lw=0.8, label=axis)
         axes.axhline(0, color="0.5", lw=0.8)
         axes.set(ylabel="residual rad/s")
-        axes.set_title(f"{name}: reading − model, ± 1σ", loc="left")
         axes.set_xticks(
             range(len(averages)),
             [f"{o.joint_name} {o.direction}" for o in found.observations] + ["rest"] * len(found.rests),
             rotation=60,
             ha="right",
         )
-        axes.legend(loc="lower right", bbox_to_anchor=(1, 1), borderaxespad=0, ncols=3, frameon=False)
+        _finish(axes, f"{name}: reading − model, ± 1σ")
     return Plot(figure)
 
 
@@ -89,6 +87,12 @@ def plot_comparison(comparison: Comparison, sensor: str, reference: str) -> Plot
     figure = _figure(10, 7.5)
     draw_comparison(figure, comparison, sensor, reference)
     return Plot(figure)
+
+
+def _finish(axes: "Axes", title: str) -> None:
+    """A title on the left, the axes' names on the right of it."""
+    axes.set_title(title, loc="left")
+    axes.legend(loc="lower right", bbox_to_anchor=(1, 1), borderaxespad=0, ncols=3, frameon=False)
 
 
 def _figure(width: float, height: float) -> "Figure":

@@ -10,17 +10,16 @@ from rig.analysis.calibration import DEFAULT_ESTIMATOR, SensorResult
 from rig.analysis.outcome import Outcome
 from rig.analysis.verdict import Check
 from rig.data.settings import setting
-from rig.errors import Refused
 from rig.estimation.arrays import Array
 from rig.notebook.html import table
-from rig.notebook.runs import Run
+from rig.notebook.runs import NoSuchSensor, Run
 from rig.plans.recorded import judged
 
 if TYPE_CHECKING:
     from rig.notebook.plots import Plot
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, eq=False)
 class Calibration:
     """One sensor's calibration: rate = `scale` × (reading + `bias_rad_s`)."""
 
@@ -46,6 +45,12 @@ class Calibration:
     def std(self) -> Array:
         """(6,) standard deviations, in the order of the covariance."""
         return np.asarray(np.sqrt(np.diag(self.covariance)), dtype=np.float64)
+
+    def to_dict(self) -> dict[str, Any]:
+        """Scale, bias and covariance as `result.json` has them."""
+        from rig.report.sensor_entry import estimate_entry
+
+        return estimate_entry(self.found.solution).model_dump(mode="json")
 
     def rows(self) -> list[tuple[str, ...]]:
         """Axis, scale factor and bias with their standard deviations, in words."""
@@ -75,7 +80,7 @@ class Calibration:
 HEADINGS = ("axis", "scale factor", "± 1σ", "bias rad/s", "± 1σ rad/s")
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, eq=False)
 class Result(Mapping[str, Calibration]):
     """What a run amounts to: `result["gyro"]` is a sensor's calibration."""
 
@@ -101,13 +106,13 @@ class Result(Mapping[str, Calibration]):
         """What each sweep and rest leaves unexplained, sensor by sensor."""
         from rig.notebook.plots import plot_residuals
 
-        return plot_residuals(self)
+        return plot_residuals(self.outcome.results)
 
     def __getitem__(self, name: str) -> Calibration:
         results = self.outcome.results
         if name not in results:
             known = f"Choose one of: {', '.join(results)}" if results else "Solve the recording of a calibration"
-            raise Refused("no_such_sensor", f"this result has no calibration of {name}", known)
+            raise NoSuchSensor("no_such_sensor", f"this result has no calibration of {name}", known)
         return Calibration(name, results[name])
 
     def __iter__(self) -> Iterator[str]:

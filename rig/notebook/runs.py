@@ -1,7 +1,7 @@
 """A run as it was recorded: its sensors' readings in rad/s on the arm's clock."""
 
-from collections.abc import Iterator, Mapping
-from dataclasses import dataclass
+from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import asdict, dataclass
 from functools import cached_property
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -9,24 +9,33 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from numpy.typing import NDArray
 
-from rig.data.run_file import RecordedSensor
+from rig.analysis.calibration import DEFAULT_ESTIMATOR
+from rig.analysis.outcome import Outcome
+from rig.data.run_file import RecordedSensor, RunData
 from rig.data.settings import RunSettings
 from rig.errors import Refused
 from rig.estimation.arrays import Array
 from rig.notebook.html import table
-from rig.plans.recorded import RecordedRun, open_run
+from rig.observation.observed_run import ObservedRun, observe_runs
+from rig.plans.recorded import RecordedRun, judged, open_run
 
 if TYPE_CHECKING:
     from rig.notebook.plots import Plot
 
+HEADINGS = ("sensor", "part", "serial number", "Hz", "samples", "readings")
 
-@dataclass(frozen=True)
+
+class NoSuchSensor(Refused, KeyError):
+    """There is no sensor of that name; a KeyError as well, so that `name in run` and `run.get(name)` work."""
+
+
+@dataclass(frozen=True, eq=False)
 class Readings:
     """One sensor's readings in all recordings of a movement, in the order they were made."""
 
     name: str
     sensor: RecordedSensor
-    recorded: RecordedRun
+    recordings: Sequence[RunData]
 
     def on_arm_clock(self) -> tuple[Array, Array]:
         """Controller times (n,) in s and readings (n, 3) in rad/s. Raises Fault as `estimate_time_base` does."""
@@ -38,7 +47,7 @@ class Readings:
         from rig.observation.timebase import ArmMotion
 
         streams = [
-            on_the_arms_clock(run.samples[self.name], self.sensor, ArmMotion(run.arm)) for run in self.recorded.movement
+            on_the_arms_clock(run.samples[self.name], self.sensor, ArmMotion(run.arm)) for run in self.recordings
         ]
         return (
             np.concatenate([stream.time_s for stream in streams]),
@@ -48,23 +57,34 @@ class Readings:
     @property
     def samples(self) -> NDArray[Any]:
         """(n,) SAMPLE_DTYPE: counts, board times and sequence numbers as the board sent them."""
-        return np.concatenate([run.samples[self.name] for run in self.recorded.movement])
+        return np.concatenate([run.samples[self.name] for run in self.recordings])
+
+    def to_dict(self) -> dict[str, Any]:
+        """What is known of the sensor, as plain numbers and texts; not the samples."""
+        return {"name": self.name, **asdict(self.sensor), "samples": len(self.samples)}
 
     def plot(self) -> "Plot":
         """The three axes over time, the sweeps shaded."""
         from rig.notebook.plots import plot_readings
+        from rig.observation.windows import swept
 
-        return plot_readings(self)
+        sweeps = [finished.window for run in self.recordings for finished in swept(run)]
+        return plot_readings(*self.on_arm_clock(), sweeps, f"{self.name}, {self.sensor.mode} readings")
+
+    def row(self) -> tuple[str, ...]:
+        """In words, under `HEADINGS`."""
+        sensor = self.sensor
+        return self.name, sensor.part, sensor.serial_number, f"{sensor.rate_hz:g}", str(len(self.samples)), sensor.mode
 
     def __repr__(self) -> str:
-        sensor = self.sensor
-        return (
-            f"<{self.name}: {sensor.part} {sensor.serial_number}, {len(self.samples)} samples at {sensor.rate_hz:g} Hz,"
-            f" {sensor.mode}>"
-        )
+        name, part, serial_number, rate_hz, samples, mode = self.row()
+        return f"<{name}: {part} {serial_number}, {samples} samples at {rate_hz} Hz, {mode}>"
+
+    def _repr_html_(self) -> str:
+        return table(self.name, HEADINGS, [self.row()])
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, eq=False)
 class Run(Mapping[str, Readings]):
     """A recorded run: `run["gyro"]` are a sensor's readings.
 
@@ -84,9 +104,9 @@ class Run(Mapping[str, Readings]):
         return self.recorded.movement[0].settings
 
     @property
-    def provenance(self) -> Mapping[str, Any]:
-        """What was measured with what, and when."""
-        return self.recorded.movement[0].provenance
+    def started_utc(self) -> str:
+        """When the run began."""
+        return str(self.recorded.movement[0].provenance["started_utc"])
 
     @property
     def verification(self) -> "Run | None":
@@ -96,31 +116,44 @@ class Run(Mapping[str, Readings]):
             return None
         return Run(RecordedRun(recorded.path, (), recorded.corrected, alone=True))
 
+    @cached_property
+    def calibration(self) -> Outcome | None:
+        """What the raw readings amount to by themselves; None where none were recorded."""
+        return judged(self.recorded.only_raw(), DEFAULT_ESTIMATOR) if self.recorded.raw else None
+
+    @cached_property
+    def corrected(self) -> tuple[ObservedRun, ...]:
+        """The recordings of readings that the board had corrected."""
+        return observe_runs(self.recorded.corrected) if self.recorded.corrected else ()
+
+    def to_dict(self) -> dict[str, Any]:
+        """What was recorded and what it is judged by, as plain numbers, lists and texts; not the samples."""
+        sensors = {name: readings.to_dict() for name, readings in self.items()}
+        return {"path": str(self.path), "settings": asdict(self.settings), "sensors": sensors}
+
+    @cached_property
+    def _readings(self) -> Mapping[str, Readings]:
+        recordings = self.recorded.movement
+        return {name: Readings(name, sensor, recordings) for name, sensor in recordings[0].sensors.items()}
+
     def __getitem__(self, name: str) -> Readings:
-        sensors = self.recorded.movement[0].sensors
-        if name not in sensors:
-            raise Refused(
-                "no_such_sensor", f"{self.path} holds no sensor {name}", f"Choose one of: {', '.join(sensors)}"
-            )
-        return Readings(name, sensors[name], self.recorded)
+        if name not in self._readings:
+            known = ", ".join(self._readings)
+            raise NoSuchSensor("no_such_sensor", f"{self.path} holds no sensor {name}", f"Choose one of: {known}")
+        return self._readings[name]
 
     def __iter__(self) -> Iterator[str]:
-        return iter(self.recorded.movement[0].sensors)
+        return iter(self._readings)
 
     def __len__(self) -> int:
-        return len(self.recorded.movement[0].sensors)
+        return len(self._readings)
 
     def __repr__(self) -> str:
         return f"<run {self.path.name}: {self.settings.procedure}, {', '.join(map(repr, self.values()))}>"
 
     def _repr_html_(self) -> str:
-        rows = [
-            (name, r.sensor.part, r.sensor.serial_number, f"{r.sensor.rate_hz:g}", str(len(r.samples)), r.sensor.mode)
-            for name, r in self.items()
-        ]
-        started = self.provenance.get("started_utc", "")
-        title = f"{self.path.name}: {self.settings.procedure}, {started}"
-        return table(title, ("sensor", "part", "serial number", "Hz", "samples", "readings"), rows)
+        title = f"{self.path.name}: {self.settings.procedure}, {self.started_utc}"
+        return table(title, HEADINGS, [readings.row() for readings in self.values()])
 
 
 def load(path: str | Path) -> Run:

@@ -40,6 +40,7 @@ def test_readings_are_in_rad_s_on_the_arms_clock(run: rig.Run) -> None:
     assert time_s.shape == (len(run["gyro"].samples),)
     assert rate_rad_s.shape == (len(time_s), 3)
     assert np.all(np.diff(time_s) > 0)
+    assert run["gyro"] is run["gyro"]  # its clock is found once
     arm = run.recorded.movement[0].arm["time_s"]
     assert arm[0] - 1 < time_s[0] < time_s[-1] < arm[-1] + 1
     sweep = next(swept(run.recorded.movement[0])).window
@@ -88,6 +89,8 @@ def test_what_is_not_there_is_refused_by_name(run: rig.Run, result: rig.Result) 
     for ask in (lambda: run["accelerometer"], lambda: result["accelerometer"], lambda: rig.compare(run, "gyro", "x")):
         with pytest.raises(Refused, match=r"no_such_sensor: .*gyro, reference"):
             ask()
+    assert "gyro" in run and "accelerometer" not in run and run.get("accelerometer") is None
+    assert "gyro" in result and result.get("accelerometer") is None
     with pytest.raises(Refused, match="no_run"):
         rig.load(ROOT / "docs")
     with pytest.raises(AttributeError, match="no attribute 'sovle'"):
@@ -98,7 +101,8 @@ def test_everything_shows_itself_in_a_line_or_a_table(run: rig.Run, result: rig.
     beside = rig.compare(run, "gyro", "reference")
     for shown in (run, run["gyro"], result, result["gyro"], beside):
         assert len(repr(shown)) < 300
-    for shown in (run, result, result["gyro"], beside):
+    for shown in (run, run["gyro"], result, result["gyro"], beside):
         assert shown._repr_html_().startswith("<table>")
+        assert json.loads(json.dumps(shown.to_dict()))
     for plot in (run["gyro"].plot(), result.plot(), beside.plot()):
         assert plot._repr_png_().startswith(b"\x89PNG")

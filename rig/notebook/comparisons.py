@@ -2,7 +2,7 @@
 
 from collections.abc import Sequence
 from dataclasses import dataclass
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
@@ -12,16 +12,15 @@ from rig.analysis.comparison import compare as compare_readings
 from rig.analysis.verification import relative_mounting
 from rig.errors import Refused
 from rig.notebook.html import table
-from rig.notebook.results import Result, solve
 from rig.notebook.runs import Run
-from rig.observation.observed_run import ObservedRun, observe_runs
+from rig.observation.observed_run import ObservedRun
 
 if TYPE_CHECKING:
     from rig.notebook.plots import Plot
 
 
-@dataclass(frozen=True)
-class Beside:
+@dataclass(frozen=True, eq=False)
+class SensorComparison:
     """Readings of `sensor` beside those of `reference`, in the frame of `sensor`.
 
     `before` are its raw readings, `after` those that the board had corrected; None where they were not recorded.
@@ -46,6 +45,18 @@ class Beside:
 
         return plot_comparison(self.shown, self.sensor, self.reference)
 
+    def to_dict(self) -> dict[str, Any]:
+        """RMS of the difference on each axis, rad/s, and how the two sit to each other, as plain numbers."""
+        parts = {"before": self.before, "after": self.after}
+        return {
+            "sensor": self.sensor,
+            "reference": self.reference,
+            "rotation_rad": self.rotation.vector_rad.tolist(),
+            "rms_rad_s": {
+                when: found.movement.rms_rad_s.tolist() for when, found in parts.items() if found is not None
+            },
+        }
+
     def _rows(self) -> list[tuple[str, ...]]:
         return [
             (when, *(f"{rms:.5f}" for rms in found.movement.rms_rad_s))
@@ -61,7 +72,7 @@ class Beside:
         return table(f"{self.sensor} beside {self.reference}, RMS rad/s", ("calibration", "x", "y", "z"), self._rows())
 
 
-def compare(run: Run, sensor: str, reference: str) -> Beside:
+def compare(run: Run, sensor: str, reference: str) -> SensorComparison:
     """Compare two sensors of a run sample by sample, the one corrected by what is known of it.
 
     The reference's calibration is the turntable's where the run names one, else this run's own. Raises Refused
@@ -69,32 +80,30 @@ def compare(run: Run, sensor: str, reference: str) -> Beside:
     """
     for name in (sensor, reference):
         run[name]  # refused by name
-    recorded = run.recorded
-    result = solve(Run(recorded.only_raw())) if recorded.raw else None
-    before, after = (observe_runs(runs) if runs else () for runs in (recorded.raw, recorded.corrected))
-    raw = before or after
-    known = _known(run, reference, result, raw)
-    calibration = result.outcome.results[sensor] if result is not None else None
-    rotation = relative_mounting(sensor, known, raw, calibration)
+    calibration = run.calibration
+    before = calibration.recordings if calibration is not None else ()
+    raw = before or run.corrected
+    known = _known(run, reference, raw)
+    rotation = relative_mounting(sensor, known, raw, calibration.results[sensor] if calibration is not None else None)
     parts = (
-        compare_readings(part, sensor, _known(run, reference, result, part), rotation.matrix) if part else None
-        for part in (before, after)
+        compare_readings(part, sensor, _known(run, reference, part), rotation.matrix) if part else None
+        for part in (before, run.corrected)
     )
-    return Beside(sensor, reference, rotation, *parts)
+    return SensorComparison(sensor, reference, rotation, *parts)
 
 
-def _known(run: Run, name: str, result: Result | None, recordings: Sequence[ObservedRun]) -> Reference:
+def _known(run: Run, name: str, recordings: Sequence[ObservedRun]) -> Reference:
     """What corrects a sensor's readings in these recordings: nothing where the board has done it already."""
     if recordings[0].run.sensors[name].mode == "calibrated":
         return Reference(name, np.ones(3), np.zeros(3))
     turntable = run.settings.reference
     if turntable is not None and turntable.name == name:
         return Reference(name, np.array(turntable.scale), np.array(turntable.bias_rad_s))
-    if result is None:
+    if run.calibration is None:
         raise Refused(
             "nothing_to_compare",
             f"{run.path} tells nothing of {name}'s own calibration",
             "Compare with the sensor whose role is reference",
         )
-    found = result[name]
+    found = run.calibration.results[name]
     return Reference(name, found.scale, found.bias_rad_s)
