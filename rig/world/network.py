@@ -19,8 +19,14 @@ class Session(Protocol):
     """What one client talks to: bytes in, bytes out, and a turn at every tick."""
 
     closing: bool  # close the connection once everything has been sent
-    dialogue: bool  # a client speaks with it by question and answer, each waiting for the one before
-    newest_only: bool  # a client overlooks what it sends when the next comes at once
+
+    @property
+    def dialogue(self) -> bool:
+        """Whether a client speaks with it by question and answer, each waiting for the one before."""
+
+    @property
+    def newest_only(self) -> bool:
+        """Whether a client overlooks what it sends when the next comes at once."""
 
     def greeting(self) -> bytes: ...
     def receive(self, data: bytes) -> bytes: ...
