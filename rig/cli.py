@@ -57,7 +57,10 @@ def guarded(command: Callable[[], int]) -> int:
         return _ended(str(interrupt) or "interrupted", INTERRUPTED)
     except OSError as error:
         return _ended(str(Fault("system", f"the system refused ({error})", "Mend that, then try again")), FAULT)
-    except Exception:
+    except SystemExit as ended:  # what a script's own code raised: its status would be taken for a verdict
+        ended_by = f"a script ended the program (SystemExit: {ended})"
+        return _ended(str(Fault("script_failed", ended_by, "Let the script end nothing by itself")), FAULT)
+    except BaseException:
         import traceback
 
         traceback.print_exc()  # a defect of ours; Python's own status, 1, would mean a verdict

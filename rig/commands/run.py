@@ -6,7 +6,7 @@ from pathlib import Path
 
 from rig.commands.configured import Configured, configured
 from rig.commands.laboratory import simulated_laboratory
-from rig.data.run_folder import CONFIG, RESULT, SCRIPT, new_folder
+from rig.data.run_folder import CONFIG, RESULT, SCRIPT, new_folder, script_identity
 from rig.errors import Refused
 from rig.plans.script_file import ScriptFile, load_script
 from rig.report.document import document_of
@@ -33,14 +33,14 @@ def run(
     Returns 0 passed, 1 verdict failed.
     """
     found = configured(config_path, overrides, script)
-    folder = new_folder(out, found.loaded, found.script.text)
+    folder = new_folder(out, found.loaded, found.script.text, found.script.identity)
     return _carry_out(folder, found, assume_yes=assume_yes, as_json=as_json)
 
 
 def resume(folder: Path, *, assume_yes: bool = False, as_json: bool = False) -> int:
     """Go on with an interrupted run by the script it was begun with: sweeps it has finished count, the others are done.
 
-    Returns as `run` does. Raises Refused `no_run`, `already_finished`, `another_script`.
+    Returns as `run` does. Raises Refused `no_run`, `already_finished`, and as `script_identity` and `load_script`.
     """
     if not (folder / CONFIG).exists():
         raise Refused("no_run", f"{folder} holds no {CONFIG}", "Give the folder of an interrupted run")
@@ -52,7 +52,7 @@ def resume(folder: Path, *, assume_yes: bool = False, as_json: bool = False) -> 
             f"{folder} keeps no {SCRIPT}, so the script it was begun with is not known",
             "Start a new run with `rig run`",
         )
-    found = configured(folder / CONFIG, script=load_script(folder / SCRIPT))
+    found = configured(folder / CONFIG, script=load_script(folder / SCRIPT, script_identity(folder)))
     return _carry_out(folder, found, assume_yes=assume_yes, as_json=as_json)
 
 

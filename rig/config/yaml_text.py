@@ -4,7 +4,6 @@ Nothing a text holds makes reading it slow, large or deep: a configuration is a 
 refused instead of read.
 """
 
-import stat
 from collections.abc import Iterator, Mapping
 from dataclasses import dataclass
 from pathlib import Path
@@ -13,6 +12,7 @@ from typing import Any
 import yaml
 
 from rig.config.quoting import escape, first_control_character, quote, shorten
+from rig.config.regular_file import UnfitFile, read_regular_file
 
 Location = tuple[int | str, ...]
 
@@ -46,15 +46,11 @@ class Document:
 def read_file(path: Path) -> str:
     """The text of a regular file of reasonable size. Raises `Unreadable`."""
     try:
-        # A device or a pipe would be read for ever.
-        if not stat.S_ISREG(path.stat().st_mode):
-            raise Unreadable("cannot be read: it is no regular file")
-        with path.open("rb") as file:
-            content = file.read(SIZE_MAX_BYTES + 1)
+        content = read_regular_file(path, SIZE_MAX_BYTES)
+    except UnfitFile as unfit:
+        raise Unreadable(f"cannot be read: {unfit}") from None
     except OSError as error:
         raise Unreadable(f"cannot be read: {error.strerror}") from None
-    if len(content) > SIZE_MAX_BYTES:
-        raise Unreadable(f"cannot be read: it is longer than {SIZE_MAX_BYTES} bytes, so it is no configuration")
     try:
         return content.decode("utf-8-sig")
     except UnicodeDecodeError as error:

@@ -9,10 +9,12 @@ from typing import Annotated, Final, Literal
 
 from pydantic import BaseModel, ConfigDict, Field, JsonValue, ValidationError
 
+from rig.config.regular_file import UnfitFile, read_regular_file
 from rig.errors import Refused
 
 SCHEMA: Final = "rig.result/1"
 NAME = "result.json"
+SIZE_MAX_BYTES = 64_000_000  # a run of six sweeps with its verification has 66,000
 
 Positive = Annotated[float, Field(gt=0)]
 Vector3 = tuple[float, float, float]
@@ -298,11 +300,10 @@ def read_result(path: Path) -> ResultDocument:
     """The `result.json` of a run folder or at `path` itself. Raises Refused `no_result`, `not_a_result`."""
     file = _file(path)
     try:
-        return ResultDocument.model_validate_json(file.read_bytes())
-    except OSError as error:
-        raise Refused(
-            "no_result", f"{file} cannot be read: {error.strerror}", "Give a run folder or its result.json"
-        ) from error
+        return ResultDocument.model_validate_json(read_regular_file(file, SIZE_MAX_BYTES))
+    except (UnfitFile, OSError) as error:
+        why = error.strerror if isinstance(error, OSError) else error
+        raise Refused("no_result", f"{file} cannot be read: {why}", "Give a run folder or its result.json") from error
     except ValidationError as error:
         first = error.errors()[0]
         where = ".".join(map(str, first["loc"]))

@@ -1,25 +1,43 @@
 """What lies where in a run folder, and how to go on with one."""
 
+import json
 import shlex
+from dataclasses import asdict, dataclass
 from datetime import UTC, datetime
 from pathlib import Path
 
 from rig.config.load import Loaded
+from rig.config.regular_file import UnfitFile, read_regular_file
+from rig.data.checked import checked
 from rig.errors import Refused
 
 CONFIG, SCRIPT, RESULT = "config.yaml", "script.py", "result.json"
+SCRIPT_IDENTITY = "script.json"
+IDENTITY_MAX_BYTES = 10_000
 _BEGINNINGS = {"raw": "run", "calibrated": "verify"}  # of the names of recordings, by what is streamed
 
 
-def new_folder(out: Path | None, loaded: Loaded, script: str) -> Path:
-    """A run folder with the configuration as used and the script's text, nothing else. Raises Refused `run_folder`."""
+@dataclass(frozen=True, slots=True)
+class ScriptIdentity:
+    """Which script a run was begun with: what its file was called, and the SHA-256 of its text in hexadecimal."""
+
+    name: str
+    sha256: str
+
+
+def new_folder(out: Path | None, loaded: Loaded, script: str, identity: ScriptIdentity) -> Path:
+    """A run folder with the configuration as used, the script's text and what is known of it, nothing else.
+
+    Raises Refused `run_folder`.
+    """
     stamp = datetime.now(UTC).strftime("%Y-%m-%dT%H-%M-%SZ")
     folder = out or Path(loaded.config.output.folder) / f"{stamp}-{loaded.config.procedure.name}"
     try:
         folder.mkdir(parents=True, exist_ok=True)
         empty = not any(folder.iterdir())
         if empty:
-            (folder / SCRIPT).write_text(script, encoding="utf-8")
+            (folder / SCRIPT).write_text(script, encoding="utf-8", newline="")
+            (folder / SCRIPT_IDENTITY).write_text(json.dumps(asdict(identity)) + "\n", encoding="utf-8")
             (folder / CONFIG).write_text(loaded.text, encoding="utf-8")
     except OSError as error:
         raise Refused("run_folder", f"{folder} cannot be written: {error}", "Choose another with --out") from error
@@ -28,6 +46,20 @@ def new_folder(out: Path | None, loaded: Loaded, script: str) -> Path:
             "run_folder", f"{folder} is not empty", f"Choose another with --out, or go on with: {resuming(folder)}"
         )
     return folder
+
+
+def script_identity(folder: Path) -> ScriptIdentity:
+    """Which script a run folder was begun with. Raises Refused `another_script` when it does not say."""
+    path = folder / SCRIPT_IDENTITY
+    try:
+        return checked(ScriptIdentity, json.loads(read_regular_file(path, IDENTITY_MAX_BYTES)), "script")
+    except (UnfitFile, OSError, ValueError) as error:
+        why = error.strerror if isinstance(error, OSError) else error
+        raise Refused(
+            "another_script",
+            f"{path} does not say which script the run was begun with ({why})",
+            "Start a new run with `rig run`",
+        ) from error
 
 
 def recordings(folder: Path, readings: str) -> list[Path]:

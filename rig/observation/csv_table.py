@@ -1,13 +1,14 @@
 """Columns of numbers from a CSV file that somebody else wrote: within bounds, or refused by name."""
 
 import csv
-import stat
 from array import array
 from collections.abc import Iterator, Sequence
+from io import TextIOWrapper
 from pathlib import Path
 
 import numpy as np
 
+from rig.config.regular_file import UnfitFile, open_regular_file
 from rig.errors import Refused
 from rig.estimation.arrays import Array
 
@@ -39,16 +40,14 @@ def read_columns(path: Path, columns: Sequence[str], alternatives: Sequence[str]
 
 
 def _rows(path: Path, largest_mb: int) -> Iterator[list[str]]:
-    """The rows of a regular file that is not too large: a pipe or a device may never end."""
+    """The rows of a regular file that is not too large."""
     try:
-        status = path.stat()
-        if not stat.S_ISREG(status.st_mode):
-            raise _unreadable(path, "it is no regular file")
-        if status.st_size > largest_mb * 1_000_000:
-            raise _unreadable(path, f"it is larger than {largest_mb} MB")
-        with path.open(newline="", encoding="utf-8-sig") as file:
-            yield from csv.reader(file)
-    except (OSError, ValueError, csv.Error) as error:
+        with (
+            open_regular_file(path, largest_mb * 1_000_000) as file,
+            TextIOWrapper(file, encoding="utf-8-sig", newline="") as text,
+        ):
+            yield from csv.reader(text)
+    except (UnfitFile, OSError, ValueError, csv.Error) as error:
         raise _unreadable(path, str(error)) from error
 
 

@@ -21,6 +21,7 @@ from rig.data.run_folder import next_recording, recordings, resuming
 from rig.data.settings import RunSettings, settings_of
 from rig.errors import Fault, Refused, RigError
 from rig.plans.phase import Phase
+from rig.plans.script_errors import ENDING
 from rig.plans.script_file import ScriptFile, installed_script
 from rig.report.writers import write_outcome
 from rig.runner.connect import Connector
@@ -140,6 +141,11 @@ class Run:
             fault = Fault("system", f"{self.folder} cannot be used ({error})", remedy)
             self._ended(Failed(fault))
             raise fault from error
+        except SystemExit as ended:
+            what = _with_notes(f"the script {self.script.name} ended the program (SystemExit: {ended})", ended)
+            fault = Fault("script_failed", what, ENDING)
+            self._ended(Failed(fault), advice)
+            raise fault from ended
         except KeyboardInterrupt as interrupt:
             stopped = _with_notes("interrupted", interrupt)
             text = f"{stopped}; the data are kept in {self.folder}. Go on with: {resuming(self.folder)}"

@@ -8,7 +8,7 @@ import yaml
 
 from rig.config.layers import FILES_MAX, merge
 from rig.config.load import ConfigurationRefused, load, parse
-from rig.data.run_folder import new_folder
+from rig.data.run_folder import ScriptIdentity, new_folder
 from rig.world.section import world_section
 from support.paths import CONFIGS, DEMO
 
@@ -69,7 +69,7 @@ def test_the_path_is_relative_to_the_file_that_names_it(folder: Path, monkeypatc
 def test_the_text_as_used_stands_alone(folder: Path) -> None:
     """A run folder may be resumed where its base is not."""
     loaded = load(written(folder, "base: stock/demo.yaml\nprocedure: {rest_s: 7}\n"), ["world.seed=5"])
-    kept = new_folder(folder / "run", loaded, script="") / "config.yaml"
+    kept = new_folder(folder / "run", loaded, "", ScriptIdentity("", "")) / "config.yaml"
     shutil.rmtree(folder / "stock")
     again = load(kept)
     assert "base" not in yaml.safe_load(kept.read_text(encoding="utf-8"))

@@ -1,12 +1,13 @@
 """One model writes and reads `result.json`; its schema is committed; files of earlier versions stay readable."""
 
 import json
+import os
 from pathlib import Path
 
 import jsonschema
 import pytest
 
-from rig.data.result_file import read_result, schema_text
+from rig.data.result_file import SIZE_MAX_BYTES, read_result, schema_text
 from rig.errors import Refused
 from support.paths import DOCS, FIXTURES
 from support.results import VERIFIED
@@ -50,3 +51,17 @@ def test_provenance_may_say_more_than_this_version_knows(tmp_path: Path) -> None
     (tmp_path / "result.json").write_text(json.dumps(document), encoding="utf-8")
     again = json.loads(read_result(tmp_path).text())
     assert again == document
+
+
+@pytest.mark.parametrize("kind", ["pipe", "device", "huge"])
+def test_only_a_regular_file_of_a_sensible_size_is_read(kind: str, tmp_path: Path) -> None:
+    path = tmp_path / "result.json"
+    if kind == "pipe":
+        os.mkfifo(path)
+    elif kind == "device":
+        path = Path("/dev/zero")
+    else:
+        with path.open("wb") as file:
+            file.truncate(SIZE_MAX_BYTES + 1)
+    with pytest.raises(Refused, match=r"no_result: .*(no regular file|longer than 64000000 bytes)"):
+        read_result(path)

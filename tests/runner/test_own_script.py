@@ -74,7 +74,7 @@ def test_an_interrupted_script_of_ones_own_is_resumed_by_itself(interrupted: Pat
     solved = rig("solve", interrupted, "--json")
     assert json.loads(solved.stdout)["sensors"] == result["sensors"], solved.stderr
     (interrupted / "script.py").write_text("PROCEDURE = None", encoding="utf-8")
-    assert "rig: not_a_script: " in rig("solve", interrupted).stderr, "it is judged as it was, or not at all"
+    assert "rig: another_script: " in rig("solve", interrupted).stderr, "it is judged as it was, or not at all"
 
 
 def test_it_runs_as_a_script_too_and_is_planned(tmp_path: Path) -> None:

@@ -1,0 +1,33 @@
+"""What the code of somebody's own procedure raises, by name: it is no defect of the rig."""
+
+import traceback
+from collections.abc import Iterator
+from contextlib import contextmanager
+from pathlib import Path
+
+from rig.errors import ProblemError, Refused
+
+ENDING = 'Let it end nothing by itself: `if __name__ == "__main__":` belongs before what runs it alone'
+
+
+@contextmanager
+def script_errors(what: str, remedy: str = "Mend the script") -> Iterator[None]:
+    """Raises Refused `script_failed`, `what` with the reason and its place; errors that have a name stay as they are.
+
+    A script that ends the program is refused as well: its exit status would be taken for a verdict.
+    """
+    try:
+        yield
+    except ProblemError:
+        raise
+    except SystemExit as ended:
+        raise Refused("script_failed", f"{what} ({_reason(ended)})", ENDING) from ended
+    except Exception as error:
+        raise Refused("script_failed", f"{what} ({_reason(error)})", remedy) from error
+
+
+def _reason(error: BaseException) -> str:
+    """What was raised, and where: the innermost place."""
+    said = f"{type(error).__name__}: {error}" if str(error) else type(error).__name__
+    places = traceback.extract_tb(error.__traceback__)[2:]  # the first two are the rig's own
+    return f"{said}; {Path(places[-1].filename).name}, line {places[-1].lineno}" if places else said
