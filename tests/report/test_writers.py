@@ -8,7 +8,7 @@ from pathlib import Path
 
 import pytest
 
-from rig.analysis.outcome import Outcome, outcome_of
+from rig.analysis.outcome import Outcome, calibrated
 from rig.data.result_file import ResultDocument, read_result
 from rig.data.run_file import read_run
 from rig.report import writers
@@ -17,7 +17,7 @@ from support.paths import FIXTURES, ROOT
 
 @pytest.fixture(scope="module")
 def outcome() -> Outcome:
-    return outcome_of([read_run(FIXTURES / "calibration" / "run.h5")])
+    return calibrated([read_run(FIXTURES / "calibration" / "run.h5")])
 
 
 def test_the_folder_holds_the_header_and_the_result(outcome: Outcome, tmp_path: Path) -> None:
@@ -47,10 +47,10 @@ def write_toy(outcome, document, folder):
 RUN = """
 import sys
 from pathlib import Path
-from rig.analysis.outcome import outcome_of
+from rig.analysis.outcome import calibrated
 from rig.data.run_file import read_run
 from rig.report.writers import write_outcome
-print(*write_outcome(Path(sys.argv[2]), outcome_of([read_run(Path(sys.argv[1]))])))
+print(*write_outcome(Path(sys.argv[2]), calibrated([read_run(Path(sys.argv[1]))])))
 """
 
 
