@@ -55,7 +55,7 @@ def test_two_recordings_of_two_sensors_are_four_observations() -> None:
     assert outcome.results is calibration.results
 
 
-def test_the_board_has_one_clock_and_each_sensor_its_delay() -> None:
+def test_the_delay_between_two_sensors_is_that_between_their_clock_fits() -> None:
     (recording,) = calibrated([recorded("run.h5")]).recordings
     late = recording.delay("gyro", behind="reference")
     assert abs(late.delay_s) < 5 * late.std_s < 1e-4  # simulated sensors without filters
