@@ -33,12 +33,12 @@ def end(runs, repeated, folder):
 """
 NEW = """
 import rig.cli
-from rig.analysis.outcome import outcome_of, verified
+from rig.analysis.outcome import calibrated, verified
 from rig.data.run_file import read_run
 from rig.report.writers import write_outcome
 
 def end(runs, repeated, folder):
-    list(write_outcome(folder, verified(outcome_of(runs), repeated)))
+    list(write_outcome(folder, verified(calibrated(runs), repeated)))
 """
 MEASURE = """
 import json, resource, sys

@@ -16,7 +16,7 @@ from rig.cli import run_script  # first: it keeps linear algebra to one thread
 
 # isort: split
 from procedures.six_observation import movement
-from rig.analysis.outcome import Outcome, outcome_of, verified
+from rig.analysis.outcome import Outcome, verified, verified_alone
 from rig.config.procedure_sections import VerifySection
 from rig.data.run_file import RunData
 from rig.plans.registry import Procedure
@@ -34,7 +34,7 @@ def verify(rig: Verbs) -> None:
 def comparison(runs: Sequence[RunData], before: Outcome | None, estimator: str) -> Outcome:
     """The newest movement against the reference; with the calibration it followed, if there was one."""
     newest = runs[-1:]
-    return outcome_of([], newest, estimator) if before is None else verified(before, newest)
+    return verified_alone(newest) if before is None else verified(before, newest)
 
 
 PROCEDURE = Procedure(

@@ -62,21 +62,30 @@ class Outcome:
         return self.verdict == "pass"
 
 
-def outcome_of(
-    runs: Sequence[RunData], repeated: Sequence[RunData] | None = None, estimator: str = DEFAULT_ESTIMATOR
-) -> Outcome:
-    """Solve and judge recordings: the same for a run that just ended and from its files.
+def calibrated(runs: Sequence[RunData], estimator: str = DEFAULT_ESTIMATOR) -> Outcome:
+    """Solve and judge the recordings of a calibration, at least one: the same for a run that just ended and from files.
 
-    `runs` are those of the calibration, none where only stored calibrations are verified; `repeated` those of the
-    movement with calibrated readings, None where no verification is asked for. Raises `Fault` or `Refused` by name when
-    the recordings do not hold what they should.
+    Raises Fault or Refused by name when the recordings do not hold what they should.
     """
-    outcome = _calibrated(runs, estimator) if runs else _nothing_calibrated(*repeated or ())
-    return outcome if repeated is None else verified(outcome, repeated)
+    settings = runs[0].settings
+    chosen = known_estimator(estimator)
+    recordings = observe_recordings(runs)
+    results = solve_observed(runs[0].sensors, recordings, chosen)
+    onboard = {name: agreement(runs, name) for name in settings.to_calibrate}
+    checks = judge({name: results[name].solution for name in onboard}, settings.limits)
+    return Outcome(
+        recordings=recordings,
+        settings=settings,
+        results=results,
+        onboard=onboard,
+        verifications={},
+        checks=(*checks, *(check for name, agreed in onboard.items() for check in agreed.checks(name))),
+        provenance=_provenance(runs),
+    )
 
 
 def verified(outcome: Outcome, repeated: Sequence[RunData]) -> Outcome:
-    """The same with what `repeated`, the movement with calibrated readings, says of it.
+    """The same with what `repeated`, the calibration's movement with calibrated readings, says of it.
 
     Without such a recording the checks of the verification fail. Raises Fault as `observe_runs` and `verify` do.
     """
@@ -103,27 +112,13 @@ def verified(outcome: Outcome, repeated: Sequence[RunData]) -> Outcome:
     )
 
 
-def _calibrated(runs: Sequence[RunData], estimator: str) -> Outcome:
-    settings = runs[0].settings
-    chosen = known_estimator(estimator)
-    recordings = observe_recordings(runs)
-    results = solve_observed(runs[0].sensors, recordings, chosen)
-    onboard = {name: agreement(runs, name) for name in settings.to_calibrate}
-    checks = judge({name: results[name].solution for name in onboard}, settings.limits)
-    return Outcome(
-        recordings=recordings,
-        settings=settings,
-        results=results,
-        onboard=onboard,
-        verifications={},
-        checks=(*checks, *(check for name, agreed in onboard.items() for check in agreed.checks(name))),
-        provenance=_provenance(runs),
-    )
+def verified_alone(repeated: Sequence[RunData]) -> Outcome:
+    """What recordings of calibrated readings, at least one, say of the calibrations the board had stored before.
 
-
-def _nothing_calibrated(*repeated: RunData) -> Outcome:
-    """Where stored calibrations are verified there is nothing but what was recorded."""
-    return Outcome((), repeated[0].settings, {}, {}, {}, (), _provenance(repeated[:1]))
+    Raises Fault as `verified` does.
+    """
+    nothing_calibrated = Outcome((), repeated[0].settings, {}, {}, {}, (), _provenance(repeated[:1]))
+    return verified(nothing_calibrated, repeated)
 
 
 def _provenance(runs: Sequence[RunData]) -> Provenance:

@@ -10,7 +10,7 @@ from functools import cache
 from importlib.metadata import entry_points
 from typing import Any, Generic, Literal, Protocol, TypeVar
 
-from rig.analysis.outcome import Outcome, outcome_of
+from rig.analysis.outcome import Outcome, calibrated
 from rig.arm.motion import Plan
 from rig.arm.state import Joints
 from rig.config.models import ArmSection, ProcedureSection
@@ -47,7 +47,7 @@ Analysis = Callable[[Sequence[RunData], Outcome | None, str], Outcome]
 
 def calibration(runs: Sequence[RunData], before: Outcome | None, estimator: str) -> Outcome:
     """The usual analysis: scale and bias of every sensor from averaged revolutions, held against the limits."""
-    return outcome_of(runs, None, estimator)
+    return calibrated(runs, estimator)
 
 
 @dataclass(frozen=True, slots=True)

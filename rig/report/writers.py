@@ -1,5 +1,6 @@
 """What a finished run leaves in its folder. A new document is a file with its writer, and its line in `WRITERS`."""
 
+import importlib
 from collections.abc import Iterable, Iterator, Sequence
 from pathlib import Path
 from typing import Protocol
@@ -7,8 +8,12 @@ from typing import Protocol
 from rig.analysis.outcome import Outcome
 from rig.data.result_file import ResultDocument, write_result
 from rig.report.document import document_of
-from rig.report.figures import write_figures
-from rig.report.header import write_header
+
+# `module:function`, imported when a run has ended.
+WRITERS: Sequence[str] = (
+    "rig.report.figures:write_figures",
+    "rig.report.header:write_header",
+)
 
 
 class Writer(Protocol):
@@ -20,15 +25,15 @@ class Writer(Protocol):
     def __call__(self, outcome: Outcome, document: ResultDocument, folder: Path, /) -> Iterable[str]: ...
 
 
-WRITERS: Sequence[Writer] = (
-    write_figures,
-    write_header,
-)
-
-
 def write_outcome(folder: Path, outcome: Outcome) -> Iterator[str]:
     """All documents, then `result.json`, which ends the run; yields what to tell the operator."""
     document = document_of(outcome)
-    for write in WRITERS:
-        yield from write(outcome, document, folder)
+    for name in WRITERS:
+        yield from _writer(name)(outcome, document, folder)
     write_result(document, folder)
+
+
+def _writer(name: str) -> Writer:
+    module, function = name.split(":")
+    writer: Writer = getattr(importlib.import_module(module), function)
+    return writer

@@ -9,7 +9,7 @@ from typing import Any
 
 import pytest
 
-from rig.analysis.outcome import outcome_of, verified
+from rig.analysis.outcome import calibrated, verified, verified_alone
 from rig.data.run_file import RunData, read_run
 from rig.errors import Refused
 from rig.estimation.vector_model import solve_vector_model
@@ -43,7 +43,7 @@ def calls(*functions: Callable[..., Any]) -> Iterator[Counter[str]]:
 def test_two_recordings_of_two_sensors_are_four_observations() -> None:
     runs, repeated = [recorded("run.h5")], [recorded("verify.h5")]
     with calls(ArmMotion.__init__, estimate_time_base, observe_sensor, solve_vector_model) as counted:
-        calibration = outcome_of(runs)
+        calibration = calibrated(runs)
         outcome = verified(calibration, repeated)
     assert calibration.passed and outcome.passed
     assert counted == {
@@ -55,8 +55,8 @@ def test_two_recordings_of_two_sensors_are_four_observations() -> None:
     assert outcome.results is calibration.results
 
 
-def test_the_board_has_one_clock_and_each_sensor_its_delay() -> None:
-    (recording,) = outcome_of([recorded("run.h5")]).recordings
+def test_the_delay_between_two_sensors_is_that_between_their_clock_fits() -> None:
+    (recording,) = calibrated([recorded("run.h5")]).recordings
     late = recording.delay("gyro", behind="reference")
     assert abs(late.delay_s) < 5 * late.std_s < 1e-4  # simulated sensors without filters
     assert recording.delay("gyro", behind="gyro").delay_s == 0.0
@@ -64,5 +64,18 @@ def test_the_board_has_one_clock_and_each_sensor_its_delay() -> None:
 
 def test_an_estimator_nobody_knows_is_refused_before_anything_is_observed() -> None:
     with calls(observe_sensor) as counted, pytest.raises(Refused, match="unknown_estimator"):
-        outcome_of([recorded("run.h5")], estimator="newtun")
+        calibrated([recorded("run.h5")], estimator="newtun")
     assert not counted
+
+
+def test_stored_calibrations_are_verified_alone() -> None:
+    repeated = [recorded("verify.h5")]
+    outcome = verified_alone(repeated)
+    assert outcome.passed and list(outcome.verifications) == ["gyro"]
+    assert not outcome.results and not outcome.recordings
+    assert outcome.provenance.verified_utc == (repeated[0].provenance["started_utc"],)
+
+
+def test_a_verification_that_was_not_recorded_has_not_passed() -> None:
+    outcome = verified(calibrated([recorded("run.h5")]), [])
+    assert not outcome.passed and not outcome.verifications

@@ -10,7 +10,7 @@ from typing import Any
 import h5py
 import pytest
 
-from rig.analysis.outcome import outcome_of
+from rig.analysis.outcome import calibrated, verified
 from rig.data.run_file import RunData, read_run
 from rig.report.document import document_of
 from support.paths import FIXTURES
@@ -20,7 +20,9 @@ RELATIVE = 1e-12
 
 def solved(folder: Path) -> dict[str, Any]:
     runs, repeated = [read_run(folder / "run.h5")], folder / "verify.h5"
-    outcome = outcome_of(runs, [read_run(repeated)] if repeated.exists() else None)
+    outcome = calibrated(runs)
+    if repeated.exists():
+        outcome = verified(outcome, [read_run(repeated)])
     document: dict[str, Any] = json.loads(document_of(outcome).text())
     return document
 
@@ -61,5 +63,5 @@ def test_keys_the_configuration_no_longer_has_do_not_matter(tmp_path: Path) -> N
 
 def test_another_limit_gives_another_verdict() -> None:
     run: RunData = read_run(FIXTURES / "calibration" / "run.h5")
-    assert outcome_of([run]).passed
-    assert not outcome_of([run.judged_by(["limits.scale_std=1e-6"])]).passed
+    assert calibrated([run]).passed
+    assert not calibrated([run.judged_by(["limits.scale_std=1e-6"])]).passed

@@ -26,6 +26,8 @@ from rig.report.verification_table import verification_lines, verification_table
 from support.synthetic_run import SCALE, Setup
 from support.synthetic_verification import REFERENCE, TRUTH, Stored, recording
 
+pytestmark = pytest.mark.slow
+
 KNOWN = Reference("reference", np.array(REFERENCE.scale), np.array(REFERENCE.bias_rad_s))
 QUIET = Setup(noise_rad_s=0.002)
 TURN_RATE = np.pi / 3

@@ -28,6 +28,8 @@ from rig.errors import Fault, Refused
 from rig.plans.six_sweeps import plan_six_observation
 from support.worlds import World, WorldHandle
 
+pytestmark = pytest.mark.slow
+
 PAYLOAD = (0.35, (0.0, 0.0, 0.025))
 WRIST_3 = 5
 

@@ -19,7 +19,7 @@ def shell(command: str, **environment: str) -> subprocess.CompletedProcess[str]:
         ["bash", "-o", "pipefail", "-c", command],
         capture_output=True,
         text=True,
-        timeout=30,
+        timeout=240,
         check=False,
         env={**os.environ, **environment},
     )

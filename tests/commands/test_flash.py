@@ -60,7 +60,7 @@ def rig_board_flash(*arguments: str) -> subprocess.CompletedProcess[str]:
         [sys.executable, "-m", "rig", "board", "flash", *arguments],
         capture_output=True,
         text=True,
-        timeout=30,
+        timeout=240,
         check=False,
         stdin=subprocess.DEVNULL,
     )

@@ -14,10 +14,12 @@ import h5py
 import numpy as np
 import pytest
 
-from rig.analysis.outcome import outcome_of
+from rig.analysis.outcome import calibrated
 from rig.data.run_file import read_run
 from rig.errors import Fault, Refused
 from support.paths import ROOT
+
+pytestmark = pytest.mark.slow
 
 RECORDING = ROOT / "tests" / "fixtures" / "af3b9f0" / "calibration" / "run.h5"
 TIMEOUT_S = 5.0
@@ -70,7 +72,7 @@ def test_a_damaged_recording_is_refused_by_name_or_solved(
     path = tmp_path / "run.h5"
     path.write_bytes(damage(bytearray(RECORDING.read_bytes()), np.random.default_rng(seed)))
     try:
-        outcome_of([read_run(path, TIMEOUT_S)])
+        calibrated([read_run(path, TIMEOUT_S)])
     except (Refused, Fault) as error:
         assert error.name
 

@@ -270,7 +270,7 @@ except Fault as fault:
 def test_a_full_disk_is_a_named_fault_and_keeps_what_was_written(tmp_path: Path) -> None:
     path = tmp_path / "run.h5"
     script = FULL_DISK.format(tests=str(ROOT / "tests"), path=str(path))
-    done = subprocess.run([sys.executable, "-c", script], capture_output=True, text=True, timeout=30, check=False)
+    done = subprocess.run([sys.executable, "-c", script], capture_output=True, text=True, timeout=240, check=False)
     assert (done.returncode, done.stderr) == (3, "")  # no crash, no noise from the library
     name, what, added = json.loads(done.stdout)
     assert name == "recording_failed"

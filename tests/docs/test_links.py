@@ -1,5 +1,6 @@
 """Every page's links lead somewhere, the paths it names exist, the commands it shows are commands."""
 
+import functools
 import re
 import shlex
 from collections.abc import Iterator
@@ -8,6 +9,7 @@ from pathlib import Path
 import pytest
 
 from rig.cli import main
+from rig.errors.catalogue import catalogue
 from support.paths import DOCS, ROOT
 
 PAGES = [
@@ -22,6 +24,12 @@ LINK = re.compile(r"!?\[[^\]]*\]\(([^)\s]+)\)")
 HEADING = re.compile(r"^#{1,6} (.+)$", re.MULTILINE)
 FOLDERS = "benchmarks|configs|docs|firmware_host|procedures|rig|tests"
 NAMED_PATH = re.compile(rf"(?<![\w./-])(?:{FOLDERS})/[\w./<>*-]*\w/?")
+NAMES_ALONE = re.compile(r"\((`[a-z]\w*_\w+`(?:(?:, | or | and )(?:`\w+`|…))*)\)")  # an error behind what it is about
+NO_ERRORS = {"board_scale", "board_bias", "degenerate", "not_converged"}  # checks, and outcomes on the board
+SNAKE_CASE = re.compile(r"[a-z][a-z0-9]*(?:_[a-z0-9]+)+")
+SOURCES = ("rig/**/*.py", "firmware_host/**/*.[ch]", "firmware_host/**/*.py", "procedures/*.py", "configs/*.yaml")
+OF_OTHERS = {"ur_description"}
+WIDTH = 128
 LEFT_OUT = "--left-out"  # no command has it
 NUMBERS = {"N": "1"}  # what a page writes where the command wants a number
 
@@ -79,6 +87,34 @@ def test_every_path_a_page_names_exists(page: Path) -> None:
         for path in NAMED_PATH.findall(written):
             pattern = re.sub(r"<\w+>", "*", path.rstrip("/"))
             assert any(ROOT.glob(pattern)), f"{path} in {written!r} is not there"
+
+
+@functools.cache
+def words_of_the_source() -> set[str]:
+    files = [file for pattern in SOURCES for file in ROOT.glob(pattern)]
+    return {word for file in files for word in re.findall(r"\w+", file.read_text(encoding="utf-8"))}
+
+
+@pytest.mark.parametrize("page", PAGES, ids=page_name)
+def test_every_error_a_page_names_is_in_the_catalogue(page: Path) -> None:
+    """An error stands in parentheses, alone or among others: "refuses an arm that was moved (`arm_moved`)"."""
+    text = " ".join(FENCE.sub("", page.read_text(encoding="utf-8")).split())
+    named = {name for alone in NAMES_ALONE.findall(text) for name in re.findall(r"\w+", alone)}
+    assert named - NO_ERRORS <= {entry.name for entry in catalogue()}
+
+
+@pytest.mark.parametrize("page", PAGES, ids=page_name)
+def test_every_name_on_a_page_stands_in_the_source(page: Path) -> None:
+    """Errors wherever they stand, checks, columns, keys: what was renamed there must not live on here."""
+    errors = {entry.name for entry in catalogue()}
+    named = {written for written, inline in code(page) if inline and SNAKE_CASE.fullmatch(written)}
+    assert named <= words_of_the_source() | errors | OF_OTHERS
+
+
+@pytest.mark.parametrize("page", PAGES, ids=page_name)
+def test_no_line_but_a_tables_is_too_wide(page: Path) -> None:
+    lines = enumerate(FENCE.sub("", page.read_text(encoding="utf-8")).splitlines(), start=1)
+    assert not [number for number, line in lines if len(line) > WIDTH and not line.startswith("|")]
 
 
 @pytest.mark.parametrize("page", PAGES, ids=page_name)

@@ -4,8 +4,12 @@ import json
 import re
 from pathlib import Path
 
+import pytest
+
 from support.commands import rig
 from support.paths import CONFIGS, DOCS
+
+pytestmark = pytest.mark.slow
 
 PAGE = DOCS / "how-to" / "own-procedure.md"
 

@@ -107,14 +107,14 @@ def ignore(batch: SampleBatch) -> None:
     """A consumer for tests that look at something else."""
 
 
-def wait_for(condition: Callable[[], bool], deadline_s: float = 10.0) -> None:
+def wait_for(condition: Callable[[], bool], deadline_s: float = 60.0) -> None:
     end_s = time.monotonic() + deadline_s
     while not condition():
         assert time.monotonic() < end_s, "waited in vain"
         time.sleep(0.002)
 
 
-def fault_of(board: Board, deadline_s: float = 10.0) -> tuple[BoardError, float]:
+def fault_of(board: Board, deadline_s: float = 60.0) -> tuple[BoardError, float]:
     """The error that check() raises, and how long it took, s."""
     start_s = time.monotonic()
     while time.monotonic() < start_s + deadline_s:

@@ -4,6 +4,8 @@ import pytest
 
 from support.full_rate import CASES, stream
 
+pytestmark = pytest.mark.slow
+
 
 @pytest.mark.parametrize(
     ("case", "simulated_s"),

@@ -5,7 +5,7 @@ from dataclasses import replace
 
 import pytest
 
-from rig.analysis.outcome import Outcome, outcome_of
+from rig.analysis.outcome import Outcome, calibrated
 from rig.analysis.verdict import Check
 from rig.data.run_file import read_run
 from rig.report.document import document_of
@@ -14,7 +14,7 @@ from support.paths import FIXTURES
 
 @pytest.fixture(scope="module")
 def outcome() -> Outcome:
-    return outcome_of([read_run(FIXTURES / "calibration" / "run.h5")])
+    return calibrated([read_run(FIXTURES / "calibration" / "run.h5")])
 
 
 def test_the_keys_stand_in_the_order_they_always_had(outcome: Outcome) -> None:
@@ -39,7 +39,7 @@ def test_a_limit_that_was_not_set_is_not_written_as_a_number(outcome: Outcome) -
 
 
 def test_a_reference_has_no_solution_of_the_board() -> None:
-    found = outcome_of([read_run(FIXTURES / "verified" / "run.h5")])
+    found = calibrated([read_run(FIXTURES / "verified" / "run.h5")])
     sensors = json.loads(document_of(found).text())["sensors"]
     assert (sensors["gyro"]["role"], "board" in sensors["gyro"]) == ("calibrate", True)
     assert (sensors["reference"]["role"], "board" in sensors["reference"]) == ("reference", False)

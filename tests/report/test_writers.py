@@ -8,7 +8,7 @@ from pathlib import Path
 
 import pytest
 
-from rig.analysis.outcome import Outcome, outcome_of
+from rig.analysis.outcome import Outcome, calibrated
 from rig.data.result_file import ResultDocument, read_result
 from rig.data.run_file import read_run
 from rig.report import writers
@@ -17,7 +17,7 @@ from support.paths import FIXTURES, ROOT
 
 @pytest.fixture(scope="module")
 def outcome() -> Outcome:
-    return outcome_of([read_run(FIXTURES / "calibration" / "run.h5")])
+    return calibrated([read_run(FIXTURES / "calibration" / "run.h5")])
 
 
 def test_the_folder_holds_the_header_and_the_result(outcome: Outcome, tmp_path: Path) -> None:
@@ -26,13 +26,14 @@ def test_the_folder_holds_the_header_and_the_result(outcome: Outcome, tmp_path: 
     assert read_result(tmp_path).verdict == outcome.verdict == "pass"
 
 
+def on_a_full_disk(outcome: Outcome, document: ResultDocument, folder: Path) -> tuple[str, ...]:
+    raise OSError(28, "No space left on device")
+
+
 def test_the_result_comes_last_so_that_a_run_whose_documents_fail_is_not_ended(
     outcome: Outcome, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    def on_a_full_disk(outcome: Outcome, document: ResultDocument, folder: Path) -> tuple[str, ...]:
-        raise OSError(28, "No space left on device")
-
-    monkeypatch.setattr(writers, "WRITERS", (*writers.WRITERS, on_a_full_disk))
+    monkeypatch.setattr(writers, "WRITERS", (*writers.WRITERS, f"{__name__}:on_a_full_disk"))
     with pytest.raises(OSError, match="No space"):
         list(writers.write_outcome(tmp_path, outcome))
     assert [file.name for file in tmp_path.iterdir()] == ["calibration.h"]
@@ -46,10 +47,10 @@ def write_toy(outcome, document, folder):
 RUN = """
 import sys
 from pathlib import Path
-from rig.analysis.outcome import outcome_of
+from rig.analysis.outcome import calibrated
 from rig.data.run_file import read_run
 from rig.report.writers import write_outcome
-print(*write_outcome(Path(sys.argv[2]), outcome_of([read_run(Path(sys.argv[1]))])))
+print(*write_outcome(Path(sys.argv[2]), calibrated([read_run(Path(sys.argv[1]))])))
 """
 
 
@@ -58,8 +59,9 @@ def test_a_writer_of_ones_own_is_a_file_and_a_line(tmp_path: Path) -> None:
     shutil.copytree(ROOT / "rig", house / "rig", ignore=shutil.ignore_patterns("__pycache__"))
     (house / "rig" / "report" / "toy.py").write_text(TOY, encoding="utf-8")
     table = house / "rig" / "report" / "writers.py"
-    line = 'WRITERS = (*WRITERS, __import__("rig.report.toy", fromlist=["toy"]).write_toy)\n'
-    table.write_text(table.read_text(encoding="utf-8") + line, encoding="utf-8")
+    before, after = table.read_text(encoding="utf-8").split('    "rig.report.header:write_header",\n')
+    line = '    "rig.report.toy:write_toy",\n'
+    table.write_text(f'{before}    "rig.report.header:write_header",\n{line}{after}', encoding="utf-8")
     folder = tmp_path / "run"
     folder.mkdir()
     done = subprocess.run(

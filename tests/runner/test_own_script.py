@@ -41,7 +41,7 @@ def interrupted(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Path]:
     )  # fmt: skip
     wait_for_log(out, "done: sweep wrist_1 cw")
     process.send_signal(signal.SIGINT)
-    _, errors = process.communicate(timeout=20)
+    _, errors = process.communicate(timeout=240)
     assert process.returncode == 130, errors
     copy.write_text("a later version, which is another script", encoding="utf-8")
     yield out

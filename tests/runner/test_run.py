@@ -18,6 +18,8 @@ from support.commands import configuration, rig, wait_for_log
 from support.paths import ROOT
 from support.worlds import merge
 
+pytestmark = pytest.mark.slow
+
 Start = Callable[..., subprocess.Popen[str]]
 
 
@@ -110,7 +112,9 @@ def test_every_estimator_recovers_the_truth(finished: tuple[Path, dict[str, Any]
 def test_the_script_runs_as_the_command_does_and_limits_that_are_not_met_fail(tmp_path: Path) -> None:
     script = [sys.executable, str(ROOT / "procedures" / "six_observation.py")]
     config = configuration(tmp_path, {"limits": {"scale_deviation": 0.01}})
-    done = subprocess.run([*script, str(config)], cwd=tmp_path, capture_output=True, text=True, timeout=50, check=False)
+    done = subprocess.run(
+        [*script, str(config)], cwd=tmp_path, capture_output=True, text=True, timeout=240, check=False
+    )
     assert done.returncode == 1, done.stderr
     assert len(list((tmp_path / "runs").glob("*-six_observation/result.json"))) == 1
     assert "verdict: FAIL" in done.stdout and "gyro.scale_deviation" in done.stdout
@@ -122,7 +126,7 @@ def test_an_interrupted_run_is_kept_and_resumed(start: Start, tmp_path: Path) ->
     wait_for_log(out, "done: sweep wrist_3 ccw")
     interrupted_s = time.monotonic()
     process.send_signal(signal.SIGINT)
-    _, errors = process.communicate(timeout=20)
+    _, errors = process.communicate(timeout=240)
     assert process.returncode == 130
     assert time.monotonic() - interrupted_s < 4
     assert f"rig resume {out}" in errors and "Traceback" not in errors
@@ -154,7 +158,7 @@ def test_a_run_goes_on_when_nobody_reads_what_it_says(start: Start, tmp_path: Pa
     process.stderr.readline()
     process.stderr.close()
     process.stdout.close()
-    assert process.wait(50) == 0
+    assert process.wait(240) == 0
     assert json.loads((out / "result.json").read_text(encoding="utf-8"))["verdict"] == "pass"
 
 

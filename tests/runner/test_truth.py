@@ -26,7 +26,7 @@ def normalised_errors(seed: int, folder: Path) -> np.ndarray:
     changes = {"world.seed": seed, "arm.host": host, "board.port": f"socket://{host}:7321"}
     for path, value in changes.items():
         command += ["--set", f"{path}={value}"]
-    done = subprocess.run(command, capture_output=True, text=True, timeout=60, check=False)
+    done = subprocess.run(command, capture_output=True, text=True, timeout=240, check=False)
     assert done.returncode == 0, done.stderr
     sensor = json.loads(done.stdout)["sensors"]["gyro"]
     truth = yaml.safe_load(DEMO.read_text(encoding="utf-8"))["world"]["sensors"]["gyro"]

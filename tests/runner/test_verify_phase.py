@@ -9,7 +9,11 @@ from contextlib import ExitStack, suppress
 from pathlib import Path
 from typing import Any
 
+import pytest
+
 from support.worlds import World, hardware
+
+pytestmark = pytest.mark.slow
 
 CHANGES: dict[str, Any] = {
     "arm": {"transfer_speed_deg_s": 170},
@@ -55,7 +59,7 @@ def test_an_arm_that_was_moved_between_the_halves_goes_on_only_if_somebody_agree
         with suppress(OSError):  # a terminal whose other end has closed
             while more := os.read(operator, 4096):
                 said += more
-        assert process.wait(20) == 3
+        assert process.wait(240) == 3
         failed.pop_all()
     os.close(operator)
     assert b"rig: not_confirmed: " in said and b"go on with: rig resume" in said, said

@@ -15,6 +15,8 @@ from rig.study.catalogue import STUDIES, find
 from rig.study.files import write
 from rig.study.report import Report, Settings
 
+pytestmark = pytest.mark.slow
+
 RUNS = {"normal": 15, "extreme": 15, "estimators": 50, "kvh-gyro": 3, "kvh-accelerometer": 25}
 
 

@@ -18,6 +18,8 @@ from third_party.rtde import rtde as makers
 from support.arm_client import client, wait_for
 from support.worlds import World, WorldHandle, worlds
 
+pytestmark = pytest.mark.slow
+
 HOME = [0.0, -math.pi / 2, math.pi / 2, -math.pi / 2, -math.pi / 2, 0.0]
 ENCODER_STEP_RAD = 6.0e-6
 

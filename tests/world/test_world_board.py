@@ -30,6 +30,8 @@ from rig.world.section import world_section
 from support.paths import DEMO
 from support.worlds import World
 
+pytestmark = pytest.mark.slow
+
 COUNT_RAD_S = math.radians(8.75e-3)
 SENSORS = ("lsm9ds1", "mpu9250", "adis16465")  # the board's table
 PAIR = DEMO.with_name("mpu9250_adis16465.yaml")

@@ -15,6 +15,8 @@ import pytest
 from support.arm_client import client, wait_for
 from support.worlds import World, WorldHandle, fresh_host
 
+pytestmark = pytest.mark.slow
+
 
 def moving(world: WorldHandle) -> bool:
     return bool(world.state()["qd_rad_s"][5] > 0.4)

@@ -8,6 +8,8 @@ import pytest
 
 from support.paths import FIRMWARE
 
+pytestmark = pytest.mark.slow
+
 
 @pytest.mark.timeout(150)  # the sanitizers' build takes its time on a busy machine
 def test_random_plays_break_no_rule(tmp_path: Path) -> None:

@@ -17,6 +17,8 @@ from rig.estimation.accumulator import Accumulator, SixObservationEstimator, Sol
 from rig.estimation.arrays import Array
 from support.host_board import core
 
+pytestmark = pytest.mark.slow
+
 DIRECTIONS = np.array([[0, 0, -1], [0, 0, 1], [1, 0, 0], [-1, 0, 0], [0, 1, 0], [0, -1, 0]], dtype=np.float64)
 SCALE_AGREEMENT = 1e-4  # relative
 BIAS_AGREEMENT_RAD_S = 1e-5

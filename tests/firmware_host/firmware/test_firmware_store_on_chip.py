@@ -11,6 +11,8 @@ from firmware_host.frames import Frame, encode
 from firmware_host.protocol import ERRORS
 from support.emulated_session import Session, shipped_flash
 
+pytestmark = pytest.mark.slow
+
 IMAGE_BYTES = STORE_OFFSET
 WRITE_OPERATIONS = 13  # one erase, twelve doublewords
 ERASE_OPERATIONS = 2

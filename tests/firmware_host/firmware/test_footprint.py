@@ -4,6 +4,8 @@ import pytest
 
 from firmware_host import footprint
 
+pytestmark = pytest.mark.slow
+
 
 def test_flash_ram_and_stack_are_within_their_limits(capsys: pytest.CaptureFixture[str]) -> None:
     assert footprint.main() == 0
