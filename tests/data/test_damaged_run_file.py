@@ -17,11 +17,11 @@ import pytest
 from rig.analysis.outcome import calibrated
 from rig.data.run_file import read_run
 from rig.errors import Fault, Refused
-from support.paths import ROOT
+from support.paths import FIXTURES
 
 pytestmark = pytest.mark.slow
 
-RECORDING = ROOT / "tests" / "fixtures" / "af3b9f0" / "calibration" / "run.h5"
+RECORDING = FIXTURES / "calibration" / "run.h5"
 TIMEOUT_S = 5.0
 METADATA_BYTES = 12_000  # where a run file's first structures lie
 DAMAGES = 24

@@ -11,10 +11,9 @@ from rig.data.settings import RunSettings, settings_from_json, settings_of
 from rig.data.settings_of_run_1 import settings_of_configuration
 from rig.errors import Refused
 from rig.plans.six_sweeps import plan_six_observation
-from support.paths import ROOT
+from support.paths import CONFIGS, FIXTURES
 
-FIXTURES = ROOT / "tests" / "fixtures" / "af3b9f0"
-VERIFIED = load(ROOT / "configs" / "lsm9ds1_adis16465.yaml").text
+VERIFIED = load(CONFIGS / "lsm9ds1_adis16465.yaml").text
 
 
 def settings(text: str = VERIFIED) -> RunSettings:

@@ -10,9 +10,7 @@ import pytest
 import rig
 from rig.errors import Refused
 from rig.observation.windows import swept
-from support.paths import ROOT
-
-FIXTURES = ROOT / "tests" / "fixtures" / "af3b9f0"
+from support.paths import DOCS, FIXTURES
 
 
 @pytest.fixture(scope="module")
@@ -92,7 +90,7 @@ def test_what_is_not_there_is_refused_by_name(run: rig.Run, result: rig.Result) 
     assert "gyro" in run and "accelerometer" not in run and run.get("accelerometer") is None
     assert "gyro" in result and result.get("accelerometer") is None
     with pytest.raises(Refused, match="no_run"):
-        rig.load(ROOT / "docs")
+        rig.load(DOCS)
     with pytest.raises(AttributeError, match="no attribute 'sovle'"):
         rig.sovle  # noqa: B018
 

@@ -58,7 +58,7 @@ def test_an_own_script_may_borrow_all_but_its_name_and_is_kept_itself(tmp_path: 
     own, config = tmp_path / "own.py", tmp_path / "hardware.yaml"
     own.write_text(OWN, encoding="utf-8")
     assert not load_script(own).is_installed
-    hardware = yaml.safe_load((CONFIGS / "ci.yaml").read_text(encoding="utf-8"))
+    hardware = yaml.safe_load((CONFIGS / "demo.yaml").read_text(encoding="utf-8"))
     del hardware["world"]
     config.write_text(yaml.safe_dump({**hardware, "board": {"port": "socket://127.9.9.9:1"}}), encoding="utf-8")
     command = [sys.executable, str(own), str(config), "--out", str(tmp_path / "run")]

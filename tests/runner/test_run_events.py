@@ -5,7 +5,6 @@ import sys
 from collections.abc import Iterator
 from itertools import pairwise
 from pathlib import Path
-from typing import Any
 
 import pytest
 
@@ -32,18 +31,8 @@ from rig.station.events import (
     VerdictReached,
 )
 from rig.station.station import Stations, always_yes
-from support.worlds import worlds
+from support.worlds import QUICK_EXPERIMENT, worlds
 
-CHANGES: dict[str, Any] = {
-    "arm": {"transfer_speed_deg_s": 170},
-    "sensors": {
-        "gyro": {"rate_hz": 119},
-        "reference": {"part": "adis16465", "serial_number": "ADIS16465-001", "role": "reference"},
-    },
-    "procedure": {"verify": True, "speed_deg_s": 150, "acceleration_deg_s2": 400, "rest_s": 0.5},
-    "limits": {"scale_std": 1, "bias_std_rad_s": 1, "verification_rms_rad_s": 1, "verification_mean_rad_s": 1},
-    "world": {"time_scale": 12, "sensors": {"reference": {"scale": [1.0, 1.0, 1.0], "bias_rad_s": [0.0, 0.0, 0.0]}}},
-}
 pytestmark = [pytest.mark.slow, pytest.mark.timeout(900)]  # a whole experiment
 
 
@@ -63,7 +52,7 @@ def events(tmp_path_factory: pytest.TempPathFactory) -> Iterator[list[RunEvent]]
     folder = tmp_path_factory.mktemp("events")
     listener = Everything()
     with worlds(folder) as start:
-        found = configured(start(CHANGES).config_path)
+        found = configured(start(QUICK_EXPERIMENT).config_path)
         run = Run(folder, found.loaded, found.script, Stations((listener,), always_yes))
         assert run.carry_out(found.phase).passed
     yield listener.events
@@ -166,7 +155,7 @@ Run(Path(sys.argv[2]), found.loaded, found.script, Stations((Imports(),), always
 
 
 def test_nothing_is_imported_while_the_arm_is_under_way(tmp_path: Path) -> None:
-    once = {**CHANGES, "procedure": {**CHANGES["procedure"], "verify": False}}
+    once = {**QUICK_EXPERIMENT, "procedure": {**QUICK_EXPERIMENT["procedure"], "verify": False}}
     with worlds(tmp_path) as start:
         command = [sys.executable, "-c", IMPORTS, str(start(once).config_path), str(tmp_path)]
         done = subprocess.run(command, capture_output=True, text=True, timeout=240, check=False)

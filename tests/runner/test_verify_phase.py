@@ -7,29 +7,17 @@ import subprocess
 import sys
 from contextlib import ExitStack, suppress
 from pathlib import Path
-from typing import Any
 
 import pytest
 
-from support.worlds import World, hardware
+from support.worlds import QUICK_EXPERIMENT, World, hardware
 
 pytestmark = pytest.mark.slow
-
-CHANGES: dict[str, Any] = {
-    "arm": {"transfer_speed_deg_s": 170},
-    "sensors": {
-        "gyro": {"rate_hz": 119},
-        "reference": {"part": "adis16465", "serial_number": "ADIS16465-001", "role": "reference"},
-    },
-    "procedure": {"verify": True, "speed_deg_s": 150, "acceleration_deg_s2": 400, "rest_s": 0.5},
-    "limits": {"scale_std": 1, "bias_std_rad_s": 1, "verification_rms_rad_s": 1, "verification_mean_rad_s": 1},
-    "world": {"time_scale": 12, "sensors": {"reference": {"scale": [1.0, 1.0, 1.0], "bias_rad_s": [0.0, 0.0, 0.0]}}},
-}
 NUDGE = b"def nudge():\n movej([0.2, -1.57, 1.57, -1.57, -1.57, 0], a=20, v=3)\nend\n"
 
 
 def test_an_arm_that_was_moved_between_the_halves_goes_on_only_if_somebody_agrees(world: World, tmp_path: Path) -> None:
-    handle = world(CHANGES)
+    handle = world(QUICK_EXPERIMENT)
     config, out = hardware(handle.config_path, tmp_path), tmp_path / "run"
     operator, terminal = pty.openpty()
     said = b""

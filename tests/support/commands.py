@@ -8,6 +8,7 @@ from typing import Any
 
 import yaml
 
+from rig.config.load import load
 from support.paths import CONFIGS
 from support.worlds import fresh_host, merge
 
@@ -29,7 +30,7 @@ def configuration(folder: Path, changes: dict[str, Any] | None = None) -> Path:
     """ci.yaml on an address of its own, with changes."""
     host = fresh_host()
     address = {"arm": {"host": host}, "board": {"port": f"socket://{host}:7321"}}
-    document = merge(merge(yaml.safe_load(CI.read_text(encoding="utf-8")), address), changes or {})
+    document = merge(merge(yaml.safe_load(load(CI).text), address), changes or {})
     path = folder / "config.yaml"
     path.write_text(yaml.safe_dump(document, sort_keys=False), encoding="utf-8")
     return path

@@ -19,6 +19,18 @@ from support.paths import DEMO
 START_TIMEOUT_S = 20.0
 REPLY_TIMEOUT_S = 30.0
 
+# What `world` makes of demo.yaml with this: a calibration beside a reference, and its verification, in few seconds.
+QUICK_EXPERIMENT: dict[str, Any] = {
+    "arm": {"transfer_speed_deg_s": 170},
+    "sensors": {
+        "gyro": {"rate_hz": 119},
+        "reference": {"part": "adis16465", "serial_number": "ADIS16465-001", "role": "reference"},
+    },
+    "procedure": {"verify": True, "speed_deg_s": 150, "acceleration_deg_s2": 400, "rest_s": 0.5},
+    "limits": {"scale_std": 1, "bias_std_rad_s": 1, "verification_rms_rad_s": 1, "verification_mean_rad_s": 1},
+    "world": {"time_scale": 12, "sensors": {"reference": {"scale": [1.0, 1.0, 1.0], "bias_rad_s": [0.0, 0.0, 0.0]}}},
+}
+
 _addresses = itertools.count()
 
 
