@@ -15,7 +15,6 @@ from rig.errors import Refused
 from rig.plans.registry import AnyProcedure, Procedure, installed, module_of
 from rig.plans.script_errors import script_errors
 
-
 SIZE_MAX_BYTES = 1_000_000  # the longest procedure shipped has 3,000
 REMEDY = "Give a Python file that defines PROCEDURE, as procedures/six_observation.py does"
 IMPORTABLE = "Mend the script; it may import what is installed, but no file beside it"
