@@ -155,7 +155,7 @@ class Motion:
         """Offset and gain from target to smooth angle, so that the joints stand exactly on both ends of the way."""
         first = [r.smooth(q) for r, q in zip(self._ripples, start, strict=True)]
         last = [r.smooth(q) for r, q in zip(self._ripples, end, strict=True)]
-        gain = tuple(
-            (v - u) / (b - a) if abs(b - a) > 1e-6 else 1.0 for u, v, a, b in zip(first, last, start, end, strict=True)
+        gain = tuple(  # a way shorter than any precision asked for has none
+            (v - u) / (b - a) if abs(b - a) > 1e-9 else 1.0 for u, v, a, b in zip(first, last, start, end, strict=True)
         )
         return tuple(u - g * a for u, g, a in zip(first, gain, start, strict=True)), gain
