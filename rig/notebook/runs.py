@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from numpy.typing import NDArray
 
+from rig.data.provenance import Provenance
 from rig.data.run_file import RecordedSensor
 from rig.data.settings import RunSettings
 from rig.errors import Refused
@@ -84,7 +85,7 @@ class Run(Mapping[str, Readings]):
         return self.recorded.movement[0].settings
 
     @property
-    def provenance(self) -> Mapping[str, Any]:
+    def provenance(self) -> Provenance:
         """What was measured with what, and when."""
         return self.recorded.movement[0].provenance
 
@@ -118,7 +119,7 @@ class Run(Mapping[str, Readings]):
             (name, r.sensor.part, r.sensor.serial_number, f"{r.sensor.rate_hz:g}", str(len(r.samples)), r.sensor.mode)
             for name, r in self.items()
         ]
-        started = self.provenance.get("started_utc", "")
+        started = self.provenance.started_utc
         title = f"{self.path.name}: {self.settings.procedure}, {started}"
         return table(title, ("sensor", "part", "serial number", "Hz", "samples", "readings"), rows)
 

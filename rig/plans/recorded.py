@@ -6,7 +6,7 @@ from pathlib import Path
 
 from rig.analysis.outcome import Outcome
 from rig.data.run_file import RunData, read_run
-from rig.data.run_folder import SCRIPT, ScriptIdentity, recordings
+from rig.data.run_folder import SCRIPT, recordings
 from rig.errors import Refused
 from rig.plans.registry import AnyProcedure, Readings, installed
 from rig.plans.script_file import load_script
@@ -81,9 +81,8 @@ def procedure_of(run: RunData, folder: Path) -> AnyProcedure:
     """
     name = run.settings.procedure
     procedures = installed()
-    if name not in procedures or not run.provenance.get("script_installed", True):
-        kept = ScriptIdentity(run.provenance.get("script", ""), run.provenance.get("script_sha256", ""))
-        script = load_script(folder / SCRIPT, kept)
+    if name not in procedures or not run.provenance.script_installed:
+        script = load_script(folder / SCRIPT, run.provenance.script_identity)
         procedures = {**procedures, name: script.procedure}
     found = procedures[name]
     # Recordings of before there were phases name the procedure that the run began with.

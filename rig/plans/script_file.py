@@ -15,7 +15,6 @@ from rig.errors import Refused
 from rig.plans.registry import AnyProcedure, Procedure, installed, module_of
 from rig.plans.script_errors import script_errors
 
-
 SIZE_MAX_BYTES = 1_000_000  # the longest procedure shipped has 3,000
 REMEDY = "Give a Python file that defines PROCEDURE, as procedures/six_observation.py does"
 IMPORTABLE = "Mend the script; it may import what is installed, but no file beside it"
@@ -44,10 +43,6 @@ class ScriptFile:
         """Whether it is the very script that is installed under its procedure's name."""
         name = self.procedure.name
         return name in installed() and installed_script(name).sha256 == self.sha256
-
-    def provenance(self) -> dict[str, str | bool]:
-        """What a recording keeps of it."""
-        return {"script": self.name, "script_sha256": self.sha256, "script_installed": self.is_installed}
 
 
 def script_in(module: ModuleType, procedure: AnyProcedure) -> ScriptFile:

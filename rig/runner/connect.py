@@ -11,7 +11,7 @@ from rig.arm.driver import Arm
 from rig.arm.state import ArmReport
 from rig.board.identify import refuse_other_firmware, refusing
 from rig.config.load import Loaded
-from rig.data.provenance import provenance
+from rig.data.provenance import provenance_of
 from rig.data.run_file import RunRecorder
 from rig.data.settings import RunSettings
 from rig.plans.phase import Phase
@@ -97,7 +97,14 @@ class Connector:
     ) -> Recording:
         described = {name: sensor.described for name, sensor in sensors.items()}
         stored = {name: sensor.stored for name, sensor in sensors.items() if sensor.stored is not None}
-        made_with = provenance(self.loaded, board.identity, report, stored, self.script.provenance())
+        made_with = provenance_of(
+            self.loaded,
+            board.identity,
+            report,
+            stored,
+            self.script.identity,
+            script_installed=self.script.is_installed,
+        )
         self.resumed.refuse_other_instruments(made_with, described)
         with refusing():
             recorder = RunRecorder(
