@@ -3,7 +3,7 @@
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 from datetime import UTC, datetime
-from typing import Any, Literal
+from typing import Literal
 
 import numpy as np
 
@@ -18,17 +18,19 @@ from rig.analysis.comparison import Reference
 from rig.analysis.onboard_check import Agreement, agreement
 from rig.analysis.verdict import Check, judge, verdict, verification_checks
 from rig.analysis.verification import Verification, verify
+from rig.data.provenance import Provenance
+from rig.data.result_file import StoredCalibrationEntry
 from rig.data.run_file import RunData
 from rig.data.settings import RunSettings
 from rig.observation.observed_run import ObservedRun, observe_runs
 
 
 @dataclass(frozen=True, slots=True)
-class Provenance:
+class Origin:
     """What was measured with what, and when: `recorded` is that of the run's first recording."""
 
-    recorded: Mapping[str, Any]
-    stored_calibrations: Mapping[str, Any]
+    recorded: Provenance
+    stored_calibrations: Mapping[str, StoredCalibrationEntry]
     resumed_utc: tuple[str, ...]
     verified_utc: tuple[str, ...]
     solved_utc: datetime
@@ -49,7 +51,7 @@ class Outcome:
     onboard: Mapping[str, Agreement]
     verifications: Mapping[str, Verification]
     checks: tuple[Check, ...]
-    provenance: Provenance
+    provenance: Origin
 
     @property
     def verdict(self) -> Literal["pass", "fail"]:
@@ -80,7 +82,7 @@ def calibrated(runs: Sequence[RunData], estimator: str = DEFAULT_ESTIMATOR) -> O
         onboard=onboard,
         verifications={},
         checks=(*checks, *(check for name, agreed in onboard.items() for check in agreed.checks(name))),
-        provenance=_provenance(runs),
+        provenance=_origin(runs),
     )
 
 
@@ -106,8 +108,8 @@ def verified(outcome: Outcome, repeated: Sequence[RunData]) -> Outcome:
         checks=(*outcome.checks, *checks),
         provenance=replace(
             outcome.provenance,
-            stored_calibrations=_stored(repeated[-1]) if repeated else outcome.provenance.stored_calibrations,
-            verified_utc=tuple(run.provenance["started_utc"] for run in repeated),
+            stored_calibrations=(repeated[-1] if repeated else outcome).provenance.stored_calibrations,
+            verified_utc=tuple(run.provenance.started_utc for run in repeated),
         ),
     )
 
@@ -117,21 +119,15 @@ def verified_alone(repeated: Sequence[RunData]) -> Outcome:
 
     Raises Fault as `verified` does.
     """
-    nothing_calibrated = Outcome((), repeated[0].settings, {}, {}, {}, (), _provenance(repeated[:1]))
+    nothing_calibrated = Outcome((), repeated[0].settings, {}, {}, {}, (), _origin(repeated[:1]))
     return verified(nothing_calibrated, repeated)
 
 
-def _provenance(runs: Sequence[RunData]) -> Provenance:
-    return Provenance(
+def _origin(runs: Sequence[RunData]) -> Origin:
+    return Origin(
         recorded=runs[0].provenance,
-        stored_calibrations=_stored(runs[-1]),
-        resumed_utc=tuple(run.provenance["started_utc"] for run in runs[1:]),
+        stored_calibrations=runs[-1].provenance.stored_calibrations,
+        resumed_utc=tuple(run.provenance.started_utc for run in runs[1:]),
         verified_utc=(),
         solved_utc=datetime.now(UTC),
     )
-
-
-def _stored(run: RunData) -> Mapping[str, Any]:
-    """The calibrations by which the board corrected its readings."""
-    stored: Mapping[str, Any] = run.provenance.get("stored_calibrations", {})
-    return stored

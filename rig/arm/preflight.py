@@ -6,7 +6,7 @@ from collections.abc import Sequence
 import numpy as np
 
 from rig.arm.condition import readiness
-from rig.arm.motion import Motion, Plan, travel
+from rig.arm.motion import SAME_PLACE_RAD, Motion, Plan, travel
 from rig.arm.state import JOINT_NAMES, ArmReport, Joints
 from rig.config.ur10e_limits import (
     ACCELERATION_LIMIT_RAD_S2,
@@ -21,8 +21,9 @@ FIRST_MOTION_LIMIT_RAD = tuple(math.radians(angle) for angle in (120, 120, 120, 
 
 
 def plan_problems(plan: Plan, payload_kg: float) -> list[Problem]:
-    """What is wrong with the plan itself: limits of position, speed, acceleration and payload."""
-    problems = [problem for motion in plan.motions for problem in _motion_problems(motion)]
+    """What is wrong with the plan itself: steps that are none, limits of position, speed, acceleration and payload."""
+    problems = step_problems(plan)
+    problems += [problem for motion in plan.motions if _travels(motion) for problem in _motion_problems(motion)]
     if not 0 <= payload_kg <= PAYLOAD_LIMIT_KG:
         problems.append(
             Problem(
@@ -32,6 +33,34 @@ def plan_problems(plan: Plan, payload_kg: float) -> list[Problem]:
             )
         )
     return list(dict.fromkeys(problems))
+
+
+def step_problems(plan: Plan) -> list[Problem]:
+    """Steps that cannot be made: every one must take time, and every motion must lead somewhere, at some speed."""
+    problems = [
+        Problem(
+            "no_duration",
+            f"{step.name} is planned to take {step.duration_s:g} s",
+            "Leave it out of the plan, or give it a duration above 0",
+        )
+        for step in plan.steps
+        if not 0 < step.duration_s < math.inf
+    ]
+    problems += [
+        Problem("no_travel", f"{motion.name} leads nowhere", "Leave it out of the plan, or let it move a joint")
+        for motion in plan.motions
+        if not _travels(motion)
+    ]
+    problems += [
+        Problem(
+            "no_speed",
+            f"{motion.name} is planned with {motion.speed_rad_s:g} rad/s and {motion.acceleration_rad_s2:g} rad/s²",
+            "Give it a speed and an acceleration above 0",
+        )
+        for motion in plan.motions
+        if not (0 < motion.speed_rad_s < math.inf and 0 < motion.acceleration_rad_s2 < math.inf)
+    ]
+    return problems
 
 
 def arm_problems(plan: Plan, report: ArmReport) -> list[Problem]:
@@ -87,6 +116,11 @@ def refuse(problems: Sequence[Problem]) -> None:
     *others, last = problems
     also = "".join(f"{problem.what} ({problem.name}): {problem.remedy}. " for problem in others)
     raise Refused(problems[0].name, also + last.what, last.remedy)
+
+
+def _travels(motion: Motion) -> bool:
+    way = travel(motion.start_q_rad, motion.target_q_rad)
+    return all(map(math.isfinite, way)) and max(map(abs, way)) > SAME_PLACE_RAD
 
 
 def _motion_problems(motion: Motion) -> list[Problem]:

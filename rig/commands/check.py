@@ -47,7 +47,7 @@ def _look_at_board(found: Configured) -> list[str]:
             try:
                 info = find_sensor(identity, name, section)
                 print(f"sensor {name}: {info.part}, identity register 0x{info.who_am_i:02x}")
-                if found.phase.procedure.readings == "calibrated" and name in config.to_calibrate:
+                if found.phase.procedure.reads_corrected and name in config.to_calibrate:
                     stored = stored_calibration(board, name, section)
                     print(f"sensor {name}: calibrated on {stored.calibration.written_utc:%Y-%m-%d}")
             except RigError as error:

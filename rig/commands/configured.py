@@ -1,12 +1,14 @@
 """The configuration and the procedure a command is about: the one the file names, or one in a file of its own."""
 
 from collections.abc import Sequence
+from contextlib import nullcontext
 from dataclasses import dataclass
 from pathlib import Path
 
 from rig.config.load import Loaded, load
 from rig.plans.phase import Phase, first_phase
 from rig.plans.registry import Procedures, installed, sections
+from rig.plans.script_errors import script_errors
 from rig.plans.script_file import ScriptFile, installed_script, load_script
 
 
@@ -22,7 +24,7 @@ class Configured:
 def configured(config_path: Path, overrides: Sequence[str] = (), script: ScriptFile | Path | None = None) -> Configured:
     """Load a configuration, for `script` (a file or one that is loaded) if it is given, whatever procedure it names.
 
-    Raises Refused as `load`, `installed` and `load_script` do.
+    Raises Refused as `load`, `installed`, `load_script` and `first_phase` do; `script_failed` too.
     """
     if isinstance(script, Path):
         script = load_script(script)
@@ -30,7 +32,9 @@ def configured(config_path: Path, overrides: Sequence[str] = (), script: ScriptF
     if script is not None:
         procedures = {**procedures, script.procedure.name: script.procedure}
         overrides = [*overrides, f"procedure.name={script.procedure.name}"]
-    loaded = load(config_path, overrides, sections(procedures))
+    # The section of a script is its own code as well.
+    with script_errors(f"the section of {script.name} fails") if script is not None else nullcontext():
+        loaded = load(config_path, overrides, sections(procedures))
     if script is None:
         script = installed_script(loaded.config.procedure.name)
     return Configured(loaded, script, first_phase(script.procedure, loaded.config, procedures))

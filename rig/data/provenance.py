@@ -3,40 +3,83 @@
 import hashlib
 import platform
 from collections.abc import Mapping
+from dataclasses import asdict, dataclass, field
 from datetime import UTC, datetime
 from importlib.metadata import version
 from typing import Any
 
-from firmware_host.client import BoardIdentity, StoredCalibration
+from firmware_host.answers import BoardIdentity, StoredCalibration
 from rig import __version__
 from rig.arm.state import ArmReport
 from rig.config.load import Loaded
+from rig.data.checked import checked
+from rig.data.result_file import StoredCalibrationEntry
+from rig.data.run_folder import ScriptIdentity
 
 PACKAGES = ("ur-rtde", "numpy", "h5py", "pyserial")
 
 
-def provenance(
+@dataclass(frozen=True, slots=True)
+class Provenance:
+    """Versions, serial numbers, the configuration's and the script's hashes, the time.
+
+    `stored_calibrations` are those by which the board corrected what it streamed, by sensor name. Files of schema
+    "rig.run/1" do not name the script; that was an installed one.
+    """
+
+    started_utc: str
+    rig_version: str
+    python_version: str
+    package_versions: Mapping[str, str]
+    configuration_sha256: str
+    arm_serial_number: str
+    arm_software: str
+    board_unique_id: str
+    firmware_version: str
+    sensor_serial_numbers: Mapping[str, str]
+    stored_calibrations: Mapping[str, StoredCalibrationEntry] = field(default_factory=dict)
+    script: str | None = None
+    script_sha256: str | None = None
+    script_installed: bool = True
+
+    @property
+    def script_identity(self) -> ScriptIdentity:
+        """Which script the recording was made by; one that no file is where it does not say."""
+        return ScriptIdentity(self.script or "", self.script_sha256 or "")
+
+    def document(self) -> dict[str, Any]:
+        """As it fits into JSON; nothing of a script that is not known."""
+        stored = {name: entry.model_dump(mode="json") for name, entry in self.stored_calibrations.items()}
+        document = {**asdict(self), "stored_calibrations": stored}
+        unknown = ("script", "script_sha256", "script_installed") if self.script_sha256 is None else ()
+        return {key: value for key, value in document.items() if key not in unknown}
+
+
+def provenance_of(
     loaded: Loaded,
     board: BoardIdentity,
     arm: ArmReport,
     stored: Mapping[str, StoredCalibration],
-    script: Mapping[str, str | bool],
-) -> dict[str, Any]:
-    """Versions, serial numbers, the configuration's and the script's hashes, the time; fits into JSON.
-
-    `stored` are the calibrations by which the board corrects what it streams, `script` says by which script it was.
-    """
-    return {
-        "started_utc": datetime.now(UTC).isoformat(timespec="seconds"),
-        "rig_version": __version__,
-        "python_version": platform.python_version(),
-        "package_versions": {name: version(name) for name in PACKAGES},
-        "configuration_sha256": hashlib.sha256(loaded.rig_text.encode()).hexdigest(),
-        **script,
-        "arm_serial_number": arm.serial_number,
-        "arm_software": arm.polyscope,
-        "board_unique_id": board.unique_id,
-        "firmware_version": board.firmware,
-        "sensor_serial_numbers": {name: section.serial_number for name, section in loaded.config.sensors.items()},
-        "stored_calibrations": {name: calibration.document() for name, calibration in stored.items()},
-    }
+    script: ScriptIdentity,
+    *,
+    script_installed: bool,
+) -> Provenance:
+    """That of a recording which begins now; `stored` as in `Provenance`."""
+    return Provenance(
+        started_utc=datetime.now(UTC).isoformat(timespec="seconds"),
+        rig_version=__version__,
+        python_version=platform.python_version(),
+        package_versions={name: version(name) for name in PACKAGES},
+        configuration_sha256=hashlib.sha256(loaded.rig_text.encode()).hexdigest(),
+        arm_serial_number=arm.serial_number,
+        arm_software=arm.polyscope,
+        board_unique_id=board.unique_id,
+        firmware_version=board.firmware,
+        sensor_serial_numbers={name: section.serial_number for name, section in loaded.config.sensors.items()},
+        stored_calibrations={
+            name: checked(StoredCalibrationEntry, calibration.document(), name) for name, calibration in stored.items()
+        },
+        script=script.name,
+        script_sha256=script.sha256,
+        script_installed=script_installed,
+    )

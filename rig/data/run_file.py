@@ -27,6 +27,7 @@ from rig.data.checked import Finite, Positive, checked, quoted
 from rig.data.events import Event, Recorded, from_lines, to_line
 from rig.data.extract import reason
 from rig.data.layout import EVENTS_DTYPE, SCHEMA, Contents, append, empty, lay_out
+from rig.data.provenance import Provenance
 from rig.data.settings import RunSettings, settings_from_json
 from rig.data.settings_of_run_1 import settings_of_configuration
 from rig.errors import Fault, Refused
@@ -36,7 +37,6 @@ READ_TIMEOUT_S, READ_BYTES_PER_S = 20.0, 5e6  # for a file of no size, and more 
 
 
 MOUNTING_TOLERANCE = 1e-6
-PROVENANCE_KEYS = ("started_utc", "board_unique_id", "arm_serial_number")  # what a resumed run is recognised by
 
 Axis = Annotated[tuple[Finite, ...], Field(min_length=3, max_length=3)]
 
@@ -72,7 +72,7 @@ class RunData:
 
     config: str
     settings: RunSettings
-    provenance: dict[str, Any]
+    provenance: Provenance
     sensors: dict[str, RecordedSensor]
     samples: dict[str, NDArray[Any]]
     arm: NDArray[Any]
@@ -86,8 +86,8 @@ class RunData:
 class RunRecorder:
     """Writes a run file from any number of threads; what they hand over is on its way to the disk within 0.5 s.
 
-    `config` is the configuration's text without its `world:` section; `provenance` must fit into JSON. The folder of
-    `path` must exist and the file must not. Raises Fault `recording_failed` from the constructor, `check` and `close`.
+    `config` is the configuration's text without its `world:` section. The folder of `path` must exist and the file must
+    not. Raises Fault `recording_failed` from the constructor, `check` and `close`.
     The adding calls never wait for the disk and do not report its failures, so that a full disk stalls neither the
     board's link nor the arm's: watch `check`.
     """
@@ -98,7 +98,7 @@ class RunRecorder:
         *,
         config: str,
         settings: RunSettings,
-        provenance: Mapping[str, Any],
+        provenance: Provenance,
         sensors: Mapping[str, RecordedSensor],
     ) -> None:
         import h5py
@@ -112,7 +112,7 @@ class RunRecorder:
         try:
             if path.exists():
                 raise FileExistsError(f"{path.name} is there already")
-            texts = {"config": config, "settings": settings.to_json(), "provenance": json.dumps(dict(provenance))}
+            texts = {"config": config, "settings": settings.to_json(), "provenance": json.dumps(provenance.document())}
             described = {name: asdict(sensor) for name, sensor in sensors.items()}
             lay_out(path, empty(SCHEMA, texts, described), swmr=True)
             self._file = h5py.File(path, "r+", libver="latest")
@@ -214,13 +214,13 @@ def read_run(path: Path, timeout_s: float | None = None) -> RunData:
         return RunData(
             config=contents.texts["config"],
             settings=_settings(contents),
-            provenance=_provenance(contents.texts["provenance"]),
+            provenance=checked(Provenance, json.loads(contents.texts["provenance"]), "provenance"),
             sensors={name: _sensor(attributes) for name, attributes in contents.described.items()},
             samples={name: _whole_rows(rows) for name, rows in contents.samples.items()},
             arm=_whole_rows(contents.arm),
             events=tuple(from_lines(contents.events.tobytes())),
         )
-    except ValueError as error:
+    except (ValueError, RecursionError) as error:
         raise _not_a_run_file(path, str(error)) from None
 
 
@@ -274,13 +274,6 @@ def _settings(contents: Contents) -> RunSettings:
     if missing := [name for name in named if name not in contents.described]:
         raise ValueError(f"it holds no samples of {', '.join(missing)}, a sensor of its settings")
     return settings
-
-
-def _provenance(text: str) -> dict[str, Any]:
-    provenance = json.loads(text)
-    if not isinstance(provenance, dict) or not all(isinstance(provenance.get(key), str) for key in PROVENANCE_KEYS):
-        raise ValueError(f"its provenance does not say {', '.join(PROVENANCE_KEYS)}")
-    return provenance
 
 
 def _sensor(attributes: Mapping[str, Any]) -> RecordedSensor:

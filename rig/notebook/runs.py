@@ -11,6 +11,7 @@ from numpy.typing import NDArray
 
 from rig.analysis.calibration import DEFAULT_ESTIMATOR
 from rig.analysis.outcome import Outcome
+from rig.data.provenance import Provenance
 from rig.data.run_file import RecordedSensor, RunData
 from rig.data.settings import RunSettings
 from rig.errors import Refused
@@ -104,9 +105,9 @@ class Run(Mapping[str, Readings]):
         return self.recorded.movement[0].settings
 
     @property
-    def started_utc(self) -> str:
-        """When the run began."""
-        return str(self.recorded.movement[0].provenance["started_utc"])
+    def provenance(self) -> Provenance:
+        """What was measured with what, and when."""
+        return self.recorded.movement[0].provenance
 
     @property
     def verification(self) -> "Run | None":
@@ -152,7 +153,7 @@ class Run(Mapping[str, Readings]):
         return f"<run {self.path.name}: {self.settings.procedure}, {', '.join(map(repr, self.values()))}>"
 
     def _repr_html_(self) -> str:
-        title = f"{self.path.name}: {self.settings.procedure}, {self.started_utc}"
+        title = f"{self.path.name}: {self.settings.procedure}, {self.provenance.started_utc}"
         return table(title, HEADINGS, [readings.row() for readings in self.values()])
 
 

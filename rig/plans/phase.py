@@ -8,6 +8,7 @@ from rig.arm.motion import Plan
 from rig.arm.state import Joints
 from rig.config.models import RigConfig
 from rig.plans.registry import AnyProcedure, Procedures
+from rig.plans.script_errors import script_errors
 
 
 class PhasePlanner(Protocol):
@@ -31,12 +32,18 @@ class Phase:
 
 
 def first_phase(procedure: AnyProcedure, config: RigConfig, procedures: Procedures) -> Phase:
-    """The phase a run of `procedure` begins with; what follows repeats its movement."""
+    """The phase a run of `procedure` begins with; what follows repeats its movement.
+
+    Raises Refused `no_such_procedure`; the phase's `plan` raises Refused as the procedure's, and `script_failed`.
+    """
 
     def plan(start_q_rad: Joints | None = None, done: Collection[int] = ()) -> Plan:
-        return procedure.plan(config.arm, config.procedure, start_q_rad, done)
+        with script_errors(f"the procedure {procedure.name} cannot be planned"):
+            made = procedure.plan(config.arm, config.procedure, start_q_rad, done)
+            if not isinstance(made, Plan):
+                raise TypeError(f"its planner gives {type(made).__name__}, no Plan")
+            return made
 
-    follows = None
-    if config.procedure.then_verify and procedure.then is not None:
-        follows = Phase(procedures[procedure.then], plan, agreed=True)
+    following = procedure.following(procedures) if config.procedure.then_verify else None
+    follows = None if following is None else Phase(following, plan, agreed=True)
     return Phase(procedure, plan, follows=follows)

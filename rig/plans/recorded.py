@@ -6,9 +6,9 @@ from pathlib import Path
 
 from rig.analysis.outcome import Outcome
 from rig.data.run_file import RunData, read_run
-from rig.data.run_folder import SCRIPT, ScriptIdentity, recordings
+from rig.data.run_folder import SCRIPT, recordings
 from rig.errors import Refused
-from rig.plans.registry import AnyProcedure, Readings, installed
+from rig.plans.registry import AnyProcedure, installed
 from rig.plans.script_file import load_script
 
 
@@ -43,14 +43,12 @@ def open_run(path: Path) -> RecordedRun:
     """The recordings in a run folder, or a run file. Raises Refused `no_run`, and as `read_run`."""
     if not path.is_dir():
         run = read_run(path)
-        raw = readings_of(run) == "raw"
-        return RecordedRun(path, (run,) if raw else (), () if raw else (run,), alone=True)
-    raw_runs, corrected = (
-        tuple(read_run(file) for file in recordings(path, readings)) for readings in ("raw", "calibrated")
-    )
-    if not raw_runs and not corrected:
+        corrected = _is_corrected(run)
+        return RecordedRun(path, () if corrected else (run,), (run,) if corrected else (), alone=True)
+    raw, repeated = (tuple(read_run(file) for file in recordings(path, readings)) for readings in ("raw", "calibrated"))
+    if not raw and not repeated:
         raise Refused("no_run", f"{path} holds no run.h5", "Give a run folder or a run file")
-    return RecordedRun(path, raw_runs, corrected)
+    return RecordedRun(path, raw, repeated)
 
 
 def judged(run: RecordedRun, estimator: str) -> Outcome:
@@ -64,14 +62,15 @@ def judged(run: RecordedRun, estimator: str) -> Outcome:
     outcome = procedure.analyse(run.movement, None, estimator)
     if run.raw and run.corrected:
         return procedure_of(run.corrected[0], folder).analyse(run.corrected, outcome, estimator)
-    if run.raw and not run.alone and run.raw[0].settings.then_verify and procedure.then is not None:
-        return installed()[procedure.then].analyse([], outcome, estimator)
+    if run.raw and not run.alone and run.raw[0].settings.then_verify:
+        missing = procedure.following(installed())
+        return outcome if missing is None else missing.analyse([], outcome, estimator)
     return outcome
 
 
-def readings_of(run: RunData) -> Readings:
-    """What the sensors to calibrate streamed."""
-    return "calibrated" if any(sensor.mode == "calibrated" for sensor in run.sensors.values()) else "raw"
+def _is_corrected(run: RunData) -> bool:
+    """Whether the board corrected what the sensors to calibrate streamed."""
+    return any(sensor.mode == "calibrated" for sensor in run.sensors.values())
 
 
 def procedure_of(run: RunData, folder: Path) -> AnyProcedure:
@@ -81,10 +80,11 @@ def procedure_of(run: RunData, folder: Path) -> AnyProcedure:
     """
     name = run.settings.procedure
     procedures = installed()
-    if name not in procedures or not run.provenance.get("script_installed", True):
-        kept = ScriptIdentity(run.provenance.get("script", ""), run.provenance.get("script_sha256", ""))
-        script = load_script(folder / SCRIPT, kept)
+    if name not in procedures or not run.provenance.script_installed:
+        script = load_script(folder / SCRIPT, run.provenance.script_identity)
         procedures = {**procedures, name: script.procedure}
     found = procedures[name]
     # Recordings of before there were phases name the procedure that the run began with.
-    return procedures[found.then] if found.then and found.readings != readings_of(run) else found
+    if found.reads_corrected != _is_corrected(run):
+        return found.following(procedures) or found
+    return found

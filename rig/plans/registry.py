@@ -67,6 +67,26 @@ class Procedure(Generic[SectionT]):
     readings: Readings = "raw"
     then: str | None = None
 
+    @property
+    def reads_corrected(self) -> bool:
+        """Whether the board corrects what the sensors to calibrate stream, by the calibrations it has stored."""
+        return self.readings == "calibrated"
+
+    @property
+    def calibrates_along(self) -> bool:
+        """Whether the board averages and solves while the host records: it can from raw readings alone."""
+        return self.readings == "raw"
+
+    def following(self, procedures: "Procedures") -> "AnyProcedure | None":
+        """The procedure that `then` names, if it names one. Raises Refused `no_such_procedure`."""
+        if self.then is not None and self.then not in procedures:
+            raise Refused(
+                "no_such_procedure",
+                f"the procedure {self.name} is to be followed by {self.then!r}, which is not installed",
+                f"Let `then` name one of: {', '.join(procedures)}",
+            )
+        return None if self.then is None else procedures[self.then]
+
 
 AnyProcedure = Procedure[Any]
 Procedures = Mapping[str, AnyProcedure]

@@ -44,10 +44,6 @@ class ScriptFile:
         name = self.procedure.name
         return name in installed() and installed_script(name).sha256 == self.sha256
 
-    def provenance(self) -> dict[str, str | bool]:
-        """What a recording keeps of it."""
-        return {"script": self.name, "script_sha256": self.sha256, "script_installed": self.is_installed}
-
 
 def script_in(module: ModuleType, procedure: AnyProcedure) -> ScriptFile:
     """The procedure a module that is imported already defines, with the module's file."""

@@ -1,6 +1,6 @@
 """The typed outcome of a run as the document of `result.json`."""
 
-from rig.analysis.outcome import Outcome, Provenance
+from rig.analysis.outcome import Origin, Outcome
 from rig.analysis.verdict import Check
 from rig.data.result_file import SCHEMA, CheckEntry, ProvenanceEntry, ResultDocument
 from rig.report.sensor_entry import sensor_entry
@@ -30,13 +30,13 @@ def _check(check: Check) -> CheckEntry:
     return CheckEntry(name=check.name, value=check.value, limit=check.limit, unit=check.unit, passed=check.passed)
 
 
-def _provenance(provenance: Provenance) -> ProvenanceEntry:
+def _provenance(origin: Origin) -> ProvenanceEntry:
     return ProvenanceEntry.model_validate(
         {
-            **provenance.recorded,
-            "stored_calibrations": provenance.stored_calibrations,
-            "resumed_utc": provenance.resumed_utc,
-            "verified_utc": provenance.verified_utc,
-            "solved_utc": provenance.solved_utc.isoformat(timespec="seconds"),
+            **origin.recorded.document(),
+            "stored_calibrations": origin.stored_calibrations,
+            "resumed_utc": origin.resumed_utc,
+            "verified_utc": origin.verified_utc,
+            "solved_utc": origin.solved_utc.isoformat(timespec="seconds"),
         }
     )

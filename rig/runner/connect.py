@@ -1,6 +1,5 @@
 """Connects the board and the arm, starts the recording, and hands all of it to a script as one `Rig`."""
 
-import importlib
 from collections.abc import Iterator, Mapping
 from contextlib import ExitStack, contextmanager
 from dataclasses import dataclass
@@ -11,7 +10,7 @@ from rig.arm.driver import Arm
 from rig.arm.state import ArmReport
 from rig.board.identify import refuse_other_firmware, refusing
 from rig.config.load import Loaded
-from rig.data.provenance import provenance
+from rig.data.provenance import provenance_of
 from rig.data.run_file import RunRecorder
 from rig.data.settings import RunSettings
 from rig.plans.phase import Phase
@@ -23,9 +22,6 @@ from rig.runner.resumption import Resumption
 from rig.runner.sensors import BoardSensor, set_up_sensors
 from rig.station.events import ArmConnected, BoardConnected, RunResumed
 from rig.station.station import Station
-
-# What the board's own calibration needs of the host after each sweep: to import it takes longer than to use it.
-NEEDED_BETWEEN_SWEEPS = ("scipy.interpolate",)
 
 
 @dataclass(frozen=True, slots=True)
@@ -48,8 +44,9 @@ class Connector:
         was recorded earlier, or has no calibration to correct by.
         """
         whole_plan = self.phase.plan()
-        for module in NEEDED_BETWEEN_SWEEPS:
-            importlib.import_module(module)
+        # The board's own calibration needs it of the host after each sweep: to import it takes longer than to use it.
+        import scipy.interpolate  # noqa: F401
+
         if self.resumed.earlier:
             self.station.event(RunResumed(len(self.resumed.done), len(whole_plan.sweeps)))
         acquisition = Acquisition()
@@ -73,8 +70,7 @@ class Connector:
         with refusing():
             board = stack.enter_context(Board(section.port, section.baud, acquisition.on_samples))
             refuse_other_firmware(board.identity)
-            calibrated = self.phase.procedure.readings == "calibrated"
-            sensors = set_up_sensors(board, self.loaded.config, calibrated=calibrated)
+            sensors = set_up_sensors(board, self.loaded.config, calibrated=self.phase.procedure.reads_corrected)
         for name, sensor in sensors.items():
             acquisition.expect(sensor.index, name, sensor.described.sensitivity_rad_s_per_count)
         self.station.event(BoardConnected(section.port, board.identity))
@@ -97,7 +93,14 @@ class Connector:
     ) -> Recording:
         described = {name: sensor.described for name, sensor in sensors.items()}
         stored = {name: sensor.stored for name, sensor in sensors.items() if sensor.stored is not None}
-        made_with = provenance(self.loaded, board.identity, report, stored, self.script.provenance())
+        made_with = provenance_of(
+            self.loaded,
+            board.identity,
+            report,
+            stored,
+            self.script.identity,
+            script_installed=self.script.is_installed,
+        )
         self.resumed.refuse_other_instruments(made_with, described)
         with refusing():
             recorder = RunRecorder(
@@ -113,7 +116,7 @@ class Connector:
         self, board: Board, acquisition: Acquisition, recording: Recording, sensors: Mapping[str, BoardSensor]
     ) -> BoardCalibration | None:
         """The board's own calibration from raw readings; it is given back what it observed before an interruption."""
-        if self.phase.procedure.readings == "calibrated":
+        if not self.phase.procedure.calibrates_along:
             return None
         to_calibrate = {name: (sensors[name].index, sensors[name].described) for name in self.settings.to_calibrate}
         along = BoardCalibration(board, acquisition, recording.note, self.settings.observation, to_calibrate)

@@ -57,7 +57,7 @@ class Run:
 
     def _resumed(self, phase: Phase) -> Resumption:
         """What counts of the phase's recordings before. Corrected readings are compared as one movement: none do."""
-        if phase.procedure.readings == "calibrated":
+        if phase.procedure.reads_corrected:
             return Resumption()
         with self.reported(self._mended, moved=False):
             earlier = [read_run(file) for file in recordings(self.folder, phase.procedure.readings)]
@@ -95,7 +95,7 @@ class Run:
     def _judged(self, phase: Phase, runs: tuple[RunData, ...], before: Outcome | None) -> Outcome:
         with self.reported(self._repeating, moved=True):
             outcome = phase.procedure.analyse(runs, before, DEFAULT_ESTIMATOR)
-            if runs and phase.procedure.readings == "raw":
+            if runs and phase.procedure.calibrates_along:
                 check_observed(runs[-1], self.loaded.config.to_calibrate)
             return outcome
 
@@ -134,6 +134,7 @@ class Run:
                 self.station.event(Failed(error))
                 raise
             fault = Fault(error.name, _with_notes(error.what, error), error.remedy)
+            fault.__cause__ = error
             self._ended(Failed(fault), advice)
             raise fault from error
         except OSError as error:
@@ -144,6 +145,7 @@ class Run:
         except SystemExit as ended:
             what = _with_notes(f"the script {self.script.name} ended the program (SystemExit: {ended})", ended)
             fault = Fault("script_failed", what, ENDING)
+            fault.__cause__ = ended
             self._ended(Failed(fault), advice)
             raise fault from ended
         except KeyboardInterrupt as interrupt:

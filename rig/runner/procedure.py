@@ -13,7 +13,7 @@ from math import degrees, radians
 from firmware_host.client import Board
 from rig.arm.driver import Arm
 from rig.arm.motion import Plan, Rest, Step, Sweep, Transfer, travel
-from rig.arm.preflight import arm_problems, plan_problems, refuse, way_to_home
+from rig.arm.preflight import arm_problems, plan_problems, refuse, step_problems, way_to_home
 from rig.arm.state import ArmReport
 from rig.config.models import ArmSection
 from rig.data.events import Event, RestFinished, RestStarted, SweepFinished, SweepStarted
@@ -104,7 +104,8 @@ class Rig:
         Raises `Refused` naming every problem found; nothing has moved then.
         """
         report, payload = self.devices.report, self.devices.payload
-        refuse([*plan_problems(self.whole_plan, payload.payload_kg), *arm_problems(self.plan, report)])
+        problems = [*plan_problems(self.whole_plan, payload.payload_kg), *step_problems(self.plan)]
+        refuse(list(dict.fromkeys([*problems, *arm_problems(self.plan, report)])))
         self.station.event(PreflightPassed(self.plan, report))
         away_rad = max(map(abs, way_to_home(self.plan, report.state.q_rad)))
         if not (self.phase.agreed and away_rad <= SAME_POSE_RAD):
@@ -210,13 +211,15 @@ class Rig:
         self.recording.check()
         state = self.devices.arm.latest
         within_s = min(state.time_s - self._step_started_s, step.duration_s)
+        # A script may make steps of its own, one that takes no time too.
+        fraction = within_s / step.duration_s if step.duration_s > 0 else 1.0
         self.station.event(SamplesTaken(self.devices.acquisition.samples()))
         self.station.event(
             Progress(
                 number=self._number,
                 count=len(self.plan.steps),
                 step=step,
-                fraction=within_s / step.duration_s,
+                fraction=fraction,
                 elapsed_s=self._done_s + within_s,
                 remaining_s=self.plan.duration_s - self._done_s - within_s,
                 arm_speed_rad_s=max(map(abs, state.qd_rad_s)),

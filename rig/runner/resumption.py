@@ -2,8 +2,8 @@
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
-from typing import Any
 
+from rig.data.provenance import Provenance
 from rig.data.run_file import RecordedSensor, RunData
 from rig.data.settings import RunSettings
 from rig.errors import Refused
@@ -21,17 +21,21 @@ class Resumption:
     earlier: Sequence[RunData] = ()
     done: frozenset[int] = frozenset()
 
-    def refuse_other_instruments(self, provenance: Mapping[str, Any], sensors: Mapping[str, RecordedSensor]) -> None:
+    def refuse_other_instruments(self, provenance: Provenance, sensors: Mapping[str, RecordedSensor]) -> None:
         """Readings of two boards, or at two settings, are not one calibration.
 
         Raises Refused `another_board`, `another_arm`, `another_sensor`.
         """
         for run in self.earlier:
-            for key, what in (("board_unique_id", "board"), ("arm_serial_number", "arm")):
-                if run.provenance[key] != provenance[key]:
+            begun = run.provenance
+            for what, before, now in (
+                ("board", begun.board_unique_id, provenance.board_unique_id),
+                ("arm", begun.arm_serial_number, provenance.arm_serial_number),
+            ):
+                if before != now:
                     raise Refused(
                         "another_board" if what == "board" else "another_arm",
-                        f"the run was begun with the {what} {run.provenance[key]}, this is {provenance[key]}",
+                        f"the run was begun with the {what} {before}, this is {now}",
                         f"Connect the {what} the run was begun with, or start a new run with `rig run`",
                     )
             if run.sensors != sensors:
@@ -49,7 +53,7 @@ def resumption(earlier: Sequence[RunData], settings: RunSettings, script: Script
     Refused `another_script`, `another_procedure`.
     """
     for run in earlier:
-        if run.provenance.get("script_sha256") != script.sha256:
+        if run.provenance.script_sha256 != script.sha256:
             raise Refused(
                 "another_script",
                 f"{script.name} in the run folder is not the script the run was begun with",

@@ -1,5 +1,7 @@
 """The line an event is worth, for a terminal and for the log."""
 
+from traceback import format_exception
+
 from rig.station.events import (
     ArmConnected,
     BoardConnected,
@@ -48,6 +50,8 @@ def line(event: RunEvent) -> str | None:
 def reason(event: RunEvent) -> str | None:
     """Why a run ended early. The log keeps it; on a terminal the command says it last."""
     match event:
+        case Failed(error) if error.name == "script_failed" and error.__cause__ is not None:
+            return f"{error}\n{''.join(format_exception(error.__cause__)).rstrip()}"
         case Failed(error):
             return str(error)
         case Interrupted(text) | Crashed(text):

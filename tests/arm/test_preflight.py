@@ -2,11 +2,12 @@
 
 import math
 from dataclasses import replace
+from typing import Any
 
 import pytest
 
 from rig.arm.condition import program_interruption, readiness
-from rig.arm.motion import Plan, Transfer
+from rig.arm.motion import Plan, Rest, Transfer
 from rig.arm.preflight import arm_problems, plan_problems, refuse, way_to_home
 from rig.arm.state import ArmReport, ArmState, Joints, RobotMode, RuntimeState, SafetyMode
 from rig.config.models import ArmSection
@@ -77,6 +78,26 @@ def test_a_base_that_leads_a_motion_is_held_to_its_own_limit() -> None:
     problems = plan_problems(replace(plan(), steps=(*plan().steps, swing)), 0.3)
     assert names(problems) == ["joint_speed"]
     assert "base" in problems[0].what
+
+
+@pytest.mark.parametrize(
+    ("change", "name"),
+    [
+        ({"duration_s": 0.0}, "no_duration"),
+        ({"duration_s": math.nan}, "no_duration"),
+        ({"target_q_rad": HOME}, "no_travel"),
+        ({"target_q_rad": (*HOME[:5], math.nan)}, "no_travel"),
+        ({"speed_rad_s": 0.0}, "no_speed"),
+        ({"acceleration_rad_s2": -1.0}, "no_speed"),
+    ],
+)
+def test_a_step_that_is_none_is_refused_by_name(change: dict[str, Any], name: str) -> None:
+    step = replace(Transfer("there", HOME, (*HOME[:5], 0.5), 0.5, 1.0, 2.0), **change)
+    assert names(plan_problems(Plan((step,), HOME, HOME), 0.3)) == [name]
+
+
+def test_a_rest_takes_time() -> None:
+    assert names(plan_problems(Plan((Rest("a rest", 0.0),), HOME, HOME), 0.3)) == ["no_duration"]
 
 
 def test_payload_beyond_the_arm_is_refused() -> None:

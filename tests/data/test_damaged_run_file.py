@@ -161,6 +161,13 @@ def sweep(**changes: object) -> Callable[[h5py.File], None]:
     return events(lambda line: line["detail"].get("sweep") and line["detail"].update(sweep=changes))
 
 
+def provenance(**changes: object) -> Callable[[h5py.File], None]:
+    def change(file: h5py.File) -> None:
+        file.attrs["provenance"] = json.dumps({**json.loads(file.attrs["provenance"]), **changes})
+
+    return change
+
+
 SHAPES: dict[str, tuple[Callable[[h5py.File], None], str]] = {
     "a sensor without samples": (instead("samples/gyro", lambda file, name: None), "no samples of gyro"),
     "no sensors": (without("samples"), "it has no samples"),
@@ -169,7 +176,15 @@ SHAPES: dict[str, tuple[Callable[[h5py.File], None], str]] = {
     "a number for a schema": (attribute("schema", 3), "its schema is not a text"),
     "a number for a configuration": (attribute("config", 3), "its config is not a text"),
     "settings of a configuration": (attribute("config", "limits: 3"), "its configuration cannot be understood"),
-    "provenance that is a list": (attribute("provenance", "[]"), "its provenance does not say"),
+    "provenance that is a list": (attribute("provenance", "[]"), r"provenance is \[\]"),
+    "provenance nested without end": (attribute("provenance", "[" * 60_000), "not_a_run_file"),
+    "provenance without a version": (provenance(rig_version=None), r"provenance\.rig_version"),
+    "provenance with a number for a serial number": (provenance(arm_serial_number=3), r"provenance\.arm_serial_number"),
+    "package versions that are a list": (provenance(package_versions=[]), r"provenance\.package_versions"),
+    "serial numbers of numbers": (provenance(sensor_serial_numbers={"gyro": 1}), r"sensor_serial_numbers\.gyro"),
+    "stored calibrations of text": (provenance(stored_calibrations="gyro"), r"provenance\.stored_calibrations"),
+    "a stored calibration of nothing": (provenance(stored_calibrations={"gyro": {}}), r"stored_calibrations\.gyro"),
+    "a script that is a list": (provenance(script=["own.py"]), r"provenance\.script"),
     "provenance that is no JSON": (attribute("provenance", "{"), "not_a_run_file"),
     "provenance of bytes": (attribute("provenance", np.void(b"\xff\x00")), "not_a_run_file"),
     "mounting of one row": (attribute("mounting", [1.0, 0.0, 0.0], "samples/gyro"), r"sensor\.mounting"),
@@ -203,3 +218,9 @@ def test_a_file_of_another_shape_is_refused_with_what_is_wrong(recording: Path, 
         change(file)
     said = refused(recording)
     assert re.search(complaint, said), said
+
+
+def test_of_provenance_more_may_be_said_than_this_version_knows(recording: Path) -> None:
+    with h5py.File(recording, "r+") as file:
+        provenance(operator={"name": "R. Feynman"})(file)
+    assert read_run(recording).provenance == read_run(RECORDING).provenance

@@ -6,6 +6,7 @@ import signal
 import subprocess
 import sys
 import time
+from dataclasses import replace
 from multiprocessing.connection import Connection
 from pathlib import Path
 from typing import Any
@@ -33,6 +34,8 @@ from rig.data.run_file import RecordedSensor, RunRecorder, make_plain, read_run
 from rig.data.settings import Limits, ObservationThresholds, PlannedSweep, RunSettings
 from rig.errors import Fault, Refused
 from support.paths import ROOT
+from support.results import VERIFIED
+from support.synthetic_run import PROVENANCE as SYNTHETIC
 
 SENSOR = RecordedSensor(
     part="lsm9ds1",
@@ -76,13 +79,15 @@ EVENTS: tuple[Event, ...] = (
     BoardRecalled("gyro", 2),
     BoardSolved("gyro", BoardSolution("closed_form", "solved", 6, 1, (1.1, 1.2, 0.9), (0.01, 0.0, -0.02))),
 )
+STORED = VERIFIED.provenance.stored_calibrations["gyro"]
 CONFIG = "arm: {host: 192.0.2.1}\n# °\n"
-PROVENANCE = {
-    "started_utc": "2026-11-21T00:00:00+00:00",
-    "board_unique_id": "0123",
-    "arm_serial_number": "2026",
-    "sensor_serial_numbers": {"gyro": "LSM9DS1-001"},
-}
+PROVENANCE = replace(
+    SYNTHETIC,
+    script="mine.py",
+    script_sha256="0" * 64,
+    script_installed=False,
+    stored_calibrations={"gyro": STORED},
+)
 TICK_S = 0.01
 
 

@@ -3,13 +3,18 @@
 import os
 import subprocess
 import sys
+from collections.abc import Callable
+from dataclasses import replace
 from pathlib import Path
 
+import pytest
 import yaml
 
 from procedures import six_observation, verify
+from rig.arm.motion import Plan
 from rig.config.load import load
 from rig.config.procedure_sections import STOCK_SECTIONS
+from rig.errors import Refused
 from rig.plans.phase import first_phase
 from rig.plans.registry import installed, sections
 from rig.plans.script_file import installed_script, load_script
@@ -46,6 +51,38 @@ def test_a_calibration_is_followed_by_its_verification_only_when_asked() -> None
     assert first_phase(six_observation.PROCEDURE, once, installed()).follows is None
     alone = load(VERIFIED, ["procedure.name=verify"]).config
     assert first_phase(verify.PROCEDURE, alone, installed()).follows is None
+
+
+def test_a_procedure_that_is_to_follow_and_is_not_there_is_refused_by_name() -> None:
+    config = load(VERIFIED).config
+    with pytest.raises(Refused, match=r"no_such_procedure: .*six_observation is to be followed by 'nonesuch'"):
+        first_phase(replace(six_observation.PROCEDURE, then="nonesuch"), config, installed())
+
+
+def failing(*_: object) -> Plan:
+    raise ZeroDivisionError("by a speed of nothing")
+
+
+def giving_nothing(*_: object) -> Plan:
+    return None  # type: ignore[return-value]
+
+
+def ending(*_: object) -> Plan:
+    raise SystemExit(0)
+
+
+@pytest.mark.parametrize(
+    ("planner", "said"),
+    [
+        (failing, r"ZeroDivisionError: by a speed of nothing; test_registry\.py, line \d+"),
+        (giving_nothing, "TypeError: its planner gives NoneType, no Plan"),
+        (ending, "SystemExit: 0"),
+    ],
+)
+def test_a_planner_that_fails_is_refused_by_name(planner: Callable[..., Plan], said: str) -> None:
+    phase = first_phase(replace(six_observation.PROCEDURE, plan=planner), load(VERIFIED).config, installed())
+    with pytest.raises(Refused, match=rf"script_failed: the procedure six_observation cannot be planned \({said}"):
+        phase.plan()
 
 
 def test_the_kept_script_is_the_file_the_procedure_came_from() -> None:

@@ -8,11 +8,12 @@ import pytest
 import yaml
 
 from rig.cli import guarded, main
+from rig.commands.configured import configured
 from rig.data.run_folder import ScriptIdentity, script_identity
 from rig.errors import Refused
 from rig.plans.script_file import SIZE_MAX_BYTES, load_script
 from support.commands import configuration
-from support.paths import ROOT
+from support.paths import CONFIGS, ROOT
 from support.worlds import hardware
 
 OWN = ROOT / "tests" / "support" / "unequal_sweeps.py"
@@ -93,3 +94,10 @@ def test_a_run_that_was_refused_before_its_first_recording_goes_on_by_its_own_sc
     assert main(["resume", str(out)]) == 2 and "rig: no_port: " in capsys.readouterr().err
     (out / "script.json").write_text("[]", encoding="utf-8")
     assert main(["resume", str(out)]) == 2 and "rig: another_script: " in capsys.readouterr().err
+
+
+def test_a_section_that_fails_is_refused_by_name(tmp_path: Path) -> None:
+    checking = "    def problems(self, config):\n        return [1 / 0]\n\n\ndef plan("
+    path = script(tmp_path, OWN.read_text(encoding="utf-8").replace("def plan(", checking, 1))
+    with pytest.raises(Refused, match=r"script_failed: the section of own\.py fails \(ZeroDivisionError"):
+        configured(CONFIGS / "demo.yaml", ["procedure={}"], path)

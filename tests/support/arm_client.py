@@ -27,7 +27,7 @@ def until(condition):
 CONNECT = "control, receive = RTDEControlInterface(host), RTDEReceiveInterface(host)\nsay('connected')\n"
 
 
-def wait_for(condition: Callable[[], Any], what: str, limit_s: float = 10.0) -> Any:
+def wait_for(condition: Callable[[], Any], what: str, limit_s: float = 60.0) -> Any:
     """Wait until `condition` is true; the wait is wall time, as a client's would be."""
     end = time.monotonic() + limit_s
     while not (answer := condition()):

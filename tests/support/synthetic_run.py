@@ -15,6 +15,7 @@ from rig.arm.state import ARM_STATE_DTYPE
 from rig.config.load import parse
 from rig.config.procedure_sections import SixSweepsSection
 from rig.data.events import Event, Recorded, RestFinished, RestStarted, SweepFinished, SweepStarted
+from rig.data.provenance import Provenance
 from rig.data.run_file import RecordedSensor, RunData
 from rig.data.settings import settings_of
 from rig.estimation.arrays import Array
@@ -27,6 +28,18 @@ sensors: {{gyro: {{part: lsm9ds1, serial_number: LSM9DS1-001}}}}
 procedure: {{speed_deg_s: {speed_deg_s}, rest_s: {rest_s}, repeats: {repeats}}}
 limits: {{scale_deviation: 0.3, scale_std: 0.002, bias_rad_s: 0.1, bias_std_rad_s: 0.002, condition: 100}}
 """
+PROVENANCE = Provenance(
+    started_utc="2026-11-21T00:00:00+00:00",
+    rig_version="0.2.0",
+    python_version="3.11.7",
+    package_versions={},
+    configuration_sha256="",
+    arm_serial_number="2026",
+    arm_software="URSoftware 5.14.0.0 (synthetic)",
+    board_unique_id="0123",
+    firmware_version="0.2.0",
+    sensor_serial_numbers={"gyro": "LSM9DS1-001"},
+)
 SCALE = (1.1771, 1.1554, 1.1440)
 BIAS_RAD_S = (0.0077, -0.0100, -0.0051)
 SENSITIVITY = float(np.radians(8.75e-3))
@@ -153,7 +166,9 @@ def run_data(setup: Setup, motion: Motion, board_s: Array, counts: Array) -> Run
     arm["q_rad"], arm["qd_rad_s"] = np.round(q / 6e-6) * 6e-6, qd
     arm["target_speed_fraction"] = arm["speed_scaling"] = 1.0
     arm["robot_mode"], arm["safety_mode"], arm["runtime_state"] = 7, 1, 2
-    return RunData(motion.config, motion.settings, {}, {"gyro": SENSOR}, {"gyro": samples}, arm, motion.events())
+    return RunData(
+        motion.config, motion.settings, PROVENANCE, {"gyro": SENSOR}, {"gyro": samples}, arm, motion.events()
+    )
 
 
 SENSOR = RecordedSensor(
