@@ -11,7 +11,7 @@ from typing import TYPE_CHECKING, Any
 from rig import __version__
 from rig.commands.standard_streams import keep_streams_usable
 from rig.errors import Fault, Refused, RigError
-from rig.station.plain_text import printable_lines
+from rig.errors.quoting import printable_lines
 
 if TYPE_CHECKING:
     from rig.plans.registry import AnyProcedure

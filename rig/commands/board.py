@@ -26,6 +26,7 @@ from rig.data.result_file import ResultDocument, passed_result
 from rig.errors import Fault, Refused
 from rig.report.board_info import info_document, print_info, print_stored
 from rig.station.confirm import agreed_or_refused
+from rig.station.plain_text import say
 
 
 @dataclass(frozen=True, slots=True)
@@ -58,7 +59,7 @@ def read(config_path: Path, overrides: Sequence[str], sensor: str | None, *, as_
         places = _places(board, config, sensor, config.sensors)
     for place in places:
         if place.stored is not None and place.stored.calibration.serial_number != place.section.serial_number:
-            print(f"{place.name}: stored for another sensor than {place.section.serial_number}", file=sys.stderr)
+            say(f"{place.name}: stored for another sensor than {place.section.serial_number}", file=sys.stderr)
     documents = {place.name: None if place.stored is None else place.stored.document() for place in places}
     if as_json:
         print(json.dumps({"schema": "rig.board_calibration/1", "sensors": documents}, indent=2))
@@ -83,7 +84,7 @@ def write(
             for place in places:
                 board.configure(place.index, place.section.rate_hz, place.section.range_deg_s)
                 record = store(board, place.index, found[place.name])
-                print(f"stored: {place.name}, {_in_words(record)}")
+                say(f"stored: {place.name}, {_in_words(record)}")
     return 0
 
 
@@ -106,7 +107,7 @@ def erase(config_path: Path, overrides: Sequence[str], sensor: str | None, *, as
                         f"the board still has a calibration for {place.name} after it was erased",
                         "Try again; if that does not help, replace the microcontroller board",
                     )
-                print(f"erased: {place.name}")
+                say(f"erased: {place.name}")
     return 0
 
 
@@ -119,9 +120,7 @@ def _connected(config_path: Path, overrides: Sequence[str]) -> Iterator[tuple[Ri
             stack.enter_context(simulated_laboratory(stack.enter_context(written(loaded.text))))
             kept = loaded.flash_file
             memory = f"is kept in {kept}" if kept else "too, unless world.board.flash_file names a file that keeps it"
-            print(
-                f"simulated laboratory: it lasts as long as this command, its board's memory {memory}", file=sys.stderr
-            )
+            say(f"simulated laboratory: it lasts as long as this command, its board's memory {memory}", file=sys.stderr)
         with refusing():
             board = stack.enter_context(Board(loaded.config.board.port, loaded.config.board.baud, lambda batch: None))
         yield loaded.config, board

@@ -13,6 +13,7 @@ from rig.board.identify import find_sensor, refuse_other_firmware, refusing, sto
 from rig.commands.configured import Configured, configured
 from rig.commands.laboratory import simulated_laboratory, written
 from rig.errors import RigError
+from rig.station.plain_text import say
 
 
 def check(config_path: Path, overrides: Sequence[str], script: Path | None = None) -> int:
@@ -21,8 +22,8 @@ def check(config_path: Path, overrides: Sequence[str], script: Path | None = Non
     with written(found.loaded.text) as used, simulated_laboratory(used) if found.loaded.simulated else nullcontext():
         missing = [*_named(_look_at_board, found), *_named(_look_at_arm, found)]
     for problem in missing:
-        print(f"missing: {problem}", file=sys.stderr)
-    print(f"not ready: {len(missing)} to mend" if missing else "ready")
+        say(f"missing: {problem}", file=sys.stderr)
+    say(f"not ready: {len(missing)} to mend" if missing else "ready")
     return 2 if missing else 0
 
 
@@ -38,7 +39,7 @@ def _look_at_board(found: Configured) -> list[str]:
     config, missing = found.loaded.config, []
     with refusing(), Board(config.board.port, config.board.baud, lambda batch: None) as board:
         identity = board.identity
-        print(f"board at {config.board.port}: {identity.unique_id}, firmware {identity.firmware}")
+        say(f"board at {config.board.port}: {identity.unique_id}, firmware {identity.firmware}")
         try:
             refuse_other_firmware(identity)
         except RigError as error:
@@ -46,10 +47,10 @@ def _look_at_board(found: Configured) -> list[str]:
         for name, section in config.sensors.items():
             try:
                 info = find_sensor(identity, name, section)
-                print(f"sensor {name}: {info.part}, identity register 0x{info.who_am_i:02x}")
+                say(f"sensor {name}: {info.part}, identity register 0x{info.who_am_i:02x}")
                 if found.phase.procedure.reads_corrected and name in config.to_calibrate:
                     stored = stored_calibration(board, name, section)
-                    print(f"sensor {name}: calibrated on {stored.calibration.written_utc:%Y-%m-%d}")
+                    say(f"sensor {name}: calibrated on {stored.calibration.written_utc:%Y-%m-%d}")
             except RigError as error:
                 missing.append(str(error))
     return missing
@@ -60,8 +61,8 @@ def _look_at_arm(found: Configured) -> list[str]:
     report = look(section.host)
     state = report.state
     angles = " ".join(f"{degrees(angle):.1f}" for angle in state.q_rad)
-    print(f"arm at {report.host}: serial number {report.serial_number}, PolyScope {report.polyscope}")
-    print(f"arm joints: {angles} °, speed slider {100 * state.target_speed_fraction:.0f} %")
+    say(f"arm at {report.host}: serial number {report.serial_number}, PolyScope {report.polyscope}")
+    say(f"arm joints: {angles} °, speed slider {100 * state.target_speed_fraction:.0f} %")
     plan = found.phase.plan(state.q_rad)
     problems = [*plan_problems(plan, section.payload_kg), *arm_problems(plan, report)]
     return [f"{problem.name}: {problem.what}. {problem.remedy}." for problem in problems]

@@ -8,6 +8,7 @@ from firmware_host import flashing
 from firmware_host.protocol import FIRMWARE_VERSION
 from rig.board.identify import changing, refusing
 from rig.station.confirm import agreed_or_refused
+from rig.station.plain_text import say
 
 
 def flash(probe_id: str | None, drive: Path | None, *, by_drive: bool, assume_yes: bool) -> int:
@@ -34,5 +35,5 @@ def flash(probe_id: str | None, drive: Path | None, *, by_drive: bool, assume_ye
     )
     with changing():
         put()
-    print(f"flashed: firmware {FIRMWARE_VERSION}; see it with `rig board info CONFIG`")
+    say(f"flashed: firmware {FIRMWARE_VERSION}; see it with `rig board info CONFIG`")
     return 0

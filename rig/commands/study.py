@@ -11,6 +11,7 @@ from rich.progress import track
 from rich.table import Table
 
 from rig.errors import Refused
+from rig.station.plain_text import say
 from rig.study.catalogue import STUDIES, find
 from rig.study.files import Format, missing_extra, write
 from rig.study.report import Finding, Settings
@@ -53,7 +54,7 @@ def run_study(
     paths = write(report, out, name, table_format)
     _print_findings(name, report.findings)
     for path in paths:
-        print(f"written: {path}", file=sys.stderr)
+        say(f"written: {path}", file=sys.stderr)
     return 0
 
 

@@ -5,8 +5,8 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
-from rig.config.quoting import first_control_character, quote, shorten
-from rig.config.yaml_text import DEPTH_MAX, Location, Unreadable, read_file, read_yaml
+from rig.config.yaml_text import DEPTH_MAX, Location, Unreadable, first_control_character, read_file, read_yaml
+from rig.errors.quoting import quote, shorten
 
 BASE = "base"
 FILES_MAX = 8  # one on another

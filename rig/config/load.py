@@ -15,10 +15,10 @@ from pydantic import BaseModel, ValidationError
 from rig.config.layers import BASE, Layered, Places, put_together, read_layers
 from rig.config.models import ProcedureSection, RigConfig
 from rig.config.procedure_sections import DEFAULT_PROCEDURE, STOCK_SECTIONS
-from rig.config.quoting import escape, quote
 from rig.config.world_models import WorldSection
 from rig.config.yaml_text import Location, Unreadable, dotted
 from rig.errors import Refused
+from rig.errors.quoting import printable, quote
 
 Model = TypeVar("Model", bound=BaseModel)
 Sections = Mapping[str, type[ProcedureSection]] | None  # None: the procedure is no matter of the reader's
@@ -48,8 +48,8 @@ class ConfigurationRefused(Refused):
     def __init__(self, source: str, problems: Sequence[str]) -> None:
         count = "1 error" if len(problems) == 1 else f"{len(problems)} errors"
         remedy = "Mend the file and run again; nothing has moved"
-        super().__init__("configuration", f"{escape(source)} has {count}", remedy)
-        self.problems = tuple(escape(problem) for problem in problems)
+        super().__init__("configuration", f"{printable(source)} has {count}", remedy)
+        self.problems = tuple(printable(problem) for problem in problems)
 
     def __str__(self) -> str:
         more = len(self.problems) - PROBLEMS_SHOWN

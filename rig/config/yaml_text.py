@@ -4,6 +4,7 @@ Nothing a text holds makes reading it slow, large or deep: a configuration is a 
 refused instead of read.
 """
 
+import unicodedata
 from collections.abc import Iterator, Mapping
 from dataclasses import dataclass
 from pathlib import Path
@@ -11,8 +12,8 @@ from typing import Any
 
 import yaml
 
-from rig.config.quoting import escape, first_control_character, quote, shorten
 from rig.config.regular_file import UnfitFile, read_regular_file
+from rig.errors.quoting import printable, quote, shorten
 
 Location = tuple[int | str, ...]
 
@@ -24,6 +25,7 @@ NUMBER_MAX_CHARACTERS = 40
 NUMBERS = ("tag:yaml.org,2002:int", "tag:yaml.org,2002:float")
 TEXT = "tag:yaml.org,2002:str"
 MERGE = "tag:yaml.org,2002:merge"
+UNSEEN = frozenset({"Cc", "Cf", "Cs", "Zl", "Zp"})  # control, format, half a pair, breaks of lines and paragraphs
 
 
 class Unreadable(Exception):
@@ -41,6 +43,11 @@ class Document:
     data: Any
     lines: Mapping[Location, int]
     problems: tuple[str, ...]
+
+
+def first_control_character(text: str) -> str | None:
+    """The first character that does something instead of being seen: escape, carriage return, text direction …"""
+    return next((character for character in text if unicodedata.category(character) in UNSEEN), None)
 
 
 def read_file(path: Path) -> str:
@@ -63,7 +70,7 @@ def read_yaml(text: str) -> Document:
         raise Unreadable(f"is longer than {SIZE_MAX_BYTES} characters, so it is no configuration")
     for number, line in enumerate(text.split("\n"), 1):
         if (found := first_control_character(line.rstrip("\r").replace("\t", " "))) is not None:
-            raise Unreadable(f"holds the control character {escape(found)}", number)
+            raise Unreadable(f"holds the control character {printable(found)}", number)
     try:
         loader = _Loader(text)
         node = loader.get_single_node()
@@ -149,7 +156,7 @@ def _survey(node: yaml.Node | None, location: Location, lines: dict[Location, in
 def _visible(node: yaml.ScalarNode, location: Location) -> Iterator[str]:
     """Quotes can hide a control character behind an escape."""
     if (found := first_control_character(node.value)) is not None:
-        yield f"{dotted(location)} (line {node.start_mark.line + 1}): holds the control character {escape(found)}"
+        yield f"{dotted(location)} (line {node.start_mark.line + 1}): holds the control character {printable(found)}"
 
 
 def dotted(location: Location) -> str:

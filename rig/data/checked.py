@@ -4,7 +4,7 @@ from typing import Annotated, Any, TypeVar
 
 from pydantic import Field, TypeAdapter, ValidationError
 
-QUOTED_CHARACTERS = 60
+from rig.errors.quoting import quote
 
 Finite = Annotated[float, Field(allow_inf_nan=False)]
 Positive = Annotated[float, Field(gt=0, allow_inf_nan=False)]
@@ -19,14 +19,8 @@ def checked(kind: type[Kind], document: Any, where: str) -> Kind:
     except ValidationError as error:
         first = error.errors()[0]
         place = ".".join((where, *map(str, first["loc"])))
-        raise ValueError(f"{place} is {quoted(first['input'])}: {first['msg']}") from None
+        raise ValueError(f"{place} is {quote(first['input'])}: {first['msg']}") from None
     return value
-
-
-def quoted(value: object) -> str:
-    """For a message: whatever it is, in few plain characters."""
-    text = ascii(value) if isinstance(value, str) else repr(value)
-    return text if len(text) <= QUOTED_CHARACTERS else text[: QUOTED_CHARACTERS - 1] + "…"
 
 
 def _adapter(kind: type[Any]) -> TypeAdapter[Any]:

@@ -12,7 +12,8 @@ from typing import Any
 from firmware_host.answers import BoardObservation, BoardSolution
 from rig.arm.motion import Sweep
 from rig.arm.state import JOINT_NAMES
-from rig.data.checked import Finite, checked, quoted
+from rig.data.checked import Finite, checked
+from rig.errors.quoting import quote
 
 LARGEST_INTEGER = 2**63 - 1
 
@@ -130,7 +131,7 @@ def _from_document(document: Any) -> Recorded:
         raise ValueError("it has no name and no details")
     name, detail = document.get("name"), document["detail"]
     if name not in _KINDS:
-        raise ValueError(f"there is no event {quoted(name)}")
+        raise ValueError(f"there is no event {quote(name)}")
     event = checked(_KINDS[name], _nested(name, detail), name)
     if isinstance(event, SweepStarted | SweepFinished):
         _check_sweep(event.sweep)
@@ -157,9 +158,9 @@ def _check_sweep(sweep: Sweep) -> None:
     low, high = sweep.revolution_rad
     numbers = (*sweep.axis_flange, *sweep.start_q_rad, *sweep.end_q_rad, low, high, sweep.speed_rad_s, sweep.duration_s)
     if not (0 <= sweep.joint < len(JOINT_NAMES) and low < high and all(map(math.isfinite, numbers))):
-        raise ValueError(f"there is no such sweep as {quoted(sweep)}")
+        raise ValueError(f"there is no such sweep as {quote(sweep)}")
 
 
 def _check_observation(observation: BoardObservation) -> None:
     if not all(0 <= n <= LARGEST_INTEGER for n in (observation.start_us, observation.end_us, observation.samples)):
-        raise ValueError(f"there is no such observation as {quoted(observation)}")
+        raise ValueError(f"there is no such observation as {quote(observation)}")

@@ -26,7 +26,8 @@ Role = Literal["calibrate", "reference"]
 
 
 class _Entry(BaseModel):
-    model_config = ConfigDict(frozen=True, extra="forbid", allow_inf_nan=False)
+    # What a later version has added is ignored when it is read.
+    model_config = ConfigDict(frozen=True, allow_inf_nan=False)
 
 
 class CheckEntry(_Entry):

@@ -23,7 +23,7 @@ from numpy.typing import NDArray
 from pydantic import Field
 
 from rig.arm.state import ARM_STATE_DTYPE, ArmState
-from rig.data.checked import Finite, Positive, checked, quoted
+from rig.data.checked import Finite, Positive, checked
 from rig.data.events import Event, Recorded, from_lines, to_line
 from rig.data.extract import reason
 from rig.data.layout import EVENTS_DTYPE, SCHEMA, Contents, append, empty, lay_out
@@ -31,6 +31,7 @@ from rig.data.provenance import Provenance
 from rig.data.settings import RunSettings, settings_from_json
 from rig.data.settings_of_run_1 import settings_of_configuration
 from rig.errors import Fault, Refused
+from rig.errors.quoting import quote
 
 FLUSH_PERIOD_S = 0.25  # half of what is promised, so that a slow flush still keeps the promise
 READ_TIMEOUT_S, READ_BYTES_PER_S = 20.0, 5e6  # for a file of no size, and more for each byte: a busy machine's
@@ -282,7 +283,7 @@ def _sensor(attributes: Mapping[str, Any]) -> RecordedSensor:
     # No element of a rotation exceeds one; the squares of much larger ones would overflow.
     small = np.abs(mounting).max() < 2
     if not (small and np.allclose(mounting @ mounting.T, np.eye(3), atol=MOUNTING_TOLERANCE)):
-        raise ValueError(f"the mounting of {sensor.part} is no rotation: {quoted(sensor.mounting)}")
+        raise ValueError(f"the mounting of {sensor.part} is no rotation: {quote(sensor.mounting)}")
     return sensor
 
 

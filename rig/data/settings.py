@@ -11,8 +11,9 @@ from typing import TYPE_CHECKING, Annotated
 
 from pydantic import Field
 
-from rig.data.checked import Finite, Positive, checked, quoted
+from rig.data.checked import Finite, Positive, checked
 from rig.errors import Refused
+from rig.errors.quoting import quote
 
 if TYPE_CHECKING:
     from rig.arm.motion import Plan
@@ -110,7 +111,7 @@ def settings_from_json(text: str) -> RunSettings:
     document = json.loads(text)
     schema = document.get("schema") if isinstance(document, dict) else None
     if schema != SCHEMA:
-        raise ValueError(f"the schema of its settings is {quoted(schema)}, not {SCHEMA!r}")
+        raise ValueError(f"the schema of its settings is {quote(schema)}, not {SCHEMA!r}")
     return checked(RunSettings, document, "settings")
 
 
@@ -141,7 +142,7 @@ def _overridden(settings: RunSettings, item: str) -> RunSettings:
     if path.strip() not in _settable():
         raise Refused(
             "unknown_setting",
-            f"a recording has no setting {quoted(path.strip())} that could be changed",
+            f"a recording has no setting {quote(path.strip())} that could be changed",
             f"Set one of {', '.join(_settable())}",
         )
     document = asdict(settings)

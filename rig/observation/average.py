@@ -25,6 +25,12 @@ class Average:
     duration_s: float
     temperature_c: float
 
+    @property
+    def mean_std_rad_s(self) -> Array:
+        """(3,) standard deviation of the mean."""
+        std: Array = np.sqrt(self.variance_rad2_s2)
+        return std
+
 
 @dataclass(frozen=True, slots=True)
 class Stream:

@@ -10,10 +10,10 @@ import numpy as np
 
 from rig.config.regular_file import UnfitFile, open_regular_file
 from rig.errors import Refused
+from rig.errors.quoting import quote, shorten
 from rig.estimation.arrays import Array
 
 LARGEST_NUMBER = 1e12  # either sign, in any SI unit: what is beyond is a mistake, and its square might overflow
-SHOWN = 80  # characters of a row or a list of columns that a message quotes
 
 
 def read_columns(path: Path, columns: Sequence[str], alternatives: Sequence[str], largest_mb: int) -> dict[str, Array]:
@@ -30,8 +30,7 @@ def read_columns(path: Path, columns: Sequence[str], alternatives: Sequence[str]
         if len(numbers) != len(names):
             raise Refused(
                 "not_a_number",
-                f"{path}, line {line}: {_shortened(','.join(row))!r} is not {len(names)} numbers below "
-                f"{LARGEST_NUMBER:g}",
+                f"{path}, line {line}: {quote(','.join(row))} is not {len(names)} numbers below {LARGEST_NUMBER:g}",
                 "Write plain decimal numbers with a point, no NaN, one for each column",
             )
         values.extend(numbers)
@@ -72,7 +71,7 @@ def _check_columns(path: Path, names: Sequence[str], columns: Sequence[str], alt
         if name not in known and meant not in (name, *names):
             raise Refused(
                 "wrong_unit",
-                f"{path} has a column {_shortened(name)} where {meant} belongs",
+                f"{path} has a column {shorten(name)} where {meant} belongs",
                 f"Convert it to the unit that the name {meant} carries",
             )
     problems = [f"lacks {name}" for name in columns if name not in names]
@@ -82,13 +81,7 @@ def _check_columns(path: Path, names: Sequence[str], columns: Sequence[str], alt
         problems.append(f"has {' and '.join(given) or 'none'} of {', '.join(alternatives)}")
     unknown = ", ".join(name for name in names if name not in known)
     if unknown:
-        problems.append(f"has the unknown {_shortened(unknown)}")
+        problems.append(f"has the unknown {shorten(unknown)}")
     if problems:
         wanted = ", ".join(columns) + (f" and one of {', '.join(alternatives)}" if alternatives else "")
         raise Refused("wrong_columns", f"{path} {', '.join(problems)}", f"Its first row must name {wanted}")
-
-
-def _shortened(text: str) -> str:
-    """As much of a text as a message may quote, without what a terminal would obey."""
-    plain = "".join(character if character.isprintable() else "?" for character in text[: SHOWN + 1])
-    return plain if len(plain) <= SHOWN else f"{plain[:SHOWN]}…"

@@ -1,8 +1,8 @@
 """The typed outcome of a run as the document of `result.json`."""
 
 from rig.analysis.outcome import Origin, Outcome
-from rig.analysis.verdict import Check
 from rig.data.result_file import SCHEMA, CheckEntry, ProvenanceEntry, ResultDocument
+from rig.report.entry import entry
 from rig.report.sensor_entry import sensor_entry
 from rig.report.verification_entry import verification_entry
 
@@ -12,7 +12,7 @@ def document_of(outcome: Outcome) -> ResultDocument:
     return ResultDocument(
         schema=SCHEMA,
         verdict=outcome.verdict,
-        checks=tuple(map(_check, outcome.checks)),
+        checks=tuple(entry(CheckEntry, check) for check in outcome.checks),
         provenance=_provenance(outcome.provenance),
         sensors={
             name: sensor_entry(
@@ -24,10 +24,6 @@ def document_of(outcome: Outcome) -> ResultDocument:
         },
         verification={name: verification_entry(found) for name, found in outcome.verifications.items()},
     )
-
-
-def _check(check: Check) -> CheckEntry:
-    return CheckEntry(name=check.name, value=check.value, limit=check.limit, unit=check.unit, passed=check.passed)
 
 
 def _provenance(origin: Origin) -> ProvenanceEntry:

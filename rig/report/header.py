@@ -6,7 +6,7 @@ from pathlib import Path
 
 from rig.analysis.outcome import Outcome
 from rig.data.result_file import ResultDocument
-from rig.station.plain_text import printable
+from rig.errors.quoting import printable
 
 
 def write_header(outcome: Outcome, document: ResultDocument, folder: Path) -> tuple[str, ...]:

@@ -4,7 +4,7 @@ import sys
 from collections.abc import Sequence
 
 from rig.errors import Refused
-from rig.station.plain_text import printable_lines
+from rig.errors.quoting import printable_lines
 
 
 def ask_operator(announcement: Sequence[str], to_do: str = "start") -> bool:

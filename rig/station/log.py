@@ -6,6 +6,7 @@ from datetime import datetime
 from pathlib import Path
 from typing import TextIO
 
+from rig.errors.quoting import printable_lines
 from rig.station.events import RunEvent
 from rig.station.words import line, reason
 
@@ -22,7 +23,7 @@ class Log:
         if text is not None:
             now = datetime.now().isoformat(sep=" ", timespec="milliseconds").replace(".", ",")
             with suppress(OSError):
-                self._file.write(f"{now} INFO {text}\n")
+                self._file.write(f"{now} INFO {printable_lines(text)}\n")
                 self._file.flush()
 
 

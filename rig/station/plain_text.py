@@ -1,19 +1,16 @@
-"""Texts from outside (serial numbers, names, paths) as they may be shown: nothing in them commands the terminal."""
+"""Texts with something from outside in them (serial numbers, names, paths) on stdout, stderr and in tables."""
 
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, TextIO
+
+from rig.errors.quoting import printable
 
 if TYPE_CHECKING:
     from rich.text import Text
 
 
-def printable(text: str) -> str:
-    """The text with every control character, line ends too, written as an escape: `\\x1b`, `\\n`."""
-    return "".join(c if c.isprintable() else c.encode("unicode_escape").decode("ascii") for c in text)
-
-
-def printable_lines(text: str) -> str:
-    """The same for a message of several lines, which keeps them."""
-    return "\n".join(map(printable, text.split("\n")))
+def say(text: str, file: TextIO | None = None) -> None:
+    """One printable line, on stdout unless told otherwise."""
+    print(printable(text), file=file)
 
 
 def plain(text: str, style: str = "") -> "Text":

@@ -11,8 +11,9 @@ from rich.live import Live
 from rich.progress_bar import ProgressBar
 from rich.table import Table
 
+from rig.errors.quoting import printable_lines
 from rig.station.events import Progress, RunEvent, SamplesTaken, SensorSamples
-from rig.station.plain_text import plain, printable_lines
+from rig.station.plain_text import plain
 from rig.station.station import Listener
 from rig.station.words import line
 

@@ -37,11 +37,20 @@ def test_results_satisfy_the_committed_schema(name: str) -> None:
         jsonschema.validate(document, schema)
 
 
-def test_a_key_nobody_knows_is_refused_by_its_place(tmp_path: Path) -> None:
+def test_what_a_later_version_has_added_is_no_hindrance(tmp_path: Path) -> None:
     document = json.loads(VERIFIED.text())
-    document["sensors"]["gyro"]["observations"][2]["spead_rad_s"] = 1.0
+    for place in (document, document["checks"][0], document["sensors"]["gyro"], document["verification"]["gyro"]):
+        place["humidity"] = 0.4
     (tmp_path / "result.json").write_text(json.dumps(document), encoding="utf-8")
-    with pytest.raises(Refused, match=r"not_a_result: .*sensors\.gyro\.observations\.2\.spead_rad_s"):
+    jsonschema.validate(document, json.loads((DOCS / "result.schema.json").read_text(encoding="utf-8")))
+    assert read_result(tmp_path) == VERIFIED
+
+
+def test_what_is_missing_or_wrong_is_refused_by_its_place(tmp_path: Path) -> None:
+    document = json.loads(VERIFIED.text())
+    document["sensors"]["gyro"]["observations"][2]["speed_rad_s"] = "fast"
+    (tmp_path / "result.json").write_text(json.dumps(document), encoding="utf-8")
+    with pytest.raises(Refused, match=r"not_a_result: .*sensors\.gyro\.observations\.2\.speed_rad_s"):
         read_result(tmp_path)
 
 

@@ -7,8 +7,10 @@ import pytest
 
 from rig.analysis.outcome import Outcome, calibrated
 from rig.analysis.verdict import Check
+from rig.data.result_file import CheckEntry
 from rig.data.run_file import read_run
 from rig.report.document import document_of
+from rig.report.entry import entry
 from support.paths import FIXTURES
 
 
@@ -43,3 +45,10 @@ def test_a_reference_has_no_solution_of_the_board() -> None:
     sensors = json.loads(document_of(found).text())["sensors"]
     assert (sensors["gyro"]["role"], "board" in sensors["gyro"]) == ("calibrate", True)
     assert (sensors["reference"]["role"], "board" in sensors["reference"]) == ("reference", False)
+
+
+def test_a_field_the_document_does_not_have_is_not_written(outcome: Outcome) -> None:
+    with pytest.raises(TypeError, match="CheckEntry has no limits"):
+        entry(CheckEntry, outcome.checks[0], limits=1.0)
+    with pytest.raises(ValueError, match="passed"):
+        entry(CheckEntry, object(), name="gyro.scale", value=None, limit=None, unit="1")

@@ -1,15 +1,22 @@
 """Texts from outside are shown as they are, and command neither rich nor the terminal."""
 
+import ast
 import io
+import sys
+from collections.abc import Iterator
+from pathlib import Path
 
 import pytest
 from rich.console import Console
 from rich.live import Live
 
 from rig.cli import main
+from rig.errors.quoting import printable, printable_lines
 from rig.station.events import Message
-from rig.station.plain_text import plain, printable, printable_lines
+from rig.station.log import log
+from rig.station.plain_text import plain, say
 from rig.station.view import LiveView, PlainView
+from support.paths import ROOT
 
 HOSTILE = "[/nope] [red]x[/] :skull: \x1b]0;title\x07 \x9b31m"
 SHOWN = "[/nope] [red]x[/] :skull: \\x1b]0;title\\x07 \\x9b31m"
@@ -34,6 +41,35 @@ def test_the_operators_view_shows_it_as_it_is(capsys: pytest.CaptureFixture[str]
     assert SHOWN in console.export_text()
     PlainView().event(Message(HOSTILE))
     assert capsys.readouterr().err == SHOWN + "\n"
+
+
+def test_a_line_for_a_pipe_shows_it_as_it_is(capsys: pytest.CaptureFixture[str]) -> None:
+    say(f"{HOSTILE}\nready")
+    say(HOSTILE, sys.stderr)
+    assert capsys.readouterr() == (SHOWN + "\\nready\n", SHOWN + "\n")
+
+
+def test_the_log_shows_it_as_it_is(tmp_path: Path) -> None:
+    with log(tmp_path / "log.txt") as logged:
+        logged.event(Message(HOSTILE))
+    assert (tmp_path / "log.txt").read_text(encoding="utf-8").endswith(f" INFO {SHOWN}\n")
+
+
+def printed(file: Path) -> Iterator[ast.expr]:
+    """What a module gives to `print`."""
+    for node in ast.walk(ast.parse(file.read_text(encoding="utf-8"))):
+        if isinstance(node, ast.Call) and ast.unparse(node.func) == "print":
+            yield from node.args
+
+
+@pytest.mark.parametrize("room", ["commands", "report", "runner", "board"])
+def test_what_is_printed_as_it_stands_is_written_in_the_source_or_json(room: str) -> None:
+    """All else may hold something from outside, and goes through `say` or `plain`."""
+    for file in sorted((ROOT / "rig" / room).rglob("*.py")):
+        for text in printed(file):
+            call = ast.unparse(text.func) if isinstance(text, ast.Call) else ""
+            safe = call == "json.dumps" or call.endswith("text")
+            assert isinstance(text, ast.Constant) or safe, f"{file.name}:{text.lineno} prints {ast.unparse(text)}"
 
 
 def test_an_error_names_a_hostile_path_without_obeying_it(capsys: pytest.CaptureFixture[str]) -> None:

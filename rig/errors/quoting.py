@@ -1,0 +1,28 @@
+"""Shows what somebody else wrote: serial numbers, names, paths, values. Nothing in it that a terminal would obey."""
+
+from typing import Any
+
+SHOWN_CHARACTERS = 60
+
+
+def printable(text: str) -> str:
+    """The text with every character that is not seen, line ends too, written as Python does: `\\x1b`, `\\n`."""
+    if text.isprintable():
+        return text
+    return "".join(c if c.isprintable() else c.encode("unicode_escape").decode("ascii") for c in text)
+
+
+def printable_lines(text: str) -> str:
+    """The same for a message of several lines, which keeps them."""
+    return "\n".join(map(printable, text.split("\n")))
+
+
+def shorten(text: str) -> str:
+    """The beginning of what is long, and how long it is; printable."""
+    shown = printable(text[:SHOWN_CHARACTERS])
+    return shown if len(text) <= SHOWN_CHARACTERS else f"{shown}… ({len(text)} characters)"
+
+
+def quote(value: Any) -> str:
+    """A value as Python writes it, shortened."""
+    return shorten(repr(value))
