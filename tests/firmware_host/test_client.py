@@ -476,14 +476,14 @@ def streaming(wire: tuple[BoardOnAWire, str]) -> Board:
     return board
 
 
-def test_a_board_that_falls_silent_while_streaming_is_noticed_within_a_second_and_a_bit(
+def test_a_board_that_falls_silent_while_streaming_is_noticed_within_two_seconds_and_a_bit(
     wire: tuple[BoardOnAWire, str],
 ) -> None:
     with closing(streaming(wire)) as board:
         board.check()
         wire[0].hold.set()
         error, after_s = fault_of(board)
-    assert error.name == "board_link_lost" and 0.5 < after_s < 2.0
+    assert error.name == "board_link_lost" and 1.0 < after_s < 4.0
 
 
 @ON_ONE_WIRE
@@ -491,7 +491,7 @@ def test_noise_instead_of_frames_while_streaming_is_a_lost_link(wire: tuple[Boar
     with closing(streaming(wire)) as board:
         wire[0].on_send = lambda data: bytes(byte >> 1 | 0x80 for byte in data)
         error, after_s = fault_of(board)
-    assert error.name == "board_link_lost" and after_s < 2.0
+    assert error.name == "board_link_lost" and after_s < 4.0
 
 
 def test_a_closed_socket_is_noticed_at_once() -> None:

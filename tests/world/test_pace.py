@@ -12,7 +12,7 @@ import pytest
 
 from rig.arm.driver import Arm
 from rig.arm.motion import Transfer, trapezoid_duration
-from rig.world.clock import DIALOGUE_S, TICK_S, Clock
+from rig.world.clock import DIALOGUE_S, DIALOGUE_TICK_S, TICK_S, Clock
 from rig.world.wire import LATEST_S, LEAST_PATIENCE_S, LEAST_S, PATIENCE_S, Wire
 from support.arm_client import wait_for
 from support.arm_relay import relay
@@ -110,7 +110,7 @@ def test_a_client_that_reads_every_byte_may_be_some_behind() -> None:
     assert client.wire.wait_s(most_s=0.0) > 0.0
 
 
-def test_a_second_lasts_a_second_while_a_client_asks() -> None:
+def test_the_clock_hardly_runs_while_a_client_asks() -> None:
     wall = Wall()
     clock = Clock(10.0, wall)
 
@@ -124,7 +124,7 @@ def test_a_second_lasts_a_second_while_a_client_asks() -> None:
 
     assert ticks_in(DIALOGUE_S) == pytest.approx(10 * DIALOGUE_S / TICK_S, rel=0.05)
     clock.dialogue()
-    assert ticks_in(DIALOGUE_S * 0.99) == pytest.approx(DIALOGUE_S / TICK_S, rel=0.05)
+    assert ticks_in(DIALOGUE_S * 0.99) == pytest.approx(DIALOGUE_S / DIALOGUE_TICK_S, abs=1)
 
 
 @linux
