@@ -73,7 +73,7 @@ def test_stored_calibrations_are_verified_alone() -> None:
     outcome = verified_alone(repeated)
     assert outcome.passed and list(outcome.verifications) == ["gyro"]
     assert not outcome.results and not outcome.recordings
-    assert outcome.provenance.verified_utc == (repeated[0].provenance["started_utc"],)
+    assert outcome.provenance.verified_utc == (repeated[0].provenance.started_utc,)
 
 
 def test_a_verification_that_was_not_recorded_has_not_passed() -> None:
