@@ -24,8 +24,8 @@ class Solved(Protocol):
     def bias_rad_s(self) -> Array | Sequence[float]: ...
 
 
-def store_calibrations(config: RigConfig, results: Mapping[str, Solved]) -> Iterator[str]:
-    """Store the solution of every sensor to calibrate, by sensor name; yields a line about each.
+def store_calibrations(config: RigConfig, results: Mapping[str, Solved]) -> Iterator[tuple[str, StoredCalibration]]:
+    """Store the solution of every sensor to calibrate, by sensor name; yields each with its record.
 
     Raises BoardError as the board refuses, `not_stored` when it reads back otherwise; Refused as `find_sensor`.
     """
@@ -34,8 +34,7 @@ def store_calibrations(config: RigConfig, results: Mapping[str, Solved]) -> Iter
             section = config.sensors[name]
             index = find_sensor(board.identity, name, section).index
             board.configure(index, section.rate_hz, section.range_deg_s)  # the record says for which range it holds
-            stored = store(board, index, calibration_of(results[name]))
-            yield f"stored on the board: {name}, {section.part} {section.serial_number}, record {stored.sequence}"
+            yield name, store(board, index, calibration_of(results[name]))
 
 
 def calibration_of(solved: Solved) -> Calibration:

@@ -13,7 +13,7 @@ from rig.report.document import document_of
 from rig.report.table import print_outcome
 from rig.runner.phases import Run
 from rig.station.confirm import ask_operator
-from rig.station.events import Message
+from rig.station.events import RunFolderWritten
 from rig.station.log import log
 from rig.station.station import Stations, always_yes
 from rig.station.view import view
@@ -63,9 +63,9 @@ def _carry_out(folder: Path, found: Configured, *, assume_yes: bool, as_json: bo
         station = Stations((logged, seen), answer)
         this = Run(folder, found.loaded, found.script, station)
         if found.loaded.simulated:
-            with this.reported(""):
+            with this.reported():
                 laboratory.enter_context(simulated_laboratory(folder / CONFIG))
         outcome = this.carry_out(found.phase)
-        station.event(Message(f"written: {folder}"))
+        station.event(RunFolderWritten(folder))
     print_outcome(document_of(outcome), as_json=as_json)
     return 0 if outcome.passed else 1

@@ -11,6 +11,7 @@ from rig.analysis.outcome import Outcome
 from rig.analysis.verification import Verification
 from rig.data.result_file import ResultDocument
 from rig.estimation.arrays import Array
+from rig.station.events import NotPlotted, Plotted, RunEvent
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
@@ -20,27 +21,27 @@ COLUMNS = 600  # about as many as a panel has pixels across
 MARGINS = {"left": 0.06, "right": 0.985, "bottom": 0.065, "top": 0.915, "wspace": 0.16, "hspace": 0.14}
 
 
-def write_figures(outcome: Outcome, document: ResultDocument, folder: Path) -> tuple[str, ...]:
+def write_figures(outcome: Outcome, document: ResultDocument, folder: Path) -> tuple[RunEvent, ...]:
     """Those of all verifications of a run, if it has any."""
     return (draw_verifications(outcome.verifications.values(), folder),) if outcome.verifications else ()
 
 
-def draw_verifications(verifications: Iterable[Verification], folder: Path) -> str:
+def draw_verifications(verifications: Iterable[Verification], folder: Path) -> Plotted | NotPlotted:
     """Draw `verification_<sensor>_before` (where there is one) and `…_after`, each as PNG and SVG, into `folder`.
 
-    Returns what to tell the operator: the files, or how to get them where matplotlib, which an extra brings, is absent.
+    Draws nothing where matplotlib, which an extra brings, is absent.
     """
     try:
         import matplotlib  # noqa: F401
     except ImportError:
-        return "no plots: they need matplotlib, install the extra with pip install 'calibration-rig[study]'"
-    written = [
+        return NotPlotted()
+    written = (
         _write(verification, when, comparison, folder)
         for verification in verifications
         for when, comparison in (("before", verification.before), ("after", verification.after))
         if comparison is not None
-    ]
-    return f"plotted: {', '.join(written)} (.png, .svg)"
+    )
+    return Plotted(tuple(written))
 
 
 def _write(verification: Verification, when: str, comparison: Comparison, folder: Path) -> str:

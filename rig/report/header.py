@@ -7,12 +7,15 @@ from pathlib import Path
 from rig.analysis.outcome import Outcome
 from rig.data.result_file import ResultDocument
 from rig.errors.quoting import printable
+from rig.station.events import DocumentWritten, RunEvent
 
 
-def write_header(outcome: Outcome, document: ResultDocument, folder: Path) -> tuple[str, ...]:
+def write_header(outcome: Outcome, document: ResultDocument, folder: Path) -> tuple[RunEvent, ...]:
     """`calibration.h`, unless the calibration failed its limits: nobody should compile it in then."""
     if outcome.passed and outcome.results:
-        (folder / "calibration.h").write_text(calibration_header(document), encoding="utf-8")
+        path = folder / "calibration.h"
+        path.write_text(calibration_header(document), encoding="utf-8")
+        return (DocumentWritten(path),)
     return ()
 
 

@@ -6,8 +6,9 @@ from pathlib import Path
 from typing import Protocol
 
 from rig.analysis.outcome import Outcome
-from rig.data.result_file import ResultDocument, write_result
+from rig.data.result_file import NAME, ResultDocument, write_result
 from rig.report.document import document_of
+from rig.station.events import DocumentWritten, RunEvent
 
 # `module:function`, imported when a run has ended.
 WRITERS: Sequence[str] = (
@@ -17,20 +18,21 @@ WRITERS: Sequence[str] = (
 
 
 class Writer(Protocol):
-    """Writes files of its own into the run folder; returns what to tell the operator.
+    """Writes files of its own into the run folder; returns what to tell of it.
 
     `outcome` has everything the analysis found, curves too; `document` is what `result.json` will say of it.
     """
 
-    def __call__(self, outcome: Outcome, document: ResultDocument, folder: Path, /) -> Iterable[str]: ...
+    def __call__(self, outcome: Outcome, document: ResultDocument, folder: Path, /) -> Iterable[RunEvent]: ...
 
 
-def write_outcome(folder: Path, outcome: Outcome) -> Iterator[str]:
-    """All documents, then `result.json`, which ends the run; yields what to tell the operator."""
+def write_outcome(folder: Path, outcome: Outcome) -> Iterator[RunEvent]:
+    """All documents, then `result.json`, which ends the run; yields what to tell of them."""
     document = document_of(outcome)
     for name in WRITERS:
         yield from _writer(name)(outcome, document, folder)
     write_result(document, folder)
+    yield DocumentWritten(folder / NAME)
 
 
 def _writer(name: str) -> Writer:

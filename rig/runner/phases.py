@@ -26,10 +26,20 @@ from rig.plans.script_file import ScriptFile, installed_script
 from rig.report.writers import write_outcome
 from rig.runner.connect import Connector
 from rig.runner.resumption import Resumption, resumption
-from rig.station.events import Checked, Crashed, Failed, Interrupted, Message, PhaseStarted, RunEvent, VerdictReached
+from rig.station.events import (
+    Advice,
+    CalibrationStored,
+    Checked,
+    Crashed,
+    Failed,
+    Interrupted,
+    ObservationMade,
+    PhaseSkipped,
+    PhaseStarted,
+    RunEvent,
+    VerdictReached,
+)
 from rig.station.station import Station
-
-NOT_VERIFIED = "not verified: the calibration failed its limits, so the board keeps what it had"
 
 
 @dataclass(frozen=True, slots=True)
@@ -51,7 +61,7 @@ class Run:
                 self._store(outcome)
                 runs = self._recorded(phase, Resumption(), moved=True)
             else:
-                self.station.event(Message(NOT_VERIFIED))
+                self.station.event(PhaseSkipped(phase.procedure.name))
             outcome = self._judged(phase, runs, outcome)
         return self._written(outcome)
 
@@ -97,32 +107,37 @@ class Run:
             outcome = phase.procedure.analyse(runs, before, DEFAULT_ESTIMATOR)
             if runs and phase.procedure.calibrates_along:
                 check_observed(runs[-1], self.loaded.config.to_calibrate)
-            return outcome
+        if before is None:
+            for name, result in outcome.results.items():
+                for observation in result.observations:
+                    self.station.event(ObservationMade(name, observation))
+        return outcome
 
     def _store(self, outcome: Outcome) -> None:
         with self.reported(self._mended, moved=True):
-            for text in store_calibrations(self.loaded.config, outcome.results):
-                self.station.event(Message(text))
+            for name, stored in store_calibrations(self.loaded.config, outcome.results):
+                sensor = self.loaded.config.sensors[name]
+                self.station.event(CalibrationStored(name, sensor.part, sensor.serial_number, stored.sequence))
 
     def _written(self, outcome: Outcome) -> Outcome:
         with self.reported(self._repeating, moved=True):
-            for text in write_outcome(self.folder, outcome):
-                self.station.event(Message(text))
+            for event in write_outcome(self.folder, outcome):
+                self.station.event(event)
         for check in outcome.checks:
             self.station.event(Checked(check))
         self.station.event(VerdictReached(outcome.passed))
         return outcome
 
     @property
-    def _mended(self) -> str:
-        return f"the data are kept in {self.folder}; when it is mended, go on with: {resuming(self.folder)}"
+    def _mended(self) -> Advice:
+        return Advice(self.folder, repeats=False)
 
     @property
-    def _repeating(self) -> str:
-        return f"the data are kept in {self.folder}; to repeat refused sweeps: {resuming(self.folder)}"
+    def _repeating(self) -> Advice:
+        return Advice(self.folder, repeats=True)
 
     @contextmanager
-    def reported(self, advice: str, *, moved: bool = False) -> Iterator[None]:
+    def reported(self, advice: Advice | None = None, *, moved: bool = False) -> Iterator[None]:
         """What ends a run early goes into its log too; a fault is followed by `advice`, an interruption by its own.
 
         A refusal says that nothing has moved: after a phase of the run (`moved`) it is a fault.
@@ -157,10 +172,10 @@ class Run:
             self._ended(Crashed(traceback.format_exc()))
             raise
 
-    def _ended(self, event: RunEvent, advice: str = "") -> None:
+    def _ended(self, event: RunEvent, advice: Advice | None = None) -> None:
         self.station.event(event)
-        if advice and self.folder.exists():
-            self.station.event(Message(advice))
+        if advice is not None and self.folder.exists():
+            self.station.event(advice)
 
 
 def _with_notes(what: str, error: BaseException) -> str:

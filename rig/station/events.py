@@ -4,6 +4,7 @@ All events of a run come in order, from the thread that runs the procedure.
 """
 
 from dataclasses import dataclass
+from pathlib import Path
 
 from firmware_host.client import BoardIdentity
 from rig.analysis.verdict import Check
@@ -11,15 +12,9 @@ from rig.arm.motion import Plan, Step
 from rig.arm.state import ArmReport
 from rig.data.events import Event
 from rig.errors import RigError
+from rig.observation.observe import Observation
 
 Vector = tuple[float, float, float]
-
-
-@dataclass(frozen=True, slots=True)
-class Message:
-    """Something worth a line for which there is no event of its own."""
-
-    text: str
 
 
 @dataclass(frozen=True, slots=True)
@@ -141,6 +136,50 @@ class PhaseRecorded:
 
 
 @dataclass(frozen=True, slots=True)
+class ObservationMade:
+    """The host has averaged a revolution of `sensor`: once a phase is judged, each that its calibration rests on."""
+
+    sensor: str
+    observation: Observation
+
+
+@dataclass(frozen=True, slots=True)
+class CalibrationStored:
+    """The board keeps the sensor's new calibration, as its record number `record`."""
+
+    sensor: str
+    part: str
+    serial_number: str
+    record: int
+
+
+@dataclass(frozen=True, slots=True)
+class PhaseSkipped:
+    """What was to follow, the verification, does not: the calibration failed its limits and is not stored."""
+
+    procedure: str
+
+
+@dataclass(frozen=True, slots=True)
+class DocumentWritten:
+    """A document of the outcome lies at `path`."""
+
+    path: Path
+
+
+@dataclass(frozen=True, slots=True)
+class Plotted:
+    """Plots lie in the run folder, each as PNG and SVG under these names without their endings."""
+
+    names: tuple[str, ...]
+
+
+@dataclass(frozen=True, slots=True)
+class NotPlotted:
+    """There are no plots: what draws them is not installed."""
+
+
+@dataclass(frozen=True, slots=True)
 class Checked:
     """One limit beside what was measured."""
 
@@ -152,6 +191,29 @@ class VerdictReached:
     """The run's verdict; its checks came before it."""
 
     passed: bool
+
+
+@dataclass(frozen=True, slots=True)
+class ListenerDropped:
+    """A listener raised `error` when it was told something; it hears nothing more."""
+
+    listener: str
+    error: str
+
+
+@dataclass(frozen=True, slots=True)
+class RunFolderWritten:
+    """The run is over, and all of it lies in `folder`."""
+
+    folder: Path
+
+
+@dataclass(frozen=True, slots=True)
+class Advice:
+    """After a failure: the data are kept in `folder`, from which the run goes on, or `repeats` its refused sweeps."""
+
+    folder: Path
+    repeats: bool
 
 
 @dataclass(frozen=True, slots=True)
@@ -178,7 +240,6 @@ class Crashed:
 # What the recording keeps is told as well: sweeps, rests, and what the board observed and solved.
 RunEvent = (
     Event
-    | Message
     | BoardConnected
     | ArmConnected
     | RunResumed
@@ -192,8 +253,17 @@ RunEvent = (
     | SamplesTaken
     | StepFinished
     | PhaseRecorded
+    | ObservationMade
+    | CalibrationStored
+    | PhaseSkipped
+    | DocumentWritten
+    | Plotted
+    | NotPlotted
     | Checked
     | VerdictReached
+    | ListenerDropped
+    | RunFolderWritten
+    | Advice
     | Failed
     | Interrupted
     | Crashed

@@ -4,11 +4,11 @@ from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from typing import Protocol
 
-from rig.station.events import Answered, Prompt, RunEvent
+from rig.station.events import Answered, ListenerDropped, Prompt, RunEvent
 
 
 class Listener(Protocol):
-    """Is told everything. It must neither block nor raise: a run does not depend on who looks on."""
+    """Is told everything, and must not block. One that raises is told nothing more: a run does not depend on it."""
 
     def event(self, event: RunEvent) -> None: ...
 
@@ -21,7 +21,7 @@ class Station(Protocol):
     def ask(self, prompt: Prompt) -> bool: ...
 
 
-@dataclass(frozen=True, slots=True)
+@dataclass(slots=True)
 class Stations:
     """Several listeners, and one who answers."""
 
@@ -29,9 +29,17 @@ class Stations:
     answer: Callable[[Sequence[str], str], bool]
 
     def event(self, event: RunEvent) -> None:
-        """Tell everyone, in order."""
+        """Tell everyone, in order. Who raises is dropped, and the others are told of that."""
+        failed: list[tuple[Listener, Exception]] = []
         for listener in self.listeners:
-            listener.event(event)
+            try:
+                listener.event(event)
+            except Exception as error:
+                failed.append((listener, error))
+        for gone, _ in failed:
+            self.listeners = [listener for listener in self.listeners if listener is not gone]
+        for gone, why in failed:
+            self.event(ListenerDropped(type(gone).__name__, f"{type(why).__name__}: {why}"))
 
     def ask(self, prompt: Prompt) -> bool:
         """Whether the operator agrees; everyone hears the question and the answer."""

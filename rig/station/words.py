@@ -2,16 +2,23 @@
 
 from traceback import format_exception
 
+from rig.data.run_folder import resuming
 from rig.station.events import (
+    Advice,
     ArmConnected,
     BoardConnected,
+    CalibrationStored,
     Crashed,
     Failed,
     Interrupted,
-    Message,
+    ListenerDropped,
+    NotPlotted,
     PhaseRecorded,
+    PhaseSkipped,
+    Plotted,
     PreflightPassed,
     RunEvent,
+    RunFolderWritten,
     RunResumed,
     SamplingStarted,
     StepFinished,
@@ -22,8 +29,6 @@ def line(event: RunEvent) -> str | None:
     """What to say of it in one line; None for what only an instrument shows, or what others say."""
     text: str | None
     match event:
-        case Message(said):
-            text = said
         case RunResumed(done, planned):
             text = f"resuming: {done} of {planned} sweeps are recorded, sound and known to the board"
         case BoardConnected(port, identity):
@@ -42,6 +47,30 @@ def line(event: RunEvent) -> str | None:
         case PhaseRecorded(sensors, missed_states):
             samples, lost = (sum(counts) for counts in zip(*((s.samples, s.lost) for s in sensors), strict=True))
             text = f"recorded: {samples} samples, {lost} lost; {missed_states} arm states missed"
+        case _:
+            text = _of_the_outcome(event)
+    return text
+
+
+def _of_the_outcome(event: RunEvent) -> str | None:
+    """The same of what is told when nothing moves any more."""
+    text: str | None
+    match event:
+        case CalibrationStored(sensor, part, serial_number, record):
+            text = f"stored on the board: {sensor}, {part} {serial_number}, record {record}"
+        case PhaseSkipped():
+            text = "not verified: the calibration failed its limits, so the board keeps what it had"
+        case Plotted(names):
+            text = f"plotted: {', '.join(names)} (.png, .svg)"
+        case NotPlotted():
+            text = "no plots: they need matplotlib, install the extra with pip install 'calibration-rig[study]'"
+        case RunFolderWritten(folder):
+            text = f"written: {folder}"
+        case Advice(folder, repeats):
+            to_do = "to repeat refused sweeps" if repeats else "when it is mended, go on with"
+            text = f"the data are kept in {folder}; {to_do}: {resuming(folder)}"
+        case ListenerDropped(listener, error):
+            text = f"{listener} hears nothing more of this run: it failed ({error})"
         case _:
             text = None
     return text

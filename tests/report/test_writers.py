@@ -12,6 +12,7 @@ from rig.analysis.outcome import Outcome, calibrated
 from rig.data.result_file import ResultDocument, read_result
 from rig.data.run_file import read_run
 from rig.report import writers
+from rig.station.events import DocumentWritten, RunEvent
 from support.paths import FIXTURES, ROOT
 
 
@@ -21,12 +22,13 @@ def outcome() -> Outcome:
 
 
 def test_the_folder_holds_the_header_and_the_result(outcome: Outcome, tmp_path: Path) -> None:
-    assert list(writers.write_outcome(tmp_path, outcome)) == []
+    written = [DocumentWritten(tmp_path / name) for name in ("calibration.h", "result.json")]
+    assert list(writers.write_outcome(tmp_path, outcome)) == written
     assert sorted(file.name for file in tmp_path.iterdir()) == ["calibration.h", "result.json"]
     assert read_result(tmp_path).verdict == outcome.verdict == "pass"
 
 
-def on_a_full_disk(outcome: Outcome, document: ResultDocument, folder: Path) -> tuple[str, ...]:
+def on_a_full_disk(outcome: Outcome, document: ResultDocument, folder: Path) -> tuple[RunEvent, ...]:
     raise OSError(28, "No space left on device")
 
 
@@ -40,9 +42,12 @@ def test_the_result_comes_last_so_that_a_run_whose_documents_fail_is_not_ended(
 
 
 TOY = """
+from rig.station.events import DocumentWritten
+
 def write_toy(outcome, document, folder):
-    (folder / "toy.txt").write_text(f"{document.verdict}, {len(outcome.results)} sensors", encoding="utf-8")
-    return ("toy written",)
+    path = folder / "toy.txt"
+    path.write_text(f"{document.verdict}, {len(outcome.results)} sensors", encoding="utf-8")
+    return (DocumentWritten(path),)
 """
 RUN = """
 import sys
@@ -50,7 +55,7 @@ from pathlib import Path
 from rig.analysis.outcome import calibrated
 from rig.data.run_file import read_run
 from rig.report.writers import write_outcome
-print(*write_outcome(Path(sys.argv[2]), calibrated([read_run(Path(sys.argv[1]))])))
+print(*(event.path.name for event in write_outcome(Path(sys.argv[2]), calibrated([read_run(Path(sys.argv[1]))]))))
 """
 
 
@@ -73,6 +78,6 @@ def test_a_writer_of_ones_own_is_a_file_and_a_line(tmp_path: Path) -> None:
         timeout=50,
         check=False,
     )
-    assert done.stdout == "toy written\n", done
+    assert done.stdout == "calibration.h toy.txt result.json\n", done
     assert (folder / "toy.txt").read_text(encoding="utf-8") == "pass, 1 sensors"
     assert sorted(file.name for file in folder.iterdir()) == ["calibration.h", "result.json", "toy.txt"]

@@ -16,10 +16,13 @@ from rig.station.events import (
     Answered,
     ArmConnected,
     BoardConnected,
+    CalibrationStored,
     Checked,
-    Message,
+    DocumentWritten,
+    ObservationMade,
     PhaseRecorded,
     PhaseStarted,
+    Plotted,
     PreflightPassed,
     Progress,
     Prompt,
@@ -66,7 +69,7 @@ def phases(events: list[RunEvent]) -> list[list[RunEvent]]:
 
 
 def test_the_phases_come_one_after_the_other(events: list[RunEvent]) -> None:
-    told = [type(event) for event in events if not isinstance(event, Message)]
+    told = [type(event) for event in events]
     steps = (StepStarted, Progress, SamplesTaken, StepFinished)
     recorded = (SweepStarted, SweepFinished, RestStarted, RestFinished, BoardObserved, BoardSolved)
     around = [kind for kind in told if kind not in (*steps, *recorded)]
@@ -74,7 +77,9 @@ def test_the_phases_come_one_after_the_other(events: list[RunEvent]) -> None:
     checks = around.count(Checked)
     assert around == [
         *connected, Prompt, Answered, SamplingStarted, PhaseRecorded,
+        *[ObservationMade] * 12, CalibrationStored,
         *connected, SamplingStarted, PhaseRecorded,
+        Plotted, DocumentWritten, DocumentWritten,
         *[Checked] * checks, VerdictReached,
     ]  # fmt: skip
     first, second = (event for event in events if isinstance(event, PhaseStarted))
@@ -132,6 +137,14 @@ def test_the_observations_come_as_they_are_made(events: list[RunEvent]) -> None:
     assert [(event.sensor, event.sweep) for event in observed] == [("gyro", sweep) for sweep in range(6)]
     assert {event.solution.method for event in calibration if isinstance(event, BoardSolved)} >= {"closed_form"}
     assert not any(isinstance(event, BoardObserved) for event in verification)
+
+
+def test_the_hosts_own_observations_come_when_the_calibration_is_judged(events: list[RunEvent]) -> None:
+    made = [event for event in events if isinstance(event, ObservationMade)]
+    assert [(e.sensor, e.observation.sweep) for e in made] == [(s, i) for s in ("gyro", "reference") for i in range(6)]
+    for event in made:
+        turned = event.observation.average.mean_rad_s["xyz".index(event.observation.axis)]
+        assert abs(turned) == pytest.approx(event.observation.speed_rad_s, rel=0.3)
 
 
 IMPORTS = """

@@ -4,20 +4,26 @@ from pathlib import Path
 
 from rig.errors import Fault
 from rig.station.events import (
+    Advice,
     Answered,
+    CalibrationStored,
     Crashed,
     Failed,
     Interrupted,
-    Message,
+    ListenerDropped,
     PhaseRecorded,
+    PhaseSkipped,
+    Plotted,
     Prompt,
     RunEvent,
+    RunFolderWritten,
     RunResumed,
     SamplesTaken,
+    SamplingStarted,
     SensorSamples,
 )
 from rig.station.log import log
-from rig.station.station import Stations
+from rig.station.station import Stations, always_yes
 from rig.station.words import line, reason
 
 SAMPLES = (SensorSamples("gyro", 100, 2, (0.0, 0.0, 1.0)), SensorSamples("reference", 50, 1, None))
@@ -36,13 +42,23 @@ class Everything:
 def test_a_line_is_made_of_what_the_event_holds() -> None:
     assert line(RunResumed(2, 6)) == "resuming: 2 of 6 sweeps are recorded, sound and known to the board"
     assert line(PhaseRecorded(SAMPLES, 4)) == "recorded: 150 samples, 3 lost; 4 arm states missed"
+    stored = CalibrationStored("gyro", "lsm9ds1", "LSM9DS1-001", 3)
+    assert line(stored) == "stored on the board: gyro, lsm9ds1 LSM9DS1-001, record 3"
+    said = line(PhaseSkipped("verify"))
+    assert said == "not verified: the calibration failed its limits, so the board keeps what it had"
+    assert line(Plotted(("one", "other"))) == "plotted: one, other (.png, .svg)"
+    assert line(RunFolderWritten(Path("a run"))) == "written: a run"
+    kept = "the data are kept in a run"
+    assert line(Advice(Path("a run"), repeats=True)) == f"{kept}; to repeat refused sweeps: rig resume 'a run'"
+    going_on = f"{kept}; when it is mended, go on with: rig resume 'a run'"
+    assert line(Advice(Path("a run"), repeats=False)) == going_on
     assert line(SamplesTaken(SAMPLES)) is None and line(Failed(Fault("x", "y", "z"))) is None
 
 
 def test_the_log_keeps_lines_and_reasons_with_the_time(tmp_path: Path) -> None:
     with log(tmp_path / "log.txt") as listener:
         events = (
-            Message("good morning"),
+            SamplingStarted(),
             SamplesTaken(SAMPLES),
             Failed(Fault("no_luck", "it broke", "Mend it")),
             Interrupted("interrupted"),
@@ -52,14 +68,17 @@ def test_the_log_keeps_lines_and_reasons_with_the_time(tmp_path: Path) -> None:
             listener.event(event)
     said = (tmp_path / "log.txt").read_text(encoding="utf-8").splitlines()
     assert [text[24:] for text in said] == [
-        "INFO good morning", "INFO no_luck: it broke. Mend it.", "INFO interrupted", "INFO Traceback",
-    ]  # fmt: skip
-    assert reason(Message("good morning")) is None
+        "INFO sampling: every sensor delivers",
+        "INFO no_luck: it broke. Mend it.",
+        "INFO interrupted",
+        "INFO Traceback",
+    ]
+    assert reason(SamplingStarted()) is None
 
 
 def test_a_log_on_a_full_disk_is_no_error() -> None:
     with log(Path("/dev/full")) as listener:
-        listener.event(Message("lost"))
+        listener.event(SamplingStarted())
 
 
 def test_everyone_hears_everything_and_one_answers() -> None:
@@ -72,8 +91,38 @@ def test_everyone_hears_everything_and_one_answers() -> None:
         return False
 
     station = Stations((one, other), answer)
-    station.event(Message("good morning"))
+    station.event(SamplingStarted())
     prompt = Prompt(("The arm will move.",), "start")
     assert not station.ask(prompt)
     assert asked == [(("The arm will move.",), "start")]
-    assert one.events == other.events == [Message("good morning"), prompt, Answered(agreed=False)]
+    assert one.events == other.events == [SamplingStarted(), prompt, Answered(agreed=False)]
+
+
+class Raising:
+    """Cannot bear to be told that sampling started."""
+
+    def __init__(self) -> None:
+        self.events: list[RunEvent] = []
+
+    def event(self, event: RunEvent) -> None:
+        self.events.append(event)
+        if isinstance(event, SamplingStarted):
+            raise ValueError("too much")
+
+
+def test_a_listener_that_raises_is_dropped_and_the_others_are_told_so_once() -> None:
+    one, raising, other = Everything(), Raising(), Everything()
+    station = Stations((one, raising, other), always_yes)
+    told = (PhaseSkipped("verify"), SamplingStarted(), PhaseSkipped("verify"))
+    for event in told:
+        station.event(event)
+    dropped = ListenerDropped("Raising", "ValueError: too much")
+    assert one.events == other.events == [*told[:2], dropped, told[2]]
+    assert raising.events == list(told[:2])
+    assert line(dropped) == "Raising hears nothing more of this run: it failed (ValueError: too much)"
+
+
+def test_the_log_keeps_where_a_script_failed() -> None:
+    failed = Fault("script_failed", "it broke", "Mend it")
+    failed.__cause__ = ZeroDivisionError("by nothing")
+    assert reason(Failed(failed)) == "script_failed: it broke. Mend it.\nZeroDivisionError: by nothing"

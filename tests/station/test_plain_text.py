@@ -12,7 +12,7 @@ from rich.live import Live
 
 from rig.cli import main
 from rig.errors.quoting import printable, printable_lines
-from rig.station.events import Message
+from rig.station.events import RunFolderWritten
 from rig.station.log import log
 from rig.station.plain_text import plain, say
 from rig.station.view import LiveView, PlainView
@@ -37,10 +37,10 @@ def test_rich_finds_nothing_in_it() -> None:
 
 def test_the_operators_view_shows_it_as_it_is(capsys: pytest.CaptureFixture[str]) -> None:
     console = Console(file=io.StringIO(), record=True, width=100)
-    LiveView(Live(console=console, auto_refresh=False)).event(Message(HOSTILE))
+    LiveView(Live(console=console, auto_refresh=False)).event(RunFolderWritten(Path(HOSTILE)))
     assert SHOWN in console.export_text()
-    PlainView().event(Message(HOSTILE))
-    assert capsys.readouterr().err == SHOWN + "\n"
+    PlainView().event(RunFolderWritten(Path(HOSTILE)))
+    assert capsys.readouterr().err == f"written: {SHOWN}\n"
 
 
 def test_a_line_for_a_pipe_shows_it_as_it_is(capsys: pytest.CaptureFixture[str]) -> None:
@@ -51,8 +51,8 @@ def test_a_line_for_a_pipe_shows_it_as_it_is(capsys: pytest.CaptureFixture[str])
 
 def test_the_log_shows_it_as_it_is(tmp_path: Path) -> None:
     with log(tmp_path / "log.txt") as logged:
-        logged.event(Message(HOSTILE))
-    assert (tmp_path / "log.txt").read_text(encoding="utf-8").endswith(f" INFO {SHOWN}\n")
+        logged.event(RunFolderWritten(Path(HOSTILE)))
+    assert (tmp_path / "log.txt").read_text(encoding="utf-8").endswith(f" INFO written: {SHOWN}\n")
 
 
 def printed(file: Path) -> Iterator[ast.expr]:
