@@ -1,6 +1,5 @@
 """`rig board info` and `calibration`: look at the board, read and change the calibrations it has stored."""
 
-import json
 import sys
 from collections.abc import Iterable, Iterator, Mapping, Sequence
 from contextlib import ExitStack, contextmanager
@@ -24,7 +23,7 @@ from rig.config.load import load
 from rig.config.models import RigConfig, SensorSection
 from rig.data.result_file import ResultDocument, passed_result
 from rig.errors import Fault, Refused
-from rig.report.board_info import info_document, print_info, print_stored
+from rig.report.board_info import BoardInfo, BoardSensor, print_info, print_stored
 from rig.station.confirm import agreed_or_refused
 from rig.station.plain_text import say
 
@@ -44,12 +43,13 @@ def info(config_path: Path, overrides: Sequence[str], *, as_json: bool) -> int:
     with _connected(config_path, overrides) as (config, board), refusing():
         calibrations = [board.read_calibration(sensor.index) for sensor in board.identity.sensors]
         names: dict[str, str] = {section.part: name for name, section in config.sensors.items()}
-        configured = [names.get(configured_part(sensor.part)) for sensor in board.identity.sensors]
-        document = info_document(config.board.port, board.identity, board.status(), configured, calibrations)
-    if as_json:
-        print(json.dumps(document, indent=2))
-    else:
-        print_info(document)
+        status = board.status()
+        sensors = tuple(
+            BoardSensor(sensor, names.get(configured_part(sensor.part)), counts, stored)
+            for sensor, counts, stored in zip(board.identity.sensors, status.sensors, calibrations, strict=True)
+        )
+        found = BoardInfo(config.board.port, board.identity, status, sensors)
+    print_info(found, as_json=as_json)
     return 0
 
 
@@ -60,11 +60,7 @@ def read(config_path: Path, overrides: Sequence[str], sensor: str | None, *, as_
     for place in places:
         if place.stored is not None and place.stored.calibration.serial_number != place.section.serial_number:
             say(f"{place.name}: stored for another sensor than {place.section.serial_number}", file=sys.stderr)
-    documents = {place.name: None if place.stored is None else place.stored.document() for place in places}
-    if as_json:
-        print(json.dumps({"schema": "rig.board_calibration/1", "sensors": documents}, indent=2))
-    else:
-        print_stored(documents)
+    print_stored({place.name: place.stored for place in places}, as_json=as_json)
     return 0
 
 

@@ -3,19 +3,13 @@
 There is no configuration, so there are no limits to judge it by.
 """
 
-import json
 from pathlib import Path
 
-from rich.console import Console
-
 from rig.analysis.calibration import known_estimator, or_fault, solve_observations, solve_six_observation
-from rig.data.result_file import ErrorEntry, EstimateEntry
 from rig.errors import Refused, raised_as
-from rig.estimation.six_observation import MODEL, PARAMETER_UNITS, PARAMETERS
 from rig.observation.csv_import import read
+from rig.report.external import External, print_external
 from rig.report.sensor_entry import entry_or_error, estimate_entry
-from rig.report.table import estimate_table
-from rig.station.plain_text import plain
 
 
 def solve_external(samples: Path, sweeps: Path, estimator: str, *, as_json: bool) -> int:
@@ -27,30 +21,8 @@ def solve_external(samples: Path, sweeps: Path, estimator: str, *, as_json: bool
     with raised_as(Refused):  # nothing runs here: whatever is wrong with the data, no arm had to be stopped for it
         data = read(samples, sweeps)
         solution = solve_observations(data.sweeps, chosen, data.rests)
-    estimate = estimate_entry(solution)
     # Three sweeps may do for the vector model, not for the six observations.
     beside = entry_or_error(or_fault(lambda: solve_six_observation(data.sweeps, "newton")))
-    document = {
-        "schema": "rig.external/1",
-        "samples": str(samples),
-        "sweeps": str(sweeps),
-        "model": MODEL,
-        **estimate.model_dump(),
-        "covariance_order": list(PARAMETERS),
-        "covariance_units": list(PARAMETER_UNITS),
-        "rests": len(data.rests),
-        "six_observation": beside.model_dump(),
-    }
-    if as_json:
-        print(json.dumps(document, indent=2))
-    else:
-        _print(f"{samples}, {MODEL}", estimate, beside, Console())
+    found = External(samples, sweeps, len(data.rests), estimate_entry(solution), beside)
+    print_external(found, as_json=as_json)
     return 0
-
-
-def _print(title: str, estimate: EstimateEntry, beside: EstimateEntry | ErrorEntry, console: Console) -> None:
-    console.print(estimate_table(f"{title}, {estimate.estimator}", estimate))
-    if isinstance(beside, ErrorEntry):
-        console.print(plain(f"six_observation: {beside.error}"))
-    elif beside.estimator != estimate.estimator:
-        console.print(estimate_table("six observations alone, the rests and the axes left out", beside))

@@ -1,106 +1,145 @@
 """What `rig board` prints: the board's health and what it has stored."""
 
-from collections.abc import Mapping, Sequence
-from dataclasses import asdict
+import json
+from collections.abc import Mapping
+from dataclasses import asdict, dataclass
 from typing import Any
 
 from rich.box import SIMPLE
 from rich.console import Console
 from rich.table import Table
 
-from firmware_host.answers import BoardIdentity, BoardStatus, StoredCalibration
+from firmware_host.answers import BoardIdentity, BoardStatus, SensorCounts, SensorInfo, StoredCalibration
 from firmware_host.protocol import FIRMWARE_VERSION
 from rig.station.plain_text import plain
 
 
-def info_document(
-    port: str,
-    identity: BoardIdentity,
-    status: BoardStatus,
-    configured: Sequence[str | None],
-    calibrations: Sequence[StoredCalibration | None],
-) -> dict[str, Any]:
-    """Everything about a board as plain numbers and strings, of schema "rig.board/1".
+@dataclass(frozen=True, slots=True)
+class BoardSensor:
+    """A sensor the firmware knows: its name in the configuration, if it has one, and what is stored for it."""
 
-    `configured` and `calibrations` stand beside `identity.sensors`: each one's name in the configuration and what is
-    stored for it.
-    """
-    health = asdict(status)
-    counts = health.pop("sensors")
+    info: SensorInfo
+    configured_as: str | None
+    counts: SensorCounts
+    stored: StoredCalibration | None
+
+
+@dataclass(frozen=True, slots=True)
+class BoardInfo:
+    """Everything about the board at `port`."""
+
+    port: str
+    identity: BoardIdentity
+    status: BoardStatus
+    sensors: tuple[BoardSensor, ...]
+
+
+def print_info(board: BoardInfo, *, as_json: bool) -> None:
+    """The board on stdout: a table for people, JSON of schema "rig.board/1" for machines."""
+    if as_json:
+        print(json.dumps(_info_document(board), indent=2))
+    else:
+        _print_info(board)
+
+
+def print_stored(stored: Mapping[str, StoredCalibration | None], *, as_json: bool) -> None:
+    """Stored calibrations by sensor name: tables for people, JSON of schema "rig.board_calibration/1" for machines."""
+    if as_json:
+        print(json.dumps({"schema": "rig.board_calibration/1", "sensors": _documents(stored)}, indent=2))
+    else:
+        _print_stored(stored)
+
+
+def _documents(stored: Mapping[str, StoredCalibration | None]) -> dict[str, Any]:
+    return {name: None if each is None else each.document() for name, each in stored.items()}
+
+
+def _info_document(board: BoardInfo) -> dict[str, Any]:
+    health = asdict(board.status)
+    del health["sensors"]  # each stands with its sensor
     return {
         "schema": "rig.board/1",
-        "port": port,
-        "unique_id": identity.unique_id,
-        "firmware": identity.firmware,
+        "port": board.port,
+        "unique_id": board.identity.unique_id,
+        "firmware": board.identity.firmware,
         "shipped_firmware": FIRMWARE_VERSION,
-        "protocol": identity.protocol,
+        "protocol": board.identity.protocol,
         "health": health,
         "sensors": [
             {
-                "part": sensor.part,
-                "present": sensor.present,
-                "who_am_i": sensor.who_am_i,
-                "configured_as": name,
-                "counts": count,
-                "calibration": None if stored is None else stored.document(),
+                "part": sensor.info.part,
+                "present": sensor.info.present,
+                "who_am_i": sensor.info.who_am_i,
+                "configured_as": sensor.configured_as,
+                "counts": asdict(sensor.counts),
+                **_documents({"calibration": sensor.stored}),
             }
-            for sensor, name, stored, count in zip(identity.sensors, configured, calibrations, counts, strict=True)
+            for sensor in board.sensors
         ],
     }
 
 
-def print_info(document: Mapping[str, Any]) -> None:
-    """An `info_document` for people."""
+def _print_info(board: BoardInfo) -> None:
     console = Console(highlight=False)
-    health = document["health"]
-    flashed = document["firmware"] == document["shipped_firmware"]
-    fault = f"0x{health['fault_pc']:08x}" if health["fault_pc"] else "none"
+    identity, health = board.identity, board.status
+    flashed = identity.firmware == FIRMWARE_VERSION
     facts = {
-        "board": f"{document['unique_id']} at {document['port']}",
-        "firmware": f"{document['firmware']}, protocol {document['protocol']}"
-        + ("" if flashed else f"; this program comes with {document['shipped_firmware']}: `rig board flash`"),
-        "up": f"{health['uptime_s']:.1f} s, last started by: {health['reset_cause']}",
-        "clock": "follows the crystal" if health["clock_locked"] else "NOT locked to the crystal: time stamps drift",
-        "link": f"{health['rx_errors']} damaged requests, {health['tx_overruns']} frames without room, "
-        f"{health['frames_lost']} lost on the way, {health['frames_repeated']} came twice",
-        "sensor bus": f"{health['bus_errors']} failed reads",
-        "stack": f"{health['stack_high_water_bytes']} bytes at most",
-        "last fault": fault,
+        "board": f"{identity.unique_id} at {board.port}",
+        "firmware": f"{identity.firmware}, protocol {identity.protocol}"
+        + ("" if flashed else f"; this program comes with {FIRMWARE_VERSION}: `rig board flash`"),
+        "up": f"{health.uptime_s:.1f} s, last started by: {health.reset_cause}",
+        "clock": "follows the crystal" if health.clock_locked else "NOT locked to the crystal: time stamps drift",
+        "link": f"{health.rx_errors} damaged requests, {health.tx_overruns} frames without room, "
+        f"{health.frames_lost} lost on the way, {health.frames_repeated} came twice",
+        "sensor bus": f"{health.bus_errors} failed reads",
+        "stack": f"{health.stack_high_water_bytes} bytes at most",
+        "last fault": f"0x{health.fault_pc:08x}" if health.fault_pc else "none",
     }
     for name, value in facts.items():
         console.print(plain(f"{name + ':':12}{value}"), soft_wrap=True)
     table = Table(box=SIMPLE)
     for heading in ("part", "fitted", "identity", "configured as", "stored calibration"):
         table.add_column(heading)
-    for sensor in document["sensors"]:
-        stored = sensor["calibration"]
+    for sensor in board.sensors:
         table.add_row(
-            plain(sensor["part"]),
-            "yes" if sensor["present"] else "no",
-            f"0x{sensor['who_am_i']:02x}",
-            plain(sensor["configured_as"] or ""),
-            plain("none" if stored is None else f"{stored['serial_number']}, {stored['written_utc']}"),
+            plain(sensor.info.part),
+            "yes" if sensor.info.present else "no",
+            f"0x{sensor.info.who_am_i:02x}",
+            plain(sensor.configured_as or ""),
+            plain(
+                "none"
+                if sensor.stored is None
+                else f"{sensor.stored.calibration.serial_number}, {_written(sensor.stored)}"
+            ),
         )
     console.print(table)
 
 
-def print_stored(documents: Mapping[str, Mapping[str, Any] | None]) -> None:
-    """Stored calibrations by sensor name, for people."""
+def _print_stored(stored: Mapping[str, StoredCalibration | None]) -> None:
     console = Console(highlight=False)
-    for name, stored in documents.items():
-        if stored is None:
+    for name, record in stored.items():
+        if record is None:
             console.print(plain(f"{name}: no calibration stored"))
             continue
+        calibration = record.calibration
         console.print(
             plain(
-                f"{name}: {stored['part']} {stored['serial_number']} at {stored['range_deg_s']:g} °/s, "
-                f"{stored['temperature_c']:.1f} °C; record {stored['sequence']} of {stored['written_utc']}"
+                f"{name}: {record.part} {calibration.serial_number} at {record.range_deg_s:g} °/s, "
+                f"{calibration.temperature_c:.1f} °C; record {record.sequence} of {_written(record)}"
             ),
             soft_wrap=True,
         )
         table = Table(box=SIMPLE)
         for heading in ("axis", "scale factor", "bias rad/s"):
             table.add_column(heading, justify="left" if heading == "axis" else "right")
-        for axis, scale, bias in zip("xyz", stored["scale"], stored["bias_rad_s"], strict=True):
+        for axis, scale, bias in zip("xyz", calibration.scale, calibration.bias_rad_s, strict=True):
             table.add_row(axis, f"{scale:.6f}", f"{bias:+.6f}")
         console.print(table)
+
+
+def _stored_for(record: StoredCalibration | None) -> str:
+    return "none" if record is None else f"{record.calibration.serial_number}, {_written(record)}"
+
+
+def _written(record: StoredCalibration) -> str:
+    return record.calibration.written_utc.isoformat(timespec="seconds")

@@ -2,11 +2,13 @@
 
 import io
 import shutil
+from datetime import UTC, datetime
 from pathlib import Path
 
 import pytest
 from rich.console import Console
 
+from firmware_host.answers import Calibration, StoredCalibration
 from rig.commands.solve_csv import solve_external
 from rig.data.result_file import CheckEntry, ResultDocument
 from rig.report.board_info import print_stored
@@ -51,8 +53,9 @@ def test_the_other_tables_show_names_as_they_are(capsys: pytest.CaptureFixture[s
     console = Console(width=150, file=io.StringIO(), record=True)
     console.print(verification_table(HOSTILE, VERIFIED.verification["gyro"]))
     assert SHOWN in console.export_text()
-    stored = VERIFIED.provenance.stored_calibrations["gyro"].model_dump() | {"serial_number": HOSTILE}
-    print_stored({"gyro": stored, HOSTILE: None})
+    calibration = Calibration("six", HOSTILE, datetime.now(UTC), 22.5, (1.0, 1.0, 1.0), (0.0, 0.0, 0.0))
+    stored = StoredCalibration(1, "LSM9DS1", 0x68, 245.0, calibration)
+    print_stored({"gyro": stored, HOSTILE: None}, as_json=False)
     assert capsys.readouterr().out.count(SHOWN) == 2
 
 
