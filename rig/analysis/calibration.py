@@ -76,15 +76,6 @@ def known_estimator(name: str) -> Estimator:
     raise Refused("unknown_estimator", f"there is no estimator {name!r}", f"Choose one of {', '.join(ESTIMATORS)}")
 
 
-def solve_runs(runs: Sequence[RunData], estimator: str = DEFAULT_ESTIMATOR) -> dict[str, SensorResult]:
-    """Calibrate every sensor from one recording, or from all recordings of a run that was resumed.
-
-    Raises as `observe_recordings` and `solve_observed` do.
-    """
-    chosen = known_estimator(estimator)  # before the work of observing
-    return solve_observed(runs[0].sensors, observe_recordings(runs), chosen)
-
-
 def observe_recordings(runs: Sequence[RunData]) -> tuple[ObservedRun, ...]:
     """All recordings of one calibration; those without a finished sweep add nothing.
 

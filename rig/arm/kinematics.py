@@ -64,11 +64,6 @@ def flange_axes(q_rad: ArrayLike) -> Array:
     return np.swapaxes(flange[..., :3, :3], -1, -2) @ axes_in_base
 
 
-def wrist_axes(q_rad: ArrayLike) -> Array:
-    """(…, 3, 3) unit axes of wrist 1, 2 and 3 (columns) in the flange frame; orthogonal where wrist 2 is at ±90°."""
-    return flange_axes(q_rad)[..., 3:]
-
-
 def flange_rate(q_rad: ArrayLike, qd_rad_s: ArrayLike) -> Array:
     """(…, 3) angular velocity of the flange in its own frame, rad/s, from joint angles and speeds (…, 6)."""
     rate: Array = np.einsum("...ij,...j->...i", flange_axes(q_rad), np.asarray(qd_rad_s, dtype=np.float64))

@@ -10,10 +10,10 @@ from typing import Annotated, Final, Literal
 from pydantic import BaseModel, ConfigDict, Field, JsonValue, ValidationError
 
 from rig.config.regular_file import UnfitFile, read_regular_file
+from rig.data.run_folder import RESULT
 from rig.errors import Refused
 
 SCHEMA: Final = "rig.result/1"
-NAME = "result.json"
 SIZE_MAX_BYTES = 64_000_000  # a run of six sweeps with its verification has 66,000
 
 Positive = Annotated[float, Field(gt=0)]
@@ -292,9 +292,9 @@ def schema_text() -> str:
 
 def write_result(document: ResultDocument, folder: Path) -> None:
     """`result.json` into a run folder, whole or not at all: it ends the run."""
-    part = folder / f"{NAME}.part"
+    part = folder / f"{RESULT}.part"
     part.write_text(document.text() + "\n", encoding="utf-8")
-    part.replace(folder / NAME)
+    part.replace(folder / RESULT)
 
 
 def read_result(path: Path) -> ResultDocument:
@@ -329,7 +329,7 @@ def passed_result(path: Path) -> ResultDocument:
 
 
 def _file(path: Path) -> Path:
-    return path / NAME if path.is_dir() else path
+    return path / RESULT if path.is_dir() else path
 
 
 if __name__ == "__main__":

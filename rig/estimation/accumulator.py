@@ -96,17 +96,6 @@ class Accumulator:
             self.count + 1,
         )
 
-    def combine(self, other: Self) -> Self:
-        """The accumulator of the revolutions of both, as if each had been added to one."""
-        return type(self)(
-            self.geometry + other.geometry,
-            self.normal + other.normal,
-            self.right + other.right,
-            self.moments + other.moments,
-            self.speed_noise + other.speed_noise,
-            self.count + other.count,
-        )
-
     def solve(self, estimator: SixObservationEstimator = "newton") -> Solution:
         """The parameters with their covariance.
 

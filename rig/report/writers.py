@@ -6,7 +6,8 @@ from pathlib import Path
 from typing import Protocol
 
 from rig.analysis.outcome import Outcome
-from rig.data.result_file import NAME, ResultDocument, write_result
+from rig.data.result_file import ResultDocument, write_result
+from rig.data.run_folder import RESULT
 from rig.report.document import document_of
 from rig.station.events import DocumentWritten, RunEvent
 
@@ -32,7 +33,7 @@ def write_outcome(folder: Path, outcome: Outcome) -> Iterator[RunEvent]:
     for name in WRITERS:
         yield from _writer(name)(outcome, document, folder)
     write_result(document, folder)
-    yield DocumentWritten(folder / NAME)
+    yield DocumentWritten(folder / RESULT)
 
 
 def _writer(name: str) -> Writer:

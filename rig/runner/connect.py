@@ -61,7 +61,6 @@ class Connector:
                 whole_plan=whole_plan,
                 recording=recording,
                 along=self._calibrating_along(board, acquisition, recording, sensors),
-                station=self.station,
                 phase=self.phase,
             )
 

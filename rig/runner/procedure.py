@@ -91,7 +91,6 @@ class Rig:
     whole_plan: Plan
     recording: Recording
     along: BoardCalibration | None
-    station: Station
     phase: Phase
     _number: int = 0  # of the step that goes on, or the last one
     _done_s: float = 0.0  # planned duration of the steps behind us
@@ -106,7 +105,7 @@ class Rig:
         report, payload = self.devices.report, self.devices.payload
         problems = [*plan_problems(self.whole_plan, payload.payload_kg), *step_problems(self.plan)]
         refuse(list(dict.fromkeys([*problems, *arm_problems(self.plan, report)])))
-        self.station.event(PreflightPassed(self.plan, report))
+        self.recording.station.event(PreflightPassed(self.plan, report))
         away_rad = max(map(abs, way_to_home(self.plan, report.state.q_rad)))
         if not (self.phase.agreed and away_rad <= SAME_POSE_RAD):
             self._agree()
@@ -116,7 +115,7 @@ class Rig:
 
     def _agree(self) -> None:
         prompt = announcement(self.plan, self.devices.report, self.whole_plan if self.phase.follows else None)
-        if not self.station.ask(prompt):
+        if not self.recording.station.ask(prompt):
             raise Refused("not_confirmed", "nobody agreed to the movement", "Run again and agree, or give --yes")
 
     def _refuse_moved(self) -> None:
@@ -148,7 +147,7 @@ class Rig:
                     "Check the sensor's wiring and its data-ready line, then run `rig check`",
                 )
             time.sleep(0.005)
-        self.station.event(SamplingStarted())
+        self.recording.station.event(SamplingStarted())
 
     def move(self, transfer: Transfer) -> None:
         """Bring the arm to where the next sweep starts, or home."""
@@ -198,12 +197,12 @@ class Rig:
         place = self._number, len(self.plan.steps), step
         arm = self.devices.arm
         self._step_started_s = arm.latest.time_s
-        self.station.event(StepStarted(*place))
+        self.recording.station.event(StepStarted(*place))
         yield
         took_s = arm.latest.time_s - self._step_started_s
         then()
         self._done_s += step.duration_s
-        self.station.event(StepFinished(*place, took_s))
+        self.recording.station.event(StepFinished(*place, took_s))
 
     def _watch(self, step: Step) -> None:
         """Called many times a second while the arm is busy: look after board and recording, tell the operator."""
@@ -213,8 +212,8 @@ class Rig:
         within_s = min(state.time_s - self._step_started_s, step.duration_s)
         # A script may make steps of its own, one that takes no time too.
         fraction = within_s / step.duration_s if step.duration_s > 0 else 1.0
-        self.station.event(SamplesTaken(self.devices.acquisition.samples()))
-        self.station.event(
+        self.recording.station.event(SamplesTaken(self.devices.acquisition.samples()))
+        self.recording.station.event(
             Progress(
                 number=self._number,
                 count=len(self.plan.steps),

@@ -8,7 +8,6 @@ import pytest
 from rich.console import Console
 
 from firmware_host.answers import BoardObservation, BoardSolution
-from rig.analysis.calibration import solve_runs
 from rig.analysis.onboard_check import agreement, check_observed
 from rig.data.events import BoardNotObserved, BoardObserved, BoardRecalled, BoardSolved, Event, Recorded
 from rig.data.run_file import RunData
@@ -18,6 +17,7 @@ from rig.observation.windows import swept
 from rig.report.sensor_entry import sensor_entry
 from rig.report.table import print_result
 from support.results import result_document
+from support.solving import solve_runs
 from support.synthetic_run import SENSITIVITY, Setup, synthetic_run
 
 START_MARGIN_US = 300_000  # past the ramps

@@ -9,7 +9,6 @@ import numpy as np
 import pytest
 from rich.console import Console
 
-from rig.analysis.calibration import solve_runs
 from rig.analysis.comparison import Reference
 from rig.analysis.verdict import verdict, verification_checks
 from rig.analysis.verification import Verification, verify
@@ -25,6 +24,7 @@ from rig.report.verification_entry import verification_entry
 from rig.report.verification_table import verification_lines, verification_table
 from rig.station.events import Plotted
 from rig.station.words import line
+from support.solving import solve_runs
 from support.synthetic_run import SCALE, Setup
 from support.synthetic_verification import REFERENCE, TRUTH, Stored, recording
 

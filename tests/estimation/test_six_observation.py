@@ -31,8 +31,14 @@ def sweeps(
     return every[:, None] * directions @ tilt(5).T / scale - bias, every
 
 
-def gather(means: Array, speeds: Array, variance: Array = VARIANCE, weight: float | None = None) -> Accumulator:
-    accumulated = Accumulator.empty()
+def gather(
+    means: Array,
+    speeds: Array,
+    variance: Array = VARIANCE,
+    weight: float | None = None,
+    after: Accumulator | None = None,
+) -> Accumulator:
+    accumulated = Accumulator.empty() if after is None else after
     for mean, speed in zip(means, speeds, strict=True):
         accumulated = accumulated.add(mean, variance, float(speed), weight=weight)
     return accumulated
@@ -170,7 +176,7 @@ def test_speeds_known_badly_make_the_scale_uncertain() -> None:
 def test_sweeps_add_up_in_any_order_and_from_any_parts() -> None:
     means, speeds = sweeps(directions=np.tile(DIRECTIONS, (3, 1)))
     whole = gather(means, speeds).solve()
-    parts = gather(means[11:], speeds[11:]).combine(gather(means[:11][::-1], speeds[:11]))
+    parts = gather(means[:11][::-1], speeds[:11], after=gather(means[11:], speeds[11:]))
     np.testing.assert_allclose(values(parts.solve()), values(whole), rtol=1e-9)
     once = gather(means[:6], speeds[:6]).solve()
     np.testing.assert_allclose(whole.covariance, once.covariance / 3, rtol=1e-6, atol=1e-15)
@@ -180,8 +186,9 @@ def test_sweeps_add_up_in_any_order_and_from_any_parts() -> None:
 def test_a_noisy_sweep_counts_for_less() -> None:
     means, speeds = sweeps(directions=np.tile(DIRECTIONS, (2, 1)))
     off = np.array([0.0, 0.0, 0.05])
-    poor = gather(means[:6], speeds[:6]).combine(gather(means[6:] + off, speeds[6:], VARIANCE * 1e4)).solve()
-    alike = gather(means[:6], speeds[:6]).combine(gather(means[6:] + off, speeds[6:])).solve()
+    sound = gather(means[:6], speeds[:6])
+    poor = gather(means[6:] + off, speeds[6:], VARIANCE * 1e4, after=sound).solve()
+    alike = gather(means[6:] + off, speeds[6:], after=sound).solve()
     assert abs(poor.bias_rad_s[2] - BIAS[2]) < 1e-4
     assert abs(alike.bias_rad_s[2] - BIAS[2]) > 1e-2
 

@@ -8,7 +8,6 @@ import numpy as np
 import pytest
 from numpy.typing import NDArray
 
-from rig.analysis.calibration import solve_runs
 from rig.arm.state import ARM_STATE_DTYPE
 from rig.data.events import Event, SweepFinished, SweepStarted
 from rig.data.run_file import RunData
@@ -20,6 +19,7 @@ from rig.observation.observed_run import observe_run
 from rig.observation.timebase import ArmMotion, TimeBase, estimate_time_base, widening
 from rig.observation.windows import swept
 from rig.report.sensor_entry import sensor_entry
+from support.solving import solve_runs
 from support.synthetic_run import (
     BIAS_RAD_S,
     SENSITIVITY,

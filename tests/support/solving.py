@@ -1,0 +1,18 @@
+"""Recordings to calibrations in one step."""
+
+from collections.abc import Sequence
+
+from rig.analysis.calibration import (
+    DEFAULT_ESTIMATOR,
+    SensorResult,
+    known_estimator,
+    observe_recordings,
+    solve_observed,
+)
+from rig.data.run_file import RunData
+
+
+def solve_runs(runs: Sequence[RunData], estimator: str = DEFAULT_ESTIMATOR) -> dict[str, SensorResult]:
+    """Calibrate every sensor from one recording, or from all recordings of a run that was resumed."""
+    chosen = known_estimator(estimator)  # before the work of observing
+    return solve_observed(runs[0].sensors, observe_recordings(runs), chosen)
