@@ -55,6 +55,7 @@ class Board:
         self._on_samples = on_samples
         self._timeout_s = timeout_s
         self._streaming = False
+        self._heard = (-1, 0.0)  # frames seen at the last check, and another's clock when there was a new one
         self._parts: tuple[str, ...] = ()
         self._link = BoardLink(port, baud, self._take)
         try:
@@ -142,15 +143,22 @@ class Board:
         self._ask("reboot")
         self.identity = self._hello()
 
-    def check(self) -> None:
-        """Raises what went wrong meanwhile: the board's own error, or board_link_lost (closed, silent in a stream)."""
+    def check(self, clock_s: float | None = None) -> None:
+        """Raises what went wrong meanwhile: the board's own error, or board_link_lost (closed, silent in a stream).
+
+        `clock_s` is what another instrument's clock shows now, if there is one: a silence must be as long by that too.
+        """
         if self._link.fault is not None:
             raise self._link.fault
-        if self._streaming and self._link.silent_s > min(self._timeout_s, _SILENCE_S):
+        silent_s = self._link.silent_s
+        if clock_s is not None:
+            if self._link.frames_seen != self._heard[0]:
+                self._heard = self._link.frames_seen, clock_s
+            silent_s = min(silent_s, clock_s - self._heard[1])
+        if self._streaming and silent_s > min(self._timeout_s, _SILENCE_S):
             raise BoardError(
                 "board_link_lost",
-                f"no readable frame from the board on {self._link.port} for {self._link.silent_s:.1f} s "
-                "while it should stream",
+                f"no readable frame from the board on {self._link.port} for {silent_s:.1f} s while it should stream",
                 "Check the board's supply and cable, and whether another program has the port",
             )
 

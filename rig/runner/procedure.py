@@ -137,7 +137,7 @@ class Rig:
         board.start(self.devices.corrected)
         host_s, arm_s = time.monotonic(), arm.latest.time_s
         while silent := self.devices.acquisition.silent():
-            board.check()
+            board.check(arm.latest.time_s)
             arm.check()
             # By both clocks: this machine may be busy, and the controller's clock another's to run.
             if min(time.monotonic() - host_s, arm.latest.time_s - arm_s) > FIRST_SAMPLE_TIMEOUT_S:
@@ -206,7 +206,7 @@ class Rig:
 
     def _watch(self, step: Step) -> None:
         """Called many times a second while the arm is busy: look after board and recording, tell the operator."""
-        self.devices.board.check()
+        self.devices.board.check(self.devices.arm.latest.time_s)
         self.recording.check()
         state = self.devices.arm.latest
         within_s = min(state.time_s - self._step_started_s, step.duration_s)

@@ -79,8 +79,7 @@ class Connection:
         self._wire.look()
         if not self._due or self.listener.silent:
             return 0.0
-        # Time to look at the last packet, at most as much as a real controller gives.
-        wait_s = self._wire.wait_s(self._ticks * TICK_S * self.session.newest_only)
+        wait_s = self._wire.wait_s(self._ticks * TICK_S, overlooks=self.session.newest_only)
         if wait_s <= 0.0:
             due, self._due = self._due, b""
             self._ticks = 0

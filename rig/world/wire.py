@@ -10,10 +10,10 @@ import socket
 import struct
 from collections.abc import Callable
 
-# So long a client is waited for, until it has caught up: less than other clients bear a silence. One that often lets
-# the world wait longer than the least is waited for less, for a real controller would not wait at all.
-LEAST_PATIENCE_S, PATIENCE_S = 0.05, 0.7
-REGAINED = 0.05  # of the time that passes, in patience
+# So long a client is waited for; until it has caught up it then gets its packets as fast as from a real controller.
+# One that often lets the world wait longer than the least is waited for less: a real controller would not wait at all.
+LEAST_PATIENCE_S, PATIENCE_S = 0.3, 0.7
+REGAINED = 0.1  # of the time that passes, in patience
 # A client that keeps only the newest packet must look at one before the next comes, so it is given some time after it
 # has taken one: so many times as long as it took of late, which grows with the load of the machine.
 LATENESS = 2.0
@@ -92,12 +92,14 @@ class Wire:
         self._seen_unread = False
         self._taken_s = wall()
         self._late_s = 0.0
+        self._newest_s = 0.0  # when the last packet went
         self._patience_s = PATIENCE_S
 
     def sent(self) -> None:
         """Something was sent."""
+        self._newest_s = self._wall()
         if self._sent_s is None:
-            self._sent_s, self._seen_unread = self._wall(), False
+            self._sent_s, self._seen_unread = self._newest_s, False
 
     def look(self) -> None:
         """See whether the client has taken what was sent."""
@@ -115,13 +117,17 @@ class Wire:
         self._patience_s = min(self._patience_s - spent_s + regained_s, PATIENCE_S)
         self._taken_s, self._sent_s = now_s, None
 
-    def wait_s(self, most_s: float) -> float:
-        """Wall time until the next look; 0 when the next packet may go, as to a client that was waited for in vain.
+    def wait_s(self, interval_s: float, *, overlooks: bool) -> float:
+        """Wall time until the next look; 0 when the next packet may go.
 
-        `most_s` is the time the client is given at most to look at what it has taken: 0 when it overlooks nothing.
+        `interval_s` is the virtual time since the last one, which is what a real controller gives a client. One that
+        `overlooks` a packet when the next comes at once has time to look at it.
         """
         now_s = self._wall()
-        if self._sent_s is not None:
-            delay_s = now_s - self._sent_s
-            return 0.0 if delay_s > self._patience_s else min(max(LOOK_S[0], delay_s / 4), LOOK_S[1])
-        return max(0.0, self._taken_s + min(max(self._late_s * LATENESS, LEAST_S), most_s) - now_s)
+        if self._sent_s is None:
+            time_s = min(max(self._late_s * LATENESS, LEAST_S), interval_s) if overlooks else 0.0
+            return max(0.0, self._taken_s + time_s - now_s)
+        delay_s = now_s - self._sent_s
+        if delay_s > self._patience_s:
+            return max(0.0, self._newest_s + interval_s - now_s)
+        return min(max(LOOK_S[0], delay_s / 4), LOOK_S[1])

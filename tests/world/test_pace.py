@@ -13,7 +13,7 @@ import pytest
 from rig.arm.driver import Arm
 from rig.arm.motion import Transfer, trapezoid_duration
 from rig.world.clock import DIALOGUE_S, DIALOGUE_TICK_S, TICK_S, Clock
-from rig.world.wire import LATEST_S, LEAST_PATIENCE_S, LEAST_S, PATIENCE_S, Wire
+from rig.world.wire import LATEST_S, LEAST_S, PATIENCE_S, Wire
 from support.arm_client import wait_for
 from support.arm_relay import relay
 from support.rtde_reader import RtdeReader
@@ -59,55 +59,56 @@ def test_the_next_packet_waits_until_the_last_one_is_taken() -> None:
     client = Client()
     client.is_sent(100)
     client.wall.passes(PATIENCE_S / 2)
-    assert client.wire.wait_s(PERIOD_S) > 0.0
+    assert client.wire.wait_s(PERIOD_S, overlooks=True) > 0.0
     client.takes_all(after_s=0.0)
     client.wall.passes(PERIOD_S)
-    assert client.wire.wait_s(PERIOD_S) == 0.0
+    assert client.wire.wait_s(PERIOD_S, overlooks=True) == 0.0
 
 
 def test_a_client_has_time_to_look_at_a_packet_and_a_late_one_has_more() -> None:
     client = Client()
     client.is_sent(100)
     client.takes_all(after_s=LEAST_S / 10)
-    assert client.wire.wait_s(PERIOD_S) == pytest.approx(LEAST_S)
+    assert client.wire.wait_s(PERIOD_S, overlooks=True) == pytest.approx(LEAST_S)
     client.is_sent(100)
     client.takes_all(after_s=LATEST_S / 5)
-    assert LEAST_S < client.wire.wait_s(PERIOD_S) < PERIOD_S
+    assert LEAST_S < client.wire.wait_s(PERIOD_S, overlooks=True) < PERIOD_S
 
 
 def test_no_client_has_more_time_than_a_real_controller_gives_it() -> None:
     client = Client()
     client.is_sent(100)
     client.takes_all(after_s=PATIENCE_S / 2)
-    assert client.wire.wait_s(PERIOD_S) == pytest.approx(PERIOD_S)
+    assert client.wire.wait_s(PERIOD_S, overlooks=True) == pytest.approx(PERIOD_S)
 
 
-def test_a_client_that_hangs_is_waited_for_in_vain_only_so_long() -> None:
+def test_a_client_that_hangs_is_waited_for_only_so_long_and_then_gets_what_a_real_controller_sends() -> None:
     client = Client()
     client.is_sent(100)
     client.wall.passes(PATIENCE_S * 1.01)
-    assert client.wire.wait_s(PERIOD_S) == 0.0
+    assert client.wire.wait_s(PERIOD_S, overlooks=True) == 0.0
     client.is_sent(100)
-    client.wire.look()
-    assert client.wire.wait_s(PERIOD_S) == 0.0, "it has not caught up"
+    assert client.wire.wait_s(PERIOD_S, overlooks=True) == pytest.approx(PERIOD_S)
+    client.wall.passes(PERIOD_S)
+    assert client.wire.wait_s(PERIOD_S, overlooks=True) == 0.0, "it has not caught up"
 
 
 def test_a_client_that_is_slow_again_and_again_is_not_waited_for_each_time() -> None:
     client = Client()
-    for _ in range(3):
+    for _ in range(4):
         client.is_sent(100)
-        client.takes_all(after_s=0.5)
+        client.takes_all(after_s=0.6)
     client.is_sent(100)
-    client.wall.passes(4 * LEAST_PATIENCE_S)
-    assert client.wire.wait_s(PERIOD_S) == 0.0
+    client.wall.passes(0.5)
+    assert client.wire.wait_s(PERIOD_S, overlooks=True) == 0.0
 
 
 def test_a_client_that_reads_every_byte_may_be_some_behind() -> None:
     client = Client(allowance=1000)
     client.is_sent(900)
-    assert client.wire.wait_s(most_s=0.0) == 0.0
+    assert client.wire.wait_s(PERIOD_S, overlooks=False) == 0.0
     client.is_sent(900)
-    assert client.wire.wait_s(most_s=0.0) > 0.0
+    assert client.wire.wait_s(PERIOD_S, overlooks=False) > 0.0
 
 
 def test_the_clock_hardly_runs_while_a_client_asks() -> None:
@@ -153,7 +154,7 @@ def test_a_client_that_never_reads_again_does_not_stop_the_world_for_others(worl
     deaf = RtdeReader(running.host)
     reader = RtdeReader(running.host)
     began_s = reader.newest_s()
-    wait_for(lambda: reader.newest_s() > began_s + 10.0, "ten seconds of the world")
+    wait_for(lambda: reader.newest_s() > began_s + 5.0, "five seconds of the world")
     reader.close()
     deaf.close()
 
@@ -163,7 +164,7 @@ def test_a_client_that_comes_back_after_long_is_waited_for_again(world: World) -
     reader = RtdeReader(running.host)
     before_s = reader.newest_s()
     time.sleep(2 * PATIENCE_S)
-    assert reader.newest_s() - before_s > 1.0, "the world waited all the time"
+    assert reader.newest_s() - before_s > 0.2, "the world waited all the time"
     reader.close()
 
 
