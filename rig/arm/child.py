@@ -39,6 +39,7 @@ HEARTBEAT_S = 0.01
 FIRST_PACKET_S = 3.0
 TICK_S = 0.1
 PARENT_TICKS = 20  # 2 s without a sign of the parent's life
+PARENT_SPARED = 2  # … and at most so many times that on a machine that has no processor for it
 PAYLOAD_S = 1.0  # the payload shows in the states within this
 PAYLOAD_TOLERANCE_KG = 0.01
 
@@ -91,7 +92,7 @@ class _Child:
         self._holds_arm = False  # our program may run on the controller
         self._operations_before: int | None = None  # change count before the running move; None when none runs
         self._serving = False  # a request is being served: others, and the parent's signs of life, wait in the pipe
-        self._parent = Silence(os.getppid())
+        self._parent = Silence(os.getppid(), spared=PARENT_SPARED)
 
     def send(self, message: Message) -> None:
         with self._sending:

@@ -2,6 +2,7 @@
 
 import multiprocessing
 import os
+import select
 import signal
 import threading
 from collections.abc import Callable, Iterator
@@ -16,6 +17,7 @@ from rig.errors import Problem
 
 TICK_S = 0.05
 SILENT_TICKS = 10  # 0.5 s without a heartbeat
+SPARED = 4  # … and at most so many times that, when the child's main thread is ready to run and gets no processor
 FROZEN_TICKS = 16  # 0.8 s with heartbeats but no new state
 CROWDED = 2.0  # programs a processor that want to run: from here on a controller is given twice that
 STALE_TICKS = 2  # when the child ends after 0.1 s without a new state, it had lost the arm before
@@ -40,7 +42,7 @@ class ChildLink:
         self._ended = threading.Event()
         self._sending = threading.Lock()
         self._patient = False
-        self._silent = Silence(0)  # no message; counted once the child runs
+        self._silent = Silence(0, spared=SPARED)  # no message; counted once the child runs
         self._beaten = False  # there was a heartbeat since the guard's last tick
         self._frozen_ticks = 0  # with a heartbeat, without a new state
         context = multiprocessing.get_context("spawn")
@@ -63,7 +65,8 @@ class ChildLink:
             self._process.start()
         self._child_pipe.close()
         assert self._process.pid is not None
-        self._silent = Silence(self._process.pid)
+        # Its main thread sends the heartbeats; the client's own threads may wait for a processor as long as they like.
+        self._silent = Silence(self._process.pid, spared=SPARED, thread=self._process.pid)
         for thread in self._threads:
             thread.start()
 
@@ -130,7 +133,7 @@ class ChildLink:
 
     def _guard(self) -> None:
         while not self._ended.wait(TICK_S):
-            self.send(Alive())
+            self._say_alive()
             self._silent.tick()
             self._frozen_ticks += self._beaten
             self._beaten = False
@@ -140,6 +143,18 @@ class ChildLink:
                 return self._give_up("arm_link_lost", f"no new state comes from the arm at {self._host}")
         return None
 
+    def _say_alive(self) -> None:
+        """Tell the child that somebody is there; never wait for it: a child that does not listen is to be noticed."""
+        if not self._sending.acquire(blocking=False):
+            return
+        try:
+            if _writable(self._pipe):
+                self._pipe.send(Alive())
+        except OSError:
+            return
+        finally:
+            self._sending.release()
+
     def _give_up(self, name: str, what: str) -> None:
         """End a child that cannot be trusted any more: a client that reconnects uploads its script again."""
         self._ended.set()
@@ -148,6 +163,13 @@ class ChildLink:
 
     def _lose(self, name: str, what: str) -> None:
         self._on_lost(Problem(name, what, "Look at the arm and its network cable, then start again"))
+
+
+def _writable(pipe: "Connection[Request, Message]") -> bool:
+    """Whether the pipe takes a message at once; where the system cannot be asked, it is taken for granted."""
+    if os.name != "posix":
+        return True
+    return bool(select.select([], [pipe.fileno()], [], 0)[1])
 
 
 def _crowded() -> bool:

@@ -4,7 +4,6 @@ import time
 from pathlib import Path
 
 STARVED = 0.5  # of a tick spent waiting for a processor: more, and a silence in it says nothing about the process
-SPARED = 10  # so many times its limit a silence may last, however busy the machine: the arm is not to be left alone
 NS_PER_S = 1e9
 
 _Times = dict[str, tuple[float, float]]  # by thread: seconds on a processor, seconds waiting for one
@@ -13,13 +12,16 @@ _Times = dict[str, tuple[float, float]]  # by thread: seconds on a processor, se
 class Silence:
     """Counts the ticks without a sign of life from the process `pid`.
 
-    Ticks and not seconds, because the one who counts may be held up itself; and no ticks in which a thread of the other
-    process spent most of the time waiting for a processor. Where the system does not tell (proc(5) of Linux does) all
-    ticks count.
+    Ticks and not seconds, because the one who counts may be held up itself; and no ticks in which the thread whose
+    signs of life are waited for (`thread`, any where it is None) spent most of the time waiting for a processor. Where
+    the system does not tell (proc(5) of Linux does) all ticks count. However busy the machine, a silence lasts at most
+    `spared` times its limit: the arm is not to be left alone.
     """
 
-    def __init__(self, pid: int) -> None:
+    def __init__(self, pid: int, *, spared: int, thread: int | None = None) -> None:
         self._tasks = Path(f"/proc/{pid}/task")
+        self._thread = None if thread is None else str(thread)
+        self._spared = spared
         self.ticks = 0
         self._all_ticks = 0
         self._times: _Times = {}
@@ -38,7 +40,7 @@ class Silence:
 
     def lasts_over(self, limit: int) -> bool:
         """Whether there were more than `limit` silent ticks, or far more when the machine was too busy to tell."""
-        return self.ticks > limit or self._all_ticks > SPARED * limit
+        return self.ticks > limit or self._all_ticks > self._spared * limit
 
     def _starved(self, known: bool) -> bool:
         """Whether the process waited for a processor since the last call; False when that is not `known`.
@@ -52,7 +54,7 @@ class Silence:
             waited_s - before[thread][1] > STARVED * elapsed_s
             or (ran_s - before[thread][0] < (1.0 - STARVED) * elapsed_s and _ready(self._tasks / thread))
             for thread, (ran_s, waited_s) in self._times.items()
-            if thread in before
+            if thread in before and self._thread in (None, thread)
         )
 
 

@@ -58,7 +58,8 @@ class Stopper:
 
     def _stop(self) -> None:
         began_s = time.monotonic()
-        self._send(Stop(BRAKE_RAD_S2))
+        # In a thread of its own: a child that does not listen must not keep the stop from the controller.
+        threading.Thread(target=self._send, args=(Stop(BRAKE_RAD_S2),), name="arm brake", daemon=True).start()
         try:
             with Dashboard(self._host, timeout_s=DASHBOARD_S) as dashboard:
                 dashboard.stop_program()

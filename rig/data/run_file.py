@@ -106,6 +106,8 @@ class RunRecorder:
 
         self.path = path
         self._failure: Exception | None = None
+        self.removed = False  # whether the file is no longer in its place
+        self.removed = False  # whether the file is no longer in its place
         self._controller_time_s: float | None = None
         self._lock = threading.Lock()
         self._pending = _Pending({name: [] for name in sensors}, [], [])
@@ -167,6 +169,7 @@ class RunRecorder:
             while not closing:
                 closing = self._closing.wait(FLUSH_PERIOD_S)
                 self._flush()
+                self.removed = not self.path.exists()  # asked here: a disk that hangs may hold up this thread, no other
             self._file.close()
         except Exception as error:  # whatever it is, the run must hear of it
             self._failure = error
@@ -241,11 +244,19 @@ def _contents(path: Path, timeout_s: float | None) -> Contents:
         raise Refused("no_run_file", f"there is no file {path}", "Give the path of a run.h5")
     if timeout_s is None:
         timeout_s = READ_TIMEOUT_S + path.stat().st_size / READ_BYTES_PER_S
-    command = [sys.executable, "-m", "rig.data.extract", str(path)]
+    # Not from the working folder, where any file could pass for a module, but by what this process finds modules by.
+    command = [sys.executable, "-P", "-m", "rig.data.extract", str(path)]
+    environment = {**os.environ, "PYTHONPATH": os.pathsep.join(filter(None, sys.path))}
     with tempfile.TemporaryFile() as out:
         try:
             done = subprocess.run(
-                command, stdin=subprocess.DEVNULL, stdout=out, stderr=subprocess.PIPE, timeout=timeout_s, check=False
+                command,
+                stdin=subprocess.DEVNULL,
+                stdout=out,
+                stderr=subprocess.PIPE,
+                timeout=timeout_s,
+                check=False,
+                env=environment,
             )
         except subprocess.TimeoutExpired:
             raise _not_a_run_file(path, f"the HDF5 library found no end of it in {timeout_s:.0f} s") from None

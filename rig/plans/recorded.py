@@ -45,7 +45,9 @@ def open_run(path: Path) -> RecordedRun:
         run = read_run(path)
         corrected = _is_corrected(run)
         return RecordedRun(path, () if corrected else (run,), (run,) if corrected else (), alone=True)
-    raw, repeated = (tuple(read_run(file) for file in recordings(path, readings)) for readings in ("raw", "calibrated"))
+    # Corrected readings are compared as one whole movement: what was interrupted before it does not count.
+    files = recordings(path, "raw"), recordings(path, "calibrated")[-1:]
+    raw, repeated = (tuple(map(read_run, each)) for each in files)
     if not raw and not repeated:
         raise Refused("no_run", f"{path} holds no run.h5", "Give a run folder or a run file")
     return RecordedRun(path, raw, repeated)

@@ -92,6 +92,8 @@ class Run:
                     f"{path} is not there any more",
                     "Start a new run, and leave its folder in its place until it has ended",
                 )
+            if phase.procedure.reads_corrected:
+                files = files[-1:]  # one whole movement; what was interrupted before it does not count
             for file in files[:-1]:
                 make_plain(file)  # if the run was killed, only readers that know about it could open its file
             return tuple(read_run(file) for file in files)

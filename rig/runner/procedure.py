@@ -70,7 +70,7 @@ class Recording:
     def check(self) -> None:
         """Raise Fault `recording_failed`, or `run_folder_removed` when the file is no longer in its place."""
         self.recorder.check()
-        if not self.recorder.path.exists():
+        if self.recorder.removed:
             raise Fault(
                 "run_folder_removed",
                 f"{self.recorder.path} was removed or moved away while it was recorded",

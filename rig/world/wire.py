@@ -51,7 +51,10 @@ class SocketTable:
         netlink = self._netlink
         if netlink is None:
             return lambda: 0
-        (far_host, far_port), (near_host, near_port) = connection.getpeername(), connection.getsockname()
+        try:
+            (far_host, far_port), (near_host, near_port) = connection.getpeername(), connection.getsockname()
+        except OSError:  # it has hung up already
+            return lambda: 0
         sockets = _SOCKET_ID.pack(far_port, near_port, socket.inet_aton(far_host), socket.inet_aton(near_host)) + _ANY
         number = next(self._numbers) & 0xFFFFFFFF  # so that nobody takes another's late answer for his own
         request = (

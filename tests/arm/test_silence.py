@@ -10,9 +10,10 @@ from contextlib import contextmanager
 
 import pytest
 
-from rig.arm.silence import SPARED, Silence
+from rig.arm.silence import Silence
 
 TICK_S = 0.05
+SPARED = 10
 
 
 @contextmanager
@@ -34,11 +35,11 @@ def ticks_of(silence: Silence, number: int) -> int:
 def test_a_frozen_process_is_silent_in_every_tick() -> None:
     with process("import time; time.sleep(60)") as frozen:
         frozen.send_signal(signal.SIGSTOP)
-        assert ticks_of(Silence(frozen.pid), 10) == 10
+        assert ticks_of(Silence(frozen.pid, spared=SPARED), 10) == 10
 
 
 def test_a_sign_of_life_ends_a_silence() -> None:
-    silence = Silence(os.getpid())
+    silence = Silence(os.getpid(), spared=SPARED)
     for _ in range(5):
         silence.tick()
     silence.heard()
@@ -48,7 +49,7 @@ def test_a_sign_of_life_ends_a_silence() -> None:
 def test_where_nothing_is_known_of_a_process_every_tick_counts() -> None:
     with process("pass") as ended:
         ended.wait()
-        assert ticks_of(Silence(ended.pid), 4) == 4
+        assert ticks_of(Silence(ended.pid, spared=SPARED), 4) == 4
 
 
 @pytest.mark.skipif(sys.platform != "linux", reason="only Linux tells who waits for a processor")
@@ -59,7 +60,20 @@ def test_ticks_in_which_the_process_waited_for_a_processor_do_not_count_for_ever
         for each in (starved, first, second):
             os.sched_setaffinity(each.pid, {processor})
         os.setpriority(os.PRIO_PROCESS, starved.pid, 19)
-        silence = Silence(starved.pid)
+        silence = Silence(starved.pid, spared=SPARED)
         assert ticks_of(silence, 10) <= 4
         assert not silence.lasts_over(9)
         assert silence.lasts_over(10 // SPARED - 1), "however busy the machine, there is an end"
+
+
+@pytest.mark.skipif(sys.platform != "linux", reason="only Linux tells who waits for a processor")
+def test_a_main_thread_that_hangs_is_silent_though_another_thread_waits_for_a_processor() -> None:
+    """Like a driver whose client spins in a thread of its own: that says nothing for the thread that is waited for."""
+    spinning = "import threading, time, zlib\ndef spin():\n while True: zlib.crc32(bytes(10**6))\n"
+    hanging = spinning + "threading.Thread(target=spin, daemon=True).start()\ntime.sleep(60)"
+    processor = min(os.sched_getaffinity(0))
+    with process(hanging) as hung, process("while True: pass") as first, process("while True: pass") as second:
+        for each in (hung, first, second):
+            os.sched_setaffinity(each.pid, {processor})
+        time.sleep(0.5)  # the interpreter has started
+        assert ticks_of(Silence(hung.pid, spared=SPARED, thread=hung.pid), 10) >= 8

@@ -2,7 +2,7 @@
 
 import pytest
 
-from rig.arm import child, child_link, driver, silence, stopping
+from rig.arm import child, child_link, driver, stopping
 from rig.data import run_file
 from support.house_picture import PAGE, drawn
 
@@ -11,8 +11,8 @@ SAID = [
     f"{child.PARENT_TICKS} of its ticks of {child.TICK_S:g} s",
     f"{child_link.SILENT_TICKS} of its ticks of {1000 * child_link.TICK_S:g} ms",
     f"within {stopping.STOP_S:g} s",
-    f"after {silence.SPARED * child_link.SILENT_TICKS * child_link.TICK_S:g} s at the latest",
-    f"a program that hangs after {silence.SPARED * child.PARENT_TICKS * child.TICK_S:g} s",
+    f"after {child_link.SPARED * child_link.SILENT_TICKS * child_link.TICK_S:g} s at the latest",
+    f"a program that hangs after {child.PARENT_SPARED * child.PARENT_TICKS * child.TICK_S:g} s",
     f"{child_link.FROZEN_TICKS} ticks of heartbeats without a new state",
     f"patient for {child_link.PATIENT_TICKS * child_link.TICK_S:g} s",
     f"at least every {1000 * driver.WATCH_S:g} ms",
