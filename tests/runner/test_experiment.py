@@ -44,7 +44,7 @@ def finished(request: pytest.FixtureRequest, tmp_path_factory: pytest.TempPathFa
         command("run", config, "--out", out, *on_fresh_host()), capture_output=True, text=True, timeout=240, check=False
     )
     assert done.returncode == 0, done.stdout + done.stderr
-    world = yaml.safe_load(config.read_text(encoding="utf-8"))["world"]["sensors"]
+    world = yaml.safe_load((out / "config.yaml").read_text(encoding="utf-8"))["world"]["sensors"]  # bases and all
     return out, json.loads((out / "result.json").read_text(encoding="utf-8")), world
 
 
