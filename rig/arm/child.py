@@ -31,33 +31,17 @@ from rig.arm.messages import (
 )
 from rig.arm.silence import Silence
 from rig.arm.state import ArmState
+from rig.arm.state_stream import Packet, StateStream
 from rig.arm.stopping import BRAKE_RAD_S2
 from rig.errors import Problem
 
-POLL_S = 0.0003  # packets come every 8 ms, or every 0.8 ms when the controller's clock runs ten times faster
 HEARTBEAT_S = 0.01
-FIRST_PACKET_S = 3.0
+FIRST_PACKET_S = 5.0
 TICK_S = 0.1
 PARENT_TICKS = 20  # 2 s without a sign of the parent's life
 PARENT_SPARED = 2  # … and at most so many times that on a machine that has no processor for it
-PAYLOAD_S = 1.0  # the payload shows in the states within this
+PAYLOAD_S = 1.0  # the payload shows in the states within this, by the controller's clock and by this machine's
 PAYLOAD_TOLERANCE_KG = 0.01
-
-# The getters below read exactly these; asking for nothing else keeps the packets small.
-VARIABLES = [
-    "timestamp",
-    "actual_q",
-    "actual_qd",
-    "target_speed_fraction",
-    "speed_scaling",
-    "robot_mode",
-    "safety_mode",
-    "runtime_state",
-    "robot_status_bits",
-    "safety_status_bits",
-    "payload",
-    "payload_cog",
-]
 
 
 def main(pipe: "Connection[Message, Request]", host: str, state_rate_hz: float, log: str | None) -> None:
@@ -72,7 +56,7 @@ def main(pipe: "Connection[Message, Request]", host: str, state_rate_hz: float, 
     try:
         try:
             child.connect()
-        except RuntimeError as error:
+        except OSError as error:
             child.send(Failed(_connection_failure(host, str(error))))
             requests.join()  # the parent reads this and ends the process
         child.stream()
@@ -87,7 +71,8 @@ class _Child:
         self._host = host
         self._state_rate_hz = state_rate_hz
         self._sending = threading.Lock()
-        self._receive: Any = None
+        self._states: StateStream | None = None
+        self._latest: Packet | None = None
         self._control: Any = None
         self._holds_arm = False  # our program may run on the controller
         self._operations_before: int | None = None  # change count before the running move; None when none runs
@@ -99,27 +84,21 @@ class _Child:
             self._pipe.send(message)
 
     def connect(self) -> None:
-        """Open the receive interface and wait for its first packet; `RuntimeError` when the client gives up."""
-        from rtde_receive import RTDEReceiveInterface
-
-        self._receive = RTDEReceiveInterface(self._host, self._state_rate_hz, VARIABLES)
-        deadline = time.monotonic() + FIRST_PACKET_S
-        while not (self._receive.isConnected() and self._receive.getTimestamp() > 0):
-            if time.monotonic() > deadline:
-                raise RuntimeError(f"no state came within {FIRST_PACKET_S:g} s")
-            time.sleep(POLL_S)
-        x, y, z = self._receive.getPayloadCog()
-        self.send(Connected(self._receive.getPayload(), (x, y, z)))
+        """Let the controller send its states and wait for the first; `OSError` when none comes."""
+        self._states = StateStream(self._host, self._state_rate_hz, FIRST_PACKET_S)
+        first = self._latest = self._states.first
+        self.send(Connected(first.payload_kg, first.payload_centre_m))
+        self.send(Heartbeat((first.state,)))
 
     def stream(self) -> NoReturn:
         """Send every state to the parent, in order, until the parent is gone."""
+        assert self._states is not None
         batch: list[ArmState] = []
-        last_s, beat_s = 0.0, time.monotonic()
+        beat_s = time.monotonic()
         while True:
-            state = self._read(last_s)
-            if state:
-                batch.append(state)
-                last_s = state.time_s
+            for packet in self._states.read(HEARTBEAT_S):
+                self._latest = packet
+                batch.append(packet.state)
             self._report_arrival()
             if time.monotonic() - beat_s >= HEARTBEAT_S:
                 beat_s = time.monotonic()
@@ -128,28 +107,6 @@ class _Child:
                 except OSError:
                     self.abandon()
                 batch.clear()
-            time.sleep(POLL_S)
-
-    def _read(self, last_s: float) -> ArmState | None:
-        """The newest packet, or None when it is the last one still; one replaced while it is read is read anew."""
-        receive = self._receive
-        time_s = receive.getTimestamp()
-        if time_s == last_s:
-            return None
-        state = ArmState(
-            time_s=time_s,
-            host_time_s=time.monotonic(),
-            q_rad=tuple(receive.getActualQ()),
-            qd_rad_s=tuple(receive.getActualQd()),
-            target_speed_fraction=receive.getTargetSpeedFraction(),
-            speed_scaling=receive.getSpeedScaling(),
-            robot_mode=receive.getRobotMode(),
-            safety_mode=receive.getSafetyMode(),
-            runtime_state=receive.getRuntimeState(),
-            robot_status_bits=receive.getRobotStatus(),
-            safety_status_bits=receive.getSafetyStatusBits(),
-        )
-        return state if receive.getTimestamp() == time_s else self._read(last_s)
 
     def _report_arrival(self) -> None:
         before = self._operations_before
@@ -206,11 +163,16 @@ class _Child:
             self._holds_arm = False
             return Failed(_control_failure(self._host, str(error)))
         self._control.setPayload(request.payload_kg, list(request.payload_centre_m))
-        deadline = time.monotonic() + PAYLOAD_S
-        while abs(self._receive.getPayload() - request.payload_kg) > PAYLOAD_TOLERANCE_KG:
-            if time.monotonic() > deadline:
+        return self._await_payload(request.payload_kg)
+
+    def _await_payload(self, wanted_kg: float) -> Message:
+        """Wait until the states show the payload."""
+        assert self._latest is not None
+        host_s, arm_s = time.monotonic(), self._latest.state.time_s
+        while abs((latest := self._latest).payload_kg - wanted_kg) > PAYLOAD_TOLERANCE_KG:
+            if min(time.monotonic() - host_s, latest.state.time_s - arm_s) > PAYLOAD_S:
                 self._control.stopScript()
-                return Failed(_payload_failure(self._receive.getPayload(), request.payload_kg))
+                return Failed(_payload_failure(latest.payload_kg, wanted_kg))
             time.sleep(HEARTBEAT_S)
         return ControlTaken()
 

@@ -1,0 +1,155 @@
+"""The arm's states, every one of them: the reading half of RTDE, port 30004, protocol version 2.
+
+The receive interface of `ur_rtde` keeps only the newest packet and does not say when one comes: who is held up for a
+moment, by another thread or by a busy machine, loses states. Here they wait in the socket until they are read. Only
+reading is done here; what drives the arm is `ur_rtde`. (Real-Time Data Exchange guide of the maker: packages of a
+big-endian size, u16, a type, one letter, and a payload.)
+"""
+
+import select
+import socket
+import struct
+import time
+from collections.abc import Iterator
+from dataclasses import dataclass
+
+from rig.arm.state import ArmState
+
+PORT = 30004
+VERSION = 2
+HEADER = struct.Struct(">HB")
+# What is asked for, with the type it must have. Asking for nothing else keeps the packets small.
+VARIABLES = {
+    "timestamp": "DOUBLE",
+    "actual_q": "VECTOR6D",
+    "actual_qd": "VECTOR6D",
+    "target_speed_fraction": "DOUBLE",
+    "speed_scaling": "DOUBLE",
+    "robot_mode": "INT32",
+    "safety_mode": "INT32",
+    "runtime_state": "UINT32",
+    "robot_status_bits": "UINT32",
+    "safety_status_bits": "UINT32",
+    "payload": "DOUBLE",
+    "payload_cog": "VECTOR3D",
+}
+PACKET = struct.Struct(">B d 6d 6d d d i i I I I d 3d".replace(" ", ""))  # the recipe's number, then these
+
+
+@dataclass(frozen=True, slots=True)
+class Packet:
+    """One packet: the arm's state, and the payload the controller reckons with (kg; m from the flange)."""
+
+    state: ArmState
+    payload_kg: float
+    payload_centre_m: tuple[float, float, float]
+
+
+class StateStream:
+    """A connection over which the controller at `host` sends its state at `rate_hz` of its own time."""
+
+    def __init__(self, host: str, rate_hz: float, timeout_s: float) -> None:
+        """Connects and waits for the first packet. Raises `OSError` when none comes within `timeout_s`."""
+        self._deadline_s = time.monotonic() + timeout_s
+        self._buffer = bytearray()
+        self.closed = False  # by the controller
+        self._socket = socket.create_connection((host, PORT), timeout_s)
+        try:
+            self._socket.setsockopt(socket.IPPROTO_TCP, socket.TCP_NODELAY, 1)
+            self._socket.setblocking(False)
+            self._set_up(rate_hz)
+            self._first = self._await_packet()
+        except BaseException:
+            self._socket.close()
+            raise
+
+    @property
+    def first(self) -> Packet:
+        """The packet that came first; `read` returns those after it."""
+        return self._first
+
+    def read(self, timeout_s: float) -> list[Packet]:
+        """The packets that have come, oldest first; waits for one for at most `timeout_s`. Empty once `closed`."""
+        if self.closed:
+            time.sleep(timeout_s)
+            return []
+        if select.select([self._socket], [], [], timeout_s)[0]:
+            self._receive()
+        return [_packet(payload) for kind, payload in self._packages() if kind == "U"]
+
+    def _set_up(self, rate_hz: float) -> None:
+        if self._ask("V", struct.pack(">H", VERSION)) != b"\1":
+            raise ConnectionError(f"it does not speak version {VERSION} of RTDE")
+        answer = self._ask("O", struct.pack(">d", rate_hz) + ",".join(VARIABLES).encode())
+        types = answer[1:].decode().split(",")
+        wrong = [name for name, type_ in zip(VARIABLES, types, strict=False) if type_ != VARIABLES[name]]
+        if wrong or len(types) != len(VARIABLES):
+            raise ConnectionError(f"it does not send {', '.join(wrong) or 'what was asked for'}")
+        if self._ask("S", b"") != b"\1":
+            raise ConnectionError("it does not start to send")
+
+    def _ask(self, kind: str, payload: bytes) -> bytes:
+        """One question and its answer; messages in between are passed over."""
+        self._socket.sendall(HEADER.pack(HEADER.size + len(payload), ord(kind)) + payload)
+        while True:
+            self._await_bytes()
+            for answered, answer in self._packages():
+                if answered == kind:
+                    return answer
+
+    def _await_packet(self) -> Packet:
+        while True:
+            for kind, payload in self._packages():
+                if kind == "U":
+                    return _packet(payload)
+            self._await_bytes()
+
+    def _await_bytes(self) -> None:
+        left_s = self._deadline_s - time.monotonic()
+        if left_s <= 0.0 or not select.select([self._socket], [], [], left_s)[0]:
+            raise TimeoutError("it does not answer")
+        self._receive()
+        if self.closed:
+            raise ConnectionError("it closed the connection")
+
+    def _receive(self) -> None:
+        try:
+            data = self._socket.recv(65536)
+        except BlockingIOError:
+            return
+        except OSError:
+            data = b""
+        self.closed = not data
+        self._buffer += data
+
+    def _packages(self) -> Iterator[tuple[str, bytes]]:
+        """The whole packages among the bytes that have come."""
+        while len(self._buffer) >= HEADER.size:
+            size, kind = HEADER.unpack_from(self._buffer)
+            if size < HEADER.size:
+                self.closed = True  # not RTDE: nothing that follows can be trusted
+                return
+            if len(self._buffer) < size:
+                return
+            payload = bytes(self._buffer[HEADER.size : size])
+            del self._buffer[:size]
+            yield chr(kind), payload
+
+
+def _packet(payload: bytes) -> Packet:
+    values = PACKET.unpack(payload)
+    fraction, scaling, robot_mode, safety_mode, runtime_state, robot_bits, safety_bits, payload_kg = values[14:22]
+    state = ArmState(
+        time_s=values[1],
+        host_time_s=time.monotonic(),
+        q_rad=values[2:8],
+        qd_rad_s=values[8:14],
+        target_speed_fraction=fraction,
+        speed_scaling=scaling,
+        robot_mode=robot_mode,
+        safety_mode=safety_mode,
+        runtime_state=runtime_state,
+        robot_status_bits=robot_bits,
+        safety_status_bits=safety_bits,
+    )
+    return Packet(state, payload_kg, values[22:25])
