@@ -43,7 +43,6 @@ class ControlSession:
 
     closing = False
     dialogue = False
-    newest_only = False
 
     def __init__(self, world: World) -> None:
         self._world = world

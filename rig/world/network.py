@@ -5,6 +5,7 @@ import socket
 import time
 from collections.abc import Callable
 from contextlib import suppress
+from math import inf
 from typing import Protocol
 
 from rig.errors import Refused
@@ -12,7 +13,7 @@ from rig.world.clock import TICK_S
 from rig.world.wire import SocketTable, Wire
 
 BACKLOG_BYTES = 1 << 16  # a client that does not read loses packages beyond this
-UNPACED = 1 << 30  # the allowance of a client that nobody waits for
+UNPACED = inf  # the lag of a client that nobody waits for
 
 
 class Session(Protocol):
@@ -23,10 +24,6 @@ class Session(Protocol):
     @property
     def dialogue(self) -> bool:
         """Whether a client speaks with it by question and answer, each waiting for the one before."""
-
-    @property
-    def newest_only(self) -> bool:
-        """Whether a client overlooks what it sends when the next comes at once."""
 
     def greeting(self) -> bytes: ...
     def receive(self, data: bytes) -> bytes: ...
@@ -41,8 +38,8 @@ class Connection:
         self._network, self._peer, self.session, self.listener = network, peer, session, listener
         self._unsent = bytearray()
         self._due = b""  # what the last tick made for this client and its wire does not take yet
-        self._ticks = 0  # since something was sent at a tick
-        self._wire = Wire(network.sockets.unread(peer), listener.allowance, time.monotonic)
+        self._ticks = 0
+        self._wire = Wire(network.sockets.unread(peer), listener.lag_s, time.monotonic)
         peer.setblocking(False)
         with suppress(OSError):
             peer.setsockopt(socket.IPPROTO_TCP, socket.TCP_NODELAY, 1)
@@ -75,14 +72,12 @@ class Connection:
         self._due = self.session.tick()
 
     def deliver(self) -> float:
-        """Send what the last tick made if the client has taken what came before; else the wall time to wait."""
-        self._wire.look()
+        """Send what the last tick made if the client is not too far behind; else the wall time to wait."""
         if not self._due or self.listener.silent:
             return 0.0
-        wait_s = self._wire.wait_s(self._ticks * TICK_S, overlooks=self.session.newest_only)
+        wait_s = self._wire.wait_s(self._ticks * TICK_S)
         if wait_s <= 0.0:
             due, self._due = self._due, b""
-            self._ticks = 0
             self.send(due)
         return wait_s
 
@@ -90,7 +85,7 @@ class Connection:
         """Send as much as goes now, keep the rest; whole packages are dropped when the client does not read."""
         if not data or self.listener.silent:
             return
-        self._wire.sent()
+        self._wire.sent(self._ticks * TICK_S)
         if not self._unsent:
             try:
                 sent = self._peer.send(data)
@@ -155,7 +150,7 @@ class Connection:
 class Listener:
     """One port. `limit` bounds the clients at a time: further ones are hung up on at once.
 
-    A client may have `allowance` bytes unread before the world waits for it.
+    A client may be `lag_s` of the world's time behind before the world waits for it.
     """
 
     def __init__(
@@ -165,10 +160,10 @@ class Listener:
         new_session: Callable[[], Session],
         *,
         limit: int,
-        allowance: int,
+        lag_s: float,
     ) -> None:
         self._network, self._address = network, address
-        self._new_session, self._limit, self.allowance = new_session, limit, allowance
+        self._new_session, self._limit, self.lag_s = new_session, limit, lag_s
         self.silent = False
         self._socket: socket.socket | None = None
         self.open()
@@ -247,9 +242,9 @@ class Network:
         self.connections: list[Connection] = []
 
     def listen(
-        self, host: str, port: int, new_session: Callable[[], Session], *, limit: int = 16, allowance: int = UNPACED
+        self, host: str, port: int, new_session: Callable[[], Session], *, limit: int = 16, lag_s: float = UNPACED
     ) -> Listener:
-        listener = Listener(self, (host, port), new_session, limit=limit, allowance=allowance)
+        listener = Listener(self, (host, port), new_session, limit=limit, lag_s=lag_s)
         self.listeners.append(listener)
         return listener
 

@@ -28,15 +28,14 @@ if TYPE_CHECKING:
     from rig.world.board.pty_port import PtyPort
 
 IDLE_POLL_S = 0.2
-SERIAL_BYTES = 1 << 15  # on their way from the board to the host: more would be lost in the end
-# What answers on a port, and how many bytes a client may have unread before the world waits for it. Of RTDE packets
-# clients keep only the newest.
-ARM_PORTS: dict[int, tuple[Callable[[Robot], Session], int]] = {
+ARM_LAG_S = 0.04  # of the world's time, that a reader of the arm's states may be behind: five packets at 125 Hz
+SERIAL_LAG_S = 1.0  # … and a reader of the serial line, where nothing is lost that the system can hold
+ARM_PORTS: dict[int, tuple[Callable[[Robot], Session], float]] = {
     dashboard_server.PORT: (dashboard_server.DashboardSession, UNPACED),
     script_socket.PRIMARY_PORT: (primary.PrimarySession, UNPACED),
     script_socket.SECONDARY_PORT: (primary.PrimarySession, UNPACED),
     script_socket.REALTIME_PORT: (script_socket.ScriptSession, UNPACED),
-    rtde.PORT: (rtde.RtdeSession, 0),
+    rtde.PORT: (rtde.RtdeSession, ARM_LAG_S),
 }
 
 
@@ -54,11 +53,11 @@ class World:
         host, board_url = loaded.config.arm.host, loaded.config.board.port
         try:
             self.arm_listeners = [
-                self.network.listen(host, port, partial(new_session, self.laboratory.robot), allowance=allowance)
-                for port, (new_session, allowance) in ARM_PORTS.items()
+                self.network.listen(host, port, partial(new_session, self.laboratory.robot), lag_s=lag_s)
+                for port, (new_session, lag_s) in ARM_PORTS.items()
             ]
             self.board_listener = self.network.listen(
-                *_board_address(board_url), self._new_serial_session, limit=1, allowance=SERIAL_BYTES
+                *_board_address(board_url), self._new_serial_session, limit=1, lag_s=SERIAL_LAG_S
             )
             control_port = section.control_port
             self.network.listen(host, control_port, lambda: ControlSession(self))

@@ -1,8 +1,8 @@
-"""How far a client is behind: what it was sent and has not taken, and how much time it needs before the next packet.
+"""How far a client is behind: what it was sent and has not taken.
 
-The world's clock is paced by this, as a sender is by a wire that carries one packet at a time. Nothing is asked of the
-client: where both ends are on one Linux machine, the system knows how many bytes wait in the other end's socket
-(sock_diag(7)). Elsewhere they count as taken.
+The world's clock is paced by this, as a sender is by a wire. Nothing is asked of the client: where both ends are on one
+Linux machine, the system knows how many bytes wait in the other end's socket (sock_diag(7)). Elsewhere they count as
+taken.
 """
 
 import itertools
@@ -10,16 +10,10 @@ import socket
 import struct
 from collections.abc import Callable
 
-# So long a client is waited for; until it has caught up it then gets its packets as fast as from a real controller.
-# One that often lets the world wait longer than the least is waited for less: a real controller would not wait at all.
+# So long (wall time) a client is waited for; until it has caught up it then gets what it is sent as fast as from a real
+# controller. One that often lets the world wait longer than the least is waited for less.
 LEAST_PATIENCE_S, PATIENCE_S = 0.3, 0.7
 REGAINED = 0.1  # of the time that passes, in patience
-# A client that keeps only the newest packet must look at one before the next comes, so it is given some time after it
-# has taken one: so many times as long as it took of late, which grows with the load of the machine.
-LATENESS = 2.0
-LEAST_S = 0.0004  # … and at least this
-LATEST_S = 0.01  # a client that once was later than this is not given more for it
-FORGETTING = 0.99  # of how late a client was, at every packet
 LOOK_S = (0.0001, 0.001)  # time between two looks at a client that is waited for: a quarter of its delay, within these
 
 Unread = Callable[[], int]
@@ -84,53 +78,41 @@ class SocketTable:
 
 
 class Wire:
-    """One client's pace: `look` at it often, and send the next packet when `wait_s` is 0.
+    """One client's pace: it may be `lag_s` of the world's time behind before the world waits for it."""
 
-    The wire is free while at most `allowance` bytes are unread.
-    """
-
-    def __init__(self, unread: Unread, allowance: int, wall: Callable[[], float]) -> None:
-        self._unread, self._allowance, self._wall = unread, allowance, wall
-        self._sent_s: float | None = None  # when the first packet went that is not known to be taken
-        self._seen_unread = False
-        self._taken_s = wall()
-        self._late_s = 0.0
-        self._newest_s = 0.0  # when the last packet went
+    def __init__(self, unread: Unread, lag_s: float, wall: Callable[[], float]) -> None:
+        self._unread, self._lag_s, self._wall = unread, lag_s, wall
+        self._behind_since_s: float | None = None  # the world's time of the first packet that is not known to be taken
+        self._waiting_since_s: float | None = None  # wall time, as everything below
         self._patience_s = PATIENCE_S
+        self._settled_s = wall()
+        self._sent_s, self._sent_time_s = 0.0, 0.0  # of the last packet, and the world's time then
 
-    def sent(self) -> None:
-        """Something was sent."""
-        self._newest_s = self._wall()
-        if self._sent_s is None:
-            self._sent_s, self._seen_unread = self._newest_s, False
+    def sent(self, time_s: float) -> None:
+        """Something was sent at `time_s` of the world."""
+        self._sent_s, self._sent_time_s = self._wall(), time_s
+        if self._behind_since_s is None:
+            self._behind_since_s = time_s
 
-    def look(self) -> None:
-        """See whether the client has taken what was sent."""
-        if self._sent_s is None:
-            return
-        if self._unread() > self._allowance:
-            self._seen_unread = True
-            return
+    def wait_s(self, time_s: float) -> float:
+        """Wall time until the next look; 0 when what came about at `time_s` of the world may be sent."""
+        if self._behind_since_s is None or time_s - self._behind_since_s <= self._lag_s:
+            return 0.0
         now_s = self._wall()
-        # What is gone at the first look may have been for long: then it was this process that was late.
-        late_s = (now_s - self._sent_s) * self._seen_unread
-        self._late_s = max(min(late_s, LATEST_S), self._late_s * FORGETTING)
-        spent_s = max(0.0, min(late_s, self._patience_s) - LEAST_PATIENCE_S)
-        regained_s = REGAINED * (now_s - self._taken_s)
+        if not self._unread():
+            self._settle(now_s)
+            return 0.0
+        if self._waiting_since_s is None:
+            self._waiting_since_s = now_s
+        waited_s = now_s - self._waiting_since_s
+        if waited_s > self._patience_s:
+            return max(0.0, self._sent_s + time_s - self._sent_time_s - now_s)
+        return min(max(LOOK_S[0], waited_s / 4), LOOK_S[1])
+
+    def _settle(self, now_s: float) -> None:
+        """The client has caught up."""
+        waited_s = 0.0 if self._waiting_since_s is None else now_s - self._waiting_since_s
+        spent_s = max(0.0, min(waited_s, self._patience_s) - LEAST_PATIENCE_S)
+        regained_s = REGAINED * (now_s - self._settled_s)
         self._patience_s = min(self._patience_s - spent_s + regained_s, PATIENCE_S)
-        self._taken_s, self._sent_s = now_s, None
-
-    def wait_s(self, interval_s: float, *, overlooks: bool) -> float:
-        """Wall time until the next look; 0 when the next packet may go.
-
-        `interval_s` is the virtual time since the last one, which is what a real controller gives a client. One that
-        `overlooks` a packet when the next comes at once has time to look at it.
-        """
-        now_s = self._wall()
-        if self._sent_s is None:
-            time_s = min(max(self._late_s * LATENESS, LEAST_S), interval_s) if overlooks else 0.0
-            return max(0.0, self._taken_s + time_s - now_s)
-        delay_s = now_s - self._sent_s
-        if delay_s > self._patience_s:
-            return max(0.0, self._newest_s + interval_s - now_s)
-        return min(max(LOOK_S[0], delay_s / 4), LOOK_S[1])
+        self._settled_s, self._behind_since_s, self._waiting_since_s = now_s, None, None

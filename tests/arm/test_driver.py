@@ -111,7 +111,6 @@ def test_moves_arrive_in_time_and_states_come_without_gaps(world: World) -> None
     with Arm(laboratory.host, states.append, state_rate_hz=500) as arm:
         arm.take_control(*PAYLOAD)
         assert laboratory.state()["payload_kg"] == pytest.approx(PAYLOAD[0])
-        first, missed = len(states) - 1, arm.missed_states
         out = turn(arm.latest.q_rad, 1.0)
         began_s = arm.latest.time_s
         arm.move(out)
@@ -124,11 +123,9 @@ def test_moves_arrive_in_time_and_states_come_without_gaps(world: World) -> None
         assert arm.stop() == outcome
     planned_s = 2 * out.duration_s + 0.2
     assert planned_s - 0.02 <= took_s <= planned_s + 3 * 0.05  # three hand-overs
-    gaps_s = [after.time_s - before.time_s for before, after in pairwise(states[first:])]
-    # The client keeps only the newest packet: on a busy machine some are replaced unread, and counted.
-    assert sum(round(gap_s * 500) - 1 for gap_s in gaps_s) == arm.missed_states - missed
-    assert len(gaps_s) > 125 * planned_s
-    assert max(gaps_s) < 0.05
+    assert arm.missed_states == 0
+    times_s = [state.time_s for state in states]
+    np.testing.assert_allclose(np.diff(times_s), 1 / 500, atol=1e-9)
     record = np.array([state.to_record() for state in states], ARM_STATE_DTYPE)
     assert np.ptp(record["q_rad"][:, WRIST_3]) == pytest.approx(1.0, abs=1e-3)
     assert np.all(np.diff(record["time_s"]) > 0)

@@ -13,13 +13,15 @@ import pytest
 from rig.arm.driver import Arm
 from rig.arm.motion import Transfer, trapezoid_duration
 from rig.world.clock import DIALOGUE_S, DIALOGUE_TICK_S, TICK_S, Clock
-from rig.world.wire import LATEST_S, LEAST_S, PATIENCE_S, Wire
+from rig.world.process import ARM_LAG_S
+from rig.world.wire import PATIENCE_S, Wire
 from support.arm_client import wait_for
 from support.arm_relay import relay
 from support.rtde_reader import RtdeReader
 from support.worlds import World
 
 PERIOD_S = 0.008  # between packets at 125 Hz
+LAG_S = 5.5 * PERIOD_S
 FAST = {"world": {"time_scale": 50}}
 linux = pytest.mark.skipif(sys.platform != "linux", reason="only Linux tells what another program has not read")
 
@@ -38,77 +40,61 @@ class Wall:
 
 
 class Client:
-    """The bytes a client has not read, and the wire to it."""
+    """The bytes a client has not read, the wire to it, and the world that sends a packet every 8 ms of its time."""
 
-    def __init__(self, allowance: int = 0) -> None:
-        self.wall, self.unread = Wall(), 0
-        self.wire = Wire(lambda: self.unread, allowance, self.wall)
+    def __init__(self) -> None:
+        self.wall, self.unread, self.time_s = Wall(), 0, 0.0
+        self.wire = Wire(lambda: self.unread, LAG_S, self.wall)
 
-    def is_sent(self, size: int) -> None:
-        self.wire.sent()
-        self.unread += size
-        self.wire.look()
+    def is_sent(self, packets: int) -> None:
+        for _ in range(packets):
+            self.time_s += PERIOD_S
+            self.wire.sent(self.time_s)
+            self.unread += 100
+
+    @property
+    def wait_s(self) -> float:
+        return self.wire.wait_s(self.time_s + PERIOD_S)
 
     def takes_all(self, after_s: float) -> None:
+        assert self.wait_s > 0.0
         self.wall.passes(after_s)
         self.unread = 0
-        self.wire.look()
+        assert self.wait_s == 0.0
 
 
-def test_the_next_packet_waits_until_the_last_one_is_taken() -> None:
+def test_the_world_waits_for_a_client_that_is_behind() -> None:
     client = Client()
-    client.is_sent(100)
-    client.wall.passes(PATIENCE_S / 2)
-    assert client.wire.wait_s(PERIOD_S, overlooks=True) > 0.0
-    client.takes_all(after_s=0.0)
-    client.wall.passes(PERIOD_S)
-    assert client.wire.wait_s(PERIOD_S, overlooks=True) == 0.0
-
-
-def test_a_client_has_time_to_look_at_a_packet_and_a_late_one_has_more() -> None:
-    client = Client()
-    client.is_sent(100)
-    client.takes_all(after_s=LEAST_S / 10)
-    assert client.wire.wait_s(PERIOD_S, overlooks=True) == pytest.approx(LEAST_S)
-    client.is_sent(100)
-    client.takes_all(after_s=LATEST_S / 5)
-    assert LEAST_S < client.wire.wait_s(PERIOD_S, overlooks=True) < PERIOD_S
-
-
-def test_no_client_has_more_time_than_a_real_controller_gives_it() -> None:
-    client = Client()
-    client.is_sent(100)
-    client.takes_all(after_s=PATIENCE_S / 2)
-    assert client.wire.wait_s(PERIOD_S, overlooks=True) == pytest.approx(PERIOD_S)
+    client.is_sent(5)
+    assert client.wait_s == 0.0
+    client.is_sent(1)
+    assert client.wait_s > 0.0
+    client.takes_all(after_s=0.1)
+    client.is_sent(5)
+    assert client.wait_s == 0.0, "it had caught up"
 
 
 def test_a_client_that_hangs_is_waited_for_only_so_long_and_then_gets_what_a_real_controller_sends() -> None:
     client = Client()
-    client.is_sent(100)
+    client.is_sent(6)
+    assert client.wait_s > 0.0
     client.wall.passes(PATIENCE_S * 1.01)
-    assert client.wire.wait_s(PERIOD_S, overlooks=True) == 0.0
-    client.is_sent(100)
-    assert client.wire.wait_s(PERIOD_S, overlooks=True) == pytest.approx(PERIOD_S)
-    client.wall.passes(PERIOD_S)
-    assert client.wire.wait_s(PERIOD_S, overlooks=True) == 0.0, "it has not caught up"
+    assert client.wait_s == 0.0
+    client.is_sent(1)
+    assert client.wait_s == pytest.approx(PERIOD_S)
+    client.wall.passes(PERIOD_S * 1.01)
+    assert client.wait_s == 0.0, "it has not caught up"
 
 
 def test_a_client_that_is_slow_again_and_again_is_not_waited_for_each_time() -> None:
     client = Client()
     for _ in range(4):
-        client.is_sent(100)
+        client.is_sent(6)
         client.takes_all(after_s=0.6)
-    client.is_sent(100)
+    client.is_sent(6)
+    assert client.wait_s > 0.0
     client.wall.passes(0.5)
-    assert client.wire.wait_s(PERIOD_S, overlooks=True) == 0.0
-
-
-def test_a_client_that_reads_every_byte_may_be_some_behind() -> None:
-    client = Client(allowance=1000)
-    client.is_sent(900)
-    assert client.wire.wait_s(PERIOD_S, overlooks=False) == 0.0
-    client.is_sent(900)
-    assert client.wire.wait_s(PERIOD_S, overlooks=False) > 0.0
+    assert client.wait_s == 0.0
 
 
 def test_the_clock_hardly_runs_while_a_client_asks() -> None:
@@ -129,24 +115,15 @@ def test_the_clock_hardly_runs_while_a_client_asks() -> None:
 
 
 @linux
-@pytest.mark.parametrize("pause_s", [0.003, 0.02])
-def test_a_slow_client_that_keeps_only_the_newest_packet_misses_none(world: World, pause_s: float) -> None:
+@pytest.mark.parametrize("pause_s", [0.003, 0.02, 0.25])
+def test_the_world_does_not_run_ahead_of_a_slow_client(world: World, pause_s: float) -> None:
     reader = RtdeReader(world(FAST).host)
-    times_s = []
-    for _ in range(100):
-        times_s.append(reader.newest_s())
+    times_s = [reader.newest_s()]
+    for _ in range(6):
         time.sleep(pause_s)
+        times_s.append(reader.newest_s())
     reader.close()
-    assert max(after - before for before, after in pairwise(times_s)) == pytest.approx(PERIOD_S)
-
-
-@linux
-def test_a_client_that_stalls_for_half_a_second_misses_nothing(world: World) -> None:
-    reader = RtdeReader(world(FAST).host)
-    before_s = reader.newest_s()
-    time.sleep(0.5)
-    assert reader.newest_s() - before_s == pytest.approx(PERIOD_S)
-    reader.close()
+    assert max(after - before for before, after in pairwise(times_s)) < ARM_LAG_S + 2 * PERIOD_S
 
 
 def test_a_client_that_never_reads_again_does_not_stop_the_world_for_others(world: World) -> None:
@@ -210,4 +187,4 @@ def test_a_driver_that_stalls_for_a_moment_misses_no_state(world: World) -> None
 
         arm.move(turn(arm), stall)
         assert next(stalls, None) is None, "nothing stalled"
-        assert arm.missed_states - missed <= 3
+        assert arm.missed_states == missed

@@ -72,7 +72,6 @@ class SerialSession:
 
     closing = False
     dialogue = False
-    newest_only = False
 
     def __init__(self, line: SerialLine) -> None:
         self._line = line

@@ -30,7 +30,6 @@ class DashboardSession:
     """One connection to the dashboard."""
 
     dialogue = True
-    newest_only = False
 
     def __init__(self, robot: Robot) -> None:
         self._robot = robot

@@ -33,7 +33,6 @@ class PrimarySession:
 
     closing = False
     dialogue = True
-    newest_only = False
 
     def __init__(self, robot: Robot) -> None:
         self._robot = robot

@@ -85,11 +85,6 @@ class RtdeSession:
         """A client asks until its recipes are set up; then it reads, and writes registers."""
         return not self._started
 
-    @property
-    def newest_only(self) -> bool:
-        """Clients that only read keep the newest package; those that write as well wait for what it says to change."""
-        return not self._inputs
-
     def greeting(self) -> bytes:
         return b""
 

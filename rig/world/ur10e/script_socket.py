@@ -88,7 +88,6 @@ class ScriptSession:
 
     closing = False
     dialogue = True
-    newest_only = False
 
     def __init__(self, robot: Robot) -> None:
         self._robot = robot
