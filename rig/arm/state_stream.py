@@ -12,6 +12,9 @@ import struct
 import time
 from collections.abc import Iterator
 from dataclasses import dataclass
+from itertools import zip_longest
+from types import TracebackType
+from typing import Self
 
 from rig.arm.state import ArmState
 
@@ -63,6 +66,14 @@ class StateStream:
             self._socket.close()
             raise
 
+    def __enter__(self) -> Self:
+        return self
+
+    def __exit__(
+        self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
+    ) -> None:
+        self._socket.close()
+
     @property
     def first(self) -> Packet:
         """The packet that came first; `read` returns those after it."""
@@ -75,16 +86,20 @@ class StateStream:
             return []
         if select.select([self._socket], [], [], timeout_s)[0]:
             self._receive()
-        return [_packet(payload) for kind, payload in self._packages() if kind == "U"]
+        try:
+            return [_packet(payload) for kind, payload in self._packages() if kind == "U"]
+        except (ConnectionError, struct.error):  # what is not readable is a link that is lost
+            self.closed = True
+            return []
 
     def _set_up(self, rate_hz: float) -> None:
         if self._ask("V", struct.pack(">H", VERSION)) != b"\1":
             raise ConnectionError(f"it does not speak version {VERSION} of RTDE")
         answer = self._ask("O", struct.pack(">d", rate_hz) + ",".join(VARIABLES).encode())
         types = answer[1:].decode().split(",")
-        wrong = [name for name, type_ in zip(VARIABLES, types, strict=False) if type_ != VARIABLES[name]]
-        if wrong or len(types) != len(VARIABLES):
-            raise ConnectionError(f"it does not send {', '.join(wrong) or 'what was asked for'}")
+        wrong = [name for name, type_ in zip_longest(VARIABLES, types[: len(VARIABLES)]) if type_ != VARIABLES[name]]
+        if wrong:
+            raise ConnectionError(f"it does not send {', '.join(wrong)}")
         if self._ask("S", b"") != b"\1":
             raise ConnectionError("it does not start to send")
 
@@ -127,8 +142,7 @@ class StateStream:
         while len(self._buffer) >= HEADER.size:
             size, kind = HEADER.unpack_from(self._buffer)
             if size < HEADER.size:
-                self.closed = True  # not RTDE: nothing that follows can be trusted
-                return
+                raise ConnectionError("this is no RTDE")  # nothing that follows can be trusted
             if len(self._buffer) < size:
                 return
             payload = bytes(self._buffer[HEADER.size : size])

@@ -1,0 +1,143 @@
+"""The arm's states as they come over the wire, whole or in pieces, and controllers that do not send them."""
+
+import socket
+import threading
+import time
+from collections.abc import Callable, Iterator
+
+import pytest
+
+from rig.arm.state_stream import HEADER, PACKET, PORT, VARIABLES, StateStream
+from support.worlds import fresh_host
+
+TYPES = ",".join(VARIABLES.values()).encode()
+
+
+def package(kind: str, payload: bytes) -> bytes:
+    return HEADER.pack(HEADER.size + len(payload), ord(kind)) + payload
+
+
+def data(time_s: float) -> bytes:
+    return package("U", PACKET.pack(1, time_s, *range(12), 1.0, 1.0, 7, 1, 2, 3, 1, 0.35, 0.0, 0.0, 0.025))
+
+
+MESSAGE = package("M", b"\2hi\4RTDE\1")
+ANSWERS = {"V": package("V", b"\1"), "O": package("O", b"\1" + TYPES), "S": package("S", b"\1")}
+
+Send = Callable[[bytes], None]
+
+
+class Controller:
+    """Answers the questions of one client by `answers`; `send` sends it what a test likes."""
+
+    def __init__(self, answers: dict[str, bytes]) -> None:
+        self.host = fresh_host()
+        self._answers = answers
+        self._listener = socket.create_server((self.host, PORT))
+        self._client: socket.socket | None = None
+        self._server = threading.Thread(target=self._serve, daemon=True)
+        self._server.start()
+
+    def _serve(self) -> None:
+        self._client, _ = self._listener.accept()
+        for kind in "VOS":
+            asked = b""
+            while len(asked) < HEADER.size or len(asked) < HEADER.unpack_from(asked)[0]:
+                if not (more := self._client.recv(4096)):
+                    return
+                asked += more
+            assert chr(asked[2]) == kind
+            self._client.sendall(self._answers.get(kind, b""))
+
+    def send(self, sent: bytes) -> None:
+        assert self._client is not None
+        self._client.sendall(sent)
+
+    def hang_up(self) -> None:
+        if self._client is not None:
+            self._client.close()
+
+    def close(self) -> None:
+        self.hang_up()
+        self._server.join(5.0)
+        self._listener.close()
+
+
+@pytest.fixture
+def controllers() -> Iterator[Callable[..., Controller]]:
+    running: list[Controller] = []
+
+    def start(**changed: bytes) -> Controller:
+        running.append(Controller({**ANSWERS, **changed}))
+        return running[-1]
+
+    yield start
+    for each in running:
+        each.close()
+
+
+Controllers = Callable[..., Controller]
+
+
+def times_of(stream: StateStream, number: int) -> list[float]:
+    """The time stamps of the next packets."""
+    times_s: list[float] = []
+    end_s = time.monotonic() + 5.0
+    while len(times_s) < number and time.monotonic() < end_s:
+        times_s += [packet.state.time_s for packet in stream.read(0.01)]
+    return times_s
+
+
+def test_every_state_comes_in_order_also_in_pieces_and_among_messages(controllers: Controllers) -> None:
+    controller = controllers(S=MESSAGE + ANSWERS["S"] + MESSAGE + data(1.0) + data(2.0))
+    with StateStream(controller.host, 125.0, 5.0) as stream:
+        assert stream.first.state.time_s == 1.0
+        for byte in data(3.0) + MESSAGE + data(4.0):
+            controller.send(bytes([byte]))
+        assert times_of(stream, 3) == [2.0, 3.0, 4.0]
+
+
+def test_states_wait_for_a_reader_that_is_held_up(controllers: Controllers) -> None:
+    controller = controllers(S=ANSWERS["S"] + data(0.0))
+    with StateStream(controller.host, 125.0, 5.0) as stream:
+        controller.send(b"".join(data(float(k)) for k in range(1, 300)))
+        assert times_of(stream, 299) == [float(k) for k in range(1, 300)]
+
+
+def test_a_state_says_what_the_controller_sent(controllers: Controllers) -> None:
+    with StateStream(controllers(S=ANSWERS["S"] + data(1.5)).host, 125.0, 5.0) as stream:
+        first = stream.first
+    state = first.state
+    assert (state.q_rad, state.qd_rad_s) == (tuple(range(6)), tuple(range(6, 12)))
+    assert (state.robot_mode, state.safety_mode, state.runtime_state) == (7, 1, 2)
+    assert (state.robot_status_bits, state.safety_status_bits) == (3, 1)
+    assert (first.payload_kg, first.payload_centre_m) == (0.35, (0.0, 0.0, 0.025))
+
+
+def test_a_connection_that_closes_gives_no_more_states(controllers: Controllers) -> None:
+    controller = controllers(S=ANSWERS["S"] + data(1.0))
+    with StateStream(controller.host, 125.0, 5.0) as stream:
+        controller.hang_up()
+        assert times_of(stream, 0) == [] and stream.read(0.2) == [] and stream.closed
+        began_s = time.monotonic()
+        assert stream.read(0.05) == [] and time.monotonic() - began_s > 0.04, "it must not spin"
+
+
+@pytest.mark.parametrize(
+    ("answers", "said"),
+    [
+        ({"V": package("V", b"\0")}, "version 2"),
+        ({"O": package("O", b"\1" + TYPES.replace(b"VECTOR3D", b"NOT_FOUND"))}, "payload_cog"),
+        ({"O": package("O", b"\0")}, "timestamp"),
+        ({"S": package("S", b"\0")}, "does not start"),
+        ({"S": ANSWERS["S"]}, "does not answer"),
+        ({"V": b"HTTP/1.1 400 Bad Request\r\n"}, "does not answer|RTDE"),
+        ({"V": b"\0\0\0\0"}, "no RTDE"),
+    ],
+    ids=["version", "a variable", "no recipe", "start", "silence", "another protocol", "zeros"],
+)
+def test_a_controller_that_sends_no_states_is_an_error_that_says_why(
+    controllers: Controllers, answers: dict[str, bytes], said: str
+) -> None:
+    with pytest.raises(OSError, match=said):
+        StateStream(controllers(**answers).host, 125.0, 0.5)
