@@ -10,7 +10,7 @@ from firmware_host.protocol import MESSAGE_BY_CODE, MESSAGE_BY_NAME, OVERHEAD, P
 from firmware_host.stuffing import stuff, unstuff
 
 _BLOCK_MAX = PAYLOAD_MAX + OVERHEAD + 1
-_REMEMBERED = 1024  # frames: more than a buffer on the way holds and may hand on twice
+_REMEMBERED = 200  # frames: more than a buffer on the way hands on twice, and fewer than their sequence counts
 _CRC_OF_INTACT = 0x2144DF1C  # of any bytes followed by their own CRC
 
 

@@ -40,6 +40,7 @@ FIRST_PACKET_S = 5.0
 TICK_S = 0.1
 PARENT_TICKS = 20  # 2 s without a sign of the parent's life
 PARENT_SPARED = 2  # … and at most so many times that on a machine that has no processor for it
+ABANDON_S = 5.0  # the last stop, over the dashboard or over the client, has so long
 PAYLOAD_S = 1.0  # the payload shows in the states within this, by the controller's clock and by this machine's
 PAYLOAD_TOLERANCE_KG = 0.01
 
@@ -197,6 +198,8 @@ class _Child:
     def abandon(self) -> NoReturn:
         """Nobody supervises any more: stop the arm, over the dashboard or else over the client, and leave."""
         if self._holds_arm:
+            # The client's own stop may wait for ever for a controller that is gone; the system's alarm ends that.
+            signal.setitimer(signal.ITIMER_REAL, ABANDON_S)
             try:
                 with Dashboard(self._host) as dashboard:
                     dashboard.stop_program()

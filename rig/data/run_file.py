@@ -107,7 +107,6 @@ class RunRecorder:
         self.path = path
         self._failure: Exception | None = None
         self.removed = False  # whether the file is no longer in its place
-        self.removed = False  # whether the file is no longer in its place
         self._controller_time_s: float | None = None
         self._lock = threading.Lock()
         self._pending = _Pending({name: [] for name in sensors}, [], [])

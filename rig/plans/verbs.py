@@ -23,7 +23,7 @@ class Verbs(Protocol):
         ...
 
     def move(self, transfer: Transfer) -> None:
-        """Bring the arm somewhere; nothing is measured."""
+        """Bring the arm somewhere; nothing is measured. It must be the plan's next motion, as a sweep must."""
         ...
 
     def sweep(self, sweep: Sweep) -> None:

@@ -12,7 +12,7 @@ from math import degrees, radians
 
 from firmware_host.client import Board
 from rig.arm.driver import Arm
-from rig.arm.motion import Plan, Rest, Step, Sweep, Transfer, travel
+from rig.arm.motion import Motion, Plan, Rest, Step, Sweep, Transfer, travel
 from rig.arm.preflight import arm_problems, plan_problems, refuse, step_problems, way_to_home
 from rig.arm.state import ArmReport
 from rig.config.models import ArmSection
@@ -92,6 +92,7 @@ class Rig:
     recording: Recording
     along: BoardCalibration | None
     phase: Phase
+    _motions: Iterator[Motion] | None = None  # the plan's, those to come; None before pre-flight
     _number: int = 0  # of the step that goes on, or the last one
     _done_s: float = 0.0  # planned duration of the steps behind us
     _step_started_s: float = 0.0  # controller time
@@ -112,6 +113,7 @@ class Rig:
         self._refuse_moved()
         x, y, z = (millimetres / 1000 for millimetres in payload.payload_centre_mm)
         self.devices.arm.take_control(payload.payload_kg, (x, y, z))
+        self._motions = iter(self.plan.motions)
 
     def _agree(self) -> None:
         prompt = announcement(self.plan, self.devices.report, self.whole_plan if self.phase.follows else None)
@@ -150,7 +152,8 @@ class Rig:
         self.recording.station.event(SamplingStarted())
 
     def move(self, transfer: Transfer) -> None:
-        """Bring the arm to where the next sweep starts, or home."""
+        """Bring the arm to where the next sweep starts, or home. Raises `unplanned_motion`."""
+        self._refuse_unplanned(transfer)
         with self._step(transfer):
             self.devices.arm.move(transfer, lambda: self._watch(transfer))
 
@@ -158,13 +161,26 @@ class Rig:
         """Turn one wrist through a whole revolution at constant speed and note when it began and ended.
 
         Afterwards, while the arm stands still, the board averages the revolution as well when it calibrates along.
+        Raises `unplanned_motion`.
         """
+        self._refuse_unplanned(sweep)
         if self.along is not None:
             self.along.keep(sweep)
         with self._step(sweep, then=lambda: self._observe(sweep)):
             self.recording.note(SweepStarted(sweep))
             self.devices.arm.move(sweep, lambda: self._watch(sweep))
             self.recording.note(SweepFinished(sweep))
+
+    def _refuse_unplanned(self, motion: Motion) -> None:
+        """Pre-flight has judged the plan's motions, one from the end of the other: nobody has looked at other ways."""
+        what = f"the script orders {motion.name}"
+        remedy = "Let the script make the motions of `plan.steps`, each once, in their order, after `preflight()`"
+        if self._motions is None:
+            raise Refused("unplanned_motion", f"{what} before pre-flight", remedy)
+        due = next(self._motions, None)
+        if motion != due:
+            planned = "no motion is left" if due is None else f"{due.name} comes next"
+            raise Fault("unplanned_motion", f"{what}, but in the plan that passed pre-flight {planned}", remedy)
 
     def _observe(self, sweep: Sweep) -> None:
         if self.along is not None:

@@ -5,16 +5,14 @@ from collections.abc import Callable
 TICKS_PER_SECOND = 500
 TICK_S = 1.0 / TICKS_PER_SECOND
 PATIENCE_S = 0.02  # wall time the world may be behind and still catch up
-DIALOGUE_S = 0.1  # wall time after a client's question in which …
-DIALOGUE_TICK_S = 0.008  # … a tick lasts so long: who asks is not looking at what passes meanwhile
-HURRY = 1.5  # … so many times as fast as it should go: a burst of packets would overrun a client that polls
+DIALOGUE_S = 0.1  # wall time after a client's question in which the clock goes no faster than a real one
 
 
 class Clock:
     """Says how many ticks are due. Virtual time runs at most `time_scale` times as fast as wall time.
 
     When the machine cannot keep up, the lost wall time is forgotten: virtual time slows down instead of jumping.
-    While a client asks and is answered (`dialogue`) it hardly runs.
+    While a client asks and is answered (`dialogue`) it goes no faster than wall time.
     `hold` stops it, `run` lets it go on, `advance` lets exactly so much pass and holds again.
     """
 
@@ -66,10 +64,11 @@ class Clock:
         if now_s - due_s > PATIENCE_S:
             self._anchor()
             return 0.0
-        pace_s = max(period_s, DIALOGUE_TICK_S) if now_s < self._dialogue_until_s else period_s / HURRY
-        return max(0.0, due_s - now_s, self._counted_s + pace_s - now_s)
+        if now_s < self._dialogue_until_s:
+            due_s = max(due_s, self._counted_s + max(TICK_S, period_s))
+        return max(0.0, due_s - now_s)
 
     def count(self) -> None:
-        """A tick begins now: what it costs to make must not come on top of the wait for the next."""
+        """A tick begins now."""
         self.tick += 1
         self._counted_s = self._wall()

@@ -14,6 +14,7 @@ from collections.abc import Callable
 # controller. One that often lets the world wait longer than the least is waited for less.
 LEAST_PATIENCE_S, PATIENCE_S = 0.3, 0.7
 REGAINED = 0.1  # of the time that passes, in patience
+GONE_S = 5.0  # one that has taken nothing for so long reads no more, and slows the world for nobody else
 LOOK_S = (0.0001, 0.001)  # time between two looks at a client that is waited for: a quarter of its delay, within these
 
 Unread = Callable[[], int]
@@ -105,6 +106,8 @@ class Wire:
         if self._waiting_since_s is None:
             self._waiting_since_s = now_s
         waited_s = now_s - self._waiting_since_s
+        if waited_s > GONE_S:
+            return 0.0
         if waited_s > self._patience_s:
             return max(0.0, self._sent_s + time_s - self._sent_time_s - now_s)
         return min(max(LOOK_S[0], waited_s / 4), LOOK_S[1])
