@@ -28,7 +28,7 @@ PROCEDURE = Procedure(name="six_observation", section=SixObservationSection, pla
 @pytest.mark.parametrize(
     ("before", "status", "said"),
     [
-        ("rig.preflight()", 3, "the script orders sweep wrist_"),
+        ("rig.preflight()", 3, "comes next"),
         ("pass", 2, "before pre-flight"),
     ],
 )
