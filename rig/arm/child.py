@@ -1,8 +1,9 @@
 """The supervised process: the only place where the `ur_rtde` client lives.
 
 The client can block for minutes, loop or crash the interpreter when a connection is lost; here that harms nothing but
-this process. The main thread reads states and sends heartbeats; a second thread serves the parent's requests, so that
-a stop is heard while a move runs. When the parent is gone the arm is stopped and the process ends.
+this process. The main thread reads states and sends heartbeats and never waits for the client; other threads serve the
+parent's requests, so that a stop is heard while a move runs, and watch for the end of a move. When the parent is gone
+the arm is stopped and the process ends.
 """
 
 import os
@@ -54,6 +55,7 @@ def main(pipe: "Connection[Message, Request]", host: str, state_rate_hz: float, 
     requests = threading.Thread(target=child.serve, name="requests", daemon=True)
     requests.start()
     threading.Thread(target=child.watch_parent, name="parent watch", daemon=True).start()
+    threading.Thread(target=child.watch_move, name="move watch", daemon=True).start()
     try:
         try:
             child.connect()
@@ -100,7 +102,6 @@ class _Child:
             for packet in self._states.read(HEARTBEAT_S):
                 self._latest = packet
                 batch.append(packet.state)
-            self._report_arrival()
             if time.monotonic() - beat_s >= HEARTBEAT_S:
                 beat_s = time.monotonic()
                 try:
@@ -108,15 +109,6 @@ class _Child:
                 except OSError:
                     self.abandon()
                 batch.clear()
-
-    def _report_arrival(self) -> None:
-        before = self._operations_before
-        if before is None:
-            return
-        status = self._control.getAsyncOperationProgressEx()
-        if status.changeCount() != before and not status.isAsyncOperationRunning():
-            self._operations_before = None
-            self.send(MoveFinished())
 
     def serve(self) -> None:
         """Serve the parent's requests one after the other."""
@@ -143,6 +135,22 @@ class _Child:
             self._parent.tick()
             if self._holds_arm and not self._serving and self._parent.lasts_over(PARENT_TICKS):
                 self.abandon()
+
+    def watch_move(self) -> NoReturn:
+        """Report the end of a move.
+
+        A thread of its own: the client answers only when none of its own threads holds it up, and heartbeats must not
+        wait for that.
+        """
+        while True:
+            time.sleep(HEARTBEAT_S)
+            before = self._operations_before
+            if before is None:
+                continue
+            status = self._control.getAsyncOperationProgressEx()
+            if status.changeCount() != before and not status.isAsyncOperationRunning():
+                self._operations_before = None
+                self.send(MoveFinished())
 
     def _handle(self, request: Request) -> None:
         match request:

@@ -52,7 +52,7 @@ class Silence:
         self._looked_s, self._times = now_s, _times(self._tasks)
         return known and any(
             waited_s - before[thread][1] > STARVED * elapsed_s
-            or (ran_s - before[thread][0] < (1.0 - STARVED) * elapsed_s and _ready(self._tasks / thread))
+            or (ran_s - before[thread][0] < (1.0 - STARVED) * elapsed_s and _held_up(self._tasks / thread))
             for thread, (ran_s, waited_s) in self._times.items()
             if thread in before and self._thread in (None, thread)
         )
@@ -69,8 +69,9 @@ def _times(tasks: Path) -> _Times:
     return times
 
 
-def _ready(task: Path) -> bool:
+def _held_up(task: Path) -> bool:
+    """Whether the thread is ready to run, or waits for memory that the system has put away."""
     try:
-        return (task / "stat").read_text(errors="replace").rpartition(")")[2].split()[0] == "R"
+        return (task / "stat").read_text(errors="replace").rpartition(")")[2].split()[0] in "RD"
     except (OSError, IndexError):
         return False

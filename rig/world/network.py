@@ -53,18 +53,23 @@ class Connection:
         if events & selectors.EVENT_WRITE:
             self._flush()
         if events & selectors.EVENT_READ:
-            try:
-                data = self._peer.recv(65536)
-            except BlockingIOError:
-                return
-            except OSError:
-                data = b""
-            if not data:
-                self.close()
-                return
-            if self.session.dialogue:
-                self._network.on_dialogue()
-            self.send(self.session.receive(data))
+            self.read()
+
+    def read(self) -> bool:
+        """Take what the client has said, and close when it has hung up; whether there may be more."""
+        try:
+            data = self._peer.recv(65536)
+        except BlockingIOError:
+            return False
+        except OSError:
+            data = b""
+        if not data:
+            self.close()
+            return False
+        if self.session.dialogue:
+            self._network.on_dialogue()
+        self.send(self.session.receive(data))
+        return True
 
     def tick(self) -> None:
         """The session's turn; what it has to say goes out as soon as `deliver` finds the wire free."""
@@ -126,17 +131,6 @@ class Connection:
         else:
             selector.unregister(self._peer)
         self._watched = events
-
-    def close_if_gone(self) -> None:
-        """Close when the client has hung up."""
-        try:
-            gone = not self._peer.recv(1, socket.MSG_PEEK)
-        except BlockingIOError:
-            gone = False
-        except OSError:
-            gone = True
-        if gone:
-            self.close()
 
     def close(self) -> None:
         if self in self._network.connections:
@@ -201,7 +195,8 @@ class Listener:
         except OSError:
             return
         for connection in self.connections:
-            connection.close_if_gone()  # its end may be known only after this one's beginning
+            while not self.silent and connection.read():  # its end may be known only after this one's beginning
+                pass
         if len(self.connections) >= self._limit:
             peer.close()
             return

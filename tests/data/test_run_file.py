@@ -200,11 +200,12 @@ def reports(pipe: Connection) -> list[tuple[float, int]]:
 
 
 @pytest.mark.slow
-def test_a_killed_run_opens_and_holds_all_but_the_last_second(tmp_path: Path) -> None:
+@pytest.mark.proof
+def test_a_killed_run_opens_and_holds_all_but_the_last_second(tmp_path: Path, thorough: bool) -> None:
     processes = multiprocessing.get_context("forkserver")
     processes.set_forkserver_preload(["h5py", "rig.data.run_file"])
-    lives = np.random.default_rng(50).uniform(0.0, 2.5, 50)
-    for batch, batch_lives in enumerate(np.array_split(lives, 8)):
+    lives = np.random.default_rng(50).uniform(0.0, 2.5, 48 if thorough else 12)
+    for batch, batch_lives in enumerate(np.array_split(lives, len(lives) // 6)):
         writers = []
         for number in range(len(batch_lives)):
             ours, theirs = processes.Pipe(duplex=False)

@@ -23,7 +23,7 @@ def rig(*arguments: str | Path) -> subprocess.CompletedProcess[str]:
 def python(*arguments: str | Path) -> subprocess.CompletedProcess[str]:
     """`python …`, until it has ended."""
     command = [sys.executable, *map(str, arguments)]
-    return subprocess.run(command, capture_output=True, text=True, timeout=50, check=False)
+    return subprocess.run(command, capture_output=True, text=True, timeout=240, check=False)
 
 
 def configuration(folder: Path, changes: dict[str, Any] | None = None) -> Path:
