@@ -19,7 +19,7 @@ TICK_S = 0.05
 SILENT_TICKS = 10  # 0.5 s without a heartbeat
 SPARED = 4  # … and at most so many times that, when the child's main thread is ready to run and gets no processor
 FROZEN_TICKS = 16  # 0.8 s with heartbeats but no new state
-CROWDED = 2.0  # programs a processor that want to run: from here on a controller is given twice that
+CROWDED = 5.0  # times that is what a controller is given at most, one for each program a processor that wants to run
 STALE_TICKS = 2  # when the child ends after 0.1 s without a new state, it had lost the arm before
 CRASHES = (-signal.SIGSEGV, -signal.SIGABRT)  # how the client itself ends when the arm closes a connection
 PATIENT_TICKS = 240  # 12 s while a client's constructor holds the child's interpreter, at worst until its 5 s time-out
@@ -139,7 +139,7 @@ class ChildLink:
             self._beaten = False
             if self._silent.lasts_over(PATIENT_TICKS if self._patient else SILENT_TICKS):
                 return self._give_up("arm_driver_hung", "the process that talks to the arm no longer answers")
-            if self._frozen_ticks > (PATIENT_TICKS if self._patient else FROZEN_TICKS * (2 if _crowded() else 1)):
+            if self._frozen_ticks > (PATIENT_TICKS if self._patient else FROZEN_TICKS * _crowding()):
                 return self._give_up("arm_link_lost", f"no new state comes from the arm at {self._host}")
         return None
 
@@ -172,11 +172,11 @@ def _writable(pipe: "Connection[Request, Message]") -> bool:
     return bool(select.select([], [pipe.fileno()], [], 0)[1])
 
 
-def _crowded() -> bool:
-    """Whether this machine has far more to do than it can: what is late then may be late by that."""
+def _crowding() -> float:
+    """How many programs a processor of this machine has to serve, 1 to CROWDED: what is late may be late by that."""
     if not hasattr(os, "getloadavg"):  # Windows
-        return False
-    return os.getloadavg()[0] > CROWDED * (os.cpu_count() or 1)
+        return 1.0
+    return min(max(os.getloadavg()[0] / (os.cpu_count() or 1), 1.0), CROWDED)
 
 
 @contextmanager
