@@ -25,17 +25,32 @@ UNTOLD = ("rank_deficient", "ill_conditioned", "too_few_observations")  # what m
 class Seen:
     """What the vector model is made of: sweeps first, then rests, N in all.
 
-    `means_rad_s`, `variances_rad2_s2` (N, 3) of the noise alone; `rates_rad_s` (N, 3) of the flange against the stars
-    where the Earth's rate is known, else against the room; `speed_std_rad_s` (N,); `gravity_m_s2` (N, 3) downwards, in
-    the flange's frame; `windows_s` (N, 2) on the clock of the first recording.
+    `means_rad_s`, `variances_rad2_s2` (N, 3) of the noise alone; `turns_rad_s` (N, 3) rates of the flange in the room,
+    `earth_rad_s` (N, 3) that of the room, as far as it is known; `speed_std_rad_s` (N,); `attitudes` (N, 3, 3) from the
+    base into the flange; `gravity_m_s2` (N, 3) downwards, in the flange's frame; `windows_s` (N, 2) on the clock of the
+    first recording; `joints` (N) which of the arm's joints turned, None for a rest.
     """
 
     means_rad_s: Array
     variances_rad2_s2: Array
-    rates_rad_s: Array
+    turns_rad_s: Array
+    earth_rad_s: Array
     speed_std_rad_s: Array
+    attitudes: Array
     gravity_m_s2: Array
     windows_s: Array
+    joints: tuple[str | None, ...]
+
+    @property
+    def rates_rad_s(self) -> Array:
+        """(N, 3) of the flange against the stars."""
+        rates: Array = self.turns_rad_s + self.earth_rad_s
+        return rates
+
+    def centripetal_m_s2(self, offset_m: Array) -> Array:
+        """(N, 3) acceleration at `offset_m` (3,) from the flange while it turns, in the flange's frame."""
+        outwards: Array = np.cross(self.turns_rad_s, np.cross(self.turns_rad_s, offset_m))
+        return outwards
 
 
 @dataclass(frozen=True, slots=True)
@@ -47,8 +62,13 @@ class Explained:
     seen: Seen
 
 
-def see(observations: Sequence[Observation], rests: Sequence[Average], windows_s: Array, site: Site) -> Seen:
-    """Put together what the arm knows of each average. All of them must have an attitude."""
+def see(
+    observations: Sequence[Observation], rests: Sequence[Average], windows_s: Array, site: Site, clock_error: float
+) -> Seen:
+    """Put together what the arm knows of each average. All of them must have an attitude.
+
+    `clock_error` is how much too fast the controller's clock runs: speeds by it are too small by that.
+    """
     averages = [*(observation.average for observation in observations), *rests]
     attitudes = np.array([average.attitude for average in averages], dtype=np.float64)
     turned = [observation.speed_rad_s * observation.axis_flange for observation in observations]
@@ -56,10 +76,13 @@ def see(observations: Sequence[Observation], rests: Sequence[Average], windows_s
     return Seen(
         means_rad_s=np.array([average.mean_rad_s for average in averages]),
         variances_rad2_s2=np.array([average.variance_rad2_s2 - average.drift_rad2_s2 for average in averages]),
-        rates_rad_s=np.array([*turned, *np.zeros((len(rests), 3))]) + attitudes @ earth,
+        turns_rad_s=np.array([*turned, *np.zeros((len(rests), 3))]) * (1 + clock_error),
+        earth_rad_s=attitudes @ earth,
         speed_std_rad_s=np.array([*(each.speed_std_rad_s for each in observations), *np.zeros(len(rests))]),
+        attitudes=attitudes,
         gravity_m_s2=attitudes @ (-site.gravity_m_s2 * np.array(site.up)),
         windows_s=windows_s,
+        joints=(*(each.joint_name for each in observations), *[None] * len(rests)),
     )
 
 

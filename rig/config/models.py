@@ -314,6 +314,38 @@ class SiteSection(Section):
         return x, y, z
 
 
+class UncertaintySection(Section):
+    """How far off may be what no recording shows. Half-widths: every value within is equally likely."""
+
+    controller_clock_ppm: Positive = Field(
+        default=50.0, description="the arm controller's clock, about which its maker says nothing"
+    )
+    computer_clock_ppm: Positive = Field(
+        default=1.0, description="this computer's clock over a run, disciplined by a time server; 50 without one"
+    )
+    crystal_ppm: Positive = Field(default=20.0, description="the board's 32768 Hz crystal at room temperature")
+    axis_deg: float = Field(
+        default=0.06,
+        ge=0,
+        le=5,
+        description="direction of each wrist's axis by the kinematics that are used: 1 mrad, as of calibrated arms of "
+        "this size (Slamani, Nubiola and Bonev, 2012)",
+    )
+    sensor_offset_mm: float = Field(
+        default=50.0, ge=0, le=1000, description="how far from the flange's axes the sensor sits, either way"
+    )
+    g_sensitivity_deg_s_g: float | None = Field(
+        default=None,
+        ge=0,
+        description="change of a reading for 1 g, where attitudes do not tell it; left out, what is known of the part",
+    )
+    decision_rule: Literal["simple", "guard_band"] = Field(
+        default="simple",
+        description="what a limit is held against: `simple`, the value; `guard_band`, the value and its expanded "
+        "uncertainty, so that at most one in forty is accepted wrongly",
+    )
+
+
 class OutputSection(Section):
     """Where results go."""
 
@@ -331,6 +363,7 @@ class RigConfig(Section):
     procedure: ProcedureSection
     observation: ObservationSection = ObservationSection()
     site: SiteSection = SiteSection()
+    uncertainty: UncertaintySection = UncertaintySection()
     limits: LimitsSection
     output: OutputSection = OutputSection()
 

@@ -9,13 +9,17 @@ RATE_TOLERANCE = 2e-4  # relative: 333.33 stands for 1000/3, and the closest two
 
 @dataclass(frozen=True, slots=True)
 class Part:
-    """One kind of gyroscope: `rates_hz` and `ranges_deg_s` are all it can do, `rates_rule` says the rates in words."""
+    """One kind of gyroscope: `rates_hz` and `ranges_deg_s` are all it can do, `rates_rule` says the rates in words.
+
+    `g_sensitivity_deg_s_g` is how much a reading may change for 1 g, at most.
+    """
 
     rates_hz: tuple[float, ...]
     rates_rule: str
     ranges_deg_s: tuple[float, ...]
     default_rate_hz: float
     default_range_deg_s: float
+    g_sensitivity_deg_s_g: float
 
     def accept_rate(self, rate_hz: float) -> float:
         """The part's own rate that `rate_hz` means. Raises ValueError naming the nearest when there is none."""
@@ -41,6 +45,7 @@ PARTS: Mapping[str, Part] = MappingProxyType(
             ranges_deg_s=(245, 500, 2000),
             default_rate_hz=238,
             default_range_deg_s=245,
+            g_sensitivity_deg_s_g=0.1,  # not stated; that of the MPU-6050, a part of the same kind, PS-MPU-6000A 6.1
         ),
         "mpu9250": Part(  # register map RM-MPU-9250A-00, registers 25 (SMPLRT_DIV) and 27 (GYRO_CONFIG)
             rates_hz=tuple(1000 / (1 + divider) for divider in range(250)),
@@ -48,6 +53,7 @@ PARTS: Mapping[str, Part] = MappingProxyType(
             ranges_deg_s=(250, 500, 1000, 2000),
             default_rate_hz=200,
             default_range_deg_s=250,
+            g_sensitivity_deg_s_g=0.1,  # not stated; that of the MPU-6050, PS-MPU-6000A 6.1
         ),
         "adis16465": Part(  # datasheet, register DEC_RATE; the range is the model's: -1, -2 and -3 have one each
             rates_hz=tuple(2000 / (1 + divider) for divider in range(2000)),
@@ -55,6 +61,7 @@ PARTS: Mapping[str, Part] = MappingProxyType(
             ranges_deg_s=(125, 500, 2000),
             default_rate_hz=200,
             default_range_deg_s=500,
+            g_sensitivity_deg_s_g=0.015,  # as the datasheet of the ADIS16445 states
         ),
     }
 )

@@ -7,10 +7,11 @@ the next; these do not, so that an old recording is judged as it was, or by what
 import json
 from collections.abc import Sequence
 from dataclasses import asdict, dataclass, fields
-from typing import TYPE_CHECKING, Annotated
+from typing import TYPE_CHECKING, Annotated, Literal
 
 from pydantic import Field
 
+from rig.config.sensor_catalogue import PARTS
 from rig.data.checked import Finite, Positive, checked
 from rig.errors import Refused
 from rig.errors.quoting import quote
@@ -70,6 +71,23 @@ class Site:
 
 
 @dataclass(frozen=True, slots=True)
+class Uncertainty:
+    """Half-widths of what no recording shows: all values between, either way, are equally likely.
+
+    `decision_rule` says whether a limit is held against the value alone ("simple") or against the value with its
+    expanded uncertainty ("guard_band").
+    """
+
+    controller_clock_ppm: Positive
+    computer_clock_ppm: Positive
+    crystal_ppm: Positive
+    axis_deg: Annotated[float, Field(ge=0)]
+    sensor_offset_mm: Annotated[float, Field(ge=0)]
+    g_sensitivity_deg_s_g: dict[str, Annotated[float, Field(ge=0)]]
+    decision_rule: Literal["simple", "guard_band"]
+
+
+@dataclass(frozen=True, slots=True)
 class PlannedSweep:
     """A sweep the whole procedure has: its place in the plan, its joint, "cw" or "ccw", its speed."""
 
@@ -85,7 +103,8 @@ class RunSettings:
 
     `to_calibrate` names the sensors the calibration is for, `planned_sweeps` are those of the whole procedure, however
     often the run was interrupted. Recordings of before there was a `site` (None) are solved as they were then: neither
-    gravity nor the Earth's rate is looked for, and a bias that wanders widens the variance of every average alike.
+    gravity nor the Earth's rate is looked for, and a bias that wanders widens the variance of every average alike. Nor
+    do they have an `uncertainty` beyond the noise.
     """
 
     procedure: str
@@ -97,6 +116,7 @@ class RunSettings:
     home_q_rad: Annotated[tuple[Finite, ...], Field(min_length=6, max_length=6)]
     planned_sweeps: tuple[PlannedSweep, ...]
     site: Site | None = None
+    uncertainty: Uncertainty | None = None
 
     @property
     def movement(self) -> tuple[object, ...]:
@@ -145,6 +165,20 @@ def settings_of(config: "RigConfig", plan: "Plan") -> RunSettings:
             PlannedSweep(sweep.index, sweep.joint_name, sweep.direction, sweep.speed_rad_s) for sweep in plan.sweeps
         ),
         site=Site(config.site.up, config.site.gravity_m_s2, config.site.earth_rate_rad_s),
+        uncertainty=_uncertainty(config),
+    )
+
+
+def _uncertainty(config: "RigConfig") -> Uncertainty:
+    """As the file says; a sensor's g-sensitivity is its part's where the file does not say."""
+    section = config.uncertainty
+    said = section.g_sensitivity_deg_s_g
+    return Uncertainty(
+        **section.model_dump(exclude={"g_sensitivity_deg_s_g"}),
+        g_sensitivity_deg_s_g={
+            name: PARTS[sensor.part].g_sensitivity_deg_s_g if said is None else said
+            for name, sensor in config.sensors.items()
+        },
     )
 
 

@@ -1,0 +1,75 @@
+"""The controller's clock, the only standard of size: held against this computer's and the board's crystal.
+
+Both stand in every recording. A speed is 2π over a time of the controller's, so every scale factor errs by what that
+clock errs by.
+"""
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from rig.data.settings import Uncertainty
+from rig.observation.observed_run import ObservedRun
+
+# The board's counter runs from its 32768 Hz crystal by way of a PLL, 576 ppm below the nominal rate (docs/board.md).
+NOMINAL_DRIFT = 4e6 / (122 * 32768) - 1
+LOCKED = 150e-6  # an oscillator farther from that is not held by the crystal
+REAL_TIME = 1e-3  # a controller's clock is that close to a computer's; a simulated one may run at any pace
+PPM = 1e-6
+
+
+@dataclass(frozen=True, slots=True)
+class ClockComparison:
+    """How much too fast the controller's clock runs by another one, and the standard uncertainty of that, both relative."""
+
+    by: str
+    error: float
+    std: float
+
+
+@dataclass(frozen=True, slots=True)
+class ClockCheck:
+    """What is known of the controller's clock: `error` is how much too fast it runs, `std` its standard uncertainty.
+
+    Made of all `comparisons` and of what such a clock may be off at all, weighted by their variances.
+    """
+
+    error: float
+    std: float
+    comparisons: tuple[ClockComparison, ...]
+
+
+def check_clock(recording: ObservedRun, known: Uncertainty) -> ClockCheck:
+    """The clock of one recording's controller."""
+    found = [each for each in (_by_computer(recording, known), _by_crystal(recording, known)) if each is not None]
+    prior = known.controller_clock_ppm * PPM / np.sqrt(3)
+    weights = np.array([1 / prior**2, *(1 / each.std**2 for each in found)])
+    errors = np.array([0.0, *(each.error for each in found)])
+    return ClockCheck(float(weights @ errors / weights.sum()), float(weights.sum() ** -0.5), tuple(found))
+
+
+def _by_computer(recording: ObservedRun, known: Uncertainty) -> ClockComparison | None:
+    """By the times at which the states came; None where both clocks do not go at one pace, as in a faster laboratory."""
+    states = recording.motion.states
+    host_s, arm_s = states["host_time_s"] - states["host_time_s"][0], states["time_s"] - states["time_s"][0]
+    design = np.column_stack([np.ones_like(host_s), host_s])
+    (_, slope), *_ = np.linalg.lstsq(design, arm_s, rcond=None)
+    if not abs(slope - 1) < REAL_TIME:
+        return None
+    late = arm_s - design @ np.linalg.lstsq(design, arm_s, rcond=None)[0]
+    # States that come late come in bursts: every second counts as one look.
+    spread = host_s.std() * np.sqrt(max(host_s[-1], 1.0))
+    std = float(np.hypot(late.std() / spread, known.computer_clock_ppm * PPM))
+    return ClockComparison("the computer's clock", float(slope - 1), std)
+
+
+def _by_crystal(recording: ObservedRun, known: Uncertainty) -> ClockComparison | None:
+    """By the board's counter; None where no crystal holds it."""
+    bases = [each.time_base for each in recording.sensors.values()]
+    best = min(bases, key=lambda base: base.drift_std)
+    error = (1 + best.drift) / (1 + NOMINAL_DRIFT) - 1
+    if not abs(error) < LOCKED:
+        return None
+    return ClockComparison(
+        "the board's crystal", error, float(np.hypot(best.drift_std, known.crystal_ppm * PPM / np.sqrt(3)))
+    )
