@@ -11,10 +11,9 @@ from typing import Literal
 
 import numpy as np
 
-from rig.analysis.clock import ClockCheck
 from rig.analysis.explained import Explained, Seen
+from rig.analysis.surroundings import Surroundings
 from rig.config.models import EARTH_RATE_RAD_S
-from rig.data.settings import Site, Uncertainty
 from rig.estimation.arrays import Array
 
 COVERAGE_FACTOR = 2.0
@@ -85,17 +84,14 @@ class Budget:
         return shares
 
 
-def budget(
-    explained: Explained, sensor: str, site: Site, known: Uncertainty, clock: ClockCheck, state_jitter_s: float
-) -> Budget:
-    """The budget of one sensor's vector solution. `state_jitter_s` is that of the arm states' times."""
-    return Budget(tuple(_contributors(explained, sensor, site, known, clock, state_jitter_s)))
+def budget(explained: Explained, sensor: str, surroundings: Surroundings) -> Budget:
+    """The budget of one sensor's vector solution."""
+    return Budget(tuple(_contributors(explained, sensor, surroundings)))
 
 
-def _contributors(
-    explained: Explained, sensor: str, site: Site, known: Uncertainty, clock: ClockCheck, state_jitter_s: float
-) -> Iterator[Contributor]:
+def _contributors(explained: Explained, sensor: str, surroundings: Surroundings) -> Iterator[Contributor]:
     solution, seen = explained.solution, explained.seen
+    known, clock = surroundings.uncertainty, surroundings.clock
     matrix = solution.matrix
 
     def of(patterns: Array) -> Array:
@@ -119,7 +115,7 @@ def _contributors(
     clocks = " and ".join(each.by for each in clock.comparisons) or "no other clock"
     clock_spread = of(clock.std * turned[None])
     yield Contributor("controller clock", "A", "normal", None, "", f"held against {clocks}", np.inf, clock_spread)
-    jitter = np.sqrt(2) * state_jitter_s / np.diff(seen.windows_s).T[0]
+    jitter = np.sqrt(2) * surroundings.state_jitter_s / np.diff(seen.windows_s).T[0]
     each_turn = np.eye(len(turned))[:, :, None] * (jitter[:, None] * turned)[None]
     yield Contributor(
         "times of the arm's states", "A", "normal", None, "", "scatter of the joint angles", np.inf, of(each_turn)
@@ -127,11 +123,9 @@ def _contributors(
     yield assumed(
         "arm's axes", known.axis_deg, "°", "uncertainty.axis_deg", _tilted(seen, np.radians(known.axis_deg)) @ matrix.T
     )
-    if site.earth_rate_rad_s is None:
+    if surroundings.site.earth_rate_rad_s is None:
         patterns = EARTH_RATE_RAD_S * np.swapaxes(seen.attitudes, 0, 2).swapaxes(1, 2)  # (base axis, N, flange axis)
-        yield assumed(
-            "Earth's rate", EARTH_RATE_RAD_S, "rad/s", "site.latitude_deg is not given", patterns @ matrix.T
-        )
+        yield assumed("Earth's rate", EARTH_RATE_RAD_S, "rad/s", "site.latitude_deg is not given", patterns @ matrix.T)
     per_g = np.radians(known.g_sensitivity_deg_s_g[sensor]) / GRAVITY_M_S2
     unknown = [np.outer(row, column) for row in per_g * np.eye(3) for column in np.eye(3)]
     sensitivity = solution.g_sensitivity
@@ -172,6 +166,7 @@ def _tilted(seen: Seen, angle_rad: float) -> Array:
         swept = np.array([each == joint for each in seen.joints])
         axis = seen.turns_rad_s[swept][0] / np.linalg.norm(seen.turns_rad_s[swept][0])
         first = np.cross(axis, np.eye(3)[np.argmin(np.abs(axis))])
-        for way in (first / np.linalg.norm(first), np.cross(axis, first / np.linalg.norm(first))):
-            patterns.append(np.where(swept[:, None], angle_rad * np.cross(way, seen.turns_rad_s), 0.0))
+        first /= np.linalg.norm(first)
+        tilts = angle_rad * np.array([np.cross(way, seen.turns_rad_s) for way in (first, np.cross(axis, first))])
+        patterns.extend(np.where(swept[:, None], tilts, 0.0))
     return np.array(patterns)

@@ -2,13 +2,14 @@
 
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
-from datetime import datetime
 from itertools import combinations
 from typing import Literal, TypeVar, get_args
 
 import numpy as np
 
+from rig.analysis.budget import Budget, budget
 from rig.analysis.explained import Explained, explain, see
+from rig.analysis.surroundings import Surroundings, surroundings_of
 from rig.data.run_file import RecordedSensor, RunData
 from rig.errors import Fault, Refused
 from rig.estimation.accumulator import Accumulator, SixObservationEstimator, Solution
@@ -18,7 +19,7 @@ from rig.estimation.levenberg_marquardt import LevenbergMarquardtSolution, solve
 from rig.estimation.refusals import check_duplicates
 from rig.estimation.vector_model import VectorSolution, solve_vector_model
 from rig.observation.average import Average
-from rig.observation.observe import Observation, SensorObservations
+from rig.observation.observe import Observation
 from rig.observation.observed_run import ObservedRun, observe_runs
 from rig.observation.timebase import TimeBase
 from rig.observation.windows import finished_sweeps
@@ -35,7 +36,7 @@ class SensorResult:
     """One sensor's calibration and what it rests on.
 
     `explained` is the vector model with gravity and a wandering bias, None for recordings of before there was a site
-    and where the vector model has no solution.
+    and where the vector model has no solution. The `budget` is its; there is none of another estimator.
 
     `solution` is the chosen estimator's. Beside it stand the others from the same observations: `vector_model`,
     `six_observation` (exact) and `algorithm_1`, the paper's own, or the Fault one ends in. There is one time base for
@@ -46,6 +47,7 @@ class SensorResult:
     solution: Estimate
     vector_model: VectorSolution | Fault
     explained: Explained | None
+    budget: Budget | None
     six_observation: Solution
     algorithm_1: Solution | Fault
     observations: tuple[Observation, ...]
@@ -66,6 +68,11 @@ class SensorResult:
     def bias_rad_s(self) -> Array:
         """(3,) by the chosen estimator."""
         return self.solution.bias_rad_s
+
+    @property
+    def combined_covariance(self) -> Array:
+        """(6, 6) with all that is in the budget; of the noise alone where there is none."""
+        return self.solution.covariance if self.budget is None else self.budget.covariance
 
     @property
     def temperature_c(self) -> float:
@@ -107,11 +114,16 @@ def solve_observed(
     Raises Refused `unknown_estimator`; Fault `duplicated_observation` and as the estimators do.
     """
     chosen = known_estimator(estimator)
-    return {name: _solve_sensor(name, sensor, recordings, chosen) for name, sensor in sensors.items()}
+    surroundings = surroundings_of(recordings)
+    return {name: _solve_sensor(name, sensor, recordings, surroundings, chosen) for name, sensor in sensors.items()}
 
 
 def _solve_sensor(
-    name: str, sensor: RecordedSensor, recordings: Sequence[ObservedRun], estimator: Estimator
+    name: str,
+    sensor: RecordedSensor,
+    recordings: Sequence[ObservedRun],
+    surroundings: Surroundings | None,
+    estimator: Estimator,
 ) -> SensorResult:
     parts = [recording.sensors[name] for recording in recordings]
     observations = tuple(observation for part in parts for observation in part.revolutions)
@@ -119,14 +131,12 @@ def _solve_sensor(
     mounting = np.array(sensor.mounting)
     check_duplicates(np.array([observation.average.mean_rad_s for observation in observations]))
     six_observation = solve_six_observation(observations, "newton")
-    explained = _explained(recordings, parts, observations, rests, mounting)
-    vector_model = (
-        or_fault(lambda: solve_vector(observations, rests, mounting))
-        if explained is None
-        else explained
-        if isinstance(explained, Fault)
-        else explained.solution
-    )
+    explained: Explained | Fault | None = None
+    if surroundings is None:
+        vector_model = or_fault(lambda: solve_vector(observations, rests, mounting))
+    else:
+        explained = or_fault(lambda: explain(see(recordings, name, surroundings), mounting))
+        vector_model = explained if isinstance(explained, Fault) else explained.solution
     algorithm_1 = or_fault(lambda: solve_six_observation(observations, "algorithm_1"))
     by_name = {"vector": vector_model, "newton": six_observation, "algorithm_1": algorithm_1}
     solution = by_name[estimator] if estimator in by_name else solve_observations(observations, estimator)
@@ -136,48 +146,18 @@ def _solve_sensor(
         sensor=sensor,
         solution=solution,
         vector_model=vector_model,
-        explained=None if isinstance(explained, Fault) else explained,
+        explained=explained if isinstance(explained, Explained) else None,
+        budget=(
+            budget(explained, name, surroundings)
+            if isinstance(explained, Explained) and surroundings is not None and estimator == "vector"
+            else None
+        ),
         six_observation=six_observation,
         algorithm_1=algorithm_1,
         observations=observations,
         rests=rests,
         time_bases=tuple(part.time_base for part in parts),
     )
-
-
-def _explained(
-    recordings: Sequence[ObservedRun],
-    parts: Sequence[SensorObservations],
-    observations: Sequence[Observation],
-    rests: Sequence[Average],
-    mounting: Array,
-) -> Explained | Fault | None:
-    """The vector model with what the site adds, or the Fault it ends in; None where the recordings know no site."""
-    site = recordings[0].run.settings.site
-    if site is None:
-        return None
-    windows_s = np.array(
-        [
-            (average.start_s + since_s, average.end_s + since_s)
-            for kind in (0, 1)
-            for part, since_s in zip(parts, _begun_s(recordings), strict=True)
-            for average in (part.rests if kind else [observation.average for observation in part.revolutions])
-        ]
-    )
-    return or_fault(lambda: explain(see(observations, rests, windows_s, site), mounting))
-
-
-def _begun_s(recordings: Sequence[ObservedRun]) -> list[float]:
-    """What takes the controller's times of each recording to the clock of the first: it may have been switched off."""
-    first = recordings[0]
-    return [
-        (_started(each) - _started(first)).total_seconds() + float(first.motion.time_s[0] - each.motion.time_s[0])
-        for each in recordings
-    ]
-
-
-def _started(recording: ObservedRun) -> datetime:
-    return datetime.fromisoformat(recording.run.provenance.started_utc)
 
 
 def solve_observations(

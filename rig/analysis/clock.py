@@ -5,22 +5,26 @@ clock errs by.
 """
 
 from dataclasses import dataclass
+from math import comb
 
 import numpy as np
 
 from rig.data.settings import Uncertainty
 from rig.observation.observed_run import ObservedRun
+from rig.observation.windows import swept
 
 # The board's counter runs from its 32768 Hz crystal by way of a PLL, 576 ppm below the nominal rate (docs/board.md).
 NOMINAL_DRIFT = 4e6 / (122 * 32768) - 1
 LOCKED = 150e-6  # an oscillator farther from that is not held by the crystal
 REAL_TIME = 1e-3  # a controller's clock is that close to a computer's; a simulated one may run at any pace
 PPM = 1e-6
+ORDER = 6
+EVEN_S = 1e-4  # states whose steps in time differ by less follow each other evenly
 
 
 @dataclass(frozen=True, slots=True)
 class ClockComparison:
-    """How much too fast the controller's clock runs by another one, and the standard uncertainty of that, both relative."""
+    """How much too fast the controller's clock runs by another one, and the standard uncertainty of that: fractions."""
 
     by: str
     error: float
@@ -48,8 +52,26 @@ def check_clock(recording: ObservedRun, known: Uncertainty) -> ClockCheck:
     return ClockCheck(float(weights @ errors / weights.sum()), float(weights.sum() ** -0.5), tuple(found))
 
 
+def state_jitter_s(recording: ObservedRun) -> float:
+    """Standard deviation of the times the arm's states are of, from how the joint angles of the sweeps scatter.
+
+    Differences of the sixth order: of what the servo does, slow beside the states, nothing is left in them. What is left
+    are the times, and the encoder's steps.
+    """
+    scatter = []
+    for finished in swept(recording.run):
+        inside = slice(*np.searchsorted(recording.motion.time_s, [finished.window.start_s, finished.window.end_s]))
+        states = recording.motion.states[inside]
+        steps = np.diff(states["q_rad"][:, finished.sweep.joint], n=ORDER)
+        even = np.ptp(np.lib.stride_tricks.sliding_window_view(np.diff(states["time_s"]), ORDER), axis=1)
+        steps = steps[even < EVEN_S]
+        if len(steps):
+            scatter.append(np.mean(steps**2) / comb(2 * ORDER, ORDER) / finished.sweep.speed_rad_s**2)
+    return float(np.sqrt(np.mean(scatter))) if scatter else 0.0
+
+
 def _by_computer(recording: ObservedRun, known: Uncertainty) -> ClockComparison | None:
-    """By the times at which the states came; None where both clocks do not go at one pace, as in a faster laboratory."""
+    """By the times at which the states came; None where the two clocks do not go at one pace."""
     states = recording.motion.states
     host_s, arm_s = states["host_time_s"] - states["host_time_s"][0], states["time_s"] - states["time_s"][0]
     design = np.column_stack([np.ones_like(host_s), host_s])

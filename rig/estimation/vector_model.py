@@ -49,8 +49,9 @@ class VectorSolution:
     - `angles_covariance_rad2` (6, 6): of `non_orthogonality_rad`, then of small turns of `mounting` about sensor x y z.
     - `g_sensitivity` (3, 3) in rad/s per m/s² and its (9, 9) covariance (row by row), or None.
     - `response` (6, N, 3): derivative of scale and bias with respect to the mean readings.
-    - `residuals_rad_s` (N, 3): reading less model. `rank` is that of the scaled design, `condition` that of its part for
-      axes and bias: how well sweeps and rests tell these, whatever they tell of gravity.
+    - `residuals_rad_s` (N, 3): reading less model.
+    - `rank` is that of the scaled design, `condition` that of its part for axes and bias: how well sweeps and rests tell
+      these, whatever they tell of gravity.
     """
 
     scale: Array

@@ -1,0 +1,28 @@
+"""What a run's recordings tell of the place they were made in: the site, and the clock everything is measured by."""
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+from rig.analysis.clock import ClockCheck, check_clock, state_jitter_s
+from rig.data.settings import Site, Uncertainty
+from rig.observation.observed_run import ObservedRun
+
+
+@dataclass(frozen=True, slots=True)
+class Surroundings:
+    """The site, what no recording shows of it, the controller's clock, and the jitter of its states' times (s)."""
+
+    site: Site
+    uncertainty: Uncertainty
+    clock: ClockCheck
+    state_jitter_s: float
+
+
+def surroundings_of(recordings: Sequence[ObservedRun]) -> Surroundings | None:
+    """By the first recording's settings and its longest motion; None where those of before know no site."""
+    settings = recordings[0].run.settings
+    if settings.site is None or settings.uncertainty is None:
+        return None
+    longest = max(recordings, key=lambda each: float(each.motion.time_s[-1] - each.motion.time_s[0]))
+    clock = check_clock(longest, settings.uncertainty)
+    return Surroundings(settings.site, settings.uncertainty, clock, state_jitter_s(longest))
