@@ -161,7 +161,7 @@ def _of_walk(explained: Explained) -> Array:
 
 def _tilted(seen: Seen, angle_rad: float) -> Array:
     """(2 per axis, N, 3) errors of the turns' rates when one wrist's axis is tilted, for either way of tilting it."""
-    patterns = []
+    patterns: list[Array] = []
     for joint in sorted(set(seen.joints) - {None}, key=str):
         swept = np.array([each == joint for each in seen.joints])
         axis = seen.turns_rad_s[swept][0] / np.linalg.norm(seen.turns_rad_s[swept][0])

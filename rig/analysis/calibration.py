@@ -9,7 +9,7 @@ import numpy as np
 
 from rig.analysis.budget import Budget, budget
 from rig.analysis.explained import Explained, explain, see
-from rig.analysis.surroundings import Surroundings, surroundings_of
+from rig.analysis.surroundings import Surroundings
 from rig.data.run_file import RecordedSensor, RunData
 from rig.errors import Fault, Refused
 from rig.estimation.accumulator import Accumulator, SixObservationEstimator, Solution
@@ -106,15 +106,17 @@ def observe_recordings(runs: Sequence[RunData]) -> tuple[ObservedRun, ...]:
 
 
 def solve_observed(
-    sensors: Mapping[str, RecordedSensor], recordings: Sequence[ObservedRun], estimator: str = DEFAULT_ESTIMATOR
+    sensors: Mapping[str, RecordedSensor],
+    recordings: Sequence[ObservedRun],
+    estimator: str = DEFAULT_ESTIMATOR,
+    surroundings: Surroundings | None = None,
 ) -> dict[str, SensorResult]:
-    """Calibrate each of `sensors` from all recordings.
+    """Calibrate each of `sensors` from all recordings, which were made in these `surroundings`.
 
     Whatever the estimator, the sweeps must bear the six-observation solution: a plan that lacks a direction is refused.
     Raises Refused `unknown_estimator`; Fault `duplicated_observation` and as the estimators do.
     """
     chosen = known_estimator(estimator)
-    surroundings = surroundings_of(recordings)
     return {name: _solve_sensor(name, sensor, recordings, surroundings, chosen) for name, sensor in sensors.items()}
 
 

@@ -55,8 +55,8 @@ def check_clock(recording: ObservedRun, known: Uncertainty) -> ClockCheck:
 def state_jitter_s(recording: ObservedRun) -> float:
     """Standard deviation of the times the arm's states are of, from how the joint angles of the sweeps scatter.
 
-    Differences of the sixth order: of what the servo does, slow beside the states, nothing is left in them. What is left
-    are the times, and the encoder's steps.
+    Differences of the sixth order: of what the servo does, slow beside the states, nothing is left in them. What is
+    left are the times, and the encoder's steps.
     """
     scatter = []
     for finished in swept(recording.run):

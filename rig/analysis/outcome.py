@@ -14,8 +14,10 @@ from rig.analysis.calibration import (
     observe_recordings,
     solve_observed,
 )
+from rig.analysis.clock import ClockCheck
 from rig.analysis.comparison import Reference
 from rig.analysis.onboard_check import Agreement, agreement
+from rig.analysis.surroundings import surroundings_of
 from rig.analysis.verdict import Check, judge, verdict, verification_checks
 from rig.analysis.verification import Verification, verify
 from rig.data.provenance import Provenance
@@ -42,7 +44,8 @@ class Outcome:
 
     `recordings` are those of the calibration with a finished sweep. `results` hold every recorded sensor's calibration
     and `onboard` the board's own of the sensors to calibrate; all three are empty where stored calibrations were
-    verified. `verifications` hold those that could be made.
+    verified. `verifications` hold those that could be made. `clock` is the controller's, None where recordings of
+    before say nothing of its uncertainty.
     """
 
     recordings: tuple[ObservedRun, ...]
@@ -52,6 +55,7 @@ class Outcome:
     verifications: Mapping[str, Verification]
     checks: tuple[Check, ...]
     provenance: Origin
+    clock: ClockCheck | None = None
 
     @property
     def verdict(self) -> Literal["pass", "fail"]:
@@ -72,9 +76,15 @@ def calibrated(runs: Sequence[RunData], estimator: str = DEFAULT_ESTIMATOR) -> O
     settings = runs[0].settings
     chosen = known_estimator(estimator)
     recordings = observe_recordings(runs)
-    results = solve_observed(runs[0].sensors, recordings, chosen)
+    surroundings = surroundings_of(recordings)
+    results = solve_observed(runs[0].sensors, recordings, chosen, surroundings)
     onboard = {name: agreement(runs, name) for name in settings.to_calibrate}
-    checks = judge({name: results[name].solution for name in onboard}, settings.limits)
+    checks = judge(
+        {name: results[name].solution for name in onboard},
+        settings.limits,
+        {name: result.budget for name, result in results.items() if result.budget is not None},
+        "simple" if settings.uncertainty is None else settings.uncertainty.decision_rule,
+    )
     return Outcome(
         recordings=recordings,
         settings=settings,
@@ -83,6 +93,7 @@ def calibrated(runs: Sequence[RunData], estimator: str = DEFAULT_ESTIMATOR) -> O
         verifications={},
         checks=(*checks, *(check for name, agreed in onboard.items() for check in agreed.checks(name))),
         provenance=_origin(runs),
+        clock=None if surroundings is None else surroundings.clock,
     )
 
 

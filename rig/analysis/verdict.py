@@ -3,38 +3,63 @@
 import math
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
+from types import MappingProxyType
 from typing import Literal
 
 import numpy as np
 
+from rig.analysis.budget import COVERAGE_FACTOR, Budget
 from rig.analysis.verification import Verification
-from rig.data.settings import Limits
+from rig.data.settings import DecisionRule, Limits
+from rig.estimation.arrays import Array
 from rig.estimation.estimate import Estimate
 
 
 @dataclass(frozen=True, slots=True)
 class Check:
-    """One limit: it passes when `value` is a number not above `limit`. `unit` belongs to both.
+    """One limit: it passes when `value` is a number not above `limit` less `guard`. `unit` belongs to all of them.
 
-    `value` is None where nothing was measured, `limit` where none was set.
+    `value` is None where nothing was measured, `limit` where none was set, `uncertainty` (expanded, k = 2) where the
+    value has none. The `guard` is that uncertainty where the decision rule is the guard band (ILAC-G8, 4.2).
     """
 
     name: str
     value: float | None
     limit: float | None
     unit: str
+    uncertainty: float | None = None
+    guard: float = 0.0
 
     @property
     def passed(self) -> bool:
         """False for a measurement that is missing or not a number, and without a limit."""
         if self.value is None or self.limit is None:
             return False
-        return math.isfinite(self.value) and self.value <= self.limit
+        return math.isfinite(self.value) and self.value <= self.limit - self.guard
+
+    @property
+    def false_acceptance(self) -> float | None:
+        """The probability that what passed is beyond the limit all the same; None where nothing passed."""
+        if self.value is None or self.limit is None or not self.uncertainty or not self.passed:
+            return None
+        return 0.5 * math.erfc((self.limit - self.value) * COVERAGE_FACTOR / self.uncertainty / math.sqrt(2))
 
 
-def judge(solutions: Mapping[str, Estimate], limits: Limits) -> tuple[Check, ...]:
-    """The checks of every sensor, by sensor name; what the limits mean is said in the names."""
-    return tuple(check for name, solution in solutions.items() for check in _checks(name, solution, limits))
+def judge(
+    solutions: Mapping[str, Estimate],
+    limits: Limits,
+    budgets: Mapping[str, Budget] = MappingProxyType({}),
+    rule: DecisionRule = "simple",
+) -> tuple[Check, ...]:
+    """The checks of every sensor, by sensor name; what the limits mean is said in the names.
+
+    With a sensor's budget its combined uncertainties are judged, and values by the decision rule; else the noise alone.
+    """
+    return tuple(
+        check
+        for name, solution in solutions.items()
+        for check in _checks(name, solution, limits, budgets.get(name), rule)
+    )
 
 
 def verification_checks(sensor: str, verification: Verification | None, limits: Limits) -> tuple[Check, ...]:
@@ -60,12 +85,25 @@ def verdict(checks: Sequence[Check]) -> Literal["pass", "fail"]:
     return "pass" if checks and all(check.passed for check in checks) else "fail"
 
 
-def _checks(sensor: str, solution: Estimate, limits: Limits) -> tuple[Check, ...]:
-    std = np.sqrt(np.diag(solution.covariance))
+def _checks(
+    sensor: str, solution: Estimate, limits: Limits, budget: Budget | None, rule: DecisionRule
+) -> tuple[Check, ...]:
+    def held(name: str, values: Array, uncertainties: Array | None, limit: float, unit: str) -> Check:
+        """The value that comes nearest to its limit."""
+        largest = _largest(values)
+        if uncertainties is None or largest is None:
+            return Check(f"{sensor}.{name}", largest, limit, unit)
+        guards = uncertainties * (rule == "guard_band")
+        worst = int(np.argmax(np.abs(values) + guards))
+        value, uncertainty, guard = abs(float(values[worst])), float(uncertainties[worst]), float(guards[worst])
+        return Check(f"{sensor}.{name}", value, limit, unit, uncertainty, guard)
+
+    std = np.sqrt(np.diag(solution.covariance)) if budget is None else budget.std
+    scale, bias = (None, None) if budget is None else (budget.expanded[:3], budget.expanded[3:])
     return (
-        Check(f"{sensor}.scale_deviation", _largest(solution.scale - 1), limits.scale_deviation, "1"),
+        held("scale_deviation", solution.scale - 1, scale, limits.scale_deviation, "1"),
         Check(f"{sensor}.scale_std", _largest(std[:3]), limits.scale_std, "1"),
-        Check(f"{sensor}.bias", _largest(solution.bias_rad_s), limits.bias_rad_s, "rad/s"),
+        held("bias", solution.bias_rad_s, bias, limits.bias_rad_s, "rad/s"),
         Check(f"{sensor}.bias_std", _largest(std[3:]), limits.bias_std_rad_s, "rad/s"),
         Check(f"{sensor}.condition", _largest(np.array([solution.condition])), limits.condition, "1"),
     )

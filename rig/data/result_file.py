@@ -5,42 +5,38 @@ SI units, the unit in every name; vectors and matrices are lists, rows first. Ke
 
 import json
 from pathlib import Path
-from typing import Annotated, Final, Literal
+from typing import Final, Literal
 
-from pydantic import BaseModel, ConfigDict, Field, JsonValue, ValidationError
+from pydantic import ConfigDict, Field, JsonValue, ValidationError
 
 from rig.config.regular_file import UnfitFile, read_regular_file
+from rig.data.budget_entries import BiasProcessEntry, BudgetEntry, ClockEntry
+from rig.data.result_types import Entry, Matrix3, Matrix6, Positive, PositiveVector3, Role, Vector3
 from rig.data.run_folder import RESULT
 from rig.errors import Refused
 
 SCHEMA: Final = "rig.result/1"
 SIZE_MAX_BYTES = 64_000_000  # a run of six sweeps with its verification has 66,000
 
-Positive = Annotated[float, Field(gt=0)]
-Vector3 = tuple[float, float, float]
-Vector6 = tuple[float, float, float, float, float, float]
-PositiveVector3 = tuple[Positive, Positive, Positive]
-Matrix3 = tuple[Vector3, Vector3, Vector3]
-Matrix6 = Annotated[tuple[Vector6, ...], Field(min_length=6, max_length=6)]
-Role = Literal["calibrate", "reference"]
 
+class CheckEntry(Entry):
+    """One limit of the verdict; `value` is null where nothing was measured, `limit` where none was set.
 
-class _Entry(BaseModel):
-    # What a later version has added is ignored when it is read.
-    model_config = ConfigDict(frozen=True, allow_inf_nan=False)
-
-
-class CheckEntry(_Entry):
-    """One limit of the verdict; `value` is null where nothing was measured, `limit` where none was set."""
+    Where the value has an expanded uncertainty: `uncertainty`, by how much the `decision_rule` has it stay below the
+    limit (`guard`), and the probability that it is accepted although it is beyond the limit.
+    """
 
     name: str
     value: float | None
     limit: float | None
     unit: str
     passed: bool
+    uncertainty: float | None = None
+    guard: float = 0.0
+    false_acceptance: float | None = None
 
 
-class StoredCalibrationEntry(_Entry):
+class StoredCalibrationEntry(Entry):
     """A calibration the board had stored, g = K (m + b), while it corrected its readings."""
 
     sequence: int
@@ -55,7 +51,7 @@ class StoredCalibrationEntry(_Entry):
     bias_rad_s: Vector3
 
 
-class ProvenanceEntry(_Entry):
+class ProvenanceEntry(Entry):
     """What was measured with what, and when. Later versions may add to it."""
 
     model_config = ConfigDict(frozen=True, extra="allow")
@@ -77,13 +73,13 @@ class ProvenanceEntry(_Entry):
     solved_utc: str
 
 
-class ErrorEntry(_Entry):
+class ErrorEntry(Entry):
     """Why an estimator that stands beside the chosen one has no solution."""
 
     error: str
 
 
-class EstimateEntry(_Entry):
+class EstimateEntry(Entry):
     """One estimator's solution; `covariance` in the order kx ky kz bx by bz, its units 1 and rad/s."""
 
     estimator: str
@@ -96,7 +92,7 @@ class EstimateEntry(_Entry):
     condition: float
 
 
-class VectorEntry(_Entry):
+class VectorEntry(Entry):
     """The vector model's solution: the six parameters, and how the three axes lie to each other and to the flange."""
 
     model: str
@@ -116,11 +112,13 @@ class VectorEntry(_Entry):
     non_orthogonality_order: tuple[str, str, str]
     mounting: Matrix3
     mounting_std_rad: Vector3
+    g_sensitivity_rad_s_per_m_s2: Matrix3 | None = None
+    g_sensitivity_std_rad_s_per_m_s2: Matrix3 | None = None
     residuals_rad_s: tuple[Vector3, ...]
     warnings: tuple[str, ...]
 
 
-class AverageEntry(_Entry):
+class AverageEntry(Entry):
     """A rest: the mean reading, the standard deviation of that mean, and of one sample."""
 
     mean_rad_s: Vector3
@@ -131,7 +129,7 @@ class AverageEntry(_Entry):
     temperature_c: float
 
 
-class ObservationEntry(_Entry):
+class ObservationEntry(Entry):
     """One revolution of a joint and the mean reading over it."""
 
     sweep: int
@@ -151,7 +149,7 @@ class ObservationEntry(_Entry):
     temperature_c: float
 
 
-class TimeBaseEntry(_Entry):
+class TimeBaseEntry(Entry):
     """The board's clock: controller time = board time + offset + drift × (board time − reference)."""
 
     offset_s: float
@@ -161,7 +159,7 @@ class TimeBaseEntry(_Entry):
     reference_board_s: float
 
 
-class BoardSolutionEntry(_Entry):
+class BoardSolutionEntry(Entry):
     """What the board solved for by one method, in single precision."""
 
     sensor: str
@@ -173,7 +171,7 @@ class BoardSolutionEntry(_Entry):
     bias_rad_s: Vector3
 
 
-class BoardEntry(_Entry):
+class BoardEntry(Entry):
     """The board's solutions by method, and the closed form's distance from the same in double precision."""
 
     solutions: dict[str, BoardSolutionEntry]
@@ -184,11 +182,12 @@ class BoardEntry(_Entry):
     bias_difference_rad_s: float | None
 
 
-class SensorEntry(_Entry):
+class SensorEntry(Entry):
     """A sensor's calibration by the chosen estimator, what it rests on, and what the other estimators say.
 
-    `temperature_c` is the mean over all averaged samples. A reference has no `board`: the board solves only for the
-    sensors that are to be calibrated.
+    `covariance` is that of noise and of a bias that wanders, `covariance_combined` holds all of the `budget`; both are
+    there where the vector model was chosen. `temperature_c` is the mean over all averaged samples. A reference has no
+    `board`: the board solves only for the sensors that are to be calibrated.
     """
 
     part: str
@@ -201,6 +200,9 @@ class SensorEntry(_Entry):
     scale: PositiveVector3
     bias_rad_s: Vector3
     covariance: Matrix6
+    covariance_combined: Matrix6 | None = None
+    budget: BudgetEntry | None = None
+    bias_process: BiasProcessEntry | None = None
     observations_used: int
     rank: int
     condition: float
@@ -216,7 +218,7 @@ class SensorEntry(_Entry):
     board: BoardEntry | None = None
 
 
-class RotationEntry(_Entry):
+class RotationEntry(Entry):
     """How two sensors sit to each other: `matrix` takes a vector of the reference's frame into the sensor's."""
 
     matrix: Matrix3
@@ -226,7 +228,7 @@ class RotationEntry(_Entry):
     residuals_rad_s: tuple[Vector3, ...]
 
 
-class DeviationEntry(_Entry):
+class DeviationEntry(Entry):
     """Reading less reference over a number of samples, axis by axis."""
 
     samples: int
@@ -236,7 +238,7 @@ class DeviationEntry(_Entry):
     max_rad_s: Vector3
 
 
-class RevolutionErrorEntry(_Entry):
+class RevolutionErrorEntry(Entry):
     """Mean reading less mean reference over one revolution."""
 
     sweep: int
@@ -246,7 +248,7 @@ class RevolutionErrorEntry(_Entry):
     std_rad_s: Vector3
 
 
-class ComparisonEntry(_Entry):
+class ComparisonEntry(Entry):
     """A sensor's readings beside the reference's; `noise_rad_s` is null without rests; one delay a recording."""
 
     movement: DeviationEntry
@@ -257,7 +259,7 @@ class ComparisonEntry(_Entry):
     delay_std_s: tuple[float, ...]
 
 
-class VerificationEntry(_Entry):
+class VerificationEntry(Entry):
     """A sensor against its reference, in the sensor's frame; `before` is null where only calibrated readings exist."""
 
     reference: str
@@ -269,13 +271,14 @@ class VerificationEntry(_Entry):
     after: ComparisonEntry
 
 
-class ResultDocument(_Entry):
+class ResultDocument(Entry):
     """The result of a run, of schema "rig.result/1"; `sensors` is empty where stored calibrations were verified."""
 
     schema_name: Literal["rig.result/1"] = Field(alias="schema")  # as SCHEMA
     verdict: Literal["pass", "fail"]
     checks: tuple[CheckEntry, ...]
     provenance: ProvenanceEntry
+    clock: ClockEntry | None = None
     sensors: dict[str, SensorEntry]
     verification: dict[str, VerificationEntry]
 

@@ -23,6 +23,7 @@ if TYPE_CHECKING:
 SCHEMA = "rig.settings/2"
 SCHEMAS = ("rig.settings/1", SCHEMA)  # the first knows no site
 
+DecisionRule = Literal["simple", "guard_band"]
 Vector3 = tuple[Finite, Finite, Finite]
 
 
@@ -84,7 +85,7 @@ class Uncertainty:
     axis_deg: Annotated[float, Field(ge=0)]
     sensor_offset_mm: Annotated[float, Field(ge=0)]
     g_sensitivity_deg_s_g: dict[str, Annotated[float, Field(ge=0)]]
-    decision_rule: Literal["simple", "guard_band"]
+    decision_rule: DecisionRule
 
 
 @dataclass(frozen=True, slots=True)

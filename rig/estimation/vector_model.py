@@ -50,8 +50,8 @@ class VectorSolution:
     - `g_sensitivity` (3, 3) in rad/s per m/s² and its (9, 9) covariance (row by row), or None.
     - `response` (6, N, 3): derivative of scale and bias with respect to the mean readings.
     - `residuals_rad_s` (N, 3): reading less model.
-    - `rank` is that of the scaled design, `condition` that of its part for axes and bias: how well sweeps and rests tell
-      these, whatever they tell of gravity.
+    - `rank` is that of the scaled design, `condition` that of its part for axes and bias: how well sweeps and rests
+      tell these, whatever they tell of gravity.
     """
 
     scale: Array

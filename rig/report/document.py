@@ -1,7 +1,9 @@
 """The typed outcome of a run as the document of `result.json`."""
 
 from rig.analysis.outcome import Origin, Outcome
+from rig.analysis.verdict import Check
 from rig.data.result_file import SCHEMA, CheckEntry, ProvenanceEntry, ResultDocument
+from rig.report.budget_entry import clock_entry
 from rig.report.entry import entry
 from rig.report.sensor_entry import sensor_entry
 from rig.report.verification_entry import verification_entry
@@ -9,10 +11,10 @@ from rig.report.verification_entry import verification_entry
 
 def document_of(outcome: Outcome) -> ResultDocument:
     """Plain numbers, texts and tuples, in SI units, of schema "rig.result/1"."""
-    return ResultDocument(
+    document = ResultDocument(
         schema=SCHEMA,
         verdict=outcome.verdict,
-        checks=tuple(entry(CheckEntry, check) for check in outcome.checks),
+        checks=tuple(map(_check, outcome.checks)),
         provenance=_provenance(outcome.provenance),
         sensors={
             name: sensor_entry(
@@ -24,6 +26,13 @@ def document_of(outcome: Outcome) -> ResultDocument:
         },
         verification={name: verification_entry(found) for name, found in outcome.verifications.items()},
     )
+    return document if outcome.clock is None else document.model_copy(update={"clock": clock_entry(outcome.clock)})
+
+
+def _check(check: Check) -> CheckEntry:
+    if check.uncertainty is not None:
+        return entry(CheckEntry, check)
+    return CheckEntry(name=check.name, value=check.value, limit=check.limit, unit=check.unit, passed=check.passed)
 
 
 def _provenance(origin: Origin) -> ProvenanceEntry:

@@ -11,15 +11,17 @@ from rig.data.result_file import (
     ErrorEntry,
     EstimateEntry,
     ObservationEntry,
-    Role,
     SensorEntry,
     TimeBaseEntry,
     VectorEntry,
 )
+from rig.data.result_types import Role
 from rig.errors import Fault
 from rig.estimation import vector_model
+from rig.estimation.arrays import Array
 from rig.estimation.estimate import Estimate
 from rig.estimation.six_observation import MODEL, PARAMETER_UNITS, PARAMETERS
+from rig.report.budget_entry import bias_process_entry, budget_entry
 from rig.report.entry import entry
 
 
@@ -40,7 +42,16 @@ def sensor_entry(result: SensorResult, role: Role = "calibrate", agreed: Agreeme
         six_observation=estimate_entry(result.six_observation),
         algorithm_1=entry_or_error(result.algorithm_1),
     )  # fmt: skip
-    return found if agreed is None else found.model_copy(update={"board": _board(agreed)})
+    more: dict[str, object] = {} if agreed is None else {"board": _board(agreed)}
+    if result.budget is not None:
+        more |= {"covariance_combined": _rows(result.budget.covariance), "budget": budget_entry(result.budget)}
+    if result.explained is not None:
+        more["bias_process"] = bias_process_entry(result.explained)
+    return found.model_copy(update=more)
+
+
+def _rows(matrix: Array) -> tuple[tuple[float, ...], ...]:
+    return tuple(map(tuple, matrix.tolist()))
 
 
 def estimate_entry(solution: Estimate) -> EstimateEntry:
@@ -57,6 +68,13 @@ def _vector(outcome: vector_model.VectorSolution | Fault) -> VectorEntry | Error
     if isinstance(outcome, Fault):
         return ErrorEntry(error=str(outcome))
     angles = np.sqrt(np.diag(outcome.angles_covariance_rad2))
+    sensitivity: dict[str, object] = {}
+    if outcome.g_sensitivity is not None and outcome.g_sensitivity_covariance is not None:
+        std = np.sqrt(np.diag(outcome.g_sensitivity_covariance)).reshape(3, 3)
+        sensitivity = {
+            "g_sensitivity_rad_s_per_m_s2": outcome.g_sensitivity,
+            "g_sensitivity_std_rad_s_per_m_s2": std,
+        }
     return entry(
         VectorEntry, outcome,
         model=vector_model.MODEL,
@@ -65,6 +83,7 @@ def _vector(outcome: vector_model.VectorSolution | Fault) -> VectorEntry | Error
         non_orthogonality_std_rad=angles[:3],
         non_orthogonality_order=("yz", "zx", "xy"),
         mounting_std_rad=angles[3:],
+        **sensitivity,
     )  # fmt: skip
 
 

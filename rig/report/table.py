@@ -8,6 +8,7 @@ from rich.console import Console
 from rich.table import Table
 
 from rig.data.result_file import BoardEntry, CheckEntry, ErrorEntry, ResultDocument, SensorEntry
+from rig.report.budget_table import budget_table
 from rig.report.verification_table import verification_lines, verification_table
 from rig.station.plain_text import plain
 
@@ -36,7 +37,9 @@ def print_result(result: ResultDocument, console: Console) -> None:
     for name, sensor in result.sensors.items():
         known = " (known)" if sensor.role == "reference" else ""
         title = f"{name}{known}: {sensor.part} {sensor.serial_number}, {sensor.model}, {sensor.estimator}"
-        console.print(estimate_table(title, sensor))
+        console.print(estimate_table(title, sensor, None if sensor.budget is None else sensor.budget.expanded))
+        if sensor.budget is not None:
+            console.print(budget_table(sensor.budget))
         for line in _beside(sensor):
             console.print(plain(line))
     for name, verification in result.verification.items():
@@ -47,19 +50,20 @@ def print_result(result: ResultDocument, console: Console) -> None:
     console.print(f"verdict: {result.verdict.upper()}", style="bold green" if result.verdict == "pass" else "bold red")
 
 
-def estimate_table(title: str, estimate: Estimated) -> Table:
-    """Scale and bias of each axis with their uncertainties."""
+def estimate_table(title: str, estimate: Estimated, expanded: Sequence[float] | None = None) -> Table:
+    """Scale and bias of each axis with their uncertainties: `expanded` (k = 2) where all of it is known, else 1σ."""
     table = Table(title=plain(title, "table.title"), title_justify="left")
-    for heading in ("axis", "scale factor", "± 1σ", "bias rad/s", "± 1σ rad/s"):
+    headings = ("± 1σ", "± 1σ rad/s") if expanded is None else ("± U", "± U rad/s")
+    for heading in ("axis", "scale factor", headings[0], "bias rad/s", headings[1]):
         table.add_column(heading, justify="left" if heading == "axis" else "right")
-    std = [estimate.covariance[i][i] ** 0.5 for i in range(6)]
+    shown = expanded or [estimate.covariance[i][i] ** 0.5 for i in range(6)]
     for i, axis in enumerate("xyz"):
         table.add_row(
             axis,
             f"{estimate.scale[i]:.5f}",
-            f"{std[i]:.5f}",
+            f"{shown[i]:.5f}",
             f"{estimate.bias_rad_s[i]:+.5f}",
-            f"{std[3 + i]:.5f}",
+            f"{shown[3 + i]:.5f}",
         )
     return table
 

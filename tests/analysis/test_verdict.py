@@ -5,6 +5,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
+from rig.analysis.budget import Budget, Contributor
 from rig.analysis.verdict import Check, judge, verdict, verification_checks
 from rig.data.settings import Limits
 from rig.estimation.accumulator import Solution
@@ -64,6 +65,19 @@ def test_without_a_limit_nothing_passes() -> None:
     checks = verification_checks("gyro", None, unset)
     assert [check.limit for check in checks] == [0.1, None, None]
     assert not Check("gyro.verification_mean", 0.0, None, "rad/s").passed
+
+
+def test_the_guard_band_keeps_the_expanded_uncertainty_away_from_the_limit() -> None:
+    std = np.array([0.001, 0.001, 0.001, 4e-4, 4e-4, 4e-4])
+    noise = Contributor("noise", "A", "normal", None, "", "", np.inf, np.diag(std**2))
+    budgets = {"gyro": Budget((noise,))}
+    near = replace(GOOD, bias_rad_s=np.array([0.0077, -0.0995, -0.0051]))
+    simple, guarded = (judge({"gyro": near}, LIMITS, budgets, rule)[2] for rule in ("simple", "guard_band"))
+    assert simple.passed and not guarded.passed
+    assert simple.uncertainty == guarded.guard == pytest.approx(8e-4)
+    assert simple.false_acceptance == pytest.approx(0.106, abs=0.001)  # 0.0005 is 1.25 standard uncertainties
+    good = judge({"gyro": GOOD}, LIMITS, budgets, "guard_band")[2]
+    assert good.passed and good.false_acceptance is not None and good.false_acceptance < 0.025
 
 
 def test_nothing_measured_is_not_a_pass() -> None:

@@ -5,7 +5,7 @@ import pytest
 
 from rig.estimation.arrays import Array
 from rig.estimation.bias_process import BiasProcess, estimate_bias_process, walk_covariance
-from rig.estimation.vector_model import design_matrix, solve_vector_model
+from rig.estimation.vector_model import VectorSolution, design_matrix, solve_vector_model
 
 STEP_S = 0.02
 AXES = np.repeat(np.eye(3), 2, axis=0) * np.tile([1.0, -1.0], 3)[:, None]
@@ -45,7 +45,8 @@ def test_a_bias_that_walks_is_as_uncertain_as_it_has_to_be(noise_rad_s: float) -
     variances = noise_rad_s**2 / (200 * (windows_s[:, 1:] - windows_s[:, :1])) * np.ones(3)
     rng = np.random.default_rng(2)
     errors, widths = [], []
-    best = solve(np.zeros((12, 3)) + 1e-9 * rng.standard_normal((12, 3)) + rates, rates, variances, 3e-5, windows_s)
+    known = BiasProcess(3e-5, 0.0, 0)
+    best = solve(rates + 1e-9 * rng.standard_normal((12, 3)), rates, variances, known, windows_s)
     for _ in range(150):
         wandered, whole = wandering(windows_s, 3e-5, rng)
         means = rates + wandered + np.sqrt(variances) * rng.standard_normal((12, 3))
@@ -60,8 +61,7 @@ def test_a_bias_that_walks_is_as_uncertain_as_it_has_to_be(noise_rad_s: float) -
     assert np.mean(widths) < 1.2
 
 
-def solve(means, rates, variances, walk, windows_s):  # type: ignore[no-untyped-def]
-    process = walk if isinstance(walk, BiasProcess) else BiasProcess(walk, 0.0, 0)
+def solve(means: Array, rates: Array, variances: Array, process: BiasProcess, windows_s: Array) -> VectorSolution:
     shared = None if process.steady else process.covariance(windows_s)
     return solve_vector_model(means, rates, variances, shared_covariance_rad2_s2=shared)
 

@@ -1,0 +1,46 @@
+"""The uncertainty as entries of `result.json`."""
+
+import numpy as np
+
+from rig.analysis.budget import COVERAGE_FACTOR, Budget
+from rig.analysis.clock import ClockCheck
+from rig.analysis.explained import Explained
+from rig.data.budget_entries import (
+    BiasProcessEntry,
+    BudgetEntry,
+    ClockComparisonEntry,
+    ClockEntry,
+    ContributorEntry,
+)
+from rig.report.entry import entry
+
+HOUR_S = 3600.0
+
+
+def budget_entry(found: Budget) -> BudgetEntry:
+    """The combined uncertainty and all it is made of."""
+    lines = [
+        entry(ContributorEntry, each, share=share, freedom=_finite(each.freedom))
+        for each, share in zip(found.contributors, found.shares, strict=True)
+    ]
+    freedom = [_finite(each) for each in found.freedom.tolist()]
+    return entry(BudgetEntry, found, contributors=lines, coverage_factor=COVERAGE_FACTOR, freedom=freedom)
+
+
+def bias_process_entry(explained: Explained) -> BiasProcessEntry:
+    """How the bias wandered, and for how long it was averaged."""
+    return entry(
+        BiasProcessEntry,
+        explained.bias,
+        mean_over_s=float(np.ptp(explained.seen.windows_s)),
+        hour_std_rad_s=explained.bias.wandered_rad_s(HOUR_S),
+    )
+
+
+def clock_entry(check: ClockCheck) -> ClockEntry:
+    """The controller's clock."""
+    return entry(ClockEntry, check, comparisons=[entry(ClockComparisonEntry, each) for each in check.comparisons])
+
+
+def _finite(freedom: float) -> float | None:
+    return freedom if np.isfinite(freedom) else None

@@ -1,0 +1,29 @@
+"""The uncertainty budget as a person reads it in the terminal."""
+
+from rich.table import Table
+
+from rig.data.budget_entries import BudgetEntry
+from rig.station.plain_text import plain
+
+NEGLIGIBLE = 0.001  # of every variance: such lines are in result.json alone
+
+
+def budget_table(budget: BudgetEntry) -> Table:
+    """What matters of the budget: the standard uncertainty of the axis it matters most to, and its share there."""
+    coverage = f"U = {budget.coverage_factor:g} × the combined standard uncertainty, about 95 %"
+    table = Table(title="uncertainty budget", title_justify="left", caption=coverage, caption_justify="left")
+    for heading in ("contributor", "type", "scale u", "share", "bias u rad/s", "share"):
+        table.add_column(heading, justify="left" if heading in ("contributor", "type") else "right")
+    for line in sorted(budget.contributors, key=lambda each: -max(each.share)):
+        if max(line.share) < NEGLIGIBLE:
+            continue
+        assumed = "" if line.half_width is None else f" ±{line.half_width:.3g} {line.unit}"
+        table.add_row(
+            plain(line.name + assumed),
+            line.kind,
+            f"{max(line.std[:3]):.1e}",
+            f"{100 * max(line.share[:3]):.0f} %",
+            f"{max(line.std[3:]):.1e}",
+            f"{100 * max(line.share[3:]):.0f} %",
+        )
+    return table
