@@ -7,14 +7,15 @@ from typing import Literal, TypeVar, get_args
 
 import numpy as np
 
-from rig.analysis.budget import Budget, budget
-from rig.analysis.explained import Explained, explain, see
+from rig.analysis.seen import see, unknown_of
 from rig.analysis.surroundings import Surroundings
 from rig.data.run_file import RecordedSensor, RunData
 from rig.errors import Fault, Refused
 from rig.estimation.accumulator import Accumulator, SixObservationEstimator, Solution
 from rig.estimation.arrays import Array
+from rig.estimation.budget import Budget, budget
 from rig.estimation.estimate import Estimate
+from rig.estimation.explained import Explained, explain
 from rig.estimation.levenberg_marquardt import LevenbergMarquardtSolution, solve_levenberg_marquardt
 from rig.estimation.refusals import check_duplicates
 from rig.estimation.vector_model import VectorSolution, solve_vector_model
@@ -150,7 +151,7 @@ def _solve_sensor(
         vector_model=vector_model,
         explained=explained if isinstance(explained, Explained) else None,
         budget=(
-            budget(explained, name, surroundings)
+            budget(explained, unknown_of(surroundings, name))
             if isinstance(explained, Explained) and surroundings is not None and estimator == "vector"
             else None
         ),

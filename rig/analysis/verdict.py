@@ -8,10 +8,10 @@ from typing import Literal
 
 import numpy as np
 
-from rig.analysis.budget import COVERAGE_FACTOR, Budget
 from rig.analysis.verification import Verification
 from rig.data.settings import DecisionRule, Limits
 from rig.estimation.arrays import Array
+from rig.estimation.budget import COVERAGE_FACTOR, Budget
 from rig.estimation.estimate import Estimate
 
 

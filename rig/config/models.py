@@ -18,6 +18,7 @@ from rig.config.ur10e_limits import (
     PAYLOAD_LIMIT_KG,
     SPEED_LIMIT_DEG_S,
 )
+from rig.estimation.earth import EARTH_RATE_RAD_S, STANDARD_GRAVITY_M_S2
 
 Direction = Literal["cw", "ccw"]
 AxisName = Literal["+x", "-x", "+y", "-y", "+z", "-z"]
@@ -28,7 +29,6 @@ JointAngle = Annotated[float, Field(ge=-JOINT_LIMIT_DEG, le=JOINT_LIMIT_DEG)]
 Offset = Annotated[float, Field(ge=-1000, le=1000)]
 # A name becomes that of a dataset, of files and of C arrays.
 SensorName = Annotated[str, Field(pattern=r"^\w[\w -]*$", max_length=40)]
-EARTH_RATE_RAD_S = 7.292115e-5  # of the WGS 84 ellipsoid
 MIN_LEVEL = 0.1  # sine of the angle between the vertical and what a heading is given of
 SERIAL_NUMBER_MAX = 24  # of the kind "text24" in the board's protocol
 RATIO: dict[str, Any] = {"unit": "1"}  # a number without a unit, where the key cannot say so
@@ -272,7 +272,7 @@ class SiteSection(Section):
         le=360,
         description="where the x axis of the arm's base points: 0 north, 90 east; with latitude_deg",
     )
-    gravity_m_s2: float = Field(default=9.80665, gt=9.7, lt=9.9, description="acceleration of free fall")
+    gravity_m_s2: float = Field(default=STANDARD_GRAVITY_M_S2, gt=9.7, lt=9.9, description="acceleration of free fall")
     base_up: Vector3 = Field(
         default=(0.0, 0.0, 1.0), description="upwards in the frame of the arm's base; 0 0 −1 under a ceiling"
     )

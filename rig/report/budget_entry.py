@@ -2,9 +2,7 @@
 
 import numpy as np
 
-from rig.analysis.budget import COVERAGE_FACTOR, Budget
 from rig.analysis.clock import ClockCheck
-from rig.analysis.explained import Explained
 from rig.data.budget_entries import (
     BiasProcessEntry,
     BudgetEntry,
@@ -12,6 +10,8 @@ from rig.data.budget_entries import (
     ClockEntry,
     ContributorEntry,
 )
+from rig.estimation.budget import COVERAGE_FACTOR, Budget
+from rig.estimation.explained import Explained
 from rig.report.entry import entry
 
 HOUR_S = 3600.0

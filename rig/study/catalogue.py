@@ -31,6 +31,7 @@ STUDIES = {
     "averaging": Entry("averaging before squaring against squaring before averaging", "averaging:study"),
     "estimators": Entry("every estimator's mean squared error over its Cramér–Rao bound", "estimators:study"),
     "misalignment": Entry("error against mounting error and non-orthogonality", "misalignment:study"),
+    "budget": Entry("whether the stated uncertainty holds where everything may be wrong", "budget:study"),
     "kvh-gyro": Entry("TRIAX III-A: fiber-optic gyroscope on a rate table, bias drift of Fig. 4", "kvh_gyro:study"),
     "kvh-accelerometer": Entry(
         "TRIAX III-B: accelerometer on a rate table, bias drift of Fig. 6", "kvh_accelerometer:study"

@@ -5,10 +5,10 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from rig.analysis.budget import Budget, Contributor
 from rig.analysis.verdict import Check, judge, verdict, verification_checks
 from rig.data.settings import Limits
 from rig.estimation.accumulator import Solution
+from rig.estimation.budget import Budget, Contributor
 
 LIMITS = Limits(scale_deviation=0.3, scale_std=0.002, bias_rad_s=0.1, bias_std_rad_s=0.001, condition=100)
 GOOD = Solution(

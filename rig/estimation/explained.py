@@ -5,18 +5,14 @@ to it; at rest the sensor reads bias, Earth and gravity alone. None of this is a
 apart stays out of the model and belongs into the uncertainty.
 """
 
-from collections.abc import Sequence
 from dataclasses import dataclass
-from datetime import datetime
 
 import numpy as np
 
-from rig.analysis.surroundings import Surroundings
 from rig.errors import Fault
 from rig.estimation.arrays import Array
 from rig.estimation.bias_process import BiasProcess, estimate_bias_process
 from rig.estimation.vector_model import VectorSolution, design_matrix, solve_vector_model
-from rig.observation.observed_run import ObservedRun
 
 UNTOLD = ("rank_deficient", "ill_conditioned", "too_few_observations")  # what more columns than sweeps bear ends in
 
@@ -60,47 +56,6 @@ class Explained:
     solution: VectorSolution
     bias: BiasProcess
     seen: Seen
-
-
-def see(recordings: Sequence[ObservedRun], sensor: str, surroundings: Surroundings) -> Seen:
-    """Put together what the arm knows of each average of a sensor, in all recordings of a run.
-
-    Speeds by a controller's clock that runs too fast are too small by that.
-    """
-    site, parts = surroundings.site, [recording.sensors[sensor] for recording in recordings]
-    turns = [
-        (turn, since_s) for part, since_s in zip(parts, _since_s(recordings), strict=True) for turn in part.revolutions
-    ]
-    rests = [(rest, since_s) for part, since_s in zip(parts, _since_s(recordings), strict=True) for rest in part.rests]
-    placed = [*((turn.average, since_s) for turn, since_s in turns), *rests]
-    averages = [average for average, _ in placed]
-    attitudes = np.array([average.attitude for average in averages], dtype=np.float64)
-    turned = np.array([turn.speed_rad_s * turn.axis_flange for turn, _ in turns])
-    earth = np.zeros(3) if site.earth_rate_rad_s is None else np.array(site.earth_rate_rad_s)
-    return Seen(
-        means_rad_s=np.array([average.mean_rad_s for average in averages]),
-        variances_rad2_s2=np.array([average.variance_rad2_s2 - average.drift_rad2_s2 for average in averages]),
-        turns_rad_s=np.concatenate([turned * (1 + surroundings.clock.error), np.zeros((len(rests), 3))]),
-        earth_rad_s=attitudes @ earth,
-        speed_std_rad_s=np.array([*(turn.speed_std_rad_s for turn, _ in turns), *np.zeros(len(rests))]),
-        attitudes=attitudes,
-        gravity_m_s2=attitudes @ (-site.gravity_m_s2 * np.array(site.up)),
-        windows_s=np.array([(average.start_s + since_s, average.end_s + since_s) for average, since_s in placed]),
-        joints=(*(turn.joint_name for turn, _ in turns), *[None] * len(rests)),
-    )
-
-
-def _since_s(recordings: Sequence[ObservedRun]) -> list[float]:
-    """What takes the controller's times of each recording to the clock of the first: it may have been switched off."""
-    first = recordings[0]
-    return [
-        (_started(each) - _started(first)).total_seconds() + float(first.motion.time_s[0] - each.motion.time_s[0])
-        for each in recordings
-    ]
-
-
-def _started(recording: ObservedRun) -> datetime:
-    return datetime.fromisoformat(recording.run.provenance.started_utc)
 
 
 def explain(seen: Seen, nominal_mounting: Array) -> Explained:

@@ -11,13 +11,11 @@ from typing import Literal
 
 import numpy as np
 
-from rig.analysis.explained import Explained, Seen
-from rig.analysis.surroundings import Surroundings
-from rig.config.models import EARTH_RATE_RAD_S
 from rig.estimation.arrays import Array
+from rig.estimation.earth import EARTH_RATE_RAD_S, STANDARD_GRAVITY_M_S2
+from rig.estimation.explained import Explained, Seen
 
 COVERAGE_FACTOR = 2.0
-GRAVITY_M_S2 = 9.80665  # of the unit g
 
 
 @dataclass(frozen=True, slots=True)
@@ -84,14 +82,30 @@ class Budget:
         return shares
 
 
-def budget(explained: Explained, sensor: str, surroundings: Surroundings) -> Budget:
+@dataclass(frozen=True, slots=True)
+class Unknown:
+    """What no recording shows: half-widths, but for `clock_std` and `state_jitter_s`, which are standard uncertainties.
+
+    `clock_std` is a fraction, `clock_source` says how it is known; `axis_rad` is the direction of each swept axis,
+    `earth_rate` whether the Earth's rate is among the unknown.
+    """
+
+    clock_std: float
+    clock_source: str
+    state_jitter_s: float
+    axis_rad: float
+    sensor_offset_m: float
+    g_sensitivity_rad_s_per_g: float
+    earth_rate: bool
+
+
+def budget(explained: Explained, unknown: Unknown) -> Budget:
     """The budget of one sensor's vector solution."""
-    return Budget(tuple(_contributors(explained, sensor, surroundings)))
+    return Budget(tuple(_contributors(explained, unknown)))
 
 
-def _contributors(explained: Explained, sensor: str, surroundings: Surroundings) -> Iterator[Contributor]:
+def _contributors(explained: Explained, unknown: Unknown) -> Iterator[Contributor]:
     solution, seen = explained.solution, explained.seen
-    known, clock = surroundings.uncertainty, surroundings.clock
     matrix = solution.matrix
 
     def of(patterns: Array) -> Array:
@@ -105,44 +119,42 @@ def _contributors(explained: Explained, sensor: str, surroundings: Surroundings)
         spread = of(patterns / np.sqrt(3))
         return Contributor(name, "B", "rectangular", half_width, unit, source, np.inf, spread)
 
+    def found(name: str, source: str, covariance: Array, freedom: float = np.inf) -> Contributor:
+        return Contributor(name, "A", "normal", None, "", source, freedom, covariance)
+
     walk = _of_walk(explained)
-    noise = solution.covariance - walk
-    yield Contributor("noise", "A", "normal", None, "", "scatter of the readings", np.inf, noise)
+    yield found("noise", "scatter of the readings", solution.covariance - walk)
     if not explained.bias.steady:
-        found = "scatter of rests and sweeps about each other"
-        yield Contributor("bias instability", "A", "normal", None, "", found, float(explained.bias.freedom), walk)
+        source = "scatter of rests and sweeps about each other"
+        yield found("bias instability", source, walk, float(explained.bias.freedom))
     turned = seen.turns_rad_s @ matrix.T
-    clocks = " and ".join(each.by for each in clock.comparisons) or "no other clock"
-    clock_spread = of(clock.std * turned[None])
-    yield Contributor("controller clock", "A", "normal", None, "", f"held against {clocks}", np.inf, clock_spread)
-    jitter = np.sqrt(2) * surroundings.state_jitter_s / np.diff(seen.windows_s).T[0]
+    yield found("controller clock", unknown.clock_source, of(unknown.clock_std * turned[None]))
+    jitter = np.sqrt(2) * unknown.state_jitter_s / np.diff(seen.windows_s).T[0]
     each_turn = np.eye(len(turned))[:, :, None] * (jitter[:, None] * turned)[None]
-    yield Contributor(
-        "times of the arm's states", "A", "normal", None, "", "scatter of the joint angles", np.inf, of(each_turn)
-    )
-    yield assumed(
-        "arm's axes", known.axis_deg, "°", "uncertainty.axis_deg", _tilted(seen, np.radians(known.axis_deg)) @ matrix.T
-    )
-    if surroundings.site.earth_rate_rad_s is None:
-        patterns = EARTH_RATE_RAD_S * np.swapaxes(seen.attitudes, 0, 2).swapaxes(1, 2)  # (base axis, N, flange axis)
-        yield assumed("Earth's rate", EARTH_RATE_RAD_S, "rad/s", "site.latitude_deg is not given", patterns @ matrix.T)
-    per_g = np.radians(known.g_sensitivity_deg_s_g[sensor]) / GRAVITY_M_S2
-    unknown = [np.outer(row, column) for row in per_g * np.eye(3) for column in np.eye(3)]
+    yield found("times of the arm's states", "scatter of the joint angles", of(each_turn))
+    tilted = _tilted(seen, unknown.axis_rad) @ matrix.T
+    yield assumed("arm's axes", float(np.degrees(unknown.axis_rad)), "°", "uncertainty.axis_deg", tilted)
+    if unknown.earth_rate:
+        along = (
+            EARTH_RATE_RAD_S * np.moveaxis(seen.attitudes, -1, 0) @ matrix.T
+        )  # one pattern for each axis of the base
+        yield assumed("Earth's rate", EARTH_RATE_RAD_S, "rad/s", "site.latitude_deg is not given", along)
+    per_m_s2 = unknown.g_sensitivity_rad_s_per_g / STANDARD_GRAVITY_M_S2
+    any_sensitivity = [per_m_s2 * np.outer(row, column) for row in np.eye(3) for column in np.eye(3)]
     sensitivity = solution.g_sensitivity
     if sensitivity is None:
         yield assumed(
             "g-sensitivity",
-            known.g_sensitivity_deg_s_g[sensor],
+            float(np.degrees(unknown.g_sensitivity_rad_s_per_g)),
             "°/s/g",
             "what is known of the part; rests at more attitudes would tell it",
-            np.array([seen.gravity_m_s2 @ each.T for each in unknown]),
+            np.array([seen.gravity_m_s2 @ each.T for each in any_sensitivity]),
         )
-    offsets = known.sensor_offset_mm / 1000 * np.eye(3)
-    outwards = np.array([seen.centripetal_m_s2(offset) for offset in offsets])
-    felt = unknown if sensitivity is None else [sensitivity]
+    outwards = np.array([seen.centripetal_m_s2(offset) for offset in unknown.sensor_offset_m * np.eye(3)])
+    felt = any_sensitivity if sensitivity is None else [sensitivity]
     yield assumed(
         "centripetal acceleration",
-        known.sensor_offset_mm,
+        1000 * unknown.sensor_offset_m,
         "mm",
         "uncertainty.sensor_offset_mm",
         np.concatenate([outwards @ each.T for each in felt]),
