@@ -6,6 +6,7 @@ from datetime import datetime
 import numpy as np
 
 from rig.analysis.surroundings import Surroundings
+from rig.config.sensor_catalogue import PARTS
 from rig.estimation.budget import Unknown
 from rig.estimation.explained import Seen
 from rig.observation.observed_run import ObservedRun
@@ -52,15 +53,16 @@ def _started(recording: ObservedRun) -> datetime:
     return datetime.fromisoformat(recording.run.provenance.started_utc)
 
 
-def unknown_of(surroundings: Surroundings, sensor: str) -> Unknown:
-    """What no recording shows of a sensor's surroundings."""
+def unknown_of(surroundings: Surroundings, name: str, part: str) -> Unknown:
+    """What no recording shows of the surroundings of a sensor of that name and kind."""
     known, clock = surroundings.uncertainty, surroundings.clock
+    g_sensitivity_deg_s_g = known.g_sensitivity_deg_s_g.get(name, PARTS[part].g_sensitivity_deg_s_g)
     return Unknown(
         clock_std=clock.std,
         clock_source="held against " + (" and ".join(each.by for each in clock.comparisons) or "no other clock"),
         state_jitter_s=surroundings.state_jitter_s,
         axis_rad=float(np.radians(known.axis_deg)),
         sensor_offset_m=known.sensor_offset_mm / 1000,
-        g_sensitivity_rad_s_per_g=float(np.radians(known.g_sensitivity_deg_s_g[sensor])),
+        g_sensitivity_rad_s_per_g=float(np.radians(g_sensitivity_deg_s_g)),
         earth_rate=surroundings.site.earth_rate_rad_s is None,
     )

@@ -18,7 +18,6 @@ from rig.config.ur10e_limits import (
     PAYLOAD_LIMIT_KG,
     SPEED_LIMIT_DEG_S,
 )
-from rig.estimation.earth import EARTH_RATE_RAD_S, STANDARD_GRAVITY_M_S2
 
 Direction = Literal["cw", "ccw"]
 AxisName = Literal["+x", "-x", "+y", "-y", "+z", "-z"]
@@ -272,9 +271,13 @@ class SiteSection(Section):
         le=360,
         description="where the x axis of the arm's base points: 0 north, 90 east; with latitude_deg",
     )
-    gravity_m_s2: float = Field(default=STANDARD_GRAVITY_M_S2, gt=9.7, lt=9.9, description="acceleration of free fall")
+    gravity_m_s2: float = Field(
+        default=9.80665, gt=9.7, lt=9.9, description="acceleration of free fall", json_schema_extra={"unit": "m/s²"}
+    )
     base_up: Vector3 = Field(
-        default=(0.0, 0.0, 1.0), description="upwards in the frame of the arm's base; 0 0 −1 under a ceiling"
+        default=(0.0, 0.0, 1.0),
+        description="upwards in the frame of the arm's base; 0 0 −1 under a ceiling",
+        json_schema_extra=RATIO,
     )
 
     @field_validator("base_up")
@@ -298,19 +301,6 @@ class SiteSection(Section):
     def up(self) -> Vector3:
         """Unit vector."""
         x, y, z = (np.array(self.base_up) / np.linalg.norm(self.base_up)).tolist()
-        return x, y, z
-
-    @property
-    def earth_rate_rad_s(self) -> Vector3 | None:
-        """The Earth's rate in the frame of the base, None where it is not known."""
-        if self.latitude_deg is None or self.heading_deg is None:
-            return None
-        up = np.array(self.up)
-        ahead = np.array([1.0, 0.0, 0.0]) - up[0] * up
-        ahead /= np.linalg.norm(ahead)
-        heading, latitude = np.radians([self.heading_deg, self.latitude_deg])
-        north = np.cos(heading) * ahead + np.sin(heading) * np.cross(up, ahead)
-        x, y, z = (EARTH_RATE_RAD_S * (np.cos(latitude) * north + np.sin(latitude) * up)).tolist()
         return x, y, z
 
 
@@ -338,6 +328,7 @@ class UncertaintySection(Section):
         default=None,
         ge=0,
         description="change of a reading for 1 g, where attitudes do not tell it; left out, what is known of the part",
+        json_schema_extra={"unit": "°/s/g"},
     )
     decision_rule: Literal["simple", "guard_band"] = Field(
         default="simple",

@@ -200,9 +200,6 @@ class SensorEntry(Entry):
     scale: PositiveVector3
     bias_rad_s: Vector3
     covariance: Matrix6
-    covariance_combined: Matrix6 | None = None
-    budget: BudgetEntry | None = None
-    bias_process: BiasProcessEntry | None = None
     observations_used: int
     rank: int
     condition: float
@@ -216,6 +213,9 @@ class SensorEntry(Entry):
     six_observation: EstimateEntry | ErrorEntry
     algorithm_1: EstimateEntry | ErrorEntry
     board: BoardEntry | None = None
+    covariance_combined: Matrix6 | None = None
+    budget: BudgetEntry | None = None
+    bias_process: BiasProcessEntry | None = None
 
 
 class RotationEntry(Entry):

@@ -9,16 +9,18 @@ from collections.abc import Sequence
 from dataclasses import asdict, dataclass, fields
 from typing import TYPE_CHECKING, Annotated, Literal
 
+import numpy as np
 from pydantic import Field
 
 from rig.config.sensor_catalogue import PARTS
 from rig.data.checked import Finite, Positive, checked
 from rig.errors import Refused
 from rig.errors.quoting import quote
+from rig.estimation.earth import EARTH_RATE_RAD_S
 
 if TYPE_CHECKING:
     from rig.arm.motion import Plan
-    from rig.config.models import RigConfig
+    from rig.config.models import RigConfig, SiteSection
 
 SCHEMA = "rig.settings/2"
 SCHEMAS = ("rig.settings/1", SCHEMA)  # the first knows no site
@@ -165,9 +167,23 @@ def settings_of(config: "RigConfig", plan: "Plan") -> RunSettings:
         planned_sweeps=tuple(
             PlannedSweep(sweep.index, sweep.joint_name, sweep.direction, sweep.speed_rad_s) for sweep in plan.sweeps
         ),
-        site=Site(config.site.up, config.site.gravity_m_s2, config.site.earth_rate_rad_s),
+        site=_site(config.site),
         uncertainty=_uncertainty(config),
     )
+
+
+def _site(section: "SiteSection") -> Site:
+    """With the Earth's rate in the frame of the base, where latitude and heading are known."""
+    earth_rate: Vector3 | None = None
+    if section.latitude_deg is not None and section.heading_deg is not None:
+        up = np.array(section.up)
+        ahead = np.array([1.0, 0.0, 0.0]) - up[0] * up
+        ahead /= np.linalg.norm(ahead)
+        heading, latitude = np.radians([section.heading_deg, section.latitude_deg])
+        north = np.cos(heading) * ahead + np.sin(heading) * np.cross(up, ahead)
+        x, y, z = (EARTH_RATE_RAD_S * (np.cos(latitude) * north + np.sin(latitude) * up)).tolist()
+        earth_rate = x, y, z
+    return Site(section.up, section.gravity_m_s2, earth_rate)
 
 
 def _uncertainty(config: "RigConfig") -> Uncertainty:

@@ -43,8 +43,9 @@ def sensor_entry(result: SensorResult, role: Role = "calibrate", agreed: Agreeme
         algorithm_1=entry_or_error(result.algorithm_1),
     )  # fmt: skip
     more: dict[str, object] = {} if agreed is None else {"board": _board(agreed)}
-    if result.budget is not None:
-        more |= {"covariance_combined": _rows(result.budget.covariance), "budget": budget_entry(result.budget)}
+    if result.uncertainty is not None:
+        combined = result.uncertainty.covariance
+        more |= {"covariance_combined": _rows(combined), "budget": budget_entry(result.uncertainty)}
     if result.explained is not None:
         more["bias_process"] = bias_process_entry(result.explained)
     return found.model_copy(update=more)
