@@ -1,12 +1,13 @@
 """From recordings to a calibration: the one path that a run and `rig solve` share, pure from end to end."""
 
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Collection, Mapping, Sequence
 from dataclasses import dataclass
 from itertools import combinations
 from typing import Literal, TypeVar, get_args
 
 import numpy as np
 
+from rig.analysis.correction import Correction, CorrectionKind, diagonal_correction, matrix_correction
 from rig.data.run_file import RecordedSensor, RunData
 from rig.errors import Fault, Refused
 from rig.estimation.accumulator import Accumulator, SixObservationEstimator, Solution
@@ -34,7 +35,7 @@ class SensorResult:
 
     `solution` is the chosen estimator's. Beside it stand the others from the same observations: `vector_model`,
     `six_observation` (exact) and `algorithm_1`, the paper's own, or the Fault one ends in. There is one time base for
-    each recording that took part.
+    each recording that took part. `corrected_by` is what the board and `calibration.h` make of it.
     """
 
     sensor: RecordedSensor
@@ -45,6 +46,7 @@ class SensorResult:
     observations: tuple[Observation, ...]
     rests: tuple[Average, ...]
     time_bases: tuple[TimeBase, ...]
+    corrected_by: Correction
 
     @property
     def serial_number(self) -> str:
@@ -60,6 +62,16 @@ class SensorResult:
     def bias_rad_s(self) -> Array:
         """(3,) by the chosen estimator."""
         return self.solution.bias_rad_s
+
+    @property
+    def correction(self) -> CorrectionKind:
+        """Whether the axes are corrected each for itself or by the whole matrix."""
+        return self.corrected_by.kind
+
+    @property
+    def correction_matrix(self) -> Array:
+        """(3, 3) M of g = M (m + b)."""
+        return self.corrected_by.matrix
 
     @property
     def temperature_c(self) -> float:
@@ -93,21 +105,33 @@ def observe_recordings(runs: Sequence[RunData]) -> tuple[ObservedRun, ...]:
 
 
 def solve_observed(
-    sensors: Mapping[str, RecordedSensor], recordings: Sequence[ObservedRun], estimator: str = DEFAULT_ESTIMATOR
+    sensors: Mapping[str, RecordedSensor],
+    recordings: Sequence[ObservedRun],
+    estimator: str = DEFAULT_ESTIMATOR,
+    matrix_corrected: Collection[str] = (),
 ) -> dict[str, SensorResult]:
     """Calibrate each of `sensors` from all recordings.
 
-    Whatever the estimator, the sweeps must bear the six-observation solution: a plan that lacks a direction is refused.
+    The whole matrix corrects the readings of those in `matrix_corrected`, if the estimator is the vector model: the
+    others take the axes to stand at right angles. Whatever the estimator, the sweeps must bear the six-observation
+    solution: a plan that lacks a direction is refused.
     Raises Refused `unknown_estimator`; Fault `duplicated_observation` and as the estimators do.
     """
     chosen = known_estimator(estimator)
     return {
-        name: _solve_sensor(sensor, [recording.sensors[name] for recording in recordings], chosen)
+        name: _solve_sensor(
+            sensor,
+            [recording.sensors[name] for recording in recordings],
+            chosen,
+            whole_matrix=name in matrix_corrected,
+        )
         for name, sensor in sensors.items()
     }
 
 
-def _solve_sensor(sensor: RecordedSensor, parts: Sequence[SensorObservations], estimator: Estimator) -> SensorResult:
+def _solve_sensor(
+    sensor: RecordedSensor, parts: Sequence[SensorObservations], estimator: Estimator, *, whole_matrix: bool
+) -> SensorResult:
     observations = tuple(observation for part in parts for observation in part.revolutions)
     rests = tuple(rest for part in parts for rest in part.rests)
     mounting = np.array(sensor.mounting)
@@ -128,7 +152,14 @@ def _solve_sensor(sensor: RecordedSensor, parts: Sequence[SensorObservations], e
         observations=observations,
         rests=rests,
         time_bases=tuple(part.time_base for part in parts),
+        corrected_by=_correction(solution, whole_matrix=whole_matrix),
     )
+
+
+def _correction(solution: Estimate, *, whole_matrix: bool) -> Correction:
+    if whole_matrix and isinstance(solution, VectorSolution):
+        return matrix_correction(solution)
+    return diagonal_correction(solution.scale)
 
 
 def solve_observations(

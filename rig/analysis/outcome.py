@@ -72,7 +72,7 @@ def calibrated(runs: Sequence[RunData], estimator: str = DEFAULT_ESTIMATOR) -> O
     settings = runs[0].settings
     chosen = known_estimator(estimator)
     recordings = observe_recordings(runs)
-    results = solve_observed(runs[0].sensors, recordings, chosen)
+    results = solve_observed(runs[0].sensors, recordings, chosen, settings.matrix_corrected)
     onboard = {name: agreement(runs, name) for name in settings.to_calibrate}
     checks = judge({name: results[name].solution for name in onboard}, settings.limits)
     return Outcome(

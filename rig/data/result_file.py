@@ -41,7 +41,7 @@ class CheckEntry(_Entry):
 
 
 class StoredCalibrationEntry(_Entry):
-    """A calibration the board had stored, g = K (m + b), while it corrected its readings."""
+    """A calibration the board had stored while it corrected its readings: g = `matrix` (m + b), else K (m + b)."""
 
     sequence: int
     part: str
@@ -53,6 +53,7 @@ class StoredCalibrationEntry(_Entry):
     temperature_c: float
     scale: Vector3
     bias_rad_s: Vector3
+    matrix: Matrix3 | None = None
 
 
 class ProvenanceEntry(_Entry):
@@ -187,8 +188,9 @@ class BoardEntry(_Entry):
 class SensorEntry(_Entry):
     """A sensor's calibration by the chosen estimator, what it rests on, and what the other estimators say.
 
-    `temperature_c` is the mean over all averaged samples. A reference has no `board`: the board solves only for the
-    sensors that are to be calibrated.
+    `correction_matrix` is M of g = M (m + b), by which the board and the C header correct readings; results of before
+    have none, and it is K. `temperature_c` is the mean over all averaged samples. A reference has no `board`: the board
+    solves only for the sensors that are to be calibrated.
     """
 
     part: str
@@ -214,6 +216,8 @@ class SensorEntry(_Entry):
     six_observation: EstimateEntry | ErrorEntry
     algorithm_1: EstimateEntry | ErrorEntry
     board: BoardEntry | None = None
+    correction: Literal["matrix", "diagonal"] = "diagonal"
+    correction_matrix: Matrix3 | None = None
 
 
 class RotationEntry(_Entry):

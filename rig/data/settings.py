@@ -74,7 +74,7 @@ class RunSettings:
     """What was to be done and how it is judged. `then_verify` says that a verification was to follow a calibration.
 
     `to_calibrate` names the sensors the calibration is for, `planned_sweeps` are those of the whole procedure, however
-    often the run was interrupted.
+    often the run was interrupted. `matrix_corrected` names those of them whose readings the whole matrix corrects.
     """
 
     procedure: str
@@ -85,6 +85,7 @@ class RunSettings:
     reference: KnownReference | None
     home_q_rad: Annotated[tuple[Finite, ...], Field(min_length=6, max_length=6)]
     planned_sweeps: tuple[PlannedSweep, ...]
+    matrix_corrected: tuple[str, ...] = ()
 
     @property
     def movement(self) -> tuple[object, ...]:
@@ -132,6 +133,7 @@ def settings_of(config: "RigConfig", plan: "Plan") -> RunSettings:
         planned_sweeps=tuple(
             PlannedSweep(sweep.index, sweep.joint_name, sweep.direction, sweep.speed_rad_s) for sweep in plan.sweeps
         ),
+        matrix_corrected=tuple(name for name, each in config.to_calibrate.items() if each.correction == "matrix"),
     )
 
 

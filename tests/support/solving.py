@@ -12,7 +12,9 @@ from rig.analysis.calibration import (
 from rig.data.run_file import RunData
 
 
-def solve_runs(runs: Sequence[RunData], estimator: str = DEFAULT_ESTIMATOR) -> dict[str, SensorResult]:
+def solve_runs(
+    runs: Sequence[RunData], estimator: str = DEFAULT_ESTIMATOR, matrix_corrected: Sequence[str] = ()
+) -> dict[str, SensorResult]:
     """Calibrate every sensor from one recording, or from all recordings of a run that was resumed."""
     chosen = known_estimator(estimator)  # before the work of observing
-    return solve_observed(runs[0].sensors, observe_recordings(runs), chosen)
+    return solve_observed(runs[0].sensors, observe_recordings(runs), chosen, matrix_corrected)
