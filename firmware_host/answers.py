@@ -12,6 +12,7 @@ from firmware_host.frames import Frame
 from firmware_host.samples import SAMPLE_DTYPE
 
 Vector = tuple[float, float, float]
+Matrix = tuple[Vector, Vector, Vector]
 
 
 class SampleBatch(NamedTuple):
@@ -189,17 +190,25 @@ class BoardSolution:
 
 @dataclass(frozen=True, slots=True)
 class Calibration:
-    """A calibration as the board keeps it; `model` is one of `protocol.MODELS`, `serial_number` the sensor's.
+    """A calibration as the board keeps it: rate = `matrix` (m + `bias_rad_s`).
 
-    `temperature_c` is the sensor's during the calibration.
+    `model` is one of `protocol.MODELS`, `serial_number` the sensor's, `temperature_c` its own during the calibration.
     """
 
     model: str
     serial_number: str
     written_utc: datetime
     temperature_c: float
-    scale: Vector
+    matrix: Matrix
     bias_rad_s: Vector
+
+    @property
+    def scale(self) -> Vector:
+        """Each axis' scale factor k: F⁻¹ being the matrix, up to a rotation, 1/‖row i of F‖."""
+        if self.model == protocol.MODELS[1]:
+            return self.matrix[0][0], self.matrix[1][1], self.matrix[2][2]
+        kx, ky, kz = (1 / np.linalg.norm(np.linalg.inv(self.matrix), axis=1)).tolist()
+        return kx, ky, kz
 
     @classmethod
     def of(cls, values: dict[str, Any]) -> Self:
@@ -209,7 +218,7 @@ class Calibration:
             serial_number=protocol.text(values["serial_number"]),
             written_utc=datetime.fromtimestamp(values["written_unix_s"], UTC),
             temperature_c=values["temperature_c"],
-            scale=values["scale"],
+            matrix=values["matrix"],
             bias_rad_s=values["bias_rad_s"],
         )
 
@@ -220,20 +229,21 @@ class Calibration:
             "serial_number": self.serial_number,
             "written_unix_s": int(self.written_utc.timestamp()),
             "temperature_c": self.temperature_c,
-            "scale": self.scale,
+            "matrix": self.matrix,
             "bias_rad_s": self.bias_rad_s,
         }
 
     def as_kept(self) -> Self:
         """The same as it comes back from the board: single precision, whole seconds."""
-        temperature_c, kx, ky, kz, bx, by, bz = struct.unpack(
-            "<7f", struct.pack("<7f", self.temperature_c, *self.scale, *self.bias_rad_s)
+        temperature_c, *matrix, bx, by, bz = struct.unpack(
+            "<13f", struct.pack("<13f", self.temperature_c, *(k for row in self.matrix for k in row), *self.bias_rad_s)
         )
+        mxx, mxy, mxz, myx, myy, myz, mzx, mzy, mzz = matrix
         return replace(
             self,
             written_utc=self.written_utc.replace(microsecond=0),
             temperature_c=temperature_c,
-            scale=(kx, ky, kz),
+            matrix=((mxx, mxy, mxz), (myx, myy, myz), (mzx, mzy, mzz)),
             bias_rad_s=(bx, by, bz),
         )
 
@@ -276,6 +286,7 @@ class StoredCalibration:
             "written_utc": calibration.written_utc.isoformat(timespec="seconds"),
             "temperature_c": calibration.temperature_c,
             "scale": list(calibration.scale),
+            "matrix": [list(row) for row in calibration.matrix],
             "bias_rad_s": list(calibration.bias_rad_s),
         }
 

@@ -21,6 +21,9 @@ FLASH_BYTES = 256 * 1024
 CALIBRATION_BYTES = 6 * 2048  # the last pages: an image that reached into them would erase the calibrations
 RAM_START, RAM_BYTES = 0x2000_0000, 64 * 1024
 DEVICE_ID_REGISTER, DEVICE_ID = 0xE004_2000, 0x435  # DBGMCU_IDCODE of all STM32L43x and L44x (RM0394)
+DEBUG_REGISTER = 0xE004_2004  # DBGMCU_CR: what keeps its clock while the core sleeps; a reset does not clear it
+# Under reset first: firmware that sleeps most of the time may not let a probe in. A probe that cannot do that halts it.
+CONNECT_MODES = ("under-reset", "halt")
 
 IMAGE_NAME = "rig_l432.bin"
 NUCLEO_CODE = "0770"  # of the Nucleo-L432KC in the link of its MBED.HTM, as in mbed-ls' table of platforms
@@ -89,16 +92,20 @@ def flash_by_probe(image: bytes, probe: Any) -> None:
     from pyocd.core.exceptions import Error
     from pyocd.core.session import Session
 
-    options = {"target_override": TARGET, "hide_programming_progress": True}
-    try:
-        with Session(probe, options=options) as session:
-            _program(session, image)
-    except (Error, OSError) as error:
-        raise BoardError(
-            "flash_failed",
-            f"the probe {probe.unique_id} could not program the board: {error}",
-            "Check the board's supply and try again",
-        ) from error
+    failure: Exception | None = None
+    for mode in CONNECT_MODES:
+        options = {"target_override": TARGET, "hide_programming_progress": True, "connect_mode": mode}
+        try:
+            with Session(probe, options=options) as session:
+                _program(session, image)
+            return
+        except (Error, OSError) as error:
+            failure = error
+    raise BoardError(
+        "flash_failed",
+        f"the probe {probe.unique_id} could not program the board: {failure}",
+        "Check the board's supply and try again",
+    ) from failure
 
 
 def _program(session: Any, image: bytes) -> None:
@@ -121,6 +128,8 @@ def _program(session: Any, image: bytes) -> None:
             "the board's flash reads back otherwise than it was written",
             "Try again; if that does not help, replace the board",
         )
+    # pyocd sets its bits when it connects; left on, they wake an erratum of the chip's in every sleep until a power-off
+    session.target.write32(DEBUG_REGISTER, 0)
     session.target.reset()
 
 

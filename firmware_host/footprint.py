@@ -11,6 +11,7 @@ import sys
 from pathlib import Path
 from typing import Any
 
+import numpy as np
 from elftools.elf.constants import SH_FLAGS
 from elftools.elf.elffile import ELFFile
 
@@ -100,7 +101,7 @@ def stack_used(image: bytes, elf: bytes) -> int:
     session.ask("stop")
     for sensor in SENSORS:
         solution = solutions[len(METHODS) * sensor]
-        found = {"scale": solution["scale"], "bias_rad_s": solution["bias_rad_s"]}
+        found = {"matrix": np.diag(solution["scale"]), "bias_rad_s": solution["bias_rad_s"]}
         about = {"model": 1, "serial_number": "footprint", "written_unix_s": 0, "temperature_c": 25.0}
         session.ask("write_calibration", sensor=sensor, **about, **found)
         session.ask("read_calibration", sensor=sensor)

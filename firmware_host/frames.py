@@ -30,8 +30,8 @@ def encode(name: str, sequence: int, values: dict[str, Any] | None = None, items
     flat: list[Any] = []
     for field in message.fields:
         value = values[field.name]
-        if field.kind.startswith("vector"):
-            flat.extend(value)
+        if field.rows:
+            flat.extend(np.ravel(value).tolist())
         else:
             flat.append(value.encode("ascii") if isinstance(value, str) else value)
     payload = message.head.pack(*flat)

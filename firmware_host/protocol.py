@@ -11,6 +11,7 @@ own frames count up modulo 256, so a missing number is a lost frame. `reply_to` 
 """
 
 import struct
+from collections.abc import Iterator
 from dataclasses import dataclass
 from functools import cached_property
 from itertools import islice
@@ -20,8 +21,8 @@ import numpy as np
 
 from firmware_host.problem import Problem
 
-PROTOCOL_VERSION = 2
-FIRMWARE_VERSION = "0.2.1"  # of the shipped image
+PROTOCOL_VERSION = 3
+FIRMWARE_VERSION = "0.3.0"  # of the shipped image
 PAYLOAD_MAX = 240
 OVERHEAD = 6  # bytes of a frame around its payload before COBS: type, sequence, CRC
 COBS_BYTES = 2  # that COBS adds: the code byte and the delimiter
@@ -35,7 +36,8 @@ MAX_SCALE = 4.0
 
 MODES = ("raw", "calibrated")
 RESET_CAUSES = ("unknown", "power", "pin", "software", "watchdog", "fault")
-MODELS = ("none", "k_times_m_plus_b")  # of a calibration; the second is g = K (m + b), SIX Eq. (3)
+# Of a calibration: g = K (m + b) with K diagonal, SIX Eq. (3), and the same with a whole matrix in the place of K.
+MODELS = ("none", "k_times_m_plus_b", "matrix_times_m_plus_b")
 METHODS = ("closed_form", "algorithm_1")
 SOLUTION_STATUSES = ("solved", "too_few_observations", "degenerate", "not_converged")
 ENUMERATIONS = {  # name → prefix of its values in C, the values counted from 0
@@ -61,6 +63,7 @@ KINDS = {
     "vector_i16": ("3h", "int16_t", "[3]"),
     "vector_i32": ("3i", "int32_t", "[3]"),
     "vector_f32": ("3f", "float", "[3]"),
+    "matrix_f32": ("9f", "float", "[3][3]"),
 }
 
 
@@ -71,6 +74,11 @@ class Field:
     name: str
     kind: str
     meaning: str
+
+    @property
+    def rows(self) -> int:
+        """Of three numbers each: 1 of a vector, 3 of a matrix, 0 of anything else."""
+        return {"vector": 1, "matrix": 3}.get(self.kind.partition("_")[0], 0)
 
 
 @dataclass(frozen=True)
@@ -93,21 +101,28 @@ class Message:
     def item_dtype(self) -> np.dtype[np.void]:
         """Layout of one item; without items, an empty one."""
         codes = {"bytes12": "V12", "text12": "S12", "text24": "S24"}
-        vectors = {"vector_i16": "(3,)<i2", "vector_i32": "(3,)<i4", "vector_f32": "(3,)<f4"}
+        vectors = {"vector_i16": "(3,)<i2", "vector_i32": "(3,)<i4", "vector_f32": "(3,)<f4", "matrix_f32": "(3,3)<f4"}
         return np.dtype([(f.name, (codes | vectors).get(f.kind, "<" + KINDS[f.kind][0])) for f in self.items])
 
     @cached_property
     def _names(self) -> tuple[str, ...] | None:
-        """Names of what `head` unpacks, one for one; None when some of it is vectors."""
-        vectors = any(field.kind.startswith("vector") for field in self.fields)
-        return None if vectors else tuple(field.name for field in self.fields)
+        """Names of what `head` unpacks, one for one; None when some of it is vectors or matrices."""
+        return None if any(field.rows for field in self.fields) else tuple(field.name for field in self.fields)
 
     def named(self, values: tuple[Any, ...]) -> dict[str, Any]:
-        """What `head` unpacks, by field name; a vector is a tuple of three."""
+        """What `head` unpacks, by field name; a vector is a tuple of three, a matrix of its three rows."""
         if self._names is not None:  # the frequent frames, made short
             return dict(zip(self._names, values, strict=True))
         rest = iter(values)
-        return {f.name: tuple(islice(rest, 3)) if f.kind.startswith("vector") else next(rest) for f in self.fields}
+        return {field.name: _next(field.rows, rest) for field in self.fields}
+
+
+def _next(rows: int, values: Iterator[Any]) -> Any:
+    """The next value, vector or matrix of those that `head` unpacks."""
+    if rows == 0:
+        return next(values)
+    found = tuple(tuple(islice(values, 3)) for _ in range(rows))
+    return found if rows > 1 else found[0]
 
 
 REPLY_TO = Field("reply_to", "u8", "sequence of the frame this answers, 0 = nobody asked")
@@ -128,7 +143,7 @@ CALIBRATION = (  # what the host knows of a calibration; the board adds which pa
     Field("serial_number", "text24", "of the sensor, as the configuration names it"),
     Field("written_unix_s", "u64", "when it was written, seconds since 1970 UTC"),
     Field("temperature_c", "f32", "of the sensor during the calibration, degrees Celsius"),
-    Field("scale", "vector_f32", "diagonal of K"),
+    Field("matrix", "matrix_f32", "what m + b is multiplied by, row by row; of k_times_m_plus_b it is diagonal"),
     Field("bias_rad_s", "vector_f32", "b, in the units of the reading"),
 )
 
@@ -351,7 +366,9 @@ ERRORS = {  # code → what the board reports; `what` follows "the board says th
     14: Problem("other_sensor", "the stored calibration is of another part or range", "Calibrate in this range"),
     15: Problem("not_kept", "it has not kept the readings of that time", "Ask it to keep them before the sweep"),
     16: Problem("bad_observation", "the observation is out of order or not finite", "Begin anew with observation 0"),
-    17: Problem("bad_calibration", "the calibration is not finite or of no known model", "Calibrate again"),
+    17: Problem(
+        "bad_calibration", "the calibration is no sensor's: not finite, or of no known model", "Calibrate again"
+    ),
     18: Problem("flash_failed", "its flash did not take what was written", "Replace the microcontroller board"),
     19: Problem("sensor_fault", "the sensor reports a fault of its own", "Check its supply; else replace the sensor"),
 }

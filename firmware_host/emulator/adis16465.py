@@ -21,7 +21,8 @@ _FILT_CTRL, _RANG_MDL, _MSC_CTRL, _DEC_RATE, _GLOB_CMD, _PROD_ID = 0x5C, 0x5E, 0
 # Registers that can be written, with their values after reset and the bits that have a model. Writing a one to any
 # other bit that is zero after reset fails the run: it would switch on a correction or clock that is not simulated.
 _RESET_AND_BITS = {
-    **dict.fromkeys(range(0x40, 0x58, 2), (0x0000, 0x0000)),  # bias corrections
+    **dict.fromkeys(range(0x40, 0x4C, 2), (0x0000, 0xFFFF)),  # what the user wants added to the rates, 32 bits an axis
+    **dict.fromkeys(range(0x4C, 0x58, 2), (0x0000, 0x0000)),  # the same of the accelerations
     _FILT_CTRL: (0x0000, 0x0007),
     _MSC_CTRL: (0x00C1, 0x00C1),  # data-ready polarity, alignment and acceleration compensation; no sync
     0x62: (0x07D0, 0x07D0),  # UP_SCALE
@@ -31,7 +32,8 @@ _RESET_AND_BITS = {
 # A setting acts, and reads back, only so long after its last byte was written (no-OS, adis1646x_timeouts)
 _UPDATE_S = {_FILT_CTRL: 30e-6, _DEC_RATE: 30e-6, _MSC_CTRL: 200e-6}
 _DR_ACTIVE_HIGH = 0x0001
-_SPI_ERROR = 1 << 3  # DIAG_STAT
+_XG_BIAS_LOW = 0x40
+_OVERRUN, _SPI_ERROR = 1 << 1, 1 << 3  # DIAG_STAT
 _SOFTWARE_RESET = 0x80
 _MAX_FILTER, _MAX_DEC_RATE = 6, 1999
 _RANGES = {125: (0x0003, 160), 500: (0x0007, 40), 2000: (0x000F, 10)}  # °/s: RANG_MDL, LSB per °/s
@@ -54,7 +56,8 @@ class Adis16465:
     The part samples from power-up on and cannot be told to be quiet. With averaging (DEC_RATE, FILT_CTRL) its rates
     have 32 bits, and the upper 16 alone, which a burst carries, are rounded down. Averages and filters themselves are
     not simulated: `truth` states the noise of an output. There is no gravity in the laboratory: the accelerometer
-    shows the part at rest with z up.
+    shows the part at rest with z up. What was written to its bias registers it keeps until its next software reset,
+    whatever becomes of the board; a data path that was `overrun` says so until then.
     """
 
     name = "ADIS16465"
@@ -162,9 +165,8 @@ class Adis16465:
             )
 
     def _burst_data(self) -> bytes:
-        words = [self._diagnosis, *(self._rate(axis) >> 16 for axis in range(3)), 0, 0, _COUNTS_PER_G]
+        words = [self._take_diagnosis(), *(self._rate(axis) >> 16 for axis in range(3)), 0, 0, _COUNTS_PER_G]
         data = b"".join((word & 0xFFFF).to_bytes(2, "big") for word in (*words, self._temperature, self._counter))
-        self._diagnosis = 0
         return data + (sum(data) & 0xFFFF).to_bytes(2, "big")
 
     def _continue_burst(self) -> int:
@@ -183,6 +185,7 @@ class Adis16465:
         self._registers.reset()
         self._waiting: dict[int, tuple[float, int]] = {}  # address → when a setting acts, its value
         self._diagnosis = self._counter = 0
+        self.overrun = False
         self._counts = [0, 0, 0]  # 32 bits each
         self._answer = 0
         self._data_valid = False
@@ -195,8 +198,7 @@ class Adis16465:
         if address in self._registers.values:
             return self._registers.values[address]
         if address == _DIAG_STAT:
-            diagnosis, self._diagnosis = self._diagnosis, 0
-            return diagnosis
+            return self._take_diagnosis()
         if _X_GYRO_LOW <= address < _X_ACCL_LOW:
             axis, high = divmod(address - _X_GYRO_LOW, 4)
             return self._rate(axis) >> (16 if high else 0) & 0xFFFF
@@ -212,6 +214,11 @@ class Adis16465:
         if address not in fixed:
             raise self._registers.unmodelled("read of", address)
         return fixed[address]
+
+    def _take_diagnosis(self) -> int:
+        """Reading clears what does not stand."""
+        diagnosis, self._diagnosis = self._diagnosis, 0
+        return diagnosis | (_OVERRUN if self.overrun else 0)
 
     def _write(self, address: int, byte: int, time_s: float) -> None:
         """One byte of a register; an odd address is its upper byte."""
@@ -258,12 +265,20 @@ class Adis16465:
 
     def _update(self, time_s: float) -> None:
         """New output registers; the data-ready line tells of them and rests shortly before the next."""
-        self._counts = [saturated(round(rate / self._per_count), bits=32) for rate in self._gyroscope.read(time_s)]
+        rates = self._gyroscope.read(time_s)
+        self._counts = [
+            saturated(round(rate / self._per_count) + self._user_bias(axis), bits=32) for axis, rate in enumerate(rates)
+        ]
         self._counter = self._counter + 1 & 0xFFFF
         self._data_valid = True
         self._samples += 1 + self._registers.values[_DEC_RATE]
         self._next_update_s = self._usable_s + self._sample_time(self._samples)
         self._next_change_s = self._next_update_s - _UPDATING_S
+
+    def _user_bias(self, axis: int) -> int:
+        """In the 32-bit rate's counts (Linux, adis16475.c: calibbias)."""
+        low, high = (self._registers.values[_XG_BIAS_LOW + 4 * axis + half] for half in (0, 2))
+        return (high << 16 | low) - (1 << 32 if high >> 15 else 0)
 
     def _rate(self, axis: int) -> int:
         """As the 32-bit register pair shows it: without averaging, the lower 16 bits are empty."""

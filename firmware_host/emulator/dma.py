@@ -7,6 +7,7 @@ from firmware_host.emulator.bus import Register, Stored, Violation
 from firmware_host.emulator.nvic import Nvic
 
 _ENABLE, _COMPLETE_INTERRUPT, _TO_PERIPHERAL, _MEMORY_INCREMENT = 1 << 0, 1 << 1, 1 << 4, 1 << 7
+_ERROR_INTERRUPT = 1 << 3  # of transfers that meet no memory, which end the run here
 _PRIORITY = 3 << 12
 _GLOBAL, _COMPLETE = 1 << 0, 1 << 1  # flags of a channel
 _CHANNEL, _IRQ, _REQUEST = 7, 17, 2  # channel 7 serves USART2_TX when it selects request 2
@@ -29,7 +30,7 @@ class Dma1:
     base = 0x4002_0000
 
     def __init__(self, memory: Memory, nvic: Nvic, data_register: int) -> None:
-        modes = _ENABLE | _COMPLETE_INTERRUPT | _TO_PERIPHERAL | _MEMORY_INCREMENT | _PRIORITY
+        modes = _ENABLE | _COMPLETE_INTERRUPT | _ERROR_INTERRUPT | _TO_PERIPHERAL | _MEMORY_INCREMENT | _PRIORITY
         self._memory = memory
         self._nvic = nvic
         self._data_register = data_register

@@ -15,7 +15,7 @@ _PG, _PER, _STRT, _OPTLOCK, _LOCK = 1 << 0, 1 << 1, 1 << 16, 1 << 30, 1 << 31
 _PNB_SHIFT, _PNB = 3, 0xFF << 3
 _PROGERR, _PGAERR, _SIZERR, _PGSERR, _BSY = 1 << 3, 1 << 5, 1 << 6, 1 << 7, 1 << 16
 _ERRORS = 0xC3FA  # all that SR can say went wrong, as far as the firmware may clear it
-_ECCD = 1 << 31
+_ECCC, _ECCD = 1 << 30, 1 << 31
 _DATA_CACHE, _INSTRUCTION_CACHE = 1 << 10, 1 << 9
 _RESET_DATA_CACHE, _RESET_INSTRUCTION_CACHE = 1 << 12, 1 << 11
 # Data sheet DS11451, "Flash memory characteristics", typical
@@ -61,7 +61,7 @@ class Flash:
             Register(0x08, "KEYR", None, self._write_key),
             Register(0x10, "SR", lambda: self._status | (_BSY if self.busy else 0), self._clear_status),
             Register(0x14, "CR", lambda: self._control, self._write_control),
-            Register(0x18, "ECCR", lambda: self._ecc, self._clear_ecc),
+            Register(0x18, "ECCR", lambda: 0 if self._memory.flags_lost else self._ecc, self._clear_ecc),
         )
 
     @property
@@ -136,7 +136,7 @@ class Flash:
         self._status &= ~value
 
     def _clear_ecc(self, value: int) -> None:
-        check_bits("FLASH ECCR", value & ~0x1F_FFFF, _ECCD)
+        check_bits("FLASH ECCR", value & ~0x1F_FFFF, _ECCC | _ECCD)
         if value & _ECCD:
             self._ecc = 0
             self._nvic.set_line(NMI - FIRST_IRQ, False)

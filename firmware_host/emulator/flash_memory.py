@@ -19,8 +19,9 @@ class FlashMemory:
     """Contents and state of the flash.
 
     `image`: the program, from the start; `store`: the last pages, erased when left out; `torn`: offsets of doublewords
-    whose erasing or programming was cut off: reading one is an error that the chip detects. Raises BoardError when the
-    image does not fit. `on_change` is called after every change.
+    whose erasing or programming was cut off: reading one is an error that the chip detects; with `flags_lost` it does
+    not say which, as the chip's errata have it of a power loss in the middle of an operation. Raises BoardError when
+    the image does not fit. `on_change` is called after every change.
     """
 
     def __init__(self, image: bytes, store: bytes = b"", torn: frozenset[int] = frozenset()) -> None:
@@ -28,6 +29,7 @@ class FlashMemory:
             raise BoardError("image_too_big", f"the image has {len(image)} bytes", f"Flash holds {STORE_OFFSET}")
         self.data = bytearray(image.ljust(STORE_OFFSET, b"\xff") + store.ljust(FLASH_BYTES - STORE_OFFSET, b"\xff"))
         self.torn = set(torn)
+        self.flags_lost = False
         self.operations = 0  # erasures and programmings begun
         self.on_change: Callable[[], None] = lambda: None
         self._fails_at: int | None = None

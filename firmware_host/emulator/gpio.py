@@ -1,4 +1,4 @@
-"""GPIO outputs and functions, SYSCFG's selection of external interrupts, and EXTI (RM0394, chapters 8, 9 and 13)."""
+"""GPIO levels and functions, SYSCFG's selection of external interrupts, and EXTI (RM0394, chapters 8, 9 and 13)."""
 
 from collections.abc import Callable, Sequence
 
@@ -28,6 +28,7 @@ class Port:
         self._pulls = Stored(f"{prefix} PUPDR", 0xFFFF_FFFF, _PULLS_AFTER_RESET[letter])
         self._output = 0
         self._alternate = [Stored(f"{prefix} AFR{half}", 0xFFFF_FFFF) for half in "LH"]
+        self._levels = 0  # that devices drive
         self._watched: list[tuple[int, Callable[[bool], None]]] = []
         self._watched_level: list[bool] = []
 
@@ -42,6 +43,7 @@ class Port:
             self._mode.at(0x00),
             self._speed.at(0x08),
             self._pulls.at(0x0C),
+            Register(0x10, "IDR", self._read_levels, None),
             Register(0x18, "BSRR", None, self._set_and_reset),
             self._alternate[0].at(0x20),
             self._alternate[1].at(0x24),
@@ -58,9 +60,17 @@ class Port:
             return None
         return self._alternate[pin // 8].value >> 4 * (pin % 8) & 0xF
 
+    def drive(self, pin: int, high: bool) -> None:
+        """A device drives the pin."""
+        self._levels = self._levels & ~(1 << pin) | high << pin
+
     def is_input(self, pin: int) -> bool:
         """A pin left analog, as after a reset, does not see its level."""
         return self._mode.value >> 2 * pin & 3 == _INPUT
+
+    def _read_levels(self) -> int:
+        """Of the pins that devices drive; the others' levels have no model and read 0."""
+        return sum(1 << pin for pin in range(16) if self._levels >> pin & 1 and self.is_input(pin))
 
     def _set_and_reset(self, value: int) -> None:
         self._output = self._output & ~(value >> 16) | value & 0xFFFF

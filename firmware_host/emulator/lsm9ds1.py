@@ -18,6 +18,8 @@ _CTRL_REG8 = 0x22
 # Registers of the accelerometer and gyroscope, with their values after reset and the bits that have a model. Writing
 # one to any other bit fails the run: it would switch on a filter, FIFO, sleep or format that is not simulated.
 _RESET_AND_BITS = {
+    0x04: (0x00, 0x00),  # ACT_THS: no sleep while nothing turns
+    0x05: (0x00, 0x00),  # ACT_DUR
     _INT1_CTRL: (0x00, 0x02),  # INT_DRDY_G
     0x0D: (0x00, 0x00),  # INT2_CTRL
     _CTRL_REG1_G: (0x00, 0xFB),  # ODR_G, FS_G; BW_G acts on the second filter, which is not in the path

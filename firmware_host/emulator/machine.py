@@ -21,6 +21,7 @@ _RAM, _RAM_SIZE = 0x2000_0000, 64 * 1024  # SRAM1, then SRAM2 at its second addr
 _SYSTEM_MEMORY, _UNIQUE_ID, _FLASH_KB = 0x1FFF_7000, 0x1FFF_7590, 0x1FFF_75E0
 _WFI, _BRANCH_TO_SELF = 0xBF30, 0xE7FE
 _EXCEPTION_RETURN = 8
+_EXCEPTION_CYCLES = 12 + 10  # entry and return (Cortex-M4 Technical Reference Manual, 3.9), charged at the entry
 _CORE_EXCEPTIONS = {2: "supervisor call", 7: "breakpoint"}
 _CORRECT = "Correct the firmware"
 
@@ -30,8 +31,8 @@ class EmulatedBoard:
 
     `flash`: its contents, which outlive the board; `elf`: the same program with symbols; `devices`: what hangs on
     SPI1; `unique_id`: 12 bytes; `crystal_ppm`: how fast the board's crystal runs; `boot_time_s`: virtual time of
-    power-up. Instructions are counted exactly and take one core cycle each; wait states and the entry of exceptions
-    take no time.
+    power-up. Instructions are counted exactly and take one core cycle each; every doubleword of a block is fetched anew
+    with the wait states of the flash, as if there were neither cache nor prefetch, and an exception takes its cycles.
     The same inputs at the same virtual times give the same bytes.
     """
 
@@ -154,6 +155,9 @@ class EmulatedBoard:
                 self._restart()
             waits_for_flash = self._chip.flash.busy
             entry = Entry.NONE if waits_for_flash else cortex.enter_pending(self._chip.control.vectors)
+            if entry is Entry.TAKEN:
+                cycles = _EXCEPTION_CYCLES + self._chip.flash.wait_states  # the vector comes from flash
+                timeline.now += cycles * self._chip.clocks.ticks_per_core_cycle
             if entry is not Entry.NONE:
                 self._asleep = False  # a masked interrupt wakes the core too
             if self._asleep or waits_for_flash:
@@ -189,7 +193,8 @@ class EmulatedBoard:
         code = instructions(self._engine.read(address, size))
         if not self._chip.control.float_enabled and any(is_floating_point(instruction) for instruction in code):
             raise Violation("firmware_fault", "floating point before CPACR enables it", _CORRECT)
-        ticks = len(code) * self._chip.clocks.ticks_per_core_cycle
+        cycles = len(code) + self._chip.flash.wait_states * _doublewords(address, size)
+        ticks = cycles * self._chip.clocks.ticks_per_core_cycle
         if code == [_BRANCH_TO_SELF]:
             return max(ticks, self._timeline.deadline - self._timeline.now)  # it turns until something happens
         self._costs[address] = ticks
@@ -233,3 +238,8 @@ class EmulatedBoard:
         self._asleep = False
         self._chip.reset()
         self._cortex.reset(_FLASH)
+
+
+def _doublewords(address: int, size: int) -> int:
+    """How many lines of the flash, of 64 bits, a block of code lies in."""
+    return (address + size - 1) // 8 - address // 8 + 1

@@ -210,6 +210,7 @@ class DeviceLink:
         level = device.interrupt_level and device.fault is not Fault.ABSENT
         if level != self._level:
             self._level = level
+            self._interrupt_port.drive(self._interrupt_pin, level)
             if level and self._interrupt_port.is_input(self._interrupt_pin):
                 self._exti.rising_edge(self._interrupt_port, self._interrupt_pin)
         due_s = device.next_event_s

@@ -13,7 +13,10 @@ _START, _KICK, _UNLOCK = 0xCCCC, 0xAAAA, 0x5555
 
 
 class Tim2:
-    """A free-running 32-bit up-counter. The prescaler acts from the next update event on, as on the chip."""
+    """A free-running 32-bit up-counter. The prescaler acts from the next update event on, as on the chip.
+
+    The counter stands while the auto-reload register is 0, as it is after a reset by the maker's own file.
+    """
 
     name = "TIM2"
     base = 0x4000_0000
@@ -23,11 +26,13 @@ class Tim2:
         self._clocks = clocks
         self._control = Stored("TIM2 CR1", 1, after=self._switch)
         self._prescaler = Stored("TIM2 PSC", 0xFFFF)
+        self._reload = Stored("TIM2 ARR", 0xFFFF_FFFF, after=self._switch)
         self.reset()
 
     def reset(self) -> None:
         self._control.reset()
         self._prescaler.reset()
+        self._reload.reset()
         self._divider = 1  # the prescaler in effect, plus one
         self._counted = 0  # the count at `_since`
         self._since: int | None = None  # tick, None while stopped
@@ -40,6 +45,7 @@ class Tim2:
             Register(0x14, "EGR", None, self._generate),
             Register(0x24, "CNT", self._read_count, None),
             self._prescaler.at(0x28),
+            self._reload.at(0x2C),
         )
 
     @property
@@ -51,7 +57,7 @@ class Tim2:
         if self._since is None:
             return self._counted
         ticks = self._timeline.now - self._since
-        return (self._counted + ticks * self._timer_hz // (TICK_HZ * self._divider)) & 0xFFFF_FFFF
+        return (self._counted + ticks * self._timer_hz // (TICK_HZ * self._divider)) % (self._reload.value + 1)
 
     def _read_count(self) -> int:
         timeline = self._timeline
@@ -66,7 +72,7 @@ class Tim2:
 
     def _switch(self) -> None:
         self._counted = self._count()
-        self._since = self._timeline.now if self._control.value & 1 else None
+        self._since = self._timeline.now if self._control.value & 1 and self._reload.value else None
 
     def _generate(self, value: int) -> None:
         check_bits("TIM2 EGR", value, 1)

@@ -14,10 +14,10 @@ MIN_INDEPENDENCE = 1e-3  # least over greatest information about a turn; revolut
 
 
 class Calibration(Protocol):
-    """Scale (3,) and bias_rad_s (3,) of g = K (m + b)."""
+    """correction_matrix (3, 3) and bias_rad_s (3,) of g = M (m + b)."""
 
     @property
-    def scale(self) -> Array: ...
+    def correction_matrix(self) -> Array: ...
     @property
     def bias_rad_s(self) -> Array: ...
 
@@ -29,9 +29,9 @@ class MeanRates:
     rate_rad_s: Array
     covariance_rad2_s2: Array
 
-    def turned(self, rotation: Array) -> "MeanRates":
-        """The same in another frame."""
-        return MeanRates(self.rate_rad_s @ rotation.T, rotation @ self.covariance_rad2_s2 @ rotation.T)
+    def turned(self, matrix: Array) -> "MeanRates":
+        """The same in another frame, or corrected."""
+        return MeanRates(self.rate_rad_s @ matrix.T, matrix @ self.covariance_rad2_s2 @ matrix.T)
 
 
 @dataclass(frozen=True, slots=True)
@@ -62,9 +62,10 @@ def mean_rates(observations: Sequence[Observation], calibration: Calibration | N
     """The mean rates of a sensor's revolutions, corrected; without a calibration, as the sensor read them."""
     means = np.array([observation.average.mean_rad_s for observation in observations])
     variances = np.array([observation.average.variance_rad2_s2 for observation in observations])
-    if calibration is not None:
-        means, variances = calibration.scale * (means + calibration.bias_rad_s), calibration.scale**2 * variances
-    return MeanRates(means, variances[:, :, None] * np.eye(3))
+    raw = MeanRates(means, variances[:, :, None] * np.eye(3))
+    if calibration is None:
+        return raw
+    return MeanRates(means + calibration.bias_rad_s, raw.covariance_rad2_s2).turned(calibration.correction_matrix)
 
 
 def relative_rotation(sensor: MeanRates, reference: MeanRates, nominal: Array) -> RelativeRotation:

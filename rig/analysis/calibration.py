@@ -1,12 +1,13 @@
 """From recordings to a calibration: the one path that a run and `rig solve` share, pure from end to end."""
 
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Collection, Mapping, Sequence
 from dataclasses import dataclass
 from itertools import combinations
 from typing import Literal, TypeVar, get_args
 
 import numpy as np
 
+from rig.analysis.correction import Correction, CorrectionKind, diagonal_correction, matrix_correction
 from rig.analysis.seen import see, unknown_of
 from rig.analysis.surroundings import Surroundings
 from rig.data.run_file import RecordedSensor, RunData
@@ -42,7 +43,7 @@ class SensorResult:
 
     `solution` is the chosen estimator's. Beside it stand the others from the same observations: `vector_model`,
     `six_observation` (exact) and `algorithm_1`, the paper's own, or the Fault one ends in. There is one time base for
-    each recording that took part.
+    each recording that took part. `corrected_by` is what the board and `calibration.h` make of it.
     """
 
     sensor: RecordedSensor
@@ -55,6 +56,7 @@ class SensorResult:
     observations: tuple[Observation, ...]
     rests: tuple[Average, ...]
     time_bases: tuple[TimeBase, ...]
+    corrected_by: Correction
 
     @property
     def serial_number(self) -> str:
@@ -75,6 +77,16 @@ class SensorResult:
     def combined_covariance(self) -> Array:
         """(6, 6) with all that is in the budget; of the noise alone where there is none."""
         return self.solution.covariance if self.uncertainty is None else self.uncertainty.covariance
+
+    @property
+    def correction(self) -> CorrectionKind:
+        """Whether the axes are corrected each for itself or by the whole matrix."""
+        return self.corrected_by.kind
+
+    @property
+    def correction_matrix(self) -> Array:
+        """(3, 3) M of g = M (m + b)."""
+        return self.corrected_by.matrix
 
     @property
     def temperature_c(self) -> float:
@@ -112,14 +124,20 @@ def solve_observed(
     recordings: Sequence[ObservedRun],
     estimator: str = DEFAULT_ESTIMATOR,
     surroundings: Surroundings | None = None,
+    matrix_corrected: Collection[str] = (),
 ) -> dict[str, SensorResult]:
     """Calibrate each of `sensors` from all recordings, which were made in these `surroundings`.
 
-    Whatever the estimator, the sweeps must bear the six-observation solution: a plan that lacks a direction is refused.
+    The whole matrix corrects the readings of those in `matrix_corrected`, if the estimator is the vector model: the
+    others take the axes to stand at right angles. Whatever the estimator, the sweeps must bear the six-observation
+    solution: a plan that lacks a direction is refused.
     Raises Refused `unknown_estimator`; Fault `duplicated_observation` and as the estimators do.
     """
     chosen = known_estimator(estimator)
-    return {name: _solve_sensor(name, sensor, recordings, surroundings, chosen) for name, sensor in sensors.items()}
+    return {
+        name: _solve_sensor(name, sensor, recordings, surroundings, chosen, whole_matrix=name in matrix_corrected)
+        for name, sensor in sensors.items()
+    }
 
 
 def _solve_sensor(
@@ -128,6 +146,8 @@ def _solve_sensor(
     recordings: Sequence[ObservedRun],
     surroundings: Surroundings | None,
     estimator: Estimator,
+    *,
+    whole_matrix: bool,
 ) -> SensorResult:
     parts = [recording.sensors[name] for recording in recordings]
     observations = tuple(observation for part in parts for observation in part.revolutions)
@@ -161,7 +181,14 @@ def _solve_sensor(
         observations=observations,
         rests=rests,
         time_bases=tuple(part.time_base for part in parts),
+        corrected_by=_correction(solution, whole_matrix=whole_matrix),
     )
+
+
+def _correction(solution: Estimate, *, whole_matrix: bool) -> Correction:
+    if whole_matrix and isinstance(solution, VectorSolution):
+        return matrix_correction(solution)
+    return diagonal_correction(solution.scale)
 
 
 def solve_observations(

@@ -32,6 +32,11 @@ class Reference:
     scale: Array
     bias_rad_s: Array
 
+    @property
+    def correction_matrix(self) -> Array:
+        """(3, 3) K."""
+        return np.diag(self.scale)
+
 
 def turns_of(sensor: str, recordings: Sequence[ObservedRun]) -> list[Observation]:
     """All revolutions as a sensor saw them."""

@@ -77,7 +77,7 @@ def calibrated(runs: Sequence[RunData], estimator: str = DEFAULT_ESTIMATOR) -> O
     chosen = known_estimator(estimator)
     recordings = observe_recordings(runs)
     surroundings = surroundings_of(recordings)
-    results = solve_observed(runs[0].sensors, recordings, chosen, surroundings)
+    results = solve_observed(runs[0].sensors, recordings, chosen, surroundings, settings.matrix_corrected)
     onboard = {name: agreement(runs, name) for name in settings.to_calibrate}
     checks = judge(
         {name: results[name].solution for name in onboard},

@@ -1,7 +1,8 @@
 """Calibrated readings against a sensor that is known: SIX, Section IV-B, Tables IV and V.
 
 How the two sensors sit to each other comes from the calibration's revolutions, so that the verification stays a test of
-them. Only a rotation is taken out: axes that are not at right angles, and cross-axis errors of either part, stay in.
+them. Only a rotation is taken out: what the board's correction leaves of axes that are not at right angles, and
+cross-axis errors of either part, stay in.
 """
 
 from collections.abc import Sequence

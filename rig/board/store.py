@@ -2,7 +2,9 @@
 
 from collections.abc import Iterator, Mapping, Sequence
 from datetime import UTC, datetime
-from typing import Protocol
+from typing import Literal, Protocol
+
+import numpy as np
 
 from firmware_host.client import Board, Calibration, StoredCalibration
 from firmware_host.errors import BoardError
@@ -12,7 +14,7 @@ from rig.estimation.arrays import Array
 
 
 class Solved(Protocol):
-    """A sensor's solution, g = K (m + b), just found or read from `result.json`."""
+    """A sensor's solution, g = M (m + b), just found or read from `result.json`; no `correction_matrix` means K."""
 
     @property
     def serial_number(self) -> str: ...
@@ -20,6 +22,10 @@ class Solved(Protocol):
     def temperature_c(self) -> float: ...
     @property
     def scale(self) -> Array | Sequence[float]: ...
+    @property
+    def correction(self) -> Literal["matrix", "diagonal"]: ...
+    @property
+    def correction_matrix(self) -> Array | Sequence[Sequence[float]] | None: ...
     @property
     def bias_rad_s(self) -> Array | Sequence[float]: ...
 
@@ -39,13 +45,15 @@ def store_calibrations(config: RigConfig, results: Mapping[str, Solved]) -> Iter
 
 def calibration_of(solved: Solved) -> Calibration:
     """A sensor's solution as the board keeps it, dated now."""
-    (kx, ky, kz), (bx, by, bz) = map(float, solved.scale), map(float, solved.bias_rad_s)
+    matrix = np.diag(solved.scale) if solved.correction_matrix is None else np.array(solved.correction_matrix)
+    x, y, z = ((float(row[0]), float(row[1]), float(row[2])) for row in matrix)
+    bx, by, bz = map(float, solved.bias_rad_s)
     return Calibration(
-        model="k_times_m_plus_b",
+        model="matrix_times_m_plus_b" if solved.correction == "matrix" else "k_times_m_plus_b",
         serial_number=solved.serial_number,
         written_utc=datetime.now(UTC),
         temperature_c=solved.temperature_c,
-        scale=(kx, ky, kz),
+        matrix=(x, y, z),
         bias_rad_s=(bx, by, bz),
     )
 

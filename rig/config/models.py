@@ -156,6 +156,11 @@ class SensorSection(Section):
         json_schema_extra=OF_THE_PART,
     )
     mounting: MountingSection = Field(default=MountingSection(), description="how it sits on the flange")
+    correction: Literal["matrix", "diagonal"] = Field(
+        default="diagonal",
+        description="what the board and `calibration.h` correct readings by: each axis for itself, as in the paper, or "
+        "the whole matrix, which also brings the axes to right angles",
+    )
     turntable: TurntableSection = Field(
         default=TurntableSection(), description="its own calibration, of a reference only; left out, it reads true"
     )

@@ -37,7 +37,7 @@ class CheckEntry(Entry):
 
 
 class StoredCalibrationEntry(Entry):
-    """A calibration the board had stored, g = K (m + b), while it corrected its readings."""
+    """A calibration the board had stored while it corrected its readings: g = `matrix` (m + b), else K (m + b)."""
 
     sequence: int
     part: str
@@ -49,6 +49,7 @@ class StoredCalibrationEntry(Entry):
     temperature_c: float
     scale: Vector3
     bias_rad_s: Vector3
+    matrix: Matrix3 | None = None
 
 
 class ProvenanceEntry(Entry):
@@ -186,8 +187,9 @@ class SensorEntry(Entry):
     """A sensor's calibration by the chosen estimator, what it rests on, and what the other estimators say.
 
     `covariance` is that of noise and of a bias that wanders, `covariance_combined` holds all of the `budget`; both are
-    there where the vector model was chosen. `temperature_c` is the mean over all averaged samples. A reference has no
-    `board`: the board solves only for the sensors that are to be calibrated.
+    there where the vector model was chosen. `correction_matrix` is M of g = M (m + b), by which the board and the C
+    header correct readings; results of before have none, and it is K. `temperature_c` is the mean over all averaged
+    samples. A reference has no `board`: the board solves only for the sensors that are to be calibrated.
     """
 
     part: str
@@ -216,6 +218,8 @@ class SensorEntry(Entry):
     covariance_combined: Matrix6 | None = None
     budget: BudgetEntry | None = None
     bias_process: BiasProcessEntry | None = None
+    correction: Literal["matrix", "diagonal"] = "diagonal"
+    correction_matrix: Matrix3 | None = None
 
 
 class RotationEntry(Entry):

@@ -105,9 +105,10 @@ class RunSettings:
     """What was to be done and how it is judged. `then_verify` says that a verification was to follow a calibration.
 
     `to_calibrate` names the sensors the calibration is for, `planned_sweeps` are those of the whole procedure, however
-    often the run was interrupted. Recordings of before there was a `site` (None) are solved as they were then: neither
-    gravity nor the Earth's rate is looked for, and a bias that wanders widens the variance of every average alike. Nor
-    do they have an `uncertainty` beyond the noise.
+    often the run was interrupted. `matrix_corrected` names those of them whose readings the whole matrix corrects.
+    Recordings of before there was a `site` (None) are solved as they were then: neither gravity nor the Earth's rate is
+    looked for, and a bias that wanders widens the variance of every average alike. Nor do they have an `uncertainty`
+    beyond the noise.
     """
 
     procedure: str
@@ -118,6 +119,7 @@ class RunSettings:
     reference: KnownReference | None
     home_q_rad: Annotated[tuple[Finite, ...], Field(min_length=6, max_length=6)]
     planned_sweeps: tuple[PlannedSweep, ...]
+    matrix_corrected: tuple[str, ...] = ()
     site: Site | None = None
     uncertainty: Uncertainty | None = None
 
@@ -167,6 +169,7 @@ def settings_of(config: "RigConfig", plan: "Plan") -> RunSettings:
         planned_sweeps=tuple(
             PlannedSweep(sweep.index, sweep.joint_name, sweep.direction, sweep.speed_rad_s) for sweep in plan.sweeps
         ),
+        matrix_corrected=tuple(name for name, each in config.to_calibrate.items() if each.correction == "matrix"),
         site=_site(config.site),
         uncertainty=_uncertainty(config),
     )

@@ -130,15 +130,14 @@ def _print_stored(stored: Mapping[str, StoredCalibration | None]) -> None:
             soft_wrap=True,
         )
         table = Table(box=SIMPLE)
-        for heading in ("axis", "scale factor", "bias rad/s"):
+        whole = calibration.model == "matrix_times_m_plus_b"
+        for heading in ("axis", "scale factor", "bias rad/s", *(("matrix", "", "") if whole else ())):
             table.add_column(heading, justify="left" if heading == "axis" else "right")
-        for axis, scale, bias in zip("xyz", calibration.scale, calibration.bias_rad_s, strict=True):
-            table.add_row(axis, f"{scale:.6f}", f"{bias:+.6f}")
+        rows = zip("xyz", calibration.scale, calibration.bias_rad_s, calibration.matrix, strict=True)
+        for axis, scale, bias, row in rows:
+            elements = (f"{element:+.6f}" for element in row) if whole else ()
+            table.add_row(axis, f"{scale:.6f}", f"{bias:+.6f}", *elements)
         console.print(table)
-
-
-def _stored_for(record: StoredCalibration | None) -> str:
-    return "none" if record is None else f"{record.calibration.serial_number}, {_written(record)}"
 
 
 def _written(record: StoredCalibration) -> str:

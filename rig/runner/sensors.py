@@ -4,6 +4,8 @@ from collections.abc import Mapping
 from dataclasses import dataclass, replace
 from math import radians
 
+import numpy as np
+
 from firmware_host.client import Board, Calibration, StoredCalibration
 from firmware_host.protocol import CALIBRATED_RAD_S, FULL_SCALE_COUNTS
 from rig.board.identify import find_sensor, stored_calibration
@@ -62,8 +64,11 @@ def _corrected(board: Board, name: str, section: SensorSection) -> BoardSensor:
 def corrected(sensor: RecordedSensor, calibration: Calibration) -> RecordedSensor:
     """The same sensor when the board corrects its readings: a count is then a microradian per second."""
     limit_rad_s = sensor.full_scale_counts * sensor.sensitivity_rad_s_per_count
-    both = zip(calibration.scale, calibration.bias_rad_s, strict=True)
-    lowest_rad_s = min(k * (limit_rad_s - abs(b)) for k, b in both)  # what a saturated reading becomes, at least
+    bias_rad_s = np.abs(calibration.bias_rad_s)
+    # What a saturated reading becomes, at least: the other axes may read anything beside it.
+    on_axis, beside = np.diag(np.diag(calibration.matrix)), np.abs(calibration.matrix)
+    np.fill_diagonal(beside, 0.0)
+    lowest_rad_s = float(np.min(on_axis @ (limit_rad_s - bias_rad_s) - beside @ (limit_rad_s + bias_rad_s)))
     return replace(
         sensor,
         sensitivity_rad_s_per_count=CALIBRATED_RAD_S,

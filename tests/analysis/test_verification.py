@@ -35,12 +35,33 @@ QUIET = Setup(noise_rad_s=0.002)
 TURN_RATE = np.pi / 3
 
 MADE = recording(QUIET)  # the calibration's movement
-CALIBRATION = solve_runs([MADE])["gyro"].solution
+CALIBRATED = solve_runs([MADE])["gyro"]
+CALIBRATION = CALIBRATED.solution
 REPEATED = recording(
     replace(QUIET, seed=2, boot_s=33.0), stored=Stored(CALIBRATION.scale, CALIBRATION.bias_rad_s), lag_s=0.004
 )
 SEEN_BEFORE, SEEN = observe_runs([MADE]), observe_runs([REPEATED])
-FOUND = verify("gyro", KNOWN, SEEN, SEEN_BEFORE, CALIBRATION)
+FOUND = verify("gyro", KNOWN, SEEN, SEEN_BEFORE, CALIBRATED)
+
+
+def test_the_whole_matrix_leaves_no_error_where_the_axes_are_not_at_right_angles() -> None:
+    """The diagonal leaves half of 0.3° times the speed, 2.7e-3 rad/s; the rotation found is the same."""
+    lean = np.array([[1.0, 0.0052, -0.0035], [0.0, 1.0, 0.0044], [0.0, 0.0, 1.0]])
+    axes = lean / np.linalg.norm(lean, axis=1)[:, None]
+    made, again = recording(QUIET, axes=axes), replace(QUIET, seed=2, boot_s=33.0)
+    worst, turned = {}, {}
+    for kind, corrected in {"matrix": ["gyro"], "diagonal": []}.items():
+        found = solve_runs([made], matrix_corrected=corrected)["gyro"]
+        assert found.correction == kind
+        repeated = recording(again, stored=found, axes=axes)
+        verified = verify("gyro", KNOWN, observe_runs([repeated]), observe_runs([made]), found)
+        worst[kind] = max(np.abs(turn.error_rad_s).max() for turn in verified.after.revolutions)
+        turned[kind] = verified.rotation.matrix
+        noise = verified.after.noise_rad_s
+        if kind == "matrix":
+            assert noise is not None and np.all(verified.after.movement.rms_rad_s < 1.05 * noise)
+    assert worst["matrix"] < 3e-4 and worst["diagonal"] > 2e-3
+    assert np.allclose(turned["matrix"], turned["diagonal"], atol=2e-5), "the frame is the one nearest to the axes"
 
 
 def rotation(vector: tuple[float, ...]) -> Array:
@@ -196,7 +217,7 @@ def test_the_recordings_of_a_resumed_run_count_together() -> None:
 
     assert FOUND.before is not None
     parts = observe_runs([part(range(2)), part(range(0)), part(range(2, 6))])
-    resumed = verify("gyro", KNOWN, SEEN, parts, CALIBRATION)
+    resumed = verify("gyro", KNOWN, SEEN, parts, CALIBRATED)
     assert resumed.before is not None
     assert len(resumed.before.delay_s) == 2
     assert resumed.before.movement.samples == FOUND.before.movement.samples
@@ -253,7 +274,7 @@ def test_one_wrist_does_not_tell_how_the_sensors_sit() -> None:
 
 def test_the_calibration_s_recording_must_be_raw() -> None:
     with pytest.raises(Fault, match="wrong_mode"):
-        verify("gyro", KNOWN, SEEN, SEEN, CALIBRATION)
+        verify("gyro", KNOWN, SEEN, SEEN, CALIBRATED)
 
 
 def limits(rms: float | None, mean: float | None) -> Limits:
@@ -290,7 +311,7 @@ def test_the_worst_axis_and_the_worst_revolution_are_judged() -> None:
 def test_a_reference_that_misses_the_arm_is_blamed_itself(scale: float, bias_rad_s: float, error_rad_s: float) -> None:
     """A turntable's values mistyped, or a reference that has aged: the sensor differs from it, but not from the arm."""
     reference = Reference("reference", KNOWN.scale * scale, KNOWN.bias_rad_s + np.array([bias_rad_s, 0.0, 0.0]))
-    found = verify("gyro", reference, SEEN, SEEN_BEFORE, CALIBRATION)
+    found = verify("gyro", reference, SEEN, SEEN_BEFORE, CALIBRATED)
     assert found.reference_error_rad_s == pytest.approx(error_rad_s, abs=5e-4)
     checks = {check.name: check.passed for check in verification_checks("gyro", found, limits(1.0, 0.01))}
     assert checks["gyro.verification_reference"] == (error_rad_s < 0.01)

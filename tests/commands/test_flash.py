@@ -178,6 +178,9 @@ class Chip:
     def reset_and_halt(self) -> None:
         self.done.append("halted after a reset")
 
+    def write32(self, address: int, value: int) -> None:
+        self.done.append(f"0x{address:08x} = {value}")
+
     def reset(self) -> None:
         self.done.append("reset")
 
@@ -197,4 +200,34 @@ def test_what_runs_on_the_board_is_stopped_by_a_reset_before_its_flash_is_erased
 
     monkeypatch.setattr("pyocd.flash.file_programmer.FileProgrammer", Programmer)
     flashing._program(SimpleNamespace(target=chip), flashing.shipped_image())
-    assert chip.done == ["halted after a reset", "programmed", "reset"]
+    debug_bits_cleared = "0xe0042004 = 0"
+    assert chip.done == ["halted after a reset", "programmed", debug_bits_cleared, "reset"]
+
+
+@pytest.mark.parametrize("works", ["under-reset", "halt", "neither"])
+def test_a_board_that_sleeps_is_caught_under_reset_and_else_halted(monkeypatch: pytest.MonkeyPatch, works: str) -> None:
+    from pyocd.core.exceptions import TransferFaultError
+
+    tried: list[str] = []
+
+    class Session:
+        def __init__(self, probe: SimpleNamespace, options: dict[str, object]) -> None:
+            self.mode = str(options["connect_mode"])
+
+        def __enter__(self) -> "Session":
+            tried.append(self.mode)
+            if self.mode != works:
+                raise TransferFaultError
+            return self
+
+        def __exit__(self, *error: object) -> None:
+            pass
+
+    monkeypatch.setattr("pyocd.core.session.Session", Session)
+    monkeypatch.setattr(flashing, "_program", lambda session, image: None)
+    probe = SimpleNamespace(unique_id="0123")
+    if works == "neither":
+        assert refused(lambda: flashing.flash_by_probe(b"", probe)).name == "flash_failed"
+    else:
+        flashing.flash_by_probe(b"", probe)
+    assert tried == (["under-reset"] if works == "under-reset" else ["under-reset", "halt"])

@@ -203,7 +203,7 @@ CALIBRATION = Calibration(
     serial_number="LSM9DS1-001",
     written_utc=datetime(2026, 11, 21, 12, 0, 0, 987654, UTC),
     temperature_c=22.7,
-    scale=(1.1771, 1.1554, 1.1440),
+    matrix=((1.1771, 0.0, 0.0), (0.0, 1.1554, 0.0), (0.0, 0.0, 1.1440)),
     bias_rad_s=(0.0077, -0.0100, -0.0051),
 )
 

@@ -37,6 +37,8 @@ def value_of(kind: str) -> st.SearchStrategy[Any]:
         return st.floats(width=32, allow_nan=False)
     if kind == "vector_f32":
         return st.tuples(*[st.floats(width=32, allow_nan=False)] * 3)
+    if kind == "matrix_f32":
+        return st.tuples(*[value_of("vector_f32")] * 3)
     size = int(protocol.KINDS[kind][0].removesuffix("s"))
     return st.binary(min_size=size, max_size=size)
 

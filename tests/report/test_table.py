@@ -53,7 +53,8 @@ def test_the_other_tables_show_names_as_they_are(capsys: pytest.CaptureFixture[s
     console = Console(width=150, file=io.StringIO(), record=True)
     console.print(verification_table(HOSTILE, VERIFIED.verification["gyro"]))
     assert SHOWN in console.export_text()
-    calibration = Calibration("six", HOSTILE, datetime.now(UTC), 22.5, (1.0, 1.0, 1.0), (0.0, 0.0, 0.0))
+    matrix = ((1.0, 0.0, 0.0), (0.0, 1.0, 0.0), (0.0, 0.0, 1.0))
+    calibration = Calibration("k_times_m_plus_b", HOSTILE, datetime.now(UTC), 22.5, matrix, (0.0, 0.0, 0.0))
     stored = StoredCalibration(1, "LSM9DS1", 0x68, 245.0, calibration)
     print_stored({"gyro": stored, HOSTILE: None}, as_json=False)
     assert capsys.readouterr().out.count(SHOWN) == 2

@@ -164,6 +164,27 @@ def test_a_stored_calibration_is_verified_later(finished: Finished, tmp_path: Pa
     assert np.allclose(kept["scale"], result["sensors"]["gyro"]["scale"], rtol=1e-6)
 
 
+def test_the_whole_matrix_leaves_noise_alone(tmp_path: Path) -> None:
+    """Where the diagonal leaves 2.8e-3 rad/s, half of what two axes lack of 90° times the speed."""
+    out, chosen = tmp_path / "run", ["--set", "sensors.gyro.correction=matrix"]
+    done = subprocess.run(
+        command("run", CONFIGS / "lsm9ds1_adis16465.yaml", "--out", out, *chosen, *on_fresh_host()),
+        capture_output=True, text=True, timeout=240, check=False,
+    )  # fmt: skip
+    assert done.returncode == 0, done.stdout + done.stderr
+    result = json.loads((out / "result.json").read_text(encoding="utf-8"))
+    gyro, after = result["sensors"]["gyro"], result["verification"]["gyro"]["after"]
+    largest = np.abs([turn["error_rad_s"] for turn in after["revolutions"]]).max()
+    over_noise = np.array(after["movement"]["rms_rad_s"]) / after["noise_rad_s"]
+    print(f"mean of a revolution {largest:.1e} rad/s at most, RMS {over_noise} of the noise")
+    assert largest <= 3e-4 and over_noise.max() <= 1.05
+    kept = result["provenance"]["stored_calibrations"]["gyro"]
+    assert kept["model"] == "matrix_times_m_plus_b" and gyro["correction"] == "matrix"
+    assert np.allclose(kept["matrix"], gyro["correction_matrix"], atol=1e-7)
+    assert np.allclose(kept["scale"], gyro["scale"], rtol=1e-6)
+    assert "gyro_matrix[3][3]" in (out / "calibration.h").read_text(encoding="utf-8")
+
+
 def test_a_failed_calibration_is_neither_stored_nor_verified(tmp_path: Path) -> None:
     out = tmp_path / "run"
     config = configuration(tmp_path, merge(QUICK_EXPERIMENT, {"limits": {"scale_deviation": 0.01}}))

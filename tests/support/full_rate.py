@@ -17,11 +17,11 @@ CASES: dict[str, tuple[dict[str, float], tuple[str, ...]]] = {
 }
 SLICE_S = 1.0  # simulated, between looks at what came
 CALIBRATION = {
-    "model": 1,
+    "model": 2,
     "serial_number": "simulated",
     "written_unix_s": 1_790_000_000,
     "temperature_c": 22.0,
-    "scale": (1.1771, 1.1554, 1.1440),
+    "matrix": ((1.1771, -0.0030, 0.0020), (-0.0031, 1.1554, -0.0025), (0.0021, -0.0026, 1.1440)),
     "bias_rad_s": (0.0077, -0.0100, -0.0051),
 }
 STARTING = 80  # conversions that may be no samples: those a part makes while it settles

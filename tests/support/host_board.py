@@ -12,7 +12,7 @@ from typing import Any
 
 from firmware_host.frames import Frame, FrameReader, encode
 from firmware_host.protocol import ERRORS
-from support.host_sensors import Adis16465Registers, Lsm9ds1Registers, Mpu9250Registers, Part
+from support.host_sensors import Adis16465Registers, Listener, Lsm9ds1Registers, Mpu9250Registers, Part
 from support.paths import FIRMWARE
 
 PERIOD_US = 4202  # 238 Hz
@@ -21,6 +21,7 @@ SETTLING = 8  # conversions of the LSM9DS1 thrown away after a configure
 _BUS = ctypes.CFUNCTYPE(None, ctypes.c_uint, ctypes.c_uint32, ctypes.POINTER(ctypes.c_uint8), ctypes.c_size_t)
 _TRANSMIT = ctypes.CFUNCTYPE(None, ctypes.POINTER(ctypes.c_uint8), ctypes.c_size_t)
 _RESTART = ctypes.CFUNCTYPE(None)
+_LINE = ctypes.CFUNCTYPE(ctypes.c_bool, ctypes.c_uint)
 
 
 @functools.cache
@@ -51,12 +52,16 @@ class HostBoard:
         self.gyro = Lsm9ds1Registers()
         self.mpu9250 = Mpu9250Registers()
         self.adis16465 = Adis16465Registers()
-        self.sensors: list[Part] = [self.gyro, self.mpu9250, self.adis16465]  # by the bus's device numbers
+        self.magnetometer = Listener()  # the LSM9DS1's
+        # By the bus's device numbers
+        self.sensors: list[Part] = [self.gyro, self.mpu9250, self.adis16465, self.magnetometer]
         self.line_is_free = True  # False: the transmitter is busy until `sent()`
         self.restarts = 0
         self.wire = bytearray()
         self._callbacks = (_BUS(self._bus), _TRANSMIT(self._transmit), _RESTART(self._restart))
+        self._line_callback = _LINE(self._line)
         self.core.host_connect(*self._callbacks)
+        self.core.host_watch_lines(self._line_callback)
         self.core.host_flash_clear()
         self.set_time(0)
         self.core.board_reset()
@@ -65,6 +70,10 @@ class HostBoard:
         assert size % 2 == 0
         answer = self.sensors[device].transfer(ctypes.string_at(pointer, size), max_hz, self.core.port_time_us())
         ctypes.memmove(pointer, answer, size)
+
+    def _line(self, sensor: int) -> bool:
+        """Only the LSM9DS1 holds its line until it is read."""
+        return sensor == 0 and self.gyro.fresh
 
     def _transmit(self, pointer: "ctypes._Pointer[ctypes.c_uint8]", size: int) -> None:
         self.wire += ctypes.string_at(pointer, size)

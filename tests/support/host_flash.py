@@ -76,7 +76,7 @@ class HostFlash:
         rng, old = self._rng, int.from_bytes(self.contents(page), "little")
         noise = rng.getrandbits(8 * PAGE_BYTES)
         sparse = noise & rng.getrandbits(8 * PAGE_BYTES) & rng.getrandbits(8 * PAGE_BYTES)
-        one_bit = 1 << rng.randrange(8 * 96)
+        one_bit = 1 << rng.randrange(8 * 120)
         left = rng.choice([old, old | one_bit, old | sparse, old | noise, noise, 2 ** (8 * PAGE_BYTES) - 1])
         self.put(page, left.to_bytes(PAGE_BYTES, "little"))
         for offset in range(0, PAGE_BYTES, DOUBLEWORD):

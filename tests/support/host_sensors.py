@@ -1,6 +1,6 @@
 """The three parts as the drivers see them: registers behind a chip select, enough to tell what a driver does."""
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from typing import Protocol
 
 
@@ -23,6 +23,17 @@ class Nobody:
         return bytes((self.level,)) * len(data)
 
 
+class Listener:
+    """A part that is only told things."""
+
+    def __init__(self) -> None:
+        self.told: list[bytes] = []
+
+    def transfer(self, data: bytes, _max_hz: int, _time_us: int) -> bytes:
+        self.told.append(data)
+        return bytes(len(data))
+
+
 class Lsm9ds1Registers:
     """Registers that count up in a burst; a new conversion raises a flag that reading the last output lowers."""
 
@@ -36,6 +47,7 @@ class Lsm9ds1Registers:
         self.stuck: set[int] = set()  # registers that ignore writes
         self.transfers: list[int] = []
         self.fresh = False
+        self.again_after_reading = 0  # so many times a conversion comes just when the last one has been read
 
     def transfer(self, data: bytes, max_hz: int, _time_us: int) -> bytes:
         """One chip select: the bytes in, the bytes out."""
@@ -52,8 +64,9 @@ class Lsm9ds1Registers:
 
     def _read(self, address: int, size: int, _max_hz: int) -> bytes:
         self.values[0x17] = 0x02 if self.fresh else 0x00
-        if address + size > 0x1D:
-            self.fresh = False
+        if address <= 0x1D < address + size:
+            self.fresh = self.again_after_reading > 0
+            self.again_after_reading -= self.fresh
         return bytes(self.values[address : address + size])
 
     def convert(self, counts: Sequence[int], temperature: int) -> None:
@@ -96,13 +109,16 @@ class Adis16465Registers:
     """Words of 16 bits, high byte first; an answer comes one frame later, a setting some time after its writing."""
 
     def __init__(self) -> None:
-        self.words = {0x5C: 0, 0x5E: 0x0007, 0x60: 0x00C1, 0x64: 0, 0x68: 0, 0x72: 0x4051}
+        self.words = {0x02: 0, **dict.fromkeys(range(0x40, 0x4C, 2), 0)}
+        self.words |= {0x5C: 0, 0x5E: 0x0007, 0x60: 0x00C1, 0x64: 0, 0x68: 0, 0x72: 0x4051}
         self.writes: list[tuple[int, int]] = []
         self.stuck: set[int] = set()  # registers that ignore writes
         self.transfers: list[int] = []
         self.status = 0
         self.counter = 0
         self.taking_us = 150
+        self.cured_by_reset = False  # what DIAG_STAT says goes with the next reset
+        self.before_burst: Callable[[], None] | None = None  # what happens once, just before the registers are read
         self.damage = 0  # added to the next bursts' last data byte
         self._data = [0] * 7
         self._answer = 0
@@ -116,6 +132,9 @@ class Adis16465Registers:
         self._idle_since_us = time_us
         self.transfers.append(len(data))
         if data == b"\x68" + bytes(21):
+            before, self.before_burst = self.before_burst, None
+            if before is not None:
+                before()
             return self._answer.to_bytes(2, "big") + self._burst()
         assert len(data) == 2
         answer, address = self._answer, data[0] & 0x7E
@@ -131,6 +150,8 @@ class Adis16465Registers:
     def _write(self, address: int, byte: int, time_us: int) -> None:
         self.writes.append((address, byte))
         word = address & 0x7E
+        if (word, byte) == (0x68, 0x80) and self.cured_by_reset:
+            self.words[0x02] = 0
         if word not in self.stuck:
             _, value = self._pending.get(word, (0, self.words[word]))
             value = value & 0x00FF | byte << 8 if address & 1 else value & 0xFF00 | byte

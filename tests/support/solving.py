@@ -13,8 +13,10 @@ from rig.analysis.surroundings import surroundings_of
 from rig.data.run_file import RunData
 
 
-def solve_runs(runs: Sequence[RunData], estimator: str = DEFAULT_ESTIMATOR) -> dict[str, SensorResult]:
+def solve_runs(
+    runs: Sequence[RunData], estimator: str = DEFAULT_ESTIMATOR, matrix_corrected: Sequence[str] = ()
+) -> dict[str, SensorResult]:
     """Calibrate every sensor from one recording, or from all recordings of a run that was resumed."""
     chosen = known_estimator(estimator)  # before the work of observing
     recordings = observe_recordings(runs)
-    return solve_observed(runs[0].sensors, recordings, chosen, surroundings_of(recordings))
+    return solve_observed(runs[0].sensors, recordings, chosen, surroundings_of(recordings), matrix_corrected)

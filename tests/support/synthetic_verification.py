@@ -4,6 +4,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
+from rig.analysis.alignment import Calibration
 from rig.data.run_file import RunData
 from rig.estimation.arrays import Array
 from support.synthetic_run import (
@@ -34,6 +35,11 @@ class Stored:
     scale: Array
     bias_rad_s: Array
 
+    @property
+    def correction_matrix(self) -> Array:
+        """(3, 3) K."""
+        return np.diag(self.scale)
+
 
 TRUTH = Stored(np.array(SCALE), np.array(BIAS_RAD_S))
 
@@ -41,7 +47,7 @@ TRUTH = Stored(np.array(SCALE), np.array(BIAS_RAD_S))
 def recording(
     setup: Setup,
     *,
-    stored: Stored | None = None,
+    stored: Calibration | None = None,
     reference: Setup = REFERENCE,
     lag_s: float = 0.0,
     axes: Array | None = None,
@@ -63,7 +69,7 @@ def recording(
     samples = {**run.samples, "reference": runs["reference"].samples["gyro"]}
     if stored is not None:
         raw = samples["gyro"]["counts"] * SENSITIVITY
-        samples["gyro"]["counts"] = np.round(1e6 * stored.scale * (raw + stored.bias_rad_s))
+        samples["gyro"]["counts"] = np.round(1e6 * (raw + stored.bias_rad_s) @ stored.correction_matrix.T)
         sensors["gyro"] = replace(
             sensors["gyro"], mode="calibrated", sensitivity_rad_s_per_count=1e-6, full_scale_counts=2**31 - 1
         )

@@ -173,7 +173,7 @@ CALIBRATION = {
     "serial_number": "MPU-1",
     "written_unix_s": 1_790_000_000,
     "temperature_c": 22.0,
-    "scale": (1.25, 1.0, 0.75),
+    "matrix": ((1.25, 0.0, 0.0), (0.0, 1.0, 0.0), (0.0, 0.0, 0.75)),
     "bias_rad_s": (0.5, 0.25, 0.125),
 }
 
@@ -185,7 +185,9 @@ def give_calibration(one: Host) -> None:
 
 def stored_scale(one: Host) -> tuple[float, ...] | None:
     answer = one.answer("read_calibration", {"sensor": 1})
-    return answer.values["scale"] if answer.name == "calibration" else None
+    if answer.name != "calibration":
+        return None
+    return tuple(row[axis] for axis, row in enumerate(answer.values["matrix"]))
 
 
 def test_without_power_the_board_keeps_its_calibration_but_without_a_file_not_for_the_next_world() -> None:

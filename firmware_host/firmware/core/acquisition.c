@@ -33,6 +33,7 @@ struct stream {
     uint64_t watched_us; /* from when on silence counts */
     uint32_t settling;  /* conversions still to throw away */
     uint32_t distrust;  /* grows by bad reads, shrinks by good ones */
+    bool overtaken;     /* the next edge came while a reading was under way */
     bool silence_reported, bad_reads_reported;
     uint32_t conversions, sent, dropped;
     struct sample ring[RING];
@@ -68,17 +69,31 @@ void acquisition_set_rate(unsigned sensor, double rate_hz)
         stream->settling = driver->settling_us / stream->period_us + 1;
 }
 
-/* Lowers a data-ready line that is already high: without it no further edge would come. A line that only rattles is left
-   alone after some tries. */
+#define TRIES 3u /* a line that only rattles is left alone */
+
+/* Reads what was converted before the start. A part that holds its line makes no edge until that is down. A part with pulses
+   is read once and no more: an ADIS16465 bears only so many words from one conversion to the next. */
 static void rearm(unsigned sensor)
 {
+    const struct sensor_driver *driver = sensors[sensor].driver;
     struct stream *stream = &streams[sensor];
     struct reading discarded;
-    unsigned tries = 3;
+    unsigned tries = driver->holds_line ? TRIES : 1;
     do {
         stream->edges_seen = stream->edges;
+        driver->read(sensors[sensor].device, &discarded);
+    } while (--tries != 0 && (stream->edges != stream->edges_seen || port_line_is_high(sensor)));
+    if (!driver->holds_line)
+        stream->edges_seen = stream->edges; /* it has been read, or the next tells of itself */
+}
+
+/* A held line that rose again before it was seen to fall has made no edge, and would make none any more. */
+static void lower_line(unsigned sensor)
+{
+    const struct stream *stream = &streams[sensor];
+    struct reading discarded;
+    for (unsigned tries = TRIES; tries != 0 && port_line_is_high(sensor) && stream->edges == stream->edges_seen; tries--)
         sensors[sensor].driver->read(sensors[sensor].device, &discarded);
-    } while (stream->edges != stream->edges_seen && --tries != 0);
 }
 
 bool acquisition_start(uint8_t calibrated, const struct correction corrections[SENSOR_COUNT])
@@ -95,6 +110,7 @@ bool acquisition_start(uint8_t calibrated, const struct correction corrections[S
         if (stream->calibrated)
             stream->correction = corrections[i];
         stream->distrust = 0;
+        stream->overtaken = false;
         stream->silence_reported = stream->bad_reads_reported = false;
         stream->last_us = stream->watched_us = clock_now();
         if (is_named(configured, i))
@@ -187,19 +203,29 @@ static void acquire(unsigned sensor)
     stream->edges_seen = edges;
     stream->last_us = stream->watched_us = time_us;
 
+    const struct sensor_driver *driver = sensors[sensor].driver;
     struct reading reading;
-    enum read_result result = sensors[sensor].driver->read(sensors[sensor].device, &reading);
-    watch_reads(sensor, result);
+    uint32_t began_us = port_time_us();
+    enum read_result result = driver->read(sensors[sensor].device, &reading);
+    /* An edge between the look at them and the moment the values were taken: they may be the next conversion's, under the
+       time of the one before. Then the next reading is the same again. What was taken is safe from later edges. */
+    bool again = stream->overtaken && result == READ_STALE;
+    stream->overtaken = stream->edges != edges && (int32_t)(stream->captured_us - began_us) <= driver->latched_within_us;
+    if (driver->holds_line)
+        lower_line(sensor);
+    if (!again)
+        watch_reads(sensor, result);
     if (stream->settling != 0) {
         stream->settling--;
         return;
     }
     stream->conversions += conversions;
     stream->dropped += conversions - 1;
-    if (result == READ_FRESH)
+    bool good = result == READ_FRESH && !stream->overtaken;
+    if (good)
         kept_add(sensor, time_us, reading.counts);
     bool full = stream->written - stream->read == RING;
-    if (result != READ_FRESH || full) {
+    if (!good || full) {
         stream->dropped++;
         return;
     }

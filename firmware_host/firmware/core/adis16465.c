@@ -10,7 +10,12 @@
 #define BUS_HZ 1000000u /* a burst's limit (data sheet, table 2; Linux's ADIS16475_BURST_MAX_SPEED); other frames take 2 MHz */
 #define STALL_US 16u /* between frames (table 2; Linux's cs_change_delay) */
 
+#define LATCHED_US 50u /* a pause of STALL_US, then the frame that begins the burst, 26 µs */
+
 enum register_address {
+    DIAG_STAT = 0x02,
+    XG_BIAS_LOW = 0x40, /* and five more, to 0x4A */
+    ZG_BIAS_HIGH = 0x4A,
     FILT_CTRL = 0x5C,
     RANG_MDL = 0x5E,
     MSC_CTRL = 0x60,
@@ -29,6 +34,10 @@ enum register_address {
 /* A setting reads back only when the part has worked it in, 30 µs after its writing, MSC_CTRL 200 µs (Analog's no-OS,
    drivers/imu/adis1646x.c); more than 60 was seen (EngineerZone, thread 581040). Two conversions are time enough. */
 #define TAKEN_WITHIN_US 1000u
+#define POLL_US 100u /* between two looks: the part bears a dozen words from one conversion to the next */
+
+#define GLOB_CMD_RESET 0x0080u
+#define RESET_US 260000u /* Analog's no-OS: 255 ms */
 
 /* By what RANG_MDL says: the model decides the range. */
 static const struct gyro_range ranges[] = {
@@ -81,6 +90,7 @@ static bool write_register(unsigned device, uint8_t address, uint16_t value)
     exchange(device, (uint8_t)(address + 1) | WRITE, (uint8_t)(value >> 8));
     uint32_t written_us = port_time_us();
     do {
+        port_wait_us(POLL_US);
         if (read_register(device, address) == value)
             return true;
     } while (port_time_us() - written_us < TAKEN_WITHIN_US);
@@ -101,6 +111,32 @@ static const struct gyro_range *range_of_model(unsigned device)
     return NULL;
 }
 
+static bool is_well(unsigned device)
+{
+    return (read_register(device, DIAG_STAT) & ~DIAG_STAT_UPDATE_FAILED) == 0;
+}
+
+/* A flag that stands, such as of a data path that was overrun, may stand until the part is reset (data sheet, DIAG_STAT), and
+   its RST pin is not connected. Half a second at most: the watchdog allows one. */
+static bool cure(unsigned device)
+{
+    if (is_well(device))
+        return true;
+    exchange(device, GLOB_CMD | WRITE, (uint8_t)GLOB_CMD_RESET);
+    exchange(device, (GLOB_CMD + 1) | WRITE, 0);
+    port_wait_us(RESET_US);
+    return identify(device) == IDENTITY && is_well(device);
+}
+
+/* What somebody stored there would be added to every reading, and a calibration would be one of the part with it. */
+static bool clear_biases(unsigned device)
+{
+    for (uint8_t address = XG_BIAS_LOW; address <= ZG_BIAS_HIGH; address += 2)
+        if (!write_register(device, address, 0))
+            return false;
+    return true;
+}
+
 static enum error_code configure(unsigned device, const struct configure_payload *wanted, struct setup_payload *setup)
 {
     const struct gyro_range *range = range_of_model(device);
@@ -109,7 +145,10 @@ static enum error_code configure(unsigned device, const struct configure_payload
     if (!(wanted->range_deg_s <= (float)range->deg_s))
         return ERROR_BAD_RANGE;
     uint16_t divider = nearest_divider(BASE_HZ, wanted->rate_hz, DIVIDER_MAX);
-    if (!write_register(device, FILT_CTRL, 0) || !write_register(device, MSC_CTRL, MSC_CTRL_AS_DELIVERED) ||
+    if (!cure(device))
+        return ERROR_SENSOR_FAULT;
+    if (!clear_biases(device) || !write_register(device, FILT_CTRL, 0) ||
+        !write_register(device, MSC_CTRL, MSC_CTRL_AS_DELIVERED) ||
         !write_register(device, DEC_RATE, (uint16_t)(divider - 1)))
         return ERROR_SETUP_FAILED;
     setup->rate_hz = BASE_HZ / divider;
@@ -144,4 +183,5 @@ static enum read_result read(unsigned device, struct reading *reading)
     return fresh ? READ_FRESH : READ_STALE;
 }
 
-const struct sensor_driver adis16465_gyro = {"ADIS16465", IDENTITY, 0, SETTLING, reset, identify, configure, read};
+const struct sensor_driver adis16465_gyro = {
+    "ADIS16465", IDENTITY, 0, SETTLING, false, LATCHED_US, reset, NULL, identify, configure, read};

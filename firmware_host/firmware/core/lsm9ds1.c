@@ -9,6 +9,8 @@
 #define BUS_HZ 5000000u /* half of what section 5.2.1 allows: the wires are loose */
 
 enum register_address {
+    ACT_THS = 0x04,
+    ACT_DUR = 0x05,
     INT1_CTRL = 0x0C,
     WHO_AM_I = 0x0F,
     CTRL_REG1_G = 0x10,
@@ -20,7 +22,11 @@ enum register_address {
     CTRL_REG8 = 0x22,
     CTRL_REG9 = 0x23,
     CTRL_REG10 = 0x24,
+    FIFO_CTRL = 0x2E,
 };
+
+#define CTRL_REG3_M 0x22u         /* the magnetometer's, section 8.7 */
+#define CTRL_REG3_M_QUIET 0x83u   /* I2C_DISABLE, and powered down as after a start */
 
 #define INT1_CTRL_DRDY_G 0x02u
 #define CTRL_REG4_AXES 0x38u       /* z, y, x on */
@@ -48,6 +54,14 @@ static uint16_t identify(unsigned device)
     return byte_register_read(device, BUS_HZ, WHO_AM_I);
 }
 
+/* The magnetometer has no read-back here: it answers on a wire of its own, which is not connected. */
+static void keep_to_spi(unsigned device)
+{
+    uint8_t bytes[2] = {CTRL_REG3_M, CTRL_REG3_M_QUIET};
+    byte_register_write(device, BUS_HZ, CTRL_REG9, CTRL_REG9_I2C_DISABLE);
+    bus_xfer(BUS_LSM9DS1_MAGNETOMETER, BUS_HZ, bytes, sizeof bytes);
+}
+
 static size_t nearest_rate(float hz)
 {
     size_t best = 0;
@@ -68,6 +82,9 @@ static bool write_settings(unsigned device, uint8_t rate_code, uint8_t range_cod
         {CTRL_REG3_G, 0}, /* no high-pass: it would remove the bias that is to be measured */
         {ORIENT_CFG_G, 0},
         {CTRL_REG10, 0}, /* no self-test: it would add a rate */
+        {FIFO_CTRL, 0},
+        {ACT_THS, 0}, /* no sleep while nothing turns */
+        {ACT_DUR, 0},
         {INT1_CTRL, INT1_CTRL_DRDY_G},
         {CTRL_REG1_G, (uint8_t)(rate_code << 5 | range_code << 3)},
     };
@@ -106,4 +123,5 @@ static enum read_result read(unsigned device, struct reading *reading)
     return (bytes[3] & (STATUS_GDA | STATUS_ALWAYS_0)) == STATUS_GDA ? READ_FRESH : READ_STALE;
 }
 
-const struct sensor_driver lsm9ds1_gyro = {"LSM9DS1", IDENTITY, 0, SETTLING, NULL, identify, configure, read};
+const struct sensor_driver lsm9ds1_gyro = {
+    "LSM9DS1", IDENTITY, 0, SETTLING, true, 0, NULL, keep_to_spi, identify, configure, read};

@@ -41,6 +41,7 @@ enum register_address {
 /* Section 3.1: the gyroscope starts within 35 ms; Linux's INV_MPU6500_GYRO_STARTUP_TIME is 70 ms, which also holds the
    slowest filter's 33 ms delay (map, register 26). */
 #define SETTLING_US 70000u
+#define LATCHED_US 2u /* the registers stand still from the select on (map, section 4.22) */
 #define WAKING_US 10000u /* until registers can be written: Linux's INV_MPU6050_REG_UP_TIME_MAX */
 
 /* Sensitivities are those of section 3.1, not range / 32768. FS_SEL: map, register 27. */
@@ -57,6 +58,11 @@ static const float bandwidths_hz[] = {184.0f, 92.0f, 41.0f, 20.0f, 10.0f, 5.0f};
 static uint16_t identify(unsigned device)
 {
     return byte_register_read(device, REGISTERS_HZ, WHO_AM_I);
+}
+
+static void keep_to_spi(unsigned device)
+{
+    byte_register_write(device, REGISTERS_HZ, USER_CTRL, USER_CTRL_I2C_IF_DIS);
 }
 
 /* The widest filter that keeps what it lets through below half the data rate. */
@@ -82,7 +88,7 @@ static bool wake(unsigned device)
 static bool write_settings(unsigned device, uint16_t divider, uint8_t filter, uint8_t range)
 {
     const struct byte_setting settings[] = {
-        {USER_CTRL, USER_CTRL_I2C_IF_DIS}, /* or what is said to the others on the bus might look like I2C */
+        {USER_CTRL, USER_CTRL_I2C_IF_DIS},
         {INT_ENABLE, 0},
         {PWR_MGMT_2, 0}, /* all axes on */
         {FIFO_EN, 0},
@@ -131,4 +137,5 @@ static enum read_result read(unsigned device, struct reading *reading)
     return status == INT_STATUS_RAW_DATA_RDY ? READ_FRESH : READ_STALE;
 }
 
-const struct sensor_driver mpu9250_gyro = {"MPU-9250", IDENTITY, SETTLING_US, 1, NULL, identify, configure, read};
+const struct sensor_driver mpu9250_gyro = {
+    "MPU-9250", IDENTITY, SETTLING_US, 1, false, LATCHED_US, NULL, keep_to_spi, identify, configure, read};

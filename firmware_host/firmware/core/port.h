@@ -13,7 +13,8 @@ uint32_t port_time_us(void);
 void port_wait_us(uint32_t duration_us);
 
 /* Parts the bus leads to, by their selects. */
-#define BUS_DEVICES 3u
+#define BUS_DEVICES 4u
+#define BUS_LSM9DS1_MAGNETOMETER 3u /* a die of its own, which only is told to keep off the wires */
 
 /* Selects `device`, exchanges `size` bytes in place at `max_hz` or the next slower clock, deselects. `size` is even: the SPI
    FIFO takes two bytes an access. */
@@ -21,6 +22,9 @@ void bus_xfer(unsigned device, uint32_t max_hz, uint8_t *bytes, size_t size);
 
 /* From now on only these sensors' data-ready lines interrupt: bit i is sensor i. What they did before is forgotten. */
 void port_listen(uint8_t mask);
+
+/* Whether a sensor's data-ready line is up now. */
+bool port_line_is_high(unsigned sensor);
 
 /* Starts sending; the bytes stay untouched until the port calls link_sent(). */
 void port_transmit(const uint8_t *bytes, size_t size);

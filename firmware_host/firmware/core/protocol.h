@@ -4,8 +4,8 @@
 
 #include <stdint.h>
 
-#define PROTOCOL_VERSION 2u
-#define FIRMWARE_VERSION "0.2.1"
+#define PROTOCOL_VERSION 3u
+#define FIRMWARE_VERSION "0.3.0"
 #define PAYLOAD_MAX 240u
 #define FRAME_OVERHEAD 6u /* type, sequence, CRC */
 #define COBS_BYTES 2u /* code byte and delimiter */
@@ -79,6 +79,7 @@ enum sample_mode {
 enum calibration_model {
     MODEL_NONE = 0,
     MODEL_K_TIMES_M_PLUS_B = 1,
+    MODEL_MATRIX_TIMES_M_PLUS_B = 2,
 };
 
 enum solve_method {
@@ -279,10 +280,10 @@ struct calibration_payload {
     char serial_number[24]; /* of the sensor, as the configuration names it */
     uint64_t written_unix_s; /* when it was written, seconds since 1970 UTC */
     float temperature_c; /* of the sensor during the calibration, degrees Celsius */
-    float scale[3]; /* diagonal of K */
+    float matrix[3][3]; /* what m + b is multiplied by, row by row; of k_times_m_plus_b it is diagonal */
     float bias_rad_s[3]; /* b, in the units of the reading */
 } __attribute__((packed));
-_Static_assert(sizeof(struct calibration_payload) == 85, "calibration_payload");
+_Static_assert(sizeof(struct calibration_payload) == 109, "calibration_payload");
 
 /* write_calibration, from the host: store a calibration for a configured sensor; the old one stays until the new one is whole; answered by ack */
 struct write_calibration_payload {
@@ -291,10 +292,10 @@ struct write_calibration_payload {
     char serial_number[24]; /* of the sensor, as the configuration names it */
     uint64_t written_unix_s; /* when it was written, seconds since 1970 UTC */
     float temperature_c; /* of the sensor during the calibration, degrees Celsius */
-    float scale[3]; /* diagonal of K */
+    float matrix[3][3]; /* what m + b is multiplied by, row by row; of k_times_m_plus_b it is diagonal */
     float bias_rad_s[3]; /* b, in the units of the reading */
 } __attribute__((packed));
-_Static_assert(sizeof(struct write_calibration_payload) == 62, "write_calibration_payload");
+_Static_assert(sizeof(struct write_calibration_payload) == 86, "write_calibration_payload");
 
 /* erase_calibration, from the host: forget the calibration of a sensor; answered by ack */
 struct erase_calibration_payload {

@@ -2,6 +2,7 @@
 #ifndef SENSOR_H
 #define SENSOR_H
 
+#include <stdbool.h>
 #include <stdint.h>
 
 #include "protocol.h"
@@ -26,8 +27,18 @@ struct sensor_driver {
     uint32_t settling_us;
     uint8_t settling;
 
+    /* The data-ready line stays up until a reading lowers it; else it falls by itself. */
+    bool holds_line;
+
+    /* So long after a reading began at most, a new conversion may still be what is read. */
+    uint8_t latched_within_us;
+
     /* Forgets what it remembers of the part; NULL when that is nothing. */
     void (*reset)(unsigned device);
+
+    /* Lets the part, which has been identified, listen to nothing but its select: what is said to another one may look
+       like its I2C address, and its answer would spoil what is said. NULL when it has no I2C. May come again and again. */
+    void (*keep_to_spi)(unsigned device);
 
     /* Reads the identity register. */
     uint16_t (*identify)(unsigned device);

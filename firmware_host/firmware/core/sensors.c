@@ -28,7 +28,10 @@ enum error_code sensors_identify(unsigned sensor, uint16_t *who_am_i)
 {
     const struct sensor_driver *driver = sensors[sensor].driver;
     *who_am_i = driver->identify(sensors[sensor].device);
-    if (*who_am_i == driver->identity)
+    if (*who_am_i == driver->identity) {
+        if (driver->keep_to_spi != NULL)
+            driver->keep_to_spi(sensors[sensor].device);
         return 0;
+    }
     return is_nobody(*who_am_i) ? ERROR_SENSOR_ABSENT : ERROR_SENSOR_MISMATCH;
 }

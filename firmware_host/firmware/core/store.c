@@ -11,7 +11,8 @@
    a page whose erasing was cut off and that still looks like a record. */
 
 #define SLOTS 2u
-#define SEAL 0x314C4143u /* "CAL1": another layout takes another number, and its records are then none */
+#define SEAL 0x324C4143u          /* "CAL2": another layout takes another number, and an older image finds no record then */
+#define DIAGONAL_SEAL 0x314C4143u /* "CAL1", up to firmware 0.2.1: three scale factors in the place of the matrix */
 
 struct slot {
     struct calibration_payload record;
@@ -22,7 +23,17 @@ struct slot {
 
 #define DOUBLEWORDS (sizeof(struct slot) / sizeof(uint64_t))
 
-_Static_assert(sizeof(struct calibration_payload) == 85, "another layout takes another seal");
+struct diagonal_slot {
+    uint8_t head[offsetof(struct calibration_payload, matrix)];
+    float scale[3];
+    float bias_rad_s[3];
+    uint8_t unused[3];
+    uint32_t seal;
+    uint32_t crc;
+} __attribute__((packed));
+
+_Static_assert(sizeof(struct calibration_payload) == 109, "another layout takes another seal");
+_Static_assert(sizeof(struct diagonal_slot) == 96, "as it lies in flash");
 _Static_assert(sizeof(struct slot) % sizeof(uint64_t) == 0 && offsetof(struct slot, seal) % sizeof(uint64_t) == 0,
                "the seal is the last doubleword");
 _Static_assert(SLOTS * SENSOR_COUNT <= FLASH_PAGES && sizeof(struct slot) <= FLASH_PAGE_BYTES, "the flash has room");
@@ -32,42 +43,66 @@ static unsigned page_of(unsigned sensor, unsigned slot)
     return SLOTS * sensor + slot;
 }
 
-static uint32_t crc_of(const struct slot *slot)
+/* A slot of whichever layout, which ends with its seal and the CRC of all before. */
+static bool read_sealed(unsigned page, void *slot, size_t size, uint32_t seal)
 {
-    return frame_crc(0, (const uint8_t *)slot, offsetof(struct slot, seal));
+    uint32_t end[2];
+    if (!port_flash_read(page, 0, slot, size))
+        return false;
+    memcpy(end, (uint8_t *)slot + size - sizeof end, sizeof end);
+    return end[0] == seal && end[1] == frame_crc(0, slot, size - sizeof end);
 }
 
-static bool read_slot(unsigned page, struct slot *slot)
+static bool is_diagonal(unsigned page)
 {
-    return port_flash_read(page, 0, slot, sizeof *slot) && slot->seal == SEAL && slot->crc == crc_of(slot);
+    struct diagonal_slot slot;
+    return read_sealed(page, &slot, sizeof slot, DIAGONAL_SEAL);
+}
+
+static bool read_diagonal(unsigned page, struct calibration_payload *record)
+{
+    struct diagonal_slot slot;
+    if (!read_sealed(page, &slot, sizeof slot, DIAGONAL_SEAL))
+        return false;
+    *record = (struct calibration_payload){0};
+    memcpy(record, slot.head, sizeof slot.head);
+    memcpy(record->bias_rad_s, slot.bias_rad_s, sizeof record->bias_rad_s);
+    for (unsigned axis = 0; axis < 3; axis++)
+        record->matrix[axis][axis] = slot.scale[axis];
+    return true;
+}
+
+static bool read_record(unsigned page, struct calibration_payload *record)
+{
+    struct slot slot;
+    if (!read_sealed(page, &slot, sizeof slot, SEAL))
+        return read_diagonal(page, record);
+    *record = slot.record;
+    return true;
 }
 
 /* Sequence numbers may wrap: the difference tells. */
-static bool is_newer(const struct slot *a, const struct slot *b)
+static bool is_newer(const struct calibration_payload *a, const struct calibration_payload *b)
 {
-    return (int32_t)(a->record.sequence - b->record.sequence) > 0;
+    return (int32_t)(a->sequence - b->sequence) > 0;
 }
 
 /* The slot of the newest record, which is then in `newest`; SLOTS when there is none. */
-static unsigned find_newest(unsigned sensor, struct slot *newest)
+static unsigned find_newest(unsigned sensor, struct calibration_payload *newest)
 {
-    struct slot slots[SLOTS];
+    struct calibration_payload record;
     unsigned found = SLOTS;
     for (unsigned i = 0; i < SLOTS; i++)
-        if (read_slot(page_of(sensor, i), &slots[i]) && (found == SLOTS || is_newer(&slots[i], &slots[found])))
+        if (read_record(page_of(sensor, i), &record) && (found == SLOTS || is_newer(&record, newest))) {
+            *newest = record;
             found = i;
-    if (found != SLOTS)
-        *newest = slots[found];
+        }
     return found;
 }
 
 bool store_read(unsigned sensor, struct calibration_payload *record)
 {
-    struct slot newest;
-    if (find_newest(sensor, &newest) == SLOTS)
-        return false;
-    *record = newest.record;
-    return true;
+    return find_newest(sensor, record) != SLOTS;
 }
 
 static bool program(unsigned page, const struct slot *slot)
@@ -83,20 +118,25 @@ static bool program(unsigned page, const struct slot *slot)
 
 bool store_write(unsigned sensor, struct calibration_payload *record)
 {
-    struct slot newest, written, slot = {.seal = SEAL};
+    struct calibration_payload newest;
+    struct slot written, slot = {.seal = SEAL};
     unsigned found = find_newest(sensor, &newest);
     unsigned page = page_of(sensor, found == 0 ? 1 : 0);
-    record->sequence = found == SLOTS ? 1 : newest.record.sequence + 1;
+    record->sequence = found == SLOTS ? 1 : newest.sequence + 1;
     slot.record = *record;
-    slot.crc = crc_of(&slot);
-    return port_flash_erase(page) && program(page, &slot) && read_slot(page, &written) &&
-           memcmp(&written, &slot, sizeof slot) == 0;
+    slot.crc = frame_crc(0, (const uint8_t *)&slot, offsetof(struct slot, seal));
+    bool stored = port_flash_erase(page) && program(page, &slot) && read_sealed(page, &written, sizeof written, SEAL) &&
+                  memcmp(&written, &slot, sizeof slot) == 0;
+    /* An image that knows only the old layout would correct by the calibration before, which it can still read. */
+    if (stored && found != SLOTS && is_diagonal(page_of(sensor, found)))
+        port_flash_erase(page_of(sensor, found));
+    return stored;
 }
 
 /* The older record first: were it last, a power loss in between would bring it back. */
 bool store_erase(unsigned sensor)
 {
-    struct slot newest;
+    struct calibration_payload newest;
     unsigned newer = find_newest(sensor, &newest) == 1 ? 1 : 0;
     return port_flash_erase(page_of(sensor, 1 - newer)) && port_flash_erase(page_of(sensor, newer));
 }

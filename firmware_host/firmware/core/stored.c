@@ -24,14 +24,28 @@ void stored_on_read(const struct frame *request)
     }
 }
 
-#define LARGEST 1e6f /* scale, or bias in rad/s: far beyond any sensor's, and no product of two overflows */
+#define LARGEST 1e6f /* matrix, or bias in rad/s: far beyond any sensor's, and no product of two overflows */
+
+/* K, or a matrix that some sensor may have: its axes are nearer to right angles than to each other. */
+static bool is_usable_matrix(const struct write_calibration_payload *calibration)
+{
+    bool whole = calibration->model == MODEL_MATRIX_TIMES_M_PLUS_B;
+    bool usable = whole || calibration->model == MODEL_K_TIMES_M_PLUS_B;
+    for (unsigned row = 0; row < 3; row++) {
+        float on_axis = calibration->matrix[row][row], beside = 0.0f;
+        for (unsigned column = 0; column < 3; column++)
+            if (column != row)
+                beside += __builtin_fabsf(calibration->matrix[row][column]);
+        usable = usable && on_axis > 0.0f && on_axis < LARGEST && (whole ? beside < on_axis : beside == 0.0f);
+    }
+    return usable;
+}
 
 static bool is_usable(const struct write_calibration_payload *calibration)
 {
-    bool usable = calibration->model == MODEL_K_TIMES_M_PLUS_B;
+    bool usable = is_usable_matrix(calibration);
     for (unsigned axis = 0; axis < 3; axis++)
-        usable = usable && calibration->scale[axis] > 0.0f && calibration->scale[axis] < LARGEST &&
-                 __builtin_fabsf(calibration->bias_rad_s[axis]) < LARGEST;
+        usable = usable && __builtin_fabsf(calibration->bias_rad_s[axis]) < LARGEST;
     return usable;
 }
 
@@ -78,7 +92,7 @@ static enum error_code write(const struct write_calibration_payload *wanted)
     memcpy(record.serial_number, wanted->serial_number, sizeof record.serial_number);
     record.written_unix_s = wanted->written_unix_s;
     record.temperature_c = wanted->temperature_c;
-    memcpy(record.scale, wanted->scale, sizeof record.scale);
+    memcpy(record.matrix, wanted->matrix, sizeof record.matrix);
     memcpy(record.bias_rad_s, wanted->bias_rad_s, sizeof record.bias_rad_s);
     return is_stored(&record) || store_write(wanted->sensor, &record) ? 0 : ERROR_FLASH_FAILED;
 }
@@ -123,9 +137,9 @@ enum error_code stored_correction(unsigned sensor, struct correction *correction
     if (memcmp(record.part, present.part, sizeof record.part) != 0 || record.who_am_i != present.who_am_i ||
         record.range_deg_s != present.range_deg_s)
         return ERROR_OTHER_SENSOR;
-    float scale[3], bias_rad_s[3];
-    memcpy(scale, record.scale, sizeof scale);
+    float matrix[3][3], bias_rad_s[3];
+    memcpy(matrix, record.matrix, sizeof matrix);
     memcpy(bias_rad_s, record.bias_rad_s, sizeof bias_rad_s);
-    *correction = correction_of(scale, bias_rad_s, (float)setups_of(sensor)->sensitivity_rad_s);
+    *correction = correction_of(matrix, bias_rad_s, (float)setups_of(sensor)->sensitivity_rad_s);
     return 0;
 }

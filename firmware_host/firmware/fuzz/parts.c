@@ -2,12 +2,12 @@
 
 #include <string.h>
 
-#define PARTS 3u
+#define PARTS 4u
 #define MEMORY 256u
 
-/* The first two: registers behind a byte of address. The third: words of 16 bits, high byte first, answered a frame later,
+/* The first two, and the magnetometer, which nobody reads: registers behind a byte of address. The third: words of 16 bits, high byte first, answered a frame later,
    but for the burst, whose ten words begin at BURST_DATA. */
-enum { LSM9DS1, MPU9250, ADIS16465 };
+enum { LSM9DS1, MPU9250, ADIS16465, MAGNETOMETER };
 
 #define READ 0x80u
 #define ADIS_WRITE 0x80u

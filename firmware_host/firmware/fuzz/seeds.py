@@ -36,7 +36,7 @@ SETUP = b"".join(
     frame("configure", sensor, rate_hz, range_deg_s)
     for sensor, rate_hz, range_deg_s in ((0, 238.0, 245.0), (1, 200.0, 250.0), (2, 200.0, 500.0))
 )
-RECORD = (1, b"LSM9DS1-001", 1_700_000_000, 25.0, 1.1, 1.2, 1.3, 0.01, -0.02, 0.03)
+RECORD = (1, b"LSM9DS1-001", 1_700_000_000, 25.0, 1.1, 0.0, 0.0, 0.0, 1.2, 0.0, 0.0, 0.0, 1.3, 0.01, -0.02, 0.03)
 OBSERVATIONS = b"".join(
     frame("recall", 0, index, *(speed_rad_s * (i == index // 2) + 0.01 for i in range(3)), abs(speed_rad_s))
     for index, speed_rad_s in enumerate((0.5, -0.5, 0.5, -0.5, 0.5, -0.5))

@@ -8,14 +8,17 @@
 typedef void (*bus_function)(unsigned device, uint32_t max_hz, uint8_t *bytes, size_t size);
 typedef void (*transmit_function)(const uint8_t *bytes, size_t size);
 typedef void (*restart_function)(void);
+typedef bool (*line_function)(unsigned sensor);
 
 static bus_function on_bus;
 static transmit_function on_transmit;
 static restart_function on_restart;
+static line_function on_line;
 static uint32_t time_us;
 static const uint8_t unique_id[12] = {0x01, 0x23, 0x45, 0x67, 0x89, 0xAB, 0xCD, 0xEF, 0x01, 0x23, 0x45, 0x67};
 
 void host_connect(bus_function bus, transmit_function transmit, restart_function restart);
+void host_watch_lines(line_function line);
 void host_set_time_us(uint32_t now_us);
 
 void host_connect(bus_function bus, transmit_function transmit, restart_function restart)
@@ -23,6 +26,12 @@ void host_connect(bus_function bus, transmit_function transmit, restart_function
     on_bus = bus;
     on_transmit = transmit;
     on_restart = restart;
+}
+
+/* Who knows the data-ready lines' levels; without, they are down. */
+void host_watch_lines(line_function line)
+{
+    on_line = line;
 }
 
 void host_set_time_us(uint32_t now_us)
@@ -43,6 +52,11 @@ void port_wait_us(uint32_t duration_us)
 void port_listen(uint8_t mask)
 {
     (void)mask; /* the caller knows what it started */
+}
+
+bool port_line_is_high(unsigned sensor)
+{
+    return on_line != NULL && on_line(sensor);
 }
 
 void bus_xfer(unsigned device, uint32_t max_hz, uint8_t *bytes, size_t size)

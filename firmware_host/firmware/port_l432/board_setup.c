@@ -1,5 +1,5 @@
 /* Wiring: USART2 to the ST-LINK (TX PA2, RX PA15), SPI1 on PB3 PB4 PB5; select and data-ready of the LSM9DS1 on PA11 and PA8,
-   of the MPU-9250 on PB0 and PA12, of the ADIS16465 on PA4 and PA1. */
+   of the MPU-9250 on PB0 and PA12, of the ADIS16465 on PA4 and PA1; select of the LSM9DS1's magnetometer on PB1. */
 #include "board_setup.h"
 
 #include "protocol.h"
@@ -9,6 +9,7 @@
 
 enum pin_mode { PIN_INPUT = 0, PIN_OUTPUT = 1, PIN_ALTERNATE = 2 };
 enum pin_pull { PULL_UP = 1, PULL_DOWN = 2 };
+enum pin_speed { SPEED_MEDIUM = 1 }; /* enough for 5 MHz; faster edges would ring on loose wires */
 #define PER_PIN(pin, value) ((uint32_t)(value) << (2u * (pin)))
 #define PIN_MASK(pin) PER_PIN(pin, 3u)
 
@@ -42,6 +43,8 @@ static void start_crystal(void)
     PWR_CR1 |= PWR_CR1_DBP;
     while (!(PWR_CR1 & PWR_CR1_DBP)) /* until then a write to BDCR is lost */
         ;
+    if (!(RCC_BDCR & RCC_BDCR_LSEON))
+        RCC_BDCR &= ~RCC_BDCR_LSEBYP; /* it outlives resets, and would call a clock ready that is not there */
     RCC_BDCR |= RCC_BDCR_LSEON;
 }
 
@@ -61,25 +64,29 @@ static void setup_pins(void)
     GPIOA_AFRH |= GPIOA_AFRH_AFRH15(3u);
     GPIOA_PUPDR = (GPIOA_PUPDR & ~(PIN_MASK(1u) | PIN_MASK(8u) | PIN_MASK(12u) | PIN_MASK(15u))) |
                   PER_PIN(1u, PULL_DOWN) | PER_PIN(8u, PULL_DOWN) | PER_PIN(12u, PULL_DOWN) | PER_PIN(15u, PULL_UP);
-    GPIOA_OSPEEDR |= PER_PIN(2u, 1u) | PER_PIN(4u, 1u) | PER_PIN(11u, 1u);
+    GPIOA_OSPEEDR = (GPIOA_OSPEEDR & ~(PIN_MASK(2u) | PIN_MASK(4u) | PIN_MASK(11u))) |
+                    PER_PIN(2u, SPEED_MEDIUM) | PER_PIN(4u, SPEED_MEDIUM) | PER_PIN(11u, SPEED_MEDIUM);
     GPIOA_MODER = (GPIOA_MODER & ~(PIN_MASK(1u) | PIN_MASK(2u) | PIN_MASK(4u) | PIN_MASK(8u) | PIN_MASK(11u) |
                                    PIN_MASK(12u) | PIN_MASK(15u))) |
                   PER_PIN(1u, PIN_INPUT) | PER_PIN(2u, PIN_ALTERNATE) | PER_PIN(4u, PIN_OUTPUT) |
                   PER_PIN(8u, PIN_INPUT) | PER_PIN(11u, PIN_OUTPUT) | PER_PIN(12u, PIN_INPUT) |
                   PER_PIN(15u, PIN_ALTERNATE);
 
-    GPIOB_BSRR = GPIOB_BSRR_BS0;
+    GPIOB_BSRR = GPIOB_BSRR_BS0 | GPIOB_BSRR_BS1;
     GPIOB_AFRL |= GPIOB_AFRL_AFRL3(5u) | GPIOB_AFRL_AFRL4(5u) | GPIOB_AFRL_AFRL5(5u);
     GPIOB_PUPDR = (GPIOB_PUPDR & ~PIN_MASK(4u)) | PER_PIN(4u, PULL_UP);
-    GPIOB_OSPEEDR |= PER_PIN(0u, 1u) | PER_PIN(3u, 1u) | PER_PIN(5u, 1u);
-    GPIOB_MODER = (GPIOB_MODER & ~(PIN_MASK(0u) | PIN_MASK(3u) | PIN_MASK(4u) | PIN_MASK(5u))) |
-                  PER_PIN(0u, PIN_OUTPUT) | PER_PIN(3u, PIN_ALTERNATE) | PER_PIN(4u, PIN_ALTERNATE) |
-                  PER_PIN(5u, PIN_ALTERNATE);
+    GPIOB_OSPEEDR = (GPIOB_OSPEEDR & ~(PIN_MASK(0u) | PIN_MASK(1u) | PIN_MASK(3u) | PIN_MASK(5u))) |
+                    PER_PIN(0u, SPEED_MEDIUM) | PER_PIN(1u, SPEED_MEDIUM) | PER_PIN(3u, SPEED_MEDIUM) |
+                    PER_PIN(5u, SPEED_MEDIUM);
+    GPIOB_MODER = (GPIOB_MODER & ~(PIN_MASK(0u) | PIN_MASK(1u) | PIN_MASK(3u) | PIN_MASK(4u) | PIN_MASK(5u))) |
+                  PER_PIN(0u, PIN_OUTPUT) | PER_PIN(1u, PIN_OUTPUT) | PER_PIN(3u, PIN_ALTERNATE) |
+                  PER_PIN(4u, PIN_ALTERNATE) | PER_PIN(5u, PIN_ALTERNATE);
 }
 
 static void setup_microseconds(void)
 {
     TIM2_PSC = CLOCK_HZ / 1000000u - 1u;
+    TIM2_ARR = 0xFFFFFFFFu; /* the maker's own file says it comes up 0, which would hold the counter */
     TIM2_EGR = TIM2_EGR_UG; /* loads the prescaler */
     TIM2_CR1 = TIM2_CR1_CEN;
 }
@@ -110,8 +117,12 @@ static void setup_data_ready(void)
     EXTI_RTSR1 |= EXTI_RTSR1_TR1 | EXTI_RTSR1_TR8 | EXTI_RTSR1_TR12;
 }
 
+#define LATER 0x10u /* the next priority after the data-ready edges', whose time stamps wait for nobody */
+
 static void setup_interrupts(void)
 {
+    NVIC_IPR4 = NVIC_IPR4_IPR_N1(LATER); /* DMA1_CH7 */
+    NVIC_IPR9 = NVIC_IPR9_IPR_N2(LATER); /* USART2 */
     NVIC_ISER0 = 1u << EXTI1_IRQ | 1u << DMA1_CH7_IRQ | 1u << EXTI9_5_IRQ;
     NVIC_ISER1 = 1u << (USART2_IRQ - 32u) | 1u << (EXTI15_10_IRQ - 32u);
     STK_LOAD = CLOCK_HZ / TICK_HZ - 1u;

@@ -39,6 +39,7 @@ static void begin(void)
 
 static bool finish(void)
 {
+    __asm volatile("dsb" ::: "memory"); /* what starts it has arrived before anybody looks whether it is busy */
     while (FLASH_SR & FLASH_SR_BSY)
         ;
     bool done = (FLASH_SR & ERRORS) == 0;
@@ -81,11 +82,13 @@ bool port_flash_read(unsigned page, size_t offset, void *bytes, size_t size)
     return !torn;
 }
 
+/* Not asked is the flag: a power loss in the middle of an erase or a programming may spoil the register that holds it (ST's
+   errata of the L4), and a record that cannot be read must not keep the board from starting. */
 bool flash_take_torn_read(void)
 {
-    if (!reading || !(FLASH_ECCR & FLASH_ECCR_ECCD))
+    if (!reading)
         return false;
-    FLASH_ECCR = FLASH_ECCR_ECCD; /* written 1 to clear; still standing on return it would bring the NMI again */
+    FLASH_ECCR = FLASH_ECCR_ECCD | FLASH_ECCR_ECCC; /* written 1 to clear; standing on return it would bring the NMI again */
     __asm volatile("dsb" ::: "memory");
     torn = true;
     return true;

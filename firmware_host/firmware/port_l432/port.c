@@ -39,6 +39,7 @@ static const struct {
     {&GPIOA_BSRR, GPIOA_BSRR_BR11, GPIOA_BSRR_BS11},
     {&GPIOB_BSRR, GPIOB_BSRR_BR0, GPIOB_BSRR_BS0},
     {&GPIOA_BSRR, GPIOA_BSRR_BR4, GPIOA_BSRR_BS4},
+    {&GPIOB_BSRR, GPIOB_BSRR_BR1, GPIOB_BSRR_BS1},
 };
 
 /* An edge pends its line also while that is masked. */
@@ -54,6 +55,12 @@ void port_listen(uint8_t mask)
         if (is_named(mask, i))
             EXTI_IMR1 |= lines[i].enable;
     }
+}
+
+bool port_line_is_high(unsigned sensor)
+{
+    static const uint32_t levels[SENSOR_COUNT] = {GPIOA_IDR_IDR8, GPIOA_IDR_IDR12, GPIOA_IDR_IDR1};
+    return (GPIOA_IDR & levels[sensor]) != 0;
 }
 
 static void set_bus_clock(uint32_t max_hz)
@@ -95,7 +102,7 @@ void port_transmit(const uint8_t *bytes, size_t size)
     DMA1_CMAR7 = (uint32_t)bytes;
     DMA1_CNDTR7 = size;
     __asm volatile("dmb" ::: "memory"); /* the bytes are in memory before the channel reads them */
-    DMA1_CCR7 = DMA1_CCR7_EN | DMA1_CCR7_TCIE | DMA1_CCR7_DIR | DMA1_CCR7_MINC;
+    DMA1_CCR7 = DMA1_CCR7_EN | DMA1_CCR7_TCIE | DMA1_CCR7_TEIE | DMA1_CCR7_DIR | DMA1_CCR7_MINC;
 }
 
 void port_restart(void)
@@ -167,8 +174,8 @@ void exti1_handler(void)
 
 void dma1_channel7_handler(void)
 {
-    DMA1_IFCR = DMA1_IFCR_CGIF7;
-    link_sent();
+    DMA1_IFCR = DMA1_IFCR_CTCIF7 | DMA1_IFCR_CTEIF7; /* not CGIF7, which an erratum says may clear more than it names */
+    link_sent();                                     /* also what was cut off: the CRC finds it, and the line goes on */
     woken = true;
 }
 
@@ -197,7 +204,7 @@ static void sleep_until_woken(void)
 {
     __asm volatile("cpsid i" ::: "memory");
     if (!woken)
-        __asm volatile("wfi" ::: "memory");
+        __asm volatile("wfi\n isb" ::: "memory"); /* the barrier: an erratum of the flash at waking, while a debugger is on */
     __asm volatile("cpsie i\n isb" ::: "memory");
 }
 

@@ -36,6 +36,7 @@
 #define RCC_BDCR REGISTER(RCC_BASE, 0x90u)
 #define RCC_BDCR_LSEON (1u << 0)
 #define RCC_BDCR_LSERDY (1u << 1)
+#define RCC_BDCR_LSEBYP (1u << 2)
 #define RCC_CSR REGISTER(RCC_BASE, 0x94u)
 #define RCC_CSR_RMVF (1u << 23)
 #define RCC_CSR_PINRSTF (1u << 26)
@@ -66,6 +67,7 @@
 #define FLASH_CR_START (1u << 16)
 #define FLASH_CR_LOCK (1u << 31)
 #define FLASH_ECCR REGISTER(FLASH_BASE, 0x18u)
+#define FLASH_ECCR_ECCC (1u << 30)
 #define FLASH_ECCR_ECCD (1u << 31)
 
 #define PWR_BASE 0x40007000u
@@ -76,6 +78,10 @@
 #define GPIOA_MODER REGISTER(GPIOA_BASE, 0x00u)
 #define GPIOA_OSPEEDR REGISTER(GPIOA_BASE, 0x08u)
 #define GPIOA_PUPDR REGISTER(GPIOA_BASE, 0x0Cu)
+#define GPIOA_IDR REGISTER(GPIOA_BASE, 0x10u)
+#define GPIOA_IDR_IDR1 (1u << 1)
+#define GPIOA_IDR_IDR8 (1u << 8)
+#define GPIOA_IDR_IDR12 (1u << 12)
 #define GPIOA_BSRR REGISTER(GPIOA_BASE, 0x18u)
 #define GPIOA_BSRR_BS4 (1u << 4)
 #define GPIOA_BSRR_BS11 (1u << 11)
@@ -92,7 +98,9 @@
 #define GPIOB_PUPDR REGISTER(GPIOB_BASE, 0x0Cu)
 #define GPIOB_BSRR REGISTER(GPIOB_BASE, 0x18u)
 #define GPIOB_BSRR_BS0 (1u << 0)
+#define GPIOB_BSRR_BS1 (1u << 1)
 #define GPIOB_BSRR_BR0 (1u << 16)
+#define GPIOB_BSRR_BR1 (1u << 17)
 #define GPIOB_AFRL REGISTER(GPIOB_BASE, 0x20u)
 #define GPIOB_AFRL_AFRL3(value) ((value) << 12)
 #define GPIOB_AFRL_AFRL4(value) ((value) << 16)
@@ -122,10 +130,12 @@
 
 #define DMA1_BASE 0x40020000u
 #define DMA1_IFCR REGISTER(DMA1_BASE, 0x04u)
-#define DMA1_IFCR_CGIF7 (1u << 24)
+#define DMA1_IFCR_CTCIF7 (1u << 25)
+#define DMA1_IFCR_CTEIF7 (1u << 27)
 #define DMA1_CCR7 REGISTER(DMA1_BASE, 0x80u)
 #define DMA1_CCR7_EN (1u << 0)
 #define DMA1_CCR7_TCIE (1u << 1)
+#define DMA1_CCR7_TEIE (1u << 3)
 #define DMA1_CCR7_DIR (1u << 4)
 #define DMA1_CCR7_MINC (1u << 7)
 #define DMA1_CNDTR7 REGISTER(DMA1_BASE, 0x84u)
@@ -172,6 +182,7 @@
 #define TIM2_EGR_UG (1u << 0)
 #define TIM2_CNT REGISTER(TIM2_BASE, 0x24u)
 #define TIM2_PSC REGISTER(TIM2_BASE, 0x28u)
+#define TIM2_ARR REGISTER(TIM2_BASE, 0x2Cu)
 
 #define IWDG_BASE 0x40003000u
 #define IWDG_KR REGISTER(IWDG_BASE, 0x00u)
@@ -181,6 +192,11 @@
 #define NVIC_BASE 0xE000E100u
 #define NVIC_ISER0 REGISTER(NVIC_BASE, 0x00u)
 #define NVIC_ISER1 REGISTER(NVIC_BASE, 0x04u)
+
+#define NVIC_IPR4 REGISTER(NVIC_BASE, 0x310u)
+#define NVIC_IPR4_IPR_N1(value) ((value) << 8)
+#define NVIC_IPR9 REGISTER(NVIC_BASE, 0x324u)
+#define NVIC_IPR9_IPR_N2(value) ((value) << 16)
 
 #define STK_BASE 0xE000E010u
 #define STK_CTRL REGISTER(STK_BASE, 0x00u)

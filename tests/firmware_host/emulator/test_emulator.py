@@ -394,23 +394,58 @@ def test_a_byte_that_arrives_is_an_interrupt(tmp_path: Path) -> None:
     assert board.transmitted() == b"IBM"
 
 
-def test_instructions_take_one_cycle_each(tmp_path: Path) -> None:
+def test_instructions_take_a_cycle_each_and_every_line_of_the_flash_its_wait_states(tmp_path: Path) -> None:
+    """A loop of four narrow instructions in one line of 64 bits, then in two; the chip's cache would spare the wait."""
     source = """
+        #define LOOP(before) __asm volatile( \\
+            "mov r0, #100\\n .balign 8\\n" before "1: subs r0, #1\\n nop\\n nop\\n bne 1b" ::: "r0", "cc")
         int main(void)
         {
             setup();
             REG(0x40021058) |= 1;
+            REG(0x4000002C) = ~0u;
             REG(0x40000014) = 1;
             REG(0x40000000) = 1; /* TIM2 at 80 MHz */
-            uint32_t from = REG(0x40000024);
-            __asm volatile("mov r0, #100\\n 1: subs r0, #1\\n nop\\n nop\\n bne 1b" ::: "r0", "cc");
-            uint32_t cycles = REG(0x40000024) - from;
-            put(cycles); put(cycles >> 8);
+            for (int i = 0; i < 2; i++) {
+                uint32_t from = REG(0x40000024);
+                if (i == 0)
+                    LOOP("");
+                else
+                    LOOP("nop\\n");
+                uint32_t cycles = REG(0x40000024) - from;
+                put(cycles); put(cycles >> 8);
+            }
             for (;;);
         }
         """
-    cycles = int.from_bytes(run(source, tmp_path), "little")
-    assert 400 <= cycles <= 404
+    sent = run(source, tmp_path)
+    in_one_line, over_two = (int.from_bytes(sent[i : i + 2], "little") for i in (0, 2))
+    assert 800 <= in_one_line <= 850
+    assert 1200 <= over_two <= 1250
+
+
+def test_an_exception_takes_its_cycles(tmp_path: Path) -> None:
+    """Twelve to enter, ten to return, and the vector from the flash."""
+    source = """
+        void pendsv(void) {}
+        __attribute__((noinline)) uint32_t time(void) { __asm volatile(""); return REG(0x40000024); }
+        int main(void)
+        {
+            setup();
+            REG(0x40021058) |= 1;
+            REG(0x4000002C) = ~0u;
+            REG(0x40000014) = 1;
+            REG(0x40000000) = 1;
+            for (int i = 0; i < 2; i++) {
+                uint32_t from = time();
+                REG(0xE000ED04) = i << 28; /* pends it */
+                put(time() - from);
+            }
+            for (;;);
+        }
+        """
+    without, with_exception = run(source, tmp_path)
+    assert 26 <= with_exception - without <= 60
 
 
 # --- the sensor's bus

@@ -89,7 +89,8 @@ def test_the_core_stands_still_while_the_flash_works(tmp_path: Path) -> None:
     board = chip(
         """
         ticks = 0;
-        REG(0x40021058) |= 1; REG(0x40000028) = 79; REG(0x40000014) = 1; REG(0x40000000) = 1; /* TIM2: microseconds */
+        /* TIM2: microseconds */
+        REG(0x40021058) |= 1; REG(0x40000028) = 79; REG(0x4000002C) = ~0u; REG(0x40000014) = 1; REG(0x40000000) = 1;
         REG(0xE000E014) = 80000 - 1; REG(0xE000E018) = 0; REG(0xE000E010) = 7;
         uint32_t start = REG(0x40000024);
         erase(PAGE);

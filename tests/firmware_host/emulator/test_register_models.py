@@ -61,7 +61,7 @@ PARTS = (
         temperature_counts=lambda temperature_c: 16 * (temperature_c - 25),
         forbidden=(
             ("unmodelled_register", b"\xa8\x00"),
-            ("unmodelled_register", b"\x05\x01"),
+            ("unmodelled_register", b"\x06\x01"),
             ("unmodelled_bits", b"\x20\x60"),  # accelerometer on
         ),
     ),

@@ -6,7 +6,7 @@ import math
 import pytest
 
 from firmware_host.protocol import ERRORS
-from support.host_board import HostBoard, configured, convert, error_of, first_samples
+from support.host_board import HostBoard, configured, convert, error_of, first_samples, sample_sequences
 from support.host_sensors import Adis16465Registers, Nobody
 
 
@@ -46,10 +46,11 @@ def test_the_adis16465_decimates(board: HostBoard, wanted_hz: float, hz: float, 
 def test_settings_of_the_adis16465_are_written_by_bytes_and_believed_when_they_read_back(board: HostBoard) -> None:
     board.adis16465.words |= {0x5C: 0x0004, 0x60: 0x0002}
     configured(board, 2, rate_hz=2)
+    biases = [(address, 0x00) for address in range(0x40, 0x4C)]
     filter_off = [(0x5C, 0x00), (0x5D, 0x00)]
     data_ready_rises = [(0x60, 0xC1), (0x61, 0x00)]
     decimation = [(0x64, 0xE7), (0x65, 0x03)]  # 999
-    assert board.adis16465.writes == filter_off + data_ready_rises + decimation
+    assert board.adis16465.writes == biases + filter_off + data_ready_rises + decimation
     board.adis16465.taking_us = 2000
     assert error_of(board.ask("configure", sensor=2, rate_hz=200, range_deg_s=125)) == "setup_failed"
 
@@ -114,6 +115,66 @@ def test_damage_again_and_again_is_named_but_not_a_burst_now_and_then(every: int
     assert errors == ["checksum_failed"] * named
 
 
+def test_biases_somebody_stored_in_the_adis16465_are_cleared(board: HostBoard) -> None:
+    biases = range(0x40, 0x4C, 2)
+    board.adis16465.words |= dict.fromkeys(biases, 0x1234)
+    board.adis16465.stuck.add(0x46)
+    assert error_of(board.ask("configure", sensor=2, rate_hz=200, range_deg_s=125)[:1]) == "setup_failed"
+    board.adis16465.stuck.clear()
+    configured(board, 2)
+    assert {board.adis16465.words[address] for address in biases} == {0}
+
+
+def test_an_adis16465_that_reports_a_fault_is_reset_once_and_then_believed(board: HostBoard) -> None:
+    board.adis16465.words[0x02] = 0x0002  # data path overrun
+    board.adis16465.cured_by_reset = True
+    configured(board, 2)
+    assert board.adis16465.writes[:2] == [(0x68, 0x80), (0x69, 0x00)]
+    assert board.core.port_time_us() >= 200_000
+    board.adis16465.writes.clear()
+    configured(board, 2)
+    assert (0x68, 0x80) not in board.adis16465.writes
+    board.adis16465.words[0x02] = 0x0020
+    board.adis16465.cured_by_reset = False
+    assert error_of(board.ask("configure", sensor=2, rate_hz=200, range_deg_s=125)[:1]) == "sensor_fault"
+
+
+def test_a_reading_that_the_next_conversion_overtakes_is_lost_and_the_part_not_blamed() -> None:
+    """Whose reading it is cannot be told: it may be the next one's under the time of the one before."""
+    board, part = streaming_adis16465()
+    for k in range(20):
+        next_us = 65_000 + 10_000 * k + 5000
+
+        def overtake(next_us: int = next_us) -> None:
+            part.convert((7, 7, 7), -48)
+            board.data_ready(next_us, 2)
+
+        part.before_burst = overtake
+        convert(board, next_us - 5000, late_us=4990, sensor=2)
+    frames = board.ask("stop", 4)
+    assert [f for f in frames if f.name == "error"] == []
+    assert sample_sequences(frames, 2) == [0]
+    (report,) = [f for f in board.ask("status", 5) if f.name == "report"]
+    assert (report.items["conversions"][2], report.items["dropped"][2], report.values["bus_errors"]) == (41, 40, 0)
+
+
+def test_a_reading_during_which_the_next_conversion_comes_is_good_once_its_values_are_taken() -> None:
+    board, part = streaming_adis16465()
+
+    def overlap() -> None:
+        board.data_ready(65_000 + 5000, 2)
+
+    part.before_burst = overlap
+    part.convert((7, 7, 7), -48)
+    board.data_ready(65_000, 2)
+    board.wait_until(69_900)
+    board.run(1)
+    part.convert((8, 8, 8), -48)
+    board.run(1)
+    frames = board.ask("stop", 4)
+    assert sample_sequences(frames, 2) == [0, 1, 2]
+
+
 FRESH, STALE = range(2)  # enum read_result of core/sensor.h
 
 
@@ -125,7 +186,10 @@ class Driver(ctypes.Structure):
         ("identity", ctypes.c_uint16),
         ("settling_us", ctypes.c_uint32),
         ("settling", ctypes.c_uint8),
+        ("holds_line", ctypes.c_bool),
+        ("latched_within_us", ctypes.c_uint8),
         ("reset", ctypes.CFUNCTYPE(None, ctypes.c_uint)),
+        ("keep_to_spi", ctypes.CFUNCTYPE(None, ctypes.c_uint)),
         ("identify", ctypes.CFUNCTYPE(ctypes.c_uint16, ctypes.c_uint)),
         ("configure", ctypes.CFUNCTYPE(ctypes.c_int, ctypes.c_uint, ctypes.c_void_p, ctypes.c_void_p)),
         ("read", ctypes.CFUNCTYPE(ctypes.c_int, ctypes.c_uint, ctypes.c_void_p)),

@@ -18,9 +18,11 @@ CALIBRATION: dict[str, Any] = {
     "serial_number": "LSM-0042",
     "written_unix_s": 1_790_000_000,
     "temperature_c": 23.5,
-    "scale": tuple(SCALE),
+    "matrix": np.diag(SCALE),
     "bias_rad_s": tuple(BIAS_RAD_S),
 }
+MATRIX = np.array([[1.1771, -0.0052, 0.0031], [-0.0053, 1.1554, 0.0047], [0.0032, 0.0048, 1.1440]])
+WHOLE = CALIBRATION | {"model": 2, "matrix": MATRIX}
 
 
 def test_a_calibration_is_read_back_as_written_with_the_part_it_belongs_to() -> None:
@@ -35,7 +37,7 @@ def test_a_calibration_is_read_back_as_written_with_the_part_it_belongs_to() -> 
     assert (values["reply_to"], values["sensor"], values["sequence"], values["who_am_i"]) == (9, 0, 1, 0x68)
     assert (text(values["part"]), text(values["serial_number"])) == ("LSM9DS1", "LSM-0042")
     assert (values["range_deg_s"], values["written_unix_s"], values["temperature_c"]) == (245, 1_790_000_000, 23.5)
-    assert values["scale"] == pytest.approx(SCALE, rel=1e-7)
+    assert np.array(values["matrix"]) == pytest.approx(np.diag(SCALE), rel=1e-7)
     assert values["bias_rad_s"] == pytest.approx(BIAS_RAD_S, rel=1e-7)
     (ack,) = board.ask("erase_calibration", sensor=0)
     assert ack.name == "ack"
@@ -60,12 +62,16 @@ NAN, INFINITY = float("nan"), float("inf")
     "wrong",
     [
         {"model": 0},
-        {"model": 2},
-        {"scale": (1.0, 0.0, 1.0)},
-        {"scale": (1.0, -1.0, 1.0)},
-        {"scale": (NAN, 1.0, 1.0)},
-        {"scale": (1.0, 1.0, INFINITY)},
-        {"scale": (1e30, 1.0, 1.0)},
+        {"model": 3},
+        {"matrix": np.diag((1.0, 0.0, 1.0))},
+        {"matrix": np.diag((1.0, -1.0, 1.0))},
+        {"matrix": np.diag((1.0, 1.0, INFINITY))},
+        {"matrix": np.diag((1e30, 1.0, 1.0))},
+        {"matrix": ((NAN, 0.0, 0.0), (0.0, 1.0, 0.0), (0.0, 0.0, 1.0))},
+        {"matrix": MATRIX},
+        {"model": 2, "matrix": ((1.0, 0.6, -0.5), (0.0, 1.0, 0.0), (0.0, 0.0, 1.0))},
+        {"model": 2, "matrix": ((1.0, 0.0, 0.0), (0.0, 1.0, 0.0), (NAN, 0.0, 1.0))},
+        {"model": 2, "matrix": -MATRIX},
         {"bias_rad_s": (0.0, NAN, 0.0)},
         {"bias_rad_s": (0.0, 0.0, -INFINITY)},
         {"bias_rad_s": (-1e30, 0.0, 0.0)},
@@ -139,9 +145,31 @@ def test_calibrated_rates_are_k_times_m_plus_b_to_the_microradian() -> None:
     assert rates(frames) == pytest.approx(SCALE * (counts * RAD_S + BIAS_RAD_S), abs=1.5e-6)
 
 
+@pytest.mark.parametrize("range_deg_s", [245, 500, 2000])
+def test_the_whole_matrix_corrects_within_the_bound_of_single_precision(range_deg_s: float) -> None:
+    board = HostBoard()
+    setup = configured(board, 0, 238, range_deg_s)
+    board.ask("write_calibration", sensor=0, **WHOLE)
+    board.ask("start", sensors=1)
+    settle(board)
+    counts = np.random.default_rng(5).integers(-32768, 32768, (2000, 3))
+    counts[:8] = np.array(np.meshgrid(*3 * [[-32768, 32767]])).reshape(3, -1).T
+    frames = []
+    for k, row in enumerate(counts.tolist()):
+        convert(board, (k + 1) * PERIOD_US, row)
+        frames += board.frames()
+    frames += board.ask("stop")
+    matrix, bias = (values.astype(np.float32).astype(float) for values in (MATRIX, BIAS_RAD_S))  # as kept
+    readings = counts * setup["sensitivity_rad_s"]
+    error_rad_s = np.abs(rates(frames) - (readings + bias) @ matrix.T)
+    bound_rad_s = 0.5e-6 + 8 * 2.0**-24 * (np.abs(readings) + np.abs(bias)) @ np.abs(matrix).T
+    assert np.all(error_rad_s <= bound_rad_s)
+    assert bound_rad_s.max() < (3.5e-6 if range_deg_s == 245 else 2.5e-5)
+
+
 def test_calibrated_rates_are_rounded_not_cut_off() -> None:
     urad_per_count = 1e6 * RAD_S  # 152.7
-    board = calibrated_board(CALIBRATION | {"scale": (1.0, 1.0, 1.0), "bias_rad_s": (0.0, 0.0, 0.0)})
+    board = calibrated_board(CALIBRATION | {"matrix": np.eye(3), "bias_rad_s": (0.0, 0.0, 0.0)})
     for count in range(1, 30):
         convert(board, count * PERIOD_US, (count, -count, 0))
     exact = np.arange(1, 30) * urad_per_count
@@ -165,7 +193,7 @@ def test_one_sensor_streams_calibrated_beside_another_that_streams_raw() -> None
 
 
 def test_rates_that_do_not_fit_are_the_largest_that_do() -> None:
-    board = calibrated_board(CALIBRATION | {"scale": (1e5, 1e5, 1.0), "bias_rad_s": (0.0, 0.0, 0.0)})
+    board = calibrated_board(CALIBRATION | {"matrix": np.diag((1e5, 1e5, 1.0)), "bias_rad_s": (0.0, 0.0, 0.0)})
     convert(board, PERIOD_US, (32767, -32768, 0))
     assert rates(board.ask("stop")) == pytest.approx(np.array([[2147.483647, -2147.483647, 0.0]]), abs=1e-9)
 

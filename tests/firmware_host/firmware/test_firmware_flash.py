@@ -27,10 +27,13 @@ int main(void)
 """
 
 
-def run(body: str, folder: Path, torn: frozenset[int] = frozenset()) -> tuple[list[int], FlashMemory]:
+def run(
+    body: str, folder: Path, torn: frozenset[int] = frozenset(), *, flags_lost: bool = False
+) -> tuple[list[int], FlashMemory]:
     """What `body` put, and the flash after it."""
     image, elf = tiny_firmware.build(SOURCE % body, folder, INCLUDES)
     flash = FlashMemory(image, torn=torn)
+    flash.flags_lost = flags_lost
     board = tiny_firmware.power_up(flash, elf)
     board.advance(0.1)
     return list(board.transmitted()), flash
@@ -71,7 +74,18 @@ def test_a_torn_doubleword_is_told_each_time_and_hides_no_other(tmp_path: Path) 
     assert run(body, tmp_path, torn=frozenset({STORE_OFFSET}))[0] == [0, 0, 1, 1, 1]
 
 
+def test_a_torn_doubleword_is_told_also_where_the_chip_has_lost_the_flag_of_it(tmp_path: Path) -> None:
+    body = """
+        put(port_flash_read(0, 0, bytes, 8));
+        put(port_flash_read(0, 8, bytes, 8));
+        put(port_flash_erase(0));
+        put(port_flash_read(0, 0, bytes, 8));
+        """
+    assert run(body, tmp_path, torn=frozenset({STORE_OFFSET}), flags_lost=True)[0] == [0, 1, 1, 1]
+
+
 def test_torn_flash_that_something_else_reads_is_not_taken_for_the_stores(tmp_path: Path) -> None:
-    body = f"FLASH_ACR &= ~FLASH_ACR_DCEN; (void)REG({STORE:#x}); FLASH_ECCR = FLASH_ECCR_ECCD;"
+    read_before = "port_flash_read(1, 0, bytes, 8);"  # and is over
+    body = f"{read_before} FLASH_ACR &= ~FLASH_ACR_DCEN; (void)REG({STORE:#x}); FLASH_ECCR = FLASH_ECCR_ECCD;"
     sent, _flash = run(body, tmp_path, torn=frozenset({STORE_OFFSET}))
     assert set(sent) == {ord("?")}

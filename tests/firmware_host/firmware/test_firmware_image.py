@@ -65,6 +65,14 @@ def test_the_elf_is_the_image_with_names_and_little_ram() -> None:
     assert {"reset_handler", "main", "board_run", "exti9_5_handler", "fault_handler"} <= names
 
 
+def test_a_barrier_stands_behind_every_sleep() -> None:
+    """An erratum: waking, the first instruction may be fetched wrong while a debugger keeps the clocks on."""
+    image = (IMAGE / "rig_l432.bin").read_bytes()
+    halfwords = [int.from_bytes(image[at : at + 2], "little") for at in range(0, len(image) - 1, 2)]
+    behind = [halfwords[at + 1 : at + 3] for at, halfword in enumerate(halfwords) if halfword == 0xBF30]  # WFI
+    assert behind == [[0xF3BF, 0x8F6F]]  # ISB
+
+
 # The register header
 
 

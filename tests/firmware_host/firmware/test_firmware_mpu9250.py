@@ -63,7 +63,7 @@ def test_what_the_mpu9250_was_told_before_is_overruled(board: HostBoard) -> None
 def test_a_sleeping_mpu9250_is_woken_first_and_given_time(board: HostBoard) -> None:
     board.mpu9250.values[0x6B] = 0x40
     configured(board, 1)
-    assert board.mpu9250.writes[0] == (0x6B, 0x01)
+    assert board.mpu9250.writes[:2] == [(0x6A, 0x10), (0x6B, 0x01)]
     assert board.core.port_time_us() >= 10_000
 
 

@@ -92,8 +92,23 @@ def test_asking_who_is_there_changes_nothing(board: HostBoard, sensor: int) -> N
         board.data_ready(100_000 + 5000 * k, sensor)
         board.wait_until(100_000 + 5000 * k)
         board.ask("hello", 3)  # which the main loop answers before it reads the sensor
-    assert part.writes == []
+    assert set(part.writes) <= {(0x23, 0x04), (0x6A, 0x10)}, "but for what keeps the part off I2C"
     assert board.ask("status", 4)[-1].values["bus_errors"] == 0
+
+
+def test_every_part_is_kept_off_i2c_from_the_start_and_also_one_that_is_never_configured() -> None:
+    """On a shared bus what is said to another part may spell its I2C address."""
+    board = HostBoard()
+    board.ask("hello")
+    assert board.gyro.values[0x23] == 0x04 and board.mpu9250.values[0x6A] == 0x10
+    assert board.magnetometer.told == [bytes((0x22, 0x83))], "I2C off, and powered down"
+    board.magnetometer.told.clear()
+    board.gyro.values[0x0F], board.mpu9250.values[0x75] = 0x69, 0x70
+    board.gyro.writes.clear()
+    board.mpu9250.writes.clear()
+    board.ask("hello", 2)
+    assert not board.gyro.writes and not board.mpu9250.writes, "another part is left alone"
+    assert not board.magnetometer.told
 
 
 # LSM9DS1

@@ -10,9 +10,10 @@ import pytest
 from support.host_board import core
 from support.host_flash import PAGE_BYTES, PAGES, HostFlash
 
-SEAL = 0x314C4143
-RECORD_BYTES = 85
-WRITE_OPERATIONS = 13  # one erase, twelve doublewords
+SEAL, OLD_SEAL = 0x324C4143, 0x314C4143  # the old one is that of firmware 0.2.1
+RECORD_BYTES = 109
+WRITE_OPERATIONS = 16  # one erase, fifteen doublewords
+HEAD_BYTES = 61  # of a record, before its matrix; old ones have three scale factors there
 
 
 class Store:
@@ -51,6 +52,23 @@ def slot(sequence: int, content: bytes) -> bytes:
     """How a whole record lies in flash."""
     body = content[:2] + struct.pack("<I", sequence) + content[6:] + bytes(3)
     return body + struct.pack("<II", SEAL, crc32(body))
+
+
+def old_slot(sequence: int, content: bytes) -> bytes:
+    """The same as firmware 0.2.1 wrote it; `content` is 85 bytes."""
+    body = content[:2] + struct.pack("<I", sequence) + content[6:] + bytes(3)
+    return body + struct.pack("<II", OLD_SEAL, crc32(body))
+
+
+def old_record(rng: random.Random) -> bytes:
+    """Any content of an old one."""
+    return record(rng)[:HEAD_BYTES] + struct.pack("<6f", 1.1, 1.2, 1.3, 0.1, -0.2, 0.3)
+
+
+def as_diagonal(content: bytes) -> bytes:
+    """An old record as it is read today."""
+    head, (kx, ky, kz, *bias) = content[:HEAD_BYTES], struct.unpack("<6f", content[HEAD_BYTES:])
+    return head + struct.pack("<12f", kx, 0, 0, 0, ky, 0, 0, 0, kz, *bias)
 
 
 @pytest.fixture
@@ -93,7 +111,7 @@ def test_a_write_is_one_erase_of_the_other_slot_then_each_doubleword_once_the_se
         assert len(flash.operations) == WRITE_OPERATIONS
         erase, *programs = flash.operations
         assert (erase.page, erase.value) == (page, None)
-        assert [(p.page, p.offset) for p in programs] == [(page, 8 * i) for i in range(12)]
+        assert [(p.page, p.offset) for p in programs] == [(page, 8 * i) for i in range(15)]
         seal = programs[-1].value
         assert seal is not None and seal & 0xFFFFFFFF == SEAL
 
@@ -180,7 +198,7 @@ def test_a_bit_that_flips_in_a_stored_record_brings_the_one_before_back(flash: H
     old, new = record(rng), record(rng)
     assert Store().write(old) and Store().write(new)
     whole = flash.contents(1)
-    for bit in range(8 * 96):
+    for bit in range(8 * 120):
         damaged = int.from_bytes(whole, "little") ^ 1 << bit
         flash.put(1, damaged.to_bytes(PAGE_BYTES, "little"))
         assert Store().read() == old
@@ -205,3 +223,57 @@ def test_no_page_is_touched_but_the_sensors_own(flash: HostFlash) -> None:
         flash.put(page, mark)
     assert Store(1).write(record(random.Random(8))) and Store(1).erase()
     assert [flash.contents(page) for page in (0, 1, 4, 5)] == [marks[page] for page in (0, 1, 4, 5)]
+
+
+# Records of firmware 0.2.1
+
+
+def test_an_old_record_is_read_as_a_diagonal_also_where_the_rest_of_its_page_is_torn(flash: HostFlash) -> None:
+    old = old_record(random.Random(9))
+    flash.put(0, old_slot(7, old))
+    assert Store().read_numbered() == (7, as_diagonal(old))
+    flash.tear(0, 96)
+    assert Store().read_numbered() == (7, as_diagonal(old))
+    flash.tear(0, 88)
+    assert Store().read() is None
+
+
+def test_the_newer_of_an_old_record_and_a_new_one_counts(flash: HostFlash) -> None:
+    rng = random.Random(10)
+    old, new = old_record(rng), record(rng)
+    flash.put(0, old_slot(7, old))
+    flash.put(1, slot(8, new))
+    assert Store().read() == new
+    flash.put(1, slot(6, new))
+    assert Store().read() == as_diagonal(old)
+
+
+def test_a_write_forgets_the_old_record_once_the_new_one_is_whole_so_that_no_older_image_corrects_by_it(
+    flash: HostFlash,
+) -> None:
+    rng = random.Random(11)
+    old, new = old_record(rng), record(rng)
+    flash.put(0, old_slot(7, old))
+    assert Store().write(new)
+    assert flash.contents(0) == b"\xff" * PAGE_BYTES
+    assert Store().read_numbered() == (8, new)
+    assert Store().write(record(rng)) and Store().read_numbered() != (8, new)
+    assert flash.contents(1)[: len(slot(8, new))] == slot(8, new), "a new record stays beside the newest"
+
+
+def test_a_cut_while_the_first_record_of_today_is_written_leaves_the_old_one_or_the_new(flash: HostFlash) -> None:
+    news = 0
+    for lasts in range(WRITE_OPERATIONS + 1):
+        for seed in range(40):
+            rng = random.Random(1000 * lasts + seed)
+            flash = HostFlash()
+            old, new = old_record(rng), record(rng)
+            flash.put(0, old_slot(7, old))
+            flash.power_up(lasts, rng)
+            Store().write(new)
+            assert flash.failed
+            flash.power_up()
+            found = Store().read()
+            assert found == new if lasts == WRITE_OPERATIONS else found in (as_diagonal(old), new)
+            news += found == new
+    assert news >= 40

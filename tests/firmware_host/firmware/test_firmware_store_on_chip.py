@@ -14,17 +14,17 @@ from support.emulated_session import Session, shipped_flash
 pytestmark = pytest.mark.slow
 
 IMAGE_BYTES = STORE_OFFSET
-WRITE_OPERATIONS = 13  # one erase, twelve doublewords
+WRITE_OPERATIONS = 16  # one erase, fifteen doublewords
 ERASE_OPERATIONS = 2
 
 
 def calibration(number: int) -> dict[str, Any]:
     return {
-        "model": 1,
+        "model": 2,
         "serial_number": f"LSM-{number:04}",
         "written_unix_s": 1_790_000_000 + number,
         "temperature_c": 20.0 + number,
-        "scale": (1.0 + 0.125 * number, 1.25, 0.75),
+        "matrix": ((1.0 + 0.125 * number, 0.125, -0.0625), (0.25, 1.25, 0.0), (0.0, 0.5, 0.75)),
         "bias_rad_s": (0.5, -0.25, 0.0625 * number),
     }
 
@@ -47,8 +47,8 @@ def stored(session: Session) -> int | None:
         assert ERRORS[answer.values["code"]].name == "no_calibration"
         return None
     number: int = round(answer.values["temperature_c"] - 20)
-    assert {key: answer.values[key] for key in ("scale", "bias_rad_s")} == {
-        key: calibration(number)[key] for key in ("scale", "bias_rad_s")
+    assert {key: answer.values[key] for key in ("matrix", "bias_rad_s")} == {
+        key: calibration(number)[key] for key in ("matrix", "bias_rad_s")
     }
     return number
 

@@ -95,6 +95,29 @@ def test_a_new_start_counts_from_zero_and_lowers_a_data_ready_line_left_high() -
     assert (batch.values["sequence"], batch.values["dropped"], batch.values["count"]) == (0, 0, 1)
 
 
+def test_a_line_that_rose_again_before_it_was_seen_to_fall_does_not_stop_the_stream() -> None:
+    """No edge comes of that, and none would any more: the part is read until its line is down; one is lost."""
+    board = streaming_board()
+    for k in (1, 2):
+        convert(board, k * PERIOD_US)
+    board.gyro.again_after_reading = 1
+    convert(board, 3 * PERIOD_US)
+    assert not board.gyro.fresh
+    for k in (5, 6):
+        convert(board, k * PERIOD_US)
+    frames = board.ask("stop", 2)
+    assert sample_sequences(frames) == [0, 1, 2, 4, 5]
+    assert frames[-2].values["dropped"] == 1
+
+
+def test_a_line_that_is_stuck_up_does_not_hold_the_board() -> None:
+    board = streaming_board()
+    board.gyro.again_after_reading = 10**6
+    convert(board, PERIOD_US)
+    assert board.gyro.fresh
+    assert board.ask("status", 2)[-1].name == "report"
+
+
 def test_conversions_that_passed_while_the_line_was_high_are_counted_as_lost() -> None:
     board = streaming_board()
     for k in (1, 2, 3, 7, 8):  # three without an edge, as when the main loop is late
