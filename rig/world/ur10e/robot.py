@@ -8,6 +8,7 @@ from typing import Protocol
 from rig.world.clock import TICK_S, TICKS_PER_SECOND
 from rig.world.ur10e.controller_messages import MessageKind, Messages, ProgramError
 from rig.world.ur10e.joint_motion import Motion
+from rig.world.ur10e.links import NOMINAL, Links
 from rig.world.ur10e.modes import SAFETY_BITS, RobotMode, RuntimeState, SafetyMode
 
 JOINT_LIMIT_RAD = 6.2831853072 + 1e-6  # every joint ±360°
@@ -50,8 +51,11 @@ class Identity:
 class Robot:
     """The controller. Everything that changes it is a method here; `step` makes it 2 ms older."""
 
-    def __init__(self, identity: Identity, motion: Motion, remote_control: bool, speed_slider: float) -> None:
+    def __init__(
+        self, identity: Identity, motion: Motion, remote_control: bool, speed_slider: float, links: Links = NOMINAL
+    ) -> None:
         self.identity = identity
+        self.links = links  # as it knows them
         self.motion = motion
         self.remote_control = remote_control
         self.tick = 0

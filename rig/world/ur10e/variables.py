@@ -33,11 +33,11 @@ def _tcp_speed(robot: Robot) -> tuple[float, ...]:
     if not any(qd):
         return (0.0,) * 6
     step = 1e-4
-    before = forward_kinematics.flange_pose([a - v * step for a, v in zip(q, qd, strict=True)])
-    after = forward_kinematics.flange_pose([a + v * step for a, v in zip(q, qd, strict=True)])
+    before = forward_kinematics.flange_pose([a - v * step for a, v in zip(q, qd, strict=True)], robot.links)
+    after = forward_kinematics.flange_pose([a + v * step for a, v in zip(q, qd, strict=True)], robot.links)
     linear = [(b - a) / (2.0 * step) for a, b in zip(before[:3], after[:3], strict=True)]
-    rate = forward_kinematics.flange_rate(q, qd)
-    rotation = forward_kinematics.rotation_from_vector(forward_kinematics.flange_pose(q)[3:])
+    rate = forward_kinematics.flange_rate(q, qd, robot.links)
+    rotation = forward_kinematics.rotation_from_vector(forward_kinematics.flange_pose(q, robot.links)[3:])
     return (*linear, *(sum(r * w for r, w in zip(row, rate, strict=True)) for row in rotation))
 
 
@@ -46,11 +46,11 @@ def joint_modes(robot: Robot) -> tuple[int, ...]:
 
 
 def _pose(robot: Robot) -> tuple[float, ...]:
-    return forward_kinematics.flange_pose(robot.motion.actual_q_rad)
+    return forward_kinematics.flange_pose(robot.motion.actual_q_rad, robot.links)
 
 
 def _target_pose(robot: Robot) -> tuple[float, ...]:
-    return forward_kinematics.flange_pose(robot.motion.now.target_q_rad)
+    return forward_kinematics.flange_pose(robot.motion.now.target_q_rad, robot.links)
 
 
 ZERO3, ZERO6 = (0.0,) * 3, (0.0,) * 6
