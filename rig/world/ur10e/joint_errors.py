@@ -14,6 +14,7 @@ from rig.world.ur10e.trajectory import Joints
 
 WRISTS = (3, 4, 5)
 REVERSAL_RAD = 0.01  # way in which hysteresis comes about: inside the ramps
+STANDING_RAD_S = 1e-6  # a joint that need not move may be asked to by rounding
 FORGOTTEN = 12.0  # settling times after which nothing is left of it
 
 
@@ -67,7 +68,8 @@ class JointErrors:
     def step(self, time_s: float, q_rad: Joints, qd_rad_s: Joints) -> None:
         """The joints at the end of a tick, as the encoders see them."""
         for joint, (angle, speed) in enumerate(zip(q_rad, qd_rad_s, strict=True)):
-            if speed:
+            moving = abs(speed) > STANDING_RAD_S
+            if moving:
                 direction = 1.0 if speed > 0.0 else -1.0
                 if direction != self._direction[joint]:
                     self._reversal[joint] = (angle, self._hysteresis(joint, angle)[0])
@@ -75,7 +77,7 @@ class JointErrors:
                     self._known[joint] = False
             elif self._moving[joint]:
                 self._stops[joint] = (time_s, self._direction[joint])
-            self._moving[joint] = bool(speed)
+            self._moving[joint] = moving
 
     def quiet(self, time_s: float) -> bool:
         """Whether joints that stand stand still."""
