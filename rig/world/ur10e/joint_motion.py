@@ -107,6 +107,11 @@ class Motion:
         return self.now.qd_rad_s
 
     @property
+    def qdd_rad_s2(self) -> Joints:
+        """Accelerations at the end of the last tick."""
+        return ZERO if self.still else self.with_accelerations(self._ticks[-1].start_s + TICK_S)[2]
+
+    @property
     def moving(self) -> bool:
         return any(self.now.target_qd_rad_s)
 

@@ -98,7 +98,7 @@ def _robot_mode(robot: Robot) -> bytes:
         robot.robot_mode,
         0,  # control mode: position
         robot.speed_slider,
-        robot.motion.fraction,
+        robot.speed_scaling,
         1.0,
         0,
     )
