@@ -7,13 +7,13 @@ import numpy as np
 import pytest
 from scipy.spatial.transform import Rotation
 
-from rig.config.load import load
 from rig.world.clock import TICK_S
 from rig.world.laboratory import Laboratory
 from rig.world.section import world_section
 from rig.world.ur10e.primary import PrimarySession
 from rig.world.ur10e.rtde import Output, RtdeSession, package
 from rig.world.ur10e.variables import OUTPUTS, TYPES
+from support.ideal import ideal
 from support.paths import DEMO
 
 HOME = (0.0, -math.pi / 2, math.pi / 2, -math.pi / 2, -math.pi / 2, 0.0)
@@ -65,7 +65,7 @@ GUIDE = {
 
 
 def laboratory(*overrides: str) -> Laboratory:
-    loaded = load(DEMO, overrides)
+    loaded = ideal(DEMO, overrides)
     new = Laboratory(loaded.config, world_section(loaded))
     new.unplug()
     return new

@@ -7,7 +7,6 @@ from collections.abc import Mapping, Sequence
 
 import numpy as np
 import pytest
-import yaml
 from scipy.spatial.transform import Rotation
 
 from firmware_host.frames import FrameReader
@@ -20,6 +19,7 @@ from rig.world.section import world_section
 from rig.world.ur10e.flange_motion import Felt
 from rig.world.ur10e.primary import PrimarySession
 from rig.world.ur10e.rtde import Output
+from support.ideal import ideal_document
 from support.laboratory_host import Host, host
 from support.paths import DEMO
 
@@ -349,7 +349,7 @@ def test_states_are_not_of_the_instant_they_are_stamped_with() -> None:
 # -- nothing -------------------------------------------------------------------------------------------------------
 def test_left_out_or_written_as_its_default_an_imperfection_is_none() -> None:
     """To the byte, at both ends of the wire."""
-    demo = yaml.safe_load(DEMO.read_text(encoding="utf-8"))["world"]
+    demo = ideal_document(DEMO)["world"]
     written = WorldSection.model_validate(demo).model_dump(mode="json", exclude_none=True)
     said = []
     for section in (demo, written):

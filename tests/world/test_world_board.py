@@ -16,7 +16,7 @@ from firmware_host.emulator.flash_memory import DOUBLEWORD_BYTES, PAGE_BYTES, ST
 from firmware_host.errors import BoardError
 from firmware_host.frames import FrameReader, encode
 from rig.arm.kinematics import flange_rate
-from rig.config.load import Loaded, load
+from rig.config.load import Loaded
 from rig.config.models import mounting_matrix
 from rig.errors import Refused
 from rig.world.board.flash_file import flash_of
@@ -24,6 +24,7 @@ from rig.world.board.mounting import firmware
 from rig.world.board.serial_line import misread
 from rig.world.clock import TICKS_PER_SECOND
 from rig.world.section import world_section
+from support.ideal import ideal
 from support.laboratory_host import Host, booted, host
 from support.paths import DEMO
 from support.worlds import World
@@ -36,12 +37,12 @@ STILL = "world.arm.vibration_fraction=0"
 
 
 def demo(*overrides: str) -> Loaded:
-    return load(DEMO, overrides)
+    return ideal(DEMO, overrides)
 
 
 def pair(*overrides: str) -> Loaded:
     """A gyroscope to calibrate and a reference, on one bus."""
-    return load(PAIR, overrides)
+    return ideal(PAIR, overrides)
 
 
 def digest_of_a_run(loaded: Loaded) -> tuple[str, tuple[float, ...]]:
