@@ -40,7 +40,7 @@ class Laboratory:
             if arm.state_jitter_s
             else None,
         )
-        self._arm = TrueArm(arm, site_of(world.site), motion, random)
+        self.arm = TrueArm(arm, site_of(world.site), motion, random)
         major, minor, bugfix, build = (int(part) for part in arm.polyscope.split("."))
         self.robot = Robot(
             Identity(arm.serial_number, (major, minor, bugfix, build)),
@@ -58,7 +58,7 @@ class Laboratory:
     def plug_in(self) -> None:
         """Give the board power, if it has none."""
         if self.board is None:
-            time_s = self._arm.true_s(self.robot.time_s)
+            time_s = self.arm.true_s(self.robot.time_s)
             self._sensors = mount_sensors(self._config, self._world, self._motion_of, time_s)
             for name, fault in self._faults.items():
                 self._sensors[name].fault = fault
@@ -80,18 +80,18 @@ class Laboratory:
     def step(self) -> None:
         """One tick of everything. Raises BoardError when the firmware broke a rule of the chip."""
         self.robot.step()
-        self._arm.step(self.robot.time_s)
+        self.arm.step(self.robot.time_s)
         if self.board is not None:
             # After the arm, so that the sensors can ask for any instant of the tick.
-            self.board.advance(self._arm.true_s(self.robot.time_s))
+            self.board.advance(self.arm.true_s(self.robot.time_s))
 
     @property
     def tick_s(self) -> float:
         """How long a tick lasts, which is 2 ms by the controller's clock."""
-        return self._arm.tick_s
+        return self.arm.tick_s
 
     def _motion_of(self, sensor: SensorTruth) -> MotionAt:
         """What a sensor on the flange feels at a virtual time inside the last tick."""
-        if self._arm.ideal and not sensor.gyro.g_sensitivity_rad_s_per_g:
-            return lambda time_s: sensor.rate(self._arm.rate_at(time_s))
-        return lambda time_s: sensor.motion(self._arm.felt_at(time_s))
+        if self.arm.ideal and not sensor.gyro.g_sensitivity_rad_s_per_g:
+            return lambda time_s: sensor.rate(self.arm.rate_at(time_s))
+        return lambda time_s: sensor.motion(self.arm.felt_at(time_s))

@@ -120,6 +120,9 @@ def test_without_a_latitude_it_feels_nothing() -> None:
 
 
 # -- the sensor ----------------------------------------------------------------------------------------------------
+SIMULATED = SimulatedSensorSection.model_validate(
+    {"scale": [1, 1, 1], "bias_rad_s": [0, 0, 0], "g_sensitivity_rad_s_per_g": [[0.01, 0, 0]] * 3}
+)
 PER_G = [[0.05, 0.01, 0.0], [0.0, 0.06, 0.0], [0.02, 0.0, 0.07]]
 
 
@@ -134,6 +137,16 @@ def test_gravity_shows_in_the_readings_of_a_g_sensitive_gyroscope() -> None:
         up = Rotation.from_euler("x", -4, degrees=True).apply([0, 0, 9.81 / G])
         x, y, z = chain(pose)[:3, :3].T @ up
         assert rates(one, 100)[-1] == pytest.approx(np.array(PER_G) @ [y, -x, z], abs=COUNT)
+
+
+def test_gravity_is_that_of_where_the_arm_stands_when_nobody_looked_on_the_way() -> None:
+    one = laboratory({"g_sensitivity_rad_s_per_g": PER_G})
+    assert rates(one, 100)[-1] == pytest.approx(np.array(PER_G) @ chain(HOME)[:3, :3].T @ [0, 0, 1], abs=COUNT)
+    one.laboratory.unplug()
+    stand(one, TILTED)
+    sensor = SensorTruth(SensorSection.model_validate({"part": "lsm9ds1", "serial_number": "A"}), SIMULATED)
+    felt = one.laboratory.arm.felt_at(one.laboratory.robot.time_s)
+    assert sensor.motion(felt)[3:] == pytest.approx(chain(TILTED)[:3, :3].T @ [0, 0, 1], abs=1e-9)
 
 
 def test_a_sensor_off_the_axis_feels_the_turn_push_it_inwards() -> None:

@@ -53,8 +53,10 @@ class TrueArm:
 
     def step(self, controller_s: float) -> None:
         """A tick of the controller has ended."""
-        if self._errors is not None and not self._motion.still:
-            self._errors.step(controller_s, self._motion.q_rad, self._motion.qd_rad_s)
+        if not self._motion.still:
+            self._at_rest = None
+            if self._errors is not None:
+                self._errors.step(controller_s, self._motion.q_rad, self._motion.qd_rad_s)
 
     def rate_at(self, time_s: float) -> Vector:
         """Angular rate of an ideal arm's flange in its own frame, rad/s, at a time inside the last tick."""
