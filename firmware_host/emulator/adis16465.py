@@ -10,7 +10,7 @@ from collections.abc import Callable, Sequence
 import numpy as np
 
 from firmware_host.emulator.bus import Violation
-from firmware_host.emulator.gyroscope import Gyroscope, GyroTruth, saturated
+from firmware_host.emulator.gyroscope import Gyroscope, GyroTruth, Temperature, saturated
 from firmware_host.emulator.part_registers import PartRegisters
 from firmware_host.emulator.spi_device import Fault
 
@@ -48,10 +48,9 @@ _BURST_WORDS = 10
 class Adis16465:
     """The module on the SPI bus, in the variant of the range `range_deg_s`: 125 (-1), 500 (-2) or 2000 (-3).
 
-    `rate_at(time_s)`: true angular rate in the part's own axes, 3 floats, rad/s; asked once for each update of the
-    output registers, at the instant of the update. `temperature_c`: of the module. `seed`: of the noise, which is
-    drawn per update. `oscillator_ppm`: how fast its sample clock runs. `ready_s`: when it has started up (the maker's
-    driver allows 310 ms from power-up); before, it is silent.
+    `motion_at`, `truth`, `seed`, `temperature_c`: see `Gyroscope`; the motion is asked for once for each update of the
+    output registers, at its instant, and noise is drawn per update. `oscillator_ppm`: how fast its sample clock runs.
+    `ready_s`: when it has started up (the maker's driver allows 310 ms from power-up); before, it is silent.
 
     The part samples from power-up on and cannot be told to be quiet. With averaging (DEC_RATE, FILT_CTRL) its rates
     have 32 bits, and the upper 16 alone, which a burst carries, are rounded down. Averages and filters themselves are
@@ -65,10 +64,10 @@ class Adis16465:
 
     def __init__(
         self,
-        rate_at: Callable[[float], Sequence[float]],
+        motion_at: Callable[[float], Sequence[float]],
         truth: GyroTruth,
         *,
-        temperature_c: float,
+        temperature_c: float | Temperature,
         seed: int | np.random.SeedSequence,
         oscillator_ppm: float = 0.0,
         chip_select: str = "PA4",
@@ -81,10 +80,10 @@ class Adis16465:
         self.fault: Fault | None = None
         self._range_model, counts_per_deg_s = _RANGES[range_deg_s]
         self._per_count = math.radians(1 / counts_per_deg_s) / 65536  # of the 32-bit number
-        self._gyroscope = Gyroscope(rate_at, truth, seed)
+        self._gyroscope = Gyroscope(motion_at, truth, seed, temperature_c)
         self._speed = 1 + oscillator_ppm * 1e-6
         self._registers = PartRegisters(self.name, "adis16465.py", _RESET_AND_BITS, digits=4)
-        self._temperature = saturated(round(temperature_c * 10)) & 0xFFFF
+        self._show_temperature(ready_s)
         self._command: int | None = None  # first byte of the frame under way
         self._burst: bytes | None = None  # what is left to be clocked out
         self._answer = 0  # to the frame before
@@ -265,6 +264,7 @@ class Adis16465:
 
     def _update(self, time_s: float) -> None:
         """New output registers; the data-ready line tells of them and rests shortly before the next."""
+        self._show_temperature(time_s)
         rates = self._gyroscope.read(time_s)
         self._counts = [
             saturated(round(rate / self._per_count) + self._user_bias(axis), bits=32) for axis, rate in enumerate(rates)
@@ -279,6 +279,9 @@ class Adis16465:
         """In the 32-bit rate's counts (Linux, adis16475.c: calibbias)."""
         low, high = (self._registers.values[_XG_BIAS_LOW + 4 * axis + half] for half in (0, 2))
         return (high << 16 | low) - (1 << 32 if high >> 15 else 0)
+
+    def _show_temperature(self, time_s: float) -> None:
+        self._temperature = saturated(round(self._gyroscope.temperature_c(time_s) * 10)) & 0xFFFF
 
     def _rate(self, axis: int) -> int:
         """As the 32-bit register pair shows it: without averaging, the lower 16 bits are empty."""

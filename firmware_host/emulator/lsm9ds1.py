@@ -6,7 +6,7 @@ from collections.abc import Callable, Sequence
 import numpy as np
 
 from firmware_host.emulator.bus import Violation
-from firmware_host.emulator.gyroscope import Gyroscope, GyroTruth, saturated
+from firmware_host.emulator.gyroscope import Gyroscope, GyroTruth, Temperature, saturated
 from firmware_host.emulator.part_registers import Conversions, PartRegisters
 from firmware_host.emulator.spi_device import Fault
 
@@ -45,10 +45,9 @@ _BDU, _IF_ADD_INC, _SW_RESET = 0x40, 0x04, 0x01
 class Lsm9ds1:
     """The accelerometer-gyroscope die on the SPI bus; the accelerometer, which runs along, is left out.
 
-    `rate_at(time_s)`: true angular rate in the part's own axes, 3 floats, rad/s; asked once for each conversion, at
-    the instant of the conversion. `temperature_c`: die temperature. `seed`: of the noise, which is drawn per
-    conversion, so that readings do not depend on when they are read. `oscillator_ppm`: how fast the part's own
-    oscillator makes its data rate.
+    `motion_at`, `truth`, `seed`, `temperature_c`: see `Gyroscope`; the motion is asked for once for each conversion, at
+    its instant, and noise is drawn per conversion, so that readings do not depend on when they are read.
+    `oscillator_ppm`: how fast the part's own oscillator makes its data rate.
 
     The data-ready line stays high until the high byte of the z rate is read: a conversion that nobody read is
     replaced by the next without a new edge. The datasheet says how many conversions after a start to discard, not how
@@ -61,10 +60,10 @@ class Lsm9ds1:
 
     def __init__(
         self,
-        rate_at: Callable[[float], Sequence[float]],
+        motion_at: Callable[[float], Sequence[float]],
         truth: GyroTruth,
         *,
-        temperature_c: float,
+        temperature_c: float | Temperature,
         seed: int | np.random.SeedSequence,
         oscillator_ppm: float = 0.0,
         chip_select: str = "PA11",
@@ -73,10 +72,9 @@ class Lsm9ds1:
         self.chip_select = chip_select
         self.interrupt = interrupt
         self.fault: Fault | None = None
-        self._gyroscope = Gyroscope(rate_at, truth, seed)
+        self._gyroscope = Gyroscope(motion_at, truth, seed, temperature_c)
         self._registers = PartRegisters(self.name, "lsm9ds1.py", _RESET_AND_BITS)
         self._conversions = Conversions(oscillator_ppm)
-        self._temperature_raw = saturated(round((temperature_c - 25) * 16), bits=12)
         self._address: int | None = None  # None: the next byte is the address
         self._reading = False
         self._reset()
@@ -193,5 +191,6 @@ class Lsm9ds1:
             if not self._held[axis_index]:
                 low = 2 * axis_index
                 self._output[low : low + 2] = data[low : low + 2]
-        self._temperature = self._temperature_raw.to_bytes(2, "little", signed=True)
+        temperature = saturated(round((self._gyroscope.temperature_c(time_s) - 25) * 16), bits=12)
+        self._temperature = temperature.to_bytes(2, "little", signed=True)
         self._status |= _GDA | _TDA

@@ -8,7 +8,7 @@ from collections.abc import Callable, Sequence
 import numpy as np
 
 from firmware_host.emulator.bus import Violation
-from firmware_host.emulator.gyroscope import Gyroscope, GyroTruth, saturated
+from firmware_host.emulator.gyroscope import Gyroscope, GyroTruth, Temperature, saturated
 from firmware_host.emulator.part_registers import Conversions, PartRegisters
 from firmware_host.emulator.spi_device import Fault
 
@@ -52,14 +52,13 @@ _START_S = 0.035  # specification, table 1: the gyroscope after it left sleep
 class Mpu9250:
     """The die with accelerometer and gyroscope on the SPI bus.
 
-    `rate_at(time_s)`: true angular rate in the part's own axes, 3 floats, rad/s; asked once for each conversion, at
-    the instant of the conversion. `temperature_c`: die temperature. `seed`: of the noise, which is drawn per
-    conversion. `oscillator_ppm`: how fast the part's own oscillator makes its data rate; the specification allows a
-    percent.
+    `motion_at`, `truth`, `seed`, `temperature_c`: see `Gyroscope`; the motion is asked for once for each conversion, at
+    its instant, and noise is drawn per conversion. `oscillator_ppm`: how fast the part's own oscillator makes its data
+    rate; the specification allows a percent.
 
     The part runs from power-up, but here it converts only while its data-ready interrupt is enabled; reading data
-    without it fails the run. Filters have neither effect nor delay, except that the turn rate comes in linearly while
-    the gyroscope starts. There is no gravity in the laboratory: the accelerometer shows the part at rest with z up.
+    without it fails the run. Its filter settings have neither effect nor delay (a filter is part of the truth), except
+    that the motion comes in linearly while the gyroscope starts. The accelerometer shows the part at rest with z up.
     """
 
     name = "MPU-9250"
@@ -67,10 +66,10 @@ class Mpu9250:
 
     def __init__(
         self,
-        rate_at: Callable[[float], Sequence[float]],
+        motion_at: Callable[[float], Sequence[float]],
         truth: GyroTruth,
         *,
-        temperature_c: float,
+        temperature_c: float | Temperature,
         seed: int | np.random.SeedSequence,
         oscillator_ppm: float = 0.0,
         chip_select: str = "PB0",
@@ -79,11 +78,9 @@ class Mpu9250:
         self.chip_select = chip_select
         self.interrupt = interrupt
         self.fault: Fault | None = None
-        self._gyroscope = Gyroscope(rate_at, truth, seed)
+        self._gyroscope = Gyroscope(motion_at, truth, seed, temperature_c)
         self._registers = PartRegisters(self.name, "mpu9250.py", _RESET_AND_BITS)
         self._conversions = Conversions(oscillator_ppm)
-        temperature = saturated(round((temperature_c - _ROOM_C) * _COUNTS_PER_DEG_C))
-        self._temperature = temperature.to_bytes(2, "big", signed=True)
         self._address: int | None = None  # None: the next byte is the address
         self._reading = False
         self._pin = False
@@ -217,7 +214,8 @@ class Mpu9250:
             saturated(round(rate_rad_s / self._per_count)).to_bytes(2, "big", signed=True)
             for rate_rad_s in self._gyroscope.read(time_s, settled)
         )
-        self._latest = bytes(4) + upright.to_bytes(2, "big") + self._temperature + rates
+        temperature = saturated(round((self._gyroscope.temperature_c(time_s) - _ROOM_C) * _COUNTS_PER_DEG_C))
+        self._latest = bytes(4) + upright.to_bytes(2, "big") + temperature.to_bytes(2, "big", signed=True) + rates
         self._status = _RAW_RDY
         self._pin = True
         if not self._registers.values[_INT_PIN_CFG] & _LATCH_INT_EN:

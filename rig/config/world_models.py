@@ -1,13 +1,70 @@
 """The `world:` section: what the simulated laboratory simulates. Only the world uses the values given here."""
 
 from pathlib import Path
-from typing import Annotated
+from typing import Annotated, Any
 
 from pydantic import Field
 
 from rig.config.models import RATIO, Section, SensorName, Vector3
 
+Joint = Annotated[float, Field(ge=-0.1, le=0.1)]
+Joints = tuple[Joint, Joint, Joint, Joint, Joint, Joint]
+Length = Annotated[float, Field(ge=-50, le=50)]
+Lengths = tuple[Length, Length, Length, Length, Length, Length]
+NO_LENGTHS: Lengths = (0.0, 0.0, 0.0, 0.0, 0.0, 0.0)
+NO_ANGLES: Joints = (0.0, 0.0, 0.0, 0.0, 0.0, 0.0)
+Sensitivity = Annotated[float, Field(ge=-0.1, le=0.1)]
+SensitivityRow = tuple[Sensitivity, Sensitivity, Sensitivity]
+NO_ROW: SensitivityRow = (0.0, 0.0, 0.0)
+Tilt = Annotated[float, Field(ge=-10, le=10)]
+RATE_PER_K: dict[str, Any] = {"unit": "rad/s/K"}
+PER_RATE: dict[str, Any] = {"unit": "1/(rad/s)"}
 Cycles = Annotated[int, Field(ge=1, le=200)]
+
+
+class SiteSection(Section):
+    """Where the laboratory stands, and how the arm's base stands in it."""
+
+    latitude_deg: float | None = Field(
+        default=None, ge=-90, le=90, description="geographic latitude; without it the Earth does not turn"
+    )
+    heading_deg: float = Field(
+        default=0.0,
+        ge=-360,
+        le=360,
+        description="where the base's x axis points: from north, clockwise seen from above",
+    )
+    base_tilt_deg: tuple[Tilt, Tilt] = Field(
+        default=(0.0, 0.0), description="how the base is tilted: about its x axis, then about its y axis"
+    )
+    gravity_m_s2: float = Field(
+        default=9.80665, ge=0, le=20, description="acceleration of free fall", json_schema_extra={"unit": "m/s²"}
+    )
+
+
+class CalibrationSection(Section):
+    """How the arm differs from its drawing as its maker measured it: the controller reports it and reckons with it."""
+
+    delta_theta_rad: Joints = Field(default=NO_ANGLES, description="each joint's angle more than it says")
+    delta_a_mm: Lengths = Field(default=NO_LENGTHS, description="each link's length a more than the drawing's")
+    delta_d_mm: Lengths = Field(default=NO_LENGTHS, description="each link's offset d more than the drawing's")
+    delta_alpha_rad: Joints = Field(default=NO_ANGLES, description="each link's twist alpha more than the drawing's")
+
+
+class ResidueSection(Section):
+    """What is wrong with the arm beyond that, and its controller does not know."""
+
+    twist_rad: Joints = Field(default=NO_ANGLES, description="each link's twist alpha more than the controller thinks")
+    zero_rad: Joints = Field(default=NO_ANGLES, description="each joint's angle more than its encoder says")
+    encoder_once_rad: float = Field(
+        default=0.0, ge=0, le=0.01, description="amplitude of each encoder's error that comes once a turn"
+    )
+    encoder_twice_rad: float = Field(
+        default=0.0, ge=0, le=0.01, description="the same of that which comes twice a turn"
+    )
+    hysteresis_rad: float = Field(
+        default=0.0, ge=0, le=0.001, description="between a joint's angles when it comes from either side"
+    )
 
 
 class SimulatedArmSection(Section):
@@ -37,6 +94,29 @@ class SimulatedArmSection(Section):
         default=(18, 31, 50), max_length=100, description="how often each part of the ripple comes in one turn"
     )
     encoder_step_rad: float = Field(default=6.0e-6, ge=0, le=1, description="resolution of the joint angles it reports")
+    vibration_rms_rad_s: float = Field(
+        default=0.0,
+        ge=0,
+        le=1,
+        description="RMS of a vibration of each wrist that nothing is locked to and no encoder sees",
+    )
+    vibration_hz: float = Field(default=10.0, ge=0.1, le=200, description="its frequency")
+    settling_rad: float = Field(
+        default=0.0,
+        ge=0,
+        le=0.01,
+        description="amplitude with which a joint that stopped swings out, unseen by its encoder",
+    )
+    settling_hz: float = Field(default=10.0, ge=0.1, le=200, description="frequency of that swing")
+    settling_decay_s: float = Field(default=0.1, ge=0.001, le=10, description="time in which it falls to 1/e")
+    clock_ppm: float = Field(
+        default=0.0, ge=-1000, le=1000, description="how much too fast the controller's clock runs, and with it the arm"
+    )
+    state_jitter_s: float = Field(
+        default=0.0, ge=0, le=0.001, description="RMS of the time between a state's stamp and the look at the encoders"
+    )
+    calibration: CalibrationSection = CalibrationSection()
+    residue: ResidueSection = ResidueSection()
 
 
 class SimulatedBoardSection(Section):
@@ -74,7 +154,66 @@ class SimulatedSensorSection(Section):
     non_orthogonality_deg: Vector3 = Field(
         default=(0.0, 0.0, 0.0), description="by how much the angles between its axes x y, x z, y z are off 90°"
     )
-    temperature_c: float = Field(default=22.0, ge=-40, le=85, description="what its thermometer says")
+    temperature_c: float = Field(
+        default=22.0, ge=-40, le=85, description="what its thermometer says once warm; scale and bias are those of then"
+    )
+    start_temperature_c: float | None = Field(
+        default=None, ge=-40, le=85, description="the same when it gets power; without it, it is warm at once"
+    )
+    warm_up_s: float = Field(default=300.0, ge=1, le=100_000, description="time constant of its warming")
+    bias_rad_s_per_k: Vector3 = Field(
+        default=NO_ROW, description="by how much b of each axis grows with temperature", json_schema_extra=RATE_PER_K
+    )
+    scale_per_k: Vector3 = Field(
+        default=NO_ROW,
+        description="by which fraction the scale factor of each axis grows with temperature",
+        json_schema_extra={"unit": "1/K"},
+    )
+    bias_instability_rad_s: float = Field(
+        default=0.0, ge=0, le=0.1, description="flicker of the bias: the floor of its Allan deviation"
+    )
+    bias_instability_time_s: float = Field(
+        default=100.0, ge=10, le=10_000, description="averaging time around which that floor lies"
+    )
+    bias_random_walk_rad_s_per_sqrt_s: float = Field(
+        default=0.0,
+        ge=0,
+        le=0.1,
+        description="random walk of the bias: the standard deviation of what a second adds",
+        json_schema_extra={"unit": "rad/s/√s"},
+    )
+    g_sensitivity_rad_s_per_g: tuple[SensitivityRow, SensitivityRow, SensitivityRow] = Field(
+        default=(NO_ROW, NO_ROW, NO_ROW),
+        description="what a reading of x, y, z gains by specific force along x, y, z: a row for each reading",
+        json_schema_extra={"unit": "rad/s/g", "allowed": "3 rows of 3 numbers, each -0.1 to 0.1"},
+    )
+    offset_mm: Vector3 = Field(
+        default=NO_ROW, description="where it sits, x y z from the flange's centre in the flange's frame"
+    )
+    nonlinearity_even_per_rad_s: float = Field(
+        default=0.0,
+        ge=-0.1,
+        le=0.1,
+        description="by which fraction a reading grows with its rate",
+        json_schema_extra=PER_RATE,
+    )
+    nonlinearity_odd_per_rad_s: float = Field(
+        default=0.0,
+        ge=-0.1,
+        le=0.1,
+        description="by which fraction a reading grows with its rate's magnitude",
+        json_schema_extra=PER_RATE,
+    )
+    bandwidth_hz: float | None = Field(
+        default=None, ge=1, le=10_000, description="of its own low-pass of first order; without it, it has none"
+    )
+    delay_ms: float = Field(
+        default=0.0,
+        ge=0,
+        le=50,
+        description="by how much its readings are late beside that",
+        json_schema_extra={"unit": "ms"},
+    )
 
 
 class WorldSection(Section):
@@ -89,6 +228,7 @@ class WorldSection(Section):
     control_port: int = Field(
         default=7322, ge=1, le=65535, description="TCP port on which tests cause faults", json_schema_extra=RATIO
     )
+    site: SiteSection = SiteSection()
     arm: SimulatedArmSection = SimulatedArmSection()
     board: SimulatedBoardSection = SimulatedBoardSection()
     sensors: dict[SensorName, SimulatedSensorSection] = Field(min_length=1)

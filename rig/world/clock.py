@@ -13,11 +13,13 @@ class Clock:
 
     When the machine cannot keep up, the lost wall time is forgotten: virtual time slows down instead of jumping.
     While a client asks and is answered (`dialogue`) it goes no faster than wall time.
+    `tick_s`: how long a tick of 2 ms of the controller's clock really lasts.
     `hold` stops it, `run` lets it go on, `advance` lets exactly so much pass and holds again.
     """
 
-    def __init__(self, time_scale: float, wall: Callable[[], float]) -> None:
+    def __init__(self, time_scale: float, wall: Callable[[], float], tick_s: float = TICK_S) -> None:
         self.time_scale = time_scale
+        self._tick_s = tick_s
         self.tick = 0
         self._wall = wall
         self._stop_at: int | None = None
@@ -58,14 +60,14 @@ class Clock:
         """Wall time until the next tick is due: 0 when it is due now, infinity while held."""
         if self.held:
             return float("inf")
-        period_s = TICK_S / self.time_scale
+        period_s = self._tick_s / self.time_scale
         due_s = self._anchor_wall_s + (self.tick + 1 - self._anchor_tick) * period_s
         now_s = self._wall()
         if now_s - due_s > PATIENCE_S:
             self._anchor()
             return 0.0
         if now_s < self._dialogue_until_s:
-            due_s = max(due_s, self._counted_s + max(TICK_S, period_s))
+            due_s = max(due_s, self._counted_s + max(self._tick_s, period_s))
         return max(0.0, due_s - now_s)
 
     def count(self) -> None:

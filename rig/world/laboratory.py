@@ -1,5 +1,6 @@
 """The simulated laboratory without its sockets: arm, board and sensors on one clock, deterministic."""
 
+from functools import partial
 from math import radians
 from random import Random
 
@@ -8,14 +9,15 @@ from firmware_host.emulator.spi_device import Fault, SpiDevice
 from rig.config.models import RigConfig
 from rig.config.world_models import WorldSection
 from rig.world.board.flash_file import flash_of
-from rig.world.board.mounting import mount_sensors, power_up
-from rig.world.ur10e.forward_kinematics import Vector, flange_rate
+from rig.world.board.mounting import MotionAt, mount_sensors, power_up
+from rig.world.board.sensor_truth import SensorTruth
+from rig.world.site import site_of
 from rig.world.ur10e.joint_motion import Motion
 from rig.world.ur10e.ripple import ripple
 from rig.world.ur10e.robot import Identity, Robot
+from rig.world.ur10e.true_arm import TrueArm, known_links
 
 JOINTS = 6
-STILL: Vector = (0.0, 0.0, 0.0)
 
 
 class Laboratory:
@@ -29,12 +31,23 @@ class Laboratory:
         arm = world.arm
         random = Random(world.seed)
         ripples = [ripple(arm.vibration_fraction, arm.vibration_cycles_per_turn, random) for _ in range(JOINTS)]
+        motion = Motion(
+            [radians(angle) for angle in config.arm.home_deg],
+            ripples,
+            arm.encoder_step_rad,
+            memory_s=1e-3 * max(sensor.delay_ms for sensor in world.sensors.values()),
+            lateness_s=partial(Random(f"jitter {world.seed}").gauss, 0.0, arm.state_jitter_s)
+            if arm.state_jitter_s
+            else None,
+        )
+        self.arm = TrueArm(arm, site_of(world.site), motion, random)
         major, minor, bugfix, build = (int(part) for part in arm.polyscope.split("."))
         self.robot = Robot(
             Identity(arm.serial_number, (major, minor, bugfix, build)),
-            Motion([radians(angle) for angle in config.arm.home_deg], ripples, arm.encoder_step_rad),
+            motion,
             arm.remote_control,
             arm.speed_slider,
+            known_links(arm.calibration),
         )
         self._flash = flash_of(world.board.flash_file)
         self.board: EmulatedBoard | None = None  # None: without power
@@ -45,8 +58,8 @@ class Laboratory:
     def plug_in(self) -> None:
         """Give the board power, if it has none."""
         if self.board is None:
-            time_s = self.robot.time_s
-            self._sensors = mount_sensors(self._config, self._world, self._flange_rate_at, time_s)
+            time_s = self.arm.true_s(self.robot.time_s)
+            self._sensors = mount_sensors(self._config, self._world, self._motion_of, time_s)
             for name, fault in self._faults.items():
                 self._sensors[name].fault = fault
             self.board = power_up(self._world, self._flash, self._sensors.values(), time_s)
@@ -67,11 +80,18 @@ class Laboratory:
     def step(self) -> None:
         """One tick of everything. Raises BoardError when the firmware broke a rule of the chip."""
         self.robot.step()
+        self.arm.step(self.robot.time_s)
         if self.board is not None:
             # After the arm, so that the sensors can ask for any instant of the tick.
-            self.board.advance(self.robot.time_s)
+            self.board.advance(self.arm.true_s(self.robot.time_s))
 
-    def _flange_rate_at(self, time_s: float) -> Vector:
-        """Angular rate of the flange in its own frame at a virtual time inside the last tick, rad/s."""
-        motion = self.robot.motion
-        return STILL if motion.still else flange_rate(*motion.at(time_s))
+    @property
+    def tick_s(self) -> float:
+        """How long a tick lasts, which is 2 ms by the controller's clock."""
+        return self.arm.tick_s
+
+    def _motion_of(self, sensor: SensorTruth) -> MotionAt:
+        """What a sensor on the flange feels at a virtual time inside the last tick."""
+        if self.arm.ideal and not sensor.gyro.g_sensitivity_rad_s_per_g:
+            return lambda time_s: sensor.rate(self.arm.rate_at(time_s))
+        return lambda time_s: sensor.motion(self.arm.felt_at(time_s))

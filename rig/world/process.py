@@ -46,7 +46,7 @@ class World:
         section = world_section(loaded)
         self.laboratory = Laboratory(loaded.config, section)
         self.line = SerialLine(self.laboratory)
-        self.clock = Clock(section.time_scale, time.monotonic)
+        self.clock = Clock(section.time_scale, time.monotonic, self.laboratory.tick_s)
         self.network = Network(self.clock.dialogue)
         self._silent_until_s = 0.0
         self._ended = False

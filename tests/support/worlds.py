@@ -14,6 +14,7 @@ from typing import Any
 import pytest
 import yaml
 
+from support.ideal import ideal_document
 from support.paths import DEMO
 
 START_TIMEOUT_S = 20.0
@@ -104,7 +105,7 @@ def worlds(folder: Path) -> Iterator[World]:
     def start(changes: Mapping[str, Any] | None = None) -> WorldHandle:
         host = fresh_host()
         address = {"arm": {"host": host}, "board": {"port": f"socket://{host}:7321"}}
-        document = merge(merge(yaml.safe_load(DEMO.read_text(encoding="utf-8")), address), changes or {})
+        document = merge(merge(ideal_document(DEMO), address), changes or {})
         config_path = folder / f"world-{len(running)}.yaml"
         config_path.write_text(yaml.safe_dump(document, sort_keys=False, allow_unicode=True), encoding="utf-8")
         process = subprocess.Popen(
@@ -136,6 +137,6 @@ def worlds(folder: Path) -> Iterator[World]:
 
 @pytest.fixture
 def world(tmp_path: Path) -> Iterator[World]:
-    """Starts worlds: `world({"world": {"time_scale": 1}})` is demo.yaml with these changes, on a fresh address."""
+    """Starts worlds: `world({"world": {"time_scale": 1}})` is an ideal demo.yaml so changed, on a fresh address."""
     with worlds(tmp_path) as start:
         yield start

@@ -5,9 +5,7 @@ import math
 import socket
 import time
 from collections.abc import Sequence
-from dataclasses import dataclass
 from pathlib import Path
-from typing import Any
 
 import numpy as np
 import pytest
@@ -16,89 +14,35 @@ from scipy.spatial.transform import Rotation
 from firmware_host.client import Board, SampleBatch
 from firmware_host.emulator.flash_memory import DOUBLEWORD_BYTES, PAGE_BYTES, STORE_OFFSET
 from firmware_host.errors import BoardError
-from firmware_host.frames import Frame, FrameReader, encode
+from firmware_host.frames import FrameReader, encode
 from rig.arm.kinematics import flange_rate
-from rig.config.load import Loaded, load
+from rig.config.load import Loaded
 from rig.config.models import mounting_matrix
 from rig.errors import Refused
 from rig.world.board.flash_file import flash_of
 from rig.world.board.mounting import firmware
-from rig.world.board.serial_line import SerialLine, misread
+from rig.world.board.serial_line import misread
 from rig.world.clock import TICKS_PER_SECOND
-from rig.world.laboratory import Laboratory
 from rig.world.section import world_section
+from support.ideal import ideal
+from support.laboratory_host import Host, booted, host
 from support.paths import DEMO
 from support.worlds import World
 
 pytestmark = pytest.mark.slow
 
 COUNT_RAD_S = math.radians(8.75e-3)
-SENSORS = ("lsm9ds1", "mpu9250", "adis16465")  # the board's table
 PAIR = DEMO.with_name("mpu9250_adis16465.yaml")
 STILL = "world.arm.vibration_fraction=0"
 
 
-@dataclass
-class Host:
-    """A host written out in ticks: it asks the board in process, so every byte has its moment."""
-
-    laboratory: Laboratory
-    line: SerialLine
-    received: bytearray
-
-    def ask(self, name: str, sequence: int, values: dict[str, Any] | None = None) -> None:
-        self.line.to_board(encode(name, sequence, values), None)
-
-    def ticks(self, count: int) -> None:
-        for _ in range(count):
-            self.laboratory.step()
-            self.line.tick()
-            self.received += self.line.to_host(None)
-
-    def samples(self, sensor: int = 0) -> np.ndarray:
-        """(n, 3) counts of every sample of one sensor received so far."""
-        frames = FrameReader().feed(bytes(self.received))
-        samples = [frame for frame in frames if frame.name == "samples"]
-        return np.concatenate([frame.items["counts"] for frame in samples if frame.values["sensor"] == sensor])
-
-    def answer(self, name: str, values: dict[str, Any]) -> Frame:
-        """Ask, and wait for the answer."""
-        self.received.clear()
-        self.ask(name, 99, values)
-        self.ticks(100)
-        frames = FrameReader().feed(bytes(self.received))
-        (answer,) = [frame for frame in frames if frame.values.get("reply_to") == 99]
-        return answer
-
-
-def booted(loaded: Loaded) -> Host:
-    """A laboratory whose board has started."""
-    laboratory = Laboratory(loaded.config, world_section(loaded))
-    new = Host(laboratory, SerialLine(laboratory), bytearray())
-    new.ticks(200)
-    return new
-
-
-def host(loaded: Loaded) -> Host:
-    """A laboratory whose board streams every sensor it has."""
-    new = booted(loaded)
-    for sensor in loaded.config.sensors.values():
-        index = SENSORS.index(sensor.part)
-        settings = {"sensor": index, "rate_hz": sensor.rate_hz, "range_deg_s": sensor.range_deg_s}
-        new.ask("configure", 1, settings)
-        new.ticks(20)
-    new.ask("start", 2, {"sensors": 0})
-    new.ticks(20)
-    return new
-
-
 def demo(*overrides: str) -> Loaded:
-    return load(DEMO, overrides)
+    return ideal(DEMO, overrides)
 
 
 def pair(*overrides: str) -> Loaded:
     """A gyroscope to calibrate and a reference, on one bus."""
-    return load(PAIR, overrides)
+    return ideal(PAIR, overrides)
 
 
 def digest_of_a_run(loaded: Loaded) -> tuple[str, tuple[float, ...]]:

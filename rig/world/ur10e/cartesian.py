@@ -9,6 +9,7 @@ from numpy.typing import NDArray
 from rig.world.ur10e.controller_messages import ProgramError
 from rig.world.ur10e.forward_kinematics import flange_frame, rotation_from_vector, rotation_vector
 from rig.world.ur10e.joint_motion import JOINT_SPEED_LIMIT_RAD_S
+from rig.world.ur10e.links import NOMINAL, Links
 from rig.world.ur10e.trajectory import Joints, Piece, Trajectory, rest
 
 Array = NDArray[np.float64]
@@ -19,24 +20,24 @@ ACCURACY = 1e-9
 DIFFERENCE_RAD = 1e-6
 
 
-def _twist(q: Sequence[float] | Array, rotation: Array, position: Array) -> Array:
+def _twist(q: Sequence[float] | Array, rotation: Array, position: Array, links: Links) -> Array:
     """(6,) way from the flange at `q` to a frame: translation (m) and rotation vector (rad), in the base frame."""
-    here, origin = flange_frame(list(q))
+    here, origin = flange_frame(list(q), links)
     turn = rotation @ np.array(here).T
     return np.array([*(position - np.array(origin)), *rotation_vector(turn.tolist())])
 
 
-def _jacobian(q: Sequence[float] | Array) -> Array:
+def _jacobian(q: Sequence[float] | Array, links: Links) -> Array:
     """(6, 6) twist of the flange per joint speed."""
     columns = []
     for joint in range(6):
         nudged = [angle + DIFFERENCE_RAD * (i == joint) for i, angle in enumerate(q)]
-        rotation, position = flange_frame(nudged)
-        columns.append(_twist(q, np.array(rotation), np.array(position)) / DIFFERENCE_RAD)
+        rotation, position = flange_frame(nudged, links)
+        columns.append(_twist(q, np.array(rotation), np.array(position), links) / DIFFERENCE_RAD)
     return np.array(columns).T
 
 
-def joints_for(pose: Sequence[float], near: Joints) -> Joints:
+def joints_for(pose: Sequence[float], near: Joints, links: Links = NOMINAL) -> Joints:
     """The joints that put the flange at `pose` (m, rotation vector rad), by Newton's method from `near`.
 
     Raises `ProgramError` when it does not get there: out of reach, or singular on the way.
@@ -44,19 +45,21 @@ def joints_for(pose: Sequence[float], near: Joints) -> Joints:
     rotation, position = np.array(rotation_from_vector(pose[3:])), np.array(pose[:3])
     q = np.array(near)
     for _ in range(100):
-        error = _twist(q, rotation, position)
+        error = _twist(q, rotation, position, links)
         if np.abs(error).max() < ACCURACY:
             return tuple(q.tolist())
-        matrix = _jacobian(q)
+        matrix = _jacobian(q, links)
         step = matrix.T @ np.linalg.solve(matrix @ matrix.T + 1e-9 * np.eye(6), error)
         q = q + step * min(1.0, 0.3 / float(np.abs(step).max()))
     raise ProgramError("no inverse kinematics solution was found")
 
 
-def straight_line(start: Joints, pose: Sequence[float], speed_m_s: float, acceleration_m_s2: float) -> Trajectory:
+def straight_line(
+    start: Joints, pose: Sequence[float], speed_m_s: float, acceleration_m_s2: float, links: Links = NOMINAL
+) -> Trajectory:
     """A moveL from rest to rest. Raises `ProgramError` when a joint would exceed its speed."""
     rotation, position = np.array(rotation_from_vector(pose[3:])), np.array(pose[:3])
-    twist = _twist(start, rotation, position)
+    twist = _twist(start, rotation, position, links)
     length = max(hypot(*twist[:3]), LEVER_M * hypot(*twist[3:]))
     if length < ACCURACY:
         return rest(start)
@@ -68,7 +71,7 @@ def straight_line(start: Joints, pose: Sequence[float], speed_m_s: float, accele
 
     def rate(time_s: float, q: Array) -> Array:
         along = top * min(1.0, time_s / ramp_s, max(0.0, duration_s - time_s) / ramp_s)
-        return np.asarray(np.linalg.solve(_jacobian(q), twist * (along / length)), dtype=np.float64)
+        return np.asarray(np.linalg.solve(_jacobian(q, links), twist * (along / length)), dtype=np.float64)
 
     q, qd, pieces = np.array(start), np.zeros(6), []
     for knot in range(knots):
@@ -77,4 +80,4 @@ def straight_line(start: Joints, pose: Sequence[float], speed_m_s: float, accele
             raise ProgramError("joint speed limit exceeded on the way of movel")
         pieces.append(Piece(step_s, tuple(q.tolist()), tuple(qd.tolist()), tuple(((next_qd - qd) / step_s).tolist())))
         q, qd = q + (qd + next_qd) * (step_s / 2.0), next_qd
-    return Trajectory(pieces, joints_for(pose, tuple(q.tolist())))
+    return Trajectory(pieces, joints_for(pose, tuple(q.tolist()), links))

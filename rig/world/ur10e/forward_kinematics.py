@@ -6,55 +6,45 @@ Plain floats, because the sensors ask several hundred times a simulated second.
 from collections.abc import Sequence
 from math import acos, cos, pi, sin, sqrt
 
+from rig.world.ur10e.links import NOMINAL, Links
+
 Vector = tuple[float, float, float]
 Rotation = tuple[Vector, Vector, Vector]
 
-# UR10e, maker's article 45257: link length a, offset d (m), twist in quarter turns.
-LINKS = (
-    (0.0, 0.1807, 1),
-    (-0.6127, 0.0, 0),
-    (-0.57155, 0.0, 0),
-    (0.0, 0.17415, 1),
-    (0.0, 0.11985, -1),
-    (0.0, 0.11655, 0),
-)
 
-
-def flange_rate(q_rad: Sequence[float], qd_rad_s: Sequence[float]) -> Vector:
+def flange_rate(q_rad: Sequence[float], qd_rad_s: Sequence[float], links: Links = NOMINAL) -> Vector:
     """Angular velocity of the flange in its own frame, rad/s, carried outwards joint by joint."""
     x = y = z = 0.0
-    for (_, _, twist), angle, speed in zip(LINKS, q_rad, qd_rad_s, strict=True):
+    for link, angle, speed in zip(links, q_rad, qd_rad_s, strict=True):
         z += speed
-        c, s = cos(angle), sin(angle)
+        c, s = cos(angle + link.theta_rad), sin(angle + link.theta_rad)
         x, y = c * x + s * y, c * y - s * x
-        if twist == 1:
-            y, z = z, -y
-        elif twist == -1:
-            y, z = -z, y
+        c, s = link.cos_alpha, link.sin_alpha
+        y, z = c * y + s * z, c * z - s * y
     return x, y, z
 
 
-def flange_frame(q_rad: Sequence[float]) -> tuple[Rotation, Vector]:
+def flange_frame(q_rad: Sequence[float], links: Links = NOMINAL) -> tuple[Rotation, Vector]:
     """Rotation (rows) and position (m) of the flange in the base frame."""
     rotation = ((1.0, 0.0, 0.0), (0.0, 1.0, 0.0), (0.0, 0.0, 1.0))
     position = (0.0, 0.0, 0.0)
-    for (a, d, twist), angle in zip(LINKS, q_rad, strict=True):
-        c, s = cos(angle), sin(angle)
-        ca, sa = (1.0, 0.0) if twist == 0 else (0.0, float(twist))
-        step = (a * c, a * s, d)
+    for link, angle in zip(links, q_rad, strict=True):
+        c, s = cos(angle + link.theta_rad), sin(angle + link.theta_rad)
+        ca, sa = link.cos_alpha, link.sin_alpha
+        step = (link.a_m * c, link.a_m * s, link.d_m)
         position = tuple(  # type: ignore[assignment]
             p + sum(r * t for r, t in zip(row, step, strict=True)) for p, row in zip(position, rotation, strict=True)
         )
-        link = ((c, -s * ca, s * sa), (s, c * ca, -c * sa), (0.0, sa, ca))
+        turn = ((c, -s * ca, s * sa), (s, c * ca, -c * sa), (0.0, sa, ca))
         rotation = tuple(  # type: ignore[assignment]
-            tuple(sum(row[k] * link[k][j] for k in range(3)) for j in range(3)) for row in rotation
+            tuple(sum(row[k] * turn[k][j] for k in range(3)) for j in range(3)) for row in rotation
         )
     return rotation, position
 
 
-def flange_pose(q_rad: Sequence[float]) -> tuple[float, ...]:
+def flange_pose(q_rad: Sequence[float], links: Links = NOMINAL) -> tuple[float, ...]:
     """Position (m) and rotation vector (rad) of the flange in the base frame, the six numbers UR calls a pose."""
-    rotation, position = flange_frame(q_rad)
+    rotation, position = flange_frame(q_rad, links)
     return (*position, *rotation_vector(rotation))
 
 

@@ -1,8 +1,10 @@
 """The simulated joints: a trajectory played with a time scaling (speed slider, pause), known at any instant."""
 
-from collections.abc import Sequence
+from collections import deque
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
-from math import nan
+from math import ceil, nan
+from typing import NamedTuple
 
 from rig.world.clock import TICK_S
 from rig.world.ur10e.ripple import Ripple
@@ -24,25 +26,50 @@ class Instant:
     qd_rad_s: Joints
 
 
+class _Tick(NamedTuple):
+    """How a tick was played: where on the trajectory it began, and the time scaling there and its change."""
+
+    start_s: float
+    along_s: float
+    fraction: float
+    slope_per_s: float
+    trajectory: Trajectory
+    offset: Joints
+    gain: Joints
+
+
 class Motion:
     """Positions and velocities of the six joints. `step` makes a tick; `at` answers for any time inside the last one.
+
+    `memory_s`: how long before the end of the last tick `at` answers as well. `lateness_s`: drawn once a tick, how much
+    later than at its end the encoders are read.
 
     Three angles are in play: `target` (what a program asked for), `smooth` (the same with the servo's static error
     taken out, so that the joint comes to rest exactly on target) and the joint's own, with the ripple.
     """
 
-    def __init__(self, start_rad: Sequence[float], ripples: Sequence[Ripple], encoder_step_rad: float = 0.0) -> None:
+    def __init__(
+        self,
+        start_rad: Sequence[float],
+        ripples: Sequence[Ripple],
+        encoder_step_rad: float = 0.0,
+        memory_s: float = 0.0,
+        lateness_s: Callable[[], float] | None = None,
+    ) -> None:
         self._ripples = tuple(ripples)
         self._encoder_step_rad = encoder_step_rad
-        self._start_s = 0.0
+        self._lateness_s, self._late_s = lateness_s, 0.0
         self._trajectory = rest(tuple(start_rad))
         self._offset, self._gain = self._map(tuple(start_rad), tuple(start_rad))
         self._smooth, self._angles = [nan] * 6, [0.0] * 6  # what was worked out last, joint by joint
-        self.still = True  # nothing moved in the whole of the last tick
         self._scaled = True  # a stop is not stretched by the speed slider
-        self._trajectory_s = self._begin_s = 0.0
-        self._fraction = self._begin_fraction = 1.0
+        self._trajectory_s = 0.0
+        self._fraction = 1.0
         self.fraction_wanted = 1.0
+        self._ticks = deque(
+            [_Tick(0.0, 0.0, 1.0, 0.0, self._trajectory, self._offset, self._gain)], 1 + ceil(memory_s / TICK_S)
+        )
+        self._stirred = 0  # ticks in memory since something moved, at most
         self._now: Instant | None = None  # worked out when somebody asks: most ticks nobody does
 
     # -- what the joints do now ---------------------------------------------------------------------------------
@@ -62,9 +89,14 @@ class Motion:
         if self._now is None:
             target, velocity, acceleration = self._trajectory.at(self._trajectory_s)
             fraction = self._fraction if self._scaled else 1.0
-            q, qd = self._joints(target, velocity, fraction)
+            q, qd = self._joints(self._offset, self._gain, target, velocity, fraction)
             self._now = Instant(target, tuple(v * fraction for v in velocity), acceleration, q, qd)
         return self._now
+
+    @property
+    def still(self) -> bool:
+        """Nothing moved in the whole of the last tick, and of those in memory."""
+        return not self._stirred
 
     @property
     def q_rad(self) -> Joints:
@@ -75,52 +107,82 @@ class Motion:
         return self.now.qd_rad_s
 
     @property
+    def qdd_rad_s2(self) -> Joints:
+        """Accelerations at the end of the last tick."""
+        return ZERO if self.still else self.with_accelerations(self._ticks[-1].start_s + TICK_S)[2]
+
+    @property
     def moving(self) -> bool:
         return any(self.now.target_qd_rad_s)
 
     @property
     def actual_q_rad(self) -> Joints:
         """The joints' angles as the encoders see them, at the end of the last tick."""
-        step = self._encoder_step_rad
-        return tuple(round(q / step) * step for q in self.q_rad) if step else self.q_rad
+        step, q_rad = self._encoder_step_rad, self.q_rad
+        if self._late_s:
+            q_rad = tuple(q + v * self._late_s for q, v in zip(q_rad, self.qd_rad_s, strict=True))
+        return tuple(round(q / step) * step for q in q_rad) if step else q_rad
 
     def at(self, time_s: float) -> tuple[Joints, Joints]:
-        """True angles and speeds of the joints at a virtual time inside the last tick."""
-        elapsed = min(max(time_s - self._start_s, 0.0), TICK_S)
-        if self._scaled:
-            slope = (self._fraction - self._begin_fraction) / TICK_S
-            fraction = self._begin_fraction + slope * elapsed
-            along = self._begin_s + (self._begin_fraction + 0.5 * slope * elapsed) * elapsed
-        else:
-            fraction, along = 1.0, self._begin_s + elapsed
-        target, velocity, _ = self._trajectory.at(along)
-        return self._joints(target, velocity, fraction)
+        """True angles and speeds of the joints at a virtual time inside the last tick, or `memory_s` before it."""
+        tick, fraction, target, velocity, _ = self._played(time_s)
+        return self._joints(tick.offset, tick.gain, target, velocity, fraction)
 
-    def _joints(self, target: Joints, velocity: Joints, fraction: float) -> tuple[Joints, Joints]:
-        smooth = [o + g * p for o, g, p in zip(self._offset, self._gain, target, strict=True)]
+    def with_accelerations(self, time_s: float) -> tuple[Joints, Joints, Joints]:
+        """The same with the joints' accelerations, those of the ripple included."""
+        tick, fraction, target, velocity, acceleration = self._played(time_s)
+        q, qd = self._joints(tick.offset, tick.gain, target, velocity, fraction)
+        qdd = [0.0] * 6
+        for joint, (v, a) in enumerate(zip(velocity, acceleration, strict=True)):
+            if v or a:
+                gain, u = tick.gain[joint], self._smooth[joint]
+                ripple = self._ripples[joint]
+                speed = gain * v * fraction
+                change = gain * (a * fraction * fraction + v * tick.slope_per_s)
+                qdd[joint] = ripple.gain(u) * change + ripple.bend(u) * speed * speed
+        return q, qd, tuple(qdd)
+
+    def _played(self, time_s: float) -> tuple[_Tick, float, Joints, Joints, Joints]:
+        """The tick a time lies in, the time scaling then, and what the trajectory asks for."""
+        tick = self._ticks[-1]
+        if time_s < tick.start_s:
+            tick = next((it for it in reversed(self._ticks) if it.start_s <= time_s), self._ticks[0])
+        elapsed = min(max(time_s - tick.start_s, 0.0), TICK_S)
+        along = tick.along_s + (tick.fraction + 0.5 * tick.slope_per_s * elapsed) * elapsed
+        return tick, tick.fraction + tick.slope_per_s * elapsed, *tick.trajectory.at(along)
+
+    def _joints(
+        self, offset: Joints, gain: Joints, target: Joints, velocity: Joints, fraction: float
+    ) -> tuple[Joints, Joints]:
+        smooth = [o + g * p for o, g, p in zip(offset, gain, target, strict=True)]
         for joint, u in enumerate(smooth):
             if self._smooth[joint] != u:  # most moves turn few joints
                 self._smooth[joint], self._angles[joint] = u, self._ripples[joint].angle(u)
         q = tuple(self._angles)
         qd = tuple(
             r.gain(u) * g * v * fraction if v else 0.0
-            for r, u, g, v in zip(self._ripples, smooth, self._gain, velocity, strict=True)
+            for r, u, g, v in zip(self._ripples, smooth, gain, velocity, strict=True)
         )
         return q, qd
 
     # -- one tick ------------------------------------------------------------------------------------------------
     def step(self, end_s: float) -> None:
         """Play one tick, ending at the virtual time `end_s`."""
-        self._start_s = end_s - TICK_S
-        self._begin_s, self._begin_fraction = self._trajectory_s, self._fraction
+        begin_s, begin_fraction = self._trajectory_s, self._fraction
         change = self.fraction_wanted - self._fraction
         limit = SCALING_RATE_PER_S * TICK_S
         self._fraction += max(-limit, min(limit, change))
-        self.still = self.standing
-        if not self.still:
-            mean = 0.5 * (self._begin_fraction + self._fraction) if self._scaled else 1.0
+        fraction, slope = (begin_fraction, (self._fraction - begin_fraction) / TICK_S) if self._scaled else (1.0, 0.0)
+        self._ticks.append(_Tick(end_s - TICK_S, begin_s, fraction, slope, self._trajectory, self._offset, self._gain))
+        if self.standing:
+            self._stirred = max(0, self._stirred - 1)
+        else:
+            mean = 0.5 * (begin_fraction + self._fraction) if self._scaled else 1.0
             self._trajectory_s += mean * TICK_S
             self._now = None
+            self._stirred = self._ticks.maxlen or 1
+        if self._lateness_s is not None:
+            self._late_s = self._lateness_s()
 
     # -- commands ------------------------------------------------------------------------------------------------
     def move(self, target_rad: Joints, speed_rad_s: float, acceleration_rad_s2: float) -> None:

@@ -10,8 +10,9 @@ from math import pi
 
 from rig.world.clock import TICKS_PER_SECOND
 from rig.world.ur10e.controller_messages import Message, MessageKind
-from rig.world.ur10e.forward_kinematics import LINKS, flange_pose
+from rig.world.ur10e.forward_kinematics import flange_pose
 from rig.world.ur10e.joint_motion import JOINT_SPEED_LIMIT_RAD_S
+from rig.world.ur10e.links import NOMINAL, Links
 from rig.world.ur10e.modes import RobotMode, RuntimeState, SafetyMode
 from rig.world.ur10e.robot import TCP_OFFSET, Robot
 from rig.world.ur10e.script_socket import ScriptSession
@@ -97,7 +98,7 @@ def _robot_mode(robot: Robot) -> bytes:
         robot.robot_mode,
         0,  # control mode: position
         robot.speed_slider,
-        robot.motion.fraction,
+        robot.speed_scaling,
         1.0,
         0,
     )
@@ -118,22 +119,25 @@ def _masterboard(robot: Robot) -> bytes:
 
 
 def _cartesian(robot: Robot) -> bytes:
-    return struct.pack(">12d", *flange_pose(robot.motion.actual_q_rad), *TCP_OFFSET)
+    return struct.pack(">12d", *flange_pose(robot.motion.actual_q_rad, robot.links), *TCP_OFFSET)
 
 
-LENGTHS, OFFSETS = [a for a, _, _ in LINKS], [d for _, d, _ in LINKS]
-TWISTS = [twist * pi / 2 for _, _, twist in LINKS]
+def _denavit_hartenberg(links: Links) -> list[float]:
+    """Of all six links a, d and alpha, as both sub-packages hold them."""
+    return [*(link.a_m for link in links), *(link.d_m for link in links), *(link.alpha_rad for link in links)]
 
 
 def _kinematics(robot: Robot) -> bytes:
-    return struct.pack(">6I24dI", *[1] * 6, *[0.0] * 6, *LENGTHS, *OFFSETS, *TWISTS, 0)
+    """The arm's own links, its maker's calibration included."""
+    angles = [link.theta_rad for link in robot.links]
+    return struct.pack(">6I24dI", *[1] * 6, *angles, *_denavit_hartenberg(robot.links), 0)
 
 
 def _configuration(robot: Robot) -> bytes:
     positions = [-2 * pi, 2 * pi] * 6
     speeds = [value for speed in JOINT_SPEED_LIMIT_RAD_S for value in (speed, 40.0)]
     defaults = [1.05, 1.4, 0.25, 1.2, 0.5]  # joint speed and acceleration, tool speed and acceleration, radius
-    numbers = [*positions, *speeds, *defaults, *LENGTHS, *OFFSETS, *TWISTS, *[0.0] * 6]
+    numbers = [*positions, *speeds, *defaults, *_denavit_hartenberg(NOMINAL), *[0.0] * 6]
     return struct.pack(f">{len(numbers)}d4i", *numbers, 0, 0, UR10, 0)
 
 

@@ -75,12 +75,12 @@ class Threads:
         self.take(name)
         yield from self.stopj(name, HAND_OVER_RAD_S2)
         self.take(name)
-        motion = self.robot.motion
+        motion, links = self.robot.motion, self.robot.links
         if move.straight:
-            pose = move.target if move.is_pose else flange_pose(move.target)
-            trajectory = straight_line(motion.q_rad, pose, move.speed, move.acceleration)
+            pose = move.target if move.is_pose else flange_pose(move.target, links)
+            trajectory = straight_line(motion.q_rad, pose, move.speed, move.acceleration, links)
         else:
-            target = joints_for(move.target, motion.q_rad) if move.is_pose else move.target
+            target = joints_for(move.target, motion.q_rad, links) if move.is_pose else move.target
             trajectory = line(motion.q_rad, target, move.speed, move.acceleration, JOINT_SPEED_LIMIT_RAD_S)
         if any(abs(q) > JOINT_LIMIT_RAD for q in trajectory.end_rad):
             raise ProgramError("joint position out of limits: a target lies beyond ±360°")

@@ -24,6 +24,10 @@ class Ripple:
         """Exact derivative of the joint's angle with respect to the smooth angle."""
         return 1.0 + sum(a * n * cos(n * smooth_rad + phase) for n, a, phase in self.components)
 
+    def bend(self, smooth_rad: float) -> float:
+        """The second derivative."""
+        return -sum(a * n * n * sin(n * smooth_rad + phase) for n, a, phase in self.components)
+
     def smooth(self, angle_rad: float) -> float:
         """A smooth angle at which the joint stands at `angle_rad` (bisection: it brackets a root for any amplitude)."""
         if not self.components:

@@ -8,7 +8,10 @@ from typing import Protocol
 from rig.world.clock import TICK_S, TICKS_PER_SECOND
 from rig.world.ur10e.controller_messages import MessageKind, Messages, ProgramError
 from rig.world.ur10e.joint_motion import Motion
+from rig.world.ur10e.links import NOMINAL, Links
 from rig.world.ur10e.modes import SAFETY_BITS, RobotMode, RuntimeState, SafetyMode
+from rig.world.ur10e.tcp_motion import TcpMotion, tcp_motion
+from rig.world.ur10e.trajectory import Joints
 
 JOINT_LIMIT_RAD = 6.2831853072 + 1e-6  # every joint ±360°
 PROGRAM_STOP_RAD_S2 = 4.0
@@ -50,8 +53,12 @@ class Identity:
 class Robot:
     """The controller. Everything that changes it is a method here; `step` makes it 2 ms older."""
 
-    def __init__(self, identity: Identity, motion: Motion, remote_control: bool, speed_slider: float) -> None:
+    def __init__(
+        self, identity: Identity, motion: Motion, remote_control: bool, speed_slider: float, links: Links = NOMINAL
+    ) -> None:
         self.identity = identity
+        self.links = links  # as it knows them
+        self._tcp_motions: dict[str, tuple[tuple[Joints, Joints, Joints], TcpMotion]] = {}
         self.motion = motion
         self.remote_control = remote_control
         self.tick = 0
@@ -242,6 +249,31 @@ class Robot:
         self._last_input_tick = self.tick
 
     # -- what RTDE reports -------------------------------------------------------------------------------------------
+    @property
+    def speed_scaling(self) -> float:
+        """How much slower than the slider asks the joints go: clients multiply both."""
+        return min(1.0, self.motion.fraction / self.speed_slider) if self.speed_slider else 1.0
+
+    @property
+    def tcp_motion(self) -> TcpMotion:
+        """How the tool centre point moves by the encoders."""
+        motion = self.motion
+        return self._reckoned("actual", motion.q_rad, motion.qd_rad_s, motion.qdd_rad_s2)
+
+    @property
+    def target_tcp_motion(self) -> TcpMotion:
+        """How it is meant to move."""
+        now = self.motion.now
+        return self._reckoned("target", now.target_q_rad, now.target_qd_rad_s, now.target_qdd_rad_s2)
+
+    def _reckoned(self, which: str, q_rad: Joints, qd_rad_s: Joints, qdd_rad_s2: Joints) -> TcpMotion:
+        """Once for all who ask while the joints are the same."""
+        joints = q_rad, qd_rad_s, qdd_rad_s2
+        before = self._tcp_motions.get(which)
+        if before is None or before[0] != joints:
+            before = self._tcp_motions[which] = joints, tcp_motion(q_rad, qd_rad_s, qdd_rad_s2, self.links)
+        return before[1]
+
     @property
     def steady(self) -> bool:
         """Standing still for half a second."""

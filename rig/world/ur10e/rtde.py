@@ -11,10 +11,11 @@ from typing import Any
 
 from rig.world.clock import TICKS_PER_SECOND
 from rig.world.ur10e.robot import Robot
-from rig.world.ur10e.variables import INPUTS, OUTPUTS, TYPES, Get, Put, apply_masked
+from rig.world.ur10e.variables import INPUTS, OUTPUTS, TYPES, Get, Put, apply_masked, output_type
 
 PORT = 30004
 HEADER = struct.Struct(">HB")
+RECIPE_BYTES = 2048  # RTDE guide: the list of names is not longer
 DEFAULT_HZ = 125.0  # version 1 has no frequency
 
 
@@ -135,8 +136,12 @@ class RtdeSession:
         if self._version == 2:
             (frequency_hz,) = struct.unpack_from(">d", payload)
             payload = payload[8:]
+        if len(payload) > RECIPE_BYTES:
+            self._output = None
+            refusal = package("O", b"\0" if self._version == 2 else b"")
+            return self._say(f"a recipe of {len(payload)} bytes, the most is {RECIPE_BYTES}") + refusal
         names = _names(payload)
-        kinds = [OUTPUTS[name][0] if name in OUTPUTS else "NOT_FOUND" for name in names]
+        kinds = [output_type(self._robot, name) for name in names]
         valid = "NOT_FOUND" not in kinds and bool(names) and 0.0 < frequency_hz <= TICKS_PER_SECOND
         self._output = Output(names, frequency_hz, 1 if self._version == 2 else None) if valid else None
         lead = bytes([valid]) if self._version == 2 else b""

@@ -243,11 +243,11 @@ class ControlProgram:
         return _nothing()
 
     def _forward_kinematics(self) -> Steps:
-        self._results(forward_kinematics.flange_pose(self._robot.motion.actual_q_rad))
+        self._results(forward_kinematics.flange_pose(self._robot.motion.actual_q_rad, self._robot.links))
         return _nothing()
 
     def _inverse_kinematics(self) -> Steps:
-        self._results(joints_for(self._doubles(0, 6), self._robot.motion.q_rad))
+        self._results(joints_for(self._doubles(0, 6), self._robot.motion.q_rad, self._robot.links))
         return _nothing()
 
     def _is_steady(self) -> Steps:

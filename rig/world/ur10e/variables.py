@@ -6,6 +6,7 @@ from typing import Any
 from rig.world.ur10e import forward_kinematics
 from rig.world.ur10e.modes import RobotMode
 from rig.world.ur10e.robot import TCP_OFFSET, Robot
+from rig.world.ur10e.tcp_motion import GRAVITY, elbow
 
 Get = Callable[[Robot], Any]
 Put = Callable[[Robot, Any], None]
@@ -16,7 +17,23 @@ TYPES = {
     "VECTOR3D": ("3d", 3), "VECTOR6D": ("6d", 6), "VECTOR6INT32": ("6i", 6), "VECTOR6UINT32": ("6I", 6),
 }  # fmt: skip
 
-JOINT_MODE_RUNNING, JOINT_MODE_OFF = 253, 239
+JOINT_MODE_OFF = 239
+JOINT_MODES = {RobotMode.RUNNING: 253, RobotMode.IDLE: 255}
+CONFIGURABLE = 0xFF00  # of the bits of digital inputs and outputs, where they stand
+
+# Outputs that controllers answer for from a version on (RTDE guide, "introduced in version").
+SINCE: dict[str, tuple[int, int]] = {
+    "collision_detection_ratio": (5, 15),
+    "time_scale_source": (5, 17),
+    "actual_robot_energy_consumed": (5, 23),
+    "actual_robot_braking_energy_dissipated": (5, 23),
+}
+
+
+def output_type(robot: Robot, name: str) -> str:
+    """The RTDE type of an output, "NOT_FOUND" for one that a controller of this version does not have."""
+    found = name in OUTPUTS and robot.identity.polyscope[:2] >= SINCE.get(name, (0, 0))
+    return OUTPUTS[name][0] if found else "NOT_FOUND"
 
 
 def _constant(value: Any) -> Get:
@@ -27,33 +44,23 @@ def _bits(registers: Sequence[bool], first: int) -> int:
     return sum(1 << i for i in range(32) if registers[first + i])
 
 
-def _tcp_speed(robot: Robot) -> tuple[float, ...]:
-    """Linear and angular velocity of the flange in the base frame, from the poses a tick apart."""
-    q, qd = robot.motion.q_rad, robot.motion.qd_rad_s
-    if not any(qd):
-        return (0.0,) * 6
-    step = 1e-4
-    before = forward_kinematics.flange_pose([a - v * step for a, v in zip(q, qd, strict=True)])
-    after = forward_kinematics.flange_pose([a + v * step for a, v in zip(q, qd, strict=True)])
-    linear = [(b - a) / (2.0 * step) for a, b in zip(before[:3], after[:3], strict=True)]
-    rate = forward_kinematics.flange_rate(q, qd)
-    rotation = forward_kinematics.rotation_from_vector(forward_kinematics.flange_pose(q)[3:])
-    return (*linear, *(sum(r * w for r, w in zip(row, rate, strict=True)) for row in rotation))
-
-
 def joint_modes(robot: Robot) -> tuple[int, ...]:
-    return (JOINT_MODE_RUNNING if robot.robot_mode == RobotMode.RUNNING else JOINT_MODE_OFF,) * 6
+    return (JOINT_MODES.get(robot.robot_mode, JOINT_MODE_OFF),) * 6
+
+
+def _volts_when_on(volts: float) -> Callable[[Robot], float]:
+    return lambda robot: volts if robot.robot_mode >= RobotMode.POWER_ON else 0.0
 
 
 def _pose(robot: Robot) -> tuple[float, ...]:
-    return forward_kinematics.flange_pose(robot.motion.actual_q_rad)
+    return forward_kinematics.flange_pose(robot.motion.actual_q_rad, robot.links)
 
 
 def _target_pose(robot: Robot) -> tuple[float, ...]:
-    return forward_kinematics.flange_pose(robot.motion.now.target_q_rad)
+    return forward_kinematics.flange_pose(robot.motion.now.target_q_rad, robot.links)
 
 
-ZERO3, ZERO6 = (0.0,) * 3, (0.0,) * 6
+ZERO6 = (0.0,) * 6
 
 OUTPUTS: dict[str, tuple[str, Get]] = {
     "timestamp": ("DOUBLE", lambda r: r.time_s),
@@ -63,9 +70,14 @@ OUTPUTS: dict[str, tuple[str, Get]] = {
     "actual_q": ("VECTOR6D", lambda r: r.motion.actual_q_rad),
     "actual_qd": ("VECTOR6D", lambda r: r.motion.qd_rad_s),
     "actual_TCP_pose": ("VECTOR6D", _pose),
-    "actual_TCP_speed": ("VECTOR6D", _tcp_speed),
+    "actual_TCP_speed": ("VECTOR6D", lambda r: r.tcp_motion.speed),
+    "actual_TCP_acceleration": ("VECTOR6D", lambda r: r.tcp_motion.acceleration),
+    "actual_tool_accelerometer": ("VECTOR3D", lambda r: r.tcp_motion.accelerometer),
     "target_TCP_pose": ("VECTOR6D", _target_pose),
-    "target_TCP_speed": ("VECTOR6D", _tcp_speed),
+    "target_TCP_speed": ("VECTOR6D", lambda r: r.target_tcp_motion.speed),
+    "target_TCP_acceleration": ("VECTOR6D", lambda r: r.target_tcp_motion.acceleration),
+    "elbow_position": ("VECTOR3D", lambda r: elbow(r.motion.q_rad, r.motion.qd_rad_s, r.links)[0]),
+    "elbow_velocity": ("VECTOR3D", lambda r: elbow(r.motion.q_rad, r.motion.qd_rad_s, r.links)[1]),
     "tcp_offset": ("VECTOR6D", _constant(TCP_OFFSET)),
     "robot_mode": ("INT32", lambda r: r.robot_mode),
     "joint_mode": ("VECTOR6INT32", joint_modes),
@@ -74,9 +86,12 @@ OUTPUTS: dict[str, tuple[str, Get]] = {
     "robot_status_bits": ("UINT32", lambda r: r.robot_status_bits),
     "safety_status_bits": ("UINT32", lambda r: r.safety_status_bits),
     "runtime_state": ("UINT32", lambda r: r.runtime_state),
-    "speed_scaling": ("DOUBLE", lambda r: r.motion.fraction),
+    "speed_scaling": ("DOUBLE", lambda r: r.speed_scaling),
     "target_speed_fraction": ("DOUBLE", lambda r: r.speed_slider),
     "actual_digital_output_bits": ("UINT64", lambda r: r.digital_outputs),
+    "actual_configurable_digital_output_bits": ("UINT64", lambda r: r.digital_outputs & CONFIGURABLE),
+    "actual_joint_voltage": ("VECTOR6D", lambda r: (_volts_when_on(48.0)(r),) * 6),
+    "actual_robot_voltage": ("DOUBLE", _volts_when_on(48.0)),
     "standard_analog_output0": ("DOUBLE", lambda r: r.analog_outputs[0]),
     "standard_analog_output1": ("DOUBLE", lambda r: r.analog_outputs[1]),
     "payload": ("DOUBLE", lambda r: r.payload_kg),
@@ -90,25 +105,22 @@ OUTPUTS: dict[str, tuple[str, Get]] = {
 # Quantities the simulation has no physics for: constant, and plausible for an idle controller.
 _CONSTANTS: dict[tuple[str, Any], str] = {
     ("VECTOR6D", ZERO6): """target_current target_moment actual_current actual_current_window actual_current_as_torque
-        joint_control_output actual_TCP_force actual_TCP_acceleration target_TCP_acceleration ft_raw_wrench
-        joint_position_deviation_ratio wrench_calc_from_currents payload_inertia""",
+        joint_control_output actual_TCP_force ft_raw_wrench wrench_calc_from_currents payload_inertia""",
     ("VECTOR6D", (28.0,) * 6): "joint_temperatures",
-    ("VECTOR6D", (48.0,) * 6): "actual_joint_voltage",
-    ("VECTOR3D", ZERO3): "elbow_position elbow_velocity",
-    ("VECTOR3D", (0.0, 0.0, 9.82)): "actual_tool_accelerometer target_gravity",
+    ("VECTOR3D", GRAVITY): "target_gravity",
     ("DOUBLE", 0.0): """actual_momentum standard_analog_input0 standard_analog_input1 io_current tcp_force_scalar
-        collision_detection_ratio tool_analog_input0 tool_analog_input1 tool_output_current euromap67_24V_voltage
-        euromap67_24V_current actual_robot_energy_consumed actual_robot_braking_energy_dissipated""",
+        collision_detection_ratio joint_position_deviation_ratio tool_analog_input0 tool_analog_input1
+        tool_output_current euromap67_24V_voltage euromap67_24V_current actual_robot_energy_consumed
+        actual_robot_braking_energy_dissipated""",
     ("DOUBLE", 1.0): "target_execution_time",
     ("DOUBLE", 0.3): "actual_execution_time actual_robot_current",
     ("DOUBLE", 28.0): "tool_temperature",
-    ("DOUBLE", 48.0): "actual_main_voltage actual_robot_voltage",
-    ("UINT64", 0): "actual_digital_input_bits",
+    ("DOUBLE", 48.0): "actual_main_voltage",
+    ("UINT64", 0): "actual_digital_input_bits actual_configurable_digital_input_bits",
     ("UINT32", 0): """analog_io_types tool_analog_input_types euromap67_input_bits euromap67_output_bits
         script_control_line""",
     ("UINT32", 255): "tool_mode",
-    ("UINT8", 0): """actual_configurable_digital_input_bits actual_configurable_digital_output_bits tool_output_mode
-        tool_digital_output0_mode tool_digital_output1_mode""",
+    ("UINT8", 0): "tool_output_mode tool_digital_output0_mode tool_digital_output1_mode",
     ("INT32", 0): "encoder0_raw encoder1_raw time_scale_source tool_output_voltage",
 }
 OUTPUTS |= {name: (kind, _constant(value)) for (kind, value), names in _CONSTANTS.items() for name in names.split()}

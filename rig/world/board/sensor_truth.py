@@ -1,0 +1,83 @@
+"""How one simulated sensor sits on the flange and what it reads of the flange's motion, with or without a board.
+
+`SensorTruth` is what the emulated sensors are made of. Studies and tests use it alone: `readings` takes arrays.
+"""
+
+from collections.abc import Sequence
+from math import radians
+
+import numpy as np
+
+from firmware_host.emulator.gyroscope import GyroTruth, Temperature, Warming, readings
+from rig.config.models import SensorSection, mounting_matrix
+from rig.config.world_models import SimulatedSensorSection
+from rig.world.ur10e.flange_motion import Components, Felt, moved
+from rig.world.ur10e.forward_kinematics import rotation_from_vector
+
+STANDARD_GRAVITY_M_S2 = 9.80665  # what a data sheet's g is
+
+
+class SensorTruth:
+    """One sensor. `gyro`: its errors; `temperature_c`: the die's, of a part that gets power at the time `powered_s`."""
+
+    def __init__(self, sensor: SensorSection, simulated: SimulatedSensorSection, powered_s: float = 0.0) -> None:
+        self.gyro = _gyro(simulated)
+        self.temperature_c: float | Temperature = simulated.temperature_c
+        if simulated.start_temperature_c is not None:
+            self.temperature_c = Warming(
+                simulated.start_temperature_c, simulated.temperature_c, simulated.warm_up_s, powered_s
+            )
+        self._rows = _rows(sensor, simulated.mounting_error_deg)
+        self._offset_m = [1e-3 * offset for offset in simulated.offset_mm]
+
+    def rate(self, flange_rate: Components) -> Components:
+        """The flange's rate in the sensor's own axes."""
+        (a, b, c), (d, e, f), (g, h, i) = self._rows
+        u, v, w = flange_rate
+        return a * u + b * v + c * w, d * u + e * v + f * w, g * u + h * v + i * w
+
+    def motion(self, flange: Felt) -> Sequence[float]:
+        """What the part feels of what the flange feels: its `motion_at`, 3 components or 6."""
+        rate = self.rate(flange.rate_rad_s)
+        if not self.gyro.g_sensitivity_rad_s_per_g:
+            return rate
+        force = moved(flange.rate_rad_s, flange.change_rad_s2, flange.force_m_s2, self._offset_m)
+        return (*rate, *(component / STANDARD_GRAVITY_M_S2 for component in self.rate(force)))
+
+    def readings(self, time_s: np.ndarray, flange: Felt, seed: int | np.random.SeedSequence) -> np.ndarray:
+        """The readings (n, 3) rad/s at times (n,), before rounding to counts. `flange`: arrays (n,) of those times."""
+        columns = [np.broadcast_to(component, time_s.shape) for component in self.motion(flange)]
+        return readings(self.gyro, time_s, np.column_stack(columns), seed, self.temperature_c)
+
+
+def _rows(sensor: SensorSection, mounting_error_deg: Sequence[float]) -> list[list[float]]:
+    """The rotation from the flange's axes to the sensor's.
+
+    The sensor sits as `sensor.mounting` says, then turned by the rotation vector `mounting_error_deg` (degrees, in its
+    own nominal axes): a vector's components change by the inverse of that rotation.
+    """
+    x, y, z = (radians(angle) for angle in mounting_error_deg)
+    error = np.array(rotation_from_vector((x, y, z)))
+    rows: list[list[float]] = (error.T @ mounting_matrix(sensor.mounting)).tolist()
+    return rows
+
+
+def _gyro(simulated: SimulatedSensorSection) -> GyroTruth:
+    g_sensitivity = simulated.g_sensitivity_rad_s_per_g
+    return GyroTruth(
+        scale=simulated.scale,
+        bias_rad_s=simulated.bias_rad_s,
+        noise_rad_s=simulated.noise_rad_s,
+        non_orthogonality_rad=[radians(angle) for angle in simulated.non_orthogonality_deg],
+        scale_per_k=simulated.scale_per_k,
+        bias_rad_s_per_k=simulated.bias_rad_s_per_k,
+        holds_at_c=simulated.temperature_c,
+        g_sensitivity_rad_s_per_g=g_sensitivity if any(map(any, g_sensitivity)) else (),
+        nonlinearity_even_per_rad_s=simulated.nonlinearity_even_per_rad_s,
+        nonlinearity_odd_per_rad_s=simulated.nonlinearity_odd_per_rad_s,
+        bandwidth_hz=simulated.bandwidth_hz,
+        delay_s=1e-3 * simulated.delay_ms,
+        instability_rad_s=simulated.bias_instability_rad_s,
+        instability_time_s=simulated.bias_instability_time_s,
+        random_walk_rad_s_per_sqrt_s=simulated.bias_random_walk_rad_s_per_sqrt_s,
+    )

@@ -1,0 +1,34 @@
+"""Where the laboratory stands: what the base of the arm feels of the Earth, in the base's own axes."""
+
+from dataclasses import dataclass
+from math import cos, radians, sin
+
+from rig.config.world_models import SiteSection
+
+EARTH_RATE_RAD_S = 7.292115e-5  # WGS 84: against the stars, not the sun
+
+Vector = tuple[float, float, float]
+
+
+@dataclass(frozen=True, slots=True)
+class Site:
+    """`earth_rate_rad_s`: of the ground; `specific_force_m_s2`: of a body at rest, which is gravity turned upwards."""
+
+    earth_rate_rad_s: Vector
+    specific_force_m_s2: Vector
+
+
+def site_of(section: SiteSection) -> Site:
+    """North, west and up, turned clockwise by the heading, then tilted about the base's x axis and its new y axis."""
+    rate = EARTH_RATE_RAD_S if section.latitude_deg is not None else 0.0
+    latitude, heading = radians(section.latitude_deg or 0.0), radians(section.heading_deg)
+    about_x, about_y = (radians(angle) for angle in section.base_tilt_deg)
+
+    def in_base(north: float, up: float) -> Vector:
+        """Of a vector without a part to the west."""
+        x, y, z = north * cos(heading), north * sin(heading), up
+        y, z = cos(about_x) * y + sin(about_x) * z, cos(about_x) * z - sin(about_x) * y
+        x, z = cos(about_y) * x - sin(about_y) * z, cos(about_y) * z + sin(about_y) * x
+        return x, y, z
+
+    return Site(in_base(rate * cos(latitude), rate * sin(latitude)), in_base(0.0, section.gravity_m_s2))

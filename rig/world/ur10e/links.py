@@ -1,0 +1,57 @@
+"""The links of a UR10e: as the drawing has them, as its controller knows them, and as they are.
+
+Denavit and Hartenberg's parameters, in the names of UR's calibration file (delta_theta, delta_a, delta_d, delta_alpha).
+"""
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from math import cos, pi, sin
+
+ZERO6 = (0.0,) * 6
+
+
+@dataclass(frozen=True, slots=True)
+class Link:
+    """One link: a turn by its joint's angle and `theta_rad`, a way d along z and a along x, a turn by alpha about x."""
+
+    theta_rad: float
+    a_m: float
+    d_m: float
+    alpha_rad: float
+    cos_alpha: float
+    sin_alpha: float
+
+
+Links = tuple[Link, ...]
+
+# UR10e, maker's article 45257: length a, offset d (m), twist alpha in quarter turns.
+_DRAWING = (
+    (0.0, 0.1807, 1),
+    (-0.6127, 0.0, 0),
+    (-0.57155, 0.0, 0),
+    (0.0, 0.17415, 1),
+    (0.0, 0.11985, -1),
+    (0.0, 0.11655, 0),
+)
+
+
+def links(
+    theta_rad: Sequence[float] = ZERO6,
+    a_m: Sequence[float] = ZERO6,
+    d_m: Sequence[float] = ZERO6,
+    alpha_rad: Sequence[float] = ZERO6,
+) -> Links:
+    """The drawing's links with these deviations of each joint. Without any, quarter turns are exact."""
+    return tuple(
+        _link(theta, a + da, d + dd, quarters, twist)
+        for (a, d, quarters), theta, da, dd, twist in zip(_DRAWING, theta_rad, a_m, d_m, alpha_rad, strict=True)
+    )
+
+
+def _link(theta_rad: float, a_m: float, d_m: float, quarters: int, twist_rad: float) -> Link:
+    c, s = cos(twist_rad), sin(twist_rad)
+    cosine, sine = {-1: (s, -c), 0: (c, s), 1: (-s, c)}[quarters]
+    return Link(theta_rad, a_m, d_m, quarters * pi / 2 + twist_rad, cosine, sine)
+
+
+NOMINAL = links()

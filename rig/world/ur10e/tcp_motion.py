@@ -1,0 +1,58 @@
+"""What the controller reckons of the tool centre point from the joints: speeds, accelerations, its accelerometer.
+
+With its own links, on a base that it takes to stand upright and still. Linear parts come first, then angular ones.
+"""
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+from rig.world.site import Site
+from rig.world.ur10e.flange_motion import felt
+from rig.world.ur10e.forward_kinematics import Vector, flange_frame, flange_pose, flange_rate
+from rig.world.ur10e.links import Links
+from rig.world.ur10e.trajectory import ZERO, Joints
+
+GRAVITY: Vector = (0.0, 0.0, 9.82)  # m/s², what an arm says of gravity, against its direction
+UPRIGHT = Site((0.0, 0.0, 0.0), GRAVITY)
+STEP_S = 1e-4
+
+
+@dataclass(frozen=True, slots=True)
+class TcpMotion:
+    """Speed and acceleration (m/s, rad/s; m/s², rad/s²) in the base's axes; `accelerometer`, m/s², in the tool's."""
+
+    speed: tuple[float, ...]
+    acceleration: tuple[float, ...]
+    accelerometer: Vector
+
+
+def tcp_motion(q_rad: Joints, qd_rad_s: Joints, qdd_rad_s2: Joints, links: Links) -> TcpMotion:
+    """Of joints with these angles, speeds and accelerations."""
+    _, change, force = felt(q_rad, qd_rad_s, qdd_rad_s2, links, UPRIGHT)
+    if not any(qd_rad_s) and not any(qdd_rad_s2):
+        return TcpMotion(ZERO, ZERO, force)
+    rotation, _ = flange_frame(q_rad, links)
+
+    def in_base(vector: Sequence[float]) -> list[float]:
+        return [sum(r * v for r, v in zip(row, vector, strict=True)) for row in rotation]
+
+    linear = [push - rest for push, rest in zip(in_base(force), GRAVITY, strict=True)]
+    speed = (*_velocity(q_rad, qd_rad_s, links), *in_base(flange_rate(q_rad, qd_rad_s, links)))
+    return TcpMotion(speed, (*linear, *in_base(change)), force)
+
+
+def elbow(q_rad: Joints, qd_rad_s: Joints, links: Links) -> tuple[Vector, Vector]:
+    """Position (m) and velocity (m/s) of the elbow, where the upper arm ends, in the base's axes."""
+    _, position = flange_frame(q_rad[:2], links[:2])
+    velocity = _velocity(q_rad[:2], qd_rad_s[:2], links[:2])
+    return position, velocity
+
+
+def _velocity(q_rad: Joints, qd_rad_s: Joints, links: Links) -> Vector:
+    """Of the origin behind the last link, from the places a moment before and after."""
+    before, after = (
+        flange_pose([a + sign * v * STEP_S for a, v in zip(q_rad, qd_rad_s, strict=True)], links)[:3]
+        for sign in (-1, 1)
+    )
+    x, y, z = ((b - a) / (2.0 * STEP_S) for a, b in zip(before, after, strict=True))
+    return x, y, z

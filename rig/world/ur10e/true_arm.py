@@ -1,0 +1,93 @@
+"""The arm as it is, beside what its controller knows: how its flange really moves, and in whose time."""
+
+from math import pi
+from random import Random
+
+from rig.config.world_models import CalibrationSection, SimulatedArmSection
+from rig.world.clock import TICK_S
+from rig.world.site import Site
+from rig.world.ur10e.flange_motion import Felt, felt
+from rig.world.ur10e.forward_kinematics import Vector, flange_rate
+from rig.world.ur10e.joint_errors import Errors, JointErrors
+from rig.world.ur10e.joint_motion import Motion
+from rig.world.ur10e.links import NOMINAL, ZERO6, Links, links
+
+STILL: Vector = (0.0, 0.0, 0.0)
+
+
+def known_links(calibration: CalibrationSection, twist_rad: tuple[float, ...] = ZERO6) -> Links:
+    """The links as the maker calibrated them; with the twists that he does not know, as they are."""
+    return links(
+        calibration.delta_theta_rad,
+        [1e-3 * length for length in calibration.delta_a_mm],
+        [1e-3 * length for length in calibration.delta_d_mm],
+        [known + rest for known, rest in zip(calibration.delta_alpha_rad, twist_rad, strict=True)],
+    )
+
+
+class TrueArm:
+    """Where the joints that `motion` plays really stand. Times are the world's; the controller's clock has its error.
+
+    `ideal`: nothing but the drawing, on a ground that does not turn: then the rate is all that anybody can feel of it.
+    """
+
+    def __init__(self, section: SimulatedArmSection, site: Site, motion: Motion, random: Random) -> None:
+        self._motion, self._site = motion, site
+        self._speed = 1.0 + 1e-6 * section.clock_ppm
+        self._links = known_links(section.calibration, section.residue.twist_rad)
+        errors = _errors(section)
+        self._errors = JointErrors(errors, random) if errors.any else None
+        self._at_rest: Felt | None = None
+        self.ideal = (
+            self._speed == 1.0 and self._links == NOMINAL and self._errors is None and not any(site.earth_rate_rad_s)
+        )
+
+    @property
+    def tick_s(self) -> float:
+        """How long the controller's tick of 2 ms really lasts."""
+        return TICK_S / self._speed
+
+    def true_s(self, controller_s: float) -> float:
+        """The time when the controller's clock shows that."""
+        return controller_s / self._speed
+
+    def step(self, controller_s: float) -> None:
+        """A tick of the controller has ended."""
+        if not self._motion.still:
+            self._at_rest = None
+            if self._errors is not None:
+                self._errors.step(controller_s, self._motion.q_rad, self._motion.qd_rad_s)
+
+    def rate_at(self, time_s: float) -> Vector:
+        """Angular rate of an ideal arm's flange in its own frame, rad/s, at a time inside the last tick."""
+        return STILL if self._motion.still else flange_rate(*self._motion.at(time_s))
+
+    def felt_at(self, time_s: float) -> Felt:
+        """All that a body on the flange feels at a time inside the last tick or the motion's memory."""
+        controller_s = time_s * self._speed
+        resting = self._motion.still and (self._errors is None or self._errors.quiet(controller_s))
+        if resting and self._at_rest is not None:
+            return self._at_rest
+        q, qd, qdd = self._motion.with_accelerations(controller_s)
+        if self._errors is not None:
+            q, qd, qdd = self._errors.at(controller_s, q, qd, qdd)
+        if self._speed != 1.0:  # the controller's seconds are not the world's
+            qd, qdd = tuple(v * self._speed for v in qd), tuple(a * self._speed**2 for a in qdd)
+        now = felt(q, qd, qdd, self._links, self._site)
+        self._at_rest = now if resting else None
+        return now
+
+
+def _errors(section: SimulatedArmSection) -> Errors:
+    residue = section.residue
+    return Errors(
+        residue.zero_rad,
+        residue.encoder_once_rad,
+        residue.encoder_twice_rad,
+        residue.hysteresis_rad,
+        2.0 * pi * section.vibration_hz,
+        section.vibration_rms_rad_s,
+        section.settling_rad,
+        2.0 * pi * section.settling_hz,
+        section.settling_decay_s,
+    )

@@ -1,0 +1,38 @@
+"""Configurations without a laboratory's imperfections: tests of one thing at a time begin with these."""
+
+from collections.abc import Mapping, Sequence
+from pathlib import Path
+from typing import Any
+
+import yaml
+
+from rig.config.load import Loaded, load, parse
+
+OF_THE_ARM = {
+    "vibration_rms_rad_s", "vibration_hz", "settling_rad", "settling_hz", "settling_decay_s", "clock_ppm",
+    "state_jitter_s", "calibration", "residue",
+}  # fmt: skip
+OF_A_SENSOR = {
+    "offset_mm", "start_temperature_c", "warm_up_s", "bias_rad_s_per_k", "scale_per_k", "g_sensitivity_rad_s_per_g",
+    "bias_instability_rad_s", "bias_instability_time_s", "bias_random_walk_rad_s_per_sqrt_s",
+    "nonlinearity_odd_per_rad_s", "nonlinearity_even_per_rad_s", "bandwidth_hz", "delay_ms",
+}  # fmt: skip
+
+
+def ideal_document(path: Path) -> dict[str, Any]:
+    """What a file and its bases say, but for the imperfections in its `world:` section."""
+    document: dict[str, Any] = yaml.safe_load(load(path).text)
+    world = document["world"]
+    world.pop("site", None)
+    world["arm"] = _without(world.get("arm", {}), OF_THE_ARM)
+    world["sensors"] = {name: _without(sensor, OF_A_SENSOR) for name, sensor in world["sensors"].items()}
+    return document
+
+
+def ideal(path: Path, overrides: Sequence[str] = ()) -> Loaded:
+    """The same as a configuration, with overrides as `--set` takes them."""
+    return parse(yaml.safe_dump(ideal_document(path), sort_keys=False), overrides=overrides)
+
+
+def _without(section: Mapping[str, Any], keys: set[str]) -> dict[str, Any]:
+    return {key: value for key, value in section.items() if key not in keys}
