@@ -11,6 +11,7 @@ import numpy as np
 
 from rig.data.settings import Uncertainty
 from rig.observation.observed_run import ObservedRun
+from rig.observation.timebase import widening
 from rig.observation.windows import swept
 
 # The board's counter runs from its 32768 Hz crystal by way of a PLL, 576 ppm below the nominal rate (docs/board.md).
@@ -75,13 +76,12 @@ def _by_computer(recording: ObservedRun, known: Uncertainty) -> ClockComparison 
     states = recording.motion.states
     host_s, arm_s = states["host_time_s"] - states["host_time_s"][0], states["time_s"] - states["time_s"][0]
     design = np.column_stack([np.ones_like(host_s), host_s])
-    (_, slope), *_ = np.linalg.lstsq(design, arm_s, rcond=None)
+    (offset, slope), *_ = np.linalg.lstsq(design, arm_s, rcond=None)
     if not abs(slope - 1) < REAL_TIME:
         return None
-    late = arm_s - design @ np.linalg.lstsq(design, arm_s, rcond=None)[0]
-    # States that come late come in bursts: every second counts as one look.
-    spread = host_s.std() * np.sqrt(max(host_s[-1], 1.0))
-    std = float(np.hypot(late.std() / spread, known.computer_clock_ppm * PPM))
+    late = arm_s - design @ (offset, slope)
+    of_the_line = late.std() / host_s.std() * np.sqrt(widening(late) / len(late))  # states come late in bursts
+    std = float(np.hypot(of_the_line, known.computer_clock_ppm * PPM / np.sqrt(3)))
     return ClockComparison("the computer's clock", float(slope - 1), std)
 
 

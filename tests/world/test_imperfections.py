@@ -210,7 +210,7 @@ def test_a_bias_walks_as_its_truth_alone_says() -> None:
     sensor = SensorSection.model_validate({"part": "lsm9ds1", "serial_number": "A"})
     still = Felt((0.0,) * 3, (0.0,) * 3, (0.0,) * 3)
     seen = rates(one, 1000)
-    times_s = 0.137 + items(one, "time_us") * 1e-6 / (CRYSTAL * 1.000035)  # boot_time_s, crystal_ppm of demo.yaml
+    times_s = 0.137 + items(one, "time_us") * 1e-6 / (CRYSTAL * 1.000012)  # boot_time_s, crystal_ppm of demo.yaml
     alone = SensorTruth(sensor, simulated).readings(times_s, still, np.random.SeedSequence([5, 0]))
     assert np.abs(seen - alone).max() < 1.5e-3  # the time stamps are late by the interrupt's delay
     assert np.ptp(alone, axis=0).min() > 0.01
