@@ -6,6 +6,7 @@ and how much longer a run took than alone.
 """
 
 import argparse
+import json
 import re
 import subprocess
 import sys
@@ -61,6 +62,9 @@ def run_demo(config: Path, folder: Path, number: int) -> Demo:
     errors = re.findall(r"^rig: (\w+): (.*)", ended.stderr, re.MULTILINE)
     name, said = errors[-1] if errors else ("no error", ended.stderr[-200:])
     ending, said = (VERDICTS[ended.returncode], "") if ended.returncode in VERDICTS else (name, f": {said}")
+    if ending == "fail":
+        checks = json.loads((out / "result.json").read_text(encoding="utf-8"))["checks"]
+        said = ": " + ", ".join(f"{check['name']} {check['value']}" for check in checks if not check["passed"])
     return Demo(
         ending, said, ended.returncode, wall_s, *count_states(out / "run.h5", load(config).config.arm.state_rate_hz)
     )

@@ -37,6 +37,7 @@ from rig.arm.stopping import BRAKE_RAD_S2
 from rig.errors import Problem
 
 HEARTBEAT_S = 0.01
+MOVE_POLL_S = 0.003
 FIRST_PACKET_S = 5.0
 TICK_S = 0.1
 PARENT_TICKS = 20  # 2 s without a sign of the parent's life
@@ -143,7 +144,7 @@ class _Child:
         wait for that.
         """
         while True:
-            time.sleep(HEARTBEAT_S)
+            time.sleep(MOVE_POLL_S)
             before = self._operations_before
             if before is None:
                 continue

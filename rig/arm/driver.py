@@ -23,6 +23,7 @@ START_S = 5.0  # a move begins within this (wall time), or not at all
 ANSWER_S = 5.0  # the dashboard has so long to answer while nothing moves
 SLOWNESS = 1.1  # a move may take this much longer than planned …
 SLOWNESS_S = 1.0  # … plus this, in the controller's time
+REPORT_S = 5.0  # … and to tell so, in wall time, once the arm stands where it should
 INTERRUPTION_S = 0.05  # a stopped program waits so long for the safety bits that explain it
 REASON_S = 0.2  # a refused move waits so long (wall time) for a state that explains it
 NOT_HELD = StopOutcome(True, "the arm was not under control")
@@ -156,10 +157,17 @@ class Arm:
             self._request(Move(motion.target_q_rad, motion.speed_rad_s, motion.acceleration_rad_s2))
             asked_s = time.monotonic()
             self._wait(lambda: self._answer is not None or time.monotonic() > asked_s + START_S, watch)
-            deadline_s = self.latest.time_s + motion.duration_s * SLOWNESS + SLOWNESS_S
             if self._answer is None:
                 self._fail(_not_started(motion))
-            self._wait(lambda: self._has_ended(motion) or self.latest.time_s > deadline_s, watch)
+            takes_s = motion.duration_s * SLOWNESS + SLOWNESS_S
+            deadline_s, reported_s = self.latest.time_s + takes_s, time.monotonic() + takes_s + REPORT_S
+
+            def late() -> bool:
+                """By the controller's clock; the news that it has arrived travels by this machine's."""
+                arrived = self._stands_at(motion) and time.monotonic() < reported_s
+                return self.latest.time_s > deadline_s and not arrived
+
+            self._wait(lambda: self._has_ended(motion) or late(), watch)
             if isinstance(self._answer, Failed):
                 self._wait_for_reason()
                 self._fail(self._answer.problem)
@@ -167,8 +175,7 @@ class Arm:
                 self._fail(
                     Problem(
                         "arm_slower_than_planned",
-                        f"{motion.name} did not end within {motion.duration_s * SLOWNESS + SLOWNESS_S:.1f} s, "
-                        f"planned were {motion.duration_s:.1f} s",
+                        f"{motion.name} did not end within {takes_s:.1f} s, planned were {motion.duration_s:.1f} s",
                         "Look for a speed limit in the safety settings or a program that slows the arm down",
                     )
                 )
@@ -244,8 +251,12 @@ class Arm:
     def _has_ended(self, motion: Motion) -> bool:
         if isinstance(self._answer, Failed):
             return True
+        return isinstance(self._answer, MoveFinished) and self._stands_at(motion)
+
+    def _stands_at(self, motion: Motion) -> bool:
+        """Whether the arm is at rest where the motion ends."""
         away_rad = max(map(abs, travel(self.latest.q_rad, motion.target_q_rad)))
-        return isinstance(self._answer, MoveFinished) and self.latest.at_rest and away_rad < ARRIVAL_RAD
+        return self.latest.at_rest and away_rad < ARRIVAL_RAD
 
     def _take(self, message: Message) -> None:
         """Called by the link's reader thread with every message of the child."""

@@ -38,7 +38,7 @@ class Silence:
         starved = self._all_ticks > 1 and self._starved(known=self._all_ticks > 2)
         self.ticks += not starved
 
-    def lasts_over(self, limit: int) -> bool:
+    def lasts_over(self, limit: float) -> bool:
         """Whether there were more than `limit` silent ticks, or far more when the machine was too busy to tell."""
         return self.ticks > limit or self._all_ticks > self._spared * limit
 
