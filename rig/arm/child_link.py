@@ -138,7 +138,8 @@ class ChildLink:
             self._frozen_ticks += self._beaten
             self._beaten = False
             crowding = _crowding()
-            if self._silent.lasts_over(PATIENT_TICKS if self._patient else SILENT_TICKS * crowding):
+            allowed = SILENT_TICKS * (1.0 if self._silent.stopped else crowding)
+            if self._silent.lasts_over(PATIENT_TICKS if self._patient else allowed):
                 return self._give_up("arm_driver_hung", "the process that talks to the arm no longer answers")
             if self._frozen_ticks > (PATIENT_TICKS if self._patient else FROZEN_TICKS * crowding):
                 return self._give_up("arm_link_lost", f"no new state comes from the arm at {self._host}")

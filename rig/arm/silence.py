@@ -42,6 +42,11 @@ class Silence:
         """Whether there were more than `limit` silent ticks, or far more when the machine was too busy to tell."""
         return self.ticks > limit or self._all_ticks > self._spared * limit
 
+    @property
+    def stopped(self) -> bool:
+        """Whether somebody has stopped the process: then it is not the machine that keeps it silent."""
+        return self._thread is not None and _state(self._tasks / self._thread) == "T"
+
     def _starved(self, known: bool) -> bool:
         """Whether the process waited for a processor since the last call; False when that is not `known`.
 
@@ -71,7 +76,11 @@ def _times(tasks: Path) -> _Times:
 
 def _held_up(task: Path) -> bool:
     """Whether the thread is ready to run, or waits for memory that the system has put away."""
+    return _state(task) in ("R", "D")
+
+
+def _state(task: Path) -> str:
     try:
-        return (task / "stat").read_text(errors="replace").rpartition(")")[2].split()[0] in "RD"
+        return (task / "stat").read_text(errors="replace").rpartition(")")[2].split()[0]
     except (OSError, IndexError):
-        return False
+        return ""

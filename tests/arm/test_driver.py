@@ -25,6 +25,7 @@ from rig.config.models import ArmSection
 from rig.config.procedure_sections import SixObservationSection
 from rig.errors import Fault, Refused
 from rig.plans.six_sweeps import plan_six_observation
+from support.crowding import crowding
 from support.worlds import World, WorldHandle
 
 pytestmark = pytest.mark.slow
@@ -172,7 +173,7 @@ def test_a_fault_during_a_move_is_named_and_the_arm_stands_still(
         watch = AtSpeed(arm, lambda: laboratory.control(order))
         with pytest.raises(Fault) as fault:
             arm.move(turn(arm.latest.q_rad, 6.0), watch)
-        assert time.monotonic() - watch.acted_s < 3.0  # on a machine that is not crowded, 2
+        assert time.monotonic() - watch.acted_s < 2.0 * crowding()
         assert fault.value.name == name
         assert "test move" in fault.value.what or "127." in fault.value.what
         assert fault.value.remedy
@@ -193,7 +194,7 @@ def test_a_child_that_dies_or_hangs_mid_move_leaves_a_standing_arm_within_a_seco
         def end_child_and_await_the_stop() -> None:
             os.kill(child.pid or 0, getattr(signal, kind))
             killed_s = time.monotonic()
-            until(lambda: stands(laboratory), 2.0)
+            until(lambda: stands(laboratory), 5.0)
             stood_s.append(time.monotonic() - killed_s)
 
         with pytest.raises(Fault) as fault:
@@ -201,7 +202,7 @@ def test_a_child_that_dies_or_hangs_mid_move_leaves_a_standing_arm_within_a_seco
         assert fault.value.name == name
         assert "the controller says that its program has ended" in fault.value.what
         assert "Look at the arm" in fault.value.remedy and "emergency stop" not in fault.value.remedy
-        assert stood_s[0] < 1.0
+        assert stood_s[0] < 1.0 * crowding()
 
 
 @pytest.mark.parametrize("where", ["move", "rest"])
@@ -270,7 +271,7 @@ def test_a_dashboard_that_is_gone_too_is_said_honestly(laboratory: WorldHandle) 
         cut = AtSpeed(arm, lambda: laboratory.control({"do": "close_arm", "listen": False}))
         with pytest.raises(Fault) as fault:
             arm.move(turn(arm.latest.q_rad, 6.0), cut)
-        assert time.monotonic() - cut.acted_s < 2.0
+        assert time.monotonic() - cut.acted_s < 2.0 * crowding()
     assert fault.value.name == "arm_link_lost"
     assert "dashboard did not take the stop" in fault.value.what
     assert "press the emergency stop" in fault.value.remedy
