@@ -98,7 +98,7 @@ def nearest_axis(vector: Array) -> tuple[str, int]:
 def sound_sweeps(run: RunData, settings: ObservationThresholds) -> frozenset[int]:
     """The finished sweeps that `observe_sensor` accepts for every sensor: a resumed run need not repeat them."""
     try:
-        motion = ArmMotion(run.arm)
+        motion = ArmMotion(run.arm, run.provenance.kinematics)
     except Fault:
         return frozenset()
     sound = (_sound_for(run, sensor, motion, settings) for sensor in run.sensors)

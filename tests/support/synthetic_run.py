@@ -4,12 +4,12 @@ The arm follows the rig's own plan with trapezoid ramps and a ripple locked to t
 its own epoch and rate; readings follow g = K (m + b) with mounting error, noise, quantisation and saturation.
 """
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
 from firmware_host.samples import SAMPLE_DTYPE
-from rig.arm.kinematics import flange_rate
+from rig.arm.kinematics import NOMINAL, DenavitHartenberg, flange_rate
 from rig.arm.motion import Plan, Rest, Sweep, Transfer
 from rig.arm.state import ARM_STATE_DTYPE
 from rig.config.load import parse
@@ -63,6 +63,8 @@ class Setup:
     sample_rate_hz: float = 238.0
     boot_s: float = -4321.0  # controller time at which the board's clock stood at zero
     drift: float = -35e-6  # of the controller against the board
+    kinematics: DenavitHartenberg = NOMINAL  # how the arm is made
+    told: DenavitHartenberg | None = None  # how its controller says it is made
 
 
 def truth(setup: Setup) -> Array:
@@ -118,10 +120,10 @@ class Motion:
         return tuple(events)
 
 
-def true_rate(motion: Motion, time_s: Array) -> Array:
+def true_rate(motion: Motion, time_s: Array, kinematics: DenavitHartenberg = NOMINAL) -> Array:
     """(n, 3) angular velocity of the flange in its frame, rad/s."""
     q, qd = motion.joints(time_s)
-    return flange_rate(q, qd)
+    return flange_rate(q, qd, kinematics)
 
 
 def synthetic_run(setup: Setup) -> RunData:
@@ -129,7 +131,7 @@ def synthetic_run(setup: Setup) -> RunData:
     rng = np.random.default_rng(setup.seed)
     motion = Motion(setup, rng)
     board_s, controller_s = sample_times(setup, motion)
-    return run_data(setup, motion, board_s, readings(setup, true_rate(motion, controller_s), rng))
+    return run_data(setup, motion, board_s, readings(setup, true_rate(motion, controller_s, setup.kinematics), rng))
 
 
 def sample_times(setup: Setup, motion: Motion) -> tuple[Array, Array]:
@@ -166,8 +168,9 @@ def run_data(setup: Setup, motion: Motion, board_s: Array, counts: Array) -> Run
     arm["q_rad"], arm["qd_rad_s"] = np.round(q / 6e-6) * 6e-6, qd
     arm["target_speed_fraction"] = arm["speed_scaling"] = 1.0
     arm["robot_mode"], arm["safety_mode"], arm["runtime_state"] = 7, 1, 2
+    provenance = replace(PROVENANCE, arm_kinematics=setup.told)
     return RunData(
-        motion.config, motion.settings, PROVENANCE, {"gyro": SENSOR}, {"gyro": samples}, arm, motion.events()
+        motion.config, motion.settings, provenance, {"gyro": SENSOR}, {"gyro": samples}, arm, motion.events()
     )
 
 
