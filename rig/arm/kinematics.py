@@ -14,6 +14,12 @@ from pydantic import Field
 from rig.estimation.arrays import Array
 
 ROUNDING = 1e-15
+WRIST_1, WRIST_2, WRIST_3 = 3, 4, 5
+WAVES = ("cos", "sin", "cos 2", "sin 2")  # an eccentric or tilted graduation errs once and twice a turn
+AXIS_ERRORS = (  # all that can be wrong with the angles between the wrists' axes
+    *(f"twist of wrist_{number}" for number in (1, 2, 3)),
+    *(name for wrist in ("wrist_2", "wrist_3") for name in (f"zero of {wrist}", *(f"{w} of {wrist}" for w in WAVES))),
+)
 
 Finite = Annotated[float, Field(allow_inf_nan=False)]
 OfJoints = Annotated[tuple[Finite, ...], Field(min_length=6, max_length=6)]
@@ -35,6 +41,29 @@ NOMINAL = DenavitHartenberg(  # the maker's article 45257
     d_m=(0.1807, 0.0, 0.0, 0.17415, 0.11985, 0.11655),
     alpha_rad=(pi / 2, 0.0, 0.0, pi / 2, -pi / 2, 0.0),
 )
+
+
+def axis_errors(q_rad: ArrayLike, joint: int, arm: DenavitHartenberg = NOMINAL) -> Array:
+    """(13, 3) change of the direction of a wrist's axis in the flange's frame, by radian of each of `AXIS_ERRORS`.
+
+    At joint angles `q_rad` (6,). What turns the whole flange is seen by a sensor as its mounting.
+    """
+    q = np.asarray(q_rad, dtype=np.float64)
+    frames = np.array(_frames(q, arm))[:, :3, :3]
+    to_flange = frames[-1].T
+    axis = to_flange @ frames[joint, :, 2]
+
+    def turned(about: Array, link: int) -> Array:
+        """By a turn of all that lies beyond the joint `link`, the flange among it."""
+        return np.cross(axis, to_flange @ about) if joint <= link else np.zeros(3)
+
+    changes = [turned(frames[link + 1][:, 0], link) for link in (WRIST_1, WRIST_2, WRIST_3)]
+    for link in (WRIST_2, WRIST_3):
+        by_zero = turned(frames[link][:, 2], link)
+        angle = q[link]
+        waves = (np.cos(angle), np.sin(angle), np.cos(2 * angle), np.sin(2 * angle))
+        changes += [by_zero, *(wave * by_zero for wave in waves)]
+    return np.array(changes)
 
 
 def _link(angle_rad: Array, a_m: float, d_m: float, alpha_rad: float) -> Array:

@@ -25,7 +25,7 @@ CONFIG = """
 arm: {{host: 192.0.2.1, payload_kg: 0.35}}
 board: {{port: /dev/ttyACM0}}
 sensors: {{gyro: {{part: lsm9ds1, serial_number: LSM9DS1-001}}}}
-procedure: {{speed_deg_s: {speed_deg_s}, rest_s: {rest_s}, repeats: {repeats}}}
+procedure: {{speed_deg_s: {speed_deg_s}, rest_s: {rest_s}, repeats: {repeats}{procedure}}}
 limits: {{scale_deviation: 0.3, scale_std: 0.002, bias_rad_s: 0.1, bias_std_rad_s: 0.002, condition: 100}}
 """
 PROVENANCE = Provenance(
@@ -64,6 +64,9 @@ class Setup:
     boot_s: float = -4321.0  # controller time at which the board's clock stood at zero
     drift: float = -35e-6  # of the controller against the board
     kinematics: DenavitHartenberg = NOMINAL  # how the arm is made
+    procedure: tuple[tuple[str, str], ...] = ()  # further keys of its section, and their values
+    odd_per_rad_s: float = 0.0  # of each axis
+    even_per_rad_s: float = 0.0
     told: DenavitHartenberg | None = None  # how its controller says it is made
 
 
@@ -76,7 +79,12 @@ class Motion:
     """Joint angles and speeds of a planned movement with its ripple, at any controller time. Begins at time 100 s."""
 
     def __init__(self, setup: Setup, rng: np.random.Generator) -> None:
-        self.config = CONFIG.format(speed_deg_s=setup.speed_deg_s, rest_s=setup.rest_s, repeats=setup.repeats)
+        self.config = CONFIG.format(
+            speed_deg_s=setup.speed_deg_s,
+            rest_s=setup.rest_s,
+            repeats=setup.repeats,
+            procedure="".join(f", {key}: {value}" for key, value in setup.procedure),
+        )
         config = parse(self.config).config
         assert isinstance(config.procedure, SixSweepsSection)
         self.plan: Plan = plan_six_observation(config.arm, config.procedure)
@@ -143,6 +151,7 @@ def sample_times(setup: Setup, motion: Motion) -> tuple[Array, Array]:
 def readings(setup: Setup, rate: Array, rng: np.random.Generator) -> Array:
     """Counts (n, 3) of a sensor that feels the flange's rate (n, 3)."""
     turned = rate @ _rotation(np.array(setup.mounting_error_rad)).T
+    turned = turned * (1 + setup.odd_per_rad_s * np.abs(turned) + setup.even_per_rad_s * turned)
     noise = rng.normal(size=turned.shape)
     if setup.noise_correlation:
         fresh = np.sqrt(1 - setup.noise_correlation**2) * noise
