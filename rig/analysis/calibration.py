@@ -37,7 +37,8 @@ class SensorResult:
     """One sensor's calibration and what it rests on.
 
     `explained` is the vector model with gravity and a wandering bias, None for recordings of before there was a site
-    and where the vector model has no solution. The `budget` is its; there is none of another estimator.
+    and where the vector model has no solution. The `uncertainty` is its; there is none of another
+    estimator.
 
     `solution` is the chosen estimator's. Beside it stand the others from the same observations: `vector_model`,
     `six_observation` (exact) and `algorithm_1`, the paper's own, or the Fault one ends in. There is one time base for
@@ -48,7 +49,7 @@ class SensorResult:
     solution: Estimate
     vector_model: VectorSolution | Fault
     explained: Explained | None
-    budget: Budget | None
+    uncertainty: Budget | None
     six_observation: Solution
     algorithm_1: Solution | Fault
     observations: tuple[Observation, ...]
@@ -73,7 +74,7 @@ class SensorResult:
     @property
     def combined_covariance(self) -> Array:
         """(6, 6) with all that is in the budget; of the noise alone where there is none."""
-        return self.solution.covariance if self.budget is None else self.budget.covariance
+        return self.solution.covariance if self.uncertainty is None else self.uncertainty.covariance
 
     @property
     def temperature_c(self) -> float:
@@ -150,7 +151,7 @@ def _solve_sensor(
         solution=solution,
         vector_model=vector_model,
         explained=explained if isinstance(explained, Explained) else None,
-        budget=(
+        uncertainty=(
             budget(explained, unknown_of(surroundings, name))
             if isinstance(explained, Explained) and surroundings is not None and estimator == "vector"
             else None

@@ -82,7 +82,7 @@ def calibrated(runs: Sequence[RunData], estimator: str = DEFAULT_ESTIMATOR) -> O
     checks = judge(
         {name: results[name].solution for name in onboard},
         settings.limits,
-        {name: result.budget for name, result in results.items() if result.budget is not None},
+        {name: result.uncertainty for name, result in results.items() if result.uncertainty is not None},
         "simple" if settings.uncertainty is None else settings.uncertainty.decision_rule,
     )
     return Outcome(

@@ -11,7 +11,7 @@ from pydantic import ConfigDict, Field, JsonValue, ValidationError
 
 from rig.config.regular_file import UnfitFile, read_regular_file
 from rig.data.budget_entries import BiasProcessEntry, BudgetEntry, ClockEntry
-from rig.data.result_types import Entry, Matrix3, Matrix6, Positive, PositiveVector3, Role, Vector3
+from rig.data.result_types import Entry, Matrix3, Matrix6, Positive, PositiveVector3, Role, Vector3, Vector6
 from rig.data.run_folder import RESULT
 from rig.errors import Refused
 
@@ -51,6 +51,15 @@ class StoredCalibrationEntry(Entry):
     bias_rad_s: Vector3
 
 
+class KinematicsEntry(Entry):
+    """The arm's Denavit–Hartenberg parameters that were reckoned with, base to wrist 3."""
+
+    theta_rad: Vector6
+    a_m: Vector6
+    d_m: Vector6
+    alpha_rad: Vector6
+
+
 class ProvenanceEntry(Entry):
     """What was measured with what, and when. Later versions may add to it."""
 
@@ -71,6 +80,7 @@ class ProvenanceEntry(Entry):
     resumed_utc: tuple[str, ...]
     verified_utc: tuple[str, ...]
     solved_utc: str
+    arm_kinematics: KinematicsEntry | None = None
 
 
 class ErrorEntry(Entry):
@@ -116,6 +126,15 @@ class VectorEntry(Entry):
     g_sensitivity_std_rad_s_per_m_s2: Matrix3 | None = None
     residuals_rad_s: tuple[Vector3, ...]
     warnings: tuple[str, ...]
+
+
+class NonlinearityEntry(Entry):
+    """Of each axis: reading = (g + odd |g| g + even g²) / scale − bias, g the rate along it in rad/s."""
+
+    odd_per_rad_s: Vector3
+    odd_std_per_rad_s: Vector3
+    even_per_rad_s: Vector3
+    even_std_per_rad_s: Vector3
 
 
 class AverageEntry(Entry):
@@ -186,8 +205,9 @@ class SensorEntry(Entry):
     """A sensor's calibration by the chosen estimator, what it rests on, and what the other estimators say.
 
     `covariance` is that of noise and of a bias that wanders, `covariance_combined` holds all of the `budget`; both are
-    there where the vector model was chosen. `temperature_c` is the mean over all averaged samples. A reference has no
-    `board`: the board solves only for the sensors that are to be calibrated.
+    there where the vector model was chosen. `speeds_rad_s` are those of the sweeps: found at one speed, either way, the
+    calibration is valid at that speed, and there is no `nonlinearity`. `temperature_c` is the mean over all averaged
+    samples. A reference has no `board`: the board solves only for the sensors that are to be calibrated.
     """
 
     part: str
@@ -203,6 +223,8 @@ class SensorEntry(Entry):
     covariance_combined: Matrix6 | None = None
     budget: BudgetEntry | None = None
     bias_process: BiasProcessEntry | None = None
+    speeds_rad_s: tuple[float, ...] = ()
+    nonlinearity: NonlinearityEntry | None = None
     observations_used: int
     rank: int
     condition: float

@@ -10,6 +10,7 @@ from rig.data.result_file import (
     BoardSolutionEntry,
     ErrorEntry,
     EstimateEntry,
+    NonlinearityEntry,
     ObservationEntry,
     SensorEntry,
     TimeBaseEntry,
@@ -43,10 +44,16 @@ def sensor_entry(result: SensorResult, role: Role = "calibrate", agreed: Agreeme
         algorithm_1=entry_or_error(result.algorithm_1),
     )  # fmt: skip
     more: dict[str, object] = {} if agreed is None else {"board": _board(agreed)}
-    if result.budget is not None:
-        more |= {"covariance_combined": _rows(result.budget.covariance), "budget": budget_entry(result.budget)}
+    if result.uncertainty is not None:
+        more |= {
+            "covariance_combined": _rows(result.uncertainty.covariance),
+            "budget": budget_entry(result.uncertainty),
+        }
     if result.explained is not None:
         more["bias_process"] = bias_process_entry(result.explained)
+        more["speeds_rad_s"] = result.explained.seen.speeds_rad_s
+        if result.explained.nonlinearity is not None:
+            more["nonlinearity"] = entry(NonlinearityEntry, result.explained.nonlinearity)
     return found.model_copy(update=more)
 
 

@@ -7,7 +7,8 @@ from math import pi
 import numpy as np
 import pytest
 
-from rig.analysis.calibration import SensorResult, observe_recordings, solve_observed
+from rig.analysis.calibration import SensorResult
+from rig.analysis.outcome import calibrated
 from rig.arm.kinematics import NOMINAL, DenavitHartenberg
 from rig.estimation.arrays import Array
 from rig.estimation.vector_model import VectorSolution
@@ -34,8 +35,7 @@ CURVED = Setup(
 
 @cache
 def solved(setup: Setup) -> SensorResult:
-    run = synthetic_run(setup)
-    return solve_observed(run.sensors, observe_recordings([run]))["gyro"]
+    return calibrated([synthetic_run(setup)]).results["gyro"]
 
 
 def skew_deg(result: SensorResult) -> tuple[float, float]:
