@@ -6,10 +6,15 @@ from datetime import datetime
 import numpy as np
 
 from rig.analysis.surroundings import Surroundings
+from rig.arm.kinematics import AXIS_ERRORS
 from rig.config.sensor_catalogue import PARTS
+from rig.estimation.arrays import Array
 from rig.estimation.budget import Unknown
 from rig.estimation.explained import Seen
+from rig.observation.observe import Observation
 from rig.observation.observed_run import ObservedRun
+
+WAVE_SHARE = 0.3  # of the error of a joint's zero, what its encoder errs once or twice a turn; assumed
 
 
 def see(recordings: Sequence[ObservedRun], sensor: str, surroundings: Surroundings) -> Seen:
@@ -37,7 +42,16 @@ def see(recordings: Sequence[ObservedRun], sensor: str, surroundings: Surroundin
         gravity_m_s2=attitudes @ (-site.gravity_m_s2 * np.array(site.up)),
         windows_s=np.array([(average.start_s + since_s, average.end_s + since_s) for average, since_s in placed]),
         joints=(*(turn.joint_name for turn, _ in turns), *[None] * len(rests)),
+        axis_errors_rad_s=_axis_errors([turn for turn, _ in turns], len(rests), surroundings.uncertainty.axis_deg),
     )
+
+
+def _axis_errors(turns: Sequence[Observation], rests: int, axis_deg: float) -> Array:
+    """(P, N, 3) as in `Seen`, for angles of the arm that may be off by `axis_deg` either way."""
+    steady = np.array([name.startswith(("twist", "zero")) for name in AXIS_ERRORS])
+    std = np.radians(axis_deg) / np.sqrt(3) * np.where(steady, 1.0, WAVE_SHARE)
+    off = [std[:, None] * turn.speed_rad_s * turn.axis_errors for turn in turns if turn.axis_errors is not None]
+    return np.concatenate([np.swapaxes(off, 0, 1), np.zeros((len(std), rests, 3))], axis=1)
 
 
 def _since_s(recordings: Sequence[ObservedRun]) -> list[float]:

@@ -11,8 +11,10 @@ from typing import Self
 from rig.arm.child_link import ChildLink
 from rig.arm.condition import program_interruption, readiness
 from rig.arm.dashboard import Dashboard
+from rig.arm.kinematics import DenavitHartenberg
 from rig.arm.messages import Connected, Failed, Heartbeat, Message, Move, MoveFinished, TakeControl
 from rig.arm.motion import Motion, travel
+from rig.arm.primary import read_kinematics
 from rig.arm.state import ArmReport, ArmState, RuntimeState
 from rig.arm.stopping import StopOutcome, Stopper
 from rig.errors import Fault, Problem, Refused, RigError
@@ -105,6 +107,7 @@ class Arm:
                     payload_kg=self._connected.payload_kg,
                     payload_centre_m=self._connected.payload_centre_m,
                     state=self.latest,
+                    kinematics=_kinematics(self._host),
                 )
         except OSError as error:
             raise Refused(
@@ -318,6 +321,13 @@ def _not_started(motion: Motion) -> Problem:
         f"{motion.name} was not begun within {START_S:g} s",
         "Read the pendant's log, then start again",
     )
+
+
+def _kinematics(host: str) -> DenavitHartenberg | None:
+    try:
+        return read_kinematics(host, ANSWER_S)
+    except OSError:
+        return None
 
 
 def look(host: str) -> ArmReport:

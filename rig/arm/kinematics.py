@@ -3,25 +3,73 @@
 Every function takes arrays whose last axis holds the six joints, base to wrist 3, and broadcasts over the others.
 """
 
+from dataclasses import dataclass
+from math import pi
+from typing import Annotated
+
 import numpy as np
 from numpy.typing import ArrayLike
+from pydantic import Field
 
 from rig.estimation.arrays import Array
 
-# Denavit–Hartenberg parameters (maker's article 45257): (a in m, d in m, cos α, sin α); every α is a multiple of 90°.
-DH = (
-    (0.0, 0.1807, 0.0, 1.0),
-    (-0.6127, 0.0, 1.0, 0.0),
-    (-0.57155, 0.0, 1.0, 0.0),
-    (0.0, 0.17415, 0.0, 1.0),
-    (0.0, 0.11985, 0.0, -1.0),
-    (0.0, 0.11655, 1.0, 0.0),
+ROUNDING = 1e-15
+WRIST_1, WRIST_2, WRIST_3 = 3, 4, 5
+WAVES = ("cos", "sin", "cos 2", "sin 2")  # an eccentric or tilted graduation errs once and twice a turn
+AXIS_ERRORS = (  # all that can be wrong with the angles between the wrists' axes
+    *(f"twist of wrist_{number}" for number in (1, 2, 3)),
+    *(name for wrist in ("wrist_2", "wrist_3") for name in (f"zero of {wrist}", *(f"{w} of {wrist}" for w in WAVES))),
+)
+
+Finite = Annotated[float, Field(allow_inf_nan=False)]
+OfJoints = Annotated[tuple[Finite, ...], Field(min_length=6, max_length=6)]
+
+
+@dataclass(frozen=True, slots=True)
+class DenavitHartenberg:
+    """An arm's geometry: of each joint, base to wrist 3, its zero θ, the length a, the offset d and the twist α."""
+
+    theta_rad: OfJoints
+    a_m: OfJoints
+    d_m: OfJoints
+    alpha_rad: OfJoints
+
+
+NOMINAL = DenavitHartenberg(  # the maker's article 45257
+    theta_rad=(0.0,) * 6,
+    a_m=(0.0, -0.6127, -0.57155, 0.0, 0.0, 0.0),
+    d_m=(0.1807, 0.0, 0.0, 0.17415, 0.11985, 0.11655),
+    alpha_rad=(pi / 2, 0.0, 0.0, pi / 2, -pi / 2, 0.0),
 )
 
 
-def _link(angle_rad: Array, a_m: float, d_m: float, cos_alpha: float, sin_alpha: float) -> Array:
+def axis_errors(q_rad: ArrayLike, joint: int, arm: DenavitHartenberg = NOMINAL) -> Array:
+    """(13, 3) change of the direction of a wrist's axis in the flange's frame, by radian of each of `AXIS_ERRORS`.
+
+    At joint angles `q_rad` (6,). What turns the whole flange is seen by a sensor as its mounting.
+    """
+    q = np.asarray(q_rad, dtype=np.float64)
+    frames = np.array(_frames(q, arm))[:, :3, :3]
+    to_flange = frames[-1].T
+    axis = to_flange @ frames[joint, :, 2]
+
+    def turned(about: Array, link: int) -> Array:
+        """By a turn of all that lies beyond the joint `link`, the flange among it."""
+        return np.cross(axis, to_flange @ about) if joint <= link else np.zeros(3)
+
+    changes = [turned(frames[link + 1][:, 0], link) for link in (WRIST_1, WRIST_2, WRIST_3)]
+    for link in (WRIST_2, WRIST_3):
+        by_zero = turned(frames[link][:, 2], link)
+        angle = q[link]
+        waves = (np.cos(angle), np.sin(angle), np.cos(2 * angle), np.sin(2 * angle))
+        changes += [by_zero, *(wave * by_zero for wave in waves)]
+    return np.array(changes)
+
+
+def _link(angle_rad: Array, a_m: float, d_m: float, alpha_rad: float) -> Array:
     """(…, 4, 4) transform across one joint: turn about z, along z, along x, turn about x."""
     cos, sin = np.cos(angle_rad), np.sin(angle_rad)
+    cos_alpha, sin_alpha = _clean(np.cos(alpha_rad)), _clean(np.sin(alpha_rad))
     link = np.zeros((*angle_rad.shape, 4, 4))
     link[..., 0, 0], link[..., 0, 1], link[..., 0, 2], link[..., 0, 3] = (
         cos,
@@ -40,37 +88,42 @@ def _link(angle_rad: Array, a_m: float, d_m: float, cos_alpha: float, sin_alpha:
     return link
 
 
-def _frames(q_rad: ArrayLike) -> list[Array]:
+def _clean(value: float) -> float:
+    """Of a quarter turn the sines are 0 and 1: π/2 is rounded."""
+    return 0.0 if abs(value) < ROUNDING else float(value)
+
+
+def _frames(q_rad: ArrayLike, arm: DenavitHartenberg) -> list[Array]:
     """Seven (…, 4, 4) transforms in the base frame: the base itself, then the frame after each joint."""
     q = np.asarray(q_rad, dtype=np.float64)
     frames = [np.broadcast_to(np.eye(4), (*q.shape[:-1], 4, 4))]
-    for joint, parameters in enumerate(DH):
-        frames.append(frames[-1] @ _link(q[..., joint], *parameters))
+    for joint, (theta, *link) in enumerate(zip(arm.theta_rad, arm.a_m, arm.d_m, arm.alpha_rad, strict=True)):
+        frames.append(frames[-1] @ _link(q[..., joint] + theta, *link))
     return frames
 
 
-def flange_pose(q_rad: ArrayLike) -> Array:
+def flange_pose(q_rad: ArrayLike, arm: DenavitHartenberg = NOMINAL) -> Array:
     """(…, 4, 4) pose of the flange in the base frame (metres) from joint angles `q_rad` (…, 6)."""
-    return _frames(q_rad)[-1]
+    return _frames(q_rad, arm)[-1]
 
 
-def flange_attitude(q_rad: ArrayLike) -> Array:
+def flange_attitude(q_rad: ArrayLike, arm: DenavitHartenberg = NOMINAL) -> Array:
     """(…, 3, 3) rotations taking a vector of the base frame into the flange's, for joint angles `q_rad` (…, 6)."""
-    rotations: Array = np.swapaxes(flange_pose(q_rad)[..., :3, :3], -1, -2)
+    rotations: Array = np.swapaxes(flange_pose(q_rad, arm)[..., :3, :3], -1, -2)
     return rotations
 
 
-def flange_axes(q_rad: ArrayLike) -> Array:
+def flange_axes(q_rad: ArrayLike, arm: DenavitHartenberg = NOMINAL) -> Array:
     """(…, 3, 6) unit axes of the six joints (columns) in the flange frame, for joint angles `q_rad` (…, 6).
 
     A joint's own angle does not move its column, so a sweep of one wrist keeps its axis.
     """
-    *before, flange = _frames(q_rad)
+    *before, flange = _frames(q_rad, arm)
     axes_in_base = np.stack([frame[..., :3, 2] for frame in before], axis=-1)
     return np.swapaxes(flange[..., :3, :3], -1, -2) @ axes_in_base
 
 
-def flange_rate(q_rad: ArrayLike, qd_rad_s: ArrayLike) -> Array:
+def flange_rate(q_rad: ArrayLike, qd_rad_s: ArrayLike, arm: DenavitHartenberg = NOMINAL) -> Array:
     """(…, 3) angular velocity of the flange in its own frame, rad/s, from joint angles and speeds (…, 6)."""
-    rate: Array = np.einsum("...ij,...j->...i", flange_axes(q_rad), np.asarray(qd_rad_s, dtype=np.float64))
+    rate: Array = np.einsum("...ij,...j->...i", flange_axes(q_rad, arm), np.asarray(qd_rad_s, dtype=np.float64))
     return rate

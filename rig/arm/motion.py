@@ -34,8 +34,8 @@ class Sweep:
 
     `index` counts the plan's sweeps from 0. `joint` is 0 (base) to 5 (wrist 3). `direction` is "ccw" for a growing
     joint angle, "cw" for a falling one. `axis_flange` is the unit vector of the flange's angular velocity in the
-    flange frame, sign included. `revolution_rad` is the (low, high) joint angle of the revolution: exactly 2π,
-    centred on the home pose.
+    flange frame, sign included, as of the nominal arm. `revolution_rad` is the (low, high) joint angle of the
+    revolution: exactly 2π, centred on the home pose.
     """
 
     index: int

@@ -6,8 +6,10 @@ from collections.abc import Sequence
 import numpy as np
 
 from rig.arm.condition import readiness
+from rig.arm.kinematics import NOMINAL, DenavitHartenberg, flange_axes
 from rig.arm.motion import SAME_PLACE_RAD, Motion, Plan, travel
 from rig.arm.state import JOINT_NAMES, ArmReport, Joints
+from rig.config.models import ArmSection
 from rig.config.ur10e_limits import (
     ACCELERATION_LIMIT_RAD_S2,
     JOINT_LIMIT_RAD,
@@ -18,6 +20,8 @@ from rig.errors import Problem, Refused
 
 # How far the first motion may swing the large joints through the room, and the wrists.
 FIRST_MOTION_LIMIT_RAD = tuple(math.radians(angle) for angle in (120, 120, 120, 360, 360, 360))
+WRISTS = (3, 4, 5)
+MAX_DISAGREEMENT_RAD = math.radians(1)  # what factories find differs from the nominal arm by a few milliradians
 
 
 def plan_problems(plan: Plan, payload_kg: float) -> list[Problem]:
@@ -102,6 +106,46 @@ def arm_problems(plan: Plan, report: ArmReport) -> list[Problem]:
             )
         )
     return problems
+
+
+def kinematics_problems(arm: ArmSection, report: ArmReport) -> list[Problem]:
+    """What is wrong with the controller's account of its arm, where the configuration asks for it.
+
+    Wrists that turn about other axes than a UR10e's are none, or are not known: the directions are compared in the
+    flange's frame at home.
+    """
+    if arm.kinematics == "nominal":
+        return []
+    if report.kinematics is None:
+        return [
+            Problem(
+                "no_kinematics",
+                f"the controller at {report.host} does not say how its arm is made (primary interface, port 30001)",
+                "Enable the primary interface in the arm's security settings, or set arm.kinematics: nominal",
+            )
+        ]
+    home = np.radians(arm.home_deg)
+    told, nominal = (flange_axes(home, each)[:, WRISTS] for each in (report.kinematics, NOMINAL))
+    angles = np.arctan2(np.linalg.norm(np.cross(told, nominal, axis=0), axis=0), np.sum(told * nominal, axis=0))
+    return [
+        Problem(
+            "kinematics_disagree",
+            f"by what the controller says the axis of {JOINT_NAMES[joint]} lies {math.degrees(angle):.1f}° from a "
+            f"UR10e's, {math.degrees(MAX_DISAGREEMENT_RAD):g}° is allowed",
+            "Check that the controller is set up for this arm, or set arm.kinematics: nominal",
+        )
+        for joint, angle in zip(WRISTS, angles, strict=True)
+        if angle > MAX_DISAGREEMENT_RAD
+    ]
+
+
+def used_kinematics(arm: ArmSection, report: ArmReport) -> DenavitHartenberg:
+    """The geometry a recording is made with, as the configuration says.
+
+    Raises Refused `no_kinematics`, `kinematics_disagree`.
+    """
+    refuse(kinematics_problems(arm, report))
+    return NOMINAL if arm.kinematics == "nominal" or report.kinematics is None else report.kinematics
 
 
 def way_to_home(plan: Plan, q_rad: Joints) -> Joints:

@@ -5,6 +5,8 @@ from enum import IntEnum
 
 import numpy as np
 
+from rig.arm.kinematics import DenavitHartenberg
+
 JOINT_NAMES = ("base", "shoulder", "elbow", "wrist_1", "wrist_2", "wrist_3")
 
 Joints = tuple[float, ...]  # six values, base to wrist 3
@@ -106,7 +108,8 @@ class ArmState:
 class ArmReport:
     """What a look at the arm shows; None where the controller does not tell.
 
-    `payload_kg` and `payload_centre_m` (3,) are what the controller reckons with at present.
+    `payload_kg` and `payload_centre_m` (3,) are what the controller reckons with at present, `kinematics` is its arm's
+    geometry as the factory has measured it.
     """
 
     host: str
@@ -117,3 +120,4 @@ class ArmReport:
     payload_kg: float | None
     payload_centre_m: tuple[float, float, float] | None
     state: ArmState
+    kinematics: DenavitHartenberg | None = None

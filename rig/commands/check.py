@@ -8,7 +8,7 @@ from pathlib import Path
 
 from firmware_host.client import Board
 from rig.arm.driver import look
-from rig.arm.preflight import arm_problems, plan_problems
+from rig.arm.preflight import arm_problems, kinematics_problems, plan_problems
 from rig.board.identify import find_sensor, refuse_other_firmware, refusing, stored_calibration
 from rig.commands.configured import Configured, configured
 from rig.commands.laboratory import simulated_laboratory, written
@@ -64,5 +64,9 @@ def _look_at_arm(found: Configured) -> list[str]:
     say(f"arm at {report.host}: serial number {report.serial_number}, PolyScope {report.polyscope}")
     say(f"arm joints: {angles} °, speed slider {100 * state.target_speed_fraction:.0f} %")
     plan = found.phase.plan(state.q_rad)
-    problems = [*plan_problems(plan, section.payload_kg), *arm_problems(plan, report)]
+    problems = [
+        *plan_problems(plan, section.payload_kg),
+        *arm_problems(plan, report),
+        *kinematics_problems(section, report),
+    ]
     return [f"{problem.name}: {problem.what}. {problem.remedy}." for problem in problems]

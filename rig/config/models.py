@@ -59,6 +59,11 @@ class ArmSection(Section):
         default=120.0, ge=0.1, le=SPEED_LIMIT_DEG_S, description="speed of the ways between sweeps"
     )
     state_rate_hz: float = Field(default=125.0, ge=125, le=500, description="how often the arm tells its state")
+    kinematics: Literal["controller", "nominal"] = Field(
+        default="controller",
+        description="whose account of the arm's geometry is used: `controller`, as the factory has measured this arm; "
+        "`nominal`, that of every UR10e",
+    )
 
     @field_validator("host")
     @classmethod

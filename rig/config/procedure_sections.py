@@ -2,7 +2,7 @@
 
 from collections.abc import Iterator, Mapping
 from types import MappingProxyType
-from typing import Literal, Self
+from typing import Annotated, Literal, Self, get_args
 
 from pydantic import Field, model_validator
 
@@ -19,6 +19,7 @@ __all__ = [
 ]
 
 Wrist = Literal["wrist_1", "wrist_2", "wrist_3"]
+Speed = Annotated[float, Field(ge=0.5, le=SPEED_LIMIT_DEG_S)]  # slower, and the board cannot keep a sweep's readings
 DEFAULT_PROCEDURE = "six_observation"
 SPEED_TO_RANGE = 1.5  # scale error, bias, ripple and noise come on top of a sweep's speed
 
@@ -26,18 +27,35 @@ SPEED_TO_RANGE = 1.5  # scale error, bias, ripple and noise come on top of a swe
 class SixSweepsSection(ProcedureSection):
     """The movement of SIX, Section III: which wrists, in what order, how fast, how often."""
 
-    order: tuple[Wrist, ...] = Field(
-        default=("wrist_3", "wrist_1", "wrist_2"), min_length=1, description="which wrist turns after which, each once"
+    axes: Literal[3, 6] = Field(
+        default=3,
+        description="how many axes are swept: `3`, one of each wrist; `6`, three more of wrist 1 with wrists 2 and 3 "
+        "turned, which tells the sensor's own angles from the arm's",
+        json_schema_extra=RATIO,
     )
-    directions: tuple[Direction, ...] = Field(
-        default=("cw", "ccw"), min_length=1, description="which way each wrist turns first, and then"
+    order: tuple[Wrist, ...] | None = Field(
+        default=None,
+        min_length=1,
+        description="which wrist turns after which, each once; left out, the order in which a steady drift of the bias "
+        "does least harm",
+    )
+    directions: tuple[Direction, ...] | None = Field(
+        default=None,
+        min_length=1,
+        description="which way each wrist turns first, and then; left out, the ways in which a steady drift of the "
+        "bias does least harm",
     )
     repeats: int = Field(default=1, ge=1, le=100, description="how often all of it is done", json_schema_extra=RATIO)
-    speed_deg_s: float = Field(
+    speed_deg_s: Speed = Field(
         default=60.0,
-        ge=0.5,  # slower, and the board cannot keep a sweep's readings
-        le=SPEED_LIMIT_DEG_S,
         description=f"constant speed of a sweep; every sensor's range must be at least {SPEED_TO_RANGE} times as large",
+    )
+    speeds_deg_s: tuple[Speed, ...] | None = Field(
+        default=None,
+        min_length=1,
+        max_length=8,
+        description="several speeds instead of `speed_deg_s`: every sweep is made at each, which tells how nonlinear "
+        "the sensor is",
     )
     acceleration_deg_s2: float = Field(
         default=240.0,
@@ -53,16 +71,25 @@ class SixSweepsSection(ProcedureSection):
     @model_validator(mode="after")
     def every_direction_is_swept(self) -> Self:
         """Six parameters need all six directions (SIX, section II-B); refuse before anything moves, not after."""
-        if len(set(self.order)) < 3 or len(self.order) > 3 or set(self.directions) != {"cw", "ccw"}:
+        order, directions = self.order or get_args(Wrist), self.directions or ("cw", "ccw")
+        if len(set(order)) < 3 or len(order) > 3 or set(directions) != {"cw", "ccw"}:
             raise ValueError("order must name wrist_1, wrist_2 and wrist_3 once each, and directions both cw and ccw")
+        if len(set(self.speeds)) < len(self.speeds):
+            raise ValueError("speeds_deg_s must name each speed once; repeats says how often all of it is done")
         return self
+
+    @property
+    def speeds(self) -> tuple[float, ...]:
+        """At which every sweep is made, °/s."""
+        return self.speeds_deg_s or (self.speed_deg_s,)
 
     def problems(self, config: RigConfig) -> Iterator[str]:
         """Sweeps beyond a sensor's range; a verification that could not pass."""
         for name, sensor in config.sensors.items():
-            if self.speed_deg_s * SPEED_TO_RANGE > sensor.range_deg_s:
+            if max(self.speeds) * SPEED_TO_RANGE > sensor.range_deg_s:
+                key = "speeds_deg_s" if self.speeds_deg_s else "speed_deg_s"
                 yield (
-                    f"procedure.speed_deg_s {self.speed_deg_s:g} is too fast for sensors.{name}.range_deg_s "
+                    f"procedure.{key} {max(self.speeds):g} is too fast for sensors.{name}.range_deg_s "
                     f"{sensor.range_deg_s:g}: the range must be at least {SPEED_TO_RANGE} times the speed"
                 )
         if self.needs_reference:

@@ -10,6 +10,8 @@ from typing import Any
 
 from firmware_host.answers import BoardIdentity, StoredCalibration
 from rig import __version__
+from rig.arm.kinematics import NOMINAL, DenavitHartenberg
+from rig.arm.preflight import used_kinematics
 from rig.arm.state import ArmReport
 from rig.config.load import Loaded
 from rig.data.checked import checked
@@ -23,8 +25,9 @@ PACKAGES = ("ur-rtde", "numpy", "h5py", "pyserial")
 class Provenance:
     """Versions, serial numbers, the configuration's and the script's hashes, the time.
 
-    `stored_calibrations` are those by which the board corrected what it streamed, by sensor name. Files of schema
-    "rig.run/1" do not name the script; that was an installed one.
+    `stored_calibrations` are those by which the board corrected what it streamed, by sensor name. `arm_kinematics` is
+    the arm's geometry that was reckoned with; older recordings do not say (None): that was the nominal one. Files of
+    schema "rig.run/1" do not name the script; that was an installed one.
     """
 
     started_utc: str
@@ -41,6 +44,12 @@ class Provenance:
     script: str | None = None
     script_sha256: str | None = None
     script_installed: bool = True
+    arm_kinematics: DenavitHartenberg | None = None
+
+    @property
+    def kinematics(self) -> DenavitHartenberg:
+        """The arm's geometry its angles are to be read with."""
+        return self.arm_kinematics or NOMINAL
 
     @property
     def script_identity(self) -> ScriptIdentity:
@@ -48,10 +57,11 @@ class Provenance:
         return ScriptIdentity(self.script or "", self.script_sha256 or "")
 
     def document(self) -> dict[str, Any]:
-        """As it fits into JSON; nothing of a script that is not known."""
+        """As it fits into JSON; nothing of what is not known."""
         stored = {name: entry.model_dump(mode="json") for name, entry in self.stored_calibrations.items()}
         document = {**asdict(self), "stored_calibrations": stored}
-        unknown = ("script", "script_sha256", "script_installed") if self.script_sha256 is None else ()
+        unknown = {"script", "script_sha256", "script_installed"} if self.script_sha256 is None else set()
+        unknown |= {"arm_kinematics"} if self.arm_kinematics is None else set()
         return {key: value for key, value in document.items() if key not in unknown}
 
 
@@ -64,7 +74,7 @@ def provenance_of(
     *,
     script_installed: bool,
 ) -> Provenance:
-    """That of a recording which begins now; `stored` as in `Provenance`."""
+    """That of a recording which begins now; `stored` as in `Provenance`. Raises Refused as `used_kinematics` does."""
     return Provenance(
         started_utc=datetime.now(UTC).isoformat(timespec="seconds"),
         rig_version=__version__,
@@ -82,4 +92,5 @@ def provenance_of(
         script=script.name,
         script_sha256=script.sha256,
         script_installed=script_installed,
+        arm_kinematics=used_kinematics(loaded.config.arm, arm),
     )

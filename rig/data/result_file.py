@@ -11,7 +11,7 @@ from pydantic import ConfigDict, Field, JsonValue, ValidationError
 
 from rig.config.regular_file import UnfitFile, read_regular_file
 from rig.data.budget_entries import BiasProcessEntry, BudgetEntry, ClockEntry
-from rig.data.result_types import Entry, Matrix3, Matrix6, Positive, PositiveVector3, Role, Vector3
+from rig.data.result_types import Entry, Matrix3, Matrix6, Positive, PositiveVector3, Role, Vector3, Vector6
 from rig.data.run_folder import RESULT
 from rig.errors import Refused
 
@@ -52,6 +52,15 @@ class StoredCalibrationEntry(Entry):
     matrix: Matrix3 | None = None
 
 
+class KinematicsEntry(Entry):
+    """The arm's Denavit–Hartenberg parameters that were reckoned with, base to wrist 3."""
+
+    theta_rad: Vector6
+    a_m: Vector6
+    d_m: Vector6
+    alpha_rad: Vector6
+
+
 class ProvenanceEntry(Entry):
     """What was measured with what, and when. Later versions may add to it."""
 
@@ -72,6 +81,7 @@ class ProvenanceEntry(Entry):
     resumed_utc: tuple[str, ...]
     verified_utc: tuple[str, ...]
     solved_utc: str
+    arm_kinematics: KinematicsEntry | None = None
 
 
 class ErrorEntry(Entry):
@@ -117,6 +127,15 @@ class VectorEntry(Entry):
     g_sensitivity_std_rad_s_per_m_s2: Matrix3 | None = None
     residuals_rad_s: tuple[Vector3, ...]
     warnings: tuple[str, ...]
+
+
+class NonlinearityEntry(Entry):
+    """Of each axis: reading = (g + odd |g| g + even g²) / scale − bias, g the rate along it in rad/s."""
+
+    odd_per_rad_s: Vector3
+    odd_std_per_rad_s: Vector3
+    even_per_rad_s: Vector3
+    even_std_per_rad_s: Vector3
 
 
 class AverageEntry(Entry):
@@ -188,8 +207,10 @@ class SensorEntry(Entry):
 
     `covariance` is that of noise and of a bias that wanders, `covariance_combined` holds all of the `budget`; both are
     there where the vector model was chosen. `correction_matrix` is M of g = M (m + b), by which the board and the C
-    header correct readings; results of before have none, and it is K. `temperature_c` is the mean over all averaged
-    samples. A reference has no `board`: the board solves only for the sensors that are to be calibrated.
+    header correct readings; results of before have none, and it is K. `speeds_rad_s` are those of the sweeps: found at
+    one speed, either way, the calibration is valid at that speed, and there is no `nonlinearity`. `temperature_c` is
+    the mean over all averaged samples. A reference has no `board`: the board solves only for the sensors that are to be
+    calibrated.
     """
 
     part: str
@@ -218,6 +239,8 @@ class SensorEntry(Entry):
     covariance_combined: Matrix6 | None = None
     budget: BudgetEntry | None = None
     bias_process: BiasProcessEntry | None = None
+    speeds_rad_s: tuple[float, ...] = ()
+    nonlinearity: NonlinearityEntry | None = None
     correction: Literal["matrix", "diagonal"] = "diagonal"
     correction_matrix: Matrix3 | None = None
 

@@ -132,8 +132,8 @@ def _contributors(explained: Explained, unknown: Unknown) -> Iterator[Contributo
     jitter = np.sqrt(2) * unknown.state_jitter_s / np.diff(seen.windows_s).T[0]
     each_turn = np.eye(len(turned))[:, :, None] * (jitter[:, None] * turned)[None]
     yield found("times of the arm's states", "scatter of the joint angles", of(each_turn))
-    tilted = _tilted(seen, unknown.axis_rad) @ matrix.T
-    yield assumed("arm's axes", float(np.degrees(unknown.axis_rad)), "°", "uncertainty.axis_deg", tilted)
+    tilted = _tilted(seen, unknown.axis_rad) if seen.axis_errors_rad_s is None else np.sqrt(3) * seen.axis_errors_rad_s
+    yield assumed("arm's axes", float(np.degrees(unknown.axis_rad)), "°", "uncertainty.axis_deg", tilted @ matrix.T)
     if unknown.earth_rate:
         along = (
             EARTH_RATE_RAD_S * np.moveaxis(seen.attitudes, -1, 0) @ matrix.T

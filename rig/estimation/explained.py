@@ -1,8 +1,9 @@
 """The vector model with all that a recording tells beside the sweeps: gravity, the Earth's rate, a bias that wanders.
 
 Gravity stands still in the room and turns in the flange's frame, so attitudes tell what of a reading is sensitivity
-to it; at rest the sensor reads bias, Earth and gravity alone. None of this is assumed: what the attitudes do not tell
-apart stays out of the model and belongs into the uncertainty.
+to it; at rest the sensor reads bias, Earth and gravity alone. Sweeps about more than three axes tell the angles between
+the sensor's axes from those between the arm's, sweeps at several speeds how nonlinear the sensor is. None of this is
+assumed: what sweeps and rests do not tell apart stays out of the model and belongs into the uncertainty.
 """
 
 from dataclasses import dataclass
@@ -12,7 +13,9 @@ import numpy as np
 from rig.errors import Fault
 from rig.estimation.arrays import Array
 from rig.estimation.bias_process import BiasProcess, estimate_bias_process
-from rig.estimation.vector_model import VectorSolution, design_matrix, solve_vector_model
+from rig.estimation.common_errors import CommonErrors, solve_with_common_errors
+from rig.estimation.nonlinearity import Nonlinearity, curvature, distinct_speeds, nonlinearity
+from rig.estimation.vector_model import VectorSolution, design_matrix, of_the_speed
 
 UNTOLD = ("rank_deficient", "ill_conditioned", "too_few_observations")  # what more columns than sweeps bear ends in
 
@@ -24,7 +27,8 @@ class Seen:
     `means_rad_s`, `variances_rad2_s2` (N, 3) of the noise alone; `turns_rad_s` (N, 3) rates of the flange in the room,
     `earth_rad_s` (N, 3) that of the room, as far as it is known; `speed_std_rad_s` (N,); `attitudes` (N, 3, 3) from the
     base into the flange; `gravity_m_s2` (N, 3) downwards, in the flange's frame; `windows_s` (N, 2) on the clock of the
-    first recording; `joints` (N) which of the arm's joints turned, None for a rest.
+    first recording; `joints` (N) which of the arm's joints turned, None for a rest; `axis_errors_rad_s` (P, N, 3) how
+    far the turns would be off for one standard uncertainty of each of the arm's own angles, as far as it is known.
     """
 
     means_rad_s: Array
@@ -36,6 +40,13 @@ class Seen:
     gravity_m_s2: Array
     windows_s: Array
     joints: tuple[str | None, ...]
+    axis_errors_rad_s: Array | None = None
+
+    @property
+    def speeds_rad_s(self) -> tuple[float, ...]:
+        """At which the sweeps were made, the slowest first; sweeps of one speed differ by the arm's timing only."""
+        speeds = np.linalg.norm(self.turns_rad_s, axis=1)
+        return distinct_speeds(speeds[speeds > 0])
 
     @property
     def rates_rad_s(self) -> Array:
@@ -51,11 +62,15 @@ class Seen:
 
 @dataclass(frozen=True, slots=True)
 class Explained:
-    """The vector model's solution, how the bias wandered, and what both were found from."""
+    """The vector model's solution, how the bias wandered, and what both were found from.
+
+    `nonlinearity` is None where all sweeps were made at one speed, for which the solution holds then.
+    """
 
     solution: VectorSolution
     bias: BiasProcess
     seen: Seen
+    nonlinearity: Nonlinearity | None
 
 
 def explain(seen: Seen, nominal_mounting: Array) -> Explained:
@@ -72,23 +87,35 @@ def explain(seen: Seen, nominal_mounting: Array) -> Explained:
 
 
 def _explain(seen: Seen, nominal_mounting: Array, gravity_m_s2: Array | None) -> Explained:
-    def solve(shared: Array | None) -> VectorSolution:
-        return solve_vector_model(
+    several = len(seen.speeds_rad_s) > 1
+    no_errors = np.zeros((0, *seen.means_rad_s.shape))
+    axis_errors = no_errors if seen.axis_errors_rad_s is None else seen.axis_errors_rad_s
+
+    def effects(matrix: Array) -> Array:
+        """(P, N, 3) on the readings, of one standard deviation each."""
+        return np.concatenate([axis_errors @ matrix.T, curvature(matrix, seen.rates_rad_s) if several else no_errors])
+
+    def solve(shared: Array | None) -> tuple[VectorSolution, CommonErrors]:
+        return solve_with_common_errors(
             seen.means_rad_s,
             seen.rates_rad_s,
             seen.variances_rad2_s2,
+            effects,
             speed_std_rad_s=seen.speed_std_rad_s,
             gravity_m_s2=gravity_m_s2,
             nominal_mounting=nominal_mounting,
             shared_covariance_rad2_s2=shared,
         )
 
-    steady = solve(None)
-    of_the_speed = (seen.speed_std_rad_s[:, None] * np.linalg.norm(steady.matrix, axis=1)) ** 2
+    steady, errors = solve(None)
+    of_the_speeds = of_the_speed(seen.rates_rad_s, seen.speed_std_rad_s, steady.matrix) ** 2
     bias = estimate_bias_process(
         design_matrix(seen.rates_rad_s, gravity_m_s2),
-        seen.means_rad_s,
-        seen.variances_rad2_s2 + of_the_speed,
+        seen.means_rad_s - errors.readings_rad_s,
+        seen.variances_rad2_s2 + of_the_speeds,
         seen.windows_s,
     )
-    return Explained(steady if bias.steady else solve(bias.covariance(seen.windows_s)), bias, seen)
+    solution, errors = (steady, errors) if bias.steady else solve(bias.covariance(seen.windows_s))
+    curved = slice(len(axis_errors), None)
+    found = nonlinearity(errors.sizes[curved], errors.covariance[curved, curved]) if several else None
+    return Explained(solution, bias, seen, found)

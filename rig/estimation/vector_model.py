@@ -124,11 +124,11 @@ def solve_vector_model(
 
     speed_noise = np.zeros_like(means)
     shared = None if shared_covariance_rad2_s2 is None else np.asarray(shared_covariance_rad2_s2, dtype=np.float64)
-    coefficients, inverse = _regress(design, means, variances, shared)
+    coefficients, inverse = regress(design, means, variances, shared)
     if speed_std.any():
-        speed_noise = _speed_noise(rates, speed_std, coefficients)
-        coefficients, inverse = _regress(design, means, variances + speed_noise**2, shared)
-        speed_noise = _speed_noise(rates, speed_std, coefficients)
+        speed_noise = of_the_speed(rates, speed_std, coefficients[:3].T)
+        coefficients, inverse = regress(design, means, variances + speed_noise**2, shared)
+        speed_noise = of_the_speed(rates, speed_std, coefficients[:3].T)
     raw = _raw_covariance(inverse, variances, speed_noise, shared)
 
     matrix = coefficients[:3].T
@@ -139,7 +139,7 @@ def solve_vector_model(
     order = np.array([i * columns + j for i in range(3) for j in range(3)] + [i * columns + 3 for i in range(3)])
     matrix_covariance = raw[np.ix_(order, order)]
     to_parameters = parameter_jacobian(matrix, scale)
-    to_angles = _angle_jacobian(axes, scale)
+    to_angles = angle_jacobian(axes, scale)
     sensed = np.array([i * columns + j for i in range(3) for j in range(4, columns)], dtype=np.intp)
     residuals = means - design @ coefficients
     return VectorSolution(
@@ -169,7 +169,7 @@ def solve_vector_batch(means_rad_s: ArrayLike, rates_rad_s: ArrayLike, variances
     `means_rad_s` (R, N, 3); `rates_rad_s` (N, 3) or (R, N, 3); `variances_rad2_s2` (N, 3), alike for all runs.
     """
     means, rates, variances = (np.asarray(a, dtype=np.float64) for a in (means_rad_s, rates_rad_s, variances_rad2_s2))
-    coefficients, _ = _regress(design_matrix(rates, None), means, variances)
+    coefficients, _ = regress(design_matrix(rates, None), means, variances)
     matrix = np.swapaxes(coefficients[..., :3, :], -1, -2)
     return VectorBatch(1 / np.linalg.norm(matrix, axis=-1), -coefficients[..., 3, :], matrix)
 
@@ -203,7 +203,7 @@ def _unit(design: Array) -> Array:
     return np.concatenate([np.full(3, speed), [1.0], np.full(design.shape[1] - 4, gravity)])
 
 
-def _regress(design: Array, means: Array, variances: Array, shared: Array | None = None) -> tuple[Array, Array]:
+def regress(design: Array, means: Array, variances: Array, shared: Array | None = None) -> tuple[Array, Array]:
     """Coefficients (…, p, 3) and the linear map (…, 3, p, N) that made them: one weighted regression for each axis."""
     transposed = np.swapaxes(design, -1, -2)[..., None, :, :]
     if shared is None:
@@ -217,11 +217,11 @@ def _regress(design: Array, means: Array, variances: Array, shared: Array | None
     return coefficients, inverse
 
 
-def _speed_noise(rates: Array, speed_std: Array, coefficients: Array) -> Array:
+def of_the_speed(rates: Array, speed_std: Array, matrix: Array) -> Array:
     """(N, 3) what one standard deviation of the speed does to the readings, F û σ."""
     speed = np.linalg.norm(rates, axis=1)
     axes = np.divide(rates, speed[:, None], out=np.zeros_like(rates), where=speed[:, None] > 0)
-    noise: Array = speed_std[:, None] * (axes @ coefficients[:3])
+    noise: Array = speed_std[:, None] * (axes @ matrix.T)
     return noise
 
 
@@ -259,7 +259,7 @@ def parameter_jacobian(matrix: Array, scale: Array) -> Array:
     return jacobian
 
 
-def _angle_jacobian(axes: Array, scale: Array) -> Array:
+def angle_jacobian(axes: Array, scale: Array) -> Array:
     """(6, 9) derivative of the non-orthogonality and of the mounting's rotation with respect to F, row by row.
 
     With A = S R and δR = [δθ]× R: (tr S − S) δθ = the axial vector of M − Mᵀ, M = δA Rᵀ.

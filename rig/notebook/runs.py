@@ -48,7 +48,8 @@ class Readings:
         from rig.observation.timebase import ArmMotion
 
         streams = [
-            on_the_arms_clock(run.samples[self.name], self.sensor, ArmMotion(run.arm)) for run in self.recordings
+            on_the_arms_clock(run.samples[self.name], self.sensor, ArmMotion(run.arm, run.provenance.kinematics))
+            for run in self.recordings
         ]
         return (
             np.concatenate([stream.time_s for stream in streams]),

@@ -13,6 +13,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
+from rig.arm.kinematics import axis_errors
 from rig.arm.motion import Sweep
 from rig.data.run_file import RunData
 from rig.data.settings import ObservationThresholds
@@ -37,8 +38,9 @@ class Observation:
 
     What turned the sensor is not known (None) of data recorded elsewhere.
     `axis` ("x", "y", "z") and `sign` name the sensor axis nominally along the turn; `axis_flange` (3,) is the unit
-    vector of the turn in the flange frame by the measured joints; `speed_std_rad_s` comes from arm states too far apart
-    to tell the turn's ends exactly; `lost` samples are missing from the average.
+    vector of the turn in the flange frame by the measured joints, `axis_errors` (13, 3) how the arm's own errors change
+    it, per radian (`rig.arm.kinematics.AXIS_ERRORS`); `speed_std_rad_s` comes from arm states too far apart to tell the
+    turn's ends exactly; `lost` samples are missing from the average.
     """
 
     sweep: int
@@ -51,6 +53,7 @@ class Observation:
     speed_std_rad_s: float
     lost: int
     average: Average
+    axis_errors: Array | None = None
 
 
 @dataclass(frozen=True, slots=True)
@@ -98,7 +101,7 @@ def nearest_axis(vector: Array) -> tuple[str, int]:
 def sound_sweeps(run: RunData, settings: ObservationThresholds) -> frozenset[int]:
     """The finished sweeps that `observe_sensor` accepts for every sensor: a resumed run need not repeat them."""
     try:
-        motion = ArmMotion(run.arm)
+        motion = ArmMotion(run.arm, run.provenance.kinematics)
     except Fault:
         return frozenset()
     sound = (_sound_for(run, sensor, motion, settings) for sensor in run.sensors)
@@ -178,6 +181,8 @@ def _observation(
         speed_std_rad_s=turn.speed_std_rad_s,
         lost=lost,
         average=averaged,
+        axis_errors=(1 if sweep.direction == "ccw" else -1)
+        * axis_errors(motion.angles(turn.start_s), sweep.joint, motion.kinematics),
     )
 
 

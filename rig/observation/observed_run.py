@@ -46,7 +46,7 @@ class ObservedRun:
 
 def observe_run(run: RunData, thresholds: ObservationThresholds, superseded: Collection[int] = ()) -> ObservedRun:
     """Observe every sensor of a recording; raises Fault as `ArmMotion` and `observe_sensor` do."""
-    motion = ArmMotion(run.arm)
+    motion = ArmMotion(run.arm, run.provenance.kinematics)
     sensors = {name: observe_sensor(run, name, motion, thresholds, superseded) for name in run.sensors}
     return ObservedRun(run, motion, sensors)
 

@@ -5,6 +5,7 @@ from typing import Any
 
 from numpy.typing import NDArray
 
+from rig.arm.kinematics import NOMINAL, DenavitHartenberg
 from rig.arm.motion import Sweep
 from rig.data.events import BoardObserved
 from rig.data.run_file import RecordedSensor, RunData
@@ -23,6 +24,7 @@ def revolution_on_the_board(
     *,
     first: int,
     settings: ObservationThresholds,
+    kinematics: DenavitHartenberg = NOMINAL,
 ) -> tuple[int, int, float]:
     """When a sweep's revolution began and ended on the board's clock, µs, and its speed by the arm's joints, rad/s.
 
@@ -30,7 +32,7 @@ def revolution_on_the_board(
     the state `first`, and should: a slow sweep alone may not stand out from the noise or hold too few samples, where
     a fast motion to where sweeps begin tells the time. Raises Fault as `estimate_time_base` and `find_revolution` do.
     """
-    motion = ArmMotion(arm)
+    motion = ArmMotion(arm, kinematics)
     clock = on_the_arms_clock(samples, sensor, motion).clock
     window = Window(float(arm["time_s"][min(first, len(arm) - 1)]), float(arm["time_s"][-1]))
     revolution = find_revolution(motion, sweep, window, settings)

@@ -13,7 +13,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from rig.arm.kinematics import flange_attitude, flange_rate
+from rig.arm.kinematics import NOMINAL, DenavitHartenberg, flange_attitude, flange_rate
 from rig.errors import Fault
 from rig.estimation.arrays import Array
 
@@ -72,13 +72,14 @@ class TimeBase:
 class ArmMotion:
     """The recorded arm as functions of controller time: `angles(t)` (n, 6) rad, `rate(t)` (n, 3) flange rate rad/s.
 
-    `rate(t, 1)` is the flange's angular acceleration. `states` is (m,) ARM_STATE_DTYPE. Raises Fault `no_motion`,
-    `not_finite`, `impossible_times`.
+    `rate(t, 1)` is the flange's angular acceleration. `states` is (m,) ARM_STATE_DTYPE of an arm of that `kinematics`.
+    Raises Fault `no_motion`, `not_finite`, `impossible_times`.
     """
 
-    def __init__(self, states: NDArray[Any]) -> None:
+    def __init__(self, states: NDArray[Any], kinematics: DenavitHartenberg = NOMINAL) -> None:
         from scipy.interpolate import CubicSpline
 
+        self.kinematics = kinematics
         self.time_s, first = np.unique(states["time_s"], return_index=True)
         self.states = states[first]
         if len(self.time_s) < 4:
@@ -89,7 +90,7 @@ class ArmMotion:
             raise _not_finite("an arm state")
         _check_span(self.time_s, "the arm's states")
         self.angles = CubicSpline(self.time_s, self.states["q_rad"])
-        rates = flange_rate(self.states["q_rad"], self.angles(self.time_s, 1))
+        rates = flange_rate(self.states["q_rad"], self.angles(self.time_s, 1), kinematics)
         if not np.linalg.norm(rates, axis=1).max() > MIN_RATE_RAD_S:
             raise Fault("no_motion", "the arm stands still in the whole recording", "Record a run with sweeps")
         self.rate = CubicSpline(self.time_s, rates)
@@ -99,7 +100,7 @@ class ArmMotion:
     def attitude(self, start_s: float, end_s: float) -> Array:
         """(3, 3) mean rotation from the base frame into the flange's between two controller times."""
         times_s = np.linspace(start_s, end_s, ATTITUDES, endpoint=False) + (end_s - start_s) / (2 * ATTITUDES)
-        mean: Array = flange_attitude(self.angles(times_s)).mean(axis=0)
+        mean: Array = flange_attitude(self.angles(times_s), self.kinematics).mean(axis=0)
         return mean
 
     def covered(self, time_s: Array) -> NDArray[np.bool_]:

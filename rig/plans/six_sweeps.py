@@ -1,22 +1,48 @@
-"""The six sweeps of SIX, Section III, around the home pose, with the ways between them and the rests after them."""
+"""The sweeps of SIX, Section III, around the home pose, with the ways between them and the rests after them."""
 
 import math
-from collections.abc import Collection, Iterable
+from collections.abc import Collection, Iterable, Iterator, Sequence
+from dataclasses import dataclass
+from functools import lru_cache
+from itertools import permutations, product
 
 import numpy as np
 
 from rig.arm.kinematics import flange_axes
 from rig.arm.motion import SAME_PLACE_RAD, Plan, Rest, Step, Sweep, Transfer, trapezoid_duration, travel
 from rig.arm.state import JOINT_NAMES, Joints
-from rig.config.models import ArmSection
-from rig.config.procedure_sections import SixSweepsSection
+from rig.config.models import ArmSection, Direction
+from rig.config.procedure_sections import SixSweepsSection, Wrist
 from rig.errors import Refused
+from rig.plans.drift import drift_effect
 
 # The first motion may swing the large joints from wherever somebody left the arm, so it is made at leisure.
 APPROACH_SPEED_RAD_S = math.radians(30)
 APPROACH_ACCELERATION_RAD_S2 = math.radians(60)
 # The swept axes must span space: the smallest singular value of their unit vectors, 1 when orthogonal.
 AXES_SPAN = 0.5
+USUAL_ORDER: tuple[Wrist, ...] = ("wrist_3", "wrist_1", "wrist_2")  # that of the paper
+BOTH_WAYS: tuple[Direction, Direction] = ("cw", "ccw")
+WORTHWHILE = 2 / 3  # an order that is not better by a third is not worth leaving the paper's
+DIGITS = 9  # equally good but for rounding: the first of them is chosen, on every machine
+WRIST_1, WRIST_2, WRIST_3 = (JOINT_NAMES.index(name) for name in ("wrist_1", "wrist_2", "wrist_3"))
+
+
+@dataclass(frozen=True, slots=True)
+class Station:
+    """A wrist that is swept, and the pose around which it turns."""
+
+    joint: int
+    pose_q_rad: Joints
+
+
+@dataclass(frozen=True, slots=True)
+class Order:
+    """`stations` one after the other, each in its `ways`; these are reversed every other time where `turning`."""
+
+    stations: tuple[Station, ...]
+    ways: tuple[tuple[Direction, ...], ...]
+    turning: bool
 
 
 def plan_six_observation(
@@ -25,27 +51,28 @@ def plan_six_observation(
     start_q_rad: Joints | None = None,
     done: Collection[int] = (),
 ) -> Plan:
-    """The movement of SIX, Section III: each wrist in the configured order turns clockwise, rests, turns back, rests.
+    """The movement of SIX, Section III: each wrist in its order turns one way, rests, turns back, rests.
 
+    With `axes: 6` wrist 1 turns about three axes more, with wrists 2 and 3 turned; with several speeds all of it is
+    made at each. What the file leaves open of order and directions is chosen so that a steady drift of the bias does
+    least harm (`drift_effect`). The whole series repeats `procedure.repeats` times.
     `start_q_rad` is where the arm stands (home when None); from there the plan goes home first, slowly, and it ends
     at home.
     `done` holds the indices of sweeps to leave out: those an interrupted run has finished.
-    The whole series repeats `procedure.repeats` times. Limits are not judged here: see `rig.arm.preflight`.
+    Limits are not judged here: see `rig.arm.preflight`.
     Raises Refused `axes_do_not_span`.
     """
     home = _radians(arm.home_deg)
-    _check_span(home, procedure)
+    _check_span(home)
     start = home if start_q_rad is None else start_q_rad
-    sweeps = [sweep for sweep in _sweeps(home, procedure) if sweep.index not in done]
+    sweeps = [sweep for sweep in _ordered_sweeps(arm, procedure) if sweep.index not in done]
     steps = tuple(_connected(sweeps, start, home, arm, procedure))
     return Plan(steps, start_q_rad=start, home_q_rad=home)
 
 
-def _check_span(home: Joints, procedure: SixSweepsSection) -> None:
+def _check_span(home: Joints) -> None:
     """Six parameters can be told only from turns about three independent axes."""
-    swept = sorted(JOINT_NAMES.index(wrist) for wrist in set(procedure.order))
-    span = np.linalg.svd(flange_axes(home)[:, swept], compute_uv=False)
-    if len(span) < 3 or span[2] < AXES_SPAN:
+    if np.linalg.svd(flange_axes(home)[:, [WRIST_1, WRIST_2, WRIST_3]], compute_uv=False)[2] < AXES_SPAN:
         raise Refused(
             "axes_do_not_span",
             "the swept wrists do not turn the flange about three independent axes",
@@ -53,42 +80,99 @@ def _check_span(home: Joints, procedure: SixSweepsSection) -> None:
         )
 
 
-def _sweeps(home: Joints, procedure: SixSweepsSection) -> list[Sweep]:
-    """The sweeps in order, each around the home pose."""
-    speed, acceleration = math.radians(procedure.speed_deg_s), math.radians(procedure.acceleration_deg_s2)
-    half_travel = math.pi + math.radians(procedure.margin_deg) + speed**2 / (2 * acceleration)
-    duration = trapezoid_duration(2 * half_travel, speed, acceleration)
-    wanted = [
-        (wrist, direction)
-        for _ in range(procedure.repeats)
-        for wrist in procedure.order
-        for direction in procedure.directions
-    ]
-    sweeps = []
-    for index, (wrist, direction) in enumerate(wanted):
-        joint = JOINT_NAMES.index(wrist)
-        sign = 1 if direction == "ccw" else -1
-        x, y, z = (sign * flange_axes(home)[:, joint]).tolist()
-        sweeps.append(
-            Sweep(
-                index=index,
-                joint=joint,
-                joint_name=wrist,
-                direction=direction,
-                axis_flange=(x, y, z),
-                start_q_rad=_with_joint(home, joint, home[joint] - sign * half_travel),
-                end_q_rad=_with_joint(home, joint, home[joint] + sign * half_travel),
-                speed_rad_s=speed,
-                acceleration_rad_s2=acceleration,
-                duration_s=duration,
-                revolution_rad=(home[joint] - math.pi, home[joint] + math.pi),
-            )
-        )
+@lru_cache(maxsize=16)
+def _ordered_sweeps(arm: ArmSection, procedure: SixSweepsSection) -> tuple[Sweep, ...]:
+    """All sweeps in the order the file names, or else the best one: the ways first, then the order of the wrists."""
+    home = _radians(arm.home_deg)
+
+    def harm(order: Order) -> float:
+        trial = procedure.model_copy(update={"repeats": min(procedure.repeats, 2)})  # more of them repeat these
+        return round(drift_effect(tuple(_connected(_sweeps(order, trial), home, home, arm, trial))), DIGITS)
+
+    def best(orders: Sequence[Order]) -> Order:
+        first, *others = ((harm(order), order) for order in orders) if len(orders) > 1 else [(0.0, orders[0])]
+        least = min(others, key=lambda each: each[0], default=first)
+        return least[1] if least[0] < WORTHWHILE * first[0] else first[1]
+
+    chosen = best(list(_ways(_stations(home, procedure, procedure.order or USUAL_ORDER), procedure)))
+    if procedure.order is None:
+        ways = dict(zip(chosen.stations, chosen.ways, strict=True))
+        others = [_stations(home, procedure, each) for each in permutations(USUAL_ORDER)]
+        chosen = best([Order(each, tuple(ways[station] for station in each), chosen.turning) for each in others])
+    return tuple(_sweeps(chosen, procedure))
+
+
+def _stations(home: Joints, procedure: SixSweepsSection, order: Sequence[str]) -> tuple[Station, ...]:
+    """What is swept, in the order of the wrists; what wrist 1 does with the others turned follows its own sweep.
+
+    Wrist 2 is turned by 45° so that the flange comes away from the forearm, never towards it.
+    """
+    away = math.radians(-45 if math.sin(home[WRIST_2]) > 0 else 45)
+    turned = ((away, 0.0), (away, math.pi / 2), (0.0, math.pi / 4)) if procedure.axes == 6 else ()
+    stations = []
+    for joint in map(JOINT_NAMES.index, order):
+        stations.append(Station(joint, home))
+        if joint == WRIST_1:
+            stations += [
+                Station(joint, (*home[:WRIST_2], home[WRIST_2] + second, home[WRIST_3] + third))
+                for second, third in turned
+            ]
+    return tuple(stations)
+
+
+def _ways(stations: tuple[Station, ...], procedure: SixSweepsSection) -> Iterator[Order]:
+    """Every permissible choice of directions, the paper's first."""
+    if procedure.directions is not None:
+        yield Order(stations, (procedure.directions,) * len(stations), turning=False)
+        return
+    several = procedure.repeats * len(procedure.speeds) > 1
+    for turning in (False, True) if several else (False,):
+        for ways in product((BOTH_WAYS, BOTH_WAYS[::-1]), repeat=len(stations)):
+            yield Order(stations, ways, turning)
+
+
+def _sweeps(order: Order, procedure: SixSweepsSection) -> list[Sweep]:
+    """The sweeps one after the other: repeat by repeat, speed by speed, station by station."""
+    sweeps: list[Sweep] = []
+    for turn, speed_deg_s in enumerate(procedure.speeds * procedure.repeats):
+        for station, ways in zip(order.stations, order.ways, strict=True):
+            for direction in ways[::-1] if order.turning and turn % 2 else ways:
+                sweeps.append(_sweep(len(sweeps), station, direction, speed_deg_s, procedure))
     return sweeps
 
 
+def _sweep(
+    index: int, station: Station, direction: Direction, speed_deg_s: float, procedure: SixSweepsSection
+) -> Sweep:
+    joint, pose = station.joint, station.pose_q_rad
+    speed, acceleration = math.radians(speed_deg_s), math.radians(procedure.acceleration_deg_s2)
+    half_travel = math.pi + math.radians(procedure.margin_deg) + speed**2 / (2 * acceleration)
+    sign = 1 if direction == "ccw" else -1
+    x, y, z = (sign * axis for axis in _axis(station))
+    return Sweep(
+        index=index,
+        joint=joint,
+        joint_name=JOINT_NAMES[joint],
+        direction=direction,
+        axis_flange=(x, y, z),
+        start_q_rad=_with_joint(pose, joint, pose[joint] - sign * half_travel),
+        end_q_rad=_with_joint(pose, joint, pose[joint] + sign * half_travel),
+        speed_rad_s=speed,
+        acceleration_rad_s2=acceleration,
+        duration_s=trapezoid_duration(2 * half_travel, speed, acceleration),
+        revolution_rad=(pose[joint] - math.pi, pose[joint] + math.pi),
+    )
+
+
+@lru_cache(maxsize=64)
+def _axis(station: Station) -> tuple[float, float, float]:
+    """In the flange's frame, of a growing angle."""
+    x, y, z = flange_axes(station.pose_q_rad)[:, station.joint].tolist()
+    return x, y, z
+
+
 def _connected(
-    sweeps: list[Sweep], start: Joints, home: Joints, arm: ArmSection, procedure: SixSweepsSection
+    sweeps: Sequence[Sweep], start: Joints, home: Joints, arm: ArmSection, procedure: SixSweepsSection
 ) -> Iterable[Step]:
     """Sweeps with the rests after them and a transfer wherever the arm is not yet where the next one begins."""
     speed, acceleration = math.radians(arm.transfer_speed_deg_s), math.radians(procedure.acceleration_deg_s2)

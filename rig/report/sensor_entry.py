@@ -10,6 +10,7 @@ from rig.data.result_file import (
     BoardSolutionEntry,
     ErrorEntry,
     EstimateEntry,
+    NonlinearityEntry,
     ObservationEntry,
     SensorEntry,
     TimeBaseEntry,
@@ -48,6 +49,9 @@ def sensor_entry(result: SensorResult, role: Role = "calibrate", agreed: Agreeme
         more |= {"covariance_combined": _rows(combined), "budget": budget_entry(result.uncertainty)}
     if result.explained is not None:
         more["bias_process"] = bias_process_entry(result.explained)
+        more["speeds_rad_s"] = result.explained.seen.speeds_rad_s
+        if result.explained.nonlinearity is not None:
+            more["nonlinearity"] = entry(NonlinearityEntry, result.explained.nonlinearity)
     return found.model_copy(update=more)
 
 

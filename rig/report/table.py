@@ -80,7 +80,8 @@ def _checks(checks: Iterable[CheckEntry]) -> Table:
 
 
 def _beside(sensor: SensorEntry) -> Iterator[str]:
-    """What the other estimators make of the same sweeps, and what the vector model says about the axes."""
+    """At what speeds it holds, what the other estimators make of it, and what the vector model says about the axes."""
+    yield from _speeds(sensor)
     vector = sensor.vector_model
     others = {"vector_model": vector, "six_observation": sensor.six_observation, "algorithm_1": sensor.algorithm_1}
     for name, other in others.items():
@@ -95,6 +96,21 @@ def _beside(sensor: SensorEntry) -> Iterator[str]:
         std = max(np.degrees(vector.non_orthogonality_std_rad))
         yield f"non-orthogonality yz zx xy: {skew} ° (± {std:.3f})"
         yield from (f"warning: {warning}" for warning in vector.warnings)
+
+
+def _speeds(sensor: SensorEntry) -> Iterator[str]:
+    """Where it is valid: one speed does not tell how far the sensor is from linear."""
+    speeds = ", ".join(f"±{speed:.1f}" for speed in np.degrees(sensor.speeds_rad_s))
+    found = sensor.nonlinearity
+    if found is None:
+        yield from [f"valid at {speeds} °/s"] if speeds else []
+        return
+    for name, values, std in (
+        ("odd", found.odd_per_rad_s, found.odd_std_per_rad_s),
+        ("even", found.even_per_rad_s, found.even_std_per_rad_s),
+    ):
+        percent = _triple(np.multiply(100, values), "+.4f")
+        yield f"nonlinearity, {name}: {percent} % per rad/s (± {100 * max(std):.4f}), from {speeds} °/s"
 
 
 def _on_the_board(board: BoardEntry) -> Iterator[str]:

@@ -109,7 +109,7 @@ class Connector:
                 provenance=made_with,
                 sensors=described,
             )
-        return Recording(stack.enter_context(recorder), described, self.station)
+        return Recording(stack.enter_context(recorder), described, self.station, made_with.kinematics)
 
     def _calibrating_along(
         self, board: Board, acquisition: Acquisition, recording: Recording, sensors: Mapping[str, BoardSensor]
@@ -118,7 +118,14 @@ class Connector:
         if not self.phase.procedure.calibrates_along:
             return None
         to_calibrate = {name: (sensors[name].index, sensors[name].described) for name in self.settings.to_calibrate}
-        along = BoardCalibration(board, acquisition, recording.note, self.settings.observation, to_calibrate)
+        along = BoardCalibration(
+            board,
+            acquisition,
+            recording.note,
+            self.settings.observation,
+            to_calibrate,
+            recording.kinematics,
+        )
         with refusing():
             along.recall(self.resumed.earlier, self.resumed.done)
         return along

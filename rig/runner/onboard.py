@@ -13,6 +13,7 @@ import numpy as np
 from firmware_host.client import Board, BoardObservation
 from firmware_host.errors import BoardError
 from firmware_host.protocol import METHODS
+from rig.arm.kinematics import DenavitHartenberg
 from rig.arm.motion import Sweep
 from rig.arm.state import ARM_STATE_DTYPE
 from rig.data.events import BoardNotObserved, BoardObserved, BoardRecalled, BoardSolved, Event
@@ -38,6 +39,7 @@ class BoardCalibration:
     note: Callable[[Event], None]
     settings: ObservationThresholds
     sensors: Mapping[str, tuple[int, RecordedSensor]]
+    kinematics: DenavitHartenberg
     _observed: dict[str, int] = field(default_factory=dict)
 
     def recall(self, earlier: Sequence[RunData], done: Collection[int]) -> None:
@@ -82,7 +84,7 @@ class BoardCalibration:
         samples, states, new = self.acquisition.kept(index)
         arm = np.array([state.to_record() for state in states], ARM_STATE_DTYPE)
         start_us, end_us, speed_rad_s = revolution_on_the_board(
-            samples, sensor, arm, sweep, first=len(arm) - new, settings=self.settings
+            samples, sensor, arm, sweep, first=len(arm) - new, settings=self.settings, kinematics=self.kinematics
         )
         return self.board.observe(index, self._count(name), start_us, end_us, speed_rad_s), speed_rad_s
 

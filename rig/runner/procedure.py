@@ -12,6 +12,7 @@ from math import degrees, radians
 
 from firmware_host.client import Board
 from rig.arm.driver import Arm
+from rig.arm.kinematics import DenavitHartenberg
 from rig.arm.motion import Motion, Plan, Rest, Step, Sweep, Transfer, travel
 from rig.arm.preflight import arm_problems, plan_problems, refuse, step_problems, way_to_home
 from rig.arm.state import ArmReport
@@ -56,11 +57,14 @@ class Devices:
 
 @dataclass(frozen=True, slots=True)
 class Recording:
-    """Where everything goes, and what of (`sensors` by name); what happens is told at the `station` as well."""
+    """Where everything goes, and what of (`sensors` by name, an arm of known `kinematics`); what happens is told at the
+    `station` as well.
+    """
 
     recorder: RunRecorder
     sensors: Mapping[str, RecordedSensor]
     station: Station
+    kinematics: DenavitHartenberg
 
     def note(self, event: Event) -> None:
         """Record what happens, and tell it."""

@@ -7,8 +7,16 @@ from typing import Any
 import pytest
 
 from rig.arm.condition import program_interruption, readiness
+from rig.arm.kinematics import NOMINAL
 from rig.arm.motion import Plan, Rest, Transfer
-from rig.arm.preflight import arm_problems, plan_problems, refuse, way_to_home
+from rig.arm.preflight import (
+    arm_problems,
+    kinematics_problems,
+    plan_problems,
+    refuse,
+    used_kinematics,
+    way_to_home,
+)
 from rig.arm.state import ArmReport, ArmState, Joints, RobotMode, RuntimeState, SafetyMode
 from rig.config.models import ArmSection
 from rig.config.procedure_sections import SixObservationSection
@@ -16,6 +24,7 @@ from rig.errors import Problem, Refused
 from rig.plans.six_sweeps import plan_six_observation
 
 HOME_DEG = (0.0, -90.0, 90.0, -90.0, -90.0, 0.0)
+ARM = ArmSection(host="10.0.0.2", payload_kg=0.3)
 HOME: Joints = tuple(math.radians(angle) for angle in HOME_DEG)
 
 READY = ArmState(
@@ -157,3 +166,24 @@ def test_paused_and_stopped_programs_are_told_apart() -> None:
     assert (paused.name, stopped.name) == ("arm_paused", "program_stopped")
     assert program_interruption(replace(READY, runtime_state=RuntimeState.PLAYING)) is None
     assert readiness(READY) is None
+
+
+def test_the_controllers_account_of_its_arm_is_used_unless_the_file_wants_the_nominal_one() -> None:
+    measured = replace(NOMINAL, theta_rad=(0.0, -0.7, 0.3, 0.4, 1e-3, 0.0))
+    told = replace(REPORT, kinematics=measured)
+    assert used_kinematics(ARM, told) == measured
+    nominal = ARM.model_copy(update={"kinematics": "nominal"})
+    assert used_kinematics(nominal, told) == used_kinematics(nominal, REPORT) == NOMINAL
+
+
+def test_an_arm_that_does_not_say_how_it_is_made_is_refused() -> None:
+    assert names(kinematics_problems(ARM, REPORT)) == ["no_kinematics"]
+    with pytest.raises(Refused, match="no_kinematics"):
+        used_kinematics(ARM, REPORT)
+
+
+@pytest.mark.parametrize(("off_deg", "found"), [(0.9, []), (1.1, ["kinematics_disagree"])])
+def test_wrists_about_other_axes_than_a_ur10es_are_refused(off_deg: float, found: list[str]) -> None:
+    *others, wrist_2, wrist_3 = NOMINAL.alpha_rad
+    odd = replace(NOMINAL, alpha_rad=(*others, wrist_2 + math.radians(off_deg), wrist_3))
+    assert names(kinematics_problems(ARM, replace(REPORT, kinematics=odd))) == found

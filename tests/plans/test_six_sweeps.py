@@ -5,11 +5,13 @@ import math
 import numpy as np
 import pytest
 
-from rig.arm.kinematics import flange_rate
+from rig.arm.kinematics import flange_axes, flange_pose, flange_rate
 from rig.arm.motion import Plan, Rest, Sweep, Transfer, trapezoid_duration, travel
+from rig.arm.preflight import plan_problems
 from rig.config.models import ArmSection
 from rig.config.procedure_sections import SixObservationSection
 from rig.errors import Refused
+from rig.plans.drift import drift_effect
 from rig.plans.six_sweeps import plan_six_observation
 
 ARM = ArmSection(host="127.0.0.2", payload_kg=0.35)
@@ -31,8 +33,61 @@ def test_the_order_is_the_paper_s() -> None:
     ]
 
 
+def test_six_axes_are_the_three_and_three_between_them() -> None:
+    made = plan(axes=6)
+    axes = {tuple(np.round(np.abs(sweep.axis_flange) * np.sqrt(2), 3) ** 2 / 2) for sweep in made.sweeps}
+    assert len(made.sweeps) == 12
+    assert len(axes) == 6
+    assert plan_problems(made, 0.35) == []
+
+
+@pytest.mark.parametrize("wrist_2_deg", [-90.0, 90.0])
+def test_the_flange_never_turns_towards_the_forearm(wrist_2_deg: float) -> None:
+    """Wrist 1 turns in the forearm's plane: along its axis the flange keeps its distance, 0.174 m, or has more."""
+    arm = ArmSection(host="127.0.0.2", payload_kg=0.35, home_deg=(0, -90, 90, -90, wrist_2_deg, 0))
+    made = plan_six_observation(arm, SixObservationSection(axes=6))
+    assert plan_problems(made, 0.35) == []
+    for sweep in made.sweeps:
+        if sweep.joint_name == "wrist_1":
+            pose = flange_pose(sweep.start_q_rad)
+            axis = pose[:3, :3] @ flange_axes(sweep.start_q_rad)[:, 3]
+            assert abs(axis @ (pose[:3, 3] - (0.0, 0.0, 0.1807))) > 0.174
+
+
+def test_every_sweep_is_made_at_every_speed() -> None:
+    made = plan(speeds_deg_s=[30, 60, 120], speed_deg_s=10)
+    seen = [(sweep.joint_name, sweep.direction, round(math.degrees(sweep.speed_rad_s))) for sweep in made.sweeps]
+    assert len(set(seen)) == len(seen) == 18
+    assert {speed for *_, speed in seen} == {30, 60, 120}
+
+
+@pytest.mark.parametrize(
+    ("changes", "less"),
+    [({"repeats": 2}, 0.2), ({"axes": 6}, 0.35), ({"axes": 6, "order": ["wrist_1", "wrist_2", "wrist_3"]}, 0.5)],
+)
+def test_the_order_makes_little_of_a_steady_drift(changes: dict[str, object], less: float) -> None:
+    named = plan(**{**changes, "order": ["wrist_3", "wrist_1", "wrist_2"], "directions": ["cw", "ccw"]})
+    assert drift_effect(plan(**changes).steps) < less * drift_effect(named.steps)
+
+
+def test_an_order_the_file_names_is_kept() -> None:
+    made = plan(axes=6, order=["wrist_2", "wrist_3", "wrist_1"], directions=["ccw", "cw"])
+    assert [sweep.name for sweep in made.sweeps[:5]] == [
+        "sweep wrist_2 ccw",
+        "sweep wrist_2 cw",
+        "sweep wrist_3 ccw",
+        "sweep wrist_3 cw",
+        "sweep wrist_1 ccw",
+    ]
+    assert [sweep.joint_name for sweep in plan(order=["wrist_2", "wrist_3", "wrist_1"]).sweeps[::2]] == [
+        "wrist_2",
+        "wrist_3",
+        "wrist_1",
+    ]
+
+
 def test_steps_join_without_a_gap_and_end_at_home() -> None:
-    made = plan()
+    made = plan(axes=6, speeds_deg_s=[60, 90])
     here = made.start_q_rad
     for motion in made.motions:
         np.testing.assert_allclose(motion.start_q_rad, here, atol=1e-12)
@@ -58,8 +113,8 @@ def test_every_revolution_runs_at_constant_speed_with_the_margin_on_each_side(sp
         assert ends[1] - high - ramp_rad == pytest.approx(math.radians(3))
 
 
-def test_only_the_swept_wrist_leaves_home_and_the_axis_is_the_flange_s_turn() -> None:
-    for sweep in plan().sweeps:
+def test_only_the_swept_wrist_moves_and_the_axis_is_the_flange_s_turn() -> None:
+    for sweep in plan(axes=6).sweeps:
         moved = np.array(travel(sweep.start_q_rad, sweep.end_q_rad))
         assert np.flatnonzero(moved).tolist() == [sweep.joint]
         assert (moved[sweep.joint] > 0) == (sweep.direction == "ccw")

@@ -1,17 +1,23 @@
 """The typed outcome as the document of `result.json`: nothing is written that nobody set or measured."""
 
+import io
 import json
+import math
 from dataclasses import replace
 
 import pytest
+from rich.console import Console
 
 from rig.analysis.outcome import Outcome, calibrated
 from rig.analysis.verdict import Check
+from rig.arm.kinematics import NOMINAL
 from rig.data.result_file import CheckEntry
 from rig.data.run_file import read_run
 from rig.report.document import document_of
 from rig.report.entry import entry
+from rig.report.table import print_result
 from support.paths import FIXTURES
+from support.synthetic_run import Setup, synthetic_run
 
 
 @pytest.fixture(scope="module")
@@ -52,3 +58,15 @@ def test_a_field_the_document_does_not_have_is_not_written(outcome: Outcome) -> 
         entry(CheckEntry, outcome.checks[0], limits=1.0)
     with pytest.raises(ValueError, match="passed"):
         entry(CheckEntry, object(), name="gyro.scale", value=None, limit=None, unit="1")
+
+
+def test_the_result_says_which_arm_was_reckoned_with_and_at_what_speed_it_is_valid() -> None:
+    document = document_of(calibrated([synthetic_run(Setup(told=NOMINAL))]))
+    assert document.provenance.arm_kinematics is not None
+    assert document.provenance.arm_kinematics.alpha_rad == NOMINAL.alpha_rad
+    sensor = json.loads(document.text())["sensors"]["gyro"]
+    assert sensor["speeds_rad_s"] == pytest.approx([math.pi / 3], rel=1e-3)
+    assert "nonlinearity" not in sensor
+    console = Console(width=150, file=io.StringIO(), record=True)
+    print_result(document, console)
+    assert "valid at ±60.0 °/s" in console.export_text()

@@ -4,12 +4,12 @@ The arm follows the rig's own plan with trapezoid ramps and a ripple locked to t
 its own epoch and rate; readings follow g = K (m + b) with mounting error, noise, quantisation and saturation.
 """
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
 from firmware_host.samples import SAMPLE_DTYPE
-from rig.arm.kinematics import flange_rate
+from rig.arm.kinematics import NOMINAL, DenavitHartenberg, flange_rate
 from rig.arm.motion import Plan, Rest, Sweep, Transfer
 from rig.arm.state import ARM_STATE_DTYPE
 from rig.config.load import parse
@@ -25,7 +25,7 @@ CONFIG = """
 arm: {{host: 192.0.2.1, payload_kg: 0.35}}
 board: {{port: /dev/ttyACM0}}
 sensors: {{gyro: {{part: lsm9ds1, serial_number: LSM9DS1-001}}}}
-procedure: {{speed_deg_s: {speed_deg_s}, rest_s: {rest_s}, repeats: {repeats}}}
+procedure: {{speed_deg_s: {speed_deg_s}, rest_s: {rest_s}, repeats: {repeats}{procedure}}}
 limits: {{scale_deviation: 0.3, scale_std: 0.002, bias_rad_s: 0.1, bias_std_rad_s: 0.002, condition: 100}}
 """
 PROVENANCE = Provenance(
@@ -63,6 +63,11 @@ class Setup:
     sample_rate_hz: float = 238.0
     boot_s: float = -4321.0  # controller time at which the board's clock stood at zero
     drift: float = -35e-6  # of the controller against the board
+    kinematics: DenavitHartenberg = NOMINAL  # how the arm is made
+    procedure: tuple[tuple[str, str], ...] = ()  # further keys of its section, and their values
+    odd_per_rad_s: float = 0.0  # of each axis
+    even_per_rad_s: float = 0.0
+    told: DenavitHartenberg | None = None  # how its controller says it is made
 
 
 def truth(setup: Setup) -> Array:
@@ -74,7 +79,12 @@ class Motion:
     """Joint angles and speeds of a planned movement with its ripple, at any controller time. Begins at time 100 s."""
 
     def __init__(self, setup: Setup, rng: np.random.Generator) -> None:
-        self.config = CONFIG.format(speed_deg_s=setup.speed_deg_s, rest_s=setup.rest_s, repeats=setup.repeats)
+        self.config = CONFIG.format(
+            speed_deg_s=setup.speed_deg_s,
+            rest_s=setup.rest_s,
+            repeats=setup.repeats,
+            procedure="".join(f", {key}: {value}" for key, value in setup.procedure),
+        )
         config = parse(self.config).config
         assert isinstance(config.procedure, SixSweepsSection)
         self.plan: Plan = plan_six_observation(config.arm, config.procedure)
@@ -118,10 +128,10 @@ class Motion:
         return tuple(events)
 
 
-def true_rate(motion: Motion, time_s: Array) -> Array:
+def true_rate(motion: Motion, time_s: Array, kinematics: DenavitHartenberg = NOMINAL) -> Array:
     """(n, 3) angular velocity of the flange in its frame, rad/s."""
     q, qd = motion.joints(time_s)
-    return flange_rate(q, qd)
+    return flange_rate(q, qd, kinematics)
 
 
 def synthetic_run(setup: Setup) -> RunData:
@@ -129,7 +139,7 @@ def synthetic_run(setup: Setup) -> RunData:
     rng = np.random.default_rng(setup.seed)
     motion = Motion(setup, rng)
     board_s, controller_s = sample_times(setup, motion)
-    return run_data(setup, motion, board_s, readings(setup, true_rate(motion, controller_s), rng))
+    return run_data(setup, motion, board_s, readings(setup, true_rate(motion, controller_s, setup.kinematics), rng))
 
 
 def sample_times(setup: Setup, motion: Motion) -> tuple[Array, Array]:
@@ -141,6 +151,7 @@ def sample_times(setup: Setup, motion: Motion) -> tuple[Array, Array]:
 def readings(setup: Setup, rate: Array, rng: np.random.Generator) -> Array:
     """Counts (n, 3) of a sensor that feels the flange's rate (n, 3)."""
     turned = rate @ _rotation(np.array(setup.mounting_error_rad)).T
+    turned = turned * (1 + setup.odd_per_rad_s * np.abs(turned) + setup.even_per_rad_s * turned)
     noise = rng.normal(size=turned.shape)
     if setup.noise_correlation:
         fresh = np.sqrt(1 - setup.noise_correlation**2) * noise
@@ -166,8 +177,9 @@ def run_data(setup: Setup, motion: Motion, board_s: Array, counts: Array) -> Run
     arm["q_rad"], arm["qd_rad_s"] = np.round(q / 6e-6) * 6e-6, qd
     arm["target_speed_fraction"] = arm["speed_scaling"] = 1.0
     arm["robot_mode"], arm["safety_mode"], arm["runtime_state"] = 7, 1, 2
+    provenance = replace(PROVENANCE, arm_kinematics=setup.told)
     return RunData(
-        motion.config, motion.settings, PROVENANCE, {"gyro": SENSOR}, {"gyro": samples}, arm, motion.events()
+        motion.config, motion.settings, provenance, {"gyro": SENSOR}, {"gyro": samples}, arm, motion.events()
     )
 
 

@@ -1,0 +1,74 @@
+"""The arm's geometry as a controller tells it."""
+
+import socket
+import struct
+import threading
+from collections.abc import Iterator
+from contextlib import contextmanager
+
+import numpy as np
+import pytest
+
+from rig.arm.driver import look
+from rig.arm.kinematics import DenavitHartenberg, flange_axes
+from rig.arm.primary import PORT, read_kinematics
+from support.worlds import World
+
+HOST = "127.0.3.252"
+CALIBRATED = DenavitHartenberg(
+    (1e-4, -0.7, 0.3, 0.4, -2e-4, 1e-4),
+    (1e-4, -0.61, -0.57, 1e-5, 2e-5, 0.0),
+    (0.1807, 120.0, -300.0, 180.174, 0.11985, 0.11655),
+    (1.5708, 2e-3, -5e-3, 1.5700, -1.5704, 0.0),
+)
+
+
+def package(kind: int, payload: bytes) -> bytes:
+    return struct.pack(">iB", 5 + len(payload), kind) + payload
+
+
+def info(arm: DenavitHartenberg) -> bytes:
+    return package(5, struct.pack(">6I24dI", *range(6), *arm.theta_rad, *arm.a_m, *arm.d_m, *arm.alpha_rad, 2))
+
+
+@contextmanager
+def saying(*pieces: bytes) -> Iterator[None]:
+    """A controller that sends these bytes to whoever connects, and waits until he goes."""
+
+    def serve(listener: socket.socket) -> None:
+        client, _ = listener.accept()
+        with client:
+            for piece in pieces:
+                client.sendall(piece)
+            client.settimeout(5.0)
+            client.recv(1)
+
+    with socket.create_server((HOST, PORT)) as listener:
+        server = threading.Thread(target=serve, args=(listener,))
+        server.start()
+        yield
+        server.join()
+
+
+def test_the_geometry_is_found_among_other_packages_however_they_are_cut() -> None:
+    stream = (
+        package(20, b"a message") + package(16, package(0, b"mode")) + package(16, package(1, b"q") + info(CALIBRATED))
+    )
+    with saying(stream[:30], stream[30:80], stream[80:]):
+        assert read_kinematics(HOST, 5.0) == CALIBRATED
+
+
+def test_a_controller_that_does_not_tell_is_none() -> None:
+    with saying(package(16, package(0, b"mode")), package(16, package(5, b"an older layout"))):
+        assert read_kinematics(HOST, 0.3) is None
+
+
+def test_what_is_no_primary_interface_is_an_error_of_the_link() -> None:
+    with saying(b"Connected: Universal Robots Dashboard Server\n"), pytest.raises(ConnectionError):
+        read_kinematics(HOST, 5.0)
+
+
+def test_a_look_tells_the_geometry_of_the_simulated_arm(world: World) -> None:
+    told = look(world({}).host)
+    assert told.kinematics is not None
+    np.testing.assert_allclose(flange_axes(np.zeros(6), told.kinematics), flange_axes(np.zeros(6)), atol=1e-12)
