@@ -2,11 +2,13 @@
 
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
+from datetime import datetime
 from itertools import combinations
 from typing import Literal, TypeVar, get_args
 
 import numpy as np
 
+from rig.analysis.explained import Explained, explain, see
 from rig.data.run_file import RecordedSensor, RunData
 from rig.errors import Fault, Refused
 from rig.estimation.accumulator import Accumulator, SixObservationEstimator, Solution
@@ -32,6 +34,9 @@ Result = TypeVar("Result")
 class SensorResult:
     """One sensor's calibration and what it rests on.
 
+    `explained` is the vector model with gravity and a wandering bias, None for recordings of before there was a site
+    and where the vector model has no solution.
+
     `solution` is the chosen estimator's. Beside it stand the others from the same observations: `vector_model`,
     `six_observation` (exact) and `algorithm_1`, the paper's own, or the Fault one ends in. There is one time base for
     each recording that took part.
@@ -40,6 +45,7 @@ class SensorResult:
     sensor: RecordedSensor
     solution: Estimate
     vector_model: VectorSolution | Fault
+    explained: Explained | None
     six_observation: Solution
     algorithm_1: Solution | Fault
     observations: tuple[Observation, ...]
@@ -101,19 +107,26 @@ def solve_observed(
     Raises Refused `unknown_estimator`; Fault `duplicated_observation` and as the estimators do.
     """
     chosen = known_estimator(estimator)
-    return {
-        name: _solve_sensor(sensor, [recording.sensors[name] for recording in recordings], chosen)
-        for name, sensor in sensors.items()
-    }
+    return {name: _solve_sensor(name, sensor, recordings, chosen) for name, sensor in sensors.items()}
 
 
-def _solve_sensor(sensor: RecordedSensor, parts: Sequence[SensorObservations], estimator: Estimator) -> SensorResult:
+def _solve_sensor(
+    name: str, sensor: RecordedSensor, recordings: Sequence[ObservedRun], estimator: Estimator
+) -> SensorResult:
+    parts = [recording.sensors[name] for recording in recordings]
     observations = tuple(observation for part in parts for observation in part.revolutions)
     rests = tuple(rest for part in parts for rest in part.rests)
     mounting = np.array(sensor.mounting)
     check_duplicates(np.array([observation.average.mean_rad_s for observation in observations]))
     six_observation = solve_six_observation(observations, "newton")
-    vector_model = or_fault(lambda: solve_vector(observations, rests, mounting))
+    explained = _explained(recordings, parts, observations, rests, mounting)
+    vector_model = (
+        or_fault(lambda: solve_vector(observations, rests, mounting))
+        if explained is None
+        else explained
+        if isinstance(explained, Fault)
+        else explained.solution
+    )
     algorithm_1 = or_fault(lambda: solve_six_observation(observations, "algorithm_1"))
     by_name = {"vector": vector_model, "newton": six_observation, "algorithm_1": algorithm_1}
     solution = by_name[estimator] if estimator in by_name else solve_observations(observations, estimator)
@@ -123,12 +136,48 @@ def _solve_sensor(sensor: RecordedSensor, parts: Sequence[SensorObservations], e
         sensor=sensor,
         solution=solution,
         vector_model=vector_model,
+        explained=None if isinstance(explained, Fault) else explained,
         six_observation=six_observation,
         algorithm_1=algorithm_1,
         observations=observations,
         rests=rests,
         time_bases=tuple(part.time_base for part in parts),
     )
+
+
+def _explained(
+    recordings: Sequence[ObservedRun],
+    parts: Sequence[SensorObservations],
+    observations: Sequence[Observation],
+    rests: Sequence[Average],
+    mounting: Array,
+) -> Explained | Fault | None:
+    """The vector model with what the site adds, or the Fault it ends in; None where the recordings know no site."""
+    site = recordings[0].run.settings.site
+    if site is None:
+        return None
+    windows_s = np.array(
+        [
+            (average.start_s + since_s, average.end_s + since_s)
+            for kind in (0, 1)
+            for part, since_s in zip(parts, _begun_s(recordings), strict=True)
+            for average in (part.rests if kind else [observation.average for observation in part.revolutions])
+        ]
+    )
+    return or_fault(lambda: explain(see(observations, rests, windows_s, site), mounting))
+
+
+def _begun_s(recordings: Sequence[ObservedRun]) -> list[float]:
+    """What takes the controller's times of each recording to the clock of the first: it may have been switched off."""
+    first = recordings[0]
+    return [
+        (_started(each) - _started(first)).total_seconds() + float(first.motion.time_s[0] - each.motion.time_s[0])
+        for each in recordings
+    ]
+
+
+def _started(recording: ObservedRun) -> datetime:
+    return datetime.fromisoformat(recording.run.provenance.started_utc)
 
 
 def solve_observations(

@@ -54,6 +54,12 @@ def flange_pose(q_rad: ArrayLike) -> Array:
     return _frames(q_rad)[-1]
 
 
+def flange_attitude(q_rad: ArrayLike) -> Array:
+    """(…, 3, 3) rotations taking a vector of the base frame into the flange's, for joint angles `q_rad` (…, 6)."""
+    rotations: Array = np.swapaxes(flange_pose(q_rad)[..., :3, :3], -1, -2)
+    return rotations
+
+
 def flange_axes(q_rad: ArrayLike) -> Array:
     """(…, 3, 6) unit axes of the six joints (columns) in the flange frame, for joint angles `q_rad` (…, 6).
 

@@ -28,6 +28,8 @@ JointAngle = Annotated[float, Field(ge=-JOINT_LIMIT_DEG, le=JOINT_LIMIT_DEG)]
 Offset = Annotated[float, Field(ge=-1000, le=1000)]
 # A name becomes that of a dataset, of files and of C arrays.
 SensorName = Annotated[str, Field(pattern=r"^\w[\w -]*$", max_length=40)]
+EARTH_RATE_RAD_S = 7.292115e-5  # of the WGS 84 ellipsoid
+MIN_LEVEL = 0.1  # sine of the angle between the vertical and what a heading is given of
 SERIAL_NUMBER_MAX = 24  # of the kind "text24" in the board's protocol
 RATIO: dict[str, Any] = {"unit": "1"}  # a number without a unit, where the key cannot say so
 OF_THE_PART: dict[str, Any] = {"allowed": "what the part has, see below", "usual": "the part's usual one"}
@@ -260,6 +262,58 @@ class LimitsSection(Section):
     )
 
 
+class SiteSection(Section):
+    """Where the arm stands. With latitude and heading the Earth's rate is taken out of the readings."""
+
+    latitude_deg: float | None = Field(default=None, ge=-90, le=90, description="north is positive; with heading_deg")
+    heading_deg: float | None = Field(
+        default=None,
+        ge=-360,
+        le=360,
+        description="where the x axis of the arm's base points: 0 north, 90 east; with latitude_deg",
+    )
+    gravity_m_s2: float = Field(default=9.80665, gt=9.7, lt=9.9, description="acceleration of free fall")
+    base_up: Vector3 = Field(
+        default=(0.0, 0.0, 1.0), description="upwards in the frame of the arm's base; 0 0 −1 under a ceiling"
+    )
+
+    @field_validator("base_up")
+    @classmethod
+    def a_direction(cls, value: Vector3) -> Vector3:
+        """Of any length."""
+        if not np.linalg.norm(value) > 1e-6:
+            raise ValueError("must be a direction, such as [0, 0, 1]")
+        return value
+
+    @model_validator(mode="after")
+    def both_or_neither(self) -> Self:
+        """The Earth's rate needs both."""
+        if (self.latitude_deg is None) != (self.heading_deg is None):
+            raise ValueError("needs latitude_deg and heading_deg, or neither")
+        if self.heading_deg is not None and np.linalg.norm(np.cross(self.up, (1, 0, 0))) < MIN_LEVEL:
+            raise ValueError("heading_deg says nothing where the x axis of the base points up or down")
+        return self
+
+    @property
+    def up(self) -> Vector3:
+        """Unit vector."""
+        x, y, z = (np.array(self.base_up) / np.linalg.norm(self.base_up)).tolist()
+        return x, y, z
+
+    @property
+    def earth_rate_rad_s(self) -> Vector3 | None:
+        """The Earth's rate in the frame of the base, None where it is not known."""
+        if self.latitude_deg is None or self.heading_deg is None:
+            return None
+        up = np.array(self.up)
+        ahead = np.array([1.0, 0.0, 0.0]) - up[0] * up
+        ahead /= np.linalg.norm(ahead)
+        heading, latitude = np.radians([self.heading_deg, self.latitude_deg])
+        north = np.cos(heading) * ahead + np.sin(heading) * np.cross(up, ahead)
+        x, y, z = (EARTH_RATE_RAD_S * (np.cos(latitude) * north + np.sin(latitude) * up)).tolist()
+        return x, y, z
+
+
 class OutputSection(Section):
     """Where results go."""
 
@@ -276,6 +330,7 @@ class RigConfig(Section):
     sensors: dict[SensorName, SensorSection] = Field(min_length=1)
     procedure: ProcedureSection
     observation: ObservationSection = ObservationSection()
+    site: SiteSection = SiteSection()
     limits: LimitsSection
     output: OutputSection = OutputSection()
 

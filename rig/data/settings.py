@@ -19,7 +19,8 @@ if TYPE_CHECKING:
     from rig.arm.motion import Plan
     from rig.config.models import RigConfig
 
-SCHEMA = "rig.settings/1"
+SCHEMA = "rig.settings/2"
+SCHEMAS = ("rig.settings/1", SCHEMA)  # the first knows no site
 
 Vector3 = tuple[Finite, Finite, Finite]
 
@@ -60,6 +61,15 @@ class KnownReference:
 
 
 @dataclass(frozen=True, slots=True)
+class Site:
+    """Where the arm stands, in its base frame: `up` (unit vector), gravity, the Earth's rate where it is known."""
+
+    up: Vector3
+    gravity_m_s2: Positive
+    earth_rate_rad_s: Vector3 | None
+
+
+@dataclass(frozen=True, slots=True)
 class PlannedSweep:
     """A sweep the whole procedure has: its place in the plan, its joint, "cw" or "ccw", its speed."""
 
@@ -74,7 +84,8 @@ class RunSettings:
     """What was to be done and how it is judged. `then_verify` says that a verification was to follow a calibration.
 
     `to_calibrate` names the sensors the calibration is for, `planned_sweeps` are those of the whole procedure, however
-    often the run was interrupted.
+    often the run was interrupted. Recordings of before there was a `site` (None) are solved as they were then: neither
+    gravity nor the Earth's rate is looked for, and a bias that wanders widens the variance of every average alike.
     """
 
     procedure: str
@@ -85,6 +96,7 @@ class RunSettings:
     reference: KnownReference | None
     home_q_rad: Annotated[tuple[Finite, ...], Field(min_length=6, max_length=6)]
     planned_sweeps: tuple[PlannedSweep, ...]
+    site: Site | None = None
 
     @property
     def movement(self) -> tuple[object, ...]:
@@ -110,7 +122,7 @@ def settings_from_json(text: str) -> RunSettings:
     """What `to_json` wrote. Raises ValueError naming what is wrong."""
     document = json.loads(text)
     schema = document.get("schema") if isinstance(document, dict) else None
-    if schema != SCHEMA:
+    if schema not in SCHEMAS:
         raise ValueError(f"the schema of its settings is {quote(schema)}, not {SCHEMA!r}")
     return checked(RunSettings, document, "settings")
 
@@ -132,6 +144,7 @@ def settings_of(config: "RigConfig", plan: "Plan") -> RunSettings:
         planned_sweeps=tuple(
             PlannedSweep(sweep.index, sweep.joint_name, sweep.direction, sweep.speed_rad_s) for sweep in plan.sweeps
         ),
+        site=Site(config.site.up, config.site.gravity_m_s2, config.site.earth_rate_rad_s),
     )
 
 

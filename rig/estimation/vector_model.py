@@ -48,6 +48,7 @@ class VectorSolution:
     - `mounting` (3, 3): the rotation from the flange frame to the sensor frame nearest to the three axes.
     - `angles_covariance_rad2` (6, 6): of `non_orthogonality_rad`, then of small turns of `mounting` about sensor x y z.
     - `g_sensitivity` (3, 3) in rad/s per m/s² and its (9, 9) covariance (row by row), or None.
+    - `response` (6, N, 3): derivative of scale and bias with respect to the mean readings.
     - `residuals_rad_s` (N, 3): reading less model. `rank` and `condition` are those of the scaled design.
     """
 
@@ -61,6 +62,7 @@ class VectorSolution:
     angles_covariance_rad2: Array
     g_sensitivity: Array | None
     g_sensitivity_covariance: Array | None
+    response: Array
     residuals_rad_s: Array
     observations: int
     rank: int
@@ -87,12 +89,15 @@ def solve_vector_model(
     speed_std_rad_s: ArrayLike | None = None,
     gravity_m_s2: ArrayLike | None = None,
     nominal_mounting: ArrayLike | None = None,
+    shared_covariance_rad2_s2: ArrayLike | None = None,
 ) -> VectorSolution:
     """Solve m = F ω + c (+ G a) by weighted least squares.
 
     `means_rad_s`, `variances_rad2_s2` (N, 3): mean readings and the variances of these means; `rates_rad_s` (N, 3):
     the mean rate in the flange frame, zero for a rest; `speed_std_rad_s` (N,): how well its size is known;
-    `gravity_m_s2` (N, 3): mean gravity in the flange frame; `nominal_mounting` (3, 3): flange to sensor, to be held to.
+    `gravity_m_s2` (N, 3): mean gravity in the flange frame; `nominal_mounting` (3, 3): flange to sensor, to be held to;
+    `shared_covariance_rad2_s2` (N, N): of what the observations have in common beside their own variances, as a bias
+    that wanders, alike and independent for the three axes.
 
     Raises Fault `too_few_observations`, `not_finite`, `bad_variance`, `zero_reading`, `duplicated_observation`,
     `rank_deficient`, `ill_conditioned`, `wrong_unit`, `mirrored_axis`, `swapped_axes`, `wrong_mounting`.
@@ -100,7 +105,7 @@ def solve_vector_model(
     means, rates, variances = (np.asarray(a, dtype=np.float64) for a in (means_rad_s, rates_rad_s, variances_rad2_s2))
     count = len(means)
     speed_std = np.zeros(count) if speed_std_rad_s is None else np.asarray(speed_std_rad_s, dtype=np.float64)
-    design = _design(rates, None if gravity_m_s2 is None else np.asarray(gravity_m_s2, dtype=np.float64))
+    design = design_matrix(rates, None if gravity_m_s2 is None else np.asarray(gravity_m_s2, dtype=np.float64))
     for name, array in (("means", means), ("rates", rates), ("variances", variances)):
         require_shape(name, array, (count, 3))
     require_shape("speed_std", speed_std, (count,))
@@ -115,12 +120,13 @@ def solve_vector_model(
     check_conditioning(found, columns, MAX_CONDITION, "axis, bias or g-sensitivity", REMEDY)
 
     speed_noise = np.zeros_like(means)
-    coefficients, inverse = _regress(design, means, variances)
+    shared = None if shared_covariance_rad2_s2 is None else np.asarray(shared_covariance_rad2_s2, dtype=np.float64)
+    coefficients, inverse = _regress(design, means, variances, shared)
     if speed_std.any():
         speed_noise = _speed_noise(rates, speed_std, coefficients)
-        coefficients, inverse = _regress(design, means, variances + speed_noise**2)
+        coefficients, inverse = _regress(design, means, variances + speed_noise**2, shared)
         speed_noise = _speed_noise(rates, speed_std, coefficients)
-    raw = _raw_covariance(inverse, variances, speed_noise)
+    raw = _raw_covariance(inverse, variances, speed_noise, shared)
 
     matrix = coefficients[:3].T
     scale = 1 / np.linalg.norm(matrix, axis=1)
@@ -144,12 +150,13 @@ def solve_vector_model(
         angles_covariance_rad2=to_angles @ matrix_covariance[:9, :9] @ to_angles.T,
         g_sensitivity=coefficients[4:].T if columns > 4 else None,
         g_sensitivity_covariance=raw[np.ix_(sensed, sensed)] if columns > 4 else None,
+        response=_response(to_parameters, inverse),
         residuals_rad_s=residuals,
         observations=count,
         rank=found.rank,
         condition=found.condition,
         iterations=2 if speed_std.any() else 1,
-        warnings=inconsistency(residuals, variances + speed_noise**2, 3 * (count - columns)),
+        warnings=inconsistency(residuals, _all_variances(variances, speed_noise, shared), 3 * (count - columns)),
     )
 
 
@@ -159,7 +166,7 @@ def solve_vector_batch(means_rad_s: ArrayLike, rates_rad_s: ArrayLike, variances
     `means_rad_s` (R, N, 3); `rates_rad_s` (N, 3) or (R, N, 3); `variances_rad2_s2` (N, 3), alike for all runs.
     """
     means, rates, variances = (np.asarray(a, dtype=np.float64) for a in (means_rad_s, rates_rad_s, variances_rad2_s2))
-    coefficients, _ = _regress(_design(rates, None), means, variances)
+    coefficients, _ = _regress(design_matrix(rates, None), means, variances)
     matrix = np.swapaxes(coefficients[..., :3, :], -1, -2)
     return VectorBatch(1 / np.linalg.norm(matrix, axis=-1), -coefficients[..., 3, :], matrix)
 
@@ -177,7 +184,7 @@ def nearest_rotation(axes: Array) -> Array:
     return rotation
 
 
-def _design(rates: Array, gravity: Array | None) -> Array:
+def design_matrix(rates: Array, gravity: Array | None) -> Array:
     """Z (…, N, 4 or 7) = [ω 1 (a)]."""
     blocks = [rates, np.ones((*rates.shape[:-1], 1))]
     if gravity is not None:
@@ -193,10 +200,15 @@ def _unit(design: Array) -> Array:
     return np.concatenate([np.full(3, speed), [1.0], np.full(design.shape[1] - 4, gravity)])
 
 
-def _regress(design: Array, means: Array, variances: Array) -> tuple[Array, Array]:
+def _regress(design: Array, means: Array, variances: Array, shared: Array | None = None) -> tuple[Array, Array]:
     """Coefficients (…, p, 3) and the linear map (…, 3, p, N) that made them: one weighted regression for each axis."""
-    weights = 1 / np.swapaxes(variances, -1, -2)  # (…, 3, N)
-    weighted = np.swapaxes(design, -1, -2)[..., None, :, :] * weights[..., :, None, :]  # (…, 3, p, N)
+    transposed = np.swapaxes(design, -1, -2)[..., None, :, :]
+    if shared is None:
+        weights = 1 / np.swapaxes(variances, -1, -2)  # (…, 3, N)
+        weighted = transposed * weights[..., :, None, :]  # (…, 3, p, N)
+    else:
+        noise = np.array([np.diag(own) for own in variances.T]) + shared
+        weighted = transposed @ np.linalg.inv(noise)
     inverse: Array = np.asarray(np.linalg.solve(weighted @ design[..., None, :, :], weighted), dtype=np.float64)
     coefficients: Array = np.einsum("...ipn,...ni->...pi", inverse, means)
     return coefficients, inverse
@@ -210,13 +222,29 @@ def _speed_noise(rates: Array, speed_std: Array, coefficients: Array) -> Array:
     return noise
 
 
-def _raw_covariance(inverse: Array, variances: Array, speed_noise: Array) -> Array:
+def _raw_covariance(inverse: Array, variances: Array, speed_noise: Array, shared: Array | None) -> Array:
     """(3 p, 3 p) covariance of the coefficients, axis by axis; a wrong speed moves all three axes at once."""
     columns = inverse.shape[1]
     covariance = np.einsum("in,jn,ipn,jqn->ipjq", speed_noise.T, speed_noise.T, inverse, inverse)
     for axis in range(3):
         covariance[axis, :, axis] += (inverse[axis] * variances[:, axis]) @ inverse[axis].T
+        if shared is not None:
+            covariance[axis, :, axis] += inverse[axis] @ shared @ inverse[axis].T
     return np.asarray(covariance.reshape(3 * columns, 3 * columns), dtype=np.float64)
+
+
+def _all_variances(variances: Array, speed_noise: Array, shared: Array | None) -> Array:
+    """(N, 3) of each mean reading, whatever it comes from."""
+    alike = 0.0 if shared is None else np.diag(shared)[:, None]
+    everything: Array = variances + speed_noise**2 + alike
+    return everything
+
+
+def _response(to_parameters: Array, inverse: Array) -> Array:
+    """(6, N, 3) derivative of k and b with respect to each mean reading, from (6, 12) and the linear map (3, p, N)."""
+    of_matrix = np.einsum("qij,ijn->qni", to_parameters[:, :9].reshape(6, 3, 3), inverse[:, :3])
+    response: Array = of_matrix + np.einsum("qi,in->qni", to_parameters[:, 9:], inverse[:, 3])
+    return response
 
 
 def parameter_jacobian(matrix: Array, scale: Array) -> Array:

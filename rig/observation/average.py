@@ -9,21 +9,32 @@ from numpy.typing import NDArray
 from rig.data.run_file import RecordedSensor
 from rig.estimation.arrays import Array
 from rig.observation.timebase import ArmMotion, TimeBase, estimate_time_base, widening
+from rig.observation.windows import Window
 
 
 @dataclass(frozen=True, slots=True)
 class Average:
     """Readings averaged: mean (3,) rad/s, variance (3,) of that mean in (rad/s)², noise (3,) of one sample in rad/s.
 
-    The variance of a revolution or a rest also holds the drift of the bias from rest to rest.
+    The variance of a revolution or a rest also holds the drift of the bias from rest to rest, `drift_rad2_s2` (3,).
+    `start_s`, `end_s`: between which times, on the controller's clock. `attitude` (3, 3) is the mean rotation from the
+    arm's base frame into the flange's, None where no arm tells it.
     """
 
     mean_rad_s: Array
     variance_rad2_s2: Array
     noise_rad_s: Array
     samples: int
-    duration_s: float
+    start_s: float
+    end_s: float
     temperature_c: float
+    attitude: Array | None = None
+    drift_rad2_s2: Array | float = 0.0
+
+    @property
+    def duration_s(self) -> float:
+        """Of what was averaged."""
+        return self.end_s - self.start_s
 
     @property
     def mean_std_rad_s(self) -> Array:
@@ -62,7 +73,13 @@ def between(stream: Stream, start_s: float, end_s: float) -> slice:
     return slice(*np.searchsorted(stream.time_s, [start_s, end_s]).tolist())
 
 
-def average(stream: Stream, inside: slice, duration_s: float, excess: Array, covered: NDArray[np.bool_]) -> Average:
+def average(
+    stream: Stream,
+    inside: slice,
+    window: Window,
+    excess: Array,
+    covered: NDArray[np.bool_],
+) -> Average:
     """Mean and its variance; `excess` (n,) is the arm's rate less its mean 2π/T, known where `covered` (n,).
 
     A straight line of reading against excess says what is read at the mean speed: few samples do not meet the vibration
@@ -84,7 +101,8 @@ def average(stream: Stream, inside: slice, duration_s: float, excess: Array, cov
         variance_rad2_s2=variance * wider * of_the_mean + rounding_left(variance, count),
         noise_rad_s=np.sqrt(variance),
         samples=len(known),
-        duration_s=duration_s,
+        start_s=window.start_s,
+        end_s=window.end_s,
         temperature_c=float(temperature) + stream.sensor.temperature_offset_c,
     )
 

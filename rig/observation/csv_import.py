@@ -23,6 +23,7 @@ from rig.observation.average import Average
 from rig.observation.csv_table import read_columns
 from rig.observation.observe import Observation, nearest_axis
 from rig.observation.timebase import widening
+from rig.observation.windows import Window
 
 SAMPLE_COLUMNS = ("time_s", "x_rad_s", "y_rad_s", "z_rad_s")
 SWEEP_COLUMNS = ("start_s", "end_s", "axis_x", "axis_y", "axis_z")
@@ -76,7 +77,7 @@ def average(samples: Array, sweeps: Array, axes: Array) -> ExternalData:
     turns, rests = [], []
     for row, (start_s, end_s, speed) in enumerate(sweeps.tolist(), start=1):
         inside = slice(*np.searchsorted(time_s, [start_s, end_s]).tolist())
-        mean = _average(readings[inside], end_s - start_s, interval_s, row)
+        mean = _average(readings[inside], Window(start_s, end_s), interval_s, row)
         if speed == 0:
             rests.append(mean)
         else:
@@ -122,9 +123,9 @@ def _check_overlap(sweeps: Array) -> None:
         )
 
 
-def _average(readings: Array, duration_s: float, interval_s: float, row: int) -> Average:
+def _average(readings: Array, window: Window, interval_s: float, row: int) -> Average:
     """Mean and its variance, from the scatter about the mean; vibration counts as noise here, for no arm reports it."""
-    count, expected = len(readings), duration_s / interval_s
+    count, expected = len(readings), (window.end_s - window.start_s) / interval_s
     if count < MIN_SAMPLES or count < (1 - MAX_LOST_FRACTION) * expected - 1:
         raise Fault(
             "lost_samples",
@@ -138,7 +139,8 @@ def _average(readings: Array, duration_s: float, interval_s: float, row: int) ->
         variance_rad2_s2=variance * wider / count,
         noise_rad_s=np.sqrt(variance),
         samples=count,
-        duration_s=duration_s,
+        start_s=window.start_s,
+        end_s=window.end_s,
         temperature_c=float("nan"),
     )
 

@@ -140,8 +140,12 @@ def bias_drift(rests: Sequence[Average]) -> Array:
     return np.maximum(scatter - noise, 0.0) if significant else np.zeros(3)
 
 
+def _placed(average: Average, motion: ArmMotion) -> Average:
+    return replace(average, attitude=motion.attitude(average.start_s, average.end_s))
+
+
 def _drifting(average: Average, drift: Array) -> Average:
-    return replace(average, variance_rad2_s2=average.variance_rad2_s2 + drift)
+    return replace(average, variance_rad2_s2=average.variance_rad2_s2 + drift, drift_rad2_s2=drift)
 
 
 def _observation(
@@ -156,7 +160,8 @@ def _observation(
     if covered.mean() < 0.5:
         raise arm_states_lost(where, "more than half the time")
     excess = motion.rate(stream.time_s[inside]) @ turn.axis_flange - turn.speed_rad_s
-    averaged = average(stream, inside, turn.duration_s, excess, covered)
+    window = Window(turn.start_s, turn.end_s)
+    averaged = _placed(average(stream, inside, window, excess, covered), motion)
     expected = np.array(stream.sensor.mounting) @ turn.axis_flange
     turned = averaged.mean_rad_s - stream.clock.zero_rate_rad_s
     _check_direction(turned, expected, where, settings)
@@ -186,7 +191,8 @@ def _rest(stream: Stream, motion: ArmMotion, window: Window) -> Average | None:
     if np.ptp(states["q_rad"], axis=0).max() > MAX_REST_TRAVEL_RAD:
         return None
     count = inside.stop - inside.start
-    return average(stream, inside, end - start, np.zeros(count), np.ones(count, dtype=np.bool_))
+    steady, known = np.zeros(count), np.ones(count, dtype=np.bool_)
+    return _placed(average(stream, inside, Window(start, end), steady, known), motion)
 
 
 def _lost(stream: Stream, inside: slice, where: str, settings: ObservationThresholds) -> int:

@@ -13,7 +13,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from rig.arm.kinematics import flange_rate
+from rig.arm.kinematics import flange_attitude, flange_rate
 from rig.errors import Fault
 from rig.estimation.arrays import Array
 
@@ -25,6 +25,7 @@ CANDIDATES = 12  # peaks of the correlation looked at: six equal sweeps give ele
 MIN_EXPLAINED = 0.5  # share of the readings' variance that the arm's motion must explain
 MIN_RATE_RAD_S = 0.01
 MAX_STATE_STEP_S = 0.02  # between arm states that still show the servo's vibration
+ATTITUDES = 72  # of which a mean is made: over a whole turn what is perpendicular to the axis averages out
 MAX_DRIFT = 0.03  # an oscillator that no crystal holds is within 2 %
 MAX_DRIFT_LONG_RUN = 1e-3  # one that a crystal holds is within 600 ppm; in hours, a wider search would take minutes
 MAX_DRIFT_STEPS = 20  # to either side
@@ -94,6 +95,12 @@ class ArmMotion:
         self.rate = CubicSpline(self.time_s, rates)
         close = np.diff(self.time_s) <= MAX_STATE_STEP_S
         self._covered = close & np.append(close[1:], True) & np.append(True, close[:-1])
+
+    def attitude(self, start_s: float, end_s: float) -> Array:
+        """(3, 3) mean rotation from the base frame into the flange's between two controller times."""
+        times_s = np.linspace(start_s, end_s, ATTITUDES, endpoint=False) + (end_s - start_s) / (2 * ATTITUDES)
+        mean: Array = flange_attitude(self.angles(times_s)).mean(axis=0)
+        return mean
 
     def covered(self, time_s: Array) -> NDArray[np.bool_]:
         """Which of these times (n,) lie where states follow each other closely enough for `rate` to be true."""

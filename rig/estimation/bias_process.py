@@ -1,0 +1,105 @@
+"""A bias that does not stand still: a random walk, and what scatters from one average to the next.
+
+The readings are averaged over windows. A random walk of rate q (rad/s per √s) makes the bias of a later window differ
+from that of an earlier one the more the farther they are apart; flicker noise is between that and a scatter s that has
+no memory. Both are found from the averages themselves by restricted maximum likelihood (Patterson and Thompson,
+Biometrika 58 (1971) 545), which takes into account how much of the scatter the fitted parameters have taken up.
+"""
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import ArrayLike
+
+from rig.estimation.arrays import Array
+
+STEPS = 25  # of either size on its grid
+SPAN = 300.0  # largest size over the smallest that is looked at
+SIGNIFICANT = 4.0  # twice the gain in log-likelihood below which a bias counts as steady: 5 % of steady ones exceed it
+
+
+@dataclass(frozen=True, slots=True)
+class BiasProcess:
+    """How the bias wanders: `walk_rad_s_sqrt_s` (q) and `scatter_rad_s` (s), zero where it is steady.
+
+    `freedom` is how many differences it was found from.
+    """
+
+    walk_rad_s_sqrt_s: float
+    scatter_rad_s: float
+    freedom: int
+
+    @property
+    def steady(self) -> bool:
+        """Whether nothing but noise was seen."""
+        return self.walk_rad_s_sqrt_s == 0.0 and self.scatter_rad_s == 0.0
+
+    def covariance(self, windows_s: ArrayLike) -> Array:
+        """(N, N) that it adds to means over the windows (N, 2), about the mean bias over all the time they span."""
+        return _added(self.walk_rad_s_sqrt_s**2, self.scatter_rad_s**2, walk_covariance(windows_s))
+
+    def wandered_rad_s(self, duration_s: float) -> float:
+        """Standard deviation of the change of the bias in so much time."""
+        return float(np.hypot(self.walk_rad_s_sqrt_s * np.sqrt(duration_s), self.scatter_rad_s))
+
+
+def walk_covariance(windows_s: ArrayLike) -> Array:
+    """(N, N) covariance of the means of a random walk of rate 1 over windows (N, 2) [start, end] that do not overlap.
+
+    Counted from the walk's mean over the whole time from the first start to the last end.
+    """
+    windows = np.asarray(windows_s, dtype=np.float64)
+    start, end = (windows - windows.min()).T
+    span = float(end.max())
+    middle, length = (start + end) / 2, end - start
+    together = np.minimum.outer(middle, middle)  # the earlier window lies before all of the later one
+    np.fill_diagonal(together, start + length / 3)
+    with_mean = middle - (start**2 + start * end + end**2) / (6 * span)
+    covariance: Array = together - with_mean[:, None] - with_mean[None, :] + span / 3
+    return covariance
+
+
+def estimate_bias_process(
+    design: ArrayLike, means_rad_s: ArrayLike, variances_rad2_s2: ArrayLike, windows_s: ArrayLike
+) -> BiasProcess:
+    """The process behind the mean readings (N, 3), which without it are `design` (N, p) × parameters + noise.
+
+    `variances_rad2_s2` (N, 3) are those of the noise, `windows_s` (N, 2) when was averaged. One process for the three
+    axes, so that few averages tell it. Steady when that explains them as well.
+    """
+    z, means, variances = (np.asarray(a, dtype=np.float64) for a in (design, means_rad_s, variances_rad2_s2))
+    freedom = 3 * (len(z) - z.shape[1])
+    if freedom < 3:
+        return BiasProcess(0.0, 0.0, max(freedom, 0))
+    unit = walk_covariance(windows_s)
+    typical = float(np.median(variances))
+    grid = np.concatenate([[0.0], typical * np.geomspace(SPAN**-0.5, SPAN, STEPS) ** 2])
+    walks = grid / float(np.median(np.diag(unit)))
+    sizes = np.array([(walk, scatter) for walk in walks for scatter in grid])
+    gain = np.zeros(len(sizes))
+    for axis in range(3):
+        noise = np.diag(variances[:, axis]) + _added(sizes[:, :1, None], sizes[:, 1:, None], unit)
+        gain += _restricted_likelihood(z, means[:, axis], noise)
+    best = int(np.argmax(gain))
+    if 2 * (gain[best] - gain[0]) < SIGNIFICANT:
+        return BiasProcess(0.0, 0.0, freedom)
+    walk, scatter = np.sqrt(sizes[best]).tolist()
+    return BiasProcess(walk, scatter, freedom)
+
+
+def _added(walk: Array | float, scatter: Array | float, unit: Array) -> Array:
+    """(…, N, N) for squared rates of the walk and squared scatters, both (…, 1, 1)."""
+    covariance: Array = np.asarray(walk * unit + scatter * np.eye(len(unit)), dtype=np.float64)
+    return covariance
+
+
+def _restricted_likelihood(design: Array, means: Array, noise: Array) -> Array:
+    """(K,) logarithms, up to a constant, for noise covariances (K, N, N)."""
+    right = np.broadcast_to(np.column_stack([design, means]), (*noise.shape[:-2], len(means), design.shape[1] + 1))
+    solved = np.linalg.solve(noise, right)
+    inner = np.swapaxes(right, -1, -2) @ solved  # [ZᵀV⁻¹Z, ZᵀV⁻¹m; ·, mᵀV⁻¹m]
+    parameters, rest = inner[..., :-1, :-1], inner[..., :-1, -1]
+    explained = np.sum(rest * np.linalg.solve(parameters, rest[..., None])[..., 0], axis=-1)
+    sizes = np.linalg.slogdet(noise)[1] + np.linalg.slogdet(parameters)[1]
+    likelihood: Array = -0.5 * (sizes + inner[..., -1, -1] - explained)
+    return likelihood
