@@ -49,7 +49,8 @@ class VectorSolution:
     - `angles_covariance_rad2` (6, 6): of `non_orthogonality_rad`, then of small turns of `mounting` about sensor x y z.
     - `g_sensitivity` (3, 3) in rad/s per m/s² and its (9, 9) covariance (row by row), or None.
     - `response` (6, N, 3): derivative of scale and bias with respect to the mean readings.
-    - `residuals_rad_s` (N, 3): reading less model. `rank` and `condition` are those of the scaled design.
+    - `residuals_rad_s` (N, 3): reading less model. `rank` is that of the scaled design, `condition` that of its part for
+      axes and bias: what sweeps and rests tell, whatever they tell of gravity beside it.
     """
 
     scale: Array
@@ -116,8 +117,9 @@ def solve_vector_model(
     moving = rates.any(axis=1)
     check_signal(means[moving])
     check_duplicates(means[moving])
-    found = conditioning(design / _unit(design), columns)
-    check_conditioning(found, columns, MAX_CONDITION, "axis, bias or g-sensitivity", REMEDY)
+    told = conditioning(design / _unit(design), columns)
+    check_conditioning(told, columns, MAX_CONDITION, "axis, bias or g-sensitivity", REMEDY)
+    found = conditioning(design[:, :4] / _unit(design)[:4], 4) if columns > 4 else told
 
     speed_noise = np.zeros_like(means)
     shared = None if shared_covariance_rad2_s2 is None else np.asarray(shared_covariance_rad2_s2, dtype=np.float64)
@@ -153,7 +155,7 @@ def solve_vector_model(
         response=_response(to_parameters, inverse),
         residuals_rad_s=residuals,
         observations=count,
-        rank=found.rank,
+        rank=told.rank,
         condition=found.condition,
         iterations=2 if speed_std.any() else 1,
         warnings=inconsistency(residuals, _all_variances(variances, speed_noise, shared), 3 * (count - columns)),
