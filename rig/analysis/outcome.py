@@ -15,6 +15,7 @@ from rig.analysis.calibration import (
     solve_observed,
 )
 from rig.analysis.comparison import Reference
+from rig.analysis.contradictions import contradictions
 from rig.analysis.onboard_check import Agreement, agreement
 from rig.analysis.verdict import Check, judge, verdict, verification_checks
 from rig.analysis.verification import Verification, verify
@@ -81,7 +82,11 @@ def calibrated(runs: Sequence[RunData], estimator: str = DEFAULT_ESTIMATOR) -> O
         results=results,
         onboard=onboard,
         verifications={},
-        checks=(*checks, *(check for name, agreed in onboard.items() for check in agreed.checks(name))),
+        checks=(
+            *checks,
+            *(check for name, agreed in onboard.items() for check in agreed.checks(name)),
+            *contradictions(recordings, results, settings.to_calibrate).checks,
+        ),
         provenance=_origin(runs),
     )
 

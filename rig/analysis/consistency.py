@@ -1,0 +1,164 @@
+"""Whether what a recording tells of a sensor agrees with itself: pieces of sweeps and rests against one model.
+
+All pieces must be explained by one calibration: m = F ω + c + G a + d t, the vector model with gravity and a bias that
+drifts steadily, to within the noise, a bias that wanders, and what arm and sensor may legitimately be off by. Each
+check adds columns for one thing that might be wrong and asks how much they explain: without it, χ² with as many degrees
+of freedom as columns. The process of the bias comes from what is left within the sweeps and between the rests, so that
+a wrong sweep does not excuse itself.
+"""
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from rig.analysis.pieces import Pieces
+from rig.estimation.arrays import Array
+from rig.estimation.bias_process import estimate_bias_process
+
+# Of the speed: twists of a real arm's wrists (−8e-4, +4e-4 rad, UR's own calibration), and what 0.1 % of full scale,
+# a common statement of nonlinearity, amounts to at a quarter of the range.
+TOLERANCE = 5e-4
+WITHIN_A_TURN = 3e-4  # of the speed: graduation and eccentricity of an encoder, which cancel over the turn
+
+
+Statistic = tuple[float, float]  # and its limit
+
+
+@dataclass(frozen=True, slots=True)
+class Consistency:
+    """The statistics of one sensor by the name of their check, each with its limit.
+
+    `sweep` is that of the sweep least like the others; `disturbed` those beyond the limit, by place, each beside the
+    ones before it.
+    """
+
+    statistics: dict[str, Statistic]
+    sweep: Statistic
+    disturbed: dict[int, Statistic]
+
+
+def consistency(pieces: Pieces, matrix: Array, rate: float) -> Consistency:
+    """Every statistic with its critical value; `rate` is that of false alarms for each, `matrix` (3, 3) F."""
+    from scipy.special import chdtri
+
+    lower = np.asarray(np.linalg.cholesky(_covariance(pieces, matrix)), dtype=np.float64)  # (3, N, N)
+    seen = _whiten(lower, pieces.means_rad_s.T[:, :, None])[:, 0]
+    base = _whiten(lower, _each_axis(_known(pieces)))
+    found: dict[str, Statistic] = {}
+    for name, columns in _suspicions(pieces, matrix).items():
+        explained, freedom = _explained(seen, base, _whiten(lower, columns))
+        if freedom:
+            found[name] = explained, float(chdtri(freedom, rate))
+    ranked = _disturbed(pieces, lower, seen, base, rate)
+    return Consistency(found, ranked[0][1], {sweep: each for sweep, each in ranked if each[0] > each[1]})
+
+
+def _disturbed(pieces: Pieces, lower: Array, seen: Array, base: Array, rate: float) -> list[tuple[int, Statistic]]:
+    """The sweep least like the others, then the next once that is taken out, until they agree or half are out."""
+    from scipy.special import chdtri
+
+    left = np.unique(pieces.sweep[pieces.sweep >= 0]).tolist()
+    each_rate, most, found = rate / len(left), (len(left) + 1) // 2, list[tuple[int, Statistic]]()
+    while len(found) < most:
+        explained = {sweep: _explained(seen, base, _whiten(lower, _of_sweep(pieces, sweep))) for sweep in left}
+        worst = max(left, key=lambda sweep: explained[sweep][0])
+        value, freedom = explained[worst]
+        found.append((worst, (value, float(chdtri(freedom, each_rate)))))
+        if value <= found[-1][1][1]:
+            break
+        left.remove(worst)
+        base = np.concatenate([base, _whiten(lower, _of_sweep(pieces, worst))], axis=1)
+    return found
+
+
+def _covariance(pieces: Pieces, matrix: Array) -> Array:
+    """(3, N, N) of the pieces' means: noise, a bias that wanders, and what arm and sensor may be off by."""
+    count = len(pieces.sweep)
+    own = np.arange(count)
+    same = (pieces.sweep[:, None] == pieces.sweep) & (pieces.sweep >= 0)
+    speed = np.linalg.norm(pieces.rates_rad_s @ matrix.T, axis=1)
+    off = (TOLERANCE**2 + np.outer(pieces.speed_std, pieces.speed_std)) * same * np.outer(speed, speed)
+    off[own, own] += (WITHIN_A_TURN * speed) ** 2
+    steady = _basis(
+        np.column_stack(
+            [*(pieces.sweep == sweep for sweep in np.unique(pieces.sweep)), pieces.gravity_m_s2, _time(pieces)]
+        )
+    )
+    variances = pieces.variances_rad2_s2 + ((WITHIN_A_TURN * speed) ** 2)[:, None]
+    bias = estimate_bias_process(steady, pieces.means_rad_s, variances, pieces.times_s, significant=0.0)
+    noise = np.array([np.diag(each) for each in pieces.variances_rad2_s2.T])
+    return np.asarray(noise + off + bias.covariance(pieces.times_s), dtype=np.float64)
+
+
+def _known(pieces: Pieces) -> Array:
+    """(N, 8) columns of the model, for each axis alike."""
+    ones = np.ones(len(pieces.sweep))
+    return np.column_stack([pieces.rates_rad_s, ones, pieces.gravity_m_s2, _time(pieces)])
+
+
+def _suspicions(pieces: Pieces, matrix: Array) -> dict[str, Array]:
+    """By name of the check (3, N, k): what each would add to the three axes' readings."""
+    felt, time = pieces.rates_rad_s @ matrix.T, _time(pieces)
+    turned = np.cross(np.eye(3)[:, None], felt[None]) * time[None, :, None]  # (k, N, 3)
+    found = {
+        "scale_changed": _per_axis(felt * time[:, None]),
+        "loose_mounting": np.transpose(turned, (2, 1, 0)),
+        "cw_against_ccw": _per_axis(np.abs(felt)),
+        "residuals": _per_axis(np.eye(len(time))[:, :, None] * np.ones(3)),
+    }
+    moving = pieces.sweep >= 0
+    if not moving.all():
+        found["sweeps_against_rests"] = _per_axis(np.outer(moving, np.ones(3)))
+    return found
+
+
+def _of_sweep(pieces: Pieces, sweep: int) -> Array:
+    """(3, N, 6): another reading in this sweep, and another in its second half than in its first."""
+    inside = (pieces.sweep == sweep).astype(np.float64)
+    return _each_axis(np.column_stack([inside, inside * pieces.place]))
+
+
+def _time(pieces: Pieces) -> Array:
+    """(N,) of the pieces' middles, from −1 to 1."""
+    middle = pieces.times_s.mean(axis=1)
+    time: Array = (2 * middle - middle.max() - middle.min()) / np.ptp(middle)
+    return time
+
+
+def _each_axis(columns: Array) -> Array:
+    """(3, N, 3 k): columns (N, k) for each axis with a coefficient of its own."""
+    count, wide = columns.shape
+    return np.asarray(np.einsum("ij,nk->injk", np.eye(3), columns).reshape(3, count, 3 * wide), dtype=np.float64)
+
+
+def _per_axis(columns: Array) -> Array:
+    """(3, N, 3 k) from (N, 3) or (N, k, 3): each axis' own columns, with a coefficient of its own."""
+    wide = columns[:, None, :] if columns.ndim == 2 else columns
+    stacked: Array = np.einsum("ij,nki->injk", np.eye(3), wide).reshape(3, len(wide), -1)
+    return stacked
+
+
+def _whiten(lower: Array, columns: Array) -> Array:
+    """(3 N, k) of columns (3, N, k), so that the noise is one and independent."""
+    white = np.asarray(np.linalg.solve(lower, columns), dtype=np.float64)
+    return white.reshape(-1, columns.shape[2])
+
+
+def _basis(columns: Array) -> Array:
+    """Orthonormal columns that span the same."""
+    sizes = np.linalg.norm(columns, axis=0)
+    left, singular, _ = np.linalg.svd(columns / np.where(sizes > 0, sizes, 1.0), full_matrices=False)
+    basis: Array = left[:, singular > 1e-6 * singular[0]]
+    return basis
+
+
+def _explained(seen: Array, base: Array, columns: Array) -> tuple[float, int]:
+    """How much of what `base` leaves of the readings these columns explain, and how many they are beside it."""
+    known = _basis(base)
+    sizes = np.linalg.norm(columns, axis=0)
+    new = columns / np.where(sizes > 0, sizes, 1.0)
+    new = new - known @ (known.T @ new)
+    left, singular, _ = np.linalg.svd(new, full_matrices=False)
+    told = left[:, singular > 1e-3]
+    explained = told.T @ (seen - known @ (known.T @ seen))
+    return float(explained @ explained), told.shape[1]
