@@ -18,6 +18,7 @@ from rig.estimation.bias_process import estimate_bias_process
 # Of the speed: twists of a real arm's wrists (−8e-4, +4e-4 rad, UR's own calibration), and what 0.1 % of full scale,
 # a common statement of nonlinearity, amounts to at a quarter of the range.
 TOLERANCE = 5e-4
+ALIKE = 10.0  # of χ²: what explains less than the best by no more than this might be the cause as well
 WITHIN_A_TURN = 3e-4  # of the speed: graduation and eccentricity of an encoder, which cancel over the turn
 
 
@@ -28,8 +29,7 @@ Statistic = tuple[float, float]  # and its limit
 class Consistency:
     """The statistics of one sensor by the name of their check, each with its limit.
 
-    `sweep` is that of the sweep least like the others; `disturbed` those beyond the limit, by place, each beside the
-    ones before it.
+    `sweep` is that of the sweep least like the others; `disturbed` are those beyond the limit, by place.
     """
 
     statistics: dict[str, Statistic]
@@ -41,33 +41,38 @@ def consistency(pieces: Pieces, matrix: Array, rate: float) -> Consistency:
     """Every statistic with its critical value; `rate` is that of false alarms for each, `matrix` (3, 3) F."""
     from scipy.special import chdtri
 
-    lower = np.asarray(np.linalg.cholesky(_covariance(pieces, matrix)), dtype=np.float64)  # (3, N, N)
-    seen = _whiten(lower, pieces.means_rad_s.T[:, :, None])[:, 0]
-    base = _whiten(lower, _each_axis(_known(pieces)))
+    white = _whitening(_covariance(pieces, matrix), pieces.variances_rad2_s2.min(axis=0))
+    seen = _whiten(white, pieces.means_rad_s.T[:, :, None])[:, 0]
+    base = _whiten(white, _each_axis(_known(pieces)))
     found: dict[str, Statistic] = {}
     for name, columns in _suspicions(pieces, matrix).items():
-        explained, freedom = _explained(seen, base, _whiten(lower, columns))
+        explained, freedom = _explained(seen, base, _whiten(white, columns))
         if freedom:
             found[name] = explained, float(chdtri(freedom, rate))
-    ranked = _disturbed(pieces, lower, seen, base, rate)
+    ranked = _disturbed(pieces, white, seen, base, rate)
     return Consistency(found, ranked[0][1], {sweep: each for sweep, each in ranked if each[0] > each[1]})
 
 
-def _disturbed(pieces: Pieces, lower: Array, seen: Array, base: Array, rate: float) -> list[tuple[int, Statistic]]:
-    """The sweep least like the others, then the next once that is taken out, until they agree or half are out."""
+def _disturbed(pieces: Pieces, white: Array, seen: Array, base: Array, rate: float) -> list[tuple[int, Statistic]]:
+    """The sweep least like the others, then the next once that is taken out, until they agree or half are out.
+
+    Where one turn each way about an axis is all there is, either of the two may be the one: then both are named.
+    """
     from scipy.special import chdtri
 
     left = np.unique(pieces.sweep[pieces.sweep >= 0]).tolist()
     each_rate, most, found = rate / len(left), (len(left) + 1) // 2, list[tuple[int, Statistic]]()
     while len(found) < most:
-        explained = {sweep: _explained(seen, base, _whiten(lower, _of_sweep(pieces, sweep))) for sweep in left}
+        explained = {sweep: _explained(seen, base, _whiten(white, _of_sweep(pieces, sweep))) for sweep in left}
         worst = max(left, key=lambda sweep: explained[sweep][0])
         value, freedom = explained[worst]
-        found.append((worst, (value, float(chdtri(freedom, each_rate)))))
-        if value <= found[-1][1][1]:
-            break
-        left.remove(worst)
-        base = np.concatenate([base, _whiten(lower, _of_sweep(pieces, worst))], axis=1)
+        limit = float(chdtri(freedom, each_rate))
+        if value <= limit:
+            return found or [(worst, (value, limit))]
+        alike = [sweep for sweep in left if explained[sweep][0] > value - ALIKE]
+        found += [(sweep, (value, limit)) for sweep in alike]
+        left = [sweep for sweep in left if sweep not in alike]
+        base = np.concatenate([base, _whiten(white, _of_sweep(pieces, worst))], axis=1)
     return found
 
 
@@ -76,7 +81,8 @@ def _covariance(pieces: Pieces, matrix: Array) -> Array:
     count = len(pieces.sweep)
     own = np.arange(count)
     same = (pieces.sweep[:, None] == pieces.sweep) & (pieces.sweep >= 0)
-    speed = np.linalg.norm(pieces.rates_rad_s @ matrix.T, axis=1)
+    felt = pieces.rates_rad_s @ matrix.T
+    speed = np.linalg.norm(felt, axis=1)
     off = (TOLERANCE**2 + np.outer(pieces.speed_std, pieces.speed_std)) * same * np.outer(speed, speed)
     off[own, own] += (WITHIN_A_TURN * speed) ** 2
     steady = _basis(
@@ -85,7 +91,7 @@ def _covariance(pieces: Pieces, matrix: Array) -> Array:
         )
     )
     variances = pieces.variances_rad2_s2 + ((WITHIN_A_TURN * speed) ** 2)[:, None]
-    bias = estimate_bias_process(steady, pieces.means_rad_s, variances, pieces.times_s, significant=0.0)
+    bias = estimate_bias_process(steady, pieces.means_rad_s - felt, variances, pieces.times_s, significant=0.0)
     noise = np.array([np.diag(each) for each in pieces.variances_rad2_s2.T])
     return np.asarray(noise + off + bias.covariance(pieces.times_s), dtype=np.float64)
 
@@ -99,6 +105,8 @@ def _known(pieces: Pieces) -> Array:
 def _suspicions(pieces: Pieces, matrix: Array) -> dict[str, Array]:
     """By name of the check (3, N, k): what each would add to the three axes' readings."""
     felt, time = pieces.rates_rad_s @ matrix.T, _time(pieces)
+    for sweep in np.unique(pieces.sweep):  # what changes within a sweep is that sweep's own matter
+        time[pieces.sweep == sweep] = time[pieces.sweep == sweep].mean()
     turned = np.cross(np.eye(3)[:, None], felt[None]) * time[None, :, None]  # (k, N, 3)
     found = {
         "scale_changed": _per_axis(felt * time[:, None]),
@@ -138,10 +146,19 @@ def _per_axis(columns: Array) -> Array:
     return stacked
 
 
-def _whiten(lower: Array, columns: Array) -> Array:
-    """(3 N, k) of columns (3, N, k), so that the noise is one and independent."""
-    white = np.asarray(np.linalg.solve(lower, columns), dtype=np.float64)
-    return white.reshape(-1, columns.shape[2])
+def _whitening(covariance: Array, least: Array) -> Array:
+    """(3, N, N) what makes noise of covariance (3, N, N) one and independent; no variance is below `least` (3,).
+
+    Windows overlap when a computer's clock was put back between two recordings, and what is computed is no covariance.
+    """
+    variances, directions = np.linalg.eigh(covariance)
+    sizes = np.sqrt(np.maximum(variances, least[:, None]))
+    return np.asarray(directions.swapaxes(1, 2) / sizes[:, :, None], dtype=np.float64)
+
+
+def _whiten(white: Array, columns: Array) -> Array:
+    """(3 N, k) of columns (3, N, k)."""
+    return np.asarray((white @ columns).reshape(-1, columns.shape[2]), dtype=np.float64)
 
 
 def _basis(columns: Array) -> Array:

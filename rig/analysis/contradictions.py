@@ -53,6 +53,11 @@ def contradictions(
     return Contradictions(tuple(checks), frozenset(disturbed))
 
 
+def names_a_sweep(check: str) -> bool:
+    """Whether a check of that name is one a disturbed sweep has failed."""
+    return f".{DISTURBED}." in check
+
+
 def disturbed_sweeps(runs: Sequence[RunData]) -> frozenset[int]:
     """The sweeps in the recordings of a run so far that contradict the others; none where they cannot be solved."""
     try:

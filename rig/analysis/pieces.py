@@ -30,12 +30,13 @@ class Window:
 
     `sweep` is the place of the revolution among all of the sensor's, −1 for a rest; `counts` (n, 3) are the readings
     as recorded, `residual_counts` (m, 3) what of a reading neither its part's mean nor the arm's vibration explains,
-    where the arm's motion is known.
+    where the arm's motion is known; `vibration_counts` (3,) is the RMS of that vibration.
     """
 
     sweep: int
     counts: NDArray[np.int64]
     residual_counts: Array
+    vibration_counts: Array
 
 
 @dataclass(frozen=True, slots=True)
@@ -71,9 +72,7 @@ class _Piece:
     end_s: float
 
 
-def cut(
-    name: str, recordings: Sequence[ObservedRun], result: SensorResult, explained: Explained, site: Site
-) -> Pieces:
+def cut(name: str, recordings: Sequence[ObservedRun], result: SensorResult, explained: Explained, site: Site) -> Pieces:
     """The sensor's revolutions and rests of all recordings in pieces, in the order `explained` was made from."""
     parts = max(1, min(PARTS, MOST_PIECES // len(result.observations)))
     streams = [(recording, recording.stream(name)) for recording in recordings]
@@ -81,7 +80,7 @@ def cut(
     rests = [(*each, rest) for each in streams for rest in each[0].sensors[name].rests]
     found = [
         *(
-            _cut(stream, recording.motion, turn.average, site, parts, sweep, turn)
+            _cut(stream, recording.motion, turn.average, site, parts, sweep=sweep, turn=turn)
             for sweep, (recording, stream, turn) in enumerate(turns)
         ),
         *(_cut(stream, recording.motion, rest, site, max(1, parts // 2)) for recording, stream, rest in rests),
@@ -110,6 +109,7 @@ def _cut(
     average: Average,
     site: Site,
     parts: int,
+    *,
     sweep: int = -1,
     turn: Observation | None = None,
 ) -> tuple[Window, list[_Piece]]:
@@ -126,11 +126,12 @@ def _cut(
     used = np.isin(part, enough)
     part, rate, readings, time_s = part[used], rate[used], readings[used], time_s[used]
     means, rates = _means(readings, part, parts), _means(rate, part, parts)
-    residual = readings - means[part]
+    residual, shaken = readings - means[part], np.zeros(readings.shape)
     if turn is not None:
         vibration = np.column_stack([rate @ turn.axis_flange, motion.rate(time_s, 1) @ turn.axis_flange])
         vibration -= _means(vibration, part, parts)[part]
-        residual = residual - vibration @ np.linalg.lstsq(vibration, residual, rcond=None)[0]
+        shaken = vibration @ np.linalg.lstsq(vibration, residual, rcond=None)[0]
+        residual = residual - shaken
     count = stream.sensor.sensitivity_rad_s_per_count
     scatter = np.maximum(np.sum(residual**2, axis=0) / max(len(residual) - len(enough), 1), count**2 / 12)
     wider = np.array([widening(residual[:, axis]) for axis in range(3)])
@@ -152,7 +153,8 @@ def _cut(
                 end_s=float(ends[each + 1]),
             )
         )
-    return Window(sweep, stream.raw["counts"][inside].astype(np.int64), residual / count), pieces
+    seen = stream.raw["counts"][inside].astype(np.int64)
+    return Window(sweep, seen, residual / count, np.sqrt(np.mean(shaken**2, axis=0)) / count), pieces
 
 
 def _means(values: Array, part: NDArray[np.intp], parts: int) -> Array:

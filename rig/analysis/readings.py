@@ -21,6 +21,7 @@ STRETCH = 8  # readings on three axes, some 50 bits at one count of noise
 FEWEST_VALUES = 24  # of an axis, to say that a bit ought to have changed
 ONE_BIT = 0.8  # of the spikes off by the same power of two: they are a bit's doing
 FEWEST_SPIKES = 5
+VIBRATION_LEFT = 0.1  # of the arm's vibration, which the sensor's filter changes and the arm's states tell in part
 HEAP = 10  # readings
 
 
@@ -36,7 +37,9 @@ def judge_readings(counts: Sequence[NDArray[np.int64]], windows: Sequence[Window
     noise = np.min([_noise(window.counts) for window in at_rest], axis=0)
     spikes, of_a_bit = _spikes(windows)
     stuck = _constant_bits(np.concatenate(counts)) + _uneven_bits(windows, noise, sure) + of_a_bit
-    found = {"stuck_bit": (float(stuck), 0.0), "spikes": (spikes, SPIKE), "skewed_noise": _skewness(windows, sure)}
+    found = {"stuck_bit": (float(stuck), 0.0), "spikes": (spikes, SPIKE)}
+    if len(at_rest) < len(windows):
+        found["skewed_noise"] = _skewness(at_rest, sure)
     if noise.min() >= 1:
         found["stuck_axis"] = max(map(_longest_run, counts)), LONGEST_RUN
         found["repeated_readings"] = sum(map(_repeated, counts)), 0.0
@@ -79,7 +82,8 @@ def _spikes(windows: Sequence[Window]) -> tuple[float, int]:
     farthest, sizes = 0.0, [[], [], []]  # type: float, list[list[Array]]
     for window in windows:
         off = window.residual_counts - np.median(window.residual_counts, axis=0)
-        deviation = np.maximum(1.4826 * np.median(np.abs(off), axis=0), 0.5)
+        noise = np.maximum(1.4826 * np.median(np.abs(off), axis=0), 0.5)
+        deviation = np.maximum(noise, VIBRATION_LEFT * window.vibration_counts)
         farthest = max(farthest, float(np.max(np.abs(off) / deviation)))
         for axis in range(3):
             beyond = np.abs(off[:, axis]) > SPIKE * deviation[axis]
@@ -99,7 +103,10 @@ def _one_bit(powers: Array) -> bool:
 
 
 def _skewness(windows: Sequence[Window], sure: float) -> tuple[float, float]:
-    """The largest skewness of an axis' noise, which a bit that is now and then wrong makes, and what is allowed."""
+    """The largest skewness of an axis' noise, which a bit that is now and then wrong makes, and what is allowed.
+
+    At rest: the arm's vibration need not be even.
+    """
     from scipy.stats import skew
 
     parts = [window.residual_counts / np.maximum(window.residual_counts.std(axis=0), 0.5) for window in windows]

@@ -95,7 +95,7 @@ def readings_of(setup: Setup) -> Readings:
 def scaled(by: float, where: Callable[[Readings], Mask], axes: tuple[int, ...] = (0, 1, 2)) -> Damage:
     def damage(seen: Readings) -> Readings:
         felt = seen.felt()
-        felt[np.ix_(where(seen), list(axes))] *= by
+        felt[np.ix_(where(seen), np.array(axes))] *= by
         return seen.feeling(felt)
 
     return damage
@@ -155,7 +155,7 @@ def spiky(share: float, size_rad_s: float, *, one_sided: bool = False) -> Damage
 def frozen(where: Callable[[Readings], Mask], axes: tuple[int, ...]) -> Damage:
     def damage(seen: Readings) -> Readings:
         counts, there = seen.counts.copy(), seen.second(where(seen))
-        counts[np.ix_(there, list(axes))] = counts[np.argmax(there)][list(axes)]
+        counts[np.ix_(there, np.array(axes))] = counts[np.argmax(there)][list(axes)]
         return seen.reading(counts)
 
     return damage
