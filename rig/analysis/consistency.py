@@ -41,14 +41,18 @@ def consistency(pieces: Pieces, matrix: Array, rate: float) -> Consistency:
     """Every statistic with its critical value; `rate` is that of false alarms for each, `matrix` (3, 3) F."""
     from scipy.special import chdtri
 
-    white = _whitening(_covariance(pieces, matrix), pieces.variances_rad2_s2.min(axis=0))
+    felt = pieces.rates_rad_s @ matrix.T
+    white = _whitening(_covariance(pieces, felt, _steady(pieces)), pieces.variances_rad2_s2.min(axis=0))
     seen = _whiten(white, pieces.means_rad_s.T[:, :, None])[:, 0]
     base = _whiten(white, _each_axis(_known(pieces)))
     found: dict[str, Statistic] = {}
-    for name, columns in _suspicions(pieces, matrix).items():
+    for name, columns in _suspicions(pieces, felt).items():
         explained, freedom = _explained(seen, base, _whiten(white, columns))
         if freedom:
             found[name] = explained, float(chdtri(freedom, rate))
+    jumped = _jumped(pieces, felt, rate)
+    if jumped is not None:
+        found["bias_jumped"] = jumped
     ranked = _disturbed(pieces, white, seen, base, rate)
     return Consistency(found, ranked[0][1], {sweep: each for sweep, each in ranked if each[0] > each[1]})
 
@@ -76,24 +80,55 @@ def _disturbed(pieces: Pieces, white: Array, seen: Array, base: Array, rate: flo
     return found
 
 
-def _covariance(pieces: Pieces, matrix: Array) -> Array:
-    """(3, N, N) of the pieces' means: noise, a bias that wanders, and what arm and sensor may be off by."""
-    count = len(pieces.sweep)
-    own = np.arange(count)
+def _jumped(pieces: Pieces, felt: Array, rate: float) -> Statistic | None:
+    """How much a jump of the bias between two rests explains beside its wandering; None without three rests.
+
+    The process is estimated anew beside the jump that explains most, for that jump would be taken for wandering. Few
+    rests tell that process, so the critical value is F's.
+    """
+    from scipy.special import fdtri
+
+    steady, middle = _steady(pieces), pieces.times_s.mean(axis=1)
+    ends = [pieces.times_s[pieces.sweep == sweep].max() for sweep in np.unique(pieces.sweep[pieces.sweep >= 0])]
+    steps = [np.where(middle < end, 0.0, 1.0)[:, None] for end in ends]
+    steps = [step for step in steps if len(np.unique(step[pieces.sweep < 0])) > 1]
+    if len(steps) < 2:
+        return None
+
+    def explained(step: Array, beside: Array) -> float:
+        white = _whitening(_covariance(pieces, felt, beside), pieces.variances_rad2_s2.min(axis=0))
+        seen = _whiten(white, (pieces.means_rad_s - felt).T[:, :, None])[:, 0]
+        return _explained(seen, _whiten(white, _each_axis(steady)), _whiten(white, _each_axis(step)))[0]
+
+    left = pieces.means_rad_s - felt
+    left = left - steady @ (steady.T @ left)
+    aside = [step - steady @ (steady.T @ step) for step in steps]
+    best = max(range(len(steps)), key=lambda k: float(np.sum((aside[k].T @ left) ** 2 / np.sum(aside[k] ** 2))))
+    beside = _basis(np.column_stack([steady, steps[best]]))
+    freedom = 3 * (len(steps) - 1)
+    return explained(steps[best], beside), 3 * float(fdtri(3, freedom, 1 - rate / len(steps)))
+
+
+def _covariance(pieces: Pieces, felt: Array, steady: Array) -> Array:
+    """(3, N, N) of the pieces' means: noise, a bias that wanders, and what arm and sensor may be off by.
+
+    How the bias wanders is found from what `steady` (N, k), orthonormal columns, leaves of the readings.
+    """
+    own = np.arange(len(pieces.sweep))
     same = (pieces.sweep[:, None] == pieces.sweep) & (pieces.sweep >= 0)
-    felt = pieces.rates_rad_s @ matrix.T
     speed = np.linalg.norm(felt, axis=1)
     off = (TOLERANCE**2 + np.outer(pieces.speed_std, pieces.speed_std)) * same * np.outer(speed, speed)
     off[own, own] += (WITHIN_A_TURN * speed) ** 2
-    steady = _basis(
-        np.column_stack(
-            [*(pieces.sweep == sweep for sweep in np.unique(pieces.sweep)), pieces.gravity_m_s2, _time(pieces)]
-        )
-    )
     variances = pieces.variances_rad2_s2 + ((WITHIN_A_TURN * speed) ** 2)[:, None]
     bias = estimate_bias_process(steady, pieces.means_rad_s - felt, variances, pieces.times_s, significant=0.0)
     noise = np.array([np.diag(each) for each in pieces.variances_rad2_s2.T])
     return np.asarray(noise + off + bias.covariance(pieces.times_s), dtype=np.float64)
+
+
+def _steady(pieces: Pieces) -> Array:
+    """(N, k) orthonormal columns: whatever each sweep reads as a whole, the rests alike, gravity, a steady drift."""
+    places = [pieces.sweep == sweep for sweep in np.unique(pieces.sweep)]
+    return _basis(np.column_stack([*places, pieces.gravity_m_s2, _time(pieces)]))
 
 
 def _known(pieces: Pieces) -> Array:
@@ -102,9 +137,9 @@ def _known(pieces: Pieces) -> Array:
     return np.column_stack([pieces.rates_rad_s, ones, pieces.gravity_m_s2, _time(pieces)])
 
 
-def _suspicions(pieces: Pieces, matrix: Array) -> dict[str, Array]:
+def _suspicions(pieces: Pieces, felt: Array) -> dict[str, Array]:
     """By name of the check (3, N, k): what each would add to the three axes' readings."""
-    felt, time = pieces.rates_rad_s @ matrix.T, _time(pieces)
+    time = _time(pieces)
     for sweep in np.unique(pieces.sweep):  # what changes within a sweep is that sweep's own matter
         time[pieces.sweep == sweep] = time[pieces.sweep == sweep].mean()
     turned = np.cross(np.eye(3)[:, None], felt[None]) * time[None, :, None]  # (k, N, 3)

@@ -20,7 +20,7 @@ from rig.observation.observed_run import ObservedRun
 from rig.observation.timebase import ArmMotion, widening
 
 PARTS = 4  # of a revolution; a rest has half as many
-MOST_PIECES = 72  # of all revolutions: beyond twelve sweeps these are cut into fewer parts
+MOST_PIECES = 48  # of all revolutions: beyond twelve sweeps these are cut into fewer parts
 FEWEST_SAMPLES = 20
 
 
