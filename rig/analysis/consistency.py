@@ -84,7 +84,8 @@ def _jumped(pieces: Pieces, felt: Array, rate: float) -> Statistic | None:
     """How much a jump of the bias between two rests explains beside its wandering; None without three rests.
 
     The process is estimated anew beside the jump that explains most, for that jump would be taken for wandering. Few
-    rests tell that process, so the critical value is F's.
+    rests tell that process, and least of all beside the jump that suits them best: simulated random walks exceed
+    the critical value about as often as F does with one degree of freedom for each place a jump might have.
     """
     from scipy.special import fdtri
 
@@ -105,8 +106,7 @@ def _jumped(pieces: Pieces, felt: Array, rate: float) -> Statistic | None:
     aside = [step - steady @ (steady.T @ step) for step in steps]
     best = max(range(len(steps)), key=lambda k: float(np.sum((aside[k].T @ left) ** 2 / np.sum(aside[k] ** 2))))
     beside = _basis(np.column_stack([steady, steps[best]]))
-    freedom = 3 * (len(steps) - 1)
-    return explained(steps[best], beside), 3 * float(fdtri(3, freedom, 1 - rate / len(steps)))
+    return explained(steps[best], beside), 3 * float(fdtri(3, len(steps), 1 - rate / len(steps)))
 
 
 def _covariance(pieces: Pieces, felt: Array, steady: Array) -> Array:
