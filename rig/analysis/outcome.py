@@ -16,6 +16,7 @@ from rig.analysis.calibration import (
 )
 from rig.analysis.clock import ClockCheck
 from rig.analysis.comparison import Reference
+from rig.analysis.contradictions import contradictions
 from rig.analysis.onboard_check import Agreement, agreement
 from rig.analysis.surroundings import surroundings_of
 from rig.analysis.verdict import Check, judge, verdict, verification_checks
@@ -91,7 +92,11 @@ def calibrated(runs: Sequence[RunData], estimator: str = DEFAULT_ESTIMATOR) -> O
         results=results,
         onboard=onboard,
         verifications={},
-        checks=(*checks, *(check for name, agreed in onboard.items() for check in agreed.checks(name))),
+        checks=(
+            *checks,
+            *(check for name, agreed in onboard.items() for check in agreed.checks(name)),
+            *contradictions(recordings, results, settings.to_calibrate).checks,
+        ),
         provenance=_origin(runs),
         clock=None if surroundings is None else surroundings.clock,
     )

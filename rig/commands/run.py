@@ -4,8 +4,10 @@ from collections.abc import Sequence
 from contextlib import ExitStack
 from pathlib import Path
 
+from rig.analysis.contradictions import names_a_sweep
 from rig.commands.configured import Configured, configured
 from rig.commands.laboratory import simulated_laboratory
+from rig.data.result_file import read_result
 from rig.data.run_folder import CONFIG, RESULT, SCRIPT, new_folder, script_identity
 from rig.errors import Refused
 from rig.plans.script_file import ScriptFile, load_script
@@ -40,11 +42,12 @@ def run(
 def resume(folder: Path, *, assume_yes: bool = False, as_json: bool = False) -> int:
     """Go on with an interrupted run by the script it was begun with: sweeps it has finished count, the others are done.
 
-    Returns as `run` does. Raises Refused `no_run`, `already_finished`, and as `script_identity` and `load_script`.
+    A sweep that the verdict named as disturbed is repeated. Returns as `run` does. Raises Refused `no_run`,
+    `already_finished`, and as `read_result`, `script_identity` and `load_script`.
     """
     if not (folder / CONFIG).exists():
         raise Refused("no_run", f"{folder} holds no {CONFIG}", "Give the folder of an interrupted run")
-    if (folder / RESULT).exists():
+    if (folder / RESULT).exists() and not any(names_a_sweep(check.name) for check in read_result(folder).checks):
         raise Refused("already_finished", f"{folder} has its {RESULT}", "Start a new run with `rig run`")
     if not (folder / SCRIPT).exists():
         raise Refused(

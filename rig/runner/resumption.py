@@ -3,6 +3,7 @@
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 
+from rig.analysis.contradictions import disturbed_sweeps
 from rig.data.provenance import Provenance
 from rig.data.run_file import RecordedSensor, RunData
 from rig.data.settings import RunSettings
@@ -49,7 +50,8 @@ class Resumption:
 def resumption(earlier: Sequence[RunData], settings: RunSettings, script: ScriptFile) -> Resumption:
     """What counts of the recordings of an interrupted run: sound sweeps that the board has averaged as well.
 
-    Sweeps are counted by their place in the procedure, so the rest of a run must be the rest of the same one. Raises
+    A sweep that contradicts the others is to be repeated. Sweeps are counted by their place in the procedure, so the
+    rest of a run must be the rest of the same one. Raises
     Refused `another_script`, `another_procedure`.
     """
     for run in earlier:
@@ -66,4 +68,4 @@ def resumption(earlier: Sequence[RunData], settings: RunSettings, script: Script
                 REMEDY,
             )
     done = (sound_sweeps(run, settings.observation) & observed_sweeps(run, settings.to_calibrate) for run in earlier)
-    return Resumption(earlier, frozenset[int]().union(*done))
+    return Resumption(earlier, frozenset[int]().union(*done) - disturbed_sweeps(earlier))

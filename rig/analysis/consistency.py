@@ -1,0 +1,216 @@
+"""Whether what a recording tells of a sensor agrees with itself: pieces of sweeps and rests against one model.
+
+All pieces must be explained by one calibration: m = F ω + c + G a + d t, the vector model with gravity and a bias that
+drifts steadily, to within the noise, a bias that wanders, and what arm and sensor may legitimately be off by. Each
+check adds columns for one thing that might be wrong and asks how much they explain: without it, χ² with as many degrees
+of freedom as columns. The process of the bias comes from what is left within the sweeps and between the rests, so that
+a wrong sweep does not excuse itself.
+"""
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from rig.analysis.pieces import Pieces
+from rig.estimation.arrays import Array
+from rig.estimation.bias_process import estimate_bias_process
+
+# Of the speed: twists of a real arm's wrists (−8e-4, +4e-4 rad, UR's own calibration), and what 0.1 % of full scale,
+# a common statement of nonlinearity, amounts to at a quarter of the range.
+TOLERANCE = 5e-4
+ALIKE = 10.0  # of χ²: what explains less than the best by no more than this might be the cause as well
+WITHIN_A_TURN = 3e-4  # of the speed: graduation and eccentricity of an encoder, which cancel over the turn
+
+
+Statistic = tuple[float, float]  # and its limit
+
+
+@dataclass(frozen=True, slots=True)
+class Consistency:
+    """The statistics of one sensor by the name of their check, each with its limit.
+
+    `sweep` is that of the sweep least like the others; `disturbed` are those beyond the limit, by place.
+    """
+
+    statistics: dict[str, Statistic]
+    sweep: Statistic
+    disturbed: dict[int, Statistic]
+
+
+def consistency(pieces: Pieces, matrix: Array, rate: float) -> Consistency:
+    """Every statistic with its critical value; `rate` is that of false alarms for each, `matrix` (3, 3) F."""
+    from scipy.special import chdtri
+
+    felt = pieces.rates_rad_s @ matrix.T
+    white = _whitening(_covariance(pieces, felt, _steady(pieces)), pieces.variances_rad2_s2.min(axis=0))
+    seen = _whiten(white, pieces.means_rad_s.T[:, :, None])[:, 0]
+    base = _whiten(white, _each_axis(_known(pieces)))
+    found: dict[str, Statistic] = {}
+    for name, columns in _suspicions(pieces, felt).items():
+        explained, freedom = _explained(seen, base, _whiten(white, columns))
+        if freedom:
+            found[name] = explained, float(chdtri(freedom, rate))
+    jumped = _jumped(pieces, felt, rate)
+    if jumped is not None:
+        found["bias_jumped"] = jumped
+    ranked = _disturbed(pieces, white, seen, base, rate)
+    return Consistency(found, ranked[0][1], {sweep: each for sweep, each in ranked if each[0] > each[1]})
+
+
+def _disturbed(pieces: Pieces, white: Array, seen: Array, base: Array, rate: float) -> list[tuple[int, Statistic]]:
+    """The sweep least like the others, then the next once that is taken out, until they agree or half are out.
+
+    Where one turn each way about an axis is all there is, either of the two may be the one: then both are named.
+    """
+    from scipy.special import chdtri
+
+    left = np.unique(pieces.sweep[pieces.sweep >= 0]).tolist()
+    each_rate, most, found = rate / len(left), (len(left) + 1) // 2, list[tuple[int, Statistic]]()
+    while len(found) < most:
+        explained = {sweep: _explained(seen, base, _whiten(white, _of_sweep(pieces, sweep))) for sweep in left}
+        worst = max(left, key=lambda sweep: explained[sweep][0])
+        value, freedom = explained[worst]
+        limit = float(chdtri(freedom, each_rate))
+        if value <= limit:
+            return found or [(worst, (value, limit))]
+        alike = [sweep for sweep in left if explained[sweep][0] > value - ALIKE]
+        found += [(sweep, (value, limit)) for sweep in alike]
+        left = [sweep for sweep in left if sweep not in alike]
+        base = np.concatenate([base, _whiten(white, _of_sweep(pieces, worst))], axis=1)
+    return found
+
+
+def _jumped(pieces: Pieces, felt: Array, rate: float) -> Statistic | None:
+    """How much a jump of the bias between two rests explains beside its wandering; None without three rests.
+
+    The process is estimated anew beside the jump that explains most, for that jump would be taken for wandering. Few
+    rests tell that process, and least of all beside the jump that suits them best: simulated random walks exceed
+    the critical value about as often as F does with one degree of freedom for each place a jump might have.
+    """
+    from scipy.special import fdtri
+
+    steady, middle = _steady(pieces), pieces.times_s.mean(axis=1)
+    ends = [pieces.times_s[pieces.sweep == sweep].max() for sweep in np.unique(pieces.sweep[pieces.sweep >= 0])]
+    steps = [np.where(middle < end, 0.0, 1.0)[:, None] for end in ends]
+    steps = [step for step in steps if len(np.unique(step[pieces.sweep < 0])) > 1]
+    if len(steps) < 2:
+        return None
+
+    def explained(step: Array, beside: Array) -> float:
+        white = _whitening(_covariance(pieces, felt, beside), pieces.variances_rad2_s2.min(axis=0))
+        seen = _whiten(white, (pieces.means_rad_s - felt).T[:, :, None])[:, 0]
+        return _explained(seen, _whiten(white, _each_axis(steady)), _whiten(white, _each_axis(step)))[0]
+
+    left = pieces.means_rad_s - felt
+    left = left - steady @ (steady.T @ left)
+    aside = [step - steady @ (steady.T @ step) for step in steps]
+    best = max(range(len(steps)), key=lambda k: float(np.sum((aside[k].T @ left) ** 2 / np.sum(aside[k] ** 2))))
+    beside = _basis(np.column_stack([steady, steps[best]]))
+    return explained(steps[best], beside), 3 * float(fdtri(3, len(steps), 1 - rate / len(steps)))
+
+
+def _covariance(pieces: Pieces, felt: Array, steady: Array) -> Array:
+    """(3, N, N) of the pieces' means: noise, a bias that wanders, and what arm and sensor may be off by.
+
+    How the bias wanders is found from what `steady` (N, k), orthonormal columns, leaves of the readings.
+    """
+    own = np.arange(len(pieces.sweep))
+    same = (pieces.sweep[:, None] == pieces.sweep) & (pieces.sweep >= 0)
+    speed = np.linalg.norm(felt, axis=1)
+    off = (TOLERANCE**2 + np.outer(pieces.speed_std, pieces.speed_std)) * same * np.outer(speed, speed)
+    off[own, own] += (WITHIN_A_TURN * speed) ** 2
+    variances = pieces.variances_rad2_s2 + ((WITHIN_A_TURN * speed) ** 2)[:, None]
+    bias = estimate_bias_process(steady, pieces.means_rad_s - felt, variances, pieces.times_s, significant=0.0)
+    noise = np.array([np.diag(each) for each in pieces.variances_rad2_s2.T])
+    return np.asarray(noise + off + bias.covariance(pieces.times_s), dtype=np.float64)
+
+
+def _steady(pieces: Pieces) -> Array:
+    """(N, k) orthonormal columns: whatever each sweep reads as a whole, the rests alike, gravity, a steady drift."""
+    places = [pieces.sweep == sweep for sweep in np.unique(pieces.sweep)]
+    return _basis(np.column_stack([*places, pieces.gravity_m_s2, _time(pieces)]))
+
+
+def _known(pieces: Pieces) -> Array:
+    """(N, 8) columns of the model, for each axis alike."""
+    ones = np.ones(len(pieces.sweep))
+    return np.column_stack([pieces.rates_rad_s, ones, pieces.gravity_m_s2, _time(pieces)])
+
+
+def _suspicions(pieces: Pieces, felt: Array) -> dict[str, Array]:
+    """By name of the check (3, N, k): what each would add to the three axes' readings."""
+    time = _time(pieces)
+    for sweep in np.unique(pieces.sweep):  # what changes within a sweep is that sweep's own matter
+        time[pieces.sweep == sweep] = time[pieces.sweep == sweep].mean()
+    turned = np.cross(np.eye(3)[:, None], felt[None]) * time[None, :, None]  # (k, N, 3)
+    found = {
+        "scale_changed": _per_axis(felt * time[:, None]),
+        "loose_mounting": np.transpose(turned, (2, 1, 0)),
+        "cw_against_ccw": _per_axis(np.abs(felt)),
+        "residuals": _per_axis(np.eye(len(time))[:, :, None] * np.ones(3)),
+    }
+    moving = pieces.sweep >= 0
+    if not moving.all():
+        found["sweeps_against_rests"] = _per_axis(np.outer(moving, np.ones(3)))
+    return found
+
+
+def _of_sweep(pieces: Pieces, sweep: int) -> Array:
+    """(3, N, 6): another reading in this sweep, and another in its second half than in its first."""
+    inside = (pieces.sweep == sweep).astype(np.float64)
+    return _each_axis(np.column_stack([inside, inside * pieces.place]))
+
+
+def _time(pieces: Pieces) -> Array:
+    """(N,) of the pieces' middles, from −1 to 1."""
+    middle = pieces.times_s.mean(axis=1)
+    time: Array = (2 * middle - middle.max() - middle.min()) / np.ptp(middle)
+    return time
+
+
+def _each_axis(columns: Array) -> Array:
+    """(3, N, 3 k): columns (N, k) for each axis with a coefficient of its own."""
+    count, wide = columns.shape
+    return np.asarray(np.einsum("ij,nk->injk", np.eye(3), columns).reshape(3, count, 3 * wide), dtype=np.float64)
+
+
+def _per_axis(columns: Array) -> Array:
+    """(3, N, 3 k) from (N, 3) or (N, k, 3): each axis' own columns, with a coefficient of its own."""
+    wide = columns[:, None, :] if columns.ndim == 2 else columns
+    stacked: Array = np.einsum("ij,nki->injk", np.eye(3), wide).reshape(3, len(wide), -1)
+    return stacked
+
+
+def _whitening(covariance: Array, least: Array) -> Array:
+    """(3, N, N) what makes noise of covariance (3, N, N) one and independent; no variance is below `least` (3,).
+
+    Windows overlap when a computer's clock was put back between two recordings, and what is computed is no covariance.
+    """
+    variances, directions = np.linalg.eigh(covariance)
+    sizes = np.sqrt(np.maximum(variances, least[:, None]))
+    return np.asarray(directions.swapaxes(1, 2) / sizes[:, :, None], dtype=np.float64)
+
+
+def _whiten(white: Array, columns: Array) -> Array:
+    """(3 N, k) of columns (3, N, k)."""
+    return np.asarray((white @ columns).reshape(-1, columns.shape[2]), dtype=np.float64)
+
+
+def _basis(columns: Array) -> Array:
+    """Orthonormal columns that span the same."""
+    sizes = np.linalg.norm(columns, axis=0)
+    left, singular, _ = np.linalg.svd(columns / np.where(sizes > 0, sizes, 1.0), full_matrices=False)
+    basis: Array = left[:, singular > 1e-6 * singular[0]]
+    return basis
+
+
+def _explained(seen: Array, base: Array, columns: Array) -> tuple[float, int]:
+    """How much of what `base` leaves of the readings these columns explain, and how many they are beside it."""
+    known = _basis(base)
+    sizes = np.linalg.norm(columns, axis=0)
+    new = columns / np.where(sizes > 0, sizes, 1.0)
+    new = new - known @ (known.T @ new)
+    left, singular, _ = np.linalg.svd(new, full_matrices=False)
+    told = left[:, singular > 1e-3]
+    explained = told.T @ (seen - known @ (known.T @ seen))
+    return float(explained @ explained), told.shape[1]

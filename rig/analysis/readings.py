@@ -1,0 +1,141 @@
+"""Whether readings are what a converter makes of a noisy rate: their bits, their range, their repetitions. Pure.
+
+Noise above one count sets every low bit as often as not, has no gap and no heap at an end of its range, no run of equal
+readings and no two stretches alike. Where the noise is below a count none of this can be said, and nothing is.
+"""
+
+from collections.abc import Sequence
+
+import numpy as np
+from numpy.typing import NDArray
+
+from rig.analysis.pieces import Window
+from rig.estimation.arrays import Array
+
+Statistics = dict[str, tuple[float, float]]
+
+SPIKE = 8.0  # of the noise's own deviation: one reading in 1e15
+SKEWNESS = 0.15  # below, hardly a fiftieth of the noise's deviation is left in a mean
+LONGEST_RUN = 25  # equal readings of one axis: at one count of noise every fourth reading equals the one before
+STRETCH = 8  # readings on three axes, some 50 bits at one count of noise
+FEWEST_VALUES = 24  # of an axis, to say that a bit ought to have changed
+ONE_BIT = 0.8  # of the spikes off by the same power of two: they are a bit's doing
+FEWEST_SPIKES = 5
+VIBRATION_LEFT = 0.1  # of the arm's vibration, which the sensor's filter changes and the arm's states tell in part
+HEAP = 10  # readings
+
+
+def judge_readings(counts: Sequence[NDArray[np.int64]], windows: Sequence[Window], rate: float) -> Statistics:
+    """By name of the check its statistic and limit, from all readings (n, 3) of each recording and from the windows.
+
+    `rate` is that of false alarms for each, where it is not far smaller.
+    """
+    from scipy.special import ndtri
+
+    sure = -float(ndtri(rate / (2 * 3 * 16)))  # of a normal variable, over three axes and their bits
+    at_rest = [window for window in windows if window.sweep < 0] or windows
+    noise = np.min([_noise(window.counts) for window in at_rest], axis=0)
+    spikes, of_a_bit = _spikes(windows)
+    stuck = _constant_bits(np.concatenate(counts)) + _uneven_bits(windows, noise, sure) + of_a_bit
+    found = {"stuck_bit": (float(stuck), 0.0), "spikes": (spikes, SPIKE)}
+    if len(at_rest) < len(windows):
+        found["skewed_noise"] = _skewness(at_rest, sure)
+    if noise.min() >= 1:
+        found["stuck_axis"] = max(map(_longest_run, counts)), LONGEST_RUN
+        found["repeated_readings"] = sum(map(_repeated, counts)), 0.0
+        found["clipping"] = _heaped(np.concatenate([each.counts for each in windows if each.sweep >= 0]), sure), 0.0
+    return found
+
+
+def _noise(counts: NDArray[np.int64]) -> Array:
+    """(3,) standard deviation of one reading in counts, from the differences of neighbours: drift does not matter."""
+    noise: Array = 1.4826 * np.median(np.abs(np.diff(counts, axis=0)), axis=0) / np.sqrt(2)
+    return noise
+
+
+def _constant_bits(counts: NDArray[np.int64]) -> int:
+    """How many bits, over the axes, never change although the readings reach far enough to change them."""
+    constant = 0
+    for axis in counts.T:
+        if len(np.unique(axis)) < FEWEST_VALUES:
+            continue
+        bits = [bit for bit in range(16) if 2 ** (bit + 2) <= np.ptp(axis)]
+        constant += sum(int(np.ptp((axis >> bit) & 1) == 0) for bit in bits)
+    return constant
+
+
+def _uneven_bits(windows: Sequence[Window], noise: Array, sure: float) -> int:
+    """How many bits, far enough below the noise to be set in every other reading, are not."""
+    uneven = 0
+    counts = np.concatenate([window.counts for window in windows])
+    for axis in range(3):
+        for bit in range(16):
+            if 1.5 * 2**bit > noise[axis]:
+                break
+            ones = float(np.mean((counts[:, axis] >> bit) & 1))
+            uneven += abs(ones - 0.5) > sure * 0.5 / np.sqrt(len(counts))
+    return uneven
+
+
+def _spikes(windows: Sequence[Window]) -> tuple[float, int]:
+    """The farthest reading in standard deviations of the noise, and how many bits, over the axes, make such."""
+    farthest, sizes = 0.0, [[], [], []]  # type: float, list[list[Array]]
+    for window in windows:
+        off = window.residual_counts - np.median(window.residual_counts, axis=0)
+        noise = np.maximum(1.4826 * np.median(np.abs(off), axis=0), 0.5)
+        deviation = np.maximum(noise, VIBRATION_LEFT * window.vibration_counts)
+        farthest = max(farthest, float(np.max(np.abs(off) / deviation)))
+        for axis in range(3):
+            beyond = np.abs(off[:, axis]) > SPIKE * deviation[axis]
+            power = np.round(np.log2(np.maximum(np.abs(off[beyond, axis]), 1)))
+            near = np.abs(np.abs(off[beyond, axis]) - 2**power) < np.maximum(3 * deviation[axis], 0.05 * 2**power)
+            sizes[axis].append(np.where(near, power, -1))
+    return farthest, sum(_one_bit(np.concatenate(each)) for each in sizes)
+
+
+def _one_bit(powers: Array) -> bool:
+    """Whether most spikes, each off by a power of two or by none (−1), are off by the same."""
+    if len(powers) < FEWEST_SPIKES:
+        return False
+    which, often = np.unique(powers, return_counts=True)
+    most = int(np.argmax(often))
+    return bool(which[most] >= 0 and often[most] >= ONE_BIT * len(powers))
+
+
+def _skewness(windows: Sequence[Window], sure: float) -> tuple[float, float]:
+    """The largest skewness of an axis' noise, which a bit that is now and then wrong makes, and what is allowed.
+
+    At rest: the arm's vibration need not be even.
+    """
+    from scipy.stats import skew
+
+    parts = [window.residual_counts / np.maximum(window.residual_counts.std(axis=0), 0.5) for window in windows]
+    noise = np.concatenate(parts)
+    return float(np.max(np.abs(skew(noise, axis=0)))), max(SKEWNESS, sure * float(np.sqrt(6 / len(noise))))
+
+
+def _longest_run(counts: NDArray[np.int64]) -> int:
+    """Of equal readings of one axis."""
+    longest = 0
+    for axis in counts.T:
+        changes = np.flatnonzero(np.diff(axis))
+        longest = max(longest, int(np.max(np.diff(changes, prepend=-1, append=len(axis) - 1))))
+    return longest
+
+
+def _repeated(counts: NDArray[np.int64]) -> int:
+    """How many stretches of readings have been there before."""
+    stretches = np.lib.stride_tricks.sliding_window_view(counts.astype(np.int16), STRETCH, axis=0)
+    rows = np.ascontiguousarray(stretches.reshape(len(stretches), -1))
+    return len(rows) - len(np.unique(rows.view(f"V{rows.shape[1] * 2}")))
+
+
+def _heaped(counts: NDArray[np.int64], sure: float) -> int:
+    """How many readings stand at the very end of what an axis reads, where more do than next to it; else none."""
+    heaped = 0
+    for axis in counts.T:
+        values, often = np.unique(axis, return_counts=True)
+        for end, beside in ((often[0], often[1]), (often[-1], often[-2])) if len(values) > 1 else ():
+            if end >= HEAP and end - beside > sure * np.sqrt(end + beside):
+                heaped += int(end)
+    return heaped
