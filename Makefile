@@ -12,7 +12,7 @@ BIN := $(VENV)/bin
 FIND_PYTHON = for p in python3.12 python3.11 python3 python; do \
   "$$p" -c 'import sys; sys.exit(sys.version_info[:2] not in [(3, 11), (3, 12)])' 2>/dev/null && echo "$$p" && break; done
 
-STUDIES := normal extreme speed convergence sine averaging estimators misalignment kvh-gyro kvh-accelerometer
+STUDIES := normal extreme speed convergence sine averaging estimators misalignment budget kvh-gyro kvh-accelerometer
 
 .PHONY: demo check test proof lint firmware bench figures clean
 .DELETE_ON_ERROR:
