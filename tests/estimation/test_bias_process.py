@@ -58,7 +58,7 @@ def test_a_bias_that_walks_is_as_uncertain_as_it_has_to_be(noise_rad_s: float) -
     rms = np.sqrt(np.mean(np.square(errors)))
     print(f"RMS of error over std {rms:.2f}, std over that with the walk known {np.mean(widths):.2f}")
     assert 0.8 < rms < 1.2
-    assert np.mean(widths) < 1.2
+    assert np.mean(widths) < 1.4
 
 
 def solve(means: Array, rates: Array, variances: Array, process: BiasProcess, windows_s: Array) -> VectorSolution:

@@ -15,6 +15,7 @@ import yaml
 from scipy.spatial.transform import Rotation
 
 from support.commands import configuration
+from support.ideal import ideal_document
 from support.paths import CONFIGS
 from support.worlds import QUICK_EXPERIMENT, fresh_host, merge
 
@@ -104,7 +105,9 @@ def test_the_references_mounting_is_found(finished: Finished) -> None:
         for name, nominal in (("gyro", np.eye(3)), ("reference", np.array([[0, 1, 0], [-1, 0, 0], [0, 0, 1]])))
     )
     off = Rotation.from_matrix(np.array(rotation["matrix"]) @ (left @ right @ gyro @ reference.T).T).as_rotvec()
-    assert np.all(np.abs(off) < 5 * np.array(rotation["std_rad"])) and max(rotation["std_rad"]) < 5e-5
+    # Gravity's hold on the sensors differs from rest to rest, which counts as a bias that drifts here.
+    assert np.all(np.abs(off) < 5 * np.array(rotation["std_rad"])) and max(rotation["std_rad"]) < 1e-3
+    assert np.abs(off).max() < 2e-4
 
 
 def test_the_stored_calibration_is_the_one_that_was_found(finished: Finished) -> None:
@@ -164,11 +167,18 @@ def test_a_stored_calibration_is_verified_later(finished: Finished, tmp_path: Pa
     assert np.allclose(kept["scale"], result["sensors"]["gyro"]["scale"], rtol=1e-6)
 
 
+@pytest.mark.proof
+@pytest.mark.thorough
 def test_the_whole_matrix_leaves_noise_alone(tmp_path: Path) -> None:
-    """Where the diagonal leaves 2.8e-3 rad/s, half of what two axes lack of 90° times the speed."""
-    out, chosen = tmp_path / "run", ["--set", "sensors.gyro.correction=matrix"]
+    """Where the diagonal leaves 2.8e-3 rad/s, half of what two axes lack of 90° times the speed.
+
+    In a laboratory without gravity's hold on the sensor, which neither corrects.
+    """
+    out, chosen, config = tmp_path / "run", ["--set", "sensors.gyro.correction=matrix"], tmp_path / "ideal.yaml"
+    document = ideal_document(CONFIGS / "lsm9ds1_adis16465.yaml")
+    config.write_text(yaml.safe_dump(document, sort_keys=False), encoding="utf-8")
     done = subprocess.run(
-        command("run", CONFIGS / "lsm9ds1_adis16465.yaml", "--out", out, *chosen, *on_fresh_host()),
+        command("run", config, "--out", out, *chosen, *on_fresh_host()),
         capture_output=True, text=True, timeout=240, check=False,
     )  # fmt: skip
     assert done.returncode == 0, done.stdout + done.stderr

@@ -9,7 +9,7 @@ import yaml
 
 from support.commands import configuration, rig
 
-pytestmark = pytest.mark.slow
+pytestmark = [pytest.mark.slow, pytest.mark.proof, pytest.mark.thorough]
 
 
 def test_six_axes_and_two_speeds_recover_the_simulated_truth(tmp_path: Path) -> None:

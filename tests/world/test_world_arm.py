@@ -88,7 +88,9 @@ def test_a_blocking_move_arrives_in_its_planned_time(home: Arm) -> None:
     assert control.moveJ(target(math.pi), math.radians(60), math.radians(80))
     took = receive.getTimestamp() - start
     wait_for(lambda: receive.getActualQ() == pytest.approx(target(math.pi), abs=2 * ENCODER_STEP_RAD), "the target")
-    assert 3.75 <= took <= 3.75 + 0.5  # the handshake costs wall time, ten times as much in virtual time
+    assert (
+        3.75 - 0.01 <= took <= 3.75 + 0.5
+    )  # the client may show a state of before; the handshake costs wall time, ten times as much in virtual time
 
 
 def test_an_asynchronous_move_shows_its_progress_and_its_end(home: Arm) -> None:
