@@ -22,6 +22,7 @@ from rig.observation.timebase import ArmMotion, widening
 PARTS = 4  # of a revolution; a rest has half as many
 MOST_PIECES = 48  # of all revolutions: beyond twelve sweeps these are cut into fewer parts
 FEWEST_SAMPLES = 20
+FEWEST_AT_REST = 60  # of a whole rest: fewer do not tell its noise well enough to weigh it by
 
 
 @dataclass(frozen=True, slots=True)
@@ -88,6 +89,8 @@ def cut(name: str, recordings: Sequence[ObservedRun], result: SensorResult, expl
     averages = [*(turn.average for *_, turn in turns), *(rest for *_, rest in rests)]
     pieces, times_s = [], []
     for (_, made), average, began_s in zip(found, averages, explained.seen.windows_s[:, 0], strict=True):
+        if made and made[0].sweep < 0 and average.samples < FEWEST_AT_REST:
+            continue
         pieces += made
         times_s += [np.array([piece.start_s, piece.end_s]) - average.start_s + began_s for piece in made]
     return Pieces(
