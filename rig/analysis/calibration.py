@@ -74,11 +74,6 @@ class SensorResult:
         return self.solution.bias_rad_s
 
     @property
-    def combined_covariance(self) -> Array:
-        """(6, 6) with all that is in the budget; of the noise alone where there is none."""
-        return self.solution.covariance if self.uncertainty is None else self.uncertainty.covariance
-
-    @property
     def correction(self) -> CorrectionKind:
         """Whether the axes are corrected each for itself or by the whole matrix."""
         return self.corrected_by.kind

@@ -35,13 +35,15 @@ def contradictions(
 
     A sweep that is named is part of the name, `gyro.disturbed_sweep.3`.
     """
+    site = recordings[0].run.settings.site
+    if site is None:
+        return Contradictions((), frozenset())
     checks: list[Check] = []
     disturbed: set[int] = set()
-    site = recordings[0].run.settings.site
     rate = FALSE_ALARMS / (SHARES * len(sensors))
-    for name in sensors if site is not None else ():
+    for name in sensors:
         explained = results[name].explained
-        if site is None or explained is None:
+        if explained is None:
             continue
         pieces = cut(name, recordings, results[name], explained, site)
         found = consistency(pieces, explained.solution.matrix, rate)

@@ -22,11 +22,10 @@ def see(recordings: Sequence[ObservedRun], sensor: str, surroundings: Surroundin
 
     Speeds by a controller's clock that runs too fast are too small by that.
     """
-    site, parts = surroundings.site, [recording.sensors[sensor] for recording in recordings]
-    turns = [
-        (turn, since_s) for part, since_s in zip(parts, _since_s(recordings), strict=True) for turn in part.revolutions
-    ]
-    rests = [(rest, since_s) for part, since_s in zip(parts, _since_s(recordings), strict=True) for rest in part.rests]
+    site = surroundings.site
+    parts = [(each.sensors[sensor], since_s) for each, since_s in zip(recordings, _since_s(recordings), strict=True)]
+    turns = [(turn, since_s) for part, since_s in parts for turn in part.revolutions]
+    rests = [(rest, since_s) for part, since_s in parts for rest in part.rests]
     placed = [*((turn.average, since_s) for turn, since_s in turns), *rests]
     averages = [average for average, _ in placed]
     attitudes = np.array([average.attitude for average in averages], dtype=np.float64)

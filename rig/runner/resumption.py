@@ -51,8 +51,7 @@ def resumption(earlier: Sequence[RunData], settings: RunSettings, script: Script
     """What counts of the recordings of an interrupted run: sound sweeps that the board has averaged as well.
 
     A sweep that contradicts the others is to be repeated. Sweeps are counted by their place in the procedure, so the
-    rest of a run must be the rest of the same one. Raises
-    Refused `another_script`, `another_procedure`.
+    rest of a run must be the rest of the same one. Raises Refused `another_script`, `another_procedure`.
     """
     for run in earlier:
         if run.provenance.script_sha256 != script.sha256:
