@@ -2,12 +2,13 @@
 
 Runs the demonstration alone, then N times, two at a time, beside busy loops, each on a loopback address of its own.
 Prints how many runs came to a verdict, the faults and refusals of the others by name, the arm states that were missed
-and how much longer a run took than alone.
+and how much longer a run took than alone. `--keep DIR` keeps the folders of runs that did not pass, with their logs.
 """
 
 import argparse
 import json
 import re
+import shutil
 import subprocess
 import sys
 import tempfile
@@ -44,8 +45,8 @@ class Demo:
     missed: int
 
 
-def run_demo(config: Path, folder: Path, number: int) -> Demo:
-    """Run `config` in a folder and on a loopback address that belong to `number` alone."""
+def run_demo(config: Path, folder: Path, keep: Path | None, number: int) -> Demo:
+    """Run `config` in a folder and on a loopback address that belong to `number` alone; move what failed to `keep`."""
     host, out = f"127.40.{number // 250 + 1}.{number % 250 + 1}", folder / str(number)
     began_s = time.perf_counter()
     ended = subprocess.run(
@@ -65,9 +66,10 @@ def run_demo(config: Path, folder: Path, number: int) -> Demo:
     if ending == "fail":
         checks = json.loads((out / "result.json").read_text(encoding="utf-8"))["checks"]
         said = ": " + ", ".join(f"{check['name']} {check['value']}" for check in checks if not check["passed"])
-    return Demo(
-        ending, said, ended.returncode, wall_s, *count_states(out / "run.h5", load(config).config.arm.state_rate_hz)
-    )
+    states, missed = count_states(out / "run.h5", load(config).config.arm.state_rate_hz)
+    if keep is not None and ending != "pass" and out.exists():
+        shutil.move(out, keep / str(number))
+    return Demo(ending, said, ended.returncode, wall_s, states, missed)
 
 
 def count_states(recording: Path, state_rate_hz: float) -> tuple[int, int]:
@@ -97,9 +99,10 @@ def main() -> int:
     parser.add_argument("--demos", type=int, default=40, metavar="N", help="how many runs beside the busy loops")
     parser.add_argument("--at-once", type=int, default=2, metavar="N", help="how many of them at a time")
     parser.add_argument("--busy", type=int, default=3, metavar="N", help="how many busy loops")
+    parser.add_argument("--keep", type=Path, metavar="DIR", help="an existing folder for the runs that did not pass")
     options = parser.parse_args()
     with tempfile.TemporaryDirectory() as folder:
-        run = partial(run_demo, options.config, Path(folder))
+        run = partial(run_demo, options.config, Path(folder), options.keep)
         quiet = run(0)
         print(f"alone: {quiet.ending} after {quiet.wall_s:.1f} s, {quiet.missed} of {quiet.states} arm states missed")
         with busy_loops(options.busy), ThreadPoolExecutor(options.at_once) as pool:

@@ -135,6 +135,7 @@ class _Child:
             time.sleep(TICK_S)
             self._parent.tick()
             if self._holds_arm and not self._serving and self._parent.lasts_over(PARENT_TICKS):
+                print(f"nobody supervises: silent for {self._parent.ticks} ticks of {TICK_S} s", file=sys.stderr)
                 self.abandon()
 
     def watch_move(self) -> NoReturn:

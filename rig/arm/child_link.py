@@ -12,14 +12,13 @@ from pathlib import Path
 
 from rig.arm import child
 from rig.arm.messages import Alive, Heartbeat, Message, Request
-from rig.arm.silence import Silence
+from rig.arm.silence import Silence, crowding
 from rig.errors import Problem
 
 TICK_S = 0.05
 SILENT_TICKS = 10  # 0.5 s without a heartbeat
 SPARED = 4  # … and at most so many times that, when the child's main thread is ready to run and gets no processor
 FROZEN_TICKS = 16  # 0.8 s with heartbeats but no new state
-CROWDED = 5.0  # times both are given at most: once for each program a processor that wants to run
 STALE_TICKS = 2  # when the child ends after 0.1 s without a new state, it had lost the arm before
 CRASHES = (-signal.SIGSEGV, -signal.SIGABRT)  # how the client itself ends when the arm closes a connection
 PATIENT_TICKS = 240  # 12 s while a client's constructor holds the child's interpreter, at worst until its 5 s time-out
@@ -137,11 +136,9 @@ class ChildLink:
             self._silent.tick()
             self._frozen_ticks += self._beaten
             self._beaten = False
-            crowding = _crowding()
-            allowed = SILENT_TICKS * (1.0 if self._silent.stopped else crowding)
-            if self._silent.lasts_over(PATIENT_TICKS if self._patient else allowed):
+            if self._silent.lasts_over(PATIENT_TICKS if self._patient else SILENT_TICKS):
                 return self._give_up("arm_driver_hung", "the process that talks to the arm no longer answers")
-            if self._frozen_ticks > (PATIENT_TICKS if self._patient else FROZEN_TICKS * crowding):
+            if self._frozen_ticks > (PATIENT_TICKS if self._patient else FROZEN_TICKS * crowding()):
                 return self._give_up("arm_link_lost", f"no new state comes from the arm at {self._host}")
         return None
 
@@ -172,13 +169,6 @@ def _writable(pipe: "Connection[Request, Message]") -> bool:
     if os.name != "posix":
         return True
     return bool(select.select([], [pipe.fileno()], [], 0)[1])
-
-
-def _crowding() -> float:
-    """How many programs a processor of this machine has to serve, 1 to CROWDED: what is late may be late by that."""
-    if not hasattr(os, "getloadavg"):  # Windows
-        return 1.0
-    return min(max(os.getloadavg()[0] / (os.cpu_count() or 1), 1.0), CROWDED)
 
 
 @contextmanager

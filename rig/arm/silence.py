@@ -1,8 +1,10 @@
 """How long another process has been silent, counted so that a busy machine does not look like a process that hangs."""
 
+import os
 import time
 from pathlib import Path
 
+CROWDED = 5.0  # times a limit is given at most, once for each program a processor that wants to run
 STARVED = 0.5  # of a tick spent waiting for a processor: more, and a silence in it says nothing about the process
 NS_PER_S = 1e9
 
@@ -14,12 +16,14 @@ class Silence:
 
     Ticks and not seconds, because the one who counts may be held up itself; and no ticks in which the thread whose
     signs of life are waited for (`thread`, any where it is None) spent most of the time waiting for a processor. Where
-    the system does not tell (proc(5) of Linux does) all ticks count. However busy the machine, a silence lasts at most
-    `spared` times its limit: the arm is not to be left alone.
+    the system does not tell (proc(5) of Linux does) all ticks count. Of a process that somebody has stopped every tick
+    counts. However busy the machine, a silence lasts at most `spared` times CROWDED times its limit: the arm is not to
+    be left alone.
     """
 
     def __init__(self, pid: int, *, spared: int, thread: int | None = None) -> None:
         self._tasks = Path(f"/proc/{pid}/task")
+        self._main = str(pid)
         self._thread = None if thread is None else str(thread)
         self._spared = spared
         self.ticks = 0
@@ -39,13 +43,18 @@ class Silence:
         self.ticks += not starved
 
     def lasts_over(self, limit: float) -> bool:
-        """Whether there were more than `limit` silent ticks, or far more when the machine was too busy to tell."""
-        return self.ticks > limit or self._all_ticks > self._spared * limit
+        """Whether there were more than `limit` silent ticks, or far more when the machine was too busy to tell.
 
-    @property
-    def stopped(self) -> bool:
+        The limit is that of a machine with a processor for everybody; it is stretched by the machine's `crowding`.
+        """
+        if max(self.ticks, self._all_ticks / self._spared) <= limit:
+            return False
+        stretched = limit * (1.0 if self._stopped() else crowding())
+        return self.ticks > stretched or self._all_ticks > self._spared * stretched
+
+    def _stopped(self) -> bool:
         """Whether somebody has stopped the process: then it is not the machine that keeps it silent."""
-        return self._thread is not None and _state(self._tasks / self._thread) == "T"
+        return _state(self._tasks / self._main) == "T"
 
     def _starved(self, known: bool) -> bool:
         """Whether the process waited for a processor since the last call; False when that is not `known`.
@@ -61,6 +70,13 @@ class Silence:
             for thread, (ran_s, waited_s) in self._times.items()
             if thread in before and self._thread in (None, thread)
         )
+
+
+def crowding() -> float:
+    """How many programs a processor of this machine has to serve, 1 to CROWDED: what is late may be late by that."""
+    if not hasattr(os, "getloadavg"):  # Windows
+        return 1.0
+    return min(max(os.getloadavg()[0] / (os.cpu_count() or 1), 1.0), CROWDED)
 
 
 def _times(tasks: Path) -> _Times:

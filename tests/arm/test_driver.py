@@ -20,12 +20,12 @@ import pytest
 from rig.arm.driver import Arm, look
 from rig.arm.motion import Transfer, trapezoid_duration
 from rig.arm.preflight import arm_problems, plan_problems
+from rig.arm.silence import crowding
 from rig.arm.state import ARM_STATE_DTYPE, ArmState, Joints
 from rig.config.models import ArmSection
 from rig.config.procedure_sections import SixObservationSection
 from rig.errors import Fault, Refused
 from rig.plans.six_sweeps import plan_six_observation
-from support.crowding import crowding
 from support.worlds import World, WorldHandle
 
 pytestmark = pytest.mark.slow

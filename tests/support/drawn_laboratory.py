@@ -1,0 +1,119 @@
+"""Simulated laboratories in which everything that can be wrong is, drawn from its distribution, and their truth."""
+
+from collections.abc import Mapping
+from dataclasses import replace
+from typing import Any
+
+import numpy as np
+import yaml
+
+from firmware_host.emulator.gyroscope import readings
+from rig.config.load import parse
+from rig.config.world_models import WorldSection
+from rig.world.board.sensor_truth import SensorTruth
+from support.ideal import ideal_document
+from support.paths import CONFIGS
+from support.worlds import merge
+
+SPEED_RAD_S = np.pi / 3
+JOINTS = 6
+PART_ERRORS: dict[str, dict[str, float]] = {  # standard deviations, as those values that the configurations give
+    "lsm9ds1": {"g_rad_s": 1.7e-3, "per_k": 5e-4, "flicker_rad_s": 4.8e-5, "walk": 1e-5, "noise_rad_s": 0.002},
+    "adis16465": {"g_rad_s": 2.6e-4, "per_k": 5e-6, "flicker_rad_s": 9.7e-6, "walk": 3e-7, "noise_rad_s": 0.00045},
+}
+
+
+def drawn(seed: int) -> dict[str, Any]:
+    """A configuration: a LSM9DS1 and an ADIS16465 that are both to be calibrated, in a laboratory of its own."""
+    rng = np.random.default_rng(seed)
+    document = ideal_document(CONFIGS / "lsm9ds1_adis16465.yaml")
+    for name in ("role", "turntable"):
+        document["sensors"]["reference"].pop(name)
+    changes: dict[str, Any] = {
+        "procedure": {"verify": False},
+        "limits": {
+            "scale_std": 1,
+            "bias_std_rad_s": 1,
+            "verification_rms_rad_s": None,
+            "verification_mean_rad_s": None,
+        },
+        "world": {
+            "seed": seed,
+            "site": {
+                "latitude_deg": float(rng.uniform(30, 60)),
+                "heading_deg": float(rng.uniform(0, 360)),
+                "base_tilt_deg": rng.normal(0, 0.15, 2).tolist(),
+                "gravity_m_s2": float(rng.uniform(9.79, 9.82)),
+            },
+            "arm": _arm(rng),
+            "board": {"crystal_ppm": float(rng.normal(0, 10))},
+            "sensors": {name: _sensor(rng, sensor["part"]) for name, sensor in document["sensors"].items()},
+        },
+    }
+    changed: dict[str, Any] = merge(document, changes)
+    for name in ("verification_rms_rad_s", "verification_mean_rad_s"):
+        changed["limits"].pop(name)
+    return changed
+
+
+def _arm(rng: np.random.Generator) -> dict[str, Any]:
+    wrists = np.array([0, 0, 0, 1, 1, 1])
+    return {
+        "vibration_rms_rad_s": float(rng.uniform(0, 0.004)),
+        "vibration_hz": float(rng.uniform(8, 30)),
+        "settling_rad": 5.0e-5,
+        "clock_ppm": float(rng.uniform(-50, 50)),
+        "state_jitter_s": float(rng.uniform(0, 1e-4)),
+        "calibration": {
+            "delta_alpha_rad": (6e-4 * wrists * rng.standard_normal(JOINTS)).tolist(),
+            "delta_theta_rad": (6e-4 * wrists * rng.standard_normal(JOINTS)).tolist(),
+            "delta_d_mm": rng.normal(0, 0.2, JOINTS).tolist(),
+        },
+        "residue": {
+            "twist_rad": (6e-5 * wrists * rng.standard_normal(JOINTS)).tolist(),
+            "zero_rad": (6e-5 * wrists * rng.standard_normal(JOINTS)).tolist(),
+            "encoder_once_rad": 3.0e-5,
+            "encoder_twice_rad": 1.0e-5,
+            "hysteresis_rad": 5.0e-5,
+        },
+    }
+
+
+def _sensor(rng: np.random.Generator, part: str) -> dict[str, Any]:
+    errors = PART_ERRORS[part]
+    return {
+        "scale": rng.uniform(0.9, 1.1, 3).tolist(),
+        "bias_rad_s": rng.uniform(-0.02, 0.02, 3).tolist(),
+        "noise_rad_s": errors["noise_rad_s"],
+        "mounting_error_deg": rng.normal(0, 2, 3).tolist(),
+        "non_orthogonality_deg": rng.normal(0, 0.2, 3).tolist(),
+        "offset_mm": rng.uniform(-20, 20, 3).tolist(),
+        "start_temperature_c": 22 - float(rng.uniform(0, 0.3)),
+        "bias_rad_s_per_k": rng.normal(0, errors["per_k"], 3).tolist(),
+        "scale_per_k": rng.normal(0, 3e-4, 3).tolist(),
+        "g_sensitivity_rad_s_per_g": rng.normal(0, errors["g_rad_s"], (3, 3)).tolist(),
+        "bias_instability_rad_s": errors["flicker_rad_s"] * float(rng.uniform(0.5, 1.5)),
+        "bias_random_walk_rad_s_per_sqrt_s": errors["walk"] * float(rng.uniform(0.5, 3)),
+        "nonlinearity_odd_per_rad_s": float(rng.normal(0, 2.3e-4)),
+        "nonlinearity_even_per_rad_s": float(rng.normal(0, 5e-5)),
+    }
+
+
+def truth(document: Mapping[str, Any], name: str, from_s: float, to_s: float) -> np.ndarray:
+    """(6,) scale at ± 60 °/s and bias without gravity of a sensor, as means over a time of the world.
+
+    Made of what the simulated part reads without noise, at rest and turning about each of its axes.
+    """
+    loaded = parse(yaml.safe_dump(dict(document)))
+    world = WorldSection.model_validate(document["world"])
+    sensor = SensorTruth(loaded.config.sensors[name], world.sensors[name])
+    quiet = replace(sensor.gyro, noise_rad_s=0.0, g_sensitivity_rad_s_per_g=(), non_orthogonality_rad=(0.0, 0.0, 0.0))
+    seed = np.random.SeedSequence([world.seed, sorted(world.sensors).index(name)])
+    time_s = np.arange(from_s, to_s, 0.05)
+
+    def read(rate_rad_s: float) -> np.ndarray:
+        turning = np.full((len(time_s), 3), rate_rad_s)
+        return readings(quiet, time_s, turning, seed, sensor.temperature_c)
+
+    scale = np.mean(2 * SPEED_RAD_S / (read(SPEED_RAD_S) - read(-SPEED_RAD_S)), axis=0)
+    return np.concatenate([scale, -read(0.0).mean(axis=0)])
