@@ -20,7 +20,7 @@ def simulated_laboratory(config_path: Path) -> Iterator[None]:
     The world ends when its standard input closes, so it cannot outlive this process, however this process ends.
     Raises Refused: what the world refused, or `world_not_ready` when it ends without a word of its own.
     """
-    command = [sys.executable, "-m", "rig.world", str(config_path), "--until-eof"]
+    command = [sys.executable, "-P", "-m", "rig.world", str(config_path), "--until-eof"]
     # A session of its own: Ctrl-C in the terminal must stop the arm first, not the laboratory under it.
     with subprocess.Popen(command, stdin=subprocess.PIPE, stdout=subprocess.PIPE, start_new_session=True) as process:
         assert process.stdin is not None and process.stdout is not None
@@ -46,7 +46,7 @@ def simulated_laboratory(config_path: Path) -> Iterator[None]:
 def foreground_laboratory(config_text: str) -> int:
     """Run only the world of a configuration, given as text, until Ctrl-C; returns its exit status."""
     with written(config_text) as config_path:
-        return subprocess.call([sys.executable, "-m", "rig.world", str(config_path)])
+        return subprocess.call([sys.executable, "-P", "-m", "rig.world", str(config_path)])
 
 
 @contextmanager

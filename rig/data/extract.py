@@ -3,15 +3,17 @@
 The HDF5 library does not come back from some damaged files, and nothing in a process can end it then, no signal
 either. So a file is read where it can be ended from outside, and only what proved whole reaches the rig: a line of JSON
 (schema, texts, descriptions of the sensors), then the arrays in NumPy's format: each sensor's samples, arm, events.
-What is of another shape ends in one line on stderr and exit status 1.
+What is of another shape ends in one line on stderr and exit status 1, an output that takes no more in NO_ROOM.
 """
 
+import io
 import json
 import os
 import re
 import sys
+from collections.abc import Iterator
 from pathlib import Path
-from typing import Any, BinaryIO
+from typing import Any, NoReturn
 
 import numpy as np
 from numpy.typing import NDArray
@@ -21,11 +23,12 @@ from rig.arm.state import ARM_STATE_DTYPE
 from rig.data.layout import EVENTS_DTYPE, SCHEMA, TEXTS
 
 OPEN_FOR_WRITING = 0x01  # of the superblock's consistency flags
+NO_ROOM = 2
 MAX_UNWRITTEN_ROWS = 100_000  # announced and not there: what a kill leaves of one flush, and more
 
 
-def extract(path: Path, out: BinaryIO) -> None:
-    """Write the contents of a run file to `out`. Raises OSError, ValueError and whatever else h5py does."""
+def extract(path: Path) -> Iterator[dict[str, Any] | NDArray[Any]]:
+    """The contents of a run file, header first. Raises OSError, ValueError and whatever else h5py does."""
     import h5py
 
     # A plain open refuses a file whose writer was killed; an SWMR reader trusts one that is cut short, and waits for
@@ -37,16 +40,15 @@ def extract(path: Path, out: BinaryIO) -> None:
             raise ValueError(f"its schema is {schema!r:.60}, not {SCHEMA!r}")
         sensors = _member(file, "samples", h5py.Group)
         samples = {name: _member(sensors, name, h5py.Dataset) for name in sensors}
-        header = {
+        yield {
             "schema": schema,
             "texts": {name: _text(file, name) for name in TEXTS[schema]},
             "described": {name: _attributes(dataset) for name, dataset in samples.items()},
         }
-        out.write(json.dumps(header).encode() + b"\n")
         for name, dataset in samples.items():
-            np.save(out, _rows(dataset, f"samples/{name}", SAMPLE_DTYPE))
+            yield _rows(dataset, f"samples/{name}", SAMPLE_DTYPE)
         for name, dtype in (("arm", ARM_STATE_DTYPE), ("events", EVENTS_DTYPE)):
-            np.save(out, _rows(_member(file, name, h5py.Dataset), name, dtype))
+            yield _rows(_member(file, name, h5py.Dataset), name, dtype)
 
 
 def reason(error: Exception) -> str:
@@ -114,19 +116,36 @@ def _text(file: Any, name: str) -> str:
 
 
 def _plain(value: Any) -> Any:
-    """An attribute in Python's own types; one that JSON does not have ends in the TypeError of `json.dumps`."""
+    """An attribute in Python's own types; one that JSON does not have ends in the TypeError of `_encoded`."""
     return value.tolist() if isinstance(value, np.ndarray | np.generic) else value
 
 
 def _main() -> int:
     try:
-        extract(Path(sys.argv[1]), sys.stdout.buffer)
-        sys.stdout.flush()
+        for part in extract(Path(sys.argv[1])):
+            encoded = _encoded(part)
+            try:
+                sys.stdout.buffer.write(encoded)
+                sys.stdout.flush()
+            except OSError as error:
+                _end(NO_ROOM, error)
     except Exception as error:  # of whatever kind: what it is damaged into is up to chance
-        sys.stderr.write(reason(error) + "\n")
-        sys.stderr.flush()
-        os._exit(1)  # HDF5 may not close what it could not open
+        _end(1, error)
     return 0
+
+
+def _encoded(part: dict[str, Any] | NDArray[Any]) -> bytes:
+    if isinstance(part, dict):
+        return json.dumps(part).encode() + b"\n"
+    encoded = io.BytesIO()
+    np.save(encoded, part)
+    return encoded.getvalue()
+
+
+def _end(status: int, error: Exception) -> NoReturn:
+    sys.stderr.write(reason(error) + "\n")
+    sys.stderr.flush()
+    os._exit(status)  # HDF5 may not close what it could not open
 
 
 if __name__ == "__main__":

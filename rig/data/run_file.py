@@ -25,7 +25,7 @@ from pydantic import Field
 from rig.arm.state import ARM_STATE_DTYPE, ArmState
 from rig.data.checked import Finite, Positive, checked
 from rig.data.events import Event, Recorded, from_lines, to_line
-from rig.data.extract import reason
+from rig.data.extract import NO_ROOM, reason
 from rig.data.layout import EVENTS_DTYPE, SCHEMA, Contents, append, empty, lay_out
 from rig.data.provenance import Provenance
 from rig.data.settings import RunSettings, settings_from_json
@@ -210,7 +210,7 @@ def read_run(path: Path, timeout_s: float | None = None) -> RunData:
 
     Rows that the kill left unwritten or torn at the end are dropped. Raises Refused: `no_run_file` when there is none,
     `not_a_run_file` when it is something else, damaged, of another schema, or cannot be read within `timeout_s` (None:
-    by its size).
+    by its size); `temporary_folder_full`.
     """
     contents = _contents(path, timeout_s)
     try:
@@ -261,6 +261,8 @@ def _contents(path: Path, timeout_s: float | None) -> Contents:
             raise _not_a_run_file(path, f"the HDF5 library found no end of it in {timeout_s:.0f} s") from None
         if done.returncode != 0:
             said = done.stderr.decode(errors="replace").strip().splitlines() or ["reading it ended the HDF5 library"]
+            if done.returncode == NO_ROOM:
+                raise _no_room(path, said[-1])
             raise _not_a_run_file(path, said[-1])
         out.seek(0)
         header = json.loads(out.readline())
@@ -273,6 +275,14 @@ def _not_a_run_file(path: Path, why: str) -> Refused:
         "not_a_run_file",
         f"{path} cannot be read as a run ({why})",
         "Give the path of a run.h5 the rig has written, and that nothing has damaged since",
+    )
+
+
+def _no_room(path: Path, why: str) -> Refused:
+    return Refused(
+        "temporary_folder_full",
+        f"{tempfile.gettempdir()} has no room for what {path} holds ({why})",
+        "Make room there, or let TMPDIR name another folder",
     )
 
 

@@ -15,6 +15,7 @@ import numpy as np
 import pytest
 
 from rig.analysis.outcome import calibrated
+from rig.arm.silence import crowding
 from rig.data.run_file import read_run
 from rig.errors import Fault, Refused
 from support.paths import FIXTURES
@@ -22,7 +23,7 @@ from support.paths import FIXTURES
 pytestmark = pytest.mark.slow
 
 RECORDING = FIXTURES / "calibration" / "run.h5"
-TIMEOUT_S = 5.0
+TIMEOUT_S = 5.0 * crowding()
 METADATA_BYTES = 12_000  # where a run file's first structures lie
 DAMAGES = 24
 
@@ -103,6 +104,20 @@ def test_a_signal_ends_the_reading(recording: Path) -> None:
     process.terminate()
     _, said = process.communicate(timeout=10)
     assert (process.returncode, said) == (130, b"rig: interrupted\n")
+
+
+@pytest.mark.skipif(sys.platform == "win32", reason="no limit for files there")
+def test_a_full_temporary_folder_is_not_the_recordings_fault(recording: Path) -> None:
+    import resource
+
+    before = resource.getrlimit(resource.RLIMIT_FSIZE)
+    resource.setrlimit(resource.RLIMIT_FSIZE, (10_000, before[1]))  # the reading process inherits it
+    try:
+        with pytest.raises(Refused, match="no room") as refusal:
+            read_run(recording)
+    finally:
+        resource.setrlimit(resource.RLIMIT_FSIZE, before)
+    assert refusal.value.name == "temporary_folder_full"
 
 
 def attribute(name: str, value: object, place: str = "/") -> Callable[[h5py.File], None]:

@@ -17,6 +17,9 @@ from support.worlds import merge
 
 SPEED_RAD_S = np.pi / 3
 JOINTS = 6
+AXIS_RAD = np.radians(0.06)  # half-width, as `uncertainty.axis_deg` has it by default
+WAVE_RAD = 0.3 * AXIS_RAD / np.sqrt(3)  # of the encoders' waves, cosine and sine each
+HALF_COUNT_RAD_S = {"lsm9ds1": 0.0, "adis16465": np.radians(0.025) / 2}  # its upper words alone round downwards
 PART_ERRORS: dict[str, dict[str, float]] = {  # standard deviations, as those values that the configurations give
     "lsm9ds1": {"g_rad_s": 1.7e-3, "per_k": 5e-4, "flicker_rad_s": 4.8e-5, "walk": 1e-5, "noise_rad_s": 0.002},
     "adis16465": {"g_rad_s": 2.6e-4, "per_k": 5e-6, "flicker_rad_s": 9.7e-6, "walk": 3e-7, "noise_rad_s": 0.00045},
@@ -46,7 +49,7 @@ def drawn(seed: int) -> dict[str, Any]:
                 "gravity_m_s2": float(rng.uniform(9.79, 9.82)),
             },
             "arm": _arm(rng),
-            "board": {"crystal_ppm": float(rng.normal(0, 10))},
+            "board": {"crystal_ppm": float(rng.uniform(-20, 20))},
             "sensors": {name: _sensor(rng, sensor["part"]) for name, sensor in document["sensors"].items()},
         },
     }
@@ -70,10 +73,10 @@ def _arm(rng: np.random.Generator) -> dict[str, Any]:
             "delta_d_mm": rng.normal(0, 0.2, JOINTS).tolist(),
         },
         "residue": {
-            "twist_rad": (6e-5 * wrists * rng.standard_normal(JOINTS)).tolist(),
-            "zero_rad": (6e-5 * wrists * rng.standard_normal(JOINTS)).tolist(),
-            "encoder_once_rad": 3.0e-5,
-            "encoder_twice_rad": 1.0e-5,
+            "twist_rad": (AXIS_RAD * wrists * rng.uniform(-1, 1, JOINTS)).tolist(),
+            "zero_rad": (AXIS_RAD * wrists * rng.uniform(-1, 1, JOINTS)).tolist(),
+            "encoder_once_rad": float(rng.rayleigh(WAVE_RAD)),
+            "encoder_twice_rad": float(rng.rayleigh(WAVE_RAD)),
             "hysteresis_rad": 5.0e-5,
         },
     }
@@ -99,10 +102,13 @@ def _sensor(rng: np.random.Generator, part: str) -> dict[str, Any]:
     }
 
 
-def truth(document: Mapping[str, Any], name: str, from_s: float, to_s: float) -> np.ndarray:
-    """(6,) scale at ± 60 °/s and bias without gravity of a sensor, as means over a time of the world.
+def truth(
+    document: Mapping[str, Any], name: str, from_s: float, to_s: float, speed_rad_s: float = SPEED_RAD_S
+) -> np.ndarray:
+    """(6,) scale at plus and minus a speed and bias without gravity of a sensor, as means over a time of the world.
 
-    Made of what the simulated part reads without noise, at rest and turning about each of its axes.
+    Made of what the simulated part reads without noise, at rest and turning about each of its axes. The bias is that of
+    the words which are read.
     """
     loaded = parse(yaml.safe_dump(dict(document)))
     world = WorldSection.model_validate(document["world"])
@@ -115,5 +121,6 @@ def truth(document: Mapping[str, Any], name: str, from_s: float, to_s: float) ->
         turning = np.full((len(time_s), 3), rate_rad_s)
         return readings(quiet, time_s, turning, seed, sensor.temperature_c)
 
-    scale = np.mean(2 * SPEED_RAD_S / (read(SPEED_RAD_S) - read(-SPEED_RAD_S)), axis=0)
-    return np.concatenate([scale, -read(0.0).mean(axis=0)])
+    scale = np.mean(2 * speed_rad_s / (read(speed_rad_s) - read(-speed_rad_s)), axis=0)
+    bias = -read(0.0).mean(axis=0) + HALF_COUNT_RAD_S[loaded.config.sensors[name].part]
+    return np.concatenate([scale, bias])
