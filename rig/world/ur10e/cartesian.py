@@ -1,13 +1,13 @@
 """Moves in tool space: the joints for a pose, and the joints along a straight line."""
 
-from collections.abc import Sequence
-from math import hypot, sqrt
+from collections.abc import Generator, Sequence
+from math import hypot, inf, sqrt
 
 import numpy as np
 from numpy.typing import NDArray
 
 from rig.world.ur10e.controller_messages import ProgramError
-from rig.world.ur10e.forward_kinematics import flange_frame, rotation_from_vector, rotation_vector
+from rig.world.ur10e.forward_kinematics import flange_frame, frames, rotation_from_vector, rotation_vector
 from rig.world.ur10e.joint_motion import JOINT_SPEED_LIMIT_RAD_S
 from rig.world.ur10e.links import NOMINAL, Links
 from rig.world.ur10e.trajectory import Joints, Piece, Trajectory, rest
@@ -17,7 +17,8 @@ Array = NDArray[np.float64]
 KNOT_S = 0.01  # the joints follow the line exactly this often, with constant acceleration in between
 LEVER_M = 0.3  # a rotation by one radian counts as so long a way
 ACCURACY = 1e-9
-DIFFERENCE_RAD = 1e-6
+SLOWEST = 0.1  # of the speed asked for
+KNOTS_A_TICK = 5  # are planned
 
 
 def _twist(q: Sequence[float] | Array, rotation: Array, position: Array, links: Links) -> Array:
@@ -27,14 +28,17 @@ def _twist(q: Sequence[float] | Array, rotation: Array, position: Array, links: 
     return np.array([*(position - np.array(origin)), *rotation_vector(turn.tolist())])
 
 
+def _length(twist: Array) -> float:
+    """Of a way, m."""
+    return max(hypot(*twist[:3]), LEVER_M * hypot(*twist[3:]))
+
+
 def _jacobian(q: Sequence[float] | Array, links: Links) -> Array:
     """(6, 6) twist of the flange per joint speed."""
-    columns = []
-    for joint in range(6):
-        nudged = [angle + DIFFERENCE_RAD * (i == joint) for i, angle in enumerate(q)]
-        rotation, position = flange_frame(nudged, links)
-        columns.append(_twist(q, np.array(rotation), np.array(position), links) / DIFFERENCE_RAD)
-    return np.array(columns).T
+    *inner, (_, flange) = frames(list(q), links)
+    axes = np.array([[row[2] for row in rotation] for rotation, _ in inner])
+    levers = np.array(flange) - np.array([position for _, position in inner])
+    return np.hstack([np.cross(axes, levers), axes]).T
 
 
 def joints_for(pose: Sequence[float], near: Joints, links: Links = NOMINAL) -> Joints:
@@ -56,28 +60,54 @@ def joints_for(pose: Sequence[float], near: Joints, links: Links = NOMINAL) -> J
 
 def straight_line(
     start: Joints, pose: Sequence[float], speed_m_s: float, acceleration_m_s2: float, links: Links = NOMINAL
-) -> Trajectory:
-    """A moveL from rest to rest. Raises `ProgramError` when a joint would exceed its speed."""
+) -> Generator[None, None, Trajectory]:
+    """A moveL from rest to rest, planned in small parts, so that the world goes on meanwhile.
+
+    Where a joint would be too fast the whole line is made so much slower. Raises `ProgramError` when that would be
+    slower than `SLOWEST`, because the line leads through a singularity, and when the pose is out of reach.
+    """
     rotation, position = np.array(rotation_from_vector(pose[3:])), np.array(pose[:3])
     twist = _twist(start, rotation, position, links)
-    length = max(hypot(*twist[:3]), LEVER_M * hypot(*twist[3:]))
+    length = _length(twist)
     if length < ACCURACY:
         return rest(start)
+    joints_for(pose, start, links)  # a pose out of reach is not planned for
     top = min(speed_m_s, sqrt(length * acceleration_m_s2))
-    ramp_s = top / acceleration_m_s2
+    slowest = SLOWEST * top
+    while top > slowest:
+        pieces, excess = yield from _along(start, twist, top, acceleration_m_s2, links)
+        if excess <= 1.0:
+            end_rad, _, _ = pieces[-1].at(pieces[-1].duration_s)
+            return Trajectory(pieces, joints_for(pose, end_rad, links))
+        top /= 1.001 * excess
+    raise ProgramError("joint speed limit exceeded on the way of movel")
+
+
+def _along(
+    start: Joints, twist: Array, top: float, acceleration: float, links: Links
+) -> Generator[None, None, tuple[list[Piece], float]]:
+    """The pieces of a way at the speed `top`, and by how many times its fastest joint is too fast."""
+    length = _length(twist)
+    ramp_s = top / acceleration
     duration_s = ramp_s + length / top
     knots = max(2, round(duration_s / KNOT_S))
     step_s = duration_s / knots
-
-    def rate(time_s: float, q: Array) -> Array:
-        along = top * min(1.0, time_s / ramp_s, max(0.0, duration_s - time_s) / ramp_s)
-        return np.asarray(np.linalg.solve(_jacobian(q, links), twist * (along / length)), dtype=np.float64)
-
-    q, qd, pieces = np.array(start), np.zeros(6), []
-    for knot in range(knots):
-        next_qd = rate((knot + 1) * step_s, q + qd * step_s)
-        if np.any(np.abs(next_qd) > JOINT_SPEED_LIMIT_RAD_S):
-            raise ProgramError("joint speed limit exceeded on the way of movel")
+    limits = np.array(JOINT_SPEED_LIMIT_RAD_S)
+    q: Array = np.array(start)
+    qd: Array = np.zeros(6)
+    pieces: list[Piece] = []
+    excess = 0.0
+    for knot in range(1, knots + 1):
+        if knot % KNOTS_A_TICK == 0:
+            yield
+        along = top * min(1.0, knot * step_s / ramp_s, max(0.0, duration_s - knot * step_s) / ramp_s)
+        try:
+            next_qd: Array = np.asarray(
+                np.linalg.solve(_jacobian(q + qd * step_s, links), twist * (along / length)), dtype=np.float64
+            )
+        except np.linalg.LinAlgError:
+            return pieces, inf
+        excess = max(excess, float(np.max(np.abs(next_qd) / limits)))
         pieces.append(Piece(step_s, tuple(q.tolist()), tuple(qd.tolist()), tuple(((next_qd - qd) / step_s).tolist())))
         q, qd = q + (qd + next_qd) * (step_s / 2.0), next_qd
-    return Trajectory(pieces, joints_for(pose, tuple(q.tolist()), links))
+    return pieces, excess

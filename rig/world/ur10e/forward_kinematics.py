@@ -3,7 +3,7 @@
 Plain floats, because the sensors ask several hundred times a simulated second.
 """
 
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 from math import acos, cos, pi, sin, sqrt
 
 from rig.world.ur10e.links import NOMINAL, Links
@@ -24,10 +24,11 @@ def flange_rate(q_rad: Sequence[float], qd_rad_s: Sequence[float], links: Links 
     return x, y, z
 
 
-def flange_frame(q_rad: Sequence[float], links: Links = NOMINAL) -> tuple[Rotation, Vector]:
-    """Rotation (rows) and position (m) of the flange in the base frame."""
-    rotation = ((1.0, 0.0, 0.0), (0.0, 1.0, 0.0), (0.0, 0.0, 1.0))
-    position = (0.0, 0.0, 0.0)
+def frames(q_rad: Sequence[float], links: Links = NOMINAL) -> Iterator[tuple[Rotation, Vector]]:
+    """Rotation (rows) and position (m) in the base frame of the base, then of what each link carries, flange last."""
+    rotation: Rotation = ((1.0, 0.0, 0.0), (0.0, 1.0, 0.0), (0.0, 0.0, 1.0))
+    position: Vector = (0.0, 0.0, 0.0)
+    yield rotation, position
     for link, angle in zip(links, q_rad, strict=True):
         c, s = cos(angle + link.theta_rad), sin(angle + link.theta_rad)
         ca, sa = link.cos_alpha, link.sin_alpha
@@ -39,7 +40,13 @@ def flange_frame(q_rad: Sequence[float], links: Links = NOMINAL) -> tuple[Rotati
         rotation = tuple(  # type: ignore[assignment]
             tuple(sum(row[k] * turn[k][j] for k in range(3)) for j in range(3)) for row in rotation
         )
-    return rotation, position
+        yield rotation, position
+
+
+def flange_frame(q_rad: Sequence[float], links: Links = NOMINAL) -> tuple[Rotation, Vector]:
+    """Rotation (rows) and position (m) of the flange in the base frame."""
+    *_, flange = frames(q_rad, links)
+    return flange
 
 
 def flange_pose(q_rad: Sequence[float], links: Links = NOMINAL) -> tuple[float, ...]:

@@ -78,7 +78,7 @@ class Threads:
         motion, links = self.robot.motion, self.robot.links
         if move.straight:
             pose = move.target if move.is_pose else flange_pose(move.target, links)
-            trajectory = straight_line(motion.q_rad, pose, move.speed, move.acceleration, links)
+            trajectory = yield from straight_line(motion.q_rad, pose, move.speed, move.acceleration, links)
         else:
             target = joints_for(move.target, motion.q_rad, links) if move.is_pose else move.target
             trajectory = line(motion.q_rad, target, move.speed, move.acceleration, JOINT_SPEED_LIMIT_RAD_S)
