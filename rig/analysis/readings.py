@@ -18,6 +18,7 @@ SPIKE = 8.0  # of the noise's own deviation: one reading in 1e15
 SKEWNESS = 0.15  # below, hardly a fiftieth of the noise's deviation is left in a mean
 LONGEST_RUN = 25  # equal readings of one axis: at one count of noise every fourth reading equals the one before
 STRETCH = 8  # readings on three axes, some 50 bits at one count of noise
+MEMORY = 12  # readings
 FEWEST_VALUES = 24  # of an axis, to say that a bit ought to have changed
 ONE_BIT = 0.8  # of the spikes off by the same power of two: they are a bit's doing
 FEWEST_SPIKES = 5
@@ -48,9 +49,21 @@ def judge_readings(counts: Sequence[NDArray[np.int64]], windows: Sequence[Window
 
 
 def _noise(counts: NDArray[np.int64]) -> Array:
-    """(3,) standard deviation of one reading in counts, from the differences of neighbours: drift does not matter."""
-    noise: Array = 1.4826 * np.median(np.abs(np.diff(counts, axis=0)), axis=0) / np.sqrt(2)
-    return noise
+    """(3,) standard deviation in counts of what the readings before a reading do not tell of it.
+
+    Drift and vibration do not count: they carry a reading across counts together with its neighbours.
+    """
+    return np.array([_innovation(axis - axis.mean()) for axis in counts.T])
+
+
+def _innovation(readings: Array) -> float:
+    """Standard deviation of the error of the best linear prediction from the `MEMORY` readings before."""
+    if len(readings) < 4 * MEMORY:
+        return float(np.std(np.diff(readings)) / np.sqrt(2)) if len(readings) > 1 else 0.0
+    before = np.lib.stride_tricks.sliding_window_view(readings[:-1], MEMORY)
+    now = readings[MEMORY:]
+    error = now - before @ np.linalg.lstsq(before, now, rcond=None)[0]
+    return float(1.4826 * np.median(np.abs(error)))
 
 
 def _constant_bits(counts: NDArray[np.int64]) -> int:

@@ -77,17 +77,18 @@ def average(
     stream: Stream,
     inside: slice,
     window: Window,
-    excess: Array,
+    passing: Array,
     covered: NDArray[np.bool_],
 ) -> Average:
-    """Mean and its variance; `excess` (n,) is the arm's rate less its mean 2π/T, known where `covered` (n,).
+    """Mean and its variance. `passing` (n, k) comes and goes in the window and is zero in its mean, such as the arm's
+    rate less its mean 2π/T; the arm tells where it is known, `covered` (n,).
 
-    A straight line of reading against excess says what is read at the mean speed: few samples do not meet the vibration
+    A straight line of reading against what passes says what is read without it: few samples do not meet a vibration
     evenly. The noise is what is left of that line, and never below the rounding to counts; its variance is widened
     where the residuals are not white. What rounding leaves in a mean however many samples there are is added.
     """
     m = stream.readings_rad_s[inside]
-    columns, known = np.column_stack([np.ones(int(covered.sum())), excess[covered]]), m[covered]
+    columns, known = np.column_stack([np.ones(int(covered.sum())), passing[covered]]), m[covered]
     coefficients, _, rank, _ = np.linalg.lstsq(columns, known, rcond=None)
     residual = known - columns @ coefficients
     scatter = np.sum(residual**2, axis=0) / (len(known) - rank)

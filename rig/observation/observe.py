@@ -79,7 +79,7 @@ def observe_sensor(
     """
     stream = on_the_arms_clock(run.samples[sensor], run.sensors[sensor], motion)
     revolutions = [
-        _revolution(stream, motion, finished, settings)
+        _revolution(run, stream, motion, finished, settings)
         for finished in swept(run)
         if finished.sweep.index not in superseded
     ]
@@ -116,14 +116,18 @@ def _sound_for(run: RunData, sensor: str, motion: ArmMotion, settings: Observati
         return frozenset()
     for finished in swept(run):
         with suppress(Fault):
-            _revolution(stream, motion, finished, settings)
+            _revolution(run, stream, motion, finished, settings)
             sound.add(finished.sweep.index)
     return frozenset(sound)
 
 
-def _revolution(stream: Stream, motion: ArmMotion, finished: Finished, settings: ObservationThresholds) -> Observation:
+def _revolution(
+    run: RunData, stream: Stream, motion: ArmMotion, finished: Finished, settings: ObservationThresholds
+) -> Observation:
     turn = find_revolution(motion, finished.sweep, finished.window, settings)
-    return _observation(stream, motion, finished.sweep, turn, settings)
+    # Recordings of before there was a site are observed as they were then.
+    gravity_turns = run.settings.site is not None
+    return _observation(stream, motion, finished.sweep, turn, settings, gravity_turns=gravity_turns)
 
 
 def bias_drift(rests: Sequence[Average]) -> Array:
@@ -152,8 +156,15 @@ def _drifting(average: Average, drift: Array) -> Average:
 
 
 def _observation(
-    stream: Stream, motion: ArmMotion, sweep: Sweep, turn: Revolution, settings: ObservationThresholds
+    stream: Stream,
+    motion: ArmMotion,
+    sweep: Sweep,
+    turn: Revolution,
+    settings: ObservationThresholds,
+    *,
+    gravity_turns: bool,
 ) -> Observation:
+    """`gravity_turns`: what the sensor feels of gravity, once up and down in a revolution, is not taken for noise."""
     where = describe(sweep)
     inside = between(stream, turn.start_s, turn.end_s)
     lost = _lost(stream, inside, where, settings)
@@ -162,9 +173,12 @@ def _observation(
     covered = motion.covered(stream.time_s[inside])
     if covered.mean() < 0.5:
         raise arm_states_lost(where, "more than half the time")
-    excess = motion.rate(stream.time_s[inside]) @ turn.axis_flange - turn.speed_rad_s
+    passing = [motion.rate(stream.time_s[inside]) @ turn.axis_flange - turn.speed_rad_s]
+    if gravity_turns:
+        turned_rad = turn.speed_rad_s * (stream.time_s[inside] - turn.start_s)
+        passing += [np.cos(turned_rad), np.sin(turned_rad)]
     window = Window(turn.start_s, turn.end_s)
-    averaged = _placed(average(stream, inside, window, excess, covered), motion)
+    averaged = _placed(average(stream, inside, window, np.column_stack(passing), covered), motion)
     expected = np.array(stream.sensor.mounting) @ turn.axis_flange
     turned = averaged.mean_rad_s - stream.clock.zero_rate_rad_s
     _check_direction(turned, expected, where, settings)
@@ -196,7 +210,7 @@ def _rest(stream: Stream, motion: ArmMotion, window: Window) -> Average | None:
     if np.ptp(states["q_rad"], axis=0).max() > MAX_REST_TRAVEL_RAD:
         return None
     count = inside.stop - inside.start
-    steady, known = np.zeros(count), np.ones(count, dtype=np.bool_)
+    steady, known = np.zeros((count, 1)), np.ones(count, dtype=np.bool_)
     return _placed(average(stream, inside, Window(start, end), steady, known), motion)
 
 

@@ -10,6 +10,8 @@ from rig.analysis.calibration import observe_recordings, solve_observed
 from rig.analysis.contradictions import DISTURBED as NAMED
 from rig.analysis.contradictions import FALSE_ALARMS, contradictions, disturbed_sweeps, names_a_sweep
 from rig.analysis.outcome import calibrated
+from rig.analysis.pieces import Window
+from rig.analysis.readings import judge_readings
 from rig.analysis.surroundings import surroundings_of
 from rig.analysis.verdict import Check
 from rig.data.run_file import RunData
@@ -219,3 +221,27 @@ def test_other_procedures_are_held_against_themselves_too(rest_s: float, repeats
     everything = {check.name.split(".")[1] for check in judged(synthetic_run(Setup(noise_rad_s=0.005)))[0]}
     assert {check.name.split(".")[1] for check in checks} == everything - without
     assert not failed(checks)
+
+
+@pytest.mark.parametrize("rms_counts", [3.0, 6.0, 12.0])
+def test_an_arm_that_vibrates_under_a_quiet_sensor_is_no_stuck_bit(rms_counts: float) -> None:
+    """One count of noise and a steady 14 Hz: readings crowd at the ends of the swing, whatever bits are set there."""
+    time_s = np.arange(520)[:, None] / 200
+    for seed in range(10):
+        rng = np.random.default_rng(seed)
+        windows = []
+        for sweep in range(6):
+            swing = rms_counts * np.sqrt(2) * np.sin(2 * np.pi * 14 * time_s + rng.uniform(0, 2 * np.pi, 3))
+            counts = np.round(rng.uniform(-50, 50, 3) + swing + 1.03 * rng.standard_normal((len(time_s), 3)))
+            windows.append(Window(sweep, counts.astype(np.int64), counts - counts.mean(axis=0), np.zeros(3)))
+        stuck, _ = judge_readings([window.counts for window in windows], windows, FALSE_ALARMS / 10)["stuck_bit"]
+        assert stuck == 0, seed
+
+
+def test_a_low_bit_that_is_stuck_is_found_under_vibration_too() -> None:
+    rng = np.random.default_rng(1)
+    swing = 12 * np.sin(2 * np.pi * 14 * np.arange(520)[:, None] / 200)
+    counts = np.round(swing + 5 * rng.standard_normal((520, 3))).astype(np.int64) & ~1
+    window = Window(0, counts, counts - counts.mean(axis=0), np.zeros(3))
+    stuck, _ = judge_readings([counts], [window], FALSE_ALARMS / 10)["stuck_bit"]
+    assert stuck >= 3

@@ -41,6 +41,29 @@ def look(run: RunData, settings: ObservationThresholds = SETTINGS) -> SensorObse
     return observe_run(run, settings).sensors["gyro"]
 
 
+def feeling_gravity(run: RunData, rad_s_per_g: float) -> RunData:
+    """The same readings, as of a sensor whose first axis feels 1 g that turns with each sweep."""
+    samples = run.samples["gyro"].copy()
+    seen = look(run)
+    time_s = seen.time_base.controller_time_s(samples["board_time_us"] * 1e-6)
+    for turn in seen.revolutions:
+        inside = (time_s >= turn.average.start_s) & (time_s <= turn.average.end_s)
+        felt = rad_s_per_g * np.cos(turn.speed_rad_s * (time_s[inside] - turn.average.start_s))
+        samples["counts"][inside, 0] += np.round(felt / SENSITIVITY).astype(np.int16)
+    return replace(run, samples={"gyro": samples})
+
+
+def test_gravity_that_turns_with_the_sensor_is_no_noise() -> None:
+    """0.3 °/s/g of a sensor with a noise of 0.002 rad/s: over a revolution nothing of it is left in the mean."""
+    quiet = synthetic_run(Setup(noise_rad_s=0.002))
+    felt = look(feeling_gravity(quiet, np.radians(0.3)))
+    for without, turn in zip(look(quiet).revolutions, felt.revolutions, strict=True):
+        std = np.sqrt(without.average.variance_rad2_s2)
+        assert turn.average.noise_rad_s == pytest.approx(without.average.noise_rad_s, rel=0.02)
+        assert np.sqrt(turn.average.variance_rad2_s2) == pytest.approx(std, rel=0.1)
+        assert np.all(np.abs(turn.average.mean_rad_s - without.average.mean_rad_s) < 0.3 * std)
+
+
 def clock_errors(setup: Setup, clock: TimeBase) -> tuple[float, float]:
     """Offset (s) and drift, found less true."""
     return clock.offset_s - (setup.boot_s + setup.drift * clock.reference_s), clock.drift - setup.drift
