@@ -32,7 +32,7 @@ test: $(VENV)/dev.installed lint
 	$(MAKE) -C firmware_host/firmware coverage_table COVERED=$(CURDIR)/build/coverage PYTHON=$(CURDIR)/$(BIN)/python
 
 proof: $(VENV)/dev.installed
-	$(BIN)/pytest -m proof --proof -rP
+	$(PYTEST) -m proof --proof -rP
 
 lint: $(VENV)/dev.installed
 	$(BIN)/ruff check .
