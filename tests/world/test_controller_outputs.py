@@ -186,3 +186,59 @@ def test_an_arm_without_power_says_so() -> None:
     one.robot.power_on()
     ticks(one, 600)
     assert value(one, "joint_mode").tolist() == [255] * 6  # idle, brakes on
+
+
+DRAWING = [(0, 0.1807, 90), (-0.6127, 0, 0), (-0.57155, 0, 0), (0, 0.17415, 90), (0, 0.11985, -90), (0, 0.11655, 0)]
+
+
+def link_frames(q_rad: np.ndarray) -> list[np.ndarray]:
+    """(4, 4) of the base and of each link, by Denavit and Hartenberg's lengths (m) and twists (°) of the drawing."""
+    frames = [np.eye(4)]
+    for angle, (a, d, alpha) in zip(q_rad, DRAWING, strict=True):
+        turn, twist = np.eye(4), np.eye(4)
+        turn[:3, :3], turn[:3, 3] = Rotation.from_euler("z", angle).as_matrix(), (0, 0, d)
+        twist[:3, :3], twist[:3, 3] = Rotation.from_euler("x", alpha, degrees=True).as_matrix(), (a, 0, 0)
+        frames.append(frames[-1] @ turn @ twist)
+    return frames
+
+
+def potential_energy(q_rad: np.ndarray, payload_kg: float) -> float:
+    """J, of the maker's masses and of a payload 5 cm before the flange."""
+    frames = link_frames(q_rad)
+    own = [(0.021, 0, 0.027), (0.38, 0, 0.158), (0.24, 0, 0.068), (0, 0.007, 0.018), (0, 0.007, 0.018), (0, 0, -0.026)]
+    masses = [7.369, 13.051, 3.989, 2.1, 1.98, 0.615]
+    heights = [(frames[link + 1] @ [*centre, 1])[2] for link, centre in enumerate(own)]
+    return 9.82 * float(np.dot(masses, heights) + payload_kg * (frames[-1] @ [0, 0, 0.05, 1])[2])
+
+
+def test_at_rest_the_joints_bear_the_slope_of_the_potential_energy() -> None:
+    one = laboratory()
+    one.robot.set_payload(3.0, (0.0, 0.0, 0.05))
+    one.robot.motion.move(TILTED, 2.0, 8.0)
+    ticks(one, 2000)
+    q, step = value(one, "target_q"), 1e-5 * np.eye(6)
+    slope = [(potential_energy(q + each, 3.0) - potential_energy(q - each, 3.0)) / 2e-5 for each in step]
+    assert value(one, "target_moment") == pytest.approx(slope, abs=1e-3)
+    assert value(one, "actual_current_as_torque") == pytest.approx(slope, abs=1e-2)
+    assert 30 < np.abs(slope).max() < 300  # the shoulder
+    weight = rotation(one).inv().apply([0, 0, -3 * 9.82])
+    assert value(one, "ft_raw_wrench") == pytest.approx([*weight, *np.cross([0, 0, 0.05], weight)], abs=1e-2)
+    assert value(one, "actual_momentum")[0] == pytest.approx(0.0, abs=1e-6)
+    one.robot.power_off()
+    assert not value(one, "target_moment").any()
+
+
+def test_moments_are_those_that_carry_the_masses_along() -> None:
+    """Over a move from rest to rest their work is the potential energy that was gained."""
+    one = laboratory("world.arm.vibration_fraction=0")
+    before = potential_energy(value(one, "target_q"), 0.0)
+    one.robot.motion.move(TILTED, 1.0, 2.0)
+    work_j, largest = 0.0, 0.0
+    while True:
+        ticks(one, 1)
+        work_j += float(value(one, "target_moment") @ value(one, "target_qd")) * TICK_S
+        largest = max(largest, value(one, "actual_momentum")[0])
+        if one.robot.motion.standing:
+            break
+    assert work_j == pytest.approx(potential_energy(value(one, "target_q"), 0.0) - before, abs=0.3)
+    assert 1 < largest < 30

@@ -5,6 +5,7 @@ from typing import Any
 
 from rig.world.ur10e import forward_kinematics
 from rig.world.ur10e.modes import RobotMode
+from rig.world.ur10e.moments import Load, load
 from rig.world.ur10e.robot import TCP_OFFSET, Robot
 from rig.world.ur10e.tcp_motion import GRAVITY, elbow
 
@@ -60,6 +61,23 @@ def _target_pose(robot: Robot) -> tuple[float, ...]:
     return forward_kinematics.flange_pose(robot.motion.now.target_q_rad, robot.links)
 
 
+def _load(robot: Robot) -> Load:
+    motion = robot.motion
+    joints = motion.q_rad, motion.qd_rad_s, motion.qdd_rad_s2
+    return load(joints, robot.payload_kg, robot.payload_centre_m, robot.links)
+
+
+def _target_load(robot: Robot) -> Load:
+    now = robot.motion.now
+    joints = now.target_q_rad, now.target_qd_rad_s, now.target_qdd_rad_s2
+    return load(joints, robot.payload_kg, robot.payload_centre_m, robot.links)
+
+
+def _borne(of: Callable[[Robot], Load]) -> Get:
+    """The joints' moments; without power the brakes bear everything."""
+    return lambda robot: of(robot).moments_nm if robot.robot_mode == RobotMode.RUNNING else ZERO6
+
+
 ZERO6 = (0.0,) * 6
 
 OUTPUTS: dict[str, tuple[str, Get]] = {
@@ -78,6 +96,10 @@ OUTPUTS: dict[str, tuple[str, Get]] = {
     "target_TCP_acceleration": ("VECTOR6D", lambda r: r.target_tcp_motion.acceleration),
     "elbow_position": ("VECTOR3D", lambda r: elbow(r.motion.q_rad, r.motion.qd_rad_s, r.links)[0]),
     "elbow_velocity": ("VECTOR3D", lambda r: elbow(r.motion.q_rad, r.motion.qd_rad_s, r.links)[1]),
+    "target_moment": ("VECTOR6D", _borne(_target_load)),
+    "actual_current_as_torque": ("VECTOR6D", _borne(_load)),
+    "actual_momentum": ("DOUBLE", lambda r: _load(r).momentum_kg_m_s),
+    "ft_raw_wrench": ("VECTOR6D", lambda r: _load(r).wrench),
     "tcp_offset": ("VECTOR6D", _constant(TCP_OFFSET)),
     "robot_mode": ("INT32", lambda r: r.robot_mode),
     "joint_mode": ("VECTOR6INT32", joint_modes),
@@ -104,11 +126,11 @@ OUTPUTS: dict[str, tuple[str, Get]] = {
 
 # Quantities the simulation has no physics for: constant, and plausible for an idle controller.
 _CONSTANTS: dict[tuple[str, Any], str] = {
-    ("VECTOR6D", ZERO6): """target_current target_moment actual_current actual_current_window actual_current_as_torque
-        joint_control_output actual_TCP_force ft_raw_wrench wrench_calc_from_currents payload_inertia""",
+    ("VECTOR6D", ZERO6): """target_current actual_current actual_current_window joint_control_output actual_TCP_force
+        wrench_calc_from_currents payload_inertia""",
     ("VECTOR6D", (28.0,) * 6): "joint_temperatures",
     ("VECTOR3D", GRAVITY): "target_gravity",
-    ("DOUBLE", 0.0): """actual_momentum standard_analog_input0 standard_analog_input1 io_current tcp_force_scalar
+    ("DOUBLE", 0.0): """standard_analog_input0 standard_analog_input1 io_current tcp_force_scalar
         collision_detection_ratio joint_position_deviation_ratio tool_analog_input0 tool_analog_input1
         tool_output_current euromap67_24V_voltage euromap67_24V_current actual_robot_energy_consumed
         actual_robot_braking_energy_dissipated""",

@@ -1,0 +1,79 @@
+"""What the joints must bear and the flange feels: weights and accelerations of the links and of the payload.
+
+Each link's mass is thought of as sitting in its centre (maker's article 45257, "Dynamics"): what else it resists a turn
+with is left out, and so is friction. The base stands upright and still, as the controller takes it to.
+"""
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from functools import lru_cache
+
+import numpy as np
+from numpy.typing import NDArray
+
+from rig.world.ur10e.forward_kinematics import frames
+from rig.world.ur10e.links import Links
+from rig.world.ur10e.tcp_motion import GRAVITY
+from rig.world.ur10e.trajectory import Joints
+
+Array = NDArray[np.float64]
+
+MASSES_KG = (7.369, 13.051, 3.989, 2.1, 1.98, 0.615)
+CENTRES_M = (  # in the frame of what each link carries
+    (0.021, 0.0, 0.027),
+    (0.38, 0.0, 0.158),
+    (0.24, 0.0, 0.068),
+    (0.0, 0.007, 0.018),
+    (0.0, 0.007, 0.018),
+    (0.0, 0.0, -0.026),
+)
+STEP_S = 1e-3
+
+
+@dataclass(frozen=True, slots=True)
+class Load:
+    """`moments_nm` of the six joints; `wrench`, N and N m, of the payload's weight on the flange, in its axes;
+    `momentum_kg_m_s`, the size of it all together.
+    """
+
+    moments_nm: tuple[float, ...]
+    wrench: tuple[float, ...]
+    momentum_kg_m_s: float
+
+
+@lru_cache(maxsize=4)  # several outputs and several clients ask for the same
+def load(
+    joints: tuple[Joints, Joints, Joints], payload_kg: float, payload_centre_m: tuple[float, ...], links: Links
+) -> Load:
+    """Of joints at angles (rad) with speeds (rad/s) and accelerations (rad/s²), and a payload in the flange's axes."""
+    q, qd, qdd = (np.array(each) for each in joints)
+    masses = np.array([*MASSES_KG, payload_kg])
+    rotations, places = _frames(q, links)
+    here = _centres(q, payload_centre_m, links)
+    before, after = (
+        _centres(q + sign * STEP_S * qd + STEP_S**2 / 2 * qdd, payload_centre_m, links) for sign in (-1, 1)
+    )
+    forces = masses[:, None] * ((after - 2 * here + before) / STEP_S**2 + GRAVITY)
+    moments = [
+        float(rotations[joint, :, 2] @ np.cross(here[joint:] - places[joint], forces[joint:]).sum(axis=0))
+        for joint in range(len(MASSES_KG))
+    ]
+    weight = -rotations[-1].T @ forces[-1]
+    turning = np.cross(np.array(payload_centre_m), weight)
+    momentum = masses @ (after - before) / (2 * STEP_S)
+    return Load(tuple(moments), (*weight.tolist(), *turning.tolist()), float(np.linalg.norm(momentum)))
+
+
+def _frames(q: Array, links: Links) -> tuple[Array, Array]:
+    """Rotations (7, 3, 3) and places (7, 3) of the base and of what each link carries."""
+    rotations, places = zip(*frames(q.tolist(), links), strict=True)
+    return np.array(rotations), np.array(places)
+
+
+def _centres(q: Array, payload_centre_m: Sequence[float], links: Links) -> Array:
+    """(7, 3) of the links and of the payload, m."""
+    rotations, places = _frames(q, links)
+    own = np.array([*CENTRES_M, payload_centre_m])
+    carried = [*range(1, len(places)), len(places) - 1]  # the payload sits where the last link does
+    centres: Array = places[carried] + np.einsum("nij,nj->ni", rotations[carried], own)
+    return centres
