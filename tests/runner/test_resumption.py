@@ -1,15 +1,21 @@
 """What counts of an interrupted run: sound sweeps that the board knows and that do not contradict one another."""
 
+import json
 from dataclasses import replace
+from pathlib import Path
 
+import h5py
 import numpy as np
+import pytest
 
 from firmware_host.answers import BoardObservation
+from rig.analysis.calibration import observe_recordings
 from rig.data.events import BoardObserved, Recorded
-from rig.data.run_file import RunData
+from rig.data.run_file import RunData, read_run
 from rig.observation.windows import swept
 from rig.plans.script_file import installed_script
 from rig.runner.resumption import resumption
+from support.commands import configuration, rig
 from support.damaged_readings import offset, readings_of
 from support.synthetic_run import Setup
 
@@ -46,3 +52,29 @@ def test_what_was_repeated_counts_in_its_place() -> None:
     again = known_to_the_board(readings_of(replace(SETUP, seed=2)).recording())
     again = replace(again, provenance=replace(again.provenance, started_utc="2026-11-21T00:10:00+00:00"))
     assert resumption([damaged, again], damaged.settings, SCRIPT).done == set(range(6))
+
+
+@pytest.mark.slow
+def test_a_finished_run_repeats_the_sweep_that_its_verdict_named(tmp_path: Path) -> None:
+    """Something moved the bench during sweep 4: the recording shows it, and the verdict named it."""
+    out = tmp_path / "run"
+    config = configuration(tmp_path, {"procedure": {"rest_s": 1.0}})
+    assert rig("run", config, "--out", out).returncode == 0
+    assert "already_finished" in rig("resume", out).stderr
+    (observed,) = observe_recordings([read_run(out / "run.h5")])
+    seen = observed.sensors["gyro"]
+    turn = seen.revolutions[4].average
+    with h5py.File(out / "run.h5", "r+") as file:
+        samples = file["samples/gyro"][:]
+        time_s = seen.time_base.controller_time_s(samples["board_time_us"] * 1e-6)
+        samples["counts"][(time_s > turn.start_s) & (time_s < turn.end_s), 0] += 300
+        file["samples/gyro"][:] = samples
+    result = json.loads((out / "result.json").read_text(encoding="utf-8"))
+    named = {**result["checks"][-1], "name": "gyro.disturbed_sweep.4", "passed": False}
+    (out / "result.json").write_text(json.dumps({**result, "verdict": "fail", "checks": [*result["checks"], named]}))
+
+    resumed = rig("resume", out)
+    assert resumed.returncode == 0, resumed.stderr
+    assert resumed.stderr.count("done: sweep") == 2  # which of the two about one axis it was nobody can tell
+    repeated = json.loads((out / "result.json").read_text(encoding="utf-8"))
+    assert repeated["verdict"] == "pass" and len(repeated["sensors"]["gyro"]["observations"]) == 6
