@@ -10,8 +10,8 @@ from math import comb
 import numpy as np
 
 from rig.data.settings import Uncertainty
+from rig.observation.colour import widening
 from rig.observation.observed_run import ObservedRun
-from rig.observation.timebase import widening
 from rig.observation.windows import swept
 
 # The board's counter runs from its 32768 Hz crystal by way of a PLL, 576 ppm below the nominal rate (docs/board.md).

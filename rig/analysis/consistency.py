@@ -120,7 +120,7 @@ def _covariance(pieces: Pieces, felt: Array, steady: Array) -> Array:
     off = (TOLERANCE**2 + np.outer(pieces.speed_std, pieces.speed_std)) * same * np.outer(speed, speed)
     off[own, own] += (WITHIN_A_TURN * speed) ** 2
     variances = pieces.variances_rad2_s2 + ((WITHIN_A_TURN * speed) ** 2)[:, None]
-    bias = estimate_bias_process(steady, pieces.means_rad_s - felt, variances, pieces.times_s, significant=0.0)
+    bias = estimate_bias_process(steady, pieces.means_rad_s - felt, variances, pieces.times_s)
     noise = np.array([np.diag(each) for each in pieces.variances_rad2_s2.T])
     return np.asarray(noise + off + bias.covariance(pieces.times_s), dtype=np.float64)
 

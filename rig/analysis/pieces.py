@@ -15,9 +15,10 @@ from rig.data.settings import Site
 from rig.estimation.arrays import Array
 from rig.estimation.explained import Explained
 from rig.observation.average import Average, Stream, between, rounding_left
+from rig.observation.colour import widening
 from rig.observation.observe import Observation
 from rig.observation.observed_run import ObservedRun
-from rig.observation.timebase import ArmMotion, widening
+from rig.observation.timebase import ArmMotion
 
 PARTS = 4  # of a revolution; a rest has half as many
 MOST_PIECES = 48  # of all revolutions: beyond twelve sweeps these are cut into fewer parts

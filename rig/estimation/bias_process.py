@@ -15,7 +15,6 @@ from rig.estimation.arrays import Array
 
 STEPS = 25  # of either size on its grid
 SPAN = 300.0  # largest size over the smallest that is looked at
-SIGNIFICANT = 4.0  # twice the gain in log-likelihood below which a bias counts as steady: 5 % of steady ones exceed it
 
 
 @dataclass(frozen=True, slots=True)
@@ -64,13 +63,12 @@ def estimate_bias_process(
     means_rad_s: ArrayLike,
     variances_rad2_s2: ArrayLike,
     windows_s: ArrayLike,
-    significant: float = SIGNIFICANT,
 ) -> BiasProcess:
     """The process behind the mean readings (N, 3), which without it are `design` (N, p) × parameters + noise.
 
     `variances_rad2_s2` (N, 3) are those of the noise, `windows_s` (N, 2) when was averaged. One process for the three
-    axes, so that few averages tell it. Steady when that explains them as well: when twice the gain in log-likelihood
-    stays below `significant`.
+    axes, so that few averages tell it. What is most likely is taken, however little likelier than steadiness it is: to
+    wait until it is certain would leave out most of what is there.
     """
     z, means, variances = (np.asarray(a, dtype=np.float64) for a in (design, means_rad_s, variances_rad2_s2))
     freedom = 3 * (len(z) - z.shape[1])
@@ -86,8 +84,6 @@ def estimate_bias_process(
         noise = np.diag(variances[:, axis]) + _added(sizes[:, :1, None], sizes[:, 1:, None], unit)
         gain += _restricted_likelihood(z, means[:, axis], noise)
     best = int(np.argmax(gain))
-    if 2 * (gain[best] - gain[0]) < significant:
-        return BiasProcess(0.0, 0.0, freedom)
     walk, scatter = np.sqrt(sizes[best]).tolist()
     return BiasProcess(walk, scatter, freedom)
 

@@ -20,9 +20,9 @@ from rig.errors import Fault, Refused
 from rig.estimation.arrays import Array
 from rig.estimation.refusals import check_reading_ratio
 from rig.observation.average import Average
+from rig.observation.colour import widening
 from rig.observation.csv_table import read_columns
 from rig.observation.observe import Observation, nearest_axis
-from rig.observation.timebase import widening
 from rig.observation.windows import Window
 
 SAMPLE_COLUMNS = ("time_s", "x_rad_s", "y_rad_s", "z_rad_s")

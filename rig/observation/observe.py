@@ -7,7 +7,7 @@ once the arm's measured rate is taken out of them. The mean comes first; squarin
 Nothing doubtful is averaged: whatever does not belong into a calibration raises a Fault with a name of its own.
 """
 
-from collections.abc import Collection, Sequence
+from collections.abc import Callable, Collection, Sequence
 from contextlib import suppress
 from dataclasses import dataclass, replace
 
@@ -21,6 +21,7 @@ from rig.errors import Fault
 from rig.estimation.arrays import Array
 from rig.estimation.refusals import check_reading_ratio
 from rig.observation.average import Average, Stream, average, between, on_the_arms_clock
+from rig.observation.colour import noise_left, widening
 from rig.observation.revolution import Revolution, arm_states_lost, describe, find_revolution
 from rig.observation.timebase import ArmMotion, TimeBase
 from rig.observation.windows import Finished, Window, finished_sweeps, rested, swept
@@ -83,7 +84,8 @@ def observe_sensor(
         for finished in swept(run)
         if finished.sweep.index not in superseded
     ]
-    rests = tuple(rest for window in rested(run) if (rest := _rest(stream, motion, window)))
+    coloured = widening if _as_before(run) else noise_left
+    rests = tuple(rest for window in rested(run) if (rest := _rest(stream, motion, window, coloured)))
     drift = bias_drift(rests)
     return SensorObservations(
         stream.clock,
@@ -125,9 +127,12 @@ def _revolution(
     run: RunData, stream: Stream, motion: ArmMotion, finished: Finished, settings: ObservationThresholds
 ) -> Observation:
     turn = find_revolution(motion, finished.sweep, finished.window, settings)
-    # Recordings of before there was a site are observed as they were then.
-    gravity_turns = run.settings.site is not None
-    return _observation(stream, motion, finished.sweep, turn, settings, gravity_turns=gravity_turns)
+    return _observation(stream, motion, finished.sweep, turn, settings, as_before=_as_before(run))
+
+
+def _as_before(run: RunData) -> bool:
+    """Recordings of before there was a site are observed as they were then."""
+    return run.settings.site is None
 
 
 def bias_drift(rests: Sequence[Average]) -> Array:
@@ -162,9 +167,9 @@ def _observation(
     turn: Revolution,
     settings: ObservationThresholds,
     *,
-    gravity_turns: bool,
+    as_before: bool,
 ) -> Observation:
-    """`gravity_turns`: what the sensor feels of gravity, once up and down in a revolution, is not taken for noise."""
+    """`as_before`: takes for noise what the sensor feels of gravity, once up and down, and all that vibrates."""
     where = describe(sweep)
     inside = between(stream, turn.start_s, turn.end_s)
     lost = _lost(stream, inside, where, settings)
@@ -174,11 +179,12 @@ def _observation(
     if covered.mean() < 0.5:
         raise arm_states_lost(where, "more than half the time")
     passing = [motion.rate(stream.time_s[inside]) @ turn.axis_flange - turn.speed_rad_s]
-    if gravity_turns:
+    if not as_before:
         turned_rad = turn.speed_rad_s * (stream.time_s[inside] - turn.start_s)
         passing += [np.cos(turned_rad), np.sin(turned_rad)]
     window = Window(turn.start_s, turn.end_s)
-    averaged = _placed(average(stream, inside, window, np.column_stack(passing), covered), motion)
+    coloured = widening if as_before else noise_left
+    averaged = _placed(average(stream, inside, window, np.column_stack(passing), covered, coloured=coloured), motion)
     expected = np.array(stream.sensor.mounting) @ turn.axis_flange
     turned = averaged.mean_rad_s - stream.clock.zero_rate_rad_s
     _check_direction(turned, expected, where, settings)
@@ -200,7 +206,7 @@ def _observation(
     )
 
 
-def _rest(stream: Stream, motion: ArmMotion, window: Window) -> Average | None:
+def _rest(stream: Stream, motion: ArmMotion, window: Window, coloured: Callable[[Array], float]) -> Average | None:
     """The mean reading of a rest; None where the arm did not stand still or the rest is too short to say anything."""
     start, end = window.start_s + REST_SETTLING_S, window.end_s - REST_SETTLING_S
     inside = between(stream, start, end)
@@ -211,7 +217,7 @@ def _rest(stream: Stream, motion: ArmMotion, window: Window) -> Average | None:
         return None
     count = inside.stop - inside.start
     steady, known = np.zeros((count, 1)), np.ones(count, dtype=np.bool_)
-    return _placed(average(stream, inside, Window(start, end), steady, known), motion)
+    return _placed(average(stream, inside, Window(start, end), steady, known, coloured=coloured), motion)
 
 
 def _lost(stream: Stream, inside: slice, where: str, settings: ObservationThresholds) -> int:

@@ -16,6 +16,7 @@ from numpy.typing import NDArray
 from rig.arm.kinematics import NOMINAL, DenavitHartenberg, flange_attitude, flange_rate
 from rig.errors import Fault
 from rig.estimation.arrays import Array
+from rig.observation.colour import widening
 
 MIN_SAMPLES = 100
 MAX_SPAN_S = 48 * 3600.0  # of a recording; what lies farther apart is damage, and would fill the memory
@@ -30,8 +31,6 @@ MAX_DRIFT = 0.03  # an oscillator that no crystal holds is within 2 %
 MAX_DRIFT_LONG_RUN = 1e-3  # one that a crystal holds is within 600 ppm; in hours, a wider search would take minutes
 MAX_DRIFT_STEPS = 20  # to either side
 FINE_STEPS = 100
-WHITENESS_LAGS = 20
-WHITENESS_LIMIT = 45.3  # χ² of 20 degrees of freedom at 0.999
 
 
 @dataclass(frozen=True, slots=True)
@@ -129,21 +128,6 @@ def estimate_time_base(board_time_s: Array, readings_rad_s: Array, motion: ArmMo
             f"the board's clock would run {100 * clock.drift:+.2f} % off, to {clock.offset_std_s * 1e3:.1f} ms"
         )
     return clock
-
-
-def widening(residuals: Array) -> float:
-    """Factor ≥ 1 on the variance of a mean of these residuals (n,): 1 for white noise, 1 + 2 Σ ρ for coloured noise.
-
-    The lag correlations ρ count only if they are significant together (Box–Pierce), so that white noise is left alone.
-    """
-    count = len(residuals)
-    centred = residuals - residuals.mean()
-    power = float(centred @ centred)
-    if count <= 2 * WHITENESS_LAGS or power == 0:
-        return 1.0
-    rho = np.array([centred[lag:] @ centred[:-lag] for lag in range(1, WHITENESS_LAGS + 1)]) / power
-    coloured = count * float(rho @ rho) > WHITENESS_LIMIT
-    return max(1.0, 1 + 2 * float(rho.sum())) if coloured else 1.0
 
 
 def _check_samples(board_time_s: Array, readings: Array) -> None:

@@ -21,9 +21,15 @@ AXIS_RAD = np.radians(0.06)  # half-width, as `uncertainty.axis_deg` has it by d
 WAVE_RAD = 0.3 * AXIS_RAD / np.sqrt(3)  # of the encoders' waves, cosine and sine each
 HALF_COUNT_RAD_S = {"lsm9ds1": 0.0, "adis16465": np.radians(0.025) / 2}  # its upper words alone round downwards
 PART_ERRORS: dict[str, dict[str, float]] = {  # standard deviations, as those values that the configurations give
-    "lsm9ds1": {"g_rad_s": 1.7e-3, "per_k": 5e-4, "flicker_rad_s": 4.8e-5, "walk": 1e-5, "noise_rad_s": 0.002},
-    "adis16465": {"g_rad_s": 2.6e-4, "per_k": 5e-6, "flicker_rad_s": 9.7e-6, "walk": 3e-7, "noise_rad_s": 0.00045},
-}
+    "lsm9ds1": {
+        "g_rad_s": 1.7e-3, "bias_per_k": 5e-4, "scale_per_k": 3e-4, "flicker_rad_s": 4.8e-5, "walk": 1e-5,
+        "odd": 2.3e-4, "even": 5e-5, "noise_rad_s": 0.002,
+    },
+    "adis16465": {
+        "g_rad_s": 2.6e-4, "bias_per_k": 0.0, "scale_per_k": 0.0, "flicker_rad_s": 9.7e-6, "walk": 3e-7,
+        "odd": 0.0, "even": 0.0, "noise_rad_s": 0.00045,
+    },
+}  # fmt: skip
 
 
 def drawn(seed: int) -> dict[str, Any]:
@@ -92,13 +98,13 @@ def _sensor(rng: np.random.Generator, part: str) -> dict[str, Any]:
         "non_orthogonality_deg": rng.normal(0, 0.2, 3).tolist(),
         "offset_mm": rng.uniform(-20, 20, 3).tolist(),
         "start_temperature_c": 22 - float(rng.uniform(0, 0.3)),
-        "bias_rad_s_per_k": rng.normal(0, errors["per_k"], 3).tolist(),
-        "scale_per_k": rng.normal(0, 3e-4, 3).tolist(),
+        "bias_rad_s_per_k": rng.normal(0, errors["bias_per_k"], 3).tolist(),
+        "scale_per_k": rng.normal(0, errors["scale_per_k"], 3).tolist(),
         "g_sensitivity_rad_s_per_g": rng.normal(0, errors["g_rad_s"], (3, 3)).tolist(),
         "bias_instability_rad_s": errors["flicker_rad_s"] * float(rng.uniform(0.5, 1.5)),
         "bias_random_walk_rad_s_per_sqrt_s": errors["walk"] * float(rng.uniform(0.5, 3)),
-        "nonlinearity_odd_per_rad_s": float(rng.normal(0, 2.3e-4)),
-        "nonlinearity_even_per_rad_s": float(rng.normal(0, 5e-5)),
+        "nonlinearity_odd_per_rad_s": float(rng.normal(0, errors["odd"])),
+        "nonlinearity_even_per_rad_s": float(rng.normal(0, errors["even"])),
     }
 
 

@@ -1,0 +1,47 @@
+"""How far the mean of residuals scatters that are not white: neighbours alike average out worse, vibration better."""
+
+import numpy as np
+
+from rig.estimation.arrays import Array
+
+LAGS = 20
+WHITE = 45.3  # χ² of 20 degrees of freedom at 0.999
+MEMORY = 32  # residuals that tell something of the next: a whole wave of 7 Hz at 238 readings a second
+SAMPLES_EACH = 12  # are needed to find one coefficient
+
+
+def widening(residuals: Array) -> float:
+    """Factor ≥ 1 on the variance of a mean of these residuals (n,): 1 for white noise, 1 + 2 Σ ρ for coloured noise.
+
+    The lag correlations ρ count only if they are significant together (Box–Pierce), so that white noise is left alone.
+    """
+    rho = _correlations(residuals)
+    return 1.0 if rho is None else max(1.0, 1 + 2 * float(rho.sum()))
+
+
+def noise_left(residuals: Array) -> float:
+    """The same factor by an autoregressive model, smaller than 1 where most of the residuals is a vibration.
+
+    A mean over many periods has nearly nothing left of one, whatever its correlations add up to. What is left of the
+    mean is the spectrum at zero: of an autoregression with coefficients a and innovations e, var(e) / (1 − Σ a)².
+    """
+    if _correlations(residuals) is None:
+        return 1.0
+    centred = residuals - residuals.mean()
+    memory = max(1, min(MEMORY, len(centred) // SAMPLES_EACH))
+    before, now = np.lib.stride_tricks.sliding_window_view(centred[:-1], memory), centred[memory:]
+    coefficients, *_ = np.linalg.lstsq(before, now, rcond=None)
+    innovations = now - before @ coefficients
+    variance = float(innovations @ innovations) / (len(now) - memory)
+    return variance / (1 - float(coefficients.sum())) ** 2 / float(np.mean(centred**2))
+
+
+def _correlations(residuals: Array) -> Array | None:
+    """(LAGS,) lag correlations; None where they are those of white noise, or the residuals are too few to say."""
+    count = len(residuals)
+    centred = residuals - residuals.mean()
+    power = float(centred @ centred)
+    if count <= 2 * LAGS or power == 0:
+        return None
+    rho: Array = np.array([centred[lag:] @ centred[:-lag] for lag in range(1, LAGS + 1)]) / power
+    return rho if count * float(rho @ rho) > WHITE else None
