@@ -6,7 +6,7 @@ from rig.estimation.arrays import Array
 
 LAGS = 20
 WHITE = 45.3  # χ² of 20 degrees of freedom at 0.999
-MEMORY = 32  # residuals that tell something of the next: a whole wave of 7 Hz at 238 readings a second
+MEMORIES = (1, 2, 4, 8, 16, 32)  # residuals that tell something of the next; 32: a whole wave of 7 Hz at 238 a second
 SAMPLES_EACH = 12  # are needed to find one coefficient
 
 
@@ -23,17 +23,26 @@ def noise_left(residuals: Array) -> float:
     """The same factor by an autoregressive model, smaller than 1 where most of the residuals is a vibration.
 
     A mean over many periods has nearly nothing left of one, whatever its correlations add up to. What is left of the
-    mean is the spectrum at zero: of an autoregression with coefficients a and innovations e, var(e) / (1 − Σ a)².
+    mean is the spectrum at zero: of an autoregression with coefficients a and innovations e, var(e) / (1 − Σ a)². Its
+    memory is the one that Akaike's criterion asks for.
     """
     if _correlations(residuals) is None:
         return 1.0
     centred = residuals - residuals.mean()
-    memory = max(1, min(MEMORY, len(centred) // SAMPLES_EACH))
-    before, now = np.lib.stride_tricks.sliding_window_view(centred[:-1], memory), centred[memory:]
+    memories = [memory for memory in MEMORIES if memory * SAMPLES_EACH <= len(centred)]
+    _, spectrum_at_zero = min(_autoregression(centred, memory, memories[-1]) for memory in memories)
+    return spectrum_at_zero / float(np.mean(centred**2))
+
+
+def _autoregression(centred: Array, memory: int, longest: int) -> tuple[float, float]:
+    """Akaike's criterion and the spectrum at zero, by as many residuals as with the `longest` memory."""
+    before = np.lib.stride_tricks.sliding_window_view(centred[longest - memory : -1], memory)
+    now = centred[longest:]
     coefficients, *_ = np.linalg.lstsq(before, now, rcond=None)
     innovations = now - before @ coefficients
-    variance = float(innovations @ innovations) / (len(now) - memory)
-    return variance / (1 - float(coefficients.sum())) ** 2 / float(np.mean(centred**2))
+    power = float(innovations @ innovations)
+    criterion = len(now) * float(np.log(power / len(now))) + 2 * memory
+    return criterion, power / (len(now) - memory) / (1 - float(coefficients.sum())) ** 2
 
 
 def _correlations(residuals: Array) -> Array | None:

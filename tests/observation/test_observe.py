@@ -14,7 +14,7 @@ from rig.data.run_file import RunData
 from rig.data.settings import ObservationThresholds
 from rig.errors import Fault, Refused
 from rig.estimation.arrays import Array
-from rig.observation.colour import widening
+from rig.observation.colour import noise_left, widening
 from rig.observation.observe import SensorObservations
 from rig.observation.observed_run import observe_run
 from rig.observation.timebase import ArmMotion, TimeBase, estimate_time_base
@@ -188,6 +188,18 @@ def test_coloured_noise_widens_the_uncertainty() -> None:
     usual = look(USUAL).revolutions[0].average.variance_rad2_s2
     wide = look(synthetic_run(Setup(noise_correlation=0.6))).revolutions[0].average.variance_rad2_s2
     np.testing.assert_allclose(wide / usual, 4.0, rtol=0.4)
+
+
+def test_of_a_vibration_hardly_anything_is_left_in_a_mean() -> None:
+    """Its correlations do not say so: added up to any lag they are large."""
+    rng = np.random.default_rng(5)
+    time_s = np.arange(1428) / 238
+    for wave_hz, noise in ((14.0, 0.4), (9.0, 0.2), (25.0, 1.0)):
+        waves = np.sqrt(2) * np.sin(2 * np.pi * wave_hz * time_s + rng.uniform(0, 2 * np.pi, (60, 1)))
+        draws = waves + noise * rng.normal(size=(60, len(time_s)))
+        stated = np.mean([noise_left(draw) * np.var(draw) / len(draw) for draw in draws])
+        assert stated == pytest.approx(noise**2 / len(time_s), rel=0.6), wave_hz
+        assert np.mean([widening(draw) * np.var(draw) / len(draw) for draw in draws]) > 3 * stated
 
 
 def test_rests_show_the_reading_at_zero_rate() -> None:
