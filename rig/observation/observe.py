@@ -169,7 +169,10 @@ def _observation(
     *,
     as_before: bool,
 ) -> Observation:
-    """`as_before`: takes for noise what the sensor feels of gravity, once up and down, and all that vibrates."""
+    """Nothing is left in a mean of what comes once or twice in a turn: gravity, and the encoder's own error.
+
+    `as_before`: takes these for noise, and all that vibrates.
+    """
     where = describe(sweep)
     inside = between(stream, turn.start_s, turn.end_s)
     lost = _lost(stream, inside, where, settings)
@@ -181,7 +184,7 @@ def _observation(
     passing = [motion.rate(stream.time_s[inside]) @ turn.axis_flange - turn.speed_rad_s]
     if not as_before:
         turned_rad = turn.speed_rad_s * (stream.time_s[inside] - turn.start_s)
-        passing += [np.cos(turned_rad), np.sin(turned_rad)]
+        passing += [wave(times * turned_rad) for times in (1, 2) for wave in (np.cos, np.sin)]
     window = Window(turn.start_s, turn.end_s)
     coloured = widening if as_before else noise_left
     averaged = _placed(average(stream, inside, window, np.column_stack(passing), covered, coloured=coloured), motion)

@@ -38,7 +38,9 @@ def drawn(seed: int) -> dict[str, Any]:
     document = ideal_document(CONFIGS / "lsm9ds1_adis16465.yaml")
     for name in ("role", "turntable"):
         document["sensors"]["reference"].pop(name)
+    site = {"latitude_deg": float(rng.uniform(30, 60)), "heading_deg": float(rng.uniform(0, 360))}
     changes: dict[str, Any] = {
+        "site": site,
         "procedure": {"verify": False},
         "limits": {
             "scale_std": 1,
@@ -49,8 +51,7 @@ def drawn(seed: int) -> dict[str, Any]:
         "world": {
             "seed": seed,
             "site": {
-                "latitude_deg": float(rng.uniform(30, 60)),
-                "heading_deg": float(rng.uniform(0, 360)),
+                **site,
                 "base_tilt_deg": rng.normal(0, 0.15, 2).tolist(),
                 "gravity_m_s2": float(rng.uniform(9.79, 9.82)),
             },
