@@ -13,10 +13,10 @@ from support.drawn_laboratory import SPEED_RAD_S, drawn
 from support.single_effects import Effect, bound, with_effect
 from support.whole_runs import WholeRun, whole_run
 
-SEEDS, FEW = range(1, 21), range(1, 2)
+SEEDS = range(1, 21)
 SENSORS = ("gyro", "reference")
 
-pytestmark = [pytest.mark.slow, pytest.mark.proof, pytest.mark.timeout(2400)]
+pytestmark = [pytest.mark.slow, pytest.mark.proof, pytest.mark.thorough, pytest.mark.timeout(2400)]
 
 
 def runs(make: Callable[[int], dict[str, object]], seeds: range, folder: Path) -> list[WholeRun]:
@@ -36,19 +36,17 @@ def error_over_std(run: WholeRun, sensor: str) -> np.ndarray:
     )
 
 
-def test_the_stated_uncertainty_holds_in_imperfect_laboratories(tmp_path: Path, thorough: bool) -> None:
-    finished = runs(drawn, SEEDS if thorough else FEW, tmp_path)
+def test_the_stated_uncertainty_holds_in_imperfect_laboratories(tmp_path: Path) -> None:
+    """The short version of this is test_truth.py: the demonstration, which is as imperfect, with few seeds."""
+    finished = runs(drawn, SEEDS, tmp_path)
     errors = {name: np.swapaxes([error_over_std(run, name) for run in finished], 0, 1) for name in SENSORS}
     for name, (stated, plain) in errors.items():
         print(f"{name}: {described(stated)}; without the remedies {described(plain)}")
         print(np.round(stated, 1))
     for stated, plain in errors.values():
-        assert np.abs(stated).max() < 4  # 2 U
-        if thorough:
-            assert holds(stated) and not holds(plain)
+        assert holds(stated) and not holds(plain)
 
 
-@pytest.mark.thorough
 @pytest.mark.parametrize("effect", Effect)
 def test_of_a_single_effect_no_more_is_stated_than_it_leaves_undeterminable(tmp_path: Path, effect: Effect) -> None:
     finished = runs(partial(with_effect, effect), range(1, 9), tmp_path)
