@@ -2,6 +2,7 @@
 
 from collections.abc import Callable
 from concurrent.futures import ThreadPoolExecutor
+from dataclasses import replace
 from functools import partial
 from pathlib import Path
 
@@ -27,7 +28,10 @@ def runs(make: Callable[[int], dict[str, object]], seeds: range, folder: Path) -
 def error_over_std(run: WholeRun, sensor: str) -> np.ndarray:
     """(2, 6): with what the run states, and of the vector model of sweeps alone with noise for its only uncertainty."""
     true = run.truth(sensor, SPEED_RAD_S)
-    plain = solve_vector(run.observed.sensors[sensor].revolutions, ())
+    turns = run.observed.sensors[sensor].revolutions
+    averages = [turn.average for turn in turns]
+    noise = [replace(each, variance_rad2_s2=each.variance_rad2_s2 - each.drift_rad2_s2) for each in averages]
+    plain = solve_vector([replace(turn, average=each) for turn, each in zip(turns, noise, strict=True)], ())
     return np.array(
         [
             (run.stated(sensor) - true) / run.stated_std(sensor),
