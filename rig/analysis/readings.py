@@ -11,6 +11,7 @@ from numpy.typing import NDArray
 
 from rig.analysis.pieces import Window
 from rig.estimation.arrays import Array
+from rig.observation.colour import predicted
 
 Statistics = dict[str, tuple[float, float]]
 
@@ -60,10 +61,8 @@ def _innovation(readings: Array) -> float:
     """Standard deviation of the error of the best linear prediction from the `MEMORY` readings before."""
     if len(readings) < 4 * MEMORY:
         return float(np.std(np.diff(readings)) / np.sqrt(2)) if len(readings) > 1 else 0.0
-    before = np.lib.stride_tricks.sliding_window_view(readings[:-1], MEMORY)
-    now = readings[MEMORY:]
-    error = now - before @ np.linalg.lstsq(before, now, rcond=None)[0]
-    return float(1.4826 * np.median(np.abs(error)))
+    _, innovations = predicted(readings, MEMORY)
+    return float(1.4826 * np.median(np.abs(innovations)))
 
 
 def _constant_bits(counts: NDArray[np.int64]) -> int:

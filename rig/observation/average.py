@@ -1,6 +1,5 @@
 """A sensor's samples on the controller's clock, and their averages with the variance of the mean."""
 
-from collections.abc import Callable
 from dataclasses import dataclass
 from typing import Any
 
@@ -9,6 +8,7 @@ from numpy.typing import NDArray
 
 from rig.data.run_file import RecordedSensor
 from rig.estimation.arrays import Array
+from rig.observation.colour import noise_left, widening
 from rig.observation.timebase import ArmMotion, TimeBase, estimate_time_base
 from rig.observation.windows import Window
 
@@ -81,15 +81,15 @@ def average(
     passing: Array,
     covered: NDArray[np.bool_],
     *,
-    coloured: Callable[[Array], float],
+    as_before: bool,
 ) -> Average:
     """Mean and its variance. `passing` (n, k) comes and goes in the window and is zero in its mean, such as the arm's
     rate less its mean 2π/T; the arm tells where it is known, `covered` (n,).
 
     A straight line of reading against what passes says what is read without it: few samples do not meet a vibration
-    evenly. The noise is what is left of that line, and never below the rounding to counts; `coloured` says by which
-    factor the variance of the mean differs from that of as many white residuals. What rounding leaves in a mean however
-    many samples there are is added.
+    evenly. The noise is what is left of that line, and never below the rounding to counts; the variance of the mean
+    allows for residuals that are not white, `as_before` by what their correlations add up to. What rounding leaves in a
+    mean however many samples there are is added.
     """
     m = stream.readings_rad_s[inside]
     columns, known = np.column_stack([np.ones(int(covered.sum())), passing[covered]]), m[covered]
@@ -98,6 +98,7 @@ def average(
     scatter = np.sum(residual**2, axis=0) / (len(known) - rank)
     count = stream.sensor.sensitivity_rad_s_per_count
     variance = np.maximum(scatter, count**2 / 12)
+    coloured = widening if as_before else noise_left
     factor = np.array([coloured(residual[:, axis]) for axis in range(3)])
     temperature = stream.raw["temperature_counts"][inside].mean() * stream.sensor.temperature_c_per_count
     of_the_mean = np.linalg.pinv(columns.T @ columns, hermitian=True)[0, 0]  # 1/n where the excess averages out

@@ -36,13 +36,20 @@ def noise_left(residuals: Array) -> float:
 
 def _autoregression(centred: Array, memory: int, longest: int) -> tuple[float, float]:
     """Akaike's criterion and the spectrum at zero, by as many residuals as with the `longest` memory."""
-    before = np.lib.stride_tricks.sliding_window_view(centred[longest - memory : -1], memory)
-    now = centred[longest:]
-    coefficients, *_ = np.linalg.lstsq(before, now, rcond=None)
-    innovations = now - before @ coefficients
-    power = float(innovations @ innovations)
-    criterion = len(now) * float(np.log(power / len(now))) + 2 * memory
-    return criterion, power / (len(now) - memory) / (1 - float(coefficients.sum())) ** 2
+    coefficients, innovations = predicted(centred[longest - memory :], memory)
+    count, power = len(innovations), float(innovations @ innovations)
+    criterion = count * float(np.log(power / count)) + 2 * memory
+    return criterion, power / (count - memory) / (1 - float(coefficients.sum())) ** 2
+
+
+def predicted(residuals: Array, memory: int) -> tuple[Array, Array]:
+    """The best linear prediction of each of the residuals (n,) from the `memory` before it.
+
+    Its coefficients (memory,), and its errors (n - memory,), which are called innovations.
+    """
+    before, now = np.lib.stride_tricks.sliding_window_view(residuals[:-1], memory), residuals[memory:]
+    coefficients = np.asarray(np.linalg.lstsq(before, now, rcond=None)[0], dtype=np.float64)
+    return coefficients, now - before @ coefficients
 
 
 def _correlations(residuals: Array) -> Array | None:

@@ -7,7 +7,7 @@ once the arm's measured rate is taken out of them. The mean comes first; squarin
 Nothing doubtful is averaged: whatever does not belong into a calibration raises a Fault with a name of its own.
 """
 
-from collections.abc import Callable, Collection, Sequence
+from collections.abc import Collection, Sequence
 from contextlib import suppress
 from dataclasses import dataclass, replace
 
@@ -21,7 +21,6 @@ from rig.errors import Fault
 from rig.estimation.arrays import Array
 from rig.estimation.refusals import check_reading_ratio
 from rig.observation.average import Average, Stream, average, between, on_the_arms_clock
-from rig.observation.colour import noise_left, widening
 from rig.observation.revolution import Revolution, arm_states_lost, describe, find_revolution
 from rig.observation.timebase import ArmMotion, TimeBase
 from rig.observation.windows import Finished, Window, finished_sweeps, rested, swept
@@ -84,8 +83,7 @@ def observe_sensor(
         for finished in swept(run)
         if finished.sweep.index not in superseded
     ]
-    coloured = widening if _as_before(run) else noise_left
-    rests = tuple(rest for window in rested(run) if (rest := _rest(stream, motion, window, coloured)))
+    rests = tuple(rest for window in rested(run) if (rest := _rest(stream, motion, window, as_before=_as_before(run))))
     drift = bias_drift(rests)
     return SensorObservations(
         stream.clock,
@@ -186,8 +184,7 @@ def _observation(
         turned_rad = turn.speed_rad_s * (stream.time_s[inside] - turn.start_s)
         passing += [wave(times * turned_rad) for times in (1, 2) for wave in (np.cos, np.sin)]
     window = Window(turn.start_s, turn.end_s)
-    coloured = widening if as_before else noise_left
-    averaged = _placed(average(stream, inside, window, np.column_stack(passing), covered, coloured=coloured), motion)
+    averaged = _placed(average(stream, inside, window, np.column_stack(passing), covered, as_before=as_before), motion)
     expected = np.array(stream.sensor.mounting) @ turn.axis_flange
     turned = averaged.mean_rad_s - stream.clock.zero_rate_rad_s
     _check_direction(turned, expected, where, settings)
@@ -209,7 +206,7 @@ def _observation(
     )
 
 
-def _rest(stream: Stream, motion: ArmMotion, window: Window, coloured: Callable[[Array], float]) -> Average | None:
+def _rest(stream: Stream, motion: ArmMotion, window: Window, *, as_before: bool) -> Average | None:
     """The mean reading of a rest; None where the arm did not stand still or the rest is too short to say anything."""
     start, end = window.start_s + REST_SETTLING_S, window.end_s - REST_SETTLING_S
     inside = between(stream, start, end)
@@ -220,7 +217,7 @@ def _rest(stream: Stream, motion: ArmMotion, window: Window, coloured: Callable[
         return None
     count = inside.stop - inside.start
     steady, known = np.zeros((count, 1)), np.ones(count, dtype=np.bool_)
-    return _placed(average(stream, inside, Window(start, end), steady, known, coloured=coloured), motion)
+    return _placed(average(stream, inside, Window(start, end), steady, known, as_before=as_before), motion)
 
 
 def _lost(stream: Stream, inside: slice, where: str, settings: ObservationThresholds) -> int:

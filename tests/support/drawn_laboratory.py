@@ -9,8 +9,8 @@ import yaml
 
 from firmware_host.emulator.gyroscope import readings
 from rig.config.load import parse
-from rig.config.world_models import WorldSection
 from rig.world.board.sensor_truth import SensorTruth
+from rig.world.section import world_section
 from support.ideal import ideal_document
 from support.paths import CONFIGS
 from support.worlds import merge
@@ -118,7 +118,7 @@ def truth(
     the words which are read.
     """
     loaded = parse(yaml.safe_dump(dict(document)))
-    world = WorldSection.model_validate(document["world"])
+    world = world_section(loaded)
     sensor = SensorTruth(loaded.config.sensors[name], world.sensors[name])
     quiet = replace(sensor.gyro, noise_rad_s=0.0, g_sensitivity_rad_s_per_g=(), non_orthogonality_rad=(0.0, 0.0, 0.0))
     seed = np.random.SeedSequence([world.seed, sorted(world.sensors).index(name)])

@@ -1,8 +1,6 @@
 """Runs of `rig run` with a configuration of their own, and what they stated."""
 
 import json
-import subprocess
-import sys
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
@@ -13,6 +11,7 @@ import yaml
 from rig.analysis.calibration import observe_recordings
 from rig.data.run_file import read_run
 from rig.observation.observed_run import ObservedRun
+from support.commands import rig
 from support.drawn_laboratory import truth
 from support.worlds import fresh_host
 
@@ -49,8 +48,7 @@ def whole_run(document: dict[str, Any], folder: Path) -> WholeRun:
     folder.mkdir()
     config, out = folder / "config.yaml", folder / "run"
     config.write_text(yaml.safe_dump(document), encoding="utf-8")
-    command = [sys.executable, "-m", "rig", "run", str(config), "--out", str(out)]
-    done = subprocess.run(command, capture_output=True, text=True, timeout=300, check=False)
+    done = rig("run", config, "--out", out)
     assert done.returncode == 0, done.stderr + done.stdout
     (observed,) = observe_recordings([read_run(out / "run.h5")])
     return WholeRun(document, observed, json.loads((out / "result.json").read_text(encoding="utf-8")))

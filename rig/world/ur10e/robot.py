@@ -11,7 +11,6 @@ from rig.world.ur10e.joint_motion import Motion
 from rig.world.ur10e.links import NOMINAL, Links
 from rig.world.ur10e.modes import SAFETY_BITS, RobotMode, RuntimeState, SafetyMode
 from rig.world.ur10e.tcp_motion import TcpMotion, tcp_motion
-from rig.world.ur10e.trajectory import Joints
 
 JOINT_LIMIT_RAD = 6.2831853072 + 1e-6  # every joint ±360°
 PROGRAM_STOP_RAD_S2 = 4.0
@@ -58,7 +57,6 @@ class Robot:
     ) -> None:
         self.identity = identity
         self.links = links  # as it knows them
-        self._tcp_motions: dict[str, tuple[tuple[Joints, Joints, Joints], TcpMotion]] = {}
         self.motion = motion
         self.remote_control = remote_control
         self.tick = 0
@@ -258,21 +256,13 @@ class Robot:
     def tcp_motion(self) -> TcpMotion:
         """How the tool centre point moves by the encoders."""
         motion = self.motion
-        return self._reckoned("actual", motion.q_rad, motion.qd_rad_s, motion.qdd_rad_s2)
+        return tcp_motion(motion.q_rad, motion.qd_rad_s, motion.qdd_rad_s2, self.links)
 
     @property
     def target_tcp_motion(self) -> TcpMotion:
         """How it is meant to move."""
         now = self.motion.now
-        return self._reckoned("target", now.target_q_rad, now.target_qd_rad_s, now.target_qdd_rad_s2)
-
-    def _reckoned(self, which: str, q_rad: Joints, qd_rad_s: Joints, qdd_rad_s2: Joints) -> TcpMotion:
-        """Once for all who ask while the joints are the same."""
-        joints = q_rad, qd_rad_s, qdd_rad_s2
-        before = self._tcp_motions.get(which)
-        if before is None or before[0] != joints:
-            before = self._tcp_motions[which] = joints, tcp_motion(q_rad, qd_rad_s, qdd_rad_s2, self.links)
-        return before[1]
+        return tcp_motion(now.target_q_rad, now.target_qd_rad_s, now.target_qdd_rad_s2, self.links)
 
     @property
     def steady(self) -> bool:

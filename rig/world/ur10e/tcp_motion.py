@@ -5,6 +5,7 @@ With its own links, on a base that it takes to stand upright and still. Linear p
 
 from collections.abc import Sequence
 from dataclasses import dataclass
+from functools import lru_cache
 
 from rig.world.site import Site
 from rig.world.ur10e.flange_motion import felt
@@ -26,6 +27,7 @@ class TcpMotion:
     accelerometer: Vector
 
 
+@lru_cache(maxsize=4)  # several outputs and several clients ask for the same
 def tcp_motion(q_rad: Joints, qd_rad_s: Joints, qdd_rad_s2: Joints, links: Links) -> TcpMotion:
     """Of joints with these angles, speeds and accelerations."""
     _, change, force = felt(q_rad, qd_rad_s, qdd_rad_s2, links, UPRIGHT)
