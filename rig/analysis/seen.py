@@ -2,6 +2,7 @@
 
 from collections.abc import Sequence
 from datetime import datetime
+from itertools import pairwise
 
 import numpy as np
 
@@ -54,12 +55,18 @@ def _axis_errors(turns: Sequence[Observation], rests: int, axis_deg: float) -> A
 
 
 def _since_s(recordings: Sequence[ObservedRun]) -> list[float]:
-    """What takes the controller's times of each recording to the clock of the first: it may have been switched off."""
+    """What takes the controller's times of each recording to the clock of the first: it may have been switched off.
+
+    No recording begins before the last one has ended, whatever the computer's clock says: it may have been set, and an
+    accelerated laboratory's time passes faster.
+    """
     first = recordings[0]
-    return [
-        (_started(each) - _started(first)).total_seconds() + float(first.motion.time_s[0] - each.motion.time_s[0])
-        for each in recordings
-    ]
+    since_s = [0.0]
+    for last, each in pairwise(recordings):
+        by_the_computer = (_started(each) - _started(first)).total_seconds() + float(first.motion.time_s[0])
+        ended = float(last.motion.time_s[-1]) + since_s[-1]
+        since_s.append(max(by_the_computer, ended) - float(each.motion.time_s[0]))
+    return since_s
 
 
 def _started(recording: ObservedRun) -> datetime:
