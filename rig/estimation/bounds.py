@@ -10,7 +10,7 @@ from numpy.typing import ArrayLike
 from rig.estimation.arrays import Array
 from rig.estimation.levenberg_marquardt import squared_rate_jacobian, squared_rate_variance
 from rig.estimation.reference_model import covariance_bound
-from rig.estimation.vector_model import parameter_jacobian
+from rig.estimation.sensor_axes import parameter_jacobian
 
 
 def six_observation_bound(scale: ArrayLike, rates_rad_s: ArrayLike, variances_rad2_s2: ArrayLike) -> Array:

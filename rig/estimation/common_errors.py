@@ -16,12 +16,12 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from rig.estimation.arrays import Array
+from rig.estimation.sensor_axes import angle_jacobian, parameter_jacobian
 from rig.estimation.vector_model import (
     VectorSolution,
-    angle_jacobian,
     design_matrix,
     of_the_speed,
-    parameter_jacobian,
+    places,
     regress,
     solve_vector_model,
 )
@@ -112,18 +112,17 @@ def _known_to(solution: VectorSolution, whole: Array, left: Array, noise: Array,
     of_speed = np.einsum("ipjn,nj->ipn", whole, speed_noise).reshape(3 * columns, -1)
     raw = np.einsum("ipjn,jnm,kqjm->ipkq", whole, noise, whole).reshape(3 * columns, 3 * columns)
     raw += of_speed @ of_speed.T
-    order = np.array([i * columns + j for i in range(3) for j in range(3)] + [i * columns + 3 for i in range(3)])
-    sensed = np.array([i * columns + j for i in range(3) for j in range(4, columns)], dtype=np.intp)
-    matrix_covariance = raw[np.ix_(order, order)]
+    of_matrix, of_gravity = places(columns)
+    matrix_covariance = raw[of_matrix[:, None], of_matrix]
     to_parameters = parameter_jacobian(solution.matrix, solution.scale)
-    to_angles = angle_jacobian(solution.scale[:, None] * solution.matrix, solution.scale)
+    to_angles = angle_jacobian(solution.scale[:, None] * solution.matrix, solution.scale, solution.mounting)
     of_errors = to_angles @ left[:, :3].reshape(9, -1)
-    response = np.einsum("qr,rin->qni", to_parameters, whole.reshape(3 * columns, 3, -1)[order])
+    response = np.einsum("qr,rin->qni", to_parameters, whole.reshape(3 * columns, 3, -1)[of_matrix])
     return replace(
         solution,
         covariance=to_parameters @ matrix_covariance @ to_parameters.T,
         matrix_covariance=matrix_covariance,
         angles_covariance_rad2=to_angles @ matrix_covariance[:9, :9] @ to_angles.T + of_errors @ of_errors.T,
-        g_sensitivity_covariance=raw[np.ix_(sensed, sensed)] if columns > 4 else None,
+        g_sensitivity_covariance=raw[of_gravity[:, None], of_gravity] if columns > 4 else None,
         response=response,
     )

@@ -98,10 +98,9 @@ def check_revolutions(means: Array, speeds_rad_s: Array, variances: Array, speed
 
 def check_duplicates(means: Array) -> None:
     """Raises Fault `duplicated_observation` where two mean readings of (N, 3) agree to the last bit."""
-    unique, first = np.unique(means, axis=0, return_index=True)
-    if len(unique) < len(means):
-        again = int(np.setdiff1d(np.arange(len(means)), first)[0])
-        earlier = int(np.flatnonzero((means == means[again]).all(axis=1))[0])
+    same = (means[:, None] == means[None, :]).all(axis=-1)
+    if same.sum() > len(means):
+        earlier, again = np.argwhere(np.triu(same, 1))[0].tolist()
         raise Fault(
             "duplicated_observation",
             f"observations {earlier} and {again} hold the same readings",

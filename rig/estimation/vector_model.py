@@ -12,10 +12,11 @@ The equations are linear in F, c and G, one weighted regression for each axis: e
 """
 
 from dataclasses import dataclass
+from functools import cache
 from typing import Literal
 
 import numpy as np
-from numpy.typing import ArrayLike
+from numpy.typing import ArrayLike, NDArray
 
 from rig.estimation.arrays import Array
 from rig.estimation.refusals import (
@@ -31,6 +32,7 @@ from rig.estimation.refusals import (
     inconsistency,
     require_shape,
 )
+from rig.estimation.sensor_axes import angle_jacobian, nearest_rotation, non_orthogonality, parameter_jacobian
 
 MODEL = "m = F ω − b, k_i = 1/‖F_i‖"
 MATRIX_PARAMETERS = (*(f"f{i}{j}" for i in "xyz" for j in "xyz"), "cx", "cy", "cz")
@@ -118,9 +120,10 @@ def solve_vector_model(
     moving = rates.any(axis=1)
     check_signal(means[moving])
     check_duplicates(means[moving])
-    told = conditioning(design / _unit(design), columns)
+    scaled = design / _unit(design)
+    told = conditioning(scaled, columns)
     check_conditioning(told, columns, MAX_CONDITION, "axis, bias or g-sensitivity", REMEDY)
-    found = conditioning(design[:, :4] / _unit(design)[:4], 4) if columns > 4 else told
+    found = conditioning(scaled[:, :4], 4) if columns > 4 else told
 
     speed_noise = np.zeros_like(means)
     shared = None if shared_covariance_rad2_s2 is None else np.asarray(shared_covariance_rad2_s2, dtype=np.float64)
@@ -136,11 +139,11 @@ def solve_vector_model(
     check_unit(scale)
     axes = scale[:, None] * matrix
     check_axes(axes, None if nominal_mounting is None else np.asarray(nominal_mounting, dtype=np.float64))
-    order = np.array([i * columns + j for i in range(3) for j in range(3)] + [i * columns + 3 for i in range(3)])
-    matrix_covariance = raw[np.ix_(order, order)]
+    of_matrix, of_gravity = places(columns)
+    matrix_covariance = raw[of_matrix[:, None], of_matrix]
     to_parameters = parameter_jacobian(matrix, scale)
-    to_angles = angle_jacobian(axes, scale)
-    sensed = np.array([i * columns + j for i in range(3) for j in range(4, columns)], dtype=np.intp)
+    mounting = nearest_rotation(axes)
+    to_angles = angle_jacobian(axes, scale, mounting)
     residuals = means - design @ coefficients
     return VectorSolution(
         scale=scale,
@@ -149,10 +152,10 @@ def solve_vector_model(
         matrix=matrix,
         matrix_covariance=matrix_covariance,
         non_orthogonality_rad=non_orthogonality(axes),
-        mounting=nearest_rotation(axes),
+        mounting=mounting,
         angles_covariance_rad2=to_angles @ matrix_covariance[:9, :9] @ to_angles.T,
         g_sensitivity=coefficients[4:].T if columns > 4 else None,
-        g_sensitivity_covariance=raw[np.ix_(sensed, sensed)] if columns > 4 else None,
+        g_sensitivity_covariance=raw[of_gravity[:, None], of_gravity] if columns > 4 else None,
         response=_response(to_parameters, inverse),
         residuals_rad_s=residuals,
         observations=count,
@@ -174,19 +177,6 @@ def solve_vector_batch(means_rad_s: ArrayLike, rates_rad_s: ArrayLike, variances
     return VectorBatch(1 / np.linalg.norm(matrix, axis=-1), -coefficients[..., 3, :], matrix)
 
 
-def non_orthogonality(axes: Array) -> Array:
-    """(3,) rad by which the angles between y and z, z and x, x and y fall short of 90°, from unit rows (3, 3)."""
-    angles: Array = np.arcsin(np.clip([axes[1] @ axes[2], axes[2] @ axes[0], axes[0] @ axes[1]], -1, 1))
-    return angles
-
-
-def nearest_rotation(axes: Array) -> Array:
-    """The rotation (3, 3) nearest to three axes (rows) in the sum of squares: the orthogonal factor of axes = S R."""
-    left, _, right = np.linalg.svd(axes)
-    rotation: Array = left @ right
-    return rotation
-
-
 def design_matrix(rates: Array, gravity: Array | None) -> Array:
     """Z (…, N, 4 or 7) = [ω 1 (a)]."""
     blocks = [rates, np.ones((*rates.shape[:-1], 1))]
@@ -198,9 +188,10 @@ def design_matrix(rates: Array, gravity: Array | None) -> Array:
 
 def _unit(design: Array) -> Array:
     """(p,) the size of each block of columns, so that rate, one and gravity compare while a missing axis shows."""
-    speed = np.sqrt(np.mean(np.sum(design[:, :3] ** 2, axis=1))) or 1.0
-    gravity = np.sqrt(np.mean(np.sum(design[:, 4:] ** 2, axis=1))) or 1.0
-    return np.concatenate([np.full(3, speed), [1.0], np.full(design.shape[1] - 4, gravity)])
+    unit = np.ones(design.shape[1])
+    for block in (slice(0, 3), slice(4, None)):
+        unit[block] = float(np.linalg.norm(design[:, block])) / len(design) ** 0.5 or 1.0
+    return unit
 
 
 def regress(design: Array, means: Array, variances: Array, shared: Array | None = None) -> tuple[Array, Array]:
@@ -227,13 +218,23 @@ def of_the_speed(rates: Array, speed_std: Array, matrix: Array) -> Array:
 
 def _raw_covariance(inverse: Array, variances: Array, speed_noise: Array, shared: Array | None) -> Array:
     """(3 p, 3 p) covariance of the coefficients, axis by axis; a wrong speed moves all three axes at once."""
-    columns = inverse.shape[1]
-    covariance = np.einsum("in,jn,ipn,jqn->ipjq", speed_noise.T, speed_noise.T, inverse, inverse)
-    for axis in range(3):
-        covariance[axis, :, axis] += (inverse[axis] * variances[:, axis]) @ inverse[axis].T
-        if shared is not None:
-            covariance[axis, :, axis] += inverse[axis] @ shared @ inverse[axis].T
-    return np.asarray(covariance.reshape(3 * columns, 3 * columns), dtype=np.float64)
+    columns, count = inverse.shape[1:]
+    of_speed = (inverse * speed_noise.T[:, None]).reshape(3 * columns, count)
+    covariance = (of_speed @ of_speed.T).reshape(3, columns, 3, columns)
+    noise = inverse * variances.T[:, None]
+    if shared is not None:
+        noise = noise + inverse @ shared
+    each = np.arange(3)
+    covariance[each, :, each] += noise @ np.swapaxes(inverse, -1, -2)
+    raw: Array = covariance.reshape(3 * columns, 3 * columns)
+    return raw
+
+
+@cache
+def places(columns: int) -> tuple[NDArray[np.intp], NDArray[np.intp]]:
+    """Where F, row by row, then c stand among the coefficients axis by axis, (12,), and where G does, row by row."""
+    place = np.arange(3 * columns, dtype=np.intp).reshape(3, columns)
+    return np.concatenate([place[:, :3].ravel(), place[:, 3]]), place[:, 4:].ravel()
 
 
 def _all_variances(variances: Array, speed_noise: Array, shared: Array | None) -> Array:
@@ -248,31 +249,3 @@ def _response(to_parameters: Array, inverse: Array) -> Array:
     of_matrix = np.einsum("qij,ijn->qni", to_parameters[:, :9].reshape(6, 3, 3), inverse[:, :3])
     response: Array = of_matrix + np.einsum("qi,in->qni", to_parameters[:, 9:], inverse[:, 3])
     return response
-
-
-def parameter_jacobian(matrix: Array, scale: Array) -> Array:
-    """(6, 12) derivative of k and b with respect to F (row by row) and c: δk = −k³ F_i·δF_i, δb = −δc."""
-    jacobian = np.zeros((6, 12))
-    for i in range(3):
-        jacobian[i, 3 * i : 3 * i + 3] = -(scale[i] ** 3) * matrix[i]
-    jacobian[3:, 9:] = -np.eye(3)
-    return jacobian
-
-
-def angle_jacobian(axes: Array, scale: Array) -> Array:
-    """(6, 9) derivative of the non-orthogonality and of the mounting's rotation with respect to F, row by row.
-
-    With A = S R and δR = [δθ]× R: (tr S − S) δθ = the axial vector of M − Mᵀ, M = δA Rᵀ.
-    """
-    rotation = nearest_rotation(axes)
-    stretch = axes @ rotation.T
-    change = np.zeros((9, 3, 3))  # of the unit rows, for a unit change of each element of F
-    for i in range(3):
-        change[3 * i : 3 * i + 3, i] = scale[i] * (np.eye(3) - np.outer(axes[i], axes[i]))
-    sines, sine_change = axes @ axes.T, change @ axes.T
-    skew = change @ rotation.T
-    skew = skew - np.swapaxes(skew, -1, -2)
-    pairs, others = [1, 2, 0], [2, 0, 1]
-    of_pairs = sine_change[:, pairs, others] + sine_change[:, others, pairs]
-    axial = np.linalg.solve(np.trace(stretch) * np.eye(3) - stretch, skew[:, others, pairs].T)
-    return np.concatenate([(of_pairs / np.sqrt(1 - sines[pairs, others] ** 2)).T, axial])

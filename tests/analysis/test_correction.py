@@ -4,7 +4,8 @@ import numpy as np
 import pytest
 
 from rig.analysis.correction import diagonal_correction, matrix_correction
-from rig.estimation.vector_model import nearest_rotation, solve_vector_model
+from rig.estimation.sensor_axes import nearest_rotation
+from rig.estimation.vector_model import solve_vector_model
 
 SCALE, BIAS_RAD_S = np.array([1.1771, 1.1554, 1.1440]), np.array([0.0077, -0.0100, -0.0051])
 AXES = np.array([[1.0, 0.02, -0.01], [0.08, 1.0, 0.03], [-0.05, 0.015, 1.0]])

@@ -9,7 +9,8 @@ from rig.config.models import ArmSection
 from rig.config.procedure_sections import SixObservationSection
 from rig.estimation.arrays import Array
 from rig.estimation.common_errors import solve_with_common_errors
-from rig.estimation.vector_model import non_orthogonality, solve_vector_model
+from rig.estimation.sensor_axes import non_orthogonality
+from rig.estimation.vector_model import solve_vector_model
 from rig.plans.six_sweeps import plan_six_observation
 
 AXIS_STD_RAD = 1e-3

@@ -6,7 +6,8 @@ from scipy.spatial.transform import Rotation
 
 from rig.errors import Fault
 from rig.estimation.arrays import Array
-from rig.estimation.vector_model import VectorSolution, non_orthogonality, solve_vector_batch, solve_vector_model
+from rig.estimation.sensor_axes import non_orthogonality
+from rig.estimation.vector_model import VectorSolution, solve_vector_batch, solve_vector_model
 
 SPEED = np.pi / 3
 SWEEPS = SPEED * np.kron(np.eye(3), [[1.0], [-1.0]])
