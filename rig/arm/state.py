@@ -1,7 +1,9 @@
 """What the arm says about itself: one state per controller packet, and the report a look at the arm gives."""
 
-from dataclasses import astuple, dataclass
+from collections.abc import Callable
+from dataclasses import dataclass, fields
 from enum import IntEnum
+from operator import attrgetter
 
 import numpy as np
 
@@ -10,6 +12,7 @@ from rig.arm.kinematics import DenavitHartenberg
 JOINT_NAMES = ("base", "shoulder", "elbow", "wrist_1", "wrist_2", "wrist_3")
 
 Joints = tuple[float, ...]  # six values, base to wrist 3
+Row = tuple[float | int | Joints, ...]
 
 ARM_STATE_DTYPE = np.dtype(
     [
@@ -94,14 +97,17 @@ class ArmState:
     robot_status_bits: int
     safety_status_bits: int
 
-    def to_record(self) -> tuple[float | int | Joints, ...]:
+    def to_record(self) -> Row:
         """The values in the order of `ARM_STATE_DTYPE`: one row for `np.array([...], ARM_STATE_DTYPE)`."""
-        return astuple(self)
+        return _IN_ORDER(self)  # `astuple` copies every value: a tenth of a run's computing
 
     @property
     def at_rest(self) -> bool:
         """Whether no joint moves."""
         return max(map(abs, self.qd_rad_s)) < REST_SPEED_RAD_S
+
+
+_IN_ORDER: Callable[[ArmState], Row] = attrgetter(*(each.name for each in fields(ArmState)))
 
 
 @dataclass(frozen=True, slots=True)
