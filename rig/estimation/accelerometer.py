@@ -42,12 +42,13 @@ def solve_accelerometer(
     down: ArrayLike = (0.0, 0.0, 1.0),
     second_order: bool = False,
     method: Method = "as_published",
+    attitude_std_rad: ArrayLike | None = None,
 ) -> AccelerometerSolution:
     """Calibrate from mean readings (N, 3) with their variances (N, 3) in attitudes R (N, 3, 3), body to table.
 
     `gravity_m_s2` is the known size of g; `down` (3,) says to which side of the table it points, roughly: +z for the
     north-east-down frame of TRIAX, −z for the base frame of a robot on a floor. First order needs 5 attitudes, second
-    order 6 (rank 14 and 17). Raises what `solve_triaxial` raises.
+    order 6 (rank 14 and 17). `attitude_std_rad` (N,) as in `solve_triaxial`. Raises what `solve_triaxial` raises.
     """
     fit = solve_triaxial(
         readings_m_s2,
@@ -56,6 +57,7 @@ def solve_accelerometer(
         KnownNorm(gravity_m_s2, -np.asarray(down, dtype=np.float64)),
         second_order=second_order,
         method=method,
+        attitude_std_rad=attitude_std_rad,
     )
     sign = np.ones(len(fit.covariance))
     sign[9:12] = -1.0

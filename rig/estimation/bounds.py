@@ -9,7 +9,7 @@ from numpy.typing import ArrayLike
 
 from rig.estimation.arrays import Array
 from rig.estimation.levenberg_marquardt import squared_rate_jacobian, squared_rate_variance
-from rig.estimation.reference_model import covariance_bound
+from rig.estimation.reference_model import covariance_bound, whitening
 from rig.estimation.sensor_axes import parameter_jacobian
 
 
@@ -65,7 +65,7 @@ def triaxial_bound(
     theta = np.concatenate(parts).astype(np.float64)
     r, v = np.asarray(attitudes, dtype=np.float64), np.asarray(variances, dtype=np.float64)
     v_bar = np.zeros((len(r), 3)) if known is None else np.asarray(known, dtype=np.float64)
-    return covariance_bound(theta, r, v_bar, v, norm_known=known is None)
+    return covariance_bound(theta, r, v_bar, whitening(v), norm_known=known is None)
 
 
 def efficiency(errors: ArrayLike, bound: Array) -> Array:

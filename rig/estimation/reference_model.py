@@ -7,6 +7,8 @@ wanted: 15 or 18 numbers. The least-squares fit weighted by the readings' varian
 Gauss–Newton finds it from the paper's estimate in a few steps. With v̄ = 0, F and v_ref are known only up to a common
 factor, so there ‖v_ref‖ is held.
 
+How well each reading is known comes as W (…, N, 3, 3) with W V Wᵀ = 1, V its covariance: `whitening`.
+
 All functions broadcast over runs: readings (…, N, 3), θ (…, 15 or 18).
 """
 
@@ -102,17 +104,22 @@ def free_directions(theta: Array, *, norm_known: bool) -> Array:
     return np.delete(free, 9, axis=-1)
 
 
-def weighted_jacobian(theta: Array, attitudes: Array, v_bar: Array, variances: Array, *, norm_known: bool) -> Array:
-    """J (…, 3 N, q), weighted by 1/σ and reduced to the free directions: JᵀJ is the Fisher information."""
+def whitening(variances: Array) -> Array:
+    """W (…, N, 3, 3) of readings whose three errors are independent, with variances (…, N, 3)."""
+    return np.asarray(np.eye(3) / np.sqrt(variances)[..., None], dtype=np.float64)
+
+
+def weighted_jacobian(theta: Array, attitudes: Array, v_bar: Array, white: Array, *, norm_known: bool) -> Array:
+    """W J (…, 3 N, q), reduced to the free directions: (W J)ᵀ W J is the Fisher information."""
     free = free_directions(theta, norm_known=norm_known)
-    rows = jacobian(theta, attitudes, v_bar) / np.sqrt(variances)[..., None]
+    rows = white @ jacobian(theta, attitudes, v_bar)
     reduced: Array = rows.reshape(*rows.shape[:-3], -1, rows.shape[-1]) @ free
     return reduced
 
 
-def covariance_bound(theta: Array, attitudes: Array, v_bar: Array, variances: Array, *, norm_known: bool) -> Array:
+def covariance_bound(theta: Array, attitudes: Array, v_bar: Array, white: Array, *, norm_known: bool) -> Array:
     """(…, p, p) inverse of the Fisher information: the covariance of the maximum-likelihood estimate to first order."""
-    reduced = weighted_jacobian(theta, attitudes, v_bar, variances, norm_known=norm_known)
+    reduced = weighted_jacobian(theta, attitudes, v_bar, white, norm_known=norm_known)
     size = np.linalg.norm(reduced, axis=-2, keepdims=True)
     scaled = reduced / size
     inverse = np.linalg.inv(np.swapaxes(scaled, -1, -2) @ scaled) / (np.swapaxes(size, -1, -2) * size)
@@ -122,7 +129,7 @@ def covariance_bound(theta: Array, attitudes: Array, v_bar: Array, variances: Ar
 
 
 def most_likely(
-    start: Array, readings: Array, attitudes: Array, v_bar: Array, variances: Array, *, norm_known: bool
+    start: Array, readings: Array, attitudes: Array, v_bar: Array, white: Array, *, norm_known: bool
 ) -> tuple[Array, int]:
     """θ (…, p) of least weighted squares by Gauss–Newton from `start`, and the steps it took."""
     theta = start.copy()
@@ -130,8 +137,8 @@ def most_likely(
     steps = 0
     while steps < STEP_LIMIT:
         steps += 1
-        reduced = weighted_jacobian(theta, attitudes, v_bar, variances, norm_known=norm_known)
-        residuals = (readings - predicted(theta, attitudes, v_bar)) / np.sqrt(variances)
+        reduced = weighted_jacobian(theta, attitudes, v_bar, white, norm_known=norm_known)
+        residuals = (white @ (readings - predicted(theta, attitudes, v_bar))[..., None])[..., 0]
         size = np.linalg.norm(reduced, axis=-2)
         scaled = reduced / size[..., None, :]
         right = np.einsum("...rq,...r->...q", scaled, residuals.reshape(*residuals.shape[:-2], -1))
@@ -142,7 +149,7 @@ def most_likely(
             reference = theta[..., REFERENCE]
             theta[..., REFERENCE] = reference * (norm / np.linalg.norm(reference, axis=-1, keepdims=True))
         # In standard deviations of a reading; beyond rounding, which small variances make large in this unit.
-        rounding = 1e-13 * np.linalg.norm(readings / np.sqrt(variances))
+        rounding = 1e-13 * np.linalg.norm(white @ readings[..., None])
         if np.max(np.linalg.norm(step, axis=-1)) <= STEP_TOLERANCE + rounding:
             break
     return theta, steps

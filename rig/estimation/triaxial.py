@@ -6,11 +6,13 @@ R takes body coordinates to table coordinates; v_ref, in table coordinates, is f
 adds: its rate for a gyroscope (v_ref is then the Earth's rate), nothing for an accelerometer or a magnetometer. With
 v̄ = 0 the factor between F and v_ref is unknown, so ‖v_ref‖ and the side it points to must be given.
 
-Two methods: "as_published" solves the stacked equations (`rig.estimation.stacked`). The readings stand in X, so their
+Three methods: "as_published" solves the stacked equations (`rig.estimation.stacked`). The readings stand in X, so their
 noise σ shrinks F⁻¹ by about (σ/v_rms)², however many readings there are; beside a standard deviation that falls with
 √N this shows once √N σ/v_rms nears one. Averages of minutes stay far below it, single samples at slow rates do not.
 "maximum_likelihood" goes on from there to the weighted least squares in the readings themselves
 (`rig.estimation.reference_model`): no such bias, no scaling of columns, and the most made of unequal noise.
+"attitude_weighted" allows for attitudes that are not exactly known, as those of an arm
+(`rig.estimation.attitude_error`), and says how far off they are.
 """
 
 from dataclasses import dataclass
@@ -22,6 +24,7 @@ from numpy.typing import ArrayLike
 from rig.errors import Fault
 from rig.estimation import refusals
 from rig.estimation.arrays import Array
+from rig.estimation.attitude_error import AttitudeError, AttitudeWeighted, Placed, furthest_off, solve_attitude_weighted
 from rig.estimation.reference_model import (
     BIAS,
     REFERENCE,
@@ -33,13 +36,18 @@ from rig.estimation.reference_model import (
     most_likely,
     predicted,
     sensed,
+    whitening,
 )
 from rig.estimation.stacked import column_sizes, published_covariance, published_estimate, stack
 
-Method = Literal["as_published", "maximum_likelihood"]
+EqualWeights = Literal["as_published", "maximum_likelihood"]
+Method = EqualWeights | Literal["attitude_weighted"]
 
 MAX_CONDITION = 1e4
 NOTICEABLE = 0.5  # √N σ/v_rms
+UNTRUSTWORTHY_RAD = 5e-3  # attitudes that are further off, and the reference's model is at fault rather than they
+SUSPICIOUS_RAD = 5e-4  # whether one of the attitudes alone is to blame
+ODD = 6.0  # times as far off as the others are
 MIN_SIDE = 0.05  # cosine between the reference and the direction that says its sign
 REMEDY = "Take more attitudes, turned about at least two different axes"
 
@@ -53,6 +61,7 @@ class TriaxialSolution:
     - `covariance` (15, 15) or (18, 18): the rows of F, v_ref, b, φ.
     - `residuals` (N, 3): reading less model. `rank` and `condition` are those of the scaled X; full is 15 (18), one
       less where ‖v_ref‖ is given. `iterations` counts linear solutions or Gauss–Newton steps.
+    - `attitude_error` by the method "attitude_weighted", else None.
     """
 
     method: Method
@@ -67,6 +76,7 @@ class TriaxialSolution:
     condition: float
     iterations: int
     warnings: tuple[str, ...]
+    attitude_error: AttitudeError | None = None
 
 
 def solve_triaxial(
@@ -77,15 +87,17 @@ def solve_triaxial(
     *,
     second_order: bool = False,
     method: Method = "as_published",
+    attitude_std_rad: ArrayLike | None = None,
 ) -> TriaxialSolution:
     """Solve for F, v_ref and b, and φ with `second_order`.
 
     `readings`, `variances` (N, 3): mean readings and the variances of these means; `attitudes` (N, 3, 3): R, body to
-    table; `known`: v̄ as a `KnownVector`, or what is known of v_ref where v̄ = 0 as a `KnownNorm`.
+    table; `known`: v̄ as a `KnownVector`, or what is known of v_ref where v̄ = 0 as a `KnownNorm`; `attitude_std_rad`
+    (N,): how well each attitude is said to be known, for the method "attitude_weighted".
 
     Raises Fault `too_few_observations`, `not_finite`, `bad_variance`, `zero_reading`, `duplicated_observation`,
-    `bad_attitude`, `rank_deficient`, `ill_conditioned`, `sign_unknown`, `wrong_unit`, `mirrored_axis`; ValueError for
-    a wrong shape.
+    `bad_attitude`, `rank_deficient`, `ill_conditioned`, `sign_unknown`, `wrong_unit`, `mirrored_axis`,
+    `attitude_untrustworthy`; ValueError for a wrong shape.
     """
     m, r, v = (np.asarray(a, dtype=np.float64) for a in (readings, attitudes, variances))
     v_bar, norm_known = known.v_bar(len(m)), isinstance(known, KnownNorm)
@@ -95,16 +107,25 @@ def solve_triaxial(
 
     start, solutions = published_estimate(m, r, known, second_order=second_order)
     squares = sensed(start, r, v_bar) ** 2 if second_order else None
-    found = _conditioning(stack(m, r, squares) / column_sizes(m, squares), m, v, needed)
-    refusals.check_conditioning(found, needed, MAX_CONDITION, "some of F, reference and bias", REMEDY)
+    told = _conditioning(stack(m, r, squares) / column_sizes(m, squares), m, v, needed)
+    refusals.check_conditioning(told, needed, MAX_CONDITION, "some of F, reference and bias", REMEDY)
     if isinstance(known, KnownNorm):
         _check_side(start[REFERENCE], np.asarray(known.side, dtype=np.float64))
+    attitude_error = None
+    white = whitening(v)
     if method == "as_published":
         theta, iterations = start, solutions
         covariance = published_covariance(theta, m, r, known, v)
+    elif method == "maximum_likelihood":
+        theta, iterations = most_likely(start, m, r, v_bar, white, norm_known=norm_known)
+        covariance = covariance_bound(theta, r, v_bar, white, norm_known=norm_known)
     else:
-        theta, iterations = most_likely(start, m, r, v_bar, v, norm_known=norm_known)
-        covariance = covariance_bound(theta, r, v_bar, v, norm_known=norm_known)
+        stated = np.zeros(len(m)) if attitude_std_rad is None else np.asarray(attitude_std_rad, dtype=np.float64)
+        placed = Placed(m, v, r, v_bar, stated, norm_known)
+        found = solve_attitude_weighted(start, placed)
+        _check_attitudes(start, placed, found)
+        theta, covariance, iterations = found.theta, found.covariance, found.iterations
+        attitude_error, white = found.attitude_error, found.white
     f = theta[F].reshape(3, 3)
     refusals.check_unit(1 / np.linalg.norm(f, axis=1))
     if np.linalg.det(f) < 0:
@@ -114,6 +135,7 @@ def solve_triaxial(
             "Correct the order and signs of the sensor's axes, or the side the reference points to",
         )
     residuals = m - predicted(theta, r, v_bar)
+    whitened = (white @ residuals[..., None])[..., 0]
     return TriaxialSolution(
         method=method,
         matrix=f,
@@ -123,10 +145,11 @@ def solve_triaxial(
         covariance=covariance,
         residuals=residuals,
         observations=len(m),
-        rank=found.rank,
-        condition=found.condition,
+        rank=told.rank,
+        condition=told.condition,
         iterations=iterations,
-        warnings=refusals.inconsistency(residuals, v, 3 * len(m) - needed) + _errors_in_x(m, v, method),
+        warnings=refusals.inconsistency(whitened, np.ones_like(v), 3 * len(m) - needed) + _errors_in_x(m, v, method),
+        attitude_error=attitude_error,
     )
 
 
@@ -137,7 +160,7 @@ def solve_triaxial_batch(
     known: Known,
     *,
     second_order: bool = False,
-    method: Method = "as_published",
+    method: EqualWeights = "as_published",
 ) -> Array:
     """θ (R, 15 or 18) = [rows of F, v_ref, b, φ] of many runs (R, N, 3) in the same attitudes, without gates.
 
@@ -146,7 +169,7 @@ def solve_triaxial_batch(
     m, r, v = (np.asarray(a, dtype=np.float64) for a in (readings, attitudes, variances))
     theta, _ = published_estimate(m, r, known, second_order=second_order)
     if method == "maximum_likelihood":
-        theta, _ = most_likely(theta, m, r, known.v_bar(len(r)), v, norm_known=isinstance(known, KnownNorm))
+        theta, _ = most_likely(theta, m, r, known.v_bar(len(r)), whitening(v), norm_known=isinstance(known, KnownNorm))
     return theta
 
 
@@ -184,6 +207,23 @@ def _errors_in_x(m: Array, v: Array, method: Method) -> tuple[str, ...]:
     if method != "as_published" or len(m) * v.mean() < NOTICEABLE**2 * np.mean(m**2):
         return ()
     return ("noise in the readings biases the published estimate; maximum_likelihood does not suffer from it",)
+
+
+def _check_attitudes(start: Array, placed: Placed, found: AttitudeWeighted) -> None:
+    """All of them, and the one that fits worst where enough others are left to tell."""
+    off = found.attitude_error.std_rad
+    said = f"the readings say that the attitudes are off by {1e3 * off:.2g} mrad each"
+    if off > SUSPICIOUS_RAD and 3 * (len(placed.readings) - 1) > len(start) + 3:
+        worst, by, expected = furthest_off(start, placed, found)
+        if by > max(UNTRUSTWORTHY_RAD, ODD * expected):
+            said = f"attitude {worst} is off by {1e3 * by:.2g} mrad, say the others, which are by {1e3 * expected:.2g}"
+            off = by
+    if off > UNTRUSTWORTHY_RAD:
+        raise Fault(
+            "attitude_untrustworthy",
+            said,
+            "Check the attitudes: their frame, their direction (body to table), one that was not reached",
+        )
 
 
 def _check_side(reference: Array, side: Array) -> None:

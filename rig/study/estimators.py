@@ -16,7 +16,7 @@ from rig.estimation.bounds import efficiency, six_observation_bound, triaxial_bo
 from rig.estimation.levenberg_marquardt import LevenbergMarquardtSolution, solve_levenberg_marquardt
 from rig.estimation.reference_model import KnownNorm, KnownVector
 from rig.estimation.six_observation import PARAMETERS
-from rig.estimation.triaxial import Method, solve_triaxial_batch
+from rig.estimation.triaxial import EqualWeights, solve_triaxial_batch
 from rig.estimation.vector_model import VectorBatch, solve_vector_batch
 from rig.study import rate_table as rt
 from rig.study import simulation as sim
@@ -30,7 +30,7 @@ NOISE_RAD_S = sim.NOISE_LEVELS_RAD_S[0]
 SPEEDS = {"60°/s": sim.ARM_RAD_S, "3 rad/s": sim.FAST_RAD_S}
 RESTS, REST_SAMPLES = 6, round(3 * sim.RATE_HZ)  # SIX, section IV: 3 s after each sweep
 GYRO_ESTIMATORS = ("closed form", "Algorithm 1", "Levenberg–Marquardt", "vector model", "vector model with rests")
-METHODS: tuple[Method, ...] = ("as_published", "maximum_likelihood")
+METHODS: tuple[EqualWeights, ...] = ("as_published", "maximum_likelihood")
 TABLE_POSES = 40
 
 

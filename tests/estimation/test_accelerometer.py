@@ -9,7 +9,7 @@ from rig.errors import Fault
 from rig.estimation.accelerometer import AccelerometerSolution, solve_accelerometer, specific_force
 from rig.estimation.arrays import Array
 from rig.estimation.reference_model import KnownNorm
-from rig.estimation.triaxial import Method, solve_triaxial_batch
+from rig.estimation.triaxial import EqualWeights, solve_triaxial_batch
 from rig.study.rate_table import (
     ACCELEROMETER_BIAS_M_S2,
     ACCELEROMETER_MATRIX,
@@ -21,7 +21,7 @@ from rig.study.rate_table import (
 )
 from support.rate_table import attitudes, noisy
 
-METHODS: tuple[Method, ...] = ("as_published", "maximum_likelihood")
+METHODS: tuple[EqualWeights, ...] = ("as_published", "maximum_likelihood")
 GRAVITY = -ACCELEROMETER_REFERENCE_M_S2
 NORM = float(np.linalg.norm(GRAVITY))
 FIRST = np.concatenate([ACCELEROMETER_MATRIX.ravel(), GRAVITY, ACCELEROMETER_BIAS_M_S2])
@@ -42,7 +42,7 @@ def values(solution: AccelerometerSolution) -> Array:
 
 
 @pytest.mark.parametrize("method", METHODS)
-def test_the_published_accelerometer_is_found(method: Method) -> None:
+def test_the_published_accelerometer_is_found(method: EqualWeights) -> None:
     r = attitudes(30)
     m = noisy(readings(r), VARIANCES)
     solution = solve_accelerometer(m, r, VARIANCES, gravity_m_s2=NORM, second_order=True, method=method)
@@ -58,7 +58,7 @@ def test_the_published_accelerometer_is_found(method: Method) -> None:
 
 
 @pytest.mark.parametrize("method", METHODS)
-def test_first_order_is_exact_for_a_linear_sensor(method: Method) -> None:
+def test_first_order_is_exact_for_a_linear_sensor(method: EqualWeights) -> None:
     r = attitudes(5)
     exact = solve_accelerometer(readings(r, np.zeros(3)), r, VARIANCES[:5], gravity_m_s2=NORM, method=method)
     np.testing.assert_allclose(values(exact), FIRST, atol=1e-11)
@@ -79,7 +79,7 @@ def test_the_iteration_settles_and_leaves_what_first_order_cannot_explain() -> N
 
 @pytest.mark.parametrize("method", METHODS)
 @pytest.mark.parametrize("second_order", [False, True])
-def test_the_covariance_is_that_of_repeated_calibrations(method: Method, second_order: bool) -> None:
+def test_the_covariance_is_that_of_repeated_calibrations(method: EqualWeights, second_order: bool) -> None:
     r = attitudes(14)
     variances = VARIANCES[:14] * 25  # loud enough that rounding is nowhere near
     exact = readings(r, ACCELEROMETER_SECOND_ORDER if second_order else np.zeros(3))

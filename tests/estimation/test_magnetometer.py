@@ -7,10 +7,10 @@ from rig.errors import Fault
 from rig.estimation.arrays import Array
 from rig.estimation.magnetometer import field, solve_magnetometer
 from rig.estimation.reference_model import KnownNorm
-from rig.estimation.triaxial import Method, solve_triaxial_batch
+from rig.estimation.triaxial import EqualWeights, solve_triaxial_batch
 from support.rate_table import attitudes, noisy
 
-METHODS: tuple[Method, ...] = ("as_published", "maximum_likelihood")
+METHODS: tuple[EqualWeights, ...] = ("as_published", "maximum_likelihood")
 EARTH_FIELD = np.array([26.2, -0.9, 34.1]) * 1e-6  # T, north-east-down, near Lisbon
 SCALE = np.diag([1.1, 0.95, 1.02])
 NON_ORTHOGONALITY = np.array([[1.0, 0.02, -0.01], [0.0, 1.0, 0.03], [0.0, 0.0, 1.0]])
@@ -31,7 +31,7 @@ def readings(r: Array) -> Array:
 
 
 @pytest.mark.parametrize("method", METHODS)
-def test_iron_field_and_offset_are_found(method: Method) -> None:
+def test_iron_field_and_offset_are_found(method: EqualWeights) -> None:
     r = attitudes(20)
     solution = solve_magnetometer(noisy(readings(r), VARIANCES), r, VARIANCES, field_t=NORM, method=method)
     std = np.sqrt(np.diag(solution.covariance))
@@ -45,7 +45,7 @@ def test_iron_field_and_offset_are_found(method: Method) -> None:
 
 
 @pytest.mark.parametrize("method", METHODS)
-def test_the_covariance_is_that_of_repeated_calibrations(method: Method) -> None:
+def test_the_covariance_is_that_of_repeated_calibrations(method: EqualWeights) -> None:
     r = attitudes(20)
     reported = solve_magnetometer(readings(r), r, VARIANCES, field_t=NORM, method=method).covariance
     found = solve_triaxial_batch(

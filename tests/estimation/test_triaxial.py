@@ -7,7 +7,7 @@ from scipy.spatial.transform import Rotation
 from rig.errors import Fault
 from rig.estimation.arrays import Array
 from rig.estimation.reference_model import KnownNorm, KnownVector, jacobian, predicted
-from rig.estimation.triaxial import Method, TriaxialSolution, solve_triaxial, solve_triaxial_batch
+from rig.estimation.triaxial import EqualWeights, TriaxialSolution, solve_triaxial, solve_triaxial_batch
 from rig.study.rate_table import (
     AVERAGED_S,
     DEG_H,
@@ -19,7 +19,7 @@ from rig.study.rate_table import (
 )
 from support.rate_table import attitudes, noisy
 
-METHODS: tuple[Method, ...] = ("as_published", "maximum_likelihood")
+METHODS: tuple[EqualWeights, ...] = ("as_published", "maximum_likelihood")
 THETA = np.concatenate([GYRO_MATRIX.ravel(), GYRO_REFERENCE_RAD_S, GYRO_BIAS_RAD_S])
 UP = np.array([0.0, 0.0, -1.0])  # north-east-down; in the north the Earth's rate has a part upwards
 EARTH = KnownNorm(float(np.linalg.norm(GYRO_REFERENCE_RAD_S)), UP)
@@ -35,7 +35,7 @@ def readings(r: Array, rates: Array | None = None, theta: Array = THETA) -> Arra
 
 
 @pytest.mark.parametrize("method", METHODS)
-def test_the_published_gyroscope_is_found_from_25_hz_samples(method: Method) -> None:
+def test_the_published_gyroscope_is_found_from_25_hz_samples(method: EqualWeights) -> None:
     r, rates = swinging(600)  # ten minutes
     variances = np.full((len(r), 3), GYRO_RANDOM_WALK**2 * 25)
     solution = solve_triaxial(noisy(readings(r, rates), variances), r, variances, KnownVector(rates), method=method)
@@ -50,7 +50,7 @@ def test_the_published_gyroscope_is_found_from_25_hz_samples(method: Method) -> 
 
 
 @pytest.mark.parametrize("method", METHODS)
-def test_a_still_gyroscope_knows_the_earth_from_its_norm(method: Method) -> None:
+def test_a_still_gyroscope_knows_the_earth_from_its_norm(method: EqualWeights) -> None:
     r = attitudes(10)
     variances = np.full((10, 3), GYRO_RANDOM_WALK**2 / AVERAGED_S)
     exact = solve_triaxial(readings(r), r, variances, EARTH, method=method)
@@ -62,7 +62,7 @@ def test_a_still_gyroscope_knows_the_earth_from_its_norm(method: Method) -> None
 
 @pytest.mark.parametrize("method", METHODS)
 @pytest.mark.parametrize("still", [True, False])
-def test_the_covariance_is_that_of_repeated_calibrations(method: Method, still: bool) -> None:
+def test_the_covariance_is_that_of_repeated_calibrations(method: EqualWeights, still: bool) -> None:
     r = attitudes(16)
     rates = None if still else np.random.default_rng(3).normal(size=(16, 3)) * 1e-3
     known = EARTH if rates is None else KnownVector(rates)
@@ -103,7 +103,7 @@ def test_maximum_likelihood_makes_more_of_uneven_noise() -> None:
 
 
 @pytest.mark.parametrize("method", METHODS)
-def test_the_table_frame_and_the_units_are_a_matter_of_naming(method: Method) -> None:
+def test_the_table_frame_and_the_units_are_a_matter_of_naming(method: EqualWeights) -> None:
     r, turn = attitudes(12), Rotation.from_rotvec([0.4, -0.3, 0.9]).as_matrix()
     variances = np.full((12, 3), (0.05 * DEG_H) ** 2)
     m = noisy(readings(r), variances)
