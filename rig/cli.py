@@ -9,8 +9,9 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from rig import __version__
+from rig.commands import solve_arguments
 from rig.commands.standard_streams import keep_streams_usable
-from rig.errors import Fault, Refused, RigError
+from rig.errors import Fault, RigError
 from rig.errors.quoting import printable_lines
 
 if TYPE_CHECKING:
@@ -100,26 +101,8 @@ def _parser() -> argparse.ArgumentParser:
     resume = add("resume", _resume, "go on with an interrupted run")
     resume.add_argument("run_folder", type=Path, metavar="RUN_DIR")
     _add_outcome(resume)
-    solve = add("solve", _solve, "recompute the calibration from a recording")
-    solve.add_argument(
-        "run", type=Path, metavar="RUN", help="a run folder or its run.h5; with --sweeps, samples as CSV"
-    )
-    solve.add_argument("--sweeps", type=Path, metavar="CSV", help="the sweeps, for samples recorded elsewhere")
-    solve.add_argument(
-        "--estimator",
-        default="vector",
-        metavar="NAME",
-        help="vector (default), newton, levenberg_marquardt, or algorithm_1, as published",
-    )
-    solve.add_argument(
-        "--set",
-        action="append",
-        default=[],
-        metavar="NAME=VALUE",
-        dest="overrides",
-        help="judge by another threshold or limit than was recorded, for example observation.max_lost_fraction=0.01",
-    )
-    solve.add_argument("--json", action="store_true", help="for machines")
+    solve = add("solve", solve_arguments.solve, "recompute the calibration from a recording")
+    solve_arguments.add_arguments(solve)
     study = add("study", _study, "Monte-Carlo studies of the papers' figures and tables; without a name, list them")
     study.add_argument("name", nargs="?", metavar="NAME")
     study.add_argument("--out", type=Path, default=Path("studies"), metavar="DIR", help="default: studies")
@@ -239,18 +222,6 @@ def _check(options: argparse.Namespace) -> int:
     from rig.commands.check import check
 
     return check(options.config, options.overrides, options.script)
-
-
-def _solve(options: argparse.Namespace) -> int:
-    if options.sweeps is not None:
-        if options.overrides:
-            raise Refused("unknown_setting", "samples as CSV come without settings", "Leave out --set")
-        from rig.commands.solve_csv import solve_external
-
-        return solve_external(options.run, options.sweeps, options.estimator, as_json=options.json)
-    from rig.commands.solve import solve
-
-    return solve(options.run, options.estimator, options.overrides, as_json=options.json)
 
 
 def _study(options: argparse.Namespace) -> int:

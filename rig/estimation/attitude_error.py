@@ -166,12 +166,11 @@ def _restricted(theta: Array, placed: Placed) -> float:
 
 def _uncertainty(delta: float, fit: Array, turned: Array) -> float:
     """By the expected information on δ²: half the trace of (P G)², G = E Eᵀ and P what the fit leaves, whitened."""
-    orthogonal, _ = np.linalg.qr(fit)
-    count = len(turned)
-    left = np.eye(3 * count) - orthogonal @ orthogonal.T
-    growth = np.einsum("nij,nkj->nik", turned, turned)
-    change = np.einsum("anb,nbc->anc", left.reshape(3 * count, count, 3), growth).reshape(3 * count, -1)
-    information = 0.5 * float(np.sum(change * change.T))
+    orthogonal = np.linalg.qr(fit)[0].reshape(*turned.shape[:2], -1)
+    growth = turned @ np.swapaxes(turned, -1, -2)
+    grown = growth @ orthogonal
+    taken = np.einsum("nip,niq->pq", orthogonal, grown)
+    information = 0.5 * float(np.sum(growth**2) - 2 * np.sum(grown**2) + np.sum(taken**2))
     if information <= 0:
         return float("inf")
     return float(np.sqrt(delta**2 + information**-0.5) - delta)

@@ -14,6 +14,7 @@ from numpy.typing import ArrayLike
 from rig.estimation.arrays import Array
 
 STEPS = 25  # of either size on its grid
+PRICE = 1.0  # of walk, and of scatter, in the logarithm of the likelihood
 SPAN = 300.0  # largest size over the smallest that is looked at
 
 
@@ -67,8 +68,9 @@ def estimate_bias_process(
     """The process behind the mean readings (N, 3), which without it are `design` (N, p) × parameters + noise.
 
     `variances_rad2_s2` (N, 3) are those of the noise, `windows_s` (N, 2) when was averaged. One process for the three
-    axes, so that few averages tell it. What is most likely is taken, however little likelier than steadiness it is: to
-    wait until it is certain would leave out most of what is there.
+    axes, so that few averages tell it. Walk and scatter each have to make the averages likelier by as much as Akaike's
+    criterion asks of a parameter: to wait until they are certain would leave out most of what is there, and whatever is
+    likeliest holds a little of both where there is noise alone.
     """
     z, means, variances = (np.asarray(a, dtype=np.float64) for a in (design, means_rad_s, variances_rad2_s2))
     freedom = 3 * (len(z) - z.shape[1])
@@ -79,7 +81,7 @@ def estimate_bias_process(
     grid = np.concatenate([[0.0], typical * np.geomspace(SPAN**-0.5, SPAN, STEPS) ** 2])
     walks = grid / float(np.median(np.diag(unit)))
     sizes = np.array([(walk, scatter) for walk in walks for scatter in grid])
-    gain = np.zeros(len(sizes))
+    gain = -PRICE * np.count_nonzero(sizes, axis=1).astype(np.float64)
     for axis in range(3):
         noise = np.diag(variances[:, axis]) + _added(sizes[:, :1, None], sizes[:, 1:, None], unit)
         gain += _restricted_likelihood(z, means[:, axis], noise)

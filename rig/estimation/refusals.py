@@ -98,9 +98,11 @@ def check_revolutions(means: Array, speeds_rad_s: Array, variances: Array, speed
 
 def check_duplicates(means: Array) -> None:
     """Raises Fault `duplicated_observation` where two mean readings of (N, 3) agree to the last bit."""
-    same = (means[:, None] == means[None, :]).all(axis=-1)
-    if same.sum() > len(means):
-        earlier, again = np.argwhere(np.triu(same, 1))[0].tolist()
+    order = np.lexsort(means.T)
+    same = (means[order[1:]] == means[order[:-1]]).all(axis=-1)
+    if same.any():
+        first = int(np.argmax(same))
+        earlier, again = sorted(order[first : first + 2].tolist())
         raise Fault(
             "duplicated_observation",
             f"observations {earlier} and {again} hold the same readings",

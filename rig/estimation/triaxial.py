@@ -122,7 +122,10 @@ def solve_triaxial(
     else:
         stated = np.zeros(len(m)) if attitude_std_rad is None else np.asarray(attitude_std_rad, dtype=np.float64)
         placed = Placed(m, v, r, v_bar, stated, norm_known)
-        found = solve_attitude_weighted(start, placed)
+        try:
+            found = solve_attitude_weighted(start, placed)
+        except np.linalg.LinAlgError:
+            raise _untrustworthy("the readings contradict the attitudes so much that no fit converges") from None
         _check_attitudes(start, placed, found)
         theta, covariance, iterations = found.theta, found.covariance, found.iterations
         attitude_error, white = found.attitude_error, found.white
@@ -191,9 +194,17 @@ def _check(m: Array, r: Array, v: Array, known: Known, parameters: int) -> None:
     if off.max() > 1e-6 or (np.linalg.det(r) < 0).any():
         raise Fault(
             "bad_attitude",
-            f"attitude {int(np.argmax(off))} is not a rotation (it misses by {off.max():.2g})",
+            f"attitude {int(np.argmax(off)) + 1} is not a rotation (it misses by {off.max():.2g})",
             "Give attitudes as rotation matrices from body to table coordinates",
         )
+    if isinstance(known, KnownNorm):
+        _check_size(m, known.norm)
+
+
+def _check_size(m: Array, norm: float) -> None:
+    """Whatever the attitudes: readings are as large as the reference at least, and differ by no more than it."""
+    size, spread = (float(np.sqrt(np.mean(np.sum(each**2, axis=1)))) for each in (m, m - m.mean(axis=0)))
+    refusals.check_unit(np.full(3, norm / np.clip(norm, spread, size)))
 
 
 def _conditioning(scaled: Array, m: Array, v: Array, needed: int) -> refusals.Conditioning:
@@ -216,14 +227,20 @@ def _check_attitudes(start: Array, placed: Placed, found: AttitudeWeighted) -> N
     if off > SUSPICIOUS_RAD and 3 * (len(placed.readings) - 1) > len(start) + 3:
         worst, by, expected = furthest_off(start, placed, found)
         if by > max(UNTRUSTWORTHY_RAD, ODD * expected):
-            said = f"attitude {worst} is off by {1e3 * by:.2g} mrad, say the others, which are by {1e3 * expected:.2g}"
+            said = (
+                f"attitude {worst + 1} is off by {1e3 * by:.2g} mrad, say the others, which are by {1e3 * expected:.2g}"
+            )
             off = by
     if off > UNTRUSTWORTHY_RAD:
-        raise Fault(
-            "attitude_untrustworthy",
-            said,
-            "Check the attitudes: their frame, their direction (body to table), one that was not reached",
-        )
+        raise _untrustworthy(said)
+
+
+def _untrustworthy(what: str) -> Fault:
+    return Fault(
+        "attitude_untrustworthy",
+        what,
+        "Check the attitudes: their frame, their direction (body to table), one that was not reached",
+    )
 
 
 def _check_side(reference: Array, side: Array) -> None:

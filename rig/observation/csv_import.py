@@ -20,16 +20,14 @@ from rig.errors import Fault, Refused
 from rig.estimation.arrays import Array
 from rig.estimation.refusals import check_reading_ratio
 from rig.observation.average import Average
-from rig.observation.colour import widening
 from rig.observation.csv_table import read_columns
+from rig.observation.csv_windows import check_times, inside, mean_of, overlapping
 from rig.observation.observe import Observation, nearest_axis
 from rig.observation.windows import Window
 
 SAMPLE_COLUMNS = ("time_s", "x_rad_s", "y_rad_s", "z_rad_s")
 SWEEP_COLUMNS = ("start_s", "end_s", "axis_x", "axis_y", "axis_z")
 MOTION_COLUMNS = ("speed_rad_s", "angle_rad")
-MIN_SAMPLES = 20
-MAX_LOST_FRACTION = 0.01
 MIN_DURATION_S = 1e-3  # so many samples need longer at any rate
 SAMPLES_MB, SWEEPS_MB = 256, 1  # an hour at 1 kHz, and some ten thousand sweeps
 
@@ -64,20 +62,20 @@ def average(samples: Array, sweeps: Array, axes: Array) -> ExternalData:
     `wrong_unit`.
     """
     time_s, readings = samples[:, 0], samples[:, 1:]
-    if len(time_s) < MIN_SAMPLES or not (np.diff(time_s) > 0).all():
-        raise Refused(
-            "time_not_increasing",
-            "the samples are too few, or their time_s does not increase from row to row",
-            "Give every sample once, in the order of time, on one clock",
-        )
+    check_times(time_s)
     if not len(sweeps):
         raise Fault("too_few_observations", "there is no sweep", "Give a row for every sweep and every rest")
-    _check_overlap(sweeps)
+    windows = [Window(start_s, end_s) for start_s, end_s in sweeps[:, :2].tolist()]
+    if shared := overlapping(windows):
+        raise Refused(
+            "overlapping_sweeps",
+            f"sweeps {shared[0]} and {shared[1]} share samples",
+            "Give every sweep once, with its own start and end",
+        )
     interval_s = float(np.median(np.diff(time_s)))
     turns, rests = [], []
-    for row, (start_s, end_s, speed) in enumerate(sweeps.tolist(), start=1):
-        inside = slice(*np.searchsorted(time_s, [start_s, end_s]).tolist())
-        mean = _average(readings[inside], Window(start_s, end_s), interval_s, row)
+    for row, (window, speed) in enumerate(zip(windows, sweeps[:, 2].tolist(), strict=True), start=1):
+        mean = _average(readings[inside(time_s, window)], window, interval_s, row)
         if speed == 0:
             rests.append(mean)
         else:
@@ -111,34 +109,13 @@ def _speeds(sweeps: dict[str, Array]) -> Array:
     return np.asarray(motion / durations if by_angle else motion, dtype=np.float64)
 
 
-def _check_overlap(sweeps: Array) -> None:
-    order = np.argsort(sweeps[:, 0])
-    late = np.flatnonzero(sweeps[order[1:], 0] < sweeps[order[:-1], 1])
-    if len(late):
-        first, second = int(order[late[0]]) + 1, int(order[late[0] + 1]) + 1
-        raise Refused(
-            "overlapping_sweeps",
-            f"sweeps {first} and {second} share samples",
-            "Give every sweep once, with its own start and end",
-        )
-
-
 def _average(readings: Array, window: Window, interval_s: float, row: int) -> Average:
-    """Mean and its variance, from the scatter about the mean; vibration counts as noise here, for no arm reports it."""
-    count, expected = len(readings), (window.end_s - window.start_s) / interval_s
-    if count < MIN_SAMPLES or count < (1 - MAX_LOST_FRACTION) * expected - 1:
-        raise Fault(
-            "lost_samples",
-            f"sweep {row} has {count} samples where {expected:.0f} belong",
-            "Check that both files use one clock in seconds, and that no samples are missing",
-        )
-    variance = readings.var(axis=0, ddof=1)
-    wider = np.array([widening(readings[:, axis] - readings[:, axis].mean()) for axis in range(3)])
+    mean = mean_of(readings, window, interval_s, f"sweep {row}")
     return Average(
-        mean_rad_s=readings.mean(axis=0),
-        variance_rad2_s2=variance * wider / count,
-        noise_rad_s=np.sqrt(variance),
-        samples=count,
+        mean_rad_s=mean.value,
+        variance_rad2_s2=mean.variance,
+        noise_rad_s=mean.noise,
+        samples=mean.samples,
         start_s=window.start_s,
         end_s=window.end_s,
         temperature_c=float("nan"),

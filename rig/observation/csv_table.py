@@ -16,14 +16,21 @@ from rig.estimation.arrays import Array
 LARGEST_NUMBER = 1e12  # either sign, in any SI unit: what is beyond is a mistake, and its square might overflow
 
 
-def read_columns(path: Path, columns: Sequence[str], alternatives: Sequence[str], largest_mb: int) -> dict[str, Array]:
+def read_columns(
+    path: Path,
+    columns: Sequence[str],
+    alternatives: Sequence[str],
+    largest_mb: int,
+    optional: Sequence[Sequence[str]] = (),
+) -> dict[str, Array]:
     """The columns of a file by name: all of `columns`, and exactly one of `alternatives` if there are any.
 
-    The first row holds the names. Raises Refused `no_file`, `wrong_columns`, `wrong_unit`, `not_a_number`.
+    Of each group of `optional` ones all, or none. The first row holds the names. Raises Refused `no_file`,
+    `wrong_columns`, `wrong_unit`, `not_a_number`.
     """
     rows = _rows(path, largest_mb)
     names = [name.strip() for name in next(rows, [])]
-    _check_columns(path, names, columns, alternatives)
+    _check_columns(path, names, columns, alternatives, optional)
     values = array("d")
     for line, row in enumerate(rows, start=2):
         numbers = _numbers(row)
@@ -63,18 +70,24 @@ def _numbers(row: Sequence[str]) -> list[float]:
     return numbers if all(abs(number) < LARGEST_NUMBER for number in numbers) else []
 
 
-def _check_columns(path: Path, names: Sequence[str], columns: Sequence[str], alternatives: Sequence[str]) -> None:
-    known = (*columns, *alternatives)
-    by_quantity = {name.split("_")[0]: name for name in known if not name.startswith("axis")}
+def _check_columns(
+    path: Path,
+    names: Sequence[str],
+    columns: Sequence[str],
+    alternatives: Sequence[str],
+    optional: Sequence[Sequence[str]],
+) -> None:
+    known = (*columns, *alternatives, *(name for group in optional for name in group))
     for name in names:
-        meant = by_quantity.get(name.split("_")[0], name)
-        if name not in known and meant not in (name, *names):
+        meant = [each for each in known if _quantity(each) == _quantity(name) and each not in names]
+        if name not in known and "_" in name and meant and not name.startswith("axis"):
             raise Refused(
                 "wrong_unit",
-                f"{path} has a column {shorten(name)} where {meant} belongs",
-                f"Convert it to the unit that the name {meant} carries",
+                f"{path} has a column {shorten(name)} where {' or '.join(meant)} belongs",
+                f"Convert it to the unit that the name {' or '.join(meant)} carries",
             )
-    problems = [f"lacks {name}" for name in columns if name not in names]
+    needed = [*columns, *(name for group in optional if set(group) & set(names) for name in group)]
+    problems = [f"lacks {name}" for name in needed if name not in names]
     problems += [f"names {name} twice" for name in known if names.count(name) > 1]
     given = [name for name in names if name in alternatives]
     if alternatives and len(set(given)) != 1:
@@ -84,4 +97,11 @@ def _check_columns(path: Path, names: Sequence[str], columns: Sequence[str], alt
         problems.append(f"has the unknown {shorten(unknown)}")
     if problems:
         wanted = ", ".join(columns) + (f" and one of {', '.join(alternatives)}" if alternatives else "")
-        raise Refused("wrong_columns", f"{path} {', '.join(problems)}", f"Its first row must name {wanted}")
+        more = "".join(f"; {', '.join(group)} may stand there too" for group in optional)
+        raise Refused("wrong_columns", f"{path} {', '.join(problems)}", f"Its first row must name {wanted}{more}")
+
+
+def _quantity(name: str) -> str:
+    """What a column is of: `rate_x` of `rate_x_rad_s`, `x` of `x_rad_s`."""
+    words = name.split("_")
+    return "_".join(words[:2]) if words[0] == "rate" else words[0]

@@ -207,4 +207,4 @@ def _draw(rows: list[dict[str, Any]], figure: "Figure") -> None:
     panel.axhline(95.45, color="black", linestyle="--", linewidth=0.8)
     panel.set_xticks(range(len(PARAMETERS)), PARAMETERS)
     panel.set(ylabel="sessions whose truth lies within ± U, %", ylim=(0, 100))
-    panel.legend(loc="lower left")
+    panel.legend(loc="lower center", bbox_to_anchor=(0.5, 1.0), ncols=2, frameon=False)

@@ -175,7 +175,7 @@ def test_one_attitude_that_was_moved_by_two_degrees_is_seen(method: Method) -> N
             wrong[place] = r[place] @ Rotation.from_rotvec([0, np.radians(2), 0]).as_matrix()
         m = recorded(independent(0.0), MPU_3_S, place)
         if method == "attitude_weighted":
-            with pytest.raises(Fault, match=rf"attitude_untrustworthy: attitude {place} is off by"):
+            with pytest.raises(Fault, match=rf"attitude_untrustworthy: attitude {place + 1} is off by"):
                 solve(m, MPU_3_S, method, wrong)
         else:
             assert "times what the variances explain" in solve(m, MPU_3_S, method, wrong).fit.warnings[0]

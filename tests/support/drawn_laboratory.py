@@ -129,5 +129,5 @@ def truth(
         return readings(quiet, time_s, turning, seed, sensor.temperature_c)
 
     scale = np.mean(2 * speed_rad_s / (read(speed_rad_s) - read(-speed_rad_s)), axis=0)
-    bias = -read(0.0).mean(axis=0) + HALF_COUNT_RAD_S[loaded.config.sensors[name].part]
+    bias = -read(0.0).mean(axis=0) + HALF_COUNT_RAD_S.get(loaded.config.sensors[name].part, 0.0)
     return np.concatenate([scale, bias])

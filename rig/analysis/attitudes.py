@@ -1,0 +1,190 @@
+"""From readings in known attitudes to calibrations: gyroscope, accelerometer and magnetometer, as TRIAX has them."""
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+from typing import get_args
+
+import numpy as np
+
+from rig.errors import Fault, Refused
+from rig.estimation.arrays import Array
+from rig.estimation.reference_model import Known, KnownNorm, KnownVector
+from rig.estimation.refusals import check_axes
+from rig.estimation.triaxial import Method, TriaxialSolution, solve_triaxial
+from rig.observation.attitude_import import PlacedReadings, Quantity
+
+METHODS: tuple[Method, ...] = (*get_args(get_args(Method)[0]), *get_args(get_args(Method)[1]))
+SEEN = 3.0  # standard deviations that the largest second-order term must have
+UPWARDS = dict(zip(("+x", "+y", "+z", "-x", "-y", "-z"), np.concatenate([np.eye(3), -np.eye(3)]), strict=True))
+
+
+@dataclass(frozen=True, slots=True)
+class Surrounding:
+    """What is known of the place: the size of gravity, that of the magnetic field or None, and the table's upward axis.
+
+    `field_upwards` where the field rises from the ground, as it does south of the magnetic equator. `any_mounting`
+    where the sensor's axes need not point along those of the body whose attitudes are given.
+    """
+
+    gravity_m_s2: float
+    field_t: float | None
+    up: str
+    field_upwards: bool = False
+    any_mounting: bool = False
+
+    def known(self, quantity: Quantity, placed: PlacedReadings) -> Known:
+        """What the reference of a quantity is. Raises Fault `no_rates`, `field_strength_unknown`."""
+        up = UPWARDS[self.up]
+        if quantity == "acceleration":
+            return KnownNorm(self.gravity_m_s2, up)
+        if quantity == "rate":
+            if placed.rates_rad_s is None:
+                raise Fault(
+                    "no_rates",
+                    "the attitudes do not say how the table turned; at rest a gyroscope shows the Earth's rate alone",
+                    "Give the columns rate_x_rad_s, rate_y_rad_s, rate_z_rad_s, in body coordinates",
+                )
+            return KnownVector(placed.rates_rad_s)
+        if self.field_t is None:
+            raise Fault(
+                "field_strength_unknown",
+                "the size of the magnetic field is not given, and the scale of a magnetometer is relative to it",
+                "Give --field-t, in tesla, as a reference magnetometer measured it where the sensor was",
+            )
+        return KnownNorm(self.field_t, up if self.field_upwards else -up)
+
+
+@dataclass(frozen=True, slots=True)
+class InAttitudes:
+    """One quantity's calibration by the chosen method, and by each of the others, or the Fault that it ends in."""
+
+    solution: TriaxialSolution
+    beside: Mapping[Method, TriaxialSolution | Fault]
+
+
+def solve_placed(
+    placed: PlacedReadings, surrounding: Surrounding, method: Method | None, *, second_order: bool
+) -> dict[Quantity, InAttitudes | Fault]:
+    """Every quantity that was recorded, by `method`; None chooses the one that suits it.
+
+    That is "maximum_likelihood" for a gyroscope, whose reference is the Earth's rate, and "attitude_weighted" else.
+    """
+    return {
+        quantity: _or_fault(
+            placed,
+            quantity,
+            surrounding,
+            method or ("maximum_likelihood" if quantity == "rate" else "attitude_weighted"),
+            second_order and quantity == "acceleration",
+        )
+        for quantity in placed.means
+    }
+
+
+def known_method(name: str | None) -> Method | None:
+    """Raises Refused `unknown_estimator`."""
+    for method in METHODS:
+        if name == method:
+            return method
+    if name is None:
+        return None
+    raise Refused("unknown_estimator", f"there is no {name} for readings in attitudes", f"Use {', '.join(METHODS)}")
+
+
+def _or_fault(
+    placed: PlacedReadings, quantity: Quantity, surrounding: Surrounding, method: Method, second_order: bool
+) -> InAttitudes | Fault:
+    try:
+        known = surrounding.known(quantity, placed)
+        solution = _solve(placed, quantity, known, method, second_order=second_order)
+        if second_order:
+            _check_seen(solution)
+        if not surrounding.any_mounting:
+            check_axes(solution.matrix / np.linalg.norm(solution.matrix, axis=1, keepdims=True), np.eye(3))
+    except Fault as fault:
+        return fault
+    beside: dict[Method, TriaxialSolution | Fault] = {}
+    for other in METHODS:
+        if other != method and (other != "attitude_weighted" or quantity != "rate"):
+            try:
+                beside[other] = _solve(placed, quantity, known, other, second_order=second_order)
+            except Fault as fault:
+                beside[other] = fault
+    return InAttitudes(solution, beside)
+
+
+def _solve(
+    placed: PlacedReadings, quantity: Quantity, known: Known, method: Method, *, second_order: bool
+) -> TriaxialSolution:
+    """Raises Fault as `solve_triaxial` does, and `inverted_attitudes`."""
+    means = placed.means[quantity]
+    variances = None if placed.variances is None else placed.variances[quantity]
+    if variances is None:
+        variances = _scatter(placed, means, known, second_order=second_order)
+
+    def solved(attitudes: Array) -> TriaxialSolution:
+        return solve_triaxial(
+            means,
+            attitudes,
+            variances,
+            known,
+            second_order=second_order,
+            method=method,
+            attitude_std_rad=placed.attitude_std_rad,
+        )
+
+    try:
+        return solved(placed.attitudes)
+    except Fault as fault:
+        if fault.name != "attitude_untrustworthy":
+            raise
+        try:
+            solved(np.swapaxes(placed.attitudes, -1, -2))
+        except Fault:
+            raise fault from None
+        raise Fault(
+            "inverted_attitudes",
+            "the readings contradict the attitudes and agree with their inverses",
+            "Give quaternions that take body to table coordinates: conjugate those that take table to body",
+        ) from None
+
+
+def _scatter(placed: PlacedReadings, means: Array, known: Known, *, second_order: bool) -> Array:
+    """(N, 3) variances of the means from how they scatter about the model, each axis' noise alike in all rows.
+
+    Equal weights: the model that weighs attitude errors would take them for noise here.
+    """
+    counts = placed.samples[:, None]
+    quiet = np.full_like(means, (1e-9 * np.abs(means).max()) ** 2) / counts
+    left = solve_triaxial(means, placed.attitudes, quiet, known, second_order=second_order).residuals
+    freedom = len(means) - (18 if second_order else 15) / 3
+    if freedom < 1:
+        raise Fault(
+            "too_few_observations",
+            f"{len(means)} rows of few samples do not show their noise",
+            "Give longer rows, or more of them",
+        )
+    variances: Array = np.maximum(np.sum(left**2 * counts, axis=0) / freedom, 1e-30) / counts
+    return variances
+
+
+def _check_seen(solution: TriaxialSolution) -> None:
+    assert solution.second_order is not None
+    std = np.sqrt(np.diag(solution.covariance)[15:18])
+    largest = float(np.max(np.abs(solution.second_order) / std))
+    if largest < SEEN:
+        raise Fault(
+            "second_order_not_seen",
+            f"no second-order term is beyond {largest:.1f} of its standard deviations",
+            "Leave out --second-order: it would triple the uncertainty of the bias for nothing; or dwell longer",
+        )
+
+
+def in_unit(solution: TriaxialSolution) -> tuple[Array, Array]:
+    """Scale factors 1/‖row of F‖ (3,), and the standard deviations of them and of the bias (6,)."""
+    size = np.linalg.norm(solution.matrix, axis=1)
+    jacobian = np.zeros((6, len(solution.covariance)))
+    for i in range(3):
+        jacobian[i, 3 * i : 3 * i + 3] = -solution.matrix[i] / size[i] ** 3
+        jacobian[3 + i, 12 + i] = 1.0
+    return 1 / size, np.sqrt(np.diag(jacobian @ solution.covariance @ jacobian.T))

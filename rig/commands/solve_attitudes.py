@@ -1,0 +1,36 @@
+"""`rig solve SAMPLES.csv --attitudes ATTITUDES.csv`: calibrations from readings in known attitudes, without a verdict.
+
+There is no configuration, so there are no limits to judge them by.
+"""
+
+from pathlib import Path
+
+from rig.analysis.attitudes import Surrounding, known_method, solve_placed
+from rig.errors import Fault, Refused, raised_as
+from rig.observation.attitude_import import read_placed
+from rig.report.attitudes import Found, print_found
+
+
+def solve_attitudes(
+    samples: Path,
+    attitudes: Path,
+    estimator: str | None,
+    surrounding: Surrounding,
+    *,
+    second_order: bool,
+    as_json: bool,
+) -> int:
+    """Solve two CSV files and print what they give; returns 0.
+
+    Raises Refused `unknown_estimator`, whatever `read_placed` finds wrong, and what the estimator does where not one of
+    the recorded quantities has a solution.
+    """
+    method = known_method(estimator)
+    with raised_as(Refused):  # nothing runs here: whatever is wrong with the data, no arm had to be stopped for it
+        placed = read_placed(samples, attitudes)
+        results = solve_placed(placed, surrounding, method, second_order=second_order)
+        faults = [result for result in results.values() if isinstance(result, Fault)]
+        if len(faults) == len(results):
+            raise faults[0]
+    print_found(Found(samples, attitudes, surrounding, results), as_json=as_json)
+    return 0

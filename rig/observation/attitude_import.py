@@ -1,0 +1,145 @@
+"""Data recorded elsewhere in known attitudes: a CSV file of samples and one of attitudes, as TRIAX uses them.
+
+samples: `time_s`, which must increase, and any of `x_rad_s y_rad_s z_rad_s` (rate), `x_m_s2 y_m_s2 z_m_s2` (what an
+accelerometer feels: at rest the opposite of gravity) and `x_t y_t z_t` (magnetic field, tesla).
+
+attitudes: `start_s`, `end_s` on the same clock and `qw qx qy qz`, the unit quaternion that takes body to table
+coordinates; where the table turns `rate_x_rad_s rate_y_rad_s rate_z_rad_s`, its rate in body coordinates; where it is
+known how good the attitude is, `attitude_std_rad` about each axis. While the table turns, a row holds for its middle
+and should be short: down to one sample, whose noise is then taken from how all rows scatter about the model.
+
+Columns may stand in any order; the first row holds their names.
+"""
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Literal, get_args
+
+import numpy as np
+
+from rig.errors import Fault, Refused
+from rig.estimation.arrays import Array
+from rig.observation.csv_table import read_columns
+from rig.observation.csv_windows import MIN_SAMPLES, check_complete, check_times, inside, mean_of, overlapping
+from rig.observation.windows import Window
+
+Quantity = Literal["rate", "acceleration", "field"]
+QUANTITIES: tuple[Quantity, ...] = get_args(Quantity)
+UNITS: Mapping[Quantity, str] = {"rate": "rad/s", "acceleration": "m/s²", "field": "T"}
+COLUMNS: Mapping[Quantity, tuple[str, ...]] = {
+    "rate": ("x_rad_s", "y_rad_s", "z_rad_s"),
+    "acceleration": ("x_m_s2", "y_m_s2", "z_m_s2"),
+    "field": ("x_t", "y_t", "z_t"),
+}
+PLACE_COLUMNS = ("start_s", "end_s", "qw", "qx", "qy", "qz")
+RATE_COLUMNS = ("rate_x_rad_s", "rate_y_rad_s", "rate_z_rad_s")
+STD_COLUMN = "attitude_std_rad"
+SAMPLES_MB, ATTITUDES_MB = 256, 32  # an hour at 1 kHz; an hour's table at 50 Hz
+NORM_TOLERANCE = 1e-3
+
+
+@dataclass(frozen=True, slots=True)
+class PlacedReadings:
+    """What the two files tell, N attitudes: `means` (N, 3) of every quantity, and the variances (N, 3) of these means.
+
+    No variances where rows hold too few samples to show their noise. `samples` (N,); `attitudes` (N, 3, 3), body to
+    table; `rates_rad_s` (N, 3) of the table in body coordinates and `attitude_std_rad` (N,), if they were given.
+    """
+
+    means: Mapping[Quantity, Array]
+    variances: Mapping[Quantity, Array] | None
+    samples: Array
+    attitudes: Array
+    rates_rad_s: Array | None
+    attitude_std_rad: Array | None
+
+
+def read_placed(samples_path: Path, attitudes_path: Path) -> PlacedReadings:
+    """Read and average both files.
+
+    Raises Refused `no_file`, `wrong_columns`, `wrong_unit`, `not_a_number`, `time_not_increasing`, `bad_quaternion`,
+    `bad_attitude_row`, `overlapping_attitudes`; Fault `lost_samples`, `too_few_observations`.
+    """
+    samples = read_columns(samples_path, ("time_s",), (), SAMPLES_MB, tuple(COLUMNS.values()))
+    rows = read_columns(attitudes_path, PLACE_COLUMNS, (), ATTITUDES_MB, (RATE_COLUMNS, (STD_COLUMN,)))
+    given = [quantity for quantity in QUANTITIES if COLUMNS[quantity][0] in samples]
+    if not given:
+        raise Refused(
+            "wrong_columns",
+            f"{samples_path} holds no readings",
+            f"Its first row must name time_s and {', or '.join(' '.join(names) for names in COLUMNS.values())}",
+        )
+    time_s = samples["time_s"]
+    check_times(time_s)
+    windows = _windows(rows)
+    readings = {quantity: np.column_stack([samples[name] for name in COLUMNS[quantity]]) for quantity in given}
+    counts = np.array([inside(time_s, window).stop - inside(time_s, window).start for window in windows])
+    interval_s = float(np.median(np.diff(time_s)))
+    for row, (window, count) in enumerate(zip(windows, counts.tolist(), strict=True), start=1):
+        check_complete(count, window, interval_s, f"attitude {row}", 1)
+    means, variances = {}, {}
+    short = bool(counts.min() < MIN_SAMPLES)
+    for quantity, each in readings.items():
+        cuts = [each[inside(time_s, window)] for window in windows]
+        means[quantity] = np.array([cut.mean(axis=0) for cut in cuts])
+        if not short:
+            placed = [
+                mean_of(cut, window, interval_s, f"attitude {row}")
+                for row, (cut, window) in enumerate(zip(cuts, windows, strict=True), start=1)
+            ]
+            variances[quantity] = np.array([mean.variance for mean in placed])
+    return PlacedReadings(
+        means,
+        None if short else variances,
+        counts.astype(np.float64),
+        _rotations(rows),
+        np.column_stack([rows[name] for name in RATE_COLUMNS]) if RATE_COLUMNS[0] in rows else None,
+        _stated(rows),
+    )
+
+
+def _windows(rows: Mapping[str, Array]) -> list[Window]:
+    if not len(rows["start_s"]):
+        raise Fault("too_few_observations", "there is no attitude", "Give a row for every attitude")
+    windows = [Window(start_s, end_s) for start_s, end_s in zip(rows["start_s"], rows["end_s"], strict=True)]
+    for row, window in enumerate(windows, start=1):
+        if window.end_s <= window.start_s:
+            raise Refused(
+                "bad_attitude_row",
+                f"attitude {row} ends before it starts",
+                "Give start_s before end_s, on the samples' clock",
+            )
+    if shared := overlapping(windows):
+        raise Refused(
+            "overlapping_attitudes",
+            f"attitudes {shared[0]} and {shared[1]} share samples",
+            "Give every attitude its own start and end",
+        )
+    return windows
+
+
+def _rotations(rows: Mapping[str, Array]) -> Array:
+    from scipy.spatial.transform import Rotation
+
+    quaternions = np.column_stack([rows[name] for name in ("qw", "qx", "qy", "qz")])
+    norms = np.linalg.norm(quaternions, axis=1)
+    worst = int(np.argmax(np.abs(norms - 1)))
+    if abs(norms[worst] - 1) > NORM_TOLERANCE:
+        raise Refused(
+            "bad_quaternion",
+            f"the quaternion of attitude {worst + 1} has the length {norms[worst]:.4g}",
+            "Give unit quaternions qw qx qy qz that take body to table coordinates",
+        )
+    return np.asarray(Rotation.from_quat(quaternions[:, [1, 2, 3, 0]]).as_matrix(), dtype=np.float64)
+
+
+def _stated(rows: Mapping[str, Array]) -> Array | None:
+    stated = rows.get(STD_COLUMN)
+    if stated is not None and (stated < 0).any():
+        raise Refused(
+            "bad_attitude_row",
+            f"attitude {int(np.argmin(stated)) + 1} has a negative {STD_COLUMN}",
+            "Give the standard deviation of the attitude about each axis in rad, 0 where it is exact",
+        )
+    return stated

@@ -1,0 +1,72 @@
+"""What CSV files recorded elsewhere have in common: samples in the order of time, rows from one moment to another."""
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from itertools import pairwise
+
+import numpy as np
+
+from rig.errors import Fault, Refused
+from rig.estimation.arrays import Array
+from rig.observation.colour import widening
+from rig.observation.windows import Window
+
+MIN_SAMPLES = 20
+MAX_LOST_FRACTION = 0.01
+
+
+@dataclass(frozen=True, slots=True)
+class Mean:
+    """Of the readings (3,) in a window, with its variance and the standard deviation of one of them."""
+
+    value: Array
+    variance: Array
+    noise: Array
+    samples: int
+
+
+def check_times(time_s: Array) -> None:
+    """Raises Refused `time_not_increasing`."""
+    if len(time_s) < MIN_SAMPLES or not (np.diff(time_s) > 0).all():
+        raise Refused(
+            "time_not_increasing",
+            "the samples are too few, or their time_s does not increase from row to row",
+            "Give every sample once, in the order of time, on one clock",
+        )
+
+
+def overlapping(windows: Sequence[Window]) -> tuple[int, int] | None:
+    """Numbers, from 1, of two windows that share samples."""
+    order = np.argsort([window.start_s for window in windows]).tolist()
+    for first, second in pairwise(order):
+        if windows[second].start_s < windows[first].end_s:
+            return first + 1, second + 1
+    return None
+
+
+def inside(time_s: Array, window: Window) -> slice:
+    """The samples of a window."""
+    start, end = np.searchsorted(time_s, [window.start_s, window.end_s]).tolist()
+    return slice(start, end)
+
+
+def mean_of(readings: Array, window: Window, interval_s: float, where: str) -> Mean:
+    """Mean and its variance, from the scatter about the mean; vibration counts as noise here, for no arm reports it.
+
+    `readings` (n, 3) are those of the window. Raises Fault `lost_samples`, which says `where`.
+    """
+    check_complete(len(readings), window, interval_s, where, MIN_SAMPLES)
+    variance = readings.var(axis=0, ddof=1)
+    wider = np.array([widening(readings[:, axis] - readings[:, axis].mean()) for axis in range(3)])
+    return Mean(readings.mean(axis=0), variance * wider / len(readings), np.sqrt(variance), len(readings))
+
+
+def check_complete(count: int, window: Window, interval_s: float, where: str, least: int) -> None:
+    """Raises Fault `lost_samples` where fewer samples are in a window than belong there."""
+    expected = (window.end_s - window.start_s) / interval_s
+    if count < least or count < (1 - MAX_LOST_FRACTION) * expected - 1:
+        raise Fault(
+            "lost_samples",
+            f"{where} has {count} samples where {expected:.0f} belong",
+            "Check that both files use one clock in seconds, and that no samples are missing",
+        )

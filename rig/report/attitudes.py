@@ -1,0 +1,152 @@
+"""Calibrations from readings in known attitudes, for people and for machines."""
+
+import json
+from collections.abc import Iterator, Mapping
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from rich.console import Console
+from rich.table import Table
+
+from rig.analysis.attitudes import InAttitudes, Surrounding, in_unit
+from rig.errors import Fault
+from rig.estimation import accelerometer, magnetometer
+from rig.estimation.triaxial import TriaxialSolution
+from rig.observation.attitude_import import UNITS, Quantity
+from rig.station.plain_text import plain
+
+SCHEMA = "rig.attitudes/1"
+MODELS: Mapping[Quantity, str] = {
+    "rate": "ω_m = F (Rᵀ ω_E + ω) + b",
+    "acceleration": accelerometer.MODEL,
+    "field": magnetometer.MODEL,
+}
+REFERENCES: Mapping[Quantity, str] = {
+    "rate": "Earth's rate",
+    "acceleration": "specific force at rest",
+    "field": "magnetic field",
+}
+
+
+@dataclass(frozen=True, slots=True)
+class Found:
+    """What two CSV files gave."""
+
+    samples: Path
+    attitudes: Path
+    surrounding: Surrounding
+    results: Mapping[Quantity, InAttitudes | Fault]
+
+
+def print_found(found: Found, *, as_json: bool) -> None:
+    """The solutions on stdout: tables for people, JSON of schema "rig.attitudes/1" for machines."""
+    if as_json:
+        print(json.dumps(_document(found), indent=2, allow_nan=False))
+        return
+    console = Console(highlight=False)
+    for quantity, result in found.results.items():
+        if isinstance(result, Fault):
+            console.print(plain(f"{quantity}: {result}"))
+            continue
+        console.print(_table(f"{found.samples}: {quantity}, {MODELS[quantity]}", quantity, result.solution))
+        for line in _lines(quantity, result, found.surrounding):
+            console.print(plain(line))
+
+
+def _table(title: str, quantity: Quantity, solution: TriaxialSolution) -> Table:
+    """The scale factor and the bias of each axis; ± 2σ."""
+    table = Table(title=plain(title, "table.title"), title_justify="left")
+    unit = UNITS[quantity]
+    for heading in ("axis", "scale factor", "± 2σ", f"bias {unit}", f"± 2σ {unit}"):
+        table.add_column(heading, justify="left" if heading == "axis" else "right")
+    scale, std = in_unit(solution)
+    for i, axis in enumerate("xyz"):
+        bias = f"{solution.bias[i]:+.4e}", f"{2 * std[3 + i]:.1e}"
+        table.add_row(axis, f"{scale[i]:.6f}", f"{2 * std[i]:.6f}", *bias)
+    return table
+
+
+def _lines(quantity: Quantity, result: InAttitudes, surrounding: Surrounding) -> Iterator[str]:
+    solution, unit = result.solution, UNITS[quantity]
+    for axis, row in zip("xyz", solution.matrix.tolist(), strict=True):
+        yield f"F {axis}: " + "  ".join(f"{element:+.6f}" for element in row)
+    reference = " ".join(f"{each:+.6g}" for each in solution.reference)
+    yield f"{REFERENCES[quantity]} in table coordinates: {reference} {unit}"
+    if quantity == "acceleration":
+        yield f"gravity {surrounding.gravity_m_s2:g} m/s², to which the scale factors are relative"
+    if solution.second_order is not None:
+        std = np.sqrt(np.diag(solution.covariance)[15:18])
+        terms = "  ".join(
+            f"{value:+.3e} ± {2 * each:.1e}" for value, each in zip(solution.second_order, std, strict=True)
+        )
+        yield f"second order: {terms} 1/({unit})"
+    if solution.attitude_error is not None:
+        error = solution.attitude_error
+        off, known = 1e3 * error.std_rad, 2e3 * error.uncertainty_rad
+        yield f"attitude error found: {off:.3f} ± {known:.3f} mrad about each axis"
+    rms = float(np.sqrt(np.mean(solution.residuals**2)))
+    judged = f"condition {solution.condition:.1f}, residuals {rms:.2g} {unit}"
+    yield f"{solution.method}: {solution.observations} attitudes, {judged}"
+    yield from (f"warning: {warning}" for warning in solution.warnings)
+    for method, other in result.beside.items():
+        if isinstance(other, Fault):
+            yield f"{method}: {other}"
+        else:
+            scale, bias = (" ".join(f"{each:.6g}" for each in values) for values in (in_unit(other)[0], other.bias))
+            yield f"{method}: scale {scale}, bias {bias} {unit}"
+
+
+def _document(found: Found) -> dict[str, Any]:
+    return {
+        "schema": SCHEMA,
+        "samples": str(found.samples),
+        "attitudes": str(found.attitudes),
+        "gravity_m_s2": found.surrounding.gravity_m_s2,
+        "field_t": found.surrounding.field_t,
+        "quantities": {
+            quantity: {"error": str(result)} if isinstance(result, Fault) else _entry(quantity, result)
+            for quantity, result in found.results.items()
+        },
+    }
+
+
+def _entry(quantity: Quantity, result: InAttitudes) -> dict[str, Any]:
+    return {
+        "model": MODELS[quantity],
+        "unit": UNITS[quantity],
+        **_solution(result.solution),
+        "covariance_order": [
+            *(f"f{i}{j}" for i in "xyz" for j in "xyz"),
+            *(f"reference_{axis}" for axis in "xyz"),
+            *(f"bias_{axis}" for axis in "xyz"),
+            *(f"phi_{axis}" for axis in "xyz" if result.solution.second_order is not None),
+        ],
+        "beside": {
+            method: {"error": str(other)} if isinstance(other, Fault) else _solution(other)
+            for method, other in result.beside.items()
+        },
+    }
+
+
+def _solution(solution: TriaxialSolution) -> dict[str, Any]:
+    error = solution.attitude_error
+    return {
+        "estimator": solution.method,
+        "matrix": solution.matrix.tolist(),
+        "scale": in_unit(solution)[0].tolist(),
+        "bias": solution.bias.tolist(),
+        "reference_table": solution.reference.tolist(),
+        "second_order": None if solution.second_order is None else solution.second_order.tolist(),
+        "covariance": solution.covariance.tolist(),
+        "attitude_error_rad": None if error is None else error.std_rad,
+        "attitude_error_std_rad": None
+        if error is None or not np.isfinite(error.uncertainty_rad)
+        else error.uncertainty_rad,
+        "observations_used": solution.observations,
+        "rank": solution.rank,
+        "condition": solution.condition,
+        "residual_rms": float(np.sqrt(np.mean(solution.residuals**2))),
+        "warnings": list(solution.warnings),
+    }
