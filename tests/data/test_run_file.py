@@ -204,7 +204,7 @@ def reports(pipe: Connection) -> list[tuple[float, int]]:
 def test_a_killed_run_opens_and_holds_all_but_the_last_second(tmp_path: Path, thorough: bool) -> None:
     processes = multiprocessing.get_context("forkserver")
     processes.set_forkserver_preload(["h5py", "rig.data.run_file"])
-    lives = np.random.default_rng(50).uniform(0.0, 2.5, 48 if thorough else 12)
+    lives = np.random.default_rng(50).uniform(0.0, 2.5, 48 if thorough else 6)
     for batch, batch_lives in enumerate(np.array_split(lives, len(lives) // 6)):
         writers = []
         for number in range(len(batch_lives)):

@@ -211,6 +211,8 @@ def test_a_failed_calibration_is_neither_stored_nor_verified(tmp_path: Path) -> 
     assert checks["gyro.verification_rms"]["value"] is None and not checks["gyro.verification_rms"]["passed"]
 
 
+@pytest.mark.proof
+@pytest.mark.thorough
 def test_an_interrupted_verification_is_resumed(tmp_path: Path) -> None:
     out = tmp_path / "run"
     process = subprocess.Popen(
