@@ -101,23 +101,16 @@ def errors(arm: Arm, std: float, method: Method, runs: int, joints: Array = JOIN
         pytest.param(geometry(1e-3), ADIS_3_S, 15, id="ADIS16465, geometry"),
     ],
 )
-@pytest.mark.proof
-def test_an_arm_that_errs_by_a_milliradian_costs_little_and_is_told(
-    arm: Arm, std: float, better: float, thorough: bool
-) -> None:
+def test_an_arm_that_errs_by_a_milliradian_costs_little_and_is_told(arm: Arm, std: float, better: float) -> None:
     """TRIAX weighs all directions alike, and no dwell however long helps it."""
-    published, weighted = (
-        errors(arm, std, method, 40 if thorough else 12) for method in ("as_published", "attitude_weighted")
-    )
+    published, weighted = (errors(arm, std, method, 30) for method in ("as_published", "attitude_weighted"))
     assert weighted.scale * better < published.scale and weighted.bias * better < published.bias
     assert weighted.non_orthogonality * better < published.non_orthogonality
-    wide = 0.0 if thorough else 0.1
-    assert 0.8 - wide < weighted.over_stated < 1.3 + wide < published.over_stated
+    assert 0.8 < weighted.over_stated < 1.3 < published.over_stated
     assert 0.7e-3 < np.sqrt(np.mean(weighted.found_rad**2)) < 1.4e-3
 
 
-@pytest.mark.proof
-@pytest.mark.parametrize("error_rad", [1e-4, *(pytest.param(e, marks=pytest.mark.thorough) for e in (0.0, 1e-3, 3e-3))])
+@pytest.mark.parametrize("error_rad", [0.0, 1e-4, 1e-3, 3e-3])
 def test_it_is_never_worse_than_equal_weights_or_than_the_size_of_gravity_alone(error_rad: float) -> None:
     arm = independent(error_rad)
     weighted = errors(arm, KVH_10_S, "attitude_weighted", 30)
@@ -134,14 +127,12 @@ def test_it_is_never_worse_than_equal_weights_or_than_the_size_of_gravity_alone(
 
 def test_exact_attitudes_are_found_exact_and_cost_nothing() -> None:
     weighted, alike = (
-        errors(independent(0.0), MPU_3_S, method, 15) for method in ("attitude_weighted", "as_published")
+        errors(independent(0.0), MPU_3_S, method, 30) for method in ("attitude_weighted", "as_published")
     )
     assert np.median(weighted.found_rad) == 0.0
-    assert weighted.scale < 1.03 * alike.scale and 0.8 < weighted.over_stated < 1.25
+    assert weighted.scale < 1.03 * alike.scale and 0.85 < weighted.over_stated < 1.2
 
 
-@pytest.mark.proof
-@pytest.mark.thorough
 def test_the_uncertainty_of_the_attitude_error_is_its_scatter() -> None:
     found = [solve(recorded(independent(1e-3), KVH_10_S, seed), KVH_10_S, "attitude_weighted", attitudes_of(JOINTS))
              for seed in range(60)]  # fmt: skip
@@ -153,7 +144,7 @@ def test_the_uncertainty_of_the_attitude_error_is_its_scatter() -> None:
 
 def test_faces_alone_lose_the_angles_between_the_axes_on_a_real_arm() -> None:
     eighteen, faces = (
-        errors(independent(1e-3), KVH_10_S, "attitude_weighted", 10, joints_rad(wrists)) for wrists in (EIGHTEEN, FACES)
+        errors(independent(1e-3), KVH_10_S, "attitude_weighted", 20, joints_rad(wrists)) for wrists in (EIGHTEEN, FACES)
     )
     assert faces.non_orthogonality > 5 * eighteen.non_orthogonality
 
