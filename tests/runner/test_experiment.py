@@ -147,6 +147,8 @@ def test_a_calibration_whose_verification_is_missing_has_not_passed(finished: Fi
     assert missing == VERIFIED
 
 
+@pytest.mark.proof
+@pytest.mark.thorough
 @pytest.mark.parametrize("finished", EXPERIMENTS[:1], indirect=True)
 def test_a_stored_calibration_is_verified_later(finished: Finished, tmp_path: Path) -> None:
     """The board remembers over a power cycle: another process, another laboratory, the same flash."""

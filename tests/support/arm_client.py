@@ -17,7 +17,7 @@ from rtde_receive import RTDEReceiveInterface
 host = sys.argv[1]
 home = [0.0, -1.5707963, 1.5707963, -1.5707963, -1.5707963, 0.0]
 there = [*home[:5], 3.0]
-def say(*words): print(">", *words, flush=True)
+def say(*words): print("\\n>", *words, flush=True)  # ur_rtde may be in the middle of a line
 def until(condition):
     end = time.monotonic() + 30.0
     while not condition():
