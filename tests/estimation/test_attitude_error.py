@@ -20,6 +20,8 @@ KVH_10_S, MPU_3_S, ADIS_3_S = (1e-3 * MG * density / np.sqrt(s) for density, s i
 JOINTS = joints_rad(EIGHTEEN)
 AXIS_PAIRS = [1, 2, 0], [2, 0, 1]
 
+pytestmark = pytest.mark.slow
+
 Arm = Callable[[Array, np.random.Generator], Array]
 
 
