@@ -2,18 +2,21 @@
 
 from collections.abc import Mapping
 from dataclasses import dataclass
+from functools import partial
 from typing import get_args
 
 import numpy as np
 
+from rig.analysis.calibration import or_fault
 from rig.errors import Fault, Refused
 from rig.estimation.arrays import Array
-from rig.estimation.reference_model import Known, KnownNorm, KnownVector
+from rig.estimation.reference_model import BIAS, F, Known, KnownNorm, KnownVector
 from rig.estimation.refusals import check_axes
-from rig.estimation.triaxial import Method, TriaxialSolution, solve_triaxial
+from rig.estimation.sensor_axes import parameter_jacobian
+from rig.estimation.triaxial import EqualWeights, Method, TriaxialSolution, solve_triaxial
 from rig.observation.attitude_import import PlacedReadings, Quantity
 
-METHODS: tuple[Method, ...] = (*get_args(get_args(Method)[0]), *get_args(get_args(Method)[1]))
+METHODS: tuple[Method, ...] = (*get_args(EqualWeights), "attitude_weighted")
 SEEN = 3.0  # standard deviations that the largest second-order term must have
 UPWARDS = dict(zip(("+x", "+y", "+z", "-x", "-y", "-z"), np.concatenate([np.eye(3), -np.eye(3)]), strict=True))
 
@@ -70,12 +73,15 @@ def solve_placed(
     That is "maximum_likelihood" for a gyroscope, whose reference is the Earth's rate, and "attitude_weighted" else.
     """
     return {
-        quantity: _or_fault(
-            placed,
-            quantity,
-            surrounding,
-            method or ("maximum_likelihood" if quantity == "rate" else "attitude_weighted"),
-            second_order and quantity == "acceleration",
+        quantity: or_fault(
+            partial(
+                _solved,
+                placed,
+                quantity,
+                surrounding,
+                method or ("maximum_likelihood" if quantity == "rate" else "attitude_weighted"),
+                second_order=second_order and quantity == "acceleration",
+            )
         )
         for quantity in placed.means
     }
@@ -91,36 +97,28 @@ def known_method(name: str | None) -> Method | None:
     raise Refused("unknown_estimator", f"there is no {name} for readings in attitudes", f"Use {', '.join(METHODS)}")
 
 
-def _or_fault(
-    placed: PlacedReadings, quantity: Quantity, surrounding: Surrounding, method: Method, second_order: bool
-) -> InAttitudes | Fault:
-    try:
-        known = surrounding.known(quantity, placed)
-        solution = _solve(placed, quantity, known, method, second_order=second_order)
-        if second_order:
-            _check_seen(solution)
-        if not surrounding.any_mounting:
-            check_axes(solution.matrix / np.linalg.norm(solution.matrix, axis=1, keepdims=True), np.eye(3))
-    except Fault as fault:
-        return fault
-    beside: dict[Method, TriaxialSolution | Fault] = {}
-    for other in METHODS:
-        if other != method and (other != "attitude_weighted" or quantity != "rate"):
-            try:
-                beside[other] = _solve(placed, quantity, known, other, second_order=second_order)
-            except Fault as fault:
-                beside[other] = fault
-    return InAttitudes(solution, beside)
+def _solved(
+    placed: PlacedReadings, quantity: Quantity, surrounding: Surrounding, method: Method, *, second_order: bool
+) -> InAttitudes:
+    known, means = surrounding.known(quantity, placed), placed.means[quantity]
+    if placed.variances is None:
+        variances = _scatter(placed, means, known, second_order=second_order)
+    else:
+        variances = placed.variances[quantity]
+    solve = partial(_solve, placed, means, variances, known, second_order=second_order)
+    solution = solve(method=method)
+    if second_order:
+        _check_seen(solution)
+    if not surrounding.any_mounting:
+        check_axes(solution.matrix / np.linalg.norm(solution.matrix, axis=1, keepdims=True), np.eye(3))
+    others = [each for each in METHODS if each != method and (each != "attitude_weighted" or quantity != "rate")]
+    return InAttitudes(solution, {other: or_fault(partial(solve, method=other)) for other in others})
 
 
 def _solve(
-    placed: PlacedReadings, quantity: Quantity, known: Known, method: Method, *, second_order: bool
+    placed: PlacedReadings, means: Array, variances: Array, known: Known, *, method: Method, second_order: bool
 ) -> TriaxialSolution:
     """Raises Fault as `solve_triaxial` does, and `inverted_attitudes`."""
-    means = placed.means[quantity]
-    variances = None if placed.variances is None else placed.variances[quantity]
-    if variances is None:
-        variances = _scatter(placed, means, known, second_order=second_order)
 
     def solved(attitudes: Array) -> TriaxialSolution:
         return solve_triaxial(
@@ -182,9 +180,7 @@ def _check_seen(solution: TriaxialSolution) -> None:
 
 def in_unit(solution: TriaxialSolution) -> tuple[Array, Array]:
     """Scale factors 1/‖row of F‖ (3,), and the standard deviations of them and of the bias (6,)."""
-    size = np.linalg.norm(solution.matrix, axis=1)
-    jacobian = np.zeros((6, len(solution.covariance)))
-    for i in range(3):
-        jacobian[i, 3 * i : 3 * i + 3] = -solution.matrix[i] / size[i] ** 3
-        jacobian[3 + i, 12 + i] = 1.0
-    return 1 / size, np.sqrt(np.diag(jacobian @ solution.covariance @ jacobian.T))
+    scale = 1 / np.linalg.norm(solution.matrix, axis=1)
+    jacobian = parameter_jacobian(solution.matrix, scale)
+    told = np.r_[F, BIAS]
+    return scale, np.sqrt(np.diag(jacobian @ solution.covariance[np.ix_(told, told)] @ jacobian.T))

@@ -4,9 +4,7 @@ import argparse
 from pathlib import Path
 
 from rig.errors import Refused
-
-STANDARD_GRAVITY_M_S2 = 9.80665  # by definition (CGPM 1901); the place's own lies within 0.3 % of it
-DEFAULT_ESTIMATOR = "vector"
+from rig.estimation.earth import STANDARD_GRAVITY_M_S2
 
 
 def add_arguments(solve: argparse.ArgumentParser) -> None:
@@ -55,12 +53,14 @@ def add_arguments(solve: argparse.ArgumentParser) -> None:
 def solve(options: argparse.Namespace) -> int:
     """A recording, samples with sweeps, or samples with attitudes."""
     if options.sweeps is None and options.attitudes is None:
+        from rig.analysis.calibration import DEFAULT_ESTIMATOR
         from rig.commands.solve import solve
 
         return solve(options.run, options.estimator or DEFAULT_ESTIMATOR, options.overrides, as_json=options.json)
     if options.overrides:
         raise Refused("unknown_setting", "samples as CSV come without settings", "Leave out --set")
     if options.sweeps is not None:
+        from rig.analysis.calibration import DEFAULT_ESTIMATOR
         from rig.commands.solve_csv import solve_external
 
         return solve_external(options.run, options.sweeps, options.estimator or DEFAULT_ESTIMATOR, as_json=options.json)

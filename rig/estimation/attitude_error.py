@@ -22,6 +22,7 @@ from rig.estimation.reference_model import (
     predicted,
     sensed,
     weighted_jacobian,
+    whitened,
 )
 from rig.estimation.reference_model import matrix as matrix_of
 
@@ -109,7 +110,7 @@ def furthest_off(start: Array, placed: Placed, found: AttitudeWeighted) -> tuple
     One that was not reached makes all look worse than they are, itself better.
     """
     residuals = placed.readings - predicted(found.theta, placed.attitudes, placed.v_bar)
-    worst = int(np.argmax(np.sum((found.white @ residuals[..., None]) ** 2, axis=(1, 2))))
+    worst = int(np.argmax(np.sum(whitened(found.white, residuals) ** 2, axis=1)))
     rest = solve_attitude_weighted(start, placed.without(worst))
     missed = placed.readings[worst] - predicted(rest.theta, placed.attitudes, placed.v_bar)[worst]
     turned = effects(rest.theta, placed.attitudes, placed.v_bar)[worst]
@@ -150,7 +151,7 @@ def _restricted(theta: Array, placed: Placed) -> float:
         white = whitening_with(placed.variances, turned, np.hypot(placed.attitude_std_rad, np.exp(log_delta)))
         fit = weighted_jacobian(theta, r, v_bar, white, norm_known=placed.norm_known)
         orthogonal, triangle = np.linalg.qr(fit)
-        left = (white @ residuals[..., None]).reshape(-1)
+        left = whitened(white, residuals).reshape(-1)
         left = left - orthogonal @ (orthogonal.T @ left)
         sizes = np.linalg.slogdet(white)[1].sum() - np.log(np.abs(np.diag(triangle))).sum()
         return float(0.5 * left @ left - sizes)

@@ -43,17 +43,13 @@ def solve_magnetometer(
     field_t: float,
     side: ArrayLike = (0.0, 0.0, 1.0),
     method: Method = "as_published",
-    attitude_std_rad: ArrayLike | None = None,
 ) -> MagnetometerSolution:
     """Calibrate from mean readings (N, 3) with their variances (N, 3) in attitudes R (N, 3, 3), body to table.
 
     `field_t` is the known size of the field; `side` (3,) a table vector with which it makes less than a right angle
-    (down, in the northern hemisphere). Needs 5 attitudes (rank 14). `attitude_std_rad` (N,) as in
-    `solve_triaxial`. Raises what `solve_triaxial` raises.
+    (down, in the northern hemisphere). Needs 5 attitudes (rank 14). Raises what `solve_triaxial` raises.
     """
-    fit = solve_triaxial(
-        readings_t, attitudes, variances_t2, KnownNorm(field_t, side), method=method, attitude_std_rad=attitude_std_rad
-    )
+    fit = solve_triaxial(readings_t, attitudes, variances_t2, KnownNorm(field_t, side), method=method)
     hard_iron = np.asarray(np.linalg.solve(fit.matrix, fit.bias), dtype=np.float64)
     return MagnetometerSolution(fit.matrix, fit.bias, fit.reference, hard_iron, fit.covariance, fit)
 

@@ -109,6 +109,12 @@ def whitening(variances: Array) -> Array:
     return np.asarray(np.eye(3) / np.sqrt(variances)[..., None], dtype=np.float64)
 
 
+def whitened(white: Array, residuals: Array) -> Array:
+    """W r (…, N, 3) of residuals (…, N, 3): independent, each with the standard deviation 1."""
+    independent: Array = (white @ residuals[..., None])[..., 0]
+    return independent
+
+
 def weighted_jacobian(theta: Array, attitudes: Array, v_bar: Array, white: Array, *, norm_known: bool) -> Array:
     """W J (…, 3 N, q), reduced to the free directions: (W J)ᵀ W J is the Fisher information."""
     free = free_directions(theta, norm_known=norm_known)
@@ -138,7 +144,7 @@ def most_likely(
     while steps < STEP_LIMIT:
         steps += 1
         reduced = weighted_jacobian(theta, attitudes, v_bar, white, norm_known=norm_known)
-        residuals = (white @ (readings - predicted(theta, attitudes, v_bar))[..., None])[..., 0]
+        residuals = whitened(white, readings - predicted(theta, attitudes, v_bar))
         size = np.linalg.norm(reduced, axis=-2)
         scaled = reduced / size[..., None, :]
         right = np.einsum("...rq,...r->...q", scaled, residuals.reshape(*residuals.shape[:-2], -1))
@@ -149,7 +155,7 @@ def most_likely(
             reference = theta[..., REFERENCE]
             theta[..., REFERENCE] = reference * (norm / np.linalg.norm(reference, axis=-1, keepdims=True))
         # In standard deviations of a reading; beyond rounding, which small variances make large in this unit.
-        rounding = 1e-13 * np.linalg.norm(white @ readings[..., None])
+        rounding = 1e-13 * np.linalg.norm(whitened(white, readings))
         if np.max(np.linalg.norm(step, axis=-1)) <= STEP_TOLERANCE + rounding:
             break
     return theta, steps

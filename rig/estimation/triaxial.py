@@ -36,6 +36,7 @@ from rig.estimation.reference_model import (
     most_likely,
     predicted,
     sensed,
+    whitened,
     whitening,
 )
 from rig.estimation.stacked import column_sizes, published_covariance, published_estimate, stack
@@ -138,7 +139,6 @@ def solve_triaxial(
             "Correct the order and signs of the sensor's axes, or the side the reference points to",
         )
     residuals = m - predicted(theta, r, v_bar)
-    whitened = (white @ residuals[..., None])[..., 0]
     return TriaxialSolution(
         method=method,
         matrix=f,
@@ -151,7 +151,8 @@ def solve_triaxial(
         rank=told.rank,
         condition=told.condition,
         iterations=iterations,
-        warnings=refusals.inconsistency(whitened, np.ones_like(v), 3 * len(m) - needed) + _errors_in_x(m, v, method),
+        warnings=refusals.inconsistency(whitened(white, residuals), np.ones_like(v), 3 * len(m) - needed)
+        + _errors_in_x(m, v, method),
         attitude_error=attitude_error,
     )
 

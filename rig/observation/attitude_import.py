@@ -21,7 +21,7 @@ import numpy as np
 from rig.errors import Fault, Refused
 from rig.estimation.arrays import Array
 from rig.observation.csv_table import read_columns
-from rig.observation.csv_windows import MIN_SAMPLES, check_complete, check_times, inside, mean_of, overlapping
+from rig.observation.csv_windows import MIN_SAMPLES, check_complete, check_times, inside, overlapping, scatter_of
 from rig.observation.windows import Window
 
 Quantity = Literal["rate", "acceleration", "field"]
@@ -74,24 +74,20 @@ def read_placed(samples_path: Path, attitudes_path: Path) -> PlacedReadings:
     check_times(time_s)
     windows = _windows(rows)
     readings = {quantity: np.column_stack([samples[name] for name in COLUMNS[quantity]]) for quantity in given}
-    counts = np.array([inside(time_s, window).stop - inside(time_s, window).start for window in windows])
+    cuts = [inside(time_s, window) for window in windows]
+    counts = np.array([cut.stop - cut.start for cut in cuts])
     interval_s = float(np.median(np.diff(time_s)))
     for row, (window, count) in enumerate(zip(windows, counts.tolist(), strict=True), start=1):
-        check_complete(count, window, interval_s, f"attitude {row}", 1)
-    means, variances = {}, {}
-    short = bool(counts.min() < MIN_SAMPLES)
-    for quantity, each in readings.items():
-        cuts = [each[inside(time_s, window)] for window in windows]
-        means[quantity] = np.array([cut.mean(axis=0) for cut in cuts])
-        if not short:
-            placed = [
-                mean_of(cut, window, interval_s, f"attitude {row}")
-                for row, (cut, window) in enumerate(zip(cuts, windows, strict=True), start=1)
-            ]
-            variances[quantity] = np.array([mean.variance for mean in placed])
+        check_complete(count, window, interval_s, f"attitude {row}", least=1)
+    means = {quantity: np.array([each[cut].mean(axis=0) for cut in cuts]) for quantity, each in readings.items()}
+    variances = None
+    if counts.min() >= MIN_SAMPLES:
+        variances = {
+            quantity: np.array([scatter_of(each[cut])[0] for cut in cuts]) for quantity, each in readings.items()
+        }
     return PlacedReadings(
         means,
-        None if short else variances,
+        variances,
         counts.astype(np.float64),
         _rotations(rows),
         np.column_stack([rows[name] for name in RATE_COLUMNS]) if RATE_COLUMNS[0] in rows else None,

@@ -21,7 +21,7 @@ from rig.estimation.arrays import Array
 from rig.estimation.refusals import check_reading_ratio
 from rig.observation.average import Average
 from rig.observation.csv_table import read_columns
-from rig.observation.csv_windows import check_times, inside, mean_of, overlapping
+from rig.observation.csv_windows import check_complete, check_times, inside, overlapping, scatter_of
 from rig.observation.observe import Observation, nearest_axis
 from rig.observation.windows import Window
 
@@ -110,12 +110,13 @@ def _speeds(sweeps: dict[str, Array]) -> Array:
 
 
 def _average(readings: Array, window: Window, interval_s: float, row: int) -> Average:
-    mean = mean_of(readings, window, interval_s, f"sweep {row}")
+    check_complete(len(readings), window, interval_s, f"sweep {row}")
+    variance, noise = scatter_of(readings)
     return Average(
-        mean_rad_s=mean.value,
-        variance_rad2_s2=mean.variance,
-        noise_rad_s=mean.noise,
-        samples=mean.samples,
+        mean_rad_s=readings.mean(axis=0),
+        variance_rad2_s2=variance,
+        noise_rad_s=noise,
+        samples=len(readings),
         start_s=window.start_s,
         end_s=window.end_s,
         temperature_c=float("nan"),

@@ -1,7 +1,6 @@
 """What CSV files recorded elsewhere have in common: samples in the order of time, rows from one moment to another."""
 
 from collections.abc import Sequence
-from dataclasses import dataclass
 from itertools import pairwise
 
 import numpy as np
@@ -13,16 +12,6 @@ from rig.observation.windows import Window
 
 MIN_SAMPLES = 20
 MAX_LOST_FRACTION = 0.01
-
-
-@dataclass(frozen=True, slots=True)
-class Mean:
-    """Of the readings (3,) in a window, with its variance and the standard deviation of one of them."""
-
-    value: Array
-    variance: Array
-    noise: Array
-    samples: int
 
 
 def check_times(time_s: Array) -> None:
@@ -50,18 +39,17 @@ def inside(time_s: Array, window: Window) -> slice:
     return slice(start, end)
 
 
-def mean_of(readings: Array, window: Window, interval_s: float, where: str) -> Mean:
-    """Mean and its variance, from the scatter about the mean; vibration counts as noise here, for no arm reports it.
+def scatter_of(readings: Array) -> tuple[Array, Array]:
+    """The variance of the mean of readings (n, 3), and the standard deviation of one of them, (3,) each.
 
-    `readings` (n, 3) are those of the window. Raises Fault `lost_samples`, which says `where`.
+    From the scatter about the mean; vibration counts as noise here, for no arm reports it.
     """
-    check_complete(len(readings), window, interval_s, where, MIN_SAMPLES)
     variance = readings.var(axis=0, ddof=1)
     wider = np.array([widening(readings[:, axis] - readings[:, axis].mean()) for axis in range(3)])
-    return Mean(readings.mean(axis=0), variance * wider / len(readings), np.sqrt(variance), len(readings))
+    return variance * wider / len(readings), np.sqrt(variance)
 
 
-def check_complete(count: int, window: Window, interval_s: float, where: str, least: int) -> None:
+def check_complete(count: int, window: Window, interval_s: float, where: str, least: int = MIN_SAMPLES) -> None:
     """Raises Fault `lost_samples` where fewer samples are in a window than belong there."""
     expected = (window.end_s - window.start_s) / interval_s
     if count < least or count < (1 - MAX_LOST_FRACTION) * expected - 1:

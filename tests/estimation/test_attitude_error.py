@@ -38,19 +38,13 @@ def geometry(error_rad: float) -> Arm:
     return lambda joints, rng: crooked(joints, error_rad, rng)
 
 
-def solve(m: Array, std: float, method: Method, r: Array, **options: Array) -> AccelerometerSolution:
+def solve(
+    m: Array, std: float, method: Method, r: Array, *, attitude_std_rad: Array | None = None
+) -> AccelerometerSolution:
     variances = np.full_like(m, std**2)
-    if "attitude_std_rad" in options:
-        return solve_accelerometer(
-            m,
-            r,
-            variances,
-            gravity_m_s2=NORM,
-            down=(0, 0, -1),
-            method=method,
-            attitude_std_rad=options["attitude_std_rad"],
-        )
-    return solve_accelerometer(m, r, variances, gravity_m_s2=NORM, down=(0, 0, -1), method=method)
+    return solve_accelerometer(
+        m, r, variances, gravity_m_s2=NORM, down=(0, 0, -1), method=method, attitude_std_rad=attitude_std_rad
+    )
 
 
 def recorded(arm: Arm, std: float, seed: int, joints: Array = JOINTS) -> Array:

@@ -19,7 +19,7 @@ SPEED_RAD_S = np.pi / 3
 JOINTS = 6
 AXIS_RAD = np.radians(0.06)  # half-width, as `uncertainty.axis_deg` has it by default
 WAVE_RAD = 0.3 * AXIS_RAD / np.sqrt(3)  # of the encoders' waves, cosine and sine each
-HALF_COUNT_RAD_S = {"lsm9ds1": 0.0, "adis16465": np.radians(0.025) / 2}  # its upper words alone round downwards
+HALF_COUNT_RAD_S = {"adis16465": np.radians(0.025) / 2}  # its upper words alone round downwards
 PART_ERRORS: dict[str, dict[str, float]] = {  # standard deviations, as those values that the configurations give
     "lsm9ds1": {
         "g_rad_s": 1.7e-3, "bias_per_k": 5e-4, "scale_per_k": 3e-4, "flicker_rad_s": 4.8e-5, "walk": 1e-5,
