@@ -61,13 +61,17 @@ class Deviation:
 
 @dataclass(frozen=True, slots=True)
 class RevolutionError:
-    """Mean reading less mean reference over one whole turn, (3,) rad/s, and what noise leaves uncertain of it."""
+    """Mean reading less mean reference over one whole turn, (3,) rad/s, and what noise leaves uncertain of it.
+
+    `gravity_rad_s` (3,) is what of it gravity adds to the reading, None where no calibration tells.
+    """
 
     sweep: int
     joint_name: str | None
     direction: str | None
     error_rad_s: Array
     std_rad_s: Array
+    gravity_rad_s: Array | None
 
 
 @dataclass(frozen=True, slots=True)
@@ -91,9 +95,16 @@ class Comparison:
     delay_std_s: tuple[float, ...]
 
 
-def compare(recordings: Sequence[ObservedRun], sensor: str, reference: Reference, rotation: Array) -> Comparison:
+def compare(
+    recordings: Sequence[ObservedRun],
+    sensor: str,
+    reference: Reference,
+    rotation: Array,
+    gravity_rad_s: Array | None = None,
+) -> Comparison:
     """The readings of `sensor` as they were recorded beside the reference's; `rotation` (3, 3) turns the latter.
 
+    `gravity_rad_s` (N, 3) is what gravity adds to the readings of each revolution, where that is known.
     Raises Fault `no_overlap`, `different_clocks`.
     """
     parts = [_part(recording, sensor, reference, rotation) for recording in recordings]
@@ -104,7 +115,7 @@ def compare(recordings: Sequence[ObservedRun], sensor: str, reference: Reference
         movement=_deviation([part.error[part.sweeping | part.resting] for part in parts]),
         sweeps=_deviation([part.error[part.sweeping] for part in parts]),
         noise_rad_s=_noise([part.error[rest] for part in parts for rest in part.still]),
-        revolutions=_revolution_errors(recordings, sensor, reference, rotation),
+        revolutions=_revolution_errors(recordings, sensor, reference, rotation, gravity_rad_s),
         delay_s=tuple(part.delay.delay_s for part in parts),
         delay_std_s=tuple(part.delay.std_s for part in parts),
     )
@@ -210,13 +221,14 @@ def _noise(rests: Sequence[Array]) -> Array | None:
 
 
 def _revolution_errors(
-    recordings: Sequence[ObservedRun], sensor: str, reference: Reference, rotation: Array
+    recordings: Sequence[ObservedRun], sensor: str, reference: Reference, rotation: Array, gravity_rad_s: Array | None
 ) -> tuple[RevolutionError, ...]:
     turns = turns_of(sensor, recordings)
     tested, known = mean_rates(turns), mean_rates(turns_of(reference.name, recordings), reference).turned(rotation)
     errors = tested.rate_rad_s - known.rate_rad_s
     stds = np.sqrt(np.diagonal(tested.covariance_rad2_s2 + known.covariance_rad2_s2, axis1=1, axis2=2))
+    held = [None] * len(turns) if gravity_rad_s is None else gravity_rad_s
     return tuple(
-        RevolutionError(turn.sweep, turn.joint_name, turn.direction, error, std)
-        for turn, error, std in zip(turns, errors, stds, strict=True)
+        RevolutionError(turn.sweep, turn.joint_name, turn.direction, error, std, gravity)
+        for turn, error, std, gravity in zip(turns, errors, stds, held, strict=True)
     )

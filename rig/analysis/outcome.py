@@ -15,7 +15,7 @@ from rig.analysis.calibration import (
     solve_observed,
 )
 from rig.analysis.clock import ClockCheck
-from rig.analysis.comparison import Reference
+from rig.analysis.comparison import Reference, turns_of
 from rig.analysis.contradictions import contradictions
 from rig.analysis.onboard_check import Agreement, agreement
 from rig.analysis.surroundings import surroundings_of
@@ -24,7 +24,9 @@ from rig.analysis.verification import Verification, verify
 from rig.data.provenance import Provenance
 from rig.data.result_file import StoredCalibrationEntry
 from rig.data.run_file import RunData
-from rig.data.settings import RunSettings
+from rig.data.settings import RunSettings, Site
+from rig.estimation.arrays import Array
+from rig.estimation.vector_model import VectorSolution
 from rig.observation.observed_run import ObservedRun, observe_runs
 
 
@@ -114,7 +116,14 @@ def verified(outcome: Outcome, repeated: Sequence[RunData]) -> Outcome:
         after = observe_runs(repeated)
         reference = Reference(known.name, np.array(known.scale), np.array(known.bias_rad_s))
         found = {
-            name: verify(name, reference, after, outcome.recordings, outcome.results.get(name))
+            name: verify(
+                name,
+                reference,
+                after,
+                outcome.recordings,
+                outcome.results.get(name),
+                gravity_rad_s=_gravity_left(outcome.results, (name, reference), after, settings.site),
+            )
             for name in settings.to_calibrate
         }
     checks = [check for name, each in found.items() for check in verification_checks(name, each, settings.limits)]
@@ -128,6 +137,28 @@ def verified(outcome: Outcome, repeated: Sequence[RunData]) -> Outcome:
             verified_utc=tuple(run.provenance.started_utc for run in repeated),
         ),
     )
+
+
+def _gravity_left(
+    results: Mapping[str, SensorResult], pair: tuple[str, Reference], after: Sequence[ObservedRun], site: Site | None
+) -> tuple[Array, Array] | None:
+    """(N, 3) what gravity adds to the corrected readings of sensor and reference, neither of which knows where down is.
+
+    None where the calibration did not find it.
+    """
+    name, reference = pair
+    corrections = {name: results[name].correction_matrix} if name in results else {}
+    corrections[reference.name] = reference.correction_matrix
+    left = []
+    for each, matrix in corrections.items():
+        solution = results[each].vector_model if each in results else None
+        if site is None or not isinstance(solution, VectorSolution) or solution.g_sensitivity is None:
+            return None
+        attitudes = np.array([turn.average.attitude for turn in turns_of(each, after)], dtype=np.float64)
+        down = -site.gravity_m_s2 * np.array(site.up)
+        left.append(attitudes @ down @ (matrix @ solution.g_sensitivity).T)
+    of_sensor, of_reference = left
+    return of_sensor, of_reference
 
 
 def verified_alone(repeated: Sequence[RunData]) -> Outcome:

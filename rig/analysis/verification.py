@@ -14,6 +14,7 @@ from rig.analysis.alignment import Calibration, RelativeRotation, mean_rates, re
 from rig.analysis.comparison import Comparison, Reference, compare, turns_of
 from rig.data.run_file import RunData
 from rig.errors import Fault
+from rig.estimation.arrays import Array
 from rig.observation.observed_run import ObservedRun
 from rig.observation.windows import finished_sweeps
 
@@ -40,11 +41,14 @@ def verify(
     after: Sequence[ObservedRun],
     before: Sequence[ObservedRun] = (),
     calibration: Calibration | None = None,
+    *,
+    gravity_rad_s: tuple[Array, Array] | None = None,
 ) -> Verification:
     """Judge the readings that the board has calibrated (`after`) by the reference beside it.
 
     `before` are the recordings of raw readings that the `calibration` was made from; they tell how the two sensors sit
-    to each other. Without them `after` itself tells it.
+    to each other. Without them `after` itself tells it. `gravity_rad_s` (N, 3) is what gravity adds to the corrected
+    readings of sensor and reference in the revolutions of `after`, where the calibration found it.
 
     Raises Fault `sensor_missing`, `wrong_mode`, `nothing_to_compare`, `incomplete_verification`, `no_overlap`,
     `different_clocks`, and as `relative_rotation` does.
@@ -63,8 +67,17 @@ def verify(
         _against_the_arm(after, reference),
         rotation,
         compare(before, sensor, reference, rotation.matrix) if before else None,
-        compare(after, sensor, reference, rotation.matrix),
+        compare(after, sensor, reference, rotation.matrix, _apart(gravity_rad_s, rotation.matrix)),
     )
+
+
+def _apart(gravity_rad_s: tuple[Array, Array] | None, rotation: Array) -> Array | None:
+    """(N, 3) how far gravity takes the sensor's readings from the reference's."""
+    if gravity_rad_s is None:
+        return None
+    of_sensor, of_reference = gravity_rad_s
+    apart: Array = of_sensor - of_reference @ rotation.T
+    return apart
 
 
 def relative_mounting(

@@ -266,13 +266,14 @@ class DeviationEntry(Entry):
 
 
 class RevolutionErrorEntry(Entry):
-    """Mean reading less mean reference over one revolution."""
+    """Mean reading less mean reference over one revolution; `gravity_rad_s` is what of it gravity adds, if known."""
 
     sweep: int
     joint: str
     direction: str
     error_rad_s: Vector3
     std_rad_s: Vector3
+    gravity_rad_s: Vector3 | None = None
 
 
 class ComparisonEntry(Entry):

@@ -38,5 +38,9 @@ def verification_lines(entry: VerificationEntry) -> Iterator[str]:
     stds = [turn.std_rad_s for turn in entry.after.revolutions]
     yield f"the reference itself, against the arm: at most {entry.reference_error_rad_s:.5f} rad/s off"
     yield f"mean over a revolution after: at most {np.abs(errors).max():.5f} rad/s off (± {np.max(stds):.5f})"
+    held = [turn.gravity_rad_s for turn in entry.after.revolutions]
+    if None not in held:
+        without = np.abs(np.array(errors) - np.array(held)).max()
+        yield f"    of which gravity, which the board cannot see: without it at most {without:.5f}"
     for delay, std in zip(entry.after.delay_s, entry.after.delay_std_s, strict=True):
         yield f"lags the reference by {1e3 * delay:.2f} ms (± {1e3 * std:.2f}), taken out"

@@ -196,6 +196,7 @@ def test_an_undamaged_run_raises_no_alarm(thorough: bool) -> None:
     assert FALSE_ALARMS == 0.01
 
 
+@pytest.mark.slow
 def test_a_disturbed_sweep_is_named_and_fails_the_verdict() -> None:
     """Which of the two about one axis it was cannot be told where there are only two."""
     run = offset(0.02, sweep_2)(readings_of(Setup(noise_rad_s=0.005))).recording()
@@ -206,17 +207,20 @@ def test_a_disturbed_sweep_is_named_and_fails_the_verdict() -> None:
     assert disturbed_sweeps([run]) == {2, 3}
 
 
+@pytest.mark.slow
 def test_of_several_sweeps_alike_the_disturbed_one_is_named_alone() -> None:
     setup = Setup(noise_rad_s=0.005, repeats=2, rest_s=1.0, speed_deg_s=120.0)
     assert disturbed_sweeps([offset(0.02, sweep_2)(readings_of(setup)).recording()]) == {2}
 
 
+@pytest.mark.slow
 def test_recordings_of_before_there_was_a_site_are_judged_as_they_were() -> None:
     run = offset(0.02, sweep_2)(readings_of(Setup(noise_rad_s=0.005))).recording()
     old_run = replace(run, settings=replace(run.settings, site=None))
     assert judged(old_run)[0] == () and disturbed_sweeps([old_run]) == frozenset()
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
     ("rest_s", "repeats", "without"),
     [(0.0, 1, {"sweeps_against_rests", "skewed_noise", "bias_jumped"}), (0.7, 1, set()), (1.0, 3, set())],

@@ -59,6 +59,7 @@ def test_three_axes_do_not_tell_the_sensors_angles_from_the_arms_and_say_so() ->
     assert found < 3 * std
 
 
+@pytest.mark.slow
 def test_six_axes_tell_them_apart() -> None:
     found, std = skew_deg(solved(SIX))
     assert found < 0.01
@@ -69,6 +70,7 @@ def test_six_axes_leave_scale_and_bias_as_well_known() -> None:
     assert np.abs(off(SIX)).max() < 4
 
 
+@pytest.mark.slow
 def test_several_speeds_tell_the_nonlinearity_and_the_scale_without_it() -> None:
     explained = solved(CURVED).explained
     assert explained is not None

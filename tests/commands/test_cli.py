@@ -56,6 +56,7 @@ def test_a_procedures_help_is_the_instruction_for_the_technician(procedure: str)
     assert done.returncode == 0 and "Before you start:" in done.stdout and "What happens:" in done.stdout, done
 
 
+@pytest.mark.slow
 def test_the_plan_of_a_verification_is_not_said_to_be_repeated() -> None:
     plan = f"{sys.executable} -m rig plan {ROOT / 'configs' / 'lsm9ds1_adis16465.yaml'}"
     assert "the same once more to verify it" in shell(plan).stdout

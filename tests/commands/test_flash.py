@@ -132,6 +132,7 @@ def test_the_drive_is_found_among_others(tmp_path: Path) -> None:
     assert refused(lambda: flashing.find_drive([nucleo, second])).name == "several_drives"
 
 
+@pytest.mark.slow
 def test_another_drive_is_refused_by_name_before_anybody_is_asked(tmp_path: Path) -> None:
     (tmp_path / "stick").mkdir()
     drive(tmp_path / "NODE_F302R8", code="0705")

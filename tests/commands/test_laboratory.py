@@ -13,6 +13,7 @@ from support.paths import DEMO
 from support.worlds import World
 
 
+@pytest.mark.slow
 def test_a_laboratory_whose_port_is_taken_is_refused_by_the_worlds_own_words(world: World) -> None:
     running = world()
     with (

@@ -275,6 +275,7 @@ except Fault as fault:
 """
 
 
+@pytest.mark.slow
 def test_a_full_disk_is_a_named_fault_and_keeps_what_was_written(tmp_path: Path) -> None:
     path = tmp_path / "run.h5"
     script = FULL_DISK.format(tests=str(ROOT / "tests"), path=str(path))

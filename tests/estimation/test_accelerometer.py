@@ -77,6 +77,7 @@ def test_the_iteration_settles_and_leaves_what_first_order_cannot_explain() -> N
     assert "times what the variances explain" in first.fit.warnings[0] and not second.fit.warnings
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("method", METHODS)
 @pytest.mark.parametrize("second_order", [False, True])
 def test_the_covariance_is_that_of_repeated_calibrations(method: EqualWeights, second_order: bool) -> None:

@@ -39,6 +39,7 @@ def test_the_covariance_of_a_walk_is_that_of_many_walks() -> None:
     assert np.abs(found - expected).max() < 0.06 * expected.diagonal().max()
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("noise_rad_s", [0.00045, 0.002])  # of a sample, at 200 Hz: ADIS16465, LSM9DS1
 def test_a_bias_that_walks_is_as_uncertain_as_it_has_to_be(noise_rad_s: float) -> None:
     windows_s, rates = session()
@@ -66,6 +67,7 @@ def solve(means: Array, rates: Array, variances: Array, process: BiasProcess, wi
     return solve_vector_model(means, rates, variances, shared_covariance_rad2_s2=shared)
 
 
+@pytest.mark.slow
 def test_a_steady_bias_is_stated_hardly_less_well_than_if_it_were_known_to_be() -> None:
     windows_s, rates = session()
     variances = np.full((12, 3), 1e-10)

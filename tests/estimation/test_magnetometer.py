@@ -44,6 +44,7 @@ def test_iron_field_and_offset_are_found(method: EqualWeights) -> None:
     np.testing.assert_allclose(field(readings(r), exact), np.einsum("nji,j->ni", r, EARTH_FIELD), atol=1e-16)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("method", METHODS)
 def test_the_covariance_is_that_of_repeated_calibrations(method: EqualWeights) -> None:
     r = attitudes(20)

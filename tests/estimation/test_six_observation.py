@@ -145,6 +145,7 @@ def test_algorithm_1_needs_more_passes_for_a_closer_tolerance() -> None:
     assert by_algorithm_1(p, q, 1e-12)[1] > by_algorithm_1(p, q)[1]
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("repeats", [1, 3])
 @pytest.mark.parametrize("bias", [BIAS, np.array([0.15, -0.13, 0.18])])
 def test_the_covariance_is_that_of_repeated_calibrations(repeats: int, bias: Array) -> None:

@@ -92,6 +92,7 @@ def test_order_and_unit_of_time_do_not_matter() -> None:
     np.testing.assert_allclose(np.radians(in_degrees.bias_rad_s), one.bias_rad_s, rtol=1e-12)
 
 
+@pytest.mark.slow
 def test_every_covariance_is_that_of_repeated_calibrations() -> None:
     truth = solve_vector_model(readings(), RATES, VARIANCES)
     runs = [everything(solve_vector_model(m, RATES, VARIANCES)) for m in noisy(readings(), runs=3000)]

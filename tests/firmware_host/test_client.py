@@ -409,6 +409,7 @@ def test_frames_that_come_twice_are_taken_once_and_counted(wire: tuple[BoardOnAW
     assert (status.frames_lost, status.frames_repeated) == (0, doubled[0])
 
 
+@pytest.mark.slow
 @ON_ONE_WIRE
 def test_bytes_that_come_twice_cost_the_frames_they_damage_and_no_others(wire: tuple[BoardOnAWire, str]) -> None:
     random = np.random.default_rng(2)
@@ -476,6 +477,7 @@ def streaming(wire: tuple[BoardOnAWire, str]) -> Board:
     return board
 
 
+@pytest.mark.slow
 def test_a_board_that_falls_silent_while_streaming_is_noticed_within_two_seconds_and_a_bit(
     wire: tuple[BoardOnAWire, str],
 ) -> None:
@@ -486,6 +488,7 @@ def test_a_board_that_falls_silent_while_streaming_is_noticed_within_two_seconds
     assert error.name == "board_link_lost" and 1.0 < after_s < 4.0
 
 
+@pytest.mark.slow
 @ON_ONE_WIRE
 def test_noise_instead_of_frames_while_streaming_is_a_lost_link(wire: tuple[BoardOnAWire, str]) -> None:
     with closing(streaming(wire)) as board:

@@ -95,6 +95,7 @@ def test_what_is_not_there_is_refused_by_name(run: rig.Run, result: rig.Result) 
         rig.sovle  # noqa: B018
 
 
+@pytest.mark.slow
 def test_everything_shows_itself_in_a_line_or_a_table(run: rig.Run, result: rig.Result) -> None:
     beside = rig.compare(run, "gyro", "reference")
     for shown in (run, run["gyro"], result, result["gyro"], beside):

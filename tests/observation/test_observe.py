@@ -70,6 +70,7 @@ def clock_errors(setup: Setup, clock: TimeBase) -> tuple[float, float]:
     return clock.offset_s - (setup.boot_s + setup.drift * clock.reference_s), clock.drift - setup.drift
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
     "setup",
     [
@@ -190,6 +191,7 @@ def test_coloured_noise_widens_the_uncertainty() -> None:
     np.testing.assert_allclose(wide / usual, 4.0, rtol=0.4)
 
 
+@pytest.mark.slow
 def test_of_a_vibration_hardly_anything_is_left_in_a_mean() -> None:
     """Its correlations do not say so: added up to any lag they are large."""
     rng = np.random.default_rng(5)
@@ -219,6 +221,7 @@ def drifting(run: RunData, change_rad_s: float) -> RunData:
     return counts(run, change)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(("noise_rad_s", "change_rad_s"), [(0.035, 0.03), (0.003, 0.01)])
 def test_a_bias_that_drifts_makes_the_result_uncertain(noise_rad_s: float, change_rad_s: float) -> None:
     """The rests show it. Without them the errors would be nine and thirty times what is reported.
@@ -454,6 +457,7 @@ def thinned(run: RunData, seed: int) -> RunData:
     return with_arm(run, lambda arm: arm[kept])
 
 
+@pytest.mark.slow
 def test_holes_between_arm_states_cost_certainty_not_truth() -> None:
     errors, clocks, stds = [], [], []
     for seed in range(24):

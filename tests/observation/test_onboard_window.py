@@ -29,6 +29,7 @@ def told(run: RunData, setup: Setup, sweep: int) -> tuple[float, float]:
     return middle_s - (start_s + end_s) / 2, float(np.degrees(speed_rad_s))
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
     "setup",
     [Setup(), Setup(speed_deg_s=10.0, rest_s=0.5), Setup(sample_rate_hz=14.9, noise_rad_s=0.005)],

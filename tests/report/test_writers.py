@@ -59,6 +59,7 @@ print(*(event.path.name for event in write_outcome(Path(sys.argv[2]), calibrated
 """
 
 
+@pytest.mark.slow
 def test_a_writer_of_ones_own_is_a_file_and_a_line(tmp_path: Path) -> None:
     house = tmp_path / "house"
     shutil.copytree(ROOT / "rig", house / "rig", ignore=shutil.ignore_patterns("__pycache__"))

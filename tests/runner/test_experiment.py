@@ -94,6 +94,18 @@ def test_calibrated_readings_follow_the_reference(finished: Finished) -> None:
             assert (out / f"verification_gyro_{when}{suffix}").stat().st_size > 10_000
 
 
+def test_gravitys_share_of_what_is_left_is_told(finished: Finished) -> None:
+    """The board does not know which way is down: about the vertical axis most of what it leaves is gravity's hold."""
+    out, result, _ = finished
+    upright = [turn for turn in result["verification"]["gyro"]["after"]["revolutions"] if turn["joint"] == "wrist_3"]
+    along = np.array([turn["error_rad_s"][2] for turn in upright])
+    gravity = np.array([turn["gravity_rad_s"][2] for turn in upright])
+    print(f"along the axis {along}, without gravity {along - gravity} rad/s")
+    assert np.abs(along - gravity).max() < np.abs(along).min() / 2
+    shown = subprocess.run(command("solve", out), capture_output=True, text=True, timeout=240, check=False)
+    assert "of which gravity" in shown.stdout
+
+
 def test_the_references_mounting_is_found(finished: Finished) -> None:
     """The simulated sensors sit askew by their own mounting errors; what is between them is reported.
 

@@ -47,6 +47,7 @@ def test_a_sweep_that_contradicts_the_others_is_repeated() -> None:
     assert resumption([run], run.settings, SCRIPT).done == {0, 1, 2, 3}
 
 
+@pytest.mark.slow
 def test_what_was_repeated_counts_in_its_place() -> None:
     damaged = known_to_the_board(offset(0.02, lambda seen: seen.sweep(4))(readings_of(SETUP)).recording())
     again = known_to_the_board(readings_of(replace(SETUP, seed=2)).recording())

@@ -123,6 +123,7 @@ def test_the_clock_goes_no_faster_than_a_real_one_while_a_client_asks() -> None:
     assert ticks_in(DIALOGUE_S * 0.99) == pytest.approx(DIALOGUE_S / TICK_S, abs=1)
 
 
+@pytest.mark.slow
 @linux
 @pytest.mark.parametrize("pause_s", [0.003, 0.02, 0.25])
 def test_the_world_does_not_run_ahead_of_a_slow_client(world: World, pause_s: float) -> None:
@@ -135,6 +136,7 @@ def test_the_world_does_not_run_ahead_of_a_slow_client(world: World, pause_s: fl
     assert max(after - before for before, after in pairwise(times_s)) < ARM_LAG_S + 2 * PERIOD_S
 
 
+@pytest.mark.slow
 def test_a_client_that_never_reads_again_does_not_stop_the_world_for_others(world: World) -> None:
     running = world(FAST)
     deaf = RtdeReader(running.host)
@@ -145,6 +147,7 @@ def test_a_client_that_never_reads_again_does_not_stop_the_world_for_others(worl
     deaf.close()
 
 
+@pytest.mark.slow
 def test_a_client_that_comes_back_after_long_is_waited_for_again(world: World) -> None:
     running = world(FAST)
     reader = RtdeReader(running.host)
@@ -159,6 +162,7 @@ def turn(arm: Arm) -> Transfer:
     return Transfer("test move", start, (*start[:5], start[5] + 4.0), 1.0, 2.0, trapezoid_duration(4.0, 1.0, 2.0))
 
 
+@pytest.mark.slow
 @linux
 def test_a_stalled_wire_does_not_end_a_move(world: World) -> None:
     times_s: list[float] = []
@@ -179,6 +183,7 @@ def test_a_stalled_wire_does_not_end_a_move(world: World) -> None:
     assert max(after - before for before, after in pairwise(times_s)) < 1.0, "4 s passed in the world meanwhile"
 
 
+@pytest.mark.slow
 @linux
 def test_a_driver_that_stalls_for_a_moment_misses_no_state(world: World) -> None:
     with Arm(world({"world": {"time_scale": 8}}).host) as arm:

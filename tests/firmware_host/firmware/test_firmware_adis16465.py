@@ -15,6 +15,7 @@ def board() -> HostBoard:
     return HostBoard()
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
     ("model", "deg_s", "counts_per_deg_s"), [(0x0003, 125, 160), (0x0007, 500, 40), (0x000F, 2000, 10)]
 )

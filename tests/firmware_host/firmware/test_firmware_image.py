@@ -31,6 +31,7 @@ def compiler_of(elf_path: Path) -> str:
         return str(comment.data().rstrip(b"\0").decode())
 
 
+@pytest.mark.slow
 def test_the_sources_build_the_committed_image_byte_for_byte_wherever_they_lie(tmp_path: Path) -> None:
     elsewhere = tmp_path / "a folder of another name"
     shutil.copytree(FIRMWARE, elsewhere, ignore=shutil.ignore_patterns("image"))
