@@ -37,7 +37,7 @@ def main(duration_s: float) -> None:
         )
         board.advance(0.1)
         for sensor, rate_hz in enumerate(rates_hz):
-            settings = {"sensor": sensor, "rate_hz": rate_hz, "range_deg_s": RANGES_DEG_S[sensor]}
+            settings = {"sensor": sensor, "rate_hz": rate_hz, "range_deg_s": RANGES_DEG_S[sensor], "range_g": 0}
             board.receive(encode("configure", 1, settings))
         board.receive(encode("start", 2, {"sensors": 0}))
         board.advance(0.2)

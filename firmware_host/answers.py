@@ -9,7 +9,7 @@ import numpy as np
 
 from firmware_host import protocol
 from firmware_host.frames import Frame
-from firmware_host.samples import SAMPLE_DTYPE
+from firmware_host.samples import IMU_SAMPLE_DTYPE, SAMPLE_DTYPE
 
 Vector = tuple[float, float, float]
 Matrix = tuple[Vector, Vector, Vector]
@@ -18,8 +18,9 @@ Matrix = tuple[Vector, Vector, Vector]
 class SampleBatch(NamedTuple):
     """Samples of one sensor in the order of their sequence numbers, which have no gap inside a batch.
 
-    `dropped` is the board's count of conversions lost on its side since the start; `samples` is (n,) of `SAMPLE_DTYPE`.
-    In the mode "raw" their counts are the part's, in the mode "calibrated" they are microradians per second.
+    `dropped` is the board's count of conversions lost on its side since the start; `samples` is (n,) of `SAMPLE_DTYPE`,
+    of `IMU_SAMPLE_DTYPE` where accelerations come along. In the mode "raw" their counts are the part's, in the mode
+    "calibrated" they are microradians per second.
     """
 
     sensor: int
@@ -29,15 +30,18 @@ class SampleBatch(NamedTuple):
 
     @classmethod
     def of(cls, frame: Frame, host_time_s: float) -> Self:
-        """A `samples` or `rates` frame that came at `host_time_s`."""
+        """A `samples`, `imu_samples` or `rates` frame that came at `host_time_s`."""
         values, items = frame.values, frame.items
-        samples = np.empty(len(items), SAMPLE_DTYPE)
+        with_acceleration = frame.name == "imu_samples"
+        samples = np.empty(len(items), IMU_SAMPLE_DTYPE if with_acceleration else SAMPLE_DTYPE)
         first = values["sequence"]
         samples["sequence"] = np.arange(first, first + len(items))
         samples["board_time_us"] = items["delta_us"].astype(np.uint64) + values["base_time_us"]
         samples["host_time_s"] = host_time_s
-        samples["counts"] = items["counts" if frame.name == "samples" else "rate_urad_s"]
+        samples["counts"] = items["rate_urad_s" if frame.name == "rates" else "counts"]
         samples["temperature_counts"] = items["temperature_counts"]
+        if with_acceleration:
+            samples["acceleration_counts"] = items["acceleration"]
         return cls(values["sensor"], protocol.MODES[values["mode"]], values["dropped"], samples)
 
 
@@ -78,13 +82,18 @@ class BoardIdentity:
 
 @dataclass(frozen=True, slots=True)
 class SensorSetup:
-    """What the part really does: rate = counts · sensitivity_rad_s, temperature = counts · scale + offset."""
+    """What the part really does: rate = counts · sensitivity_rad_s, temperature = counts · scale + offset.
+
+    Acceleration = counts · sensitivity_m_s2; where none are sent, that and range_m_s2 are 0.
+    """
 
     rate_hz: float
     range_deg_s: float
     sensitivity_rad_s: float
     temperature_scale_c: float
     temperature_offset_c: float
+    range_m_s2: float
+    sensitivity_m_s2: float
 
     @classmethod
     def of(cls, frame: Frame) -> Self:

@@ -73,9 +73,12 @@ class Board:
     ) -> None:
         self.close()
 
-    def configure(self, sensor: int, rate_hz: float, range_deg_s: float) -> SensorSetup:
-        """Sets a sensor to the nearest data rate and the next range up."""
-        values = {"sensor": sensor, "rate_hz": rate_hz, "range_deg_s": range_deg_s}
+    def configure(self, sensor: int, rate_hz: float, range_deg_s: float, range_g: float = 0.0) -> SensorSetup:
+        """Sets a sensor to the nearest data rate and the next range up.
+
+        With a `range_g` other than 0 its accelerations come along, in the next range up; not in a calibrated stream.
+        """
+        values = {"sensor": sensor, "rate_hz": rate_hz, "range_deg_s": range_deg_s, "range_g": range_g}
         return SensorSetup.of(self._ask("configure", values))
 
     def start(self, calibrated: Collection[int] = ()) -> None:
@@ -219,7 +222,7 @@ class Board:
 
     def _take(self, frame: Frame, host_time_s: float, request: str | None) -> None:
         """On the reader thread: every frame as it comes."""
-        if frame.name in ("samples", "rates"):
+        if frame.name in ("samples", "imu_samples", "rates"):
             if self._streaming:
                 self._on_samples(SampleBatch.of(frame, host_time_s))
         elif frame.name == "ack" and request in ("start", "stop", "reboot"):

@@ -21,8 +21,8 @@ import numpy as np
 
 from firmware_host.problem import Problem
 
-PROTOCOL_VERSION = 3
-FIRMWARE_VERSION = "0.3.0"  # of the shipped image
+PROTOCOL_VERSION = 4
+FIRMWARE_VERSION = "0.4.0"  # of the shipped image
 PAYLOAD_MAX = 240
 OVERHEAD = 6  # bytes of a frame around its payload before COBS: type, sequence, CRC
 COBS_BYTES = 2  # that COBS adds: the code byte and the delimiter
@@ -128,7 +128,7 @@ def _next(rows: int, values: Iterator[Any]) -> Any:
 REPLY_TO = Field("reply_to", "u8", "sequence of the frame this answers, 0 = nobody asked")
 SENSOR = Field("sensor", "u8", "index in the identity's list")
 SENSORS = Field("sensors", "u8", "which sensors: bit i is the sensor of index i in the identity's list")
-BATCH = (  # what samples and rates begin with
+BATCH = (  # what samples, imu_samples and rates begin with
     SENSOR,
     Field("mode", "u8", "enum sample_mode"),
     Field("sequence", "u32", "of the first sample; counts every conversion of the part since start"),
@@ -137,6 +137,7 @@ BATCH = (  # what samples and rates begin with
     Field("count", "u8", "number of samples"),
 )
 DELTA = Field("delta_us", "u32", "board time after base_time_us")
+COUNTS = Field("counts", "vector_i16", "turn rate: x, y, z as the part reports them, in right-handed axes")
 TEMPERATURE = Field("temperature_counts", "i16", "as the part reports it")
 CALIBRATION = (  # what the host knows of a calibration; the board adds which part it was measured on
     Field("model", "u8", "enum calibration_model"),
@@ -176,6 +177,7 @@ MESSAGES = (
             SENSOR,
             Field("rate_hz", "f32", "wanted data rate, Hz; the nearest is taken"),
             Field("range_deg_s", "f32", "wanted range, degrees per second; the next one up is taken"),
+            Field("range_g", "f32", "wanted range of accelerations, g; the next one up is taken; 0 = none wanted"),
         ),
     ),
     Message(
@@ -191,6 +193,8 @@ MESSAGES = (
             Field("sensitivity_rad_s", "f64", "rad/s per count"),
             Field("temperature_scale_c", "f64", "degrees Celsius per count"),
             Field("temperature_offset_c", "f64", "degrees Celsius at count 0"),
+            Field("range_m_s2", "f64", "range of accelerations, m/s²; 0 = none are sent"),
+            Field("sensitivity_m_s2", "f64", "m/s² per count; 0 = none are sent"),
         ),
     ),
     Message(
@@ -208,7 +212,7 @@ MESSAGES = (
         "board",
         "a run of raw samples with consecutive sequence numbers",
         BATCH,
-        (DELTA, Field("counts", "vector_i16", "x, y, z as the part reports them"), TEMPERATURE),
+        (DELTA, COUNTS, TEMPERATURE),
     ),
     Message(0x09, "status", "host", "how is it going? answered by report"),
     Message(
@@ -344,6 +348,23 @@ MESSAGES = (
             Field("speed_rad_s", "f32", "magnitude of the turn rate then, rad/s"),
         ),
     ),
+    Message(
+        0x18,
+        "imu_samples",
+        "board",
+        "in the place of samples where accelerations are wanted: both triads of one conversion",
+        BATCH,
+        (
+            DELTA,
+            COUNTS,
+            Field(
+                "acceleration",
+                "vector_i16",
+                "specific force: x, y, z in the same axes; at rest the axis up is positive",
+            ),
+            TEMPERATURE,
+        ),
+    ),
 )
 
 
@@ -353,7 +374,7 @@ ERRORS = {  # code → what the board reports; `what` follows "the board says th
     3: Problem("no_such_sensor", "it has no sensor of this number", "Check the sensors in the configuration"),
     4: Problem("sensor_absent", "the sensor does not answer on its bus", "Check its supply and its SPI wires"),
     5: Problem("bad_rate", "the data rate is not a positive number", "Correct rate_hz in the configuration"),
-    6: Problem("bad_range", "the part has no such range", "Correct range_deg_s in the configuration"),
+    6: Problem("bad_range", "the part has no such range", "Correct range_deg_s or range_g in the configuration"),
     7: Problem(
         "no_calibration", "it has no calibration stored for this sensor", "Store one: `rig board calibration write`"
     ),

@@ -11,3 +11,5 @@ SAMPLE_DTYPE = np.dtype(
         ("temperature_counts", "<i2"),
     ]
 )
+# Of a sensor whose accelerations come along: x, y, z of the same conversion, in the axes of `counts`.
+IMU_SAMPLE_DTYPE = np.dtype([*SAMPLE_DTYPE.descr, ("acceleration_counts", "<i4", (3,))])

@@ -1,4 +1,4 @@
-"""The ADIS16465's gyroscope and thermometer at register level (Analog Devices data sheet ADIS16465).
+"""The ADIS16465's gyroscope, accelerometer and thermometer at register level (Analog Devices data sheet ADIS16465).
 
 What the data sheet leaves open is taken from the maker's own driver (no-OS, drivers/imu/adis1646x.c: update times,
 defaults) and from Linux (drivers/iio/imu/adis16475.c: 32-bit format, burst, checksum).
@@ -9,14 +9,16 @@ from collections.abc import Callable, Sequence
 
 import numpy as np
 
+from firmware_host.emulator.accelerometer import STANDARD_GRAVITY_M_S2, Accelerometer, AccelerometerTruth
 from firmware_host.emulator.bus import Violation
 from firmware_host.emulator.gyroscope import Gyroscope, GyroTruth, Temperature, saturated
 from firmware_host.emulator.part_registers import PartRegisters
 from firmware_host.emulator.spi_device import Fault
+from firmware_host.emulator.triad import Remembered
 
 PROD_ID = 0x4051
 _ADIS16470 = 0x4056
-_DIAG_STAT, _X_GYRO_LOW, _X_ACCL_LOW, _TEMP_OUT, _DATA_CNTR = 0x02, 0x04, 0x10, 0x1C, 0x22
+_DIAG_STAT, _X_GYRO_LOW, _TEMP_OUT, _DATA_CNTR = 0x02, 0x04, 0x1C, 0x22
 _FILT_CTRL, _RANG_MDL, _MSC_CTRL, _DEC_RATE, _GLOB_CMD, _PROD_ID = 0x5C, 0x5E, 0x60, 0x64, 0x68, 0x72
 # Registers that can be written, with their values after reset and the bits that have a model. Writing a one to any
 # other bit that is zero after reset fails the run: it would switch on a correction or clock that is not simulated.
@@ -37,7 +39,8 @@ _OVERRUN, _SPI_ERROR = 1 << 1, 1 << 3  # DIAG_STAT
 _SOFTWARE_RESET = 0x80
 _MAX_FILTER, _MAX_DEC_RATE = 6, 1999
 _RANGES = {125: (0x0003, 160), 500: (0x0007, 40), 2000: (0x000F, 10)}  # °/s: RANG_MDL, LSB per °/s
-_COUNTS_PER_G = 4000
+_M_S2_PER_COUNT = STANDARD_GRAVITY_M_S2 / 4000 / 65536  # of the 32-bit number
+_OUTPUTS = 6  # x, y, z of the rates, then of the accelerations: two words each, the lower first
 _RATE_HZ = 2000
 _STALL_S = 16e-6  # data sheet, table 2, tSTALL
 _RESET_S = 0.255  # no-OS: after a software reset
@@ -49,14 +52,14 @@ class Adis16465:
     """The module on the SPI bus, in the variant of the range `range_deg_s`: 125 (-1), 500 (-2) or 2000 (-3).
 
     `motion_at`, `truth`, `seed`, `temperature_c`: see `Gyroscope`; the motion is asked for once for each update of the
-    output registers, at its instant, and noise is drawn per update. `oscillator_ppm`: how fast its sample clock runs.
+    output registers, at its instant, and noise is drawn per update. `acceleration`: see `Accelerometer`.
+    `oscillator_ppm`: how fast its sample clock runs.
     `ready_s`: when it has started up (the maker's driver allows 310 ms from power-up); before, it is silent.
 
-    The part samples from power-up on and cannot be told to be quiet. With averaging (DEC_RATE, FILT_CTRL) its rates
+    The part samples from power-up on and cannot be told to be quiet. With averaging (DEC_RATE, FILT_CTRL) its outputs
     have 32 bits, and the upper 16 alone, which a burst carries, are rounded down. Averages and filters themselves are
-    not simulated: `truth` states the noise of an output. There is no gravity in the laboratory: the accelerometer
-    shows the part at rest with z up. What was written to its bias registers it keeps until its next software reset,
-    whatever becomes of the board; a data path that was `overrun` says so until then.
+    not simulated: `truth` states the noise of an output. What was written to its bias registers it keeps until its next
+    software reset, whatever becomes of the board; a data path that was `overrun` says so until then.
     """
 
     name = "ADIS16465"
@@ -69,6 +72,7 @@ class Adis16465:
         *,
         temperature_c: float | Temperature,
         seed: int | np.random.SeedSequence,
+        acceleration: AccelerometerTruth | None = None,
         oscillator_ppm: float = 0.0,
         chip_select: str = "PA4",
         interrupt: str = "PA1",
@@ -80,7 +84,9 @@ class Adis16465:
         self.fault: Fault | None = None
         self._range_model, counts_per_deg_s = _RANGES[range_deg_s]
         self._per_count = math.radians(1 / counts_per_deg_s) / 65536  # of the 32-bit number
-        self._gyroscope = Gyroscope(motion_at, truth, seed, temperature_c)
+        motion = Remembered(motion_at)
+        self._gyroscope = Gyroscope(motion, truth, seed, temperature_c)
+        self._accelerometer = Accelerometer(motion, acceleration, seed, temperature_c)
         self._speed = 1 + oscillator_ppm * 1e-6
         self._registers = PartRegisters(self.name, "adis16465.py", _RESET_AND_BITS, digits=4)
         self._show_temperature(ready_s)
@@ -164,7 +170,7 @@ class Adis16465:
             )
 
     def _burst_data(self) -> bytes:
-        words = [self._take_diagnosis(), *(self._rate(axis) >> 16 for axis in range(3)), 0, 0, _COUNTS_PER_G]
+        words = [self._take_diagnosis(), *(self._shown(output) >> 16 for output in range(_OUTPUTS))]
         data = b"".join((word & 0xFFFF).to_bytes(2, "big") for word in (*words, self._temperature, self._counter))
         return data + (sum(data) & 0xFFFF).to_bytes(2, "big")
 
@@ -185,7 +191,7 @@ class Adis16465:
         self._waiting: dict[int, tuple[float, int]] = {}  # address → when a setting acts, its value
         self._diagnosis = self._counter = 0
         self.overrun = False
-        self._counts = [0, 0, 0]  # 32 bits each
+        self._counts = [0] * _OUTPUTS  # rates, then accelerations; 32 bits each
         self._answer = 0
         self._data_valid = False
         self._usable_s = time_s
@@ -198,13 +204,11 @@ class Adis16465:
             return self._registers.values[address]
         if address == _DIAG_STAT:
             return self._take_diagnosis()
-        if _X_GYRO_LOW <= address < _X_ACCL_LOW:
-            axis, high = divmod(address - _X_GYRO_LOW, 4)
-            return self._rate(axis) >> (16 if high else 0) & 0xFFFF
+        if _X_GYRO_LOW <= address < _TEMP_OUT:
+            output, high = divmod(address - _X_GYRO_LOW, 4)
+            return self._shown(output) >> (16 if high else 0) & 0xFFFF
         fixed = {
             0x00: 0,  # reserved: what drivers ask for to clock an answer out
-            **dict.fromkeys(range(_X_ACCL_LOW, _TEMP_OUT, 2), 0),
-            0x1A: _COUNTS_PER_G,  # Z_ACCL_OUT
             _TEMP_OUT: self._temperature,
             _DATA_CNTR: self._counter,
             _RANG_MDL: self._range_model,
@@ -269,6 +273,8 @@ class Adis16465:
         self._counts = [
             saturated(round(rate / self._per_count) + self._user_bias(axis), bits=32) for axis, rate in enumerate(rates)
         ]
+        force_m_s2 = self._accelerometer.read(time_s)
+        self._counts += [saturated(round(component / _M_S2_PER_COUNT), bits=32) for component in force_m_s2]
         self._counter = self._counter + 1 & 0xFFFF
         self._data_valid = True
         self._samples += 1 + self._registers.values[_DEC_RATE]
@@ -283,8 +289,8 @@ class Adis16465:
     def _show_temperature(self, time_s: float) -> None:
         self._temperature = saturated(round(self._gyroscope.temperature_c(time_s) * 10)) & 0xFFFF
 
-    def _rate(self, axis: int) -> int:
+    def _shown(self, output: int) -> int:
         """As the 32-bit register pair shows it: without averaging, the lower 16 bits are empty."""
         if self._registers.values[_DEC_RATE] or self._registers.values[_FILT_CTRL]:
-            return self._counts[axis]
-        return saturated(self._counts[axis] + 0x8000 >> 16) << 16
+            return self._counts[output]
+        return saturated(self._counts[output] + 0x8000 >> 16) << 16

@@ -1,4 +1,4 @@
-"""A gyroscope's bias in the run: flicker noise and a random walk, functions of time that begin at zero.
+"""The bias of a triad in the run: flicker noise and a random walk, functions of time that begin at zero.
 
 Flicker noise is a sum of Gauss-Markov processes with correlation times a decade apart (IEEE Std 952-1997, annexes B and
 C): a variance of σ² for each makes a floor of the Allan deviation of √(2 ln 2 / ln 10) σ.
@@ -15,37 +15,37 @@ _SIGMA_PER_FLOOR = sqrt(log(10.0) / (2.0 * log(2.0)))
 
 
 class Drift:
-    """Three axes that drift apart. `time_s` of its methods: since the world began.
+    """Three axes that drift apart, in the units of their readings. `time_s` of its methods: since the world began.
 
-    `instability_rad_s`: floor of the Allan deviation, flat around an averaging time of `instability_time_s`;
-    `random_walk_rad_s_per_sqrt_s`: standard deviation of what a second adds, growing with the root of time.
+    `instability`: floor of the Allan deviation, flat around an averaging time of `instability_time_s`;
+    `random_walk_per_sqrt_s`: standard deviation of what a second adds, growing with the root of time.
     """
 
     def __init__(
         self,
-        instability_rad_s: float,
+        instability: float,
         instability_time_s: float,
-        random_walk_rad_s_per_sqrt_s: float,
+        random_walk_per_sqrt_s: float,
         seed: np.random.SeedSequence,
     ) -> None:
         self._random = np.random.default_rng(seed)
         times_s = instability_time_s * np.array(_CORRELATION_TIMES)
         self._keep = np.array([[exp(-STEP_S / time_s)] for time_s in times_s])
-        self._fresh = instability_rad_s * _SIGMA_PER_FLOOR * np.sqrt(1.0 - self._keep**2)
-        self._step = random_walk_rad_s_per_sqrt_s * sqrt(STEP_S)
+        self._fresh = instability * _SIGMA_PER_FLOOR * np.sqrt(1.0 - self._keep**2)
+        self._step = random_walk_per_sqrt_s * sqrt(STEP_S)
         self._flicker = np.zeros((len(times_s), 3))
         self._walk = np.zeros(3)
         self._knots = [[0.0, 0.0, 0.0]]
 
     def at(self, time_s: float) -> list[float]:
-        """The bias at one time, (3,) rad/s."""
+        """The bias at one time, (3,)."""
         before, part = divmod(time_s / STEP_S, 1.0)
         knot = max(int(before), 0)
         self._reach(knot)
         return [a + part * (b - a) for a, b in zip(self._knots[knot], self._knots[knot + 1], strict=True)]
 
     def at_times(self, time_s: np.ndarray) -> np.ndarray:
-        """The bias at times (n,), (n, 3) rad/s."""
+        """The bias at times (n,), (n, 3)."""
         self._reach(int(np.max(time_s, initial=0.0) / STEP_S))
         knots = np.array(self._knots)
         places = np.arange(len(knots)) * STEP_S

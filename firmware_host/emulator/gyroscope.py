@@ -7,11 +7,9 @@ from typing import Any
 
 import numpy as np
 
-from firmware_host.emulator.drift import Drift
+from firmware_host.emulator.triad import Bend, Seed, Temperature, Triad, TriadErrors
 
-_NOISE_BLOCK = 3 * 256
-
-Temperature = Callable[[float], float]
+__all__ = ["GyroTruth", "Gyroscope", "Temperature", "Warming", "readings", "saturated"]
 
 
 @dataclass(frozen=True, slots=True)
@@ -72,129 +70,69 @@ class Gyroscope:
         self,
         motion_at: Callable[[float], Sequence[float]],
         truth: GyroTruth,
-        seed: int | np.random.SeedSequence,
+        seed: Seed,
         temperature_c: float | Temperature = 25.0,
     ) -> None:
         self._motion_at = motion_at
-        self._axes = _Axes(truth)
         self._truth = truth
-        self._bias = list(truth.bias_rad_s)
-        self._noise_rad_s = truth.noise_rad_s
-        self._warms = callable(temperature_c)
-        self.temperature_c: Temperature = temperature_c if callable(temperature_c) else lambda _time_s: temperature_c
-        self._low_pass = LowPass(truth.bandwidth_hz) if truth.bandwidth_hz is not None else None
-        self._drift = _drift(truth, seed)
-        self._random = np.random.default_rng(seed)
-        self._noise: list[float] = []
+        self._triad = _triad(truth, seed, temperature_c)
+        self._bend = _bend(truth)
+        self.temperature_c = self._triad.temperature_c
 
     def read(self, time_s: float, settled: float = 1.0) -> list[float]:
         """The next reading, (3,) rad/s, taken at `time_s`; of the motion only the fraction `settled` is felt."""
-        if len(self._noise) < 3:
-            self._noise = self._random.standard_normal(_NOISE_BLOCK).tolist()[::-1]
         motion = [settled * component for component in self._motion_at(time_s - self._truth.delay_s)]
-        warmer_k = self.temperature_c(time_s) - self._truth.holds_at_c if self._warms else 0.0
-        felt = self._axes.sense(motion, warmer_k)
-        if self._low_pass is not None:
-            felt = self._low_pass.step(time_s, felt)
-        bias = self._bias
-        if warmer_k:
-            bias = [b + per_k * warmer_k for b, per_k in zip(bias, self._truth.bias_rad_s_per_k, strict=True)]
-        if self._drift is not None:
-            bias = [b + drift for b, drift in zip(bias, self._drift.at(time_s), strict=True)]
-        return [value - b + self._noise_rad_s * self._noise.pop() for value, b in zip(felt, bias, strict=True)]
+        warmer_k = self._triad.warmer_k(time_s)
+        return self._triad.read(time_s, _felt(self._triad, self._truth, motion, warmer_k, self._bend), warmer_k)
 
 
 def readings(
     truth: GyroTruth,
     time_s: np.ndarray,
     motion: np.ndarray,
-    seed: int | np.random.SeedSequence,
+    seed: Seed,
     temperature_c: float | Temperature = 25.0,
 ) -> np.ndarray:
     """The readings (n, 3) rad/s that a `Gyroscope` would take at `time_s` (n,) of a `motion` (n, 3 or 6), before
     rounding to counts. The motion of `truth.delay_s` before is interpolated in straight lines.
     """
     late_s = time_s - truth.delay_s
-    felt_then = [np.interp(late_s, time_s, column) for column in motion.T] if truth.delay_s else list(motion.T)
-    warmer_k = (
-        np.array([temperature_c(t) for t in time_s.tolist()]) - truth.holds_at_c if callable(temperature_c) else 0.0
+    then = [np.interp(late_s, time_s, column) for column in motion.T] if truth.delay_s else list(motion.T)
+    triad = _triad(truth, seed, temperature_c)
+    warmer_k = triad.all_warmer_k(time_s)
+    return triad.readings(time_s, _felt(triad, truth, then, warmer_k, _bend(truth)), warmer_k)
+
+
+def _felt(triad: Triad, truth: GyroTruth, motion: Sequence[Any], warmer_k: Any, bend: Bend | None) -> list[Any]:
+    """What the elements make of a motion of 3 or 6 components, floats or arrays, before bias and noise."""
+    felt = triad.sense(motion[:3], warmer_k, bend)
+    if truth.g_sensitivity_rad_s_per_g:
+        x, y, z = motion[3:]
+        rows = zip(felt, truth.g_sensitivity_rad_s_per_g, strict=True)
+        felt = [value + (row[0] * x + row[1] * y + row[2] * z) for value, row in rows]
+    return felt
+
+
+def _bend(truth: GyroTruth) -> Bend | None:
+    even, odd = truth.nonlinearity_even_per_rad_s, truth.nonlinearity_odd_per_rad_s
+    return (lambda along: along * (1.0 + even * along + odd * abs(along))) if even or odd else None
+
+
+def _triad(truth: GyroTruth, seed: Seed, temperature_c: float | Temperature) -> Triad:
+    errors = TriadErrors(
+        scale=truth.scale,
+        bias=truth.bias_rad_s,
+        noise=truth.noise_rad_s,
+        non_orthogonality_rad=truth.non_orthogonality_rad,
+        scale_per_k=truth.scale_per_k,
+        bias_per_k=truth.bias_rad_s_per_k,
+        holds_at_c=truth.holds_at_c,
+        bandwidth_hz=truth.bandwidth_hz,
+        instability=truth.instability_rad_s,
+        instability_time_s=truth.instability_time_s,
+        random_walk_per_sqrt_s=truth.random_walk_rad_s_per_sqrt_s,
     )
-    felt = np.column_stack(_Axes(truth).sense(felt_then, warmer_k))
-    if truth.bandwidth_hz is not None:
-        low_pass = LowPass(truth.bandwidth_hz)
-        felt = np.array([low_pass.step(t, row) for t, row in zip(time_s.tolist(), felt.tolist(), strict=True)])
-    bias = np.array(truth.bias_rad_s) + np.multiply.outer(warmer_k, np.array(truth.bias_rad_s_per_k))
-    if (drift := _drift(truth, seed)) is not None:
-        bias = bias + drift.at_times(time_s)
-    noise = np.random.default_rng(seed).standard_normal(felt.shape)
-    taken: np.ndarray = felt - bias + truth.noise_rad_s * noise
-    return taken
-
-
-class _Axes:
-    """What the three elements make of a motion before bias and noise."""
-
-    def __init__(self, truth: GyroTruth) -> None:
-        xy, xz, yz = truth.non_orthogonality_rad
-        self._axes = (
-            (1.0, 0.0, 0.0),
-            (math.sin(xy), math.cos(xy), 0.0),
-            (math.sin(xz), math.sin(yz), math.sqrt(1 - math.sin(xz) ** 2 - math.sin(yz) ** 2)),
-        )
-        self._inverse_scale = [1 / k for k in truth.scale]
-        self._per_k = truth.scale_per_k
-        self._per_g = truth.g_sensitivity_rad_s_per_g
-        self._even, self._odd = truth.nonlinearity_even_per_rad_s, truth.nonlinearity_odd_per_rad_s
-
-    def sense(self, motion: Sequence[Any], warmer_k: Any) -> list[Any]:
-        """Three components, floats or arrays as those of the motion (3 or 6) and `warmer_k` are."""
-        x, y, z, *force = motion
-        felt = []
-        for index, (axis, inverse_scale) in enumerate(zip(self._axes, self._inverse_scale, strict=True)):
-            along = axis[0] * x + axis[1] * y + axis[2] * z
-            if self._even or self._odd:
-                along = along * (1.0 + self._even * along + self._odd * abs(along))
-            value = along * inverse_scale
-            if self._per_k[index]:
-                value = value / (1.0 + self._per_k[index] * warmer_k)
-            if self._per_g:
-                row = self._per_g[index]
-                value = value + (row[0] * force[0] + row[1] * force[1] + row[2] * force[2])
-            felt.append(value)
-        return felt
-
-
-class LowPass:
-    """A low-pass of first order, exact for inputs that are straight lines between the times they are given at."""
-
-    def __init__(self, bandwidth_hz: float) -> None:
-        self._time_constant_s = 1.0 / (2.0 * math.pi * bandwidth_hz)
-        self._time_s = -math.inf
-        self._inputs: list[float] = []
-        self._outputs: list[float] = []
-
-    def step(self, time_s: float, inputs: list[float]) -> list[float]:
-        """The outputs at `time_s`, when the inputs have come to these."""
-        since_s = time_s - self._time_s
-        if math.isinf(since_s):
-            self._outputs = inputs
-        elif since_s > 0.0:
-            forgotten = math.exp(-since_s / self._time_constant_s)
-            late = self._time_constant_s / since_s  # by how much of the step the output of a straight line lags
-            self._outputs = [
-                new - late * (new - old) + (output - old + late * (new - old)) * forgotten
-                for new, old, output in zip(inputs, self._inputs, self._outputs, strict=True)
-            ]
-        self._time_s, self._inputs = time_s, inputs
-        return self._outputs
-
-
-def _drift(truth: GyroTruth, seed: int | np.random.SeedSequence) -> Drift | None:
-    if not (truth.instability_rad_s or truth.random_walk_rad_s_per_sqrt_s):
-        return None
-    sequence = seed if isinstance(seed, np.random.SeedSequence) else np.random.SeedSequence(seed)
-    own = np.random.SeedSequence(sequence.entropy, spawn_key=(*sequence.spawn_key, 1))
-    return Drift(truth.instability_rad_s, truth.instability_time_s, truth.random_walk_rad_s_per_sqrt_s, own)
+    return Triad(errors, seed, temperature_c)
 
 
 def saturated(counts: int, bits: int = 16) -> int:

@@ -1,20 +1,25 @@
-"""The LSM9DS1's gyroscope and thermometer at register level (datasheet DocID025715, sections 2, 5, 6 and 7)."""
+"""The LSM9DS1's gyroscope, accelerometer and thermometer at register level (datasheet DocID025715, sections 2, 3, 5, 6
+and 7).
+"""
 
 import math
 from collections.abc import Callable, Sequence
 
 import numpy as np
 
+from firmware_host.emulator.accelerometer import STANDARD_GRAVITY_M_S2, Accelerometer, AccelerometerTruth
 from firmware_host.emulator.bus import Violation
 from firmware_host.emulator.gyroscope import Gyroscope, GyroTruth, Temperature, saturated
 from firmware_host.emulator.part_registers import Conversions, PartRegisters
 from firmware_host.emulator.spi_device import Fault
+from firmware_host.emulator.triad import Remembered
 
 WHO_AM_I = 0x68
 _LSM6DS3 = 0x69  # what another part of the maker answers
 _INT1_CTRL, _WHO_AM_I, _CTRL_REG1_G = 0x0C, 0x0F, 0x10
 _OUT_TEMP_L, _OUT_TEMP_H, _STATUS_REG, _OUT_X_L_G, _OUT_Z_H_G = 0x15, 0x16, 0x17, 0x18, 0x1D
-_CTRL_REG8 = 0x22
+_CTRL_REG6_XL, _CTRL_REG8 = 0x20, 0x22
+_STATUS_REG_AGAIN, _OUT_X_L_XL, _OUT_Z_H_XL = 0x27, 0x28, 0x2D
 # Registers of the accelerometer and gyroscope, with their values after reset and the bits that have a model. Writing
 # one to any other bit fails the run: it would switch on a filter, FIFO, sleep or format that is not simulated.
 _RESET_AND_BITS = {
@@ -28,7 +33,7 @@ _RESET_AND_BITS = {
     0x13: (0x00, 0x00),  # ORIENT_CFG_G
     0x1E: (0x38, 0x38),  # CTRL_REG4: all three axes
     0x1F: (0x38, 0x38),  # CTRL_REG5_XL
-    0x20: (0x00, 0x00),  # CTRL_REG6_XL: a write would leave the accelerometer alone running (section 3.1)
+    _CTRL_REG6_XL: (0x00, 0xFF),  # ODR_XL, FS_XL, and which filter, which is part of the truth
     0x21: (0x00, 0x00),  # CTRL_REG7_XL
     _CTRL_REG8: (0x04, 0x45),  # BDU, IF_ADD_INC, SW_RESET
     0x23: (0x00, 0x04),  # CTRL_REG9: I2C_DISABLE
@@ -38,16 +43,23 @@ _RESET_AND_BITS = {
 _RATES_HZ = {1: 14.9, 2: 59.5, 3: 119.0, 4: 238.0, 5: 476.0, 6: 952.0}  # table 46
 _SETTLING = {1: 2, 2: 3, 3: 3, 4: 4, 5: 5, 6: 8}  # table 12: first conversions to discard, without the second filter
 _SENSITIVITIES_MDPS = {0: 8.75, 1: 17.5, 3: 70.0}  # table 3; 245, 500 and 2000 °/s
-_GDA, _TDA = 0x02, 0x04
+_SENSITIVITIES_MG = {0: 0.061, 1: 0.732, 2: 0.122, 3: 0.244}  # the same table; 2, 16, 4 and 8 g
+_XLDA, _GDA, _TDA = 0x01, 0x02, 0x04
+_LAST_OUTPUT = 5  # the high byte of z
 _BDU, _IF_ADD_INC, _SW_RESET = 0x40, 0x04, 0x01
 
 
 class Lsm9ds1:
-    """The accelerometer-gyroscope die on the SPI bus; the accelerometer, which runs along, is left out.
+    """The accelerometer-gyroscope die on the SPI bus.
 
     `motion_at`, `truth`, `seed`, `temperature_c`: see `Gyroscope`; the motion is asked for once for each conversion, at
     its instant, and noise is drawn per conversion, so that readings do not depend on when they are read.
-    `oscillator_ppm`: how fast the part's own oscillator makes its data rate.
+    `acceleration`: see `Accelerometer`. `oscillator_ppm`: how fast the part's own oscillator makes its data rate.
+
+    Motion and truth are in right-handed axes, those of the part's magnetometer: the registers of both triads show x
+    with the other sign (figure 1). The accelerometer runs with the gyroscope or not at all: writing its control
+    register leaves it alone (section 3.1), and alone it has no model, so that nothing converts until CTRL_REG1_G is
+    written.
 
     The data-ready line stays high until the high byte of the z rate is read: a conversion that nobody read is
     replaced by the next without a new edge. The datasheet says how many conversions after a start to discard, not how
@@ -65,6 +77,7 @@ class Lsm9ds1:
         *,
         temperature_c: float | Temperature,
         seed: int | np.random.SeedSequence,
+        acceleration: AccelerometerTruth | None = None,
         oscillator_ppm: float = 0.0,
         chip_select: str = "PA11",
         interrupt: str = "PA8",
@@ -72,7 +85,9 @@ class Lsm9ds1:
         self.chip_select = chip_select
         self.interrupt = interrupt
         self.fault: Fault | None = None
-        self._gyroscope = Gyroscope(motion_at, truth, seed, temperature_c)
+        motion = Remembered(motion_at)
+        self._gyroscope = Gyroscope(motion, truth, seed, temperature_c)
+        self._accelerometer = Accelerometer(motion, acceleration, seed, temperature_c)
         self._registers = PartRegisters(self.name, "lsm9ds1.py", _RESET_AND_BITS)
         self._conversions = Conversions(oscillator_ppm)
         self._address: int | None = None  # None: the next byte is the address
@@ -117,21 +132,23 @@ class Lsm9ds1:
     def _reset(self) -> None:
         self._registers.reset()
         self._status = 0
-        self._latest = bytes(6)
-        self._output = bytearray(6)
+        self._rates = _Outputs()
+        self._accelerations = _Outputs()
         self._temperature = bytes(2)
-        self._held = [False, False, False]  # BDU: low byte read, high byte not yet
         self._settling = 0
+        self._accelerating = False
         self._conversions.stop()
 
     def _read(self, address: int) -> int:
         if _OUT_X_L_G <= address <= _OUT_Z_H_G:
-            return self._read_output(address - _OUT_X_L_G)
+            return self._read_output(self._rates, address - _OUT_X_L_G, _GDA)
+        if _OUT_X_L_XL <= address <= _OUT_Z_H_XL:
+            return self._read_output(self._accelerations, address - _OUT_X_L_XL, _XLDA)
         if address in self._registers.values:
             return self._registers.values[address]
         if address == _WHO_AM_I:
             return _LSM6DS3 if self.fault is Fault.OTHER_PART else WHO_AM_I
-        if address == _STATUS_REG:
+        if address in (_STATUS_REG, _STATUS_REG_AGAIN):
             return self._status
         if address in (_OUT_TEMP_L, _OUT_TEMP_H):
             if address == _OUT_TEMP_H:
@@ -139,16 +156,10 @@ class Lsm9ds1:
             return self._temperature[address - _OUT_TEMP_L]
         raise self._registers.unmodelled("read of", address)
 
-    def _read_output(self, index: int) -> int:
-        axis, high = divmod(index, 2)
-        value = self._output[index]
-        if self._registers.values[_CTRL_REG8] & _BDU:
-            self._held[axis] = not high
-            if high:
-                self._output[index - 1 : index + 1] = self._latest[index - 1 : index + 1]
-        if axis == 2 and high:
-            self._status &= ~_GDA
-        return value
+    def _read_output(self, outputs: "_Outputs", index: int, flag: int) -> int:
+        if index == _LAST_OUTPUT:
+            self._status &= ~flag
+        return outputs.read(index, block_update=bool(self._registers.values[_CTRL_REG8] & _BDU))
 
     def _write(self, address: int, value: int, time_s: float) -> None:
         self._registers.check(address, value)
@@ -157,8 +168,10 @@ class Lsm9ds1:
             return
         changed = self._registers.values[address] != value
         self._registers.values[address] = value
-        if address == _CTRL_REG1_G and changed:
+        if address == _CTRL_REG1_G and (changed or math.isinf(self._conversions.next_s)):
             self._start(value, time_s)
+        if address == _CTRL_REG6_XL:
+            self._conversions.stop()
 
     def _start(self, control: int, time_s: float) -> None:
         """A new data rate or range: conversions begin anew."""
@@ -169,7 +182,16 @@ class Lsm9ds1:
                 f"LSM9DS1 CTRL_REG1_G = 0x{control:02X}: data rate or range that the part does not have",
                 "Use rate codes 0–6 and range codes 0, 1, 3",
             )
-        self._status &= ~_GDA
+        control_xl = self._registers.values[_CTRL_REG6_XL]
+        if control_xl >> 5 not in (0, rate_code):
+            raise Violation(
+                "sensor_setup",
+                f"LSM9DS1 CTRL_REG6_XL = 0x{control_xl:02X} with CTRL_REG1_G = 0x{control:02X}: two data rates",
+                "Use the same rate code in both, or 0 for no accelerations",
+            )
+        self._accelerating = bool(control_xl >> 5)
+        self._g_per_count = _SENSITIVITIES_MG[control_xl >> 3 & 3] * 1e-3
+        self._status &= ~(_GDA | _XLDA)
         self._settling = _SETTLING.get(rate_code, 0)
         if rate_code:
             self._conversions.start(time_s, _RATES_HZ[rate_code])
@@ -182,15 +204,39 @@ class Lsm9ds1:
     def _convert(self, time_s: float) -> None:
         """One conversion of all axes and the thermometer, as the output registers will show it."""
         settled = min(1.0, self._conversions.count / (self._settling + 1))
-        data = b"".join(
-            saturated(round(rate_rad_s / self._per_count)).to_bytes(2, "little", signed=True)
-            for rate_rad_s in self._gyroscope.read(time_s, settled)
-        )
-        self._latest = data
-        for axis_index in range(3):
-            if not self._held[axis_index]:
-                low = 2 * axis_index
-                self._output[low : low + 2] = data[low : low + 2]
+        self._rates.show(self._gyroscope.read(time_s, settled), self._per_count)
         temperature = saturated(round((self._gyroscope.temperature_c(time_s) - 25) * 16), bits=12)
         self._temperature = temperature.to_bytes(2, "little", signed=True)
         self._status |= _GDA | _TDA
+        if self._accelerating:
+            force_m_s2 = self._accelerometer.read(time_s, settled)
+            self._accelerations.show(force_m_s2, self._g_per_count * STANDARD_GRAVITY_M_S2)
+            self._status |= _XLDA
+
+
+class _Outputs:
+    """The output registers of one triad: two bytes an axis, x and y and z."""
+
+    def __init__(self) -> None:
+        self._latest = bytes(6)
+        self._output = bytearray(6)
+        self._held = [False, False, False]  # block update: low byte read, high byte not yet
+
+    def show(self, vector: Sequence[float], per_count: float) -> None:
+        """A new conversion of a vector in right-handed axes."""
+        x, y, z = vector
+        counts = (saturated(round(component / per_count)) for component in (-x, y, z))
+        self._latest = data = b"".join(count.to_bytes(2, "little", signed=True) for count in counts)
+        for axis, held in enumerate(self._held):
+            if not held:
+                self._output[2 * axis : 2 * axis + 2] = data[2 * axis : 2 * axis + 2]
+
+    def read(self, index: int, *, block_update: bool) -> int:
+        """One byte."""
+        axis, high = divmod(index, 2)
+        value = self._output[index]
+        if block_update:
+            self._held[axis] = not high
+            if high:
+                self._output[index - 1 : index + 1] = self._latest[index - 1 : index + 1]
+        return value

@@ -1,5 +1,5 @@
-"""The MPU-9250's gyroscope and thermometer at register level (product specification PS-MPU-9250A-01, register map
-RM-MPU-9250A-00). Its magnetometer, FIFO, I2C master and motion processor are left out.
+"""The MPU-9250's gyroscope, accelerometer and thermometer at register level (product specification PS-MPU-9250A-01,
+register map RM-MPU-9250A-00). Its magnetometer, FIFO, I2C master and motion processor are left out.
 """
 
 import math
@@ -7,10 +7,12 @@ from collections.abc import Callable, Sequence
 
 import numpy as np
 
+from firmware_host.emulator.accelerometer import STANDARD_GRAVITY_M_S2, Accelerometer, AccelerometerTruth
 from firmware_host.emulator.bus import Violation
 from firmware_host.emulator.gyroscope import Gyroscope, GyroTruth, Temperature, saturated
 from firmware_host.emulator.part_registers import Conversions, PartRegisters
 from firmware_host.emulator.spi_device import Fault
+from firmware_host.emulator.triad import Remembered
 
 WHO_AM_I = 0x71
 _MPU6500 = 0x70  # what the part without magnetometer answers
@@ -26,7 +28,7 @@ _RESET_AND_BITS = {
     _CONFIG: (0x00, 0x07),  # DLPF_CFG
     _GYRO_CONFIG: (0x00, 0x1B),  # GYRO_FS_SEL, FCHOICE_B
     _ACCEL_CONFIG: (0x00, 0x18),  # ACCEL_FS_SEL
-    0x1D: (0x00, 0x0F),  # ACCEL_CONFIG2: its filter changes nothing about an accelerometer at rest
+    0x1D: (0x00, 0x07),  # ACCEL_CONFIG2: A_DLPFCFG
     0x1E: (0x00, 0x00),  # LP_ACCEL_ODR
     0x1F: (0x00, 0x00),  # WOM_THR
     0x23: (0x00, 0x00),  # FIFO_EN
@@ -53,12 +55,13 @@ class Mpu9250:
     """The die with accelerometer and gyroscope on the SPI bus.
 
     `motion_at`, `truth`, `seed`, `temperature_c`: see `Gyroscope`; the motion is asked for once for each conversion, at
-    its instant, and noise is drawn per conversion. `oscillator_ppm`: how fast the part's own oscillator makes its data
-    rate; the specification allows a percent.
+    its instant, and noise is drawn per conversion. `acceleration`: see `Accelerometer`. `oscillator_ppm`: how fast the
+    part's own oscillator makes its data rate; the specification allows a percent.
 
     The part runs from power-up, but here it converts only while its data-ready interrupt is enabled; reading data
     without it fails the run. Its filter settings have neither effect nor delay (a filter is part of the truth), except
-    that the motion comes in linearly while the gyroscope starts. The accelerometer shows the part at rest with z up.
+    that the motion comes in linearly while the gyroscope starts. The accelerometer's offset registers hold the
+    factory's trim: whoever writes to them fails the run.
     """
 
     name = "MPU-9250"
@@ -71,6 +74,7 @@ class Mpu9250:
         *,
         temperature_c: float | Temperature,
         seed: int | np.random.SeedSequence,
+        acceleration: AccelerometerTruth | None = None,
         oscillator_ppm: float = 0.0,
         chip_select: str = "PB0",
         interrupt: str = "PA12",
@@ -78,7 +82,9 @@ class Mpu9250:
         self.chip_select = chip_select
         self.interrupt = interrupt
         self.fault: Fault | None = None
-        self._gyroscope = Gyroscope(motion_at, truth, seed, temperature_c)
+        motion = Remembered(motion_at)
+        self._gyroscope = Gyroscope(motion, truth, seed, temperature_c)
+        self._accelerometer = Accelerometer(motion, acceleration, seed, temperature_c)
         self._registers = PartRegisters(self.name, "mpu9250.py", _RESET_AND_BITS)
         self._conversions = Conversions(oscillator_ppm)
         self._address: int | None = None  # None: the next byte is the address
@@ -209,13 +215,15 @@ class Mpu9250:
     def _convert(self, time_s: float) -> None:
         """One conversion of all axes, as the output registers will show it from the next access on."""
         settled = min(1.0, (time_s - self._awake_s) / _START_S)
-        upright = _COUNTS_PER_G[self._registers.values[_ACCEL_CONFIG] >> 3 & 3]
-        rates = b"".join(
-            saturated(round(rate_rad_s / self._per_count)).to_bytes(2, "big", signed=True)
-            for rate_rad_s in self._gyroscope.read(time_s, settled)
+        counts_per_g = _COUNTS_PER_G[self._registers.values[_ACCEL_CONFIG] >> 3 & 3]
+        rates = self._gyroscope.read(time_s, settled)
+        force_m_s2 = self._accelerometer.read(time_s, settled)
+        numbers = (
+            *(component / STANDARD_GRAVITY_M_S2 * counts_per_g for component in force_m_s2),
+            (self._gyroscope.temperature_c(time_s) - _ROOM_C) * _COUNTS_PER_DEG_C,
+            *(rate_rad_s / self._per_count for rate_rad_s in rates),
         )
-        temperature = saturated(round((self._gyroscope.temperature_c(time_s) - _ROOM_C) * _COUNTS_PER_DEG_C))
-        self._latest = bytes(4) + upright.to_bytes(2, "big") + temperature.to_bytes(2, "big", signed=True) + rates
+        self._latest = b"".join(saturated(round(number)).to_bytes(2, "big", signed=True) for number in numbers)
         self._status = _RAW_RDY
         self._pin = True
         if not self._registers.values[_INT_PIN_CFG] & _LATCH_INT_EN:

@@ -18,6 +18,7 @@ from firmware_host import protocol
 from firmware_host.client import Board, Calibration, SampleBatch
 from firmware_host.errors import BoardError
 from firmware_host.frames import decode, encode
+from firmware_host.samples import IMU_SAMPLE_DTYPE, SAMPLE_DTYPE
 from rig.config.link_budget import Stream
 from support.host_board import HostBoard, configured, convert, settle
 from support.worlds import fresh_host
@@ -57,7 +58,7 @@ class BoardOnAWire(threading.Thread):
                 while (converted + 1) * PERIOD_US <= now_us:
                     converted += 1
                     if self.board.gyro.values[0x10]:
-                        self.board.gyro.convert((converted % 1000, -converted % 1000, 7), -48)
+                        self.board.gyro.convert((converted % 1000, -converted % 1000, 7), -48, (converted % 500, -5, 6))
                         self.board.data_ready(converted * PERIOD_US)
                         self.board.run()
                 os.write(fd, self.on_send(bytes(self.board.wire)))
@@ -161,7 +162,7 @@ def test_a_stream_left_running_is_stopped_by_the_next_program_and_restarts_at_ze
     wire: tuple[BoardOnAWire, str],
 ) -> None:
     board = wire[0].board
-    board.receive(encode("configure", 1, {"sensor": 0, "rate_hz": 238, "range_deg_s": 245}))
+    board.receive(encode("configure", 1, {"sensor": 0, "rate_hz": 238, "range_deg_s": 245, "range_g": 0}))
     board.receive(encode("start", 2, {"sensors": 0}))
     batches: list[SampleBatch] = []
     with Board(wire[1], protocol.BAUD_RATE, batches.append) as client:
@@ -231,6 +232,42 @@ def test_a_stored_calibration_is_there_after_a_reset_until_it_is_erased(wire: tu
         board.erase_calibration(0)
         assert board.read_calibration(0) is None
         board.erase_calibration(0)
+
+
+@ON_ONE_WIRE
+def test_accelerations_come_along_where_a_range_is_asked_for_and_not_in_a_calibrated_stream(
+    wire: tuple[BoardOnAWire, str],
+) -> None:
+    batches: list[SampleBatch] = []
+    with Board(wire[1], protocol.BAUD_RATE, batches.append) as board:
+        setup = board.configure(0, 238, 245, range_g=3)
+        assert setup.range_m_s2 == pytest.approx(4 * 9.80665)
+        assert setup.sensitivity_m_s2 == pytest.approx(0.122e-3 * 9.80665)
+        board.start()
+        wait_for(lambda: sum(len(batch.samples) for batch in batches) >= 30)
+        board.stop()
+        samples = np.concatenate([batch.samples for batch in batches])
+        assert samples.dtype == IMU_SAMPLE_DTYPE
+        assert samples["sequence"].tolist() == list(range(len(samples)))
+        assert {batch.mode for batch in batches} == {"raw"}
+        x, y, z = samples["acceleration_counts"].T
+        assert (x == samples["counts"][:, 0] % 500).all(), "of the same conversion"
+        assert set(y.tolist()) == {-5} and set(z.tolist()) == {6}
+
+        board.write_calibration(0, CALIBRATION)
+        batches.clear()
+        board.start(calibrated=[0])
+        wait_for(lambda: len(batches) > 0)
+        board.stop()
+        assert batches[0].samples.dtype == SAMPLE_DTYPE and batches[0].mode == "calibrated"
+
+        setup = board.configure(0, 238, 245)
+        assert (setup.range_m_s2, setup.sensitivity_m_s2) == (0.0, 0.0)
+        batches.clear()
+        board.start()
+        wait_for(lambda: len(batches) > 0)
+        board.stop()
+        assert batches[0].samples.dtype == SAMPLE_DTYPE and batches[0].mode == "raw"
 
 
 @ON_ONE_WIRE

@@ -2,6 +2,7 @@
 
 import pytest
 
+from support.emulated_session import RANGE_G
 from support.full_rate import CASES, stream
 
 pytestmark = pytest.mark.slow
@@ -16,3 +17,17 @@ def test_no_conversion_is_lost_at_full_rate(case: str, simulated_s: float) -> No
     result = stream(rates_hz, simulated_s, calibrated)
     assert result.complaints == []
     assert all(account.samples > 0.94 * simulated_s * account.rate_hz for account in result.accounts.values())
+
+
+@pytest.mark.parametrize(
+    "rates_hz",
+    [
+        {"lsm9ds1": 238.0, "mpu9250": 200.0, "adis16465": 200.0},
+        {"lsm9ds1": 952.0, "mpu9250": 1000.0, "adis16465": 1000.0},
+    ],
+    ids=["usual", "highest at which outputs are averages"],
+)
+def test_no_conversion_with_its_accelerations_is_lost(rates_hz: dict[str, float]) -> None:
+    result = stream(rates_hz, 3.0, range_g=RANGE_G)
+    assert result.complaints == []
+    assert all(account.samples > 0.9 * 3.0 * account.rate_hz for account in result.accounts.values())

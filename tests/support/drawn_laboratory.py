@@ -19,7 +19,6 @@ SPEED_RAD_S = np.pi / 3
 JOINTS = 6
 AXIS_RAD = np.radians(0.06)  # half-width, as `uncertainty.axis_deg` has it by default
 WAVE_RAD = 0.3 * AXIS_RAD / np.sqrt(3)  # of the encoders' waves, cosine and sine each
-HALF_COUNT_RAD_S = {"adis16465": np.radians(0.025) / 2}  # its upper words alone round downwards
 PART_ERRORS: dict[str, dict[str, float]] = {  # standard deviations, as those values that the configurations give
     "lsm9ds1": {
         "g_rad_s": 1.7e-3, "bias_per_k": 5e-4, "scale_per_k": 3e-4, "flicker_rad_s": 4.8e-5, "walk": 1e-5,
@@ -114,8 +113,7 @@ def truth(
 ) -> np.ndarray:
     """(6,) scale at plus and minus a speed and bias without gravity of a sensor, as means over a time of the world.
 
-    Made of what the simulated part reads without noise, at rest and turning about each of its axes. The bias is that of
-    the words which are read.
+    Made of what the simulated part reads without noise, at rest and turning about each of its axes.
     """
     loaded = parse(yaml.safe_dump(dict(document)))
     world = world_section(loaded)
@@ -129,5 +127,5 @@ def truth(
         return readings(quiet, time_s, turning, seed, sensor.temperature_c)
 
     scale = np.mean(2 * speed_rad_s / (read(speed_rad_s) - read(-speed_rad_s)), axis=0)
-    bias = -read(0.0).mean(axis=0) + HALF_COUNT_RAD_S.get(loaded.config.sensors[name].part, 0.0)
+    bias = -read(0.0).mean(axis=0)
     return np.concatenate([scale, bias])

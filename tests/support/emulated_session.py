@@ -6,6 +6,7 @@ from typing import Any
 
 import numpy as np
 
+from firmware_host.emulator.accelerometer import AccelerometerTruth
 from firmware_host.emulator.adis16465 import Adis16465
 from firmware_host.emulator.flash_memory import FlashMemory
 from firmware_host.emulator.gyroscope import GyroTruth
@@ -25,8 +26,10 @@ PARTS: dict[str, Callable[..., SpiDevice]] = {
     "mpu9250": Mpu9250,
     "adis16465": Adis16465,
 }  # in the order of the board's sensor table
+RANGE_G = 8.0  # which every part has
 RATES_AND_RANGES = {"lsm9ds1": (238.0, 245.0), "mpu9250": (200.0, 250.0), "adis16465": (200.0, 500.0)}
 TRUTH = GyroTruth((1.1771, 1.1554, 1.1440), (0.0077, -0.0100, -0.0051))
+ACCELERATION = AccelerometerTruth((1.02, 0.99, 1.01), (0.2, -0.1, 0.3))
 
 
 def shipped_flash() -> FlashMemory:
@@ -55,7 +58,10 @@ class Session:
         truth = replace(TRUTH, noise_rad_s=noise_rad_s)
         self.readings = dict.fromkeys(parts, 0)
         self.sensors: dict[str, SpiDevice] = {
-            part: PARTS[part](self._counted(part, rate_at), truth, temperature_c=22.0, seed=seed) for part in parts
+            part: PARTS[part](
+                self._counted(part, rate_at), truth, acceleration=ACCELERATION, temperature_c=22.0, seed=seed
+            )
+            for part in parts
         }
         self.flash = flash or shipped_flash()
         self.board = EmulatedBoard(
@@ -99,14 +105,17 @@ class Session:
         (answer,) = [frame for frame in self.run(0.05) if frame.values.get("reply_to") == self._asked]
         return answer
 
-    def configure(self, part: str, rate_hz: float | None = None, range_deg_s: float | None = None) -> Frame:
-        """Set a gyroscope up, by default at its usual rate and range. Returns the board's `setup`."""
+    def configure(
+        self, part: str, rate_hz: float | None = None, range_deg_s: float | None = None, range_g: float = 0.0
+    ) -> Frame:
+        """Set a part up, by default at its usual rate and range, without accelerations. Returns the board's `setup`."""
         usual_rate_hz, usual_range_deg_s = RATES_AND_RANGES[part]
         setup = self.ask(
             "configure",
             sensor=list(PARTS).index(part),
             rate_hz=rate_hz or usual_rate_hz,
             range_deg_s=range_deg_s or usual_range_deg_s,
+            range_g=range_g,
         )
         assert setup.name == "setup", setup
         return setup
@@ -119,14 +128,24 @@ class Session:
 
 
 def samples(frames: Sequence[Frame], sensor: int = 0) -> np.ndarray:
-    """The samples of one sensor in `frames`, (n,) records: time_us, counts (3,), temperature, sequence."""
-    dtype = [("time_us", "u8"), ("counts", "i2", 3), ("temperature", "i2"), ("sequence", "u4")]
+    """The samples of one sensor in `frames`, (n,) records: time_us, counts (3,), acceleration (3,), temperature,
+    sequence; accelerations that are not sent are zeros.
+    """
+    dtype = [
+        ("time_us", "u8"),
+        ("counts", "i2", 3),
+        ("acceleration", "i2", 3),
+        ("temperature", "i2"),
+        ("sequence", "u4"),
+    ]
     parts = [np.empty(0, dtype)]
     for frame in frames:
-        if frame.name == "samples" and frame.values["sensor"] == sensor:
-            part = np.empty(len(frame.items), dtype)
+        if frame.name in ("samples", "imu_samples") and frame.values["sensor"] == sensor:
+            part = np.zeros(len(frame.items), dtype)
             part["time_us"] = frame.values["base_time_us"] + frame.items["delta_us"].astype("u8")
             part["counts"] = frame.items["counts"]
+            if frame.name == "imu_samples":
+                part["acceleration"] = frame.items["acceleration"]
             part["temperature"] = frame.items["temperature_counts"]
             part["sequence"] = frame.values["sequence"] + np.arange(len(frame.items))
             parts.append(part)

@@ -84,14 +84,18 @@ class Stream:
         return found
 
 
-def stream(rates_hz: Mapping[str, float], duration_s: float, calibrated: Collection[str] = ()) -> Stream:
-    """Streams the named parts at these rates for so long, in simulated seconds; those in `calibrated` calibrated."""
+def stream(
+    rates_hz: Mapping[str, float], duration_s: float, calibrated: Collection[str] = (), range_g: float = 0.0
+) -> Stream:
+    """Streams the named parts at these rates for so long, in simulated seconds; those in `calibrated` calibrated, all
+    others with accelerations unless `range_g` is 0.
+    """
     session = Session(parts=list(rates_hz))
     session.run(0.2)
     names = list(PARTS)
     accounts = {}
     for part, rate_hz in rates_hz.items():
-        accounts[part] = Account(session.configure(part, rate_hz).values["rate_hz"])
+        accounts[part] = Account(session.configure(part, rate_hz, range_g=range_g).values["rate_hz"])
         if part in calibrated:
             assert session.ask("write_calibration", sensor=names.index(part), **CALIBRATION).name == "ack"
     before, readings = len(session.sent), dict(session.readings)
@@ -110,7 +114,7 @@ def stream(rates_hz: Mapping[str, float], duration_s: float, calibrated: Collect
 def _take(accounts: Mapping[str, Account], frames: Iterable[Frame]) -> None:
     names = list(PARTS)
     for frame in frames:
-        if frame.name in ("samples", "rates"):
+        if frame.name in ("samples", "imu_samples", "rates"):
             accounts[names[frame.values["sensor"]]].take(frame)
         else:
             assert frame.name in ("ack", "identity"), frame

@@ -129,7 +129,9 @@ class HostBoard:
 def streaming_board() -> HostBoard:
     """A board whose LSM9DS1 has just been started at 238 Hz, with nothing on the wire yet."""
     board = HostBoard()
-    assert [frame.name for frame in board.ask("configure", sensor=0, rate_hz=238, range_deg_s=245)] == ["setup"]
+    assert [frame.name for frame in board.ask("configure", sensor=0, rate_hz=238, range_deg_s=245, range_g=0)] == [
+        "setup"
+    ]
     assert [frame.name for frame in board.ask("start", sensors=0)] == ["ack"]
     settle(board)
     return board
@@ -142,10 +144,16 @@ def settle(board: HostBoard, time_us: int = 0) -> None:
 
 
 def convert(
-    board: HostBoard, time_us: int, counts: Sequence[int] = (1, -2, 3), late_us: int = 20, sensor: int = 0
+    board: HostBoard,
+    time_us: int,
+    counts: Sequence[int] = (1, -2, 3),
+    late_us: int = 20,
+    sensor: int = 0,
+    *,
+    acceleration: Sequence[int] = (0, 0, 0),
 ) -> None:
     """One conversion: the interrupt at `time_us`, the main loop `late_us` after."""
-    (board.gyro, board.mpu9250, board.adis16465)[sensor].convert(counts, -48)
+    (board.gyro, board.mpu9250, board.adis16465)[sensor].convert(counts, -48, acceleration)
     board.data_ready(time_us, sensor)
     board.wait_until(time_us + late_us)
     board.run()
@@ -160,20 +168,28 @@ def error_of(frames: list[Frame]) -> str:
 
 def sample_sequences(frames: list[Frame], sensor: int = 0) -> list[int]:
     """The sequence numbers of a sensor's samples."""
-    batches = [frame for frame in frames if frame.name == "samples" and frame.values["sensor"] == sensor]
+    batches = [f for f in frames if f.name in ("samples", "imu_samples") and f.values["sensor"] == sensor]
     return [batch.values["sequence"] + i for batch in batches for i in range(batch.values["count"])]
 
 
-def configured(board: HostBoard, sensor: int, rate_hz: float = 200, range_deg_s: float = 125) -> dict[str, Any]:
+def configured(
+    board: HostBoard, sensor: int, rate_hz: float = 200, range_deg_s: float = 125, range_g: float = 0
+) -> dict[str, Any]:
     """Sets a sensor up. Returns what the board answers."""
-    (setup,) = board.ask("configure", sensor=sensor, rate_hz=rate_hz, range_deg_s=range_deg_s)
+    (setup,) = board.ask("configure", sensor=sensor, rate_hz=rate_hz, range_deg_s=range_deg_s, range_g=range_g)
     assert setup.name == "setup"
     return setup.values
 
 
-def first_samples(board: HostBoard, sensor: int, counts: tuple[int, int, int], conversions: int = 40) -> Frame:
+def first_samples(
+    board: HostBoard,
+    sensor: int,
+    counts: tuple[int, int, int],
+    conversions: int = 40,
+    acceleration: tuple[int, int, int] = (0, 0, 0),
+) -> Frame:
     """Start, let the sensor convert the same over and over, stop. Returns the first batch."""
     board.ask("start", 2, sensors=0)
     for k in range(conversions):
-        convert(board, 100_000 + 5000 * k, counts, sensor=sensor)
-    return next(frame for frame in board.ask("stop", 3) if frame.name == "samples")
+        convert(board, 100_000 + 5000 * k, counts, sensor=sensor, acceleration=acceleration)
+    return next(frame for frame in board.ask("stop", 3) if frame.name in ("samples", "imu_samples"))

@@ -6,6 +6,7 @@ from typing import Protocol
 
 import numpy as np
 
+from firmware_host.emulator.accelerometer import AccelerometerTruth
 from firmware_host.emulator.adis16465 import Adis16465
 from firmware_host.emulator.gyroscope import GyroTruth
 from firmware_host.emulator.lsm9ds1 import Lsm9ds1
@@ -18,7 +19,9 @@ NO_ERRORS = GyroTruth()
 # Codes by data rate in Hz and by range in degrees per second
 LSM9DS1_RATES = {14.9: 1, 59.5: 2, 119.0: 3, 238.0: 4, 476.0: 5, 952.0: 6}
 LSM9DS1_RANGES = {245.0: 0, 500.0: 1, 2000.0: 3}
+LSM9DS1_RANGES_G = {2.0: 0, 4.0: 2, 8.0: 3, 16.0: 1}
 MPU9250_RANGES = {250.0: 0, 500.0: 1, 1000.0: 2, 2000.0: 3}
+MPU9250_RANGES_G = {2.0: 0, 4.0: 1, 8.0: 2, 16.0: 3}
 
 Rate = Callable[[float], Sequence[float]]
 
@@ -61,9 +64,12 @@ class Driver(Protocol):
     part: SpiDevice
 
     def identity(self) -> int: ...
-    def start(self, rate_hz: float, range_deg_s: float) -> None: ...
+    def start(self, rate_hz: float, range_deg_s: float, range_g: float = 8.0) -> None: ...
     def read(self) -> tuple[list[int], int]:
         """The rates and the temperature of the conversion that is waiting, as counts."""
+
+    def accelerations(self) -> list[int]:
+        """Of the same conversion; to be asked for first."""
 
     def exchange(self, data: bytes) -> bytes: ...
     def advance(self, time_s: float) -> None: ...
@@ -93,23 +99,37 @@ class Lsm9ds1Driver(Registers):
         rate_at: Rate = still,
         truth: GyroTruth = NO_ERRORS,
         *,
+        acceleration: AccelerometerTruth | None = None,
         range_deg_s: float = 500.0,
         temperature_c: float = 25.0,
         seed: int = 1,
         ppm: float = 0.0,
     ) -> None:
-        super().__init__(Lsm9ds1(rate_at, truth, temperature_c=temperature_c, seed=seed, oscillator_ppm=ppm))
+        super().__init__(
+            Lsm9ds1(
+                rate_at, truth, acceleration=acceleration, temperature_c=temperature_c, seed=seed, oscillator_ppm=ppm
+            )
+        )
 
     def identity(self) -> int:
         return self.get(0x0F)[0]
 
-    def start(self, rate_hz: float, range_deg_s: float) -> None:
+    def start(self, rate_hz: float, range_deg_s: float, range_g: float = 8.0) -> None:
         self.set(0x0C, 0x02)
+        self.set(0x20, LSM9DS1_RATES[rate_hz] << 5 | LSM9DS1_RANGES_G[range_g] << 3)
         self.set(0x10, LSM9DS1_RATES[rate_hz] << 5 | LSM9DS1_RANGES[range_deg_s] << 3)
 
     def read(self) -> tuple[list[int], int]:
-        temperature, _status, *rates = integers(self.get(0x15, 2) + bytes(2) + self.get(0x18, 6), "<")
-        return rates, temperature
+        (temperature,) = integers(self.get(0x15, 2), "<")
+        return self._vector(0x18), temperature
+
+    def accelerations(self) -> list[int]:
+        return self._vector(0x28)
+
+    def _vector(self, address: int) -> list[int]:
+        """The part's own x points the other way than the right-handed one."""
+        x, y, z = integers(self.get(address, 6), "<")
+        return [max(-32768, min(32767, -x)), y, z]
 
 
 class Mpu9250Driver(Registers):
@@ -120,18 +140,24 @@ class Mpu9250Driver(Registers):
         rate_at: Rate = still,
         truth: GyroTruth = NO_ERRORS,
         *,
+        acceleration: AccelerometerTruth | None = None,
         range_deg_s: float = 500.0,
         temperature_c: float = 25.0,
         seed: int = 1,
         ppm: float = 0.0,
     ) -> None:
-        super().__init__(Mpu9250(rate_at, truth, temperature_c=temperature_c, seed=seed, oscillator_ppm=ppm))
+        super().__init__(
+            Mpu9250(
+                rate_at, truth, acceleration=acceleration, temperature_c=temperature_c, seed=seed, oscillator_ppm=ppm
+            )
+        )
 
     def identity(self) -> int:
         return self.get(0x75)[0]
 
-    def start(self, rate_hz: float, range_deg_s: float) -> None:
+    def start(self, rate_hz: float, range_deg_s: float, range_g: float = 8.0) -> None:
         self.set(0x1A, 1)
+        self.set(0x1C, MPU9250_RANGES_G[range_g] << 3)
         self.set(0x19, round(1000 / rate_hz) - 1)
         self.set(0x1B, MPU9250_RANGES[range_deg_s] << 3)
         self.set(0x38, 0x01)
@@ -140,6 +166,9 @@ class Mpu9250Driver(Registers):
         _status, *data = self.get(0x3A, 15)
         _x, _y, _z, temperature, *rates = integers(bytes(data), ">")
         return rates, temperature
+
+    def accelerations(self) -> list[int]:
+        return integers(self.get(0x3B, 6), ">")
 
 
 class Adis16465Driver(Master):
@@ -150,6 +179,7 @@ class Adis16465Driver(Master):
         rate_at: Rate = still,
         truth: GyroTruth = NO_ERRORS,
         *,
+        acceleration: AccelerometerTruth | None = None,
         range_deg_s: float = 500.0,
         temperature_c: float = 25.0,
         seed: int = 1,
@@ -158,6 +188,7 @@ class Adis16465Driver(Master):
         part = Adis16465(
             rate_at,
             truth,
+            acceleration=acceleration,
             temperature_c=temperature_c,
             seed=seed,
             oscillator_ppm=ppm,
@@ -180,7 +211,8 @@ class Adis16465Driver(Master):
     def identity(self) -> int:
         return self.get(0x72)
 
-    def start(self, rate_hz: float, range_deg_s: float) -> None:
+    def start(self, rate_hz: float, range_deg_s: float, range_g: float = 8.0) -> None:
+        assert range_g == 8.0, "the part has one range"
         self.set(0x64, round(2000 / rate_hz) - 1)
         self.await_data()  # of the old rate
         self.read()
@@ -188,3 +220,6 @@ class Adis16465Driver(Master):
     def read(self) -> tuple[list[int], int]:
         _status, *rates_and_rest = integers(self.burst()[:16], ">")
         return rates_and_rest[:3], rates_and_rest[6]
+
+    def accelerations(self) -> list[int]:
+        return integers(self.burst()[8:14], ">")

@@ -2,27 +2,19 @@
 
 #include <string.h>
 
+#include "batch.h"
 #include "clock.h"
 #include "kept.h"
 #include "link.h"
 #include "port.h"
 #include "sensors.h"
+#include "setups.h"
 
 #define RING 64u              /* a power of two */
 #define SILENCE_PERIODS 10u   /* so many conversions missing in a row is a fault, not jitter */
 #define SILENCE_US 100000u    /* and time for a part that is just starting up */
 #define BAD_READS 10u         /* so many in a row are worth a word, */
 #define GOOD_READS 8u         /* and as good as one less after so many good ones */
-#define SAMPLES_MAX ((PAYLOAD_MAX - sizeof(struct samples_payload)) / sizeof(struct samples_item))
-#define RATES_MAX ((PAYLOAD_MAX - sizeof(struct rates_payload)) / sizeof(struct rates_item))
-
-_Static_assert(sizeof(struct samples_payload) == sizeof(struct rates_payload), "both begin alike");
-
-struct sample {
-    uint64_t time_us;
-    uint32_t sequence;
-    struct reading reading;
-};
 
 struct stream {
     volatile uint32_t edges; /* by the interrupt */
@@ -38,7 +30,7 @@ struct stream {
     uint32_t conversions, sent, dropped;
     struct sample ring[RING];
     uint32_t written, read;
-    bool calibrated;
+    const struct batch_layout *layout;
     struct correction correction; /* if calibrated */
 };
 
@@ -69,6 +61,11 @@ void acquisition_set_rate(unsigned sensor, double rate_hz)
         stream->settling = driver->settling_us / stream->period_us + 1;
 }
 
+static enum read_result read_sensor(unsigned sensor, struct reading *reading)
+{
+    return sensors[sensor].driver->read(sensors[sensor].device, setups_of(sensor), reading);
+}
+
 #define TRIES 3u /* a line that only rattles is left alone */
 
 /* Reads what was converted before the start. A part that holds its line makes no edge until that is down. A part with pulses
@@ -81,7 +78,7 @@ static void rearm(unsigned sensor)
     unsigned tries = driver->holds_line ? TRIES : 1;
     do {
         stream->edges_seen = stream->edges;
-        driver->read(sensors[sensor].device, &discarded);
+        read_sensor(sensor, &discarded);
     } while (--tries != 0 && (stream->edges != stream->edges_seen || port_line_is_high(sensor)));
     if (!driver->holds_line)
         stream->edges_seen = stream->edges; /* it has been read, or the next tells of itself */
@@ -93,7 +90,7 @@ static void lower_line(unsigned sensor)
     const struct stream *stream = &streams[sensor];
     struct reading discarded;
     for (unsigned tries = TRIES; tries != 0 && port_line_is_high(sensor) && stream->edges == stream->edges_seen; tries--)
-        sensors[sensor].driver->read(sensors[sensor].device, &discarded);
+        read_sensor(sensor, &discarded);
 }
 
 bool acquisition_start(uint8_t calibrated, const struct correction corrections[SENSOR_COUNT])
@@ -106,9 +103,11 @@ bool acquisition_start(uint8_t calibrated, const struct correction corrections[S
         struct stream *stream = &streams[i];
         stream->conversions = stream->sent = stream->dropped = 0;
         stream->written = stream->read = 0;
-        stream->calibrated = is_named(calibrated, i);
-        if (stream->calibrated)
+        stream->layout = setups_of(i)->range_m_s2 > 0.0 ? &batch_imu_samples : &batch_samples;
+        if (is_named(calibrated, i)) {
+            stream->layout = &batch_rates;
             stream->correction = corrections[i];
+        }
         stream->distrust = 0;
         stream->overtaken = false;
         stream->silence_reported = stream->bad_reads_reported = false;
@@ -206,14 +205,14 @@ static void acquire(unsigned sensor)
     const struct sensor_driver *driver = sensors[sensor].driver;
     struct reading reading;
     uint32_t began_us = port_time_us();
-    enum read_result result = driver->read(sensors[sensor].device, &reading);
+    enum read_result result = read_sensor(sensor, &reading);
     /* An edge between the look at them and the moment the values were taken: they may be the next conversion's, under the
        time of the one before. Then the next reading is the same again. What was taken is safe from later edges. */
     bool again = stream->overtaken && result == READ_STALE;
     stream->overtaken = stream->edges != edges && (int32_t)(stream->captured_us - began_us) <= driver->latched_within_us;
     if (driver->holds_line)
         lower_line(sensor);
-    if (!again)
+    if (!again && result != READ_TORN)
         watch_reads(sensor, result);
     if (stream->settling != 0) {
         stream->settling--;
@@ -235,50 +234,36 @@ static void acquire(unsigned sensor)
 
 static unsigned batch_max(const struct stream *stream)
 {
-    return stream->calibrated ? RATES_MAX : SAMPLES_MAX;
+    return (PAYLOAD_MAX - sizeof(struct samples_payload)) / stream->layout->item_size;
 }
 
 /* Sends the oldest samples up to a gap in the sequence: a batch numbers its samples by the first. The link has room. */
 static void send_batch(unsigned sensor)
 {
-    struct {
-        struct samples_payload head;
-        union {
-            struct samples_item samples[SAMPLES_MAX];
-            struct rates_item rates[RATES_MAX];
-        };
-    } __attribute__((packed)) batch;
     struct stream *stream = &streams[sensor];
+    const struct batch_layout *layout = stream->layout;
     const struct sample *first = &stream->ring[stream->read % RING];
+    uint8_t payload[PAYLOAD_MAX];
+    size_t size = sizeof(struct samples_payload);
     uint8_t count = 0;
     while (count < batch_max(stream) && stream->read + count != stream->written) {
         const struct sample *sample = &stream->ring[(stream->read + count) % RING];
         if (sample->sequence != first->sequence + count)
             break;
-        uint32_t delta_us = (uint32_t)(sample->time_us - first->time_us);
-        const struct reading *reading = &sample->reading;
-        if (stream->calibrated) {
-            struct rates_item item = {.delta_us = delta_us, .temperature_counts = reading->temperature_counts};
-            int32_t rate_urad_s[3];
-            correction_apply(&stream->correction, reading->counts, rate_urad_s);
-            memcpy(item.rate_urad_s, rate_urad_s, sizeof item.rate_urad_s);
-            batch.rates[count++] = item;
-        } else {
-            struct samples_item item = {.delta_us = delta_us, .temperature_counts = reading->temperature_counts};
-            memcpy(item.counts, reading->counts, sizeof item.counts);
-            batch.samples[count++] = item;
-        }
+        layout->write(sample, (uint32_t)(sample->time_us - first->time_us), &stream->correction, &payload[size]);
+        size += layout->item_size;
+        count++;
     }
-    batch.head = (struct samples_payload){
+    struct samples_payload head = {
         .sensor = (uint8_t)sensor,
-        .mode = stream->calibrated ? MODE_CALIBRATED : MODE_RAW,
+        .mode = layout->mode,
         .sequence = first->sequence,
         .dropped = stream->dropped,
         .base_time_us = first->time_us,
         .count = count,
     };
-    size_t item_size = stream->calibrated ? sizeof batch.rates[0] : sizeof batch.samples[0];
-    link_send(stream->calibrated ? MESSAGE_RATES : MESSAGE_SAMPLES, &batch, sizeof batch.head + count * item_size);
+    memcpy(payload, &head, sizeof head);
+    link_send(layout->message, payload, size);
     stream->read += count;
     stream->sent += count;
 }

@@ -16,6 +16,8 @@ enum register_address {
     SMPLRT_DIV = 0x19,
     CONFIG = 0x1A,
     GYRO_CONFIG = 0x1B,
+    ACCEL_CONFIG = 0x1C,
+    ACCEL_CONFIG_2 = 0x1D,
     FIFO_EN = 0x23,
     INT_PIN_CFG = 0x37,
     INT_ENABLE = 0x38,
@@ -45,14 +47,23 @@ enum register_address {
 #define WAKING_US 10000u /* until registers can be written: Linux's INV_MPU6050_REG_UP_TIME_MAX */
 
 /* Sensitivities are those of section 3.1, not range / 32768. FS_SEL: map, register 27. */
-static const struct gyro_range ranges[] = {
+static const struct range ranges[] = {
     {250.0, 0, RADIANS(1.0 / 131.0)},
     {500.0, 1, RADIANS(1.0 / 65.5)},
     {1000.0, 2, RADIANS(1.0 / 32.8)},
     {2000.0, 3, RADIANS(1.0 / 16.4)},
 };
 
-/* Bandwidth at DLPF_CFG 1 … 6: map, register 26. */
+/* Section 3.2; AFS_SEL: map, register 28. */
+static const struct range accelerations[] = {
+    NO_ACCELERATION,
+    {2.0, 0, 1.0 / 16384.0},
+    {4.0, 1, 1.0 / 8192.0},
+    {8.0, 2, 1.0 / 4096.0},
+    {16.0, 3, 1.0 / 2048.0},
+};
+
+/* Bandwidth at DLPF_CFG 1 … 6: map, register 26. A_DLPFCFG's are near them: 184, 92, 41, 20, 10, 5 (register 29). */
 static const float bandwidths_hz[] = {184.0f, 92.0f, 41.0f, 20.0f, 10.0f, 5.0f};
 
 static uint16_t identify(unsigned device)
@@ -84,8 +95,10 @@ static bool wake(unsigned device)
 }
 
 /* What an image flashed before left on, such as an offset or the self-test, goes off. Interrupts last.
-   The interrupt is a pulse for each conversion, not a level that a read lowers: a read that is missed costs no edge. */
-static bool write_settings(unsigned device, uint16_t divider, uint8_t filter, uint8_t range)
+   The interrupt is a pulse for each conversion, not a level that a read lowers: a read that is missed costs no edge.
+   The offsets of the gyroscope are the user's; those of the accelerometer (registers 119 to 126) are the factory's trim
+   and stay as they are. */
+static bool write_settings(unsigned device, uint16_t divider, uint8_t filter, uint8_t range, uint8_t acceleration_range)
 {
     const struct byte_setting settings[] = {
         {USER_CTRL, USER_CTRL_I2C_IF_DIS},
@@ -95,6 +108,8 @@ static bool write_settings(unsigned device, uint16_t divider, uint8_t filter, ui
         {CONFIG, filter},
         {SMPLRT_DIV, (uint8_t)(divider - 1)},
         {GYRO_CONFIG, (uint8_t)(range << 3)}, /* FCHOICE_B 0: through the filter */
+        {ACCEL_CONFIG, (uint8_t)(acceleration_range << 3)}, /* no self-test */
+        {ACCEL_CONFIG_2, filter},             /* ACCEL_FCHOICE_B 0: through the filter */
         {INT_PIN_CFG, 0},                     /* active high, push-pull, 50 µs; reading the status clears it */
         {INT_ENABLE, INT_ENABLE_RAW_RDY},
     };
@@ -106,15 +121,15 @@ static bool write_settings(unsigned device, uint16_t divider, uint8_t filter, ui
 
 static enum error_code configure(unsigned device, const struct configure_payload *wanted, struct setup_payload *setup)
 {
-    const struct gyro_range *range = choose_range(wanted->range_deg_s, ranges, COUNT(ranges));
-    if (range == NULL)
+    const struct range *range = choose_range(wanted->range_deg_s, ranges, COUNT(ranges));
+    const struct range *acceleration = choose_range(wanted->range_g, accelerations, COUNT(accelerations));
+    if (range == NULL || acceleration == NULL)
         return ERROR_BAD_RANGE;
     uint16_t divider = nearest_divider(BASE_HZ, wanted->rate_hz, DIVIDER_MAX);
     setup->rate_hz = BASE_HZ / divider;
-    if (!wake(device) || !write_settings(device, divider, filter_code(setup->rate_hz), range->code))
+    if (!wake(device) || !write_settings(device, divider, filter_code(setup->rate_hz), range->code, acceleration->code))
         return ERROR_SETUP_FAILED;
-    setup->range_deg_s = range->deg_s;
-    setup->sensitivity_rad_s = range->sensitivity_rad_s;
+    tell_ranges(range, acceleration, setup);
     setup->temperature_scale_c = 1.0 / 333.87; /* section 3.4.2: not the MPU-6050's formula */
     setup->temperature_offset_c = 21.0;
     return 0;
@@ -126,13 +141,16 @@ static int16_t int16_at(const uint8_t *bytes)
 }
 
 /* One chip select for status, acceleration, temperature and rates: they lie side by side, and one burst is one moment. */
-static enum read_result read(unsigned device, struct reading *reading)
+static enum read_result read(unsigned device, const struct setup_payload *setup, struct reading *reading)
 {
+    (void)setup;
     uint8_t bytes[16] = {INT_STATUS | BYTE_REGISTER_READ};
     bus_xfer(device, DATA_HZ, bytes, sizeof bytes);
     reading->temperature_counts = int16_at(&bytes[8]);
-    for (unsigned axis = 0; axis < 3; axis++)
+    for (unsigned axis = 0; axis < 3; axis++) {
+        reading->acceleration[axis] = int16_at(&bytes[2 + 2 * axis]);
         reading->counts[axis] = int16_at(&bytes[10 + 2 * axis]);
+    }
     uint8_t status = bytes[1] & (INT_STATUS_RAW_DATA_RDY | INT_STATUS_ALWAYS_0);
     return status == INT_STATUS_RAW_DATA_RDY ? READ_FRESH : READ_STALE;
 }

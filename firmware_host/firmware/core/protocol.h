@@ -4,8 +4,8 @@
 
 #include <stdint.h>
 
-#define PROTOCOL_VERSION 3u
-#define FIRMWARE_VERSION "0.3.0"
+#define PROTOCOL_VERSION 4u
+#define FIRMWARE_VERSION "0.4.0"
 #define PAYLOAD_MAX 240u
 #define FRAME_OVERHEAD 6u /* type, sequence, CRC */
 #define COBS_BYTES 2u /* code byte and delimiter */
@@ -38,6 +38,7 @@ enum message_type {
     MESSAGE_WRITE_CALIBRATION = 21,
     MESSAGE_ERASE_CALIBRATION = 22,
     MESSAGE_RECALL = 23,
+    MESSAGE_IMU_SAMPLES = 24,
 };
 
 enum error_code {
@@ -117,8 +118,9 @@ struct configure_payload {
     uint8_t sensor; /* index in the identity's list */
     float rate_hz; /* wanted data rate, Hz; the nearest is taken */
     float range_deg_s; /* wanted range, degrees per second; the next one up is taken */
+    float range_g; /* wanted range of accelerations, g; the next one up is taken; 0 = none wanted */
 } __attribute__((packed));
-_Static_assert(sizeof(struct configure_payload) == 9, "configure_payload");
+_Static_assert(sizeof(struct configure_payload) == 13, "configure_payload");
 
 /* setup, from the board: what the part really does */
 struct setup_payload {
@@ -129,8 +131,10 @@ struct setup_payload {
     double sensitivity_rad_s; /* rad/s per count */
     double temperature_scale_c; /* degrees Celsius per count */
     double temperature_offset_c; /* degrees Celsius at count 0 */
+    double range_m_s2; /* range of accelerations, m/s²; 0 = none are sent */
+    double sensitivity_m_s2; /* m/s² per count; 0 = none are sent */
 } __attribute__((packed));
-_Static_assert(sizeof(struct setup_payload) == 42, "setup_payload");
+_Static_assert(sizeof(struct setup_payload) == 58, "setup_payload");
 
 /* start, from the host: stream every configured sensor, sequences from 0: those named calibrated, the others raw; answered by ack */
 struct start_payload {
@@ -158,7 +162,7 @@ _Static_assert(sizeof(struct samples_payload) == 19, "samples_payload");
 
 struct samples_item {
     uint32_t delta_us; /* board time after base_time_us */
-    int16_t counts[3]; /* x, y, z as the part reports them */
+    int16_t counts[3]; /* turn rate: x, y, z as the part reports them, in right-handed axes */
     int16_t temperature_counts; /* as the part reports it */
 } __attribute__((packed));
 _Static_assert(sizeof(struct samples_item) == 12, "samples_item");
@@ -311,5 +315,24 @@ struct recall_payload {
     float speed_rad_s; /* magnitude of the turn rate then, rad/s */
 } __attribute__((packed));
 _Static_assert(sizeof(struct recall_payload) == 19, "recall_payload");
+
+/* imu_samples, from the board: in the place of samples where accelerations are wanted: both triads of one conversion */
+struct imu_samples_payload {
+    uint8_t sensor; /* index in the identity's list */
+    uint8_t mode; /* enum sample_mode */
+    uint32_t sequence; /* of the first sample; counts every conversion of the part since start */
+    uint32_t dropped; /* conversions since start that never became a sample in a frame */
+    uint64_t base_time_us; /* board time of the first sample, read before the bus transfer */
+    uint8_t count; /* number of samples */
+} __attribute__((packed));
+_Static_assert(sizeof(struct imu_samples_payload) == 19, "imu_samples_payload");
+
+struct imu_samples_item {
+    uint32_t delta_us; /* board time after base_time_us */
+    int16_t counts[3]; /* turn rate: x, y, z as the part reports them, in right-handed axes */
+    int16_t acceleration[3]; /* specific force: x, y, z in the same axes; at rest the axis up is positive */
+    int16_t temperature_counts; /* as the part reports it */
+} __attribute__((packed));
+_Static_assert(sizeof(struct imu_samples_item) == 18, "imu_samples_item");
 
 #endif

@@ -7,8 +7,10 @@
 
 #include "protocol.h"
 
+/* Both triads of one conversion, in the part's right-handed axes. */
 struct reading {
     int16_t counts[3];
+    int16_t acceleration[3]; /* only where it was asked for */
     int16_t temperature_counts;
 };
 
@@ -17,6 +19,7 @@ enum read_result {
     READ_STALE,   /* nothing new, or nobody there */
     READ_DAMAGED, /* the part's own checksum does not match */
     READ_FAULTY,  /* the part itself says that something is wrong with it */
+    READ_TORN,    /* the next conversion came in between: what was read is of two, and nobody is to blame */
 };
 
 struct sensor_driver {
@@ -43,12 +46,13 @@ struct sensor_driver {
     /* Reads the identity register. */
     uint16_t (*identify)(unsigned device);
 
-    /* Sets the part, which has been identified, to rate and range, both positive, and reads every setting back; fills
-       `setup` with what the part really does. 0, or why not. */
+    /* Sets the part, which has been identified, to rate and range, both positive, and to a range of accelerations, not
+       negative, and reads every setting back; fills `setup` with what the part really does. 0, or why not. */
     enum error_code (*configure)(unsigned device, const struct configure_payload *wanted, struct setup_payload *setup);
 
-    /* Reads one conversion, which also lowers the data-ready line of a part that holds it. */
-    enum read_result (*read)(unsigned device, struct reading *reading);
+    /* Reads one conversion, of the rates as `setup` has them, which also lowers the data-ready line of a part that holds
+       it; with its accelerations where `setup` has a range of those. */
+    enum read_result (*read)(unsigned device, const struct setup_payload *setup, struct reading *reading);
 };
 
 #endif

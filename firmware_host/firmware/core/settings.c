@@ -1,11 +1,19 @@
 #include "settings.h"
 
-const struct gyro_range *choose_range(float wanted_deg_s, const struct gyro_range *ranges, size_t count)
+const struct range *choose_range(float wanted, const struct range *ranges, size_t count)
 {
     for (size_t i = 0; i < count; i++)
-        if (wanted_deg_s <= (float)ranges[i].deg_s)
+        if (wanted <= (float)ranges[i].full_scale)
             return &ranges[i];
     return NULL;
+}
+
+void tell_ranges(const struct range *rate, const struct range *acceleration, struct setup_payload *setup)
+{
+    setup->range_deg_s = rate->full_scale;
+    setup->sensitivity_rad_s = rate->per_count;
+    setup->range_m_s2 = STANDARD_GRAVITY_M_S2 * acceleration->full_scale;
+    setup->sensitivity_m_s2 = STANDARD_GRAVITY_M_S2 * acceleration->per_count;
 }
 
 static float distance(double a, float b)

@@ -16,7 +16,7 @@ static enum error_code refuse_wanted(const struct configure_payload *wanted)
 {
     if (!(wanted->rate_hz > 0.0f && wanted->rate_hz < 1e6f))
         return ERROR_BAD_RATE;
-    return wanted->range_deg_s > 0.0f ? 0 : ERROR_BAD_RANGE;
+    return wanted->range_deg_s > 0.0f && wanted->range_g >= 0.0f ? 0 : ERROR_BAD_RANGE;
 }
 
 enum error_code setups_configure(const struct configure_payload *wanted)

@@ -22,7 +22,7 @@ void parts_reset(void)
 {
     memset(memory, 0, sizeof memory);
     memory[LSM9DS1][0x0F] = 0x68;   /* WHO_AM_I */
-    memory[LSM9DS1][0x17] = 0x02;   /* STATUS_REG: new data, always */
+    memory[LSM9DS1][0x17] = 0x02;   /* STATUS_REG: new data, always; its twin at 0x27 says none after the rates */
     memory[MPU9250][0x75] = 0x71;   /* WHO_AM_I */
     memory[MPU9250][0x6B] = 0x01;   /* PWR_MGMT_1 */
     memory[MPU9250][0x3A] = 0x01;   /* INT_STATUS: new data, always */
@@ -77,10 +77,11 @@ void parts_convert(unsigned device, uint8_t value)
 {
     static const struct {
         uint8_t first, size;
-    } rates[PARTS] = {{0x18, 6}, {0x43, 6}, {BURST_DATA + 2, 6}};
-    for (uint8_t i = 0; i < rates[device].size; i++)
-        memory[device][rates[device].first + i] = (uint8_t)(value * (i + 1));
-    memory[ADIS16465][BURST_DATA + 17]++; /* the counter of conversions */
+    } outputs[PARTS][2] = {{{0x18, 6}, {0x28, 6}}, {{0x3B, 6}, {0x43, 6}}, {{BURST_DATA + 2, 12}, {0x04, 24}}};
+    for (unsigned block = 0; block < 2; block++)
+        for (uint8_t i = 0; i < outputs[device][block].size; i++)
+            memory[device][outputs[device][block].first + i] = (uint8_t)(value * (i + 1));
+    memory[ADIS16465][0x23] = ++memory[ADIS16465][BURST_DATA + 17]; /* the counter of conversions, low byte */
 }
 
 void parts_disturb(unsigned device, uint8_t address, uint8_t value)

@@ -11,7 +11,7 @@ void parts_reset(void);
 /* One chip select; answers in place. */
 void parts_xfer(unsigned device, uint32_t max_hz, uint8_t *bytes, size_t size);
 
-/* A new conversion of a part, its rates derived from `value`. */
+/* A new conversion of a part, its rates and accelerations derived from `value`. */
 void parts_convert(unsigned device, uint8_t value);
 
 /* Overwrites any byte of a part's memory. */

@@ -32,10 +32,13 @@ def zeros(message: Message) -> bytes:
     return bytes((FRAME, message.code, 1, message.head.size)) + bytes(message.head.size)
 
 
-SETUP = b"".join(
-    frame("configure", sensor, rate_hz, range_deg_s)
-    for sensor, rate_hz, range_deg_s in ((0, 238.0, 245.0), (1, 200.0, 250.0), (2, 200.0, 500.0))
-)
+def setup(range_g: float) -> bytes:
+    """All three sensors set up."""
+    rates_and_ranges = ((0, 238.0, 245.0), (1, 200.0, 250.0), (2, 200.0, 500.0))
+    return b"".join(frame("configure", *sensor, range_g) for sensor in rates_and_ranges)
+
+
+SETUP = setup(0.0)
 RECORD = (1, b"LSM9DS1-001", 1_700_000_000, 25.0, 1.1, 0.0, 0.0, 0.0, 1.2, 0.0, 0.0, 0.0, 1.3, 0.01, -0.02, 0.03)
 OBSERVATIONS = b"".join(
     frame("recall", 0, index, *(speed_rad_s * (i == index // 2) + 0.01 for i in range(3)), abs(speed_rad_s))
@@ -44,6 +47,7 @@ OBSERVATIONS = b"".join(
 PLAYS = {
     "requests": b"".join(zeros(message) for message in MESSAGES if message.sender == "host"),
     "stream": SETUP + frame("start", 0) + convert(7, 120, 4000) + frame("status") + frame("stop"),
+    "accelerations": setup(8.0) + frame("start", 0) + convert(7, 120, 4000) + frame("status") + frame("stop"),
     "kept": SETUP
     + frame("keep", 7, 0.5)
     + frame("start", 0)

@@ -93,16 +93,18 @@ def test_the_counter_counts_the_updates() -> None:
 
 
 def test_low_words_carry_what_averaging_adds() -> None:
-    def rates(driver: Adis16465Driver) -> list[int]:
-        """32 bits each."""
+    def outputs(driver: Adis16465Driver) -> list[int]:
+        """Rates, then accelerations, 32 bits each."""
         driver.await_data()
-        words = [driver.get(X_GYRO_LOW + 2 * word) for word in range(6)]
+        words = [driver.get(X_GYRO_LOW + 2 * word) for word in range(12)]
         return [low | high << 16 for low, high in zip(words[::2], words[1::2], strict=True)]
 
-    driver = turning()
-    assert rates(driver) == [round(rate / PER_COUNT) << 16 & 0xFFFF_FFFF for rate in RATE]
+    force_g = (0.10003, -0.20004, 0.9)
+    in_counts = [*(rate / PER_COUNT for rate in RATE), *(4000 * force for force in force_g)]
+    driver = Adis16465Driver(lambda _time_s: (*RATE, *force_g))
+    assert outputs(driver) == [round(counts) << 16 & 0xFFFF_FFFF for counts in in_counts]
     driver.start(200.0, 500.0)
-    assert rates(driver) == [round(rate / PER_COUNT * 65536) & 0xFFFF_FFFF for rate in RATE]
+    assert outputs(driver) == [round(counts * 65536) & 0xFFFF_FFFF for counts in in_counts]
 
 
 def test_the_upper_word_alone_is_rounded_down_when_it_averages() -> None:

@@ -13,7 +13,16 @@ from firmware_host.errors import BoardError
 from firmware_host.frames import Frame, encode
 from firmware_host.protocol import ERRORS
 from support import tiny_firmware
-from support.emulated_session import CRYSTAL_PPM, PARTS, RATES_AND_RANGES, TRUTH, Session, samples
+from support.emulated_session import (
+    ACCELERATION,
+    CRYSTAL_PPM,
+    PARTS,
+    RANGE_G,
+    RATES_AND_RANGES,
+    TRUTH,
+    Session,
+    samples,
+)
 
 ALL = tuple(PARTS)
 RATE_RAD_S = (0.5, -0.3, 1.0)
@@ -59,7 +68,31 @@ def test_each_tells_its_own_truth_in_its_own_counts() -> None:
     for index, part in enumerate(ALL):
         counts = samples(frames, index)["counts"]
         assert len(counts)
-        assert np.all(np.abs(counts * per_count[part] - reading) <= per_count[part])
+        assert np.all(np.abs(counts * per_count[part] - reading) <= 0.5 * per_count[part])
+
+
+def test_accelerations_of_all_three_come_along_in_the_same_axes_without_a_loss() -> None:
+    """Motion and truth are in right-handed axes, and so is what arrives, of the LSM9DS1 too."""
+    force_g = (0.5, -0.3, 0.8)
+    session = Session(parts=ALL, rate_at=lambda _time_s: (*RATE_RAD_S, *force_g), noise_rad_s=0.0)
+    session.run(0.2)
+    setups = {part: session.configure(part, range_g=RANGE_G).values for part in ALL}
+    session.board.receive(encode("start", 78, {"sensors": 0}))
+    frames = session.run(1.0)
+    rates = np.array(RATE_RAD_S) / np.array(TRUTH.scale) - np.array(TRUTH.bias_rad_s)
+    forces = 9.80665 * np.array(force_g) / np.array(ACCELERATION.scale) - np.array(ACCELERATION.bias_m_s2)
+    for index, part in enumerate(ALL):
+        stream = samples(frames, index)
+        assert len(stream) > 0.8 * setups[part]["rate_hz"]
+        assert np.all(np.diff(stream["sequence"]) == 1)
+        for name, sensitivity, expected in (
+            ("counts", "sensitivity_rad_s", rates),
+            ("acceleration", "sensitivity_m_s2", forces),
+        ):
+            assert np.all(
+                np.abs(stream[name] * setups[part][sensitivity] - expected) <= 0.5 * setups[part][sensitivity]
+            )
+    assert {frame.values["dropped"] for frame in frames if frame.name == "imu_samples"} == {0}
 
 
 def test_equal_inputs_give_equal_bytes() -> None:
@@ -83,7 +116,7 @@ def test_a_part_that_is_not_there_is_told_from_another(part: str, fault: Fault, 
     present = session.ask("hello").items["present"].astype(bool)
     assert present.tolist() == [other != part for other in ALL]
     rate_hz, range_deg_s = RATES_AND_RANGES[part]
-    answer = session.ask("configure", sensor=ALL.index(part), rate_hz=rate_hz, range_deg_s=range_deg_s)
+    answer = session.ask("configure", sensor=ALL.index(part), rate_hz=rate_hz, range_deg_s=range_deg_s, range_g=0)
     assert error(answer) == name
     session.sensors[part].fault = None
     session.configure(part)

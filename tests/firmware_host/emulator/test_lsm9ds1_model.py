@@ -10,7 +10,7 @@ from firmware_host.emulator.bus import Violation
 from support.spi_master import LSM9DS1_RATES, Lsm9ds1Driver, Rate, integers, still
 
 INT1_CTRL, WHO_AM_I, CTRL_REG1_G, CTRL_REG8 = 0x0C, 0x0F, 0x10, 0x22
-STATUS, OUT_G = 0x17, 0x18
+STATUS, OUT_G, CTRL_REG6_XL, STATUS_AGAIN, OUT_XL = 0x17, 0x18, 0x20, 0x27, 0x28
 BDU, IF_ADD_INC, SW_RESET = 0x40, 0x04, 0x01
 PERIOD_S = 1 / 238
 
@@ -38,7 +38,7 @@ def test_powered_down_it_does_nothing() -> None:
 @pytest.mark.parametrize(("rate_hz", "discard"), [(14.9, 2), (59.5, 3), (119.0, 3), (238.0, 4), (476.0, 5), (952.0, 8)])
 def test_the_first_conversions_after_a_start_are_wrong(rate_hz: float, discard: int) -> None:
     driver = polled(lambda _time_s: (1.0, 1.0, 1.0), rate_hz)
-    right = [next_counts(driver)[0] == round(math.degrees(1.0) / 8.75e-3) for _ in range(20)]
+    right = [next_counts(driver)[1] == round(math.degrees(1.0) / 8.75e-3) for _ in range(20)]
     assert right == [False] * discard + [True] * (20 - discard)
 
 
@@ -68,9 +68,9 @@ def test_the_pin_stays_low_unless_routed() -> None:
 
 
 def ramp(time_s: float) -> Sequence[float]:
-    """256 counts a conversion at 245 °/s and 238 Hz, from -1 count: every conversion changes both bytes."""
-    counts = round(time_s / PERIOD_S) * 0x101 - 1
-    return (counts * math.radians(8.75e-3),) * 3
+    """257 counts a conversion at 245 °/s and 238 Hz, from -1 count: every conversion changes both bytes."""
+    rate = (round(time_s / PERIOD_S) * 0x101 - 1) * math.radians(8.75e-3)
+    return -rate, rate, rate  # the part's x is the other way
 
 
 def test_an_unread_conversion_is_replaced_by_the_next() -> None:
@@ -115,4 +115,60 @@ def test_software_reset_restores_every_register() -> None:
 def test_rates_and_ranges_it_does_not_have_are_refused(control: int) -> None:
     with pytest.raises(Violation, match="LSM9DS1") as caught:
         Lsm9ds1Driver().set(CTRL_REG1_G, control)
+    assert caught.value.name == "sensor_setup"
+
+
+def accelerating(force_at: Rate = lambda _time_s: (0.0, 0.0, 0.0, 0.25, 0.5, 1.0)) -> Lsm9ds1Driver:
+    driver = Lsm9ds1Driver(force_at)
+    driver.set(CTRL_REG8, IF_ADD_INC | BDU)
+    driver.set(CTRL_REG6_XL, LSM9DS1_RATES[238.0] << 5)
+    driver.set(CTRL_REG1_G, LSM9DS1_RATES[238.0] << 5)
+    driver.advance(10.5 * PERIOD_S)
+    return driver
+
+
+def test_the_registers_of_both_triads_are_left_handed() -> None:
+    """In the axes of the magnetometer, which are right-handed, their x points the other way (datasheet, figure 1)."""
+    driver = accelerating(lambda _time_s: (1.0, 1.0, 1.0, 0.5, 0.5, 0.5))
+    rate, force = round(math.degrees(1.0) / 8.75e-3), round(0.5 / 0.061e-3)
+    assert integers(driver.get(OUT_G, 6), "<") == [-rate, rate, rate]
+    assert integers(driver.get(OUT_XL, 6), "<") == [-force, force, force]
+
+
+def test_the_accelerations_have_a_flag_of_their_own_that_reading_their_last_byte_lowers() -> None:
+    driver = accelerating()
+    assert driver.get(STATUS_AGAIN) == driver.get(STATUS) == b"\x07"
+    driver.get(OUT_XL, 5)
+    assert driver.get(STATUS_AGAIN) == b"\x07"
+    driver.get(OUT_XL + 5)
+    assert driver.get(STATUS_AGAIN) == b"\x06"
+    driver.get(OUT_G, 6)
+    assert driver.get(STATUS_AGAIN) == b"\x04"
+
+
+def test_block_data_update_holds_for_accelerations_too() -> None:
+    def force_at(time_s: float) -> Sequence[float]:
+        counts = round(time_s / PERIOD_S) * 0x101 - 1
+        return 0.0, 0.0, 0.0, 0.0, counts * 0.061e-3, 0.0
+
+    driver = accelerating(force_at)
+    low = driver.get(OUT_XL + 2)
+    driver.advance(11.5 * PERIOD_S)
+    assert int.from_bytes(low + driver.get(OUT_XL + 3), "little") == 10 * 0x101 - 1
+    assert integers(driver.get(OUT_XL, 6), "<")[1] == 11 * 0x101 - 1
+
+
+def test_writing_its_control_register_leaves_the_accelerometer_alone_until_the_gyroscope_is_told() -> None:
+    driver = accelerating()
+    driver.set(CTRL_REG6_XL, LSM9DS1_RATES[238.0] << 5)
+    assert driver.part.next_event_s == math.inf
+    driver.set(CTRL_REG1_G, LSM9DS1_RATES[238.0] << 5)
+    assert driver.part.next_event_s - driver.time_s == pytest.approx(PERIOD_S)
+
+
+def test_two_data_rates_at_once_are_refused() -> None:
+    driver = Lsm9ds1Driver()
+    driver.set(CTRL_REG6_XL, LSM9DS1_RATES[119.0] << 5)
+    with pytest.raises(Violation, match="two data rates") as caught:
+        driver.set(CTRL_REG1_G, LSM9DS1_RATES[238.0] << 5)
     assert caught.value.name == "sensor_setup"

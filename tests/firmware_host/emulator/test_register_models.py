@@ -5,12 +5,14 @@ from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from functools import partial
 from itertools import pairwise
+from typing import Any
 
 import numpy as np
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
+from firmware_host.emulator.accelerometer import AccelerometerTruth
 from firmware_host.emulator.bus import Violation
 from firmware_host.emulator.gyroscope import GyroTruth
 from firmware_host.emulator.spi_device import Fault
@@ -21,7 +23,7 @@ DISCARD_S = 0.1  # every part's filters have settled
 
 @dataclass(frozen=True)
 class Part:
-    """A part's datasheet: `per_count_deg_s`: range → sensitivity; `forbidden`: accesses that have no model."""
+    """A part's datasheet: `per_count_deg_s`, `per_count_g`: range → sensitivity; `forbidden`: accesses."""
 
     name: str
     new: Callable[..., Driver]
@@ -29,6 +31,7 @@ class Part:
     other_identity: int
     rates_hz: Sequence[float]
     per_count_deg_s: dict[float, float]
+    per_count_g: dict[float, float]
     temperature_counts: Callable[[float], float]
     forbidden: Sequence[tuple[str, bytes]]
 
@@ -39,11 +42,12 @@ class Part:
         *,
         rate_hz: float | None = None,
         range_deg_s: float = 500.0,
-        **others: float,
+        range_g: float = 8.0,
+        **others: Any,
     ) -> Driver:
-        """A part that runs, by default at its fastest rate here and in the range that all parts have."""
+        """A part that runs, by default at its fastest rate here and in the ranges that all parts have."""
         driver = self.new(rate_at, truth, range_deg_s=range_deg_s, **others)
-        driver.start(rate_hz or self.rates_hz[-1], range_deg_s)
+        driver.start(rate_hz or self.rates_hz[-1], range_deg_s, range_g)
         return driver
 
     def per_count_rad_s(self, range_deg_s: float = 500.0) -> float:
@@ -58,11 +62,12 @@ PARTS = (
         other_identity=0x69,
         rates_hz=(14.9, 59.5, 119.0, 238.0, 476.0, 952.0),
         per_count_deg_s={245.0: 8.75e-3, 500.0: 17.5e-3, 2000.0: 70.0e-3},
+        per_count_g={2.0: 0.061e-3, 4.0: 0.122e-3, 8.0: 0.244e-3, 16.0: 0.732e-3},
         temperature_counts=lambda temperature_c: 16 * (temperature_c - 25),
         forbidden=(
-            ("unmodelled_register", b"\xa8\x00"),
+            ("unmodelled_register", b"\xa6\x00"),
             ("unmodelled_register", b"\x06\x01"),
-            ("unmodelled_bits", b"\x20\x60"),  # accelerometer on
+            ("unmodelled_bits", b"\x21\x04"),  # the accelerometer's second filter
         ),
     ),
     Part(
@@ -72,10 +77,12 @@ PARTS = (
         other_identity=0x70,
         rates_hz=(4.0, 100.0, 200.0, 500.0, 1000.0),
         per_count_deg_s={250.0: 1 / 131, 500.0: 1 / 65.5, 1000.0: 1 / 32.8, 2000.0: 1 / 16.4},
+        per_count_g={2.0: 1 / 16384, 4.0: 1 / 8192, 8.0: 1 / 4096, 16.0: 1 / 2048},
         temperature_counts=lambda temperature_c: 333.87 * (temperature_c - 21),
         forbidden=(
             ("unmodelled_register", b"\xf2\x00"),  # FIFO count
             ("unmodelled_register", b"\x26\x01"),
+            ("unmodelled_register", b"\x77\x00"),  # the accelerometer's offset, which is the factory's trim
             ("unmodelled_bits", b"\x1b\xe0"),  # self-test
             ("unmodelled_bits", b"\x6a\x40"),  # FIFO on
         ),
@@ -87,6 +94,7 @@ PARTS = (
         other_identity=0x4056,
         rates_hz=(1.0, 100.0, 200.0, 500.0, 2000.0),
         per_count_deg_s={125.0: 1 / 160, 500.0: 1 / 40, 2000.0: 1 / 10},
+        per_count_g={8.0: 1 / 4000},
         temperature_counts=lambda temperature_c: 10 * temperature_c,
         forbidden=(
             ("unmodelled_register", b"\x24\x00"),  # delta angle
@@ -122,6 +130,13 @@ def settled(driver: Driver) -> np.ndarray:
         driver.await_data()
         rates, _temperature = driver.read()
     return np.array(rates)
+
+
+def settled_acceleration(driver: Driver) -> np.ndarray:
+    """The accelerations of one conversion, (3,), after the part has settled."""
+    settled(driver)
+    driver.await_data()
+    return np.array(driver.accelerations())
 
 
 def constant(rate: Sequence[float], _time_s: float) -> Sequence[float]:
@@ -195,7 +210,7 @@ def test_the_truth_is_g_equals_k_times_m_plus_b(
     reading = settled(part.driver(lambda _time_s: rate, GyroTruth(scale, bias_rad_s), rate_hz=part.rates_hz[-2]))
     per_count = part.per_count_rad_s()
     recovered = np.array(scale) * (reading * per_count + np.array(bias_rad_s))
-    slack = 1.0 if part.name == "ADIS16465" else 0.5001  # it averages here, and then rounds down
+    slack = 1.0 if part.name == "ADIS16465" else 0.5001  # it averages here, and a burst alone rounds down
     assert np.all(np.abs(recovered - rate) <= slack * per_count * np.array(scale))
 
 
@@ -250,3 +265,52 @@ def test_what_has_no_model_is_refused_by_name(part: Part) -> None:
             driver.exchange(access)
         assert caught.value.name == name, access
         assert part.name in caught.value.what
+
+
+@pytest.mark.parametrize(
+    ("part", "range_g"), [(p, r) for p in PARTS for r in p.per_count_g], ids=lambda v: getattr(v, "name", None)
+)
+def test_sensitivity_to_acceleration_is_the_datasheets(part: Part, range_g: float) -> None:
+    force_g = range_g * np.array([0.9, -0.5, 0.1])
+    driver = part.driver(lambda _time_s: (0.1, 0.2, 0.3, *force_g.tolist()), range_g=range_g)
+    error = settled_acceleration(driver) - force_g / part.per_count_g[range_g]
+    assert np.all(np.abs(error) <= 0.5)
+
+
+@every_part
+def test_too_much_acceleration_saturates(part: Part) -> None:
+    driver = part.driver(lambda _time_s: (0.0, 0.0, 0.0, 90.0, -90.0, 0.0))
+    assert settled_acceleration(driver).tolist() == [32767, -32768, 0]
+
+
+@every_part
+def test_a_motion_without_force_shows_a_part_at_rest_with_z_up(part: Part) -> None:
+    assert settled_acceleration(part.driver()).tolist() == [0, 0, round(1 / part.per_count_g[8.0])]
+
+
+@every_part
+def test_a_motion_is_asked_for_once_though_two_triads_feel_it(part: Part) -> None:
+    asked: list[float] = []
+
+    def motion_at(time_s: float) -> Sequence[float]:
+        asked.append(time_s)
+        return 0.0, 0.0, 0.0, 0.0, 0.0, 1.0
+
+    driver = part.driver(motion_at, acceleration=AccelerometerTruth(noise_m_s2=0.01))
+    driver.advance(driver.part.next_event_s + 0.2)
+    assert len(asked) > 0.19 * part.rates_hz[-1]
+    assert len(asked) == len(set(asked))
+
+
+@every_part
+def test_what_the_accelerometer_does_leaves_the_rates_as_they_are(part: Part) -> None:
+    """Byte for byte: its noise is drawn from a seed of its own."""
+    noisy = AccelerometerTruth(noise_m_s2=0.1, random_walk_m_s2_per_sqrt_s=0.1)
+    truth = GyroTruth(noise_rad_s=0.035, random_walk_rad_s_per_sqrt_s=0.01)
+    with_it, without = (part.driver(truth=truth, acceleration=acceleration) for acceleration in (noisy, None))
+    assert np.array_equal(counts(with_it, 100), counts(without, 100))
+    with_it.await_data()
+    first = with_it.accelerations()
+    with_it.read()
+    with_it.await_data()
+    assert with_it.accelerations() != first

@@ -5,7 +5,7 @@ import math
 
 import pytest
 
-from firmware_host.protocol import ERRORS
+from firmware_host.protocol import ERRORS, MESSAGE_BY_NAME
 from support.host_board import HostBoard, configured, convert, error_of, first_samples, sample_sequences
 from support.host_sensors import Adis16465Registers, Nobody
 
@@ -27,12 +27,12 @@ def test_the_model_of_the_adis16465_has_its_range(
     assert setup["range_deg_s"] == deg_s
     assert setup["sensitivity_rad_s"] == pytest.approx(math.radians(1 / counts_per_deg_s), rel=1e-15)
     assert (setup["temperature_scale_c"], setup["temperature_offset_c"]) == (0.1, 0.0)
-    assert error_of(board.ask("configure", sensor=2, rate_hz=200, range_deg_s=deg_s + 1)) == "bad_range"
+    assert error_of(board.ask("configure", sensor=2, rate_hz=200, range_deg_s=deg_s + 1, range_g=0)) == "bad_range"
 
 
 def test_a_model_of_the_adis16465_that_nobody_knows_is_another_part(board: HostBoard) -> None:
     board.adis16465.words[0x5E] = 0x000B
-    assert error_of(board.ask("configure", sensor=2, rate_hz=200, range_deg_s=125)) == "sensor_mismatch"
+    assert error_of(board.ask("configure", sensor=2, rate_hz=200, range_deg_s=125, range_g=0)) == "sensor_mismatch"
 
 
 @pytest.mark.parametrize(
@@ -47,20 +47,27 @@ def test_the_adis16465_decimates(board: HostBoard, wanted_hz: float, hz: float, 
 def test_settings_of_the_adis16465_are_written_by_bytes_and_believed_when_they_read_back(board: HostBoard) -> None:
     board.adis16465.words |= {0x5C: 0x0004, 0x60: 0x0002}
     configured(board, 2, rate_hz=2)
-    biases = [(address, 0x00) for address in range(0x40, 0x4C)]
+    biases = [(address, 0x00) for address in range(0x40, 0x58)]  # of the rates, then of the accelerations
     filter_off = [(0x5C, 0x00), (0x5D, 0x00)]
     data_ready_rises = [(0x60, 0xC1), (0x61, 0x00)]
     decimation = [(0x64, 0xE7), (0x65, 0x03)]  # 999
     assert board.adis16465.writes == biases + filter_off + data_ready_rises + decimation
     board.adis16465.taking_us = 2000
-    assert error_of(board.ask("configure", sensor=2, rate_hz=200, range_deg_s=125)) == "setup_failed"
+    assert error_of(board.ask("configure", sensor=2, rate_hz=200, range_deg_s=125, range_g=0)) == "setup_failed"
 
 
-def test_an_adis16465_sample_is_one_burst_with_a_checksum(board: HostBoard) -> None:
-    configured(board, 2)
+@pytest.mark.parametrize(
+    ("rate_hz", "range_g", "frames"),
+    [(200, 0, 5), (200, 8, 8), (2000, 8, 0)],  # three or six lower words and the counter; without averaging, none
+)
+def test_an_adis16465_sample_is_a_burst_with_a_checksum_and_the_lower_words_that_averaging_fills(
+    board: HostBoard, rate_hz: float, range_g: float, frames: int
+) -> None:
+    configured(board, 2, rate_hz=rate_hz, range_g=range_g)
     board.adis16465.transfers.clear()
     batch = first_samples(board, 2, (-32768, 258, 32767))
-    assert board.adis16465.transfers == [22] * 41
+    at_start = [22]  # what is read before the first conversion is nothing new
+    assert board.adis16465.transfers == at_start + ([22] + [2] * frames) * 40
     assert batch.items["counts"][0].tolist() == [-32768, 258, 32767]
     assert batch.items["temperature_counts"][0] == -48
 
@@ -117,10 +124,10 @@ def test_damage_again_and_again_is_named_but_not_a_burst_now_and_then(every: int
 
 
 def test_biases_somebody_stored_in_the_adis16465_are_cleared(board: HostBoard) -> None:
-    biases = range(0x40, 0x4C, 2)
+    biases = range(0x40, 0x58, 2)
     board.adis16465.words |= dict.fromkeys(biases, 0x1234)
-    board.adis16465.stuck.add(0x46)
-    assert error_of(board.ask("configure", sensor=2, rate_hz=200, range_deg_s=125)[:1]) == "setup_failed"
+    board.adis16465.stuck.add(0x56)
+    assert error_of(board.ask("configure", sensor=2, rate_hz=200, range_deg_s=125, range_g=0)[:1]) == "setup_failed"
     board.adis16465.stuck.clear()
     configured(board, 2)
     assert {board.adis16465.words[address] for address in biases} == {0}
@@ -137,7 +144,7 @@ def test_an_adis16465_that_reports_a_fault_is_reset_once_and_then_believed(board
     assert (0x68, 0x80) not in board.adis16465.writes
     board.adis16465.words[0x02] = 0x0020
     board.adis16465.cured_by_reset = False
-    assert error_of(board.ask("configure", sensor=2, rate_hz=200, range_deg_s=125)[:1]) == "sensor_fault"
+    assert error_of(board.ask("configure", sensor=2, rate_hz=200, range_deg_s=125, range_g=0)[:1]) == "sensor_fault"
 
 
 def test_a_reading_that_the_next_conversion_overtakes_is_lost_and_the_part_not_blamed() -> None:
@@ -193,18 +200,20 @@ class Driver(ctypes.Structure):
         ("keep_to_spi", ctypes.CFUNCTYPE(None, ctypes.c_uint)),
         ("identify", ctypes.CFUNCTYPE(ctypes.c_uint16, ctypes.c_uint)),
         ("configure", ctypes.CFUNCTYPE(ctypes.c_int, ctypes.c_uint, ctypes.c_void_p, ctypes.c_void_p)),
-        ("read", ctypes.CFUNCTYPE(ctypes.c_int, ctypes.c_uint, ctypes.c_void_p)),
+        ("read", ctypes.CFUNCTYPE(ctypes.c_int, ctypes.c_uint, ctypes.c_void_p, ctypes.c_void_p)),
     )
 
 
 def test_two_adis16465_on_one_bus_do_not_share_what_the_driver_remembers(board: HostBoard) -> None:
     driver = Driver.in_dll(board.core, "adis16465_gyro")
-    reading = ctypes.create_string_buffer(8)
+    setup, reading = ctypes.create_string_buffer(MESSAGE_BY_NAME["setup"].head.size), ctypes.create_string_buffer(14)
     first, second = board.adis16465, Adis16465Registers()
     board.sensors[1] = second
     for part in (first, second):
         part.convert((1, 2, 3), -48)
     assert first.counter == second.counter == 1
-    assert [driver.read(device, reading) for device in (2, 1, 2, 1)] == [FRESH, FRESH, STALE, STALE]
+    assert [driver.read(device, setup, reading) for device in (2, 1, 2, 1)] == [FRESH, FRESH, STALE, STALE]
     board.core.board_reset()
-    assert [driver.read(device, reading) for device in (2, 1)] == [FRESH, STALE], "device 2 alone is on this board"
+    assert [driver.read(device, setup, reading) for device in (2, 1)] == [FRESH, STALE], (
+        "device 2 alone is on this board"
+    )

@@ -152,8 +152,8 @@ def test_the_whole_matrix_corrects_within_the_bound_of_single_precision(range_de
     board.ask("write_calibration", sensor=0, **WHOLE)
     board.ask("start", sensors=1)
     settle(board)
-    counts = np.random.default_rng(5).integers(-32768, 32768, (2000, 3))
-    counts[:8] = np.array(np.meshgrid(*3 * [[-32768, 32767]])).reshape(3, -1).T
+    counts = np.random.default_rng(5).integers(-32767, 32768, (2000, 3))  # all that the part's x, turned, can be
+    counts[:8] = np.array(np.meshgrid(*3 * [[-32767, 32767]])).reshape(3, -1).T
     frames = []
     for k, row in enumerate(counts.tolist()):
         convert(board, (k + 1) * PERIOD_US, row)

@@ -20,13 +20,15 @@ def board() -> HostBoard:
 @pytest.mark.parametrize("sensor", range(3))
 @pytest.mark.parametrize("rate_hz", [0.0, -238.0, math.nan, math.inf])
 def test_a_rate_that_is_no_rate_is_refused(board: HostBoard, sensor: int, rate_hz: float) -> None:
-    assert error_of(board.ask("configure", sensor=sensor, rate_hz=rate_hz, range_deg_s=100)) == "bad_rate"
+    assert error_of(board.ask("configure", sensor=sensor, rate_hz=rate_hz, range_deg_s=100, range_g=0)) == "bad_rate"
 
 
 @pytest.mark.parametrize("sensor", range(3))
 @pytest.mark.parametrize("range_deg_s", [0.0, -245.0, 2001.0, math.nan, math.inf])
 def test_a_range_the_part_does_not_have_is_refused(board: HostBoard, sensor: int, range_deg_s: float) -> None:
-    assert error_of(board.ask("configure", sensor=sensor, rate_hz=238, range_deg_s=range_deg_s)) == "bad_range"
+    assert (
+        error_of(board.ask("configure", sensor=sensor, rate_hz=238, range_deg_s=range_deg_s, range_g=0)) == "bad_range"
+    )
 
 
 @pytest.mark.parametrize(("sensor", "bytes_read"), [(0, 1), (1, 1), (2, 2)])
@@ -39,7 +41,7 @@ def test_a_missing_part_is_told_in_the_identity_and_refused(
     expected = int.from_bytes(bytes((level,)) * bytes_read, "big")
     assert identity.items["who_am_i"][sensor] == expected
     assert identity.items["present"].tolist() == [i != sensor for i in range(3)]
-    (error,) = board.ask("configure", sensor=sensor, rate_hz=200, range_deg_s=100)
+    (error,) = board.ask("configure", sensor=sensor, rate_hz=200, range_deg_s=100, range_g=0)
     assert (ERRORS[error.values["code"]].name, error.values["sensor"]) == ("sensor_absent", sensor)
 
 
@@ -57,14 +59,14 @@ def test_another_part_is_told_in_the_identity_and_refused(board: HostBoard, sens
         board.adis16465.words[0x72] = identity
     (answer,) = board.ask("hello")
     assert answer.items["who_am_i"][sensor] == identity and not answer.items["present"][sensor]
-    (error,) = board.ask("configure", sensor=sensor, rate_hz=200, range_deg_s=100)
+    (error,) = board.ask("configure", sensor=sensor, rate_hz=200, range_deg_s=100, range_g=0)
     assert (ERRORS[error.values["code"]].name, error.values["sensor"]) == ("sensor_mismatch", sensor)
 
 
 @pytest.mark.parametrize("sensor", range(3))
 def test_a_part_is_identified_before_its_range_is_judged(board: HostBoard, sensor: int) -> None:
     board.sensors[sensor] = Nobody()
-    assert error_of(board.ask("configure", sensor=sensor, rate_hz=238, range_deg_s=2001)) == "sensor_absent"
+    assert error_of(board.ask("configure", sensor=sensor, rate_hz=238, range_deg_s=2001, range_g=0)) == "sensor_absent"
 
 
 @pytest.mark.parametrize(("sensor", "register"), [(0, 0x10), (0, 0x22), (1, 0x19), (1, 0x13), (1, 0x6B), (2, 0x64)])
@@ -74,7 +76,7 @@ def test_a_setting_that_does_not_stick_is_refused_and_takes_the_sensor_out(
     board.gyro.values[0x22], board.mpu9250.values[0x13], board.mpu9250.values[0x6B] = 0, 1, 0x41
     part = (board.gyro, board.mpu9250, board.adis16465)[sensor]
     part.stuck.add(register)
-    assert error_of(board.ask("configure", sensor=sensor, rate_hz=100, range_deg_s=100)) == "setup_failed"
+    assert error_of(board.ask("configure", sensor=sensor, rate_hz=100, range_deg_s=100, range_g=0)) == "setup_failed"
     assert error_of(board.ask("start", sensors=0)) == "not_configured"
     part.stuck.clear()
     configured(board, sensor)
@@ -119,7 +121,7 @@ def test_every_part_is_kept_off_i2c_from_the_start_and_also_one_that_is_never_co
     [(1, 14.9, 1), (50, 59.5, 2), (100, 119.0, 3), (200, 238.0, 4), (238, 238.0, 4), (400, 476.0, 5), (1e4, 952.0, 6)],
 )
 def test_the_nearest_data_rate_is_set(board: HostBoard, wanted_hz: float, hz: float, code: int) -> None:
-    (setup,) = board.ask("configure", sensor=0, rate_hz=wanted_hz, range_deg_s=245)
+    (setup,) = board.ask("configure", sensor=0, rate_hz=wanted_hz, range_deg_s=245, range_g=0)
     assert setup.values["rate_hz"] == hz
     assert board.gyro.values[0x10] == code << 5
 
@@ -131,7 +133,7 @@ def test_the_nearest_data_rate_is_set(board: HostBoard, wanted_hz: float, hz: fl
 def test_the_next_range_up_is_set_with_its_own_sensitivity(
     board: HostBoard, wanted: float, deg_s: float, code: int, mdps: float
 ) -> None:
-    (setup,) = board.ask("configure", sensor=0, rate_hz=238, range_deg_s=wanted)
+    (setup,) = board.ask("configure", sensor=0, rate_hz=238, range_deg_s=wanted, range_g=0)
     assert setup.values["range_deg_s"] == deg_s
     assert setup.values["sensitivity_rad_s"] == pytest.approx(math.radians(mdps * 1e-3), rel=1e-15)
     assert (setup.values["temperature_scale_c"], setup.values["temperature_offset_c"]) == (1 / 16, 25.0)
@@ -139,12 +141,13 @@ def test_the_next_range_up_is_set_with_its_own_sensitivity(
 
 
 def test_settings_that_decide_what_a_reading_means_are_written_whatever_they_were(board: HostBoard) -> None:
-    addresses = (0x0C, 0x11, 0x12, 0x13, 0x1E, 0x22, 0x23, 0x24)
+    addresses = (0x0C, 0x11, 0x12, 0x13, 0x1E, 0x1F, 0x20, 0x21, 0x22, 0x23, 0x24)
     for address in addresses:
         board.gyro.values[address] = 0xFF & ~0x01
-    board.ask("configure", sensor=0, rate_hz=238, range_deg_s=245)
+    board.ask("configure", sensor=0, rate_hz=238, range_deg_s=245, range_g=0)
     # data-ready of the gyroscope alone; no filter, sign change, I2C or self-test; three axes; BDU, address increment
     expected = {0x0C: 0x02, 0x11: 0, 0x12: 0, 0x13: 0, 0x1E: 0x38, 0x22: 0x44, 0x23: 0x04, 0x24: 0}
+    expected |= {0x1F: 0x38, 0x20: 0, 0x21: 0}  # the accelerometer off
     assert {address: board.gyro.values[address] for address in addresses} == expected
     assert board.gyro.writes[-1][0] == 0x10, "the part must start only when everything else is set"
 
@@ -156,5 +159,5 @@ def test_one_sample_is_one_transfer_of_temperature_status_and_rates() -> None:
         convert(board, k * PERIOD_US, (-32768, 32767, k))
     assert board.gyro.transfers == [10] * 19
     first = next(frame for frame in board.frames() if frame.name == "samples")
-    assert first.items["counts"][0].tolist() == [-32768, 32767, 1]
+    assert first.items["counts"][0].tolist() == [-32767, 32767, 1], "of the part's +32767 along its own x"
     assert first.items["temperature_counts"][0] == -48

@@ -17,7 +17,7 @@ def three_streams() -> HostBoard:
     """All three started, each at its own rate; what they convert while settling is over at 100 ms."""
     board = HostBoard()
     for sensor, rate_hz, range_deg_s in SETUPS:
-        (setup,) = board.ask("configure", sensor=sensor, rate_hz=rate_hz, range_deg_s=range_deg_s)
+        (setup,) = board.ask("configure", sensor=sensor, rate_hz=rate_hz, range_deg_s=range_deg_s, range_g=0)
         assert setup.values["rate_hz"] == rate_hz
     board.ask("start", sensors=0)
     settling = ((0, 8), (1, 15), (2, 2))

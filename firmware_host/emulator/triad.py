@@ -1,0 +1,159 @@
+"""Three sensing elements of a part, for turn rate or for specific force: from a true vector, through their errors and
+their noise, to a reading.
+"""
+
+import math
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+
+from firmware_host.emulator.drift import Drift
+
+_NOISE_BLOCK = 3 * 256
+
+Seed = int | np.random.SeedSequence
+Temperature = Callable[[float], float]
+Bend = Callable[[Any], Any]
+
+
+@dataclass(frozen=True, slots=True)
+class TriadErrors:
+    """What `GyroTruth` and `AccelerometerTruth` have in common, and explain; everything in the units of a reading."""
+
+    scale: Sequence[float]
+    bias: Sequence[float]
+    noise: float
+    non_orthogonality_rad: Sequence[float]
+    scale_per_k: Sequence[float]
+    bias_per_k: Sequence[float]
+    holds_at_c: float
+    bandwidth_hz: float | None
+    instability: float
+    instability_time_s: float
+    random_walk_per_sqrt_s: float
+
+
+class Triad:
+    """Three elements with these errors, of a part whose temperature is one number or a function of time.
+
+    A reading is made of `sense`, whatever else the part feels, and `read`; `readings` makes many in one go.
+    """
+
+    def __init__(self, errors: TriadErrors, seed: Seed, temperature_c: float | Temperature) -> None:
+        xy, xz, yz = errors.non_orthogonality_rad
+        self._axes = (
+            (1.0, 0.0, 0.0),
+            (math.sin(xy), math.cos(xy), 0.0),
+            (math.sin(xz), math.sin(yz), math.sqrt(1 - math.sin(xz) ** 2 - math.sin(yz) ** 2)),
+        )
+        self._errors = errors
+        self._inverse_scale = [1 / k for k in errors.scale]
+        self._bias = list(errors.bias)
+        self._warms = callable(temperature_c)
+        self.temperature_c: Temperature = temperature_c if callable(temperature_c) else lambda _time_s: temperature_c
+        self._low_pass = LowPass(errors.bandwidth_hz) if errors.bandwidth_hz is not None else None
+        self._drift = _drift(errors, seed)
+        self._random = np.random.default_rng(seed)
+        self._noise: list[float] = []
+
+    def sense(self, true: Sequence[Any], warmer_k: Any, bend: Bend | None = None) -> list[Any]:
+        """What the elements make of a vector before bias and noise: three floats or arrays, as `true` and `warmer_k`.
+
+        `bend`: what becomes of the component along an element's axis.
+        """
+        x, y, z = true
+        felt = []
+        for axis, inverse_scale, per_k in zip(self._axes, self._inverse_scale, self._errors.scale_per_k, strict=True):
+            along = axis[0] * x + axis[1] * y + axis[2] * z
+            if bend is not None:
+                along = bend(along)
+            value = along * inverse_scale
+            felt.append(value / (1.0 + per_k * warmer_k) if per_k else value)
+        return felt
+
+    def warmer_k(self, time_s: float) -> float:
+        """By how much the part is warmer than where its errors hold."""
+        return self.temperature_c(time_s) - self._errors.holds_at_c if self._warms else 0.0
+
+    def read(self, time_s: float, felt: list[float], warmer_k: float) -> list[float]:
+        """The next reading, (3,), at `time_s`, of what the elements felt then."""
+        if len(self._noise) < 3:
+            self._noise = self._random.standard_normal(_NOISE_BLOCK).tolist()[::-1]
+        if self._low_pass is not None:
+            felt = self._low_pass.step(time_s, felt)
+        bias = self._bias
+        if warmer_k:
+            bias = [b + per_k * warmer_k for b, per_k in zip(bias, self._errors.bias_per_k, strict=True)]
+        if self._drift is not None:
+            bias = [b + drift for b, drift in zip(bias, self._drift.at(time_s), strict=True)]
+        return [value - b + self._errors.noise * self._noise.pop() for value, b in zip(felt, bias, strict=True)]
+
+    def all_warmer_k(self, time_s: np.ndarray) -> np.ndarray | float:
+        """The same as `warmer_k`, (n,) or one number for all."""
+        return np.array([self.warmer_k(t) for t in time_s.tolist()]) if self._warms else 0.0
+
+    def readings(self, time_s: np.ndarray, felt: Sequence[np.ndarray], warmer_k: np.ndarray | float) -> np.ndarray:
+        """All readings (n, 3) at times (n,) of what the elements felt, three arrays (n,)."""
+        columns = np.column_stack(felt)
+        if self._low_pass is not None:
+            rows = zip(time_s.tolist(), columns.tolist(), strict=True)
+            columns = np.array([self._low_pass.step(t, row) for t, row in rows])
+        bias = np.array(self._bias) + np.multiply.outer(warmer_k, np.array(self._errors.bias_per_k))
+        if self._drift is not None:
+            bias = bias + self._drift.at_times(time_s)
+        noise = self._random.standard_normal(columns.shape)
+        taken: np.ndarray = columns - bias + self._errors.noise * noise
+        return taken
+
+
+class Remembered:
+    """A part's motion, asked for once for each time although two triads feel it."""
+
+    def __init__(self, motion_at: Callable[[float], Sequence[float]]) -> None:
+        self._motion_at = motion_at
+        self._time_s = math.nan
+        self._motion: Sequence[float] = ()
+
+    def __call__(self, time_s: float) -> Sequence[float]:
+        if time_s != self._time_s:
+            self._time_s, self._motion = time_s, self._motion_at(time_s)
+        return self._motion
+
+
+class LowPass:
+    """A low-pass of first order, exact for inputs that are straight lines between the times they are given at."""
+
+    def __init__(self, bandwidth_hz: float) -> None:
+        self._time_constant_s = 1.0 / (2.0 * math.pi * bandwidth_hz)
+        self._time_s = -math.inf
+        self._inputs: list[float] = []
+        self._outputs: list[float] = []
+
+    def step(self, time_s: float, inputs: list[float]) -> list[float]:
+        """The outputs at `time_s`, when the inputs have come to these."""
+        since_s = time_s - self._time_s
+        if math.isinf(since_s):
+            self._outputs = inputs
+        elif since_s > 0.0:
+            forgotten = math.exp(-since_s / self._time_constant_s)
+            late = self._time_constant_s / since_s  # by how much of the step the output of a straight line lags
+            self._outputs = [
+                new - late * (new - old) + (output - old + late * (new - old)) * forgotten
+                for new, old, output in zip(inputs, self._inputs, self._outputs, strict=True)
+            ]
+        self._time_s, self._inputs = time_s, inputs
+        return self._outputs
+
+
+def spawned(seed: Seed, key: int) -> np.random.SeedSequence:
+    """A seed of its own that depends on `seed` alone: what draws from it changes nothing for the others."""
+    sequence = seed if isinstance(seed, np.random.SeedSequence) else np.random.SeedSequence(seed)
+    return np.random.SeedSequence(sequence.entropy, spawn_key=(*sequence.spawn_key, key))
+
+
+def _drift(errors: TriadErrors, seed: Seed) -> Drift | None:
+    if not (errors.instability or errors.random_walk_per_sqrt_s):
+        return None
+    return Drift(errors.instability, errors.instability_time_s, errors.random_walk_per_sqrt_s, spawned(seed, 1))
