@@ -113,6 +113,20 @@ def flange_attitude(q_rad: ArrayLike, arm: DenavitHartenberg = NOMINAL) -> Array
     return rotations
 
 
+def distance_to_forearm(q_rad: ArrayLike, point_m: ArrayLike = (0.0, 0.0, 0.0)) -> Array:
+    """(…,) m from a point of the flange's frame, its centre if none is given, to the line from elbow to wrist 1.
+
+    For joint angles `q_rad` (…, 6) of the nominal arm.
+    """
+    frames = _frames(q_rad, NOMINAL)
+    elbow, wrist_1, flange = (frames[number][..., :3, 3] for number in (2, 3, 6))
+    point = flange + frames[6][..., :3, :3] @ np.asarray(point_m, dtype=np.float64)
+    forearm = wrist_1 - elbow
+    along = np.sum((point - elbow) * forearm, axis=-1) / np.sum(forearm**2, axis=-1)
+    nearest = elbow + np.clip(along, 0, 1)[..., None] * forearm
+    return np.asarray(np.linalg.norm(point - nearest, axis=-1), dtype=np.float64)
+
+
 def flange_axes(q_rad: ArrayLike, arm: DenavitHartenberg = NOMINAL) -> Array:
     """(…, 3, 6) unit axes of the six joints (columns) in the flange frame, for joint angles `q_rad` (…, 6).
 
@@ -121,6 +135,17 @@ def flange_axes(q_rad: ArrayLike, arm: DenavitHartenberg = NOMINAL) -> Array:
     *before, flange = _frames(q_rad, arm)
     axes_in_base = np.stack([frame[..., :3, 2] for frame in before], axis=-1)
     return np.swapaxes(flange[..., :3, :3], -1, -2) @ axes_in_base
+
+
+def flange_arm(q_rad: ArrayLike, joint: int, arm: DenavitHartenberg = NOMINAL) -> Array:
+    """(…, 3) metres from the axis of a joint to the flange's origin, in the flange's frame: what it swings on.
+
+    From the joint's own origin, at joint angles `q_rad` (…, 6); along the axis it means nothing.
+    """
+    frames = _frames(q_rad, arm)
+    to_flange = np.swapaxes(frames[-1][..., :3, :3], -1, -2)
+    swung: Array = np.einsum("...ij,...j->...i", to_flange, frames[-1][..., :3, 3] - frames[joint][..., :3, 3])
+    return swung
 
 
 def flange_rate(q_rad: ArrayLike, qd_rad_s: ArrayLike, arm: DenavitHartenberg = NOMINAL) -> Array:

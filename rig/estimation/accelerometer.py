@@ -7,6 +7,7 @@ Eq. (11) −Rᵀ g in the first-order term; in the second-order term the sign do
 """
 
 from dataclasses import dataclass
+from typing import Protocol
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -66,7 +67,18 @@ def solve_accelerometer(
     )
 
 
-def specific_force(readings_m_s2: ArrayLike, solution: AccelerometerSolution) -> Array:
+class Calibrated(Protocol):
+    """F (3, 3), b (3,) in m/s², φ (3,) in 1/(m/s²) or None."""
+
+    @property
+    def matrix(self) -> Array: ...
+    @property
+    def bias_m_s2(self) -> Array: ...
+    @property
+    def second_order_s2_m(self) -> Array | None: ...
+
+
+def specific_force(readings_m_s2: ArrayLike, solution: Calibrated) -> Array:
     """Calibrated readings s (…, 3), m/s²: the smaller root of φ s² + s = F⁻¹ (a_m − b)."""
     linear = (np.asarray(readings_m_s2, dtype=np.float64) - solution.bias_m_s2) @ np.linalg.inv(solution.matrix).T
     if solution.second_order_s2_m is None:

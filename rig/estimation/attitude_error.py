@@ -9,6 +9,7 @@ well known as ever. For δ → 0 this is the fit of equal directions, for δ →
 δ is what restricted maximum likelihood (Patterson and Thompson, Biometrika 58 (1971) 545) makes of the residuals.
 """
 
+from collections.abc import Callable
 from dataclasses import dataclass
 
 import numpy as np
@@ -140,9 +141,7 @@ def whitening_with(variances: Array, turned: Array, std_rad: Array) -> Array:
 
 
 def _restricted(theta: Array, placed: Placed) -> float:
-    """The likeliest δ: the best of a grid, then between its neighbours."""
-    from scipy.optimize import minimize_scalar
-
+    """The likeliest δ."""
     r, v_bar = placed.attitudes, placed.v_bar
     turned = effects(theta, r, v_bar)
     residuals = placed.readings - predicted(theta, r, v_bar)
@@ -155,6 +154,13 @@ def _restricted(theta: Array, placed: Placed) -> float:
         left = left - orthogonal @ (orthogonal.T @ left)
         sizes = np.linalg.slogdet(white)[1].sum() - np.log(np.abs(np.diag(triangle))).sum()
         return float(0.5 * left @ left - sizes)
+
+    return likeliest(lost)
+
+
+def likeliest(lost: Callable[[float], float]) -> float:
+    """δ, rad, of the least `lost` at ln δ: the best of a grid, then between its neighbours."""
+    from scipy.optimize import minimize_scalar
 
     grid = np.linspace(np.log(SMALLEST_RAD), np.log(LARGEST_RAD), GRID)
     values = [lost(each) for each in grid]

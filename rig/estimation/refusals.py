@@ -18,6 +18,8 @@ CONFUSED = (  # ratios of reading over what is felt that a wrong unit gives
     (np.pi / 180, "the rates look like degrees per second given as rad/s"),
     (1 / 9.80665, "the readings look like g given as m/s²"),
 )
+MIN_SIDE = 0.05  # cosine between the reference and the direction that says its sign
+NO_FIT = "the readings contradict the attitudes so much that no fit converges"
 CONSISTENT = 3.0  # residuals larger than so many times what the variances explain are worth a warning
 
 
@@ -165,6 +167,46 @@ def check_axes(axes: Array, nominal: Array | None) -> None:
         raise Fault(
             "mirrored_axis", "the sensor's axes form a left-handed frame: one is mirrored or two swapped", remedy
         )
+
+
+def check_rotations(attitudes: Array) -> None:
+    """Raises Fault `bad_attitude` unless every matrix of (N, 3, 3) is a rotation."""
+    off = np.abs(attitudes @ np.swapaxes(attitudes, -1, -2) - np.eye(3)).max(axis=(1, 2), initial=0.0)
+    if off.max(initial=0.0) > 1e-6 or (np.linalg.det(attitudes) < 0).any():
+        raise Fault(
+            "bad_attitude",
+            f"attitude {int(np.argmax(off)) + 1} is not a rotation (it misses by {off.max():.2g})",
+            "Give attitudes as rotation matrices from body to table coordinates",
+        )
+
+
+def check_side(reference: Array, side: Array) -> None:
+    """Raises Fault `sign_unknown` unless more than noise tells the sign of v_ref (3,), by a direction (3,) near it."""
+    if abs(reference @ side) < MIN_SIDE * np.linalg.norm(reference) * np.linalg.norm(side):
+        raise Fault(
+            "sign_unknown",
+            "the reference lies across the direction that should tell its sign",
+            "Give a direction the reference points along, for example the vertical for gravity",
+        )
+
+
+def check_handedness(matrix: Array) -> None:
+    """Raises Fault `mirrored_axis` where F (3, 3) is that of a left-handed sensor."""
+    if np.linalg.det(matrix) < 0:
+        raise Fault(
+            "mirrored_axis",
+            "the sensor's axes form a left-handed frame: one is mirrored or two are swapped",
+            "Correct the order and signs of the sensor's axes, or the side the reference points to",
+        )
+
+
+def untrustworthy(what: str) -> Fault:
+    """The error for attitudes that the readings contradict."""
+    return Fault(
+        "attitude_untrustworthy",
+        what,
+        "Check the attitudes: their frame, their direction (body to table), one that was not reached",
+    )
 
 
 @dataclass(frozen=True, slots=True)

@@ -21,7 +21,6 @@ from typing import Literal
 import numpy as np
 from numpy.typing import ArrayLike
 
-from rig.errors import Fault
 from rig.estimation import refusals
 from rig.estimation.arrays import Array
 from rig.estimation.attitude_error import AttitudeError, AttitudeWeighted, Placed, furthest_off, solve_attitude_weighted
@@ -49,7 +48,6 @@ NOTICEABLE = 0.5  # √N σ/v_rms
 UNTRUSTWORTHY_RAD = 5e-3  # attitudes that are further off, and the reference's model is at fault rather than they
 SUSPICIOUS_RAD = 5e-4  # whether one of the attitudes alone is to blame
 ODD = 6.0  # times as far off as the others are
-MIN_SIDE = 0.05  # cosine between the reference and the direction that says its sign
 REMEDY = "Take more attitudes, turned about at least two different axes"
 
 
@@ -111,7 +109,7 @@ def solve_triaxial(
     told = _conditioning(stack(m, r, squares) / column_sizes(m, squares), m, v, needed)
     refusals.check_conditioning(told, needed, MAX_CONDITION, "some of F, reference and bias", REMEDY)
     if isinstance(known, KnownNorm):
-        _check_side(start[REFERENCE], np.asarray(known.side, dtype=np.float64))
+        refusals.check_side(start[REFERENCE], np.asarray(known.side, dtype=np.float64))
     attitude_error = None
     white = whitening(v)
     if method == "as_published":
@@ -126,18 +124,15 @@ def solve_triaxial(
         try:
             found = solve_attitude_weighted(start, placed)
         except np.linalg.LinAlgError:
-            raise _untrustworthy("the readings contradict the attitudes so much that no fit converges") from None
+            raise refusals.untrustworthy(
+                "the readings contradict the attitudes so much that no fit converges"
+            ) from None
         _check_attitudes(start, placed, found)
         theta, covariance, iterations = found.theta, found.covariance, found.iterations
         attitude_error, white = found.attitude_error, found.white
     f = theta[F].reshape(3, 3)
     refusals.check_unit(1 / np.linalg.norm(f, axis=1))
-    if np.linalg.det(f) < 0:
-        raise Fault(
-            "mirrored_axis",
-            "the sensor's axes form a left-handed frame: one is mirrored or two are swapped",
-            "Correct the order and signs of the sensor's axes, or the side the reference points to",
-        )
+    refusals.check_handedness(f)
     residuals = m - predicted(theta, r, v_bar)
     return TriaxialSolution(
         method=method,
@@ -191,13 +186,7 @@ def _check(m: Array, r: Array, v: Array, known: Known, parameters: int) -> None:
     refusals.check_signal(m)
     if isinstance(known, KnownNorm):
         refusals.check_duplicates(m)  # averages never repeat; single samples of a turning sensor may
-    off = np.abs(r @ np.swapaxes(r, -1, -2) - np.eye(3)).max(axis=(1, 2))
-    if off.max() > 1e-6 or (np.linalg.det(r) < 0).any():
-        raise Fault(
-            "bad_attitude",
-            f"attitude {int(np.argmax(off)) + 1} is not a rotation (it misses by {off.max():.2g})",
-            "Give attitudes as rotation matrices from body to table coordinates",
-        )
+    refusals.check_rotations(r)
     if isinstance(known, KnownNorm):
         _check_size(m, known.norm)
 
@@ -233,22 +222,4 @@ def _check_attitudes(start: Array, placed: Placed, found: AttitudeWeighted) -> N
             )
             off = by
     if off > UNTRUSTWORTHY_RAD:
-        raise _untrustworthy(said)
-
-
-def _untrustworthy(what: str) -> Fault:
-    return Fault(
-        "attitude_untrustworthy",
-        what,
-        "Check the attitudes: their frame, their direction (body to table), one that was not reached",
-    )
-
-
-def _check_side(reference: Array, side: Array) -> None:
-    """The sign of v_ref and F must be told by more than noise."""
-    if abs(reference @ side) < MIN_SIDE * np.linalg.norm(reference) * np.linalg.norm(side):
-        raise Fault(
-            "sign_unknown",
-            "the reference lies across the direction that should tell its sign",
-            "Give a direction the reference points along, for example the vertical for gravity",
-        )
+        raise refusals.untrustworthy(said)

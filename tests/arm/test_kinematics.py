@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from rig.arm.kinematics import flange_axes, flange_pose, flange_rate
+from rig.arm.kinematics import flange_arm, flange_axes, flange_pose, flange_rate
 
 HOME = np.radians([0, -90, 90, -90, -90, 0])
 
@@ -69,3 +69,15 @@ def test_a_sweep_of_one_wrist_keeps_its_own_axis() -> None:
         q[:, joint] = angles
         axes = flange_axes(q)[:, :, joint]
         np.testing.assert_allclose(axes, np.broadcast_to(axes[0], axes.shape), atol=1e-12)
+
+
+@pytest.mark.parametrize("joint", range(6))
+def test_half_a_turn_of_a_joint_shows_on_what_the_flange_swings(joint: int) -> None:
+    """The way between both places is twice what lies across the axis."""
+    q = random_joints(20)
+    turned = q + np.pi * np.eye(6)[joint]
+    here, there, axis = flange_pose(q), flange_pose(turned), flange_axes(q)[..., joint]
+    way = np.einsum("nji,nj->ni", here[:, :3, :3], here[:, :3, 3] - there[:, :3, 3])
+    swung = flange_arm(q, joint)
+    across = swung - np.sum(swung * axis, axis=1, keepdims=True) * axis
+    np.testing.assert_allclose(2 * across, way, atol=1e-12)

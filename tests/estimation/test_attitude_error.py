@@ -7,12 +7,13 @@ import numpy as np
 import pytest
 from scipy.spatial.transform import Rotation
 
+from rig.config.attitude_sets import EIGHTEEN, FACES
 from rig.errors import Fault
 from rig.estimation.accelerometer import AccelerometerSolution, solve_accelerometer
 from rig.estimation.arrays import Array
 from rig.estimation.triaxial import Method
 from rig.study.rate_table import ACCELEROMETER_BIAS_M_S2, ACCELEROMETER_MATRIX, MG
-from support.arm_attitudes import EIGHTEEN, FACES, attitudes_of, crooked, joints_rad
+from support.arm_attitudes import attitudes_of, crooked, joints_rad
 
 NORM = 9.80665
 UP = NORM * np.array([0.02, -0.01, 1.0]) / np.linalg.norm([0.02, -0.01, 1.0])  # a base that is not quite upright

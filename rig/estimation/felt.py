@@ -1,0 +1,247 @@
+"""What an accelerometer on an arm's flange feels: at rest in attitudes, and in sweeps by their first harmonic.
+
+    m = F (s + φ s²) + b,   s = Rᵀ v_ref + ω × (ω × (p + r)) + α × (p + r)
+
+in flange coordinates; F holds the mounting. v_ref is the specific force at rest, in base coordinates; p goes from the
+axis that turns to the flange, the arm knows it; r, the lever arm, from the flange to the sensor.
+
+A joint that turns by θ about the flange-fixed axis a, from the attitude R₀, at the constant rate ω, is felt as a mean,
+a cosine and a sine over its angle. With u = R₀ᵀ v_ref and c = ω² (a aᵀ − 1) (p + r):
+
+    mean: a (a·u) + c,   cosine: cos ψ (u − a (a·u)) + sin ψ a × u,   sine: sin ψ (u − a (a·u)) − cos ψ a × u
+
+ψ = ω τ is what the joint turns while the accelerometer lags behind the clock of its time stamps: with opposite signs
+for opposite directions. Where a gyroscope's readings have set that clock, τ is the lag behind the gyroscope. What the
+filter takes of the size, (ω τ)²/2 at most, is left out: 14 ppm at 60°/s and 5 ms.
+
+Dwells and sweeps are one list of K = N + 3 M vectors: the N dwells, then mean, cosine and sine of each of M sweeps.
+θ (22,) holds F row by row, v_ref, b, r, τ and φ.
+"""
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from rig.estimation.arrays import Array
+from rig.estimation.reference_model import BIAS, REFERENCE, matrix
+
+LEVER, DELAY, SECOND = slice(15, 18), 18, slice(19, 22)
+PARAMETERS = 22
+OWN_ERRORS = 3  # of a dwell: a small turn of the flange
+SHARED_ERRORS = 10  # of a station: a small turn in the flange's frame, one in the base's, four waves of the angle
+SHARE = 0.5**0.5  # of δ, in each: so both turns together are off as far as a dwell is, and so are all waves together
+
+
+@dataclass(frozen=True, slots=True)
+class Dwells:
+    """Mean readings (N, 3) in m/s² at rest, the variances (N, 3) of these means, attitudes (N, 3, 3) flange to base."""
+
+    readings_m_s2: Array
+    variances_m2_s4: Array
+    attitudes: Array
+
+
+@dataclass(frozen=True, slots=True)
+class Sweeps:
+    """Whole revolutions at constant speed.
+
+    - `harmonics_m_s2` (M, 3, 3): mean, cosine and sine over the joint's angle (rows) of the axes x y z;
+      `covariances_m2_s4` (M, 9, 9) of these nine, row by row. `rig.estimation.sweep_harmonics` makes both.
+    - `axes_flange` (M, 3): unit vector of a growing angle; `speeds_rad_s` (M,): negative where the angle falls.
+    - `attitudes` (M, 3, 3): flange to base where the angle is counted from.
+    - `arms_m` (M, 3): p, from the axis to the flange's origin, in flange coordinates.
+    - `stations` (M,): a number for each joint and pose; sweeps of one station, both ways, share the arm's errors.
+    """
+
+    harmonics_m_s2: Array
+    covariances_m2_s4: Array
+    axes_flange: Array
+    speeds_rad_s: Array
+    attitudes: Array
+    arms_m: Array
+    stations: NDArray[np.intp]
+
+
+NO_DWELLS = Dwells(np.zeros((0, 3)), np.zeros((0, 3)), np.zeros((0, 3, 3)))
+NO_SWEEPS = Sweeps(
+    harmonics_m_s2=np.zeros((0, 3, 3)),
+    covariances_m2_s4=np.zeros((0, 9, 9)),
+    axes_flange=np.zeros((0, 3)),
+    speeds_rad_s=np.zeros(0),
+    attitudes=np.zeros((0, 3, 3)),
+    arms_m=np.zeros((0, 3)),
+    stations=np.zeros(0, dtype=np.intp),
+)
+
+
+@dataclass(frozen=True, slots=True)
+class Movement:
+    """Dwells and sweeps together."""
+
+    dwells: Dwells
+    sweeps: Sweeps
+
+    def without(self, dwell: int) -> "Movement":
+        """All but one dwell."""
+        left = np.arange(len(self.dwells.readings_m_s2)) != dwell
+        own = self.dwells
+        return Movement(Dwells(own.readings_m_s2[left], own.variances_m2_s4[left], own.attitudes[left]), self.sweeps)
+
+    def readings(self) -> Array:
+        """(K, 3) m/s²."""
+        return np.concatenate([self.dwells.readings_m_s2, self.sweeps.harmonics_m_s2.reshape(-1, 3)])
+
+    def noise(self) -> Array:
+        """(3 K, 3 K) covariance of the readings' noise."""
+        own = self.dwells.variances_m2_s4.size
+        whole = np.zeros((own + 9 * len(self.sweeps.speeds_rad_s),) * 2)
+        whole[:own, :own] = np.diag(self.dwells.variances_m2_s4.ravel())
+        for sweep, covariance in enumerate(self.sweeps.covariances_m2_s4):
+            place = slice(own + 9 * sweep, own + 9 * sweep + 9)
+            whole[place, place] = covariance
+        return whole
+
+    def constant(self) -> Array:
+        """(K,) 1 where the bias is read, 0 in a cosine and a sine."""
+        return np.concatenate(
+            [np.ones(len(self.dwells.readings_m_s2)), np.tile([1.0, 0.0, 0.0], len(self.sweeps.speeds_rad_s))]
+        )
+
+
+def predicted(theta: Array, movement: Movement) -> Array:
+    """(K, 3) readings of the model."""
+    s = felt(theta, movement)
+    readings: Array = (s + theta[SECOND] * _product(s, s, movement)) @ matrix(theta).T
+    return readings + movement.constant()[:, None] * theta[BIAS]
+
+
+def felt(theta: Array, movement: Movement) -> Array:
+    """s (K, 3)."""
+    s: Array = of_gravity(theta[DELAY], movement) @ theta[REFERENCE] + of_lever(movement) @ theta[LEVER]
+    return s + of_arms(movement)
+
+
+def of_gravity(delay_s: float, movement: Movement) -> Array:
+    """(K, 3, 3) that takes v_ref to what is felt of it."""
+    sweeps = movement.sweeps
+    to_flange = np.swapaxes(sweeps.attitudes, -1, -2)
+    along = sweeps.axes_flange[:, :, None] * sweeps.axes_flange[:, None, :]
+    across, turned = np.eye(3) - along, cross(sweeps.axes_flange)
+    phase = sweeps.speeds_rad_s * delay_s
+    cos, sin = np.cos(phase)[:, None, None], np.sin(phase)[:, None, None]
+    waves = np.stack([along, cos * across + sin * turned, sin * across - cos * turned], axis=1) @ to_flange[:, None]
+    return np.concatenate([np.swapaxes(movement.dwells.attitudes, -1, -2), waves.reshape(-1, 3, 3)])
+
+
+def of_lever(movement: Movement) -> Array:
+    """(K, 3, 3) that takes the lever arm to the centripetal acceleration: in the mean of a sweep alone."""
+    axes, speeds = movement.sweeps.axes_flange, movement.sweeps.speeds_rad_s
+    whole = np.zeros((len(movement.dwells.readings_m_s2) + 3 * len(speeds), 3, 3))
+    centripetal = axes[:, :, None] * axes[:, None, :] - np.eye(3)
+    whole[len(movement.dwells.readings_m_s2) :: 3] = speeds[:, None, None] ** 2 * centripetal
+    return whole
+
+
+def of_arms(movement: Movement) -> Array:
+    """(K, 3) m/s²: the centripetal acceleration of the flange itself."""
+    arms = np.zeros((len(movement.dwells.readings_m_s2) + 3 * len(movement.sweeps.arms_m), 3, 1))
+    arms[len(movement.dwells.readings_m_s2) :: 3, :, 0] = movement.sweeps.arms_m
+    acceleration: Array = (of_lever(movement) @ arms)[..., 0]
+    return acceleration
+
+
+def jacobian(theta: Array, movement: Movement) -> Array:
+    """(3 K, 22) derivative of the readings with respect to θ."""
+    s, gravity = felt(theta, movement), of_gravity(theta[DELAY], movement)
+    square = _product(s, s, movement)
+    columns = np.zeros((*s.shape, PARAMETERS))
+    for axis in range(3):
+        columns[:, axis, 3 * axis : 3 * axis + 3] = s + theta[SECOND] * square
+        columns[:, axis, BIAS.start + axis] = movement.constant()
+    by_delay = np.zeros_like(s)
+    waves = _waves(gravity @ theta[REFERENCE], movement)
+    later = by_delay[len(movement.dwells.readings_m_s2) :].reshape(-1, 3, 3)
+    later[:, 1] = -movement.sweeps.speeds_rad_s[:, None] * waves[:, 2]
+    later[:, 2] = movement.sweeps.speeds_rad_s[:, None] * waves[:, 1]
+    columns[..., REFERENCE] = _read(gravity, theta, movement)
+    columns[..., LEVER] = _read(of_lever(movement), theta, movement)
+    columns[..., DELAY] = _read(by_delay[..., None], theta, movement)[..., 0]
+    columns[..., SECOND] = matrix(theta) * square[:, None, :]
+    return columns.reshape(-1, PARAMETERS)
+
+
+def effects(theta: Array, movement: Movement) -> Array:
+    """(3 K, P) change of the readings by each of the arm's errors, per radian; P = 3 N + 10 for each station.
+
+    A dwell has three of its own. All points of a station's sweeps share ten: small turns of the flange and of the base,
+    and waves of the joint's angle, A cos θ + B sin θ + C cos 2θ + D sin 2θ, of which the first harmonic is kept.
+    """
+    count, sweeps = len(movement.dwells.readings_m_s2), movement.sweeps
+    gravity, s = of_gravity(theta[DELAY], movement), felt(theta, movement)
+    stations, places = np.unique(sweeps.stations, return_inverse=True)
+    changes = np.zeros((len(gravity), 3, OWN_ERRORS * count + SHARED_ERRORS * len(stations)))
+    for dwell in range(count):
+        changes[dwell, :, OWN_ERRORS * dwell : OWN_ERRORS * (dwell + 1)] = cross(s[dwell])
+    for sweep, (axis, speed) in enumerate(zip(sweeps.axes_flange, sweeps.speeds_rad_s, strict=True)):
+        rows = slice(count + 3 * sweep, count + 3 * sweep + 3)
+        first = OWN_ERRORS * count + SHARED_ERRORS * places[sweep]
+        own = changes[rows, :, first : first + SHARED_ERRORS]
+        own[..., 0:3] = cross(s[rows])
+        own[..., 3:6] = gravity[rows] @ cross(theta[REFERENCE])
+        arm = sweeps.arms_m[sweep] + theta[LEVER]
+        own[..., 6:10] = _of_angle(gravity[rows] @ theta[REFERENCE], axis, speed**2, arm)
+        own *= SHARE
+    return _read(changes, theta, movement).reshape(3 * len(gravity), -1)
+
+
+def _of_angle(pulled: Array, axis: Array, speed_squared: float, arm: Array) -> Array:
+    """(3, 3, 4) change of mean, cosine and sine by waves w of the angle: gravity turns by w, the rate grows by ω w′.
+
+    Gravity by w times the derivative of its first harmonic; centripetal 2 ω² w′ (a aᵀ − 1) (p + r) and Euler
+    ω² w″ a × (p + r) have a first harmonic for the waves once a turn. What the delay changes in this is left out.
+    """
+    _, cos, sin = pulled
+    centripetal, euler = (speed_squared * each for each in (axis * (axis @ arm) - arm, np.cross(axis, arm)))
+    changes = np.zeros((3, 3, 4))
+    changes[0, :, 0], changes[1, :, 0], changes[2, :, 0] = sin / 2, -euler, -2 * centripetal
+    changes[0, :, 1], changes[1, :, 1], changes[2, :, 1] = -cos / 2, 2 * centripetal, -euler
+    changes[1, :, 2], changes[2, :, 2] = sin / 2, cos / 2
+    changes[1, :, 3], changes[2, :, 3] = -cos / 2, sin / 2
+    return changes
+
+
+def _read(changes: Array, theta: Array, movement: Movement) -> Array:
+    """What changes (K, 3, P) of s change in the readings."""
+    s = felt(theta, movement)[..., None]
+    grown: Array = changes + 2 * theta[SECOND][:, None] * _product(s, changes, movement)
+    return np.asarray(matrix(theta) @ grown, dtype=np.float64)
+
+
+def _product(one: Array, other: Array, movement: Movement) -> Array:
+    """(K, 3, …) element by element; in a sweep that of two waves, of which the first harmonic is kept."""
+    count = len(movement.dwells.readings_m_s2)
+    mean, cos, sin = np.moveaxis(_waves(one, movement), 1, 0)
+    others = np.moveaxis(_waves(other, movement), 1, 0)
+    waves = np.stack(
+        [
+            mean * others[0] + (cos * others[1] + sin * others[2]) / 2,
+            mean * others[1] + cos * others[0],
+            mean * others[2] + sin * others[0],
+        ],
+        axis=1,
+    )
+    return np.concatenate([one[:count] * other[:count], waves.reshape(-1, *waves.shape[2:])])
+
+
+def _waves(vectors: Array, movement: Movement) -> Array:
+    """(M, 3, …) mean, cosine and sine out of the list of (K, …)."""
+    return vectors[len(movement.dwells.readings_m_s2) :].reshape(-1, 3, *vectors.shape[1:])
+
+
+def cross(vectors: Array) -> Array:
+    """(…, 3, 3) matrices [v]×."""
+    x, y, z = np.moveaxis(vectors, -1, 0)
+    nothing = np.zeros_like(x)
+    rows = [np.stack(row, axis=-1) for row in ((nothing, -z, y), (z, nothing, -x), (-y, x, nothing))]
+    return np.stack(rows, axis=-2)

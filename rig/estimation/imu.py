@@ -1,0 +1,271 @@
+"""An accelerometer calibrated on an arm from sweeps and attitudes together: the model of `rig.estimation.felt`.
+
+F, b, the direction of v_ref, the lever arm r, the delay τ and, where wanted, φ are found together, by weighted least
+squares; the weights allow for an arm that is not quite where it says. Each dwell is turned by small angles of its own,
+the points of a sweep by errors that they share, all of the common size δ: restricted likelihood over dwells and sweeps
+together finds it (`rig.estimation.shared_errors`).
+"""
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import ArrayLike
+
+from rig.estimation import refusals
+from rig.estimation.arrays import Array
+from rig.estimation.attitude_error import PASSES, SETTLED, AttitudeError
+from rig.estimation.felt import (
+    DELAY,
+    LEVER,
+    NO_DWELLS,
+    NO_SWEEPS,
+    PARAMETERS,
+    SECOND,
+    Dwells,
+    Movement,
+    Sweeps,
+    effects,
+    jacobian,
+    predicted,
+)
+from rig.estimation.linear_start import MAX_CONDITION, REMEDY, linear_start
+from rig.estimation.reference_model import BIAS, REFERENCE, STEP_LIMIT, STEP_TOLERANCE, free_directions, matrix
+from rig.estimation.shared_errors import Apart, apart, likeliest_error, with_uncertainty
+from rig.estimation.triaxial import ODD, SUSPICIOUS_RAD, UNTRUSTWORTHY_RAD
+
+MODEL = "m = F (s + φ s²) + b, s = Rᵀ v_ref + ω × (ω × (p + r)) + α × (p + r)"
+
+
+@dataclass(frozen=True, slots=True)
+class ImuSolution:
+    """An accelerometer's calibration from dwells and sweeps.
+
+    - `matrix` F (3, 3), `bias_m_s2` b (3,), `reference_m_s2` v_ref (3,) in base coordinates.
+    - `lever_arm_m` r (3,) in the flange's frame and `delay_s` τ, None without sweeps; `second_order_s2_m` φ (3,) or
+      None.
+    - `covariance` (22, 22): the rows of F, v_ref, b, r, τ, φ (`rig.estimation.felt`); zero for what was held.
+    - `attitude_error`: δ of the arm, about each axis.
+    - `dwell_residuals_m_s2` (N, 3), `sweep_residuals_m_s2` (M, 3, 3): reading less model.
+    - `rank`, `condition`: of the readings' derivatives, each column in its own size.
+    """
+
+    matrix: Array
+    bias_m_s2: Array
+    reference_m_s2: Array
+    lever_arm_m: Array | None
+    delay_s: float | None
+    second_order_s2_m: Array | None
+    covariance: Array
+    attitude_error: AttitudeError
+    dwell_residuals_m_s2: Array
+    sweep_residuals_m_s2: Array
+    rank: int
+    condition: float
+    iterations: int
+    warnings: tuple[str, ...]
+
+
+@dataclass(frozen=True, slots=True)
+class Fit:
+    """θ (22,), how readings are told apart, J (3 K, q) of what is free, its directions (22, q), δ, and the steps."""
+
+    theta: Array
+    readings: Apart
+    jacobian: Array
+    free: Array
+    std_rad: float
+    iterations: int
+
+    def covariance(self) -> Array:
+        """(22, 22) by the Fisher information."""
+        weighted = self.readings.white(self.std_rad) @ self.jacobian
+        size = np.linalg.norm(weighted, axis=0)
+        inverse = np.linalg.inv((weighted / size).T @ (weighted / size)) / np.outer(size, size)
+        return np.asarray(self.free @ inverse @ self.free.T, dtype=np.float64)
+
+
+def solve_imu(
+    dwells: Dwells = NO_DWELLS,
+    sweeps: Sweeps = NO_SWEEPS,
+    *,
+    gravity_m_s2: float,
+    up: ArrayLike = (0.0, 0.0, 1.0),
+    second_order: bool = False,
+    attitude_std_rad: float | None = None,
+) -> ImuSolution:
+    """Calibrate from dwells, sweeps or both.
+
+    `gravity_m_s2` is the size of v_ref, `up` (3,) says to which side of the base it points, roughly;
+    `attitude_std_rad` holds δ, 0 for an exact arm, instead of finding it.
+
+    Raises Fault `too_few_observations`, `not_finite`, `bad_variance`, `bad_speed`, `zero_reading`,
+    `duplicated_observation`, `bad_attitude`, `rank_deficient`, `ill_conditioned`, `sign_unknown`, `wrong_unit`,
+    `mirrored_axis`, `attitude_untrustworthy`; ValueError for a wrong shape, or axes that are no unit vectors.
+    """
+    movement = Movement(dwells, sweeps)
+    held = _held(movement, second_order=second_order)
+    needed = PARAMETERS - 1 - len(held)
+    _check(movement, needed)
+    start = linear_start(movement, gravity_m_s2, np.asarray(up, dtype=np.float64))
+    free = _free(start, held)
+    slopes = jacobian(start, movement) @ free
+    told = refusals.conditioning(slopes / _sizes(slopes), needed)
+    refusals.check_conditioning(told, needed, MAX_CONDITION, "some of F, bias, reference, lever arm and delay", REMEDY)
+    try:
+        fit = most_likely(start, movement, held, attitude_std_rad)
+        covariance = fit.covariance()
+        if attitude_std_rad is None:
+            _check_attitudes(start, movement, held, fit)
+    except np.linalg.LinAlgError:
+        raise refusals.untrustworthy(refusals.NO_FIT) from None
+    f = matrix(fit.theta)
+    refusals.check_unit(1 / np.linalg.norm(f, axis=1))
+    refusals.check_handedness(f)
+    residuals = movement.readings() - predicted(fit.theta, movement)
+    white = fit.readings.white(fit.std_rad) @ residuals.ravel()
+    count, swept = len(dwells.readings_m_s2), len(sweeps.speeds_rad_s) > 0
+    return ImuSolution(
+        matrix=f,
+        bias_m_s2=fit.theta[BIAS],
+        reference_m_s2=fit.theta[REFERENCE],
+        lever_arm_m=fit.theta[LEVER] if swept else None,
+        delay_s=float(fit.theta[DELAY]) if swept else None,
+        second_order_s2_m=fit.theta[SECOND] if second_order else None,
+        covariance=covariance,
+        attitude_error=with_uncertainty(fit.readings, fit.std_rad, fit.jacobian)
+        if attitude_std_rad is None
+        else AttitudeError(attitude_std_rad, 0.0),
+        dwell_residuals_m_s2=residuals[:count],
+        sweep_residuals_m_s2=residuals[count:].reshape(-1, 3, 3),
+        rank=told.rank,
+        condition=told.condition,
+        iterations=fit.iterations,
+        warnings=refusals.inconsistency(white, np.ones_like(white), len(white) - needed),
+    )
+
+
+def covariance_bound(
+    theta: Array, dwells: Dwells, sweeps: Sweeps, attitude_std_rad: float, *, second_order: bool = False
+) -> Array:
+    """(22, 22) Cramér–Rao bound at the true θ (22,) and δ, for movement and noise as given.
+
+    The readings themselves do not matter.
+    """
+    movement = Movement(dwells, sweeps)
+    free = _free(theta, _held(movement, second_order=second_order))
+    readings = apart(movement.noise(), effects(theta, movement))
+    return Fit(theta, readings, jacobian(theta, movement) @ free, free, attitude_std_rad, 0).covariance()
+
+
+def most_likely(start: Array, movement: Movement, held: list[int], attitude_std_rad: float | None) -> Fit:
+    """The most likely θ and δ from `start` (22,), alternately, until δ stands still; `held` elements of θ stay."""
+    noise, theta, steps = movement.noise(), start, 0
+    delta, last = attitude_std_rad or 0.0, np.inf
+    for _ in range(PASSES):
+        readings = apart(noise, effects(theta, movement))
+        theta, taken = _least_squares(theta, movement, held, readings.white(delta))
+        steps += taken
+        if attitude_std_rad is not None or abs(delta - last) <= SETTLED * delta:
+            break
+        slopes = jacobian(theta, movement) @ _free(theta, held)
+        residuals = (movement.readings() - predicted(theta, movement)).ravel()
+        last, delta = delta, likeliest_error(apart(noise, effects(theta, movement)), residuals, slopes)
+    free = _free(theta, held)
+    return Fit(theta, readings, jacobian(theta, movement) @ free, free, delta, steps)
+
+
+def _least_squares(theta: Array, movement: Movement, held: list[int], white: Array) -> tuple[Array, int]:
+    """θ by Gauss–Newton, and the steps it took."""
+    readings, norm = movement.readings(), np.linalg.norm(theta[REFERENCE])
+    rounding = 1e-13 * float(np.linalg.norm(white @ readings.ravel()))
+    steps, moved = 0, np.inf
+    while steps < STEP_LIMIT and moved > STEP_TOLERANCE + rounding:
+        free = _free(theta, held)
+        slopes = white @ jacobian(theta, movement) @ free
+        size = _sizes(slopes)
+        residuals = white @ (readings - predicted(theta, movement)).ravel()
+        step = np.linalg.lstsq(slopes / size, residuals)[0]
+        theta = theta + free @ (step / size)
+        theta[REFERENCE] *= norm / np.linalg.norm(theta[REFERENCE])
+        steps, moved = steps + 1, float(np.linalg.norm(step))
+    return theta, steps
+
+
+def _check_attitudes(start: Array, movement: Movement, held: list[int], fit: Fit) -> None:
+    """All of them, and the dwell that fits worst where enough others are left to tell."""
+    off, readings = fit.std_rad, movement.readings().size
+    said = f"the readings say that the attitudes are off by {1e3 * off:.2g} mrad each"
+    if off > SUSPICIOUS_RAD and len(movement.dwells.readings_m_s2) and readings - 3 > fit.free.shape[1] + 3:
+        worst, by, expected = _furthest_off(start, movement, held, fit)
+        if by > max(UNTRUSTWORTHY_RAD, ODD * expected):
+            off = by
+            said = (
+                f"attitude {worst + 1} is off by {1e3 * by:.2g} mrad, say the others, which are by {1e3 * expected:.2g}"
+            )
+    if off > UNTRUSTWORTHY_RAD:
+        raise refusals.untrustworthy(said)
+
+
+def _furthest_off(start: Array, movement: Movement, held: list[int], fit: Fit) -> tuple[int, float, float]:
+    """The dwell that fits worst, by how much the others say it is off, rad, and their own δ."""
+    count = len(movement.dwells.readings_m_s2)
+    residuals = (movement.readings() - predicted(fit.theta, movement))[:count]
+    turned = effects(fit.theta, movement)[: 3 * count].reshape(count, 3, -1)
+    spread = movement.dwells.variances_m2_s4[..., None] * np.eye(3) + fit.std_rad**2 * turned @ turned.swapaxes(1, 2)
+    misfit = np.sum(residuals * np.linalg.solve(spread, residuals[..., None])[..., 0], axis=1)
+    worst = int(np.argmax(misfit))
+    rest = most_likely(start, movement.without(worst), held, None)
+    missed = (movement.readings() - predicted(rest.theta, movement))[worst]
+    own = effects(rest.theta, movement)[3 * worst : 3 * worst + 3, 3 * worst : 3 * worst + 3]
+    off = np.linalg.lstsq(own, missed, rcond=1e-6)[0]  # about the reference itself nothing can be told
+    return worst, float(np.linalg.norm(off)), rest.std_rad
+
+
+def _held(movement: Movement, *, second_order: bool) -> list[int]:
+    """The elements of θ that are not looked for."""
+    held = [] if second_order else list(range(PARAMETERS))[SECOND]
+    return held if len(movement.sweeps.speeds_rad_s) else [*range(LEVER.start, LEVER.stop), DELAY, *held]
+
+
+def _free(theta: Array, held: list[int]) -> Array:
+    """(22, q) the ways θ may move: v_ref across itself, what is held not at all."""
+    whole = free_directions(theta, norm_known=True)
+    free: Array = np.delete(whole, [each - 1 for each in held], axis=1)  # one column of v_ref stands before them
+    return free
+
+
+def _sizes(columns: Array) -> Array:
+    """(q,) norms; 1 for a column of zeros."""
+    sizes: Array = np.linalg.norm(columns, axis=0)
+    return np.where(sizes > 0, sizes, 1.0)
+
+
+def _check(movement: Movement, needed: int) -> None:
+    dwells, sweeps = movement.dwells, movement.sweeps
+    count, swept = len(dwells.readings_m_s2), len(sweeps.speeds_rad_s)
+    shapes = (
+        ("readings", dwells.readings_m_s2, (count, 3)),
+        ("variances", dwells.variances_m2_s4, (count, 3)),
+        ("attitudes", dwells.attitudes, (count, 3, 3)),
+        ("harmonics", sweeps.harmonics_m_s2, (swept, 3, 3)),
+        ("covariances", sweeps.covariances_m2_s4, (swept, 9, 9)),
+        ("axes", sweeps.axes_flange, (swept, 3)),
+        ("speeds", sweeps.speeds_rad_s, (swept,)),
+        ("attitudes of sweeps", sweeps.attitudes, (swept, 3, 3)),
+        ("arms", sweeps.arms_m, (swept, 3)),
+        ("stations", sweeps.stations.astype(np.float64), (swept,)),
+    )
+    for name, array, shape in shapes:
+        refusals.require_shape(name, array, shape)
+    refusals.check_count(count + 3 * swept, -(-needed // 3), needed)
+    refusals.check_finite(**{name: array for name, array, _ in shapes})
+    refusals.check_variances(dwells.variances_m2_s4)
+    refusals.check_variances(np.asarray(np.linalg.eigvalsh(sweeps.covariances_m2_s4), dtype=np.float64))
+    if (np.abs(np.linalg.norm(sweeps.axes_flange, axis=1) - 1) > 1e-6).any():
+        raise ValueError("axes must be unit vectors")
+    refusals.check_speeds(np.abs(sweeps.speeds_rad_s))
+    for attitudes in (dwells.attitudes, sweeps.attitudes):
+        refusals.check_rotations(attitudes)
+    for readings in (dwells.readings_m_s2, sweeps.harmonics_m_s2.reshape(-1, 9)):
+        refusals.check_signal(readings)
+        refusals.check_duplicates(readings)

@@ -1,0 +1,122 @@
+"""The first harmonic of one revolution: mean, cosine and sine over the joint's angle of what an accelerometer read.
+
+It is the natural extension of the mean that a gyroscope's revolution is reduced to. What the servo's vibration adds is
+known from the joint's own speed: centripetal acceleration by ω² less the square of its mean, Euler acceleration by the
+angular acceleration α, and gravity by what the joint turns more while the filter lags. All of it is taken out in one
+regression, so it neither turns the result nor counts as noise. So are the second and the third harmonic, which an
+angle that errs and a sensor that is not linear make. A speed that changes only once to four times in a turn cannot be
+told from gravity; what it does stays.
+"""
+
+from collections.abc import Callable
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import ArrayLike
+
+from rig.errors import Fault
+from rig.estimation.arrays import Array
+from rig.estimation.refusals import check_finite, require_shape
+
+WHOLE_TURN = 0.05  # of a turn, that the samples may miss or exceed
+WAVES = 3  # harmonics of the angle; only the first is wanted
+VIBRATION_WAVES = 100  # in a turn: 17 Hz at 60°/s
+MIN_SAMPLES = 50
+
+
+@dataclass(frozen=True, slots=True)
+class FirstHarmonic:
+    """`harmonic_m_s2` (3, 3): mean, cosine, sine (rows) of the axes x y z; `covariance_m2_s4` (9, 9), row by row.
+
+    `speed_rad_s`: 2π over the time of a turn, negative where the angle falls. `noise_m_s2` (3,) of one sample.
+    """
+
+    harmonic_m_s2: Array
+    covariance_m2_s4: Array
+    speed_rad_s: float
+    noise_m_s2: Array
+
+
+def first_harmonic(
+    time_s: ArrayLike,
+    readings_m_s2: ArrayLike,
+    angle_rad: ArrayLike,
+    speed_rad_s: ArrayLike,
+    coloured: Callable[[Array], float] = lambda _: 1.0,
+) -> FirstHarmonic:
+    """Reduce one whole revolution of n samples.
+
+    `time_s` (n,) on the arm's clock, `readings_m_s2` (n, 3); `angle_rad`, `speed_rad_s` (n,): of the joint at these
+    times, by the arm's states, the angle counted from where the attitude is known. `coloured` gives the factor by which
+    the variance of a mean of residuals (n,) differs from that of white noise.
+
+    Raises Fault `not_finite`, `incomplete_revolution`; ValueError for a wrong shape.
+    """
+    t, m, angle, speed = (
+        np.asarray(each, dtype=np.float64) for each in (time_s, readings_m_s2, angle_rad, speed_rad_s)
+    )
+    count = len(t)
+    for name, array, shape in (("readings", m, (count, 3)), ("angle", angle, (count,)), ("speed", speed, (count,))):
+        require_shape(name, array, shape)
+    check_finite(time=t, readings=m, angle=angle, speed=speed)
+    mean_speed = _mean_speed(t, angle)
+    columns = np.hstack([_waves(angle, WAVES), _of_vibration(t, angle, speed, mean_speed)])
+    size = np.linalg.norm(columns, axis=0)
+    size = np.where(size > 0, size, 1.0)
+    inverse = np.linalg.pinv(columns / size, rcond=1e-9)  # an arm without vibration leaves columns empty
+    coefficients = (inverse @ m) / size[:, None]
+    residuals = m - columns @ coefficients
+    scatter = residuals.T @ residuals / (count - np.linalg.matrix_rank(columns / size, rtol=1e-9))
+    factor = np.sqrt([coloured(residuals[:, axis]) for axis in range(3)])
+    gain = inverse[:3] / size[:3, None]
+    return FirstHarmonic(
+        harmonic_m_s2=coefficients[:3],
+        covariance_m2_s4=np.kron(gain @ gain.T, scatter * np.outer(factor, factor)),
+        speed_rad_s=mean_speed,
+        noise_m_s2=np.sqrt(np.diag(scatter)),
+    )
+
+
+def _mean_speed(time_s: Array, angle_rad: Array) -> float:
+    """2π/T: the mean by time, which a vibration does not change over a whole turn."""
+    travel = angle_rad[-1] - angle_rad[0] if len(angle_rad) else 0.0
+    turned = abs(travel) * len(angle_rad) / max(len(angle_rad) - 1, 1)  # the last sample's own share
+    if len(angle_rad) < MIN_SAMPLES or abs(turned / (2 * np.pi) - 1) > WHOLE_TURN:
+        raise Fault(
+            "incomplete_revolution",
+            f"{len(angle_rad)} samples cover {np.degrees(turned):.0f}° and not one whole revolution",
+            "Give the samples of exactly one revolution, or repeat the sweep",
+        )
+    return float(travel / (time_s[-1] - time_s[0]))
+
+
+def _waves(angle_rad: Array, count: int) -> Array:
+    """(n, 1 + 2 count): 1, cos θ, sin θ, cos 2θ, …"""
+    turned = angle_rad[:, None] * np.arange(1, count + 1)
+    waves = np.stack([np.cos(turned), np.sin(turned)], axis=-1).reshape(len(angle_rad), -1)
+    return np.column_stack([np.ones_like(angle_rad), waves])
+
+
+def _of_vibration(time_s: Array, angle_rad: Array, speed_rad_s: Array, mean_speed_rad_s: float) -> Array:
+    """(n, 6) what the joint's uneven speed is felt as.
+
+    Differences of encoder steps are noise, so the speed is smoothed first: it is what its waves in the time of a turn
+    make of it, and they are differentiated. A filter's lag shows α's change, and the change of this.
+    """
+    waves = _waves(mean_speed_rad_s * time_s, min(VIBRATION_WAVES, len(time_s) // 4))
+    together = waves.T @ waves  # nearly diagonal: over a turn the waves are orthogonal
+    excess = np.asarray(np.linalg.solve(together, waves.T @ (speed_rad_s - mean_speed_rad_s)), dtype=np.float64)
+    excess[: 1 + 2 * (WAVES + 1)] = 0.0  # times cos θ, a slower one is the mean or a wave that is wanted
+    changes = [excess]
+    for _ in range(3):
+        changes.append(mean_speed_rad_s * _changed(changes[-1]))
+    uneven, *of_acceleration = np.array(changes) @ waves.T
+    squared = (2 * mean_speed_rad_s + uneven) * uneven
+    return np.column_stack([squared, *of_acceleration, uneven * np.cos(angle_rad), uneven * np.sin(angle_rad)])
+
+
+def _changed(coefficients: Array) -> Array:
+    """(1 + 2 k,) the derivative of a sum of waves."""
+    cos, sin = coefficients[1::2], coefficients[2::2]
+    times = np.arange(1, len(cos) + 1)
+    return np.concatenate([[0.0], np.stack([times * sin, -times * cos], axis=-1).ravel()])
