@@ -1,4 +1,5 @@
-"""What an arm can be told to do, step by step: motions with their joints, speed and duration, and rests. Pure."""
+"""What an arm can be told to do, step by step: motions with their joints, speed and duration, rests and
+dwells. Pure."""
 
 import math
 from dataclasses import dataclass
@@ -32,9 +33,9 @@ class Motion(Protocol):
 class Sweep:
     """One wrist through one revolution at constant speed, with ramps and margins outside the revolution.
 
-    `index` counts the plan's sweeps from 0. `joint` is 0 (base) to 5 (wrist 3). `direction` is "ccw" for a growing
-    joint angle, "cw" for a falling one. `axis_flange` is the unit vector of the flange's angular velocity in the
-    flange frame, sign included, as of the nominal arm. `revolution_rad` is the (low, high) joint angle of the
+    `index` counts the procedure's sweeps and dwells from 0. `joint` is 0 (base) to 5 (wrist 3). `direction` is "ccw"
+    for a growing joint angle, "cw" for a falling one. `axis_flange` is the unit vector of the flange's angular velocity
+    in the flange frame, sign included, as of the nominal arm. `revolution_rad` is the (low, high) joint angle of the
     revolution: exactly 2π, centred on the home pose.
     """
 
@@ -61,7 +62,7 @@ class Sweep:
 
 @dataclass(frozen=True, slots=True)
 class Transfer:
-    """A movement between sweeps; nothing is measured during it."""
+    """A movement between sweeps or attitudes; nothing is measured during it."""
 
     name: str
     start_q_rad: Joints
@@ -79,7 +80,26 @@ class Rest:
     duration_s: float
 
 
-Step = Sweep | Transfer | Rest
+@dataclass(frozen=True, slots=True)
+class Dwell:
+    """The arm stands still in the attitude `q_rad`, and that is measured, for `duration_s` in the controller's time.
+
+    It begins when the sensors have settled after the way there, `settle_s` after the arm has arrived at the latest;
+    `duration_s` does not hold that wait. `index` counts the procedure's sweeps and dwells from 0.
+    """
+
+    index: int
+    q_rad: Joints
+    duration_s: float
+    settle_s: float
+
+    @property
+    def name(self) -> str:
+        angles = (round(math.degrees(angle), 1) + 0.0 for angle in self.q_rad[3:])  # no -0
+        return f"dwell at {' '.join(f'{angle:g}' for angle in angles)}"
+
+
+Step = Sweep | Transfer | Rest | Dwell
 
 
 @dataclass(frozen=True, slots=True)
@@ -92,16 +112,25 @@ class Plan:
 
     @property
     def duration_s(self) -> float:
-        """The sum of all motions and rests."""
+        """The sum of all motions, rests and dwells, without the waits for sensors to settle."""
         return sum(step.duration_s for step in self.steps)
+
+    @property
+    def settling_s(self) -> float:
+        """How long the waits for sensors to settle may take in all."""
+        return sum(dwell.settle_s for dwell in self.dwells)
 
     @property
     def sweeps(self) -> tuple[Sweep, ...]:
         return tuple(step for step in self.steps if isinstance(step, Sweep))
 
     @property
+    def dwells(self) -> tuple[Dwell, ...]:
+        return tuple(step for step in self.steps if isinstance(step, Dwell))
+
+    @property
     def motions(self) -> tuple[Sweep | Transfer, ...]:
-        return tuple(step for step in self.steps if not isinstance(step, Rest))
+        return tuple(step for step in self.steps if isinstance(step, (Sweep, Transfer)))
 
 
 def trapezoid_duration(distance_rad: float, speed_rad_s: float, acceleration_rad_s2: float) -> float:

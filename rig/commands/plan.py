@@ -3,15 +3,21 @@
 from collections.abc import Sequence
 from pathlib import Path
 
+from rig.analysis.attitude_account import attitude_account
 from rig.arm.preflight import plan_problems, refuse
 from rig.commands.configured import configured
 from rig.report.plan_table import print_plan
 
 
 def plan(config_path: Path, overrides: Sequence[str], script: Path | None, *, as_json: bool) -> int:
-    """Print the plan from the home pose; returns 0. Raises `Refused` when a motion breaks a limit."""
+    """Print the plan from the home pose, and what its attitudes will tell; returns 0.
+
+    Raises `Refused` when a motion breaks a limit, and when the attitudes do not tell enough.
+    """
     found = configured(config_path, overrides, script)
     steps = found.phase.plan()
-    refuse(plan_problems(steps, found.loaded.config.arm.payload_kg))
-    print_plan(steps, repeated=found.phase.follows is not None, as_json=as_json)
+    config = found.loaded.config
+    refuse(plan_problems(steps, config.arm.payload_kg, config.arm.payload_centre_mm))
+    account = attitude_account(config, steps)
+    print_plan(steps, account, repeated=found.phase.follows is not None, as_json=as_json)
     return 0

@@ -24,6 +24,7 @@ AxisName = Literal["+x", "-x", "+y", "-y", "+z", "-z"]
 Vector3 = tuple[float, float, float]
 Vector6 = tuple[float, float, float, float, float, float]
 Positive = Annotated[float, Field(gt=0)]
+AccelerometerOrder = Literal[0, 1, 2]
 JointAngle = Annotated[float, Field(ge=-JOINT_LIMIT_DEG, le=JOINT_LIMIT_DEG)]
 Offset = Annotated[float, Field(ge=-1000, le=1000)]
 # A name becomes that of a dataset, of files and of C arrays.
@@ -141,6 +142,16 @@ class TurntableSection(Section):
     bias_rad_s: Vector3 = Field(default=(0.0, 0.0, 0.0), description="bias of each axis, added to the reading")
 
 
+class AccelerationSection(Section):
+    """The part's accelerometer; without this section it is not read. It is calibrated where attitudes are held."""
+
+    range_g: float | None = Field(
+        default=None,
+        description="its full scale, one of the part's; left out, the smallest it has",
+        json_schema_extra={"unit": "g"},
+    )
+
+
 class SensorSection(Section):
     """One gyroscope on the board, under a name of your choice: at most 40 letters, digits, `_`, `-` and spaces."""
 
@@ -168,6 +179,9 @@ class SensorSection(Section):
     )
     turntable: TurntableSection = Field(
         default=TurntableSection(), description="its own calibration, of a reference only; left out, it reads true"
+    )
+    acceleration: AccelerationSection | None = Field(
+        default=None, description="its accelerometer; left out, only the gyroscope is read"
     )
 
     @model_validator(mode="before")
@@ -199,6 +213,21 @@ class SensorSection(Section):
             return value
         return part.accept_rate(value) if info.field_name == "rate_hz" else part.accept_range(value)
 
+    @field_validator("acceleration")
+    @classmethod
+    def a_range_of_its_accelerometer(
+        cls, value: AccelerationSection | None, info: ValidationInfo
+    ) -> AccelerationSection | None:
+        """As of its gyroscope; left out, the smallest: nothing on the arm is felt beyond 2 g."""
+        part = PARTS.get(info.data.get("part", ""))
+        if value is None or part is None:
+            return value
+        if value.range_g is None:
+            return value.model_copy(update={"range_g": part.ranges_g[0]})
+        if value.range_g not in part.ranges_g:
+            raise ValueError(f"the part has no range_g {value.range_g:g}; it has {', '.join(map(str, part.ranges_g))}")
+        return value
+
     @field_validator("turntable")
     @classmethod
     def only_of_a_reference(cls, value: TurntableSection, info: ValidationInfo) -> TurntableSection:
@@ -222,6 +251,11 @@ class ProcedureSection(Section):
     def needs_reference(self) -> bool:
         """Whether calibrated readings are compared with a reference's."""
         return self.then_verify
+
+    @property
+    def accelerometer_order(self) -> AccelerometerOrder:
+        """Of the accelerometer's model that the attitudes must tell; 0 where they need not tell one."""
+        return 0
 
     def problems(self, config: "RigConfig") -> Iterable[str]:
         """What of the rest of the configuration does not fit this procedure, a line each."""
@@ -268,6 +302,24 @@ class LimitsSection(Section):
         default=None,
         description="the same difference averaged over each revolution, and the reference's from the arm; a "
         "verification needs it",
+    )
+    acceleration_scale_deviation: Positive | None = Field(
+        default=None,
+        description="of an accelerometer's scale factor from 1; a calibration of one needs it",
+        json_schema_extra=RATIO,
+    )
+    acceleration_scale_std: Positive | None = Field(
+        default=None, description="standard deviation of such a scale factor; needed too", json_schema_extra=RATIO
+    )
+    acceleration_bias_m_s2: Positive | None = Field(
+        default=None, description="magnitude of an accelerometer's bias; needed too"
+    )
+    acceleration_bias_std_m_s2: Positive | None = Field(
+        default=None, description="standard deviation of such a bias; needed too"
+    )
+    acceleration_verification_m_s2: Positive | None = Field(
+        default=None,
+        description="how far the size of a calibrated acceleration at rest may be from gravity's; needed with repeats",
     )
 
 
@@ -389,8 +441,11 @@ class RigConfig(Section):
     @field_validator("sensors")
     @classmethod
     def the_link_carries_them(cls, sensors: dict[str, SensorSection], info: ValidationInfo) -> dict[str, SensorSection]:
-        """Rates for which the link is too slow would lose samples. Calibrated readings, the larger ones, must fit."""
-        streams = {name: Stream(s.rate_hz, calibrated=s.role == "calibrate") for name, s in sensors.items()}
+        """Rates for which the link is too slow would lose samples. Of what a sensor sends, the larger must fit."""
+        streams = {
+            name: Stream(s.rate_hz, calibrated=s.role == "calibrate", acceleration=s.acceleration is not None)
+            for name, s in sensors.items()
+        }
         problem = over_budget(streams, info.data["board"].baud) if "board" in info.data else None
         if problem is not None:
             raise ValueError(problem)

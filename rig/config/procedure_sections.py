@@ -2,19 +2,24 @@
 
 from collections.abc import Iterator, Mapping
 from types import MappingProxyType
-from typing import Annotated, Literal, Self, get_args
+from typing import Annotated, Any, Literal, Self, get_args
 
-from pydantic import Field, model_validator
+import numpy as np
+from pydantic import BeforeValidator, Field, field_validator, model_validator
 
-from rig.config.models import RATIO, Direction, ProcedureSection, RigConfig
+from rig.config.attitude_sets import SETS
+from rig.config.models import RATIO, AccelerometerOrder, Direction, JointAngle, ProcedureSection, RigConfig
 from rig.config.ur10e_limits import ACCELERATION_LIMIT_DEG_S2, SPEED_LIMIT_DEG_S
 
 __all__ = [
     "DEFAULT_PROCEDURE",
     "STOCK_SECTIONS",
+    "AttitudesSection",
+    "ImuSection",
     "ProcedureSection",
     "SixObservationSection",
     "SixSweepsSection",
+    "StaticAttitudesSection",
     "VerifySection",
 ]
 
@@ -127,8 +132,106 @@ class VerifySection(SixSweepsSection):
         return True
 
 
+def set_of_that_name(value: Any) -> Any:
+    """The attitudes a name stands for; those that are given one by one as they are."""
+    if not isinstance(value, str):
+        return value
+    if value not in SETS:
+        raise ValueError(f"no set of attitudes; allowed: {', '.join(SETS)}, or a list of them")
+    return SETS[value]
+
+
+class AttitudesSection(ProcedureSection):
+    """Attitudes in which the arm stands still: which, how long, how often."""
+
+    attitudes: Annotated[tuple[tuple[JointAngle, JointAngle, JointAngle], ...], BeforeValidator(set_of_that_name)] = (
+        Field(
+            default=SETS["eighteen"],
+            min_length=1,
+            max_length=100,
+            description="`eighteen`, best for an arm whose attitudes are good to 1 mrad; `faces`, twelve that are best "
+            "for exact ones; or a list of your own, each the angles of wrists 1, 2 and 3; base, shoulder and elbow "
+            "stay as in `arm.home_deg`",
+            json_schema_extra={
+                "unit": "°",
+                "allowed": f"{', '.join(f'`{name}`' for name in SETS)} or a list of 3 numbers each",
+                "usual": "`eighteen`",
+            },
+        )
+    )
+    dwell_s: float = Field(default=3.0, ge=0.1, le=3600, description="standing still in each attitude")
+    settle_s: float = Field(
+        default=5.0, gt=0, le=5, description="how long the sensors may take to settle before, or the run ends"
+    )
+    second_order: bool = Field(
+        default=False,
+        description="whether the attitudes must tell an accelerometer's second-order terms too, which triples the "
+        "uncertainty of its bias",
+    )
+    repeats: int = Field(default=1, ge=1, le=100, description="how often all of it is done", json_schema_extra=RATIO)
+    acceleration_deg_s2: float = Field(
+        default=240.0, ge=0.1, le=ACCELERATION_LIMIT_DEG_S2, description="of every motion"
+    )
+
+    @field_validator("attitudes")
+    @classmethod
+    def each_once(cls, value: tuple[tuple[float, float, float], ...]) -> tuple[tuple[float, float, float], ...]:
+        """Twice the same tells nothing new of the arm's errors, which it makes twice as well."""
+        found: set[tuple[float, ...]] = set()
+        for attitude in value:
+            turned = tuple(np.mod(attitude, 360).tolist())
+            if turned in found:
+                raise ValueError(f"{list(attitude)} stands there twice; repeats says how often all of it is done")
+            found.add(turned)
+        return value
+
+    @property
+    def accelerometer_order(self) -> AccelerometerOrder:
+        """As the file says."""
+        return 2 if self.second_order else 1
+
+    def problems(self, config: RigConfig) -> Iterator[str]:
+        """What the calibration of an accelerometer lacks."""
+        if not any(sensor.acceleration for sensor in config.to_calibrate.values()):
+            yield "attitudes calibrate accelerometers: give a sensor with role: calibrate its section acceleration"
+        needed = ["scale_deviation", "scale_std", "bias_m_s2", "bias_std_m_s2"]
+        if self.repeats > 1:
+            needed.append("verification_m_s2")  # by the last repeat
+        limits = [f"acceleration_{name}" for name in needed]
+        if lacking := [f"limits.{name}" for name in limits if getattr(config.limits, name) is None]:
+            yield f"an accelerometer's calibration needs {', '.join(lacking)}"
+
+
+class StaticAttitudesSection(AttitudesSection):
+    """The arm stands still in attitudes that tell an accelerometer's scale, angles and bias."""
+
+    name: Literal["static_attitudes"] = Field(default="static_attitudes", description="this procedure")
+
+
+class ImuSection(SixSweepsSection, AttitudesSection):
+    """Sweeps, then attitudes: gyroscope and accelerometer in one run."""
+
+    def problems(self, config: RigConfig) -> Iterator[str]:
+        """Of both."""
+        yield from SixSweepsSection.problems(self, config)
+        yield from AttitudesSection.problems(self, config)
+
+    name: Literal["imu"] = Field(default="imu", description="this procedure")
+    axes: Literal[3, 6] = Field(
+        default=6,
+        description="how many axes are swept: `3`, one of each wrist; `6`, three more of wrist 1 with wrists 2 and 3 "
+        "turned, which tells the sensor's own angles from the arm's",
+        json_schema_extra=RATIO,
+    )
+
+
 STOCK_SECTIONS: Mapping[str, type[ProcedureSection]] = MappingProxyType(
-    {"six_observation": SixObservationSection, "verify": VerifySection}
+    {
+        "six_observation": SixObservationSection,
+        "verify": VerifySection,
+        "static_attitudes": StaticAttitudesSection,
+        "imu": ImuSection,
+    }
 )
 
 

@@ -15,6 +15,7 @@ Schema = Mapping[str, Any]
 # A key ends in its unit. The longer endings come first.
 UNITS = {
     "_deg_s2": "°/s²",
+    "_m_s2": "m/s²",
     "_deg_s": "°/s",
     "_rad_s": "rad/s",
     "_deg": "°",
@@ -119,11 +120,12 @@ def _parts() -> Iterator[str]:
             f"{part.default_rate_hz:g}",
             ", ".join(f"{range_deg_s:g}" for range_deg_s in part.ranges_deg_s),
             f"{part.default_range_deg_s:g}",
+            ", ".join(f"{range_g:g}" for range_g in part.ranges_g),
         )
         for name, part in PARTS.items()
     )
     yield from ("### The parts' rates and ranges", "")
-    yield from _table(("part", "`rate_hz` in Hz", "usual", "`range_deg_s` in °/s", "usual"), rows)
+    yield from _table(("part", "`rate_hz` in Hz", "usual", "`range_deg_s` in °/s", "usual", "`range_g` in g"), rows)
     yield ""
 
 
@@ -149,7 +151,7 @@ def _section(path: str, schema: Schema, definitions: Schema, heading: str | None
         return
     section = _resolved(schema, definitions)
     properties = section["properties"]
-    inner = {key: it for key, it in properties.items() if "$ref" in it or "patternProperties" in it}
+    inner = {key: found for key, it in properties.items() if (found := _section_of(it)) is not None}
     required = section.get("required", ())
     yield from (heading or f"### `{path}`", "", " ".join(section["description"].split()), "")
     rows = (_row(key, it, key in required) for key, it in properties.items() if key not in inner)
@@ -157,6 +159,13 @@ def _section(path: str, schema: Schema, definitions: Schema, heading: str | None
     yield ""
     for key, it in inner.items():
         yield from _section(f"{path}.{key}", it, definitions)
+
+
+def _section_of(schema: Schema) -> Schema | None:
+    """What a key holds if that is a section or several, be it one that may be null."""
+    if "$ref" in schema or "patternProperties" in schema:
+        return schema
+    return next((each for each in schema.get("anyOf", ()) if "$ref" in each), None)
 
 
 def _resolved(schema: Schema, definitions: Schema) -> Schema:

@@ -1,4 +1,4 @@
-"""The gyroscopes the board has drivers for: which data rates and ranges each can be set to."""
+"""The sensors the board has drivers for: which data rates and ranges each can be set to."""
 
 from collections.abc import Mapping
 from dataclasses import dataclass
@@ -9,9 +9,11 @@ RATE_TOLERANCE = 2e-4  # relative: 333.33 stands for 1000/3, and the closest two
 
 @dataclass(frozen=True, slots=True)
 class Part:
-    """One kind of gyroscope: `rates_hz` and `ranges_deg_s` are all it can do, `rates_rule` says the rates in words.
+    """One kind of sensor: `rates_hz` and `ranges_deg_s` are all its gyroscope can do, `rates_rule` says rates in words.
 
-    `g_sensitivity_deg_s_g` is how much a reading may change for 1 g, at most.
+    `g_sensitivity_deg_s_g` is how much a reading may change for 1 g, at most. `ranges_g` are those of its
+    accelerometer, which shares its data rate, the usual one first; `acceleration_noise_ug_sqrt_hz` is the noise density
+    of that, in µg/√Hz.
     """
 
     rates_hz: tuple[float, ...]
@@ -20,6 +22,8 @@ class Part:
     default_rate_hz: float
     default_range_deg_s: float
     g_sensitivity_deg_s_g: float
+    ranges_g: tuple[float, ...]
+    acceleration_noise_ug_sqrt_hz: float
 
     def accept_rate(self, rate_hz: float) -> float:
         """The part's own rate that `rate_hz` means. Raises ValueError naming the nearest when there is none."""
@@ -46,6 +50,8 @@ PARTS: Mapping[str, Part] = MappingProxyType(
             default_rate_hz=238,
             default_range_deg_s=245,
             g_sensitivity_deg_s_g=0.1,  # not stated; that of the MPU-6050, a part of the same kind, PS-MPU-6000A 6.1
+            ranges_g=(2, 4, 8, 16),
+            acceleration_noise_ug_sqrt_hz=150,  # not stated; assumed
         ),
         "mpu9250": Part(  # register map RM-MPU-9250A-00, registers 25 (SMPLRT_DIV) and 27 (GYRO_CONFIG)
             rates_hz=tuple(1000 / (1 + divider) for divider in range(250)),
@@ -54,6 +60,8 @@ PARTS: Mapping[str, Part] = MappingProxyType(
             default_rate_hz=200,
             default_range_deg_s=250,
             g_sensitivity_deg_s_g=0.1,  # not stated; that of the MPU-6050, PS-MPU-6000A 6.1
+            ranges_g=(2, 4, 8, 16),
+            acceleration_noise_ug_sqrt_hz=300,  # PS-MPU-9250A-01, section 3.2
         ),
         "adis16465": Part(  # datasheet, register DEC_RATE; the range is the model's: -1, -2 and -3 have one each
             rates_hz=tuple(2000 / (1 + divider) for divider in range(2000)),
@@ -62,6 +70,8 @@ PARTS: Mapping[str, Part] = MappingProxyType(
             default_rate_hz=200,
             default_range_deg_s=500,
             g_sensitivity_deg_s_g=0.015,  # as the datasheet of the ADIS16445 states
+            ranges_g=(8,),
+            acceleration_noise_ug_sqrt_hz=23,  # assumed: the data sheet of the part has it, not looked up
         ),
     }
 )

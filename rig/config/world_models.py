@@ -142,6 +142,42 @@ class SimulatedBoardSection(Section):
     pty: bool = Field(default=False, description="also offer the serial port as a pseudo-terminal (POSIX)")
 
 
+class SimulatedAccelerometerSection(Section):
+    """The truth of one accelerometer, a = F (s + φ s²) + b of the specific force s; as warm as its gyroscope."""
+
+    scale: Vector3 = Field(
+        default=(1.0, 1.0, 1.0),
+        description="scale factor of each axis: what the length of a row of F is 1 over",
+        json_schema_extra=RATIO,
+    )
+    bias_m_s2: Vector3 = Field(default=NO_ROW, description="bias b of each axis, part of the reading")
+    noise_m_s2: float = Field(default=0.01, ge=0, description="standard deviation of a sample's noise")
+    non_orthogonality_deg: Vector3 = Field(
+        default=NO_ROW, description="by how much the angles between its axes x y, x z, y z are off 90°"
+    )
+    second_order_s2_m: Vector3 = Field(default=NO_ROW, description="φ of each axis", json_schema_extra={"unit": "s²/m"})
+    bandwidth_hz: float | None = Field(
+        default=None, ge=1, le=10_000, description="of its own low-pass of first order; without it, it has none"
+    )
+    delay_ms: float = Field(
+        default=0.0,
+        ge=0,
+        le=50,
+        description="by how much its readings are late beside that",
+        json_schema_extra={"unit": "ms"},
+    )
+    bias_m_s2_per_k: Vector3 = Field(
+        default=NO_ROW,
+        description="by how much b of each axis grows with temperature",
+        json_schema_extra={"unit": "m/s²/K"},
+    )
+    scale_per_k: Vector3 = Field(
+        default=NO_ROW,
+        description="by which fraction the scale factor of each axis grows with temperature",
+        json_schema_extra={"unit": "1/K"},
+    )
+
+
 class SimulatedSensorSection(Section):
     """The truth of one simulated gyroscope, in the model g = K (m + b)."""
 
@@ -213,6 +249,10 @@ class SimulatedSensorSection(Section):
         le=50,
         description="by how much its readings are late beside that",
         json_schema_extra={"unit": "ms"},
+    )
+    accelerometer: SimulatedAccelerometerSection = Field(
+        default=SimulatedAccelerometerSection(),
+        description="the accelerometer beside it, of a sensor that has `acceleration`",
     )
 
 

@@ -6,7 +6,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from rig.arm.kinematics import flange_attitude
-from rig.arm.motion import Rest, Step, Sweep
+from rig.arm.motion import Dwell, Rest, Step, Sweep, Transfer
 from rig.arm.state import Joints
 from rig.config.models import Vector3
 
@@ -48,14 +48,19 @@ def drift_effect(steps: Sequence[Step]) -> float:
 
 
 def _looks(steps: Sequence[Step]) -> Iterator[Look]:
-    """The sweeps, and the rests after them."""
+    """The sweeps, the rests after them, and the dwells."""
     time_s, here = 0.0, None
     for step in steps:
         middle_s = time_s + step.duration_s / 2
-        if isinstance(step, Sweep):
-            x, y, z = (step.speed_rad_s * axis for axis in step.axis_flange)
-            yield Look((x, y, z), step.start_q_rad, middle_s, step.duration_s)
-        elif isinstance(step, Rest) and here is not None:
+        match step:
+            case Sweep():
+                x, y, z = (step.speed_rad_s * axis for axis in step.axis_flange)
+                yield Look((x, y, z), step.start_q_rad, middle_s, step.duration_s)
+                here = step.end_q_rad
+            case Transfer():
+                here = step.target_q_rad
+            case Dwell():
+                here = step.q_rad
+        if isinstance(step, (Rest, Dwell)) and here is not None:
             yield Look((0.0, 0.0, 0.0), here, middle_s, step.duration_s)
-        here = here if isinstance(step, Rest) else step.target_q_rad
         time_s += step.duration_s

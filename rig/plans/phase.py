@@ -4,6 +4,7 @@ from collections.abc import Collection
 from dataclasses import dataclass
 from typing import Protocol
 
+from rig.analysis.attitude_account import refuse_untelling
 from rig.arm.motion import Plan
 from rig.arm.state import Joints
 from rig.config.models import RigConfig
@@ -34,7 +35,8 @@ class Phase:
 def first_phase(procedure: AnyProcedure, config: RigConfig, procedures: Procedures) -> Phase:
     """The phase a run of `procedure` begins with; what follows repeats its movement.
 
-    Raises Refused `no_such_procedure`; the phase's `plan` raises Refused as the procedure's, and `script_failed`.
+    Raises Refused `no_such_procedure`; the phase's `plan` raises Refused as the procedure's, `script_failed`, and
+    `rank_deficient`, `ill_conditioned` where the whole plan's attitudes do not tell what is asked of them.
     """
 
     def plan(start_q_rad: Joints | None = None, done: Collection[int] = ()) -> Plan:
@@ -42,7 +44,9 @@ def first_phase(procedure: AnyProcedure, config: RigConfig, procedures: Procedur
             made = procedure.plan(config.arm, config.procedure, start_q_rad, done)
             if not isinstance(made, Plan):
                 raise TypeError(f"its planner gives {type(made).__name__}, no Plan")
-            return made
+        if not done:
+            refuse_untelling(config, made)
+        return made
 
     following = procedure.following(procedures) if config.procedure.then_verify else None
     follows = None if following is None else Phase(following, plan, agreed=True)

@@ -25,9 +25,10 @@ SectionT_contra = TypeVar("SectionT_contra", bound=ProcedureSection, contravaria
 
 
 class Planner(Protocol[SectionT_contra]):
-    """Makes the steps; pure. `start_q_rad` is where the arm stands (at home when None), `done` the sweeps to leave out.
+    """Makes the steps; pure. `start_q_rad` is where the arm stands (at home when None), `done` what to leave out.
 
-    The sweeps' `index` is their place in the whole procedure. Raises `Refused` by name when there is no such movement.
+    The `index` of sweeps and dwells, by which `done` names them, is their place in the whole procedure. Raises
+    `Refused` by name when there is no such movement.
     """
 
     def __call__(

@@ -9,16 +9,14 @@ from itertools import permutations, product
 import numpy as np
 
 from rig.arm.kinematics import flange_axes
-from rig.arm.motion import SAME_PLACE_RAD, Plan, Rest, Step, Sweep, Transfer, trapezoid_duration, travel
+from rig.arm.motion import Plan, Rest, Step, Sweep, trapezoid_duration
 from rig.arm.state import JOINT_NAMES, Joints
 from rig.config.models import ArmSection, Direction
 from rig.config.procedure_sections import SixSweepsSection, Wrist
 from rig.errors import Refused
 from rig.plans.drift import drift_effect
+from rig.plans.ways import approach, in_radians, transfer
 
-# The first motion may swing the large joints from wherever somebody left the arm, so it is made at leisure.
-APPROACH_SPEED_RAD_S = math.radians(30)
-APPROACH_ACCELERATION_RAD_S2 = math.radians(60)
 # The swept axes must span space: the smallest singular value of their unit vectors, 1 when orthogonal.
 AXES_SPAN = 0.5
 USUAL_ORDER: tuple[Wrist, ...] = ("wrist_3", "wrist_1", "wrist_2")  # that of the paper
@@ -62,7 +60,7 @@ def plan_six_observation(
     Limits are not judged here: see `rig.arm.preflight`.
     Raises Refused `axes_do_not_span`.
     """
-    home = _radians(arm.home_deg)
+    home = in_radians(arm.home_deg)
     _check_span(home)
     start = home if start_q_rad is None else start_q_rad
     sweeps = [sweep for sweep in _ordered_sweeps(arm, procedure) if sweep.index not in done]
@@ -83,7 +81,7 @@ def _check_span(home: Joints) -> None:
 @lru_cache(maxsize=16)
 def _ordered_sweeps(arm: ArmSection, procedure: SixSweepsSection) -> tuple[Sweep, ...]:
     """All sweeps in the order the file names, or else the best one: the ways first, then the order of the wrists."""
-    home = _radians(arm.home_deg)
+    home = in_radians(arm.home_deg)
 
     def harm(order: Order) -> float:
         trial = procedure.model_copy(update={"repeats": min(procedure.repeats, 2)})  # more of them repeat these
@@ -176,29 +174,15 @@ def _connected(
 ) -> Iterable[Step]:
     """Sweeps with the rests after them and a transfer wherever the arm is not yet where the next one begins."""
     speed, acceleration = math.radians(arm.transfer_speed_deg_s), math.radians(procedure.acceleration_deg_s2)
-    leisure = min(speed, APPROACH_SPEED_RAD_S), min(acceleration, APPROACH_ACCELERATION_RAD_S2)
-    yield from _transfer("approach home", start, home, *leisure)
+    yield from approach(start, home, speed, acceleration)
     here = home
     for sweep in sweeps:
-        yield from _transfer(f"transfer to the start of {sweep.name}", here, sweep.start_q_rad, speed, acceleration)
+        yield from transfer(f"transfer to the start of {sweep.name}", here, sweep.start_q_rad, speed, acceleration)
         yield sweep
         if procedure.rest_s > 0:
             yield Rest(f"rest after {sweep.name}", procedure.rest_s)
         here = sweep.end_q_rad
-    yield from _transfer("transfer home", here, home, speed, acceleration)
-
-
-def _transfer(
-    name: str, start: Joints, target: Joints, speed_rad_s: float, acceleration_rad_s2: float
-) -> Iterable[Transfer]:
-    distance_rad = max(map(abs, travel(start, target)))
-    if distance_rad > SAME_PLACE_RAD:
-        duration_s = trapezoid_duration(distance_rad, speed_rad_s, acceleration_rad_s2)
-        yield Transfer(name, start, target, speed_rad_s, acceleration_rad_s2, duration_s)
-
-
-def _radians(degrees: Iterable[float]) -> Joints:
-    return tuple(math.radians(angle) for angle in degrees)
+    yield from transfer("transfer home", here, home, speed, acceleration)
 
 
 def _with_joint(q_rad: Joints, joint: int, angle_rad: float) -> Joints:

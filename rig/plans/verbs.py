@@ -3,7 +3,7 @@
 from collections.abc import Callable
 from typing import Protocol
 
-from rig.arm.motion import Plan, Rest, Sweep, Transfer
+from rig.arm.motion import Dwell, Plan, Rest, Sweep, Transfer
 
 
 class Verbs(Protocol):
@@ -32,6 +32,10 @@ class Verbs(Protocol):
 
     def rest(self, rest: Rest) -> None:
         """Stand still."""
+        ...
+
+    def dwell(self, dwell: Dwell) -> None:
+        """Stand still in an attitude and measure there, once the sensors have settled."""
         ...
 
     def solve_on_board(self) -> None:

@@ -9,20 +9,25 @@ from rich.box import SIMPLE
 from rich.console import Console
 from rich.table import Table
 
-from rig.arm.motion import SAME_PLACE_RAD, Plan, Rest, Step, Sweep
+from rig.analysis.attitude_account import AttitudeAccount
+from rig.arm.motion import SAME_PLACE_RAD, Dwell, Plan, Rest, Step, Sweep
 from rig.arm.state import JOINT_NAMES
+from rig.report.attitude_account import account_document, print_account
 
 
-def plan_document(plan: Plan, *, repeated: bool) -> dict[str, Any]:
+def plan_document(plan: Plan, account: AttitudeAccount | None, *, repeated: bool) -> dict[str, Any]:
     """The plan for machines: SI units, every field of every step; `repeated` if it is done once more, to verify."""
     steps = [{"kind": type(step).__name__.lower(), **asdict(step)} for step in plan.steps]
-    return {"schema": "rig.plan/1", "duration_s": plan.duration_s, "repeated": repeated, "steps": steps}
+    document = {"schema": "rig.plan/1", "duration_s": plan.duration_s, "repeated": repeated, "steps": steps}
+    if account is not None:
+        document |= {"settling_s": plan.settling_s, "attitudes": account_document(account)}
+    return document
 
 
-def print_plan(plan: Plan, *, repeated: bool, as_json: bool) -> None:
+def print_plan(plan: Plan, account: AttitudeAccount | None, *, repeated: bool, as_json: bool) -> None:
     """The plan on stdout: a table in degrees for people, JSON in SI units for machines."""
     if as_json:
-        print(json.dumps(plan_document(plan, repeated=repeated), indent=2))
+        print(json.dumps(plan_document(plan, account, repeated=repeated), indent=2, allow_nan=False))
         return
     console = Console(highlight=False)
     table = Table(title="plan, from the home pose", title_justify="left", box=SIMPLE)
@@ -30,17 +35,26 @@ def print_plan(plan: Plan, *, repeated: bool, as_json: bool) -> None:
         table.add_column(heading, justify="left" if heading in ("step", "joints °") else "right", no_wrap=True)
     at_s = 0.0
     for step in plan.steps:
-        name = step.name if isinstance(step, Sweep) else type(step).__name__.lower()
+        name = step.name if isinstance(step, (Sweep, Dwell)) else type(step).__name__.lower()
         table.add_row(f"{at_s:.1f}", name, f"{step.duration_s:.2f}", *_motion(step))
         at_s += step.duration_s
     console.print(table)
-    console.print(f"{len(plan.sweeps)} sweeps, {len(plan.motions)} motions, {plan.duration_s:.1f} s; all within limits")
+    measured = f"{len(plan.sweeps)} sweeps, " if plan.sweeps or not plan.dwells else ""
+    measured += f"{len(plan.dwells)} dwells, " if plan.dwells else ""
+    console.print(f"{measured}{len(plan.motions)} motions, {plan.duration_s:.1f} s; all within limits")
+    if plan.dwells:
+        whole_s = plan.duration_s + plan.settling_s
+        console.print(
+            f"Before each dwell the sensors may take {plan.dwells[0].settle_s:g} s to settle: {whole_s:.1f} s at most"
+        )
     if repeated:
         console.print(f"If the calibration passes, the same once more to verify it: {2 * plan.duration_s:.1f} s in all")
+    if account is not None:
+        print_account(console, account)
 
 
 def _motion(step: Step) -> tuple[str, str, str]:
-    if isinstance(step, Rest):
+    if isinstance(step, (Rest, Dwell)):
         return "", "", ""
     turns = [
         f"{name} {math.degrees(start):+.1f} → {math.degrees(target):+.1f}"

@@ -4,11 +4,12 @@ import math
 from dataclasses import replace
 from typing import Any
 
+import numpy as np
 import pytest
 
 from rig.arm.condition import program_interruption, readiness
-from rig.arm.kinematics import NOMINAL
-from rig.arm.motion import Plan, Rest, Transfer
+from rig.arm.kinematics import NOMINAL, distance_to_forearm
+from rig.arm.motion import Dwell, Plan, Rest, Transfer
 from rig.arm.preflight import (
     arm_problems,
     kinematics_problems,
@@ -18,10 +19,12 @@ from rig.arm.preflight import (
     way_to_home,
 )
 from rig.arm.state import ArmReport, ArmState, Joints, RobotMode, RuntimeState, SafetyMode
+from rig.config.attitude_sets import EIGHTEEN, FACES
 from rig.config.models import ArmSection
-from rig.config.procedure_sections import SixObservationSection
+from rig.config.procedure_sections import SixObservationSection, StaticAttitudesSection
 from rig.errors import Problem, Refused
 from rig.plans.six_sweeps import plan_six_observation
+from rig.plans.static_attitudes import plan_static_attitudes
 
 HOME_DEG = (0.0, -90.0, 90.0, -90.0, -90.0, 0.0)
 ARM = ArmSection(host="10.0.0.2", payload_kg=0.3)
@@ -187,3 +190,54 @@ def test_wrists_about_other_axes_than_a_ur10es_are_refused(off_deg: float, found
     *others, wrist_2, wrist_3 = NOMINAL.alpha_rad
     odd = replace(NOMINAL, alpha_rad=(*others, wrist_2 + math.radians(off_deg), wrist_3))
     assert names(kinematics_problems(ARM, replace(REPORT, kinematics=odd))) == found
+
+
+def attitudes(*wrists_deg: tuple[float, float, float]) -> Plan:
+    return plan_static_attitudes(ARM, StaticAttitudesSection(attitudes=wrists_deg))
+
+
+def test_an_attitude_that_brings_the_flange_to_the_forearm_is_refused() -> None:
+    """Wrist 2 at -135° turns it towards the forearm: to 0.092 m, or a little more, by wrist 1."""
+    near = [problem for problem in plan_problems(attitudes((45, -135, 0)), 0.3) if problem.what.startswith("dwell at")]
+    assert names(near) == ["forearm_too_near"]
+    assert (
+        near[0].what == "dwell at 45 -135 0 brings the flange within 0.095 m of the forearm's line, 0.15 m is the least"
+    )
+    assert plan_problems(attitudes((45, -45, 0)), 0.3) == []  # away from it
+
+
+def test_a_way_between_sound_attitudes_that_passes_the_forearm_is_refused() -> None:
+    made = attitudes((45, -90, 0), (45, -270, 0))
+    assert distance_to_forearm(np.array([dwell.q_rad for dwell in made.dwells])).min() > 0.17
+    problems = plan_problems(made, 0.3)
+    assert names(problems) == ["forearm_too_near"]
+    assert all(problem.what.startswith("transfer") for problem in problems)
+
+
+def test_what_the_flange_carries_is_kept_from_the_forearm_too() -> None:
+    """Ten degrees beyond -90° the flange itself is clear, at 0.154 m."""
+    made = attitudes((45, -100, 0))
+    assert plan_problems(made, 0.3) == []
+    said = {problem.what.split(" brings the ")[1].split()[0] for problem in plan_problems(made, 0.3, (0.0, 0.0, 60.0))}
+    assert said == {"payload"}
+
+
+def test_a_way_home_from_an_attitude_is_judged_too() -> None:
+    back = Transfer("transfer home", (*HOME[:3], math.radians(45), math.radians(-200), 0.0), HOME, 1.0, 2.0, 3.0)
+    dwell = Dwell(0, back.start_q_rad, 3.0, 5.0)
+    problems = plan_problems(Plan((dwell, back), back.start_q_rad, HOME), 0.3)
+    assert [problem.what.split(" brings")[0] for problem in problems] == [dwell.name, "transfer home"]
+
+
+@pytest.mark.parametrize("made", [attitudes(*EIGHTEEN), attitudes(*FACES)])
+def test_the_stock_attitudes_keep_clear_of_the_forearm(made: Plan) -> None:
+    """0.174 m, the length of the link before wrist 2, is the least there is with wrist 2 at -90°."""
+    assert plan_problems(made, 0.3) == []
+    for way in made.motions:
+        poses = np.linspace(way.start_q_rad, way.target_q_rad, 100)
+        assert distance_to_forearm(poses).min() > 0.174
+
+
+def test_a_dwell_takes_time_and_the_poses_must_be_numbers() -> None:
+    nowhere = Dwell(0, (math.nan,) * 6, 0.0, 5.0)
+    assert names(plan_problems(Plan((nowhere,), HOME, HOME), 0.3)) == ["no_duration"]

@@ -22,7 +22,9 @@ def keys() -> Iterator[tuple[str, str, Mapping[str, Any]]]:
         schema = model.model_json_schema()
         for section in (schema, *schema.get("$defs", {}).values()):
             for key, value in section["properties"].items():
-                if section["title"] != "ProcedureSection" and not {"$ref", "patternProperties"} & set(value):
+                parts = (value, *value.get("anyOf", ()))
+                inner = any({"$ref", "patternProperties"} & set(part) for part in parts)
+                if section["title"] != "ProcedureSection" and not inner:
                     yield section["title"], key, value
 
 

@@ -1,0 +1,41 @@
+"""Calibrate gyroscopes and the accelerometers beside them in one run: sweeps as in SIX, attitudes as in TRIAX.
+
+    python procedures/imu.py configs/imu.yaml
+
+Before you start: as for procedures/six_observation.py.
+
+What happens: the arm goes home and makes twelve sweeps about six axes with a rest after each; then it goes to eighteen
+attitudes and stands still in each. Five minutes in all. Ctrl-C stops the arm at any moment and keeps what was measured.
+"""
+
+from rig.cli import run_script  # first: it keeps linear algebra to one thread
+
+# isort: split
+from rig.arm.motion import Dwell, Rest, Sweep, Transfer
+from rig.config.procedure_sections import ImuSection
+from rig.plans.imu import plan_imu
+from rig.plans.registry import Procedure
+from rig.plans.verbs import Verbs
+
+
+def imu(rig: Verbs) -> None:
+    """The steps, in the order the plan has them (`rig plan CONFIG` prints it, and what the attitudes will tell)."""
+    rig.preflight()  # refuses unless limits, clearances, payload, modes and the speed slider are right; then asks
+    rig.start_sampling()  # from here on every sample and every arm state is in run.h5
+    for step in rig.plan.steps:
+        match step:
+            case Transfer():
+                rig.move(step)  # to where the next sweep begins, or to the next attitude
+            case Sweep():
+                rig.sweep(step)  # one revolution at constant speed; the board averages it while the arm rests
+            case Rest():
+                rig.rest(step)  # stand still
+            case Dwell():
+                rig.dwell(step)  # let the sensors settle, then stand still: the accelerometers' part
+    rig.solve_on_board()  # the gyroscopes' calibration by the board, to be held against the computer's
+
+
+PROCEDURE = Procedure(name="imu", section=ImuSection, plan=plan_imu, script=imu)
+
+if __name__ == "__main__":
+    raise SystemExit(run_script(PROCEDURE))

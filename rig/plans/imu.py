@@ -1,0 +1,27 @@
+"""Sweeps and attitudes in one run: what calibrates a gyroscope and the accelerometer beside it."""
+
+from collections.abc import Collection
+from dataclasses import replace
+
+from rig.arm.motion import Plan
+from rig.arm.state import Joints
+from rig.config.models import ArmSection
+from rig.config.procedure_sections import ImuSection
+from rig.plans.six_sweeps import plan_six_observation
+from rig.plans.static_attitudes import dwells
+
+
+def plan_imu(
+    arm: ArmSection,
+    procedure: ImuSection,
+    start_q_rad: Joints | None = None,
+    done: Collection[int] = (),
+) -> Plan:
+    """All sweeps as in `plan_six_observation`, home, then all attitudes as in `plan_static_attitudes`, and home again.
+
+    Sweeps are counted first, dwells after them; `done` holds the indices of either to leave out.
+    Raises Refused `axes_do_not_span`.
+    """
+    sweeps = plan_six_observation(arm, procedure, start_q_rad, done)
+    first = len(plan_six_observation(arm, procedure).sweeps)
+    return replace(sweeps, steps=(*sweeps.steps, *dwells(arm, procedure, done, first)))

@@ -1,0 +1,60 @@
+"""Attitudes in which the arm stands still, one after the other, as TRIAX needs them of an accelerometer."""
+
+import math
+from collections.abc import Collection, Iterator
+from functools import lru_cache
+
+import numpy as np
+
+from rig.arm.motion import Dwell, Plan, Step, trapezoid_duration
+from rig.arm.state import Joints
+from rig.config.models import ArmSection
+from rig.config.procedure_sections import AttitudesSection
+from rig.plans.shortest_way import shortest_way
+from rig.plans.ways import approach, in_radians, transfer
+
+
+def plan_static_attitudes(
+    arm: ArmSection,
+    procedure: AttitudesSection,
+    start_q_rad: Joints | None = None,
+    done: Collection[int] = (),
+) -> Plan:
+    """Home, every attitude once in the order that takes the arm least time, `repeats` times, and home again.
+
+    `start_q_rad` is where the arm stands (home when None); from there the plan goes home first, slowly.
+    `done` holds the indices of dwells to leave out: those an interrupted run has finished.
+    Limits and clearances are not judged here: see `rig.arm.preflight`; nor what the attitudes tell: see
+    `rig.analysis.attitude_account`.
+    """
+    home = in_radians(arm.home_deg)
+    start = home if start_q_rad is None else start_q_rad
+    speed, acceleration = math.radians(arm.transfer_speed_deg_s), math.radians(procedure.acceleration_deg_s2)
+    steps = (*approach(start, home, speed, acceleration), *dwells(arm, procedure, done))
+    return Plan(steps, start_q_rad=start, home_q_rad=home)
+
+
+def dwells(arm: ArmSection, procedure: AttitudesSection, done: Collection[int] = (), first: int = 0) -> Iterator[Step]:
+    """The dwells with the ways to them, from home and back; none if all are `done`. They are counted from `first`."""
+    home = in_radians(arm.home_deg)
+    speed, acceleration = math.radians(arm.transfer_speed_deg_s), math.radians(procedure.acceleration_deg_s2)
+    here = home
+    for index, attitude in enumerate(_order(arm, procedure) * procedure.repeats, first):
+        if index not in done:
+            dwell = Dwell(index, attitude, procedure.dwell_s, procedure.settle_s)
+            yield from transfer(f"transfer to the {dwell.name}", here, attitude, speed, acceleration)
+            yield dwell
+            here = attitude
+    yield from transfer("transfer home", here, home, speed, acceleration)
+
+
+@lru_cache(maxsize=16)
+def _order(arm: ArmSection, procedure: AttitudesSection) -> tuple[Joints, ...]:
+    """The attitudes' joint angles, in the order of the shortest way from home through all of them and back."""
+    home = in_radians(arm.home_deg)
+    attitudes = [(*home[:3], *in_radians(wrists)) for wrists in procedure.attitudes]
+    places = np.array([home, *attitudes])
+    speed, acceleration = math.radians(arm.transfer_speed_deg_s), math.radians(procedure.acceleration_deg_s2)
+    farthest = np.abs(places[:, None] - places).max(axis=-1)
+    between_s = np.vectorize(trapezoid_duration)(farthest, speed, acceleration)
+    return tuple(attitudes[place - 1] for place in shortest_way(between_s))

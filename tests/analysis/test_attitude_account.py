@@ -1,0 +1,51 @@
+"""What a plan's attitudes are said to tell of the sensors in a file."""
+
+from math import sqrt
+
+import pytest
+
+from rig.analysis.attitude_account import AttitudeAccount, attitude_account
+from rig.config.load import load
+from rig.plans.phase import first_phase
+from rig.plans.registry import installed
+from support.paths import CONFIGS, DEMO
+
+
+def account(*overrides: str) -> AttitudeAccount:
+    config = load(CONFIGS / "attitudes.yaml", overrides).config
+    plan = first_phase(installed()[config.procedure.name], config, installed()).plan()
+    found = attitude_account(config, plan)
+    assert found is not None
+    return found
+
+
+@pytest.mark.slow
+def test_repeats_average_the_noise_and_not_the_arms_error() -> None:
+    exact = [account(f"procedure.repeats={n}", "uncertainty.axis_deg=0").sensors["mpu9250"] for n in (1, 4)]
+    assert exact[0].scale_std == pytest.approx(2 * exact[1].scale_std)
+    assert exact[0].non_orthogonality_std_rad == pytest.approx(2 * exact[1].non_orthogonality_std_rad)
+    faces = ["procedure.attitudes=faces", "uncertainty.axis_deg=0.06"]
+    real = [account(f"procedure.repeats={n}", *faces).sensors["adis16465"] for n in (1, 4)]
+    assert real[0].scale_std == pytest.approx(2 * real[1].scale_std)
+    assert real[0].non_orthogonality_std_rad == pytest.approx(real[1].non_orthogonality_std_rad, rel=0.01)
+
+
+def test_each_part_has_its_own_noise_and_a_longer_dwell_less_of_it() -> None:
+    found = account("uncertainty.axis_deg=0").sensors
+    longer = account("uncertainty.axis_deg=0", "procedure.dwell_s=12").sensors
+    for name, density in (("lsm9ds1", 150), ("mpu9250", 300), ("adis16465", 23)):
+        bias_ug = found[name].bias_std_m_s2 / 9.80665e-6
+        assert bias_ug == pytest.approx(density / sqrt(3 * 18), rel=0.01)
+        assert longer[name].bias_std_m_s2 == pytest.approx(found[name].bias_std_m_s2 / 2)
+
+
+def test_under_a_ceiling_the_attitudes_tell_as_much() -> None:
+    floor, ceiling = account(), account("site.base_up=[0,0,-1]")
+    assert ceiling.first.condition == pytest.approx(floor.first.condition)
+    assert ceiling.sensors["mpu9250"].bias_std_m_s2 == pytest.approx(floor.sensors["mpu9250"].bias_std_m_s2)
+
+
+def test_sweeps_alone_have_none() -> None:
+    config = load(DEMO).config
+    plan = first_phase(installed()["six_observation"], config, installed()).plan()
+    assert attitude_account(config, plan) is None
