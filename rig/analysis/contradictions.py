@@ -65,7 +65,7 @@ def disturbed_sweeps(runs: Sequence[RunData]) -> frozenset[int]:
     """The sweeps in the recordings of a run so far that contradict the others; none where they cannot be solved."""
     try:
         recordings = observe_recordings(runs)
-        if not recordings:
+        if not recordings or not runs[0].settings.planned_sweeps:
             return frozenset()
         sensors = runs[0].settings.to_calibrate
         chosen = {name: runs[0].sensors[name] for name in sensors}

@@ -1,12 +1,13 @@
 """The outcome of a run: solved, verified, judged. The documents made of it are `rig.report`'s."""
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 from datetime import UTC, datetime
 from typing import Literal
 
 import numpy as np
 
+from rig.analysis.acceleration import AccelerometerResult, calibrate_accelerometers
 from rig.analysis.calibration import (
     DEFAULT_ESTIMATOR,
     SensorResult,
@@ -19,12 +20,13 @@ from rig.analysis.comparison import Reference, turns_of
 from rig.analysis.contradictions import contradictions
 from rig.analysis.onboard_check import Agreement, agreement
 from rig.analysis.surroundings import surroundings_of
-from rig.analysis.verdict import Check, judge, verdict, verification_checks
+from rig.analysis.verdict import Check, acceleration_checks, judge, verdict, verification_checks
 from rig.analysis.verification import Verification, verify
 from rig.data.provenance import Provenance
 from rig.data.result_file import StoredCalibrationEntry
 from rig.data.run_file import RunData
 from rig.data.settings import RunSettings, Site
+from rig.errors import Fault
 from rig.estimation.arrays import Array
 from rig.estimation.vector_model import VectorSolution
 from rig.observation.observed_run import ObservedRun, observe_runs
@@ -48,7 +50,7 @@ class Outcome:
     `recordings` are those of the calibration with a finished sweep. `results` hold every recorded sensor's calibration
     and `onboard` the board's own of the sensors to calibrate; all three are empty where stored calibrations were
     verified. `verifications` hold those that could be made. `clock` is the controller's, None where recordings of
-    before say nothing of its uncertainty.
+    before say nothing of its uncertainty. Where no sweep was planned there are `accelerometers` alone.
     """
 
     recordings: tuple[ObservedRun, ...]
@@ -59,6 +61,7 @@ class Outcome:
     checks: tuple[Check, ...]
     provenance: Origin
     clock: ClockCheck | None = None
+    accelerometers: Mapping[str, AccelerometerResult] = field(default_factory=dict)
 
     @property
     def verdict(self) -> Literal["pass", "fail"]:
@@ -79,8 +82,17 @@ def calibrated(runs: Sequence[RunData], estimator: str = DEFAULT_ESTIMATOR) -> O
     settings = runs[0].settings
     chosen = known_estimator(estimator)
     recordings = observe_recordings(runs)
+    if not recordings:
+        raise Fault(
+            "too_few_observations",
+            "no finished sweep is recorded, and a calibration needs sweeps in six directions, or dwells in attitudes",
+            "Record the movement; resume the run if it was interrupted",
+        )
+    if not settings.planned_sweeps:
+        return _in_attitudes(runs, recordings)
     surroundings = surroundings_of(recordings)
     results = solve_observed(runs[0].sensors, recordings, chosen, surroundings, settings.matrix_corrected)
+    accelerometers = calibrate_accelerometers(recordings, settings, results)
     onboard = {name: agreement(runs, name) for name in settings.to_calibrate}
     checks = judge(
         {name: results[name].solution for name in onboard},
@@ -98,9 +110,25 @@ def calibrated(runs: Sequence[RunData], estimator: str = DEFAULT_ESTIMATOR) -> O
             *checks,
             *(check for name, agreed in onboard.items() for check in agreed.checks(name)),
             *contradictions(recordings, results, settings.to_calibrate).checks,
+            *_acceleration_checks(accelerometers, settings),
         ),
         provenance=_origin(runs),
         clock=None if surroundings is None else surroundings.clock,
+        accelerometers=accelerometers,
+    )
+
+
+def _in_attitudes(runs: Sequence[RunData], recordings: tuple[ObservedRun, ...]) -> Outcome:
+    """Accelerometers alone: no sweep was planned, from which a gyroscope could be calibrated."""
+    settings = runs[0].settings
+    found = calibrate_accelerometers(recordings, settings)
+    checks = _acceleration_checks(found, settings)
+    return Outcome(recordings, settings, {}, {}, {}, checks, _origin(runs), accelerometers=found)
+
+
+def _acceleration_checks(found: Mapping[str, AccelerometerResult], settings: RunSettings) -> tuple[Check, ...]:
+    return tuple(
+        check for name, result in found.items() for check in acceleration_checks(name, result, settings.limits)
     )
 
 

@@ -8,6 +8,7 @@ from typing import Literal
 
 import numpy as np
 
+from rig.analysis.acceleration import AccelerometerResult
 from rig.analysis.verification import Verification
 from rig.data.settings import DecisionRule, Limits
 from rig.estimation.arrays import Array
@@ -78,6 +79,24 @@ def verification_checks(sensor: str, verification: Verification | None, limits: 
         Check(f"{sensor}.verification_mean", mean, limits.verification_mean_rad_s, "rad/s"),
         Check(f"{sensor}.verification_reference", known, limits.verification_mean_rad_s, "rad/s"),
     )
+
+
+def acceleration_checks(sensor: str, result: AccelerometerResult, limits: Limits) -> tuple[Check, ...]:
+    """An accelerometer's scale and bias, their standard deviations, gravity's size in attitudes that were held out."""
+    std = np.sqrt(np.diag(result.covariance))
+    checks = (
+        ("scale_deviation", result.scale - 1, limits.acceleration_scale_deviation, "1"),
+        ("scale_std", std[:3], limits.acceleration_scale_std, "1"),
+        ("bias", result.bias_m_s2, limits.acceleration_bias_m_s2, "m/s²"),
+        ("bias_std", std[3:], limits.acceleration_bias_std_m_s2, "m/s²"),
+    )
+    found = [
+        Check(f"{sensor}.acceleration_{name}", _largest(values), limit, unit) for name, values, limit, unit in checks
+    ]
+    if result.held_out is not None:
+        limit = limits.acceleration_verification_m_s2
+        found.append(Check(f"{sensor}.acceleration_verification", result.held_out.rms_m_s2, limit, "m/s²"))
+    return tuple(found)
 
 
 def verdict(checks: Sequence[Check]) -> Literal["pass", "fail"]:

@@ -10,7 +10,7 @@ from dataclasses import asdict, dataclass
 from typing import Any
 
 from firmware_host.answers import BoardObservation, BoardSolution
-from rig.arm.motion import Sweep
+from rig.arm.motion import Dwell, Sweep
 from rig.arm.state import JOINT_NAMES
 from rig.data.checked import Finite, checked
 from rig.errors.quoting import quote
@@ -40,6 +40,20 @@ class RestStarted:
 @dataclass(frozen=True, slots=True)
 class RestFinished:
     """It has stood still until now."""
+
+
+@dataclass(frozen=True, slots=True)
+class DwellStarted:
+    """The arm stands in an attitude, and the sensors have settled: from now on it is measured."""
+
+    dwell: Dwell
+
+
+@dataclass(frozen=True, slots=True)
+class DwellFinished:
+    """It has been measured."""
+
+    dwell: Dwell
 
 
 @dataclass(frozen=True, slots=True)
@@ -78,13 +92,15 @@ class BoardSolved:
 
 
 OfTheBoard = BoardObserved | BoardNotObserved | BoardRecalled | BoardSolved
-Event = SweepStarted | SweepFinished | RestStarted | RestFinished | OfTheBoard
+Event = SweepStarted | SweepFinished | RestStarted | RestFinished | DwellStarted | DwellFinished | OfTheBoard
 
 _KINDS: dict[str, type[Event]] = {
     "sweep_started": SweepStarted,
     "sweep_finished": SweepFinished,
     "rest_started": RestStarted,
     "rest_finished": RestFinished,
+    "dwell_started": DwellStarted,
+    "dwell_finished": DwellFinished,
     "board_observed": BoardObserved,
     "board_not_observed": BoardNotObserved,
     "board_recalled": BoardRecalled,
@@ -135,6 +151,8 @@ def _from_document(document: Any) -> Recorded:
     event = checked(_KINDS[name], _nested(name, detail), name)
     if isinstance(event, SweepStarted | SweepFinished):
         _check_sweep(event.sweep)
+    if isinstance(event, DwellStarted | DwellFinished):
+        _check_dwell(event.dwell)
     if isinstance(event, BoardObserved):
         _check_observation(event.observation)
     times = checked(_Times, document, name)
@@ -159,6 +177,12 @@ def _check_sweep(sweep: Sweep) -> None:
     numbers = (*sweep.axis_flange, *sweep.start_q_rad, *sweep.end_q_rad, low, high, sweep.speed_rad_s, sweep.duration_s)
     if not (0 <= sweep.joint < len(JOINT_NAMES) and low < high and all(map(math.isfinite, numbers))):
         raise ValueError(f"there is no such sweep as {quote(sweep)}")
+
+
+def _check_dwell(dwell: Dwell) -> None:
+    """The same of a dwell."""
+    if len(dwell.q_rad) != len(JOINT_NAMES) or not all(map(math.isfinite, (*dwell.q_rad, dwell.duration_s))):
+        raise ValueError(f"there is no such dwell as {quote(dwell)}")
 
 
 def _check_observation(observation: BoardObservation) -> None:

@@ -18,9 +18,8 @@ from typing import Any, NoReturn
 import numpy as np
 from numpy.typing import NDArray
 
-from firmware_host.samples import SAMPLE_DTYPE
 from rig.arm.state import ARM_STATE_DTYPE
-from rig.data.layout import EVENTS_DTYPE, SCHEMA, TEXTS
+from rig.data.layout import EVENTS_DTYPE, SCHEMA, TEXTS, sample_dtype
 
 OPEN_FOR_WRITING = 0x01  # of the superblock's consistency flags
 NO_ROOM = 2
@@ -46,7 +45,7 @@ def extract(path: Path) -> Iterator[dict[str, Any] | NDArray[Any]]:
             "described": {name: _attributes(dataset) for name, dataset in samples.items()},
         }
         for name, dataset in samples.items():
-            yield _rows(dataset, f"samples/{name}", SAMPLE_DTYPE)
+            yield _rows(dataset, f"samples/{name}", sample_dtype(dataset.attrs))
         for name, dtype in (("arm", ARM_STATE_DTYPE), ("events", EVENTS_DTYPE)):
             yield _rows(_member(file, name, h5py.Dataset), name, dtype)
 

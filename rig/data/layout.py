@@ -1,8 +1,9 @@
 """How a run lies in HDF5 (schema "rig.run/2").
 
-`/samples/<sensor>` (SAMPLE_DTYPE, the sensor's description as attributes), `/arm` (ARM_STATE_DTYPE), `/events` (bytes:
-SWMR forbids data of variable length, so an event is a line of JSON); `schema`, `config` (YAML), `settings` and
-`provenance` (JSON) as attributes of the file. Schema "rig.run/1" lacks `settings`.
+`/samples/<sensor>` (SAMPLE_DTYPE, or IMU_SAMPLE_DTYPE where accelerations were recorded; the sensor's description as
+attributes), `/arm` (ARM_STATE_DTYPE), `/events` (bytes: SWMR forbids data of variable length, so an event is a line of
+JSON); `schema`, `config` (YAML), `settings` and `provenance` (JSON) as attributes of the file. Schema "rig.run/1" lacks
+`settings`.
 """
 
 from collections.abc import Mapping
@@ -13,7 +14,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from firmware_host.samples import SAMPLE_DTYPE
+from firmware_host.samples import IMU_SAMPLE_DTYPE, SAMPLE_DTYPE
 from rig.arm.state import ARM_STATE_DTYPE
 
 SCHEMA = "rig.run/2"
@@ -28,8 +29,8 @@ CHUNK_BYTES = 65536
 class Contents:
     """What a run file holds, as it stands there: nothing of it is judged yet.
 
-    `texts` are the attributes named in `TEXTS`, `described` the attributes of each sensor; `samples` (n,) SAMPLE_DTYPE
-    by sensor, `arm` (n,) ARM_STATE_DTYPE, `events` (n,) bytes.
+    `texts` are the attributes named in `TEXTS`, `described` the attributes of each sensor; `samples` (n,) by sensor, of
+    its `sample_dtype`, `arm` (n,) ARM_STATE_DTYPE, `events` (n,) bytes.
     """
 
     schema: str
@@ -42,8 +43,13 @@ class Contents:
 
 def empty(schema: str, texts: Mapping[str, str], described: Mapping[str, Mapping[str, Any]]) -> Contents:
     """The contents of a run that begins."""
-    samples = {name: np.empty(0, SAMPLE_DTYPE) for name in described}
+    samples = {name: np.empty(0, sample_dtype(attributes)) for name, attributes in described.items()}
     return Contents(schema, texts, described, samples, np.empty(0, ARM_STATE_DTYPE), np.empty(0, EVENTS_DTYPE))
+
+
+def sample_dtype(attributes: Mapping[str, Any]) -> np.dtype[Any]:
+    """Of the samples of a sensor that is described so."""
+    return IMU_SAMPLE_DTYPE if "sensitivity_m_s2_per_count" in attributes else SAMPLE_DTYPE
 
 
 def lay_out(path: Path, contents: Contents, *, swmr: bool) -> None:

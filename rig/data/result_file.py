@@ -10,8 +10,9 @@ from typing import Final, Literal
 from pydantic import ConfigDict, Field, JsonValue, ValidationError
 
 from rig.config.regular_file import UnfitFile, read_regular_file
+from rig.data.accelerometer_entries import AccelerometerEntry
 from rig.data.budget_entries import BiasProcessEntry, BudgetEntry, ClockEntry
-from rig.data.result_types import Entry, Matrix3, Matrix6, Positive, PositiveVector3, Role, Vector3, Vector6
+from rig.data.result_types import Entry, ErrorEntry, Matrix3, Matrix6, Positive, PositiveVector3, Role, Vector3, Vector6
 from rig.data.run_folder import RESULT
 from rig.errors import Refused
 
@@ -82,12 +83,6 @@ class ProvenanceEntry(Entry):
     verified_utc: tuple[str, ...]
     solved_utc: str
     arm_kinematics: KinematicsEntry | None = None
-
-
-class ErrorEntry(Entry):
-    """Why an estimator that stands beside the chosen one has no solution."""
-
-    error: str
 
 
 class EstimateEntry(Entry):
@@ -300,7 +295,10 @@ class VerificationEntry(Entry):
 
 
 class ResultDocument(Entry):
-    """The result of a run, of schema "rig.result/1"; `sensors` is empty where stored calibrations were verified."""
+    """The result of a run, of schema "rig.result/1"; `sensors` is empty where stored calibrations were verified.
+
+    It is also empty where no sweeps were made, `accelerometers` where none were calibrated.
+    """
 
     schema_name: Literal["rig.result/1"] = Field(alias="schema")  # as SCHEMA
     verdict: Literal["pass", "fail"]
@@ -309,6 +307,7 @@ class ResultDocument(Entry):
     clock: ClockEntry | None = None
     sensors: dict[str, SensorEntry]
     verification: dict[str, VerificationEntry]
+    accelerometers: dict[str, AccelerometerEntry] = Field(default_factory=dict)
 
     def text(self) -> str:
         """The JSON; what was left out stays out."""

@@ -18,3 +18,9 @@ class Entry(BaseModel):
 
     # What a later version has added is ignored when it is read.
     model_config = ConfigDict(frozen=True, allow_inf_nan=False)
+
+
+class ErrorEntry(Entry):
+    """Why an estimator that stands beside the chosen one has no solution."""
+
+    error: str

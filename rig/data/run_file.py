@@ -49,7 +49,8 @@ class RecordedSensor:
     rate in rad/s = counts × `sensitivity_rad_s_per_count`; temperature in °C = counts × `temperature_c_per_count` +
     `temperature_offset_c`. `full_scale_counts` is the largest number the part reports: a reading there is saturated.
     `mounting` (3 rows of 3) is the nominal rotation from the flange frame to the sensor's. `mode` is "calibrated" when
-    the board corrected the readings before it sent them.
+    the board corrected the readings before it sent them. Where its accelerations were recorded as well: acceleration in
+    m/s² = counts × `sensitivity_m_s2_per_count`, of the same full scale, which is `range_m_s2`.
     """
 
     part: str
@@ -62,11 +63,23 @@ class RecordedSensor:
     temperature_offset_c: Finite
     mounting: Annotated[tuple[Axis, ...], Field(min_length=3, max_length=3)]
     mode: Literal["raw", "calibrated"] = "raw"  # files of before there were two modes say nothing
+    range_m_s2: Positive | None = None
+    sensitivity_m_s2_per_count: Positive | None = None
+
+    @property
+    def has_acceleration(self) -> bool:
+        """Whether its samples hold accelerations."""
+        return self.sensitivity_m_s2_per_count is not None
+
+    def attributes(self) -> dict[str, Any]:
+        """As they stand in the file: what there is nothing of is left out."""
+        return {name: value for name, value in asdict(self).items() if value is not None}
 
 
 @dataclass(frozen=True, slots=True)
 class RunData:
-    """A run file in memory: `samples` by sensor name (n,) SAMPLE_DTYPE, `arm` (n,) ARM_STATE_DTYPE, events in order.
+    """A run file in memory: `samples` by sensor name (n,) SAMPLE_DTYPE or IMU_SAMPLE_DTYPE, `arm` (n,) ARM_STATE_DTYPE,
+    events in order.
 
     `settings` say what it is judged by; `config` is the configuration's text, for people.
     """
@@ -115,7 +128,7 @@ class RunRecorder:
             if path.exists():
                 raise FileExistsError(f"{path.name} is there already")
             texts = {"config": config, "settings": settings.to_json(), "provenance": json.dumps(provenance.document())}
-            described = {name: asdict(sensor) for name, sensor in sensors.items()}
+            described = {name: sensor.attributes() for name, sensor in sensors.items()}
             lay_out(path, empty(SCHEMA, texts, described), swmr=True)
             self._file = h5py.File(path, "r+", libver="latest")
             self._file.swmr_mode = True
@@ -134,7 +147,7 @@ class RunRecorder:
         self.close()
 
     def add_samples(self, sensor: str, samples: NDArray[Any]) -> None:
-        """Append samples (n,) SAMPLE_DTYPE of a sensor named at the start. The array must not change afterwards."""
+        """Append samples (n,) of a sensor named at the start, of its dtype. The array must not change afterwards."""
         with self._lock:
             self._pending.samples[sensor].append(samples)
 

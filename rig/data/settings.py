@@ -5,6 +5,7 @@ the next; these do not, so that an old recording is judged as it was, or by what
 """
 
 import json
+from collections import Counter
 from collections.abc import Sequence
 from dataclasses import asdict, dataclass, fields
 from typing import TYPE_CHECKING, Annotated, Literal
@@ -19,11 +20,11 @@ from rig.errors.quoting import quote
 from rig.estimation.earth import EARTH_RATE_RAD_S
 
 if TYPE_CHECKING:
-    from rig.arm.motion import Plan
+    from rig.arm.motion import Dwell, Plan
     from rig.config.models import RigConfig, SiteSection
 
-SCHEMA = "rig.settings/2"
-SCHEMAS = ("rig.settings/1", SCHEMA)  # the first knows no site
+SCHEMA = "rig.settings/3"
+SCHEMAS = ("rig.settings/1", "rig.settings/2", SCHEMA)  # the first knows no site, the second no dwells
 
 DecisionRule = Literal["simple", "guard_band"]
 Vector3 = tuple[Finite, Finite, Finite]
@@ -44,7 +45,7 @@ class ObservationThresholds:
 
 @dataclass(frozen=True, slots=True)
 class Limits:
-    """The verdict's limits; those of a verification are None where none was asked for."""
+    """The verdict's limits; those of a verification and of accelerometers are None where none were asked for."""
 
     scale_deviation: Positive
     scale_std: Positive
@@ -53,6 +54,11 @@ class Limits:
     condition: Positive
     verification_rms_rad_s: Positive | None = None
     verification_mean_rad_s: Positive | None = None
+    acceleration_scale_deviation: Positive | None = None
+    acceleration_scale_std: Positive | None = None
+    acceleration_bias_m_s2: Positive | None = None
+    acceleration_bias_std_m_s2: Positive | None = None
+    acceleration_verification_m_s2: Positive | None = None
 
 
 @dataclass(frozen=True, slots=True)
@@ -101,6 +107,16 @@ class PlannedSweep:
 
 
 @dataclass(frozen=True, slots=True)
+class PlannedDwell:
+    """A dwell the whole procedure has: its place in the plan, the joint angles, which time the attitudes are gone
+    through, from 0."""
+
+    index: int
+    q_rad: Annotated[tuple[Finite, ...], Field(min_length=6, max_length=6)]
+    repeat: Annotated[int, Field(ge=0)]
+
+
+@dataclass(frozen=True, slots=True)
 class RunSettings:
     """What was to be done and how it is judged. `then_verify` says that a verification was to follow a calibration.
 
@@ -108,7 +124,7 @@ class RunSettings:
     often the run was interrupted. `matrix_corrected` names those of them whose readings the whole matrix corrects.
     Recordings of before there was a `site` (None) are solved as they were then: neither gravity nor the Earth's rate is
     looked for, and a bias that wanders widens the variance of every average alike. Nor do they have an `uncertainty`
-    beyond the noise.
+    beyond the noise. `second_order` says that accelerometers are looked for terms of that order.
     """
 
     procedure: str
@@ -122,11 +138,13 @@ class RunSettings:
     matrix_corrected: tuple[str, ...] = ()
     site: Site | None = None
     uncertainty: Uncertainty | None = None
+    planned_dwells: tuple[PlannedDwell, ...] = ()
+    second_order: bool = False
 
     @property
     def movement(self) -> tuple[object, ...]:
-        """What two recordings must have in common for their sweeps to be those of one run."""
-        return self.procedure, self.then_verify, self.home_q_rad, self.planned_sweeps
+        """What two recordings must have in common for their sweeps and dwells to be those of one run."""
+        return self.procedure, self.then_verify, self.home_q_rad, self.planned_sweeps, self.planned_dwells
 
     def with_overrides(self, overrides: Sequence[str]) -> "RunSettings":
         """The same with other thresholds or limits: `observation.max_lost_fraction=0.01`, `limits.scale_std=0.001`.
@@ -172,7 +190,19 @@ def settings_of(config: "RigConfig", plan: "Plan") -> RunSettings:
         matrix_corrected=tuple(name for name, each in config.to_calibrate.items() if each.correction == "matrix"),
         site=_site(config.site),
         uncertainty=_uncertainty(config),
+        planned_dwells=_planned(plan.dwells),
+        second_order=config.procedure.accelerometer_order == 2,
     )
+
+
+def _planned(dwells: "Sequence[Dwell]") -> tuple[PlannedDwell, ...]:
+    """Each with how often its attitude was there before."""
+    seen: Counter[tuple[float, ...]] = Counter()
+    planned = []
+    for dwell in dwells:
+        planned.append(PlannedDwell(dwell.index, dwell.q_rad, seen[dwell.q_rad]))
+        seen[dwell.q_rad] += 1
+    return tuple(planned)
 
 
 def _site(section: "SiteSection") -> Site:

@@ -45,6 +45,16 @@ class Average:
 
 
 @dataclass(frozen=True, slots=True)
+class Mean:
+    """Of readings in any unit: mean (3,), variance (3,) of that mean, `noise` (3,) of one, and how many there were."""
+
+    mean: Array
+    variance: Array
+    noise: Array
+    samples: int
+
+
+@dataclass(frozen=True, slots=True)
 class Stream:
     """A sensor's samples in physical units, on the controller's clock."""
 
@@ -83,33 +93,45 @@ def average(
     *,
     as_before: bool,
 ) -> Average:
-    """Mean and its variance. `passing` (n, k) comes and goes in the window and is zero in its mean, such as the arm's
-    rate less its mean 2π/T; the arm tells where it is known, `covered` (n,).
+    """The readings inside: see `mean_of`."""
+    count = stream.sensor.sensitivity_rad_s_per_count
+    found = mean_of(stream.readings_rad_s[inside], count, passing, covered, as_before=as_before)
+    temperature = stream.raw["temperature_counts"][inside].mean() * stream.sensor.temperature_c_per_count
+    return Average(
+        mean_rad_s=found.mean,
+        variance_rad2_s2=found.variance,
+        noise_rad_s=found.noise,
+        samples=found.samples,
+        start_s=window.start_s,
+        end_s=window.end_s,
+        temperature_c=float(temperature) + stream.sensor.temperature_offset_c,
+    )
+
+
+def mean_of(readings: Array, count: float, passing: Array, covered: NDArray[np.bool_], *, as_before: bool) -> Mean:
+    """Mean and its variance of readings (n, 3) in steps of `count`.
+
+    `passing` (n, k) comes and goes in the window and is zero in its mean, such as the arm's rate less its mean 2π/T;
+    the arm tells where it is known, `covered` (n,).
 
     A straight line of reading against what passes says what is read without it: few samples do not meet a vibration
     evenly. The noise is what is left of that line, and never below the rounding to counts; the variance of the mean
     allows for residuals that are not white, `as_before` by what their correlations add up to. What rounding leaves in a
     mean however many samples there are is added.
     """
-    m = stream.readings_rad_s[inside]
-    columns, known = np.column_stack([np.ones(int(covered.sum())), passing[covered]]), m[covered]
+    columns, known = np.column_stack([np.ones(int(covered.sum())), passing[covered]]), readings[covered]
     coefficients, _, rank, _ = np.linalg.lstsq(columns, known, rcond=None)
     residual = known - columns @ coefficients
     scatter = np.sum(residual**2, axis=0) / (len(known) - rank)
-    count = stream.sensor.sensitivity_rad_s_per_count
     variance = np.maximum(scatter, count**2 / 12)
     coloured = widening if as_before else noise_left
     factor = np.array([coloured(residual[:, axis]) for axis in range(3)])
-    temperature = stream.raw["temperature_counts"][inside].mean() * stream.sensor.temperature_c_per_count
     of_the_mean = np.linalg.pinv(columns.T @ columns, hermitian=True)[0, 0]  # 1/n where the excess averages out
-    return Average(
-        mean_rad_s=coefficients[0],
-        variance_rad2_s2=variance * factor * of_the_mean + rounding_left(variance, count),
-        noise_rad_s=np.sqrt(variance),
+    return Mean(
+        mean=coefficients[0],
+        variance=variance * factor * of_the_mean + rounding_left(variance, count),
+        noise=np.sqrt(variance),
         samples=len(known),
-        start_s=window.start_s,
-        end_s=window.end_s,
-        temperature_c=float(temperature) + stream.sensor.temperature_offset_c,
     )
 
 

@@ -20,10 +20,12 @@ from rig.data.settings import ObservationThresholds
 from rig.errors import Fault
 from rig.estimation.arrays import Array
 from rig.estimation.refusals import check_reading_ratio
+from rig.observation.acceleration import DwellReading, dwell_reading, dwell_readings
 from rig.observation.average import Average, Stream, average, between, on_the_arms_clock
 from rig.observation.revolution import Revolution, arm_states_lost, describe, find_revolution
+from rig.observation.swept_acceleration import SweptAcceleration, swept_acceleration
 from rig.observation.timebase import ArmMotion, TimeBase
-from rig.observation.windows import Finished, Window, finished_sweeps, rested, swept
+from rig.observation.windows import Finished, Window, dwelt, finished_dwells, finished_sweeps, rested, swept
 
 STUCK_REPEATS = 10  # equal readings in a row, of a sensor whose noise exceeds a count
 REST_SETTLING_S = 0.2  # kept away from either end of a rest
@@ -40,7 +42,8 @@ class Observation:
     `axis` ("x", "y", "z") and `sign` name the sensor axis nominally along the turn; `axis_flange` (3,) is the unit
     vector of the turn in the flange frame by the measured joints, `axis_errors` (13, 3) how the arm's own errors change
     it, per radian (`rig.arm.kinematics.AXIS_ERRORS`); `speed_std_rad_s` comes from arm states too far apart to tell the
-    turn's ends exactly; `lost` samples are missing from the average.
+    turn's ends exactly; `lost` samples are missing from the average. `acceleration` is what the accelerometer beside it
+    read, where one is to be calibrated.
     """
 
     sweep: int
@@ -54,15 +57,20 @@ class Observation:
     lost: int
     average: Average
     axis_errors: Array | None = None
+    acceleration: SweptAcceleration | None = None
 
 
 @dataclass(frozen=True, slots=True)
 class SensorObservations:
-    """What a recording tells of a sensor: its clock, its revolutions, its rests (mean readings at zero rate)."""
+    """What a recording tells of a sensor: its clock, its revolutions, its rests (mean readings at zero rate).
+
+    `dwells` are what its accelerometer read in attitudes, of a sensor whose accelerations were recorded.
+    """
 
     time_base: TimeBase
     revolutions: tuple[Observation, ...]
     rests: tuple[Average, ...]
+    dwells: tuple[DwellReading, ...] = ()
 
 
 def observe_sensor(
@@ -70,11 +78,11 @@ def observe_sensor(
 ) -> SensorObservations:
     """Average every finished sweep of a recording, in which the arm moved by `motion`.
 
-    An interrupted sweep has no end in the recording and is left out. So are the sweeps whose index is in `superseded`:
-    a later recording of the same run repeats them.
-    Raises Fault `incomplete_revolution`, `arm_states_lost`, `slider_below_100`, `speed_not_constant`,
-    `other_joint_moved`, `lost_samples`, `saturation`, `stuck_sensor`, `stuck_axis`, `wrong_axis`, `wrong_sign`,
-    `wrong_unit`, `not_finite`, `time_base_not_found`, `board_clock_restarted`, `duplicated_samples`,
+    An interrupted sweep has no end in the recording and is left out. So are sweeps and dwells whose index is in
+    `superseded`: a later recording of the same run repeats them.
+    Raises Fault as `dwell_readings` does, and `incomplete_revolution`, `arm_states_lost`, `slider_below_100`,
+    `speed_not_constant`, `other_joint_moved`, `lost_samples`, `saturation`, `stuck_sensor`, `stuck_axis`, `wrong_axis`,
+    `wrong_sign`, `wrong_unit`, `not_finite`, `time_base_not_found`, `board_clock_restarted`, `duplicated_samples`,
     `impossible_times`.
     """
     stream = on_the_arms_clock(run.samples[sensor], run.sensors[sensor], motion)
@@ -89,6 +97,7 @@ def observe_sensor(
         stream.clock,
         tuple(replace(o, average=_drifting(o.average, drift)) for o in revolutions),
         tuple(_drifting(rest, drift) for rest in rests),
+        tuple(dwell_readings(run, stream, motion, settings, superseded)) if stream.sensor.has_acceleration else (),
     )
 
 
@@ -100,12 +109,21 @@ def nearest_axis(vector: Array) -> tuple[str, int]:
 
 def sound_sweeps(run: RunData, settings: ObservationThresholds) -> frozenset[int]:
     """The finished sweeps that `observe_sensor` accepts for every sensor: a resumed run need not repeat them."""
+    return finished_sweeps(run) & _sound(run, settings)
+
+
+def sound_dwells(run: RunData, settings: ObservationThresholds) -> frozenset[int]:
+    """The same of the dwells."""
+    return finished_dwells(run) & _sound(run, settings)
+
+
+def _sound(run: RunData, settings: ObservationThresholds) -> frozenset[int]:
     try:
         motion = ArmMotion(run.arm, run.provenance.kinematics)
     except Fault:
         return frozenset()
     sound = (_sound_for(run, sensor, motion, settings) for sensor in run.sensors)
-    return frozenset.intersection(finished_sweeps(run), *sound)
+    return frozenset.intersection(*sound)
 
 
 def _sound_for(run: RunData, sensor: str, motion: ArmMotion, settings: ObservationThresholds) -> frozenset[int]:
@@ -118,6 +136,11 @@ def _sound_for(run: RunData, sensor: str, motion: ArmMotion, settings: Observati
         with suppress(Fault):
             _revolution(run, stream, motion, finished, settings)
             sound.add(finished.sweep.index)
+    for dwelt_in in dwelt(run):
+        with suppress(Fault):
+            if stream.sensor.has_acceleration:
+                dwell_reading(stream, motion, dwelt_in, settings)
+            sound.add(dwelt_in.dwell.index)
     return frozenset(sound)
 
 
@@ -125,7 +148,10 @@ def _revolution(
     run: RunData, stream: Stream, motion: ArmMotion, finished: Finished, settings: ObservationThresholds
 ) -> Observation:
     turn = find_revolution(motion, finished.sweep, finished.window, settings)
-    return _observation(stream, motion, finished.sweep, turn, settings, as_before=_as_before(run))
+    seen = _observation(stream, motion, finished.sweep, turn, settings, as_before=_as_before(run))
+    if stream.sensor.has_acceleration and run.settings.planned_dwells:
+        return replace(seen, acceleration=swept_acceleration(stream, motion, finished.sweep, turn))
+    return seen
 
 
 def _as_before(run: RunData) -> bool:

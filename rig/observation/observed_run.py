@@ -10,7 +10,7 @@ from rig.data.settings import ObservationThresholds
 from rig.observation.average import Stream, on_clock
 from rig.observation.observe import SensorObservations, observe_sensor
 from rig.observation.timebase import ArmMotion
-from rig.observation.windows import finished_sweeps
+from rig.observation.windows import finished_dwells, finished_sweeps
 
 
 @dataclass(frozen=True, slots=True)
@@ -52,17 +52,21 @@ def observe_run(run: RunData, thresholds: ObservationThresholds, superseded: Col
 
 
 def observe_runs(runs: Sequence[RunData]) -> tuple[ObservedRun, ...]:
-    """Every recording of one run that holds a finished sweep; a sweep that several hold counts in the last one.
+    """Every recording of one run that adds a finished sweep or dwell; one that several hold counts in the last one.
 
     The thresholds are those of the first recording. Raises Fault as `observe_run` does.
     """
     return tuple(
         observe_run(run, runs[0].settings.observation, _repeated(runs[place + 1 :]))
         for place, run in enumerate(runs)
-        if finished_sweeps(run)
+        if _finished(run) - _repeated(runs[place + 1 :])
     )
 
 
 def _repeated(later: Sequence[RunData]) -> frozenset[int]:
-    """The sweeps that later recordings of a run hold as well."""
-    return frozenset[int]().union(*map(finished_sweeps, later))
+    """The sweeps and dwells that later recordings of a run hold as well."""
+    return frozenset[int]().union(*map(_finished, later))
+
+
+def _finished(run: RunData) -> frozenset[int]:
+    return finished_sweeps(run) | finished_dwells(run)

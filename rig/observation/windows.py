@@ -1,14 +1,22 @@
-"""When the sweeps and rests of a recording were, on the controller's clock. Pure."""
+"""When the sweeps, rests and dwells of a recording were, on the controller's clock. Pure."""
 
 from collections.abc import Iterator
 from dataclasses import dataclass
 from typing import TypeVar
 
-from rig.arm.motion import Sweep
-from rig.data.events import Event, RestFinished, RestStarted, SweepFinished, SweepStarted
+from rig.arm.motion import Dwell, Sweep
+from rig.data.events import (
+    DwellFinished,
+    DwellStarted,
+    Event,
+    RestFinished,
+    RestStarted,
+    SweepFinished,
+    SweepStarted,
+)
 from rig.data.run_file import RunData
 
-Ending = TypeVar("Ending", SweepFinished, RestFinished)
+Ending = TypeVar("Ending", bound=Event)
 
 
 @dataclass(frozen=True, slots=True)
@@ -27,6 +35,14 @@ class Finished:
     window: Window
 
 
+@dataclass(frozen=True, slots=True)
+class Dwelt:
+    """A dwell that was begun and finished, and when."""
+
+    dwell: Dwell
+    window: Window
+
+
 def swept(run: RunData) -> Iterator[Finished]:
     """The sweeps of a recording that were begun and finished, in order; an interrupted one is left out."""
     for event, window in _between(run, SweepStarted, SweepFinished):
@@ -34,14 +50,25 @@ def swept(run: RunData) -> Iterator[Finished]:
 
 
 def rested(run: RunData) -> Iterator[Window]:
-    """The rests that were begun and finished, in order."""
-    for _, window in _between(run, RestStarted, RestFinished):
-        yield window
+    """The rests that were begun and finished, in order; a dwell is one too."""
+    windows = [window for _, window in _between(run, RestStarted, RestFinished)]
+    yield from sorted([*windows, *(each.window for each in dwelt(run))], key=lambda window: window.start_s)
+
+
+def dwelt(run: RunData) -> Iterator[Dwelt]:
+    """The dwells that were begun and finished, in order."""
+    for event, window in _between(run, DwellStarted, DwellFinished):
+        yield Dwelt(event.dwell, window)
 
 
 def finished_sweeps(run: RunData) -> frozenset[int]:
     """The indices of the sweeps a recording holds from start to end."""
     return frozenset(finished.sweep.index for finished in swept(run))
+
+
+def finished_dwells(run: RunData) -> frozenset[int]:
+    """The same of the dwells."""
+    return frozenset(each.dwell.index for each in dwelt(run))
 
 
 def _between(run: RunData, begin: type[Event], end: type[Ending]) -> Iterator[tuple[Ending, Window]]:

@@ -3,6 +3,7 @@
 from rig.analysis.outcome import Origin, Outcome
 from rig.analysis.verdict import Check
 from rig.data.result_file import SCHEMA, CheckEntry, ProvenanceEntry, ResultDocument
+from rig.report.accelerometer_entry import accelerometer_entry
 from rig.report.budget_entry import clock_entry
 from rig.report.entry import entry
 from rig.report.sensor_entry import sensor_entry
@@ -26,7 +27,12 @@ def document_of(outcome: Outcome) -> ResultDocument:
         },
         verification={name: verification_entry(found) for name, found in outcome.verifications.items()},
     )
-    return document if outcome.clock is None else document.model_copy(update={"clock": clock_entry(outcome.clock)})
+    more: dict[str, object] = {}
+    if outcome.clock is not None:
+        more["clock"] = clock_entry(outcome.clock)
+    if outcome.accelerometers:
+        more["accelerometers"] = {name: accelerometer_entry(found) for name, found in outcome.accelerometers.items()}
+    return document.model_copy(update=more)
 
 
 def _check(check: Check) -> CheckEntry:

@@ -6,7 +6,8 @@ from pathlib import Path
 
 from rich.console import Console
 
-from rig.data.result_file import ErrorEntry, EstimateEntry
+from rig.data.result_file import EstimateEntry
+from rig.data.result_types import ErrorEntry
 from rig.estimation.six_observation import MODEL, PARAMETER_UNITS, PARAMETERS
 from rig.report.table import estimate_table
 from rig.station.plain_text import plain

@@ -8,7 +8,6 @@ from rig.data.result_file import (
     AverageEntry,
     BoardEntry,
     BoardSolutionEntry,
-    ErrorEntry,
     EstimateEntry,
     NonlinearityEntry,
     ObservationEntry,
@@ -16,7 +15,7 @@ from rig.data.result_file import (
     TimeBaseEntry,
     VectorEntry,
 )
-from rig.data.result_types import Role
+from rig.data.result_types import ErrorEntry, Role
 from rig.errors import Fault
 from rig.estimation import vector_model
 from rig.estimation.arrays import Array

@@ -7,7 +7,9 @@ import numpy as np
 from rich.console import Console
 from rich.table import Table
 
-from rig.data.result_file import BoardEntry, CheckEntry, ErrorEntry, ResultDocument, SensorEntry
+from rig.data.result_file import BoardEntry, CheckEntry, ResultDocument, SensorEntry
+from rig.data.result_types import ErrorEntry
+from rig.report.accelerometer_table import accelerometer_lines, accelerometer_table
 from rig.report.budget_table import budget_table
 from rig.report.verification_table import verification_lines, verification_table
 from rig.station.plain_text import plain
@@ -41,6 +43,10 @@ def print_result(result: ResultDocument, console: Console) -> None:
         if sensor.budget is not None:
             console.print(budget_table(sensor.budget))
         for line in _beside(sensor):
+            console.print(plain(line))
+    for name, accelerometer in result.accelerometers.items():
+        console.print(accelerometer_table(name, accelerometer))
+        for line in accelerometer_lines(accelerometer):
             console.print(plain(line))
     for name, verification in result.verification.items():
         console.print(verification_table(name, verification))

@@ -14,6 +14,7 @@ from rig.station.events import DocumentWritten, RunEvent
 # `module:function`, imported when a run has ended.
 WRITERS: Sequence[str] = (
     "rig.report.figures:write_figures",
+    "rig.report.accelerometer_figures:write_accelerometer_figures",
     "rig.report.header:write_header",
 )
 

@@ -9,7 +9,8 @@ import numpy as np
 from firmware_host.client import SampleBatch
 from firmware_host.samples import SAMPLE_DTYPE
 from rig.arm.state import ArmState
-from rig.data.run_file import RunRecorder
+from rig.data.run_file import RecordedSensor, RunRecorder
+from rig.runner.settling import Settling
 from rig.station.events import SensorSamples, Vector
 
 KEPT_PARTS = 3
@@ -55,12 +56,14 @@ class Acquisition:
 
     counts: dict[int, SensorCount] = field(default_factory=dict)
     recorder: RunRecorder | None = None
+    settling: Settling = field(default_factory=Settling)
     _kept: deque[_Part] = field(default_factory=lambda: deque(maxlen=KEPT_PARTS))
     _lock: threading.Lock = field(default_factory=threading.Lock)
 
-    def expect(self, index: int, name: str, sensitivity_rad_s_per_count: float) -> None:
+    def expect(self, index: int, name: str, sensor: RecordedSensor) -> None:
         """Count the samples of a sensor by its index on the board, before the stream begins."""
-        self.counts[index] = SensorCount(name, sensitivity_rad_s_per_count)
+        self.counts[index] = SensorCount(name, sensor.sensitivity_rad_s_per_count)
+        self.settling.expect(index, name, sensor)
 
     def on_samples(self, batch: SampleBatch) -> None:
         """Take a batch of samples of a sensor known in `counts`."""
@@ -69,6 +72,7 @@ class Acquisition:
             count.add(batch)
             if self._kept:
                 self._kept[-1].batches[batch.sensor].append(batch.samples)
+        self.settling.add(batch)
         if self.recorder is not None:
             self.recorder.add_samples(count.name, batch.samples)
 
@@ -86,7 +90,7 @@ class Acquisition:
             self._kept.append(_Part(defaultdict(list), []))
 
     def kept(self, sensor: int) -> tuple[np.ndarray, list[ArmState], int]:
-        """All samples (n,) SAMPLE_DTYPE of one sensor and all arm states that are held, and how many of these are new.
+        """All samples (n,) of one sensor and all arm states that are held, and how many of these are new.
 
         New are those since the latest `keep`.
         """

@@ -23,6 +23,8 @@ def announcement(plan: Plan, report: ArmReport, repeated: Plan | None) -> Prompt
     ]
     if plan.sweeps:
         lines.append(f"Then {len(plan.sweeps)} sweeps turn the wrists by more than a whole turn each.")
+    if plan.dwells:
+        lines.append(f"Then it stands still in {len(plan.dwells)} attitudes; settling may add {plan.settling_s:.0f} s.")
     if repeated is not None:
         lines.append(
             "If the calibration passes, the board stores it in the place of what it had, and without another "

@@ -71,7 +71,7 @@ class Connector:
             refuse_other_firmware(board.identity)
             sensors = set_up_sensors(board, self.loaded.config, calibrated=self.phase.procedure.reads_corrected)
         for name, sensor in sensors.items():
-            acquisition.expect(sensor.index, name, sensor.described.sensitivity_rad_s_per_count)
+            acquisition.expect(sensor.index, name, sensor.described)
         self.station.event(BoardConnected(section.port, board.identity))
         return board, sensors
 

@@ -13,11 +13,19 @@ from math import degrees, radians
 from firmware_host.client import Board
 from rig.arm.driver import Arm
 from rig.arm.kinematics import DenavitHartenberg
-from rig.arm.motion import Motion, Plan, Rest, Step, Sweep, Transfer, travel
+from rig.arm.motion import Dwell, Motion, Plan, Rest, Step, Sweep, Transfer, travel
 from rig.arm.preflight import arm_problems, plan_problems, refuse, step_problems, way_to_home
 from rig.arm.state import ArmReport
 from rig.config.models import ArmSection
-from rig.data.events import Event, RestFinished, RestStarted, SweepFinished, SweepStarted
+from rig.data.events import (
+    DwellFinished,
+    DwellStarted,
+    Event,
+    RestFinished,
+    RestStarted,
+    SweepFinished,
+    SweepStarted,
+)
 from rig.data.run_file import RecordedSensor, RunRecorder
 from rig.errors import Fault, Refused
 from rig.plans.phase import Phase
@@ -36,6 +44,8 @@ from rig.station.events import (
 from rig.station.station import Station
 
 FIRST_SAMPLE_TIMEOUT_S = 2.0
+SETTLING_LOOK_S = 0.05  # between two questions whether the sensors have settled
+AT_REST_TIMEOUT_S = 5.0  # for the readings that tell how they scatter before anything has moved
 SAME_POSE_RAD = radians(1)  # what was announced and agreed to still holds
 
 
@@ -108,7 +118,8 @@ class Rig:
         Raises `Refused` naming every problem found; nothing has moved then.
         """
         report, payload = self.devices.report, self.devices.payload
-        problems = [*plan_problems(self.whole_plan, payload.payload_kg), *step_problems(self.plan)]
+        problems = plan_problems(self.whole_plan, payload.payload_kg, payload.payload_centre_mm)
+        problems += step_problems(self.plan)
         refuse(list(dict.fromkeys([*problems, *arm_problems(self.plan, report)])))
         self.recording.station.event(PreflightPassed(self.plan, report))
         away_rad = max(map(abs, way_to_home(self.plan, report.state.q_rad)))
@@ -153,6 +164,8 @@ class Rig:
                     "Check the sensor's wiring and its data-ready line, then run `rig check`",
                 )
             time.sleep(0.005)
+        if self.whole_plan.dwells:
+            self._wait(self.devices.acquisition.settling.learned, AT_REST_TIMEOUT_S)
         self.recording.station.event(SamplingStarted())
 
     def move(self, transfer: Transfer) -> None:
@@ -196,6 +209,27 @@ class Rig:
             self.recording.note(RestStarted())
             self.devices.arm.rest(rest.duration_s, lambda: self._watch(rest))
             self.recording.note(RestFinished())
+
+    def dwell(self, dwell: Dwell) -> None:
+        """Stand still in an attitude until the sensors have settled, then measure. Raises Fault `not_settled`."""
+        with self._step(dwell):
+            settling = self.devices.acquisition.settling
+            settling.begin()
+            if not self._wait(lambda: not settling.unsettled(), dwell.settle_s, lambda: self._watch(dwell)):
+                raise _not_settled(dwell, settling.unsettled())
+            self.recording.note(DwellStarted(dwell))
+            self.devices.arm.rest(dwell.duration_s, lambda: self._watch(dwell))
+            self.recording.note(DwellFinished(dwell))
+
+    def _wait(self, until: Callable[[], bool], at_most_s: float, watch: Callable[[], None] = lambda: None) -> bool:
+        """Stand still until something is so; False when it was not within so much of the controller's time."""
+        arm = self.devices.arm
+        began_s = arm.latest.time_s
+        while not until():
+            if arm.latest.time_s - began_s > at_most_s:
+                return False
+            arm.rest(SETTLING_LOOK_S, watch)
+        return True
 
     def solve_on_board(self) -> None:
         """Let the board compute its own calibration from what it has averaged; it stands beside the host's."""
@@ -244,3 +278,15 @@ class Rig:
                 arm_speed_rad_s=max(map(abs, state.qd_rad_s)),
             )
         )
+
+
+def _not_settled(dwell: Dwell, unsettled: Mapping[str, float | None]) -> Fault:
+    scatter = ", ".join(
+        f"{name} has sent too little" if ratio is None else f"{name} scatters {ratio:.1f} times as much as at rest"
+        for name, ratio in unsettled.items()
+    )
+    return Fault(
+        "not_settled",
+        f"{dwell.settle_s:g} s after the arm came to {dwell.name} the sensors have not settled: {scatter}",
+        "Fix board and fixture more stiffly, keep the cable from swinging and the table from shaking, then resume",
+    )

@@ -8,7 +8,7 @@ from rig.data.provenance import Provenance
 from rig.data.run_file import RecordedSensor, RunData
 from rig.data.settings import RunSettings
 from rig.errors import Refused
-from rig.observation.observe import sound_sweeps
+from rig.observation.observe import sound_dwells, sound_sweeps
 from rig.observation.onboard_window import observed_sweeps
 from rig.plans.script_file import ScriptFile
 
@@ -17,7 +17,7 @@ REMEDY = "Undo the change in config.yaml, or start a new run with `rig run`"
 
 @dataclass(frozen=True, slots=True)
 class Resumption:
-    """The recordings so far, oldest first, and the indices of the sweeps in them that count; none in a new run."""
+    """The recordings so far, oldest first, and the sweeps and dwells in them that count; none in a new run."""
 
     earlier: Sequence[RunData] = ()
     done: frozenset[int] = frozenset()
@@ -48,10 +48,10 @@ class Resumption:
 
 
 def resumption(earlier: Sequence[RunData], settings: RunSettings, script: ScriptFile) -> Resumption:
-    """What counts of the recordings of an interrupted run: sound sweeps that the board has averaged as well.
+    """What counts of the recordings of an interrupted run: sound dwells, sound sweeps that the board has averaged too.
 
-    A sweep that contradicts the others is to be repeated. Sweeps are counted by their place in the procedure, so the
-    rest of a run must be the rest of the same one. Raises Refused `another_script`, `another_procedure`.
+    A sweep that contradicts the others is to be repeated. Both are counted by their place in the procedure,
+    so the rest of a run must be the rest of the same one. Raises Refused `another_script`, `another_procedure`.
     """
     for run in earlier:
         if run.provenance.script_sha256 != script.sha256:
@@ -66,5 +66,6 @@ def resumption(earlier: Sequence[RunData], settings: RunSettings, script: Script
                 "config.yaml in the run folder describes another procedure or home pose than the recording there",
                 REMEDY,
             )
-    done = (sound_sweeps(run, settings.observation) & observed_sweeps(run, settings.to_calibrate) for run in earlier)
-    return Resumption(earlier, frozenset[int]().union(*done) - disturbed_sweeps(earlier))
+    swept = (sound_sweeps(run, settings.observation) & observed_sweeps(run, settings.to_calibrate) for run in earlier)
+    dwelt = (sound_dwells(run, settings.observation) for run in earlier)
+    return Resumption(earlier, frozenset[int]().union(*swept, *dwelt) - disturbed_sweeps(earlier))

@@ -40,7 +40,8 @@ def set_up_sensors(board: Board, config: RigConfig, *, calibrated: bool) -> Mapp
 
 def _raw(board: Board, name: str, section: SensorSection) -> BoardSensor:
     info = find_sensor(board.identity, name, section)
-    setup = board.configure(info.index, section.rate_hz, section.range_deg_s)
+    range_g = 0.0 if section.acceleration is None else section.acceleration.range_g or 0.0
+    setup = board.configure(info.index, section.rate_hz, section.range_deg_s, range_g)
     described = RecordedSensor(
         part=section.part,
         serial_number=section.serial_number,
@@ -51,6 +52,8 @@ def _raw(board: Board, name: str, section: SensorSection) -> BoardSensor:
         temperature_c_per_count=setup.temperature_scale_c,
         temperature_offset_c=setup.temperature_offset_c,
         mounting=tuple(tuple(row) for row in mounting_matrix(section.mounting).tolist()),
+        range_m_s2=setup.range_m_s2 or None,
+        sensitivity_m_s2_per_count=setup.sensitivity_m_s2 or None,
     )
     return BoardSensor(info.index, described)
 
@@ -62,7 +65,7 @@ def _corrected(board: Board, name: str, section: SensorSection) -> BoardSensor:
 
 
 def corrected(sensor: RecordedSensor, calibration: Calibration) -> RecordedSensor:
-    """The same sensor when the board corrects its readings: a count is then a microradian per second."""
+    """The same sensor when the board corrects its rates, which it sends without accelerations: in microradians/s."""
     limit_rad_s = sensor.full_scale_counts * sensor.sensitivity_rad_s_per_count
     bias_rad_s = np.abs(calibration.bias_rad_s)
     # What a saturated reading becomes, at least: the other axes may read anything beside it.
@@ -74,4 +77,6 @@ def corrected(sensor: RecordedSensor, calibration: Calibration) -> RecordedSenso
         sensitivity_rad_s_per_count=CALIBRATED_RAD_S,
         full_scale_counts=int(lowest_rad_s / CALIBRATED_RAD_S),
         mode="calibrated",
+        range_m_s2=None,
+        sensitivity_m_s2_per_count=None,
     )

@@ -35,7 +35,7 @@ class Laboratory:
             [radians(angle) for angle in config.arm.home_deg],
             ripples,
             arm.encoder_step_rad,
-            memory_s=1e-3 * max(sensor.delay_ms for sensor in world.sensors.values()),
+            memory_s=1e-3 * max(max(each.delay_ms, each.accelerometer.delay_ms) for each in world.sensors.values()),
             lateness_s=partial(Random(f"jitter {world.seed}").gauss, 0.0, arm.state_jitter_s)
             if arm.state_jitter_s
             else None,
@@ -92,6 +92,6 @@ class Laboratory:
 
     def _motion_of(self, sensor: SensorTruth) -> MotionAt:
         """What a sensor on the flange feels at a virtual time inside the last tick."""
-        if self.arm.ideal and not sensor.gyro.g_sensitivity_rad_s_per_g:
+        if self.arm.ideal and not sensor.feels_force:
             return lambda time_s: sensor.rate(self.arm.rate_at(time_s))
         return lambda time_s: sensor.motion(self.arm.felt_at(time_s))

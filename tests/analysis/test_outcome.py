@@ -4,6 +4,7 @@ import sys
 from collections import Counter
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
+from dataclasses import replace
 from types import FrameType
 from typing import Any
 
@@ -11,7 +12,7 @@ import pytest
 
 from rig.analysis.outcome import calibrated, verified, verified_alone
 from rig.data.run_file import RunData, read_run
-from rig.errors import Refused
+from rig.errors import Fault, Refused
 from rig.estimation.vector_model import solve_vector_model
 from rig.observation.observe import observe_sensor
 from rig.observation.timebase import ArmMotion, estimate_time_base
@@ -60,6 +61,11 @@ def test_the_delay_between_two_sensors_is_that_between_their_clock_fits() -> Non
     late = recording.delay("gyro", behind="reference")
     assert abs(late.delay_s) < 5 * late.std_s < 1e-4  # simulated sensors without filters
     assert recording.delay("gyro", behind="gyro").delay_s == 0.0
+
+
+def test_a_recording_without_sweeps_is_refused_by_name() -> None:
+    with pytest.raises(Fault, match="too_few_observations: no finished sweep"):
+        calibrated([replace(recorded("run.h5"), events=())])
 
 
 def test_an_estimator_nobody_knows_is_refused_before_anything_is_observed() -> None:

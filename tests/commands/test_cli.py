@@ -50,7 +50,26 @@ def test_a_narrow_terminal_gets_every_step() -> None:
     assert json.loads(shell(f"{PLAN} --json").stdout) and done.stdout.count("sweep") >= 6
 
 
-@pytest.mark.parametrize("procedure", ["six_observation", "verify"])
+@pytest.mark.slow
+def test_the_plan_of_attitudes_says_what_they_will_tell_of_each_accelerometer() -> None:
+    imu = f"{sys.executable} -m rig plan {ROOT / 'configs' / 'imu.yaml'}"
+    said = shell(imu).stdout
+    assert "12 sweeps, 18 dwells" in said and "rank 14 of 14, condition 1.86" in said and "293.5 s at most" in said
+    document = json.loads(shell(f"{imu} --json --set procedure.second_order=true").stdout)
+    assert document["attitudes"]["needed"] == 17 and document["settling_s"] == 90
+    found = document["attitudes"]["sensors"]
+    assert set(found) == {"lsm9ds1", "mpu9250", "adis16465"}
+    assert found["mpu9250"]["scale_std"] == pytest.approx(94e-6, rel=0.02)
+    assert found["adis16465"]["second_order_std_s2_m"] < found["mpu9250"]["second_order_std_s2_m"]
+
+
+def test_attitudes_of_ones_own_that_tell_too_little_are_refused_by_the_plan() -> None:
+    imu = f"{sys.executable} -m rig plan {ROOT / 'configs' / 'imu.yaml'}"
+    done = shell(f"{imu} --set 'procedure.attitudes=[[0, -90, 0], [0, -90, 90], [0, -90, 180]]'")
+    assert done.returncode == 2 and "rig: rank_deficient: 3 attitudes tell 9 of the 14" in done.stderr, done
+
+
+@pytest.mark.parametrize("procedure", ["six_observation", "verify", "static_attitudes", "imu"])
 def test_a_procedures_help_is_the_instruction_for_the_technician(procedure: str) -> None:
     done = shell(f"{sys.executable} {ROOT / 'procedures' / procedure}.py --help")
     assert done.returncode == 0 and "Before you start:" in done.stdout and "What happens:" in done.stdout, done

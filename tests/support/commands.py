@@ -26,20 +26,22 @@ def python(*arguments: str | Path) -> subprocess.CompletedProcess[str]:
     return subprocess.run(command, capture_output=True, text=True, timeout=240, check=False)
 
 
-def configuration(folder: Path, changes: dict[str, Any] | None = None) -> Path:
-    """ci.yaml on an address of its own, with changes."""
+def configuration(folder: Path, changes: dict[str, Any] | None = None, procedure: dict[str, Any] | None = None) -> Path:
+    """ci.yaml on an address of its own, with changes, or with another `procedure` altogether."""
     host = fresh_host()
     address = {"arm": {"host": host}, "board": {"port": f"socket://{host}:7321"}}
     document = merge(merge(yaml.safe_load(load(CI).text), address), changes or {})
+    if procedure is not None:
+        document["procedure"] = procedure
     path = folder / "config.yaml"
     path.write_text(yaml.safe_dump(document, sort_keys=False), encoding="utf-8")
     return path
 
 
-def wait_for_log(folder: Path, words: str, timeout_s: float = 30.0) -> None:
-    """Until the run's log says so."""
+def wait_for_log(folder: Path, words: str, timeout_s: float = 30.0, times: int = 1) -> None:
+    """Until the run's log says so, so many times."""
     log = folder / "log.txt"
     deadline_s = time.monotonic() + timeout_s
-    while not (log.exists() and words in log.read_text(encoding="utf-8")):
+    while not (log.exists() and log.read_text(encoding="utf-8").count(words) >= times):
         assert time.monotonic() < deadline_s, f"{log} never said {words!r}"
         time.sleep(0.01)

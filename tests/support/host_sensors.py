@@ -35,7 +35,10 @@ class Listener:
 
 
 class Lsm9ds1Registers:
-    """Registers that count up in a burst; a new conversion raises a flag that reading the last output lowers."""
+    """Registers that count up in a burst; a new conversion raises flags that reading the last outputs lowers.
+
+    Both triads are left-handed: the registers hold x with the other sign.
+    """
 
     max_hz = 10e6
 
@@ -46,8 +49,12 @@ class Lsm9ds1Registers:
         self.writes: list[tuple[int, int]] = []
         self.stuck: set[int] = set()  # registers that ignore writes
         self.transfers: list[int] = []
-        self.fresh = False
+        self.fresh = self.fresh_acceleration = False
         self.again_after_reading = 0  # so many times a conversion comes just when the last one has been read
+        self.before_acceleration: Callable[[], None] | None = (
+            None  # what happens once, before the accelerations are read
+        )
+        self.after_acceleration: Callable[[], None] | None = None  # or just after
 
     def transfer(self, data: bytes, max_hz: int, _time_us: int) -> bytes:
         """One chip select: the bytes in, the bytes out."""
@@ -63,17 +70,28 @@ class Lsm9ds1Registers:
         return b"\0" + self._read(address, len(data) - 1, max_hz)
 
     def _read(self, address: int, size: int, _max_hz: int) -> bytes:
-        self.values[0x17] = 0x02 if self.fresh else 0x00
+        reads_acceleration = address <= 0x2D < address + size
+        if reads_acceleration and self.before_acceleration is not None:
+            before, self.before_acceleration = self.before_acceleration, None
+            before()
+        self.values[0x17] = self.values[0x27] = 0x02 * self.fresh | 0x01 * self.fresh_acceleration
+        read = bytes(self.values[address : address + size])
         if address <= 0x1D < address + size:
             self.fresh = self.again_after_reading > 0
             self.again_after_reading -= self.fresh
-        return bytes(self.values[address : address + size])
+        if reads_acceleration:
+            self.fresh_acceleration = False
+            if self.after_acceleration is not None:
+                after, self.after_acceleration = self.after_acceleration, None
+                after()
+        return read
 
-    def convert(self, counts: Sequence[int], temperature: int) -> None:
-        """A new conversion in the output registers."""
-        for address, value in zip((0x15, 0x18, 0x1A, 0x1C), (temperature, *counts), strict=True):
-            self.values[address : address + 2] = value.to_bytes(2, "little", signed=True)
-        self.fresh = True
+    def convert(self, counts: Sequence[int], temperature: int, acceleration: Sequence[int] = (0, 0, 0)) -> None:
+        """A new conversion in the output registers, of vectors in right-handed axes."""
+        words = (temperature, -counts[0], *counts[1:], -acceleration[0], *acceleration[1:])
+        for address, value in zip((0x15, 0x18, 0x1A, 0x1C, 0x28, 0x2A, 0x2C), words, strict=True):
+            self.values[address : address + 2] = min(value, 32767).to_bytes(2, "little", signed=True)
+        self.fresh = self.fresh_acceleration = True
 
 
 class Mpu9250Registers(Lsm9ds1Registers):
@@ -99,8 +117,10 @@ class Mpu9250Registers(Lsm9ds1Registers):
             self.fresh = False
         return bytes(self.values[address : address + size])
 
-    def convert(self, counts: Sequence[int], temperature: int) -> None:
-        words = (0x1111, -0x2222, 0x3333, temperature, *counts)  # acceleration first
+    def convert(
+        self, counts: Sequence[int], temperature: int, acceleration: Sequence[int] = (0x11, -0x22, 0x33)
+    ) -> None:
+        words = (*acceleration, temperature, *counts)
         self.values[0x3B:0x49] = b"".join(word.to_bytes(2, "big", signed=True) for word in words)
         self.fresh = True
 
@@ -109,7 +129,12 @@ class Adis16465Registers:
     """Words of 16 bits, high byte first; an answer comes one frame later, a setting some time after its writing."""
 
     def __init__(self) -> None:
-        self.words = {0x02: 0, **dict.fromkeys(range(0x40, 0x4C, 2), 0)}
+        self.words = {
+            0x00: 0,
+            0x02: 0,
+            **dict.fromkeys(range(0x04, 0x1C, 2), 0),
+            **dict.fromkeys(range(0x40, 0x58, 2), 0),
+        }
         self.words |= {0x5C: 0, 0x5E: 0x0007, 0x60: 0x00C1, 0x64: 0, 0x68: 0, 0x72: 0x4051}
         self.writes: list[tuple[int, int]] = []
         self.stuck: set[int] = set()  # registers that ignore writes
@@ -119,6 +144,7 @@ class Adis16465Registers:
         self.taking_us = 150
         self.cured_by_reset = False  # what DIAG_STAT says goes with the next reset
         self.before_burst: Callable[[], None] | None = None  # what happens once, just before the registers are read
+        self.after_burst: Callable[[], None] | None = None  # or just after
         self.damage = 0  # added to the next bursts' last data byte
         self._data = [0] * 7
         self._answer = 0
@@ -127,7 +153,7 @@ class Adis16465Registers:
 
     def transfer(self, data: bytes, max_hz: int, time_us: int) -> bytes:
         """One chip select: the bytes in, the bytes out."""
-        assert max_hz <= 1e6
+        assert max_hz <= (2e6 if len(data) == 2 else 1e6), "a burst is slow"
         assert (time_us - self._idle_since_us) % 2**32 >= 16, "the part needs 16 µs between frames"
         self._idle_since_us = time_us
         self.transfers.append(len(data))
@@ -135,7 +161,11 @@ class Adis16465Registers:
             before, self.before_burst = self.before_burst, None
             if before is not None:
                 before()
-            return self._answer.to_bytes(2, "big") + self._burst()
+            burst = self._answer.to_bytes(2, "big") + self._burst()
+            after, self.after_burst = self.after_burst, None
+            if after is not None:
+                after()
+            return burst
         assert len(data) == 2
         answer, address = self._answer, data[0] & 0x7E
         if data[0] & 0x80:
@@ -164,7 +194,17 @@ class Adis16465Registers:
         body[-1] = (body[-1] + self.damage) & 0xFF
         return bytes(body) + total.to_bytes(2, "big")
 
-    def convert(self, counts: Sequence[int], temperature: int) -> None:
-        """A new conversion in the output registers."""
-        self._data = [*counts, 0x0111, -0x0222, 0x0333, temperature]
+    def convert(
+        self,
+        counts: Sequence[int],
+        temperature: int,
+        acceleration: Sequence[int] = (0x0111, -0x0222, 0x0333),
+        low_words: Sequence[int] = (0, 0, 0, 0, 0, 0),
+    ) -> None:
+        """A new conversion in the output registers: upper words, and the lower ones of all six."""
+        self._data = [*counts, *acceleration, temperature]
         self.counter = (self.counter + 1) & 0xFFFF
+        for output, (low, upper) in enumerate(zip(low_words, self._data[:6], strict=True)):
+            self.words[0x04 + 4 * output] = low
+            self.words[0x06 + 4 * output] = upper & 0xFFFF
+        self.words[0x22] = self.counter

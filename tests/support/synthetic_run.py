@@ -10,7 +10,7 @@ import numpy as np
 
 from firmware_host.samples import SAMPLE_DTYPE
 from rig.arm.kinematics import NOMINAL, DenavitHartenberg, flange_rate
-from rig.arm.motion import Plan, Rest, Sweep, Transfer
+from rig.arm.motion import Dwell, Plan, Rest, Step, Sweep, Transfer
 from rig.arm.state import ARM_STATE_DTYPE
 from rig.config.load import parse
 from rig.config.procedure_sections import SixSweepsSection
@@ -105,7 +105,7 @@ class Motion:
         smooth[place == -1] = here
         for index, step in enumerate(self.plan.steps):
             inside = place == index
-            if isinstance(step, Rest):
+            if isinstance(step, (Rest, Dwell)):
                 smooth[inside] = here
                 continue
             fraction, rate = _trapezoid(time_s[inside] - (self.ends[index] - step.duration_s), step)
@@ -196,7 +196,7 @@ SENSOR = RecordedSensor(
 )
 
 
-def _events(step: Sweep | Transfer | Rest) -> tuple[Event, ...]:
+def _events(step: Step) -> tuple[Event, ...]:
     """At the beginning and at the end of a step."""
     if isinstance(step, Sweep):
         return SweepStarted(step), SweepFinished(step)

@@ -63,18 +63,23 @@ def _sensor(
     seed: np.random.SeedSequence,
     ready_s: float,
 ) -> SpiDevice:
-    motion_at = motion_of(truth)
+    motion_at, acceleration = motion_of(truth), truth.accelerometer
     match sensor.part:
         case "lsm9ds1":
-            return Lsm9ds1(motion_at, truth.gyro, temperature_c=truth.temperature_c, seed=seed)
+            return Lsm9ds1(
+                motion_at, truth.gyro, temperature_c=truth.temperature_c, seed=seed, acceleration=acceleration
+            )
         case "mpu9250":
-            return Mpu9250(motion_at, truth.gyro, temperature_c=truth.temperature_c, seed=seed)
+            return Mpu9250(
+                motion_at, truth.gyro, temperature_c=truth.temperature_c, seed=seed, acceleration=acceleration
+            )
         case "adis16465":  # it comes in three variants, one for each range
             return Adis16465(
                 motion_at,
                 truth.gyro,
                 temperature_c=truth.temperature_c,
                 seed=seed,
+                acceleration=acceleration,
                 range_deg_s=int(sensor.range_deg_s),
                 ready_s=ready_s,
             )

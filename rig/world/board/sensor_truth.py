@@ -8,9 +8,10 @@ from math import radians
 
 import numpy as np
 
+from firmware_host.emulator.accelerometer import AccelerometerTruth
 from firmware_host.emulator.gyroscope import GyroTruth, Temperature, Warming, readings
 from rig.config.models import SensorSection, mounting_matrix
-from rig.config.world_models import SimulatedSensorSection
+from rig.config.world_models import SimulatedAccelerometerSection, SimulatedSensorSection
 from rig.world.ur10e.flange_motion import Components, Felt, moved
 from rig.world.ur10e.forward_kinematics import rotation_from_vector
 
@@ -18,10 +19,15 @@ STANDARD_GRAVITY_M_S2 = 9.80665  # what a data sheet's g is
 
 
 class SensorTruth:
-    """One sensor. `gyro`: its errors; `temperature_c`: the die's, of a part that gets power at the time `powered_s`."""
+    """One sensor. `gyro`, `accelerometer`: their errors, the latter None where it is not read; `temperature_c`: the
+    die's, of a part that gets power at the time `powered_s`.
+    """
 
     def __init__(self, sensor: SensorSection, simulated: SimulatedSensorSection, powered_s: float = 0.0) -> None:
         self.gyro = _gyro(simulated)
+        self.accelerometer = (
+            None if sensor.acceleration is None else _accelerometer(simulated.accelerometer, simulated.temperature_c)
+        )
         self.temperature_c: float | Temperature = simulated.temperature_c
         if simulated.start_temperature_c is not None:
             self.temperature_c = Warming(
@@ -29,6 +35,11 @@ class SensorTruth:
             )
         self._rows = _rows(sensor, simulated.mounting_error_deg)
         self._offset_m = [1e-3 * offset for offset in simulated.offset_mm]
+
+    @property
+    def feels_force(self) -> bool:
+        """Whether anything it reads depends on the specific force."""
+        return self.accelerometer is not None or bool(self.gyro.g_sensitivity_rad_s_per_g)
 
     def rate(self, flange_rate: Components) -> Components:
         """The flange's rate in the sensor's own axes."""
@@ -39,7 +50,7 @@ class SensorTruth:
     def motion(self, flange: Felt) -> Sequence[float]:
         """What the part feels of what the flange feels: its `motion_at`, 3 components or 6."""
         rate = self.rate(flange.rate_rad_s)
-        if not self.gyro.g_sensitivity_rad_s_per_g:
+        if not self.feels_force:
             return rate
         force = moved(flange.rate_rad_s, flange.change_rad_s2, flange.force_m_s2, self._offset_m)
         return (*rate, *(component / STANDARD_GRAVITY_M_S2 for component in self.rate(force)))
@@ -80,4 +91,20 @@ def _gyro(simulated: SimulatedSensorSection) -> GyroTruth:
         instability_rad_s=simulated.bias_instability_rad_s,
         instability_time_s=simulated.bias_instability_time_s,
         random_walk_rad_s_per_sqrt_s=simulated.bias_random_walk_rad_s_per_sqrt_s,
+    )
+
+
+def _accelerometer(simulated: SimulatedAccelerometerSection, holds_at_c: float) -> AccelerometerTruth:
+    """The emulated part has its bias to be added to the reading, as that of the gyroscope; TRIAX's is part of it."""
+    return AccelerometerTruth(
+        scale=simulated.scale,
+        bias_m_s2=[-bias for bias in simulated.bias_m_s2],
+        noise_m_s2=simulated.noise_m_s2,
+        non_orthogonality_rad=[radians(angle) for angle in simulated.non_orthogonality_deg],
+        second_order_s2_m=simulated.second_order_s2_m,
+        scale_per_k=simulated.scale_per_k,
+        bias_m_s2_per_k=[-bias for bias in simulated.bias_m_s2_per_k],
+        holds_at_c=holds_at_c,
+        bandwidth_hz=simulated.bandwidth_hz,
+        delay_s=1e-3 * simulated.delay_ms,
     )

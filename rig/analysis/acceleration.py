@@ -1,0 +1,262 @@
+"""Accelerometers from dwells in known attitudes and from sweeps: TRIAX, section III-B, on an arm."""
+
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass
+from functools import partial
+from types import MappingProxyType
+
+import numpy as np
+
+from rig.analysis.calibration import SensorResult, or_fault
+from rig.data.run_file import RecordedSensor
+from rig.data.settings import PlannedDwell, RunSettings, Site
+from rig.errors import Fault
+from rig.estimation.accelerometer import AccelerometerSolution, solve_accelerometer, specific_force
+from rig.estimation.arrays import Array
+from rig.estimation.felt import LEVER, NO_SWEEPS, SECOND, Dwells, Sweeps
+from rig.estimation.imu import ImuSolution, solve_imu
+from rig.estimation.reference_model import BIAS, F
+from rig.estimation.refusals import check_axes
+from rig.estimation.sensor_axes import angle_jacobian, nearest_rotation, non_orthogonality, parameter_jacobian
+from rig.estimation.triads import Alignment, alignment
+from rig.estimation.triaxial import Method, TriaxialSolution
+from rig.observation.acceleration import DwellReading
+from rig.observation.observed_run import ObservedRun
+
+BESIDE: tuple[Method, ...] = ("attitude_weighted", "maximum_likelihood", "as_published")
+NO_GYROSCOPES: Mapping[str, SensorResult] = MappingProxyType({})
+SEEN = 3.0  # standard deviations that the largest second-order term must have
+
+
+@dataclass(frozen=True, slots=True)
+class HeldOut:
+    """The attitudes gone through once more after the calibration, which knows nothing of them.
+
+    `error_m_s2` (N,): the size of each calibrated acceleration less that of gravity.
+    """
+
+    dwells: tuple[DwellReading, ...]
+    error_m_s2: Array
+
+    @property
+    def rms_m_s2(self) -> float:
+        """Of all of them."""
+        return float(np.sqrt(np.mean(self.error_m_s2**2)))
+
+
+@dataclass(frozen=True, slots=True)
+class AccelerometerResult:
+    """One accelerometer's calibration, a = F (s + φ s²) + b, and what it rests on; `sweeps` counts them.
+
+    The body of the `solution` is the sensor as it is nominally mounted: F is nearly diagonal, and φ the sensor's own.
+    `alignment` is to the gyroscope beside it, None where that was not calibrated.
+
+    `scale` (3,) is 1/‖row of F‖, `covariance` (6, 6) that of scale and bias. Beside it stand the solutions from the
+    attitudes alone, by method, or the Fault each ends in. `held_out` is there when the attitudes were repeated.
+    """
+
+    sensor: RecordedSensor
+    gravity_m_s2: float
+    solution: ImuSolution
+    scale: Array
+    covariance: Array
+    non_orthogonality_rad: Array
+    non_orthogonality_std_rad: Array
+    alignment: Alignment | None
+    beside: Mapping[Method, TriaxialSolution | Fault]
+    dwells: tuple[DwellReading, ...]
+    sweeps: int
+    held_out: HeldOut | None
+
+    @property
+    def correction_matrix(self) -> Array:
+        """(3, 3) M of s = M (a − b).
+
+        In the right-angled frame nearest to the gyroscope's axes, where that is known: corrected rates and
+        accelerations are in one frame then. Else in that nearest to the accelerometer's own.
+        """
+        matrix: Array = nearest_rotation(self.solution.matrix * self.scale[:, None]) @ np.linalg.inv(
+            self.solution.matrix
+        )
+        return matrix if self.alignment is None else self.alignment.rotation.T @ matrix
+
+    @property
+    def bias_m_s2(self) -> Array:
+        """(3,) b."""
+        return self.solution.bias_m_s2
+
+    @property
+    def lever_arm_m(self) -> Array | None:
+        """(3,) from the sweeps' axes to the sensor, in the flange's frame; None without sweeps."""
+        lever = self.solution.lever_arm_m
+        return None if lever is None else np.array(self.sensor.mounting).T @ lever
+
+    @property
+    def lever_arm_std_m(self) -> Array | None:
+        """(3,) its standard deviations: a nominal mounting only renames the axes."""
+        if self.solution.lever_arm_m is None:
+            return None
+        std: Array = np.abs(np.array(self.sensor.mounting)).T @ np.sqrt(np.diag(self.solution.covariance)[LEVER])
+        return std
+
+    @property
+    def temperature_c(self) -> float:
+        """Mean over all dwells."""
+        return float(np.mean([dwell.temperature_c for dwell in self.dwells]))
+
+
+def calibrate_accelerometers(
+    recordings: Sequence[ObservedRun], settings: RunSettings, gyroscopes: Mapping[str, SensorResult] = NO_GYROSCOPES
+) -> dict[str, AccelerometerResult]:
+    """Every sensor to calibrate whose accelerations were recorded in dwells; beside the `gyroscopes` of the same run.
+
+    Raises Fault as `solve_imu` and `solve_triaxial` do, and `not_all_attitudes`, `second_order_not_seen`,
+    `swapped_axes`, `mirrored_axis`, `wrong_mounting`.
+    """
+    if not settings.planned_dwells or settings.site is None:
+        return {}
+    described = recordings[0].run.sensors
+    return {
+        name: _calibrated(name, recordings, settings, settings.site, gyroscopes.get(name))
+        for name in settings.to_calibrate
+        if described[name].has_acceleration
+    }
+
+
+def _calibrated(
+    name: str,
+    recordings: Sequence[ObservedRun],
+    settings: RunSettings,
+    site: Site,
+    gyroscope: SensorResult | None,
+) -> AccelerometerResult:
+    sensor = recordings[0].run.sensors[name]
+    dwells = tuple(dwell for recording in recordings for dwell in recording.sensors[name].dwells)
+    used, left_out = _apart(dwells, settings.planned_dwells)
+    mounting = np.array(sensor.mounting)
+    seen, sweeps = _dwells(used, mounting), _sweeps(name, recordings, mounting)
+    solve = partial(
+        solve_accelerometer,
+        seen.readings_m_s2,
+        seen.attitudes,
+        seen.variances_m2_s4,
+        gravity_m_s2=site.gravity_m_s2,
+        down=-np.array(site.up),
+        second_order=settings.second_order,
+    )
+    weighted = solve(method="attitude_weighted").fit  # refuses one attitude that is off alone
+    check_axes(weighted.matrix / np.linalg.norm(weighted.matrix, axis=1, keepdims=True), np.eye(3))
+    solution = solve_imu(seen, sweeps, gravity_m_s2=site.gravity_m_s2, up=site.up, second_order=settings.second_order)
+    if settings.second_order:
+        _check_seen(solution)
+    scale = 1 / np.linalg.norm(solution.matrix, axis=1)
+    axes = solution.matrix * scale[:, None]
+    angles = angle_jacobian(axes, scale, nearest_rotation(axes))
+    return AccelerometerResult(
+        sensor=sensor,
+        gravity_m_s2=site.gravity_m_s2,
+        solution=solution,
+        scale=scale,
+        covariance=_covariance(solution, scale),
+        non_orthogonality_rad=non_orthogonality(axes),
+        non_orthogonality_std_rad=np.sqrt(np.diag(angles @ solution.covariance[F, F] @ angles.T))[:3],
+        alignment=None if gyroscope is None else _alignment(gyroscope, solution, mounting),
+        beside={"attitude_weighted": weighted, **{each: _beside(partial(solve, method=each)) for each in BESIDE[1:]}},
+        dwells=used,
+        sweeps=len(sweeps.speeds_rad_s),
+        held_out=_held_out(left_out, solution, site.gravity_m_s2) if left_out else None,
+    )
+
+
+def _apart(
+    dwells: Sequence[DwellReading], planned: Sequence[PlannedDwell]
+) -> tuple[tuple[DwellReading, ...], tuple[DwellReading, ...]]:
+    """The dwells a calibration is made from, and the last repeat of the attitudes where there are several."""
+    repeat = {each.index: each.repeat for each in planned}
+    if missing := sorted(repeat.keys() - {dwell.index for dwell in dwells}):
+        raise Fault(
+            "not_all_attitudes",
+            f"{len(missing)} of {len(repeat)} dwells were not finished",
+            "Go on with `rig resume RUN_DIR`, or run the procedure again",
+        )
+    last = max(repeat.values())
+    used = tuple(dwell for dwell in dwells if last == 0 or repeat[dwell.index] < last)
+    return used, tuple(dwell for dwell in dwells if last > 0 and repeat[dwell.index] == last)
+
+
+def _dwells(dwells: Sequence[DwellReading], mounting: Array) -> Dwells:
+    return Dwells(
+        readings_m_s2=np.array([dwell.reading.mean for dwell in dwells]),
+        variances_m2_s4=np.array([dwell.reading.variance for dwell in dwells]),
+        attitudes=np.array([(mounting @ _rotation(dwell.attitude)).T for dwell in dwells]),
+    )
+
+
+def _sweeps(name: str, recordings: Sequence[ObservedRun], mounting: Array) -> Sweeps:
+    """All that was swept, in the axes of the sensor as it is nominally mounted."""
+    turns = [turn for recording in recordings for turn in recording.sensors[name].revolutions]
+    found = [turn.acceleration for turn in turns if turn.acceleration is not None]
+    if not found:
+        return NO_SWEEPS
+    stations = list(dict.fromkeys(each.station for each in found))
+    return Sweeps(
+        harmonics_m_s2=np.array([each.harmonic.harmonic_m_s2 for each in found]),
+        covariances_m2_s4=np.array([each.harmonic.covariance_m2_s4 for each in found]),
+        axes_flange=np.array([each.axis_flange for each in found]) @ mounting.T,
+        speeds_rad_s=np.array([each.harmonic.speed_rad_s for each in found]),
+        attitudes=np.array([(mounting @ each.attitude).T for each in found]),
+        arms_m=np.array([each.arm_m for each in found]) @ mounting.T,
+        stations=np.array([stations.index(each.station) for each in found], dtype=np.intp),
+    )
+
+
+def _rotation(mean: Array) -> Array:
+    """The rotation nearest to a mean of rotations that hardly differ: the encoders' steps make it shrink."""
+    left, _, right = np.linalg.svd(mean)
+    rotation: Array = left @ right
+    return rotation
+
+
+def _beside(solve: Callable[[], AccelerometerSolution]) -> TriaxialSolution | Fault:
+    found = or_fault(solve)
+    return found if isinstance(found, Fault) else found.fit
+
+
+def _alignment(gyroscope: SensorResult, solution: ImuSolution, mounting: Array) -> Alignment | None:
+    """Both F by the flange's axes; None where the vector model has no solution of the gyroscope."""
+    vector = gyroscope.vector_model
+    if isinstance(vector, Fault):
+        return None
+    to_flange = np.kron(np.eye(3), mounting.T)  # of the rows of F
+    return alignment(
+        vector.matrix,
+        solution.matrix @ mounting,
+        vector.matrix_covariance[F, F],
+        to_flange @ solution.covariance[F, F] @ to_flange.T,
+    )
+
+
+def _covariance(solution: ImuSolution, scale: Array) -> Array:
+    """(6, 6) of scale and bias; b is part of the reading here, where the gyroscope's is added to it."""
+    jacobian = parameter_jacobian(solution.matrix, scale)
+    jacobian[3:] *= -1
+    told = np.r_[F, BIAS]
+    covariance: Array = jacobian @ solution.covariance[np.ix_(told, told)] @ jacobian.T
+    return covariance
+
+
+def _held_out(dwells: tuple[DwellReading, ...], solution: ImuSolution, gravity_m_s2: float) -> HeldOut:
+    found = specific_force(np.array([dwell.reading.mean for dwell in dwells]), solution)
+    return HeldOut(dwells, np.linalg.norm(found, axis=1) - gravity_m_s2)
+
+
+def _check_seen(solution: ImuSolution) -> None:
+    assert solution.second_order_s2_m is not None
+    std = np.sqrt(np.diag(solution.covariance)[SECOND])
+    largest = float(np.max(np.abs(solution.second_order_s2_m) / std))
+    if largest < SEEN:
+        raise Fault(
+            "second_order_not_seen",
+            f"no second-order term is beyond {largest:.1f} of its standard deviations",
+            "Set procedure.second_order: false, which makes the bias much better known; or dwell longer",
+        )

@@ -1,0 +1,97 @@
+"""What `result.json` says of accelerometers."""
+
+from typing import Literal
+
+from rig.data.result_types import Entry, ErrorEntry, Matrix3, Matrix6, PositiveVector3, Role, Vector3
+
+
+class InAttitudesEntry(Entry):
+    """The solution of one method from the dwells alone."""
+
+    method: str
+    scale: PositiveVector3
+    bias_m_s2: Vector3
+    matrix: Matrix3
+    rank: int
+    condition: float
+
+
+class DwellEntry(Entry):
+    """A dwell: the mean reading in an attitude, its standard deviation, and what the model leaves of it.
+
+    `attitude` takes a vector of the arm's base frame into the flange's.
+    """
+
+    index: int
+    name: str
+    attitude: Matrix3
+    mean_m_s2: Vector3
+    mean_std_m_s2: Vector3
+    noise_m_s2: Vector3
+    residual_m_s2: Vector3
+    samples: int
+    duration_s: float
+    temperature_c: float
+
+
+class HeldOutEntry(Entry):
+    """The last repeat of the attitudes, which the calibration does not know: size of acceleration less gravity."""
+
+    dwells: int
+    rms_m_s2: float
+    max_m_s2: float
+
+
+class AlignmentEntry(Entry):
+    """The small rotation vector that takes the gyroscope's frame into the accelerometer's beside it."""
+
+    rotation_rad: Vector3
+    std_rad: Vector3
+
+
+class AccelerometerEntry(Entry):
+    """A calibration a = F (s + φ s²) + b of the specific force s in the flange's frame.
+
+    - `covariance` is that of scale and bias; `gravity_m_s2` what the scale factors are relative to.
+    - `reference_m_s2` is the specific force at rest in the arm's base frame, `attitude_error_rad` how far the arm's
+      attitudes are off about each axis, by the readings' own account.
+    - `lever_arm_m`, from the sweeps' axes to the sensor in the flange's frame, and `delay_s`, by which it lags behind
+      the gyroscope, are there where sweeps were made.
+    - `correction_matrix` is M of s = M (a − b), first order: in the frame of the gyroscope's corrected rates (whole
+      matrix) where there is an `alignment`, else in the right-angled frame nearest to the accelerometer's own axes.
+    """
+
+    part: str
+    serial_number: str
+    range_m_s2: float
+    role: Role
+    model: str
+    estimator: Literal["attitude_weighted"]
+    gravity_m_s2: float
+    scale: PositiveVector3
+    bias_m_s2: Vector3
+    covariance: Matrix6
+    covariance_order: tuple[str, ...]
+    covariance_units: tuple[str, ...]
+    matrix: Matrix3
+    non_orthogonality_rad: Vector3
+    non_orthogonality_std_rad: Vector3
+    second_order_s2_m: Vector3 | None
+    second_order_std_s2_m: Vector3 | None
+    reference_m_s2: Vector3
+    attitude_error_rad: float
+    attitude_error_std_rad: float
+    lever_arm_m: Vector3 | None
+    lever_arm_std_m: Vector3 | None
+    delay_s: float | None
+    delay_std_s: float | None
+    alignment: AlignmentEntry | None
+    dwells: tuple[DwellEntry, ...]
+    sweeps: int
+    rank: int
+    condition: float
+    temperature_c: float
+    correction_matrix: Matrix3
+    beside: dict[str, InAttitudesEntry | ErrorEntry]
+    held_out: HeldOutEntry | None
+    warnings: tuple[str, ...]

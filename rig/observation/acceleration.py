@@ -1,0 +1,130 @@
+"""What an accelerometer read in dwells: mean readings at rest, each with the attitude the arm stood in."""
+
+from collections.abc import Collection, Iterator
+from dataclasses import dataclass
+
+import numpy as np
+
+from rig.data.run_file import RunData
+from rig.data.settings import ObservationThresholds
+from rig.errors import Fault
+from rig.estimation.arrays import Array
+from rig.observation.average import Mean, Stream, between, mean_of
+from rig.observation.timebase import ArmMotion
+from rig.observation.windows import Dwelt, Window, dwelt
+
+MAX_DWELL_TRAVEL_RAD = 1e-3  # of any joint, while it stands
+MIN_DWELL_SAMPLES = 20
+
+
+@dataclass(frozen=True, slots=True)
+class DwellReading:
+    """A dwell of the procedure, by its `index`: the mean reading in m/s².
+
+    `attitude` (3, 3) is the mean rotation from the arm's base frame into the flange's, `window` the controller's times.
+    """
+
+    index: int
+    name: str
+    reading: Mean
+    attitude: Array
+    window: Window
+    temperature_c: float
+
+
+def dwell_readings(
+    run: RunData, stream: Stream, motion: ArmMotion, settings: ObservationThresholds, superseded: Collection[int] = ()
+) -> Iterator[DwellReading]:
+    """Every finished dwell of a recording whose index is not in `superseded`, of a sensor with accelerations.
+
+    Raises Fault `arm_moved_in_dwell`, `arm_states_lost`, `lost_samples`, `saturation`, `stuck_sensor`.
+    """
+    for each in dwelt(run):
+        if each.dwell.index not in superseded:
+            yield dwell_reading(stream, motion, each, settings)
+
+
+def accelerations(stream: Stream, inside: slice) -> Array:
+    """(n, 3) m/s² of the samples inside."""
+    sensitivity = stream.sensor.sensitivity_m_s2_per_count
+    assert sensitivity is not None, "asked of a sensor with accelerations only"
+    readings: Array = stream.raw["acceleration_counts"][inside] * sensitivity
+    return readings
+
+
+def check_acceleration(stream: Stream, inside: slice, where: str) -> None:
+    """Raises Fault `saturation`, `stuck_sensor` of what the accelerometer read there."""
+    counts = stream.raw["acceleration_counts"][inside].astype(np.int64)
+    saturated = np.any(np.abs(counts) >= stream.sensor.full_scale_counts, axis=1)
+    if saturated.any():
+        raise Fault(
+            "saturation",
+            f"in {where} {int(saturated.sum())} accelerations stand at the end of the sensor's range",
+            "Choose a wider acceleration.range_g",
+        )
+    if len(counts) and not np.ptp(counts, axis=0).any() and _is_noisy(stream):
+        raise Fault(
+            "stuck_sensor",
+            f"in {where} the accelerometer repeats one reading {len(counts)} times",
+            "Check the sensor's supply and its bus wiring, then repeat the run",
+        )
+
+
+def _is_noisy(stream: Stream) -> bool:
+    """Whether neighbouring samples differ as a rule: without noise they may well be alike."""
+    steps = np.abs(np.diff(stream.raw["acceleration_counts"], axis=0))
+    return bool(len(steps)) and np.median(steps, axis=0).min() >= 1
+
+
+def dwell_reading(stream: Stream, motion: ArmMotion, finished: Dwelt, settings: ObservationThresholds) -> DwellReading:
+    """One finished dwell. Raises Fault as `dwell_readings` does."""
+    dwell, window = finished.dwell, finished.window
+    where = f"dwell {dwell.index} ({dwell.name})"
+    inside = between(stream, window.start_s, window.end_s)
+    _check_standing(motion, window, where)
+    _check_complete(stream, inside, where, settings)
+    check_acceleration(stream, inside, where)
+    readings = accelerations(stream, inside)
+    count = stream.sensor.sensitivity_m_s2_per_count or 0.0
+    steady, known = np.zeros((len(readings), 1)), np.ones(len(readings), dtype=np.bool_)
+    temperature = stream.raw["temperature_counts"][inside].mean() * stream.sensor.temperature_c_per_count
+    return DwellReading(
+        index=dwell.index,
+        name=dwell.name,
+        reading=mean_of(readings, count, steady, known, as_before=False),
+        attitude=motion.attitude(window.start_s, window.end_s),
+        window=window,
+        temperature_c=float(temperature) + stream.sensor.temperature_offset_c,
+    )
+
+
+def _check_standing(motion: ArmMotion, window: Window, where: str) -> None:
+    states = motion.states[(motion.time_s >= window.start_s) & (motion.time_s <= window.end_s)]
+    if len(states) < 2:
+        raise Fault(
+            "arm_states_lost",
+            f"in {where} the arm's states are missing",
+            "Check the network to the robot and the load of this computer, then repeat the run",
+        )
+    travelled = float(np.ptp(states["q_rad"], axis=0).max())
+    if travelled > MAX_DWELL_TRAVEL_RAD:
+        raise Fault(
+            "arm_moved_in_dwell",
+            f"in {where} a joint moved by {np.degrees(travelled):.2f}°",
+            "Let nothing move the arm while it stands, then repeat the run",
+        )
+
+
+def _check_complete(stream: Stream, inside: slice, where: str, settings: ObservationThresholds) -> None:
+    count = inside.stop - inside.start
+    lost = 0
+    if count:
+        sequence = stream.raw["sequence"][inside].astype(np.int64)
+        lost = int(sequence[-1] - sequence[0]) + 1 - count
+    if count < MIN_DWELL_SAMPLES or lost > settings.max_lost_fraction * (count + lost):
+        raise Fault(
+            "lost_samples",
+            f"in {where} there are {count} samples and {lost} are missing, "
+            f"{100 * settings.max_lost_fraction:g} % may, and {MIN_DWELL_SAMPLES} are needed",
+            "Check the cable to the board and the load of this computer, or dwell longer",
+        )

@@ -1,0 +1,58 @@
+"""What an accelerometer read in sweeps: the first harmonic of each revolution over the measured joint angle."""
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from rig.arm.kinematics import flange_arm, flange_attitude
+from rig.arm.motion import Sweep
+from rig.estimation.arrays import Array
+from rig.estimation.sweep_harmonics import FirstHarmonic, first_harmonic
+from rig.observation.acceleration import accelerations, check_acceleration
+from rig.observation.average import Stream, between
+from rig.observation.colour import noise_left
+from rig.observation.revolution import Revolution, describe
+from rig.observation.timebase import ArmMotion
+
+
+@dataclass(frozen=True, slots=True)
+class SweptAcceleration:
+    """Sweep `sweep` of the plan. The joint's angle is counted from where the revolution began.
+
+    There `attitude` (3, 3) takes a vector of the arm's base frame into the flange's. `axis_flange` (3,) is the unit
+    vector of a growing angle, `arm_m` (3,) a way from the axis to the flange's origin, in the flange's frame.
+    `station` names the joint and the pose it turned in.
+    """
+
+    sweep: int
+    harmonic: FirstHarmonic
+    attitude: Array
+    axis_flange: Array
+    arm_m: Array
+    station: tuple[float, ...]
+
+
+def swept_acceleration(stream: Stream, motion: ArmMotion, sweep: Sweep, turn: Revolution) -> SweptAcceleration:
+    """Raises Fault `saturation`, `stuck_sensor`, `incomplete_revolution`, `not_finite`."""
+    inside = between(stream, turn.start_s, turn.end_s)
+    check_acceleration(stream, inside, describe(sweep))
+    time_s = stream.time_s[inside]
+    known = motion.covered(time_s)
+    time_s = time_s[known]
+    began = motion.angles(turn.start_s)
+    others = np.delete(began, sweep.joint)
+    growing = 1.0 if sweep.direction == "ccw" else -1.0
+    return SweptAcceleration(
+        sweep=sweep.index,
+        harmonic=first_harmonic(
+            time_s,
+            accelerations(stream, inside)[known],
+            motion.angles(time_s)[:, sweep.joint] - began[sweep.joint],
+            motion.angles(time_s, 1)[:, sweep.joint],
+            noise_left,
+        ),
+        attitude=flange_attitude(began, motion.kinematics),
+        axis_flange=growing * turn.axis_flange,
+        arm_m=flange_arm(began, sweep.joint, motion.kinematics),
+        station=(sweep.joint, *np.round(others, 2).tolist()),
+    )

@@ -1,0 +1,81 @@
+"""An accelerometer's entry in `result.json`."""
+
+import numpy as np
+
+from rig.analysis.acceleration import AccelerometerResult, HeldOut
+from rig.data.accelerometer_entries import (
+    AccelerometerEntry,
+    AlignmentEntry,
+    DwellEntry,
+    HeldOutEntry,
+    InAttitudesEntry,
+)
+from rig.data.result_types import ErrorEntry
+from rig.errors import Fault
+from rig.estimation.arrays import Array
+from rig.estimation.felt import DELAY, SECOND
+from rig.estimation.imu import MODEL
+from rig.estimation.triads import Alignment
+from rig.estimation.triaxial import TriaxialSolution
+from rig.observation.acceleration import DwellReading
+from rig.report.entry import entry
+
+PARAMETERS = ("kx", "ky", "kz", "bx", "by", "bz")
+UNITS = ("1", "1", "1", "m/s²", "m/s²", "m/s²")
+
+
+def accelerometer_entry(result: AccelerometerResult) -> AccelerometerEntry:
+    """Scale, bias and covariance; beside them the other methods from the attitudes alone."""
+    solution = result.solution
+    std = np.sqrt(np.diag(solution.covariance))
+    return entry(
+        AccelerometerEntry, result, result.sensor, solution,
+        role="calibrate",
+        model=MODEL,
+        estimator="attitude_weighted",
+        covariance_order=PARAMETERS,
+        covariance_units=UNITS,
+        second_order_std_s2_m=None if solution.second_order_s2_m is None else std[SECOND],
+        attitude_error_rad=solution.attitude_error.std_rad,
+        attitude_error_std_rad=solution.attitude_error.uncertainty_rad,
+        lever_arm_m=result.lever_arm_m,
+        lever_arm_std_m=result.lever_arm_std_m,
+        delay_std_s=None if solution.delay_s is None else float(std[DELAY]),
+        alignment=None if result.alignment is None else _alignment(result.alignment),
+        dwells=[_dwell(each, left) for each, left in zip(result.dwells, solution.dwell_residuals_m_s2, strict=True)],
+        beside={name: _beside(found) for name, found in result.beside.items()},
+        held_out=None if result.held_out is None else _held_out(result.held_out),
+    )  # fmt: skip
+
+
+def _dwell(dwell: DwellReading, residual: Array) -> DwellEntry:
+    return entry(
+        DwellEntry, dwell, dwell.reading,
+        mean_m_s2=dwell.reading.mean,
+        mean_std_m_s2=np.sqrt(dwell.reading.variance),
+        noise_m_s2=dwell.reading.noise,
+        residual_m_s2=residual,
+        duration_s=dwell.window.end_s - dwell.window.start_s,
+    )  # fmt: skip
+
+
+def _alignment(found: Alignment) -> AlignmentEntry:
+    return entry(
+        AlignmentEntry, found,
+        rotation_rad=found.vector_rad,
+        std_rad=np.sqrt(np.diag(found.covariance_rad2)),
+    )  # fmt: skip
+
+
+def _held_out(held: HeldOut) -> HeldOutEntry:
+    return HeldOutEntry(dwells=len(held.dwells), rms_m_s2=held.rms_m_s2, max_m_s2=float(np.abs(held.error_m_s2).max()))
+
+
+def _beside(found: TriaxialSolution | Fault) -> InAttitudesEntry | ErrorEntry:
+    if isinstance(found, Fault):
+        return ErrorEntry(error=str(found))
+    return entry(
+        InAttitudesEntry, found,
+        scale=1 / np.linalg.norm(found.matrix, axis=1),
+        bias_m_s2=found.bias,
+    )  # fmt: skip

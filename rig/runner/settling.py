@@ -1,0 +1,85 @@
+"""When the sensors have settled after a motion: their readings scatter hardly more than they did before anything moved.
+
+The arm's controller says that it stands still while what it carries still swings, so the sensors are asked.
+"""
+
+import threading
+from collections import deque
+from dataclasses import dataclass, field
+
+import numpy as np
+
+from firmware_host.client import SampleBatch
+from rig.data.run_file import RecordedSensor
+from rig.estimation.arrays import Array
+
+SPAN_S = 0.5  # of readings that are looked at, all of them after the motion
+QUIET = 1.2  # times the scatter at rest; the scatter of a hundred samples on three axes is known to 4 %
+LEAST_COUNTS = 0.5  # of scatter: rounding is no swing
+
+
+@dataclass(slots=True)
+class _Watched:
+    """The latest readings of one sensor, (3,) counts each."""
+
+    name: str
+    field: str
+    enough: int
+    recent: deque[Array]
+    at_rest_counts: float | None = None
+
+    def scatter_counts(self) -> float | None:
+        """RMS over the axes of the standard deviation; None while there are too few."""
+        if len(self.recent) < self.enough:
+            return None
+        return float(np.sqrt(np.var(np.array(self.recent), axis=0).mean()))
+
+
+@dataclass(slots=True)
+class Settling:
+    """Fed by the board's reader thread, asked by the script's."""
+
+    _watched: dict[int, _Watched] = field(default_factory=dict)
+    _lock: threading.Lock = field(default_factory=threading.Lock)
+
+    def expect(self, index: int, name: str, sensor: RecordedSensor) -> None:
+        """Watch a sensor by its index on the board: its accelerations where it sends them, else its rates."""
+        enough = max(2, round(SPAN_S * sensor.rate_hz))
+        of = "acceleration_counts" if sensor.has_acceleration else "counts"
+        self._watched[index] = _Watched(name, of, enough, deque(maxlen=enough))
+
+    def add(self, batch: SampleBatch) -> None:
+        """Take the newest readings of a sensor that is watched."""
+        watched = self._watched.get(batch.sensor)
+        if watched is not None:
+            with self._lock:
+                watched.recent.extend(batch.samples[watched.field].astype(np.float64))
+
+    def begin(self) -> None:
+        """The arm stands from now on: what was read before does not count."""
+        with self._lock:
+            for watched in self._watched.values():
+                watched.recent.clear()
+
+    def learned(self) -> bool:
+        """Take what is read now for the scatter at rest; False while there is too little of it."""
+        with self._lock:
+            scatters = {index: watched.scatter_counts() for index, watched in self._watched.items()}
+            if None in scatters.values():
+                return False
+            for index, scatter in scatters.items():
+                self._watched[index].at_rest_counts = scatter
+            return True
+
+    def unsettled(self) -> dict[str, float | None]:
+        """The sensors that have not settled: name → scatter over that at rest, None with too few readings."""
+        with self._lock:
+            ratios = {watched.name: _ratio(watched) for watched in self._watched.values()}
+        return {name: ratio for name, ratio in ratios.items() if ratio is None or ratio > QUIET}
+
+
+def _ratio(watched: _Watched) -> float | None:
+    scatter = watched.scatter_counts()
+    if scatter is None or watched.at_rest_counts is None:
+        return None
+    return scatter / max(watched.at_rest_counts, LEAST_COUNTS)

@@ -1,0 +1,34 @@
+"""Which attitudes tell most: an exchange search for the largest determinant of the information (Fedorov, 1972)."""
+
+import numpy as np
+
+from rig.estimation.arrays import Array
+
+
+def information(rows: Array) -> Array:
+    """(N, p, p) what each attitude adds, from the weighted equations (N, 3, p)."""
+    added: Array = np.swapaxes(rows, -1, -2) @ rows
+    return added
+
+
+def log_determinant(information: Array, chosen: list[int]) -> float:
+    """Of the information of those attitudes together; -inf if they leave something undetermined."""
+    return float(np.linalg.slogdet(information[chosen].sum(axis=0))[1])
+
+
+def exchange_search(information: Array, count: int, rng: np.random.Generator, starts: int) -> list[int]:
+    """The best `count` different attitudes: from random ones, the best exchange of one for another, while any gains."""
+    found = [_exchanged(information, rng.permutation(len(information))[:count].tolist()) for _ in range(starts)]
+    return max(found, key=lambda chosen: log_determinant(information, chosen))
+
+
+def _exchanged(information: Array, chosen: list[int]) -> list[int]:
+    while True:
+        now = information[chosen].sum(axis=0)
+        others = [place for place in range(len(information)) if place not in chosen]
+        trials = now - information[chosen][:, None] + information[others]
+        values = np.linalg.slogdet(trials)[1]
+        out, into = np.unravel_index(int(np.argmax(values)), values.shape)
+        if not values[out, into] > np.linalg.slogdet(now)[1] + 1e-9:
+            return chosen
+        chosen = [*chosen[:out], others[into], *chosen[out + 1 :]]
