@@ -19,6 +19,7 @@ from rig.data.events import DwellFinished, DwellStarted
 from rig.data.run_file import RunData, read_run
 from rig.errors import Fault
 from support.commands import configuration, rig, wait_for_log
+from support.worlds import merge
 
 ACCELEROMETER: dict[str, Any] = {
     "scale": [1.02, 0.985, 1.01],
@@ -200,6 +201,14 @@ def test_a_recording_that_is_wrong_is_refused_by_name(in_attitudes: Finished, da
     with pytest.raises(Fault) as refused:
         calibrated([damage(run)])
     assert re.fullmatch(name, refused.value.name), refused.value
+
+
+def test_a_board_that_goes_on_swinging_is_not_measured(tmp_path: Path) -> None:
+    swings = {"world": {"arm": {"settling_rad": 2e-3, "settling_hz": 10, "settling_decay_s": 10}}}
+    config = configuration(tmp_path, merge(LABORATORY, swings), {**ATTITUDES, "settle_s": 1})
+    done = rig("run", config, "--out", tmp_path / "run")
+    assert done.returncode == 3 and "rig: not_settled: 1 s after the arm came to dwell" in done.stderr, done.stderr
+    assert "times as much as at rest" in done.stderr
 
 
 def test_an_interrupted_run_goes_on_where_it_stood(tmp_path: Path) -> None:

@@ -15,15 +15,15 @@ from support.worlds import fresh_host, merge
 CI = CONFIGS / "ci.yaml"
 
 
-def rig(*arguments: str | Path) -> subprocess.CompletedProcess[str]:
+def rig(*arguments: str | Path, timeout_s: float = 240) -> subprocess.CompletedProcess[str]:
     """`rig …`, until it has ended."""
-    return python("-m", "rig", *arguments)
+    return python("-m", "rig", *arguments, timeout_s=timeout_s)
 
 
-def python(*arguments: str | Path) -> subprocess.CompletedProcess[str]:
+def python(*arguments: str | Path, timeout_s: float = 240) -> subprocess.CompletedProcess[str]:
     """`python …`, until it has ended."""
     command = [sys.executable, *map(str, arguments)]
-    return subprocess.run(command, capture_output=True, text=True, timeout=240, check=False)
+    return subprocess.run(command, capture_output=True, text=True, timeout=timeout_s, check=False)
 
 
 def configuration(folder: Path, changes: dict[str, Any] | None = None, procedure: dict[str, Any] | None = None) -> Path:
