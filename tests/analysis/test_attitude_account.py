@@ -21,10 +21,11 @@ def account(*overrides: str) -> AttitudeAccount:
 
 @pytest.mark.slow
 def test_repeats_average_the_noise_and_not_the_arms_error() -> None:
-    exact = [account(f"procedure.repeats={n}", "uncertainty.axis_deg=0").sensors["mpu9250"] for n in (1, 4)]
+    judged = "limits.acceleration_verification_m_s2=1"
+    exact = [account(f"procedure.repeats={n}", judged, "uncertainty.axis_deg=0").sensors["mpu9250"] for n in (1, 4)]
     assert exact[0].scale_std == pytest.approx(2 * exact[1].scale_std)
     assert exact[0].non_orthogonality_std_rad == pytest.approx(2 * exact[1].non_orthogonality_std_rad)
-    faces = ["procedure.attitudes=faces", "uncertainty.axis_deg=0.06"]
+    faces = [judged, "procedure.attitudes=faces", "uncertainty.axis_deg=0.06"]
     real = [account(f"procedure.repeats={n}", *faces).sensors["adis16465"] for n in (1, 4)]
     assert real[0].scale_std == pytest.approx(2 * real[1].scale_std)
     assert real[0].non_orthogonality_std_rad == pytest.approx(real[1].non_orthogonality_std_rad, rel=0.01)

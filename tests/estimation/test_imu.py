@@ -245,6 +245,8 @@ def test_without_the_lever_arm_the_bias_of_sweeps_alone_is_wrong(part: str) -> N
 
 
 @pytest.mark.slow
+@pytest.mark.proof
+@pytest.mark.thorough
 def test_the_uncertainty_of_the_attitude_error_is_its_scatter() -> None:
     """In arms that err in every dwell and station for themselves, as the model has it."""
     _, dwells, sweeps = recorded(TWELVE_AND_REST, 0.0, 150.0, 1)

@@ -93,10 +93,9 @@ def test_scale_and_bias_hold_on_an_arm_that_is_off_by_a_milliradian(tmp_path: Pa
         over = rms(np.array(errors) / stds)
         times = rms(np.array(published)[:, 0, :3]) / rms(np.array(published)[:, 1, :3])
         lever, skew = rms(np.array(levers)), rms(np.array(skews))
-        print(
-            f"{name}: scale {scale:.1f} ppm, bias {bias:.1f} µg, {over:.2f} of the stated; as_published {times:.1f} times"
-        )
-        print(f"  worse in attitudes alone; lever arm {lever:.2f} mm off, gyroscope's angles {skew:.4f} °")
+        print(f"{name}: scale {scale:.1f} ppm, bias {bias:.1f} µg, {over:.2f} of the stated;")
+        print(f"  as_published {times:.1f} times worse in attitudes alone;")
+        print(f"  lever arm {lever:.2f} mm off, gyroscope's angles {skew:.4f} °")
         assert scale <= scale_ppm and bias <= bias_ug and 0.8 <= over <= 1.3 and times >= better
         assert skew <= 0.01
 

@@ -151,6 +151,8 @@ def test_an_interrupted_run_is_kept_and_resumed(start: Start, tmp_path: Path) ->
     assert json.loads(rig("solve", out, "--json").stdout)["sensors"] == result["sensors"]
 
 
+@pytest.mark.proof
+@pytest.mark.thorough
 def test_a_run_goes_on_when_nobody_reads_what_it_says(start: Start, tmp_path: Path) -> None:
     out = tmp_path / "run"
     process = start("run", configuration(tmp_path), "--out", out)

@@ -168,6 +168,8 @@ Run(Path(sys.argv[2]), found.loaded, found.script, Stations((Imports(),), always
 """
 
 
+@pytest.mark.proof
+@pytest.mark.thorough
 def test_nothing_is_imported_while_the_arm_is_under_way(tmp_path: Path) -> None:
     once = {**QUICK_EXPERIMENT, "procedure": {**QUICK_EXPERIMENT["procedure"], "verify": False}}
     with worlds(tmp_path) as start:

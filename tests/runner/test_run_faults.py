@@ -19,6 +19,8 @@ import pytest
 from rig.data.run_file import read_run
 from support.worlds import World, WorldHandle, hardware
 
+# The driver names each of these faults in tests/arm/test_driver.py as well: a few whole runs are enough for a change.
+THOROUGH = [pytest.mark.proof, pytest.mark.thorough]
 pytestmark = pytest.mark.slow
 
 Start = Callable[..., "RunningRig"]
@@ -91,7 +93,7 @@ def start(world: World, tmp_path: Path) -> Iterator[Start]:
 
 @pytest.mark.parametrize(
     "number",
-    [signal.SIGINT, signal.SIGTERM, signal.SIGQUIT, signal.SIGTSTP],
+    [signal.SIGINT, signal.SIGTERM, pytest.param(signal.SIGQUIT, marks=THOROUGH), signal.SIGTSTP],
     ids=["Ctrl-C", "SIGTERM", "Ctrl-backslash", "Ctrl-Z"],
 )
 def test_an_interrupt_stops_the_arm_within_a_second(start: Start, number: signal.Signals) -> None:
@@ -147,12 +149,12 @@ def test_the_arm_stops_when_the_program_freezes(start: Start) -> None:
     [
         ({"do": "protective_stop"}, "protective_stop"),
         ({"do": "emergency_stop"}, "emergency_stop"),
-        ({"do": "pause"}, "arm_paused"),
+        pytest.param({"do": "pause"}, "arm_paused", marks=THOROUGH),
         ({"do": "stop_program"}, "program_stopped"),
-        ({"do": "speed_slider", "fraction": 0.5}, "speed_slider"),
+        pytest.param({"do": "speed_slider", "fraction": 0.5}, "speed_slider", marks=THOROUGH),
         ({"do": "close_arm"}, "arm_link_lost"),
         ({"do": "unplug_board"}, "board_link_lost"),
-        ({"do": "silence_board", "on": True}, "board_link_lost"),
+        pytest.param({"do": "silence_board", "on": True}, "board_link_lost", marks=THOROUGH),
         ({"do": "reset_board"}, "board_error"),
     ],
     ids=lambda value: value if isinstance(value, str) else "",

@@ -16,6 +16,8 @@ pytestmark = pytest.mark.slow
 NUDGE = b"def nudge():\n movej([0.2, -1.57, 1.57, -1.57, -1.57, 0], a=20, v=3)\nend\n"
 
 
+@pytest.mark.proof
+@pytest.mark.thorough
 def test_an_arm_that_was_moved_between_the_halves_goes_on_only_if_somebody_agrees(world: World, tmp_path: Path) -> None:
     handle = world(QUICK_EXPERIMENT)
     config, out = hardware(handle.config_path, tmp_path), tmp_path / "run"

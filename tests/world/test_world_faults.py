@@ -243,6 +243,8 @@ def test_an_emergency_stop_takes_the_power_until_it_is_released(world: World) ->
     wait_for(lambda: running.state()["robot_mode"] == "IDLE", "the power")
 
 
+@pytest.mark.proof
+@pytest.mark.thorough
 def test_the_slider_may_be_moved_during_a_move(world: World) -> None:
     running = world()
     with client(running, BLOCKING_MOVE) as arm:
