@@ -20,8 +20,9 @@ STUDIES := normal extreme speed convergence sine averaging estimators misalignme
 demo: $(VENV)/demo.installed
 	$(BIN)/rig run configs/demo.yaml
 
-# Tests run two at a time: every simulated laboratory has a loopback address of its own.
-PYTEST := $(BIN)/pytest -n 2 --dist worksteal
+# Tests run two at a time: every simulated laboratory has a loopback address of its own. As many threads as that for linear
+# algebra would only be in each other's way.
+PYTEST := OPENBLAS_NUM_THREADS=1 $(BIN)/pytest -n 2 --dist worksteal
 
 check: $(VENV)/dev.installed lint
 	$(PYTEST) -m "not slow"

@@ -7,6 +7,7 @@ from types import MappingProxyType
 
 import numpy as np
 
+from rig.analysis.attitudes import check_seen
 from rig.analysis.calibration import SensorResult, or_fault
 from rig.data.run_file import RecordedSensor
 from rig.data.settings import PlannedDwell, RunSettings, Site
@@ -25,7 +26,7 @@ from rig.observation.observed_run import ObservedRun
 
 BESIDE: tuple[Method, ...] = ("attitude_weighted", "maximum_likelihood", "as_published")
 NO_GYROSCOPES: Mapping[str, SensorResult] = MappingProxyType({})
-SEEN = 3.0  # standard deviations that the largest second-order term must have
+NOT_SEEN = "Set procedure.second_order: false, which makes the bias much better known; or dwell longer"
 
 
 @dataclass(frozen=True, slots=True)
@@ -148,7 +149,7 @@ def _calibrated(
     check_axes(weighted.matrix / np.linalg.norm(weighted.matrix, axis=1, keepdims=True), np.eye(3))
     solution = solve_imu(seen, sweeps, gravity_m_s2=site.gravity_m_s2, up=site.up, second_order=settings.second_order)
     if settings.second_order:
-        _check_seen(solution)
+        check_seen(solution.second_order_s2_m, np.sqrt(np.diag(solution.covariance)[SECOND]), NOT_SEEN)
     scale = 1 / np.linalg.norm(solution.matrix, axis=1)
     axes = solution.matrix * scale[:, None]
     angles = angle_jacobian(axes, scale, nearest_rotation(axes))
@@ -248,15 +249,3 @@ def _covariance(solution: ImuSolution, scale: Array) -> Array:
 def _held_out(dwells: tuple[DwellReading, ...], solution: ImuSolution, gravity_m_s2: float) -> HeldOut:
     found = specific_force(np.array([dwell.reading.mean for dwell in dwells]), solution)
     return HeldOut(dwells, np.linalg.norm(found, axis=1) - gravity_m_s2)
-
-
-def _check_seen(solution: ImuSolution) -> None:
-    assert solution.second_order_s2_m is not None
-    std = np.sqrt(np.diag(solution.covariance)[SECOND])
-    largest = float(np.max(np.abs(solution.second_order_s2_m) / std))
-    if largest < SEEN:
-        raise Fault(
-            "second_order_not_seen",
-            f"no second-order term is beyond {largest:.1f} of its standard deviations",
-            "Set procedure.second_order: false, which makes the bias much better known; or dwell longer",
-        )

@@ -18,6 +18,7 @@ from rig.observation.attitude_import import PlacedReadings, Quantity
 
 METHODS: tuple[Method, ...] = (*get_args(EqualWeights), "attitude_weighted")
 SEEN = 3.0  # standard deviations that the largest second-order term must have
+NOT_SEEN = "Leave out --second-order: it would triple the uncertainty of the bias for nothing; or dwell longer"
 UPWARDS = dict(zip(("+x", "+y", "+z", "-x", "-y", "-z"), np.concatenate([np.eye(3), -np.eye(3)]), strict=True))
 
 
@@ -108,7 +109,8 @@ def _solved(
     solve = partial(_solve, placed, means, variances, known, second_order=second_order)
     solution = solve(method=method)
     if second_order:
-        _check_seen(solution)
+        std = np.sqrt(np.diag(solution.covariance)[15:18])
+        check_seen(solution.second_order, std, NOT_SEEN)
     if not surrounding.any_mounting:
         check_axes(solution.matrix / np.linalg.norm(solution.matrix, axis=1, keepdims=True), np.eye(3))
     others = [each for each in METHODS if each != method and (each != "attitude_weighted" or quantity != "rate")]
@@ -166,15 +168,13 @@ def _scatter(placed: PlacedReadings, means: Array, known: Known, *, second_order
     return variances
 
 
-def _check_seen(solution: TriaxialSolution) -> None:
-    assert solution.second_order is not None
-    std = np.sqrt(np.diag(solution.covariance)[15:18])
-    largest = float(np.max(np.abs(solution.second_order) / std))
+def check_seen(second_order: Array | None, std: Array, remedy: str) -> None:
+    """Whether any of the terms φ (3,) that were asked for is told. Raises Fault `second_order_not_seen`."""
+    assert second_order is not None
+    largest = float(np.max(np.abs(second_order) / std))
     if largest < SEEN:
         raise Fault(
-            "second_order_not_seen",
-            f"no second-order term is beyond {largest:.1f} of its standard deviations",
-            "Leave out --second-order: it would triple the uncertainty of the bias for nothing; or dwell longer",
+            "second_order_not_seen", f"no second-order term is beyond {largest:.1f} of its standard deviations", remedy
         )
 
 

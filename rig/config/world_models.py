@@ -142,6 +142,23 @@ class SimulatedBoardSection(Section):
     pty: bool = Field(default=False, description="also offer the serial port as a pseudo-terminal (POSIX)")
 
 
+# Of a gyroscope and an accelerometer alike.
+Bandwidth = Annotated[
+    float | None, Field(ge=1, le=10_000, description="of its own low-pass of first order; without it, it has none")
+]
+Delay = Annotated[
+    float,
+    Field(ge=0, le=50, description="by how much its readings are late beside that", json_schema_extra={"unit": "ms"}),
+]
+ScalePerK = Annotated[
+    Vector3,
+    Field(
+        description="by which fraction the scale factor of each axis grows with temperature",
+        json_schema_extra={"unit": "1/K"},
+    ),
+]
+
+
 class SimulatedAccelerometerSection(Section):
     """The truth of one accelerometer, a = F (s + φ s²) + b of the specific force s; as warm as its gyroscope."""
 
@@ -156,26 +173,14 @@ class SimulatedAccelerometerSection(Section):
         default=NO_ROW, description="by how much the angles between its axes x y, x z, y z are off 90°"
     )
     second_order_s2_m: Vector3 = Field(default=NO_ROW, description="φ of each axis", json_schema_extra={"unit": "s²/m"})
-    bandwidth_hz: float | None = Field(
-        default=None, ge=1, le=10_000, description="of its own low-pass of first order; without it, it has none"
-    )
-    delay_ms: float = Field(
-        default=0.0,
-        ge=0,
-        le=50,
-        description="by how much its readings are late beside that",
-        json_schema_extra={"unit": "ms"},
-    )
+    bandwidth_hz: Bandwidth = None
+    delay_ms: Delay = 0.0
     bias_m_s2_per_k: Vector3 = Field(
         default=NO_ROW,
         description="by how much b of each axis grows with temperature",
         json_schema_extra={"unit": "m/s²/K"},
     )
-    scale_per_k: Vector3 = Field(
-        default=NO_ROW,
-        description="by which fraction the scale factor of each axis grows with temperature",
-        json_schema_extra={"unit": "1/K"},
-    )
+    scale_per_k: ScalePerK = NO_ROW
 
 
 class SimulatedSensorSection(Section):
@@ -200,11 +205,7 @@ class SimulatedSensorSection(Section):
     bias_rad_s_per_k: Vector3 = Field(
         default=NO_ROW, description="by how much b of each axis grows with temperature", json_schema_extra=RATE_PER_K
     )
-    scale_per_k: Vector3 = Field(
-        default=NO_ROW,
-        description="by which fraction the scale factor of each axis grows with temperature",
-        json_schema_extra={"unit": "1/K"},
-    )
+    scale_per_k: ScalePerK = NO_ROW
     bias_instability_rad_s: float = Field(
         default=0.0, ge=0, le=0.1, description="flicker of the bias: the floor of its Allan deviation"
     )
@@ -240,16 +241,8 @@ class SimulatedSensorSection(Section):
         description="by which fraction a reading grows with its rate's magnitude",
         json_schema_extra=PER_RATE,
     )
-    bandwidth_hz: float | None = Field(
-        default=None, ge=1, le=10_000, description="of its own low-pass of first order; without it, it has none"
-    )
-    delay_ms: float = Field(
-        default=0.0,
-        ge=0,
-        le=50,
-        description="by how much its readings are late beside that",
-        json_schema_extra={"unit": "ms"},
-    )
+    bandwidth_hz: Bandwidth = None
+    delay_ms: Delay = 0.0
     accelerometer: SimulatedAccelerometerSection = Field(
         default=SimulatedAccelerometerSection(),
         description="the accelerometer beside it, of a sensor that has `acceleration`",
