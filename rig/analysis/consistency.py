@@ -47,7 +47,7 @@ def consistency(pieces: Pieces, matrix: Array, rate: float) -> Consistency:
     base = _whiten(white, _each_axis(_known(pieces)))
     found: dict[str, Statistic] = {}
     for name, columns in _suspicions(pieces, felt).items():
-        explained, freedom = _explained(seen, base, _whiten(white, columns))
+        explained, freedom = _explained(seen, base, None if columns is None else _whiten(white, columns))
         if freedom:
             found[name] = explained, float(chdtri(freedom, rate))
     jumped = _jumped(pieces, felt, rate)
@@ -137,17 +137,17 @@ def _known(pieces: Pieces) -> Array:
     return np.column_stack([pieces.rates_rad_s, ones, pieces.gravity_m_s2, _time(pieces)])
 
 
-def _suspicions(pieces: Pieces, felt: Array) -> dict[str, Array]:
-    """By name of the check (3, N, k): what each would add to the three axes' readings."""
+def _suspicions(pieces: Pieces, felt: Array) -> dict[str, Array | None]:
+    """By name of the check (3, N, k): what each would add to the three axes' readings; None is anything at all."""
     time = _time(pieces)
     for sweep in np.unique(pieces.sweep):  # what changes within a sweep is that sweep's own matter
         time[pieces.sweep == sweep] = time[pieces.sweep == sweep].mean()
     turned = np.cross(np.eye(3)[:, None], felt[None]) * time[None, :, None]  # (k, N, 3)
-    found = {
+    found: dict[str, Array | None] = {
         "scale_changed": _per_axis(felt * time[:, None]),
         "loose_mounting": np.transpose(turned, (2, 1, 0)),
         "cw_against_ccw": _per_axis(np.abs(felt)),
-        "residuals": _per_axis(np.eye(len(time))[:, :, None] * np.ones(3)),
+        "residuals": None,
     }
     moving = pieces.sweep >= 0
     if not moving.all():
@@ -175,9 +175,8 @@ def _each_axis(columns: Array) -> Array:
 
 
 def _per_axis(columns: Array) -> Array:
-    """(3, N, 3 k) from (N, 3) or (N, k, 3): each axis' own columns, with a coefficient of its own."""
-    wide = columns[:, None, :] if columns.ndim == 2 else columns
-    stacked: Array = np.einsum("ij,nki->injk", np.eye(3), wide).reshape(3, len(wide), -1)
+    """(3, N, 3) from (N, 3): each axis' own column, with a coefficient of its own."""
+    stacked: Array = np.einsum("ij,ni->inj", np.eye(3), columns)
     return stacked
 
 
@@ -204,13 +203,19 @@ def _basis(columns: Array) -> Array:
     return basis
 
 
-def _explained(seen: Array, base: Array, columns: Array) -> tuple[float, int]:
-    """How much of what `base` leaves of the readings these columns explain, and how many they are beside it."""
+def _explained(seen: Array, base: Array, columns: Array | None) -> tuple[float, int]:
+    """How much of what `base` leaves of the readings these columns explain, and how many they are beside it.
+
+    None explains all of it. (Decomposing that many columns is slow, and LAPACK's quick way does not always converge.)
+    """
     known = _basis(base)
+    unexplained = seen - known @ (known.T @ seen)
+    if columns is None:
+        return float(unexplained @ unexplained), len(seen) - known.shape[1]
     sizes = np.linalg.norm(columns, axis=0)
     new = columns / np.where(sizes > 0, sizes, 1.0)
     new = new - known @ (known.T @ new)
     left, singular, _ = np.linalg.svd(new, full_matrices=False)
     told = left[:, singular > 1e-3]
-    explained = told.T @ (seen - known @ (known.T @ seen))
+    explained = told.T @ unexplained
     return float(explained @ explained), told.shape[1]
