@@ -45,7 +45,7 @@ from rig.station.station import Station
 
 FIRST_SAMPLE_TIMEOUT_S = 2.0
 SETTLING_LOOK_S = 0.05  # between two questions whether the sensors have settled
-AT_REST_TIMEOUT_S = 5.0  # for the readings that tell how they scatter before anything has moved
+AT_REST_TIMEOUT_S = 10.0  # for the readings that tell how they scatter before anything has moved
 SAME_POSE_RAD = radians(1)  # what was announced and agreed to still holds
 
 

@@ -14,6 +14,9 @@ from rig.data.run_file import RecordedSensor
 from rig.estimation.arrays import Array
 
 SPAN_S = 0.5  # of readings that are looked at, all of them after the motion
+SPANS_AT_REST = (
+    6  # what the arm vibrates with where it stands comes and goes: the largest of these is what rest is like
+)
 QUIET = 1.2  # times the scatter at rest; the scatter of a hundred samples on three axes is known to 4 %
 LEAST_COUNTS = 0.5  # of scatter: rounding is no swing
 
@@ -23,10 +26,10 @@ class _Watched:
     """The latest readings of one sensor, (3,) counts each."""
 
     name: str
-    field: str
+    column: str
     enough: int
     recent: deque[Array]
-    at_rest_counts: float | None = None
+    at_rest_counts: list[float] = field(default_factory=list)
 
     def scatter_counts(self) -> float | None:
         """RMS over the axes of the standard deviation; None while there are too few."""
@@ -53,7 +56,7 @@ class Settling:
         watched = self._watched.get(batch.sensor)
         if watched is not None:
             with self._lock:
-                watched.recent.extend(batch.samples[watched.field].astype(np.float64))
+                watched.recent.extend(batch.samples[watched.column].astype(np.float64))
 
     def begin(self) -> None:
         """The arm stands from now on: what was read before does not count."""
@@ -62,14 +65,14 @@ class Settling:
                 watched.recent.clear()
 
     def learned(self) -> bool:
-        """Take what is read now for the scatter at rest; False while there is too little of it."""
+        """Take what is read now for how it is at rest; False while there is too little of it."""
         with self._lock:
-            scatters = {index: watched.scatter_counts() for index, watched in self._watched.items()}
-            if None in scatters.values():
-                return False
-            for index, scatter in scatters.items():
-                self._watched[index].at_rest_counts = scatter
-            return True
+            for watched in self._watched.values():
+                scatter = watched.scatter_counts()
+                if scatter is not None:
+                    watched.at_rest_counts.append(scatter)
+                    watched.recent.clear()
+            return all(len(watched.at_rest_counts) >= SPANS_AT_REST for watched in self._watched.values())
 
     def unsettled(self) -> dict[str, float | None]:
         """The sensors that have not settled: name → scatter over that at rest, None with too few readings."""
@@ -80,6 +83,6 @@ class Settling:
 
 def _ratio(watched: _Watched) -> float | None:
     scatter = watched.scatter_counts()
-    if scatter is None or watched.at_rest_counts is None:
+    if scatter is None or not watched.at_rest_counts:
         return None
-    return scatter / max(watched.at_rest_counts, LEAST_COUNTS)
+    return scatter / max(*watched.at_rest_counts, LEAST_COUNTS)
