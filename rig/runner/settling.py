@@ -18,6 +18,7 @@ SPANS_AT_REST = (
     6  # what the arm vibrates with where it stands comes and goes: the largest of these is what rest is like
 )
 QUIET = 1.2  # times the scatter at rest; the scatter of a hundred samples on three axes is known to 4 %
+STEADY, NOT_FALLING = 2.0, 0.85  # an arm vibrates differently in each attitude: what stays as it is no swing either
 LEAST_COUNTS = 0.5  # of scatter: rounding is no swing
 
 
@@ -31,11 +32,32 @@ class _Watched:
     recent: deque[Array]
     at_rest_counts: list[float] = field(default_factory=list)
 
-    def scatter_counts(self) -> float | None:
-        """RMS over the axes of the standard deviation; None while there are too few."""
-        if len(self.recent) < self.enough:
+    def scatter_counts(self, before: int = 0) -> float | None:
+        """RMS over the axes of the standard deviation of the newest readings, or of those so many spans `before`.
+
+        None while there are too few.
+        """
+        if len(self.recent) < (before + 1) * self.enough:
             return None
-        return float(np.sqrt(np.var(np.array(self.recent), axis=0).mean()))
+        end = len(self.recent) - before * self.enough
+        span = np.array(self.recent)[end - self.enough : end]
+        return float(np.sqrt(np.var(span, axis=0).mean()))
+
+    def over_rest(self) -> float | None:
+        """The newest scatter over that at rest, None with too few readings."""
+        scatter = self.scatter_counts()
+        if scatter is None or not self.at_rest_counts:
+            return None
+        return scatter / max(*self.at_rest_counts, LEAST_COUNTS)
+
+    @property
+    def settled(self) -> bool:
+        """Whether it scatters as at rest, or not much more and without becoming quieter."""
+        ratio, scatter, earlier = self.over_rest(), self.scatter_counts(), self.scatter_counts(before=1)
+        if ratio is None or scatter is None:
+            return False
+        steady = earlier is not None and scatter >= NOT_FALLING * earlier
+        return ratio <= QUIET or (ratio <= STEADY and steady)
 
 
 @dataclass(slots=True)
@@ -49,7 +71,7 @@ class Settling:
         """Watch a sensor by its index on the board: its accelerations where it sends them, else its rates."""
         enough = max(2, round(SPAN_S * sensor.rate_hz))
         of = "acceleration_counts" if sensor.has_acceleration else "counts"
-        self._watched[index] = _Watched(name, of, enough, deque(maxlen=enough))
+        self._watched[index] = _Watched(name, of, enough, deque(maxlen=2 * enough))
 
     def add(self, batch: SampleBatch) -> None:
         """Take the newest readings of a sensor that is watched."""
@@ -77,12 +99,4 @@ class Settling:
     def unsettled(self) -> dict[str, float | None]:
         """The sensors that have not settled: name → scatter over that at rest, None with too few readings."""
         with self._lock:
-            ratios = {watched.name: _ratio(watched) for watched in self._watched.values()}
-        return {name: ratio for name, ratio in ratios.items() if ratio is None or ratio > QUIET}
-
-
-def _ratio(watched: _Watched) -> float | None:
-    scatter = watched.scatter_counts()
-    if scatter is None or not watched.at_rest_counts:
-        return None
-    return scatter / max(*watched.at_rest_counts, LEAST_COUNTS)
+            return {each.name: each.over_rest() for each in self._watched.values() if not each.settled}
