@@ -186,10 +186,11 @@ def _apart(
 
 
 def _dwells(dwells: Sequence[DwellReading], mounting: Array) -> Dwells:
+    """In the axes of the nominal mounting; a mean of rotations that hardly differ has shrunk by the encoders' steps."""
     return Dwells(
         readings_m_s2=np.array([dwell.reading.mean for dwell in dwells]),
         variances_m2_s4=np.array([dwell.reading.variance for dwell in dwells]),
-        attitudes=np.array([(mounting @ _rotation(dwell.attitude)).T for dwell in dwells]),
+        attitudes=np.array([(mounting @ nearest_rotation(dwell.attitude)).T for dwell in dwells]),
     )
 
 
@@ -209,13 +210,6 @@ def _sweeps(name: str, recordings: Sequence[ObservedRun], mounting: Array) -> Sw
         arms_m=np.array([each.arm_m for each in found]) @ mounting.T,
         stations=np.array([stations.index(each.station) for each in found], dtype=np.intp),
     )
-
-
-def _rotation(mean: Array) -> Array:
-    """The rotation nearest to a mean of rotations that hardly differ: the encoders' steps make it shrink."""
-    left, _, right = np.linalg.svd(mean)
-    rotation: Array = left @ right
-    return rotation
 
 
 def _beside(solve: Callable[[], AccelerometerSolution]) -> TriaxialSolution | Fault:

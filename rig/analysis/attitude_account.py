@@ -14,8 +14,8 @@ from rig.config.sensor_catalogue import PARTS
 from rig.errors import Refused
 from rig.estimation.arrays import Array
 from rig.estimation.attitude_design import Expected, Order, Telling, expected, g_efficiency, telling
+from rig.estimation.earth import MICRO_G_M_S2
 
-MICRO_G = 9.80665e-6  # m/s², as data sheets mean it
 MAX_CONDITION = 100.0  # the worst of a thousand random tens has 19; beyond, noise decides more than the attitudes do
 
 
@@ -59,7 +59,7 @@ def attitude_account(config: RigConfig, plan: Plan) -> AttitudeAccount | None:
         name: expected(
             attitudes,
             reference,
-            PARTS[sensor.part].acceleration_noise_ug_sqrt_hz * MICRO_G / np.sqrt(dwells_s),
+            PARTS[sensor.part].acceleration_noise_ug_sqrt_hz * MICRO_G_M_S2 / np.sqrt(dwells_s),
             attitude_std_rad,
             order,
         )

@@ -183,8 +183,7 @@ def _gravity_left(
         if site is None or not isinstance(solution, VectorSolution) or solution.g_sensitivity is None:
             return None
         attitudes = np.array([turn.average.attitude for turn in turns_of(each, after)], dtype=np.float64)
-        down = -site.gravity_m_s2 * np.array(site.up)
-        left.append(attitudes @ down @ (matrix @ solution.g_sensitivity).T)
+        left.append(attitudes @ site.down_m_s2 @ (matrix @ solution.g_sensitivity).T)
     of_sensor, of_reference = left
     return of_sensor, of_reference
 

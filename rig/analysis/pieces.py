@@ -139,7 +139,6 @@ def _cut(
     count = stream.sensor.sensitivity_rad_s_per_count
     scatter = np.maximum(np.sum(residual**2, axis=0) / max(len(residual) - len(enough), 1), count**2 / 12)
     wider = np.array([widening(residual[:, axis]) for axis in range(3)])
-    down = -site.gravity_m_s2 * np.array(site.up)
     earth = np.zeros(3) if site.earth_rate_rad_s is None else np.array(site.earth_rate_rad_s)
     pieces = []
     for each in enough:
@@ -151,7 +150,7 @@ def _cut(
                 mean_rad_s=means[each],
                 variance_rad2_s2=scatter * wider / np.sum(part == each) + rounding_left(scatter, count),
                 rate_rad_s=rates[each] + attitude @ earth,
-                gravity_m_s2=attitude @ down,
+                gravity_m_s2=attitude @ site.down_m_s2,
                 speed_std=0.0 if turn is None else turn.speed_std_rad_s / turn.speed_rad_s,
                 start_s=float(ends[each]),
                 end_s=float(ends[each + 1]),

@@ -39,7 +39,7 @@ def see(recordings: Sequence[ObservedRun], sensor: str, surroundings: Surroundin
         earth_rad_s=attitudes @ earth,
         speed_std_rad_s=np.array([*(turn.speed_std_rad_s for turn, _ in turns), *np.zeros(len(rests))]),
         attitudes=attitudes,
-        gravity_m_s2=attitudes @ (-site.gravity_m_s2 * np.array(site.up)),
+        gravity_m_s2=attitudes @ site.down_m_s2,
         windows_s=np.array([(average.start_s + since_s, average.end_s + since_s) for average, since_s in placed]),
         joints=(*(turn.joint_name for turn, _ in turns), *[None] * len(rests)),
         axis_errors_rad_s=_axis_errors([turn for turn, _ in turns], len(rests), surroundings.uncertainty.axis_deg),

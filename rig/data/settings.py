@@ -11,6 +11,7 @@ from dataclasses import asdict, dataclass, fields
 from typing import TYPE_CHECKING, Annotated, Literal
 
 import numpy as np
+from numpy.typing import NDArray
 from pydantic import Field
 
 from rig.config.sensor_catalogue import PARTS
@@ -77,6 +78,11 @@ class Site:
     up: Vector3
     gravity_m_s2: Positive
     earth_rate_rad_s: Vector3 | None
+
+    @property
+    def down_m_s2(self) -> NDArray[np.float64]:
+        """(3,) gravity in the base frame."""
+        return -self.gravity_m_s2 * np.array(self.up)
 
 
 @dataclass(frozen=True, slots=True)

@@ -87,14 +87,13 @@ def dwell_reading(stream: Stream, motion: ArmMotion, finished: Dwelt, settings: 
     readings = accelerations(stream, inside)
     count = stream.sensor.sensitivity_m_s2_per_count or 0.0
     steady, known = np.zeros((len(readings), 1)), np.ones(len(readings), dtype=np.bool_)
-    temperature = stream.raw["temperature_counts"][inside].mean() * stream.sensor.temperature_c_per_count
     return DwellReading(
         index=dwell.index,
         name=dwell.name,
         reading=mean_of(readings, count, steady, known, as_before=False),
         attitude=motion.attitude(window.start_s, window.end_s),
         window=window,
-        temperature_c=float(temperature) + stream.sensor.temperature_offset_c,
+        temperature_c=stream.temperature_c(inside),
     )
 
 

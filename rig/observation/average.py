@@ -65,6 +65,11 @@ class Stream:
     readings_rad_s: Array
     raw: NDArray[Any]
 
+    def temperature_c(self, inside: slice) -> float:
+        """The mean of the samples inside."""
+        counts = float(self.raw["temperature_counts"][inside].mean())
+        return counts * self.sensor.temperature_c_per_count + self.sensor.temperature_offset_c
+
 
 def on_the_arms_clock(raw: NDArray[Any], sensor: RecordedSensor, motion: ArmMotion) -> Stream:
     """Samples (n,) SAMPLE_DTYPE in rad/s at the controller's times. Raises Fault as `estimate_time_base` does."""
@@ -96,7 +101,6 @@ def average(
     """The readings inside: see `mean_of`."""
     count = stream.sensor.sensitivity_rad_s_per_count
     found = mean_of(stream.readings_rad_s[inside], count, passing, covered, as_before=as_before)
-    temperature = stream.raw["temperature_counts"][inside].mean() * stream.sensor.temperature_c_per_count
     return Average(
         mean_rad_s=found.mean,
         variance_rad2_s2=found.variance,
@@ -104,7 +108,7 @@ def average(
         samples=found.samples,
         start_s=window.start_s,
         end_s=window.end_s,
-        temperature_c=float(temperature) + stream.sensor.temperature_offset_c,
+        temperature_c=stream.temperature_c(inside),
     )
 
 

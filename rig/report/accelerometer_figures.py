@@ -10,13 +10,13 @@ from rig.analysis.acceleration import AccelerometerResult
 from rig.analysis.outcome import Outcome
 from rig.data.result_file import ResultDocument
 from rig.estimation.arrays import Array
+from rig.estimation.earth import MICRO_G_M_S2
+from rig.report.figures import save, style
 from rig.station.events import NotPlotted, Plotted, RunEvent
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
     from matplotlib.figure import Figure
-
-MICRO_G = 9.80665e-6  # m/s²
 
 
 def write_accelerometer_figures(outcome: Outcome, document: ResultDocument, folder: Path) -> tuple[RunEvent, ...]:
@@ -27,7 +27,7 @@ def write_accelerometer_figures(outcome: Outcome, document: ResultDocument, fold
 def draw_accelerometers(found: Mapping[str, AccelerometerResult], folder: Path) -> Plotted | NotPlotted:
     """Draw `accelerometer_<sensor>`, as PNG and SVG, into `folder`; nothing where matplotlib is absent."""
     try:
-        import matplotlib as mpl
+        import matplotlib  # noqa: F401
     except ImportError:
         return NotPlotted()
     from matplotlib.figure import Figure
@@ -35,12 +35,11 @@ def draw_accelerometers(found: Mapping[str, AccelerometerResult], folder: Path) 
     names = []
     for sensor, result in found.items():
         name = f"accelerometer_{sensor}"
-        with mpl.rc_context({"font.size": 9, "svg.hashsalt": "rig", "axes.grid": True, "grid.alpha": 0.3}):
+        with style():
             figure = Figure(figsize=(10.0, 4.6), layout="constrained")
             draw_accelerometer(figure, result)
             figure.suptitle(f"{sensor}: accelerometer in {len(result.dwells)} attitudes")
-            figure.savefig(folder / f"{name}.png", dpi=110)
-            figure.savefig(folder / f"{name}.svg", dpi=110, metadata={"Date": None})
+            save(figure, folder, name)
         names.append(name)
     return Plotted(tuple(names))
 
@@ -56,11 +55,11 @@ def _draw_residuals(axes: "Axes", result: AccelerometerResult) -> None:
     count = np.arange(1, len(result.dwells) + 1)
     noise = np.sqrt([dwell.reading.variance for dwell in result.dwells])
     turned = result.solution.attitude_error.std_rad * result.gravity_m_s2
-    expected = 2 * np.hypot(noise.max(axis=1), turned) / MICRO_G
+    expected = 2 * np.hypot(noise.max(axis=1), turned) / MICRO_G_M_S2
     axes.fill_between(count, -expected, expected, color="0.9", label="±2σ of noise and attitude", step="mid")
     for i, axis in enumerate("xyz"):
-        left = result.solution.dwell_residuals_m_s2[:, i] / MICRO_G
-        axes.errorbar(count + 0.15 * (i - 1), left, 2 * noise[:, i] / MICRO_G, fmt="o", ms=3, lw=0.8, label=axis)
+        left = result.solution.dwell_residuals_m_s2[:, i] / MICRO_G_M_S2
+        axes.errorbar(count + 0.15 * (i - 1), left, 2 * noise[:, i] / MICRO_G_M_S2, fmt="o", ms=3, lw=0.8, label=axis)
     axes.locator_params("x", integer=True)
     axes.set_xlabel("attitude")
     axes.set_ylabel("reading − model   µg")

@@ -8,7 +8,8 @@ from rich.box import SIMPLE
 from rich.console import Console
 from rich.table import Table
 
-from rig.analysis.attitude_account import MICRO_G, AttitudeAccount
+from rig.analysis.attitude_account import AttitudeAccount
+from rig.estimation.earth import MICRO_G_M_S2
 from rig.station.plain_text import plain
 
 
@@ -43,7 +44,11 @@ def print_account(console: Console, account: AttitudeAccount) -> None:
     for heading in headings:
         table.add_column(heading, justify="right")
     for name, expected in account.sensors.items():
-        values = [1e6 * expected.scale_std, 1e3 * expected.non_orthogonality_std_rad, expected.bias_std_m_s2 / MICRO_G]
+        values = [
+            1e6 * expected.scale_std,
+            1e3 * expected.non_orthogonality_std_rad,
+            expected.bias_std_m_s2 / MICRO_G_M_S2,
+        ]
         if expected.second_order_std_s2_m is not None:
             values.append(1e6 * expected.second_order_std_s2_m)
         table.add_row(plain(name), *(f"{value:.3g}" for value in values))

@@ -1,6 +1,7 @@
 """A verification's plots, in the manner of SIX, Figs. 7–10: sensor and reference over time, before and after."""
 
 from collections.abc import Iterable
+from contextlib import AbstractContextManager
 from pathlib import Path
 from typing import TYPE_CHECKING
 
@@ -45,19 +46,30 @@ def draw_verifications(verifications: Iterable[Verification], folder: Path) -> P
 
 
 def _write(verification: Verification, when: str, comparison: Comparison, folder: Path) -> str:
-    import matplotlib as mpl
     from matplotlib.figure import Figure
 
     name = f"verification_{verification.sensor}_{when}"
-    with mpl.rc_context({"font.size": 9, "svg.hashsalt": "rig", "axes.grid": True, "grid.alpha": 0.3}):
+    with style():
         figure = Figure(figsize=(10.0, 7.5))
         draw_comparison(figure, comparison, verification.sensor, verification.reference.name)
         figure.suptitle(
             f"{verification.sensor} {when} calibration, beside {verification.reference.name}; RMS of sweeps and rests"
         )
-        figure.savefig(folder / f"{name}.png", dpi=110)
-        figure.savefig(folder / f"{name}.svg", dpi=110, metadata={"Date": None})
+        save(figure, folder, name)
     return name
+
+
+def style() -> AbstractContextManager[None]:
+    """What is drawn within looks alike, and its SVG has the same bytes each time."""
+    import matplotlib as mpl
+
+    return mpl.rc_context({"font.size": 9, "svg.hashsalt": "rig", "axes.grid": True, "grid.alpha": 0.3})
+
+
+def save(figure: "Figure", folder: Path, name: str) -> None:
+    """As PNG and as SVG."""
+    figure.savefig(folder / f"{name}.png", dpi=110)
+    figure.savefig(folder / f"{name}.svg", dpi=110, metadata={"Date": None})
 
 
 def draw_comparison(figure: "Figure", comparison: Comparison, sensor: str, reference: str) -> None:
