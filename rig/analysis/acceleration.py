@@ -147,7 +147,14 @@ def _calibrated(
     )
     weighted = solve(method="attitude_weighted").fit  # refuses one attitude that is off alone
     check_axes(weighted.matrix / np.linalg.norm(weighted.matrix, axis=1, keepdims=True), np.eye(3))
-    solution = solve_imu(seen, sweeps, gravity_m_s2=site.gravity_m_s2, up=site.up, second_order=settings.second_order)
+    solution = solve_imu(
+        seen,
+        sweeps,
+        gravity_m_s2=site.gravity_m_s2,
+        up=site.up,
+        second_order=settings.second_order,
+        repeatability_rad=_repeatability_rad(settings),
+    )
     if settings.second_order:
         check_seen(solution.second_order_s2_m, np.sqrt(np.diag(solution.covariance)[SECOND]), NOT_SEEN)
     scale = 1 / np.linalg.norm(solution.matrix, axis=1)
@@ -210,6 +217,13 @@ def _sweeps(name: str, recordings: Sequence[ObservedRun], mounting: Array) -> Sw
         arms_m=np.array([each.arm_m for each in found]) @ mounting.T,
         stations=np.array([stations.index(each.station) for each in found], dtype=np.intp),
     )
+
+
+def _repeatability_rad(settings: RunSettings) -> float:
+    """A standard deviation."""
+    if settings.uncertainty is None:
+        return 0.0
+    return float(np.radians(settings.uncertainty.repeatability_deg) / np.sqrt(3))
 
 
 def _beside(solve: Callable[[], AccelerometerSolution]) -> TriaxialSolution | Fault:

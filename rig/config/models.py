@@ -383,6 +383,13 @@ class UncertaintySection(Section):
         description="direction of each wrist's axis by the kinematics that are used: 1 mrad, as of calibrated arms of "
         "this size (Slamani, Nubiola and Bonev, 2012)",
     )
+    repeatability_deg: float = Field(
+        default=0.005,
+        ge=0,
+        le=5,
+        description="how differently the arm stands when it comes back: 87 µrad, as of an arm of this size (Slamani, "
+        "Nubiola and Bonev, 2012)",
+    )
     sensor_offset_mm: float = Field(
         default=50.0, ge=0, le=1000, description="how far from the flange's axes the sensor sits, either way"
     )

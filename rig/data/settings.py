@@ -100,6 +100,7 @@ class Uncertainty:
     sensor_offset_mm: Annotated[float, Field(ge=0)]
     g_sensitivity_deg_s_g: dict[str, Annotated[float, Field(ge=0)]]
     decision_rule: DecisionRule
+    repeatability_deg: Annotated[float, Field(ge=0)] = 0.0  # unknown to recordings of before
 
 
 @dataclass(frozen=True, slots=True)

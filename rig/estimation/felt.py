@@ -18,7 +18,7 @@ Dwells and sweeps are one list of K = N + 3 M vectors: the N dwells, then mean, 
 θ (22,) holds F row by row, v_ref, b, r, τ and φ.
 """
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.typing import NDArray
@@ -30,6 +30,7 @@ LEVER, DELAY, SECOND = slice(15, 18), 18, slice(19, 22)
 PARAMETERS = 22
 OWN_ERRORS = 3  # of a dwell: a small turn of the flange
 SHARED_ERRORS = 10  # of a station: a small turn in the flange's frame, one in the base's, four waves of the angle
+TURNS = 6  # of these ten, both turns
 SHARE = 0.5**0.5  # of δ, in each: so both turns together are off as far as a dwell is, and so are all waves together
 
 
@@ -77,16 +78,21 @@ NO_SWEEPS = Sweeps(
 
 @dataclass(frozen=True, slots=True)
 class Movement:
-    """Dwells and sweeps together."""
+    """Dwells and sweeps together.
+
+    `repeatability_rad`: the standard deviation of the small turns by which each sweep is off for itself, about each
+    axis, where those of one station share all else: a joint that is come to from the other side stands elsewhere.
+    """
 
     dwells: Dwells
     sweeps: Sweeps
+    repeatability_rad: float = 0.0
 
     def without(self, dwell: int) -> "Movement":
         """All but one dwell."""
         left = np.arange(len(self.dwells.readings_m_s2)) != dwell
         own = self.dwells
-        return Movement(Dwells(own.readings_m_s2[left], own.variances_m2_s4[left], own.attitudes[left]), self.sweeps)
+        return replace(self, dwells=Dwells(own.readings_m_s2[left], own.variances_m2_s4[left], own.attitudes[left]))
 
     def readings(self) -> Array:
         """(K, 3) m/s²."""
@@ -193,6 +199,17 @@ def effects(theta: Array, movement: Movement) -> Array:
         own[..., 6:10] = _of_angle(gravity[rows] @ theta[REFERENCE], axis, speed**2, arm)
         own *= SHARE
     return _read(changes, theta, movement).reshape(3 * len(gravity), -1)
+
+
+def noise(theta: Array, movement: Movement) -> Array:
+    """(3 K, 3 K) covariance of what is off in each reading for itself: its noise, and the arm's repeatability."""
+    whole, sweeps = movement.noise(), movement.sweeps
+    if movement.repeatability_rad == 0.0:
+        return whole
+    alone = replace(sweeps, stations=np.arange(len(sweeps.stations)))
+    own = effects(theta, replace(movement, sweeps=alone))[:, OWN_ERRORS * len(movement.dwells.readings_m_s2) :]
+    turns = own[:, np.arange(own.shape[1]) % SHARED_ERRORS < TURNS] * (movement.repeatability_rad / SHARE)
+    return np.asarray(whole + turns @ turns.T, dtype=np.float64)
 
 
 def _of_angle(pulled: Array, axis: Array, speed_squared: float, arm: Array) -> Array:

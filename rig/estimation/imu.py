@@ -26,6 +26,7 @@ from rig.estimation.felt import (
     Sweeps,
     effects,
     jacobian,
+    noise,
     predicted,
 )
 from rig.estimation.linear_start import MAX_CONDITION, REMEDY, linear_start
@@ -92,17 +93,18 @@ def solve_imu(
     up: ArrayLike = (0.0, 0.0, 1.0),
     second_order: bool = False,
     attitude_std_rad: float | None = None,
+    repeatability_rad: float = 0.0,
 ) -> ImuSolution:
     """Calibrate from dwells, sweeps or both.
 
     `gravity_m_s2` is the size of v_ref, `up` (3,) says to which side of the base it points, roughly;
-    `attitude_std_rad` holds δ, 0 for an exact arm, instead of finding it.
+    `attitude_std_rad` holds δ, 0 for an exact arm, instead of finding it. `repeatability_rad`: see `Movement`.
 
     Raises Fault `too_few_observations`, `not_finite`, `bad_variance`, `bad_speed`, `zero_reading`,
     `duplicated_observation`, `bad_attitude`, `rank_deficient`, `ill_conditioned`, `sign_unknown`, `wrong_unit`,
     `mirrored_axis`, `attitude_untrustworthy`; ValueError for a wrong shape, or axes that are no unit vectors.
     """
-    movement = Movement(dwells, sweeps)
+    movement = Movement(dwells, sweeps, repeatability_rad)
     held = _held(movement, second_order=second_order)
     needed = PARAMETERS - 1 - len(held)
     _check(movement, needed)
@@ -153,23 +155,23 @@ def covariance_bound(
     """
     movement = Movement(dwells, sweeps)
     free = _free(theta, _held(movement, second_order=second_order))
-    readings = apart(movement.noise(), effects(theta, movement))
+    readings = apart(noise(theta, movement), effects(theta, movement))
     return Fit(theta, readings, jacobian(theta, movement) @ free, free, attitude_std_rad, 0).covariance()
 
 
 def most_likely(start: Array, movement: Movement, held: list[int], attitude_std_rad: float | None) -> Fit:
     """The most likely θ and δ from `start` (22,), alternately, until δ stands still; `held` elements of θ stay."""
-    noise, theta, steps = movement.noise(), start, 0
+    theta, steps = start, 0
     delta, last = attitude_std_rad or 0.0, np.inf
     for _ in range(PASSES):
-        readings = apart(noise, effects(theta, movement))
+        readings = apart(noise(theta, movement), effects(theta, movement))
         theta, taken = _least_squares(theta, movement, held, readings.white(delta))
         steps += taken
         if attitude_std_rad is not None or abs(delta - last) <= SETTLED * delta:
             break
         slopes = jacobian(theta, movement) @ _free(theta, held)
         residuals = (movement.readings() - predicted(theta, movement)).ravel()
-        last, delta = delta, likeliest_error(apart(noise, effects(theta, movement)), residuals, slopes)
+        last, delta = delta, likeliest_error(apart(noise(theta, movement), effects(theta, movement)), residuals, slopes)
     free = _free(theta, held)
     return Fit(theta, readings, jacobian(theta, movement) @ free, free, delta, steps)
 

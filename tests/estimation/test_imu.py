@@ -30,7 +30,16 @@ from rig.estimation.imu import ImuSolution, covariance_bound, most_likely, solve
 from rig.estimation.reference_model import BIAS
 from rig.estimation.sensor_axes import non_orthogonality
 from support.arm_attitudes import crooked_arm, joints_rad
-from support.arm_sweeps import DWELL_S, MICRO_G, Truth, joints_at, planned, recorded_dwells, recorded_sweeps
+from support.arm_sweeps import (
+    DWELL_S,
+    MICRO_G,
+    Truth,
+    joints_at,
+    planned,
+    recorded_dwells,
+    recorded_sweeps,
+    with_readings,
+)
 
 NORM = 9.80665
 UP = NORM * np.array([0.02, -0.01, 1.0]) / np.linalg.norm([0.02, -0.01, 1.0])  # a base that is not quite upright
@@ -285,6 +294,38 @@ def test_points_of_a_turn_that_are_taken_for_independent_state_too_little() -> N
     shared = errors(TWELVE, 1e-3, "MPU-9250", 10).over_stated[2]
     print(f"bias over what is stated: {apart:.1f} apart, {shared:.1f} shared")
     assert apart > 2 and shared < 1.5
+
+
+@pytest.mark.slow
+def test_a_joint_that_stands_elsewhere_when_it_comes_from_the_other_side_is_no_delay() -> None:
+    """Both look alike, so the delay is stated as well as the arm repeats; without that far too well."""
+    half_width_rad, delays = 5e-5, []
+    for seed in range(5):
+        rng = np.random.default_rng(seed)
+        truth, arm = drawn(rng), crooked_arm(1e-4, rng)
+        dwells, swept = recorded_dwells(truth, arm, JOINTS, DENSITY_UG["ADIS16465"], rng), []
+        for sweep in planned(6):
+            lag = half_width_rad / 2 * np.r_[0, 0, 0, rng.choice([-1, 1], 3)]
+            lag[sweep.joint] = half_width_rad / 2 * (1 if sweep.direction == "ccw" else -1)
+            swept.append(recorded_sweeps(truth, partial(_lagging, arm, lag), (sweep,), DENSITY_UG["ADIS16465"], rng))
+        sweeps = with_readings(
+            np.concatenate([each.harmonics_m_s2 for each in swept]),
+            np.concatenate([each.covariances_m2_s4 for each in swept]),
+            planned(6),
+        )
+        off = []
+        for repeatability_rad in (0.0, half_width_rad / np.sqrt(3)):
+            solution = solve(dwells, sweeps, repeatability_rad=repeatability_rad)
+            assert solution.delay_s is not None
+            off.append((solution.delay_s - truth.delay_s) / np.sqrt(solution.covariance[DELAY, DELAY]))
+        delays.append(off)
+    without, known = np.sqrt(np.mean(np.square(delays), axis=0))
+    print(f"delay over what is stated: {known:.1f}, without the repeatability {without:.1f}")
+    assert known < 2.5 and without > 2 * known
+
+
+def _lagging(arm: Callable[[Array], Array], lag_rad: Array, joints: Array) -> Array:
+    return arm(joints - lag_rad)
 
 
 def test_the_delay_turns_both_ways_apart() -> None:
