@@ -13,7 +13,7 @@ import numpy as np
 
 from rig.analysis.pieces import Pieces
 from rig.estimation.arrays import Array
-from rig.estimation.bias_process import estimate_bias_process
+from rig.estimation.bias_process import likeliest_bias_process
 
 # Of the speed: twists of a real arm's wrists (−8e-4, +4e-4 rad, UR's own calibration), and what 0.1 % of full scale,
 # a common statement of nonlinearity, amounts to at a quarter of the range.
@@ -120,7 +120,7 @@ def _covariance(pieces: Pieces, felt: Array, steady: Array) -> Array:
     off = (TOLERANCE**2 + np.outer(pieces.speed_std, pieces.speed_std)) * same * np.outer(speed, speed)
     off[own, own] += (WITHIN_A_TURN * speed) ** 2
     variances = pieces.variances_rad2_s2 + ((WITHIN_A_TURN * speed) ** 2)[:, None]
-    bias = estimate_bias_process(steady, pieces.means_rad_s - felt, variances, pieces.times_s)
+    bias = likeliest_bias_process(steady, pieces.means_rad_s - felt, variances, pieces.times_s)
     noise = np.array([np.diag(each) for each in pieces.variances_rad2_s2.T])
     return np.asarray(noise + off + bias.covariance(pieces.times_s), dtype=np.float64)
 

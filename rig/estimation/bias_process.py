@@ -6,6 +6,7 @@ no memory. Both are found from the averages themselves by restricted maximum lik
 Biometrika 58 (1971) 545), which takes into account how much of the scatter the fitted parameters have taken up.
 """
 
+from collections.abc import Callable
 from dataclasses import dataclass
 
 import numpy as np
@@ -59,19 +60,36 @@ def walk_covariance(windows_s: ArrayLike) -> Array:
     return covariance
 
 
-def estimate_bias_process(
-    design: ArrayLike,
-    means_rad_s: ArrayLike,
-    variances_rad2_s2: ArrayLike,
-    windows_s: ArrayLike,
+def expected_bias_process(
+    design: ArrayLike, means_rad_s: ArrayLike, variances_rad2_s2: ArrayLike, windows_s: ArrayLike
 ) -> BiasProcess:
     """The process behind the mean readings (N, 3), which without it are `design` (N, p) × parameters + noise.
 
     `variances_rad2_s2` (N, 3) are those of the noise, `windows_s` (N, 2) when was averaged. One process for the three
-    axes, so that few averages tell it. Walk and scatter each have to make the averages likelier by as much as Akaike's
-    criterion asks of a parameter: to wait until they are certain would leave out most of what is there, and whatever is
-    likeliest holds a little of both where there is noise alone.
+    axes, so that few averages tell it. Walk and scatter are their means over all sizes, each as likely as it makes the
+    averages; before, each was as likely to be there as not, and of any order of magnitude. The likeliest sizes would by
+    chance be far too small in one run and too large in the next, and so would be every uncertainty.
     """
+    return _bias_process(design, means_rad_s, variances_rad2_s2, windows_s, _mean)
+
+
+def likeliest_bias_process(
+    design: ArrayLike, means_rad_s: ArrayLike, variances_rad2_s2: ArrayLike, windows_s: ArrayLike
+) -> BiasProcess:
+    """The same with the likeliest sizes, zero where they do not make the averages likelier by Akaike's price.
+
+    It holds no walk where noise alone would do: what is held against it is not excused by what is not there.
+    """
+    return _bias_process(design, means_rad_s, variances_rad2_s2, windows_s, _likeliest)
+
+
+def _bias_process(
+    design: ArrayLike,
+    means_rad_s: ArrayLike,
+    variances_rad2_s2: ArrayLike,
+    windows_s: ArrayLike,
+    chosen: Callable[[Array, Array], Array],
+) -> BiasProcess:
     z, means, variances = (np.asarray(a, dtype=np.float64) for a in (design, means_rad_s, variances_rad2_s2))
     freedom = 3 * (len(z) - z.shape[1])
     if freedom < 3:
@@ -80,14 +98,25 @@ def estimate_bias_process(
     typical = float(np.median(variances))
     grid = np.concatenate([[0.0], typical * np.geomspace(SPAN**-0.5, SPAN, STEPS) ** 2])
     walks = grid / float(np.median(np.diag(unit)))
-    sizes = np.array([(walk, scatter) for walk in walks for scatter in grid])
-    gain = -PRICE * np.count_nonzero(sizes, axis=1).astype(np.float64)
+    squares = np.array([(walk, scatter) for walk in walks for scatter in grid])
+    likelihood = np.zeros(len(squares))
     for axis in range(3):
-        noise = np.diag(variances[:, axis]) + _added(sizes[:, :1, None], sizes[:, 1:, None], unit)
-        gain += _restricted_likelihood(z, means[:, axis], noise)
-    best = int(np.argmax(gain))
-    walk, scatter = np.sqrt(sizes[best]).tolist()
+        noise = np.diag(variances[:, axis]) + _added(squares[:, :1, None], squares[:, 1:, None], unit)
+        likelihood += _restricted_likelihood(z, means[:, axis], noise)
+    walk, scatter = chosen(np.sqrt(squares), likelihood).tolist()
     return BiasProcess(walk, scatter, freedom)
+
+
+def _mean(sizes: Array, likelihood: Array) -> Array:
+    """(2,) of sizes (K, 2), of which zero is before as likely as all others together."""
+    belief = likelihood - np.log(STEPS) * np.count_nonzero(sizes, axis=1)
+    weights = np.exp(belief - belief.max())
+    return np.asarray(weights @ sizes / weights.sum(), dtype=np.float64)
+
+
+def _likeliest(sizes: Array, likelihood: Array) -> Array:
+    """(2,) of sizes (K, 2)."""
+    return np.asarray(sizes[np.argmax(likelihood - PRICE * np.count_nonzero(sizes, axis=1))], dtype=np.float64)
 
 
 def _added(walk: Array | float, scatter: Array | float, unit: Array) -> Array:

@@ -12,7 +12,7 @@ import numpy as np
 
 from rig.errors import Fault
 from rig.estimation.arrays import Array
-from rig.estimation.bias_process import BiasProcess, estimate_bias_process
+from rig.estimation.bias_process import BiasProcess, expected_bias_process
 from rig.estimation.common_errors import CommonErrors, solve_with_common_errors
 from rig.estimation.nonlinearity import Nonlinearity, curvature, distinct_speeds, nonlinearity
 from rig.estimation.vector_model import VectorSolution, design_matrix, of_the_speed
@@ -109,7 +109,7 @@ def _explain(seen: Seen, nominal_mounting: Array, gravity_m_s2: Array | None) ->
 
     steady, errors = solve(None)
     of_the_speeds = of_the_speed(seen.rates_rad_s, seen.speed_std_rad_s, steady.matrix) ** 2
-    bias = estimate_bias_process(
+    bias = expected_bias_process(
         design_matrix(seen.rates_rad_s, gravity_m_s2),
         seen.means_rad_s - errors.readings_rad_s,
         seen.variances_rad2_s2 + of_the_speeds,
