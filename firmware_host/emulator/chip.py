@@ -1,5 +1,6 @@
 """The STM32L432's peripherals and the rig's wiring, assembled."""
 
+import ctypes
 from collections.abc import Callable, Sequence
 
 from firmware_host.emulator import rcc
@@ -10,6 +11,7 @@ from firmware_host.emulator.engine import Engine
 from firmware_host.emulator.flash import Flash
 from firmware_host.emulator.flash_memory import FLASH_BYTES, STORE_OFFSET, FlashMemory
 from firmware_host.emulator.gpio import Exti, Port, Syscfg
+from firmware_host.emulator.hooks import Shortcuts
 from firmware_host.emulator.nvic import Nvic
 from firmware_host.emulator.spi import Spi1
 from firmware_host.emulator.spi_device import BoardClock, DeviceLink, SpiBus, SpiDevice
@@ -58,6 +60,7 @@ class Chip:
         )
         sensor_bus = SpiBus(timeline, lambda: self._on_pins(_SENSOR_BUS_FUNCTIONS))
         self._spi = Spi1(timeline, clocks, sensor_bus.exchange)
+        self._timer = Tim2(timeline, clocks)
         self.control = SystemControl(nvic, lambda: on_reset(rcc.RESET_SOFTWARE))
         self.flash = flash = Flash(timeline, memory, nvic)
         power = rcc.Power()
@@ -71,7 +74,8 @@ class Chip:
         )
         watchdog = Watchdog(timeline, lambda: on_reset(rcc.RESET_WATCHDOG))
         peripherals, ports, core = RegisterBus(_PERIPHERALS), RegisterBus(_PORTS), RegisterBus(_CORE)
-        engine.map_io(_PERIPHERALS, _PERIPHERALS_SIZE, peripherals.read, peripherals.write)
+        shortcuts = Shortcuts(None, *map(ctypes.addressof, (timeline, self._timer.counter, self._spi.bus)))
+        engine.map_io(_PERIPHERALS, _PERIPHERALS_SIZE, peripherals.read, peripherals.write, shortcuts)
         engine.map_io(_PORTS, _PORTS_SIZE, ports.read, ports.write)
         engine.map_io(_STORE, _STORE_SIZE, flash.read, flash.write)
         engine.map_io(_CORE, _CORE_SIZE, core.read, core.write)
@@ -79,7 +83,7 @@ class Chip:
         self._blocks: list[Peripheral] = []
         self._attach(core, SysTick(timeline, clocks, nvic), nvic, self.control)
         self._attach(peripherals, exti, watchdog)
-        self._attach_gated(peripherals, dma, flash, Tim2(timeline, clocks), self.usart, power, syscfg, self._spi)
+        self._attach_gated(peripherals, dma, flash, self._timer, self.usart, power, syscfg, self._spi)
         self._attach_gated(ports, *self._ports.values())
         self._attach(peripherals, self.rcc)  # last: its reset switches the gates of the others
         for device in devices:
@@ -109,9 +113,14 @@ class Chip:
     def _gate(self, peripheral: str, on: bool) -> None:
         bus, block = self._gated[peripheral]
         bus.clock(block, on)
+        if block is self._timer:
+            self._timer.counter.clocked = on
+        elif block is self._spi:
+            self._spi.bus.clocked = on
 
     def _clock_changed(self) -> None:
         self._spi.retune()
+        self._timer.retune()
         self._on_clock()
 
     def _port_of(self, pin: str) -> Port:

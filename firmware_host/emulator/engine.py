@@ -2,12 +2,13 @@
 
 The Python binding that ships with Unicorn wraps every callback and every register in objects of its own. Calling the
 same shared library directly halves the price of a register access by the firmware (0.2 µs instead of 0.5 µs) and
-cuts a batch of eleven core registers from 16 µs to 0.7 µs; the emulator's pace hangs on these two numbers.
+cuts a batch of eleven core registers from 16 µs to 0.7 µs; the emulator's pace hangs on these two numbers. What happens
+far more often yet is not for Python at all: see `hooks.py`.
 """
 
 import ctypes
 import weakref
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Sequence
 from typing import Any
 
 from unicorn import (
@@ -32,9 +33,13 @@ from unicorn import (
 from unicorn.arm_const import UC_ARM_REG_LR, UC_ARM_REG_PC, UC_CPU_ARM_CORTEX_M4
 from unicorn.unicorn_py3.unicorn import uclib
 
+from firmware_host.emulator.hooks import BlockTicks, Meter, Shortcuts, address_of
 from firmware_host.emulator.timeline import Timeline
 
 _SET_CPU_MODEL = (1 << 30) | (1 << 26) | UC_CTL_CPU_MODEL  # uc_ctl: write, one argument
+# While the core runs nobody else may: giving the interpreter up and taking it back would cost at each callback
+_start = ctypes.PyDLL(uclib._name, handle=uclib._handle).uc_emu_start
+_start.argtypes = uclib.uc_emu_start.argtypes
 _NO_END = 0xFFFF_FFFF  # an address the core never executes: only stop(), WFI and faults end a run
 
 # Unicorn passes one argument more to all of these, the user's data: what is not looked at need not be converted
@@ -106,9 +111,17 @@ class Engine:
         _check(uclib.uc_mem_map(self._handle, address, size, UC_PROT_READ | UC_PROT_EXEC))
 
     def map_io(
-        self, address: int, size: int, read: Callable[[int, int], int], write: Callable[[int, int, int], None]
+        self,
+        address: int,
+        size: int,
+        read: Callable[[int, int], int],
+        write: Callable[[int, int, int], None],
+        shortcuts: Shortcuts | None = None,
     ) -> None:
-        """Route a range to `read(offset, size)` and `write(offset, size, value)`; what they raise ends `run`."""
+        """Route a range to `read(offset, size)` and `write(offset, size, value)`; what they raise ends `run`.
+
+        `shortcuts`: of the reads, some need not come to `read`.
+        """
 
         def on_read(_handle: int, offset: int, width: int) -> int:
             try:
@@ -126,15 +139,21 @@ class Engine:
         read_callback, write_callback = _READ(on_read), _WRITE(on_write)
         self._callbacks += [read_callback, write_callback]
         reader, writer = _pointer(read_callback), _pointer(write_callback)
-        _check(uclib.uc_mmio_map(self._handle, address, size, reader, None, writer, None))
+        if shortcuts is not None:
+            shortcuts.ask = reader.value
+            self._callbacks.append(shortcuts)
+            reader = ctypes.c_void_p(address_of("read"))
+        _check(
+            uclib.uc_mmio_map(
+                self._handle, address, size, reader, shortcuts and ctypes.byref(shortcuts), writer, None
+            )
+        )
 
-    def meter(self, timeline: Timeline, ticks: Mapping[int, int], measure: Callable[[int, int], int]) -> None:
+    def meter(self, timeline: Timeline, ticks: BlockTicks, measure: Callable[[int, int], int]) -> None:
         """Let time pass with the instructions: before each block add `ticks[address]`, or stop if it must.
 
         A block not yet in `ticks` is given to `measure(address, size_bytes)`, which returns its ticks.
         """
-
-        known = ticks.get
 
         def on_block(_handle: int, address: int, size: int) -> None:
             try:
@@ -142,12 +161,14 @@ class Engine:
                     self.paused = True
                     self.stop()
                     return
-                cost = known(address)
-                timeline.now += measure(address, size) if cost is None else cost
+                timeline.now += ticks[address] or measure(address, size)
             except BaseException as error:
                 self._fail(error)
 
-        self._hook(UC_HOOK_BLOCK, _BLOCK(on_block))
+        callback = _BLOCK(on_block)
+        meter = Meter(_pointer(callback), ctypes.addressof(timeline), *ticks.place)
+        self._callbacks += [callback, meter, timeline, ticks]
+        self._add(UC_HOOK_BLOCK, ctypes.c_void_p(address_of("block")), ctypes.byref(meter))
 
     def on_instruction(self, address: int, hook: Callable[[int], None]) -> Callable[[], None]:
         """Call `hook(address)` before the instruction at `address`; what this returns ends that, between two runs."""
@@ -210,7 +231,7 @@ class Engine:
 
     def run(self, address: int) -> None:
         """Run from `address` until `stop`, WFI or a fault. Raises EngineFault, or what a callback raised."""
-        status = uclib.uc_emu_start(self._handle, address | 1, _NO_END, 0, 0)
+        status = _start(self._handle, address | 1, _NO_END, 0, 0)
         if self._raised is not None:
             raised, self._raised = self._raised, None
             raise raised
@@ -237,8 +258,11 @@ class Engine:
     def _hook(self, kind: int, callback: Any, begin: int = 1, end: int = 0) -> ctypes.c_size_t:
         """Add a hook for addresses from `begin` to `end`; the default is Unicorn's way to say everywhere."""
         self._callbacks.append(callback)
+        return self._add(kind, _pointer(callback), None, begin, end)
+
+    def _add(self, kind: int, function: ctypes.c_void_p, user: Any, begin: int = 1, end: int = 0) -> ctypes.c_size_t:
         handle = ctypes.c_size_t()
-        _check(uclib.uc_hook_add(self._handle, ctypes.byref(handle), kind, _pointer(callback), None, begin, end))
+        _check(uclib.uc_hook_add(self._handle, ctypes.byref(handle), kind, function, user, begin, end))
         return handle
 
 

@@ -10,6 +10,7 @@ from firmware_host.emulator.chip import Chip
 from firmware_host.emulator.cortex import Cortex, Entry
 from firmware_host.emulator.engine import Engine, EngineFault
 from firmware_host.emulator.flash_memory import FLASH_BYTES, STORE_OFFSET, FlashMemory, PowerLost
+from firmware_host.emulator.hooks import BlockTicks
 from firmware_host.emulator.spi_device import BoardClock, SpiDevice
 from firmware_host.emulator.symbols import Symbols
 from firmware_host.emulator.thumb import instructions, is_floating_point
@@ -51,7 +52,7 @@ class EmulatedBoard:
         self._timeline = Timeline()
         self._engine = Engine()
         self._load_memories(flash, unique_id)
-        self._costs: dict[int, int] = {}  # address of a block → its ticks
+        self._costs = BlockTicks(_FLASH, STORE_OFFSET)
         self._after_wfi: set[int] = set()  # addresses found to follow a WFI
         self._chip = Chip(
             self._engine,

@@ -1,19 +1,20 @@
 """SPI1 (RM0394, chapter 40): master, eight bits, two bytes an access to its FIFOs, each taking its time on the bus."""
 
-from collections import deque
 from collections.abc import Callable, Sequence
 
 from firmware_host.emulator.bus import Register, Stored, Violation
 from firmware_host.emulator.clocks import Clocks
+from firmware_host.emulator.hooks import FIFO_PAIRS, Bus, elsewhere
 from firmware_host.emulator.timeline import TICK_HZ, Timeline
 
 _CPHA, _CPOL, _MSTR, _SPE, _SSI, _SSM = 1 << 0, 1 << 1, 1 << 2, 1 << 6, 1 << 8, 1 << 9
-_RXNE, _TXE, _BSY = 1 << 0, 1 << 1, 1 << 7
-_FIFO_PAIRS = 2
 
 
 class Spi1:
-    """The bus master. `exchange(self, low, high)` puts two bytes on the bus and returns those that come back."""
+    """The bus master. `exchange(self, low, high)` puts two bytes on the bus and returns those that come back.
+
+    Reads of its status and of what has come do not come here: see `hooks.ll`.
+    """
 
     name = "SPI1"
     base = 0x4001_3000
@@ -22,26 +23,24 @@ class Spi1:
         self._timeline = timeline
         self._clocks = clocks
         self._exchange = exchange
+        self.bus = Bus()
         self.setup_count = 0  # how often mode or clock have been set: what was checked before may no longer hold
         self._control = Stored("SPI1 CR1", 0x037F, after=self.retune)
         self._control2 = Stored("SPI1 CR2", 0, initial=0x0700)
-        self._received: deque[tuple[int, int]] = deque()  # tick at which both bytes are in, the bytes
         self.reset()
 
     def reset(self) -> None:
         self._control.reset()
         self._control2.reset()
         self.retune()
-        self._received.clear()
-        self._free = 0  # tick at which the bus has sent everything
-        self._polled = False
+        self.bus.waiting = self.bus.free = self.bus.polled = 0
 
     def registers(self) -> Sequence[Register]:
         return (
             Register(0x00, "CR1", self._control.read, self._write_control),
             self._control2.at(0x04),
-            Register(0x08, "SR", self._read_status, None),
-            Register(0x0C, "DR", self._read_data, self._write_data, size=2),
+            Register(0x08, "SR", elsewhere, None),
+            Register(0x0C, "DR", self._underrun, self._write_data, size=2),
         )
 
     @property
@@ -55,14 +54,14 @@ class Spi1:
 
     def retune(self) -> None:
         """Take over a new bus clock or divider."""
-        self._pair_ticks = round(16 * TICK_HZ / self.clock_hz)
+        self.bus.pair_ticks = self._pair_ticks = round(16 * TICK_HZ / self.clock_hz)
         self._half_bit_ticks = self._pair_ticks // 32
         self.setup_count += 1
 
     @property
     def busy(self) -> bool:
         """Something is still on the bus."""
-        return self._free > self._timeline.now
+        return bool(self.bus.free > self._timeline.now)
 
     def _write_control(self, value: int) -> None:
         if self.busy:
@@ -73,27 +72,14 @@ class Spi1:
         needed = _SPE | _MSTR | _SSM | _SSI
         if self._control.value & needed != needed:
             raise Violation("spi_setup", "SPI1 is used without all of SPE, MSTR, SSM, SSI", "Set CR1 before writing DR")
-        if len(self._received) == _FIFO_PAIRS:
+        bus, waiting = self.bus, self.bus.waiting
+        if waiting == FIFO_PAIRS:
             raise Violation("spi_overrun", "SPI1 DR written more than two pairs ahead of reading", "Read DR in between")
-        self._polled = False
-        answer = self._exchange(self, value & 0xFF, value >> 8)
-        self._free = max(self._timeline.now, self._free) + self._pair_ticks
-        self._received.append((self._free - self._half_bit_ticks, answer))  # a bit is taken in its middle
+        bus.polled = 0
+        bus.answers[waiting] = self._exchange(self, value & 0xFF, value >> 8)
+        bus.free = free = max(self._timeline.now, bus.free) + self._pair_ticks
+        bus.ready[waiting] = free - self._half_bit_ticks  # a bit is taken in its middle
+        bus.waiting = waiting + 1
 
-    def _read_data(self) -> int:
-        self._polled = False
-        if not self._received or self._received[0][0] > self._timeline.now:
-            raise Violation("spi_underrun", "SPI1 DR read before RXNE", "Wait for RXNE")
-        return self._received.popleft()[1]
-
-    def _read_status(self) -> int:
-        awaited = self._received[0][0] if self._received else self._free
-        if awaited > self._timeline.now:
-            if self._polled:  # the firmware waits: so do we, instead of counting its turns
-                self._timeline.wait_until(awaited)
-            self._polled = True
-        now = self._timeline.now
-        status = _BSY if self._free > now else 0
-        if self._received and self._received[0][0] <= now:
-            status |= _RXNE
-        return status | (_TXE if self._free - now <= self._pair_ticks else 0)
+    def _underrun(self) -> int:
+        raise Violation("spi_underrun", "SPI1 DR read before RXNE", "Wait for RXNE")

@@ -2,22 +2,21 @@
 
 from collections.abc import Callable
 
+from firmware_host.emulator.hooks import Time
+
 TICK_HZ = 80_000_000  # the core clock the firmware sets; while it runs slower, an instruction takes several ticks
 NEVER = 1 << 62
 
 
-class Timeline:
+class Timeline(Time):
     """Now, and one next due tick for each registered action.
 
-    The machine's block hook reads `now` and `deadline` on every block, so they are plain attributes: `deadline` is
-    the tick at which something is due, the limit is reached, or `interrupt` was called.
+    The machine's block hook reads `now` and `deadline` on every block, from machine code: `deadline` is the tick at
+    which something is due, the limit is reached, or `interrupt` was called.
     """
 
-    __slots__ = ("_actions", "_due", "_limit", "deadline", "next_due", "now")
-
     def __init__(self) -> None:
-        self.now = 0
-        self.deadline = 0
+        super().__init__(now=0, deadline=0)
         self._limit = 0
         self.next_due = NEVER
         self._actions: list[Callable[[], None]] = []

@@ -1,21 +1,22 @@
 """TIM2 as a free-running counter and the independent watchdog (RM0394, chapters 28 and 31)."""
 
 from collections.abc import Callable, Sequence
+from math import gcd
 
 from firmware_host.emulator.bus import Register, Stored, Violation, check_bits
 from firmware_host.emulator.clocks import Clocks
+from firmware_host.emulator.hooks import Counter, elsewhere
 from firmware_host.emulator.timeline import TICK_HZ, Timeline
 
 _LSI_HZ = 32_000
-_POLL_TICKS = 40  # reads of the counter closer together than this, so many in a row, are a wait
-_POLLS = 3
 _START, _KICK, _UNLOCK = 0xCCCC, 0xAAAA, 0x5555
 
 
 class Tim2:
     """A free-running 32-bit up-counter. The prescaler acts from the next update event on, as on the chip.
 
-    The counter stands while the auto-reload register is 0, as it is after a reset by the maker's own file.
+    The counter stands while the auto-reload register is 0, as it is after a reset by the maker's own file. Its reads
+    do not come here: see `hooks.ll`.
     """
 
     name = "TIM2"
@@ -24,6 +25,7 @@ class Tim2:
     def __init__(self, timeline: Timeline, clocks: Clocks) -> None:
         self._timeline = timeline
         self._clocks = clocks
+        self.counter = Counter()
         self._control = Stored("TIM2 CR1", 1, after=self._switch)
         self._prescaler = Stored("TIM2 PSC", 0xFFFF)
         self._reload = Stored("TIM2 ARR", 0xFFFF_FFFF, after=self._switch)
@@ -34,52 +36,43 @@ class Tim2:
         self._prescaler.reset()
         self._reload.reset()
         self._divider = 1  # the prescaler in effect, plus one
-        self._counted = 0  # the count at `_since`
-        self._since: int | None = None  # tick, None while stopped
-        self._read_at = 0  # tick of the last read
-        self._polls = 0
+        self._runs = False
+        counter = self.counter
+        counter.counted = counter.since = counter.read_at = counter.polls = 0
+        self.retune()
 
     def registers(self) -> Sequence[Register]:
         return (
             self._control.at(0x00),
             Register(0x14, "EGR", None, self._generate),
-            Register(0x24, "CNT", self._read_count, None),
+            Register(0x24, "CNT", elsewhere, None),
             self._prescaler.at(0x28),
             self._reload.at(0x2C),
         )
 
-    @property
-    def _timer_hz(self) -> int:
-        """RM0394, section 6.2.14: timers run at twice the bus clock when the bus is divided."""
-        return self._clocks.pclk1_hz * (1 if self._clocks.pclk1_hz == self._clocks.core_hz else 2)
-
-    def _count(self) -> int:
-        if self._since is None:
-            return self._counted
-        ticks = self._timeline.now - self._since
-        return (self._counted + ticks * self._timer_hz // (TICK_HZ * self._divider)) % (self._reload.value + 1)
-
-    def _read_count(self) -> int:
-        timeline = self._timeline
-        self._polls = self._polls + 1 if timeline.now - self._read_at < _POLL_TICKS else 0
-        if self._polls > _POLLS and self._since is not None:
-            # the firmware waits: so do we, until the next count, instead of counting its turns
-            scale = TICK_HZ * self._divider
-            counts = (timeline.now - self._since) * self._timer_hz // scale
-            timeline.wait_until(self._since - -(counts + 1) * scale // self._timer_hz)
-        self._read_at = timeline.now
-        return self._count()
+    def retune(self) -> None:
+        """Take over a new bus clock, prescaler or reload value."""
+        clocks, counter = self._clocks, self.counter
+        # RM0394, section 6.2.14: timers run at twice the bus clock when the bus is divided
+        timer_hz = clocks.pclk1_hz * (1 if clocks.pclk1_hz == clocks.core_hz else 2)
+        scale = TICK_HZ * self._divider
+        common = gcd(timer_hz, scale)
+        counter.counts, counter.ticks = timer_hz // common if self._runs else 0, scale // common
+        counter.modulus = self._reload.value + 1
 
     def _switch(self) -> None:
-        self._counted = self._count()
-        self._since = self._timeline.now if self._control.value & 1 and self._reload.value else None
+        counter = self.counter
+        counter.counted += (self._timeline.now - counter.since) * counter.counts // counter.ticks
+        counter.counted %= self._reload.value + 1
+        counter.since = self._timeline.now
+        self._runs = bool(self._control.value & 1 and self._reload.value)
+        self.retune()
 
     def _generate(self, value: int) -> None:
         check_bits("TIM2 EGR", value, 1)
         self._divider = self._prescaler.value + 1
-        self._counted = 0
-        if self._since is not None:
-            self._since = self._timeline.now
+        self.counter.counted, self.counter.since = 0, self._timeline.now
+        self.retune()
 
 
 class Watchdog:

@@ -1,0 +1,111 @@
+"""The functions of `hooks.ll` as machine code, and the structures that they share with Python.
+
+A hook in Python costs a microsecond, one of these a few nanoseconds; a second of the board's time has a quarter of a
+million blocks of instructions. LLVM translates them in a few milliseconds, and no compiler need be there.
+"""
+
+import ctypes
+from functools import cache
+from importlib import resources
+
+import llvmlite.binding as llvm
+
+Int = ctypes.c_int64
+FIFO_PAIRS = 2
+
+
+class Time(ctypes.Structure):
+    """`now`, and the `deadline` at which Python is asked before time goes on; ticks."""
+
+    _fields_ = (("now", Int), ("deadline", Int))
+
+
+class Meter(ctypes.Structure):
+    """What blocks cost: `ticks` of the one at each halfword from `first_address` on, 0 where it has to be asked for."""
+
+    _fields_ = (
+        ("ask", ctypes.c_void_p),
+        ("time", ctypes.c_void_p),
+        ("first_address", Int),
+        ("halfwords", Int),
+        ("ticks", ctypes.c_void_p),
+    )
+
+
+class BlockTicks:
+    """Ticks by address, of the blocks of instructions in `size_bytes` from `first_address` on; 0 is not known."""
+
+    def __init__(self, first_address: int, size_bytes: int) -> None:
+        self._first_address = first_address
+        self._halfwords = size_bytes // 2
+        self._ticks = (ctypes.c_uint32 * self._halfwords)()
+
+    @property
+    def place(self) -> tuple[int, int, int]:
+        """The last fields of `Meter`."""
+        return self._first_address, self._halfwords, ctypes.addressof(self._ticks)
+
+    def __getitem__(self, address: int) -> int:
+        index = address - self._first_address >> 1
+        return self._ticks[index] if 0 <= index < self._halfwords else 0
+
+    def __setitem__(self, address: int, ticks: int) -> None:
+        index = address - self._first_address >> 1
+        if 0 <= index < self._halfwords:
+            self._ticks[index] = ticks
+
+    def clear(self) -> None:
+        ctypes.memset(self._ticks, 0, ctypes.sizeof(self._ticks))
+
+
+class Counter(ctypes.Structure):
+    """A free-running counter that can be read while it is `clocked`: `counted` at the tick `since`, from where on it
+    counts `counts` in `ticks`, none while it stands; it starts anew at `modulus`. `read_at`: tick of the last read;
+    `polls`: reads in a row, one just after the other.
+    """
+
+    _fields_ = tuple(
+        (name, Int) for name in ("clocked", "since", "counted", "counts", "ticks", "modulus", "read_at", "polls")
+    )
+
+
+class Bus(ctypes.Structure):
+    """A bus master while it is `clocked`: it has sent everything at the tick `free`, two bytes take `pair_ticks`.
+
+    `waiting` pairs of bytes are under way or not read yet: all of one is in at `ready`, and it is `answers`. `polled`:
+    the status was read in vain.
+    """
+
+    _fields_ = (
+        *((name, Int) for name in ("clocked", "free", "pair_ticks", "polled", "waiting")),
+        ("ready", Int * FIFO_PAIRS),
+        ("answers", Int * FIFO_PAIRS),
+    )
+
+
+class Shortcuts(ctypes.Structure):
+    """What reads of the peripherals need not ask Python for."""
+
+    _fields_ = tuple((name, ctypes.c_void_p) for name in ("ask", "time", "counter", "bus"))
+
+
+def elsewhere() -> int:
+    """In place of a read that machine code answers."""
+    raise AssertionError("this register is read by hooks.ll")
+
+
+@cache
+def address_of(function: str) -> int:
+    """Where the machine code of a function lies; it stays there."""
+    return int(_translated().get_function_address(function))
+
+
+@cache
+def _translated() -> llvm.ExecutionEngine:
+    llvm.initialize_native_target()
+    llvm.initialize_native_asmprinter()
+    module = llvm.parse_assembly((resources.files(__package__) / "hooks.ll").read_text("utf-8"))
+    module.verify()
+    engine = llvm.create_mcjit_compiler(module, llvm.Target.from_default_triple().create_target_machine())
+    engine.finalize_object()
+    return engine
