@@ -1,17 +1,15 @@
 """The STM32L432's peripherals and the rig's wiring, assembled."""
 
-import ctypes
 from collections.abc import Callable, Sequence
 
 from firmware_host.emulator import rcc
 from firmware_host.emulator.bus import Peripheral, RegisterBus
 from firmware_host.emulator.clocks import Clocks
 from firmware_host.emulator.dma import Dma1
-from firmware_host.emulator.engine import Engine
+from firmware_host.emulator.engine import Engine, QuickAccess
 from firmware_host.emulator.flash import Flash
 from firmware_host.emulator.flash_memory import FLASH_BYTES, STORE_OFFSET, FlashMemory
 from firmware_host.emulator.gpio import Exti, Port, Syscfg
-from firmware_host.emulator.hooks import Shortcuts
 from firmware_host.emulator.nvic import Nvic
 from firmware_host.emulator.spi import Spi1
 from firmware_host.emulator.spi_device import BoardClock, DeviceLink, SpiBus, SpiDevice
@@ -56,10 +54,10 @@ class Chip:
             clocks=clocks,
             nvic=nvic,
             dma=dma,
-            pins_connected=lambda: self._on_pins(_SERIAL_FUNCTIONS),
+            pins_connected=self._on_pins(_SERIAL_FUNCTIONS),
         )
-        sensor_bus = SpiBus(timeline, lambda: self._on_pins(_SENSOR_BUS_FUNCTIONS))
-        self._spi = Spi1(timeline, clocks, sensor_bus.exchange)
+        self._spi = Spi1(timeline, clocks)
+        sensor_bus = SpiBus(timeline, self._spi, self._on_pins(_SENSOR_BUS_FUNCTIONS))
         self._timer = Tim2(timeline, clocks)
         self.control = SystemControl(nvic, lambda: on_reset(rcc.RESET_SOFTWARE))
         self.flash = flash = Flash(timeline, memory, nvic)
@@ -74,8 +72,8 @@ class Chip:
         )
         watchdog = Watchdog(timeline, lambda: on_reset(rcc.RESET_WATCHDOG))
         peripherals, ports, core = RegisterBus(_PERIPHERALS), RegisterBus(_PORTS), RegisterBus(_CORE)
-        shortcuts = Shortcuts(None, *map(ctypes.addressof, (timeline, self._timer.counter, self._spi.bus)))
-        engine.map_io(_PERIPHERALS, _PERIPHERALS_SIZE, peripherals.read, peripherals.write, shortcuts)
+        quick = QuickAccess(timeline, self._timer.counter, self._spi.bus, sensor_bus.exchange)
+        engine.map_io(_PERIPHERALS, _PERIPHERALS_SIZE, peripherals.read, peripherals.write, quick)
         engine.map_io(_PORTS, _PORTS_SIZE, ports.read, ports.write)
         engine.map_io(_STORE, _STORE_SIZE, flash.read, flash.write)
         engine.map_io(_CORE, _CORE_SIZE, core.read, core.write)
@@ -126,5 +124,14 @@ class Chip:
     def _port_of(self, pin: str) -> Port:
         return self._ports[pin[1]]
 
-    def _on_pins(self, functions: dict[str, int]) -> bool:
-        return all(self._port_of(pin).function(int(pin[2:])) == function for pin, function in functions.items())
+    def _on_pins(self, functions: dict[str, int]) -> Callable[[], bool]:
+        """Whether the firmware has put these functions on these pins, whenever that is asked."""
+        wires = [(self._port_of(pin).function, int(pin[2:]), function) for pin, function in functions.items()]
+
+        def connected() -> bool:
+            for function_of, pin, function in wires:  # asked at every access to a sensor
+                if function_of(pin) != function:
+                    return False
+            return True
+
+        return connected

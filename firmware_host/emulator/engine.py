@@ -9,6 +9,7 @@ far more often yet is not for Python at all: see `hooks.py`.
 import ctypes
 import weakref
 from collections.abc import Callable, Sequence
+from dataclasses import dataclass
 from typing import Any
 
 from unicorn import (
@@ -33,7 +34,7 @@ from unicorn import (
 from unicorn.arm_const import UC_ARM_REG_LR, UC_ARM_REG_PC, UC_CPU_ARM_CORTEX_M4
 from unicorn.unicorn_py3.unicorn import uclib
 
-from firmware_host.emulator.hooks import BlockTicks, Meter, Shortcuts, address_of
+from firmware_host.emulator.hooks import BlockTicks, Bus, Counter, Meter, Shortcuts, address_of
 from firmware_host.emulator.timeline import Timeline
 
 _SET_CPU_MODEL = (1 << 30) | (1 << 26) | UC_CTL_CPU_MODEL  # uc_ctl: write, one argument
@@ -45,6 +46,7 @@ _NO_END = 0xFFFF_FFFF  # an address the core never executes: only stop(), WFI an
 # Unicorn passes one argument more to all of these, the user's data: what is not looked at need not be converted
 _READ = ctypes.CFUNCTYPE(ctypes.c_uint64, ctypes.c_void_p, ctypes.c_uint64, ctypes.c_uint)
 _WRITE = ctypes.CFUNCTYPE(None, ctypes.c_void_p, ctypes.c_uint64, ctypes.c_uint, ctypes.c_uint64)
+_EXCHANGE = ctypes.CFUNCTYPE(ctypes.c_uint64, ctypes.c_uint64)
 _BLOCK = ctypes.CFUNCTYPE(None, ctypes.c_void_p, ctypes.c_uint64, ctypes.c_uint32)
 _INVALID = ctypes.CFUNCTYPE(
     ctypes.c_bool, ctypes.c_void_p, ctypes.c_int, ctypes.c_uint64, ctypes.c_int, ctypes.c_int64, ctypes.c_void_p
@@ -62,6 +64,19 @@ _ATTEMPTS = {
 
 class EngineFault(Exception):
     """The core cannot go on, or there is no such memory; the message is Unicorn's."""
+
+
+@dataclass(frozen=True, slots=True)
+class QuickAccess:
+    """Registers that are read and written without asking Python, see `hooks.ll`: those of `counter` and `bus`.
+
+    `exchange(pair)`: what comes back for two bytes put on the bus, the first one low.
+    """
+
+    timeline: Timeline
+    counter: Counter
+    bus: Bus
+    exchange: Callable[[int], int]
 
 
 class Registers:
@@ -116,11 +131,11 @@ class Engine:
         size: int,
         read: Callable[[int, int], int],
         write: Callable[[int, int, int], None],
-        shortcuts: Shortcuts | None = None,
+        quick: "QuickAccess | None" = None,
     ) -> None:
         """Route a range to `read(offset, size)` and `write(offset, size, value)`; what they raise ends `run`.
 
-        `shortcuts`: of the reads, some need not come to `read`.
+        `quick`: what of it is not asked of them.
         """
 
         def on_read(_handle: int, offset: int, width: int) -> int:
@@ -139,15 +154,23 @@ class Engine:
         read_callback, write_callback = _READ(on_read), _WRITE(on_write)
         self._callbacks += [read_callback, write_callback]
         reader, writer = _pointer(read_callback), _pointer(write_callback)
-        if shortcuts is not None:
-            shortcuts.ask = reader.value
-            self._callbacks.append(shortcuts)
-            reader = ctypes.c_void_p(address_of("read"))
-        _check(
-            uclib.uc_mmio_map(
-                self._handle, address, size, reader, shortcuts and ctypes.byref(shortcuts), writer, None
-            )
-        )
+        user = None
+        if quick is not None:
+
+            def on_exchange(pair: int) -> int:
+                try:
+                    return quick.exchange(pair)
+                except BaseException as error:
+                    self._fail(error)
+                    return 0
+
+            exchange = _EXCHANGE(on_exchange)
+            shared = map(ctypes.addressof, (quick.timeline, quick.counter, quick.bus))
+            shortcuts = Shortcuts(reader, writer, _pointer(exchange), *shared)
+            self._callbacks += [exchange, quick, shortcuts]
+            reader, writer = ctypes.c_void_p(address_of("read")), ctypes.c_void_p(address_of("write"))
+            user = ctypes.byref(shortcuts)
+        _check(uclib.uc_mmio_map(self._handle, address, size, reader, user, writer, user))
 
     def meter(self, timeline: Timeline, ticks: BlockTicks, measure: Callable[[int, int], int]) -> None:
         """Let time pass with the instructions: before each block add `ticks[address]`, or stop if it must.

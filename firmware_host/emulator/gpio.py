@@ -31,6 +31,7 @@ class Port:
         self._levels = 0  # that devices drive
         self._watched: list[tuple[int, Callable[[bool], None]]] = []
         self._watched_level: list[bool] = []
+        self._watched_pins = 0
 
     def reset(self) -> None:
         for register in (self._mode, self._speed, self._pulls, *self._alternate):
@@ -53,6 +54,7 @@ class Port:
         """Call `on_level` when the firmware's output on `pin` changes; a pin that is no output counts as high."""
         self._watched.append((pin, on_level))
         self._watched_level.append(True)
+        self._watched_pins |= 1 << pin
 
     def function(self, pin: int) -> int | None:
         """The alternate function selected on `pin`, None when it is no alternate-function pin."""
@@ -73,8 +75,9 @@ class Port:
         return sum(1 << pin for pin in range(16) if self._levels >> pin & 1 and self.is_input(pin))
 
     def _set_and_reset(self, value: int) -> None:
-        self._output = self._output & ~(value >> 16) | value & 0xFFFF
-        self._outputs_changed()
+        before, self._output = self._output, self._output & ~(value >> 16) | value & 0xFFFF
+        if (before ^ self._output) & self._watched_pins:
+            self._outputs_changed()
 
     def _outputs_changed(self) -> None:
         for index, (pin, on_level) in enumerate(self._watched):

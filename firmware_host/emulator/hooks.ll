@@ -4,9 +4,10 @@
 
 %Time = type { i64, i64 }                                 ; now, deadline
 %Meter = type { ptr, ptr, i64, i64, ptr }                 ; ask, time, first address, halfwords, ticks of each
-%Shortcuts = type { ptr, ptr, ptr, ptr }                  ; ask, time, counter, bus
+%Shortcuts = type { ptr, ptr, ptr, ptr, ptr, ptr }        ; read, write, exchange, time, counter, bus
 %Counter = type { i64, i64, i64, i64, i64, i64, i64, i64 } ; clocked, since, counted, counts, ticks, modulus, read at, polls
-%Bus = type { i64, i64, i64, i64, i64, [2 x i64], [2 x i64] } ; clocked, free, pair, polled, waiting, ready, answers
+%Bus = type { i64, i64, i64, i64, i64, i64, i64, [2 x i64], [2 x i64] } ; clocked, speaks, free, pair, half a bit,
+                                                          ; polled, waiting, ready, answers
 
 ; --- before each block of instructions: let its ticks pass
 
@@ -64,9 +65,9 @@ define internal void @wait_until(ptr %time, i64 %tick) {
 ; --- reads of the peripherals: the counter and the bus by themselves, the others by Python
 
 define i64 @read(ptr %engine, i64 %offset, i32 %size, ptr %shortcuts) {
-  %time_at = getelementptr %Shortcuts, ptr %shortcuts, i32 0, i32 1
-  %counter_at = getelementptr %Shortcuts, ptr %shortcuts, i32 0, i32 2
-  %bus_at = getelementptr %Shortcuts, ptr %shortcuts, i32 0, i32 3
+  %time_at = getelementptr %Shortcuts, ptr %shortcuts, i32 0, i32 3
+  %counter_at = getelementptr %Shortcuts, ptr %shortcuts, i32 0, i32 4
+  %bus_at = getelementptr %Shortcuts, ptr %shortcuts, i32 0, i32 5
   %time = load ptr, ptr %time_at
   %counter = load ptr, ptr %counter_at
   %bus = load ptr, ptr %bus_at
@@ -109,6 +110,62 @@ ask:
   %python = load ptr, ptr %shortcuts
   %answer = call i64 %python(ptr %engine, i64 %offset, i32 %size)
   ret i64 %answer
+}
+
+; --- writes to the peripherals: pairs of bytes go to the bus, which answers, all else to Python
+
+define void @write(ptr %engine, i64 %offset, i32 %size, i64 %value, ptr %shortcuts) {
+  %time_at = getelementptr %Shortcuts, ptr %shortcuts, i32 0, i32 3
+  %bus_at = getelementptr %Shortcuts, ptr %shortcuts, i32 0, i32 5
+  %time = load ptr, ptr %time_at
+  %bus = load ptr, ptr %bus_at
+  %clocked = load i64, ptr %bus
+  %speaks_at = getelementptr %Bus, ptr %bus, i32 0, i32 1
+  %waiting_at = getelementptr %Bus, ptr %bus, i32 0, i32 6
+  %speaks = load i64, ptr %speaks_at
+  %waiting = load i64, ptr %waiting_at
+  %wide_offset = shl i64 %offset, 3
+  %width = zext i32 %size to i64
+  %access = or i64 %wide_offset, %width
+  %is_data = icmp eq i64 %access, 622690 ; SPI1 DR, 0x1300C: two bytes
+  %is_clocked = icmp ne i64 %clocked, 0
+  %is_set_up = icmp ne i64 %speaks, 0
+  %has_room = icmp ult i64 %waiting, 2
+  %one = and i1 %is_data, %is_clocked
+  %two = and i1 %is_set_up, %has_room
+  %goes = and i1 %one, %two
+  br i1 %goes, label %speak, label %ask
+
+speak:
+  %exchange_at = getelementptr %Shortcuts, ptr %shortcuts, i32 0, i32 2
+  %exchange = load ptr, ptr %exchange_at
+  %answer = call i64 %exchange(i64 %value)
+  %free_at = getelementptr %Bus, ptr %bus, i32 0, i32 2
+  %pair_at = getelementptr %Bus, ptr %bus, i32 0, i32 3
+  %half_at = getelementptr %Bus, ptr %bus, i32 0, i32 4
+  %polled_at = getelementptr %Bus, ptr %bus, i32 0, i32 5
+  %ready_at = getelementptr %Bus, ptr %bus, i32 0, i32 7, i64 %waiting
+  %answer_at = getelementptr %Bus, ptr %bus, i32 0, i32 8, i64 %waiting
+  %free = load i64, ptr %free_at
+  %pair = load i64, ptr %pair_at
+  %half = load i64, ptr %half_at
+  %now = load i64, ptr %time
+  %begins = call i64 @llvm.smax.i64(i64 %now, i64 %free)
+  %ends = add i64 %begins, %pair
+  %ready = sub i64 %ends, %half      ; a bit is taken in its middle
+  %more = add i64 %waiting, 1
+  store i64 %ends, ptr %free_at
+  store i64 %ready, ptr %ready_at
+  store i64 %answer, ptr %answer_at
+  store i64 %more, ptr %waiting_at
+  store i64 0, ptr %polled_at
+  ret void
+
+ask:
+  %python_at = getelementptr %Shortcuts, ptr %shortcuts, i32 0, i32 1
+  %python = load ptr, ptr %python_at
+  call void %python(ptr %engine, i64 %offset, i32 %size, i64 %value)
+  ret void
 }
 
 ; --- TIM2. Who reads it again and again waits for the next count, and so do we, instead of counting his turns
@@ -166,11 +223,11 @@ count:
 ; --- SPI1. Who looks twice in vain waits for what is on the bus
 
 define internal i64 @read_status(ptr %bus, ptr %time) {
-  %free_at = getelementptr %Bus, ptr %bus, i32 0, i32 1
-  %pair_at = getelementptr %Bus, ptr %bus, i32 0, i32 2
-  %polled_at = getelementptr %Bus, ptr %bus, i32 0, i32 3
-  %waiting_at = getelementptr %Bus, ptr %bus, i32 0, i32 4
-  %ready_at = getelementptr %Bus, ptr %bus, i32 0, i32 5
+  %free_at = getelementptr %Bus, ptr %bus, i32 0, i32 2
+  %pair_at = getelementptr %Bus, ptr %bus, i32 0, i32 3
+  %polled_at = getelementptr %Bus, ptr %bus, i32 0, i32 5
+  %waiting_at = getelementptr %Bus, ptr %bus, i32 0, i32 6
+  %ready_at = getelementptr %Bus, ptr %bus, i32 0, i32 7
   %free = load i64, ptr %free_at
   %waiting = load i64, ptr %waiting_at
   %ready = load i64, ptr %ready_at
@@ -207,8 +264,8 @@ answer:
 }
 
 define internal i1 @has_come(ptr %bus, ptr %time) {
-  %waiting_at = getelementptr %Bus, ptr %bus, i32 0, i32 4
-  %ready_at = getelementptr %Bus, ptr %bus, i32 0, i32 5
+  %waiting_at = getelementptr %Bus, ptr %bus, i32 0, i32 6
+  %ready_at = getelementptr %Bus, ptr %bus, i32 0, i32 7
   %waiting = load i64, ptr %waiting_at
   %ready = load i64, ptr %ready_at
   %now = load i64, ptr %time
@@ -219,12 +276,12 @@ define internal i1 @has_come(ptr %bus, ptr %time) {
 }
 
 define internal i64 @take(ptr %bus) {
-  %polled_at = getelementptr %Bus, ptr %bus, i32 0, i32 3
-  %waiting_at = getelementptr %Bus, ptr %bus, i32 0, i32 4
-  %ready_at = getelementptr %Bus, ptr %bus, i32 0, i32 5
-  %ready_next_at = getelementptr %Bus, ptr %bus, i32 0, i32 5, i32 1
-  %answer_at = getelementptr %Bus, ptr %bus, i32 0, i32 6
-  %answer_next_at = getelementptr %Bus, ptr %bus, i32 0, i32 6, i32 1
+  %polled_at = getelementptr %Bus, ptr %bus, i32 0, i32 5
+  %waiting_at = getelementptr %Bus, ptr %bus, i32 0, i32 6
+  %ready_at = getelementptr %Bus, ptr %bus, i32 0, i32 7
+  %ready_next_at = getelementptr %Bus, ptr %bus, i32 0, i32 7, i32 1
+  %answer_at = getelementptr %Bus, ptr %bus, i32 0, i32 8
+  %answer_next_at = getelementptr %Bus, ptr %bus, i32 0, i32 8, i32 1
   %answer = load i64, ptr %answer_at
   %waiting = load i64, ptr %waiting_at
   %left = sub i64 %waiting, 1

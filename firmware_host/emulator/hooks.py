@@ -70,23 +70,26 @@ class Counter(ctypes.Structure):
 
 
 class Bus(ctypes.Structure):
-    """A bus master while it is `clocked`: it has sent everything at the tick `free`, two bytes take `pair_ticks`.
+    """A bus master while it is `clocked`, set up to exchange while it `speaks`: it has sent everything at the tick
+    `free`, two bytes take `pair_ticks`.
 
     `waiting` pairs of bytes are under way or not read yet: all of one is in at `ready`, and it is `answers`. `polled`:
     the status was read in vain.
     """
 
     _fields_ = (
-        *((name, Int) for name in ("clocked", "free", "pair_ticks", "polled", "waiting")),
+        *((name, Int) for name in ("clocked", "speaks", "free", "pair_ticks", "half_bit_ticks", "polled", "waiting")),
         ("ready", Int * FIFO_PAIRS),
         ("answers", Int * FIFO_PAIRS),
     )
 
 
 class Shortcuts(ctypes.Structure):
-    """What reads of the peripherals need not ask Python for."""
+    """What accesses to the peripherals need not ask Python for: Python's `read` and `write`, its `exchange` with what
+    the bus connects, and where `Time`, `Counter` and `Bus` lie.
+    """
 
-    _fields_ = tuple((name, ctypes.c_void_p) for name in ("ask", "time", "counter", "bus"))
+    _fields_ = tuple((name, ctypes.c_void_p) for name in ("read", "write", "exchange", "time", "counter", "bus"))
 
 
 def elsewhere() -> int:

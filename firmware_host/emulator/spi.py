@@ -1,28 +1,27 @@
 """SPI1 (RM0394, chapter 40): master, eight bits, two bytes an access to its FIFOs, each taking its time on the bus."""
 
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 
 from firmware_host.emulator.bus import Register, Stored, Violation
 from firmware_host.emulator.clocks import Clocks
-from firmware_host.emulator.hooks import FIFO_PAIRS, Bus, elsewhere
+from firmware_host.emulator.hooks import Bus, elsewhere
 from firmware_host.emulator.timeline import TICK_HZ, Timeline
 
 _CPHA, _CPOL, _MSTR, _SPE, _SSI, _SSM = 1 << 0, 1 << 1, 1 << 2, 1 << 6, 1 << 8, 1 << 9
+_NEEDED = _SPE | _MSTR | _SSM | _SSI
 
 
 class Spi1:
-    """The bus master. `exchange(self, low, high)` puts two bytes on the bus and returns those that come back.
-
-    Reads of its status and of what has come do not come here: see `hooks.ll`.
+    """The bus master. What it puts on the bus and what comes back does not pass here, nor do reads of its status: see
+    `hooks.ll`. `mode`: of SPI, 0–3, clock polarity and phase; `clock_hz`: of the bus.
     """
 
     name = "SPI1"
     base = 0x4001_3000
 
-    def __init__(self, timeline: Timeline, clocks: Clocks, exchange: Callable[["Spi1", int, int], int]) -> None:
+    def __init__(self, timeline: Timeline, clocks: Clocks) -> None:
         self._timeline = timeline
         self._clocks = clocks
-        self._exchange = exchange
         self.bus = Bus()
         self.setup_count = 0  # how often mode or clock have been set: what was checked before may no longer hold
         self._control = Stored("SPI1 CR1", 0x037F, after=self.retune)
@@ -40,22 +39,17 @@ class Spi1:
             Register(0x00, "CR1", self._control.read, self._write_control),
             self._control2.at(0x04),
             Register(0x08, "SR", elsewhere, None),
-            Register(0x0C, "DR", self._underrun, self._write_data, size=2),
+            Register(0x0C, "DR", self._refuse_read, self._refuse_write, size=2),
         )
 
-    @property
-    def mode(self) -> int:
-        """SPI mode 0–3: clock polarity and phase."""
-        return self._control.value & (_CPOL | _CPHA)
-
-    @property
-    def clock_hz(self) -> float:
-        return self._clocks.pclk2_hz / (2 << (self._control.value >> 3 & 7))
-
     def retune(self) -> None:
-        """Take over a new bus clock or divider."""
-        self.bus.pair_ticks = self._pair_ticks = round(16 * TICK_HZ / self.clock_hz)
-        self._half_bit_ticks = self._pair_ticks // 32
+        """Take over a new bus clock or what the control register says."""
+        control, bus = self._control.value, self.bus
+        self.mode = control & (_CPOL | _CPHA)
+        self.clock_hz = self._clocks.pclk2_hz / (2 << (control >> 3 & 7))
+        pair_ticks = round(16 * TICK_HZ / self.clock_hz)
+        bus.speaks = control & _NEEDED == _NEEDED
+        bus.pair_ticks, bus.half_bit_ticks = pair_ticks, pair_ticks // 32
         self.setup_count += 1
 
     @property
@@ -66,20 +60,13 @@ class Spi1:
     def _write_control(self, value: int) -> None:
         if self.busy:
             raise Violation("spi_setup", "SPI1 CR1 written while the bus is busy", "Wait until BSY is clear")
-        self._control.write(value)
+        if value != self._control.value:
+            self._control.write(value)
 
-    def _write_data(self, value: int) -> None:
-        needed = _SPE | _MSTR | _SSM | _SSI
-        if self._control.value & needed != needed:
+    def _refuse_write(self, _value: int) -> None:
+        if not self.bus.speaks:
             raise Violation("spi_setup", "SPI1 is used without all of SPE, MSTR, SSM, SSI", "Set CR1 before writing DR")
-        bus, waiting = self.bus, self.bus.waiting
-        if waiting == FIFO_PAIRS:
-            raise Violation("spi_overrun", "SPI1 DR written more than two pairs ahead of reading", "Read DR in between")
-        bus.polled = 0
-        bus.answers[waiting] = self._exchange(self, value & 0xFF, value >> 8)
-        bus.free = free = max(self._timeline.now, bus.free) + self._pair_ticks
-        bus.ready[waiting] = free - self._half_bit_ticks  # a bit is taken in its middle
-        bus.waiting = waiting + 1
+        raise Violation("spi_overrun", "SPI1 DR written more than two pairs ahead of reading", "Read DR in between")
 
-    def _underrun(self) -> int:
+    def _refuse_read(self) -> int:
         raise Violation("spi_underrun", "SPI1 DR read before RXNE", "Wait for RXNE")

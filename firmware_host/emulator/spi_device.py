@@ -90,16 +90,16 @@ _UNCHECKED = -1
 class SpiBus:
     """The wires between SPI1 and the devices. `pins_connected()`: has the firmware put SPI1 on its pins?"""
 
-    def __init__(self, timeline: Timeline, pins_connected: Callable[[], bool]) -> None:
+    def __init__(self, timeline: Timeline, spi: Spi1, pins_connected: Callable[[], bool]) -> None:
         self._timeline = timeline
+        self._spi = spi
         self._pins_connected = pins_connected
         self._selected: list[DeviceLink] = []
         self._checked = _UNCHECKED
-        self._spi: Spi1 | None = None  # who spoke last
 
     def chip_select(self, link: "DeviceLink", low: bool) -> None:
         """A device's chip select goes down or up. Raises Violation when the bus has not finished."""
-        if self._spi is not None and self._spi.busy:
+        if self._spi.busy:
             raise Violation(
                 "spi_busy", f"the select of the {link.device.name} changes on a busy bus", "Wait until BSY is clear"
             )
@@ -109,18 +109,18 @@ class SpiBus:
             self._selected.remove(link)
         self._checked = _UNCHECKED
 
-    def exchange(self, spi: Spi1, first: int, second: int) -> int:
-        """Pass two bytes to the selected device; its answers, the first one low.
+    def exchange(self, pair: int) -> int:
+        """Pass two bytes, the first one low, to the selected device; its answers, likewise.
 
         Raises Violation when the bus is not set up as it must be.
         """
-        if self._timeline.next_due <= self._timeline.now:
-            self._timeline.run_due()
+        spi, timeline = self._spi, self._timeline
+        if timeline.next_due <= timeline.now:
+            timeline.run_due()
         if self._checked == spi.setup_count:
-            return self._selected[0].exchange(first, second) if self._selected else 0xFFFF
-        self._spi = spi
+            return self._selected[0].exchange(pair) if self._selected else 0xFFFF
         self._check_wires()
-        answer = self._selected[0].exchange(first, second) if self._selected else 0xFFFF
+        answer = self._selected[0].exchange(pair) if self._selected else 0xFFFF
         self._check_clock(spi)  # not before: the clock that a part accepts depends on what it is asked for
         self._checked = spi.setup_count
         return answer
@@ -174,13 +174,13 @@ class DeviceLink:
         port_of(device.chip_select).watch(int(device.chip_select[2:]), self._chip_select)
         self._settle()
 
-    def exchange(self, first: int, second: int) -> int:
-        """Pass two bytes to the device and return its answers, the first one low."""
+    def exchange(self, pair: int) -> int:
+        """Pass two bytes to the device, the first one low, and return its answers likewise."""
         device = self.device
         if device.fault is Fault.ABSENT:
             return 0xFFFF
         time_s = self._clock.seconds(self._timeline.now)
-        answer = device.transfer(first, time_s) | device.transfer(second, time_s) << 8
+        answer = device.transfer(pair & 0xFF, time_s) | device.transfer(pair >> 8, time_s) << 8
         if device.fault is Fault.DAMAGED:
             self._sent += 2
             if self._sent >= _DAMAGED_BYTE:
