@@ -43,13 +43,15 @@ class Triad:
 
     def __init__(self, errors: TriadErrors, seed: Seed, temperature_c: float | Temperature) -> None:
         xy, xz, yz = errors.non_orthogonality_rad
-        self._axes = (
+        axes = (
             (1.0, 0.0, 0.0),
             (math.sin(xy), math.cos(xy), 0.0),
             (math.sin(xz), math.sin(yz), math.sqrt(1 - math.sin(xz) ** 2 - math.sin(yz) ** 2)),
         )
         self._errors = errors
-        self._inverse_scale = [1 / k for k in errors.scale]
+        self._elements = [
+            (*axis, 1 / k, per_k) for axis, k, per_k in zip(axes, errors.scale, errors.scale_per_k, strict=True)
+        ]
         self._bias = list(errors.bias)
         self._warms = callable(temperature_c)
         self.temperature_c: Temperature = temperature_c if callable(temperature_c) else lambda _time_s: temperature_c
@@ -65,8 +67,8 @@ class Triad:
         """
         x, y, z = true
         felt = []
-        for axis, inverse_scale, per_k in zip(self._axes, self._inverse_scale, self._errors.scale_per_k, strict=True):
-            along = axis[0] * x + axis[1] * y + axis[2] * z
+        for a, b, c, inverse_scale, per_k in self._elements:
+            along = a * x + b * y + c * z
             if bend is not None:
                 along = bend(along)
             value = along * inverse_scale

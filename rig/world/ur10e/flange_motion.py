@@ -10,7 +10,7 @@ from math import cos, sin
 from typing import Any, NamedTuple
 
 from rig.world.site import Site
-from rig.world.ur10e.links import Links
+from rig.world.ur10e.links import Link, Links
 
 Components = tuple[Any, Any, Any]  # x, y, z: floats, or arrays of one shape
 
@@ -28,17 +28,36 @@ def felt(
     q_rad: Sequence[float], qd_rad_s: Sequence[float], qdd_rad_s2: Sequence[float], links: Links, site: Site
 ) -> Felt:
     """Of one instant: angles, speeds and accelerations of the six joints."""
+    return felt_of_turns(turns_of(q_rad, links), qd_rad_s, qdd_rad_s2, links, site)
+
+
+def turns_of(q_rad: Sequence[float], links: Sequence[Link]) -> list[tuple[float, float]]:
+    """Cosine and sine of each joint's whole angle."""
     turned = [angle + link.theta_rad for angle, link in zip(q_rad, links, strict=True)]
-    return felt_of_turns([(cos(a), sin(a)) for a in turned], qd_rad_s, qdd_rad_s2, links, site)
+    return [(cos(angle), sin(angle)) for angle in turned]
 
 
 def felt_of_turns(
     turns: Sequence[tuple[Any, Any]], qd_rad_s: Sequence[Any], qdd_rad_s2: Sequence[Any], links: Links, site: Site
 ) -> Felt:
     """The same of cosine and sine of each joint's whole angle, its `theta_rad` included."""
-    x, y, z = site.earth_rate_rad_s  # rate
-    u, v, w = 0.0, 0.0, 0.0  # its change
-    f, g, h = site.specific_force_m_s2
+    return carried(base(site), turns, qd_rad_s, qdd_rad_s2, links)
+
+
+def base(site: Site) -> Felt:
+    """What the arm's base feels."""
+    return Felt(site.earth_rate_rad_s, (0.0, 0.0, 0.0), site.specific_force_m_s2)
+
+
+def carried(
+    inner: Felt,
+    turns: Sequence[tuple[Any, Any]],
+    qd_rad_s: Sequence[Any],
+    qdd_rad_s2: Sequence[Any],
+    links: Sequence[Link],
+) -> Felt:
+    """What the last of these links feels, when the one before the first feels `inner`."""
+    (x, y, z), (u, v, w), (f, g, h) = inner
     for (cosine, sine), speed, acceleration, link in zip(turns, qd_rad_s, qdd_rad_s2, links, strict=True):
         u, v, w = u + y * speed, v - x * speed, w + acceleration
         z = z + speed

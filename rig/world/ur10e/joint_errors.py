@@ -87,15 +87,15 @@ class JointErrors:
 
     def at(self, time_s: float, q_rad: Joints, qd_rad_s: Joints, qdd_rad_s2: Joints) -> tuple[Joints, Joints, Joints]:
         """True angles, speeds and accelerations at a time of which the encoders' are given."""
-        angles, speeds, accelerations = [], [], []
-        for joint, (e, speed, acceleration) in enumerate(zip(q_rad, qd_rad_s, qdd_rad_s2, strict=True)):
+        angles, speeds, accelerations = list(q_rad), list(qd_rad_s), list(qdd_rad_s2)
+        for joint, (e, speed) in enumerate(zip(q_rad, qd_rad_s, strict=True)):
             if self._placed[joint][0] != e or not self._known[joint]:  # most moves turn few joints
                 self._placed[joint] = (e, *self._place(joint, e))
                 self._known[joint] = True
-            _, angle, gain, bend = self._placed[joint]
-            angles.append(angle)
-            speeds.append(gain * speed)
-            accelerations.append(gain * acceleration + bend * speed * speed)
+            _, angles[joint], gain, bend = self._placed[joint]
+            if speed or accelerations[joint]:
+                speeds[joint] = gain * speed
+                accelerations[joint] = gain * accelerations[joint] + bend * speed * speed
         if self._vibration_rad:
             for joint in WRISTS:
                 phase = self._vibration * time_s + self._phases[joint][2]

@@ -133,7 +133,8 @@ class Motion:
         tick, fraction, target, velocity, acceleration = self._played(time_s)
         q, qd = self._joints(tick.offset, tick.gain, target, velocity, fraction)
         qdd = [0.0] * 6
-        for joint, (v, a) in enumerate(zip(velocity, acceleration, strict=True)):
+        for joint in range(6):
+            v, a = velocity[joint], acceleration[joint]
             if v or a:
                 gain, u = tick.gain[joint], self._smooth[joint]
                 ripple = self._ripples[joint]
@@ -154,16 +155,14 @@ class Motion:
     def _joints(
         self, offset: Joints, gain: Joints, target: Joints, velocity: Joints, fraction: float
     ) -> tuple[Joints, Joints]:
-        smooth = [o + g * p for o, g, p in zip(offset, gain, target, strict=True)]
-        for joint, u in enumerate(smooth):
+        speeds = [0.0] * 6
+        for joint in range(6):
+            u = offset[joint] + gain[joint] * target[joint]
             if self._smooth[joint] != u:  # most moves turn few joints
                 self._smooth[joint], self._angles[joint] = u, self._ripples[joint].angle(u)
-        q = tuple(self._angles)
-        qd = tuple(
-            r.gain(u) * g * v * fraction if v else 0.0
-            for r, u, g, v in zip(self._ripples, smooth, gain, velocity, strict=True)
-        )
-        return q, qd
+            if velocity[joint]:
+                speeds[joint] = self._ripples[joint].gain(u) * gain[joint] * velocity[joint] * fraction
+        return tuple(self._angles), tuple(speeds)
 
     # -- one tick ------------------------------------------------------------------------------------------------
     def step(self, end_s: float) -> None:

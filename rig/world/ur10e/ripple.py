@@ -18,15 +18,24 @@ class Ripple:
 
     def angle(self, smooth_rad: float) -> float:
         """The joint's angle at the smooth angle, rad."""
-        return smooth_rad + sum(a * sin(n * smooth_rad + phase) for n, a, phase in self.components)
+        ripple = 0.0
+        for n, a, phase in self.components:
+            ripple += a * sin(n * smooth_rad + phase)
+        return smooth_rad + ripple
 
     def gain(self, smooth_rad: float) -> float:
         """Exact derivative of the joint's angle with respect to the smooth angle."""
-        return 1.0 + sum(a * n * cos(n * smooth_rad + phase) for n, a, phase in self.components)
+        ripple = 0.0
+        for n, a, phase in self.components:
+            ripple += a * n * cos(n * smooth_rad + phase)
+        return 1.0 + ripple
 
     def bend(self, smooth_rad: float) -> float:
         """The second derivative."""
-        return -sum(a * n * n * sin(n * smooth_rad + phase) for n, a, phase in self.components)
+        ripple = 0.0
+        for n, a, phase in self.components:
+            ripple += a * n * n * sin(n * smooth_rad + phase)
+        return -ripple
 
     def smooth(self, angle_rad: float) -> float:
         """A smooth angle at which the joint stands at `angle_rad` (bisection: it brackets a root for any amplitude)."""

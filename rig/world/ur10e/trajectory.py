@@ -1,7 +1,7 @@
 """Joint motion as pieces of constant acceleration: exact at any time, not only at ticks."""
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from math import inf, sqrt
 
 Joints = tuple[float, ...]
@@ -17,14 +17,22 @@ class Piece:
     q_rad: Joints
     qd_rad_s: Joints = ZERO
     qdd_rad_s2: Joints = ZERO
+    _moving: tuple[int, ...] = field(init=False, repr=False)  # joints: the others need no working out
+
+    def __post_init__(self) -> None:
+        moves = [any(each) for each in zip(self.qd_rad_s, self.qdd_rad_s2, strict=True)]
+        object.__setattr__(self, "_moving", tuple(joint for joint, moving in enumerate(moves) if moving))
 
     def at(self, time_s: float) -> tuple[Joints, Joints, Joints]:
         """Position, velocity, acceleration `time_s` after the piece began."""
         half = 0.5 * time_s
-        qd = tuple(v + a * time_s for v, a in zip(self.qd_rad_s, self.qdd_rad_s2, strict=True))
-        # The mean of the velocities at both ends, times the time.
-        q = tuple(p + (v + w) * half for p, v, w in zip(self.q_rad, self.qd_rad_s, qd, strict=True))
-        return q, qd, self.qdd_rad_s2
+        q, qd = list(self.q_rad), list(self.qd_rad_s)
+        for joint in self._moving:
+            before = qd[joint]
+            qd[joint] = before + self.qdd_rad_s2[joint] * time_s
+            # The mean of the velocities at both ends, times the time.
+            q[joint] += (before + qd[joint]) * half
+        return tuple(q), tuple(qd), self.qdd_rad_s2
 
 
 class Trajectory:

@@ -6,13 +6,14 @@ from random import Random
 from rig.config.world_models import CalibrationSection, SimulatedArmSection
 from rig.world.clock import TICK_S
 from rig.world.site import Site
-from rig.world.ur10e.flange_motion import Felt, felt
+from rig.world.ur10e.flange_motion import Felt, base, carried, turns_of
 from rig.world.ur10e.forward_kinematics import Vector, flange_rate
 from rig.world.ur10e.joint_errors import Errors, JointErrors
 from rig.world.ur10e.joint_motion import Motion
 from rig.world.ur10e.links import NOMINAL, ZERO6, Links, links
 
 STILL: Vector = (0.0, 0.0, 0.0)
+WRIST = 3  # the first of the joints that vibrate: those before it mostly stand
 
 
 def known_links(calibration: CalibrationSection, twist_rad: tuple[float, ...] = ZERO6) -> Links:
@@ -38,6 +39,7 @@ class TrueArm:
         errors = _errors(section)
         self._errors = JointErrors(errors, random) if errors.any else None
         self._at_rest: Felt | None = None
+        self._forearm: tuple[tuple[tuple[float, ...], ...], Felt] = ((), base(site))  # felt there, and how joints were
         self.ideal = (
             self._speed == 1.0 and self._links == NOMINAL and self._errors is None and not any(site.earth_rate_rad_s)
         )
@@ -73,7 +75,12 @@ class TrueArm:
             q, qd, qdd = self._errors.at(controller_s, q, qd, qdd)
         if self._speed != 1.0:  # the controller's seconds are not the world's
             qd, qdd = tuple(v * self._speed for v in qd), tuple(a * self._speed**2 for a in qdd)
-        now = felt(q, qd, qdd, self._links, self._site)
+        inner = q[:WRIST], qd[:WRIST], qdd[:WRIST]
+        if self._forearm[0] != inner:
+            forearm = self._links[:WRIST]
+            self._forearm = inner, carried(base(self._site), turns_of(inner[0], forearm), *inner[1:], forearm)
+        wrist = self._links[WRIST:]
+        now = carried(self._forearm[1], turns_of(q[WRIST:], wrist), qd[WRIST:], qdd[WRIST:], wrist)
         self._at_rest = now if resting else None
         return now
 
