@@ -38,9 +38,15 @@ from firmware_host.emulator.hooks import BlockTicks, Bus, Counter, Meter, Shortc
 from firmware_host.emulator.timeline import Timeline
 
 _SET_CPU_MODEL = (1 << 30) | (1 << 26) | UC_CTL_CPU_MODEL  # uc_ctl: write, one argument
-# While the core runs nobody else may: giving the interpreter up and taking it back would cost at each callback
-_start = ctypes.PyDLL(uclib._name, handle=uclib._handle).uc_emu_start
+# The calls that the pace hangs on, without what the binding's own do beside: while the core runs nobody else may, so
+# that the interpreter need not be given up and taken back at each call and callback; and few arguments are converted
+_quick = ctypes.PyDLL(uclib._name, handle=uclib._handle)
+_start = _quick.uc_emu_start
 _start.argtypes = uclib.uc_emu_start.argtypes
+_read_registers, _write_registers = _quick.uc_reg_read_batch, _quick.uc_reg_write_batch
+_read_memory, _write_memory = _quick.uc_mem_read, _quick.uc_mem_write
+_read_memory.argtypes = _write_memory.argtypes = ctypes.c_void_p, ctypes.c_uint64, ctypes.c_void_p, ctypes.c_size_t
+_SCRATCH_BYTES = 512
 _NO_END = 0xFFFF_FFFF  # an address the core never executes: only stop(), WFI and faults end a run
 
 # Unicorn passes one argument more to all of these, the user's data: what is not looked at need not be converted
@@ -96,12 +102,12 @@ class Registers:
         self._pointers = (ctypes.c_void_p * self._count)(*(base + 4 * i for i in range(self._count)))
 
     def read(self) -> list[int]:
-        uclib.uc_reg_read_batch(self._handle, self._ids, self._pointers, self._count)
+        _read_registers(self._handle, self._ids, self._pointers, self._count)
         return self._values[:]
 
     def write(self, values: Sequence[int]) -> None:
-        self._values[:] = list(values)
-        uclib.uc_reg_write_batch(self._handle, self._ids, self._pointers, self._count)
+        self._values[:] = values
+        _write_registers(self._handle, self._ids, self._pointers, self._count)
 
 
 class Engine:
@@ -113,6 +119,7 @@ class Engine:
         _check(uclib.uc_ctl(self._handle, _SET_CPU_MODEL, ctypes.c_int(UC_CPU_ARM_CORTEX_M4)))
         weakref.finalize(self, uclib.uc_close, self._handle)
         self._callbacks: list[Any] = []  # ctypes callbacks live as long as the engine
+        self._scratch = ctypes.create_string_buffer(_SCRATCH_BYTES)
         self._raised: BaseException | None = None
         self._fault_place: list[int] | None = None
         self._place = self.registers([UC_ARM_REG_PC, UC_ARM_REG_LR])
@@ -244,13 +251,13 @@ class Engine:
 
     def read(self, address: int, size: int) -> bytes:
         """Read memory. Raises EngineFault where there is none."""
-        buffer = ctypes.create_string_buffer(size)
-        _check(uclib.uc_mem_read(self._handle, address, buffer, size))
-        return buffer.raw
+        buffer = self._scratch if size <= _SCRATCH_BYTES else ctypes.create_string_buffer(size)
+        _check(_read_memory(self._handle, address, buffer, size))
+        return buffer[:size]
 
     def write(self, address: int, data: bytes) -> None:
         """Write memory, read-only or not. Raises EngineFault where there is none."""
-        _check(uclib.uc_mem_write(self._handle, address, data, len(data)))
+        _check(_write_memory(self._handle, address, data, len(data)))
 
     def run(self, address: int) -> None:
         """Run from `address` until `stop`, WFI or a fault. Raises EngineFault, or what a callback raised."""

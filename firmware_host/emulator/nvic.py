@@ -12,7 +12,6 @@ SYSTICK = 15
 FIRST_IRQ = 16  # exception number of interrupt 0
 _INTERRUPTS = 84  # RM0394, table 46: 0 … 82, rounded up to whole words of priorities
 _WORDS = 3
-_IDLE_PRIORITY = 256  # lower than every exception
 _PRIORITY_BITS = 0xF0  # the chip implements the upper four of eight
 
 
@@ -67,8 +66,13 @@ class Nvic:
             return None
         if waiting >> NMI & 1:  # above every priority that can be set
             return NMI
-        number = min(_bits(waiting), key=lambda n: (self._priorities[n], n))
-        current = min((self._priorities[n] for n in self._active), default=_IDLE_PRIORITY)
+        if waiting & waiting - 1:
+            number = min(_bits(waiting), key=lambda n: (self._priorities[n], n))
+        else:
+            number = waiting.bit_length() - 1
+        if not self._active:
+            return number
+        current = min(self._priorities[n] for n in self._active)
         return number if self._priorities[number] < current else None
 
     def priority(self, number: int) -> int:
