@@ -5,6 +5,7 @@ defaults) and from Linux (drivers/iio/imu/adis16475.c: 32-bit format, burst, che
 """
 
 import math
+import struct
 from collections.abc import Callable, Sequence
 
 import numpy as np
@@ -46,6 +47,9 @@ _STALL_S = 16e-6  # data sheet, table 2, tSTALL
 _RESET_S = 0.255  # no-OS: after a software reset
 _UPDATING_S = 20e-6  # the data-ready line rests so long while the registers change: the model's own, no figure known
 _BURST_WORDS = 10
+
+
+_WORDS = struct.Struct(">9H")  # of a burst, without their sum
 
 
 class Adis16465:
@@ -171,7 +175,7 @@ class Adis16465:
 
     def _burst_data(self) -> bytes:
         words = [self._take_diagnosis(), *(self._shown(output) >> 16 for output in range(_OUTPUTS))]
-        data = b"".join((word & 0xFFFF).to_bytes(2, "big") for word in (*words, self._temperature, self._counter))
+        data = _WORDS.pack(*[word & 0xFFFF for word in (*words, self._temperature, self._counter)])
         return data + (sum(data) & 0xFFFF).to_bytes(2, "big")
 
     def _continue_burst(self) -> int:

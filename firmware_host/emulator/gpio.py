@@ -29,8 +29,8 @@ class Port:
         self._output = 0
         self._alternate = [Stored(f"{prefix} AFR{half}", 0xFFFF_FFFF) for half in "LH"]
         self._levels = 0  # that devices drive
-        self._watched: list[tuple[int, Callable[[bool], None]]] = []
-        self._watched_level: list[bool] = []
+        self._watched: dict[int, Callable[[bool], None]] = {}  # by pin
+        self._watched_low = 0  # those that are low
         self._watched_pins = 0
 
     def reset(self) -> None:
@@ -52,8 +52,7 @@ class Port:
 
     def watch(self, pin: int, on_level: Callable[[bool], None]) -> None:
         """Call `on_level` when the firmware's output on `pin` changes; a pin that is no output counts as high."""
-        self._watched.append((pin, on_level))
-        self._watched_level.append(True)
+        self._watched[pin] = on_level
         self._watched_pins |= 1 << pin
 
     def function(self, pin: int) -> int | None:
@@ -75,17 +74,17 @@ class Port:
         return sum(1 << pin for pin in range(16) if self._levels >> pin & 1 and self.is_input(pin))
 
     def _set_and_reset(self, value: int) -> None:
-        before, self._output = self._output, self._output & ~(value >> 16) | value & 0xFFFF
-        if (before ^ self._output) & self._watched_pins:
+        self._output = self._output & ~(value >> 16) | value & 0xFFFF
+        if (self._output ^ ~self._watched_low) & self._watched_pins:
             self._outputs_changed()
 
     def _outputs_changed(self) -> None:
-        for index, (pin, on_level) in enumerate(self._watched):
-            is_output = self._mode.value >> 2 * pin & 3 == _OUTPUT
-            high = not is_output or bool(self._output >> pin & 1)
-            if high != self._watched_level[index]:
-                self._watched_level[index] = high
-                on_level(high)
+        for pin, on_level in self._watched.items():
+            bit = 1 << pin
+            low = not self._output & bit and self._mode.value >> 2 * pin & 3 == _OUTPUT
+            if low != bool(self._watched_low & bit):
+                self._watched_low ^= bit
+                on_level(not low)
 
 
 class Syscfg:

@@ -81,7 +81,9 @@ class Gyroscope:
 
     def read(self, time_s: float, settled: float = 1.0) -> list[float]:
         """The next reading, (3,) rad/s, taken at `time_s`; of the motion only the fraction `settled` is felt."""
-        motion = [settled * component for component in self._motion_at(time_s - self._truth.delay_s)]
+        motion = self._motion_at(time_s - self._truth.delay_s)
+        if settled != 1.0:
+            motion = [settled * component for component in motion]
         warmer_k = self._triad.warmer_k(time_s)
         return self._triad.read(time_s, _felt(self._triad, self._truth, motion, warmer_k, self._bend), warmer_k)
 

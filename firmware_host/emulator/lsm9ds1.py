@@ -3,6 +3,7 @@ and 7).
 """
 
 import math
+import struct
 from collections.abc import Callable, Sequence
 
 import numpy as np
@@ -46,6 +47,7 @@ _SENSITIVITIES_MDPS = {0: 8.75, 1: 17.5, 3: 70.0}  # table 3; 245, 500 and 2000 
 _SENSITIVITIES_MG = {0: 0.061, 1: 0.732, 2: 0.122, 3: 0.244}  # the same table; 2, 16, 4 and 8 g
 _XLDA, _GDA, _TDA = 0x01, 0x02, 0x04
 _LAST_OUTPUT = 5  # the high byte of z
+_COUNTS = struct.Struct("<3h")
 _BDU, _IF_ADD_INC, _SW_RESET = 0x40, 0x04, 0x01
 
 
@@ -225,8 +227,8 @@ class _Outputs:
     def show(self, vector: Sequence[float], per_count: float) -> None:
         """A new conversion of a vector in right-handed axes."""
         x, y, z = vector
-        counts = (saturated(round(component / per_count)) for component in (-x, y, z))
-        self._latest = data = b"".join(count.to_bytes(2, "little", signed=True) for count in counts)
+        counts = [saturated(round(component / per_count)) for component in (-x, y, z)]
+        self._latest = data = _COUNTS.pack(*counts)
         for axis, held in enumerate(self._held):
             if not held:
                 self._output[2 * axis : 2 * axis + 2] = data[2 * axis : 2 * axis + 2]

@@ -3,6 +3,7 @@ register map RM-MPU-9250A-00). Its magnetometer, FIFO, I2C master and motion pro
 """
 
 import math
+import struct
 from collections.abc import Callable, Sequence
 
 import numpy as np
@@ -46,6 +47,7 @@ _LATCH_INT_EN, _INT_ANYRD_2CLEAR, _RAW_RDY = 0x20, 0x10, 0x01
 _COUNTS_PER_DEG_S = (131.0, 65.5, 32.8, 16.4)  # specification, table 1; 250, 500, 1000, 2000 °/s
 _COUNTS_PER_G = (16384, 8192, 4096, 2048)  # specification, table 2
 _COUNTS_PER_DEG_C, _ROOM_C = 333.87, 21.0  # specification, table 3, and register map, section 4.23
+_OUTPUTS = struct.Struct(">7h")  # the three accelerations, the temperature, the three rates
 _PULSE_S = 50e-6  # of the interrupt line when it is not latched (register map, register 55)
 _RESET_S = 0.1  # specification, table 3: registers can be read and written after 11 ms, at most 100 ms
 _START_S = 0.035  # specification, table 1: the gyroscope after it left sleep
@@ -223,7 +225,7 @@ class Mpu9250:
             (self._gyroscope.temperature_c(time_s) - _ROOM_C) * _COUNTS_PER_DEG_C,
             *(rate_rad_s / self._per_count for rate_rad_s in rates),
         )
-        self._latest = b"".join(saturated(round(number)).to_bytes(2, "big", signed=True) for number in numbers)
+        self._latest = _OUTPUTS.pack(*[saturated(round(number)) for number in numbers])
         self._status = _RAW_RDY
         self._pin = True
         if not self._registers.values[_INT_PIN_CFG] & _LATCH_INT_EN:

@@ -29,8 +29,11 @@ class Timeline(Time):
         return len(self._due) - 1
 
     def schedule(self, slot: int, tick: int) -> None:
-        self._due[slot] = tick
-        self.next_due = min(self._due)
+        before, self._due[slot] = self._due[slot], tick
+        if tick <= self.next_due:
+            self.next_due = tick
+        elif before == self.next_due:
+            self.next_due = min(self._due)
         self.deadline = min(self.deadline, tick)
 
     def cancel(self, slot: int) -> None:
