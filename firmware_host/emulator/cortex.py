@@ -46,11 +46,11 @@ class Cortex:
     def __init__(self, engine: Engine, nvic: Nvic) -> None:
         self._engine = engine
         self._nvic = nvic
-        self._state = engine.registers(_STATE)
+        self._left = engine.registers([arm.UC_ARM_REG_PC, arm.UC_ARM_REG_SP])
         self._floats = engine.registers(_FLOATS)
         self._masks = engine.registers(_MASKS)
         self._everything = engine.registers([*_CALLER_SAVED, *_STATE, *_MASKS])
-        self._restored = engine.registers([*_STATE, *_CALLER_SAVED])
+        self._restored = engine.registers([*_STATE, *_CALLER_SAVED, arm.UC_ARM_REG_PC])
         self._link = engine.registers([*_STATE, arm.UC_ARM_REG_LR])
         self._program_counter = engine.registers([arm.UC_ARM_REG_PC])
         self.pc = 0
@@ -97,11 +97,14 @@ class Cortex:
         self._jump(entry, f"the vector of exception {number} (interrupt {number - FIRST_IRQ})")
         return Entry.TAKEN
 
-    def return_from_exception(self, return_code: int) -> None:
-        """Undo `enter_pending`, after the core branched to `return_code` (EXC_RETURN)."""
+    def return_from_exception(self) -> None:
+        """Inside a hook: undo `enter_pending`, after the core branched to a return code (EXC_RETURN), and go on where
+        it was, without the price of stopping and running anew.
+        """
+        at, base = self._left.read()
+        return_code = at | 1
         if return_code not in _RETURNS:
             raise Violation("bad_return", f"exception return to 0x{return_code:08X}", "Correct the firmware")
-        base = self._state.read()[-1]
         self._nvic.leave()
         *scratch, pc, xpsr = _BASIC_FRAME.unpack(self._engine.read(base, _BASIC_FRAME.size))
         stack = base + _BASIC_FRAME.size
@@ -118,7 +121,7 @@ class Cortex:
                 f"the stack frame returns to exception {xpsr & 0x1FF}, not to the one that was left",
                 "Look for a stack overflow in the firmware",
             )
-        self._restored.write([control, xpsr & ~_REALIGNED, stack, *scratch])
+        self._restored.write([control, xpsr & ~_REALIGNED, stack, *scratch, pc | 1])
         self.pc = pc
 
     def _jump(self, entry: int, source: str) -> None:

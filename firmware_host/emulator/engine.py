@@ -123,7 +123,6 @@ class Engine:
         self._raised: BaseException | None = None
         self._fault_place: list[int] | None = None
         self._place = self.registers([UC_ARM_REG_PC, UC_ARM_REG_LR])
-        self._program_counter = self.registers([UC_ARM_REG_PC])
         self.paused = False  # the last run ended at the deadline
 
     def map_ram(self, address: int, size: int) -> None:
@@ -266,10 +265,6 @@ class Engine:
             raised, self._raised = self._raised, None
             raise raised
         _check(status)
-
-    def go_on_at(self, address: int) -> None:
-        """Inside a hook: go on at `address`, without the price of stopping and running anew."""
-        self._program_counter.write([address | 1])
 
     def fault_place(self) -> list[int]:
         """Program counter and link register when a callback first raised; if none did, as they are."""

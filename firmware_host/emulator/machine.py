@@ -204,10 +204,7 @@ class EmulatedBoard:
     def _core_exception(self, number: int) -> None:
         if number != _EXCEPTION_RETURN:
             raise Violation("firmware_fault", _CORE_EXCEPTIONS.get(number, f"core exception {number}"), _CORRECT)
-        cortex = self._cortex
-        cortex.paused()
-        cortex.return_from_exception(cortex.pc | 1)
-        self._engine.go_on_at(cortex.pc)
+        self._cortex.return_from_exception()
         if self._chip.nvic.candidate() is not None:  # another has waited, or the same again
             self._timeline.interrupt()
 

@@ -186,7 +186,8 @@ class DeviceLink:
             if self._sent >= _DAMAGED_BYTE:
                 self._sent -= _DAMAGED_BYTE
                 answer ^= 0x0001 if self._sent else 0x0100
-        self._settle()
+        if device.interrupt_level != self._level or device.next_event_s != self._due_s:
+            self._settle()
         return answer
 
     def _chip_select(self, high: bool) -> None:
