@@ -6,8 +6,8 @@
 %Meter = type { ptr, ptr, i64, i64, ptr }                 ; ask, time, first address, halfwords, ticks of each
 %Shortcuts = type { ptr, ptr, ptr, ptr, ptr, ptr }        ; read, write, exchange, time, counter, bus
 %Counter = type { i64, i64, i64, i64, i64, i64, i64, i64 } ; clocked, since, counted, counts, ticks, modulus, read at, polls
-%Bus = type { i64, i64, i64, i64, i64, i64, i64, [2 x i64], [2 x i64] } ; clocked, speaks, free, pair, half a bit,
-                                                          ; polled, waiting, ready, answers
+%Bus = type { i64, i64, i64, i64, i64, i64, i64, [2 x i64], [2 x i64], i64 } ; clocked, speaks, free, pair, half a bit,
+                                                          ; polled, waiting, ready, answers, control
 
 ; --- before each block of instructions: let its ticks pass
 
@@ -76,6 +76,7 @@ define i64 @read(ptr %engine, i64 %offset, i32 %size, ptr %shortcuts) {
   %access = or i64 %wide_offset, %width
   switch i64 %access, label %ask [
     i64 292, label %count      ; TIM2 CNT, 0x24: four bytes
+    i64 622596, label %control ; SPI1 CR1, 0x13000: four bytes
     i64 622660, label %status  ; SPI1 SR, 0x13008: four bytes
     i64 622690, label %data    ; SPI1 DR, 0x1300C: two bytes
   ]
@@ -87,6 +88,15 @@ count:
 counter_count:
   %counted = call i64 @read_count(ptr %counter, ptr %time)
   ret i64 %counted
+
+control:
+  %control_clocked = load i64, ptr %bus
+  %control_on = icmp ne i64 %control_clocked, 0
+  br i1 %control_on, label %bus_control, label %ask
+bus_control:
+  %control_at = getelementptr %Bus, ptr %bus, i32 0, i32 9
+  %control_value = load i64, ptr %control_at
+  ret i64 %control_value
 
 status:
   %clocked = load i64, ptr %bus
@@ -112,7 +122,8 @@ ask:
   ret i64 %answer
 }
 
-; --- writes to the peripherals: pairs of bytes go to the bus, which answers, all else to Python
+; --- writes to the peripherals: pairs of bytes go to the bus, which answers, and setting it up as it is does nothing;
+; --- all else is for Python
 
 define void @write(ptr %engine, i64 %offset, i32 %size, i64 %value, ptr %shortcuts) {
   %time_at = getelementptr %Shortcuts, ptr %shortcuts, i32 0, i32 3
@@ -134,7 +145,23 @@ define void @write(ptr %engine, i64 %offset, i32 %size, i64 %value, ptr %shortcu
   %one = and i1 %is_data, %is_clocked
   %two = and i1 %is_set_up, %has_room
   %goes = and i1 %one, %two
-  br i1 %goes, label %speak, label %ask
+  br i1 %goes, label %speak, label %set_up
+
+set_up:
+  %free_now_at = getelementptr %Bus, ptr %bus, i32 0, i32 2
+  %control_at = getelementptr %Bus, ptr %bus, i32 0, i32 9
+  %free_now = load i64, ptr %free_now_at
+  %control = load i64, ptr %control_at
+  %looked = load i64, ptr %time
+  %is_control = icmp eq i64 %access, 622596 ; SPI1 CR1, 0x13000: four bytes
+  %is_same = icmp eq i64 %value, %control
+  %is_quiet = icmp sle i64 %free_now, %looked
+  %three = and i1 %is_control, %is_clocked
+  %four = and i1 %is_same, %is_quiet
+  %nothing = and i1 %three, %four
+  br i1 %nothing, label %done, label %ask
+done:
+  ret void
 
 speak:
   %exchange_at = getelementptr %Shortcuts, ptr %shortcuts, i32 0, i32 2

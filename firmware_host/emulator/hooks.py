@@ -74,13 +74,14 @@ class Bus(ctypes.Structure):
     `free`, two bytes take `pair_ticks`.
 
     `waiting` pairs of bytes are under way or not read yet: all of one is in at `ready`, and it is `answers`. `polled`:
-    the status was read in vain.
+    the status was read in vain. `control`: how it is set up.
     """
 
     _fields_ = (
         *((name, Int) for name in ("clocked", "speaks", "free", "pair_ticks", "half_bit_ticks", "polled", "waiting")),
         ("ready", Int * FIFO_PAIRS),
         ("answers", Int * FIFO_PAIRS),
+        ("control", Int),
     )
 
 

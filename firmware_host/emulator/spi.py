@@ -12,8 +12,8 @@ _NEEDED = _SPE | _MSTR | _SSM | _SSI
 
 
 class Spi1:
-    """The bus master. What it puts on the bus and what comes back does not pass here, nor do reads of its status: see
-    `hooks.ll`. `mode`: of SPI, 0–3, clock polarity and phase; `clock_hz`: of the bus.
+    """The bus master. What it puts on the bus and what comes back does not pass here, nor do reads of its status and of
+    how it is set up: see `hooks.ll`. `mode`: of SPI, 0–3, clock polarity and phase; `clock_hz`: of the bus.
     """
 
     name = "SPI1"
@@ -48,6 +48,7 @@ class Spi1:
         self.mode = control & (_CPOL | _CPHA)
         self.clock_hz = self._clocks.pclk2_hz / (2 << (control >> 3 & 7))
         pair_ticks = round(16 * TICK_HZ / self.clock_hz)
+        bus.control = control
         bus.speaks = control & _NEEDED == _NEEDED
         bus.pair_ticks, bus.half_bit_ticks = pair_ticks, pair_ticks // 32
         self.setup_count += 1
@@ -60,8 +61,7 @@ class Spi1:
     def _write_control(self, value: int) -> None:
         if self.busy:
             raise Violation("spi_setup", "SPI1 CR1 written while the bus is busy", "Wait until BSY is clear")
-        if value != self._control.value:
-            self._control.write(value)
+        self._control.write(value)
 
     def _refuse_write(self, _value: int) -> None:
         if not self.bus.speaks:
