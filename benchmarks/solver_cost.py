@@ -34,6 +34,7 @@ from unicorn.arm_const import (
 )
 
 from firmware_host.emulator.engine import Engine
+from firmware_host.emulator.hooks import BlockTicks
 from firmware_host.emulator.thumb import instructions
 from firmware_host.emulator.timeline import NEVER, Timeline
 from firmware_host.protocol import METHODS
@@ -106,7 +107,7 @@ class Core:
             assert isinstance(symbols, SymbolTableSection)
             self._functions = {symbol.name: symbol["st_value"] for symbol in symbols.iter_symbols()}
         self._timeline.run_until(NEVER)
-        self._lengths: dict[int, int] = {}  # of blocks, in instructions
+        self._lengths = BlockTicks(CODE, CODE_BYTES)  # in instructions
         self._engine.meter(self._timeline, self._lengths, self._measure)
 
     def _measure(self, address: int, size: int) -> int:

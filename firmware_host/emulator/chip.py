@@ -129,9 +129,6 @@ class Chip:
         wires = [(self._port_of(pin).function, int(pin[2:]), function) for pin, function in functions.items()]
 
         def connected() -> bool:
-            for function_of, pin, function in wires:  # asked at every access to a sensor
-                if function_of(pin) != function:
-                    return False
-            return True
+            return all(function_of(pin) == function for function_of, pin, function in wires)
 
         return connected

@@ -106,7 +106,7 @@ class Registers:
         return self._values[:]
 
     def write(self, values: Sequence[int]) -> None:
-        self._values[:] = values
+        self._values[:] = values  # type: ignore[call-overload]  # any sequence will do
         _write_registers(self._handle, self._ids, self._pointers, self._count)
 
 
@@ -252,7 +252,7 @@ class Engine:
         """Read memory. Raises EngineFault where there is none."""
         buffer = self._scratch if size <= _SCRATCH_BYTES else ctypes.create_string_buffer(size)
         _check(_read_memory(self._handle, address, buffer, size))
-        return buffer[:size]
+        return buffer.raw[:size]
 
     def write(self, address: int, data: bytes) -> None:
         """Write memory, read-only or not. Raises EngineFault where there is none."""

@@ -197,7 +197,7 @@ ask:
 
 ; --- TIM2. Who reads it again and again waits for the next count, and so do we, instead of counting his turns
 
-define internal i64 @read_count(ptr %counter, ptr %time) {
+define i64 @read_count(ptr %counter, ptr %time) {
   %since_at = getelementptr %Counter, ptr %counter, i32 0, i32 1
   %counted_at = getelementptr %Counter, ptr %counter, i32 0, i32 2
   %counts_at = getelementptr %Counter, ptr %counter, i32 0, i32 3
@@ -249,7 +249,7 @@ count:
 
 ; --- SPI1. Who looks twice in vain waits for what is on the bus
 
-define internal i64 @read_status(ptr %bus, ptr %time) {
+define i64 @read_status(ptr %bus, ptr %time) {
   %free_at = getelementptr %Bus, ptr %bus, i32 0, i32 2
   %pair_at = getelementptr %Bus, ptr %bus, i32 0, i32 3
   %polled_at = getelementptr %Bus, ptr %bus, i32 0, i32 5

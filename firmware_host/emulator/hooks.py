@@ -5,6 +5,7 @@ million blocks of instructions. LLVM translates them in a few milliseconds, and 
 """
 
 import ctypes
+from collections.abc import Callable
 from functools import cache
 from importlib import resources
 
@@ -18,6 +19,8 @@ class Time(ctypes.Structure):
     """`now`, and the `deadline` at which Python is asked before time goes on; ticks."""
 
     _fields_ = (("now", Int), ("deadline", Int))
+    now: int
+    deadline: int
 
 
 class Meter(ctypes.Structure):
@@ -67,6 +70,14 @@ class Counter(ctypes.Structure):
     _fields_ = tuple(
         (name, Int) for name in ("clocked", "since", "counted", "counts", "ticks", "modulus", "read_at", "polls")
     )
+    clocked: int
+    since: int
+    counted: int
+    counts: int
+    ticks: int
+    modulus: int
+    read_at: int
+    polls: int
 
 
 class Bus(ctypes.Structure):
@@ -83,6 +94,14 @@ class Bus(ctypes.Structure):
         ("answers", Int * FIFO_PAIRS),
         ("control", Int),
     )
+    clocked: int
+    speaks: int
+    free: int
+    pair_ticks: int
+    half_bit_ticks: int
+    polled: int
+    waiting: int
+    control: int
 
 
 class Shortcuts(ctypes.Structure):
@@ -93,9 +112,10 @@ class Shortcuts(ctypes.Structure):
     _fields_ = tuple((name, ctypes.c_void_p) for name in ("read", "write", "exchange", "time", "counter", "bus"))
 
 
-def elsewhere() -> int:
-    """In place of a read that machine code answers."""
-    raise AssertionError("this register is read by hooks.ll")
+def reader(function: str, *shared: ctypes.Structure) -> Callable[[], int]:
+    """A register's read in machine code, for who asks from Python; `shared` are its arguments."""
+    read = ctypes.CFUNCTYPE(ctypes.c_uint64, *[ctypes.c_void_p] * len(shared))(address_of(function))
+    return lambda: int(read(*map(ctypes.addressof, shared)))
 
 
 @cache

@@ -4,7 +4,7 @@ from collections.abc import Sequence
 
 from firmware_host.emulator.bus import Register, Stored, Violation
 from firmware_host.emulator.clocks import Clocks
-from firmware_host.emulator.hooks import Bus, elsewhere
+from firmware_host.emulator.hooks import Bus, reader
 from firmware_host.emulator.timeline import TICK_HZ, Timeline
 
 _CPHA, _CPOL, _MSTR, _SPE, _SSI, _SSM = 1 << 0, 1 << 1, 1 << 2, 1 << 6, 1 << 8, 1 << 9
@@ -38,7 +38,7 @@ class Spi1:
         return (
             Register(0x00, "CR1", self._control.read, self._write_control),
             self._control2.at(0x04),
-            Register(0x08, "SR", elsewhere, None),
+            Register(0x08, "SR", reader("read_status", self.bus, self._timeline), None),
             Register(0x0C, "DR", self._refuse_read, self._refuse_write, size=2),
         )
 
@@ -56,7 +56,7 @@ class Spi1:
     @property
     def busy(self) -> bool:
         """Something is still on the bus."""
-        return bool(self.bus.free > self._timeline.now)
+        return self.bus.free > self._timeline.now
 
     def _write_control(self, value: int) -> None:
         if self.busy:

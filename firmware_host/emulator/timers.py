@@ -5,7 +5,7 @@ from math import gcd
 
 from firmware_host.emulator.bus import Register, Stored, Violation, check_bits
 from firmware_host.emulator.clocks import Clocks
-from firmware_host.emulator.hooks import Counter, elsewhere
+from firmware_host.emulator.hooks import Counter, reader
 from firmware_host.emulator.timeline import TICK_HZ, Timeline
 
 _LSI_HZ = 32_000
@@ -15,8 +15,8 @@ _START, _KICK, _UNLOCK = 0xCCCC, 0xAAAA, 0x5555
 class Tim2:
     """A free-running 32-bit up-counter. The prescaler acts from the next update event on, as on the chip.
 
-    The counter stands while the auto-reload register is 0, as it is after a reset by the maker's own file. Its reads
-    do not come here: see `hooks.ll`.
+    The counter stands while the auto-reload register is 0, as it is after a reset by the maker's own file. It is
+    read by machine code: see `hooks.ll`.
     """
 
     name = "TIM2"
@@ -45,7 +45,7 @@ class Tim2:
         return (
             self._control.at(0x00),
             Register(0x14, "EGR", None, self._generate),
-            Register(0x24, "CNT", elsewhere, None),
+            Register(0x24, "CNT", reader("read_count", self.counter, self._timeline), None),
             self._prescaler.at(0x28),
             self._reload.at(0x2C),
         )
