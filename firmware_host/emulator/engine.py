@@ -137,7 +137,7 @@ class Engine:
         size: int,
         read: Callable[[int, int], int],
         write: Callable[[int, int, int], None],
-        quick: "QuickAccess | None" = None,
+        quick: QuickAccess | None = None,
     ) -> None:
         """Route a range to `read(offset, size)` and `write(offset, size, value)`; what they raise ends `run`.
 

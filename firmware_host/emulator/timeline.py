@@ -65,7 +65,3 @@ class Timeline(Time):
     def interrupt(self) -> None:
         """Have the core pause at the end of the current block: an exception may have become pending."""
         self.deadline = 0
-
-    def wait_until(self, tick: int) -> None:
-        """Let time pass for a core that polls a flag which changes at `tick`, but not beyond the next event."""
-        self.now = max(self.now, min(tick, self.deadline))

@@ -85,7 +85,7 @@ class PlainRegisters:
         self._polls = self._polls + 1 if timeline.now - self._read_at < POLL_TICKS else 0
         if self._polls > POLLS and counter.counts:
             next_count = (timeline.now - counter.since) * counter.counts // counter.ticks + 1
-            timeline.wait_until(counter.since - -next_count * counter.ticks // counter.counts)
+            wait_until(timeline, counter.since - -next_count * counter.ticks // counter.counts)
         self._read_at = timeline.now
         counts = (timeline.now - counter.since) * counter.counts // counter.ticks
         return (counter.counted + counts) % counter.modulus
@@ -95,7 +95,7 @@ class PlainRegisters:
         awaited = self._received[0][0] if self._received else bus.free
         if awaited > timeline.now:
             if self._polled:
-                timeline.wait_until(awaited)
+                wait_until(timeline, awaited)
             self._polled = True
         received = bool(self._received) and self._received[0][0] <= timeline.now
         room = bus.free - timeline.now <= bus.pair_ticks
@@ -113,6 +113,10 @@ class PlainRegisters:
         ready, answer = self._received.pop(0)
         assert ready <= self._quick.timeline.now
         return answer
+
+
+def wait_until(timeline: Timeline, tick: int) -> None:
+    timeline.now = max(timeline.now, min(tick, timeline.deadline))
 
 
 def bytes_by_tick(parts: Sequence[str], duration_s: float) -> list[bytes]:
