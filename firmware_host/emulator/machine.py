@@ -151,7 +151,8 @@ class EmulatedBoard:
     def _run(self, limit: int) -> None:
         timeline, cortex = self._timeline, self._cortex
         while True:
-            timeline.run_due()
+            if timeline.next_due <= timeline.now:
+                timeline.run_due()
             if self._reset_cause is not None:
                 self._restart()
             waits_for_flash = self._chip.flash.busy

@@ -90,7 +90,8 @@ class Triad:
             bias = [b + per_k * warmer_k for b, per_k in zip(bias, self._errors.bias_per_k, strict=True)]
         if self._drift is not None:
             bias = [b + drift for b, drift in zip(bias, self._drift.at(time_s), strict=True)]
-        return [value - b + self._errors.noise * self._noise.pop() for value, b in zip(felt, bias, strict=True)]
+        scale, draw = self._errors.noise, self._noise.pop
+        return [value - b + scale * draw() for value, b in zip(felt, bias, strict=True)]
 
     def all_warmer_k(self, time_s: np.ndarray) -> np.ndarray | float:
         """The same as `warmer_k`, (n,) or one number for all."""

@@ -74,7 +74,8 @@ class TrueArm:
         if self._errors is not None:
             q, qd, qdd = self._errors.at(controller_s, q, qd, qdd)
         if self._speed != 1.0:  # the controller's seconds are not the world's
-            qd, qdd = tuple(v * self._speed for v in qd), tuple(a * self._speed**2 for a in qdd)
+            speed, squared = self._speed, self._speed**2
+            qd, qdd = tuple(v * speed for v in qd), tuple(a * squared for a in qdd)
         inner = q[:WRIST], qd[:WRIST], qdd[:WRIST]
         if self._forearm[0] != inner:
             forearm = self._links[:WRIST]
