@@ -103,6 +103,16 @@ def _parser() -> argparse.ArgumentParser:
     _add_outcome(resume)
     solve = add("solve", solve_arguments.solve, "recompute the calibration from a recording")
     solve_arguments.add_arguments(solve)
+    report = add("report", _report, "the certificate of a finished run: HTML, PDF, digital certificate")
+    report.add_argument("run", type=Path, metavar="RUN", help="a run folder or its result.json")
+    report.add_argument(
+        "--pdf",
+        action="store_true",
+        help="PDF/A-3b too, with result.json and the digital certificate attached (extra `pdf`)",
+    )
+    report.add_argument("--dcc", action="store_true", help="the digital certificate (DCC 3.2.1, XML) too")
+    report.add_argument("--out", type=Path, metavar="DIR", help="where to (default: the run folder)")
+    _add_set(report, "say something else on the certificate, for example certificate.customer=Example")
     study = add("study", _study, "Monte-Carlo studies of the papers' figures and tables; without a name, list them")
     study.add_argument("name", nargs="?", metavar="NAME")
     study.add_argument("--out", type=Path, default=Path("studies"), metavar="DIR", help="default: studies")
@@ -153,14 +163,11 @@ def _add_board(board: argparse.ArgumentParser) -> None:
 
 def _add_config(parser: argparse.ArgumentParser) -> None:
     parser.add_argument("config", type=Path, metavar="CONFIG", help="YAML configuration file")
-    parser.add_argument(
-        "--set",
-        action="append",
-        default=[],
-        metavar="PATH=VALUE",
-        dest="overrides",
-        help="change one value of the file",
-    )
+    _add_set(parser, "change one value of the file")
+
+
+def _add_set(parser: argparse.ArgumentParser, text: str) -> None:
+    parser.add_argument("--set", action="append", default=[], metavar="PATH=VALUE", dest="overrides", help=text)
 
 
 def _add_script(parser: argparse.ArgumentParser) -> None:
@@ -222,6 +229,12 @@ def _check(options: argparse.Namespace) -> int:
     from rig.commands.check import check
 
     return check(options.config, options.overrides, options.script)
+
+
+def _report(options: argparse.Namespace) -> int:
+    from rig.commands.report import report
+
+    return report(options.run, options.out, options.overrides, pdf=options.pdf, dcc=options.dcc)
 
 
 def _study(options: argparse.Namespace) -> int:

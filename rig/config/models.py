@@ -5,11 +5,12 @@ says what it means: docs/configuration.md is made of these descriptions.
 """
 
 from collections.abc import Iterable, Mapping
+from datetime import date
 from typing import Annotated, Any, Literal, Self
 from urllib.parse import urlsplit
 
 import numpy as np
-from pydantic import BaseModel, ConfigDict, Field, ValidationInfo, field_validator, model_validator
+from pydantic import BaseModel, ConfigDict, Field, StringConstraints, ValidationInfo, field_validator, model_validator
 
 from rig.config.link_budget import Stream, over_budget
 from rig.config.sensor_catalogue import PARTS
@@ -26,6 +27,7 @@ Vector6 = tuple[float, float, float, float, float, float]
 Positive = Annotated[float, Field(gt=0)]
 AccelerometerOrder = Literal[0, 1, 2]
 JointAngle = Annotated[float, Field(ge=-JOINT_LIMIT_DEG, le=JOINT_LIMIT_DEG)]
+Words = Annotated[str, StringConstraints(strip_whitespace=True, min_length=1, max_length=200)]
 Offset = Annotated[float, Field(ge=-1000, le=1000)]
 # A name becomes that of a dataset, of files and of C arrays.
 SensorName = Annotated[str, Field(pattern=r"^\w[\w -]*$", max_length=40)]
@@ -324,8 +326,28 @@ class LimitsSection(Section):
 
 
 class SiteSection(Section):
-    """Where the arm stands. With latitude and heading the Earth's rate is taken out of the readings."""
+    """Where the arm stands, and whose it is. With latitude and heading the Earth's rate is taken out of the readings.
 
+    What a certificate says of the laboratory; left out, it reads "not stated".
+    """
+
+    laboratory: Words | None = Field(default=None, description="the laboratory's name, for certificates")
+    address: Words | None = Field(default=None, description="its address, in one line")
+    country: Annotated[str, Field(pattern="^[A-Z]{2}$")] | None = Field(
+        default=None,
+        description="the country it is in, for digital certificates",
+        json_schema_extra={"allowed": "two capital letters (ISO 3166-1)"},
+    )
+    place: Words | None = Field(default=None, description="where the arm stands, if not at that address: site, room")
+    time_reference: Words | None = Field(
+        default=None,
+        description="what disciplines this computer's clock, such as `NTP, ptbtime1.ptb.de`; without it a certificate "
+        "calls no time traceable",
+    )
+    ambient_temperature_c: float | None = Field(default=None, ge=-50, le=100, description="of the air, as you measured")
+    ambient_humidity_percent: float | None = Field(
+        default=None, ge=0, le=100, description="relative, of the air", json_schema_extra={"unit": "%"}
+    )
     latitude_deg: float | None = Field(default=None, ge=-90, le=90, description="north is positive; with heading_deg")
     heading_deg: float | None = Field(
         default=None,
@@ -406,6 +428,28 @@ class UncertaintySection(Section):
     )
 
 
+class CertificateSection(Section):
+    """What a certificate says of the order and of who answers for it. Left out, it reads "not stated"."""
+
+    customer: Words | None = Field(default=None, description="the customer's name")
+    customer_address: Words | None = Field(default=None, description="the customer's address, in one line")
+    received: date | None = Field(
+        default=None, description="when the item was received", json_schema_extra={"allowed": "date, as 2026-11-20"}
+    )
+    condition: Words | None = Field(default=None, description="the item's condition, as received")
+    authorised_by: Words | None = Field(
+        default=None, description="who authorises the certificate; left out, there is a line to sign on"
+    )
+    replaces: Words | None = Field(
+        default=None, description="the number of the certificate that this one amends and replaces"
+    )
+    issued: date | None = Field(
+        default=None,
+        description="when it is issued; left out, the day the result was computed",
+        json_schema_extra={"allowed": "date, as 2026-11-20"},
+    )
+
+
 class OutputSection(Section):
     """Where results go."""
 
@@ -425,6 +469,7 @@ class RigConfig(Section):
     site: SiteSection = SiteSection()
     uncertainty: UncertaintySection = UncertaintySection()
     limits: LimitsSection
+    certificate: CertificateSection = CertificateSection()
     output: OutputSection = OutputSection()
 
     @field_validator("sensors")

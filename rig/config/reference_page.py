@@ -174,7 +174,8 @@ def _resolved(schema: Schema, definitions: Schema) -> Schema:
 
 def _row(key: str, schema: Schema, required: bool) -> tuple[str, ...]:
     value = next((it for it in schema.get("anyOf", ()) if it != {"type": "null"}), schema)
-    return f"`{key}`", schema["description"], unit_of(key, schema), _allowed(value), _left_out(schema, required)
+    allowed = schema.get("allowed") or _allowed(value)
+    return f"`{key}`", schema["description"], unit_of(key, schema), allowed, _left_out(schema, required)
 
 
 def unit_of(key: str, schema: Schema) -> str:
@@ -184,8 +185,6 @@ def unit_of(key: str, schema: Schema) -> str:
 
 def _allowed(schema: Schema) -> str:
     """What a value may be, in words."""
-    if "allowed" in schema:
-        return str(schema["allowed"])
     if "prefixItems" in schema:
         first, *others = schema["prefixItems"]
         return f"{1 + len(others)} numbers{_each(first)}"

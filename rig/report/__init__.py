@@ -1,1 +1,1 @@
-"""What a run leaves behind: result, C header, tables."""
+"""What a run leaves behind: result, certificate, C header, tables."""

@@ -16,6 +16,7 @@ WRITERS: Sequence[str] = (
     "rig.report.figures:write_figures",
     "rig.report.accelerometer_figures:write_accelerometer_figures",
     "rig.report.header:write_header",
+    "rig.report.certificate.writer:write_certificate",
 )
 
 

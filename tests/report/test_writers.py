@@ -21,10 +21,10 @@ def outcome() -> Outcome:
     return calibrated([read_run(FIXTURES / "calibration" / "run.h5")])
 
 
-def test_the_folder_holds_the_header_and_the_result(outcome: Outcome, tmp_path: Path) -> None:
-    written = [DocumentWritten(tmp_path / name) for name in ("calibration.h", "result.json")]
+def test_the_folder_holds_header_certificate_and_result(outcome: Outcome, tmp_path: Path) -> None:
+    written = [DocumentWritten(tmp_path / name) for name in ("calibration.h", "certificate.html", "result.json")]
     assert list(writers.write_outcome(tmp_path, outcome)) == written
-    assert sorted(file.name for file in tmp_path.iterdir()) == ["calibration.h", "result.json"]
+    assert sorted(file.name for file in tmp_path.iterdir()) == ["calibration.h", "certificate.html", "result.json"]
     assert read_result(tmp_path).verdict == outcome.verdict == "pass"
 
 
@@ -38,7 +38,7 @@ def test_the_result_comes_last_so_that_a_run_whose_documents_fail_is_not_ended(
     monkeypatch.setattr(writers, "WRITERS", (*writers.WRITERS, f"{__name__}:on_a_full_disk"))
     with pytest.raises(OSError, match="No space"):
         list(writers.write_outcome(tmp_path, outcome))
-    assert [file.name for file in tmp_path.iterdir()] == ["calibration.h"]
+    assert sorted(file.name for file in tmp_path.iterdir()) == ["calibration.h", "certificate.html"]
 
 
 TOY = """
@@ -79,6 +79,11 @@ def test_a_writer_of_ones_own_is_a_file_and_a_line(tmp_path: Path) -> None:
         timeout=50,
         check=False,
     )
-    assert done.stdout == "calibration.h toy.txt result.json\n", done
+    assert done.stdout == "calibration.h toy.txt certificate.html result.json\n", done
     assert (folder / "toy.txt").read_text(encoding="utf-8") == "pass, 1 sensors"
-    assert sorted(file.name for file in folder.iterdir()) == ["calibration.h", "result.json", "toy.txt"]
+    assert sorted(file.name for file in folder.iterdir()) == [
+        "calibration.h",
+        "certificate.html",
+        "result.json",
+        "toy.txt",
+    ]

@@ -1,0 +1,161 @@
+"""What a certificate holds, from a result and from what the laboratory says: texts and numbers, no layout."""
+
+import hashlib
+import re
+from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import dataclass
+from datetime import date, datetime
+
+from rig.data.accelerometer_entries import AccelerometerEntry
+from rig.data.result_file import CheckEntry, ProvenanceEntry, ResultDocument, SensorEntry, VerificationEntry
+from rig.report.certificate.stated import Stated
+
+# The checks that hold a property of the item against a limit; the others ask whether the measurement is fit for use.
+CONFORMITY = re.compile(r"\.(acceleration_)?(scale_deviation|bias|verification_rms|verification_mean|verification)$")
+SIMULATED_ARM = "(simulated)"  # so ends the version of a controller that is none
+BY_COMPUTER = "the computer's clock"
+
+
+@dataclass(frozen=True, slots=True)
+class Gyroscope:
+    """One calibrated gyroscope: its result, and its verification if there was one."""
+
+    name: str
+    sensor: SensorEntry
+    verification: VerificationEntry | None
+
+    @property
+    def has_uncertainty(self) -> bool:
+        """Whether more than noise is known of its uncertainty."""
+        return self.sensor.budget is not None and self.sensor.covariance_combined is not None
+
+
+@dataclass(frozen=True, slots=True)
+class Certificate:
+    """All of it. `marks` are what must stand across every page; without any it is a certificate to be signed."""
+
+    number: str
+    title: str
+    marks: tuple[str, ...]
+    issued: date
+    stated: Stated
+    result: ResultDocument
+    gyroscopes: tuple[Gyroscope, ...]
+    accelerometers: Mapping[str, AccelerometerEntry]
+    verified: Mapping[str, VerificationEntry]
+    conformity: tuple[CheckEntry, ...]
+    fitness: tuple[CheckEntry, ...]
+    traceable: bool
+    deviations: tuple[str, ...]
+    references: tuple[str, ...]
+
+    @property
+    def provenance(self) -> ProvenanceEntry:
+        """What was measured with what, and when."""
+        return self.result.provenance
+
+    @property
+    def performed(self) -> tuple[date, date]:
+        """The first and the last day of the measurement."""
+        times = (self.provenance.started_utc, *self.provenance.resumed_utc, *self.provenance.verified_utc)
+        days = sorted(datetime.fromisoformat(each).date() for each in times)
+        return days[0], days[-1]
+
+    @property
+    def guarded(self) -> bool:
+        """Whether the decision rule has a guard band; None of the checks says so where no uncertainty is known."""
+        return any(check.guard > 0 for check in self.conformity)
+
+
+def certificate_of(result: ResultDocument, stated: Stated) -> Certificate:
+    """The certificate of a result. The same result and statements make the same certificate, its number too."""
+    gyroscopes = tuple(
+        Gyroscope(name, sensor, result.verification.get(name))
+        for name, sensor in result.sensors.items()
+        if sensor.role == "calibrate"
+    )
+    verified = {name: found for name, found in result.verification.items() if name not in result.sensors}
+    conformity = tuple(check for check in result.checks if CONFORMITY.search(check.name))
+    fitness = tuple(check for check in result.checks if check not in conformity)
+    return Certificate(
+        number=_number(result, stated),
+        title=_title(gyroscopes, result.accelerometers),
+        marks=tuple(_marks(result, stated, gyroscopes, fitness)),
+        issued=stated.certificate.issued or datetime.fromisoformat(result.provenance.solved_utc).date(),
+        stated=stated,
+        result=result,
+        gyroscopes=gyroscopes,
+        accelerometers={n: each for n, each in result.accelerometers.items() if each.role == "calibrate"},
+        verified=verified,
+        conformity=conformity,
+        fitness=fitness,
+        traceable=_traceable(result, stated),
+        deviations=tuple(_deviations(result)),
+        references=tuple(_references(result)),
+    )
+
+
+def is_simulated(result: ResultDocument, stated: Stated) -> bool:
+    """Whether a simulated laboratory was measured in, by the configuration or by what the controller calls itself."""
+    return stated.simulated or result.provenance.arm_software.endswith(SIMULATED_ARM)
+
+
+def _number(result: ResultDocument, stated: Stated) -> str:
+    """The day, and a part of the SHA-256 of all the certificate is made of: another content, another number."""
+    said = f"{result.text()}\n{stated.site!r}\n{stated.certificate!r}\n{stated.simulated}"
+    day = datetime.fromisoformat(result.provenance.started_utc)
+    return f"RIG-{day:%Y%m%d}-{hashlib.sha256(said.encode()).hexdigest()[:12].upper()}"
+
+
+def _title(gyroscopes: Sequence[Gyroscope], accelerometers: Mapping[str, AccelerometerEntry]) -> str:
+    if not gyroscopes and not accelerometers:
+        return "Verification report"
+    return "Calibration certificate" if all(each.has_uncertainty for each in gyroscopes) else "Calibration record"
+
+
+def _marks(
+    result: ResultDocument, stated: Stated, gyroscopes: Sequence[Gyroscope], fitness: Sequence[CheckEntry]
+) -> Iterator[str]:
+    if is_simulated(result, stated):
+        yield "Simulated laboratory: no real item was calibrated"
+    if not all(each.has_uncertainty for each in gyroscopes):
+        yield "Not a certificate: the uncertainty is not known"
+    if not all(check.passed for check in fitness):
+        yield "Not valid: the measurement failed its own checks"
+
+
+def _traceable(result: ResultDocument, stated: Stated) -> bool:
+    """Whether the unit of time, the only standard of size here, hangs on a named reference.
+
+    Accelerometers are relative to a gravity that is stated without a chain of its own.
+    """
+    compared = result.clock is not None and any(each.by == BY_COMPUTER for each in result.clock.comparisons)
+    measured = bool(result.sensors) and not result.accelerometers and not is_simulated(result, stated)
+    return measured and compared and stated.where.time_reference is not None
+
+
+def _deviations(result: ResultDocument) -> Iterator[str]:
+    provenance = result.provenance
+    if provenance.resumed_utc:
+        yield f"The measurement was interrupted and gone on with at {', '.join(provenance.resumed_utc)} (UTC)."
+    for name, sensor in result.sensors.items():
+        lost = sum(turn.lost for turn in sensor.observations)
+        if lost:
+            yield f"{name}: {lost} samples were lost within sweeps and left out."
+        yield from (f"{name}: {warning}" for warning in getattr(sensor.vector_model, "warnings", ()))
+    for name, accelerometer in result.accelerometers.items():
+        yield from (f"{name}, accelerometer: {warning}" for warning in accelerometer.warnings)
+    if not provenance.model_dump().get("script_installed", True):
+        yield f"The movement was that of a script of the laboratory's own, {provenance.model_dump().get('script')}."
+
+
+def _references(result: ResultDocument) -> Iterator[str]:
+    """Results that others had found: the calibration a reference came with."""
+    for found in {each.reference: each for each in result.verification.values()}.values():
+        serial = result.provenance.sensor_serial_numbers.get(found.reference, "not stated")
+        scale = ", ".join(f"{k:g}" for k in found.reference_scale)
+        bias = ", ".join(f"{b:g}" for b in found.reference_bias_rad_s)
+        yield (
+            f"Reference {found.reference}, serial number {serial}: scale factors {scale}, biases {bias} rad/s, as "
+            "stated in the laboratory's configuration, without an uncertainty."
+        )

@@ -1,0 +1,30 @@
+"""The certificate as one HTML page: self-contained, for screens light and dark, for paper and for screen readers."""
+
+from functools import cache
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+from rig.report.certificate import plots, tables
+from rig.report.certificate.content import Certificate
+from rig.report.certificate.tables import DEG
+
+if TYPE_CHECKING:
+    from jinja2 import Template
+
+TEMPLATE = Path(__file__).with_name("certificate.html.j2")
+FOOTING = "Relates only to the items calibrated. Not issued under an accreditation."
+
+
+def certificate_page(certificate: Certificate) -> str:
+    """HTML that loads nothing from anywhere; every text of configuration, board or arm is escaped."""
+    return _template().render(certificate=certificate, deg=DEG, footing=FOOTING)
+
+
+@cache
+def _template() -> "Template":
+    from jinja2 import Environment, StrictUndefined
+
+    environment = Environment(autoescape=True, undefined=StrictUndefined, trim_blocks=True, lstrip_blocks=True)
+    for module in (tables, plots):
+        environment.globals |= {name: value for name, value in vars(module).items() if callable(value)}
+    return environment.from_string(TEMPLATE.read_text(encoding="utf-8"))

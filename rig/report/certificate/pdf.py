@@ -1,0 +1,25 @@
+"""The certificate as PDF/A-3b: the page of `certificate.html` with the data it was made from attached."""
+
+from collections.abc import Mapping
+from pathlib import Path
+
+from rig.errors import Refused
+
+DESCRIBED = {"result.json": "the result, of schema rig.result/1", "certificate.xml": "the digital certificate (DCC)"}
+
+
+def write_pdf(page: str, attachments: Mapping[str, bytes], path: Path) -> None:
+    """`attachments` by name. Raises Refused `no_weasyprint` where the extra `pdf` or a library it needs is absent."""
+    try:
+        from weasyprint import HTML, Attachment
+    except (ImportError, OSError) as error:  # OSError: Pango itself is not there
+        raise Refused(
+            "no_weasyprint",
+            f"a PDF is made by WeasyPrint, which cannot be loaded ({str(error).splitlines()[0]})",
+            "Install calibration-rig[pdf] and Pango (Debian: libpangoft2-1.0-0), or print certificate.html",
+        ) from None
+    enclosed = [
+        Attachment(string=content, name=name, description=DESCRIBED[name], relationship="Source")
+        for name, content in attachments.items()
+    ]
+    HTML(string=page).write_pdf(path, pdf_variant="pdf/a-3b", attachments=enclosed)

@@ -1,0 +1,44 @@
+"""How a value and its uncertainty are written (JCGM 100, 7.2.6; EA-4/02 M:2022, 6.3)."""
+
+from dataclasses import dataclass
+from decimal import ROUND_HALF_UP, Context, Decimal
+
+DIGITS = 2  # significant, of an uncertainty
+WIDE = Context(prec=1000)  # a value may have any size beside its uncertainty
+
+
+@dataclass(frozen=True, slots=True)
+class Rounded:
+    """A value and its expanded uncertainty U, both to the same decimal."""
+
+    value: Decimal
+    uncertainty: Decimal
+
+    @property
+    def value_text(self) -> str:
+        """With the sign of a bias below zero that typesetters use."""
+        return f"{self.value:f}".replace("-", "−")
+
+    @property
+    def uncertainty_text(self) -> str:
+        return f"{self.uncertainty:f}"
+
+
+def rounded(value: float, uncertainty: float) -> Rounded:
+    """U to two significant digits, the value to the same decimal.
+
+    Half is rounded up: so U never falls by more than 4.8 %, and EA-4/02 wants it rounded up only from 5 %. Raises
+    ValueError for a value that is not finite or an uncertainty that is not a positive number.
+    """
+    exact, wide = Decimal(repr(value)), Decimal(repr(uncertainty))
+    if not exact.is_finite() or not wide.is_finite() or wide <= 0:
+        raise ValueError(f"{value!r} ± {uncertainty!r} cannot be rounded")
+    last = wide.adjusted() - (DIGITS - 1)
+    if _to(wide, last).adjusted() > wide.adjusted():  # 0.0996 is 0.10
+        last += 1
+    return Rounded(_to(exact, last), _to(wide, last))
+
+
+def _to(number: Decimal, exponent: int) -> Decimal:
+    found = number.quantize(Decimal((0, (1,), exponent)), ROUND_HALF_UP, WIDE)
+    return found if found else abs(found)  # no −0.000

@@ -1,0 +1,51 @@
+"""What the laboratory says beside the result: from the configuration that the run folder keeps."""
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from pathlib import Path
+
+from rig.config.load import Loaded, load
+from rig.config.models import CertificateSection, SiteSection
+from rig.data.run_folder import CONFIG
+from rig.errors import Refused
+from rig.errors.quoting import quote
+
+MEASURED_BY = {"latitude_deg", "heading_deg", "gravity_m_s2", "base_up"}  # keys of `site` that the result depends on
+
+NOTHING = CertificateSection()
+
+
+@dataclass(frozen=True, slots=True)
+class Stated:
+    """None is "not stated": nothing is invented. `simulated` says that a simulated laboratory stood at the far end."""
+
+    site: SiteSection | None = None
+    certificate: CertificateSection = NOTHING
+    simulated: bool = False
+
+    @property
+    def where(self) -> SiteSection:
+        """The site, nothing said of it where no configuration is kept."""
+        return self.site or SiteSection()
+
+
+def stated_in(folder: Path, overrides: Sequence[str] = ()) -> Stated:
+    """What the run folder's configuration says, `overrides` laid over it; nothing where it keeps none.
+
+    Raises Refused `unknown_setting` for an override of what was measured, and as `load`.
+    """
+    for override in overrides:
+        section, _, key = override.partition("=")[0].strip().partition(".")
+        if section != "certificate" and (section != "site" or key in MEASURED_BY or not key):
+            raise Refused(
+                "unknown_setting",
+                f"{quote(override)} would change what was measured",
+                "Set a key of certificate, or one of site that the result does not depend on",
+            )
+    path = folder / CONFIG
+    return of_configuration(load(path, overrides, sections=None)) if path.exists() else Stated()
+
+
+def of_configuration(loaded: Loaded) -> Stated:
+    """What it says of site and certificate."""
+    return Stated(loaded.config.site, loaded.config.certificate, loaded.simulated)

@@ -1,0 +1,216 @@
+"""The numbers of a certificate as they are printed: rounded, with their signs and units."""
+
+import math
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass
+
+import numpy as np
+
+from rig.data.accelerometer_entries import AccelerometerEntry
+from rig.data.budget_entries import BudgetEntry, ContributorEntry
+from rig.data.result_file import CheckEntry, SensorEntry, VectorEntry, VerificationEntry
+from rig.report.certificate.rounding import rounded
+
+AXES = ("x", "y", "z")
+NEGLIGIBLE = 0.001  # of every variance: lines below are summed up in one
+NOTHING = 1e-12  # of a variance
+ENOUGH_FREEDOM = 50.0  # degrees of it, for k = 2 to cover 95 % (EA-4/02 M:2022, annex E)
+DEG = math.degrees(1)
+
+
+@dataclass(frozen=True, slots=True)
+class Pair:
+    """A value and its uncertainty, as texts."""
+
+    value: str
+    uncertainty: str
+
+
+@dataclass(frozen=True, slots=True)
+class AxisRow:
+    """One axis: scale factor and bias, the latter in two units."""
+
+    axis: str
+    scale: Pair
+    bias: Pair
+    bias_deg: Pair
+
+
+@dataclass(frozen=True, slots=True)
+class BudgetRow:
+    """One contributor: what it does to the axis it matters most to, and its share of that variance."""
+
+    name: str
+    kind: str
+    distribution: str
+    assumed: str
+    freedom: str
+    scale: str
+    scale_share: str
+    bias: str
+    bias_share: str
+
+
+@dataclass(frozen=True, slots=True)
+class CheckRow:
+    """One limit, and what was found."""
+
+    name: str
+    value: str
+    uncertainty: str
+    limit: str
+    false_acceptance: str
+    passed: bool
+    unit: str
+
+
+def pair(value: float, uncertainty: float) -> Pair:
+    """Rounded together; a value that has no uncertainty at all is printed with nine digits."""
+    if not uncertainty > 0:
+        return Pair(f"{value:.9g}".replace("-", "−"), "0")
+    found = rounded(value, uncertainty)
+    return Pair(found.value_text, found.uncertainty_text)
+
+
+def axis_rows(sensor: SensorEntry) -> list[AxisRow]:
+    """With U of the budget; without one, with the standard deviation of the noise, which the page then calls so."""
+    spread = _noise(sensor) if sensor.budget is None else sensor.budget.expanded
+    return [
+        AxisRow(
+            axis,
+            pair(sensor.scale[i], spread[i]),
+            pair(sensor.bias_rad_s[i], spread[3 + i]),
+            pair(DEG * sensor.bias_rad_s[i], DEG * spread[3 + i]),
+        )
+        for i, axis in enumerate(AXES)
+    ]
+
+
+def acceleration_rows(found: AccelerometerEntry) -> list[AxisRow]:
+    """Two standard deviations of the solution's; the bias in m/s² and in thousandths of the stated gravity."""
+    spread = [2 * found.covariance[i][i] ** 0.5 for i in range(6)]
+    milli = 1000 / found.gravity_m_s2
+    return [
+        AxisRow(
+            axis,
+            pair(found.scale[i], spread[i]),
+            pair(found.bias_m_s2[i], spread[3 + i]),
+            pair(milli * found.bias_m_s2[i], milli * spread[3 + i]),
+        )
+        for i, axis in enumerate(AXES)
+    ]
+
+
+def _noise(sensor: SensorEntry) -> list[float]:
+    return [sensor.covariance[i][i] ** 0.5 for i in range(6)]
+
+
+def budget_rows(budget: BudgetEntry) -> list[BudgetRow]:
+    """The largest of three axes, largest shares first; all negligible ones in one line."""
+    lines = sorted(budget.contributors, key=lambda line: -max(line.share))
+    rows = [_budget_row(line) for line in lines if max(line.share) >= NEGLIGIBLE]
+    small = [line for line in lines if max(line.share) < NEGLIGIBLE]
+    if small:
+        std = np.sqrt(np.sum(np.square([line.std for line in small]), axis=0))
+        names = ", ".join(line.name for line in small)
+        rows.append(_row((f"below 0.1 %: {names}", "", "", "", ""), std, np.square(std) / np.square(budget.std)))
+    return rows
+
+
+def _budget_row(line: ContributorEntry) -> BudgetRow:
+    assumed = "found from the readings" if line.half_width is None else f"±{line.half_width:.3g} {line.unit}"
+    said = line.name, line.kind, line.distribution, assumed, freedom_text(line.freedom)
+    return _row(said, line.std, line.share)
+
+
+def _row(said: tuple[str, str, str, str, str], std: Sequence[float], share: Sequence[float]) -> BudgetRow:
+    numbers = [
+        text
+        for part in (slice(0, 3), slice(3, 6))
+        for text in (_part(max(std[part]), max(share[part])), percent(max(share[part])))
+    ]
+    return BudgetRow(*said, *numbers)
+
+
+def _part(std: float, share: float) -> str:
+    """What is nothing but the arithmetic's rounding is not printed."""
+    return "0" if share < NOTHING else small(std)
+
+
+def small(value: float) -> str:
+    """Two digits, in powers of ten."""
+    if value == 0:
+        return "0"
+    mantissa, exponent = f"{value:.1e}".split("e")
+    return f"{mantissa}\u00a0×\u00a010{str(int(exponent)).translate(str.maketrans('-0123456789', '⁻⁰¹²³⁴⁵⁶⁷⁸⁹'))}"
+
+
+def percent(share: float) -> str:
+    """Of the variance."""
+    return "<\u00a00.1\u00a0%" if share < 0.001 else f"{100 * share:.1f}\u00a0%"
+
+
+def freedom_text(freedom: float | None) -> str:
+    """Degrees of freedom."""
+    return "∞" if freedom is None or freedom > 1e4 else f"{freedom:.0f}"
+
+
+def fewest_freedom(budget: BudgetEntry) -> float:
+    """Effective degrees of freedom of the result that has the fewest."""
+    return min(math.inf if each is None else each for each in budget.freedom)
+
+
+def coverage_sentence(budget: BudgetEntry) -> str:
+    """What k = 2 stands for: the sentence of EA-4/02 M:2022, 6.4, or that of its annex E where freedom is scarce."""
+    k = f"{budget.coverage_factor:g}"
+    begins = (
+        "The reported expanded uncertainty of measurement is the standard uncertainty of measurement multiplied by the "
+        f"coverage factor k\u00a0=\u00a0{k}, which for a "
+    )
+    freedom = fewest_freedom(budget)
+    if freedom >= ENOUGH_FREEDOM:
+        return f"{begins}normal distribution corresponds to a coverage probability of approximately 95 %."
+    from scipy.special import stdtr
+
+    covered = 1 - 2 * float(stdtr(freedom, -budget.coverage_factor))
+    return (
+        f"{begins}t-distribution with ν_eff\u00a0=\u00a0{freedom:.0f} effective degrees of freedom, the fewest "
+        f"of any value here, corresponds to a coverage probability of approximately {100 * covered:.0f} %."
+    )
+
+
+def check_row(check: CheckEntry) -> CheckRow:
+    """What was not measured or not limited reads so."""
+    value, uncertainty = ("not measured" if check.value is None else f"{check.value:.4g}"), "not stated"
+    if check.value is not None and check.uncertainty:
+        found = pair(check.value, check.uncertainty)
+        value, uncertainty = found.value, found.uncertainty
+    limit = "not set" if check.limit is None else f"{check.limit:g}"
+    risk = "–" if check.false_acceptance is None else percent(check.false_acceptance)
+    return CheckRow(check.name, value, uncertainty, limit, risk, check.passed, check.unit)
+
+
+def verification_rows(found: VerificationEntry) -> Iterator[tuple[str, ...]]:
+    """Axis; RMS as found and as left; largest mean over a revolution as found and as left. All in rad/s."""
+    for i, axis in enumerate(AXES):
+        yield (
+            axis,
+            "–" if found.before is None else f"{found.before.movement.rms_rad_s[i]:.5f}",
+            f"{found.after.movement.rms_rad_s[i]:.5f}",
+            "–" if found.before is None else _largest_turn([t.error_rad_s for t in found.before.revolutions], i),
+            _largest_turn([turn.error_rad_s for turn in found.after.revolutions], i),
+        )
+
+
+def _largest_turn(errors: Sequence[Sequence[float]], axis: int) -> str:
+    return f"{max(abs(error[axis]) for error in errors):.5f}" if errors else "–"
+
+
+def skew_rows(vector: VectorEntry) -> list[tuple[str, Pair]]:
+    """Angles by which the axes are off right ones, in degrees, with two standard deviations."""
+    return [
+        (name, pair(DEG * angle, 2 * DEG * std))
+        for name, angle, std in zip(
+            vector.non_orthogonality_order, vector.non_orthogonality_rad, vector.non_orthogonality_std_rad, strict=True
+        )
+    ]

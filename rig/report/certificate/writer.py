@@ -1,0 +1,19 @@
+"""`certificate.html` in every run folder."""
+
+from pathlib import Path
+
+from rig.analysis.outcome import Outcome
+from rig.data.result_file import ResultDocument
+from rig.report.certificate.content import certificate_of
+from rig.report.certificate.page import certificate_page
+from rig.report.certificate.stated import stated_in
+from rig.station.events import DocumentWritten, RunEvent
+
+PAGE = "certificate.html"
+
+
+def write_certificate(outcome: Outcome, document: ResultDocument, folder: Path) -> tuple[RunEvent, ...]:
+    """Whatever the verdict: what failed stands there too, across every page where it makes the measurement unfit."""
+    path = folder / PAGE
+    path.write_text(certificate_page(certificate_of(document, stated_in(folder))), encoding="utf-8")
+    return (DocumentWritten(path),)

@@ -1,0 +1,262 @@
+"""The certificate: all that ISO/IEC 17025 asks for, nothing invented, nothing loaded, noise not called uncertainty."""
+
+import re
+from decimal import Decimal
+from pathlib import Path
+
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+
+from rig.config.load import parse
+from rig.config.models import CertificateSection, SiteSection
+from rig.data.result_file import CheckEntry, ResultDocument, read_result
+from rig.errors import Refused
+from rig.report.certificate.content import is_simulated
+from rig.report.certificate.page import certificate_page
+from rig.report.certificate.rounding import rounded
+from rig.report.certificate.stated import Stated, of_configuration, stated_in
+from rig.report.certificate.tables import coverage_sentence
+from support.certified import LABORATORY, certificate, compared, planted, read, result
+from support.paths import CONFIGS, FIXTURES
+
+CLAUSES = [
+    *(f"7.8.2.1{letter}" for letter in "abcdefghijlmnop"),
+    *(f"7.8.4.1{letter}" for letter in "abcdef"),
+    "7.8.4.3",
+    "7.8.6",
+]
+MARKUP = "<script>alert(1)</script>\"'><img src=x onerror=y>&amp;"
+# What a result's model holds to a few words, and times.
+FIXED = {
+    *("schema", "verdict", "role", "kind", "distribution", "axis", "direction", "joint", "correction", "name", "by"),
+    *("unit", "model", "estimator", "started_utc", "solved_utc", "resumed_utc", "verified_utc", "status"),
+    *("non_orthogonality_order", "covariance_order", "covariance_units"),
+}
+
+
+@pytest.mark.parametrize("clause", CLAUSES)
+@pytest.mark.parametrize("stated", [LABORATORY, Stated()], ids=["said", "unsaid"])
+def test_every_clause_stands_there_with_words(clause: str, stated: Stated) -> None:
+    assert read(certificate(stated=stated)).under[clause].strip()
+
+
+def test_what_replaces_what_is_said_by_an_amended_one() -> None:
+    amended = Stated(LABORATORY.site, LABORATORY.certificate.model_copy(update={"replaces": "RIG-1"}))
+    assert "replaces RIG-1" in read(certificate(stated=amended)).under["7.8.8"]
+    assert "7.8.8" not in read(certificate()).under
+    assert certificate(stated=amended).number != certificate().number == certificate().number
+
+
+def test_values_and_their_uncertainties_are_those_of_the_budget() -> None:
+    sensor = result().sensors["gyro"]
+    assert sensor.budget is not None
+    page = read(certificate())
+    values = [*sensor.scale, *sensor.bias_rad_s]
+    for value, expanded in zip(values, sensor.budget.expanded, strict=True):
+        found = rounded(value, expanded)
+        assert f"{found.value_text} ± {found.uncertainty_text}" in page.text
+    noise = [sensor.covariance[i][i] ** 0.5 for i in range(6)]
+    assert all(u > 2 * n for u, n in zip(sensor.budget.expanded, noise, strict=True))
+    for line in sensor.budget.contributors:
+        assert line.name in page.under["7.8.4.1a"]
+
+
+def test_noise_is_not_called_uncertainty() -> None:
+    """A result of before there were budgets makes no certificate."""
+    found = certificate(read_result(FIXTURES / "calibration"))
+    page = read(found)
+    assert found.title == "Calibration record"
+    assert any("uncertainty is not known" in mark for mark in found.marks)
+    assert "noise alone, which is not the uncertainty" in page.text
+    assert "expanded uncertainty, k = 2" not in page.text
+    assert "No expanded uncertainty is known" in page.under["7.8.4.1a"]
+
+
+def test_what_was_not_said_reads_so_and_nobody_is_invented() -> None:
+    silent = read(certificate(stated=Stated()))
+    for clause in ("7.8.2.1b", "7.8.2.1c", "7.8.2.1e", "7.8.2.1h", "7.8.2.1g", "7.8.2.1o"):
+        assert "not stated" in silent.under[clause], clause
+    said = read(certificate())
+    assert "not stated" not in "".join(said.under[clause] for clause in CLAUSES)
+    for words in ("Bench Laboratory", "1 Long Lane", "room 2", "Example & Sons", "2026-11-19", "A. Person", "21.5 °C"):
+        assert words in said.text
+
+
+def test_a_simulated_laboratory_is_told_across_every_page() -> None:
+    document = result()
+    for stated, software in ((Stated(simulated=True), "5.14"), (LABORATORY, "URSoftware 5.14.0.0 (simulated)")):
+        provenance = document.provenance.model_copy(update={"arm_software": software})
+        simulated = document.model_copy(update={"provenance": provenance})
+        assert is_simulated(simulated, stated)
+        page = read(certificate(simulated, stated))
+        fixed = next(attributes for tag, attributes in page.tags if attributes.get("class") == "across")
+        assert fixed and re.search(r"\.across \{ position: fixed", page.style)
+        assert page.text.count("Simulated laboratory: no real item was calibrated") == 2  # across, and to be read out
+        assert 'content: "Simulated laboratory' in page.style  # in the margin of each sheet
+    assert "Simulated" not in certificate_page(certificate())
+
+
+def test_a_measurement_that_contradicts_itself_is_not_valid() -> None:
+    spoilt = CheckEntry(name="gyro.stuck_bit", value=1.0, limit=0.0, unit="1", passed=False)
+    found = certificate(result().model_copy(update={"checks": (*result().checks, spoilt)}))
+    assert any("Not valid" in mark for mark in found.marks)
+    assert "failed: gyro.stuck_bit" in read(found).text
+
+
+def test_a_value_beyond_its_limit_is_a_statement_and_no_spoilt_measurement() -> None:
+    beyond = CheckEntry(name="gyro.bias", value=0.2, limit=0.1, unit="rad/s", passed=False, uncertainty=0.01)
+    found = certificate(result().model_copy(update={"checks": (*result().checks, beyond)}))
+    assert not found.marks
+    assert re.search(r"gyro\.bias 0\.200 0\.010 0\.1 rad/s – fail", read(found).text)
+
+
+@pytest.mark.parametrize(("guard", "words"), [(0.0, "simple acceptance"), (0.01, "guard band of w = U")])
+def test_the_decision_rule_is_said(guard: float, words: str) -> None:
+    check = CheckEntry(
+        name="gyro.bias", value=0.01, limit=0.1, unit="rad/s", passed=True, uncertainty=0.01, guard=guard
+    )
+    assert words in read(certificate(result().model_copy(update={"checks": (check,)}))).under["7.8.6"]
+
+
+def test_time_is_traceable_only_through_a_reference_that_is_named_and_was_compared() -> None:
+    unnamed = Stated(SiteSection(), CertificateSection())
+    simulated = Stated(LABORATORY.site, simulated=True)
+    alone = result().model_copy(update={"clock": result().clock.model_copy(update={"comparisons": ()})})  # type: ignore[union-attr]
+    assert certificate(compared(result())).traceable
+    assert "traceable to the second" in read(certificate(compared(result()))).under["7.8.4.1c"]
+    for found in (
+        certificate(compared(result()), unnamed),
+        certificate(alone),
+        certificate(compared(result()), simulated),
+    ):
+        assert not found.traceable
+        assert "No metrological traceability" in read(found).under["7.8.4.1c"]
+
+
+def test_before_and_after_of_a_verified_run_are_as_found_and_as_left() -> None:
+    document = read_result(FIXTURES / "verified")
+    page = read(certificate(document))
+    before, after = document.verification["gyro"].before, document.verification["gyro"].after
+    assert before is not None
+    for value in (*before.movement.rms_rad_s, *after.movement.rms_rad_s):
+        assert f"{value:.5f}" in page.under["7.8.4.1d"]
+    assert "Reference reference, serial number" in page.under["7.8.2.1p"]
+
+
+def test_scarce_freedom_is_said() -> None:
+    budget = result().sensors["gyro"].budget
+    assert budget is not None
+    assert "normal distribution" in coverage_sentence(budget)
+    scarce = coverage_sentence(budget.model_copy(update={"freedom": (8.0, *[None] * 5)}))
+    assert "ν_eff\u00a0=\u00a08" in scarce
+    assert "approximately 92 %" in scarce  # of Student's t with 8 degrees of freedom within ± 2
+
+
+def test_no_resource_is_loaded_from_anywhere() -> None:
+    page = read(certificate())
+    for tag, attributes in page.tags:
+        assert tag not in {
+            "script",
+            "link",
+            "img",
+            "iframe",
+            "object",
+            "embed",
+            "base",
+            "image",
+            "use",
+            "audio",
+            "video",
+        }
+        assert not {"src", "href", "xlink:href", "srcset", "style", "action", "data"} & attributes.keys()
+        assert not any(name.startswith("on") for name in attributes)
+    assert not re.search(r"url\(|@import|https?:|//", page.style)
+    policy = next(a["content"] for _, a in page.tags if a.get("http-equiv") == "Content-Security-Policy")
+    assert policy == "default-src 'none'; style-src 'unsafe-inline'"
+
+
+def test_every_text_from_elsewhere_shows_as_text() -> None:
+    document = compared(result())
+    hostile = ResultDocument.model_validate(
+        planted(document.model_dump(by_alias=True, exclude_unset=True), MARKUP, FIXED)
+    )
+    said = dict.fromkeys(("laboratory", "address", "place", "time_reference"), MARKUP)
+    order = dict.fromkeys(("customer", "customer_address", "condition", "authorised_by", "replaces"), MARKUP)
+    stated = Stated(SiteSection(**said), CertificateSection(**order))
+    document = hostile.model_copy(update={"sensors": {MARKUP: hostile.sensors["gyro"]}})
+    page = read(certificate(document, stated))
+    tags = {tag for tag, _ in read(certificate()).tags} | {"p"}
+    assert {tag for tag, _ in page.tags} <= tags
+    assert page.text.count(MARKUP) > 12
+    assert not any("onerror" in attributes for _, attributes in page.tags)
+    assert "script" not in page.style
+
+
+def test_a_screen_reader_finds_its_way() -> None:
+    page = read(certificate())
+    root = next(attributes for tag, attributes in page.tags if tag == "html")
+    assert root["lang"] == "en"
+    tables, captions = ([tag for tag, _ in page.tags].count(name) for name in ("table", "caption"))
+    assert tables == captions > 0
+    assert all(attributes.get("scope") for tag, attributes in page.tags if tag == "th")
+    names = {attributes["id"] for _, attributes in page.tags if attributes.get("id")}
+    pictures = [attributes for tag, attributes in page.tags if tag == "svg"]
+    assert len(pictures) == 2
+    for attributes in pictures:
+        assert attributes["role"] == "img"
+        assert set((attributes["aria-labelledby"] or "").split()) <= names
+    assert "prefers-color-scheme: dark" in page.style
+
+
+@given(
+    value=st.floats(-1e12, 1e12, allow_nan=False),
+    uncertainty=st.floats(1e-12, 1e12, allow_nan=False),
+)
+def test_two_significant_digits_the_same_decimals_and_never_below_95_percent(value: float, uncertainty: float) -> None:
+    found = rounded(value, uncertainty)
+    digits = found.uncertainty_text.replace(".", "").lstrip("0")
+    assert len(digits.rstrip("0")) <= 2 <= len(digits)
+    places = [len(text.partition(".")[2]) for text in (found.value_text, found.uncertainty_text)]
+    assert places[0] == places[1]
+    exact = Decimal(repr(uncertainty))
+    assert Decimal("0.95") * exact <= found.uncertainty <= Decimal("1.05") * exact
+    unit = Decimal(1).scaleb(found.uncertainty.adjusted() - 1)
+    assert abs(found.value - Decimal(repr(value))) <= unit / 2
+
+
+@pytest.mark.parametrize(
+    ("value", "uncertainty", "texts"),
+    [
+        (1.17622532, 0.00171697, ("1.1762", "0.0017")),
+        (-0.009761911, 0.00099612, ("−0.0098", "0.0010")),
+        (-0.00001, 0.0012, ("0.0000", "0.0012")),
+        (1234.5, 123.0, ("1230", "120")),
+    ],
+)
+def test_rounding_by_example(value: float, uncertainty: float, texts: tuple[str, str]) -> None:
+    found = rounded(value, uncertainty)
+    assert (found.value_text, found.uncertainty_text) == texts
+
+
+@pytest.mark.parametrize(("value", "uncertainty"), [(1.0, 0.0), (1.0, -1.0), (float("nan"), 1.0), (1.0, float("inf"))])
+def test_what_cannot_be_rounded_is_not(value: float, uncertainty: float) -> None:
+    with pytest.raises(ValueError, match="cannot be rounded"):
+        rounded(value, uncertainty)
+
+
+def test_what_the_configuration_says_is_stated(tmp_path: Path) -> None:
+    text = (CONFIGS / "demo.yaml").read_text(encoding="utf-8")
+    said = "site: {laboratory: ' Ours ', country: DE}\ncertificate: {customer: Theirs, received: 2026-11-20}\n"
+    found = of_configuration(parse(text + said))
+    assert found.simulated
+    assert (found.where.laboratory, found.certificate.customer, str(found.certificate.received)) == (
+        "Ours",
+        "Theirs",
+        "2026-11-20",
+    )
+    (tmp_path / "config.yaml").write_text(text + said, encoding="utf-8")
+    amended = stated_in(tmp_path, ["certificate.customer=Somebody", "certificate.replaces=RIG-1"])
+    assert (amended.certificate.customer, amended.certificate.replaces) == ("Somebody", "RIG-1")
+    with pytest.raises(Refused, match="unknown_setting"):
+        stated_in(tmp_path, ["site.gravity_m_s2=9.81"])
