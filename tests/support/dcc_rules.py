@@ -1,0 +1,56 @@
+"""What PTB has to say about a digital certificate: its schemas, where they are at hand, and its Schematron.
+
+The schemas (DCC 3.2.1, D-SI 2.1.0, LGPL-3, and the W3C's for signatures) are no part of this project. They are looked
+for in the folder RIG_DCC_SCHEMAS names, in tests/fixtures/dcc, and in shared/dcc beside the repository.
+"""
+
+import functools
+import os
+from pathlib import Path
+
+import pytest
+from lxml import etree
+
+from support.paths import FIXTURES, ROOT
+
+FILES = {
+    "https://ptb.de/si/v2.1.0/SI_Format.xsd": "SI-2.1.0.xsd",
+    "https://www.ptb.de/dcc/d-sig/xmldsig-core-schema.xsd": "xmldsig-core-schema.xsd",
+}
+REMARKS = {"warning", "information"}
+MAIN = "dcc-3.2.1.xsd"
+PLACES = [Path(os.environ.get("RIG_DCC_SCHEMAS", "")), FIXTURES.parent / "dcc", ROOT.parent / "shared" / "dcc"]
+
+
+def schema_faults(xml: bytes) -> list[str]:
+    """What the schema refuses; the test is skipped, by name, where there is none."""
+    folder = next((place for place in PLACES if (place / MAIN).is_file()), None)
+    if folder is None:
+        pytest.skip("PTB's schemas are not here: set RIG_DCC_SCHEMAS to their folder")
+    schema = _schema(folder)
+    schema.validate(etree.fromstring(xml))
+    return [str(error.message) for error in schema.error_log]
+
+
+@functools.cache
+def _schema(folder: Path) -> etree.XMLSchema:
+    class Local(etree.Resolver):  # type: ignore[misc]
+        def resolve(self, url, public_id, context):  # type: ignore[no-untyped-def]
+            return self.resolve_filename(str(folder / FILES[url]), context) if url in FILES else None
+
+    parser = etree.XMLParser(no_network=True)
+    parser.resolvers.add(Local())
+    return etree.XMLSchema(etree.parse(str(folder / MAIN), parser))
+
+
+def rule_faults(xml: bytes) -> list[str]:
+    """Errors by PTB's Schematron; its warnings and remarks are left out."""
+    found = _rules().validate_str(xml.decode())
+    return [each.text for each in [*found.failed_assertions, *found.successful_reports] if each.role not in REMARKS]
+
+
+@functools.cache
+def _rules():  # type: ignore[no-untyped-def]
+    from dcclib.validation.schematron import SchematronValidator
+
+    return SchematronValidator.for_dcc()
