@@ -13,6 +13,7 @@ from rig.commands import solve_arguments
 from rig.commands.standard_streams import keep_streams_usable
 from rig.errors import Fault, RigError
 from rig.errors.quoting import printable_lines
+from rig.report.exports.formats import FORMATS
 
 if TYPE_CHECKING:
     from rig.plans.registry import AnyProcedure
@@ -113,6 +114,12 @@ def _parser() -> argparse.ArgumentParser:
     report.add_argument("--dcc", action="store_true", help="the digital certificate (DCC 3.2.1, XML) too")
     report.add_argument("--out", type=Path, metavar="DIR", help="where to (default: the run folder)")
     _add_set(report, "say something else on the certificate, for example certificate.customer=Example")
+    export = add("export", _export, "what was calibrated and recorded, in the files of other programs")
+    export.add_argument("run", type=Path, metavar="RUN", help="a run folder")
+    export.add_argument(
+        "--format", choices=FORMATS, required=True, help="whose; docs/how-to/export.md says what each holds"
+    )
+    export.add_argument("--out", type=Path, metavar="DIR", help="where to (default: export/FORMAT in the run folder)")
     study = add("study", _study, "Monte-Carlo studies of the papers' figures and tables; without a name, list them")
     study.add_argument("name", nargs="?", metavar="NAME")
     study.add_argument("--out", type=Path, default=Path("studies"), metavar="DIR", help="default: studies")
@@ -235,6 +242,12 @@ def _report(options: argparse.Namespace) -> int:
     from rig.commands.report import report
 
     return report(options.run, options.out, options.overrides, pdf=options.pdf, dcc=options.dcc)
+
+
+def _export(options: argparse.Namespace) -> int:
+    from rig.commands.export import export
+
+    return export(options.run, options.format, options.out)
 
 
 def _study(options: argparse.Namespace) -> int:

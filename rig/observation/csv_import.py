@@ -1,6 +1,7 @@
 """Data recorded elsewhere: a CSV file of samples and one of sweeps, solved as the rig solves its own recordings.
 
-samples: `time_s`, `x_rad_s`, `y_rad_s`, `z_rad_s`. The gyroscope's readings; the time must increase.
+samples: `time_s`, `x_rad_s`, `y_rad_s`, `z_rad_s`. The gyroscope's readings; the time must increase. `temperature_c`
+may stand there too, as `rig export` writes it; nothing here depends on it.
 
 sweeps: `start_s`, `end_s` on the same clock, `axis_x`, `axis_y`, `axis_z` (unit vector of the turn in a frame fixed to
 the sensor's carrier, right-handed), and either `speed_rad_s` (mean speed) or `angle_rad` (angle turned from start to
@@ -46,7 +47,7 @@ def read(samples_path: Path, sweeps_path: Path) -> ExternalData:
     Raises Refused `no_file`, `wrong_columns`, `wrong_unit`, `not_a_number`, `time_not_increasing`, `bad_sweep`,
     `overlapping_sweeps`; Fault as `average` does.
     """
-    samples = read_columns(samples_path, SAMPLE_COLUMNS, (), SAMPLES_MB)
+    samples = read_columns(samples_path, SAMPLE_COLUMNS, (), SAMPLES_MB, (("temperature_c",),))
     sweeps = read_columns(sweeps_path, SWEEP_COLUMNS, MOTION_COLUMNS, SWEEPS_MB)
     return average(
         np.column_stack([samples[name] for name in SAMPLE_COLUMNS]),

@@ -17,7 +17,7 @@ from rig.report.certificate.page import certificate_page
 from rig.report.certificate.rounding import rounded
 from rig.report.certificate.stated import Stated, of_configuration, stated_in
 from rig.report.certificate.tables import coverage_sentence
-from support.certified import LABORATORY, certificate, compared, planted, read, result
+from support.certified import LABORATORY, certificate, compared, planted, read, result, with_accelerometer
 from support.paths import CONFIGS, FIXTURES
 
 CLAUSES = [
@@ -142,6 +142,18 @@ def test_before_and_after_of_a_verified_run_are_as_found_and_as_left() -> None:
     for value in (*before.movement.rms_rad_s, *after.movement.rms_rad_s):
         assert f"{value:.5f}" in page.under["7.8.4.1d"]
     assert "Reference reference, serial number" in page.under["7.8.2.1p"]
+
+
+def test_an_accelerometer_stands_there_with_its_uncertainty_and_what_is_not_in_it() -> None:
+    document = with_accelerometer()
+    page = read(certificate(compared(document)))
+    assert "1.01235 ± 0.00020" in page.text  # two standard deviations of 1e-4
+    assert "0.3000 ± 0.0020" in page.text
+    assert "No budget of further contributors was evaluated" in page.under["7.8.4.1a"]
+    assert "9.81 m/s² as exact" in page.under["7.8.4.1a"]
+    assert "No metrological traceability" in page.under["7.8.4.1c"]
+    alone = read(certificate(document.model_copy(update={"sensors": {}})))
+    assert "1.01235 ± 0.00020" in alone.text
 
 
 def test_scarce_freedom_is_said() -> None:

@@ -12,7 +12,7 @@ from rig.errors import Refused
 from rig.report.certificate.dcc import JOINT_FACTOR, digital_certificate
 from rig.report.certificate.stated import Stated
 from rig.report.certificate.xml_parts import product
-from support.certified import LABORATORY, certificate, compared, result
+from support.certified import LABORATORY, certificate, compared, result, with_accelerometer
 from support.dcc_rules import rule_faults, schema_faults
 from support.paths import FIXTURES
 
@@ -56,6 +56,15 @@ def test_the_schema_finds_nothing_wrong(stated: Stated) -> None:
 )
 def test_ptb_s_rules_find_nothing_wrong(stated: Stated) -> None:
     assert rule_faults(digital_certificate(certificate(stated=stated))) == []
+
+
+@pytest.mark.slow
+def test_accelerometers_and_verifications_are_valid_too() -> None:
+    verified = read_result(FIXTURES / "verified").verification
+    xml = digital_certificate(certificate(with_accelerometer().model_copy(update={"verification": verified})))
+    assert [len(each) for each in map(numbers, found(xml, "si:valueXMLList"))] == [3, 3, 6, 3, 3, 3, 3, 6]
+    assert rule_faults(xml) == []
+    assert schema_faults(xml) == []
 
 
 @pytest.mark.slow

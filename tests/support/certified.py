@@ -10,8 +10,10 @@ from typing import Any
 from rig.analysis.outcome import calibrated
 from rig.arm.kinematics import NOMINAL
 from rig.config.models import CertificateSection, SiteSection
+from rig.data.accelerometer_entries import AccelerometerEntry
 from rig.data.budget_entries import ClockComparisonEntry
 from rig.data.result_file import ResultDocument
+from rig.data.result_types import Matrix3, Vector3
 from rig.report.certificate.content import Certificate, certificate_of
 from rig.report.certificate.page import certificate_page
 from rig.report.certificate.stated import Stated
@@ -20,6 +22,7 @@ from support.synthetic_run import Setup, synthetic_run
 
 CELLS = {"td", "th", "p", "div", "dd", "dt", "li", "h1", "h2", "h3", "caption"}
 VOID = {"meta", "br", "link", "img", "input", "hr", "base", "embed", "source"}
+IDENTITY: Matrix3 = ((1.0, 0.0, 0.0), (0.0, 1.0, 0.0), (0.0, 0.0, 1.0))
 LABORATORY = Stated(
     SiteSection(
         laboratory="Bench Laboratory",
@@ -48,6 +51,54 @@ def result() -> ResultDocument:
     document = document_of(calibrated([synthetic_run(Setup(told=NOMINAL))]))
     checks = tuple(check for check in document.checks if not check.name.startswith("gyro.board"))
     return document.model_copy(update={"checks": checks, "verdict": "pass"})
+
+
+def accelerometer(
+    correction: Matrix3 = ((1.02, 0.01, 0.0), (0.0, 0.98, -0.01), (0.0, 0.0, 1.01)),
+) -> AccelerometerEntry:
+    """One beside the gyroscope."""
+    none: Vector3 = (0.0, 0.0, 0.0)
+    covariance = tuple(tuple(1e-8 * (i == j) * (1 if i < 3 else 100) for j in range(6)) for i in range(6))
+    dwell = {"index": 0, "name": "x up", "attitude": IDENTITY, "mean_m_s2": none, "mean_std_m_s2": none}
+    dwell |= {"noise_m_s2": (0.01, 0.02, 0.01), "residual_m_s2": none, "samples": 600, "duration_s": 3.0}
+    return AccelerometerEntry.model_validate(
+        {
+            "part": "lsm9ds1",
+            "serial_number": "LSM9DS1-001",
+            "range_m_s2": 19.6,
+            "role": "calibrate",
+            "model": "m = F s + b",
+            "estimator": "attitude_weighted",
+            "gravity_m_s2": 9.81,
+            "scale": (1.012345, 0.987654, 1.0),
+            "bias_m_s2": (0.3, -0.2, 0.1),
+            "covariance": covariance,
+            "covariance_order": ("kx", "ky", "kz", "bx", "by", "bz"),
+            "covariance_units": ("1", "1", "1", "m/s²", "m/s²", "m/s²"),
+            "matrix": IDENTITY,
+            "non_orthogonality_rad": none,
+            "non_orthogonality_std_rad": none,
+            "second_order_s2_m": None,
+            "second_order_std_s2_m": None,
+            "reference_m_s2": (0.0, 0.0, 9.81),
+            "attitude_error_rad": 5e-4,
+            "attitude_error_std_rad": 1e-4,
+            **dict.fromkeys(("lever_arm_m", "lever_arm_std_m", "delay_s", "delay_std_s", "alignment", "held_out")),
+            "dwells": ({**dwell, "temperature_c": 22.0},),
+            "sweeps": 6,
+            "rank": 14,
+            "condition": 1.9,
+            "temperature_c": 22.0,
+            "correction_matrix": correction,
+            "beside": {},
+            "warnings": (),
+        }
+    )
+
+
+def with_accelerometer(found: AccelerometerEntry | None = None) -> ResultDocument:
+    """That result with an accelerometer."""
+    return result().model_copy(update={"accelerometers": {"gyro": found or accelerometer()}})
 
 
 def compared(document: ResultDocument) -> ResultDocument:

@@ -118,7 +118,7 @@ def budget_rows(budget: BudgetEntry) -> list[BudgetRow]:
 
 
 def _budget_row(line: ContributorEntry) -> BudgetRow:
-    assumed = "found from the readings" if line.half_width is None else f"±{line.half_width:.3g} {line.unit}"
+    assumed = "from readings" if line.half_width is None else f"±{line.half_width:.3g} {line.unit}"
     said = line.name, line.kind, line.distribution, assumed, freedom_text(line.freedom)
     return _row(said, line.std, line.share)
 

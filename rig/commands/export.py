@@ -1,0 +1,37 @@
+"""`rig export`: a run in the files of other programs."""
+
+from pathlib import Path
+
+from rig.data.result_file import passed_result
+from rig.errors import Refused
+from rig.observation.observed_run import observe_runs
+from rig.plans.recorded import open_run
+from rig.report.exports.formats import OF_READINGS, texts_of_calibrations, writer_of_readings
+from rig.station.plain_text import say
+
+
+def export(run: Path, name: str, out: Path | None) -> int:
+    """Readings of the first movement, or the calibrations of a run that passed, into `out`.
+
+    Returns 0. Raises Refused `report_folder`, of readings as `open_run` and `observe_runs`, of calibrations as
+    `passed_result` and `exported` do, `missing_extra`.
+    """
+    folder = out or (run if run.is_dir() else run.parent) / "export" / name
+    try:
+        if name in OF_READINGS:
+            recordings = observe_runs(open_run(run).movement)
+            if not recordings:
+                raise Refused("nothing_to_export", "no sweep or dwell was finished", "Resume the run")
+            folder.mkdir(parents=True, exist_ok=True)
+            written = writer_of_readings(name)(recordings, folder)
+        else:
+            texts = texts_of_calibrations(name)(passed_result(run))
+            folder.mkdir(parents=True, exist_ok=True)
+            written = [folder / file for file in texts]
+            for path, text in zip(written, texts.values(), strict=True):
+                path.write_text(text, encoding="utf-8")
+    except OSError as error:
+        raise Refused("report_folder", f"{folder} cannot be written: {error}", "Choose another with --out") from error
+    for path in written:
+        say(str(path))
+    return 0

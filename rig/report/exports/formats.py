@@ -1,0 +1,49 @@
+"""Which formats there are, and where each is written. A new one is a file with its writer, and its line here."""
+
+import importlib
+from collections.abc import Callable, Mapping
+from typing import TYPE_CHECKING, Any, Final
+
+if TYPE_CHECKING:  # the command line asks for the names alone
+    from collections.abc import Sequence
+    from pathlib import Path
+
+    from rig.data.result_file import ResultDocument
+    from rig.observation.observed_run import ObservedRun
+
+    ReadingsWriter = Callable[[Sequence[ObservedRun], Path], list[Path]]
+    CalibrationTexts = Callable[[ResultDocument], Mapping[str, str]]
+
+# `module:function`. Of readings: (recordings, folder) → the files written.
+OF_READINGS: Final[Mapping[str, str]] = {
+    "csv": "rig.report.exports.tables:write_csv",
+    "parquet": "rig.report.exports.tables:write_parquet",
+    "mat": "rig.report.exports.tables:write_mat",
+    "ros2": "rig.report.exports.ros2:write_bag",
+}
+# Of calibrations: (result) → texts by name of the file.
+OF_CALIBRATIONS: Final[Mapping[str, str]] = {
+    "imucal": "rig.report.exports.imucal:imucal_files",
+    "px4": "rig.report.exports.autopilots:px4_files",
+    "ardupilot": "rig.report.exports.autopilots:ardupilot_files",
+    "kalibr": "rig.report.exports.kalibr:kalibr_files",
+}
+FORMATS: Final = (*OF_READINGS, *OF_CALIBRATIONS)
+
+
+def writer_of_readings(name: str) -> "ReadingsWriter":
+    """Loads what it needs, which may be an extra's."""
+    found: ReadingsWriter = _named(OF_READINGS[name])
+    return found
+
+
+def texts_of_calibrations(name: str) -> "CalibrationTexts":
+    """The same of calibrations."""
+    found: CalibrationTexts = _named(OF_CALIBRATIONS[name])
+    return found
+
+
+def _named(place: str) -> Callable[..., Any]:
+    module, function = place.split(":")
+    found: Callable[..., Any] = getattr(importlib.import_module(module), function)
+    return found

@@ -1,0 +1,79 @@
+"""Kalibr's YAML: what its --imu wants to be told of noise, and intrinsics as its result has them.
+
+Kalibr (IccSensors.py, "scale-misalignment"): m_a = M_a a + b_a, m_g = M_g C_g ω + A_g C_g a + b_g with lower triangular
+M, in the frame of the accelerometer's axes; without one, of the gyroscope's.
+"""
+
+from collections.abc import Mapping
+
+import numpy as np
+import yaml
+
+from rig.data.result_file import ResultDocument
+from rig.estimation.arrays import Array
+from rig.report.exports.names import plain_names
+from rig.report.exports.parameters import Exported, comments, exported
+
+
+def kalibr_files(result: ResultDocument) -> Mapping[str, str]:
+    """For each sensor `…_imu.yaml` (noise) and `…_intrinsics.yaml`."""
+    files = {}
+    sensors = exported(result)
+    names = plain_names(each.name for each in sensors)
+    for each in sensors:
+        topic = f"/{names[each.name]}/imu"  # as in the bag of `--format ros2`
+        files[f"{each.name}_imu.yaml"] = _noise(result, each, topic)
+        files[f"{each.name}_intrinsics.yaml"] = _intrinsics(result, each, topic)
+    return files
+
+
+def triangular(matrix: Array) -> tuple[Array, Array]:
+    """(3, 3) = M · C with M lower triangular, positive on its diagonal, and C a rotation, of a right-handed matrix."""
+    q, r = np.linalg.qr(matrix.T)
+    signs = np.sign(np.diag(r))
+    return r.T * signs + 0.0, (q * signs).T  # no −0.0
+
+
+def _noise(result: ResultDocument, each: Exported, topic: str) -> str:
+    known = {
+        "rostopic": topic,
+        "update_rate": each.gyroscope.rate_hz,
+        "gyroscope_noise_density": each.gyroscope.density,
+        "accelerometer_noise_density": None if each.accelerometer is None else each.accelerometer.density,
+    }
+    unknown = [name for name, value in known.items() if value is None]
+    said = [
+        *comments(result, each),
+        "Noise densities in rad/s/sqrt(Hz), m/s^2/sqrt(Hz): of a sample at rest over the rate's root, worst axis.",
+        "Lost: gyroscope_random_walk, accelerometer_random_walk, which take hours at rest; add your own.",
+        *(f"Lost: {name}, which this run does not tell" for name in unknown),
+    ]
+    return _yaml(said, {name: value for name, value in known.items() if value is not None})
+
+
+def _intrinsics(result: ResultDocument, each: Exported, topic: str) -> str:
+    imu: dict[str, object] = {"model": "scale-misalignment", "rostopic": topic}
+    to_body = np.eye(3)
+    if each.accelerometer is not None:
+        scaled, to_body = triangular(each.accelerometer.matrix)
+        imu["accelerometers"] = {"M": scaled.tolist()}
+    scaled, turned = triangular(each.gyroscope.matrix @ to_body.T)
+    in_body = each.g_sensitivity @ to_body.T
+    imu["gyroscopes"] = {"M": scaled.tolist(), "A": (in_body @ turned.T).tolist(), "C_gyro_i": turned.tolist()}
+    said = [
+        *comments(result, each),
+        "m = M C_gyro_i w + A C_gyro_i a + b: readings m in rad/s, w true, a in m/s^2. Kalibr keeps no bias here:",
+        f"b = -b of result.json = {each.gyroscope.offset.tolist()} rad/s",
+    ]
+    if each.accelerometer is not None:
+        said.append(f"accelerometer: m = M a + b, b = {each.accelerometer.offset.tolist()} m/s^2")
+    if not each.found_g_sensitivity:
+        said.append("A is zero: the g-sensitivity was not found.")
+    said.append("Lost: uncertainties, temperature, the accelerometer's second order and place.")
+    return _yaml(said, {"imu0": imu})
+
+
+def _yaml(said: list[str], document: Mapping[str, object]) -> str:
+    heading = "".join(f"# {line}\n" for line in said)
+    nested = any(isinstance(value, dict) for value in document.values())  # matrices are written a row a line
+    return heading + yaml.safe_dump(document, sort_keys=False, default_flow_style=None if nested else False)

@@ -1,0 +1,120 @@
+"""Readings, sweeps and arm states as tables: CSV, Parquet, MATLAB.
+
+Readings are those the board sent, in each sensor's own axes, on the arm controller's clock. `rig solve GYRO.csv
+--sweeps GYRO_sweeps.csv` reads the CSV files.
+"""
+
+from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import dataclass
+from pathlib import Path
+
+import numpy as np
+
+from rig.arm.state import JOINT_NAMES
+from rig.estimation.arrays import Array
+from rig.observation.acceleration import accelerations
+from rig.observation.average import Stream
+from rig.observation.observed_run import ObservedRun
+from rig.report.exports.names import plain_names
+from rig.study.files import missing_extra
+
+RATES = ("x_rad_s", "y_rad_s", "z_rad_s")
+ACCELERATIONS = ("x_m_s2", "y_m_s2", "z_m_s2")
+CLOCK = "Times are seconds of the arm controller's clock."
+LOST = "Not here: counts, the board's and the computer's times, events, settings; they are in run.h5."
+
+
+@dataclass(frozen=True, slots=True)
+class Table:
+    """Columns (n,) by name, which carries the unit, and what they mean."""
+
+    name: str
+    columns: Mapping[str, Array]
+    said: str
+
+
+def tables_of(recordings: Sequence[ObservedRun]) -> Iterator[Table]:
+    """Of each recording the arm, and of each sensor its readings, its accelerations if it has any, and its sweeps."""
+    for number, recording in enumerate(recordings, start=1):
+        after = "" if number == 1 else f"-{number}"
+        yield Table(f"arm{after}", _arm(recording), f"Joint angles and rates, base to wrist 3. {CLOCK} {LOST}")
+        for name, sensor in recording.run.sensors.items():
+            stream = recording.stream(name)
+            whose = f"{name}, {sensor.part} {sensor.serial_number}, {sensor.mode} readings in the sensor's own axes."
+            yield Table(f"{name}{after}", _readings(stream), f"{whose} {CLOCK} {LOST}")
+            if sensor.has_acceleration:
+                columns = {"time_s": stream.time_s, **_split(ACCELERATIONS, accelerations(stream, slice(None)))}
+                yield Table(f"{name}_acceleration{after}", columns, f"{whose} Upwards at rest. {CLOCK} {LOST}")
+            turned = "Whole turns about a unit vector in the flange's frame; those of angle 0 are rests."
+            yield Table(f"{name}_sweeps{after}", _sweeps(recording, name), f"{turned} {CLOCK} {LOST}")
+
+
+def _arm(recording: ObservedRun) -> dict[str, Array]:
+    states = recording.motion.states
+    angles = {f"{joint}_rad": states["q_rad"][:, i] for i, joint in enumerate(JOINT_NAMES)}
+    rates = {f"{joint}_rad_s": states["qd_rad_s"][:, i] for i, joint in enumerate(JOINT_NAMES)}
+    return {"time_s": states["time_s"], **angles, **rates}
+
+
+def _readings(stream: Stream) -> dict[str, Array]:
+    sensor = stream.sensor
+    temperature = stream.raw["temperature_counts"] * sensor.temperature_c_per_count + sensor.temperature_offset_c
+    return {"time_s": stream.time_s, **_split(RATES, stream.readings_rad_s), "temperature_c": temperature}
+
+
+def _sweeps(recording: ObservedRun, name: str) -> dict[str, Array]:
+    seen = recording.sensors[name]
+    rows = [(turn.average.start_s, turn.average.end_s, *turn.axis_flange, 2 * np.pi) for turn in seen.revolutions]
+    rows += [(rest.start_s, rest.end_s, 0.0, 0.0, 0.0, 0.0) for rest in seen.rests]
+    names = ("start_s", "end_s", "axis_x", "axis_y", "axis_z", "angle_rad")
+    return _split(names, np.array(sorted(rows), dtype=np.float64).reshape(-1, len(names)))
+
+
+def _split(names: Sequence[str], columns: Array) -> dict[str, Array]:
+    return {name: columns[:, i] for i, name in enumerate(names)}
+
+
+def write_csv(recordings: Sequence[ObservedRun], folder: Path) -> list[Path]:
+    """A file for each table, and `README.txt`, since a table of numbers has no room for words."""
+    written, said = [], []
+    for table in tables_of(recordings):
+        path = folder / f"{table.name}.csv"
+        rows = np.column_stack(list(table.columns.values()))
+        np.savetxt(path, rows, fmt="%.17g", delimiter=",", header=",".join(table.columns), comments="")
+        written.append(path)
+        said.append(f"{path.name}: {table.said}\n")
+    readme = folder / "README.txt"
+    readme.write_text("".join(said), encoding="utf-8")
+    return [*written, readme]
+
+
+def write_parquet(recordings: Sequence[ObservedRun], folder: Path) -> list[Path]:
+    """A file for each table, its meaning as metadata `convention`. Raises Refused `missing_extra`."""
+    try:
+        import pyarrow
+        import pyarrow.parquet
+    except ImportError as error:
+        raise missing_extra(error, "parquet") from error
+    written = []
+    for table in tables_of(recordings):
+        path = folder / f"{table.name}.parquet"
+        columns = pyarrow.table({name: np.ascontiguousarray(column) for name, column in table.columns.items()})
+        pyarrow.parquet.write_table(columns.replace_schema_metadata({"convention": table.said}), path)
+        written.append(path)
+    return written
+
+
+def write_mat(recordings: Sequence[ObservedRun], folder: Path) -> list[Path]:
+    """`run.mat`: a struct for each table, columns as fields (n, 1), its meaning as field `convention`."""
+    from scipy.io import savemat
+
+    tables = tuple(tables_of(recordings))
+    names = plain_names(table.name for table in tables)
+    structs = {names[table.name]: {**_columns(table), "convention": table.said} for table in tables}
+    path = folder / "run.mat"
+    savemat(path, structs, do_compression=True, long_field_names=True)
+    return [path]
+
+
+def _columns(table: Table) -> dict[str, Array]:
+    return {name: column[:, None] for name, column in table.columns.items()}

@@ -1,0 +1,262 @@
+"""Other programs read what is exported, with the values, units and signs of the result."""
+
+import json
+from dataclasses import replace
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+import yaml
+
+from firmware_host.samples import IMU_SAMPLE_DTYPE
+from rig.cli import main
+from rig.data.result_file import ResultDocument, VectorEntry, read_result
+from rig.errors import Refused
+from rig.estimation.arrays import Array
+from rig.observation.observed_run import ObservedRun, observe_runs
+from rig.plans.recorded import open_run
+from rig.report.exports.autopilots import ardupilot_files, px4_files
+from rig.report.exports.formats import FORMATS, OF_CALIBRATIONS, texts_of_calibrations, writer_of_readings
+from rig.report.exports.imucal import imucal_files
+from rig.report.exports.kalibr import kalibr_files, triangular
+from rig.report.exports.names import plain_names
+from rig.report.exports.parameters import exported
+from support.certified import accelerometer, result
+from support.paths import FIXTURES
+
+GRAVITY_M_S2 = 9.81
+
+
+def rows(matrix: Array) -> Any:
+    return tuple(map(tuple, matrix.tolist()))
+
+
+@pytest.fixture(scope="module")
+def sensed() -> ResultDocument:
+    """The result with a sensor of skew axes, felt gravity, and an accelerometer beside it."""
+    rng = np.random.default_rng(5)
+    sensor = result().sensors["gyro"]
+    vector = sensor.vector_model
+    assert isinstance(vector, VectorEntry)
+    changed = vector.model_copy(update={"g_sensitivity_rad_s_per_m_s2": rows(1e-3 * rng.normal(size=(3, 3)))})
+    beside = accelerometer(rows(np.eye(3) + 0.02 * rng.normal(size=(3, 3))))
+    return result().model_copy(
+        update={
+            "sensors": {"gyro": sensor.model_copy(update={"vector_model": changed})},
+            "accelerometers": {"gyro": beside},
+        }
+    )
+
+
+@pytest.fixture(scope="module")
+def recordings() -> tuple[ObservedRun, ...]:
+    return observe_runs(open_run(FIXTURES / "calibration").movement)
+
+
+def felt(document: ResultDocument, rate_flange: Array, up_flange: Array) -> tuple[Array, Array]:
+    """What gyroscope and accelerometer read, by the models of the result, of a rate and of gravity from above."""
+    sensor = document.sensors["gyro"]
+    vector = sensor.vector_model
+    assert isinstance(vector, VectorEntry) and vector.g_sensitivity_rad_s_per_m_s2 is not None
+    down = -GRAVITY_M_S2 * up_flange
+    reading = np.array(vector.matrix) @ rate_flange + np.array(vector.g_sensitivity_rad_s_per_m_s2) @ down
+    force = np.array(vector.mounting) @ -down
+    beside = document.accelerometers["gyro"]
+    acceleration = np.linalg.inv(np.array(beside.correction_matrix)) @ force + np.array(beside.bias_m_s2)
+    return reading - np.array(sensor.bias_rad_s), acceleration
+
+
+def motion() -> tuple[Array, Array]:
+    rng = np.random.default_rng(7)
+    up = rng.normal(size=3)
+    return rng.normal(size=3), up / np.linalg.norm(up)
+
+
+def test_imucal_takes_readings_to_the_true_rate_and_force(sensed: ResultDocument) -> None:
+    from imucal import CalibrationInfo
+
+    (text,) = imucal_files(sensed).values()
+    found = CalibrationInfo.from_json(text)
+    rate, up = motion()
+    reading, acceleration = felt(sensed, rate, up)
+    force, turned = found.calibrate(acceleration[None], reading[None], "m/s^2", "rad/s")
+    mounting = np.array(sensed.sensors["gyro"].vector_model.mounting)  # type: ignore[union-attr]
+    np.testing.assert_allclose(turned[0], mounting @ rate, rtol=1e-12, atol=1e-15)
+    np.testing.assert_allclose(force[0], GRAVITY_M_S2 * mounting @ up, rtol=1e-12, atol=1e-15)
+    assert "b_g = -b" in found.comment and "Left out" in found.comment
+
+
+def test_imucal_of_a_gyroscope_alone_leaves_accelerations_as_they_are() -> None:
+    from imucal import CalibrationInfo
+
+    old = read_result(FIXTURES / "calibration")
+    found = CalibrationInfo.from_json(*imucal_files(old).values())
+    force, _ = found.calibrate(np.ones((1, 3)), np.ones((1, 3)), "m/s^2", "rad/s")
+    np.testing.assert_array_equal(force, np.ones((1, 3)))
+    assert "No accelerometer" in found.comment and "K_ga is zero" in found.comment
+
+
+def test_kalibr_s_intrinsics_say_the_same_of_the_same_motion(sensed: ResultDocument) -> None:
+    text = kalibr_files(sensed)["gyro_intrinsics.yaml"]
+    imu = yaml.safe_load(text)["imu0"]
+    scaled, sensitivity, turned = (np.array(imu["gyroscopes"][name]) for name in ("M", "A", "C_gyro_i"))
+    of_force = np.array(imu["accelerometers"]["M"])
+    for lower in (scaled, of_force):
+        assert np.array_equal(lower, np.tril(lower))
+    np.testing.assert_allclose(turned @ turned.T, np.eye(3), atol=1e-12)
+    mounting = np.array(sensed.sensors["gyro"].vector_model.mounting)  # type: ignore[union-attr]
+    beside = sensed.accelerometers["gyro"]
+    _, body = triangular(np.linalg.inv(np.array(beside.correction_matrix)))
+    rate, up = motion()
+    reading, acceleration = felt(sensed, rate, up)
+    rate_body, force_body = body @ mounting @ rate, GRAVITY_M_S2 * body @ mounting @ up
+    without_bias = reading + np.array(sensed.sensors["gyro"].bias_rad_s)
+    np.testing.assert_allclose(
+        scaled @ turned @ rate_body + sensitivity @ turned @ force_body, without_bias, rtol=1e-12, atol=1e-15
+    )
+    np.testing.assert_allclose(of_force @ force_body, acceleration - np.array(beside.bias_m_s2), rtol=1e-12, atol=1e-15)
+
+
+def test_kalibr_s_noise_is_that_of_rests_over_the_root_of_the_rate(sensed: ResultDocument) -> None:
+    text = kalibr_files(sensed)["gyro_imu.yaml"]
+    found = yaml.safe_load(text)
+    assert found["update_rate"] == pytest.approx(238, rel=0.01)
+    assert found["gyroscope_noise_density"] == pytest.approx(0.035 / 238**0.5, rel=0.05)
+    assert found["accelerometer_noise_density"] == pytest.approx(0.02 / 200**0.5)
+    assert "Lost: gyroscope_random_walk, accelerometer_random_walk" in text
+    alone = kalibr_files(read_result(FIXTURES / "calibration"))["gyro_imu.yaml"]
+    assert "accelerometer_noise_density" not in yaml.safe_load(alone)
+    assert "Lost: accelerometer_noise_density" in alone
+
+
+def test_autopilots_subtract_minus_b(sensed: ResultDocument) -> None:
+    bias = sensed.sensors["gyro"].bias_rad_s
+    px4, ardupilot = px4_files(sensed)["px4.params"], ardupilot_files(sensed)["ardupilot.param"]
+    lines = [line.split("\t") for line in px4.splitlines() if not line.startswith("#")]
+    assert [line[2] for line in lines] == ["CAL_GYRO0_XOFF", "CAL_GYRO0_YOFF", "CAL_GYRO0_ZOFF"]
+    assert [float(line[3]) for line in lines] == [-b for b in bias]
+    pairs = dict(line.split(",") for line in ardupilot.splitlines() if not line.startswith("#"))
+    assert [float(pairs[f"INS_GYROFFS_{axis}"]) for axis in "XYZ"] == [-b for b in bias]
+    assert pairs["INS_GYR_CAL"] == "0"
+    assert float(pairs["INS_GYR1_CALTEMP"]) == sensed.sensors["gyro"].temperature_c
+    for text in (px4, ardupilot):
+        assert "Lost: scale factors" in text and "rad/s" in text
+
+
+def test_a_second_gyroscope_has_parameters_of_its_own(sensed: ResultDocument) -> None:
+    two = sensed.model_copy(update={"sensors": dict.fromkeys(("a", "b"), sensed.sensors["gyro"])})
+    assert "INS_GYR2OFFS_X," in ardupilot_files(two)["ardupilot.param"]
+    assert "CAL_GYRO1_XOFF" in px4_files(two)["px4.params"]
+
+
+@pytest.mark.parametrize("name", OF_CALIBRATIONS)
+def test_a_hostile_serial_number_stays_in_its_comment(sensed: ResultDocument, name: str) -> None:
+    sensor = sensed.sensors["gyro"].model_copy(update={"serial_number": "1\nINS_GYROFFS_X,9\n- ]}"})
+    hostile = sensed.model_copy(update={"sensors": {"gyro": sensor}})
+    for text in texts_of_calibrations(name)(hostile).values():
+        assert "\nINS_GYROFFS_X,9" not in text
+
+
+def test_nothing_calibrated_is_nothing_to_export() -> None:
+    with pytest.raises(Refused, match="nothing_to_export"):
+        exported(result().model_copy(update={"sensors": {}}))
+
+
+def test_names_stay_apart_where_blanks_are_not_taken() -> None:
+    assert plain_names(["my gyro", "my-gyro", "2nd"]) == {"my gyro": "my_gyro", "my-gyro": "my_gyro_", "2nd": "s_2nd"}
+
+
+def test_csv_solves_to_the_same_calibration(
+    recordings: tuple[ObservedRun, ...], tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    files = {path.name for path in writer_of_readings("csv")(recordings, tmp_path)}
+    assert files == {"arm.csv", "gyro.csv", "gyro_sweeps.csv", "README.txt"}
+    solving = ["solve", str(tmp_path / "gyro.csv"), "--sweeps", str(tmp_path / "gyro_sweeps.csv"), "--json"]
+    assert main(solving) == 0
+    again = json.loads(capsys.readouterr().out)
+    first = read_result(FIXTURES / "calibration").sensors["gyro"]
+    std = np.sqrt(np.diag(first.covariance))
+    off = np.array([*again["scale"], *again["bias_rad_s"]]) - np.array([*first.scale, *first.bias_rad_s])
+    assert np.all(np.abs(off) < std)  # the arm's vibration is noise there
+    said = (tmp_path / "README.txt").read_text(encoding="utf-8")
+    assert all(f"{name}: " in said for name in files - {"README.txt"}) and "Not here" in said
+
+
+def test_parquet_and_matlab_hold_the_readings(recordings: tuple[ObservedRun, ...], tmp_path: Path) -> None:
+    import pyarrow.parquet
+    from scipy.io import loadmat
+
+    stream = recordings[0].stream("gyro")
+    writer_of_readings("parquet")(recordings, tmp_path)
+    table = pyarrow.parquet.read_table(tmp_path / "gyro.parquet")
+    assert b"raw readings in the sensor's own axes" in table.schema.metadata[b"convention"]
+    writer_of_readings("mat")(recordings, tmp_path)
+    struct = loadmat(tmp_path / "run.mat", simplify_cells=True)["gyro"]
+    assert "raw readings" in struct["convention"]
+    for i, name in enumerate(("x_rad_s", "y_rad_s", "z_rad_s")):
+        np.testing.assert_array_equal(table[name].to_numpy(), stream.readings_rad_s[:, i])
+        np.testing.assert_array_equal(struct[name], stream.readings_rad_s[:, i])
+    np.testing.assert_array_equal(struct["time_s"], stream.time_s)
+
+
+def test_a_ros_2_bag_holds_the_readings(recordings: tuple[ObservedRun, ...], tmp_path: Path) -> None:
+    from rosbags.rosbag2 import Reader
+    from rosbags.typesys import Stores, get_typestore
+
+    (path,) = writer_of_readings("ros2")(recordings, tmp_path)
+    store = get_typestore(Stores.ROS2_JAZZY)
+    stream = recordings[0].stream("gyro")
+    with Reader(path) as bag:
+        (connection,) = bag.connections
+        assert connection.topic == "/gyro/imu"
+        messages: list[Any] = [store.deserialize_cdr(data, connection.msgtype) for _, _, data in bag.messages()]
+    rates = np.array([[m.angular_velocity.x, m.angular_velocity.y, m.angular_velocity.z] for m in messages])
+    np.testing.assert_allclose(rates, stream.readings_rad_s, rtol=1e-12, atol=1e-15)
+    since_s = np.array([m.header.stamp.sec % 10**6 + 1e-9 * m.header.stamp.nanosec for m in messages])
+    np.testing.assert_allclose(np.diff(since_s), np.diff(stream.time_s), atol=1e-8)
+    first: Any = messages[0]
+    assert first.orientation_covariance[0] == first.linear_acceleration_covariance[0] == -1
+    noise = np.array([rest.noise_rad_s for rest in recordings[0].sensors["gyro"].rests])
+    variance = first.angular_velocity_covariance.reshape(3, 3)
+    np.testing.assert_allclose(np.diag(variance), np.mean(noise**2, axis=0))
+    assert "orientation_covariance[0] = -1" in (path / "metadata.yaml").read_text(encoding="utf-8")
+    with pytest.raises(Refused, match="report_folder"):
+        writer_of_readings("ros2")(recordings, tmp_path)
+
+
+def with_accelerations(observed: ObservedRun) -> ObservedRun:
+    """The same of a sensor whose accelerometer was read, at 1, 2, 3 counts."""
+    old = observed.run.samples["gyro"]
+    samples = np.zeros(len(old), IMU_SAMPLE_DTYPE)
+    for name in old.dtype.names or ():
+        samples[name] = old[name]
+    samples["acceleration_counts"] = (1, 2, 3)
+    sensor = replace(observed.run.sensors["gyro"], range_m_s2=20.0, sensitivity_m_s2_per_count=0.25)
+    return replace(observed, run=replace(observed.run, samples={"gyro": samples}, sensors={"gyro": sensor}))
+
+
+def test_accelerations_are_exported_beside_the_rates(recordings: tuple[ObservedRun, ...], tmp_path: Path) -> None:
+    from rosbags.rosbag2 import Reader
+    from rosbags.typesys import Stores, get_typestore
+
+    felt = [with_accelerations(recordings[0])]
+    writer_of_readings("csv")(felt, tmp_path)
+    header, first, *_ = (tmp_path / "gyro_acceleration.csv").read_text(encoding="utf-8").splitlines()
+    assert header == "time_s,x_m_s2,y_m_s2,z_m_s2" and first.endswith(",0.25,0.5,0.75")
+    (path,) = writer_of_readings("ros2")(felt, tmp_path)
+    store = get_typestore(Stores.ROS2_JAZZY)
+    with Reader(path) as bag:
+        connection, _, data = next(iter(bag.messages()))
+        message: Any = store.deserialize_cdr(data, connection.msgtype)
+    force = message.linear_acceleration
+    assert (force.x, force.y, force.z) == (0.25, 0.5, 0.75)
+    assert message.linear_acceleration_covariance[0] == 0  # nothing stood still in attitudes: not known
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("name", FORMATS)
+def test_every_format_by_the_command_line(name: str, tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    assert main(["export", str(FIXTURES / "calibration"), "--format", name, "--out", str(tmp_path / "made")]) == 0
+    told = [Path(line) for line in capsys.readouterr().out.splitlines()]
+    assert told and all(path.exists() for path in told)
