@@ -326,10 +326,7 @@ class LimitsSection(Section):
 
 
 class SiteSection(Section):
-    """Where the arm stands, and whose it is. With latitude and heading the Earth's rate is taken out of the readings.
-
-    What a certificate says of the laboratory; left out, it reads "not stated".
-    """
+    """Where the arm stands. With latitude and heading the Earth's rate is taken out; the words are for certificates."""
 
     laboratory: Words | None = Field(default=None, description="the laboratory's name, for certificates")
     address: Words | None = Field(default=None, description="its address, in one line")

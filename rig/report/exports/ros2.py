@@ -19,9 +19,9 @@ FORMAT: Final = 9  # of ROS 2 Jazzy and later
 NANO = 10**9
 SAID = (
     "angular_velocity in rad/s and linear_acceleration in m/s^2 (upwards at rest) as the board sent them, in each "
-    "sensor's own axes; covariances are diagonal, of one sample at rest. orientation_covariance[0] = -1: no "
-    "orientation is known; linear_acceleration_covariance[0] = -1: none was recorded. Stamps: the recording's start in UTC, to a "
-    "second, and from there the arm controller's clock. Lost: temperature, counts, the arm's states, the calibration."
+    "sensor's own axes; covariances are diagonal, of one sample at rest. orientation_covariance[0] = -1: no attitude "
+    "is known; linear_acceleration_covariance[0] = -1: none was recorded. Stamps: the recording's start in UTC, to a "
+    "second, from there the arm controller's clock. Lost: temperature, counts, the arm's states, the calibration."
 )
 
 
