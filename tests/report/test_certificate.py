@@ -151,7 +151,7 @@ def test_an_accelerometer_stands_there_with_its_uncertainty_and_what_is_not_in_i
     assert "0.3000 ± 0.0020" in page.text
     assert "No budget of further contributors was evaluated" in page.under["7.8.4.1a"]
     assert "9.81 m/s² as exact" in page.under["7.8.4.1a"]
-    assert "No metrological traceability" in page.under["7.8.4.1c"]
+    assert "9.81 m/s² by the laboratory's configuration, whose origin is not stated" in page.under["7.8.4.1c"]
     alone = read(certificate(document.model_copy(update={"sensors": {}})))
     assert "1.01235 ± 0.00020" in alone.text
 

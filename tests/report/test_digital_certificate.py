@@ -126,6 +126,8 @@ def test_it_says_whether_it_is_traceable_and_that_a_simulated_one_is_not_valid()
     real = digital_certificate(certificate(compared(result())))
     assert [each.text for each in found(real, "dcc:traceable")] == ["true"]
     assert found(real, "dcc:valid") == []
+    both = digital_certificate(certificate(compared(with_accelerometer())))
+    assert [each.text for each in found(both, "dcc:traceable")] == ["true", "false"]  # gravity has no chain
     simulated = digital_certificate(certificate(compared(result()), SIMULATED))
     assert [each.text for each in found(simulated, "dcc:traceable")] == ["false"]
     assert [each.text for each in found(simulated, "dcc:valid")] == ["false"]

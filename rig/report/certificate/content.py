@@ -125,12 +125,12 @@ def _marks(
 
 
 def _traceable(result: ResultDocument, stated: Stated) -> bool:
-    """Whether the unit of time, the only standard of size here, hangs on a named reference.
+    """Whether the unit of time, the only standard of a gyroscope's scale, hangs on a named reference.
 
-    Accelerometers are relative to a gravity that is stated without a chain of its own.
+    Accelerometers never are: their gravity is stated without a chain of its own.
     """
     compared = result.clock is not None and any(each.by == BY_COMPUTER for each in result.clock.comparisons)
-    measured = bool(result.sensors) and not result.accelerometers and not is_simulated(result, stated)
+    measured = bool(result.sensors) and not is_simulated(result, stated)
     return measured and compared and stated.where.time_reference is not None
 
 

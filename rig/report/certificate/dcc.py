@@ -127,13 +127,20 @@ def _statements(c: Certificate) -> Iterator[Element]:
         yield dcc("statement", text("name", "validity"), text("declaration", f"{mark}."), words("valid", "false"))
     time = c.stated.where.time_reference
     chain = f"The unit of time hangs on {time}." if c.traceable else "No metrological traceability is claimed."
-    yield dcc("statement", text("name", "traceability"), words("traceable", str(c.traceable).lower()),
-              text("declaration", chain + " Angles are whole turns, 2π by closure of the circle."))  # fmt: skip
+    if c.gyroscopes:
+        yield _chain("gyroscopes", f"{chain} Angles are whole turns, 2π by closure of the circle.", c.traceable)
+    if c.accelerometers:
+        yield _chain("accelerometers", "Gravity is stated by the laboratory without a chain of its own.", False)
     relates = "The results relate only to the items calibrated. Not issued under an accreditation."
     yield dcc("statement", text("name", "scope"), text("declaration", " ".join([relates, *c.deviations])))
     rule = "guard band w = U (ILAC-G8:09/2019, 4.2.2)" if c.guarded else "simple acceptance (ILAC-G8:09/2019, 4.2.1)"
     for check in c.conformity:
         yield _conformity(check, rule)
+
+
+def _chain(of: str, said: str, traceable: bool) -> Element:
+    flag = words("traceable", str(traceable).lower())
+    return dcc("statement", text("name", f"traceability of {of}"), flag, text("declaration", said))
 
 
 def _conformity(check: CheckEntry, rule: str) -> Element:
