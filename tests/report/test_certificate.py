@@ -11,6 +11,7 @@ from hypothesis import strategies as st
 from rig.config.load import parse
 from rig.config.models import CertificateSection, SiteSection
 from rig.data.result_file import CheckEntry, ResultDocument, read_result
+from rig.data.result_types import ErrorEntry
 from rig.errors import Refused
 from rig.report.certificate.content import is_simulated
 from rig.report.certificate.page import certificate_page
@@ -154,6 +155,25 @@ def test_an_accelerometer_stands_there_with_its_uncertainty_and_what_is_not_in_i
     assert "9.81 m/s² by the laboratory's configuration, whose origin is not stated" in page.under["7.8.4.1c"]
     alone = read(certificate(document.model_copy(update={"sensors": {}})))
     assert "1.01235 ± 0.00020" in alone.text
+
+
+def test_a_verification_alone_is_reported_as_that() -> None:
+    document = read_result(FIXTURES / "verified").model_copy(update={"sensors": {}})
+    found = certificate(document)
+    assert found.title == "Verification report"
+    assert len(found.marks) == 1 and "Simulated" in found.marks[0]  # as that run was
+    page = read(found)
+    assert "Stored calibration of gyro, verified" in page.text
+    assert f"{document.verification['gyro'].after.movement.rms_rad_s[0]:.5f}" in page.under["7.8.2.1m"]
+
+
+def test_a_vector_model_without_a_solution_leaves_out_what_it_would_tell() -> None:
+    sensor = result().sensors["gyro"].model_copy(update={"vector_model": ErrorEntry(error="too_few_observations")})
+    bare = sensor.model_copy(update={"budget": None, "covariance_combined": None, "estimator": "newton"})
+    page = read(certificate(result().model_copy(update={"sensors": {"gyro": bare}})))
+    assert "estimator newton" in page.text and "Angles between the axes" not in page.text
+    assert "what it adds to the readings was not separated from the biases" in page.text
+    assert not [tag for tag, _ in page.tags if tag == "svg"]
 
 
 def test_scarce_freedom_is_said() -> None:

@@ -9,8 +9,9 @@ import pytest
 from rig.config.models import CertificateSection, SiteSection
 from rig.data.result_file import read_result
 from rig.errors import Refused
-from rig.report.certificate.dcc import JOINT_FACTOR, digital_certificate
+from rig.report.certificate.dcc import digital_certificate
 from rig.report.certificate.stated import Stated
+from rig.report.certificate.tables import JOINT_FACTOR
 from rig.report.certificate.xml_parts import product
 from support.certified import LABORATORY, certificate, compared, result, with_accelerometer
 from support.dcc_rules import rule_faults, schema_faults

@@ -63,7 +63,7 @@ class Certificate:
 
     @property
     def guarded(self) -> bool:
-        """Whether the decision rule has a guard band; None of the checks says so where no uncertainty is known."""
+        """Whether values had to stay below their limits by U."""
         return any(check.guard > 0 for check in self.conformity)
 
 

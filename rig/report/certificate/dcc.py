@@ -12,13 +12,12 @@ from rig.data.accelerometer_entries import AccelerometerEntry
 from rig.data.result_file import CheckEntry, VerificationEntry
 from rig.errors import Refused
 from rig.report.certificate.content import Certificate, Gyroscope
-from rig.report.certificate.tables import coverage_sentence
+from rig.report.certificate.tables import JOINT_FACTOR, coverage_sentence
 from rig.report.certificate.xml_parts import DCC as NAMESPACE
 from rig.report.certificate.xml_parts import XSI, Part, dcc, real, real_list, text, words
 
 DCC: Final = "certificate.xml"
 SCHEMA_VERSION = "3.2.1"
-JOINT_FACTOR = 3.548  # √χ² of six degrees of freedom at 95 %
 ONE, RATE, ACCELERATION = r"\one", r"\radian\second\tothe{-1}", r"\metre\second\tothe{-2}"
 AXES = ("x", "y", "z")
 SIX = ("kx", "ky", "kz", "bx", "by", "bz")

@@ -6,7 +6,7 @@ from typing import TYPE_CHECKING
 
 from rig.report.certificate import plots, tables
 from rig.report.certificate.content import Certificate
-from rig.report.certificate.tables import DEG
+from rig.report.certificate.tables import DEG, JOINT_FACTOR
 
 if TYPE_CHECKING:
     from jinja2 import Template
@@ -17,7 +17,7 @@ FOOTING = "Relates only to the items calibrated. Not issued under an accreditati
 
 def certificate_page(certificate: Certificate) -> str:
     """HTML that loads nothing from anywhere; every text of configuration, board or arm is escaped."""
-    return _template().render(certificate=certificate, deg=DEG, footing=FOOTING)
+    return _template().render(certificate=certificate, deg=DEG, joint=JOINT_FACTOR, footing=FOOTING)
 
 
 @cache

@@ -15,6 +15,7 @@ AXES = ("x", "y", "z")
 NEGLIGIBLE = 0.001  # of every variance: lines below are summed up in one
 NOTHING = 1e-12  # of a variance
 ENOUGH_FREEDOM = 50.0  # degrees of it, for k = 2 to cover 95 % (EA-4/02 M:2022, annex E)
+JOINT_FACTOR = 3.548  # of six values at once: √χ² of six degrees of freedom at 95 %
 DEG = math.degrees(1)
 
 
