@@ -60,9 +60,10 @@ def test_ptb_s_rules_find_nothing_wrong(stated: Stated) -> None:
 
 
 @pytest.mark.slow
-def test_accelerometers_and_verifications_are_valid_too() -> None:
+@pytest.mark.parametrize("stated", [LABORATORY, SILENT], ids=["said", "unsaid"])
+def test_accelerometers_and_verifications_are_valid_too(stated: Stated) -> None:
     verified = read_result(FIXTURES / "verified").verification
-    xml = digital_certificate(certificate(with_accelerometer().model_copy(update={"verification": verified})))
+    xml = digital_certificate(certificate(with_accelerometer().model_copy(update={"verification": verified}), stated))
     assert [len(each) for each in map(numbers, found(xml, "si:valueXMLList"))] == [3, 3, 6, 3, 3, 3, 3, 6]
     assert rule_faults(xml) == []
     assert schema_faults(xml) == []

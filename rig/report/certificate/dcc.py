@@ -19,6 +19,11 @@ from rig.report.certificate.xml_parts import XSI, Part, dcc, real, real_list, te
 DCC: Final = "certificate.xml"
 SCHEMA_VERSION = "3.2.1"
 ONE, RATE, ACCELERATION = r"\one", r"\radian\second\tothe{-1}", r"\metre\second\tothe{-2}"
+# PTB's rules want a condition to each quantity.
+UNKNOWN_AIR = dcc(
+    "influenceConditions",
+    dcc("influenceCondition", text("name", "ambient temperature"), dcc("data", text("text", None))),
+)
 AXES = ("x", "y", "z")
 SIX = ("kx", "ky", "kz", "bx", "by", "bz")
 
@@ -181,7 +186,7 @@ def _measured(c: Certificate, item: str, name: str, results: Iterator[Element], 
         dcc("usedSoftware", _software(c)),
         dcc("measuringEquipments", dcc("measuringEquipment", text("name", "robot arm UR10e"), words("model", "UR10e"),
             dcc("identifications", _identified("manufacturer", c.provenance.arm_serial_number, "serial number")))),
-        dcc("influenceConditions", *conditions) if any(each is not None for each in conditions) else None,
+        dcc("influenceConditions", *conditions) if any(each is not None for each in conditions) else UNKNOWN_AIR,
         dcc("results", *results),
         refId=item,
     )  # fmt: skip

@@ -52,7 +52,9 @@ def residuals(sensor: SensorEntry) -> Residuals | None:
     if isinstance(vector, ErrorEntry) or len(vector.residuals_rad_s) != len(averages) or not averages:
         return None
     left = np.array(vector.residuals_rad_s)
-    bars = 2 * np.array([each.mean_std_rad_s for each in averages])
+    # Not the average's own standard deviation, which counts as drift of the bias what gravity does to the rests.
+    bars = 2 * np.array([each.noise_rad_s for each in averages])
+    bars /= np.sqrt([[each.samples] for each in averages])
     reach, unit, factor = _scale(float((np.abs(left) + bars).max()))
     across = (WIDTH - LEFT - RIGHT) / len(averages)
 
