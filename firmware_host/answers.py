@@ -9,18 +9,21 @@ import numpy as np
 
 from firmware_host import protocol
 from firmware_host.frames import Frame
-from firmware_host.samples import IMU_SAMPLE_DTYPE, SAMPLE_DTYPE
+from firmware_host.samples import FIELD_SAMPLE_DTYPE, IMU_SAMPLE_DTYPE, SAMPLE_DTYPE
 
 Vector = tuple[float, float, float]
 Matrix = tuple[Vector, Vector, Vector]
+
+
+_DTYPES = {"imu_samples": IMU_SAMPLE_DTYPE, "field_samples": FIELD_SAMPLE_DTYPE}
 
 
 class SampleBatch(NamedTuple):
     """Samples of one sensor in the order of their sequence numbers, which have no gap inside a batch.
 
     `dropped` is the board's count of conversions lost on its side since the start; `samples` is (n,) of `SAMPLE_DTYPE`,
-    of `IMU_SAMPLE_DTYPE` where accelerations come along. In the mode "raw" their counts are the part's, in the mode
-    "calibrated" they are microradians per second.
+    of `IMU_SAMPLE_DTYPE` where accelerations come along, of `FIELD_SAMPLE_DTYPE` of a magnetometer. In the mode "raw"
+    their counts are the part's, in the mode "calibrated" they are microradians per second.
     """
 
     sensor: int
@@ -30,29 +33,35 @@ class SampleBatch(NamedTuple):
 
     @classmethod
     def of(cls, frame: Frame, host_time_s: float) -> Self:
-        """A `samples`, `imu_samples` or `rates` frame that came at `host_time_s`."""
+        """A `samples`, `imu_samples`, `field_samples` or `rates` frame that came at `host_time_s`."""
         values, items = frame.values, frame.items
-        with_acceleration = frame.name == "imu_samples"
-        samples = np.empty(len(items), IMU_SAMPLE_DTYPE if with_acceleration else SAMPLE_DTYPE)
+        samples = np.empty(len(items), _DTYPES.get(frame.name, SAMPLE_DTYPE))
         first = values["sequence"]
         samples["sequence"] = np.arange(first, first + len(items))
         samples["board_time_us"] = items["delta_us"].astype(np.uint64) + values["base_time_us"]
         samples["host_time_s"] = host_time_s
-        samples["counts"] = items["rate_urad_s" if frame.name == "rates" else "counts"]
-        samples["temperature_counts"] = items["temperature_counts"]
-        if with_acceleration:
+        if frame.name == "field_samples":
+            samples["field_counts"] = items["field"]
+        else:
+            samples["counts"] = items["rate_urad_s" if frame.name == "rates" else "counts"]
+            samples["temperature_counts"] = items["temperature_counts"]
+        if frame.name == "imu_samples":
             samples["acceleration_counts"] = items["acceleration"]
         return cls(values["sensor"], protocol.MODES[values["mode"]], values["dropped"], samples)
 
 
 @dataclass(frozen=True, slots=True)
 class SensorInfo:
-    """A sensor the firmware has a driver for; `present` says whether its identity register answered rightly."""
+    """A sensor the firmware has a driver for; `present` says whether its identity register answered rightly.
+
+    `quantity` is one of `protocol.QUANTITIES`.
+    """
 
     index: int
     part: str
     who_am_i: int
     present: bool
+    quantity: str
 
 
 @dataclass(frozen=True, slots=True)
@@ -74,8 +83,8 @@ class BoardIdentity:
             unique_id=frame.values["unique_id"].hex(),
             reset_cause=reset_cause(frame),
             sensors=tuple(
-                SensorInfo(index, protocol.text(part), who_am_i, bool(present))
-                for index, (part, who_am_i, present) in enumerate(frame.items.tolist())
+                SensorInfo(index, protocol.text(part), who_am_i, bool(present), protocol.QUANTITIES[quantity])
+                for index, (part, who_am_i, present, quantity) in enumerate(frame.items.tolist())
             ),
         )
 
@@ -84,7 +93,8 @@ class BoardIdentity:
 class SensorSetup:
     """What the part really does: rate = counts · sensitivity_rad_s, temperature = counts · scale + offset.
 
-    Acceleration = counts · sensitivity_m_s2; where none are sent, that and range_m_s2 are 0.
+    Acceleration = counts · sensitivity_m_s2, magnetic field = counts · sensitivity_t; of what is not sent, sensitivity
+    and range are 0.
     """
 
     rate_hz: float
@@ -94,6 +104,8 @@ class SensorSetup:
     temperature_offset_c: float
     range_m_s2: float
     sensitivity_m_s2: float
+    range_t: float
+    sensitivity_t: float
 
     @classmethod
     def of(cls, frame: Frame) -> Self:

@@ -74,12 +74,15 @@ class Board:
         self.close()
 
     def configure(self, sensor: int, rate_hz: float, range_deg_s: float, range_g: float = 0.0) -> SensorSetup:
-        """Sets a sensor to the nearest data rate and the next range up.
+        """Sets a gyroscope to the nearest data rate and the next range up.
 
         With a `range_g` other than 0 its accelerations come along, in the next range up; not in a calibrated stream.
         """
-        values = {"sensor": sensor, "rate_hz": rate_hz, "range_deg_s": range_deg_s, "range_g": range_g}
-        return SensorSetup.of(self._ask("configure", values))
+        return self._configure(sensor, rate_hz, range_deg_s=range_deg_s, range_g=range_g)
+
+    def configure_magnetometer(self, sensor: int, rate_hz: float, range_gauss: float) -> SensorSetup:
+        """The same of a magnetometer."""
+        return self._configure(sensor, rate_hz, range_gauss=range_gauss)
 
     def start(self, calibrated: Collection[int] = ()) -> None:
         """Streams every configured sensor, sequences from 0; those in `calibrated` by their stored calibration."""
@@ -174,6 +177,10 @@ class Board:
                 self._link.tell("stop")
         self._link.close()
 
+    def _configure(self, sensor: int, rate_hz: float, **ranges: float) -> SensorSetup:
+        values = {"sensor": sensor, "rate_hz": rate_hz, "range_deg_s": 0.0, "range_g": 0.0, "range_gauss": 0.0}
+        return SensorSetup.of(self._ask("configure", values | ranges))
+
     def _hello(self) -> BoardIdentity:
         before = self._link.bytes_seen, self._link.frames_seen
         try:
@@ -222,7 +229,7 @@ class Board:
 
     def _take(self, frame: Frame, host_time_s: float, request: str | None) -> None:
         """On the reader thread: every frame as it comes."""
-        if frame.name in ("samples", "imu_samples", "rates"):
+        if frame.name in protocol.SAMPLES:
             if self._streaming:
                 self._on_samples(SampleBatch.of(frame, host_time_s))
         elif frame.name == "ack" and request in ("start", "stop", "reboot"):

@@ -1,8 +1,8 @@
 """What the image takes of the chip: `python -m firmware_host.footprint`, which `make firmware` runs after the build.
 
 Flash and RAM are the linker's. The stack is what the board itself reports after a session on the emulator that asks
-for everything it can do: three sensors streaming with accelerations, observations kept and averaged, both solutions, a
-calibration written, read, streamed by and erased.
+for everything it can do: three gyroscopes streaming with accelerations, and a magnetometer, observations kept and
+averaged, both solutions, a calibration written, read, streamed by and erased.
 """
 
 import io
@@ -19,16 +19,22 @@ from firmware_host.emulator.adis16465 import Adis16465
 from firmware_host.emulator.flash_memory import FlashMemory
 from firmware_host.emulator.gyroscope import GyroTruth
 from firmware_host.emulator.lsm9ds1 import Lsm9ds1
+from firmware_host.emulator.lsm9ds1_magnetometer import Lsm9ds1Magnetometer
 from firmware_host.emulator.machine import EmulatedBoard
+from firmware_host.emulator.magnetometer import MagnetometerTruth
 from firmware_host.emulator.mpu9250 import Mpu9250
 from firmware_host.frames import Frame, FrameReader, encode
 from firmware_host.protocol import METHODS
 
 IMAGE = Path(__file__).parent / "firmware" / "image"
 LIMIT_BYTES = 32 * 1024  # of flash, and of RAM
-RANGE_G = 8.0  # which every sensor has
+RANGE_G = 8.0  # which every gyroscope's accelerometer has
 RAM = range(0x2000_0000, 0x2000_C000)
-SETUPS = ((238.0, 245.0), (200.0, 250.0), (200.0, 500.0))  # Hz and °/s, in the order of the board's sensors
+SETUPS = (
+    (238.0, 245.0),
+    (200.0, 250.0),
+    (200.0, 500.0),
+)  # Hz and °/s, in the order of the board's gyroscopes, which come first
 SENSORS = range(len(SETUPS))
 DIRECTIONS = ((0, 0, 1), (0, 0, -1), (1, 0, 0), (-1, 0, 0), (0, 1, 0), (0, -1, 0))
 SPEED_RAD_S = 1.0472
@@ -36,7 +42,7 @@ STEP_S = 0.01
 
 
 class Session:
-    """A board with three sensors that turn about `direction`."""
+    """A board with all its sensors, which turn about `direction`."""
 
     def __init__(self, image: bytes, elf: bytes) -> None:
         self.direction: tuple[float, ...] = DIRECTIONS[0]
@@ -44,7 +50,10 @@ class Session:
         self._board = EmulatedBoard(
             flash=FlashMemory(image),
             elf=elf,
-            devices=[part(self._rate_at, truth, temperature_c=25.0, seed=1) for part in (Lsm9ds1, Mpu9250, Adis16465)],
+            devices=[
+                *(part(self._rate_at, truth, temperature_c=25.0, seed=1) for part in (Lsm9ds1, Mpu9250, Adis16465)),
+                Lsm9ds1Magnetometer(lambda _time_s: (0.0, 0.0, 50e-6), MagnetometerTruth(), seed=1),
+            ],
             unique_id=bytes(12),
             crystal_ppm=0.0,
             boot_time_s=0.0,
@@ -91,7 +100,10 @@ def stack_used(image: bytes, elf: bytes) -> int:
     """The most stack ever used, bytes, as the board reports it after it has done everything."""
     session = Session(image, elf)
     for sensor, (rate_hz, range_deg_s) in enumerate(SETUPS):
-        session.ask("configure", sensor=sensor, rate_hz=rate_hz, range_deg_s=range_deg_s, range_g=RANGE_G)
+        ranges = {"range_deg_s": range_deg_s, "range_g": RANGE_G, "range_gauss": 0.0}
+        session.ask("configure", sensor=sensor, rate_hz=rate_hz, **ranges)
+    ranges = {"range_deg_s": 0.0, "range_g": 0.0, "range_gauss": 4.0}
+    session.ask("configure", sensor=len(SETUPS), rate_hz=80.0, **ranges)
     session.ask("start", sensors=0)
     session.run(0.5)
     for index in range(len(DIRECTIONS)):

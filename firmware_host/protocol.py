@@ -21,8 +21,8 @@ import numpy as np
 
 from firmware_host.problem import Problem
 
-PROTOCOL_VERSION = 4
-FIRMWARE_VERSION = "0.4.0"  # of the shipped image
+PROTOCOL_VERSION = 5
+FIRMWARE_VERSION = "0.5.0"  # of the shipped image
 PAYLOAD_MAX = 240
 OVERHEAD = 6  # bytes of a frame around its payload before COBS: type, sequence, CRC
 COBS_BYTES = 2  # that COBS adds: the code byte and the delimiter
@@ -35,6 +35,10 @@ CALIBRATED_RAD_S = 1e-6  # a count of calibrated readings: they come in microrad
 MAX_SCALE = 4.0
 
 MODES = ("raw", "calibrated")
+QUANTITIES = (
+    "rate",
+    "field",
+)  # what a sensor measures: a gyroscope, beside which there may be accelerations, a magnetometer
 RESET_CAUSES = ("unknown", "power", "pin", "software", "watchdog", "fault")
 # Of a calibration: g = K (m + b) with K diagonal, SIX Eq. (3), and the same with a whole matrix in the place of K.
 MODELS = ("none", "k_times_m_plus_b", "matrix_times_m_plus_b")
@@ -43,6 +47,7 @@ SOLUTION_STATUSES = ("solved", "too_few_observations", "degenerate", "not_conver
 ENUMERATIONS = {  # name → prefix of its values in C, the values counted from 0
     "reset_cause": ("RESET", RESET_CAUSES),
     "sample_mode": ("MODE", MODES),
+    "sensor_quantity": ("QUANTITY", QUANTITIES),
     "calibration_model": ("MODEL", MODELS),
     "solve_method": ("METHOD", METHODS),
     "solution_status": ("SOLUTION", SOLUTION_STATUSES),
@@ -128,7 +133,7 @@ def _next(rows: int, values: Iterator[Any]) -> Any:
 REPLY_TO = Field("reply_to", "u8", "sequence of the frame this answers, 0 = nobody asked")
 SENSOR = Field("sensor", "u8", "index in the identity's list")
 SENSORS = Field("sensors", "u8", "which sensors: bit i is the sensor of index i in the identity's list")
-BATCH = (  # what samples, imu_samples and rates begin with
+BATCH = (  # what samples, imu_samples, field_samples and rates begin with
     SENSOR,
     Field("mode", "u8", "enum sample_mode"),
     Field("sequence", "u32", "of the first sample; counts every conversion of the part since start"),
@@ -166,6 +171,7 @@ MESSAGES = (
             Field("part", "text12", "part the firmware has a driver for"),
             Field("who_am_i", "u16", "identity register as read"),
             Field("present", "u8", "1 = the identity register reads as the part's"),
+            Field("quantity", "u8", "enum sensor_quantity"),
         ),
     ),
     Message(
@@ -176,8 +182,9 @@ MESSAGES = (
         (
             SENSOR,
             Field("rate_hz", "f32", "wanted data rate, Hz; the nearest is taken"),
-            Field("range_deg_s", "f32", "wanted range, degrees per second; the next one up is taken"),
-            Field("range_g", "f32", "wanted range of accelerations, g; the next one up is taken; 0 = none wanted"),
+            Field("range_deg_s", "f32", "wanted range, degrees per second; the next one up; 0 of a magnetometer"),
+            Field("range_g", "f32", "wanted range of accelerations, g; the next one up; 0 = none wanted"),
+            Field("range_gauss", "f32", "wanted range of a magnetometer, gauss; the next one up; 0 of any other"),
         ),
     ),
     Message(
@@ -189,12 +196,14 @@ MESSAGES = (
             REPLY_TO,
             SENSOR,
             Field("rate_hz", "f64", "nominal data rate, Hz"),
-            Field("range_deg_s", "f64", "range, degrees per second"),
-            Field("sensitivity_rad_s", "f64", "rad/s per count"),
-            Field("temperature_scale_c", "f64", "degrees Celsius per count"),
+            Field("range_deg_s", "f64", "range, degrees per second; 0 = no rates are sent"),
+            Field("sensitivity_rad_s", "f64", "rad/s per count; 0 = none are sent"),
+            Field("temperature_scale_c", "f64", "degrees Celsius per count; 0 = no temperature is sent"),
             Field("temperature_offset_c", "f64", "degrees Celsius at count 0"),
             Field("range_m_s2", "f64", "range of accelerations, m/s²; 0 = none are sent"),
             Field("sensitivity_m_s2", "f64", "m/s² per count; 0 = none are sent"),
+            Field("range_t", "f64", "range of the magnetic field, tesla; 0 = none is sent"),
+            Field("sensitivity_t", "f64", "tesla per count; 0 = none is sent"),
         ),
     ),
     Message(
@@ -365,6 +374,14 @@ MESSAGES = (
             TEMPERATURE,
         ),
     ),
+    Message(
+        0x19,
+        "field_samples",
+        "board",
+        "in the place of samples where a magnetometer is read",
+        BATCH,
+        (DELTA, Field("field", "vector_i16", "magnetic flux density: x, y, z as the part reports them, right-handed")),
+    ),
 )
 
 
@@ -374,7 +391,9 @@ ERRORS = {  # code → what the board reports; `what` follows "the board says th
     3: Problem("no_such_sensor", "it has no sensor of this number", "Check the sensors in the configuration"),
     4: Problem("sensor_absent", "the sensor does not answer on its bus", "Check its supply and its SPI wires"),
     5: Problem("bad_rate", "the data rate is not a positive number", "Correct rate_hz in the configuration"),
-    6: Problem("bad_range", "the part has no such range", "Correct range_deg_s or range_g in the configuration"),
+    6: Problem(
+        "bad_range", "the part has no such range", "Correct range_deg_s, range_g or range_gauss in the configuration"
+    ),
     7: Problem(
         "no_calibration", "it has no calibration stored for this sensor", "Store one: `rig board calibration write`"
     ),
@@ -392,8 +411,10 @@ ERRORS = {  # code → what the board reports; `what` follows "the board says th
     ),
     18: Problem("flash_failed", "its flash did not take what was written", "Replace the microcontroller board"),
     19: Problem("sensor_fault", "the sensor reports a fault of its own", "Check its supply; else replace the sensor"),
+    20: Problem("not_a_gyroscope", "this is asked of gyroscopes only", "Leave the magnetometer out of the request"),
 }
 
+SAMPLES = ("samples", "imu_samples", "field_samples", "rates")  # the messages of a stream
 MESSAGE_BY_CODE = {message.code: message for message in MESSAGES}
 MESSAGE_BY_NAME = {message.name: message for message in MESSAGES}
 

@@ -13,3 +13,5 @@ SAMPLE_DTYPE = np.dtype(
 )
 # Of a sensor whose accelerations come along: x, y, z of the same conversion, in the axes of `counts`.
 IMU_SAMPLE_DTYPE = np.dtype([*SAMPLE_DTYPE.descr, ("acceleration_counts", "<i4", (3,))])
+# Of a magnetometer, which has no thermometer: x, y, z of the field as the part reports them.
+FIELD_SAMPLE_DTYPE = np.dtype([*SAMPLE_DTYPE.descr[:3], ("field_counts", "<i4", (3,))])

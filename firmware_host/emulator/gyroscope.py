@@ -7,7 +7,7 @@ from typing import Any
 
 import numpy as np
 
-from firmware_host.emulator.triad import Bend, Seed, Temperature, Triad, TriadErrors
+from firmware_host.emulator.triad import Bend, Seed, Temperature, Triad, TriadErrors, saturated
 
 __all__ = ["GyroTruth", "Gyroscope", "Temperature", "Warming", "readings", "saturated"]
 
@@ -135,9 +135,3 @@ def _triad(truth: GyroTruth, seed: Seed, temperature_c: float | Temperature) -> 
         random_walk_per_sqrt_s=truth.random_walk_rad_s_per_sqrt_s,
     )
     return Triad(errors, seed, temperature_c)
-
-
-def saturated(counts: int, bits: int = 16) -> int:
-    """The nearest number that a two's complement register of so many bits holds."""
-    limit = 1 << bits - 1
-    return max(-limit, min(limit - 1, counts))

@@ -3,7 +3,6 @@ and 7).
 """
 
 import math
-import struct
 from collections.abc import Callable, Sequence
 
 import numpy as np
@@ -11,7 +10,7 @@ import numpy as np
 from firmware_host.emulator.accelerometer import STANDARD_GRAVITY_M_S2, Accelerometer, AccelerometerTruth
 from firmware_host.emulator.bus import Violation
 from firmware_host.emulator.gyroscope import Gyroscope, GyroTruth, Temperature, saturated
-from firmware_host.emulator.part_registers import Conversions, PartRegisters
+from firmware_host.emulator.part_registers import Conversions, OutputRegisters, PartRegisters
 from firmware_host.emulator.spi_device import Fault
 from firmware_host.emulator.triad import Remembered
 
@@ -47,7 +46,6 @@ _SENSITIVITIES_MDPS = {0: 8.75, 1: 17.5, 3: 70.0}  # table 3; 245, 500 and 2000 
 _SENSITIVITIES_MG = {0: 0.061, 1: 0.732, 2: 0.122, 3: 0.244}  # the same table; 2, 16, 4 and 8 g
 _XLDA, _GDA, _TDA = 0x01, 0x02, 0x04
 _LAST_OUTPUT = 5  # the high byte of z
-_COUNTS = struct.Struct("<3h")
 _BDU, _IF_ADD_INC, _SW_RESET = 0x40, 0x04, 0x01
 
 
@@ -134,8 +132,8 @@ class Lsm9ds1:
     def _reset(self) -> None:
         self._registers.reset()
         self._status = 0
-        self._rates = _Outputs()
-        self._accelerations = _Outputs()
+        self._rates = OutputRegisters()
+        self._accelerations = OutputRegisters()
         self._temperature = bytes(2)
         self._settling = 0
         self._accelerating = False
@@ -158,7 +156,7 @@ class Lsm9ds1:
             return self._temperature[address - _OUT_TEMP_L]
         raise self._registers.unmodelled("read of", address)
 
-    def _read_output(self, outputs: "_Outputs", index: int, flag: int) -> int:
+    def _read_output(self, outputs: OutputRegisters, index: int, flag: int) -> int:
         if index == _LAST_OUTPUT:
             self._status &= ~flag
         return outputs.read(index, block_update=bool(self._registers.values[_CTRL_REG8] & _BDU))
@@ -206,39 +204,17 @@ class Lsm9ds1:
     def _convert(self, time_s: float) -> None:
         """One conversion of all axes and the thermometer, as the output registers will show it."""
         settled = min(1.0, self._conversions.count / (self._settling + 1))
-        self._rates.show(self._gyroscope.read(time_s, settled), self._per_count)
+        self._rates.show(_left_handed(self._gyroscope.read(time_s, settled)), self._per_count)
         temperature = saturated(round((self._gyroscope.temperature_c(time_s) - 25) * 16), bits=12)
         self._temperature = temperature.to_bytes(2, "little", signed=True)
         self._status |= _GDA | _TDA
         if self._accelerating:
             force_m_s2 = self._accelerometer.read(time_s, settled)
-            self._accelerations.show(force_m_s2, self._g_per_count * STANDARD_GRAVITY_M_S2)
+            self._accelerations.show(_left_handed(force_m_s2), self._g_per_count * STANDARD_GRAVITY_M_S2)
             self._status |= _XLDA
 
 
-class _Outputs:
-    """The output registers of one triad: two bytes an axis, x and y and z."""
-
-    def __init__(self) -> None:
-        self._latest = bytes(6)
-        self._output = bytearray(6)
-        self._held = [False, False, False]  # block update: low byte read, high byte not yet
-
-    def show(self, vector: Sequence[float], per_count: float) -> None:
-        """A new conversion of a vector in right-handed axes."""
-        x, y, z = vector
-        counts = [saturated(round(component / per_count)) for component in (-x, y, z)]
-        self._latest = data = _COUNTS.pack(*counts)
-        for axis, held in enumerate(self._held):
-            if not held:
-                self._output[2 * axis : 2 * axis + 2] = data[2 * axis : 2 * axis + 2]
-
-    def read(self, index: int, *, block_update: bool) -> int:
-        """One byte."""
-        axis, high = divmod(index, 2)
-        value = self._output[index]
-        if block_update:
-            self._held[axis] = not high
-            if high:
-                self._output[index - 1 : index + 1] = self._latest[index - 1 : index + 1]
-        return value
+def _left_handed(vector: Sequence[float]) -> Sequence[float]:
+    """A vector in right-handed axes as both triads have it."""
+    x, y, z = vector
+    return -x, y, z

@@ -1,9 +1,15 @@
-"""What the models of all parts share: registers that keep what is written, and the clock that conversions follow."""
+"""What the models of the parts share: registers that keep what is written, those that show what was measured, and the
+clock that conversions follow.
+"""
 
 import math
-from collections.abc import Mapping
+import struct
+from collections.abc import Mapping, Sequence
 
 from firmware_host.emulator.bus import Violation
+from firmware_host.emulator.triad import saturated
+
+_COUNTS = struct.Struct("<3h")
 
 
 class PartRegisters:
@@ -74,3 +80,29 @@ class Conversions:
         self.count += 1
         self.next_s = self._started_s + (self.count + 1) * self._period_s
         return now_s
+
+
+class OutputRegisters:
+    """The output registers of one triad of the LSM9DS1: two bytes an axis, low byte first, x and y and z."""
+
+    def __init__(self) -> None:
+        self._latest = bytes(6)
+        self._output = bytearray(6)
+        self._held = [False, False, False]  # block update: low byte read, high byte not yet
+
+    def show(self, vector: Sequence[float], per_count: float) -> None:
+        """A new conversion of a vector in the part's own axes."""
+        self._latest = data = _COUNTS.pack(*[saturated(round(component / per_count)) for component in vector])
+        for axis, held in enumerate(self._held):
+            if not held:
+                self._output[2 * axis : 2 * axis + 2] = data[2 * axis : 2 * axis + 2]
+
+    def read(self, index: int, *, block_update: bool) -> int:
+        """One byte."""
+        axis, high = divmod(index, 2)
+        value = self._output[index]
+        if block_update:
+            self._held[axis] = not high
+            if high:
+                self._output[index - 1 : index + 1] = self._latest[index - 1 : index + 1]
+        return value

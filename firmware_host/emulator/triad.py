@@ -1,5 +1,5 @@
-"""Three sensing elements of a part, for turn rate or for specific force: from a true vector, through their errors and
-their noise, to a reading.
+"""Three sensing elements of a part, for turn rate, specific force or magnetic field: from a true vector,
+through their errors and their noise, to a reading.
 """
 
 import math
@@ -20,7 +20,10 @@ Bend = Callable[[Any], Any]
 
 @dataclass(frozen=True, slots=True)
 class TriadErrors:
-    """What `GyroTruth` and `AccelerometerTruth` have in common, and explain; everything in the units of a reading."""
+    """What `GyroTruth`, `AccelerometerTruth` and `MagnetometerTruth` have in common, and explain.
+
+    Everything in the units of a reading.
+    """
 
     scale: Sequence[float]
     bias: Sequence[float]
@@ -160,3 +163,9 @@ def _drift(errors: TriadErrors, seed: Seed) -> Drift | None:
     if not (errors.instability or errors.random_walk_per_sqrt_s):
         return None
     return Drift(errors.instability, errors.instability_time_s, errors.random_walk_per_sqrt_s, spawned(seed, 1))
+
+
+def saturated(counts: int, bits: int = 16) -> int:
+    """The nearest number that a two's complement register of so many bits holds."""
+    limit = 1 << bits - 1
+    return max(-limit, min(limit - 1, counts))

@@ -131,10 +131,11 @@ def test_a_board_is_greeted_set_up_streams_and_stops(wire: tuple[BoardOnAWire, s
     batches: list[SampleBatch] = []
     with Board(wire[1], protocol.BAUD_RATE, batches.append) as board:
         assert board.identity.unique_id == "0123456789abcdef01234567"
-        assert [(s.part, s.who_am_i, s.present) for s in board.identity.sensors] == [
-            ("LSM9DS1", 0x68, True),
-            ("MPU-9250", 0x71, True),
-            ("ADIS16465", 0x4051, True),
+        assert [(s.part, s.who_am_i, s.present, s.quantity) for s in board.identity.sensors] == [
+            ("LSM9DS1", 0x68, True, "rate"),
+            ("MPU-9250", 0x71, True, "rate"),
+            ("ADIS16465", 0x4051, True, "rate"),
+            ("LSM9DS1-M", 0x3D, True, "field"),
         ]
         setup = board.configure(0, rate_hz=200, range_deg_s=245)
         assert (setup.rate_hz, setup.range_deg_s) == (238.0, 245.0)
@@ -162,7 +163,9 @@ def test_a_stream_left_running_is_stopped_by_the_next_program_and_restarts_at_ze
     wire: tuple[BoardOnAWire, str],
 ) -> None:
     board = wire[0].board
-    board.receive(encode("configure", 1, {"sensor": 0, "rate_hz": 238, "range_deg_s": 245, "range_g": 0}))
+    board.receive(
+        encode("configure", 1, {"sensor": 0, "rate_hz": 238, "range_deg_s": 245, "range_g": 0, "range_gauss": 0})
+    )
     board.receive(encode("start", 2, {"sensors": 0}))
     batches: list[SampleBatch] = []
     with Board(wire[1], protocol.BAUD_RATE, batches.append) as client:

@@ -11,7 +11,9 @@ from firmware_host.emulator.adis16465 import Adis16465
 from firmware_host.emulator.flash_memory import FlashMemory
 from firmware_host.emulator.gyroscope import GyroTruth
 from firmware_host.emulator.lsm9ds1 import Lsm9ds1
+from firmware_host.emulator.lsm9ds1_magnetometer import Lsm9ds1Magnetometer
 from firmware_host.emulator.machine import EmulatedBoard
+from firmware_host.emulator.magnetometer import MagnetometerTruth
 from firmware_host.emulator.mpu9250 import Mpu9250
 from firmware_host.emulator.spi_device import SpiDevice
 from firmware_host.frames import Frame, FrameReader, encode
@@ -21,11 +23,26 @@ CRYSTAL_PPM = 35.0
 UNIQUE_ID = bytes(range(12))
 
 
+FIELD_T = (20e-6, -5e-6, 43e-6)
+MAGNETIC = MagnetometerTruth((1.02, 0.97, 1.01), (12e-6, -30e-6, 8e-6))
+
+
+def magnetometer(motion_at: Callable[[float], Sequence[float]], *_truth: Any, seed: int, **_others: Any) -> SpiDevice:
+    """Made as the gyroscopes are; it feels one field, and its conversions are counted like theirs."""
+
+    def field_at(time_s: float) -> Sequence[float]:
+        motion_at(time_s)
+        return FIELD_T
+
+    return Lsm9ds1Magnetometer(field_at, MAGNETIC, seed=seed)
+
+
 PARTS: dict[str, Callable[..., SpiDevice]] = {
     "lsm9ds1": Lsm9ds1,
     "mpu9250": Mpu9250,
     "adis16465": Adis16465,
-}  # in the order of the board's sensor table
+}  # the gyroscopes, in the order of the board's sensor table
+BESIDE = {"lsm9ds1_magnetometer": magnetometer}
 RANGE_G = 8.0  # which every part has
 RATES_AND_RANGES = {"lsm9ds1": (238.0, 245.0), "mpu9250": (200.0, 250.0), "adis16465": (200.0, 500.0)}
 TRUTH = GyroTruth((1.1771, 1.1554, 1.1440), (0.0077, -0.0100, -0.0051))
@@ -38,7 +55,7 @@ def shipped_flash() -> FlashMemory:
 
 
 class Session:
-    """A board with the gyroscopes `parts`, and every frame it has sent. The virtual clock moves by `tick_s` at a time.
+    """A board with the sensors `parts`, and every frame it has sent. The virtual clock moves by `tick_s` at a time.
 
     `sensors`: the simulated parts, by name, to break and to mend; `readings`: how many conversions each has made.
     `flash`: of another session, after a power cut.
@@ -58,7 +75,7 @@ class Session:
         truth = replace(TRUTH, noise_rad_s=noise_rad_s)
         self.readings = dict.fromkeys(parts, 0)
         self.sensors: dict[str, SpiDevice] = {
-            part: PARTS[part](
+            part: (PARTS | BESIDE)[part](
                 self._counted(part, rate_at), truth, acceleration=ACCELERATION, temperature_c=22.0, seed=seed
             )
             for part in parts
@@ -116,9 +133,15 @@ class Session:
             rate_hz=rate_hz or usual_rate_hz,
             range_deg_s=range_deg_s or usual_range_deg_s,
             range_g=range_g,
+            range_gauss=0.0,
         )
         assert setup.name == "setup", setup
         return setup
+
+    def configure_magnetometer(self, rate_hz: float = 80.0, range_gauss: float = 4.0) -> Frame:
+        """The same of the magnetometer."""
+        ranges = {"range_deg_s": 0.0, "range_g": 0.0, "range_gauss": range_gauss}
+        return self.ask("configure", sensor=3, rate_hz=rate_hz, **ranges)
 
     def stream(self, duration_s: float, rate_hz: float = 238.0, range_deg_s: float = 245.0) -> np.ndarray:
         """Configure and start the LSM9DS1, then run. Returns what `samples` does."""

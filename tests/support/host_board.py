@@ -1,4 +1,4 @@
-"""The firmware's core built for this machine, with the three sensors on its bus; tests play the chip."""
+"""The firmware's core built for this machine, with the four sensors on its bus; tests play the chip."""
 
 import ctypes
 import fcntl
@@ -12,7 +12,7 @@ from typing import Any
 
 from firmware_host.frames import Frame, FrameReader, encode
 from firmware_host.protocol import ERRORS
-from support.host_sensors import Adis16465Registers, Listener, Lsm9ds1Registers, Mpu9250Registers, Part
+from support.host_sensors import Adis16465Registers, Lsm9ds1Registers, MagnetometerRegisters, Mpu9250Registers, Part
 from support.paths import FIRMWARE
 
 PERIOD_US = 4202  # 238 Hz
@@ -52,7 +52,7 @@ class HostBoard:
         self.gyro = Lsm9ds1Registers()
         self.mpu9250 = Mpu9250Registers()
         self.adis16465 = Adis16465Registers()
-        self.magnetometer = Listener()  # the LSM9DS1's
+        self.magnetometer = MagnetometerRegisters()  # the LSM9DS1's
         # By the bus's device numbers
         self.sensors: list[Part] = [self.gyro, self.mpu9250, self.adis16465, self.magnetometer]
         self.line_is_free = True  # False: the transmitter is busy until `sent()`
@@ -72,8 +72,8 @@ class HostBoard:
         ctypes.memmove(pointer, answer, size)
 
     def _line(self, sensor: int) -> bool:
-        """Only the LSM9DS1 holds its line until it is read."""
-        return sensor == 0 and self.gyro.fresh
+        """Only the LSM9DS1's two dies hold their lines until they are read."""
+        return (sensor == 0 and self.gyro.fresh) or (sensor == 3 and self.magnetometer.fresh)
 
     def _transmit(self, pointer: "ctypes._Pointer[ctypes.c_uint8]", size: int) -> None:
         self.wire += ctypes.string_at(pointer, size)
@@ -129,9 +129,9 @@ class HostBoard:
 def streaming_board() -> HostBoard:
     """A board whose LSM9DS1 has just been started at 238 Hz, with nothing on the wire yet."""
     board = HostBoard()
-    assert [frame.name for frame in board.ask("configure", sensor=0, rate_hz=238, range_deg_s=245, range_g=0)] == [
-        "setup"
-    ]
+    assert [
+        frame.name for frame in board.ask("configure", sensor=0, rate_hz=238, range_deg_s=245, range_g=0, range_gauss=0)
+    ] == ["setup"]
     assert [frame.name for frame in board.ask("start", sensors=0)] == ["ack"]
     settle(board)
     return board
@@ -153,7 +153,7 @@ def convert(
     acceleration: Sequence[int] = (0, 0, 0),
 ) -> None:
     """One conversion: the interrupt at `time_us`, the main loop `late_us` after."""
-    (board.gyro, board.mpu9250, board.adis16465)[sensor].convert(counts, -48, acceleration)
+    (board.gyro, board.mpu9250, board.adis16465, board.magnetometer)[sensor].convert(counts, -48, acceleration)
     board.data_ready(time_us, sensor)
     board.wait_until(time_us + late_us)
     board.run()
@@ -168,7 +168,9 @@ def error_of(frames: list[Frame]) -> str:
 
 def sample_sequences(frames: list[Frame], sensor: int = 0) -> list[int]:
     """The sequence numbers of a sensor's samples."""
-    batches = [f for f in frames if f.name in ("samples", "imu_samples") and f.values["sensor"] == sensor]
+    batches = [
+        f for f in frames if f.name in ("samples", "imu_samples", "field_samples") and f.values["sensor"] == sensor
+    ]
     return [batch.values["sequence"] + i for batch in batches for i in range(batch.values["count"])]
 
 
@@ -176,7 +178,9 @@ def configured(
     board: HostBoard, sensor: int, rate_hz: float = 200, range_deg_s: float = 125, range_g: float = 0
 ) -> dict[str, Any]:
     """Sets a sensor up. Returns what the board answers."""
-    (setup,) = board.ask("configure", sensor=sensor, rate_hz=rate_hz, range_deg_s=range_deg_s, range_g=range_g)
+    (setup,) = board.ask(
+        "configure", sensor=sensor, rate_hz=rate_hz, range_deg_s=range_deg_s, range_g=range_g, range_gauss=0
+    )
     assert setup.name == "setup"
     return setup.values
 

@@ -1,4 +1,4 @@
-"""The three parts as the drivers see them: registers behind a chip select, enough to tell what a driver does."""
+"""The parts as the drivers see them: registers behind a chip select, enough to tell what a driver does."""
 
 from collections.abc import Callable, Sequence
 from typing import Protocol
@@ -21,17 +21,6 @@ class Nobody:
     def transfer(self, data: bytes, _max_hz: int, _time_us: int) -> bytes:
         self.transfers += 1
         return bytes((self.level,)) * len(data)
-
-
-class Listener:
-    """A part that is only told things."""
-
-    def __init__(self) -> None:
-        self.told: list[bytes] = []
-
-    def transfer(self, data: bytes, _max_hz: int, _time_us: int) -> bytes:
-        self.told.append(data)
-        return bytes(len(data))
 
 
 class Lsm9ds1Registers:
@@ -92,6 +81,33 @@ class Lsm9ds1Registers:
         for address, value in zip((0x15, 0x18, 0x1A, 0x1C, 0x28, 0x2A, 0x2C), words, strict=True):
             self.values[address : address + 2] = min(value, 32767).to_bytes(2, "little", signed=True)
         self.fresh = self.fresh_acceleration = True
+
+
+class MagnetometerRegisters(Lsm9ds1Registers):
+    """The LSM9DS1's other die: bit 6 of an address lets it count up; data are fresh until all have been read."""
+
+    def __init__(self) -> None:
+        super().__init__()
+        self.values = bytearray(64)
+        self.values[0x0F] = 0x3D
+        self.values[0x20], self.values[0x22] = 0x10, 0x03  # as after power-up
+        self.is_heard = True  # False: the wire it answers on is not connected
+
+    def transfer(self, data: bytes, max_hz: int, time_us: int) -> bytes:
+        assert len(data) == 2 or data[0] & 0x40, "without that bit the same register answers over and over"
+        answer = super().transfer(bytes((data[0] & ~0x40,)) + data[1:], max_hz, time_us)
+        return answer if self.is_heard else b"\xff" * len(data)
+
+    def _read(self, address: int, size: int, _max_hz: int) -> bytes:
+        self.values[0x27] = 0x0F * self.fresh
+        read = bytes(self.values[address : address + size])
+        self.fresh = self.fresh and not address <= 0x2D < address + size
+        return read
+
+    def convert(self, counts: Sequence[int], _temperature: int = 0, _acceleration: Sequence[int] = ()) -> None:
+        """A new conversion of the field; the die has no thermometer."""
+        self.values[0x28:0x2E] = b"".join(count.to_bytes(2, "little", signed=True) for count in counts)
+        self.fresh = True
 
 
 class Mpu9250Registers(Lsm9ds1Registers):

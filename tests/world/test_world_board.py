@@ -123,7 +123,12 @@ CALIBRATION = {
 
 
 def give_calibration(one: Host) -> None:
-    assert one.answer("configure", {"sensor": 1, "rate_hz": 200.0, "range_deg_s": 250.0, "range_g": 0}).name == "setup"
+    assert (
+        one.answer(
+            "configure", {"sensor": 1, "rate_hz": 200.0, "range_deg_s": 250.0, "range_g": 0, "range_gauss": 0}
+        ).name
+        == "setup"
+    )
     assert one.answer("write_calibration", CALIBRATION).name == "ack"
 
 
@@ -160,7 +165,7 @@ def test_a_flash_file_keeps_the_calibration_for_the_next_world_but_never_the_pro
 def test_a_flash_file_keeps_what_a_power_cut_tore(tmp_path: Path) -> None:
     kept = pair(f"world.board.flash_file={tmp_path / 'board.bin'}")
     one = booted(kept)
-    one.answer("configure", {"sensor": 1, "rate_hz": 200.0, "range_deg_s": 250.0, "range_g": 0})
+    one.answer("configure", {"sensor": 1, "rate_hz": 200.0, "range_deg_s": 250.0, "range_g": 0, "range_gauss": 0})
     one.ask("write_calibration", 9, CALIBRATION)
     one.ticks(5)  # the erasing takes eleven
     again = flash_of(tmp_path / "board.bin")
@@ -351,7 +356,11 @@ def test_a_host_that_does_not_read_does_not_stop_the_world(world: World) -> None
     running = world()
     host_name, port = running.board_port.removeprefix("socket://").split(":")
     with socket.create_connection((host_name, int(port)), 5.0) as idle:
-        idle.sendall(encode("configure", 1, {"sensor": 0, "rate_hz": 952.0, "range_deg_s": 245.0, "range_g": 0}))
+        idle.sendall(
+            encode(
+                "configure", 1, {"sensor": 0, "rate_hz": 952.0, "range_deg_s": 245.0, "range_g": 0, "range_gauss": 0}
+            )
+        )
         idle.sendall(encode("start", 2, {"sensors": 0}))
         before = running.state()["time_s"]
         time.sleep(0.5)  # at 952 Hz and ten times real time this fills every buffer on the way

@@ -11,6 +11,7 @@
 #include "setups.h"
 
 #define RING 64u              /* a power of two */
+#define FIELD_RING 16u        /* another, of a magnetometer: it is slower */
 #define SILENCE_PERIODS 10u   /* so many conversions missing in a row is a fault, not jitter */
 #define SILENCE_US 100000u    /* and time for a part that is just starting up */
 #define BAD_READS 10u         /* so many in a row are worth a word, */
@@ -28,19 +29,25 @@ struct stream {
     bool overtaken;     /* the next edge came while a reading was under way */
     bool silence_reported, bad_reads_reported;
     uint32_t conversions, sent, dropped;
-    struct sample ring[RING];
-    uint32_t written, read;
+    struct sample *ring;
+    uint32_t ring_size, written, read;
     const struct batch_layout *layout;
     struct correction correction; /* if calibrated */
 };
 
 static struct stream streams[SENSOR_COUNT];
+static struct sample rings[GYROSCOPE_COUNT][RING], field_rings[SENSOR_COUNT - GYROSCOPE_COUNT][FIELD_RING];
 static bool running;
 static uint32_t bus_errors;
 
 void acquisition_reset(void)
 {
     memset(streams, 0, sizeof streams);
+    for (unsigned i = 0; i < SENSOR_COUNT; i++) {
+        bool gyroscope = i < GYROSCOPE_COUNT;
+        streams[i].ring = gyroscope ? rings[i] : field_rings[i - GYROSCOPE_COUNT];
+        streams[i].ring_size = gyroscope ? RING : FIELD_RING;
+    }
     running = false;
     bus_errors = 0;
 }
@@ -93,6 +100,13 @@ static void lower_line(unsigned sensor)
         read_sensor(sensor, &discarded);
 }
 
+static const struct batch_layout *layout_of(const struct setup_payload *setup)
+{
+    if (setup->range_t > 0.0)
+        return &batch_field_samples;
+    return setup->range_m_s2 > 0.0 ? &batch_imu_samples : &batch_samples;
+}
+
 bool acquisition_start(uint8_t calibrated, const struct correction corrections[SENSOR_COUNT])
 {
     uint8_t configured = 0;
@@ -103,7 +117,7 @@ bool acquisition_start(uint8_t calibrated, const struct correction corrections[S
         struct stream *stream = &streams[i];
         stream->conversions = stream->sent = stream->dropped = 0;
         stream->written = stream->read = 0;
-        stream->layout = setups_of(i)->range_m_s2 > 0.0 ? &batch_imu_samples : &batch_samples;
+        stream->layout = layout_of(setups_of(i));
         if (is_named(calibrated, i)) {
             stream->layout = &batch_rates;
             stream->correction = corrections[i];
@@ -185,6 +199,11 @@ static void watch_reads(unsigned sensor, enum read_result result)
         stream->bad_reads_reported = complain(sensor, meaning[result]);
 }
 
+static struct sample *sample_at(const struct stream *stream, uint32_t number)
+{
+    return &stream->ring[number % stream->ring_size];
+}
+
 static void acquire(unsigned sensor)
 {
     struct stream *stream = &streams[sensor];
@@ -223,12 +242,12 @@ static void acquire(unsigned sensor)
     bool good = result == READ_FRESH && !stream->overtaken;
     if (good)
         kept_add(sensor, time_us, reading.counts);
-    bool full = stream->written - stream->read == RING;
+    bool full = stream->written - stream->read == stream->ring_size;
     if (!good || full) {
         stream->dropped++;
         return;
     }
-    stream->ring[stream->written % RING] = (struct sample){time_us, stream->conversions - 1, reading};
+    *sample_at(stream, stream->written) = (struct sample){time_us, stream->conversions - 1, reading};
     stream->written++;
 }
 
@@ -242,12 +261,12 @@ static void send_batch(unsigned sensor)
 {
     struct stream *stream = &streams[sensor];
     const struct batch_layout *layout = stream->layout;
-    const struct sample *first = &stream->ring[stream->read % RING];
+    const struct sample *first = sample_at(stream, stream->read);
     uint8_t payload[PAYLOAD_MAX];
     size_t size = sizeof(struct samples_payload);
     uint8_t count = 0;
     while (count < batch_max(stream) && stream->read + count != stream->written) {
-        const struct sample *sample = &stream->ring[(stream->read + count) % RING];
+        const struct sample *sample = sample_at(stream, stream->read + count);
         if (sample->sequence != first->sequence + count)
             break;
         layout->write(sample, (uint32_t)(sample->time_us - first->time_us), &stream->correction, &payload[size]);
@@ -273,7 +292,7 @@ static bool batch_is_due(const struct stream *stream)
     uint32_t waiting = stream->written - stream->read;
     if (waiting == 0 || !link_has_room())
         return false;
-    uint64_t age_us = stream->last_us - stream->ring[stream->read % RING].time_us;
+    uint64_t age_us = stream->last_us - sample_at(stream, stream->read)->time_us;
     return waiting >= batch_max(stream) || age_us >= BATCH_AGE_US || !running;
 }
 

@@ -213,4 +213,4 @@ static enum read_result read(unsigned device, const struct setup_payload *setup,
 }
 
 const struct sensor_driver adis16465_gyro = {
-    "ADIS16465", IDENTITY, 0, SETTLING, false, LATCHED_US, reset, NULL, identify, configure, read};
+    "ADIS16465", IDENTITY, QUANTITY_RATE, 0, SETTLING, false, LATCHED_US, reset, NULL, identify, configure, read};

@@ -22,6 +22,6 @@ struct batch_layout {
     void (*write)(const struct sample *sample, uint32_t delta_us, const struct correction *correction, uint8_t *item);
 };
 
-extern const struct batch_layout batch_samples, batch_imu_samples, batch_rates;
+extern const struct batch_layout batch_samples, batch_imu_samples, batch_field_samples, batch_rates;
 
 #endif

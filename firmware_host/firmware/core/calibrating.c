@@ -15,7 +15,7 @@ static struct session {
     uint8_t type; /* of the request last taken, and its payload: a host that missed the answer asks again */
     uint8_t request[sizeof(struct observe_payload)];
     struct observed_payload answer;
-} sessions[SENSOR_COUNT];
+} sessions[GYROSCOPE_COUNT];
 
 _Static_assert(sizeof(struct recall_payload) <= sizeof(struct observe_payload), "both fit the session");
 
@@ -28,7 +28,8 @@ void calibrating_reset(void)
 void calibrating_forget(unsigned sensor)
 {
     kept_forget(sensor);
-    memset(&sessions[sensor], 0, sizeof sessions[sensor]);
+    if (sensor < GYROSCOPE_COUNT)
+        memset(&sessions[sensor], 0, sizeof sessions[sensor]);
 }
 
 void calibrating_on_keep(const struct frame *request)
@@ -143,8 +144,9 @@ void calibrating_on_solve(const struct frame *request)
 {
     struct solve_payload wanted;
     memcpy(&wanted, request->payload, sizeof wanted);
-    if (wanted.sensor >= SENSOR_COUNT) {
-        reply_refused(request, ERROR_NO_SUCH_SENSOR, wanted.sensor);
+    enum error_code error = sensors_check_gyroscope(wanted.sensor);
+    if (error) {
+        reply_refused(request, error, wanted.sensor);
         return;
     }
     const struct accumulator *accumulator = &sessions[wanted.sensor].accumulator;

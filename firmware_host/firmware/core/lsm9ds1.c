@@ -2,6 +2,7 @@
 #include "lsm9ds1.h"
 
 #include "byte_registers.h"
+#include "lsm9ds1_magnetometer.h"
 #include "port.h"
 #include "settings.h"
 
@@ -29,9 +30,6 @@ enum register_address {
     OUT_X_L_XL = 0x28, /* and five more, to 0x2D */
     FIFO_CTRL = 0x2E,
 };
-
-#define CTRL_REG3_M 0x22u         /* the magnetometer's, section 8.7 */
-#define CTRL_REG3_M_QUIET 0x83u   /* I2C_DISABLE, and powered down as after a start */
 
 #define INT1_CTRL_DRDY_G 0x02u
 #define CTRL_REG4_AXES 0x38u       /* z, y, x on */
@@ -73,12 +71,11 @@ static uint16_t identify(unsigned device)
     return byte_register_read(device, BUS_HZ, WHO_AM_I);
 }
 
-/* The magnetometer has no read-back here: it answers on a wire of its own, which is not connected. */
+/* Of both dies: the magnetometer listens even where its own wire to answer on is not connected. */
 static void keep_to_spi(unsigned device)
 {
-    uint8_t bytes[2] = {CTRL_REG3_M, CTRL_REG3_M_QUIET};
     byte_register_write(device, BUS_HZ, CTRL_REG9, CTRL_REG9_I2C_DISABLE);
-    bus_xfer(BUS_LSM9DS1_MAGNETOMETER, BUS_HZ, bytes, sizeof bytes);
+    lsm9ds1_magnetometer.keep_to_spi(BUS_LSM9DS1_MAGNETOMETER);
 }
 
 static size_t nearest_rate(float hz)
@@ -172,4 +169,4 @@ static enum read_result read(unsigned device, const struct setup_payload *setup,
 }
 
 const struct sensor_driver lsm9ds1_gyro = {
-    "LSM9DS1", IDENTITY, 0, SETTLING, true, 0, NULL, keep_to_spi, identify, configure, read};
+    "LSM9DS1", IDENTITY, QUANTITY_RATE, 0, SETTLING, true, 0, NULL, keep_to_spi, identify, configure, read};

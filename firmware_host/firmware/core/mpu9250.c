@@ -156,4 +156,4 @@ static enum read_result read(unsigned device, const struct setup_payload *setup,
 }
 
 const struct sensor_driver mpu9250_gyro = {
-    "MPU-9250", IDENTITY, SETTLING_US, 1, false, LATCHED_US, NULL, keep_to_spi, identify, configure, read};
+    "MPU-9250", IDENTITY, QUANTITY_RATE, SETTLING_US, 1, false, LATCHED_US, NULL, keep_to_spi, identify, configure, read};

@@ -14,7 +14,7 @@ void port_wait_us(uint32_t duration_us);
 
 /* Parts the bus leads to, by their selects. */
 #define BUS_DEVICES 4u
-#define BUS_LSM9DS1_MAGNETOMETER 3u /* a die of its own, which only is told to keep off the wires */
+#define BUS_LSM9DS1_MAGNETOMETER 3u /* a die of its own, which the gyroscope's driver too keeps off the wires */
 
 /* Selects `device`, exchanges `size` bytes in place at `max_hz` or the next slower clock, deselects. `size` is even: the SPI
    FIFO takes two bytes an access. */

@@ -4,8 +4,8 @@
 
 #include <stdint.h>
 
-#define PROTOCOL_VERSION 4u
-#define FIRMWARE_VERSION "0.4.0"
+#define PROTOCOL_VERSION 5u
+#define FIRMWARE_VERSION "0.5.0"
 #define PAYLOAD_MAX 240u
 #define FRAME_OVERHEAD 6u /* type, sequence, CRC */
 #define COBS_BYTES 2u /* code byte and delimiter */
@@ -39,6 +39,7 @@ enum message_type {
     MESSAGE_ERASE_CALIBRATION = 22,
     MESSAGE_RECALL = 23,
     MESSAGE_IMU_SAMPLES = 24,
+    MESSAGE_FIELD_SAMPLES = 25,
 };
 
 enum error_code {
@@ -61,6 +62,7 @@ enum error_code {
     ERROR_BAD_CALIBRATION = 17,
     ERROR_FLASH_FAILED = 18,
     ERROR_SENSOR_FAULT = 19,
+    ERROR_NOT_A_GYROSCOPE = 20,
 };
 
 enum reset_cause {
@@ -75,6 +77,11 @@ enum reset_cause {
 enum sample_mode {
     MODE_RAW = 0,
     MODE_CALIBRATED = 1,
+};
+
+enum sensor_quantity {
+    QUANTITY_RATE = 0,
+    QUANTITY_FIELD = 1,
 };
 
 enum calibration_model {
@@ -110,31 +117,35 @@ struct identity_item {
     char part[12]; /* part the firmware has a driver for */
     uint16_t who_am_i; /* identity register as read */
     uint8_t present; /* 1 = the identity register reads as the part's */
+    uint8_t quantity; /* enum sensor_quantity */
 } __attribute__((packed));
-_Static_assert(sizeof(struct identity_item) == 15, "identity_item");
+_Static_assert(sizeof(struct identity_item) == 16, "identity_item");
 
 /* configure, from the host: set a sensor up; answered by setup */
 struct configure_payload {
     uint8_t sensor; /* index in the identity's list */
     float rate_hz; /* wanted data rate, Hz; the nearest is taken */
-    float range_deg_s; /* wanted range, degrees per second; the next one up is taken */
-    float range_g; /* wanted range of accelerations, g; the next one up is taken; 0 = none wanted */
+    float range_deg_s; /* wanted range, degrees per second; the next one up; 0 of a magnetometer */
+    float range_g; /* wanted range of accelerations, g; the next one up; 0 = none wanted */
+    float range_gauss; /* wanted range of a magnetometer, gauss; the next one up; 0 of any other */
 } __attribute__((packed));
-_Static_assert(sizeof(struct configure_payload) == 13, "configure_payload");
+_Static_assert(sizeof(struct configure_payload) == 17, "configure_payload");
 
 /* setup, from the board: what the part really does */
 struct setup_payload {
     uint8_t reply_to; /* sequence of the frame this answers, 0 = nobody asked */
     uint8_t sensor; /* index in the identity's list */
     double rate_hz; /* nominal data rate, Hz */
-    double range_deg_s; /* range, degrees per second */
-    double sensitivity_rad_s; /* rad/s per count */
-    double temperature_scale_c; /* degrees Celsius per count */
+    double range_deg_s; /* range, degrees per second; 0 = no rates are sent */
+    double sensitivity_rad_s; /* rad/s per count; 0 = none are sent */
+    double temperature_scale_c; /* degrees Celsius per count; 0 = no temperature is sent */
     double temperature_offset_c; /* degrees Celsius at count 0 */
     double range_m_s2; /* range of accelerations, m/s²; 0 = none are sent */
     double sensitivity_m_s2; /* m/s² per count; 0 = none are sent */
+    double range_t; /* range of the magnetic field, tesla; 0 = none is sent */
+    double sensitivity_t; /* tesla per count; 0 = none is sent */
 } __attribute__((packed));
-_Static_assert(sizeof(struct setup_payload) == 58, "setup_payload");
+_Static_assert(sizeof(struct setup_payload) == 74, "setup_payload");
 
 /* start, from the host: stream every configured sensor, sequences from 0: those named calibrated, the others raw; answered by ack */
 struct start_payload {
@@ -334,5 +345,22 @@ struct imu_samples_item {
     int16_t temperature_counts; /* as the part reports it */
 } __attribute__((packed));
 _Static_assert(sizeof(struct imu_samples_item) == 18, "imu_samples_item");
+
+/* field_samples, from the board: in the place of samples where a magnetometer is read */
+struct field_samples_payload {
+    uint8_t sensor; /* index in the identity's list */
+    uint8_t mode; /* enum sample_mode */
+    uint32_t sequence; /* of the first sample; counts every conversion of the part since start */
+    uint32_t dropped; /* conversions since start that never became a sample in a frame */
+    uint64_t base_time_us; /* board time of the first sample, read before the bus transfer */
+    uint8_t count; /* number of samples */
+} __attribute__((packed));
+_Static_assert(sizeof(struct field_samples_payload) == 19, "field_samples_payload");
+
+struct field_samples_item {
+    uint32_t delta_us; /* board time after base_time_us */
+    int16_t field[3]; /* magnetic flux density: x, y, z as the part reports them, right-handed */
+} __attribute__((packed));
+_Static_assert(sizeof(struct field_samples_item) == 10, "field_samples_item");
 
 #endif

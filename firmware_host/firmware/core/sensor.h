@@ -7,9 +7,9 @@
 
 #include "protocol.h"
 
-/* Both triads of one conversion, in the part's right-handed axes. */
+/* One conversion, in the part's right-handed axes. */
 struct reading {
-    int16_t counts[3];
+    int16_t counts[3];       /* of the rate or the field */
     int16_t acceleration[3]; /* only where it was asked for */
     int16_t temperature_counts;
 };
@@ -25,6 +25,7 @@ enum read_result {
 struct sensor_driver {
     char part[12];
     uint16_t identity; /* what `identify` reads of this part */
+    uint8_t quantity;  /* enum sensor_quantity */
 
     /* What to throw away after a configure, while the part starts up and its filters settle: for so long, and so many. */
     uint32_t settling_us;
@@ -46,11 +47,12 @@ struct sensor_driver {
     /* Reads the identity register. */
     uint16_t (*identify)(unsigned device);
 
-    /* Sets the part, which has been identified, to rate and range, both positive, and to a range of accelerations, not
-       negative, and reads every setting back; fills `setup` with what the part really does. 0, or why not. */
+    /* Sets the part, which has been identified, to data rate and range, both positive, a gyroscope also to a range of
+       accelerations, not negative, and reads every setting back; fills `setup` with what the part really does. 0, or why
+       not. */
     enum error_code (*configure)(unsigned device, const struct configure_payload *wanted, struct setup_payload *setup);
 
-    /* Reads one conversion, of the rates as `setup` has them, which also lowers the data-ready line of a part that holds
+    /* Reads one conversion, of what `setup` has, which also lowers the data-ready line of a part that holds
        it; with its accelerations where `setup` has a range of those. */
     enum read_result (*read)(unsigned device, const struct setup_payload *setup, struct reading *reading);
 };

@@ -13,11 +13,15 @@ struct sensor {
     unsigned device;
 };
 
-#define SENSOR_COUNT 3u
+#define SENSOR_COUNT 4u
+#define GYROSCOPE_COUNT 3u /* which come first */
 extern const struct sensor sensors[SENSOR_COUNT];
 
 /* What the drivers remember of their parts goes. */
 void sensors_reset(void);
+
+/* 0 when there is such a gyroscope, or why not. */
+enum error_code sensors_check_gyroscope(uint8_t sensor);
 
 /* Reads the identity register; 0 when it is the part's, or ERROR_SENSOR_ABSENT, or ERROR_SENSOR_MISMATCH. */
 enum error_code sensors_identify(unsigned sensor, uint16_t *who_am_i);

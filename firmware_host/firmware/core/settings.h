@@ -11,9 +11,12 @@
 #define COUNT(table) (sizeof(table) / sizeof(table)[0])
 #define RADIANS(degrees) ((degrees) * 3.14159265358979323846 / 180.0)
 
+#define TESLA(gauss) ((gauss) * 1e-4)
+
 #define STANDARD_GRAVITY_M_S2 9.80665 /* what a data sheet's g is */
 
-/* Of turn rates, in degrees per second and rad/s per count, or of accelerations, in g and g per count. */
+/* Of turn rates, in degrees per second and rad/s per count, of accelerations, in g and g per count, or of the magnetic
+   field, in gauss and gauss per count. */
 struct range {
     double full_scale;
     uint8_t code; /* as the part's register has it */

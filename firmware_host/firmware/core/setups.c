@@ -1,5 +1,6 @@
 #include "setups.h"
 
+#include <stdbool.h>
 #include <string.h>
 
 #include "sensors.h"
@@ -11,12 +12,15 @@ void setups_reset(void)
     memset(setups, 0, sizeof setups);
 }
 
-/* Why what was asked for makes no sense for any part, or 0. */
-static enum error_code refuse_wanted(const struct configure_payload *wanted)
+/* Why what was asked for makes no sense for any part that measures this, or 0. */
+static enum error_code refuse_wanted(const struct configure_payload *wanted, uint8_t quantity)
 {
     if (!(wanted->rate_hz > 0.0f && wanted->rate_hz < 1e6f))
         return ERROR_BAD_RATE;
-    return wanted->range_deg_s > 0.0f && wanted->range_g >= 0.0f ? 0 : ERROR_BAD_RANGE;
+    bool fits = quantity == QUANTITY_FIELD
+                    ? wanted->range_gauss > 0.0f && wanted->range_deg_s == 0.0f && wanted->range_g == 0.0f
+                    : wanted->range_deg_s > 0.0f && wanted->range_g >= 0.0f && wanted->range_gauss == 0.0f;
+    return fits ? 0 : ERROR_BAD_RANGE;
 }
 
 enum error_code setups_configure(const struct configure_payload *wanted)
@@ -25,7 +29,7 @@ enum error_code setups_configure(const struct configure_payload *wanted)
     struct setup_payload *setup = &setups[wanted->sensor];
     uint16_t who_am_i;
     *setup = (struct setup_payload){.sensor = wanted->sensor};
-    enum error_code error = refuse_wanted(wanted);
+    enum error_code error = refuse_wanted(wanted, sensor->driver->quantity);
     if (!error)
         error = sensors_identify(wanted->sensor, &who_am_i);
     if (!error)
@@ -42,9 +46,8 @@ const struct setup_payload *setups_of(unsigned sensor)
 
 enum error_code setups_check(uint8_t sensor)
 {
-    if (sensor >= SENSOR_COUNT)
-        return ERROR_NO_SUCH_SENSOR;
-    return setups[sensor].rate_hz > 0.0 ? 0 : ERROR_NOT_CONFIGURED;
+    enum error_code error = sensors_check_gyroscope(sensor);
+    return error || setups[sensor].rate_hz > 0.0 ? error : ERROR_NOT_CONFIGURED;
 }
 
 enum error_code setups_check_mask(uint8_t mask, uint8_t *wrong)

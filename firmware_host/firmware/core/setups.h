@@ -12,7 +12,7 @@ enum error_code setups_configure(const struct configure_payload *wanted);
 /* What an existing sensor does; its rate is 0 unless it is configured. */
 const struct setup_payload *setups_of(unsigned sensor);
 
-/* 0 when there is such a sensor and it is configured, or why not. */
+/* 0 when there is such a gyroscope and it is configured, or why not. */
 enum error_code setups_check(uint8_t sensor);
 
 /* The same for every sensor with its bit in `mask`; `*wrong` becomes the first that is not. */

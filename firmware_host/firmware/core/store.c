@@ -36,7 +36,7 @@ _Static_assert(sizeof(struct calibration_payload) == 109, "another layout takes 
 _Static_assert(sizeof(struct diagonal_slot) == 96, "as it lies in flash");
 _Static_assert(sizeof(struct slot) % sizeof(uint64_t) == 0 && offsetof(struct slot, seal) % sizeof(uint64_t) == 0,
                "the seal is the last doubleword");
-_Static_assert(SLOTS * SENSOR_COUNT <= FLASH_PAGES && sizeof(struct slot) <= FLASH_PAGE_BYTES, "the flash has room");
+_Static_assert(SLOTS * GYROSCOPE_COUNT <= FLASH_PAGES && sizeof(struct slot) <= FLASH_PAGE_BYTES, "the flash has room");
 
 static unsigned page_of(unsigned sensor, unsigned slot)
 {

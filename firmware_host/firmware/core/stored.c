@@ -14,8 +14,9 @@ void stored_on_read(const struct frame *request)
 {
     uint8_t sensor = request->payload[0];
     struct calibration_payload record;
-    if (sensor >= SENSOR_COUNT) {
-        reply_refused(request, ERROR_NO_SUCH_SENSOR, sensor);
+    enum error_code error = sensors_check_gyroscope(sensor);
+    if (error) {
+        reply_refused(request, error, sensor);
     } else if (!store_read(sensor, &record)) {
         reply_refused(request, ERROR_NO_CALIBRATION, sensor);
     } else {
@@ -99,8 +100,9 @@ static enum error_code write(const struct write_calibration_payload *wanted)
 
 static enum error_code erase(uint8_t sensor)
 {
-    if (sensor >= SENSOR_COUNT)
-        return ERROR_NO_SUCH_SENSOR;
+    enum error_code error = sensors_check_gyroscope(sensor);
+    if (error)
+        return error;
     if (acquisition_is_running())
         return ERROR_BUSY_STREAMING;
     return store_erase(sensor) ? 0 : ERROR_FLASH_FAILED;

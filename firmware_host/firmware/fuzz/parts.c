@@ -5,8 +5,8 @@
 #define PARTS 4u
 #define MEMORY 256u
 
-/* The first two, and the magnetometer, which nobody reads: registers behind a byte of address. The third: words of 16 bits, high byte first, answered a frame later,
-   but for the burst, whose ten words begin at BURST_DATA. */
+/* All but the third: registers behind a byte of address, of which the magnetometer has one bit less. The third: words of 16
+   bits, high byte first, answered a frame later, but for the burst, whose ten words begin at BURST_DATA. */
 enum { LSM9DS1, MPU9250, ADIS16465, MAGNETOMETER };
 
 #define READ 0x80u
@@ -26,6 +26,8 @@ void parts_reset(void)
     memory[MPU9250][0x75] = 0x71;   /* WHO_AM_I */
     memory[MPU9250][0x6B] = 0x01;   /* PWR_MGMT_1 */
     memory[MPU9250][0x3A] = 0x01;   /* INT_STATUS: new data, always */
+    memory[MAGNETOMETER][0x0F] = 0x3D; /* WHO_AM_I_M */
+    memory[MAGNETOMETER][0x27] = 0x0F; /* STATUS_REG_M: new data, always */
     memory[ADIS16465][0x72] = 0x40; /* PROD_ID */
     memory[ADIS16465][0x73] = 0x51;
     memory[ADIS16465][0x5F] = 0x07; /* RANG_MDL: 500 °/s */
@@ -64,8 +66,8 @@ void parts_xfer(unsigned device, uint32_t max_hz, uint8_t *bytes, size_t size)
         adis_xfer(bytes, size);
         return;
     }
-    uint8_t address = bytes[0] & 0x7Fu;
-    for (size_t i = 1; i < size; i++, address = (address + 1) & 0x7Fu) {
+    uint8_t mask = device == MAGNETOMETER ? 0x3Fu : 0x7Fu, address = bytes[0] & mask;
+    for (size_t i = 1; i < size; i++, address = (address + 1) & mask) {
         if (bytes[0] & READ)
             bytes[i] = memory[device][address];
         else
@@ -77,7 +79,7 @@ void parts_convert(unsigned device, uint8_t value)
 {
     static const struct {
         uint8_t first, size;
-    } outputs[PARTS][2] = {{{0x18, 6}, {0x28, 6}}, {{0x3B, 6}, {0x43, 6}}, {{BURST_DATA + 2, 12}, {0x04, 24}}};
+    } outputs[PARTS][2] = {{{0x18, 6}, {0x28, 6}}, {{0x3B, 6}, {0x43, 6}}, {{BURST_DATA + 2, 12}, {0x04, 24}}, {{0x28, 6}}};
     for (unsigned block = 0; block < 2; block++)
         for (uint8_t i = 0; i < outputs[device][block].size; i++)
             memory[device][outputs[device][block].first + i] = (uint8_t)(value * (i + 1));

@@ -33,9 +33,10 @@ def zeros(message: Message) -> bytes:
 
 
 def setup(range_g: float) -> bytes:
-    """All three sensors set up."""
+    """All four sensors set up."""
     rates_and_ranges = ((0, 238.0, 245.0), (1, 200.0, 250.0), (2, 200.0, 500.0))
-    return b"".join(frame("configure", *sensor, range_g) for sensor in rates_and_ranges)
+    gyroscopes = b"".join(frame("configure", *sensor, range_g, 0.0) for sensor in rates_and_ranges)
+    return gyroscopes + frame("configure", 3, 80.0, 0.0, 0.0, 4.0)
 
 
 SETUP = setup(0.0)
@@ -46,7 +47,7 @@ OBSERVATIONS = b"".join(
 )
 PLAYS = {
     "requests": b"".join(zeros(message) for message in MESSAGES if message.sender == "host"),
-    "stream": SETUP + frame("start", 0) + convert(7, 120, 4000) + frame("status") + frame("stop"),
+    "stream": SETUP + frame("start", 0) + convert(15, 120, 4000) + frame("status") + frame("stop"),
     "accelerations": setup(8.0) + frame("start", 0) + convert(7, 120, 4000) + frame("status") + frame("stop"),
     "kept": SETUP
     + frame("keep", 7, 0.5)

@@ -1,5 +1,5 @@
 /* Wiring: USART2 to the ST-LINK (TX PA2, RX PA15), SPI1 on PB3 PB4 PB5; select and data-ready of the LSM9DS1 on PA11 and PA8,
-   of the MPU-9250 on PB0 and PA12, of the ADIS16465 on PA4 and PA1; select of the LSM9DS1's magnetometer on PB1. */
+   of the MPU-9250 on PB0 and PA12, of the ADIS16465 on PA4 and PA1, of the LSM9DS1's magnetometer on PB1 and PA3. */
 #include "board_setup.h"
 
 #include "protocol.h"
@@ -62,15 +62,16 @@ static void setup_pins(void)
     GPIOA_BSRR = GPIOA_BSRR_BS4 | GPIOA_BSRR_BS11; /* deselected before they are outputs */
     GPIOA_AFRL |= GPIOA_AFRL_AFRL2(7u);
     GPIOA_AFRH |= GPIOA_AFRH_AFRH15(3u);
-    GPIOA_PUPDR = (GPIOA_PUPDR & ~(PIN_MASK(1u) | PIN_MASK(8u) | PIN_MASK(12u) | PIN_MASK(15u))) |
-                  PER_PIN(1u, PULL_DOWN) | PER_PIN(8u, PULL_DOWN) | PER_PIN(12u, PULL_DOWN) | PER_PIN(15u, PULL_UP);
+    GPIOA_PUPDR = (GPIOA_PUPDR & ~(PIN_MASK(1u) | PIN_MASK(3u) | PIN_MASK(8u) | PIN_MASK(12u) | PIN_MASK(15u))) |
+                  PER_PIN(1u, PULL_DOWN) | PER_PIN(3u, PULL_DOWN) | PER_PIN(8u, PULL_DOWN) | PER_PIN(12u, PULL_DOWN) |
+                  PER_PIN(15u, PULL_UP);
     GPIOA_OSPEEDR = (GPIOA_OSPEEDR & ~(PIN_MASK(2u) | PIN_MASK(4u) | PIN_MASK(11u))) |
                     PER_PIN(2u, SPEED_MEDIUM) | PER_PIN(4u, SPEED_MEDIUM) | PER_PIN(11u, SPEED_MEDIUM);
-    GPIOA_MODER = (GPIOA_MODER & ~(PIN_MASK(1u) | PIN_MASK(2u) | PIN_MASK(4u) | PIN_MASK(8u) | PIN_MASK(11u) |
+    GPIOA_MODER = (GPIOA_MODER & ~(PIN_MASK(1u) | PIN_MASK(2u) | PIN_MASK(3u) | PIN_MASK(4u) | PIN_MASK(8u) | PIN_MASK(11u) |
                                    PIN_MASK(12u) | PIN_MASK(15u))) |
-                  PER_PIN(1u, PIN_INPUT) | PER_PIN(2u, PIN_ALTERNATE) | PER_PIN(4u, PIN_OUTPUT) |
-                  PER_PIN(8u, PIN_INPUT) | PER_PIN(11u, PIN_OUTPUT) | PER_PIN(12u, PIN_INPUT) |
-                  PER_PIN(15u, PIN_ALTERNATE);
+                  PER_PIN(1u, PIN_INPUT) | PER_PIN(2u, PIN_ALTERNATE) | PER_PIN(3u, PIN_INPUT) |
+                  PER_PIN(4u, PIN_OUTPUT) | PER_PIN(8u, PIN_INPUT) | PER_PIN(11u, PIN_OUTPUT) |
+                  PER_PIN(12u, PIN_INPUT) | PER_PIN(15u, PIN_ALTERNATE);
 
     GPIOB_BSRR = GPIOB_BSRR_BS0 | GPIOB_BSRR_BS1;
     GPIOB_AFRL |= GPIOB_AFRL_AFRL3(5u) | GPIOB_AFRL_AFRL4(5u) | GPIOB_AFRL_AFRL5(5u);
@@ -111,10 +112,10 @@ static void setup_serial(void)
 
 static void setup_data_ready(void)
 {
-    SYSCFG_EXTICR1 = SYSCFG_EXTICR1_EXTI1(0u); /* port A, all three */
+    SYSCFG_EXTICR1 = SYSCFG_EXTICR1_EXTI1(0u) | SYSCFG_EXTICR1_EXTI3(0u); /* port A, all four */
     SYSCFG_EXTICR3 = SYSCFG_EXTICR3_EXTI8(0u);
     SYSCFG_EXTICR4 = SYSCFG_EXTICR4_EXTI12(0u);
-    EXTI_RTSR1 |= EXTI_RTSR1_TR1 | EXTI_RTSR1_TR8 | EXTI_RTSR1_TR12;
+    EXTI_RTSR1 |= EXTI_RTSR1_TR1 | EXTI_RTSR1_TR3 | EXTI_RTSR1_TR8 | EXTI_RTSR1_TR12;
 }
 
 #define LATER 0x10u /* the next priority after the data-ready edges', whose time stamps wait for nobody */
@@ -123,7 +124,7 @@ static void setup_interrupts(void)
 {
     NVIC_IPR4 = NVIC_IPR4_IPR_N1(LATER); /* DMA1_CH7 */
     NVIC_IPR9 = NVIC_IPR9_IPR_N2(LATER); /* USART2 */
-    NVIC_ISER0 = 1u << EXTI1_IRQ | 1u << DMA1_CH7_IRQ | 1u << EXTI9_5_IRQ;
+    NVIC_ISER0 = 1u << EXTI1_IRQ | 1u << EXTI3_IRQ | 1u << DMA1_CH7_IRQ | 1u << EXTI9_5_IRQ;
     NVIC_ISER1 = 1u << (USART2_IRQ - 32u) | 1u << (EXTI15_10_IRQ - 32u);
     STK_LOAD = CLOCK_HZ / TICK_HZ - 1u;
     STK_VAL = 0;

@@ -48,7 +48,8 @@ void port_listen(uint8_t mask)
     static const struct {
         uint32_t enable, pending;
     } lines[SENSOR_COUNT] = {
-        {EXTI_IMR1_MR8, EXTI_PR1_PR8}, {EXTI_IMR1_MR12, EXTI_PR1_PR12}, {EXTI_IMR1_MR1, EXTI_PR1_PR1}};
+        {EXTI_IMR1_MR8, EXTI_PR1_PR8}, {EXTI_IMR1_MR12, EXTI_PR1_PR12}, {EXTI_IMR1_MR1, EXTI_PR1_PR1},
+        {EXTI_IMR1_MR3, EXTI_PR1_PR3}};
     for (unsigned i = 0; i < SENSOR_COUNT; i++) {
         EXTI_IMR1 &= ~lines[i].enable;
         EXTI_PR1 = lines[i].pending;
@@ -59,7 +60,7 @@ void port_listen(uint8_t mask)
 
 bool port_line_is_high(unsigned sensor)
 {
-    static const uint32_t levels[SENSOR_COUNT] = {GPIOA_IDR_IDR8, GPIOA_IDR_IDR12, GPIOA_IDR_IDR1};
+    static const uint32_t levels[SENSOR_COUNT] = {GPIOA_IDR_IDR8, GPIOA_IDR_IDR12, GPIOA_IDR_IDR1, GPIOA_IDR_IDR3};
     return (GPIOA_IDR & levels[sensor]) != 0;
 }
 
@@ -170,6 +171,11 @@ void exti15_10_handler(void)
 void exti1_handler(void)
 {
     data_ready(2, EXTI_PR1_PR1);
+}
+
+void exti3_handler(void)
+{
+    data_ready(3, EXTI_PR1_PR3);
 }
 
 void dma1_channel7_handler(void)

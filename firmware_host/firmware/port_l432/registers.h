@@ -80,6 +80,7 @@
 #define GPIOA_PUPDR REGISTER(GPIOA_BASE, 0x0Cu)
 #define GPIOA_IDR REGISTER(GPIOA_BASE, 0x10u)
 #define GPIOA_IDR_IDR1 (1u << 1)
+#define GPIOA_IDR_IDR3 (1u << 3)
 #define GPIOA_IDR_IDR8 (1u << 8)
 #define GPIOA_IDR_IDR12 (1u << 12)
 #define GPIOA_BSRR REGISTER(GPIOA_BASE, 0x18u)
@@ -109,6 +110,7 @@
 #define SYSCFG_BASE 0x40010000u
 #define SYSCFG_EXTICR1 REGISTER(SYSCFG_BASE, 0x08u)
 #define SYSCFG_EXTICR1_EXTI1(value) ((value) << 4)
+#define SYSCFG_EXTICR1_EXTI3(value) ((value) << 12)
 #define SYSCFG_EXTICR3 REGISTER(SYSCFG_BASE, 0x10u)
 #define SYSCFG_EXTICR3_EXTI8(value) ((value) << 0)
 #define SYSCFG_EXTICR4 REGISTER(SYSCFG_BASE, 0x14u)
@@ -117,14 +119,17 @@
 #define EXTI_BASE 0x40010400u
 #define EXTI_IMR1 REGISTER(EXTI_BASE, 0x00u)
 #define EXTI_IMR1_MR1 (1u << 1)
+#define EXTI_IMR1_MR3 (1u << 3)
 #define EXTI_IMR1_MR8 (1u << 8)
 #define EXTI_IMR1_MR12 (1u << 12)
 #define EXTI_RTSR1 REGISTER(EXTI_BASE, 0x08u)
 #define EXTI_RTSR1_TR1 (1u << 1)
+#define EXTI_RTSR1_TR3 (1u << 3)
 #define EXTI_RTSR1_TR8 (1u << 8)
 #define EXTI_RTSR1_TR12 (1u << 12)
 #define EXTI_PR1 REGISTER(EXTI_BASE, 0x14u)
 #define EXTI_PR1_PR1 (1u << 1)
+#define EXTI_PR1_PR3 (1u << 3)
 #define EXTI_PR1_PR8 (1u << 8)
 #define EXTI_PR1_PR12 (1u << 12)
 
@@ -217,6 +222,7 @@
 #define FPU_CPACR_CPACR_CP(value) ((value) << 20)
 
 #define EXTI1_IRQ 7u
+#define EXTI3_IRQ 9u
 #define DMA1_CH7_IRQ 17u
 #define EXTI9_5_IRQ 23u
 #define USART2_IRQ 38u

@@ -19,6 +19,7 @@ void reset_handler(void);
 void fault_handler(void);
 void nmi_handler(void);
 void exti1_handler(void);
+void exti3_handler(void);
 void exti9_5_handler(void);
 void dma1_channel7_handler(void);
 void usart2_handler(void);
@@ -103,6 +104,7 @@ __attribute__((section(".vectors"), used)) static const struct {
         [2] = fault_handler, /* HardFault, to which all other faults lead while they are not enabled */
         [14] = systick_handler,
         [INTERRUPT(EXTI1_IRQ)] = exti1_handler,
+        [INTERRUPT(EXTI3_IRQ)] = exti3_handler,
         [INTERRUPT(DMA1_CH7_IRQ)] = dma1_channel7_handler,
         [INTERRUPT(EXTI9_5_IRQ)] = exti9_5_handler,
         [INTERRUPT(USART2_IRQ)] = usart2_handler,

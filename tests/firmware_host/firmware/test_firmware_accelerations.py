@@ -31,7 +31,7 @@ def board() -> HostBoard:
 def test_a_range_of_accelerations_the_part_does_not_have_is_refused(
     board: HostBoard, sensor: int, range_g: float
 ) -> None:
-    answer = board.ask("configure", sensor=sensor, rate_hz=200, range_deg_s=125, range_g=range_g)
+    answer = board.ask("configure", sensor=sensor, rate_hz=200, range_deg_s=125, range_g=range_g, range_gauss=0)
     assert error_of(answer) == "bad_range"
 
 
@@ -177,7 +177,10 @@ def test_the_adis16465_has_one_range_of_accelerations(board: HostBoard) -> None:
     setup = configured(board, 2, range_g=2)
     assert setup["range_m_s2"] == pytest.approx(8 * G_M_S2, rel=1e-15)
     assert setup["sensitivity_m_s2"] == pytest.approx(G_M_S2 / 4000, rel=1e-15)
-    assert error_of(board.ask("configure", sensor=2, rate_hz=200, range_deg_s=125, range_g=8.1)) == "bad_range"
+    assert (
+        error_of(board.ask("configure", sensor=2, rate_hz=200, range_deg_s=125, range_g=8.1, range_gauss=0))
+        == "bad_range"
+    )
 
 
 @pytest.mark.parametrize(("range_g", "name"), [(0, "samples"), (8, "imu_samples")])

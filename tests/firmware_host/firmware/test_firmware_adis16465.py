@@ -27,12 +27,18 @@ def test_the_model_of_the_adis16465_has_its_range(
     assert setup["range_deg_s"] == deg_s
     assert setup["sensitivity_rad_s"] == pytest.approx(math.radians(1 / counts_per_deg_s), rel=1e-15)
     assert (setup["temperature_scale_c"], setup["temperature_offset_c"]) == (0.1, 0.0)
-    assert error_of(board.ask("configure", sensor=2, rate_hz=200, range_deg_s=deg_s + 1, range_g=0)) == "bad_range"
+    assert (
+        error_of(board.ask("configure", sensor=2, rate_hz=200, range_deg_s=deg_s + 1, range_g=0, range_gauss=0))
+        == "bad_range"
+    )
 
 
 def test_a_model_of_the_adis16465_that_nobody_knows_is_another_part(board: HostBoard) -> None:
     board.adis16465.words[0x5E] = 0x000B
-    assert error_of(board.ask("configure", sensor=2, rate_hz=200, range_deg_s=125, range_g=0)) == "sensor_mismatch"
+    assert (
+        error_of(board.ask("configure", sensor=2, rate_hz=200, range_deg_s=125, range_g=0, range_gauss=0))
+        == "sensor_mismatch"
+    )
 
 
 @pytest.mark.parametrize(
@@ -53,7 +59,10 @@ def test_settings_of_the_adis16465_are_written_by_bytes_and_believed_when_they_r
     decimation = [(0x64, 0xE7), (0x65, 0x03)]  # 999
     assert board.adis16465.writes == biases + filter_off + data_ready_rises + decimation
     board.adis16465.taking_us = 2000
-    assert error_of(board.ask("configure", sensor=2, rate_hz=200, range_deg_s=125, range_g=0)) == "setup_failed"
+    assert (
+        error_of(board.ask("configure", sensor=2, rate_hz=200, range_deg_s=125, range_g=0, range_gauss=0))
+        == "setup_failed"
+    )
 
 
 @pytest.mark.parametrize(
@@ -127,7 +136,10 @@ def test_biases_somebody_stored_in_the_adis16465_are_cleared(board: HostBoard) -
     biases = range(0x40, 0x58, 2)
     board.adis16465.words |= dict.fromkeys(biases, 0x1234)
     board.adis16465.stuck.add(0x56)
-    assert error_of(board.ask("configure", sensor=2, rate_hz=200, range_deg_s=125, range_g=0)[:1]) == "setup_failed"
+    assert (
+        error_of(board.ask("configure", sensor=2, rate_hz=200, range_deg_s=125, range_g=0, range_gauss=0)[:1])
+        == "setup_failed"
+    )
     board.adis16465.stuck.clear()
     configured(board, 2)
     assert {board.adis16465.words[address] for address in biases} == {0}
@@ -144,7 +156,10 @@ def test_an_adis16465_that_reports_a_fault_is_reset_once_and_then_believed(board
     assert (0x68, 0x80) not in board.adis16465.writes
     board.adis16465.words[0x02] = 0x0020
     board.adis16465.cured_by_reset = False
-    assert error_of(board.ask("configure", sensor=2, rate_hz=200, range_deg_s=125, range_g=0)[:1]) == "sensor_fault"
+    assert (
+        error_of(board.ask("configure", sensor=2, rate_hz=200, range_deg_s=125, range_g=0, range_gauss=0)[:1])
+        == "sensor_fault"
+    )
 
 
 def test_a_reading_that_the_next_conversion_overtakes_is_lost_and_the_part_not_blamed() -> None:

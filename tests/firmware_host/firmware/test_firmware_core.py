@@ -38,7 +38,12 @@ def test_identity_names_board_firmware_and_sensor(board: HostBoard) -> None:
     assert identity.values["protocol"] == protocol.PROTOCOL_VERSION
     assert protocol.text(identity.values["firmware"]) == protocol.FIRMWARE_VERSION
     assert identity.values["unique_id"].hex() == "0123456789abcdef01234567"
-    assert identity.items.tolist() == [(b"LSM9DS1", 0x68, 1), (b"MPU-9250", 0x71, 1), (b"ADIS16465", 0x4051, 1)]
+    assert identity.items.tolist() == [
+        (b"LSM9DS1", 0x68, 1, 0),
+        (b"MPU-9250", 0x71, 1, 0),
+        (b"ADIS16465", 0x4051, 1, 0),
+        (b"LSM9DS1-M", 0x3D, 1, 1),
+    ]
 
 
 def test_a_frame_longer_than_any_request_is_counted_and_the_next_one_answered(board: HostBoard) -> None:
@@ -63,13 +68,19 @@ def test_a_burst_that_overruns_the_receive_ring_costs_only_itself(board: HostBoa
 def test_requests_that_cannot_be_met_are_refused_by_name(board: HostBoard) -> None:
     assert error_of(board.ask("start", sensors=0)) == "not_configured"
     assert error_of(board.ask("start", sensors=1)) == "not_configured"
-    assert error_of(board.ask("configure", sensor=3, rate_hz=238, range_deg_s=245, range_g=0)) == "no_such_sensor"
+    assert (
+        error_of(board.ask("configure", sensor=4, rate_hz=238, range_deg_s=245, range_g=0, range_gauss=0))
+        == "no_such_sensor"
+    )
     assert error_of(board.ask("ack", reply_to=0)) == "unknown_message"
     body = bytes((1, 5)) + b"hello takes no payload"
     board.receive(cobs.encode(body + crc32(body).to_bytes(4, "little")) + b"\0")
     assert error_of(board.frames()) == "bad_length"
     streaming = streaming_board()
-    assert error_of(streaming.ask("configure", sensor=0, rate_hz=238, range_deg_s=245, range_g=0)) == "busy_streaming"
+    assert (
+        error_of(streaming.ask("configure", sensor=0, rate_hz=238, range_deg_s=245, range_g=0, range_gauss=0))
+        == "busy_streaming"
+    )
 
 
 def test_an_idle_board_names_itself_twice_a_second_and_a_streaming_one_does_not() -> None:

@@ -98,7 +98,9 @@ def test_a_bias_that_somebody_stored_in_the_adis16465_is_not_in_the_readings() -
 def test_an_adis16465_whose_data_path_was_overrun_is_reset_when_it_is_configured() -> None:
     session, part = adis16465_session()
     part.overrun = True
-    session.board.receive(encode("configure", 9, {"sensor": 2, "rate_hz": 200.0, "range_deg_s": 500.0, "range_g": 0}))
+    session.board.receive(
+        encode("configure", 9, {"sensor": 2, "rate_hz": 200.0, "range_deg_s": 500.0, "range_g": 0, "range_gauss": 0})
+    )
     assert "setup" in [frame.name for frame in session.run(0.4)]
     assert not part.overrun
     assert np.all(np.abs(mean_rate(session)) > 0)

@@ -29,7 +29,7 @@ def test_the_time_stamp_is_the_interrupts_and_counts_beyond_32_bits() -> None:
     start = 2**32 - 50_000
     board.set_time(start)
     board.core.board_reset()
-    board.ask("configure", sensor=0, rate_hz=238, range_deg_s=245, range_g=0)
+    board.ask("configure", sensor=0, rate_hz=238, range_deg_s=245, range_g=0, range_gauss=0)
     board.ask("start", sensors=0)
     settle(board, start)
     times = [start + k * PERIOD_US for k in range(1, 60)]
@@ -46,7 +46,7 @@ def test_the_time_stamp_is_the_interrupts_and_counts_beyond_32_bits() -> None:
 )
 def test_a_batch_leaves_when_it_is_80_ms_old_or_full(rate_hz: float, period_us: int, count: int) -> None:
     board = HostBoard()
-    board.ask("configure", sensor=0, rate_hz=rate_hz, range_deg_s=245, range_g=0)
+    board.ask("configure", sensor=0, rate_hz=rate_hz, range_deg_s=245, range_g=0, range_gauss=0)
     board.ask("start", sensors=0)
     settle(board)
     for k in range(1, 100):
@@ -58,7 +58,7 @@ def test_a_batch_leaves_when_it_is_80_ms_old_or_full(rate_hz: float, period_us: 
 
 def test_what_a_part_converts_while_it_settles_is_no_sample_and_no_loss() -> None:
     board = HostBoard()
-    board.ask("configure", sensor=0, rate_hz=238, range_deg_s=245, range_g=0)
+    board.ask("configure", sensor=0, rate_hz=238, range_deg_s=245, range_g=0, range_gauss=0)
     board.ask("start", sensors=0)
     for k in range(1, SETTLING + 4):
         convert(board, k * PERIOD_US, (k, 0, 0))
@@ -266,7 +266,7 @@ def test_every_conversion_is_either_received_or_counted_as_dropped(steps: list[t
 
 
 def test_a_line_that_rattles_does_not_hold_the_board_up(board: HostBoard) -> None:
-    board.ask("configure", sensor=0, rate_hz=238, range_deg_s=245, range_g=0)
+    board.ask("configure", sensor=0, rate_hz=238, range_deg_s=245, range_g=0, range_gauss=0)
     transfer = board.gyro.transfer
 
     def rattling(data: bytes, max_hz: int, time_us: int, /) -> bytes:

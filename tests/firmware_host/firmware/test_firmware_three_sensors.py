@@ -17,7 +17,9 @@ def three_streams() -> HostBoard:
     """All three started, each at its own rate; what they convert while settling is over at 100 ms."""
     board = HostBoard()
     for sensor, rate_hz, range_deg_s in SETUPS:
-        (setup,) = board.ask("configure", sensor=sensor, rate_hz=rate_hz, range_deg_s=range_deg_s, range_g=0)
+        (setup,) = board.ask(
+            "configure", sensor=sensor, rate_hz=rate_hz, range_deg_s=range_deg_s, range_g=0, range_gauss=0
+        )
         assert setup.values["rate_hz"] == rate_hz
     board.ask("start", sensors=0)
     settling = ((0, 8), (1, 15), (2, 2))
@@ -81,8 +83,8 @@ def test_every_conversion_of_every_sensor_is_received_or_counted_as_dropped(fate
     report = board.ask("status", 2)[-1]
     board.receive(encode("stop", 3))
     board.run(30)
-    assert [int(item["conversions"]) for item in report.items] == seen
-    assert [int(i["samples"]) + int(i["dropped"]) for i in board.ask("status", 4)[-1].items] == seen
+    assert [int(item["conversions"]) for item in report.items[:3]] == seen
+    assert [int(i["samples"]) + int(i["dropped"]) for i in board.ask("status", 4)[-1].items[:3]] == seen
 
 
 def errors_of(frames: list[Frame]) -> list[tuple[int, str]]:
@@ -103,7 +105,7 @@ def test_dead_sensors_are_named_once_and_cost_the_others_nothing() -> None:
     assert sample_sequences(frames, 0) == list(range(3_000_000 // PERIODS_US[0]))
     assert sample_sequences(frames, 1) == sample_sequences(frames, 2) == []
     report = board.ask("status", 3)[-1]
-    assert report.items["dropped"].tolist() == [0, 0, 1200]
+    assert report.items["dropped"].tolist() == [0, 0, 1200, 0]
     assert report.values["bus_errors"] == 1200
     assert nobody.transfers < 3 * 10, "a silent part is tried now and then, not in every pass"
 
