@@ -1,4 +1,4 @@
-"""The simulated magnetometer: from the true magnetic flux density, through the part's errors and its noise, to tesla."""
+"""The simulated magnetometer: from the true magnetic flux density, through the part's errors and noise, in tesla."""
 
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass

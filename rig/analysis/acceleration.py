@@ -7,7 +7,7 @@ from types import MappingProxyType
 
 import numpy as np
 
-from rig.analysis.attitudes import check_seen
+from rig.analysis.attitudes import check_seen, scale_and_bias_covariance
 from rig.analysis.calibration import SensorResult, or_fault
 from rig.data.run_file import RecordedSensor
 from rig.data.settings import PlannedDwell, RunSettings, Site
@@ -16,9 +16,9 @@ from rig.estimation.accelerometer import AccelerometerSolution, solve_accelerome
 from rig.estimation.arrays import Array
 from rig.estimation.felt import LEVER, NO_SWEEPS, SECOND, Dwells, Sweeps
 from rig.estimation.imu import ImuSolution, solve_imu
-from rig.estimation.reference_model import BIAS, F
+from rig.estimation.reference_model import F
 from rig.estimation.refusals import check_axes
-from rig.estimation.sensor_axes import angle_jacobian, nearest_rotation, non_orthogonality, parameter_jacobian
+from rig.estimation.sensor_axes import angle_jacobian, nearest_rotation, non_orthogonality
 from rig.estimation.triads import Alignment, alignment
 from rig.estimation.triaxial import Method, TriaxialSolution
 from rig.observation.acceleration import DwellReading
@@ -165,7 +165,7 @@ def _calibrated(
         gravity_m_s2=site.gravity_m_s2,
         solution=solution,
         scale=scale,
-        covariance=_covariance(solution, scale),
+        covariance=scale_and_bias_covariance(solution.matrix, scale, solution.covariance),
         non_orthogonality_rad=non_orthogonality(axes),
         non_orthogonality_std_rad=np.sqrt(np.diag(angles @ solution.covariance[F, F] @ angles.T))[:3],
         alignment=None if gyroscope is None else _alignment(gyroscope, solution, mounting),
@@ -243,15 +243,6 @@ def _alignment(gyroscope: SensorResult, solution: ImuSolution, mounting: Array) 
         vector.matrix_covariance[F, F],
         to_flange @ solution.covariance[F, F] @ to_flange.T,
     )
-
-
-def _covariance(solution: ImuSolution, scale: Array) -> Array:
-    """(6, 6) of scale and bias; b is part of the reading here, where the gyroscope's is added to it."""
-    jacobian = parameter_jacobian(solution.matrix, scale)
-    jacobian[3:] *= -1
-    told = np.r_[F, BIAS]
-    covariance: Array = jacobian @ solution.covariance[np.ix_(told, told)] @ jacobian.T
-    return covariance
 
 
 def _held_out(dwells: tuple[DwellReading, ...], solution: ImuSolution, gravity_m_s2: float) -> HeldOut:

@@ -181,6 +181,13 @@ def check_seen(second_order: Array | None, std: Array, remedy: str) -> None:
 def in_unit(solution: TriaxialSolution) -> tuple[Array, Array]:
     """Scale factors 1/‖row of F‖ (3,), and the standard deviations of them and of the bias (6,)."""
     scale = 1 / np.linalg.norm(solution.matrix, axis=1)
-    jacobian = parameter_jacobian(solution.matrix, scale)
+    return scale, np.sqrt(np.diag(scale_and_bias_covariance(solution.matrix, scale, solution.covariance)))
+
+
+def scale_and_bias_covariance(matrix: Array, scale: Array, covariance: Array) -> Array:
+    """(6, 6) from that of a reference model's parameters; b is part of the reading, a gyroscope's is added to it."""
+    jacobian = parameter_jacobian(matrix, scale)
+    jacobian[3:] *= -1
     told = np.r_[F, BIAS]
-    return scale, np.sqrt(np.diag(jacobian @ solution.covariance[np.ix_(told, told)] @ jacobian.T))
+    found: Array = jacobian @ covariance[np.ix_(told, told)] @ jacobian.T
+    return found

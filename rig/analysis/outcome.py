@@ -18,6 +18,7 @@ from rig.analysis.calibration import (
 from rig.analysis.clock import ClockCheck
 from rig.analysis.comparison import Reference, turns_of
 from rig.analysis.contradictions import contradictions
+from rig.analysis.magnetic_field import MagnetometerResult, calibrate_magnetometers
 from rig.analysis.onboard_check import Agreement, agreement
 from rig.analysis.surroundings import surroundings_of
 from rig.analysis.verdict import Check, acceleration_checks, judge, verdict, verification_checks
@@ -50,7 +51,8 @@ class Outcome:
     `recordings` are those of the calibration with a finished sweep. `results` hold every recorded sensor's calibration
     and `onboard` the board's own of the sensors to calibrate; all three are empty where stored calibrations were
     verified. `verifications` hold those that could be made. `clock` is the controller's, None where recordings of
-    before say nothing of its uncertainty. Where no sweep was planned there are `accelerometers` alone.
+    before say nothing of its uncertainty. Where no sweep was planned there are `accelerometers` alone, and beside them
+    the `magnetometers`, of which no check judges any.
     """
 
     recordings: tuple[ObservedRun, ...]
@@ -62,6 +64,7 @@ class Outcome:
     provenance: Origin
     clock: ClockCheck | None = None
     accelerometers: Mapping[str, AccelerometerResult] = field(default_factory=dict)
+    magnetometers: Mapping[str, MagnetometerResult | Fault] = field(default_factory=dict)
 
     @property
     def verdict(self) -> Literal["pass", "fail"]:
@@ -115,6 +118,7 @@ def calibrated(runs: Sequence[RunData], estimator: str = DEFAULT_ESTIMATOR) -> O
         provenance=_origin(runs),
         clock=None if surroundings is None else surroundings.clock,
         accelerometers=accelerometers,
+        magnetometers=calibrate_magnetometers(recordings, settings),
     )
 
 
@@ -123,7 +127,17 @@ def _in_attitudes(runs: Sequence[RunData], recordings: tuple[ObservedRun, ...]) 
     settings = runs[0].settings
     found = calibrate_accelerometers(recordings, settings)
     checks = _acceleration_checks(found, settings)
-    return Outcome(recordings, settings, {}, {}, {}, checks, _origin(runs), accelerometers=found)
+    return Outcome(
+        recordings,
+        settings,
+        {},
+        {},
+        {},
+        checks,
+        _origin(runs),
+        accelerometers=found,
+        magnetometers=calibrate_magnetometers(recordings, settings),
+    )
 
 
 def _acceleration_checks(found: Mapping[str, AccelerometerResult], settings: RunSettings) -> tuple[Check, ...]:

@@ -5,8 +5,10 @@ from math import isclose
 
 from firmware_host.client import Board, BoardIdentity, SensorInfo, StoredCalibration
 from firmware_host.protocol import FIRMWARE_VERSION
-from rig.config.models import SensorSection
+from rig.config.models import MagnetometerSection, SensorSection
 from rig.errors import Fault, Refused, raised_as
+
+Configured = SensorSection | MagnetometerSection
 
 NOBODY = (0x00, 0xFF, 0x0000, 0xFFFF)  # what a bus reads where no part drives it
 
@@ -29,6 +31,9 @@ IMPOSTORS = {
     },
 }
 
+# A die of a part is no part of its maker's.
+DIES = {"lsm9ds1m": "lsm9ds1_magnetometer"}
+
 
 refusing = partial(raised_as, Refused)  # before anything has moved
 changing = partial(raised_as, Fault)  # while the board is being changed: no refusal any more
@@ -45,7 +50,7 @@ def refuse_other_firmware(identity: BoardIdentity) -> None:
         )
 
 
-def sensor_entry(identity: BoardIdentity, name: str, section: SensorSection) -> SensorInfo:
+def sensor_entry(identity: BoardIdentity, name: str, section: Configured) -> SensorInfo:
     """The board's entry for a configured sensor, whatever answers in its place. Raises Refused `sensor_missing`."""
     for info in identity.sensors:
         if configured_part(info.part) == section.part:
@@ -53,7 +58,7 @@ def sensor_entry(identity: BoardIdentity, name: str, section: SensorSection) -> 
     raise _missing(name, section, "no driver for it")
 
 
-def find_sensor(identity: BoardIdentity, name: str, section: SensorSection) -> SensorInfo:
+def find_sensor(identity: BoardIdentity, name: str, section: Configured) -> SensorInfo:
     """The board's entry for a configured sensor that answers. Raises Refused `sensor_missing` or `sensor_mismatch`."""
     info = sensor_entry(identity, name, section)
     if info.present:
@@ -67,7 +72,7 @@ def find_sensor(identity: BoardIdentity, name: str, section: SensorSection) -> S
     )
 
 
-def _missing(name: str, section: SensorSection, seen: str) -> Refused:
+def _missing(name: str, section: Configured, seen: str) -> Refused:
     return Refused(
         "sensor_missing",
         f"sensors.{name}: the board finds no {section.part} ({seen})",
@@ -121,7 +126,8 @@ def refuse_other_sensor(
 
 def configured_part(part: str) -> str:
     """A part as the configuration spells it; the board names parts as their makers do."""
-    return part.lower().replace("-", "")
+    spelt = part.lower().replace("-", "")
+    return DIES.get(spelt, spelt)
 
 
 def impostor(part: str, who_am_i: int) -> str:

@@ -41,8 +41,11 @@ class _Place:
 def info(config_path: Path, overrides: Sequence[str], *, as_json: bool) -> int:
     """Print the board's identity, health, sensors and stored calibrations."""
     with _connected(config_path, overrides) as (config, board), refusing():
-        calibrations = [board.read_calibration(sensor.index) for sensor in board.identity.sensors]
-        names: dict[str, str] = {section.part: name for name, section in config.sensors.items()}
+        calibrations = [
+            board.read_calibration(sensor.index) if sensor.quantity == "rate" else None
+            for sensor in board.identity.sensors
+        ]
+        names: dict[str, str] = {section.part: name for name, section in config.on_the_board.items()}
         status = board.status()
         sensors = tuple(
             BoardSensor(sensor, names.get(configured_part(sensor.part)), counts, stored)

@@ -44,12 +44,12 @@ def _look_at_board(found: Configured) -> list[str]:
             refuse_other_firmware(identity)
         except RigError as error:
             missing.append(str(error))
-        for name, section in config.sensors.items():
+        for name, section in config.on_the_board.items():
             try:
                 info = find_sensor(identity, name, section)
                 say(f"sensor {name}: {info.part}, identity register 0x{info.who_am_i:02x}")
                 if found.phase.procedure.reads_corrected and name in config.to_calibrate:
-                    stored = stored_calibration(board, name, section)
+                    stored = stored_calibration(board, name, config.to_calibrate[name])
                     say(f"sensor {name}: calibrated on {stored.calibration.written_utc:%Y-%m-%d}")
             except RigError as error:
                 missing.append(str(error))

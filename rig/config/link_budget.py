@@ -11,21 +11,30 @@ MARGIN = 0.1  # of the link stays free: answers, and a clock that is a little of
 
 @dataclass(frozen=True, slots=True)
 class Stream:
-    """What one sensor sends: samples a second, raw or `calibrated` or both in turn, raw ones with its accelerations."""
+    """What one sensor sends: samples a second, raw or `calibrated` or both in turn, raw ones with its accelerations.
+
+    Or those of a magnetometer, of its `field`.
+    """
 
     rate_hz: float
     calibrated: bool
     acceleration: bool = False
+    field: bool = False
 
     @property
     def bytes_per_sample(self) -> float:
         """A sample's bytes and its share of the frame around it."""
-        name = "imu_samples" if self.acceleration else "rates" if self.calibrated else "samples"
-        message = MESSAGE_BY_NAME[name]
+        message = MESSAGE_BY_NAME[self._message]
         item, head = message.item_dtype.itemsize, message.head.size
         full_frame = (PAYLOAD_MAX - head) // item
         samples = min(full_frame, 1 + int(BATCH_AGE_US * 1e-6 * self.rate_hz))
         return item + (head + OVERHEAD + COBS_BYTES) / samples
+
+    @property
+    def _message(self) -> str:
+        if self.field:
+            return "field_samples"
+        return "imu_samples" if self.acceleration else "rates" if self.calibrated else "samples"
 
     @property
     def bytes_per_s(self) -> float:

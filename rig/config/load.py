@@ -200,9 +200,13 @@ def _world_fits(config: RigConfig, world: WorldSection) -> Iterator[str]:
         yield f"arm.host: {quote(host)} must be a loopback address (127.x.y.z) when the file has a world: section"
     if not port.startswith("socket://"):
         yield f"board.port: {quote(port)} must be socket://host:port when the file has a world: section"
-    for name in sorted(set(config.sensors) ^ set(world.sensors)):
-        where = "world.sensors" if name in config.sensors else "sensors"
-        yield f"{where}.{name}: missing; every sensor stands both in sensors and in world.sensors"
+    for kind, named, simulated in (
+        ("sensors", config.sensors, world.sensors),
+        ("magnetometers", config.magnetometers, world.magnetometers),
+    ):
+        for name in sorted(set(named) ^ set(simulated)):
+            where = f"world.{kind}" if name in named else kind
+            yield f"{where}.{name}: missing; every sensor stands both in {kind} and in world.{kind}"
 
 
 def _is_loopback(host: str) -> bool:

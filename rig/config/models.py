@@ -13,7 +13,7 @@ import numpy as np
 from pydantic import BaseModel, ConfigDict, Field, StringConstraints, ValidationInfo, field_validator, model_validator
 
 from rig.config.link_budget import Stream, over_budget
-from rig.config.sensor_catalogue import PARTS
+from rig.config.sensor_catalogue import MAGNETOMETERS, PARTS, in_words, nearest_rate, one_of
 from rig.config.ur10e_limits import (
     JOINT_LIMIT_DEG,
     PAYLOAD_LIMIT_KG,
@@ -202,9 +202,7 @@ class SensorSection(Section):
     @classmethod
     def the_board_can_keep_it(cls, value: str) -> str:
         """The board stores it beside the calibration, in a field of fixed width."""
-        if not (value.isascii() and value.isprintable() and 0 < len(value) <= SERIAL_NUMBER_MAX):
-            raise ValueError(f"must be 1 to {SERIAL_NUMBER_MAX} plain ASCII characters; the board keeps no others")
-        return value
+        return checked_serial_number(value)
 
     @field_validator("rate_hz", "range_deg_s")
     @classmethod
@@ -237,6 +235,54 @@ class SensorSection(Section):
         if info.data.get("role") == "calibrate":
             raise ValueError("only a sensor with role: reference has one; a sensor to calibrate gets its own here")
         return value
+
+
+def checked_serial_number(value: str) -> str:
+    """Raises ValueError when the board could not keep it."""
+    if not (value.isascii() and value.isprintable() and 0 < len(value) <= SERIAL_NUMBER_MAX):
+        raise ValueError(f"must be 1 to {SERIAL_NUMBER_MAX} plain ASCII characters; the board keeps no others")
+    return value
+
+
+class MagnetometerSection(Section):
+    """One magnetometer on the board, under a name that no gyroscope has: recorded, and calibrated in attitudes."""
+
+    part: Literal["lsm9ds1_magnetometer"] = Field(description="which magnetometer it is")
+    serial_number: str = Field(
+        description="which specimen it is; in every result",
+        json_schema_extra={"allowed": f"1 to {SERIAL_NUMBER_MAX} plain ASCII characters"},
+    )
+    rate_hz: float = Field(
+        default=MAGNETOMETERS["lsm9ds1_magnetometer"].default_rate_hz,
+        description="samples a second, one of the part's rates",
+        json_schema_extra={"allowed": in_words(MAGNETOMETERS["lsm9ds1_magnetometer"].rates_hz)},
+    )
+    range_gauss: float = Field(
+        default=MAGNETOMETERS["lsm9ds1_magnetometer"].ranges_gauss[0],
+        description="full scale, one of the part's ranges; 1 gauss is 100 µT, twice the Earth's field",
+        json_schema_extra={"unit": "gauss", "allowed": in_words(MAGNETOMETERS["lsm9ds1_magnetometer"].ranges_gauss)},
+    )
+    mounting: MountingSection = Field(default=MountingSection(), description="how it sits on the flange")
+
+    @field_validator("serial_number")
+    @classmethod
+    def as_any_other(cls, value: str) -> str:
+        """Of the same kind as a gyroscope's."""
+        return checked_serial_number(value)
+
+    @field_validator("rate_hz")
+    @classmethod
+    def a_rate_of_the_part(cls, value: float, info: ValidationInfo) -> float:
+        """Never silently another one."""
+        part = MAGNETOMETERS.get(info.data.get("part", ""))
+        return value if part is None else nearest_rate(value, part.rates_hz, in_words(part.rates_hz))
+
+    @field_validator("range_gauss")
+    @classmethod
+    def a_range_of_the_part(cls, value: float, info: ValidationInfo) -> float:
+        """As the rate."""
+        part = MAGNETOMETERS.get(info.data.get("part", ""))
+        return value if part is None else one_of(value, part.ranges_gauss)
 
 
 class ProcedureSection(Section):
@@ -355,6 +401,16 @@ class SiteSection(Section):
     gravity_m_s2: float = Field(
         default=9.80665, gt=9.7, lt=9.9, description="acceleration of free fall", json_schema_extra={"unit": "m/s²"}
     )
+    magnetic_field_ut: float | None = Field(
+        default=None,
+        ge=1,
+        le=1000,
+        description="size of the magnetic field where the magnetometer stands, as a reference there measured it: its "
+        "scale factors are relative to it; without it a magnetometer is recorded, not calibrated",
+    )
+    magnetic_field_upwards: bool = Field(
+        default=False, description="whether that field rises from the ground, as it does south of the magnetic equator"
+    )
     base_up: Vector3 = Field(
         default=(0.0, 0.0, 1.0),
         description="upwards in the frame of the arm's base; 0 0 −1 under a ceiling",
@@ -461,6 +517,7 @@ class RigConfig(Section):
     arm: ArmSection
     board: BoardSection
     sensors: dict[SensorName, SensorSection] = Field(min_length=1)
+    magnetometers: dict[SensorName, MagnetometerSection] = Field(default={}, max_length=len(MAGNETOMETERS))
     procedure: ProcedureSection
     observation: ObservationSection = ObservationSection()
     site: SiteSection = SiteSection()
@@ -491,14 +548,28 @@ class RigConfig(Section):
     @classmethod
     def the_link_carries_them(cls, sensors: dict[str, SensorSection], info: ValidationInfo) -> dict[str, SensorSection]:
         """Rates for which the link is too slow would lose samples. Of what a sensor sends, the larger must fit."""
-        streams = {
-            name: Stream(s.rate_hz, calibrated=s.role == "calibrate", acceleration=s.acceleration is not None)
-            for name, s in sensors.items()
-        }
-        problem = over_budget(streams, info.data["board"].baud) if "board" in info.data else None
-        if problem is not None:
-            raise ValueError(problem)
+        if "board" in info.data:
+            _refuse_more_than_the_link_carries(info.data["board"], _streams(sensors))
         return sensors
+
+    @field_validator("magnetometers")
+    @classmethod
+    def magnetometers_fit_beside_them(
+        cls, magnetometers: dict[str, MagnetometerSection], info: ValidationInfo
+    ) -> dict[str, MagnetometerSection]:
+        """A name stands for one sensor, and the link carries them too."""
+        sensors = info.data.get("sensors", {})
+        if both := sorted(sensors.keys() & magnetometers.keys()):
+            raise ValueError(f"{', '.join(both)} is the name of one of the sensors already")
+        if sensors and "board" in info.data:
+            fields = {name: Stream(m.rate_hz, calibrated=False, field=True) for name, m in magnetometers.items()}
+            _refuse_more_than_the_link_carries(info.data["board"], _streams(sensors) | fields)
+        return magnetometers
+
+    @property
+    def on_the_board(self) -> Mapping[str, SensorSection | MagnetometerSection]:
+        """Every sensor by name, gyroscopes first."""
+        return {**self.sensors, **self.magnetometers}
 
     @property
     def to_calibrate(self) -> Mapping[str, SensorSection]:
@@ -509,3 +580,16 @@ class RigConfig(Section):
     def reference(self) -> tuple[str, SensorSection] | None:
         """The sensor whose calibration is known, with its name, if there is one."""
         return next(((name, s) for name, s in self.sensors.items() if s.role == "reference"), None)
+
+
+def _streams(sensors: Mapping[str, SensorSection]) -> dict[str, Stream]:
+    return {
+        name: Stream(s.rate_hz, calibrated=s.role == "calibrate", acceleration=s.acceleration is not None)
+        for name, s in sensors.items()
+    }
+
+
+def _refuse_more_than_the_link_carries(board: BoardSection, streams: Mapping[str, Stream]) -> None:
+    problem = over_budget(streams, board.baud)
+    if problem is not None:
+        raise ValueError(problem)

@@ -23,6 +23,7 @@ UNITS = {
     "_per_turn": "1/turn",
     "_mm": "mm",
     "_kg": "kg",
+    "_ut": "µT",
     "_hz": "Hz",
     "_ppm": "ppm",
     "_c": "°C",

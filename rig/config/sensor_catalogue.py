@@ -1,6 +1,6 @@
 """The sensors the board has drivers for: which data rates and ranges each can be set to."""
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from types import MappingProxyType
 
@@ -27,18 +27,41 @@ class Part:
 
     def accept_rate(self, rate_hz: float) -> float:
         """The part's own rate that `rate_hz` means. Raises ValueError naming the nearest when there is none."""
-        nearest = min(self.rates_hz, key=lambda rate: abs(rate - rate_hz))
-        if abs(nearest - rate_hz) > RATE_TOLERANCE * nearest:
-            raise ValueError(f"not available; the nearest is {nearest:.6g}; allowed: {self.rates_rule}")
-        return nearest
+        return nearest_rate(rate_hz, self.rates_hz, self.rates_rule)
 
     def accept_range(self, range_deg_s: float) -> float:
         """`range_deg_s` if the part has it. Raises ValueError naming the nearest otherwise."""
-        if range_deg_s not in self.ranges_deg_s:
-            nearest = min(self.ranges_deg_s, key=lambda candidate: abs(candidate - range_deg_s))
-            allowed = ", ".join(f"{candidate:g}" for candidate in self.ranges_deg_s)
-            raise ValueError(f"not available; the nearest is {nearest:g}; allowed: {allowed}")
-        return range_deg_s
+        return one_of(range_deg_s, self.ranges_deg_s)
+
+
+@dataclass(frozen=True, slots=True)
+class MagnetometerPart:
+    """One kind of magnetometer: its data rates that dwells of seconds can use, its ranges, the usual one first."""
+
+    rates_hz: tuple[float, ...]
+    ranges_gauss: tuple[float, ...]
+    default_rate_hz: float
+
+
+def nearest_rate(rate_hz: float, rates_hz: Sequence[float], rule: str) -> float:
+    """The rate that `rate_hz` means. Raises ValueError naming the nearest when there is none."""
+    nearest = min(rates_hz, key=lambda rate: abs(rate - rate_hz))
+    if abs(nearest - rate_hz) > RATE_TOLERANCE * nearest:
+        raise ValueError(f"not available; the nearest is {nearest:.6g}; allowed: {rule}")
+    return nearest
+
+
+def one_of(value: float, allowed: Sequence[float]) -> float:
+    """`value` if it is allowed. Raises ValueError naming the nearest otherwise."""
+    if value not in allowed:
+        nearest = min(allowed, key=lambda candidate: abs(candidate - value))
+        raise ValueError(f"not available; the nearest is {nearest:g}; allowed: {in_words(allowed)}")
+    return value
+
+
+def in_words(values: Sequence[float]) -> str:
+    """A list of numbers."""
+    return ", ".join(f"{value:g}" for value in values)
 
 
 PARTS: Mapping[str, Part] = MappingProxyType(
@@ -72,6 +95,14 @@ PARTS: Mapping[str, Part] = MappingProxyType(
             g_sensitivity_deg_s_g=0.015,  # as the datasheet of the ADIS16445 states
             ranges_g=(8,),
             acceleration_noise_ug_sqrt_hz=23,  # assumed: the data sheet of the part has it, not looked up
+        ),
+    }
+)
+
+MAGNETOMETERS: Mapping[str, MagnetometerPart] = MappingProxyType(
+    {
+        "lsm9ds1_magnetometer": MagnetometerPart(  # datasheet DocID025715, table 3 and register CTRL_REG1_M
+            rates_hz=(5, 10, 20, 40, 80), ranges_gauss=(4, 8, 12, 16), default_rate_hz=80
         ),
     }
 )

@@ -40,6 +40,18 @@ class SiteSection(Section):
     gravity_m_s2: float = Field(
         default=9.80665, ge=0, le=20, description="acceleration of free fall", json_schema_extra={"unit": "m/s²"}
     )
+    magnetic_field_ut: float = Field(
+        default=48.0,
+        ge=0,
+        le=1000,
+        description="size of the magnetic field, everywhere the same; the Earth's own is 22 to 67 (IGRF-13)",
+    )
+    magnetic_dip_deg: float = Field(
+        default=65.0, ge=-90, le=90, description="how far it points below the horizon; above it where negative"
+    )
+    magnetic_declination_deg: float = Field(
+        default=0.0, ge=-180, le=180, description="where its horizontal part points: from north, clockwise from above"
+    )
 
 
 class CalibrationSection(Section):
@@ -249,6 +261,26 @@ class SimulatedSensorSection(Section):
     )
 
 
+class SimulatedMagnetometerSection(Section):
+    """The truth of one simulated magnetometer, m = F B + b of the magnetic field B where it is."""
+
+    scale: Vector3 = Field(
+        default=(1.0, 1.0, 1.0),
+        description="scale factor of each axis: what the length of a row of F is 1 over",
+        json_schema_extra=RATIO,
+    )
+    bias_ut: Vector3 = Field(
+        default=NO_ROW, description="bias b of each axis, part of the reading: its own, and iron that turns with it"
+    )
+    noise_ut: float = Field(default=0.3, ge=0, description="standard deviation of a sample's noise")
+    non_orthogonality_deg: Vector3 = Field(
+        default=NO_ROW, description="by how much the angles between its axes x y, x z, y z are off 90°"
+    )
+    mounting_error_deg: Vector3 = Field(
+        default=NO_ROW, description="rotation vector by which it sits off its nominal mounting"
+    )
+
+
 class WorldSection(Section):
     """The simulated laboratory."""
 
@@ -265,3 +297,4 @@ class WorldSection(Section):
     arm: SimulatedArmSection = SimulatedArmSection()
     board: SimulatedBoardSection = SimulatedBoardSection()
     sensors: dict[SensorName, SimulatedSensorSection] = Field(min_length=1)
+    magnetometers: dict[SensorName, SimulatedMagnetometerSection] = Field(default={})

@@ -1,9 +1,9 @@
 """How a run lies in HDF5 (schema "rig.run/2").
 
-`/samples/<sensor>` (SAMPLE_DTYPE, or IMU_SAMPLE_DTYPE where accelerations were recorded; the sensor's description as
-attributes), `/arm` (ARM_STATE_DTYPE), `/events` (bytes: SWMR forbids data of variable length, so an event is a line of
-JSON); `schema`, `config` (YAML), `settings` and `provenance` (JSON) as attributes of the file. Schema "rig.run/1" lacks
-`settings`.
+`/samples/<sensor>` (SAMPLE_DTYPE, IMU_SAMPLE_DTYPE where accelerations were recorded, FIELD_SAMPLE_DTYPE of a
+magnetometer; the sensor's description as attributes), `/arm` (ARM_STATE_DTYPE), `/events` (bytes: SWMR forbids data of
+variable length, so an event is a line of JSON); `schema`, `config` (YAML), `settings` and `provenance` (JSON) as
+attributes of the file. Schema "rig.run/1" lacks `settings`.
 """
 
 from collections.abc import Mapping
@@ -14,7 +14,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from firmware_host.samples import IMU_SAMPLE_DTYPE, SAMPLE_DTYPE
+from firmware_host.samples import FIELD_SAMPLE_DTYPE, IMU_SAMPLE_DTYPE, SAMPLE_DTYPE
 from rig.arm.state import ARM_STATE_DTYPE
 
 SCHEMA = "rig.run/2"
@@ -49,7 +49,14 @@ def empty(schema: str, texts: Mapping[str, str], described: Mapping[str, Mapping
 
 def sample_dtype(attributes: Mapping[str, Any]) -> np.dtype[Any]:
     """Of the samples of a sensor that is described so."""
+    if is_magnetometer(attributes):
+        return FIELD_SAMPLE_DTYPE
     return IMU_SAMPLE_DTYPE if "sensitivity_m_s2_per_count" in attributes else SAMPLE_DTYPE
+
+
+def is_magnetometer(attributes: Mapping[str, Any]) -> bool:
+    """Whether a sensor that is described so measures a field."""
+    return "sensitivity_t_per_count" in attributes
 
 
 def lay_out(path: Path, contents: Contents, *, swmr: bool) -> None:

@@ -85,7 +85,7 @@ def provenance_of(
         arm_software=arm.polyscope,
         board_unique_id=board.unique_id,
         firmware_version=board.firmware,
-        sensor_serial_numbers={name: section.serial_number for name, section in loaded.config.sensors.items()},
+        sensor_serial_numbers={name: each.serial_number for name, each in loaded.config.on_the_board.items()},
         stored_calibrations={
             name: checked(StoredCalibrationEntry, calibration.document(), name) for name, calibration in stored.items()
         },

@@ -12,6 +12,7 @@ from pydantic import ConfigDict, Field, JsonValue, ValidationError
 from rig.config.regular_file import UnfitFile, read_regular_file
 from rig.data.accelerometer_entries import AccelerometerEntry
 from rig.data.budget_entries import BiasProcessEntry, BudgetEntry, ClockEntry
+from rig.data.magnetometer_entries import MagnetometerEntry
 from rig.data.result_types import Entry, ErrorEntry, Matrix3, Matrix6, Positive, PositiveVector3, Role, Vector3, Vector6
 from rig.data.run_folder import RESULT
 from rig.errors import Refused
@@ -297,7 +298,8 @@ class VerificationEntry(Entry):
 class ResultDocument(Entry):
     """The result of a run, of schema "rig.result/1"; `sensors` is empty where stored calibrations were verified.
 
-    It is also empty where no sweeps were made, `accelerometers` where none were calibrated.
+    It is also empty where no sweeps were made, `accelerometers` where none were calibrated, `magnetometers` where none
+    were recorded; one that was recorded and not calibrated says why.
     """
 
     schema_name: Literal["rig.result/1"] = Field(alias="schema")  # as SCHEMA
@@ -308,6 +310,7 @@ class ResultDocument(Entry):
     sensors: dict[str, SensorEntry]
     verification: dict[str, VerificationEntry]
     accelerometers: dict[str, AccelerometerEntry] = Field(default_factory=dict)
+    magnetometers: dict[str, MagnetometerEntry | ErrorEntry] = Field(default_factory=dict)
 
     def text(self) -> str:
         """The JSON; what was left out stays out."""

@@ -5,6 +5,7 @@ attributes exist before that mode begins, afterwards rows are only appended, and
 anything that points to it. What lies where is said in `rig.data.layout`.
 """
 
+import dataclasses
 import json
 import os
 import subprocess
@@ -26,7 +27,7 @@ from rig.arm.state import ARM_STATE_DTYPE, ArmState
 from rig.data.checked import Finite, Positive, checked
 from rig.data.events import Event, Recorded, from_lines, to_line
 from rig.data.extract import NO_ROOM, reason
-from rig.data.layout import EVENTS_DTYPE, SCHEMA, Contents, append, empty, lay_out
+from rig.data.layout import EVENTS_DTYPE, SCHEMA, Contents, append, empty, is_magnetometer, lay_out
 from rig.data.provenance import Provenance
 from rig.data.settings import RunSettings, settings_from_json
 from rig.data.settings_of_run_1 import settings_of_configuration
@@ -77,9 +78,34 @@ class RecordedSensor:
 
 
 @dataclass(frozen=True, slots=True)
+class RecordedMagnetometer:
+    """What a reader of the file must know about one magnetometer: field in tesla = counts × `sensitivity_t_per_count`.
+
+    `full_scale_counts` and `mounting` as of a `RecordedSensor`.
+    """
+
+    part: str
+    serial_number: str
+    rate_hz: Positive
+    range_t: Positive
+    sensitivity_t_per_count: Positive
+    full_scale_counts: Annotated[int, Field(gt=0)]
+    mounting: Annotated[tuple[Axis, ...], Field(min_length=3, max_length=3)]
+
+    @property
+    def mode(self) -> Literal["raw"]:
+        """The board corrects no field."""
+        return "raw"
+
+    def attributes(self) -> dict[str, Any]:
+        """As they stand in the file."""
+        return asdict(self)
+
+
+@dataclass(frozen=True, slots=True)
 class RunData:
-    """A run file in memory: `samples` by sensor name (n,) SAMPLE_DTYPE or IMU_SAMPLE_DTYPE, `arm` (n,) ARM_STATE_DTYPE,
-    events in order.
+    """A run file in memory: `samples` (n,) by name of a sensor, SAMPLE_DTYPE or IMU_SAMPLE_DTYPE, or of one of the
+    `magnetometers`, FIELD_SAMPLE_DTYPE; `arm` (n,) ARM_STATE_DTYPE; events in order.
 
     `settings` say what it is judged by; `config` is the configuration's text, for people.
     """
@@ -91,6 +117,7 @@ class RunData:
     samples: dict[str, NDArray[Any]]
     arm: NDArray[Any]
     events: tuple[Recorded, ...]
+    magnetometers: dict[str, RecordedMagnetometer] = dataclasses.field(default_factory=dict)
 
     def judged_by(self, overrides: Sequence[str]) -> "RunData":
         """The same recording under other settings: see `RunSettings.with_overrides`."""
@@ -113,7 +140,7 @@ class RunRecorder:
         config: str,
         settings: RunSettings,
         provenance: Provenance,
-        sensors: Mapping[str, RecordedSensor],
+        sensors: Mapping[str, RecordedSensor | RecordedMagnetometer],
     ) -> None:
         import h5py
 
@@ -231,10 +258,19 @@ def read_run(path: Path, timeout_s: float | None = None) -> RunData:
             config=contents.texts["config"],
             settings=_settings(contents),
             provenance=checked(Provenance, json.loads(contents.texts["provenance"]), "provenance"),
-            sensors={name: _sensor(attributes) for name, attributes in contents.described.items()},
+            sensors={
+                name: _sensor(attributes)
+                for name, attributes in contents.described.items()
+                if not is_magnetometer(attributes)
+            },
             samples={name: _whole_rows(rows) for name, rows in contents.samples.items()},
             arm=_whole_rows(contents.arm),
             events=tuple(from_lines(contents.events.tobytes())),
+            magnetometers={
+                name: _magnetometer(attributes)
+                for name, attributes in contents.described.items()
+                if is_magnetometer(attributes)
+            },
         )
     except (ValueError, RecursionError) as error:
         raise _not_a_run_file(path, str(error)) from None
@@ -312,12 +348,22 @@ def _settings(contents: Contents) -> RunSettings:
 
 def _sensor(attributes: Mapping[str, Any]) -> RecordedSensor:
     sensor = checked(RecordedSensor, attributes, "sensor")
+    _check_mounting(sensor)
+    return sensor
+
+
+def _magnetometer(attributes: Mapping[str, Any]) -> RecordedMagnetometer:
+    magnetometer = checked(RecordedMagnetometer, attributes, "magnetometer")
+    _check_mounting(magnetometer)
+    return magnetometer
+
+
+def _check_mounting(sensor: RecordedSensor | RecordedMagnetometer) -> None:
     mounting = np.array(sensor.mounting)
     # No element of a rotation exceeds one; the squares of much larger ones would overflow.
     small = np.abs(mounting).max() < 2
     if not (small and np.allclose(mounting @ mounting.T, np.eye(3), atol=MOUNTING_TOLERANCE)):
         raise ValueError(f"the mounting of {sensor.part} is no rotation: {quote(sensor.mounting)}")
-    return sensor
 
 
 def _whole_rows(rows: NDArray[Any]) -> NDArray[Any]:

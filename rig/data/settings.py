@@ -24,8 +24,9 @@ if TYPE_CHECKING:
     from rig.arm.motion import Dwell, Plan
     from rig.config.models import RigConfig, SiteSection
 
-SCHEMA = "rig.settings/3"
-SCHEMAS = ("rig.settings/1", "rig.settings/2", SCHEMA)  # the first knows no site, the second no dwells
+SCHEMA = "rig.settings/4"
+# The first knows no site, the second no dwells, the third no magnetic field.
+SCHEMAS = ("rig.settings/1", "rig.settings/2", "rig.settings/3", SCHEMA)
 
 DecisionRule = Literal["simple", "guard_band"]
 Vector3 = tuple[Finite, Finite, Finite]
@@ -73,11 +74,16 @@ class KnownReference:
 
 @dataclass(frozen=True, slots=True)
 class Site:
-    """Where the arm stands, in its base frame: `up` (unit vector), gravity, the Earth's rate where it is known."""
+    """Where the arm stands, in its base frame: `up` (unit vector), gravity, the Earth's rate where it is known.
+
+    Of the magnetic field its size is known or nothing, and whether it rises from the ground.
+    """
 
     up: Vector3
     gravity_m_s2: Positive
     earth_rate_rad_s: Vector3 | None
+    magnetic_field_t: Positive | None = None
+    magnetic_field_upwards: bool = False
 
     @property
     def down_m_s2(self) -> NDArray[np.float64]:
@@ -223,7 +229,8 @@ def _site(section: "SiteSection") -> Site:
         north = np.cos(heading) * ahead + np.sin(heading) * np.cross(up, ahead)
         x, y, z = (EARTH_RATE_RAD_S * (np.cos(latitude) * north + np.sin(latitude) * up)).tolist()
         earth_rate = x, y, z
-    return Site(section.up, section.gravity_m_s2, earth_rate)
+    field_t = None if section.magnetic_field_ut is None else section.magnetic_field_ut / 1e6
+    return Site(section.up, section.gravity_m_s2, earth_rate, field_t, section.magnetic_field_upwards)
 
 
 def _uncertainty(config: "RigConfig") -> Uncertainty:

@@ -2,8 +2,10 @@
 
 from collections.abc import Collection, Iterator
 from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
+from numpy.typing import NDArray
 
 from rig.data.run_file import RunData
 from rig.data.settings import ObservationThresholds
@@ -82,7 +84,7 @@ def dwell_reading(stream: Stream, motion: ArmMotion, finished: Dwelt, settings: 
     where = f"dwell {dwell.index} ({dwell.name})"
     inside = between(stream, window.start_s, window.end_s)
     _check_standing(motion, window, where)
-    _check_complete(stream, inside, where, settings)
+    check_complete(stream.raw[inside], where, settings)
     check_acceleration(stream, inside, where)
     readings = accelerations(stream, inside)
     count = stream.sensor.sensitivity_m_s2_per_count or 0.0
@@ -114,11 +116,11 @@ def _check_standing(motion: ArmMotion, window: Window, where: str) -> None:
         )
 
 
-def _check_complete(stream: Stream, inside: slice, where: str, settings: ObservationThresholds) -> None:
-    count = inside.stop - inside.start
-    lost = 0
+def check_complete(samples: NDArray[Any], where: str, settings: ObservationThresholds) -> None:
+    """Raises Fault `lost_samples` where too few were recorded in a dwell, or too many of them are missing."""
+    count, lost = len(samples), 0
     if count:
-        sequence = stream.raw["sequence"][inside].astype(np.int64)
+        sequence = samples["sequence"].astype(np.int64)
         lost = int(sequence[-1] - sequence[0]) + 1 - count
     if count < MIN_DWELL_SAMPLES or lost > settings.max_lost_fraction * (count + lost):
         raise Fault(

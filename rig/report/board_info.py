@@ -68,6 +68,7 @@ def _info_document(board: BoardInfo) -> dict[str, Any]:
         "sensors": [
             {
                 "part": sensor.info.part,
+                "quantity": sensor.info.quantity,
                 "present": sensor.info.present,
                 "who_am_i": sensor.info.who_am_i,
                 "configured_as": sensor.configured_as,
@@ -98,11 +99,12 @@ def _print_info(board: BoardInfo) -> None:
     for name, value in facts.items():
         console.print(plain(f"{name + ':':12}{value}"), soft_wrap=True)
     table = Table(box=SIMPLE)
-    for heading in ("part", "fitted", "identity", "configured as", "stored calibration"):
+    for heading in ("part", "measures", "fitted", "identity", "configured as", "stored calibration"):
         table.add_column(heading)
     for sensor in board.sensors:
         table.add_row(
             plain(sensor.info.part),
+            sensor.info.quantity,
             "yes" if sensor.info.present else "no",
             f"0x{sensor.info.who_am_i:02x}",
             plain(sensor.configured_as or ""),

@@ -6,6 +6,7 @@ from rig.data.result_file import SCHEMA, CheckEntry, ProvenanceEntry, ResultDocu
 from rig.report.accelerometer_entry import accelerometer_entry
 from rig.report.budget_entry import clock_entry
 from rig.report.entry import entry
+from rig.report.magnetometer_entry import magnetometer_entry
 from rig.report.sensor_entry import sensor_entry
 from rig.report.verification_entry import verification_entry
 
@@ -32,6 +33,8 @@ def document_of(outcome: Outcome) -> ResultDocument:
         more["clock"] = clock_entry(outcome.clock)
     if outcome.accelerometers:
         more["accelerometers"] = {name: accelerometer_entry(found) for name, found in outcome.accelerometers.items()}
+    if outcome.magnetometers:
+        more["magnetometers"] = {name: magnetometer_entry(found) for name, found in outcome.magnetometers.items()}
     return document.model_copy(update=more)
 
 

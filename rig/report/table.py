@@ -11,6 +11,7 @@ from rig.data.result_file import BoardEntry, CheckEntry, ResultDocument, SensorE
 from rig.data.result_types import ErrorEntry
 from rig.report.accelerometer_table import accelerometer_lines, accelerometer_table
 from rig.report.budget_table import budget_table
+from rig.report.magnetometer_table import magnetometer_lines, magnetometer_table
 from rig.report.verification_table import verification_lines, verification_table
 from rig.station.plain_text import plain
 
@@ -47,6 +48,13 @@ def print_result(result: ResultDocument, console: Console) -> None:
     for name, accelerometer in result.accelerometers.items():
         console.print(accelerometer_table(name, accelerometer))
         for line in accelerometer_lines(accelerometer):
+            console.print(plain(line))
+    for name, magnetometer in result.magnetometers.items():
+        if isinstance(magnetometer, ErrorEntry):
+            console.print(plain(f"{name}, magnetometer, not calibrated: {magnetometer.error}"))
+            continue
+        console.print(magnetometer_table(name, magnetometer))
+        for line in magnetometer_lines(magnetometer):
             console.print(plain(line))
     for name, verification in result.verification.items():
         console.print(verification_table(name, verification))

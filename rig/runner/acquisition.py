@@ -3,13 +3,14 @@
 import threading
 from collections import defaultdict, deque
 from dataclasses import dataclass, field
+from typing import Literal
 
 import numpy as np
 
 from firmware_host.client import SampleBatch
 from firmware_host.samples import SAMPLE_DTYPE
 from rig.arm.state import ArmState
-from rig.data.run_file import RecordedSensor, RunRecorder
+from rig.data.run_file import RecordedMagnetometer, RecordedSensor, RunRecorder
 from rig.runner.settling import Settling
 from rig.station.events import SensorSamples, Vector
 
@@ -18,24 +19,35 @@ KEPT_PARTS = 3
 
 @dataclass(slots=True)
 class SensorCount:
-    """What one sensor has delivered so far. `lost` counts the gaps in its sequence numbers."""
+    """What one sensor has delivered so far. `lost` counts the gaps in its sequence numbers.
+
+    `sensitivity` is rad/s per count, or of a magnetometer, whose samples have another `column`, tesla.
+    """
 
     name: str
-    sensitivity_rad_s_per_count: float
+    sensitivity: float
+    column: Literal["counts", "field_counts"] = "counts"
     samples: int = 0
     lost: int = 0
-    rate_rad_s: Vector | None = None
+    latest: Vector | None = None
     _next_sequence: int = 0
 
     def add(self, batch: SampleBatch) -> None:
-        """Count one batch; its mean becomes `rate_rad_s`."""
+        """Count one batch; its mean becomes the `latest` reading."""
         sequence = batch.samples["sequence"]
         last = int(sequence[-1])
         self.lost += last + 1 - self._next_sequence - len(sequence)
         self._next_sequence = last + 1
         self.samples += len(sequence)
-        x, y, z = (batch.samples["counts"].mean(axis=0) * self.sensitivity_rad_s_per_count).tolist()
-        self.rate_rad_s = (x, y, z)
+        x, y, z = (batch.samples[self.column].mean(axis=0) * self.sensitivity).tolist()
+        self.latest = (x, y, z)
+
+    @property
+    def seen(self) -> SensorSamples:
+        """As it is told."""
+        if self.column == "field_counts":
+            return SensorSamples(self.name, self.samples, self.lost, None, self.latest)
+        return SensorSamples(self.name, self.samples, self.lost, self.latest)
 
 
 @dataclass(frozen=True, slots=True)
@@ -64,6 +76,10 @@ class Acquisition:
         """Count the samples of a sensor by its index on the board, before the stream begins."""
         self.counts[index] = SensorCount(name, sensor.sensitivity_rad_s_per_count)
         self.settling.expect(index, name, sensor)
+
+    def expect_field(self, index: int, name: str, magnetometer: RecordedMagnetometer) -> None:
+        """The same of a magnetometer, which tells nothing of whether the arm has settled."""
+        self.counts[index] = SensorCount(name, magnetometer.sensitivity_t_per_count, "field_counts")
 
     def on_samples(self, batch: SampleBatch) -> None:
         """Take a batch of samples of a sensor known in `counts`."""
@@ -103,7 +119,7 @@ class Acquisition:
     def samples(self) -> tuple[SensorSamples, ...]:
         """What every sensor has delivered so far."""
         with self._lock:
-            return tuple(SensorSamples(c.name, c.samples, c.lost, c.rate_rad_s) for c in self.counts.values())
+            return tuple(count.seen for count in self.counts.values())
 
     def silent(self) -> list[str]:
         """The sensors that have delivered nothing yet."""

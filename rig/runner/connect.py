@@ -11,7 +11,7 @@ from rig.arm.state import ArmReport
 from rig.board.identify import refuse_other_firmware, refusing
 from rig.config.load import Loaded
 from rig.data.provenance import provenance_of
-from rig.data.run_file import RunRecorder
+from rig.data.run_file import RecordedMagnetometer, RecordedSensor, RunRecorder
 from rig.data.settings import RunSettings
 from rig.plans.phase import Phase
 from rig.plans.script_file import ScriptFile
@@ -19,7 +19,7 @@ from rig.runner.acquisition import Acquisition
 from rig.runner.onboard import BoardCalibration
 from rig.runner.procedure import Devices, Recording, Rig
 from rig.runner.resumption import Resumption
-from rig.runner.sensors import BoardSensor, set_up_sensors
+from rig.runner.sensors import BoardMagnetometer, BoardSensor, set_up_magnetometers, set_up_sensors
 from rig.station.events import ArmConnected, BoardConnected, RunResumed
 from rig.station.station import Station
 
@@ -51,9 +51,9 @@ class Connector:
             self.station.event(RunResumed(len(self.resumed.done), len(whole_plan.sweeps)))
         acquisition = Acquisition()
         with ExitStack() as stack:
-            board, sensors = self._connect_board(stack, acquisition)
+            board, sensors, magnetometers = self._connect_board(stack, acquisition)
             arm, report = self._connect_arm(stack, acquisition)
-            recording = self._record(stack, board, sensors, report)
+            recording = self._record(stack, board, sensors, magnetometers, report)
             acquisition.recorder = recording.recorder
             yield Rig(
                 devices=Devices(arm, report, self.loaded.config.arm, board, _streaming_corrected(sensors), acquisition),
@@ -64,16 +64,21 @@ class Connector:
                 phase=self.phase,
             )
 
-    def _connect_board(self, stack: ExitStack, acquisition: Acquisition) -> tuple[Board, Mapping[str, BoardSensor]]:
+    def _connect_board(
+        self, stack: ExitStack, acquisition: Acquisition
+    ) -> tuple[Board, Mapping[str, BoardSensor], Mapping[str, BoardMagnetometer]]:
         section = self.loaded.config.board
         with refusing():
             board = stack.enter_context(Board(section.port, section.baud, acquisition.on_samples))
             refuse_other_firmware(board.identity)
             sensors = set_up_sensors(board, self.loaded.config, calibrated=self.phase.procedure.reads_corrected)
+            magnetometers = set_up_magnetometers(board, self.loaded.config)
         for name, sensor in sensors.items():
             acquisition.expect(sensor.index, name, sensor.described)
+        for name, magnetometer in magnetometers.items():
+            acquisition.expect_field(magnetometer.index, name, magnetometer.described)
         self.station.event(BoardConnected(section.port, board.identity))
-        return board, sensors
+        return board, sensors, magnetometers
 
     def _connect_arm(self, stack: ExitStack, acquisition: Acquisition) -> tuple[Arm, ArmReport]:
         section = self.loaded.config.arm
@@ -88,9 +93,13 @@ class Connector:
         stack: ExitStack,
         board: Board,
         sensors: Mapping[str, BoardSensor],
+        magnetometers: Mapping[str, BoardMagnetometer],
         report: ArmReport,
     ) -> Recording:
-        described = {name: sensor.described for name, sensor in sensors.items()}
+        described: dict[str, RecordedSensor | RecordedMagnetometer] = {
+            **{name: sensor.described for name, sensor in sensors.items()},
+            **{name: magnetometer.described for name, magnetometer in magnetometers.items()},
+        }
         stored = {name: sensor.stored for name, sensor in sensors.items() if sensor.stored is not None}
         made_with = provenance_of(
             self.loaded,

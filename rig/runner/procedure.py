@@ -26,7 +26,7 @@ from rig.data.events import (
     SweepFinished,
     SweepStarted,
 )
-from rig.data.run_file import RecordedSensor, RunRecorder
+from rig.data.run_file import RecordedMagnetometer, RecordedSensor, RunRecorder
 from rig.errors import Fault, Refused
 from rig.plans.phase import Phase
 from rig.runner.acquisition import Acquisition
@@ -72,7 +72,7 @@ class Recording:
     """
 
     recorder: RunRecorder
-    sensors: Mapping[str, RecordedSensor]
+    sensors: Mapping[str, RecordedSensor | RecordedMagnetometer]
     station: Station
     kinematics: DenavitHartenberg
 

@@ -9,8 +9,8 @@ import numpy as np
 from firmware_host.client import Board, Calibration, StoredCalibration
 from firmware_host.protocol import CALIBRATED_RAD_S, FULL_SCALE_COUNTS
 from rig.board.identify import find_sensor, stored_calibration
-from rig.config.models import RigConfig, SensorSection, mounting_matrix
-from rig.data.run_file import RecordedSensor
+from rig.config.models import MagnetometerSection, RigConfig, SensorSection, mounting_matrix
+from rig.data.run_file import RecordedMagnetometer, RecordedSensor
 
 
 @dataclass(frozen=True, slots=True)
@@ -36,6 +36,34 @@ def set_up_sensors(board: Board, config: RigConfig, *, calibrated: bool) -> Mapp
         else _raw(board, name, section)
         for name, section in config.sensors.items()
     }
+
+
+@dataclass(frozen=True, slots=True)
+class BoardMagnetometer:
+    """A magnetometer that is set up, as a `BoardSensor` is."""
+
+    index: int
+    described: RecordedMagnetometer
+
+
+def set_up_magnetometers(board: Board, config: RigConfig) -> Mapping[str, BoardMagnetometer]:
+    """Every configured magnetometer by its name. Raises Refused as `find_sensor`."""
+    return {name: _magnetometer(board, name, section) for name, section in config.magnetometers.items()}
+
+
+def _magnetometer(board: Board, name: str, section: MagnetometerSection) -> BoardMagnetometer:
+    info = find_sensor(board.identity, name, section)
+    setup = board.configure_magnetometer(info.index, section.rate_hz, section.range_gauss)
+    described = RecordedMagnetometer(
+        part=section.part,
+        serial_number=section.serial_number,
+        rate_hz=setup.rate_hz,
+        range_t=setup.range_t,
+        sensitivity_t_per_count=setup.sensitivity_t,
+        full_scale_counts=FULL_SCALE_COUNTS,
+        mounting=tuple(tuple(row) for row in mounting_matrix(section.mounting).tolist()),
+    )
+    return BoardMagnetometer(info.index, described)
 
 
 def _raw(board: Board, name: str, section: SensorSection) -> BoardSensor:

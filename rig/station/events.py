@@ -102,12 +102,16 @@ class Progress:
 
 @dataclass(frozen=True, slots=True)
 class SensorSamples:
-    """What one sensor has delivered so far: samples, gaps in their numbers, the newest mean reading in rad/s."""
+    """What one sensor has delivered so far: samples, gaps in their numbers, the newest mean reading.
+
+    That is a rate in rad/s, or of a magnetometer a field in tesla.
+    """
 
     sensor: str
     samples: int
     lost: int
     rate_rad_s: Vector | None
+    field_t: Vector | None = None
 
 
 @dataclass(frozen=True, slots=True)

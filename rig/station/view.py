@@ -71,6 +71,9 @@ def _panel(progress: Progress, samples: SamplesTaken) -> Table:
 
 
 def _readings(sensor: SensorSamples) -> str:
+    if sensor.field_t is not None:
+        field = " ".join(f"{1e6 * component:+7.2f}" for component in sensor.field_t)
+        return f"{field} µT, {sensor.samples} samples, {sensor.lost} lost"
     rates = "waiting" if sensor.rate_rad_s is None else " ".join(f"{degrees(r):+7.2f}" for r in sensor.rate_rad_s)
     return f"{rates} °/s, {sensor.samples} samples, {sensor.lost} lost"
 

@@ -9,8 +9,10 @@ from firmware_host.emulator.spi_device import Fault, SpiDevice
 from rig.config.models import RigConfig
 from rig.config.world_models import WorldSection
 from rig.world.board.flash_file import flash_of
-from rig.world.board.mounting import MotionAt, mount_sensors, power_up
+from rig.world.board.magnetometer_truth import MountedMagnetometer
+from rig.world.board.mounting import MotionAt, mount_magnetometers, mount_sensors, power_up
 from rig.world.board.sensor_truth import SensorTruth
+from rig.world.magnetic_field import magnetic_field_of
 from rig.world.site import site_of
 from rig.world.ur10e.joint_motion import Motion
 from rig.world.ur10e.ripple import ripple
@@ -52,14 +54,18 @@ class Laboratory:
         self._flash = flash_of(world.board.flash_file)
         self.board: EmulatedBoard | None = None  # None: without power
         self._sensors: dict[str, SpiDevice] = {}
-        self._faults: dict[str, Fault | None] = dict.fromkeys(world.sensors)
+        self._faults: dict[str, Fault | None] = dict.fromkeys([*world.sensors, *world.magnetometers])
+        self._field = magnetic_field_of(world.site)
         self.plug_in()
 
     def plug_in(self) -> None:
         """Give the board power, if it has none."""
         if self.board is None:
             time_s = self.arm.true_s(self.robot.time_s)
-            self._sensors = mount_sensors(self._config, self._world, self._motion_of, time_s)
+            self._sensors = {
+                **mount_sensors(self._config, self._world, self._motion_of, time_s),
+                **mount_magnetometers(self._config, self._world, self._field_of),
+            }
             for name, fault in self._faults.items():
                 self._sensors[name].fault = fault
             self.board = power_up(self._world, self._flash, self._sensors.values(), time_s)
@@ -95,3 +101,7 @@ class Laboratory:
         if self.arm.ideal and not sensor.feels_force:
             return lambda time_s: sensor.rate(self.arm.rate_at(time_s))
         return lambda time_s: sensor.motion(self.arm.felt_at(time_s))
+
+    def _field_of(self, sensor: MountedMagnetometer) -> MotionAt:
+        """What a magnetometer on the flange feels at such a time."""
+        return lambda time_s: sensor.feels(self._field, self.arm.frame_at(time_s))

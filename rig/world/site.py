@@ -19,16 +19,20 @@ class Site:
 
 
 def site_of(section: SiteSection) -> Site:
-    """North, west and up, turned clockwise by the heading, then tilted about the base's x axis and its new y axis."""
+    """As the section has it."""
     rate = EARTH_RATE_RAD_S if section.latitude_deg is not None else 0.0
-    latitude, heading = radians(section.latitude_deg or 0.0), radians(section.heading_deg)
+    latitude = radians(section.latitude_deg or 0.0)
+    return Site(
+        in_base(section, north=rate * cos(latitude), up=rate * sin(latitude)),
+        in_base(section, up=section.gravity_m_s2),
+    )
+
+
+def in_base(section: SiteSection, *, north: float = 0.0, west: float = 0.0, up: float = 0.0) -> Vector:
+    """A vector turned clockwise by the heading, then tilted about the base's x axis and its new y axis."""
+    heading = radians(section.heading_deg)
     about_x, about_y = (radians(angle) for angle in section.base_tilt_deg)
-
-    def in_base(north: float, up: float) -> Vector:
-        """Of a vector without a part to the west."""
-        x, y, z = north * cos(heading), north * sin(heading), up
-        y, z = cos(about_x) * y + sin(about_x) * z, cos(about_x) * z - sin(about_x) * y
-        x, z = cos(about_y) * x - sin(about_y) * z, cos(about_y) * z + sin(about_y) * x
-        return x, y, z
-
-    return Site(in_base(rate * cos(latitude), rate * sin(latitude)), in_base(0.0, section.gravity_m_s2))
+    x, y, z = north * cos(heading) - west * sin(heading), north * sin(heading) + west * cos(heading), up
+    y, z = cos(about_x) * y + sin(about_x) * z, cos(about_x) * z - sin(about_x) * y
+    x, z = cos(about_y) * x - sin(about_y) * z, cos(about_y) * z + sin(about_y) * x
+    return x, y, z

@@ -273,7 +273,7 @@ def test_other_firmware_than_the_shipped_is_refused_with_the_remedy() -> None:
     ],
 )
 def test_what_answers_in_a_sensors_place(part: str, board_part: str, who_am_i: int, name: str, words: str) -> None:
-    identity = replace(IDENTITY, sensors=(SensorInfo(0, board_part, who_am_i, False),))
+    identity = replace(IDENTITY, sensors=(SensorInfo(0, board_part, who_am_i, False, "rate"),))
     section = SensorSection.model_validate({"part": part, "serial_number": "a"})
     with pytest.raises(Refused) as refusal:
         find_sensor(identity, "gyro", section)

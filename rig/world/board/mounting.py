@@ -9,11 +9,13 @@ import numpy as np
 from firmware_host.emulator.adis16465 import Adis16465
 from firmware_host.emulator.flash_memory import FlashMemory
 from firmware_host.emulator.lsm9ds1 import Lsm9ds1
+from firmware_host.emulator.lsm9ds1_magnetometer import Lsm9ds1Magnetometer
 from firmware_host.emulator.machine import EmulatedBoard
 from firmware_host.emulator.mpu9250 import Mpu9250
 from firmware_host.emulator.spi_device import SpiDevice
 from rig.config.models import RigConfig, SensorSection
 from rig.config.world_models import WorldSection
+from rig.world.board.magnetometer_truth import MountedMagnetometer
 from rig.world.board.sensor_truth import SensorTruth
 
 MotionAt = Callable[[float], Sequence[float]]
@@ -41,6 +43,22 @@ def mount_sensors(
             time_s + world.board.boot_time_s,
         )
         for index, (name, simulated) in enumerate(sorted(world.sensors.items()))
+    }
+
+
+def mount_magnetometers(
+    config: RigConfig, world: WorldSection, field_of: Callable[[MountedMagnetometer], MotionAt]
+) -> dict[str, SpiDevice]:
+    """The magnetometers of the `world:` section, by name. `field_of`: what each of them feels at any time, T."""
+    mounted = {
+        name: MountedMagnetometer(config.magnetometers[name], simulated)
+        for name, simulated in sorted(world.magnetometers.items())
+    }
+    return {
+        name: Lsm9ds1Magnetometer(
+            field_of(each), each.truth, seed=np.random.SeedSequence([world.seed, len(world.sensors) + index])
+        )
+        for index, (name, each) in enumerate(mounted.items())
     }
 
 

@@ -10,7 +10,7 @@ import numpy as np
 
 from firmware_host.emulator.accelerometer import STANDARD_GRAVITY_M_S2, AccelerometerTruth
 from firmware_host.emulator.gyroscope import GyroTruth, Temperature, Warming, readings
-from rig.config.models import SensorSection, mounting_matrix
+from rig.config.models import MountingSection, SensorSection, mounting_matrix
 from rig.config.world_models import SimulatedAccelerometerSection, SimulatedSensorSection
 from rig.world.ur10e.flange_motion import Components, Felt, moved
 from rig.world.ur10e.forward_kinematics import rotation_from_vector
@@ -31,7 +31,7 @@ class SensorTruth:
             self.temperature_c = Warming(
                 simulated.start_temperature_c, simulated.temperature_c, simulated.warm_up_s, powered_s
             )
-        self._rows = _rows(sensor, simulated.mounting_error_deg)
+        self._rows = mounted_rows(sensor.mounting, simulated.mounting_error_deg)
         self._offset_m = [1e-3 * offset for offset in simulated.offset_mm]
 
     @property
@@ -59,15 +59,15 @@ class SensorTruth:
         return readings(self.gyro, time_s, np.column_stack(columns), seed, self.temperature_c)
 
 
-def _rows(sensor: SensorSection, mounting_error_deg: Sequence[float]) -> list[list[float]]:
+def mounted_rows(mounting: MountingSection, mounting_error_deg: Sequence[float]) -> list[list[float]]:
     """The rotation from the flange's axes to the sensor's.
 
-    The sensor sits as `sensor.mounting` says, then turned by the rotation vector `mounting_error_deg` (degrees, in its
+    The sensor sits as `mounting` says, then turned by the rotation vector `mounting_error_deg` (degrees, in its
     own nominal axes): a vector's components change by the inverse of that rotation.
     """
     x, y, z = (radians(angle) for angle in mounting_error_deg)
     error = np.array(rotation_from_vector((x, y, z)))
-    rows: list[list[float]] = (error.T @ mounting_matrix(sensor.mounting)).tolist()
+    rows: list[list[float]] = (error.T @ mounting_matrix(mounting)).tolist()
     return rows
 
 

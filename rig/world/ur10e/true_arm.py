@@ -7,10 +7,11 @@ from rig.config.world_models import CalibrationSection, SimulatedArmSection
 from rig.world.clock import TICK_S
 from rig.world.site import Site
 from rig.world.ur10e.flange_motion import Felt, base, carried, turns_of
-from rig.world.ur10e.forward_kinematics import Vector, flange_rate
+from rig.world.ur10e.forward_kinematics import Rotation, Vector, flange_frame, flange_rate
 from rig.world.ur10e.joint_errors import Errors, JointErrors
 from rig.world.ur10e.joint_motion import Motion
 from rig.world.ur10e.links import NOMINAL, ZERO6, Links, links
+from rig.world.ur10e.trajectory import Joints
 
 STILL: Vector = (0.0, 0.0, 0.0)
 WRIST = 3  # the first of the joints that vibrate: those before it mostly stand
@@ -70,9 +71,7 @@ class TrueArm:
         resting = self._motion.still and (self._errors is None or self._errors.quiet(controller_s))
         if resting and self._at_rest is not None:
             return self._at_rest
-        q, qd, qdd = self._motion.with_accelerations(controller_s)
-        if self._errors is not None:
-            q, qd, qdd = self._errors.at(controller_s, q, qd, qdd)
+        q, qd, qdd = self._joints_at(controller_s)
         if self._speed != 1.0:  # the controller's seconds are not the world's
             speed, squared = self._speed, self._speed**2
             qd, qdd = tuple(v * speed for v in qd), tuple(a * squared for a in qdd)
@@ -84,6 +83,16 @@ class TrueArm:
         now = carried(self._forearm[1], turns_of(q[WRIST:], wrist), qd[WRIST:], qdd[WRIST:], wrist)
         self._at_rest = now if resting else None
         return now
+
+    def frame_at(self, time_s: float) -> tuple[Rotation, Vector]:
+        """The flange's rotation (rows) and place (m) in the base frame, at such a time."""
+        q, _, _ = self._joints_at(time_s * self._speed)
+        return flange_frame(q, self._links)
+
+    def _joints_at(self, controller_s: float) -> tuple[Joints, Joints, Joints]:
+        """Angles, speeds and accelerations of the joints by the controller's seconds."""
+        q, qd, qdd = self._motion.with_accelerations(controller_s)
+        return (q, qd, qdd) if self._errors is None else self._errors.at(controller_s, q, qd, qdd)
 
 
 def _errors(section: SimulatedArmSection) -> Errors:

@@ -1,6 +1,7 @@
 """The LSM9DS1's magnetometer: a sensor of its own with its own select and line, whose samples are a field."""
 
 import math
+from typing import Any
 
 import pytest
 
@@ -27,7 +28,7 @@ def board() -> HostBoard:
 
 
 def ask_for(board: HostBoard, rate_hz: float = 80.0, **ranges: float) -> list[Frame]:
-    wanted = {"range_deg_s": 0.0, "range_g": 0.0, "range_gauss": 4.0} | ranges
+    wanted: dict[str, Any] = {"range_deg_s": 0.0, "range_g": 0.0, "range_gauss": 4.0} | ranges
     return board.ask("configure", sensor=SENSOR, rate_hz=rate_hz, **wanted)
 
 

@@ -1,0 +1,52 @@
+"""A magnetometer's entry in `result.json`."""
+
+import numpy as np
+
+from rig.analysis.magnetic_field import ESTIMATOR, MagnetometerResult
+from rig.data.magnetometer_entries import FieldDwellEntry, FieldSolutionEntry, MagnetometerEntry
+from rig.data.result_types import ErrorEntry
+from rig.errors import Fault
+from rig.estimation.arrays import Array
+from rig.estimation.magnetometer import MODEL, MagnetometerSolution
+from rig.observation.field import FieldReading
+from rig.report.entry import entry
+
+PARAMETERS = ("kx", "ky", "kz", "bx", "by", "bz")
+UNITS = ("1", "1", "1", "T", "T", "T")
+
+
+def magnetometer_entry(result: MagnetometerResult | Fault) -> MagnetometerEntry | ErrorEntry:
+    """Scale, bias and covariance, and beside them the other methods; or why there are none."""
+    if isinstance(result, Fault):
+        return ErrorEntry(error=str(result))
+    solution, error = result.solution, result.solution.fit.attitude_error
+    assert error is not None, "the method finds it"
+    return entry(
+        MagnetometerEntry, result, result.sensor, solution, solution.fit,
+        model=MODEL,
+        estimator=ESTIMATOR,
+        covariance_order=PARAMETERS,
+        covariance_units=UNITS,
+        field_base_t=solution.field_table_t,
+        attitude_error_rad=error.std_rad,
+        attitude_error_std_rad=error.uncertainty_rad if np.isfinite(error.uncertainty_rad) else None,
+        dwells=[_dwell(each, left) for each, left in zip(result.dwells, solution.fit.residuals, strict=True)],
+        beside={method: _beside(found) for method, found in result.beside.items()},
+    )  # fmt: skip
+
+
+def _dwell(dwell: FieldReading, residual: Array) -> FieldDwellEntry:
+    return entry(
+        FieldDwellEntry, dwell, dwell.reading,
+        mean_t=dwell.reading.mean,
+        mean_std_t=np.sqrt(dwell.reading.variance),
+        noise_t=dwell.reading.noise,
+        residual_t=residual,
+        duration_s=dwell.window.end_s - dwell.window.start_s,
+    )  # fmt: skip
+
+
+def _beside(found: MagnetometerSolution | Fault) -> FieldSolutionEntry | ErrorEntry:
+    if isinstance(found, Fault):
+        return ErrorEntry(error=str(found))
+    return entry(FieldSolutionEntry, found, found.fit, scale=1 / np.linalg.norm(found.matrix, axis=1))
