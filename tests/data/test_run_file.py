@@ -16,7 +16,7 @@ import numpy as np
 import pytest
 
 from firmware_host.answers import BoardObservation, BoardSolution
-from firmware_host.samples import SAMPLE_DTYPE
+from firmware_host.samples import FIELD_SAMPLE_DTYPE, SAMPLE_DTYPE
 from rig.arm.motion import Sweep
 from rig.arm.state import ARM_STATE_DTYPE, ArmState
 from rig.data.events import (
@@ -30,7 +30,7 @@ from rig.data.events import (
     SweepFinished,
     SweepStarted,
 )
-from rig.data.run_file import RecordedSensor, RunRecorder, make_plain, read_run
+from rig.data.run_file import RecordedMagnetometer, RecordedSensor, RunRecorder, make_plain, read_run
 from rig.data.settings import Limits, ObservationThresholds, PlannedSweep, RunSettings
 from rig.errors import Fault, Refused
 from support.paths import ROOT
@@ -104,6 +104,24 @@ def some_samples(first: int, count: int) -> np.ndarray[Any, Any]:
     samples["counts"] = samples["sequence"][:, None] * [1, -2, 3]
     samples["temperature_counts"] = -48
     return samples
+
+
+def test_a_magnetometer_comes_back_beside_the_gyroscopes(tmp_path: Path) -> None:
+    """Equal in all that is known of it: a run that is gone on with asks whether it is the same."""
+    path = tmp_path / "run.h5"
+    compass = RecordedMagnetometer("lsm9ds1_magnetometer", "M1", 80.0, 4e-4, 1.4e-8, 32767, SENSOR.mounting)
+    samples = np.zeros(300, FIELD_SAMPLE_DTYPE)
+    samples["sequence"] = np.arange(300)
+    samples["host_time_s"] = time.monotonic()
+    samples["field_counts"] = samples["sequence"][:, None] * [1, -2, 3]
+    with RunRecorder(
+        path, config=CONFIG, settings=SETTINGS, provenance=PROVENANCE, sensors={"gyro": SENSOR, "compass": compass}
+    ) as recording:
+        recording.add_samples("compass", samples)
+        recording.add_samples("gyro", some_samples(0, 10))
+    run = read_run(path)
+    assert run.sensors == {"gyro": SENSOR} and run.magnetometers == {"compass": compass}
+    np.testing.assert_array_equal(run.samples["compass"], samples)
 
 
 def some_state(number: int) -> ArmState:

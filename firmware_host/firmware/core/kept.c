@@ -30,7 +30,7 @@ bool kept_begin(const float rates_hz[SENSOR_COUNT], float duration_s)
     float readings = 0.0f;
     for (unsigned i = 0; i < SENSOR_COUNT; i++)
         readings += rates_hz[i] * RATE_TOLERANCE * duration_s;
-    per_block = 1u + (uint32_t)(readings / (BLOCKS - SENSOR_COUNT * (BLOCKS_TO_SPARE + 1u)));
+    per_block = 1u + (uint32_t)(readings / (BLOCKS - GYROSCOPE_COUNT * (BLOCKS_TO_SPARE + 1u)));
     struct block *next = blocks;
     for (unsigned i = 0; i < SENSOR_COUNT; i++) {
         if (!(rates_hz[i] > 0.0f))
