@@ -51,7 +51,8 @@ def main(duration_s: float) -> None:
         board.advance(0.1)
         for sensor, rate_hz in enumerate(rates_hz):
             settings = {"sensor": sensor, "rate_hz": rate_hz, "range_deg_s": RANGES_DEG_S[sensor]}
-            board.receive(encode("configure", 1, settings | {"range_g": RANGES_G[sensor] if accelerating else 0}))
+            settings |= {"range_g": RANGES_G[sensor] if accelerating else 0, "range_gauss": 0}
+            board.receive(encode("configure", 1, settings))
         board.receive(encode("start", 2, {"sensors": 0}))
         board.advance(0.2)
         reader, samples = FrameReader(), 0

@@ -60,7 +60,8 @@ def host(loaded: Loaded) -> Host:
     new = booted(loaded)
     for sensor in loaded.config.sensors.values():
         index = SENSORS.index(sensor.part)
-        settings = {"sensor": index, "rate_hz": sensor.rate_hz, "range_deg_s": sensor.range_deg_s, "range_g": 0}
+        settings = {"sensor": index, "rate_hz": sensor.rate_hz, "range_deg_s": sensor.range_deg_s}
+        settings |= {"range_g": 0, "range_gauss": 0}
         new.ask("configure", 1, settings)
         new.ticks(20)
     new.ask("start", 2, {"sensors": 0})

@@ -207,6 +207,7 @@ class Driver(ctypes.Structure):
     _fields_ = (
         ("part", ctypes.c_char * 12),
         ("identity", ctypes.c_uint16),
+        ("quantity", ctypes.c_uint8),
         ("settling_us", ctypes.c_uint32),
         ("settling", ctypes.c_uint8),
         ("holds_line", ctypes.c_bool),
