@@ -5,13 +5,10 @@ import time
 from collections.abc import Callable
 from typing import Any
 
-import serial
-
 from firmware_host.errors import BoardError
 from firmware_host.frames import Frame, FrameReader, encode
+from firmware_host.serial_port import READ_TIMEOUT_S, SerialPort
 
-_READ_TIMEOUT_S = 0.005  # pyserial waits for all bytes asked for or this long, so it is the delay of every read
-_READ_SIZE = 65536
 _ATTEMPTS = 4  # times a request is sent before the board counts as gone; each waits twice as long as the one before
 
 
@@ -45,8 +42,8 @@ class BoardLink:
         self._sending = threading.Lock()
         self._closing = threading.Event()
         try:
-            self._serial = serial.serial_for_url(port, baudrate=baud, timeout=_READ_TIMEOUT_S, exclusive=True)
-        except (serial.SerialException, OSError, ValueError) as error:
+            self._serial = SerialPort(port, baud)
+        except OSError as error:
             raise BoardError(
                 "no_port",
                 f"the port {port} does not open: {error}",
@@ -63,7 +60,7 @@ class BoardLink:
     @property
     def silent_s(self) -> float:
         """How long no frame has come, in time spent reading: when the reader was held up, nobody was silent."""
-        return self._reads_without_frame * _READ_TIMEOUT_S
+        return self._reads_without_frame * READ_TIMEOUT_S
 
     @property
     def frames_lost(self) -> int:
@@ -121,11 +118,6 @@ class BoardLink:
         """Ends the reader thread and closes the port."""
         self._closing.set()
         self._reader.join()
-        sock = getattr(self._serial, "_socket", None)
-        if sock is not None:
-            # pyserial would leave it open when the far end closed it first, and else wait 0.3 s after closing it.
-            sock.close()
-            self._serial.is_open = False
         self._serial.close()
 
     def _send(self, name: str, sequence: int, values: dict[str, Any]) -> None:
@@ -133,7 +125,7 @@ class BoardLink:
         try:
             with self._sending:
                 self._serial.write(b"\0" + encode(name, sequence, values))
-        except (serial.SerialException, OSError) as error:
+        except OSError as error:
             raise self._port_closed(error) from error
 
     def _port_closed(self, error: Exception) -> BoardError:
@@ -145,8 +137,8 @@ class BoardLink:
 
     def _receive(self) -> bytes:
         try:
-            return bytes(self._serial.read(_READ_SIZE))
-        except (serial.SerialException, OSError) as error:
+            return self._serial.read()
+        except OSError as error:
             raise self._port_closed(error) from error
 
     def _read(self) -> None:

@@ -24,6 +24,7 @@ if "numpy" not in sys.modules:
     for _library in ("OPENBLAS", "OMP", "MKL"):
         os.environ.setdefault(f"{_library}_NUM_THREADS", "1")
 
+_KVH = "look at a KVH 1775"
 _BOARD = "look at the board, read and change its stored calibrations, flash its firmware"
 FAULT, INTERRUPTED = Fault.exit_status, 130
 # Every way to end a command from outside. Left alone, a closed terminal, Ctrl-\ and Ctrl-Z would end or suspend this
@@ -129,6 +130,7 @@ def _parser() -> argparse.ArgumentParser:
     study.add_argument("--dask", metavar="ADDRESS", help="compute on the cluster of this Dask scheduler")
     study.add_argument("--format", choices=("csv", "parquet"), default="csv", help="of the table (default: csv)")
     _add_board(commands.add_parser("board", help=_BOARD, description=_BOARD))
+    _add_kvh(commands.add_parser("kvh", help=_KVH, description=_KVH))
     world = add("world", _world, "only the simulated laboratory, in the foreground, for any client")
     _add_config(world)
     return parser
@@ -166,6 +168,17 @@ def _add_board(board: argparse.ArgumentParser) -> None:
     )
     for command in (write, erase, flash):
         command.add_argument("--yes", action="store_true", help="do not ask before the board is changed")
+
+
+def _add_kvh(kvh: argparse.ArgumentParser) -> None:
+    commands = kvh.add_subparsers(title="commands", required=True, metavar="COMMAND")
+    text = "its number, the settings in its memory, its built-in test, what it sends; changes nothing"
+    info = commands.add_parser("info", help=text, description=text)
+    info.set_defaults(command=_kvh_info)
+    info.add_argument("target", metavar="PORT_OR_CONFIG", help="its serial port, or a YAML configuration file")
+    _add_set(info, "change one value of the file")
+    info.add_argument("--baud", type=int, metavar="BD", help="speed of its line (default: the file's, or 921600)")
+    info.add_argument("--json", action="store_true", help="for machines")
 
 
 def _add_config(parser: argparse.ArgumentParser) -> None:
@@ -295,6 +308,12 @@ def _board_flash(options: argparse.Namespace) -> int:
 
     drive = Path(options.drive) if options.drive else None
     return flash(options.probe, drive, by_drive=options.drive is not None, assume_yes=options.yes)
+
+
+def _kvh_info(options: argparse.Namespace) -> int:
+    from rig.commands.kvh import info
+
+    return info(options.target, options.overrides, options.baud, as_json=options.json)
 
 
 def _world(options: argparse.Namespace) -> int:

@@ -86,8 +86,10 @@ def _by_computer(recording: ObservedRun, known: Uncertainty) -> ClockComparison 
 
 
 def _by_crystal(recording: ObservedRun, known: Uncertainty) -> ClockComparison | None:
-    """By the board's counter; None where no crystal holds it."""
-    bases = [each.time_base for each in recording.sensors.values()]
+    """By the board's counter; None where no crystal holds it, or no board was there."""
+    bases = [each.time_base for name, each in recording.sensors.items() if recording.run.sensors[name].on_board]
+    if not bases:
+        return None
     best = min(bases, key=lambda base: base.drift_std)
     error = (1 + best.drift) / (1 + NOMINAL_DRIFT) - 1
     if not abs(error) < LOCKED:

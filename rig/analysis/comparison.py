@@ -1,4 +1,4 @@
-"""A gyroscope's readings beside those of a reference on the same board: sample by sample, and turn by turn.
+"""A gyroscope's readings beside those of a reference: sample by sample, and turn by turn.
 
 The reference's readings, corrected with its own calibration, are turned into the frame of the sensor under test and
 interpolated at that sensor's times. Each sensor stands on the arm's clock by its own time base, so the delays of their
@@ -81,7 +81,8 @@ class Comparison:
     `time_s` (n,) is controller time; `reading_rad_s` and `reference_rad_s` (n, 3) are in the sensor's frame. `movement`
     counts all n samples, `sweeps` those of the sweeps with their ramps. `noise_rad_s` (3,) is the standard deviation of
     the difference while the arm rests: both parts' noise, the RMS of a perfect calibration; None without rests.
-    `delay_s` is by how much the sensor's filter lags the reference's, one for each recording, with `delay_std_s`.
+    `delay_s` is by how much the sensor's filter lags the reference's, one for each recording, with `delay_std_s`; there
+    are none where no one clock stamps the samples of both.
     """
 
     time_s: Array
@@ -116,8 +117,8 @@ def compare(
         sweeps=_deviation([part.error[part.sweeping] for part in parts]),
         noise_rad_s=_noise([part.error[rest] for part in parts for rest in part.still]),
         revolutions=_revolution_errors(recordings, sensor, reference, rotation, gravity_rad_s),
-        delay_s=tuple(part.delay.delay_s for part in parts),
-        delay_std_s=tuple(part.delay.std_s for part in parts),
+        delay_s=tuple(part.delay.delay_s for part in parts if part.delay),
+        delay_std_s=tuple(part.delay.std_s for part in parts if part.delay),
     )
 
 
@@ -131,7 +132,7 @@ class _Part:
     sweeping: NDArray[np.bool_]
     resting: NDArray[np.bool_]
     still: tuple[NDArray[np.bool_], ...]
-    delay: Delay
+    delay: Delay | None
 
     @property
     def error(self) -> Array:
@@ -165,9 +166,9 @@ def _part(recording: ObservedRun, sensor: str, reference: Reference, rotation: A
     )
 
 
-def _delay(recording: ObservedRun, sensor: str, reference: str) -> Delay:
+def _delay(recording: ObservedRun, sensor: str, reference: str) -> Delay | None:
     found = recording.delay(sensor, behind=reference)
-    if abs(found.delay_s) > MAX_DELAY_S:
+    if found is not None and abs(found.delay_s) > MAX_DELAY_S:
         raise Fault(
             "different_clocks",
             f"the time stamps of sensor and reference are {abs(found.delay_s):.2f} s apart for one movement",

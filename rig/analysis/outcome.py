@@ -49,7 +49,7 @@ class Outcome:
     """What a run's recordings amount to, by sensor name.
 
     `recordings` are those of the calibration with a finished sweep. `results` hold every recorded sensor's calibration
-    and `onboard` the board's own of the sensors to calibrate; all three are empty where stored calibrations were
+    and `onboard` the board's own of the sensors on it to calibrate; all three are empty where stored calibrations were
     verified. `verifications` hold those that could be made. `clock` is the controller's, None where recordings of
     before say nothing of its uncertainty. Where no sweep was planned there are `accelerometers` alone, and beside them
     the `magnetometers`, of which no check judges any.
@@ -96,9 +96,9 @@ def calibrated(runs: Sequence[RunData], estimator: str = DEFAULT_ESTIMATOR) -> O
     surroundings = surroundings_of(recordings)
     results = solve_observed(runs[0].sensors, recordings, chosen, surroundings, settings.matrix_corrected)
     accelerometers = calibrate_accelerometers(recordings, settings, results)
-    onboard = {name: agreement(runs, name) for name in settings.to_calibrate}
+    onboard = {name: agreement(runs, name) for name in settings.to_calibrate if runs[0].sensors[name].on_board}
     checks = judge(
-        {name: results[name].solution for name in onboard},
+        {name: results[name].solution for name in settings.to_calibrate},
         settings.limits,
         {name: result.uncertainty for name, result in results.items() if result.uncertainty is not None},
         "simple" if settings.uncertainty is None else settings.uncertainty.decision_rule,

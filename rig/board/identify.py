@@ -5,7 +5,7 @@ from math import isclose
 
 from firmware_host.client import Board, BoardIdentity, SensorInfo, StoredCalibration
 from firmware_host.protocol import FIRMWARE_VERSION
-from rig.config.models import MagnetometerSection, SensorSection
+from rig.config.models import BoardSection, MagnetometerSection, RigConfig, SensorSection
 from rig.errors import Fault, Refused, raised_as
 
 Configured = SensorSection | MagnetometerSection
@@ -37,6 +37,17 @@ DIES = {"lsm9ds1m": "lsm9ds1_magnetometer"}
 
 refusing = partial(raised_as, Refused)  # before anything has moved
 changing = partial(raised_as, Fault)  # while the board is being changed: no refusal any more
+
+
+def configured_board(config: RigConfig) -> BoardSection:
+    """Raises Refused `no_board_section` where every sensor has a port of its own."""
+    if config.board is None:
+        raise Refused(
+            "no_board_section",
+            "the configuration has no section board: its sensors have ports of their own",
+            "Name a configuration with a board; a KVH 1775 is looked at with `rig kvh info`",
+        )
+    return config.board
 
 
 def refuse_other_firmware(identity: BoardIdentity) -> None:

@@ -8,7 +8,7 @@ import numpy as np
 
 from firmware_host.client import Board, Calibration, StoredCalibration
 from firmware_host.errors import BoardError
-from rig.board.identify import find_sensor
+from rig.board.identify import configured_board, find_sensor
 from rig.config.models import RigConfig
 from rig.estimation.arrays import Array
 
@@ -31,15 +31,19 @@ class Solved(Protocol):
 
 
 def store_calibrations(config: RigConfig, results: Mapping[str, Solved]) -> Iterator[tuple[str, StoredCalibration]]:
-    """Store the solution of every sensor to calibrate, by sensor name; yields each with its record.
+    """Store the solution of every sensor to calibrate that is on the board; yields its name with its record.
 
     Raises BoardError as the board refuses, `not_stored` when it reads back otherwise; Refused as `find_sensor`.
     """
-    with Board(config.board.port, config.board.baud, lambda batch: None) as board:
-        for name in config.to_calibrate:
-            section = config.sensors[name]
-            index = find_sensor(board.identity, name, section).index
-            board.configure(index, section.rate_hz, section.range_deg_s)  # the record says for which range it holds
+    if not config.on_board:
+        return
+    section = configured_board(config)
+    with Board(section.port, section.baud, lambda batch: None) as board:
+        for name, sensor in config.on_board.items():
+            if name not in config.to_calibrate:
+                continue
+            index = find_sensor(board.identity, name, sensor).index
+            board.configure(index, sensor.rate_hz, sensor.range_deg_s)  # the record says for which range it holds
             yield name, store(board, index, calibration_of(results[name]))
 
 

@@ -10,6 +10,7 @@ from pathlib import Path
 from firmware_host.client import Board, Calibration, StoredCalibration
 from rig.board.identify import (
     changing,
+    configured_board,
     configured_part,
     find_sensor,
     refuse_other_firmware,
@@ -45,13 +46,13 @@ def info(config_path: Path, overrides: Sequence[str], *, as_json: bool) -> int:
             board.read_calibration(sensor.index) if sensor.quantity == "rate" else None
             for sensor in board.identity.sensors
         ]
-        names: dict[str, str] = {section.part: name for name, section in config.on_the_board.items()}
+        names: dict[str, str] = {section.part: name for name, section in config.parts_on_board.items()}
         status = board.status()
         sensors = tuple(
             BoardSensor(sensor, names.get(configured_part(sensor.part)), counts, stored)
             for sensor, counts, stored in zip(board.identity.sensors, status.sensors, calibrations, strict=True)
         )
-        found = BoardInfo(config.board.port, board.identity, status, sensors)
+        found = BoardInfo(configured_board(config).port, board.identity, status, sensors)
     print_info(found, as_json=as_json)
     return 0
 
@@ -114,6 +115,7 @@ def erase(config_path: Path, overrides: Sequence[str], sensor: str | None, *, as
 def _connected(config_path: Path, overrides: Sequence[str]) -> Iterator[tuple[RigConfig, Board]]:
     """The board of a configuration, in its simulated laboratory if it has one."""
     loaded = load(config_path, overrides, sections=None)
+    section = configured_board(loaded.config)
     with ExitStack() as stack:
         if loaded.simulated:
             stack.enter_context(simulated_laboratory(stack.enter_context(written(loaded.text))))
@@ -121,7 +123,7 @@ def _connected(config_path: Path, overrides: Sequence[str]) -> Iterator[tuple[Ri
             memory = f"is kept in {kept}" if kept else "too, unless world.board.flash_file names a file that keeps it"
             say(f"simulated laboratory: it lasts as long as this command, its board's memory {memory}", file=sys.stderr)
         with refusing():
-            board = stack.enter_context(Board(loaded.config.board.port, loaded.config.board.baud, lambda batch: None))
+            board = stack.enter_context(Board(section.port, section.baud, lambda batch: None))
         yield loaded.config, board
 
 
@@ -130,6 +132,7 @@ def _places(board: Board, config: RigConfig, sensor: str | None, among: Mapping[
 
     Raises Refused `no_such_sensor`, `sensor_missing`.
     """
+    among = {name: section for name, section in among.items() if section.on_board}
     if sensor is not None and sensor not in among:
         raise Refused(
             "no_such_sensor",

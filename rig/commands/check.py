@@ -9,10 +9,13 @@ from pathlib import Path
 from firmware_host.client import Board
 from rig.arm.driver import look
 from rig.arm.preflight import arm_problems, kinematics_problems, plan_problems
-from rig.board.identify import find_sensor, refuse_other_firmware, refusing, stored_calibration
+from rig.board.identify import configured_board, find_sensor, refuse_other_firmware, refusing, stored_calibration
 from rig.commands.configured import Configured, configured
 from rig.commands.laboratory import simulated_laboratory, written
+from rig.config.models import RigConfig
 from rig.errors import RigError
+from rig.sensors.errors import SensorError
+from rig.sensors.registry import OWN_PORT
 from rig.station.plain_text import say
 
 
@@ -20,7 +23,8 @@ def check(config_path: Path, overrides: Sequence[str], script: Path | None = Non
     """Look at the board and the arm; print what is there and what is missing. 0 when a run could start, else 2."""
     found = configured(config_path, overrides, script)
     with written(found.loaded.text) as used, simulated_laboratory(used) if found.loaded.simulated else nullcontext():
-        missing = [*_named(_look_at_board, found), *_named(_look_at_arm, found)]
+        looks = [_look_at_board, _look_at_instruments, _look_at_arm]
+        missing = [problem for look_at in looks for problem in _named(look_at, found)]
     for problem in missing:
         say(f"missing: {problem}", file=sys.stderr)
     say(f"not ready: {len(missing)} to mend" if missing else "ready")
@@ -36,15 +40,19 @@ def _named(look_at: Callable[[Configured], list[str]], found: Configured) -> lis
 
 
 def _look_at_board(found: Configured) -> list[str]:
-    config, missing = found.loaded.config, []
-    with refusing(), Board(config.board.port, config.board.baud, lambda batch: None) as board:
+    config: RigConfig = found.loaded.config
+    missing: list[str] = []
+    if not config.parts_on_board:
+        return missing
+    configured = configured_board(config)
+    with refusing(), Board(configured.port, configured.baud, lambda batch: None) as board:
         identity = board.identity
-        say(f"board at {config.board.port}: {identity.unique_id}, firmware {identity.firmware}")
+        say(f"board at {configured.port}: {identity.unique_id}, firmware {identity.firmware}")
         try:
             refuse_other_firmware(identity)
         except RigError as error:
             missing.append(str(error))
-        for name, section in config.on_the_board.items():
+        for name, section in config.parts_on_board.items():
             try:
                 info = find_sensor(identity, name, section)
                 say(f"sensor {name}: {info.part}, identity register 0x{info.who_am_i:02x}")
@@ -52,6 +60,22 @@ def _look_at_board(found: Configured) -> list[str]:
                     stored = stored_calibration(board, name, config.to_calibrate[name])
                     say(f"sensor {name}: calibrated on {stored.calibration.written_utc:%Y-%m-%d}")
             except RigError as error:
+                missing.append(str(error))
+    return missing
+
+
+def _look_at_instruments(found: Configured) -> list[str]:
+    """The sensors with a port of their own; nothing in their memories is changed."""
+    missing = []
+    for name, section in found.loaded.config.sensors.items():
+        if section.serial is not None:
+            try:
+                for seen in OWN_PORT[section.part].look(name, section):
+                    if isinstance(seen, str):
+                        say(f"sensor {name}: {seen}")
+                    else:
+                        missing.append(str(seen))
+            except SensorError as error:
                 missing.append(str(error))
     return missing
 

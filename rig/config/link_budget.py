@@ -6,6 +6,7 @@ from dataclasses import dataclass
 from firmware_host.protocol import BATCH_AGE_US, COBS_BYTES, MESSAGE_BY_NAME, OVERHEAD, PAYLOAD_MAX
 
 BITS_PER_BYTE = 10  # start bit, eight data bits, stop bit
+KVH1775_MESSAGE_BYTES = {"A": 36, "B": 40, "C": 38}  # ICD 56-0298 Rev. B, tables 5-1, 5-3, 5-5
 MARGIN = 0.1  # of the link stays free: answers, and a clock that is a little off
 
 
@@ -59,4 +60,15 @@ def over_budget(streams: Mapping[str, Stream], baud: int) -> str | None:
         f"the serial link cannot carry these rates: {terms} = {needed:.0f} bytes/s, but board.baud {baud} / "
         f"{BITS_PER_BYTE} bits a byte less {MARGIN:.0%} kept free = {capacity_bytes_per_s(baud):.0f} bytes/s; "
         "lower rate_hz or raise board.baud"
+    )
+
+
+def own_line_over_budget(rate_hz: float, message_bytes: int, baud: int) -> str | None:
+    """The arithmetic, when a sensor's own line cannot carry its messages; None when it can."""
+    if rate_hz * message_bytes <= capacity_bytes_per_s(baud):
+        return None
+    return (
+        f"its line cannot carry this rate: {rate_hz:g} Hz × {message_bytes} bytes = {rate_hz * message_bytes:g} "
+        f"bytes/s, but serial.baud {baud} / {BITS_PER_BYTE} bits a byte less {MARGIN:.0%} kept free = "
+        f"{capacity_bytes_per_s(baud):.0f} bytes/s; lower rate_hz, or set the sensor to a higher baud rate"
     )

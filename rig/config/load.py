@@ -195,11 +195,14 @@ def _nearest(word: str, allowed: Sequence[str]) -> str:
 
 def _world_fits(config: RigConfig, world: WorldSection) -> Iterator[str]:
     """The world stands in for hardware only on this machine, and only for the sensors the rig names."""
-    host, port = config.arm.host, config.board.port
+    host = config.arm.host
+    ports = {} if config.board is None else {"board.port": config.board.port}
+    ports |= {f"sensors.{name}.serial.port": s.serial.port for name, s in config.sensors.items() if s.serial}
     if not _is_loopback(host):
         yield f"arm.host: {quote(host)} must be a loopback address (127.x.y.z) when the file has a world: section"
-    if not port.startswith("socket://"):
-        yield f"board.port: {quote(port)} must be socket://host:port when the file has a world: section"
+    for place, port in ports.items():
+        if not port.startswith("socket://"):
+            yield f"{place}: {quote(port)} must be socket://host:port when the file has a world: section"
     for kind, named, simulated in (
         ("sensors", config.sensors, world.sensors),
         ("magnetometers", config.magnetometers, world.magnetometers),
@@ -207,6 +210,9 @@ def _world_fits(config: RigConfig, world: WorldSection) -> Iterator[str]:
         for name in sorted(set(named) ^ set(simulated)):
             where = f"world.{kind}" if name in named else kind
             yield f"{where}.{name}: missing; every sensor stands both in {kind} and in world.{kind}"
+    for name in sorted(config.on_board.keys() & world.sensors.keys()):
+        if world.sensors[name].kvh1775 is not None:
+            yield f"world.sensors.{name}.kvh1775: no such instrument; the sensor is on the board"
 
 
 def _is_loopback(host: str) -> bool:

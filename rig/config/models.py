@@ -12,7 +12,7 @@ from urllib.parse import urlsplit
 import numpy as np
 from pydantic import BaseModel, ConfigDict, Field, StringConstraints, ValidationInfo, field_validator, model_validator
 
-from rig.config.link_budget import Stream, over_budget
+from rig.config.link_budget import KVH1775_MESSAGE_BYTES, Stream, over_budget, own_line_over_budget
 from rig.config.sensor_catalogue import MAGNETOMETERS, PARTS, in_words, nearest_rate, one_of
 from rig.config.ur10e_limits import (
     JOINT_LIMIT_DEG,
@@ -84,8 +84,21 @@ def checked_host(name: str) -> str:
     return name
 
 
+def checked_port(value: str) -> str:
+    """A serial port's name, or `socket://host:port`. Raises ValueError when it cannot be one."""
+    if value.startswith("socket://"):
+        try:
+            parts = urlsplit(value)
+            complete = bool(checked_host(parts.hostname or "") and parts.port)
+        except ValueError:
+            complete = False
+        if not complete:
+            raise ValueError("must be socket://host:port with a port from 1 to 65535")
+    return value
+
+
 class BoardSection(Section):
-    """The microcontroller board."""
+    """The microcontroller board; left out where every sensor has a port of its own."""
 
     port: str = Field(
         min_length=1,
@@ -100,15 +113,7 @@ class BoardSection(Section):
     @classmethod
     def an_address_has_host_and_port(cls, value: str) -> str:
         """Of `socket://host:port`; the name of a serial port is the system's affair."""
-        if value.startswith("socket://"):
-            try:
-                parts = urlsplit(value)
-                complete = bool(checked_host(parts.hostname or "") and parts.port)
-            except ValueError:
-                complete = False
-            if not complete:
-                raise ValueError("must be socket://host:port with a port from 1 to 65535")
-        return value
+        return checked_port(value)
 
 
 def mounting_matrix(mounting: "MountingSection") -> np.ndarray:
@@ -118,6 +123,37 @@ def mounting_matrix(mounting: "MountingSection") -> np.ndarray:
     for row, name in enumerate((mounting.x, mounting.y, mounting.z)):
         rows[row, axes[name[1]]] = 1.0 if name[0] == "+" else -1.0
     return rows
+
+
+class OwnPortSection(Section):
+    """The serial port of a sensor that is not on the board, and what it sends there."""
+
+    port: str = Field(
+        min_length=1,
+        max_length=255,
+        description="serial port, such as `/dev/ttyUSB0` or `COM4`, or `socket://host:port`",
+    )
+    baud: Literal[9600, 19200, 38400, 57600, 115200, 460800, 576000, 921600, 4147200] = Field(
+        default=921600,
+        description="speed the sensor's line is set to; the rig changes it on neither side",
+        json_schema_extra={"unit": "Bd"},
+    )
+    message: Literal["A", "B", "C"] = Field(
+        default="B",
+        description="format of its messages: `B` has the sensor's own microseconds, by which lost messages are counted "
+        "beyond doubt; `A` and `C` have none, and `C` has its magnetic field",
+    )
+    rotation: Literal["delta", "rate"] = Field(
+        default="delta",
+        description="`delta`: the angle turned through since the message before, in which nothing is aliased; `rate`: "
+        "the rate as the sensor's own filter leaves it",
+    )
+
+    @field_validator("port")
+    @classmethod
+    def an_address_has_host_and_port(cls, value: str) -> str:
+        """As of the board."""
+        return checked_port(value)
 
 
 class MountingSection(Section):
@@ -155,11 +191,11 @@ class AccelerationSection(Section):
 
 
 class SensorSection(Section):
-    """One gyroscope on the board, under a name of your choice: at most 40 letters, digits, `_`, `-` and spaces."""
+    """One gyroscope, under a name of your choice: at most 40 letters, digits, `_`, `-` and spaces."""
 
-    part: Literal["lsm9ds1", "mpu9250", "adis16465"] = Field(description="which gyroscope it is")
+    part: Literal["lsm9ds1", "mpu9250", "adis16465", "kvh1775"] = Field(description="which gyroscope it is")
     serial_number: str = Field(
-        description="which specimen it is; kept on the board and in every result",
+        description="which specimen it is; kept on the board and in every result; a `kvh1775` is asked for its own",
         json_schema_extra={"allowed": f"1 to {SERIAL_NUMBER_MAX} plain ASCII characters"},
     )
     role: Literal["calibrate", "reference"] = Field(
@@ -185,6 +221,14 @@ class SensorSection(Section):
     acceleration: AccelerationSection | None = Field(
         default=None, description="its accelerometer; left out, only the gyroscope is read"
     )
+    serial: OwnPortSection | None = Field(
+        default=None, description="its own serial port, of a `kvh1775`; the other parts are on the board"
+    )
+
+    @property
+    def on_board(self) -> bool:
+        """Whether the board reads it."""
+        return self.serial is None
 
     @model_validator(mode="before")
     @classmethod
@@ -227,6 +271,22 @@ class SensorSection(Section):
         if value.range_g not in part.ranges_g:
             raise ValueError(f"the part has no range_g {value.range_g:g}; it has {', '.join(map(str, part.ranges_g))}")
         return value
+
+    @model_validator(mode="after")
+    def its_own_port_carries_it(self) -> Self:
+        """A part has a port of its own or it is on the board."""
+        own_port = PARTS[self.part].own_port
+        if own_port != (self.serial is not None):
+            raise ValueError(
+                f"{self.part} is {'not on the board: give its section serial' if own_port else 'on the board: leave'}"
+                f"{'' if own_port else ' serial out'}"
+            )
+        if self.serial is not None:
+            size = KVH1775_MESSAGE_BYTES[self.serial.message]
+            problem = own_line_over_budget(self.rate_hz, size, self.serial.baud)
+            if problem is not None:
+                raise ValueError(problem)
+        return self
 
     @field_validator("turntable")
     @classmethod
@@ -515,7 +575,7 @@ class RigConfig(Section):
     """Everything the rig reads. It has no knowledge of whether the far end is simulated."""
 
     arm: ArmSection
-    board: BoardSection
+    board: BoardSection | None = None
     sensors: dict[SensorName, SensorSection] = Field(min_length=1)
     magnetometers: dict[SensorName, MagnetometerSection] = Field(default={}, max_length=len(MAGNETOMETERS))
     procedure: ProcedureSection
@@ -532,11 +592,13 @@ class RigConfig(Section):
         """The board has one place for each part, and a calibration one reference at most."""
         places: dict[str, str] = {}
         for name, sensor in sensors.items():
-            if sensor.part in places:
-                raise ValueError(
-                    f"{places[sensor.part]} and {name} are both {sensor.part}; the board has one place for each part"
-                )
-            places[sensor.part] = name
+            if sensor.serial is not None:
+                place, what = sensor.serial.port, f"at {sensor.serial.port}; a port is one sensor's"
+            else:
+                place, what = sensor.part, f"{sensor.part}; the board has one place for each part"
+            if place in places:
+                raise ValueError(f"{places[place]} and {name} are both {what}")
+            places[place] = name
         references = [name for name, sensor in sensors.items() if sensor.role == "reference"]
         if len(references) > 1:
             raise ValueError(f"{' and '.join(references)} have role: reference; at most one sensor can")
@@ -548,8 +610,12 @@ class RigConfig(Section):
     @classmethod
     def the_link_carries_them(cls, sensors: dict[str, SensorSection], info: ValidationInfo) -> dict[str, SensorSection]:
         """Rates for which the link is too slow would lose samples. Of what a sensor sends, the larger must fit."""
-        if "board" in info.data:
-            _refuse_more_than_the_link_carries(info.data["board"], _streams(sensors))
+        streams = _streams(sensors)
+        if "board" not in info.data or not streams:
+            return sensors
+        if info.data["board"] is None:
+            raise ValueError(f"the board reads {' and '.join(streams)}, but there is no section board")
+        _refuse_more_than_the_link_carries(info.data["board"], streams)
         return sensors
 
     @field_validator("magnetometers")
@@ -561,15 +627,28 @@ class RigConfig(Section):
         sensors = info.data.get("sensors", {})
         if both := sorted(sensors.keys() & magnetometers.keys()):
             raise ValueError(f"{', '.join(both)} is the name of one of the sensors already")
-        if sensors and "board" in info.data:
-            fields = {name: Stream(m.rate_hz, calibrated=False, field=True) for name, m in magnetometers.items()}
-            _refuse_more_than_the_link_carries(info.data["board"], _streams(sensors) | fields)
+        if not magnetometers or not sensors or "board" not in info.data:
+            return magnetometers
+        if info.data["board"] is None:
+            raise ValueError(f"the board reads {' and '.join(magnetometers)}, but there is no section board")
+        fields = {name: Stream(m.rate_hz, calibrated=False, field=True) for name, m in magnetometers.items()}
+        _refuse_more_than_the_link_carries(info.data["board"], _streams(sensors) | fields)
         return magnetometers
 
     @property
-    def on_the_board(self) -> Mapping[str, SensorSection | MagnetometerSection]:
+    def all_sensors(self) -> Mapping[str, SensorSection | MagnetometerSection]:
         """Every sensor by name, gyroscopes first."""
         return {**self.sensors, **self.magnetometers}
+
+    @property
+    def on_board(self) -> Mapping[str, SensorSection]:
+        """The gyroscopes the board reads, by name; the others have a port of their own."""
+        return {name: sensor for name, sensor in self.sensors.items() if sensor.on_board}
+
+    @property
+    def parts_on_board(self) -> Mapping[str, SensorSection | MagnetometerSection]:
+        """All that the board reads, by name, gyroscopes first."""
+        return {**self.on_board, **self.magnetometers}
 
     @property
     def to_calibrate(self) -> Mapping[str, SensorSection]:
@@ -586,6 +665,7 @@ def _streams(sensors: Mapping[str, SensorSection]) -> dict[str, Stream]:
     return {
         name: Stream(s.rate_hz, calibrated=s.role == "calibrate", acceleration=s.acceleration is not None)
         for name, s in sensors.items()
+        if s.on_board
     }
 
 

@@ -88,7 +88,8 @@ def _keys() -> Iterator[str]:
     yield from (
         "## Keys",
         "",
-        "`arm`, `board`, `sensors` and `limits` must be there; the other sections may be left out.",
+        "`arm`, `sensors` and `limits` must be there, and `board` where a sensor is on it; the other sections may be "
+        "left out.",
         "",
     )
     schema = RigConfig.model_json_schema()
@@ -96,7 +97,8 @@ def _keys() -> Iterator[str]:
         if name == "procedure":
             yield from _procedures()
         else:
-            yield from _section(name, schema["properties"][name], schema["$defs"])
+            section = schema["properties"][name]
+            yield from _section(name, _section_of(section) or section, schema["$defs"])
 
 
 def _procedures() -> Iterator[str]:
@@ -135,8 +137,9 @@ def _world() -> Iterator[str]:
     yield from (
         "## The simulated laboratory",
         "",
-        "With a `world:` section a simulated UR10e and an emulated board answer at `arm.host` and `board.port`, on",
-        "this machine only: the host must be a loopback address (127.x.y.z), the port `socket://host:port`.",
+        "With a `world:` section a simulated UR10e, an emulated board and simulated KVH 1775s answer at `arm.host`,",
+        "`board.port` and `sensors.<name>.serial.port`, on this machine only: the host must be a loopback address",
+        "(127.x.y.z), a port `socket://host:port`.",
         "Without one the rig connects to what is there. Only the laboratory uses what stands here: neither a recording",
         "nor a result holds it.",
         "",

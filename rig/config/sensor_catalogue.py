@@ -1,4 +1,4 @@
-"""The sensors the board has drivers for: which data rates and ranges each can be set to."""
+"""The sensors the rig has drivers for: which data rates and ranges each can be set to."""
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
@@ -13,7 +13,7 @@ class Part:
 
     `g_sensitivity_deg_s_g` is how much a reading may change for 1 g, at most. `ranges_g` are those of its
     accelerometer, which shares its data rate, the usual one first; `acceleration_noise_ug_sqrt_hz` is the noise density
-    of that, in µg/√Hz.
+    of that, in µg/√Hz. A part with a port of its own stands beside the board, with a clock of its own.
     """
 
     rates_hz: tuple[float, ...]
@@ -24,6 +24,7 @@ class Part:
     g_sensitivity_deg_s_g: float
     ranges_g: tuple[float, ...]
     acceleration_noise_ug_sqrt_hz: float
+    own_port: bool = False
 
     def accept_rate(self, rate_hz: float) -> float:
         """The part's own rate that `rate_hz` means. Raises ValueError naming the nearest when there is none."""
@@ -64,6 +65,11 @@ def in_words(values: Sequence[float]) -> str:
     return ", ".join(f"{value:g}" for value in values)
 
 
+def has_own_port(part: str) -> bool:
+    """Whether such a part stands beside the board, with a clock of its own; parts that are not known do not."""
+    return part in PARTS and PARTS[part].own_port
+
+
 PARTS: Mapping[str, Part] = MappingProxyType(
     {
         "lsm9ds1": Part(  # datasheet DocID025715, tables 3 and 46
@@ -95,6 +101,17 @@ PARTS: Mapping[str, Part] = MappingProxyType(
             g_sensitivity_deg_s_g=0.015,  # as the datasheet of the ADIS16445 states
             ranges_g=(8,),
             acceleration_noise_ug_sqrt_hz=23,  # assumed: the data sheet of the part has it, not looked up
+        ),
+        "kvh1775": Part(  # ICD 56-0298 Rev. B, command =DR; -01 and -25 have one range of acceleration each
+            rates_hz=(1, 5, 10, 25, 50, 100, 250, 500, 750, 1000, 3600, 5000),
+            rates_rule="1, 5, 10, 25, 50, 100, 250, 500, 750, 1000, 3600, 5000",
+            ranges_deg_s=(490,),  # of the maker's data sheet
+            default_rate_hz=1000,
+            default_range_deg_s=490,
+            g_sensitivity_deg_s_g=0.0003,  # not stated; assumed: 1 °/h/g, light does not feel force
+            ranges_g=(10, 25),
+            acceleration_noise_ug_sqrt_hz=119,  # TRIAX, table 1: 0.0701 m/s/√h
+            own_port=True,
         ),
     }
 )

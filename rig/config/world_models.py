@@ -195,6 +195,24 @@ class SimulatedAccelerometerSection(Section):
     scale_per_k: ScalePerK = NO_ROW
 
 
+class SimulatedKvhSection(Section):
+    """The simulated KVH 1775 around its gyroscope: its clock, and what its last user left in its memory."""
+
+    serial_number: str | None = Field(
+        default=None, max_length=24, description="what it says its number is; left out, what the configuration expects"
+    )
+    oscillator_ppm: float = Field(default=-8.0, ge=-1000, le=1000, description="how much too fast its clock runs")
+    on_for_s: float = Field(
+        default=3.0, ge=0, le=1e6, description="how long it has been on; its microseconds wrap after 4295 s"
+    )
+    settings: dict[str, str] = Field(
+        default={},
+        description="what is not as its maker delivers it, as its commands have it: `{DR: '250', OUTPUTFMT: B}`",
+        json_schema_extra={"allowed": "settings of its commands", "usual": "`{}`"},
+    )
+    pty: bool = Field(default=False, description="also offer its port as a pseudo-terminal (POSIX)")
+
+
 class SimulatedSensorSection(Section):
     """The truth of one simulated gyroscope, in the model g = K (m + b)."""
 
@@ -259,6 +277,7 @@ class SimulatedSensorSection(Section):
         default=SimulatedAccelerometerSection(),
         description="the accelerometer beside it, of a sensor that has `acceleration`",
     )
+    kvh1775: SimulatedKvhSection | None = Field(default=None, description="the instrument it is in, of a `kvh1775`")
 
 
 class SimulatedMagnetometerSection(Section):

@@ -18,12 +18,13 @@ from rig.data.checked import checked
 from rig.data.result_file import StoredCalibrationEntry
 from rig.data.run_folder import ScriptIdentity
 
+NO_BOARD = "none"  # where every sensor has a port of its own
 PACKAGES = ("ur-rtde", "numpy", "h5py", "pyserial")
 
 
 @dataclass(frozen=True, slots=True)
 class Provenance:
-    """Versions, serial numbers, the configuration's and the script's hashes, the time.
+    """Versions, serial numbers (`NO_BOARD` where there is none), the configuration's and the script's hashes, the time.
 
     `stored_calibrations` are those by which the board corrected what it streamed, by sensor name. `arm_kinematics` is
     the arm's geometry that was reckoned with; older recordings do not say (None): that was the nominal one. Files of
@@ -67,7 +68,7 @@ class Provenance:
 
 def provenance_of(
     loaded: Loaded,
-    board: BoardIdentity,
+    board: BoardIdentity | None,
     arm: ArmReport,
     stored: Mapping[str, StoredCalibration],
     script: ScriptIdentity,
@@ -83,9 +84,9 @@ def provenance_of(
         configuration_sha256=hashlib.sha256(loaded.rig_text.encode()).hexdigest(),
         arm_serial_number=arm.serial_number,
         arm_software=arm.polyscope,
-        board_unique_id=board.unique_id,
-        firmware_version=board.firmware,
-        sensor_serial_numbers={name: each.serial_number for name, each in loaded.config.on_the_board.items()},
+        board_unique_id=NO_BOARD if board is None else board.unique_id,
+        firmware_version=NO_BOARD if board is None else board.firmware,
+        sensor_serial_numbers={name: each.serial_number for name, each in loaded.config.all_sensors.items()},
         stored_calibrations={
             name: checked(StoredCalibrationEntry, calibration.document(), name) for name, calibration in stored.items()
         },

@@ -24,6 +24,7 @@ from numpy.typing import NDArray
 from pydantic import Field
 
 from rig.arm.state import ARM_STATE_DTYPE, ArmState
+from rig.config.sensor_catalogue import has_own_port
 from rig.data.checked import Finite, Positive, checked
 from rig.data.events import Event, Recorded, from_lines, to_line
 from rig.data.extract import NO_ROOM, reason
@@ -66,6 +67,11 @@ class RecordedSensor:
     mode: Literal["raw", "calibrated"] = "raw"  # files of before there were two modes say nothing
     range_m_s2: Positive | None = None
     sensitivity_m_s2_per_count: Positive | None = None
+
+    @property
+    def on_board(self) -> bool:
+        """Whether the board read it, and stamped its samples with the board's clock."""
+        return not has_own_port(self.part)
 
     @property
     def has_acceleration(self) -> bool:

@@ -33,11 +33,13 @@ class ObservedRun:
         """A sensor's samples in rad/s on the arm's clock."""
         return on_clock(self.run.samples[sensor], self.run.sensors[sensor], self.sensors[sensor].time_base)
 
-    def delay(self, sensor: str, behind: str) -> Delay:
-        """By how much `sensor` lags the sensor `behind`.
+    def delay(self, sensor: str, behind: str) -> Delay | None:
+        """By how much `sensor` lags the sensor `behind`; None where no one clock stamps the samples of both.
 
-        The board's one clock stamps the samples of both, so what their time bases differ by is their filters' doing.
+        Where the board's does, what their time bases differ by is their filters' doing.
         """
+        if not all(self.run.sensors[name].on_board for name in (sensor, behind)):
+            return None
         late, known = self.sensors[sensor].time_base, self.sensors[behind].time_base
         middle = np.array([known.reference_s])
         delay_s = float(known.controller_time_s(middle)[0] - late.controller_time_s(middle)[0])

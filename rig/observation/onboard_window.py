@@ -41,9 +41,10 @@ def revolution_on_the_board(
 
 
 def observed_sweeps(run: RunData, sensors: Collection[str]) -> frozenset[int]:
-    """The sweeps of a recording of which the board has an observation for every one of these sensors."""
+    """The sweeps of a recording of which the board has an observation for every one of these sensors that is on it."""
     everything = finished_sweeps(run)
-    return everything.intersection(*(observed_before([run], sensor, everything) for sensor in sensors))
+    on_board = [sensor for sensor in sensors if run.sensors[sensor].on_board]
+    return everything.intersection(*(observed_before([run], sensor, everything) for sensor in on_board))
 
 
 def observed_before(earlier: Sequence[RunData], sensor: str, done: Collection[int]) -> dict[int, BoardObserved]:

@@ -3,11 +3,11 @@
 import threading
 from collections import defaultdict, deque
 from dataclasses import dataclass, field
-from typing import Literal
+from typing import Any, Literal
 
 import numpy as np
+from numpy.typing import NDArray
 
-from firmware_host.client import SampleBatch
 from firmware_host.samples import SAMPLE_DTYPE
 from rig.arm.state import ArmState
 from rig.data.run_file import RecordedMagnetometer, RecordedSensor, RunRecorder
@@ -32,14 +32,14 @@ class SensorCount:
     latest: Vector | None = None
     _next_sequence: int = 0
 
-    def add(self, batch: SampleBatch) -> None:
-        """Count one batch; its mean becomes the `latest` reading."""
-        sequence = batch.samples["sequence"]
+    def add(self, samples: NDArray[Any]) -> None:
+        """Count samples (n,); their mean becomes the `latest` reading."""
+        sequence = samples["sequence"]
         last = int(sequence[-1])
         self.lost += last + 1 - self._next_sequence - len(sequence)
         self._next_sequence = last + 1
         self.samples += len(sequence)
-        x, y, z = (batch.samples[self.column].mean(axis=0) * self.sensitivity).tolist()
+        x, y, z = (samples[self.column].mean(axis=0) * self.sensitivity).tolist()
         self.latest = (x, y, z)
 
     @property
@@ -54,43 +54,41 @@ class SensorCount:
 class _Part:
     """What came between two calls of `keep`."""
 
-    batches: defaultdict[int, list[np.ndarray]]
+    batches: defaultdict[str, list[np.ndarray]]
     states: list[ArmState]
 
 
 @dataclass(slots=True)
 class Acquisition:
-    """Fed by the board's and the arm's reader threads, read by the script's. `counts` by the board's sensor index.
+    """Fed by the reader threads of the sources and of the arm, read by the script's. `counts` by the sensor's name.
 
     What comes before there is a `recorder` is not kept. From the first `keep` on, all that came since the last
     `KEPT_PARTS` of them is also held in memory.
     """
 
-    counts: dict[int, SensorCount] = field(default_factory=dict)
+    counts: dict[str, SensorCount] = field(default_factory=dict)
     recorder: RunRecorder | None = None
     settling: Settling = field(default_factory=Settling)
     _kept: deque[_Part] = field(default_factory=lambda: deque(maxlen=KEPT_PARTS))
     _lock: threading.Lock = field(default_factory=threading.Lock)
 
-    def expect(self, index: int, name: str, sensor: RecordedSensor) -> None:
-        """Count the samples of a sensor by its index on the board, before the stream begins."""
-        self.counts[index] = SensorCount(name, sensor.sensitivity_rad_s_per_count)
-        self.settling.expect(index, name, sensor)
+    def expect(self, name: str, sensor: RecordedSensor | RecordedMagnetometer) -> None:
+        """Count the samples of a sensor, before its stream begins; a field tells nothing of whether the arm settled."""
+        if isinstance(sensor, RecordedMagnetometer):
+            self.counts[name] = SensorCount(name, sensor.sensitivity_t_per_count, "field_counts")
+        else:
+            self.counts[name] = SensorCount(name, sensor.sensitivity_rad_s_per_count)
+            self.settling.expect(name, sensor)
 
-    def expect_field(self, index: int, name: str, magnetometer: RecordedMagnetometer) -> None:
-        """The same of a magnetometer, which tells nothing of whether the arm has settled."""
-        self.counts[index] = SensorCount(name, magnetometer.sensitivity_t_per_count, "field_counts")
-
-    def on_samples(self, batch: SampleBatch) -> None:
-        """Take a batch of samples of a sensor known in `counts`."""
+    def on_samples(self, sensor: str, samples: NDArray[Any]) -> None:
+        """Take samples (n,) of a sensor known in `counts`."""
         with self._lock:
-            count = self.counts[batch.sensor]
-            count.add(batch)
+            self.counts[sensor].add(samples)
             if self._kept:
-                self._kept[-1].batches[batch.sensor].append(batch.samples)
-        self.settling.add(batch)
+                self._kept[-1].batches[sensor].append(samples)
+        self.settling.add(sensor, samples)
         if self.recorder is not None:
-            self.recorder.add_samples(count.name, batch.samples)
+            self.recorder.add_samples(sensor, samples)
 
     def on_state(self, state: ArmState) -> None:
         """Take a state of the arm."""
@@ -105,7 +103,7 @@ class Acquisition:
         with self._lock:
             self._kept.append(_Part(defaultdict(list), []))
 
-    def kept(self, sensor: int) -> tuple[np.ndarray, list[ArmState], int]:
+    def kept(self, sensor: str) -> tuple[np.ndarray, list[ArmState], int]:
         """All samples (n,) of one sensor and all arm states that are held, and how many of these are new.
 
         New are those since the latest `keep`.

@@ -1,32 +1,40 @@
-"""Connects the board and the arm, starts the recording, and hands all of it to a script as one `Rig`."""
+"""Connects the sources of samples and the arm, starts the recording, and hands all of it to a script as one `Rig`."""
 
 from collections.abc import Iterator, Mapping
 from contextlib import ExitStack, contextmanager
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from pathlib import Path
 
-from firmware_host.client import Board
+from firmware_host.client import Calibration
 from rig.arm.driver import Arm
 from rig.arm.state import ArmReport
-from rig.board.identify import refuse_other_firmware, refusing
+from rig.board.identify import configured_board, refusing
+from rig.board.store import Solved, calibration_of
 from rig.config.load import Loaded
 from rig.data.provenance import provenance_of
-from rig.data.run_file import RecordedMagnetometer, RecordedSensor, RunRecorder
+from rig.data.run_file import RunRecorder
 from rig.data.settings import RunSettings
+from rig.errors import Refused
 from rig.plans.phase import Phase
 from rig.plans.script_file import ScriptFile
 from rig.runner.acquisition import Acquisition
+from rig.runner.host_correction import HostCorrected, correcting
 from rig.runner.onboard import BoardCalibration
 from rig.runner.procedure import Devices, Recording, Rig
 from rig.runner.resumption import Resumption
-from rig.runner.sensors import BoardMagnetometer, BoardSensor, set_up_magnetometers, set_up_sensors
-from rig.station.events import ArmConnected, BoardConnected, RunResumed
+from rig.runner.sensors import BoardSource, board_source
+from rig.sensors.registry import OWN_PORT
+from rig.sensors.source import OnSamples, Recorded, SampleSource
+from rig.station.events import ArmConnected, BoardConnected, RunResumed, SensorConnected
 from rig.station.station import Station
 
 
 @dataclass(frozen=True, slots=True)
 class Connector:
-    """Opens one phase of a run: what is to be done, by which configuration and script, recorded where, told to whom."""
+    """Opens one phase of a run: what is to be done, by which configuration and script, recorded where, told to whom.
+
+    `found` are the calibrations of the phase before, by sensor name.
+    """
 
     phase: Phase
     loaded: Loaded
@@ -35,6 +43,7 @@ class Connector:
     path: Path
     station: Station
     resumed: Resumption
+    found: Mapping[str, Solved] = field(default_factory=dict)
 
     @contextmanager
     def open(self) -> Iterator[Rig]:
@@ -51,34 +60,58 @@ class Connector:
             self.station.event(RunResumed(len(self.resumed.done), len(whole_plan.sweeps)))
         acquisition = Acquisition()
         with ExitStack() as stack:
-            board, sensors, magnetometers = self._connect_board(stack, acquisition)
+            board = self._connect_board(stack, acquisition) if self.loaded.config.parts_on_board else None
+            sources = (*([board] if board else []), *self._connect_others(stack, acquisition))
+            described = {name: sensor for source in sources for name, sensor in source.sensors.items()}
+            for name, sensor in described.items():
+                acquisition.expect(name, sensor)
             arm, report = self._connect_arm(stack, acquisition)
-            recording = self._record(stack, board, sensors, magnetometers, report)
+            recording = self._record(stack, board, described, report)
             acquisition.recorder = recording.recorder
             yield Rig(
-                devices=Devices(arm, report, self.loaded.config.arm, board, _streaming_corrected(sensors), acquisition),
+                devices=Devices(arm, report, self.loaded.config.arm, sources, acquisition),
                 plan=self.phase.plan(report.state.q_rad, self.resumed.done),
                 whole_plan=whole_plan,
                 recording=recording,
-                along=self._calibrating_along(board, acquisition, recording, sensors),
+                along=None if board is None else self._calibrating_along(board, acquisition, recording),
                 phase=self.phase,
             )
 
-    def _connect_board(
-        self, stack: ExitStack, acquisition: Acquisition
-    ) -> tuple[Board, Mapping[str, BoardSensor], Mapping[str, BoardMagnetometer]]:
-        section = self.loaded.config.board
+    def _connect_board(self, stack: ExitStack, acquisition: Acquisition) -> BoardSource:
+        config, calibrated = self.loaded.config, self.phase.procedure.reads_corrected
         with refusing():
-            board = stack.enter_context(Board(section.port, section.baud, acquisition.on_samples))
-            refuse_other_firmware(board.identity)
-            sensors = set_up_sensors(board, self.loaded.config, calibrated=self.phase.procedure.reads_corrected)
-            magnetometers = set_up_magnetometers(board, self.loaded.config)
-        for name, sensor in sensors.items():
-            acquisition.expect(sensor.index, name, sensor.described)
-        for name, magnetometer in magnetometers.items():
-            acquisition.expect_field(magnetometer.index, name, magnetometer.described)
-        self.station.event(BoardConnected(section.port, board.identity))
-        return board, sensors, magnetometers
+            source = stack.enter_context(board_source(config, acquisition.on_samples, calibrated=calibrated))
+        self.station.event(BoardConnected(configured_board(config).port, source.board.identity))
+        return source
+
+    def _connect_others(self, stack: ExitStack, acquisition: Acquisition) -> Iterator[SampleSource]:
+        """The sensors with a port of their own; to verify one, its calibration corrects its readings here."""
+        config, calibrated = self.loaded.config, self.phase.procedure.reads_corrected
+        for name, section in config.sensors.items():
+            if section.serial is None:
+                continue
+            kind = OWN_PORT[section.part]
+            calibration = self._calibration(name) if calibrated and name in config.to_calibrate else None
+            on_samples: OnSamples = acquisition.on_samples
+            if calibration is not None:
+                per_count = kind.describe(section).sensitivity_rad_s_per_count
+                on_samples = correcting(calibration, per_count, on_samples)
+            with refusing():
+                source = stack.enter_context(kind.connect(name, section, on_samples))
+            self.station.event(
+                SensorConnected(name, section.part, section.serial_number, section.serial.port, source.corrected)
+            )
+            yield source if calibration is None else HostCorrected(source, calibration)
+
+    def _calibration(self, name: str) -> Calibration:
+        """Raises Refused `nothing_to_correct_by`."""
+        if name not in self.found:
+            raise Refused(
+                "nothing_to_correct_by",
+                f"sensors.{name}: there is no board that keeps its calibration, and this run has found none",
+                "Verify it in the run that calibrates it: procedure.name six_observation with verify: true",
+            )
+        return calibration_of(self.found[name])
 
     def _connect_arm(self, stack: ExitStack, acquisition: Acquisition) -> tuple[Arm, ArmReport]:
         section = self.loaded.config.arm
@@ -91,21 +124,15 @@ class Connector:
     def _record(
         self,
         stack: ExitStack,
-        board: Board,
-        sensors: Mapping[str, BoardSensor],
-        magnetometers: Mapping[str, BoardMagnetometer],
+        board: BoardSource | None,
+        described: Mapping[str, Recorded],
         report: ArmReport,
     ) -> Recording:
-        described: dict[str, RecordedSensor | RecordedMagnetometer] = {
-            **{name: sensor.described for name, sensor in sensors.items()},
-            **{name: magnetometer.described for name, magnetometer in magnetometers.items()},
-        }
-        stored = {name: sensor.stored for name, sensor in sensors.items() if sensor.stored is not None}
         made_with = provenance_of(
             self.loaded,
-            board.identity,
+            None if board is None else board.board.identity,
             report,
-            stored,
+            {} if board is None else board.stored,
             self.script.identity,
             script_installed=self.script.is_installed,
         )
@@ -121,14 +148,21 @@ class Connector:
         return Recording(stack.enter_context(recorder), described, self.station, made_with.kinematics)
 
     def _calibrating_along(
-        self, board: Board, acquisition: Acquisition, recording: Recording, sensors: Mapping[str, BoardSensor]
+        self, source: BoardSource, acquisition: Acquisition, recording: Recording
     ) -> BoardCalibration | None:
-        """The board's own calibration from raw readings; it is given back what it observed before an interruption."""
-        if not self.phase.procedure.calibrates_along:
+        """The board's own calibration from raw readings; it is given back what it observed before an interruption.
+
+        None where the readings are no raw ones, or no sensor on it is to be calibrated.
+        """
+        to_calibrate = {
+            name: (sensor.index, sensor.described)
+            for name, sensor in source.set_up.items()
+            if name in self.settings.to_calibrate
+        }
+        if not (self.phase.procedure.calibrates_along and to_calibrate):
             return None
-        to_calibrate = {name: (sensors[name].index, sensors[name].described) for name in self.settings.to_calibrate}
         along = BoardCalibration(
-            board,
+            source.board,
             acquisition,
             recording.note,
             self.settings.observation,
@@ -138,7 +172,3 @@ class Connector:
         with refusing():
             along.recall(self.resumed.earlier, self.resumed.done)
         return along
-
-
-def _streaming_corrected(sensors: Mapping[str, BoardSensor]) -> tuple[int, ...]:
-    return tuple(sensor.index for sensor in sensors.values() if sensor.stored is not None)

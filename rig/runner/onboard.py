@@ -81,7 +81,7 @@ class BoardCalibration:
     def _observe(self, name: str, sweep: Sweep) -> tuple[BoardObservation, float]:
         """The board's observation and the speed it was told, rad/s."""
         index, sensor = self.sensors[name]
-        samples, states, new = self.acquisition.kept(index)
+        samples, states, new = self.acquisition.kept(name)
         arm = np.array([state.to_record() for state in states], ARM_STATE_DTYPE)
         start_us, end_us, speed_rad_s = revolution_on_the_board(
             samples, sensor, arm, sweep, first=len(arm) - new, settings=self.settings, kinematics=self.kinematics

@@ -5,13 +5,12 @@ were kept, the command to go on with.
 """
 
 import traceback
-from collections.abc import Iterator
+from collections.abc import Iterator, Mapping
 from contextlib import contextmanager
 from dataclasses import dataclass, replace
 from pathlib import Path
 
-from firmware_host.errors import BoardError
-from rig.analysis.calibration import DEFAULT_ESTIMATOR
+from rig.analysis.calibration import DEFAULT_ESTIMATOR, SensorResult
 from rig.analysis.onboard_check import check_observed
 from rig.analysis.outcome import Outcome
 from rig.board.store import store_calibrations
@@ -19,7 +18,7 @@ from rig.config.load import Loaded
 from rig.data.run_file import RunData, make_plain, read_run
 from rig.data.run_folder import next_recording, recordings, resuming
 from rig.data.settings import RunSettings, settings_of
-from rig.errors import Fault, Refused, RigError
+from rig.errors import Fault, ProblemError, Refused
 from rig.plans.phase import Phase
 from rig.plans.script_errors import ENDING
 from rig.plans.script_file import ScriptFile, installed_script
@@ -59,7 +58,7 @@ class Run:
             runs: tuple[RunData, ...] = ()
             if outcome.passed:
                 self._store(outcome)
-                runs = self._recorded(phase, Resumption(), moved=True)
+                runs = self._recorded(phase, Resumption(), moved=True, found=outcome.results)
             else:
                 self.station.event(PhaseSkipped(phase.procedure.name))
             outcome = self._judged(phase, runs, outcome)
@@ -73,13 +72,16 @@ class Run:
             earlier = [read_run(file) for file in recordings(self.folder, phase.procedure.readings)]
             return resumption(earlier, self._settings(phase), self.script)
 
-    def _recorded(self, phase: Phase, resumed: Resumption, *, moved: bool) -> tuple[RunData, ...]:
-        """Carry out the phase's script; all recordings of the phase."""
+    def _recorded(
+        self, phase: Phase, resumed: Resumption, *, moved: bool, found: Mapping[str, SensorResult] | None = None
+    ) -> tuple[RunData, ...]:
+        """Carry out the phase's script, with the calibrations `found` before; all recordings of the phase."""
         readings = phase.procedure.readings
         path = next_recording(self.folder, readings)
         own = phase.procedure is self.script.procedure
         script = self.script if own else installed_script(phase.procedure.name)
-        connector = Connector(phase, self.loaded, self._settings(phase), script, path, self.station, resumed)
+        settings = self._settings(phase)
+        connector = Connector(phase, self.loaded, settings, script, path, self.station, resumed, found or {})
         with self.reported(self._mended, moved=moved), connector.open() as rig:
             self.station.event(PhaseStarted(phase.procedure.name, rig.plan, rig.readings()))
             phase.procedure.script(rig)
@@ -146,7 +148,7 @@ class Run:
         """
         try:
             yield
-        except (RigError, BoardError) as error:
+        except ProblemError as error:
             if isinstance(error, Refused) and not moved:
                 self.station.event(Failed(error))
                 raise

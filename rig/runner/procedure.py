@@ -10,7 +10,6 @@ from contextlib import contextmanager
 from dataclasses import dataclass
 from math import degrees, radians
 
-from firmware_host.client import Board
 from rig.arm.driver import Arm
 from rig.arm.kinematics import DenavitHartenberg
 from rig.arm.motion import Dwell, Motion, Plan, Rest, Step, Sweep, Transfer, travel
@@ -32,6 +31,7 @@ from rig.plans.phase import Phase
 from rig.runner.acquisition import Acquisition
 from rig.runner.announcement import announcement
 from rig.runner.onboard import BoardCalibration
+from rig.sensors.source import SampleSource
 from rig.station.events import (
     PhaseRecorded,
     PreflightPassed,
@@ -53,15 +53,13 @@ SAME_POSE_RAD = radians(1)  # what was announced and agreed to still holds
 class Devices:
     """What is connected.
 
-    `report` is the arm as it stood, `payload` what it carries. `corrected` are the board's indices of the sensors that
-    stream corrected readings.
+    `report` is the arm as it stood, `payload` what it carries; `sources` are where samples come from.
     """
 
     arm: Arm
     report: ArmReport
     payload: ArmSection
-    board: Board
-    corrected: tuple[int, ...]
+    sources: tuple[SampleSource, ...]
     acquisition: Acquisition
 
 
@@ -147,14 +145,16 @@ class Rig:
             )
 
     def start_sampling(self) -> None:
-        """Let the board stream; from here on every sample is recorded. Raises `Fault` when a sensor stays silent."""
-        board, arm = self.devices.board, self.devices.arm
+        """Let every source stream; from here on every sample is recorded. Raises `Fault` for a silent sensor."""
+        sources, arm = self.devices.sources, self.devices.arm
         if self.along is not None:
             self.along.begin()
-        board.start(self.devices.corrected)
+        for source in sources:
+            source.start()
         host_s, arm_s = time.monotonic(), arm.latest.time_s
         while silent := self.devices.acquisition.silent():
-            board.check(arm.latest.time_s)
+            for source in sources:
+                source.check(arm.latest.time_s)
             arm.check()
             # By both clocks: this machine may be busy, and the controller's clock another's to run.
             if min(time.monotonic() - host_s, arm.latest.time_s - arm_s) > FIRST_SAMPLE_TIMEOUT_S:
@@ -260,7 +260,8 @@ class Rig:
 
     def _watch(self, step: Step) -> None:
         """Called many times a second while the arm is busy: look after board and recording, tell the operator."""
-        self.devices.board.check(self.devices.arm.latest.time_s)
+        for source in self.devices.sources:
+            source.check(self.devices.arm.latest.time_s)
         self.recording.check()
         state = self.devices.arm.latest
         within_s = min(state.time_s - self._step_started_s, step.duration_s)

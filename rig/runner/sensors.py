@@ -1,16 +1,18 @@
-"""Sets the configured sensors up on the board, and describes them for the recording."""
+"""The board as a source of samples: its configured sensors set up, and described for the recording."""
 
-from collections.abc import Mapping
+from collections.abc import Iterator, Mapping
+from contextlib import contextmanager
 from dataclasses import dataclass, replace
 from math import radians
 
 import numpy as np
 
-from firmware_host.client import Board, Calibration, StoredCalibration
+from firmware_host.client import Board, Calibration, SampleBatch, StoredCalibration
 from firmware_host.protocol import CALIBRATED_RAD_S, FULL_SCALE_COUNTS
-from rig.board.identify import find_sensor, stored_calibration
+from rig.board.identify import configured_board, find_sensor, refuse_other_firmware, stored_calibration
 from rig.config.models import MagnetometerSection, RigConfig, SensorSection, mounting_matrix
 from rig.data.run_file import RecordedMagnetometer, RecordedSensor
+from rig.sensors.source import OnSamples, Recorded
 
 
 @dataclass(frozen=True, slots=True)
@@ -25,8 +27,67 @@ class BoardSensor:
     stored: StoredCalibration | None = None
 
 
+@dataclass(frozen=True, slots=True)
+class BoardMagnetometer:
+    """A magnetometer that is set up, as a `BoardSensor` is."""
+
+    index: int
+    described: RecordedMagnetometer
+
+
+@dataclass(frozen=True, slots=True)
+class BoardSource:
+    """The board with its sensors set up, by name. What it streams is handed on by the sensors' names."""
+
+    board: Board
+    set_up: Mapping[str, BoardSensor]
+    magnetometers: Mapping[str, BoardMagnetometer]
+
+    @property
+    def sensors(self) -> Mapping[str, Recorded]:
+        """As of `SampleSource`."""
+        return {
+            **{name: sensor.described for name, sensor in self.set_up.items()},
+            **{name: magnetometer.described for name, magnetometer in self.magnetometers.items()},
+        }
+
+    @property
+    def stored(self) -> Mapping[str, StoredCalibration]:
+        """The calibrations by which readings are corrected, by sensor name."""
+        return {name: sensor.stored for name, sensor in self.set_up.items() if sensor.stored is not None}
+
+    def start(self) -> None:
+        """As of `SampleSource`; what is stored corrects."""
+        self.board.start([self.set_up[name].index for name in self.stored])
+
+    def check(self, clock_s: float | None = None) -> None:
+        """As of `SampleSource`. Raises BoardError."""
+        self.board.check(clock_s)
+
+
+@contextmanager
+def board_source(config: RigConfig, on_samples: OnSamples, *, calibrated: bool) -> Iterator[BoardSource]:
+    """The board for the length of the `with` block.
+
+    Raises BoardError as `Board`, Refused as `configured_board`, `refuse_other_firmware` and `set_up_sensors`.
+    """
+    section = configured_board(config)
+    names: dict[int, str] = {}
+
+    def on_batch(batch: SampleBatch) -> None:
+        on_samples(names[batch.sensor], batch.samples)
+
+    with Board(section.port, section.baud, on_batch) as board:
+        refuse_other_firmware(board.identity)
+        set_up = set_up_sensors(board, config, calibrated=calibrated)
+        magnetometers = set_up_magnetometers(board, config)
+        names.update({sensor.index: name for name, sensor in set_up.items()})
+        names.update({magnetometer.index: name for name, magnetometer in magnetometers.items()})
+        yield BoardSource(board, set_up, magnetometers)
+
+
 def set_up_sensors(board: Board, config: RigConfig, *, calibrated: bool) -> Mapping[str, BoardSensor]:
-    """Every configured sensor by its name; those to calibrate stream corrected readings when `calibrated`.
+    """Every configured sensor on the board by its name; those to calibrate stream corrected readings when `calibrated`.
 
     Raises Refused as `find_sensor` and `stored_calibration`.
     """
@@ -34,16 +95,8 @@ def set_up_sensors(board: Board, config: RigConfig, *, calibrated: bool) -> Mapp
         name: _corrected(board, name, section)
         if calibrated and name in config.to_calibrate
         else _raw(board, name, section)
-        for name, section in config.sensors.items()
+        for name, section in config.on_board.items()
     }
-
-
-@dataclass(frozen=True, slots=True)
-class BoardMagnetometer:
-    """A magnetometer that is set up, as a `BoardSensor` is."""
-
-    index: int
-    described: RecordedMagnetometer
 
 
 def set_up_magnetometers(board: Board, config: RigConfig) -> Mapping[str, BoardMagnetometer]:
@@ -89,11 +142,11 @@ def _raw(board: Board, name: str, section: SensorSection) -> BoardSensor:
 def _corrected(board: Board, name: str, section: SensorSection) -> BoardSensor:
     raw = _raw(board, name, section)
     stored = stored_calibration(board, name, section)
-    return BoardSensor(raw.index, corrected(raw.described, stored.calibration), stored)
+    return BoardSensor(raw.index, corrected(raw.described, stored.calibration, CALIBRATED_RAD_S), stored)
 
 
-def corrected(sensor: RecordedSensor, calibration: Calibration) -> RecordedSensor:
-    """The same sensor when the board corrects its rates, which it sends without accelerations: in microradians/s."""
+def corrected(sensor: RecordedSensor, calibration: Calibration, sensitivity_rad_s: float) -> RecordedSensor:
+    """The same sensor when its rates come corrected, in counts of that size and without accelerations."""
     limit_rad_s = sensor.full_scale_counts * sensor.sensitivity_rad_s_per_count
     bias_rad_s = np.abs(calibration.bias_rad_s)
     # What a saturated reading becomes, at least: the other axes may read anything beside it.
@@ -102,8 +155,8 @@ def corrected(sensor: RecordedSensor, calibration: Calibration) -> RecordedSenso
     lowest_rad_s = float(np.min(on_axis @ (limit_rad_s - bias_rad_s) - beside @ (limit_rad_s + bias_rad_s)))
     return replace(
         sensor,
-        sensitivity_rad_s_per_count=CALIBRATED_RAD_S,
-        full_scale_counts=int(lowest_rad_s / CALIBRATED_RAD_S),
+        sensitivity_rad_s_per_count=sensitivity_rad_s,
+        full_scale_counts=int(lowest_rad_s / sensitivity_rad_s),
         mode="calibrated",
         range_m_s2=None,
         sensitivity_m_s2_per_count=None,

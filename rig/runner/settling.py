@@ -6,10 +6,11 @@ The arm's controller says that it stands still while what it carries still swing
 import threading
 from collections import deque
 from dataclasses import dataclass, field
+from typing import Any
 
 import numpy as np
+from numpy.typing import NDArray
 
-from firmware_host.client import SampleBatch
 from rig.data.run_file import RecordedSensor
 from rig.estimation.arrays import Array
 
@@ -62,23 +63,23 @@ class _Watched:
 
 @dataclass(slots=True)
 class Settling:
-    """Fed by the board's reader thread, asked by the script's."""
+    """Fed by the reader threads of the sources, asked by the script's."""
 
-    _watched: dict[int, _Watched] = field(default_factory=dict)
+    _watched: dict[str, _Watched] = field(default_factory=dict)
     _lock: threading.Lock = field(default_factory=threading.Lock)
 
-    def expect(self, index: int, name: str, sensor: RecordedSensor) -> None:
-        """Watch a sensor by its index on the board: its accelerations where it sends them, else its rates."""
+    def expect(self, name: str, sensor: RecordedSensor) -> None:
+        """Watch a sensor: its accelerations where it sends them, else its rates."""
         enough = max(2, round(SPAN_S * sensor.rate_hz))
         of = "acceleration_counts" if sensor.has_acceleration else "counts"
-        self._watched[index] = _Watched(name, of, enough, deque(maxlen=2 * enough))
+        self._watched[name] = _Watched(name, of, enough, deque(maxlen=2 * enough))
 
-    def add(self, batch: SampleBatch) -> None:
-        """Take the newest readings of a sensor that is watched."""
-        watched = self._watched.get(batch.sensor)
+    def add(self, sensor: str, samples: NDArray[Any]) -> None:
+        """Take the newest readings (n,) of a sensor that is watched."""
+        watched = self._watched.get(sensor)
         if watched is not None:
             with self._lock:
-                watched.recent.extend(batch.samples[watched.column].astype(np.float64))
+                watched.recent.extend(samples[watched.column].astype(np.float64))
 
     def begin(self) -> None:
         """The arm stands from now on: what was read before does not count."""

@@ -3,6 +3,7 @@
 All events of a run come in order, from the thread that runs the procedure.
 """
 
+from collections.abc import Mapping
 from dataclasses import dataclass
 from pathlib import Path
 
@@ -23,6 +24,18 @@ class BoardConnected:
 
     port: str
     identity: BoardIdentity
+
+
+@dataclass(frozen=True, slots=True)
+class SensorConnected:
+    """The instrument `sensor` answered at a port of its own; `corrected` settings in its memory were not as needed:
+    name → what was there."""
+
+    sensor: str
+    part: str
+    serial_number: str
+    port: str
+    corrected: Mapping[str, str]
 
 
 @dataclass(frozen=True, slots=True)
@@ -245,6 +258,7 @@ class Crashed:
 RunEvent = (
     Event
     | BoardConnected
+    | SensorConnected
     | ArmConnected
     | RunResumed
     | PhaseStarted

@@ -21,6 +21,7 @@ from rig.station.events import (
     RunFolderWritten,
     RunResumed,
     SamplingStarted,
+    SensorConnected,
     StepFinished,
 )
 
@@ -33,6 +34,10 @@ def line(event: RunEvent) -> str | None:
             text = f"resuming: {done} of {planned} sweeps are recorded, sound and known to the board"
         case BoardConnected(port, identity):
             text = f"board: {identity.unique_id}, firmware {identity.firmware} at {port}"
+        case SensorConnected(sensor, part, serial_number, port, corrected):
+            text = f"{sensor}: {part} {serial_number} at {port}" + "".join(
+                f"; {name} was {before}, corrected" for name, before in corrected.items()
+            )
         case ArmConnected(report):
             text = f"arm: serial number {report.serial_number}, PolyScope {report.polyscope} at {report.host}"
         case PreflightPassed(plan, report):

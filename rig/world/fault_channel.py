@@ -9,16 +9,20 @@ A request is `{"do": NAME, …}`; the reply is one line, `{"ok": true, "time_s":
     register_in_use name · register_free name   an RTDE input that a fieldbus claims
     close_arm listen · silence_arm duration_s   the controller's sockets (the silence is in wall time)
     sensor_fault sensor fault   absent, other_part (its identity) or damaged (a bit now and then); null: it is well
+    kvh_fault sensor bit_error_rate lose status test silent   what is given holds until something else is:
+                                                wire errors, messages lost next, valid bits, BIT's first byte, dead line
+    kvh_power sensor on
     unplug_board · plug_in_board · reset_board · silence_board on · host_baud baud (null: the board's own)
 """
 
 import json
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
 from typing import Any, Protocol
 
 from firmware_host.emulator.spi_device import Fault
 from rig.world.board.serial_line import SerialLine
 from rig.world.clock import Clock
+from rig.world.kvh1775.mounting import Mount
 from rig.world.laboratory import Laboratory
 
 Reply = dict[str, Any]
@@ -31,6 +35,9 @@ class World(Protocol):
     laboratory: Laboratory
     line: SerialLine
     clock: Clock
+
+    @property
+    def kvh_lines(self) -> Mapping[str, SerialLine]: ...
 
     def close_arm(self, *, listen: bool) -> None: ...
     def silence_arm(self, duration_s: float) -> None: ...
@@ -69,6 +76,8 @@ class ControlSession:
             "register_free": self._register_free,
             "close_arm": self._close_arm,
             "silence_arm": self._silence_arm,
+            "kvh_fault": self._kvh_fault,
+            "kvh_power": self._kvh_power,
             "unplug_board": world.unplug_board,
             "plug_in_board": world.plug_in_board,
             "reset_board": self._reset_board,
@@ -168,6 +177,36 @@ class ControlSession:
 
     def _sensor_fault(self, sensor: str, fault: str | None) -> None:
         self._world.laboratory.set_sensor_fault(sensor, None if fault is None else Fault(fault))
+
+    def _kvh_fault(
+        self,
+        sensor: str,
+        *,
+        bit_error_rate: float | None = None,
+        lose: int = 0,
+        status: int | None = None,
+        test: int | None = None,
+        silent: bool | None = None,
+    ) -> None:
+        kvh = self._kvh(sensor).kvh
+        if kvh is None:
+            raise ValueError(f"the KVH 1775 {sensor!r} is switched off")
+        line, faults = self._world.kvh_lines[sensor], kvh.faults
+        line.bit_error_rate = line.bit_error_rate if bit_error_rate is None else float(bit_error_rate)
+        line.silent = line.silent if silent is None else bool(silent)
+        faults.lose += int(lose)
+        faults.status = faults.status if status is None else int(status)
+        faults.test = faults.test if test is None else int(test)
+
+    def _kvh_power(self, sensor: str, on: bool) -> None:
+        mount = self._kvh(sensor)
+        self._world.laboratory.switch_on(sensor) if on else mount.switch_off()
+
+    def _kvh(self, sensor: str) -> Mount:
+        mounts = self._world.laboratory.kvhs
+        if sensor not in mounts:
+            raise ValueError(f"no KVH 1775 {sensor!r}; there are {', '.join(mounts) or 'none'}")
+        return mounts[sensor]
 
     def _silence_board(self, on: bool) -> None:
         """A cable that carries nothing, with its port still there."""

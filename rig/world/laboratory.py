@@ -12,6 +12,7 @@ from rig.world.board.flash_file import flash_of
 from rig.world.board.magnetometer_truth import MountedMagnetometer
 from rig.world.board.mounting import MotionAt, mount_magnetometers, mount_sensors, power_up
 from rig.world.board.sensor_truth import SensorTruth
+from rig.world.kvh1775.mounting import mounts
 from rig.world.magnetic_field import magnetic_field_of
 from rig.world.site import site_of
 from rig.world.ur10e.joint_motion import Motion
@@ -54,14 +55,25 @@ class Laboratory:
         self._flash = flash_of(world.board.flash_file)
         self.board: EmulatedBoard | None = None  # None: without power
         self._sensors: dict[str, SpiDevice] = {}
-        self._faults: dict[str, Fault | None] = dict.fromkeys([*world.sensors, *world.magnetometers])
+        self._faults: dict[str, Fault | None] = dict.fromkeys([*config.on_board, *world.magnetometers])
         self._field = magnetic_field_of(world.site)
+        self.kvhs = mounts(config, world)
         self.plug_in()
+        for name in self.kvhs:
+            self.switch_on(name)
+
+    def switch_on(self, name: str) -> None:
+        """Give the KVH 1775 of that name power, if it has none. Raises KeyError when there is no such sensor."""
+        self.kvhs[name].switch_on(self._motion_of, self._time_s)
+
+    @property
+    def _time_s(self) -> float:
+        return self.arm.true_s(self.robot.time_s)
 
     def plug_in(self) -> None:
-        """Give the board power, if it has none."""
-        if self.board is None:
-            time_s = self.arm.true_s(self.robot.time_s)
+        """Give the board power, if there is one and it has none."""
+        if self.board is None and self._config.board is not None:
+            time_s = self._time_s
             self._sensors = {
                 **mount_sensors(self._config, self._world, self._motion_of, time_s),
                 **mount_magnetometers(self._config, self._world, self._field_of),
@@ -89,7 +101,10 @@ class Laboratory:
         self.arm.step(self.robot.time_s)
         if self.board is not None:
             # After the arm, so that the sensors can ask for any instant of the tick.
-            self.board.advance(self.arm.true_s(self.robot.time_s))
+            self.board.advance(self._time_s)
+        for mount in self.kvhs.values():
+            if mount.kvh is not None:
+                mount.kvh.advance(self._time_s)
 
     @property
     def tick_s(self) -> float:

@@ -19,7 +19,7 @@ from rig.world.board.serial_line import SerialLine, SerialSession
 from rig.world.clock import Clock
 from rig.world.fault_channel import ControlSession
 from rig.world.laboratory import Laboratory
-from rig.world.network import UNPACED, Network, Session
+from rig.world.network import UNPACED, Listener, Network, Session
 from rig.world.section import world_section
 from rig.world.ur10e import dashboard_server, primary, rtde, script_socket
 from rig.world.ur10e.robot import Robot
@@ -45,31 +45,44 @@ class World:
     def __init__(self, loaded: Loaded) -> None:
         section = world_section(loaded)
         self.laboratory = Laboratory(loaded.config, section)
-        self.line = SerialLine(self.laboratory)
+        self.line = SerialLine(lambda: self.laboratory.board)
+        self.kvh_lines = {
+            name: SerialLine(partial(getattr, mount, "kvh"), section.seed)
+            for name, mount in self.laboratory.kvhs.items()
+        }
         self.clock = Clock(section.time_scale, time.monotonic, self.laboratory.tick_s)
         self.network = Network(self.clock.dialogue)
         self._silent_until_s = 0.0
         self._ended = False
-        host, board_url = loaded.config.arm.host, loaded.config.board.port
+        host, board = loaded.config.arm.host, loaded.config.board
         try:
             self.arm_listeners = [
                 self.network.listen(host, port, partial(new_session, self.laboratory.robot), lag_s=lag_s)
                 for port, (new_session, lag_s) in ARM_PORTS.items()
             ]
-            self.board_listener = self.network.listen(
-                *_board_address(board_url), self._new_serial_session, limit=1, lag_s=SERIAL_LAG_S
-            )
+            self.board_listener = None if board is None else self._listen("board.port", board.port, self.line)
+            kvh_ports = {name: s.serial.port for name, s in loaded.config.sensors.items() if s.serial is not None}
+            for name, port in kvh_ports.items():
+                self._listen(f"sensors.{name}.serial.port", port, self.kvh_lines[name])
             control_port = section.control_port
             self.network.listen(host, control_port, lambda: ControlSession(self))
         except Refused:
             self.network.close()
             raise
-        self._pty = _open_pty(self.line, self.network.selector) if section.board.pty else None
+        pty = _open_pty(self.line, self.network.selector) if section.board.pty else None
+        kvh_ptys = {
+            name: _open_pty(line, self.network.selector)
+            for name, line in self.kvh_lines.items()
+            if (kvh := section.sensors[name].kvh1775) is not None and kvh.pty
+        }
+        self._ptys = [*([pty] if pty else []), *kvh_ptys.values()]
         self._description = {
             "ready": True,
             "arm": host,
-            "board": board_url,
-            "pty": self._pty.path if self._pty else None,
+            "board": None if board is None else board.port,
+            "pty": pty.path if pty else None,
+            "kvh_ports": kvh_ports,
+            "kvh_ptys": {name: each.path for name, each in kvh_ptys.items()},
             "control": f"{host}:{control_port}",
         }
 
@@ -77,8 +90,9 @@ class World:
         """The line that says where everything listens."""
         return json.dumps(self._description)
 
-    def _new_serial_session(self) -> Session:
-        return SerialSession(self.line)
+    def _listen(self, key: str, url: str, line: SerialLine) -> Listener:
+        """The far end of a serial line; a client who opens what another has open is hung up on."""
+        return self.network.listen(*_address(key, url), lambda: SerialSession(line), limit=1, lag_s=SERIAL_LAG_S)
 
     # -- faults that live in the wires -----------------------------------------------------------------------------
     def silence_arm(self, duration_s: float) -> None:
@@ -94,12 +108,14 @@ class World:
 
     def unplug_board(self) -> None:
         """Pull the board's cable: no power, no port."""
-        self.board_listener.close()
+        if self.board_listener is not None:
+            self.board_listener.close()
         self.laboratory.unplug()
 
     def plug_in_board(self) -> None:
         self.laboratory.plug_in()
-        self.board_listener.open()
+        if self.board_listener is not None:
+            self.board_listener.open()
 
     # -- the loop ----------------------------------------------------------------------------------------------------
     def end(self) -> None:
@@ -125,18 +141,19 @@ class World:
             # The firmware broke a rule of the chip: the board is dead, and its cable with it.
             print(error, file=sys.stderr, flush=True)
             self.unplug_board()
-        self.line.tick()
-        if self._pty is not None:
-            self._pty.tick()
+        for line in (self.line, *self.kvh_lines.values()):
+            line.tick()
+        for pty in self._ptys:
+            pty.tick()
         self.network.tick()
 
     def close(self) -> None:
-        if self._pty is not None:
-            self._pty.close()
+        for pty in self._ptys:
+            pty.close()
         self.network.close()
 
 
-def _board_address(url: str) -> tuple[str, int]:
+def _address(key: str, url: str) -> tuple[str, int]:
     """Host and port of `socket://host:port`. Raises `Refused` for any other port."""
     parts = urlsplit(url)
     try:
@@ -146,14 +163,18 @@ def _board_address(url: str) -> tuple[str, int]:
         pass  # a port that is no number
     raise Refused(
         "board_port",
-        f"board.port {url!r} is no address to listen on",
+        f"{key} {url!r} is no address to listen on",
         "Write socket://host:port",
     )
 
 
 def _open_pty(line: SerialLine, selector: selectors.BaseSelector) -> "PtyPort":
     if os.name != "posix":
-        raise Refused("no_pty", "world.board.pty: this system has no pseudo-terminals", "Use the socket:// port")
+        raise Refused(
+            "no_pty",
+            "world: this system has no pseudo-terminals",
+            "Leave every `pty: true` out, and use the socket:// port",
+        )
     from rig.world.board.pty_port import PtyPort  # its modules exist on POSIX only
 
     return PtyPort(line, selector)

@@ -17,7 +17,7 @@ from typing import Any
 import pytest
 
 from rig.data.run_file import read_run
-from support.worlds import World, WorldHandle, hardware
+from support.worlds import World, WorldHandle, fresh_host, hardware
 
 # The driver names each of these faults in tests/arm/test_driver.py as well: a few whole runs are enough for a change.
 THOROUGH = [pytest.mark.proof, pytest.mark.thorough]
@@ -274,3 +274,27 @@ def test_check_looks_and_moves_nothing(world: World, tmp_path: Path) -> None:
     assert "missing: speed_slider: the speed slider stands at 30 %" in missing.stderr
     state = handle.state()
     assert not state["program_running"] and not state["moving"] and state["claims"] == []
+
+
+@pytest.mark.parametrize(
+    ("fault", "name"),
+    [
+        ({"do": "kvh_power", "on": False}, "kvh_link_lost"),
+        pytest.param({"do": "kvh_fault", "status": 0x75}, "kvh_axis_invalid", marks=THOROUGH),
+        pytest.param({"do": "kvh_fault", "lose": 200}, "kvh_gap_ambiguous", marks=THOROUGH),
+    ],
+)
+def test_a_sensor_on_its_own_port_that_fails_ends_the_run(start: Start, fault: dict[str, Any], name: str) -> None:
+    kvh = {"part": "kvh1775", "serial_number": "1775-1", "rate_hz": 250}
+    port = {"port": f"socket://{fresh_host()}:7331"}
+    truth = {"scale": [1.0, 1.0, 1.0], "bias_rad_s": [0.0, 0.0, 0.0], "noise_rad_s": 1e-4}
+    rig = start(
+        {"sensors": {"kvh": {**kvh, "serial": port}}, "world": {"time_scale": 2, "sensors": {"kvh": truth}}},
+    )
+    rig.until_sweeping()
+    rig.world.control({**fault, "sensor": "kvh"})
+    status, errors = rig.end()
+    assert status == 3 and name in errors and "the arm is stopped" in errors
+    assert not rig.world.state()["moving"]
+    run = read_run(rig.out / "run.h5")
+    assert len(run.samples["kvh"]) > 100 and len(run.samples["gyro"]) > 100, "the data are kept"

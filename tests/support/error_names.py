@@ -17,6 +17,7 @@ MAKERS = {
     "Fault": "fault",
     "RigError": "either",
     "BoardError": "either",
+    "SensorError": "either",
     "Problem": "either",
     "Violation": "simulated",
 }

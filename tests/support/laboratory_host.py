@@ -23,7 +23,7 @@ class Host:
     received: bytearray
 
     def ask(self, name: str, sequence: int, values: dict[str, Any] | None = None) -> None:
-        self.line.to_board(encode(name, sequence, values), None)
+        self.line.to_device(encode(name, sequence, values), None)
 
     def ticks(self, count: int) -> None:
         for _ in range(count):
@@ -50,7 +50,7 @@ class Host:
 def booted(loaded: Loaded) -> Host:
     """A laboratory whose board has started."""
     laboratory = Laboratory(loaded.config, world_section(loaded))
-    new = Host(laboratory, SerialLine(laboratory), bytearray())
+    new = Host(laboratory, SerialLine(lambda: laboratory.board), bytearray())
     new.ticks(200)
     return new
 

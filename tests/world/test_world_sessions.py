@@ -104,6 +104,7 @@ def test_any_recipe_at_any_rate(outputs: list[str], inputs: list[str], rate_hz: 
 
 @pytest.mark.parametrize("port", ["socket://127.0.0.1", "socket://127.0.0.1:x", "/dev/ttyACM0"])
 def test_a_board_port_that_is_no_address_is_refused(port: str) -> None:
+    assert LOADED.config.board is not None
     board = LOADED.config.board.model_copy(update={"port": port})
     config = LOADED.config.model_copy(
         update={"board": board, "arm": LOADED.config.arm.model_copy(update={"host": "127.9.9.9"})}

@@ -30,7 +30,7 @@ def firmware(suffix: str) -> bytes:
 def mount_sensors(
     config: RigConfig, world: WorldSection, motion_of: Callable[[SensorTruth], MotionAt], time_s: float
 ) -> dict[str, SpiDevice]:
-    """The sensors of the `world:` section, by name, given power at the virtual time `time_s`.
+    """The board's sensors of the `world:` section, by name, given power at the virtual time `time_s`.
 
     `motion_of`: what each of them feels at any time, 3 components or 6.
     """
@@ -43,6 +43,7 @@ def mount_sensors(
             time_s + world.board.boot_time_s,
         )
         for index, (name, simulated) in enumerate(sorted(world.sensors.items()))
+        if config.sensors[name].on_board
     }
 
 
@@ -101,3 +102,5 @@ def _sensor(
                 range_deg_s=int(sensor.range_deg_s),
                 ready_s=ready_s,
             )
+        case "kvh1775":
+            raise ValueError("a KVH 1775 is on no board")

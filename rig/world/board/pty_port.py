@@ -1,4 +1,4 @@
-"""The board's serial port as a pseudo-terminal (POSIX): a path that pyserial opens like /dev/ttyACM0."""
+"""A serial port as a pseudo-terminal (POSIX): a path that pyserial opens like /dev/ttyACM0."""
 
 import os
 import selectors
@@ -29,10 +29,10 @@ class PtyPort:
 
     def _ready(self, events: int) -> None:
         with suppress(OSError):
-            self._line.to_board(os.read(self._master, 4096), self._baud())
+            self._line.to_device(os.read(self._master, 4096), self._baud())
 
     def tick(self) -> None:
-        """Hand on what the board sent; what the user does not read in time is lost, as on a real port."""
+        """Hand on what the device sent; what the user does not read in time is lost, as on a real port."""
         if self._line.fresh and (data := self._line.to_host(self._baud())):
             with suppress(BlockingIOError):
                 os.write(self._master, data)

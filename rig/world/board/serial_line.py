@@ -1,6 +1,9 @@
-"""The board's serial line: bytes between the USART and the host, spoilt when the baud rates differ."""
+"""A serial line: bytes between what it comes from and the host, spoilt by unlike baud rates or a bad wire."""
 
-from rig.world.laboratory import Laboratory
+from collections.abc import Callable
+from typing import Protocol
+
+import numpy as np
 
 TOLERANCE = 0.03  # of the baud rate; a receiver still reads ten bits right
 
@@ -29,27 +32,44 @@ def misread(data: bytes, sent_baud: float, read_baud: float) -> bytes:
     return bytes(seen)
 
 
-class SerialLine:
-    """Between the laboratory's board and the host's end.
+class Device(Protocol):
+    """What stands at the far end of a serial line."""
 
-    `host_baud` is the host's baud rate where the transport does not tell (None: the same as the board's); a `silent`
-    line loses everything both ways.
+    @property
+    def baud_rate(self) -> float | None:
+        """None while it neither sends nor hears."""
+
+    def transmitted(self) -> bytes: ...
+    def receive(self, data: bytes) -> None: ...
+
+
+class SerialLine:
+    """Between a device of the laboratory (None: it has no power) and the host's end.
+
+    `host_baud` is the host's baud rate where the transport does not tell (None: the same as the device's); a `silent`
+    line loses everything both ways; of what the device sends, each bit is wrong with the probability `bit_error_rate`.
     """
 
-    def __init__(self, laboratory: Laboratory) -> None:
-        self._laboratory = laboratory
+    def __init__(self, device: Callable[[], Device | None], seed: int = 0) -> None:
+        self._device = device
+        self._random = np.random.default_rng(seed)
         self.host_baud: float | None = None
         self.silent = False
-        self.fresh = b""  # what the board has sent in the last tick, as the line carries it
+        self.bit_error_rate = 0.0
+        self.fresh = b""  # what the device has sent in the last tick, as the line carries it
 
     @property
     def baud(self) -> float | None:
-        """The board's baud rate; None while its USART is off or it has no power."""
-        return self._laboratory.board.baud_rate if self._laboratory.board is not None else None
+        """The device's baud rate; None while its USART is off or it has no power."""
+        device = self._device()
+        return device.baud_rate if device is not None else None
 
     def tick(self) -> None:
-        board = self._laboratory.board
-        self.fresh = board.transmitted() if board is not None else b""
+        device = self._device()
+        self.fresh = device.transmitted() if device is not None else b""
+        if self.bit_error_rate and self.fresh:
+            bits = np.unpackbits(np.frombuffer(self.fresh, np.uint8))
+            self.fresh = np.packbits(bits ^ (self._random.random(len(bits)) < self.bit_error_rate)).tobytes()
 
     def to_host(self, host_baud: float | None) -> bytes:
         """What a host at `host_baud` reads in this tick."""
@@ -58,13 +78,13 @@ class SerialLine:
         wanted, baud = host_baud or self.host_baud, self.baud
         return misread(self.fresh, baud, wanted) if wanted and baud else self.fresh
 
-    def to_board(self, data: bytes, host_baud: float | None) -> None:
+    def to_device(self, data: bytes, host_baud: float | None) -> None:
         """A host at `host_baud` sends."""
-        board, baud = self._laboratory.board, self.baud
-        if self.silent or board is None or not baud:
+        device, baud = self._device(), self.baud
+        if self.silent or device is None or not baud:
             return
         wanted = host_baud or self.host_baud
-        board.receive(misread(data, wanted, baud) if wanted else data)
+        device.receive(misread(data, wanted, baud) if wanted else data)
 
 
 class SerialSession:
@@ -80,7 +100,7 @@ class SerialSession:
         return b""
 
     def receive(self, data: bytes) -> bytes:
-        self._line.to_board(data, None)
+        self._line.to_device(data, None)
         return b""
 
     def tick(self) -> bytes:

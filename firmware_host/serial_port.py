@@ -1,0 +1,33 @@
+"""A serial port or `socket://host:port`, by pyserial: bytes, and OSError for all that goes wrong."""
+
+import serial
+
+READ_TIMEOUT_S = 0.005  # pyserial waits for all bytes asked for or this long, so it is the delay of every read
+_READ_SIZE = 65536
+
+
+class SerialPort:
+    """An open port; raises OSError from the constructor, `read` and `write`."""
+
+    def __init__(self, port: str, baud: int) -> None:
+        try:
+            self._serial = serial.serial_for_url(port, baudrate=baud, timeout=READ_TIMEOUT_S, exclusive=True)
+        except ValueError as error:  # what is no port's name, or no baud rate of it
+            raise OSError(str(error)) from error
+
+    def read(self) -> bytes:
+        """What came within `READ_TIMEOUT_S`."""
+        return bytes(self._serial.read(_READ_SIZE))
+
+    def write(self, data: bytes) -> None:
+        """Send, whatever the far end makes of it."""
+        self._serial.write(data)
+
+    def close(self) -> None:
+        """Close the port."""
+        sock = getattr(self._serial, "_socket", None)
+        if sock is not None:
+            # pyserial would leave it open when the far end closed it first, and else wait 0.3 s after closing it.
+            sock.close()
+            self._serial.is_open = False
+        self._serial.close()

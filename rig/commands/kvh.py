@@ -1,0 +1,78 @@
+"""`rig kvh info`: look at a KVH 1775 at a port or in a configuration. Nothing in its memory is changed."""
+
+import sys
+from collections.abc import Sequence
+from contextlib import ExitStack
+from dataclasses import replace
+from pathlib import Path
+from typing import Any, cast
+
+import numpy as np
+from numpy.typing import NDArray
+
+from rig.commands.laboratory import simulated_laboratory, written
+from rig.config.load import load
+from rig.errors import Refused, raised_as
+from rig.report.kvh_info import KvhInfo, print_kvh_info
+from rig.sensors.errors import SensorError
+from rig.sensors.kvh1775.driver import Kvh1775
+from rig.sensors.kvh1775.messages import Format
+from rig.sensors.kvh1775.settings import Wanted
+from rig.station.plain_text import say
+
+LOOK_S = 1.0
+LEAST_MESSAGES = 3
+
+
+def info(target: str, overrides: Sequence[str], baud: int | None, *, as_json: bool) -> int:
+    """Print what is at the port `target`, or every KVH 1775 of the configuration `target`; 2 if one has a problem."""
+    with ExitStack() as stack:
+        places = {target: (target, baud or 921600)}
+        if Path(target).is_file():
+            loaded = load(target, overrides, sections=None)
+            places = {
+                name: (section.serial.port, baud or section.serial.baud)
+                for name, section in loaded.config.sensors.items()
+                if section.serial is not None
+            }
+            if not places:
+                raise Refused("no_kvh_section", f"{target} has no KVH 1775", "Give a port, or another configuration")
+            if loaded.simulated:
+                stack.enter_context(simulated_laboratory(stack.enter_context(written(loaded.text))))
+        problems = []
+        for name, (port, speed) in places.items():
+            found = _look(name, port, speed)
+            print_kvh_info(found, as_json=as_json)
+            problems += [found.problem] if found.problem is not None else []
+    for problem in problems:
+        say(f"rig: {problem}", file=sys.stderr)
+    return 2 if problems else 0
+
+
+def _look(name: str, port: str, baud: int) -> KvhInfo:
+    """Raises Refused where nothing can be asked at all."""
+    seen: list[NDArray[Any]] = []
+    with (
+        raised_as(Refused),
+        Kvh1775(name, port, baud, lambda messages, numbers, times_us, host_time_s: seen.append(messages)) as kvh,
+    ):
+        found = KvhInfo(name, port, baud, kvh.serial_number, dict(kvh.settings))
+        try:
+            kvh.run()
+            found = replace(found, built_in_test=kvh.test().values.hex(" "))
+            rate_hz = float(kvh.settings["DR"])
+            kvh.start(Wanted(rate_hz, cast(Format, kvh.settings["OUTPUTFMT"]), "rate"))
+            kvh.listen(LOOK_S + LEAST_MESSAGES / rate_hz)
+        except SensorError as error:
+            found = replace(found, problem=str(error))
+        if not seen:
+            return found
+        messages = np.concatenate(seen)
+        return replace(
+            found,
+            messages=len(messages),
+            lost=kvh.lost,
+            rotation=tuple(messages["rotation"].mean(axis=0, dtype=np.float64).tolist()),
+            acceleration_g=tuple(messages["acceleration_g"].mean(axis=0, dtype=np.float64).tolist()),
+            status=f"0x{int(np.bitwise_and.reduce(messages['status'])):02x}",
+        )

@@ -1,0 +1,319 @@
+"""The host end of a KVH 1775's line: a thread that reads, a dialogue in configuration mode, a stream in normal mode.
+
+The same driver talks to the instrument over RS-422 and to the simulated one: bytes on a port.
+"""
+
+import re
+import threading
+import time
+from collections.abc import Callable, Collection
+from contextlib import suppress
+from types import TracebackType
+from typing import Any, Self
+
+from numpy.typing import NDArray
+
+from firmware_host.serial_port import READ_TIMEOUT_S, SerialPort
+from rig.sensors.errors import SensorError
+from rig.sensors.kvh1775.counting import MessageCounter
+from rig.sensors.kvh1775.messages import BuiltInTest, MessageReader
+from rig.sensors.kvh1775.settings import NAMES, Wanted, same
+
+ATTEMPTS = 4  # times a command is sent; each waits twice as long as the one before
+SILENCE_S = 2.0  # without a message in a stream, and the link is lost
+KEPT_BYTES = 4096  # of what came while an answer was awaited
+_CABLE = "Check its supply and cable, and whether another program has the port"
+
+# Messages (n,) MESSAGE_DTYPE, their numbers (n,) from 0, their times (n,) in µs, and when they were read.
+OnMessages = Callable[[NDArray[Any], NDArray[Any], NDArray[Any], float], None]
+
+
+class Kvh1775:
+    """The instrument on a serial port or `socket://host:port`; a context manager. `on_messages` runs on its thread.
+
+    What goes wrong is a SensorError whose name begins with `kvh_`; all messages name `sensor`, as the configuration.
+    """
+
+    def __init__(
+        self, sensor: str, port: str, baud: int, on_messages: OnMessages | None = None, timeout_s: float = 4.0
+    ) -> None:
+        """Opens the port, ends a stream that may be running, and asks for number and settings.
+
+        Raises SensorError: no_port, no_kvh, kvh_wrong_baud_rate, kvh_does_not_hear, kvh_command_refused.
+        """
+        self._sensor, self._port, self._baud = sensor, port, baud
+        self._on_messages, self._timeout_s = on_messages, timeout_s
+        self._messages = MessageReader()
+        self._bytes_seen = self._messages_seen = self._idle_reads = 0
+        self._tests: list[BuiltInTest] = []
+        self._counter: MessageCounter | None = None  # while it streams
+        self._format = b""
+        self._fault: SensorError | None = None
+        self._heard = bytearray()
+        self._news = threading.Condition()
+        self._closing = threading.Event()
+        self._clock_s: float | None = None  # what another instrument's clock showed at the last check,
+        self._clock_at_message_s: float | None = None  # … and when the last message came
+        try:
+            self._serial = SerialPort(port, baud)
+        except OSError as error:
+            raise SensorError(
+                "no_port",
+                f"sensors.{sensor}: the port {port} does not open: {error}",
+                "Check serial.port and the cable, and that no other program has the port",
+            ) from error
+        self._reader = threading.Thread(target=self._read, name=f"kvh1775 {port}", daemon=True)
+        self._reader.start()
+        try:
+            self._configure()
+            self.serial_number = self._ask("?IS", "IS")
+            self.settings = {name: self._ask(f"?{name}", name) for name in NAMES}
+        except BaseException:
+            self.close()
+            raise
+
+    def __enter__(self) -> Self:
+        return self
+
+    def __exit__(
+        self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
+    ) -> None:
+        self.close()
+
+    @property
+    def port(self) -> str:
+        """Where it is."""
+        return self._port
+
+    def correct(self, settings: dict[str, str]) -> None:
+        """Changes settings in its memory, and reads every one back. Raises SensorError, also `kvh_setting_not_kept`."""
+        for name, value in settings.items():
+            self._ask(f"={name},{value}", name)
+        self.settings = {name: self._ask(f"?{name}", name) for name in NAMES}
+        for name, value in settings.items():
+            if not same(self.settings[name], value):
+                raise SensorError(
+                    "kvh_setting_not_kept",
+                    f"sensors.{self._sensor}: the KVH 1775 was set to {name},{value} and reads back "
+                    f"{self.settings[name]}",
+                    "Switch it off and on, then try again; if it stays, ask its maker",
+                )
+
+    def run(self) -> None:
+        """Back to normal mode, in which it sends messages as it is set to. Raises SensorError `kvh_silent`."""
+        seen = self._messages_seen
+        period_s = 1.0 / float(self.settings["DR"])
+        for wait_s in self._waits(self._timeout_s + ATTEMPTS * period_s):
+            self._write("=CONFIG,0")  # which is not answered
+            if self._wait(lambda: self._messages_seen > seen, wait_s):
+                return
+        raise SensorError(
+            "kvh_silent",
+            f"sensors.{self._sensor}: no message came from the KVH 1775 on {self._port} in normal mode",
+            "Look at its MSYNC: an instrument that waits for an external one sends nothing by itself",
+        )
+
+    def test(self) -> BuiltInTest:
+        """What its built-in test says, in normal mode. Raises SensorError `kvh_no_test`, `kvh_test_failed`."""
+        self._tests.clear()
+        period_s = 1.0 / float(self.settings["DR"])  # its result follows the next message
+        for wait_s in self._waits(self._timeout_s + ATTEMPTS * period_s):
+            self._write("?BIT")  # ?BIT,2 has bytes that the ICD does not print as 7f when all is well
+            if self._wait(lambda: bool(self._tests), wait_s):
+                found = self._tests[0]
+                if not found.passed:
+                    raise SensorError(
+                        "kvh_test_failed",
+                        f"sensors.{self._sensor}: the built-in test of the KVH 1775 gives {found.values.hex(' ')}, "
+                        "where 7f is good",
+                        "Look the bits up in its manual, under the built-in test; do not calibrate it like this",
+                    )
+                return found
+        raise SensorError(
+            "kvh_no_test",
+            f"sensors.{self._sensor}: the KVH 1775 on {self._port} sends no result of its built-in test",
+            "Switch it off and on, then try again",
+        )
+
+    def start(self, wanted: Wanted) -> None:
+        """From the next message on, everything goes to `on_messages`."""
+        with self._news:
+            self._counter = MessageCounter(1e6 / wanted.rate_hz, timed=wanted.message == "B")
+            self._format = wanted.message.encode()
+            self._idle_reads = 0
+
+    @property
+    def lost(self) -> int:
+        """Messages lost in the stream."""
+        return 0 if self._counter is None else self._counter.lost
+
+    def check(self, clock_s: float | None = None) -> None:
+        """Raises what went wrong meanwhile: `kvh_link_lost`, and what a message could not be used for.
+
+        `clock_s` is what another instrument's clock shows now, if there is one: a silence must be as long by that too.
+        """
+        if self._fault is not None:
+            raise self._fault
+        with self._news:
+            self._clock_s = self._clock_s if clock_s is None else clock_s
+            silent_s = self._silent_s
+        if self._counter is not None and silent_s > SILENCE_S + 2e-6 * self._counter.interval_us:
+            raise SensorError(
+                "kvh_link_lost",
+                f"sensors.{self._sensor}: no whole message from the KVH 1775 on {self._port} for {silent_s:.1f} s",
+                _CABLE,
+            )
+
+    def listen(self, duration_s: float) -> None:
+        """Waits so long while it streams. Raises what goes wrong meanwhile."""
+        self._wait(lambda: False, duration_s)
+
+    @property
+    def _silent_s(self) -> float:
+        """How long no message has come, in time spent reading: when the reader was held up, nobody was silent.
+
+        Nor was anybody while another instrument's clock stood still, if there is one: it may be a simulated one's.
+        """
+        silent_s = self._idle_reads * READ_TIMEOUT_S
+        if self._clock_s is None:
+            return silent_s
+        if self._clock_at_message_s is None:
+            self._clock_at_message_s = self._clock_s
+        return min(silent_s, self._clock_s - self._clock_at_message_s)
+
+    def fail(self, error: SensorError) -> None:
+        """Makes `error` what `check` raises, unless there is one already."""
+        self._fault = self._fault or error
+
+    def close(self) -> None:
+        """Leaves it in normal mode, as after switching on, and closes the port. May be called twice."""
+        if self._closing.is_set():
+            return
+        with suppress(SensorError):
+            self._write("=CONFIG,0")
+        self._closing.set()
+        self._reader.join()
+        self._serial.close()
+
+    # -- the dialogue ----------------------------------------------------------------------------------------------
+    def _configure(self) -> None:
+        """Into configuration mode, from whichever it is in."""
+        try:
+            self._ask("=CONFIG,1", "CONFIG")
+        except SensorError as error:
+            if error.name != "kvh_link_lost" or self._fault is not None:
+                raise
+            raise self._why_no_answer() from error
+
+    def _why_no_answer(self) -> SensorError:
+        where = f"sensors.{self._sensor}: the KVH 1775 on {self._port}"
+        if self._messages_seen:
+            return SensorError(
+                "kvh_does_not_hear",
+                f"{where} sends, but does not answer",
+                "Check the pair of wires to its receiver",
+            )
+        if self._bytes_seen:
+            return SensorError(
+                "kvh_wrong_baud_rate",
+                f"{self._bytes_seen} bytes came from {where} at {self._baud} Bd, and no message or answer in them",
+                "Set serial.baud to what the instrument is set to; it is delivered with 921600",
+            )
+        return SensorError("no_kvh", f"{where}: nothing came within {self._timeout_s:g} s", _CABLE)
+
+    def _ask(self, command: str, name: str) -> str:
+        """What stands behind `name` in the answer. Raises SensorError `kvh_command_refused`, `kvh_link_lost`."""
+        answer = re.compile(rb"%s,([^\r\n]*)[\r\n]" % re.escape(name.encode()))
+        for wait_s in self._waits(self._timeout_s):
+            with self._news:
+                self._heard.clear()
+            self._write(command)
+            if self._wait(lambda: answer.search(self._heard) is not None, wait_s):
+                found = answer.search(self._heard)
+                assert found is not None
+                return found.group(1).decode("ascii", "replace").strip()
+            # Only now: what it finds invalid may have been half a command of somebody else's, or the empty line before.
+            if (invalid := re.search(rb"INVALID[^\r\n]*", self._heard)) is not None:
+                raise SensorError(
+                    "kvh_command_refused",
+                    f"sensors.{self._sensor}: the KVH 1775 answers {command} with "
+                    f"{invalid.group().decode('ascii', 'replace')}",
+                    "Look whether its software is older than its interface document 56-0298 Rev. B",
+                )
+        raise SensorError(
+            "kvh_link_lost",
+            f"sensors.{self._sensor}: the KVH 1775 on {self._port} did not answer {command} within "
+            f"{self._timeout_s:g} s",
+            _CABLE,
+        )
+
+    @staticmethod
+    def _waits(timeout_s: float) -> Collection[float]:
+        return [timeout_s * 2**attempt / (2**ATTEMPTS - 1) for attempt in range(ATTEMPTS)]
+
+    def _wait(self, until: Callable[[], bool], timeout_s: float) -> bool:
+        """Whether it was so in time. Raises what went wrong meanwhile."""
+        with self._news:
+            done = self._news.wait_for(lambda: until() or self._fault is not None, timeout_s)
+            if self._fault is not None:
+                raise self._fault
+            return done
+
+    def _write(self, command: str) -> None:
+        """The leading line end finishes whatever half a command it may have heard before."""
+        try:
+            self._serial.write(b"\r\n" + command.encode("ascii") + b"\r\n")
+        except OSError as error:
+            raise self._port_closed(error) from error
+
+    def _port_closed(self, error: Exception) -> SensorError:
+        return SensorError("kvh_link_lost", f"sensors.{self._sensor}: the port {self._port} closed: {error}", _CABLE)
+
+    # -- the reader's thread ---------------------------------------------------------------------------------------
+    def _read(self) -> None:
+        try:
+            while not self._closing.is_set():
+                self._take(self._serial.read(), time.monotonic())
+        except OSError as error:
+            self.fail(self._port_closed(error))
+        except SensorError as error:
+            self.fail(error)
+        except Exception as error:  # a failing consumer must reach the caller, not end in a dead thread
+            self.fail(SensorError("kvh_not_taken", f"sensors.{self._sensor}: {error!r}", "See the run's log"))
+        with self._news:
+            self._news.notify_all()
+
+    def _take(self, data: bytes, host_time_s: float) -> None:
+        decoded = self._messages.feed(data)
+        with self._news:
+            silent_s = self._silent_s
+            if len(decoded.messages):
+                self._idle_reads, self._clock_at_message_s = 0, self._clock_s
+            else:
+                self._idle_reads += 1
+            if not data:
+                return
+            self._bytes_seen += len(data)
+            self._messages_seen += len(decoded.messages)
+            self._heard = (self._heard + data)[-KEPT_BYTES:]
+            self._tests += decoded.tests
+            counter = self._counter
+            self._news.notify_all()
+        if counter is None or not len(decoded.messages):
+            return
+        if decoded.tests:
+            raise SensorError(
+                "kvh_restarted",
+                f"sensors.{self._sensor}: the KVH 1775 on {self._port} told of its built-in test while it streamed: it "
+                "was switched off and on",
+                "Check its supply, then run again",
+            )
+        if (decoded.messages["format"] != self._format).any():
+            raise SensorError(
+                "kvh_other_format",
+                f"sensors.{self._sensor}: the KVH 1775 on {self._port} sends another format than it was set to",
+                "See that no other program talks to it, then run again",
+            )
+        numbers, times_us = counter.count(decoded.messages, silent_s)
+        if self._on_messages is not None:
+            self._on_messages(decoded.messages, numbers, times_us, host_time_s)

@@ -1,0 +1,206 @@
+"""A configured KVH 1775 as a source of samples: set up as the run needs it, its messages made samples."""
+
+from collections.abc import Iterator, Mapping
+from contextlib import contextmanager
+from math import radians
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from firmware_host.samples import IMU_SAMPLE_DTYPE, SAMPLE_DTYPE
+from rig.config.models import OwnPortSection, SensorSection, mounting_matrix
+from rig.config.sensor_catalogue import PARTS
+from rig.data.run_file import RecordedSensor
+from rig.estimation.earth import STANDARD_GRAVITY_M_S2
+from rig.sensors.errors import SensorError
+from rig.sensors.kvh1775.driver import Kvh1775
+from rig.sensors.kvh1775.settings import Wanted, corrections, refusals
+from rig.sensors.source import OnSamples
+
+# The instrument sends single-precision floats; a sample holds whole numbers. This many stand for its full scale: far
+# finer than a float near it, and half of what 32 bits hold.
+FULL_SCALE_COUNTS = 1 << 30
+GYROSCOPE_VALID, ACCELEROMETER_VALID = 0x07, 0x70
+INVALID_S = 1.0  # of messages in a row that say of themselves they are wrong
+DEGREES_PER_COUNT = 0.01
+_UNKNOWN = 1 << 40  # temperature that nothing has told yet
+
+
+class Kvh1775Source:
+    """An instrument that is set up.
+
+    A message that says of itself an axis is invalid is no sample: it counts as lost.
+    """
+
+    def __init__(self, name: str, section: SensorSection, on_samples: OnSamples) -> None:
+        """Raises SensorError as `Kvh1775`, `refusals`, and `kvh_other_serial_number`."""
+        self._name, self._on_samples = name, on_samples
+        line = _line_of(section)
+        self._wanted = wanted_of(section)
+        self._described = describe(section)
+        self._valid = GYROSCOPE_VALID | (ACCELEROMETER_VALID if section.acceleration is not None else 0)
+        self._invalid_in_a_row = 0
+        self._temperature_counts = _UNKNOWN
+        self._first: int | None = None  # number of the first message that became a sample
+        self._driver = Kvh1775(name, line.port, line.baud, self._take)
+        try:
+            self.serial_number = self._driver.serial_number
+            for refusal in judge(self._driver, name, section):
+                raise refusal
+            found = self._driver.settings
+            changes = corrections(found, self._wanted)
+            self._corrected = {setting: found[setting] for setting in changes}
+            self._driver.correct(changes)
+            self._driver.run()
+            self._driver.test()
+        except BaseException:
+            self.close()
+            raise
+
+    @property
+    def corrected(self) -> Mapping[str, str]:
+        """Settings that were not as the run needs them: name → what was there."""
+        return self._corrected
+
+    @property
+    def sensors(self) -> Mapping[str, RecordedSensor]:
+        """The one there is."""
+        return {self._name: self._described}
+
+    def start(self) -> None:
+        """As of `SampleSource`."""
+        self._driver.start(self._wanted)
+
+    def check(self, clock_s: float | None = None) -> None:
+        """As of `SampleSource`. Raises SensorError as `Kvh1775.check`, and `kvh_axis_invalid`."""
+        self._driver.check(clock_s)
+
+    def close(self) -> None:
+        """Ends the thread and closes the port."""
+        self._driver.close()
+
+    def _take(self, messages: NDArray[Any], numbers: NDArray[Any], times_us: NDArray[Any], host_time_s: float) -> None:
+        """On the reader's thread: what is valid, as samples."""
+        temperature_counts = self._temperatures(messages)
+        valid = (messages["status"] & self._valid) == self._valid
+        valid &= np.isfinite(messages["rotation"]).all(axis=1) & np.isfinite(messages["acceleration_g"]).all(axis=1)
+        self._watch(messages, valid)
+        valid &= temperature_counts != _UNKNOWN
+        if not valid.any():
+            return
+        samples = np.zeros(int(valid.sum()), sample_dtype(self._described))
+        if self._first is None:
+            self._first = int(numbers[valid][0])
+        samples["sequence"] = numbers[valid] - self._first
+        samples["board_time_us"] = times_us[valid]
+        samples["host_time_s"] = host_time_s
+        samples["temperature_counts"] = temperature_counts[valid]
+        rate_rad_s = messages["rotation"][valid].astype(np.float64)
+        if self._wanted.rotation == "delta":
+            rate_rad_s *= self._wanted.rate_hz  # its own seconds, in which it counts its intervals
+        samples["counts"] = _counts(rate_rad_s, self._described.sensitivity_rad_s_per_count)
+        if self._described.sensitivity_m_s2_per_count is not None:
+            force_m_s2 = messages["acceleration_g"][valid].astype(np.float64) * STANDARD_GRAVITY_M_S2
+            samples["acceleration_counts"] = _counts(force_m_s2, self._described.sensitivity_m_s2_per_count)
+        self._on_samples(self._name, samples)
+
+    def _watch(self, messages: NDArray[Any], valid: NDArray[np.bool_]) -> None:
+        good = np.flatnonzero(valid)
+        self._invalid_in_a_row = len(valid) - 1 - int(good[-1]) if len(good) else self._invalid_in_a_row + len(valid)
+        if self._invalid_in_a_row > INVALID_S * self._wanted.rate_hz:
+            raise SensorError(
+                "kvh_axis_invalid",
+                f"sensors.{self._name}: the KVH 1775 has called its readings invalid for {INVALID_S:g} s, status "
+                f"0x{int(messages['status'][-1]):02x} where 0x77 is good",
+                "Wait until it is warm, look at its built-in test with `rig kvh info`; if it stays, ask its maker",
+            )
+
+    def _temperatures(self, messages: NDArray[Any]) -> NDArray[np.int64]:
+        """(n,) in hundredths of a degree; format C says it in every fourth message, and `_UNKNOWN` before the first."""
+        if self._wanted.message != "C":
+            found: NDArray[np.int64] = messages["temperature"].astype(np.int64)
+            return found
+        said = messages["sequence"] % 4 == 0
+        hundredths = np.rint(messages["fourth"].astype(np.float64) / DEGREES_PER_COUNT).astype(np.int64)
+        newest = np.maximum.accumulate(np.where(said, np.arange(len(said)), -1))
+        held: NDArray[np.int64] = np.where(newest >= 0, hundredths[newest], self._temperature_counts)
+        self._temperature_counts = int(held[-1])
+        return held
+
+
+def wanted_of(section: SensorSection) -> Wanted:
+    """What a configured sensor has to be set to."""
+    line = _line_of(section)
+    return Wanted(section.rate_hz, line.message, line.rotation)
+
+
+def judge(driver: Kvh1775, name: str, section: SensorSection) -> Iterator[SensorError]:
+    """What speaks against using the instrument: another number than configured, settings nobody may just change."""
+    if driver.serial_number != section.serial_number:
+        yield SensorError(
+            "kvh_other_serial_number",
+            f"sensors.{name}: the KVH 1775 on {driver.port} has serial number {driver.serial_number}, the "
+            f"configuration says {section.serial_number}",
+            "Correct serial_number in the configuration, or connect that instrument",
+        )
+    yield from refusals(f"sensors.{name}", driver.settings)
+
+
+def describe(section: SensorSection) -> RecordedSensor:
+    """What a reader of its samples must know."""
+    range_rad_s = radians(section.range_deg_s)
+    range_m_s2 = None
+    if section.acceleration is not None:
+        range_m_s2 = (section.acceleration.range_g or PARTS[section.part].ranges_g[0]) * STANDARD_GRAVITY_M_S2
+    return RecordedSensor(
+        part=section.part,
+        serial_number=section.serial_number,
+        rate_hz=section.rate_hz,
+        range_rad_s=range_rad_s,
+        sensitivity_rad_s_per_count=range_rad_s / FULL_SCALE_COUNTS,
+        full_scale_counts=FULL_SCALE_COUNTS,
+        temperature_c_per_count=DEGREES_PER_COUNT,
+        temperature_offset_c=0.0,
+        mounting=tuple(tuple(row) for row in mounting_matrix(section.mounting).tolist()),
+        range_m_s2=range_m_s2,
+        sensitivity_m_s2_per_count=None if range_m_s2 is None else range_m_s2 / FULL_SCALE_COUNTS,
+    )
+
+
+@contextmanager
+def kvh1775(name: str, section: SensorSection, on_samples: OnSamples) -> Iterator[Kvh1775Source]:
+    """The instrument for the length of the `with` block. Raises SensorError as `Kvh1775Source`."""
+    source = Kvh1775Source(name, section, on_samples)
+    try:
+        yield source
+    finally:
+        source.close()
+
+
+def look(name: str, section: SensorSection) -> Iterator[str | SensorError]:
+    """What there is, and what is wrong with it; nothing in its memory is changed. Raises SensorError as `Kvh1775`."""
+    line = _line_of(section)
+    with Kvh1775(name, line.port, line.baud) as driver:
+        yield f"KVH 1775 at {line.port}: serial number {driver.serial_number}"
+        for setting, value in corrections(driver.settings, wanted_of(section)).items():
+            yield f"{setting} is {driver.settings[setting]}; a run sets it to {value}"
+        yield from judge(driver, name, section)
+        driver.run()
+        yield f"built-in test: {driver.test().values.hex(' ')}"
+
+
+def sample_dtype(sensor: RecordedSensor) -> np.dtype[Any]:
+    """Of its samples."""
+    return IMU_SAMPLE_DTYPE if sensor.has_acceleration else SAMPLE_DTYPE
+
+
+def _counts(values: NDArray[np.float64], per_count: float) -> NDArray[np.float64]:
+    limit = 2.0 * FULL_SCALE_COUNTS - 1
+    return np.clip(np.rint(values / per_count), -limit, limit)
+
+
+def _line_of(section: SensorSection) -> OwnPortSection:
+    if section.serial is None:
+        raise ValueError("the configuration lets no sensor with a port of its own pass without one")
+    return section.serial

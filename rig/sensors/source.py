@@ -1,0 +1,30 @@
+"""Where samples come from: whatever has a port of its own, be it a board with several sensors or one instrument."""
+
+from collections.abc import Callable, Mapping
+from typing import Any, Protocol
+
+from numpy.typing import NDArray
+
+from rig.data.run_file import RecordedMagnetometer, RecordedSensor
+
+Recorded = RecordedSensor | RecordedMagnetometer
+
+# A sensor's name, and samples (n,) SAMPLE_DTYPE, IMU_SAMPLE_DTYPE or FIELD_SAMPLE_DTYPE; called on the source's thread.
+OnSamples = Callable[[str, NDArray[Any]], None]
+
+
+class SampleSource(Protocol):
+    """Connected and set up, and silent until `start`. Errors are ProblemErrors, by name."""
+
+    @property
+    def sensors(self) -> Mapping[str, Recorded]:
+        """What it streams, by the sensors' names."""
+        ...
+
+    def start(self) -> None:
+        """From now on every sample is handed on, those of each sensor numbered from 0."""
+        ...
+
+    def check(self, clock_s: float | None = None) -> None:
+        """Raises what went wrong meanwhile; a silence must be as long by the clock that shows `clock_s`, if any."""
+        ...

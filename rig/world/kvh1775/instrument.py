@@ -1,0 +1,174 @@
+"""The simulated KVH 1775: two modes, settings that outlast its supply, an oscillator of its own, bytes in and out.
+
+Source: ICD 56-0298 Rev. B, sections 3.3 (modes), 3.4 (built-in test), 5 (messages), 8 (commands).
+"""
+
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass
+from math import ceil
+from typing import cast
+
+import numpy as np
+
+from firmware_host.emulator.accelerometer import STANDARD_GRAVITY_M_S2, Accelerometer
+from firmware_host.emulator.gyroscope import Gyroscope
+from rig.sensors.kvh1775.messages import ALL_VALID, GOOD_TEST_BYTE, SEQUENCE_NUMBERS, Format, encode, encode_test
+from rig.world.board.sensor_truth import SensorTruth
+from rig.world.kvh1775.memory import Memory
+
+INTERNAL_STEP_S = 1e-3  # at most, between two looks at the motion that a delta angle is summed of
+LINE_END = b"\r\n"
+LONGEST_COMMAND = 200
+FIELD_GAUSS = (0.2, 0.0, -0.4)  # somewhere in Europe; nothing in the laboratory turns it
+
+
+@dataclass(slots=True)
+class Faults:
+    """What a test can make wrong: the next messages to `lose`, `status` bits that are valid, built-in test bytes."""
+
+    lose: int = 0
+    status: int = ALL_VALID
+    test: int = GOOD_TEST_BYTE
+
+
+class Kvh1775:
+    """The instrument, switched on at the virtual time `time_s`, by when it has counted `on_for_s`.
+
+    `motion_at`: what it feels, rate in rad/s and specific force in g. `memory`: its settings, which it changes.
+    """
+
+    def __init__(
+        self,
+        truth: SensorTruth,
+        motion_at: Callable[[float], Sequence[float]],
+        memory: Memory,
+        *,
+        serial_number: str,
+        oscillator_ppm: float,
+        on_for_s: float,
+        seed: np.random.SeedSequence,
+        time_s: float,
+    ) -> None:
+        self.faults = Faults()
+        self._truth, self._motion_at, self._memory = truth, motion_at, memory
+        self._serial_number = serial_number
+        self._speed = 1.0 + 1e-6 * oscillator_ppm
+        self._counted_from_s = time_s - on_for_s / self._speed
+        self._felt: Sequence[float] = ()
+        self._gyroscope = Gyroscope(lambda time_s: self._felt, truth.gyro, seed, truth.temperature_c)
+        self._accelerometer = Accelerometer(motion_at, truth.accelerometer, seed, truth.temperature_c)
+        self._now_s = time_s
+        self._sequence = 0
+        self._command = bytearray()
+        self._sent = bytearray(encode_test(bytes([GOOD_TEST_BYTE] * 6)))
+        self._tests_due: list[int] = []
+        self.configuring = False
+        self._begin()
+
+    @property
+    def baud_rate(self) -> float:
+        """Of both directions."""
+        return float(self._memory["BAUD"])
+
+    def transmitted(self) -> bytes:
+        """What it has sent since it was asked last."""
+        data = bytes(self._sent)
+        self._sent.clear()
+        return data
+
+    def receive(self, data: bytes) -> None:
+        """Commands end with CR, LF or both."""
+        for byte in data:
+            if byte in LINE_END:
+                line, self._command = bytes(self._command), bytearray()
+                if line.strip():
+                    self._obey(line.decode("ascii", "replace").strip().upper())
+            elif len(self._command) < LONGEST_COMMAND:
+                self._command.append(byte)
+
+    def advance(self, time_s: float) -> None:
+        """Live until this virtual time, which lies in the laboratory's last tick."""
+        while not self.configuring and self._memory["MSYNC"] == "IMU":
+            at_s = self._began_s + (self._steps + 1) * self._step_s
+            if at_s > time_s:
+                break
+            self._steps += 1
+            self._look(at_s)
+            if self._steps % self._steps_each == 0:
+                self._send(at_s)
+        self._now_s = time_s
+
+    # -- normal mode ---------------------------------------------------------------------------------------------
+    def _begin(self) -> None:
+        """Messages from now on, the first after one interval."""
+        delta = self._memory["ROTFMT"] == "DELTA"
+        interval_s = 1.0 / float(self._memory["DR"])  # of its own seconds
+        self._steps_each = ceil(interval_s / INTERNAL_STEP_S - 1e-9) if delta else 1
+        self._step_s = interval_s / self._steps_each / self._speed
+        self._began_s, self._steps = self._now_s, 0
+        self._before: Sequence[float] | None = None
+        self._sum = [0.0] * 6
+
+    def _look(self, at_s: float) -> None:
+        """One look at the motion: a rate is what it is now, a delta angle is summed by the trapezoidal rule."""
+        now = self._motion_at(at_s - self._truth.gyro.delay_s)
+        before = self._before or now
+        self._sum = [total + 0.5 * (old + new) for total, old, new in zip(self._sum, before, now, strict=False)]
+        self._before = now
+
+    def _send(self, at_s: float) -> None:
+        memory = self._memory
+        delta = memory["ROTFMT"] == "DELTA"
+        self._felt = [total / self._steps_each for total in self._sum] if delta else cast(Sequence[float], self._before)
+        self._sum = [0.0] * 6
+        rotation = np.array(self._gyroscope.read(at_s))
+        if delta:
+            rotation /= float(memory["DR"])
+        if memory["ROTUNITS"] == "DEG":
+            rotation = np.degrees(rotation)
+        acceleration_g = np.array(self._accelerometer.read(at_s)) / STANDARD_GRAVITY_M_S2
+        axes = memory.axes
+        sequence, self._sequence = self._sequence, (self._sequence + 1) % SEQUENCE_NUMBERS
+        if self.faults.lose > 0:
+            self.faults.lose -= 1
+            return
+        temperature = self._temperature(at_s)
+        self._sent += encode(
+            cast(Format, memory["OUTPUTFMT"]),
+            rotation=axes @ rotation,
+            acceleration_g=axes @ acceleration_g,
+            sequence=sequence,
+            status=self.faults.status,
+            temperature=round(temperature),
+            time_us=round((at_s - self._counted_from_s) * self._speed * 1e6) % 2**32,
+            fourth=(temperature, *FIELD_GAUSS)[sequence % 4],
+        )
+        for count in self._tests_due:
+            self._sent += encode_test(bytes([self.faults.test] + [GOOD_TEST_BYTE] * (count - 1)))
+        self._tests_due.clear()
+
+    def _temperature(self, at_s: float) -> float:
+        unit = self._memory["TEMPUNITS"]
+        celsius = self._gyroscope.temperature_c(at_s)
+        value = celsius if unit.startswith("C") else celsius * 1.8 + 32.0
+        return value * 100.0 if unit.endswith("_100") else value
+
+    # -- commands ------------------------------------------------------------------------------------------------
+    def _obey(self, command: str) -> None:
+        if command in ("?BIT", "?BIT,2") and not self.configuring:
+            self._tests_due.append(6 if command == "?BIT" else 8)
+        elif command == "=CONFIG,1":
+            self.configuring = True
+            self._answer("CONFIG,1")
+        elif not self.configuring:
+            return  # binary mode hears nothing else
+        elif command == "=CONFIG,0":
+            self.configuring = False  # not answered: the messages say it
+            self._begin()
+        elif command == "?IS":
+            self._answer(f"IS,{self._serial_number}")
+        else:
+            self._answer(self._memory.obey(command))
+
+    def _answer(self, text: str) -> None:
+        self._sent += text.encode("ascii", "replace") + LINE_END

@@ -1,0 +1,96 @@
+"""The settings a KVH 1775 keeps without its supply, and the commands that ask for and change them (ICD, section 8)."""
+
+from collections.abc import Mapping
+from math import isfinite
+
+import numpy as np
+from numpy.typing import NDArray
+
+IDENTITY = "1,0,0,0,1,0,0,0,1"
+FILTERS = ("CHEBY", "BUTTER", "AVE", "CUSTOM")
+FACTORY: Mapping[str, str] = {
+    "AXES": IDENTITY,
+    "BAUD": "921600",
+    "DR": "1000",
+    "FILTEN,A": "1",
+    "FILTEN,G": "1",
+    "FILTTYPE,A": "CHEBY",
+    "FILTTYPE,G": "CHEBY",
+    "MSYNC": "IMU",
+    "OUTPUTFMT": "A",
+    "ROTFMT": "DELTA",
+    "ROTUNITS": "RAD",
+    "TEMPUNITS": "C",
+}
+CHOICES: Mapping[str, tuple[str, ...]] = {
+    "BAUD": ("9600", "19200", "38400", "57600", "115200", "460800", "576000", "921600", "4147200"),
+    "DR": ("1", "5", "10", "25", "50", "100", "250", "500", "750", "1000", "3600", "5000"),
+    "FILTEN,A": ("0", "1"),
+    "FILTEN,G": ("0", "1"),
+    "FILTTYPE,A": FILTERS,
+    "FILTTYPE,G": FILTERS,
+    "MSYNC": ("IMU", "EXT"),
+    "OUTPUTFMT": ("A", "B", "C"),
+    "ROTFMT": ("DELTA", "RATE"),
+    "ROTUNITS": ("RAD", "DEG"),
+    "TEMPUNITS": ("C", "F", "C_100", "F_100"),
+}
+
+
+class Memory:
+    """The instrument's non-volatile memory, as its user left it: `left` over the factory's settings.
+
+    Raises ValueError for a setting the instrument does not have.
+    """
+
+    def __init__(self, left: Mapping[str, str]) -> None:
+        self._settings = dict(FACTORY)
+        for name, value in left.items():
+            if not self._set(name.upper(), value.upper()):
+                raise ValueError(f"a KVH 1775 cannot be set to {name},{value}")
+
+    def __getitem__(self, name: str) -> str:
+        return self._settings[name]
+
+    @property
+    def axes(self) -> NDArray[np.float64]:
+        """(3, 3) by which rates and accelerations are multiplied: any matrix, not only rotations."""
+        return np.array([float(value) for value in self["AXES"].split(",")]).reshape(3, 3)
+
+    def obey(self, command: str) -> str:
+        """The answer to a command in capitals."""
+        sign, name = command[:1], command[1:]
+        if sign == "?" and name in self._settings:
+            return self._said(name)
+        if command == "=RSTCFG":
+            self._settings.update({**FACTORY, "BAUD": self["BAUD"]})
+            return "RSTCFG"
+        if sign == "=":
+            for known in self._settings:
+                if name.startswith(f"{known},") and self._set(known, name[len(known) + 1 :]):
+                    return self._said(known)
+        return f"INVALID,{command}"
+
+    def _said(self, name: str) -> str:
+        if name == "AXES":
+            return "AXES," + ",".join(f"{value:+.6E}" for value in self.axes.ravel().tolist())
+        return f"{name},{self[name]}"
+
+    def _set(self, name: str, value: str) -> bool:
+        if name == "AXES":
+            if not _nine_numbers(value):
+                return False
+        elif value not in CHOICES.get(name, ()):
+            return False
+        self._settings[name] = value
+        if (name, value) == ("MSYNC", "EXT"):
+            self._settings.update({"FILTTYPE,A": "AVE", "FILTTYPE,G": "AVE"})  # and so they stay
+        return True
+
+
+def _nine_numbers(text: str) -> bool:
+    try:
+        values = [float(value) for value in text.split(",")]
+    except ValueError:
+        return False
+    return len(values) == 9 and all(map(isfinite, values))

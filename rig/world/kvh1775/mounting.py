@@ -1,0 +1,66 @@
+"""The KVH 1775s of the laboratory: their memories, and the instruments on the flange that use them."""
+
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass
+
+import numpy as np
+
+from rig.config.models import AccelerationSection, RigConfig
+from rig.config.world_models import SimulatedKvhSection, WorldSection
+from rig.errors import Refused
+from rig.world.board.sensor_truth import SensorTruth
+from rig.world.kvh1775.instrument import Kvh1775
+from rig.world.kvh1775.memory import Memory
+
+MotionAt = Callable[[float], Sequence[float]]
+
+
+@dataclass(slots=True)
+class Mount:
+    """One instrument's place: what stays there when it is switched off, which is its memory."""
+
+    name: str
+    config: RigConfig
+    world: WorldSection
+    memory: Memory
+    kvh: Kvh1775 | None = None  # None: without power
+
+    def switch_on(self, motion_of: Callable[[SensorTruth], MotionAt], time_s: float) -> None:
+        """Give it power at the virtual time `time_s`, if it has none."""
+        if self.kvh is not None:
+            return
+        sensor, section = self.config.sensors[self.name], _section(self.world, self.name)
+        # It sends accelerations whether the rig reads them or not.
+        sensor = sensor.model_copy(update={"acceleration": sensor.acceleration or AccelerationSection()})
+        truth = SensorTruth(sensor, self.world.sensors[self.name], time_s)
+        self.kvh = Kvh1775(
+            truth,
+            motion_of(truth),
+            self.memory,
+            serial_number=section.serial_number or sensor.serial_number,
+            oscillator_ppm=section.oscillator_ppm,
+            on_for_s=section.on_for_s,
+            seed=np.random.SeedSequence([self.world.seed, sorted(self.world.sensors).index(self.name)]),
+            time_s=time_s,
+        )
+
+    def switch_off(self) -> None:
+        """Take its power away."""
+        self.kvh = None
+
+
+def mounts(config: RigConfig, world: WorldSection) -> dict[str, Mount]:
+    """By sensor name, each as its last user left it. Raises `Refused` `kvh_settings` for what it cannot be set to."""
+    found = {}
+    for name in sorted(world.sensors.keys() - config.on_board.keys()):
+        try:
+            found[name] = Mount(name, config, world, Memory(_section(world, name).settings))
+        except ValueError as error:
+            raise Refused(
+                "kvh_settings", f"world.sensors.{name}.kvh1775.settings: {error}", "Give settings of its commands"
+            ) from None
+    return found
+
+
+def _section(world: WorldSection, name: str) -> SimulatedKvhSection:
+    return world.sensors[name].kvh1775 or SimulatedKvhSection()

@@ -1,0 +1,155 @@
+"""Runs with a KVH 1775 on its own serial port: alone, and beside a board whose reference verifies it."""
+
+import json
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+import yaml
+
+from rig.analysis.calibration import observe_recordings
+from rig.config.load import ConfigurationRefused, load
+from rig.data.run_file import read_run
+from support.commands import rig
+from support.ideal import ideal_document
+from support.paths import CONFIGS, DEMO
+from support.worlds import fresh_host, merge
+
+KVH = CONFIGS / "kvh1775.yaml"
+QUICK: dict[str, Any] = {
+    "arm": {"transfer_speed_deg_s": 170},
+    "sensors": {"kvh": {"rate_hz": 100, "acceleration": None}},
+    "procedure": {"speed_deg_s": 150, "acceleration_deg_s2": 400, "rest_s": 0.5},
+    "limits": {"bias_std_rad_s": 0.001, "scale_std": 0.001},
+    "world": {"time_scale": 12},
+}
+BOARD: dict[str, Any] = {
+    "board": {},
+    "sensors": {"reference": {"part": "adis16465", "serial_number": "ADIS-1", "role": "reference"}},
+    "limits": {"verification_rms_rad_s": 0.02, "verification_mean_rad_s": 0.002},
+    "world": {
+        "sensors": {
+            "reference": {"scale": [1.0, 1.0, 1.0], "bias_rad_s": [0.0, 0.0, 0.0], "noise_rad_s": 0.002},
+            "kvh": {"scale": [1.0015, 0.999, 1.001], "bias_rad_s": [3e-4, -2e-4, 4e-4]},
+        }
+    },
+}
+
+
+def configuration(folder: Path, *changes: dict[str, Any]) -> Path:
+    """kvh1775.yaml so changed, on an address of its own."""
+    host = fresh_host()
+    document = ideal_document(KVH)
+    for change in (QUICK, *changes):
+        document = merge(document, change)
+    document["arm"]["host"] = host
+    document["sensors"]["kvh"]["serial"]["port"] = f"socket://{host}:7331"
+    if "board" in document:
+        document["board"] = {"port": f"socket://{host}:7321"}
+    path = folder / "config.yaml"
+    path.write_text(yaml.safe_dump(document), encoding="utf-8")
+    return path
+
+
+def sensor(result: dict[str, Any]) -> tuple[np.ndarray, np.ndarray]:
+    """(6,) scale and bias of the KVH 1775 as stated, and their standard deviations."""
+    entry = result["sensors"]["kvh"]
+    return np.array(entry["scale"] + entry["bias_rad_s"]), np.sqrt(np.diag(entry["covariance_combined"]))
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("message", ["A", "B"])
+def test_without_a_board(message: str, tmp_path: Path) -> None:
+    serial = {"sensors": {"kvh": {"serial": {"message": message}}}}
+    done = rig("run", configuration(tmp_path, serial), "--out", tmp_path / "run")
+    assert done.returncode == 0, done.stderr + done.stdout
+    assert "ROTUNITS was DEG, corrected" in done.stderr
+    result = json.loads((tmp_path / "run" / "result.json").read_text(encoding="utf-8"))
+    stated, std = sensor(result)
+    truth = [1.0004, 0.9997, 1.0002, 4.8e-6, -2.9e-6, 3.9e-6]
+    assert (np.abs(stated - truth) < 4 * std).all()
+    assert std[:3].max() < 1e-4
+    assert result["provenance"]["board_unique_id"] == "none"
+    assert result["provenance"]["sensor_serial_numbers"] == {"kvh": "1775-0042"}
+    (observed,) = observe_recordings([read_run(tmp_path / "run" / "run.h5")])
+    clock = observed.sensors["kvh"].time_base
+    assert clock.drift == pytest.approx(8e-6, abs=5 * clock.drift_std + 1e-6), "its oscillator is 8 ppm slow"
+
+
+@pytest.mark.slow
+def test_beside_a_board_whose_reference_verifies_it(tmp_path: Path) -> None:
+    verify = {"procedure": {"verify": True}}
+    done = rig("run", configuration(tmp_path, BOARD, verify), "--out", tmp_path / "run")
+    assert done.returncode == 0, done.stderr + done.stdout
+    result = json.loads((tmp_path / "run" / "result.json").read_text(encoding="utf-8"))
+    stated, std = sensor(result)
+    assert (np.abs(stated - [1.0015, 0.999, 1.001, 3e-4, -2e-4, 4e-4]) < 4 * std).all()
+    verification = result["verification"]["kvh"]
+    assert verification["after"]["delay_s"] == [], "two clocks tell nothing of it"
+    before, after = (
+        np.abs([turn["error_rad_s"] for turn in verification[when]["revolutions"]]).max()
+        for when in ("before", "after")
+    )
+    assert before > 0.002 > after, "the host has corrected its readings by what was found"
+    recorded = read_run(tmp_path / "run" / "verify.h5").sensors
+    assert recorded["kvh"].mode == "calibrated" and recorded["reference"].mode == "raw"
+
+
+@pytest.mark.slow
+@pytest.mark.proof
+@pytest.mark.thorough
+@pytest.mark.timeout(900)
+def test_its_accelerometers_are_calibrated_where_those_of_the_board_are(tmp_path: Path) -> None:
+    imu: dict[str, Any] = {
+        "sensors": {"kvh": {"rate_hz": 250, "acceleration": {"range_g": 10}}},
+        "procedure": {"name": "imu", "dwell_s": 2},
+        "site": {"gravity_m_s2": 9.80665},
+    }
+    done = rig("run", configuration(tmp_path, imu), "--out", tmp_path / "run", timeout_s=800)
+    assert done.returncode == 0, done.stderr + done.stdout
+    result = json.loads((tmp_path / "run" / "result.json").read_text(encoding="utf-8"))
+    entry = result["accelerometers"]["kvh"]
+    assert entry["scale"] == pytest.approx([1.001, 0.9995, 1.0008], abs=2e-4)
+    assert entry["bias_m_s2"] == pytest.approx([0.004, -0.006, 0.005], abs=2e-3)
+
+
+@pytest.mark.slow
+def test_axes_that_somebody_left_refuse_the_run_before_anything_moves(tmp_path: Path) -> None:
+    axes = {"world": {"sensors": {"kvh": {"kvh1775": {"settings": {"AXES": "0,1,0,1,0,0,0,0,1"}}}}}}
+    done = rig("run", configuration(tmp_path, axes), "--out", tmp_path / "run")
+    assert done.returncode == 2 and "kvh_axes_not_identity" in done.stderr
+    assert "pre-flight" not in done.stderr, "nothing has moved"
+
+
+@pytest.mark.slow
+def test_check_and_info_say_what_is_there(tmp_path: Path) -> None:
+    left = {"world": {"sensors": {"kvh": {"kvh1775": {"settings": {"FILTTYPE,G": "CUSTOM"}, "serial_number": "9"}}}}}
+    config = configuration(tmp_path, left)
+    done = rig("check", config)
+    assert done.returncode == 2
+    assert "serial number 9" in done.stdout and "a run sets it to B" in done.stdout
+    assert "kvh_other_serial_number" in done.stderr and "kvh_custom_filter" in done.stderr
+    done = rig("kvh", "info", config, "--json")
+    assert done.returncode == 0, done.stderr
+    found = json.loads(done.stdout)
+    assert found["serial_number"] == "9" and found["settings"]["FILTTYPE,G"] == "CUSTOM"
+    assert found["built_in_test"] == " ".join(["7f"] * 6) and found["messages"] > 100 and found["lost"] == 0
+    assert found["acceleration_g"][2] == pytest.approx(-1.0, abs=0.02), "at home the flange looks down"
+
+
+@pytest.mark.parametrize(
+    ("file", "override", "said"),
+    [
+        (KVH, "sensors.kvh.serial=null", "kvh1775 is not on the board: give its section serial"),
+        (DEMO, "sensors.gyro.serial={port: /dev/ttyUSB0}", "lsm9ds1 is on the board: leave serial out"),
+        (KVH, "sensors.kvh.serial.baud=9600", "its line cannot carry this rate: 250 Hz × 40 bytes = 10000 bytes/s"),
+        (KVH, "sensors.kvh.serial.port=/dev/ttyUSB0", "sensors.kvh.serial.port"),
+        (DEMO, "board=null", "the board reads gyro, but there is no section board"),
+        (DEMO, "world.sensors.gyro.kvh1775={}", "no such instrument; the sensor is on the board"),
+    ],
+)
+def test_a_sensor_has_a_port_of_its_own_or_is_on_the_board(file: Path, override: str, said: str) -> None:
+    with pytest.raises(ConfigurationRefused) as caught:
+        load(file, [override])
+    assert any(said in problem for problem in caught.value.problems), caught.value.problems

@@ -1,0 +1,316 @@
+"""The KVH 1775's driver and the simulated instrument, with bytes on a pseudo-terminal between them."""
+
+import sys
+import time
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
+from typing import Any
+
+import numpy as np
+import pytest
+from numpy.typing import NDArray
+
+from rig.sensors.errors import SensorError
+from rig.sensors.kvh1775.driver import Kvh1775
+from rig.sensors.kvh1775.source import Kvh1775Source, kvh1775, look
+from support.kvh_on_a_wire import SERIAL_NUMBER, KvhOnAWire, kvh_on_a_wire, section
+
+pytestmark = pytest.mark.skipif(sys.platform == "win32", reason="no pseudo-terminals")
+
+TURNING = (0.5, -0.25, 1.0, 0.1, -0.2, 0.97)
+
+
+class Collected:
+    """Samples as they come."""
+
+    def __init__(self) -> None:
+        self.parts: list[NDArray[Any]] = []
+
+    def __call__(self, sensor: str, samples: NDArray[Any]) -> None:
+        assert sensor == "kvh"
+        self.parts.append(samples)
+
+    @property
+    def samples(self) -> NDArray[Any]:
+        return np.concatenate(self.parts)
+
+    def wait(self, source: Kvh1775Source, count: int) -> NDArray[Any]:
+        """The samples once there are so many."""
+        until_s = time.monotonic() + 20.0
+        while sum(map(len, self.parts)) < count:
+            source.check()
+            assert time.monotonic() < until_s
+            time.sleep(0.005)
+        return self.samples
+
+
+@contextmanager
+def streaming(wire: KvhOnAWire, **changes: object) -> Iterator[tuple[Kvh1775Source, Collected]]:
+    collected = Collected()
+    with kvh1775("kvh", section(wire.port, **changes), collected) as source:
+        source.start()
+        yield source, collected
+
+
+def refused(port: str, **changes: object) -> SensorError:
+    with pytest.raises(SensorError) as caught, kvh1775("kvh", section(port, **changes), Collected()):
+        pass
+    return caught.value
+
+
+def until_raised(source: Kvh1775Source, timeout_s: float = 10.0) -> SensorError:
+    """What `check` raises before long."""
+    until_s = time.monotonic() + timeout_s
+    with pytest.raises(SensorError) as caught:
+        while time.monotonic() < until_s:
+            source.check()
+            time.sleep(0.005)
+    return caught.value
+
+
+@pytest.mark.parametrize("message", ["A", "B", "C"])
+@pytest.mark.parametrize("rotation", ["delta", "rate"])
+def test_samples_are_what_the_instrument_feels(message: str, rotation: str) -> None:
+    with kvh_on_a_wire(motion_at=lambda time_s: TURNING, pace=4) as wire:
+        changes = {"message": message, "rotation": rotation, "rate_hz": 250, "acceleration": {"range_g": 10}}
+        with streaming(wire, **changes) as (source, collected):
+            samples = collected.wait(source, 300)
+            described = source.sensors["kvh"]
+    rate = samples["counts"] * described.sensitivity_rad_s_per_count
+    assert described.sensitivity_m_s2_per_count is not None
+    force = samples["acceleration_counts"] * described.sensitivity_m_s2_per_count
+    assert rate.mean(axis=0) == pytest.approx(TURNING[:3], abs=3e-6)
+    assert rate[2:].std(axis=0) == pytest.approx([1e-5] * 3, rel=0.3)
+    assert force.mean(axis=0) == pytest.approx(np.array(TURNING[3:]) * 9.80665, abs=3e-3)
+    assert samples["sequence"].tolist() == list(range(len(samples))), "300 are more than two rounds of 128"
+    steps_us = np.diff(samples["board_time_us"].astype(np.int64))
+    assert set(steps_us.tolist()) <= {3999, 4000, 4001}
+    assert (samples["temperature_counts"] * described.temperature_c_per_count == 22.0).all()
+
+
+def test_what_somebody_left_is_corrected_and_stays_corrected() -> None:
+    left = {"DR": "100", "OUTPUTFMT": "C", "ROTFMT": "RATE", "ROTUNITS": "DEG", "TEMPUNITS": "F", "FILTEN,G": "0"}
+    with kvh_on_a_wire({**left, "FILTTYPE,A": "BUTTER"}) as wire:
+        with kvh1775("kvh", section(wire.port), Collected()) as source:
+            assert source.corrected == {**left, "FILTTYPE,A": "BUTTER"}
+        with kvh1775("kvh", section(wire.port), Collected()) as source:
+            assert source.corrected == {}, "it is in the instrument's memory now"
+        assert wire.memory["ROTUNITS"] == "RAD"
+
+
+def test_an_instrument_that_waits_for_an_external_sync_is_brought_back() -> None:
+    with kvh_on_a_wire({"MSYNC": "EXT"}) as wire, streaming(wire) as (source, collected):
+        assert source.corrected["MSYNC"] == "EXT" and source.corrected["FILTTYPE,G"] == "AVE"
+        collected.wait(source, 10)
+
+
+def test_an_instrument_somebody_left_in_configuration_mode_is_found() -> None:
+    with kvh_on_a_wire() as wire:
+        wire.order(lambda kvh: kvh.receive(b"=config,1\r"))
+        with streaming(wire) as (source, collected):
+            collected.wait(source, 10)
+
+
+def test_looking_changes_nothing_and_says_what_a_run_would() -> None:
+    with kvh_on_a_wire({"OUTPUTFMT": "C", "AXES": "0,1,0,-1,0,0,0,0,1"}) as wire:
+        seen = list(look("kvh", section(wire.port, serial_number="another")))
+        assert wire.memory["OUTPUTFMT"] == "C"
+    assert "OUTPUTFMT is C; a run sets it to B" in seen
+    names = [each.name for each in seen if isinstance(each, SensorError)]
+    assert names == ["kvh_other_serial_number", "kvh_axes_not_identity"]
+    assert seen[-1] == "built-in test: " + " ".join(["7f"] * 6)
+
+
+@pytest.mark.parametrize(
+    ("left", "name", "said"),
+    [
+        ({"AXES": "4,0,0,0,1,0,0,0,1"}, "kvh_axes_not_identity", "+4.000000E+00"),
+        ({"FILTTYPE,G": "CUSTOM"}, "kvh_custom_filter", "gyroscope"),
+        ({"FILTTYPE,A": "CUSTOM"}, "kvh_custom_filter", "accelerometer"),
+    ],
+)
+def test_what_changes_the_readings_is_refused_by_name(left: dict[str, str], name: str, said: str) -> None:
+    with kvh_on_a_wire(left) as wire:
+        error = refused(wire.port)
+        assert wire.memory["OUTPUTFMT"] == "A", "nothing was changed before"
+    assert error.name == name and said in error.what
+
+
+def test_another_specimen_is_refused() -> None:
+    with kvh_on_a_wire() as wire:
+        error = refused(wire.port, serial_number="1775-8")
+    assert error.name == "kvh_other_serial_number" and SERIAL_NUMBER in error.what
+
+
+def test_a_built_in_test_that_fails_is_refused() -> None:
+    with kvh_on_a_wire() as wire:
+        wire.order(lambda kvh: setattr(kvh.faults, "test", 0x7D))
+        error = refused(wire.port)
+    assert error.name == "kvh_test_failed" and "7d 7f" in error.what
+
+
+def test_a_command_it_does_not_know_is_named() -> None:
+    with kvh_on_a_wire() as wire:
+        del wire.memory._settings["FILTEN,G"]
+        with pytest.raises(SensorError) as caught:
+            Kvh1775("kvh", wire.port, 921600)
+    assert caught.value.name == "kvh_command_refused" and "?FILTEN,G with INVALID" in caught.value.what
+
+
+def test_half_a_command_of_somebody_else_is_in_nobodys_way() -> None:
+    with kvh_on_a_wire() as wire:
+        wire.order(lambda kvh: kvh.receive(b"=config,1\r\n=OUTPUTF"))
+        with streaming(wire) as (source, collected):
+            collected.wait(source, 10)
+
+
+def test_a_wrong_baud_rate_is_named() -> None:
+    with kvh_on_a_wire({"BAUD": "115200"}) as wire, pytest.raises(SensorError) as caught:
+        Kvh1775("kvh", wire.port, 921600, timeout_s=0.4)
+    assert caught.value.name == "kvh_wrong_baud_rate"
+
+
+def test_a_dead_line_and_a_missing_port_are_named() -> None:
+    with kvh_on_a_wire() as wire:
+        wire.line.silent = True
+        with pytest.raises(SensorError) as caught:
+            Kvh1775("kvh", wire.port, 921600, timeout_s=0.3)
+    assert caught.value.name == "no_kvh"
+    with pytest.raises(SensorError) as caught:
+        Kvh1775("kvh", "/dev/there-is-none", 921600)
+    assert caught.value.name == "no_port"
+
+
+def test_a_line_that_carries_one_way_only_is_named() -> None:
+    with kvh_on_a_wire() as wire:
+        wire.line.to_device = lambda data, host_baud: None  # type: ignore[method-assign]
+        with pytest.raises(SensorError) as caught:
+            Kvh1775("kvh", wire.port, 921600, timeout_s=0.5)
+    assert caught.value.name == "kvh_does_not_hear"
+
+
+@pytest.mark.parametrize("message", ["A", "B"])
+def test_lost_messages_are_counted(message: str) -> None:
+    with (
+        kvh_on_a_wire(pace=6) as wire,
+        streaming(wire, message=message, rate_hz=100) as (source, collected),
+    ):
+        collected.wait(source, 20)
+        wire.order(lambda kvh: setattr(kvh.faults, "lose", 100))
+        samples = collected.wait(source, 60)
+    steps = np.diff(samples["sequence"].astype(int))
+    assert sorted(set(steps.tolist())) == [1, 101]
+    times_us = samples["board_time_us"].astype(np.int64)
+    assert times_us[-1] - times_us[0] == pytest.approx(
+        10_000 * (samples["sequence"][-1] - samples["sequence"][0]), abs=2
+    )
+
+
+@pytest.mark.parametrize("message", ["A", "B"])
+def test_a_gap_nobody_can_count_ends_the_stream(message: str) -> None:
+    with kvh_on_a_wire() as wire, streaming(wire, message=message) as (source, collected):
+        collected.wait(source, 20)
+        wire.order(lambda kvh: setattr(kvh.faults, "lose", 250))
+        assert until_raised(source).name == "kvh_gap_ambiguous"
+
+
+def test_a_laboratory_that_stands_still_is_no_silence() -> None:
+    """A simulated one does on a busy machine, and the arm's clock with it."""
+    with kvh_on_a_wire(pace=2) as wire, streaming(wire, message="A") as (source, collected):
+        collected.wait(source, 20)
+        source.check(clock_s=7.0)
+        wire.limit_s = 0.0
+        time.sleep(0.5)
+        wire.limit_s = np.inf
+        source.check(clock_s=7.0)
+        collected.wait(source, len(collected.samples) + 100)
+    assert (np.diff(collected.samples["sequence"]) == 1).all()
+
+
+def test_bit_errors_cost_messages_and_nothing_else() -> None:
+    with kvh_on_a_wire(motion_at=lambda time_s: TURNING, pace=4) as wire, streaming(wire) as (source, collected):
+        wire.line.bit_error_rate = 1e-4  # every thirtieth message
+        samples = collected.wait(source, 3000)
+        described = source.sensors["kvh"]
+    assert len(samples) < samples["sequence"][-1] + 1
+    rate = samples["counts"] * described.sensitivity_rad_s_per_count
+    assert np.abs(rate - TURNING[:3]).max() < 1e-4
+
+
+def test_readings_it_calls_invalid_are_no_samples_and_end_the_stream_when_they_stay() -> None:
+    with kvh_on_a_wire(pace=4) as wire, streaming(wire) as (source, collected):
+        collected.wait(source, 20)
+        wire.order(lambda kvh: setattr(kvh.faults, "status", 0x75))
+        error = until_raised(source)
+    assert error.name == "kvh_axis_invalid" and "0x75" in error.what
+
+
+def test_an_accelerometer_that_is_not_read_may_be_invalid() -> None:
+    with kvh_on_a_wire(pace=6) as wire:
+        wire.order(lambda kvh: setattr(kvh.faults, "status", 0x07))
+        with streaming(wire, rate_hz=250) as (source, collected):
+            collected.wait(source, 400)
+
+
+def silent(wire: KvhOnAWire) -> None:
+    wire.line.silent = True
+
+
+def restarted(wire: KvhOnAWire) -> None:
+    wire.order(lambda kvh: wire.switch_on())
+
+
+@pytest.mark.parametrize(
+    ("happens", "name"),
+    [
+        pytest.param(silent, "kvh_link_lost", marks=pytest.mark.slow),
+        (restarted, "kvh_restarted"),
+        (KvhOnAWire.close, "kvh_link_lost"),
+    ],
+)
+def test_what_happens_in_a_stream_is_named(happens: Callable[[KvhOnAWire], None], name: str) -> None:
+    wire = KvhOnAWire({})
+    try:
+        with streaming(wire) as (source, collected):
+            collected.wait(source, 20)
+            happens(wire)
+            assert until_raised(source).name == name
+    finally:
+        if happens is not KvhOnAWire.close:
+            wire.close()
+
+
+def test_the_microseconds_wrap_while_it_streams() -> None:
+    """71.6 min after it was switched on."""
+    on_for_s = 2**32 * 1e-6 - 4.0
+    with kvh_on_a_wire(pace=8, on_for_s=on_for_s) as wire, streaming(wire, rate_hz=100) as (source, collected):
+        samples = collected.wait(source, 500)
+    times_us = samples["board_time_us"].astype(np.int64)
+    assert times_us[0] < 2**32 < times_us[-1]
+    assert np.diff(times_us).max() <= 10_001 and np.diff(times_us).min() >= 9_999
+
+
+@pytest.mark.slow
+@pytest.mark.proof
+@pytest.mark.thorough
+@pytest.mark.timeout(900)
+def test_ten_minutes_at_1000_hz_lose_nothing() -> None:
+    """As fast as they are read, for a pseudo-terminal keeps some thousand bytes: a loss is the driver's."""
+    count = 600_000
+    seen = [0]
+
+    with kvh_on_a_wire() as wire:
+
+        def take(sensor: str, samples: NDArray[Any]) -> None:
+            assert (samples["sequence"] == np.arange(seen[0], seen[0] + len(samples))).all()
+            seen[0] += len(samples)
+            wire.limit_s = samples["board_time_us"][-1] * 1e-6 - wire.on_for_s + 0.05
+            wire.at_once = True
+
+        with kvh1775("kvh", section(wire.port), take) as source:
+            source.start()
+            until_s = time.monotonic() + 800.0
+            while seen[0] < count and time.monotonic() < until_s:
+                source.check()
+                time.sleep(0.05)
+    assert seen[0] >= count

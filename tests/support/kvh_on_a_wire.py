@@ -1,0 +1,123 @@
+"""A simulated KVH 1775 on a pseudo-terminal, without a laboratory around it: it turns as it is told."""
+
+import selectors
+import threading
+import time
+from collections.abc import Callable, Iterator, Mapping, Sequence
+from contextlib import contextmanager
+
+import numpy as np
+
+from rig.config.models import SensorSection
+from rig.config.world_models import SimulatedKvhSection, SimulatedSensorSection
+from rig.world.board.pty_port import PtyPort
+from rig.world.board.sensor_truth import SensorTruth
+from rig.world.board.serial_line import SerialLine
+from rig.world.kvh1775.instrument import Kvh1775
+from rig.world.kvh1775.memory import Memory
+
+SERIAL_NUMBER = "1775-7"
+TICK_S = 0.002
+STILL = (0.0, 0.0, 0.0, 0.0, 0.0, 1.0)
+
+
+def section(port: str, **changes: object) -> SensorSection:
+    """A configured sensor at `port`; `changes` may be of its serial section too."""
+    of_the_line: dict[str, object] = {
+        key: changes.pop(key) for key in ("baud", "message", "rotation") if key in changes
+    }
+    serial: dict[str, object] = {"port": port, **of_the_line}
+    sensor: dict[str, object] = {"part": "kvh1775", "serial_number": SERIAL_NUMBER, "serial": serial, **changes}
+    return SensorSection.model_validate(sensor)
+
+
+class KvhOnAWire:
+    """The instrument, `pace` times as fast as the clock on the wall, or `at_once`; it stands still at `limit_s`.
+
+    `motion_at`: what it feels at a time, rad/s and g.
+    """
+
+    def __init__(
+        self,
+        left: Mapping[str, str],
+        motion_at: Callable[[float], Sequence[float]] = lambda time_s: STILL,
+        pace: float = 1.0,
+        on_for_s: float = 3.0,
+    ) -> None:
+        self.memory = Memory(left)
+        self._motion_at, self.on_for_s, self._pace = motion_at, on_for_s, pace
+        self.time_s = 0.0
+        self.kvh: Kvh1775 | None = None
+        self.line = SerialLine(lambda: self.kvh, seed=5)
+        self.limit_s, self.at_once = np.inf, False
+        self._selector = selectors.DefaultSelector()
+        self._pty = PtyPort(self.line, self._selector)
+        self.port = self._pty.path
+        self._ending = threading.Event()
+        self._orders: list[Callable[[], None]] = []
+        self.switch_on()
+        self._thread = threading.Thread(target=self._live, daemon=True)
+        self._thread.start()
+
+    def switch_on(self) -> None:
+        sensor = section("x", acceleration={"range_g": 10})
+        truth = SensorTruth(sensor, SimulatedSensorSection(scale=(1, 1, 1), bias_rad_s=(0, 0, 0), noise_rad_s=1e-5))
+        self.kvh = Kvh1775(
+            truth,
+            self._motion_at,
+            self.memory,
+            serial_number=SERIAL_NUMBER,
+            oscillator_ppm=SimulatedKvhSection().oscillator_ppm,
+            on_for_s=self.on_for_s,
+            seed=np.random.SeedSequence(1),
+            time_s=self.time_s,
+        )
+
+    def order(self, what: Callable[[Kvh1775], None]) -> None:
+        """Let the instrument's own thread do it, and wait until it is done."""
+        done = threading.Event()
+
+        def carry_out() -> None:
+            assert self.kvh is not None
+            what(self.kvh)
+            done.set()
+
+        self._orders.append(carry_out)
+        assert done.wait(5.0)
+
+    def close(self) -> None:
+        self._ending.set()
+        self._thread.join()
+        self._pty.close()
+        self._selector.close()
+
+    def _live(self) -> None:
+        began_s = time.monotonic()
+        while not self._ending.is_set():
+            while self._orders:
+                self._orders.pop(0)()
+            behind = self.at_once or self.time_s < (time.monotonic() - began_s) * self._pace
+            for key, events in self._selector.select(0.0 if behind else 0.001):
+                key.data(events)
+            if behind and self.time_s < self.limit_s:
+                self.time_s += TICK_S
+                if self.kvh is not None:
+                    self.kvh.advance(self.time_s)
+                self.line.tick()
+                self._pty.tick()
+
+
+@contextmanager
+def kvh_on_a_wire(
+    left: Mapping[str, str] | None = None,
+    motion_at: Callable[[float], Sequence[float]] = lambda time_s: STILL,
+    *,
+    pace: float = 1.0,
+    on_for_s: float = 3.0,
+) -> Iterator[KvhOnAWire]:
+    """For the length of the `with` block."""
+    wire = KvhOnAWire(left or {}, motion_at, pace, on_for_s)
+    try:
+        yield wire
+    finally:
+        wire.close()
