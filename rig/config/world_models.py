@@ -17,6 +17,7 @@ Sensitivity = Annotated[float, Field(ge=-0.1, le=0.1)]
 SensitivityRow = tuple[Sensitivity, Sensitivity, Sensitivity]
 NO_ROW: SensitivityRow = (0.0, 0.0, 0.0)
 Tilt = Annotated[float, Field(ge=-10, le=10)]
+Turn = Annotated[float, Field(ge=-180, le=180)]
 RATE_PER_K: dict[str, Any] = {"unit": "rad/s/K"}
 PER_RATE: dict[str, Any] = {"unit": "1/(rad/s)"}
 Cycles = Annotated[int, Field(ge=1, le=200)]
@@ -98,6 +99,9 @@ class SimulatedArmSection(Section):
     remote_control: bool = Field(default=True, description="whether the pendant is switched to remote control")
     speed_slider: float = Field(
         default=1.0, gt=0, le=1, description="the pendant's speed slider, as a fraction", json_schema_extra=RATIO
+    )
+    tcp_rotation_deg: tuple[Turn, Turn, Turn] = Field(
+        default=(0.0, 0.0, 0.0), description="rotation vector by which the tool's frame is turned in the flange's"
     )
     vibration_fraction: float = Field(
         default=0.05, ge=0, lt=0.5, description="RMS of the rate's ripple over the rate", json_schema_extra=RATIO

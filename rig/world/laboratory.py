@@ -44,6 +44,7 @@ class Laboratory:
             else None,
         )
         self.arm = TrueArm(arm, site_of(world.site), motion, random)
+        about_x, about_y, about_z = arm.tcp_rotation_deg
         major, minor, bugfix, build = (int(part) for part in arm.polyscope.split("."))
         self.robot = Robot(
             Identity(arm.serial_number, (major, minor, bugfix, build)),
@@ -51,6 +52,7 @@ class Laboratory:
             arm.remote_control,
             arm.speed_slider,
             known_links(arm.calibration),
+            tool_turn_rad=(radians(about_x), radians(about_y), radians(about_z)),
         )
         self._flash = flash_of(world.board.flash_file)
         self.board: EmulatedBoard | None = None  # None: without power

@@ -16,6 +16,7 @@ from rig.config.world_models import SimulatedSensorSection, WorldSection
 from rig.world.board.sensor_truth import SensorTruth
 from rig.world.clock import TICK_S, TICKS_PER_SECOND, Clock
 from rig.world.section import world_section
+from rig.world.ur10e.controller_messages import ProgramError
 from rig.world.ur10e.flange_motion import Felt
 from rig.world.ur10e.primary import PrimarySession
 from rig.world.ur10e.rtde import Output
@@ -269,6 +270,44 @@ def test_a_straight_move_ends_where_the_calibrated_arm_is_meant_to_be() -> None:
     one.ticks(600)
     (seen,) = states(one, 1, "actual_q")
     assert seen == pytest.approx((*HOME[:5], 0.2), abs=1e-6)
+
+
+TOOL_DEG = [20.0, -30.0, 50.0]
+
+
+def test_a_turned_tool_frame_shows_in_every_pose() -> None:
+    """RTDE and the primary interface tell the tool's frame, which is the flange's turned by the offset."""
+    one = laboratory(arm={"tcp_rotation_deg": TOOL_DEG})
+    stand(one, TILTED)
+    turn, flange = Rotation.from_rotvec(TOOL_DEG, degrees=True), chain(TILTED)
+    package = PrimarySession(one.laboratory.robot).greeting()
+    primary = struct.unpack_from(">12d", package, package.index(struct.pack(">iB", 5 + 12 * 8, 4)) + 5)
+    told = states(one, 1, "actual_TCP_pose", "target_TCP_pose", "tcp_offset")[0]
+    for pose in (told[:6], told[6:12], primary[:6]):
+        assert pose[:3] == pytest.approx(flange[:3, 3], abs=1e-4)
+        assert Rotation.from_rotvec(pose[3:]).as_matrix() == pytest.approx(flange[:3, :3] @ turn.as_matrix(), abs=1e-4)
+    for offset in (told[12:], primary[6:]):
+        assert offset == pytest.approx([0, 0, 0, *np.radians(TOOL_DEG)])
+
+
+@pytest.mark.parametrize("move", ["movej", "movel"])
+def test_a_pose_that_is_asked_for_is_the_tools(move: str) -> None:
+    one = laboratory(arm={"tcp_rotation_deg": TOOL_DEG})
+    stand(one, TILTED)
+    goal = (*TILTED[:5], TILTED[5] + 0.2)
+    turned = Rotation.from_matrix(chain(goal)[:3, :3]) * Rotation.from_rotvec(TOOL_DEG, degrees=True)
+    pose = [*chain(goal)[:3, 3], *turned.as_rotvec()]
+    PrimarySession(one.laboratory.robot).receive(f"{move}(p[{','.join(map(str, pose))}], a=8, v=2)\n".encode())
+    one.ticks(600)
+    (seen,) = states(one, 1, "actual_q")
+    assert seen == pytest.approx(goal, abs=1e-5)
+
+
+def test_the_tools_frame_is_the_pendants_to_change() -> None:
+    robot = laboratory(arm={"tcp_rotation_deg": TOOL_DEG}).laboratory.robot
+    robot.set_tcp(robot.tcp_offset)
+    with pytest.raises(ProgramError, match="not simulated"):
+        robot.set_tcp((0.0,) * 6)
 
 
 def test_twists_turn_the_axis_that_the_sensor_feels() -> None:

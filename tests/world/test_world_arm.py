@@ -13,8 +13,10 @@ import pytest
 from rtde_control import Path, PathEntry, RTDEControlInterface
 from rtde_io import RTDEIOInterface
 from rtde_receive import RTDEReceiveInterface
+from scipy.spatial.transform import Rotation
 from third_party.rtde import rtde as makers
 
+from rig.world.ur10e.forward_kinematics import flange_pose
 from support.arm_client import client, wait_for
 from support.worlds import World, WorldHandle, worlds
 
@@ -154,6 +156,26 @@ def test_moves_in_tool_space_as_ur_rtdes_own_tests_make_them(home: Arm) -> None:
     path.addEntry(PathEntry(PathEntry.MoveL, PathEntry.PositionTcpPose, [*start, 0.5, 4.0, 0.099]))
     assert control.movePath(path, False)
     wait_for(lambda: receive.getActualTCPPose() == pytest.approx(start, abs=1e-4), "the end of the path")
+
+
+def test_with_a_turned_tool_frame_poses_are_the_tools(world: World) -> None:
+    running = world({"world": {"arm": {"tcp_rotation_deg": [0.0, 0.0, 90.0]}}})
+    with control_of(running) as control, reports_of(running) as receive:
+        tilted = [0.0, -1.5, 1.5, -1.5, -1.2, 0.3]
+        assert control.moveJ(tilted, 2.0, 10.0)
+        wait_for(lambda: receive.getActualQ() == pytest.approx(tilted, abs=1e-4), "the start")
+        offset = [0.0, 0.0, 0.0, 0.0, 0.0, math.pi / 2]
+        assert control.getTCPOffset() == pytest.approx(offset)
+        tool, flange = receive.getActualTCPPose(), list(flange_pose(tilted))
+        # This client does not wait for the answer to that question.
+        wait_for(lambda: control.getActualToolFlangePose() == pytest.approx(flange, abs=1e-4), "the flange's pose")
+        turned = Rotation.from_rotvec(flange[3:]) * Rotation.from_rotvec(offset[3:])
+        assert tool == pytest.approx([*flange[:3], *turned.as_rotvec()], abs=1e-4)
+        assert control.getForwardKinematics() == pytest.approx(tool, abs=1e-4)
+        assert control.getInverseKinematics(tool) == pytest.approx(tilted, abs=1e-4)
+        up = [*tool[:2], tool[2] + 0.1, *tool[3:]]
+        assert control.moveL(up, 0.25, 0.5)
+        wait_for(lambda: receive.getActualTCPPose() == pytest.approx(up, abs=1e-4), "the pose")
 
 
 def test_settings_and_questions(home: Arm) -> None:

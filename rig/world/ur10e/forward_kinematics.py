@@ -37,10 +37,13 @@ def frames(q_rad: Sequence[float], links: Links = NOMINAL) -> Iterator[tuple[Rot
             p + sum(r * t for r, t in zip(row, step, strict=True)) for p, row in zip(position, rotation, strict=True)
         )
         turn = ((c, -s * ca, s * sa), (s, c * ca, -c * sa), (0.0, sa, ca))
-        rotation = tuple(  # type: ignore[assignment]
-            tuple(sum(row[k] * turn[k][j] for k in range(3)) for j in range(3)) for row in rotation
-        )
+        rotation = _product(rotation, turn)
         yield rotation, position
+
+
+def _product(left: Rotation, right: Rotation) -> Rotation:
+    rows = (tuple(sum(row[k] * right[k][j] for k in range(3)) for j in range(3)) for row in left)
+    return tuple(rows)  # type: ignore[return-value]
 
 
 def flange_frame(q_rad: Sequence[float], links: Links = NOMINAL) -> tuple[Rotation, Vector]:
@@ -53,6 +56,11 @@ def flange_pose(q_rad: Sequence[float], links: Links = NOMINAL) -> tuple[float, 
     """Position (m) and rotation vector (rad) of the flange in the base frame, the six numbers UR calls a pose."""
     rotation, position = flange_frame(q_rad, links)
     return (*position, *rotation_vector(rotation))
+
+
+def turned_pose(pose: Sequence[float], turn: Rotation) -> tuple[float, ...]:
+    """The pose of a frame in the same place, turned: `turn` takes its vectors into the frame at `pose`."""
+    return (*pose[:3], *rotation_vector(_product(rotation_from_vector(pose[3:]), turn)))
 
 
 def rotation_vector(r: Sequence[Sequence[float]]) -> Vector:

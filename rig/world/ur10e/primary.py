@@ -10,11 +10,10 @@ from math import pi
 
 from rig.world.clock import TICKS_PER_SECOND
 from rig.world.ur10e.controller_messages import Message, MessageKind
-from rig.world.ur10e.forward_kinematics import flange_pose
 from rig.world.ur10e.joint_motion import JOINT_SPEED_LIMIT_RAD_S
 from rig.world.ur10e.links import NOMINAL, Links
 from rig.world.ur10e.modes import RobotMode, RuntimeState, SafetyMode
-from rig.world.ur10e.robot import TCP_OFFSET, Robot
+from rig.world.ur10e.robot import Robot
 from rig.world.ur10e.script_socket import ScriptSession
 from rig.world.ur10e.variables import joint_modes
 
@@ -119,7 +118,7 @@ def _masterboard(robot: Robot) -> bytes:
 
 
 def _cartesian(robot: Robot) -> bytes:
-    return struct.pack(">12d", *flange_pose(robot.motion.actual_q_rad, robot.links), *TCP_OFFSET)
+    return struct.pack(">12d", *robot.tcp_pose(robot.motion.actual_q_rad), *robot.tcp_offset)
 
 
 def _denavit_hartenberg(links: Links) -> list[float]:

@@ -18,7 +18,10 @@ HAND_OVER_RAD_S2 = 4.0  # a move that follows a killed one lets the joints come 
 
 @dataclass(frozen=True, slots=True)
 class Move:
-    """A movej or (`straight`) movel to joint angles or (`is_pose`) a pose; rad/s and rad/s², straight: m/s and m/s²."""
+    """A movej or (`straight`) movel to joint angles or (`is_pose`) a pose of the tool's frame.
+
+    Speed and acceleration in rad/s and rad/s², straight: m/s and m/s².
+    """
 
     target: tuple[float, ...]
     speed: float
@@ -77,10 +80,12 @@ class Threads:
         self.take(name)
         motion, links = self.robot.motion, self.robot.links
         if move.straight:
-            pose = move.target if move.is_pose else flange_pose(move.target, links)
+            pose = self.robot.flange_for(move.target) if move.is_pose else flange_pose(move.target, links)
             trajectory = yield from straight_line(motion.q_rad, pose, move.speed, move.acceleration, links)
         else:
-            target = joints_for(move.target, motion.q_rad, links) if move.is_pose else move.target
+            target = move.target
+            if move.is_pose:
+                target = joints_for(self.robot.flange_for(target), motion.q_rad, links)
             trajectory = line(motion.q_rad, target, move.speed, move.acceleration, JOINT_SPEED_LIMIT_RAD_S)
         if any(abs(q) > JOINT_LIMIT_RAD for q in trajectory.end_rad):
             raise ProgramError("joint position out of limits: a target lies beyond ±360°")

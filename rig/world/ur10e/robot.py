@@ -7,6 +7,7 @@ from typing import Protocol
 
 from rig.world.clock import TICK_S, TICKS_PER_SECOND
 from rig.world.ur10e.controller_messages import MessageKind, Messages, ProgramError
+from rig.world.ur10e.forward_kinematics import Vector, flange_pose, rotation_from_vector, turned_pose
 from rig.world.ur10e.joint_motion import Motion
 from rig.world.ur10e.links import NOMINAL, Links
 from rig.world.ur10e.modes import SAFETY_BITS, RobotMode, RuntimeState, SafetyMode
@@ -17,7 +18,6 @@ PROGRAM_STOP_RAD_S2 = 4.0
 PROTECTIVE_STOP_RAD_S2 = 15.0
 BRAKE_RAD_S2 = 40.0
 UNLOCK_AFTER_S = 5.0
-TCP_OFFSET = (0.0,) * 6  # the tool centre point is the flange
 START_DELAY_S = 0.02  # between the last byte of a program and its first line
 POWER_STEP_S = 0.5  # powering on, releasing the brakes
 
@@ -53,10 +53,19 @@ class Robot:
     """The controller. Everything that changes it is a method here; `step` makes it 2 ms older."""
 
     def __init__(
-        self, identity: Identity, motion: Motion, remote_control: bool, speed_slider: float, links: Links = NOMINAL
+        self,
+        identity: Identity,
+        motion: Motion,
+        remote_control: bool,
+        speed_slider: float,
+        links: Links = NOMINAL,
+        *,
+        tool_turn_rad: Vector = (0.0, 0.0, 0.0),
     ) -> None:
         self.identity = identity
         self.links = links  # as it knows them
+        # The tool's frame in the flange's (m, rotation vector rad): it stands in the same place, and may be turned.
+        self.tcp_offset = (0.0, 0.0, 0.0, *tool_turn_rad)
         self.motion = motion
         self.remote_control = remote_control
         self.tick = 0
@@ -235,8 +244,8 @@ class Robot:
         self.payload_kg, self.payload_centre_m = mass_kg, tuple(centre_m)
 
     def set_tcp(self, offset: Sequence[float]) -> None:
-        if tuple(offset) != TCP_OFFSET:
-            raise ProgramError("not simulated: a tool centre point other than the flange")
+        if tuple(offset) != self.tcp_offset:
+            raise ProgramError("not simulated: a tool centre point other than that of the installation")
 
     def input_received(self) -> None:
         """An RTDE client wrote an input: feeds the watchdog."""
@@ -245,6 +254,19 @@ class Robot:
     def set_watchdog(self, minimum_hz: float) -> None:
         self.watchdog_s = 1.0 / minimum_hz if minimum_hz > 0.0 else 0.0
         self._last_input_tick = self.tick
+
+    # -- the tool's frame --------------------------------------------------------------------------------------------
+    def tcp_pose(self, q_rad: Sequence[float]) -> tuple[float, ...]:
+        """Pose of the tool centre point (m, rotation vector rad) in the base's frame, at these joint angles."""
+        return self._turned(flange_pose(q_rad, self.links), 1)
+
+    def flange_for(self, tcp_pose: Sequence[float]) -> tuple[float, ...]:
+        """The flange's pose that brings the tool centre point to this one."""
+        return self._turned(tcp_pose, -1)
+
+    def _turned(self, pose: Sequence[float], sign: int) -> tuple[float, ...]:
+        turn = [sign * angle for angle in self.tcp_offset[3:]]
+        return turned_pose(pose, rotation_from_vector(turn)) if any(turn) else tuple(pose)
 
     # -- what RTDE reports -------------------------------------------------------------------------------------------
     @property

@@ -20,7 +20,8 @@ STEP_S = 1e-4
 
 @dataclass(frozen=True, slots=True)
 class TcpMotion:
-    """Speed and acceleration (m/s, rad/s; m/s², rad/s²) in the base's axes; `accelerometer`, m/s², in the tool's."""
+    """Speed and acceleration (m/s, rad/s; m/s², rad/s²) in the base's axes; `accelerometer`, m/s², in the flange's,
+    where it sits."""
 
     speed: tuple[float, ...]
     acceleration: tuple[float, ...]

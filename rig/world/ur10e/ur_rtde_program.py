@@ -7,11 +7,11 @@ done, the client writes 0, the program answers 1 (ready). Real-time commands are
 from collections.abc import Callable, Iterator, Sequence
 
 from rig.world.clock import TICK_S
-from rig.world.ur10e import forward_kinematics
 from rig.world.ur10e.cartesian import joints_for
 from rig.world.ur10e.controller_messages import ProgramError
+from rig.world.ur10e.forward_kinematics import flange_pose
 from rig.world.ur10e.program_threads import Move, Steps, Threads, finite
-from rig.world.ur10e.robot import JOINT_LIMIT_RAD, TCP_OFFSET, Robot
+from rig.world.ur10e.robot import JOINT_LIMIT_RAD, Robot
 from rig.world.ur10e.trajectory import Joints
 
 REALTIME = frozenset({6, 9, 10, 11, 24, 25, 26, 27, 38, 58, 66, 67, 68, 69, 70, 71})
@@ -57,7 +57,7 @@ class ControlProgram:
             45: self._move_path,
             46: self._inverse_kinematics,
             47: self._is_steady,
-            58: self._forward_kinematics,  # of the flange, which is the tool centre point here
+            58: self._flange_pose,
         }
         self._main = self._loop()
 
@@ -223,7 +223,7 @@ class ControlProgram:
         return _nothing()
 
     def _tcp_offset(self) -> Steps:
-        self._results(TCP_OFFSET)
+        self._results(self._robot.tcp_offset)
         return _nothing()
 
     def _step_time(self) -> Steps:
@@ -243,11 +243,16 @@ class ControlProgram:
         return _nothing()
 
     def _forward_kinematics(self) -> Steps:
-        self._results(forward_kinematics.flange_pose(self._robot.motion.actual_q_rad, self._robot.links))
+        self._results(self._robot.tcp_pose(self._robot.motion.actual_q_rad))
+        return _nothing()
+
+    def _flange_pose(self) -> Steps:
+        self._results(flange_pose(self._robot.motion.actual_q_rad, self._robot.links))
         return _nothing()
 
     def _inverse_kinematics(self) -> Steps:
-        self._results(joints_for(self._doubles(0, 6), self._robot.motion.q_rad, self._robot.links))
+        flange = self._robot.flange_for(self._doubles(0, 6))
+        self._results(joints_for(flange, self._robot.motion.q_rad, self._robot.links))
         return _nothing()
 
     def _is_steady(self) -> Steps:

@@ -3,10 +3,9 @@
 from collections.abc import Callable, Sequence
 from typing import Any
 
-from rig.world.ur10e import forward_kinematics
 from rig.world.ur10e.modes import RobotMode
 from rig.world.ur10e.moments import Load, load
-from rig.world.ur10e.robot import TCP_OFFSET, Robot
+from rig.world.ur10e.robot import Robot
 from rig.world.ur10e.tcp_motion import GRAVITY, elbow
 
 Get = Callable[[Robot], Any]
@@ -53,14 +52,6 @@ def _volts_when_on(volts: float) -> Callable[[Robot], float]:
     return lambda robot: volts if robot.robot_mode >= RobotMode.POWER_ON else 0.0
 
 
-def _pose(robot: Robot) -> tuple[float, ...]:
-    return forward_kinematics.flange_pose(robot.motion.actual_q_rad, robot.links)
-
-
-def _target_pose(robot: Robot) -> tuple[float, ...]:
-    return forward_kinematics.flange_pose(robot.motion.now.target_q_rad, robot.links)
-
-
 def _load(robot: Robot) -> Load:
     motion = robot.motion
     joints = motion.q_rad, motion.qd_rad_s, motion.qdd_rad_s2
@@ -87,11 +78,11 @@ OUTPUTS: dict[str, tuple[str, Get]] = {
     "target_qdd": ("VECTOR6D", lambda r: r.motion.now.target_qdd_rad_s2),
     "actual_q": ("VECTOR6D", lambda r: r.motion.actual_q_rad),
     "actual_qd": ("VECTOR6D", lambda r: r.motion.qd_rad_s),
-    "actual_TCP_pose": ("VECTOR6D", _pose),
+    "actual_TCP_pose": ("VECTOR6D", lambda r: r.tcp_pose(r.motion.actual_q_rad)),
     "actual_TCP_speed": ("VECTOR6D", lambda r: r.tcp_motion.speed),
     "actual_TCP_acceleration": ("VECTOR6D", lambda r: r.tcp_motion.acceleration),
     "actual_tool_accelerometer": ("VECTOR3D", lambda r: r.tcp_motion.accelerometer),
-    "target_TCP_pose": ("VECTOR6D", _target_pose),
+    "target_TCP_pose": ("VECTOR6D", lambda r: r.tcp_pose(r.motion.now.target_q_rad)),
     "target_TCP_speed": ("VECTOR6D", lambda r: r.target_tcp_motion.speed),
     "target_TCP_acceleration": ("VECTOR6D", lambda r: r.target_tcp_motion.acceleration),
     "elbow_position": ("VECTOR3D", lambda r: elbow(r.motion.q_rad, r.motion.qd_rad_s, r.links)[0]),
@@ -100,7 +91,7 @@ OUTPUTS: dict[str, tuple[str, Get]] = {
     "actual_current_as_torque": ("VECTOR6D", _borne(_load)),
     "actual_momentum": ("DOUBLE", lambda r: _load(r).momentum_kg_m_s),
     "ft_raw_wrench": ("VECTOR6D", lambda r: _load(r).wrench),
-    "tcp_offset": ("VECTOR6D", _constant(TCP_OFFSET)),
+    "tcp_offset": ("VECTOR6D", lambda r: r.tcp_offset),
     "robot_mode": ("INT32", lambda r: r.robot_mode),
     "joint_mode": ("VECTOR6INT32", joint_modes),
     "safety_mode": ("INT32", lambda r: r.safety_mode),
