@@ -1,13 +1,14 @@
 """Pre-flight: what can be known to go wrong before the arm moves. Pure: a plan and a report in, problems out."""
 
 import math
-from collections.abc import Iterator, Sequence
+from collections.abc import Sequence
 
 import numpy as np
 
+from rig.arm.clearance import clearance_problems
 from rig.arm.condition import readiness
-from rig.arm.kinematics import NOMINAL, DenavitHartenberg, distance_to_forearm, flange_axes
-from rig.arm.motion import SAME_PLACE_RAD, Dwell, Motion, Plan, Transfer, travel
+from rig.arm.kinematics import NOMINAL, DenavitHartenberg, flange_axes
+from rig.arm.motion import SAME_PLACE_RAD, Motion, Plan, travel
 from rig.arm.state import JOINT_NAMES, ArmReport, Joints
 from rig.config.models import ArmSection
 from rig.config.ur10e_limits import (
@@ -17,17 +18,11 @@ from rig.config.ur10e_limits import (
     SPEED_LIMIT_RAD_S,
 )
 from rig.errors import Problem, Refused
-from rig.estimation.arrays import Array
 
 # How far the first motion may swing the large joints through the room, and the wrists.
 FIRST_MOTION_LIMIT_RAD = tuple(math.radians(angle) for angle in (120, 120, 120, 360, 360, 360))
 WRISTS = (3, 4, 5)
 MAX_DISAGREEMENT_RAD = math.radians(1)  # what factories find differs from the nominal arm by a few milliradians
-
-# From the flange's centre, and from that of its payload, to the line from elbow to wrist 1: how thick the forearm and
-# how large the payload are is not known, and both need that room.
-FOREARM_CLEARANCE_M = 0.15
-ALONG_THE_WAY_RAD = math.radians(2)
 
 
 def plan_problems(
@@ -35,11 +30,11 @@ def plan_problems(
 ) -> list[Problem]:
     """What is wrong with the plan itself: steps that are none, limits of position, speed, acceleration and payload.
 
-    And attitudes, or the ways to and from them, that bring the flange or its payload too near the forearm.
+    And what brings the flange or its payload too near the forearm.
     """
     problems = step_problems(plan)
     problems += [problem for motion in plan.motions if _travels(motion) for problem in _motion_problems(motion)]
-    problems += clearance_problems(plan, np.array(payload_centre_mm) / 1000)
+    problems += clearance_problems(plan, payload_centre_mm)
     if not 0 <= payload_kg <= PAYLOAD_LIMIT_KG:
         problems.append(
             Problem(
@@ -77,43 +72,6 @@ def step_problems(plan: Plan) -> list[Problem]:
         if not (0 < motion.speed_rad_s < math.inf and 0 < motion.acceleration_rad_s2 < math.inf)
     ]
     return problems
-
-
-def clearance_problems(plan: Plan, payload_centre_m: Array) -> list[Problem]:
-    """Attitudes, and ways to and from them, that bring the flange or its payload, (3,) in its frame, near the forearm.
-
-    By the nominal arm. Sweeps and the ways to them are not judged: about the usual home a sweep of wrist 2 takes the
-    flange to within 0.133 m.
-    """
-    return [
-        Problem(
-            "forearm_too_near",
-            f"{name} brings the {what} within {distance_m:.3f} m of the forearm's line, {FOREARM_CLEARANCE_M:g} m is "
-            "the least",
-            "Bring wrist 2 nearer to -90 or 90 in procedure.attitudes, or turn wrist 1 so that it points away",
-        )
-        for name, q_rad in _to_attitudes(plan)
-        for what, distance_m in [_nearest(q_rad, payload_centre_m)]
-        if distance_m < FOREARM_CLEARANCE_M
-    ]
-
-
-def _nearest(q_rad: Array, payload_centre_m: Array) -> tuple[str, float]:
-    """What comes nearest to the forearm in the poses (N, 6), and how near, m."""
-    flange_m, payload_m = (float(distance_to_forearm(q_rad, point).min()) for point in (np.zeros(3), payload_centre_m))
-    return ("flange", flange_m) if flange_m <= payload_m else ("payload", payload_m)
-
-
-def _to_attitudes(plan: Plan) -> Iterator[tuple[str, Array]]:
-    """The name and the poses (N, 6) of each dwell and of each transfer that begins or ends at one."""
-    for before, step, after in zip((None, *plan.steps), plan.steps, (*plan.steps[1:], None), strict=False):
-        if isinstance(step, Dwell):
-            yield step.name, np.array([step.q_rad])
-        elif isinstance(step, Transfer) and (isinstance(before, Dwell) or isinstance(after, Dwell)):
-            way = np.array(travel(step.start_q_rad, step.target_q_rad))
-            if np.isfinite(way).all():  # what is not has a problem of its own
-                parts = np.linspace(0, 1, 2 + int(np.abs(way).max() / ALONG_THE_WAY_RAD))
-                yield step.name, step.start_q_rad + parts[:, None] * way
 
 
 def arm_problems(plan: Plan, report: ArmReport) -> list[Problem]:

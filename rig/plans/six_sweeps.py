@@ -8,6 +8,7 @@ from itertools import permutations, product
 
 import numpy as np
 
+from rig.arm.clearance import keeps_clear
 from rig.arm.kinematics import flange_axes
 from rig.arm.motion import Plan, Rest, Step, Sweep, trapezoid_duration
 from rig.arm.state import JOINT_NAMES, Joints
@@ -172,17 +173,27 @@ def _axis(station: Station) -> tuple[float, float, float]:
 def _connected(
     sweeps: Sequence[Sweep], start: Joints, home: Joints, arm: ArmSection, procedure: SixSweepsSection
 ) -> Iterable[Step]:
-    """Sweeps with the rests after them and a transfer wherever the arm is not yet where the next one begins."""
+    """Sweeps with the rests after them and a transfer wherever the arm is not yet where the next one begins.
+
+    It leads through home where the straight way takes the flange or its payload to the forearm, as wrists 1 and 2 may
+    when they turn together.
+    """
     speed, acceleration = math.radians(arm.transfer_speed_deg_s), math.radians(procedure.acceleration_deg_s2)
     yield from approach(start, home, speed, acceleration)
     here = home
     for sweep in sweeps:
+        if not _clear(here, sweep.start_q_rad, arm.payload_centre_mm):
+            yield from transfer("transfer home", here, home, speed, acceleration)
+            here = home
         yield from transfer(f"transfer to the start of {sweep.name}", here, sweep.start_q_rad, speed, acceleration)
         yield sweep
         if procedure.rest_s > 0:
             yield Rest(f"rest after {sweep.name}", procedure.rest_s)
         here = sweep.end_q_rad
     yield from transfer("transfer home", here, home, speed, acceleration)
+
+
+_clear = lru_cache(maxsize=1024)(keeps_clear)  # the search for the best order asks for the same ways again and again
 
 
 def _with_joint(q_rad: Joints, joint: int, angle_rad: float) -> Joints:

@@ -10,6 +10,7 @@ from contextlib import contextmanager
 from dataclasses import dataclass
 from math import degrees, radians
 
+from rig.arm.clearance import clearance_problems
 from rig.arm.driver import Arm
 from rig.arm.kinematics import DenavitHartenberg
 from rig.arm.motion import Dwell, Motion, Plan, Rest, Step, Sweep, Transfer, travel
@@ -118,6 +119,7 @@ class Rig:
         report, payload = self.devices.report, self.devices.payload
         problems = plan_problems(self.whole_plan, payload.payload_kg, payload.payload_centre_mm)
         problems += step_problems(self.plan)
+        problems += clearance_problems(self.plan, payload.payload_centre_mm)  # other ways, where steps are left out
         refuse(list(dict.fromkeys([*problems, *arm_problems(self.plan, report)])))
         self.recording.station.event(PreflightPassed(self.plan, report))
         away_rad = max(map(abs, way_to_home(self.plan, report.state.q_rad)))

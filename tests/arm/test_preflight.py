@@ -9,7 +9,7 @@ import pytest
 
 from rig.arm.condition import program_interruption, readiness
 from rig.arm.kinematics import NOMINAL, distance_to_forearm
-from rig.arm.motion import Dwell, Plan, Rest, Transfer
+from rig.arm.motion import Dwell, Motion, Plan, Rest, Transfer
 from rig.arm.preflight import (
     arm_problems,
     kinematics_problems,
@@ -227,6 +227,56 @@ def test_a_way_home_from_an_attitude_is_judged_too() -> None:
     dwell = Dwell(0, back.start_q_rad, 3.0, 5.0)
     problems = plan_problems(Plan((dwell, back), back.start_q_rad, HOME), 0.3)
     assert [problem.what.split(" brings")[0] for problem in problems] == [dwell.name, "transfer home"]
+
+
+SWEPT_BESIDE = (*HOME_DEG[:3], 0.0, *HOME_DEG[4:])
+SWEPT_INTO = (*HOME_DEG[:3], 90.0, *HOME_DEG[4:])
+
+
+@pytest.mark.parametrize("wrist_2_deg", [-110.0, -90.0, 90.0])
+@pytest.mark.parametrize("changes", [{}, {"axes": 6}, {"directions": ["ccw", "cw"]}])
+def test_sweeps_and_the_ways_between_them_keep_clear_of_the_forearm(
+    wrist_2_deg: float, changes: dict[str, Any]
+) -> None:
+    """Turning together, wrists 1 and 2 would take the flange to 0.087 m with wrist 2 at 90°: they go through home."""
+    made = plan((*HOME_DEG[:4], wrist_2_deg, 0.0), **changes)
+    assert plan_problems(made, 0.3) == []
+    assert all(nearest_m(motion) > 0.115 for motion in made.motions)
+
+
+def nearest_m(motion: Motion) -> float:
+    return float(distance_to_forearm(np.linspace(motion.start_q_rad, motion.target_q_rad, 300)).min())
+
+
+def test_a_home_about_which_wrist_2_sweeps_into_the_forearm_is_refused() -> None:
+    assert plan_problems(plan(SWEPT_BESIDE), 0.3) == []
+    problems = plan_problems(plan(SWEPT_INTO), 0.3)
+    assert names(problems) == ["forearm_too_near"]
+    assert {problem.what for problem in problems} >= {
+        f"sweep wrist_2 {way} brings the flange within 0.058 m of the forearm's line, 0.115 m is the least"
+        for way in ("cw", "ccw")
+    }
+    assert all("wrist 1 in arm.home_deg" in problem.remedy for problem in problems)
+
+
+@pytest.mark.parametrize("below_mm", [25.0, 57.0, 120.0])
+def test_a_fixture_below_the_flange_passes_beside_the_forearm_too(below_mm: float) -> None:
+    assert plan_problems(plan(), 0.3, (0.0, 0.0, below_mm)) == []
+    assert names(plan_problems(plan(), 0.3, (0.0, 60.0, below_mm))) == ["forearm_too_near"]
+
+
+def test_sweeps_left_out_do_not_lead_the_rest_to_the_forearm() -> None:
+    """Straight from the last sweep of wrist 1 that way, the flange would come to 0.087 m."""
+    rest = plan_six_observation(ARM, SixObservationSection(), done=(0, 1, 2, 4))
+    assert [sweep.index for sweep in rest.sweeps] == [3, 5]
+    assert plan_problems(rest, 0.3) == []
+
+
+def test_the_way_from_where_the_arm_stands_is_judged() -> None:
+    stands = (*HOME[:3], math.radians(90), math.radians(-180), 0.0)
+    (problem,) = plan_problems(plan_six_observation(ARM, SixObservationSection(), start_q_rad=stands), 0.3)
+    assert problem.name == "forearm_too_near" and problem.what.startswith("approach home brings")
+    assert "from the pendant" in problem.remedy
 
 
 @pytest.mark.parametrize("made", [attitudes(*EIGHTEEN), attitudes(*FACES)])

@@ -1,0 +1,102 @@
+"""How near to its own forearm a plan brings what the arm carries. Pure."""
+
+from collections.abc import Iterator
+from math import radians
+from typing import NamedTuple
+
+import numpy as np
+
+from rig.arm.kinematics import distance_to_forearm
+from rig.arm.motion import Dwell, Plan, Rest, travel
+from rig.arm.state import Joints
+from rig.config.ur10e_limits import JOINT_LIMIT_RAD
+from rig.errors import Problem
+from rig.estimation.arrays import Array
+
+# From the flange's centre, and from that of its payload, to the line from elbow to wrist 1: how thick the forearm and
+# how large the payload are is not known, and both need that room.
+FOREARM_CLEARANCE_M = 0.15
+# Sweeps and the ways between them cannot keep that. About the usual home a sweep of wrist 2 takes the flange to 0.133 m
+# and the middle of a fixture to 0.120 m, the link that holds it off the forearm; a way between sweeps, to 0.118 m. The
+# forearm reaches 0.06 to 0.07 m from its line; 0.045 m are left for half a flange or half a fixture.
+SWEEP_CLEARANCE_M = 0.115
+ALONG_THE_WAY_RAD = radians(2)
+OTHER_ATTITUDES = "Bring wrist 2 nearer to -90 or 90 in procedure.attitudes, or turn wrist 1 so that it points away"
+OTHER_HOME = "Set wrist 1 in arm.home_deg between -180 and 0: then wrist 2 sweeps beside the forearm"
+NEARER_HOME = "Bring the arm near its home pose from the pendant"
+
+Offset = tuple[float, float, float]
+
+
+class _Way(NamedTuple):
+    """The poses (N, 6) of a step, how near the forearm they may come, and what to do about it."""
+
+    name: str
+    q_rad: Array
+    least_m: float
+    remedy: str
+
+
+def clearance_problems(plan: Plan, payload_centre_mm: Offset) -> list[Problem]:
+    """Dwells and motions that bring the flange or its payload's centre, x y z in its frame, too near the forearm.
+
+    By the nominal arm. What begins or ends at an attitude keeps `FOREARM_CLEARANCE_M`, all else `SWEEP_CLEARANCE_M`.
+    The way from where the arm stands is judged where the plan begins there.
+    """
+    return [
+        Problem(
+            "forearm_too_near",
+            f"{way.name} brings the {what} within {distance_m:.3f} m of the forearm's line, "
+            f"{way.least_m:g} m is the least",
+            way.remedy,
+        )
+        for way in _ways(plan)
+        for what, distance_m in [_nearest(way.q_rad, payload_centre_mm)]
+        if distance_m < way.least_m
+    ]
+
+
+def keeps_clear(start_q_rad: Joints, target_q_rad: Joints, payload_centre_mm: Offset) -> bool:
+    """Whether a straight way in joint space is clear enough for sweeps and what lies between them.
+
+    Nothing is said against one beyond the joints' limits, which is refused as that.
+    """
+    if not _within_limits(start_q_rad, target_q_rad):
+        return True
+    _, distance_m = _nearest(_between(start_q_rad, target_q_rad), payload_centre_mm)
+    return distance_m >= SWEEP_CLEARANCE_M
+
+
+def _nearest(q_rad: Array, payload_centre_mm: Offset) -> tuple[str, float]:
+    """What comes nearest to the forearm in the poses (N, 6), and how near, m."""
+    points = np.zeros(3), np.array(payload_centre_mm) / 1000
+    flange_m, payload_m = (float(distance_to_forearm(q_rad, point).min()) for point in points)
+    return ("flange", flange_m) if flange_m <= payload_m else ("payload", payload_m)
+
+
+def _within_limits(*poses: Joints) -> bool:
+    """False as well where an angle is no number."""
+    return bool(np.abs(poses).max() <= JOINT_LIMIT_RAD)
+
+
+def _between(start_q_rad: Joints, target_q_rad: Joints) -> Array:
+    """(N, 6) poses, both ends among them."""
+    way = np.array(travel(start_q_rad, target_q_rad))
+    parts = np.linspace(0, 1, 2 + int(np.abs(way).max() / ALONG_THE_WAY_RAD))
+    poses: Array = start_q_rad + parts[:, None] * way
+    return poses
+
+
+def _ways(plan: Plan) -> Iterator[_Way]:
+    """That of each dwell and each motion; what is no way, or beyond the joints' limits, has a problem of its own."""
+    for before, step, after in zip((None, *plan.steps), plan.steps, (*plan.steps[1:], None), strict=False):
+        if isinstance(step, Dwell):
+            yield _Way(step.name, np.array([step.q_rad]), FOREARM_CLEARANCE_M, OTHER_ATTITUDES)
+        elif not isinstance(step, Rest) and _within_limits(step.start_q_rad, step.target_q_rad):
+            q_rad = _between(step.start_q_rad, step.target_q_rad)
+            if isinstance(before, Dwell) or isinstance(after, Dwell):
+                yield _Way(step.name, q_rad, FOREARM_CLEARANCE_M, OTHER_ATTITUDES)
+            elif before is None and step.target_q_rad == plan.home_q_rad:
+                yield _Way(step.name, q_rad, SWEEP_CLEARANCE_M, NEARER_HOME)
+            else:
+                yield _Way(step.name, q_rad, SWEEP_CLEARANCE_M, OTHER_HOME)
