@@ -11,10 +11,9 @@ from typing import Self
 from rig.arm.child_link import ChildLink
 from rig.arm.condition import program_interruption, readiness
 from rig.arm.dashboard import Dashboard
-from rig.arm.kinematics import DenavitHartenberg
 from rig.arm.messages import Connected, Failed, Heartbeat, Message, Move, MoveFinished, TakeControl
 from rig.arm.motion import Motion, travel
-from rig.arm.primary import read_kinematics
+from rig.arm.primary import Account, read_account
 from rig.arm.state import ArmReport, ArmState, RuntimeState
 from rig.arm.stopping import StopOutcome, Stopper
 from rig.errors import Fault, Problem, Refused, RigError
@@ -98,6 +97,7 @@ class Arm:
         self.check()
         try:
             with Dashboard(self._host, ANSWER_S) as dashboard:
+                account = _account(self._host)
                 return ArmReport(
                     host=self._host,
                     polyscope=dashboard.polyscope(),
@@ -107,7 +107,8 @@ class Arm:
                     payload_kg=self._connected.payload_kg,
                     payload_centre_m=self._connected.payload_centre_m,
                     state=self.latest,
-                    kinematics=_kinematics(self._host),
+                    kinematics=account.kinematics,
+                    tcp_offset=account.tcp_offset,
                 )
         except OSError as error:
             raise Refused(
@@ -323,11 +324,12 @@ def _not_started(motion: Motion) -> Problem:
     )
 
 
-def _kinematics(host: str) -> DenavitHartenberg | None:
+def _account(host: str) -> Account:
+    """What the controller tells; nothing without its primary interface."""
     try:
-        return read_kinematics(host, ANSWER_S)
+        return read_account(host, ANSWER_S)
     except OSError:
-        return None
+        return Account()
 
 
 def look(host: str) -> ArmReport:

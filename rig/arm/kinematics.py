@@ -23,6 +23,7 @@ AXIS_ERRORS = (  # all that can be wrong with the angles between the wrists' axe
 
 Finite = Annotated[float, Field(allow_inf_nan=False)]
 OfJoints = Annotated[tuple[Finite, ...], Field(min_length=6, max_length=6)]
+Pose = Annotated[tuple[Finite, ...], Field(min_length=6, max_length=6)]  # a controller's: m, rotation vector in rad
 
 
 @dataclass(frozen=True, slots=True)

@@ -23,6 +23,7 @@ from rig.errors import Problem, Refused
 FIRST_MOTION_LIMIT_RAD = tuple(math.radians(angle) for angle in (120, 120, 120, 360, 360, 360))
 WRISTS = (3, 4, 5)
 MAX_DISAGREEMENT_RAD = math.radians(1)  # what factories find differs from the nominal arm by a few milliradians
+MAX_TOOL_TURN_RAD = 1e-3  # what a pendant rounds is less, what somebody means is more
 
 
 def plan_problems(
@@ -112,7 +113,24 @@ def arm_problems(plan: Plan, report: ArmReport) -> list[Problem]:
                 "Bring the arm near its home pose from the pendant, or correct arm.home_deg",
             )
         )
-    return problems
+    return [*problems, *_tool_problems(plan, report)]
+
+
+def _tool_problems(plan: Plan, report: ArmReport) -> list[Problem]:
+    """A turned tool frame, where attitudes are visited; a controller that does not tell of it is not held up."""
+    if not plan.dwells or report.tcp_offset is None:
+        return []
+    turn_rad = abs(math.remainder(math.hypot(*report.tcp_offset[3:]), math.tau))
+    if turn_rad <= MAX_TOOL_TURN_RAD:
+        return []
+    return [
+        Problem(
+            "tcp_rotated",
+            f"the tool's frame on the pendant is turned by {math.degrees(turn_rad):.2g}° against the flange's, "
+            "in which the rig measures: somebody's tool or mounting is meant",
+            "Set the rotation of the TCP to zero on the pendant for this run",
+        )
+    ]
 
 
 def kinematics_problems(arm: ArmSection, report: ArmReport) -> list[Problem]:

@@ -1,8 +1,9 @@
-"""What the controller says of its arm's geometry: one package of the primary interface, port 30001. Receives only.
+"""What the controller says of its arm's geometry and of its tool's frame: primary interface, port 30001. Receives only.
 
 Every UR is measured in the factory, and its controller reckons with what was found. (Client interface description of
 the maker for PolyScope 5: packages of a big-endian size, i32, a type, u8, and a payload; a robot state, type 16, holds
-sub-packages of the same form, and of these KinematicsInfo, type 5, is sent once after connecting.)
+sub-packages of the same form. Of these KinematicsInfo, type 5, is sent once after connecting; Cartesian Info, type 4,
+in every state: the tool centre point's pose, and where it stands in the flange's frame.)
 """
 
 import math
@@ -10,21 +11,35 @@ import socket
 import struct
 import time
 from collections.abc import Iterator
+from dataclasses import dataclass, replace
 
-from rig.arm.kinematics import DenavitHartenberg
+from rig.arm.kinematics import DenavitHartenberg, Pose
 
 PORT = 30001
 HEADER = struct.Struct(">iB")
-ROBOT_STATE, KINEMATICS_INFO = 16, 5
+ROBOT_STATE, CARTESIAN_INFO, KINEMATICS_INFO = 16, 4, 5
 KINEMATICS = struct.Struct(">6I 6d 6d 6d 6d I".replace(" ", ""))  # checksums; θ, a, d, α; how well it was calibrated
+CARTESIAN = struct.Struct(">6d 6d".replace(" ", ""))  # the tool centre point in the base's frame, and in the flange's
 SIZE_MAX = 1 << 20  # a robot state has some 1500 bytes
 
 
-def read_kinematics(host: str, timeout_s: float) -> DenavitHartenberg | None:
-    """The geometry of the arm at `host`; None when it is not told within `timeout_s`. Raises `OSError`."""
-    deadline_s, buffer = time.monotonic() + timeout_s, bytearray()
+@dataclass(frozen=True, slots=True)
+class Account:
+    """The arm's geometry, and where its tool centre point stands in the flange's frame; None where it is not told."""
+
+    kinematics: DenavitHartenberg | None = None
+    tcp_offset: Pose | None = None
+
+    @property
+    def complete(self) -> bool:
+        return self.kinematics is not None and self.tcp_offset is not None
+
+
+def read_account(host: str, timeout_s: float) -> Account:
+    """What the controller at `host` tells within `timeout_s`. Raises `OSError`."""
+    deadline_s, buffer, account = time.monotonic() + timeout_s, bytearray(), Account()
     with socket.create_connection((host, PORT), timeout_s) as connection:
-        while (left_s := deadline_s - time.monotonic()) > 0:
+        while not account.complete and (left_s := deadline_s - time.monotonic()) > 0:
             connection.settimeout(left_s)
             try:
                 data = connection.recv(65536)
@@ -34,19 +49,26 @@ def read_kinematics(host: str, timeout_s: float) -> DenavitHartenberg | None:
                 break
             buffer += data
             for kind, payload in _taken(buffer):
-                if kind == ROBOT_STATE and (found := _kinematics(payload)) is not None:
-                    return found
-    return None
+                if kind == ROBOT_STATE:
+                    account = _completed(account, payload)
+    return account
 
 
-def _kinematics(state: bytes) -> DenavitHartenberg | None:
-    """What a robot state says of it, if anything that can be."""
+def _completed(account: Account, state: bytes) -> Account:
+    """With what a robot state says, if it can be."""
     for kind, payload in _taken(bytearray(state)):
-        if kind == KINEMATICS_INFO and len(payload) >= KINEMATICS.size:
-            values = KINEMATICS.unpack_from(payload)[6:30]
-            if all(map(math.isfinite, values)):
-                return DenavitHartenberg(values[:6], values[6:12], values[12:18], values[18:])
-    return None
+        if kind == KINEMATICS_INFO and (values := _numbers(KINEMATICS, payload)[6:30]):
+            told = DenavitHartenberg(values[:6], values[6:12], values[12:18], values[18:])
+            account = replace(account, kinematics=told)
+        elif kind == CARTESIAN_INFO and (values := _numbers(CARTESIAN, payload)[6:]):
+            account = replace(account, tcp_offset=values)
+    return account
+
+
+def _numbers(layout: struct.Struct, payload: bytes) -> tuple[float, ...]:
+    """Of a payload; none when it is too short for them, or they are no numbers."""
+    values = layout.unpack_from(payload) if len(payload) >= layout.size else ()
+    return values if all(map(math.isfinite, values)) else ()
 
 
 def _taken(buffer: bytearray) -> Iterator[tuple[int, bytes]]:

@@ -7,7 +7,7 @@ from operator import attrgetter
 
 import numpy as np
 
-from rig.arm.kinematics import DenavitHartenberg
+from rig.arm.kinematics import DenavitHartenberg, Pose
 
 JOINT_NAMES = ("base", "shoulder", "elbow", "wrist_1", "wrist_2", "wrist_3")
 
@@ -115,7 +115,7 @@ class ArmReport:
     """What a look at the arm shows; None where the controller does not tell.
 
     `payload_kg` and `payload_centre_m` (3,) are what the controller reckons with at present, `kinematics` is its arm's
-    geometry as the factory has measured it.
+    geometry as the factory has measured it, `tcp_offset` where its tool centre point stands in the flange's frame.
     """
 
     host: str
@@ -127,3 +127,4 @@ class ArmReport:
     payload_centre_m: tuple[float, float, float] | None
     state: ArmState
     kinematics: DenavitHartenberg | None = None
+    tcp_offset: Pose | None = None

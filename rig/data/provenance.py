@@ -10,7 +10,7 @@ from typing import Any
 
 from firmware_host.answers import BoardIdentity, StoredCalibration
 from rig import __version__
-from rig.arm.kinematics import NOMINAL, DenavitHartenberg
+from rig.arm.kinematics import NOMINAL, DenavitHartenberg, Pose
 from rig.arm.preflight import used_kinematics
 from rig.arm.state import ArmReport
 from rig.config.load import Loaded
@@ -27,8 +27,9 @@ class Provenance:
     """Versions, serial numbers (`NO_BOARD` where there is none), the configuration's and the script's hashes, the time.
 
     `stored_calibrations` are those by which the board corrected what it streamed, by sensor name. `arm_kinematics` is
-    the arm's geometry that was reckoned with; older recordings do not say (None): that was the nominal one. Files of
-    schema "rig.run/1" do not name the script; that was an installed one.
+    the arm's geometry that was reckoned with; older recordings do not say (None): that was the nominal one.
+    `tcp_offset` is where the controller's tool centre point stood in the flange's frame, which nothing is reckoned
+    with; None where it was not told. Files of schema "rig.run/1" do not name the script; that was an installed one.
     """
 
     started_utc: str
@@ -46,6 +47,7 @@ class Provenance:
     script_sha256: str | None = None
     script_installed: bool = True
     arm_kinematics: DenavitHartenberg | None = None
+    tcp_offset: Pose | None = None
 
     @property
     def kinematics(self) -> DenavitHartenberg:
@@ -62,7 +64,7 @@ class Provenance:
         stored = {name: entry.model_dump(mode="json") for name, entry in self.stored_calibrations.items()}
         document = {**asdict(self), "stored_calibrations": stored}
         unknown = {"script", "script_sha256", "script_installed"} if self.script_sha256 is None else set()
-        unknown |= {"arm_kinematics"} if self.arm_kinematics is None else set()
+        unknown |= {name for name in ("arm_kinematics", "tcp_offset") if document[name] is None}
         return {key: value for key, value in document.items() if key not in unknown}
 
 
@@ -94,4 +96,5 @@ def provenance_of(
         script_sha256=script.sha256,
         script_installed=script_installed,
         arm_kinematics=used_kinematics(loaded.config.arm, arm),
+        tcp_offset=arm.tcp_offset,
     )

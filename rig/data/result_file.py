@@ -84,6 +84,7 @@ class ProvenanceEntry(Entry):
     verified_utc: tuple[str, ...]
     solved_utc: str
     arm_kinematics: KinematicsEntry | None = None
+    tcp_offset: Vector6 | None = None
 
 
 class EstimateEntry(Entry):

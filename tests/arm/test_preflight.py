@@ -229,6 +229,19 @@ def test_a_way_home_from_an_attitude_is_judged_too() -> None:
     assert [problem.what.split(" brings")[0] for problem in problems] == [dwell.name, "transfer home"]
 
 
+@pytest.mark.parametrize(("turned_rad", "found"), [(0.9e-3, []), (1.1e-3, ["tcp_rotated"]), (math.tau - 1e-4, [])])
+def test_a_turned_tool_frame_is_refused_where_attitudes_are_visited(turned_rad: float, found: list[str]) -> None:
+    told = replace(REPORT, tcp_offset=(0.0, 0.0, 0.12, 0.6 * turned_rad, 0.0, -0.8 * turned_rad))
+    assert names(arm_problems(attitudes((45, -90, 0)), told)) == found
+    assert arm_problems(plan(), told) == []
+
+
+def test_it_says_by_how_much_the_frame_is_turned() -> None:
+    told = replace(REPORT, tcp_offset=(0.0, 0.0, 0.0, 0.0, 0.0, math.radians(45)))
+    (problem,) = arm_problems(attitudes((45, -90, 0)), told)
+    assert "turned by 45° against the flange's" in problem.what and "TCP to zero" in problem.remedy
+
+
 SWEPT_BESIDE = (*HOME_DEG[:3], 0.0, *HOME_DEG[4:])
 SWEPT_INTO = (*HOME_DEG[:3], 90.0, *HOME_DEG[4:])
 

@@ -1,4 +1,4 @@
-"""The arm's geometry as a controller tells it."""
+"""The arm's geometry and its tool's frame as a controller tells them."""
 
 import socket
 import struct
@@ -11,7 +11,7 @@ import pytest
 
 from rig.arm.driver import look
 from rig.arm.kinematics import DenavitHartenberg, flange_axes
-from rig.arm.primary import PORT, read_kinematics
+from rig.arm.primary import PORT, Account, read_account
 from support.worlds import World
 
 HOST = "127.0.3.252"
@@ -29,6 +29,13 @@ def package(kind: int, payload: bytes) -> bytes:
 
 def info(arm: DenavitHartenberg) -> bytes:
     return package(5, struct.pack(">6I24dI", *range(6), *arm.theta_rad, *arm.a_m, *arm.d_m, *arm.alpha_rad, 2))
+
+
+TURNED = (0.01, 0.0, 0.12, 0.0, 0.5, -0.25)
+
+
+def cartesian(tcp_offset: tuple[float, ...]) -> bytes:
+    return package(4, struct.pack(">12d", 0.4, -0.2, 0.6, 3.1, 0.0, 0.0, *tcp_offset))
 
 
 @contextmanager
@@ -50,25 +57,36 @@ def saying(*pieces: bytes) -> Iterator[None]:
         server.join()
 
 
-def test_the_geometry_is_found_among_other_packages_however_they_are_cut() -> None:
-    stream = (
-        package(20, b"a message") + package(16, package(0, b"mode")) + package(16, package(1, b"q") + info(CALIBRATED))
-    )
+@pytest.mark.parametrize("tool_first", [True, False])
+def test_both_are_found_among_other_packages_in_whatever_state_they_come_and_however_they_are_cut(
+    tool_first: bool,
+) -> None:
+    geometry, tool = package(16, package(1, b"q") + info(CALIBRATED)), package(16, cartesian(TURNED) + package(0, b""))
+    told = tool + geometry if tool_first else geometry + tool
+    stream = package(20, b"a message") + package(16, package(0, b"mode")) + told
     with saying(stream[:30], stream[30:80], stream[80:]):
-        assert read_kinematics(HOST, 5.0) == CALIBRATED
+        assert read_account(HOST, 5.0) == Account(CALIBRATED, TURNED)
 
 
 def test_a_controller_that_does_not_tell_is_none() -> None:
     with saying(package(16, package(0, b"mode")), package(16, package(5, b"an older layout"))):
-        assert read_kinematics(HOST, 0.3) is None
+        assert read_account(HOST, 0.3) == Account()
+
+
+def test_what_one_package_tells_holds_without_the_other() -> None:
+    with saying(package(16, info(CALIBRATED) + cartesian((0.0,) * 5 + (float("nan"),)))):
+        assert read_account(HOST, 0.3) == Account(CALIBRATED)
+    with saying(package(16, cartesian(TURNED))):
+        assert read_account(HOST, 0.3) == Account(tcp_offset=TURNED)
 
 
 def test_what_is_no_primary_interface_is_an_error_of_the_link() -> None:
     with saying(b"Connected: Universal Robots Dashboard Server\n"), pytest.raises(ConnectionError):
-        read_kinematics(HOST, 5.0)
+        read_account(HOST, 5.0)
 
 
 def test_a_look_tells_the_geometry_of_the_simulated_arm(world: World) -> None:
     told = look(world({}).host)
     assert told.kinematics is not None
     np.testing.assert_allclose(flange_axes(np.zeros(6), told.kinematics), flange_axes(np.zeros(6)), atol=1e-12)
+    assert told.tcp_offset == (0.0,) * 6

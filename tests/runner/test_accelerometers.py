@@ -211,6 +211,15 @@ def test_a_board_that_goes_on_swinging_is_not_measured(tmp_path: Path) -> None:
     assert "times as much as at rest" in done.stderr
 
 
+def test_a_turned_tool_frame_is_refused_before_attitudes(tmp_path: Path) -> None:
+    turned = {"world": {"arm": {"tcp_rotation_deg": [0, 0, 45]}}}
+    config = configuration(tmp_path, merge(LABORATORY, turned), ATTITUDES)
+    looked, ran = rig("check", config), rig("run", config, "--out", tmp_path / "run")
+    assert looked.returncode == ran.returncode == 2, looked.stdout + ran.stdout
+    assert "missing: tcp_rotated: the tool's frame on the pendant is turned by 45°" in looked.stderr
+    assert "rig: tcp_rotated: " in ran.stderr and "to zero on the pendant" in ran.stderr
+
+
 def test_an_interrupted_run_goes_on_where_it_stood(tmp_path: Path) -> None:
     """Dwells that are finished are not repeated."""
     config, out = configuration(tmp_path, LABORATORY, ATTITUDES), tmp_path / "run"

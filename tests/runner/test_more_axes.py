@@ -27,3 +27,4 @@ def test_six_axes_and_two_speeds_recover_the_simulated_truth(tmp_path: Path) -> 
     error = np.array(sensor["scale"] + sensor["bias_rad_s"]) - np.array(truth["scale"] + truth["bias_rad_s"])
     assert (np.abs(error) < 4 * np.sqrt(np.diag(sensor["covariance_combined"]))).all()
     assert result["provenance"]["arm_kinematics"]["d_m"][0] == pytest.approx(0.1807)
+    assert result["provenance"]["tcp_offset"] == [0.0] * 6
