@@ -114,7 +114,7 @@ def test_a_part_that_is_not_there_is_told_from_another(part: str, fault: Fault, 
     session.sensors[part].fault = fault
     session.run(0.2)
     present = session.ask("hello").items["present"].astype(bool)
-    assert present.tolist() == [other != part for other in ALL]
+    assert present[: len(ALL)].tolist() == [other != part for other in ALL]
     rate_hz, range_deg_s = RATES_AND_RANGES[part]
     answer = session.ask(
         "configure", sensor=ALL.index(part), rate_hz=rate_hz, range_deg_s=range_deg_s, range_g=0, range_gauss=0
