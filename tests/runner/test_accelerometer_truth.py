@@ -14,7 +14,7 @@ from support.commands import rig
 from support.paths import CONFIGS
 from support.worlds import fresh_host, merge
 
-SEEDS = range(1, 7)
+SEEDS = range(1, 21)
 ERROR_RAD = 1e-3
 MICRO_G = 9.80665e-6  # m/s²
 LIMITS = {"mpu9250": (90.0, 90.0, 2.5), "adis16465": (8.0, 8.0, 15.0), "lsm9ds1": (90.0, 90.0, 2.5)}  # ppm, µg, times
