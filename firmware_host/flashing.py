@@ -155,13 +155,14 @@ def flash_by_drive(image: bytes, drive: Path, timeout_s: float = DRIVE_TIMEOUT_S
     deadline_s = time.monotonic() + timeout_s
     while time.monotonic() < deadline_s:
         try:
+            back = _is_mounted(drive) and not copied.exists()  # looked at first: with it came what may have failed
             if failure.exists():
                 raise BoardError(
                     "flash_failed",
                     f"the board did not take the image: {' '.join(failure.read_text(errors='replace').split())}",
                     "Unplug the board, plug it in, and try again, or flash through the probe",
                 )
-            if _is_mounted(drive) and not copied.exists():
+            if back:
                 return
         except OSError:
             pass  # the drive is just going or coming

@@ -79,7 +79,7 @@ def test_the_phases_come_one_after_the_other(events: list[RunEvent]) -> None:
         *connected, Prompt, Answered, SamplingStarted, PhaseRecorded,
         *[ObservationMade] * 12, CalibrationStored,
         *connected, SamplingStarted, PhaseRecorded,
-        Plotted, DocumentWritten, DocumentWritten,
+        Plotted, *[DocumentWritten] * 3,
         *[Checked] * checks, VerdictReached,
     ]  # fmt: skip
     first, second = (event for event in events if isinstance(event, PhaseStarted))
