@@ -252,6 +252,8 @@ class Adis16465:
 
     def _settle_settings(self, time_s: float) -> None:
         """Let the settings act whose time has come."""
+        if not self._waiting:
+            return
         for register, (when_s, value) in list(self._waiting.items()):
             if when_s <= time_s:
                 del self._waiting[register]

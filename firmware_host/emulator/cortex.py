@@ -72,8 +72,7 @@ class Cortex:
         if number is None:
             return Entry.NONE
         *scratch, control, xpsr, stack, primask, faultmask, basepri = self._everything.read()
-        masked = primask or faultmask or (basepri and self._nvic.priority(number) >= basepri)
-        if masked and number != NMI:
+        if self._masked(number, primask, faultmask, basepri):
             return Entry.MASKED
         if control & (_PROCESS_STACK | _UNPRIVILEGED):
             raise Violation(
@@ -96,6 +95,15 @@ class Cortex:
         (entry,) = struct.unpack("<I", self._engine.read(vectors + 4 * number, 4))
         self._jump(entry, f"the vector of exception {number} (interrupt {number - FIRST_IRQ})")
         return Entry.TAKEN
+
+    def masks_pending(self) -> bool:
+        """Whether an exception waits that is still held off."""
+        number = self._nvic.candidate()
+        return number is not None and self._masked(number, *self._masks.read())
+
+    def _masked(self, number: int, primask: int, faultmask: int, basepri: int) -> bool:
+        held_off = primask or faultmask or (basepri and self._nvic.priority(number) >= basepri)
+        return bool(held_off) and number != NMI
 
     def return_from_exception(self) -> None:
         """Inside a hook: undo `enter_pending`, after the core branched to a return code (EXC_RETURN), and go on where

@@ -23,11 +23,13 @@ class Port:
         self.number = _PORTS[letter]  # as SYSCFG counts
         self.base = 0x4800_0000 + 0x400 * _PORTS[letter]
         prefix = self.name
-        self._mode = Stored(f"{prefix} MODER", 0xFFFF_FFFF, _MODE_AFTER_RESET[letter], self._outputs_changed)
+        self.setup_count = 0  # how often functions have been set
+        self._mode = Stored(f"{prefix} MODER", 0xFFFF_FFFF, _MODE_AFTER_RESET[letter], self._functions_changed)
         self._speed = Stored(f"{prefix} OSPEEDR", 0xFFFF_FFFF, _SPEED_AFTER_RESET[letter])
         self._pulls = Stored(f"{prefix} PUPDR", 0xFFFF_FFFF, _PULLS_AFTER_RESET[letter])
         self._output = 0
-        self._alternate = [Stored(f"{prefix} AFR{half}", 0xFFFF_FFFF) for half in "LH"]
+        self._output_pins = 0
+        self._alternate = [Stored(f"{prefix} AFR{half}", 0xFFFF_FFFF, after=self._functions_changed) for half in "LH"]
         self._levels = 0  # that devices drive
         self._watched: dict[int, Callable[[bool], None]] = {}  # by pin
         self._watched_low = 0  # those that are low
@@ -37,7 +39,7 @@ class Port:
         for register in (self._mode, self._speed, self._pulls, *self._alternate):
             register.reset()
         self._output = 0
-        self._outputs_changed()
+        self._functions_changed()
 
     def registers(self) -> Sequence[Register]:
         return (
@@ -75,16 +77,20 @@ class Port:
 
     def _set_and_reset(self, value: int) -> None:
         self._output = self._output & ~(value >> 16) | value & 0xFFFF
-        if (self._output ^ ~self._watched_low) & self._watched_pins:
-            self._outputs_changed()
+        self._outputs_changed()
+
+    def _functions_changed(self) -> None:
+        self.setup_count += 1
+        self._output_pins = sum(1 << pin for pin in range(16) if self._mode.value >> 2 * pin & 3 == _OUTPUT)
+        self._outputs_changed()
 
     def _outputs_changed(self) -> None:
-        for pin, on_level in self._watched.items():
-            bit = 1 << pin
-            low = not self._output & bit and self._mode.value >> 2 * pin & 3 == _OUTPUT
-            if low != bool(self._watched_low & bit):
-                self._watched_low ^= bit
-                on_level(not low)
+        low = ~self._output & self._output_pins & self._watched_pins
+        changed, self._watched_low = low ^ self._watched_low, low
+        if changed:
+            for pin, on_level in self._watched.items():
+                if changed >> pin & 1:
+                    on_level(not low >> pin & 1)
 
 
 class Syscfg:

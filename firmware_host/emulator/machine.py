@@ -171,8 +171,7 @@ class EmulatedBoard:
                 return
             else:
                 # Nothing tells when the firmware unmasks a waiting exception: look after every block
-                one_block = entry is Entry.MASKED
-                timeline.run_until(timeline.now + 1 if one_block else limit)
+                timeline.run_until(limit, cortex.masks_pending if entry is Entry.MASKED else None)
                 self._execute()
 
     def _execute(self) -> None:

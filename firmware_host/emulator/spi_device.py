@@ -49,13 +49,13 @@ class SpiDevice(Protocol):
         """Do everything due up to and including `time_s`."""
 
     def select(self, time_s: float) -> None:
-        """Chip select falls."""
+        """Chip select falls, which neither moves the interrupt line nor `next_event_s`."""
 
     def transfer(self, byte: int, time_s: float) -> int:
         """Exchange one byte. Raises Violation for what the part does not allow or the model does not know."""
 
     def deselect(self, time_s: float) -> None:
-        """Chip select rises."""
+        """Chip select rises, likewise."""
 
 
 # The MSI locked to the 32768 Hz crystal runs at 122 times its frequency, not at the 4 MHz it is meant to have
@@ -195,11 +195,13 @@ class DeviceLink:
         if timeline.next_due <= timeline.now:
             timeline.run_due()
         self._bus.chip_select(self, not high)
+        device = self.device
         if high:
-            self.device.deselect(self._clock.seconds(timeline.now))
+            device.deselect(self._clock.seconds(timeline.now))
         else:
-            self.device.select(self._clock.seconds(timeline.now))
-        self._settle()
+            device.select(self._clock.seconds(timeline.now))
+        if device.fault is not None:  # it may just have come
+            self._settle()
 
     def _event(self) -> None:
         self.device.advance(self._due_s)

@@ -18,6 +18,7 @@ class Timeline(Time):
     def __init__(self) -> None:
         super().__init__(now=0, deadline=0)
         self._limit = 0
+        self._on: Callable[[], bool] | None = None
         self.next_due = NEVER
         self._actions: list[Callable[[], None]] = []
         self._due: list[int] = []
@@ -48,10 +49,10 @@ class Timeline(Time):
             self.next_due = min(self._due)
             self._actions[slot]()
 
-    def run_until(self, limit: int) -> None:
-        """The core runs from now on, and is to pause at `limit`."""
-        self._limit = limit
-        self.deadline = min(self.next_due, limit)
+    def run_until(self, limit: int, on: Callable[[], bool] | None = None) -> None:
+        """The core runs from now on, and is to pause at `limit`, or when `on`, asked after every block, says no."""
+        self._limit, self._on = limit, on
+        self.deadline = min(self.next_due, limit if on is None else self.now + 1)
 
     def go_on(self) -> bool:
         """Do what is due while the core runs. Whether it may run on: nothing interrupted, the limit is still ahead."""
@@ -59,8 +60,11 @@ class Timeline(Time):
             self.run_due()
         if not self.deadline or self.now >= self._limit:
             return False
-        self.deadline = min(self.next_due, self._limit)
-        return True
+        if self._on is None:
+            self.deadline = min(self.next_due, self._limit)
+            return True
+        self.deadline = self.now + 1
+        return self._on()
 
     def interrupt(self) -> None:
         """Have the core pause at the end of the current block: an exception may have become pending."""

@@ -14,6 +14,7 @@ from rig.world.wire import SocketTable, Wire
 
 BACKLOG_BYTES = 1 << 16  # a client that does not read loses packages beyond this
 UNPACED = inf  # the lag of a client that nobody waits for
+GATHER_S = 0.002  # wall time for which a gathering wire keeps bytes together while the world has more to do
 
 
 class Session(Protocol):
@@ -37,7 +38,8 @@ class Connection:
     def __init__(self, network: "Network", peer: socket.socket, session: Session, listener: "Listener") -> None:
         self._network, self._peer, self.session, self.listener = network, peer, session, listener
         self._unsent = bytearray()
-        self._due = b""  # what the last tick made for this client and its wire does not take yet
+        self._due = b""  # what ticks made for this client and its wire does not take yet
+        self._delivered_s = 0.0  # wall time
         self._ticks = 0
         self._wire = Wire(network.sockets.unread(peer), listener.lag_s, time.monotonic)
         peer.setblocking(False)
@@ -74,15 +76,18 @@ class Connection:
     def tick(self) -> None:
         """The session's turn; what it has to say goes out as soon as `deliver` finds the wire free."""
         self._ticks += 1
-        self._due = self.session.tick()
+        self._due = (b"" if self.listener.silent else self._due) + self.session.tick()
 
-    def deliver(self) -> float:
-        """Send what the last tick made if the client is not too far behind; else the wall time to wait."""
+    def deliver(self, idle: bool) -> float:
+        """Send what ticks made if the client is not too far behind; else the wall time to wait."""
         if not self._due or self.listener.silent:
+            return 0.0
+        if self.listener.gathers and not idle and time.monotonic() - self._delivered_s < GATHER_S:
             return 0.0
         wait_s = self._wire.wait_s(self._ticks * TICK_S)
         if wait_s <= 0.0:
             due, self._due = self._due, b""
+            self._delivered_s = time.monotonic()
             self.send(due)
         return wait_s
 
@@ -144,7 +149,8 @@ class Connection:
 class Listener:
     """One port. `limit` bounds the clients at a time: further ones are hung up on at once.
 
-    A client may be `lag_s` of the world's time behind before the world waits for it.
+    A client may be `lag_s` of the world's time behind before the world waits for it. A port that `gathers` hands on in
+    one go what several ticks make, as a USB adapter does, while the world has more to do: every packet wakes its reader.
     """
 
     def __init__(
@@ -155,9 +161,10 @@ class Listener:
         *,
         limit: int,
         lag_s: float,
+        gathers: bool,
     ) -> None:
         self._network, self._address = network, address
-        self._new_session, self._limit, self.lag_s = new_session, limit, lag_s
+        self._new_session, self._limit, self.lag_s, self.gathers = new_session, limit, lag_s, gathers
         self.silent = False
         self._socket: socket.socket | None = None
         self.open()
@@ -237,9 +244,16 @@ class Network:
         self.connections: list[Connection] = []
 
     def listen(
-        self, host: str, port: int, new_session: Callable[[], Session], *, limit: int = 16, lag_s: float = UNPACED
+        self,
+        host: str,
+        port: int,
+        new_session: Callable[[], Session],
+        *,
+        limit: int = 16,
+        lag_s: float = UNPACED,
+        gathers: bool = False,
     ) -> Listener:
-        listener = Listener(self, (host, port), new_session, limit=limit, lag_s=lag_s)
+        listener = Listener(self, (host, port), new_session, limit=limit, lag_s=lag_s, gathers=gathers)
         self.listeners.append(listener)
         return listener
 
@@ -253,12 +267,12 @@ class Network:
         for connection in tuple(self.connections):
             connection.tick()
 
-    def deliver(self) -> float:
-        """Send what the last tick made to every client whose wire is free; the wall time to wait for the others.
+    def deliver(self, idle: bool = True) -> float:
+        """Send what ticks made to every client whose wire is free; the wall time to wait for the others.
 
-        A tick is over when this returns 0.
+        A tick is over when this returns 0. `idle`: the next one is not due yet, so that nothing is gathered any longer.
         """
-        return max((connection.deliver() for connection in tuple(self.connections)), default=0.0)
+        return max([connection.deliver(idle) for connection in tuple(self.connections)], default=0.0)
 
     def close(self) -> None:
         for listener in self.listeners:

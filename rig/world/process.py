@@ -28,6 +28,7 @@ if TYPE_CHECKING:
     from rig.world.board.pty_port import PtyPort
 
 IDLE_POLL_S = 0.2
+BUSY_POLL_S = 0.001  # wall time for which the sockets are not looked at while ticks are due one after the other
 ARM_LAG_S = 0.04  # of the world's time, that a reader of the arm's states may be behind: five packets at 125 Hz
 SERIAL_LAG_S = 1.0  # … and a reader of the serial line, where nothing is lost that the system can hold
 ARM_PORTS: dict[int, tuple[Callable[[Robot], Session], float]] = {
@@ -92,7 +93,9 @@ class World:
 
     def _listen(self, key: str, url: str, line: SerialLine) -> Listener:
         """The far end of a serial line; a client who opens what another has open is hung up on."""
-        return self.network.listen(*_address(key, url), lambda: SerialSession(line), limit=1, lag_s=SERIAL_LAG_S)
+        return self.network.listen(
+            *_address(key, url), lambda: SerialSession(line), limit=1, lag_s=SERIAL_LAG_S, gathers=True
+        )
 
     # -- faults that live in the wires -----------------------------------------------------------------------------
     def silence_arm(self, duration_s: float) -> None:
@@ -123,9 +126,13 @@ class World:
 
     def run(self) -> None:
         """Serve until `end`. A tick ends when its clients have been given theirs, and they have their own pace."""
+        polled_s = 0.0
         while not self._ended:
-            behind_s = self.network.deliver()
-            self.network.poll(behind_s or min(self.clock.wait_s(), IDLE_POLL_S))
+            wait_s = self.clock.wait_s()
+            behind_s = self.network.deliver(idle=wait_s > 0.0)
+            if behind_s or wait_s > 0.0 or time.monotonic() - polled_s >= BUSY_POLL_S:
+                self.network.poll(behind_s or min(wait_s, IDLE_POLL_S))
+                polled_s = time.monotonic()
             if self._silent_until_s and time.monotonic() >= self._silent_until_s:
                 self._silent_until_s = 0.0
                 for listener in self.arm_listeners:

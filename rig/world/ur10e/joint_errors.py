@@ -10,7 +10,7 @@ from dataclasses import dataclass
 from math import cos, exp, inf, pi, sin, sqrt
 from random import Random
 
-from rig.world.ur10e.trajectory import Joints
+from rig.world.ur10e.trajectory import ZERO, Joints
 
 WRISTS = (3, 4, 5)
 REVERSAL_RAD = 0.01  # way in which hysteresis comes about: inside the ramps
@@ -64,6 +64,7 @@ class JointErrors:
         self._patience_s = FORGOTTEN * errors.settling_decay_s
         self._placed = [(0.0, 0.0, 1.0, 0.0)] * 6  # last worked out: encoder's angle; angle and its two derivatives
         self._known = [False] * 6
+        self._stood: tuple[Joints, Joints] = ((), ())  # the encoders' angles that joints stood at last, and the true
 
     def step(self, time_s: float, q_rad: Joints, qd_rad_s: Joints) -> None:
         """The joints at the end of a tick, as the encoders see them."""
@@ -87,15 +88,12 @@ class JointErrors:
 
     def at(self, time_s: float, q_rad: Joints, qd_rad_s: Joints, qdd_rad_s2: Joints) -> tuple[Joints, Joints, Joints]:
         """True angles, speeds and accelerations at a time of which the encoders' are given."""
-        angles, speeds, accelerations = list(q_rad), list(qd_rad_s), list(qdd_rad_s2)
-        for joint, (e, speed) in enumerate(zip(q_rad, qd_rad_s, strict=True)):
-            if self._placed[joint][0] != e or not self._known[joint]:  # most moves turn few joints
-                self._placed[joint] = (e, *self._place(joint, e))
-                self._known[joint] = True
-            _, angles[joint], gain, bend = self._placed[joint]
-            if speed or accelerations[joint]:
-                speeds[joint] = gain * speed
-                accelerations[joint] = gain * accelerations[joint] + bend * speed * speed
+        if qd_rad_s is ZERO and q_rad is self._stood[0]:
+            angles, speeds, accelerations = list(self._stood[1]), [0.0] * 6, [0.0] * 6
+        else:
+            angles, speeds, accelerations = self._carried(q_rad, qd_rad_s, qdd_rad_s2)
+            if qd_rad_s is ZERO:
+                self._stood = q_rad, tuple(angles)
         if self._vibration_rad:
             for joint in WRISTS:
                 phase = self._vibration * time_s + self._phases[joint][2]
@@ -111,6 +109,21 @@ class JointErrors:
                     speeds[joint] += speed
                     accelerations[joint] += acceleration
         return tuple(angles), tuple(speeds), tuple(accelerations)
+
+    def _carried(
+        self, q_rad: Joints, qd_rad_s: Joints, qdd_rad_s2: Joints
+    ) -> tuple[list[float], list[float], list[float]]:
+        """The same without vibration and settling."""
+        angles, speeds, accelerations = list(q_rad), list(qd_rad_s), list(qdd_rad_s2)
+        for joint, (e, speed) in enumerate(zip(q_rad, qd_rad_s, strict=True)):
+            if self._placed[joint][0] != e or not self._known[joint]:  # most moves turn few joints
+                self._placed[joint] = (e, *self._place(joint, e))
+                self._known[joint] = True
+            _, angles[joint], gain, bend = self._placed[joint]
+            if speed or accelerations[joint]:
+                speeds[joint] = gain * speed
+                accelerations[joint] = gain * accelerations[joint] + bend * speed * speed
+        return angles, speeds, accelerations
 
     def _place(self, joint: int, e: float) -> tuple[float, float, float]:
         """True angle at the encoder's, and its two derivatives by that."""

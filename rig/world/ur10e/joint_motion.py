@@ -130,6 +130,8 @@ class Motion:
 
     def with_accelerations(self, time_s: float) -> tuple[Joints, Joints, Joints]:
         """The same with the joints' accelerations, those of the ripple included."""
+        if self.still:
+            return self.now.q_rad, ZERO, ZERO
         tick, fraction, target, velocity, acceleration = self._played(time_s)
         q, qd = self._joints(tick.offset, tick.gain, target, velocity, fraction)
         qdd = [0.0] * 6

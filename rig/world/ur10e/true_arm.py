@@ -74,7 +74,7 @@ class TrueArm:
         q, qd, qdd = self._joints_at(controller_s)
         if self._speed != 1.0:  # the controller's seconds are not the world's
             speed, squared = self._speed, self._speed**2
-            qd, qdd = tuple(v * speed for v in qd), tuple(a * squared for a in qdd)
+            qd, qdd = tuple([v * speed for v in qd]), tuple([a * squared for a in qdd])
         inner = q[:WRIST], qd[:WRIST], qdd[:WRIST]
         if self._forearm[0] != inner:
             forearm = self._links[:WRIST]
