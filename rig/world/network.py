@@ -149,8 +149,8 @@ class Connection:
 class Listener:
     """One port. `limit` bounds the clients at a time: further ones are hung up on at once.
 
-    A client may be `lag_s` of the world's time behind before the world waits for it. A port that `gathers` hands on in
-    one go what several ticks make, as a USB adapter does, while the world has more to do: every packet wakes its reader.
+    A client may be `lag_s` of the world's time behind before the world waits for it. While the world has more to do, a
+    port that `gathers` hands on several ticks' bytes in one go, as a USB adapter does: every packet wakes its reader.
     """
 
     def __init__(

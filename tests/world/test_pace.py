@@ -3,6 +3,7 @@
 import multiprocessing
 import os
 import signal
+import socket
 import sys
 import threading
 import time
@@ -12,13 +13,14 @@ import pytest
 
 from rig.arm.driver import Arm
 from rig.arm.motion import Transfer, trapezoid_duration
+from rig.world import network
 from rig.world.clock import DIALOGUE_S, TICK_S, Clock
 from rig.world.process import ARM_LAG_S
 from rig.world.wire import GONE_S, PATIENCE_S, Wire
 from support.arm_client import wait_for
 from support.arm_relay import relay
 from support.rtde_reader import RtdeReader
-from support.worlds import World
+from support.worlds import World, fresh_host
 
 PERIOD_S = 0.008  # between packets at 125 Hz
 LAG_S = 5.5 * PERIOD_S
@@ -202,3 +204,52 @@ def test_a_driver_that_stalls_for_a_moment_misses_no_state(world: World) -> None
         arm.move(turn(arm), stall)
         assert next(stalls, None) is None, "nothing stalled"
         assert arm.missed_states == missed
+
+
+class Talker:
+    """A device that says one byte a tick."""
+
+    closing = dialogue = False
+
+    def __init__(self) -> None:
+        self.said = 0
+
+    def greeting(self) -> bytes:
+        return b""
+
+    def receive(self, data: bytes) -> bytes:
+        return b""
+
+    def tick(self) -> bytes:
+        self.said += 1
+        return bytes([self.said])
+
+    def closed(self) -> None:
+        pass
+
+
+def test_a_gathering_port_hands_on_in_one_go_what_came_about_while_ticks_were_due(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    monkeypatch.setattr(network, "GATHER_S", 60.0)
+    host = fresh_host()
+    ports = network.Network(lambda: None)
+    ports.listen(host, 7321, Talker, gathers=True)
+    try:
+        with socket.create_connection((host, 7321), 5.0) as client:
+            ports.poll(5.0)
+            for idle in (False, False, False, True):
+                ports.tick()
+                assert ports.deliver(idle) == 0.0
+            client.settimeout(5.0)
+            heard = b""
+            while len(heard) < 4:
+                heard += client.recv(64)
+            assert heard == bytes([1, 2, 3, 4])
+            ports.tick()
+            ports.deliver(idle=False)
+            client.setblocking(False)
+            with pytest.raises(BlockingIOError):
+                client.recv(64)
+    finally:
+        ports.close()
