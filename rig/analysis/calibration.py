@@ -1,22 +1,23 @@
 """From recordings to a calibration: the one path that a run and `rig solve` share, pure from end to end."""
 
 from collections.abc import Callable, Collection, Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from itertools import combinations
 from typing import Literal, TypeVar, get_args
 
 import numpy as np
 
 from rig.analysis.correction import Correction, CorrectionKind, diagonal_correction, matrix_correction
-from rig.analysis.seen import see, unknown_of
+from rig.analysis.seen import known_of, see, unknown_of
 from rig.analysis.surroundings import Surroundings
 from rig.data.run_file import RecordedSensor, RunData
 from rig.errors import Fault, Refused
 from rig.estimation.accumulator import Accumulator, SixObservationEstimator, Solution
 from rig.estimation.arrays import Array
 from rig.estimation.budget import Budget, budget
+from rig.estimation.earth_rate import EarthRate, find_earth_rate
 from rig.estimation.estimate import Estimate
-from rig.estimation.explained import Explained, explain
+from rig.estimation.explained import Explained, Seen, explain
 from rig.estimation.levenberg_marquardt import LevenbergMarquardtSolution, solve_levenberg_marquardt
 from rig.estimation.refusals import check_duplicates
 from rig.estimation.vector_model import VectorSolution, solve_vector_model
@@ -43,7 +44,8 @@ class SensorResult:
 
     `solution` is the chosen estimator's. Beside it stand the others from the same observations: `vector_model`,
     `six_observation` (exact) and `algorithm_1`, the paper's own, or the Fault one ends in. There is one time base for
-    each recording that took part. `corrected_by` is what the board and `calibration.h` make of it.
+    each recording that took part. `corrected_by` is what the board and `calibration.h` make of it. `earth` is what
+    the sensor found of the Earth's rate, or the Fault for which it did not, None where it was not to.
     """
 
     sensor: RecordedSensor
@@ -57,6 +59,7 @@ class SensorResult:
     rests: tuple[Average, ...]
     time_bases: tuple[TimeBase, ...]
     corrected_by: Correction
+    earth: EarthRate | Fault | None = None
 
     @property
     def serial_number(self) -> str:
@@ -151,10 +154,15 @@ def _solve_sensor(
     check_duplicates(np.array([observation.average.mean_rad_s for observation in observations]))
     six_observation = solve_six_observation(observations, "newton")
     explained: Explained | Fault | None = None
+    earth_rate: EarthRate | Fault | None = None
     if surroundings is None:
         vector_model = or_fault(lambda: solve_vector(observations, rests, mounting))
     else:
-        explained = or_fault(lambda: explain(see(recordings, name, surroundings), mounting))
+        seen = see(recordings, name, surroundings)
+        if surroundings.finds_earth_rate:
+            known = known_of(surroundings, name, sensor.part)
+            earth_rate = or_fault(lambda: find_earth_rate(seen, mounting, known))
+        explained = or_fault(lambda: explain(_with(earth_rate, seen), mounting))
         vector_model = explained if isinstance(explained, Fault) else explained.solution
     algorithm_1 = or_fault(lambda: solve_six_observation(observations, "algorithm_1"))
     by_name = {"vector": vector_model, "newton": six_observation, "algorithm_1": algorithm_1}
@@ -167,7 +175,7 @@ def _solve_sensor(
         vector_model=vector_model,
         explained=explained if isinstance(explained, Explained) else None,
         uncertainty=(
-            budget(explained, unknown_of(surroundings, name, sensor.part))
+            budget(explained, unknown_of(surroundings, name, sensor.part, found_earth_rate(earth_rate)))
             if isinstance(explained, Explained) and surroundings is not None and estimator == "vector"
             else None
         ),
@@ -177,7 +185,19 @@ def _solve_sensor(
         rests=rests,
         time_bases=tuple(part.time_base for part in parts),
         corrected_by=_correction(solution, whole_matrix=whole_matrix),
+        earth=earth_rate,
     )
+
+
+def found_earth_rate(earth_rate: EarthRate | Fault | None) -> EarthRate | None:
+    """None where it was not found, for whatever reason."""
+    return earth_rate if isinstance(earth_rate, EarthRate) else None
+
+
+def _with(earth_rate: EarthRate | Fault | None, seen: Seen) -> Seen:
+    """What was found counts; else what the site says, if it says anything."""
+    found = found_earth_rate(earth_rate)
+    return seen if found is None else replace(seen, earth_rate_rad_s=found.rate_rad_s)
 
 
 def _correction(solution: Estimate, *, whole_matrix: bool) -> Correction:

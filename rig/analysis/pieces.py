@@ -5,7 +5,7 @@ and so is what the sensor's filter delays of it.
 """
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.typing import NDArray
@@ -76,6 +76,8 @@ class _Piece:
 
 def cut(name: str, recordings: Sequence[ObservedRun], result: SensorResult, explained: Explained, site: Site) -> Pieces:
     """The sensor's revolutions and rests of all recordings in pieces, in the order `explained` was made from."""
+    x, y, z = explained.seen.earth_rate_rad_s.tolist()  # known by the site, or found
+    site = replace(site, earth_rate_rad_s=(x, y, z))
     parts = max(1, min(PARTS, MOST_PIECES // len(result.observations)))
     streams = [(recording, recording.stream(name)) for recording in recordings]
     turns = [(*each, turn) for each in streams for turn in each[0].sensors[name].revolutions]

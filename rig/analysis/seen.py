@@ -9,8 +9,10 @@ import numpy as np
 from rig.analysis.surroundings import Surroundings
 from rig.arm.kinematics import AXIS_ERRORS
 from rig.config.sensor_catalogue import PARTS
+from rig.data.settings import Uncertainty
 from rig.estimation.arrays import Array
 from rig.estimation.budget import Unknown
+from rig.estimation.earth_rate import EarthRate, Known
 from rig.estimation.explained import Seen
 from rig.observation.observe import Observation
 from rig.observation.observed_run import ObservedRun
@@ -36,7 +38,7 @@ def see(recordings: Sequence[ObservedRun], sensor: str, surroundings: Surroundin
         means_rad_s=np.array([average.mean_rad_s for average in averages]),
         variances_rad2_s2=np.array([average.variance_rad2_s2 - average.drift_rad2_s2 for average in averages]),
         turns_rad_s=np.concatenate([turned * (1 + surroundings.clock.error), np.zeros((len(rests), 3))]),
-        earth_rad_s=attitudes @ earth,
+        earth_rate_rad_s=earth,
         speed_std_rad_s=np.array([*(turn.speed_std_rad_s for turn, _ in turns), *np.zeros(len(rests))]),
         attitudes=attitudes,
         gravity_m_s2=attitudes @ site.down_m_s2,
@@ -73,16 +75,33 @@ def _started(recording: ObservedRun) -> datetime:
     return datetime.fromisoformat(recording.run.provenance.started_utc)
 
 
-def unknown_of(surroundings: Surroundings, name: str, part: str) -> Unknown:
-    """What no recording shows of the surroundings of a sensor of that name and kind."""
+def known_of(surroundings: Surroundings, name: str, part: str) -> Known:
+    """What is known of surroundings and sensor before the Earth's rate is looked for."""
+    site, uncertainty = surroundings.site, surroundings.uncertainty
+    return Known(
+        up=np.array(site.up),
+        latitude_rad=site.latitude_rad,
+        g_sensitivity=g_sensitivity_deg_s_g(uncertainty, name, part) > 0,
+        repeatability_rad=float(np.radians(uncertainty.repeatability_deg) / np.sqrt(3)),
+        state_jitter_s=surroundings.state_jitter_s,
+    )
+
+
+def g_sensitivity_deg_s_g(known: Uncertainty, name: str, part: str) -> float:
+    """Half-width; that of the part where nothing else is said of the sensor."""
+    return known.g_sensitivity_deg_s_g.get(name, PARTS[part].g_sensitivity_deg_s_g)
+
+
+def unknown_of(surroundings: Surroundings, name: str, part: str, earth_rate: EarthRate | None) -> Unknown:
+    """What no recording shows of the surroundings of a sensor of that name and kind, and the Earth's rate it found."""
     known, clock = surroundings.uncertainty, surroundings.clock
-    g_sensitivity_deg_s_g = known.g_sensitivity_deg_s_g.get(name, PARTS[part].g_sensitivity_deg_s_g)
     return Unknown(
         clock_std=clock.std,
         clock_source="held against " + (" and ".join(each.by for each in clock.comparisons) or "no other clock"),
         state_jitter_s=surroundings.state_jitter_s,
         axis_rad=float(np.radians(known.axis_deg)),
         sensor_offset_m=known.sensor_offset_mm / 1000,
-        g_sensitivity_rad_s_per_g=float(np.radians(g_sensitivity_deg_s_g)),
-        earth_rate=surroundings.site.earth_rate_rad_s is None,
+        g_sensitivity_rad_s_per_g=float(np.radians(g_sensitivity_deg_s_g(known, name, part))),
+        earth_rate=earth_rate is None and surroundings.site.earth_rate_rad_s is None,
+        earth_covariance_rad2_s2=None if earth_rate is None else earth_rate.covariance_rad2_s2,
     )

@@ -10,12 +10,16 @@ from rig.observation.observed_run import ObservedRun
 
 @dataclass(frozen=True, slots=True)
 class Surroundings:
-    """The site, what no recording shows of it, the controller's clock, and the jitter of its states' times (s)."""
+    """The site, what no recording shows of it, the controller's clock, and the jitter of its states' times (s).
+
+    `finds_earth_rate` says that the site is not asked for the Earth's rate.
+    """
 
     site: Site
     uncertainty: Uncertainty
     clock: ClockCheck
     state_jitter_s: float
+    finds_earth_rate: bool = False
 
 
 def surroundings_of(recordings: Sequence[ObservedRun]) -> Surroundings | None:
@@ -25,4 +29,5 @@ def surroundings_of(recordings: Sequence[ObservedRun]) -> Surroundings | None:
         return None
     longest = max(recordings, key=lambda each: float(each.motion.time_s[-1] - each.motion.time_s[0]))
     clock = check_clock(longest, settings.uncertainty)
-    return Surroundings(settings.site, settings.uncertainty, clock, state_jitter_s(longest))
+    jitter_s = state_jitter_s(longest)
+    return Surroundings(settings.site, settings.uncertainty, clock, jitter_s, settings.finds_earth_rate)

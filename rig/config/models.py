@@ -365,6 +365,11 @@ class ProcedureSection(Section):
         """Of the accelerometer's model that the attitudes must tell; 0 where they need not tell one."""
         return 0
 
+    @property
+    def finds_earth_rate(self) -> bool:
+        """Whether the Earth's rate is found from what the gyroscopes read; else it is known by the site, or unknown."""
+        return False
+
     def problems(self, config: "RigConfig") -> Iterable[str]:
         """What of the rest of the configuration does not fit this procedure, a line each."""
         return ()
@@ -451,7 +456,12 @@ class SiteSection(Section):
     ambient_humidity_percent: float | None = Field(
         default=None, ge=0, le=100, description="relative, of the air", json_schema_extra={"unit": "%"}
     )
-    latitude_deg: float | None = Field(default=None, ge=-90, le=90, description="north is positive; with heading_deg")
+    latitude_deg: float | None = Field(
+        default=None,
+        ge=-90,
+        le=90,
+        description="north is positive; with heading_deg, or alone where the Earth's rate is found",
+    )
     heading_deg: float | None = Field(
         default=None,
         ge=-360,
@@ -486,9 +496,9 @@ class SiteSection(Section):
         return value
 
     @model_validator(mode="after")
-    def both_or_neither(self) -> Self:
-        """The Earth's rate needs both."""
-        if (self.latitude_deg is None) != (self.heading_deg is None):
+    def a_heading_has_a_latitude(self) -> Self:
+        """The Earth's rate needs both where it is known."""
+        if self.heading_deg is not None and self.latitude_deg is None:
             raise ValueError("needs latitude_deg and heading_deg, or neither")
         if self.heading_deg is not None and np.linalg.norm(np.cross(self.up, (1, 0, 0))) < MIN_LEVEL:
             raise ValueError("heading_deg says nothing where the x axis of the base points up or down")

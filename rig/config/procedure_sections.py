@@ -83,6 +83,17 @@ class SixSweepsSection(ProcedureSection):
             raise ValueError("speeds_deg_s must name each speed once; repeats says how often all of it is done")
         return self
 
+    earth_rate: Literal["known", "find"] = Field(
+        default="known",
+        description="`known`: taken out where `site` gives latitude and heading, else part of the uncertainty; `find`: "
+        "found from the readings of a gyroscope that is good enough, which needs rests in many attitudes (`imu`)",
+    )
+
+    @property
+    def finds_earth_rate(self) -> bool:
+        """As the file says."""
+        return self.earth_rate == "find"
+
     @property
     def speeds(self) -> tuple[float, ...]:
         """At which every sweep is made, °/s."""
@@ -97,6 +108,8 @@ class SixSweepsSection(ProcedureSection):
                     f"procedure.{key} {max(self.speeds):g} is too fast for sensors.{name}.range_deg_s "
                     f"{sensor.range_deg_s:g}: the range must be at least {SPEED_TO_RANGE} times the speed"
                 )
+        if config.site.latitude_deg is not None and config.site.heading_deg is None and not self.finds_earth_rate:
+            yield "site needs latitude_deg and heading_deg, or neither; procedure.earth_rate: find needs no heading"
         if self.needs_reference:
             yield from verification_problems(config)
 

@@ -12,6 +12,7 @@ from pydantic import ConfigDict, Field, JsonValue, ValidationError
 from rig.config.regular_file import UnfitFile, read_regular_file
 from rig.data.accelerometer_entries import AccelerometerEntry
 from rig.data.budget_entries import BiasProcessEntry, BudgetEntry, ClockEntry
+from rig.data.earth_rate_entries import EarthRateEntry
 from rig.data.magnetometer_entries import MagnetometerEntry
 from rig.data.result_types import Entry, ErrorEntry, Matrix3, Matrix6, Positive, PositiveVector3, Role, Vector3, Vector6
 from rig.data.run_folder import RESULT
@@ -207,7 +208,7 @@ class SensorEntry(Entry):
     header correct readings; results of before have none, and it is K. `speeds_rad_s` are those of the sweeps: found at
     one speed, either way, the calibration is valid at that speed, and there is no `nonlinearity`. `temperature_c` is
     the mean over all averaged samples. A reference has no `board`: the board solves only for the sensors that are to be
-    calibrated.
+    calibrated. `earth_rate` is there where it was to be found, or says why it was not.
     """
 
     part: str
@@ -240,6 +241,7 @@ class SensorEntry(Entry):
     nonlinearity: NonlinearityEntry | None = None
     correction: Literal["matrix", "diagonal"] = "diagonal"
     correction_matrix: Matrix3 | None = None
+    earth_rate: EarthRateEntry | ErrorEntry | None = None
 
 
 class RotationEntry(Entry):

@@ -24,9 +24,9 @@ if TYPE_CHECKING:
     from rig.arm.motion import Dwell, Plan
     from rig.config.models import RigConfig, SiteSection
 
-SCHEMA = "rig.settings/4"
-# The first knows no site, the second no dwells, the third no magnetic field.
-SCHEMAS = ("rig.settings/1", "rig.settings/2", "rig.settings/3", SCHEMA)
+SCHEMA = "rig.settings/5"
+# The first knows no site, the second no dwells, the third no magnetic field, the fourth no Earth's rate to be found.
+SCHEMAS = ("rig.settings/1", "rig.settings/2", "rig.settings/3", "rig.settings/4", SCHEMA)
 
 DecisionRule = Literal["simple", "guard_band"]
 Vector3 = tuple[Finite, Finite, Finite]
@@ -76,7 +76,8 @@ class KnownReference:
 class Site:
     """Where the arm stands, in its base frame: `up` (unit vector), gravity, the Earth's rate where it is known.
 
-    Of the magnetic field its size is known or nothing, and whether it rises from the ground.
+    Of the magnetic field its size is known or nothing, and whether it rises from the ground. The latitude may be known
+    where the Earth's rate is not, for want of a heading.
     """
 
     up: Vector3
@@ -84,6 +85,7 @@ class Site:
     earth_rate_rad_s: Vector3 | None
     magnetic_field_t: Positive | None = None
     magnetic_field_upwards: bool = False
+    latitude_rad: Annotated[float, Field(ge=-np.pi / 2, le=np.pi / 2)] | None = None
 
     @property
     def down_m_s2(self) -> NDArray[np.float64]:
@@ -137,7 +139,8 @@ class RunSettings:
     often the run was interrupted. `matrix_corrected` names those of them whose readings the whole matrix corrects.
     Recordings of before there was a `site` (None) are solved as they were then: neither gravity nor the Earth's rate is
     looked for, and a bias that wanders widens the variance of every average alike. Nor do they have an `uncertainty`
-    beyond the noise. `second_order` says that accelerometers are looked for terms of that order.
+    beyond the noise. `second_order` says that accelerometers are looked for terms of that order, `finds_earth_rate`
+    that the Earth's rate is to be found from what the gyroscopes read, not taken from the site.
     """
 
     procedure: str
@@ -153,6 +156,7 @@ class RunSettings:
     uncertainty: Uncertainty | None = None
     planned_dwells: tuple[PlannedDwell, ...] = ()
     second_order: bool = False
+    finds_earth_rate: bool = False
 
     @property
     def movement(self) -> tuple[object, ...]:
@@ -205,6 +209,7 @@ def settings_of(config: "RigConfig", plan: "Plan") -> RunSettings:
         uncertainty=_uncertainty(config),
         planned_dwells=_planned(plan.dwells),
         second_order=config.procedure.accelerometer_order == 2,
+        finds_earth_rate=config.procedure.finds_earth_rate,
     )
 
 
@@ -230,7 +235,8 @@ def _site(section: "SiteSection") -> Site:
         x, y, z = (EARTH_RATE_RAD_S * (np.cos(latitude) * north + np.sin(latitude) * up)).tolist()
         earth_rate = x, y, z
     field_t = None if section.magnetic_field_ut is None else section.magnetic_field_ut / 1e6
-    return Site(section.up, section.gravity_m_s2, earth_rate, field_t, section.magnetic_field_upwards)
+    latitude_rad = None if section.latitude_deg is None else float(np.radians(section.latitude_deg))
+    return Site(section.up, section.gravity_m_s2, earth_rate, field_t, section.magnetic_field_upwards, latitude_rad)
 
 
 def _uncertainty(config: "RigConfig") -> Uncertainty:

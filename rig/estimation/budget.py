@@ -87,7 +87,8 @@ class Unknown:
     """What no recording shows: half-widths, but for `clock_std` and `state_jitter_s`, which are standard uncertainties.
 
     `clock_std` is a fraction, `clock_source` says how it is known; `axis_rad` is the direction of each swept axis,
-    `earth_rate` whether the Earth's rate is among the unknown.
+    `earth_rate` whether the Earth's rate is among the unknown, `earth_covariance_rad2_s2` (3, 3), in the base's frame,
+    how well it was found where it was.
     """
 
     clock_std: float
@@ -97,6 +98,7 @@ class Unknown:
     sensor_offset_m: float
     g_sensitivity_rad_s_per_g: float
     earth_rate: bool
+    earth_covariance_rad2_s2: Array | None = None
 
 
 def budget(explained: Explained, unknown: Unknown) -> Budget:
@@ -134,7 +136,11 @@ def _contributors(explained: Explained, unknown: Unknown) -> Iterator[Contributo
     yield found("times of the arm's states", "scatter of the joint angles", of(each_turn))
     tilted = _tilted(seen, unknown.axis_rad) if seen.axis_errors_rad_s is None else np.sqrt(3) * seen.axis_errors_rad_s
     yield assumed("arm's axes", float(np.degrees(unknown.axis_rad)), "°", "uncertainty.axis_deg", tilted @ matrix.T)
-    if unknown.earth_rate:
+    if unknown.earth_covariance_rad2_s2 is not None:
+        size, way = np.linalg.eigh(unknown.earth_covariance_rad2_s2)
+        spread = seen.attitudes @ (way * np.sqrt(size.clip(min=0.0)))  # of each way the rate found may be off
+        yield found("Earth's rate", "found from sweeps and rests", of(np.moveaxis(spread, -1, 0) @ matrix.T))
+    elif unknown.earth_rate:
         along = EARTH_RATE_RAD_S * np.moveaxis(seen.attitudes, -1, 0) @ matrix.T  # for each axis of the base
         yield assumed("Earth's rate", EARTH_RATE_RAD_S, "rad/s", "site.latitude_deg is not given", along)
     per_m_s2 = unknown.g_sensitivity_rad_s_per_g / STANDARD_GRAVITY_M_S2

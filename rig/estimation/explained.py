@@ -25,16 +25,17 @@ class Seen:
     """What the vector model is made of: sweeps first, then rests, N in all.
 
     `means_rad_s`, `variances_rad2_s2` (N, 3) of the noise alone; `turns_rad_s` (N, 3) rates of the flange in the room,
-    `earth_rad_s` (N, 3) that of the room, as far as it is known; `speed_std_rad_s` (N,); `attitudes` (N, 3, 3) from the
-    base into the flange; `gravity_m_s2` (N, 3) downwards, in the flange's frame; `windows_s` (N, 2) on the clock of the
-    first recording; `joints` (N) which of the arm's joints turned, None for a rest; `axis_errors_rad_s` (P, N, 3) how
-    far the turns would be off for one standard uncertainty of each of the arm's own angles, as far as it is known.
+    `earth_rate_rad_s` (3,) that of the room, in the base's frame, as far as it is known; `speed_std_rad_s` (N,);
+    `attitudes` (N, 3, 3) from the base into the flange; `gravity_m_s2` (N, 3) downwards, in the flange's frame;
+    `windows_s` (N, 2) on the clock of the first recording; `joints` (N) which of the arm's joints turned, None for a
+    rest; `axis_errors_rad_s` (P, N, 3) how far the turns would be off for one standard uncertainty of each of the arm's
+    own angles, as far as it is known.
     """
 
     means_rad_s: Array
     variances_rad2_s2: Array
     turns_rad_s: Array
-    earth_rad_s: Array
+    earth_rate_rad_s: Array
     speed_std_rad_s: Array
     attitudes: Array
     gravity_m_s2: Array
@@ -51,7 +52,7 @@ class Seen:
     @property
     def rates_rad_s(self) -> Array:
         """(N, 3) of the flange against the stars."""
-        rates: Array = self.turns_rad_s + self.earth_rad_s
+        rates: Array = self.turns_rad_s + self.attitudes @ self.earth_rate_rad_s
         return rates
 
     def centripetal_m_s2(self, offset_m: Array) -> Array:

@@ -22,6 +22,7 @@ from rig.estimation.arrays import Array
 from rig.estimation.estimate import Estimate
 from rig.estimation.six_observation import MODEL, PARAMETER_UNITS, PARAMETERS
 from rig.report.budget_entry import bias_process_entry, budget_entry
+from rig.report.earth_rate import earth_rate_entry
 from rig.report.entry import entry
 
 
@@ -51,6 +52,8 @@ def sensor_entry(result: SensorResult, role: Role = "calibrate", agreed: Agreeme
         more["speeds_rad_s"] = result.explained.seen.speeds_rad_s
         if result.explained.nonlinearity is not None:
             more["nonlinearity"] = entry(NonlinearityEntry, result.explained.nonlinearity)
+    if result.earth is not None:
+        more["earth_rate"] = earth_rate_entry(result.earth)
     return found.model_copy(update=more)
 
 

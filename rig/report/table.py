@@ -1,5 +1,6 @@
 """The result as a person reads it in the terminal."""
 
+import math
 from collections.abc import Iterable, Iterator, Sequence
 from typing import Protocol
 
@@ -11,9 +12,12 @@ from rig.data.result_file import BoardEntry, CheckEntry, ResultDocument, SensorE
 from rig.data.result_types import ErrorEntry
 from rig.report.accelerometer_table import accelerometer_lines, accelerometer_table
 from rig.report.budget_table import budget_table
+from rig.report.earth_rate import earth_rate_lines
 from rig.report.magnetometer_table import magnetometer_lines, magnetometer_table
 from rig.report.verification_table import verification_lines, verification_table
 from rig.station.plain_text import plain
+
+FEWEST_DECIMALS = 5  # a MEMS gyroscope's uncertainty
 
 
 class Estimated(Protocol):
@@ -71,15 +75,22 @@ def estimate_table(title: str, estimate: Estimated, expanded: Sequence[float] | 
     for heading in ("axis", "scale factor", headings[0], "bias rad/s", headings[1]):
         table.add_column(heading, justify="left" if heading == "axis" else "right")
     shown = expanded or [estimate.covariance[i][i] ** 0.5 for i in range(6)]
+    scale, bias = decimals(shown[:3]), decimals(shown[3:])
     for i, axis in enumerate("xyz"):
         table.add_row(
             axis,
-            f"{estimate.scale[i]:.5f}",
-            f"{shown[i]:.5f}",
-            f"{estimate.bias_rad_s[i]:+.5f}",
-            f"{shown[3 + i]:.5f}",
+            f"{estimate.scale[i]:.{scale}f}",
+            f"{shown[i]:.{scale}f}",
+            f"{estimate.bias_rad_s[i]:+.{bias}f}",
+            f"{shown[3 + i]:.{bias}f}",
         )
     return table
+
+
+def decimals(uncertainties: Sequence[float]) -> int:
+    """How many the smallest of them warrants, which is printed with two digits; five at least."""
+    smallest = min(uncertainties)
+    return max(FEWEST_DECIMALS, 1 - math.floor(math.log10(smallest))) if smallest > 0 else FEWEST_DECIMALS
 
 
 def _checks(checks: Iterable[CheckEntry]) -> Table:
@@ -96,13 +107,16 @@ def _checks(checks: Iterable[CheckEntry]) -> Table:
 def _beside(sensor: SensorEntry) -> Iterator[str]:
     """At what speeds it holds, what the other estimators make of it, and what the vector model says about the axes."""
     yield from _speeds(sensor)
+    yield from earth_rate_lines(sensor.earth_rate)
     vector = sensor.vector_model
+    std = [sensor.covariance[i][i] ** 0.5 for i in range(6)]
+    scale, bias = f".{decimals(std[:3])}f", f"+.{decimals(std[3:])}f"
     others = {"vector_model": vector, "six_observation": sensor.six_observation, "algorithm_1": sensor.algorithm_1}
     for name, other in others.items():
         if isinstance(other, ErrorEntry):
             yield f"{name}: {other.error}"
         elif other.estimator != sensor.estimator:
-            yield f"{name}: k {_triple(other.scale, '.5f')}, b {_triple(other.bias_rad_s, '+.5f')} rad/s"
+            yield f"{name}: k {_triple(other.scale, scale)}, b {_triple(other.bias_rad_s, bias)} rad/s"
     if sensor.board is not None:
         yield from _on_the_board(sensor.board)
     if not isinstance(vector, ErrorEntry):

@@ -110,7 +110,7 @@ def _one(effects: Effects, rng: np.random.Generator) -> Array:
         means_rad_s=means,
         variances_rad2_s2=variances,
         turns_rad_s=corrected,
-        earth_rad_s=np.zeros_like(corrected),
+        earth_rate_rad_s=np.zeros(3),
         speed_std_rad_s=np.zeros(len(durations)),
         attitudes=told.attitudes.mean(axis=1),
         gravity_m_s2=told.attitudes.mean(axis=1) @ (-STANDARD_GRAVITY_M_S2 * up),

@@ -11,6 +11,7 @@ import yaml
 from rig.analysis.calibration import observe_recordings
 from rig.config.load import ConfigurationRefused, load
 from rig.data.run_file import read_run
+from rig.estimation.earth_rate import DEG_H
 from support.commands import rig
 from support.ideal import ideal_document
 from support.paths import CONFIGS, DEMO
@@ -112,6 +113,30 @@ def test_its_accelerometers_are_calibrated_where_those_of_the_board_are(tmp_path
     entry = result["accelerometers"]["kvh"]
     assert entry["scale"] == pytest.approx([1.001, 0.9995, 1.0008], abs=2e-4)
     assert entry["bias_m_s2"] == pytest.approx([0.004, -0.006, 0.005], abs=2e-3)
+
+
+@pytest.mark.slow
+@pytest.mark.proof
+@pytest.mark.thorough
+@pytest.mark.timeout(900)
+def test_it_finds_the_earths_rate(tmp_path: Path) -> None:
+    """TRIAX, section III-A, which is 0.36 °/h off."""
+    document = yaml.safe_load(load(CONFIGS / "kvh1775_earth.yaml").text)
+    host = fresh_host()
+    document["arm"]["host"] = host
+    document["sensors"]["kvh"]["serial"]["port"] = f"socket://{host}:7331"
+    path = tmp_path / "config.yaml"
+    path.write_text(yaml.safe_dump(document), encoding="utf-8")
+    done = rig("run", path, "--out", tmp_path / "run", timeout_s=800)
+    assert done.returncode == 0, done.stderr + done.stdout
+    assert "Earth's rate found: 1" in done.stdout
+    result = json.loads((tmp_path / "run" / "result.json").read_text(encoding="utf-8"))
+    earth = result["sensors"]["kvh"]["earth_rate"]
+    assert abs(earth["norm_rad_s"] - 7.292115e-5) < 4 * earth["norm_std_rad_s"] < 4 * 0.1 * DEG_H
+    assert abs(earth["latitude_rad"] - np.radians(38.777888)) < 4 * earth["latitude_std_rad"] + np.radians(0.1)
+    stated, std = sensor(result)
+    truth = [0.99959967, 0.99869272, 1.00028956, 2.634478e-6, -9.332663e-7, 1.35263e-7]
+    assert (np.abs(stated - truth) < 4 * std).all()
 
 
 @pytest.mark.slow
