@@ -105,6 +105,12 @@ def _parser() -> argparse.ArgumentParser:
     _add_outcome(resume)
     solve = add("solve", solve_arguments.solve, "recompute the calibration from a recording")
     solve_arguments.add_arguments(solve)
+    allan = add(
+        "allan", _allan, "random walk and bias instability, by the Allan deviation of what was recorded at rest"
+    )
+    allan.add_argument("run", type=Path, metavar="RUN", help="a run folder or its run.h5")
+    allan.add_argument("--plot", type=Path, metavar="DIR", help="draw the curves into this folder")
+    allan.add_argument("--json", action="store_true", help="for machines")
     report = add("report", _report, "the certificate of a finished run: HTML, PDF, digital certificate")
     report.add_argument("run", type=Path, metavar="RUN", help="a run folder or its result.json")
     report.add_argument(
@@ -249,6 +255,12 @@ def _check(options: argparse.Namespace) -> int:
     from rig.commands.check import check
 
     return check(options.config, options.overrides, options.script)
+
+
+def _allan(options: argparse.Namespace) -> int:
+    from rig.commands.allan import allan
+
+    return allan(options.run, options.plot, as_json=options.json)
 
 
 def _report(options: argparse.Namespace) -> int:

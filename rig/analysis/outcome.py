@@ -8,6 +8,7 @@ from typing import Literal
 import numpy as np
 
 from rig.analysis.acceleration import AccelerometerResult, calibrate_accelerometers
+from rig.analysis.bias_drift import Drifts, bias_drifts
 from rig.analysis.calibration import (
     DEFAULT_ESTIMATOR,
     SensorResult,
@@ -21,7 +22,7 @@ from rig.analysis.contradictions import contradictions
 from rig.analysis.magnetic_field import MagnetometerResult, calibrate_magnetometers
 from rig.analysis.onboard_check import Agreement, agreement
 from rig.analysis.surroundings import surroundings_of
-from rig.analysis.verdict import Check, acceleration_checks, judge, verdict, verification_checks
+from rig.analysis.verdict import Check, acceleration_checks, drift_checks, judge, verdict, verification_checks
 from rig.analysis.verification import Verification, verify
 from rig.data.provenance import Provenance
 from rig.data.result_file import StoredCalibrationEntry
@@ -53,6 +54,7 @@ class Outcome:
     verified. `verifications` hold those that could be made. `clock` is the controller's, None where recordings of
     before say nothing of its uncertainty. Where no sweep was planned there are `accelerometers` alone, and beside them
     the `magnetometers`, of which no check judges any.
+    `drifts` are there where attitudes were repeated to watch the bias.
     """
 
     recordings: tuple[ObservedRun, ...]
@@ -65,6 +67,7 @@ class Outcome:
     clock: ClockCheck | None = None
     accelerometers: Mapping[str, AccelerometerResult] = field(default_factory=dict)
     magnetometers: Mapping[str, MagnetometerResult | Fault] = field(default_factory=dict)
+    drifts: Drifts = field(default_factory=dict)
 
     @property
     def verdict(self) -> Literal["pass", "fail"]:
@@ -120,6 +123,17 @@ def calibrated(runs: Sequence[RunData], estimator: str = DEFAULT_ESTIMATOR) -> O
         accelerometers=accelerometers,
         magnetometers=calibrate_magnetometers(recordings, settings),
     )
+
+
+def drifted(runs: Sequence[RunData], estimator: str = DEFAULT_ESTIMATOR) -> Outcome:
+    """As `calibrated`, of attitudes that were gone through again and again: the bias by repeat too, and judged.
+
+    Raises Fault as `calibrated` and `bias_drifts` do.
+    """
+    outcome = calibrated(runs, estimator)
+    found = bias_drifts(outcome.recordings, outcome.settings)
+    checks = [check for name, each in found.items() for check in drift_checks(name, each, outcome.settings.limits)]
+    return replace(outcome, drifts=found, checks=(*outcome.checks, *checks))
 
 
 def _in_attitudes(runs: Sequence[RunData], recordings: tuple[ObservedRun, ...]) -> Outcome:

@@ -26,7 +26,9 @@ def see(recordings: Sequence[ObservedRun], sensor: str, surroundings: Surroundin
     Speeds by a controller's clock that runs too fast are too small by that.
     """
     site = surroundings.site
-    parts = [(each.sensors[sensor], since_s) for each, since_s in zip(recordings, _since_s(recordings), strict=True)]
+    parts = [
+        (each.sensors[sensor], since_s) for each, since_s in zip(recordings, since_first_s(recordings), strict=True)
+    ]
     turns = [(turn, since_s) for part, since_s in parts for turn in part.revolutions]
     rests = [(rest, since_s) for part, since_s in parts for rest in part.rests]
     placed = [*((turn.average, since_s) for turn, since_s in turns), *rests]
@@ -56,7 +58,7 @@ def _axis_errors(turns: Sequence[Observation], rests: int, axis_deg: float) -> A
     return np.concatenate([np.swapaxes(off, 0, 1), np.zeros((len(std), rests, 3))], axis=1)
 
 
-def _since_s(recordings: Sequence[ObservedRun]) -> list[float]:
+def since_first_s(recordings: Sequence[ObservedRun]) -> list[float]:
     """What takes the controller's times of each recording to the clock of the first: it may have been switched off.
 
     No recording begins before the last one has ended, whatever the computer's clock says: it may have been set, and an

@@ -9,6 +9,8 @@ from typing import Literal
 import numpy as np
 
 from rig.analysis.acceleration import AccelerometerResult
+from rig.analysis.at_rest import Quantity
+from rig.analysis.bias_drift import BiasDrift
 from rig.analysis.verification import Verification
 from rig.data.settings import DecisionRule, Limits
 from rig.estimation.arrays import Array
@@ -96,6 +98,19 @@ def acceleration_checks(sensor: str, result: AccelerometerResult, limits: Limits
     if result.held_out is not None:
         limit = limits.acceleration_verification_m_s2
         found.append(Check(f"{sensor}.acceleration_verification", result.held_out.rms_m_s2, limit, "m/s²"))
+    return tuple(found)
+
+
+def drift_checks(sensor: str, drifts: Mapping[Quantity, BiasDrift], limits: Limits) -> tuple[Check, ...]:
+    """The largest change of a bias between any two repeats."""
+    allowed: Mapping[Quantity, tuple[str, float | None, str]] = {
+        "rate": ("bias_drift", limits.bias_drift_rad_s, "rad/s"),
+        "acceleration": ("acceleration_bias_drift", limits.acceleration_bias_drift_m_s2, "m/s²"),
+    }
+    found = []
+    for quantity, drift in drifts.items():
+        name, limit, unit = allowed[quantity]
+        found.append(Check(f"{sensor}.{name}", _largest(drift.held.largest_change), limit, unit))
     return tuple(found)
 
 

@@ -434,6 +434,12 @@ class LimitsSection(Section):
         default=None,
         description="how far the size of a calibrated acceleration at rest may be from gravity's; needed with repeats",
     )
+    bias_drift_rad_s: Positive | None = Field(
+        default=None, description="change of a gyroscope's bias between any two repeats; `bias_drift` needs it"
+    )
+    acceleration_bias_drift_m_s2: Positive | None = Field(
+        default=None, description="change of an accelerometer's bias between any two repeats; `bias_drift` needs it"
+    )
 
 
 class SiteSection(Section):

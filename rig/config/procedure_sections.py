@@ -15,6 +15,7 @@ __all__ = [
     "DEFAULT_PROCEDURE",
     "STOCK_SECTIONS",
     "AttitudesSection",
+    "BiasDriftSection",
     "ImuSection",
     "ProcedureSection",
     "SixObservationSection",
@@ -26,6 +27,7 @@ __all__ = [
 Wrist = Literal["wrist_1", "wrist_2", "wrist_3"]
 Speed = Annotated[float, Field(ge=0.5, le=SPEED_LIMIT_DEG_S)]  # slower, and the board cannot keep a sweep's readings
 DEFAULT_PROCEDURE = "six_observation"
+DRIFT_LIMITS = ("bias_drift_rad_s", "acceleration_bias_drift_m_s2")
 SPEED_TO_RANGE = 1.5  # scale error, bias, ripple and noise come on top of a sweep's speed
 
 
@@ -221,6 +223,23 @@ class StaticAttitudesSection(AttitudesSection):
     name: Literal["static_attitudes"] = Field(default="static_attitudes", description="this procedure")
 
 
+class BiasDriftSection(AttitudesSection):
+    """The same attitudes again and again, for hours: how the bias drifts. As set, ten hours like the second paper's."""
+
+    name: Literal["bias_drift"] = Field(default="bias_drift", description="this procedure")
+    dwell_s: float = Field(default=200.0, ge=0.1, le=3600, description="standing still in each attitude")
+    repeats: int = Field(
+        default=10, ge=2, le=100, description="how often all attitudes are gone through", json_schema_extra=RATIO
+    )
+
+    def problems(self, config: RigConfig) -> Iterator[str]:
+        """What the calibration of an accelerometer lacks, and limits of the drift."""
+        yield from AttitudesSection.problems(self, config)
+        limits = [f"limits.{name}" for name in DRIFT_LIMITS if getattr(config.limits, name) is None]
+        if limits:
+            yield f"a bias that is watched needs {', '.join(limits)}"
+
+
 class ImuSection(SixSweepsSection, AttitudesSection):
     """Sweeps, then attitudes: gyroscope and accelerometer in one run."""
 
@@ -244,6 +263,7 @@ STOCK_SECTIONS: Mapping[str, type[ProcedureSection]] = MappingProxyType(
         "verify": VerifySection,
         "static_attitudes": StaticAttitudesSection,
         "imu": ImuSection,
+        "bias_drift": BiasDriftSection,
     }
 )
 

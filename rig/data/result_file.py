@@ -12,6 +12,7 @@ from pydantic import ConfigDict, Field, JsonValue, ValidationError
 from rig.config.regular_file import UnfitFile, read_regular_file
 from rig.data.accelerometer_entries import AccelerometerEntry
 from rig.data.budget_entries import BiasProcessEntry, BudgetEntry, ClockEntry
+from rig.data.drift_entries import DriftEntry
 from rig.data.earth_rate_entries import EarthRateEntry
 from rig.data.magnetometer_entries import MagnetometerEntry
 from rig.data.result_types import Entry, ErrorEntry, Matrix3, Matrix6, Positive, PositiveVector3, Role, Vector3, Vector6
@@ -303,6 +304,7 @@ class ResultDocument(Entry):
 
     It is also empty where no sweeps were made, `accelerometers` where none were calibrated, `magnetometers` where none
     were recorded; one that was recorded and not calibrated says why.
+    `bias_drift` holds the biases by repeat of a run of that procedure, by sensor, then by "rate" and "acceleration".
     """
 
     schema_name: Literal["rig.result/1"] = Field(alias="schema")  # as SCHEMA
@@ -314,6 +316,7 @@ class ResultDocument(Entry):
     verification: dict[str, VerificationEntry]
     accelerometers: dict[str, AccelerometerEntry] = Field(default_factory=dict)
     magnetometers: dict[str, MagnetometerEntry | ErrorEntry] = Field(default_factory=dict)
+    bias_drift: dict[str, dict[str, DriftEntry]] = Field(default_factory=dict)
 
     def text(self) -> str:
         """The JSON; what was left out stays out."""

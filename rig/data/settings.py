@@ -61,6 +61,8 @@ class Limits:
     acceleration_bias_m_s2: Positive | None = None
     acceleration_bias_std_m_s2: Positive | None = None
     acceleration_verification_m_s2: Positive | None = None
+    bias_drift_rad_s: Positive | None = None
+    acceleration_bias_drift_m_s2: Positive | None = None
 
 
 @dataclass(frozen=True, slots=True)

@@ -5,6 +5,7 @@ from rig.analysis.verdict import Check
 from rig.data.result_file import SCHEMA, CheckEntry, ProvenanceEntry, ResultDocument
 from rig.report.accelerometer_entry import accelerometer_entry
 from rig.report.budget_entry import clock_entry
+from rig.report.drift_entry import drift_entry
 from rig.report.entry import entry
 from rig.report.magnetometer_entry import magnetometer_entry
 from rig.report.sensor_entry import sensor_entry
@@ -35,6 +36,11 @@ def document_of(outcome: Outcome) -> ResultDocument:
         more["accelerometers"] = {name: accelerometer_entry(found) for name, found in outcome.accelerometers.items()}
     if outcome.magnetometers:
         more["magnetometers"] = {name: magnetometer_entry(found) for name, found in outcome.magnetometers.items()}
+    if outcome.drifts:
+        more["bias_drift"] = {
+            name: {quantity: drift_entry(quantity, drift) for quantity, drift in each.items()}
+            for name, each in outcome.drifts.items()
+        }
     return document.model_copy(update=more)
 
 

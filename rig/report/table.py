@@ -12,6 +12,7 @@ from rig.data.result_file import BoardEntry, CheckEntry, ResultDocument, SensorE
 from rig.data.result_types import ErrorEntry
 from rig.report.accelerometer_table import accelerometer_lines, accelerometer_table
 from rig.report.budget_table import budget_table
+from rig.report.drift_table import print_drifts
 from rig.report.earth_rate import earth_rate_lines
 from rig.report.magnetometer_table import magnetometer_lines, magnetometer_table
 from rig.report.verification_table import verification_lines, verification_table
@@ -60,6 +61,7 @@ def print_result(result: ResultDocument, console: Console) -> None:
         console.print(magnetometer_table(name, magnetometer))
         for line in magnetometer_lines(magnetometer):
             console.print(plain(line))
+    print_drifts(result.bias_drift, console)
     for name, verification in result.verification.items():
         console.print(verification_table(name, verification))
         for line in verification_lines(verification):

@@ -2,6 +2,8 @@
 
 import threading
 from collections import defaultdict, deque
+from collections.abc import Iterator
+from contextlib import contextmanager
 from dataclasses import dataclass, field
 from typing import Any, Literal
 
@@ -15,6 +17,8 @@ from rig.runner.settling import Settling
 from rig.station.events import SensorSamples, Vector
 
 KEPT_PARTS = 3
+WHOLE_S = 5.0  # of a dwell, in which every state of the arm is recorded
+STANDING_S = 0.25  # between those recorded after: an arm that stands needs no more, and hours of it would fill the disk
 
 
 @dataclass(slots=True)
@@ -59,6 +63,23 @@ class _Part:
 
 
 @dataclass(slots=True)
+class _Thinning:
+    """Which states of a dwell are recorded, by their times."""
+
+    began_s: float | None = None
+    last_s: float = 0.0
+
+    def keeps(self, time_s: float) -> bool:
+        """Asked of each state once, in their order."""
+        if self.began_s is None:
+            self.began_s = time_s
+        if time_s - self.began_s > WHOLE_S and time_s - self.last_s < STANDING_S:
+            return False
+        self.last_s = time_s
+        return True
+
+
+@dataclass(slots=True)
 class Acquisition:
     """Fed by the reader threads of the sources and of the arm, read by the script's. `counts` by the sensor's name.
 
@@ -71,6 +92,7 @@ class Acquisition:
     settling: Settling = field(default_factory=Settling)
     _kept: deque[_Part] = field(default_factory=lambda: deque(maxlen=KEPT_PARTS))
     _lock: threading.Lock = field(default_factory=threading.Lock)
+    _thinning: "_Thinning | None" = None
 
     def expect(self, name: str, sensor: RecordedSensor | RecordedMagnetometer) -> None:
         """Count the samples of a sensor, before its stream begins; a field tells nothing of whether the arm settled."""
@@ -95,8 +117,21 @@ class Acquisition:
         with self._lock:
             if self._kept:
                 self._kept[-1].states.append(state)
-        if self.recorder is not None:
+        thinning = self._thinning
+        if self.recorder is not None and (thinning is None or thinning.keeps(state.time_s)):
             self.recorder.add_arm_state(state)
+
+    @contextmanager
+    def standing(self) -> Iterator[None]:
+        """The arm stands still for the length of the `with` block: after a while only a few of its states are recorded.
+
+        Whoever watches the arm sees all of them all the same.
+        """
+        self._thinning = _Thinning()
+        try:
+            yield
+        finally:
+            self._thinning = None
 
     def keep(self) -> None:
         """From now on hold what comes, as a part of its own; the oldest part goes when there are too many."""

@@ -220,7 +220,8 @@ class Rig:
             if not self._wait(lambda: not settling.unsettled(), dwell.settle_s, lambda: self._watch(dwell)):
                 raise _not_settled(dwell, settling.unsettled())
             self.recording.note(DwellStarted(dwell))
-            self.devices.arm.rest(dwell.duration_s, lambda: self._watch(dwell))
+            with self.devices.acquisition.standing():
+                self.devices.arm.rest(dwell.duration_s, lambda: self._watch(dwell))
             self.recording.note(DwellFinished(dwell))
 
     def _wait(self, until: Callable[[], bool], at_most_s: float, watch: Callable[[], None] = lambda: None) -> bool:

@@ -1,0 +1,45 @@
+"""Watch how biases drift, as in TRIAX, sections III-A and III-B.
+
+    python procedures/bias_drift.py configs/bias_drift.yaml
+
+Before you start: as for procedures/six_observation.py. It takes hours, ten as it is set.
+
+What happens: the arm goes through its attitudes again and again and stands still in each, for minutes. All repeats but
+the last calibrate the accelerometers, every one tells the biases. After a power cut `rig resume` goes on with the dwell
+that was interrupted. Ctrl-C stops the arm at any moment and keeps what was measured.
+"""
+
+from collections.abc import Sequence
+
+from rig.cli import run_script  # first: it keeps linear algebra to one thread
+
+# isort: split
+from procedures.static_attitudes import static_attitudes
+from rig.analysis.outcome import Outcome, drifted
+from rig.config.procedure_sections import BiasDriftSection
+from rig.data.run_file import RunData
+from rig.plans.registry import Procedure
+from rig.plans.static_attitudes import plan_static_attitudes
+from rig.plans.verbs import Verbs
+
+
+def bias_drift(rig: Verbs) -> None:
+    """The steps of the static attitudes, `repeats` times."""
+    static_attitudes(rig)
+
+
+def by_repeat(runs: Sequence[RunData], before: Outcome | None, estimator: str) -> Outcome:
+    """The calibration of the accelerometers, and every sensor's bias by repeat."""
+    return drifted(runs, estimator)
+
+
+PROCEDURE = Procedure(
+    name="bias_drift",
+    section=BiasDriftSection,
+    plan=plan_static_attitudes,
+    script=bias_drift,
+    analyse=by_repeat,
+)
+
+if __name__ == "__main__":
+    raise SystemExit(run_script(PROCEDURE))

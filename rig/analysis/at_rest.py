@@ -1,0 +1,113 @@
+"""How the sensors of a recording behave while the arm stands still: Allan deviation of every rest and dwell. Pure."""
+
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass
+from functools import partial
+from itertools import pairwise
+from typing import Literal
+
+import numpy as np
+
+from rig.analysis.calibration import or_fault
+from rig.data.run_file import RecordedSensor, RunData
+from rig.errors import Fault
+from rig.estimation.allan import AllanAxis, AllanCurve, allan_curve, read_axis, too_short
+from rig.estimation.arrays import Array
+from rig.observation.acceleration import accelerations
+from rig.observation.average import Stream, between, on_the_arms_clock
+from rig.observation.observe import MAX_REST_TRAVEL_RAD, REST_SETTLING_S
+from rig.observation.timebase import ArmMotion
+from rig.observation.windows import rested
+
+Quantity = Literal["rate", "acceleration"]
+
+FEWEST_TO_JUDGE = 20  # readings: fewer may be alike
+
+
+@dataclass(frozen=True, slots=True)
+class AtRest:
+    """One quantity of a sensor at rest: its Allan deviation in rad/s or m/s², what each axis tells, what it rests on.
+
+    `longest_s` is the longest stretch without a gap, `total_s` that of all; `temperature_c` the least and the largest.
+    """
+
+    curve: AllanCurve
+    axes: tuple[AllanAxis, AllanAxis, AllanAxis]
+    stretches: int
+    longest_s: float
+    total_s: float
+    temperature_c: tuple[float, float]
+
+
+@dataclass(frozen=True, slots=True)
+class SensorAtRest:
+    """A sensor, and each quantity it sends, or the Fault it ends in."""
+
+    sensor: RecordedSensor
+    quantities: dict[Quantity, AtRest | Fault]
+
+
+def at_rest(runs: Sequence[RunData]) -> dict[str, SensorAtRest]:
+    """Every sensor with rates, by name, over all recordings of a run; readings the board corrected are left out.
+
+    Raises Fault as `ArmMotion` and `on_the_arms_clock` do.
+    """
+    motions = [ArmMotion(run.arm, run.provenance.kinematics) for run in runs]
+    found = {}
+    for name, sensor in runs[0].sensors.items():
+        pieces = []
+        for run, motion in zip(runs, motions, strict=True):
+            stream = on_the_arms_clock(run.samples[name], sensor, motion)
+            pieces += [(stream, inside) for inside in _stretches(run, stream, motion)]
+        quantities: list[Quantity] = ["rate", "acceleration"] if sensor.has_acceleration else ["rate"]
+        found[name] = SensorAtRest(sensor, {each: or_fault(partial(_of, pieces, each)) for each in quantities})
+    return found
+
+
+def _stretches(run: RunData, stream: Stream, motion: ArmMotion) -> Iterator[slice]:
+    """The samples of every rest and dwell in which the arm stood still, apart where one is missing."""
+    for window in rested(run):
+        start_s, end_s = window.start_s + REST_SETTLING_S, window.end_s - REST_SETTLING_S
+        states = motion.states[(motion.time_s >= start_s) & (motion.time_s <= end_s)]
+        inside = between(stream, start_s, end_s)
+        if len(states) < 2 or np.ptp(states["q_rad"], axis=0).max() > MAX_REST_TRAVEL_RAD:
+            continue
+        sequence = stream.raw["sequence"][inside].astype(np.int64)
+        gaps = inside.start + 1 + np.flatnonzero(np.diff(sequence) != 1)
+        edges = [inside.start, *gaps.tolist(), inside.stop]
+        yield from (slice(start, end) for start, end in pairwise(edges))
+
+
+def _of(pieces: Sequence[tuple[Stream, slice]], quantity: Quantity) -> AtRest:
+    long = [(stream, inside) for stream, inside in pieces if inside.stop - inside.start > 2]
+    if not long:
+        raise too_short("the arm never stood still for longer than a few readings")
+    readings = [_readings(stream, inside, quantity) for stream, inside in long]
+    if any(not np.ptp(each, axis=0).all() for each in readings if len(each) > FEWEST_TO_JUDGE):
+        raise Fault(
+            "stuck_sensor",
+            f"an axis repeats one {quantity} through a whole rest",
+            "Check the sensor's supply and its wiring; a sensor whose noise is below its resolution has no such curve",
+        )
+    times = [(stream.time_s[inside.stop - 1] - stream.time_s[inside.start]) for stream, inside in long]
+    interval_s = float(np.sum(times) / np.sum([len(each) - 1 for each in readings]))
+    curve = allan_curve(readings, interval_s)
+    temperatures = [_temperatures(stream, inside) for stream, inside in long]
+    return AtRest(
+        curve=curve,
+        axes=(read_axis(curve, 0), read_axis(curve, 1), read_axis(curve, 2)),
+        stretches=len(long),
+        longest_s=float(np.max(times)),
+        total_s=float(np.sum(times)),
+        temperature_c=(min(low for low, _ in temperatures), max(high for _, high in temperatures)),
+    )
+
+
+def _readings(stream: Stream, inside: slice, quantity: Quantity) -> Array:
+    return stream.readings_rad_s[inside] if quantity == "rate" else accelerations(stream, inside)
+
+
+def _temperatures(stream: Stream, inside: slice) -> tuple[float, float]:
+    counts = stream.raw["temperature_counts"][inside].astype(np.float64)
+    degrees = counts * stream.sensor.temperature_c_per_count + stream.sensor.temperature_offset_c
+    return float(degrees.min()), float(degrees.max())

@@ -1,0 +1,219 @@
+"""The bias of every sensor repeat by repeat, of a run that goes through the same attitudes again and again: TRIAX,
+sections III-A and III-B, Figs. 4 and 6. Pure.
+"""
+
+from collections import defaultdict
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass
+from functools import partial
+
+import numpy as np
+
+from rig.analysis.at_rest import Quantity
+from rig.analysis.calibration import or_fault
+from rig.analysis.seen import since_first_s
+from rig.data.run_file import RecordedSensor
+from rig.data.settings import RunSettings, Site
+from rig.errors import Fault
+from rig.estimation.arrays import Array
+from rig.estimation.bias_by_repeat import BiasByRepeat, bias_by_repeat
+from rig.estimation.bias_over_temperature import BiasOverTemperature, bias_over_temperature
+from rig.estimation.reference_model import BIAS, KnownNorm
+from rig.estimation.sensor_axes import nearest_rotation
+from rig.estimation.triaxial import TriaxialSolution, solve_triaxial
+from rig.observation.observed_run import ObservedRun
+from rig.observation.windows import dwelt
+
+FEWEST_REPEATS = 2
+
+
+@dataclass(frozen=True, slots=True)
+class Anew:
+    """The bias of one repeat with everything found anew from it: (3,), and its standard deviation (3,)."""
+
+    bias: Array
+    std: Array
+
+
+@dataclass(frozen=True, slots=True)
+class BiasDrift:
+    """The bias of one quantity of a sensor by repeat, rad/s or m/s².
+
+    `held`: scale, axes and reference are those of the first repeat (accelerometers), or nominal (gyroscopes). A
+    gyroscope's bias has what a scale that is not nominal makes of the Earth's rate in it, and all of the Earth's rate
+    where the site does not say it (`earth_rate_known`): the same in every repeat. `common_std` (3,) is what all biases
+    share beside that. `anew` is each repeat for itself, or the Fault it ends in. `time_s` and `temperature_c` (R,) are
+    means over each repeat, times since the first.
+    """
+
+    held: BiasByRepeat
+    common_std: Array
+    anew: tuple[Anew | Fault, ...]
+    time_s: Array
+    temperature_c: Array
+    over_temperature: BiasOverTemperature | Fault
+    earth_rate_known: bool
+
+
+Drifts = Mapping[str, Mapping[Quantity, BiasDrift]]
+
+
+@dataclass(frozen=True, slots=True)
+class Stand:
+    """What a sensor read in one dwell: means (3,), their variances, the attitude base → sensor, when, how warm."""
+
+    mean: Array
+    variance: Array
+    attitude: Array
+    time_s: float
+    temperature_c: float
+
+
+def bias_drifts(recordings: Sequence[ObservedRun], settings: RunSettings) -> Drifts:
+    """Of every sensor to calibrate, over all recordings of a run; repeats that were not finished are left out.
+
+    Raises Fault `not_all_attitudes` with fewer than two whole repeats, and as `solve_triaxial` for the first one.
+    """
+    site = settings.site
+    assert site is not None, "recordings of before there was a site know no dwells"
+    repeats: defaultdict[int, dict[tuple[float, ...], int]] = defaultdict(dict)
+    for planned in settings.planned_dwells:
+        repeats[planned.repeat][planned.q_rad] = planned.index
+    order = sorted(repeats[0])
+    table = [[found[q_rad] for q_rad in order] for _, found in sorted(repeats.items()) if len(found) == len(order)]
+    drifts: dict[str, dict[Quantity, BiasDrift]] = {}
+    for name in settings.to_calibrate:
+        sensor = recordings[0].run.sensors[name]
+        drifts[name] = {"rate": rate_drift(_whole(_rates(recordings, name, sensor), table), site)}
+        if sensor.has_acceleration:
+            accelerations = _whole(_accelerations(recordings, name, sensor), table)
+            drifts[name]["acceleration"] = acceleration_drift(accelerations, site, second_order=settings.second_order)
+    return drifts
+
+
+def _whole(found: Mapping[int, Stand], table: Sequence[Sequence[int]]) -> list[list[Stand]]:
+    """The whole repeats, attitudes in the same order."""
+    whole = [[found[index] for index in repeat] for repeat in table if found.keys() >= set(repeat)]
+    if len(whole) < FEWEST_REPEATS:
+        raise Fault(
+            "not_all_attitudes",
+            f"{len(whole)} of {len(table)} repeats were finished, and a drift needs {FEWEST_REPEATS}",
+            "Go on with `rig resume RUN_DIR`, or run the procedure again",
+        )
+    return whole
+
+
+def _accelerations(recordings: Sequence[ObservedRun], name: str, sensor: RecordedSensor) -> dict[int, Stand]:
+    """By the dwell's index."""
+    mounting = np.array(sensor.mounting)
+    return {
+        dwell.index: Stand(
+            dwell.reading.mean,
+            dwell.reading.variance,
+            mounting @ nearest_rotation(dwell.attitude),
+            (dwell.window.start_s + dwell.window.end_s) / 2 + since_s,
+            dwell.temperature_c,
+        )
+        for recording, since_s in zip(recordings, since_first_s(recordings), strict=True)
+        for dwell in recording.sensors[name].dwells
+    }
+
+
+def _rates(recordings: Sequence[ObservedRun], name: str, sensor: RecordedSensor) -> dict[int, Stand]:
+    """A dwell is a rest of the gyroscope's."""
+    mounting, found = np.array(sensor.mounting), {}
+    for recording, since_s in zip(recordings, since_first_s(recordings), strict=True):
+        for each in dwelt(recording.run):
+            for rest in recording.sensors[name].rests:
+                if each.window.start_s <= rest.start_s and rest.end_s <= each.window.end_s:
+                    assert rest.attitude is not None, "an arm made it"
+                    found[each.dwell.index] = Stand(
+                        rest.mean_rad_s,
+                        rest.variance_rad2_s2 - rest.drift_rad2_s2,
+                        mounting @ nearest_rotation(rest.attitude),
+                        (rest.start_s + rest.end_s) / 2 + since_s,
+                        rest.temperature_c,
+                    )
+    return found
+
+
+def acceleration_drift(repeats: Sequence[Sequence[Stand]], site: Site, *, second_order: bool) -> BiasDrift:
+    """Of an accelerometer, from repeats of the same attitudes in the same order; the first one finds what is held.
+
+    Raises Fault as `solve_triaxial` and `bias_by_repeat` do.
+    """
+    means, variances, attitudes = _stacked(repeats)
+    up = np.array(site.up)
+
+    def solve(repeat: int) -> TriaxialSolution:
+        return solve_triaxial(
+            means[repeat],
+            attitudes[repeat],
+            variances[repeat],
+            KnownNorm(site.gravity_m_s2, up),
+            second_order=second_order,
+            method="attitude_weighted",
+        )
+
+    first = solve(0)
+    felt = np.einsum("rnji,j->rni", attitudes, first.reference)
+    if first.second_order is not None:
+        felt = felt + first.second_order * felt**2
+    held = bias_by_repeat(means, variances, felt @ first.matrix.T, first.bias)
+    # What the first repeat's noise adds to its bias is in its own `std` already.
+    common = np.maximum(np.diag(first.covariance)[BIAS] - held.std[0] ** 2, 0.0)
+    return _drift(repeats, held, np.sqrt(common), solve, earth_rate_known=site.earth_rate_rad_s is not None)
+
+
+def rate_drift(repeats: Sequence[Sequence[Stand]], site: Site) -> BiasDrift:
+    """Of a gyroscope, whose scale and axes are held at their nominal values. Raises Fault as `bias_by_repeat` does."""
+    means, variances, attitudes = _stacked(repeats)
+    earth = np.zeros(3) if site.earth_rate_rad_s is None else np.array(site.earth_rate_rad_s)
+
+    def solve(repeat: int) -> TriaxialSolution:
+        if site.earth_rate_rad_s is None:
+            raise Fault(
+                "earth_rate_unknown",
+                "a gyroscope at rest shows the Earth's rate alone, and the site does not say it",
+                "Give site.latitude_deg and site.heading_deg",
+            )
+        known = KnownNorm(float(np.linalg.norm(earth)), earth)
+        return solve_triaxial(means[repeat], attitudes[repeat], variances[repeat], known, method="maximum_likelihood")
+
+    held = bias_by_repeat(means, variances, np.einsum("rnji,j->rni", attitudes, earth))
+    return _drift(repeats, held, np.zeros(3), solve, earth_rate_known=site.earth_rate_rad_s is not None)
+
+
+def _drift(
+    repeats: Sequence[Sequence[Stand]],
+    held: BiasByRepeat,
+    common_std: Array,
+    solve: Callable[[int], TriaxialSolution],
+    *,
+    earth_rate_known: bool,
+) -> BiasDrift:
+    times = np.array([np.mean([each.time_s for each in repeat]) for repeat in repeats])
+    temperatures = np.array([np.mean([each.temperature_c for each in repeat]) for repeat in repeats])
+    return BiasDrift(
+        held=held,
+        common_std=common_std,
+        anew=tuple(or_fault(partial(_anew, solve, repeat)) for repeat in range(len(repeats))),
+        time_s=times - times[0],
+        temperature_c=temperatures,
+        over_temperature=or_fault(partial(bias_over_temperature, held.bias, held.std, temperatures, times)),
+        earth_rate_known=earth_rate_known,
+    )
+
+
+def _anew(solve: Callable[[int], TriaxialSolution], repeat: int) -> Anew:
+    found = solve(repeat)
+    return Anew(found.bias, np.sqrt(np.diag(found.covariance)[BIAS]))
+
+
+def _stacked(repeats: Sequence[Sequence[Stand]]) -> tuple[Array, Array, Array]:
+    """Means and variances (R, N, 3), attitudes (R, N, 3, 3) from the sensor into the base."""
+    return (
+        np.array([[each.mean for each in repeat] for repeat in repeats]),
+        np.array([[each.variance for each in repeat] for repeat in repeats]),
+        np.array([[each.attitude.T for each in repeat] for repeat in repeats]),
+    )

@@ -1,0 +1,58 @@
+"""What `result.json` says of biases by repeat."""
+
+from rig.data.result_types import Entry, ErrorEntry, Vector3
+
+
+class BiasEntry(Entry):
+    """A bias and its standard deviation."""
+
+    bias: Vector3
+    std: Vector3
+
+
+class MoveEntry(Entry):
+    """Before `repeat`, counted from 1, the bias moved by `change`, known to `std`; most along `axis`."""
+
+    repeat: int
+    axis: str
+    change: Vector3
+    std: Vector3
+
+
+class RepeatEntry(Entry):
+    """One repeat of all attitudes: its bias with scale, axes and reference `held`, and with everything found `anew`.
+
+    `time_s` is that of its middle since the first's.
+    """
+
+    time_s: float
+    temperature_c: float
+    held: BiasEntry
+    anew: BiasEntry | ErrorEntry
+
+
+class SlopeEntry(Entry):
+    """Of the bias over temperature, per °C, in the range that was seen; holds nowhere else."""
+
+    slope: Vector3
+    std: Vector3
+    range_c: tuple[float, float]
+    correlation_with_time: float
+
+
+class DriftEntry(Entry):
+    """One quantity's bias by repeat, in its `unit`.
+
+    `common_std` is what all biases share beside their own; `excess` how many times more the readings scatter from
+    repeat to repeat than they do within a dwell. A steady bias has `moves` in a share of `false_alarm` of all runs.
+    """
+
+    unit: str
+    repeats: tuple[RepeatEntry, ...]
+    common_std: Vector3
+    excess: Vector3
+    moves: tuple[MoveEntry, ...]
+    false_alarm: float
+    largest_change: Vector3
+    over_temperature: SlopeEntry | ErrorEntry
+    earth_rate_known: bool

@@ -1,0 +1,211 @@
+"""The Allan deviation of a sensor at rest, and what it says of random walk and bias instability.
+
+    σ²(τ) = ⟨(ȳ_{k+m} − ȳ_k)²⟩ / 2,   τ = m τ₀
+
+over all overlapping pairs of neighbouring means ȳ of m readings (NIST SP 1065, section 5.2.4, of readings in place of
+frequencies). Pairs lie within one stretch of readings, never across two: between them the sensor may have been turned.
+
+How well σ² is known is said by its equivalent degrees of freedom (Howe, Allan and Barnes 1981; NIST SP 1065, table
+5), those of the noise that prevails about τ by the curve's own slope. σ² times these over its truth is then χ².
+White noise has the slope −1/2 and σ = N/√τ, N being the random walk; the least σ, where the curve is flat, is 0.664
+times the bias instability B (IEEE Std 952-1997, C.1.1 and C.1.3).
+"""
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from typing import Literal
+
+import numpy as np
+
+from rig.errors import Fault
+from rig.estimation.arrays import Array
+from rig.estimation.refusals import check_finite
+
+Noise = Literal["white", "flicker", "random_walk"]
+
+COVERAGE = 0.95  # of the confidence intervals
+RANDOM_WALK_TAU_S = 1.0  # where random walk is read: beyond the sensor's filter, before its bias moves
+RANDOM_WALK_KNOWN = 0.1  # relative standard deviation
+SLOPE_ALLOWED = 0.05  # what the slope may differ from −1/2 beside its own uncertainty: N would be 5 % off
+INSTABILITY_KNOWN = 0.2
+FLICKER = float(np.sqrt(2 * np.log(2) / np.pi))  # 0.664: least σ over bias instability
+BEYOND = 3.0  # standard deviations by which the least σ must exceed what white noise alone gives there
+FEWEST = 3  # readings of a stretch
+
+
+@dataclass(frozen=True, slots=True)
+class AllanCurve:
+    """Overlapping Allan deviation: `tau_s` (T,), `deviation`, `low`, `high` (T, 3) in the unit of the readings.
+
+    `low` and `high` bound the truth with the probability 95 %; `freedom` (T, 3) are the equivalent degrees of freedom.
+    """
+
+    tau_s: Array
+    deviation: Array
+    low: Array
+    high: Array
+    freedom: Array
+
+    @property
+    def relative_std(self) -> Array:
+        """(T, 3) standard deviation of each deviation, as a fraction of it."""
+        std: Array = 1 / np.sqrt(2 * self.freedom)
+        return std
+
+
+@dataclass(frozen=True, slots=True)
+class Read:
+    """What is read off the curve of one axis, its standard deviation, and at which τ."""
+
+    value: float
+    std: float
+    tau_s: float
+
+
+@dataclass(frozen=True, slots=True)
+class AllanAxis:
+    """Of one axis: N in the unit of the readings times √s, B in that unit; or the Fault that says why there is none."""
+
+    random_walk: Read | Fault
+    bias_instability: Read | Fault
+
+
+def allan_curve(stretches: Sequence[Array], interval_s: float) -> AllanCurve:
+    """The overlapping Allan deviation of stretches (nᵢ, 3) of readings taken every `interval_s`.
+
+    τ stands about at the powers of two, 1 s among them. Raises Fault `not_finite`, and `recording_too_short` where
+    no stretch has three readings.
+    """
+    used = [np.asarray(stretch, dtype=np.float64) for stretch in stretches if len(stretch) >= FEWEST]
+    if not used:
+        raise too_short(f"no stretch at rest has {FEWEST} readings without a gap")
+    for stretch in used:
+        check_finite(readings=stretch)
+    phases = [np.vstack([np.zeros(3), np.cumsum(stretch - stretch.mean(axis=0), axis=0)]) for stretch in used]
+    longest = (max(map(len, phases)) - 1) // 2
+    factors = {2**power for power in range(longest.bit_length())} | {round(RANDOM_WALK_TAU_S / interval_s)}
+    chosen = np.array(sorted(factor for factor in factors if 1 <= factor <= longest))
+    squares = np.array([_variance(phases, factor) for factor in chosen])
+    points = [len(phase) for phase in phases]
+    tau_s, deviation = chosen * interval_s, np.sqrt(squares)
+    freedom = np.array(
+        [
+            [_freedom(points, int(factor), _prevailing(slope)) for slope in slopes]
+            for factor, slopes in zip(chosen, _slopes(tau_s, deviation), strict=True)
+        ]
+    )
+    low, high = _bounds(deviation, freedom)
+    return AllanCurve(tau_s, deviation, low, high, freedom)
+
+
+def read_axis(curve: AllanCurve, axis: int) -> AllanAxis:
+    """What the curve of one axis tells."""
+    walk = _random_walk(curve, axis)
+    return AllanAxis(walk, _instability(curve, axis, walk))
+
+
+def too_short(what: str) -> Fault:
+    """The error for what a longer recording would tell."""
+    return Fault("recording_too_short", what, "Record longer at rest; long dwells tell more than many short ones")
+
+
+def equivalent_freedom(points: int, factor: int, noise: Noise) -> float:
+    """Equivalent degrees of freedom of σ² from so many phases (readings + 1) at τ = `factor` τ₀, at least 1."""
+    n, m = float(points), float(factor)
+    if noise == "white":
+        freedom = (3 * (n - 1) / (2 * m) - 2 * (n - 2) / n) * 4 * m**2 / (4 * m**2 + 5)
+    elif noise == "flicker":
+        freedom = 2 * (n - 2) ** 2 / (2.3 * n - 4.9) if factor == 1 else 5 * n**2 / (4 * m * (n + 3 * m))
+    else:
+        freedom = (n - 2) / m * ((n - 1) ** 2 - 3 * m * (n - 1) + 4 * m**2) / (n - 3) ** 2 if points > 3 else 1.0
+    return max(freedom, 1.0)
+
+
+def _variance(phases: Sequence[Array], factor: int) -> Array:
+    """(3,) σ² at τ = `factor` τ₀ over all stretches that reach so far."""
+    total, count = np.zeros(3), 0
+    for phase in phases:
+        if len(phase) > 2 * factor:
+            second = phase[2 * factor :] - 2 * phase[factor:-factor] + phase[: -2 * factor]
+            total += np.sum(second**2, axis=0)
+            count += len(second)
+    variance: Array = total / (2 * factor**2 * count)
+    return variance
+
+
+def _freedom(points: Sequence[int], factor: int, noise: Noise) -> float:
+    """Of all stretches together: independent of each other, each counts by its share of the pairs (Satterthwaite)."""
+    reach = [n for n in points if n > 2 * factor]
+    pairs = np.array([n - 2 * factor for n in reach], dtype=np.float64)
+    own = np.array([equivalent_freedom(n, factor, noise) for n in reach])
+    return float(pairs.sum() ** 2 / np.sum(pairs**2 / own))
+
+
+def _slopes(tau_s: Array, deviation: Array) -> Array:
+    """(T, 3) of log σ over log τ, between the neighbours of each τ; that of white noise where there is one τ."""
+    if len(tau_s) < 2:
+        return np.full(deviation.shape, -0.5)
+    logarithm = np.log(np.maximum(deviation, np.finfo(np.float64).tiny))
+    slopes: Array = np.gradient(logarithm, np.log(tau_s), axis=0)
+    return slopes
+
+
+def _prevailing(slope: float) -> Noise:
+    """The noise whose slope, −1/2, 0 or 1/2, is nearest."""
+    if slope < -0.25:
+        return "white"
+    return "flicker" if slope < 0.25 else "random_walk"
+
+
+def _bounds(deviation: Array, freedom: Array) -> tuple[Array, Array]:
+    from scipy.special import chdtri
+
+    beside = (1 - COVERAGE) / 2
+    return deviation * np.sqrt(freedom / chdtri(freedom, beside)), deviation * np.sqrt(
+        freedom / chdtri(freedom, 1 - beside)
+    )
+
+
+def _random_walk(curve: AllanCurve, axis: int) -> Read | Fault:
+    """N = σ(τ) √τ at the τ nearest to 1 s, if the curve falls there as that of white noise does."""
+    at = int(np.argmin(np.abs(curve.tau_s - RANDOM_WALK_TAU_S)))
+    tau_s, known = float(curve.tau_s[at]), float(curve.relative_std[at, axis])
+    if abs(tau_s - RANDOM_WALK_TAU_S) > RANDOM_WALK_TAU_S / 2:
+        return too_short(f"no stretch reaches {RANDOM_WALK_TAU_S:g} s, where random walk is read")
+    if known > RANDOM_WALK_KNOWN:
+        return too_short(
+            f"random walk would be known to {100 * known:.0f} %, {100 * RANDOM_WALK_KNOWN:.0f} % is the most"
+        )
+    # To either side by about two, so that the slope does not hang on one point.
+    below, above = (int(np.argmin(np.abs(np.log(curve.tau_s / (tau_s * by))))) for by in (0.5, 2.0))
+    if below == above:
+        return too_short(f"the curve has no second point beside {RANDOM_WALK_TAU_S:g} s to tell its slope")
+    run = np.log(curve.tau_s[above] / curve.tau_s[below])
+    slope = float(np.log(curve.deviation[above, axis] / curve.deviation[below, axis]) / run)
+    slope_std = float(np.hypot(*curve.relative_std[[below, above], axis]) / run)
+    if abs(slope + 0.5) > SLOPE_ALLOWED + 3 * slope_std:
+        return Fault(
+            "not_white_noise",
+            f"at {tau_s:.2g} s the deviation changes with the power {slope:+.2f} of τ, not −0.5",
+            "Look at the curve: something vibrates, the readings are filtered that long, or the bias moves that fast",
+        )
+    value = float(curve.deviation[at, axis] * np.sqrt(tau_s))
+    return Read(value, value * known, tau_s)
+
+
+def _instability(curve: AllanCurve, axis: int, walk: Read | Fault) -> Read | Fault:
+    """B from the least σ, if the curve has its floor within what is well known."""
+    known = curve.relative_std[:, axis]
+    usable = np.flatnonzero(known <= INSTABILITY_KNOWN)
+    if not len(usable):
+        return too_short(f"no point of the curve is known to {100 * INSTABILITY_KNOWN:.0f} %")
+    last = int(usable[-1])
+    least = int(usable[np.argmin(curve.deviation[usable, axis])])
+    tau_s, deviation = float(curve.tau_s[least]), float(curve.deviation[least, axis])
+    by_noise = walk.value / np.sqrt(tau_s) if isinstance(walk, Read) else 0.0
+    if least == last or deviation < by_noise * (1 + BEYOND * known[least]):
+        return too_short(
+            f"the deviation still falls at {curve.tau_s[last]:.3g} s, the longest known to "
+            f"{100 * INSTABILITY_KNOWN:.0f} %"
+        )
+    return Read(deviation / FLICKER, deviation / FLICKER * float(known[least]), tau_s)

@@ -1,0 +1,155 @@
+"""Allan deviations, for people and for machines, and their plots."""
+
+import json
+from collections.abc import Iterator, Mapping
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+from rich.console import Console
+from rich.table import Table
+
+from rig.analysis.at_rest import AtRest, Quantity, SensorAtRest
+from rig.errors import Fault
+from rig.estimation.allan import FLICKER, Read
+from rig.estimation.earth import MICRO_G_M_S2
+from rig.report.figures import save, style
+from rig.station.plain_text import plain
+
+if TYPE_CHECKING:
+    from matplotlib.axes import Axes
+
+SCHEMA = "rig.allan/1"
+MINUTE_S = 60.0  # √(3600 s): from √s to √h
+DEG_H = np.pi / 180 / 3600  # rad/s
+# By the quantity: SI units of N and B, and those on the screen with their size in SI.
+SI: Mapping[Quantity, tuple[str, str]] = {"rate": ("rad_sqrt_s", "rad_s"), "acceleration": ("m_s_sqrt_s", "m_s2")}
+SHOWN: Mapping[Quantity, tuple[tuple[str, float], tuple[str, float]]] = {
+    "rate": (("°/√h", np.pi / 180 / MINUTE_S), ("°/h", DEG_H)),
+    "acceleration": (("m/s/√h", 1 / MINUTE_S), ("µg", MICRO_G_M_S2)),
+}
+WALKS: Mapping[Quantity, str] = {"rate": "angle random walk", "acceleration": "velocity random walk"}
+
+
+def print_at_rest(found: Mapping[str, SensorAtRest], *, as_json: bool) -> None:
+    """On stdout: tables for people, JSON of schema "rig.allan/1" for machines."""
+    if as_json:
+        print(json.dumps(document(found), indent=2, allow_nan=False))
+        return
+    console = Console(highlight=False)
+    for name, each in found.items():
+        for quantity, seen in each.quantities.items():
+            if isinstance(seen, Fault):
+                console.print(plain(f"{name}, {quantity}: {seen}"))
+                continue
+            console.print(_table(f"{name}, {quantity}: {each.sensor.part} {each.sensor.serial_number}", quantity, seen))
+            for line in _lines(seen):
+                console.print(plain(line))
+
+
+def document(found: Mapping[str, SensorAtRest]) -> dict[str, Any]:
+    """In SI units, of schema "rig.allan/1"."""
+    return {
+        "schema": SCHEMA,
+        "sensors": {
+            name: {
+                "part": each.sensor.part,
+                "serial_number": each.sensor.serial_number,
+                **{
+                    quantity: {"error": str(seen)} if isinstance(seen, Fault) else _entry(quantity, seen)
+                    for quantity, seen in each.quantities.items()
+                },
+            }
+            for name, each in found.items()
+        },
+    }
+
+
+def draw_at_rest(found: Mapping[str, SensorAtRest], folder: Path) -> list[Path]:
+    """`allan_<sensor>`, as PNG and SVG, into `folder`, of every sensor that has a curve. Needs matplotlib."""
+    from matplotlib.figure import Figure
+
+    written = []
+    for name, each in found.items():
+        curves = {quantity: seen for quantity, seen in each.quantities.items() if isinstance(seen, AtRest)}
+        if not curves:
+            continue
+        with style():
+            figure = Figure(figsize=(5.5 * len(curves), 4.6), layout="constrained")
+            for axes, (quantity, seen) in zip(np.ravel(figure.subplots(1, len(curves))), curves.items(), strict=True):
+                _draw(axes, quantity, seen)
+            figure.suptitle(f"{name}: {each.sensor.part} {each.sensor.serial_number} at rest; bands hold 95 %")
+            save(figure, folder, f"allan_{name}")
+        written += [folder / f"allan_{name}.png", folder / f"allan_{name}.svg"]
+    return written
+
+
+def _table(title: str, quantity: Quantity, seen: AtRest) -> Table:
+    table = Table(title=plain(title, "table.title"), title_justify="left")
+    (walk_unit, walk_size), (bias_unit, bias_size) = SHOWN[quantity]
+    headings = ("axis", f"{WALKS[quantity]} {walk_unit}", "± 2σ", f"bias instability {bias_unit}", "± 2σ", "at s")
+    for heading in headings:
+        table.add_column(heading, justify="left" if heading == "axis" else "right")
+    for axis, told in zip("xyz", seen.axes, strict=True):
+        floor = told.bias_instability
+        at = f"{floor.tau_s:.3g}" if isinstance(floor, Read) else ""
+        table.add_row(axis, *_cells(told.random_walk, walk_size), *_cells(floor, bias_size), at)
+    return table
+
+
+def _cells(told: Read | Fault, size: float) -> tuple[str, str]:
+    if isinstance(told, Fault):
+        return told.name, ""
+    return f"{told.value / size:.4g}", f"{2 * told.std / size:.1g}"
+
+
+def _lines(seen: AtRest) -> Iterator[str]:
+    low, high = seen.temperature_c
+    yield (
+        f"{seen.stretches} stretches at rest, {seen.total_s:.4g} s in all, the longest {seen.longest_s:.4g} s; "
+        f"{low:.1f} to {high:.1f} °C"
+    )
+    for what in ("random_walk", "bias_instability"):
+        said = {str(told) for axis in seen.axes if isinstance(told := getattr(axis, what), Fault)}
+        yield from (f"{what.replace('_', ' ')}: {text}" for text in sorted(said))
+
+
+def _entry(quantity: Quantity, seen: AtRest) -> dict[str, Any]:
+    walk, floor = SI[quantity]
+    return {
+        "stretches": seen.stretches,
+        "longest_s": seen.longest_s,
+        "total_s": seen.total_s,
+        "temperature_c": list(seen.temperature_c),
+        f"random_walk_{walk}": [_read(axis.random_walk) for axis in seen.axes],
+        f"bias_instability_{floor}": [_read(axis.bias_instability) for axis in seen.axes],
+        "tau_s": seen.curve.tau_s.tolist(),
+        f"deviation_{floor}": seen.curve.deviation.tolist(),
+        f"deviation_low_{floor}": seen.curve.low.tolist(),
+        f"deviation_high_{floor}": seen.curve.high.tolist(),
+        "degrees_of_freedom": seen.curve.freedom.tolist(),
+    }
+
+
+def _read(told: Read | Fault) -> dict[str, Any]:
+    if isinstance(told, Fault):
+        return {"error": str(told)}
+    return {"value": told.value, "std": told.std, "tau_s": told.tau_s}
+
+
+def _draw(axes: "Axes", quantity: Quantity, seen: AtRest) -> None:
+    """The curves with their bands, and what was read off them."""
+    unit, size = SHOWN[quantity][1]
+    curve = seen.curve
+    for i, (axis, told) in enumerate(zip("xyz", seen.axes, strict=True)):
+        axes.loglog(curve.tau_s, curve.deviation[:, i] / size, "o-", ms=3, lw=1, color=f"C{i}", label=axis)
+        axes.fill_between(curve.tau_s, curve.low[:, i] / size, curve.high[:, i] / size, color=f"C{i}", alpha=0.15)
+        if isinstance(told.random_walk, Read):
+            line = told.random_walk.value / np.sqrt(curve.tau_s) / size
+            axes.loglog(curve.tau_s, line, ":", lw=0.8, color=f"C{i}")
+        if isinstance(told.bias_instability, Read):
+            floor = told.bias_instability
+            axes.plot(floor.tau_s, floor.value * FLICKER / size, "v", color=f"C{i}")
+    axes.set(xlabel="τ s", ylabel=f"Allan deviation   {unit}", title=quantity)
+    axes.plot([], [], "k:", lw=0.8, label="random walk")
+    axes.legend(frameon=False, ncols=2, fontsize=8)

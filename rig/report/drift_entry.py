@@ -1,0 +1,55 @@
+"""A bias by repeat as `result.json` has it."""
+
+from rig.analysis.at_rest import Quantity
+from rig.analysis.bias_drift import Anew, BiasDrift
+from rig.data.drift_entries import BiasEntry, DriftEntry, MoveEntry, RepeatEntry, SlopeEntry
+from rig.data.result_types import ErrorEntry, Vector3
+from rig.errors import Fault
+from rig.estimation.arrays import Array
+from rig.estimation.bias_by_repeat import FALSE_ALARM
+from rig.observation.attitude_import import UNITS
+
+
+def drift_entry(quantity: Quantity, drift: BiasDrift) -> DriftEntry:
+    """In SI units."""
+    held, slope = drift.held, drift.over_temperature
+    return DriftEntry(
+        unit=UNITS[quantity],
+        repeats=tuple(
+            RepeatEntry(
+                time_s=float(drift.time_s[repeat]),
+                temperature_c=float(drift.temperature_c[repeat]),
+                held=BiasEntry(bias=_vector(held.bias[repeat]), std=_vector(held.std[repeat])),
+                anew=_anew(drift.anew[repeat]),
+            )
+            for repeat in range(len(held.bias))
+        ),
+        common_std=_vector(drift.common_std),
+        excess=_vector(held.excess),
+        moves=tuple(
+            MoveEntry(repeat=move.repeat + 1, axis="xyz"[move.axis], change=_vector(move.change), std=_vector(move.std))
+            for move in held.moves
+        ),
+        false_alarm=FALSE_ALARM,
+        largest_change=_vector(held.largest_change),
+        over_temperature=ErrorEntry(error=str(slope))
+        if isinstance(slope, Fault)
+        else SlopeEntry(
+            slope=_vector(slope.slope),
+            std=_vector(slope.std),
+            range_c=slope.range_c,
+            correlation_with_time=slope.correlation,
+        ),
+        earth_rate_known=drift.earth_rate_known,
+    )
+
+
+def _anew(found: Anew | Fault) -> BiasEntry | ErrorEntry:
+    if isinstance(found, Fault):
+        return ErrorEntry(error=str(found))
+    return BiasEntry(bias=_vector(found.bias), std=_vector(found.std))
+
+
+def _vector(values: Array) -> Vector3:
+    x, y, z = values.tolist()
+    return x, y, z

@@ -1,0 +1,66 @@
+"""Biases by repeat, drawn as in TRIAX, Figs. 4 and 6."""
+
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from rig.analysis.bias_drift import Anew, BiasDrift
+from rig.analysis.outcome import Outcome
+from rig.data.result_file import ResultDocument
+from rig.report.drift_table import SHOWN
+from rig.report.figures import save, style
+from rig.station.events import NotPlotted, Plotted, RunEvent
+
+if TYPE_CHECKING:
+    from matplotlib.axes import Axes
+
+
+def write_drift_figures(outcome: Outcome, document: ResultDocument, folder: Path) -> tuple[RunEvent, ...]:
+    """`bias_drift_<sensor>` of every sensor whose bias was watched, as PNG and SVG; none without matplotlib."""
+    if not outcome.drifts:
+        return ()
+    try:
+        import matplotlib  # noqa: F401
+    except ImportError:
+        return (NotPlotted(),)
+    from matplotlib.figure import Figure
+
+    names = []
+    for sensor, drifts in outcome.drifts.items():
+        with style():
+            figure = Figure(figsize=(5.5 * len(drifts), 4.6), layout="constrained")
+            panels = np.ravel(figure.subplots(1, len(drifts)))
+            for axes, (quantity, drift) in zip(panels, drifts.items(), strict=True):
+                draw_drift(axes, quantity, drift)
+            figure.suptitle(f"{sensor}: bias by repeat")
+            save(figure, folder, f"bias_drift_{sensor}")
+        names.append(f"bias_drift_{sensor}")
+    return (Plotted(tuple(names)),)
+
+
+def draw_drift(axes: "Axes", quantity: str, drift: BiasDrift) -> None:
+    """Dots: scale and axes held. Crosses: everything found anew. A line before each repeat at which the bias moved."""
+    unit, size, what = SHOWN[quantity]
+    repeat = np.arange(1, len(drift.held.bias) + 1)
+    again = [(number, found) for number, found in zip(repeat, drift.anew, strict=True) if isinstance(found, Anew)]
+    for i, axis in enumerate("xyz"):
+        held, std = drift.held.bias[:, i] / size, drift.held.std[:, i] / size
+        axes.errorbar(repeat, held, 2 * std, fmt="o-", ms=3, lw=0.8, color=f"C{i}", label=axis)
+        if again:
+            biases, stds = ([getattr(found, of)[i] / size for _, found in again] for of in ("bias", "std"))
+            axes.errorbar(
+                [number + 0.15 for number, _ in again],
+                biases,
+                2 * np.array(stds),
+                fmt="x",
+                ms=4,
+                lw=0.6,
+                alpha=0.6,
+                color=f"C{i}",
+            )
+    for move in drift.held.moves:
+        axes.axvline(move.repeat + 0.5, color="0.5", ls=":", lw=0.8)
+    axes.locator_params("x", integer=True)
+    axes.set(xlabel="repeat", ylabel=f"bias   {unit}", title=f"{what}; ±2σ, × found anew")
+    axes.legend(frameon=False, ncols=3, fontsize=8)
