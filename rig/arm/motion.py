@@ -6,7 +6,7 @@ from dataclasses import dataclass
 from typing import Protocol
 
 from rig.arm.state import Joints
-from rig.config.models import Direction, Vector3
+from rig.config.section import Direction, Vector3
 
 # Joint angles closer than this are the same place: well above the encoder's step, well below anything that matters.
 SAME_PLACE_RAD = 1e-4

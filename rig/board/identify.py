@@ -5,7 +5,8 @@ from math import isclose
 
 from firmware_host.client import Board, BoardIdentity, SensorInfo, StoredCalibration
 from firmware_host.protocol import FIRMWARE_VERSION
-from rig.config.models import BoardSection, MagnetometerSection, RigConfig, SensorSection
+from rig.config.models import BoardSection, RigConfig
+from rig.config.sensor_sections import MagnetometerSection, SensorSection
 from rig.errors import Fault, Refused, raised_as
 
 Configured = SensorSection | MagnetometerSection

@@ -21,7 +21,8 @@ from rig.board.identify import (
 from rig.board.store import calibration_of, store
 from rig.commands.laboratory import simulated_laboratory, written
 from rig.config.load import load
-from rig.config.models import RigConfig, SensorSection
+from rig.config.models import RigConfig
+from rig.config.sensor_sections import SensorSection
 from rig.data.result_file import ResultDocument, passed_result
 from rig.errors import Fault, Refused
 from rig.report.board_info import BoardInfo, BoardSensor, print_info, print_stored

@@ -8,7 +8,8 @@ import numpy as np
 from pydantic import BeforeValidator, Field, field_validator, model_validator
 
 from rig.config.attitude_sets import SETS
-from rig.config.models import RATIO, AccelerometerOrder, Direction, JointAngle, ProcedureSection, RigConfig
+from rig.config.models import ProcedureSection, RigConfig
+from rig.config.section import RATIO, AccelerometerOrder, Direction, JointAngle
 from rig.config.ur10e_limits import ACCELERATION_LIMIT_DEG_S2, SPEED_LIMIT_DEG_S
 
 __all__ = [

@@ -5,7 +5,7 @@ from typing import Annotated, Any
 
 from pydantic import Field
 
-from rig.config.models import RATIO, Section, SensorName, Vector3
+from rig.config.section import RATIO, Section, SensorName, Vector3
 
 Joint = Annotated[float, Field(ge=-0.1, le=0.1)]
 Joints = tuple[Joint, Joint, Joint, Joint, Joint, Joint]

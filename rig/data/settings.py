@@ -22,7 +22,8 @@ from rig.estimation.earth import EARTH_RATE_RAD_S
 
 if TYPE_CHECKING:
     from rig.arm.motion import Dwell, Plan
-    from rig.config.models import RigConfig, SiteSection
+    from rig.config.judging_sections import SiteSection
+    from rig.config.models import RigConfig
 
 SCHEMA = "rig.settings/5"
 # The first knows no site, the second no dwells, the third no magnetic field, the fourth no Earth's rate to be found.

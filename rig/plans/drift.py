@@ -8,7 +8,7 @@ import numpy as np
 from rig.arm.kinematics import flange_attitude
 from rig.arm.motion import Dwell, Rest, Step, Sweep, Transfer
 from rig.arm.state import Joints
-from rig.config.models import Vector3
+from rig.config.section import Vector3
 
 NEGLIGIBLE = 1e-6  # of the largest singular value: what attitudes do not tell is left alone
 

@@ -12,8 +12,9 @@ from rig.arm.clearance import keeps_clear
 from rig.arm.kinematics import flange_axes
 from rig.arm.motion import Plan, Rest, Step, Sweep, trapezoid_duration
 from rig.arm.state import JOINT_NAMES, Joints
-from rig.config.models import ArmSection, Direction
+from rig.config.models import ArmSection
 from rig.config.procedure_sections import SixSweepsSection, Wrist
+from rig.config.section import Direction
 from rig.errors import Refused
 from rig.plans.drift import drift_effect
 from rig.plans.ways import approach, in_radians, transfer

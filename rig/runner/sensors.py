@@ -10,7 +10,8 @@ import numpy as np
 from firmware_host.client import Board, Calibration, SampleBatch, StoredCalibration
 from firmware_host.protocol import CALIBRATED_RAD_S, FULL_SCALE_COUNTS
 from rig.board.identify import configured_board, find_sensor, refuse_other_firmware, stored_calibration
-from rig.config.models import MagnetometerSection, RigConfig, SensorSection, mounting_matrix
+from rig.config.models import RigConfig
+from rig.config.sensor_sections import MagnetometerSection, SensorSection, mounting_matrix
 from rig.data.run_file import RecordedMagnetometer, RecordedSensor
 from rig.sensors.source import OnSamples, Recorded
 

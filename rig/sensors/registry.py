@@ -6,7 +6,7 @@ from dataclasses import dataclass
 from types import MappingProxyType
 from typing import Protocol
 
-from rig.config.models import SensorSection
+from rig.config.sensor_sections import SensorSection
 from rig.data.run_file import RecordedSensor
 from rig.sensors.errors import SensorError
 from rig.sensors.kvh1775.source import describe, kvh1775, look

@@ -18,7 +18,7 @@ from firmware_host.client import Board, BoardIdentity, SensorInfo
 from firmware_host.protocol import FIRMWARE_VERSION
 from rig.board.identify import find_sensor, refuse_other_firmware, stored_calibration
 from rig.board.store import calibration_of, store
-from rig.config.models import SensorSection
+from rig.config.sensor_sections import SensorSection
 from rig.data.result_file import passed_result, read_result, write_result
 from rig.errors import Refused
 from support.results import SENSOR, VERIFIED, result_document

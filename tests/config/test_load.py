@@ -9,8 +9,8 @@ import yaml
 
 from rig.config import ur10e_limits
 from rig.config.load import ConfigurationRefused, load, parse
-from rig.config.models import SensorSection
 from rig.config.procedure_sections import SixObservationSection
+from rig.config.sensor_sections import SensorSection
 from rig.world.section import world_section
 from support.paths import CONFIGS
 

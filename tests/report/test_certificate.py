@@ -8,8 +8,8 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
+from rig.config.judging_sections import CertificateSection, SiteSection
 from rig.config.load import parse
-from rig.config.models import CertificateSection, SiteSection
 from rig.data.result_file import CheckEntry, ResultDocument, read_result
 from rig.data.result_types import ErrorEntry
 from rig.errors import Refused

@@ -6,7 +6,7 @@ from xml.etree.ElementTree import Element, fromstring
 import numpy as np
 import pytest
 
-from rig.config.models import CertificateSection, SiteSection
+from rig.config.judging_sections import CertificateSection, SiteSection
 from rig.data.result_file import read_result
 from rig.errors import Refused
 from rig.report.certificate.dcc import digital_certificate

@@ -9,7 +9,7 @@ from typing import Any
 
 from rig.analysis.outcome import calibrated
 from rig.arm.kinematics import NOMINAL
-from rig.config.models import CertificateSection, SiteSection
+from rig.config.judging_sections import CertificateSection, SiteSection
 from rig.data.accelerometer_entries import AccelerometerEntry
 from rig.data.budget_entries import ClockComparisonEntry
 from rig.data.result_file import ResultDocument

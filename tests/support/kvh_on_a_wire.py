@@ -8,7 +8,7 @@ from contextlib import contextmanager
 
 import numpy as np
 
-from rig.config.models import SensorSection
+from rig.config.sensor_sections import SensorSection
 from rig.config.world_models import SimulatedKvhSection, SimulatedSensorSection
 from rig.world.board.pty_port import PtyPort
 from rig.world.board.sensor_truth import SensorTruth

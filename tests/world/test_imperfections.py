@@ -11,7 +11,7 @@ from scipy.spatial.transform import Rotation
 
 from firmware_host.frames import FrameReader
 from rig.config.load import load
-from rig.config.models import SensorSection
+from rig.config.sensor_sections import SensorSection
 from rig.config.world_models import SimulatedSensorSection, WorldSection
 from rig.world.board.sensor_truth import SensorTruth
 from rig.world.clock import TICK_S, TICKS_PER_SECOND, Clock

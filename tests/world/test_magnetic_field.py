@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from rig.config.models import MagnetometerSection
+from rig.config.sensor_sections import MagnetometerSection
 from rig.config.world_models import SimulatedMagnetometerSection, SiteSection
 from rig.world.board.magnetometer_truth import MountedMagnetometer
 from rig.world.magnetic_field import UniformField, magnetic_field_of

@@ -17,7 +17,7 @@ from firmware_host.errors import BoardError
 from firmware_host.frames import FrameReader, encode
 from rig.arm.kinematics import flange_rate
 from rig.config.load import Loaded
-from rig.config.models import mounting_matrix
+from rig.config.sensor_sections import mounting_matrix
 from rig.errors import Refused
 from rig.world.board.flash_file import flash_of
 from rig.world.board.mounting import firmware

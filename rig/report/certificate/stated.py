@@ -4,8 +4,8 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path
 
+from rig.config.judging_sections import CertificateSection, SiteSection
 from rig.config.load import Loaded, load
-from rig.config.models import CertificateSection, SiteSection
 from rig.data.run_folder import CONFIG
 from rig.errors import Refused
 from rig.errors.quoting import quote

@@ -9,8 +9,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from firmware_host.samples import IMU_SAMPLE_DTYPE, SAMPLE_DTYPE
-from rig.config.models import OwnPortSection, SensorSection, mounting_matrix
 from rig.config.sensor_catalogue import PARTS
+from rig.config.sensor_sections import OwnPortSection, SensorSection, mounting_matrix
 from rig.data.run_file import RecordedSensor
 from rig.estimation.earth import STANDARD_GRAVITY_M_S2
 from rig.sensors.errors import SensorError

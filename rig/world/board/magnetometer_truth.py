@@ -3,7 +3,7 @@
 from math import radians
 
 from firmware_host.emulator.magnetometer import MagnetometerTruth
-from rig.config.models import MagnetometerSection
+from rig.config.sensor_sections import MagnetometerSection
 from rig.config.world_models import SimulatedMagnetometerSection
 from rig.world.board.sensor_truth import mounted_rows
 from rig.world.magnetic_field import MagneticField

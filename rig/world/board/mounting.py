@@ -13,7 +13,8 @@ from firmware_host.emulator.lsm9ds1_magnetometer import Lsm9ds1Magnetometer
 from firmware_host.emulator.machine import EmulatedBoard
 from firmware_host.emulator.mpu9250 import Mpu9250
 from firmware_host.emulator.spi_device import SpiDevice
-from rig.config.models import RigConfig, SensorSection
+from rig.config.models import RigConfig
+from rig.config.sensor_sections import SensorSection
 from rig.config.world_models import WorldSection
 from rig.world.board.magnetometer_truth import MountedMagnetometer
 from rig.world.board.sensor_truth import SensorTruth

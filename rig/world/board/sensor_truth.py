@@ -10,7 +10,7 @@ import numpy as np
 
 from firmware_host.emulator.accelerometer import STANDARD_GRAVITY_M_S2, AccelerometerTruth
 from firmware_host.emulator.gyroscope import GyroTruth, Temperature, Warming, readings
-from rig.config.models import MountingSection, SensorSection, mounting_matrix
+from rig.config.sensor_sections import MountingSection, SensorSection, mounting_matrix
 from rig.config.world_models import SimulatedAccelerometerSection, SimulatedSensorSection
 from rig.world.ur10e.flange_motion import Components, Felt, moved
 from rig.world.ur10e.forward_kinematics import rotation_from_vector

@@ -5,7 +5,8 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from rig.config.models import AccelerationSection, RigConfig
+from rig.config.models import RigConfig
+from rig.config.sensor_sections import AccelerationSection
 from rig.config.world_models import SimulatedKvhSection, WorldSection
 from rig.errors import Refused
 from rig.world.board.sensor_truth import SensorTruth

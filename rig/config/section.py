@@ -1,0 +1,48 @@
+"""What all sections of a configuration file share: how they are checked, and what their values may be."""
+
+from typing import Annotated, Any, Literal
+from urllib.parse import urlsplit
+
+from pydantic import BaseModel, ConfigDict, Field, StringConstraints
+
+from rig.config.ur10e_limits import JOINT_LIMIT_DEG
+
+Direction = Literal["cw", "ccw"]
+Vector3 = tuple[float, float, float]
+Vector6 = tuple[float, float, float, float, float, float]
+Positive = Annotated[float, Field(gt=0)]
+AccelerometerOrder = Literal[0, 1, 2]
+JointAngle = Annotated[float, Field(ge=-JOINT_LIMIT_DEG, le=JOINT_LIMIT_DEG)]
+Words = Annotated[str, StringConstraints(strip_whitespace=True, min_length=1, max_length=200)]
+Offset = Annotated[float, Field(ge=-1000, le=1000)]
+# A name becomes that of a dataset, of files and of C arrays.
+SensorName = Annotated[str, Field(pattern=r"^\w[\w -]*$", max_length=40)]
+RATIO: dict[str, Any] = {"unit": "1"}  # a number without a unit, where the key cannot say so
+
+
+class Section(BaseModel):
+    """A part of the file: unknown keys are refused, values are frozen."""
+
+    model_config = ConfigDict(extra="forbid", frozen=True, allow_inf_nan=False)
+
+
+def checked_host(name: str) -> str:
+    """A host's name or address. Raises ValueError when it cannot be one."""
+    try:
+        name.encode("idna")
+    except UnicodeError:
+        raise ValueError("no host's name; between its dots stand 1 to 63 characters each") from None
+    return name
+
+
+def checked_port(value: str) -> str:
+    """A serial port's name, or `socket://host:port`. Raises ValueError when it cannot be one."""
+    if value.startswith("socket://"):
+        try:
+            parts = urlsplit(value)
+            complete = bool(checked_host(parts.hostname or "") and parts.port)
+        except ValueError:
+            complete = False
+        if not complete:
+            raise ValueError("must be socket://host:port with a port from 1 to 65535")
+    return value

@@ -1,0 +1,250 @@
+"""The sections of a sensor: its part and rate, how it is mounted, the port of its own, what of it is known before."""
+
+from collections.abc import Mapping
+from typing import Any, Literal, Self
+
+import numpy as np
+from pydantic import Field, ValidationInfo, field_validator, model_validator
+
+from rig.config.link_budget import KVH1775_MESSAGE_BYTES, own_line_over_budget
+from rig.config.section import (
+    RATIO,
+    Positive,
+    Section,
+    Vector3,
+    checked_port,
+)
+from rig.config.sensor_catalogue import MAGNETOMETERS, PARTS, in_words, nearest_rate, one_of
+
+AxisName = Literal["+x", "-x", "+y", "-y", "+z", "-z"]
+SERIAL_NUMBER_MAX = 24  # of the kind "text24" in the board's protocol
+OF_THE_PART: dict[str, Any] = {"allowed": "what the part has, see below", "usual": "the part's usual one"}
+
+
+def mounting_matrix(mounting: "MountingSection") -> np.ndarray:
+    """(3, 3) rotation taking a flange-frame vector to the sensor's nominal frame: row i is sensor axis i."""
+    axes = {"x": 0, "y": 1, "z": 2}
+    rows = np.zeros((3, 3))
+    for row, name in enumerate((mounting.x, mounting.y, mounting.z)):
+        rows[row, axes[name[1]]] = 1.0 if name[0] == "+" else -1.0
+    return rows
+
+
+class OwnPortSection(Section):
+    """The serial port of a sensor that is not on the board, and what it sends there."""
+
+    port: str = Field(
+        min_length=1,
+        max_length=255,
+        description="serial port, such as `/dev/ttyUSB0` or `COM4`, or `socket://host:port`",
+    )
+    baud: Literal[9600, 19200, 38400, 57600, 115200, 460800, 576000, 921600, 4147200] = Field(
+        default=921600,
+        description="speed the sensor's line is set to; the rig changes it on neither side",
+        json_schema_extra={"unit": "Bd"},
+    )
+    message: Literal["A", "B", "C"] = Field(
+        default="B",
+        description="format of its messages: `B` has the sensor's own microseconds, by which lost messages are counted "
+        "beyond doubt; `A` and `C` have none, and `C` has its magnetic field",
+    )
+    rotation: Literal["delta", "rate"] = Field(
+        default="delta",
+        description="`delta`: the angle turned through since the message before, in which nothing is aliased; `rate`: "
+        "the rate as the sensor's own filter leaves it",
+    )
+
+    @field_validator("port")
+    @classmethod
+    def an_address_has_host_and_port(cls, value: str) -> str:
+        """As of the board."""
+        return checked_port(value)
+
+
+class MountingSection(Section):
+    """Which flange axis each sensor axis points along, nominally: a right-handed frame. It need not be exact."""
+
+    x: AxisName = Field(default="+x", description="the flange axis along which the sensor's x axis points")
+    y: AxisName = Field(default="+y", description="the same of its y axis")
+    z: AxisName = Field(default="+z", description="the same of its z axis")
+
+    @model_validator(mode="after")
+    def right_handed(self) -> Self:
+        """A mirrored or doubled axis is not a mounting."""
+        if not np.isclose(np.linalg.det(mounting_matrix(self)), 1.0):
+            raise ValueError("must name three different axes that form a right-handed frame, for example +x, +y, +z")
+        return self
+
+
+class TurntableSection(Section):
+    """A reference's own calibration, found before: rate = scale · (reading + bias_rad_s)."""
+
+    scale: tuple[Positive, Positive, Positive] = Field(
+        default=(1.0, 1.0, 1.0), description="scale factor of each axis", json_schema_extra=RATIO
+    )
+    bias_rad_s: Vector3 = Field(default=(0.0, 0.0, 0.0), description="bias of each axis, added to the reading")
+
+
+class AccelerationSection(Section):
+    """The part's accelerometer; without this section it is not read. It is calibrated where attitudes are held."""
+
+    range_g: float | None = Field(
+        default=None,
+        description="its full scale, one of the part's; left out, the smallest it has",
+        json_schema_extra={"unit": "g"},
+    )
+
+
+class SensorSection(Section):
+    """One gyroscope, under a name of your choice: at most 40 letters, digits, `_`, `-` and spaces."""
+
+    part: Literal["lsm9ds1", "mpu9250", "adis16465", "kvh1775"] = Field(description="which gyroscope it is")
+    serial_number: str = Field(
+        description="which specimen it is; kept on the board and in every result; a `kvh1775` is asked for its own",
+        json_schema_extra={"allowed": f"1 to {SERIAL_NUMBER_MAX} plain ASCII characters"},
+    )
+    role: Literal["calibrate", "reference"] = Field(
+        default="calibrate",
+        description="what it is here for; at most one sensor is the reference others are compared with",
+    )
+    rate_hz: float = Field(
+        description="samples a second, one of the part's rates; 333.33 stands for 1000/3", json_schema_extra=OF_THE_PART
+    )
+    range_deg_s: float = Field(
+        description="full scale, one of the part's ranges; at least 1.5 times the fastest sweep",
+        json_schema_extra=OF_THE_PART,
+    )
+    mounting: MountingSection = Field(default=MountingSection(), description="how it sits on the flange")
+    correction: Literal["matrix", "diagonal"] = Field(
+        default="diagonal",
+        description="what the board and `calibration.h` correct readings by: each axis for itself, as in the paper, or "
+        "the whole matrix, which also brings the axes to right angles",
+    )
+    turntable: TurntableSection = Field(
+        default=TurntableSection(), description="its own calibration, of a reference only; left out, it reads true"
+    )
+    acceleration: AccelerationSection | None = Field(
+        default=None, description="its accelerometer; left out, only the gyroscope is read"
+    )
+    serial: OwnPortSection | None = Field(
+        default=None, description="its own serial port, of a `kvh1775`; the other parts are on the board"
+    )
+
+    @property
+    def on_board(self) -> bool:
+        """Whether the board reads it."""
+        return self.serial is None
+
+    @model_validator(mode="before")
+    @classmethod
+    def usual_of_the_part(cls, data: Any) -> Any:
+        """Left out, data rate and range are the part's usual ones."""
+        if not isinstance(data, Mapping):
+            return data
+        name = data.get("part")
+        # A part that is not known is an error of its own, whatever stands in for it here.
+        part = PARTS[name] if isinstance(name, str) and name in PARTS else next(iter(PARTS.values()))
+        usual = {"rate_hz": part.default_rate_hz, "range_deg_s": part.default_range_deg_s}
+        return {**data, **{key: value for key, value in usual.items() if data.get(key) is None}}
+
+    @field_validator("serial_number")
+    @classmethod
+    def the_board_can_keep_it(cls, value: str) -> str:
+        """The board stores it beside the calibration, in a field of fixed width."""
+        return checked_serial_number(value)
+
+    @field_validator("rate_hz", "range_deg_s")
+    @classmethod
+    def the_part_has_it(cls, value: float, info: ValidationInfo) -> float:
+        """Only what the part can do, and never silently something else."""
+        part = PARTS.get(info.data.get("part", ""))
+        if part is None:
+            return value
+        return part.accept_rate(value) if info.field_name == "rate_hz" else part.accept_range(value)
+
+    @field_validator("acceleration")
+    @classmethod
+    def a_range_of_its_accelerometer(
+        cls, value: AccelerationSection | None, info: ValidationInfo
+    ) -> AccelerationSection | None:
+        """As of its gyroscope; left out, the smallest: nothing on the arm is felt beyond 2 g."""
+        part = PARTS.get(info.data.get("part", ""))
+        if value is None or part is None:
+            return value
+        if value.range_g is None:
+            return value.model_copy(update={"range_g": part.ranges_g[0]})
+        if value.range_g not in part.ranges_g:
+            raise ValueError(f"the part has no range_g {value.range_g:g}; it has {', '.join(map(str, part.ranges_g))}")
+        return value
+
+    @model_validator(mode="after")
+    def its_own_port_carries_it(self) -> Self:
+        """A part has a port of its own or it is on the board."""
+        own_port = PARTS[self.part].own_port
+        if own_port != (self.serial is not None):
+            raise ValueError(
+                f"{self.part} is {'not on the board: give its section serial' if own_port else 'on the board: leave'}"
+                f"{'' if own_port else ' serial out'}"
+            )
+        if self.serial is not None:
+            size = KVH1775_MESSAGE_BYTES[self.serial.message]
+            problem = own_line_over_budget(self.rate_hz, size, self.serial.baud)
+            if problem is not None:
+                raise ValueError(problem)
+        return self
+
+    @field_validator("turntable")
+    @classmethod
+    def only_of_a_reference(cls, value: TurntableSection, info: ValidationInfo) -> TurntableSection:
+        """A sensor that is to be calibrated has no calibration yet."""
+        if info.data.get("role") == "calibrate":
+            raise ValueError("only a sensor with role: reference has one; a sensor to calibrate gets its own here")
+        return value
+
+
+def checked_serial_number(value: str) -> str:
+    """Raises ValueError when the board could not keep it."""
+    if not (value.isascii() and value.isprintable() and 0 < len(value) <= SERIAL_NUMBER_MAX):
+        raise ValueError(f"must be 1 to {SERIAL_NUMBER_MAX} plain ASCII characters; the board keeps no others")
+    return value
+
+
+class MagnetometerSection(Section):
+    """One magnetometer on the board, under a name that no gyroscope has: recorded, and calibrated in attitudes."""
+
+    part: Literal["lsm9ds1_magnetometer"] = Field(description="which magnetometer it is")
+    serial_number: str = Field(
+        description="which specimen it is; in every result",
+        json_schema_extra={"allowed": f"1 to {SERIAL_NUMBER_MAX} plain ASCII characters"},
+    )
+    rate_hz: float = Field(
+        default=MAGNETOMETERS["lsm9ds1_magnetometer"].default_rate_hz,
+        description="samples a second, one of the part's rates",
+        json_schema_extra={"allowed": in_words(MAGNETOMETERS["lsm9ds1_magnetometer"].rates_hz)},
+    )
+    range_gauss: float = Field(
+        default=MAGNETOMETERS["lsm9ds1_magnetometer"].ranges_gauss[0],
+        description="full scale, one of the part's ranges; 1 gauss is 100 µT, twice the Earth's field",
+        json_schema_extra={"unit": "gauss", "allowed": in_words(MAGNETOMETERS["lsm9ds1_magnetometer"].ranges_gauss)},
+    )
+    mounting: MountingSection = Field(default=MountingSection(), description="how it sits on the flange")
+
+    @field_validator("serial_number")
+    @classmethod
+    def as_any_other(cls, value: str) -> str:
+        """Of the same kind as a gyroscope's."""
+        return checked_serial_number(value)
+
+    @field_validator("rate_hz")
+    @classmethod
+    def a_rate_of_the_part(cls, value: float, info: ValidationInfo) -> float:
+        """Never silently another one."""
+        part = MAGNETOMETERS.get(info.data.get("part", ""))
+        return value if part is None else nearest_rate(value, part.rates_hz, in_words(part.rates_hz))
+
+    @field_validator("range_gauss")
+    @classmethod
+    def a_range_of_the_part(cls, value: float, info: ValidationInfo) -> float:
+        """As the rate."""
+        part = MAGNETOMETERS.get(info.data.get("part", ""))
+        return value if part is None else one_of(value, part.ranges_gauss)
