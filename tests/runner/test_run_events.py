@@ -101,7 +101,8 @@ def test_every_step_of_the_plan_starts_goes_on_and_finishes(events: list[RunEven
             begun, *within, ended = (event for event in steps if event.number == number)
             assert begun == StepStarted(number, len(plan.steps), step)
             assert isinstance(ended, StepFinished) and ended.step == step
-            assert ended.took_s == pytest.approx(step.duration_s, abs=1.0)
+            # By the arm's clock, which goes on while a busy computer does not look.
+            assert step.duration_s - 1.0 < ended.took_s < step.duration_s + 10.0
             assert within and all(isinstance(event, Progress) and event.step == step for event in within)
         progress = [event for event in steps if isinstance(event, Progress)]
         for one, other in pairwise(progress):
