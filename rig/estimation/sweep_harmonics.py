@@ -67,14 +67,25 @@ def first_harmonic(
     coefficients = (inverse @ m) / size[:, None]
     residuals = m - columns @ coefficients
     scatter = residuals.T @ residuals / (count - np.linalg.matrix_rank(columns / size, rtol=1e-9))
-    factor = np.sqrt([coloured(residuals[:, axis]) for axis in range(3)])
     gain = inverse[:3] / size[:3, None]
     return FirstHarmonic(
         harmonic_m_s2=coefficients[:3],
-        covariance_m2_s4=np.kron(gain @ gain.T, scatter * np.outer(factor, factor)),
+        covariance_m2_s4=np.kron(gain @ gain.T, _left_of_mean(residuals, scatter, coloured)),
         speed_rad_s=mean_speed,
         noise_m_s2=np.sqrt(np.diag(scatter)),
     )
+
+
+def _left_of_mean(residuals: Array, scatter: Array, coloured: Callable[[Array], float]) -> Array:
+    """(3, 3) the scatter of residuals (n, 3) as far as it does not average out better or worse than white noise.
+
+    Told apart along its own directions: a vibration is one of them and averages out nearly whole, the noise across it
+    does not. Along x, y, z both are mixed, and the vibration's correlation would be taken for that of what is left.
+    """
+    spread, directions = np.linalg.eigh(scatter)
+    along = residuals @ directions
+    left = spread * np.array([coloured(along[:, k]) for k in range(3)])
+    return np.asarray((directions * left) @ directions.T, dtype=np.float64)
 
 
 def _mean_speed(time_s: Array, angle_rad: Array) -> float:
