@@ -5,7 +5,8 @@ known from the joint's own speed: centripetal acceleration by ω² less the squa
 angular acceleration α, and gravity by what the joint turns more while the filter lags. All of it is taken out in one
 regression, so it neither turns the result nor counts as noise. So are the second and the third harmonic, which an
 angle that errs and a sensor that is not linear make. A speed that changes only once to four times in a turn cannot be
-told from gravity; what it does stays.
+told from gravity; what it does stays. An arm that also swings at a frequency of its own, of which its encoders see
+nothing, shows as a line in what is left; it is taken out as well, for a turn does not end where such a swing does.
 """
 
 from collections.abc import Callable
@@ -22,6 +23,9 @@ WHOLE_TURN = 0.05  # of a turn, that the samples may miss or exceed
 WAVES = 3  # harmonics of the angle; only the first is wanted
 VIBRATION_WAVES = 100  # in a turn: 17 Hz at 60°/s
 MIN_SAMPLES = 50
+EMPTY = 1e-9  # an arm without vibration leaves columns empty
+LINE = 0.1  # of what is left, that a line must make up to be one; of 600 white samples the highest has 0.03
+PADDED = 16  # finer than a turn's own frequencies
 
 
 @dataclass(frozen=True, slots=True)
@@ -61,19 +65,44 @@ def first_harmonic(
     check_finite(time=t, readings=m, angle=angle, speed=speed)
     mean_speed = _mean_speed(t, angle)
     columns = np.hstack([_waves(angle, WAVES), _of_vibration(t, angle, speed, mean_speed)])
+    inverse, residuals = _regression(columns, m)
+    swinging = np.hstack([columns, _line(t, residuals)])
+    without = _regression(swinging, m)
+    if np.sum(without[1] ** 2) < (1 - LINE) * np.sum(residuals**2):
+        columns, (inverse, residuals) = swinging, without
     size = np.linalg.norm(columns, axis=0)
-    size = np.where(size > 0, size, 1.0)
-    inverse = np.linalg.pinv(columns / size, rcond=1e-9)  # an arm without vibration leaves columns empty
-    coefficients = (inverse @ m) / size[:, None]
-    residuals = m - columns @ coefficients
-    scatter = residuals.T @ residuals / (count - np.linalg.matrix_rank(columns / size, rtol=1e-9))
-    gain = inverse[:3] / size[:3, None]
+    unknown = np.linalg.matrix_rank(columns / np.where(size > 0, size, 1.0), rtol=EMPTY)
+    scatter = residuals.T @ residuals / (count - unknown)
+    gain: Array = inverse[:3]
+    left = _left_of_mean(residuals, scatter, coloured)
     return FirstHarmonic(
-        harmonic_m_s2=coefficients[:3],
-        covariance_m2_s4=np.kron(gain @ gain.T, _left_of_mean(residuals, scatter, coloured)),
+        harmonic_m_s2=gain @ m,
+        covariance_m2_s4=np.asarray(np.kron(gain @ gain.T, left), dtype=np.float64),
         speed_rad_s=mean_speed,
         noise_m_s2=np.sqrt(np.diag(scatter)),
     )
+
+
+def _regression(columns: Array, readings: Array) -> tuple[Array, Array]:
+    """(p, n) that takes readings (n, 3) to the coefficients of `columns` (n, p), and what these leave, (n, 3)."""
+    size = np.linalg.norm(columns, axis=0)
+    size = np.where(size > 0, size, 1.0)
+    inverse = np.linalg.pinv(columns / size, rcond=EMPTY) / size[:, None]
+    return inverse, readings - columns @ (inverse @ readings)
+
+
+def _line(time_s: Array, residuals: Array) -> Array:
+    """(n, 2) cosine and sine of the frequency that is strongest in residuals (n, 3), at even times (n,)."""
+    count = len(residuals)
+    power = np.sum(np.abs(np.fft.rfft(residuals * np.hanning(count)[:, None], PADDED * count, axis=0)) ** 2, axis=1)
+    power[: PADDED * (WAVES + 1)] = 0.0  # slower ones are waves that are wanted, or drift
+    top = int(np.clip(np.argmax(power), 1, len(power) - 2))
+    before, here, after = np.log(power[top - 1 : top + 2] + np.finfo(np.float64).tiny)
+    bend = before - 2 * here + after
+    peak = top + (0.5 * (before - after) / bend if bend < 0 else 0.0)
+    step_s = (time_s[-1] - time_s[0]) / (count - 1)
+    phase = 2 * np.pi * peak / (PADDED * count * step_s) * (time_s - time_s[0])
+    return np.column_stack([np.cos(phase), np.sin(phase)])
 
 
 def _left_of_mean(residuals: Array, scatter: Array, coloured: Callable[[Array], float]) -> Array:
