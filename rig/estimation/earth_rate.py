@@ -19,7 +19,6 @@ Whether the Earth was seen is for the readings to say: what was found must be la
 what the bias did from one rest to the next, and it must be as large as the Earth's rate is.
 """
 
-from collections.abc import Callable
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -28,9 +27,9 @@ from rig.errors import Fault
 from rig.estimation import refusals
 from rig.estimation.arrays import Array
 from rig.estimation.bias_process import expected_bias_process
-from rig.estimation.common_errors import CommonErrors, solve_with_common_errors
+from rig.estimation.common_errors import CommonErrors
 from rig.estimation.earth import EARTH_RATE_RAD_S
-from rig.estimation.explained import Seen
+from rig.estimation.explained import Seen, solver
 from rig.estimation.nonlinearity import curvature
 from rig.estimation.vector_model import MAX_CONDITION, VectorSolution, design_matrix, of_the_speed
 
@@ -174,7 +173,7 @@ def _fit(seen: Seen, nominal_mounting: Array, directions: Array, gravity: Array 
         bent = [curvature(matrix, seen.rates_rad_s)] if several else []
         return np.concatenate([*bent, turned @ matrix.T])
 
-    solve = _solver(seen, nominal_mounting, gravity, timed, effects)
+    solve = solver(seen, nominal_mounting, gravity, timed, effects)
     solution, errors = solve(None)
     own = seen.variances_rad2_s2 + of_the_speed(seen.rates_rad_s, timed, solution.matrix) ** 2
     design = design_matrix(seen.rates_rad_s, gravity)
@@ -182,24 +181,6 @@ def _fit(seen: Seen, nominal_mounting: Array, directions: Array, gravity: Array 
     shared = bias.covariance(seen.windows_s)
     solution, errors = solve(shared)
     return _Fit(solution, errors, own + np.diag(shared)[:, None])
-
-
-def _solver(
-    seen: Seen, nominal_mounting: Array, gravity: Array | None, timed: Array, effects: Callable[[Array], Array]
-) -> Callable[[Array | None], tuple[VectorSolution, CommonErrors]]:
-    def solve(shared: Array | None) -> tuple[VectorSolution, CommonErrors]:
-        return solve_with_common_errors(
-            seen.means_rad_s,
-            seen.rates_rad_s,
-            seen.variances_rad2_s2,
-            effects,
-            speed_std_rad_s=timed,
-            gravity_m_s2=gravity,
-            nominal_mounting=nominal_mounting,
-            shared_covariance_rad2_s2=shared,
-        )
-
-    return solve
 
 
 def _of_the_earth(fit: _Fit, directions: int) -> tuple[Array, Array]:

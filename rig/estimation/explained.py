@@ -6,6 +6,7 @@ the sensor's axes from those between the arm's, sweeps at several speeds how non
 assumed: what sweeps and rests do not tell apart stays out of the model and belongs into the uncertainty.
 """
 
+from collections.abc import Callable
 from dataclasses import dataclass
 
 import numpy as np
@@ -87,6 +88,33 @@ def explain(seen: Seen, nominal_mounting: Array) -> Explained:
     return _explain(seen, nominal_mounting, None)
 
 
+def solver(
+    seen: Seen,
+    nominal_mounting: Array,
+    gravity_m_s2: Array | None,
+    speed_std_rad_s: Array,
+    effects: Callable[[Array], Array],
+) -> Callable[[Array | None], tuple[VectorSolution, CommonErrors]]:
+    """The vector model of what was seen, as a function of the covariance (N, N) its means share, if any.
+
+    `effects` are those of `solve_with_common_errors`, `gravity_m_s2` is None where no sensitivity to it is to be found.
+    """
+
+    def solve(shared: Array | None) -> tuple[VectorSolution, CommonErrors]:
+        return solve_with_common_errors(
+            seen.means_rad_s,
+            seen.rates_rad_s,
+            seen.variances_rad2_s2,
+            effects,
+            speed_std_rad_s=speed_std_rad_s,
+            gravity_m_s2=gravity_m_s2,
+            nominal_mounting=nominal_mounting,
+            shared_covariance_rad2_s2=shared,
+        )
+
+    return solve
+
+
 def _explain(seen: Seen, nominal_mounting: Array, gravity_m_s2: Array | None) -> Explained:
     several = len(seen.speeds_rad_s) > 1
     no_errors = np.zeros((0, *seen.means_rad_s.shape))
@@ -96,18 +124,7 @@ def _explain(seen: Seen, nominal_mounting: Array, gravity_m_s2: Array | None) ->
         """(P, N, 3) on the readings, of one standard deviation each."""
         return np.concatenate([axis_errors @ matrix.T, curvature(matrix, seen.rates_rad_s) if several else no_errors])
 
-    def solve(shared: Array | None) -> tuple[VectorSolution, CommonErrors]:
-        return solve_with_common_errors(
-            seen.means_rad_s,
-            seen.rates_rad_s,
-            seen.variances_rad2_s2,
-            effects,
-            speed_std_rad_s=seen.speed_std_rad_s,
-            gravity_m_s2=gravity_m_s2,
-            nominal_mounting=nominal_mounting,
-            shared_covariance_rad2_s2=shared,
-        )
-
+    solve = solver(seen, nominal_mounting, gravity_m_s2, seen.speed_std_rad_s, effects)
     steady, errors = solve(None)
     of_the_speeds = of_the_speed(seen.rates_rad_s, seen.speed_std_rad_s, steady.matrix) ** 2
     bias = expected_bias_process(

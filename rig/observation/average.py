@@ -9,6 +9,7 @@ from numpy.typing import NDArray
 from rig.data.run_file import RecordedSensor
 from rig.estimation.arrays import Array
 from rig.observation.colour import noise_left, widening
+from rig.observation.tapered import flank_s, noise_at_zero, weights
 from rig.observation.timebase import ArmMotion, TimeBase, estimate_time_base
 from rig.observation.windows import Window
 
@@ -101,6 +102,23 @@ def average(
     """The readings inside: see `mean_of`."""
     count = stream.sensor.sensitivity_rad_s_per_count
     found = mean_of(stream.readings_rad_s[inside], count, passing, covered, as_before=as_before)
+    return _averaged(stream, inside, window, found)
+
+
+def average_at_rest(stream: Stream, inside: slice, window: Window) -> Average:
+    """The readings inside, of an arm that stands and vibrates: see `tapered_mean`.
+
+    It is said to last from where the weights have come half-way to where they have gone half-way: so long an even mean
+    is as far from another one, for a bias that walks, to a thousandth.
+    """
+    found = tapered_mean(
+        stream.readings_rad_s[inside], stream.time_s[inside], window, stream.sensor.sensitivity_rad_s_per_count
+    )
+    half_s = flank_s(window.end_s - window.start_s) / 2
+    return _averaged(stream, inside, Window(window.start_s + half_s, window.end_s - half_s), found)
+
+
+def _averaged(stream: Stream, inside: slice, window: Window, found: Mean) -> Average:
     return Average(
         mean_rad_s=found.mean,
         variance_rad2_s2=found.variance,
@@ -136,6 +154,22 @@ def mean_of(readings: Array, count: float, passing: Array, covered: NDArray[np.b
         variance=variance * factor * of_the_mean + rounding_left(variance, count),
         noise=np.sqrt(variance),
         samples=len(known),
+    )
+
+
+def tapered_mean(readings: Array, time_s: Array, window: Window, count: float) -> Mean:
+    """Of readings (n, 3) in steps of `count`, at times (n,): those in the middle of the window count most.
+
+    The variance is that of the noise without the vibration, which the weights leave nothing of.
+    """
+    shares = weights(time_s, window.start_s, window.end_s)
+    variance = np.maximum(np.var(readings, axis=0, ddof=1), count**2 / 12)
+    at_zero = np.minimum(noise_at_zero(readings), variance)
+    return Mean(
+        mean=shares @ readings,
+        variance=at_zero * float(shares @ shares) + rounding_left(variance, count),
+        noise=np.sqrt(variance),
+        samples=len(readings),
     )
 
 

@@ -18,6 +18,9 @@ from rig.config.attitude_sets import EIGHTEEN
 from rig.estimation.arrays import Array
 from rig.estimation.earth_rate import DEG_H
 from rig.estimation.explained import Seen
+from rig.observation.average import tapered_mean
+from rig.observation.tapered import flank_s
+from rig.observation.windows import Window
 from rig.study.rate_table import GYRO_BIAS_RAD_S, GYRO_MATRIX
 from support.arm_attitudes import crooked_arm, joints_rad
 from support.arm_sweeps import joints_at, planned, signed_speed
@@ -29,6 +32,7 @@ HOME_RAD = np.radians([0.0, -90.0, 90.0, -90.0, -90.0, 0.0])
 POINTS = 180  # of a turn
 PAUSE_S = 2.0
 REST_S = 3.0
+VIBRATION_HZ, SAMPLES_HZ = 14.0, 250.0  # of configs/kvh1775_earth.yaml
 ARM_RAD = 6e-4  # half of what `uncertainty.axis_deg` allows, as a standard deviation
 
 
@@ -57,7 +61,7 @@ class Session:
     """What is done: sweeps about so many axes, with rests, then dwells of `dwell_s` (none for 0).
 
     The arm: geometry and encoders off by `arm_rad`, hysteresis between both directions, turns timed to `timing_s` at
-    either end, axes that lean by `leaning_rad` for each sweep anew.
+    either end, axes that lean by `leaning_rad` for each sweep anew, a vibration about each of the flange's axes, RMS.
     """
 
     part: Part = KVH1775
@@ -67,6 +71,7 @@ class Session:
     hysteresis_rad: float = 1e-4
     timing_s: float = 2e-5
     leaning_rad: float = 5e-5
+    vibration_rad_s: float = 0.0
     g_sensitivity_rad_s_g: tuple[float, ...] = (0.0,) * 9
     earth_rad_s: float = EARTH_RAD_S
     wrists_deg: tuple[tuple[float, float, float], ...] = EIGHTEEN
@@ -122,8 +127,12 @@ def recorded(session: Session, seed: int) -> tuple[Seen, Truth]:
     means = rates @ GYRO_MATRIX.T + pulled + GYRO_BIAS_RAD_S + wandered
     variances = np.repeat((session.part.density**2 / lengths)[:, None], 3, axis=1)
     std = ARM_RAD * np.array([1.0 if name.startswith(("twist", "zero")) else WAVE_SHARE for name in AXIS_ERRORS])
+    if session.vibration_rad_s:
+        noise, variances, windows = _vibrating(session, windows, turns, rng)
+    else:
+        noise = np.sqrt(variances) * rng.normal(size=means.shape)
     seen = Seen(
-        means_rad_s=means + np.sqrt(variances) * rng.normal(size=means.shape),
+        means_rad_s=means + noise,
         variances_rad2_s2=variances,
         turns_rad_s=np.array([each.turn_rad_s for each in stretches]),
         earth_rate_rad_s=np.zeros(3),
@@ -172,6 +181,27 @@ def _rests(session: Session, poses: Callable[[Array], Array], rng: np.random.Gen
         stands = angles + np.r_[np.zeros(3), rng.choice([-0.5, 0.5], 3)] * session.hysteresis_rad
         attitude, told = (each[0, :3, :3].T for each in (poses(stands[None]), flange_pose(angles[None])))
         yield Stretch(duration, np.zeros(3), attitude, told, np.zeros(3), np.zeros((len(AXIS_ERRORS), 3)), None)
+
+
+def _vibrating(session: Session, windows_s: Array, turns: int, rng: np.random.Generator) -> tuple[Array, Array, Array]:
+    """(N, 3) what noise and vibration leave in each average, by whole turns evenly, else as the rig averages rests; the
+    variances (N, 3) of that, and the windows (N, 2) as the rig tells them."""
+    noises, variances, windows = [], [], windows_s.copy()
+    for place, (start, end) in enumerate(windows_s):
+        edges = np.linspace(start, end, round((end - start) * SAMPLES_HZ) + 1)
+        turn = 2 * np.pi * VIBRATION_HZ
+        swing = np.sqrt(2) * session.vibration_rad_s / turn * np.sin(turn * edges[:, None] + rng.uniform(0, 7, 3))
+        sampled = session.part.density * np.sqrt(SAMPLES_HZ) * rng.normal(size=(len(edges) - 1, 3))
+        readings = np.diff(swing, axis=0) * SAMPLES_HZ + sampled
+        if place < turns:
+            noises.append(readings.mean(axis=0))
+            variances.append(np.full(3, session.part.density**2 / (end - start)))
+        else:
+            found = tapered_mean(readings, (edges[1:] + edges[:-1]) / 2, Window(start, end), 1e-12)
+            noises.append(found.mean)
+            variances.append(found.variance)
+            windows[place] += np.array([0.5, -0.5]) * flank_s(end - start)
+    return np.array(noises), np.array(variances), windows
 
 
 def _wandering(part: Part, windows_s: Array, rng: np.random.Generator) -> tuple[Array, Array]:
