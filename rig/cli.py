@@ -127,6 +127,12 @@ def _parser() -> argparse.ArgumentParser:
         "--format", choices=FORMATS, required=True, help="whose; docs/how-to/export.md says what each holds"
     )
     export.add_argument("--out", type=Path, metavar="DIR", help="where to (default: export/FORMAT in the run folder)")
+    export.add_argument(
+        "--at-temperature",
+        nargs=2,
+        metavar=("CELSIUS", "DRIFT_RUN"),
+        help="biases as they are at that temperature, by the slopes a run of bias_drift has found",
+    )
     study = add("study", _study, "Monte-Carlo studies of the papers' figures and tables; without a name, list them")
     study.add_argument("name", nargs="?", metavar="NAME")
     study.add_argument("--out", type=Path, default=Path("studies"), metavar="DIR", help="default: studies")
@@ -272,7 +278,7 @@ def _report(options: argparse.Namespace) -> int:
 def _export(options: argparse.Namespace) -> int:
     from rig.commands.export import export
 
-    return export(options.run, options.format, options.out)
+    return export(options.run, options.format, options.out, options.at_temperature)
 
 
 def _study(options: argparse.Namespace) -> int:

@@ -2,20 +2,24 @@
 
 from pathlib import Path
 
-from rig.data.result_file import passed_result
+from rig.data.result_file import ResultDocument, passed_result, read_result
 from rig.errors import Refused
 from rig.observation.observed_run import observe_runs
 from rig.plans.recorded import open_run
 from rig.report.exports.formats import OF_READINGS, texts_of_calibrations, writer_of_readings
+from rig.report.exports.temperature import at_temperature
 from rig.station.plain_text import say
 
 
-def export(run: Path, name: str, out: Path | None) -> int:
+def export(run: Path, name: str, out: Path | None, moved: tuple[str, str] | None = None) -> int:
     """Readings of the first movement, or the calibrations of a run that passed, into `out`.
 
-    Returns 0. Raises Refused `report_folder`, of readings as `open_run` and `observe_runs`, of calibrations as
-    `passed_result` and `exported` do, `missing_extra`.
+    `moved`: a temperature in °C, and the run of `bias_drift` that tells how to get there.
+    Returns 0. Raises Refused `report_folder`, `bad_option`, of readings as `open_run` and `observe_runs`, of
+    calibrations as `passed_result`, `at_temperature` and `exported` do, `missing_extra`.
     """
+    if moved is not None and name in OF_READINGS:
+        raise Refused("bad_option", f"--at-temperature is for calibrations, and {name} holds readings", "Leave it out")
     folder = out or (run if run.is_dir() else run.parent) / "export" / name
     try:
         if name in OF_READINGS:
@@ -25,7 +29,7 @@ def export(run: Path, name: str, out: Path | None) -> int:
             folder.mkdir(parents=True, exist_ok=True)
             written = writer_of_readings(name)(recordings, folder)
         else:
-            texts = texts_of_calibrations(name)(passed_result(run))
+            texts = texts_of_calibrations(name)(_calibration(run, moved))
             folder.mkdir(parents=True, exist_ok=True)
             written = [folder / file for file in texts]
             for path, text in zip(written, texts.values(), strict=True):
@@ -35,3 +39,16 @@ def export(run: Path, name: str, out: Path | None) -> int:
     for path in written:
         say(str(path))
     return 0
+
+
+def _calibration(run: Path, moved: tuple[str, str] | None) -> ResultDocument:
+    result = passed_result(run)
+    if moved is None:
+        return result
+    temperature, drift = moved
+    try:
+        temperature_c = float(temperature)
+    except ValueError as error:
+        remedy = "Give it as in --at-temperature 31.5 DRIFT_RUN"
+        raise Refused("bad_option", f"--at-temperature {temperature} is no temperature", remedy) from error
+    return at_temperature(result, read_result(Path(drift)), temperature_c)

@@ -1,0 +1,76 @@
+"""A calibration's biases at another temperature, by the slopes that a run of `bias_drift` has found. Pure.
+
+A slope holds in the range it was seen in, and nowhere else: neither the calibration's temperature nor the one that is
+asked for may lie outside.
+"""
+
+from typing import Literal
+
+import numpy as np
+
+from rig.data.drift_entries import SlopeEntry
+from rig.data.result_file import ResultDocument
+from rig.data.result_types import Vector3
+from rig.errors import Refused
+from rig.estimation.arrays import Array
+
+
+def at_temperature(result: ResultDocument, drift: ResultDocument, temperature_c: float) -> ResultDocument:
+    """`result` with the biases of the sensors it calibrated as they are at that temperature, by the slopes in `drift`.
+
+    Raises Refused `another_sensor`, `temperature_slope_unknown`, `temperature_outside`.
+    """
+    _check_same(result, drift)
+    sensors, accelerometers = dict(result.sensors), dict(result.accelerometers)
+    for name, sensor in result.sensors.items():
+        if sensor.role == "calibrate":
+            change = _change(drift, name, "rate", sensor.temperature_c, temperature_c)
+            moved = _vector(np.array(sensor.bias_rad_s) - change)  # b is added to a reading, which the slope is of
+            sensors[name] = sensor.model_copy(update={"bias_rad_s": moved, "temperature_c": temperature_c})
+    for name, each in result.accelerometers.items():
+        change = _change(drift, name, "acceleration", each.temperature_c, temperature_c)
+        moved = _vector(np.array(each.bias_m_s2) + change)
+        accelerometers[name] = each.model_copy(update={"bias_m_s2": moved, "temperature_c": temperature_c})
+    return result.model_copy(update={"sensors": sensors, "accelerometers": accelerometers})
+
+
+def _change(
+    drift: ResultDocument, name: str, quantity: Literal["rate", "acceleration"], from_c: float, to_c: float
+) -> Array:
+    """(3,) by which the bias of the reading changes."""
+    found = drift.bias_drift.get(name, {}).get(quantity)
+    slope = None if found is None else found.over_temperature
+    if not isinstance(slope, SlopeEntry):
+        why = "it did not watch that bias" if slope is None else slope.error
+        raise Refused(
+            "temperature_slope_unknown",
+            f"the run of bias_drift tells no slope of {name}'s {quantity} over temperature: {why}",
+            "Give a run of bias_drift in which the sensor warmed and cooled, or export without --at-temperature",
+        )
+    low, high = slope.range_c
+    for what, temperature_c in (("the calibration was made at", from_c), ("its bias is wanted at", to_c)):
+        if not low <= temperature_c <= high:
+            raise Refused(
+                "temperature_outside",
+                f"{what} {temperature_c:.1f} °C, and the slope of {name}'s {quantity} was seen "
+                f"from {low:.1f} to {high:.1f} °C only",
+                "Calibrate at the temperature at which it is used, or watch the bias over a wider range",
+            )
+    return np.array(slope.slope) * (to_c - from_c)
+
+
+def _check_same(result: ResultDocument, drift: ResultDocument) -> None:
+    """Raises Refused `another_sensor`."""
+    watched = drift.provenance.sensor_serial_numbers
+    for name, serial_number in result.provenance.sensor_serial_numbers.items():
+        if name in watched and watched[name] != serial_number:
+            raise Refused(
+                "another_sensor",
+                f"{name} is {serial_number}, and the run of bias_drift watched {watched[name]}",
+                "Give a run of bias_drift of the same sensor",
+            )
+
+
+def _vector(values: Array) -> Vector3:
+    x, y, z = values.tolist()
+    return x, y, z
