@@ -51,6 +51,9 @@ figures: $(VENV)/dev.installed
 	  $(BIN)/rig run configs/$${experiment}_adis16465.yaml --out build/$$experiment || exit 1; \
 	  for when in before after; do \
 	    cp build/$$experiment/verification_gyro_$$when.png docs/figures/$$experiment-$$when.png; done; done
+	for run in earth:earth_rate drift:bias_drift; do rm -rf build/kvh1775_$${run%%:*}; \
+	  $(BIN)/rig run configs/kvh1775_$${run%%:*}.yaml --out build/kvh1775_$${run%%:*} || exit 1; \
+	  cp build/kvh1775_$${run%%:*}/$${run##*:}_kvh.png docs/figures/kvh1775-$${run%%:*}.png; done
 
 firmware: $(VENV)/demo.installed
 	$(MAKE) -C firmware_host/firmware

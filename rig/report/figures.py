@@ -78,10 +78,10 @@ def draw_comparison(figure: "Figure", comparison: Comparison, sensor: str, refer
     since_s = comparison.time_s - comparison.time_s[0]
     error = comparison.reading_rad_s - comparison.reference_rad_s
     for i, (readings, difference) in enumerate(rows):
-        readings.plot(*_envelope(since_s, comparison.reading_rad_s[:, i]), lw=0.7, color="C0", label=sensor)
-        readings.plot(*_envelope(since_s, comparison.reference_rad_s[:, i]), lw=0.7, color="C1", label=reference)
+        readings.plot(*envelope(since_s, comparison.reading_rad_s[:, i]), lw=0.7, color="C0", label=sensor)
+        readings.plot(*envelope(since_s, comparison.reference_rad_s[:, i]), lw=0.7, color="C1", label=reference)
         readings.set_ylabel(f"{'xyz'[i]}   rad/s")
-        difference.plot(*_envelope(since_s, error[:, i]), lw=0.5, color="C3")
+        difference.plot(*envelope(since_s, error[:, i]), lw=0.5, color="C3")
         difference.set_title(f"RMS {comparison.movement.rms_rad_s[i]:.4f} rad/s", loc="right", fontsize=9)
     reach = 1.05 * float(np.abs(error).max())
     rows[0, 1].set_ylim(-reach, reach)
@@ -92,7 +92,7 @@ def draw_comparison(figure: "Figure", comparison: Comparison, sensor: str, refer
         axes.set_xlabel("time s")
 
 
-def _envelope(time_s: Array, values: Array) -> tuple[Array, Array]:
+def envelope(time_s: Array, values: Array) -> tuple[Array, Array]:
     """The curve (n,) by its lowest and highest value in each column of the panel: it looks the same, and is light."""
     if len(values) <= 2 * COLUMNS:
         return time_s, values

@@ -15,6 +15,7 @@ from rig.station.events import DocumentWritten, RunEvent
 WRITERS: Sequence[str] = (
     "rig.report.figures:write_figures",
     "rig.report.accelerometer_figures:write_accelerometer_figures",
+    "rig.report.earth_rate_figures:write_earth_rate_figures",
     "rig.report.drift_figures:write_drift_figures",
     "rig.report.header:write_header",
     "rig.report.certificate.writer:write_certificate",

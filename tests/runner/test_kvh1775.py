@@ -11,6 +11,7 @@ import yaml
 from rig.analysis.calibration import observe_recordings
 from rig.config.load import ConfigurationRefused, load
 from rig.data.run_file import read_run
+from rig.estimation.earth import EARTH_RATE_RAD_S
 from rig.estimation.earth_rate import DEG_H
 from support.commands import rig
 from support.ideal import ideal_document
@@ -118,25 +119,48 @@ def test_its_accelerometers_are_calibrated_where_those_of_the_board_are(tmp_path
 @pytest.mark.slow
 @pytest.mark.proof
 @pytest.mark.thorough
-@pytest.mark.timeout(900)
-def test_it_finds_the_earths_rate(tmp_path: Path) -> None:
-    """TRIAX, section III-A, which is 0.36 °/h off."""
-    document = yaml.safe_load(load(CONFIGS / "kvh1775_earth.yaml").text)
+@pytest.mark.timeout(3600)
+def test_it_finds_the_earths_rate_beside_what_the_paper_found(tmp_path: Path) -> None:
+    """TRIAX, section III-A, which is 0.36 °/h off: whole runs on an arm that vibrates, at another heading each."""
+    off, over, parameters = [], [], []
+    for seed in range(1, 7):
+        heading_deg = 47 * seed % 360
+        world = {"world": {"seed": seed, "site": {"heading_deg": heading_deg}}}
+        result = earth_run(tmp_path / str(seed), world)
+        earth = result["sensors"]["kvh"]["earth_rate"]
+        off.append((earth["norm_rad_s"] - EARTH_RATE_RAD_S) / DEG_H)
+        over.append((earth["norm_rad_s"] - EARTH_RATE_RAD_S) / earth["norm_std_rad_s"])
+        turned = np.angle(np.exp(1j * (earth["heading_rad"] - np.radians(heading_deg))))
+        assert abs(turned) < 4 * earth["heading_std_rad"] + np.radians(0.1)
+        assert abs(earth["latitude_rad"] - np.radians(38.777888)) < 4 * earth["latitude_std_rad"] + np.radians(0.1)
+        stated, std = sensor(result)
+        truth = [0.99959967, 0.99869272, 1.00028956, 2.634478e-6, -9.332663e-7, 1.35263e-7]
+        beside = result["accelerometers"]["kvh"]
+        bent = np.subtract(beside["second_order_s2_m"], [9.72e-6, -9.478e-5, -1.764e-5])
+        parameters += [*(stated - truth) / std, *bent / beside["second_order_std_s2_m"]]
+        print(f"seed {seed}: {off[-1]:+.3f} deg/h, {over[-1]:+.2f} σ")
+    rms, ratio = np.sqrt(np.mean(np.square(off))), np.sqrt(np.mean(np.square(over)))
+    print(f"norm {rms:.3f} deg/h RMS, over σ {ratio:.2f}; F, b and φ at most {np.abs(parameters).max():.1f} σ off")
+    assert rms < 0.1
+    assert ratio < 1.8, "six of them: within four of its own deviations of 1"
+    assert np.mean(np.abs(parameters) < 3) > 0.95 and np.abs(parameters).max() < 5, "54 of them"
+
+
+def earth_run(folder: Path, changes: dict[str, Any]) -> dict[str, Any]:
+    """The result of kvh1775_earth.yaml so changed, on an address of its own."""
+    folder.mkdir()
     host = fresh_host()
+    document = merge(yaml.safe_load(load(CONFIGS / "kvh1775_earth.yaml").text), changes)
     document["arm"]["host"] = host
     document["sensors"]["kvh"]["serial"]["port"] = f"socket://{host}:7331"
-    path = tmp_path / "config.yaml"
+    path = folder / "config.yaml"
     path.write_text(yaml.safe_dump(document), encoding="utf-8")
-    done = rig("run", path, "--out", tmp_path / "run", timeout_s=800)
+    done = rig("run", path, "--out", folder / "run", timeout_s=800)
     assert done.returncode == 0, done.stderr + done.stdout
     assert "Earth's rate found: 1" in done.stdout
-    result = json.loads((tmp_path / "run" / "result.json").read_text(encoding="utf-8"))
-    earth = result["sensors"]["kvh"]["earth_rate"]
-    assert abs(earth["norm_rad_s"] - 7.292115e-5) < 4 * earth["norm_std_rad_s"] < 4 * 0.3 * DEG_H
-    assert abs(earth["latitude_rad"] - np.radians(38.777888)) < 4 * earth["latitude_std_rad"] + np.radians(0.1)
-    stated, std = sensor(result)
-    truth = [0.99959967, 0.99869272, 1.00028956, 2.634478e-6, -9.332663e-7, 1.35263e-7]
-    assert (np.abs(stated - truth) < 4 * std).all()
+    assert (folder / "run" / "earth_rate_kvh.png").stat().st_size > 10_000
+    result: dict[str, Any] = json.loads((folder / "run" / "result.json").read_text(encoding="utf-8"))
+    return result
 
 
 @pytest.mark.slow

@@ -1,0 +1,78 @@
+"""A gyroscope that has found the Earth's rate, drawn as in TRIAX, Figs. 2 and 3: how it was turned, what is left."""
+
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from rig.analysis.calibration import SensorResult, found_earth_rate
+from rig.analysis.outcome import Outcome
+from rig.arm.kinematics import flange_attitude
+from rig.data.result_file import ResultDocument
+from rig.estimation.arrays import Array
+from rig.observation.observed_run import ObservedRun
+from rig.report.figures import envelope, save, style
+from rig.station.events import NotPlotted, Plotted, RunEvent
+
+if TYPE_CHECKING:
+    from matplotlib.figure import Figure
+
+RATE_HZ = 25.0  # at which TRIAX samples
+
+
+def write_earth_rate_figures(outcome: Outcome, document: ResultDocument, folder: Path) -> tuple[RunEvent, ...]:
+    """`earth_rate_<sensor>` of every sensor that has found it, as PNG and SVG; none without matplotlib."""
+    found = {name: result for name, result in outcome.results.items() if found_earth_rate(result.earth) is not None}
+    if not found:
+        return ()
+    try:
+        import matplotlib  # noqa: F401
+    except ImportError:
+        return (NotPlotted(),)
+    from matplotlib.figure import Figure
+
+    names = []
+    for sensor, result in found.items():
+        with style():
+            figure = Figure(figsize=(11.0, 4.6), layout="constrained")
+            draw_errors(figure, *errors(outcome.recordings[0], sensor, result))
+            figure.suptitle(f"{sensor}: rate of the flange, and error of the calibrated gyroscope, at {RATE_HZ:g} Hz")
+            save(figure, folder, f"earth_rate_{sensor}")
+        names.append(f"earth_rate_{sensor}")
+    return (Plotted(tuple(names)),)
+
+
+def errors(recording: ObservedRun, sensor: str, result: SensorResult) -> tuple[Array, Array, Array]:
+    """Times (n,), rates of the flange (n, 3), and calibrated readings less these and the Earth's rate (n, 3), rad/s.
+
+    Means over 1 / `RATE_HZ`, in the flange's frame, where the arm's states follow each other closely.
+    """
+    stream, motion, earth = recording.stream(sensor), recording.motion, found_earth_rate(result.earth)
+    assert result.explained is not None and earth is not None, "asked of a sensor that has found it"
+    solution = result.explained.solution
+    many = max(1, round(stream.sensor.rate_hz / RATE_HZ))
+    count = len(stream.time_s) // many * many
+    time_s = stream.time_s[:count].reshape(-1, many).mean(axis=1)
+    known = motion.covered(time_s)
+    turned, readings = (
+        values[:count].reshape(-1, many, 3).mean(axis=1)[known]
+        for values in (motion.rate(stream.time_s), stream.readings_rad_s)
+    )
+    felt = flange_attitude(motion.angles(time_s[known]), motion.kinematics) @ earth.rate_rad_s
+    found = (readings + solution.bias_rad_s) @ np.linalg.inv(solution.matrix).T
+    return time_s[known] - time_s[known][0], turned, found - turned - felt
+
+
+def draw_errors(figure: "Figure", time_s: Array, turned: Array, error: Array) -> None:
+    """Left as Fig. 2, right as Fig. 3, in °/s."""
+    left, right = figure.subplots(1, 2)
+    for i, axis in enumerate("xyz"):
+        left.plot(*envelope(time_s, np.degrees(turned[:, i])), lw=0.7, color=f"C{i}", label=axis)
+        std = np.degrees(error[:, i].std())
+        right.plot(
+            *envelope(time_s, np.degrees(error[:, i])), lw=0.5, alpha=0.8, color=f"C{i}", label=f"{axis}, σ {std:.4f}"
+        )
+    left.set(xlabel="time s", ylabel="°/s", title="rate of the flange in its own frame")
+    right.set(xlabel="time s", ylabel="°/s", title="corrected reading − rate of flange and Earth")
+    for panel in (left, right):
+        panel.legend(frameon=False, ncols=3, fontsize=8)
