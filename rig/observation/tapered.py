@@ -33,8 +33,9 @@ def flank_s(duration_s: float) -> float:
 def weights(time_s: Array, start_s: float, end_s: float) -> Array:
     """(n,) that add up to 1, of readings at times (n,) between start and end."""
     inside = np.clip(np.minimum(time_s - start_s, end_s - time_s) / flank_s(end_s - start_s), 0.0, 1.0)
-    window: Array = np.sin(np.pi / 2 * inside) ** 2
-    return window / window.sum()
+    window = np.sin(np.pi / 2 * inside) ** 2
+    shares: Array = window / np.sum(window)
+    return shares
 
 
 def noise_at_zero(readings: Array) -> Array:
@@ -44,7 +45,7 @@ def noise_at_zero(readings: Array) -> Array:
     """
     count = len(readings)
     phase = 2 * np.pi * (np.arange(count) + 0.5) / count
-    window = sum(size * np.cos(order * phase) for order, size in enumerate(BLACKMAN_HARRIS))
+    window: Array = np.cos(np.outer(phase, np.arange(len(BLACKMAN_HARRIS)))) @ np.array(BLACKMAN_HARRIS)
     shaped = window[:, None] * (readings - readings.mean(axis=0))
     powers = np.abs(np.fft.rfft(shaped, axis=0)[MAIN_LOBE : _highest(count)]) ** 2 / np.sum(window**2)
     found: Array = np.median(powers, axis=0) / np.log(2)
