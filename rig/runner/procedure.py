@@ -11,7 +11,6 @@ from dataclasses import dataclass
 from math import degrees, radians
 
 from rig.arm.clearance import clearance_problems
-from rig.arm.driver import Arm
 from rig.arm.kinematics import DenavitHartenberg
 from rig.arm.motion import Dwell, Motion, Plan, Rest, Step, Sweep, Transfer, travel
 from rig.arm.preflight import arm_problems, plan_problems, refuse, step_problems, way_to_home
@@ -32,6 +31,7 @@ from rig.plans.phase import Phase
 from rig.runner.acquisition import Acquisition
 from rig.runner.announcement import announcement
 from rig.runner.onboard import BoardCalibration
+from rig.runner.turner import Turner
 from rig.sensors.source import SampleSource
 from rig.station.events import (
     PhaseRecorded,
@@ -54,10 +54,11 @@ SAME_POSE_RAD = radians(1)  # what was announced and agreed to still holds
 class Devices:
     """What is connected.
 
-    `report` is the arm as it stood, `payload` what it carries; `sources` are where samples come from.
+    `turner` turns the sensors; `report` is how it stood, `payload` what it carries; `sources` are where samples come
+    from.
     """
 
-    arm: Arm
+    turner: Turner
     report: ArmReport
     payload: ArmSection
     sources: tuple[SampleSource, ...]
@@ -127,7 +128,7 @@ class Rig:
             self._agree()
         self._refuse_moved()
         x, y, z = (millimetres / 1000 for millimetres in payload.payload_centre_mm)
-        self.devices.arm.take_control(payload.payload_kg, (x, y, z))
+        self.devices.turner.take_control(payload.payload_kg, (x, y, z))
         self._motions = iter(self.plan.motions)
 
     def _agree(self) -> None:
@@ -137,7 +138,7 @@ class Rig:
 
     def _refuse_moved(self) -> None:
         """While the operator thought, somebody may have moved the arm: it would take another way than announced."""
-        moved_rad = max(map(abs, travel(self.plan.start_q_rad, self.devices.arm.latest.q_rad)))
+        moved_rad = max(map(abs, travel(self.plan.start_q_rad, self.devices.turner.latest.q_rad)))
         if moved_rad > SAME_POSE_RAD:
             raise Refused(
                 "arm_moved",
@@ -148,18 +149,18 @@ class Rig:
 
     def start_sampling(self) -> None:
         """Let every source stream; from here on every sample is recorded. Raises `Fault` for a silent sensor."""
-        sources, arm = self.devices.sources, self.devices.arm
+        sources, turner = self.devices.sources, self.devices.turner
         if self.along is not None:
             self.along.begin()
         for source in sources:
             source.start()
-        host_s, arm_s = time.monotonic(), arm.latest.time_s
+        host_s, turner_s = time.monotonic(), turner.latest.time_s
         while silent := self.devices.acquisition.silent():
             for source in sources:
-                source.check(arm.latest.time_s)
-            arm.check()
+                source.check(turner.latest.time_s)
+            turner.check()
             # By both clocks: this machine may be busy, and the controller's clock another's to run.
-            if min(time.monotonic() - host_s, arm.latest.time_s - arm_s) > FIRST_SAMPLE_TIMEOUT_S:
+            if min(time.monotonic() - host_s, turner.latest.time_s - turner_s) > FIRST_SAMPLE_TIMEOUT_S:
                 raise Fault(
                     "no_samples",
                     f"no sample from {', '.join(silent)} within {FIRST_SAMPLE_TIMEOUT_S:g} s of the start",
@@ -174,7 +175,7 @@ class Rig:
         """Bring the arm to where the next sweep starts, or home. Raises `unplanned_motion`."""
         self._refuse_unplanned(transfer)
         with self._step(transfer):
-            self.devices.arm.move(transfer, lambda: self._watch(transfer))
+            self.devices.turner.move(transfer, lambda: self._watch(transfer))
 
     def sweep(self, sweep: Sweep) -> None:
         """Turn one wrist through a whole revolution at constant speed and note when it began and ended.
@@ -187,7 +188,7 @@ class Rig:
             self.along.keep(sweep)
         with self._step(sweep, then=lambda: self._observe(sweep)):
             self.recording.note(SweepStarted(sweep))
-            self.devices.arm.move(sweep, lambda: self._watch(sweep))
+            self.devices.turner.move(sweep, lambda: self._watch(sweep))
             self.recording.note(SweepFinished(sweep))
 
     def _refuse_unplanned(self, motion: Motion) -> None:
@@ -209,7 +210,7 @@ class Rig:
         """Stand still: the readings here show the bias and the noise."""
         with self._step(rest):
             self.recording.note(RestStarted())
-            self.devices.arm.rest(rest.duration_s, lambda: self._watch(rest))
+            self.devices.turner.rest(rest.duration_s, lambda: self._watch(rest))
             self.recording.note(RestFinished())
 
     def dwell(self, dwell: Dwell) -> None:
@@ -221,17 +222,17 @@ class Rig:
                 raise _not_settled(dwell, settling.unsettled())
             self.recording.note(DwellStarted(dwell))
             with self.devices.acquisition.standing():
-                self.devices.arm.rest(dwell.duration_s, lambda: self._watch(dwell))
+                self.devices.turner.rest(dwell.duration_s, lambda: self._watch(dwell))
             self.recording.note(DwellFinished(dwell))
 
     def _wait(self, until: Callable[[], bool], at_most_s: float, watch: Callable[[], None] = lambda: None) -> bool:
         """Stand still until something is so; False when it was not within so much of the controller's time."""
-        arm = self.devices.arm
-        began_s = arm.latest.time_s
+        turner = self.devices.turner
+        began_s = turner.latest.time_s
         while not until():
-            if arm.latest.time_s - began_s > at_most_s:
+            if turner.latest.time_s - began_s > at_most_s:
                 return False
-            arm.rest(SETTLING_LOOK_S, watch)
+            turner.rest(SETTLING_LOOK_S, watch)
         return True
 
     def solve_on_board(self) -> None:
@@ -245,18 +246,18 @@ class Rig:
 
     def recorded(self) -> PhaseRecorded:
         """What was recorded and what was missed."""
-        return PhaseRecorded(self.devices.acquisition.samples(), self.devices.arm.missed_states)
+        return PhaseRecorded(self.devices.acquisition.samples(), self.devices.turner.missed_states)
 
     @contextmanager
     def _step(self, step: Step, then: Callable[[], None] = lambda: None) -> Iterator[None]:
         """One step from its first event to its last; what happens `then` belongs to it, but not to its time."""
         self._number += 1
         place = self._number, len(self.plan.steps), step
-        arm = self.devices.arm
-        self._step_started_s = arm.latest.time_s
+        turner = self.devices.turner
+        self._step_started_s = turner.latest.time_s
         self.recording.station.event(StepStarted(*place))
         yield
-        took_s = arm.latest.time_s - self._step_started_s
+        took_s = turner.latest.time_s - self._step_started_s
         then()
         self._done_s += step.duration_s
         self.recording.station.event(StepFinished(*place, took_s))
@@ -264,9 +265,9 @@ class Rig:
     def _watch(self, step: Step) -> None:
         """Called many times a second while the arm is busy: look after board and recording, tell the operator."""
         for source in self.devices.sources:
-            source.check(self.devices.arm.latest.time_s)
+            source.check(self.devices.turner.latest.time_s)
         self.recording.check()
-        state = self.devices.arm.latest
+        state = self.devices.turner.latest
         within_s = min(state.time_s - self._step_started_s, step.duration_s)
         # A script may make steps of its own, one that takes no time too.
         fraction = within_s / step.duration_s if step.duration_s > 0 else 1.0
