@@ -1,5 +1,6 @@
 """The simulated laboratory without its sockets: arm, board and sensors on one clock, deterministic."""
 
+from collections.abc import Sequence
 from functools import partial
 from math import radians
 from random import Random
@@ -15,6 +16,7 @@ from rig.world.board.sensor_truth import SensorTruth
 from rig.world.kvh1775.mounting import mounts
 from rig.world.magnetic_field import magnetic_field_of
 from rig.world.site import site_of
+from rig.world.ur10e.flange_motion import Felt
 from rig.world.ur10e.joint_motion import Motion
 from rig.world.ur10e.ripple import ripple
 from rig.world.ur10e.robot import Identity, Robot
@@ -99,8 +101,16 @@ class Laboratory:
 
     def step(self) -> None:
         """One tick of everything. Raises BoardError when the firmware broke a rule of the chip."""
+        self.turn()
+        self.sense()
+
+    def turn(self) -> None:
+        """One tick of the arm. While the robot is `waiting` another may follow before `sense`."""
         self.robot.step()
         self.arm.step(self.robot.time_s)
+
+    def sense(self) -> None:
+        """Board and instruments live until the end of the last tick. Raises BoardError as `step`."""
         if self.board is not None:
             # After the arm, so that the sensors can ask for any instant of the tick.
             self.board.advance(self._time_s)
@@ -117,7 +127,17 @@ class Laboratory:
         """What a sensor on the flange feels at a virtual time inside the last tick."""
         if self.arm.ideal and not sensor.feels_force:
             return lambda time_s: sensor.rate(self.arm.rate_at(time_s))
-        return lambda time_s: sensor.motion(self.arm.felt_at(time_s))
+        last: Felt | None = None
+        motion: Sequence[float] = ()
+
+        def motion_at(time_s: float) -> Sequence[float]:
+            nonlocal last, motion
+            felt = self.arm.felt_at(time_s)
+            if felt is not last:  # an arm that stands gives the same again
+                last, motion = felt, sensor.motion(felt)
+            return motion
+
+        return motion_at
 
     def _field_of(self, sensor: MountedMagnetometer) -> MotionAt:
         """What a magnetometer on the flange feels at such a time."""

@@ -9,7 +9,15 @@ from hypothesis import strategies as st
 
 from rig.sensors.errors import SensorError
 from rig.sensors.kvh1775.counting import MessageCounter
-from rig.sensors.kvh1775.messages import MESSAGE_BYTES, BuiltInTest, Format, MessageReader, encode, encode_test
+from rig.sensors.kvh1775.messages import (
+    MESSAGE_BYTES,
+    BuiltInTest,
+    Format,
+    MessageReader,
+    encode,
+    encode_one,
+    encode_test,
+)
 
 # ICD 56-0298 Rev. B, p. 51.
 SAMPLE = bytes.fromhex("FE81FF55 37A96A6E 38586C1F B75BF862 BF803E78 BB650D28 3B0A37AC 77 3D 0028 4BFA34D8")
@@ -40,6 +48,14 @@ def test_the_interface_documents_sample() -> None:
         "A", rotation=message["rotation"], acceleration_g=message["acceleration_g"], sequence=61, temperature=40
     )
     assert again == SAMPLE, "the CRC too"
+
+
+@pytest.mark.parametrize("name", FORMATS)
+def test_one_message_without_arrays_is_the_same(name: Format) -> None:
+    rotation, acceleration_g = [1.234567891e-5, -0.1, -0.0], [0.3, 1e-9, -1.0019064]
+    tail = {"sequence": 77, "status": 0x73, "temperature": -40, "time_us": 4_000_000_000, "fourth": 31.26}
+    arrays = encode(name, rotation=rotation, acceleration_g=acceleration_g, **tail)
+    assert encode_one(name, rotation, acceleration_g, **tail) == arrays
 
 
 def test_the_all_good_built_in_test_of_the_manual() -> None:

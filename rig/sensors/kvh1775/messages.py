@@ -4,8 +4,9 @@ Source: ICD 56-0298 Rev. B, tables 5-1 to 5-9 (formats A, B, C and their CRC) an
 """
 
 import re
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
+from struct import Struct
 from types import MappingProxyType
 from typing import Any, Literal
 from zlib import crc32
@@ -30,6 +31,14 @@ _LAYOUTS: Mapping[Format, np.dtype[Any]] = MappingProxyType(
 )
 _HEADERS: Mapping[Format, bytes] = MappingProxyType(
     {"A": b"\xfe\x81\xff\x55", "B": b"\xfe\x81\xff\x56", "C": b"\xfe\x81\xff\x57"}
+)
+# One message without its CRC: header, rotation, acceleration, and these.
+_PACKERS: Mapping[Format, tuple[Struct, tuple[str, ...]]] = MappingProxyType(
+    {
+        "A": (Struct(">4s6fBBh"), ("status", "sequence", "temperature")),
+        "B": (Struct(">4s6fIBBh"), ("time_us", "status", "sequence", "temperature")),
+        "C": (Struct(">4s7fBB"), ("fourth", "status", "sequence")),
+    }
 )
 _TEST_HEADERS = (b"\xfe\x81\x00\xaa", b"\xfe\x81\x00\xab")
 _TEST_BYTES = (6, 8)
@@ -166,6 +175,13 @@ def encode(
     )
 
 
+def encode_one(name: Format, rotation: Sequence[float], acceleration_g: Sequence[float], **tail: float) -> bytes:
+    """The same of one message, without arrays; `tail` holds every other field of the format, and may hold more."""
+    packer, fields = _PACKERS[name]
+    data = packer.pack(_HEADERS[name], *rotation, *acceleration_g, *[tail[field] for field in fields])
+    return data + _crc(data.translate(_BITS_REVERSED))
+
+
 def encode_test(values: bytes) -> bytes:
     """A built-in test of six or eight bytes."""
     data = _TEST_HEADERS[_TEST_BYTES.index(len(values))] + values
@@ -181,7 +197,7 @@ def _at(data: bytes, places: NDArray[np.intp], layout: np.dtype[Any]) -> NDArray
     return found
 
 
-def _crc(backwards: memoryview) -> bytes:
+def _crc(backwards: bytes | memoryview) -> bytes:
     return (crc32(backwards) ^ _CRC_RIGHT).to_bytes(4, "little").translate(_BITS_REVERSED)
 
 

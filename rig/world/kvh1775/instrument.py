@@ -12,7 +12,7 @@ import numpy as np
 
 from firmware_host.emulator.accelerometer import STANDARD_GRAVITY_M_S2, Accelerometer
 from firmware_host.emulator.gyroscope import Gyroscope
-from rig.sensors.kvh1775.messages import ALL_VALID, GOOD_TEST_BYTE, SEQUENCE_NUMBERS, Format, encode, encode_test
+from rig.sensors.kvh1775.messages import ALL_VALID, GOOD_TEST_BYTE, SEQUENCE_NUMBERS, Format, encode_one, encode_test
 from rig.world.board.sensor_truth import SensorTruth
 from rig.world.kvh1775.memory import Memory
 
@@ -113,7 +113,10 @@ class Kvh1775:
         """One look at the motion: a rate is what it is now, a delta angle is summed by the trapezoidal rule."""
         now = self._motion_at(at_s - self._truth.gyro.delay_s)
         before = self._before or now
-        self._sum = [total + 0.5 * (old + new) for total, old, new in zip(self._sum, before, now, strict=False)]
+        if now is before:  # half of twice a number is that number
+            self._sum = [total + each for total, each in zip(self._sum, now, strict=False)]
+        else:
+            self._sum = [total + 0.5 * (old + new) for total, old, new in zip(self._sum, before, now, strict=False)]
         self._before = now
 
     def _send(self, at_s: float) -> None:
@@ -133,10 +136,10 @@ class Kvh1775:
             self.faults.lose -= 1
             return
         temperature = self._temperature(at_s)
-        self._sent += encode(
+        self._sent += encode_one(
             cast(Format, memory["OUTPUTFMT"]),
-            rotation=axes @ rotation,
-            acceleration_g=axes @ acceleration_g,
+            (axes @ rotation).tolist(),
+            (axes @ acceleration_g).tolist(),
             sequence=sequence,
             status=self.faults.status,
             temperature=round(temperature),

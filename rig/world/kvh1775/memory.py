@@ -1,6 +1,7 @@
 """The settings a KVH 1775 keeps without its supply, and the commands that ask for and change them (ICD, section 8)."""
 
 from collections.abc import Mapping
+from functools import lru_cache
 from math import isfinite
 
 import numpy as np
@@ -55,7 +56,7 @@ class Memory:
     @property
     def axes(self) -> NDArray[np.float64]:
         """(3, 3) by which rates and accelerations are multiplied: any matrix, not only rotations."""
-        return np.array([float(value) for value in self["AXES"].split(",")]).reshape(3, 3)
+        return _matrix(self["AXES"])
 
     def obey(self, command: str) -> str:
         """The answer to a command in capitals."""
@@ -86,6 +87,11 @@ class Memory:
         if (name, value) == ("MSYNC", "EXT"):
             self._settings.update({"FILTTYPE,A": "AVE", "FILTTYPE,G": "AVE"})  # and so they stay
         return True
+
+
+@lru_cache(maxsize=4)  # asked for at every message
+def _matrix(text: str) -> NDArray[np.float64]:
+    return np.array([float(value) for value in text.split(",")]).reshape(3, 3)
 
 
 def _nine_numbers(text: str) -> bool:

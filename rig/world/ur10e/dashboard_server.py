@@ -19,6 +19,8 @@ TOO_EARLY = (
 class WaitProgram:
     """The one program on the simulated controller's disk: it waits for ever."""
 
+    waiting = True
+
     def __init__(self, name: str) -> None:
         self.name = name
 

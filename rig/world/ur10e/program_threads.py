@@ -51,6 +51,11 @@ class Threads:
         self._threads.pop(name, None)
         self.let_go(name)
 
+    @property
+    def any(self) -> bool:
+        """Whether there are threads beside the main one."""
+        return bool(self._threads)
+
     def running(self, name: str) -> bool:
         return name in self._threads
 

@@ -31,6 +31,11 @@ class Program(Protocol):
         """One tick; False when the program has ended. Raises `ProgramError`."""
         ...
 
+    @property
+    def waiting(self) -> bool:
+        """Whether ticks change nothing until a client writes an input; False where that is not known."""
+        ...
+
 
 @dataclass(slots=True)
 class Registers:
@@ -111,6 +116,16 @@ class Robot:
         if not self.motion.standing:
             self._still_since_tick = self.tick
         self._settle()
+
+    @property
+    def waiting(self) -> bool:
+        """Whether the joints stand, and nothing but a client can let them move in the ticks to come."""
+        if self._start is not None or self._mode_changes or self.watchdog_s or not self.motion.still:
+            return False
+        program = self._program
+        return self.runtime_state == RuntimeState.STOPPED or (
+            self.runtime_state == RuntimeState.PLAYING and program is not None and program.waiting
+        )
 
     def _play(self) -> None:
         if self.watchdog_s and (self.tick - self._last_input_tick) * TICK_S > self.watchdog_s:

@@ -34,6 +34,7 @@ class ControlProgram:
         self._servo_target: tuple[Joints, float] = (robot.motion.now.target_q_rad, 0.1)
         self._speed_target: tuple[Joints, float] = ((0.0,) * 6, 0.5)
         self._operation = self._writes = 0
+        self._heard: int | None = None  # the command that was there when the main thread last gave way between two
         self._commands: dict[int, Command] = {
             1: self._movej,
             2: self._movej_ik,
@@ -65,6 +66,11 @@ class ControlProgram:
         self._threads.step()
         return next(self._main, StopIteration) is not StopIteration
 
+    @property
+    def waiting(self) -> bool:
+        """Every command is done and answered, and no thread runs."""
+        return not self._threads.any and self._heard is not None and self._int(0) == self._heard
+
     def _loop(self) -> Steps:
         self._signal_async(-1)
         self._answer(READY)
@@ -82,7 +88,9 @@ class ControlProgram:
                 yield from self._command(code)()
                 self._answer(DONE)
                 executing = True
+            self._heard = None if code in REALTIME else code
             yield
+            self._heard = None
 
     def _command(self, code: int) -> Command:
         if code not in self._commands:

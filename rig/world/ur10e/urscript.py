@@ -83,6 +83,8 @@ def parse(lines: Sequence[str]) -> tuple[str, Block]:
 class ScriptProgram:
     """A program of the statements below and endless loops: no variables, no conditions."""
 
+    waiting = False  # nobody looks ahead for it
+
     def __init__(self, robot: Robot, lines: Sequence[str]) -> None:
         self._robot = robot
         self._threads = Threads(robot)
