@@ -100,6 +100,7 @@ def _parser() -> argparse.ArgumentParser:
     check = add("check", _check, "connect and look; nothing moves, no program is stopped")
     _add_config(check)
     _add_script(check)
+    _add_record(add("record", _record, "record the sensors alone, while something else turns them; nothing moves"))
     resume = add("resume", _resume, "go on with an interrupted run")
     resume.add_argument("run_folder", type=Path, metavar="RUN_DIR")
     _add_outcome(resume)
@@ -202,6 +203,14 @@ def _add_set(parser: argparse.ArgumentParser, text: str) -> None:
     parser.add_argument("--set", action="append", default=[], metavar="PATH=VALUE", dest="overrides", help=text)
 
 
+def _add_record(record: argparse.ArgumentParser) -> None:
+    _add_config(record)
+    record.add_argument("--out", type=Path, required=True, metavar="DIR", help="where each sensor gets a CSV file")
+    record.add_argument(
+        "--duration-s", type=float, required=True, metavar="S", help="how long, by the sensors' own clocks"
+    )
+
+
 def _add_script(parser: argparse.ArgumentParser) -> None:
     parser.add_argument("--script", type=Path, metavar="FILE", help="a procedure of your own, in place of the file's")
 
@@ -261,6 +270,12 @@ def _check(options: argparse.Namespace) -> int:
     from rig.commands.check import check
 
     return check(options.config, options.overrides, options.script)
+
+
+def _record(options: argparse.Namespace) -> int:
+    from rig.commands.record import record
+
+    return record(options.config, options.overrides, options.out, options.duration_s)
 
 
 def _allan(options: argparse.Namespace) -> int:

@@ -47,6 +47,11 @@ def add_arguments(solve: argparse.ArgumentParser) -> None:
     place.add_argument("--field-t", type=float, metavar="B", help="size of the magnetic field, for a magnetometer")
     place.add_argument("--field-upwards", action="store_true", help="the magnetic field rises from the ground")
     place.add_argument("--any-mounting", action="store_true", help="the sensor's axes need not lie along the body's")
+    place.add_argument(
+        "--find-clock",
+        action="store_true",
+        help="the attitudes are on a clock of their own: find it by the turning that both files show",
+    )
     place.add_argument("--second-order", action="store_true", help="find the accelerometer's second-order terms too")
 
 
@@ -76,5 +81,6 @@ def solve(options: argparse.Namespace) -> int:
         options.estimator,
         Surrounding(options.gravity_m_s2, options.field_t, options.up, options.field_upwards, options.any_mounting),
         second_order=options.second_order,
+        find_clock=options.find_clock,
         as_json=options.json,
     )

@@ -18,6 +18,7 @@ def solve_attitudes(
     surrounding: Surrounding,
     *,
     second_order: bool,
+    find_clock: bool,
     as_json: bool,
 ) -> int:
     """Solve two CSV files and print what they give; returns 0.
@@ -27,10 +28,10 @@ def solve_attitudes(
     """
     method = known_method(estimator)
     with raised_as(Refused):  # nothing runs here: whatever is wrong with the data, no arm had to be stopped for it
-        placed = read_placed(samples, attitudes)
+        placed = read_placed(samples, attitudes, find_clock=find_clock)
         results = solve_placed(placed, surrounding, method, second_order=second_order)
         faults = [result for result in results.values() if isinstance(result, Fault)]
         if len(faults) == len(results):
             raise faults[0]
-    print_found(Found(samples, attitudes, surrounding, results), as_json=as_json)
+    print_found(Found(samples, attitudes, surrounding, results, placed.clock), as_json=as_json)
     return 0

@@ -5,13 +5,14 @@ import ipaddress
 import types
 import typing
 from collections.abc import Iterator, Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any, TypeVar
 
 import yaml
 from pydantic import BaseModel, ValidationError
 
+from rig.config.judging_sections import LimitsSection
 from rig.config.layers import BASE, Layered, Places, put_together, read_layers
 from rig.config.models import ProcedureSection, RigConfig
 from rig.config.procedure_sections import DEFAULT_PROCEDURE, STOCK_SECTIONS
@@ -23,6 +24,10 @@ from rig.errors.quoting import printable, quote
 Model = TypeVar("Model", bound=BaseModel)
 Sections = Mapping[str, type[ProcedureSection]] | None  # None: the procedure is no matter of the reader's
 PROBLEMS_SHOWN = 25
+_UNUSED: Mapping[str, Any] = {
+    "arm": {"host": "none", "payload_kg": 0},
+    "limits": {name: 1 for name, field in LimitsSection.model_fields.items() if field.is_required()},
+}
 
 
 @dataclass(frozen=True, slots=True)
@@ -64,11 +69,20 @@ def load(path: str | Path, overrides: Sequence[str] = (), sections: Sections = S
     with what its `procedure:` section holds. Raises `ConfigurationRefused` listing every error with its path, line,
     value, what is allowed and, for a misspelling, the nearest valid spelling.
     """
+    return _validated(_layered(path, overrides), str(path), sections)
+
+
+def load_sensors(path: str | Path, overrides: Sequence[str] = ()) -> Loaded:
+    """As `load`, for who only reads sensors: how they are turned and judged may be missing, and is then filled in."""
+    layered = _layered(path, overrides)
+    return _validated(replace(layered, document={**_UNUSED, **layered.document}), str(path), None)
+
+
+def _layered(path: str | Path, overrides: Sequence[str]) -> Layered:
     try:
-        layered = read_layers(Path(path), overrides)
+        return read_layers(Path(path), overrides)
     except Unreadable as error:
         raise ConfigurationRefused(str(path), [str(error)]) from None
-    return _validated(layered, str(path), sections)
 
 
 def parse(

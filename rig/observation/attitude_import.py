@@ -9,6 +9,9 @@ known how good the attitude is, `attitude_std_rad` about each axis. While the ta
 and should be short: down to one sample, whose noise is then taken from how all rows scatter about the model.
 
 Columns may stand in any order; the first row holds their names.
+
+Where the table wrote its attitudes by a clock of its own, the samples' is found by the turning that both saw, as a
+board's is on the arm (`rig.observation.timebase`).
 """
 
 from collections.abc import Mapping
@@ -22,6 +25,8 @@ from rig.errors import Fault, Refused
 from rig.estimation.arrays import Array
 from rig.observation.csv_table import read_columns
 from rig.observation.csv_windows import MIN_SAMPLES, check_complete, check_times, inside, overlapping, scatter_of
+from rig.observation.table_motion import TableMotion
+from rig.observation.timebase import TimeBase, estimate_time_base
 from rig.observation.windows import Window
 
 Quantity = Literal["rate", "acceleration", "field"]
@@ -53,13 +58,15 @@ class PlacedReadings:
     attitudes: Array
     rates_rad_s: Array | None
     attitude_std_rad: Array | None
+    clock: TimeBase | None = None
 
 
-def read_placed(samples_path: Path, attitudes_path: Path) -> PlacedReadings:
-    """Read and average both files.
+def read_placed(samples_path: Path, attitudes_path: Path, *, find_clock: bool = False) -> PlacedReadings:
+    """Read and average both files. With `find_clock` each has its own clock; rows that no sample covers are left out.
 
     Raises Refused `no_file`, `wrong_columns`, `wrong_unit`, `not_a_number`, `time_not_increasing`, `bad_quaternion`,
-    `bad_attitude_row`, `overlapping_attitudes`; Fault `lost_samples`, `too_few_observations`.
+    `bad_attitude_row`, `overlapping_attitudes`; Fault `lost_samples`, `too_few_observations`, and with `find_clock` as
+    `TableMotion` and `estimate_time_base`.
     """
     samples = read_columns(samples_path, ("time_s",), (), SAMPLES_MB, tuple(COLUMNS.values()))
     rows = read_columns(attitudes_path, PLACE_COLUMNS, (), ATTITUDES_MB, (RATE_COLUMNS, (STD_COLUMN,)))
@@ -72,8 +79,19 @@ def read_placed(samples_path: Path, attitudes_path: Path) -> PlacedReadings:
         )
     time_s = samples["time_s"]
     check_times(time_s)
-    windows = _windows(rows)
+    windows, attitudes = _windows(rows), _rotations(rows)
+    rates = np.column_stack([rows[name] for name in RATE_COLUMNS]) if RATE_COLUMNS[0] in rows else None
+    stated = _stated(rows)
     readings = {quantity: np.column_stack([samples[name] for name in COLUMNS[quantity]]) for quantity in given}
+    clock = None
+    if find_clock:
+        _check_has_rates(readings)
+        middles_s = np.array([(window.start_s + window.end_s) / 2 for window in windows])
+        clock = estimate_time_base(time_s, readings["rate"], TableMotion(middles_s, attitudes, rates))
+        time_s = clock.controller_time_s(time_s)
+        seen = [row for row, window in enumerate(windows) if time_s[0] <= window.start_s and window.end_s <= time_s[-1]]
+        windows, attitudes = [windows[row] for row in seen], attitudes[seen]
+        rates, stated = (None if each is None else each[seen] for each in (rates, stated))
     cuts = [inside(time_s, window) for window in windows]
     counts = np.array([cut.stop - cut.start for cut in cuts])
     interval_s = float(np.median(np.diff(time_s)))
@@ -89,10 +107,20 @@ def read_placed(samples_path: Path, attitudes_path: Path) -> PlacedReadings:
         means,
         variances,
         counts.astype(np.float64),
-        _rotations(rows),
-        np.column_stack([rows[name] for name in RATE_COLUMNS]) if RATE_COLUMNS[0] in rows else None,
-        _stated(rows),
+        attitudes,
+        rates,
+        stated,
+        clock,
     )
+
+
+def _check_has_rates(readings: Mapping[Quantity, Array]) -> None:
+    if "rate" not in readings:
+        raise Refused(
+            "wrong_columns",
+            "the samples hold no turn rate, by which their clock would be found",
+            f"Give {', '.join(COLUMNS['rate'])} beside them, or both files on one clock",
+        )
 
 
 def _windows(rows: Mapping[str, Array]) -> list[Window]:

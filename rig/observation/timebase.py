@@ -17,6 +17,7 @@ from rig.arm.kinematics import NOMINAL, DenavitHartenberg, flange_attitude, flan
 from rig.errors import Fault
 from rig.estimation.arrays import Array
 from rig.observation.colour import widening
+from rig.observation.known_motion import KnownMotion
 
 MIN_SAMPLES = 100
 MAX_SPAN_S = 48 * 3600.0  # of a recording; what lies farther apart is damage, and would fill the memory
@@ -110,8 +111,8 @@ class ArmMotion:
         return known
 
 
-def estimate_time_base(board_time_s: Array, readings_rad_s: Array, motion: ArmMotion) -> TimeBase:
-    """The board's clock against the controller's, from readings (n, 3) taken at board times (n,).
+def estimate_time_base(board_time_s: Array, readings_rad_s: Array, motion: KnownMotion) -> TimeBase:
+    """The board's clock against that of what turned it, from readings (n, 3) taken at board times (n,).
 
     Raises Fault `not_finite`, `impossible_times`, `board_clock_restarted`, `duplicated_samples`, `stuck_sensor`,
     `stuck_axis`, `time_base_not_found`.
@@ -163,7 +164,7 @@ def _check_samples(board_time_s: Array, readings: Array) -> None:
         )
 
 
-def _coarse(board_time_s: Array, readings: Array, motion: ArmMotion) -> TimeBase:
+def _coarse(board_time_s: Array, readings: Array, motion: KnownMotion) -> TimeBase:
     """The clock to within the fine fit's reach: of all offsets and drifts, the one under which most is explained."""
     reference, half_s = (board_time_s[0] + board_time_s[-1]) / 2, (board_time_s[-1] - board_time_s[0]) / 2
     spacing = 2 * COARSE_REACH_S / half_s
@@ -178,7 +179,7 @@ def _coarse(board_time_s: Array, readings: Array, motion: ArmMotion) -> TimeBase
     return TimeBase(float(offset - reference), float(drift), float(reference), np.zeros((2, 2)), np.zeros(3))
 
 
-def _coarse_offset(time_s: Array, readings: Array, motion: ArmMotion) -> tuple[float, float]:
+def _coarse_offset(time_s: Array, readings: Array, motion: KnownMotion) -> tuple[float, float]:
     """Share explained, and offset (controller − `time_s`) to within a step.
 
     Looks at peaks of the correlation, each axis with each (not of magnitudes, in which a bias can hide the turning),
@@ -222,7 +223,7 @@ def _explained(board: Array, seen: NDArray[np.bool_], arm: Array, lag: int) -> f
     return float(np.sum(seen_together * (inverse @ seen_together))) / total if total > 0 else 0.0
 
 
-def _settled(clock: TimeBase, board_time_s: Array, readings: Array, motion: ArmMotion) -> TimeBase:
+def _settled(clock: TimeBase, board_time_s: Array, readings: Array, motion: KnownMotion) -> TimeBase:
     for _ in range(FINE_STEPS):
         before, clock = clock.offset_s, _refined(clock, board_time_s, readings, motion)
         if abs(clock.offset_s - before) < 1e-3 * clock.offset_std_s:
@@ -230,7 +231,7 @@ def _settled(clock: TimeBase, board_time_s: Array, readings: Array, motion: ArmM
     raise _not_found("the fit of the board's clock does not settle")
 
 
-def _refined(clock: TimeBase, board_time_s: Array, readings: Array, motion: ArmMotion) -> TimeBase:
+def _refined(clock: TimeBase, board_time_s: Array, readings: Array, motion: KnownMotion) -> TimeBase:
     """One Gauss–Newton step.
 
     Model: m = A r(t) + c + noise, r the flange's rate at controller time t; A (3, 3) and c (3,) are fitted along.

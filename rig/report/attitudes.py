@@ -15,6 +15,7 @@ from rig.errors import Fault
 from rig.estimation import accelerometer, magnetometer
 from rig.estimation.triaxial import TriaxialSolution
 from rig.observation.attitude_import import UNITS, Quantity
+from rig.observation.timebase import TimeBase
 from rig.station.plain_text import plain
 
 SCHEMA = "rig.attitudes/1"
@@ -32,12 +33,13 @@ REFERENCES: Mapping[Quantity, str] = {
 
 @dataclass(frozen=True, slots=True)
 class Found:
-    """What two CSV files gave."""
+    """What two CSV files gave; `clock`, where the samples' had to be found on the attitudes'."""
 
     samples: Path
     attitudes: Path
     surrounding: Surrounding
     results: Mapping[Quantity, InAttitudes | Fault]
+    clock: TimeBase | None = None
 
 
 def print_found(found: Found, *, as_json: bool) -> None:
@@ -46,6 +48,8 @@ def print_found(found: Found, *, as_json: bool) -> None:
         print(json.dumps(_document(found), indent=2, allow_nan=False))
         return
     console = Console(highlight=False)
+    if found.clock is not None:
+        console.print(plain(_clock_line(found.clock)))
     for quantity, result in found.results.items():
         if isinstance(result, Fault):
             console.print(plain(f"{quantity}: {result}"))
@@ -53,6 +57,23 @@ def print_found(found: Found, *, as_json: bool) -> None:
         console.print(_table(f"{found.samples}: {quantity}, {MODELS[quantity]}", quantity, result.solution))
         for line in _lines(quantity, result, found.surrounding):
             console.print(plain(line))
+
+
+def _clock_line(clock: TimeBase) -> str:
+    return (
+        f"the samples' clock on the table's: {clock.offset_s:+.4f} s (± {2e3 * clock.offset_std_s:.2g} ms), "
+        f"{1e6 * clock.drift:+.1f} ppm (± {2e6 * clock.drift_std:.2g}) at {clock.reference_s:.1f} s of theirs"
+    )
+
+
+def _clock_entry(clock: TimeBase) -> dict[str, float]:
+    return {
+        "offset_s": clock.offset_s,
+        "offset_std_s": clock.offset_std_s,
+        "drift": clock.drift,
+        "drift_std": clock.drift_std,
+        "reference_s": clock.reference_s,
+    }
 
 
 def _table(title: str, quantity: Quantity, solution: TriaxialSolution) -> Table:
@@ -105,6 +126,7 @@ def _document(found: Found) -> dict[str, Any]:
         "attitudes": str(found.attitudes),
         "gravity_m_s2": found.surrounding.gravity_m_s2,
         "field_t": found.surrounding.field_t,
+        **({} if found.clock is None else {"clock": _clock_entry(found.clock)}),
         "quantities": {
             quantity: {"error": str(result)} if isinstance(result, Fault) else _entry(quantity, result)
             for quantity, result in found.results.items()

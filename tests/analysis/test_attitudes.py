@@ -85,6 +85,48 @@ def test_the_papers_gyroscope_is_found_with_the_earths_rate(capsys: pytest.Captu
     assert found["std"][9:12].max() < 0.1 * np.linalg.norm(GYRO_REFERENCE_RAD_S)
 
 
+def on_another_clock(folder: Path, late_s: float, fast: float, *, rates: bool = True) -> list[Path]:
+    """The swinging example when the sensor's clock is so late and runs so much faster."""
+    samples, attitudes = folder / "samples.csv", folder / "attitudes.csv"
+    columns, *rows = (EXAMPLES / SWINGING[0]).read_text(encoding="utf-8").splitlines()
+    cells = [row.split(",", 1) for row in rows]
+    shifted = [f"{float(time_s) * (1 + fast) + late_s!r},{readings}" for time_s, readings in cells]
+    samples.write_text("\n".join([columns, *shifted]) + "\n", encoding="utf-8")
+    lines = (EXAMPLES / SWINGING[1]).read_text(encoding="utf-8").splitlines()
+    kept = lines if rates else [",".join(line.split(",")[:6]) for line in lines]
+    attitudes.write_text("\n".join(kept) + "\n", encoding="utf-8")
+    return [samples, attitudes]
+
+
+def test_the_clock_of_a_table_is_found_by_the_turning_both_saw(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    files = on_another_clock(tmp_path, late_s=-731.25, fast=4e-4)
+    assert main([*solve(files, "--find-clock"), "--json"]) == 0
+    found = json.loads(capsys.readouterr().out)
+    clock, rate = found["clock"], found["quantities"]["rate"]
+    read_s = clock["reference_s"]
+    off_s = read_s + clock["offset_s"] - (read_s + 731.25) / (1 + 4e-4)
+    assert abs(off_s) < 4 * clock["offset_std_s"] < 1e-3
+    assert abs(clock["drift"] + 4e-4) < 4 * clock["drift_std"] + 4e-7
+    assert np.allclose(rate["matrix"], GYRO_MATRIX, atol=1e-4)
+    assert main(solve(files, "--find-clock")) == 0
+    assert "the samples' clock on the table's: +731." in capsys.readouterr().out
+
+
+def test_quaternions_alone_tell_the_clock_but_no_rates(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    files = on_another_clock(tmp_path, late_s=12.5, fast=0.0, rates=False)
+    assert main(solve(files, "--find-clock")) == 2
+    assert "no_rates" in capsys.readouterr().err, "its clock was found"
+
+
+def test_a_file_of_stops_alone_tells_no_clock(capsys: pytest.CaptureFixture[str]) -> None:
+    assert main(solve([EXAMPLES / SWINGING[0], EXAMPLES / STILL[1]], "--find-clock")) == 2
+    assert "time_base_not_found: of 16 rows 0 follow another" in capsys.readouterr().err
+    assert main(solve(example(STILL), "--find-clock")) == 2
+    assert "wrong_columns: the samples hold no turn rate" in capsys.readouterr().err
+
+
 @pytest.mark.parametrize("estimator", ["as_published", "maximum_likelihood", "attitude_weighted"])
 def test_any_estimator_can_be_asked_for(estimator: str, capsys: pytest.CaptureFixture[str]) -> None:
     found = solved(capsys, example(STILL), *PLACE, "--estimator", estimator, "--second-order")

@@ -1,0 +1,130 @@
+"""Readings of the sensors alone, into CSV files as `rig solve` takes them, while something else turns them."""
+
+import time
+from collections.abc import Iterator, Mapping
+from contextlib import ExitStack, contextmanager
+from pathlib import Path
+from queue import SimpleQueue
+from types import TracebackType
+from typing import Any, Self, TextIO
+
+import numpy as np
+from numpy.typing import NDArray
+
+from rig.board.identify import refusing
+from rig.config.models import RigConfig
+from rig.data.run_file import RecordedMagnetometer
+from rig.errors import Fault, Refused
+from rig.observation.attitude_import import COLUMNS
+from rig.runner.acquisition import SensorCount
+from rig.runner.sensors import board_source
+from rig.sensors.registry import OWN_PORT
+from rig.sensors.source import OnSamples, Recorded, SampleSource
+from rig.station.events import SensorSamples
+
+LOOK_S = 0.05
+FIRST_SAMPLE_S = 2.0
+
+
+@contextmanager
+def connected(config: RigConfig, on_samples: OnSamples) -> Iterator[tuple[SampleSource, ...]]:
+    """Every sensor of a configuration, set up and silent. Raises Refused by name for what is not as it says."""
+    with ExitStack() as stack:
+        sources: list[SampleSource] = []
+        with refusing():
+            if config.parts_on_board:
+                sources.append(stack.enter_context(board_source(config, on_samples, calibrated=False)))
+            for name, section in config.sensors.items():
+                if section.serial is not None:
+                    sources.append(stack.enter_context(OWN_PORT[section.part].connect(name, section, on_samples)))
+        yield tuple(sources)
+
+
+class ReadingsFile:
+    """A sensor's readings in SI units, a row each, by the clock that stamped them."""
+
+    def __init__(self, path: Path, name: str, sensor: Recorded) -> None:
+        """Raises OSError, and FileExistsError where there is such a file."""
+        self.path = path
+        self._scales: list[tuple[str, float]]
+        if isinstance(sensor, RecordedMagnetometer):
+            self._scales, quantities = [("field_counts", sensor.sensitivity_t_per_count)], [COLUMNS["field"]]
+            self._count = SensorCount(name, sensor.sensitivity_t_per_count, "field_counts")
+        else:
+            self._scales, quantities = [("counts", sensor.sensitivity_rad_s_per_count)], [COLUMNS["rate"]]
+            self._count = SensorCount(name, sensor.sensitivity_rad_s_per_count)
+            if sensor.sensitivity_m_s2_per_count is not None:
+                self._scales.append(("acceleration_counts", sensor.sensitivity_m_s2_per_count))
+                quantities.append(COLUMNS["acceleration"])
+        self._file: TextIO = path.open("x", encoding="utf-8", newline="\n")
+        self._file.write(",".join(["time_s", *(name for names in quantities for name in names)]) + "\n")
+        self._format = ",".join(["%.6f", *["%.9g"] * 3 * len(quantities)])
+        self._began_s: float | None = None
+        self.lasts_s = 0.0  # from the first reading to the last, by their clock
+
+    def __enter__(self) -> Self:
+        return self
+
+    def __exit__(
+        self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
+    ) -> None:
+        self._file.close()
+
+    @property
+    def seen(self) -> SensorSamples:
+        """How many there are, and how many were lost."""
+        return self._count.seen
+
+    def add(self, samples: NDArray[Any]) -> None:
+        """Samples (n,) in the order they came. Raises OSError."""
+        time_s = samples["board_time_us"] * 1e-6
+        if self._began_s is None:
+            self._began_s = float(time_s[0])
+        self.lasts_s = float(time_s[-1]) - self._began_s
+        self._count.add(samples)
+        rows = np.column_stack([time_s, *(samples[column] * scale for column, scale in self._scales)])
+        np.savetxt(self._file, rows, self._format)
+        self._file.flush()
+
+
+def record_readings(config: RigConfig, folder: Path, duration_s: float) -> Mapping[Path, SensorSamples]:
+    """Record every sensor for so long by its own clock, into `folder`/<sensor>.csv; what each file holds.
+
+    Nothing is moved. What was recorded stays when it ends early. Raises Refused as `connected`, and `run_folder`;
+    Fault `no_samples`, and what a source raises.
+    """
+    arrived: SimpleQueue[tuple[str, NDArray[Any]]] = SimpleQueue()
+    with connected(config, lambda name, samples: arrived.put((name, samples))) as sources, ExitStack() as stack:
+        files = {
+            name: stack.enter_context(_new_file(folder, name, sensor))
+            for source in sources
+            for name, sensor in source.sensors.items()
+        }
+        for source in sources:
+            source.start()
+        began_s = time.monotonic()
+        while min(file.lasts_s for file in files.values()) < duration_s:
+            time.sleep(LOOK_S)
+            while not arrived.empty():
+                name, samples = arrived.get()
+                files[name].add(samples)
+            for source in sources:
+                source.check()
+            silent = [name for name, file in files.items() if not file.seen.samples]
+            if silent and time.monotonic() - began_s > FIRST_SAMPLE_S:
+                raise Fault(
+                    "no_samples",
+                    f"no sample from {', '.join(silent)} within {FIRST_SAMPLE_S:g} s of the start",
+                    "Check the sensor's wiring and its data-ready line, then run `rig check`",
+                )
+        return {file.path: file.seen for file in files.values()}
+
+
+def _new_file(folder: Path, name: str, sensor: Recorded) -> ReadingsFile:
+    try:
+        folder.mkdir(parents=True, exist_ok=True)
+        return ReadingsFile(folder / f"{name}.csv", name, sensor)
+    except OSError as error:
+        raise Refused(
+            "run_folder", f"{folder}/{name}.csv cannot be made: {error}", "Choose another with --out"
+        ) from error

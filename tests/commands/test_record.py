@@ -1,0 +1,94 @@
+"""Sensors on somebody else's turntable: recorded by `rig record`, solved with the attitudes that the table wrote."""
+
+import json
+import subprocess
+import sys
+from pathlib import Path
+
+import numpy as np
+import pytest
+import yaml
+from scipy.spatial.transform import Rotation
+
+from rig.arm.driver import Arm
+from rig.arm.kinematics import flange_attitude, flange_rate
+from rig.arm.motion import Transfer, trapezoid_duration, travel
+from rig.arm.state import ArmState, Joints
+from rig.cli import main
+from rig.commands.laboratory import simulated_laboratory
+from rig.commands.record import record
+from rig.errors import Refused
+from support.ideal import ideal_document
+from support.paths import CONFIGS
+from support.worlds import fresh_host, hardware, merge
+
+KVH = CONFIGS / "kvh1775.yaml"
+DURATION_S = 28.0
+WAYS = ((0, 0, 2), (0, -2, 0), (2, 0, 0), (0, 1.5, -2), (-2, 0.5, 0))  # of the wrists, rad
+COLUMNS = "start_s,end_s,qw,qx,qy,qz,rate_x_rad_s,rate_y_rad_s,rate_z_rad_s"
+
+
+def to(start: Joints, way: tuple[float, ...]) -> Transfer:
+    target = tuple(a + b for a, b in zip(start, (0, 0, 0, *way), strict=True))
+    longest = max(map(abs, travel(start, target)))
+    return Transfer("test move", start, target, 1.0, 4.0, trapezoid_duration(longest, 1.0, 4.0))
+
+
+def attitudes(states: list[ArmState]) -> str:
+    """What a table's controller would have written: on its own clock, the rig knows nothing of it."""
+    q, qd = (np.array([getattr(state, name) for state in states]) for name in ("q_rad", "qd_rad_s"))
+    to_table = np.swapaxes(flange_attitude(q), -1, -2)
+    quaternions = Rotation.from_matrix(to_table).as_quat()[:, [3, 0, 1, 2]]
+    middles_s = np.array([state.time_s for state in states])
+    rows = np.column_stack([middles_s - 0.004, middles_s + 0.004, quaternions, flange_rate(q, qd)])
+    return "\n".join([COLUMNS, *(",".join(f"{value:.9f}" for value in row) for row in rows.tolist())]) + "\n"
+
+
+@pytest.mark.slow
+@pytest.mark.timeout(240)
+def test_a_sensor_on_a_table_with_a_clock_of_its_own(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    host = fresh_host()
+    document = merge(ideal_document(KVH), {"arm": {"host": host}, "world": {"time_scale": 6}})
+    document["sensors"]["kvh"]["serial"]["port"] = f"socket://{host}:7331"
+    document["world"]["sensors"]["kvh"]["mounting_error_deg"] = [0, 0, 0]
+    document["world"]["arm"] = {}  # a table does not vibrate as an arm does
+    config = tmp_path / "config.yaml"
+    config.write_text(yaml.safe_dump(document), encoding="utf-8")
+    states: list[ArmState] = []
+    with simulated_laboratory(config), Arm(host, states.append) as table:
+        out = tmp_path / "recorded"
+        command = [sys.executable, "-m", "rig", "record", str(hardware(config, tmp_path)), "--out", str(out)]
+        with subprocess.Popen(
+            [*command, "--duration-s", f"{DURATION_S}"], stdout=subprocess.PIPE, text=True
+        ) as recording:
+            while not (out / "kvh.csv").exists():
+                table.check()
+                assert recording.poll() is None
+            table.take_control(0.95, (0.0, 0.0, 0.04))
+            for way in WAYS:
+                table.move(to(table.latest.q_rad, way))
+            said, _ = recording.communicate(timeout=120)
+    assert recording.returncode == 0 and ", 0 lost" in said
+    table_file = tmp_path / "table.csv"
+    table_file.write_text(attitudes(states), encoding="utf-8")
+    assert main(["solve", str(out / "kvh.csv"), "--attitudes", str(table_file), "--find-clock", "--json"]) == 0
+    found = json.loads(capsys.readouterr().out)
+    assert found["clock"]["offset_std_s"] < 1e-3
+    truth = document["world"]["sensors"]["kvh"]
+    rate = found["quantities"]["rate"]
+    assert np.allclose(rate["scale"], truth["scale"], atol=1e-3)
+    assert np.allclose(rate["bias"], -np.array(truth["bias_rad_s"]), atol=2e-4)
+    assert "error" not in found["quantities"]["acceleration"]
+
+
+def test_sensors_are_all_that_a_configuration_needs(tmp_path: Path) -> None:
+    config = tmp_path / "table.yaml"
+    sensor = {"part": "kvh1775", "serial_number": "1", "rate_hz": 250, "serial": {"port": str(tmp_path / "no_port")}}
+    config.write_text(yaml.safe_dump({"sensors": {"kvh": sensor}}), encoding="utf-8")
+    with pytest.raises(Refused, match="no_port"):
+        record(config, (), tmp_path / "out", 1.0)
+
+
+def test_a_duration_that_is_none_is_refused(tmp_path: Path) -> None:
+    with pytest.raises(Refused, match="bad_option"):
+        record(KVH, (), tmp_path, 0.0)
