@@ -12,15 +12,13 @@ from rig.data.accelerometer_entries import (
 )
 from rig.data.result_types import ErrorEntry
 from rig.errors import Fault
-from rig.estimation.arrays import Array
 from rig.estimation.felt import DELAY, SECOND
 from rig.estimation.imu import MODEL
 from rig.estimation.triads import Alignment
 from rig.estimation.triaxial import TriaxialSolution
-from rig.observation.acceleration import DwellReading
+from rig.report.axes import PARAMETERS, dwell_entry
 from rig.report.entry import entry
 
-PARAMETERS = ("kx", "ky", "kz", "bx", "by", "bz")
 UNITS = ("1", "1", "1", "m/s²", "m/s²", "m/s²")
 
 
@@ -42,20 +40,12 @@ def accelerometer_entry(result: AccelerometerResult) -> AccelerometerEntry:
         lever_arm_std_m=result.lever_arm_std_m,
         delay_std_s=None if solution.delay_s is None else float(std[DELAY]),
         alignment=None if result.alignment is None else _alignment(result.alignment),
-        dwells=[_dwell(each, left) for each, left in zip(result.dwells, solution.dwell_residuals_m_s2, strict=True)],
+        dwells=[
+            dwell_entry(DwellEntry, "m_s2", each, left)
+            for each, left in zip(result.dwells, solution.dwell_residuals_m_s2, strict=True)
+        ],
         beside={name: _beside(found) for name, found in result.beside.items()},
         held_out=None if result.held_out is None else _held_out(result.held_out),
-    )  # fmt: skip
-
-
-def _dwell(dwell: DwellReading, residual: Array) -> DwellEntry:
-    return entry(
-        DwellEntry, dwell, dwell.reading,
-        mean_m_s2=dwell.reading.mean,
-        mean_std_m_s2=np.sqrt(dwell.reading.variance),
-        noise_m_s2=dwell.reading.noise,
-        residual_m_s2=residual,
-        duration_s=dwell.window.end_s - dwell.window.start_s,
     )  # fmt: skip
 
 

@@ -1,57 +1,46 @@
 """An accelerometer's calibration as a person reads it: TRIAX, section III-B."""
 
-from collections.abc import Iterable, Iterator
+from collections.abc import Iterator
 
 import numpy as np
 from rich.table import Table
 
 from rig.data.accelerometer_entries import AccelerometerEntry
 from rig.data.result_types import ErrorEntry
-from rig.station.plain_text import plain
+from rig.report.axes import axes_table, triple
 
 
 def accelerometer_table(name: str, found: AccelerometerEntry) -> Table:
     """Scale and bias of each axis, ± 2σ."""
     model = "a = F s + b" if found.second_order_s2_m is None else "a = F (s + φ s²) + b"
     title = f"{name}, accelerometer: {found.part} {found.serial_number}, {model}, {found.estimator}"
-    table = Table(title=plain(title, "table.title"), title_justify="left")
-    for heading in ("axis", "scale factor", "± 2σ", "bias m/s²", "± 2σ m/s²"):
-        table.add_column(heading, justify="left" if heading == "axis" else "right")
-    for i, axis in enumerate("xyz"):
-        table.add_row(
-            axis,
-            f"{found.scale[i]:.6f}",
-            f"{2 * found.covariance[i][i] ** 0.5:.6f}",
-            f"{found.bias_m_s2[i]:+.5f}",
-            f"{2 * found.covariance[3 + i][3 + i] ** 0.5:.5f}",
-        )
-    return table
+    return axes_table(title, found.scale, found.bias_m_s2, found.covariance, unit="m/s²", digits=5)
 
 
 def accelerometer_lines(found: AccelerometerEntry) -> Iterator[str]:
     """What stands below the table."""
     yield f"relative to gravity, {found.gravity_m_s2:g} m/s²; {len(found.dwells)} attitudes, {found.sweeps} sweeps"
     skew, std = np.degrees(found.non_orthogonality_rad), np.degrees(found.non_orthogonality_std_rad)
-    yield f"non-orthogonality yz zx xy: {_triple(skew, '+.4f')} ° (± {2 * std.max():.4f})"
+    yield f"non-orthogonality yz zx xy: {triple(skew, '+.4f')} ° (± {2 * std.max():.4f})"
     off, known = 1e3 * found.attitude_error_rad, 2e3 * found.attitude_error_std_rad
     yield f"attitude error found: {off:.2f} mrad about each axis (± {known:.2f})"
     if found.second_order_s2_m is not None and found.second_order_std_s2_m is not None:
-        terms = _triple(found.second_order_s2_m, "+.2e")
+        terms = triple(found.second_order_s2_m, "+.2e")
         yield f"second order: {terms} s²/m (± {2 * max(found.second_order_std_s2_m):.1e})"
     if found.lever_arm_m is not None and found.lever_arm_std_m is not None:
-        lever = _triple(np.multiply(1e3, found.lever_arm_m), "+.1f")
+        lever = triple(np.multiply(1e3, found.lever_arm_m), "+.1f")
         yield f"sits at {lever} mm from the wrists' axes (± {2e3 * max(found.lever_arm_std_m):.1f})"
     if found.delay_s is not None and found.delay_std_s is not None:
         yield f"lags its gyroscope by {1e3 * found.delay_s:+.2f} ms (± {2e3 * found.delay_std_s:.2f})"
     if found.alignment is not None:
-        turned = _triple(np.degrees(found.alignment.rotation_rad), "+.4f")
+        turned = triple(np.degrees(found.alignment.rotation_rad), "+.4f")
         std_deg = 2 * np.degrees(max(found.alignment.std_rad))
         yield f"turned against its gyroscope by: {turned} ° (± {std_deg:.4f})"
     for method, other in found.beside.items():
         if isinstance(other, ErrorEntry):
             yield f"{method}, attitudes alone: {other.error}"
         else:
-            scale, bias = _triple(other.scale, ".6f"), _triple(other.bias_m_s2, "+.5f")
+            scale, bias = triple(other.scale, ".6f"), triple(other.bias_m_s2, "+.5f")
             yield f"{method}, attitudes alone: k {scale}, b {bias} m/s²"
     if found.held_out is not None:
         held = found.held_out
@@ -60,7 +49,3 @@ def accelerometer_lines(found: AccelerometerEntry) -> Iterator[str]:
             f"at most {held.max_m_s2:.5f} off"
         )
     yield from (f"warning: {warning}" for warning in found.warnings)
-
-
-def _triple(values: Iterable[float], form: str) -> str:
-    return " ".join(f"{value:{form}}" for value in values)

@@ -11,6 +11,7 @@ from rich.table import Table
 from rig.data.result_file import BoardEntry, CheckEntry, ResultDocument, SensorEntry
 from rig.data.result_types import ErrorEntry
 from rig.report.accelerometer_table import accelerometer_lines, accelerometer_table
+from rig.report.axes import triple
 from rig.report.budget_table import budget_table
 from rig.report.drift_table import print_drifts
 from rig.report.earth_rate import earth_rate_lines
@@ -118,11 +119,11 @@ def _beside(sensor: SensorEntry) -> Iterator[str]:
         if isinstance(other, ErrorEntry):
             yield f"{name}: {other.error}"
         elif other.estimator != sensor.estimator:
-            yield f"{name}: k {_triple(other.scale, scale)}, b {_triple(other.bias_rad_s, bias)} rad/s"
+            yield f"{name}: k {triple(other.scale, scale)}, b {triple(other.bias_rad_s, bias)} rad/s"
     if sensor.board is not None:
         yield from _on_the_board(sensor.board)
     if not isinstance(vector, ErrorEntry):
-        skew = _triple(np.degrees(vector.non_orthogonality_rad), "+.3f")
+        skew = triple(np.degrees(vector.non_orthogonality_rad), "+.3f")
         std = max(np.degrees(vector.non_orthogonality_std_rad))
         yield f"non-orthogonality yz zx xy: {skew} ° (± {std:.3f})"
         yield from (f"warning: {warning}" for warning in vector.warnings)
@@ -139,7 +140,7 @@ def _speeds(sensor: SensorEntry) -> Iterator[str]:
         ("odd", found.odd_per_rad_s, found.odd_std_per_rad_s),
         ("even", found.even_per_rad_s, found.even_std_per_rad_s),
     ):
-        percent = _triple(np.multiply(100, values), "+.4f")
+        percent = triple(np.multiply(100, values), "+.4f")
         yield f"nonlinearity, {name}: {percent} % per rad/s (± {100 * max(std):.4f}), from {speeds} °/s"
 
 
@@ -149,11 +150,7 @@ def _on_the_board(board: BoardEntry) -> Iterator[str]:
     if found is None:
         yield "on the board: nothing was solved"
     elif found.status == "solved":
-        yield f"on the board: k {_triple(found.scale, '.5f')}, b {_triple(found.bias_rad_s, '+.5f')} rad/s"
+        yield f"on the board: k {triple(found.scale, '.5f')}, b {triple(found.bias_rad_s, '+.5f')} rad/s"
     else:
         yield f"on the board: {found.status}, from {found.observations} sweeps"
     yield from (f"not observed by the board: {sweep}" for sweep in board.not_observed)
-
-
-def _triple(values: Iterable[float], form: str) -> str:
-    return " ".join(f"{value:{form}}" for value in values)
