@@ -12,7 +12,7 @@ keeps what was measured.
 from rig.cli import run_script  # first: it keeps linear algebra to one thread
 
 # isort: split
-from rig.arm.motion import Dwell, Transfer
+from rig.arm.motion import Dwell, Rest, Transfer
 from rig.config.procedure_sections import StaticAttitudesSection
 from rig.plans.registry import Procedure
 from rig.plans.static_attitudes import plan_static_attitudes
@@ -29,6 +29,8 @@ def static_attitudes(rig: Verbs) -> None:
                 rig.move(step)  # to the next attitude
             case Dwell():
                 rig.dwell(step)  # let the sensors settle, then stand still
+            case Rest():
+                rig.rest(step)  # at home, where a field that drifts shows (procedure.field_test_s)
 
 
 PROCEDURE = Procedure(

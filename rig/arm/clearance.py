@@ -6,7 +6,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from rig.arm.kinematics import distance_to_forearm
+from rig.arm.kinematics import distance_to_forearm, distance_to_upper_arm
 from rig.arm.motion import Dwell, Plan, Rest, travel
 from rig.arm.state import Joints
 from rig.config.ur10e_limits import JOINT_LIMIT_RAD
@@ -21,11 +21,13 @@ FOREARM_CLEARANCE_M = 0.15
 # forearm reaches 0.06 to 0.07 m from its line; 0.045 m are left for half a flange or half a fixture.
 SWEEP_CLEARANCE_M = 0.115
 ALONG_THE_WAY_RAD = radians(2)
+ALONG_THE_EXTENSION_M = 0.05
 OTHER_ATTITUDES = "Bring wrist 2 nearer to -90 or 90 in procedure.attitudes, or turn wrist 1 so that it points away"
 OTHER_HOME = "Set wrist 1 in arm.home_deg between -180 and 0: then wrist 2 sweeps beside the forearm"
 NEARER_HOME = "Bring the arm near its home pose from the pendant"
 
 Offset = tuple[float, float, float]
+NONE: Offset = (0.0, 0.0, 0.0)
 
 
 class _Way(NamedTuple):
@@ -37,13 +39,14 @@ class _Way(NamedTuple):
     remedy: str
 
 
-def clearance_problems(plan: Plan, payload_centre_mm: Offset) -> list[Problem]:
+def clearance_problems(plan: Plan, payload_centre_mm: Offset, extension_mm: Offset = NONE) -> list[Problem]:
     """Dwells and motions that bring the flange or its payload's centre, x y z in its frame, too near the forearm.
 
-    By the nominal arm. What begins or ends at an attitude keeps `FOREARM_CLEARANCE_M`, all else `SWEEP_CLEARANCE_M`.
+    So with an extension from the flange to `extension_mm`, which keeps clear of the upper arm as well. By the nominal
+    arm. What begins or ends at an attitude keeps `FOREARM_CLEARANCE_M`, all else `SWEEP_CLEARANCE_M`.
     The way from where the arm stands is judged where the plan begins there.
     """
-    return [
+    near = [
         Problem(
             "forearm_too_near",
             f"{way.name} brings the {what} within {distance_m:.3f} m of the forearm's line, "
@@ -51,27 +54,48 @@ def clearance_problems(plan: Plan, payload_centre_mm: Offset) -> list[Problem]:
             way.remedy,
         )
         for way in _ways(plan)
-        for what, distance_m in [_nearest(way.q_rad, payload_centre_mm)]
+        for what, distance_m in [_nearest(way.q_rad, payload_centre_mm, extension_mm)]
         if distance_m < way.least_m
+    ]
+    return near + [
+        Problem(
+            "upper_arm_too_near",
+            f"{way.name} brings the extension within {distance_m:.3f} m of the middle of the upper arm, "
+            f"{SWEEP_CLEARANCE_M:g} m is the least",
+            "Take a shorter extension, or open the elbow in arm.home_deg",
+        )
+        for way in (_ways(plan) if any(extension_mm) else ())
+        for distance_m in [min(float(distance_to_upper_arm(way.q_rad, p).min()) for p in _along(extension_mm))]
+        if distance_m < SWEEP_CLEARANCE_M
     ]
 
 
-def keeps_clear(start_q_rad: Joints, target_q_rad: Joints, payload_centre_mm: Offset) -> bool:
-    """Whether a straight way in joint space is clear enough for sweeps and what lies between them.
+def keeps_clear(
+    start_q_rad: Joints, target_q_rad: Joints, payload_centre_mm: Offset, extension_mm: Offset = NONE
+) -> bool:
+    """Whether a straight way in joint space is clear enough of the forearm for sweeps and what lies between them.
 
     Nothing is said against one beyond the joints' limits, which is refused as that.
     """
     if not _within_limits(start_q_rad, target_q_rad):
         return True
-    _, distance_m = _nearest(_between(start_q_rad, target_q_rad), payload_centre_mm)
+    _, distance_m = _nearest(_between(start_q_rad, target_q_rad), payload_centre_mm, extension_mm)
     return distance_m >= SWEEP_CLEARANCE_M
 
 
-def _nearest(q_rad: Array, payload_centre_mm: Offset) -> tuple[str, float]:
+def _nearest(q_rad: Array, payload_centre_mm: Offset, extension_mm: Offset) -> tuple[str, float]:
     """What comes nearest to the forearm in the poses (N, 6), and how near, m."""
-    points = np.zeros(3), np.array(payload_centre_mm) / 1000
-    flange_m, payload_m = (float(distance_to_forearm(q_rad, point).min()) for point in points)
-    return ("flange", flange_m) if flange_m <= payload_m else ("payload", payload_m)
+    points = [("flange", np.zeros(3)), ("payload", np.array(payload_centre_mm) / 1000)]
+    points += [("extension", point) for point in (_along(extension_mm) if any(extension_mm) else ())]
+    distances = [(what, float(distance_to_forearm(q_rad, point).min())) for what, point in points]
+    return min(distances, key=lambda each: each[1])
+
+
+def _along(extension_mm: Offset) -> list[Array]:
+    """Points of an extension in the flange's frame, m, its end the last; those at the flange are the flange's own."""
+    end = np.array(extension_mm) / 1000
+    count = 1 + int(np.linalg.norm(end) / ALONG_THE_EXTENSION_M)
+    return [end * part / count for part in range(1, count + 1)]
 
 
 def _within_limits(*poses: Joints) -> bool:

@@ -15,6 +15,7 @@ from rig.estimation.arrays import Array
 
 ROUNDING = 1e-15
 WRIST_1, WRIST_2, WRIST_3 = 3, 4, 5
+UPPER_ARM_BESIDE_M = 0.1762  # shoulder_offset of Universal Robots' ROS description of the UR10e
 WAVES = ("cos", "sin", "cos 2", "sin 2")  # an eccentric or tilted graduation errs once and twice a turn
 AXIS_ERRORS = (  # all that can be wrong with the angles between the wrists' axes
     *(f"twist of wrist_{number}" for number in (1, 2, 3)),
@@ -120,11 +121,30 @@ def distance_to_forearm(q_rad: ArrayLike, point_m: ArrayLike = (0.0, 0.0, 0.0)) 
     For joint angles `q_rad` (…, 6) of the nominal arm.
     """
     frames = _frames(q_rad, NOMINAL)
-    elbow, wrist_1, flange = (frames[number][..., :3, 3] for number in (2, 3, 6))
-    point = flange + frames[6][..., :3, :3] @ np.asarray(point_m, dtype=np.float64)
-    forearm = wrist_1 - elbow
-    along = np.sum((point - elbow) * forearm, axis=-1) / np.sum(forearm**2, axis=-1)
-    nearest = elbow + np.clip(along, 0, 1)[..., None] * forearm
+    return _distance(_on_flange(frames, point_m), frames[2][..., :3, 3], frames[3][..., :3, 3])
+
+
+def distance_to_upper_arm(q_rad: ArrayLike, point_m: ArrayLike) -> Array:
+    """(…,) m from a point of the flange's frame to the middle of the upper arm, shoulder to elbow; as above.
+
+    It lies beside the line that the drawing has for it (`UPPER_ARM_BESIDE_M`), on the side of wrist 1.
+    """
+    frames = _frames(q_rad, NOMINAL)
+    beside = UPPER_ARM_BESIDE_M * frames[1][..., :3, 2]
+    return _distance(_on_flange(frames, point_m), frames[1][..., :3, 3] + beside, frames[2][..., :3, 3] + beside)
+
+
+def _on_flange(frames: list[Array], point_m: ArrayLike) -> Array:
+    """(…, 3) m, in the base frame, of a point of the flange's frame."""
+    point: Array = frames[6][..., :3, 3] + frames[6][..., :3, :3] @ np.asarray(point_m, dtype=np.float64)
+    return point
+
+
+def _distance(point: Array, start: Array, end: Array) -> Array:
+    """(…,) from points to the lines between starts and ends (…, 3)."""
+    way = end - start
+    along = np.sum((point - start) * way, axis=-1) / np.sum(way**2, axis=-1)
+    nearest = start + np.clip(along, 0, 1)[..., None] * way
     return np.asarray(np.linalg.norm(point - nearest, axis=-1), dtype=np.float64)
 
 

@@ -5,7 +5,7 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from rig.arm.clearance import clearance_problems
+from rig.arm.clearance import NONE, Offset, clearance_problems
 from rig.arm.condition import readiness
 from rig.arm.kinematics import NOMINAL, DenavitHartenberg, flange_axes
 from rig.arm.motion import SAME_PLACE_RAD, Motion, Plan, travel
@@ -27,15 +27,15 @@ MAX_TOOL_TURN_RAD = 1e-3  # what a pendant rounds is less, what somebody means i
 
 
 def plan_problems(
-    plan: Plan, payload_kg: float, payload_centre_mm: tuple[float, float, float] = (0.0, 0.0, 0.0)
+    plan: Plan, payload_kg: float, payload_centre_mm: Offset = NONE, extension_mm: Offset = NONE
 ) -> list[Problem]:
     """What is wrong with the plan itself: steps that are none, limits of position, speed, acceleration and payload.
 
-    And what brings the flange or its payload too near the forearm.
+    And what brings the flange or what it carries too near the arm.
     """
     problems = step_problems(plan)
     problems += [problem for motion in plan.motions if _travels(motion) for problem in _motion_problems(motion)]
-    problems += clearance_problems(plan, payload_centre_mm)
+    problems += clearance_problems(plan, payload_centre_mm, extension_mm)
     if not 0 <= payload_kg <= PAYLOAD_LIMIT_KG:
         problems.append(
             Problem(

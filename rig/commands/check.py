@@ -89,7 +89,7 @@ def _look_at_arm(found: Configured) -> list[str]:
     say(f"arm joints: {angles} °, speed slider {100 * state.target_speed_fraction:.0f} %")
     plan = found.phase.plan(state.q_rad)
     problems = [
-        *plan_problems(plan, section.payload_kg, section.payload_centre_mm),
+        *plan_problems(plan, section.payload_kg, section.payload_centre_mm, section.extension_mm),
         *arm_problems(plan, report),
         *kinematics_problems(section, report),
     ]

@@ -17,7 +17,8 @@ def plan(config_path: Path, overrides: Sequence[str], script: Path | None, *, as
     found = configured(config_path, overrides, script)
     steps = found.phase.plan()
     config = found.loaded.config
-    refuse(plan_problems(steps, config.arm.payload_kg, config.arm.payload_centre_mm))
+    arm = config.arm
+    refuse(plan_problems(steps, arm.payload_kg, arm.payload_centre_mm, arm.extension_mm))
     account = attitude_account(config, steps)
     print_plan(steps, account, repeated=found.phase.follows is not None, as_json=as_json)
     return 0

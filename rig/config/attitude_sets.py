@@ -19,9 +19,18 @@ EIGHTEEN: tuple[WristAngles, ...] = (
     *((45, -90, wrist_3) for wrist_3 in (-90, 90)),
     *((90, -90, 45), (135, -90, -180), (135, -90, 0)),
 )
+# The same and eight with wrist 2 turned away from the forearm. While it stands at one angle, what the arm's iron adds
+# along wrist 1's axis looks like a part of the room's field, and what it adds along the flange's like a bias.
+MAGNETIC: tuple[WristAngles, ...] = (
+    *EIGHTEEN,
+    *((wrist_1, -45, wrist_3) for wrist_1, wrist_3 in zip((-180, -90, 0, 90), (0, 90, -180, -90), strict=True)),
+    *((wrist_1, -45, wrist_3) for wrist_1, wrist_3 in zip((-135, -45, 45, 135), (-90, 0, 90, 180), strict=True)),
+)
 # Each side of the flange up twice, with opposite headings: best for a table whose attitudes are exact.
 FACES: tuple[WristAngles, ...] = (
     *((wrist_1, -90, wrist_3) for wrist_1 in (-180, 0) for wrist_3 in (-180, -90, 0, 90)),
     *((wrist_1, -90, wrist_3) for wrist_1 in (-90, 90) for wrist_3 in (-90, 90)),
 )
-SETS: Mapping[str, tuple[WristAngles, ...]] = MappingProxyType({"eighteen": EIGHTEEN, "faces": FACES})
+SETS: Mapping[str, tuple[WristAngles, ...]] = MappingProxyType(
+    {"eighteen": EIGHTEEN, "faces": FACES, "magnetic": MAGNETIC}
+)

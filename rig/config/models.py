@@ -27,7 +27,7 @@ from rig.config.section import (
     checked_port,
 )
 from rig.config.sensor_catalogue import MAGNETOMETERS
-from rig.config.sensor_sections import MagnetometerSection, SensorSection
+from rig.config.sensor_sections import MagnetometerSection, SensorSection, field_name
 from rig.config.ur10e_limits import PAYLOAD_LIMIT_KG, SPEED_LIMIT_DEG_S
 
 
@@ -40,6 +40,11 @@ class ArmSection(Section):
     )
     payload_centre_mm: tuple[Offset, Offset, Offset] = Field(
         default=(0.0, 0.0, 0.0), description="its centre of mass, x y z in the flange's frame"
+    )
+    extension_mm: tuple[Offset, Offset, Offset] = Field(
+        default=(0.0, 0.0, 0.0),
+        description="end of a non-magnetic extension on which the sensors sit, x y z in the flange's frame; it and all "
+        "between it and the flange keep clear of the arm",
     )
     home_deg: tuple[JointAngle, JointAngle, JointAngle, JointAngle, JointAngle, JointAngle] = Field(
         default=(0.0, -90.0, 90.0, -90.0, -90.0, 0.0),
@@ -174,8 +179,11 @@ class RigConfig(Section):
     ) -> dict[str, MagnetometerSection]:
         """A name stands for one sensor, and the link carries them too."""
         sensors = info.data.get("sensors", {})
-        if both := sorted(sensors.keys() & magnetometers.keys()):
+        of_kvhs = {field_name(name) for name, each in sensors.items() if each.serial and each.serial.message == "C"}
+        if both := sorted((sensors.keys() | of_kvhs) & magnetometers.keys()):
             raise ValueError(f"{', '.join(both)} is the name of one of the sensors already")
+        if both := sorted(sensors.keys() & of_kvhs):
+            raise ValueError(f"{', '.join(both)} is the name of a KVH 1775's magnetometer already")
         if not magnetometers or not sensors or "board" not in info.data:
             return magnetometers
         if info.data["board"] is None:

@@ -166,8 +166,8 @@ class AttitudesSection(ProcedureSection):
             min_length=1,
             max_length=100,
             description="`eighteen`, best for an arm whose attitudes are good to 1 mrad; `faces`, twelve that are best "
-            "for exact ones; or a list of your own, each the angles of wrists 1, 2 and 3; base, shoulder and elbow "
-            "stay as in `arm.home_deg`",
+            "for exact ones; `magnetic`, the eighteen and eight more for magnetometers; or a list of your own, each "
+            "the angles of wrists 1, 2 and 3; base, shoulder and elbow stay as in `arm.home_deg`",
             json_schema_extra={
                 "unit": "°",
                 "allowed": f"{', '.join(f'`{name}`' for name in SETS)} or a list of 3 numbers each",
@@ -183,6 +183,13 @@ class AttitudesSection(ProcedureSection):
         default=False,
         description="whether the attitudes must tell an accelerometer's second-order terms too, which triples the "
         "uncertainty of its bias",
+    )
+    field_test_s: float = Field(
+        default=0.0,
+        ge=0,
+        le=600,
+        description="standing still at home before the attitudes and after them, which shows whether the magnetic "
+        "field drifted; `0`: not at all",
     )
     repeats: int = Field(default=1, ge=1, le=100, description="how often all of it is done", json_schema_extra=RATIO)
     acceleration_deg_s2: float = Field(

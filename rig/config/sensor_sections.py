@@ -30,6 +30,11 @@ def mounting_matrix(mounting: "MountingSection") -> np.ndarray:
     return rows
 
 
+def field_name(sensor: str) -> str:
+    """The name of the magnetometer in the KVH 1775 called `sensor`."""
+    return f"{sensor}_field"
+
+
 class OwnPortSection(Section):
     """The serial port of a sensor that is not on the board, and what it sends there."""
 
@@ -46,7 +51,8 @@ class OwnPortSection(Section):
     message: Literal["A", "B", "C"] = Field(
         default="B",
         description="format of its messages: `B` has the sensor's own microseconds, by which lost messages are counted "
-        "beyond doubt; `A` and `C` have none, and `C` has its magnetic field",
+        "beyond doubt; `A` and `C` have none, and `C` has its magnetic field, recorded as the magnetometer "
+        "`<sensor>_field`",
     )
     rotation: Literal["delta", "rate"] = Field(
         default="delta",

@@ -6,6 +6,7 @@ from typing import Annotated, Any
 from pydantic import Field
 
 from rig.config.section import RATIO, Section, SensorName, Vector3
+from rig.config.world_magnetism import IronSection, SimulatedFieldSection, SimulatedMagnetometerSection
 
 Joint = Annotated[float, Field(ge=-0.1, le=0.1)]
 Joints = tuple[Joint, Joint, Joint, Joint, Joint, Joint]
@@ -21,6 +22,7 @@ Turn = Annotated[float, Field(ge=-180, le=180)]
 RATE_PER_K: dict[str, Any] = {"unit": "rad/s/K"}
 PER_RATE: dict[str, Any] = {"unit": "1/(rad/s)"}
 Cycles = Annotated[int, Field(ge=1, le=200)]
+Gradient = Annotated[float, Field(ge=-1000, le=1000)]
 
 
 class SiteSection(Section):
@@ -45,13 +47,24 @@ class SiteSection(Section):
         default=48.0,
         ge=0,
         le=1000,
-        description="size of the magnetic field, everywhere the same; the Earth's own is 22 to 67 (IGRF-13)",
+        description="size of the magnetic field at the base's origin; the Earth's own is 22 to 67 (IGRF-13)",
     )
     magnetic_dip_deg: float = Field(
         default=65.0, ge=-90, le=90, description="how far it points below the horizon; above it where negative"
     )
     magnetic_declination_deg: float = Field(
         default=0.0, ge=-180, le=180, description="where its horizontal part points: from north, clockwise from above"
+    )
+    magnetic_gradient_ut_m: tuple[Gradient, Gradient, Gradient, Gradient, Gradient] = Field(
+        default=(0.0, 0.0, 0.0, 0.0, 0.0),
+        description="how it changes with place, in the base's axes: ∂Bx/∂x, ∂Bx/∂y, ∂Bx/∂z, ∂By/∂y, ∂By/∂z; the others "
+        "follow where no current flows",
+        json_schema_extra={"unit": "µT/m"},
+    )
+    magnetic_drift_ut_min: tuple[Gradient, Gradient, Gradient] = Field(
+        default=(0.0, 0.0, 0.0),
+        description="how it changes with time, along the base's axes",
+        json_schema_extra={"unit": "µT/min"},
     )
 
 
@@ -132,6 +145,7 @@ class SimulatedArmSection(Section):
         default=0.0, ge=0, le=0.001, description="RMS of the time between a state's stamp and the look at the encoders"
     )
     calibration: CalibrationSection = CalibrationSection()
+    iron: dict[SensorName, IronSection] = Field(default={}, max_length=20)
     residue: ResidueSection = ResidueSection()
 
 
@@ -281,27 +295,10 @@ class SimulatedSensorSection(Section):
         default=SimulatedAccelerometerSection(),
         description="the accelerometer beside it, of a sensor that has `acceleration`",
     )
+    magnetometer: SimulatedFieldSection = Field(
+        default=SimulatedFieldSection(), description="the magnetometer beside it, of a `kvh1775` that sends format C"
+    )
     kvh1775: SimulatedKvhSection | None = Field(default=None, description="the instrument it is in, of a `kvh1775`")
-
-
-class SimulatedMagnetometerSection(Section):
-    """The truth of one simulated magnetometer, m = F B + b of the magnetic field B where it is."""
-
-    scale: Vector3 = Field(
-        default=(1.0, 1.0, 1.0),
-        description="scale factor of each axis: what the length of a row of F is 1 over",
-        json_schema_extra=RATIO,
-    )
-    bias_ut: Vector3 = Field(
-        default=NO_ROW, description="bias b of each axis, part of the reading: its own, and iron that turns with it"
-    )
-    noise_ut: float = Field(default=0.3, ge=0, description="standard deviation of a sample's noise")
-    non_orthogonality_deg: Vector3 = Field(
-        default=NO_ROW, description="by how much the angles between its axes x y, x z, y z are off 90°"
-    )
-    mounting_error_deg: Vector3 = Field(
-        default=NO_ROW, description="rotation vector by which it sits off its nominal mounting"
-    )
 
 
 class WorldSection(Section):

@@ -87,7 +87,8 @@ class RecordedSensor:
 class RecordedMagnetometer:
     """What a reader of the file must know about one magnetometer: field in tesla = counts × `sensitivity_t_per_count`.
 
-    `full_scale_counts` and `mounting` as of a `RecordedSensor`.
+    `full_scale_counts` and `mounting` as of a `RecordedSensor`. `within` names the sensor it is in, whose clock stamps
+    its samples; None where it is on the board.
     """
 
     part: str
@@ -97,6 +98,7 @@ class RecordedMagnetometer:
     sensitivity_t_per_count: Positive
     full_scale_counts: Annotated[int, Field(gt=0)]
     mounting: Annotated[tuple[Axis, ...], Field(min_length=3, max_length=3)]
+    within: str | None = None
 
     @property
     def mode(self) -> Literal["raw"]:
@@ -104,8 +106,8 @@ class RecordedMagnetometer:
         return "raw"
 
     def attributes(self) -> dict[str, Any]:
-        """As they stand in the file."""
-        return asdict(self)
+        """As of a `RecordedSensor`."""
+        return {name: value for name, value in asdict(self).items() if value is not None}
 
 
 @dataclass(frozen=True, slots=True)

@@ -25,9 +25,10 @@ if TYPE_CHECKING:
     from rig.config.judging_sections import SiteSection
     from rig.config.models import RigConfig
 
-SCHEMA = "rig.settings/5"
-# The first knows no site, the second no dwells, the third no magnetic field, the fourth no Earth's rate to be found.
-SCHEMAS = ("rig.settings/1", "rig.settings/2", "rig.settings/3", "rig.settings/4", SCHEMA)
+SCHEMA = "rig.settings/6"
+# The first knows no site, the second no dwells, the third no magnetic field, the fourth no Earth's rate to be found,
+# the fifth no extension.
+SCHEMAS = (*(f"rig.settings/{number}" for number in range(1, 6)), SCHEMA)
 
 DecisionRule = Literal["simple", "guard_band"]
 Vector3 = tuple[Finite, Finite, Finite]
@@ -143,7 +144,8 @@ class RunSettings:
     Recordings of before there was a `site` (None) are solved as they were then: neither gravity nor the Earth's rate is
     looked for, and a bias that wanders widens the variance of every average alike. Nor do they have an `uncertainty`
     beyond the noise. `second_order` says that accelerometers are looked for terms of that order, `finds_earth_rate`
-    that the Earth's rate is to be found from what the gyroscopes read, not taken from the site.
+    that the Earth's rate is to be found from what the gyroscopes read, not taken from the site. `extension_m` is where
+    the extension ends on which the sensors sit, in the flange's frame.
     """
 
     procedure: str
@@ -160,6 +162,7 @@ class RunSettings:
     planned_dwells: tuple[PlannedDwell, ...] = ()
     second_order: bool = False
     finds_earth_rate: bool = False
+    extension_m: Vector3 = (0.0, 0.0, 0.0)
 
     @property
     def movement(self) -> tuple[object, ...]:
@@ -213,7 +216,13 @@ def settings_of(config: "RigConfig", plan: "Plan") -> RunSettings:
         planned_dwells=_planned(plan.dwells),
         second_order=config.procedure.accelerometer_order == 2,
         finds_earth_rate=config.procedure.finds_earth_rate,
+        extension_m=_metres(config.arm.extension_mm),
     )
+
+
+def _metres(millimetres: Vector3) -> Vector3:
+    x, y, z = (each / 1000 for each in millimetres)
+    return x, y, z
 
 
 def _planned(dwells: "Sequence[Dwell]") -> tuple[PlannedDwell, ...]:

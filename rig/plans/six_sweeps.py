@@ -183,7 +183,7 @@ def _connected(
     yield from approach(start, home, speed, acceleration)
     here = home
     for sweep in sweeps:
-        if not _clear(here, sweep.start_q_rad, arm.payload_centre_mm):
+        if not _clear(here, sweep.start_q_rad, arm.payload_centre_mm, arm.extension_mm):
             yield from transfer("transfer home", here, home, speed, acceleration)
             here = home
         yield from transfer(f"transfer to the start of {sweep.name}", here, sweep.start_q_rad, speed, acceleration)

@@ -6,7 +6,7 @@ from functools import lru_cache
 
 import numpy as np
 
-from rig.arm.motion import Dwell, Plan, Step, trapezoid_duration
+from rig.arm.motion import Dwell, Plan, Rest, Step, trapezoid_duration
 from rig.arm.state import Joints
 from rig.config.models import ArmSection
 from rig.config.procedure_sections import AttitudesSection
@@ -35,17 +35,24 @@ def plan_static_attitudes(
 
 
 def dwells(arm: ArmSection, procedure: AttitudesSection, done: Collection[int] = (), first: int = 0) -> Iterator[Step]:
-    """The dwells with the ways to them, from home and back; none if all are `done`. They are counted from `first`."""
+    """The dwells with the ways to them, from home and back; none if all are `done`. They are counted from `first`.
+
+    With field tests at home before them and after.
+    """
     home = in_radians(arm.home_deg)
     speed, acceleration = math.radians(arm.transfer_speed_deg_s), math.radians(procedure.acceleration_deg_s2)
+    attitudes = enumerate(_order(arm, procedure) * procedure.repeats, first)
+    left = [Dwell(index, q, procedure.dwell_s, procedure.settle_s) for index, q in attitudes if index not in done]
+    if left and procedure.field_test_s > 0:
+        yield Rest("field test before the attitudes", procedure.field_test_s)
     here = home
-    for index, attitude in enumerate(_order(arm, procedure) * procedure.repeats, first):
-        if index not in done:
-            dwell = Dwell(index, attitude, procedure.dwell_s, procedure.settle_s)
-            yield from transfer(f"transfer to the {dwell.name}", here, attitude, speed, acceleration)
-            yield dwell
-            here = attitude
+    for dwell in left:
+        yield from transfer(f"transfer to the {dwell.name}", here, dwell.q_rad, speed, acceleration)
+        yield dwell
+        here = dwell.q_rad
     yield from transfer("transfer home", here, home, speed, acceleration)
+    if left and procedure.field_test_s > 0:
+        yield Rest("field test after the attitudes", procedure.field_test_s)
 
 
 @lru_cache(maxsize=16)

@@ -10,10 +10,10 @@ import numpy as np
 from numpy.typing import NDArray
 
 from firmware_host.client import Calibration
-from firmware_host.samples import SAMPLE_DTYPE
+from firmware_host.samples import FIELD_SAMPLE_DTYPE, SAMPLE_DTYPE
 from rig.data.run_file import RecordedSensor
 from rig.runner.sensors import corrected
-from rig.sensors.source import OnSamples, SampleSource
+from rig.sensors.source import OnSamples, Recorded, SampleSource
 
 
 @dataclass(frozen=True, slots=True)
@@ -24,12 +24,13 @@ class HostCorrected:
     calibration: Calibration
 
     @property
-    def sensors(self) -> dict[str, RecordedSensor]:
-        """As of `SampleSource`: rates in the same counts, corrected, without accelerations."""
+    def sensors(self) -> dict[str, Recorded]:
+        """As of `SampleSource`: rates in the same counts, corrected, without accelerations; fields as they come."""
         return {
             name: corrected(sensor, self.calibration, sensor.sensitivity_rad_s_per_count)
-            for name, sensor in self.source.sensors.items()
             if isinstance(sensor, RecordedSensor)
+            else sensor
+            for name, sensor in self.source.sensors.items()
         }
 
     def start(self) -> None:
@@ -42,10 +43,13 @@ class HostCorrected:
 
 
 def correcting(calibration: Calibration, sensitivity_rad_s: float, on_samples: OnSamples) -> OnSamples:
-    """Hands on M (m + b) for every reading m, in counts of `sensitivity_rad_s`."""
+    """Hands on M (m + b) for every reading m of a rate, in counts of `sensitivity_rad_s`; a field as it is."""
     matrix, bias = np.array(calibration.matrix), np.array(calibration.bias_rad_s) / sensitivity_rad_s
 
     def take(sensor: str, samples: NDArray[Any]) -> None:
+        if samples.dtype == FIELD_SAMPLE_DTYPE:
+            on_samples(sensor, samples)
+            return
         rates = np.zeros(len(samples), SAMPLE_DTYPE)
         for field in SAMPLE_DTYPE.names or ():
             rates[field] = samples[field]

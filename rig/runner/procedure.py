@@ -118,9 +118,10 @@ class Rig:
         Raises `Refused` naming every problem found; nothing has moved then.
         """
         report, payload = self.devices.report, self.devices.payload
-        problems = plan_problems(self.whole_plan, payload.payload_kg, payload.payload_centre_mm)
+        problems = plan_problems(self.whole_plan, payload.payload_kg, payload.payload_centre_mm, payload.extension_mm)
         problems += step_problems(self.plan)
-        problems += clearance_problems(self.plan, payload.payload_centre_mm)  # other ways, where steps are left out
+        # Other ways, where steps are left out.
+        problems += clearance_problems(self.plan, payload.payload_centre_mm, payload.extension_mm)
         refuse(list(dict.fromkeys([*problems, *arm_problems(self.plan, report)])))
         self.recording.station.event(PreflightPassed(self.plan, report))
         away_rad = max(map(abs, way_to_home(self.plan, report.state.q_rad)))

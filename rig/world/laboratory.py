@@ -60,7 +60,7 @@ class Laboratory:
         self.board: EmulatedBoard | None = None  # None: without power
         self._sensors: dict[str, SpiDevice] = {}
         self._faults: dict[str, Fault | None] = dict.fromkeys([*config.on_board, *world.magnetometers])
-        self._field = magnetic_field_of(world.site)
+        self._field = magnetic_field_of(world.site, tuple(world.arm.iron.values()))
         self.kvhs = mounts(config, world)
         self.plug_in()
         for name in self.kvhs:
@@ -68,7 +68,7 @@ class Laboratory:
 
     def switch_on(self, name: str) -> None:
         """Give the KVH 1775 of that name power, if it has none. Raises KeyError when there is no such sensor."""
-        self.kvhs[name].switch_on(self._motion_of, self._time_s)
+        self.kvhs[name].switch_on(self._motion_of, self._field_of, self._time_s)
 
     @property
     def _time_s(self) -> float:
@@ -141,4 +141,4 @@ class Laboratory:
 
     def _field_of(self, sensor: MountedMagnetometer) -> MotionAt:
         """What a magnetometer on the flange feels at such a time."""
-        return lambda time_s: sensor.feels(self._field, self.arm.frame_at(time_s))
+        return lambda time_s: sensor.feels(self._field, self.arm.frames_at(time_s), time_s)

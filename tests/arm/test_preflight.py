@@ -222,6 +222,19 @@ def test_what_the_flange_carries_is_kept_from_the_forearm_too() -> None:
     assert said == {"payload"}
 
 
+def test_an_extension_is_kept_from_the_forearm_and_from_the_upper_arm() -> None:
+    def problems(made: Plan, extension_mm: tuple[float, float, float]) -> set[str]:
+        return set(names(plan_problems(made, 0.3, extension_mm=extension_mm)))
+
+    magnetic = plan_static_attitudes(ARM, StaticAttitudesSection.model_validate({"attitudes": "magnetic"}))
+    assert problems(magnetic, (0.0, 0.0, 320.0)) == set()
+    # Along the forearm, to which wrist 1 at 0 turns it, it ends near the elbow.
+    assert problems(magnetic, (0.0, 0.0, 350.0)) == {"upper_arm_too_near"}
+    assert problems(attitudes((0, -90, 90)), (120.0, 0.0, 200.0)) == {"forearm_too_near"}, "to the side of the flange"
+    # Half of it may be nearer than its end.
+    assert problems(attitudes((45, -60, 0)), (0.0, 0.0, 300.0)) == set()
+
+
 def test_a_way_home_from_an_attitude_is_judged_too() -> None:
     back = Transfer("transfer home", (*HOME[:3], math.radians(45), math.radians(-200), 0.0), HOME, 1.0, 2.0, 3.0)
     dwell = Dwell(0, back.start_q_rad, 3.0, 5.0)

@@ -47,6 +47,16 @@ def test_a_name_is_one_sensors() -> None:
     assert problem.startswith("magnetometers") and "gyro is the name of one of the sensors already" in problem
 
 
+def test_the_magnetometer_of_a_kvh_has_a_name_too() -> None:
+    kvh = (CONFIGS / "kvh1775.yaml").read_text(encoding="utf-8")
+    taken = "sensors.kvh_field={part: adis16465, serial_number: A1}"
+    told = "world.sensors.kvh_field={scale: [1, 1, 1], bias_rad_s: [0, 0, 0]}"
+    board = "board.port=socket://127.0.0.8:7321"
+    parse(kvh, "kvh.yaml", [taken, told, board])
+    with pytest.raises(ConfigurationRefused, match="kvh_field is the name of a KVH 1775's magnetometer already"):
+        parse(kvh, "kvh.yaml", [taken, told, board, "sensors.kvh.serial.message=C"])
+
+
 def test_the_link_has_to_carry_it_too() -> None:
     """A gyroscope's rate that just fits alone."""
     fast = (

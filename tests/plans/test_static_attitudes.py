@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 from pydantic import ValidationError
 
-from rig.arm.motion import Dwell, Plan, Sweep, Transfer, trapezoid_duration
+from rig.arm.motion import Dwell, Plan, Rest, Sweep, Transfer, trapezoid_duration
 from rig.arm.preflight import plan_problems
 from rig.config.attitude_sets import EIGHTEEN, FACES
 from rig.config.load import load
@@ -61,6 +61,15 @@ def test_every_attitude_is_held_once_with_base_shoulder_and_elbow_at_home() -> N
     assert {(dwell.duration_s, dwell.settle_s) for dwell in made.dwells} == {(3.0, 5.0)}
     assert stands_where_it_came(made) and plan_problems(made, 0.35) == []
     assert made.dwells[0].name == "dwell at -45 -90 -45"
+
+
+def test_a_field_test_is_a_rest_at_home_before_and_after() -> None:
+    made = plan(attitudes="magnetic", field_test_s=5)
+    first, *_, last = made.steps
+    assert isinstance(first, Rest) and isinstance(last, Rest) and first.duration_s == last.duration_s == 5
+    assert len(made.dwells) == 26 and stands_where_it_came(made)
+    rest = plan_static_attitudes(ARM, StaticAttitudesSection(field_test_s=5), None, range(18))
+    assert rest.steps == (), "nothing is left to hold between them"
 
 
 def test_faces_are_held_by_their_name() -> None:

@@ -10,6 +10,7 @@ import numpy as np
 import pytest
 from numpy.typing import NDArray
 
+from rig.data.run_file import RecordedMagnetometer, RecordedSensor
 from rig.sensors.errors import SensorError
 from rig.sensors.kvh1775.driver import Kvh1775
 from rig.sensors.kvh1775.source import Kvh1775Source, kvh1775, look
@@ -25,10 +26,11 @@ class Collected:
 
     def __init__(self) -> None:
         self.parts: list[NDArray[Any]] = []
+        self.fields: list[NDArray[Any]] = []
 
     def __call__(self, sensor: str, samples: NDArray[Any]) -> None:
-        assert sensor == "kvh"
-        self.parts.append(samples)
+        assert sensor in ("kvh", "kvh_field")
+        (self.parts if sensor == "kvh" else self.fields).append(samples)
 
     @property
     def samples(self) -> NDArray[Any]:
@@ -76,6 +78,7 @@ def test_samples_are_what_the_instrument_feels(message: str, rotation: str) -> N
         with streaming(wire, **changes) as (source, collected):
             samples = collected.wait(source, 300)
             described = source.sensors["kvh"]
+    assert isinstance(described, RecordedSensor)
     rate = samples["counts"] * described.sensitivity_rad_s_per_count
     assert described.sensitivity_m_s2_per_count is not None
     force = samples["acceleration_counts"] * described.sensitivity_m_s2_per_count
@@ -86,6 +89,29 @@ def test_samples_are_what_the_instrument_feels(message: str, rotation: str) -> N
     steps_us = np.diff(samples["board_time_us"].astype(np.int64))
     assert set(steps_us.tolist()) <= {3999, 4000, 4001}
     assert (samples["temperature_counts"] * described.temperature_c_per_count == 22.0).all()
+
+
+FIELD_T = (2.1e-5, -0.4e-5, -4.2e-5)
+
+
+def test_format_c_has_its_magnetometer_as_a_sensor_of_its_own() -> None:
+    with (
+        kvh_on_a_wire(pace=4, field_at=lambda time_s: FIELD_T) as wire,
+        streaming(wire, message="C", rate_hz=250) as (source, collected),
+    ):
+        collected.wait(source, 300)
+        wire.order(lambda kvh: setattr(kvh.faults, "lose", 5))  # in two readings at least
+        collected.wait(source, 400)
+        described = source.sensors["kvh_field"]
+    assert isinstance(described, RecordedMagnetometer)
+    assert (described.within, described.rate_hz, described.serial_number) == ("kvh", 62.5, SERIAL_NUMBER)
+    samples = np.concatenate(collected.fields)
+    read_t = samples["field_counts"] * described.sensitivity_t_per_count
+    assert read_t == pytest.approx(np.tile(FIELD_T, (len(samples), 1)), abs=1e-11), "whole ones, each axis in its place"
+    steps = np.diff(samples["sequence"].astype(np.int64))
+    assert samples["sequence"][0] == 0 and np.count_nonzero(steps > 1) == 1 and steps.max() in (2, 3)
+    times_us = np.diff(samples["board_time_us"].astype(np.int64))
+    assert (np.abs(times_us - 16_000 * steps) <= 2).all(), "four messages each, across the wraps of their numbers"
 
 
 def test_what_somebody_left_is_corrected_and_stays_corrected() -> None:
@@ -232,6 +258,7 @@ def test_bit_errors_cost_messages_and_nothing_else() -> None:
         wire.line.bit_error_rate = 1e-4  # every thirtieth message
         samples = collected.wait(source, 3000)
         described = source.sensors["kvh"]
+    assert isinstance(described, RecordedSensor)
     assert len(samples) < samples["sequence"][-1] + 1
     rate = samples["counts"] * described.sensitivity_rad_s_per_count
     assert np.abs(rate - TURNING[:3]).max() < 1e-4

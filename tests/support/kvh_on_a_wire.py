@@ -13,7 +13,7 @@ from rig.config.world_models import SimulatedKvhSection, SimulatedSensorSection
 from rig.world.board.pty_port import PtyPort
 from rig.world.board.sensor_truth import SensorTruth
 from rig.world.board.serial_line import SerialLine
-from rig.world.kvh1775.instrument import Kvh1775
+from rig.world.kvh1775.instrument import Kvh1775, no_field
 from rig.world.kvh1775.memory import Memory
 
 SERIAL_NUMBER = "1775-7"
@@ -34,7 +34,7 @@ def section(port: str, **changes: object) -> SensorSection:
 class KvhOnAWire:
     """The instrument, `pace` times as fast as the clock on the wall, or `at_once`; it stands still at `limit_s`.
 
-    `motion_at`: what it feels at a time, rad/s and g.
+    `motion_at`: what it feels at a time, rad/s and g; `field_at`: the magnetic field in its axes, T.
     """
 
     def __init__(
@@ -43,8 +43,10 @@ class KvhOnAWire:
         motion_at: Callable[[float], Sequence[float]] = lambda time_s: STILL,
         pace: float = 1.0,
         on_for_s: float = 3.0,
+        field_at: Callable[[float], Sequence[float]] = no_field,
     ) -> None:
         self.memory = Memory(left)
+        self._field_at = field_at
         self._motion_at, self.on_for_s, self._pace = motion_at, on_for_s, pace
         self.time_s = 0.0
         self.kvh: Kvh1775 | None = None
@@ -66,6 +68,7 @@ class KvhOnAWire:
             truth,
             self._motion_at,
             self.memory,
+            field_at=self._field_at,
             serial_number=SERIAL_NUMBER,
             oscillator_ppm=SimulatedKvhSection().oscillator_ppm,
             on_for_s=self.on_for_s,
@@ -114,9 +117,10 @@ def kvh_on_a_wire(
     *,
     pace: float = 1.0,
     on_for_s: float = 3.0,
+    field_at: Callable[[float], Sequence[float]] = no_field,
 ) -> Iterator[KvhOnAWire]:
     """For the length of the `with` block."""
-    wire = KvhOnAWire(left or {}, motion_at, pace, on_for_s)
+    wire = KvhOnAWire(left or {}, motion_at, pace, on_for_s, field_at)
     try:
         yield wire
     finally:

@@ -10,13 +10,14 @@ from numpy.typing import NDArray
 
 from firmware_host.samples import IMU_SAMPLE_DTYPE, SAMPLE_DTYPE
 from rig.config.sensor_catalogue import PARTS
-from rig.config.sensor_sections import OwnPortSection, SensorSection, mounting_matrix
-from rig.data.run_file import RecordedSensor
+from rig.config.sensor_sections import OwnPortSection, SensorSection, field_name, mounting_matrix
+from rig.data.run_file import RecordedMagnetometer, RecordedSensor
 from rig.estimation.earth import STANDARD_GRAVITY_M_S2
 from rig.sensors.errors import SensorError
 from rig.sensors.kvh1775.driver import Kvh1775
+from rig.sensors.kvh1775.field import MESSAGES_EACH, FieldReader
 from rig.sensors.kvh1775.settings import Wanted, corrections, refusals
-from rig.sensors.source import OnSamples
+from rig.sensors.source import OnSamples, Recorded
 
 # The instrument sends single-precision floats; a sample holds whole numbers. This many stand for its full scale: far
 # finer than a float near it, and half of what 32 bits hold.
@@ -24,6 +25,7 @@ FULL_SCALE_COUNTS = 1 << 30
 GYROSCOPE_VALID, ACCELEROMETER_VALID = 0x07, 0x70
 INVALID_S = 1.0  # of messages in a row that say of themselves they are wrong
 DEGREES_PER_COUNT = 0.01
+FIELD_FULL_SCALE_T = 1e-3  # as far as samples reach; the ICD says nothing of the magnetometer's own range
 _UNKNOWN = 1 << 40  # temperature that nothing has told yet
 
 
@@ -43,6 +45,8 @@ class Kvh1775Source:
         self._invalid_in_a_row = 0
         self._temperature_counts = _UNKNOWN
         self._first: int | None = None  # number of the first message that became a sample
+        self._field_name, self._field = field_name(name), describe_field(name, section)
+        self._field_reader = FieldReader(FIELD_FULL_SCALE_T / FULL_SCALE_COUNTS, FULL_SCALE_COUNTS)
         self._driver = Kvh1775(name, line.port, line.baud, self._take)
         try:
             self.serial_number = self._driver.serial_number
@@ -64,9 +68,10 @@ class Kvh1775Source:
         return self._corrected
 
     @property
-    def sensors(self) -> Mapping[str, RecordedSensor]:
-        """The one there is."""
-        return {self._name: self._described}
+    def sensors(self) -> Mapping[str, Recorded]:
+        """The one there is, and its magnetometer in format C."""
+        field = {} if self._field is None else {self._field_name: self._field}
+        return {self._name: self._described, **field}
 
     def start(self) -> None:
         """As of `SampleSource`."""
@@ -81,7 +86,11 @@ class Kvh1775Source:
         self._driver.close()
 
     def _take(self, messages: NDArray[Any], numbers: NDArray[Any], times_us: NDArray[Any], host_time_s: float) -> None:
-        """On the reader's thread: what is valid, as samples."""
+        """On the reader's thread: what is valid, as samples. Nothing says of the field whether it is."""
+        if self._field is not None:
+            fields = self._field_reader.feed(messages, numbers, times_us, host_time_s)
+            if len(fields):
+                self._on_samples(self._field_name, fields)
         temperature_counts = self._temperatures(messages)
         valid = (messages["status"] & self._valid) == self._valid
         valid &= np.isfinite(messages["rotation"]).all(axis=1) & np.isfinite(messages["acceleration_g"]).all(axis=1)
@@ -165,6 +174,23 @@ def describe(section: SensorSection) -> RecordedSensor:
         mounting=tuple(tuple(row) for row in mounting_matrix(section.mounting).tolist()),
         range_m_s2=range_m_s2,
         sensitivity_m_s2_per_count=None if range_m_s2 is None else range_m_s2 / FULL_SCALE_COUNTS,
+    )
+
+
+def describe_field(name: str, section: SensorSection) -> RecordedMagnetometer | None:
+    """The same of its magnetometer; None where its messages have no field."""
+    if _line_of(section).message != "C":
+        return None
+    described = describe(section)
+    return RecordedMagnetometer(
+        part="kvh1775_magnetometer",
+        serial_number=section.serial_number,
+        rate_hz=section.rate_hz / MESSAGES_EACH,
+        range_t=FIELD_FULL_SCALE_T,
+        sensitivity_t_per_count=FIELD_FULL_SCALE_T / FULL_SCALE_COUNTS,
+        full_scale_counts=FULL_SCALE_COUNTS,
+        mounting=described.mounting,
+        within=name,
     )
 
 

@@ -1,34 +1,44 @@
 """How a simulated magnetometer sits on the flange, what it feels there, and what is wrong with it."""
 
+from collections.abc import Sequence
 from math import radians
 
 from firmware_host.emulator.magnetometer import MagnetometerTruth
-from rig.config.sensor_sections import MagnetometerSection
-from rig.config.world_models import SimulatedMagnetometerSection
+from rig.config.sensor_sections import MountingSection
+from rig.config.world_magnetism import SimulatedFieldSection
 from rig.world.board.sensor_truth import mounted_rows
-from rig.world.magnetic_field import MagneticField
+from rig.world.magnetic_field import MICROTESLA_T, Frames, MagneticField
 from rig.world.site import Vector
-from rig.world.ur10e.forward_kinematics import Rotation
-
-MICROTESLA_T = 1e-6
 
 
 class MountedMagnetometer:
-    """One of them; `truth` are its errors."""
+    """One of them; `truth` are its errors.
 
-    def __init__(self, section: MagnetometerSection, simulated: SimulatedMagnetometerSection) -> None:
+    It sits as `mounting` says, off by the rotation vector `mounting_error_deg`, `offset_mm` from the flange's centre.
+    """
+
+    def __init__(
+        self,
+        mounting: MountingSection,
+        simulated: SimulatedFieldSection,
+        mounting_error_deg: Sequence[float] = (0.0, 0.0, 0.0),
+        offset_mm: Sequence[float] = (0.0, 0.0, 0.0),
+    ) -> None:
         self.truth = MagnetometerTruth(
             scale=simulated.scale,
             bias_t=[MICROTESLA_T * bias for bias in simulated.bias_ut],
             noise_t=MICROTESLA_T * simulated.noise_ut,
             non_orthogonality_rad=[radians(angle) for angle in simulated.non_orthogonality_deg],
         )
-        self._rows = mounted_rows(section.mounting, simulated.mounting_error_deg)
+        self._rows = mounted_rows(mounting, mounting_error_deg)
+        self._offset_m = [1e-3 * offset for offset in offset_mm]
 
-    def feels(self, field: MagneticField, flange: tuple[Rotation, Vector]) -> Vector:
-        """The field in its own axes, T, where the flange has that rotation and place; it sits in its centre."""
-        rotation, place_m = flange
-        x, y, z = field.at(place_m)
+    def feels(self, field: MagneticField, frames: Frames, time_s: float) -> Vector:
+        """The field in its own axes, T, with the arm as its `frames` say, the flange's last."""
+        rotation, (x, y, z) = frames[-1]
+        p, q, r = self._offset_m
+        a, b, c = (row[0] * p + row[1] * q + row[2] * r for row in rotation)
+        x, y, z = field.at((x + a, y + b, z + c), frames, time_s)
         a, b, c = (column[0] * x + column[1] * y + column[2] * z for column in zip(*rotation, strict=True))
         u, v, w = (row[0] * a + row[1] * b + row[2] * c for row in self._rows)
         return u, v, w

@@ -53,7 +53,12 @@ def mount_magnetometers(
 ) -> dict[str, SpiDevice]:
     """The magnetometers of the `world:` section, by name. `field_of`: what each of them feels at any time, T."""
     mounted = {
-        name: MountedMagnetometer(config.magnetometers[name], simulated)
+        name: MountedMagnetometer(
+            config.magnetometers[name].mounting,
+            simulated,
+            simulated.mounting_error_deg,
+            config.arm.extension_mm if simulated.offset_mm is None else simulated.offset_mm,
+        )
         for name, simulated in sorted(world.magnetometers.items())
     }
     return {

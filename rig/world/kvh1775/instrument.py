@@ -9,9 +9,11 @@ from math import ceil
 from typing import cast
 
 import numpy as np
+from numpy.typing import NDArray
 
 from firmware_host.emulator.accelerometer import STANDARD_GRAVITY_M_S2, Accelerometer
 from firmware_host.emulator.gyroscope import Gyroscope
+from firmware_host.emulator.magnetometer import GAUSS_T, Magnetometer, MagnetometerTruth
 from rig.sensors.kvh1775.messages import ALL_VALID, GOOD_TEST_BYTE, SEQUENCE_NUMBERS, Format, encode_one, encode_test
 from rig.world.board.sensor_truth import SensorTruth
 from rig.world.kvh1775.memory import Memory
@@ -19,7 +21,12 @@ from rig.world.kvh1775.memory import Memory
 INTERNAL_STEP_S = 1e-3  # at most, between two looks at the motion that a delta angle is summed of
 LINE_END = b"\r\n"
 LONGEST_COMMAND = 200
-FIELD_GAUSS = (0.2, 0.0, -0.4)  # somewhere in Europe; nothing in the laboratory turns it
+PERFECT = MagnetometerTruth()
+
+
+def no_field(time_s: float) -> Sequence[float]:
+    """As in a chamber that keeps it out."""
+    return 0.0, 0.0, 0.0
 
 
 @dataclass(slots=True)
@@ -34,7 +41,8 @@ class Faults:
 class Kvh1775:
     """The instrument, switched on at the virtual time `time_s`, by when it has counted `on_for_s`.
 
-    `motion_at`: what it feels, rate in rad/s and specific force in g. `memory`: its settings, which it changes.
+    `motion_at`: what it feels, rate in rad/s and specific force in g; `field_at`: the flux density in its axes, T, with
+    `magnetometer` the errors of what reads that. `memory`: its settings, which it changes.
     """
 
     def __init__(
@@ -43,6 +51,8 @@ class Kvh1775:
         motion_at: Callable[[float], Sequence[float]],
         memory: Memory,
         *,
+        field_at: Callable[[float], Sequence[float]] = no_field,
+        magnetometer: MagnetometerTruth = PERFECT,
         serial_number: str,
         oscillator_ppm: float,
         on_for_s: float,
@@ -57,6 +67,7 @@ class Kvh1775:
         self._felt: Sequence[float] = ()
         self._gyroscope = Gyroscope(lambda time_s: self._felt, truth.gyro, seed, truth.temperature_c)
         self._accelerometer = Accelerometer(motion_at, truth.accelerometer, seed, truth.temperature_c)
+        self._magnetometer = Magnetometer(field_at, magnetometer, _another(seed))
         self._now_s = time_s
         self._sequence = 0
         self._command = bytearray()
@@ -144,11 +155,18 @@ class Kvh1775:
             status=self.faults.status,
             temperature=round(temperature),
             time_us=round((at_s - self._counted_from_s) * self._speed * 1e6) % 2**32,
-            fourth=(temperature, *FIELD_GAUSS)[sequence % 4],
+            fourth=temperature if sequence % 4 == 0 else self._field_gauss(at_s)[sequence % 4 - 1],
         )
         for count in self._tests_due:
             self._sent += encode_test(bytes([self.faults.test] + [GOOD_TEST_BYTE] * (count - 1)))
         self._tests_due.clear()
+
+    def _field_gauss(self, at_s: float) -> NDArray[np.float64]:
+        """Read anew for every message, of which format C sends one axis; the others send none."""
+        if self._memory["OUTPUTFMT"] != "C":
+            return np.zeros(3)
+        field: NDArray[np.float64] = self._memory.axes @ np.array(self._magnetometer.read(at_s)) / GAUSS_T
+        return field
 
     def _temperature(self, at_s: float) -> float:
         unit = self._memory["TEMPUNITS"]
@@ -175,3 +193,8 @@ class Kvh1775:
 
     def _answer(self, text: str) -> None:
         self._sent += text.encode("ascii", "replace") + LINE_END
+
+
+def _another(seed: np.random.SeedSequence) -> np.random.SeedSequence:
+    """For the magnetometer's noise, so that it leaves that of the other triads as it is."""
+    return np.random.SeedSequence(seed.entropy, spawn_key=(*seed.spawn_key, 1775))

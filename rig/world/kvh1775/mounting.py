@@ -9,6 +9,7 @@ from rig.config.models import RigConfig
 from rig.config.sensor_sections import AccelerationSection
 from rig.config.world_models import SimulatedKvhSection, WorldSection
 from rig.errors import Refused
+from rig.world.board.magnetometer_truth import MountedMagnetometer
 from rig.world.board.sensor_truth import SensorTruth
 from rig.world.kvh1775.instrument import Kvh1775
 from rig.world.kvh1775.memory import Memory
@@ -26,18 +27,29 @@ class Mount:
     memory: Memory
     kvh: Kvh1775 | None = None  # None: without power
 
-    def switch_on(self, motion_of: Callable[[SensorTruth], MotionAt], time_s: float) -> None:
+    def switch_on(
+        self,
+        motion_of: Callable[[SensorTruth], MotionAt],
+        field_of: Callable[[MountedMagnetometer], MotionAt],
+        time_s: float,
+    ) -> None:
         """Give it power at the virtual time `time_s`, if it has none."""
         if self.kvh is not None:
             return
         sensor, section = self.config.sensors[self.name], _section(self.world, self.name)
         # It sends accelerations whether the rig reads them or not.
         sensor = sensor.model_copy(update={"acceleration": sensor.acceleration or AccelerationSection()})
-        truth = SensorTruth(sensor, self.world.sensors[self.name], time_s)
+        simulated = self.world.sensors[self.name]
+        truth = SensorTruth(sensor, simulated, time_s)
+        magnetometer = MountedMagnetometer(
+            sensor.mounting, simulated.magnetometer, simulated.mounting_error_deg, simulated.offset_mm
+        )
         self.kvh = Kvh1775(
             truth,
             motion_of(truth),
             self.memory,
+            field_at=field_of(magnetometer),
+            magnetometer=magnetometer.truth,
             serial_number=section.serial_number or sensor.serial_number,
             oscillator_ppm=section.oscillator_ppm,
             on_for_s=section.on_for_s,

@@ -54,4 +54,5 @@ def _link(theta_rad: float, a_m: float, d_m: float, quarters: int, twist_rad: fl
     return Link(theta_rad, a_m, d_m, quarters * pi / 2 + twist_rad, cosine, sine)
 
 
+LINKS = ("base", "shoulder", "upper_arm", "forearm", "wrist_1", "wrist_2", "wrist_3")
 NOMINAL = links()

@@ -7,7 +7,7 @@ from rig.config.world_models import CalibrationSection, SimulatedArmSection
 from rig.world.clock import TICK_S
 from rig.world.site import Site
 from rig.world.ur10e.flange_motion import Felt, base, carried, turns_of
-from rig.world.ur10e.forward_kinematics import Rotation, Vector, flange_frame, flange_rate
+from rig.world.ur10e.forward_kinematics import Rotation, Vector, flange_rate, frames
 from rig.world.ur10e.joint_errors import Errors, JointErrors
 from rig.world.ur10e.joint_motion import Motion
 from rig.world.ur10e.links import NOMINAL, ZERO6, Links, links
@@ -84,10 +84,11 @@ class TrueArm:
         self._at_rest = now if resting else None
         return now
 
-    def frame_at(self, time_s: float) -> tuple[Rotation, Vector]:
-        """The flange's rotation (rows) and place (m) in the base frame, at such a time."""
+    def frames_at(self, time_s: float) -> list[tuple[Rotation, Vector]]:
+        """Rotation (rows) and place (m) in the base frame of the base and of what each joint carries, the flange last,
+        at such a time."""
         q, _, _ = self._joints_at(time_s * self._speed)
-        return flange_frame(q, self._links)
+        return list(frames(q, self._links))
 
     def _joints_at(self, controller_s: float) -> tuple[Joints, Joints, Joints]:
         """Angles, speeds and accelerations of the joints by the controller's seconds."""
