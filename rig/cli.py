@@ -112,6 +112,7 @@ def _parser() -> argparse.ArgumentParser:
     allan.add_argument("run", type=Path, metavar="RUN", help="a run folder or its run.h5")
     allan.add_argument("--plot", type=Path, metavar="DIR", help="draw the curves into this folder")
     allan.add_argument("--json", action="store_true", help="for machines")
+    _add_reversal(add("reversal", _reversal, "a magnetometer's own bias, from runs between which it was turned over"))
     report = add("report", _report, "the certificate of a finished run: HTML, PDF, digital certificate")
     report.add_argument("run", type=Path, metavar="RUN", help="a run folder or its result.json")
     report.add_argument(
@@ -192,6 +193,14 @@ def _add_kvh(kvh: argparse.ArgumentParser) -> None:
     _add_set(info, "change one value of the file")
     info.add_argument("--baud", type=int, metavar="BD", help="speed of its line (default: the file's, or 921600)")
     info.add_argument("--json", action="store_true", help="for machines")
+
+
+def _add_reversal(reversal: argparse.ArgumentParser) -> None:
+    reversal.add_argument(
+        "runs", type=Path, nargs="+", metavar="RUN", help="run folders, or their run.h5: two or three"
+    )
+    reversal.add_argument("--out", type=Path, metavar="FILE", help="write the JSON to this file too")
+    reversal.add_argument("--json", action="store_true", help="for machines")
 
 
 def _add_config(parser: argparse.ArgumentParser) -> None:
@@ -282,6 +291,12 @@ def _allan(options: argparse.Namespace) -> int:
     from rig.commands.allan import allan
 
     return allan(options.run, options.plot, as_json=options.json)
+
+
+def _reversal(options: argparse.Namespace) -> int:
+    from rig.commands.reversal import reversal
+
+    return reversal(options.runs, options.out, as_json=options.json)
 
 
 def _report(options: argparse.Namespace) -> int:

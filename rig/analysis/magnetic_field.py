@@ -1,30 +1,40 @@
 """Magnetometers from dwells in known attitudes: TRIAX, Eq. (7), on an arm.
 
-As they are mounted: iron and currents that turn with a magnetometer are part of what is found of it.
+As they are mounted: iron and currents that turn with a magnetometer are part of what is found of it, the arm's own
+among them, which no residual shows. Runs with the sensor turned over tell them apart: `rig.analysis.reversal`.
 """
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 from functools import partial
 
 import numpy as np
 
+from rig.analysis.acceleration import AccelerometerResult
 from rig.analysis.attitudes import scale_and_bias_covariance
 from rig.analysis.calibration import or_fault
 from rig.data.run_file import RecordedMagnetometer
 from rig.data.settings import RunSettings
 from rig.errors import Fault
 from rig.estimation.arrays import Array
-from rig.estimation.magnetometer import MagnetometerSolution, solve_magnetometer
+from rig.estimation.magnetometer import (
+    FieldDrift,
+    MagnetometerSolution,
+    Uniformity,
+    field_drift,
+    solve_magnetometer,
+    uniformity,
+)
 from rig.estimation.reference_model import F
 from rig.estimation.refusals import check_axes
 from rig.estimation.sensor_axes import angle_jacobian, nearest_rotation, non_orthogonality
-from rig.estimation.triaxial import Method
-from rig.observation.field import FieldReading, field_readings
+from rig.estimation.triaxial import UNTRUSTWORTHY_RAD, Method
+from rig.observation.field import FieldReading, beside, field_readings, field_tests
 from rig.observation.observed_run import ObservedRun
 
 ESTIMATOR: Method = "attitude_weighted"
 BESIDE: tuple[Method, ...] = ("maximum_likelihood", "as_published")
+ELSEWHERE = "Take iron and currents away, or measure farther from them; set the sensor farther from the arm"
 
 
 @dataclass(frozen=True, slots=True)
@@ -32,12 +42,16 @@ class MagnetometerResult:
     """One magnetometer's calibration m = F B + b in the axes of its nominal mounting, and what it rests on.
 
     `scale` (3,) is 1/‖row of F‖, relative to the field's size `field_t`; `covariance` (6, 6) that of scale and bias.
-    `beside` are the other methods' solutions, or the Fault each ends in.
+    `extension_m` (3,) is where it sits on the flange, `drift` how the field changed between tests at home, None where
+    there were fewer than two. `beside` are the other methods' solutions, or the Fault each ends in.
     """
 
     sensor: RecordedMagnetometer
     field_t: float
+    extension_m: tuple[float, float, float]
     solution: MagnetometerSolution
+    uniformity: Uniformity
+    drift: FieldDrift | None
     scale: Array
     covariance: Array
     non_orthogonality_rad: Array
@@ -54,22 +68,64 @@ class MagnetometerResult:
 
 
 def calibrate_magnetometers(
-    recordings: Sequence[ObservedRun], settings: RunSettings
+    recordings: Sequence[ObservedRun], settings: RunSettings, accelerometers: Mapping[str, AccelerometerResult]
 ) -> dict[str, MagnetometerResult | Fault]:
     """Every magnetometer that was recorded, or the Fault for which it is not calibrated.
 
-    `no_attitudes` where none were held, `field_strength_unknown`, those of `field_readings` and of `solve_triaxial`,
-    `swapped_axes`, `mirrored_axis`, `wrong_mounting`.
+    `accelerometers` say how far the arm's attitudes are off. The Fault is `no_attitudes` where none were held,
+    `field_strength_unknown`, `field_drifts`, `field_not_uniform`, one of those of `field_readings` and of
+    `solve_triaxial`, `swapped_axes`, `mirrored_axis`, `wrong_mounting`.
     """
     return {
-        name: or_fault(partial(_calibrated, name, sensor, recordings, settings))
+        name: or_fault(partial(_calibrated, name, sensor, recordings, settings, accelerometers))
         for name, sensor in recordings[0].run.magnetometers.items()
     }
 
 
 def _calibrated(
-    name: str, sensor: RecordedMagnetometer, recordings: Sequence[ObservedRun], settings: RunSettings
+    name: str,
+    sensor: RecordedMagnetometer,
+    recordings: Sequence[ObservedRun],
+    settings: RunSettings,
+    accelerometers: Mapping[str, AccelerometerResult],
 ) -> MagnetometerResult:
+    field_t, upwards = _known_field(settings)
+    dwells = tuple(each for run in recordings for each in field_readings(run, name, settings.observation))
+    drift = _drift(name, recordings, settings)
+    mounting = np.array(sensor.mounting)
+    attitudes = np.array([(mounting @ nearest_rotation(dwell.attitude)).T for dwell in dwells])
+    means = np.array([dwell.reading.mean for dwell in dwells])
+    variances = np.array([dwell.reading.variance for dwell in dwells])
+    solve = partial(solve_magnetometer, means, attitudes, variances, field_t=field_t, side=upwards)
+    solution = _solved(solve)
+    scale = 1 / np.linalg.norm(solution.matrix, axis=1)
+    axes = solution.matrix * scale[:, None]
+    check_axes(axes, np.eye(3))
+    alike = uniformity(solution, means, attitudes, variances, _attitude_error_rad(name, recordings, accelerometers))
+    if not alike.uniform:
+        raise Fault("field_not_uniform", _not_alike(alike, solution), ELSEWHERE)
+    angles = angle_jacobian(axes, scale, nearest_rotation(axes))
+    return MagnetometerResult(
+        sensor=sensor,
+        field_t=field_t,
+        extension_m=settings.extension_m,
+        solution=solution,
+        uniformity=alike,
+        drift=drift,
+        scale=scale,
+        covariance=scale_and_bias_covariance(solution.matrix, scale, solution.covariance),
+        non_orthogonality_rad=non_orthogonality(axes),
+        non_orthogonality_std_rad=np.sqrt(np.diag(angles @ solution.covariance[F, F] @ angles.T))[:3],
+        beside={method: or_fault(partial(solve, method=method)) for method in BESIDE},
+        dwells=dwells,
+    )
+
+
+def _known_field(settings: RunSettings) -> tuple[float, Array]:
+    """Its size, and a vector (3,) of the base frame on its side.
+
+    Raises Fault `no_attitudes`, `field_strength_unknown`.
+    """
     site = settings.site
     if not settings.planned_dwells:
         raise Fault(
@@ -83,29 +139,54 @@ def _calibrated(
             "recorded only: the size of the field is not given, and the scale of a magnetometer is relative to it",
             "Give site.magnetic_field_ut, as a reference magnetometer measured it where the sensor stands",
         )
-    dwells = tuple(each for run in recordings for each in field_readings(run, name, settings.observation))
-    mounting = np.array(sensor.mounting)
-    solve = partial(
-        solve_magnetometer,
-        np.array([dwell.reading.mean for dwell in dwells]),
-        np.array([(mounting @ nearest_rotation(dwell.attitude)).T for dwell in dwells]),
-        np.array([dwell.reading.variance for dwell in dwells]),
-        field_t=site.magnetic_field_t,
-        side=(1.0 if site.magnetic_field_upwards else -1.0) * np.array(site.up),
+    return site.magnetic_field_t, (1.0 if site.magnetic_field_upwards else -1.0) * np.array(site.up)
+
+
+def _drift(name: str, recordings: Sequence[ObservedRun], settings: RunSettings) -> FieldDrift | None:
+    """By the tests at home of all recordings; None where there is no second one. Raises Fault `field_drifts`."""
+    tests = [test for run in recordings for test in field_tests(run, name, settings.observation, settings.home_q_rad)]
+    if len(tests) < 2:
+        return None
+    repeatability_deg = 0.0 if settings.uncertainty is None else settings.uncertainty.repeatability_deg
+    found = field_drift(
+        [test.mean for test in tests], [test.variance for test in tests], float(np.radians(repeatability_deg))
     )
-    solution = solve(method=ESTIMATOR)
-    scale = 1 / np.linalg.norm(solution.matrix, axis=1)
-    axes = solution.matrix * scale[:, None]
-    check_axes(axes, np.eye(3))
-    angles = angle_jacobian(axes, scale, nearest_rotation(axes))
-    return MagnetometerResult(
-        sensor=sensor,
-        field_t=site.magnetic_field_t,
-        solution=solution,
-        scale=scale,
-        covariance=scale_and_bias_covariance(solution.matrix, scale, solution.covariance),
-        non_orthogonality_rad=non_orthogonality(axes),
-        non_orthogonality_std_rad=np.sqrt(np.diag(angles @ solution.covariance[F, F] @ angles.T))[:3],
-        beside={method: or_fault(partial(solve, method=method)) for method in BESIDE},
-        dwells=dwells,
+    if not found.steady:
+        change_t, std_t = np.linalg.norm(found.change_t), np.linalg.norm(found.std_t)
+        raise Fault(
+            "field_drifts",
+            f"at home the readings changed by {1e6 * change_t:.3f} µT between two tests, of which noise explains "
+            f"{1e6 * std_t:.3f}: a field that drifts reads as bias and scale",
+            "Find what changed (a lift, a vehicle, a current, a sensor that warms up), wait, and run again",
+        )
+    return found
+
+
+def _solved(solve: Callable[..., MagnetometerSolution]) -> MagnetometerSolution:
+    """Raises Fault `field_not_uniform`: the accelerometer has found the same attitudes good."""
+    try:
+        return solve(method=ESTIMATOR)
+    except Fault as fault:
+        if fault.name != "attitude_untrustworthy":
+            raise
+        what = f"the accelerometer agrees with the attitudes, the magnetometer does not ({fault.what})"
+        raise Fault("field_not_uniform", what, ELSEWHERE) from fault
+
+
+def _attitude_error_rad(
+    name: str, recordings: Sequence[ObservedRun], accelerometers: Mapping[str, AccelerometerResult]
+) -> float:
+    """How far off the arm's attitudes may be, with 2σ, by the accelerometer that stood in them on the same clock."""
+    by = next((other for run in recordings if (other := beside(run, name)) in accelerometers), None)
+    found = accelerometers[by] if by is not None else next(iter(accelerometers.values()))
+    error = found.solution.attitude_error
+    return min(error.std_rad + 2 * error.uncertainty_rad, UNTRUSTWORTHY_RAD)
+
+
+def _not_alike(found: Uniformity, solution: MagnetometerSolution) -> str:
+    left_t = np.sqrt(np.mean(solution.fit.residuals**2))
+    return (
+        f"the field is not the same in all attitudes: χ² of what the model leaves is {found.chi_square:.4g}, "
+        f"{found.limit:.3g} at most by noise and by attitudes off by {1e3 * found.attitude_error_rad:.2g} mrad; "
+        f"{1e6 * left_t:.3f} µT are left in the mean"
     )

@@ -121,7 +121,7 @@ def calibrated(runs: Sequence[RunData], estimator: str = DEFAULT_ESTIMATOR) -> O
         provenance=_origin(runs),
         clock=None if surroundings is None else surroundings.clock,
         accelerometers=accelerometers,
-        magnetometers=calibrate_magnetometers(recordings, settings),
+        magnetometers=calibrate_magnetometers(recordings, settings, accelerometers),
     )
 
 
@@ -150,7 +150,7 @@ def _in_attitudes(runs: Sequence[RunData], recordings: tuple[ObservedRun, ...]) 
         checks,
         _origin(runs),
         accelerometers=found,
-        magnetometers=calibrate_magnetometers(recordings, settings),
+        magnetometers=calibrate_magnetometers(recordings, settings, found),
     )
 
 

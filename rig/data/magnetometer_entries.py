@@ -1,6 +1,9 @@
 """What `result.json` says of magnetometers."""
 
+import json
 from typing import Literal
+
+from pydantic import Field
 
 from rig.data.result_types import Entry, ErrorEntry, Matrix3, Matrix6, PositiveVector3, Vector3
 
@@ -33,11 +36,37 @@ class FieldDwellEntry(Entry):
     duration_s: float
 
 
+class UniformityEntry(Entry):
+    """Whether the field was the same in all attitudes: χ² of the residuals, and `limit`, what noise rarely makes it.
+
+    `attitude_error_rad` is what the attitudes were allowed to be off about each axis, by the accelerometer's account.
+    """
+
+    chi_square: float
+    degrees_of_freedom: int
+    limit: float
+    attitude_error_rad: float
+
+
+class FieldDriftEntry(Entry):
+    """The largest change of the readings between two tests in one attitude, its σ, its χ², and what noise rarely makes
+    that."""
+
+    change_t: Vector3
+    std_t: Vector3
+    chi_square: float
+    limit: float
+
+
 class MagnetometerEntry(Entry):
     """A calibration m = F B + b of the magnetic field B in the axes of the nominal mounting.
 
     - It is that of the magnetometer as it is mounted: iron and currents that turn with it are part of F and b, and
       `hard_iron_t` is F⁻¹ b. No limit of the verdict judges it.
+    - `arm_field_in_bias`: the arm's own field, as far as it turns with the flange, is in the bias, and no residual
+      shows it. Runs with the sensor turned over tell them apart (`rig reversal`).
+    - `extension_m` is where it sits on the flange, `uniformity` whether the field was the same in all attitudes,
+      `drift` whether it stayed the same, null where it was not tested.
     - `covariance` is that of scale and bias; `field_t` what the scale factors are relative to.
     - `field_base_t` is the field in the arm's base frame, `attitude_error_rad` how far the arm's attitudes are off
       about each axis, by the readings' own account.
@@ -49,6 +78,10 @@ class MagnetometerEntry(Entry):
     range_t: float
     model: str
     estimator: Literal["attitude_weighted"]
+    arm_field_in_bias: bool = True
+    extension_m: Vector3 = (0.0, 0.0, 0.0)
+    uniformity: UniformityEntry | None = None
+    drift: FieldDriftEntry | None = None
     field_t: float
     scale: PositiveVector3
     bias_t: Vector3
@@ -68,3 +101,52 @@ class MagnetometerEntry(Entry):
     correction_matrix: Matrix3
     beside: dict[str, FieldSolutionEntry | ErrorEntry]
     warnings: tuple[str, ...]
+
+
+class AsMountedEntry(Entry):
+    """One run of a reversal: how the sensor was mounted, and the bias found so, with the arm's field in it."""
+
+    run: str
+    started_utc: str
+    mounting: Matrix3
+    bias_t: Vector3
+    bias_std_t: Vector3
+    field_base_t: Vector3
+
+
+class ReversalEntry(Entry):
+    """A magnetometer's bias and the arm's field, told apart by turning the sensor over.
+
+    - `bias_t` is the sensor's own, but on an axis that was never turned over: `arm_field_in_bias` is true there, and it
+      is the bias as mounted.
+    - `arm_field_t` is the arm's field in the sensor's axes as it was mounted in the first run; 0 on such an axis.
+    - `covariance` is that of bias and arm's field; `chi_square` whether the runs agree on what they share.
+    - `scale` and `correction_matrix` are the means of the runs'.
+    """
+
+    part: str
+    serial_number: str
+    scale: PositiveVector3
+    scale_std: Vector3
+    bias_t: Vector3
+    bias_std_t: Vector3
+    arm_field_in_bias: tuple[bool, bool, bool]
+    arm_field_t: Vector3
+    arm_field_std_t: Vector3
+    covariance: Matrix6
+    correction_matrix: Matrix3
+    chi_square: float
+    degrees_of_freedom: int
+    limit: float
+    runs: tuple[AsMountedEntry, ...]
+
+
+class ReversalDocument(Entry):
+    """What `rig reversal` finds, by magnetometer, of schema "rig.reversal/1"."""
+
+    schema_name: Literal["rig.reversal/1"] = Field(alias="schema")
+    magnetometers: dict[str, ReversalEntry]
+
+    def text(self) -> str:
+        """The JSON."""
+        return json.dumps(self.model_dump(by_alias=True), indent=2, allow_nan=False)

@@ -13,10 +13,13 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from rig.estimation.arrays import Array
-from rig.estimation.reference_model import KnownNorm
+from rig.estimation.attitude_error import effects, whitening_with
+from rig.estimation.reference_model import KnownNorm, most_likely, predicted, whitened
 from rig.estimation.triaxial import Method, TriaxialSolution, solve_triaxial
 
 MODEL = "m_m = F Rᵀ m + b"
+FREE = 14  # F and b, and the field's direction: its size is given
+FALSE_ALARM = 1e-3  # in which a steady, uniform field is refused for one of the two
 
 
 @dataclass(frozen=True, slots=True)
@@ -58,3 +61,73 @@ def field(readings_t: ArrayLike, solution: MagnetometerSolution) -> Array:
     """Calibrated readings (…, 3) in tesla, in body coordinates."""
     readings = np.asarray(readings_t, dtype=np.float64)
     return np.asarray((readings - solution.bias_t) @ np.linalg.inv(solution.matrix).T, dtype=np.float64)
+
+
+@dataclass(frozen=True, slots=True)
+class Uniformity:
+    """Whether the field was the same in all attitudes: χ² of what the model leaves, and what noise rarely makes it.
+
+    `attitude_error_rad` is how far off the attitudes were taken to be about each axis: what is left may turn the field
+    by so much, and may not change its size.
+    """
+
+    chi_square: float
+    degrees_of_freedom: int
+    limit: float
+    attitude_error_rad: float
+
+    @property
+    def uniform(self) -> bool:
+        """As far as residuals show it."""
+        return self.chi_square <= self.limit
+
+
+def uniformity(
+    solution: MagnetometerSolution,
+    readings_t: ArrayLike,
+    attitudes: ArrayLike,
+    variances_t2: ArrayLike,
+    attitude_error_rad: float,
+) -> Uniformity:
+    """What the best fit with attitudes off by so much leaves, from the `solution` of these readings."""
+    from scipy.stats import chi2
+
+    m, r, v = (np.asarray(a, dtype=np.float64) for a in (readings_t, attitudes, variances_t2))
+    v_bar = np.zeros_like(m)
+    start = np.concatenate([solution.matrix.ravel(), solution.field_table_t, solution.bias_t])
+    white = whitening_with(v, effects(start, r, v_bar), np.full(len(m), attitude_error_rad))
+    theta, _ = most_likely(start, m, r, v_bar, white, norm_known=True)
+    left = whitened(white, m - predicted(theta, r, v_bar))
+    freedom = left.size - FREE
+    return Uniformity(float(np.sum(left**2)), freedom, float(chi2.isf(FALSE_ALARM, freedom)), attitude_error_rad)
+
+
+@dataclass(frozen=True, slots=True)
+class FieldDrift:
+    """The largest change (3,) of the readings in one attitude, as χ² of its three components says, and its σ (3,).
+
+    `limit` is what that χ² rarely is by noise, however many changes there were to choose from.
+    """
+
+    change_t: Array
+    std_t: Array
+    chi_square: float
+    limit: float
+
+    @property
+    def steady(self) -> bool:
+        """Whether noise explains it."""
+        return self.chi_square <= self.limit
+
+
+def field_drift(means_t: ArrayLike, variances_t2: ArrayLike, repeatability_rad: float) -> FieldDrift:
+    """Of each reading (N, 3), N ≥ 2, from the first; the attitude comes back to `repeatability_rad` about each axis."""
+    from scipy.stats import chi2
+
+    m, v = (np.asarray(a, dtype=np.float64) for a in (means_t, variances_t2))
+    changes = m[1:] - m[0]
+    stds = np.sqrt(v[1:] + v[0] + 2 * (repeatability_rad * np.linalg.norm(m[0])) ** 2)
+    squares = np.sum((changes / stds) ** 2, axis=1)
+    worst = int(np.argmax(squares))
+    limit = float(chi2.isf(FALSE_ALARM / len(changes), 3))
+    return FieldDrift(changes[worst], stds[worst], float(squares[worst]), limit)

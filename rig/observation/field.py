@@ -1,16 +1,22 @@
-"""What a magnetometer read in dwells: its mean readings, each with the attitude the arm stood in. Pure."""
+"""What a magnetometer read at rest: its means in dwells, each with the attitude the arm stood in, and at home. Pure."""
 
+from collections.abc import Sequence
 from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
+from numpy.typing import NDArray
 
 from rig.data.settings import ObservationThresholds
 from rig.errors import Fault
 from rig.estimation.arrays import Array
-from rig.observation.acceleration import check_complete
+from rig.observation.acceleration import MIN_DWELL_SAMPLES, check_complete
 from rig.observation.average import Mean, mean_of
 from rig.observation.observed_run import ObservedRun
-from rig.observation.windows import Window
+from rig.observation.windows import Window, rested
+
+AT_HOME_RAD = 1e-3  # of any joint
+SETTLING_S = 0.2  # kept away from either end of a rest
 
 
 @dataclass(frozen=True, slots=True)
@@ -24,32 +30,88 @@ class FieldReading:
     window: Window
 
 
+def beside(recording: ObservedRun, name: str) -> str | None:
+    """The sensor whose clock stamps the samples of the magnetometer `name`, and whose accelerometer was read in dwells.
+
+    None where there is none.
+    """
+    within = recording.run.magnetometers[name].within
+    for other, found in recording.sensors.items():
+        on_this_clock = recording.run.sensors[other].on_board if within is None else other == within
+        if on_this_clock and found.dwells:
+            return other
+    return None
+
+
 def field_readings(recording: ObservedRun, name: str, thresholds: ObservationThresholds) -> tuple[FieldReading, ...]:
     """What a magnetometer read in the dwells of the recording that an accelerometer was read in.
 
-    The board's one clock stamps all its samples, so a gyroscope's time base serves; how late the magnetometer is beside
-    that gyroscope does not matter to a mean at rest. Raises Fault `lost_samples`, `saturation`.
+    One clock stamps the samples of both, so the gyroscope's time base serves; how late the magnetometer is beside that
+    gyroscope does not matter to a mean at rest. Raises Fault `lost_samples`, `saturation`.
     """
-    beside = next((sensor for sensor in recording.sensors.values() if sensor.dwells), None)
-    if beside is None:
+    other = beside(recording, name)
+    if other is None:
         return ()
-    samples, magnetometer = recording.run.samples[name], recording.run.magnetometers[name]
-    time_s = beside.time_base.controller_time_s(samples["board_time_us"] * 1e-6)
-    found = []
-    for dwell in beside.dwells:
-        where = f"dwell {dwell.index} ({dwell.name}) of {name}"
-        inside = samples[slice(*np.searchsorted(time_s, [dwell.window.start_s, dwell.window.end_s]).tolist())]
-        check_complete(inside, where, thresholds)
-        counts = inside["field_counts"].astype(np.int64)
-        if np.any(np.abs(counts) >= magnetometer.full_scale_counts):
-            raise Fault(
-                "saturation",
-                f"in {where} the field is beyond the magnetometer's range",
-                "Choose a wider range_gauss, or take away the iron beside it",
-            )
-        per_count_t = magnetometer.sensitivity_t_per_count
-        steady, known = np.zeros((len(counts), 1)), np.ones(len(counts), dtype=np.bool_)
-        readings_t: Array = counts.astype(np.float64) * per_count_t
-        reading = mean_of(readings_t, per_count_t, steady, known, as_before=False)
-        found.append(FieldReading(dwell.index, dwell.name, reading, dwell.attitude, dwell.window))
-    return tuple(found)
+    return tuple(
+        FieldReading(
+            dwell.index,
+            dwell.name,
+            _mean(recording, name, dwell.window, f"dwell {dwell.index} ({dwell.name})", thresholds),
+            dwell.attitude,
+            dwell.window,
+        )
+        for dwell in recording.sensors[other].dwells
+    )
+
+
+def field_tests(
+    recording: ObservedRun, name: str, thresholds: ObservationThresholds, home_q_rad: Sequence[float]
+) -> tuple[Mean, ...]:
+    """The mean readings in tesla of the rests at home, in their order. Raises as `field_readings`.
+
+    One of fewer samples than a dwell needs is none: the last samples of a run may still be on their way when it ends.
+    """
+    if beside(recording, name) is None:
+        return ()
+    windows = (Window(rest.start_s + SETTLING_S, rest.end_s - SETTLING_S) for rest in rested(recording.run))
+    return tuple(
+        _mean(recording, name, window, "a field test", thresholds)
+        for window in windows
+        if window.end_s > window.start_s
+        and _at_home(recording, window, home_q_rad)
+        and len(_inside(recording, name, window)) >= MIN_DWELL_SAMPLES
+    )
+
+
+def _at_home(recording: ObservedRun, rest: Window, home_q_rad: Sequence[float]) -> bool:
+    motion = recording.motion
+    states = motion.states[(motion.time_s >= rest.start_s) & (motion.time_s <= rest.end_s)]
+    return bool(len(states)) and bool(np.abs(states["q_rad"] - np.array(home_q_rad)).max() < AT_HOME_RAD)
+
+
+def _mean(recording: ObservedRun, name: str, window: Window, what: str, thresholds: ObservationThresholds) -> Mean:
+    magnetometer = recording.run.magnetometers[name]
+    where = f"{what} of {name}"
+    inside = _inside(recording, name, window)
+    check_complete(inside, where, thresholds)
+    counts = inside["field_counts"].astype(np.int64)
+    if np.any(np.abs(counts) >= magnetometer.full_scale_counts):
+        raise Fault(
+            "saturation",
+            f"in {where} the field is beyond the magnetometer's range",
+            "Choose a wider range_gauss, or take away the iron beside it",
+        )
+    per_count_t = magnetometer.sensitivity_t_per_count
+    steady, known = np.zeros((len(counts), 1)), np.ones(len(counts), dtype=np.bool_)
+    readings_t: Array = counts.astype(np.float64) * per_count_t
+    return mean_of(readings_t, per_count_t, steady, known, as_before=False)
+
+
+def _inside(recording: ObservedRun, name: str, window: Window) -> NDArray[Any]:
+    """The samples (n,) in it."""
+    other = beside(recording, name)
+    assert other is not None, "asked for only where there is one"
+    samples = recording.run.samples[name]
+    time_s = recording.sensors[other].time_base.controller_time_s(samples["board_time_us"] * 1e-6)
+    inside: NDArray[Any] = samples[slice(*np.searchsorted(time_s, [window.start_s, window.end_s]).tolist())]
+    return inside

@@ -3,15 +3,19 @@
 import numpy as np
 
 from rig.analysis.magnetic_field import ESTIMATOR, MagnetometerResult
-from rig.data.magnetometer_entries import FieldDwellEntry, FieldSolutionEntry, MagnetometerEntry
+from rig.data.magnetometer_entries import (
+    FieldDriftEntry,
+    FieldDwellEntry,
+    FieldSolutionEntry,
+    MagnetometerEntry,
+    UniformityEntry,
+)
 from rig.data.result_types import ErrorEntry
 from rig.errors import Fault
-from rig.estimation.arrays import Array
 from rig.estimation.magnetometer import MODEL, MagnetometerSolution
-from rig.observation.field import FieldReading
+from rig.report.axes import PARAMETERS, dwell_entry
 from rig.report.entry import entry
 
-PARAMETERS = ("kx", "ky", "kz", "bx", "by", "bz")
 UNITS = ("1", "1", "1", "T", "T", "T")
 
 
@@ -27,22 +31,17 @@ def magnetometer_entry(result: MagnetometerResult | Fault) -> MagnetometerEntry 
         estimator=ESTIMATOR,
         covariance_order=PARAMETERS,
         covariance_units=UNITS,
+        arm_field_in_bias=True,
+        uniformity=entry(UniformityEntry, result.uniformity),
+        drift=None if result.drift is None else entry(FieldDriftEntry, result.drift),
         field_base_t=solution.field_table_t,
         attitude_error_rad=error.std_rad,
         attitude_error_std_rad=error.uncertainty_rad if np.isfinite(error.uncertainty_rad) else None,
-        dwells=[_dwell(each, left) for each, left in zip(result.dwells, solution.fit.residuals, strict=True)],
+        dwells=[
+            dwell_entry(FieldDwellEntry, "t", each, left)
+            for each, left in zip(result.dwells, solution.fit.residuals, strict=True)
+        ],
         beside={method: _beside(found) for method, found in result.beside.items()},
-    )  # fmt: skip
-
-
-def _dwell(dwell: FieldReading, residual: Array) -> FieldDwellEntry:
-    return entry(
-        FieldDwellEntry, dwell, dwell.reading,
-        mean_t=dwell.reading.mean,
-        mean_std_t=np.sqrt(dwell.reading.variance),
-        noise_t=dwell.reading.noise,
-        residual_t=residual,
-        duration_s=dwell.window.end_s - dwell.window.start_s,
     )  # fmt: skip
 
 

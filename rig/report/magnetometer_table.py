@@ -1,51 +1,58 @@
 """A magnetometer's calibration as a person reads it: TRIAX, Eq. (7)."""
 
-from collections.abc import Iterable, Iterator
+from collections.abc import Iterator
 
 import numpy as np
 from rich.table import Table
 
 from rig.data.magnetometer_entries import MagnetometerEntry
 from rig.data.result_types import ErrorEntry
-from rig.station.plain_text import plain
+from rig.report.axes import axes_table, triple
 
 MICROTESLA = 1e6
+FAR_ENOUGH_M = 0.3  # from the flange: a housing of 0.2 A m² is 0.4 to 1.2 µT at 20 to 40 cm
 
 
 def magnetometer_table(name: str, found: MagnetometerEntry) -> Table:
     """Scale and bias of each axis, ± 2σ."""
     title = f"{name}, magnetometer as mounted: {found.part} {found.serial_number}, {found.model}, {found.estimator}"
-    table = Table(title=plain(title, "table.title"), title_justify="left")
-    for heading in ("axis", "scale factor", "± 2σ", "bias µT", "± 2σ µT"):
-        table.add_column(heading, justify="left" if heading == "axis" else "right")
-    for i, axis in enumerate("xyz"):
-        table.add_row(
-            axis,
-            f"{found.scale[i]:.6f}",
-            f"{2 * found.covariance[i][i] ** 0.5:.6f}",
-            f"{MICROTESLA * found.bias_t[i]:+.3f}",
-            f"{2 * MICROTESLA * found.covariance[3 + i][3 + i] ** 0.5:.3f}",
-        )
-    return table
+    per_unit = np.array([1, 1, 1, MICROTESLA, MICROTESLA, MICROTESLA])
+    covariance = np.array(found.covariance) * np.outer(per_unit, per_unit)
+    return axes_table(
+        title, found.scale, np.multiply(MICROTESLA, found.bias_t).tolist(), covariance.tolist(), unit="µT", digits=3
+    )
 
 
 def magnetometer_lines(found: MagnetometerEntry) -> Iterator[str]:
     """What stands below the table."""
     yield f"relative to a field of {MICROTESLA * found.field_t:g} µT; {len(found.dwells)} attitudes; no limit judges it"
     yield "iron and currents that turn with it are part of what is found"
-    yield f"field in the arm's base: {_triple(np.multiply(MICROTESLA, found.field_base_t), '+.3f')} µT"
+    yield "the arm's own field is in the bias; runs with the sensor turned over tell it apart: rig reversal"
+    yield from _tests(found)
+    yield f"field in the arm's base: {triple(np.multiply(MICROTESLA, found.field_base_t), '+.3f')} µT"
     skew, std = np.degrees(found.non_orthogonality_rad), np.degrees(found.non_orthogonality_std_rad)
-    yield f"non-orthogonality yz zx xy: {_triple(skew, '+.4f')} ° (± {2 * std.max():.4f})"
+    yield f"non-orthogonality yz zx xy: {triple(skew, '+.4f')} ° (± {2 * std.max():.4f})"
     known = "" if found.attitude_error_std_rad is None else f" (± {2e3 * found.attitude_error_std_rad:.2f})"
     yield f"attitude error found: {1e3 * found.attitude_error_rad:.2f} mrad about each axis{known}"
     for method, other in found.beside.items():
         if isinstance(other, ErrorEntry):
             yield f"{method}: {other.error}"
         else:
-            bias = _triple(np.multiply(MICROTESLA, other.bias_t), "+.3f")
-            yield f"{method}: k {_triple(other.scale, '.6f')}, b {bias} µT"
+            bias = triple(np.multiply(MICROTESLA, other.bias_t), "+.3f")
+            yield f"{method}: k {triple(other.scale, '.6f')}, b {bias} µT"
     yield from (f"warning: {warning}" for warning in found.warnings)
 
 
-def _triple(values: Iterable[float], form: str) -> str:
-    return " ".join(f"{value:{form}}" for value in values)
+def _tests(found: MagnetometerEntry) -> Iterator[str]:
+    """What shows, and what does not, that the field was the same everywhere and all the time."""
+    if (alike := found.uniformity) is not None:
+        yield f"uniform field: χ² of the residuals {alike.chi_square:.1f}, at most {alike.limit:.1f}"
+    if (drift := found.drift) is not None:
+        change, std = np.linalg.norm(drift.change_t), np.linalg.norm(drift.std_t)
+        yield f"at home before and after: changed by {MICROTESLA * change:.3f} µT (± {2 * MICROTESLA * std:.3f})"
+    else:
+        yield "no field test at home before and after: a field that drifts is not noticed (procedure.field_test_s)"
+    away_m = float(np.linalg.norm(found.extension_m))
+    if away_m < FAR_ENOUGH_M:
+        advised = f"{1e3 * FAR_ENOUGH_M:.0f} mm are advised (arm.extension_mm)"
+        yield f"it sits {1e3 * away_m:.0f} mm from the flange; {advised}"

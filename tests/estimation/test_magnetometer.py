@@ -5,7 +5,7 @@ import pytest
 
 from rig.errors import Fault
 from rig.estimation.arrays import Array
-from rig.estimation.magnetometer import field, solve_magnetometer
+from rig.estimation.magnetometer import field, field_drift, solve_magnetometer, uniformity
 from rig.estimation.reference_model import KnownNorm
 from rig.estimation.triaxial import EqualWeights, solve_triaxial_batch
 from support.rate_table import attitudes, noisy
@@ -69,3 +69,27 @@ def test_microtesla_given_as_tesla_are_refused() -> None:
     r = attitudes(20)
     with pytest.raises(Fault, match="wrong_unit"):
         solve_magnetometer(readings(r) * 1e6, r, VARIANCES * 1e12, field_t=NORM)
+
+
+def test_a_field_that_drifts_is_told_from_noise() -> None:
+    rng = np.random.default_rng(3)
+    means = np.array([26.2, -0.9, 34.1]) * 1e-6 + rng.normal(0.0, 0.02e-6, (4, 3))
+    variances = np.full((4, 3), (0.02e-6) ** 2)
+    assert field_drift(means, variances, 0.0).steady
+    means[2] += 0.2e-6
+    drifted = field_drift(means, variances, 0.0)
+    assert not drifted.steady and drifted.change_t == pytest.approx([0.2e-6] * 3, abs=0.1e-6)
+    assert field_drift(means, variances, 5e-3).steady, "the arm may stand elsewhere"
+
+
+def test_noise_seldom_makes_a_uniform_field_look_uneven_and_attitudes_that_are_known_to_be_off_do_not() -> None:
+    r = attitudes(20)
+    solution = solve_magnetometer(readings(r), r, VARIANCES, field_t=NORM, method="maximum_likelihood")
+    found = [uniformity(solution, noisy(readings(r), VARIANCES, seed=seed), r, VARIANCES, 0.0) for seed in range(40)]
+    assert (
+        np.mean([each.chi_square for each in found]) == pytest.approx(46, abs=5) and found[0].degrees_of_freedom == 46
+    )
+    assert all(each.uniform for each in found)
+    uneven = readings(r) * (1 + 0.02 * np.sin(np.arange(20)))[:, None]
+    assert not uniformity(solution, uneven, r, VARIANCES, 0.0).uniform
+    assert not uniformity(solution, uneven, r, VARIANCES, 5e-3).uniform, "attitudes do not change its size"

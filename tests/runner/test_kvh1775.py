@@ -99,6 +99,32 @@ def test_beside_a_board_whose_reference_verifies_it(tmp_path: Path) -> None:
 
 
 @pytest.mark.slow
+def test_its_magnetometer_is_calibrated_in_format_c(tmp_path: Path) -> None:
+    nine = [[0, -90, 0], [-90, -90, 0], [-90, -90, 90], [-180, -90, 45], [90, -90, -45], [45, -90, 90], [-45, -90, -90]]
+    field: dict[str, Any] = {
+        "sensors": {"kvh": {"rate_hz": 250, "acceleration": {"range_g": 10}, "serial": {"message": "C"}}},
+        "procedure": {"name": "static_attitudes", "attitudes": [*nine, [-135, -90, 135], [0, -45, 90]], "dwell_s": 0.8},
+        "limits": {"acceleration_scale_std": 0.01, "acceleration_bias_std_m_s2": 0.05},
+        "site": {"magnetic_field_ut": 48},
+        "world": {"sensors": {"kvh": {"magnetometer": {"bias_ut": [3, -2, 5], "noise_ut": 0.1}}}},
+    }
+    document = yaml.safe_load(configuration(tmp_path, field).read_text(encoding="utf-8"))
+    document["procedure"] = {**field["procedure"], "acceleration_deg_s2": 400, "field_test_s": 4}
+    (tmp_path / "config.yaml").write_text(yaml.safe_dump(document), encoding="utf-8")
+    done = rig("run", tmp_path / "config.yaml", "--out", tmp_path / "run")
+    assert done.returncode == 0, done.stderr + done.stdout
+    found = json.loads((tmp_path / "run" / "result.json").read_text(encoding="utf-8"))["magnetometers"]["kvh_field"]
+    std = np.sqrt(np.diag(found["covariance"]))
+    off = np.array(found["scale"] + found["bias_t"]) - [1, 1, 1, 3e-6, -2e-6, 5e-6]
+    assert (np.abs(off) < 4 * std).all() and std[3:].max() < 0.1e-6
+    assert (found["part"], found["serial_number"], found["arm_field_in_bias"]) == (
+        "kvh1775_magnetometer",
+        "1775-0042",
+        True,
+    )
+
+
+@pytest.mark.slow
 @pytest.mark.proof
 @pytest.mark.thorough
 @pytest.mark.timeout(900)

@@ -27,9 +27,20 @@ TRUTH: dict[str, Any] = {
 COMPASS = {"part": "lsm9ds1_magnetometer", "serial_number": "LSM9DS1-001"}
 NINE = [[0, -90, 0], [-90, -90, 0], [-90, -90, 90], [-180, -90, 45], [90, -90, -45], [45, -90, 90], [-45, -90, -90]]
 NINE += [[-135, -90, 135], [0, -90, -135]]
-ATTITUDES = {"name": "static_attitudes", "attitudes": NINE, "dwell_s": 0.6, "acceleration_deg_s2": 700}
+NINE += [[0, -45, 90], [90, -45, 0]]  # without these no residual shows what the arm adds along wrist 1's axis
+ATTITUDES = {
+    "name": "static_attitudes",
+    "attitudes": NINE,
+    "dwell_s": 0.6,
+    "field_test_s": 4.0,
+    "acceleration_deg_s2": 700,
+}
+# Along the axis of wrist 3, where no residual shows it; 0.36 m from the sensor, which feels 1.3 µT of it.
+IRON = {"carried_by": "wrist_2", "place_mm": [0, 0, 56.55], "moment_a_m2": [0, 0, 0.3]}
+ARM_FIELD_UT = 0.2 * 0.3 / 0.36**3
+OVER = {"x": "+x", "y": "-y", "z": "-z"}
 LABORATORY: dict[str, Any] = {
-    "arm": {"transfer_speed_deg_s": 170},
+    "arm": {"transfer_speed_deg_s": 170, "extension_mm": [0, 0, 300]},
     "sensors": {"gyro": {"acceleration": {"range_g": 2}}},
     "magnetometers": {"compass": COMPASS},
     "site": SITE,
@@ -42,6 +53,7 @@ LABORATORY: dict[str, Any] = {
     "world": {
         "time_scale": 20,
         "site": {"magnetic_field_ut": 50.0, "magnetic_dip_deg": 60, "magnetic_declination_deg": 30},
+        "arm": {"iron": {"housing": IRON}},
         "magnetometers": {"compass": TRUTH},
     },
 }
@@ -76,27 +88,77 @@ def test_the_field_is_recorded_beside_the_rates_and_nothing_is_lost(
     assert run.provenance.sensor_serial_numbers["compass"] == "LSM9DS1-001"
 
 
-def test_dwells_tell_scale_bias_and_angles_as_they_are(finished: tuple[Path, dict[str, Any], str]) -> None:
+def test_dwells_tell_scale_bias_and_angles_as_mounted(finished: tuple[Path, dict[str, Any], str]) -> None:
     _, result, printed = finished
     found = result["magnetometers"]["compass"]
     std = np.sqrt(np.diag(found["covariance"]))
-    off = np.array(found["scale"] + found["bias_t"]) - [*TRUTH["scale"], *(1e-6 * np.array(TRUTH["bias_ut"]))]
+    mounted_ut = np.add(TRUTH["bias_ut"], (0, 0, ARM_FIELD_UT / TRUTH["scale"][2]))
+    off = np.array(found["scale"] + found["bias_t"]) - [*TRUTH["scale"], *(1e-6 * mounted_ut)]
     assert np.abs(off / std).max() < 4
+    assert found["bias_t"][2] - 1e-6 * TRUTH["bias_ut"][2] > 5 * std[5], "the arm's field is in it"
+    assert found["arm_field_in_bias"] and found["extension_m"] == [0, 0, 0.3]
+    assert found["uniformity"]["chi_square"] < found["uniformity"]["limit"]
+    assert found["drift"]["chi_square"] < found["drift"]["limit"]
     assert std[:3].max() < 0.01 and std[3:].max() < 0.5e-6
     skew = np.array(found["non_orthogonality_rad"]) - np.radians([0.4, -0.3, 0.5])
     assert np.all(np.abs(skew) < 4 * np.array(found["non_orthogonality_std_rad"]))
-    assert len(found["dwells"]) == 9 and found["field_t"] == 50e-6
+    assert len(found["dwells"]) == 11 and found["field_t"] == 50e-6
     # North lies along the base's x axis, the field's level part 30° clockwise of it, towards −y.
     level, down = 50e-6 * np.cos(np.radians(60)), 50e-6 * np.sin(np.radians(60))
     true = [level * np.cos(np.radians(30)), -level * np.sin(np.radians(30)), -down]
     assert found["field_base_t"] == pytest.approx(true, abs=1e-6)
     assert "magnetometer as mounted" in printed and "no limit judges it" in printed
+    certificate = (finished[0] / "certificate.html").read_text(encoding="utf-8")
+    assert "The bias is that of the magnetometer as mounted" in certificate
     assert not [check for check in result["checks"] if check["name"].startswith("compass")]
 
 
 def test_solving_the_recording_equals_the_run(finished: tuple[Path, dict[str, Any], str]) -> None:
     out, result, _ = finished
     assert json.loads(rig("solve", out, "--json").stdout)["magnetometers"] == result["magnetometers"]
+
+
+def test_turning_it_over_tells_its_own_bias_from_the_arms_field(
+    finished: tuple[Path, dict[str, Any], str], tmp_path: Path
+) -> None:
+    turned = {"sensors": {"gyro": {"mounting": OVER}}, "magnetometers": {"compass": {"mounting": OVER}}}
+    over = tmp_path / "over"
+    done = rig("run", configuration(tmp_path, merge(LABORATORY, turned), ATTITUDES), "--out", over)
+    assert done.returncode == 0, done.stdout + done.stderr
+    told = rig("reversal", finished[0], over, "--json", "--out", tmp_path / "reversal.json")
+    assert told.returncode == 0, told.stderr
+    found = json.loads(told.stdout)["magnetometers"]["compass"]
+    assert found["arm_field_in_bias"] == [True, False, False]
+    off = np.array(found["bias_t"]) - 1e-6 * np.array(TRUTH["bias_ut"])
+    assert np.all(np.abs(off) < 3 * np.array(found["bias_std_t"]))
+    assert found["arm_field_t"][2] == pytest.approx(1e-6 * ARM_FIELD_UT, abs=4 * found["arm_field_std_t"][2])
+    assert (tmp_path / "reversal.json").read_text(encoding="utf-8") == told.stdout
+    said = rig("reversal", finished[0], over).stdout
+    assert "x: never turned over" in said
+    refused = rig("reversal", finished[0], finished[0])
+    assert refused.returncode == 2 and "mounting_not_turned" in refused.stderr
+
+
+@pytest.mark.parametrize(
+    "world",
+    [
+        {"site": {"magnetic_gradient_ut_m": [2.0, 1.0, -3.0, 1.0, 1.0]}},
+        {
+            "arm": {"iron": {"housing": {"moment_a_m2": [0.12, 0.12, 0.1]}}},
+            "magnetometers": {"compass": {"offset_mm": [0, 0, 100]}},
+        },
+    ],
+    ids=["gradient", "iron"],
+)
+def test_a_room_or_an_arm_that_bends_the_field_is_refused(tmp_path: Path, world: dict[str, Any]) -> None:
+    out = tmp_path / "run"
+    done = rig("run", configuration(tmp_path, merge(LABORATORY, {"world": world}), ATTITUDES), "--out", out)
+    assert done.returncode == 0, done.stdout + done.stderr
+    result = json.loads((out / "result.json").read_text(encoding="utf-8"))
+    assert result["magnetometers"]["compass"]["error"].startswith("field_not_uniform: ")
+    assert "was recorded and not calibrated: field_not_uniform" in (out / "certificate.html").read_text(
+        encoding="utf-8"
+    )
 
 
 def test_sweeps_record_a_magnetometer_and_say_that_they_do_not_calibrate_it(tmp_path: Path) -> None:
@@ -144,7 +206,8 @@ def with_every_third_sample_lost(run: RunData) -> RunData:
         (read_as(lambda counts: np.clip(20.0 * counts, -32767, 32767)), "saturation"),
         (read_as(lambda counts: counts[:, [1, 2, 0]]), "swapped_axes"),
         (read_as(lambda counts: counts * [-1, 1, 1]), "mirrored_axis"),
-        (read_as(lambda counts: counts + np.linspace(0, 1000, len(counts))[:, None]), "attitude_untrustworthy"),
+        (read_as(lambda counts: counts + np.linspace(0, 1000, len(counts))[:, None]), "field_drifts"),
+        (read_as(lambda counts: counts + 5 * np.sin(np.linspace(0, 80, len(counts)))[:, None]), "field_not_uniform"),
     ],
 )
 def test_a_field_that_does_not_calibrate_says_why_and_costs_the_accelerometer_nothing(

@@ -7,7 +7,9 @@ from dataclasses import dataclass
 from datetime import date, datetime
 
 from rig.data.accelerometer_entries import AccelerometerEntry
+from rig.data.magnetometer_entries import MagnetometerEntry
 from rig.data.result_file import CheckEntry, ProvenanceEntry, ResultDocument, SensorEntry, VerificationEntry
+from rig.data.result_types import ErrorEntry
 from rig.report.certificate.stated import Stated
 
 # The checks that hold a property of the item against a limit; the others ask whether the measurement is fit for use.
@@ -60,6 +62,12 @@ class Certificate:
         times = (self.provenance.started_utc, *self.provenance.resumed_utc, *self.provenance.verified_utc)
         days = sorted(datetime.fromisoformat(each).date() for each in times)
         return days[0], days[-1]
+
+    @property
+    def magnetometers(self) -> Mapping[str, MagnetometerEntry]:
+        """Those that were calibrated."""
+        found = self.result.magnetometers.items()
+        return {name: each for name, each in found if isinstance(each, MagnetometerEntry)}
 
     @property
     def guarded(self) -> bool:
@@ -145,6 +153,11 @@ def _deviations(result: ResultDocument) -> Iterator[str]:
         yield from (f"{name}: {warning}" for warning in getattr(sensor.vector_model, "warnings", ()))
     for name, accelerometer in result.accelerometers.items():
         yield from (f"{name}, accelerometer: {warning}" for warning in accelerometer.warnings)
+    for name, magnetometer in result.magnetometers.items():
+        if isinstance(magnetometer, ErrorEntry):
+            yield f"{name}, magnetometer, was recorded and not calibrated: {magnetometer.error}"
+        else:
+            yield from (f"{name}, magnetometer: {warning}" for warning in magnetometer.warnings)
     if not provenance.model_dump().get("script_installed", True):
         yield f"The movement was that of a script of the laboratory's own, {provenance.model_dump().get('script')}."
 

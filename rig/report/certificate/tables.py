@@ -8,6 +8,7 @@ import numpy as np
 
 from rig.data.accelerometer_entries import AccelerometerEntry
 from rig.data.budget_entries import BudgetEntry, ContributorEntry
+from rig.data.magnetometer_entries import MagnetometerEntry
 from rig.data.result_file import CheckEntry, SensorEntry, VectorEntry, VerificationEntry
 from rig.report.certificate.rounding import rounded
 
@@ -35,6 +36,15 @@ class AxisRow:
     scale: Pair
     bias: Pair
     bias_deg: Pair
+
+
+@dataclass(frozen=True, slots=True)
+class FieldRow:
+    """One axis of a magnetometer."""
+
+    axis: str
+    scale: Pair
+    bias: Pair
 
 
 @dataclass(frozen=True, slots=True)
@@ -100,6 +110,20 @@ def acceleration_rows(found: AccelerometerEntry) -> list[AxisRow]:
         )
         for i, axis in enumerate(AXES)
     ]
+
+
+def field_rows(found: MagnetometerEntry) -> list[FieldRow]:
+    """Two standard deviations of the solution's; the bias in µT."""
+    spread = [2 * found.covariance[i][i] ** 0.5 for i in range(6)]
+    return [
+        FieldRow(axis, pair(found.scale[i], spread[i]), pair(1e6 * found.bias_t[i], 1e6 * spread[3 + i]))
+        for i, axis in enumerate(AXES)
+    ]
+
+
+def distance(vector: Sequence[float]) -> float:
+    """The length of it."""
+    return math.hypot(*vector)
 
 
 def _noise(sensor: SensorEntry) -> list[float]:

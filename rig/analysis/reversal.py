@@ -1,0 +1,92 @@
+"""Runs of one magnetometer with the sensor turned over between them: its own bias, and the arm's field."""
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+
+from rig.analysis.magnetic_field import MagnetometerResult
+from rig.analysis.outcome import Outcome
+from rig.errors import Fault, Refused
+from rig.estimation.arrays import Array
+from rig.estimation.reference_model import BIAS
+from rig.estimation.reversal import Reversal, separate
+
+ALIKE = "Give runs of one magnetometer on one arm, in the same attitudes and at the same place, turned over in between"
+
+
+@dataclass(frozen=True, slots=True)
+class AsMounted:
+    """What one run found; `run` names it."""
+
+    run: str
+    outcome: Outcome
+    result: MagnetometerResult
+
+
+@dataclass(frozen=True, slots=True)
+class MagnetometerReversal:
+    """One magnetometer in several runs. `scale` (3,) and `correction_matrix` (3, 3) are the means of theirs."""
+
+    runs: tuple[AsMounted, ...]
+    found: Reversal
+    scale: Array
+    scale_std: Array
+    correction_matrix: Array
+
+
+def reversals(runs: Sequence[tuple[str, Outcome]]) -> dict[str, MagnetometerReversal]:
+    """Every magnetometer of the first run, from runs (at least two) with their names.
+
+    Raises Refused `too_few_runs`, `no_magnetometer` where it was not recorded or not calibrated in one of them,
+    `runs_do_not_match` naming what differs, and as `separate` does.
+    """
+    if len(runs) < 2:
+        raise Refused("too_few_runs", "one run does not tell a bias from the arm's field", ALIKE)
+    names = list(runs[0][1].magnetometers)
+    if not names:
+        raise Refused("no_magnetometer", f"{runs[0][0]} has recorded no magnetometer", "Give runs with one")
+    return {name: _reversal([_as_mounted(run, outcome, name) for run, outcome in runs]) for name in names}
+
+
+def _as_mounted(run: str, outcome: Outcome, name: str) -> AsMounted:
+    result = outcome.magnetometers.get(name)
+    if result is None:
+        raise Refused("no_magnetometer", f"{run} has recorded no magnetometer {name}", ALIKE)
+    if isinstance(result, Fault):
+        raise Refused("no_magnetometer", f"in {run} {name} was not calibrated: {result}", "Mend that, and run again")
+    return AsMounted(run, outcome, result)
+
+
+def _reversal(runs: Sequence[AsMounted]) -> MagnetometerReversal:
+    first = _what_must_be_alike(runs[0])
+    for other in runs[1:]:
+        for what, value in _what_must_be_alike(other).items():
+            if value != first[what]:
+                raise Refused("runs_do_not_match", f"{runs[0].run} and {other.run} differ in {what}", ALIKE)
+    results = [each.result for each in runs]
+    found = separate(
+        np.array([each.solution.bias_t for each in results]),
+        np.array([each.solution.covariance[BIAS, BIAS] for each in results]),
+        np.array([each.solution.matrix for each in results]),
+        np.array([each.sensor.mounting for each in results]),
+    )
+    variances = [np.diag(each.covariance)[:3] for each in results]
+    return MagnetometerReversal(
+        tuple(runs),
+        found,
+        np.mean([each.scale for each in results], axis=0),
+        np.sqrt(np.sum(variances, axis=0)) / len(runs),
+        np.mean([each.correction_matrix for each in results], axis=0),
+    )
+
+
+def _what_must_be_alike(run: AsMounted) -> dict[str, object]:
+    sensor, settings = run.result.sensor, run.outcome.settings
+    return {
+        "the magnetometer": (sensor.part, sensor.serial_number),
+        "the arm": run.outcome.provenance.recorded.arm_serial_number,
+        "the attitudes": settings.planned_dwells,
+        "where it sits on the flange (arm.extension_mm)": run.result.extension_m,
+        "the size of the field (site.magnetic_field_ut)": run.result.field_t,
+    }

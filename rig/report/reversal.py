@@ -1,0 +1,67 @@
+"""What turning a magnetometer over tells, for people and for machines."""
+
+from collections.abc import Iterator, Mapping
+
+import numpy as np
+from rich.console import Console
+
+from rig.analysis.reversal import AsMounted, MagnetometerReversal
+from rig.data.magnetometer_entries import AsMountedEntry, ReversalDocument, ReversalEntry
+from rig.report.axes import axes_table, triple
+from rig.report.entry import entry
+from rig.report.magnetometer_table import MICROTESLA
+from rig.station.plain_text import plain
+
+
+def reversal_document(found: Mapping[str, MagnetometerReversal]) -> ReversalDocument:
+    """In SI units."""
+    entries = {name: _entry(each) for name, each in found.items()}
+    return ReversalDocument.model_validate({"schema": "rig.reversal/1", "magnetometers": entries})
+
+
+def print_reversal(document: ReversalDocument, *, as_json: bool) -> None:
+    """On stdout: tables for people, JSON of schema "rig.reversal/1" for machines."""
+    if as_json:
+        print(document.text())
+        return
+    console = Console(highlight=False)
+    for name, found in document.magnetometers.items():
+        title = f"{name}, magnetometer turned over: {found.part} {found.serial_number}, {len(found.runs)} runs"
+        covariance = np.diag(np.square([*found.scale_std, *np.multiply(MICROTESLA, found.bias_std_t)]))
+        bias = np.multiply(MICROTESLA, found.bias_t).tolist()
+        console.print(axes_table(title, found.scale, bias, covariance.tolist(), unit="µT", digits=3))
+        for line in _lines(found):
+            console.print(plain(line))
+
+
+def _lines(found: ReversalEntry) -> Iterator[str]:
+    mixed = [axis for axis, held in zip("xyz", found.arm_field_in_bias, strict=True) if held]
+    if mixed:
+        yield f"{' '.join(mixed)}: never turned over, so the arm's field is in the bias there, as mounted"
+    else:
+        yield "the sensor's own on all axes: the arm's field is told apart"
+    field = triple(np.multiply(MICROTESLA, found.arm_field_t), "+.3f")
+    yield f"arm's field in its axes in the first run: {field} µT (± {2 * MICROTESLA * max(found.arm_field_std_t):.3f})"
+    yield f"the runs agree: χ² {found.chi_square:.1f}, at most {found.limit:.1f}"
+    for run in found.runs:
+        yield f"as mounted in {run.run}: b {triple(np.multiply(MICROTESLA, run.bias_t), '+.3f')} µT"
+
+
+def _entry(reversal: MagnetometerReversal) -> ReversalEntry:
+    std = np.sqrt(np.diag(reversal.found.covariance))
+    return entry(
+        ReversalEntry, reversal.found, reversal, reversal.runs[0].result.sensor,
+        bias_std_t=std[:3],
+        arm_field_std_t=std[3:],
+        runs=tuple(map(_as_mounted, reversal.runs)),
+    )  # fmt: skip
+
+
+def _as_mounted(run: AsMounted) -> AsMountedEntry:
+    solution = run.result.solution
+    return entry(
+        AsMountedEntry, run, run.result.sensor, solution,
+        started_utc=run.outcome.provenance.recorded.started_utc,
+        bias_std_t=np.sqrt(np.diag(solution.covariance))[12:],
+        field_base_t=solution.field_table_t,
+    )  # fmt: skip
