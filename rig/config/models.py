@@ -153,6 +153,8 @@ class RigConfig(Section):
             if place in places:
                 raise ValueError(f"{places[place]} and {name} are both {what}")
             places[place] = name
+        if both := sorted(sensors.keys() & _fields_of_kvhs(sensors)):
+            raise ValueError(f"{', '.join(both)} is the name of a KVH 1775's magnetometer already")
         references = [name for name, sensor in sensors.items() if sensor.role == "reference"]
         if len(references) > 1:
             raise ValueError(f"{' and '.join(references)} have role: reference; at most one sensor can")
@@ -179,11 +181,8 @@ class RigConfig(Section):
     ) -> dict[str, MagnetometerSection]:
         """A name stands for one sensor, and the link carries them too."""
         sensors = info.data.get("sensors", {})
-        of_kvhs = {field_name(name) for name, each in sensors.items() if each.serial and each.serial.message == "C"}
-        if both := sorted((sensors.keys() | of_kvhs) & magnetometers.keys()):
+        if both := sorted((sensors.keys() | _fields_of_kvhs(sensors)) & magnetometers.keys()):
             raise ValueError(f"{', '.join(both)} is the name of one of the sensors already")
-        if both := sorted(sensors.keys() & of_kvhs):
-            raise ValueError(f"{', '.join(both)} is the name of a KVH 1775's magnetometer already")
         if not magnetometers or not sensors or "board" not in info.data:
             return magnetometers
         if info.data["board"] is None:
@@ -216,6 +215,11 @@ class RigConfig(Section):
     def reference(self) -> tuple[str, SensorSection] | None:
         """The sensor whose calibration is known, with its name, if there is one."""
         return next(((name, s) for name, s in self.sensors.items() if s.role == "reference"), None)
+
+
+def _fields_of_kvhs(sensors: Mapping[str, SensorSection]) -> set[str]:
+    """The names of the magnetometers that format C brings along."""
+    return {field_name(name) for name, each in sensors.items() if each.serial and each.serial.message == "C"}
 
 
 def _streams(sensors: Mapping[str, SensorSection]) -> dict[str, Stream]:
