@@ -79,7 +79,7 @@ def test_the_iteration_settles_and_leaves_what_first_order_cannot_explain() -> N
 
 @pytest.mark.slow
 @pytest.mark.parametrize("method", METHODS)
-@pytest.mark.parametrize("second_order", [False, True])
+@pytest.mark.parametrize("second_order", [pytest.param(False, marks=[pytest.mark.proof, pytest.mark.thorough]), True])
 def test_the_covariance_is_that_of_repeated_calibrations(method: EqualWeights, second_order: bool) -> None:
     r = attitudes(14)
     variances = VARIANCES[:14] * 25  # loud enough that rounding is nowhere near

@@ -40,7 +40,9 @@ def test_the_covariance_of_a_walk_is_that_of_many_walks() -> None:
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize("noise_rad_s", [0.00045, 0.002])  # of a sample, at 200 Hz: ADIS16465, LSM9DS1
+@pytest.mark.parametrize(  # of a sample, at 200 Hz: ADIS16465, LSM9DS1
+    "noise_rad_s", [pytest.param(0.00045, marks=[pytest.mark.proof, pytest.mark.thorough]), 0.002]
+)
 def test_a_bias_that_walks_is_as_uncertain_as_it_has_to_be(noise_rad_s: float) -> None:
     windows_s, rates = session()
     variances = noise_rad_s**2 / (200 * (windows_s[:, 1:] - windows_s[:, :1])) * np.ones(3)
@@ -68,12 +70,13 @@ def solve(means: Array, rates: Array, variances: Array, process: BiasProcess, wi
 
 
 @pytest.mark.slow
-def test_a_steady_bias_is_stated_hardly_less_well_than_if_it_were_known_to_be() -> None:
+@pytest.mark.proof
+def test_a_steady_bias_is_stated_hardly_less_well_than_if_it_were_known_to_be(thorough: bool) -> None:
     windows_s, rates = session()
     variances = np.full((12, 3), 1e-10)
     rng = np.random.default_rng(3)
     widths, errors = [], []
-    for _ in range(200):
+    for _ in range(200 if thorough else 80):
         means = rates + np.sqrt(variances) * rng.standard_normal((12, 3))
         process = expected_bias_process(design_matrix(rates, None), means, variances, windows_s)
         found = solve(means, rates, variances, process, windows_s)
