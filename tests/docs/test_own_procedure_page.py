@@ -6,7 +6,7 @@ from pathlib import Path
 
 import pytest
 
-from support.commands import rig
+from support.commands import rig_here
 from support.paths import CONFIGS, DOCS
 
 pytestmark = pytest.mark.slow
@@ -24,7 +24,7 @@ def test_the_page_s_procedure_plans_as_it_says(tmp_path: Path) -> None:
     script, config = tmp_path / "warm_up.py", tmp_path / "warm_up.yaml"
     script.write_text(shown("python"), encoding="utf-8")
     config.write_text(shown("yaml").replace("demo.yaml", str(CONFIGS / "demo.yaml")), encoding="utf-8")
-    planned = rig("plan", config, "--script", script, "--json")
+    planned = rig_here("plan", config, "--script", script, "--json")
     assert planned.returncode == 0, planned.stderr
     steps = json.loads(planned.stdout)["steps"]
     assert (steps[0]["kind"], steps[0]["duration_s"]) == ("rest", 600)

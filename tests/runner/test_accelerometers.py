@@ -18,7 +18,7 @@ from rig.analysis.outcome import calibrated
 from rig.data.events import DwellFinished, DwellStarted
 from rig.data.run_file import RunData, read_run
 from rig.errors import Fault
-from support.commands import configuration, rig, wait_for_log
+from support.commands import configuration, rig, rig_here, wait_for_log
 from support.worlds import merge
 
 ACCELEROMETER: dict[str, Any] = {
@@ -102,7 +102,7 @@ def test_attitudes_alone_calibrate_the_accelerometer(in_attitudes: Finished) -> 
 
 def test_a_worse_limit_fails_the_verdict(in_attitudes: Finished) -> None:
     out, *_ = in_attitudes
-    judged = rig("solve", out, "--set", "limits.acceleration_verification_m_s2=1e-6", "--json")
+    judged = rig_here("solve", out, "--set", "limits.acceleration_verification_m_s2=1e-6", "--json")
     failed = [check["name"] for check in json.loads(judged.stdout)["checks"] if not check["passed"]]
     assert judged.returncode == 1 and failed == ["gyro.acceleration_verification"]
 
@@ -123,7 +123,7 @@ def test_one_run_calibrates_gyroscope_and_accelerometer(imu: Finished) -> None:
 
 def test_solving_the_recording_equals_the_run(imu: Finished) -> None:
     out, result, *_ = imu
-    solved = json.loads(rig("solve", out, "--json").stdout)
+    solved = json.loads(rig_here("solve", out, "--json").stdout)
     assert solved["accelerometers"] == result["accelerometers"] and solved["sensors"] == result["sensors"]
 
 
@@ -220,8 +220,10 @@ def test_a_turned_tool_frame_is_refused_before_attitudes(tmp_path: Path) -> None
     assert "rig: tcp_rotated: " in ran.stderr and "to zero on the pendant" in ran.stderr
 
 
+@pytest.mark.proof
+@pytest.mark.thorough
 def test_an_interrupted_run_goes_on_where_it_stood(tmp_path: Path) -> None:
-    """Dwells that are finished are not repeated."""
+    """Dwells that are finished are not repeated; in `make test`, test_drifting.py kills such a run and resumes it."""
     config, out = configuration(tmp_path, LABORATORY, ATTITUDES), tmp_path / "run"
     command = [sys.executable, "-m", "rig", "run", str(config), "--out", str(out)]
     with subprocess.Popen(command, stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True) as running:

@@ -15,7 +15,7 @@ import yaml
 from scipy.spatial.transform import Rotation
 
 from rig.data.run_file import read_run
-from support.commands import configuration
+from support.commands import configuration, rig_here
 from support.drawn_laboratory import truth
 from support.ideal import ideal_document
 from support.paths import CONFIGS
@@ -102,7 +102,7 @@ def test_gravitys_share_of_what_is_left_is_told(finished: Finished) -> None:
     gravity = np.array([turn["gravity_rad_s"][2] for turn in upright])
     print(f"along the axis {along}, without gravity {along - gravity} rad/s")
     assert np.abs(along - gravity).max() < np.abs(along).min() / 2
-    shown = subprocess.run(command("solve", out), capture_output=True, text=True, timeout=240, check=False)
+    shown = rig_here("solve", out)
     assert "of which gravity" in shown.stdout
 
 
@@ -132,7 +132,7 @@ def test_the_stored_calibration_is_the_one_that_was_found(finished: Finished) ->
     assert "stored on the board: gyro" in log
     kept = result["provenance"]["stored_calibrations"]["gyro"]
     assert np.allclose(kept["scale"], result["sensors"]["gyro"]["scale"], rtol=1e-6)
-    again = subprocess.run(command("solve", out, "--json"), capture_output=True, text=True, timeout=240, check=False)
+    again = rig_here("solve", out, "--json")
     assert again.returncode == 0, again.stderr
     solved = json.loads(again.stdout)
     assert solved["sensors"] == result["sensors"] and solved["verification"] == result["verification"]
@@ -140,9 +140,7 @@ def test_the_stored_calibration_is_the_one_that_was_found(finished: Finished) ->
 
 def test_a_verifications_recording_alone_is_no_calibration(finished: Finished) -> None:
     out, _, _ = finished
-    alone = subprocess.run(
-        command("solve", out / "verify.h5", "--json"), capture_output=True, text=True, timeout=240, check=False
-    )
+    alone = rig_here("solve", out / "verify.h5", "--json")
     document = json.loads(alone.stdout)
     assert document["sensors"] == {} and document["verification"]["gyro"]["before"] is None
     assert {check["name"] for check in document["checks"]} == VERIFIED
@@ -151,9 +149,7 @@ def test_a_verifications_recording_alone_is_no_calibration(finished: Finished) -
 def test_a_calibration_whose_verification_is_missing_has_not_passed(finished: Finished, tmp_path: Path) -> None:
     out, _, _ = finished
     shutil.copy(out / "run.h5", tmp_path)
-    half = subprocess.run(
-        command("solve", tmp_path, "--json"), capture_output=True, text=True, timeout=240, check=False
-    )
+    half = rig_here("solve", tmp_path, "--json")
     assert half.returncode == 1, half.stderr
     missing = {check["name"] for check in json.loads(half.stdout)["checks"] if check["value"] is None}
     assert missing == VERIFIED
@@ -213,13 +209,16 @@ def test_the_whole_matrix_leaves_noise_alone(tmp_path: Path) -> None:
     assert "gyro_matrix[3][3]" in (out / "calibration.h").read_text(encoding="utf-8")
 
 
-def test_a_failed_calibration_is_neither_stored_nor_verified(tmp_path: Path) -> None:
-    out = tmp_path / "run"
+def test_the_script_runs_as_the_command_does_and_stores_and_verifies_no_calibration_that_failed(tmp_path: Path) -> None:
+    script = CONFIGS.parent / "procedures" / "six_observation.py"
     config = configuration(tmp_path, merge(QUICK_EXPERIMENT, {"limits": {"scale_deviation": 0.01}}))
     done = subprocess.run(
-        command("run", config, "--out", out), capture_output=True, text=True, timeout=240, check=False
-    )
+        [sys.executable, str(script), str(config)],
+        cwd=tmp_path, capture_output=True, text=True, timeout=240, check=False,
+    )  # fmt: skip
     assert done.returncode == 1, done.stderr
+    (out,) = (tmp_path / "runs").glob("*-six_observation")
+    assert "verdict: FAIL" in done.stdout and "gyro.scale_deviation" in done.stdout
     assert "not verified: the calibration failed its limits" in done.stderr and not (out / "verify.h5").exists()
     checks = {check["name"]: check for check in json.loads((out / "result.json").read_text())["checks"]}
     assert checks["gyro.verification_rms"]["value"] is None and not checks["gyro.verification_rms"]["passed"]

@@ -14,7 +14,7 @@ from firmware_host.samples import FIELD_SAMPLE_DTYPE
 from rig.analysis.outcome import calibrated
 from rig.data.run_file import RunData, read_run
 from rig.errors import Fault
-from support.commands import configuration, rig
+from support.commands import configuration, rig, rig_here
 from support.worlds import merge
 
 SITE: dict[str, Any] = {"magnetic_field_ut": 50.0}
@@ -115,7 +115,7 @@ def test_dwells_tell_scale_bias_and_angles_as_mounted(finished: tuple[Path, dict
 
 def test_solving_the_recording_equals_the_run(finished: tuple[Path, dict[str, Any], str]) -> None:
     out, result, _ = finished
-    assert json.loads(rig("solve", out, "--json").stdout)["magnetometers"] == result["magnetometers"]
+    assert json.loads(rig_here("solve", out, "--json").stdout)["magnetometers"] == result["magnetometers"]
 
 
 def test_turning_it_over_tells_its_own_bias_from_the_arms_field(

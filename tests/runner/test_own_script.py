@@ -12,8 +12,9 @@ from pathlib import Path
 import pytest
 import yaml
 
-from support.commands import configuration, python, rig, wait_for_log
+from support.commands import configuration, python, rig, rig_here, wait_for_log
 from support.paths import ROOT
+from support.worlds import merge
 
 OWN = ROOT / "tests" / "support" / "unequal_sweeps.py"
 SECTION = {"procedure": {"name": "unequal_sweeps", "wrist_2_deg_s": 100}}
@@ -61,6 +62,9 @@ def test_resuming_by_another_script_is_refused(interrupted: Path) -> None:
 
 
 def test_an_interrupted_script_of_ones_own_is_resumed_by_itself(interrupted: Path) -> None:
+    used = interrupted / "config.yaml"
+    faster = merge(yaml.safe_load(used.read_text(encoding="utf-8")), {"world": {"time_scale": 12}})
+    used.write_text(yaml.safe_dump(faster, sort_keys=False), encoding="utf-8")
     resumed = rig("resume", interrupted)
     assert resumed.returncode == 0, resumed.stderr
     assert "resuming: 2 of 6 sweeps" in resumed.stderr and "done: a short rest" in resumed.stderr
@@ -71,15 +75,15 @@ def test_an_interrupted_script_of_ones_own_is_resumed_by_itself(interrupted: Pat
     assert speeds == pytest.approx([radians(speed) for speed in (150, 150, 150, 150, 100, 100)], rel=1e-3)
     assert result["provenance"]["script"] == "mine.py"
     assert result["provenance"]["script_sha256"] == hashlib.sha256(OWN.read_bytes()).hexdigest()
-    solved = rig("solve", interrupted, "--json")
+    solved = rig_here("solve", interrupted, "--json")
     assert json.loads(solved.stdout)["sensors"] == result["sensors"], solved.stderr
     (interrupted / "script.py").write_text("PROCEDURE = None", encoding="utf-8")
-    assert "rig: another_script: " in rig("solve", interrupted).stderr, "it is judged as it was, or not at all"
+    assert "rig: another_script: " in rig_here("solve", interrupted).stderr, "it is judged as it was, or not at all"
 
 
 def test_it_runs_as_a_script_too_and_is_planned(tmp_path: Path) -> None:
     config = own_configuration(tmp_path)
-    planned = rig("plan", config, "--script", OWN, "--json")
+    planned = rig_here("plan", config, "--script", OWN, "--json")
     sweeps = [step for step in json.loads(planned.stdout)["steps"] if step["kind"] == "sweep"]
     assert [sweep["joint_name"] for sweep in sweeps] == [f"wrist_{joint}" for joint in (1, 1, 3, 3, 2, 2)]
     assert sweeps[-1]["speed_rad_s"] == pytest.approx(radians(100))
@@ -96,10 +100,10 @@ def test_a_file_that_is_no_script_is_refused(tmp_path: Path, text: str | None, n
     script = tmp_path / "script.py"
     if text is not None:
         script.write_text(text, encoding="utf-8")
-    refused = rig("plan", configuration(tmp_path), "--script", script)
+    refused = rig_here("plan", configuration(tmp_path), "--script", script)
     assert refused.returncode == 2 and f"rig: {name}: " in refused.stderr, refused.stderr
 
 
 def test_keys_of_another_procedure_are_unknown_to_a_script_of_ones_own(tmp_path: Path) -> None:
-    refused = rig("plan", configuration(tmp_path), "--script", OWN)
+    refused = rig_here("plan", configuration(tmp_path), "--script", OWN)
     assert refused.returncode == 2 and "procedure.rest_s" in refused.stderr and "wrist_2_deg_s" in refused.stderr

@@ -14,8 +14,7 @@ import numpy as np
 import pytest
 import yaml
 
-from support.commands import configuration, rig, wait_for_log
-from support.paths import ROOT
+from support.commands import configuration, rig, rig_here, wait_for_log
 from support.worlds import merge
 
 pytestmark = pytest.mark.slow
@@ -91,7 +90,7 @@ def test_solve_gives_the_numbers_of_the_run(finished: tuple[Path, dict[str, Any]
 
 def test_the_papers_algorithm_agrees(finished: tuple[Path, dict[str, Any], Any]) -> None:
     out, result, _ = finished
-    published = json.loads(rig("solve", out, "--estimator", "algorithm_1", "--json").stdout)["sensors"]["gyro"]
+    published = json.loads(rig_here("solve", out, "--estimator", "algorithm_1", "--json").stdout)["sensors"]["gyro"]
     assert published["estimator"] == "algorithm_1" and published["iterations"] >= 2
     beside = result["sensors"]["gyro"]
     assert beside["estimator"] == "vector" and beside["six_observation"]["estimator"] == "newton"
@@ -102,24 +101,13 @@ def test_the_papers_algorithm_agrees(finished: tuple[Path, dict[str, Any], Any])
 @pytest.mark.parametrize("estimator", ["vector", "newton", "levenberg_marquardt"])
 def test_every_estimator_recovers_the_truth(finished: tuple[Path, dict[str, Any], Any], estimator: str) -> None:
     out, result, _ = finished
-    solved = json.loads(rig("solve", out, "--estimator", estimator, "--json").stdout)["sensors"]["gyro"]
+    solved = json.loads(rig_here("solve", out, "--estimator", estimator, "--json").stdout)["sensors"]["gyro"]
     assert (
         solved["estimator"] == estimator and solved["six_observation"] == result["sensors"]["gyro"]["six_observation"]
     )
     truth = yaml.safe_load((out / "config.yaml").read_text(encoding="utf-8"))["world"]["sensors"]["gyro"]
     error = np.array(solved["scale"] + solved["bias_rad_s"]) - np.array(truth["scale"] + truth["bias_rad_s"])
     assert np.all(np.abs(error) < 4 * np.sqrt(np.diag(solved["covariance"])))
-
-
-def test_the_script_runs_as_the_command_does_and_limits_that_are_not_met_fail(tmp_path: Path) -> None:
-    script = [sys.executable, str(ROOT / "procedures" / "six_observation.py")]
-    config = configuration(tmp_path, {"limits": {"scale_deviation": 0.01}})
-    done = subprocess.run(
-        [*script, str(config)], cwd=tmp_path, capture_output=True, text=True, timeout=240, check=False
-    )
-    assert done.returncode == 1, done.stderr
-    assert len(list((tmp_path / "runs").glob("*-six_observation/result.json"))) == 1
-    assert "verdict: FAIL" in done.stdout and "gyro.scale_deviation" in done.stdout
 
 
 def test_an_interrupted_run_is_kept_and_resumed(start: Start, tmp_path: Path) -> None:
@@ -142,7 +130,8 @@ def test_an_interrupted_run_is_kept_and_resumed(start: Start, tmp_path: Path) ->
         (out / "config.yaml").write_text(yaml.safe_dump(merge(yaml.safe_load(used), change)), encoding="utf-8")
         refused = rig("resume", out)
         assert refused.returncode == 2 and f"rig: {name}: " in refused.stderr, refused.stderr
-    (out / "config.yaml").write_text(used, encoding="utf-8")
+    faster = merge(yaml.safe_load(used), {"world": {"time_scale": 12}})  # nothing is to be interrupted any more
+    (out / "config.yaml").write_text(yaml.safe_dump(faster), encoding="utf-8")
 
     resumed = rig("resume", out)
     assert resumed.returncode == 0, resumed.stderr
@@ -150,7 +139,7 @@ def test_an_interrupted_run_is_kept_and_resumed(start: Start, tmp_path: Path) ->
     assert [o["sweep"] for o in result["sensors"]["gyro"]["observations"]] == [0, 1, 2, 3, 4, 5]
     assert len(result["sensors"]["gyro"]["time_bases"]) == 2
     assert resumed.stderr.count("done: sweep") == 4
-    assert json.loads(rig("solve", out, "--json").stdout)["sensors"] == result["sensors"]
+    assert json.loads(rig_here("solve", out, "--json").stdout)["sensors"] == result["sensors"]
 
 
 @pytest.mark.proof

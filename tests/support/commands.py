@@ -3,11 +3,14 @@
 import subprocess
 import sys
 import time
+from contextlib import redirect_stderr, redirect_stdout
+from io import StringIO
 from pathlib import Path
 from typing import Any
 
 import yaml
 
+from rig.cli import main
 from rig.config.load import load
 from support.paths import CONFIGS
 from support.worlds import fresh_host, merge
@@ -24,6 +27,15 @@ def python(*arguments: str | Path, timeout_s: float = 240) -> subprocess.Complet
     """`python …`, until it has ended."""
     command = [sys.executable, *map(str, arguments)]
     return subprocess.run(command, capture_output=True, text=True, timeout=timeout_s, check=False)
+
+
+def rig_here(*arguments: str | Path) -> subprocess.CompletedProcess[str]:
+    """`rig …` without a process of its own, which saves a second: for commands that only read and reckon."""
+    said, errors = StringIO(), StringIO()
+    words = [*map(str, arguments)]
+    with redirect_stdout(said), redirect_stderr(errors):
+        status = main(words)
+    return subprocess.CompletedProcess(words, status, said.getvalue(), errors.getvalue())
 
 
 def configuration(folder: Path, changes: dict[str, Any] | None = None, procedure: dict[str, Any] | None = None) -> Path:
