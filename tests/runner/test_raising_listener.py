@@ -39,6 +39,8 @@ class Everything:
         self.events.append(event)
 
 
+@pytest.mark.proof
+@pytest.mark.thorough  # in `make test`, test_run_events.py has a listener that fails
 def test_a_run_goes_on_when_a_listener_raises_while_the_arm_moves(world: World, tmp_path: Path) -> None:
     fast = {
         "arm": {"transfer_speed_deg_s": 170},

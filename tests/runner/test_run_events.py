@@ -19,6 +19,7 @@ from rig.station.events import (
     CalibrationStored,
     Checked,
     DocumentWritten,
+    ListenerDropped,
     ObservationMade,
     PhaseRecorded,
     PhaseStarted,
@@ -39,6 +40,14 @@ from support.worlds import QUICK_EXPERIMENT, worlds
 pytestmark = [pytest.mark.slow, pytest.mark.timeout(900)]  # a whole experiment
 
 
+class Failing:
+    """Somebody else who looks on, and fails in the middle of the first motion."""
+
+    def event(self, event: RunEvent) -> None:
+        if isinstance(event, Progress):
+            raise RuntimeError("no page to show it on")
+
+
 class Everything:
     """Remembers all it is told."""
 
@@ -51,14 +60,16 @@ class Everything:
 
 @pytest.fixture(scope="module")
 def events(tmp_path_factory: pytest.TempPathFactory) -> Iterator[list[RunEvent]]:
-    """All events of a calibration and its verification."""
+    """All events of a calibration and its verification, but for the one that another listener has failed."""
     folder = tmp_path_factory.mktemp("events")
     listener = Everything()
     with worlds(folder) as start:
         found = configured(start(QUICK_EXPERIMENT).config_path)
-        run = Run(folder, found.loaded, found.script, Stations((listener,), always_yes))
+        run = Run(folder, found.loaded, found.script, Stations((Failing(), listener), always_yes))
         assert run.carry_out(found.phase).passed
-    yield listener.events
+    dropped = ListenerDropped("Failing", "RuntimeError: no page to show it on")
+    assert [event for event in listener.events if isinstance(event, ListenerDropped)] == [dropped]
+    yield [event for event in listener.events if event != dropped]
 
 
 def phases(events: list[RunEvent]) -> list[list[RunEvent]]:

@@ -17,13 +17,20 @@ from typing import Any
 import pytest
 
 from rig.data.run_file import read_run
-from support.worlds import World, WorldHandle, fresh_host, hardware
+from support.worlds import World, WorldHandle, fresh_host, hardware, merge
 
 # The driver names each of these faults in tests/arm/test_driver.py as well: a few whole runs are enough for a change.
 THOROUGH = [pytest.mark.proof, pytest.mark.thorough]
 pytestmark = pytest.mark.slow
 
 Start = Callable[..., "RunningRig"]
+
+# Slow enough to see how long the arm goes on after a fault, and soon in its first sweep.
+SOON_SWEEPING: dict[str, Any] = {
+    "arm": {"transfer_speed_deg_s": 170},
+    "procedure": {"rest_s": 0.5},
+    "world": {"time_scale": 2},
+}
 
 
 class RunningRig:
@@ -79,7 +86,7 @@ def start(world: World, tmp_path: Path) -> Iterator[Start]:
     running: list[RunningRig] = []
 
     def run(changes: dict[str, Any] | None = None, *arguments: str, before: Any = None) -> RunningRig:
-        handle = world({"world": {"time_scale": 2}, **(changes or {})})
+        handle = world(merge(SOON_SWEEPING, changes or {}))
         if before is not None:
             handle.control(before)
         running.append(RunningRig(handle, tmp_path, *(arguments or ("--yes",))))
@@ -148,9 +155,9 @@ def test_the_arm_stops_when_the_program_freezes(start: Start) -> None:
     ("fault", "name"),
     [
         ({"do": "protective_stop"}, "protective_stop"),
-        ({"do": "emergency_stop"}, "emergency_stop"),
+        pytest.param({"do": "emergency_stop"}, "emergency_stop", marks=THOROUGH),
         pytest.param({"do": "pause"}, "arm_paused", marks=THOROUGH),
-        ({"do": "stop_program"}, "program_stopped"),
+        pytest.param({"do": "stop_program"}, "program_stopped", marks=THOROUGH),
         pytest.param({"do": "speed_slider", "fraction": 0.5}, "speed_slider", marks=THOROUGH),
         ({"do": "close_arm"}, "arm_link_lost"),
         ({"do": "unplug_board"}, "board_link_lost"),
@@ -185,7 +192,7 @@ def test_a_run_folder_that_is_removed_during_the_run_is_a_named_fault(start: Sta
 
 def test_resume_repeats_the_sweep_that_was_refused(start: Start) -> None:
     fast = {"speed_deg_s": 150, "acceleration_deg_s2": 400, "rest_s": 0.5}
-    rig = start({"world": {"time_scale": 4}, "procedure": fast, "limits": {"scale_std": 1, "bias_std_rad_s": 1}})
+    rig = start({"world": {"time_scale": 8}, "procedure": fast, "limits": {"scale_std": 1, "bias_std_rad_s": 1}})
     rig.until_sweeping()
     rig.world.control({"do": "host_baud", "baud": 115200})
     rig.until(lambda state: state["q_rad"][5] < -2)
@@ -206,9 +213,9 @@ def test_resume_repeats_the_sweep_that_was_refused(start: Start) -> None:
     ("fault", "name"),
     [
         ({"do": "speed_slider", "fraction": 0.5}, "speed_slider"),
-        ({"do": "remote_control", "on": False}, "not_in_remote_control"),
+        pytest.param({"do": "remote_control", "on": False}, "not_in_remote_control", marks=THOROUGH),
         ({"do": "power_off"}, "arm_not_running"),
-        ({"do": "register_in_use"}, "registers_in_use"),
+        pytest.param({"do": "register_in_use"}, "registers_in_use", marks=THOROUGH),
         ({"do": "unplug_board"}, "no_"),
         ({"do": "silence_board", "on": True}, "no_board"),
         ({"do": "host_baud", "baud": 115200}, "wrong_baud_rate"),

@@ -25,7 +25,7 @@ QUICK_EXPERIMENT: dict[str, Any] = {
     "arm": {"transfer_speed_deg_s": 170},
     "sensors": {
         "gyro": {"rate_hz": 119},
-        "reference": {"part": "adis16465", "serial_number": "ADIS16465-001", "role": "reference"},
+        "reference": {"part": "adis16465", "serial_number": "ADIS16465-001", "role": "reference", "rate_hz": 100},
     },
     "procedure": {"verify": True, "speed_deg_s": 150, "acceleration_deg_s2": 400, "rest_s": 0.5},
     "limits": {"scale_std": 1, "bias_std_rad_s": 1, "verification_rms_rad_s": 1, "verification_mean_rad_s": 1},
