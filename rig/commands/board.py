@@ -19,6 +19,7 @@ from rig.board.identify import (
     sensor_entry,
 )
 from rig.board.store import calibration_of, store
+from rig.commands.claims import claimed_board
 from rig.commands.laboratory import simulated_laboratory, written
 from rig.config.load import load
 from rig.config.models import RigConfig
@@ -123,6 +124,7 @@ def _connected(config_path: Path, overrides: Sequence[str]) -> Iterator[tuple[Ri
             kept = loaded.flash_file
             memory = f"is kept in {kept}" if kept else "too, unless world.board.flash_file names a file that keeps it"
             say(f"simulated laboratory: it lasts as long as this command, its board's memory {memory}", file=sys.stderr)
+        stack.enter_context(claimed_board(section.port))
         with refusing():
             board = stack.enter_context(Board(section.port, section.baud, lambda batch: None))
         yield loaded.config, board

@@ -10,10 +10,11 @@ from firmware_host.client import Board
 from rig.arm.driver import look
 from rig.arm.preflight import arm_problems, kinematics_problems, plan_problems
 from rig.board.identify import configured_board, find_sensor, refuse_other_firmware, refusing, stored_calibration
+from rig.commands.claims import claimed_arm, claimed_board, claimed_sensor
 from rig.commands.configured import Configured, configured
 from rig.commands.laboratory import simulated_laboratory, written
 from rig.config.models import RigConfig
-from rig.errors import RigError
+from rig.errors import Refused, RigError
 from rig.sensors.errors import SensorError
 from rig.sensors.registry import OWN_PORT
 from rig.station.plain_text import say
@@ -45,16 +46,20 @@ def _look_at_board(found: Configured) -> list[str]:
     if not config.parts_on_board:
         return missing
     configured = configured_board(config)
-    with refusing(), Board(configured.port, configured.baud, lambda batch: None) as board:
+    with (
+        refusing(),
+        claimed_board(configured.port),
+        Board(configured.port, configured.baud, lambda batch: None) as board,
+    ):
         identity = board.identity
         say(f"board at {configured.port}: {identity.unique_id}, firmware {identity.firmware}")
         try:
             refuse_other_firmware(identity)
         except RigError as error:
             missing.append(str(error))
-        for name, section in config.parts_on_board.items():
+        for name, part in config.parts_on_board.items():
             try:
-                info = find_sensor(identity, name, section)
+                info = find_sensor(identity, name, part)
                 say(f"sensor {name}: {info.part}, identity register 0x{info.who_am_i:02x}")
                 if found.phase.procedure.reads_corrected and name in config.to_calibrate:
                     stored = stored_calibration(board, name, config.to_calibrate[name])
@@ -70,12 +75,13 @@ def _look_at_instruments(found: Configured) -> list[str]:
     for name, section in found.loaded.config.sensors.items():
         if section.serial is not None:
             try:
-                for seen in OWN_PORT[section.part].look(name, section):
-                    if isinstance(seen, str):
-                        say(f"sensor {name}: {seen}")
-                    else:
-                        missing.append(str(seen))
-            except SensorError as error:
+                with claimed_sensor(name, section.serial.port):
+                    for seen in OWN_PORT[section.part].look(name, section):
+                        if isinstance(seen, str):
+                            say(f"sensor {name}: {seen}")
+                        else:
+                            missing.append(str(seen))
+            except (Refused, SensorError) as error:
                 missing.append(str(error))
     return missing
 
@@ -93,4 +99,13 @@ def _look_at_arm(found: Configured) -> list[str]:
         *arm_problems(plan, report),
         *kinematics_problems(section, report),
     ]
-    return [f"{problem.name}: {problem.what}. {problem.remedy}." for problem in problems]
+    return [*_claims_of_others(section.host), *map(str, problems)]
+
+
+def _claims_of_others(host: str) -> list[str]:
+    """That another rig has the arm; looking at it disturbs nobody, so it is claimed for no longer than this."""
+    try:
+        with claimed_arm(host):
+            return []
+    except Refused as refused:
+        return [str(refused)]

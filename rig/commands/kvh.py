@@ -10,6 +10,7 @@ from typing import Any, cast
 import numpy as np
 from numpy.typing import NDArray
 
+from rig.commands.claims import claimed_sensor
 from rig.commands.laboratory import simulated_laboratory, written
 from rig.config.load import load
 from rig.errors import Refused, raised_as
@@ -54,6 +55,7 @@ def _look(name: str, port: str, baud: int) -> KvhInfo:
     seen: list[NDArray[Any]] = []
     with (
         raised_as(Refused),
+        claimed_sensor(name, port),
         Kvh1775(name, port, baud, lambda messages, numbers, times_us, host_time_s: seen.append(messages)) as kvh,
     ):
         found = KvhInfo(name, port, baud, kvh.serial_number, dict(kvh.settings))

@@ -5,6 +5,7 @@ from contextlib import ExitStack
 from pathlib import Path
 
 from rig.analysis.contradictions import names_a_sweep
+from rig.commands.claims import claimed
 from rig.commands.configured import Configured, configured
 from rig.commands.laboratory import simulated_laboratory
 from rig.data.result_file import read_result
@@ -62,12 +63,13 @@ def resume(folder: Path, *, assume_yes: bool = False, as_json: bool = False) -> 
 def _carry_out(folder: Path, found: Configured, *, assume_yes: bool, as_json: bool) -> int:
     # Nobody stands beside a laboratory that this process starts itself, so there nobody need be asked.
     answer = always_yes if assume_yes or found.loaded.simulated else ask_operator
-    with log(folder / "log.txt") as logged, view() as seen, ExitStack() as laboratory:
+    with log(folder / "log.txt") as logged, view() as seen, ExitStack() as held:
         station = Stations((logged, seen), answer)
         this = Run(folder, found.loaded, found.script, station)
-        if found.loaded.simulated:
-            with this.reported():
-                laboratory.enter_context(simulated_laboratory(folder / CONFIG))
+        with this.reported():
+            held.enter_context(claimed(found.loaded.config))
+            if found.loaded.simulated:
+                held.enter_context(simulated_laboratory(folder / CONFIG))
         outcome = this.carry_out(found.phase)
         station.event(RunFolderWritten(folder))
     print_outcome(document_of(outcome), as_json=as_json)

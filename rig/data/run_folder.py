@@ -1,7 +1,9 @@
 """What lies where in a run folder, and how to go on with one."""
 
+import itertools
 import json
 import shlex
+from contextlib import suppress
 from dataclasses import asdict, dataclass
 from datetime import UTC, datetime
 from pathlib import Path
@@ -30,22 +32,37 @@ def new_folder(out: Path | None, loaded: Loaded, script: str, identity: ScriptId
 
     Raises Refused `run_folder`.
     """
-    stamp = datetime.now(UTC).strftime("%Y-%m-%dT%H-%M-%SZ")
-    folder = out or Path(loaded.config.output.folder) / f"{stamp}-{loaded.config.procedure.name}"
+    parent = Path(loaded.config.output.folder)
     try:
+        folder = out or _of_its_own(parent, loaded.config.procedure.name)
         folder.mkdir(parents=True, exist_ok=True)
         empty = not any(folder.iterdir())
         if empty:
-            (folder / SCRIPT).write_text(script, encoding="utf-8", newline="")
+            with (folder / SCRIPT).open("x", encoding="utf-8", newline="") as kept:  # of two runs at once, one has it
+                kept.write(script)
             (folder / SCRIPT_IDENTITY).write_text(json.dumps(asdict(identity)) + "\n", encoding="utf-8")
             (folder / CONFIG).write_text(loaded.text, encoding="utf-8")
     except OSError as error:
-        raise Refused("run_folder", f"{folder} cannot be written: {error}", "Choose another with --out") from error
+        raise Refused(
+            "run_folder", f"{out or parent} cannot be written: {error}", "Choose another with --out"
+        ) from error
     if not empty:
         raise Refused(
             "run_folder", f"{folder} is not empty", f"Choose another with --out, or go on with: {resuming(folder)}"
         )
     return folder
+
+
+def _of_its_own(parent: Path, procedure: str) -> Path:
+    """A folder that was not there, named after time and procedure; several runs may begin in one second."""
+    parent.mkdir(parents=True, exist_ok=True)
+    name = f"{datetime.now(UTC):%Y-%m-%dT%H-%M-%SZ}-{procedure}"
+    folder, numbers = parent / name, itertools.count(2)
+    while True:
+        with suppress(FileExistsError):
+            folder.mkdir()
+            return folder
+        folder = parent / f"{name}-{next(numbers)}"
 
 
 def script_identity(folder: Path) -> ScriptIdentity:
