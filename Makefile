@@ -4,6 +4,8 @@
 # make proof   statistical acceptance over all seeds, which takes longer than anybody waits for a change
 # make firmware builds the board's image (needs arm-none-eabi-gcc) and prints what it takes of the chip
 # make bench   every benchmark, ratios measured side by side
+# make lock    pins what `make demo` installs anew, by version and hash (requirements/demo.txt)
+# make sbom    what is installed, as a CycloneDX bill of materials: build/sbom.json
 # make figures the pictures in docs/results.md, by the studies and the experiments
 
 VENV := .venv
@@ -14,7 +16,7 @@ FIND_PYTHON = for p in python3.12 python3.11 python3 python; do \
 
 STUDIES := normal extreme speed convergence sine averaging estimators misalignment budget kvh-gyro kvh-accelerometer
 
-.PHONY: demo check test proof lint firmware bench figures clean
+.PHONY: demo check test proof lint firmware bench lock sbom figures clean
 .DELETE_ON_ERROR:
 
 demo: $(VENV)/demo.installed
@@ -59,6 +61,23 @@ firmware: $(VENV)/demo.installed
 	$(MAKE) -C firmware_host/firmware
 	$(BIN)/python -m firmware_host.footprint
 
+# Tools of a release, beside what is installed for the program itself.
+TOOLS := build/tools
+
+lock: | $(TOOLS)/bin/uv
+	$(TOOLS)/bin/uv pip compile --quiet --upgrade --universal --python-version 3.11 --generate-hashes --extra world \
+	  --custom-compile-command "make lock" --output-file requirements/demo.txt pyproject.toml requirements/demo.in
+
+sbom: $(VENV)/demo.installed | $(TOOLS)/bin/cyclonedx-py
+	$(TOOLS)/bin/cyclonedx-py environment --pyproject pyproject.toml --output-reproducible --of JSON \
+	  --output-file build/sbom.json $(BIN)/python
+
+$(TOOLS)/bin/uv: TOOL := uv
+$(TOOLS)/bin/cyclonedx-py: TOOL := cyclonedx-bom
+$(TOOLS)/bin/uv $(TOOLS)/bin/cyclonedx-py: | $(BIN)/python
+	$(BIN)/python -m venv $(TOOLS)
+	$(TOOLS)/bin/python -m pip install --quiet --disable-pip-version-check $(TOOL)
+
 clean:
 	rm -rf $(VENV) *.egg-info
 
@@ -67,8 +86,10 @@ $(BIN)/python:
 	if [ -z "$$python" ]; then echo "make: Python 3.11 or 3.12 is needed (ur-rtde has no wheels for others); install one and run again" >&2; exit 1; fi; \
 	"$$python" -m venv $(VENV)
 
-$(VENV)/demo.installed: pyproject.toml | $(BIN)/python
-	$(BIN)/python -m pip install --quiet --disable-pip-version-check --editable '.[world]'
+# From the lock file: the same versions, byte for byte, whenever it is. `dev` takes the newest that pyproject.toml allows.
+$(VENV)/demo.installed: pyproject.toml requirements/demo.txt | $(BIN)/python
+	$(BIN)/python -m pip install --quiet --disable-pip-version-check --require-hashes --requirement requirements/demo.txt
+	$(BIN)/python -m pip install --quiet --disable-pip-version-check --no-deps --no-build-isolation --editable .
 	@touch $@
 
 $(VENV)/dev.installed: pyproject.toml | $(BIN)/python

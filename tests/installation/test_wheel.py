@@ -1,0 +1,60 @@
+"""Without a checkout: the sdist, the wheel made of it, and the demonstration that runs from the wheel."""
+
+import shutil
+import subprocess
+import sys
+import sysconfig
+import tarfile
+import venv
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from support.demo_runs import normalised_errors
+from support.paths import ROOT
+
+pytestmark = pytest.mark.slow
+NO_SOURCES = shutil.ignore_patterns(".*", "build", "dist", "runs", "*.egg-info", "__pycache__", "tests")
+
+
+def python(*arguments: str | Path, cwd: Path) -> str:
+    command = [sys.executable, *map(str, arguments)]
+    done = subprocess.run(command, capture_output=True, text=True, timeout=240, check=False, cwd=cwd)
+    assert done.returncode == 0, done.stdout + done.stderr
+    return done.stdout
+
+
+def built(what: str, source: Path, into: Path) -> Path:
+    """An sdist or a wheel, by the back end that pyproject.toml names."""
+    program = f"from setuptools import build_meta; print(build_meta.build_{what}({str(into)!r}))"
+    return into / python("-c", program, cwd=source).splitlines()[-1]
+
+
+@pytest.fixture(scope="module")
+def installed(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """An environment that has the wheel, and of this one all the other packages."""
+    folder = tmp_path_factory.mktemp("installed")
+    shutil.copytree(ROOT, folder / "source", ignore=NO_SOURCES)
+    sdist = built("sdist", folder / "source", folder)
+    with tarfile.open(sdist) as archive:
+        archive.extractall(folder, filter="data")
+    wheel = built("wheel", folder / sdist.name.removesuffix(".tar.gz"), folder)
+    home = folder / "home"
+    venv.create(home, symlinks=True)
+    pip = ["-m", "pip", "--python", home / "bin" / "python", "install", "--quiet", "--no-deps", "--no-index"]
+    python(*pip, wheel, cwd=folder)
+    version = f"python{sys.version_info.major}.{sys.version_info.minor}"
+    others = home / "lib" / version / "site-packages" / "others.pth"
+    others.write_text(sysconfig.get_path("purelib") + "\n", encoding="utf-8")
+    return home
+
+
+def test_the_demonstration_runs_from_the_wheel_and_finds_the_truth(installed: Path, tmp_path: Path) -> None:
+    where = [str(installed / "bin" / "python"), "-P", "-c", "import rig; print(rig.__file__)"]
+    assert subprocess.run(where, capture_output=True, text=True, check=True).stdout.startswith(str(installed))
+    config = installed / "share" / "calibration-rig" / "configs" / "demo.yaml"
+    errors = normalised_errors([installed / "bin" / "rig"], config, 1, tmp_path / "run")
+    print(f"errors of {np.round(errors, 2)} σ")
+    assert np.abs(errors).max() < 4
+    assert {file.name for file in (tmp_path / "run").iterdir()} >= {"certificate.html", "calibration.h", "result.json"}
