@@ -7,7 +7,7 @@ import signal
 import subprocess
 import sys
 from collections.abc import Iterator
-from contextlib import contextmanager
+from contextlib import ExitStack, contextmanager
 from pathlib import Path
 
 import pytest
@@ -81,7 +81,8 @@ def test_a_second_rig_has_neither_the_arm_nor_the_board_until_the_first_has_ende
 
     operator, terminal = pty.openpty()
     command = [sys.executable, "-m", "rig", "run", str(config), "--out", str(tmp_path / "first")]
-    with subprocess.Popen(command, stdin=terminal, stderr=terminal) as first:
+    with subprocess.Popen(command, stdin=terminal, stderr=terminal) as first, ExitStack() as ended:
+        ended.callback(first.kill)
         os.close(terminal)
         said = b""
         while b"Type yes to start" not in said:
