@@ -1,6 +1,5 @@
 """What the program needs, as the installed packages themselves say: names, licences."""
 
-import re
 from collections.abc import Iterable, Iterator
 from importlib.metadata import Distribution, PackageNotFoundError, distribution
 
@@ -40,11 +39,12 @@ def _required(package: Distribution, extra: str) -> Iterator[tuple[str, str]]:
 def licence(package: Distribution) -> str:
     """What it says of its licence: an SPDX expression, else classifiers, else the first line of its text; may be ""."""
     told = package.metadata
-    if expression := told.get("License-Expression"):
-        return expression
+    if "License-Expression" in told:
+        return str(told["License-Expression"])
     classifiers = [
         line.rsplit(" :: ")[-1]
         for line in told.get_all("Classifier") or ()
         if line.startswith("License :: ") and line != "License :: OSI Approved"
     ]
-    return " / ".join(sorted(classifiers)) or re.split(r"\n", (told.get("License") or "").strip())[0]
+    text = str(told["License"]).strip() if "License" in told else ""
+    return " / ".join(sorted(classifiers)) or text.split("\n", maxsplit=1)[0]
