@@ -23,9 +23,13 @@ from support.worlds import World, fresh_host, hardware
 
 pytestmark = pytest.mark.skipif(sys.platform != "linux", reason="claims are names of Linux' kernel")
 
-HOLD = (
-    "import sys; from rig.commands.claims import *; claim = {}; claim.__enter__(); print(flush=True); sys.stdin.read()"
-)
+HOLD = """
+import sys
+from rig.commands.claims import claimed_arm
+with claimed_arm(sys.argv[1]):
+    print(flush=True)
+    sys.stdin.read()
+"""
 
 
 @contextmanager
