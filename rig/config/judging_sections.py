@@ -2,6 +2,7 @@
 
 from datetime import date
 from typing import Annotated, Literal, Self
+from urllib.parse import urlsplit
 
 import numpy as np
 from pydantic import Field, field_validator, model_validator
@@ -14,6 +15,7 @@ from rig.config.section import (
     Words,
 )
 
+HISTORY_SCHEMES = ("postgresql", "sqlite")
 MIN_LEVEL = 0.1  # sine of the angle between the vertical and what a heading is given of
 
 
@@ -219,3 +221,39 @@ class CertificateSection(Section):
         description="when it is issued; left out, the day the result was computed",
         json_schema_extra={"allowed": "date, as 2026-11-20"},
     )
+
+
+class HistorySection(Section):
+    """Where finished runs are remembered. Left out, in a file of whoever runs the rig (`RIG_HISTORY` names another)."""
+
+    url: str | None = Field(
+        default=None,
+        min_length=1,
+        max_length=1000,
+        description="an SQLite file on a disk of this computer, or `postgresql://user@host/name` of a database that "
+        "several rigs share; no password, which belongs in `~/.pgpass`",
+    )
+    off: bool = Field(default=False, description="remember nothing")
+    rig: Words | None = Field(
+        default=None, description="what this rig is called there; left out, by its arm's serial number"
+    )
+    check_standards: tuple[Words, ...] = Field(
+        default=(), max_length=100, description="serial numbers of sensors that are calibrated to watch the rig itself"
+    )
+
+    @field_validator("url")
+    @classmethod
+    def a_place_without_a_password(cls, value: str | None) -> str | None:
+        """A recording keeps the configuration, so a password in it would go wherever recordings go."""
+        if value is None or "://" not in value:
+            return value
+        try:
+            parts = urlsplit(value)
+            known, secret = parts.scheme in HISTORY_SCHEMES, parts.password is not None or "password" in parts.query
+        except ValueError:
+            known, secret = False, False
+        if secret:
+            raise ValueError("holds a password, which every recording would keep; put it into ~/.pgpass")
+        if not known:
+            raise ValueError(f"must be a file or begin with {' or '.join(f'{each}://' for each in HISTORY_SCHEMES)}")
+        return value

@@ -11,6 +11,7 @@ from pydantic import Field, ValidationInfo, field_validator
 
 from rig.config.judging_sections import (
     CertificateSection,
+    HistorySection,
     LimitsSection,
     ObservationSection,
     SiteSection,
@@ -138,6 +139,7 @@ class RigConfig(Section):
     uncertainty: UncertaintySection = UncertaintySection()
     limits: LimitsSection
     certificate: CertificateSection = CertificateSection()
+    history: HistorySection = HistorySection()
     output: OutputSection = OutputSection()
 
     @field_validator("sensors")

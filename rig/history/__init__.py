@@ -1,0 +1,1 @@
+"""The laboratory's memory: every finished run, what became of each sensor since, and of the rig itself."""

@@ -1,0 +1,124 @@
+"""A finished run as its folder has it: what is entered into a history."""
+
+import hashlib
+import json
+import platform
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+from rig.config.judging_sections import HistorySection
+from rig.config.load import load
+from rig.config.regular_file import read_regular_file
+from rig.data.result_file import SIZE_MAX_BYTES, ResultDocument, read_result
+from rig.data.run_folder import CONFIG, RESULT, recordings
+from rig.errors import Refused
+from rig.report.certificate.content import CONFORMITY, SIMULATED_ARM
+
+CHUNK_BYTES = 1 << 20
+
+
+@dataclass(frozen=True, slots=True)
+class Recording:
+    """A recording's name in the run folder, its size, and its SHA-256 in hexadecimal."""
+
+    name: str
+    size: int
+    sha256: str
+
+
+@dataclass(frozen=True, slots=True)
+class Finished:
+    """`text` is all of result.json, compact; `rig` what the rig is called; `computer` and `path` where it lies.
+
+    `check_standards` are the serial numbers of sensors that are there to watch the rig.
+    """
+
+    text: str
+    document: ResultDocument
+    rig: str
+    check_standards: tuple[str, ...]
+    simulated: bool
+    computer: str
+    path: str
+    recordings: tuple[Recording, ...]
+
+    @property
+    def content_sha256(self) -> str:
+        """Of the result without the time it was computed: the same numbers again are no other result."""
+        return content_sha256(self.text)
+
+    @property
+    def measurement_sha256(self) -> str:
+        """Of what was measured: arm, board, configuration, time of its beginning."""
+        of = self.document.provenance
+        said = (of.started_utc, of.arm_serial_number, of.board_unique_id, of.configuration_sha256)
+        return hashlib.sha256("\n".join(said).encode()).hexdigest()
+
+    @property
+    def fit(self) -> bool:
+        """Whether the measurement passed its own checks; a value beyond its limit is a result like any other."""
+        return all(check.passed for check in self.document.checks if not CONFORMITY.search(check.name))
+
+
+def finished_run(folder: Path, document: ResultDocument | None = None) -> Finished:
+    """The run in `folder`, with its result.json or, in place of it, the `document` that was computed from it.
+
+    Raises Refused as `read_result`; OSError when a recording cannot be read.
+    """
+    if document is None:
+        document = read_result(folder)
+        text = read_regular_file(folder / RESULT, SIZE_MAX_BYTES)
+    else:
+        text = document.text().encode()
+    section, simulated = _configured(folder)
+    provenance = document.provenance
+    return Finished(
+        text=compact(json.loads(text)),
+        document=document,
+        rig=section.rig or provenance.arm_serial_number,
+        check_standards=section.check_standards,
+        simulated=simulated or provenance.arm_software.endswith(SIMULATED_ARM),
+        computer=platform.node(),
+        path=str(folder.resolve()),
+        recordings=tuple(
+            recording_of(file) for readings in ("raw", "calibrated") for file in recordings(folder, readings)
+        ),
+    )
+
+
+def recording_of(file: Path) -> Recording:
+    """A recording with its hash. Raises OSError."""
+    digest, size = hashlib.sha256(), 0
+    with file.open("rb") as stream:
+        while chunk := stream.read(CHUNK_BYTES):
+            digest.update(chunk)
+            size += len(chunk)
+    return Recording(file.name, size, digest.hexdigest())
+
+
+def compact(document: Any) -> str:
+    """JSON with nothing between its words."""
+    return json.dumps(document, separators=(",", ":"), ensure_ascii=False, allow_nan=False)
+
+
+def content_sha256(text: str) -> str:
+    """The hash of a result.json that tells it from others; in the order of the alphabet, without `solved_utc`."""
+    document = json.loads(text)
+    document["provenance"].pop("solved_utc", None)
+    said = json.dumps(document, sort_keys=True, separators=(",", ":"), ensure_ascii=False)
+    return hashlib.sha256(said.encode()).hexdigest()
+
+
+def _configured(folder: Path) -> tuple[HistorySection, bool]:
+    """What the folder's configuration says of the history, and whether of a simulated laboratory.
+
+    Nothing where there is none, or where it is of before some key was renamed: a result is entered all the same.
+    """
+    if not (folder / CONFIG).exists():
+        return HistorySection(), False
+    try:
+        loaded = load(folder / CONFIG, sections=None)
+    except Refused:
+        return HistorySection(), False
+    return loaded.config.history, loaded.simulated

@@ -1,0 +1,59 @@
+"""A history's tables are made, or brought up to date, when it is opened; one of a newer program is refused.
+
+Each step is a function from a connection to the next version, all in one transaction. Steps only add: what was entered
+stays.
+"""
+
+from collections.abc import Callable, Mapping
+from datetime import UTC, datetime
+
+from sqlalchemy import Connection, insert, inspect, select, text, update
+
+from rig.errors import Refused
+from rig.history import schema
+
+LOCK = 7_245_118  # any number, the same for everybody: makers of tables wait for one another
+
+MIGRATIONS: Mapping[int, Callable[[Connection], None]] = {}
+
+
+def version_of(connection: Connection, label: str) -> int:
+    """The version of the tables there are, 0 for none. Raises Refused `not_a_history`, `history_too_new`."""
+    tables = inspect(connection).get_table_names()
+    if not tables:
+        return 0
+    found = None
+    if schema.meta.name in tables:
+        columns = {column["name"] for column in inspect(connection).get_columns(schema.meta.name)}
+        if columns == {"key", "value"}:
+            found = connection.scalar(select(schema.meta.c.value).where(schema.meta.c.key == "version"))
+    if found is None or not found.isdecimal():
+        raise Refused(
+            "not_a_history",
+            f"{label} holds {', '.join(sorted(tables)[:5])}, which no history has",
+            "Give a history, or a file or database that is new",
+        )
+    if int(found) > schema.VERSION:
+        raise Refused(
+            "history_too_new",
+            f"{label} is of version {found}, made by a newer program; this one knows version {schema.VERSION}",
+            "Install the newer program here as well; the history was not touched",
+        )
+    return int(found)
+
+
+def bring_up_to_date(connection: Connection, label: str) -> None:
+    """Make the tables or migrate them, in the connection's transaction. Raises Refused as `version_of`."""
+    if connection.dialect.name == "postgresql":
+        connection.execute(text("SELECT pg_advisory_xact_lock(:lock)"), {"lock": LOCK})
+    version = version_of(connection, label)
+    if version == 0:
+        schema.metadata.create_all(connection)
+        created = {"key": "created_utc", "value": datetime.now(UTC).isoformat(timespec="seconds")}
+        connection.execute(insert(schema.meta), [created, {"key": "version", "value": str(schema.VERSION)}])
+        return
+    for number in range(version, schema.VERSION):
+        MIGRATIONS[number](connection)
+    if version < schema.VERSION:
+        newest = update(schema.meta).where(schema.meta.c.key == "version").values(value=str(schema.VERSION))
+        connection.execute(newest)

@@ -1,0 +1,96 @@
+"""The tables of a history. Rows are only ever added: what was entered stays as it was.
+
+`run.result` is the whole `result.json`; every other column of a run, its calibrations and parameters is an index of it.
+"""
+
+from sqlalchemy import (
+    BigInteger,
+    Boolean,
+    Column,
+    Float,
+    ForeignKey,
+    Index,
+    Integer,
+    MetaData,
+    String,
+    Table,
+    Text,
+    UniqueConstraint,
+)
+
+VERSION = 1
+HASH, TIME, NAME = 64, 40, 400  # longest texts of their kind
+
+metadata = MetaData()
+
+meta = Table("meta", metadata, Column("key", String(40), primary_key=True), Column("value", String(NAME)))
+
+# `measurement_sha256` is the same for results of the same recordings: a result that was computed again, or of a run that
+# was resumed, takes the place of the earlier one wherever series are made.
+run = Table(
+    "run",
+    metadata,
+    Column("id", Integer, primary_key=True),
+    Column("content_sha256", String(HASH), nullable=False, unique=True),
+    Column("measurement_sha256", String(HASH), nullable=False, index=True),
+    Column("started_utc", String(TIME), nullable=False, index=True),
+    Column("solved_utc", String(TIME), nullable=False),
+    Column("entered_utc", String(TIME), nullable=False),
+    Column("rig", String(NAME), nullable=False),
+    Column("arm_serial_number", String(NAME), nullable=False),
+    Column("board_unique_id", String(NAME), nullable=False),
+    Column("configuration_sha256", String(HASH), nullable=False),
+    Column("verdict", String(10), nullable=False),
+    Column("fit", Boolean, nullable=False),  # whether the measurement passed its own checks
+    Column("simulated", Boolean, nullable=False),
+    Column("result", Text, nullable=False),
+)
+
+location = Table(
+    "location",
+    metadata,
+    Column("id", Integer, primary_key=True),
+    Column("run_id", ForeignKey("run.id"), nullable=False),
+    Column("computer", String(NAME), nullable=False),
+    Column("path", String(4096), nullable=False),
+    Column("noted_utc", String(TIME), nullable=False),
+    UniqueConstraint("run_id", "computer", "path"),
+)
+
+recording = Table(
+    "recording",
+    metadata,
+    Column("run_id", ForeignKey("run.id"), primary_key=True),
+    Column("name", String(NAME), primary_key=True),
+    Column("bytes", BigInteger, nullable=False),
+    Column("sha256", String(HASH), nullable=False),
+)
+
+calibration = Table(
+    "calibration",
+    metadata,
+    Column("id", Integer, primary_key=True),
+    Column("run_id", ForeignKey("run.id"), nullable=False),
+    Column("sensor", String(NAME), nullable=False),
+    Column("quantity", String(40), nullable=False),
+    Column("part", String(NAME), nullable=False),
+    Column("serial_number", String(NAME), nullable=False),
+    Column("full_scale", Float, nullable=False),
+    Column("estimator", String(NAME), nullable=False),
+    Column("temperature_c", Float),
+    Column("check_standard", Boolean, nullable=False),
+    UniqueConstraint("run_id", "sensor", "quantity"),
+    Index("calibration_of_serial_number", "serial_number", "part"),
+)
+
+parameter = Table(
+    "parameter",
+    metadata,
+    Column("calibration_id", ForeignKey("calibration.id"), primary_key=True),
+    Column("name", String(40), primary_key=True),
+    Column("value", Float, nullable=False),
+    Column("std_statistical", Float, nullable=False),
+    Column("std_combined", Float),  # null where no more than noise is known
+    Column("unit", String(40), nullable=False),
+    Column("max_deviation", Float),  # from the nominal value, by the limits of that run
+)

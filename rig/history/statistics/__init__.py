@@ -1,0 +1,1 @@
+"""What a series of calibrations says: arrays in, results out, no database."""

@@ -1,0 +1,74 @@
+"""A linear model of results that each have an uncertainty of their own and spread by more than that from run to run."""
+
+from dataclasses import dataclass
+
+import numpy as np
+from scipy import stats
+
+from rig.estimation.arrays import Array
+
+CONFIDENCE = 0.95
+
+
+@dataclass(frozen=True, slots=True)
+class Fitted:
+    """`coefficients` (p,) and their `covariance` (p, p); `between_std` is the spread that the values' own stds leave.
+
+    `freedom` is n − p. `residuals` (n,) are values less the model.
+    """
+
+    coefficients: Array
+    covariance: Array
+    between_std: float
+    freedom: int
+    residuals: Array
+
+    @property
+    def std(self) -> Array:
+        """(p,) of the coefficients."""
+        return np.sqrt(np.diag(self.covariance))
+
+    @property
+    def coverage_factor(self) -> float:
+        """Student's, for 95 %."""
+        return float(stats.t.ppf((1 + CONFIDENCE) / 2, self.freedom))
+
+    def p_value(self, index: int) -> float:
+        """How likely a coefficient as far from 0 is where the true one is 0."""
+        return float(2 * stats.t.sf(abs(self.coefficients[index]) / self.std[index], self.freedom))
+
+    def at(self, row: Array) -> tuple[Array, Array]:
+        """The model's value and its std at rows (…, p) of a design."""
+        value: Array = row @ self.coefficients
+        variance: Array = np.einsum("...i,ij,...j->...", row, self.covariance, row)
+        return value, np.sqrt(variance)
+
+
+def fit(design: Array, values: Array, std: Array) -> Fitted:
+    """Weighted least squares of values (n,) with stds (n,) on a design (n, p) of full rank, n > p.
+
+    The variance between runs is DerSimonian and Laird's estimate by moments (Control. Clin. Trials 7 (1986) 177), for any
+    design as in a meta-regression. The covariance is that of Knapp and Hartung (Stat. Med. 22 (2003) 2693), which with
+    Student's t holds for few runs too; never below what the stds themselves say. Raises ValueError for fewer rows.
+    """
+    n, p = design.shape
+    if n <= p:
+        raise ValueError(f"{n} values do not determine {p} coefficients and a spread")
+    fixed = 1 / std**2
+    residuals = values - design @ _solve(design, values, fixed)
+    # Of weights W the expectation of Q = Σ w r² is n − p + τ² (ΣW − tr[(XᵀWX)⁻¹ XᵀW²X]).
+    squares = np.linalg.solve((design.T * fixed) @ design, (design.T * fixed**2) @ design)
+    beyond = float(fixed @ residuals**2) - (n - p)
+    between_variance = max(0.0, beyond / float(fixed.sum() - np.trace(squares)))
+    weights = 1 / (std**2 + between_variance)
+    coefficients = _solve(design, values, weights)
+    residuals = values - design @ coefficients
+    scatter = max(1.0, float(weights @ residuals**2) / (n - p))
+    covariance = scatter * np.linalg.inv((design.T * weights) @ design)
+    return Fitted(coefficients, covariance, float(np.sqrt(between_variance)), n - p, residuals)
+
+
+def _solve(design: Array, values: Array, weights: Array) -> Array:
+    root = np.sqrt(weights)
+    found: Array = np.linalg.lstsq(design * root[:, None], values * root, rcond=None)[0]
+    return found

@@ -1,0 +1,305 @@
+"""A history: runs are entered, and found again.
+
+    with open_history() as history:                    # or open_history("postgresql://rig@lab-server/history")
+        for each in history.calibrations(Selection(serial_number="LSM9DS1-001")):
+            print(each.started_utc, each.value("kx"), each.parameters["kx"].expanded)
+"""
+
+from collections.abc import Iterator, Mapping, Sequence
+from contextlib import contextmanager
+from dataclasses import dataclass
+from datetime import UTC, date, datetime
+from typing import Any
+
+from sqlalchemy import Connection, Engine, Row, Select, and_, exists, insert, or_, select
+from sqlalchemy.exc import IntegrityError, SQLAlchemyError
+
+from rig.errors import Refused
+from rig.history import schema
+from rig.history.engine import WRITES, engine_of
+from rig.history.finished import Finished, Recording
+from rig.history.parameters import Parameter, Quantity, calibrated
+from rig.history.place import Place, place
+
+_MANY = 500  # keys in one question: SQLite takes no more than some thousands
+
+
+@dataclass(frozen=True, slots=True)
+class Selection:
+    """Which calibrations; None is all. `rig` is its name or its arm's serial number."""
+
+    serial_number: str | None = None
+    part: str | None = None
+    since: date | None = None
+    rig: str | None = None
+
+
+@dataclass(frozen=True, slots=True)
+class Past:
+    """A calibration of long ago or of just now. `id` names it, `run_id` the run it was part of."""
+
+    id: int
+    run_id: int
+    started_utc: str
+    rig: str
+    arm_serial_number: str
+    verdict: str
+    fit: bool
+    simulated: bool
+    sensor: str
+    quantity: Quantity
+    part: str
+    serial_number: str
+    full_scale: float
+    estimator: str
+    temperature_c: float | None
+    check_standard: bool
+    parameters: Mapping[str, Parameter]
+
+    @property
+    def subject(self) -> tuple[str, str, str, float, bool]:
+        """What stays the same over the years: part, serial number, quantity, range, and whether it is simulated."""
+        return self.part, self.serial_number, self.quantity, self.full_scale, self.simulated
+
+    def value(self, name: str) -> float:
+        """Of a parameter. Raises KeyError."""
+        return self.parameters[name].value
+
+
+@dataclass(frozen=True, slots=True)
+class Entered:
+    """The run's `run_id`; `new` is False where the history had it already."""
+
+    run_id: int
+    new: bool
+
+
+@dataclass(frozen=True, slots=True)
+class Kept:
+    """A run as it was entered: its result, its recordings, and where its folder was seen, the newest place first."""
+
+    run_id: int
+    content_sha256: str
+    result: str
+    recordings: tuple[Recording, ...]
+    places: tuple[tuple[str, str], ...]
+
+
+@contextmanager
+def open_history(where: str | Place | None = None) -> Iterator["History"]:
+    """A history by its file or URL, the user's own by default; its tables are made or migrated if need be.
+
+    Raises Refused `history_unreachable`, `history_too_new`, `not_a_history`, `missing_extra`.
+    """
+    found = where if isinstance(where, Place) else place(where)
+    engine: Engine | None = None
+    try:
+        engine = engine_of(found)
+        yield History(engine)
+    except (SQLAlchemyError, OSError) as error:
+        why = str(getattr(error, "orig", None) or error).strip().splitlines()
+        raise Refused(
+            "history_unreachable",
+            f"the history {found.label} cannot be used: {why[0] if why else type(error).__name__}",
+            "Mend that, or name another with --history or RIG_HISTORY; runs are entered later by `rig history import`",
+        ) from error
+    finally:
+        if engine is not None:
+            engine.dispose()
+
+
+@dataclass(frozen=True, slots=True)
+class History:
+    """An open one."""
+
+    engine: Engine
+
+    def enter(self, finished: Finished) -> Entered:
+        """Add a run; one that is there already only gets the place of its folder noted, if that is another."""
+        try:
+            with self._writing() as connection:
+                known = self._run_id(connection, finished.content_sha256)
+                run_id = _enter(connection, finished) if known is None else known
+                _note_place(connection, run_id, finished)
+                return Entered(run_id, known is None)
+        except IntegrityError:
+            # Somebody else entered the same at the same moment, and was first.
+            with self.engine.connect() as connection:
+                known = self._run_id(connection, finished.content_sha256)
+            if known is None:
+                raise
+            return Entered(known, False)
+
+    def calibrations(self, selection: Selection = Selection()) -> list[Past]:  # noqa: B008 - frozen
+        """In the order of time. A result that another of the same measurement has replaced is left out."""
+        rows = schema.run.join(schema.calibration)
+        question = select(*_COLUMNS).select_from(rows).where(~_replaced()).order_by(*_IN_TIME)
+        return self._pasts(_chosen(question, selection))
+
+    def calibration(self, number: int) -> Past:
+        """One by its number, replaced or not. Raises Refused `not_in_history`."""
+        rows = schema.run.join(schema.calibration)
+        found = self._pasts(select(*_COLUMNS).select_from(rows).where(schema.calibration.c.id == number))
+        if not found:
+            raise Refused("not_in_history", f"there is no calibration number {number}", "Look with `rig history`")
+        return found[0]
+
+    def of_run(self, run_id: int) -> list[Past]:
+        """All of one run."""
+        rows = schema.run.join(schema.calibration)
+        return self._pasts(select(*_COLUMNS).select_from(rows).where(schema.run.c.id == run_id).order_by(*_IN_TIME))
+
+    def kept(self, run_id: int | None = None) -> Iterator[Kept]:
+        """Runs as they were entered, one or all, in the order they were."""
+        runs, places, files = schema.run, schema.location, schema.recording
+        question = select(runs.c.id, runs.c.content_sha256, runs.c.result).order_by(runs.c.id)
+        if run_id is not None:
+            question = question.where(runs.c.id == run_id)
+        with self.engine.connect() as connection:
+            for number, sha256, result in connection.execute(question).all():
+                seen = select(places.c.computer, places.c.path).where(places.c.run_id == number)
+                had = select(files.c.name, files.c.bytes, files.c.sha256).where(files.c.run_id == number)
+                yield Kept(
+                    number,
+                    sha256,
+                    result,
+                    tuple(Recording(*row) for row in connection.execute(had.order_by(files.c.name))),
+                    tuple((row[0], row[1]) for row in connection.execute(seen.order_by(places.c.id.desc()))),
+                )
+
+    @contextmanager
+    def _writing(self) -> Iterator[Connection]:
+        with self.engine.connect().execution_options(**{WRITES: True}) as connection, connection.begin():
+            yield connection
+
+    @staticmethod
+    def _run_id(connection: Connection, content_sha256: str) -> int | None:
+        found: int | None = connection.scalar(
+            select(schema.run.c.id).where(schema.run.c.content_sha256 == content_sha256)
+        )
+        return found
+
+    def _pasts(self, question: Select[Any]) -> list[Past]:
+        with self.engine.connect() as connection:
+            rows = connection.execute(question).all()
+            parameters = _parameters(connection, [row.id for row in rows])
+        return [Past(**row._mapping, parameters=parameters.get(row.id, {})) for row in rows]
+
+
+_RUN, _CALIBRATION = schema.run.c, schema.calibration.c
+_COLUMNS = (
+    _CALIBRATION.id,
+    _CALIBRATION.run_id,
+    _RUN.started_utc,
+    _RUN.rig,
+    _RUN.arm_serial_number,
+    _RUN.verdict,
+    _RUN.fit,
+    _RUN.simulated,
+    _CALIBRATION.sensor,
+    _CALIBRATION.quantity,
+    _CALIBRATION.part,
+    _CALIBRATION.serial_number,
+    _CALIBRATION.full_scale,
+    _CALIBRATION.estimator,
+    _CALIBRATION.temperature_c,
+    _CALIBRATION.check_standard,
+)
+_IN_TIME = (_RUN.started_utc, _RUN.id, _CALIBRATION.id)
+
+
+def _replaced() -> Any:
+    """Whether there is a later result of the same measurement."""
+    later = schema.run.alias("later")
+    newer = or_(
+        later.c.solved_utc > _RUN.solved_utc, and_(later.c.solved_utc == _RUN.solved_utc, later.c.id > _RUN.id)
+    )
+    return exists(select(later.c.id).where(later.c.measurement_sha256 == _RUN.measurement_sha256, newer))
+
+
+def _chosen(question: Select[Any], selection: Selection) -> Select[Any]:
+    if selection.serial_number is not None:
+        question = question.where(_CALIBRATION.serial_number == selection.serial_number)
+    if selection.part is not None:
+        question = question.where(_CALIBRATION.part == selection.part)
+    if selection.since is not None:
+        question = question.where(_RUN.started_utc >= selection.since.isoformat())
+    if selection.rig is not None:
+        question = question.where(or_(_RUN.rig == selection.rig, _RUN.arm_serial_number == selection.rig))
+    return question
+
+
+def _parameters(connection: Connection, numbers: Sequence[int]) -> dict[int, dict[str, Parameter]]:
+    columns, found = schema.parameter.c, dict[int, dict[str, Parameter]]()
+    for start in range(0, len(numbers), _MANY):
+        some = numbers[start : start + _MANY]
+        for row in connection.execute(select(schema.parameter).where(columns.calibration_id.in_(some))):
+            number, name, *values = row
+            found.setdefault(number, {})[name] = Parameter(name, *values)
+    return found
+
+
+def _enter(connection: Connection, finished: Finished) -> int:
+    origin = finished.document.provenance
+    row = {
+        "content_sha256": finished.content_sha256,
+        "measurement_sha256": finished.measurement_sha256,
+        "started_utc": _utc(origin.started_utc),
+        "solved_utc": _utc(origin.solved_utc),
+        "entered_utc": _now(),
+        "rig": finished.rig,
+        "arm_serial_number": origin.arm_serial_number,
+        "board_unique_id": origin.board_unique_id,
+        "configuration_sha256": origin.configuration_sha256,
+        "verdict": finished.document.verdict,
+        "fit": finished.fit,
+        "simulated": finished.simulated,
+        "result": finished.text,
+    }
+    run_id = _inserted(connection.execute(insert(schema.run).values(row)).inserted_primary_key)
+    if finished.recordings:
+        rows = [{"run_id": run_id, "name": r.name, "bytes": r.size, "sha256": r.sha256} for r in finished.recordings]
+        connection.execute(insert(schema.recording), rows)
+    for each in calibrated(finished.document):
+        number = _inserted(
+            connection.execute(
+                insert(schema.calibration).values(
+                    run_id=run_id,
+                    sensor=each.sensor,
+                    quantity=each.quantity,
+                    part=each.part,
+                    serial_number=each.serial_number,
+                    full_scale=each.full_scale,
+                    estimator=each.estimator,
+                    temperature_c=each.temperature_c,
+                    check_standard=each.serial_number in finished.check_standards,
+                )
+            ).inserted_primary_key
+        )
+        columns = [column.name for column in schema.parameter.c if column.name != "calibration_id"]
+        rows = [{"calibration_id": number, **{name: getattr(p, name) for name in columns}} for p in each.parameters]
+        if rows:
+            connection.execute(insert(schema.parameter), rows)
+    return run_id
+
+
+def _note_place(connection: Connection, run_id: int, finished: Finished) -> None:
+    places = schema.location.c
+    same = (places.run_id == run_id, places.computer == finished.computer, places.path == finished.path)
+    if connection.scalar(select(places.id).where(*same)) is None:
+        where = {"run_id": run_id, "computer": finished.computer, "path": finished.path, "noted_utc": _now()}
+        connection.execute(insert(schema.location).values(where))
+
+
+def _inserted(key: Row[Any] | None) -> int:
+    assert key is not None
+    return int(key[0])
+
+
+def _utc(text: str) -> str:
+    """In one form, so that texts sort as times do."""
+    return datetime.fromisoformat(text).astimezone(UTC).isoformat(timespec="seconds")
+
+
+def _now() -> str:
+    return datetime.now(UTC).isoformat(timespec="milliseconds")
