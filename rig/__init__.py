@@ -17,6 +17,7 @@ from typing import TYPE_CHECKING, Any
 
 if TYPE_CHECKING:
     from rig.errors import Fault, Refused
+    from rig.history.store import open_history
     from rig.notebook.comparisons import SensorComparison, compare
     from rig.notebook.results import Calibration, Result, solve
     from rig.notebook.runs import Readings, Run, load
@@ -33,11 +34,13 @@ __all__ = [
     "__version__",
     "compare",
     "load",
+    "open_history",
     "solve",
 ]
 
 _PLACES = {
     **dict.fromkeys(("Fault", "Refused"), "rig.errors"),
+    "open_history": "rig.history.store",
     **dict.fromkeys(("SensorComparison", "compare"), "rig.notebook.comparisons"),
     **dict.fromkeys(("Calibration", "Result", "solve"), "rig.notebook.results"),
     **dict.fromkeys(("Readings", "Run", "load"), "rig.notebook.runs"),

@@ -9,7 +9,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from rig import __version__
-from rig.commands import solve_arguments
+from rig.commands import history_arguments, solve_arguments
 from rig.commands.standard_streams import keep_streams_usable
 from rig.errors import Fault, RigError
 from rig.errors.quoting import printable_lines
@@ -38,7 +38,8 @@ _ENDING_SIGNALS = tuple(
 
 def main(arguments: Sequence[str] | None = None) -> int:
     """Entry point of `rig`; returns the exit status docs/architecture.md promises (0, 1, 2, 3 or 130)."""
-    options = _parser().parse_args(arguments)
+    said = sys.argv[1:] if arguments is None else arguments
+    options = _parser().parse_args(history_arguments.with_usual_command(said))
     return guarded(lambda: options.command(options))
 
 
@@ -135,6 +136,8 @@ def _parser() -> argparse.ArgumentParser:
         metavar=("CELSIUS", "DRIFT_RUN"),
         help="biases as they are at that temperature, by the slopes a run of bias_drift has found",
     )
+    text = "what the laboratory remembers: calibrations, trends, check standards"
+    history_arguments.add_arguments(commands.add_parser("history", help=text, description=text))
     study = add("study", _study, "Monte-Carlo studies of the papers' figures and tables; without a name, list them")
     study.add_argument("name", nargs="?", metavar="NAME")
     study.add_argument("--out", type=Path, default=Path("studies"), metavar="DIR", help="default: studies")

@@ -1,5 +1,7 @@
 """What every test has: simulated laboratories, and a Hypothesis without a stopwatch."""
 
+import os
+
 import pytest
 from hypothesis import settings
 
@@ -9,6 +11,8 @@ __all__ = ["world"]
 
 settings.register_profile("rig", deadline=None)  # a shared machine stalls now and then, which is no failure
 settings.load_profile("rig")
+
+os.environ["RIG_HISTORY"] = "off"  # nothing that a test runs enters the history of whoever runs the tests
 
 
 def pytest_addoption(parser: pytest.Parser) -> None:

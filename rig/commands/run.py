@@ -8,6 +8,7 @@ from rig.analysis.contradictions import names_a_sweep
 from rig.commands.claims import claimed
 from rig.commands.configured import Configured, configured
 from rig.commands.laboratory import simulated_laboratory
+from rig.commands.remember import print_beside, remember
 from rig.data.result_file import read_result
 from rig.data.run_folder import CONFIG, RESULT, SCRIPT, new_folder, script_identity
 from rig.errors import Refused
@@ -71,6 +72,11 @@ def _carry_out(folder: Path, found: Configured, *, assume_yes: bool, as_json: bo
             if found.loaded.simulated:
                 held.enter_context(simulated_laboratory(folder / CONFIG))
         outcome = this.carry_out(found.phase)
+        entered, beside = remember(folder, found.loaded.config.history)
+        if entered is not None:
+            station.event(entered)
         station.event(RunFolderWritten(folder))
     print_outcome(document_of(outcome), as_json=as_json)
+    if not as_json:
+        print_beside(beside)
     return 0 if outcome.passed else 1

@@ -14,7 +14,13 @@ from rig.history import schema
 
 LOCK = 7_245_118  # any number, the same for everybody: makers of tables wait for one another
 
-MIGRATIONS: Mapping[int, Callable[[Connection], None]] = {}
+
+def migrate_1_to_2(connection: Connection) -> None:
+    """Calibrations can be voided."""
+    schema.voided.create(connection)
+
+
+MIGRATIONS: Mapping[int, Callable[[Connection], None]] = {1: migrate_1_to_2}
 
 
 def version_of(connection: Connection, label: str) -> int:

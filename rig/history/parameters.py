@@ -25,6 +25,7 @@ CHECKED_AS = {  # the checks whose limits hold for scale and bias
     "field": ("", ""),
 }
 ANGLES = ("nonorth_yz", "nonorth_zx", "nonorth_xy")
+ORDER = ("k", "kx", "ky", "kz", "bx", "by", "bz", *ANGLES, *(f"g{row}{column}" for row in "xyz" for column in "xyz"))
 
 
 @dataclass(frozen=True, slots=True)

@@ -18,7 +18,7 @@ from sqlalchemy import (
     UniqueConstraint,
 )
 
-VERSION = 1
+VERSION = 2
 HASH, TIME, NAME = 64, 40, 400  # longest texts of their kind
 
 metadata = MetaData()
@@ -93,4 +93,13 @@ parameter = Table(
     Column("std_combined", Float),  # null where no more than noise is known
     Column("unit", String(40), nullable=False),
     Column("max_deviation", Float),  # from the nominal value, by the limits of that run
+)
+
+# Since version 2. A wrong entry is not taken away: it is said that it is wrong, and why.
+voided = Table(
+    "voided",
+    metadata,
+    Column("calibration_id", ForeignKey("calibration.id"), primary_key=True),
+    Column("reason", String(1000), nullable=False),
+    Column("voided_utc", String(TIME), nullable=False),
 )

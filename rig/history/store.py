@@ -18,7 +18,7 @@ from rig.errors import Refused
 from rig.history import schema
 from rig.history.engine import WRITES, engine_of
 from rig.history.finished import Finished, Recording
-from rig.history.parameters import Parameter, Quantity, calibrated
+from rig.history.parameters import ORDER, Parameter, Quantity, calibrated
 from rig.history.place import Place, place
 
 _MANY = 500  # keys in one question: SQLite takes no more than some thousands
@@ -36,7 +36,10 @@ class Selection:
 
 @dataclass(frozen=True, slots=True)
 class Past:
-    """A calibration of long ago or of just now. `id` names it, `run_id` the run it was part of."""
+    """A calibration of long ago or of just now. `id` names it, `run_id` the run it was part of.
+
+    `voided` is why it does not count, None where it does.
+    """
 
     id: int
     run_id: int
@@ -54,6 +57,7 @@ class Past:
     estimator: str
     temperature_c: float | None
     check_standard: bool
+    voided: str | None
     parameters: Mapping[str, Parameter]
 
     @property
@@ -131,23 +135,31 @@ class History:
             return Entered(known, False)
 
     def calibrations(self, selection: Selection = Selection()) -> list[Past]:  # noqa: B008 - frozen
-        """In the order of time. A result that another of the same measurement has replaced is left out."""
-        rows = schema.run.join(schema.calibration)
-        question = select(*_COLUMNS).select_from(rows).where(~_replaced()).order_by(*_IN_TIME)
+        """In the order of time, the voided ones too. A result that a later one of the same run replaced is left out."""
+        question = select(*_COLUMNS).select_from(_ROWS).where(~_replaced()).order_by(*_IN_TIME)
         return self._pasts(_chosen(question, selection))
 
     def calibration(self, number: int) -> Past:
         """One by its number, replaced or not. Raises Refused `not_in_history`."""
-        rows = schema.run.join(schema.calibration)
-        found = self._pasts(select(*_COLUMNS).select_from(rows).where(schema.calibration.c.id == number))
+        found = self._pasts(select(*_COLUMNS).select_from(_ROWS).where(schema.calibration.c.id == number))
         if not found:
             raise Refused("not_in_history", f"there is no calibration number {number}", "Look with `rig history`")
         return found[0]
 
     def of_run(self, run_id: int) -> list[Past]:
         """All of one run."""
-        rows = schema.run.join(schema.calibration)
-        return self._pasts(select(*_COLUMNS).select_from(rows).where(schema.run.c.id == run_id).order_by(*_IN_TIME))
+        return self._pasts(select(*_COLUMNS).select_from(_ROWS).where(_RUN.id == run_id).order_by(*_IN_TIME))
+
+    def void(self, number: int, reason: str) -> None:
+        """Say that a calibration does not count, and why. Raises Refused `not_in_history`, `already_voided`."""
+        before = self.calibration(number).voided
+        if before is not None:
+            raise Refused(
+                "already_voided", f"calibration {number} is void already: {before}", "Look at it with `rig history show`"
+            )
+        with self._writing() as connection:
+            row = {"calibration_id": number, "reason": reason, "voided_utc": _now()}
+            connection.execute(insert(schema.voided).values(row))
 
     def kept(self, run_id: int | None = None) -> Iterator[Kept]:
         """Runs as they were entered, one or all, in the order they were."""
@@ -204,7 +216,9 @@ _COLUMNS = (
     _CALIBRATION.estimator,
     _CALIBRATION.temperature_c,
     _CALIBRATION.check_standard,
+    schema.voided.c.reason.label("voided"),
 )
+_ROWS = schema.run.join(schema.calibration).outerjoin(schema.voided)
 _IN_TIME = (_RUN.started_utc, _RUN.id, _CALIBRATION.id)
 
 
@@ -236,7 +250,7 @@ def _parameters(connection: Connection, numbers: Sequence[int]) -> dict[int, dic
         for row in connection.execute(select(schema.parameter).where(columns.calibration_id.in_(some))):
             number, name, *values = row
             found.setdefault(number, {})[name] = Parameter(name, *values)
-    return found
+    return {number: {name: each[name] for name in ORDER if name in each} for number, each in found.items()}
 
 
 def _enter(connection: Connection, finished: Finished) -> int:

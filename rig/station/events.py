@@ -226,6 +226,23 @@ class RunFolderWritten:
 
 
 @dataclass(frozen=True, slots=True)
+class Remembered:
+    """The run stands in `history` under this number; `beyond` are the changes since the last calibration beyond U."""
+
+    history: str
+    number: int
+    beyond: tuple[str, ...]
+
+
+@dataclass(frozen=True, slots=True)
+class NotRemembered:
+    """The run in `folder` could not be entered in the history, and why. It is none the worse."""
+
+    folder: Path
+    why: str
+
+
+@dataclass(frozen=True, slots=True)
 class Advice:
     """After a failure: the data are kept in `folder`, from which the run goes on, or `repeats` its refused sweeps."""
 
@@ -280,6 +297,8 @@ RunEvent = (
     | Checked
     | VerdictReached
     | ListenerDropped
+    | Remembered
+    | NotRemembered
     | RunFolderWritten
     | Advice
     | Failed

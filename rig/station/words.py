@@ -1,5 +1,6 @@
 """The line an event is worth, for a terminal and for the log."""
 
+import shlex
 from traceback import format_exception
 
 from rig.data.run_folder import resuming
@@ -13,10 +14,12 @@ from rig.station.events import (
     Interrupted,
     ListenerDropped,
     NotPlotted,
+    NotRemembered,
     PhaseRecorded,
     PhaseSkipped,
     Plotted,
     PreflightPassed,
+    Remembered,
     RunEvent,
     RunFolderWritten,
     RunResumed,
@@ -69,6 +72,12 @@ def _of_the_outcome(event: RunEvent) -> str | None:
             text = f"plotted: {', '.join(names)} (.png, .svg)"
         case NotPlotted():
             text = "no plots: they need matplotlib, install the extra with pip install 'calibration-rig[study]'"
+        case Remembered(history, number, beyond):
+            changed = f"; changed beyond U: {', '.join(beyond)}" if beyond else ""
+            text = f"entered in {history} as run {number}{changed}"
+        case NotRemembered(folder, why):
+            later = f"rig history import {shlex.quote(str(folder))}"
+            text = f"not entered in the history, which does not matter to the run ({why}); later: {later}"
         case RunFolderWritten(folder):
             text = f"written: {folder}"
         case Advice(folder, repeats):

@@ -1,0 +1,219 @@
+"""`rig history …`: what the laboratory remembers."""
+
+import json
+import os
+import sys
+from argparse import Namespace
+from collections.abc import Iterator
+from contextlib import AbstractContextManager
+from pathlib import Path
+
+from rich.console import Console
+
+from rig.config.load import load
+from rig.data.run_folder import RESULT, recordings
+from rig.errors import Refused, RigError
+from rig.history.documents import change_entry, history_csv, history_json, rigs_json, text_of
+from rig.history.finished import Finished, finished_run
+from rig.history.integrity import examined
+from rig.history.place import ENVIRONMENT, OFF, Place, place
+from rig.history.series import changes, effects, rig_states, subjects, trends
+from rig.history.store import History, Past, Selection, open_history
+from rig.history.tables import (
+    calibrations_table,
+    changes_table,
+    effects_table,
+    parameters_table,
+    states_table,
+    title_of,
+    trend_lines,
+    trends_table,
+)
+from rig.station.plain_text import plain, say
+from rig.study.files import missing_extra
+
+DISAGREE = 1
+
+
+def listed(options: Namespace) -> int:
+    """Print calibrations; of one serial number the trends too. Raises Refused `not_in_history` and as `opened`."""
+    selection = _selection(options)
+    with opened(options) as history:
+        pasts = _selected(history, selection)
+    found = {subject: trends(each) for subject, each in subjects(pasts).items()}
+    if options.csv:
+        print(history_csv(pasts), end="")
+    elif options.json:
+        print(history_json(pasts, found if selection.serial_number is not None else None))
+    else:
+        console = Console(highlight=False)
+        console.print(calibrations_table(pasts))
+        for subject, each in found.items() if selection.serial_number is not None else ():
+            console.print(trends_table(subject, each.values()))
+            for line in trend_lines(each):
+                console.print(plain(line))
+    return 0
+
+
+def show(options: Namespace) -> int:
+    """Print one calibration, and where its run lies. Raises Refused `not_in_history`."""
+    with opened(options) as history:
+        past = history.calibration(options.number)
+        (kept,) = history.kept(past.run_id)
+    if options.json:
+        print(json.dumps(json.loads(kept.result), indent=2, ensure_ascii=False))
+        return 0
+    console = Console(highlight=False)
+    console.print(calibrations_table([past]))
+    console.print(parameters_table(past))
+    for computer, path in kept.places:
+        console.print(plain(f"lies on {computer} in {path}"))
+    for recording in kept.recordings:
+        console.print(plain(f"{recording.name}: {recording.size} bytes, SHA-256 {recording.sha256}"))
+    return 0
+
+
+def plot(options: Namespace) -> int:
+    """Draw the series of a serial number. Raises Refused `not_in_history`, `missing_extra`, `report_folder`."""
+    try:
+        import matplotlib  # noqa: F401
+    except ImportError as error:
+        raise missing_extra(error, "study") from error
+    from rig.history.plots import draw_trends
+
+    with opened(options) as history:
+        pasts = _selected(history, _selection(options))
+    try:
+        options.out.mkdir(parents=True, exist_ok=True)
+        found = {subject: trends(each) for subject, each in subjects(pasts).items()}
+        for path in draw_trends(found, options.out):
+            say(str(path))
+    except OSError as error:
+        why = f"{options.out} cannot be written: {error}"
+        raise Refused("report_folder", why, "Choose another with --out") from error
+    return 0
+
+
+def rigs(options: Namespace) -> int:
+    """Print what check standards and shared sensors say of the rigs. Returns 1 when one is out of control."""
+    with opened(options) as history:
+        pasts = history.calibrations(Selection(part=options.part, since=options.since))
+    states, found = rig_states(pasts), effects(pasts)
+    alarmed = any(chart.out_of_control for state in states for chart in state.charts.values() if chart.alarm.size)
+    if options.json:
+        print(rigs_json(states, found))
+        return DISAGREE if alarmed else 0
+    console = Console(highlight=False)
+    if any(state.charts for state in states):
+        console.print(states_table(states))
+    else:
+        console.print("no check standard has been calibrated often enough on one rig; name some in history.check_standards")
+    if found:
+        console.print(effects_table(found))
+    else:
+        console.print("no two rigs have calibrated the same sensors often enough to be told apart")
+    return DISAGREE if alarmed else 0
+
+
+def imported(options: Namespace) -> int:
+    """Enter runs; tells of each what became of it. Returns 1 when one could not be entered."""
+    new = known = refused = 0
+    with opened(options) as history:
+        for folder in _run_folders(options.folders, unsolved=options.solve):
+            try:
+                entered = history.enter(_finished(folder, solve=options.solve))
+            except (RigError, OSError) as error:
+                refused += 1
+                say(f"{folder}: {error}", sys.stderr)
+                continue
+            new, known = new + entered.new, known + (not entered.new)
+            say(f"{folder}: {'entered' if entered.new else 'there already'}, run {entered.run_id}")
+    say(f"{new} entered, {known} there already, {refused} refused")
+    return DISAGREE if refused else 0
+
+
+def verify(options: Namespace) -> int:
+    """Hold results and recordings against their hashes; names what is wrong. Returns 1 when anything is."""
+    counts = {"ok": 0, "changed": 0, "missing": 0, "elsewhere": 0}
+    with opened(options) as history:
+        for found in examined(history.kept()):
+            counts[found.state] += 1
+            if found.state != "ok":
+                say(f"{found.state}: {found.what} (run {found.run_id}): {found.why}")
+    say(", ".join(f"{count} {state}" for state, count in counts.items()))
+    return DISAGREE if counts["changed"] or counts["missing"] else 0
+
+
+def compare(options: Namespace) -> int:
+    """Two calibrations of one sensor. Raises Refused `not_in_history`, `not_comparable`."""
+    with opened(options) as history:
+        first, second = history.calibration(options.first), history.calibration(options.second)
+    if first.subject != second.subject:
+        raise Refused(
+            "not_comparable",
+            f"{first.id} is of {title_of(first.subject)}, {second.id} of {title_of(second.subject)}",
+            "Give two calibrations of one sensor at one range",
+        )
+    found = changes(first, second)
+    if options.json:
+        numbers = {"before": first.id, "now": second.id}
+        print(text_of({**numbers, "parameters": {each.name: change_entry(each) for each in found}}))
+        return 0
+    Console(highlight=False).print(changes_table(f"{title_of(first.subject)}: {first.id} and {second.id}", found))
+    return 0
+
+
+def void(options: Namespace) -> int:
+    """Say that a calibration does not count. Raises Refused `not_in_history`, `already_voided`."""
+    with opened(options) as history:
+        history.void(options.number, options.reason)
+    say(f"calibration {options.number} does not count any more")
+    return 0
+
+
+def opened(options: Namespace) -> AbstractContextManager[History]:
+    """The history that is meant. Raises Refused as `open_history`, and as `load` where a configuration names it."""
+    return open_history(_place(options.history))
+
+
+def _place(said: str | None) -> Place:
+    if said is not None and said.endswith((".yaml", ".yml")):
+        said = load(Path(said), sections=None).config.history.url
+    elif said is None:
+        said = os.environ.get(ENVIRONMENT)
+    return place(None if said == OFF else said)
+
+
+def _selection(options: Namespace) -> Selection:
+    return Selection(options.serial_number, options.part, options.since, options.rig)
+
+
+def _selected(history: History, selection: Selection) -> list[Past]:
+    """Raises Refused `not_in_history` where one sensor was asked for and there is none."""
+    pasts = history.calibrations(selection)
+    if not pasts and selection.serial_number is not None:
+        raise Refused(
+            "not_in_history",
+            f"no calibration of {selection.serial_number} was entered that fits",
+            "Look with `rig history`, or enter runs with `rig history import`",
+        )
+    return pasts
+
+
+def _run_folders(given: list[Path], *, unsolved: bool) -> Iterator[Path]:
+    """Those given, and those within them; what is no run folder comes as it is, for its own error."""
+    for folder in given:
+        inner = {file.parent for file in folder.rglob(RESULT)}
+        if unsolved:
+            inner |= {file.parent for file in folder.rglob("*.h5") if recordings(file.parent, "raw")}
+        yield from sorted(inner) or [folder]
+
+
+def _finished(folder: Path, *, solve: bool) -> Finished:
+    if solve and not (folder / RESULT).exists():
+        from rig.analysis.calibration import DEFAULT_ESTIMATOR
+        from rig.plans.recorded import judged, open_run
+        from rig.report.document import document_of
+
+        return finished_run(folder, document_of(judged(open_run(folder), DEFAULT_ESTIMATOR)))
+    return finished_run(folder)

@@ -1,0 +1,96 @@
+"""What `rig history` takes. Nothing heavy is imported for the help."""
+
+import argparse
+from collections.abc import Callable, Sequence
+from datetime import date
+from pathlib import Path
+from typing import Any
+
+LIST = "list"
+_COMMANDS = (LIST, "show", "plot", "rigs", "import", "verify", "compare", "void")
+
+
+def with_usual_command(arguments: Sequence[str]) -> list[str]:
+    """`rig history …` without one of its commands is `rig history list …`."""
+    words = list(arguments)
+    if words[:1] == ["history"] and words[1:2] not in [[each] for each in (*_COMMANDS, "-h", "--help")]:
+        words.insert(1, LIST)
+    return words
+
+
+def add_arguments(history: argparse.ArgumentParser) -> None:
+    """The commands of `rig history`."""
+    commands = history.add_subparsers(title="commands", required=True, metavar="COMMAND")
+
+    def add(name: str, text: str) -> argparse.ArgumentParser:
+        command: argparse.ArgumentParser = commands.add_parser(name, help=text, description=text)
+        command.set_defaults(command=_command(name))
+        command.add_argument(
+            "--history",
+            metavar="PLACE",
+            help="an SQLite file, a postgresql:// URL, or a configuration file that names one (default: RIG_HISTORY, "
+            "else the user's own)",
+        )
+        return command
+
+    listed = add(LIST, "calibrations, and of one sensor their trends; the usual one, its name may be left out")
+    listed.add_argument("serial_number", nargs="?", metavar="SERIAL", help="of one sensor")
+    _add_selection(listed)
+    form = listed.add_mutually_exclusive_group()
+    form.add_argument("--json", action="store_true", help="for machines")
+    form.add_argument("--csv", action="store_true", help="for machines and spreadsheets, a line for each parameter")
+    show = add("show", "one calibration with its run")
+    show.add_argument("number", type=int, metavar="NUMBER", help="as `rig history` has it")
+    show.add_argument("--json", action="store_true", help="the result.json of its run, as it was entered")
+    plot = add("plot", "draw a sensor's calibrations over time, drift and charts (extra `study`)")
+    plot.add_argument("serial_number", metavar="SERIAL")
+    _add_selection(plot)
+    plot.add_argument("--out", type=Path, default=Path(), metavar="DIR", help="where to (default: here)")
+    rigs = add("rigs", "what check standards and shared sensors say of the rigs themselves")
+    _add_selection(rigs, rig=False)
+    rigs.add_argument("--json", action="store_true", help="for machines")
+    imported = add("import", "enter runs that are in no history yet; what is there already stays as it is")
+    imported.add_argument("folders", nargs="+", type=Path, metavar="DIR", help="run folders, or folders that hold some")
+    imported.add_argument("--solve", action="store_true", help="solve recordings that have no result.json")
+    add("verify", "whether results and recordings are what was entered; exit status 1 when they are not")
+    compare = add("compare", "two calibrations of one sensor, with E_n")
+    compare.add_argument("first", type=int, metavar="A")
+    compare.add_argument("second", type=int, metavar="B")
+    compare.add_argument("--json", action="store_true", help="for machines")
+    void = add("void", "say that a calibration does not count, and why; nothing is taken away")
+    void.add_argument("number", type=int, metavar="NUMBER")
+    void.add_argument("--reason", required=True, metavar="TEXT")
+
+
+def _add_selection(parser: argparse.ArgumentParser, *, rig: bool = True) -> None:
+    parser.add_argument("--part", metavar="PART", help="only sensors of this part")
+    parser.add_argument("--since", type=_day, metavar="DATE", help="only from this day on, as 2026-11-20")
+    if rig:
+        parser.add_argument("--rig", metavar="RIG", help="only by this rig, its name or its arm's serial number")
+
+
+def _day(text: str) -> date:
+    try:
+        return date.fromisoformat(text)
+    except ValueError:
+        raise argparse.ArgumentTypeError(f"{text!r} is no day; write it as 2026-11-20") from None
+
+
+def _command(name: str) -> Callable[[argparse.Namespace], int]:
+    def run(options: argparse.Namespace) -> int:
+        from rig.commands import history
+
+        commands: dict[str, Any] = {
+            LIST: history.listed,
+            "show": history.show,
+            "plot": history.plot,
+            "rigs": history.rigs,
+            "import": history.imported,
+            "verify": history.verify,
+            "compare": history.compare,
+            "void": history.void,
+        }
+        status: int = commands[name](options)
+        return status
+
+    return run

@@ -1,0 +1,74 @@
+"""A sensor's series as pictures: every calibration with U, the drift, and the chart below. Needs matplotlib."""
+
+from collections.abc import Mapping
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from rig.history.series import Subject, Trend
+from rig.history.statistics.charts import SHEWHART_LIMIT
+from rig.history.tables import title_of
+from rig.report.exports.names import plain_names
+from rig.report.figures import save, style
+
+if TYPE_CHECKING:
+    from matplotlib.axes import Axes
+
+SHOWN = ("kx", "ky", "kz", "bx", "by", "bz")
+
+
+def draw_trends(found: Mapping[Subject, Mapping[str, Trend]], folder: Path) -> list[Path]:
+    """`history_<serial number>_<quantity>` as PNG and SVG for each subject into `folder`, which is there."""
+    from matplotlib.figure import Figure
+
+    written, names = [], set[str]()
+    for subject, trends in found.items():
+        (name,) = plain_names([f"history_{subject[1]}_{subject[2]}{'_simulated' * subject[4]}"]).values()
+        while name in names:  # the same sensor at another range
+            name += "_"
+        names.add(name)
+        shown = [trends[each] for each in SHOWN if each in trends]
+        with style():
+            figure = Figure(figsize=(4.6 * 3, 2.6 * len(shown) / 3 * 2), layout="constrained")
+            rows = figure.subplots(2 * (len(shown) // 3), 3, sharex=True, squeeze=False)
+            for i, trend in enumerate(shown):
+                row, column = 2 * (i // 3), i % 3
+                _draw_values(rows[row, column], trend)
+                _draw_chart(rows[row + 1, column], trend)
+            figure.suptitle(f"{title_of(subject)}; bars are U (k = 2), the band holds the line with 95 %")
+            for axes in rows[-1]:
+                axes.tick_params(axis="x", rotation=30)
+            save(figure, folder, name)
+        written += [folder / f"{name}.png", folder / f"{name}.svg"]
+    return written
+
+
+def _draw_values(axes: "Axes", trend: Trend) -> None:
+    expanded = [each.expanded for each in trend.parameters]
+    axes.errorbar(trend.times, trend.values, yerr=expanded, fmt="o", ms=3, lw=0.8, capsize=2, color="C0")
+    axes.set_title(f"{trend.name}   {trend.unit}", loc="left")
+    if trend.line is not None:
+        rows = np.stack([np.ones(trend.count), trend.days], axis=1)
+        value, std = trend.line.at(rows)
+        reach = trend.line.coverage_factor * std
+        axes.plot(trend.times, value, color="C3", lw=1)
+        axes.fill_between(trend.times, value - reach, value + reach, color="C3", alpha=0.15, lw=0)
+
+
+def _draw_chart(axes: "Axes", trend: Trend) -> None:
+    axes.set_ylabel("σ from those before")
+    if trend.chart is None:
+        axes.text(0.5, 0.5, "too few calibrations", ha="center", transform=axes.transAxes)
+        return
+    chart = trend.chart
+    axes.plot(trend.times, chart.deviation, ".", ms=4, color="C0", label="each")
+    axes.plot(trend.times, chart.ewma, color="C1", lw=1.2, label="EWMA")
+    for sign in (1, -1):
+        axes.plot(trend.times, sign * chart.limit, color="C1", lw=0.8, ls="--")
+        axes.axhline(sign * SHEWHART_LIMIT, color="C0", lw=0.8, ls="--")
+    alarms = chart.alarm
+    if alarms.any():
+        times = np.array(trend.times)[alarms]
+        axes.plot(times, chart.deviation[alarms], "o", ms=8, mfc="none", color="C3", label="alarm")
+    axes.legend(frameon=False, fontsize=7, ncols=3, loc="lower left")

@@ -1,0 +1,195 @@
+"""Series of calibrations: what they say of a sensor over the years, and of the rigs it was calibrated on. Pure."""
+
+from collections.abc import Iterable, Mapping, Sequence
+from dataclasses import dataclass
+from datetime import UTC, date, datetime, timedelta
+from functools import cached_property
+
+import numpy as np
+
+from rig.estimation.arrays import Array
+from rig.history.parameters import Parameter, is_scale, nominal
+from rig.history.statistics.agreement import normalised_error
+from rig.history.statistics.charts import FEWEST, Chart, chart, merged
+from rig.history.statistics.random_effects import CONFIDENCE, Fitted, fit
+from rig.history.statistics.recall import days_to_limit
+from rig.history.statistics.rig_effects import RigEffect, rig_effects
+from rig.history.store import Past
+
+YEAR_DAYS = 365.25
+DAY_S = 86400.0
+
+Subject = tuple[str, str, str, float, bool]
+
+
+@dataclass(frozen=True)
+class Trend:
+    """One parameter of one sensor over time: `times` of the calibrations, the parameter in each of them.
+
+    Lines, spreads and charts go by the statistical uncertainty of each result and by the spread that is seen beyond it;
+    what all results of a rig have in common moves none of them. They are None below five results.
+    """
+
+    name: str
+    unit: str
+    times: tuple[datetime, ...]
+    parameters: tuple[Parameter, ...]
+
+    @property
+    def count(self) -> int:
+        """How many results there are."""
+        return len(self.parameters)
+
+    @property
+    def last(self) -> Parameter:
+        """The newest."""
+        return self.parameters[-1]
+
+    @property
+    def enough(self) -> bool:
+        """Whether there are as many as a statement over time needs."""
+        return self.count >= FEWEST
+
+    @property
+    def days(self) -> Array:
+        """(n,) since the first."""
+        return np.array([(time - self.times[0]).total_seconds() / DAY_S for time in self.times])
+
+    @property
+    def values(self) -> Array:
+        """(n,)"""
+        return np.array([each.value for each in self.parameters])
+
+    @property
+    def std(self) -> Array:
+        """(n,) what differs by chance from run to run."""
+        return np.array([each.std_statistical for each in self.parameters])
+
+    @cached_property
+    def mean(self) -> Fitted | None:
+        """The mean, and the spread between runs."""
+        return fit(np.ones((self.count, 1)), self.values, self.std) if self.enough else None
+
+    @cached_property
+    def line(self) -> Fitted | None:
+        """Value at the first result, and change per day; None too where all are of one moment."""
+        if not self.enough or np.ptp(self.days) == 0:
+            return None
+        return fit(np.stack([np.ones(self.count), self.days], axis=1), self.values, self.std)
+
+    @property
+    def drifts(self) -> bool:
+        """Whether the change over time is more than chance."""
+        return self.line is not None and self.line.p_value(1) < 1 - CONFIDENCE
+
+    @cached_property
+    def chart(self) -> Chart | None:
+        """Shewhart and EWMA."""
+        return chart(self.values, self.std) if self.enough else None
+
+    @cached_property
+    def recall(self) -> date | None:
+        """The day on which value and uncertainty may have reached the limit; None without one within ten years."""
+        limit = self.last.max_deviation
+        if self.line is None or limit is None:
+            return None
+        ahead = days_to_limit(self.line, float(self.days[-1]), self.last.expanded, limit, nominal(self.name))
+        return None if ahead is None else (self.times[-1] + timedelta(days=ahead)).date()
+
+
+@dataclass(frozen=True, slots=True)
+class RigState:
+    """What the check standards say of one rig: a chart of each parameter, all of them together, in the order of time."""
+
+    rig: str
+    standards: tuple[str, ...]
+    charts: Mapping[str, Chart]
+
+
+@dataclass(frozen=True, slots=True)
+class Change:
+    """A parameter beside the one of the calibration before."""
+
+    name: str
+    unit: str
+    before: Parameter
+    now: Parameter
+
+    @property
+    def normalised_error(self) -> float:
+        """E_n; above 1 the change is beyond the uncertainty."""
+        return normalised_error(self.before.value, self.now.value, self.before.expanded, self.now.expanded)
+
+    @property
+    def beyond(self) -> bool:
+        """Whether it is more than the uncertainties of both explain."""
+        return self.normalised_error > 1
+
+
+def subjects(pasts: Iterable[Past]) -> dict[Subject, list[Past]]:
+    """Calibrations that count, by what was calibrated: neither voided nor unfit by their own checks."""
+    found: dict[Subject, list[Past]] = {}
+    for each in pasts:
+        if each.fit and each.voided is None:
+            found.setdefault(each.subject, []).append(each)
+    return found
+
+
+def trends(pasts: Sequence[Past]) -> dict[str, Trend]:
+    """Of every parameter that the newest of one subject's calibrations has."""
+    found = {}
+    for name in pasts[-1].parameters if pasts else ():
+        with_it = [each for each in pasts if name in each.parameters]
+        parameters = tuple(each.parameters[name] for each in with_it)
+        found[name] = Trend(name, parameters[-1].unit, tuple(time_of(each) for each in with_it), parameters)
+    return found
+
+
+def changes(before: Past, now: Past) -> tuple[Change, ...]:
+    """Of the parameters that both have."""
+    return tuple(
+        Change(name, now.parameters[name].unit, before.parameters[name], now.parameters[name])
+        for name in now.parameters
+        if name in before.parameters
+    )
+
+
+def rig_states(pasts: Sequence[Past]) -> list[RigState]:
+    """Every rig that has check standards; a sensor is one if it was ever called one."""
+    found = subjects(pasts)
+    standards = {subject: each for subject, each in found.items() if any(past.check_standard for past in each)}
+    states = []
+    for rig in dict.fromkeys(past.rig for each in standards.values() for past in each):
+        deviations: dict[str, list[tuple[datetime, float]]] = {}
+        serials = []
+        for (_, serial_number, *_), each in standards.items():
+            of_rig = [past for past in each if past.rig == rig]
+            serials += [serial_number] if of_rig else []
+            for name, trend in trends(of_rig).items():
+                if trend.chart is not None:
+                    judged = zip(trend.times, trend.chart.deviation.tolist(), strict=True)
+                    deviations.setdefault(name, []).extend(pair for pair in judged if np.isfinite(pair[1]))
+        charts = {name: merged(np.array([each for _, each in sorted(pairs)])) for name, pairs in deviations.items()}
+        states.append(RigState(rig, tuple(dict.fromkeys(serials)), charts))
+    return states
+
+
+def effects(pasts: Sequence[Past]) -> dict[str, tuple[RigEffect, ...]]:
+    """By parameter of gyroscopes: what rigs differ in, from the sensors they share. Of scale factors as a fraction."""
+    series = [(name, past) for each in subjects(pasts).values() for past in each for name in past.parameters]
+    found = {}
+    for name in dict.fromkeys(name for name, past in series if past.quantity == "rate"):
+        having = [past for of, past in series if of == name and past.quantity == "rate"]
+        values = np.array([past.value(name) for past in having])
+        std = np.array([past.parameters[name].std_statistical for past in having])
+        if is_scale(name):
+            values, std = np.log(values), std / values
+        told = rig_effects([past.rig for past in having], [str(past.subject) for past in having], values, std)
+        if told:
+            found[name] = told
+    return found
+
+
+def time_of(past: Past) -> datetime:
+    """When it began."""
+    return datetime.fromisoformat(past.started_utc).astimezone(UTC)

@@ -1,0 +1,73 @@
+"""Many processes enter runs into one history at the same time, on SQLite and on PostgreSQL."""
+
+import multiprocessing
+from collections.abc import Iterator
+from dataclasses import replace
+from pathlib import Path
+
+import pytest
+from sqlalchemy import delete, text
+
+from rig.history import schema
+from rig.history.engine import WRITES
+from rig.history.store import open_history
+from support.past_runs import finished
+from support.postgres import postgresql
+
+PROCESSES, ENTRIES = 8, 250
+pytestmark = pytest.mark.slow
+
+
+def enter(url: str, worker: int, entries: int) -> int:
+    """How many were new. Its runs are changed texts of one: to make them must not take longer than to enter them."""
+    first = finished(worker)
+    began = first.document.provenance.started_utc
+    new = 0
+    with open_history(url) as history:
+        for i in range(entries):
+            started = f"{began[:11]}{i // 60 + 8:02}:{i % 60:02}:00+00:00"
+            provenance = first.document.provenance.model_copy(update={"started_utc": started})
+            document = first.document.model_copy(update={"provenance": provenance})
+            new += history.enter(replace(first, text=first.text.replace(began, started), document=document)).new
+    return new
+
+
+@pytest.fixture(params=["sqlite", "postgresql"])
+def url(request: pytest.FixtureRequest, tmp_path: Path) -> Iterator[str]:
+    if request.param == "sqlite":
+        yield str(tmp_path / "history.sqlite")
+        return
+    with postgresql() as found:
+        yield found
+
+
+def test_of_what_eight_processes_enter_nothing_is_lost_and_nothing_stands_twice(url: str) -> None:
+    """The tables are made by whoever comes first."""
+    context = multiprocessing.get_context("forkserver")
+    context.set_forkserver_preload(["rig.history.store", "support.past_runs"])
+    with context.Pool(PROCESSES) as pool:
+        new = pool.starmap(enter, [(url, worker, ENTRIES) for worker in range(PROCESSES)])
+        assert new == [ENTRIES] * PROCESSES
+        again = pool.starmap(enter, [(url, worker % 2, 20) for worker in range(PROCESSES)])
+        assert again == [0] * PROCESSES
+    with open_history(url) as history:
+        with history.engine.connect() as connection:
+            runs, calibrations, parameters = (
+                connection.execute(text(f"SELECT count(*) FROM {table}")).scalar_one()
+                for table in ("run", "calibration", "parameter")
+            )
+        assert (runs, calibrations, parameters) == (2000, 2000, 2000 * 10)
+        assert len({each.started_utc for each in history.calibrations()}) == 2000
+
+
+def test_a_history_of_version_1_is_migrated_there_too(url: str) -> None:
+    with open_history(url) as history:
+        history.enter(finished(0))
+        before = history.calibrations()
+        with history.engine.connect().execution_options(**{WRITES: True}) as connection, connection.begin():
+            schema.voided.drop(connection)
+            connection.execute(delete(schema.meta).where(schema.meta.c.key == "version"))
+            connection.execute(schema.meta.insert().values(key="version", value="1"))
+    with open_history(url) as history:
+        assert history.calibrations() == before
+        history.void(before[0].id, "to see that it can be")

@@ -1,0 +1,247 @@
+"""A history: what is entered is found again, nothing is lost, nothing stands there twice, nothing is taken away."""
+
+import sqlite3
+from collections.abc import Iterator
+from datetime import timedelta
+from pathlib import Path
+
+import pytest
+from sqlalchemy import inspect, text
+
+from rig.config.judging_sections import HistorySection
+from rig.config.load import ConfigurationRefused, load
+from rig.data.result_file import read_result
+from rig.errors import Refused
+from rig.history import schema
+from rig.history.engine import engine_of
+from rig.history.finished import content_sha256, finished_run
+from rig.history.parameters import calibrated
+from rig.history.place import chosen_place, place
+from rig.history.series import changes, effects, rig_states, subjects, trends
+from rig.history.store import History, Selection, open_history
+from support.past_runs import FIRST, finished
+from support.paths import DEMO, FIXTURES, ROOT
+
+VERSION_1 = ROOT / "tests" / "fixtures" / "history" / "version_1.sql"
+
+
+@pytest.fixture
+def history(tmp_path: Path) -> Iterator[History]:
+    with open_history(str(tmp_path / "history.sqlite")) as opened:
+        yield opened
+
+
+def test_a_run_is_found_again_with_all_its_numbers(history: History) -> None:
+    run = finished_run(FIXTURES / "verified")
+    entered = history.enter(run)
+    assert entered.new
+    (kept,) = history.kept()
+    assert kept.result == run.text and content_sha256(kept.result) == kept.content_sha256
+    assert [each.name for each in kept.recordings] == ["run.h5", "verify.h5"]
+    found = history.of_run(entered.run_id)
+    stated = calibrated(read_result(FIXTURES / "verified"))
+    assert [(f.part, f.serial_number, f.estimator, f.temperature_c) for f in found] == [
+        (s.part, s.serial_number, s.estimator, s.temperature_c) for s in stated
+    ]
+    assert [set(each.parameters.values()) for each in found] == [set(each.parameters) for each in stated]
+
+
+def test_the_mean_scale_factor_has_the_uncertainty_of_all_three() -> None:
+    sensor = read_result(FIXTURES / "verified").sensors["gyro"]
+    mean = {each.name: each for each in calibrated(read_result(FIXTURES / "verified"))[0].parameters}["k"]
+    assert mean.value == pytest.approx(sum(sensor.scale) / 3)
+    variance = sum(sensor.covariance[i][j] for i in range(3) for j in range(3)) / 9
+    assert mean.std_statistical == pytest.approx(variance**0.5)
+
+
+def test_the_same_run_again_adds_nothing_but_the_place_it_lies_in_now(history: History) -> None:
+    first = history.enter(finished(0))
+    moved = finished(0, solved_after_s=3600)  # solved again, with the same numbers
+    again = history.enter(moved)
+    assert (again.run_id, again.new) == (first.run_id, False)
+    assert len(history.calibrations()) == 1
+    (kept,) = history.kept()
+    assert kept.places == (("bench", "/runs/0"),)
+
+
+def test_a_result_of_the_same_recordings_replaces_the_one_before(history: History) -> None:
+    """In series; it stays in the history."""
+    history.enter(finished(0, (1.02, 1.02, 1.02), solved_after_s=3600))
+    history.enter(finished(0, (1.01, 1.01, 1.01), solved_after_s=60))  # entered later, solved earlier
+    (counted,) = history.calibrations()
+    assert counted.value("kx") == 1.02
+    assert [history.calibration(number).value("kx") for number in (1, 2)] == [1.02, 1.01]
+
+
+def test_a_voided_calibration_stands_there_with_its_reason_and_counts_no_more(history: History) -> None:
+    history.enter(finished(0))
+    history.enter(finished(1))
+    history.void(1, "wrong serial number")
+    found = history.calibrations()
+    assert [each.voided for each in found] == ["wrong serial number", None]
+    assert [[each.id for each in series] for series in subjects(found).values()] == [[2]]
+    with pytest.raises(Refused, match="already_voided"):
+        history.void(1, "again")
+    with pytest.raises(Refused, match="not_in_history"):
+        history.void(99, "there is none")
+
+
+def test_a_measurement_that_failed_its_own_checks_is_no_part_of_a_series(history: History) -> None:
+    history.enter(finished(0, passed=False))
+    (found,) = history.calibrations()
+    assert not found.fit
+    assert subjects([found]) == {}
+
+
+def test_calibrations_are_found_by_sensor_day_and_rig(history: History) -> None:
+    history.enter(finished(9, serial_number="G-1", rig="bench A"))
+    history.enter(finished(3, serial_number="G-2", rig="bench B"))
+    history.enter(finished(5, serial_number="G-1", rig="bench B"))
+
+    def days(selection: Selection) -> list[int]:
+        return [round(float((trend.times[0] - FIRST).days)) for trend in first_trends(history, selection)]
+
+    assert days(Selection()) == [3, 5, 9]
+    assert days(Selection(serial_number="G-1")) == [5, 9]
+    assert days(Selection(since=(FIRST + timedelta(days=5)).date())) == [5, 9]
+    assert days(Selection(rig="bench B")) == [3, 5]
+    assert days(Selection(rig="arm of bench A")) == [9]
+    assert days(Selection(part="kvh1775")) == []
+
+
+def first_trends(history: History, selection: Selection) -> list:
+    return [next(iter(trends([past]).values())) for past in history.calibrations(selection)]
+
+
+def test_one_sensor_among_many_is_looked_up_not_searched_for(history: History) -> None:
+    question = "EXPLAIN QUERY PLAN SELECT id FROM calibration WHERE serial_number = 'G-1'"
+    with history.engine.connect() as connection:
+        plan = " ".join(str(row) for row in connection.execute(text(question)))
+    assert "calibration_of_serial_number" in plan and "SCAN" not in plan
+
+
+def test_a_history_of_version_1_is_migrated_with_equal_numbers(tmp_path: Path) -> None:
+    file = tmp_path / "history.sqlite"
+    old = sqlite3.connect(file)
+    old.executescript(VERSION_1.read_text(encoding="utf-8"))
+    question = "SELECT calibration_id, name, value, std_statistical, std_combined, unit FROM parameter ORDER BY 1, 2"
+    before = old.execute(question).fetchall()
+    old.close()
+    with open_history(str(file)) as history:
+        found = history.calibrations()
+        history.void(1, "to see that it can be")
+        with history.engine.connect() as connection:
+            after = [tuple(row) for row in connection.execute(text(question))]
+            migrated = columns_of(connection)
+    assert after == before and len(before) == 20
+    assert [set(each.parameters.values()) for each in found] == [
+        set(each.parameters) for each in calibrated(read_result(FIXTURES / "verified"))
+    ]
+    with open_history(str(tmp_path / "new.sqlite")) as new, new.engine.connect() as connection:
+        assert columns_of(connection) == migrated
+
+
+def columns_of(connection: object) -> dict[str, dict[str, tuple[str, bool]]]:
+    """Of every table: its columns' types, and whether they may be null."""
+    seen = inspect(connection)
+    assert seen is not None
+    return {
+        table: {column["name"]: (str(column["type"]), column["nullable"]) for column in seen.get_columns(table)}
+        for table in seen.get_table_names()
+    }
+
+
+def test_a_history_of_a_newer_program_is_refused_and_not_touched(tmp_path: Path) -> None:
+    file = tmp_path / "history.sqlite"
+    with open_history(str(file)) as history:
+        history.enter(finished(0))
+    other = sqlite3.connect(file)
+    other.execute("UPDATE meta SET value = ? WHERE key = 'version'", [str(schema.VERSION + 1)])
+    other.commit()
+    with pytest.raises(Refused, match=rf"history_too_new: .*version {schema.VERSION + 1}"), open_history(str(file)):
+        pass
+    assert other.execute("SELECT count(*) FROM run").fetchone() == (1,)
+    other.close()
+
+
+def test_what_is_no_history_is_not_made_one(tmp_path: Path) -> None:
+    file = tmp_path / "mail.sqlite"
+    other = sqlite3.connect(file)
+    other.execute("CREATE TABLE letters (id INTEGER)")
+    other.commit()
+    other.close()
+    with pytest.raises(Refused, match="not_a_history: .*letters"), open_history(str(file)):
+        pass
+    words = tmp_path / "words.txt"
+    words.write_text("no database at all, but long enough to be looked at\n" * 100, encoding="utf-8")
+    with pytest.raises(Refused, match="history_unreachable"), open_history(str(words)):
+        pass
+
+
+def test_a_history_is_in_the_user_s_folder_unless_somebody_says_otherwise(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setenv("XDG_DATA_HOME", "/somewhere/share")
+    usual = chosen_place(HistorySection(), {})
+    assert usual is not None and usual.file == Path("/somewhere/share/calibration-rig/history.sqlite")
+    said = chosen_place(HistorySection(url="/data/rig.sqlite"), {})
+    assert said is not None and said.url == "sqlite:////data/rig.sqlite"
+    told = chosen_place(HistorySection(url="/data/rig.sqlite", off=True), {"RIG_HISTORY": "/tmp/other.sqlite"})
+    assert told is not None and told.file == Path("/tmp/other.sqlite")
+    assert chosen_place(HistorySection(off=True), {}) is None
+    assert chosen_place(HistorySection(), {"RIG_HISTORY": "off"}) is None
+
+
+def test_a_password_is_not_told_and_not_taken_from_a_file_that_recordings_keep() -> None:
+    secret = place("postgresql://rig:secret@lab/history?password=secret")
+    assert secret.url.startswith("postgresql+psycopg://") and "secret" not in secret.label
+    for url in ("postgresql://rig:secret@lab/history", "postgresql://lab/history?password=secret", "mysql://lab/x"):
+        with pytest.raises(ConfigurationRefused) as refused:
+            load(DEMO, [f"history.url={url}"])
+        assert "password" in str(refused.value) or "must be a file or begin with" in str(refused.value)
+    assert load(DEMO, ["history.url=postgresql://rig@lab/history"]).config.history.url is not None
+
+
+def test_a_server_that_is_not_there_is_named(tmp_path: Path) -> None:
+    with pytest.raises(Refused, match="history_unreachable"), open_history(f"postgresql://rig@/x?host={tmp_path}"):
+        pass
+    with pytest.raises(Refused, match="history_unreachable"):
+        engine_of(place("nonsense://x"))
+
+
+def test_a_change_beyond_u_is_named(history: History) -> None:
+    history.enter(finished(0))
+    history.enter(finished(30, (1.01 + 4e-4, 0.99, 1.0)))
+    before, now = history.calibrations()
+    assert [each.name for each in changes(before, now) if each.beyond] == ["k", "kx"]
+
+
+def test_a_sensor_s_drift_and_recall_come_out_of_its_history(history: History) -> None:
+    for i in range(10):
+        history.enter(finished(30 * i, (1.01 + 1e-5 * 30 * i, 0.99, 1.0)))
+    (series,) = subjects(history.calibrations(Selection(serial_number="G-1"))).values()
+    found = trends(series)
+    assert found["kx"].line is not None and found["kx"].drifts and not found["kz"].drifts
+    assert found["kx"].line.coefficients[1] == pytest.approx(1e-5, rel=1e-6)
+    limit = found["kx"].last.max_deviation
+    assert limit is not None and found["kx"].recall is not None
+    reached = FIRST + timedelta(days=(limit - 0.01) / 1e-5)
+    assert abs((found["kx"].recall - reached.date()).days) < 30
+    assert found["bx"].recall is None  # the result states no limit for it
+
+
+def test_check_standards_chart_their_rig_and_shared_sensors_tell_rigs_apart(history: History) -> None:
+    """Two sensors watch rig A, whose clock jumps by 300 ppm; B calibrates them too, 40 ppm off."""
+    scatter = [((7 * i) % 11 - 5) * 8e-6 for i in range(40)]
+    for i, each in enumerate(scatter):
+        for serial_number in ("G-1", "G-2"):
+            for rig, factor in (("bench A", 1 + 3e-4 * (i >= 36)), ("bench B", 1 + 4e-5)):
+                scale = tuple(factor * k + each for k in (1.01, 0.99, 1.0))
+                run = finished(i, scale, serial_number=serial_number, rig=rig, check_standard=rig == "bench A")
+                history.enter(run)
+    states = {state.rig: state for state in rig_states(history.calibrations())}
+    assert states["bench A"].charts["k"].out_of_control
+    assert not states["bench B"].charts["k"].alarm.any()
+    assert states["bench A"].standards == ("G-1", "G-2")
+    quiet = [each for each in history.calibrations() if each.started_utc < (FIRST + timedelta(days=36)).isoformat()]
+    (effect,) = effects(quiet)["k"]
+    sign = 1 if effect.rig == "bench B" else -1
+    assert abs(sign * effect.value - 4e-5) < 3 * effect.std < 4e-5

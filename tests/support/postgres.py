@@ -1,0 +1,42 @@
+"""A PostgreSQL of a test's own: a new cluster in a folder of its own, reached by a socket there, gone afterwards."""
+
+import os
+import pwd
+import shutil
+import subprocess
+import tempfile
+from collections.abc import Iterator
+from contextlib import contextmanager
+from pathlib import Path
+from typing import Any
+
+PROGRAMS = Path("/usr/lib/postgresql")  # where Debian has them, by version
+FAST = ("-c", "fsync=off", "-c", "listen_addresses=", "-c", "shared_buffers=16MB", "-c", "max_connections=30")
+
+
+@contextmanager
+def postgresql() -> Iterator[str]:
+    """Its URL. As root it runs as the user `postgres`, since PostgreSQL refuses to be root's."""
+    found = sorted(PROGRAMS.glob("*/bin"), key=lambda path: int(path.parent.name))
+    assert found, "PostgreSQL is not installed: apt-get install postgresql"
+    programs = found[-1]
+    folder = Path(tempfile.mkdtemp(prefix="rig-pg-"))  # short: the path of a socket may have a hundred characters
+    other: dict[str, Any] = {}
+    try:
+        if os.geteuid() == 0:
+            user = pwd.getpwnam("postgres")
+            os.chown(folder, user.pw_uid, user.pw_gid)
+            other = {"user": user.pw_uid, "group": user.pw_gid, "extra_groups": []}
+        data = folder / "data"
+        settled: dict[str, Any] = {"cwd": folder, "stdout": subprocess.DEVNULL, "timeout": 120, **other}
+        make = (programs / "initdb", "-D", data, "-A", "trust", "-U", "rig", "-N", "--no-locale", "-E", "UTF8")
+        subprocess.run(list(map(str, make)), check=True, **settled)
+        control = [str(programs / "pg_ctl"), "-D", str(data)]
+        options = " ".join((*FAST, "-k", str(folder)))
+        subprocess.run([*control, "-w", "-l", str(folder / "log"), "-o", options, "start"], check=True, **settled)
+        try:
+            yield f"postgresql://rig@/postgres?host={folder}"
+        finally:
+            subprocess.run([*control, "-m", "immediate", "stop"], check=True, **settled)
+    finally:
+        shutil.rmtree(folder)
