@@ -107,7 +107,7 @@ def rigs(options: Namespace) -> int:
     if any(state.charts for state in states):
         console.print(states_table(states))
     else:
-        console.print("no check standard has been calibrated often enough on one rig; name some in history.check_standards")
+        console.print("no check standard was calibrated often enough on one rig; history.check_standards names them")
     if found:
         console.print(effects_table(found))
     else:

@@ -44,8 +44,10 @@ def remember(folder: Path, section: "HistorySection") -> tuple[RunEvent | None, 
     except Exception as error:  # whatever it is, the run is finished and its result is written
         why = error.what if isinstance(error, RigError) else f"{type(error).__name__}: {error}"
         return NotRemembered(folder, f"{label}: {why}"), ()
-    beyond = [f"{b.now.serial_number} {c.name} (E_n {c.normalised_error:.1f})" for b in beside for c in b.changes if c.beyond]
-    return Remembered(label, entered.run_id, tuple(beyond)), beside
+    beyond = tuple(
+        f"{b.now.serial_number} {c.name} (E_n {c.normalised_error:.1f})" for b in beside for c in b.changes if c.beyond
+    )
+    return Remembered(label, entered.run_id, beyond), beside
 
 
 def print_beside(found: Sequence[Beside]) -> None:

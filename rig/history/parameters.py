@@ -1,8 +1,8 @@
 """What of a result is followed over the years: parameters with their uncertainties, by sensor. Pure.
 
-Names: kx ky kz scale factors, k their mean, bx by bz biases; nonorth_yz nonorth_zx nonorth_xy the angles between axes less
-90°; gxx … gzz what an acceleration adds to a rate (first letter the gyroscope's axis). The mean is one of its own because
-the only standard of size of a gyroscope, the clock, moves all three alike.
+Names: kx ky kz scale factors, k their mean, bx by bz biases; nonorth_yz nonorth_zx nonorth_xy the angles between axes
+less 90°; gxx … gzz what an acceleration adds to a rate (first letter the gyroscope's axis). The mean is one of its own
+because the only standard of size of a gyroscope, the clock, moves all three alike.
 """
 
 from collections.abc import Iterator, Sequence

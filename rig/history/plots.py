@@ -15,6 +15,8 @@ from rig.report.figures import save, style
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
 
+# Of the figure's width and height. Letting the layout find them takes as long as drawing does.
+MARGINS = {"left": 0.07, "right": 0.985, "bottom": 0.06, "top": 0.93, "wspace": 0.3, "hspace": 0.25}
 SHOWN = ("kx", "ky", "kz", "bx", "by", "bz")
 
 
@@ -30,8 +32,8 @@ def draw_trends(found: Mapping[Subject, Mapping[str, Trend]], folder: Path) -> l
         names.add(name)
         shown = [trends[each] for each in SHOWN if each in trends]
         with style():
-            figure = Figure(figsize=(4.6 * 3, 2.6 * len(shown) / 3 * 2), layout="constrained")
-            rows = figure.subplots(2 * (len(shown) // 3), 3, sharex=True, squeeze=False)
+            figure = Figure(figsize=(4.6 * 3, 2.6 * len(shown) / 3 * 2))
+            rows = figure.subplots(2 * (len(shown) // 3), 3, sharex=True, squeeze=False, gridspec_kw=MARGINS)
             for i, trend in enumerate(shown):
                 row, column = 2 * (i // 3), i % 3
                 _draw_values(rows[row, column], trend)

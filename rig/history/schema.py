@@ -25,8 +25,8 @@ metadata = MetaData()
 
 meta = Table("meta", metadata, Column("key", String(40), primary_key=True), Column("value", String(NAME)))
 
-# `measurement_sha256` is the same for results of the same recordings: a result that was computed again, or of a run that
-# was resumed, takes the place of the earlier one wherever series are made.
+# `measurement_sha256` is the same for results of the same recordings: one that was computed again, or of a run that was
+# resumed, takes the place of the earlier one wherever series are made.
 run = Table(
     "run",
     metadata,

@@ -99,7 +99,7 @@ class Trend:
 
 @dataclass(frozen=True, slots=True)
 class RigState:
-    """What the check standards say of one rig: a chart of each parameter, all of them together, in the order of time."""
+    """What all check standards of one rig say of it together: a chart of each parameter, in the order of time."""
 
     rig: str
     standards: tuple[str, ...]

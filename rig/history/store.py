@@ -1,8 +1,8 @@
 """A history: runs are entered, and found again.
 
-    with open_history() as history:                    # or open_history("postgresql://rig@lab-server/history")
-        for each in history.calibrations(Selection(serial_number="LSM9DS1-001")):
-            print(each.started_utc, each.value("kx"), each.parameters["kx"].expanded)
+with open_history() as history:                    # or open_history("postgresql://rig@lab-server/history")
+    for each in history.calibrations(Selection(serial_number="LSM9DS1-001")):
+        print(each.started_utc, each.value("kx"), each.parameters["kx"].expanded)
 """
 
 from collections.abc import Iterator, Mapping, Sequence
@@ -134,7 +134,7 @@ class History:
                 raise
             return Entered(known, False)
 
-    def calibrations(self, selection: Selection = Selection()) -> list[Past]:  # noqa: B008 - frozen
+    def calibrations(self, selection: Selection = Selection()) -> list[Past]:
         """In the order of time, the voided ones too. A result that a later one of the same run replaced is left out."""
         question = select(*_COLUMNS).select_from(_ROWS).where(~_replaced()).order_by(*_IN_TIME)
         return self._pasts(_chosen(question, selection))
@@ -155,7 +155,9 @@ class History:
         before = self.calibration(number).voided
         if before is not None:
             raise Refused(
-                "already_voided", f"calibration {number} is void already: {before}", "Look at it with `rig history show`"
+                "already_voided",
+                f"calibration {number} is void: {before}",
+                "Look at it with `rig history show`",
             )
         with self._writing() as connection:
             row = {"calibration_id": number, "reason": reason, "voided_utc": _now()}
@@ -225,9 +227,7 @@ _IN_TIME = (_RUN.started_utc, _RUN.id, _CALIBRATION.id)
 def _replaced() -> Any:
     """Whether there is a later result of the same measurement."""
     later = schema.run.alias("later")
-    newer = or_(
-        later.c.solved_utc > _RUN.solved_utc, and_(later.c.solved_utc == _RUN.solved_utc, later.c.id > _RUN.id)
-    )
+    newer = or_(later.c.solved_utc > _RUN.solved_utc, and_(later.c.solved_utc == _RUN.solved_utc, later.c.id > _RUN.id))
     return exists(select(later.c.id).where(later.c.measurement_sha256 == _RUN.measurement_sha256, newer))
 
 

@@ -58,16 +58,13 @@ def trend_lines(trends: Mapping[str, Trend]) -> Iterator[str]:
 
 def changes_table(title: str, changes: Iterable[Change]) -> Table:
     """Each parameter beside the one before."""
-    table = _table(title, "parameter", "before ± U", "now ± U", "change", "unit", "E_n", "")
+    table = _table(title, "parameter", "before ± U", "now ± U", "E_n")
     for each in changes:
         table.add_row(
-            each.name,
+            plain(each.name if each.unit == "1" else f"{each.name} {each.unit}"),
             value_text(each.before),
             value_text(each.now),
-            f"{each.now.value - each.before.value:+.3g}",
-            plain(each.unit),
-            f"{each.normalised_error:.2f}",
-            "beyond U" if each.beyond else "",
+            f"{'beyond U ' if each.beyond else ''}{each.normalised_error:.2f}",
         )
     return table
 
@@ -156,7 +153,8 @@ def _chart_text(trend: Trend) -> str:
     if trend.chart is None:
         return ""
     if trend.chart.out_of_control:
-        return f"EWMA {trend.chart.ewma[-1]:+.2f} of ±{trend.chart.limit[-1]:.2f}, newest {trend.chart.deviation[-1]:+.1f} σ"
+        found = trend.chart
+        return f"EWMA {found.ewma[-1]:+.2f} of ±{found.limit[-1]:.2f}, newest {found.deviation[-1]:+.1f} σ"
     alarms = int(trend.chart.alarm.sum())
     return f"in control; {alarms} alarms before" if alarms else "in control"
 

@@ -3,7 +3,6 @@
 import csv
 import io
 import json
-import os
 import shutil
 import subprocess
 import sys
@@ -149,6 +148,7 @@ def test_a_configuration_names_the_history(year: str, capsys: pytest.CaptureFixt
     assert "12" in told(capsys, "show", "12", "--history", config)
 
 
+@pytest.mark.slow
 def test_a_series_is_drawn(year: str, capsys: pytest.CaptureFixture[str]) -> None:
     out = Path(year).parent / "plots"
     drawn = told(capsys, "plot", "G-1", "--out", out).split()
@@ -156,9 +156,7 @@ def test_a_series_is_drawn(year: str, capsys: pytest.CaptureFixture[str]) -> Non
     assert all(Path(each).stat().st_size > 10_000 for each in drawn)
 
 
-def test_a_run_goes_on_whatever_becomes_of_the_history(
-    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
-) -> None:
+def test_a_run_goes_on_whatever_becomes_of_the_history(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     (tmp_path / "file").write_text("", encoding="utf-8")
     for broken in (str(tmp_path / "file" / "history.sqlite"), f"postgresql://rig@/x?host={tmp_path}", "what://ever"):
         monkeypatch.setenv("RIG_HISTORY", broken)
@@ -180,7 +178,7 @@ def test_a_run_enters_itself_and_is_held_against_the_last(place: str, capsys: py
     folder = Path(place).parent
     changed = {"world": {"sensors": {"gyro": {"bias_rad_s": [0.2, 0.1, -0.1]}}}, "limits": {"bias_rad_s": 1}}
     command = [sys.executable, "-m", "rig", "run", configuration(folder, changed), "--out", folder / "run"]
-    done = subprocess.run(list(map(str, command)), capture_output=True, text=True, timeout=200, env=os.environ)
+    done = subprocess.run(list(map(str, command)), capture_output=True, text=True, timeout=200, check=False)
     assert done.returncode == 0, done.stderr
     assert "beside the last calibration, number 1 of " in done.stdout and "beyond U" in done.stdout
     log = (folder / "run" / "log.txt").read_text(encoding="utf-8")

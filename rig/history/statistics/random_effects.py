@@ -47,9 +47,9 @@ class Fitted:
 def fit(design: Array, values: Array, std: Array) -> Fitted:
     """Weighted least squares of values (n,) with stds (n,) on a design (n, p) of full rank, n > p.
 
-    The variance between runs is DerSimonian and Laird's estimate by moments (Control. Clin. Trials 7 (1986) 177), for any
-    design as in a meta-regression. The covariance is that of Knapp and Hartung (Stat. Med. 22 (2003) 2693), which with
-    Student's t holds for few runs too; never below what the stds themselves say. Raises ValueError for fewer rows.
+    The variance between runs is DerSimonian and Laird's estimate by moments (Control. Clin. Trials 7 (1986) 177), for
+    any design as in a meta-regression. The covariance is that of Knapp and Hartung (Stat. Med. 22 (2003) 2693), which
+    with Student's t holds for few runs too; never below what the stds themselves say. Raises ValueError for fewer rows.
     """
     n, p = design.shape
     if n <= p:

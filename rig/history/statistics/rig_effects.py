@@ -1,4 +1,4 @@
-"""What a rig adds to every result, told apart from what each sensor is: sensors that were calibrated on several rigs."""
+"""What a rig adds to every result, told apart from what each sensor is: by sensors calibrated on several rigs."""
 
 from collections.abc import Sequence
 from dataclasses import dataclass
@@ -55,9 +55,7 @@ def rig_effects(rigs: Sequence[str], sensors: Sequence[str], values: Array, std:
         for i, rig in enumerate(others):
             shared = len(set(subjects[names[rows] == rig]) & set(subjects[names[rows] != rig]))
             value, of_value = float(fitted.coefficients[i]), float(fitted.std[i])
-            found.append(
-                RigEffect(rig, reference, value, of_value, fitted.coverage_factor, fitted.between_std, shared)
-            )
+            found.append(RigEffect(rig, reference, value, of_value, fitted.coverage_factor, fitted.between_std, shared))
     return tuple(found)
 
 
