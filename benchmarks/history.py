@@ -100,16 +100,13 @@ def main() -> None:
             (run / file.name).write_bytes(file.read_bytes())
         environment = {**os.environ, "RIG_HISTORY": str(Path(folder) / f"{count}.sqlite")}
         command = [sys.executable, "-c", END_OF_RUN, str(run)]
-        times = [
-            list(
-                map(float, subprocess.run(command, env=environment, stdout=subprocess.PIPE, check=True).stdout.split())
-            )
-            for _ in range(3)
-        ]
+        times = []
+        for _ in range(3):
+            done = subprocess.run(command, env=environment, stdout=subprocess.PIPE, check=True)
+            times.append(list(map(float, done.stdout.split())))
     certificate_s, entry_s = np.min(times, axis=0)
-    print(
-        f"end of a run: certificate {certificate_s:.2f} s, history {entry_s:.2f} s, both {certificate_s + entry_s:.2f} s"
-    )
+    together = f"both {certificate_s + entry_s:.2f} s"
+    print(f"end of a run: certificate {certificate_s:.2f} s, history {entry_s:.2f} s, {together}")
     bare_s, help_s = process_s("-c", ""), process_s("-m", "rig", "--help")
     print(f"rig --help {help_s:.2f} s, a Python that imports nothing {bare_s:.2f} s, ratio {help_s / bare_s:.1f}")
 
