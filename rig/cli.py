@@ -9,7 +9,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from rig import __version__
-from rig.commands import history_arguments, solve_arguments
+from rig.commands import history_arguments, page_arguments, solve_arguments
 from rig.commands.standard_streams import keep_streams_usable
 from rig.errors import Fault, RigError
 from rig.errors.quoting import printable_lines
@@ -105,6 +105,7 @@ def _parser() -> argparse.ArgumentParser:
     resume = add("resume", _resume, "go on with an interrupted run")
     resume.add_argument("run_folder", type=Path, metavar="RUN_DIR")
     _add_outcome(resume)
+    page_arguments.add_watching(add("watch", _watch, "a recorded run in a browser, as it was"))
     solve = add("solve", solve_arguments.solve, "recompute the calibration from a recording")
     solve_arguments.add_arguments(solve)
     allan = add(
@@ -235,6 +236,7 @@ def _add_run(parser: argparse.ArgumentParser) -> None:
 def _add_outcome(parser: argparse.ArgumentParser) -> None:
     parser.add_argument("--yes", action="store_true", help="do not ask before the arm moves")
     parser.add_argument("--json", action="store_true", help="print result.json instead of tables")
+    page_arguments.add_arguments(parser)
 
 
 def run_script(procedure: "AnyProcedure") -> int:
@@ -263,13 +265,21 @@ def _run(options: argparse.Namespace) -> int:
         script=options.script,
         assume_yes=options.yes,
         as_json=options.json,
+        page=page_arguments.wish(options),
     )
 
 
 def _resume(options: argparse.Namespace) -> int:
     from rig.commands.run import resume
 
-    return resume(options.run_folder, assume_yes=options.yes, as_json=options.json)
+    page = page_arguments.wish(options)
+    return resume(options.run_folder, assume_yes=options.yes, as_json=options.json, page=page)
+
+
+def _watch(options: argparse.Namespace) -> int:
+    from rig.commands.watch import watch
+
+    return watch(options.run_folder, page_arguments.PageWish(options.page_address, options.page_token), options.speed)
 
 
 def _plan(options: argparse.Namespace) -> int:

@@ -3,11 +3,13 @@
 from collections.abc import Sequence
 from contextlib import ExitStack
 from pathlib import Path
+from typing import TYPE_CHECKING
 
 from rig.analysis.contradictions import names_a_sweep
 from rig.commands.claims import claimed
 from rig.commands.configured import Configured, configured
 from rig.commands.laboratory import simulated_laboratory
+from rig.commands.page_arguments import PageWish, operators_page
 from rig.commands.remember import print_beside, remember
 from rig.data.result_file import read_result
 from rig.data.run_folder import CONFIG, RESULT, SCRIPT, new_folder, script_identity
@@ -22,6 +24,9 @@ from rig.station.log import log
 from rig.station.station import Stations, always_yes
 from rig.station.view import view
 
+if TYPE_CHECKING:
+    from rig.page.shown import About
+
 
 def run(
     config_path: Path,
@@ -31,17 +36,18 @@ def run(
     script: ScriptFile | Path | None = None,
     assume_yes: bool = False,
     as_json: bool = False,
+    page: PageWish | None = None,
 ) -> int:
-    """Run the procedure a configuration names, or that of `script`, in a new run folder.
+    """Run the procedure a configuration names, or that of `script`, in a new run folder; on a `page` too if wanted.
 
     Returns 0 passed, 1 verdict failed.
     """
     found = configured(config_path, overrides, script)
     folder = new_folder(out, found.loaded, found.script.text, found.script.identity)
-    return _carry_out(folder, found, assume_yes=assume_yes, as_json=as_json)
+    return _carry_out(folder, found, assume_yes=assume_yes, as_json=as_json, page=page)
 
 
-def resume(folder: Path, *, assume_yes: bool = False, as_json: bool = False) -> int:
+def resume(folder: Path, *, assume_yes: bool = False, as_json: bool = False, page: PageWish | None = None) -> int:
     """Go on with an interrupted run by the script it was begun with: sweeps it has finished count, the others are done.
 
     A sweep that the verdict named as disturbed is repeated. Returns as `run` does. Raises Refused `no_run`,
@@ -58,25 +64,44 @@ def resume(folder: Path, *, assume_yes: bool = False, as_json: bool = False) -> 
             "Start a new run with `rig run`",
         )
     found = configured(folder / CONFIG, script=load_script(folder / SCRIPT, script_identity(folder)))
-    return _carry_out(folder, found, assume_yes=assume_yes, as_json=as_json)
+    return _carry_out(folder, found, assume_yes=assume_yes, as_json=as_json, page=page)
 
 
-def _carry_out(folder: Path, found: Configured, *, assume_yes: bool, as_json: bool) -> int:
-    # Nobody stands beside a laboratory that this process starts itself, so there nobody need be asked.
-    answer = always_yes if assume_yes or found.loaded.simulated else ask_operator
-    with log(folder / "log.txt") as logged, view() as seen, ExitStack() as held:
-        station = Stations((logged, seen), answer)
-        this = Run(folder, found.loaded, found.script, station)
-        with this.reported():
-            held.enter_context(claimed(found.loaded.config))
-            if found.loaded.simulated:
-                held.enter_context(simulated_laboratory(folder / CONFIG))
-        outcome = this.carry_out(found.phase)
-        entered, beside = remember(folder, found.loaded.config.history)
-        if entered is not None:
-            station.event(entered)
-        station.event(RunFolderWritten(folder))
-    print_outcome(document_of(outcome), as_json=as_json)
-    if not as_json:
-        print_beside(beside)
+def _carry_out(folder: Path, found: Configured, *, assume_yes: bool, as_json: bool, page: PageWish | None) -> int:
+    with operators_page(page, folder, lambda: _about(folder, found, page)) as shown:
+        # Nobody stands beside a laboratory that this process starts itself, so there nobody need be asked.
+        on_terminal = always_yes if assume_yes or found.loaded.simulated else ask_operator
+        answer = shown.answer if shown.answer is not None and not assume_yes else on_terminal
+        with log(folder / "log.txt") as logged, view() as seen, ExitStack() as held:
+            station = Stations((logged, seen, *shown.listeners), answer)
+            this = Run(folder, found.loaded, found.script, station)
+            with this.reported():
+                held.enter_context(claimed(found.loaded.config))
+                if found.loaded.simulated:
+                    held.enter_context(simulated_laboratory(folder / CONFIG))
+            outcome = this.carry_out(found.phase)
+            entered, beside = remember(folder, found.loaded.config.history)
+            if entered is not None:
+                station.event(entered)
+            station.event(RunFolderWritten(folder))
+        print_outcome(document_of(outcome), as_json=as_json)
+        if not as_json:
+            print_beside(beside)
+        shown.stay()
     return 0 if outcome.passed else 1
+
+
+def _about(folder: Path, found: Configured, page: PageWish | None) -> "About":
+    from rig.page.shown import About
+
+    config = found.loaded.config
+    return About(
+        folder=str(folder),
+        procedure=config.procedure.name,
+        may_answer=page is not None and page.may_answer,
+        parts={
+            name: f"{each.part} {each.serial_number}"
+            for name, each in {**config.sensors, **config.magnetometers}.items()
+        },
+        simulated=found.loaded.simulated,
+    )

@@ -102,6 +102,23 @@ def observe_sensor(
     )
 
 
+def each_sweep(
+    run: RunData, sensor: str, motion: ArmMotion, settings: ObservationThresholds
+) -> dict[int, Observation | Fault]:
+    """Every finished sweep's observation, or why there is none, by the sweep's index.
+
+    Raises Fault as `on_the_arms_clock` does.
+    """
+    stream = on_the_arms_clock(run.samples[sensor], run.sensors[sensor], motion)
+    found: dict[int, Observation | Fault] = {}
+    for finished in swept(run):
+        try:
+            found[finished.sweep.index] = _revolution(run, stream, motion, finished, settings)
+        except Fault as fault:
+            found[finished.sweep.index] = fault
+    return found
+
+
 def nearest_axis(vector: Array) -> tuple[str, int]:
     """The axis, "x", "y" or "z", nearest to a direction (3,), and the sign (1, −1) of the direction along it."""
     nearest = int(np.argmax(np.abs(vector)))

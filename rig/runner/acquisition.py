@@ -25,7 +25,8 @@ STANDING_S = 0.25  # between those recorded after: an arm that stands needs no m
 class SensorCount:
     """What one sensor has delivered so far. `lost` counts the gaps in its sequence numbers.
 
-    `sensitivity` is rad/s per count, or of a magnetometer, whose samples have another `column`, tesla.
+    `sensitivity` is rad/s per count, or of a magnetometer, whose samples have another `column`, tesla. Of a `gyroscope`
+    the rest of a sample is told as well.
     """
 
     name: str
@@ -34,6 +35,9 @@ class SensorCount:
     samples: int = 0
     lost: int = 0
     latest: Vector | None = None
+    gyroscope: RecordedSensor | None = None
+    acceleration_m_s2: Vector | None = None
+    temperature_c: float | None = None
     _next_sequence: int = 0
 
     def add(self, samples: NDArray[Any]) -> None:
@@ -43,15 +47,31 @@ class SensorCount:
         self.lost += last + 1 - self._next_sequence - len(sequence)
         self._next_sequence = last + 1
         self.samples += len(sequence)
-        x, y, z = (samples[self.column].mean(axis=0) * self.sensitivity).tolist()
-        self.latest = (x, y, z)
+        self.latest = _mean(samples[self.column], self.sensitivity)
+        if (sensor := self.gyroscope) is not None:
+            counts = int(samples["temperature_counts"][-1])
+            self.temperature_c = counts * sensor.temperature_c_per_count + sensor.temperature_offset_c
+            if sensor.sensitivity_m_s2_per_count is not None:
+                self.acceleration_m_s2 = _mean(samples["acceleration_counts"], sensor.sensitivity_m_s2_per_count)
 
     @property
     def seen(self) -> SensorSamples:
         """As it is told."""
         if self.column == "field_counts":
             return SensorSamples(self.name, self.samples, self.lost, None, self.latest)
-        return SensorSamples(self.name, self.samples, self.lost, self.latest)
+        return SensorSamples(
+            self.name,
+            self.samples,
+            self.lost,
+            self.latest,
+            acceleration_m_s2=self.acceleration_m_s2,
+            temperature_c=self.temperature_c,
+        )
+
+
+def _mean(counts: NDArray[Any], sensitivity: float) -> Vector:
+    x, y, z = (counts.mean(axis=0) * sensitivity).tolist()
+    return x, y, z
 
 
 @dataclass(frozen=True, slots=True)
@@ -99,7 +119,7 @@ class Acquisition:
         if isinstance(sensor, RecordedMagnetometer):
             self.counts[name] = SensorCount(name, sensor.sensitivity_t_per_count, "field_counts")
         else:
-            self.counts[name] = SensorCount(name, sensor.sensitivity_rad_s_per_count)
+            self.counts[name] = SensorCount(name, sensor.sensitivity_rad_s_per_count, gyroscope=sensor)
             self.settling.expect(name, sensor)
 
     def on_samples(self, sensor: str, samples: NDArray[Any]) -> None:

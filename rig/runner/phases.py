@@ -168,7 +168,7 @@ class Run:
             self._ended(Failed(fault), advice)
             raise fault from ended
         except KeyboardInterrupt as interrupt:
-            stopped = _with_notes("interrupted", interrupt)
+            stopped = _with_notes(str(interrupt) or "interrupted", interrupt)
             text = f"{stopped}; the data are kept in {self.folder}. Go on with: {resuming(self.folder)}"
             self._ended(Interrupted(text))
             raise KeyboardInterrupt(text) from None

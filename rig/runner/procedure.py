@@ -34,6 +34,7 @@ from rig.runner.onboard import BoardCalibration
 from rig.runner.turner import Turner
 from rig.sensors.source import SampleSource
 from rig.station.events import (
+    ArmSeen,
     PhaseRecorded,
     PreflightPassed,
     Progress,
@@ -273,6 +274,7 @@ class Rig:
         # A script may make steps of its own, one that takes no time too.
         fraction = within_s / step.duration_s if step.duration_s > 0 else 1.0
         self.recording.station.event(SamplesTaken(self.devices.acquisition.samples()))
+        self.recording.station.event(ArmSeen(state, self.devices.arm.missed_states))
         self.recording.station.event(
             Progress(
                 number=self._number,

@@ -10,7 +10,7 @@ from pathlib import Path
 from firmware_host.client import BoardIdentity
 from rig.analysis.verdict import Check
 from rig.arm.motion import Plan, Step
-from rig.arm.state import ArmReport
+from rig.arm.state import ArmReport, ArmState
 from rig.data.events import Event
 from rig.errors import RigError
 from rig.observation.observe import Observation
@@ -117,7 +117,8 @@ class Progress:
 class SensorSamples:
     """What one sensor has delivered so far: samples, gaps in their numbers, the newest mean reading.
 
-    That is a rate in rad/s, or of a magnetometer a field in tesla.
+    That is a rate in rad/s, or of a magnetometer a field in tesla. Acceleration and temperature are there where the
+    sensor sends them.
     """
 
     sensor: str
@@ -125,6 +126,19 @@ class SensorSamples:
     lost: int
     rate_rad_s: Vector | None
     field_t: Vector | None = None
+    acceleration_m_s2: Vector | None = None
+    temperature_c: float | None = None
+
+
+@dataclass(frozen=True, slots=True)
+class ArmSeen:
+    """How the arm stands by its newest state, and how many states it sent that were missed (None: nobody counted).
+
+    Comes with every `Progress`.
+    """
+
+    state: ArmState
+    missed_states: int | None
 
 
 @dataclass(frozen=True, slots=True)
@@ -285,6 +299,7 @@ RunEvent = (
     | SamplingStarted
     | StepStarted
     | Progress
+    | ArmSeen
     | SamplesTaken
     | StepFinished
     | PhaseRecorded

@@ -15,6 +15,7 @@ from rig.runner.phases import Run
 from rig.station.events import (
     Answered,
     ArmConnected,
+    ArmSeen,
     BoardConnected,
     CalibrationStored,
     Checked,
@@ -81,7 +82,7 @@ def phases(events: list[RunEvent]) -> list[list[RunEvent]]:
 
 def test_the_phases_come_one_after_the_other(events: list[RunEvent]) -> None:
     told = [type(event) for event in events]
-    steps = (StepStarted, Progress, SamplesTaken, StepFinished)
+    steps = (StepStarted, Progress, ArmSeen, SamplesTaken, StepFinished)
     recorded = (SweepStarted, SweepFinished, RestStarted, RestFinished, BoardObserved, BoardSolved)
     around = [kind for kind in told if kind not in (*steps, *recorded)]
     connected = [BoardConnected, ArmConnected, PhaseStarted, PreflightPassed]

@@ -1,0 +1,86 @@
+"""What the recordings of a run that goes on amount to so far: observations, refusals, parameters once they are known.
+
+Whoever looks on is told this. The result comes from `rig.analysis.outcome` when all is recorded, and may say more and
+otherwise: of uncertainty there is the noise alone here.
+"""
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+
+import numpy as np
+
+from rig.analysis.calibration import solve_vector
+from rig.data.run_file import RunData
+from rig.errors import Fault
+from rig.estimation.arrays import Array
+from rig.estimation.vector_model import VectorSolution
+from rig.observation.average import Average
+from rig.observation.observe import Observation, each_sweep, observe_sensor
+from rig.observation.timebase import ArmMotion
+from rig.observation.windows import finished_sweeps
+
+
+@dataclass(frozen=True, slots=True)
+class SoFar:
+    """Of one sensor: each finished sweep's observation or the Fault it ends in, by the sweep's index.
+
+    The `solution` is the vector model's, or the Fault that says what is missing yet. `bias_rad_s` (3,) is that of the
+    rests alone, with its standard deviation, None without rests.
+    """
+
+    sweeps: Mapping[int, Observation | Fault]
+    solution: VectorSolution | Fault
+    bias_rad_s: tuple[Array, Array] | None
+
+
+def so_far(runs: Sequence[RunData]) -> dict[str, SoFar]:
+    """What recordings of raw readings hold, by sensor; a sweep that several hold counts in the last one."""
+    sweeps: dict[str, dict[int, Observation | Fault]] = {}
+    rests: dict[str, list[Average]] = {}
+    for run in runs:
+        try:
+            motion = ArmMotion(run.arm, run.provenance.kinematics)
+        except Fault:
+            continue  # nothing has moved yet
+        for name in run.sensors:
+            found, rested = _observed(run, name, motion)
+            sweeps.setdefault(name, {}).update(found)
+            rests.setdefault(name, []).extend(rested)
+    return {
+        name: _sensor(found, rests[name], np.array(runs[-1].sensors[name].mounting)) for name, found in sweeps.items()
+    }
+
+
+def _observed(run: RunData, name: str, motion: ArmMotion) -> tuple[dict[int, Observation | Fault], Sequence[Average]]:
+    thresholds = run.settings.observation
+    try:
+        found = each_sweep(run, name, motion, thresholds)
+        left_out = {index for index, each in found.items() if isinstance(each, Fault)}
+        dwells = {dwell.index for dwell in run.settings.planned_dwells}
+        seen = observe_sensor(run, name, motion, thresholds, left_out | dwells)
+    except Fault as fault:  # of the sensor as a whole, such as a clock that is not found
+        return dict.fromkeys(finished_sweeps(run), fault), ()
+    return {**found, **{each.sweep: each for each in seen.revolutions}}, seen.rests
+
+
+def _sensor(sweeps: Mapping[int, Observation | Fault], rests: Sequence[Average], mounting: Array) -> SoFar:
+    observations = [each for _, each in sorted(sweeps.items()) if isinstance(each, Observation)]
+    solution: VectorSolution | Fault
+    try:
+        if not observations:
+            raise Fault("too_few_observations", "no sweep is averaged yet", "Wait for the first one")
+        solution = solve_vector(observations, rests, mounting)
+    except Fault as fault:
+        solution = fault
+    return SoFar(dict(sorted(sweeps.items())), solution, _bias(rests))
+
+
+def _bias(rests: Sequence[Average]) -> tuple[Array, Array] | None:
+    """Mean reading at rest, its sign turned as of g = K (m + b), weighted by inverse variance."""
+    if not rests:
+        return None
+    weights = 1 / np.array([rest.variance_rad2_s2 for rest in rests])
+    means = np.array([rest.mean_rad_s for rest in rests])
+    bias: Array = -np.sum(weights * means, axis=0) / weights.sum(axis=0)
+    std: Array = np.sqrt(1 / weights.sum(axis=0))
+    return bias, std

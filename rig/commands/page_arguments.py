@@ -1,0 +1,127 @@
+"""The operator's page on the command line: whether it is wanted, where, and what it may answer."""
+
+import argparse
+import math
+import sys
+import threading
+from collections.abc import Callable, Iterator, Sequence
+from contextlib import ExitStack, contextmanager, suppress
+from dataclasses import dataclass
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+from rig.errors import Refused
+from rig.station.station import Listener
+
+if TYPE_CHECKING:
+    from rig.page.serving import Address
+    from rig.page.shown import About
+
+Answer = Callable[[Sequence[str], str], bool]
+
+
+@dataclass(frozen=True, slots=True)
+class PageWish:
+    """Where the page is wanted (`place` is ADDRESS or ADDRESS:PORT), and whether it may answer for the operator."""
+
+    place: str | None = None
+    token: str | None = None
+    may_answer: bool = False
+
+    def address(self) -> "Address":
+        """Raises Refused `page_address`."""
+        from rig.page.serving import ADDRESS, Address
+
+        host, colon, port = (self.place or ADDRESS).rpartition(":")
+        if not colon or (host.count(":") and not host.endswith("]")):  # no port, or an IPv6 address alone
+            host, port = self.place or ADDRESS, ""
+        if port and not (port.isascii() and port.isdecimal() and int(port) < 65536):
+            raise Refused("page_address", f"{port!r} is no port", "Give --page-address ADDRESS:PORT")
+        return Address(host.strip("[]"), int(port) if port else None, self.token)
+
+
+@dataclass(frozen=True, slots=True)
+class OperatorsPage:
+    """What a run needs of its page: who listens, who answers instead of the terminal, and how to wait at the end."""
+
+    listeners: tuple[Listener, ...] = ()
+    answer: Answer | None = None
+    stay: Callable[[], None] = lambda: None
+
+
+def add_arguments(parser: argparse.ArgumentParser) -> None:
+    """Of `rig run` and `rig resume`."""
+    parser.add_argument("--page", action="store_true", help="show the run in a browser as well")
+    parser.add_argument("--confirm-on-page", action="store_true", help="ask the operator there, not on the terminal")
+    _add_place(parser)
+
+
+def add_watching(parser: argparse.ArgumentParser) -> None:
+    """Of `rig watch`, which has a page in any case."""
+    parser.add_argument("run_folder", type=Path, metavar="RUN_DIR")
+    parser.add_argument("--speed", type=_speed, default=1.0, metavar="N", help="times as fast as it was (default: 1)")
+    _add_place(parser)
+
+
+def _speed(text: str) -> float:
+    speed = float(text)
+    if not 0 < speed < math.inf:
+        raise ValueError(text)
+    return speed
+
+
+def _add_place(parser: argparse.ArgumentParser) -> None:
+    parser.add_argument(
+        "--page-address",
+        metavar="ADDRESS[:PORT]",
+        help="where (default: 127.0.0.1:8137); one that others reach needs a token",
+    )
+    parser.add_argument("--page-token", metavar="TOKEN", help="of the page's address (default: a new one each time)")
+
+
+def wish(options: argparse.Namespace) -> PageWish | None:
+    """What the arguments ask for, None for no page. Raises Refused `page_address` for what goes with a page alone."""
+    wanted = getattr(options, "page", True)
+    may_answer = getattr(options, "confirm_on_page", False)
+    if not wanted:
+        if may_answer or options.page_address or options.page_token:
+            raise Refused("page_address", "there is no page to say that of", "Give --page as well")
+        return None
+    return PageWish(options.page_address, options.page_token, may_answer)
+
+
+@contextmanager
+def operators_page(wanted: PageWish | None, folder: Path, about: "Callable[[], About]") -> Iterator[OperatorsPage]:
+    """The page of a run in `folder`, for the length of the block; nothing where none is wanted.
+
+    Raises Refused `page_address`.
+    """
+    if wanted is None:
+        yield OperatorsPage()
+        return
+    from rig.page.control import Control
+    from rig.page.feed import Feed
+    from rig.page.lookout import looking_out
+    from rig.page.serving import serving
+    from rig.page.shown import Shown
+
+    feed, control = Feed(Shown(about())), Control(may_answer=wanted.may_answer)
+    with ExitStack() as stack:
+        url = stack.enter_context(serving(feed, control, folder, wanted.address()))
+        lookout = stack.enter_context(looking_out(folder, feed))
+        print(f"page: {url}", file=sys.stderr, flush=True)
+        stack.enter_context(control.stoppable())
+        yield OperatorsPage((feed, lookout), control.ask if wanted.may_answer else None, stay_for_the_operator)
+
+
+def stay_for_the_operator() -> None:
+    """Where somebody sits at the terminal, the page with its verdict stays until Ctrl-C; a script goes on."""
+    if sys.stdin is not None and sys.stdin.isatty():
+        print("The page stays until Ctrl-C.", file=sys.stderr, flush=True)
+        wait_for_interrupt()
+
+
+def wait_for_interrupt() -> None:
+    """Until Ctrl-C, which is how it is meant to end."""
+    with suppress(KeyboardInterrupt):
+        threading.Event().wait()

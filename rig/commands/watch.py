@@ -1,0 +1,88 @@
+"""`rig watch`: a run that is recorded, replayed on the operator's page."""
+
+import sys
+import time
+from collections.abc import Iterator
+from pathlib import Path
+
+from rig.commands.page_arguments import PageWish, wait_for_interrupt
+from rig.data.result_file import ResultDocument, read_result
+from rig.data.run_file import RunData, read_run
+from rig.data.run_folder import RESULT, recordings
+from rig.errors import Refused
+from rig.page.control import Control
+from rig.page.feed import Feed
+from rig.page.replay import Moment, ended, moments
+from rig.page.rows import Look
+from rig.page.serving import serving
+from rig.page.shown import About, Shown
+from rig.report.certificate.writer import PAGE as CERTIFICATE
+from rig.station.events import DocumentWritten, Interrupted, RunEvent
+
+LOG_TAIL = 3  # lines of the log that say how a run without a result ended
+
+
+def watch(folder: Path, wanted: PageWish, speed: float) -> int:
+    """Replay every recording in a run folder, `speed` times as fast as it was; the page stays until Ctrl-C.
+
+    Returns 0. Raises Refused `no_run`, `page_address`, and as `read_run` and `read_result` do.
+    """
+    runs = [read_run(path) for readings in ("raw", "calibrated") for path in recordings(folder, readings)]
+    if not runs:
+        raise Refused("no_run", f"{folder} holds no recording", "Give the folder of a run")
+    result = read_result(folder / RESULT) if (folder / RESULT).exists() else None
+    feed = Feed(Shown(_about(folder, runs)))
+    with serving(feed, Control(may_answer=False), folder, wanted.address()) as url:
+        print(f"page: {url}", file=sys.stderr, flush=True)
+        try:
+            for run in runs:
+                _replay(moments(run), feed, speed)
+            for event in _ending(folder, result):
+                feed.event(event)
+            print("All is replayed. The page stays until Ctrl-C.", file=sys.stderr, flush=True)
+            wait_for_interrupt()
+        except KeyboardInterrupt:
+            pass
+    return 0
+
+
+def _about(folder: Path, runs: list[RunData]) -> About:
+    parts = {
+        name: f"{sensor.part} {sensor.serial_number}"
+        for run in runs
+        for name, sensor in [*run.sensors.items(), *run.magnetometers.items()]
+    }
+    simulated = runs[0].provenance.arm_software.endswith("(simulated)")
+    return About(str(folder), runs[0].settings.procedure, replayed=True, parts=parts, simulated=simulated)
+
+
+def _replay(recorded: Iterator[Moment], feed: Feed, speed: float) -> None:
+    began_s = time.monotonic()
+    for moment in recorded:
+        wait_s = began_s + moment.at_s / speed - time.monotonic()
+        if wait_s > 0:
+            time.sleep(wait_s)
+        if isinstance(moment.event, Look):
+            feed.look(moment.event)
+        else:
+            feed.event(moment.event)
+
+
+def _ending(folder: Path, result: ResultDocument | None) -> Iterator[RunEvent]:
+    if (folder / CERTIFICATE).is_file():
+        yield DocumentWritten(folder / CERTIFICATE)
+    if result is None:
+        yield Interrupted(_last_words(folder))
+        return
+    yield DocumentWritten(folder / RESULT)
+    yield from ended(result)
+
+
+def _last_words(folder: Path) -> str:
+    """How the log of a run without a result ends."""
+    try:
+        lines = (folder / "log.txt").read_text(encoding="utf-8").splitlines()
+    except OSError:
+        lines = []
+    said = [line.partition(" INFO ")[2] for line in lines if " INFO " in line]
+    return "; ".join(["this run has no result", *said[-LOG_TAIL:][-1:]])

@@ -1,0 +1,108 @@
+"""The page's addresses: files to show it, the stream of what is shown, the certificate, and two that act."""
+
+import json
+from collections.abc import Awaitable, Callable
+from pathlib import Path
+
+from starlette.applications import Starlette
+from starlette.requests import Request
+from starlette.responses import FileResponse, PlainTextResponse, Response, StreamingResponse
+from starlette.routing import Route
+
+from rig.page.control import Control
+from rig.page.feed import Broadcast
+from rig.page.guard import CERTIFICATE_POLICY, COOKIE, Door, Guard
+from rig.report.certificate.writer import PAGE as CERTIFICATE
+
+STATIC = Path(__file__).with_name("static")
+MEDIA = {".html": "text/html", ".css": "text/css", ".js": "text/javascript", ".svg": "image/svg+xml"}
+LARGEST_BODY = 1000  # bytes
+Handler = Callable[[Request], Awaitable[Response]]
+
+
+def application(broadcast: Broadcast, control: Control, door: Door, folder: Path) -> Guard:
+    """Of a run in `folder`, behind its door."""
+
+    def looking(handler: Handler) -> Handler:
+        async def allowed(request: Request) -> Response:
+            if not door.may_look(request.headers, request.cookies):
+                return _refused()
+            return await handler(request)
+
+        return allowed
+
+    def acting(handler: Handler) -> Handler:
+        async def allowed(request: Request) -> Response:
+            return await handler(request) if door.may_act(request.headers) else _refused()
+
+        return allowed
+
+    async def stream(request: Request) -> Response:
+        if broadcast.full:
+            return PlainTextResponse("too many browsers look on\n", 503)
+        streaming = StreamingResponse(broadcast.frames(), media_type="text/event-stream")
+        if door.may_act(request.headers):  # for the certificate, which opens by a link that can carry no header
+            streaming.set_cookie(COOKIE, door.token, path=f"/{CERTIFICATE}", httponly=True, samesite="strict")
+        return streaming
+
+    async def certificate(request: Request) -> Response:
+        path = folder / CERTIFICATE
+        if not path.is_file():
+            return PlainTextResponse("there is no certificate yet\n", 404)
+        return FileResponse(path, headers={"content-security-policy": CERTIFICATE_POLICY}, media_type="text/html")
+
+    async def stop(request: Request) -> Response:
+        return Response(status_code=202) if control.stop() else PlainTextResponse("nothing to stop\n", 409)
+
+    async def answer(request: Request) -> Response:
+        said = await _answer(request)
+        if said is None:
+            return PlainTextResponse('wanted: {"number": 1, "agreed": true}\n', 400)
+        number, agreed = said
+        if not control.answer(number, agreed=agreed):
+            return PlainTextResponse("that is not asked, or not here\n", 409)
+        return Response(status_code=202)
+
+    async def nothing(request: Request) -> Response:
+        return Response(status_code=204)
+
+    files = [Route("/", _file("page.html")), Route("/favicon.ico", nothing)]
+    files += [Route(f"/{path.name}", _file(path.name)) for path in STATIC.iterdir() if path.suffix in MEDIA]
+    routes = [
+        *files,
+        Route("/events", looking(stream)),
+        Route(f"/{CERTIFICATE}", looking(certificate)),
+        Route("/stop", acting(stop), methods=["POST"]),
+        Route("/answer", acting(answer), methods=["POST"]),
+    ]
+    return Guard(Starlette(routes=routes), door)
+
+
+def _file(name: str) -> Handler:
+    path = STATIC / name
+    text, media = path.read_bytes(), MEDIA[path.suffix]
+
+    async def served(request: Request) -> Response:
+        return Response(text, media_type=media)
+
+    return served
+
+
+async def _answer(request: Request) -> tuple[int, bool] | None:
+    """The question's number and the answer; None for anything else."""
+    body = b""
+    async for piece in request.stream():
+        body += piece
+        if len(body) > LARGEST_BODY:
+            return None
+    try:
+        said = json.loads(body)
+    except ValueError:
+        return None
+    if not isinstance(said, dict) or type(said.get("number")) is not int or type(said.get("agreed")) is not bool:
+        return None
+    return said["number"], said["agreed"]
+
+
+def _refused() -> Response:
+    return PlainTextResponse("the address with the token is needed, as the terminal shows it\n", 403)

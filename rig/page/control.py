@@ -1,0 +1,83 @@
+"""What a browser may ask of a run: to stop it, and, where the operator is asked on the page, to agree.
+
+A stop interrupts the thread that runs the procedure, as Ctrl-C does: what stops the arm and keeps the data then
+is the same code.
+"""
+
+import _thread
+import signal
+import threading
+from collections.abc import Callable, Iterator, Sequence
+from contextlib import contextmanager
+from typing import Any
+
+STOPPED = "stopped from the page"
+STOP_SIGNAL = getattr(
+    signal, "SIGUSR1", signal.SIGINT
+)  # of its own: SIGINT may be ignored, as in a script's background
+
+
+class Control:
+    """Between the server's thread and the run's, which is the main one."""
+
+    def __init__(self, *, may_answer: bool) -> None:
+        self._may_answer = may_answer
+        self._changed = threading.Condition()
+        self._stop: Callable[[], None] | None = None
+        self._asked = 0
+        self._answer: bool | None = None
+        self._waiting = False
+
+    @contextmanager
+    def stoppable(self) -> Iterator[None]:
+        """In this block, which is the main thread's, `stop` ends in a KeyboardInterrupt."""
+
+        def stopped(*_: Any) -> None:
+            raise KeyboardInterrupt(STOPPED)
+
+        before = signal.signal(STOP_SIGNAL, stopped)
+        try:
+            with self._changed:
+                self._stop = _interrupt_the_main_thread
+            yield
+        finally:
+            with self._changed:
+                self._stop = None
+            signal.signal(STOP_SIGNAL, before)
+
+    def stop(self) -> bool:
+        """End the run; False when there is none that could be."""
+        with self._changed:
+            if self._stop is None:
+                return False
+            self._stop()
+            return True
+
+    def ask(self, announcement: Sequence[str], to_do: str) -> bool:
+        """Wait for the operator's answer from a browser; the page shows the question as it shows all that happens."""
+        with self._changed:
+            self._asked += 1
+            self._answer, self._waiting = None, True
+            try:
+                while self._answer is None:
+                    self._changed.wait(1.0)
+                return self._answer
+            finally:
+                self._waiting = False
+
+    def answer(self, number: int, *, agreed: bool) -> bool:
+        """The answer to question `number` from 1; False when that is not the one that is asked."""
+        with self._changed:
+            if not (self._may_answer and self._waiting) or number != self._asked or self._answer is not None:
+                return False
+            self._answer = agreed
+            self._changed.notify_all()
+            return True
+
+
+def _interrupt_the_main_thread() -> None:
+    """Out of whatever it waits for, where the system can do that."""
+    if hasattr(signal, "pthread_kill"):
+        signal.pthread_kill(threading.main_thread().ident or 0, STOP_SIGNAL)
+    else:
+        _thread.interrupt_main(STOP_SIGNAL)

@@ -1,0 +1,174 @@
+"""From the thread of the run to any number of browsers, none of which can hold it up.
+
+The run's thread changes what is shown and goes on. The server's thread looks ten times a second, makes one frame of
+what has changed and lays it into each browser's mailbox, which holds one. A browser that has not taken its last frame
+by then gets none; once it reads again, it gets everything at once as it is by then.
+"""
+
+import asyncio
+import json
+import threading
+from collections.abc import AsyncIterator
+from typing import Any
+
+from rig.page.rows import Look
+from rig.page.shown import Shown
+from rig.station.events import RunEvent
+
+FRAME_S = 0.1
+SIGN_OF_LIFE_S = 5.0  # without news
+CLIENTS = 32  # browsers at a time
+
+
+class Feed:
+    """What is shown, between two threads; a listener of the run's events."""
+
+    def __init__(self, shown: Shown) -> None:
+        self._shown = shown
+        self._lock = threading.Lock()
+        self._sent = 0  # points that were in a frame
+
+    def event(self, event: RunEvent) -> None:
+        """As of a Listener: changes what is shown, waits for nobody."""
+        with self._lock:
+            self._shown.take(event)
+
+    def look(self, look: Look) -> None:
+        """What the recording amounts to so far, from any thread."""
+        with self._lock:
+            self._shown.look(look)
+
+    @property
+    def ended(self) -> bool:
+        """Whether the run is over."""
+        return self._shown.ended
+
+    def whole(self) -> bytes:
+        """Everything, for a browser that has nothing yet."""
+        with self._lock:
+            return _frame("all", {**self._shown.sections, "points": self._shown.history.since(0)})
+
+    def news(self) -> bytes | None:
+        """What has changed since the last time, None if nothing has."""
+        with self._lock:
+            shown = self._shown
+            if not shown.changed and shown.history.end == self._sent:
+                return None
+            changed = {name: shown.sections[name] for name in shown.changed}
+            points = shown.history.since(self._sent)
+            shown.changed = set()
+            self._sent = shown.history.end
+        return _frame("some", {**changed, "points": points})
+
+
+class Mailbox:
+    """A browser's: room for one frame."""
+
+    def __init__(self) -> None:
+        self._frame: bytes | None = None
+        self._behind = True  # it has nothing yet
+        self._news = asyncio.Event()
+        self._news.set()
+        self.closed = False
+
+    def put(self, frame: bytes) -> None:
+        """Lay a frame in; where one lies already, both are dropped, and the next is to be whole."""
+        self._behind = self._behind or self._frame is not None
+        self._frame = None if self._behind else frame
+        self._news.set()
+
+    def close(self) -> None:
+        """Nothing comes after what is in it."""
+        self.closed = True
+        self._news.set()
+
+    async def take(self, feed: Feed) -> bytes | None:
+        """The next frame, whole if any was dropped; None when it is closed and empty."""
+        if not self.closed:
+            await self._news.wait()
+            self._news.clear()
+        if self._behind:
+            self._behind = False
+            return feed.whole()
+        frame, self._frame = self._frame, None
+        return frame
+
+
+class Broadcast:
+    """The server's side, all in its event loop."""
+
+    def __init__(self, feed: Feed) -> None:
+        self._feed = feed
+        self._mailboxes: set[Mailbox] = set()
+        self._closing = False
+
+    @property
+    def full(self) -> bool:
+        """Whether there is room for no more browsers."""
+        return len(self._mailboxes) >= CLIENTS
+
+    @property
+    def deserted(self) -> bool:
+        """Whether nobody looks."""
+        return not self._mailboxes
+
+    def post(self, frame: bytes) -> None:
+        """One frame for everybody."""
+        for mailbox in self._mailboxes:
+            mailbox.put(frame)
+
+    async def run(self) -> None:
+        """Post what is new, ten times a second, until `close`."""
+        idle_s = 0.0
+        while not self._closing:
+            await asyncio.sleep(FRAME_S)
+            frame = self._feed.news()
+            idle_s = 0.0 if frame is not None else idle_s + FRAME_S
+            if frame is None and idle_s >= SIGN_OF_LIFE_S:
+                frame, idle_s = b": here\n\n", 0.0
+            if frame is not None:
+                self.post(frame)
+
+    async def close(self, within_s: float) -> None:
+        """Post the last news; wait until everybody has them, but no longer than `within_s`."""
+        self._closing = True
+        if (frame := self._feed.news()) is not None:
+            self.post(frame)
+        for mailbox in self._mailboxes:
+            mailbox.close()
+        deadline_s = asyncio.get_running_loop().time() + within_s
+        while self._mailboxes and asyncio.get_running_loop().time() < deadline_s:
+            await asyncio.sleep(FRAME_S / 4)
+
+    async def frames(self) -> AsyncIterator[bytes]:
+        """For one browser: everything, then what changes."""
+        mailbox = Mailbox()
+        self._mailboxes.add(mailbox)
+        if self._closing:
+            mailbox.close()
+        try:
+            while True:
+                frame = await mailbox.take(self._feed)
+                if frame is not None:
+                    yield frame
+                elif mailbox.closed:
+                    return
+        finally:
+            self._mailboxes.discard(mailbox)
+
+
+def _frame(name: str, document: dict[str, Any]) -> bytes:
+    """One server-sent event. JSON knows no NaN; what is not a number is told as null."""
+    try:
+        text = json.dumps(document, ensure_ascii=False, separators=(",", ":"), allow_nan=False)
+    except ValueError:
+        text = json.dumps(_finite(document), ensure_ascii=False, separators=(",", ":"))
+    return f"event: {name}\ndata: {text}\n\n".encode()
+
+
+def _finite(value: Any) -> Any:
+    if isinstance(value, float):
+        return value if abs(value) < float("inf") else None
+    if isinstance(value, dict):
+        return {key: _finite(each) for key, each in value.items()}
+    return [_finite(each) for each in value] if isinstance(value, list | tuple) else value

@@ -1,0 +1,59 @@
+"""The readings of the last minute, for the page's plots."""
+
+from collections import deque
+from collections.abc import Mapping
+from dataclasses import dataclass, field
+from typing import Any
+
+SPAN_S = 60.0
+STEP_S = 0.1  # between two points, in the controller's time
+POINTS = round(SPAN_S / STEP_S)
+
+Values = Mapping[str, tuple[float, ...]]  # by the name of a line, such as "gyro.rate"
+
+
+@dataclass(slots=True)
+class History:
+    """Points in their order, counted from the first: what a browser has already need not be sent again."""
+
+    first: int = 0
+    _points: deque[tuple[float, Values]] = field(default_factory=lambda: deque(maxlen=POINTS))
+
+    @property
+    def end(self) -> int:
+        """The number of the next point."""
+        return self.first + len(self._points)
+
+    def add(self, time_s: float, values: Values) -> None:
+        """Take a point, unless the last one is as good as now; time that runs backwards begins anew."""
+        if self._points:
+            since_s = time_s - self._points[-1][0]
+            if since_s < 0:
+                self.clear()
+            elif since_s < STEP_S:
+                return
+        if len(self._points) == POINTS:
+            self.first += 1
+        self._points.append((time_s, values))
+
+    def clear(self) -> None:
+        """Forget what was: another movement begins."""
+        self.first = self.end
+        self._points.clear()
+
+    def since(self, number: int) -> dict[str, Any]:
+        """The points from `number` on, as the page reads them: when, and each line's values (null: none)."""
+        start = max(number, self.first)
+        points = list(self._points)[start - self.first :]
+        lines = sorted({line for _, values in points for line in values})
+        return {
+            "from": start,
+            "first": self.first,
+            "time_s": [round(time_s, 2) for time_s, _ in points],
+            "lines": {line: [rounded(values.get(line)) for _, values in points] for line in lines},
+        }
+
+
+def rounded(vector: tuple[float, ...] | None) -> list[float] | None:
+    """To six digits, which is more than a screen shows and less than a wire carries."""
+    return None if vector is None else [float(f"{component:.6g}") for component in vector]

@@ -1,0 +1,73 @@
+"""Has the recording looked at after each step that measures, by a process of its own (`rig.page.looking`)."""
+
+import json
+import subprocess
+import sys
+import threading
+import time
+from collections.abc import Iterator
+from contextlib import contextmanager, suppress
+from pathlib import Path
+
+from rig.arm.motion import Dwell, Rest, Sweep
+from rig.page.feed import Feed
+from rig.page.rows import Look
+from rig.station.events import PhaseStarted, RunEvent, StepFinished
+
+WRITTEN_S = 0.6  # after which an event is in the file
+SHARE = 0.1  # of the time looking may take: a recording of hours is long to read
+
+
+class Lookout:
+    """A listener that wakes the thread which asks."""
+
+    def __init__(self) -> None:
+        self.wanted = threading.Event()
+        self.over = threading.Event()
+        self._raw = True
+
+    def event(self, event: RunEvent) -> None:
+        """As of a Listener."""
+        match event:
+            case PhaseStarted(_, _, sensors):
+                self._raw = "calibrated" not in sensors.values()
+            case StepFinished(_, _, Sweep() | Rest() | Dwell(), _) if self._raw:
+                self.wanted.set()
+
+
+@contextmanager
+def looking_out(folder: Path, feed: Feed) -> Iterator[Lookout]:
+    """For the length of the block; what is seen is shown by `feed`."""
+    lookout = Lookout()
+    command = [sys.executable, "-P", "-m", "rig.page.looking", str(folder)]
+    # In a session of its own: Ctrl-C is the run's.
+    with subprocess.Popen(
+        command, stdin=subprocess.PIPE, stdout=subprocess.PIPE, text=True, start_new_session=True
+    ) as process:
+        thread = threading.Thread(target=_ask, args=(process, lookout, feed), name="lookout", daemon=True)
+        thread.start()
+        try:
+            yield lookout
+        finally:
+            lookout.over.set()
+            lookout.wanted.set()
+            process.kill()
+            thread.join()
+
+
+def _ask(process: "subprocess.Popen[str]", lookout: Lookout, feed: Feed) -> None:
+    assert process.stdin is not None and process.stdout is not None
+    while lookout.wanted.wait() and not lookout.over.wait(WRITTEN_S):
+        lookout.wanted.clear()
+        asked_s = time.monotonic()
+        with suppress(OSError):  # it is killed at the end
+            process.stdin.write("\n")
+            process.stdin.flush()
+        line = process.stdout.readline()
+        if not line:
+            return
+        seen = json.loads(line)
+        if "observations" in seen:
+            feed.look(Look(**seen))
+        if lookout.over.wait((time.monotonic() - asked_s) * (1 / SHARE - 1)):
+            return

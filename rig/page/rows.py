@@ -1,0 +1,98 @@
+"""Rows of the page's tables: observations and parameters, of a run that goes on and of one with its result."""
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+
+from rig.analysis.so_far import SoFar
+from rig.data.result_file import ResultDocument
+from rig.errors import Fault
+from rig.estimation.arrays import Array
+from rig.estimation.budget import COVERAGE_FACTOR
+from rig.estimation.vector_model import VectorSolution
+from rig.observation.observe import Observation
+from rig.page.history import rounded
+
+NOISE_ONLY, COMBINED = "noise only", "combined"
+Row = dict[str, Any]
+
+
+@dataclass(frozen=True, slots=True)
+class Look:
+    """What recordings amount to at some time: rows of observations and of parameters."""
+
+    observations: list[Row]
+    parameters: list[Row]
+
+
+def observation_row(sensor: str, observation: Observation) -> Row:
+    """A revolution the host has averaged: what the sensor read along the turn stands beside 2π/T."""
+    average = observation.average
+    return {
+        "sensor": sensor,
+        "sweep": observation.sweep,
+        "by": "host",
+        "joint": observation.joint_name,
+        "direction": observation.direction,
+        "axis": observation.axis,
+        "sign": observation.sign,
+        "speed_rad_s": float(observation.speed_rad_s),
+        "mean_rad_s": rounded(tuple(average.mean_rad_s.tolist())),
+        "std_rad_s": float(average.mean_std_rad_s["xyz".index(observation.axis)]),
+        "samples": average.samples,
+        "lost": observation.lost,
+        "refused": None,
+    }
+
+
+def look_of(found: Mapping[str, SoFar]) -> Look:
+    """Of a run that goes on."""
+    observations = [_sweep(name, sweep, each) for name, one in found.items() for sweep, each in one.sweeps.items()]
+    return Look(observations, [_parameters_so_far(name, one) for name, one in found.items()])
+
+
+def parameter_rows(result: ResultDocument) -> list[Row]:
+    """Of a run's result: gyroscopes, then accelerometers; U is k = 2 of what the result states, noise where no more."""
+    rows = []
+    for name, sensor in result.sensors.items():
+        combined = sensor.covariance_combined
+        std = np.sqrt(np.diag(combined or sensor.covariance))
+        rows.append(_row(name, "rad/s", sensor.scale, sensor.bias_rad_s, std, of=COMBINED if combined else NOISE_ONLY))
+    for name, found in result.accelerometers.items():
+        std = np.sqrt(np.diag(found.covariance))
+        rows.append(_row(f"{name}, accelerometer", "m/s²", found.scale, found.bias_m_s2, std, of=NOISE_ONLY))
+    return rows
+
+
+def _sweep(sensor: str, sweep: int, found: Observation | Fault) -> Row:
+    if isinstance(found, Observation):
+        return observation_row(sensor, found)
+    return {"sensor": sensor, "sweep": sweep, "by": "host", "refused": str(found)}
+
+
+def _parameters_so_far(name: str, found: SoFar) -> Row:
+    solution = found.solution
+    if isinstance(solution, VectorSolution):
+        std = np.sqrt(np.diag(solution.covariance))
+        return _row(name, "rad/s", solution.scale, solution.bias_rad_s, std, of=NOISE_ONLY)
+    row = {"sensor": name, "unit": "rad/s", "scale": None, "scale_u": None, "of": NOISE_ONLY, "missing": solution.what}
+    if found.bias_rad_s is None:
+        return {**row, "bias": None, "bias_u": None}
+    bias, std = found.bias_rad_s
+    return {**row, "bias": rounded(tuple(bias.tolist())), "bias_u": rounded(tuple((COVERAGE_FACTOR * std).tolist()))}
+
+
+def _row(name: str, unit: str, scale: Any, bias: Any, std: Array, *, of: str) -> Row:
+    expanded = (COVERAGE_FACTOR * std).tolist()
+    return {
+        "sensor": name,
+        "unit": unit,
+        "scale": [float(f"{each:.8g}") for each in scale],
+        "scale_u": rounded(tuple(expanded[:3])),
+        "bias": [float(f"{each:.8g}") for each in bias],
+        "bias_u": rounded(tuple(expanded[3:])),
+        "of": of,
+        "missing": None,
+    }

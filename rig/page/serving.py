@@ -1,0 +1,126 @@
+"""The server in a thread of its own, beside whatever it shows."""
+
+import asyncio
+import socket
+import threading
+from collections.abc import Iterator
+from contextlib import contextmanager
+from dataclasses import dataclass
+from ipaddress import ip_address
+from pathlib import Path
+
+from rig.errors import Refused
+from rig.page.control import Control
+from rig.page.feed import Broadcast, Feed
+from rig.page.guard import Door, new_token
+
+ADDRESS, PORT = "127.0.0.1", 8137
+LAST_NEWS_S = 2.0  # for browsers to take what was shown last
+ENDING_S = 5.0
+SHORTEST_TOKEN = 22  # characters of base64, 128 bits
+
+
+@dataclass(frozen=True, slots=True)
+class Address:
+    """Where the page is: without a `port`, the usual one, or any that is free where that is taken."""
+
+    host: str = ADDRESS
+    port: int | None = None
+    token: str | None = None
+
+    @property
+    def loopback(self) -> bool:
+        """Whether only this computer reaches it."""
+        try:
+            return ip_address(self.host).is_loopback
+        except ValueError:
+            return self.host == "localhost"
+
+
+@contextmanager
+def serving(feed: Feed, control: Control, folder: Path, address: Address) -> Iterator[str]:
+    """Show `feed` to browsers for the length of the block; yields the page's address, with the token.
+
+    Raises Refused `page_address`.
+    """
+    import uvicorn
+
+    from rig.page.application import application
+
+    _check(address)
+    listening = _bound(address)
+    port = listening.getsockname()[1]
+    host = f"[{address.host}]" if ":" in address.host else address.host
+    names = {host, "localhost"} if address.loopback else {host}
+    token = address.token or new_token()
+    door = Door(frozenset(f"{name}:{port}".lower() for name in names), token, not address.loopback)
+    broadcast = Broadcast(feed)
+    config = uvicorn.Config(
+        application(broadcast, control, door, folder),
+        log_config=None,
+        access_log=False,
+        lifespan="off",
+        ws="none",
+        server_header=False,
+        timeout_graceful_shutdown=1,
+    )
+    server = uvicorn.Server(config)
+    over = threading.Event()
+
+    async def serve() -> None:
+        posting = asyncio.create_task(broadcast.run())
+        served = asyncio.create_task(server.serve([listening]))
+        while not over.is_set() and not served.done():
+            await asyncio.sleep(0.05)
+        await broadcast.close(LAST_NEWS_S)
+        server.should_exit = True
+        await asyncio.gather(posting, served)
+
+    thread = threading.Thread(target=lambda: asyncio.run(serve()), name="page", daemon=True)
+    thread.start()
+    try:
+        yield f"http://{host}:{port}/#{token}"
+    finally:
+        over.set()
+        thread.join(ENDING_S)
+        listening.close()
+
+
+def _check(address: Address) -> None:
+    if address.host in ("", "0.0.0.0", "::", "*"):
+        raise Refused(
+            "page_address",
+            "the page cannot be served on every address of this computer",
+            "Give the one address by which the tablet reaches it: --page-address ADDRESS:PORT",
+        )
+    if address.token is not None and (
+        len(address.token) < SHORTEST_TOKEN or not address.token.replace("-", "").replace("_", "").isalnum()
+    ):
+        raise Refused(
+            "page_address",
+            f"the page's token has fewer than {SHORTEST_TOKEN} characters, or others than letters, digits, - and _",
+            "Make one with: python -c 'import secrets; print(secrets.token_urlsafe(16))'",
+        )
+    if not address.loopback and address.token is None:
+        raise Refused(
+            "page_address",
+            f"others than this computer reach {address.host}, so the page there needs a token",
+            "Give --page-token TOKEN as well, or leave the address out",
+        )
+
+
+def _bound(address: Address) -> socket.socket:
+    """The listening socket, of which uvicorn makes its server."""
+    wanted = [PORT, 0] if address.port is None else [address.port]
+    why: OSError | None = None
+    for port in wanted:
+        try:
+            family = socket.AF_INET6 if ":" in address.host else socket.AF_INET
+            return socket.create_server((address.host, port), family=family, backlog=64)
+        except (OSError, OverflowError) as error:
+            why = error if isinstance(error, OSError) else OSError(str(error))
+    raise Refused(
+        "page_address",
+        f"the page cannot be served at {address.host}:{wanted[0]} ({why})",
+        "Give an address of this computer and a port that is free: --page-address ADDRESS:PORT",
+    )

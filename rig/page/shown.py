@@ -1,0 +1,265 @@
+"""What the page shows, made of a run's events. No thread, no clock, and of files only the result that is told of."""
+
+from dataclasses import asdict, dataclass, field
+from math import degrees
+from typing import Any
+
+from rig.arm.kinematics import NOMINAL, DenavitHartenberg
+from rig.arm.motion import Dwell, Rest, Step, Sweep
+from rig.arm.state import JOINT_NAMES, ArmReport, ArmState, RobotMode, RuntimeState, SafetyMode
+from rig.data.events import BoardNotObserved, BoardObserved
+from rig.data.result_file import read_result
+from rig.data.run_folder import RESULT
+from rig.errors import RigError
+from rig.page.history import History, rounded
+from rig.page.rows import Look, observation_row, parameter_rows
+from rig.report.certificate.writer import PAGE as CERTIFICATE
+from rig.station.events import (
+    Advice,
+    Answered,
+    ArmConnected,
+    ArmSeen,
+    Checked,
+    Crashed,
+    DocumentWritten,
+    Failed,
+    Interrupted,
+    ObservationMade,
+    PhaseRecorded,
+    PhaseStarted,
+    PreflightPassed,
+    Progress,
+    Prompt,
+    RunEvent,
+    RunFolderWritten,
+    SamplesTaken,
+    SensorSamples,
+    StepFinished,
+    StepStarted,
+    VerdictReached,
+)
+from rig.station.words import line
+
+LINES = 40  # of what was said last
+FACTOR = {"rate_rad_s": degrees(1.0), "acceleration_m_s2": 1.0, "field_t": 1e6}  # to °/s, m/s², µT
+ENDINGS = (VerdictReached, Failed, Interrupted, Crashed)
+
+
+@dataclass(frozen=True, slots=True)
+class About:
+    """What is known before anything has happened: the run's folder, whether it is replayed, whether the page may answer
+    the operator's questions, each sensor's part and serial number."""
+
+    folder: str
+    procedure: str
+    replayed: bool = False
+    may_answer: bool = False
+    parts: dict[str, str] = field(default_factory=dict)
+    simulated: bool = False
+
+
+class Shown:
+    """The page's `sections` by name, each of plain numbers and texts, and the `changed` ones since somebody looked."""
+
+    def __init__(self, about: About) -> None:
+        self.sections: dict[str, Any] = {
+            "about": asdict(about),
+            "state": {"kind": "connecting", "text": "Connecting to arm and board"},
+            "step": None,
+            "arm": _geometry(NOMINAL),
+            "sensors": [],
+            "prompt": None,
+            "observations": [],
+            "parameters": [],
+            "checks": [],
+            "lines": [],
+            "certificate": False,
+        }
+        self.history = History()
+        self.changed: set[str] = set(self.sections)
+        self._parts = about.parts
+        self._modes: dict[str, str] = {}
+        self._values: dict[str, tuple[float, ...]] = {}
+        self._seen: dict[tuple[str, int], dict[str, Any]] = {}
+        self._turns: dict[int, dict[str, str]] = {}
+        self._prompts = 0
+        self._solved = False
+        self.ended = False
+
+    def put(self, name: str, value: Any) -> None:
+        """Replace a section."""
+        self.sections[name] = value
+        self.changed.add(name)
+
+    def take(self, event: RunEvent) -> None:
+        """Show what has happened."""
+        match event:
+            case SamplesTaken(sensors):
+                self._samples(sensors)
+            case ArmSeen(state, missed_states):
+                self.put("arm", {**self.sections["arm"], **_stance(state), "missed": missed_states})
+                self.history.add(state.time_s, self._values)
+            case Progress():
+                self.put("step", _progress(event))
+            case _:
+                self._told(event)
+                if (text := line(event)) is not None:
+                    self.put("lines", [*self.sections["lines"], text][-LINES:])
+
+    def look(self, look: Look) -> None:
+        """What the recording so far amounts to: each sweep's observation or refusal, and the parameters."""
+        for each in look.observations:
+            self._observation(each)
+        if not self._solved:
+            self.put("parameters", look.parameters)
+
+    def _told(self, event: RunEvent) -> None:
+        """What happens once."""
+        match event:
+            case ArmConnected(report):
+                self.put("arm", {**self.sections["arm"], **_arm(report)})
+            case PhaseStarted(procedure, plan, sensors):
+                self._modes = sensors
+                self._turns = {
+                    sweep.index: {"joint": sweep.joint_name, "direction": sweep.direction} for sweep in plan.sweeps
+                }
+                self.history.clear()
+                self._values = {}
+                self.put("sensors", [])
+                self.put("step", {"number": 0, "count": len(plan.steps), "name": procedure, "kind": "waiting",
+                                  "fraction": 0.0, "elapsed_s": 0.0, "remaining_s": plan.duration_s})  # fmt: skip
+                self._state("connected", f"Before the first motion of {procedure}")
+            case PreflightPassed():
+                self._state("ready", "Pre-flight passed: plan and arm are within limits")
+            case Prompt(announcement, to_do):
+                self._prompts += 1
+                asked = {"number": self._prompts, "announcement": list(announcement), "to_do": to_do}
+                self.put("prompt", asked)
+                self._state("asking", "The operator is asked")
+            case Answered(agreed):
+                self.put("prompt", None)
+                self._state("ready", "The operator agreed" if agreed else "The operator did not agree")
+            case StepStarted(number, count, step):
+                self.put("step", {**(self.sections["step"] or {}), **_place(number, count, step)})
+                self._state(_kind(step), step.name)
+            case StepFinished():
+                self._state("ready", "Between two steps")
+            case PhaseRecorded(sensors, _):
+                self._samples(sensors)
+                self._state("judging", "Recorded; averaging, solving, judging")
+            case BoardObserved(sensor, sweep, speed_rad_s, observation):
+                seen = {"sensor": sensor, "sweep": sweep, "by": "board", "speed_rad_s": speed_rad_s}
+                self._observation({**seen, "mean_rad_s": rounded(observation.mean_rad_s)})
+            case BoardNotObserved(sensor, sweep, reason):
+                self._observation({"sensor": sensor, "sweep": sweep, "by": "board", "refused": reason})
+            case ObservationMade(sensor, observation):
+                self._observation(observation_row(sensor, observation))
+            case _:
+                self._ended(event)
+
+    def _ended(self, event: RunEvent) -> None:
+        """What is told when nothing moves any more."""
+        match event:
+            case Checked(check):
+                row = {
+                    name: getattr(check, name) for name in ("name", "value", "limit", "unit", "uncertainty", "passed")
+                }
+                self.put("checks", [*self.sections["checks"], row])
+            case VerdictReached(passed):
+                held = sum(check["passed"] for check in self.sections["checks"])
+                text = f"{held} of {len(self.sections['checks'])} checks passed"
+                self._state("passed" if passed else "failed", text)
+            case DocumentWritten(path) if path.name == CERTIFICATE:
+                self.put("certificate", True)
+            case DocumentWritten(path) if path.name == RESULT:
+                self.put("parameters", parameter_rows(read_result(path)))
+                self._solved = True
+            case Failed(error):
+                self._state("refused" if error.exit_status == 2 else "fault", _words(error))
+            case Interrupted(text):
+                self._state("stopped", text)
+            case Crashed(traceback):
+                self._state("fault", f"A defect of the program: {traceback.strip().splitlines()[-1]}")
+            case Advice() | RunFolderWritten():
+                pass  # their lines say it
+        if isinstance(event, ENDINGS):
+            self.ended = True
+            self.put("prompt", None)
+
+    def _state(self, kind: str, text: str) -> None:
+        self.put("state", {"kind": kind, "text": text})
+
+    def _samples(self, sensors: tuple[SensorSamples, ...]) -> None:
+        rows, values = [], {}
+        for sensor in sensors:
+            row: dict[str, Any] = {
+                "name": sensor.sensor,
+                "part": self._parts.get(sensor.sensor, ""),
+                "mode": self._modes.get(sensor.sensor, "raw"),
+                "samples": sensor.samples,
+                "lost": sensor.lost,
+                "temperature_c": sensor.temperature_c,
+            }
+            for quantity, factor in FACTOR.items():
+                if (vector := getattr(sensor, quantity)) is not None:
+                    values[f"{sensor.sensor}.{quantity}"] = tuple(factor * component for component in vector)
+            rows.append(row)
+        self._values = values
+        self.put("sensors", rows)
+
+    def _observation(self, row: dict[str, Any]) -> None:
+        """The host's own takes the place of what the board said of the same sweep, never the other way."""
+        key = row["sensor"], row["sweep"]
+        before = self._seen.get(key, {})
+        if before.get("by") != "host" or row["by"] == "host":
+            self._seen[key] = {**self._turns.get(row["sweep"], {}), **before, **row}
+            self.put("observations", [self._seen[each] for each in sorted(self._seen, key=lambda k: (k[1], k[0]))])
+
+
+def _words(error: RigError) -> str:
+    return str(error)
+
+
+def _kind(step: Step) -> str:
+    return {Sweep: "measuring", Dwell: "measuring", Rest: "resting"}.get(type(step), "moving")
+
+
+def _place(number: int, count: int, step: Step) -> dict[str, Any]:
+    return {"number": number, "count": count, "name": step.name, "kind": _kind(step)}
+
+
+def _progress(progress: Progress) -> dict[str, Any]:
+    return {
+        **_place(progress.number, progress.count, progress.step),
+        "fraction": round(progress.fraction, 4),
+        "elapsed_s": round(progress.elapsed_s, 2),
+        "remaining_s": round(progress.remaining_s, 2),
+    }
+
+
+def _geometry(arm: DenavitHartenberg) -> dict[str, Any]:
+    return {"geometry": asdict(arm), "joints": list(JOINT_NAMES), "q_rad": None, "missed": 0}
+
+
+def _arm(report: ArmReport) -> dict[str, Any]:
+    known = {"serial_number": report.serial_number, "host": report.host, "polyscope": report.polyscope}
+    return {**_geometry(report.kinematics or NOMINAL), **known, **_stance(report.state)}
+
+
+def _stance(state: ArmState) -> dict[str, Any]:
+    return {
+        "q_rad": rounded(state.q_rad),
+        "qd_rad_s": rounded(state.qd_rad_s),
+        "slider": round(state.target_speed_fraction, 3),
+        "scaling": round(state.speed_scaling, 3),
+        "mode": _named(RobotMode, state.robot_mode),
+        "safety": _named(SafetyMode, state.safety_mode),
+        "program": _named(RuntimeState, state.runtime_state),
+    }
+
+
+def _named(names: Any, number: int) -> str:
+    try:
+        return str(names(number).name).lower().replace("_", " ")
+    except ValueError:
+        return f"number {number}"

@@ -1,0 +1,250 @@
+// The page: keeps what the rig tells and shows it. It decides nothing.
+
+import { act, follow, token } from "./stream.js";
+import { drawArm, signed } from "./arm.js";
+import { plot } from "./plot.js";
+import * as tables from "./tables.js";
+import { colours, fresh } from "./drawing.js";
+
+const $ = (id) => document.getElementById(id);
+const shown = {};
+const points = { first: 0, times: [], lines: {} };
+const SHOWN_POINTS = 600;
+const ENDED = ["passed", "failed", "refused", "fault", "stopped"];
+const WORDS = {
+  connecting: ["Connecting", "…"], connected: ["Connected", "…"], ready: ["Ready", "■"], asking: ["Your answer is needed", "?"],
+  moving: ["Moving", "➜"], measuring: ["Measuring", "◉"], resting: ["Resting", "‖"], judging: ["Solving", "Σ"],
+  passed: ["PASS", "✓"], failed: ["FAIL", "✗"], refused: ["Refused", "⊘"], fault: ["Fault", "⚠"], stopped: ["Stopped", "■"],
+};
+const UNITS = { rate_rad_s: ["rate", "°/s", 2], acceleration_m_s2: ["acceleration", "m/s²", 3], field_t: ["magnetic field", "µT", 1] };
+
+const SHOW = {
+  about(about) {
+    $("procedure").textContent = about.procedure.replaceAll("_", " ");
+    $("folder").textContent = about.folder;
+    const tags = [about.replayed && "replay", about.simulated && "simulated"].filter(Boolean);
+    $("tags").replaceChildren(...tags.map((text) => Object.assign(document.createElement("span"), { className: "tag", textContent: text })));
+  },
+  state({ kind, text }) {
+    const [word, sign] = WORDS[kind] ?? [kind, ""];
+    document.body.dataset.kind = kind;
+    $("sign").textContent = sign;
+    if ($("state-word").textContent !== word) $("state-word").textContent = word;
+    $("state-text").textContent = text;
+    document.title = `${word} · ${shown.about?.procedure.replaceAll("_", " ") ?? "calibration rig"}`;
+    buttons();
+  },
+  step(step) {
+    if (!step) return;
+    $("left").textContent = clock(step.remaining_s);
+    $("step-number").textContent = step.number ? `Step ${step.number} of ${step.count}` : `${step.count} steps`;
+    $("step-name").textContent = step.number ? step.name.replaceAll("_", " ") : "";
+    const done = step.count ? (Math.max(0, step.number - 1) + (step.number ? step.fraction : 0)) / step.count : 0;
+    const bar = $("bar");
+    bar.setAttribute("aria-valuenow", Math.round(100 * done));
+    bar.setAttribute("aria-valuetext", `step ${step.number} of ${step.count}, ${clock(step.remaining_s)} left`);
+    drawBar(step);
+  },
+  arm(arm) {
+    $("arm-name").textContent = [arm.serial_number, arm.host].filter(Boolean).join(" · ");
+    $("missed").textContent = arm.missed ?? "not recorded";
+    $("missed").className = arm.missed ? "odd-number" : "";
+    if (!arm.q_rad) return;
+    const fast = Math.max(...arm.qd_rad_s.map(Math.abs)) * 180 / Math.PI;
+    const normal = (value, usual) => [value, value !== usual];
+    facts([
+      ["speed", [`${fast.toFixed(1)} °/s`, false]], ["slider", [`${Math.round(100 * arm.slider)} %`, arm.slider < 0.995]],
+      ["scaling", [`${Math.round(100 * arm.scaling)} %`, arm.scaling < 0.995]], ["mode", normal(arm.mode, "running")],
+      ["safety", normal(arm.safety, "normal")], ["program", [arm.program, arm.program === "paused"]],
+    ]);
+    tables.joints(arm);
+    drawArm($("arm"), arm);
+  },
+  sensors: tables.samples,
+  observations: tables.observations,
+  parameters: tables.parameters,
+  checks: tables.checks,
+  prompt,
+  certificate(there) {
+    $("certificate").hidden = !there;
+  },
+  lines(lines) {
+    const list = $("lines");
+    list.replaceChildren(...lines.map((text) => Object.assign(document.createElement("li"), { textContent: text })));
+    list.scrollTop = list.scrollHeight;
+  },
+};
+
+function prompt(asked) {
+  const box = $("prompt");
+  const before = Number(box.dataset.number || 0);
+  box.hidden = !asked;
+  if (!asked) return;
+  const here = shown.about.may_answer && token !== "";
+  $("prompt-words").replaceChildren(...asked.announcement.map((text) => Object.assign(document.createElement("li"), { textContent: text })));
+  $("yes").textContent = asked.to_do.charAt(0).toUpperCase() + asked.to_do.slice(1);
+  $("prompt-answer").hidden = !here;
+  $("prompt-elsewhere").hidden = here;
+  $("prompt-elsewhere").textContent = shown.about.may_answer
+    ? "This address lacks its token, so it is answered on a page that has it." : "It is answered at the terminal, not here.";
+  if (asked.number !== before) {
+    box.dataset.number = asked.number;
+    $("clear").checked = false;
+    $("yes").disabled = true;
+    $("prompt-title").focus();
+  }
+}
+
+function facts(pairs) {
+  $("arm-facts").replaceChildren(...pairs.map(([name, [text, odd]]) => {
+    const pair = document.createElement("div");
+    if (odd) pair.className = "odd";
+    pair.append(Object.assign(document.createElement("dt"), { textContent: name }), Object.assign(document.createElement("dd"), { textContent: text }));
+    return pair;
+  }));
+}
+
+function clock(seconds) {
+  const whole = Math.max(0, Math.ceil(seconds));
+  const [hours, minutes] = [Math.floor(whole / 3600), Math.floor(whole / 60) % 60];
+  const two = (number) => String(number).padStart(2, "0");
+  return hours ? `${hours}:${two(minutes)}:${two(whole % 60)}` : `${minutes}:${two(whole % 60)}`;
+}
+
+function drawBar({ number, count, fraction }) {
+  const { pen, width, height } = fresh($("bar-canvas"));
+  const paint = colours();
+  const wide = width / Math.max(1, count);
+  const gap = wide > 8 ? 3 : 0;
+  for (let i = 0; i < count; i += 1) {
+    const part = i + 1 < number ? 1 : i + 1 === number ? fraction : 0;
+    pen.fillStyle = paint.line;
+    pen.fillRect(i * wide, 0, wide - gap, height);
+    pen.fillStyle = paint.move;
+    pen.fillRect(i * wide, 0, (wide - gap) * part, height);
+  }
+}
+
+function take(name, news) {
+  if (name === "all") Object.assign(points, { first: news.points.first, times: [], lines: {} });
+  add(news.points);
+  delete news.points;
+  Object.assign(shown, news);
+  for (const [section, value] of Object.entries(news)) if (value !== undefined) SHOW[section]?.(value);
+  if ("about" in news) buttons();
+  redraw();
+}
+
+/** Points are counted, so that none is taken twice; what the rig has forgotten is forgotten here. */
+function add(news) {
+  const end = points.first + points.times.length;
+  const skip = Math.max(0, end - news.from);
+  if (news.from > end) Object.assign(points, { first: news.from, times: [], lines: {} });
+  const before = points.times.length;
+  const times = news.time_s.slice(skip);
+  points.times.push(...times);
+  for (const name of new Set([...Object.keys(points.lines), ...Object.keys(news.lines)])) {
+    const line = (points.lines[name] ??= new Array(before).fill(null));
+    line.push(...(news.lines[name]?.slice(skip) ?? new Array(times.length).fill(null)));
+  }
+  const drop = Math.max(news.first - points.first, points.times.length - SHOWN_POINTS, 0);
+  if (drop > 0) {
+    points.times.splice(0, drop);
+    for (const line of Object.values(points.lines)) line.splice(0, drop);
+    points.first += drop;
+  }
+}
+
+let due = false;
+function redraw() {
+  if (due) return;
+  due = true;
+  requestAnimationFrame(() => {
+    due = false;
+    for (const name of Object.keys(points.lines).sort(inOrder)) draw(name, points.lines[name]);
+  });
+}
+
+/** By sensor, then rate before acceleration before field. */
+function inOrder(one, other) {
+  const [a, b] = [one, other].map((name) => [name.slice(0, name.lastIndexOf(".")), Object.keys(UNITS).indexOf(name.slice(name.lastIndexOf(".") + 1))]);
+  return a[0] === b[0] ? a[1] - b[1] : a[0] < b[0] ? -1 : 1;
+}
+
+function draw(name, values) {
+  const id = `plot-${name.replaceAll(/[^A-Za-z0-9_-]/g, "-")}`;
+  const [sensor, quantity] = [name.slice(0, name.lastIndexOf(".")), name.slice(name.lastIndexOf(".") + 1)];
+  const [title, unit, digits] = UNITS[quantity];
+  if (!$(id)) $("readings").append(panel(id, sensor, title, unit));
+  const about = shown.sensors?.find((each) => each.name === sensor);
+  $(`${id}-about`).textContent = [about?.part, about?.mode === "calibrated" ? "corrected by the board" : ""].filter(Boolean).join(" · ");
+  const last = values.findLast((value) => value);
+  const canvas = $(`${id}-canvas`);
+  for (const [i, axis] of [..."xyz"].entries()) {
+    $(`${id}-${axis}`).textContent = `${axis} ${last ? signed(last[i], digits).padStart(digits + 4, "\u2007") : "–"}`;
+  }
+  if (last) canvas.setAttribute("aria-label", `${sensor}, ${title} over the last minute; now ${[..."xyz"].map((axis, i) => `${axis} ${last[i].toFixed(digits)}`).join(", ")} ${unit}`);
+  plot(canvas, points.times, values);
+}
+
+function panel(id, sensor, title, unit) {
+  const make = (tag, fields, ...children) => {
+    const made = Object.assign(document.createElement(tag), fields);
+    made.append(...children);
+    return made;
+  };
+  const now = make("span", { className: "now" }, ...[..."xyz"].map((axis) => make("span", { id: `${id}-${axis}`, className: axis })), make("span", { className: "unit", textContent: unit }));
+  const head = make("h2", {}, make("span", { textContent: `${sensor}, ${title}` }), make("small", { id: `${id}-about` }), now);
+  const canvas = make("canvas", { id: `${id}-canvas` });
+  canvas.setAttribute("role", "img");
+  return make("section", { id, className: "plot" }, head, canvas);
+}
+
+function buttons() {
+  const over = ENDED.includes(document.body.dataset.kind);
+  $("halt").hidden = over || token === "" || !shown.about || shown.about.replayed;
+}
+
+function say(text) {
+  $("said").hidden = !text;
+  $("said").textContent = text ?? "";
+}
+
+function linked(up, why) {
+  const over = ENDED.includes(document.body.dataset.kind);
+  $("link").dataset.up = up || over ? "yes" : "no";
+  $("link-words").textContent = up ? "connected" : over ? "the run is over, and this is how it ended" : why ?? "no connection: what stands here is old";
+  if (!up && over) {
+    $("certificate").hidden = true;
+    $("link").dataset.up = "over";
+  } else if (up && shown.certificate) $("certificate").hidden = false;
+  if (up) $("halt").disabled = false;
+}
+
+$("halt").addEventListener("click", async () => {
+  $("halt").disabled = true;
+  say(await act("stop"));
+  setTimeout(() => { $("halt").disabled = false; }, 3000);
+});
+$("clear").addEventListener("change", () => { $("yes").disabled = !$("clear").checked; });
+for (const [id, agreed] of [["yes", true], ["no", false]]) {
+  $(id).addEventListener("click", async () => say(await act("answer", { number: shown.prompt.number, agreed })));
+}
+
+const THEMES = ["as the system", "light", "dark"];
+const system = window.matchMedia("(prefers-color-scheme: dark)");
+let theme = 0;
+function paint() {
+  const dark = theme === 2 || (theme === 0 && system.matches);
+  document.documentElement.dataset.theme = dark ? "dark" : "light";
+  $("theme-words").textContent = THEMES[theme];
+  $("theme").setAttribute("aria-label", `Light or dark: ${THEMES[theme]}`);
+  for (const section of ["arm", "step"]) if (shown[section]) SHOW[section](shown[section]);
+  redraw();
+}
+$("theme").addEventListener("click", () => { theme = (theme + 1) % 3; paint(); });
+system.addEventListener("change", paint);
+window.addEventListener("resize", paint);
+paint();
+window.addEventListener("hashchange", () => window.location.reload()); // another run's token, in the same window
+follow(take, linked, () => ENDED.includes(document.body.dataset.kind));

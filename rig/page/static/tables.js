@@ -1,0 +1,93 @@
+// The tables: observations, parameters, checks, samples, joints.
+
+import { signed } from "./arm.js";
+
+/** A row of cells; a cell is a text or [text, class names]. The first is the row's heading. */
+function row(cells, kind = "") {
+  const tr = document.createElement("tr");
+  if (kind) tr.className = kind;
+  cells.forEach((cell, i) => {
+    const [text, name] = Array.isArray(cell) ? cell : [cell, ""];
+    const td = document.createElement(i === 0 ? "th" : "td");
+    if (i === 0) td.scope = "row";
+    td.textContent = text;
+    if (name) td.className = name;
+    tr.append(td);
+  });
+  return tr;
+}
+
+function fill(id, rows) {
+  const body = document.querySelector(`#${id} tbody`) ?? document.getElementById(id);
+  body.replaceChildren(...rows);
+}
+
+export const minus = (text) => text.replace("-", "−");
+const fixed = (value, digits) => (typeof value === "number" ? minus(value.toFixed(digits)) : "–");
+const plain = (value) => (typeof value === "number" ? minus(String(Number(value.toPrecision(4)))) : "–");
+const count = (value) => (typeof value === "number" ? value.toLocaleString("en").replaceAll(",", "\u202f") : "–");
+
+export function samples(sensors) {
+  fill("samples", sensors.map((s) =>
+    row([s.name, count(s.samples), [count(s.lost) + (s.lost ? " ⚠" : ""), s.lost ? "odd-number" : ""], fixed(s.temperature_c, 1)])));
+}
+
+export function joints(arm) {
+  if (!arm.q_rad) return;
+  const fastest = Math.max(...arm.qd_rad_s.map(Math.abs));
+  fill("joints", arm.joints.map((name, i) => {
+    const turning = fastest > 0.02 && Math.abs(arm.qd_rad_s[i]) === fastest;
+    return row(
+      [(turning ? "▸ " : "") + name.replace("_", " "), minus(((arm.q_rad[i] * 180) / Math.PI).toFixed(1)), signed((arm.qd_rad_s[i] * 180) / Math.PI, 1)],
+      turning ? "turning" : "",
+    );
+  }));
+}
+
+export function observations(rows) {
+  const sweeps = new Map();
+  for (const each of rows) sweeps.set(each.sweep, { ...sweeps.get(each.sweep), ...(each.joint ? each : {}) });
+  fill("observations", rows.map((o, i) => {
+    const turn = sweeps.get(o.sweep);
+    const words = turn?.joint ? `${turn.joint.replace("_", " ")} ${turn.direction}` : "";
+    const kind = i && rows[i - 1].sweep !== o.sweep ? "new-sensor" : "";
+    if (o.refused) {
+      const tr = row([o.sweep, [o.sensor, "words"], [words, "words"], [`✗ refused: ${o.refused}`, "words bad"]], kind);
+      tr.lastChild.colSpan = 6;
+      return tr;
+    }
+    const along = o.axis ? o.sign * o.mean_rad_s["xyz".indexOf(o.axis)] : largest(o.mean_rad_s);
+    const spread = o.std_rad_s ? ` ± ${(2 * o.std_rad_s).toFixed(5)}` : "";
+    return row([
+      o.sweep, [o.sensor, "words"], [words + (o.axis ? `, ${o.sign > 0 ? "+" : "−"}${o.axis}` : ""), "words"],
+      minus(along.toFixed(5)) + spread, fixed(o.speed_rad_s, 5), fixed(along / o.speed_rad_s, 5),
+      count(o.samples), [count(o.lost), o.lost ? "odd-number" : ""], o.by,
+    ], kind);
+  }));
+}
+
+const largest = (vector) => Math.max(...vector.map(Math.abs));
+
+export function parameters(rows) {
+  fill("parameters", rows.flatMap((p) => {
+    if (!p.scale && !p.bias) return [spanning(row([p.sensor, [p.missing ?? "", "words"]], "new-sensor"), 7)];
+    const axes = [..."xyz"].map((axis, i) =>
+      row([
+        i === 0 ? p.sensor : "", axis,
+        p.scale ? fixed(p.scale[i], 5) : "–", [p.scale_u ? fixed(p.scale_u[i], 5) : "–", "u"],
+        p.bias ? signed(p.bias[i], 5) : "–", [p.bias_u ? fixed(p.bias_u[i], 5) : "–", "u"], p.unit, p.of,
+      ], i === 0 ? "new-sensor" : ""));
+    if (!p.scale) axes.push(spanning(row(["", [`no scale factors yet: ${p.missing}`, "words"]]), 7));
+    return axes;
+  }));
+}
+
+function spanning(tr, columns) {
+  tr.lastChild.colSpan = columns;
+  return tr;
+}
+
+export function checks(rows) {
+  fill("checks", rows.map((c) =>
+    row([c.name, plain(c.value) + (c.uncertainty ? ` ± ${plain(c.uncertainty)}` : ""), plain(c.limit), c.unit, c.passed ? ["✓ passed", "good"] : ["✗ failed", "bad"]])));
+}

@@ -1,0 +1,158 @@
+"""Who may speak to the page's server, asked over a real socket."""
+
+import http.client
+import json
+import threading
+import time
+from collections.abc import Iterator
+from contextlib import contextmanager
+from pathlib import Path
+from urllib.parse import urlsplit
+
+import pytest
+
+from rig.errors import Refused
+from rig.page.control import STOPPED, Control
+from rig.page.feed import Feed
+from rig.page.serving import Address, serving
+from rig.page.shown import About, Shown
+from rig.station.events import Prompt
+
+TOKEN = "a-token-of-two-and-twenty"
+
+
+class Asking:
+    """Requests to one server, with the token unless told otherwise."""
+
+    def __init__(self, url: str) -> None:
+        self.port = urlsplit(url).port or 0
+        self.token = urlsplit(url).fragment
+
+    def __call__(
+        self, method: str, path: str, body: str | None = None, **headers: str
+    ) -> tuple[int, str, dict[str, str]]:
+        connection = http.client.HTTPConnection("127.0.0.1", self.port, timeout=30)
+        sent = {
+            "Authorization": f"Bearer {self.token}",
+            **{name.replace("_", "-"): text for name, text in headers.items()},
+        }
+        connection.request(method, path, body, {name: text for name, text in sent.items() if text})
+        answer = connection.getresponse()
+        told = {name.lower(): text for name, text in answer.getheaders()}
+        text = "" if path == "/events" and answer.status == 200 else answer.read().decode()
+        connection.close()
+        return answer.status, text, told
+
+
+@contextmanager
+def server(folder: Path, control: Control | None = None, feed: Feed | None = None) -> Iterator[Asking]:
+    feed = feed or Feed(Shown(About("a run", "six_observation", may_answer=True)))
+    with serving(feed, control or Control(may_answer=True), folder, Address(port=0, token=TOKEN)) as url:
+        yield Asking(url)
+
+
+@pytest.fixture(scope="module")
+def ask(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Asking]:
+    folder = tmp_path_factory.mktemp("run")
+    (folder / "certificate.html").write_text("<p>signed</p>", encoding="utf-8")
+    with server(folder) as asking:
+        yield asking
+
+
+@pytest.mark.parametrize("path", ["/", "/events", "/certificate.html", "/page.js", "/nowhere"])
+@pytest.mark.parametrize("host", ["evil.example", "127.0.0.1", "127.0.0.1:1", "127.0.0.1.evil.example:{port}"])
+def test_a_foreign_name_is_refused(ask: Asking, path: str, host: str) -> None:
+    assert ask("GET", path, Host=host.format(port=ask.port))[0] == 400
+
+
+@pytest.mark.parametrize("path", ["/stop", "/answer", "/events"])
+@pytest.mark.parametrize("origin", ["http://evil.example", "null", "http://127.0.0.1:1", "https://127.0.0.1:{port}"])
+def test_a_request_of_another_page_is_refused(ask: Asking, path: str, origin: str) -> None:
+    method = "GET" if path == "/events" else "POST"
+    assert ask(method, path, Origin=origin.format(port=ask.port))[0] == 403
+
+
+@pytest.mark.parametrize("path", ["/stop", "/answer"])
+def test_what_acts_wants_the_token_and_a_post(ask: Asking, path: str) -> None:
+    assert ask("GET", path)[0] == 405
+    for wrong in ("", "Bearer wrong", f"Basic {ask.token}", f"Bearer {ask.token}x"):
+        assert ask("POST", path, Authorization=wrong)[0] == 403
+    assert ask("POST", path, Authorization="", Cookie=f"rig_page={ask.token}")[0] == 403
+    own = f"http://127.0.0.1:{ask.port}"
+    assert ask("POST", path, '{"number": 1, "agreed": true}', Origin=own)[0] == 409  # nothing runs, nothing is asked
+
+
+@pytest.mark.parametrize(
+    "body", ["", "[]", "{", '{"number": "1", "agreed": true}', '{"number": true, "agreed": 1}', "x" * 2000]
+)
+def test_an_answer_of_another_form_is_refused(ask: Asking, body: str) -> None:
+    assert ask("POST", "/answer", body)[0] == 400
+
+
+def test_everything_comes_with_a_policy_and_loads_nothing_from_elsewhere(ask: Asking) -> None:
+    for path in ("/", "/page.js", "/page.css", "/favicon.ico", "/events"):
+        status, text, headers = ask("GET", path)
+        assert status in (200, 204) and "http://" not in text and "https://" not in text
+        assert "default-src 'none'" in headers["content-security-policy"]
+        assert "unsafe" not in headers["content-security-policy"] and headers["cache-control"] == "no-store"
+        assert headers["x-content-type-options"] == "nosniff" and "access-control-allow-origin" not in headers
+    status, text, headers = ask("GET", "/certificate.html")
+    assert status == 200 and text == "<p>signed</p>" and "script" not in headers["content-security-policy"]
+    assert ask("GET", "/../serving.py")[0] == ask("GET", "/config.yaml")[0] == 404
+
+
+def test_others_than_this_computer_need_the_token_to_look(tmp_path: Path) -> None:
+    from rig.page.guard import Door
+
+    door = Door(frozenset({"192.0.2.1:8137"}), TOKEN, looking_needs_token=True)
+    assert not door.may_look({}, {}) and door.may_look({}, {"rig_page": TOKEN})
+    assert door.may_look({"authorization": f"Bearer {TOKEN}"}, {})
+
+
+@pytest.mark.parametrize(
+    ("address", "words"),
+    [
+        (Address(host="192.0.2.1"), "needs a token"),
+        (Address(host="0.0.0.0", token=TOKEN), "every address"),
+        (Address(token="short"), "fewer than 22"),
+        (Address(host="192.0.2.1", port=1, token=TOKEN), "cannot be served at 192.0.2.1:1"),
+    ],
+)
+def test_an_address_that_will_not_do_is_refused(tmp_path: Path, address: Address, words: str) -> None:
+    feed = Feed(Shown(About("", "")))
+    with (
+        pytest.raises(Refused, match="page_address: .*" + words),
+        serving(feed, Control(may_answer=False), tmp_path, address),
+    ):
+        pass
+
+
+def test_a_page_that_may_not_answer_does_not(tmp_path: Path) -> None:
+    control = Control(may_answer=False)
+    threading.Thread(target=control.ask, args=((), "start"), daemon=True).start()
+    with server(tmp_path, control) as asking:
+        assert asking("POST", "/answer", '{"number": 1, "agreed": true}')[0] == 409
+
+
+def test_an_answer_counts_once_and_for_the_question_that_is_asked(tmp_path: Path) -> None:
+    control, answers = Control(may_answer=True), []
+    feed = Feed(Shown(About("", "")))
+    asked = threading.Thread(target=lambda: answers.append(control.ask((), "start")))
+    with server(tmp_path, control, feed) as asking:
+        feed.event(Prompt(("The arm will move.",), "start"))
+        asked.start()
+        wrong = asking("POST", "/answer", json.dumps({"number": 2, "agreed": True}))[0]
+        while (right := asking("POST", "/answer", json.dumps({"number": 1, "agreed": True}))[0]) == 409:
+            time.sleep(0.01)
+        asked.join(10)
+        again = asking("POST", "/answer", json.dumps({"number": 1, "agreed": True}))[0]
+    assert (wrong, right, again, answers) == (409, 202, 409, [True])
+
+
+def test_a_stop_interrupts_the_run_and_nothing_after_it(tmp_path: Path) -> None:
+    control = Control(may_answer=False)
+    with server(tmp_path, control) as asking:
+        with pytest.raises(KeyboardInterrupt, match=STOPPED), control.stoppable():
+            threading.Thread(target=asking, args=("POST", "/stop")).start()
+            threading.Event().wait(30)
+        assert asking("POST", "/stop")[0] == 409

@@ -1,0 +1,90 @@
+"""A real browser, Debian's chromium, driven by Selenium; its pictures are kept in build/page."""
+
+import json
+import os
+import shutil
+from collections.abc import Iterator
+from contextlib import contextmanager
+from pathlib import Path
+from typing import Any
+from urllib.parse import urlsplit
+
+import pytest
+from selenium.webdriver import Chrome, ChromeOptions
+from selenium.webdriver.chrome.service import Service
+
+from support.paths import ROOT
+
+PICTURES = ROOT / "build" / "page"
+CHROMIUM, DRIVER = shutil.which("chromium"), shutil.which("chromedriver")
+TABLET = (1280, 800)
+
+# A machine without the browser may skip these tests; CI may not.
+needs_browser = pytest.mark.skipif(
+    not (CHROMIUM and DRIVER) and os.environ.get("CI") != "true", reason="needs chromium and chromium-driver"
+)
+
+
+@contextmanager
+def browser(size: tuple[int, int] = TABLET, *, dark: bool = False) -> Iterator[Chrome]:
+    """A window of that size. It remembers what its console says and which addresses it asked."""
+    options = ChromeOptions()
+    options.binary_location = CHROMIUM or ""
+    for argument in (
+        "--headless=new",
+        "--no-sandbox",
+        "--disable-dev-shm-usage",
+        "--disable-gpu",
+        "--disable-background-networking",
+        "--disable-component-update",
+        "--disable-sync",
+        "--no-first-run",
+        "--hide-scrollbars",
+        f"--window-size={size[0]},{size[1]}",
+        *(["--force-dark-mode"] if dark else []),
+    ):
+        options.add_argument(argument)
+    options.set_capability("goog:loggingPrefs", {"browser": "ALL", "performance": "ALL"})
+    driver = Chrome(options=options, service=Service(DRIVER))
+    try:
+        set_theme(driver, dark=dark)
+        yield driver
+    finally:
+        driver.quit()
+
+
+def set_theme(driver: Chrome, *, dark: bool) -> None:
+    """What the system is said to prefer."""
+    wish = [{"name": "prefers-color-scheme", "value": "dark" if dark else "light"}]
+    driver.execute_cdp_cmd("Emulation.setEmulatedMedia", {"features": wish})
+
+
+def picture(driver: Chrome, name: str, *, whole: bool = False) -> Path:
+    """What the window shows, or the `whole` page, as build/page/NAME.png."""
+    PICTURES.mkdir(parents=True, exist_ok=True)
+    path = PICTURES / f"{name}.png"
+    if not whole:
+        driver.save_screenshot(str(path))
+        return path
+    width, height = driver.execute_script("return [innerWidth, document.documentElement.scrollHeight]")
+    metrics = {"width": width, "height": height, "deviceScaleFactor": 1, "mobile": False}
+    driver.execute_cdp_cmd("Emulation.setDeviceMetricsOverride", metrics)
+    driver.save_screenshot(str(path))
+    driver.execute_cdp_cmd("Emulation.clearDeviceMetricsOverride", {})
+    return path
+
+
+def severe(driver: Chrome) -> list[str]:
+    """What the console holds of errors since it was asked last."""
+    entries: list[dict[str, Any]] = driver.get_log("browser")  # type: ignore[no-untyped-call]
+    return [entry["message"] for entry in entries if entry["level"] == "SEVERE"]
+
+
+def asked_hosts(driver: Chrome) -> set[str]:
+    """The hosts of every address the browser has asked for since it was asked last."""
+    hosts = set()
+    for entry in driver.get_log("performance"):  # type: ignore[no-untyped-call]
+        message = json.loads(entry["message"])["message"]
+        if message["method"] == "Network.requestWillBeSent":
+            hosts.add(urlsplit(message["params"]["request"]["url"]).hostname or "")
+    return hosts
