@@ -80,14 +80,21 @@ def _add_place(parser: argparse.ArgumentParser) -> None:
 
 
 def wish(options: argparse.Namespace) -> PageWish | None:
-    """What the arguments ask for, None for no page. Raises Refused `page_address` for what goes with a page alone."""
+    """What the arguments ask for, None for no page.
+
+    Raises Refused `page_address` for a place that will not do, and for what goes with a page alone.
+    """
     wanted = getattr(options, "page", True)
     may_answer = getattr(options, "confirm_on_page", False)
     if not wanted:
         if may_answer or options.page_address or options.page_token:
             raise Refused("page_address", "there is no page to say that of", "Give --page as well")
         return None
-    return PageWish(options.page_address, options.page_token, may_answer)
+    from rig.page.serving import check
+
+    made = PageWish(options.page_address, options.page_token, may_answer)
+    check(made.address())  # before there is a run folder
+    return made
 
 
 @contextmanager
@@ -111,7 +118,12 @@ def operators_page(wanted: PageWish | None, folder: Path, about: "Callable[[], A
         lookout = stack.enter_context(looking_out(folder, feed))
         print(f"page: {url}", file=sys.stderr, flush=True)
         stack.enter_context(control.stoppable())
-        yield OperatorsPage((feed, lookout), control.ask if wanted.may_answer else None, stay_for_the_operator)
+
+        def asked(announcement: Sequence[str], to_do: str) -> bool:
+            print(f"The operator is asked on the page, whether to {to_do}.", file=sys.stderr, flush=True)
+            return control.ask(announcement, to_do)
+
+        yield OperatorsPage((feed, lookout), asked if wanted.may_answer else None, stay_for_the_operator)
 
 
 def stay_for_the_operator() -> None:

@@ -52,7 +52,9 @@ def application(broadcast: Broadcast, control: Control, door: Door, folder: Path
         return FileResponse(path, headers={"content-security-policy": CERTIFICATE_POLICY}, media_type="text/html")
 
     async def stop(request: Request) -> Response:
-        return Response(status_code=202) if control.stop() else PlainTextResponse("nothing to stop\n", 409)
+        if broadcast.over or not control.stop():
+            return PlainTextResponse("nothing to stop\n", 409)
+        return Response(status_code=202)
 
     async def answer(request: Request) -> Response:
         said = await _answer(request)

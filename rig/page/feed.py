@@ -108,6 +108,11 @@ class Broadcast:
         return len(self._mailboxes) >= CLIENTS
 
     @property
+    def over(self) -> bool:
+        """Whether the run is over."""
+        return self._feed.ended
+
+    @property
     def deserted(self) -> bool:
         """Whether nobody looks."""
         return not self._mailboxes

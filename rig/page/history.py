@@ -7,6 +7,7 @@ from typing import Any
 
 SPAN_S = 60.0
 STEP_S = 0.1  # between two points, in the controller's time
+SOON_S = 0.95 * STEP_S  # what is rounded is not early
 POINTS = round(SPAN_S / STEP_S)
 
 Values = Mapping[str, tuple[float, ...]]  # by the name of a line, such as "gyro.rate"
@@ -30,7 +31,7 @@ class History:
             since_s = time_s - self._points[-1][0]
             if since_s < 0:
                 self.clear()
-            elif since_s < STEP_S:
+            elif since_s < SOON_S:
                 return
         if len(self._points) == POINTS:
             self.first += 1

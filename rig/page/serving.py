@@ -47,7 +47,7 @@ def serving(feed: Feed, control: Control, folder: Path, address: Address) -> Ite
 
     from rig.page.application import application
 
-    _check(address)
+    check(address)
     listening = _bound(address)
     port = listening.getsockname()[1]
     host = f"[{address.host}]" if ":" in address.host else address.host
@@ -86,7 +86,8 @@ def serving(feed: Feed, control: Control, folder: Path, address: Address) -> Ite
         listening.close()
 
 
-def _check(address: Address) -> None:
+def check(address: Address) -> None:
+    """Raises Refused `page_address` for one that will not do, whatever is free here."""
     if address.host in ("", "0.0.0.0", "::", "*"):
         raise Refused(
             "page_address",

@@ -11,6 +11,7 @@ from urllib.parse import urlsplit
 
 import pytest
 
+from rig.commands.page_arguments import PageWish
 from rig.errors import Refused
 from rig.page.control import STOPPED, Control
 from rig.page.feed import Feed
@@ -156,3 +157,23 @@ def test_a_stop_interrupts_the_run_and_nothing_after_it(tmp_path: Path) -> None:
             threading.Thread(target=asking, args=("POST", "/stop")).start()
             threading.Event().wait(30)
         assert asking("POST", "/stop")[0] == 409
+
+
+@pytest.mark.parametrize(
+    ("place", "host", "port"),
+    [
+        (None, "127.0.0.1", None),
+        ("192.0.2.1", "192.0.2.1", None),
+        ("192.0.2.1:80", "192.0.2.1", 80),
+        ("[::1]:8000", "::1", 8000),
+        ("::1", "::1", None),
+    ],
+)
+def test_where_the_page_is_wanted(place: str | None, host: str, port: int | None) -> None:
+    assert PageWish(place).address() == Address(host, port)
+
+
+@pytest.mark.parametrize("place", ["127.0.0.1:x", "127.0.0.1:99999", "127.0.0.1:-1"])
+def test_a_port_that_is_none_is_refused(place: str) -> None:
+    with pytest.raises(Refused, match="page_address"):
+        PageWish(place).address()

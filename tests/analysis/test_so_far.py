@@ -1,0 +1,54 @@
+"""What is told of a run that goes on is what the recording holds by then, and the result's own once it is whole."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from rig.analysis.so_far import so_far
+from rig.data.events import SweepFinished
+from rig.data.run_file import RunData
+from rig.errors import Fault
+from rig.estimation.vector_model import VectorSolution
+from rig.observation.observe import Observation
+from support.synthetic_run import BIAS_RAD_S, SCALE, Setup, synthetic_run
+
+
+@pytest.fixture(scope="module")
+def run() -> RunData:
+    return synthetic_run(Setup(noise_rad_s=0.005))
+
+
+def until(run: RunData, sweeps: int) -> RunData:
+    """The recording as it was when so many sweeps were done."""
+    ends = [place for place, each in enumerate(run.events) if isinstance(each.event, SweepFinished)]
+    return replace(run, events=run.events[: ends[sweeps - 1] + 1])
+
+
+def test_parameters_come_when_the_sweeps_tell_them(run: RunData) -> None:
+    for sweeps in range(1, 7):
+        found = so_far([until(run, sweeps)])["gyro"]
+        assert sorted(found.sweeps) == list(range(sweeps))
+        assert all(isinstance(each, Observation) for each in found.sweeps.values())
+        assert isinstance(found.solution, VectorSolution) == (sweeps >= 5)
+        if sweeps >= 2:  # with a rest before it
+            assert found.bias_rad_s is not None
+            bias, std = found.bias_rad_s
+            assert np.all(np.abs(bias - BIAS_RAD_S) < 5 * std)
+    assert isinstance(found.solution, VectorSolution)
+    assert np.allclose(found.solution.scale, SCALE, rtol=1e-3)
+
+
+def test_a_refused_sweep_says_why_and_the_others_count(run: RunData) -> None:
+    samples = run.samples["gyro"].copy()
+    middle = len(samples) // 2
+    samples["counts"][middle : middle + 40] = run.sensors["gyro"].full_scale_counts
+    found = so_far([replace(run, samples={"gyro": samples})])["gyro"]
+    refused = [each for each in found.sweeps.values() if isinstance(each, Fault)]
+    assert [fault.name for fault in refused] == ["saturation"] and len(found.sweeps) == 6
+    assert isinstance(found.solution, VectorSolution)
+
+
+def test_nothing_is_told_of_a_recording_that_has_only_begun(run: RunData) -> None:
+    assert so_far([replace(run, arm=run.arm[:2], events=())]) == {}
+    assert so_far([replace(run, events=())])["gyro"].sweeps == {}

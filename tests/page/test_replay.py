@@ -1,0 +1,64 @@
+"""A recording, replayed: the steps, the arm and the samples as they were, in the controller's time."""
+
+from dataclasses import replace
+from itertools import pairwise
+
+import numpy as np
+import pytest
+
+from rig.data.run_file import RunData
+from rig.page.replay import Moment, moments
+from rig.page.rows import Look
+from rig.page.shown import About, Shown
+from rig.station.events import ArmSeen, PhaseStarted, Progress, SamplesTaken, StepFinished, StepStarted
+from support.synthetic_run import Setup, synthetic_run
+
+
+@pytest.fixture(scope="module")
+def run() -> RunData:
+    """With samples that came while the arm moved."""
+    made = synthetic_run(Setup(noise_rad_s=0.005, speed_deg_s=120))
+    samples, arm = made.samples["gyro"].copy(), made.arm
+    samples["sequence"] = np.arange(len(samples))
+    samples["host_time_s"] = np.linspace(arm["host_time_s"][0], arm["host_time_s"][-1], len(samples))
+    return replace(made, samples={"gyro": samples})
+
+
+@pytest.fixture(scope="module")
+def replayed(run: RunData) -> list[Moment]:
+    return list(moments(run))
+
+
+def test_steps_come_in_order_and_time_goes_on(replayed: list[Moment]) -> None:
+    assert isinstance(replayed[0].event, PhaseStarted)
+    assert all(one.at_s <= other.at_s for one, other in pairwise(replayed))
+    started = [moment.event for moment in replayed if isinstance(moment.event, StepStarted)]
+    finished = [moment.event for moment in replayed if isinstance(moment.event, StepFinished)]
+    assert [event.number for event in started] == [event.number for event in finished]
+    assert [event.number for event in started] == list(range(1, started[0].count + 1))
+    progress = [moment.event for moment in replayed if isinstance(moment.event, Progress)]
+    assert all(0 <= each.fraction <= 1 and each.remaining_s >= 0 for each in progress)
+    assert progress[-1].remaining_s < 0.2
+
+
+def test_the_arm_and_the_samples_are_those_of_that_moment(run: RunData, replayed: list[Moment]) -> None:
+    seen = [moment for moment in replayed if isinstance(moment.event, ArmSeen)]
+    for moment in seen[:: len(seen) // 20]:
+        assert isinstance(moment.event, ArmSeen)
+        at_s = moment.event.state.time_s - run.arm["time_s"][0]
+        assert abs(at_s - moment.at_s) < 0.05
+        place = np.searchsorted(run.arm["time_s"], moment.event.state.time_s)
+        assert moment.event.state.q_rad == tuple(run.arm["q_rad"][place])
+    last = [moment.event for moment in replayed if isinstance(moment.event, SamplesTaken)][-1]
+    assert last.sensors[0].samples == len(run.samples["gyro"]) and last.sensors[0].lost == 0
+
+
+def test_what_is_shown_at_the_end_is_all_of_it(replayed: list[Moment]) -> None:
+    shown = Shown(About("", "", replayed=True))
+    for moment in replayed:
+        if isinstance(moment.event, Look):
+            shown.look(moment.event)
+        else:
+            shown.take(moment.event)
+    assert [(row["sweep"], row["by"]) for row in shown.sections["observations"]] == [(n, "host") for n in range(6)]
+    assert shown.sections["parameters"][0]["scale"][0] == pytest.approx(1.1771, rel=1e-3)
