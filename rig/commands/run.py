@@ -95,13 +95,12 @@ def _about(folder: Path, found: Configured, page: PageWish | None) -> "About":
     from rig.page.shown import About
 
     config = found.loaded.config
+    parts = {name: f"{each.part} {each.serial_number}" for name, each in config.sensors.items()}
+    parts |= {name: f"{each.part} {each.serial_number}" for name, each in config.magnetometers.items()}
     return About(
         folder=str(folder),
         procedure=config.procedure.name,
         may_answer=page is not None and page.may_answer,
-        parts={
-            name: f"{each.part} {each.serial_number}"
-            for name, each in {**config.sensors, **config.magnetometers}.items()
-        },
+        parts=parts,
         simulated=found.loaded.simulated,
     )

@@ -47,11 +47,10 @@ def watch(folder: Path, wanted: PageWish, speed: float) -> int:
 
 
 def _about(folder: Path, runs: list[RunData]) -> About:
-    parts = {
-        name: f"{sensor.part} {sensor.serial_number}"
-        for run in runs
-        for name, sensor in [*run.sensors.items(), *run.magnetometers.items()]
-    }
+    parts: dict[str, str] = {}
+    for run in runs:
+        parts |= {name: f"{each.part} {each.serial_number}" for name, each in run.sensors.items()}
+        parts |= {name: f"{each.part} {each.serial_number}" for name, each in run.magnetometers.items()}
     simulated = runs[0].provenance.arm_software.endswith("(simulated)")
     return About(str(folder), runs[0].settings.procedure, replayed=True, parts=parts, simulated=simulated)
 

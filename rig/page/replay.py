@@ -59,7 +59,8 @@ def moments(run: RunData) -> Iterator[Moment]:
     began_s, ended_s = float(times_s[0]), float(times_s[-1])
     steps = _steps(run, ended_s)
     plan = Plan(tuple(each.step for each in steps), tuple(run.arm["q_rad"][0].tolist()), run.settings.home_q_rad)
-    modes: dict[str, str] = {name: sensor.mode for name, sensor in [*run.sensors.items(), *run.magnetometers.items()]}
+    modes: dict[str, str] = {name: sensor.mode for name, sensor in run.sensors.items()}
+    modes |= {name: sensor.mode for name, sensor in run.magnetometers.items()}
     yield Moment(0.0, PhaseStarted(run.settings.procedure, plan, modes))
     samples = {name: _Samples(run, name) for name in (*run.sensors, *run.magnetometers)}
 

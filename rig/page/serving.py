@@ -82,8 +82,7 @@ def serving(feed: Feed, control: Control, folder: Path, address: Address) -> Ite
         yield f"http://{host}:{port}/#{token}"
     finally:
         over.set()
-        thread.join(ENDING_S)
-        listening.close()
+        thread.join(ENDING_S)  # which closes what it listened at; one that is starved ends with the process
 
 
 def check(address: Address) -> None:

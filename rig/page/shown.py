@@ -190,7 +190,8 @@ class Shown:
         self.put("state", {"kind": kind, "text": text})
 
     def _samples(self, sensors: tuple[SensorSamples, ...]) -> None:
-        rows, values = [], {}
+        rows: list[dict[str, Any]] = []
+        values: dict[str, tuple[float, ...]] = {}
         for sensor in sensors:
             row: dict[str, Any] = {
                 "name": sensor.sensor,

@@ -136,7 +136,8 @@ def test_a_page_that_may_not_answer_does_not(tmp_path: Path) -> None:
 
 
 def test_an_answer_counts_once_and_for_the_question_that_is_asked(tmp_path: Path) -> None:
-    control, answers = Control(may_answer=True), []
+    control = Control(may_answer=True)
+    answers: list[bool] = []
     feed = Feed(Shown(About("", "")))
     asked = threading.Thread(target=lambda: answers.append(control.ask((), "start")))
     with server(tmp_path, control, feed) as asking:

@@ -57,7 +57,7 @@ def text(driver: Chrome, element: str) -> str:
     return driver.find_element(By.ID, element).text
 
 
-def until(true: Callable[[], Any], what: str, within_s: float = 60.0) -> Any:
+def until(true: Callable[[], Any], what: str, within_s: float = 120.0) -> Any:
     deadline_s = time.monotonic() + within_s
     while not (found := true()):
         assert time.monotonic() < deadline_s, f"never: {what}"
