@@ -11,11 +11,11 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 from rig.errors import Refused
-from rig.station.station import Listener
 
 if TYPE_CHECKING:
     from rig.page.serving import Address
     from rig.page.shown import About
+    from rig.station.station import Listener
 
 Answer = Callable[[Sequence[str], str], bool]
 
@@ -44,7 +44,7 @@ class PageWish:
 class OperatorsPage:
     """What a run needs of its page: who listens, who answers instead of the terminal, and how to wait at the end."""
 
-    listeners: tuple[Listener, ...] = ()
+    listeners: "tuple[Listener, ...]" = ()
     answer: Answer | None = None
     stay: Callable[[], None] = lambda: None
 
