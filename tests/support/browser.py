@@ -69,8 +69,10 @@ def picture(driver: Chrome, name: str, *, whole: bool = False) -> Path:
     width, height = driver.execute_script("return [innerWidth, document.documentElement.scrollHeight]")
     metrics = {"width": width, "height": height, "deviceScaleFactor": 1, "mobile": False}
     driver.execute_cdp_cmd("Emulation.setDeviceMetricsOverride", metrics)
-    driver.save_screenshot(str(path))
-    driver.execute_cdp_cmd("Emulation.clearDeviceMetricsOverride", {})
+    try:
+        driver.save_screenshot(str(path))
+    finally:
+        driver.execute_cdp_cmd("Emulation.clearDeviceMetricsOverride", {})
     return path
 
 
@@ -86,5 +88,7 @@ def asked_hosts(driver: Chrome) -> set[str]:
     for entry in driver.get_log("performance"):  # type: ignore[no-untyped-call]
         message = json.loads(entry["message"])["message"]
         if message["method"] == "Network.requestWillBeSent":
-            hosts.add(urlsplit(message["params"]["request"]["url"]).hostname or "")
+            address = urlsplit(message["params"]["request"]["url"])
+            if address.scheme in ("http", "https", "ws", "wss"):  # chrome: and data: leave no wire
+                hosts.add(address.hostname or "")
     return hosts
