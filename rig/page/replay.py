@@ -68,7 +68,7 @@ def moments(run: RunData) -> Iterator[Moment]:
         return tuple(each.until(host_time_s) for each in samples.values())
 
     happened = sorted(_happened(run, steps), key=lambda moment: moment[0])
-    for time_s in np.arange(began_s, ended_s + FRAME_S, FRAME_S).tolist():
+    for time_s in [*np.arange(began_s, ended_s, FRAME_S).tolist(), ended_s]:
         while happened and happened[0][0] <= time_s:
             _, event = happened.pop(0)
             yield Moment(time_s - began_s, event)
