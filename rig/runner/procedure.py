@@ -274,7 +274,7 @@ class Rig:
         # A script may make steps of its own, one that takes no time too.
         fraction = within_s / step.duration_s if step.duration_s > 0 else 1.0
         self.recording.station.event(SamplesTaken(self.devices.acquisition.samples()))
-        self.recording.station.event(ArmSeen(state, self.devices.arm.missed_states))
+        self.recording.station.event(ArmSeen(state, self.devices.turner.missed_states))
         self.recording.station.event(
             Progress(
                 number=self._number,
