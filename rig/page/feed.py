@@ -8,7 +8,7 @@ by then gets none; once it reads again, it gets everything at once as it is by t
 import asyncio
 import json
 import threading
-from collections.abc import AsyncIterator
+from collections.abc import AsyncGenerator
 from typing import Any
 
 from rig.page.rows import Look
@@ -145,7 +145,7 @@ class Broadcast:
         while self._mailboxes and asyncio.get_running_loop().time() < deadline_s:
             await asyncio.sleep(FRAME_S / 4)
 
-    async def frames(self) -> AsyncIterator[bytes]:
+    async def frames(self) -> AsyncGenerator[bytes, None]:
         """For one browser: everything, then what changes."""
         mailbox = Mailbox()
         self._mailboxes.add(mailbox)

@@ -151,8 +151,8 @@ def _progress(done: _Done, count: int, state: ArmState, *, time_s: float, began_
 
 
 def _state(row: Any) -> ArmState:
-    values = {name: row[name].tolist() for name in ARM_STATE_DTYPE.names or ()}
-    return ArmState(**{name: tuple(value) if isinstance(value, list) else value for name, value in values.items()})
+    values: dict[str, Any] = {name: row[name].tolist() for name in ARM_STATE_DTYPE.names or ()}
+    return ArmState(**{**values, "q_rad": tuple(values["q_rad"]), "qd_rad_s": tuple(values["qd_rad_s"])})
 
 
 class _Samples:

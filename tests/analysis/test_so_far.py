@@ -10,7 +10,10 @@ from rig.data.events import SweepFinished
 from rig.data.run_file import RunData
 from rig.errors import Fault
 from rig.estimation.vector_model import VectorSolution
+from rig.observation.average import on_the_arms_clock
 from rig.observation.observe import Observation
+from rig.observation.timebase import ArmMotion
+from rig.observation.windows import swept
 from support.synthetic_run import BIAS_RAD_S, SCALE, Setup, synthetic_run
 
 
@@ -41,8 +44,9 @@ def test_parameters_come_when_the_sweeps_tell_them(run: RunData) -> None:
 
 def test_a_refused_sweep_says_why_and_the_others_count(run: RunData) -> None:
     samples = run.samples["gyro"].copy()
-    middle = len(samples) // 2
-    samples["counts"][middle : middle + 40] = run.sensors["gyro"].full_scale_counts
+    third = list(swept(run))[2].window
+    times_s = on_the_arms_clock(samples, run.sensors["gyro"], ArmMotion(run.arm, run.provenance.kinematics)).time_s
+    samples["counts"][np.searchsorted(times_s, (third.start_s + third.end_s) / 2), 0] = 32767
     found = so_far([replace(run, samples={"gyro": samples})])["gyro"]
     refused = [each for each in found.sweeps.values() if isinstance(each, Fault)]
     assert [fault.name for fault in refused] == ["saturation"] and len(found.sweeps) == 6

@@ -156,10 +156,12 @@ def page(tmp_path: Path) -> Iterator[Callable[..., tuple["subprocess.Popen[str]"
 
     def start(*arguments: str | Path) -> tuple["subprocess.Popen[str]", str]:
         command = [sys.executable, "-m", "rig", *map(str, arguments), "--page-address", "127.0.0.1:0"]
-        errors = (tmp_path / f"stderr-{len(running)}").open("w+", encoding="utf-8")
-        process = subprocess.Popen(command, stdin=subprocess.DEVNULL, stdout=subprocess.PIPE, stderr=errors, text=True)
+        told = tmp_path / f"stderr-{len(running)}"
+        with told.open("w", encoding="utf-8") as errors:
+            process = subprocess.Popen(
+                command, stdin=subprocess.DEVNULL, stdout=subprocess.PIPE, stderr=errors, text=True
+            )
         running.append(process)
-        told = Path(errors.name)
         found = until(lambda: re.search(r"^page: (\S+)$", told.read_text(encoding="utf-8"), re.M), "the address")
         return process, found[1]
 

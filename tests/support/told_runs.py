@@ -6,7 +6,7 @@ from pathlib import Path
 
 from firmware_host.answers import BoardObservation
 from rig.analysis.verdict import Check
-from rig.arm.motion import Plan, Sweep, travel
+from rig.arm.motion import Plan, Sweep, Transfer, travel
 from rig.arm.state import ArmReport, ArmState, Joints, RobotMode, RuntimeState, SafetyMode
 from rig.commands.configured import configured
 from rig.data.events import BoardNotObserved, BoardObserved
@@ -71,7 +71,7 @@ def moving(plan: Plan, until_s: float, step_s: float = STEP_S) -> Iterator[RunEv
     time_s, done_s, q = 0.0, 0.0, plan.start_q_rad
     for number, step in enumerate(plan.steps, 1):
         yield StepStarted(number, len(plan.steps), step)
-        way = travel(step.start_q_rad, step.target_q_rad) if hasattr(step, "target_q_rad") else (0.0,) * 6
+        way = travel(step.start_q_rad, step.target_q_rad) if isinstance(step, Sweep | Transfer) else (0.0,) * 6
         from_q = getattr(step, "start_q_rad", q)
         began_s = time_s
         while time_s < began_s + step.duration_s:
