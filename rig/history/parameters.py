@@ -15,6 +15,7 @@ from rig.data.accelerometer_entries import AccelerometerEntry
 from rig.data.magnetometer_entries import MagnetometerEntry
 from rig.data.result_file import ResultDocument, SensorEntry, VectorEntry
 from rig.data.result_types import ErrorEntry
+from rig.estimation.arrays import Array
 
 Quantity = Literal["rate", "acceleration", "field"]
 COVERAGE_FACTOR = 2.0
@@ -162,7 +163,7 @@ def _scale_and_bias(
 ) -> Iterator[Parameter]:
     """Of the six parameters, and the mean scale factor with the scale factors' covariance."""
     mean = np.array([1 / 3, 1 / 3, 1 / 3, 0, 0, 0])
-    rows = [("k", mean, "1", None)]
+    rows: list[tuple[str, Array, str, float | None]] = [("k", mean, "1", None)]
     rows += [(f"k{axis}", np.eye(6)[i], "1", limits[0]) for i, axis in enumerate("xyz")]
     rows += [(f"b{axis}", np.eye(6)[3 + i], BIAS_UNITS[quantity], limits[1]) for i, axis in enumerate("xyz")]
     for name, row, unit, limit in rows:
@@ -176,7 +177,7 @@ def _scale_and_bias(
         )
 
 
-def _std(row: np.ndarray, covariance: Sequence[Sequence[float]]) -> float:
+def _std(row: Array, covariance: Sequence[Sequence[float]]) -> float:
     return float(np.sqrt(row @ np.array(covariance) @ row))
 
 

@@ -2,7 +2,6 @@
 
 import multiprocessing
 from collections.abc import Iterator
-from dataclasses import replace
 from pathlib import Path
 
 import pytest
@@ -11,25 +10,11 @@ from sqlalchemy import delete, text
 from rig.history import schema
 from rig.history.engine import WRITES
 from rig.history.store import open_history
-from support.past_runs import finished
+from support.past_runs import enter_many, finished
 from support.postgres import postgresql
 
 PROCESSES, ENTRIES = 8, 250
 pytestmark = pytest.mark.slow
-
-
-def enter(url: str, worker: int, entries: int) -> int:
-    """How many were new. Its runs are changed texts of one: to make them must not take longer than to enter them."""
-    first = finished(worker)
-    began = first.document.provenance.started_utc
-    new = 0
-    with open_history(url) as history:
-        for i in range(entries):
-            started = f"{began[:11]}{i // 60 + 8:02}:{i % 60:02}:00+00:00"
-            provenance = first.document.provenance.model_copy(update={"started_utc": started})
-            document = first.document.model_copy(update={"provenance": provenance})
-            new += history.enter(replace(first, text=first.text.replace(began, started), document=document)).new
-    return new
 
 
 @pytest.fixture(params=["sqlite", "postgresql"])
@@ -44,11 +29,11 @@ def url(request: pytest.FixtureRequest, tmp_path: Path) -> Iterator[str]:
 def test_of_what_eight_processes_enter_nothing_is_lost_and_nothing_stands_twice(url: str) -> None:
     """The tables are made by whoever comes first."""
     context = multiprocessing.get_context("forkserver")
-    context.set_forkserver_preload(["rig.history.store", "support.past_runs"])
+    context.set_forkserver_preload(["support.past_runs"])
     with context.Pool(PROCESSES) as pool:
-        new = pool.starmap(enter, [(url, worker, ENTRIES) for worker in range(PROCESSES)])
+        new = pool.starmap(enter_many, [(url, worker, ENTRIES) for worker in range(PROCESSES)])
         assert new == [ENTRIES] * PROCESSES
-        again = pool.starmap(enter, [(url, worker % 2, 20) for worker in range(PROCESSES)])
+        again = pool.starmap(enter_many, [(url, worker % 2, 20) for worker in range(PROCESSES)])
         assert again == [0] * PROCESSES
     with open_history(url) as history:
         with history.engine.connect() as connection:

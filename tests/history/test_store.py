@@ -17,7 +17,7 @@ from rig.history.engine import engine_of
 from rig.history.finished import content_sha256, finished_run
 from rig.history.parameters import calibrated
 from rig.history.place import chosen_place, place
-from rig.history.series import changes, effects, rig_states, subjects, trends
+from rig.history.series import Trend, changes, effects, rig_states, subjects, trends
 from rig.history.store import History, Selection, open_history
 from support.past_runs import FIRST, finished
 from support.paths import DEMO, FIXTURES, ROOT
@@ -109,7 +109,7 @@ def test_calibrations_are_found_by_sensor_day_and_rig(history: History) -> None:
     assert days(Selection(part="kvh1775")) == []
 
 
-def first_trends(history: History, selection: Selection) -> list:
+def first_trends(history: History, selection: Selection) -> list[Trend]:
     return [next(iter(trends([past]).values())) for past in history.calibrations(selection)]
 
 
