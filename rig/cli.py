@@ -24,6 +24,7 @@ if "numpy" not in sys.modules:
     for _library in ("OPENBLAS", "OMP", "MKL"):
         os.environ.setdefault(f"{_library}_NUM_THREADS", "1")
 
+_HISTORY = "what the laboratory remembers: calibrations, trends, check standards"
 _KVH = "look at a KVH 1775"
 _BOARD = "look at the board, read and change its stored calibrations, flash its firmware"
 FAULT, INTERRUPTED = Fault.exit_status, 130
@@ -137,9 +138,16 @@ def _parser() -> argparse.ArgumentParser:
         metavar=("CELSIUS", "DRIFT_RUN"),
         help="biases as they are at that temperature, by the slopes a run of bias_drift has found",
     )
-    text = "what the laboratory remembers: calibrations, trends, check standards"
-    history_arguments.add_arguments(commands.add_parser("history", help=text, description=text))
-    study = add("study", _study, "Monte-Carlo studies of the papers' figures and tables; without a name, list them")
+    history_arguments.add_arguments(commands.add_parser("history", help=_HISTORY, description=_HISTORY))
+    _add_study(add("study", _study, "Monte-Carlo studies of the papers' figures and tables; without a name, list them"))
+    _add_board(commands.add_parser("board", help=_BOARD, description=_BOARD))
+    _add_kvh(commands.add_parser("kvh", help=_KVH, description=_KVH))
+    world = add("world", _world, "only the simulated laboratory, in the foreground, for any client")
+    _add_config(world)
+    return parser
+
+
+def _add_study(study: argparse.ArgumentParser) -> None:
     study.add_argument("name", nargs="?", metavar="NAME")
     study.add_argument("--out", type=Path, default=Path("studies"), metavar="DIR", help="default: studies")
     study.add_argument("--seed", type=int, default=1, metavar="N", help="default: 1")
@@ -147,11 +155,6 @@ def _parser() -> argparse.ArgumentParser:
     study.add_argument("--jobs", type=int, metavar="N", help="processes; the results do not depend on it")
     study.add_argument("--dask", metavar="ADDRESS", help="compute on the cluster of this Dask scheduler")
     study.add_argument("--format", choices=("csv", "parquet"), default="csv", help="of the table (default: csv)")
-    _add_board(commands.add_parser("board", help=_BOARD, description=_BOARD))
-    _add_kvh(commands.add_parser("kvh", help=_KVH, description=_KVH))
-    world = add("world", _world, "only the simulated laboratory, in the foreground, for any client")
-    _add_config(world)
-    return parser
 
 
 def _add_board(board: argparse.ArgumentParser) -> None:

@@ -47,15 +47,16 @@ def draw_trends(found: Mapping[Subject, Mapping[str, Trend]], folder: Path) -> l
 
 
 def _draw_values(axes: "Axes", trend: Trend) -> None:
+    times = np.array(trend.times)
     expanded = [each.expanded for each in trend.parameters]
-    axes.errorbar(trend.times, trend.values, yerr=expanded, fmt="o", ms=3, lw=0.8, capsize=2, color="C0")
+    axes.errorbar(times, trend.values, yerr=expanded, fmt="o", ms=3, lw=0.8, capsize=2, color="C0")
     axes.set_title(f"{trend.name}   {trend.unit}", loc="left")
     if trend.line is not None:
         rows = np.stack([np.ones(trend.count), trend.days], axis=1)
         value, std = trend.line.at(rows)
         reach = trend.line.coverage_factor * std
-        axes.plot(trend.times, value, color="C3", lw=1)
-        axes.fill_between(trend.times, value - reach, value + reach, color="C3", alpha=0.15, lw=0)
+        axes.plot(times, value, color="C3", lw=1)
+        axes.fill_between(times, value - reach, value + reach, color="C3", alpha=0.15, lw=0)
 
 
 def _draw_chart(axes: "Axes", trend: Trend) -> None:
@@ -63,14 +64,13 @@ def _draw_chart(axes: "Axes", trend: Trend) -> None:
     if trend.chart is None:
         axes.text(0.5, 0.5, "too few calibrations", ha="center", transform=axes.transAxes)
         return
-    chart = trend.chart
-    axes.plot(trend.times, chart.deviation, ".", ms=4, color="C0", label="each")
-    axes.plot(trend.times, chart.ewma, color="C1", lw=1.2, label="EWMA")
+    chart, times = trend.chart, np.array(trend.times)
+    axes.plot(times, chart.deviation, ".", ms=4, color="C0", label="each")
+    axes.plot(times, chart.ewma, color="C1", lw=1.2, label="EWMA")
     for sign in (1, -1):
-        axes.plot(trend.times, sign * chart.limit, color="C1", lw=0.8, ls="--")
+        axes.plot(times, sign * chart.limit, color="C1", lw=0.8, ls="--")
         axes.axhline(sign * SHEWHART_LIMIT, color="C0", lw=0.8, ls="--")
     alarms = chart.alarm
     if alarms.any():
-        times = np.array(trend.times)[alarms]
-        axes.plot(times, chart.deviation[alarms], "o", ms=8, mfc="none", color="C3", label="alarm")
+        axes.plot(times[alarms], chart.deviation[alarms], "o", ms=8, mfc="none", color="C3", label="alarm")
     axes.legend(frameon=False, fontsize=7, ncols=3, loc="lower left")

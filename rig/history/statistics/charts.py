@@ -9,9 +9,12 @@ independent and normal from the first on, and false alarms are as rare as design
 from dataclasses import dataclass
 
 import numpy as np
+from numpy.typing import NDArray
 from scipy import special
 
 from rig.estimation.arrays import Array
+
+Alarms = NDArray[np.bool_]
 
 FEWEST = 5  # results before which nothing is judged: of the spread of fewer, little is known
 SMOOTHING = 0.15  # λ: weight of the newest deviation
@@ -31,12 +34,12 @@ class Chart:
     deviation: Array
     ewma: Array
     limit: Array
-    alarm: Array
+    alarm: Alarms
 
     @property
-    def out_of_control(self) -> Array:
+    def out_of_control(self) -> Alarms:
         """(…) whether the newest result raised an alarm."""
-        newest: Array = self.alarm[..., -1]
+        newest: Alarms = self.alarm[..., -1]
         return newest
 
 
@@ -75,12 +78,12 @@ def step(average: Array, deviation: Array, before: int) -> tuple[Array, float]:
     return smoothed, EWMA_LIMIT * float(np.sqrt(SMOOTHING / (2 - SMOOTHING) * settled))
 
 
-def beyond(deviation: Array, average: Array, limit: float | Array) -> Array:
+def beyond(deviation: Array, average: Array, limit: float | Array) -> Alarms:
     """Whether one of the two charts raises an alarm."""
     return (np.abs(deviation) > SHEWHART_LIMIT) | (np.abs(average) > limit)
 
 
-def _deviation(values: Array, std: Array, counted: Array) -> Array:
+def _deviation(values: Array, std: Array, counted: Alarms) -> Array:
     """(…) of the last result from those `counted` (…, i) before it, as the normal deviate of the same probability.
 
     With equal stds it is (x − x̄)/(s √(1 + 1/n)) whatever they are; else weights hold the variance between runs as well

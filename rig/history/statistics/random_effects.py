@@ -70,5 +70,5 @@ def fit(design: Array, values: Array, std: Array) -> Fitted:
 
 def _solve(design: Array, values: Array, weights: Array) -> Array:
     root = np.sqrt(weights)
-    found: Array = np.linalg.lstsq(design * root[:, None], values * root, rcond=None)[0]
-    return found
+    found = np.linalg.lstsq(design * root[:, None], values * root, rcond=None)[0]
+    return np.asarray(found, dtype=np.float64)
