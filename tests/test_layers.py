@@ -38,10 +38,10 @@ def test_the_house_keeps_its_contracts(copy: Path) -> None:
 
 
 def test_a_module_that_stands_on_no_layer_is_refused(copy: Path) -> None:
-    (copy / "rig" / "history.py").write_text('"""A room nobody gave a place to."""\n', encoding="utf-8")
+    (copy / "rig" / "memory.py").write_text('"""A room nobody gave a place to."""\n', encoding="utf-8")
     found = lint(copy)
     assert found.returncode == 1
-    assert "rig.history" in found.stdout
+    assert "rig.memory" in found.stdout
 
 
 @pytest.mark.parametrize(

@@ -42,7 +42,8 @@ def installed(tmp_path_factory: pytest.TempPathFactory) -> Path:
     wheel = built("wheel", folder / sdist.name.removesuffix(".tar.gz"), folder)
     home = folder / "home"
     venv.create(home, symlinks=True)
-    pip = ["-m", "pip", "--python", home / "bin" / "python", "install", "--quiet", "--no-deps", "--no-index"]
+    interpreter = home / "bin" / "python"
+    pip = ["-m", "pip", "--python", str(interpreter), "install", "--quiet", "--no-deps", "--no-index"]
     python(*pip, wheel, cwd=folder)
     version = f"python{sys.version_info.major}.{sys.version_info.minor}"
     others = home / "lib" / version / "site-packages" / "others.pth"
