@@ -17,6 +17,7 @@ class Fault(StrEnum):
     ABSENT = "absent"  # it is not there, or without supply: MISO and the interrupt line are left to their pulls
     OTHER_PART = "other_part"  # its identity register reads as another part's
     DAMAGED = "damaged"  # a bad contact: now and then a bit of what it sends is wrong
+    SILENT = "silent"  # its interrupt line is broken: it answers, and never says that there is something new
 
 
 class SpiDevice(Protocol):
@@ -210,7 +211,7 @@ class DeviceLink:
     def _settle(self) -> None:
         """Take over what the device may have changed: its interrupt line and its next event."""
         device = self.device
-        level = device.interrupt_level and device.fault is not Fault.ABSENT
+        level = device.interrupt_level and device.fault not in (Fault.ABSENT, Fault.SILENT)
         if level != self._level:
             self._level = level
             self._interrupt_port.drive(self._interrupt_pin, level)

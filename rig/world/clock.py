@@ -52,6 +52,13 @@ class Clock:
         self._stop_at = self.tick + max(1, round(duration_s * TICKS_PER_SECOND))
         return self._stop_at
 
+    def pace(self, time_scale: float) -> None:
+        """From now on at most so many times as fast as wall time. Raises ValueError for what is no pace."""
+        if not 0.0 < time_scale < float("inf"):
+            raise ValueError(f"{time_scale} is no time scale")
+        self.time_scale = time_scale
+        self._anchor()
+
     def dialogue(self) -> None:
         """A client has asked something, and its next question depends on the answer."""
         self._dialogue_until_s = self._wall() + DIALOGUE_S

@@ -4,11 +4,13 @@ A request is `{"do": NAME, …}`; the reply is one line, `{"ok": true, "time_s":
 
     state                                       everything about arm, board and clock
     hold · run · advance duration_s             the virtual clock; `advance` is answered when the time has passed
-    protective_stop · emergency_stop · release · power_off · power_on · brake_release
+    pace time_scale                             how many times as fast as real it may go from now on
+    protective_stop · emergency_stop · safeguard_stop · release · power_off · power_on · brake_release
     pause · play · stop_program · speed_slider fraction · remote_control on
     register_in_use name · register_free name   an RTDE input that a fieldbus claims
     close_arm listen · silence_arm duration_s   the controller's sockets (the silence is in wall time)
-    sensor_fault sensor fault   absent, other_part (its identity) or damaged (a bit now and then); null: it is well
+    sensor_fault sensor fault   absent, other_part (its identity), damaged (a bit now and then), silent (no data-ready),
+                                stuck (it feels what it felt) or saturated (far more than its range); null: it is well
     kvh_fault sensor bit_error_rate lose status test silent   what is given holds until something else is:
                                                 wire errors, messages lost next, valid bits, BIT's first byte, dead line
     kvh_power sensor on
@@ -19,7 +21,6 @@ import json
 from collections.abc import Callable, Mapping
 from typing import Any, Protocol
 
-from firmware_host.emulator.spi_device import Fault
 from rig.world.board.serial_line import SerialLine
 from rig.world.clock import Clock
 from rig.world.kvh1775.mounting import Mount
@@ -61,8 +62,10 @@ class ControlSession:
             "hold": self._hold,
             "run": self._run,
             "advance": self._advance,
+            "pace": lambda time_scale: world.clock.pace(float(time_scale)),
             "protective_stop": robot.protective_stop,
             "emergency_stop": robot.emergency_stop,
+            "safeguard_stop": robot.safeguard_stop,
             "release": robot.release,
             "power_off": robot.power_off,
             "power_on": robot.power_on,
@@ -138,6 +141,7 @@ class ControlSession:
             "q_rad": robot.motion.q_rad,
             "qd_rad_s": robot.motion.qd_rad_s,
             "moving": robot.motion.moving,
+            "still_since_s": robot.still_since_s,
             "program_running": robot.robot_status_bits >> 1 & 1 == 1,
             "program": robot.program_name,
             "runtime_state": robot.runtime_state.name,
@@ -176,7 +180,7 @@ class ControlSession:
             self._world.laboratory.board.reset()
 
     def _sensor_fault(self, sensor: str, fault: str | None) -> None:
-        self._world.laboratory.set_sensor_fault(sensor, None if fault is None else Fault(fault))
+        self._world.laboratory.set_sensor_fault(sensor, fault)
 
     def _kvh_fault(
         self,

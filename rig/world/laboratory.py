@@ -11,7 +11,8 @@ from rig.config.models import RigConfig
 from rig.config.world_models import WorldSection
 from rig.world.board.flash_file import flash_of
 from rig.world.board.magnetometer_truth import MountedMagnetometer
-from rig.world.board.mounting import MotionAt, mount_magnetometers, mount_sensors, power_up
+from rig.world.board.mounting import mount_magnetometers, mount_sensors, power_up
+from rig.world.board.sensing_element import ElementFault, MotionAt, SensingElement
 from rig.world.board.sensor_truth import SensorTruth
 from rig.world.kvh1775.mounting import mounts
 from rig.world.magnetic_field import magnetic_field_of
@@ -59,7 +60,8 @@ class Laboratory:
         self._flash = flash_of(world.board.flash_file)
         self.board: EmulatedBoard | None = None  # None: without power
         self._sensors: dict[str, SpiDevice] = {}
-        self._faults: dict[str, Fault | None] = dict.fromkeys([*config.on_board, *world.magnetometers])
+        self._elements: dict[str, SensingElement] = {}  # of the board's sensors that turn with the flange
+        self._faults: dict[str, str | None] = dict.fromkeys([*config.on_board, *world.magnetometers])
         self._field = magnetic_field_of(world.site, tuple(world.arm.iron.values()))
         self.kvhs = mounts(config, world)
         self.plug_in()
@@ -78,26 +80,34 @@ class Laboratory:
         """Give the board power, if there is one and it has none."""
         if self.board is None and self._config.board is not None:
             time_s = self._time_s
+            self._elements = {}
             self._sensors = {
-                **mount_sensors(self._config, self._world, self._motion_of, time_s),
+                **mount_sensors(self._config, self._world, self._element_of, time_s),
                 **mount_magnetometers(self._config, self._world, self._field_of),
             }
             for name, fault in self._faults.items():
-                self._sensors[name].fault = fault
+                self._break(name, fault)
             self.board = power_up(self._world, self._flash, self._sensors.values(), time_s)
 
     def unplug(self) -> None:
         """Take the board's power away; its flash keeps what it holds."""
         self.board = None
 
-    def set_sensor_fault(self, name: str, fault: Fault | None) -> None:
+    def set_sensor_fault(self, name: str, fault: str | None) -> None:
         """Break the sensor called `name` in the configuration, or mend it. It stays so without power too.
 
-        Raises ValueError when there is no such sensor.
+        `fault` is a value of `Fault` or of `ElementFault`. Raises ValueError when there is no such sensor or fault.
         """
         if name not in self._faults:
             raise ValueError(f"no sensor {name!r}; there are {', '.join(self._faults)}")
-        self._faults[name] = self._sensors[name].fault = fault
+        self._break(name, fault)
+        self._faults[name] = fault
+
+    def _break(self, name: str, fault: str | None) -> None:
+        inside = ElementFault(fault) if fault in list(ElementFault) and name in self._elements else None
+        self._sensors[name].fault = None if fault is None or inside else Fault(fault)
+        if name in self._elements:
+            self._elements[name].set_fault(inside)
 
     def step(self) -> None:
         """One tick of everything. Raises BoardError when the firmware broke a rule of the chip."""
@@ -122,6 +132,10 @@ class Laboratory:
     def tick_s(self) -> float:
         """How long a tick lasts, which is 2 ms by the controller's clock."""
         return self.arm.tick_s
+
+    def _element_of(self, name: str, sensor: SensorTruth) -> MotionAt:
+        """The same, of a sensor on the board, which can be broken."""
+        return self._elements.setdefault(name, SensingElement(self._motion_of(sensor)))
 
     def _motion_of(self, sensor: SensorTruth) -> MotionAt:
         """What a sensor on the flange feels at a virtual time inside the last tick."""

@@ -24,6 +24,7 @@ from rig.world.board.mounting import firmware
 from rig.world.board.serial_line import misread
 from rig.world.clock import TICKS_PER_SECOND
 from rig.world.section import world_section
+from support.arm_client import wait_for
 from support.ideal import ideal
 from support.laboratory_host import Host, booted, host
 from support.paths import DEMO
@@ -365,3 +366,23 @@ def test_a_host_that_does_not_read_does_not_stop_the_world(world: World) -> None
         before = running.state()["time_s"]
         time.sleep(0.5)  # at 952 Hz and ten times real time this fills every buffer on the way
         assert running.state()["time_s"] > before + 1.0
+
+
+def test_a_sensor_that_is_saturated_stuck_or_silent(world: World) -> None:
+    running = world()
+    board, batches = connect(running.board_port)
+
+    def counts() -> np.ndarray:
+        batches.clear()
+        wait_for(lambda: len(batches) > 30, "readings")
+        return np.concatenate([batch.samples["counts"] for batch in batches[5:]])
+
+    with board:
+        stream(board, batches, 100)
+        running.control({"do": "sensor_fault", "sensor": "gyro", "fault": "saturated"})
+        assert np.abs(counts()).min() >= 32_000
+        running.control({"do": "sensor_fault", "sensor": "gyro", "fault": "stuck"})
+        assert np.abs(counts().mean(axis=0)).max() < 500
+        running.control({"do": "sensor_fault", "sensor": "gyro", "fault": "silent"})
+        with pytest.raises(BoardError, match="sensor_silent"):
+            wait_for(lambda: board.check(running.state()["time_s"]), "its silence", 20)

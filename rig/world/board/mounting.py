@@ -1,7 +1,7 @@
 """The emulated board as the laboratory mounts it: the firmware image, and sensors that feel the flange turn."""
 
-from collections.abc import Callable, Collection, Sequence
-from functools import cache
+from collections.abc import Callable, Collection
+from functools import cache, partial
 from importlib import resources
 
 import numpy as np
@@ -17,9 +17,8 @@ from rig.config.models import RigConfig
 from rig.config.sensor_sections import SensorSection
 from rig.config.world_models import WorldSection
 from rig.world.board.magnetometer_truth import MountedMagnetometer
+from rig.world.board.sensing_element import MotionAt
 from rig.world.board.sensor_truth import SensorTruth
-
-MotionAt = Callable[[float], Sequence[float]]
 
 
 @cache
@@ -29,7 +28,7 @@ def firmware(suffix: str) -> bytes:
 
 
 def mount_sensors(
-    config: RigConfig, world: WorldSection, motion_of: Callable[[SensorTruth], MotionAt], time_s: float
+    config: RigConfig, world: WorldSection, motion_of: Callable[[str, SensorTruth], MotionAt], time_s: float
 ) -> dict[str, SpiDevice]:
     """The board's sensors of the `world:` section, by name, given power at the virtual time `time_s`.
 
@@ -39,7 +38,7 @@ def mount_sensors(
         name: _sensor(
             config.sensors[name],
             SensorTruth(config.sensors[name], simulated, time_s),
-            motion_of,
+            partial(motion_of, name),
             np.random.SeedSequence([world.seed, index]),
             time_s + world.board.boot_time_s,
         )

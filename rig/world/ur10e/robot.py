@@ -93,6 +93,7 @@ class Robot:
         self._mode_changes: list[tuple[int, RobotMode]] = []
         self._stopped_tick = 0
         self._still_since_tick = 0
+        self._moved_tick = 0
         self.speed_slider = speed_slider
         self.motion.fraction_wanted = speed_slider
 
@@ -115,6 +116,8 @@ class Robot:
         self.motion.step(self.time_s)
         if not self.motion.standing:
             self._still_since_tick = self.tick
+            if self.motion.moving:
+                self._moved_tick = self.tick
         self._settle()
 
     @property
@@ -208,6 +211,12 @@ class Robot:
         self._safety_stop(SafetyMode.ROBOT_EMERGENCY_STOP)
         self._mode_changes = [(self.tick + round(POWER_STEP_S * TICKS_PER_SECOND), RobotMode.POWER_OFF)]
 
+    def safeguard_stop(self) -> None:
+        """A light curtain or a door: the program pauses and the joints stop on their way, powered."""
+        if self.safety_mode in (SafetyMode.NORMAL, SafetyMode.REDUCED):
+            self.safety_mode = SafetyMode.SAFEGUARD_STOP
+            self.pause()
+
     def _safety_stop(self, mode: SafetyMode) -> None:
         self.safety_mode = mode
         self._stopped_tick = self.tick
@@ -224,8 +233,9 @@ class Robot:
         return True
 
     def release(self) -> None:
-        """Pull the emergency stop button out again; the robot stays without power."""
-        if self.safety_mode == SafetyMode.ROBOT_EMERGENCY_STOP:
+        """Pull the emergency stop button out again, the robot stays without power; or close the safeguard and reset it,
+        what it paused stays so until it is played."""
+        if self.safety_mode in (SafetyMode.ROBOT_EMERGENCY_STOP, SafetyMode.SAFEGUARD_STOP):
             self.safety_mode = SafetyMode.NORMAL
 
     def power_off(self) -> None:
@@ -300,6 +310,11 @@ class Robot:
         """How it is meant to move."""
         now = self.motion.now
         return tcp_motion(now.target_q_rad, now.target_qd_rad_s, now.target_qdd_rad_s2, self.links)
+
+    @property
+    def still_since_s(self) -> float:
+        """The controller's time at which the joints last moved; a paused movement stands still."""
+        return self._moved_tick * TICK_S
 
     @property
     def steady(self) -> bool:
