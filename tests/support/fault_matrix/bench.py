@@ -1,0 +1,141 @@
+"""One run on a bench of its own: a laboratory, wires to it, the command `rig run`, and hands on all of them."""
+
+import os
+import signal
+import subprocess
+import sys
+import time
+from collections.abc import Callable, Iterator, Mapping
+from contextlib import ExitStack, contextmanager, suppress
+from pathlib import Path
+from typing import Any
+
+import yaml
+
+from support.fault_matrix.wires import ARM_PORTS, Wire, wires
+from support.paths import ROOT
+from support.worlds import WorldHandle, hardware, worlds
+
+BOARD_PORT = 7321
+QUICK, REAL = 8.0, 1.0  # paces of the laboratory: on the way to the fault, and from it on
+START_S = 180.0  # wall time for a busy machine
+END_S = 240.0
+POLL_S = 0.005
+
+
+class Bench:
+    """A laboratory with a run in it. `wire` holds the wires by name: those of the arm, and `board`."""
+
+    def __init__(self, world: WorldHandle, wire: dict[str, Wire], config: Path, environment: Mapping[str, str]) -> None:
+        self.world, self.wire, self.config = world, wire, config
+        self.out = config.parent / "run"
+        self.process: subprocess.Popen[str] | None = None
+        self._environment = {**os.environ, **environment}
+        self.companions: list[subprocess.Popen[str]] = []  # other programs that a fault has started
+        self.errors = ""
+
+    # -- the command -------------------------------------------------------------------------------------------------
+    def start(self) -> None:
+        self.process = self.rig("run", str(self.config), "--out", str(self.out), "--yes")
+
+    def rig(self, *arguments: str) -> subprocess.Popen[str]:
+        """`rig …`, in a session of its own, as a terminal would start it."""
+        return subprocess.Popen(
+            [sys.executable, "-m", "rig", *arguments],
+            cwd=ROOT,
+            env=self._environment,
+            stdin=subprocess.DEVNULL,
+            stdout=subprocess.DEVNULL,
+            stderr=(self.config.parent / f"{arguments[0]}.txt").open("w", encoding="utf-8"),
+            text=True,
+            start_new_session=True,
+        )
+
+    @property
+    def running(self) -> bool:
+        assert self.process is not None
+        return self.process.poll() is None
+
+    @property
+    def pid(self) -> int:
+        assert self.process is not None
+        return self.process.pid
+
+    @property
+    def driver_pid(self) -> int | None:
+        """The child that talks to the arm."""
+        for pid in children(self.pid):
+            with suppress(OSError):
+                if b"spawn_main" in Path(f"/proc/{pid}/cmdline").read_bytes():
+                    return pid
+        return None
+
+    def send(self, number: signal.Signals) -> None:
+        """A signal to the command and all its processes in the foreground, as a terminal sends it."""
+        with suppress(ProcessLookupError):
+            os.killpg(self.pid, number)
+
+    def until(self, condition: Callable[[dict[str, Any]], bool], timeout_s: float, *, running: bool = True) -> bool:
+        """Wait for a state of the world, as long as the command runs; whether it came."""
+        deadline_s = time.monotonic() + timeout_s
+        while not condition(self.world.state()):
+            if time.monotonic() > deadline_s or (running and not self.running):
+                return False
+            time.sleep(POLL_S)
+        return True
+
+    def ended(self, timeout_s: float) -> bool:
+        """Wait for the end of the command."""
+        assert self.process is not None
+        with suppress(subprocess.TimeoutExpired):
+            self.process.wait(timeout_s)
+        return not self.running
+
+    def said(self, command: str) -> str:
+        """What `rig COMMAND` has written on stderr."""
+        return (self.config.parent / f"{command}.txt").read_text(encoding="utf-8", errors="replace")
+
+    # -- the laboratory ----------------------------------------------------------------------------------------------
+    def pace(self, time_scale: float) -> None:
+        self.world.control({"do": "pace", "time_scale": time_scale})
+
+    def end(self) -> None:
+        """Leave no process behind."""
+        pids = [] if self.process is None else [self.pid, *filter(None, [self.driver_pid])]
+        for pid in pids:
+            with suppress(ProcessLookupError):
+                os.kill(pid, signal.SIGKILL)
+        for each in [*self.companions, *([self.process] if self.process else [])]:
+            each.kill()
+            each.wait()
+
+
+def children(pid: int) -> list[int]:
+    """The process ids of a process' children, none when it has ended."""
+    with suppress(OSError):
+        return [int(each) for each in Path(f"/proc/{pid}/task/{pid}/children").read_text().split()]
+    return []
+
+
+def alive(pid: int) -> bool:
+    """Whether a process runs or hangs; one that has ended and was not waited for does not."""
+    with suppress(OSError):
+        return Path(f"/proc/{pid}/stat").read_text().rsplit(")", 1)[1].split()[0] != "Z"
+    return False
+
+
+@contextmanager
+def bench(folder: Path, changes: Mapping[str, Any], environment: Mapping[str, str]) -> Iterator[Bench]:
+    """A laboratory with these changes to the ideal demonstration, and wires between it and a rig that has not begun."""
+    folder.mkdir(parents=True)
+    with ExitStack() as stack:
+        world = stack.enter_context(worlds(folder))(changes)
+        host, wire = stack.enter_context(wires(world.host, {**ARM_PORTS, "board": BOARD_PORT}))
+        wire["board"].delivered = []
+        config = hardware(world.config_path, folder)
+        document = yaml.safe_load(config.read_text(encoding="utf-8"))
+        document["arm"]["host"], document["board"]["port"] = host, f"socket://{host}:{BOARD_PORT}"
+        config.write_text(yaml.safe_dump(document), encoding="utf-8")
+        running = Bench(world, wire, config, environment)
+        stack.callback(running.end)
+        yield running

@@ -1,0 +1,203 @@
+"""One fault at one moment of one procedure: carried out and judged."""
+
+import re
+import time
+from dataclasses import dataclass, field
+from pathlib import Path
+from random import Random
+from typing import Any
+
+import numpy as np
+
+from firmware_host.answers import SampleBatch
+from firmware_host.frames import FrameReader
+from firmware_host.protocol import SAMPLES
+from rig.data.run_file import read_run
+from rig.data.run_folder import recordings
+from rig.errors import RigError
+from support.fault_matrix.bench import END_S, POLL_S, QUICK, REAL, START_S, Bench, alive, bench
+from support.fault_matrix.catalogue import Fault
+from support.fault_matrix.clock_shift import shifted_clock
+from support.fault_matrix.setups import SETUPS, errors_in_u
+
+AT_REST_S = 1.0  # of the controller's time, after the fault can be known
+WATCHED_S = 4.0  # wall time after a fault in which the laboratory goes at its real pace
+WITHIN_U = 5.0
+RESUMES = 3  # a verdict that names a sweep is resumed again
+BEHIND_S = 0.1  # what was handed to this machine so late may be on its way to the rig yet
+
+
+@dataclass(slots=True)
+class Cell:
+    """What came of it. `deviations` is empty when all is as promised."""
+
+    fault: str
+    setup: str
+    moment: float  # of the procedure, 0 its beginning, 1 its end
+    ending: str = ""  # the error's name, or the verdict
+    status: int | None = None
+    rest_s: float | None = None  # controller's time from the fault to the arm's last movement
+    missing: int = 0  # samples received and not in the file
+    resumes: int = 0
+    verdict: str = ""
+    worst_u: float = 0.0
+    wall_s: float = 0.0
+    met: bool = True  # whether the run was still going on
+    deviations: list[str] = field(default_factory=list)
+
+
+def carry_out(
+    name: str, fault: Fault | None, setup: str, folder: Path, *, moment: float, span_s: float, seed: int
+) -> Cell:
+    """A run of `setup` that meets the fault (None: none) after `moment` of the `span_s` it takes, in `folder`."""
+    cell, random, began_s = Cell(name, setup, moment), Random(seed), time.monotonic()
+    environment = shifted_clock(folder.parent) if fault is not None and "CLOCK_SHIFT" in fault.environment else {}
+    with bench(folder, SETUPS[setup], environment) as here:
+        here.start()
+        if not here.until(lambda state: state["program_running"], START_S):
+            cell.deviations.append(f"did not start: {here.said('run')[-300:]}")
+            return cell
+        start_s = here.world.state()["time_s"]
+        cell.met = fault is None or here.until(lambda state: state["time_s"] >= start_s + moment * span_s, START_S)
+        if fault is not None and cell.met:
+            _meet(here, fault, random, cell)
+        else:
+            here.ended(END_S)
+            _account(here, None, cell, fault_s=0.0, fault_wall_s=0.0)
+        if fault is not None and cell.met and cell.verdict != "pass":
+            here.pace(QUICK)
+            fault.mend(here, random)
+            _resume(here, cell)
+        if cell.verdict == "pass":
+            cell.worst_u = errors_in_u(here.out)
+            if not cell.worst_u <= WITHIN_U:
+                cell.deviations.append(f"passed {cell.worst_u:.1f} U from the truth")
+    cell.wall_s = time.monotonic() - began_s
+    return cell
+
+
+def _meet(here: Bench, fault: Fault, random: Random, cell: Cell) -> None:
+    here.pace(REAL)
+    fault_s, fault_wall_s = here.world.state()["time_s"], time.monotonic()
+    driver_pid = here.driver_pid
+    fault.bring(here, random)
+    if fault.lasts_s is not None:
+        time.sleep(fault.lasts_s)
+        fault.mend(here, random)
+    quick = False
+    while here.running and time.monotonic() - fault_wall_s < END_S:
+        if not quick and time.monotonic() - fault_wall_s > WATCHED_S + (fault.lasts_s or 0.0):
+            here.pace(QUICK)
+            quick = True
+        time.sleep(POLL_S)
+    if here.running:
+        cell.deviations.append("hung")
+        here.end()
+    if not here.until(_stands, 30, running=False):
+        cell.deviations.append("the arm still moves")
+    _account(here, fault, cell, fault_s=fault_s, fault_wall_s=fault_wall_s)
+    for _ in range(100):
+        if driver_pid is None or not alive(driver_pid) or "driver frozen" in cell.fault:
+            break
+        time.sleep(0.1)
+    else:
+        cell.deviations.append("left its driver behind")
+    _companions(here, cell)
+
+
+def _stands(state: dict[str, Any]) -> bool:
+    return not state["moving"] and bool(state["time_s"] > state["still_since_s"])
+
+
+def _companions(here: Bench, cell: Cell) -> None:
+    for second in here.companions:
+        _, said = second.communicate(timeout=END_S)
+        if second.returncode != 2 or not re.search(r"^rig: \w+: ", said, re.MULTILINE):
+            cell.deviations.append(f"the second rig ended with {second.returncode}: {said[-200:]}")
+
+
+def _account(here: Bench, fault: Fault | None, cell: Cell, *, fault_s: float, fault_wall_s: float) -> None:
+    """How the run ended, when the arm came to rest, and whether the file holds what was received."""
+    assert here.process is not None
+    said = here.said("run")
+    cell.status = here.process.returncode
+    cell.ending = _ending(cell.status, said)
+    if cell.status == 0:
+        cell.verdict = "pass"
+    if "Traceback" in said:
+        cell.deviations.append(f"traceback: {said[-400:]}")
+    if fault is None:
+        if cell.status != 0:
+            cell.deviations.append(f"undisturbed, and ended with {cell.status}: {said[-300:]}")
+        return
+    passed = cell.status == 0 and fault.may_pass
+    named = cell.status in fault.statuses and (not fault.names or cell.status != 3 or cell.ending in fault.names)
+    if not (passed or named):
+        cell.deviations.append(f"ended with {cell.status} {cell.ending}: {said[-300:]}")
+    if cell.status != 0:
+        cell.rest_s = here.world.state()["still_since_s"] - fault_s
+        if fault.known_s is not None and cell.rest_s > fault.known_s + AT_REST_S:
+            cell.deviations.append(f"at rest only {cell.rest_s:.2f} s after the fault")
+    _files(here, fault, cell, fault_wall_s)
+
+
+def _ending(status: int, said: str) -> str:
+    errors = re.findall(r"^rig: (\w+): ", said, re.MULTILINE)
+    return {0: "pass", 1: "fail", 130: "interrupted", -9: "killed"}.get(status) or (errors[-1] if errors else "no name")
+
+
+def _files(here: Bench, fault: Fault, cell: Cell, fault_wall_s: float) -> None:
+    try:
+        runs = [read_run(path) for path in recordings(here.out, "raw")]
+    except RigError as error:
+        cell.deviations.append(f"the file is not readable: {error}")
+        return
+    if not runs:
+        cell.deviations.append("there is no file")
+        return
+    recorded = runs[0].samples["gyro"]
+    if not len(recorded):
+        return  # nothing had been received, or the arm had not begun
+    delivered = _delivered(here, recorded["host_time_s"][0], fault_wall_s - max(fault.kept_s, BEHIND_S))
+    cell.missing = len(delivered - set(recorded["board_time_us"].tolist()))
+    if cell.missing:
+        cell.deviations.append(f"{cell.missing} of {len(delivered)} samples received are not in the file")
+
+
+def _delivered(here: Bench, from_s: float, to_s: float) -> set[int]:
+    """The board's time stamps of the samples that were handed to the rig in that time."""
+    reader, stamps = FrameReader(), set[int]()
+    for wall_s, data in here.wire["board"].delivered or []:
+        for frame in reader.feed(data):
+            if frame.name in SAMPLES and from_s + BEHIND_S < wall_s < to_s:
+                stamps.update(SampleBatch.of(frame, wall_s).samples["board_time_us"].tolist())
+    return stamps
+
+
+def _resume(here: Bench, cell: Cell) -> None:
+    status: int | None = None
+    while status != 0 and cell.resumes < RESUMES:
+        cell.resumes += 1
+        here.process = here.rig("resume", str(here.out), "--yes")
+        if not here.ended(END_S):
+            cell.deviations.append("resuming hung")
+            return
+        status = here.process.returncode
+        if status not in (0, 1):
+            break
+    cell.verdict = {0: "pass", 1: "fail"}.get(status if status is not None else -1, "none")
+    if status != 0:
+        cell.deviations.append(f"resumed, it ended with {status}: {here.said('resume')[-400:]}")
+
+
+def span(setup: str, folder: Path) -> tuple[Cell, float]:
+    """A run that nothing disturbs, and how long the arm's part of it takes by the controller's clock."""
+    cell = carry_out("none", None, setup, folder, moment=1.0, span_s=0.0, seed=0)
+    arm = read_run(folder / "run" / "run.h5").arm
+    moving = np.flatnonzero(np.abs(arm["qd_rad_s"]).max(axis=1) > 0)
+    return cell, float(arm["time_s"][moving[-1]] - arm["time_s"][moving[0]])
+
+
+def document(cell: Cell) -> dict[str, Any]:
+    """As JSON has it."""
+    return {name: getattr(cell, name) for name in cell.__slots__}
