@@ -23,6 +23,7 @@ MEMORY = 12  # readings
 FEWEST_VALUES = 24  # of an axis, to say that a bit ought to have changed
 ONE_BIT = 0.8  # of the spikes off by the same power of two: they are a bit's doing
 FEWEST_SPIKES = 5
+FEWEST_OF_NOISE = 4 * MEMORY  # readings of a window that tell their noise
 VIBRATION_LEFT = 0.1  # of the arm's vibration, which the sensor's filter changes and the arm's states tell in part
 HEAP = 10  # readings
 
@@ -92,9 +93,12 @@ def _uneven_bits(windows: Sequence[Window], noise: Array, sure: float) -> int:
 def _spikes(windows: Sequence[Window]) -> tuple[float, int]:
     """The farthest reading in standard deviations of the noise, and how many bits, over the axes, make such."""
     farthest, sizes = 0.0, [[], [], []]  # type: float, list[list[Array]]
-    for window in windows:
-        off = window.residual_counts - np.median(window.residual_counts, axis=0)
-        noise = np.maximum(1.4826 * np.median(np.abs(off), axis=0), 0.5)
+    offs = [window.residual_counts - np.median(window.residual_counts, axis=0) for window in windows]
+    noises = [np.maximum(1.4826 * np.median(np.abs(off), axis=0), 0.5) for off in offs]
+    telling = [noise for off, noise in zip(offs, noises, strict=True) if len(off) >= FEWEST_OF_NOISE]
+    least = np.min(telling or [np.full(3, 0.5)], axis=0)  # a short rest, as of an interrupted run, tells too little
+    for window, off, own in zip(windows, offs, noises, strict=True):
+        noise = np.maximum(own, least)
         deviation = np.maximum(noise, VIBRATION_LEFT * window.vibration_counts)
         farthest = max(farthest, float(np.max(np.abs(off) / deviation)))
         for axis in range(3):

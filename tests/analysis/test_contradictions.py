@@ -256,3 +256,21 @@ def test_a_low_bit_that_is_stuck_is_found_under_vibration_too() -> None:
     window = Window(0, counts, counts - counts.mean(axis=0), np.zeros(3))
     stuck, _ = judge_readings([counts], [window], FALSE_ALARMS / 10)["stuck_bit"]
     assert stuck >= 3
+
+
+def test_a_rest_of_few_readings_is_held_against_the_noise_of_longer_ones() -> None:
+    """The run was interrupted in it: of twenty readings, half may lie close together by chance."""
+    rng = np.random.default_rng(1)
+    windows = [Window(sweep, *_noisy(rng, 280), np.zeros(3)) for sweep in range(6)]
+    short = np.where(np.arange(20)[:, None] % 4, 0.1, 3.0) * _noisy(rng, 20)[1]
+    windows.append(Window(-1, np.round(short).astype(np.int64), short, np.zeros(3)))
+    spikes, limit = judge_readings([window.counts for window in windows], windows, FALSE_ALARMS / 10)["spikes"]
+    assert spikes < limit
+    short[7] = 9 * 15
+    assert judge_readings([window.counts for window in windows], windows, FALSE_ALARMS / 10)["spikes"][0] > limit
+
+
+def _noisy(rng: np.random.Generator, readings: int) -> tuple[np.ndarray, np.ndarray]:
+    """(n, 3) counts, and what of them is noise: 15 counts."""
+    counts = np.round(15 * rng.standard_normal((readings, 3)))
+    return counts.astype(np.int64), counts - counts.mean(axis=0)
