@@ -12,7 +12,8 @@ import struct
 import time
 from collections.abc import Iterator
 from dataclasses import dataclass
-from itertools import zip_longest
+from itertools import chain, zip_longest
+from math import isfinite
 from types import TracebackType
 from typing import Self
 
@@ -37,6 +38,8 @@ VARIABLES = {
     "payload_cog": "VECTOR3D",
 }
 PACKET = struct.Struct(">B d 6d 6d d d i i I I I d 3d".replace(" ", ""))  # the recipe's number, then these
+
+ANGLE_RAD, SPEED_RAD_S, MODES = 13.0, 20.0, range(-1, 64)  # no arm turns so far or so fast, or has other modes
 
 
 @dataclass(frozen=True, slots=True)
@@ -151,6 +154,7 @@ class StateStream:
 
 
 def _packet(payload: bytes) -> Packet:
+    """Raises `struct.error` or `ConnectionError` for what no arm says: the bytes have come to harm on the way."""
     values = PACKET.unpack(payload)
     fraction, scaling, robot_mode, safety_mode, runtime_state, robot_bits, safety_bits, payload_kg = values[14:22]
     state = ArmState(
@@ -166,4 +170,13 @@ def _packet(payload: bytes) -> Packet:
         robot_status_bits=robot_bits,
         safety_status_bits=safety_bits,
     )
+    damaged = (
+        not all(map(isfinite, chain(values[1:16], values[21:25])))
+        or max(map(abs, state.q_rad)) > ANGLE_RAD
+        or max(map(abs, state.qd_rad_s)) > SPEED_RAD_S
+        or not 0.0 <= fraction <= 1.0
+        or not all(mode in MODES for mode in (robot_mode, safety_mode, runtime_state))
+    )
+    if damaged:
+        raise ConnectionError("no arm is in such a state")
     return Packet(state, payload_kg, values[22:25])

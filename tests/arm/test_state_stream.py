@@ -126,6 +126,20 @@ def test_a_connection_that_closes_gives_no_more_states(controllers: Controllers)
 
 
 @pytest.mark.parametrize(
+    "changed", [{2: 14.0}, {8: -21.0}, {14: 1.5}, {14: float("nan")}, {17: 256}, {1: float("inf")}], ids=str
+)
+def test_a_state_that_no_arm_can_be_in_is_a_lost_link(controllers: Controllers, changed: dict[int, float]) -> None:
+    """Bytes that were lost or damaged on the way would otherwise be believed, and blamed on slider or safety mode."""
+    values = [1, 2.0, *range(12), 1.0, 1.0, 7, 1, 2, 3, 1, 0.35, 0.0, 0.0, 0.025]
+    for place, value in changed.items():
+        values[place] = value
+    controller = controllers(S=ANSWERS["S"] + data(1.0))
+    with StateStream(controller.host, 125.0, 5.0) as stream:
+        controller.send(package("U", PACKET.pack(*values)) + data(3.0))
+        assert times_of(stream, 0) == [] and stream.read(0.2) == [] and stream.closed
+
+
+@pytest.mark.parametrize(
     ("answers", "said"),
     [
         ({"V": package("V", b"\0")}, "version 2"),
