@@ -3,7 +3,7 @@
 import threading
 import time
 from collections.abc import Callable, Iterator
-from contextlib import contextmanager
+from contextlib import contextmanager, suppress
 from pathlib import Path
 from types import TracebackType
 from typing import Self
@@ -21,6 +21,7 @@ from rig.errors import Fault, Problem, Refused, RigError
 WATCH_S = 0.02  # the caller's watch is called at least this often
 ARRIVAL_RAD = 0.01  # the joint servo's ripple and lag stay below this
 START_S = 5.0  # a move begins within this (wall time), or not at all
+LAST_STOP_S = 0.8  # … and so long once more when no state has confirmed the stop
 ANSWER_S = 5.0  # the dashboard has so long to answer while nothing moves
 SLOWNESS = 1.1  # a move may take this much longer than planned …
 SLOWNESS_S = 1.0  # … plus this, in the controller's time
@@ -62,7 +63,7 @@ class Arm:
         self._doing = "the preparation"
         self._holds_arm = False  # a program of ours may run, so a stop is ours to make
         self._supervising = False
-        self._interrupted_s = 0.0  # time stamp of the last state that showed our program running
+        self._interruption: tuple[Problem, float] | None = None  # and the time stamp of the state that showed it first
         self.missed_states = 0  # gaps in the stream, counted in states
 
     # Looking ------------------------------------------------------------------------------------------------------
@@ -204,8 +205,12 @@ class Arm:
 
     def close(self) -> None:
         """Stop the arm if it was under control, and end the child process."""
-        self.stop()
+        outcome = self.stop()
         self._link.close()
+        if not outcome.at_rest:
+            # A client that had lost the arm and found it again has started its program anew, behind that stop.
+            with suppress(OSError), Dashboard(self._host, LAST_STOP_S) as dashboard:
+                dashboard.stop_program()
 
     def __enter__(self) -> Self:
         try:
@@ -289,12 +294,17 @@ class Arm:
             self._fail(problem._replace(what=f"{problem.what} during {self._doing}"))
 
     def _judge(self, state: ArmState) -> Problem | None:
-        """Why the arm cannot go on. The safety bits that explain a stopped program may come a packet later than it."""
-        interruption = program_interruption(state)
-        if interruption is None:
-            self._interrupted_s = state.time_s
-        unexplained = state.time_s - self._interrupted_s > INTERRUPTION_S
-        return readiness(state) or (interruption if unexplained else None)
+        """Why the arm cannot go on. The safety bits that explain a stopped program may come a packet later than it.
+
+        What interrupts our program ends it: one that runs again a moment later is somebody else's.
+        """
+        if self._interruption is None and (interruption := program_interruption(state)) is not None:
+            self._interruption = interruption, state.time_s
+        if problem := readiness(state):
+            return problem
+        if self._interruption is not None and state.time_s - self._interruption[1] >= INTERRUPTION_S:
+            return self._interruption[0]
+        return None
 
     def _fail(self, problem: Problem) -> None:
         """Keep the first problem and stop the arm; nothing is a problem after a stop on request."""

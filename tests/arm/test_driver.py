@@ -57,6 +57,11 @@ def stands(world: WorldHandle) -> bool:
     return not state["moving"] and state["runtime_state"] == "STOPPED"
 
 
+def upload(world: WorldHandle, program: bytes) -> None:
+    with socket.create_connection((world.host, 30002)) as client:
+        client.sendall(program)
+
+
 class AtSpeed:
     """A watch that acts once, when the arm has reached its speed."""
 
@@ -179,6 +184,31 @@ def test_a_fault_during_a_move_is_named_and_the_arm_stands_still(
         assert fault.value.remedy
         laboratory.control({"do": "run"})
         until(lambda: stands(laboratory), 3.0)
+
+
+def test_somebody_elses_program_in_place_of_ours_is_noticed_and_stopped(laboratory: WorldHandle) -> None:
+    """It runs a moment later: the states show ours stopped for 20 ms."""
+    nudge = b"def nudge():\n movej([0.0, -1.57, 1.57, -1.57, -1.57, -6.0], a=2, v=1)\nend\n"
+    with Arm(laboratory.host) as arm:
+        arm.take_control(*PAYLOAD)
+        with pytest.raises(Fault) as fault:
+            arm.move(turn(arm.latest.q_rad, 6.0), AtSpeed(arm, lambda: upload(laboratory, nudge)))
+        assert fault.value.name == "program_stopped"
+        state = laboratory.state()
+        assert not state["moving"] and not state["program_running"] and state["q_rad"][WRIST_3] > -3.0
+
+
+def test_a_program_that_a_reconnecting_client_leaves_behind_is_stopped(laboratory: WorldHandle) -> None:
+    """No state confirms the stop, and the client's own program runs again before the client is ended."""
+    with Arm(laboratory.host) as arm:
+        arm.take_control(*PAYLOAD)
+        with pytest.raises(Fault):
+            arm.move(turn(arm.latest.q_rad, 6.0), AtSpeed(arm, lambda: laboratory.control({"do": "hold"})))
+        laboratory.control({"do": "run"})
+        until(lambda: not laboratory.state()["program_running"], 5.0)
+        upload(laboratory, b"def rtde_control():\nend\n")
+        until(lambda: laboratory.state()["program_running"], 5.0)
+    until(lambda: not laboratory.state()["program_running"], 5.0)
 
 
 @pytest.mark.parametrize(("name", "kind"), [("arm_driver_died", "SIGKILL"), ("arm_driver_hung", "SIGSTOP")])
