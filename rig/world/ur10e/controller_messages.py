@@ -11,13 +11,17 @@ class MessageKind(IntEnum):
     """Kinds of robot messages, as the primary interface numbers them."""
 
     TEXT = 0
+    SAFETY_MODE = 5
     KEY = 7
     EXCEPTION = 10
 
 
 @dataclass(frozen=True, slots=True)
 class Message:
-    """Something the controller tells everybody. `place`: line and column of the program, for an exception."""
+    """Something the controller tells everybody. `place`: line and column of the program, for an exception.
+
+    Of a change of the safety mode the text is the mode's name.
+    """
 
     number: int
     kind: MessageKind

@@ -11,6 +11,7 @@ from rig.world.ur10e.robot import Robot
 
 PORT = 29999
 PROGRAMS = ("wait_program.urp",)
+OPERATIONAL_MODES = ("MANUAL", "AUTOMATIC")
 TOO_EARLY = (
     "Cannot unlock protective stop until 5s after occurrence. Always inspect cause of protective stop before unlocking"
 )
@@ -38,6 +39,7 @@ class DashboardSession:
         self.closing = False
         self._buffer = bytearray()
         self._role = "none"
+        self._mode: str | None = None  # that the dashboard has set; None: the pendant controls it
         self._questions: dict[str, Callable[[], str]] = {
             "polyscopeversion": self._polyscope,
             "version": self._version,
@@ -51,7 +53,7 @@ class DashboardSession:
             "get serial number": lambda: robot.identity.serial_number,
             "get robot model": lambda: "UR10",
             "is in remote control": lambda: str(robot.remote_control).lower(),
-            "get operational mode": lambda: "AUTOMATIC" if robot.remote_control else "MANUAL",
+            "get operational mode": lambda: self._mode or ("AUTOMATIC" if robot.remote_control else "MANUAL"),
             "getuserrole": self._get_role,
             "stop": self._stop,
             "pause": lambda: "Pausing program" if robot.pause() else "Failed to execute: pause",
@@ -61,7 +63,8 @@ class DashboardSession:
             "addtolog": lambda: "Added log message",
             "generate flight report": lambda: "Flight Report generated with id: 1",
             "generate support file": lambda: "Completed successfully: ur_support.zip",
-            "clear operational mode": lambda: "No longer controlling the operational mode.",
+            "savelog": lambda: "Log saved to disk",
+            "clear operational mode": self._clear_mode,
             "shutdown": self._shutdown,
             "power off": self._power_off,
         }
@@ -73,11 +76,11 @@ class DashboardSession:
             "restart safety": self._restart_safety,
         }
         self._worded: dict[str, Callable[[str], str]] = {
-            "load installation": lambda name: f"Loading installation: {name}",
+            "load installation": lambda name: f"Loading installation: {name}" if name else "File not found: ",
             "load": self._load,
             "popup": lambda text: "showing popup",
             "addtolog": lambda text: "Added log message",
-            "set operational mode": lambda mode: f"Operational mode '{mode}' is set",
+            "set operational mode": self._set_mode,
             "setuserrole": self._set_role,
             "generate flight report": lambda kind: "Flight Report generated with id: 1",
             "generate support file": lambda folder: f"Completed successfully: {folder}/ur_support.zip",
@@ -109,7 +112,7 @@ class DashboardSession:
         if key in self._orders:
             return self._orders[key]() if self._robot.remote_control else f"Failed to execute: {key}"
         for words, handler in self._worded.items():
-            if key.startswith(words + " "):
+            if key == words or key.startswith(words + " "):
                 return handler(line[len(words) :].strip())
         return f"could not understand: '{line}'"
 
@@ -180,6 +183,16 @@ class DashboardSession:
         if self._robot.robot_mode != RobotMode.POWER_OFF:
             self._robot.power_off()
         return "Shutting down"
+
+    def _set_mode(self, name: str) -> str:
+        if name.upper() not in OPERATIONAL_MODES:
+            return f"Failed setting operational mode: '{name}'"
+        self._mode = name.upper()
+        return f"Setting operational mode: {self._mode}"
+
+    def _clear_mode(self) -> str:
+        self._mode = None
+        return "No longer controlling the operational mode."
 
     def _get_role(self) -> str:
         return self._role.upper()

@@ -70,6 +70,10 @@ def _content(message: Message) -> bytes:
     if message.kind == MessageKind.KEY:
         title = message.title.encode()
         return struct.pack(">iiB", 0, 0, len(title)) + title + text
+    if message.kind == MessageKind.SAFETY_MODE:
+        return struct.pack(
+            ">iiBII", 0, 0, SafetyMode[message.text], 0, 0
+        )  # which cause has which code is not simulated
     if message.kind == MessageKind.EXCEPTION:
         return struct.pack(">ii", *message.place) + text
     return text

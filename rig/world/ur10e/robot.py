@@ -75,7 +75,7 @@ class Robot:
         self.remote_control = remote_control
         self.tick = 0
         self.robot_mode = RobotMode.RUNNING
-        self.safety_mode = SafetyMode.NORMAL
+        self._safety_mode = SafetyMode.NORMAL
         self.runtime_state = RuntimeState.STOPPED
         self.inputs = Registers()
         self.outputs = Registers()
@@ -96,6 +96,17 @@ class Robot:
         self._moved_tick = 0
         self.speed_slider = speed_slider
         self.motion.fraction_wanted = speed_slider
+
+    @property
+    def safety_mode(self) -> SafetyMode:
+        return self._safety_mode
+
+    @safety_mode.setter
+    def safety_mode(self, mode: SafetyMode) -> None:
+        """Every change is told at the primary interface."""
+        if mode != self._safety_mode:
+            self.messages.say(mode.name, MessageKind.SAFETY_MODE)
+        self._safety_mode = mode
 
     # -- time ----------------------------------------------------------------------------------------------------
     @property

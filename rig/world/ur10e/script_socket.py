@@ -15,6 +15,7 @@ from rig.world.ur10e.ur_rtde_program import ControlProgram
 from rig.world.ur10e.urscript import Arguments, ScriptProgram, move
 
 PRIMARY_PORT, SECONDARY_PORT, REALTIME_PORT = 30001, 30002, 30003
+TOO_EARLY = "Cannot unlock protective stop until 5s after occurrence"
 BLOCK = re.compile(r"(def|sec|thread|if|while|for)\b.*:$")
 
 
@@ -76,7 +77,7 @@ ORDERS: dict[str, Callable[[Robot], object]] = {
     "power on": Robot.power_on,
     "power off": Robot.power_off,
     "set robotmode run": Robot.brake_release,
-    "set unlock protective stop": Robot.unlock_protective_stop,
+    "set unlock protective stop": lambda robot: robot.unlock_protective_stop() or robot.messages.say(TOO_EARLY),
     "stop program": lambda robot: robot.stop_program("stopped by a client"),
     "pause program": Robot.pause,
     "resume program": Robot.resume,

@@ -1,6 +1,7 @@
 """Simple URScript programs: statements and endless loops, played one after another."""
 
 import ast
+import operator
 import re
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
@@ -17,7 +18,7 @@ FRAME = re.compile(r"^(def|sec)\s+(\w+)\s*\(\s*\)\s*:$")
 
 
 def arguments(statement: str) -> dict[str, Any]:
-    """What a call gives, by keyword or by place ("0", "1", …). Raises `ProgramError` for anything but literals."""
+    """What a call gives, by keyword or by place ("0", "1", …). Raises `ProgramError` for anything but constants."""
     match = CALL.match(statement)
     if match is None:
         raise ProgramError(f"not simulated: {statement}")
@@ -25,10 +26,31 @@ def arguments(statement: str) -> dict[str, Any]:
     try:
         call = ast.parse(f"f({source})", mode="eval").body
         assert isinstance(call, ast.Call)
-        values = {str(i): ast.literal_eval(value) for i, value in enumerate(call.args)}
-        return values | {str(item.arg): ast.literal_eval(item.value) for item in call.keywords}
-    except (SyntaxError, ValueError):
+        values = {str(i): constant(value) for i, value in enumerate(call.args)}
+        return values | {str(item.arg): constant(item.value) for item in call.keywords}
+    except (SyntaxError, ValueError, ArithmeticError):
         raise ProgramError(f"not simulated: {statement}") from None
+
+
+OPERATIONS: dict[type[ast.operator], Callable[[float, float], float]] = {
+    ast.Add: operator.add, ast.Sub: operator.sub, ast.Mult: operator.mul, ast.Div: operator.truediv,
+}  # fmt: skip
+
+
+def constant(node: ast.expr) -> Any:
+    """What an expression of numbers is worth (`0 + 0`), or a literal. Raises ValueError, ArithmeticError."""
+    match node:
+        case ast.BinOp(left, operation, right) if type(operation) in OPERATIONS:
+            one, other = constant(left), constant(right)
+            if not (isinstance(one, int | float) and isinstance(other, int | float)):
+                raise ValueError("no number")
+            return OPERATIONS[type(operation)](one, other)
+        case ast.List(values):
+            return [constant(value) for value in values]
+        case ast.Tuple(values):
+            return tuple(constant(value) for value in values)
+        case _:
+            return ast.literal_eval(node)
 
 
 def joints(value: Any) -> Joints:
