@@ -12,6 +12,7 @@ the table of docs/reliability.md; `deviations.json` says what is not as promised
 import argparse
 import json
 import shutil
+import signal
 import subprocess
 import sys
 import tempfile
@@ -99,6 +100,8 @@ def main() -> int:
     parser.add_argument("--out", type=Path, default=ROOT / "build" / "faults", metavar="DIR")
     parser.add_argument("--again", action="store_true", help="repeat what deviated")
     options = parser.parse_args()
+    for number in (signal.SIGINT, signal.SIGQUIT):  # a shell's background ignores them, and so would the runs
+        signal.signal(number, signal.default_int_handler)
     options.out.mkdir(parents=True, exist_ok=True)
     record = options.out / "cells.jsonl"
     cells = done_before(record, again=options.again)

@@ -194,8 +194,7 @@ def test_somebody_elses_program_in_place_of_ours_is_noticed_and_stopped(laborato
         with pytest.raises(Fault) as fault:
             arm.move(turn(arm.latest.q_rad, 6.0), AtSpeed(arm, lambda: upload(laboratory, nudge)))
         assert fault.value.name == "program_stopped"
-        state = laboratory.state()
-        assert not state["moving"] and not state["program_running"] and state["q_rad"][WRIST_3] > -3.0
+        assert stands(laboratory) and laboratory.state()["q_rad"][WRIST_3] > -3.0
 
 
 def test_a_program_that_a_reconnecting_client_leaves_behind_is_stopped(laboratory: WorldHandle) -> None:

@@ -21,6 +21,7 @@ Act = Callable[[Bench, Random], object]
 STOPPED, INTERRUPTED, KILLED = 3, 130, -signal.SIGKILL
 LINK = frozenset({"arm_link_lost", "arm_driver_died", "arm_driver_hung"})
 BOARD = frozenset({"board_link_lost", "board_error", "lost_samples", "no_samples"})
+RECONNECTED = frozenset({"program_stopped"})  # a client that finds a lost arm again starts its program anew
 LINK_S, DRIVER_S, SUPERVISOR_S, BOARD_S = 0.8, 0.5, 2.0, 2.0  # silence that tells, docs/architecture.md
 
 
@@ -131,8 +132,13 @@ def _heal(bench: Bench, random: Random) -> None:
 ARM = ("rtde", "dashboard", "primary", "secondary", "script")
 
 
-def _net(name: str, bring: Act, names: frozenset[str] = LINK, **more: object) -> Fault:
-    return Fault("network", name, bring, _heal, names, **{"known_s": LINK_S, **more})  # type: ignore[arg-type]
+def _heal_and_stop(bench: Bench, random: Random) -> None:
+    _heal(bench, random)
+    bench.world.control({"do": "stop_program"})
+
+
+def _net(name: str, bring: Act, names: frozenset[str] = LINK, *, mend: Act = _heal, **more: object) -> Fault:
+    return Fault("network", name, bring, mend, names, **{"known_s": LINK_S, **more})  # type: ignore[arg-type]
 
 
 # -- processes -------------------------------------------------------------------------------------------------------
@@ -158,7 +164,10 @@ def _signal(number: signal.Signals) -> Fault:
 
 # -- disk and clocks ---------------------------------------------------------------------------------------------------
 def _fill_disk(bench: Bench, random: Random) -> None:
-    """No file of the rig can grow any more. The limit on a file's size is the full disk that needs no other disk."""
+    """No file of the rig can grow any more. The limit on a file's size is the full disk that needs no other disk.
+
+    It shows when a file must grow: HDF5 takes room for some seconds of samples at a time.
+    """
     size = (bench.out / "run.h5").stat().st_size
     resource.prlimit(bench.pid, resource.RLIMIT_FSIZE, (size, size))
 
@@ -200,15 +209,19 @@ CATALOGUE: tuple[Fault, ...] = (
           frozenset({"registers_in_use"}), may_pass=True),
     Fault("controller", "somebody else's program", _nudge, names=frozenset({"program_stopped"})),
     Fault("controller", "second rig on the same arm and board", _another_rig, may_pass=True, known_s=None),
-    Fault("controller", "silent for 3 s", _order("silence_arm", duration_s=3), names=LINK, known_s=LINK_S),
+    # A crowded computer may not notice it while it lasts; the client has then missed the end of the movement.
+    Fault("controller", "silent for 3 s", _order("silence_arm", duration_s=3),
+          names=LINK | RECONNECTED | {"arm_slower_than_planned"}, known_s=LINK_S),
     Fault("controller", "closes its connections", _order("close_arm"), names=LINK, known_s=LINK_S),
-    _net("controller gone: all ports refused", _hang_up(*ARM, refuse=True)),
+    # Nobody is left who could stop it: the movement ends where it was told to, and the program waits on the pendant.
+    _net("controller gone: all ports refused", _hang_up(*ARM, refuse=True), known_s=None, mend=_heal_and_stop),
     _net("RTDE stalls", _stall("rtde")),
     _net("RTDE half-closed", _half_close("rtde")),
     _net("RTDE reset", _hang_up("rtde")),
-    _net("RTDE loses 1 % of its bytes", _spoil(losing, 0.01, "rtde")),
-    _net("RTDE has wrong bits in 0.1 % of its bytes", _spoil(flipping, 0.001, "rtde"), may_pass=True, known_s=None,
-         names=LINK | {"arm_states_lost", "speed_not_constant", "arm_slower_than_planned"}),
+    # What makes sense is believed, damaged or not: any name will do, as long as nothing false passes.
+    _net("RTDE loses 1 % of its bytes", _spoil(losing, 0.01, "rtde"), frozenset(), known_s=None),
+    _net("RTDE has wrong bits in 0.1 % of its bytes", _spoil(flipping, 0.001, "rtde"), frozenset(), may_pass=True,
+         known_s=None),
     _net("RTDE comes 0.3 s late", _delay(0.3, "rtde"), may_pass=True, known_s=None, names=LINK),
     _net("dashboard stalls", _stall("dashboard"), may_pass=True, known_s=None),
     _net("dashboard refused", _hang_up("dashboard", refuse=True), may_pass=True, known_s=None),
@@ -233,7 +246,7 @@ CATALOGUE: tuple[Fault, ...] = (
     _sensor("not there", "absent", frozenset({"sensor_silent", "sensor_absent", "sensor_fault", *BOARD,
                                               "checksum_failed", "stuck_sensor", "saturation", "stuck_axis"}),
             statuses=SPOILT),
-    _sensor("bad contact", "damaged", frozenset({"sensor_fault", "checksum_failed", "sensor_silent"}),
+    _sensor("bad contact", "damaged", frozenset({"sensor_fault", "checksum_failed", "sensor_silent", "not_settled"}),
             statuses=SPOILT, may_pass=True),
     _sensor("stuck", "stuck", frozenset({"stuck_axis", "stuck_sensor", "no_motion", "wrong_axis", "zero_reading",
                                          "time_base_not_found", "attitude_untrustworthy", "no_rates"}),
@@ -247,8 +260,8 @@ CATALOGUE: tuple[Fault, ...] = (
           LINK | BOARD, known_s=SUPERVISOR_S, lasts_s=6.0),
     Fault("process", "the driver frozen", _kill(signal.SIGSTOP, "driver"), names=LINK, known_s=DRIVER_S),
     Fault("process", "the laboratory frozen for 3 s", _kill(signal.SIGSTOP, "world"), _kill(signal.SIGCONT, "world"),
-          LINK | BOARD, known_s=LINK_S, lasts_s=3.0, may_pass=True),
-    Fault("disk", "full", _fill_disk, names=frozenset({"recording_failed", "system"}), known_s=1.0),
+          LINK | BOARD | RECONNECTED, known_s=LINK_S, lasts_s=3.0, may_pass=True),
+    Fault("disk", "full", _fill_disk, names=frozenset({"recording_failed", "system"}), known_s=None),
     Fault("disk", "folder read-only", _make_immutable(True), _make_immutable(False), frozenset({"system"}),
           known_s=None, may_pass=True),
     Fault("clock", "one hour forward", _shift_clock(3600), may_pass=True, known_s=None,

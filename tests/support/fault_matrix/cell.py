@@ -185,8 +185,9 @@ def _resume(here: Bench, cell: Cell) -> None:
         status = here.process.returncode
         if status not in (0, 1):
             break
-    cell.verdict = {0: "pass", 1: "fail"}.get(status if status is not None else -1, "none")
-    if status != 0:
+    finished = cell.status == 1 and "already_finished" in here.said("resume")  # the verdict it had is the one it has
+    cell.verdict = "fail" if finished else {0: "pass", 1: "fail"}.get(-1 if status is None else status, "none")
+    if status != 0 and not finished:
         cell.deviations.append(f"resumed, it ended with {status}: {here.said('resume')[-400:]}")
 
 

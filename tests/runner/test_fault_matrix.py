@@ -1,0 +1,34 @@
+"""Faults at a moment of a whole run: a few of them here, all in `make proof`, many moments in benchmarks/faults.py.
+
+A named end and its exit status, the arm at rest within a second, no sample lost, a file that opens, a run that resumes
+to a pass, and a pass that is the truth.
+"""
+
+from pathlib import Path
+
+import pytest
+
+from support.fault_matrix.catalogue import BY_NAME
+from support.fault_matrix.cell import carry_out
+from support.fault_matrix.setups import SETUPS
+
+SPAN_S = {"six_observation": 29.0, "imu": 50.0}  # of the arm's motions, by the controller's clock
+FEW = ["controller: safeguard stop", "board: wire half-closed"]
+PROOF = [pytest.mark.proof, pytest.mark.thorough]
+
+pytestmark = [pytest.mark.slow, pytest.mark.timeout(600)]
+
+
+@pytest.mark.parametrize("name", FEW)
+def test_a_fault_in_a_sweep(name: str, tmp_path: Path) -> None:
+    cell = carry_out(
+        name, BY_NAME[name], "six_observation", tmp_path / "cell", moment=0.3, span_s=SPAN_S["six_observation"], seed=1
+    )
+    assert cell.met and not cell.deviations, cell
+
+
+@pytest.mark.parametrize("setup", [pytest.param(setup, marks=PROOF) for setup in SETUPS])
+@pytest.mark.parametrize("name", [pytest.param(name, marks=PROOF) for name in BY_NAME])
+def test_every_fault_in_the_middle_of_every_procedure(name: str, setup: str, tmp_path: Path) -> None:
+    cell = carry_out(name, BY_NAME[name], setup, tmp_path / "cell", moment=0.5, span_s=SPAN_S[setup], seed=2)
+    assert cell.met and not cell.deviations, cell
