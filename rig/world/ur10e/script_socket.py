@@ -73,11 +73,16 @@ def _path(lines: list[str]) -> Iterator[Move]:
             raise ProgramError(f"not simulated: {statement} in a path")
 
 
+def _unlock(robot: Robot) -> None:
+    if not robot.unlock_protective_stop():
+        robot.messages.say(TOO_EARLY)
+
+
 ORDERS: dict[str, Callable[[Robot], object]] = {
     "power on": Robot.power_on,
     "power off": Robot.power_off,
     "set robotmode run": Robot.brake_release,
-    "set unlock protective stop": lambda robot: robot.unlock_protective_stop() or robot.messages.say(TOO_EARLY),
+    "set unlock protective stop": _unlock,
     "stop program": lambda robot: robot.stop_program("stopped by a client"),
     "pause program": Robot.pause,
     "resume program": Robot.resume,
