@@ -32,7 +32,6 @@ class Bench:
         self.process: subprocess.Popen[str] | None = None
         self._environment = {**os.environ, **environment}
         self.companions: list[subprocess.Popen[str]] = []  # other programs that a fault has started
-        self.errors = ""
 
     # -- the command -------------------------------------------------------------------------------------------------
     def start(self) -> None:
@@ -40,16 +39,17 @@ class Bench:
 
     def rig(self, *arguments: str) -> subprocess.Popen[str]:
         """`rig …`, in a session of its own, as a terminal would start it."""
-        return subprocess.Popen(
-            [sys.executable, "-m", "rig", *arguments],
-            cwd=ROOT,
-            env=self._environment,
-            stdin=subprocess.DEVNULL,
-            stdout=subprocess.DEVNULL,
-            stderr=(self.config.parent / f"{arguments[0]}.txt").open("w", encoding="utf-8"),
-            text=True,
-            start_new_session=True,
-        )
+        with (self.config.parent / f"{arguments[0]}.txt").open("w", encoding="utf-8") as errors:
+            return subprocess.Popen(
+                [sys.executable, "-m", "rig", *arguments],
+                cwd=ROOT,
+                env=self._environment,
+                stdin=subprocess.DEVNULL,
+                stdout=subprocess.DEVNULL,
+                stderr=errors,
+                text=True,
+                start_new_session=True,
+            )
 
     @property
     def running(self) -> bool:
