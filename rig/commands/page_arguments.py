@@ -11,6 +11,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 from rig.errors import Refused
+from rig.station.plain_text import say
 
 if TYPE_CHECKING:
     from rig.page.serving import Address
@@ -116,11 +117,11 @@ def operators_page(wanted: PageWish | None, folder: Path, about: "Callable[[], A
     with ExitStack() as stack:
         url = stack.enter_context(serving(feed, control, folder, wanted.address()))
         lookout = stack.enter_context(looking_out(folder, feed))
-        print(f"page: {url}", file=sys.stderr, flush=True)
+        say(f"page: {url}", sys.stderr)
         stack.enter_context(control.stoppable())
 
         def asked(announcement: Sequence[str], to_do: str) -> bool:
-            print(f"The operator is asked on the page, whether to {to_do}.", file=sys.stderr, flush=True)
+            say(f"The operator is asked on the page, whether to {to_do}.", sys.stderr)
             return control.ask(announcement, to_do)
 
         yield OperatorsPage((feed, lookout), asked if wanted.may_answer else None, stay_for_the_operator)
@@ -129,7 +130,7 @@ def operators_page(wanted: PageWish | None, folder: Path, about: "Callable[[], A
 def stay_for_the_operator() -> None:
     """Where somebody sits at the terminal, the page with its verdict stays until Ctrl-C; a script goes on."""
     if sys.stdin is not None and sys.stdin.isatty():
-        print("The page stays until Ctrl-C.", file=sys.stderr, flush=True)
+        say("The page stays until Ctrl-C.", sys.stderr)
         wait_for_interrupt()
 
 

@@ -18,6 +18,7 @@ from rig.page.serving import serving
 from rig.page.shown import About, Shown
 from rig.report.certificate.writer import PAGE as CERTIFICATE
 from rig.station.events import DocumentWritten, Interrupted, RunEvent
+from rig.station.plain_text import say
 
 LOG_TAIL = 3  # lines of the log that say how a run without a result ended
 
@@ -33,13 +34,13 @@ def watch(folder: Path, wanted: PageWish, speed: float) -> int:
     result = read_result(folder / RESULT) if (folder / RESULT).exists() else None
     feed = Feed(Shown(_about(folder, runs)))
     with serving(feed, Control(may_answer=False), folder, wanted.address()) as url:
-        print(f"page: {url}", file=sys.stderr, flush=True)
+        say(f"page: {url}", sys.stderr)
         try:
             for run in runs:
                 _replay(moments(run), feed, speed)
             for event in _ending(folder, result):
                 feed.event(event)
-            print("All is replayed. The page stays until Ctrl-C.", file=sys.stderr, flush=True)
+            say("All is replayed. The page stays until Ctrl-C.", sys.stderr)
             wait_for_interrupt()
         except KeyboardInterrupt:
             pass
