@@ -13,7 +13,7 @@ from rich.console import Console
 from rig.config.load import load
 from rig.data.run_folder import RESULT, recordings
 from rig.errors import Refused, RigError
-from rig.history.documents import change_entry, history_csv, history_json, rigs_json, text_of
+from rig.history.documents import change_entry, history_csv_text, history_json_text, json_text, rigs_json_text
 from rig.history.finished import Finished, finished_run
 from rig.history.integrity import examined
 from rig.history.place import ENVIRONMENT, OFF, Place, place
@@ -42,9 +42,9 @@ def listed(options: Namespace) -> int:
         pasts = _selected(history, selection)
     found = {subject: trends(each) for subject, each in subjects(pasts).items()}
     if options.csv:
-        print(history_csv(pasts), end="")
+        print(history_csv_text(pasts), end="")
     elif options.json:
-        print(history_json(pasts, found if selection.serial_number is not None else None))
+        print(history_json_text(pasts, found if selection.serial_number is not None else None))
     else:
         console = Console(highlight=False)
         console.print(calibrations_table(pasts))
@@ -101,7 +101,7 @@ def rigs(options: Namespace) -> int:
     states, found = rig_states(pasts), effects(pasts)
     alarmed = any(chart.out_of_control for state in states for chart in state.charts.values() if chart.alarm.size)
     if options.json:
-        print(rigs_json(states, found))
+        print(rigs_json_text(states, found))
         return DISAGREE if alarmed else 0
     console = Console(highlight=False)
     if any(state.charts for state in states):
@@ -157,7 +157,7 @@ def compare(options: Namespace) -> int:
     found = changes(first, second)
     if options.json:
         numbers = {"before": first.id, "now": second.id}
-        print(text_of({**numbers, "parameters": {each.name: change_entry(each) for each in found}}))
+        print(json_text({**numbers, "parameters": {each.name: change_entry(each) for each in found}}))
         return 0
     Console(highlight=False).print(changes_table(f"{title_of(first.subject)}: {first.id} and {second.id}", found))
     return 0

@@ -8,6 +8,7 @@ from typing import Any
 
 import numpy as np
 
+from rig.errors.quoting import printable
 from rig.history.parameters import Parameter
 from rig.history.series import YEAR_DAYS, Change, RigState, Subject, Trend
 from rig.history.statistics.charts import Chart
@@ -41,7 +42,7 @@ COLUMNS = (
 )
 
 
-def history_json(pasts: Sequence[Past], trends: Mapping[Subject, Mapping[str, Trend]] | None = None) -> str:
+def history_json_text(pasts: Sequence[Past], trends: Mapping[Subject, Mapping[str, Trend]] | None = None) -> str:
     """Calibrations, and with `trends` what they say over time."""
     document: dict[str, Any] = {"schema": SCHEMA, "calibrations": [calibration_entry(each) for each in pasts]}
     if trends is not None:
@@ -49,10 +50,10 @@ def history_json(pasts: Sequence[Past], trends: Mapping[Subject, Mapping[str, Tr
             {**subject_entry(subject), "parameters": {name: trend_entry(trend) for name, trend in each.items()}}
             for subject, each in trends.items()
         ]
-    return text_of(document)
+    return json_text(document)
 
 
-def history_csv(pasts: Sequence[Past]) -> str:
+def history_csv_text(pasts: Sequence[Past]) -> str:
     """Comma-separated, with a heading; empty where nothing is known."""
     out = io.StringIO(newline="")
     writer = csv.DictWriter(out, COLUMNS, lineterminator="\n")
@@ -61,7 +62,8 @@ def history_csv(pasts: Sequence[Past]) -> str:
         entry = calibration_entry(past)
         shared = {name: entry[name] for name in COLUMNS if name in entry}
         for name, values in entry["parameters"].items():
-            writer.writerow({**shared, "parameter": name, **values})
+            row = {**shared, "parameter": name, **values}
+            writer.writerow({key: printable(cell) if isinstance(cell, str) else cell for key, cell in row.items()})
     return out.getvalue()
 
 
@@ -120,7 +122,7 @@ def change_entry(change: Change) -> dict[str, Any]:
     }
 
 
-def rigs_json(states: Sequence[RigState], effects: Mapping[str, Sequence[RigEffect]]) -> str:
+def rigs_json_text(states: Sequence[RigState], effects: Mapping[str, Sequence[RigEffect]]) -> str:
     """What check standards and shared sensors say of rigs; effects on scale factors are fractions."""
     document = {
         "schema": SCHEMA,
@@ -148,7 +150,7 @@ def rigs_json(states: Sequence[RigState], effects: Mapping[str, Sequence[RigEffe
             for name, found in effects.items()
         },
     }
-    return text_of(document)
+    return json_text(document)
 
 
 def chart_entry(chart: Chart) -> dict[str, Any]:
@@ -162,7 +164,7 @@ def chart_entry(chart: Chart) -> dict[str, Any]:
     }
 
 
-def text_of(document: Mapping[str, Any]) -> str:
+def json_text(document: Mapping[str, Any]) -> str:
     """As JSON."""
     return json.dumps(document, indent=2, allow_nan=False, ensure_ascii=False)
 

@@ -39,7 +39,8 @@ def _autoregression(centred: Array, memory: int, longest: int) -> tuple[float, f
     coefficients, innovations = predicted(centred[longest - memory :], memory)
     count, power = len(innovations), float(innovations @ innovations)
     criterion = count * float(np.log(power / count)) + 2 * memory
-    return criterion, power / (count - memory) / (1 - float(coefficients.sum())) ** 2
+    damped = (1 - float(coefficients.sum())) ** 2
+    return criterion, power / (count - memory) / damped if damped else np.inf  # what never returns has no mean
 
 
 def predicted(residuals: Array, memory: int) -> tuple[Array, Array]:

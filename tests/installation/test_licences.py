@@ -19,6 +19,8 @@ LOOKED_AT = {
     "saxonche": "MPL-2.0, unchanged: tests, states none in its metadata",
     "pyphen": "MPL-1.1, GPL-2.0+ or LGPL-2.1+: extra pdf, imported by WeasyPrint",
     "docutils": "public domain, BSD, GPL in single files: tests",
+    "psycopg": "LGPL-3.0: extra postgres",
+    "psycopg-binary": "LGPL-3.0: extra postgres",
     "allantools": "LGPL-3.0: tests",
     "dcclib": "LGPL-3.0: tests",
     "dcc-json-toolkit": "LGPL-2.1: tests",
