@@ -18,6 +18,7 @@ if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
 RATE_HZ = 25.0  # at which TRIAX samples
+GAP_S = 1.0
 
 
 def write_earth_rate_figures(outcome: Outcome, document: ResultDocument, folder: Path) -> tuple[RunEvent, ...]:
@@ -67,12 +68,19 @@ def draw_errors(figure: "Figure", time_s: Array, turned: Array, error: Array) ->
     """Left as Fig. 2, right as Fig. 3, in °/s."""
     left, right = figure.subplots(1, 2)
     for i, axis in enumerate("xyz"):
-        left.plot(*envelope(time_s, np.degrees(turned[:, i])), lw=0.7, color=f"C{i}", label=axis)
+        left.plot(*_curve(time_s, np.degrees(turned[:, i])), lw=0.7, color=f"C{i}", label=axis)
         std = np.degrees(error[:, i].std())
         right.plot(
-            *envelope(time_s, np.degrees(error[:, i])), lw=0.5, alpha=0.8, color=f"C{i}", label=f"{axis}, σ {std:.4f}"
+            *_curve(time_s, np.degrees(error[:, i])), lw=0.5, alpha=0.8, color=f"C{i}", label=f"{axis}, σ {std:.4f}"
         )
     left.set(xlabel="time s", ylabel="°/s", title="rate of the flange in its own frame")
     right.set(xlabel="time s", ylabel="°/s", title="corrected reading − rate of flange and Earth")
     for panel in (left, right):
         panel.legend(frameon=False, ncols=3, fontsize=8)
+
+
+def _curve(time_s: Array, values: Array) -> tuple[Array, Array]:
+    """Without a line across what the arm's states do not cover."""
+    times, values = envelope(time_s, values)
+    gaps = np.flatnonzero(np.diff(times) > GAP_S) + 1
+    return np.insert(times, gaps, np.nan), np.insert(values, gaps, np.nan)
