@@ -49,7 +49,6 @@ class Cortex:
         self._left = engine.registers([arm.UC_ARM_REG_PC, arm.UC_ARM_REG_SP])
         self._floats = engine.registers(_FLOATS)
         self._masks = engine.registers(_MASKS)
-        self._primask = engine.registers(_MASKS[:1])
         self._everything = engine.registers([*_CALLER_SAVED, *_STATE, *_MASKS])
         self._restored = engine.registers([*_STATE, *_CALLER_SAVED, arm.UC_ARM_REG_PC])
         self._link = engine.registers([*_STATE, arm.UC_ARM_REG_LR])
@@ -96,10 +95,6 @@ class Cortex:
         (entry,) = struct.unpack("<I", self._engine.read(vectors + 4 * number, 4))
         self._jump(entry, f"the vector of exception {number} (interrupt {number - FIRST_IRQ})")
         return Entry.TAKEN
-
-    def unmask(self) -> None:
-        """Clear PRIMASK."""
-        self._primask.write([0])
 
     def masks_pending(self) -> bool:
         """Whether an exception waits that is still held off."""

@@ -21,7 +21,6 @@ _FLASH = 0x0800_0000
 _RAM, _RAM_SIZE = 0x2000_0000, 64 * 1024  # SRAM1, then SRAM2 at its second address
 _SYSTEM_MEMORY, _UNIQUE_ID, _FLASH_KB = 0x1FFF_7000, 0x1FFF_7590, 0x1FFF_75E0
 _WFI, _BRANCH_TO_SELF = 0xBF30, 0xE7FE
-_CPSIE_I, _ISB = b"\x62\xb6", b"\xbf\xf3\x6f\x8f"
 _EXCEPTION_RETURN = 8
 _EXCEPTION_CYCLES = 12 + 10  # entry and return (Cortex-M4 Technical Reference Manual, 3.9), charged at the entry
 _CORE_EXCEPTIONS = {2: "supervisor call", 7: "breakpoint"}
@@ -170,30 +169,10 @@ class EmulatedBoard:
                 timeline.now = max(timeline.now, timeline.next_due)
             elif timeline.now >= limit:
                 return
-            elif entry is not Entry.MASKED or not self._unmasks():
+            else:
                 # Nothing tells when the firmware unmasks a waiting exception: look after every block
                 timeline.run_until(limit, cortex.masks_pending if entry is Entry.MASKED else None)
                 self._execute()
-
-    def _unmasks(self) -> bool:
-        """Whether the next block was but a barrier or the end of PRIMASK: then it has been executed.
-
-        The firmware wakes to these two each time, and to start the engine for them costs more than the handler.
-        """
-        cortex = self._cortex
-        ticks = self._costs[cortex.pc]
-        if not ticks:  # the engine has not met it as a block yet
-            return False
-        code = self._engine.read(cortex.pc, len(_ISB))
-        if code == _ISB:
-            cortex.pc += len(_ISB)
-        elif code.startswith(_CPSIE_I):
-            cortex.unmask()
-            cortex.pc += len(_CPSIE_I)
-        else:
-            return False
-        self._timeline.now += ticks
-        return True
 
     def _execute(self) -> None:
         """Run the core until the deadline, WFI or a fault."""
