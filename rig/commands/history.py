@@ -13,7 +13,7 @@ from rich.console import Console
 from rig.config.load import load
 from rig.data.run_folder import RESULT, recordings
 from rig.errors import Refused, RigError
-from rig.history.documents import change_entry, history_csv_text, history_json_text, json_text, rigs_json_text
+from rig.history.documents import change_entry, history_csv, history_document, rigs_document
 from rig.history.finished import Finished, finished_run
 from rig.history.integrity import examined
 from rig.history.place import ENVIRONMENT, OFF, Place, place
@@ -42,9 +42,11 @@ def listed(options: Namespace) -> int:
         pasts = _selected(history, selection)
     found = {subject: trends(each) for subject, each in subjects(pasts).items()}
     if options.csv:
-        print(history_csv_text(pasts), end="")
+        for line in history_csv(pasts).splitlines():
+            say(line)
     elif options.json:
-        print(history_json_text(pasts, found if selection.serial_number is not None else None))
+        document = history_document(pasts, found if selection.serial_number is not None else None)
+        print(json.dumps(document, indent=2, allow_nan=False))
     else:
         console = Console(highlight=False)
         console.print(calibrations_table(pasts))
@@ -61,7 +63,7 @@ def show(options: Namespace) -> int:
         past = history.calibration(options.number)
         (kept,) = history.kept(past.run_id)
     if options.json:
-        print(json.dumps(json.loads(kept.result), indent=2, ensure_ascii=False))
+        print(json.dumps(json.loads(kept.result), indent=2))
         return 0
     console = Console(highlight=False)
     console.print(calibrations_table([past]))
@@ -101,7 +103,7 @@ def rigs(options: Namespace) -> int:
     states, found = rig_states(pasts), effects(pasts)
     alarmed = any(chart.out_of_control for state in states for chart in state.charts.values() if chart.alarm.size)
     if options.json:
-        print(rigs_json_text(states, found))
+        print(json.dumps(rigs_document(states, found), indent=2, allow_nan=False))
         return DISAGREE if alarmed else 0
     console = Console(highlight=False)
     if any(state.charts for state in states):
@@ -157,7 +159,8 @@ def compare(options: Namespace) -> int:
     found = changes(first, second)
     if options.json:
         numbers = {"before": first.id, "now": second.id}
-        print(json_text({**numbers, "parameters": {each.name: change_entry(each) for each in found}}))
+        document = {**numbers, "parameters": {each.name: change_entry(each) for each in found}}
+        print(json.dumps(document, indent=2, allow_nan=False))
         return 0
     Console(highlight=False).print(changes_table(f"{title_of(first.subject)}: {first.id} and {second.id}", found))
     return 0

@@ -2,13 +2,11 @@
 
 import csv
 import io
-import json
 from collections.abc import Mapping, Sequence
 from typing import Any
 
 import numpy as np
 
-from rig.errors.quoting import printable
 from rig.history.parameters import Parameter
 from rig.history.series import YEAR_DAYS, Change, RigState, Subject, Trend
 from rig.history.statistics.charts import Chart
@@ -42,7 +40,9 @@ COLUMNS = (
 )
 
 
-def history_json_text(pasts: Sequence[Past], trends: Mapping[Subject, Mapping[str, Trend]] | None = None) -> str:
+def history_document(
+    pasts: Sequence[Past], trends: Mapping[Subject, Mapping[str, Trend]] | None = None
+) -> dict[str, Any]:
     """Calibrations, and with `trends` what they say over time."""
     document: dict[str, Any] = {"schema": SCHEMA, "calibrations": [calibration_entry(each) for each in pasts]}
     if trends is not None:
@@ -50,10 +50,10 @@ def history_json_text(pasts: Sequence[Past], trends: Mapping[Subject, Mapping[st
             {**subject_entry(subject), "parameters": {name: trend_entry(trend) for name, trend in each.items()}}
             for subject, each in trends.items()
         ]
-    return json_text(document)
+    return document
 
 
-def history_csv_text(pasts: Sequence[Past]) -> str:
+def history_csv(pasts: Sequence[Past]) -> str:
     """Comma-separated, with a heading; empty where nothing is known."""
     out = io.StringIO(newline="")
     writer = csv.DictWriter(out, COLUMNS, lineterminator="\n")
@@ -62,8 +62,7 @@ def history_csv_text(pasts: Sequence[Past]) -> str:
         entry = calibration_entry(past)
         shared = {name: entry[name] for name in COLUMNS if name in entry}
         for name, values in entry["parameters"].items():
-            row = {**shared, "parameter": name, **values}
-            writer.writerow({key: printable(cell) if isinstance(cell, str) else cell for key, cell in row.items()})
+            writer.writerow({**shared, "parameter": name, **values})
     return out.getvalue()
 
 
@@ -122,9 +121,9 @@ def change_entry(change: Change) -> dict[str, Any]:
     }
 
 
-def rigs_json_text(states: Sequence[RigState], effects: Mapping[str, Sequence[RigEffect]]) -> str:
+def rigs_document(states: Sequence[RigState], effects: Mapping[str, Sequence[RigEffect]]) -> dict[str, Any]:
     """What check standards and shared sensors say of rigs; effects on scale factors are fractions."""
-    document = {
+    return {
         "schema": SCHEMA,
         "rigs": [
             {
@@ -150,7 +149,6 @@ def rigs_json_text(states: Sequence[RigState], effects: Mapping[str, Sequence[Ri
             for name, found in effects.items()
         },
     }
-    return json_text(document)
 
 
 def chart_entry(chart: Chart) -> dict[str, Any]:
@@ -162,11 +160,6 @@ def chart_entry(chart: Chart) -> dict[str, Any]:
         "limit": _numbers(chart.limit),
         "alarm": chart.alarm.tolist(),
     }
-
-
-def json_text(document: Mapping[str, Any]) -> str:
-    """As JSON."""
-    return json.dumps(document, indent=2, allow_nan=False, ensure_ascii=False)
 
 
 def _parameter(parameter: Parameter) -> dict[str, Any]:

@@ -120,16 +120,17 @@ class History:
 
     def enter(self, finished: Finished) -> Entered:
         """Add a run; one that is there already only gets the place of its folder noted, if that is another."""
+        content = finished.content_sha256
         try:
             with self._writing() as connection:
-                known = self._run_id(connection, finished.content_sha256)
-                run_id = _enter(connection, finished) if known is None else known
+                known = self._run_id(connection, content)
+                run_id = _enter(connection, finished, content) if known is None else known
                 _note_place(connection, run_id, finished)
                 return Entered(run_id, known is None)
         except IntegrityError:
             # Somebody else entered the same at the same moment, and was first.
             with self.engine.connect() as connection:
-                known = self._run_id(connection, finished.content_sha256)
+                known = self._run_id(connection, content)
             if known is None:
                 raise
             return Entered(known, False)
@@ -253,10 +254,10 @@ def _parameters(connection: Connection, numbers: Sequence[int]) -> dict[int, dic
     return {number: {name: each[name] for name in ORDER if name in each} for number, each in found.items()}
 
 
-def _enter(connection: Connection, finished: Finished) -> int:
+def _enter(connection: Connection, finished: Finished, content_sha256: str) -> int:
     origin = finished.document.provenance
     row = {
-        "content_sha256": finished.content_sha256,
+        "content_sha256": content_sha256,
         "measurement_sha256": finished.measurement_sha256,
         "started_utc": _utc(origin.started_utc),
         "solved_utc": _utc(origin.solved_utc),
