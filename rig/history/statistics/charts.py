@@ -18,7 +18,7 @@ Alarms = NDArray[np.bool_]
 
 FEWEST = 5  # results before which nothing is judged: of the spread of fewer, little is known
 SMOOTHING = 0.15  # λ: weight of the newest deviation
-EWMA_LIMIT = 2.75  # in standard deviations of the average; with the other an alarm in about 330 runs in control
+EWMA_LIMIT = 2.8  # in standard deviations of the average; with the other an alarm in about 340 runs in control
 SHEWHART_LIMIT = 4.0  # in standard deviations: 3 beside an EWMA would cost half the time between false alarms
 SPREAD_MIN = 1e-12  # of a value's own size: what arithmetic leaves of equal values is no spread
 
