@@ -38,7 +38,8 @@ def _autoregression(centred: Array, memory: int, longest: int) -> tuple[float, f
     """Akaike's criterion and the spectrum at zero, by as many residuals as with the `longest` memory."""
     coefficients, innovations = predicted(centred[longest - memory :], memory)
     count, power = len(innovations), float(innovations @ innovations)
-    criterion = count * float(np.log(power / count)) + 2 * memory
+    likelihood = count * float(np.log(power / count)) if power else -np.inf
+    criterion = likelihood + 2 * memory
     damped = (1 - float(coefficients.sum())) ** 2
     return criterion, power / (count - memory) / damped if damped else np.inf  # what never returns has no mean
 

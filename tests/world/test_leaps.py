@@ -151,12 +151,11 @@ def session(loaded: Loaded, ports: dict[str, int], dwell_s: float) -> tuple[dict
 
 @pytest.mark.slow
 @pytest.mark.timeout(240)
-@pytest.mark.parametrize(("name", "dwell_s"), [("kvh1775_earth.yaml", 0.6), ("demo.yaml", 0.1)])
-def test_every_wire_carries_the_same_bytes(name: str, dwell_s: float, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_every_wire_carries_the_same_bytes(monkeypatch: pytest.MonkeyPatch) -> None:
     found, host = [], fresh_host()
     for leap in (1, process.LEAP):
         monkeypatch.setattr(process, "LEAP", leap)
-        found.append(session(*loaded_from(name, host), dwell_s))
+        found.append(session(*loaded_from("kvh1775_earth.yaml", host), dwell_s=0.6))
     (one_by_one, looks), (leaping, fewer_looks) = found
     assert looks == 1.0 and fewer_looks > 1.5, "it leaps"
     for wire, said in one_by_one.items():
