@@ -215,11 +215,11 @@ def serve(loaded: Loaded, until_eof: bool) -> None:
             signal.signal(signal.SIGINT, signal.SIG_IGN)
             # A thread, because select() takes no pipe on Windows; it only waits.
             threading.Thread(target=_await_end_of_input, args=(world,), daemon=True).start()
-        print(world.describe(), flush=True)
         # What there is now stays: to look it through again and again for garbage would cost a twentieth of the pace.
         gc.collect()
         gc.freeze()
         gc.set_threshold(GARBAGE)
+        print(world.describe(), flush=True)
         world.run()
     except KeyboardInterrupt:
         pass
