@@ -13,7 +13,7 @@ from rig.history.store import open_history
 from support.past_runs import enter_many, finished
 from support.postgres import postgresql
 
-PROCESSES, ENTRIES = 8, 250
+PROCESSES, ENTRIES, FEW = 8, 250, 60
 pytestmark = pytest.mark.slow
 
 
@@ -26,13 +26,15 @@ def url(request: pytest.FixtureRequest, tmp_path: Path) -> Iterator[str]:
         yield found
 
 
-def test_of_what_eight_processes_enter_nothing_is_lost_and_nothing_stands_twice(url: str) -> None:
+@pytest.mark.proof
+def test_of_what_eight_processes_enter_nothing_is_lost_and_nothing_stands_twice(url: str, thorough: bool) -> None:
     """The tables are made by whoever comes first."""
+    entries = ENTRIES if thorough else FEW
     context = multiprocessing.get_context("forkserver")
     context.set_forkserver_preload(["support.past_runs"])
     with context.Pool(PROCESSES) as pool:
-        new = pool.starmap(enter_many, [(url, worker, ENTRIES) for worker in range(PROCESSES)])
-        assert new == [ENTRIES] * PROCESSES
+        new = pool.starmap(enter_many, [(url, worker, entries) for worker in range(PROCESSES)])
+        assert new == [entries] * PROCESSES
         again = pool.starmap(enter_many, [(url, worker % 2, 20) for worker in range(PROCESSES)])
         assert again == [0] * PROCESSES
     with open_history(url) as history:
@@ -41,8 +43,8 @@ def test_of_what_eight_processes_enter_nothing_is_lost_and_nothing_stands_twice(
                 connection.execute(text(f"SELECT count(*) FROM {table}")).scalar_one()
                 for table in ("run", "calibration", "parameter")
             )
-        assert (runs, calibrations, parameters) == (2000, 2000, 2000 * 10)
-        assert len({each.started_utc for each in history.calibrations()}) == 2000
+        assert (runs, calibrations, parameters) == (PROCESSES * entries, PROCESSES * entries, PROCESSES * entries * 10)
+        assert len({each.started_utc for each in history.calibrations()}) == PROCESSES * entries
 
 
 def test_a_history_of_version_1_is_migrated_there_too(url: str) -> None:

@@ -43,6 +43,8 @@ LABORATORY: dict[str, Any] = {
 pytestmark = [pytest.mark.slow, pytest.mark.timeout(300)]
 
 
+@pytest.mark.proof
+@pytest.mark.thorough
 def test_a_killed_run_loses_one_dwell_at_most_and_tells_every_repeat(tmp_path: Path) -> None:
     config, out = configuration(tmp_path, LABORATORY, PROCEDURE), tmp_path / "run"
     command = [sys.executable, "-m", "rig", "run", str(config), "--out", str(out), "--yes"]

@@ -13,7 +13,7 @@ from support.fault_matrix.cell import carry_out
 from support.fault_matrix.setups import SETUPS
 
 SPAN_S = {"six_observation": 29.0, "imu": 50.0}  # of the arm's motions, by the controller's clock
-FEW = ["controller: safeguard stop", "board: wire half-closed"]
+FEW = ["board: wire half-closed"]
 PROOF = [pytest.mark.proof, pytest.mark.thorough]
 
 pytestmark = [pytest.mark.slow, pytest.mark.timeout(600)]

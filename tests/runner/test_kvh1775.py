@@ -80,6 +80,8 @@ def test_without_a_board(message: str, tmp_path: Path) -> None:
     assert clock.drift == pytest.approx(8e-6, abs=5 * clock.drift_std + 1e-6), "its oscillator is 8 ppm slow"
 
 
+@pytest.mark.proof
+@pytest.mark.thorough
 @pytest.mark.slow
 def test_beside_a_board_whose_reference_verifies_it(tmp_path: Path) -> None:
     verify = {"procedure": {"verify": True}}

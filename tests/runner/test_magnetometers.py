@@ -118,6 +118,8 @@ def test_solving_the_recording_equals_the_run(finished: tuple[Path, dict[str, An
     assert json.loads(rig_here("solve", out, "--json").stdout)["magnetometers"] == result["magnetometers"]
 
 
+@pytest.mark.proof
+@pytest.mark.thorough
 def test_turning_it_over_tells_its_own_bias_from_the_arms_field(
     finished: tuple[Path, dict[str, Any], str], tmp_path: Path
 ) -> None:
@@ -143,10 +145,13 @@ def test_turning_it_over_tells_its_own_bias_from_the_arms_field(
     "world",
     [
         {"site": {"magnetic_gradient_ut_m": [2.0, 1.0, -3.0, 1.0, 1.0]}},
-        {
-            "arm": {"iron": {"housing": {"moment_a_m2": [0.12, 0.12, 0.1]}}},
-            "magnetometers": {"compass": {"offset_mm": [0, 0, 100]}},
-        },
+        pytest.param(
+            {
+                "arm": {"iron": {"housing": {"moment_a_m2": [0.12, 0.12, 0.1]}}},
+                "magnetometers": {"compass": {"offset_mm": [0, 0, 100]}},
+            },
+            marks=[pytest.mark.proof, pytest.mark.thorough],
+        ),
     ],
     ids=["gradient", "iron"],
 )
@@ -161,6 +166,8 @@ def test_a_room_or_an_arm_that_bends_the_field_is_refused(tmp_path: Path, world:
     )
 
 
+@pytest.mark.proof
+@pytest.mark.thorough
 def test_sweeps_record_a_magnetometer_and_say_that_they_do_not_calibrate_it(tmp_path: Path) -> None:
     """Also beside a verification, in which its samples stay raw."""
     laboratory = merge(LABORATORY, {"sensors": {"gyro": {"acceleration": None}}})

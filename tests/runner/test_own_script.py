@@ -61,6 +61,8 @@ def test_resuming_by_another_script_is_refused(interrupted: Path) -> None:
         assert refused.returncode == 2 and "rig: another_script: " in refused.stderr, refused.stderr
 
 
+@pytest.mark.proof
+@pytest.mark.thorough
 def test_an_interrupted_script_of_ones_own_is_resumed_by_itself(interrupted: Path) -> None:
     used = interrupted / "config.yaml"
     faster = merge(yaml.safe_load(used.read_text(encoding="utf-8")), {"world": {"time_scale": 12}})

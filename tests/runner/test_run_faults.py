@@ -190,6 +190,8 @@ def test_a_run_folder_that_is_removed_during_the_run_is_a_named_fault(start: Sta
     assert rig.stopped_after_s() == pytest.approx(0, abs=0.1)
 
 
+@pytest.mark.proof
+@pytest.mark.thorough
 def test_resume_repeats_the_sweep_that_was_refused(start: Start) -> None:
     fast = {"speed_deg_s": 150, "acceleration_deg_s2": 400, "rest_s": 0.5}
     rig = start({"world": {"time_scale": 8}, "procedure": fast, "limits": {"scale_std": 1, "bias_std_rad_s": 1}})
