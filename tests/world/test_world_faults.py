@@ -305,7 +305,7 @@ def test_a_configuration_without_a_world_is_refused() -> None:
 def test_the_world_ends_with_its_input_and_ignores_the_terminals_interrupt(world: World) -> None:
     running = world()
     running.process.send_signal(signal.SIGINT)
-    assert running.state()["time_s"] > 0.0
+    wait_for(lambda: running.state()["time_s"] > 0.0, "the first tick")
     running.stop()
     assert running.process.returncode == 0
 
