@@ -11,8 +11,7 @@ from rig.data.run_file import RunData
 from rig.data.settings import ObservationThresholds
 from rig.errors import Fault
 from rig.estimation.arrays import Array
-from rig.observation.average import Mean, Stream, between, mean_of, tapered_mean
-from rig.observation.tapered import vibrates
+from rig.observation.average import Mean, Stream, between, mean_at_rest
 from rig.observation.timebase import ArmMotion
 from rig.observation.windows import Dwelt, Window, dwelt
 
@@ -87,23 +86,16 @@ def dwell_reading(stream: Stream, motion: ArmMotion, finished: Dwelt, settings: 
     _check_standing(motion, window, where)
     check_complete(stream.raw[inside], where, settings)
     check_acceleration(stream, inside, where)
+    count = stream.sensor.sensitivity_m_s2_per_count or 0.0
+    reading, _ = mean_at_rest(accelerations(stream, inside), stream.time_s[inside], window, count)
     return DwellReading(
         index=dwell.index,
         name=dwell.name,
-        reading=_mean(accelerations(stream, inside), stream, inside, window),
+        reading=reading,
         attitude=motion.attitude(window.start_s, window.end_s),
         window=window,
         temperature_c=stream.temperature_c(inside),
     )
-
-
-def _mean(readings: Array, stream: Stream, inside: slice, window: Window) -> Mean:
-    """Weights come and go where the arm vibrates: 2 mg at 14 Hz leave 10 µg in an even mean of three seconds."""
-    count = stream.sensor.sensitivity_m_s2_per_count or 0.0
-    if vibrates(readings):
-        return tapered_mean(readings, stream.time_s[inside], window, count)
-    steady, known = np.zeros((len(readings), 1)), np.ones(len(readings), dtype=np.bool_)
-    return mean_of(readings, count, steady, known, as_before=False)
 
 
 def _check_standing(motion: ArmMotion, window: Window, where: str) -> None:

@@ -24,7 +24,6 @@ from rig.observation.acceleration import DwellReading, dwell_reading, dwell_read
 from rig.observation.average import Average, Stream, average, average_at_rest, between, on_the_arms_clock
 from rig.observation.revolution import Revolution, arm_states_lost, describe, find_revolution
 from rig.observation.swept_acceleration import SweptAcceleration, swept_acceleration
-from rig.observation.tapered import vibrates
 from rig.observation.timebase import ArmMotion, TimeBase
 from rig.observation.windows import Finished, Window, dwelt, finished_dwells, finished_sweeps, rested, swept
 
@@ -259,12 +258,7 @@ def _rest(stream: Stream, motion: ArmMotion, window: Window, *, as_before: bool)
         return None
     if np.ptp(states["q_rad"], axis=0).max() > MAX_REST_TRAVEL_RAD:
         return None
-    window = Window(start, end)
-    if not as_before and vibrates(stream.readings_rad_s[inside]):
-        return _placed(average_at_rest(stream, inside, window), motion)
-    count = inside.stop - inside.start
-    steady, known = np.zeros((count, 1)), np.ones(count, dtype=np.bool_)
-    return _placed(average(stream, inside, window, steady, known, as_before=as_before), motion)
+    return _placed(average_at_rest(stream, inside, Window(start, end), as_before=as_before), motion)
 
 
 def _lost(stream: Stream, inside: slice, where: str, settings: ObservationThresholds) -> int:
