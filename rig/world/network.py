@@ -102,8 +102,7 @@ class Connection:
             except BlockingIOError:
                 sent = 0
             except OSError:
-                self.close()
-                return
+                return  # it has hung up; reading meets that after what it said before
             data = data[sent:]
         if data and len(self._unsent) < BACKLOG_BYTES:
             self._unsent += data
@@ -115,8 +114,7 @@ class Connection:
         except BlockingIOError:
             return
         except OSError:
-            self.close()
-            return
+            sent = len(self._unsent)
         del self._unsent[:sent]
         self.watch()
 
