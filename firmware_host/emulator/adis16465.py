@@ -162,6 +162,11 @@ class Adis16465:
             self._answer = self._read(address & ~1)
         return answer
 
+    def foretell(self) -> bytes:
+        """All of a burst: it is of the moment at which it began."""
+        told, self._burst = self._burst or b"", self._burst and b""
+        return told
+
     # --- frames
 
     def _check_pause(self, time_s: float) -> None:

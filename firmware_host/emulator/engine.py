@@ -7,6 +7,7 @@ far more often yet is not for Python at all: see `hooks.py`.
 """
 
 import ctypes
+import mmap
 import weakref
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
@@ -44,9 +45,6 @@ _quick = ctypes.PyDLL(uclib._name, handle=uclib._handle)
 _start = _quick.uc_emu_start
 _start.argtypes = uclib.uc_emu_start.argtypes
 _read_registers, _write_registers = _quick.uc_reg_read_batch, _quick.uc_reg_write_batch
-_read_memory, _write_memory = _quick.uc_mem_read, _quick.uc_mem_write
-_read_memory.argtypes = _write_memory.argtypes = ctypes.c_void_p, ctypes.c_uint64, ctypes.c_void_p, ctypes.c_size_t
-_SCRATCH_BYTES = 512
 _NO_END = 0xFFFF_FFFF  # an address the core never executes: only stop(), WFI and faults end a run
 
 # Unicorn passes one argument more to all of these, the user's data: what is not looked at need not be converted
@@ -119,17 +117,17 @@ class Engine:
         _check(uclib.uc_ctl(self._handle, _SET_CPU_MODEL, ctypes.c_int(UC_CPU_ARM_CORTEX_M4)))
         weakref.finalize(self, uclib.uc_close, self._handle)
         self._callbacks: list[Any] = []  # ctypes callbacks live as long as the engine
-        self._scratch = ctypes.create_string_buffer(_SCRATCH_BYTES)
+        self._memories: list[tuple[int, int, mmap.mmap]] = []  # first address, the one after the last, contents
         self._raised: BaseException | None = None
         self._fault_place: list[int] | None = None
         self._place = self.registers([UC_ARM_REG_PC, UC_ARM_REG_LR])
         self.paused = False  # the last run ended at the deadline
 
     def map_ram(self, address: int, size: int) -> None:
-        _check(uclib.uc_mem_map(self._handle, address, size, UC_PROT_ALL))
+        self._map(address, size, UC_PROT_ALL)
 
     def map_rom(self, address: int, size: int) -> None:
-        _check(uclib.uc_mem_map(self._handle, address, size, UC_PROT_READ | UC_PROT_EXEC))
+        self._map(address, size, UC_PROT_READ | UC_PROT_EXEC)
 
     def map_io(
         self,
@@ -250,13 +248,18 @@ class Engine:
 
     def read(self, address: int, size: int) -> bytes:
         """Read memory. Raises EngineFault where there is none."""
-        buffer = self._scratch if size <= _SCRATCH_BYTES else ctypes.create_string_buffer(size)
-        _check(_read_memory(self._handle, address, buffer, size))
-        return buffer.raw[:size]
+        for first, end, memory in self._memories:
+            if first <= address and address + size <= end:
+                return memory[address - first : address - first + size]
+        raise EngineFault(f"memory read of {size} bytes at 0x{address:08X}, where there is none")
 
     def write(self, address: int, data: bytes) -> None:
-        """Write memory, read-only or not. Raises EngineFault where there is none."""
-        _check(_write_memory(self._handle, address, data, len(data)))
+        """Write memory, read-only or not, where no code has run yet. Raises EngineFault where there is none."""
+        for first, end, memory in self._memories:
+            if first <= address and address + len(data) <= end:
+                memory[address - first : address - first + len(data)] = data
+                return
+        raise EngineFault(f"memory write of {len(data)} bytes at 0x{address:08X}, where there is none")
 
     def run(self, address: int) -> None:
         """Run from `address` until `stop`, WFI or a fault. Raises EngineFault, or what a callback raised."""
@@ -273,6 +276,13 @@ class Engine:
     def stop(self) -> None:
         """Stop before the next block; inside a block hook, before the block that the hook announces."""
         uclib.uc_emu_stop(self._handle)
+
+    def _map(self, address: int, size: int, protection: int) -> None:
+        """Memory that the engine and Python share."""
+        memory = mmap.mmap(-1, size)
+        place = ctypes.addressof(ctypes.c_char.from_buffer(memory))
+        _check(uclib.uc_mem_map_ptr(self._handle, address, size, protection, place))
+        self._memories.append((address, address + size, memory))
 
     def _fail(self, error: BaseException) -> None:
         if self._raised is None:

@@ -87,10 +87,10 @@ class Port:
     def _outputs_changed(self) -> None:
         low = ~self._output & self._output_pins & self._watched_pins
         changed, self._watched_low = low ^ self._watched_low, low
-        if changed:
-            for pin, on_level in self._watched.items():
-                if changed >> pin & 1:
-                    on_level(not low >> pin & 1)
+        while changed:
+            pin = changed.bit_length() - 1
+            changed ^= 1 << pin
+            self._watched[pin](not low >> pin & 1)
 
 
 class Syscfg:

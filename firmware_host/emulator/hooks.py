@@ -13,6 +13,7 @@ import llvmlite.binding as llvm
 
 Int = ctypes.c_int64
 FIFO_PAIRS = 2
+KNOWN_PAIRS = 16
 
 
 class Time(ctypes.Structure):
@@ -85,14 +86,16 @@ class Bus(ctypes.Structure):
     `free`, two bytes take `pair_ticks`.
 
     `waiting` pairs of bytes are under way or not read yet: all of one is in at `ready`, and it is `answers`. `polled`:
-    the status was read in vain. `control`: how it is set up.
+    the status was read in vain. `control`: how it is set up, for the `setups`th time. What comes back for the next
+    pairs is `known` from the index `known_from` to before `known_to`, in the setup `known_in`.
     """
 
     _fields_ = (
         *((name, Int) for name in ("clocked", "speaks", "free", "pair_ticks", "half_bit_ticks", "polled", "waiting")),
         ("ready", Int * FIFO_PAIRS),
         ("answers", Int * FIFO_PAIRS),
-        ("control", Int),
+        *((name, Int) for name in ("control", "setups", "known_in", "known_from", "known_to")),
+        ("known", ctypes.c_uint16 * KNOWN_PAIRS),
     )
     clocked: int
     speaks: int
@@ -102,6 +105,20 @@ class Bus(ctypes.Structure):
     polled: int
     waiting: int
     control: int
+    setups: int
+    known_in: int
+    known_from: int
+    known_to: int
+
+    def foresee(self, answers: bytes) -> None:
+        """What the next pairs will bring, whatever is sent; nothing any more for no answers."""
+        ctypes.memmove(ctypes.addressof(self) + Bus.known.offset, answers, len(answers))  # type: ignore[attr-defined]
+        self.known_in, self.known_from, self.known_to = self.setups, 0, len(answers) // 2
+
+    def foreseen(self) -> int:
+        """The next of those."""
+        self.known_from += 1
+        return int(self.known[self.known_from - 1])  # type: ignore[attr-defined]
 
 
 class Shortcuts(ctypes.Structure):

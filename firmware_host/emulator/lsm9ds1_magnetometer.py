@@ -95,6 +95,10 @@ class Lsm9ds1Magnetometer:
         self._write(address, byte, time_s)
         return 0xFF
 
+    def foretell(self) -> bytes:
+        """Nothing: what is read decides what is shown next."""
+        return b""
+
     # --- registers
 
     def _reset(self) -> None:

@@ -23,7 +23,6 @@ class Spi1:
         self._timeline = timeline
         self._clocks = clocks
         self.bus = Bus()
-        self.setup_count = 0  # how often mode or clock have been set: what was checked before may no longer hold
         self._control = Stored("SPI1 CR1", 0x037F, after=self.retune)
         self._control2 = Stored("SPI1 CR2", 0, initial=0x0700)
         self.reset()
@@ -51,7 +50,7 @@ class Spi1:
         bus.control = control
         bus.speaks = control & _NEEDED == _NEEDED
         bus.pair_ticks, bus.half_bit_ticks = pair_ticks, pair_ticks // 32
-        self.setup_count += 1
+        bus.setups += 1  # what was checked before may no longer hold
 
     @property
     def busy(self) -> bool:

@@ -55,6 +55,12 @@ class SpiDevice(Protocol):
     def transfer(self, byte: int, time_s: float) -> int:
         """Exchange one byte. Raises Violation for what the part does not allow or the model does not know."""
 
+    def foretell(self) -> bytes:
+        """What it answers to the next pairs of bytes, whatever they are and whatever happens before chip select rises.
+
+        Asked for after the first pair of an access; what it tells counts as exchanged.
+        """
+
     def deselect(self, time_s: float) -> None:
         """Chip select rises, likewise."""
 
@@ -100,7 +106,8 @@ class SpiBus:
 
     def chip_select(self, link: "DeviceLink", low: bool) -> None:
         """A device's chip select goes down or up. Raises Violation when the bus has not finished."""
-        if self._spi.busy:
+        bus = self._spi.bus
+        if bus.free > self._timeline.now:
             raise Violation(
                 "spi_busy", f"the select of the {link.device.name} changes on a busy bus", "Wait until BSY is clear"
             )
@@ -109,21 +116,28 @@ class SpiBus:
         else:
             self._selected.remove(link)
         self._checked = _UNCHECKED
+        bus.known_to = 0
 
     def exchange(self, pair: int) -> int:
         """Pass two bytes, the first one low, to the selected device; its answers, likewise.
 
         Raises Violation when the bus is not set up as it must be.
         """
-        spi, timeline = self._spi, self._timeline
+        spi, timeline, bus = self._spi, self._timeline, self._spi.bus
         if timeline.next_due <= timeline.now:
             timeline.run_due()
-        if self._checked == spi.setup_count:
-            return self._selected[0].exchange(pair) if self._selected else 0xFFFF
-        self._check_wires()
-        answer = self._selected[0].exchange(pair) if self._selected else 0xFFFF
-        self._check_clock(spi)  # not before: the clock that a part accepts depends on what it is asked for
-        self._checked = spi.setup_count
+        setups, checked = bus.setups, self._checked
+        if checked != setups:
+            self._check_wires()
+        if bus.known_from < bus.known_to:
+            answer = bus.foreseen()
+        else:
+            answer = self._selected[0].exchange(pair) if self._selected else 0xFFFF
+        if checked != setups:
+            self._check_clock(spi)  # not before: the clock that a part accepts depends on what it is asked for
+            self._checked = bus.known_in = setups
+            if checked == _UNCHECKED and self._selected and (told := self._selected[0].foretell()):
+                bus.foresee(told)
         return answer
 
     def _check_wires(self) -> None:
@@ -178,17 +192,29 @@ class DeviceLink:
     def exchange(self, pair: int) -> int:
         """Pass two bytes to the device, the first one low, and return its answers likewise."""
         device = self.device
+        time_s = self._clock.seconds(self._timeline.now)
+        if device.fault is not None:
+            return self._exchange_faulty(pair, time_s)
+        answer = device.transfer(pair & 0xFF, time_s) | device.transfer(pair >> 8, time_s) << 8
+        if device.interrupt_level != self._level or device.next_event_s != self._due_s:
+            self._settle()
+        return answer
+
+    def foretell(self) -> bytes:
+        """What the device answers next, see `SpiDevice`; of a faulty one nothing is known."""
+        return self.device.foretell() if self.device.fault is None else b""
+
+    def _exchange_faulty(self, pair: int, time_s: float) -> int:
+        device = self.device
         if device.fault is Fault.ABSENT:
             return 0xFFFF
-        time_s = self._clock.seconds(self._timeline.now)
         answer = device.transfer(pair & 0xFF, time_s) | device.transfer(pair >> 8, time_s) << 8
         if device.fault is Fault.DAMAGED:
             self._sent += 2
             if self._sent >= _DAMAGED_BYTE:
                 self._sent -= _DAMAGED_BYTE
                 answer ^= 0x0001 if self._sent else 0x0100
-        if device.interrupt_level != self._level or device.next_event_s != self._due_s:
-            self._settle()
+        self._settle()
         return answer
 
     def _chip_select(self, high: bool) -> None:

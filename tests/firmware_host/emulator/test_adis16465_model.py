@@ -61,6 +61,22 @@ def test_a_burst_ends_where_it_ends() -> None:
     assert caught.value.name == "spi_frame"
 
 
+def test_a_burst_can_be_told_beforehand() -> None:
+    told, spoken = turning(), turning()
+    for driver in (told, spoken):
+        driver.await_data()
+    part, time_s = told.part, told.time_s + 1e-3
+    part.select(time_s)
+    part.transfer(GLOB_CMD, time_s)
+    part.transfer(0, time_s)
+    assert part.foretell() == spoken.burst()
+    with pytest.raises(Violation, match="10 words"):
+        part.transfer(0, time_s)
+    part.deselect(time_s)
+    part.select(time_s + 1e-3)
+    assert part.foretell() == b""
+
+
 def test_a_burst_is_slow() -> None:
     part = Adis16465Driver().part
     for first, max_hz in ((PROD_ID, 2e6), (GLOB_CMD, 1e6)):

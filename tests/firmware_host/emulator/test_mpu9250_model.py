@@ -117,6 +117,19 @@ def test_a_burst_is_of_one_moment() -> None:
     assert len(set(integers(data, ">"))) == 1
 
 
+@pytest.mark.parametrize(("pin", "told_pairs"), [(0, 3), (LATCH, 3), (ANY_READ_CLEARS, 0)])
+def test_what_reading_does_not_change_can_be_told_beforehand(pin: int, told_pairs: int) -> None:
+    driver = running(pin)
+    driver.await_data()
+    spoken = driver.get(GYRO_OUT, 6)
+    part, time_s = driver.part, driver.time_s
+    part.select(time_s)
+    part.transfer(0x80 | GYRO_OUT, time_s)
+    told = part.foretell()
+    assert told == spoken[: 2 * told_pairs]
+    assert told + bytes([part.transfer(0, time_s) for _ in range(6 - len(told))]) == spoken
+
+
 def test_asleep_it_does_not_convert_and_takes_35_ms_to_start() -> None:
     driver = running(LATCH)
     driver.set(PWR_MGMT_1, 0x01 | SLEEP)
