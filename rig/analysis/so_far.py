@@ -5,7 +5,7 @@ otherwise: of uncertainty there is the noise alone here.
 """
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, field, replace
 
 import numpy as np
 
@@ -14,29 +14,34 @@ from rig.data.run_file import RunData
 from rig.errors import Fault
 from rig.estimation.arrays import Array
 from rig.estimation.vector_model import VectorSolution
+from rig.observation.acceleration import DwellReading, each_dwell
 from rig.observation.average import Average
 from rig.observation.observe import Observation, each_sweep, observe_sensor
 from rig.observation.timebase import ArmMotion
-from rig.observation.windows import finished_sweeps
+from rig.observation.windows import finished_dwells, finished_sweeps
 
 
 @dataclass(frozen=True, slots=True)
 class SoFar:
     """Of one sensor: each finished sweep's observation or the Fault it ends in, by the sweep's index.
 
-    The `solution` is the vector model's, or the Fault that says what is missing yet. `bias_rad_s` (3,) is that of the
-    rests alone, with its standard deviation, None without rests.
+    `dwells` are the same of what its accelerometer read in each finished dwell; `gravity_m_s2` is the site's, None in
+    recordings of before there was one. The `solution` is the vector model's, or the Fault that says what is missing
+    yet. `bias_rad_s` (3,) is that of the rests alone, with its standard deviation, None without rests.
     """
 
     sweeps: Mapping[int, Observation | Fault]
     solution: VectorSolution | Fault
     bias_rad_s: tuple[Array, Array] | None
+    dwells: Mapping[int, DwellReading | Fault] = field(default_factory=dict)
+    gravity_m_s2: float | None = None
 
 
 def so_far(runs: Sequence[RunData]) -> dict[str, SoFar]:
-    """What recordings of raw readings hold, by sensor; a sweep that several hold counts in the last one."""
+    """What recordings of raw readings hold, by sensor; a sweep or dwell that several hold counts in the last one."""
     sweeps: dict[str, dict[int, Observation | Fault]] = {}
     rests: dict[str, list[Average]] = {}
+    dwells: dict[str, dict[int, DwellReading | Fault]] = {}
     for run in runs:
         try:
             motion = ArmMotion(run.arm, run.provenance.kinematics)
@@ -46,8 +51,15 @@ def so_far(runs: Sequence[RunData]) -> dict[str, SoFar]:
             found, rested = _observed(run, name, motion)
             sweeps.setdefault(name, {}).update(found)
             rests.setdefault(name, []).extend(rested)
+            dwells.setdefault(name, {}).update(_dwelt(run, name, motion))
+    site = runs[-1].settings.site
     return {
-        name: _sensor(found, rests[name], np.array(runs[-1].sensors[name].mounting)) for name, found in sweeps.items()
+        name: replace(
+            _sensor(found, rests[name], np.array(runs[-1].sensors[name].mounting)),
+            dwells=dict(sorted(dwells[name].items())),
+            gravity_m_s2=None if site is None else site.gravity_m_s2,
+        )
+        for name, found in sweeps.items()
     }
 
 
@@ -61,6 +73,13 @@ def _observed(run: RunData, name: str, motion: ArmMotion) -> tuple[dict[int, Obs
     except Fault as fault:  # of the sensor as a whole, such as a clock that is not found
         return dict.fromkeys(finished_sweeps(run), fault), ()
     return {**found, **{each.sweep: each for each in seen.revolutions}}, seen.rests
+
+
+def _dwelt(run: RunData, name: str, motion: ArmMotion) -> dict[int, DwellReading | Fault]:
+    try:
+        return each_dwell(run, name, motion, run.settings.observation)
+    except Fault as fault:  # of the sensor as a whole
+        return dict.fromkeys(finished_dwells(run), fault)
 
 
 def _sensor(sweeps: Mapping[int, Observation | Fault], rests: Sequence[Average], mounting: Array) -> SoFar:

@@ -9,7 +9,7 @@ from numpy.typing import NDArray
 
 from rig.analysis.so_far import so_far
 from rig.analysis.verdict import Check
-from rig.arm.motion import Plan, Rest, Step, Sweep
+from rig.arm.motion import Dwell, Plan, Rest, Step, Sweep
 from rig.arm.state import ARM_STATE_DTYPE, ArmState
 from rig.data.events import DwellFinished, DwellStarted, RestFinished, RestStarted, SweepFinished, SweepStarted
 from rig.data.result_file import ResultDocument
@@ -61,6 +61,7 @@ def moments(run: RunData) -> Iterator[Moment]:
     plan = Plan(tuple(each.step for each in steps), tuple(run.arm["q_rad"][0].tolist()), run.settings.home_q_rad)
     modes: dict[str, str] = {name: sensor.mode for name, sensor in run.sensors.items()}
     modes |= {name: sensor.mode for name, sensor in run.magnetometers.items()}
+    raw = "calibrated" not in modes.values()
     yield Moment(0.0, PhaseStarted(run.settings.procedure, plan, modes))
     samples = {name: _Samples(run, name) for name in (*run.sensors, *run.magnetometers)}
 
@@ -72,7 +73,7 @@ def moments(run: RunData) -> Iterator[Moment]:
         while happened and happened[0][0] <= time_s:
             _, event = happened.pop(0)
             yield Moment(time_s - began_s, event)
-            if isinstance(event, StepFinished) and isinstance(event.step, Sweep) and "calibrated" not in modes.values():
+            if raw and isinstance(event, StepFinished) and isinstance(event.step, Sweep | Dwell):
                 yield Moment(time_s - began_s, look_of(so_far([_until(run, time_s)])))
         place = min(int(np.searchsorted(times_s, time_s)), len(run.arm) - 1)
         state = _state(run.arm[place])

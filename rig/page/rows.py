@@ -12,7 +12,8 @@ from rig.errors import Fault
 from rig.estimation.arrays import Array
 from rig.estimation.budget import COVERAGE_FACTOR
 from rig.estimation.vector_model import VectorSolution
-from rig.observation.observe import Observation
+from rig.observation.acceleration import DwellReading
+from rig.observation.observe import Observation, nearest_axis
 from rig.page.history import rounded
 
 NOISE_ONLY, COMBINED = "noise only", "combined"
@@ -47,9 +48,35 @@ def observation_row(sensor: str, observation: Observation) -> Row:
     }
 
 
+def dwell_row(sensor: str, dwell: DwellReading, gravity_m_s2: float | None) -> Row:
+    """What an accelerometer read in an attitude: the size of it stands beside gravity."""
+    mean, size = dwell.reading.mean, float(np.linalg.norm(dwell.reading.mean))
+    axis, sign = nearest_axis(mean)
+    return {
+        "sensor": accelerometer(sensor),
+        "sweep": dwell.index,
+        "by": "host",
+        "dwell": dwell.name,
+        "axis": axis,
+        "sign": sign,
+        "size_m_s2": size,
+        "std_m_s2": float(np.sqrt(mean**2 @ dwell.reading.variance)) / size if size else None,
+        "gravity_m_s2": gravity_m_s2,
+        "samples": dwell.reading.samples,
+        "refused": None,
+    }
+
+
+def accelerometer(sensor: str) -> str:
+    """How the tables call the accelerometer in a sensor."""
+    return f"{sensor}, accelerometer"
+
+
 def look_of(found: Mapping[str, SoFar]) -> Look:
     """Of a run that goes on."""
     observations = [_sweep(name, sweep, each) for name, one in found.items() for sweep, each in one.sweeps.items()]
+    for name, one in found.items():
+        observations += [_dwell(name, index, each, one.gravity_m_s2) for index, each in one.dwells.items()]
     return Look(observations, [_parameters_so_far(name, one) for name, one in found.items()])
 
 
@@ -62,7 +89,7 @@ def parameter_rows(result: ResultDocument) -> list[Row]:
         rows.append(_row(name, "rad/s", sensor.scale, sensor.bias_rad_s, std, of=COMBINED if combined else NOISE_ONLY))
     for name, found in result.accelerometers.items():
         std = np.sqrt(np.diag(found.covariance))
-        rows.append(_row(f"{name}, accelerometer", "m/s²", found.scale, found.bias_m_s2, std, of=NOISE_ONLY))
+        rows.append(_row(accelerometer(name), "m/s²", found.scale, found.bias_m_s2, std, of=NOISE_ONLY))
     return rows
 
 
@@ -70,6 +97,12 @@ def _sweep(sensor: str, sweep: int, found: Observation | Fault) -> Row:
     if isinstance(found, Observation):
         return observation_row(sensor, found)
     return {"sensor": sensor, "sweep": sweep, "by": "host", "refused": str(found)}
+
+
+def _dwell(sensor: str, index: int, found: DwellReading | Fault, gravity_m_s2: float | None) -> Row:
+    if isinstance(found, DwellReading):
+        return dwell_row(sensor, found, gravity_m_s2)
+    return {"sensor": accelerometer(sensor), "sweep": index, "by": "host", "dwell": "", "refused": str(found)}
 
 
 def _parameters_so_far(name: str, found: SoFar) -> Row:

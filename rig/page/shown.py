@@ -12,13 +12,14 @@ from rig.data.result_file import read_result
 from rig.data.run_folder import RESULT
 from rig.errors import RigError
 from rig.page.history import History, rounded
-from rig.page.rows import Look, observation_row, parameter_rows
+from rig.page.rows import Look, dwell_row, observation_row, parameter_rows
 from rig.report.certificate.writer import PAGE as CERTIFICATE
 from rig.station.events import (
     Advice,
     Answered,
     ArmConnected,
     ArmSeen,
+    AttitudeRead,
     Checked,
     Crashed,
     DocumentWritten,
@@ -152,8 +153,8 @@ class Shown:
                 self._observation({**seen, "mean_rad_s": rounded(observation.mean_rad_s)})
             case BoardNotObserved(sensor, sweep, reason):
                 self._observation({"sensor": sensor, "sweep": sweep, "by": "board", "refused": reason})
-            case ObservationMade(sensor, observation):
-                self._observation(observation_row(sensor, observation))
+            case ObservationMade() | AttitudeRead():
+                self._observation(_row(event))
             case _:
                 self._ended(event)
 
@@ -215,6 +216,12 @@ class Shown:
         if before.get("by") != "host" or row["by"] == "host":
             self._seen[key] = {**self._turns.get(row["sweep"], {}), **before, **row}
             self.put("observations", [self._seen[each] for each in sorted(self._seen, key=lambda k: (k[1], k[0]))])
+
+
+def _row(made: ObservationMade | AttitudeRead) -> dict[str, Any]:
+    if isinstance(made, ObservationMade):
+        return observation_row(made.sensor, made.observation)
+    return dwell_row(made.sensor, made.reading, made.gravity_m_s2)
 
 
 def _words(error: RigError) -> str:

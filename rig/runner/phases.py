@@ -27,6 +27,7 @@ from rig.runner.connect import Connector
 from rig.runner.resumption import Resumption, resumption
 from rig.station.events import (
     Advice,
+    AttitudeRead,
     CalibrationStored,
     Checked,
     Crashed,
@@ -112,9 +113,8 @@ class Run:
             if runs and phase.procedure.calibrates_along:
                 check_observed(runs[-1], self.loaded.config.to_calibrate)
         if before is None:
-            for name, result in outcome.results.items():
-                for observation in result.observations:
-                    self.station.event(ObservationMade(name, observation))
+            for event in observations_of(outcome):
+                self.station.event(event)
         return outcome
 
     def _store(self, outcome: Outcome) -> None:
@@ -185,3 +185,13 @@ class Run:
 def _with_notes(what: str, error: BaseException) -> str:
     """What happened, and what the arm added on its way out about its stop."""
     return "; ".join([what, *getattr(error, "__notes__", ())])
+
+
+def observations_of(outcome: Outcome) -> Iterator[ObservationMade | AttitudeRead]:
+    """What a calibration rests on, and the attitudes that were held out of it, for whoever looks on."""
+    for name, result in outcome.results.items():
+        for observation in result.observations:
+            yield ObservationMade(name, observation)
+    for name, found in outcome.accelerometers.items():
+        for reading in (*found.dwells, *(found.held_out.dwells if found.held_out else ())):
+            yield AttitudeRead(name, reading, found.gravity_m_s2)

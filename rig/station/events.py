@@ -13,6 +13,7 @@ from rig.arm.motion import Plan, Step
 from rig.arm.state import ArmReport, ArmState
 from rig.data.events import Event
 from rig.errors import RigError
+from rig.observation.acceleration import DwellReading
 from rig.observation.observe import Observation
 
 Vector = tuple[float, float, float]
@@ -175,6 +176,15 @@ class ObservationMade:
 
 
 @dataclass(frozen=True, slots=True)
+class AttitudeRead:
+    """The host has averaged what the accelerometer in `sensor` read in a dwell: once a phase is judged, every one."""
+
+    sensor: str
+    reading: DwellReading
+    gravity_m_s2: float
+
+
+@dataclass(frozen=True, slots=True)
 class CalibrationStored:
     """The board keeps the sensor's new calibration, as its record number `record`."""
 
@@ -304,6 +314,7 @@ RunEvent = (
     | StepFinished
     | PhaseRecorded
     | ObservationMade
+    | AttitudeRead
     | CalibrationStored
     | PhaseSkipped
     | DocumentWritten

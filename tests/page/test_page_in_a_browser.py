@@ -100,6 +100,7 @@ def test_every_state_has_its_word_its_sign_and_its_picture(driver: Chrome, tmp_p
             "gyro, rate", "reference, rate", "reference, acceleration",
         ]  # fmt: skip
         assert told_runs.SATURATED in text(driver, "observations") and "0.90661" in text(driver, "observations")
+        assert all(words in text(driver, "dwells") for words in ("at -90 -90 0, +z up", "9.8142", told_runs.SHAKEN))
         assert "no scale factors yet" in text(driver, "parameters") and "0.00064" in text(driver, "parameters")
         assert "3 ⚠" in text(driver, "samples")
         picture(driver, "moving-dark")

@@ -35,6 +35,18 @@ SATURATED = (
     "saturation: in sweep 3 (wrist_1 ccw) 12 samples stand at the end of the sensor's range. "
     "Choose a wider range or a slower sweep."
 )
+SHAKEN = "arm_moved_in_dwell: in dwell 7 (dwell at 0 -90 0) a joint moved by 0.31°. Let nothing move the arm."
+UPRIGHT = {
+    "sensor": "reference, accelerometer",
+    "by": "host",
+    "axis": "z",
+    "sign": 1,
+    "size_m_s2": 9.8142,
+    "std_m_s2": 0.0004,
+    "gravity_m_s2": 9.80665,
+    "samples": 1000,
+    "refused": None,
+}
 SENSORS = {"gyro": "raw", "reference": "raw"}
 ABOUT = About(
     "runs/2026-11-22T16-00-00Z-six_observation",
@@ -146,6 +158,11 @@ def look(plan: Plan, sweeps: int) -> Look:
             if sweep.index == 3 and name == "gyro":
                 refused = SATURATED
             rows.append({**row, "samples": 1428, "lost": 0, "refused": refused})
+    if sweeps >= 4:
+        rows += [
+            {**UPRIGHT, "sweep": len(plan.sweeps), "dwell": "dwell at -90 -90 0"},
+            {**UPRIGHT, "sweep": len(plan.sweeps) + 1, "dwell": "", "refused": SHAKEN},
+        ]
     known = sweeps >= 5
     parameters = [
         {

@@ -47,10 +47,12 @@ export function joints(arm) {
 export function observations(rows) {
   const sweeps = new Map();
   for (const each of rows) sweeps.set(each.sweep, { ...sweeps.get(each.sweep), ...(each.joint ? each : {}) });
-  fill("observations", rows.map((o, i) => {
+  dwells(rows.filter((each) => each.dwell !== undefined));
+  const turns = rows.filter((each) => each.dwell === undefined);
+  fill("observations", turns.map((o, i) => {
     const turn = sweeps.get(o.sweep);
     const words = turn?.joint ? `${turn.joint.replace("_", " ")} ${turn.direction}` : "";
-    const kind = i && rows[i - 1].sweep !== o.sweep ? "new-sensor" : "";
+    const kind = i && turns[i - 1].sweep !== o.sweep ? "new-sensor" : "";
     if (o.refused) {
       const tr = row([o.sweep, [o.sensor, "words"], [words, "words"], [`✗ refused: ${o.refused}`, "words bad"]], kind);
       tr.lastChild.colSpan = 6;
@@ -62,6 +64,19 @@ export function observations(rows) {
       o.sweep, [o.sensor, "words"], [words + (o.axis ? `, ${o.sign > 0 ? "+" : "−"}${o.axis}` : ""), "words"],
       minus(along.toFixed(5)) + spread, fixed(o.speed_rad_s, 5), fixed(along / o.speed_rad_s, 5),
       count(o.samples), [count(o.lost), o.lost ? "odd-number" : ""], o.by,
+    ], kind);
+  }));
+}
+
+/** What accelerometers read in attitudes: the size of it beside gravity, and the axis nearest to upwards. */
+function dwells(rows) {
+  fill("dwells", rows.map((d, i) => {
+    const kind = i && rows[i - 1].sweep !== d.sweep ? "new-sensor" : "";
+    if (d.refused) return spanning(row([d.sweep, [d.sensor, "words"], [`✗ refused: ${d.refused}`, "words bad"]], kind), 5);
+    return row([
+      d.sweep, [d.sensor, "words"], [`${d.dwell}, ${d.sign > 0 ? "+" : "−"}${d.axis} up`, "words"],
+      fixed(d.size_m_s2, 4) + (d.std_m_s2 ? ` ± ${(2 * d.std_m_s2).toFixed(4)}` : ""), fixed(d.gravity_m_s2, 4),
+      fixed(d.gravity_m_s2 && d.size_m_s2 / d.gravity_m_s2, 5), count(d.samples),
     ], kind);
   }));
 }
