@@ -23,6 +23,7 @@ import numpy as np
 from numpy.typing import NDArray
 from pydantic import Field
 
+from rig.arm.silence import Silence
 from rig.arm.state import ARM_STATE_DTYPE, ArmState
 from rig.config.sensor_catalogue import has_own_port
 from rig.data.checked import Finite, Positive, checked
@@ -36,7 +37,9 @@ from rig.errors import Fault, Refused
 from rig.errors.quoting import quote
 
 FLUSH_PERIOD_S = 0.25  # half of what is promised, so that a slow flush still keeps the promise
-READ_TIMEOUT_S, READ_BYTES_PER_S = 20.0, 5e6  # for a file of no size, and more for each byte: a busy machine's
+READ_TIMEOUT_S, READ_BYTES_PER_S = 20.0, 5e6  # for a file of no size, and more for each byte
+READ_TICK_S = 0.1
+READ_SPARED = 6  # … and at most so many times that, when the reading process gets no processor
 
 
 MOUNTING_TOLERANCE = 1e-6
@@ -258,7 +261,7 @@ def read_run(path: Path, timeout_s: float | None = None) -> RunData:
 
     Rows that the kill left unwritten or torn at the end are dropped. Raises Refused: `no_run_file` when there is none,
     `not_a_run_file` when it is something else, damaged, of another schema, or cannot be read within `timeout_s` (None:
-    by its size); `temporary_folder_full`.
+    by its size), not counting the time in which the machine is too busy to read; `temporary_folder_full`.
     """
     contents = _contents(path, timeout_s)
     try:
@@ -304,27 +307,39 @@ def _contents(path: Path, timeout_s: float | None) -> Contents:
     command = [sys.executable, "-P", "-m", "rig.data.extract", str(path)]
     environment = {**os.environ, "PYTHONPATH": os.pathsep.join(filter(None, sys.path))}
     with tempfile.TemporaryFile() as out:
-        try:
-            done = subprocess.run(
-                command,
-                stdin=subprocess.DEVNULL,
-                stdout=out,
-                stderr=subprocess.PIPE,
-                timeout=timeout_s,
-                check=False,
-                env=environment,
-            )
-        except subprocess.TimeoutExpired:
-            raise _not_a_run_file(path, f"the HDF5 library found no end of it in {timeout_s:.0f} s") from None
-        if done.returncode != 0:
-            said = done.stderr.decode(errors="replace").strip().splitlines() or ["reading it ended the HDF5 library"]
-            if done.returncode == NO_ROOM:
+        with subprocess.Popen(
+            command, stdin=subprocess.DEVNULL, stdout=out, stderr=subprocess.PIPE, env=environment
+        ) as reading:
+            try:
+                complaint = _awaited(reading, timeout_s)
+            except TimeoutError:
+                raise _not_a_run_file(path, f"the HDF5 library found no end of it in {timeout_s:.0f} s") from None
+            finally:
+                reading.kill()
+        if reading.returncode != 0:
+            said = complaint.decode(errors="replace").strip().splitlines() or ["reading it ended the HDF5 library"]
+            if reading.returncode == NO_ROOM:
                 raise _no_room(path, said[-1])
             raise _not_a_run_file(path, said[-1])
         out.seek(0)
         header = json.loads(out.readline())
         samples = {name: np.load(out) for name in header["described"]}
         return Contents(**header, samples=samples, arm=np.load(out), events=np.load(out))
+
+
+def _awaited(reading: "subprocess.Popen[bytes]", timeout_s: float) -> bytes:
+    """What it wrote to stderr, once it has ended. Raises TimeoutError.
+
+    What the library does not come back from it sleeps in, so its time on a processor would not tell; a process that
+    waits for one, or for the disk, does not sleep.
+    """
+    silent = Silence(reading.pid, spared=READ_SPARED)
+    while not silent.lasts_over(timeout_s / READ_TICK_S):
+        try:
+            return reading.communicate(timeout=READ_TICK_S)[1]
+        except subprocess.TimeoutExpired:
+            silent.tick()
+    raise TimeoutError
 
 
 def _not_a_run_file(path: Path, why: str) -> Refused:

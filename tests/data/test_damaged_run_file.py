@@ -1,6 +1,7 @@
 """Whatever has become of a run file: it is read, or refused by name. Nothing hangs, nothing ends in a traceback."""
 
 import json
+import os
 import re
 import shutil
 import subprocess
@@ -24,6 +25,7 @@ pytestmark = pytest.mark.slow
 
 RECORDING = FIXTURES / "calibration" / "run.h5"
 TIMEOUT_S = 5.0 * crowding()
+ALONE_S = 0.8  # reading the recording takes half of that where there is a processor for it
 METADATA_BYTES = 12_000  # where a run file's first structures lie
 DAMAGES = 24
 
@@ -94,6 +96,22 @@ def test_a_recording_whose_reading_does_not_end_is_given_up(recording: Path) -> 
     with pytest.raises(Refused, match="not_a_run_file"):
         read_run(recording, 1.0)
     assert time.monotonic() - begun < 10
+
+
+@pytest.mark.skipif(sys.platform != "linux", reason="only Linux tells who waits for a processor")
+def test_a_sound_recording_is_read_however_little_of_a_processor_there_is() -> None:
+    before = os.sched_getaffinity(0)
+    os.sched_setaffinity(0, {min(before)})  # for the reading process and the others alike
+    others = [subprocess.Popen([sys.executable, "-c", "while True: pass"]) for _ in range(6)]
+    try:
+        begun = time.monotonic()
+        assert len(read_run(RECORDING, ALONE_S).arm)
+        assert time.monotonic() - begun > ALONE_S, "the machine was not busy"
+    finally:
+        for other in others:
+            other.kill()
+            other.wait()
+        os.sched_setaffinity(0, before)
 
 
 def test_a_signal_ends_the_reading(recording: Path) -> None:
