@@ -3,15 +3,19 @@
 import struct
 
 import pytest
+from scipy.spatial.transform import Rotation
 
 from rig.config.load import load
 from rig.world.laboratory import Laboratory
 from rig.world.section import world_section
 from rig.world.ur10e.controller_messages import MessageKind, ProgramError
 from rig.world.ur10e.dashboard_server import DashboardSession
+from rig.world.ur10e.forward_kinematics import flange_pose
 from rig.world.ur10e.modes import SafetyMode
 from rig.world.ur10e.primary import ROBOT_MESSAGE, PrimarySession
 from rig.world.ur10e.robot import Robot
+from rig.world.ur10e.ur_rtde_questions import questions
+from rig.world.ur10e.ur_rtde_registers import Registers
 from rig.world.ur10e.urscript import arguments
 from support.paths import DEMO
 
@@ -51,6 +55,19 @@ def test_arguments_may_be_expressions_of_constants() -> None:
     for wrong in ("sleep(x + 1)", "sleep(1/0)", "sleep('a' * 999999999)", "sleep(2 ** 9)"):
         with pytest.raises(ProgramError, match="not simulated"):
             arguments(wrong)
+
+
+def test_the_forward_kinematics_of_given_joints(robot: Robot) -> None:
+    """By its command alone: version 1.6.5 of the client hangs before it sends it."""
+    q, offset = (0.2, -1.4, 1.5, -1.3, -1.2, 0.3), (0.01, 0.02, 0.1, 0.0, 0.3, 0.0)
+    robot.inputs.doubles[24:36] = [*q, *offset]
+    questions(robot, Registers(robot, 24))[44]()
+    flange = flange_pose(q, robot.links)
+    turned = Rotation.from_rotvec(flange[3:])
+    assert robot.outputs.doubles[24:27] == pytest.approx(flange[:3] + turned.apply(offset[:3]), abs=1e-12)
+    assert robot.outputs.doubles[27:30] == pytest.approx(
+        (turned * Rotation.from_rotvec(offset[3:])).as_rotvec(), abs=1e-12
+    )
 
 
 def test_a_change_of_the_safety_mode_is_told_at_the_primary_interface(robot: Robot) -> None:

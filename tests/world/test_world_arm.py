@@ -9,6 +9,7 @@ from dataclasses import dataclass
 from itertools import pairwise
 from typing import Any, Protocol, TypeVar
 
+import numpy as np
 import pytest
 from rtde_control import Path, PathEntry, RTDEControlInterface
 from rtde_io import RTDEIOInterface
@@ -176,6 +177,45 @@ def test_with_a_turned_tool_frame_poses_are_the_tools(world: World) -> None:
         up = [*tool[:2], tool[2] + 0.1, *tool[3:]]
         assert control.moveL(up, 0.25, 0.5)
         wait_for(lambda: receive.getActualTCPPose() == pytest.approx(up, abs=1e-4), "the pose")
+
+
+def test_the_tool_is_steered_as_the_joints_are(home: Arm) -> None:
+    control, receive = home.control, home.receive
+    tilted = [0.0, -1.5, 1.5, -1.5, -1.2, 0.3]
+    assert control.moveJ(tilted, 2.0, 10.0) and control.zeroFtSensor()
+    wait_for(lambda: receive.getActualQ() == pytest.approx(tilted, abs=1e-4), "the start")
+    start = receive.getActualTCPPose()
+    assert control.speedL([0.0, 0.0, 0.1, 0.0, 0.0, 0.0], 1.0)
+    wait_for(lambda: receive.getTargetTCPSpeed() == pytest.approx([0, 0, 0.1, 0, 0, 0], abs=1e-3), "the asked speed")
+    assert control.speedStop(10.0)
+    wait_for(lambda: not home.world.state()["moving"], "the joints to rest")
+    risen = receive.getActualTCPPose()
+    assert risen[2] > start[2] + 0.001 and risen[:2] == pytest.approx(start[:2], abs=1e-3)
+    assert control.servoL(start, 0.0, 0.0, 0.002, 0.1, 300)
+    wait_for(lambda: receive.getActualTCPPose() == pytest.approx(start, abs=1e-3), "the servo target")
+    control.servoStop()
+
+
+def test_kinematics_of_what_the_client_gives(home: Arm) -> None:
+    control, offset = home.control, [0.01, 0.02, 0.1, 0.0, 0.3, 0.0]
+    tilted = [0.2, -1.4, 1.5, -1.3, -1.2, 0.3]
+    pose = list(flange_pose(tilted))
+    placed, turned = control.poseTrans(pose, offset), Rotation.from_rotvec(pose[3:])
+    assert placed[:3] == pytest.approx(np.array(pose[:3]) + turned.apply(offset[:3]), abs=1e-9)
+    assert placed[3:] == pytest.approx((turned * Rotation.from_rotvec(offset[3:])).as_rotvec(), abs=1e-9)
+    near = [angle + 0.1 for angle in tilted]
+    assert control.getInverseKinematics(pose, near, 1e-10, 1e-10) == pytest.approx(tilted, abs=1e-6)
+    assert control.isPoseWithinSafetyLimits(pose) and control.getInverseKinematicsHasSolution(pose)
+    away = [3.0, *pose[1:]]
+    assert not control.isPoseWithinSafetyLimits(away) and not control.getInverseKinematicsHasSolution(away)
+
+
+def test_a_command_that_is_not_acted_out_is_named(world: World) -> None:
+    running = world()
+    named = "not simulated: command 52 (freedriveMode) of rtde_control"
+    with client(running, "say(control.freedriveMode())"):
+        wait_for(lambda: named in running.state()["messages"], "the name of the command")
+        assert not running.state()["program_running"]
 
 
 def test_settings_and_questions(home: Arm) -> None:

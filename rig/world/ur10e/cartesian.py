@@ -58,6 +58,26 @@ def joints_for(pose: Sequence[float], near: Joints, links: Links = NOMINAL) -> J
     raise ProgramError("no inverse kinematics solution was found")
 
 
+def joint_speeds(q: Joints, tool: Sequence[float], links: Links = NOMINAL) -> Joints:
+    """The joint speeds that move the flange by `tool` (m/s, rad/s, in the base's frame), all slower if one is too fast.
+
+    Raises `ProgramError` where the arm is singular.
+    """
+    try:
+        speeds = np.linalg.solve(_jacobian(q, links), np.array(tool))
+    except np.linalg.LinAlgError:
+        raise ProgramError("the arm is singular on the way of speedl") from None
+    excess = max(1.0, float(np.max(np.abs(speeds) / np.array(JOINT_SPEED_LIMIT_RAD_S))))
+    return tuple((speeds / excess).tolist())
+
+
+def approaching(tool: Sequence[float], wanted: Sequence[float], step: float) -> Sequence[float]:
+    """The speed of the tool after it has changed by `step` (m/s) towards the one that is wanted."""
+    change = np.array(wanted) - np.array(tool)
+    size = _length(change)
+    return wanted if size <= step else tuple((np.array(tool) + change * (step / size)).tolist())
+
+
 def straight_line(
     start: Joints, pose: Sequence[float], speed_m_s: float, acceleration_m_s2: float, links: Links = NOMINAL
 ) -> Generator[None, None, Trajectory]:

@@ -63,6 +63,16 @@ def turned_pose(pose: Sequence[float], turn: Rotation) -> tuple[float, ...]:
     return (*pose[:3], *rotation_vector(_product(rotation_from_vector(pose[3:]), turn)))
 
 
+def placed_pose(frame: Sequence[float], pose: Sequence[float]) -> tuple[float, ...]:
+    """A pose that is told in a frame, in that in which the frame's own pose is told: `pose_trans` of URScript."""
+    rotation = rotation_from_vector(frame[3:])
+    moved = (
+        origin + sum(turn * way for turn, way in zip(row, pose[:3], strict=True))
+        for origin, row in zip(frame[:3], rotation, strict=True)
+    )
+    return (*moved, *rotation_vector(_product(rotation, rotation_from_vector(pose[3:]))))
+
+
 def rotation_vector(r: Sequence[Sequence[float]]) -> Vector:
     """The rotation vector (rad) of a rotation matrix."""
     cosine = max(-1.0, min(1.0, (r[0][0] + r[1][1] + r[2][2] - 1.0) / 2.0))

@@ -4,21 +4,35 @@ A client writes a command into input integer register 0; the program answers 2 i
 done, the client writes 0, the program answers 1 (ready). Real-time commands are never answered 2.
 """
 
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass
+from functools import partial
 
 from rig.world.clock import TICK_S
-from rig.world.ur10e.cartesian import joints_for
+from rig.world.ur10e.cartesian import approaching, joint_speeds, joints_for
 from rig.world.ur10e.controller_messages import ProgramError
-from rig.world.ur10e.forward_kinematics import flange_pose
 from rig.world.ur10e.program_threads import Move, Steps, Threads, finite
-from rig.world.ur10e.robot import JOINT_LIMIT_RAD, Robot
+from rig.world.ur10e.robot import Robot
 from rig.world.ur10e.trajectory import Joints
+from rig.world.ur10e.ur_rtde_questions import NOT_ACTED_OUT, questions
+from rig.world.ur10e.ur_rtde_registers import Registers
 
 REALTIME = frozenset({6, 9, 10, 11, 24, 25, 26, 27, 38, 58, 66, 67, 68, 69, 70, 71})
 STOP_SCRIPT = 255
 READY, DONE = 1, 2
 
+FOLLOWING_RAD_S2 = 40.0  # of joints that follow a target from tick to tick
+
 Command = Callable[[], Steps]
+
+
+@dataclass(frozen=True, slots=True)
+class Speed:
+    """Of the joints, rad/s and rad/s²; `of_tool`: of the tool in the base's frame, m/s, rad/s and m/s²."""
+
+    speed: Joints
+    acceleration: float
+    of_tool: bool = False
 
 
 class ControlProgram:
@@ -28,11 +42,11 @@ class ControlProgram:
 
     def __init__(self, robot: Robot, register_offset: int, path: Sequence[Move]) -> None:
         self._robot = robot
-        self._offset = register_offset
+        self._registers = Registers(robot, register_offset)
         self._path = tuple(path)
         self._threads = Threads(robot)
         self._servo_target: tuple[Joints, float] = (robot.motion.now.target_q_rad, 0.1)
-        self._speed_target: tuple[Joints, float] = ((0.0,) * 6, 0.5)
+        self._speed_target = Speed((0.0,) * 6, 0.5)
         self._operation = self._writes = 0
         self._heard: int | None = None  # the command that was there when the main thread last gave way between two
         self._commands: dict[int, Command] = {
@@ -41,25 +55,16 @@ class ControlProgram:
             3: self._movel,
             4: self._movel_fk,
             9: self._speedj,
+            10: self._speedl,
             11: self._servoj,
             15: self._speed_stop,
             16: self._servo_stop,
-            17: self._set_payload,
-            26: self._step_time,
-            29: self._set_tcp,
-            31: self._protective_stop,
+            24: self._servol,
             33: self._stop,
             34: self._stop,
-            35: self._set_watchdog,
-            37: self._within_limits,
-            38: self._torques,
-            40: self._tcp_offset,
-            43: self._forward_kinematics,
             45: self._move_path,
-            46: self._inverse_kinematics,
-            47: self._is_steady,
-            58: self._flange_pose,
         }
+        self._questions = questions(robot, self._registers)
         self._main = self._loop()
 
     def step(self) -> bool:
@@ -69,50 +74,39 @@ class ControlProgram:
     @property
     def waiting(self) -> bool:
         """Every command is done and answered, and no thread runs."""
-        return not self._threads.any and self._heard is not None and self._int(0) == self._heard
+        return not self._threads.any and self._heard is not None and self._registers.whole(0) == self._heard
 
     def _loop(self) -> Steps:
         self._signal_async(-1)
-        self._answer(READY)
+        self._registers.answer(0, READY)
         executing = False
         while True:
-            code = self._int(0)
+            code = self._registers.whole(0)
             if code == 0 or code in REALTIME:
                 executing = False if code == 0 else executing
                 if code:
                     yield from self._command(code)()
-                self._answer(READY)
+                self._registers.answer(0, READY)
             elif not executing:
                 if code == STOP_SCRIPT:
                     return
                 yield from self._command(code)()
-                self._answer(DONE)
+                self._registers.answer(0, DONE)
                 executing = True
             self._heard = None if code in REALTIME else code
             yield
             self._heard = None
 
     def _command(self, code: int) -> Command:
+        if code in self._questions:
+            return partial(_at_once, self._questions[code])
         if code not in self._commands:
-            raise ProgramError(f"the simulated controller does not know command {code} of rtde_control")
+            name = f" ({NOT_ACTED_OUT[code]})" if code in NOT_ACTED_OUT else ""
+            raise ProgramError(f"not simulated: command {code}{name} of rtde_control")
         return self._commands[code]
 
-    # -- registers -------------------------------------------------------------------------------------------------
-    def _int(self, index: int) -> int:
-        return self._robot.inputs.ints[self._offset + index]
-
-    def _doubles(self, first: int, count: int) -> tuple[float, ...]:
-        start = self._offset + first
-        return tuple(self._robot.inputs.doubles[start : start + count])
-
-    def _answer(self, value: int) -> None:
-        self._robot.outputs.ints[self._offset] = value
-
-    def _result(self, value: int) -> None:
-        self._robot.outputs.ints[self._offset + 1] = value
-
-    def _results(self, values: Sequence[float]) -> None:
-        self._robot.outputs.doubles[self._offset : self._offset + len(values)] = values
+    def _asynchronously(self) -> bool:
+        return self._registers.whole(1) == 1
 
     def _signal_async(self, progress: int) -> None:
         """The word an asynchronous operation is watched by: operation id, write count, running bit, progress."""
@@ -122,11 +116,11 @@ class ControlProgram:
         word = self._operation << 24 | self._writes << 16
         if progress >= 0:
             word |= 1 << 15 | min(progress, 0x7FFF)
-        self._robot.outputs.ints[self._offset + 2] = word
+        self._registers.answer(2, word)
 
     # -- moves ---------------------------------------------------------------------------------------------------
     def _asked(self, straight: bool, is_pose: bool) -> Steps:
-        *target, speed, acceleration = self._doubles(0, 8)
+        *target, speed, acceleration = self._registers.doubles(0, 8)
         return self._move([Move(tuple(target), speed, acceleration, straight, is_pose)])
 
     def _movej(self) -> Steps:
@@ -146,7 +140,7 @@ class ControlProgram:
 
     def _move(self, path: Sequence[Move]) -> Steps:
         self._kill_async("move")
-        if self._int(1) == 1:
+        if self._asynchronously():
             self._threads.run("move", self._async_move(path))
             return
         for step in path:
@@ -166,8 +160,8 @@ class ControlProgram:
     def _stop(self) -> Steps:
         self._kill_async("stop")
         self._kill_async("move")
-        deceleration = self._doubles(0, 1)[0]
-        if self._int(1) == 1:
+        deceleration = self._registers.doubles(0, 1)[0]
+        if self._asynchronously():
             self._threads.run("stop", self._async_stop(deceleration))
             return
         yield from self._threads.stopj("main", deceleration)
@@ -178,30 +172,51 @@ class ControlProgram:
         self._signal_async(-1)
 
     def _speedj(self) -> Steps:
-        *velocity, acceleration, _ = self._doubles(0, 8)
+        return self._speed(of_tool=False)
+
+    def _speedl(self) -> Steps:
+        return self._speed(of_tool=True)
+
+    def _speed(self, of_tool: bool) -> Steps:
+        *velocity, acceleration, _ = self._registers.doubles(0, 8)
         finite([*velocity, acceleration])
-        self._speed_target = (tuple(velocity), acceleration)
+        self._speed_target = Speed(tuple(velocity), max(acceleration, 0.01), of_tool)
         if not self._threads.running("speed"):
             self._threads.run("speed", self._speed_thread())
         return _nothing()
 
     def _speed_thread(self) -> Steps:
         done = None
+        tool: Sequence[float] = (0.0,) * 6
         while True:
             self._threads.take("speed")
-            if self._speed_target != done:
-                self._robot.motion.speed(self._speed_target[0], max(self._speed_target[1], 0.01))
-                done = self._speed_target
+            wanted = self._speed_target
+            if wanted.of_tool:
+                tool = approaching(tool, wanted.speed, wanted.acceleration * TICK_S)
+                here = self._robot.motion.now.target_q_rad
+                self._robot.motion.speed(joint_speeds(here, tool, self._robot.links), FOLLOWING_RAD_S2)
+            elif wanted != done:
+                self._robot.motion.speed(wanted.speed, wanted.acceleration)
+            done = wanted
             yield
 
     def _speed_stop(self) -> Steps:
         self._threads.kill("speed")
-        return self._threads.stopj("main", self._doubles(0, 1)[0])
+        return self._threads.stopj("main", self._registers.doubles(0, 1)[0])
 
     def _servoj(self) -> Steps:
-        values = self._doubles(0, 11)
+        values = self._registers.doubles(0, 11)
         finite(values)
-        self._servo_target = (values[:6], max(values[9], 0.03))
+        return self._servo(values[:6], values[9])
+
+    def _servol(self) -> Steps:
+        values = self._registers.doubles(0, 11)
+        finite(values)
+        pose = self._robot.flange_for(values[:6])
+        return self._servo(joints_for(pose, self._robot.motion.q_rad, self._robot.links), values[9])
+
+    def _servo(self, target: Joints, lookahead_s: float) -> Steps:
+        self._servo_target = (target, max(lookahead_s, 0.03))
         if not self._threads.running("servo"):
             self._threads.run("servo", self._servo_thread())
         return _nothing()
@@ -213,64 +228,18 @@ class ControlProgram:
             target, lookahead_s = self._servo_target
             here = self._robot.motion.now.target_q_rad
             velocity = tuple((b - a) / lookahead_s for a, b in zip(here, target, strict=True))
-            self._robot.motion.speed(velocity, 40.0)
+            self._robot.motion.speed(velocity, FOLLOWING_RAD_S2)
             yield
 
     def _servo_stop(self) -> Steps:
         self._threads.kill("servo")
-        return self._threads.stopj("main", self._doubles(0, 1)[0])
-
-    # -- settings and questions ------------------------------------------------------------------------------------
-    def _set_payload(self) -> Steps:
-        mass, *centre = self._doubles(0, 4)
-        self._robot.set_payload(mass, centre if any(centre) else self._robot.payload_centre_m)
-        return _nothing()
-
-    def _set_tcp(self) -> Steps:
-        self._robot.set_tcp(self._doubles(0, 6))
-        return _nothing()
-
-    def _tcp_offset(self) -> Steps:
-        self._results(self._robot.tcp_offset)
-        return _nothing()
-
-    def _step_time(self) -> Steps:
-        self._results([TICK_S])
-        return _nothing()
-
-    def _set_watchdog(self) -> Steps:
-        self._robot.set_watchdog(self._doubles(0, 1)[0])
-        return _nothing()
-
-    def _within_limits(self) -> Steps:
-        self._result(int(all(abs(q) <= JOINT_LIMIT_RAD for q in self._doubles(0, 6))))
-        return _nothing()
-
-    def _torques(self) -> Steps:
-        self._results([0.0] * 6)
-        return _nothing()
-
-    def _forward_kinematics(self) -> Steps:
-        self._results(self._robot.tcp_pose(self._robot.motion.actual_q_rad))
-        return _nothing()
-
-    def _flange_pose(self) -> Steps:
-        self._results(flange_pose(self._robot.motion.actual_q_rad, self._robot.links))
-        return _nothing()
-
-    def _inverse_kinematics(self) -> Steps:
-        flange = self._robot.flange_for(self._doubles(0, 6))
-        self._results(joints_for(flange, self._robot.motion.q_rad, self._robot.links))
-        return _nothing()
-
-    def _is_steady(self) -> Steps:
-        self._result(int(self._robot.steady))
-        return _nothing()
-
-    def _protective_stop(self) -> Steps:
-        self._robot.protective_stop()
-        return _nothing()
+        return self._threads.stopj("main", self._registers.doubles(0, 1)[0])
 
 
-def _nothing() -> Iterator[None]:
+def _at_once(act: Callable[[], None]) -> Steps:
+    act()
+    return iter(())
+
+
+def _nothing() -> Steps:
     return iter(())
