@@ -106,7 +106,7 @@ class _Child:
             if time.monotonic() - beat_s >= HEARTBEAT_S:
                 beat_s = time.monotonic()
                 try:
-                    self.send(Heartbeat(tuple(batch)))
+                    self.send(Heartbeat(tuple(batch), self._states.silent_s))
                 except OSError:
                     self.abandon()
                 batch.clear()

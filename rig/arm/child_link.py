@@ -1,9 +1,11 @@
 """The parent's end of the supervised child: starts it, passes messages on, and notices when it falls silent."""
 
+import ipaddress
 import multiprocessing
 import os
 import select
 import signal
+import socket
 import threading
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
@@ -19,6 +21,7 @@ TICK_S = 0.05
 SILENT_TICKS = 10  # 0.5 s without a heartbeat
 SPARED = 4  # … and at most so many times that, when the child's main thread is ready to run and gets no processor
 FROZEN_TICKS = 16  # 0.8 s with heartbeats but no new state
+LINK_S = 0.8  # the same of a controller elsewhere, by what has not come: no crowd on this machine holds that one up
 STALE_TICKS = 2  # when the child ends after 0.1 s without a new state, it had lost the arm before
 CRASHES = (-signal.SIGSEGV, -signal.SIGABRT)  # how the client itself ends when the arm closes a connection
 PATIENT_TICKS = 240  # 12 s while a client's constructor holds the child's interpreter, at worst until its 5 s time-out
@@ -44,6 +47,8 @@ class ChildLink:
         self._silent = Silence(0, spared=SPARED)  # no message; counted once the child runs
         self._beaten = False  # there was a heartbeat since the guard's last tick
         self._frozen_ticks = 0  # with a heartbeat, without a new state
+        self._silent_s = 0.0  # nothing has come from the controller for so long
+        self._elsewhere = False  # it has processors of its own
         context = multiprocessing.get_context("spawn")
         self._pipe: Connection[Request, Message]
         self._pipe, self._child_pipe = context.Pipe()
@@ -60,6 +65,7 @@ class ChildLink:
 
     def start(self) -> None:
         """Start the child; `on_message` gets `Connected` or `Failed`."""
+        self._elsewhere = not _on_this_machine(self._host)
         with _interrupts_held():
             self._process.start()
         self._child_pipe.close()
@@ -118,7 +124,7 @@ class ChildLink:
                 message = self._pipe.recv()
                 self._silent.heard()
                 if isinstance(message, Heartbeat):
-                    self._beaten = True
+                    self._beaten, self._silent_s = True, message.silent_s
                     self._frozen_ticks *= not message.states
                 self._on_message(message)
         except (EOFError, OSError):
@@ -138,7 +144,8 @@ class ChildLink:
             self._beaten = False
             if self._silent.lasts_over(PATIENT_TICKS if self._patient else SILENT_TICKS):
                 return self._give_up("arm_driver_hung", "the process that talks to the arm no longer answers")
-            if self._frozen_ticks > (PATIENT_TICKS if self._patient else FROZEN_TICKS * crowding()):
+            frozen = self._frozen_ticks > (PATIENT_TICKS if self._patient else FROZEN_TICKS * crowding())
+            if frozen or (self._elsewhere and not self._patient and self._silent_s > LINK_S):
                 return self._give_up("arm_link_lost", f"no new state comes from the arm at {self._host}")
         return None
 
@@ -162,6 +169,14 @@ class ChildLink:
 
     def _lose(self, name: str, what: str) -> None:
         self._on_lost(Problem(name, what, "Look at the arm and its network cable, then start again"))
+
+
+def _on_this_machine(host: str) -> bool:
+    """Whether whoever answers there has to share this machine's processors."""
+    try:
+        return ipaddress.ip_address(socket.gethostbyname(host)).is_loopback
+    except OSError:
+        return False
 
 
 def _writable(pipe: "Connection[Request, Message]") -> bool:

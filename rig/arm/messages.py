@@ -52,9 +52,13 @@ class Connected:
 
 @dataclass(frozen=True, slots=True)
 class Heartbeat:
-    """The child lives; `states` are those that came since the last heartbeat, oldest first."""
+    """The child lives; `states` are those that came since the last heartbeat, oldest first.
+
+    For at least `silent_s` nothing at all has come from the controller: see `StateStream`.
+    """
 
     states: tuple[ArmState, ...]
+    silent_s: float = 0.0
 
 
 @dataclass(frozen=True, slots=True)

@@ -59,6 +59,8 @@ class StateStream:
         self._deadline_s = time.monotonic() + timeout_s
         self._buffer = bytearray()
         self.closed = False  # by the controller
+        self.silent_s = 0.0  # nothing has come for so long at least, however late it was looked for
+        self._heard_s = time.monotonic()
         self._socket = socket.create_connection((host, PORT), timeout_s)
         try:
             self._socket.setsockopt(socket.IPPROTO_TCP, socket.TCP_NODELAY, 1)
@@ -84,11 +86,16 @@ class StateStream:
 
     def read(self, timeout_s: float) -> list[Packet]:
         """The packets that have come, oldest first; waits for one for at most `timeout_s`. Empty once `closed`."""
+        looked_s = time.monotonic()
         if self.closed:
             time.sleep(timeout_s)
+            self.silent_s = looked_s - self._heard_s
             return []
         if select.select([self._socket], [], [], timeout_s)[0]:
             self._receive()
+            self.silent_s, self._heard_s = 0.0, time.monotonic()
+        else:  # what had come while nobody looked would be there
+            self.silent_s = looked_s - self._heard_s
         try:
             return [_packet(payload) for kind, payload in self._packages() if kind == "U"]
         except (ConnectionError, struct.error):  # what is not readable is a link that is lost

@@ -10,6 +10,7 @@ import sys
 import threading
 import time
 from collections.abc import Callable
+from contextlib import suppress
 from dataclasses import replace
 from pathlib import Path
 from typing import Any
@@ -26,6 +27,7 @@ from rig.config.models import ArmSection
 from rig.config.procedure_sections import SixObservationSection
 from rig.errors import Fault, Refused
 from rig.plans.six_sweeps import plan_six_observation
+from support.arm_relay import relay
 from support.worlds import World, WorldHandle
 
 pytestmark = pytest.mark.slow
@@ -281,6 +283,31 @@ def test_a_state_that_cannot_be_passed_on_stops_the_arm(laboratory: WorldHandle)
             arm.move(turn(arm.latest.q_rad, 6.0))
         assert "no space left on device" in fault.value.what
         assert stands(laboratory)
+
+
+def outside_address() -> str | None:
+    """Of this computer, as others know it."""
+    with socket.socket(socket.AF_INET, socket.SOCK_DGRAM) as any_way, suppress(OSError):
+        any_way.connect(("192.0.2.1", 9))
+        address = str(any_way.getsockname()[0])
+        return None if address.startswith("127.") else address
+    return None
+
+
+@pytest.mark.skipif(outside_address() is None, reason="nobody else could reach this computer")
+def test_an_arm_elsewhere_that_falls_silent_is_missed_at_once_on_a_crowded_computer(
+    laboratory: WorldHandle, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr(os, "getloadavg", lambda: (100.0, 100.0, 100.0))
+    with relay(laboratory.host, outside_address()) as wire:
+        with Arm(wire.host) as arm:
+            arm.take_control(*PAYLOAD)
+            cut = AtSpeed(arm, wire.stalled.set)
+            with pytest.raises(Fault) as fault:
+                arm.move(turn(arm.latest.q_rad, 6.0), cut)
+            assert time.monotonic() - cut.acted_s < 3.0, "as long as a crowd here excuses a controller here"
+        wire.stalled.clear()
+    assert fault.value.name == "arm_link_lost"
 
 
 def test_an_arm_slower_than_planned_is_stopped(laboratory: WorldHandle) -> None:

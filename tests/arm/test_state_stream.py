@@ -106,6 +106,23 @@ def test_states_wait_for_a_reader_that_is_held_up(controllers: Controllers) -> N
         assert times_of(stream, 299) == [float(k) for k in range(1, 300)]
 
 
+def test_a_silence_is_what_has_not_come_however_late_one_looks(controllers: Controllers) -> None:
+    controller = controllers(S=ANSWERS["S"] + data(0.0))
+    with StateStream(controller.host, 125.0, 5.0) as stream:
+        controller.send(data(1.0))
+        time.sleep(0.3)  # a reader that gets no processor
+        assert times_of(stream, 1) == [1.0] and stream.silent_s == 0.0
+        began_s = time.monotonic()
+        time.sleep(0.3)
+        assert stream.read(0.01) == [] and 0.3 <= stream.silent_s < time.monotonic() - began_s + 0.01
+        controller.send(data(2.0)[:5])  # a part of a state is a sign of life, too
+        assert stream.read(5.0) == [] and stream.silent_s == 0.0
+        controller.hang_up()
+        assert stream.read(0.01) == [] and stream.closed
+        time.sleep(0.1)
+        assert stream.read(0.0) == [] and stream.silent_s >= 0.1
+
+
 def test_a_state_says_what_the_controller_sent(controllers: Controllers) -> None:
     with StateStream(controllers(S=ANSWERS["S"] + data(1.5)).host, 125.0, 5.0) as stream:
         first = stream.first

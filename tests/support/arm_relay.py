@@ -13,8 +13,8 @@ PORTS = (29999, 30003, 30004)
 class ArmRelay:
     """Passes on what comes at `host`. While `stalled` is set it takes nothing more in, either way."""
 
-    def __init__(self, far_host: str) -> None:
-        self.host = fresh_host()
+    def __init__(self, far_host: str, host: str | None = None) -> None:
+        self.host = host or fresh_host()
         self.stalled = threading.Event()
         self._far_host = far_host
         self._sockets: list[socket.socket] = []
@@ -50,8 +50,8 @@ class ArmRelay:
 
 
 @contextmanager
-def relay(far_host: str) -> Iterator[ArmRelay]:
-    running = ArmRelay(far_host)
+def relay(far_host: str, host: str | None = None) -> Iterator[ArmRelay]:
+    running = ArmRelay(far_host, host)
     try:
         yield running
     finally:
