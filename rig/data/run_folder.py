@@ -3,6 +3,7 @@
 import itertools
 import json
 import shlex
+from collections.abc import Mapping
 from contextlib import suppress
 from dataclasses import asdict, dataclass
 from datetime import UTC, datetime
@@ -38,10 +39,9 @@ def new_folder(out: Path | None, loaded: Loaded, script: str, identity: ScriptId
         folder.mkdir(parents=True, exist_ok=True)
         empty = not any(folder.iterdir())
         if empty:
-            with (folder / SCRIPT).open("x", encoding="utf-8", newline="") as kept:  # of two runs at once, one has it
-                kept.write(script)
-            (folder / SCRIPT_IDENTITY).write_text(json.dumps(asdict(identity)) + "\n", encoding="utf-8")
-            (folder / CONFIG).write_text(loaded.text, encoding="utf-8")
+            _write_all(
+                folder, {SCRIPT: script, SCRIPT_IDENTITY: json.dumps(asdict(identity)) + "\n", CONFIG: loaded.text}
+            )
     except OSError as error:
         raise Refused(
             "run_folder", f"{out or parent} cannot be written: {error}", "Choose another with --out"
@@ -51,6 +51,20 @@ def new_folder(out: Path | None, loaded: Loaded, script: str, identity: ScriptId
             "run_folder", f"{folder} is not empty", f"Choose another with --out, or go on with: {resuming(folder)}"
         )
     return folder
+
+
+def _write_all(folder: Path, texts: Mapping[str, str]) -> None:
+    """All of these new files or, on a full disk, none: half of a configuration would be resumed from."""
+    begun: list[Path] = []
+    try:
+        for name, text in texts.items():
+            with (folder / name).open("x", encoding="utf-8", newline="") as file:  # of two runs at once, one has it
+                begun.append(folder / name)
+                file.write(text)
+    except OSError:
+        for path in begun:
+            path.unlink()
+        raise
 
 
 def _of_its_own(parent: Path, procedure: str) -> Path:
