@@ -123,6 +123,9 @@ def _parser() -> argparse.ArgumentParser:
         action="store_true",
         help="PDF/A-3b too, with result.json and the digital certificate attached (extra `pdf`)",
     )
+    report.add_argument(
+        "--reversal", type=Path, metavar="FILE", help="what `rig reversal … --out FILE` has found of its magnetometers"
+    )
     report.add_argument("--dcc", action="store_true", help="the digital certificate (DCC 3.2.1, XML) too")
     report.add_argument("--out", type=Path, metavar="DIR", help="where to (default: the run folder)")
     _add_set(report, "say something else on the certificate, for example certificate.customer=Example")
@@ -318,7 +321,7 @@ def _reversal(options: argparse.Namespace) -> int:
 def _report(options: argparse.Namespace) -> int:
     from rig.commands.report import report
 
-    return report(options.run, options.out, options.overrides, pdf=options.pdf, dcc=options.dcc)
+    return report(options.run, options.out, options.overrides, options.reversal, pdf=options.pdf, dcc=options.dcc)
 
 
 def _export(options: argparse.Namespace) -> int:

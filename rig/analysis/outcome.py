@@ -27,7 +27,7 @@ from rig.analysis.verification import Verification, verify
 from rig.data.provenance import Provenance
 from rig.data.result_file import StoredCalibrationEntry
 from rig.data.run_file import RunData
-from rig.data.settings import RunSettings, Site
+from rig.data.settings import DecisionRule, RunSettings, Site
 from rig.errors import Fault
 from rig.estimation.arrays import Array
 from rig.estimation.vector_model import VectorSolution
@@ -104,7 +104,7 @@ def calibrated(runs: Sequence[RunData], estimator: str = DEFAULT_ESTIMATOR) -> O
         {name: results[name].solution for name in settings.to_calibrate},
         settings.limits,
         {name: result.uncertainty for name, result in results.items() if result.uncertainty is not None},
-        "simple" if settings.uncertainty is None else settings.uncertainty.decision_rule,
+        _decision_rule(settings),
     )
     return Outcome(
         recordings=recordings,
@@ -131,8 +131,9 @@ def drifted(runs: Sequence[RunData], estimator: str = DEFAULT_ESTIMATOR) -> Outc
     Raises Fault as `calibrated` and `bias_drifts` do.
     """
     outcome = calibrated(runs, estimator)
-    found = bias_drifts(outcome.recordings, outcome.settings)
-    checks = [check for name, each in found.items() for check in drift_checks(name, each, outcome.settings.limits)]
+    settings = outcome.settings
+    found, rule = bias_drifts(outcome.recordings, settings), _decision_rule(settings)
+    checks = [check for name, each in found.items() for check in drift_checks(name, each, settings.limits, rule)]
     return replace(outcome, drifts=found, checks=(*outcome.checks, *checks))
 
 
@@ -155,9 +156,14 @@ def _in_attitudes(runs: Sequence[RunData], recordings: tuple[ObservedRun, ...]) 
 
 
 def _acceleration_checks(found: Mapping[str, AccelerometerResult], settings: RunSettings) -> tuple[Check, ...]:
+    rule = _decision_rule(settings)
     return tuple(
-        check for name, result in found.items() for check in acceleration_checks(name, result, settings.limits)
+        check for name, result in found.items() for check in acceleration_checks(name, result, settings.limits, rule)
     )
+
+
+def _decision_rule(settings: RunSettings) -> DecisionRule:
+    return "simple" if settings.uncertainty is None else settings.uncertainty.decision_rule
 
 
 def verified(outcome: Outcome, repeated: Sequence[RunData]) -> Outcome:

@@ -83,25 +83,30 @@ def verification_checks(sensor: str, verification: Verification | None, limits: 
     )
 
 
-def acceleration_checks(sensor: str, result: AccelerometerResult, limits: Limits) -> tuple[Check, ...]:
-    """An accelerometer's scale and bias, their standard deviations, gravity's size in attitudes that were held out."""
-    std = np.sqrt(np.diag(result.covariance))
-    checks = (
-        ("scale_deviation", result.scale - 1, limits.acceleration_scale_deviation, "1"),
-        ("scale_std", std[:3], limits.acceleration_scale_std, "1"),
-        ("bias", result.bias_m_s2, limits.acceleration_bias_m_s2, "m/s²"),
-        ("bias_std", std[3:], limits.acceleration_bias_std_m_s2, "m/s²"),
-    )
+def acceleration_checks(
+    sensor: str, result: AccelerometerResult, limits: Limits, rule: DecisionRule = "simple"
+) -> tuple[Check, ...]:
+    """An accelerometer's scale and bias, their standard deviations, gravity's size in attitudes that were held out.
+
+    The uncertainty that the decision rule heeds is the solution's, relative to the stated gravity.
+    """
+    std, of = np.sqrt(np.diag(result.covariance)), f"{sensor}.acceleration"
+    scale, bias = COVERAGE_FACTOR * std[:3], COVERAGE_FACTOR * std[3:]
     found = [
-        Check(f"{sensor}.acceleration_{name}", _largest(values), limit, unit) for name, values, limit, unit in checks
+        _held(f"{of}_scale_deviation", (result.scale - 1, scale), limits.acceleration_scale_deviation, "1", rule),
+        Check(f"{of}_scale_std", _largest(std[:3]), limits.acceleration_scale_std, "1"),
+        _held(f"{of}_bias", (result.bias_m_s2, bias), limits.acceleration_bias_m_s2, "m/s²", rule),
+        Check(f"{of}_bias_std", _largest(std[3:]), limits.acceleration_bias_std_m_s2, "m/s²"),
     ]
     if result.held_out is not None:
         limit = limits.acceleration_verification_m_s2
-        found.append(Check(f"{sensor}.acceleration_verification", result.held_out.rms_m_s2, limit, "m/s²"))
+        found.append(Check(f"{of}_verification", result.held_out.rms_m_s2, limit, "m/s²"))
     return tuple(found)
 
 
-def drift_checks(sensor: str, drifts: Mapping[Quantity, BiasDrift], limits: Limits) -> tuple[Check, ...]:
+def drift_checks(
+    sensor: str, drifts: Mapping[Quantity, BiasDrift], limits: Limits, rule: DecisionRule = "simple"
+) -> tuple[Check, ...]:
     """The largest change of a bias between any two repeats."""
     allowed: Mapping[Quantity, tuple[str, float | None, str]] = {
         "rate": ("bias_drift", limits.bias_drift_rad_s, "rad/s"),
@@ -110,7 +115,9 @@ def drift_checks(sensor: str, drifts: Mapping[Quantity, BiasDrift], limits: Limi
     found = []
     for quantity, drift in drifts.items():
         name, limit, unit = allowed[quantity]
-        found.append(Check(f"{sensor}.{name}", _largest(drift.held.largest_change), limit, unit))
+        held = drift.held
+        expanded = COVERAGE_FACTOR * held.largest_change_std
+        found.append(_held(f"{sensor}.{name}", (held.largest_change, expanded), limit, unit, rule))
     return tuple(found)
 
 
@@ -122,25 +129,26 @@ def verdict(checks: Sequence[Check]) -> Literal["pass", "fail"]:
 def _checks(
     sensor: str, solution: Estimate, limits: Limits, budget: Budget | None, rule: DecisionRule
 ) -> tuple[Check, ...]:
-    def held(name: str, values: Array, uncertainties: Array | None, limit: float, unit: str) -> Check:
-        """The value that comes nearest to its limit."""
-        largest = _largest(values)
-        if uncertainties is None or largest is None:
-            return Check(f"{sensor}.{name}", largest, limit, unit)
-        guards = uncertainties * (rule == "guard_band")
-        worst = int(np.argmax(np.abs(values) + guards))
-        value, uncertainty, guard = abs(float(values[worst])), float(uncertainties[worst]), float(guards[worst])
-        return Check(f"{sensor}.{name}", value, limit, unit, uncertainty, guard)
-
     std = np.sqrt(np.diag(solution.covariance)) if budget is None else budget.std
     scale, bias = (None, None) if budget is None else (budget.expanded[:3], budget.expanded[3:])
     return (
-        held("scale_deviation", solution.scale - 1, scale, limits.scale_deviation, "1"),
+        _held(f"{sensor}.scale_deviation", (solution.scale - 1, scale), limits.scale_deviation, "1", rule),
         Check(f"{sensor}.scale_std", _largest(std[:3]), limits.scale_std, "1"),
-        held("bias", solution.bias_rad_s, bias, limits.bias_rad_s, "rad/s"),
+        _held(f"{sensor}.bias", (solution.bias_rad_s, bias), limits.bias_rad_s, "rad/s", rule),
         Check(f"{sensor}.bias_std", _largest(std[3:]), limits.bias_std_rad_s, "rad/s"),
         Check(f"{sensor}.condition", _largest(np.array([solution.condition])), limits.condition, "1"),
     )
+
+
+def _held(name: str, found: tuple[Array, Array | None], limit: float | None, unit: str, rule: DecisionRule) -> Check:
+    """Of values (3,) and their uncertainties that which comes nearest to its limit, and what the rule makes of it."""
+    values, uncertainties = found
+    largest = _largest(values)
+    if uncertainties is None or largest is None:
+        return Check(name, largest, limit, unit)
+    guards = uncertainties * (rule == "guard_band")
+    worst = int(np.argmax(np.abs(values) + guards))
+    return Check(name, abs(float(values[worst])), limit, unit, float(uncertainties[worst]), float(guards[worst]))
 
 
 def _largest(values: np.ndarray) -> float | None:

@@ -4,6 +4,7 @@ import sys
 from collections.abc import Sequence
 from pathlib import Path
 
+from rig.data.magnetometer_entries import read_reversal
 from rig.data.result_file import read_result
 from rig.data.run_folder import RESULT
 from rig.errors import Refused
@@ -14,14 +15,24 @@ from rig.report.certificate.writer import PAGE
 from rig.station.plain_text import say
 
 
-def report(run: Path, out: Path | None, overrides: Sequence[str] = (), *, pdf: bool = False, dcc: bool = False) -> int:
+def report(
+    run: Path,
+    out: Path | None,
+    overrides: Sequence[str] = (),
+    reversal: Path | None = None,
+    *,
+    pdf: bool = False,
+    dcc: bool = False,
+) -> int:
     """Certificate of a run folder or its result.json: HTML, and with `dcc` and `pdf` in these forms, into `out`.
 
-    Returns 0. Raises Refused as `read_result`, `stated_in`, `digital_certificate` and `write_pdf` do, `report_folder`.
+    `reversal` is what `rig reversal` wrote of its magnetometers. Returns 0. Raises Refused as `read_result`,
+    `read_reversal`, `certificate_of`, `stated_in`, `digital_certificate` and `write_pdf` do, `report_folder`.
     """
     file = run / RESULT if run.is_dir() else run
     result = read_result(file)
-    certificate = certificate_of(result, stated_in(file.parent, overrides))
+    turned = {} if reversal is None else read_reversal(reversal).magnetometers
+    certificate = certificate_of(result, stated_in(file.parent, overrides), turned)
     documents = {PAGE: certificate_page(certificate).encode()}
     digital = _digital(certificate, wanted=dcc) if dcc or pdf else {}
     folder = out or file.parent

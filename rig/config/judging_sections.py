@@ -128,6 +128,14 @@ class SiteSection(Section):
         description="size of the magnetic field where the magnetometer stands, as a reference there measured it: its "
         "scale factors are relative to it; without it a magnetometer is recorded, not calibrated",
     )
+    gravity_reference: Words | None = Field(
+        default=None,
+        description="where gravity_m_s2 comes from, such as a gravimeter with its certificate or a gravity map; for "
+        "certificates",
+    )
+    magnetic_field_reference: Words | None = Field(
+        default=None, description="with what magnetic_field_ut was measured; for certificates"
+    )
     magnetic_field_upwards: bool = Field(
         default=False, description="whether that field rises from the ground, as it does south of the magnetic equator"
     )
@@ -237,6 +245,8 @@ class HistorySection(Section):
     rig: Words | None = Field(
         default=None, description="what this rig is called there; left out, by its arm's serial number"
     )
+    operator: Words | None = Field(default=None, description="who runs the rig, as the history is to have it")
+    note: Words | None = Field(default=None, description="what the history is to say of this run beside its numbers")
     check_standards: tuple[Words, ...] = Field(
         default=(), max_length=100, description="serial numbers of sensors that are calibrated to watch the rig itself"
     )

@@ -52,6 +52,13 @@ class BiasByRepeat:
         change: Array = np.ptp(self.bias, axis=0)
         return change
 
+    @property
+    def largest_change_std(self) -> Array:
+        """(3,) of that change: what the two repeats it lies between are known to."""
+        ends = np.stack([self.bias.argmin(axis=0), self.bias.argmax(axis=0)])
+        std: Array = np.hypot(*np.take_along_axis(self.std, ends, axis=0))
+        return std
+
 
 def bias_by_repeat(readings: Array, variances: Array, modelled: Array, bias: Array | None = None) -> BiasByRepeat:
     """The bias from mean readings (R, N, 3) of N attitudes in R ≥ 2 repeats, the variances of these means, and what the

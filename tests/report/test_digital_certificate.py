@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 
 from rig.config.judging_sections import CertificateSection, SiteSection
-from rig.data.result_file import read_result
+from rig.data.result_file import VectorEntry, read_result
 from rig.errors import Refused
 from rig.report.certificate.dcc import digital_certificate
 from rig.report.certificate.stated import Stated
@@ -91,10 +91,13 @@ def test_values_uncertainties_and_covariance_are_the_result_s() -> None:
     sensor = result().sensors["gyro"]
     assert sensor.budget is not None
     xml = digital_certificate(certificate())
-    scale, bias, six = map(numbers, found(xml, "si:valueXMLList"))
+    scale, bias, six, skew = map(numbers, found(xml, "si:valueXMLList"))
     assert (scale, bias, six) == ([*sensor.scale], [*sensor.bias_rad_s], [*sensor.scale, *sensor.bias_rad_s])
     expanded = [number for each in found(xml, "si:uncertaintyXMLList") for number in numbers(each)]
-    assert expanded == [*sensor.budget.expanded]
+    assert isinstance(sensor.vector_model, VectorEntry)
+    assert skew == [*sensor.vector_model.non_orthogonality_rad]
+    stds = sensor.vector_model.non_orthogonality_std_rad
+    assert expanded == [*sensor.budget.expanded, *(2 * std for std in stds)]
     covariance = np.array([float(each.text or "") for each in found(xml, "si:covariance/si:value")]).reshape(6, 6).T
     np.testing.assert_allclose(covariance, np.array(sensor.covariance_combined), rtol=1e-9)
     units = [each.text for each in found(xml, "si:covariance/si:unit")]

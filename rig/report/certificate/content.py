@@ -5,15 +5,20 @@ import re
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from datetime import date, datetime
+from types import MappingProxyType
 
 from rig.data.accelerometer_entries import AccelerometerEntry
-from rig.data.magnetometer_entries import MagnetometerEntry
+from rig.data.drift_entries import DriftEntry
+from rig.data.magnetometer_entries import MagnetometerEntry, ReversalEntry
 from rig.data.result_file import CheckEntry, ProvenanceEntry, ResultDocument, SensorEntry, VerificationEntry
 from rig.data.result_types import ErrorEntry
+from rig.errors import Refused
 from rig.report.certificate.stated import Stated
 
 # The checks that hold a property of the item against a limit; the others ask whether the measurement is fit for use.
-CONFORMITY = re.compile(r"\.(acceleration_)?(scale_deviation|bias|verification_rms|verification_mean|verification)$")
+CONFORMITY = re.compile(
+    r"\.(acceleration_)?(scale_deviation|bias|bias_drift|verification_rms|verification_mean|verification)$"
+)
 SIMULATED_ARM = "(simulated)"  # so ends the version of a controller that is none
 BY_COMPUTER = "the computer's clock"
 
@@ -34,7 +39,10 @@ class Gyroscope:
 
 @dataclass(frozen=True, slots=True)
 class Certificate:
-    """All of it. `marks` are what must stand across every page; without any it is a certificate to be signed."""
+    """All of it. `marks` are what must stand across every page; without any it is a certificate to be signed.
+
+    `reversals` are what turning magnetometers over has told, by the magnetometer's name.
+    """
 
     number: str
     title: str
@@ -50,6 +58,7 @@ class Certificate:
     traceable: bool
     deviations: tuple[str, ...]
     references: tuple[str, ...]
+    reversals: Mapping[str, ReversalEntry]
 
     @property
     def provenance(self) -> ProvenanceEntry:
@@ -70,13 +79,30 @@ class Certificate:
         return {name: each for name, each in found if isinstance(each, MagnetometerEntry)}
 
     @property
+    def drifts(self) -> tuple[tuple[str, str, DriftEntry], ...]:
+        """Sensor, quantity, and its bias by repeat."""
+        found = self.result.bias_drift.items()
+        return tuple((name, quantity, each) for name, drifts in found for quantity, each in drifts.items())
+
+    @property
+    def calibrates(self) -> bool:
+        """Whether anything was calibrated, and not verified alone."""
+        return bool(self.gyroscopes or self.accelerometers or self.magnetometers)
+
+    @property
     def guarded(self) -> bool:
         """Whether values had to stay below their limits by U."""
         return any(check.guard > 0 for check in self.conformity)
 
 
-def certificate_of(result: ResultDocument, stated: Stated) -> Certificate:
-    """The certificate of a result. The same result and statements make the same certificate, its number too."""
+def certificate_of(
+    result: ResultDocument, stated: Stated, reversals: Mapping[str, ReversalEntry] = MappingProxyType({})
+) -> Certificate:
+    """The certificate of a result. The same result and statements make the same certificate, its number too.
+
+    Raises Refused `another_sensor` for reversals of magnetometers, or from runs, other than the result's.
+    """
+    _check_same(result, reversals)
     gyroscopes = tuple(
         Gyroscope(name, sensor, result.verification.get(name))
         for name, sensor in result.sensors.items()
@@ -86,8 +112,8 @@ def certificate_of(result: ResultDocument, stated: Stated) -> Certificate:
     conformity = tuple(check for check in result.checks if CONFORMITY.search(check.name))
     fitness = tuple(check for check in result.checks if check not in conformity)
     return Certificate(
-        number=_number(result, stated),
-        title=_title(gyroscopes, result.accelerometers),
+        number=_number(result, stated, reversals),
+        title=_title(result, gyroscopes),
         marks=tuple(_marks(result, stated, gyroscopes, fitness)),
         issued=stated.certificate.issued or datetime.fromisoformat(result.provenance.solved_utc).date(),
         stated=stated,
@@ -100,6 +126,7 @@ def certificate_of(result: ResultDocument, stated: Stated) -> Certificate:
         traceable=_traceable(result, stated),
         deviations=tuple(_deviations(result)),
         references=tuple(_references(result)),
+        reversals=reversals,
     )
 
 
@@ -108,17 +135,32 @@ def is_simulated(result: ResultDocument, stated: Stated) -> bool:
     return stated.simulated or result.provenance.arm_software.endswith(SIMULATED_ARM)
 
 
-def _number(result: ResultDocument, stated: Stated) -> str:
+def _number(result: ResultDocument, stated: Stated, reversals: Mapping[str, ReversalEntry]) -> str:
     """The day, and a part of the SHA-256 of all the certificate is made of: another content, another number."""
     said = f"{result.text()}\n{stated.site!r}\n{stated.certificate!r}\n{stated.simulated}"
+    said += "".join(f"\n{name}: {each.model_dump_json()}" for name, each in reversals.items())
     day = datetime.fromisoformat(result.provenance.started_utc)
     return f"RIG-{day:%Y%m%d}-{hashlib.sha256(said.encode()).hexdigest()[:12].upper()}"
 
 
-def _title(gyroscopes: Sequence[Gyroscope], accelerometers: Mapping[str, AccelerometerEntry]) -> str:
-    if not gyroscopes and not accelerometers:
+def _title(result: ResultDocument, gyroscopes: Sequence[Gyroscope]) -> str:
+    found = any(isinstance(each, MagnetometerEntry) for each in result.magnetometers.values())
+    if not gyroscopes and not result.accelerometers and not found:
         return "Verification report"
     return "Calibration certificate" if all(each.has_uncertainty for each in gyroscopes) else "Calibration record"
+
+
+def _check_same(result: ResultDocument, reversals: Mapping[str, ReversalEntry]) -> None:
+    for name, each in reversals.items():
+        here = result.magnetometers.get(name)
+        began = {run.started_utc for run in each.runs}
+        if not isinstance(here, MagnetometerEntry) or here.serial_number != each.serial_number:
+            why = f"magnetometer {name} {each.serial_number} was turned over, which this run did not calibrate"
+        elif result.provenance.started_utc not in began:
+            why = f"{name} was turned over between runs of {', '.join(sorted(began))}; this run is none of them"
+        else:
+            continue
+        raise Refused("another_sensor", why, "Give one of the runs that `rig reversal` was given")
 
 
 def _marks(

@@ -8,24 +8,29 @@ from collections.abc import Iterator
 from typing import Final
 from xml.etree.ElementTree import Element, tostring
 
-from rig.data.accelerometer_entries import AccelerometerEntry
-from rig.data.result_file import CheckEntry, VerificationEntry
+from rig.config.sensor_catalogue import has_own_port
+from rig.data.result_file import CheckEntry
 from rig.errors import Refused
-from rig.report.certificate.content import Certificate, Gyroscope
-from rig.report.certificate.tables import JOINT_FACTOR, coverage_sentence
+from rig.report.certificate.content import Certificate
+from rig.report.certificate.dcc_results import (
+    accelerometer,
+    bias_drift,
+    gyroscope,
+    magnetometer,
+    reversed_magnetometer,
+    verification,
+)
+from rig.report.certificate.tables import kind
 from rig.report.certificate.xml_parts import DCC as NAMESPACE
-from rig.report.certificate.xml_parts import XSI, Part, dcc, real, real_list, text, words
+from rig.report.certificate.xml_parts import UNSAID, XSI, Part, dcc, real, text, words
 
 DCC: Final = "certificate.xml"
 SCHEMA_VERSION = "3.2.1"
-ONE, RATE, ACCELERATION = r"\one", r"\radian\second\tothe{-1}", r"\metre\second\tothe{-2}"
 # PTB's rules want a condition to each quantity.
 UNKNOWN_AIR = dcc(
     "influenceConditions",
     dcc("influenceCondition", text("name", "ambient temperature"), dcc("data", text("text", None))),
 )
-AXES = ("x", "y", "z")
-SIX = ("kx", "ky", "kz", "bx", "by", "bz")
 
 
 def digital_certificate(certificate: Certificate) -> bytes:
@@ -33,7 +38,7 @@ def digital_certificate(certificate: Certificate) -> bytes:
 
     Raises Refused `no_digital_certificate` where nothing was calibrated, an uncertainty or the country is not known.
     """
-    if not certificate.gyroscopes and not certificate.accelerometers:
+    if not certificate.calibrates:
         raise Refused("no_digital_certificate", "the run calibrated nothing", "Give a run that calibrates")
     unknown = ", ".join(each.name for each in certificate.gyroscopes if not each.has_uncertainty)
     if unknown:
@@ -107,6 +112,25 @@ def _items(c: Certificate) -> Iterator[Element]:
         yield _item(f"gyroscope-{i}", f"gyroscope {each.name}", each.sensor.part, each.sensor.serial_number, c)
     for i, (name, found) in enumerate(c.accelerometers.items()):
         yield _item(f"accelerometer-{i}", f"accelerometer {name}", found.part, found.serial_number, c)
+    for i, (name, field) in enumerate(c.magnetometers.items()):
+        yield _item(f"magnetometer-{i}", f"magnetometer {name}", field.part, field.serial_number, c)
+    for i, name in enumerate(_watched(c)):
+        part = c.accelerometers[name].part if name in c.accelerometers else UNSAID
+        serial = c.provenance.sensor_serial_numbers.get(name, UNSAID)
+        yield _item(f"watched-{i}", f"gyroscope {name}", part, serial, c)
+
+
+def _watched(c: Certificate) -> list[str]:
+    """Sensors of which a drift alone is told, no calibration."""
+    return sorted({name for name, quantity, _ in c.drifts if _calibrated_as(c, name, quantity) is None})
+
+
+def _calibrated_as(c: Certificate, name: str, quantity: str) -> str | None:
+    """The item's key of what drifted, where it was calibrated."""
+    if quantity == "acceleration":
+        return f"accelerometer-{list(c.accelerometers).index(name)}" if name in c.accelerometers else None
+    names = [each.name for each in c.gyroscopes]
+    return f"gyroscope-{names.index(name)}" if name in names else None
 
 
 def _item(key: str, name: str, part: str, serial: str, c: Certificate) -> Element:
@@ -115,9 +139,9 @@ def _item(key: str, name: str, part: str, serial: str, c: Certificate) -> Elemen
         "item",
         text("name", name),
         text("description", " ".join([*(f"{mark}." for mark in c.marks), condition])),
-        words("model", part.upper()),
+        words("model", kind(part)),
         dcc("identifications", _identified("manufacturer", serial, "serial number"),
-            _identified("other", c.provenance.board_unique_id, "board it is on")),
+            None if has_own_port(part) else _identified("other", c.provenance.board_unique_id, "board it is on")),
         id=key,
     )  # fmt: skip
 
@@ -134,7 +158,13 @@ def _statements(c: Certificate) -> Iterator[Element]:
     if c.gyroscopes:
         yield _chain("gyroscopes", f"{chain} Angles are whole turns, 2π by closure of the circle.", c.traceable)
     if c.accelerometers:
-        yield _chain("accelerometers", "Gravity is stated by the laboratory without a chain of its own.", False)
+        origin = c.stated.where.gravity_reference or "not stated"
+        said = f"Gravity is stated by the laboratory without a chain of its own, its origin: {origin}."
+        yield _chain("accelerometers", said, False)
+    if c.magnetometers:
+        origin = c.stated.where.magnetic_field_reference or "not stated"
+        said = f"The size of the magnetic field is stated without a chain of its own, its origin: {origin}."
+        yield _chain("magnetometers", said, False)
     relates = "The results relate only to the items calibrated. Not issued under an accreditation."
     yield dcc("statement", text("name", "scope"), text("declaration", " ".join([relates, *c.deviations])))
     rule = "guard band w = U (ILAC-G8:09/2019, 4.2.2)" if c.guarded else "simple acceptance (ILAC-G8:09/2019, 4.2.1)"
@@ -160,14 +190,22 @@ def _conformity(check: CheckEntry, rule: str) -> Element:
 
 def _results(c: Certificate) -> Iterator[Element]:
     for i, each in enumerate(c.gyroscopes):
-        yield _measured(c, f"gyroscope-{i}", f"calibration of gyroscope {each.name}", _gyroscope(each),
+        yield _measured(c, f"gyroscope-{i}", f"calibration of gyroscope {each.name}", gyroscope(each),
                         each.sensor.temperature_c)  # fmt: skip
         if each.verification is not None:
-            results = _verification(each.verification)
+            results = verification(each.verification)
             yield _measured(c, f"gyroscope-{i}", f"verification of gyroscope {each.name}", results, None)
     for i, (name, found) in enumerate(c.accelerometers.items()):
-        yield _measured(c, f"accelerometer-{i}", f"calibration of accelerometer {name}", _accelerometer(found),
+        yield _measured(c, f"accelerometer-{i}", f"calibration of accelerometer {name}", accelerometer(found),
                         found.temperature_c)  # fmt: skip
+    for i, (name, field) in enumerate(c.magnetometers.items()):
+        turned = c.reversals.get(name)
+        results = magnetometer(field) if turned is None else (*reversed_magnetometer(turned), *magnetometer(field))
+        yield _measured(c, f"magnetometer-{i}", f"calibration of magnetometer {name}", iter(results), None)
+    watched = _watched(c)
+    for name, quantity, drift in c.drifts:
+        key = _calibrated_as(c, name, quantity) or f"watched-{watched.index(name)}"
+        yield _measured(c, key, f"bias by repeat of {name}, {quantity}", bias_drift(drift), None)
 
 
 def _measured(c: Certificate, item: str, name: str, results: Iterator[Element], temperature_c: float | None) -> Element:
@@ -196,45 +234,3 @@ def _condition(name: str, value: float | None, unit: str) -> Part:
     if value is None:
         return None
     return dcc("influenceCondition", text("name", name), dcc("data", dcc("quantity", real(value, unit))))
-
-
-def _result(name: str, said: str, quantity: Element) -> Element:
-    return dcc("result", text("name", name), text("description", said), dcc("data", dcc("quantity", quantity)))
-
-
-def _gyroscope(each: Gyroscope) -> Iterator[Element]:
-    sensor, budget = each.sensor, each.sensor.budget
-    assert budget is not None and sensor.covariance_combined is not None  # or there is no digital certificate
-    covered, factor = coverage_sentence(budget), budget.coverage_factor
-    model = f"{sensor.model}: true rate g, reading m, K = diag(k)."
-    yield _result("scale factor", f"{model} {covered}",
-                  real_list(AXES, sensor.scale, [ONE], expanded=(budget.expanded[:3], factor)))  # fmt: skip
-    yield _result("bias", f"{model} {covered}",
-                  real_list(AXES, sensor.bias_rad_s, [RATE], expanded=(budget.expanded[3:], factor)))  # fmt: skip
-    yield _joint([*sensor.scale, *sensor.bias_rad_s], sensor.covariance_combined, RATE)
-
-
-def _joint(numbers: list[float], covariance: tuple[tuple[float, ...], ...], unit: str) -> Element:
-    return _result(
-        "scale factors and biases with their covariance",
-        "The ellipsoid holds all six values at once with a probability of 95 %; the matrix is the combined covariance.",
-        real_list(SIX, numbers, [ONE] * 3 + [unit] * 3, region=(covariance, JOINT_FACTOR)),
-    )
-
-
-def _accelerometer(found: AccelerometerEntry) -> Iterator[Element]:
-    said = (
-        f"a = F s + b, k = 1/‖row of F‖. The uncertainty is that of noise and of the arm's attitudes, k = 2; gravity, "
-        f"{found.gravity_m_s2!r} m/s², is taken as exact, and no further contributor was evaluated."
-    )
-    expanded = [2 * found.covariance[i][i] ** 0.5 for i in range(6)]
-    yield _result("scale factor", said, real_list(AXES, found.scale, [ONE], expanded=(expanded[:3], 2.0)))
-    yield _result("bias", said, real_list(AXES, found.bias_m_s2, [ACCELERATION], expanded=(expanded[3:], 2.0)))
-    yield _joint([*found.scale, *found.bias_m_s2], found.covariance, ACCELERATION)
-
-
-def _verification(found: VerificationEntry) -> Iterator[Element]:
-    said = f"RMS of reading less reference {found.reference}; holds the noise of both, no uncertainty was evaluated."
-    if found.before is not None:
-        yield _result("as found", said, real_list(AXES, found.before.movement.rms_rad_s, [RATE]))
-    yield _result("as left", said, real_list(AXES, found.after.movement.rms_rad_s, [RATE]))

@@ -4,14 +4,15 @@ from functools import cache
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from rig.report.certificate import plots, tables
+from rig.config.sensor_catalogue import has_own_port
+from rig.report.certificate import at_rest_tables, plots, tables
 from rig.report.certificate.content import Certificate
 from rig.report.certificate.tables import DEG, JOINT_FACTOR
 
 if TYPE_CHECKING:
     from jinja2 import Template
 
-TEMPLATE = Path(__file__).with_name("certificate.html.j2")
+TEMPLATE = "certificate.html.j2"
 FOOTING = "Relates only to the items calibrated. Not issued under an accreditation."
 
 
@@ -22,9 +23,13 @@ def certificate_page(certificate: Certificate) -> str:
 
 @cache
 def _template() -> "Template":
-    from jinja2 import Environment, StrictUndefined
+    from jinja2 import Environment, FileSystemLoader, StrictUndefined
 
-    environment = Environment(autoescape=True, undefined=StrictUndefined, trim_blocks=True, lstrip_blocks=True)
-    for module in (tables, plots):
+    loader = FileSystemLoader(Path(__file__).parent)
+    environment = Environment(
+        loader=loader, autoescape=True, undefined=StrictUndefined, trim_blocks=True, lstrip_blocks=True
+    )
+    environment.globals["has_own_port"] = has_own_port
+    for module in (tables, at_rest_tables, plots):
         environment.globals |= {name: value for name, value in vars(module).items() if callable(value)}
-    return environment.from_string(TEMPLATE.read_text(encoding="utf-8"))
+    return environment.get_template(TEMPLATE)

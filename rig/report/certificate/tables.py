@@ -6,18 +6,19 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from rig.data.accelerometer_entries import AccelerometerEntry
 from rig.data.budget_entries import BudgetEntry, ContributorEntry
-from rig.data.magnetometer_entries import MagnetometerEntry
+from rig.data.earth_rate_entries import EarthRateEntry
 from rig.data.result_file import CheckEntry, SensorEntry, VectorEntry, VerificationEntry
 from rig.report.certificate.rounding import rounded
 
 AXES = ("x", "y", "z")
+ANGLES = ("yz", "zx", "xy")
 NEGLIGIBLE = 0.001  # of every variance: lines below are summed up in one
 NOTHING = 1e-12  # of a variance
 ENOUGH_FREEDOM = 50.0  # degrees of it, for k = 2 to cover 95 % (EA-4/02 M:2022, annex E)
 JOINT_FACTOR = 3.548  # of six values at once: √χ² of six degrees of freedom at 95 %
 DEG = math.degrees(1)
+FINE_DEG_S = 1e-3
 
 
 @dataclass(frozen=True, slots=True)
@@ -35,16 +36,7 @@ class AxisRow:
     axis: str
     scale: Pair
     bias: Pair
-    bias_deg: Pair
-
-
-@dataclass(frozen=True, slots=True)
-class FieldRow:
-    """One axis of a magnetometer."""
-
-    axis: str
-    scale: Pair
-    bias: Pair
+    bias_too: Pair
 
 
 @dataclass(frozen=True, slots=True)
@@ -75,6 +67,11 @@ class CheckRow:
     unit: str
 
 
+def kind(part: str) -> str:
+    """What the maker calls it."""
+    return part.removesuffix("_magnetometer").upper()
+
+
 def pair(value: float, uncertainty: float) -> Pair:
     """Rounded together; a value that has no uncertainty at all is printed with nine digits."""
     if not uncertainty > 0:
@@ -85,45 +82,25 @@ def pair(value: float, uncertainty: float) -> Pair:
 
 def axis_rows(sensor: SensorEntry) -> list[AxisRow]:
     """With U of the budget; without one, with the standard deviation of the noise, which the page then calls so."""
-    spread = _noise(sensor) if sensor.budget is None else sensor.budget.expanded
+    spread, (_, factor) = _spread(sensor), degrees_of(sensor)
     return [
         AxisRow(
             axis,
             pair(sensor.scale[i], spread[i]),
             pair(sensor.bias_rad_s[i], spread[3 + i]),
-            pair(DEG * sensor.bias_rad_s[i], DEG * spread[3 + i]),
+            pair(factor * sensor.bias_rad_s[i], factor * spread[3 + i]),
         )
         for i, axis in enumerate(AXES)
     ]
 
 
-def acceleration_rows(found: AccelerometerEntry) -> list[AxisRow]:
-    """Two standard deviations of the solution's; the bias in m/s² and in thousandths of the stated gravity."""
-    spread = [2 * found.covariance[i][i] ** 0.5 for i in range(6)]
-    milli = 1000 / found.gravity_m_s2
-    return [
-        AxisRow(
-            axis,
-            pair(found.scale[i], spread[i]),
-            pair(found.bias_m_s2[i], spread[3 + i]),
-            pair(milli * found.bias_m_s2[i], milli * spread[3 + i]),
-        )
-        for i, axis in enumerate(AXES)
-    ]
+def degrees_of(sensor: SensorEntry) -> tuple[str, float]:
+    """In which unit the biases are printed beside rad/s, and what takes rad/s there: hours where it is a fine one."""
+    return ("°/s", DEG) if DEG * max(_spread(sensor)[3:]) >= FINE_DEG_S else ("°/h", 3600 * DEG)
 
 
-def field_rows(found: MagnetometerEntry) -> list[FieldRow]:
-    """Two standard deviations of the solution's; the bias in µT."""
-    spread = [2 * found.covariance[i][i] ** 0.5 for i in range(6)]
-    return [
-        FieldRow(axis, pair(found.scale[i], spread[i]), pair(1e6 * found.bias_t[i], 1e6 * spread[3 + i]))
-        for i, axis in enumerate(AXES)
-    ]
-
-
-def distance(vector: Sequence[float]) -> float:
-    """The length of it."""
-    return math.hypot(*vector)
+def _spread(sensor: SensorEntry) -> Sequence[float]:
+    return _noise(sensor) if sensor.budget is None else sensor.budget.expanded
 
 
 def _noise(sensor: SensorEntry) -> list[float]:
@@ -231,11 +208,28 @@ def _largest_turn(errors: Sequence[Sequence[float]], axis: int) -> str:
     return f"{max(abs(error[axis]) for error in errors):.5f}" if errors else "–"
 
 
-def skew_rows(vector: VectorEntry) -> list[tuple[str, Pair]]:
+def skew_rows(angles_rad: Sequence[float], stds_rad: Sequence[float]) -> list[tuple[str, Pair]]:
     """Angles by which the axes are off right ones, in degrees, with two standard deviations."""
     return [
-        (name, pair(DEG * angle, 2 * DEG * std))
-        for name, angle, std in zip(
-            vector.non_orthogonality_order, vector.non_orthogonality_rad, vector.non_orthogonality_std_rad, strict=True
-        )
+        (name, pair(DEG * angle, 2 * DEG * std)) for name, angle, std in zip(ANGLES, angles_rad, stds_rad, strict=True)
     ]
+
+
+def gravity_rows(vector: VectorEntry) -> list[tuple[str, list[Pair]]]:
+    """What 1 m/s² along x, y, z of the flange adds to each axis' reading, in rad/s, with two standard deviations."""
+    assert vector.g_sensitivity_rad_s_per_m_s2 is not None and vector.g_sensitivity_std_rad_s_per_m_s2 is not None
+    rows = zip(
+        AXES, vector.g_sensitivity_rad_s_per_m_s2, vector.g_sensitivity_std_rad_s_per_m_s2, strict=True
+    )  # gravity points down where the specific force points up
+    return [(axis, [pair(-g, 2 * std) for g, std in zip(row, stds, strict=True)]) for axis, row, stds in rows]
+
+
+def earth_rate_rows(found: EarthRateEntry) -> list[tuple[str, str, Pair]]:
+    """Name, unit, and value with two standard deviations."""
+    std = np.sqrt(np.diag(found.covariance_rad2_s2))
+    rows = [("size", "rad/s", pair(found.norm_rad_s, 2 * found.norm_std_rad_s))]
+    rows += [(axis, "rad/s", pair(found.rate_rad_s[i], 2 * float(std[i]))) for i, axis in enumerate(AXES)]
+    rows.append(("latitude", "°", pair(DEG * found.latitude_rad, 2 * DEG * found.latitude_std_rad)))
+    if found.heading_rad is not None and found.heading_std_rad is not None:
+        rows.append(("heading", "°", pair(DEG * found.heading_rad % 360, 2 * DEG * found.heading_std_rad)))
+    return rows

@@ -87,7 +87,7 @@ def real_list(
         covariance, factor = region
         covered = si(
             "ellipsoidalRegionXMLList",
-            _covariance(covariance, units),
+            _covariance(covariance, units if len(units) > 1 else [*units] * len(covariance)),
             values("coverageFactor", [factor]),
             values("coverageProbability", [PROBABILITY]),
         )

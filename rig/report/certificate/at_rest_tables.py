@@ -1,0 +1,119 @@
+"""The numbers of accelerometers, of magnetometers and of biases by repeat as a certificate prints them."""
+
+import math
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+
+from rig.data.accelerometer_entries import AccelerometerEntry
+from rig.data.drift_entries import DriftEntry
+from rig.data.magnetometer_entries import MagnetometerEntry, ReversalEntry
+from rig.data.result_types import ErrorEntry
+from rig.report.certificate.tables import AXES, AxisRow, Pair, pair
+
+MICRO = 1e6
+
+
+@dataclass(frozen=True, slots=True)
+class FieldRow:
+    """One axis of a magnetometer."""
+
+    axis: str
+    scale: Pair
+    bias: Pair
+
+
+@dataclass(frozen=True, slots=True)
+class ReversalRow:
+    """One axis of a magnetometer that was turned over; `mixed` where it was not, and the bias is that as mounted."""
+
+    axis: str
+    scale: Pair
+    bias: Pair
+    arm_field: Pair | None
+    mixed: bool
+
+
+@dataclass(frozen=True, slots=True)
+class DriftRow:
+    """One axis' bias: in the first and in the last repeat, how far it ever moved, and over temperature if known."""
+
+    axis: str
+    first: Pair
+    last: Pair
+    change: Pair
+    slope: Pair | None
+
+
+def acceleration_rows(found: AccelerometerEntry) -> list[AxisRow]:
+    """Two standard deviations of the solution's; the bias in m/s² and in thousandths of the stated gravity."""
+    spread, milli = expanded(found.covariance), 1000 / found.gravity_m_s2
+    return [
+        AxisRow(
+            axis,
+            pair(found.scale[i], spread[i]),
+            pair(found.bias_m_s2[i], spread[3 + i]),
+            pair(milli * found.bias_m_s2[i], milli * spread[3 + i]),
+        )
+        for i, axis in enumerate(AXES)
+    ]
+
+
+def second_order_rows(found: AccelerometerEntry) -> list[tuple[str, Pair]]:
+    """φ of each axis in s²/m with two standard deviations; none where it was not looked for."""
+    if found.second_order_s2_m is None or found.second_order_std_s2_m is None:
+        return []
+    each = zip(AXES, found.second_order_s2_m, found.second_order_std_s2_m, strict=True)
+    return [(axis, pair(value, 2 * std)) for axis, value, std in each]
+
+
+def field_rows(found: MagnetometerEntry) -> list[FieldRow]:
+    """Two standard deviations of the solution's; the bias in µT."""
+    spread = expanded(found.covariance)
+    return [
+        FieldRow(axis, pair(found.scale[i], spread[i]), pair(MICRO * found.bias_t[i], MICRO * spread[3 + i]))
+        for i, axis in enumerate(AXES)
+    ]
+
+
+def reversal_rows(found: ReversalEntry) -> list[ReversalRow]:
+    """The sensor's own bias, and the arm's field in its axes as it was mounted first, in µT."""
+    return [
+        ReversalRow(
+            axis,
+            pair(found.scale[i], 2 * found.scale_std[i]),
+            pair(MICRO * found.bias_t[i], 2 * MICRO * found.bias_std_t[i]),
+            None if mixed else pair(MICRO * found.arm_field_t[i], 2 * MICRO * found.arm_field_std_t[i]),
+            mixed,
+        )
+        for i, (axis, mixed) in enumerate(zip(AXES, found.arm_field_in_bias, strict=True))
+    ]
+
+
+def drift_rows(found: DriftEntry) -> list[DriftRow]:
+    """In the drift's own unit, with two standard deviations."""
+    bias, std = (np.array([getattr(each.held, name) for each in found.repeats]) for name in ("bias", "std"))
+    whole = np.hypot(std, found.common_std)  # what all repeats share is no part of a change
+    ends = np.stack([bias.argmin(axis=0), bias.argmax(axis=0)])
+    changed, slope = np.hypot(*np.take_along_axis(std, ends, axis=0)), found.over_temperature
+    return [
+        DriftRow(
+            axis,
+            pair(float(bias[0, i]), 2 * float(whole[0, i])),
+            pair(float(bias[-1, i]), 2 * float(whole[-1, i])),
+            pair(found.largest_change[i], 2 * float(changed[i])),
+            None if isinstance(slope, ErrorEntry) else pair(slope.slope[i], 2 * slope.std[i]),
+        )
+        for i, axis in enumerate(AXES)
+    ]
+
+
+def expanded(covariance: Sequence[Sequence[float]]) -> list[float]:
+    """Two standard deviations of each parameter."""
+    return [2 * covariance[i][i] ** 0.5 for i in range(len(covariance))]
+
+
+def distance(vector: Sequence[float]) -> float:
+    """The length of it."""
+    return math.hypot(*vector)

@@ -1,0 +1,167 @@
+"""The results of a digital certificate: values in full, with U or with their covariance, quantity by quantity."""
+
+from collections.abc import Iterator, Sequence
+from xml.etree.ElementTree import Element
+
+from rig.data.accelerometer_entries import AccelerometerEntry
+from rig.data.drift_entries import DriftEntry
+from rig.data.earth_rate_entries import EarthRateEntry
+from rig.data.magnetometer_entries import MagnetometerEntry, ReversalEntry
+from rig.data.result_file import VectorEntry, VerificationEntry
+from rig.data.result_types import ErrorEntry
+from rig.report.certificate.at_rest_tables import expanded
+from rig.report.certificate.content import Gyroscope
+from rig.report.certificate.tables import ANGLES, AXES, JOINT_FACTOR, coverage_sentence
+from rig.report.certificate.xml_parts import dcc, real_list, text
+
+ONE, RATE, ACCELERATION = r"\one", r"\radian\second\tothe{-1}", r"\metre\second\tothe{-2}"
+FIELD, ANGLE, PER_FORCE = r"\tesla", r"\radian", r"\second\tothe{2}\metre\tothe{-1}"
+PER_ACCELERATION, KELVIN = r"\radian\second\metre\tothe{-1}", r"\kelvin\tothe{-1}"
+SIX = ("kx", "ky", "kz", "bx", "by", "bz")
+# Of three values at once: √χ² of three degrees of freedom at 95 %.
+JOINT_FACTOR_3 = 2.795
+TWO = 2.0
+SOLUTION = "Two standard deviations of the solution, k = 2."
+
+
+def gyroscope(each: Gyroscope) -> Iterator[Element]:
+    """Scale factors and biases with U of the budget, and with the combined covariance; what else was found of it."""
+    sensor, budget = each.sensor, each.sensor.budget
+    assert budget is not None and sensor.covariance_combined is not None  # or there is no digital certificate
+    covered, factor = coverage_sentence(budget), budget.coverage_factor
+    model = f"{sensor.model}: true rate g, reading m, K = diag(k)."
+    yield _result("scale factor", f"{model} {covered}",
+                  real_list(AXES, sensor.scale, [ONE], expanded=(budget.expanded[:3], factor)))  # fmt: skip
+    yield _result("bias", f"{model} {covered}",
+                  real_list(AXES, sensor.bias_rad_s, [RATE], expanded=(budget.expanded[3:], factor)))  # fmt: skip
+    yield _joint([*sensor.scale, *sensor.bias_rad_s], sensor.covariance_combined, RATE)
+    if isinstance(sensor.vector_model, VectorEntry):
+        yield _skew(sensor.vector_model.non_orthogonality_rad, sensor.vector_model.non_orthogonality_std_rad)
+        yield from _g_sensitivity(sensor.vector_model)
+    if isinstance(sensor.earth_rate, EarthRateEntry):
+        yield from _earth_rate(sensor.earth_rate)
+
+
+def accelerometer(found: AccelerometerEntry) -> Iterator[Element]:
+    """Of the solution, relative to the stated gravity."""
+    said = (
+        f"{found.model}: specific force s, reading a, k = 1/‖row of F‖. The uncertainty is that of noise and of the "
+        f"arm's attitudes, k = 2; gravity, {found.gravity_m_s2!r} m/s², is taken as exact, and no further contributor "
+        "was evaluated."
+    )
+    yield from _relative([*found.scale, *found.bias_m_s2], found.covariance, ACCELERATION, said)
+    yield _skew(found.non_orthogonality_rad, found.non_orthogonality_std_rad)
+    if found.second_order_s2_m is not None and found.second_order_std_s2_m is not None:
+        yield _spread("second order", SOLUTION, AXES, (found.second_order_s2_m, found.second_order_std_s2_m), PER_FORCE)
+
+
+def magnetometer(found: MagnetometerEntry) -> Iterator[Element]:
+    """Of the solution, relative to the stated field, as mounted."""
+    said = (
+        f"{found.model}: magnetic flux density B, reading m, k = 1/‖row of F‖. The uncertainty is that of noise and of "
+        f"the arm's attitudes, k = 2; the size of the field, {found.field_t!r} T, is taken as exact, and no further "
+        "contributor was evaluated. "
+    )
+    if found.arm_field_in_bias:
+        said += "As mounted in this run: the field of the arm is in the bias, and the uncertainty does not cover it."
+    yield from _relative([*found.scale, *found.bias_t], found.covariance, FIELD, said, ", as mounted")
+    yield _skew(found.non_orthogonality_rad, found.non_orthogonality_std_rad)
+
+
+def reversed_magnetometer(found: ReversalEntry) -> Iterator[Element]:
+    """Its own bias and the arm's field, with the covariance of both."""
+    mixed = [axis for axis, held in zip(AXES, found.arm_field_in_bias, strict=True) if held]
+    began = ", ".join(run.started_utc for run in found.runs)
+    said = f"From runs of {began}, between which it was turned over. {SOLUTION}"
+    if mixed:
+        said += f" Along {', '.join(mixed)} it was never turned over: there the arm's field is in the bias."
+    yield _spread("scale factor", said, AXES, (found.scale, found.scale_std), ONE)
+    yield _spread("own bias", said, AXES, (found.bias_t, found.bias_std_t), FIELD)
+    names = ("bx", "by", "bz", "arm x", "arm y", "arm z")
+    values = [*found.bias_t, *found.arm_field_t]
+    yield _result(
+        "own bias and the arm's field in the axes of the first run with their covariance",
+        f"{said} The ellipsoid holds all six values at once with a probability of 95 %.",
+        real_list([name.replace(" ", "_") for name in names], values, [FIELD], region=(found.covariance, JOINT_FACTOR)),
+    )
+
+
+def bias_drift(found: DriftEntry) -> Iterator[Element]:
+    """Of each repeat, and over temperature where it could be told."""
+    unit = RATE if found.unit == "rad/s" else ACCELERATION
+    labels = [str(number) for number in range(1, len(found.repeats) + 1)]
+    for i, axis in enumerate(AXES):
+        values, stds = zip(*((each.held.bias[i], each.held.std[i]) for each in found.repeats), strict=True)
+        said = f"What the reading adds, scale and axes held; two standard deviations of what differs between repeats, \
+k = 2; beside them all repeats share one of {found.common_std[i]!r} {found.unit}."
+        yield _spread(f"bias along {axis} by repeat", said, labels, (values, stds), unit)
+    slope = found.over_temperature
+    if not isinstance(slope, ErrorEntry):
+        low, high = slope.range_c
+        said = f"Holds from {low!r} to {high!r} °C only. {SOLUTION}"
+        yield _spread("bias over temperature", said, AXES, (slope.slope, slope.std), unit + KELVIN)
+
+
+def verification(found: VerificationEntry) -> Iterator[Element]:
+    """RMS against a reference, as found and as left."""
+    said = f"RMS of reading less reference {found.reference}; holds the noise of both, no uncertainty was evaluated."
+    if found.before is not None:
+        yield _result("as found", said, real_list(AXES, found.before.movement.rms_rad_s, [RATE]))
+    yield _result("as left", said, real_list(AXES, found.after.movement.rms_rad_s, [RATE]))
+
+
+def _g_sensitivity(found: VectorEntry) -> Iterator[Element]:
+    if found.g_sensitivity_rad_s_per_m_s2 is None or found.g_sensitivity_std_rad_s_per_m_s2 is None:
+        return
+    labels = [f"{axis}{along}" for axis in AXES for along in AXES]
+    values = [-each for row in found.g_sensitivity_rad_s_per_m_s2 for each in row]  # gravity points down
+    stds = [each for row in found.g_sensitivity_std_rad_s_per_m_s2 for each in row]
+    said = (
+        "What a specific force along the flange's axis (second letter) adds to the reading of an axis (first letter)."
+    )
+    yield _spread("g-sensitivity", f"{said} {SOLUTION}", labels, (values, stds), PER_ACCELERATION)
+
+
+def _earth_rate(found: EarthRateEntry) -> Iterator[Element]:
+    said = "As found in the frame of the arm's base. The ellipsoid holds all three values with a probability of 95 %."
+    rate = real_list(AXES, found.rate_rad_s, [RATE], region=(found.covariance_rad2_s2, JOINT_FACTOR_3))
+    yield _result("Earth's rate", said, rate)
+    yield _spread(
+        "latitude by that rate", SOLUTION, ["latitude"], ([found.latitude_rad], [found.latitude_std_rad]), ANGLE
+    )
+    if found.heading_rad is not None and found.heading_std_rad is not None:
+        said = f"Where the x axis of the arm's base points, from north over east. {SOLUTION}"
+        yield _spread("heading by that rate", said, ["heading"], ([found.heading_rad], [found.heading_std_rad]), ANGLE)
+
+
+def _relative(
+    numbers: list[float], covariance: Sequence[Sequence[float]], unit: str, said: str, how: str = ""
+) -> Iterator[Element]:
+    widths = expanded(covariance)
+    yield _result(f"scale factor{how}", said, real_list(AXES, numbers[:3], [ONE], expanded=(widths[:3], TWO)))
+    yield _result(f"bias{how}", said, real_list(AXES, numbers[3:], [unit], expanded=(widths[3:], TWO)))
+    yield _joint(numbers, covariance, unit, how)
+
+
+def _joint(numbers: list[float], covariance: Sequence[Sequence[float]], unit: str, how: str = "") -> Element:
+    return _result(
+        f"scale factors and biases{how} with their covariance",
+        "The ellipsoid holds all six values at once with a probability of 95 %; the matrix is their covariance.",
+        real_list(SIX, numbers, [ONE] * 3 + [unit] * 3, region=(covariance, JOINT_FACTOR)),
+    )
+
+
+def _skew(angles: Sequence[float], stds: Sequence[float]) -> Element:
+    return _spread("angles between the axes less a right one", SOLUTION, ANGLES, (angles, stds), ANGLE)
+
+
+def _spread(
+    name: str, said: str, labels: Sequence[str], found: tuple[Sequence[float], Sequence[float]], unit: str
+) -> Element:
+    """Values, from these and their standard deviations."""
+    numbers, stds = found
+    return _result(name, said, real_list(labels, numbers, [unit], expanded=([TWO * std for std in stds], TWO)))
+
+
+def _result(name: str, said: str, quantity: Element) -> Element:
+    return dcc("result", text("name", name), text("description", said), dcc("data", dcc("quantity", quantity)))
