@@ -24,6 +24,7 @@ from rig.history.tables import (
     changes_table,
     effects_table,
     parameters_table,
+    run_lines,
     states_table,
     title_of,
     trend_lines,
@@ -68,6 +69,8 @@ def show(options: Namespace) -> int:
     console = Console(highlight=False)
     console.print(calibrations_table([past]))
     console.print(parameters_table(past))
+    for line in run_lines(past, kept):
+        console.print(plain(line))
     for computer, path in kept.places:
         console.print(plain(f"lies on {computer} in {path}"))
     for recording in kept.recordings:

@@ -13,6 +13,7 @@ from rig.station.events import NotRemembered, Remembered, RunEvent
 
 if TYPE_CHECKING:
     from rig.config.judging_sections import HistorySection
+    from rig.history.issued import Issued
     from rig.history.series import Change
     from rig.history.store import History, Past
 
@@ -48,6 +49,27 @@ def remember(folder: Path, section: "HistorySection") -> tuple[RunEvent | None, 
         f"{b.now.serial_number} {c.name} (E_n {c.normalised_error:.1f})" for b in beside for c in b.changes if c.beyond
     )
     return Remembered(label, entered.run_id, beyond), beside
+
+
+def remember_certificate(folder: Path, result: str, certificate: "Issued") -> str | None:
+    """Note a certificate of the run in `folder`, whose result.json is `result`; why it is in no history, or None."""
+    try:
+        from rig.config.judging_sections import HistorySection
+        from rig.history.finished import configured_in, content_sha256
+        from rig.history.place import chosen_place
+        from rig.history.store import open_history
+
+        loaded = configured_in(folder)
+        where = chosen_place(HistorySection() if loaded is None else loaded.config.history)
+        if where is None:
+            return None
+        known = False
+        if where.file is None or where.file.exists():
+            with open_history(where) as history:
+                known = history.certify(content_sha256(result), certificate)
+    except Exception as error:  # whatever it is, the certificate is written
+        return error.what if isinstance(error, RigError) else f"{type(error).__name__}: {error}"
+    return None if known else f"{where.label} does not know this run; rig history import {folder} enters it"
 
 
 def print_beside(found: Sequence[Beside]) -> None:

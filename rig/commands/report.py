@@ -4,10 +4,12 @@ import sys
 from collections.abc import Sequence
 from pathlib import Path
 
+from rig.commands.remember import remember_certificate
 from rig.data.magnetometer_entries import read_reversal
 from rig.data.result_file import read_result
 from rig.data.run_folder import RESULT
 from rig.errors import Refused
+from rig.history.issued import issued_certificate
 from rig.report.certificate.content import Certificate, certificate_of
 from rig.report.certificate.page import certificate_page
 from rig.report.certificate.stated import stated_in
@@ -33,23 +35,29 @@ def report(
     result = read_result(file)
     turned = {} if reversal is None else read_reversal(reversal).magnetometers
     certificate = certificate_of(result, stated_in(file.parent, overrides), turned)
-    documents = {PAGE: certificate_page(certificate).encode()}
+    written: dict[str, bytes] = {PAGE: certificate_page(certificate).encode()}
     digital = _digital(certificate, wanted=dcc) if dcc or pdf else {}
+    if dcc:
+        written |= digital
     folder = out or file.parent
-    written = [folder / name for name in (documents | digital if dcc else documents)]
     try:
         folder.mkdir(parents=True, exist_ok=True)
-        for path in written:
-            path.write_bytes((documents | digital)[path.name])
+        for name, content in written.items():
+            (folder / name).write_bytes(content)
         if pdf:
-            from rig.report.certificate.pdf import write_pdf
+            from rig.report.certificate.pdf import PDF, write_pdf
 
-            written.append(folder / "certificate.pdf")
-            write_pdf(documents[PAGE].decode(), {RESULT: file.read_bytes(), **digital}, written[-1])
+            write_pdf(written[PAGE].decode(), {RESULT: file.read_bytes(), **digital}, folder / PDF)
+            written[PDF] = (folder / PDF).read_bytes()
     except OSError as error:
         raise Refused("report_folder", f"{folder} cannot be written: {error}", "Choose another with --out") from error
-    for path in written:
-        say(str(path))
+    for name in written:
+        say(str(folder / name))
+    missed = remember_certificate(
+        file.parent, file.read_text(encoding="utf-8"), issued_certificate(certificate, written)
+    )
+    if missed is not None:
+        say(f"rig: the certificate is in no history: {missed}", sys.stderr)
     return 0
 
 

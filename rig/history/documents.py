@@ -30,6 +30,8 @@ COLUMNS = (
     "fit",
     "simulated",
     "check_standard",
+    "operator",
+    "note",
     "voided",
     "parameter",
     "value",
@@ -81,6 +83,8 @@ def calibration_entry(past: Past) -> dict[str, Any]:
         "verdict": past.verdict,
         "fit": past.fit,
         "check_standard": past.check_standard,
+        "operator": past.operator,
+        "note": past.note,
         "voided": past.voided,
         "parameters": {name: _parameter(each) for name, each in past.parameters.items()},
     }

@@ -8,14 +8,18 @@ from pathlib import Path
 from typing import Any
 
 from rig.config.judging_sections import HistorySection
-from rig.config.load import load
-from rig.config.regular_file import read_regular_file
+from rig.config.load import Loaded, load
+from rig.config.regular_file import UnfitFile, read_regular_file
 from rig.data.result_file import SIZE_MAX_BYTES, ResultDocument, read_result
 from rig.data.run_folder import CONFIG, RESULT, recordings
 from rig.errors import Refused
-from rig.report.certificate.content import CONFORMITY, SIMULATED_ARM
+from rig.history.issued import Issued, issued_certificate
+from rig.report.certificate.content import CONFORMITY, SIMULATED_ARM, certificate_of
+from rig.report.certificate.stated import Stated, of_configuration
 
+PAGE = "certificate.html"
 CHUNK_BYTES = 1 << 20
+PAGE_MAX_BYTES = 64_000_000  # of a run of six sweeps it has 30,000
 
 
 @dataclass(frozen=True, slots=True)
@@ -31,7 +35,8 @@ class Recording:
 class Finished:
     """`text` is all of result.json, compact; `rig` what the rig is called; `computer` and `path` where it lies.
 
-    `check_standards` are the serial numbers of sensors that are there to watch the rig.
+    `check_standards` are the serial numbers of sensors that are there to watch the rig; `operator` and `note` what the
+    configuration says of them; `certificate` is that in the folder.
     """
 
     text: str
@@ -42,6 +47,9 @@ class Finished:
     computer: str
     path: str
     recordings: tuple[Recording, ...]
+    operator: str | None = None
+    note: str | None = None
+    certificate: Issued | None = None
 
     @property
     def content_sha256(self) -> str:
@@ -71,7 +79,9 @@ def finished_run(folder: Path, document: ResultDocument | None = None) -> Finish
         text = read_regular_file(folder / RESULT, SIZE_MAX_BYTES)
     else:
         text = document.text().encode()
-    section, simulated = _configured(folder)
+    loaded = configured_in(folder)
+    section = HistorySection() if loaded is None else loaded.config.history
+    simulated = loaded is not None and loaded.simulated
     provenance = document.provenance
     return Finished(
         text=compact(json.loads(text)),
@@ -84,6 +94,9 @@ def finished_run(folder: Path, document: ResultDocument | None = None) -> Finish
         recordings=tuple(
             recording_of(file) for readings in ("raw", "calibrated") for file in recordings(folder, readings)
         ),
+        operator=section.operator,
+        note=section.note,
+        certificate=_certificate(folder, document, Stated() if loaded is None else of_configuration(loaded)),
     )
 
 
@@ -110,15 +123,24 @@ def content_sha256(text: str) -> str:
     return hashlib.sha256(said.encode()).hexdigest()
 
 
-def _configured(folder: Path) -> tuple[HistorySection, bool]:
-    """What the folder's configuration says of the history, and whether of a simulated laboratory.
+def configured_in(folder: Path) -> Loaded | None:
+    """The folder's configuration.
 
-    Nothing where there is none, or where it is of before some key was renamed: a result is entered all the same.
+    None where there is none, or where it is of before some key was renamed: a result is entered all the same.
     """
     if not (folder / CONFIG).exists():
-        return HistorySection(), False
+        return None
     try:
-        loaded = load(folder / CONFIG, sections=None)
+        return load(folder / CONFIG, sections=None)
     except Refused:
-        return HistorySection(), False
-    return loaded.config.history, loaded.simulated
+        return None
+
+
+def _certificate(folder: Path, document: ResultDocument, stated: Stated) -> Issued | None:
+    """The page in the folder, if it is the certificate of this result; an amended one was entered when it was made."""
+    try:
+        page = read_regular_file(folder / PAGE, PAGE_MAX_BYTES)
+    except (UnfitFile, OSError):
+        return None
+    certificate = certificate_of(document, stated)
+    return issued_certificate(certificate, {PAGE: page}) if certificate.number.encode() in page else None

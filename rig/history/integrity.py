@@ -39,6 +39,7 @@ def examined(runs: Iterable[Kept], computer: str | None = None) -> Iterator[Foun
         else:
             yield Found(run.run_id, f"run {run.run_id}", "ok")
         yield from _recordings(run, here)
+        yield from _certificates(run)
 
 
 def _recordings(run: Kept, here: str) -> Iterator[Found]:
@@ -62,3 +63,20 @@ def _recordings(run: Kept, here: str) -> Iterator[Found]:
             yield Found(run.run_id, str(file), "ok")
         else:
             yield Found(run.run_id, str(file), "changed", f"SHA-256 {now.sha256[:12]}…, was {recording.sha256[:12]}…")
+
+
+def _certificates(run: Kept) -> Iterator[Found]:
+    """Of those in the folder; one that was written elsewhere is not looked for."""
+    folder = next((Path(path) for _, path in run.places if Path(path).is_dir()), None)
+    if folder is None:
+        return
+    entered = {file for certificate in run.certificates for file in certificate.files}
+    for name in sorted({name for name, _ in entered}):
+        file = folder / name
+        if not file.is_file():
+            continue
+        now = recording_of(file).sha256
+        if (name, now) in entered:
+            yield Found(run.run_id, str(file), "ok")
+        else:
+            yield Found(run.run_id, str(file), "changed", f"SHA-256 {now[:12]}…, which no certificate of this run had")

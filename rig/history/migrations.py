@@ -20,7 +20,15 @@ def migrate_1_to_2(connection: Connection) -> None:
     schema.voided.create(connection)
 
 
-MIGRATIONS: Mapping[int, Callable[[Connection], None]] = {1: migrate_1_to_2}
+def migrate_2_to_3(connection: Connection) -> None:
+    """Who ran the rig, a note, and certificates' numbers: of runs before, nobody said."""
+    for name, length in (("operator", schema.NAME), ("note", schema.NOTE)):
+        connection.execute(text(f"ALTER TABLE run ADD COLUMN {name} VARCHAR({length})"))
+    schema.certificate.create(connection)
+    schema.certificate_file.create(connection)
+
+
+MIGRATIONS: Mapping[int, Callable[[Connection], None]] = {1: migrate_1_to_2, 2: migrate_2_to_3}
 
 
 def version_of(connection: Connection, label: str) -> int:

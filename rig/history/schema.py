@@ -18,8 +18,8 @@ from sqlalchemy import (
     UniqueConstraint,
 )
 
-VERSION = 2
-HASH, TIME, NAME = 64, 40, 400  # longest texts of their kind
+VERSION = 3
+HASH, TIME, NAME, NOTE = 64, 40, 400, 1000  # longest texts of their kind
 
 metadata = MetaData()
 
@@ -44,6 +44,9 @@ run = Table(
     Column("fit", Boolean, nullable=False),  # whether the measurement passed its own checks
     Column("simulated", Boolean, nullable=False),
     Column("result", Text, nullable=False),
+    # Since version 3, null where nobody said.
+    Column("operator", String(NAME)),
+    Column("note", String(NOTE)),
 )
 
 location = Table(
@@ -100,6 +103,32 @@ voided = Table(
     "voided",
     metadata,
     Column("calibration_id", ForeignKey("calibration.id"), primary_key=True),
-    Column("reason", String(1000), nullable=False),
+    Column("reason", String(NOTE), nullable=False),
     Column("voided_utc", String(TIME), nullable=False),
+)
+
+# Since version 3. A certificate by its number, which another content does not have; `replaces` is the number it says it
+# amends, of this history or another. `marks` is what stands across its pages, such as that the laboratory is simulated:
+# only one without any is a certificate to rely on.
+certificate = Table(
+    "certificate",
+    metadata,
+    Column("id", Integer, primary_key=True),
+    Column("number", String(40), nullable=False, unique=True),
+    Column("run_id", ForeignKey("run.id"), nullable=False, index=True),
+    Column("title", String(40), nullable=False),
+    Column("issued", String(TIME), nullable=False),
+    Column("replaces", String(NAME)),
+    Column("marks", String(NOTE), nullable=False),
+    Column("entered_utc", String(TIME), nullable=False),
+)
+
+# The files it was written to. A table of their own: a PDF that is made later adds a row, and changes none.
+certificate_file = Table(
+    "certificate_file",
+    metadata,
+    Column("certificate_id", ForeignKey("certificate.id"), primary_key=True),
+    Column("name", String(NAME), primary_key=True),
+    Column("sha256", String(HASH), primary_key=True),
+    Column("entered_utc", String(TIME), nullable=False),
 )

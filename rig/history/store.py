@@ -15,9 +15,10 @@ from sqlalchemy import Connection, Engine, Row, Select, and_, exists, insert, or
 from sqlalchemy.exc import IntegrityError, SQLAlchemyError
 
 from rig.errors import Refused
-from rig.history import schema
+from rig.history import certificates, schema
 from rig.history.engine import WRITES, engine_of
 from rig.history.finished import Finished, Recording
+from rig.history.issued import Issued
 from rig.history.parameters import ORDER, Parameter, Quantity, calibrated
 from rig.history.place import Place, place
 
@@ -57,6 +58,8 @@ class Past:
     estimator: str
     temperature_c: float | None
     check_standard: bool
+    operator: str | None
+    note: str | None
     voided: str | None
     parameters: Mapping[str, Parameter]
 
@@ -80,13 +83,17 @@ class Entered:
 
 @dataclass(frozen=True, slots=True)
 class Kept:
-    """A run as it was entered: its result, its recordings, and where its folder was seen, the newest place first."""
+    """A run as it was entered: its result, its recordings, and where its folder was seen, the newest place first.
+
+    `certificates` in the order they were entered.
+    """
 
     run_id: int
     content_sha256: str
     result: str
     recordings: tuple[Recording, ...]
     places: tuple[tuple[str, str], ...]
+    certificates: tuple[Issued, ...] = ()
 
 
 @contextmanager
@@ -126,6 +133,8 @@ class History:
                 known = self._run_id(connection, content)
                 run_id = _enter(connection, finished, content) if known is None else known
                 _note_place(connection, run_id, finished)
+                if finished.certificate is not None:
+                    certificates.enter(connection, run_id, finished.certificate, _now())
                 return Entered(run_id, known is None)
         except IntegrityError:
             # Somebody else entered the same at the same moment, and was first.
@@ -134,6 +143,14 @@ class History:
             if known is None:
                 raise
             return Entered(known, False)
+
+    def certify(self, content_sha256: str, certificate: Issued) -> bool:
+        """Note a certificate of the run with that result; False where the history does not have it."""
+        with self._writing() as connection:
+            run_id = self._run_id(connection, content_sha256)
+            if run_id is not None:
+                certificates.enter(connection, run_id, certificate, _now())
+            return run_id is not None
 
     def calibrations(self, selection: Selection = Selection()) -> list[Past]:
         """In the order of time, the voided ones too. A result that a later one of the same run replaced is left out."""
@@ -180,6 +197,7 @@ class History:
                     result,
                     tuple(Recording(*row) for row in connection.execute(had.order_by(files.c.name))),
                     tuple((row[0], row[1]) for row in connection.execute(seen.order_by(places.c.id.desc()))),
+                    certificates.of_run(connection, number),
                 )
 
     @contextmanager
@@ -219,6 +237,8 @@ _COLUMNS = (
     _CALIBRATION.estimator,
     _CALIBRATION.temperature_c,
     _CALIBRATION.check_standard,
+    _RUN.operator,
+    _RUN.note,
     schema.voided.c.reason.label("voided"),
 )
 _ROWS = schema.run.join(schema.calibration).outerjoin(schema.voided)
@@ -270,6 +290,8 @@ def _enter(connection: Connection, finished: Finished, content_sha256: str) -> i
         "fit": finished.fit,
         "simulated": finished.simulated,
         "result": finished.text,
+        "operator": finished.operator,
+        "note": finished.note,
     }
     run_id = _inserted(connection.execute(insert(schema.run).values(row)).inserted_primary_key)
     if finished.recordings:

@@ -8,7 +8,7 @@ from rig.history.parameters import Parameter, is_scale
 from rig.history.series import YEAR_DAYS, Change, RigState, Subject, Trend
 from rig.history.statistics.charts import FEWEST
 from rig.history.statistics.rig_effects import RigEffect
-from rig.history.store import Past
+from rig.history.store import Kept, Past
 from rig.report.certificate.rounding import rounded
 from rig.station.plain_text import plain
 
@@ -78,6 +78,21 @@ def parameters_table(past: Past) -> Table:
         combined = "not known" if each.std_combined is None else f"{each.std_combined:.3g}"
         table.add_row(each.name, value_text(each), plain(each.unit), f"{each.std_statistical:.3g}", combined)
     return table
+
+
+def run_lines(past: Past, kept: Kept) -> Iterator[str]:
+    """Who ran the rig, what was noted, and the certificates, with what makes one invalid."""
+    if past.operator is not None:
+        yield f"operator: {past.operator}"
+    if past.note is not None:
+        yield f"note: {past.note}"
+    replaced = {each.replaces for each in kept.certificates}
+    for each in kept.certificates:
+        said = f"{each.title.lower()} {each.number}, issued {each.issued}"
+        said += f", replaces {each.replaces}" if each.replaces is not None else ""
+        said += ", replaced" if each.number in replaced else ""
+        yield said + (f"; {each.marks}" if each.marks else "")
+        yield from (f"{name} of it: SHA-256 {sha256}" for name, sha256 in each.files)
 
 
 def states_table(states: Iterable[RigState]) -> Table:

@@ -3,6 +3,7 @@
 import csv
 import io
 import json
+import re
 import shutil
 import subprocess
 import sys
@@ -18,7 +19,7 @@ from rig.history.store import open_history
 from rig.station.events import NotRemembered, Remembered
 from support.commands import configuration
 from support.past_runs import FIRST, finished
-from support.paths import FIXTURES
+from support.paths import CONFIGS, FIXTURES
 
 
 @pytest.fixture
@@ -146,6 +147,31 @@ def test_what_was_never_entered_is_refused_by_name(place: str, capsys: pytest.Ca
 def test_a_configuration_names_the_history(year: str, capsys: pytest.CaptureFixture[str]) -> None:
     config = configuration(Path(year).parent, {"history": {"url": year}})
     assert "12" in told(capsys, "show", "12", "--history", config)
+
+
+def test_a_certificate_is_remembered_with_who_ran_the_rig(place: str, capsys: pytest.CaptureFixture[str]) -> None:
+    """That of the run when it is entered, amended ones when they are made; one of a simulated laboratory says so."""
+    folder = Path(place).parent / "run"
+    shutil.copytree(FIXTURES / "verified", folder)
+    demo = (CONFIGS / "demo.yaml").read_text(encoding="utf-8")
+    said = "history: {operator: A. Person, note: 'after [the] move'}\n"
+    (folder / "config.yaml").write_text(f"{demo}{said}", encoding="utf-8")
+    assert main(["report", str(folder)]) == 0
+    assert "is in no history" in capsys.readouterr().err
+    told(capsys, "import", folder)
+    first = re.findall(r"RIG-\d{8}-[0-9A-F]{12}", (folder / "certificate.html").read_text(encoding="utf-8"))[0]
+    assert main(["report", str(folder), "--set", f"certificate.replaces={first}"]) == 0
+    assert capsys.readouterr().err == ""
+    shown = " ".join(told(capsys, "show", "1").split())
+    assert "operator: A. Person" in shown and "note: after [the] move" in shown
+    assert f"calibration record {first}, issued " in shown and f"replaces {first}; Simulated laboratory" in shown
+    assert shown.count("certificate.html of it: SHA-256") == 2 and shown.count(", replaced;") == 1
+    (entry, _) = json.loads(told(capsys, "--json"))["calibrations"]
+    assert (entry["operator"], entry["note"], entry["simulated"]) == ("A. Person", "after [the] move", True)
+    assert "4 ok, 0 changed, 0 missing" in told(capsys, "verify")
+    with (folder / "certificate.html").open("a", encoding="utf-8") as page:
+        page.write("<!-- better -->")
+    assert f"changed: {folder / 'certificate.html'} (run 1)" in told(capsys, "verify", status=1)
 
 
 @pytest.mark.slow

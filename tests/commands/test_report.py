@@ -6,11 +6,12 @@ from pathlib import Path
 import pytest
 
 from rig.cli import main
+from rig.data.magnetometer_entries import ReversalDocument
 from rig.data.result_file import write_result
 from rig.errors import Refused
 from rig.report.certificate import pdf
 from rig.report.certificate.rounding import rounded
-from support.certified import result
+from support.certified import everything, result, reversal
 from support.commands import rig
 from support.paths import CONFIGS, FIXTURES
 
@@ -54,6 +55,21 @@ def test_an_amended_certificate_names_the_customer_and_what_it_replaces(run: Pat
     assert main(["report", str(run), *said]) == 0
     page = (run / "certificate.html").read_text(encoding="utf-8")
     assert "Sons &amp; Co" in page and "replaces RIG-1" in page and "room 3" in page
+
+
+def test_a_magnetometer_that_was_turned_over_is_certified_so(run: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    document = everything()
+    write_result(document, run)
+    file = run / "reversal.json"
+    found = {"schema": "rig.reversal/1", "magnetometers": {"compass": reversal(document)}}
+    file.write_text(ReversalDocument.model_validate(found).text(), encoding="utf-8")
+    assert main(["report", str(run), "--dcc", "--reversal", str(file)]) == 0
+    assert "turned over" in (run / "certificate.html").read_text(encoding="utf-8")
+    assert "own bias" in (run / "certificate.xml").read_text(encoding="utf-8")
+    capsys.readouterr()
+    for other, name in ((run / "none.json", "no_result"), (run / "result.json", "not_a_result")):
+        assert main(["report", str(run), "--reversal", str(other)]) == 2
+        assert name in capsys.readouterr().err
 
 
 def test_what_was_measured_cannot_be_said_otherwise(run: Path, capsys: pytest.CaptureFixture[str]) -> None:

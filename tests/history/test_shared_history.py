@@ -9,10 +9,12 @@ from sqlalchemy import delete, text
 
 from rig.history import schema
 from rig.history.engine import WRITES
+from rig.history.issued import Issued
 from rig.history.store import open_history
 from support.past_runs import enter_many, finished
 from support.postgres import postgresql
 
+ISSUED = Issued("RIG-1", "Calibration certificate", "2025-01-06", None, "", (("certificate.html", "ab" * 32),))
 PROCESSES, ENTRIES, FEW = 8, 250, 60
 pytestmark = pytest.mark.slow
 
@@ -52,9 +54,14 @@ def test_a_history_of_version_1_is_migrated_there_too(url: str) -> None:
         history.enter(finished(0))
         before = history.calibrations()
         with history.engine.connect().execution_options(**{WRITES: True}) as connection, connection.begin():
-            schema.voided.drop(connection)
+            for table in (schema.certificate_file, schema.certificate, schema.voided):
+                table.drop(connection)
+            for column in ("operator", "note"):
+                connection.execute(text(f"ALTER TABLE run DROP COLUMN {column}"))
             connection.execute(delete(schema.meta).where(schema.meta.c.key == "version"))
             connection.execute(schema.meta.insert().values(key="version", value="1"))
     with open_history(url) as history:
         assert history.calibrations() == before
         history.void(before[0].id, "to see that it can be")
+        assert history.certify(finished(0).content_sha256, ISSUED)
+        assert [each.certificates for each in history.kept()] == [(ISSUED,)]

@@ -2,11 +2,12 @@
 
 import sqlite3
 from collections.abc import Iterator
+from dataclasses import replace
 from datetime import timedelta
 from pathlib import Path
 
 import pytest
-from sqlalchemy import inspect, text
+from sqlalchemy import event, inspect, text
 
 from rig.config.judging_sections import HistorySection
 from rig.config.load import ConfigurationRefused, load
@@ -15,6 +16,7 @@ from rig.errors import Refused
 from rig.history import schema
 from rig.history.engine import engine_of
 from rig.history.finished import content_sha256, finished_run
+from rig.history.issued import Issued
 from rig.history.parameters import calibrated
 from rig.history.place import chosen_place, place
 from rig.history.series import Trend, changes, effects, rig_states, subjects, trends
@@ -22,7 +24,12 @@ from rig.history.store import History, Selection, open_history
 from support.past_runs import FIRST, finished
 from support.paths import DEMO, FIXTURES, ROOT
 
-VERSION_1 = ROOT / "tests" / "fixtures" / "history" / "version_1.sql"
+OLD = ROOT / "tests" / "fixtures" / "history"
+
+
+ISSUED = Issued(
+    "RIG-20250106-AAAAAAAAAAAA", "Calibration certificate", "2025-01-06", None, "", (("certificate.html", "ab" * 32),)
+)
 
 
 @pytest.fixture
@@ -120,25 +127,73 @@ def test_one_sensor_among_many_is_looked_up_not_searched_for(history: History) -
     assert "calibration_of_serial_number" in plan and "SCAN" not in plan
 
 
-def test_a_history_of_version_1_is_migrated_with_equal_numbers(tmp_path: Path) -> None:
+def test_there_is_a_fixture_of_every_old_schema() -> None:
+    assert sorted(file.name for file in OLD.iterdir()) == [f"version_{n}.sql" for n in range(1, schema.VERSION)]
+
+
+@pytest.mark.parametrize("version", range(1, schema.VERSION))
+def test_a_history_of_an_old_version_is_migrated_with_equal_numbers(version: int, tmp_path: Path) -> None:
     file = tmp_path / "history.sqlite"
     old = sqlite3.connect(file)
-    old.executescript(VERSION_1.read_text(encoding="utf-8"))
-    question = "SELECT calibration_id, name, value, std_statistical, std_combined, unit FROM parameter ORDER BY 1, 2"
-    before = old.execute(question).fetchall()
+    old.executescript((OLD / f"version_{version}.sql").read_text(encoding="utf-8"))
+    assert old.execute("SELECT value FROM meta WHERE key = 'version'").fetchone() == (str(version),)
+    tables = [name for (name,) in old.execute("SELECT name FROM sqlite_master WHERE type = 'table' AND name != 'meta'")]
+    columns = {name: ", ".join(row[1] for row in old.execute(f"PRAGMA table_info({name})")) for name in tables}
+    before = {name: old.execute(f"SELECT {columns[name]} FROM {name} ORDER BY 1, 2").fetchall() for name in tables}
     old.close()
     with open_history(str(file)) as history:
         found = history.calibrations()
-        history.void(1, "to see that it can be")
+        assert [each.voided for each in found] == [None, "the reference was another" if version >= 2 else None]
+        assert {(each.operator, each.note) for each in found} == {(None, None)}
         with history.engine.connect() as connection:
-            after = [tuple(row) for row in connection.execute(text(question))]
+            after = {
+                name: [
+                    tuple(row) for row in connection.execute(text(f"SELECT {columns[name]} FROM {name} ORDER BY 1, 2"))
+                ]
+                for name in tables
+            }
             migrated = columns_of(connection)
-    assert after == before and len(before) == 20
+        history.void(1, "to see that it can be")
+        history.enter(replace(finished(0), operator="A. Person", certificate=ISSUED))
+        assert [each.certificates for each in history.kept()] == [(), (ISSUED,)]
+    assert after == before and len(before["parameter"]) == 20
     assert [set(each.parameters.values()) for each in found] == [
         set(each.parameters) for each in calibrated(read_result(FIXTURES / "verified"))
     ]
     with open_history(str(tmp_path / "new.sqlite")) as new, new.engine.connect() as connection:
         assert columns_of(connection) == migrated
+
+
+def test_who_ran_the_rig_and_what_was_noted_is_found_again(history: History) -> None:
+    history.enter(replace(finished(0), operator="A. Person", note="after the move to room 3"))
+    history.enter(finished(1))
+    found = [(each.operator, each.note) for each in history.calibrations()]
+    assert found == [("A. Person", "after the move to room 3"), (None, None)]
+
+
+def test_a_certificate_is_entered_once_by_its_number_and_with_every_file_it_was_written_to(history: History) -> None:
+    run = replace(finished(0), certificate=ISSUED)
+    first = history.enter(run)
+    assert not history.enter(run).new
+    later = replace(ISSUED, files=(("certificate.pdf", "cd" * 32),))
+    amended = replace(ISSUED, number="RIG-20250106-BBBBBBBBBBBB", replaces=ISSUED.number, files=())
+    for each in (later, later, amended):
+        assert history.certify(run.content_sha256, each)
+    (kept,) = history.kept(first.run_id)
+    assert kept.certificates == (replace(ISSUED, files=(*ISSUED.files, *later.files)), amended)
+    assert not history.certify("0" * 64, ISSUED)  # of a run nobody entered
+
+
+def test_rows_are_only_added(history: History) -> None:
+    """What a role may do that can neither change nor remove anything (docs/how-to/shared-history.md)."""
+    said: list[str] = []
+    event.listen(history.engine, "before_cursor_execute", lambda *each: said.append(each[2].split()[0].upper()))
+    run = replace(finished(0), certificate=ISSUED, operator="A. Person")
+    history.enter(run)
+    history.enter(run)
+    history.certify(run.content_sha256, replace(ISSUED, files=(("certificate.pdf", "cd" * 32),)))
+    history.void(1, "to see what it takes")
+    assert "INSERT" in said and set(said) <= {"SELECT", "INSERT", "BEGIN"}
 
 
 def columns_of(connection: object) -> dict[str, dict[str, tuple[str, bool]]]:

@@ -18,7 +18,17 @@ from rig.report.certificate.page import certificate_page
 from rig.report.certificate.rounding import rounded
 from rig.report.certificate.stated import Stated, of_configuration, stated_in
 from rig.report.certificate.tables import coverage_sentence
-from support.certified import LABORATORY, certificate, compared, planted, read, result, with_accelerometer
+from support.certified import (
+    LABORATORY,
+    certificate,
+    compared,
+    everything,
+    planted,
+    read,
+    result,
+    reversal,
+    with_accelerometer,
+)
 from support.paths import CONFIGS, FIXTURES
 
 CLAUSES = [
@@ -36,10 +46,48 @@ FIXED = {
 }
 
 
-@pytest.mark.parametrize("clause", CLAUSES)
+def kinds() -> dict[str, ResultDocument]:
+    """What a run may find, one kind each, and all at once."""
+    whole = everything()
+    none = {"sensors": {}, "accelerometers": {}, "magnetometers": {}, "bias_drift": {}, "verification": {}}
+    return {
+        "gyroscope": result(),
+        "accelerometer": whole.model_copy(update=none | {"accelerometers": whole.accelerometers}),
+        "magnetometer": whole.model_copy(update=none | {"magnetometers": whole.magnetometers}),
+        "drift": whole.model_copy(
+            update=none | {"bias_drift": whole.bias_drift, "accelerometers": whole.accelerometers}
+        ),
+        "everything": whole,
+        "verification": read_result(FIXTURES / "verified").model_copy(update={"sensors": {}}),
+    }
+
+
+KINDS = ("gyroscope", "accelerometer", "magnetometer", "drift", "everything", "verification")
+
+
+@pytest.mark.parametrize("kind", KINDS)
 @pytest.mark.parametrize("stated", [LABORATORY, Stated()], ids=["said", "unsaid"])
-def test_every_clause_stands_there_with_words(clause: str, stated: Stated) -> None:
-    assert read(certificate(stated=stated)).under[clause].strip()
+def test_every_clause_stands_there_with_words(kind: str, stated: Stated) -> None:
+    found = certificate(kinds()[kind], stated)
+    page = read(found)
+    silent = (
+        {"7.8.4.1a", "7.8.4.1b"} if kind == "verification" else set()
+    )  # no uncertainty was evaluated, and it says so
+    assert [clause for clause in CLAUSES if not page.under.get(clause, "").strip()] == sorted(silent)
+    if not silent:
+        assert found.title == "Calibration certificate"
+
+
+@pytest.mark.parametrize("kind", KINDS)
+def test_every_uncertainty_that_is_printed_has_two_digits_and_its_value_the_same_decimals(kind: str) -> None:
+    document = kinds()[kind]
+    turned = {"compass": reversal(document)} if "compass" in document.magnetometers else {}
+    pairs = re.findall(r"(−?[\d.]+)°? ± ([\d.]+)", read(certificate(document, reversals=turned)).text)
+    for value, uncertainty in pairs:
+        assert len(uncertainty.replace(".", "").strip("0")) <= 2 <= len(uncertainty.replace(".", "").lstrip("0")), pairs
+        assert len(value.partition(".")[2]) == len(uncertainty.partition(".")[2])
+    fewest = {"verification": 0, "gyroscope": 12, "accelerometer": 15, "magnetometer": 9, "drift": 30, "everything": 60}
+    assert len(pairs) >= fewest[kind]
 
 
 def test_what_replaces_what_is_said_by_an_amended_one() -> None:
@@ -152,9 +200,92 @@ def test_an_accelerometer_stands_there_with_its_uncertainty_and_what_is_not_in_i
     assert "0.3000 ± 0.0020" in page.text
     assert "No budget of further contributors was evaluated" in page.under["7.8.4.1a"]
     assert "9.81 m/s² as exact" in page.under["7.8.4.1a"]
-    assert "9.81 m/s² by the laboratory's configuration, whose origin is not stated" in page.under["7.8.4.1c"]
+    assert (
+        "9.81 m/s² by the laboratory's configuration, its origin: gravimeter, certificate 17" in page.under["7.8.4.1c"]
+    )
+    silent = read(certificate(document, Stated()))
+    assert "9.81 m/s² by the laboratory's configuration, its origin: not stated" in silent.under["7.8.4.1c"]
     alone = read(certificate(document.model_copy(update={"sensors": {}})))
     assert "1.01235 ± 0.00020" in alone.text
+
+
+def test_a_magnetometer_is_certified_as_mounted_or_as_turned_over() -> None:
+    document = everything()
+    mounted = read(certificate(document))
+    assert "Magnetometer LSM9DS1, serial number COMPASS-7, as mounted" in mounted.text
+    assert "1.02992 ± 0.00040" in mounted.text and "−34.004 ± 0.010" in mounted.text  # two standard deviations, µT
+    assert "which no residual of this measurement shows" in mounted.under["7.8.4.1a"]
+    assert "48 µT by the laboratory's configuration, its origin: fluxgate, certificate 18" in mounted.under["7.8.4.1c"]
+    turned = certificate(document, reversals={"compass": reversal(document)})
+    page = read(turned)
+    assert "serial number COMPASS-7, turned over" in page.text
+    assert (
+        "−34.0090 ± 0.0072" in page.text
+        and "0.2200 ± 0.0076" in page.text
+        and "in the bias: not turned over" in page.text
+    )
+    assert "which no residual of this measurement shows" not in page.text
+    assert turned.number != certificate(document).number
+
+
+def test_a_reversal_of_other_runs_or_sensors_is_refused() -> None:
+    document = everything()
+    other = document.model_copy(
+        update={"provenance": document.provenance.model_copy(update={"started_utc": "2020-01-01T00:00:00+00:00"})}
+    )
+    with pytest.raises(Refused, match=r"another_sensor: .*this run is none of them"):
+        certificate(document, reversals={"compass": reversal(other)})
+    with pytest.raises(Refused, match=r"another_sensor: .*did not calibrate"):
+        certificate(result(), reversals={"compass": reversal(document)})
+
+
+def test_what_else_a_gyroscope_tells_stands_there_with_its_uncertainty() -> None:
+    page = read(certificate(everything()))
+    for said in (
+        "size 0.00007318 ± 0.00000088 rad/s",
+        "latitude 39.12 ± 0.70 °",
+        "heading 245.48 ± 0.92 °",
+        "−0.0001000 ± 0.0000026",  # what a specific force adds: gravity points the other way
+        "φ: x 0.0000097 ± 0.0000092 s²/m",
+    ):
+        assert said in page.text, said
+    assert "found from the item's own readings and taken out" in page.under["7.8.4.1b"]
+    assert "solved for by weighted least squares" in page.under["7.8.2.1f"]
+    plain = read(certificate())
+    assert "Earth's rate as found" not in plain.text
+
+
+def test_biases_by_repeat_stand_there_with_what_they_share_and_without_where_they_differ() -> None:
+    page = read(certificate(everything()))
+    assert "Bias of gyroscope gyro by repeat" in page.text and "Bias of accelerometer gyro by repeat" in page.text
+    assert "0.0000030 ± 0.0000010" in page.text  # 2 √(0.3² + 0.4²): what all repeats share is in it
+    assert "0.0000080 ± 0.0000013" in page.text  # 2 √(0.4² + 0.5²): of the change it is not
+    assert "0.00000200 ± 0.00000040" in page.text and "holds from 22.0 to 26.0 °C only" in page.under["7.8.4.1b"]
+    assert "It moved before repeat 3, most along x" in page.under["7.8.4.1b"]
+    assert "temperature_range_too_small" in page.under["7.8.4.1b"]
+    assert "The Earth's rate is in these biases" in page.under["7.8.4.1b"]
+
+
+def test_a_drift_beyond_its_limit_is_a_statement_and_no_spoilt_measurement() -> None:
+    names = ("gyro.bias_drift", "gyro.acceleration_bias_drift")
+    beyond = [
+        CheckEntry(name=name, value=0.2, limit=0.1, unit="rad/s", passed=False, uncertainty=0.01) for name in names
+    ]
+    found = certificate(everything().model_copy(update={"checks": tuple(beyond)}))
+    assert [check.name for check in found.conformity] == list(names) and not found.marks
+
+
+def test_a_clock_that_was_compared_with_none_was_not_found_to_be_anything() -> None:
+    assert result().clock is not None
+    alone = result().clock.model_copy(update={"comparisons": (), "error": 0.0, "std": 2.9e-5})  # type: ignore[union-attr]
+    said = read(certificate(result().model_copy(update={"clock": alone}))).under["7.8.4.1c"]
+    assert "compared with no other clock and is taken to be right to ± 58 × 10⁻⁶" in said and "found (" not in said
+
+
+def test_a_sensor_with_a_port_of_its_own_is_on_no_board() -> None:
+    sensor = result().sensors["gyro"].model_copy(update={"part": "kvh1775"})
+    page = read(certificate(result().model_copy(update={"sensors": {"gyro": sensor}})))
+    assert "none, it has a port of its own" in page.under["7.8.2.1g"] and "firmware" not in page.under["7.8.2.1g"]
 
 
 def test_a_verification_alone_is_reported_as_that() -> None:
@@ -186,7 +317,7 @@ def test_scarce_freedom_is_said() -> None:
 
 
 def test_no_resource_is_loaded_from_anywhere() -> None:
-    page = read(certificate())
+    page = read(certificate(everything()))
     for tag, attributes in page.tags:
         assert tag not in {
             "script",
@@ -209,24 +340,32 @@ def test_no_resource_is_loaded_from_anywhere() -> None:
 
 
 def test_every_text_from_elsewhere_shows_as_text() -> None:
-    document = compared(result())
+    document = compared(everything())
     hostile = ResultDocument.model_validate(
         planted(document.model_dump(by_alias=True, exclude_unset=True), MARKUP, FIXED)
     )
-    said = dict.fromkeys(("laboratory", "address", "place", "time_reference"), MARKUP)
+    words = ("laboratory", "address", "place", "time_reference", "gravity_reference", "magnetic_field_reference")
+    said = dict.fromkeys(words, MARKUP)
     order = dict.fromkeys(("customer", "customer_address", "condition", "authorised_by", "replaces"), MARKUP)
     stated = Stated(SiteSection(**said), CertificateSection(**order))
-    document = hostile.model_copy(update={"sensors": {MARKUP: hostile.sensors["gyro"]}})
+    document = hostile.model_copy(
+        update={
+            "sensors": {MARKUP: hostile.sensors["gyro"]},
+            "accelerometers": {f"2 {MARKUP}": hostile.accelerometers["gyro"]},
+            "magnetometers": {MARKUP: hostile.magnetometers["compass"]},
+            "bias_drift": {MARKUP: hostile.bias_drift["gyro"]},
+        }
+    )
     page = read(certificate(document, stated))
-    tags = {tag for tag, _ in read(certificate()).tags} | {"p"}
+    tags = {tag for tag, _ in read(certificate(everything())).tags} | {"p"}
     assert {tag for tag, _ in page.tags} <= tags
-    assert page.text.count(MARKUP) > 12
+    assert page.text.count(MARKUP) > 40
     assert not any("onerror" in attributes for _, attributes in page.tags)
     assert "script" not in page.style
 
 
 def test_a_screen_reader_finds_its_way() -> None:
-    page = read(certificate())
+    page = read(certificate(everything()))
     root = next(attributes for tag, attributes in page.tags if tag == "html")
     assert root["lang"] == "en"
     tables, captions = ([tag for tag, _ in page.tags].count(name) for name in ("table", "caption"))
@@ -234,7 +373,8 @@ def test_a_screen_reader_finds_its_way() -> None:
     assert all(attributes.get("scope") for tag, attributes in page.tags if tag == "th")
     names = {attributes["id"] for _, attributes in page.tags if attributes.get("id")}
     pictures = [attributes for tag, attributes in page.tags if tag == "svg"]
-    assert len(pictures) == 2
+    assert len(pictures) == 6
+    assert len(names) == len([tag for tag, attributes in page.tags if attributes.get("id")])
     for attributes in pictures:
         assert attributes["role"] == "img"
         assert set((attributes["aria-labelledby"] or "").split()) <= names

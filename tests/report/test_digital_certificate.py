@@ -7,13 +7,24 @@ import numpy as np
 import pytest
 
 from rig.config.judging_sections import CertificateSection, SiteSection
+from rig.data.earth_rate_entries import EarthRateEntry
 from rig.data.result_file import VectorEntry, read_result
 from rig.errors import Refused
 from rig.report.certificate.dcc import digital_certificate
+from rig.report.certificate.dcc_results import JOINT_FACTOR_3
 from rig.report.certificate.stated import Stated
 from rig.report.certificate.tables import JOINT_FACTOR
 from rig.report.certificate.xml_parts import product
-from support.certified import LABORATORY, certificate, compared, result, with_accelerometer
+from support.certified import (
+    LABORATORY,
+    certificate,
+    compared,
+    everything,
+    magnetometer,
+    result,
+    reversal,
+    with_accelerometer,
+)
 from support.dcc_rules import rule_faults, schema_faults
 from support.paths import FIXTURES
 
@@ -64,9 +75,89 @@ def test_ptb_s_rules_find_nothing_wrong(stated: Stated) -> None:
 def test_accelerometers_and_verifications_are_valid_too(stated: Stated) -> None:
     verified = read_result(FIXTURES / "verified").verification
     xml = digital_certificate(certificate(with_accelerometer().model_copy(update={"verification": verified}), stated))
-    assert [len(each) for each in map(numbers, found(xml, "si:valueXMLList"))] == [3, 3, 6, 3, 3, 3, 3, 6]
+    assert [len(each) for each in map(numbers, found(xml, "si:valueXMLList"))] == [3, 3, 6, 3, 9, 3, 3, 3, 3, 6, 3]
     assert rule_faults(xml) == []
     assert schema_faults(xml) == []
+
+
+def of_everything(stated: Stated = LABORATORY, *, turned: bool = True) -> bytes:
+    document = everything()
+    reversals = {"compass": reversal(document)} if turned else {}
+    return digital_certificate(certificate(document, stated, reversals))
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("stated", [LABORATORY, SIMULATED], ids=["said", "simulated"])
+def test_all_that_a_run_may_find_is_valid(stated: Stated) -> None:
+    xml = of_everything(stated)
+    assert rule_faults(xml) == []
+    assert schema_faults(xml) == []
+    document = everything()
+    none = {"sensors": {}, "accelerometers": {}, "verification": {}}
+    for update in ({"bias_drift": {}}, {"magnetometers": {}, "accelerometers": document.accelerometers}):
+        part = digital_certificate(certificate(document.model_copy(update=none | update), stated))
+        assert rule_faults(part) == [] and schema_faults(part) == []
+
+
+def measured(xml: bytes, name: str) -> dict[str, Element]:
+    """The results under a measurement of that name, by their own."""
+    (of,) = [
+        each
+        for each in found(xml, "dcc:measurementResult")
+        if each.findtext("dcc:name/dcc:content", namespaces=NAMES) == name
+    ]
+    results = of.findall("dcc:results/dcc:result", NAMES)
+    return {str(each.findtext("dcc:name/dcc:content", namespaces=NAMES)): each for each in results}
+
+
+def read_back(result_element: Element, size: int) -> tuple[list[float], np.ndarray]:
+    """Values and covariance."""
+    values = result_element.find(".//si:valueXMLList", NAMES)
+    assert values is not None
+    entries = [float(each.text or "") for each in result_element.findall(".//si:covariance/si:value", NAMES)]
+    return numbers(values), np.array(entries).reshape(size, size).T
+
+
+def test_a_magnetometer_s_covariance_is_the_result_s_as_mounted_and_turned_over() -> None:
+    document = everything()
+    entry, turned = magnetometer(), reversal(document)
+    results = measured(of_everything(), "calibration of magnetometer compass")
+    values, covariance = read_back(results["scale factors and biases, as mounted with their covariance"], 6)
+    assert values == [*entry.scale, *entry.bias_t]
+    np.testing.assert_allclose(covariance, np.array(entry.covariance), rtol=1e-9)
+    assert len({*np.array(entry.covariance).ravel()}) > 4  # and not a diagonal that anything would pass for
+    own = next(each for name, each in results.items() if name.startswith("own bias and the arm's field"))
+    values, covariance = read_back(own, 6)
+    assert values == [*turned.bias_t, *turned.arm_field_t]
+    np.testing.assert_allclose(covariance, np.array(turned.covariance), rtol=1e-9)
+    units = {each.text for each in own.findall(".//si:covariance/si:unit", NAMES)}
+    assert units == {r"\tesla\tothe{2}"}
+    widths = results["bias, as mounted"].find(".//si:uncertaintyXMLList", NAMES)
+    assert widths is not None
+    np.testing.assert_allclose(numbers(widths), 2 * np.sqrt(np.diag(entry.covariance))[3:], rtol=1e-9)
+    mounted = of_everything(turned=False).decode()
+    assert "own bias" not in mounted and "the field of the arm is in the bias" in mounted
+
+
+def test_the_earth_s_rate_and_gravity_s_part_are_the_result_s() -> None:
+    sensor = everything().sensors["gyro"]
+    assert isinstance(sensor.earth_rate, EarthRateEntry) and isinstance(sensor.vector_model, VectorEntry)
+    results = measured(of_everything(), "calibration of gyroscope gyro")
+    values, covariance = read_back(results["Earth's rate"], 3)
+    assert values == [*sensor.earth_rate.rate_rad_s]
+    np.testing.assert_allclose(covariance, np.array(sensor.earth_rate.covariance_rad2_s2), rtol=1e-9)
+    felt = results["g-sensitivity"].find(".//si:valueXMLList", NAMES)
+    assert felt is not None and sensor.vector_model.g_sensitivity_rad_s_per_m_s2 is not None
+    np.testing.assert_array_equal(numbers(felt), -np.ravel(sensor.vector_model.g_sensitivity_rad_s_per_m_s2))
+
+
+def test_biases_by_repeat_are_the_result_s() -> None:
+    results = measured(of_everything(), "bias by repeat of gyro, rate")
+    drift = everything().bias_drift["gyro"]["rate"]
+    for i, axis in enumerate("xyz"):
+        values = results[f"bias along {axis} by repeat"].find(".//si:valueXMLList", NAMES)
+        assert values is not None and numbers(values) == [each.held.bias[i] for each in drift.repeats]
+    assert r"\radian\second\tothe{-1}\kelvin\tothe{-1}" in of_everything().decode()
 
 
 @pytest.mark.slow
@@ -91,13 +182,14 @@ def test_values_uncertainties_and_covariance_are_the_result_s() -> None:
     sensor = result().sensors["gyro"]
     assert sensor.budget is not None
     xml = digital_certificate(certificate())
-    scale, bias, six, skew = map(numbers, found(xml, "si:valueXMLList"))
+    scale, bias, six, skew, felt = map(numbers, found(xml, "si:valueXMLList"))
     assert (scale, bias, six) == ([*sensor.scale], [*sensor.bias_rad_s], [*sensor.scale, *sensor.bias_rad_s])
     expanded = [number for each in found(xml, "si:uncertaintyXMLList") for number in numbers(each)]
     assert isinstance(sensor.vector_model, VectorEntry)
     assert skew == [*sensor.vector_model.non_orthogonality_rad]
-    stds = sensor.vector_model.non_orthogonality_std_rad
-    assert expanded == [*sensor.budget.expanded, *(2 * std for std in stds)]
+    stds = [*sensor.vector_model.non_orthogonality_std_rad]
+    stds += np.ravel(sensor.vector_model.g_sensitivity_std_rad_s_per_m_s2).tolist()  # type: ignore[arg-type]
+    assert len(felt) == 9 and expanded == [*sensor.budget.expanded, *(2 * std for std in stds)]
     covariance = np.array([float(each.text or "") for each in found(xml, "si:covariance/si:value")]).reshape(6, 6).T
     np.testing.assert_allclose(covariance, np.array(sensor.covariance_combined), rtol=1e-9)
     units = [each.text for each in found(xml, "si:covariance/si:unit")]
@@ -109,10 +201,11 @@ def test_values_uncertainties_and_covariance_are_the_result_s() -> None:
     assert numbers(found(xml, "si:ellipsoidalRegionXMLList/si:coverageFactor")[0]) == [JOINT_FACTOR]
 
 
-def test_the_joint_factor_holds_95_percent_of_six_values() -> None:
+def test_joint_factors_hold_95_percent_of_all_values_at_once() -> None:
     from scipy.stats import chi2
 
     assert pytest.approx(np.sqrt(chi2(6).ppf(0.95)), abs=5e-4) == JOINT_FACTOR
+    assert pytest.approx(np.sqrt(chi2(3).ppf(0.95)), abs=5e-4) == JOINT_FACTOR_3
 
 
 @pytest.mark.parametrize(
@@ -154,7 +247,7 @@ def test_what_cannot_be_certified_is_refused(refused, why: str) -> None:  # type
 
 
 def test_it_takes_no_time() -> None:
-    made = certificate()
+    made = certificate(everything())
     started_s = time.perf_counter()
     digital_certificate(made)
     assert time.perf_counter() - started_s < 0.5

@@ -1,18 +1,24 @@
 """Results with a budget, and what a reader finds on the certificates made of them."""
 
 import functools
-from collections.abc import Collection
+from collections.abc import Collection, Mapping
 from dataclasses import dataclass, field
 from datetime import date
 from html.parser import HTMLParser
+from types import MappingProxyType
 from typing import Any
+
+import numpy as np
 
 from rig.analysis.outcome import calibrated
 from rig.arm.kinematics import NOMINAL
 from rig.config.judging_sections import CertificateSection, SiteSection
 from rig.data.accelerometer_entries import AccelerometerEntry
 from rig.data.budget_entries import ClockComparisonEntry
-from rig.data.result_file import ResultDocument
+from rig.data.drift_entries import DriftEntry
+from rig.data.earth_rate_entries import EarthRateEntry
+from rig.data.magnetometer_entries import MagnetometerEntry, ReversalEntry
+from rig.data.result_file import ResultDocument, VectorEntry
 from rig.data.result_types import Matrix3, Vector3
 from rig.report.certificate.content import Certificate, certificate_of
 from rig.report.certificate.page import certificate_page
@@ -32,6 +38,8 @@ LABORATORY = Stated(
         latitude_deg=48.1,
         heading_deg=30,
         time_reference="NTP, ptbtime1.ptb.de",
+        gravity_reference="gravimeter, certificate 17",
+        magnetic_field_reference="fluxgate, certificate 18",
         ambient_temperature_c=21.5,
         ambient_humidity_percent=40,
     ),
@@ -76,8 +84,8 @@ def accelerometer(
             "covariance_order": ("kx", "ky", "kz", "bx", "by", "bz"),
             "covariance_units": ("1", "1", "1", "m/s²", "m/s²", "m/s²"),
             "matrix": IDENTITY,
-            "non_orthogonality_rad": none,
-            "non_orthogonality_std_rad": none,
+            "non_orthogonality_rad": (4e-3, -7e-3, 5e-3),
+            "non_orthogonality_std_rad": (4e-5, 5e-5, 6e-5),
             "second_order_s2_m": None,
             "second_order_std_s2_m": None,
             "reference_m_s2": (0.0, 0.0, 9.81),
@@ -101,6 +109,140 @@ def with_accelerometer(found: AccelerometerEntry | None = None) -> ResultDocumen
     return result().model_copy(update={"accelerometers": {"gyro": found or accelerometer()}})
 
 
+def magnetometer() -> MagnetometerEntry:
+    """One as mounted, whose parameters hang together."""
+    none: Vector3 = (0.0, 0.0, 0.0)
+    size = np.array([2e-4, 2e-4, 2e-4, 5e-9, 5e-9, 5e-9])
+    covariance = (0.9 * np.eye(6) + 0.1) * np.outer(size, size)
+    dwell = {"index": 0, "name": "x up", "attitude": IDENTITY, "mean_t": none, "mean_std_t": (2e-8, 2e-8, 2e-8)}
+    dwell |= {"noise_t": (3e-7, 3e-7, 3e-7), "residual_t": (1e-8, -3e-8, 0.0), "samples": 160, "duration_s": 2.0}
+    test = {"change_t": (1e-8, 0.0, 0.0), "std_t": (2e-8, 2e-8, 2e-8), "chi_square": 1.0, "limit": 16.0}
+    alike = {"chi_square": 70.0, "degrees_of_freedom": 64, "limit": 104.0, "attitude_error_rad": 2e-4}
+    return MagnetometerEntry.model_validate(
+        {
+            "part": "lsm9ds1_magnetometer",
+            "serial_number": "COMPASS-7",
+            "range_t": 4e-4,
+            "model": "m = F B + b",
+            "estimator": "attitude_weighted",
+            "extension_m": (0.0, 0.0, 0.3),
+            "uniformity": alike,
+            "drift": test,
+            "field_t": 48e-6,
+            "scale": (1.029923, 0.980027, 1.019991),
+            "bias_t": (21.003e-6, -34.004e-6, 15.218e-6),
+            "covariance": covariance.tolist(),
+            "covariance_order": ("kx", "ky", "kz", "bx", "by", "bz"),
+            "covariance_units": ("1", "1", "1", "T", "T", "T"),
+            "matrix": IDENTITY,
+            "hard_iron_t": none,
+            "non_orthogonality_rad": (0.0109, -0.0086, 0.0138),
+            "non_orthogonality_std_rad": (2.7e-4, 2.6e-4, 2.8e-4),
+            "field_base_t": (2e-5, 0.0, -4e-5),
+            "attitude_error_rad": 2e-4,
+            "attitude_error_std_rad": 1e-4,
+            "dwells": (dwell,),
+            "rank": 14,
+            "condition": 2.0,
+            "correction_matrix": IDENTITY,
+            "beside": {},
+            "warnings": (),
+        }
+    )
+
+
+def reversal(document: ResultDocument) -> ReversalEntry:
+    """Of that magnetometer, in this run and one after it; never turned over along x."""
+    own = magnetometer()
+    as_mounted = {"mounting": IDENTITY, "bias_t": own.bias_t, "bias_std_t": (5e-9,) * 3, "field_base_t": own.bias_t}
+    began = (document.provenance.started_utc, "2026-11-22T18:00:00+00:00")
+    return ReversalEntry.model_validate(
+        {
+            "part": own.part,
+            "serial_number": own.serial_number,
+            "scale": own.scale,
+            "scale_std": (1.4e-4,) * 3,
+            "bias_t": (21.003e-6, -34.009e-6, 15.002e-6),
+            "bias_std_t": (3.6e-9,) * 3,
+            "arm_field_in_bias": (True, False, False),
+            "arm_field_t": (0.0, -5e-9, 220e-9),
+            "arm_field_std_t": (0.0, 3.8e-9, 3.8e-9),
+            "covariance": np.diag(np.square([3.6e-9] * 3 + [0.0, 3.8e-9, 3.8e-9])).tolist(),
+            "correction_matrix": IDENTITY,
+            "chi_square": 1.4,
+            "degrees_of_freedom": 2,
+            "limit": 10.8,
+            "runs": [{"run": f"run {i}", "started_utc": each, **as_mounted} for i, each in enumerate(began)],
+        }
+    )
+
+
+def bias_drift(unit: str, *, slope: bool) -> DriftEntry:
+    """Three repeats, the last of them warmer; x falls, then rises."""
+    biases = ((3e-6, 1e-6, 0.0), (1e-6, 2e-6, 0.0), (9e-6, 3e-6, 1e-6))
+    stds = ((3e-7,) * 3, (4e-7,) * 3, (5e-7,) * 3)
+    found = {"slope": (2e-6, 6e-7, 2e-7), "std": (2e-7,) * 3, "range_c": (22.0, 26.0), "correlation_with_time": 0.4}
+    return DriftEntry.model_validate(
+        {
+            "unit": unit,
+            "repeats": [
+                {
+                    "time_s": 600.0 * i,
+                    "temperature_c": 22.0 + 2 * i,
+                    "held": {"bias": bias, "std": std},
+                    "anew": {"error": "too_few_observations: of these"},
+                }
+                for i, (bias, std) in enumerate(zip(biases, stds, strict=True))
+            ],
+            "common_std": (4e-7, 4e-7, 4e-7),
+            "excess": (1.0, 1.0, 1.0),
+            "moves": [{"repeat": 3, "axis": "x", "change": biases[2], "std": stds[2]}],
+            "false_alarm": 0.02,
+            "largest_change": (8e-6, 2e-6, 1e-6),
+            "over_temperature": found if slope else {"error": "temperature_range_too_small: 1 °C"},
+            "earth_rate_known": False,
+        }
+    )
+
+
+def everything() -> ResultDocument:
+    """A gyroscope that felt gravity and found the Earth's rate, an accelerometer of second order, a magnetometer, and
+    biases by repeat: more than one run finds."""
+    document = with_accelerometer(
+        accelerometer().model_copy(
+            update={"second_order_s2_m": (9.72e-6, -9.478e-5, 0.0), "second_order_std_s2_m": (4.6e-6,) * 3}
+        )
+    )
+    sensor = document.sensors["gyro"]
+    assert isinstance(sensor.vector_model, VectorEntry)
+    felt = {
+        "g_sensitivity_rad_s_per_m_s2": ((1e-4, 2e-5, 0.0), (0.0, -1e-4, 0.0), (3e-5, 0.0, 1.2e-4)),
+        "g_sensitivity_std_rad_s_per_m_s2": ((1.3e-6,) * 3,) * 3,
+    }
+    turning = EarthRateEntry(
+        rate_rad_s=(-2.356e-5, -5.165e-5, 4.618e-5),
+        covariance_rad2_s2=((2.2e-13, 4e-15, 4e-16), (4e-15, 1.9e-13, -6e-16), (4e-16, -6e-16, 2.0e-13)),
+        norm_rad_s=7.318e-5,
+        norm_std_rad_s=4.4e-7,
+        latitude_rad=0.68286,
+        latitude_std_rad=0.00608,
+        heading_rad=-1.9987,
+        heading_std_rad=0.008,
+        up=(0.0, 0.0, 1.0),
+        vertical_held=False,
+        scatter=0.8,
+    )
+    seen = {"vector_model": sensor.vector_model.model_copy(update=felt), "earth_rate": turning}
+    drifts = {"rate": bias_drift("rad/s", slope=True), "acceleration": bias_drift("m/s²", slope=False)}
+    return document.model_copy(
+        update={
+            "sensors": {"gyro": sensor.model_copy(update=seen)},
+            "magnetometers": {"compass": magnetometer()},
+            "bias_drift": {"gyro": drifts},
+        }
+    )
+
+
 def compared(document: ResultDocument) -> ResultDocument:
     """The same where the computer's clock was one that the controller's could be held against."""
     assert document.clock is not None
@@ -110,9 +252,13 @@ def compared(document: ResultDocument) -> ResultDocument:
     return document.model_copy(update={"clock": clock})
 
 
-def certificate(document: ResultDocument | None = None, stated: Stated = LABORATORY) -> Certificate:
+def certificate(
+    document: ResultDocument | None = None,
+    stated: Stated = LABORATORY,
+    reversals: Mapping[str, ReversalEntry] = MappingProxyType({}),
+) -> Certificate:
     """Of that result, by a laboratory that says all it can."""
-    return certificate_of(document or result(), stated)
+    return certificate_of(document or result(), stated, reversals)
 
 
 @dataclass

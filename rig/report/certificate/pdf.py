@@ -5,6 +5,7 @@ from pathlib import Path
 
 from rig.errors import Refused
 
+PDF = "certificate.pdf"
 DESCRIBED = {"result.json": "the result, of schema rig.result/1", "certificate.xml": "the digital certificate (DCC)"}
 
 
