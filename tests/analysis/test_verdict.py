@@ -1,13 +1,18 @@
 """The verdict: every limit is checked, and what was not measured does not pass."""
 
 from dataclasses import replace
+from types import SimpleNamespace
+from typing import cast
 
 import numpy as np
 import pytest
 
-from rig.analysis.verdict import Check, judge, verdict, verification_checks
-from rig.data.settings import Limits
+from rig.analysis.acceleration import AccelerometerResult
+from rig.analysis.bias_drift import BiasDrift
+from rig.analysis.verdict import Check, acceleration_checks, drift_checks, judge, verdict, verification_checks
+from rig.data.settings import DecisionRule, Limits
 from rig.estimation.accumulator import Solution
+from rig.estimation.bias_by_repeat import BiasByRepeat
 from rig.estimation.budget import Budget, Contributor
 
 LIMITS = Limits(scale_deviation=0.3, scale_std=0.002, bias_rad_s=0.1, bias_std_rad_s=0.001, condition=100)
@@ -82,3 +87,36 @@ def test_the_guard_band_keeps_the_expanded_uncertainty_away_from_the_limit() -> 
 
 def test_nothing_measured_is_not_a_pass() -> None:
     assert verdict(judge({}, LIMITS)) == "fail"
+
+
+@pytest.mark.parametrize(("rule", "passes"), [("simple", True), ("guard_band", False)])
+def test_accelerometers_and_drifts_are_held_against_their_limits_with_their_uncertainty(
+    rule: DecisionRule, passes: bool
+) -> None:
+    limits = replace(
+        LIMITS,
+        acceleration_scale_deviation=0.02,
+        acceleration_scale_std=1e-3,
+        acceleration_bias_m_s2=0.5,
+        acceleration_bias_std_m_s2=0.01,
+        bias_drift_rad_s=1e-4,
+    )
+    found = SimpleNamespace(
+        scale=np.array([1.0, 0.981, 1.0]),
+        bias_m_s2=np.array([0.1, 0.0, -0.495]),
+        covariance=np.diag(np.square([7e-4] * 3 + [4e-3] * 3)),
+        held_out=None,
+    )
+    checks = {each.name: each for each in acceleration_checks("a", cast(AccelerometerResult, found), limits, rule)}
+    held = BiasByRepeat(np.array([[0.0, 0, 0], [9.5e-5, 0, 0], [4e-5, 0, 0]]), np.full((3, 3), 3e-6), np.ones(3), ())
+    drift = cast(BiasDrift, SimpleNamespace(held=held))
+    checks |= {each.name: each for each in drift_checks("a", {"rate": drift}, limits, rule)}
+    for name, uncertainty in (
+        ("a.acceleration_scale_deviation", 1.4e-3),
+        ("a.acceleration_bias", 8e-3),
+        ("a.bias_drift", 2 * 2**0.5 * 3e-6),  # of both repeats that it lies between
+    ):
+        check = checks[name]
+        assert check.uncertainty == pytest.approx(uncertainty), name
+        assert (check.passed, check.false_acceptance is not None) == (passes, passes), name
+    assert checks["a.acceleration_scale_std"].passed and checks["a.acceleration_bias_std"].passed

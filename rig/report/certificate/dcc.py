@@ -200,8 +200,9 @@ def _results(c: Certificate) -> Iterator[Element]:
                         found.temperature_c)  # fmt: skip
     for i, (name, field) in enumerate(c.magnetometers.items()):
         turned = c.reversals.get(name)
-        results = magnetometer(field) if turned is None else (*reversed_magnetometer(turned), *magnetometer(field))
-        yield _measured(c, f"magnetometer-{i}", f"calibration of magnetometer {name}", iter(results), None)
+        own = () if turned is None else tuple(reversed_magnetometer(turned))
+        results = iter((*own, *magnetometer(field)))
+        yield _measured(c, f"magnetometer-{i}", f"calibration of magnetometer {name}", results, None)
     watched = _watched(c)
     for name, quantity, drift in c.drifts:
         key = _calibrated_as(c, name, quantity) or f"watched-{watched.index(name)}"
