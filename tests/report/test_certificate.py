@@ -3,6 +3,7 @@
 import re
 from decimal import Decimal
 from pathlib import Path
+from typing import Any
 
 import pytest
 from hypothesis import given
@@ -49,7 +50,13 @@ FIXED = {
 def kinds() -> dict[str, ResultDocument]:
     """What a run may find, one kind each, and all at once."""
     whole = everything()
-    none = {"sensors": {}, "accelerometers": {}, "magnetometers": {}, "bias_drift": {}, "verification": {}}
+    none: dict[str, Any] = {
+        "sensors": {},
+        "accelerometers": {},
+        "magnetometers": {},
+        "bias_drift": {},
+        "verification": {},
+    }
     return {
         "gyroscope": result(),
         "accelerometer": whole.model_copy(update=none | {"accelerometers": whole.accelerometers}),

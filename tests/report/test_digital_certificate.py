@@ -1,6 +1,7 @@
 """The digital certificate: valid by PTB's schema and by PTB's rules, and it holds what the result holds."""
 
 import time
+from typing import Any
 from xml.etree.ElementTree import Element, fromstring
 
 import numpy as np
@@ -93,8 +94,9 @@ def test_all_that_a_run_may_find_is_valid(stated: Stated) -> None:
     assert rule_faults(xml) == []
     assert schema_faults(xml) == []
     document = everything()
-    none = {"sensors": {}, "accelerometers": {}, "verification": {}}
-    for update in ({"bias_drift": {}}, {"magnetometers": {}, "accelerometers": document.accelerometers}):
+    none: dict[str, Any] = {"sensors": {}, "accelerometers": {}, "verification": {}}
+    kinds: list[dict[str, Any]] = [{"bias_drift": {}}, {"magnetometers": {}, "accelerometers": document.accelerometers}]
+    for update in kinds:
         part = digital_certificate(certificate(document.model_copy(update=none | update), stated))
         assert rule_faults(part) == [] and schema_faults(part) == []
 
