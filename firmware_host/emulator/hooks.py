@@ -112,13 +112,13 @@ class Bus(ctypes.Structure):
 
     def foresee(self, answers: bytes) -> None:
         """What the next pairs will bring, whatever is sent; nothing any more for no answers."""
-        ctypes.memmove(ctypes.addressof(self) + Bus.known.offset, answers, len(answers))  # type: ignore[attr-defined]
+        ctypes.memmove(ctypes.addressof(self) + Bus.known.offset, answers, len(answers))
         self.known_in, self.known_from, self.known_to = self.setups, 0, len(answers) // 2
 
     def foreseen(self) -> int:
         """The next of those."""
         self.known_from += 1
-        return int(self.known[self.known_from - 1])  # type: ignore[attr-defined]
+        return int(self.known[self.known_from - 1])
 
 
 class Shortcuts(ctypes.Structure):
