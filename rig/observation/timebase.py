@@ -28,8 +28,9 @@ MIN_EXPLAINED = 0.5  # share of the readings' variance that the arm's motion mus
 MIN_RATE_RAD_S = 0.01
 MAX_STATE_STEP_S = 0.02  # between arm states that still show the servo's vibration
 ATTITUDES = 72  # of which a mean is made: over a whole turn what is perpendicular to the axis averages out
+LONG_RUN_S = 1800.0  # so much of a recording the coarse search looks at, and more only where it finds nothing
 MAX_DRIFT = 0.03  # an oscillator that no crystal holds is within 2 %
-MAX_DRIFT_LONG_RUN = 1e-3  # one that a crystal holds is within 600 ppm; in hours, a wider search would take minutes
+MAX_DRIFT_LONG_RUN = 1e-3  # one that a crystal holds is within 600 ppm
 MAX_DRIFT_STEPS = 20  # to either side
 FINE_STEPS = 100
 
@@ -118,12 +119,16 @@ def estimate_time_base(board_time_s: Array, readings_rad_s: Array, motion: Known
     `stuck_axis`, `time_base_not_found`.
     """
     _check_samples(board_time_s, readings_rad_s)
-    clock = _coarse(board_time_s, readings_rad_s, motion)
-    # The coarse clock says which samples to use; a choice that followed the fine one might never settle.
-    used = motion.covered(clock.controller_time_s(board_time_s))
-    if used.sum() < MIN_SAMPLES:
-        raise _not_found("board and arm were hardly recorded at the same time")
-    clock = _settled(clock, board_time_s[used], readings_rad_s[used], motion)
+    clock, known = _begun(board_time_s, readings_rad_s, motion)
+    while True:
+        # The clock so far says which samples to use; a choice that followed the fine one might never settle.
+        used = motion.covered(clock.controller_time_s(board_time_s[:known]))
+        if used.sum() < MIN_SAMPLES:
+            raise _not_found("board and arm were hardly recorded at the same time")
+        clock = _settled(clock, board_time_s[:known][used], readings_rad_s[:known][used], motion)
+        if known == len(board_time_s):
+            break
+        known = _until(board_time_s, 2 * (board_time_s[known] - board_time_s[0]))
     if not abs(clock.drift) < MAX_DRIFT or not clock.offset_std_s < COARSE_STEP_S:
         raise _not_found(
             f"the board's clock would run {100 * clock.drift:+.2f} % off, to {clock.offset_std_s * 1e3:.1f} ms"
@@ -162,6 +167,27 @@ def _check_samples(board_time_s: Array, readings: Array) -> None:
             f"axis {'xyz'[int(np.argmax(still))]} of the gyroscope never changes, whatever the arm does",
             "The sensor is broken or wrongly configured; replace it",
         )
+
+
+def _begun(board_time_s: Array, readings: Array, motion: KnownMotion) -> tuple[TimeBase, int]:
+    """The coarse clock of the first samples in which one is found, and how many those are.
+
+    All of a recording of ordinary length; of one of hours a part, whose fine clock reaches twice as far, and so on.
+    """
+    span_s = LONG_RUN_S
+    while True:
+        known = _until(board_time_s, span_s)
+        try:
+            return _coarse(board_time_s[:known], readings[:known], motion), known
+        except Fault:
+            if known == len(board_time_s):
+                raise
+        span_s *= 2
+
+
+def _until(board_time_s: Array, span_s: float) -> int:
+    """How many samples lie in the first `span_s`."""
+    return int(np.searchsorted(board_time_s, board_time_s[0] + span_s, side="right"))
 
 
 def _coarse(board_time_s: Array, readings: Array, motion: KnownMotion) -> TimeBase:
