@@ -1,10 +1,11 @@
 """Hundreds of calibrations in a row in one laboratory: `python benchmarks/long_life.py [--runs N] [--out DIR]`.
 
 One world and one board that is never reset; three runs of four in one rig process, the fourth in a process of its own;
-every tenth calibration is stored on the board. After the second run the laboratory waits for an hour of its own time, so
-that the board's counter of microseconds wraps in the middle of the third. Prints one line a run, then memory, open files, and the course of each parameter;
-fails when memory has grown by more than 5 % after the first tenth, when a file, a thread or a process stays, when a
-parameter drifts by more than three standard uncertainties of its slope, or scatters otherwise than is stated.
+every tenth calibration is stored on the board. After the second run the laboratory waits for an hour of its own time,
+so that the board's counter of microseconds wraps in the middle of the third. Prints one line a run, then memory, open
+files, and the course of each parameter; fails when memory has grown by more than 5 % after the first tenth, when a
+file, a thread or a process stays, when a parameter drifts by more than three standard uncertainties of its slope, or
+scatters otherwise than is stated.
 """
 
 import argparse
@@ -13,9 +14,10 @@ import subprocess
 import sys
 from pathlib import Path
 
-ROOT = Path(__file__).parents[1]
-sys.path.insert(0, str(ROOT / "tests"))
+sys.path.insert(0, str(Path(__file__).parents[1] / "tests"))
 from support.long_life import Calibration, Life, complaints, courses, live
+
+ROOT = Path(__file__).parents[1]
 
 
 def tell(run: Calibration) -> None:
@@ -33,10 +35,9 @@ def conclude(life: Life, warm_up: int) -> int:
     """Print what became of everything; 1 when something is not as it should be."""
     found = complaints(life, warm_up)
     passed = [run for run in life.runs if run.status == 0]
-    print(
-        f"{len(passed)} of {len(life.runs)} runs passed, worst {max(run.error_u for run in passed):.1f} U from the truth"
-    )
-    before, after = life.board
+    worst_u = max(run.error_u for run in passed)
+    print(f"{len(passed)} of {len(life.runs)} runs passed, the worst {worst_u:.1f} U from the truth")
+    _, after = life.board
     print(
         f"the board ran {after.uptime_s / 60:.0f} min since its reset ({after.reset_cause}); its counter wrapped "
         f"{life.wraps} times, {sum(run.wraps for run in passed)} of them while it sampled"
@@ -54,7 +55,9 @@ def conclude(life: Life, warm_up: int) -> int:
             f"{course.name}: mean {course.mean:.6f}, slope {course.slope:+.1e} ± {course.slope_std:.1e} a run "
             f"({course.slope / course.slope_std:+.1f} σ), χ² {course.chi2:.0f} of {course.freedom}"
         )
-    commit = subprocess.run(["git", "-C", ROOT, "rev-parse", "--short", "HEAD"], capture_output=True, text=True)
+    commit = subprocess.run(
+        ["git", "-C", ROOT, "rev-parse", "--short", "HEAD"], capture_output=True, text=True, check=False
+    )
     print("\n".join(found) or "nothing grew, nothing drifted, nothing was left open")
     print(f"at commit {commit.stdout.strip() or 'unknown'}")
     return 1 if found else 0

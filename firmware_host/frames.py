@@ -6,11 +6,34 @@ from zlib import crc32
 
 import numpy as np
 
-from firmware_host.protocol import MESSAGE_BY_CODE, MESSAGE_BY_NAME, OVERHEAD, PAYLOAD_MAX, PROTOCOL_VERSION
+from firmware_host.protocol import (
+    MESSAGE_BY_CODE,
+    MESSAGE_BY_NAME,
+    METHODS,
+    MODES,
+    OVERHEAD,
+    PAYLOAD_MAX,
+    PROTOCOL_VERSION,
+    QUANTITIES,
+    SOLUTION_STATUSES,
+)
 from firmware_host.stuffing import stuff, unstuff
 
 _BLOCK_MAX = PAYLOAD_MAX + OVERHEAD + 1
 _REMEMBERED = 200  # frames: more than a buffer on the way hands on twice, and fewer than their sequence counts
+# Of fields: values from here on mean nothing. Where an unknown one has a name (`unknown`), any will do.
+_MEANINGLESS_FROM = {
+    "mode": len(MODES),
+    "method": len(METHODS),
+    "status": len(SOLUTION_STATUSES),
+    "quantity": len(QUANTITIES),
+    "written_unix_s": 253_402_300_800,  # the year 10 000
+}
+_CHECKED = {
+    message.name: tuple((each.name, _MEANINGLESS_FROM[each.name]) for each in fields if each.name in _MEANINGLESS_FROM)
+    for message in MESSAGE_BY_NAME.values()
+    for fields in [(*message.fields, *message.items)]
+}
 _CRC_OF_INTACT = 0x2144DF1C  # of any bytes followed by their own CRC
 
 
@@ -44,7 +67,7 @@ def encode(name: str, sequence: int, values: dict[str, Any] | None = None, items
 
 
 def decode(block: bytes) -> Frame | None:
-    """One COBS block (without its delimiter) → frame; None when damaged or not in the table.
+    """One COBS block (without its delimiter) → frame; None when damaged or not in the table, or of no meaning there.
 
     An identity of another protocol version comes back with only the two fields every version has.
     """
@@ -59,9 +82,12 @@ def decode(block: bytes) -> Frame | None:
     if len(payload) < size or (len(payload) - size) % each if each else len(payload) != size:
         return None
     values = message.named(message.head.unpack_from(payload))
-    items = np.frombuffer(payload, message.item_dtype, offset=size) if each else np.empty(0)
+    items: np.ndarray[Any, Any] = np.frombuffer(payload, message.item_dtype, offset=size) if each else np.empty(0)
     if values.get("count", len(items)) != len(items):
         return None
+    for name, limit in _CHECKED[message.name]:
+        if np.any(items[name] >= limit) if name not in values else values[name] >= limit:
+            return None
     return Frame(message.name, body[1], values, items)
 
 

@@ -5,8 +5,11 @@ import time
 from types import TracebackType
 from typing import Self
 
+from rig.errors.quoting import printable
+
 DASHBOARD_PORT = 29999
 GREETING = "Connected:"
+LINE_BYTES = 4096  # the longest answer has some dozens
 
 
 class Dashboard:
@@ -17,7 +20,7 @@ class Dashboard:
 
     def __init__(self, host: str, timeout_s: float = 0.4) -> None:
         self._socket = socket.create_connection((host, DASHBOARD_PORT), timeout=timeout_s)
-        self._lines = self._socket.makefile("rb")
+        self._heard = bytearray()
         self._timeout_s = timeout_s
 
     def ask(self, command: str) -> str:
@@ -52,7 +55,6 @@ class Dashboard:
         return self.ask("get serial number")
 
     def close(self) -> None:
-        self._lines.close()
         self._socket.close()
 
     def __enter__(self) -> Self:
@@ -64,8 +66,17 @@ class Dashboard:
         self.close()
 
     def _line(self, deadline_s: float) -> str:
-        self._socket.settimeout(max(deadline_s - time.monotonic(), 1e-3))
-        line = self._lines.readline()
-        if not line.endswith(b"\n"):
-            raise ConnectionError("the dashboard server closed the connection")
-        return line.decode(errors="replace").strip()
+        while b"\n" not in self._heard:
+            left_s = deadline_s - time.monotonic()
+            if left_s <= 0.0:
+                raise TimeoutError("the dashboard server does not answer in time")
+            if len(self._heard) > LINE_BYTES:
+                raise ConnectionError("this is no dashboard server")
+            self._socket.settimeout(left_s)
+            data = self._socket.recv(LINE_BYTES)
+            if not data:
+                raise ConnectionError("the dashboard server closed the connection")
+            self._heard += data
+        line, _, rest = self._heard.partition(b"\n")
+        self._heard = rest
+        return printable(line.decode(errors="replace").strip())

@@ -6,7 +6,6 @@ sub-packages of the same form. Of these KinematicsInfo, type 5, is sent once aft
 in every state: the tool centre point's pose, and where it stands in the flange's frame.)
 """
 
-import math
 import socket
 import struct
 import time
@@ -21,6 +20,7 @@ ROBOT_STATE, CARTESIAN_INFO, KINEMATICS_INFO = 16, 4, 5
 KINEMATICS = struct.Struct(">6I 6d 6d 6d 6d I".replace(" ", ""))  # checksums; θ, a, d, α; how well it was calibrated
 CARTESIAN = struct.Struct(">6d 6d".replace(" ", ""))  # the tool centre point in the base's frame, and in the flange's
 SIZE_MAX = 1 << 20  # a robot state has some 1500 bytes
+VALUE_MAX = 1e4  # m or rad: axes that are almost parallel meet some hundred metres away, which stands in a calibration
 
 
 @dataclass(frozen=True, slots=True)
@@ -66,9 +66,9 @@ def _completed(account: Account, state: bytes) -> Account:
 
 
 def _numbers(layout: struct.Struct, payload: bytes) -> tuple[float, ...]:
-    """Of a payload; none when it is too short for them, or they are no numbers."""
+    """Of a payload, whole numbers before them; none when it is too short for them, or no arm is made so."""
     values = layout.unpack_from(payload) if len(payload) >= layout.size else ()
-    return values if all(map(math.isfinite, values)) else ()
+    return values if all(isinstance(each, int) or abs(each) <= VALUE_MAX for each in values) else ()
 
 
 def _taken(buffer: bytearray) -> Iterator[tuple[int, bytes]]:

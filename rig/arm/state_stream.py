@@ -98,7 +98,7 @@ class StateStream:
             self.silent_s = looked_s - self._heard_s
         try:
             return [_packet(payload) for kind, payload in self._packages() if kind == "U"]
-        except (ConnectionError, struct.error):  # what is not readable is a link that is lost
+        except ConnectionError:  # what is not readable is a link that is lost
             self.closed = True
             return []
 
@@ -106,7 +106,7 @@ class StateStream:
         if self._ask("V", struct.pack(">H", VERSION)) != b"\1":
             raise ConnectionError(f"it does not speak version {VERSION} of RTDE")
         answer = self._ask("O", struct.pack(">d", rate_hz) + ",".join(VARIABLES).encode())
-        types = answer[1:].decode().split(",")
+        types = answer[1:].decode(errors="replace").split(",")
         wrong = [name for name, type_ in zip_longest(VARIABLES, types[: len(VARIABLES)]) if type_ != VARIABLES[name]]
         if wrong:
             raise ConnectionError(f"it does not send {', '.join(wrong)}")
@@ -161,7 +161,9 @@ class StateStream:
 
 
 def _packet(payload: bytes) -> Packet:
-    """Raises `struct.error` or `ConnectionError` for what no arm says: the bytes have come to harm on the way."""
+    """Raises `ConnectionError` for what no arm says: the bytes have come to harm on the way."""
+    if len(payload) != PACKET.size:
+        raise ConnectionError(f"a state of {len(payload)} bytes where {PACKET.size} belong")
     values = PACKET.unpack(payload)
     fraction, scaling, robot_mode, safety_mode, runtime_state, robot_bits, safety_bits, payload_kg = values[14:22]
     state = ArmState(

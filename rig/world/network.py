@@ -20,7 +20,10 @@ GATHER_S = 0.002  # wall time for which a gathering wire keeps bytes together wh
 class Session(Protocol):
     """What one client talks to: bytes in, bytes out, and a turn at every tick."""
 
-    closing: bool  # close the connection once everything has been sent
+    @property
+    def closing(self) -> bool:
+        """Close the connection once everything has been sent."""
+        ...
 
     @property
     def dialogue(self) -> bool:
@@ -71,6 +74,9 @@ class Connection:
         if self.session.dialogue:
             self._network.on_dialogue()
         self.send(self.session.receive(data))
+        if self.session.closing:  # which `send` does not see when there is nothing to say
+            self.watch()
+            return False
         return True
 
     def tick(self) -> None:

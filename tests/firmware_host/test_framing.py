@@ -29,6 +29,15 @@ LIMITS = {
 }
 
 
+OF_A_TABLE = {
+    "mode": protocol.MODES,
+    "method": protocol.METHODS,
+    "status": protocol.SOLUTION_STATUSES,
+    "quantity": protocol.QUANTITIES,
+}
+YEAR_10000_S = 253_402_300_800
+
+
 def value_of(kind: str) -> st.SearchStrategy[Any]:
     """Any value a field of this kind can hold."""
     if kind in LIMITS:
@@ -48,12 +57,18 @@ def messages(draw: st.DrawFn) -> tuple[Message, int, dict[str, Any], np.ndarray 
     """Any message with any contents that fit."""
     message = draw(st.sampled_from(MESSAGES))
     values = {field.name: draw(value_of(field.kind)) for field in message.fields}
+    for name in OF_A_TABLE.keys() & values.keys():
+        values[name] = draw(st.integers(0, len(OF_A_TABLE[name]) - 1))
+    if "written_unix_s" in values:
+        values["written_unix_s"] %= YEAR_10000_S
     items = None
     if message.items:
         room = (protocol.PAYLOAD_MAX - message.head.size) // message.item_dtype.itemsize
         count = draw(st.integers(0, room))
         size = count * message.item_dtype.itemsize
-        items = np.frombuffer(draw(st.binary(min_size=size, max_size=size)), message.item_dtype)
+        items = np.frombuffer(bytearray(draw(st.binary(min_size=size, max_size=size))), message.item_dtype)
+        for name in OF_A_TABLE.keys() & set(message.item_dtype.names or ()):
+            items[name] %= len(OF_A_TABLE[name])
         if "count" in values:
             values["count"] = count
     if message.name == "identity":
@@ -282,6 +297,10 @@ def test_an_identity_of_another_version_still_tells_its_version() -> None:
         bytes((8, 0)) + bytes(19) + bytes(12),  # a count of 0 and one sample
         bytes((7, 0)) + b"ack and more",
         bytes((200, 0)),  # not in the table
+        bytes((8, 0, 0, 2)) + bytes(17),  # samples of a third mode
+        bytes((2, 0, 0, protocol.PROTOCOL_VERSION)) + bytes(25) + bytes(15) + b"\2",  # a sensor of a third quantity
+        bytes((0x12, 0, 0, 0, 2)) + bytes(28),  # solved by a third method
+        bytes((0x14, 0)) + bytes(49) + b"\xff" * 8 + bytes(52),  # written in a year nobody can name
     ],
 )
 def test_contents_the_table_does_not_know_are_damage(body: bytes) -> None:

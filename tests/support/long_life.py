@@ -62,7 +62,7 @@ class Footprint:
         rss_kib = next(line.split()[1] for line in (process / "smaps_rollup").open() if line.startswith("Rss:"))
         files: Counter[str] = Counter()
         for link in (process / "fd").iterdir():
-            files[os.readlink(link).split(":[")[0]] += 1
+            files[str(link.readlink()).split(":[")[0]] += 1
         tasks = list((process / "task").iterdir())
         children = sum(len((task / "children").read_text().split()) for task in tasks)
         return cls(int(rss_kib) * 1024, len(tasks), children, files)
@@ -134,6 +134,17 @@ class Station:
         self._log.close()
 
 
+@dataclass(frozen=True, slots=True)
+class Bench:
+    """A laboratory with a station in it: where runs are written, and by which configuration."""
+
+    folder: Path
+    config: Path
+    world: WorldHandle
+    station: Station
+    history: Path
+
+
 def live(folder: Path, runs: int) -> Iterator[Calibration | Life]:
     """So many runs in one laboratory: each when it has ended, all of them in the end.
 
@@ -144,10 +155,11 @@ def live(folder: Path, runs: int) -> Iterator[Calibration | Life]:
     with worlds(folder) as start, Station(folder / "station.log", history) as station:
         world = start(SETUP)
         config = hardware(world.config_path, folder)
+        bench = Bench(folder, config, world, station, history)
         before = _status(world)
         for number in range(runs):
             began_s = float(world.state()["time_s"])
-            done.append(_run(number, folder, config, world, station, history))
+            done.append(_run(bench, number))
             yield done[-1]
             if number == 1:
                 _wait_until(world, WRAP_US * 1e-6 - (sum(done[-1].board_us) / 2e6 - began_s))
@@ -166,35 +178,35 @@ def _wait_until(world: WorldHandle, time_s: float) -> None:
         world.control({"do": "run"})
 
 
-def _run(number: int, folder: Path, config: Path, world: WorldHandle, station: Station, history: Path) -> Calibration:
-    out, in_station = folder / f"run-{number:03}", number % OWN_EVERY != OWN_EVERY - 1
-    arguments = ["run", str(config), "--out", str(out), "--yes"]
+def _run(bench: Bench, number: int) -> Calibration:
+    out, in_station = bench.folder / f"run-{number:03}", number % OWN_EVERY != OWN_EVERY - 1
+    arguments = ["run", str(bench.config), "--out", str(out), "--yes"]
     began_s = time.monotonic()
     if in_station:
-        status = station.rig(*arguments)
+        status = bench.station.rig(*arguments)
     else:
-        with (folder / "processes.log").open("a", encoding="utf-8") as log:
+        with (bench.folder / "processes.log").open("a", encoding="utf-8") as log:
             status = subprocess.run(
                 [sys.executable, "-m", "rig", *arguments],
                 stdin=subprocess.DEVNULL, stdout=log, stderr=log, timeout=END_S, check=False,
-                env={**os.environ, "RIG_HISTORY": str(history)},
+                env={**os.environ, "RIG_HISTORY": str(bench.history)},
             ).returncode  # fmt: skip
     if status == 0 and number % STORED_EVERY == 0:
-        status = station.rig("board", "calibration", "write", str(config), str(out), "--yes")
+        status = bench.station.rig("board", "calibration", "write", str(bench.config), str(out), "--yes")
     wall_s = time.monotonic() - began_s
     if status != 0:
         return Calibration(number, in_station, status, wall_s)
     gyro = read_result(out).sensors["gyro"]
     times_us = read_run(out / "run.h5").samples["gyro"]["board_time_us"]
-    world.state()  # it has heard by now that the rig has hung up
+    bench.world.state()  # it has heard by now that the rig has hung up
     return Calibration(
         number, in_station, status, wall_s,
         found=(*gyro.scale, *gyro.bias_rad_s),
         std=tuple(np.sqrt(np.diag(np.array(gyro.covariance))).tolist()),
         error_u=errors_in_u(out),
         board_us=(int(times_us.min()), int(times_us.max())),
-        world=Footprint.of(world.process.pid),
-        station=Footprint.of(station.pid),
+        world=Footprint.of(bench.world.process.pid),
+        station=Footprint.of(bench.station.pid),
     )  # fmt: skip
 
 

@@ -19,6 +19,7 @@ from rig.world.ur10e.primary import PrimarySession
 from rig.world.ur10e.robot import Robot
 from rig.world.ur10e.rtde import RtdeSession
 from rig.world.ur10e.variables import INPUTS, OUTPUTS
+from support.damaged_messages import carry_to_world
 from support.paths import DEMO
 
 LOADED = load(DEMO)
@@ -100,6 +101,59 @@ def test_any_recipe_at_any_rate(outputs: list[str], inputs: list[str], rate_hz: 
     ]
     stream = b"".join(struct.pack(">HB", 3 + len(body), kind[0]) + body for kind, body in parts)
     play(RtdeSession(LABORATORY.robot), stream)
+
+
+@pytest.mark.parametrize("name", ["RTDE", "dashboard", "primary"])
+def test_damaged_messages(name: str) -> None:
+    """A hundred thousand of them: benchmarks/damaged_frames.py."""
+    ends = carry_to_world(name, 300, seed=1)
+    refused = sum(count for end, count in ends.items() if end.startswith("refused"))
+    assert refused > 20, ends
+
+
+@pytest.mark.parametrize(
+    "program",
+    [
+        "def odd():\n movej([0,0,0,0,0,0]) + f(1)\nend\n",
+        'def odd():\n textmsg("\\ud800")\nend\n',
+        "def odd():\n set_payload(1, [0, 0])\nend\n",
+        'def odd():\n set_payload(1, "abc")\nend\n',
+        "def odd():\n sleep(" + "(" * 5000 + ")\nend\n",
+        "def odd():\n" + " while True:\n" * 2000 + " end\n" * 2000 + "end\n",
+        "def rtde_control():\n reg_offset_int = 0\n 40\nend\n",
+        "def rtde_control():\n # inject move path\n movej([0,0,0,0,0,0], a=1, v=" + "9" * 400 + ")\nend\n",
+        "def odd():\n movej([0,0,0,0,0,1], a=5e-324, v=1)\nend\n",
+    ],
+    ids=range(9),
+)
+def test_programs_that_once_ended_the_laboratory(program: str) -> None:
+    watching = RtdeSession(LABORATORY.robot)
+    recipe = struct.pack(">d", 500.0) + b"payload,payload_cog"
+    for kind, body in ((b"V", b"\0\2"), (b"O", recipe), (b"S", b"")):
+        watching.receive(struct.pack(">HB", 3 + len(body), kind[0]) + body)
+    session = PrimarySession(LABORATORY.robot)
+    session.greeting()
+    session.receive(program.encode())
+    for _ in range(30):
+        LABORATORY.turn()
+        assert watching.tick() and isinstance(session.tick(), bytes)
+    LABORATORY.robot.stop_program("")
+
+
+def test_a_client_may_not_ask_for_more_than_there_is() -> None:
+    """Input recipes without end, a command and a program without end: refused in words, and not kept."""
+    rtde, dashboard, script = (session(LABORATORY.robot) for session in (RtdeSession, DashboardSession, PrimarySession))
+    recipe = b"input_int_register_40"
+    answers = [rtde.receive(struct.pack(">HB", 3 + len(recipe), ord("I")) + recipe) for _ in range(300)]
+    assert answers[254][3] == 255 and answers[255].endswith(b"\0\x04I\0")
+    rtde.closed()
+    assert b"no RTDE" in rtde.receive(b"\0\0\0") and rtde.closing
+    said = b"".join(dashboard.receive(b"x" * 10_000) for _ in range(7))
+    assert said.startswith(b"could not understand: a line of more than") and dashboard.closing
+    script.greeting()
+    for _ in range(17):
+        script.receive(b"def odd():\n" + b" sleep(1)\n" * 6600)
+    assert script.closing and b"bytes is none" in script.tick()
 
 
 @pytest.mark.parametrize("port", ["socket://127.0.0.1", "socket://127.0.0.1:x", "/dev/ttyACM0"])

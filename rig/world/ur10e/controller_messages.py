@@ -5,6 +5,7 @@ from dataclasses import dataclass
 from enum import IntEnum
 
 KEPT = 200
+TEXT_MAX = 4000  # characters of one
 
 
 class MessageKind(IntEnum):
@@ -49,7 +50,7 @@ class Messages:
         self, text: str, kind: MessageKind = MessageKind.TEXT, title: str = "", place: tuple[int, int] = (0, 0)
     ) -> None:
         self.last += 1
-        self._messages.append(Message(self.last, kind, text, title, place))
+        self._messages.append(Message(self.last, kind, text[:TEXT_MAX], title, place))
 
     def complain(self, error: ProgramError) -> None:
         """Say what a program did wrong."""

@@ -10,6 +10,7 @@ from rig.world.ur10e.modes import RobotMode, RuntimeState, SafetyMode
 from rig.world.ur10e.robot import Robot
 
 PORT = 29999
+LINE_BYTES = 1 << 16  # no command is so long
 PROGRAMS = ("wait_program.urp",)
 OPERATIONAL_MODES = ("MANUAL", "AUTOMATIC")
 TOO_EARLY = (
@@ -93,7 +94,12 @@ class DashboardSession:
         self._buffer += data
         *lines, rest = self._buffer.split(b"\n")
         self._buffer = bytearray(rest)
-        return b"".join(self.answer(line.decode(errors="replace").strip()).encode() + b"\n" for line in lines)
+        answers = [self.answer(line.decode(errors="replace").strip()) for line in lines]
+        if len(self._buffer) > LINE_BYTES:
+            self._buffer.clear()
+            self.closing = True
+            answers.append(f"could not understand: a line of more than {LINE_BYTES} bytes")
+        return b"".join(answer.encode() + b"\n" for answer in answers)
 
     def tick(self) -> bytes:
         return b""

@@ -31,7 +31,6 @@ def package(kind: int, payload: bytes) -> bytes:
 class PrimarySession:
     """One connection: programs come in, states and messages go out."""
 
-    closing = False
     dialogue = True
 
     def __init__(self, robot: Robot) -> None:
@@ -44,6 +43,10 @@ class PrimarySession:
         name = bytes([len(PROJECT)]) + PROJECT
         version = name + struct.pack(">BBii", major, minor, bugfix, build) + b"01-01-2024, 00:00:00"
         return _message(self._robot, VERSION_MESSAGE, version) + _state(self._robot, (*STATE, *CONFIGURATION))
+
+    @property
+    def closing(self) -> bool:
+        return self._script.closing
 
     def receive(self, data: bytes) -> bytes:
         return self._script.receive(data)
@@ -66,7 +69,7 @@ def _message(robot: Robot, kind: int, payload: bytes) -> bytes:
 
 
 def _content(message: Message) -> bytes:
-    text = message.text.encode()
+    text = message.text.encode(errors="replace")  # a program's text may hold half a character
     if message.kind == MessageKind.KEY:
         title = message.title.encode()
         return struct.pack(">iiB", 0, 0, len(title)) + title + text

@@ -2,7 +2,6 @@
 
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
-from math import isfinite
 
 from rig.world.ur10e.cartesian import joints_for, straight_line
 from rig.world.ur10e.controller_messages import ProgramError
@@ -13,6 +12,8 @@ from rig.world.ur10e.trajectory import line
 
 Steps = Iterator[None]
 
+NUMBER_MAX = 1e6  # of angles, lengths, speeds and accelerations, all in SI units
+SLOWEST, SLOWEST_LINE_M_S = 1e-6, 1e-3  # rad/s and m/s, and the same per second: slower ways are not planned for
 HAND_OVER_RAD_S2 = 4.0  # a move that follows a killed one lets the joints come to rest first
 
 
@@ -32,8 +33,8 @@ class Move:
 
 def finite(values: Sequence[float]) -> None:
     """Raises `ProgramError` for a number no joint can follow."""
-    if not all(isfinite(value) for value in values):
-        raise ProgramError(f"not a number among {list(values)}")
+    if not all(abs(value) <= NUMBER_MAX for value in values):
+        raise ProgramError(f"a number no joint can follow among {list(values)}")
 
 
 class Threads:
@@ -77,9 +78,9 @@ class Threads:
 
     def move(self, name: str, move: Move) -> Steps:
         """A move on behalf of the thread `name`: ends when the joints stand at the target."""
-        if not (move.speed > 0.0 and move.acceleration > 0.0):
+        if not min(move.speed, move.acceleration) >= (SLOWEST_LINE_M_S if move.straight else SLOWEST):
             raise ProgramError("a move needs a speed and an acceleration above zero")
-        finite(move.target)
+        finite([*move.target, move.speed, move.acceleration])
         self.take(name)
         yield from self.stopj(name, HAND_OVER_RAD_S2)
         self.take(name)

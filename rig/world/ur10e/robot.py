@@ -148,8 +148,8 @@ class Robot:
         assert self._program is not None
         try:
             running = self._program.step()
-        except ProgramError as error:
-            self.messages.complain(error)
+        except (ProgramError, ValueError, ArithmeticError) as error:  # the last two: numbers that lead to none
+            self.messages.complain(error if isinstance(error, ProgramError) else ProgramError(str(error)))
             self.stop_program("")
             return
         if not running:
@@ -277,7 +277,10 @@ class Robot:
     def set_payload(self, mass_kg: float, centre_m: Sequence[float]) -> None:
         if not 0.0 <= mass_kg <= 12.5:
             raise ProgramError(f"payload {mass_kg} kg is outside 0 to 12.5 kg")
-        self.payload_kg, self.payload_centre_m = mass_kg, tuple(centre_m)
+        centre = tuple(float(each) for each in centre_m)
+        if len(centre) != 3 or not all(map(isfinite, centre)):
+            raise ProgramError(f"a payload's centre is three lengths, not {centre_m}")
+        self.payload_kg, self.payload_centre_m = mass_kg, centre
 
     def set_tcp(self, offset: Sequence[float]) -> None:
         if tuple(offset) != self.tcp_offset:

@@ -16,6 +16,7 @@ from rig.world.ur10e.variables import INPUTS, OUTPUTS, TYPES, Get, Put, apply_ma
 PORT = 30004
 HEADER = struct.Struct(">HB")
 RECIPE_BYTES = 2048  # RTDE guide: the list of names is not longer
+INPUT_RECIPES = 255  # their number is a byte, and 0 says that there is none
 DEFAULT_HZ = 125.0  # version 1 has no frequency
 
 
@@ -67,10 +68,9 @@ class Output:
 class RtdeSession:
     """One connection's recipes and state."""
 
-    closing = False
-
     def __init__(self, robot: Robot) -> None:
         self._robot = robot
+        self.closing = False
         self._buffer = bytearray()
         self._version = 1
         self._output: Output | None = None
@@ -95,7 +95,9 @@ class RtdeSession:
         while len(self._buffer) >= HEADER.size:
             size, kind = HEADER.unpack_from(self._buffer)
             if size < HEADER.size:
-                self._buffer.clear()  # not RTDE: nothing that follows can be trusted
+                self._buffer.clear()  # nothing that follows can be trusted
+                self.closing = True
+                answer += self._say(f"a package of {size} bytes is no RTDE")
                 break
             if len(self._buffer) < size:
                 break
@@ -148,6 +150,8 @@ class RtdeSession:
         return package("O", lead + ",".join(kinds).encode())
 
     def _setup_inputs(self, payload: bytes) -> bytes:
+        if len(payload) > RECIPE_BYTES or len(self._inputs) == INPUT_RECIPES:
+            return self._say("no more input recipes, or none so long") + package("I", b"\0")
         names = _names(payload)
         claims = self._robot.claims
         kinds = []

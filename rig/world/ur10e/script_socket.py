@@ -16,6 +16,8 @@ from rig.world.ur10e.urscript import Arguments, ScriptProgram, move
 
 PRIMARY_PORT, SECONDARY_PORT, REALTIME_PORT = 30001, 30002, 30003
 TOO_EARLY = "Cannot unlock protective stop until 5s after occurrence"
+TEXT_BYTES = 1 << 20  # a program is not longer; that of ur_rtde has some 60 000
+REGISTER_OFFSETS = (0, 24)  # the lower and the upper half of the registers: ur_rtde takes either
 BLOCK = re.compile(r"(def|sec|thread|if|while|for)\b.*:$")
 
 
@@ -26,9 +28,11 @@ class ScriptReader:
         self._partial = b""
         self._lines: list[str] = []
         self._depth = 0
+        self._size = 0  # bytes of what is not complete
 
     def feed(self, data: bytes) -> Iterator[list[str]]:
-        """The programs that `data` completes, each as its lines."""
+        """The programs that `data` completes, each as its lines. Raises `ProgramError` when one does not end."""
+        self._size += len(data)
         *lines, self._partial = (self._partial + data).split(b"\n")
         for raw in lines:
             line = raw.decode(errors="replace").rstrip()
@@ -41,8 +45,10 @@ class ScriptReader:
             elif words == "end":
                 self._depth = max(0, self._depth - 1)
             if self._depth == 0:
-                program, self._lines = self._lines, []
+                program, self._lines, self._size = self._lines, [], len(self._partial)
                 yield program
+        if self._size > TEXT_BYTES:
+            raise ProgramError(f"a program of more than {TEXT_BYTES} bytes is none")
 
 
 def compile_program(robot: Robot, lines: list[str]) -> Program:
@@ -54,9 +60,12 @@ def compile_program(robot: Robot, lines: list[str]) -> Program:
 
 
 def _register_offset(text: str) -> int:
-    """ur_rtde writes the offset of its integer registers on the line after this one."""
+    """ur_rtde writes the offset of its integer registers on the line after this one. Raises `ProgramError`."""
     match = re.search(r"reg_offset_int\s*=[^\n]*\n\s*(\d+)", text)
-    return int(match.group(1)) if match else 0
+    offset = int(match.group(1)) if match else 0
+    if offset not in REGISTER_OFFSETS:
+        raise ProgramError(f"registers from {offset} on are not those of rtde_control")
+    return offset
 
 
 def _path(lines: list[str]) -> Iterator[Move]:
@@ -92,22 +101,27 @@ ORDERS: dict[str, Callable[[Robot], object]] = {
 class ScriptSession:
     """One connection to a script socket."""
 
-    closing = False
     dialogue = True
 
     def __init__(self, robot: Robot) -> None:
         self._robot = robot
+        self.closing = False
         self._reader = ScriptReader()
 
     def greeting(self) -> bytes:
         return b""
 
     def receive(self, data: bytes) -> bytes:
-        for lines in self._reader.feed(data):
-            if self._robot.remote_control:
-                self._obey(lines)
-            else:
-                self._robot.messages.say("a program was ignored: the robot is in local control")
+        try:
+            for lines in self._reader.feed(data):
+                if self._robot.remote_control:
+                    self._obey(lines)
+                else:
+                    self._robot.messages.say("a program was ignored: the robot is in local control")
+        except ProgramError as error:
+            self._robot.messages.complain(error)
+            self._reader = ScriptReader()
+            self.closing = True
         return b""
 
     def tick(self) -> bytes:
@@ -129,7 +143,7 @@ class ScriptSession:
                 self._robot.start_program(program)
         except ProgramError as error:
             self._robot.messages.complain(error)
-        except (TypeError, ValueError) as error:  # a value of a kind the statement cannot take
+        except (TypeError, ValueError, ArithmeticError) as error:  # a value of a kind the statement cannot take
             self._robot.messages.complain(ProgramError(str(error)))
 
 

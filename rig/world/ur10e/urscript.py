@@ -13,6 +13,7 @@ from rig.world.ur10e.program_threads import Move, Steps, Threads, finite
 from rig.world.ur10e.robot import Robot
 from rig.world.ur10e.trajectory import Joints
 
+NESTED = 50  # loops in one another
 CALL = re.compile(r"([a-z_][a-z_0-9]*)\((.*)\)$", re.IGNORECASE)
 FRAME = re.compile(r"^(def|sec)\s+(\w+)\s*\(\s*\)\s*:$")
 
@@ -25,10 +26,12 @@ def arguments(statement: str) -> dict[str, Any]:
     source = re.sub(r"\bp\[([^\]]*)\]", r"(\1)", match.group(2))  # a pose becomes a tuple, joints stay a list
     try:
         call = ast.parse(f"f({source})", mode="eval").body
-        assert isinstance(call, ast.Call)
+        if not isinstance(call, ast.Call):
+            raise ValueError("more than a call")
         values = {str(i): constant(value) for i, value in enumerate(call.args)}
         return values | {str(item.arg): constant(item.value) for item in call.keywords}
-    except (SyntaxError, ValueError, ArithmeticError):
+    except (SyntaxError, ValueError, ArithmeticError, TypeError, RecursionError, MemoryError):
+        # The last two: the parser's way of saying that brackets are nested too deeply.
         raise ProgramError(f"not simulated: {statement}") from None
 
 
@@ -91,6 +94,8 @@ def parse(lines: Sequence[str]) -> tuple[str, Block]:
         if frame and number == 1:
             name = frame.group(2)
         elif text == "while True:":
+            if len(stack) > NESTED:
+                raise ProgramError("not simulated: loops so deep in one another", (number, 1))
             stack.append([])
         elif text == "end" and len(stack) > 1:
             body = stack.pop()
@@ -124,7 +129,7 @@ class ScriptProgram:
                     yield  # a loop that takes no time would never give way
             try:
                 yield from STATEMENTS[item.text.split("(", 1)[0]](self._robot, self._threads, Arguments(item.text))
-            except (ProgramError, TypeError, ValueError, IndexError, OverflowError) as error:
+            except (ProgramError, TypeError, ValueError, IndexError, ArithmeticError) as error:
                 raise ProgramError(str(error), item.place) from None
 
 

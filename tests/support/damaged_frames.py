@@ -1,0 +1,145 @@
+"""Frames that came to harm by the million, made by `damaged_frames.c`: for the firmware's receiver or the host's."""
+
+import json
+import subprocess
+import sys
+from collections import Counter
+from collections.abc import Callable
+from dataclasses import dataclass
+from hashlib import sha256
+from pathlib import Path
+from typing import IO, Any
+
+import numpy as np
+
+from firmware_host import protocol
+from firmware_host.answers import (
+    BoardIdentity,
+    BoardObservation,
+    BoardSolution,
+    BoardStatus,
+    SampleBatch,
+    SensorSetup,
+    StoredCalibration,
+)
+from firmware_host.frames import Frame, FrameReader, encode
+from support.paths import FIRMWARE
+
+CHUNK = 1 << 16
+OF_EACH = 40  # sound frames of each message
+
+
+@dataclass(frozen=True, slots=True)
+class Sent:
+    """What was sent, and what a receiver written from the protocol's description makes of it.
+
+    Of all `blocks` between two delimiters `valid` are whole and have a right CRC: those `as_sent`, whatever happened
+    around them; those that were `made` so on purpose, around nonsense; and those that damage made so by `chance`.
+    `answers` and `errors` are frames of the board's, all and refusals among them.
+    """
+
+    frames: int
+    blocks: int
+    refused: int
+    valid: int
+    as_sent: int
+    made: int
+    chance: int
+    answers: int
+    errors: int
+
+
+def build(folder: Path) -> Path:
+    """The program, built with sanitizers in `folder`."""
+    command = ["make", "-s", "-C", str(FIRMWARE), "damaged", f"OUT={folder}", f"PYTHON={sys.executable}"]
+    subprocess.run(command, check=True)
+    return folder / "fuzz" / "damaged_frames"
+
+
+def write_sound(path: Path, sender: str, seed: int) -> Path:
+    """Frames of all messages of a sender, with any contents that the protocol has."""
+    random = np.random.default_rng(seed)
+    wires = [
+        _sound(random, message) for message in protocol.MESSAGES if message.sender == sender for _ in range(OF_EACH)
+    ]
+    path.write_bytes(b"".join(wires))
+    return path
+
+
+def _sound(random: np.random.Generator, message: protocol.Message) -> bytes:
+    each = message.item_dtype.itemsize
+    values: dict[str, Any] = message.named(message.head.unpack(random.bytes(message.head.size)))
+    items = None
+    if each:
+        number = int(random.integers((protocol.PAYLOAD_MAX - message.head.size) // each + 1))
+        items = np.frombuffer(bytearray(random.bytes(number * each)), message.item_dtype)
+        if message.name == "identity":
+            items["quantity"] %= len(protocol.QUANTITIES)
+        values |= {"count": number} if "count" in values else {}
+    if message.name == "identity":
+        values["protocol"] = protocol.PROTOCOL_VERSION
+    values |= {name: 0 for name in ("mode", "method", "status", "written_unix_s") if name in values}
+    return encode(message.name, int(random.integers(256)), values, items)
+
+
+def to_firmware(program: Path, frames: int, seed: int, sound: Path) -> Sent:
+    """Damaged requests to the firmware's receiver and board. Raises AssertionError with what the sanitizers say."""
+    run = subprocess.run([program, str(frames), str(seed), sound], capture_output=True, text=True, check=False)
+    assert run.returncode == 0, run.stderr
+    return Sent(**json.loads(run.stderr.splitlines()[-1]))
+
+
+@dataclass(frozen=True, slots=True)
+class Heard:
+    """What the host's receiver made of a stream: its frames by name, and a digest of all they say in their order.
+
+    `damaged` blocks it refused, `repeated` ones had come before.
+    """
+
+    frames: Counter[str]
+    digest: str
+    damaged: int
+    repeated: int
+
+    @property
+    def accepted(self) -> int:
+        """Blocks that it took for whole frames."""
+        return sum(self.frames.values()) + self.repeated
+
+
+# What the host makes of a frame, as firmware_host/client.py does.
+_READ: dict[str, Callable[[Frame], object]] = {
+    **{name: lambda frame: SampleBatch.of(frame, 0.0) for name in protocol.SAMPLES},
+    "setup": SensorSetup.of,
+    "report": lambda frame: BoardStatus.of(frame, 0, 0),
+    "observed": BoardObservation.of,
+    "solution": BoardSolution.of,
+    "calibration": StoredCalibration.of,
+}
+
+
+def listen(stream: IO[bytes]) -> Heard:
+    """All that the host's receiver makes of a stream, and those who read what it accepts."""
+    reader, names, digest = FrameReader(), Counter[str](), sha256()
+    while data := stream.read(CHUNK):
+        for frame in reader.feed(data):
+            names[frame.name] += 1
+            digest.update(repr((frame.name, frame.sequence, frame.values, frame.items.tobytes())).encode())
+            if frame.name == "identity" and frame.values["protocol"] == protocol.PROTOCOL_VERSION:
+                BoardIdentity.of(frame)
+            elif read := _READ.get(frame.name):
+                read(frame)
+    return Heard(names, digest.hexdigest(), reader.damaged, reader.repeated)
+
+
+def to_host(program: Path, frames: int, seed: int, sound: Path) -> tuple[Sent, Heard, Heard]:
+    """Damaged answers and samples to the host's receiver: what was sent, heard, and heard of the whole blocks alone."""
+    whole = sound.with_suffix(".whole")
+    command = [str(program), str(frames), str(seed), str(sound), str(whole)]
+    with subprocess.Popen(command, stdout=subprocess.PIPE, stderr=subprocess.PIPE) as process:
+        assert process.stdout is not None and process.stderr is not None
+        heard = listen(process.stdout)
+        said = process.stderr.read().decode()
+    assert process.returncode == 0, said
+    with whole.open("rb") as stream:
+        return Sent(**json.loads(said.splitlines()[-1])), heard, listen(stream)
