@@ -5,6 +5,7 @@ import time
 from collections.abc import Callable
 from typing import Any
 
+from firmware_host import protocol
 from firmware_host.errors import BoardError
 from firmware_host.frames import Frame, FrameReader, encode
 from firmware_host.serial_port import READ_TIMEOUT_S, SerialPort
@@ -159,6 +160,8 @@ class BoardLink:
 
     def _take(self, frame: Frame, host_time_s: float) -> None:
         request = self._requests.get(frame.values.get("reply_to", 0))
+        if request is not None and frame.name not in (protocol.ANSWERS.get(request.name, "ack"), "error"):
+            request = None  # to a program that was here before, and whose numbers were the same
         self._on_frame(frame, host_time_s, request.name if request is not None else None)
         if request is not None:
             request.answer = frame

@@ -414,6 +414,16 @@ ERRORS = {  # code → what the board reports; `what` follows "the board says th
     20: Problem("not_a_gyroscope", "this is asked of gyroscopes only", "Leave the magnetometer out of the request"),
 }
 
+# A request is answered by `error` or by: these, every other one by `ack`.
+ANSWERS = {
+    "hello": "identity",
+    "configure": "setup",
+    "status": "report",
+    "observe": "observed",
+    "recall": "observed",
+    "solve": "solution",
+    "read_calibration": "calibration",
+}
 SAMPLES = ("samples", "imu_samples", "field_samples", "rates")  # the messages of a stream
 MESSAGE_BY_CODE = {message.code: message for message in MESSAGES}
 MESSAGE_BY_NAME = {message.name: message for message in MESSAGES}

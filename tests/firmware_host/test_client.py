@@ -588,3 +588,35 @@ def test_an_error_in_the_consumer_reaches_the_caller(wire: tuple[BoardOnAWire, s
             return False
 
         wait_for(failed)
+
+
+def test_an_answer_to_somebody_before_is_none_to_the_first_request() -> None:
+    """Every program's first request has the same number, and a cable's buffer keeps what nobody has read."""
+    identity = {"firmware": "1", "unique_id": bytes(12), "reset_cause": 1, "protocol": protocol.PROTOCOL_VERSION}
+    left_over = encode(
+        "setup",
+        7,
+        {
+            "reply_to": 1,
+            "sensor": 0,
+            **dict.fromkeys((each.name for each in protocol.MESSAGE_BY_NAME["setup"].fields[2:]), 0.0),
+        },
+    )
+    with socket.create_server((HOST, 0)) as server:
+
+        def answer() -> None:
+            client, _ = server.accept()
+            with client:
+                client.recv(4096)
+                client.sendall(left_over)
+                client.recv(4096)  # it asks again
+                client.sendall(encode("identity", 8, {"reply_to": 1, **identity}))
+                client.recv(4096)
+                client.sendall(encode("ack", 9, {"reply_to": 2}))
+                client.recv(4096)
+
+        answering = threading.Thread(target=answer)
+        answering.start()
+        with Board(f"socket://{HOST}:{server.getsockname()[1]}", protocol.BAUD_RATE, lambda batch: None) as client:
+            assert client.identity.firmware == "1"
+        answering.join()

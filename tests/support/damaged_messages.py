@@ -4,13 +4,12 @@ Nothing a reader may do but read, or refuse by name: what it raises otherwise re
 bytes that did it. A reader that hangs is ended by an alarm.
 """
 
-import signal
 import socket
 import struct
 import threading
 from collections import Counter
-from collections.abc import Callable, Iterator, Mapping, Sequence
-from contextlib import contextmanager, suppress
+from collections.abc import Callable, Mapping, Sequence
+from contextlib import suppress
 from dataclasses import dataclass
 from random import Random
 
@@ -25,100 +24,13 @@ from rig.world.ur10e.primary import package as primary_package
 from rig.world.ur10e.robot import Robot
 from rig.world.ur10e.rtde import RtdeSession
 from rig.world.ur10e.rtde import package as rtde_package
+from support.damage import HANG_S, damaged, ending_by_name
 from support.ideal import ideal
 from support.paths import DEMO
 
-HANG_S = 20  # wall time, far beyond what a reader that waits for the rest may take
 SESSION, RECOVERY = 3, 60  # messages after which a session is made afresh, and the robot put right
 PATIENCE_S = 0.25  # that the rig's readers are given for a controller that is next door
 HOSTS = tuple(f"127.19.{number}.1" for number in range(1, 9))  # so that there are ports enough for all connections
-NASTY = (b"\0", b"\xff", b"\n", b"\r", b"\x1b[2J", b"%s%n", b"\xed\xa0\x80", b"(" * 300, b"9" * 400, b"1e999", b"-nan")
-
-
-def damaged(random: Random, messages: Sequence[bytes]) -> bytes:
-    """One of the messages after one to four faults, unlike each of them."""
-    before = random.choice(messages)
-    while True:
-        bad = bytearray(before)
-        for _ in range(random.choice((1, 1, 2, 4))):
-            random.choice(FAULTS)(random, bad, messages)
-        if bad and bytes(bad) != before:
-            return bytes(bad)
-
-
-Fault = Callable[[Random, bytearray, Sequence[bytes]], None]
-
-
-def _run(random: Random, bad: bytearray) -> slice:
-    begin = random.randrange(len(bad) + 1)
-    return slice(begin, min(len(bad), begin + 1 + int(random.expovariate(0.1))))
-
-
-def _flip(random: Random, bad: bytearray, messages: Sequence[bytes]) -> None:
-    for _ in range(random.choice((1, 1, 2, 8))):
-        if bad:
-            bad[random.randrange(len(bad))] ^= 1 << random.randrange(8)
-
-
-def _cut(random: Random, bad: bytearray, messages: Sequence[bytes]) -> None:
-    del bad[random.randrange(len(bad) + 1) :]
-
-
-def _lose(random: Random, bad: bytearray, messages: Sequence[bytes]) -> None:
-    del bad[_run(random, bad)]
-
-
-def _double(random: Random, bad: bytearray, messages: Sequence[bytes]) -> None:
-    run = _run(random, bad)
-    bad[run] = bad[run] * random.choice((2, 2, 3, 50))
-
-
-def _overwrite(random: Random, bad: bytearray, messages: Sequence[bytes]) -> None:
-    run = _run(random, bad)
-    bad[run] = random.randbytes(run.stop - run.start)
-
-
-def _insert(random: Random, bad: bytearray, messages: Sequence[bytes]) -> None:
-    begin = random.randrange(len(bad) + 1)
-    bad[begin:begin] = random.choice((*NASTY, random.randbytes(1 + random.randrange(20))))
-
-
-def _splice(random: Random, bad: bytearray, messages: Sequence[bytes]) -> None:
-    """From a place on it goes on as another message."""
-    other = random.choice(messages)
-    bad[random.randrange(len(bad) + 1) :] = other[random.randrange(len(other) + 1) :]
-
-
-def _swap(random: Random, bad: bytearray, messages: Sequence[bytes]) -> None:
-    at = random.randrange(len(bad) + 1)
-    bad[:] = bad[at:] + bad[:at]
-
-
-def _mislead(random: Random, bad: bytearray, messages: Sequence[bytes]) -> None:
-    """Its size says something else."""
-    wrong = random.choice((0, 1, 2, 3, 5, len(bad) + 1, 2 * len(bad), 0x7FFF, 0xFFFF, 0x7FFFFFFF, 0xFFFFFFFF))
-    bad[:4] = struct.pack(">I", wrong) if random.random() < 0.5 else struct.pack(">H", wrong & 0xFFFF) + bad[2:4]
-
-
-FAULTS: tuple[Fault, ...] = (_flip, _flip, _cut, _lose, _double, _overwrite, _insert, _splice, _swap, _mislead)
-
-
-@contextmanager
-def _ending_by_name(bad: bytes) -> Iterator[None]:
-    """What is raised here goes on with the bytes that did it; so does an alarm where nothing ends."""
-
-    def hung(*_: object) -> None:
-        raise AssertionError("it hangs")
-
-    signal.signal(signal.SIGALRM, hung)
-    signal.alarm(HANG_S)
-    try:
-        yield
-    except BaseException as error:
-        error.add_note(f"after {bad.hex()}")
-        raise
-    finally:
-        signal.alarm(0)
 
 
 # -- the rig's side ----------------------------------------------------------------------------------------------------
@@ -253,7 +165,7 @@ def carry_to_rig(name: str, count: int, seed: int) -> Counter[str]:
     try:
         for _ in range(count):
             parts, bad = _dialogue(name, random, reader.sound)
-            with _ending_by_name(bad):
+            with ending_by_name(bad):
                 try:
                     ends[reader.read(controller.next(parts))] += 1
                 except OSError as error:
@@ -267,7 +179,7 @@ def carry_to_rig(name: str, count: int, seed: int) -> Counter[str]:
 # -- the world's side --------------------------------------------------------------------------------------------------
 _INPUTS = ",".join([*(f"input_int_register_{i}" for i in range(2)), *(f"input_double_register_{i}" for i in range(11))])
 _OUTPUTS = "timestamp,actual_q,actual_qd,payload,payload_cog,output_int_register_0,actual_digital_output_bits"
-COMMANDS = (0, 1, 2, 3, 4, 9, 11, 15, 16, 17, 26, 29, 31, 33, 34, 35, 37, 40, 43, 45, 46, 47, 58, 255)
+COMMANDS = (*range(72), 255)
 NUMBERS = (0.0, 0.5, -1.5, 1.5, 7.0, 1e-300, 5e-324, 1e9, -1e308, 1e308, float("inf"), float("nan"))
 SCRIPT = (
     "movej([0,-1,1,0,0,0], a=1, v=1)", "movel(p[0.1,0.2,0.3,0,0,0], a=1, v=0.2)", "speedj([0,0,0,0,0,1], 1, 0.1)",
@@ -342,7 +254,7 @@ def carry_to_world(name: str, count: int, seed: int) -> Counter[str]:
             "primary": lambda: [_program(random), _program(random), PROGRAM],
         }[name]()
         bad = damaged(random, messages)
-        with _ending_by_name(bad):
+        with ending_by_name(bad):
             ends[_what_was_said(name, session.receive(bad), laboratory.robot)] += 1
             if random.random() < 0.3:
                 session.receive(random.choice(messages))
