@@ -6,6 +6,7 @@ from rig.world.clock import TICK_S
 from rig.world.ur10e.cartesian import joints_for
 from rig.world.ur10e.controller_messages import ProgramError
 from rig.world.ur10e.forward_kinematics import flange_pose, placed_pose
+from rig.world.ur10e.program_threads import finite
 from rig.world.ur10e.robot import JOINT_LIMIT_RAD, Robot
 from rig.world.ur10e.trajectory import Joints
 from rig.world.ur10e.ur_rtde_registers import Registers
@@ -25,7 +26,9 @@ def questions(robot: Robot, registers: Registers) -> dict[int, Callable[[], None
 
     def joints(nearest: Joints) -> Joints:
         """That bring the tool to the asked pose."""
-        return joints_for(robot.flange_for(registers.doubles(0, 6)), nearest, robot.links)
+        pose = registers.doubles(0, 6)
+        finite([*pose, *nearest])
+        return joints_for(robot.flange_for(pose), nearest, robot.links)
 
     def reached(nearest: Joints) -> bool:
         try:
