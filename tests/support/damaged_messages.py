@@ -179,7 +179,7 @@ def carry_to_rig(name: str, count: int, seed: int) -> Counter[str]:
 # -- the world's side --------------------------------------------------------------------------------------------------
 _INPUTS = ",".join([*(f"input_int_register_{i}" for i in range(2)), *(f"input_double_register_{i}" for i in range(11))])
 _OUTPUTS = "timestamp,actual_q,actual_qd,payload,payload_cog,output_int_register_0,actual_digital_output_bits"
-COMMANDS = (*range(72), 255)
+COMMANDS = (0, 1, 2, 3, 4, 9, 11, 15, 16, 17, 26, 29, 31, 33, 34, 35, 37, 40, 43, 45, 46, 47, 58, 255)
 NUMBERS = (0.0, 0.5, -1.5, 1.5, 7.0, 1e-300, 5e-324, 1e9, -1e308, 1e308, float("inf"), float("nan"))
 SCRIPT = (
     "movej([0,-1,1,0,0,0], a=1, v=1)", "movel(p[0.1,0.2,0.3,0,0,0], a=1, v=0.2)", "speedj([0,0,0,0,0,1], 1, 0.1)",
