@@ -77,7 +77,8 @@ class Port:
 
     def _set_and_reset(self, value: int) -> None:
         self._output = self._output & ~(value >> 16) | value & 0xFFFF
-        self._outputs_changed()
+        if (~self._output & self._output_pins & self._watched_pins) != self._watched_low:
+            self._outputs_changed()
 
     def _functions_changed(self) -> None:
         self.setup_count += 1

@@ -218,15 +218,16 @@ class DeviceLink:
         return answer
 
     def _chip_select(self, high: bool) -> None:
-        timeline = self._timeline
-        if timeline.next_due <= timeline.now:
+        timeline, device = self._timeline, self.device
+        now = timeline.now
+        if timeline.next_due <= now:
             timeline.run_due()
         self._bus.chip_select(self, not high)
-        device = self.device
+        time_s = self._clock.seconds(now)
         if high:
-            device.deselect(self._clock.seconds(timeline.now))
+            device.deselect(time_s)
         else:
-            device.select(self._clock.seconds(timeline.now))
+            device.select(time_s)
         if device.fault is not None:  # it may just have come
             self._settle()
 
