@@ -7,7 +7,7 @@ controller's velocity signal, which is filtered: what counts is when the joint w
 filter is part of the offset.
 """
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Any
 
 import numpy as np
@@ -129,6 +129,7 @@ def estimate_time_base(board_time_s: Array, readings_rad_s: Array, motion: Known
         if known == len(board_time_s):
             break
         known = _until(board_time_s, 2 * (board_time_s[known] - board_time_s[0]))
+        clock = _seen_from(clock, (board_time_s[0] + board_time_s[known - 1]) / 2)
     if not abs(clock.drift) < MAX_DRIFT or not clock.offset_std_s < COARSE_STEP_S:
         raise _not_found(
             f"the board's clock would run {100 * clock.drift:+.2f} % off, to {clock.offset_std_s * 1e3:.1f} ms"
@@ -183,6 +184,12 @@ def _begun(board_time_s: Array, readings: Array, motion: KnownMotion) -> tuple[T
             if known == len(board_time_s):
                 raise
         span_s *= 2
+
+
+def _seen_from(clock: TimeBase, reference_s: float) -> TimeBase:
+    """The same clock with its offset at another time."""
+    offset_s = clock.offset_s + clock.drift * (reference_s - clock.reference_s)
+    return replace(clock, offset_s=float(offset_s), reference_s=float(reference_s))
 
 
 def _until(board_time_s: Array, span_s: float) -> int:

@@ -57,7 +57,7 @@ class Connector:
         import scipy.interpolate  # noqa: F401
 
         if self.resumed.earlier:
-            self.station.event(RunResumed(len(self.resumed.done), len(whole_plan.sweeps)))
+            self.station.event(RunResumed(len(self.resumed.done), len(whole_plan.sweeps) + len(whole_plan.dwells)))
         acquisition = Acquisition()
         with ExitStack() as stack:
             board = self._connect_board(stack, acquisition) if self.loaded.config.parts_on_board else None

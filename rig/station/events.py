@@ -48,7 +48,7 @@ class ArmConnected:
 
 @dataclass(frozen=True, slots=True)
 class RunResumed:
-    """An interrupted run goes on: `done` of the `planned` sweeps count already."""
+    """An interrupted run goes on: `done` of the `planned` sweeps and dwells count already."""
 
     done: int
     planned: int

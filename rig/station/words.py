@@ -34,7 +34,7 @@ def line(event: RunEvent) -> str | None:
     text: str | None
     match event:
         case RunResumed(done, planned):
-            text = f"resuming: {done} of {planned} sweeps are recorded, sound and known to the board"
+            text = f"resuming: {done} of {planned} sweeps and dwells are recorded and sound"
         case BoardConnected(port, identity):
             text = f"board: {identity.unique_id}, firmware {identity.firmware} at {port}"
         case SensorConnected(sensor, part, serial_number, port, corrected):

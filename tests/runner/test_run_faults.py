@@ -205,7 +205,7 @@ def test_resume_repeats_the_sweep_that_was_refused(start: Start) -> None:
     command = [sys.executable, "-m", "rig", "resume", str(rig.out), "--yes"]
     resumed = subprocess.run(command, capture_output=True, text=True, timeout=240, check=False)
     assert resumed.returncode == 0, resumed.stderr
-    assert "resuming: 5 of 6 sweeps are recorded, sound and known to the board" in resumed.stderr
+    assert "resuming: 5 of 6 sweeps and dwells are recorded and sound" in resumed.stderr
     assert resumed.stderr.count("done: sweep") == 1
     observations = json.loads((rig.out / "result.json").read_text(encoding="utf-8"))["sensors"]["gyro"]["observations"]
     assert sorted(o["sweep"] for o in observations) == [0, 1, 2, 3, 4, 5]

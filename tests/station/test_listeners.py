@@ -40,7 +40,7 @@ class Everything:
 
 
 def test_a_line_is_made_of_what_the_event_holds() -> None:
-    assert line(RunResumed(2, 6)) == "resuming: 2 of 6 sweeps are recorded, sound and known to the board"
+    assert line(RunResumed(2, 6)) == "resuming: 2 of 6 sweeps and dwells are recorded and sound"
     assert line(PhaseRecorded(SAMPLES, 4)) == "recorded: 150 samples, 3 lost; 4 arm states missed"
     stored = CalibrationStored("gyro", "lsm9ds1", "LSM9DS1-001", 3)
     assert line(stored) == "stored on the board: gyro, lsm9ds1 LSM9DS1-001, record 3"
