@@ -35,12 +35,27 @@ def beside(recording: ObservedRun, name: str) -> str | None:
 
     None where there is none.
     """
-    within = recording.run.magnetometers[name].within
-    for other, found in recording.sensors.items():
-        on_this_clock = recording.run.sensors[other].on_board if within is None else other == within
-        if on_this_clock and found.dwells:
-            return other
-    return None
+    dwelt = (sensor for sensor, found in recording.sensors.items() if found.dwells)
+    return next((sensor for sensor in dwelt if _stamps(recording, sensor, name)), None)
+
+
+def _stamps(recording: ObservedRun, sensor: str, magnetometer: str) -> bool:
+    """Whether the clock of `sensor` stamps the samples of the magnetometer too."""
+    within = recording.run.magnetometers[magnetometer].within
+    return recording.run.sensors[sensor].on_board if within is None else sensor == within
+
+
+def field_samples(recording: ObservedRun, name: str) -> tuple[Array, Array] | None:
+    """Times (n,) on the arm's clock and fields (n, 3) in tesla of all samples of a magnetometer, in its own axes.
+
+    By the time base of a sensor whose clock stamps them too; None where there is no such sensor.
+    """
+    other = next((sensor for sensor in recording.sensors if _stamps(recording, sensor, name)), None)
+    if other is None:
+        return None
+    samples, magnetometer = recording.run.samples[name], recording.run.magnetometers[name]
+    time_s = recording.sensors[other].time_base.controller_time_s(samples["board_time_us"] * 1e-6)
+    return time_s, samples["field_counts"].astype(np.float64) * magnetometer.sensitivity_t_per_count
 
 
 def field_readings(recording: ObservedRun, name: str, thresholds: ObservationThresholds) -> tuple[FieldReading, ...]:

@@ -12,6 +12,7 @@ import yaml
 
 from firmware_host.samples import FIELD_SAMPLE_DTYPE
 from rig.analysis.outcome import calibrated
+from rig.cli import main
 from rig.data.run_file import RunData, read_run
 from rig.errors import Fault
 from support.commands import configuration, rig, rig_here
@@ -86,6 +87,20 @@ def test_the_field_is_recorded_beside_the_rates_and_nothing_is_lost(
     assert samples["sequence"].tolist() == list(range(len(samples)))
     assert np.diff(samples["board_time_us"].astype(float)).mean() == pytest.approx(12_500, rel=1e-3)
     assert run.provenance.sensor_serial_numbers["compass"] == "LSM9DS1-001"
+
+
+def test_the_field_is_exported_as_it_was_read_on_the_arms_clock(
+    finished: tuple[Path, dict[str, Any], str], tmp_path: Path
+) -> None:
+    assert main(["export", str(finished[0]), "--format", "csv", "--out", str(tmp_path)]) == 0
+    table = np.genfromtxt(tmp_path / "compass.csv", delimiter=",", names=True)
+    assert table.dtype.names == ("time_s", "x_t", "y_t", "z_t")
+    run = recorded(finished[0])
+    read_t = run.samples["compass"]["field_counts"] * run.magnetometers["compass"].sensitivity_t_per_count
+    np.testing.assert_array_equal(np.column_stack([table[axis] for axis in ("x_t", "y_t", "z_t")]), read_t)
+    arm_s = run.arm["time_s"]
+    assert arm_s[0] - 1 < table["time_s"][0] and table["time_s"][-1] < arm_s[-1] + 1
+    assert "compass.csv: compass, lsm9ds1_magnetometer" in (tmp_path / "README.txt").read_text()
 
 
 def test_dwells_tell_scale_bias_and_angles_as_mounted(finished: tuple[Path, dict[str, Any], str]) -> None:

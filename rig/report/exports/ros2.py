@@ -21,7 +21,8 @@ SAID = (
     "angular_velocity in rad/s and linear_acceleration in m/s^2 (upwards at rest) as the board sent them, in each "
     "sensor's own axes; covariances are diagonal, of one sample at rest. orientation_covariance[0] = -1: no attitude "
     "is known; linear_acceleration_covariance[0] = -1: none was recorded. Stamps: the recording's start in UTC, to a "
-    "second, from there the arm controller's clock. Lost: temperature, counts, the arm's states, the calibration."
+    "second, from there the arm controller's clock. Lost: temperature, magnetometers, counts, the arm's states, the "
+    "calibration."
 )
 
 

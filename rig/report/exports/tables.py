@@ -14,12 +14,14 @@ from rig.arm.state import JOINT_NAMES
 from rig.estimation.arrays import Array
 from rig.observation.acceleration import accelerations
 from rig.observation.average import Stream
+from rig.observation.field import field_samples
 from rig.observation.observed_run import ObservedRun
 from rig.report.exports.names import plain_names
 from rig.study.files import missing_extra
 
 RATES = ("x_rad_s", "y_rad_s", "z_rad_s")
 ACCELERATIONS = ("x_m_s2", "y_m_s2", "z_m_s2")
+FIELDS = ("x_t", "y_t", "z_t")
 CLOCK = "Times are seconds of the arm controller's clock."
 LOST = "Not here: counts, the board's and the computer's times, events, settings; they are in run.h5."
 
@@ -34,7 +36,9 @@ class Table:
 
 
 def tables_of(recordings: Sequence[ObservedRun]) -> Iterator[Table]:
-    """Of each recording the arm, and of each sensor its readings, its accelerations if it has any, and its sweeps."""
+    """Of each recording the arm, of each sensor its readings, its accelerations if it has any, and its sweeps; of each
+    magnetometer its readings.
+    """
     for number, recording in enumerate(recordings, start=1):
         after = "" if number == 1 else f"-{number}"
         yield Table(f"arm{after}", _arm(recording), f"Joint angles and rates, base to wrist 3. {CLOCK} {LOST}")
@@ -47,6 +51,13 @@ def tables_of(recordings: Sequence[ObservedRun]) -> Iterator[Table]:
                 yield Table(f"{name}_acceleration{after}", columns, f"{whose} Upwards at rest. {CLOCK} {LOST}")
             turned = "Whole turns about a unit vector in the flange's frame; those of angle 0 are rests."
             yield Table(f"{name}_sweeps{after}", _sweeps(recording, name), f"{turned} {CLOCK} {LOST}")
+        for name, magnetometer in recording.run.magnetometers.items():
+            found = field_samples(recording, name)
+            if found is not None:
+                part = f"{magnetometer.part} {magnetometer.serial_number}"
+                whose = f"{name}, {part}, raw readings in tesla in the magnetometer's own axes."
+                columns = {"time_s": found[0], **_split(FIELDS, found[1])}
+                yield Table(f"{name}{after}", columns, f"{whose} {CLOCK} {LOST}")
 
 
 def _arm(recording: ObservedRun) -> dict[str, Array]:
