@@ -60,7 +60,6 @@ class World:
         self.clock = Clock(section.time_scale, time.monotonic, self.laboratory.tick_s)
         self.network = Network(self.clock.dialogue)
         self._silent_until_s = 0.0
-        self._inputs_received, self._heard_s = 0, 0.0
         self._ended = False
         host, board = loaded.config.arm.host, loaded.config.board
         try:
@@ -135,8 +134,9 @@ class World:
         """Serve until `end`. A tick ends when its clients have been given theirs, and they have their own pace."""
         polled_s = 0.0
         while not self._ended:
-            self._bear_with_the_client()
-            wait_s = self.clock.wait_s()
+            # A watchdog is about a client's life, which goes by wall time.
+            missed = self.laboratory.robot.misses_its_client
+            wait_s = self.clock.wait_s(missed)
             behind_s = self.network.deliver(idle=wait_s > 0.0)
             if behind_s or wait_s > 0.0 or time.monotonic() - polled_s >= BUSY_POLL_S:
                 self.network.poll(behind_s or min(wait_s, IDLE_POLL_S))
@@ -145,16 +145,8 @@ class World:
                 self._silent_until_s = 0.0
                 for listener in self.arm_listeners:
                     listener.set_silent(False)
-            if not behind_s and not self._ended and self.clock.wait_s() <= 0.0:
+            if not behind_s and not self._ended and self.clock.wait_s(missed) <= 0.0:
                 self._tick()
-
-    def _bear_with_the_client(self) -> None:
-        """A watchdog is about a client's life, which goes by wall time however fast the clock is."""
-        robot = self.laboratory.robot
-        if robot.inputs_received != self._inputs_received:
-            self._inputs_received, self._heard_s = robot.inputs_received, time.monotonic()
-        elif robot.misses_its_client and time.monotonic() - self._heard_s < robot.watchdog_s / 2:
-            robot.bear_with_the_client()
 
     def _tick(self) -> None:
         """One tick; while nothing but a client can let the arm move, all that are due now, `LEAP` at most.

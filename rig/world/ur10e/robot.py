@@ -87,7 +87,7 @@ class Robot:
         self.loaded_program = ""
         self.messages = Messages()
         self.watchdog_s = 0.0  # a program stops when no input came for so long; 0: no watchdog
-        self._last_input_tick = self.inputs_received = 0
+        self._last_input_tick = 0
         self._program: Program | None = None
         self._start: tuple[int, Program] | None = None
         self._mode_changes: list[tuple[int, RobotMode]] = []
@@ -288,11 +288,6 @@ class Robot:
 
     def input_received(self) -> None:
         """An RTDE client wrote an input: feeds the watchdog."""
-        self._last_input_tick = self.tick
-        self.inputs_received += 1
-
-    def bear_with_the_client(self) -> None:
-        """The watchdog begins anew, for a client that has had no time to write."""
         self._last_input_tick = self.tick
 
     @property
