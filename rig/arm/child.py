@@ -43,9 +43,6 @@ TICK_S = 0.1
 PARENT_TICKS = 20  # 2 s without a sign of the parent's life
 PARENT_SPARED = 2  # … and at most so many times that on a machine that has no processor for it
 ABANDON_S = 5.0  # the last stop, over the dashboard or over the client, has so long
-WATCHDOG_HZ = 0.4  # the controller ends our program when it has heard nothing of us for 2.5 s
-KICK_S = 0.03
-LAST_WORD_S = 0.2  # a stop waits so long for the command before it, which a lost controller may never answer
 PAYLOAD_S = 1.0  # the payload shows in the states within this, by the controller's clock and by this machine's
 PAYLOAD_TOLERANCE_KG = 0.01
 
@@ -60,7 +57,6 @@ def main(pipe: "Connection[Message, Request]", host: str, state_rate_hz: float, 
     requests.start()
     threading.Thread(target=child.watch_parent, name="parent watch", daemon=True).start()
     threading.Thread(target=child.watch_move, name="move watch", daemon=True).start()
-    threading.Thread(target=child.kick_watchdog, name="watchdog", daemon=True).start()
     try:
         try:
             child.connect()
@@ -85,8 +81,6 @@ class _Child:
         self._holds_arm = False  # our program may run on the controller
         self._operations_before: int | None = None  # change count before the running move; None when none runs
         self._serving = False  # a request is being served: others, and the parent's signs of life, wait in the pipe
-        self._commanding = threading.Lock()  # the client takes one command at a time
-        self._watched = False  # by the controller's own watchdog
         self._parent = Silence(os.getppid(), spared=PARENT_SPARED)
 
     def send(self, message: Message) -> None:
@@ -160,14 +154,6 @@ class _Child:
                 self._operations_before = None
                 self.send(MoveFinished())
 
-    def kick_watchdog(self) -> NoReturn:
-        """Show the controller that somebody is here: when nobody can reach it any more, it stops the arm itself."""
-        while True:
-            time.sleep(KICK_S)
-            if self._watched:
-                with self._commanding:
-                    self._watched = self._watched and self._control.kickWatchdog()
-
     def _handle(self, request: Request) -> None:
         match request:
             case TakeControl():
@@ -188,7 +174,6 @@ class _Child:
             self._holds_arm = False
             return Failed(_control_failure(self._host, str(error)))
         self._control.setPayload(request.payload_kg, list(request.payload_centre_m))
-        self._watched = self._control.setWatchdog(WATCHDOG_HZ)
         return self._await_payload(request.payload_kg)
 
     def _await_payload(self, wanted_kg: float) -> Message:
@@ -197,7 +182,7 @@ class _Child:
         host_s, arm_s = time.monotonic(), self._latest.state.time_s
         while abs((latest := self._latest).payload_kg - wanted_kg) > PAYLOAD_TOLERANCE_KG:
             if min(time.monotonic() - host_s, latest.state.time_s - arm_s) > PAYLOAD_S:
-                self._brake(BRAKE_RAD_S2)
+                self._control.stopScript()
                 return Failed(_payload_failure(latest.payload_kg, wanted_kg))
             time.sleep(HEARTBEAT_S)
         return ControlTaken()
@@ -205,8 +190,7 @@ class _Child:
     def _move(self, move: Move) -> None:
         before = self._control.getAsyncOperationProgressEx().changeCount()
         try:
-            with self._commanding:
-                started = self._control.moveJ(list(move.target_q_rad), move.speed_rad_s, move.acceleration_rad_s2, True)
+            started = self._control.moveJ(list(move.target_q_rad), move.speed_rad_s, move.acceleration_rad_s2, True)
         except (RuntimeError, ValueError) as error:
             self.send(Failed(_move_failure(f"the client refused the move ({error})")))
             return
@@ -218,12 +202,8 @@ class _Child:
 
     def _brake(self, deceleration_rad_s2: float) -> None:
         if self._control is not None:
-            self._watched = False
-            turn = self._commanding.acquire(timeout=LAST_WORD_S)
             self._control.stopJ(deceleration_rad_s2)
             self._control.stopScript()
-            if turn:
-                self._commanding.release()
 
     def abandon(self) -> NoReturn:
         """Nobody supervises any more: stop the arm, over the dashboard or else over the client, and leave."""

@@ -63,8 +63,8 @@ class Clock:
         """A client has asked something, and its next question depends on the answer."""
         self._dialogue_until_s = self._wall() + DIALOGUE_S
 
-    def wait_s(self, real: bool = False) -> float:
-        """Wall time until the next tick is due: 0 when it is due now, infinity while held. `real`: no faster."""
+    def wait_s(self) -> float:
+        """Wall time until the next tick is due: 0 when it is due now, infinity while held."""
         if self.held:
             return float("inf")
         period_s = self._tick_s / self.time_scale
@@ -73,7 +73,7 @@ class Clock:
         if now_s - due_s > PATIENCE_S:
             self._anchor()
             return 0.0
-        if real or now_s < self._dialogue_until_s:
+        if now_s < self._dialogue_until_s:
             due_s = max(due_s, self._counted_s + max(self._tick_s, period_s))
         return max(0.0, due_s - now_s)
 

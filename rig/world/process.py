@@ -134,9 +134,7 @@ class World:
         """Serve until `end`. A tick ends when its clients have been given theirs, and they have their own pace."""
         polled_s = 0.0
         while not self._ended:
-            # A watchdog is about a client's life, which goes by wall time.
-            missed = self.laboratory.robot.misses_its_client
-            wait_s = self.clock.wait_s(missed)
+            wait_s = self.clock.wait_s()
             behind_s = self.network.deliver(idle=wait_s > 0.0)
             if behind_s or wait_s > 0.0 or time.monotonic() - polled_s >= BUSY_POLL_S:
                 self.network.poll(behind_s or min(wait_s, IDLE_POLL_S))
@@ -145,7 +143,7 @@ class World:
                 self._silent_until_s = 0.0
                 for listener in self.arm_listeners:
                     listener.set_silent(False)
-            if not behind_s and not self._ended and self.clock.wait_s(missed) <= 0.0:
+            if not behind_s and not self._ended and self.clock.wait_s() <= 0.0:
                 self._tick()
 
     def _tick(self) -> None:

@@ -134,7 +134,7 @@ class Robot:
     @property
     def waiting(self) -> bool:
         """Whether the joints stand, and nothing but a client can let them move in the ticks to come."""
-        if self._start is not None or self._mode_changes or not self.motion.still:
+        if self._start is not None or self._mode_changes or self.watchdog_s or not self.motion.still:
             return False
         program = self._program
         return self.runtime_state == RuntimeState.STOPPED or (
@@ -289,11 +289,6 @@ class Robot:
     def input_received(self) -> None:
         """An RTDE client wrote an input: feeds the watchdog."""
         self._last_input_tick = self.tick
-
-    @property
-    def misses_its_client(self) -> bool:
-        """Whether a client that has set the watchdog has been silent for half of the time it may be."""
-        return (self.tick - self._last_input_tick) * TICK_S > self.watchdog_s / 2 > 0.0
 
     def set_watchdog(self, minimum_hz: float) -> None:
         self.watchdog_s = 1.0 / minimum_hz if minimum_hz > 0.0 else 0.0

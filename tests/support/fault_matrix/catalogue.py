@@ -22,13 +22,7 @@ STOPPED, INTERRUPTED, KILLED = 3, 130, -signal.SIGKILL
 LINK = frozenset({"arm_link_lost", "arm_driver_died", "arm_driver_hung"})
 BOARD = frozenset({"board_link_lost", "board_error", "lost_samples", "no_samples"})
 RECONNECTED = frozenset({"program_stopped"})  # a client that finds a lost arm again starts its program anew
-LINK_S, DRIVER_S, SUPERVISOR_S, WATCHDOG_S, BOARD_S = (
-    0.8,
-    0.5,
-    2.0,
-    2.5,
-    2.0,
-)  # silence that tells, docs/architecture.md
+LINK_S, DRIVER_S, SUPERVISOR_S, BOARD_S = 0.8, 0.5, 2.0, 2.0  # silence that tells, docs/architecture.md
 
 
 def nothing(bench: Bench, random: Random) -> None:
@@ -138,6 +132,11 @@ def _heal(bench: Bench, random: Random) -> None:
 ARM = ("rtde", "dashboard", "primary", "secondary", "script")
 
 
+def _heal_and_stop(bench: Bench, random: Random) -> None:
+    _heal(bench, random)
+    bench.world.control({"do": "stop_program"})
+
+
 def _net(name: str, bring: Act, names: frozenset[str] = LINK, *, mend: Act = _heal, **more: object) -> Fault:
     return Fault("network", name, bring, mend, names, **{"known_s": LINK_S, **more})  # type: ignore[arg-type]
 
@@ -214,8 +213,8 @@ CATALOGUE: tuple[Fault, ...] = (
     Fault("controller", "silent for 3 s", _order("silence_arm", duration_s=3),
           names=LINK | RECONNECTED | {"arm_slower_than_planned"}, known_s=LINK_S),
     Fault("controller", "closes its connections", _order("close_arm"), names=LINK, known_s=LINK_S),
-    # Nobody here can stop it: the controller does, by its watchdog.
-    _net("controller gone: all ports refused", _hang_up(*ARM, refuse=True), known_s=WATCHDOG_S),
+    # Nobody is left who could stop it: the movement ends where it was told to, and the program waits on the pendant.
+    _net("controller gone: all ports refused", _hang_up(*ARM, refuse=True), known_s=None, mend=_heal_and_stop),
     _net("RTDE stalls", _stall("rtde")),
     _net("RTDE half-closed", _half_close("rtde")),
     _net("RTDE reset", _hang_up("rtde")),
