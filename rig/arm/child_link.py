@@ -8,7 +8,7 @@ import signal
 import socket
 import threading
 from collections.abc import Callable, Iterator
-from contextlib import contextmanager
+from contextlib import contextmanager, suppress
 from multiprocessing.connection import Connection
 from pathlib import Path
 
@@ -111,7 +111,8 @@ class ChildLink:
             if thread is not threading.current_thread():
                 thread.join(1.0)
         self._pipe.close()
-        self._process.close()
+        with suppress(ValueError):  # killed, but held up by the system: it ends when that lets it go
+            self._process.close()
 
     def kill(self) -> None:
         """End the child by force: the client may hang, and its destructors may block or abort."""

@@ -59,7 +59,8 @@ class Footprint:
     def of(cls, pid: int) -> Self:
         """Of a process that runs."""
         process = Path("/proc") / str(pid)
-        rss_kib = next(line.split()[1] for line in (process / "smaps_rollup").open() if line.startswith("Rss:"))
+        memory = (process / "smaps_rollup").read_text().splitlines()
+        rss_kib = next(line.split()[1] for line in memory if line.startswith("Rss:"))
         files: Counter[str] = Counter()
         for link in (process / "fd").iterdir():
             files[str(link.readlink()).split(":[")[0]] += 1
