@@ -127,14 +127,12 @@ class Chip:
     def _on_pins(self, functions: dict[str, int]) -> Callable[[], bool]:
         """Whether the firmware has put these functions on these pins, whenever that is asked."""
         wires = [(self._port_of(pin), int(pin[2:]), function) for pin, function in functions.items()]
-        ports = tuple({port for port, _pin, _function in wires})
+        ports = {port for port, _pin, _function in wires}
         seen, answer = -1, False
 
         def connected() -> bool:
             nonlocal seen, answer
-            count = 0
-            for port in ports:
-                count += port.setup_count
+            count = sum([port.setup_count for port in ports])
             if count != seen:  # asked at every chip select
                 seen, answer = count, all(port.function(pin) == function for port, pin, function in wires)
             return answer

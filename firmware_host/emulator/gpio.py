@@ -77,8 +77,7 @@ class Port:
 
     def _set_and_reset(self, value: int) -> None:
         self._output = self._output & ~(value >> 16) | value & 0xFFFF
-        if (~self._output & self._output_pins & self._watched_pins) != self._watched_low:
-            self._outputs_changed()
+        self._outputs_changed()
 
     def _functions_changed(self) -> None:
         self.setup_count += 1

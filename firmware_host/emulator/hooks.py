@@ -111,9 +111,9 @@ class Bus(ctypes.Structure):
     known_to: int
 
     def foresee(self, answers: bytes) -> None:
-        """What the next pairs will bring, whatever is sent; nothing any more for no answers."""
+        """What the next pairs will bring, whatever is sent."""
         ctypes.memmove(ctypes.addressof(self) + Bus.known.offset, answers, len(answers))
-        self.known_in, self.known_from, self.known_to = self.setups, 0, len(answers) // 2
+        self.known_from, self.known_to = 0, len(answers) // 2
 
     def foreseen(self) -> int:
         """The next of those."""

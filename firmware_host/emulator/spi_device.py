@@ -106,8 +106,7 @@ class SpiBus:
 
     def chip_select(self, link: "DeviceLink", low: bool) -> None:
         """A device's chip select goes down or up. Raises Violation when the bus has not finished."""
-        bus = self._spi.bus
-        if bus.free > self._timeline.now:
+        if self._spi.busy:
             raise Violation(
                 "spi_busy", f"the select of the {link.device.name} changes on a busy bus", "Wait until BSY is clear"
             )
@@ -116,7 +115,7 @@ class SpiBus:
         else:
             self._selected.remove(link)
         self._checked = _UNCHECKED
-        bus.known_to = 0
+        self._spi.bus.known_to = 0
 
     def exchange(self, pair: int) -> int:
         """Pass two bytes, the first one low, to the selected device; its answers, likewise.
@@ -191,10 +190,11 @@ class DeviceLink:
 
     def exchange(self, pair: int) -> int:
         """Pass two bytes to the device, the first one low, and return its answers likewise."""
+        return self._transfer(pair) if self.device.fault is None else self._exchange_faulty(pair)
+
+    def _transfer(self, pair: int) -> int:
         device = self.device
         time_s = self._clock.seconds(self._timeline.now)
-        if device.fault is not None:
-            return self._exchange_faulty(pair, time_s)
         answer = device.transfer(pair & 0xFF, time_s) | device.transfer(pair >> 8, time_s) << 8
         if device.interrupt_level != self._level or device.next_event_s != self._due_s:
             self._settle()
@@ -204,17 +204,15 @@ class DeviceLink:
         """What the device answers next, see `SpiDevice`; of a faulty one nothing is known."""
         return self.device.foretell() if self.device.fault is None else b""
 
-    def _exchange_faulty(self, pair: int, time_s: float) -> int:
-        device = self.device
-        if device.fault is Fault.ABSENT:
+    def _exchange_faulty(self, pair: int) -> int:
+        if self.device.fault is Fault.ABSENT:
             return 0xFFFF
-        answer = device.transfer(pair & 0xFF, time_s) | device.transfer(pair >> 8, time_s) << 8
-        if device.fault is Fault.DAMAGED:
+        answer = self._transfer(pair)
+        if self.device.fault is Fault.DAMAGED:
             self._sent += 2
             if self._sent >= _DAMAGED_BYTE:
                 self._sent -= _DAMAGED_BYTE
                 answer ^= 0x0001 if self._sent else 0x0100
-        self._settle()
         return answer
 
     def _chip_select(self, high: bool) -> None:

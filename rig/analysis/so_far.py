@@ -5,7 +5,7 @@ otherwise: of uncertainty there is the noise alone here.
 """
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass
 
 import numpy as np
 
@@ -15,7 +15,7 @@ from rig.errors import Fault
 from rig.estimation.arrays import Array
 from rig.estimation.vector_model import VectorSolution
 from rig.observation.acceleration import DwellReading, each_dwell
-from rig.observation.average import Average
+from rig.observation.average import Average, Stream, on_the_arms_clock
 from rig.observation.observe import Observation, each_sweep, observe_sensor
 from rig.observation.timebase import ArmMotion
 from rig.observation.windows import finished_dwells, finished_sweeps
@@ -31,10 +31,13 @@ class SoFar:
     """
 
     sweeps: Mapping[int, Observation | Fault]
+    dwells: Mapping[int, DwellReading | Fault]
+    gravity_m_s2: float | None
     solution: VectorSolution | Fault
     bias_rad_s: tuple[Array, Array] | None
-    dwells: Mapping[int, DwellReading | Fault] = field(default_factory=dict)
-    gravity_m_s2: float | None = None
+
+
+Seen = tuple[dict[int, Observation | Fault], dict[int, DwellReading | Fault], Sequence[Average]]  # and the rests
 
 
 def so_far(runs: Sequence[RunData]) -> dict[str, SoFar]:
@@ -48,50 +51,58 @@ def so_far(runs: Sequence[RunData]) -> dict[str, SoFar]:
         except Fault:
             continue  # nothing has moved yet
         for name in run.sensors:
-            found, rested = _observed(run, name, motion)
-            sweeps.setdefault(name, {}).update(found)
+            turned, dwelt, rested = _seen(run, name, motion)
+            sweeps.setdefault(name, {}).update(turned)
+            dwells.setdefault(name, {}).update(dwelt)
             rests.setdefault(name, []).extend(rested)
-            dwells.setdefault(name, {}).update(_dwelt(run, name, motion))
     site = runs[-1].settings.site
     return {
-        name: replace(
-            _sensor(found, rests[name], np.array(runs[-1].sensors[name].mounting)),
-            dwells=dict(sorted(dwells[name].items())),
-            gravity_m_s2=None if site is None else site.gravity_m_s2,
+        name: SoFar(
+            dict(sorted(found.items())),
+            dict(sorted(dwells[name].items())),
+            None if site is None else site.gravity_m_s2,
+            _solution(found, rests[name], np.array(runs[-1].sensors[name].mounting)),
+            _bias(rests[name]),
         )
         for name, found in sweeps.items()
     }
 
 
-def _observed(run: RunData, name: str, motion: ArmMotion) -> tuple[dict[int, Observation | Fault], Sequence[Average]]:
-    thresholds = run.settings.observation
+def _seen(run: RunData, name: str, motion: ArmMotion) -> Seen:
+    sensor = run.sensors[name]
     try:
-        found = each_sweep(run, name, motion, thresholds)
-        left_out = {index for index, each in found.items() if isinstance(each, Fault)}
-        dwells = {dwell.index for dwell in run.settings.planned_dwells}
+        stream = on_the_arms_clock(run.samples[name], sensor, motion)
+    except Fault as fault:  # of the sensor as a whole: its clock is not found
+        dwelt = finished_dwells(run) if sensor.has_acceleration else ()
+        return dict.fromkeys(finished_sweeps(run), fault), dict.fromkeys(dwelt, fault), ()
+    turned, rests = _observed(run, name, stream, motion)
+    return turned, each_dwell(run, stream, motion, run.settings.observation), rests
+
+
+def _observed(
+    run: RunData, name: str, stream: Stream, motion: ArmMotion
+) -> tuple[dict[int, Observation | Fault], Sequence[Average]]:
+    thresholds = run.settings.observation
+    found = each_sweep(run, stream, motion, thresholds)
+    left_out = {index for index, each in found.items() if isinstance(each, Fault)}
+    dwells = {dwell.index for dwell in run.settings.planned_dwells}
+    try:
         seen = observe_sensor(run, name, motion, thresholds, left_out | dwells)
-    except Fault as fault:  # of the sensor as a whole, such as a clock that is not found
+    except Fault as fault:  # of the sensor as a whole
         return dict.fromkeys(finished_sweeps(run), fault), ()
     return {**found, **{each.sweep: each for each in seen.revolutions}}, seen.rests
 
 
-def _dwelt(run: RunData, name: str, motion: ArmMotion) -> dict[int, DwellReading | Fault]:
-    try:
-        return each_dwell(run, name, motion, run.settings.observation)
-    except Fault as fault:  # of the sensor as a whole
-        return dict.fromkeys(finished_dwells(run), fault)
-
-
-def _sensor(sweeps: Mapping[int, Observation | Fault], rests: Sequence[Average], mounting: Array) -> SoFar:
+def _solution(
+    sweeps: Mapping[int, Observation | Fault], rests: Sequence[Average], mounting: Array
+) -> VectorSolution | Fault:
     observations = [each for _, each in sorted(sweeps.items()) if isinstance(each, Observation)]
-    solution: VectorSolution | Fault
     try:
         if not observations:
             raise Fault("too_few_observations", "no sweep is averaged yet", "Wait for the first one")
-        solution = solve_vector(observations, rests, mounting)
+        return solve_vector(observations, rests, mounting)
     except Fault as fault:
-        solution = fault
-    return SoFar(dict(sorted(sweeps.items())), solution, _bias(rests))
+        return fault
 
 
 def _bias(rests: Sequence[Average]) -> tuple[Array, Array] | None:

@@ -1,14 +1,18 @@
-"""Plain values, as JSON has them, into a frozen dataclass: each of the type and in the range its annotation says."""
+"""Plain values, as JSON has them, into what they mean: each of the type and in the range its annotation says."""
 
+from pathlib import Path
 from typing import Annotated, Any, TypeVar
 
-from pydantic import Field, TypeAdapter, ValidationError
+from pydantic import BaseModel, Field, TypeAdapter, ValidationError
 
+from rig.config.regular_file import UnfitFile, read_regular_file
+from rig.errors import Refused
 from rig.errors.quoting import quote
 
 Finite = Annotated[float, Field(allow_inf_nan=False)]
 Positive = Annotated[float, Field(gt=0, allow_inf_nan=False)]
 Kind = TypeVar("Kind")
+Document = TypeVar("Document", bound=BaseModel)
 _adapters: dict[type[Any], TypeAdapter[Any]] = {}
 
 
@@ -21,6 +25,20 @@ def checked(kind: type[Kind], document: Any, where: str) -> Kind:
         place = ".".join((where, *map(str, first["loc"])))
         raise ValueError(f"{place} is {quote(first['input'])}: {first['msg']}") from None
     return value
+
+
+def read_document(kind: type[Document], file: Path, limit_bytes: int, *, what: str, remedy: str) -> Document:
+    """A JSON file of that kind; `what` it is a result of, for messages. Raises Refused `no_result`, `not_a_result`."""
+    try:
+        return kind.model_validate_json(read_regular_file(file, limit_bytes))
+    except (UnfitFile, OSError) as error:
+        why = error.strerror if isinstance(error, OSError) else error
+        raise Refused("no_result", f"{file} cannot be read: {why}", remedy) from error
+    except ValidationError as error:
+        first = error.errors()[0]
+        where = ".".join(map(str, first["loc"]))
+        why = f"{where}{': ' if where else ''}{first['msg']}"
+        raise Refused("not_a_result", f"{file} is no result of {what}: {why}", remedy) from error
 
 
 def _adapter(kind: type[Any]) -> TypeAdapter[Any]:

@@ -4,11 +4,10 @@ import json
 from pathlib import Path
 from typing import Final, Literal
 
-from pydantic import Field, ValidationError
+from pydantic import Field
 
-from rig.config.regular_file import UnfitFile, read_regular_file
+from rig.data.checked import read_document
 from rig.data.result_types import Entry, ErrorEntry, Matrix3, Matrix6, PositiveVector3, Vector3
-from rig.errors import Refused
 
 REVERSAL_MAX_BYTES: Final = 4_000_000  # of two runs it has 4,000
 
@@ -160,12 +159,4 @@ class ReversalDocument(Entry):
 def read_reversal(path: Path) -> ReversalDocument:
     """What `rig reversal … --out` wrote. Raises Refused `no_result`, `not_a_result`."""
     remedy = "Give the file of `rig reversal RUN RUN --out FILE`"
-    try:
-        return ReversalDocument.model_validate_json(read_regular_file(path, REVERSAL_MAX_BYTES))
-    except (UnfitFile, OSError) as error:
-        why = error.strerror if isinstance(error, OSError) else error
-        raise Refused("no_result", f"{path} cannot be read: {why}", remedy) from error
-    except ValidationError as error:
-        first = error.errors()[0]
-        why = f"{'.'.join(map(str, first['loc']))}: {first['msg']}"
-        raise Refused("not_a_result", f"{path} is no result of a reversal: {why}", remedy) from error
+    return read_document(ReversalDocument, path, REVERSAL_MAX_BYTES, what="a reversal", remedy=remedy)

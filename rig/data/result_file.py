@@ -7,11 +7,11 @@ import json
 from pathlib import Path
 from typing import Final, Literal
 
-from pydantic import ConfigDict, Field, JsonValue, ValidationError
+from pydantic import ConfigDict, Field, JsonValue
 
-from rig.config.regular_file import UnfitFile, read_regular_file
 from rig.data.accelerometer_entries import AccelerometerEntry
 from rig.data.budget_entries import BiasProcessEntry, BudgetEntry, ClockEntry
+from rig.data.checked import read_document
 from rig.data.drift_entries import DriftEntry
 from rig.data.earth_rate_entries import EarthRateEntry
 from rig.data.magnetometer_entries import MagnetometerEntry
@@ -338,20 +338,8 @@ def write_result(document: ResultDocument, folder: Path) -> None:
 
 def read_result(path: Path) -> ResultDocument:
     """The `result.json` of a run folder or at `path` itself. Raises Refused `no_result`, `not_a_result`."""
-    file = _file(path)
-    try:
-        return ResultDocument.model_validate_json(read_regular_file(file, SIZE_MAX_BYTES))
-    except (UnfitFile, OSError) as error:
-        why = error.strerror if isinstance(error, OSError) else error
-        raise Refused("no_result", f"{file} cannot be read: {why}", "Give a run folder or its result.json") from error
-    except ValidationError as error:
-        first = error.errors()[0]
-        where = ".".join(map(str, first["loc"]))
-        raise Refused(
-            "not_a_result",
-            f"{file} is no result of a run: {where}{': ' if where else ''}{first['msg']}",
-            "Give a run folder or its result.json",
-        ) from error
+    remedy = "Give a run folder or its result.json"
+    return read_document(ResultDocument, _file(path), SIZE_MAX_BYTES, what="a run", remedy=remedy)
 
 
 def passed_result(path: Path) -> ResultDocument:

@@ -55,9 +55,14 @@ class BiasByRepeat:
     @property
     def largest_change_std(self) -> Array:
         """(3,) of that change: what the two repeats it lies between are known to."""
-        ends = np.stack([self.bias.argmin(axis=0), self.bias.argmax(axis=0)])
-        std: Array = np.hypot(*np.take_along_axis(self.std, ends, axis=0))
-        return std
+        return largest_change_std(self.bias, self.std)
+
+
+def largest_change_std(bias: Array, std: Array) -> Array:
+    """(3,) of the largest change between any two of biases (R, 3): what the two it lies between are known to."""
+    ends = np.stack([bias.argmin(axis=0), bias.argmax(axis=0)])
+    found: Array = np.hypot(*np.take_along_axis(std, ends, axis=0))
+    return found
 
 
 def bias_by_repeat(readings: Array, variances: Array, modelled: Array, bias: Array | None = None) -> BiasByRepeat:

@@ -11,7 +11,7 @@ from rig.data.run_file import RunData
 from rig.data.settings import ObservationThresholds
 from rig.errors import Fault
 from rig.estimation.arrays import Array
-from rig.observation.average import Mean, Stream, between, mean_at_rest, on_the_arms_clock
+from rig.observation.average import Mean, Stream, between, mean_at_rest
 from rig.observation.timebase import ArmMotion
 from rig.observation.windows import Dwelt, Window, dwelt
 
@@ -47,15 +47,11 @@ def dwell_readings(
 
 
 def each_dwell(
-    run: RunData, sensor: str, motion: ArmMotion, settings: ObservationThresholds
+    run: RunData, stream: Stream, motion: ArmMotion, settings: ObservationThresholds
 ) -> dict[int, DwellReading | Fault]:
-    """Every finished dwell's reading, or why there is none, by its index; nothing of a sensor without accelerations.
-
-    Raises Fault as `on_the_arms_clock` does.
-    """
-    if not run.sensors[sensor].has_acceleration:
+    """Every finished dwell's reading, or why there is none, by its index; nothing of a sensor without accelerations."""
+    if not stream.sensor.has_acceleration:
         return {}
-    stream = on_the_arms_clock(run.samples[sensor], run.sensors[sensor], motion)
     found: dict[int, DwellReading | Fault] = {}
     for each in dwelt(run):
         try:

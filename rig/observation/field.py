@@ -53,9 +53,21 @@ def field_samples(recording: ObservedRun, name: str) -> tuple[Array, Array] | No
     other = next((sensor for sensor in recording.sensors if _stamps(recording, sensor, name)), None)
     if other is None:
         return None
-    samples, magnetometer = recording.run.samples[name], recording.run.magnetometers[name]
-    time_s = recording.sensors[other].time_base.controller_time_s(samples["board_time_us"] * 1e-6)
-    return time_s, samples["field_counts"].astype(np.float64) * magnetometer.sensitivity_t_per_count
+    return _time_s(recording, name, other), _field_t(recording, name, recording.run.samples[name])
+
+
+def _time_s(recording: ObservedRun, name: str, other: str) -> Array:
+    """(n,) on the arm's clock, by the time base of a sensor whose clock stamps the magnetometer's samples too."""
+    stamps_s = recording.run.samples[name]["board_time_us"] * 1e-6
+    return recording.sensors[other].time_base.controller_time_s(stamps_s)
+
+
+def _field_t(recording: ObservedRun, name: str, samples: NDArray[Any]) -> Array:
+    """(n, 3) in tesla."""
+    field_t: Array = (
+        samples["field_counts"].astype(np.float64) * recording.run.magnetometers[name].sensitivity_t_per_count
+    )
+    return field_t
 
 
 def field_readings(recording: ObservedRun, name: str, thresholds: ObservationThresholds) -> tuple[FieldReading, ...]:
@@ -109,24 +121,21 @@ def _mean(recording: ObservedRun, name: str, window: Window, what: str, threshol
     where = f"{what} of {name}"
     inside = _inside(recording, name, window)
     check_complete(inside, where, thresholds)
-    counts = inside["field_counts"].astype(np.int64)
-    if np.any(np.abs(counts) >= magnetometer.full_scale_counts):
+    if np.any(np.abs(inside["field_counts"].astype(np.int64)) >= magnetometer.full_scale_counts):
         raise Fault(
             "saturation",
             f"in {where} the field is beyond the magnetometer's range",
             "Choose a wider range_gauss, or take away the iron beside it",
         )
     per_count_t = magnetometer.sensitivity_t_per_count
-    steady, known = np.zeros((len(counts), 1)), np.ones(len(counts), dtype=np.bool_)
-    readings_t: Array = counts.astype(np.float64) * per_count_t
-    return mean_of(readings_t, per_count_t, steady, known, as_before=False)
+    steady, known = np.zeros((len(inside), 1)), np.ones(len(inside), dtype=np.bool_)
+    return mean_of(_field_t(recording, name, inside), per_count_t, steady, known, as_before=False)
 
 
 def _inside(recording: ObservedRun, name: str, window: Window) -> NDArray[Any]:
     """The samples (n,) in it."""
     other = beside(recording, name)
     assert other is not None, "asked for only where there is one"
-    samples = recording.run.samples[name]
-    time_s = recording.sensors[other].time_base.controller_time_s(samples["board_time_us"] * 1e-6)
-    inside: NDArray[Any] = samples[slice(*np.searchsorted(time_s, [window.start_s, window.end_s]).tolist())]
+    ends = np.searchsorted(_time_s(recording, name, other), [window.start_s, window.end_s])
+    inside: NDArray[Any] = recording.run.samples[name][slice(*ends.tolist())]
     return inside

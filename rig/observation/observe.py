@@ -102,13 +102,9 @@ def observe_sensor(
 
 
 def each_sweep(
-    run: RunData, sensor: str, motion: ArmMotion, settings: ObservationThresholds
+    run: RunData, stream: Stream, motion: ArmMotion, settings: ObservationThresholds
 ) -> dict[int, Observation | Fault]:
-    """Every finished sweep's observation, or why there is none, by the sweep's index.
-
-    Raises Fault as `on_the_arms_clock` does.
-    """
-    stream = on_the_arms_clock(run.samples[sensor], run.sensors[sensor], motion)
+    """Every finished sweep's observation, or why there is none, by the sweep's index."""
     found: dict[int, Observation | Fault] = {}
     for finished in swept(run):
         try:

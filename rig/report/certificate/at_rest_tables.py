@@ -10,6 +10,7 @@ from rig.data.accelerometer_entries import AccelerometerEntry
 from rig.data.drift_entries import DriftEntry
 from rig.data.magnetometer_entries import MagnetometerEntry, ReversalEntry
 from rig.data.result_types import ErrorEntry
+from rig.estimation.bias_by_repeat import largest_change_std
 from rig.report.certificate.tables import AXES, AxisRow, Pair, pair
 
 MICRO = 1e6
@@ -95,8 +96,7 @@ def drift_rows(found: DriftEntry) -> list[DriftRow]:
     """In the drift's own unit, with two standard deviations."""
     bias, std = (np.array([getattr(each.held, name) for each in found.repeats]) for name in ("bias", "std"))
     whole = np.hypot(std, found.common_std)  # what all repeats share is no part of a change
-    ends = np.stack([bias.argmin(axis=0), bias.argmax(axis=0)])
-    changed, slope = np.hypot(*np.take_along_axis(std, ends, axis=0)), found.over_temperature
+    changed, slope = largest_change_std(bias, std), found.over_temperature
     return [
         DriftRow(
             axis,
