@@ -61,7 +61,9 @@ def _unlock(bench: Bench, random: Random) -> None:
 
 
 def _switch_on(bench: Bench, random: Random) -> None:
-    for order in ("release", "power_on", "brake_release"):
+    bench.world.control({"do": "release"})
+    bench.until(lambda state: state["robot_mode"] == "POWER_OFF", 60, running=False)  # half a second after the stop
+    for order in ("power_on", "brake_release"):
         bench.world.control({"do": order})
     bench.until(lambda state: state["robot_mode"] == "RUNNING", 60, running=False)
 
