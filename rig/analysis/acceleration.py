@@ -9,11 +9,13 @@ import numpy as np
 
 from rig.analysis.attitudes import check_seen, scale_and_bias_covariance
 from rig.analysis.calibration import SensorResult, or_fault
+from rig.analysis.reference_budgets import accelerometer_budget
 from rig.data.run_file import RecordedSensor
 from rig.data.settings import PlannedDwell, RunSettings, Site
 from rig.errors import Fault
 from rig.estimation.accelerometer import AccelerometerSolution, solve_accelerometer, specific_force
 from rig.estimation.arrays import Array
+from rig.estimation.budget import Budget
 from rig.estimation.felt import LEVER, NO_SWEEPS, SECOND, Dwells, Sweeps
 from rig.estimation.imu import ImuSolution, solve_imu
 from rig.estimation.reference_model import F
@@ -52,8 +54,9 @@ class AccelerometerResult:
     The body of the `solution` is the sensor as it is nominally mounted: F is nearly diagonal, and φ the sensor's own.
     `alignment` is to the gyroscope beside it, None where that was not calibrated.
 
-    `scale` (3,) is 1/‖row of F‖, `covariance` (6, 6) that of scale and bias. Beside it stand the solutions from the
-    attitudes alone, by method, or the Fault each ends in. `held_out` is there when the attitudes were repeated.
+    `scale` (3,) is 1/‖row of F‖, `covariance` (6, 6) that of scale and bias by the solution alone; the `budget` has
+    all that is known of their uncertainty, None for recordings that say nothing of it. Beside it stand the solutions
+    from the attitudes alone, by method, or the Fault each ends in. `held_out`: when the attitudes were repeated.
     """
 
     sensor: RecordedSensor
@@ -61,6 +64,7 @@ class AccelerometerResult:
     solution: ImuSolution
     scale: Array
     covariance: Array
+    budget: Budget | None
     non_orthogonality_rad: Array
     non_orthogonality_std_rad: Array
     alignment: Alignment | None
@@ -166,6 +170,9 @@ def _calibrated(
         solution=solution,
         scale=scale,
         covariance=scale_and_bias_covariance(solution.matrix, scale, solution.covariance),
+        budget=None
+        if settings.uncertainty is None
+        else accelerometer_budget(solution, seen, sweeps, site, 1e-3 * settings.uncertainty.acceleration_lag_ms),
         non_orthogonality_rad=non_orthogonality(axes),
         non_orthogonality_std_rad=np.sqrt(np.diag(angles @ solution.covariance[F, F] @ angles.T))[:3],
         alignment=None if gyroscope is None else _alignment(gyroscope, solution, mounting),

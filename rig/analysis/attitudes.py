@@ -10,9 +10,9 @@ import numpy as np
 from rig.analysis.calibration import or_fault
 from rig.errors import Fault, Refused
 from rig.estimation.arrays import Array
-from rig.estimation.reference_model import BIAS, F, Known, KnownNorm, KnownVector
+from rig.estimation.reference_budget import scale_and_bias
+from rig.estimation.reference_model import Known, KnownNorm, KnownVector
 from rig.estimation.refusals import check_axes
-from rig.estimation.sensor_axes import parameter_jacobian
 from rig.estimation.triaxial import EqualWeights, Method, TriaxialSolution, solve_triaxial
 from rig.observation.attitude_import import PlacedReadings, Quantity
 
@@ -186,8 +186,6 @@ def in_unit(solution: TriaxialSolution) -> tuple[Array, Array]:
 
 def scale_and_bias_covariance(matrix: Array, scale: Array, covariance: Array) -> Array:
     """(6, 6) from that of a reference model's parameters; b is part of the reading, a gyroscope's is added to it."""
-    jacobian = parameter_jacobian(matrix, scale)
-    jacobian[3:] *= -1
-    told = np.r_[F, BIAS]
-    found: Array = jacobian @ covariance[np.ix_(told, told)] @ jacobian.T
+    jacobian = scale_and_bias(matrix, scale, len(covariance))
+    found: Array = jacobian @ covariance @ jacobian.T
     return found

@@ -13,10 +13,12 @@ import numpy as np
 from rig.analysis.acceleration import AccelerometerResult
 from rig.analysis.attitudes import scale_and_bias_covariance
 from rig.analysis.calibration import or_fault
+from rig.analysis.reference_budgets import magnetometer_budget
 from rig.data.run_file import RecordedMagnetometer
-from rig.data.settings import RunSettings
+from rig.data.settings import RunSettings, Site
 from rig.errors import Fault
 from rig.estimation.arrays import Array
+from rig.estimation.budget import Budget
 from rig.estimation.magnetometer import (
     FieldDrift,
     MagnetometerSolution,
@@ -41,7 +43,8 @@ ELSEWHERE = "Take iron and currents away, or measure farther from them; set the 
 class MagnetometerResult:
     """One magnetometer's calibration m = F B + b in the axes of its nominal mounting, and what it rests on.
 
-    `scale` (3,) is 1/‖row of F‖, relative to the field's size `field_t`; `covariance` (6, 6) that of scale and bias.
+    `scale` (3,) is 1/‖row of F‖, relative to the field's size `field_t`; `covariance` (6, 6) that of scale and bias by
+    the solution alone, the `budget` all that is known of their uncertainty.
     `extension_m` (3,) is where it sits on the flange, `drift` how the field changed between tests at home, None where
     there were fewer than two. `beside` are the other methods' solutions, or the Fault each ends in.
     """
@@ -54,6 +57,7 @@ class MagnetometerResult:
     drift: FieldDrift | None
     scale: Array
     covariance: Array
+    budget: Budget
     non_orthogonality_rad: Array
     non_orthogonality_std_rad: Array
     beside: Mapping[Method, MagnetometerSolution | Fault]
@@ -89,7 +93,8 @@ def _calibrated(
     settings: RunSettings,
     accelerometers: Mapping[str, AccelerometerResult],
 ) -> MagnetometerResult:
-    field_t, upwards = _known_field(settings)
+    site, field_t = _known_field(settings)
+    upwards = (1.0 if site.magnetic_field_upwards else -1.0) * np.array(site.up)
     dwells = tuple(each for run in recordings for each in field_readings(run, name, settings.observation))
     drift = _drift(name, recordings, settings)
     mounting = np.array(sensor.mounting)
@@ -114,6 +119,7 @@ def _calibrated(
         drift=drift,
         scale=scale,
         covariance=scale_and_bias_covariance(solution.matrix, scale, solution.covariance),
+        budget=magnetometer_budget(solution, attitudes, variances, (alike, drift), site),
         non_orthogonality_rad=non_orthogonality(axes),
         non_orthogonality_std_rad=np.sqrt(np.diag(angles @ solution.covariance[F, F] @ angles.T))[:3],
         beside={method: or_fault(partial(solve, method=method)) for method in BESIDE},
@@ -121,8 +127,8 @@ def _calibrated(
     )
 
 
-def _known_field(settings: RunSettings) -> tuple[float, Array]:
-    """Its size, and a vector (3,) of the base frame on its side.
+def _known_field(settings: RunSettings) -> tuple[Site, float]:
+    """The place, and the size of its field.
 
     Raises Fault `no_attitudes`, `field_strength_unknown`.
     """
@@ -139,7 +145,7 @@ def _known_field(settings: RunSettings) -> tuple[float, Array]:
             "recorded only: the size of the field is not given, and the scale of a magnetometer is relative to it",
             "Give site.magnetic_field_ut, as a reference magnetometer measured it where the sensor stands",
         )
-    return site.magnetic_field_t, (1.0 if site.magnetic_field_upwards else -1.0) * np.array(site.up)
+    return site, site.magnetic_field_t
 
 
 def _drift(name: str, recordings: Sequence[ObservedRun], settings: RunSettings) -> FieldDrift | None:

@@ -7,9 +7,9 @@ import numpy as np
 
 from rig.analysis.magnetic_field import MagnetometerResult
 from rig.analysis.outcome import Outcome
+from rig.analysis.reference_budgets import SIZE_OF_FIELD
 from rig.errors import Fault, Refused
 from rig.estimation.arrays import Array
-from rig.estimation.reference_model import BIAS
 from rig.estimation.reversal import Reversal, separate
 
 ALIKE = "Give runs of one magnetometer on one arm, in the same attitudes and at the same place, turned over in between"
@@ -67,18 +67,25 @@ def _reversal(runs: Sequence[AsMounted]) -> MagnetometerReversal:
     results = [each.result for each in runs]
     found = separate(
         np.array([each.solution.bias_t for each in results]),
-        np.array([each.solution.covariance[BIAS, BIAS] for each in results]),
+        np.array([each.budget.covariance[3:, 3:] for each in results]),
         np.array([each.solution.matrix for each in results]),
         np.array([each.sensor.mounting for each in results]),
     )
-    variances = [np.diag(each.covariance)[:3] for each in results]
     return MagnetometerReversal(
         tuple(runs),
         found,
         np.mean([each.scale for each in results], axis=0),
-        np.sqrt(np.sum(variances, axis=0)) / len(runs),
+        _scale_std(results),
         np.mean([each.correction_matrix for each in results], axis=0),
     )
+
+
+def _scale_std(results: Sequence[MagnetometerResult]) -> Array:
+    """(3,) of the mean of their scale factors: each run has its own, and all share how well the field is known."""
+    shared = results[0].budget.of(SIZE_OF_FIELD)[:3]
+    own = [each.budget.std[:3] ** 2 - each.budget.of(SIZE_OF_FIELD)[:3] ** 2 for each in results]
+    std: Array = np.sqrt(np.sum(own, axis=0) / len(results) ** 2 + shared**2)
+    return std
 
 
 def _what_must_be_alike(run: AsMounted) -> dict[str, object]:

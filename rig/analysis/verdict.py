@@ -88,9 +88,10 @@ def acceleration_checks(
 ) -> tuple[Check, ...]:
     """An accelerometer's scale and bias, their standard deviations, gravity's size in attitudes that were held out.
 
-    The uncertainty that the decision rule heeds is the solution's, relative to the stated gravity.
+    With a budget its combined uncertainties are judged; else the solution's, relative to the stated gravity.
     """
-    std, of = np.sqrt(np.diag(result.covariance)), f"{sensor}.acceleration"
+    std = np.sqrt(np.diag(result.covariance)) if result.budget is None else result.budget.std
+    of = f"{sensor}.acceleration"
     scale, bias = COVERAGE_FACTOR * std[:3], COVERAGE_FACTOR * std[3:]
     found = [
         _held(f"{of}_scale_deviation", (result.scale - 1, scale), limits.acceleration_scale_deviation, "1", rule),

@@ -121,12 +121,26 @@ class SiteSection(Section):
     gravity_m_s2: float = Field(
         default=9.80665, gt=9.7, lt=9.9, description="acceleration of free fall", json_schema_extra={"unit": "m/s²"}
     )
+    gravity_uncertainty_m_s2: float | None = Field(
+        default=None,
+        gt=0,
+        le=0.1,
+        description="expanded uncertainty (k = 2) of gravity_m_s2; left out, a half-width of 0.0005 is taken, of "
+        "0.03 where gravity_m_s2 is the standard value",
+        json_schema_extra={"unit": "m/s²"},
+    )
     magnetic_field_ut: float | None = Field(
         default=None,
         ge=1,
         le=1000,
         description="size of the magnetic field where the magnetometer stands, as a reference there measured it: its "
         "scale factors are relative to it; without it a magnetometer is recorded, not calibrated",
+    )
+    magnetic_field_uncertainty_ut: float | None = Field(
+        default=None,
+        gt=0,
+        le=100,
+        description="expanded uncertainty (k = 2) of magnetic_field_ut; left out, a half-width of 1 % is taken",
     )
     gravity_reference: Words | None = Field(
         default=None,
@@ -195,6 +209,14 @@ class UncertaintySection(Section):
     )
     sensor_offset_mm: float = Field(
         default=50.0, ge=0, le=1000, description="how far from the flange's axes the sensor sits, either way"
+    )
+    acceleration_lag_ms: float = Field(
+        default=5.0,
+        ge=0,
+        le=100,
+        description="by how much an accelerometer's own filter may delay its readings: it makes the wave of a sweep "
+        "smaller by half the square of what the arm turns in that time",
+        json_schema_extra={"unit": "ms"},
     )
     g_sensitivity_deg_s_g: float | None = Field(
         default=None,

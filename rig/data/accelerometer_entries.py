@@ -2,6 +2,7 @@
 
 from typing import Literal
 
+from rig.data.budget_entries import BudgetEntry
 from rig.data.result_types import Entry, ErrorEntry, Matrix3, Matrix6, PositiveVector3, Role, Vector3
 
 
@@ -52,7 +53,8 @@ class AlignmentEntry(Entry):
 class AccelerometerEntry(Entry):
     """A calibration a = F (s + φ s²) + b of the specific force s in the flange's frame.
 
-    - `covariance` is that of scale and bias; `gravity_m_s2` what the scale factors are relative to.
+    - `covariance` is that of scale and bias by the solution alone, `covariance_combined` all of it, of which `budget`
+      says what makes it up; null in results of before there was one. `gravity_m_s2` is what the scale is relative to.
     - `reference_m_s2` is the specific force at rest in the arm's base frame, `attitude_error_rad` how far the arm's
       attitudes are off about each axis, by the readings' own account.
     - `lever_arm_m`, from the sweeps' axes to the sensor in the flange's frame, and `delay_s`, by which it lags behind
@@ -95,3 +97,5 @@ class AccelerometerEntry(Entry):
     beside: dict[str, InAttitudesEntry | ErrorEntry]
     held_out: HeldOutEntry | None
     warnings: tuple[str, ...]
+    covariance_combined: Matrix6 | None = None
+    budget: BudgetEntry | None = None

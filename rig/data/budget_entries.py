@@ -1,5 +1,6 @@
 """The uncertainty's part of `result.json`."""
 
+from collections.abc import Sequence
 from typing import Annotated, Literal
 
 from pydantic import Field
@@ -11,9 +12,10 @@ Freedom6 = Annotated[tuple[float | None, ...], Field(min_length=6, max_length=6)
 
 
 class ContributorEntry(Entry):
-    """One line of the budget; `half_width` (of a rectangular distribution, in `unit`) is null where it was measured.
+    """One line of the budget; `half_width` in `unit` is null where it was measured.
 
-    `std` and `share` (of the variance) are those of kx ky kz bx by bz; units 1 and rad/s.
+    Of a normal distribution it is the expanded uncertainty (k = 2) that somebody stated.
+    `std` and `share` (of the variance) are those of kx ky kz bx by bz; units 1 and that of the biases.
     """
 
     name: str
@@ -35,6 +37,15 @@ class BudgetEntry(Entry):
     coverage_factor: float
     expanded: Vector6
     freedom: Freedom6
+
+
+def expanded_uncertainties(
+    budget: BudgetEntry | None, covariance: Sequence[Sequence[float]], coverage_factor: float = 2.0
+) -> Sequence[float]:
+    """(6,) of scale and bias: U of the budget; without one, what the solution's covariance makes of it."""
+    if budget is not None:
+        return budget.expanded
+    return [coverage_factor * covariance[i][i] ** 0.5 for i in range(len(covariance))]
 
 
 class BiasProcessEntry(Entry):

@@ -6,6 +6,7 @@ from typing import Final, Literal
 
 from pydantic import Field
 
+from rig.data.budget_entries import BudgetEntry
 from rig.data.checked import read_document
 from rig.data.result_types import Entry, ErrorEntry, Matrix3, Matrix6, PositiveVector3, Vector3
 
@@ -71,7 +72,8 @@ class MagnetometerEntry(Entry):
       shows it. Runs with the sensor turned over tell them apart (`rig reversal`).
     - `extension_m` is where it sits on the flange, `uniformity` whether the field was the same in all attitudes,
       `drift` whether it stayed the same, null where it was not tested.
-    - `covariance` is that of scale and bias; `field_t` what the scale factors are relative to.
+    - `covariance` is that of scale and bias by the solution alone, `covariance_combined` all of it, of which `budget`
+      says what makes it up; null in results of before there was one. `field_t` is what the scale is relative to.
     - `field_base_t` is the field in the arm's base frame, `attitude_error_rad` how far the arm's attitudes are off
       about each axis, by the readings' own account.
     - `correction_matrix` is M of B = M (m − b), in the right-angled frame nearest to the magnetometer's own axes.
@@ -105,6 +107,8 @@ class MagnetometerEntry(Entry):
     correction_matrix: Matrix3
     beside: dict[str, FieldSolutionEntry | ErrorEntry]
     warnings: tuple[str, ...]
+    covariance_combined: Matrix6 | None = None
+    budget: BudgetEntry | None = None
 
 
 class AsMountedEntry(Entry):

@@ -81,7 +81,8 @@ class Site:
     """Where the arm stands, in its base frame: `up` (unit vector), gravity, the Earth's rate where it is known.
 
     Of the magnetic field its size is known or nothing, and whether it rises from the ground. The latitude may be known
-    where the Earth's rate is not, for want of a heading.
+    where the Earth's rate is not, for want of a heading. `…_expanded_…` are expanded uncertainties (k = 2), None where
+    nobody stated any.
     """
 
     up: Vector3
@@ -90,6 +91,8 @@ class Site:
     magnetic_field_t: Positive | None = None
     magnetic_field_upwards: bool = False
     latitude_rad: Annotated[float, Field(ge=-np.pi / 2, le=np.pi / 2)] | None = None
+    gravity_expanded_m_s2: Positive | None = None
+    magnetic_field_expanded_t: Positive | None = None
 
     @property
     def down_m_s2(self) -> NDArray[np.float64]:
@@ -113,6 +116,7 @@ class Uncertainty:
     g_sensitivity_deg_s_g: dict[str, Annotated[float, Field(ge=0)]]
     decision_rule: DecisionRule
     repeatability_deg: Annotated[float, Field(ge=0)] = 0.0  # unknown to recordings of before
+    acceleration_lag_ms: Annotated[float, Field(ge=0)] = 5.0
 
 
 @dataclass(frozen=True, slots=True)
@@ -246,9 +250,20 @@ def _site(section: "SiteSection") -> Site:
         north = np.cos(heading) * ahead + np.sin(heading) * np.cross(up, ahead)
         x, y, z = (EARTH_RATE_RAD_S * (np.cos(latitude) * north + np.sin(latitude) * up)).tolist()
         earth_rate = x, y, z
-    field_t = None if section.magnetic_field_ut is None else section.magnetic_field_ut / 1e6
-    latitude_rad = None if section.latitude_deg is None else float(np.radians(section.latitude_deg))
-    return Site(section.up, section.gravity_m_s2, earth_rate, field_t, section.magnetic_field_upwards, latitude_rad)
+    return Site(
+        up=section.up,
+        gravity_m_s2=section.gravity_m_s2,
+        earth_rate_rad_s=earth_rate,
+        magnetic_field_t=_tesla(section.magnetic_field_ut),
+        magnetic_field_upwards=section.magnetic_field_upwards,
+        latitude_rad=None if section.latitude_deg is None else float(np.radians(section.latitude_deg)),
+        gravity_expanded_m_s2=section.gravity_uncertainty_m_s2,
+        magnetic_field_expanded_t=_tesla(section.magnetic_field_uncertainty_ut),
+    )
+
+
+def _tesla(microtesla: float | None) -> float | None:
+    return None if microtesla is None else microtesla / 1e6
 
 
 def _uncertainty(config: "RigConfig") -> Uncertainty:

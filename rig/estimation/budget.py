@@ -22,9 +22,9 @@ COVERAGE_FACTOR = 2.0
 class Contributor:
     """One line of the budget.
 
-    `kind` is the type of evaluation (JCGM 100, 4.2 and 4.3), `half_width` in `unit` what it was assumed to be, None
-    where it was found from the recording; `freedom` the degrees of freedom, infinite where it is known.
-    `covariance` (6, 6): kx ky kz bx by bz.
+    `kind` is the type of evaluation (JCGM 100, 4.2 and 4.3), `half_width` in `unit` what it was assumed to be: of a
+    normal distribution the expanded uncertainty (k = 2) that was stated; None where it was found from the recording.
+    `freedom` are the degrees of freedom, infinite where it is known. `covariance` (6, 6): kx ky kz bx by bz.
     """
 
     name: str
@@ -59,6 +59,11 @@ class Budget:
     def std(self) -> Array:
         """(6,) combined standard uncertainties."""
         std: Array = np.sqrt(np.diag(self.covariance))
+        return std
+
+    def of(self, name: str) -> Array:
+        """(6,) standard uncertainties by one contributor."""
+        std: Array = next(each.std for each in self.contributors if each.name == name)
         return std
 
     @property

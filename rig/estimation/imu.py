@@ -45,8 +45,10 @@ class ImuSolution:
     - `lever_arm_m` r (3,) in the flange's frame and `delay_s` τ, None without sweeps; `second_order_s2_m` φ (3,) or
       None.
     - `covariance` (22, 22): the rows of F, v_ref, b, r, τ, φ (`rig.estimation.felt`); zero for what was held.
+      `response` (22, 3 K): how they change with the readings.
     - `attitude_error`: δ of the arm, about each axis.
-    - `dwell_residuals_m_s2` (N, 3), `sweep_residuals_m_s2` (M, 3, 3): reading less model.
+    - `dwell_residuals_m_s2` (N, 3), `sweep_residuals_m_s2` (M, 3, 3): reading less model; `chi_square` of them, which
+      left `freedom`.
     - `rank`, `condition`: of the readings' derivatives, each column in its own size.
     """
 
@@ -57,9 +59,12 @@ class ImuSolution:
     delay_s: float | None
     second_order_s2_m: Array | None
     covariance: Array
+    response: Array
     attitude_error: AttitudeError
     dwell_residuals_m_s2: Array
     sweep_residuals_m_s2: Array
+    chi_square: float
+    freedom: int
     rank: int
     condition: float
     iterations: int
@@ -79,10 +84,19 @@ class Fit:
 
     def covariance(self) -> Array:
         """(22, 22) by the Fisher information."""
+        return np.asarray(self.free @ self._inverse() @ self.free.T, dtype=np.float64)
+
+    def response(self) -> Array:
+        """(22, 3 K): how θ changes with the readings."""
+        white = self.readings.white(self.std_rad)
+        return np.asarray(self.free @ self._inverse() @ (white @ self.jacobian).T @ white, dtype=np.float64)
+
+    def _inverse(self) -> Array:
+        """(q, q) of the Fisher information."""
         weighted = self.readings.white(self.std_rad) @ self.jacobian
         size = np.linalg.norm(weighted, axis=0)
-        inverse = np.linalg.inv((weighted / size).T @ (weighted / size)) / np.outer(size, size)
-        return np.asarray(self.free @ inverse @ self.free.T, dtype=np.float64)
+        inverse: Array = np.linalg.inv((weighted / size).T @ (weighted / size)) / np.outer(size, size)
+        return inverse
 
 
 def solve_imu(
@@ -125,7 +139,7 @@ def solve_imu(
     refusals.check_handedness(f)
     residuals = movement.readings() - predicted(fit.theta, movement)
     white = fit.readings.white(fit.std_rad) @ residuals.ravel()
-    count, swept = len(dwells.readings_m_s2), len(sweeps.speeds_rad_s) > 0
+    count, swept, freedom = len(dwells.readings_m_s2), len(sweeps.speeds_rad_s) > 0, len(white) - needed
     return ImuSolution(
         matrix=f,
         bias_m_s2=fit.theta[BIAS],
@@ -134,15 +148,18 @@ def solve_imu(
         delay_s=float(fit.theta[DELAY]) if swept else None,
         second_order_s2_m=fit.theta[SECOND] if second_order else None,
         covariance=covariance,
+        response=fit.response(),
         attitude_error=with_uncertainty(fit.readings, fit.std_rad, fit.jacobian)
         if attitude_std_rad is None
         else AttitudeError(attitude_std_rad, 0.0),
         dwell_residuals_m_s2=residuals[:count],
         sweep_residuals_m_s2=residuals[count:].reshape(-1, 3, 3),
+        chi_square=float(white @ white),
+        freedom=freedom,
         rank=told.rank,
         condition=told.condition,
         iterations=fit.iterations,
-        warnings=refusals.inconsistency(white, np.ones_like(white), len(white) - needed),
+        warnings=refusals.inconsistency(white, np.ones_like(white), freedom),
     )
 
 

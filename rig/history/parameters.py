@@ -122,7 +122,7 @@ def _accelerometer(name: str, entry: AccelerometerEntry, document: ResultDocumen
     values = (*entry.scale, *entry.bias_m_s2)
     limits = _limits(name, "acceleration", document)
     parameters = [
-        *_scale_and_bias(values, entry.covariance, None, "acceleration", limits),
+        *_scale_and_bias(values, entry.covariance, entry.covariance_combined, "acceleration", limits),
         *_angles(entry.non_orthogonality_rad, entry.non_orthogonality_std_rad),
     ]
     return Calibrated(
@@ -138,8 +138,9 @@ def _accelerometer(name: str, entry: AccelerometerEntry, document: ResultDocumen
 
 
 def _magnetometer(name: str, entry: MagnetometerEntry) -> Calibrated:
+    values = (*entry.scale, *entry.bias_t)
     parameters = [
-        *_scale_and_bias((*entry.scale, *entry.bias_t), entry.covariance, None, "field", (None, None)),
+        *_scale_and_bias(values, entry.covariance, entry.covariance_combined, "field", (None, None)),
         *_angles(entry.non_orthogonality_rad, entry.non_orthogonality_std_rad),
     ]
     return Calibrated(

@@ -88,8 +88,9 @@ def parameter_rows(result: ResultDocument) -> list[Row]:
         std = np.sqrt(np.diag(combined or sensor.covariance))
         rows.append(_row(name, "rad/s", sensor.scale, sensor.bias_rad_s, std, of=COMBINED if combined else NOISE_ONLY))
     for name, found in result.accelerometers.items():
-        std = np.sqrt(np.diag(found.covariance))
-        rows.append(_row(accelerometer(name), "m/s²", found.scale, found.bias_m_s2, std, of=NOISE_ONLY))
+        of = COMBINED if found.covariance_combined else NOISE_ONLY
+        std = np.sqrt(np.diag(found.covariance_combined or found.covariance))
+        rows.append(_row(accelerometer(name), "m/s²", found.scale, found.bias_m_s2, std, of=of))
     return rows
 
 

@@ -17,6 +17,7 @@ from rig.estimation.imu import MODEL
 from rig.estimation.triads import Alignment
 from rig.estimation.triaxial import TriaxialSolution
 from rig.report.axes import PARAMETERS, dwell_entry
+from rig.report.budget_entry import budget_entry
 from rig.report.entry import entry
 
 UNITS = ("1", "1", "1", "m/s²", "m/s²", "m/s²")
@@ -31,6 +32,8 @@ def accelerometer_entry(result: AccelerometerResult) -> AccelerometerEntry:
         role="calibrate",
         model=MODEL,
         estimator="attitude_weighted",
+        covariance_combined=None if result.budget is None else result.budget.covariance,
+        budget=None if result.budget is None else budget_entry(result.budget),
         covariance_order=PARAMETERS,
         covariance_units=UNITS,
         second_order_std_s2_m=None if solution.second_order_s2_m is None else std[SECOND],

@@ -6,20 +6,22 @@ import numpy as np
 from rich.table import Table
 
 from rig.data.accelerometer_entries import AccelerometerEntry
+from rig.data.budget_entries import expanded_uncertainties
 from rig.data.result_types import ErrorEntry
 from rig.report.axes import axes_table, triple
 
 
 def accelerometer_table(name: str, found: AccelerometerEntry) -> Table:
-    """Scale and bias of each axis, ± 2σ."""
+    """Scale and bias of each axis, ± U (k = 2)."""
     model = "a = F s + b" if found.second_order_s2_m is None else "a = F (s + φ s²) + b"
     title = f"{name}, accelerometer: {found.part} {found.serial_number}, {model}, {found.estimator}"
-    return axes_table(title, found.scale, found.bias_m_s2, found.covariance, unit="m/s²", digits=5)
+    expanded, known = expanded_uncertainties(found.budget, found.covariance), found.budget is not None
+    return axes_table(title, found.scale, found.bias_m_s2, expanded, unit="m/s²", digits=5, known=known)
 
 
 def accelerometer_lines(found: AccelerometerEntry) -> Iterator[str]:
     """What stands below the table."""
-    yield f"relative to gravity, {found.gravity_m_s2:g} m/s²; {len(found.dwells)} attitudes, {found.sweeps} sweeps"
+    yield f"relative to gravity, {found.gravity_m_s2:.6g} m/s²; {len(found.dwells)} attitudes, {found.sweeps} sweeps"
     skew, std = np.degrees(found.non_orthogonality_rad), np.degrees(found.non_orthogonality_std_rad)
     yield f"non-orthogonality yz zx xy: {triple(skew, '+.4f')} ° (± {2 * std.max():.4f})"
     off, known = 1e3 * found.attitude_error_rad, 2e3 * found.attitude_error_std_rad

@@ -23,19 +23,23 @@ def axes_table(
     title: str,
     scale: Sequence[float],
     bias: Sequence[float],
-    covariance: Sequence[Sequence[float]],
+    expanded: Sequence[float],
     *,
     unit: str,
     digits: int,
+    known: bool,
 ) -> Table:
-    """Scale factor and bias of each axis, ± 2σ; bias and the `covariance` (6, 6) of both are in `unit` of the bias."""
+    """Scale factor and bias of each axis, ± twice their standard uncertainties (6,); bias and its own in `unit`.
+
+    `known` where all that is known is in these, and not the solution's spread alone.
+    """
     table = Table(title=plain(title, "table.title"), title_justify="left")
-    for heading in ("axis", "scale factor", "± 2σ", f"bias {unit}", f"± 2σ {unit}"):
+    spread = "± U" if known else "± 2σ"
+    for heading in ("axis", "scale factor", spread, f"bias {unit}", f"{spread} {unit}"):
         table.add_column(heading, justify="left" if heading == "axis" else "right")
-    twice = 2 * np.sqrt(np.diag(np.array(covariance)))
     for i, axis in enumerate("xyz"):
         table.add_row(
-            axis, f"{scale[i]:.6f}", f"{twice[i]:.6f}", f"{bias[i]:+.{digits}f}", f"{twice[3 + i]:.{digits}f}"
+            axis, f"{scale[i]:.6f}", f"{expanded[i]:.6f}", f"{bias[i]:+.{digits}f}", f"{expanded[3 + i]:.{digits}f}"
         )
     return table
 

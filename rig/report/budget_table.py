@@ -8,11 +8,14 @@ from rig.station.plain_text import plain
 NEGLIGIBLE = 0.001  # of every variance: such lines are in result.json alone
 
 
-def budget_table(budget: BudgetEntry) -> Table:
-    """What matters of the budget: the standard uncertainty of the axis it matters most to, and its share there."""
+def budget_table(budget: BudgetEntry, unit: str = "rad/s", per_unit: float = 1.0) -> Table:
+    """What matters of the budget: the standard uncertainty of the axis it matters most to, and its share there.
+
+    That of the biases times `per_unit`, in `unit`.
+    """
     coverage = f"U = {budget.coverage_factor:g} × the combined standard uncertainty, about 95 %"
     table = Table(title="uncertainty budget", title_justify="left", caption=coverage, caption_justify="left")
-    for heading in ("contributor", "type", "scale u", "share", "bias u rad/s", "share"):
+    for heading in ("contributor", "type", "scale u", "share", f"bias u {unit}", "share"):
         table.add_column(heading, justify="left" if heading in ("contributor", "type") else "right")
     for line in sorted(budget.contributors, key=lambda each: -max(each.share)):
         if max(line.share) < NEGLIGIBLE:
@@ -23,7 +26,7 @@ def budget_table(budget: BudgetEntry) -> Table:
             line.kind,
             f"{max(line.std[:3]):.1e}",
             f"{100 * max(line.share[:3]):.0f} %",
-            f"{max(line.std[3:]):.1e}",
+            f"{per_unit * max(line.std[3:]):.1e}",
             f"{100 * max(line.share[3:]):.0f} %",
         )
     return table

@@ -14,6 +14,7 @@ from rig.data.result_types import ErrorEntry
 from rig.errors import Fault
 from rig.estimation.magnetometer import MODEL, MagnetometerSolution
 from rig.report.axes import PARAMETERS, dwell_entry
+from rig.report.budget_entry import budget_entry
 from rig.report.entry import entry
 
 UNITS = ("1", "1", "1", "T", "T", "T")
@@ -29,6 +30,8 @@ def magnetometer_entry(result: MagnetometerResult | Fault) -> MagnetometerEntry 
         MagnetometerEntry, result, result.sensor, solution, solution.fit,
         model=MODEL,
         estimator=ESTIMATOR,
+        covariance_combined=result.budget.covariance,
+        budget=budget_entry(result.budget),
         covariance_order=PARAMETERS,
         covariance_units=UNITS,
         arm_field_in_bias=True,

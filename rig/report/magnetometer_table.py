@@ -5,6 +5,7 @@ from collections.abc import Iterator
 import numpy as np
 from rich.table import Table
 
+from rig.data.budget_entries import expanded_uncertainties
 from rig.data.magnetometer_entries import MagnetometerEntry
 from rig.data.result_types import ErrorEntry
 from rig.report.axes import axes_table, triple
@@ -14,13 +15,12 @@ FAR_ENOUGH_M = 0.3  # from the flange: a housing of 0.2 A m² is 0.4 to 1.2 µT 
 
 
 def magnetometer_table(name: str, found: MagnetometerEntry) -> Table:
-    """Scale and bias of each axis, ± 2σ."""
+    """Scale and bias of each axis, ± U (k = 2)."""
     title = f"{name}, magnetometer as mounted: {found.part} {found.serial_number}, {found.model}, {found.estimator}"
     per_unit = np.array([1, 1, 1, MICROTESLA, MICROTESLA, MICROTESLA])
-    covariance = np.array(found.covariance) * np.outer(per_unit, per_unit)
-    return axes_table(
-        title, found.scale, np.multiply(MICROTESLA, found.bias_t).tolist(), covariance.tolist(), unit="µT", digits=3
-    )
+    expanded = (expanded_uncertainties(found.budget, found.covariance) * per_unit).tolist()
+    bias, known = (MICROTESLA * np.array(found.bias_t)).tolist(), found.budget is not None
+    return axes_table(title, found.scale, bias, expanded, unit="µT", digits=3, known=known)
 
 
 def magnetometer_lines(found: MagnetometerEntry) -> Iterator[str]:

@@ -27,9 +27,9 @@ def print_reversal(document: ReversalDocument, *, as_json: bool) -> None:
     console = Console(highlight=False)
     for name, found in document.magnetometers.items():
         title = f"{name}, magnetometer turned over: {found.part} {found.serial_number}, {len(found.runs)} runs"
-        covariance = np.diag(np.square([*found.scale_std, *np.multiply(MICROTESLA, found.bias_std_t)]))
+        expanded = [2 * std for std in (*found.scale_std, *np.multiply(MICROTESLA, found.bias_std_t).tolist())]
         bias = np.multiply(MICROTESLA, found.bias_t).tolist()
-        console.print(axes_table(title, found.scale, bias, covariance.tolist(), unit="µT", digits=3))
+        console.print(axes_table(title, found.scale, bias, expanded, unit="µT", digits=3, known=True))
         for line in _lines(found):
             console.print(plain(line))
 

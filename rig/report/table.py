@@ -15,7 +15,7 @@ from rig.report.axes import triple
 from rig.report.budget_table import budget_table
 from rig.report.drift_table import print_drifts
 from rig.report.earth_rate import earth_rate_lines
-from rig.report.magnetometer_table import magnetometer_lines, magnetometer_table
+from rig.report.magnetometer_table import MICROTESLA, magnetometer_lines, magnetometer_table
 from rig.report.verification_table import verification_lines, verification_table
 from rig.station.plain_text import plain
 
@@ -53,6 +53,8 @@ def print_result(result: ResultDocument, console: Console) -> None:
             console.print(plain(line))
     for name, accelerometer in result.accelerometers.items():
         console.print(accelerometer_table(name, accelerometer))
+        if accelerometer.budget is not None:
+            console.print(budget_table(accelerometer.budget, "m/s²"))
         for line in accelerometer_lines(accelerometer):
             console.print(plain(line))
     for name, magnetometer in result.magnetometers.items():
@@ -60,6 +62,8 @@ def print_result(result: ResultDocument, console: Console) -> None:
             console.print(plain(f"{name}, magnetometer, not calibrated: {magnetometer.error}"))
             continue
         console.print(magnetometer_table(name, magnetometer))
+        if magnetometer.budget is not None:
+            console.print(budget_table(magnetometer.budget, "µT", MICROTESLA))
         for line in magnetometer_lines(magnetometer):
             console.print(plain(line))
     print_drifts(result.bias_drift, console)

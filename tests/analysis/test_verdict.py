@@ -89,6 +89,11 @@ def test_nothing_measured_is_not_a_pass() -> None:
     assert verdict(judge({}, LIMITS)) == "fail"
 
 
+def _line(name: str, scale: float, bias: float) -> Contributor:
+    """Of a budget, by its standard uncertainties."""
+    return Contributor(name, "A", "normal", None, "", "", np.inf, np.diag(np.square([scale] * 3 + [bias] * 3)))
+
+
 @pytest.mark.parametrize(("rule", "passes"), [("simple", True), ("guard_band", False)])
 def test_accelerometers_and_drifts_are_held_against_their_limits_with_their_uncertainty(
     rule: DecisionRule, passes: bool
@@ -104,7 +109,8 @@ def test_accelerometers_and_drifts_are_held_against_their_limits_with_their_unce
     found = SimpleNamespace(
         scale=np.array([1.0, 0.981, 1.0]),
         bias_m_s2=np.array([0.1, 0.0, -0.495]),
-        covariance=np.diag(np.square([7e-4] * 3 + [4e-3] * 3)),
+        covariance=np.diag(np.square([6e-4] * 3 + [3e-3] * 3)),
+        budget=Budget((_line("noise", 6e-4, 3e-3), _line("gravity", 13**0.5 * 1e-4, 7**0.5 * 1e-3))),
         held_out=None,
     )
     checks = {each.name: each for each in acceleration_checks("a", cast(AccelerometerResult, found), limits, rule)}

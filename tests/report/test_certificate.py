@@ -21,6 +21,7 @@ from rig.report.certificate.stated import Stated, of_configuration, stated_in
 from rig.report.certificate.tables import coverage_sentence
 from support.certified import (
     LABORATORY,
+    accelerometer,
     certificate,
     compared,
     everything,
@@ -200,27 +201,39 @@ def test_before_and_after_of_a_verified_run_are_as_found_and_as_left() -> None:
     assert "Reference reference, serial number" in page.under["7.8.2.1p"]
 
 
-def test_an_accelerometer_stands_there_with_its_uncertainty_and_what_is_not_in_it() -> None:
+def test_an_accelerometer_stands_there_with_its_uncertainty_and_its_budget() -> None:
     document = with_accelerometer()
     page = read(certificate(compared(document)))
-    assert "1.01235 ± 0.00020" in page.text  # two standard deviations of 1e-4
-    assert "0.3000 ± 0.0020" in page.text
-    assert "No budget of further contributors was evaluated" in page.under["7.8.4.1a"]
-    assert "9.81 m/s² as exact" in page.under["7.8.4.1a"]
+    assert "1.01235 ± 0.00022" in page.text  # 1e-4 of noise, 0.5e-4 of gravity, k = 2
+    assert "0.3000 ± 0.0020" in page.text  # gravity's size leaves the bias alone
+    assert "gravity B normal ±0.000981 m/s² (k = 2) ∞ 5.1 × 10⁻⁵ 20.4 %" in page.text
+    assert "relative to the stated gravity of 9.81 m/s²" in page.text
+    assert "traceable through it" in page.under["7.8.4.1c"]
     assert (
         "9.81 m/s² by the laboratory's configuration, its origin: gravimeter, certificate 17" in page.under["7.8.4.1c"]
     )
     silent = read(certificate(document, Stated()))
     assert "9.81 m/s² by the laboratory's configuration, its origin: not stated" in silent.under["7.8.4.1c"]
     alone = read(certificate(document.model_copy(update={"sensors": {}})))
-    assert "1.01235 ± 0.00020" in alone.text
+    assert "1.01235 ± 0.00022" in alone.text
+
+
+def test_without_a_budget_it_is_no_certificate_and_without_an_uncertainty_of_gravity_not_traceable() -> None:
+    """Of results of before, and of a field that nobody has said the uncertainty of."""
+    earlier = accelerometer().model_copy(update={"budget": None, "covariance_combined": None})
+    page = read(certificate(with_accelerometer(earlier)))
+    assert "Calibration record" in page.text and "Not a certificate: the uncertainty is not known" in page.text
+    assert "1.01235 ± 0.00020" in page.text and "not all of the uncertainty" in page.text
+    assumed = read(certificate(compared(everything())))  # its field's size is taken to be good to 1 %
+    field = assumed.under["7.8.4.1c"].split("The size of the magnetic field")[1]
+    assert "no metrological traceability is claimed" in field
 
 
 def test_a_magnetometer_is_certified_as_mounted_or_as_turned_over() -> None:
     document = everything()
     mounted = read(certificate(document))
     assert "Magnetometer LSM9DS1, serial number COMPASS-7, as mounted" in mounted.text
-    assert "1.02992 ± 0.00040" in mounted.text and "−34.004 ± 0.010" in mounted.text  # two standard deviations, µT
+    assert "1.030 ± 0.012" in mounted.text and "−34.004 ± 0.010" in mounted.text  # 1 % of the field is in k
     assert "which no residual of this measurement shows" in mounted.under["7.8.4.1a"]
     assert "48 µT by the laboratory's configuration, its origin: fluxgate, certificate 18" in mounted.under["7.8.4.1c"]
     turned = certificate(document, reversals={"compass": reversal(document)})

@@ -126,7 +126,8 @@ def test_a_magnetometer_s_covariance_is_the_result_s_as_mounted_and_turned_over(
     results = measured(of_everything(), "calibration of magnetometer compass")
     values, covariance = read_back(results["scale factors and biases, as mounted with their covariance"], 6)
     assert values == [*entry.scale, *entry.bias_t]
-    np.testing.assert_allclose(covariance, np.array(entry.covariance), rtol=1e-9)
+    combined = np.array(entry.covariance_combined)
+    np.testing.assert_allclose(covariance, combined, rtol=1e-9)
     assert len({*np.array(entry.covariance).ravel()}) > 4  # and not a diagonal that anything would pass for
     own = next(each for name, each in results.items() if name.startswith("own bias and the arm's field"))
     values, covariance = read_back(own, 6)
@@ -136,7 +137,7 @@ def test_a_magnetometer_s_covariance_is_the_result_s_as_mounted_and_turned_over(
     assert units == {r"\tesla\tothe{2}"}
     widths = results["bias, as mounted"].find(".//si:uncertaintyXMLList", NAMES)
     assert widths is not None
-    np.testing.assert_allclose(numbers(widths), 2 * np.sqrt(np.diag(entry.covariance))[3:], rtol=1e-9)
+    np.testing.assert_allclose(numbers(widths), 2 * np.sqrt(np.diag(combined))[3:], rtol=1e-9)
     mounted = of_everything(turned=False).decode()
     assert "own bias" not in mounted and "the field of the arm is in the bias" in mounted
 
@@ -227,7 +228,8 @@ def test_it_says_whether_it_is_traceable_and_that_a_simulated_one_is_not_valid()
     assert [each.text for each in found(real, "dcc:traceable")] == ["true"]
     assert found(real, "dcc:valid") == []
     both = digital_certificate(certificate(compared(with_accelerometer())))
-    assert [each.text for each in found(both, "dcc:traceable")] == ["true", "false"]  # gravity has no chain
+    assert [each.text for each in found(both, "dcc:traceable")] == ["true", "true"]  # time's, and gravity's
+    assert [each.text for each in found(of_everything(), "dcc:traceable")] == ["true", "true", "false"]
     simulated = digital_certificate(certificate(compared(result()), SIMULATED))
     assert [each.text for each in found(simulated, "dcc:traceable")] == ["false"]
     assert [each.text for each in found(simulated, "dcc:valid")] == ["false"]

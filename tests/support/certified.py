@@ -6,7 +6,7 @@ from dataclasses import dataclass, field
 from datetime import date
 from html.parser import HTMLParser
 from types import MappingProxyType
-from typing import Any
+from typing import Any, TypeVar
 
 import numpy as np
 
@@ -20,6 +20,9 @@ from rig.data.earth_rate_entries import EarthRateEntry
 from rig.data.magnetometer_entries import MagnetometerEntry, ReversalEntry
 from rig.data.result_file import ResultDocument, VectorEntry
 from rig.data.result_types import Matrix3, Vector3
+from rig.estimation.attitude_error import AttitudeError
+from rig.estimation.reference_budget import KnownSize, Spread, reference_budget
+from rig.report.budget_entry import budget_entry
 from rig.report.certificate.content import Certificate, certificate_of
 from rig.report.certificate.page import certificate_page
 from rig.report.certificate.stated import Stated
@@ -28,6 +31,7 @@ from support.synthetic_run import Setup, synthetic_run
 
 CELLS = {"td", "th", "p", "div", "dd", "dt", "li", "h1", "h2", "h3", "caption"}
 VOID = {"meta", "br", "link", "img", "input", "hr", "base", "embed", "source"}
+EntryT = TypeVar("EntryT", AccelerometerEntry, MagnetometerEntry)
 IDENTITY: Matrix3 = ((1.0, 0.0, 0.0), (0.0, 1.0, 0.0), (0.0, 0.0, 1.0))
 LABORATORY = Stated(
     SiteSection(
@@ -69,7 +73,7 @@ def accelerometer(
     covariance = tuple(tuple(1e-8 * (i == j) * (1 if i < 3 else 100) for j in range(6)) for i in range(6))
     dwell = {"index": 0, "name": "x up", "attitude": IDENTITY, "mean_m_s2": none, "mean_std_m_s2": none}
     dwell |= {"noise_m_s2": (0.01, 0.02, 0.01), "residual_m_s2": none, "samples": 600, "duration_s": 3.0}
-    return AccelerometerEntry.model_validate(
+    found = AccelerometerEntry.model_validate(
         {
             "part": "lsm9ds1",
             "serial_number": "LSM9DS1-001",
@@ -102,6 +106,19 @@ def accelerometer(
             "warnings": (),
         }
     )
+    return _budgeted(found, KnownSize("gravity", 1e-4, True, 9.81, "m/s²", "site.gravity_uncertainty_m_s2"))
+
+
+def _budgeted(found: EntryT, size: KnownSize) -> EntryT:
+    """The same with a budget of its noise and of how well the reference's size is known."""
+    noise = np.linalg.cholesky(np.array(found.covariance))
+    exact = AttitudeError(0.0, 0.0)
+    spread = Spread(
+        np.array(found.scale), np.array(found.covariance), noise, np.eye(6), exact, chi_square=0.0, freedom=0
+    )
+    budget = reference_budget(spread, size)
+    combined = tuple(map(tuple, budget.covariance.tolist()))
+    return found.model_copy(update={"covariance_combined": combined, "budget": budget_entry(budget)})
 
 
 def with_accelerometer(found: AccelerometerEntry | None = None) -> ResultDocument:
@@ -118,7 +135,7 @@ def magnetometer() -> MagnetometerEntry:
     dwell |= {"noise_t": (3e-7, 3e-7, 3e-7), "residual_t": (1e-8, -3e-8, 0.0), "samples": 160, "duration_s": 2.0}
     test = {"change_t": (1e-8, 0.0, 0.0), "std_t": (2e-8, 2e-8, 2e-8), "chi_square": 1.0, "limit": 16.0}
     alike = {"chi_square": 70.0, "degrees_of_freedom": 64, "limit": 104.0, "attitude_error_rad": 2e-4}
-    return MagnetometerEntry.model_validate(
+    found = MagnetometerEntry.model_validate(
         {
             "part": "lsm9ds1_magnetometer",
             "serial_number": "COMPASS-7",
@@ -149,6 +166,7 @@ def magnetometer() -> MagnetometerEntry:
             "warnings": (),
         }
     )
+    return _budgeted(found, KnownSize("size of the field", 0.01, False, 48.0, "µT", "not given"))
 
 
 def reversal(document: ResultDocument) -> ReversalEntry:

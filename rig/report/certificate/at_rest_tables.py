@@ -7,6 +7,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from rig.data.accelerometer_entries import AccelerometerEntry
+from rig.data.budget_entries import expanded_uncertainties
 from rig.data.drift_entries import DriftEntry
 from rig.data.magnetometer_entries import MagnetometerEntry, ReversalEntry
 from rig.data.result_types import ErrorEntry
@@ -48,8 +49,8 @@ class DriftRow:
 
 
 def acceleration_rows(found: AccelerometerEntry) -> list[AxisRow]:
-    """Two standard deviations of the solution's; the bias in m/s² and in thousandths of the stated gravity."""
-    spread, milli = expanded(found.covariance), 1000 / found.gravity_m_s2
+    """± U; the bias in m/s² and in thousandths of the stated gravity."""
+    spread, milli = expanded_uncertainties(found.budget, found.covariance), 1000 / found.gravity_m_s2
     return [
         AxisRow(
             axis,
@@ -70,8 +71,8 @@ def second_order_rows(found: AccelerometerEntry) -> list[tuple[str, Pair]]:
 
 
 def field_rows(found: MagnetometerEntry) -> list[FieldRow]:
-    """Two standard deviations of the solution's; the bias in µT."""
-    spread = expanded(found.covariance)
+    """± U; the bias in µT."""
+    spread = expanded_uncertainties(found.budget, found.covariance)
     return [
         FieldRow(axis, pair(found.scale[i], spread[i]), pair(MICRO * found.bias_t[i], MICRO * spread[3 + i]))
         for i, axis in enumerate(AXES)
@@ -107,11 +108,6 @@ def drift_rows(found: DriftEntry) -> list[DriftRow]:
         )
         for i, axis in enumerate(AXES)
     ]
-
-
-def expanded(covariance: Sequence[Sequence[float]]) -> list[float]:
-    """Two standard deviations of each parameter."""
-    return [2 * covariance[i][i] ** 0.5 for i in range(len(covariance))]
 
 
 def distance(vector: Sequence[float]) -> float:

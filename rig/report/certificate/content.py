@@ -2,12 +2,13 @@
 
 import hashlib
 import re
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from datetime import date, datetime
 from types import MappingProxyType
 
 from rig.data.accelerometer_entries import AccelerometerEntry
+from rig.data.budget_entries import BudgetEntry
 from rig.data.drift_entries import DriftEntry
 from rig.data.magnetometer_entries import MagnetometerEntry, ReversalEntry
 from rig.data.result_file import CheckEntry, ProvenanceEntry, ResultDocument, SensorEntry, VerificationEntry
@@ -56,6 +57,8 @@ class Certificate:
     conformity: tuple[CheckEntry, ...]
     fitness: tuple[CheckEntry, ...]
     traceable: bool
+    traceable_gravity: bool
+    traceable_field: bool
     deviations: tuple[str, ...]
     references: tuple[str, ...]
     reversals: Mapping[str, ReversalEntry]
@@ -88,6 +91,11 @@ class Certificate:
     def calibrates(self) -> bool:
         """Whether anything was calibrated, and not verified alone."""
         return bool(self.gyroscopes or self.accelerometers or self.magnetometers)
+
+    @property
+    def without_uncertainty(self) -> tuple[str, ...]:
+        """What was calibrated, and of whose uncertainty the solution's spread alone is known."""
+        return tuple(_without_uncertainty(self.result, self.gyroscopes))
 
     @property
     def guarded(self) -> bool:
@@ -124,6 +132,8 @@ def certificate_of(
         conformity=conformity,
         fitness=fitness,
         traceable=_traceable(result, stated),
+        traceable_gravity=_referred(result, stated, result.accelerometers.values(), stated.where.gravity_reference),
+        traceable_field=_referred(result, stated, result.magnetometers.values(), stated.where.magnetic_field_reference),
         deviations=tuple(_deviations(result)),
         references=tuple(_references(result)),
         reversals=reversals,
@@ -147,7 +157,16 @@ def _title(result: ResultDocument, gyroscopes: Sequence[Gyroscope]) -> str:
     found = any(isinstance(each, MagnetometerEntry) for each in result.magnetometers.values())
     if not gyroscopes and not result.accelerometers and not found:
         return "Verification report"
-    return "Calibration certificate" if all(each.has_uncertainty for each in gyroscopes) else "Calibration record"
+    return "Calibration record" if any(_without_uncertainty(result, gyroscopes)) else "Calibration certificate"
+
+
+def _without_uncertainty(result: ResultDocument, gyroscopes: Sequence[Gyroscope]) -> Iterator[str]:
+    """Of recordings of before there was a budget, and of estimators that tell of noise alone."""
+    yield from (each.name for each in gyroscopes if not each.has_uncertainty)
+    at_rest = {**result.accelerometers, **result.magnetometers}
+    for name, each in at_rest.items():
+        if not isinstance(each, ErrorEntry) and each.budget is None:
+            yield name
 
 
 def _check_same(result: ResultDocument, reversals: Mapping[str, ReversalEntry]) -> None:
@@ -168,20 +187,34 @@ def _marks(
 ) -> Iterator[str]:
     if is_simulated(result, stated):
         yield "Simulated laboratory: no real item was calibrated"
-    if not all(each.has_uncertainty for each in gyroscopes):
+    if any(_without_uncertainty(result, gyroscopes)):
         yield "Not a certificate: the uncertainty is not known"
     if not all(check.passed for check in fitness):
         yield "Not valid: the measurement failed its own checks"
 
 
 def _traceable(result: ResultDocument, stated: Stated) -> bool:
-    """Whether the unit of time, the only standard of a gyroscope's scale, hangs on a named reference.
-
-    Accelerometers never are: their gravity is stated without a chain of its own.
-    """
+    """Whether the unit of time, the only standard of a gyroscope's scale, hangs on a named reference."""
     compared = result.clock is not None and any(each.by == BY_COMPUTER for each in result.clock.comparisons)
     measured = bool(result.sensors) and not is_simulated(result, stated)
     return measured and compared and stated.where.time_reference is not None
+
+
+def _referred(
+    result: ResultDocument,
+    stated: Stated,
+    found: Iterable[AccelerometerEntry | MagnetometerEntry | ErrorEntry],
+    reference: str | None,
+) -> bool:
+    """Whether the size of gravity or of the field, their only standard, has an uncertainty and an origin."""
+    budgets = [each.budget for each in found if not isinstance(each, ErrorEntry)]
+    known = all(budget is not None and _size_stated(budget) for budget in budgets)
+    return known and reference is not None and not is_simulated(result, stated)
+
+
+def _size_stated(budget: BudgetEntry) -> bool:
+    """A stated uncertainty is that of a normal distribution, an assumed one a half-width."""
+    return any(line.kind == "B" and line.distribution == "normal" for line in budget.contributors)
 
 
 def _deviations(result: ResultDocument) -> Iterator[str]:

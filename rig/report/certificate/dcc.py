@@ -40,7 +40,7 @@ def digital_certificate(certificate: Certificate) -> bytes:
     """
     if not certificate.calibrates:
         raise Refused("no_digital_certificate", "the run calibrated nothing", "Give a run that calibrates")
-    unknown = ", ".join(each.name for each in certificate.gyroscopes if not each.has_uncertainty)
+    unknown = ", ".join(certificate.without_uncertainty)
     if unknown:
         raise Refused(
             "no_digital_certificate",
@@ -159,17 +159,21 @@ def _statements(c: Certificate) -> Iterator[Element]:
         yield _chain("gyroscopes", f"{chain} Angles are whole turns, 2π by closure of the circle.", c.traceable)
     if c.accelerometers:
         origin = c.stated.where.gravity_reference or "not stated"
-        said = f"Gravity is stated by the laboratory without a chain of its own, its origin: {origin}."
-        yield _chain("accelerometers", said, False)
+        said = f"Gravity is stated by the laboratory, its origin: {origin}. {_claimed(c.traceable_gravity)}"
+        yield _chain("accelerometers", said, c.traceable_gravity)
     if c.magnetometers:
         origin = c.stated.where.magnetic_field_reference or "not stated"
-        said = f"The size of the magnetic field is stated without a chain of its own, its origin: {origin}."
-        yield _chain("magnetometers", said, False)
+        said = f"The size of the field is stated by the laboratory, its origin: {origin}. {_claimed(c.traceable_field)}"
+        yield _chain("magnetometers", said, c.traceable_field)
     relates = "The results relate only to the items calibrated. Not issued under an accreditation."
     yield dcc("statement", text("name", "scope"), text("declaration", " ".join([relates, *c.deviations])))
     rule = "guard band w = U (ILAC-G8:09/2019, 4.2.2)" if c.guarded else "simple acceptance (ILAC-G8:09/2019, 4.2.1)"
     for check in c.conformity:
         yield _conformity(check, rule)
+
+
+def _claimed(traceable: bool) -> str:
+    return "Its uncertainty was stated too." if traceable else "No metrological traceability is claimed."
 
 
 def _chain(of: str, said: str, traceable: bool) -> Element:

@@ -9,7 +9,6 @@ from rig.data.earth_rate_entries import EarthRateEntry
 from rig.data.magnetometer_entries import MagnetometerEntry, ReversalEntry
 from rig.data.result_file import VectorEntry, VerificationEntry
 from rig.data.result_types import ErrorEntry
-from rig.report.certificate.at_rest_tables import expanded
 from rig.report.certificate.content import Gyroscope
 from rig.report.certificate.tables import ANGLES, AXES, JOINT_FACTOR, coverage_sentence
 from rig.report.certificate.xml_parts import dcc, real_list, text
@@ -43,28 +42,20 @@ def gyroscope(each: Gyroscope) -> Iterator[Element]:
 
 
 def accelerometer(found: AccelerometerEntry) -> Iterator[Element]:
-    """Of the solution, relative to the stated gravity."""
-    said = (
-        f"{found.model}: specific force s, reading a, k = 1/‖row of F‖. The uncertainty is that of noise and of the "
-        f"arm's attitudes, k = 2; gravity, {found.gravity_m_s2!r} m/s², is taken as exact, and no further contributor "
-        "was evaluated."
-    )
-    yield from _relative([*found.scale, *found.bias_m_s2], found.covariance, ACCELERATION, said)
+    """Relative to the stated gravity, with U of the budget and the combined covariance."""
+    said = f"{found.model}: specific force s, reading a, k = 1/‖row of F‖, gravity {found.gravity_m_s2!r} m/s²."
+    yield from _relative(found, [*found.scale, *found.bias_m_s2], ACCELERATION, said)
     yield _skew(found.non_orthogonality_rad, found.non_orthogonality_std_rad)
     if found.second_order_s2_m is not None and found.second_order_std_s2_m is not None:
         yield _spread("second order", SOLUTION, AXES, (found.second_order_s2_m, found.second_order_std_s2_m), PER_FORCE)
 
 
 def magnetometer(found: MagnetometerEntry) -> Iterator[Element]:
-    """Of the solution, relative to the stated field, as mounted."""
-    said = (
-        f"{found.model}: magnetic flux density B, reading m, k = 1/‖row of F‖. The uncertainty is that of noise and of "
-        f"the arm's attitudes, k = 2; the size of the field, {found.field_t!r} T, is taken as exact, and no further "
-        "contributor was evaluated. "
-    )
+    """Relative to the stated field, as mounted, with U of the budget and the combined covariance."""
+    said = f"{found.model}: magnetic flux density B, reading m, k = 1/‖row of F‖, for a field of {found.field_t!r} T."
     if found.arm_field_in_bias:
-        said += "As mounted in this run: the field of the arm is in the bias, and the uncertainty does not cover it."
-    yield from _relative([*found.scale, *found.bias_t], found.covariance, FIELD, said, ", as mounted")
+        said += " As mounted in this run: the field of the arm is in the bias, and the uncertainty does not cover it."
+    yield from _relative(found, [*found.scale, *found.bias_t], FIELD, said, ", as mounted")
     yield _skew(found.non_orthogonality_rad, found.non_orthogonality_std_rad)
 
 
@@ -72,7 +63,7 @@ def reversed_magnetometer(found: ReversalEntry) -> Iterator[Element]:
     """Its own bias and the arm's field, with the covariance of both."""
     mixed = [axis for axis, held in zip(AXES, found.arm_field_in_bias, strict=True) if held]
     began = ", ".join(run.started_utc for run in found.runs)
-    said = f"From runs of {began}, between which it was turned over. {SOLUTION}"
+    said = f"From runs of {began}, between which it was turned over. Two combined standard uncertainties, k = 2."
     if mixed:
         said += f" Along {', '.join(mixed)} it was never turned over: there the arm's field is in the bias."
     yield _spread("scale factor", said, AXES, (found.scale, found.scale_std), ONE)
@@ -135,12 +126,14 @@ def _earth_rate(found: EarthRateEntry) -> Iterator[Element]:
 
 
 def _relative(
-    numbers: list[float], covariance: Sequence[Sequence[float]], unit: str, said: str, how: str = ""
+    found: AccelerometerEntry | MagnetometerEntry, numbers: list[float], unit: str, said: str, how: str = ""
 ) -> Iterator[Element]:
-    widths = expanded(covariance)
-    yield _result(f"scale factor{how}", said, real_list(AXES, numbers[:3], [ONE], expanded=(widths[:3], TWO)))
-    yield _result(f"bias{how}", said, real_list(AXES, numbers[3:], [unit], expanded=(widths[3:], TWO)))
-    yield _joint(numbers, covariance, unit, how)
+    budget = found.budget
+    assert budget is not None and found.covariance_combined is not None  # or there is no digital certificate
+    widths, factor, said = budget.expanded, budget.coverage_factor, f"{said} {coverage_sentence(budget)}"
+    yield _result(f"scale factor{how}", said, real_list(AXES, numbers[:3], [ONE], expanded=(widths[:3], factor)))
+    yield _result(f"bias{how}", said, real_list(AXES, numbers[3:], [unit], expanded=(widths[3:], factor)))
+    yield _joint(numbers, found.covariance_combined, unit, how)
 
 
 def _joint(numbers: list[float], covariance: Sequence[Sequence[float]], unit: str, how: str = "") -> Element:

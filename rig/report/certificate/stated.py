@@ -10,7 +10,11 @@ from rig.data.run_folder import CONFIG
 from rig.errors import Refused
 from rig.errors.quoting import quote
 
-MEASURED_BY = {"latitude_deg", "heading_deg", "gravity_m_s2", "base_up"}  # keys of `site` that the result depends on
+# Keys of `site` that the result depends on.
+MEASURED_BY = {
+    *("latitude_deg", "heading_deg", "base_up", "gravity_m_s2", "gravity_uncertainty_m_s2"),
+    *("magnetic_field_ut", "magnetic_field_uncertainty_ut", "magnetic_field_upwards"),
+}
 
 NOTHING = CertificateSection()
 

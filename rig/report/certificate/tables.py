@@ -107,29 +107,36 @@ def _noise(sensor: SensorEntry) -> list[float]:
     return [sensor.covariance[i][i] ** 0.5 for i in range(6)]
 
 
-def budget_rows(budget: BudgetEntry) -> list[BudgetRow]:
-    """The largest of three axes, largest shares first; all negligible ones in one line."""
+def budget_rows(budget: BudgetEntry, per_unit: float = 1.0) -> list[BudgetRow]:
+    """The largest of three axes, largest shares first; all negligible ones in one line.
+
+    Uncertainties of biases times `per_unit`.
+    """
     lines = sorted(budget.contributors, key=lambda line: -max(line.share))
-    rows = [_budget_row(line) for line in lines if max(line.share) >= NEGLIGIBLE]
+    rows = [_budget_row(line, per_unit) for line in lines if max(line.share) >= NEGLIGIBLE]
     small = [line for line in lines if max(line.share) < NEGLIGIBLE]
     if small:
         std = np.sqrt(np.sum(np.square([line.std for line in small]), axis=0))
         names = ", ".join(line.name for line in small)
-        rows.append(_row((f"below 0.1 %: {names}", "", "", "", ""), std, np.square(std) / np.square(budget.std)))
+        shares = np.square(std) / np.square(budget.std)
+        rows.append(_row((f"below 0.1 %: {names}", "", "", "", ""), std, shares, per_unit))
     return rows
 
 
-def _budget_row(line: ContributorEntry) -> BudgetRow:
-    assumed = "from readings" if line.half_width is None else f"±{line.half_width:.3g} {line.unit}"
+def _budget_row(line: ContributorEntry, per_unit: float) -> BudgetRow:
+    stated = " (k = 2)" if line.distribution == "normal" else ""
+    assumed = "from readings" if line.half_width is None else f"±{line.half_width:.3g} {line.unit}{stated}"
     said = line.name, line.kind, line.distribution, assumed, freedom_text(line.freedom)
-    return _row(said, line.std, line.share)
+    return _row(said, line.std, line.share, per_unit)
 
 
-def _row(said: tuple[str, str, str, str, str], std: Sequence[float], share: Sequence[float]) -> BudgetRow:
+def _row(
+    said: tuple[str, str, str, str, str], std: Sequence[float], share: Sequence[float], per_unit: float
+) -> BudgetRow:
     numbers = [
         text
-        for part in (slice(0, 3), slice(3, 6))
-        for text in (_part(max(std[part]), max(share[part])), percent(max(share[part])))
+        for part, unit in ((slice(0, 3), 1.0), (slice(3, 6), per_unit))
+        for text in (_part(unit * max(std[part]), max(share[part])), percent(max(share[part])))
     ]
     return BudgetRow(*said, *numbers)
 

@@ -1,0 +1,112 @@
+"""What belongs into the uncertainty of accelerometers and magnetometers beside what their readings tell."""
+
+from typing import Final
+
+import numpy as np
+
+from rig.data.settings import Site
+from rig.estimation.arrays import Array
+from rig.estimation.attitude_error import AttitudeError
+from rig.estimation.budget import Budget, Contributor
+from rig.estimation.earth import STANDARD_GRAVITY_M_S2
+from rig.estimation.felt import Dwells, Movement, Sweeps
+from rig.estimation.imu import ImuSolution
+from rig.estimation.magnetometer import FieldDrift, MagnetometerSolution, Uniformity
+from rig.estimation.reference_budget import (
+    KnownSize,
+    Spread,
+    assumed,
+    reference_budget,
+    response_in_attitudes,
+    scale_and_bias,
+)
+
+# What gravity by latitude and height alone may be off by: the anomalies of rocks and terrain, 50 mGal.
+LOCAL_GRAVITY_M_S2: Final = 0.0005
+# What a place may differ by from the standard value: 9.780 at the equator to 9.832 at the poles, less in the mountains.
+ANY_GRAVITY_M_S2: Final = 0.03
+UNSTATED_FIELD: Final = 0.01  # of the field: an ordinary fluxgate
+UNTESTED_DRIFT_T: Final = 1e-7  # in a run: a magnetic storm, a lift some floors away
+SIZE_OF_FIELD: Final = "size of the field"
+MICROTESLA: Final = 1e6
+
+
+def accelerometer_budget(solution: ImuSolution, dwells: Dwells, sweeps: Sweeps, site: Site, lag_s: float) -> Budget:
+    """Of the solution found from these; `lag_s` is how late the sensor's own filter may be."""
+    scale = 1 / np.linalg.norm(solution.matrix, axis=1)
+    jacobian = scale_and_bias(solution.matrix, scale, len(solution.covariance))
+    spread = Spread(
+        scale=scale,
+        covariance=jacobian @ solution.covariance @ jacobian.T,
+        response=jacobian @ solution.response,
+        noise=Movement(dwells, sweeps).noise(),
+        attitude_error=solution.attitude_error,
+        chi_square=solution.chi_square,
+        freedom=solution.freedom,
+    )
+    others = [_lagging(spread, dwells, sweeps, lag_s)] if len(sweeps.speeds_rad_s) else []
+    return reference_budget(spread, _gravity(site), others)
+
+
+def magnetometer_budget(
+    solution: MagnetometerSolution,
+    attitudes: Array,
+    variances_t2: Array,
+    tested: tuple[Uniformity, FieldDrift | None],
+    site: Site,
+) -> Budget:
+    """Of the solution found in attitudes (N, 3, 3), flange to base, with these variances (N, 3) of the means."""
+    alike, drift = tested
+    scale = 1 / np.linalg.norm(solution.matrix, axis=1)
+    error = solution.fit.attitude_error or AttitudeError(0.0, 0.0)
+    theta = np.concatenate([solution.matrix.ravel(), solution.field_table_t, solution.bias_t])
+    jacobian = scale_and_bias(solution.matrix, scale, len(theta))
+    spread = Spread(
+        scale=scale,
+        covariance=jacobian @ solution.covariance @ jacobian.T,
+        response=jacobian @ response_in_attitudes(theta, attitudes, variances_t2, error.std_rad),
+        noise=np.diag(variances_t2.ravel()),
+        attitude_error=error,
+        chi_square=alike.chi_square,
+        freedom=alike.degrees_of_freedom,
+    )
+    return reference_budget(spread, _field(site), [_drifting(spread, solution.matrix, attitudes, drift)])
+
+
+def _gravity(site: Site) -> KnownSize:
+    size, said = site.gravity_m_s2, "site.gravity_uncertainty_m_s2"
+    if site.gravity_expanded_m_s2 is not None:
+        return KnownSize("gravity", site.gravity_expanded_m_s2 / size, True, size, "m/s²", said)
+    half_width = ANY_GRAVITY_M_S2 if size == STANDARD_GRAVITY_M_S2 else LOCAL_GRAVITY_M_S2
+    return KnownSize("gravity", half_width / size, False, size, "m/s²", f"{said} is not given")
+
+
+def _field(site: Site) -> KnownSize:
+    assert site.magnetic_field_t is not None, "or it was not calibrated"
+    size_ut, said = MICROTESLA * site.magnetic_field_t, "site.magnetic_field_uncertainty_ut"
+    if site.magnetic_field_expanded_t is not None:
+        relative = site.magnetic_field_expanded_t / site.magnetic_field_t
+        return KnownSize(SIZE_OF_FIELD, relative, True, size_ut, "µT", said)
+    return KnownSize(SIZE_OF_FIELD, UNSTATED_FIELD, False, size_ut, "µT", f"{said} is not given")
+
+
+def _lagging(spread: Spread, dwells: Dwells, sweeps: Sweeps, lag_s: float) -> Contributor:
+    """The sensor's own filter makes a turn's wave smaller by (ω τ)²/2, which the model leaves out."""
+    smaller = sweeps.harmonics_m_s2 * np.square(sweeps.speeds_rad_s * lag_s)[:, None, None] / 2
+    smaller[:, 0] = 0.0  # the mean passes whole
+    pattern = np.concatenate([np.zeros(dwells.readings_m_s2.size), smaller.ravel()])
+    return assumed("filter's lag", 1e3 * lag_s, "ms", "uncertainty.acceleration_lag_ms", spread.of(pattern[None]))
+
+
+def _drifting(spread: Spread, matrix: Array, attitudes: Array, drift: FieldDrift | None) -> Contributor:
+    """A field that changes evenly from the first attitude to the last, along each axis of the base."""
+    change_t = UNTESTED_DRIFT_T
+    if drift is not None:
+        change_t = max(float(np.linalg.norm(each)) for each in (drift.change_t, drift.std_t)) / np.sqrt(3)
+    along = np.linspace(-0.5, 0.5, len(attitudes))[:, None, None] * (matrix @ np.swapaxes(attitudes, -1, -2))
+    patterns = change_t * np.moveaxis(along, -1, 0).reshape(3, -1)
+    if drift is None:
+        said = "procedure.field_test_s is not given"
+        return assumed("drift of the field", MICROTESLA * change_t, "µT", said, spread.of(patterns))
+    source = "tests at home"
+    return Contributor("drift of the field", "A", "normal", None, "", source, np.inf, spread.of(patterns))

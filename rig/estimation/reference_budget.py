@@ -1,0 +1,125 @@
+"""The uncertainty budget of a sensor calibrated in a constant reference, of which the size is given: gravity, a field.
+
+The readings tell their noise and how far the arm's attitudes are off; how well the reference is known, what the
+sensor's own filter takes and how the reference changed they do not tell, or not all of it. The solution's response
+turns each into changes of scale and bias (JCGM 100, 5.1).
+"""
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from typing import Literal
+
+import numpy as np
+
+from rig.estimation.arrays import Array
+from rig.estimation.attitude_error import AttitudeError, effects, whitening_with
+from rig.estimation.budget import COVERAGE_FACTOR, Budget, Contributor
+from rig.estimation.reference_model import BIAS, F, covariance_bound, jacobian
+from rig.estimation.sensor_axes import parameter_jacobian
+
+
+@dataclass(frozen=True, slots=True)
+class Spread:
+    """What scale and bias owe to the readings: kx ky kz bx by bz, n readings.
+
+    - `scale` (3,), `covariance` (6, 6) of noise and attitudes, `response` (6, n) to the readings.
+    - `noise` (n, n): covariance of the readings' own.
+    - `attitude_error`: how far the attitudes are off.
+    - `chi_square` of what the model leaves, and its `freedom`.
+    """
+
+    scale: Array
+    covariance: Array
+    response: Array
+    noise: Array
+    attitude_error: AttitudeError
+    chi_square: float
+    freedom: int
+
+    def of(self, patterns: Array) -> Array:
+        """(6, 6) of independent patterns (k, n) of errors in the readings, each of one standard uncertainty."""
+        effect = self.response @ patterns.T
+        covariance: Array = effect @ effect.T
+        return covariance
+
+
+@dataclass(frozen=True, slots=True)
+class KnownSize:
+    """How well the reference's size is known: the expanded uncertainty (k = 2) where it is `stated`, else a half-width.
+
+    `relative` to the size; `per_unit` takes that into `unit`.
+    """
+
+    name: str
+    relative: float
+    stated: bool
+    per_unit: float
+    unit: str
+    source: str
+
+
+def scale_and_bias(matrix: Array, scale: Array, parameters: int) -> Array:
+    """(6, p) derivative of scale and bias with respect to θ (p,), which begins with F, the reference and b.
+
+    Of a bias that is part of the reading; a gyroscope's is added to it.
+    """
+    whole = np.zeros((6, parameters))
+    whole[:, np.r_[F, BIAS]] = parameter_jacobian(matrix, scale) * np.repeat([1.0, -1.0], 3)[:, None]
+    return whole
+
+
+def response_in_attitudes(theta: Array, attitudes: Array, variances: Array, attitude_std_rad: float) -> Array:
+    """(p, 3 N): how θ (p,) changes with readings (N, 3) in attitudes off by so much, ‖v_ref‖ given."""
+    v_bar = np.zeros_like(variances)
+    white = whitening_with(variances, effects(theta, attitudes, v_bar), np.full(len(variances), attitude_std_rad))
+    bound = covariance_bound(theta, attitudes, v_bar, white, norm_known=True)
+    weighted = np.swapaxes(white, -1, -2) @ white @ jacobian(theta, attitudes, v_bar)
+    response: Array = bound @ weighted.reshape(-1, len(theta)).T
+    return response
+
+
+def reference_budget(spread: Spread, size: KnownSize, others: Sequence[Contributor] = ()) -> Budget:
+    """What the readings tell, how well the reference's size is known, and what else there is."""
+    noise = spread.response @ spread.noise @ spread.response.T
+    told = [
+        _found("noise", "scatter of the readings", noise),
+        _found(
+            "arm's attitudes",
+            "what the readings say of them",
+            spread.covariance - noise,
+            _freedom(spread.attitude_error),
+        ),
+    ]
+    beyond = spread.chi_square / max(spread.freedom, 1) - 1.0
+    if spread.freedom > 0 and beyond > 0.0:
+        left = beyond * spread.covariance
+        told.append(
+            _found("what the model leaves", "residuals beside noise and attitudes", left, float(spread.freedom))
+        )
+    return Budget((*told, _of_size(spread.scale, size), *others))
+
+
+def assumed(name: str, half_width: float, unit: str, source: str, covariance: Array) -> Contributor:
+    """Type B: `covariance` (6, 6) is that of one half-width."""
+    return Contributor(name, "B", "rectangular", half_width, unit, source, np.inf, covariance / 3)
+
+
+def _of_size(scale: Array, size: KnownSize) -> Contributor:
+    """A reference that is larger by a part makes every scale factor larger by that part, and leaves the bias alone."""
+    along = np.concatenate([scale, np.zeros(3)])
+    distribution: Literal["normal", "rectangular"] = "normal" if size.stated else "rectangular"
+    std = size.relative / (COVERAGE_FACTOR if size.stated else np.sqrt(3))
+    shown = size.relative * size.per_unit
+    spread = np.outer(along, along) * std**2
+    return Contributor(size.name, "B", distribution, shown, size.unit, size.source, np.inf, spread)
+
+
+def _found(name: str, source: str, covariance: Array, freedom: float = np.inf) -> Contributor:
+    return Contributor(name, "A", "normal", None, "", source, freedom, covariance)
+
+
+def _freedom(error: AttitudeError) -> float:
+    """Degrees of freedom of an uncertainty that is itself uncertain (JCGM 100, G.4.2)."""
+    if error.uncertainty_rad == 0.0:
+        return np.inf
+    return max(1.0, 0.5 * (error.std_rad / error.uncertainty_rad) ** 2)

@@ -1,0 +1,142 @@
+"""The budgets of accelerometers and magnetometers: what each line does, and whether U covers the truth."""
+
+from collections.abc import Callable
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from scipy.spatial.transform import Rotation
+
+from rig.analysis.reference_budgets import accelerometer_budget, magnetometer_budget
+from rig.config.attitude_sets import EIGHTEEN
+from rig.data.settings import Site
+from rig.estimation.arrays import Array
+from rig.estimation.budget import Budget
+from rig.estimation.imu import solve_imu
+from rig.estimation.magnetometer import field_drift, solve_magnetometer, uniformity
+from support.arm_attitudes import attitudes_of, crooked, crooked_arm, joints_rad
+from support.arm_sweeps import Truth, planned, recorded_dwells, recorded_sweeps
+
+GRAVITY, FIELD_T = 9.81, 48e-6
+GRAVITY_U, FIELD_U = 3e-4, 2e-7  # expanded, k = 2
+LAG_S, ARM_RAD, DENSITY_UG = 0.02, 1e-4, 150.0
+SITE = Site(
+    up=(0.0, 0.0, 1.0),
+    gravity_m_s2=GRAVITY,
+    earth_rate_rad_s=None,
+    magnetic_field_t=FIELD_T,
+    gravity_expanded_m_s2=GRAVITY_U,
+    magnetic_field_expanded_t=FIELD_U,
+)
+JOINTS = joints_rad(EIGHTEEN)
+NOISE_T, TEST_NOISE_T = 3e-8, 2e-8  # of a mean
+Session = tuple[Array, Budget, Array]  # error over u (6,), the budget, error over the solution's own spread (6,)
+
+
+def accelerometer(seed: int, site: Site = SITE, lag_s: float = LAG_S) -> Session:
+    """A session in which gravity, the arm and the sensor's filter are all off as the budget has it."""
+    rng = np.random.default_rng([71, seed])
+    gravity = GRAVITY + GRAVITY_U / 2 * rng.normal()
+    truth = Truth(
+        matrix=np.diag(1 + 0.02 * rng.normal(size=3)) @ Rotation.from_rotvec(0.01 * rng.normal(size=3)).as_matrix(),
+        bias_m_s2=0.3 * rng.normal(size=3),
+        reference_m_s2=np.array([0.0, 0.0, gravity]),
+        lever_arm_m=np.array([0.02, 0.01, 0.03]),
+        delay_s=0.0,
+    )
+    arm = crooked_arm(ARM_RAD, rng)
+    sweeps = recorded_sweeps(truth, arm, planned(6), DENSITY_UG, rng)
+    smaller = 1 - rng.uniform() * np.square(sweeps.speeds_rad_s * lag_s) / 2
+    sweeps.harmonics_m_s2[:, 1:] *= smaller[:, None, None]
+    dwells = recorded_dwells(truth, arm, JOINTS, DENSITY_UG, rng)
+    solution = solve_imu(dwells, sweeps, gravity_m_s2=GRAVITY)
+    budget = accelerometer_budget(solution, dwells, sweeps, site, lag_s)
+    scale = 1 / np.linalg.norm(solution.matrix, axis=1)
+    off = np.concatenate([scale - 1 / np.linalg.norm(truth.matrix, axis=1), solution.bias_m_s2 - truth.bias_m_s2])
+    return off / budget.std, budget, off / own_spread(budget)
+
+
+def magnetometer(seed: int, site: Site = SITE) -> Session:
+    """A session in a field that is not quite of the stated size, and that drifts less than its tests at home show."""
+    rng = np.random.default_rng([72, seed])
+    told = attitudes_of(JOINTS)
+    true = crooked(JOINTS, ARM_RAD, rng)
+    direction = np.array([0.4, 0.1, -0.9])
+    field = (FIELD_T + FIELD_U / 2 * rng.normal()) * direction / np.linalg.norm(direction)
+    matrix = np.eye(3) + 0.03 * rng.normal(size=(3, 3))
+    bias = 2e-5 * rng.normal(size=3)
+    drift = TEST_NOISE_T * rng.normal(size=3)
+    along = np.linspace(-0.5, 0.5, len(told))[:, None] * drift
+    readings = np.einsum("nji,nj->ni", true, field + along) @ matrix.T + bias
+    variances = np.full_like(readings, NOISE_T**2)
+    readings += NOISE_T * rng.normal(size=readings.shape)
+    solution = solve_magnetometer(
+        readings, told, variances, field_t=FIELD_T, side=-np.eye(3)[2], method="attitude_weighted"
+    )
+    assert solution.fit.attitude_error is not None
+    tests = [bias, bias + drift] + TEST_NOISE_T / np.sqrt(2) * rng.normal(size=(2, 3))
+    tested = (
+        uniformity(solution, readings, told, variances, solution.fit.attitude_error.std_rad),
+        field_drift(tests, np.full((2, 3), TEST_NOISE_T**2 / 2), 0.0),
+    )
+    budget = magnetometer_budget(solution, told, variances, tested, site)
+    scale = 1 / np.linalg.norm(solution.matrix, axis=1)
+    off = np.concatenate([scale - 1 / np.linalg.norm(matrix, axis=1), solution.bias_t - bias])
+    return off / budget.std, budget, off / own_spread(budget)
+
+
+def own_spread(budget: Budget) -> Array:
+    """(6,) by noise and attitudes alone."""
+    std: Array = np.hypot(budget.of("noise"), budget.of("arm's attitudes"))
+    return std
+
+
+def check(sessions: list[Session], within: tuple[float, float], without: float) -> None:
+    """Errors over u are `within` these in the mean; `without`: how far the scale is beyond its own spread at least."""
+    off = np.array([each[0] for each in sessions])
+    alone = np.array([each[2] for each in sessions])
+    rms = np.sqrt(np.mean(off**2, axis=0))
+    for part in (rms[:3], rms[3:]):
+        assert within[0] < np.sqrt(np.mean(part**2)) < within[1], rms
+    assert np.mean(np.abs(off) < 2) > 0.92
+    assert np.sqrt(np.mean(alone[:, :3] ** 2)) > without  # or the test would pass without a budget
+
+
+@pytest.mark.parametrize(("session", "without"), [(accelerometer, 1.25), (magnetometer, 2.0)])
+def test_the_stated_uncertainty_covers_the_truth(session: Callable[[int], Session], without: float) -> None:
+    check([session(seed) for seed in range(12)], (0.6, 1.3), without)
+
+
+@pytest.mark.proof
+@pytest.mark.parametrize(("session", "without"), [(accelerometer, 1.4), (magnetometer, 2.2)])
+def test_the_stated_uncertainty_covers_the_truth_in_many_sessions(
+    session: Callable[[int], Session], without: float
+) -> None:
+    check([session(seed) for seed in range(200)], (0.85, 1.1), without)
+
+
+@pytest.mark.parametrize(
+    ("session", "size", "expanded"),
+    [(accelerometer, "gravity", GRAVITY_U / GRAVITY), (magnetometer, "size of the field", FIELD_U / FIELD_T)],
+)
+def test_the_size_of_the_reference_is_the_scale_s_alone(
+    session: Callable[[int], Session], size: str, expanded: float
+) -> None:
+    _, budget, _ = session(0)
+    np.testing.assert_allclose(budget.of(size)[:3], expanded / 2, rtol=0.1)  # of scale factors near 1
+    np.testing.assert_array_equal(budget.of(size)[3:], 0)
+
+
+def test_what_nobody_has_stated_is_assumed_and_said() -> None:
+    unstated = replace(SITE, gravity_expanded_m_s2=None, magnetic_field_expanded_t=None)
+    known, standard = accelerometer(0, unstated)[1], accelerometer(0, replace(unstated, gravity_m_s2=9.80665))[1]
+    field = magnetometer(0, unstated)[1]
+    lines = [next(each for each in found.contributors if each.kind == "B") for found in (known, standard, field)]
+    assert [line.half_width for line in lines] == [pytest.approx(each) for each in (0.0005, 0.03, 0.48)]
+    assert all(line.distribution == "rectangular" and line.source.endswith("is not given") for line in lines)
+
+
+def test_without_sweeps_no_filter_lags() -> None:
+    assert "filter's lag" in {line.name for line in accelerometer(0)[1].contributors}
+    quick = accelerometer(0, lag_s=0.0)[1]
+    assert quick.of("filter's lag").max() == 0
