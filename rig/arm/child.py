@@ -198,7 +198,17 @@ class _Child:
             self.send(MoveStarted())
             self._operations_before = before
         else:
+            self._await_state()
             self.send(Failed(_move_failure("the controller did not start the move")))
+
+    def _await_state(self) -> None:
+        """Wait for another state: a link that is lost, and not the controller, may be why a move was not begun.
+
+        Without one the parent names the link before this ends.
+        """
+        latest, began_s = self._latest, time.monotonic()
+        while self._latest is latest and time.monotonic() - began_s < ABANDON_S:
+            time.sleep(HEARTBEAT_S)
 
     def _brake(self, deceleration_rad_s2: float) -> None:
         if self._control is not None:

@@ -8,7 +8,6 @@ Nothing doubtful is averaged: whatever does not belong into a calibration raises
 """
 
 from collections.abc import Collection, Sequence
-from contextlib import suppress
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -20,12 +19,13 @@ from rig.data.settings import ObservationThresholds
 from rig.errors import Fault
 from rig.estimation.arrays import Array
 from rig.estimation.refusals import check_reading_ratio
-from rig.observation.acceleration import DwellReading, dwell_reading, dwell_readings
+from rig.observation.acceleration import DwellReading, dwell_readings
 from rig.observation.average import Average, Stream, average, average_at_rest, between, on_the_arms_clock
+from rig.observation.feeling import check_dwells, check_rests
 from rig.observation.revolution import Revolution, arm_states_lost, describe, find_revolution
 from rig.observation.swept_acceleration import SweptAcceleration, swept_acceleration
 from rig.observation.timebase import ArmMotion, TimeBase
-from rig.observation.windows import Finished, Window, dwelt, finished_dwells, finished_sweeps, rested, swept
+from rig.observation.windows import Finished, Window, rested, swept
 
 STUCK_REPEATS = 10  # equal readings in a row, of a sensor whose noise exceeds a count
 REST_SETTLING_S = 0.2  # kept away from either end of a rest
@@ -87,17 +87,19 @@ def observe_sensor(
     """
     stream = on_the_arms_clock(run.samples[sensor], run.sensors[sensor], motion)
     revolutions = [
-        _revolution(run, stream, motion, finished, settings)
+        revolution_of(run, stream, motion, finished, settings)
         for finished in swept(run)
         if finished.sweep.index not in superseded
     ]
-    rests = tuple(rest for window in rested(run) if (rest := _rest(stream, motion, window, as_before=_as_before(run))))
+    rests = rests_of(run, stream, motion)
+    dwells = tuple(dwell_readings(run, stream, motion, settings, superseded)) if stream.sensor.has_acceleration else ()
+    check_feeling(run, rests, dwells)
     drift = bias_drift(rests)
     return SensorObservations(
         stream.clock,
         tuple(replace(o, average=_drifting(o.average, drift)) for o in revolutions),
         tuple(_drifting(rest, drift) for rest in rests),
-        tuple(dwell_readings(run, stream, motion, settings, superseded)) if stream.sensor.has_acceleration else (),
+        dwells,
     )
 
 
@@ -108,7 +110,7 @@ def each_sweep(
     found: dict[int, Observation | Fault] = {}
     for finished in swept(run):
         try:
-            found[finished.sweep.index] = _revolution(run, stream, motion, finished, settings)
+            found[finished.sweep.index] = revolution_of(run, stream, motion, finished, settings)
         except Fault as fault:
             found[finished.sweep.index] = fault
     return found
@@ -120,46 +122,26 @@ def nearest_axis(vector: Array) -> tuple[str, int]:
     return "xyz"[nearest], 1 if vector[nearest] > 0 else -1
 
 
-def sound_sweeps(run: RunData, settings: ObservationThresholds) -> frozenset[int]:
-    """The finished sweeps that `observe_sensor` accepts for every sensor: a resumed run need not repeat them."""
-    return finished_sweeps(run) & _sound(run, settings)
+def check_feeling(run: RunData, rests: Sequence[Average], dwells: Sequence[DwellReading]) -> None:
+    """Of recordings that say where the arm stood. Raises Fault `stuck_sensor`."""
+    if run.settings.site is None:
+        return
+    speeds = [finished.sweep.speed_rad_s for finished in swept(run)]
+    if speeds:
+        check_rests(rests, min(speeds))
+    check_dwells(dwells, run.settings.site)
 
 
-def sound_dwells(run: RunData, settings: ObservationThresholds) -> frozenset[int]:
-    """The same of the dwells."""
-    return finished_dwells(run) & _sound(run, settings)
+def rests_of(run: RunData, stream: Stream, motion: ArmMotion) -> tuple[Average, ...]:
+    """Those in which the arm stood still for long enough."""
+    found = (_rest(stream, motion, window, as_before=_as_before(run)) for window in rested(run))
+    return tuple(rest for rest in found if rest is not None)
 
 
-def _sound(run: RunData, settings: ObservationThresholds) -> frozenset[int]:
-    try:
-        motion = ArmMotion(run.arm, run.provenance.kinematics)
-    except Fault:
-        return frozenset()
-    sound = (_sound_for(run, sensor, motion, settings) for sensor in run.sensors)
-    return frozenset.intersection(*sound)
-
-
-def _sound_for(run: RunData, sensor: str, motion: ArmMotion, settings: ObservationThresholds) -> frozenset[int]:
-    sound = set()
-    try:
-        stream = on_the_arms_clock(run.samples[sensor], run.sensors[sensor], motion)
-    except Fault:
-        return frozenset()
-    for finished in swept(run):
-        with suppress(Fault):
-            _revolution(run, stream, motion, finished, settings)
-            sound.add(finished.sweep.index)
-    for dwelt_in in dwelt(run):
-        with suppress(Fault):
-            if stream.sensor.has_acceleration:
-                dwell_reading(stream, motion, dwelt_in, settings)
-            sound.add(dwelt_in.dwell.index)
-    return frozenset(sound)
-
-
-def _revolution(
+def revolution_of(
     run: RunData, stream: Stream, motion: ArmMotion, finished: Finished, settings: ObservationThresholds
 ) -> Observation:
+    """One finished sweep's. Raises Fault as `observe_sensor` does."""
     turn = find_revolution(motion, finished.sweep, finished.window, settings)
     seen = _observation(stream, motion, finished.sweep, turn, settings, as_before=_as_before(run))
     if stream.sensor.has_acceleration and run.settings.planned_dwells:

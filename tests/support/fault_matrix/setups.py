@@ -18,7 +18,7 @@ TRUTH: dict[str, dict[str, list[float]]] = {
 SWEEPS: dict[str, Any] = {
     "arm": {"transfer_speed_deg_s": 170},
     "sensors": {"gyro": {"rate_hz": 59.5, "range_deg_s": 500}},
-    "procedure": {"speed_deg_s": 150, "acceleration_deg_s2": 400, "rest_s": 0.5},
+    "procedure": {"speed_deg_s": 150, "acceleration_deg_s2": 400, "rest_s": 0.9},
     "limits": {"scale_std": 0.02, "bias_std_rad_s": 0.02, "condition": 20},
     "world": {"time_scale": 8, "sensors": {"gyro": {**TRUTH["gyro"], "noise_rad_s": 0.005}}},
 }

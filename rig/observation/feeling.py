@@ -1,0 +1,38 @@
+"""Whether a sensor still feels what the arm does: its means must change where the movement does, and not at rest."""
+
+from collections.abc import Sequence
+from itertools import pairwise
+
+import numpy as np
+
+from rig.data.settings import Site
+from rig.errors import Fault
+from rig.observation.acceleration import DwellReading
+from rig.observation.average import Average
+
+OF_A_SWEEP = 0.5  # of the slowest one's speed: so much no bias changes from rest to rest
+TURNED = 0.5  # of gravity, by which two attitudes in a row must differ to tell
+FELT = 0.1  # of what they differ by
+REMEDY = "Check the sensor's supply and its bus wiring, then repeat the run"
+
+
+def check_rests(rests: Sequence[Average], slowest_rad_s: float) -> None:
+    """Readings at rest are those of no turn. Raises Fault `stuck_sensor`."""
+    if len(rests) < 2:
+        return
+    apart = np.ptp([rest.mean_rad_s for rest in rests], axis=0).max()
+    if apart > OF_A_SWEEP * slowest_rad_s:
+        raise Fault(
+            "stuck_sensor",
+            f"at rest the gyroscope reads {np.degrees(apart):.3g} °/s more one time than another, as if it turned",
+            REMEDY,
+        )
+
+
+def check_dwells(dwells: Sequence[DwellReading], site: Site) -> None:
+    """Readings in two attitudes differ as gravity in them does. Raises Fault `stuck_sensor`."""
+    for one, other in pairwise(dwells):
+        differ = float(np.linalg.norm((one.attitude - other.attitude) @ site.up))
+        felt_m_s2 = float(np.linalg.norm(one.reading.mean - other.reading.mean))
+        if differ > TURNED and felt_m_s2 < FELT * differ * site.gravity_m_s2:
+            raise Fault("stuck_sensor", f"the accelerometer reads the same in {one.name} and {other.name}", REMEDY)
