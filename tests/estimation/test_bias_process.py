@@ -27,6 +27,7 @@ def wandering(windows_s: Array, rate: float, rng: np.random.Generator) -> tuple[
     return np.array([walk[each].mean(axis=0) for each in inside]), walk.mean(axis=0)
 
 
+@pytest.mark.slow
 def test_the_covariance_of_a_walk_is_that_of_many_walks() -> None:
     windows_s, _ = session()
     rng = np.random.default_rng(1)

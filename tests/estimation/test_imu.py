@@ -387,6 +387,7 @@ def test_what_cannot_be_is_refused_by_name(name: str, damage: Damage) -> None:
         solve(*damage(dwells, sweeps))
 
 
+@pytest.mark.slow
 def test_an_arm_that_errs_by_a_degree_is_not_trusted() -> None:
     _, dwells, sweeps = recorded(SIX_AND_REST, 0.017, 150.0, 4)
     with pytest.raises(Fault, match="attitude_untrustworthy"):

@@ -20,6 +20,7 @@ def test_two_triads_at_right_angles_are_told_by_the_turn_between_them() -> None:
     np.testing.assert_allclose(found.rotation @ found.rotation.T, np.eye(3), atol=1e-12)
 
 
+@pytest.mark.slow
 def test_the_covariance_is_the_scatter_of_the_turns() -> None:
     rng = np.random.default_rng(1)
     skew = np.eye(3) + 0.02 * rng.normal(size=(3, 3))

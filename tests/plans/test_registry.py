@@ -91,6 +91,7 @@ def test_the_kept_script_is_the_file_the_procedure_came_from() -> None:
     assert kept.name == "verify.py" and "PROCEDURE = Procedure(" in kept.text and len(kept.sha256) == 64
 
 
+@pytest.mark.slow
 def test_an_own_script_may_borrow_all_but_its_name_and_is_kept_itself(tmp_path: Path) -> None:
     own, config = tmp_path / "own.py", tmp_path / "hardware.yaml"
     own.write_text(OWN, encoding="utf-8")
@@ -104,6 +105,7 @@ def test_an_own_script_may_borrow_all_but_its_name_and_is_kept_itself(tmp_path: 
     assert (tmp_path / "run" / "script.py").read_text(encoding="utf-8") == OWN
 
 
+@pytest.mark.slow
 def test_an_installed_procedure_that_cannot_be_loaded_has_a_name(tmp_path: Path) -> None:
     package = tmp_path / "broken-1.dist-info"
     package.mkdir()

@@ -28,6 +28,7 @@ def errors_of(frames: list[Frame]) -> list[tuple[str, str]]:
     return [(NAMES[values["sensor"]], ERRORS[values["code"]].name) for values in errors]
 
 
+@pytest.mark.slow
 def test_all_sensors_at_their_full_rates_lose_nothing() -> None:
     """The gyroscopes, and the magnetometer beside them."""
     session = started(RATES_HZ)

@@ -95,6 +95,7 @@ def test_accelerations_of_all_three_come_along_in_the_same_axes_without_a_loss()
     assert {frame.values["dropped"] for frame in frames if frame.name == "imu_samples"} == {0}
 
 
+@pytest.mark.slow
 def test_equal_inputs_give_equal_bytes() -> None:
     def digest(tick_s: float) -> str:
         session = streaming(noise_rad_s=0.01, tick_s=tick_s)

@@ -62,6 +62,7 @@ def test_scale_and_bias_follow_the_temperature_and_hold_where_they_were_found() 
         assert gyroscope.read(time_s) == pytest.approx(1 / scale - bias)
 
 
+@pytest.mark.slow
 def test_flicker_makes_a_floor_of_the_allan_deviation() -> None:
     """Two hours, a floor around 10 s: level within a fifth from 1 s to 30 s, and it does not begin with a jump."""
     rates = drift(GyroTruth(instability_rad_s=1e-5, instability_time_s=10.0), 7200.0, 0.1)
