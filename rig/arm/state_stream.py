@@ -40,6 +40,8 @@ VARIABLES = {
 PACKET = struct.Struct(">B d 6d 6d d d i i I I I d 3d".replace(" ", ""))  # the recipe's number, then these
 
 ANGLE_RAD, SPEED_RAD_S, MODES = 13.0, 20.0, range(-1, 64)  # no arm turns so far or so fast, or has other modes
+# Between two states a joint goes as far as its two speeds say, to within the encoder and the hardest braking.
+ENCODER_RAD, BRAKING_RAD_S2 = 0.005, 200.0
 
 
 @dataclass(frozen=True, slots=True)
@@ -67,6 +69,7 @@ class StateStream:
             self._socket.setblocking(False)
             self._set_up(rate_hz)
             self._first = self._await_packet()
+            self._last = self._first.state
         except BaseException:
             self._socket.close()
             raise
@@ -97,7 +100,11 @@ class StateStream:
         else:  # what had come while nobody looked would be there
             self.silent_s = looked_s - self._heard_s
         try:
-            return [_packet(payload) for kind, payload in self._packages() if kind == "U"]
+            packets = [_packet(payload) for kind, payload in self._packages() if kind == "U"]
+            for packet in packets:
+                _check_way(self._last, packet.state)
+                self._last = packet.state
+            return packets
         except ConnectionError:  # what is not readable is a link that is lost
             self.closed = True
             return []
@@ -158,6 +165,15 @@ class StateStream:
             payload = bytes(self._buffer[HEADER.size : size])
             del self._buffer[:size]
             yield chr(kind), payload
+
+
+def _check_way(before: ArmState, after: ArmState) -> None:
+    """Raises `ConnectionError` where no arm goes that way in that time."""
+    passed_s = after.time_s - before.time_s
+    allowed_rad = ENCODER_RAD + BRAKING_RAD_S2 * passed_s**2 / 2
+    each = zip(before.q_rad, after.q_rad, before.qd_rad_s, after.qd_rad_s, strict=True)
+    if passed_s <= 0.0 or any(abs(q2 - q1 - (v1 + v2) / 2 * passed_s) > allowed_rad for q1, q2, v1, v2 in each):
+        raise ConnectionError("no arm goes that way")
 
 
 def _packet(payload: bytes) -> Packet:

@@ -30,6 +30,7 @@ from rig.observation.windows import Finished, Window, rested, swept
 STUCK_REPEATS = 10  # equal readings in a row, of a sensor whose noise exceeds a count
 REST_SETTLING_S = 0.2  # kept away from either end of a rest
 MAX_REST_TRAVEL_RAD = 1e-3
+MISREAD = {"wrong_axis", "wrong_sign", "wrong_unit"}  # so reads, too, what sticks in one sweep the next ones
 MIN_REST_SAMPLES = 20
 MIN_RESTS = 3  # to tell whether the bias drifts
 
@@ -86,12 +87,17 @@ def observe_sensor(
     `impossible_times`.
     """
     stream = on_the_arms_clock(run.samples[sensor], run.sensors[sensor], motion)
-    revolutions = [
-        revolution_of(run, stream, motion, finished, settings)
-        for finished in swept(run)
-        if finished.sweep.index not in superseded
-    ]
     rests = rests_of(run, stream, motion)
+    try:
+        revolutions = [
+            revolution_of(run, stream, motion, finished, settings)
+            for finished in swept(run)
+            if finished.sweep.index not in superseded
+        ]
+    except Fault as fault:
+        if fault.name in MISREAD:
+            check_feeling(run, rests, ())
+        raise
     dwells = tuple(dwell_readings(run, stream, motion, settings, superseded)) if stream.sensor.has_acceleration else ()
     check_feeling(run, rests, dwells)
     drift = bias_drift(rests)
