@@ -20,7 +20,7 @@ from firmware_host.answers import SampleBatch
 from firmware_host.frames import FrameReader
 from firmware_host.protocol import MESSAGES
 
-sys.path.insert(0, str(Path(__file__).parents[1] / "tests"))
+sys.path[:0] = [str(Path(__file__).parents[1] / each) for each in ("", "tests")]
 from support.emulated_session import Session
 
 STREAMS = {

@@ -14,7 +14,7 @@ import subprocess
 import sys
 from pathlib import Path
 
-sys.path.insert(0, str(Path(__file__).parents[1] / "tests"))
+sys.path[:0] = [str(Path(__file__).parents[1] / each) for each in ("", "tests")]
 from support.long_life import Calibration, Life, complaints, courses, live
 
 ROOT = Path(__file__).parents[1]
