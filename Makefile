@@ -3,7 +3,7 @@
 # make test    everything CI checks: lint, types, import layers, all tests (needs gcc and arm-none-eabi-gcc)
 # make proof   statistical acceptance over all seeds, which takes longer than anybody waits for a change
 # make firmware builds the board's image (needs arm-none-eabi-gcc) and prints what it takes of the chip
-# make bench   every benchmark, ratios measured side by side
+# make bench   every benchmark, ratios measured side by side; not faults, long_life and damaged_frames, which take hours
 # make lock    pins what `make demo` installs anew, by version and hash (requirements/demo.txt)
 # make sbom    what is installed, as a CycloneDX bill of materials: build/sbom.json
 # make figures the pictures in docs/results.md, by the studies and the experiments
@@ -14,6 +14,7 @@ BIN := $(VENV)/bin
 FIND_PYTHON = for p in python3.12 python3.11 python3 python; do \
   "$$p" -c 'import sys; sys.exit(sys.version_info[:2] not in [(3, 11), (3, 12)])' 2>/dev/null && echo "$$p" && break; done
 
+LONG := $(addprefix benchmarks/, faults.py long_life.py damaged_frames.py)
 STUDIES := normal extreme speed convergence sine averaging estimators misalignment budget kvh-gyro kvh-accelerometer
 
 .PHONY: demo check test proof lint firmware bench lock sbom figures clean
@@ -44,7 +45,7 @@ lint: $(VENV)/dev.installed
 	$(BIN)/lint-imports
 
 bench: $(VENV)/dev.installed
-	for benchmark in benchmarks/*.py; do $(BIN)/python $$benchmark || exit 1; done
+	for benchmark in $(filter-out $(LONG), $(wildcard benchmarks/*.py)); do $(BIN)/python $$benchmark || exit 1; done
 
 figures: $(VENV)/dev.installed
 	for study in $(STUDIES); do $(BIN)/rig study $$study --jobs 2 --out build/studies || exit 1; \
