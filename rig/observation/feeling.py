@@ -1,10 +1,11 @@
 """Whether a sensor still feels what the arm does: its means must change where the movement does, and not at rest."""
 
-from collections.abc import Sequence
+from collections.abc import Collection, Sequence
 from itertools import pairwise
 
 import numpy as np
 
+from rig.arm.motion import Sweep
 from rig.data.settings import Site
 from rig.errors import Fault
 from rig.observation.acceleration import DwellReading
@@ -27,6 +28,15 @@ def check_rests(rests: Sequence[Average], slowest_rad_s: float) -> None:
             f"at rest the gyroscope reads {np.degrees(apart):.3g} °/s more one time than another, as if it turned",
             REMEDY,
         )
+
+
+def check_other_way(sweep: Sweep, read: Collection[str | None], fault: Fault) -> None:
+    """What was `read` well in a sweep about the same joint before is neither mounted nor set up wrong.
+
+    Raises Fault `stuck_sensor`.
+    """
+    if sweep.joint_name in read:
+        raise Fault("stuck_sensor", f"{fault.what}; the other way it read as it should", REMEDY) from fault
 
 
 def check_dwells(dwells: Sequence[DwellReading], site: Site) -> None:

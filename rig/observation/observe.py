@@ -21,7 +21,7 @@ from rig.estimation.arrays import Array
 from rig.estimation.refusals import check_reading_ratio
 from rig.observation.acceleration import DwellReading, dwell_readings
 from rig.observation.average import Average, Stream, average, average_at_rest, between, on_the_arms_clock
-from rig.observation.feeling import check_dwells, check_rests
+from rig.observation.feeling import check_dwells, check_other_way, check_rests
 from rig.observation.revolution import Revolution, arm_states_lost, describe, find_revolution
 from rig.observation.swept_acceleration import SweptAcceleration, swept_acceleration
 from rig.observation.timebase import ArmMotion, TimeBase
@@ -30,7 +30,7 @@ from rig.observation.windows import Finished, Window, rested, swept
 STUCK_REPEATS = 10  # equal readings in a row, of a sensor whose noise exceeds a count
 REST_SETTLING_S = 0.2  # kept away from either end of a rest
 MAX_REST_TRAVEL_RAD = 1e-3
-MISREAD = {"wrong_axis", "wrong_sign", "wrong_unit"}  # so reads, too, what sticks in one sweep the next ones
+MISREAD = {"wrong_axis", "wrong_sign", "wrong_unit"}  # so reads, too, what has stuck
 MIN_REST_SAMPLES = 20
 MIN_RESTS = 3  # to tell whether the bias drifts
 
@@ -87,17 +87,17 @@ def observe_sensor(
     `impossible_times`.
     """
     stream = on_the_arms_clock(run.samples[sensor], run.sensors[sensor], motion)
-    rests = rests_of(run, stream, motion)
-    try:
-        revolutions = [
-            revolution_of(run, stream, motion, finished, settings)
-            for finished in swept(run)
-            if finished.sweep.index not in superseded
-        ]
-    except Fault as fault:
-        if fault.name in MISREAD:
-            check_feeling(run, rests, ())
-        raise
+    rests, revolutions = rests_of(run, stream, motion), list[Observation]()
+    for finished in swept(run):
+        if finished.sweep.index in superseded:
+            continue
+        try:
+            revolutions.append(revolution_of(run, stream, motion, finished, settings))
+        except Fault as fault:
+            if fault.name in MISREAD:
+                check_feeling(run, rests, ())
+                check_other_way(finished.sweep, [each.joint_name for each in revolutions], fault)
+            raise
     dwells = tuple(dwell_readings(run, stream, motion, settings, superseded)) if stream.sensor.has_acceleration else ()
     check_feeling(run, rests, dwells)
     drift = bias_drift(rests)

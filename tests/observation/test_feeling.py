@@ -47,6 +47,15 @@ def test_when_the_last_sweep_is_sound_the_rest_after_it_still_tells() -> None:
         observe_run(stuck_in_sweep(5), SETTINGS)
 
 
+def test_one_that_sticks_at_rest_is_told_from_a_wrong_unit_by_the_turn_the_other_way() -> None:
+    window = next(each.window for each in swept(USUAL) if each.sweep.index == 5)
+    samples, late = USUAL.samples["gyro"].copy(), readings_of(Setup()).between(window.start_s - 0.5, 1e9)
+    noise = np.random.default_rng(5).normal(scale=20, size=(int(late.sum()), 3))
+    samples["counts"][late] = np.round(noise + np.array([20, 150, 10]))
+    with pytest.raises(Fault, match=r"stuck_sensor: in sweep 5 .*; the other way it read as it should"):
+        observe_run(replace(USUAL, samples={"gyro": samples}), SETTINGS)
+
+
 def dwell(name: str, pitch_deg: float, reading: tuple[float, float, float]) -> DwellReading:
     pitch = np.radians(pitch_deg)
     attitude = np.array([[np.cos(pitch), 0, -np.sin(pitch)], [0, 1, 0], [np.sin(pitch), 0, np.cos(pitch)]])
