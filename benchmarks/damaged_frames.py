@@ -21,7 +21,8 @@ from collections import Counter
 from collections.abc import Callable
 from pathlib import Path
 
-sys.path[:0] = [str(Path(__file__).parents[1] / each) for each in ("", "tests")]
+sys.path.insert(0, str(Path(__file__).parents[1] / "tests"))
+sys.path.insert(0, str(Path(__file__).parents[1]))  # before the tests' folders of the same names
 from support.damaged_frames import Sent, build, to_firmware, to_host, write_sound
 from support.damaged_messages import carry_to_rig, carry_to_world, readers
 

@@ -20,7 +20,8 @@ from firmware_host.answers import SampleBatch
 from firmware_host.frames import FrameReader
 from firmware_host.protocol import MESSAGES
 
-sys.path[:0] = [str(Path(__file__).parents[1] / each) for each in ("", "tests")]
+sys.path.insert(0, str(Path(__file__).parents[1] / "tests"))
+sys.path.insert(0, str(Path(__file__).parents[1]))  # before the tests' folders of the same names
 from support.emulated_session import Session
 
 STREAMS = {

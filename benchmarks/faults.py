@@ -24,7 +24,8 @@ from random import Random
 from typing import Any
 from zlib import crc32
 
-sys.path[:0] = [str(Path(__file__).parents[1] / each) for each in ("", "tests")]
+sys.path.insert(0, str(Path(__file__).parents[1] / "tests"))
+sys.path.insert(0, str(Path(__file__).parents[1]))  # before the tests' folders of the same names
 from support.fault_matrix.catalogue import BY_NAME
 from support.fault_matrix.cell import Cell, carry_out, document, span
 from support.fault_matrix.setups import SETUPS

@@ -14,7 +14,8 @@ import subprocess
 import sys
 from pathlib import Path
 
-sys.path[:0] = [str(Path(__file__).parents[1] / each) for each in ("", "tests")]
+sys.path.insert(0, str(Path(__file__).parents[1] / "tests"))
+sys.path.insert(0, str(Path(__file__).parents[1]))  # before the tests' folders of the same names
 from support.long_life import Calibration, Life, complaints, courses, live
 
 ROOT = Path(__file__).parents[1]

@@ -10,7 +10,8 @@ from pathlib import Path
 
 from firmware_host.protocol import BAUD_RATE
 
-sys.path[:0] = [str(Path(__file__).parents[1] / each) for each in ("", "tests")]
+sys.path.insert(0, str(Path(__file__).parents[1] / "tests"))
+sys.path.insert(0, str(Path(__file__).parents[1]))  # before the tests' folders of the same names
 from support.full_rate import CASES, stream
 
 BYTES_PER_S = BAUD_RATE / 10  # of the line
