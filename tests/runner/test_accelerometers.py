@@ -100,6 +100,11 @@ def test_attitudes_alone_calibrate_the_accelerometer(in_attitudes: Finished) -> 
         f"gyro.acceleration_{name}" for name in ("scale_deviation", "scale_std", "bias", "bias_std", "verification")
     }
     assert "attitude error found" in printed and "held out" in printed
+    lines = {line["name"]: line for line in found["budget"]["contributors"]}
+    assert {"noise", "arm's attitudes", "gravity"} <= lines.keys() and "filter's lag" not in lines  # nothing was swept
+    assert found["budget"]["expanded"] == pytest.approx(2 * np.sqrt(np.diag(found["covariance_combined"])))
+    assert np.all(np.diag(np.subtract(found["covariance_combined"], found["covariance"])) >= -1e-15)
+    assert "uncertainty budget" in printed
     for suffix in (".png", ".svg"):
         assert (out / f"accelerometer_gyro{suffix}").stat().st_size > 10_000
 

@@ -123,6 +123,13 @@ def test_dwells_tell_scale_bias_and_angles_as_mounted(finished: tuple[Path, dict
     true = [level * np.cos(np.radians(30)), -level * np.sin(np.radians(30)), -down]
     assert found["field_base_t"] == pytest.approx(true, abs=1e-6)
     assert "magnetometer as mounted" in printed and "no limit judges it" in printed
+    lines = {line["name"]: line for line in found["budget"]["contributors"]}
+    assert {"noise", "arm's attitudes", "size of the field", "drift of the field"} <= lines.keys()
+    assert lines["size of the field"]["half_width"] == pytest.approx(0.5)  # 1 % of 50 µT: nobody said how good they are
+    assert found["budget"]["std"] == pytest.approx(np.sqrt(np.diag(found["covariance_combined"])).tolist())
+    assert found["budget"]["std"][:3] == pytest.approx([0.01 / 3**0.5 * k for k in found["scale"]], rel=0.1)
+    assert 3 * std[:3].max() < 0.01 / 3**0.5
+    assert "size of the field ±0.5 µT" in " ".join(printed.split())
     certificate = (finished[0] / "certificate.html").read_text(encoding="utf-8")
     assert "The bias is that of the magnetometer as mounted" in certificate
     assert not [check for check in result["checks"] if check["name"].startswith("compass")]
@@ -146,6 +153,7 @@ def test_turning_it_over_tells_its_own_bias_from_the_arms_field(
     assert told.returncode == 0, told.stderr
     found = json.loads(told.stdout)["magnetometers"]["compass"]
     assert found["arm_field_in_bias"] == [True, False, False]
+    assert found["scale_std"] == pytest.approx([0.01 / 3**0.5 * k for k in found["scale"]], rel=0.1)  # shared by both
     off = np.array(found["bias_t"]) - 1e-6 * np.array(TRUTH["bias_ut"])
     assert np.all(np.abs(off) < 3 * np.array(found["bias_std_t"]))
     assert found["arm_field_t"][2] == pytest.approx(1e-6 * ARM_FIELD_UT, abs=4 * found["arm_field_std_t"][2])
