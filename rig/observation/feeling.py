@@ -13,7 +13,7 @@ from rig.observation.average import Average
 
 OF_A_SWEEP = 0.5  # of the slowest one's speed: so much no bias changes from rest to rest
 TURNED = 0.5  # of gravity, by which two attitudes in a row must differ to tell
-FELT = 0.1  # of what they differ by
+FELT = 0.05  # of what they differ by; readings in g, given as m/s², are twice that
 REMEDY = "Check the sensor's supply and its bus wiring, then repeat the run"
 
 
