@@ -9,6 +9,7 @@ from rig.data.accelerometer_entries import AccelerometerEntry
 from rig.data.budget_entries import expanded_uncertainties
 from rig.data.result_types import ErrorEntry
 from rig.report.axes import axes_table, triple
+from rig.report.budget_table import assumed_lines
 
 
 def accelerometer_table(name: str, found: AccelerometerEntry) -> Table:
@@ -22,6 +23,7 @@ def accelerometer_table(name: str, found: AccelerometerEntry) -> Table:
 def accelerometer_lines(found: AccelerometerEntry) -> Iterator[str]:
     """What stands below the table."""
     yield f"relative to gravity, {found.gravity_m_s2:.6g} m/s²; {len(found.dwells)} attitudes, {found.sweeps} sweeps"
+    yield from assumed_lines(found.budget)
     skew, std = np.degrees(found.non_orthogonality_rad), np.degrees(found.non_orthogonality_std_rad)
     yield f"non-orthogonality yz zx xy: {triple(skew, '+.4f')} ° (± {2 * std.max():.4f})"
     off, known = 1e3 * found.attitude_error_rad, 2e3 * found.attitude_error_std_rad

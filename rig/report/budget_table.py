@@ -1,11 +1,21 @@
 """The uncertainty budget as a person reads it in the terminal."""
 
+from collections.abc import Iterator
+
 from rich.table import Table
 
 from rig.data.budget_entries import BudgetEntry
 from rig.station.plain_text import plain
 
+NOT_GIVEN = "is not given"
 NEGLIGIBLE = 0.001  # of every variance: such lines are in result.json alone
+
+
+def assumed_lines(budget: BudgetEntry | None) -> Iterator[str]:
+    """What was assumed because the configuration does not say it."""
+    for line in () if budget is None else budget.contributors:
+        if line.half_width is not None and line.source.endswith(NOT_GIVEN):
+            yield f"{line.name}: ± {line.half_width:.3g} {line.unit} is assumed, for {line.source}"
 
 
 def budget_table(budget: BudgetEntry, unit: str = "rad/s", per_unit: float = 1.0) -> Table:

@@ -135,7 +135,7 @@ def test_its_accelerometers_are_calibrated_where_those_of_the_board_are(tmp_path
     imu: dict[str, Any] = {
         "sensors": {"kvh": {"rate_hz": 250, "acceleration": {"range_g": 10}}},
         "procedure": {"name": "imu", "dwell_s": 2},
-        "site": {"gravity_m_s2": 9.80665},
+        "site": {"gravity_m_s2": 9.80665, "gravity_uncertainty_m_s2": 1e-4},
     }
     done = rig("run", configuration(tmp_path, imu), "--out", tmp_path / "run", timeout_s=800)
     assert done.returncode == 0, done.stderr + done.stdout

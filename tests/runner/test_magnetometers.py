@@ -129,7 +129,9 @@ def test_dwells_tell_scale_bias_and_angles_as_mounted(finished: tuple[Path, dict
     assert found["budget"]["std"] == pytest.approx(np.sqrt(np.diag(found["covariance_combined"])).tolist())
     assert found["budget"]["std"][:3] == pytest.approx([0.01 / 3**0.5 * k for k in found["scale"]], rel=0.1)
     assert 3 * std[:3].max() < 0.01 / 3**0.5
-    assert "size of the field ±0.5 µT" in " ".join(printed.split())
+    said = " ".join(printed.split())
+    assert "size of the field ±0.5 µT" in said
+    assert "± 0.5 µT is assumed, for site.magnetic_field_uncertainty_ut is not given" in said
     certificate = (finished[0] / "certificate.html").read_text(encoding="utf-8")
     assert "The bias is that of the magnetometer as mounted" in certificate
     assert not [check for check in result["checks"] if check["name"].startswith("compass")]
