@@ -224,7 +224,10 @@ class Board:
     def _ask(self, name: str, values: dict[str, Any] | None = None, timeout_s: float | None = None) -> Frame:
         answer = self._link.ask(name, values, timeout_s or self._timeout_s)
         if answer.name == "error":
-            raise self._refusal(answer)
+            refusal = self._refusal(answer)
+            if self._streaming and refusal.name == "not_configured":  # it was: asked sooner than it said hello again
+                raise self._restarted(self._link.ask("hello", None, self._timeout_s)) from refusal
+            raise refusal
         return answer
 
     def _take(self, frame: Frame, host_time_s: float, request: str | None) -> None:
@@ -240,14 +243,14 @@ class Board:
         elif frame.name == "error" and frame.values["reply_to"] == 0:
             self._link.fail(self._refusal(frame))
         elif frame.name == "identity" and request is None and self._streaming:
-            self._link.fail(
-                BoardError(
-                    "board_error",
-                    f"the board on {self._link.port} restarted while streaming (reset by: {reset_cause(frame)})",
-                    "Check its supply; a fault or watchdog is an error in the firmware: "
-                    "keep the run folder and report it",
-                )
-            )
+            self._link.fail(self._restarted(frame))
+
+    def _restarted(self, identity: Frame) -> BoardError:
+        return BoardError(
+            "board_error",
+            f"the board on {self._link.port} restarted while streaming (reset by: {reset_cause(identity)})",
+            "Check its supply; a fault or watchdog is an error in the firmware: keep the run folder and report it",
+        )
 
     def _refusal(self, frame: Frame) -> BoardError:
         """An `error` frame as the error it is: named as in the table, and naming the part it is about."""

@@ -155,7 +155,8 @@ def flash_by_drive(image: bytes, drive: Path, timeout_s: float = DRIVE_TIMEOUT_S
     deadline_s = time.monotonic() + timeout_s
     while time.monotonic() < deadline_s:
         try:
-            back = _is_mounted(drive) and not copied.exists()  # looked at first: with it came what may have failed
+            # In this order: a drive that is away shows no image either, and with it comes what may have failed.
+            back = not copied.exists() and _is_mounted(drive)
             if failure.exists():
                 raise BoardError(
                     "flash_failed",

@@ -1,8 +1,10 @@
 """A serial port or `socket://host:port`, by pyserial: bytes, and OSError for all that goes wrong."""
 
+import time
+
 import serial
 
-READ_TIMEOUT_S = 0.005  # pyserial waits for all bytes asked for or this long, so it is the delay of every read
+READ_TIMEOUT_S = 0.005  # the delay of every read: bytes come a few at a time, and each of them would wake the reader
 _READ_SIZE = 65536
 
 
@@ -11,12 +13,16 @@ class SerialPort:
 
     def __init__(self, port: str, baud: int) -> None:
         try:
-            self._serial = serial.serial_for_url(port, baudrate=baud, timeout=READ_TIMEOUT_S, exclusive=True)
+            self._serial = serial.serial_for_url(port, baudrate=baud, timeout=0, exclusive=True)
         except ValueError as error:  # what is no port's name, or no baud rate of it
             raise OSError(str(error)) from error
 
     def read(self) -> bytes:
-        """What came within `READ_TIMEOUT_S`."""
+        """What came within `READ_TIMEOUT_S`; when the port closes, what came before it first.
+
+        pyserial would wait itself, but what it has read it drops when the port closes while it waits for more.
+        """
+        time.sleep(READ_TIMEOUT_S)
         return bytes(self._serial.read(_READ_SIZE))
 
     def write(self, data: bytes) -> None:

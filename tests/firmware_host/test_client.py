@@ -19,6 +19,7 @@ from firmware_host.client import Board, Calibration, SampleBatch
 from firmware_host.errors import BoardError
 from firmware_host.frames import decode, encode
 from firmware_host.samples import IMU_SAMPLE_DTYPE, SAMPLE_DTYPE
+from firmware_host.serial_port import SerialPort
 from rig.config.link_budget import Stream
 from support.host_board import HostBoard, configured, convert, settle
 from support.worlds import fresh_host
@@ -562,6 +563,27 @@ def test_a_board_that_restarts_while_streaming_is_reported(wire: tuple[BoardOnAW
         wire[0].reset.set()
         error, _ = fault_of(board)
     assert error.name == "board_error" and "restarted" in error.what
+
+
+def test_a_board_that_restarts_and_is_asked_before_it_says_so_is_reported(wire: tuple[BoardOnAWire, str]) -> None:
+    with closing(streaming(wire)) as board:
+        board.keep([0], duration_s=1)
+        wire[0].reset.set()
+        wait_for(lambda: not wire[0].reset.is_set())
+        with pytest.raises(BoardError, match="restarted while streaming"):
+            board.observe(0, 0, 0, 1_000_000, speed_rad_s=1.0)
+
+
+def test_what_came_before_the_port_closed_is_read() -> None:
+    with socket.create_server((HOST, 0)) as server:
+        port = SerialPort(f"socket://{HOST}:{server.getsockname()[1]}", protocol.BAUD_RATE)
+        far_end, _ = server.accept()
+        far_end.sendall(bytes(range(100)))
+        far_end.close()
+        assert port.read() == bytes(range(100))
+        with pytest.raises(OSError):
+            port.read()
+        port.close()
 
 
 def test_a_sensor_that_falls_silent_is_reported(wire: tuple[BoardOnAWire, str]) -> None:
