@@ -155,9 +155,10 @@ class Arm:
     def move(self, motion: Motion, watch: Callable[[], None] = _nothing) -> None:
         """Make one movement and return when the arm has arrived and stands still.
 
-        `watch` is called at least every 20 ms; what it raises stops the arm and goes on to the caller.
+        `watch` is called before and then at least every 20 ms; what it raises stops the arm and goes on to the caller.
         """
         with self._stopping_on_error():
+            watch()
             self._doing = motion.name
             self._request(Move(motion.target_q_rad, motion.speed_rad_s, motion.acceleration_rad_s2))
             asked_s = time.monotonic()
@@ -207,8 +208,8 @@ class Arm:
         """Stop the arm if it was under control, and end the child process."""
         outcome = self.stop()
         self._link.close()
-        if not outcome.at_rest:
-            # A client that had lost the arm and found it again has started its program anew, behind that stop.
+        if self._holds_arm and (self._problem is not None or not outcome.at_rest):
+            # A client that had lost the arm and found it again may have started its program anew, behind that stop.
             with suppress(OSError), Dashboard(self._host, LAST_STOP_S) as dashboard:
                 dashboard.stop_program()
 

@@ -158,8 +158,7 @@ class Rig:
             source.start()
         host_s, turner_s = time.monotonic(), turner.latest.time_s
         while silent := self.devices.acquisition.silent():
-            for source in sources:
-                source.check(turner.latest.time_s)
+            self._check()
             turner.check()
             # By both clocks: this machine may be busy, and the controller's clock another's to run.
             if min(time.monotonic() - host_s, turner.latest.time_s - turner_s) > FIRST_SAMPLE_TIMEOUT_S:
@@ -170,7 +169,7 @@ class Rig:
                 )
             time.sleep(0.005)
         if self.whole_plan.dwells:
-            self._wait(self.devices.acquisition.settling.learned, AT_REST_TIMEOUT_S)
+            self._wait(self.devices.acquisition.settling.learned, AT_REST_TIMEOUT_S, self._check)
         self.recording.station.event(SamplingStarted())
 
     def move(self, transfer: Transfer) -> None:
@@ -227,7 +226,7 @@ class Rig:
                 self.devices.turner.rest(dwell.duration_s, lambda: self._watch(dwell))
             self.recording.note(DwellFinished(dwell))
 
-    def _wait(self, until: Callable[[], bool], at_most_s: float, watch: Callable[[], None] = lambda: None) -> bool:
+    def _wait(self, until: Callable[[], bool], at_most_s: float, watch: Callable[[], None]) -> bool:
         """Stand still until something is so; False when it was not within so much of the controller's time."""
         turner = self.devices.turner
         began_s = turner.latest.time_s
@@ -264,11 +263,15 @@ class Rig:
         self._done_s += step.duration_s
         self.recording.station.event(StepFinished(*place, took_s))
 
-    def _watch(self, step: Step) -> None:
-        """Called many times a second while the arm is busy: look after board and recording, tell the operator."""
+    def _check(self) -> None:
+        """Raise what has become of the sources or the recording."""
         for source in self.devices.sources:
             source.check(self.devices.turner.latest.time_s)
         self.recording.check()
+
+    def _watch(self, step: Step) -> None:
+        """Called many times a second while the arm is busy: look after board and recording, tell the operator."""
+        self._check()
         state = self.devices.turner.latest
         within_s = min(state.time_s - self._step_started_s, step.duration_s)
         # A script may make steps of its own, one that takes no time too.

@@ -30,9 +30,8 @@ if TYPE_CHECKING:
 
 IDLE_POLL_S = 0.2
 BUSY_POLL_S = 0.001  # wall time for which the sockets are not looked at while ticks are due one after the other
-GARBAGE = (
-    5_000  # objects made and not gone, between two looks for those that hold each other; ten clients leave so many
-)
+# Objects made and not yet gone, between two looks for those that hold each other: ten clients leave so many.
+GARBAGE = 5_000
 LEAP = 4  # ticks at most that are made in one go: a packet's interval at 125 Hz
 ARM_LAG_S = 0.04  # of the world's time, that a reader of the arm's states may be behind: five packets at 125 Hz
 SERIAL_LAG_S = 1.0  # … and a reader of the serial line, where nothing is lost that the system can hold

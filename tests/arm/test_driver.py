@@ -212,6 +212,17 @@ def test_a_program_that_a_reconnecting_client_leaves_behind_is_stopped(laborator
     until(lambda: not laboratory.state()["program_running"], 5.0)
 
 
+def test_one_that_it_leaves_behind_a_stop_that_was_seen_is_stopped_too(laboratory: WorldHandle) -> None:
+    with Arm(laboratory.host) as arm:
+        arm.take_control(*PAYLOAD)
+        with pytest.raises(Fault) as fault:
+            arm.move(turn(arm.latest.q_rad, 6.0), AtSpeed(arm, lambda: laboratory.control({"do": "stop_program"})))
+        assert "at rest" in fault.value.what
+        upload(laboratory, b"def rtde_control():\n while True:\n  sync()\n end\nend\n")
+        until(lambda: laboratory.state()["program_running"], 5.0)
+    until(lambda: not laboratory.state()["program_running"], 5.0)
+
+
 @pytest.mark.parametrize(("name", "kind"), [("arm_driver_died", "SIGKILL"), ("arm_driver_hung", "SIGSTOP")])
 def test_a_child_that_dies_or_hangs_mid_move_leaves_a_standing_arm_within_a_second(
     laboratory: WorldHandle, name: str, kind: str
@@ -270,6 +281,18 @@ def test_an_error_of_the_watch_stops_the_arm_and_is_kept(laboratory: WorldHandle
             arm.move(turn(arm.latest.q_rad, 6.0), AtSpeed(arm, complain))
         assert fault.value.name == "board_link_lost"
         assert stands(laboratory)
+
+
+def test_what_the_watch_knows_already_keeps_the_arm_from_moving(laboratory: WorldHandle) -> None:
+    def complain() -> None:
+        raise Fault("board_link_lost", "the board is gone", "plug it in")
+
+    states: list[ArmState] = []
+    with Arm(laboratory.host, states.append) as arm:
+        arm.take_control(*PAYLOAD)
+        with pytest.raises(Fault):
+            arm.move(turn(arm.latest.q_rad, 6.0), complain)
+    assert states and not any(map(any, (state.qd_rad_s for state in states)))
 
 
 def test_a_state_that_cannot_be_passed_on_stops_the_arm(laboratory: WorldHandle) -> None:

@@ -17,6 +17,7 @@ from typing import Any
 import pytest
 
 from rig.data.run_file import read_run
+from support.fault_matrix.setups import SETUPS
 from support.worlds import World, WorldHandle, fresh_host, hardware, merge
 
 # The driver names each of these faults in tests/arm/test_driver.py as well: a few whole runs are enough for a change.
@@ -178,6 +179,17 @@ def test_a_fault_during_a_sweep_stops_the_arm_and_keeps_the_data(
     assert f"rig resume {rig.out}" in errors
     assert rig.stopped_after_s() == pytest.approx(0, abs=0.1)
     assert len(read_run(rig.out / "run.h5").arm) > 0
+
+
+def test_nothing_moves_when_the_board_goes_while_the_sensors_are_first_listened_to(start: Start) -> None:
+    rig = start(merge(SETUPS["imu"], {"world": {"time_scale": 1}}))
+    began_s = rig.until(lambda state: state["program_running"])["time_s"]
+    rig.until(lambda state: state["time_s"] > began_s + 1.5)  # of 3 s
+    rig.world.control({"do": "unplug_board"})
+    status, errors = rig.end()
+    assert status == 3 and "rig: board_link_lost: " in errors, errors
+    run = read_run(rig.out / "run.h5")
+    assert len(run.arm) > 0 and not run.arm["qd_rad_s"].any()
 
 
 def test_a_run_folder_that_is_removed_during_the_run_is_a_named_fault(start: Start) -> None:
