@@ -7,7 +7,7 @@ import numpy as np
 from rig.data.settings import Site
 from rig.estimation.arrays import Array
 from rig.estimation.attitude_error import AttitudeError
-from rig.estimation.budget import Budget, Contributor
+from rig.estimation.budget import NOT_GIVEN, Budget, Contributor
 from rig.estimation.earth import STANDARD_GRAVITY_M_S2
 from rig.estimation.felt import Dwells, Movement, Sweeps
 from rig.estimation.imu import ImuSolution
@@ -33,17 +33,8 @@ MICROTESLA: Final = 1e6
 
 def accelerometer_budget(solution: ImuSolution, dwells: Dwells, sweeps: Sweeps, site: Site, lag_s: float) -> Budget:
     """Of the solution found from these; `lag_s` is how late the sensor's own filter may be."""
-    scale = 1 / np.linalg.norm(solution.matrix, axis=1)
-    jacobian = scale_and_bias(solution.matrix, scale, len(solution.covariance))
-    spread = Spread(
-        scale=scale,
-        covariance=jacobian @ solution.covariance @ jacobian.T,
-        response=jacobian @ solution.response,
-        noise=Movement(dwells, sweeps).noise(),
-        attitude_error=solution.attitude_error,
-        chi_square=solution.chi_square,
-        freedom=solution.freedom,
-    )
+    noise, left = Movement(dwells, sweeps).noise(), (solution.chi_square, solution.freedom)
+    spread = _spread(solution, solution.response, noise, solution.attitude_error, left)
     others = [_lagging(spread, dwells, sweeps, lag_s)] if len(sweeps.speeds_rad_s) else []
     return reference_budget(spread, _gravity(site), others)
 
@@ -57,20 +48,25 @@ def magnetometer_budget(
 ) -> Budget:
     """Of the solution found in attitudes (N, 3, 3), flange to base, with these variances (N, 3) of the means."""
     alike, drift = tested
-    scale = 1 / np.linalg.norm(solution.matrix, axis=1)
     error = solution.fit.attitude_error or AttitudeError(0.0, 0.0)
     theta = np.concatenate([solution.matrix.ravel(), solution.field_table_t, solution.bias_t])
-    jacobian = scale_and_bias(solution.matrix, scale, len(theta))
-    spread = Spread(
-        scale=scale,
-        covariance=jacobian @ solution.covariance @ jacobian.T,
-        response=jacobian @ response_in_attitudes(theta, attitudes, variances_t2, error.std_rad),
-        noise=np.diag(variances_t2.ravel()),
-        attitude_error=error,
-        chi_square=alike.chi_square,
-        freedom=alike.degrees_of_freedom,
-    )
+    response = response_in_attitudes(theta, attitudes, variances_t2, error.std_rad)
+    left = alike.chi_square, alike.degrees_of_freedom
+    spread = _spread(solution, response, np.diag(variances_t2.ravel()), error, left)
     return reference_budget(spread, _field(site), [_drifting(spread, solution.matrix, attitudes, drift)])
+
+
+def _spread(
+    solution: ImuSolution | MagnetometerSolution,
+    response: Array,
+    noise: Array,
+    error: AttitudeError,
+    left: tuple[float, int],
+) -> Spread:
+    """Of scale and bias, from the `response` (p, n) of all that was found; `left`: χ² of the residuals, its freedom."""
+    scale = 1 / np.linalg.norm(solution.matrix, axis=1)
+    told = scale_and_bias(solution.matrix, scale, len(solution.covariance))
+    return Spread(scale, told @ solution.covariance @ told.T, told @ response, noise, error, *left)
 
 
 def _gravity(site: Site) -> KnownSize:
@@ -78,7 +74,7 @@ def _gravity(site: Site) -> KnownSize:
     if site.gravity_expanded_m_s2 is not None:
         return KnownSize("gravity", site.gravity_expanded_m_s2 / size, True, size, "m/s²", said)
     half_width = ANY_GRAVITY_M_S2 if size == STANDARD_GRAVITY_M_S2 else LOCAL_GRAVITY_M_S2
-    return KnownSize("gravity", half_width / size, False, size, "m/s²", f"{said} is not given")
+    return KnownSize("gravity", half_width / size, False, size, "m/s²", f"{said} {NOT_GIVEN}")
 
 
 def _field(site: Site) -> KnownSize:
@@ -87,7 +83,7 @@ def _field(site: Site) -> KnownSize:
     if site.magnetic_field_expanded_t is not None:
         relative = site.magnetic_field_expanded_t / site.magnetic_field_t
         return KnownSize(SIZE_OF_FIELD, relative, True, size_ut, "µT", said)
-    return KnownSize(SIZE_OF_FIELD, UNSTATED_FIELD, False, size_ut, "µT", f"{said} is not given")
+    return KnownSize(SIZE_OF_FIELD, UNSTATED_FIELD, False, size_ut, "µT", f"{said} {NOT_GIVEN}")
 
 
 def _lagging(spread: Spread, dwells: Dwells, sweeps: Sweeps, lag_s: float) -> Contributor:
@@ -106,7 +102,7 @@ def _drifting(spread: Spread, matrix: Array, attitudes: Array, drift: FieldDrift
     along = np.linspace(-0.5, 0.5, len(attitudes))[:, None, None] * (matrix @ np.swapaxes(attitudes, -1, -2))
     patterns = change_t * np.moveaxis(along, -1, 0).reshape(3, -1)
     if drift is None:
-        said = "procedure.field_test_s is not given"
+        said = f"procedure.field_test_s {NOT_GIVEN}"
         return assumed("drift of the field", MICROTESLA * change_t, "µT", said, spread.of(patterns))
     source = "tests at home"
     return Contributor("drift of the field", "A", "normal", None, "", source, np.inf, spread.of(patterns))

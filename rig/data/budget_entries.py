@@ -39,13 +39,11 @@ class BudgetEntry(Entry):
     freedom: Freedom6
 
 
-def expanded_uncertainties(
-    budget: BudgetEntry | None, covariance: Sequence[Sequence[float]], coverage_factor: float = 2.0
-) -> Sequence[float]:
-    """(6,) of scale and bias: U of the budget; without one, what the solution's covariance makes of it."""
+def expanded_uncertainties(budget: BudgetEntry | None, covariance: Sequence[Sequence[float]]) -> Sequence[float]:
+    """(6,) of scale and bias: U of the budget; without one, two standard deviations by the solution's covariance."""
     if budget is not None:
         return budget.expanded
-    return [coverage_factor * covariance[i][i] ** 0.5 for i in range(len(covariance))]
+    return [2 * covariance[i][i] ** 0.5 for i in range(len(covariance))]
 
 
 class BiasProcessEntry(Entry):

@@ -15,6 +15,7 @@ from rig.estimation.arrays import Array
 from rig.estimation.earth import EARTH_RATE_RAD_S, STANDARD_GRAVITY_M_S2
 from rig.estimation.explained import Explained, Seen
 
+NOT_GIVEN = "is not given"  # ends the source of what is assumed because the configuration does not say it
 COVERAGE_FACTOR = 2.0
 
 
@@ -147,7 +148,7 @@ def _contributors(explained: Explained, unknown: Unknown) -> Iterator[Contributo
         yield found("Earth's rate", "found from sweeps and rests", of(np.moveaxis(spread, -1, 0) @ matrix.T))
     elif unknown.earth_rate:
         along = EARTH_RATE_RAD_S * np.moveaxis(seen.attitudes, -1, 0) @ matrix.T  # for each axis of the base
-        yield assumed("Earth's rate", EARTH_RATE_RAD_S, "rad/s", "site.latitude_deg is not given", along)
+        yield assumed("Earth's rate", EARTH_RATE_RAD_S, "rad/s", f"site.latitude_deg {NOT_GIVEN}", along)
     per_m_s2 = unknown.g_sensitivity_rad_s_per_g / STANDARD_GRAVITY_M_S2
     any_sensitivity = [per_m_s2 * np.outer(row, column) for row in np.eye(3) for column in np.eye(3)]
     sensitivity = solution.g_sensitivity

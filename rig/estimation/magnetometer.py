@@ -90,7 +90,7 @@ def uniformity(
     attitude_error_rad: float,
 ) -> Uniformity:
     """What the best fit with attitudes off by so much leaves, from the `solution` of these readings."""
-    from scipy.stats import chi2
+    from scipy.special import chdtri
 
     m, r, v = (np.asarray(a, dtype=np.float64) for a in (readings_t, attitudes, variances_t2))
     v_bar = np.zeros_like(m)
@@ -99,7 +99,7 @@ def uniformity(
     theta, _ = most_likely(start, m, r, v_bar, white, norm_known=True)
     left = whitened(white, m - predicted(theta, r, v_bar))
     freedom = left.size - FREE
-    return Uniformity(float(np.sum(left**2)), freedom, float(chi2.isf(FALSE_ALARM, freedom)), attitude_error_rad)
+    return Uniformity(float(np.sum(left**2)), freedom, float(chdtri(freedom, FALSE_ALARM)), attitude_error_rad)
 
 
 @dataclass(frozen=True, slots=True)
@@ -122,12 +122,12 @@ class FieldDrift:
 
 def field_drift(means_t: ArrayLike, variances_t2: ArrayLike, repeatability_rad: float) -> FieldDrift:
     """Of each reading (N, 3), N ≥ 2, from the first; the attitude comes back to `repeatability_rad` about each axis."""
-    from scipy.stats import chi2
+    from scipy.special import chdtri
 
     m, v = (np.asarray(a, dtype=np.float64) for a in (means_t, variances_t2))
     changes = m[1:] - m[0]
     stds = np.sqrt(v[1:] + v[0] + 2 * (repeatability_rad * np.linalg.norm(m[0])) ** 2)
     squares = np.sum((changes / stds) ** 2, axis=1)
     worst = int(np.argmax(squares))
-    limit = float(chi2.isf(FALSE_ALARM / len(changes), 3))
+    limit = float(chdtri(3, FALSE_ALARM / len(changes)))
     return FieldDrift(changes[worst], stds[worst], float(squares[worst]), limit)

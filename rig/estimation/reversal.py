@@ -46,7 +46,7 @@ def separate(biases_t: Array, covariances_t2: Array, matrices: Array, mountings:
     Raises Refused `mounting_not_turned` where all mountings are one, Fault `reversal_contradicts` where the runs do not
     agree on what turning over leaves alone.
     """
-    from scipy.stats import chi2
+    from scipy.special import chdtri
 
     together = _together(mountings)
     if together.shape[1] == 3:
@@ -55,9 +55,8 @@ def separate(biases_t: Array, covariances_t2: Array, matrices: Array, mountings:
             "the sensor was mounted alike in all runs",
             "Turn it over on its extension, say so in its `mounting`, and run again",
         )
-    told = (
-        np.eye(3) - together @ together.T
-    )  # the directions of the holder's in which a is found; it is 0 in the others
+    # The directions of the holder's in which a is found; it is 0 in the others.
+    told = np.eye(3) - together @ together.T
     white = np.linalg.inv(np.linalg.cholesky(covariances_t2))
     design = np.concatenate([np.broadcast_to(np.eye(3), matrices.shape), matrices @ mountings @ told], axis=-1)
     whitened = (white @ design).reshape(-1, 6)
@@ -65,7 +64,7 @@ def separate(biases_t: Array, covariances_t2: Array, matrices: Array, mountings:
     found = inverse @ (white @ biases_t[..., None]).reshape(-1)
     left = (white @ (biases_t - design @ found)[..., None]).reshape(-1)
     chi_square, freedom = float(left @ left), len(left) - (6 - together.shape[1])
-    limit = float(chi2.isf(FALSE_ALARM, freedom))
+    limit = float(chdtri(freedom, FALSE_ALARM))
     if chi_square > limit:
         raise Fault(
             "reversal_contradicts",

@@ -92,7 +92,7 @@ def observe_sensor(
         if finished.sweep.index in superseded:
             continue
         try:
-            revolutions.append(revolution_of(run, stream, motion, finished, settings))
+            revolutions.append(_revolution(run, stream, motion, finished, settings))
         except Fault as fault:
             if fault.name in MISREAD:
                 check_feeling(run, rests, ())
@@ -116,7 +116,7 @@ def each_sweep(
     found: dict[int, Observation | Fault] = {}
     for finished in swept(run):
         try:
-            found[finished.sweep.index] = revolution_of(run, stream, motion, finished, settings)
+            found[finished.sweep.index] = _revolution(run, stream, motion, finished, settings)
         except Fault as fault:
             found[finished.sweep.index] = fault
     return found
@@ -144,10 +144,9 @@ def rests_of(run: RunData, stream: Stream, motion: ArmMotion) -> tuple[Average, 
     return tuple(rest for rest in found if rest is not None)
 
 
-def revolution_of(
+def _revolution(
     run: RunData, stream: Stream, motion: ArmMotion, finished: Finished, settings: ObservationThresholds
 ) -> Observation:
-    """One finished sweep's. Raises Fault as `observe_sensor` does."""
     turn = find_revolution(motion, finished.sweep, finished.window, settings)
     seen = _observation(stream, motion, finished.sweep, turn, settings, as_before=_as_before(run))
     if stream.sensor.has_acceleration and run.settings.planned_dwells:

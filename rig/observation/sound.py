@@ -1,15 +1,13 @@
 """What of a recording counts when its run is resumed: what every sensor has recorded soundly."""
 
-from contextlib import suppress
-
 from rig.data.run_file import RunData
 from rig.data.settings import ObservationThresholds
 from rig.errors import Fault
-from rig.observation.acceleration import DwellReading, dwell_reading
+from rig.observation.acceleration import DwellReading, each_dwell
 from rig.observation.average import on_the_arms_clock
-from rig.observation.observe import check_feeling, rests_of, revolution_of
+from rig.observation.observe import check_feeling, each_sweep, rests_of
 from rig.observation.timebase import ArmMotion
-from rig.observation.windows import dwelt, finished_dwells, finished_sweeps, swept
+from rig.observation.windows import finished_dwells, finished_sweeps
 
 
 def sound_sweeps(run: RunData, settings: ObservationThresholds) -> frozenset[int]:
@@ -33,22 +31,13 @@ def _sound(run: RunData, settings: ObservationThresholds) -> frozenset[int]:
 
 def _sound_for(run: RunData, sensor: str, motion: ArmMotion, settings: ObservationThresholds) -> frozenset[int]:
     """Nothing of a sensor that once did not feel what the arm did: when it began nobody knows."""
-    sound, dwells = set[int](), list[DwellReading]()
     try:
         stream = on_the_arms_clock(run.samples[sensor], run.sensors[sensor], motion)
-    except Fault:
-        return frozenset()
-    for finished in swept(run):
-        with suppress(Fault):
-            revolution_of(run, stream, motion, finished, settings)
-            sound.add(finished.sweep.index)
-    for dwelt_in in dwelt(run):
-        with suppress(Fault):
-            if stream.sensor.has_acceleration:
-                dwells.append(dwell_reading(stream, motion, dwelt_in, settings))
-            sound.add(dwelt_in.dwell.index)
-    try:
+        readings = each_dwell(run, stream, motion, settings)
+        dwells = [each for each in readings.values() if isinstance(each, DwellReading)]
         check_feeling(run, rests_of(run, stream, motion), dwells)
     except Fault:
         return frozenset()
-    return frozenset(sound)
+    found = {**each_sweep(run, stream, motion, settings), **readings}
+    refused = {index for index, each in found.items() if isinstance(each, Fault)}
+    return (finished_sweeps(run) | finished_dwells(run)) - refused

@@ -5,9 +5,9 @@ from collections.abc import Iterator
 from rich.table import Table
 
 from rig.data.budget_entries import BudgetEntry
+from rig.estimation.budget import NOT_GIVEN
 from rig.station.plain_text import plain
 
-NOT_GIVEN = "is not given"
 NEGLIGIBLE = 0.001  # of every variance: such lines are in result.json alone
 
 

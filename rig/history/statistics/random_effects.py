@@ -3,7 +3,7 @@
 from dataclasses import dataclass
 
 import numpy as np
-from scipy import stats
+from scipy.special import stdtr, stdtrit
 
 from rig.estimation.arrays import Array
 
@@ -31,11 +31,11 @@ class Fitted:
     @property
     def coverage_factor(self) -> float:
         """Student's, for 95 %."""
-        return float(stats.t.ppf((1 + CONFIDENCE) / 2, self.freedom))
+        return float(stdtrit(self.freedom, (1 + CONFIDENCE) / 2))
 
     def p_value(self, index: int) -> float:
         """How likely a coefficient as far from 0 is where the true one is 0."""
-        return float(2 * stats.t.sf(abs(self.coefficients[index]) / self.std[index], self.freedom))
+        return float(2 * stdtr(self.freedom, -abs(self.coefficients[index]) / self.std[index]))
 
     def at(self, row: Array) -> tuple[Array, Array]:
         """The model's value and its std at rows (…, p) of a design."""
