@@ -3,7 +3,6 @@
 import os
 import signal
 import subprocess
-import sys
 import time
 from collections.abc import Callable, Iterator, Mapping
 from contextlib import ExitStack, contextmanager, suppress
@@ -12,8 +11,8 @@ from typing import Any
 
 import yaml
 
+from support.fault_matrix.commands import Command, Start
 from support.fault_matrix.wires import ARM_PORTS, Wire, wires
-from support.paths import ROOT
 from support.worlds import WorldHandle, hardware, worlds
 
 BOARD_PORT = 7321
@@ -26,35 +25,28 @@ POLL_S = 0.02
 class Bench:
     """A laboratory with a run in it. `wire` holds the wires by name: those of the arm, and `board`."""
 
-    def __init__(self, world: WorldHandle, wire: dict[str, Wire], config: Path, environment: Mapping[str, str]) -> None:
+    def __init__(
+        self, world: WorldHandle, wire: dict[str, Wire], config: Path, environment: Mapping[str, str], start: Start
+    ) -> None:
         self.world, self.wire, self.config = world, wire, config
+        self._start = start
         self.out = config.parent / "run"
-        self.process: subprocess.Popen[str] | None = None
-        self._environment = {**os.environ, **environment}
+        self.process: Command | None = None
+        self._environment = environment
         self.companions: list[subprocess.Popen[str]] = []  # other programs that a fault has started
 
     # -- the command -------------------------------------------------------------------------------------------------
     def start(self) -> None:
         self.process = self.rig("run", str(self.config), "--out", str(self.out), "--yes")
 
-    def rig(self, *arguments: str) -> subprocess.Popen[str]:
-        """`rig …`, in a session of its own, as a terminal would start it."""
-        with (self.config.parent / f"{arguments[0]}.txt").open("w", encoding="utf-8") as errors:
-            return subprocess.Popen(
-                [sys.executable, "-m", "rig", *arguments],
-                cwd=ROOT,
-                env=self._environment,
-                stdin=subprocess.DEVNULL,
-                stdout=subprocess.DEVNULL,
-                stderr=errors,
-                text=True,
-                start_new_session=True,
-            )
+    def rig(self, *arguments: str) -> Command:
+        """`rig …`"""
+        return self._start(arguments, self.config.parent / f"{arguments[0]}.txt", self._environment)
 
     @property
     def running(self) -> bool:
         assert self.process is not None
-        return self.process.poll() is None
+        return self.process.status is None
 
     @property
     def pid(self) -> int:
@@ -86,9 +78,9 @@ class Bench:
 
     def ended(self, timeout_s: float) -> bool:
         """Wait for the end of the command."""
-        assert self.process is not None
-        with suppress(subprocess.TimeoutExpired):
-            self.process.wait(timeout_s)
+        deadline_s = time.monotonic() + timeout_s
+        while self.running and time.monotonic() < deadline_s:
+            time.sleep(POLL_S)
         return not self.running
 
     def said(self, command: str) -> str:
@@ -105,9 +97,11 @@ class Bench:
         for pid in pids:
             with suppress(ProcessLookupError):
                 os.kill(pid, signal.SIGKILL)
-        for each in [*self.companions, *([self.process] if self.process else [])]:
+        for each in self.companions:
             each.kill()
             each.wait()
+        if self.process is not None:
+            self.ended(END_S)
 
 
 def children(pid: int) -> list[int]:
@@ -125,7 +119,7 @@ def alive(pid: int) -> bool:
 
 
 @contextmanager
-def bench(folder: Path, changes: Mapping[str, Any], environment: Mapping[str, str]) -> Iterator[Bench]:
+def bench(folder: Path, changes: Mapping[str, Any], environment: Mapping[str, str], start: Start) -> Iterator[Bench]:
     """A laboratory with these changes to the ideal demonstration, and wires between it and a rig that has not begun."""
     folder.mkdir(parents=True)
     with ExitStack() as stack:
@@ -136,6 +130,6 @@ def bench(folder: Path, changes: Mapping[str, Any], environment: Mapping[str, st
         document = yaml.safe_load(config.read_text(encoding="utf-8"))
         document["arm"]["host"], document["board"]["port"] = host, f"socket://{host}:{BOARD_PORT}"
         config.write_text(yaml.safe_dump(document), encoding="utf-8")
-        running = Bench(world, wire, config, environment)
+        running = Bench(world, wire, config, environment, start)
         stack.callback(running.end)
         yield running

@@ -23,6 +23,7 @@ LINK = frozenset({"arm_link_lost", "arm_driver_died", "arm_driver_hung"})
 BOARD = frozenset({"board_link_lost", "board_error", "lost_samples", "no_samples"})
 RECONNECTED = frozenset({"program_stopped"})  # a client that finds a lost arm again starts its program anew
 LINK_S, DRIVER_S, SUPERVISOR_S, BOARD_S = 0.8, 0.5, 2.0, 2.0  # silence that tells, docs/architecture.md
+HELLO_S, CLOSED_S = 0.5, 0.3  # a board that has restarted says so, docs/protocol.md; a port that closes is read
 
 
 def nothing(bench: Bench, random: Random) -> None:
@@ -31,11 +32,12 @@ def nothing(bench: Bench, random: Random) -> None:
 
 @dataclass(frozen=True, slots=True)
 class Fault:
-    """`names` and `statuses` are how a run that met it may end early; `may_pass` whether it may go on to its verdict.
+    """`names` and `statuses` are how a run that met it may end early; `may_pass` whether it may go on to its verdict,
+    `late_may_pass` the same where all was recorded before it that a calibration is found from.
 
     `known_s`: after so long it can be known, by real time (None: only by what has been recorded, and the arm goes on
     until then). `lasts_s`: it is mended after so long, also while the run goes on (None: when the run has ended).
-    `kept_s`: of what was received before, so much at the end may be missing from the file.
+    `kept_s`: of what was received before, so much at the end may be missing from the file: it was in memory.
     """
 
     area: str
@@ -45,6 +47,7 @@ class Fault:
     names: frozenset[str] = frozenset()
     statuses: frozenset[int] = frozenset({STOPPED})
     may_pass: bool = False
+    late_may_pass: bool = False
     known_s: float | None = 0.0
     lasts_s: float | None = None
     kept_s: float = 0.0
@@ -228,15 +231,15 @@ CATALOGUE: tuple[Fault, ...] = (
     _net("dashboard stalls", _stall("dashboard"), may_pass=True, known_s=None),
     _net("dashboard refused", _hang_up("dashboard", refuse=True), may_pass=True, known_s=None),
     _net("primary and script ports reset", _hang_up("primary", "secondary", "script"), may_pass=True, known_s=None),
-    Fault("board", "reset", _order("reset_board"), names=BOARD, known_s=0.3),
-    Fault("board", "unplugged", _order("unplug_board"), _order("plug_in_board"), BOARD, known_s=0.3),
+    Fault("board", "reset", _order("reset_board"), names=BOARD, known_s=HELLO_S),
+    Fault("board", "unplugged", _order("unplug_board"), _order("plug_in_board"), BOARD, known_s=CLOSED_S),
     Fault("board", "silent line", _order("silence_board", on=True), _order("silence_board", on=False), BOARD,
           known_s=BOARD_S),
     Fault("board", "other baud rate", _order("host_baud", baud=115200), _order("host_baud", baud=None),
           BOARD, known_s=BOARD_S),
     Fault("board", "wire stalls", _stall("board"), _heal, BOARD, known_s=BOARD_S),
-    Fault("board", "wire half-closed", _half_close("board"), _heal, BOARD, known_s=0.3),
-    Fault("board", "wire reset", _hang_up("board"), _heal, BOARD, known_s=0.3),
+    Fault("board", "wire half-closed", _half_close("board"), _heal, BOARD, known_s=CLOSED_S),
+    Fault("board", "wire reset", _hang_up("board"), _heal, BOARD, known_s=CLOSED_S),
     Fault("board", "wire loses 0.1 % of its bytes", _spoil(losing, 0.001, "board"), _heal, BOARD, known_s=None,
           statuses=SPOILT, may_pass=True),
     Fault("board", "wire has wrong bits in 0.1 % of its bytes", _spoil(flipping, 0.001, "board"), _heal, BOARD,
@@ -253,7 +256,7 @@ CATALOGUE: tuple[Fault, ...] = (
     _sensor("stuck", "stuck", frozenset({"stuck_axis", "stuck_sensor", "no_motion", "wrong_axis", "wrong_sign",
                                          "wrong_unit", "zero_reading", "time_base_not_found",
                                          "attitude_untrustworthy", "no_rates"}),
-            statuses=SPOILT),
+            statuses=SPOILT, late_may_pass=True),
     _sensor("saturated", "saturated", frozenset({"saturation", "time_base_not_found"}), statuses=SPOILT),
     Fault("process", "kill -9: the rig or its driver", _kill_any, names=LINK, statuses=frozenset({STOPPED, KILLED}),
           kept_s=1.0),
@@ -264,7 +267,7 @@ CATALOGUE: tuple[Fault, ...] = (
     Fault("process", "the driver frozen", _kill(signal.SIGSTOP, "driver"), names=LINK, known_s=DRIVER_S),
     Fault("process", "the laboratory frozen for 3 s", _kill(signal.SIGSTOP, "world"), _kill(signal.SIGCONT, "world"),
           LINK | BOARD | RECONNECTED, known_s=LINK_S, lasts_s=3.0, may_pass=True),
-    Fault("disk", "full", _fill_disk, names=frozenset({"recording_failed", "system"}), known_s=None),
+    Fault("disk", "full", _fill_disk, names=frozenset({"recording_failed", "system"}), known_s=None, kept_s=1.0),
     Fault("disk", "folder read-only", _make_immutable(True), _make_immutable(False), frozenset({"system"}),
           known_s=None, may_pass=True),
     Fault("clock", "one hour forward", _shift_clock(3600), may_pass=True, known_s=None,
