@@ -15,7 +15,7 @@ from rig.data.run_file import RunData
 from rig.errors import RigError
 from rig.observation.observed_run import ObservedRun
 
-FALSE_ALARMS = 0.01  # how often one of these checks, of any sensor, fails an undamaged run, at most
+FALSE_ALARMS = 0.001  # how often one of these checks, of any sensor, fails an undamaged run, at most
 SHARES = 13  # of each sensor: its statistics, each with a share of its own
 DISTURBED = "disturbed_sweep"
 

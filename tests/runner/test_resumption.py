@@ -60,7 +60,8 @@ def test_a_finished_run_repeats_the_sweep_that_its_verdict_named(tmp_path: Path)
     """Something moved the bench during sweep 4: the recording shows it, and the verdict named it."""
     out = tmp_path / "run"
     config = configuration(tmp_path, {"procedure": {"rest_s": 1.0}})
-    assert rig("run", config, "--out", out).returncode == 0
+    begun = rig("run", config, "--out", out)
+    assert begun.returncode == 0, begun.stderr + begun.stdout
     assert "already_finished" in rig("resume", out).stderr
     (observed,) = observe_recordings([read_run(out / "run.h5")])
     seen = observed.sensors["gyro"]
