@@ -19,6 +19,7 @@ import tempfile
 from collections import Counter
 from collections.abc import Iterable, Sequence
 from concurrent.futures import ThreadPoolExecutor
+from functools import cache
 from pathlib import Path
 from random import Random
 from typing import Any
@@ -61,7 +62,7 @@ def cell_of(key: Key, seed: int, span_s: float, kept: Path, start: Start) -> dic
             cell = Cell(name, setup, when, deviations=[f"the bench failed: {type(error).__name__}: {error}"])
         if cell.deviations:
             shutil.copytree(place, kept / f"{crc32(repr(key).encode()):08x}", dirs_exist_ok=True)
-    return {**document(cell), "number": number}
+    return {**document(cell), "number": number, "commit": commit()}
 
 
 def table(cells: Iterable[dict[str, Any]]) -> Iterable[str]:
@@ -153,14 +154,19 @@ def conclude(cells: Sequence[dict[str, Any]], out: Path) -> int:
     """Print the table; 1 when anything deviates."""
     deviating = [cell for cell in cells if cell["deviations"]]
     (out / "deviations.json").write_text(json.dumps(deviating, indent=2), encoding="utf-8")
-    commit = subprocess.run(
-        ["git", "-C", ROOT, "rev-parse", "--short", "HEAD"], capture_output=True, text=True, check=False
-    )
     print("\n".join(table(cells)))
     met = sum(cell["met"] for cell in cells)
     faults = len({cell["fault"] for cell in cells})
-    print(f"\n{met} runs met {faults} faults, at commit {commit.stdout.strip() or 'unknown'}: {len(deviating)} deviate")
+    commits = ", ".join(sorted({cell["commit"] for cell in cells}))
+    print(f"\n{met} runs met {faults} faults, at commit {commits}: {len(deviating)} deviate")
     return 1 if deviating else 0
+
+
+@cache
+def commit() -> str:
+    """What is measured, as Git describes it: `-dirty` where it is not as committed."""
+    words = ["git", "-C", str(ROOT), "describe", "--always", "--dirty"]
+    return subprocess.run(words, capture_output=True, text=True, check=False).stdout.strip() or "unknown"
 
 
 if __name__ == "__main__":

@@ -225,8 +225,10 @@ class Board:
         answer = self._link.ask(name, values, timeout_s or self._timeout_s)
         if answer.name == "error":
             refusal = self._refusal(answer)
-            if self._streaming and refusal.name == "not_configured":  # it was: asked sooner than it said hello again
-                raise self._restarted(self._link.ask("hello", None, self._timeout_s)) from refusal
+            if self._streaming and refusal.name == "not_configured" and not self.status().streaming:
+                # It was streaming: asked sooner than it said hello again, it answers as one that knows nothing.
+                refusal = self._restarted(self._link.ask("hello", None, self._timeout_s))
+                self._link.fail(refusal)
             raise refusal
         return answer
 

@@ -1,11 +1,16 @@
 """What every test has: simulated laboratories, and a Hypothesis without a stopwatch."""
 
 import os
+from collections.abc import Iterator
+from typing import TYPE_CHECKING
 
 import pytest
 from hypothesis import settings
 
 from support.worlds import world
+
+if TYPE_CHECKING:
+    from selenium.webdriver import Chrome
 
 __all__ = ["world"]
 
@@ -33,3 +38,22 @@ def pytest_collection_modifyitems(config: pytest.Config, items: list[pytest.Item
 def thorough(request: pytest.FixtureRequest) -> bool:
     """Whether a test marked `proof` goes through all its seeds (`make proof`) or through a few (`make test`)."""
     return bool(request.config.getoption("--proof"))
+
+
+@pytest.fixture(scope="module")
+def driver() -> Iterator["Chrome"]:
+    """A real browser."""
+    from support.browser import browser  # with Selenium, which few tests need
+
+    with browser(dark=True) as found:
+        yield found
+
+
+@pytest.fixture
+def nothing_severe_and_nothing_from_elsewhere(driver: "Chrome") -> Iterator[None]:
+    """What is asked of every page, whatever it shows."""
+    from support.browser import TABLET, asked_hosts, severe
+
+    driver.set_window_size(*TABLET)
+    yield
+    assert severe(driver) == [] and asked_hosts(driver) <= {"127.0.0.1"}

@@ -12,9 +12,7 @@ from contextlib import contextmanager
 from typing import Any
 
 STOPPED = "stopped from the page"
-STOP_SIGNAL = getattr(
-    signal, "SIGUSR1", signal.SIGINT
-)  # of its own: SIGINT may be ignored, as in a script's background
+STOP_SIGNAL = getattr(signal, "SIGUSR1", signal.SIGINT)  # its own: SIGINT may be ignored, as in a script's background
 
 
 class Control:

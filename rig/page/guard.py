@@ -24,9 +24,9 @@ HEADERS = {
     "x-content-type-options": "nosniff",
     "referrer-policy": "no-referrer",
     "cross-origin-resource-policy": "same-origin",
-    "cross-origin-opener-policy": "same-origin",
     "cache-control": "no-store",
 }
+OPENER = {"cross-origin-opener-policy": "same-origin"}  # heeded from loopback, complained of from elsewhere without TLS
 
 
 def new_token() -> str:
@@ -65,10 +65,12 @@ class Door:
 
 
 class Guard:
-    """Around the application: refuses what comes from elsewhere, and sends `HEADERS` with every answer."""
+    """Around the application: refuses what comes from elsewhere, and tells browsers what they may do with it."""
 
     def __init__(self, app: "ASGIApp", door: Door) -> None:
         self._app, self._door = app, door
+        headers = HEADERS if door.looking_needs_token else HEADERS | OPENER
+        self._headers = [(name.encode(), value.encode()) for name, value in headers.items()]
 
     async def __call__(self, scope: "Scope", receive: "Receive", send: "Send") -> None:
         """As ASGI has it."""
@@ -78,7 +80,7 @@ class Guard:
         async def with_headers(message: "Message") -> None:
             if message["type"] == "http.response.start":
                 there = {name for name, _ in message.get("headers", ())}
-                more = [(n.encode(), v.encode()) for n, v in HEADERS.items() if n.encode() not in there]
+                more = [(name, value) for name, value in self._headers if name not in there]
                 message = {**message, "headers": [*message.get("headers", ()), *more]}
             await send(message)
 

@@ -65,7 +65,7 @@ class BoardCalibration:
             try:
                 found, speed_rad_s = self._observe(name, sweep)
             except (Fault, BoardError) as error:
-                if error.name == "board_link_lost":
+                if error.name in ("board_link_lost", "board_error"):
                     raise
                 self.note(BoardNotObserved(name, sweep.index, str(error)))
                 continue

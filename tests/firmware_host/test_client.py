@@ -572,6 +572,16 @@ def test_a_board_that_restarts_and_is_asked_before_it_says_so_is_reported(wire: 
         wait_for(lambda: not wire[0].reset.is_set())
         with pytest.raises(BoardError, match="restarted while streaming"):
             board.observe(0, 0, 0, 1_000_000, speed_rad_s=1.0)
+        with pytest.raises(BoardError, match="restarted while streaming"):  # known from then on, whatever it is asked
+            board.check()
+
+
+def test_a_sensor_that_was_never_configured_is_no_restart(wire: tuple[BoardOnAWire, str]) -> None:
+    with closing(streaming(wire)) as board:
+        with pytest.raises(BoardError) as refusal:
+            board.keep([1], duration_s=1)
+        assert refusal.value.name == "not_configured"
+        board.check()
 
 
 def test_what_came_before_the_port_closed_is_read() -> None:

@@ -190,6 +190,7 @@ def test_nothing_moves_when_the_board_goes_while_the_sensors_are_first_listened_
     assert status == 3 and "rig: board_link_lost: " in errors, errors
     run = read_run(rig.out / "run.h5")
     assert len(run.arm) > 0 and not run.arm["qd_rad_s"].any()
+    assert run.arm["time_s"][-1] < began_s + 5.0  # not only when the ten seconds for listening are over
 
 
 def test_a_run_folder_that_is_removed_during_the_run_is_a_named_fault(start: Start) -> None:

@@ -3,7 +3,8 @@
 import json
 import os
 import shutil
-from collections.abc import Iterator
+import time
+from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from pathlib import Path
 from typing import Any
@@ -12,6 +13,7 @@ from urllib.parse import urlsplit
 import pytest
 from selenium.webdriver import Chrome, ChromeOptions
 from selenium.webdriver.chrome.service import Service
+from selenium.webdriver.common.by import By
 
 from support.paths import ROOT
 
@@ -74,6 +76,25 @@ def picture(driver: Chrome, name: str, *, whole: bool = False) -> Path:
     finally:
         driver.execute_cdp_cmd("Emulation.clearDeviceMetricsOverride", {})
     return path
+
+
+def text(driver: Chrome, element: str) -> str:
+    """What is to be read of the element of that id."""
+    return driver.find_element(By.ID, element).text
+
+
+def kind(driver: Chrome) -> str:
+    """The run's state, by the page's own name for it."""
+    return str(driver.execute_script("return document.body.dataset.kind"))
+
+
+def until(true: Callable[[], Any], what: str, within_s: float = 120.0) -> Any:
+    """Wait for what comes true, and give it."""
+    deadline_s = time.monotonic() + within_s
+    while not (found := true()):
+        assert time.monotonic() < deadline_s, f"never: {what}"
+        time.sleep(0.05)
+    return found
 
 
 def severe(driver: Chrome) -> list[str]:

@@ -212,8 +212,13 @@ function say(text) {
 
 function linked(up, why) {
   const over = ENDED.includes(document.body.dataset.kind);
-  $("link").dataset.up = up || over ? "yes" : "no";
+  $("link").dataset.up = document.body.dataset.up = up || over ? "yes" : "no";
   $("link-words").textContent = up ? "connected" : over ? "the run is over, and this is how it ended" : why ?? "no connection: what stands here is old";
+  if (!up && !shown.state) { // nothing has been shown that could be old
+    $("sign").textContent = "⚠";
+    $("state-word").textContent = "Not shown";
+    $("state-text").textContent = why ?? "the rig does not answer";
+  }
   if (!up && over) {
     $("certificate").hidden = true;
     $("link").dataset.up = "over";

@@ -1,15 +1,20 @@
 // The stream of what is shown, read by fetch because EventSource can carry no token; and requests that act.
 
 const SILENT_MS = 15000; // the server says something every 5 s
+const WHY = {
+  403: "the address lacks its token: take the one the terminal shows",
+  503: "too many browsers look on: close one of them",
+};
 
 export const token = window.location.hash.slice(1);
 const headers = token ? { Authorization: `Bearer ${token}` } : {};
 
-/** Hand every event to `take(name, document)` and say whether the line is up to `linked(up)`, until the run is `over()`. */
+/** Hand every event to `take(name, document)` and say to `linked(up, why)` whether the line is up, until the run is `over()`. */
 export async function follow(take, linked, over) {
   while (!over()) {
     const silence = new AbortController();
     let timer = null;
+    let status = null;
     const heard = () => {
       clearTimeout(timer);
       timer = setTimeout(() => silence.abort(), SILENT_MS);
@@ -17,9 +22,8 @@ export async function follow(take, linked, over) {
     try {
       heard();
       const answer = await fetch("events", { headers, signal: silence.signal, cache: "no-store" });
-      if (answer.status === 403) {
-        linked(false, "the address lacks its token: take the one the terminal shows");
-      } else if (answer.ok) {
+      status = answer.status;
+      if (answer.ok) {
         linked(true);
         await read(answer.body, take, heard);
       }
@@ -27,7 +31,8 @@ export async function follow(take, linked, over) {
       // The line is down: said below, tried again.
     }
     clearTimeout(timer);
-    linked(false);
+    linked(false, WHY[status]);
+    if (status === 403) return; // another token comes with another address, and that loads the page anew
     if (!over()) await new Promise((again) => setTimeout(again, 1000));
   }
 }

@@ -93,7 +93,8 @@ class Bench:
 
     def end(self) -> None:
         """Leave no process behind."""
-        pids = [] if self.process is None else [self.pid, *filter(None, [self.driver_pid])]
+        going_on = self.process is not None and self.running  # of one that has ended the number may be another's by now
+        pids = [self.pid, *filter(None, [self.driver_pid])] if going_on else []
         for pid in pids:
             with suppress(ProcessLookupError):
                 os.kill(pid, signal.SIGKILL)

@@ -231,7 +231,7 @@ CATALOGUE: tuple[Fault, ...] = (
     _net("dashboard stalls", _stall("dashboard"), may_pass=True, known_s=None),
     _net("dashboard refused", _hang_up("dashboard", refuse=True), may_pass=True, known_s=None),
     _net("primary and script ports reset", _hang_up("primary", "secondary", "script"), may_pass=True, known_s=None),
-    Fault("board", "reset", _order("reset_board"), names=BOARD, known_s=HELLO_S),
+    Fault("board", "reset", _order("reset_board"), names=frozenset({"board_error"}), known_s=HELLO_S),
     Fault("board", "unplugged", _order("unplug_board"), _order("plug_in_board"), BOARD, known_s=CLOSED_S),
     Fault("board", "silent line", _order("silence_board", on=True), _order("silence_board", on=False), BOARD,
           known_s=BOARD_S),

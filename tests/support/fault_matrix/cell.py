@@ -39,7 +39,7 @@ class Cell:
     ending: str = ""  # the error's name, or the verdict
     status: int | None = None
     rest_s: float | None = None  # controller's time from the fault to the arm's last movement
-    missing: int = 0  # samples received and not in the file
+    missing: int = 0  # samples received before the last one in the file, and until the fault, and not in the file
     resumes: int = 0
     verdict: str = ""
     worst_u: float = 0.0
@@ -176,7 +176,8 @@ def _files(here: Bench, fault: Fault, cell: Cell, fault_wall_s: float) -> None:
     recorded = runs[0].samples["gyro"]
     if not len(recorded):
         return  # nothing had been received, or the arm had not begun
-    delivered = _delivered(here, recorded["host_time_s"][0], fault_wall_s - max(fault.kept_s, BEHIND_S))
+    to_s = max(fault_wall_s - max(fault.kept_s, BEHIND_S), recorded["host_time_s"].max() - BEHIND_S)
+    delivered = _delivered(here, recorded["host_time_s"][0], to_s)
     cell.missing = len(delivered - set(recorded["board_time_us"].tolist()))
     if cell.missing:
         cell.deviations.append(f"{cell.missing} of {len(delivered)} samples received are not in the file")
