@@ -73,8 +73,8 @@ sbom: $(VENV)/demo.installed | $(TOOLS)/bin/cyclonedx-py
 	$(TOOLS)/bin/cyclonedx-py environment --pyproject pyproject.toml --output-reproducible --of JSON \
 	  --output-file build/sbom.json $(BIN)/python
 
-$(TOOLS)/bin/uv: TOOL := uv
-$(TOOLS)/bin/cyclonedx-py: TOOL := cyclonedx-bom
+$(TOOLS)/bin/uv: TOOL := uv==0.13.9
+$(TOOLS)/bin/cyclonedx-py: TOOL := cyclonedx-bom==7.5.0
 $(TOOLS)/bin/uv $(TOOLS)/bin/cyclonedx-py: | $(BIN)/python
 	$(BIN)/python -m venv $(TOOLS)
 	$(TOOLS)/bin/python -m pip install --quiet --disable-pip-version-check $(TOOL)

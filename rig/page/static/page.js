@@ -68,9 +68,14 @@ const SHOW = {
   certificate(there) {
     $("certificate").hidden = !there;
   },
-  lines(lines) {
+  lines(lines) { // only what is new is added, for that is what a screen reader reads out
     const list = $("lines");
-    list.replaceChildren(...lines.map((text) => Object.assign(document.createElement("li"), { textContent: text })));
+    const before = [...list.children];
+    let gone = 0;
+    while (before.slice(gone).some((each, i) => each.textContent !== lines[i])) gone += 1;
+    for (const each of before.slice(0, gone)) each.remove();
+    const said = lines.slice(before.length - gone);
+    list.append(...said.map((text) => Object.assign(document.createElement("li"), { textContent: text })));
     list.scrollTop = list.scrollHeight;
   },
 };
