@@ -142,9 +142,12 @@ def test_a_run_is_shown_from_the_question_to_the_verdict(driver: Chrome, tmp_pat
         assert driver.switch_to.active_element.get_attribute("id") == "prompt-title"
         legible(driver)
         picture(driver, "prompt-dark")
+        newest = driver.find_elements(By.CSS_SELECTOR, "#lines li")[-1]
         tell(Answered(agreed=True), *moving(plan, 52.0))
         tell.look(4)
         tell.word("Resting")
+        lines = driver.find_elements(By.CSS_SELECTOR, "#lines li")
+        assert newest in lines and newest != lines[-1]  # still the same one: it is not read out again
         assert not driver.find_element(By.ID, "prompt").is_displayed()
         until(lambda: "Step 13 of 16" in text(driver, "step-number"), "the step")
         assert text(driver, "left").startswith("0:15")
@@ -169,11 +172,8 @@ def test_a_run_is_shown_from_the_question_to_the_verdict(driver: Chrome, tmp_pat
         driver.set_window_size(*TABLET)
         set_theme(driver, dark=True)
         tell.look(6)
-        newest = driver.find_elements(By.CSS_SELECTOR, "#lines li")[-1]
         tell(*judged(tmp_path, passed=True))
         tell.word("PASS")
-        lines = driver.find_elements(By.CSS_SELECTOR, "#lines li")
-        assert newest in lines and newest != lines[-1]  # still the same one: it is not read out again
         assert text(driver, "state-text") == "5 of 5 checks passed" and "✓ passed" in text(driver, "checks")
         assert not driver.find_element(By.ID, "halt").is_displayed()
         picture(driver, "pass-dark")
