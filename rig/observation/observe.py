@@ -80,14 +80,14 @@ def observe_sensor(
     """Average every finished sweep of a recording, in which the arm moved by `motion`.
 
     An interrupted sweep has no end in the recording and is left out. So are sweeps and dwells whose index is in
-    `superseded`: a later recording of the same run repeats them.
+    `superseded`, and the rests beside them: a later recording of the same run repeats them.
     Raises Fault as `dwell_readings` does, and `incomplete_revolution`, `arm_states_lost`, `slider_below_100`,
     `speed_not_constant`, `other_joint_moved`, `lost_samples`, `saturation`, `stuck_sensor`, `stuck_axis`, `wrong_axis`,
     `wrong_sign`, `wrong_unit`, `not_finite`, `time_base_not_found`, `board_clock_restarted`, `duplicated_samples`,
     `impossible_times`.
     """
     stream = on_the_arms_clock(run.samples[sensor], run.sensors[sensor], motion)
-    rests, revolutions = rests_of(run, stream, motion), list[Observation]()
+    rests, revolutions = rests_of(run, stream, motion, superseded), list[Observation]()
     for finished in swept(run):
         if finished.sweep.index in superseded:
             continue
@@ -138,9 +138,9 @@ def check_feeling(run: RunData, rests: Sequence[Average], dwells: Sequence[Dwell
     check_dwells(dwells, run.settings.site)
 
 
-def rests_of(run: RunData, stream: Stream, motion: ArmMotion) -> tuple[Average, ...]:
-    """Those in which the arm stood still for long enough."""
-    found = (_rest(stream, motion, window, as_before=_as_before(run)) for window in rested(run))
+def rests_of(run: RunData, stream: Stream, motion: ArmMotion, superseded: Collection[int] = ()) -> tuple[Average, ...]:
+    """Those in which the arm stood still for long enough, without those beside a step in `superseded`."""
+    found = (_rest(stream, motion, window, as_before=_as_before(run)) for window in rested(run, superseded))
     return tuple(rest for rest in found if rest is not None)
 
 

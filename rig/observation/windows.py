@@ -1,6 +1,6 @@
 """When the sweeps, rests and dwells of a recording were, on the controller's clock. Pure."""
 
-from collections.abc import Iterator
+from collections.abc import Collection, Iterator
 from dataclasses import dataclass
 from typing import TypeVar
 
@@ -49,10 +49,15 @@ def swept(run: RunData) -> Iterator[Finished]:
         yield Finished(event.sweep, window)
 
 
-def rested(run: RunData) -> Iterator[Window]:
-    """The rests that were begun and finished, in order; a dwell is one too."""
-    windows = [window for _, window in _between(run, RestStarted, RestFinished)]
-    yield from sorted([*windows, *(each.window for each in dwelt(run))], key=lambda window: window.start_s)
+def rested(run: RunData, superseded: Collection[int] = ()) -> Iterator[Window]:
+    """The rests that were begun and finished, in order; a dwell is one too.
+
+    Not those whose index is in `superseded`, nor a rest just before or after such a sweep or dwell: what made it worth
+    repeating may have begun before it, and have lasted.
+    """
+    rests = [window for _, window in _between(run, RestStarted, RestFinished) if not _beside(run, window, superseded)]
+    dwells = [each.window for each in dwelt(run) if each.dwell.index not in superseded]
+    yield from sorted([*rests, *dwells], key=lambda window: window.start_s)
 
 
 def dwelt(run: RunData) -> Iterator[Dwelt]:
@@ -69,6 +74,19 @@ def finished_sweeps(run: RunData) -> frozenset[int]:
 def finished_dwells(run: RunData) -> frozenset[int]:
     """The same of the dwells."""
     return frozenset(each.dwell.index for each in dwelt(run))
+
+
+def _beside(run: RunData, rest: Window, superseded: Collection[int]) -> bool:
+    """Whether what came before the rest, or was to come after it, is in `superseded`."""
+    before, after = -1, None
+    for recorded in run.events if superseded else ():
+        match recorded.event:
+            case SweepStarted(step) | DwellStarted(step):
+                if recorded.controller_time_s is not None and recorded.controller_time_s <= rest.start_s:
+                    before = step.index
+                elif after is None:
+                    after = step.index
+    return before in superseded or (before + 1 if after is None else after) in superseded
 
 
 def _between(run: RunData, begin: type[Event], end: type[Ending]) -> Iterator[tuple[Ending, Window]]:

@@ -10,13 +10,14 @@ import pytest
 
 from firmware_host.answers import BoardObservation
 from rig.analysis.calibration import observe_recordings
+from rig.analysis.outcome import calibrated
 from rig.data.events import BoardObserved, Recorded
 from rig.data.run_file import RunData, read_run
 from rig.observation.windows import swept
 from rig.plans.script_file import installed_script
 from rig.runner.resumption import resumption
 from support.commands import configuration, rig
-from support.damaged_readings import offset, readings_of
+from support.damaged_readings import offset, readings_of, replaced
 from support.synthetic_run import Setup
 
 SCRIPT = installed_script("six_observation")
@@ -53,6 +54,29 @@ def test_what_was_repeated_counts_in_its_place() -> None:
     again = known_to_the_board(readings_of(replace(SETUP, seed=2)).recording())
     again = replace(again, provenance=replace(again.provenance, started_utc="2026-11-21T00:10:00+00:00"))
     assert resumption([damaged, again], damaged.settings, SCRIPT).done == set(range(6))
+
+
+@pytest.mark.slow
+def test_what_was_read_at_rest_beside_a_repeated_sweep_does_not_count() -> None:
+    """A bad contact in the rest before sweep 4: the run ended there, and went on with sweep 4 when it was mended."""
+    seen = readings_of(SETUP)
+    bad = replaced(lambda seen: seen.rest(3) & seen.some(0.1), 20_000)(seen).recording()
+    assert "gyro.spikes" in failed([bad])
+    begun_s = next(each.window.start_s for each in swept(seen.run) if each.sweep.index == 4)
+    other = readings_of(replace(SETUP, seed=2)).recording()
+    later = replace(other.provenance, started_utc="2026-11-21T00:10:00+00:00")
+    assert failed([part(bad, 0.0, begun_s), replace(part(other, begun_s, np.inf), provenance=later)]) == set()
+
+
+def failed(runs: list[RunData]) -> set[str]:
+    """The checks that failed but those of what the board solved, which these recordings tell nothing of."""
+    return {check.name for check in calibrated(runs).checks if not check.passed and "board" not in check.name}
+
+
+def part(run: RunData, from_s: float, to_s: float) -> RunData:
+    """What a recording tells of that time: its events. Readings and states are all there."""
+    inside = (each for each in run.events if from_s <= (each.controller_time_s or 0.0) < to_s)
+    return replace(run, events=tuple(inside))
 
 
 @pytest.mark.slow
