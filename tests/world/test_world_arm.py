@@ -302,7 +302,8 @@ def test_the_speed_slider_slows_a_move_and_shows(home: Arm) -> None:
     assert receive.getSpeedScaling() == 1.0  # what the slider leaves over: clients multiply both
     start = receive.getTimestamp()
     assert control.moveJ(target(1.0), 1.0, 2.0)
-    assert receive.getTimestamp() - start >= 2 * (1.0 + 0.5)
+    # Of the client's two connections that of the states may be some packets behind the one that says the move is done.
+    assert receive.getTimestamp() - start >= 2 * (1.0 + 0.5) - 0.1
     home.world.control({"do": "speed_slider", "fraction": 1.0})
 
 
