@@ -12,10 +12,10 @@ from numpy.typing import NDArray
 from rig.analysis.pieces import Window
 from rig.estimation.arrays import Array
 from rig.observation.colour import predicted
+from rig.observation.sound import SPIKE
 
 Statistics = dict[str, tuple[float, float]]
 
-SPIKE = 8.0  # of the noise's own deviation: one reading in 1e15
 SKEWNESS = 0.15  # below, hardly a fiftieth of the noise's deviation is left in a mean
 LONGEST_RUN = 25  # equal readings of one axis: at one count of noise every fourth reading equals the one before
 STRETCH = 8  # readings on three axes, some 50 bits at one count of noise

@@ -1,17 +1,22 @@
 """What of a recording counts when its run is resumed: what every sensor has recorded soundly."""
 
+import numpy as np
+
 from rig.data.run_file import RunData
 from rig.data.settings import ObservationThresholds
 from rig.errors import Fault
 from rig.observation.acceleration import DwellReading, each_dwell
-from rig.observation.average import on_the_arms_clock
+from rig.observation.average import Stream, between, on_the_arms_clock
 from rig.observation.observe import check_feeling, each_sweep, rests_of
 from rig.observation.timebase import ArmMotion
-from rig.observation.windows import finished_dwells, finished_sweeps
+from rig.observation.windows import Window, finished_dwells, finished_sweeps
+
+SPIKE = 8.0  # of the readings' own deviation: one reading in 1e15
 
 
 def sound_sweeps(run: RunData, settings: ObservationThresholds) -> frozenset[int]:
-    """The finished sweeps that `observe_sensor` accepts for every sensor: a resumed run need not repeat them."""
+    """The finished sweeps that `observe_sensor` accepts for every sensor, and in which no reading is a spike: a resumed
+    run need not repeat them."""
     return finished_sweeps(run) & _sound(run, settings)
 
 
@@ -38,6 +43,19 @@ def _sound_for(run: RunData, sensor: str, motion: ArmMotion, settings: Observati
         check_feeling(run, rests_of(run, stream, motion), dwells)
     except Fault:
         return frozenset()
-    found = {**each_sweep(run, stream, motion, settings), **readings}
-    refused = {index for index, each in found.items() if isinstance(each, Fault)}
-    return (finished_sweeps(run) | finished_dwells(run)) - refused
+    sweeps = each_sweep(run, stream, motion, settings)
+    refused = {index for index, each in {**sweeps, **readings}.items() if isinstance(each, Fault)}
+    turns = {i: Window(o.average.start_s, o.average.end_s) for i, o in sweeps.items() if not isinstance(o, Fault)}
+    spiky = {
+        i for i, window in {**turns, **{each.index: each.window for each in dwells}}.items() if _spiky(stream, window)
+    }
+    return (finished_sweeps(run) | finished_dwells(run)) - refused - spiky
+
+
+def _spiky(stream: Stream, window: Window) -> bool:
+    """Whether a reading at a constant rate is a spike: the verdict would fail by it, however little it moves the mean."""
+    counts = stream.raw["counts"][between(stream, window.start_s, window.end_s)].astype(np.float64)
+    if not len(counts):
+        return False
+    off = np.abs(counts - np.median(counts, axis=0))
+    return bool(np.any(off > SPIKE * np.maximum(1.4826 * np.median(off, axis=0), 0.5)))

@@ -49,6 +49,21 @@ def test_a_sweep_that_contradicts_the_others_is_repeated() -> None:
 
 
 @pytest.mark.slow
+def test_a_sweep_with_a_spike_is_repeated() -> None:
+    """One wrong reading of hundreds changes the mean by little, but the verdict would fail by it."""
+    seen = readings_of(SETUP)
+    worst = seen.counts.copy()
+    worst[np.flatnonzero(seen.sweep(2))[300]] += 20_000
+    assert resumption([known_to_the_board(seen.reading(worst).recording())], seen.run.settings, SCRIPT).done == {
+        0,
+        1,
+        3,
+        4,
+        5,
+    }
+
+
+@pytest.mark.slow
 def test_what_was_repeated_counts_in_its_place() -> None:
     damaged = known_to_the_board(offset(0.02, lambda seen: seen.sweep(4))(readings_of(SETUP)).recording())
     again = known_to_the_board(readings_of(replace(SETUP, seed=2)).recording())
