@@ -53,7 +53,7 @@ def _sound_for(run: RunData, sensor: str, motion: ArmMotion, settings: Observati
 
 
 def _spiky(stream: Stream, window: Window) -> bool:
-    """Whether a reading at a constant rate is a spike: the verdict would fail by it, however little it moves the mean."""
+    """Whether a reading at a constant rate is a spike: the verdict would fail by it, whatever the mean."""
     counts = stream.raw["counts"][between(stream, window.start_s, window.end_s)].astype(np.float64)
     if not len(counts):
         return False
