@@ -3,10 +3,8 @@
 import subprocess
 import sys
 import textwrap
-import time
-from collections.abc import Callable, Iterator
+from collections.abc import Iterator
 from contextlib import contextmanager
-from typing import Any
 
 from support.worlds import WorldHandle
 
@@ -25,15 +23,6 @@ def until(condition):
         time.sleep(0.002)
 """
 CONNECT = "control, receive = RTDEControlInterface(host), RTDEReceiveInterface(host)\nsay('connected')\n"
-
-
-def wait_for(condition: Callable[[], Any], what: str, limit_s: float = 60.0) -> Any:
-    """Wait until `condition` is true; the wait is wall time, as a client's would be."""
-    end = time.monotonic() + limit_s
-    while not (answer := condition()):
-        assert time.monotonic() < end, f"waited {limit_s} s for: {what}"
-        time.sleep(0.005)
-    return answer
 
 
 class Client:

@@ -3,7 +3,6 @@
 import json
 import os
 import shutil
-import time
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from pathlib import Path
@@ -16,6 +15,7 @@ from selenium.webdriver.chrome.service import Service
 from selenium.webdriver.common.by import By
 
 from support.paths import ROOT
+from support.waiting import wait_for
 
 PICTURES = ROOT / "build" / "page"
 CHROMIUM, DRIVER = shutil.which("chromium"), shutil.which("chromedriver")
@@ -89,12 +89,8 @@ def kind(driver: Chrome) -> str:
 
 
 def until(true: Callable[[], Any], what: str, within_s: float = 120.0) -> Any:
-    """Wait for what comes true, and give it."""
-    deadline_s = time.monotonic() + within_s
-    while not (found := true()):
-        assert time.monotonic() < deadline_s, f"never: {what}"
-        time.sleep(0.05)
-    return found
+    """As `wait_for`, with the patience that a browser needs on a busy computer."""
+    return wait_for(true, what, within_s)
 
 
 def severe(driver: Chrome) -> list[str]:

@@ -17,9 +17,9 @@ from rig.world import network
 from rig.world.clock import DIALOGUE_S, TICK_S, Clock
 from rig.world.process import ARM_LAG_S
 from rig.world.wire import GONE_S, PATIENCE_S, Wire
-from support.arm_client import wait_for
 from support.arm_relay import relay
 from support.rtde_reader import RtdeReader
+from support.waiting import wait_for
 from support.worlds import World, fresh_host
 
 PERIOD_S = 0.008  # between packets at 125 Hz

@@ -18,7 +18,8 @@ from scipy.spatial.transform import Rotation
 from third_party.rtde import rtde as makers
 
 from rig.world.ur10e.forward_kinematics import flange_pose
-from support.arm_client import client, wait_for
+from support.arm_client import client
+from support.waiting import wait_for
 from support.worlds import World, WorldHandle, worlds
 
 pytestmark = pytest.mark.slow

@@ -24,10 +24,10 @@ from rig.world.board.mounting import firmware
 from rig.world.board.serial_line import misread
 from rig.world.clock import TICKS_PER_SECOND
 from rig.world.section import world_section
-from support.arm_client import wait_for
 from support.ideal import ideal
 from support.laboratory_host import Host, booted, host
 from support.paths import DEMO
+from support.waiting import wait_for
 from support.worlds import World
 
 pytestmark = pytest.mark.slow

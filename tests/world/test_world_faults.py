@@ -12,7 +12,8 @@ import sys
 
 import pytest
 
-from support.arm_client import client, wait_for
+from support.arm_client import client
+from support.waiting import wait_for
 from support.worlds import World, WorldHandle, fresh_host
 
 pytestmark = pytest.mark.slow
