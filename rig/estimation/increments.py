@@ -1,0 +1,194 @@
+"""A gyroscope's increments: how far it has turned between two instants, and what that says of its matrix and its bias.
+
+    m = F ω + b,   Ċ = C [ω]×,   C(t₁)ᵀ C(t₂) = exp(φ₁) exp(φ₂) … exp(φₙ)
+
+C takes body coordinates at t to those of the first reading; ω is the rate against the stars, in body coordinates.
+Between readings at ω₀ and ω₁ the rate goes along a cubic whose slopes, per step, are those of the chords, ω̇ₖ =
+(ωₖ₊₁ − ωₖ₋₁)/2, so that the rotation vector of a step h is, to its fourth order (Magnus, Comm. Pure Appl. Math. 7 (1954)
+649),
+
+    φ = h (ω₀ + ω₁)/2 + h (ω̇₀ − ω̇₁)/12 + h² ω₀ × ω₁/12
+
+with the second term for what a straight line would cut off, the third for coning. Slopes are counted per step, not per
+second: where time stamps jitter they stay as small as the readings' differences are.
+
+A small error of the parameters δθ = (δF row by row, δb) adds δω = −F⁻¹ (δF ω + δb) to the rate and turns the attitude:
+
+    exp(S(t) δθ) C(t),   S(t) = −∫ C F⁻¹ [ω ⊗ 1, 1] dt        in coordinates of the first reading
+
+so one pass gives C and S at all instants that are asked for, and an increment between any two of them is a difference.
+"""
+
+from collections.abc import Iterator
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from rig.estimation.arrays import Array
+
+PARAMETERS = 12  # F row by row, b
+BLOCK = 1 << 16  # readings taken at once: 20 MB, however long the recording is
+
+
+@dataclass(frozen=True, slots=True)
+class Course:
+    """Where a gyroscope says that it was at k instants `at_s` (k,), rising.
+
+    - `attitudes` (k, 3, 3): C, body coordinates to those of the first reading.
+    - `sensitivities` (k, 3, 12): S, how C turns with F (row by row) and b, in coordinates of the first reading.
+    - `rates_rad_s` (k, 3) in body coordinates.
+    """
+
+    at_s: Array
+    attitudes: Array
+    sensitivities: Array
+    rates_rad_s: Array
+
+
+@dataclass(frozen=True, slots=True)
+class Increments:
+    """How the body turned between w pairs of instants.
+
+    - `rotations` (w, 3, 3): body coordinates at the end to those at the start.
+    - `jacobian` (w, 3, 12): J, how a rotation turns with F (row by row) and b: exp(J δθ) × rotation, so in body
+      coordinates at the start.
+    - `durations_s` (w,).
+    """
+
+    rotations: Array
+    jacobian: Array
+    durations_s: Array
+
+
+def course(time_s: Array, readings: Array, matrix: Array, bias: Array, at_s: Array) -> Course:
+    """The course by readings (n, 3) in rad/s taken at times (n,), with F (3, 3) and b (3,), at instants (k,).
+
+    Times rise strictly, instants rise and lie within them: ValueError otherwise.
+    """
+    if len(time_s) < 2 or readings.shape != (len(time_s), 3) or not (np.diff(time_s) > 0).all():
+        raise ValueError("a course needs readings (n, 3) at two rising times (n,) at least")
+    if len(at_s) and (at_s[0] < time_s[0] or at_s[-1] > time_s[-1] or (np.diff(at_s) < 0).any()):
+        raise ValueError("instants must rise, and lie within the readings' times")
+    inverse = np.linalg.inv(matrix)
+    rates = (readings - bias) @ inverse.T
+    slopes = np.asarray(np.gradient(rates, axis=0), dtype=np.float64)
+    found = [
+        _in_block(_Stretch(time_s[taken], rates[taken], slopes[taken]), at_s[asked], inverse)
+        for taken, asked in _blocks(time_s, at_s)
+    ]
+    attitude, sensitivity = np.eye(3), np.zeros((3, PARAMETERS))
+    attitudes, sensitivities, there = [], [], []
+    for c, s, w in found:
+        attitudes.append(attitude @ c[:-1])
+        sensitivities.append(sensitivity + attitude @ s[:-1])
+        there.append(w)
+        attitude, sensitivity = attitude @ c[-1], sensitivity + attitude @ s[-1]
+    return Course(at_s, np.concatenate(attitudes), np.concatenate(sensitivities), np.concatenate(there))
+
+
+def increments(time_s: Array, readings: Array, matrix: Array, bias: Array, windows_s: Array) -> Increments:
+    """How the body turned in windows (w, 2) from start to end, which may overlap; otherwise as `course`."""
+    at_s, place = np.unique(windows_s, return_inverse=True)
+    found = course(time_s, readings, matrix, bias, at_s)
+    start, end = place.reshape(-1, 2).T
+    back = np.swapaxes(found.attitudes[start], -1, -2)
+    return Increments(
+        back @ found.attitudes[end],
+        back @ (found.sensitivities[end] - found.sensitivities[start]),
+        np.diff(windows_s, axis=1)[:, 0],
+    )
+
+
+def noise_rad2(durations_s: Array, random_walk_rad_sqrt_s: float, bias_walk_rad_s_sqrt_s: float = 0.0) -> Array:
+    """Variance (w,) of an increment about each axis by white noise of the rate and a bias that walks from its start on.
+
+    Angle random walk N: N² T; a bias that is right at the start and walks by K: K² T³/3.
+    """
+    variance: Array = random_walk_rad_sqrt_s**2 * durations_s + bias_walk_rad_s_sqrt_s**2 * durations_s**3 / 3
+    return variance
+
+
+def _blocks(time_s: Array, at_s: Array) -> Iterator[tuple[slice, slice]]:
+    """Readings and the instants between them; each block begins with the last reading of the one before."""
+    first = 0
+    for start in range(0, len(time_s) - 1, BLOCK):
+        stop = min(start + BLOCK + 1, len(time_s))
+        last = len(at_s) if stop == len(time_s) else int(np.searchsorted(at_s, time_s[stop - 1]))
+        yield slice(start, stop), slice(first, last)
+        first = last
+
+
+@dataclass(frozen=True, slots=True)
+class _Stretch:
+    """Times (n,), rates (n, 3) at them, and the slopes (n, 3) of these per step."""
+
+    time_s: Array
+    rates: Array
+    slopes: Array
+
+
+def _in_block(taken: _Stretch, at_s: Array, inverse: Array) -> tuple[Array, Array, Array]:
+    """C and S at the instants of a block and, last, at its end, in body coordinates of its beginning; the rates."""
+    before = np.clip(np.searchsorted(taken.time_s, at_s, side="right") - 1, 0, len(taken.time_s) - 2)
+    every = np.arange(len(taken.time_s) - 1)
+    whole = _step(taken, every, np.ones(len(every)), inverse)
+    attitudes = _running_product(whole.vectors)
+    sensitivities = np.zeros((len(taken.time_s), 3, PARAMETERS))
+    np.cumsum(attitudes[:-1] @ whole.sensitivities, axis=0, out=sensitivities[1:])
+    part = _step(taken, before, (at_s - taken.time_s[before]) / np.diff(taken.time_s)[before], inverse)
+    c = attitudes[before] @ _matrices(part.vectors)
+    s = sensitivities[before] + attitudes[before] @ part.sensitivities
+    return np.concatenate([c, attitudes[-1:]]), np.concatenate([s, sensitivities[-1:]]), part.rates
+
+
+@dataclass(frozen=True, slots=True)
+class _Step:
+    """From readings on: rotation vectors φ (k, 3), S (k, 3, 12) in body coordinates of the start, rates reached."""
+
+    vectors: Array
+    sensitivities: Array
+    rates: Array
+
+
+def _step(taken: _Stretch, start: NDArray[np.intp], part: Array, inverse: Array) -> _Step:
+    """From readings `start` (k,) a `part` (k,) of the way to the next.
+
+    The attitude half-way stands for all of the step in S: that is the exponential's derivative to φ²/24.
+    """
+    u = part[:, None]
+    h = np.diff(taken.time_s)[start][:, None]
+    w0, w1, d0, d1 = (each[place] for each in (taken.rates, taken.slopes) for place in (start, start + 1))
+    turned = h * (
+        (u - u**3 + u**4 / 2) * w0
+        + (u**3 - u**4 / 2) * w1
+        + (u**2 / 2 - 2 * u**3 / 3 + u**4 / 4) * d0
+        + (u**4 / 4 - u**3 / 3) * d1
+    )
+    rates = w0 + u**2 * (3 - 2 * u) * (w1 - w0) + u * (1 - u) * ((1 - u) * d0 - u * d1)
+    vectors = turned + (u * h) ** 2 * np.cross(w0, rates) / 12
+    middle = -_matrices(vectors / 2) @ inverse
+    by_matrix = middle[..., None] * turned[:, None, None, :]
+    by_bias = middle * (u * h)[..., None]
+    return _Step(vectors, np.concatenate([by_matrix.reshape(-1, 3, 9), by_bias], axis=2), rates)
+
+
+def _matrices(vectors: Array) -> Array:
+    from scipy.spatial.transform import Rotation
+
+    if not len(vectors):
+        return np.zeros((0, 3, 3))
+    return np.asarray(Rotation.from_rotvec(vectors).as_matrix(), dtype=np.float64)
+
+
+def _running_product(vectors: Array) -> Array:
+    """(n + 1, 3, 3): 1, exp(φ₁), exp(φ₁) exp(φ₂), …; in rows of √n, all rows at once."""
+    width = int(np.ceil(np.sqrt(len(vectors))))
+    padded = np.zeros((width * width, 3))
+    padded[: len(vectors)] = vectors
+    products = _matrices(padded).reshape(width, width, 3, 3)
+    for column in range(1, width):
+        products[:, column] = products[:, column - 1] @ products[:, column]
+    for row in range(1, width):
+        products[row] = products[row - 1, -1] @ products[row]
+    return np.concatenate([np.eye(3)[None], products.reshape(-1, 3, 3)[: len(vectors)]])
