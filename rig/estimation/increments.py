@@ -3,9 +3,9 @@
     m = F ω + b,   Ċ = C [ω]×,   C(t₁)ᵀ C(t₂) = exp(φ₁) exp(φ₂) … exp(φₙ)
 
 C takes body coordinates at t to those of the first reading; ω is the rate against the stars, in body coordinates.
-Between readings at ω₀ and ω₁ the rate goes along a cubic whose slopes, per step, are those of the chords, ω̇ₖ =
-(ωₖ₊₁ − ωₖ₋₁)/2, so that the rotation vector of a step h is, to its fourth order (Magnus, Comm. Pure Appl. Math. 7 (1954)
-649),
+Between readings at ω₀ and ω₁ the rate goes along a cubic whose slopes, per step, are those of the chords,
+ω̇ₖ = (ωₖ₊₁ − ωₖ₋₁)/2, so that the rotation vector of a step h is, to its fourth order (Magnus, Comm. Pure Appl. Math. 7
+(1954) 649),
 
     φ = h (ω₀ + ω₁)/2 + h (ω̇₀ − ω̇₁)/12 + h² ω₀ × ω₁/12
 
@@ -70,9 +70,9 @@ def course(time_s: Array, readings: Array, matrix: Array, bias: Array, at_s: Arr
         raise ValueError("a course needs readings (n, 3) at two rising times (n,) at least")
     if len(at_s) and (at_s[0] < time_s[0] or at_s[-1] > time_s[-1] or (np.diff(at_s) < 0).any()):
         raise ValueError("instants must rise, and lie within the readings' times")
-    inverse = np.linalg.inv(matrix)
+    inverse = np.asarray(np.linalg.inv(matrix), dtype=np.float64)
     rates = (readings - bias) @ inverse.T
-    slopes = np.asarray(np.gradient(rates, axis=0), dtype=np.float64)
+    slopes = np.gradient(rates, axis=0)
     found = [
         _in_block(_Stretch(time_s[taken], rates[taken], slopes[taken]), at_s[asked], inverse)
         for taken, asked in _blocks(time_s, at_s)
