@@ -1,7 +1,7 @@
 """The host end of the link: asks the board, and passes on the samples it streams."""
 
 import contextlib
-from collections.abc import Callable, Collection, Sequence
+from collections.abc import Callable, Collection, Iterable, Sequence
 from types import TracebackType
 from typing import Any, Self
 
@@ -18,6 +18,7 @@ from firmware_host.answers import (
     SensorSetup,
     StoredCalibration,
     reset_cause,
+    sample_batches,
 )
 from firmware_host.errors import BoardError
 from firmware_host.frames import Frame
@@ -57,7 +58,7 @@ class Board:
         self._streaming = False
         self._heard = (-1, 0.0)  # frames seen at the last check, and another's clock when there was a new one
         self._parts: tuple[str, ...] = ()
-        self._link = BoardLink(port, baud, self._take)
+        self._link = BoardLink(port, baud, self._take, self._take_samples)
         try:
             self.identity = self._hello()
             self.stop()  # whoever was here before may have left the stream running
@@ -232,12 +233,15 @@ class Board:
             raise refusal
         return answer
 
-    def _take(self, frame: Frame, host_time_s: float, request: str | None) -> None:
-        """On the reader thread: every frame as it comes."""
-        if frame.name in protocol.SAMPLES:
-            if self._streaming:
-                self._on_samples(SampleBatch.of(frame, host_time_s))
-        elif frame.name == "ack" and request in ("start", "stop", "reboot"):
+    def _take_samples(self, frames: Iterable[Frame], host_time_s: float) -> None:
+        """On the reader thread: the stream as it comes; what is left of another program's is dropped."""
+        if self._streaming:
+            for batch in sample_batches(frames, host_time_s):
+                self._on_samples(batch)
+
+    def _take(self, frame: Frame, request: str | None) -> None:
+        """On the reader thread: every other frame as it comes."""
+        if frame.name == "ack" and request in ("start", "stop", "reboot"):
             # Here and not in the caller's thread: the samples of a started stream may already be in the next frame.
             self._streaming = request == "start"
             if request == "reboot":

@@ -38,12 +38,18 @@ _CRC_OF_INTACT = 0x2144DF1C  # of any bytes followed by their own CRC
 
 
 class Frame(NamedTuple):
-    """A received frame: fixed fields by name, items as a structured array of the table's layout."""
+    """A received frame: fixed fields by name, and the bytes of its items."""
 
     name: str
     sequence: int
     values: dict[str, Any]
-    items: np.ndarray
+    content: bytes
+
+    @property
+    def items(self) -> np.ndarray[Any, Any]:
+        """The items as a structured array of the table's layout; of a message without any, an empty one."""
+        dtype = MESSAGE_BY_NAME[self.name].item_dtype
+        return np.frombuffer(self.content, dtype) if dtype.itemsize else np.empty(0)
 
 
 def encode(name: str, sequence: int, values: dict[str, Any] | None = None, items: np.ndarray | None = None) -> bytes:
@@ -75,20 +81,20 @@ def decode(block: bytes) -> Frame | None:
     if body is None or len(body) < OVERHEAD or crc32(body) != _CRC_OF_INTACT or body[0] not in MESSAGE_BY_CODE:
         return None
     message = MESSAGE_BY_CODE[body[0]]
-    payload = body[2:-4]
-    if message.name == "identity" and len(payload) >= 2 and payload[1] != PROTOCOL_VERSION:
-        return Frame("identity", body[1], {"reply_to": payload[0], "protocol": payload[1]}, np.empty(0))
-    size, each = message.head.size, message.item_dtype.itemsize
-    if len(payload) < size or (len(payload) - size) % each if each else len(payload) != size:
+    if message.name == "identity" and len(body) >= OVERHEAD + 2 and body[3] != PROTOCOL_VERSION:
+        return Frame("identity", body[1], {"reply_to": body[2], "protocol": body[3]}, b"")
+    head, each = message.head, message.item_dtype.itemsize
+    length = len(body) - OVERHEAD - head.size
+    if length < 0 or length % each if each else length != 0:
         return None
-    values = message.named(message.head.unpack_from(payload))
-    items: np.ndarray[Any, Any] = np.frombuffer(payload, message.item_dtype, offset=size) if each else np.empty(0)
-    if values.get("count", len(items)) != len(items):
+    values = message.named(head.unpack_from(body, 2))
+    if each and values.get("count", length // each) != length // each:
         return None
+    frame = Frame(message.name, body[1], values, body[2 + head.size : -4])
     for name, limit in _CHECKED[message.name]:
-        if np.any(items[name] >= limit) if name not in values else values[name] >= limit:
+        if values[name] >= limit if name in values else np.any(frame.items[name] >= limit):
             return None
-    return Frame(message.name, body[1], values, items)
+    return frame
 
 
 class FrameReader:

@@ -2,7 +2,8 @@
 
 import threading
 import time
-from collections.abc import Callable
+from collections.abc import Callable, Iterable
+from itertools import groupby
 from typing import Any
 
 from firmware_host import protocol
@@ -25,11 +26,18 @@ class _Request:
 class BoardLink:
     """An open serial port or `socket://host:port`, read by a thread of its own.
 
-    `on_frame(frame, host_time_s, request)` gets every frame on that thread, with the name of the request it answers or
-    None; it has returned before `ask` does. What it raises becomes `fault`, as a lost port does.
+    `on_frame(frame, request)` gets every frame but those of the stream on that thread, with the name of the request it
+    answers or None; it has returned before `ask` does. `on_stream(frames, host_time_s)` gets those of the stream, as
+    many at once as came together. What they raise becomes `fault`, as a lost port does.
     """
 
-    def __init__(self, port: str, baud: int, on_frame: Callable[[Frame, float, str | None], None]) -> None:
+    def __init__(
+        self,
+        port: str,
+        baud: int,
+        on_frame: Callable[[Frame, str | None], None],
+        on_stream: Callable[[Iterable[Frame], float], None],
+    ) -> None:
         """Opens the port. Raises BoardError `no_port`."""
         self.port = port
         self.baud = baud
@@ -37,6 +45,7 @@ class BoardLink:
         self.frames_seen = 0
         self._reads_without_frame = 0
         self._on_frame = on_frame
+        self._on_stream = on_stream
         self._frames = FrameReader()
         self._requests: dict[int, _Request] = {}
         self._sequence = 0
@@ -149,20 +158,31 @@ class BoardLink:
                 data = self._receive()
                 host_time_s = time.monotonic()
                 self._reads_without_frame += 1
-                for frame in self._frames.feed(data):
+                frames = self._frames.feed(data)
+                if frames:
                     self._reads_without_frame = 0
-                    self.frames_seen += 1
-                    self._take(frame, host_time_s)
+                    self.frames_seen += len(frames)
+                for streamed, together in groupby(frames, _streamed):
+                    if streamed:
+                        self._on_stream(together, host_time_s)
+                    else:
+                        for frame in together:
+                            self._take(frame)
         except Exception as error:  # a lost link or a failing consumer must reach the caller, not end in a dead thread
             self.fault = error
         for request in list(self._requests.values()):
             request.answered.set()
 
-    def _take(self, frame: Frame, host_time_s: float) -> None:
+    def _take(self, frame: Frame) -> None:
         request = self._requests.get(frame.values.get("reply_to", 0))
         if request is not None and frame.name not in (protocol.ANSWERS.get(request.name, "ack"), "error"):
             request = None  # to a program that was here before, and whose numbers were the same
-        self._on_frame(frame, host_time_s, request.name if request is not None else None)
+        self._on_frame(frame, request.name if request is not None else None)
         if request is not None:
             request.answer = frame
             request.answered.set()
+
+
+def _streamed(frame: Frame) -> bool:
+    """Whether a frame belongs to the stream, which nobody asks for one by one."""
+    return frame.name in protocol.SAMPLES

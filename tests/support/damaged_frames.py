@@ -109,7 +109,7 @@ class Heard:
 
 # What the host makes of a frame, as firmware_host/client.py does.
 _READ: dict[str, Callable[[Frame], object]] = {
-    **{name: lambda frame: SampleBatch.of(frame, 0.0) for name in protocol.SAMPLES},
+    **{name: lambda frame: SampleBatch.of([frame], 0.0) for name in protocol.SAMPLES},
     "setup": SensorSetup.of,
     "report": lambda frame: BoardStatus.of(frame, 0, 0),
     "observed": BoardObservation.of,

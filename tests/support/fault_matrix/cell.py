@@ -189,7 +189,7 @@ def _delivered(here: Bench, from_s: float, to_s: float) -> set[int]:
     for wall_s, data in here.wire["board"].delivered or []:
         for frame in reader.feed(data):
             if frame.name in SAMPLES and from_s + BEHIND_S < wall_s < to_s:
-                stamps.update(SampleBatch.of(frame, wall_s).samples["board_time_us"].tolist())
+                stamps.update(SampleBatch.of([frame], wall_s).samples["board_time_us"].tolist())
     return stamps
 
 
