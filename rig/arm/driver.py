@@ -27,6 +27,7 @@ SLOWNESS = 1.1  # a move may take this much longer than planned …
 SLOWNESS_S = 1.0  # … plus this, in the controller's time
 REPORT_S = 5.0  # … and to tell so, in wall time, once the arm stands where it should
 INTERRUPTION_S = 0.05  # a stopped program waits so long for the safety bits that explain it
+SILENCE_S = 0.8  # a controller that was silent for so long may have lost the client, whatever it does afterwards
 REASON_S = 0.2  # a refused move waits so long (wall time) for a state that explains it
 NOT_HELD = StopOutcome(True, "the arm was not under control")
 
@@ -64,6 +65,7 @@ class Arm:
         self._holds_arm = False  # a program of ours may run, so a stop is ours to make
         self._supervising = False
         self._interruption: tuple[Problem, float] | None = None  # and the time stamp of the state that showed it first
+        self._silent_s = 0.0  # the longest silence of the controller since the last move ended
         self.missed_states = 0  # gaps in the stream, counted in states
 
     # Looking ------------------------------------------------------------------------------------------------------
@@ -164,7 +166,7 @@ class Arm:
             asked_s = time.monotonic()
             self._wait(lambda: self._answer is not None or time.monotonic() > asked_s + START_S, watch)
             if self._answer is None:
-                self._fail(_not_started(motion))
+                self._fail(self._unbegun(_not_started(motion)))
             takes_s = motion.duration_s * SLOWNESS + SLOWNESS_S
             deadline_s, reported_s = self.latest.time_s + takes_s, time.monotonic() + takes_s + REPORT_S
 
@@ -176,7 +178,7 @@ class Arm:
             self._wait(lambda: self._has_ended(motion) or late(), watch)
             if isinstance(self._answer, Failed):
                 self._wait_for_reason()
-                self._fail(self._answer.problem)
+                self._fail(self._unbegun(self._answer.problem))
             elif not self._has_ended(motion):
                 self._fail(
                     Problem(
@@ -186,6 +188,7 @@ class Arm:
                     )
                 )
             self.check()
+            self._silent_s = 0.0
 
     def rest(self, duration_s: float, watch: Callable[[], None] = _nothing) -> None:
         """Stand still for a time of the controller's clock; `watch` as in `move`."""
@@ -197,8 +200,8 @@ class Arm:
     def stop(self) -> StopOutcome:
         """Stop the arm and tell what is known about it; takes less than 1 s.
 
-        May be called at any time, again and again, from any thread; a second Ctrl-C does not undo it. Afterwards the
-        control script has ended and this object moves the arm no more.
+        May be called at any time, again and again, from any thread; a second Ctrl-C does not undo it and is raised when
+        it has ended. Afterwards the control script has ended and this object moves the arm no more.
         """
         if not self._holds_arm:
             return NOT_HELD
@@ -206,8 +209,10 @@ class Arm:
 
     def close(self) -> None:
         """Stop the arm if it was under control, and end the child process."""
-        outcome = self.stop()
-        self._link.close()
+        try:
+            outcome = self.stop()
+        finally:
+            self._link.close()
         if self._holds_arm and (self._problem is not None or not outcome.at_rest):
             # A client that had lost the arm and found it again may have started its program anew, behind that stop.
             with suppress(OSError), Dashboard(self._host, LAST_STOP_S) as dashboard:
@@ -224,8 +229,12 @@ class Arm:
     def __exit__(
         self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
     ) -> None:
-        if error is not None and self._problem is None:  # the arm's own problems tell of the stop themselves
-            outcome = self.stop()
+        told = self._problem is not None and isinstance(error, RigError)  # the arm's own problems tell of the stop
+        if error is not None and not told:
+            try:
+                outcome = self.stop()
+            except KeyboardInterrupt:  # one more, on the way out; the stop has ended by now
+                outcome = self.stop()
             error.add_note(". ".join(filter(None, (outcome.what, outcome.remedy))))
         self.close()
 
@@ -258,6 +267,13 @@ class Arm:
         with self._changed:
             self._changed.wait_for(lambda: self._problem is not None, REASON_S)
 
+    def _unbegun(self, problem: Problem) -> Problem:
+        """Why a move was not begun: the controller refused it, or had lost the client in a silence."""
+        if self._silent_s <= SILENCE_S:
+            return problem
+        what = f"the arm at {self._host} was silent for {self._silent_s:.1f} s, and {problem.what}"
+        return Problem("arm_link_lost", what, "Look at the arm and its network cable, then start again")
+
     def _has_ended(self, motion: Motion) -> bool:
         if isinstance(self._answer, Failed):
             return True
@@ -272,6 +288,7 @@ class Arm:
         """Called by the link's reader thread with every message of the child."""
         match message:
             case Heartbeat():
+                self._silent_s = max(self._silent_s, message.silent_s)
                 for state in message.states:
                     self._take_state(state)
             case Connected():

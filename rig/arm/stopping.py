@@ -37,6 +37,7 @@ class Stopper:
         self._seen_at_rest = seen_at_rest
         self._starting = threading.Lock()
         self._thread = threading.Thread(target=self._stop, name="arm stop")
+        self._ended = threading.Event()
         self._outcome = StopOutcome(False, "the stop has not ended", "Look at the arm")
 
     @property
@@ -51,12 +52,29 @@ class Stopper:
                 self._thread.start()
 
     def outcome(self) -> StopOutcome:
-        """Stop the arm if that has not begun, and wait for the result; less than 1 s."""
+        """Stop the arm if that has not begun, and wait for the result; less than 1 s.
+
+        An interrupt meanwhile is raised when the result is there. (An event, because `join`, once interrupted, takes
+        the thread for ended in Python 3.11.)
+        """
         self.begin()
-        self._thread.join()
+        interrupt = None
+        while not self._ended.is_set():
+            try:
+                self._ended.wait()
+            except KeyboardInterrupt as impatient:
+                interrupt = impatient
+        if interrupt is not None:
+            raise interrupt
         return self._outcome
 
     def _stop(self) -> None:
+        try:
+            self._outcome = self._stopped()
+        finally:
+            self._ended.set()
+
+    def _stopped(self) -> StopOutcome:
         began_s = time.monotonic()
         # In a thread of its own: a child that does not listen must not keep the stop from the controller.
         threading.Thread(target=self._send, args=(Stop(BRAKE_RAD_S2),), name="arm brake", daemon=True).start()
@@ -67,19 +85,18 @@ class Stopper:
         except OSError as error:
             delivered = f"the controller's dashboard did not take the stop ({error})"
         if self._seen_at_rest(began_s, began_s + STOP_S - time.monotonic()):
-            self._outcome = StopOutcome(True, "the arm is stopped and at rest")
-        elif self._program_ended(began_s + STOP_S):
-            self._outcome = StopOutcome(
+            return StopOutcome(True, "the arm is stopped and at rest")
+        if self._program_ended(began_s + STOP_S):
+            return StopOutcome(
                 False,
                 "the controller says that its program has ended, but no state shows that the arm is at rest",
                 "Look at the arm: nothing drives it any more",
             )
-        else:
-            self._outcome = StopOutcome(
-                False,
-                f"{delivered}, but no state confirms that the arm is at rest",
-                "Look at the arm and press the emergency stop if it moves",
-            )
+        return StopOutcome(
+            False,
+            f"{delivered}, but no state confirms that the arm is at rest",
+            "Look at the arm and press the emergency stop if it moves",
+        )
 
     def _program_ended(self, deadline_s: float) -> bool:
         """Whether the controller says so itself by then: what is left to ask when no states come."""

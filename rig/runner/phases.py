@@ -184,7 +184,14 @@ class Run:
 
 def _with_notes(what: str, error: BaseException) -> str:
     """What happened, and what the arm added on its way out about its stop."""
-    return "; ".join([what, *getattr(error, "__notes__", ())])
+    return "; ".join([what, *dict.fromkeys(_notes(error))])
+
+
+def _notes(error: BaseException | None) -> Iterator[str]:
+    """Those of what ended the run, and of what it interrupted: a second Ctrl-C comes while the first is handled."""
+    while error is not None:
+        yield from getattr(error, "__notes__", ())
+        error = None if error.__suppress_context__ else error.__context__
 
 
 def observations_of(outcome: Outcome) -> Iterator[ObservationMade | AttitudeRead]:

@@ -271,6 +271,24 @@ def test_ctrl_c_stops_the_arm_at_once_and_goes_on_to_the_caller(laboratory: Worl
         assert fault.value.name == "arm_stopped"
 
 
+def test_three_ctrl_c_at_once_end_with_how_the_arm_was_left(world: World) -> None:
+    laboratory = world({"world": {"time_scale": 1}})  # braking takes longer than the three
+
+    def interrupt() -> None:
+        os.kill(os.getpid(), signal.SIGINT)
+
+    def interrupt_thrice() -> None:
+        for delay_s in (0.03, 0.06):
+            threading.Timer(delay_s, interrupt).start()
+        interrupt()
+
+    with pytest.raises(KeyboardInterrupt) as interrupted, Arm(laboratory.host) as arm:
+        arm.take_control(*PAYLOAD)
+        arm.move(turn(arm.latest.q_rad, 6.0), AtSpeed(arm, interrupt_thrice))
+    assert interrupted.value.__notes__ == ["the arm is stopped and at rest"]
+    assert stands(laboratory)
+
+
 def test_an_error_of_the_watch_stops_the_arm_and_is_kept(laboratory: WorldHandle) -> None:
     def complain() -> None:
         raise Fault("board_link_lost", "the board is gone", "plug it in")
@@ -331,6 +349,18 @@ def test_an_arm_elsewhere_that_falls_silent_is_missed_at_once_on_a_crowded_compu
             assert time.monotonic() - cut.acted_s < 3.0, "as long as a crowd here excuses a controller here"
         wire.stalled.clear()
     assert fault.value.name == "arm_link_lost"
+
+
+def test_a_controller_that_was_silent_before_a_move_has_not_refused_it(
+    laboratory: WorldHandle, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr("rig.arm.child_link.crowding", lambda: 5.0)  # so crowded that 3 s of silence are excused
+    with Arm(laboratory.host) as arm:
+        arm.take_control(*PAYLOAD)
+        laboratory.control({"do": "silence_arm", "duration_s": 3.0})
+        with pytest.raises(Fault) as fault:
+            arm.move(turn(arm.latest.q_rad, 1.0))
+    assert fault.value.name == "arm_link_lost", fault.value
 
 
 def test_an_arm_slower_than_planned_is_stopped(laboratory: WorldHandle) -> None:

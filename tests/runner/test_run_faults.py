@@ -118,6 +118,17 @@ def test_an_interrupt_stops_the_arm_within_a_second(start: Start, number: signal
     assert len(run.samples["gyro"]) > 0 and len(run.arm) > 0
 
 
+def test_three_ctrl_c_at_once_leave_the_word_that_the_arm_stands(start: Start) -> None:
+    rig = start({"world": {"time_scale": 1}})
+    rig.until_sweeping()
+    for _ in range(3):
+        rig.send(signal.SIGINT)
+        time.sleep(0.05)
+    status, errors = rig.end()
+    assert status == 130
+    assert "interrupted; the arm is stopped and at rest; " in errors.splitlines()[-1], errors
+
+
 def test_killing_all_processes_at_once_stops_the_arm(start: Start) -> None:
     rig = start()
     rig.until_sweeping()
