@@ -1,7 +1,7 @@
 """The `world:` section: what the simulated laboratory simulates. Only the world uses the values given here."""
 
 from pathlib import Path
-from typing import Annotated, Any
+from typing import Annotated, Any, Literal
 
 from pydantic import Field
 
@@ -21,6 +21,10 @@ Tilt = Annotated[float, Field(ge=-10, le=10)]
 Turn = Annotated[float, Field(ge=-180, le=180)]
 RATE_PER_K: dict[str, Any] = {"unit": "rad/s/K"}
 PER_RATE: dict[str, Any] = {"unit": "1/(rad/s)"}
+JointRange = Annotated[float, Field(gt=0, le=363)]
+JointRanges = tuple[JointRange, JointRange, JointRange, JointRange, JointRange, JointRange]
+JointSpeed = Annotated[float, Field(gt=0, le=360)]
+JointSpeeds = tuple[JointSpeed, JointSpeed, JointSpeed, JointSpeed, JointSpeed, JointSpeed]
 Cycles = Annotated[int, Field(ge=1, le=200)]
 Gradient = Annotated[float, Field(ge=-1000, le=1000)]
 
@@ -96,6 +100,10 @@ class ResidueSection(Section):
 class SimulatedArmSection(Section):
     """The simulated UR10e. Its ripple is locked to the joint angle: it integrates to nothing over whole turns."""
 
+    model: Literal["ur10e", "ur3e", "ur5e", "ur16e", "ur20", "ur10"] = Field(
+        default="ur10e", description="which arm its controller says it is; another than a UR10e is there to be refused"
+    )
+
     serial_number: str = Field(
         default="20265500123",
         pattern=r"^[0-9]+$",
@@ -108,6 +116,17 @@ class SimulatedArmSection(Section):
         pattern=r"^[0-9]{1,5}\.[0-9]{1,5}\.[0-9]{1,5}\.[0-9]{1,5}$",
         description="version of the controller's software",
         json_schema_extra={"allowed": "four numbers with dots between them"},
+    )
+    dashboard: bool = Field(default=True, description="whether it has a dashboard server; a PolyScope X has none")
+    primary: bool = Field(
+        default=True, description="whether the primary interface, which tells the model, is open in its settings"
+    )
+    joint_limits_deg: JointRanges | None = Field(
+        default=None,
+        description="how far its safety settings let each joint turn either way; without it, as far as it can",
+    )
+    joint_speed_limits_deg_s: JointSpeeds | None = Field(
+        default=None, description="how fast its safety settings let each joint turn; without it, as fast as it can"
     )
     remote_control: bool = Field(default=True, description="whether the pendant is switched to remote control")
     speed_slider: float = Field(

@@ -19,6 +19,7 @@ from rig.world.magnetic_field import magnetic_field_of
 from rig.world.site import site_of
 from rig.world.ur10e.flange_motion import Felt
 from rig.world.ur10e.joint_motion import Motion
+from rig.world.ur10e.models import simulated_model
 from rig.world.ur10e.ripple import ripple
 from rig.world.ur10e.robot import Identity, Robot
 from rig.world.ur10e.true_arm import TrueArm, known_links
@@ -36,6 +37,7 @@ class Laboratory:
         self._config, self._world = config, world
         arm = world.arm
         random = Random(world.seed)
+        model = simulated_model(arm)
         ripples = [ripple(arm.vibration_fraction, arm.vibration_cycles_per_turn, random) for _ in range(JOINTS)]
         motion = Motion(
             [radians(angle) for angle in config.arm.home_deg],
@@ -45,6 +47,7 @@ class Laboratory:
             lateness_s=partial(Random(f"jitter {world.seed}").gauss, 0.0, arm.state_jitter_s)
             if arm.state_jitter_s
             else None,
+            speed_limit_rad_s=model.speed_rad_s,
         )
         self.arm = TrueArm(arm, site_of(world.site), motion, random)
         about_x, about_y, about_z = arm.tcp_rotation_deg
@@ -54,7 +57,8 @@ class Laboratory:
             motion,
             arm.remote_control,
             arm.speed_slider,
-            known_links(arm.calibration),
+            known_links(arm.calibration, drawing=model.drawing),
+            model=model,
             tool_turn_rad=(radians(about_x), radians(about_y), radians(about_z)),
         )
         self._flash = flash_of(world.board.flash_file)

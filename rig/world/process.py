@@ -15,6 +15,7 @@ from urllib.parse import urlsplit
 
 from firmware_host.errors import BoardError
 from rig.config.load import Loaded
+from rig.config.world_models import SimulatedArmSection
 from rig.errors import Refused
 from rig.world.board.serial_line import SerialLine, SerialSession
 from rig.world.clock import Clock
@@ -65,6 +66,7 @@ class World:
             self.arm_listeners = [
                 self.network.listen(host, port, partial(new_session, self.laboratory.robot), lag_s=lag_s)
                 for port, (new_session, lag_s) in ARM_PORTS.items()
+                if port not in _closed_ports(section.arm)
             ]
             self.board_listener = None if board is None else self._listen("board.port", board.port, self.line)
             kvh_ports = {name: s.serial.port for name, s in loaded.config.sensors.items() if s.serial is not None}
@@ -178,6 +180,12 @@ class World:
         for pty in self._ptys:
             pty.close()
         self.network.close()
+
+
+def _closed_ports(arm: SimulatedArmSection) -> set[int]:
+    """What the simulated controller does not offer."""
+    closed = set() if arm.dashboard else {dashboard_server.PORT}
+    return closed if arm.primary else closed | {script_socket.PRIMARY_PORT}
 
 
 def _address(key: str, url: str) -> tuple[str, int]:

@@ -52,7 +52,7 @@ class DashboardSession:
             "get loaded program": self._loaded_program,
             "isprogramsaved": lambda: f"true {robot.loaded_program}",
             "get serial number": lambda: robot.identity.serial_number,
-            "get robot model": lambda: "UR10",
+            "get robot model": lambda: robot.model.name,
             "is in remote control": lambda: str(robot.remote_control).lower(),
             "get operational mode": lambda: self._mode or ("AUTOMATIC" if robot.remote_control else "MANUAL"),
             "getuserrole": self._get_role,

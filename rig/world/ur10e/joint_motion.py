@@ -55,7 +55,10 @@ class Motion:
         encoder_step_rad: float = 0.0,
         memory_s: float = 0.0,
         lateness_s: Callable[[], float] | None = None,
+        *,
+        speed_limit_rad_s: Joints = JOINT_SPEED_LIMIT_RAD_S,
     ) -> None:
+        self.speed_limit_rad_s = speed_limit_rad_s
         self._ripples = tuple(ripples)
         self._encoder_step_rad = encoder_step_rad
         self._lateness_s, self._late_s = lateness_s, 0.0
@@ -189,7 +192,7 @@ class Motion:
     def move(self, target_rad: Joints, speed_rad_s: float, acceleration_rad_s2: float) -> None:
         """A moveJ from standstill."""
         # From where the joints stand: after a stop that need not be where the program wanted them.
-        self.follow(line(self.q_rad, target_rad, speed_rad_s, acceleration_rad_s2, JOINT_SPEED_LIMIT_RAD_S))
+        self.follow(line(self.q_rad, target_rad, speed_rad_s, acceleration_rad_s2, self.speed_limit_rad_s))
 
     def follow(self, trajectory: Trajectory) -> None:
         """Any trajectory from standstill that begins where the joints are."""
@@ -198,7 +201,7 @@ class Motion:
 
     def speed(self, qd_rad_s: Joints, acceleration_rad_s2: float) -> None:
         """A speedJ, from whatever the joints do now: to this velocity, and on."""
-        wanted = tuple(max(-m, min(m, v)) for v, m in zip(qd_rad_s, JOINT_SPEED_LIMIT_RAD_S, strict=True))
+        wanted = tuple(max(-m, min(m, v)) for v, m in zip(qd_rad_s, self.speed_limit_rad_s, strict=True))
         velocity = self._trajectory.at(self._trajectory_s)[1]
         self._play(change_speed(self.now.target_q_rad, velocity, wanted, acceleration_rad_s2), scaled=True)
 

@@ -1,4 +1,4 @@
-"""The links of a UR10e: as the drawing has them, as its controller knows them, and as they are.
+"""An arm's links: as the drawing has them, as its controller knows them, and as they are.
 
 Denavit and Hartenberg's parameters, in the names of UR's calibration file (delta_theta, delta_a, delta_d, delta_alpha).
 """
@@ -24,15 +24,16 @@ class Link:
 
 Links = tuple[Link, ...]
 
-# UR10e, maker's article 45257: length a, offset d (m), twist alpha in quarter turns.
-_DRAWING = (
-    (0.0, 0.1807, 1),
-    (-0.6127, 0.0, 0),
-    (-0.57155, 0.0, 0),
-    (0.0, 0.17415, 1),
-    (0.0, 0.11985, -1),
-    (0.0, 0.11655, 0),
-)
+Drawing = tuple[tuple[float, float, int], ...]  # of each link length a, offset d (m), twist alpha in quarter turns
+
+
+def drawn(a_m: tuple[float, float], d_m: tuple[float, float, float, float]) -> Drawing:
+    """The drawing of an arm of this maker, of a2 a3 and d1 d4 d5 d6; all are bent alike."""
+    (a2, a3), (d1, d4, d5, d6) = a_m, d_m
+    return ((0.0, d1, 1), (a2, 0.0, 0), (a3, 0.0, 0), (0.0, d4, 1), (0.0, d5, -1), (0.0, d6, 0))
+
+
+UR10E = drawn((-0.6127, -0.57155), (0.1807, 0.17415, 0.11985, 0.11655))  # maker's article 45257
 
 
 def links(
@@ -40,11 +41,12 @@ def links(
     a_m: Sequence[float] = ZERO6,
     d_m: Sequence[float] = ZERO6,
     alpha_rad: Sequence[float] = ZERO6,
+    drawing: Drawing = UR10E,
 ) -> Links:
     """The drawing's links with these deviations of each joint. Without any, quarter turns are exact."""
     return tuple(
         _link(theta, a + da, d + dd, quarters, twist)
-        for (a, d, quarters), theta, da, dd, twist in zip(_DRAWING, theta_rad, a_m, d_m, alpha_rad, strict=True)
+        for (a, d, quarters), theta, da, dd, twist in zip(drawing, theta_rad, a_m, d_m, alpha_rad, strict=True)
     )
 
 

@@ -6,12 +6,10 @@ payload; a robot state (16) holds sub-packages of the same form, a robot message
 
 import struct
 from collections.abc import Callable
-from math import pi
 
 from rig.world.clock import TICKS_PER_SECOND
 from rig.world.ur10e.controller_messages import Message, MessageKind
-from rig.world.ur10e.joint_motion import JOINT_SPEED_LIMIT_RAD_S
-from rig.world.ur10e.links import NOMINAL, Links
+from rig.world.ur10e.links import Links, links
 from rig.world.ur10e.modes import RobotMode, RuntimeState, SafetyMode
 from rig.world.ur10e.robot import Robot
 from rig.world.ur10e.script_socket import ScriptSession
@@ -20,7 +18,7 @@ from rig.world.ur10e.variables import joint_modes
 STATE_HZ = 10
 ROBOT_STATE, ROBOT_MESSAGE = 16, 20
 VERSION_MESSAGE = 3
-UR10 = 2  # robot type
+ACCELERATION_LIMIT_RAD_S2 = 40.0  # of every joint
 PROJECT = b"URControl"
 
 
@@ -140,11 +138,14 @@ def _kinematics(robot: Robot) -> bytes:
 
 
 def _configuration(robot: Robot) -> bytes:
-    positions = [-2 * pi, 2 * pi] * 6
-    speeds = [value for speed in JOINT_SPEED_LIMIT_RAD_S for value in (speed, 40.0)]
+    """What the controller is set up for: its model as drawn, and what its safety settings leave of what that can do."""
+    model = robot.model
+    positions = [value for limit in model.limit_rad for value in (-limit, limit)]
+    speeds = [value for speed in model.speed_rad_s for value in (speed, ACCELERATION_LIMIT_RAD_S2)]
     defaults = [1.05, 1.4, 0.25, 1.2, 0.5]  # joint speed and acceleration, tool speed and acceleration, radius
-    numbers = [*positions, *speeds, *defaults, *_denavit_hartenberg(NOMINAL), *[0.0] * 6]
-    return struct.pack(f">{len(numbers)}d4i", *numbers, 0, 0, UR10, 0)
+    drawing = _denavit_hartenberg(links(drawing=model.drawing))
+    numbers = [*positions, *speeds, *defaults, *drawing, *[0.0] * 6]
+    return struct.pack(f">{len(numbers)}d4i", *numbers, 0, 0, model.robot_type, 0)
 
 
 STATE: tuple[Part, ...] = ((0, _robot_mode), (1, _joints), (3, _masterboard), (4, _cartesian))

@@ -6,8 +6,7 @@ from dataclasses import dataclass
 from rig.world.ur10e.cartesian import joints_for, straight_line
 from rig.world.ur10e.controller_messages import ProgramError
 from rig.world.ur10e.forward_kinematics import flange_pose
-from rig.world.ur10e.joint_motion import JOINT_SPEED_LIMIT_RAD_S
-from rig.world.ur10e.robot import JOINT_LIMIT_RAD, Robot
+from rig.world.ur10e.robot import Robot
 from rig.world.ur10e.trajectory import line
 
 Steps = Iterator[None]
@@ -92,9 +91,9 @@ class Threads:
             target = move.target
             if move.is_pose:
                 target = joints_for(self.robot.flange_for(target), motion.q_rad, links)
-            trajectory = line(motion.q_rad, target, move.speed, move.acceleration, JOINT_SPEED_LIMIT_RAD_S)
-        if any(abs(q) > JOINT_LIMIT_RAD for q in trajectory.end_rad):
-            raise ProgramError("joint position out of limits: a target lies beyond ±360°")
+            trajectory = line(motion.q_rad, target, move.speed, move.acceleration, motion.speed_limit_rad_s)
+        if not self.robot.within_limits(trajectory.end_rad):
+            raise ProgramError("joint position out of limits: a target lies beyond a joint's limit")
         motion.follow(trajectory)
         while not motion.standing:
             yield

@@ -10,10 +10,11 @@ from rig.world.ur10e.controller_messages import MessageKind, Messages, ProgramEr
 from rig.world.ur10e.forward_kinematics import Vector, flange_pose, rotation_from_vector, turned_pose
 from rig.world.ur10e.joint_motion import Motion
 from rig.world.ur10e.links import NOMINAL, Links
+from rig.world.ur10e.models import MODELS, ArmModel
 from rig.world.ur10e.modes import SAFETY_BITS, RobotMode, RuntimeState, SafetyMode
 from rig.world.ur10e.tcp_motion import TcpMotion, tcp_motion
 
-JOINT_LIMIT_RAD = 6.2831853072 + 1e-6  # every joint ±360°
+ROUNDING_RAD = 1e-6  # a target on a joint's limit is within it
 PROGRAM_STOP_RAD_S2 = 4.0
 PROTECTIVE_STOP_RAD_S2 = 15.0
 BRAKE_RAD_S2 = 40.0
@@ -65,9 +66,11 @@ class Robot:
         speed_slider: float,
         links: Links = NOMINAL,
         *,
+        model: ArmModel = MODELS["ur10e"],
         tool_turn_rad: Vector = (0.0, 0.0, 0.0),
     ) -> None:
         self.identity = identity
+        self.model = model
         self.links = links  # as it knows them
         # The tool's frame in the flange's (m, rotation vector rad): it stands in the same place, and may be turned.
         self.tcp_offset = (0.0, 0.0, 0.0, *tool_turn_rad)
@@ -306,6 +309,10 @@ class Robot:
     def _turned(self, pose: Sequence[float], sign: int) -> tuple[float, ...]:
         turn = [sign * angle for angle in self.tcp_offset[3:]]
         return turned_pose(pose, rotation_from_vector(turn)) if any(turn) else tuple(pose)
+
+    def within_limits(self, q_rad: Sequence[float]) -> bool:
+        """Whether the joints may stand so."""
+        return all(abs(q) <= limit + ROUNDING_RAD for q, limit in zip(q_rad, self.model.limit_rad, strict=True))
 
     # -- what RTDE reports -------------------------------------------------------------------------------------------
     @property

@@ -10,20 +10,24 @@ from rig.world.ur10e.flange_motion import Felt, base, carried, turns_of
 from rig.world.ur10e.forward_kinematics import Rotation, Vector, flange_rate, frames
 from rig.world.ur10e.joint_errors import Errors, JointErrors
 from rig.world.ur10e.joint_motion import Motion
-from rig.world.ur10e.links import NOMINAL, ZERO6, Links, links
+from rig.world.ur10e.links import UR10E, ZERO6, Drawing, Links, links
+from rig.world.ur10e.models import MODELS
 from rig.world.ur10e.trajectory import Joints
 
 STILL: Vector = (0.0, 0.0, 0.0)
 WRIST = 3  # the first of the joints that vibrate: those before it mostly stand
 
 
-def known_links(calibration: CalibrationSection, twist_rad: tuple[float, ...] = ZERO6) -> Links:
+def known_links(
+    calibration: CalibrationSection, twist_rad: tuple[float, ...] = ZERO6, drawing: Drawing = UR10E
+) -> Links:
     """The links as the maker calibrated them; with the twists that he does not know, as they are."""
     return links(
         calibration.delta_theta_rad,
         [1e-3 * length for length in calibration.delta_a_mm],
         [1e-3 * length for length in calibration.delta_d_mm],
         [known + rest for known, rest in zip(calibration.delta_alpha_rad, twist_rad, strict=True)],
+        drawing,
     )
 
 
@@ -36,13 +40,17 @@ class TrueArm:
     def __init__(self, section: SimulatedArmSection, site: Site, motion: Motion, random: Random) -> None:
         self._motion, self._site = motion, site
         self._speed = 1.0 + 1e-6 * section.clock_ppm
-        self._links = known_links(section.calibration, section.residue.twist_rad)
+        drawing = MODELS[section.model].drawing
+        self._links = known_links(section.calibration, section.residue.twist_rad, drawing)
         errors = _errors(section)
         self._errors = JointErrors(errors, random) if errors.any else None
         self._at_rest: Felt | None = None
         self._forearm: tuple[tuple[tuple[float, ...], ...], Felt] = ((), base(site))  # felt there, and how joints were
         self.ideal = (
-            self._speed == 1.0 and self._links == NOMINAL and self._errors is None and not any(site.earth_rate_rad_s)
+            self._speed == 1.0
+            and self._links == links(drawing=drawing)
+            and self._errors is None
+            and not any(site.earth_rate_rad_s)
         )
 
     @property

@@ -7,7 +7,7 @@ from rig.world.ur10e.cartesian import joints_for
 from rig.world.ur10e.controller_messages import ProgramError
 from rig.world.ur10e.forward_kinematics import flange_pose, placed_pose
 from rig.world.ur10e.program_threads import finite
-from rig.world.ur10e.robot import JOINT_LIMIT_RAD, Robot
+from rig.world.ur10e.robot import Robot
 from rig.world.ur10e.trajectory import Joints
 from rig.world.ur10e.ur_rtde_registers import Registers
 
@@ -32,7 +32,7 @@ def questions(robot: Robot, registers: Registers) -> dict[int, Callable[[], None
 
     def reached(nearest: Joints) -> bool:
         try:
-            return _within_limits(joints(nearest))
+            return robot.within_limits(joints(nearest))
         except ProgramError:
             return False
 
@@ -53,7 +53,7 @@ def questions(robot: Robot, registers: Registers) -> dict[int, Callable[[], None
         31: robot.protective_stop,
         35: lambda: robot.set_watchdog(registers.doubles(0, 1)[0]),
         36: lambda: say(reached(robot.motion.q_rad)),
-        37: lambda: say(_within_limits(registers.doubles(0, 6))),
+        37: lambda: say(robot.within_limits(registers.doubles(0, 6))),
         38: lambda: put([0.0] * 6),
         39: lambda: put(placed_pose(registers.doubles(0, 6), registers.doubles(6, 6))),
         40: lambda: put(robot.tcp_offset),
@@ -65,10 +65,6 @@ def questions(robot: Robot, registers: Registers) -> dict[int, Callable[[], None
         60: lambda: say(reached(robot.motion.q_rad)),
         61: lambda: say(reached(near())),
     }
-
-
-def _within_limits(q_rad: Joints) -> bool:
-    return all(abs(q) <= JOINT_LIMIT_RAD for q in q_rad)
 
 
 NOT_ACTED_OUT = {
