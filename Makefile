@@ -1,23 +1,20 @@
-# make demo    calibrate a gyroscope on a simulated robot arm, on a bare machine with Python 3.11 or 3.12
+# make demo    calibrate a gyroscope on a simulated robot arm, on a bare machine with Python
 # make check   lint, types, import layers and the fast tests
-# make test    everything CI checks: lint, types, import layers, all tests (needs gcc and arm-none-eabi-gcc)
+# make test    everything CI checks: lint, types, import layers, all tests
 # make proof   statistical acceptance over all seeds, which takes longer than anybody waits for a change
 # make firmware builds the board's image (needs arm-none-eabi-gcc) and prints what it takes of the chip
 # make bench   every benchmark, ratios measured side by side; not faults, long_life and damaged_frames, which take hours
 # make lock    pins what `make demo` installs anew, by version and hash (requirements/demo.txt)
 # make sbom    what is installed, as a CycloneDX bill of materials: build/sbom.json
 # make figures the pictures in docs/results.md, by the studies and the experiments
+# What the machine itself lacks for one of them, requirements/system.sh installs on Debian, or names.
 
 VENV := .venv
 BIN := $(VENV)/bin
-# ur-rtde has wheels for CPython 3.11 and 3.12; take the first interpreter that is one of them.
-FIND_PYTHON = for p in python3.12 python3.11 python3 python; do \
-  "$$p" -c 'import sys; sys.exit(sys.version_info[:2] not in [(3, 11), (3, 12)])' 2>/dev/null && echo "$$p" && break; done
-
 LONG := $(addprefix benchmarks/, faults.py long_life.py damaged_frames.py)
 STUDIES := normal extreme speed convergence sine averaging estimators misalignment budget kvh-gyro kvh-accelerometer
 
-.PHONY: demo check test proof lint firmware bench lock sbom figures clean
+.PHONY: demo system check test proof lint firmware bench lock sbom figures clean
 .DELETE_ON_ERROR:
 
 demo: $(VENV)/demo.installed
@@ -27,15 +24,18 @@ demo: $(VENV)/demo.installed
 # algebra would only be in each other's way.
 PYTEST := OPENBLAS_NUM_THREADS=1 $(BIN)/pytest -n 2 --dist worksteal
 
-check: $(VENV)/dev.installed lint
+system:
+	requirements/system.sh test
+
+check: system $(VENV)/dev.installed lint
 	$(PYTEST) -m "not slow"
 
-test: $(VENV)/dev.installed lint
+test: system $(VENV)/dev.installed lint
 	rm -rf build/coverage
 	RIG_COVERAGE=$(CURDIR)/build/coverage $(PYTEST)
 	$(MAKE) -C firmware_host/firmware coverage_table COVERED=$(CURDIR)/build/coverage PYTHON=$(CURDIR)/$(BIN)/python
 
-proof: $(VENV)/dev.installed
+proof: system $(VENV)/dev.installed
 	$(PYTEST) -m proof --proof -rP
 
 lint: $(VENV)/dev.installed
@@ -73,19 +73,17 @@ sbom: $(VENV)/demo.installed | $(TOOLS)/bin/cyclonedx-py
 	$(TOOLS)/bin/cyclonedx-py environment --pyproject pyproject.toml --output-reproducible --of JSON \
 	  --output-file build/sbom.json $(BIN)/python
 
-$(TOOLS)/bin/uv: TOOL := uv==0.13.9
+$(TOOLS)/bin/uv: TOOL := $(file < requirements/uv.txt)
 $(TOOLS)/bin/cyclonedx-py: TOOL := cyclonedx-bom==7.5.0
 $(TOOLS)/bin/uv $(TOOLS)/bin/cyclonedx-py: | $(BIN)/python
 	$(BIN)/python -m venv $(TOOLS)
 	$(TOOLS)/bin/python -m pip install --quiet --disable-pip-version-check $(TOOL)
 
 clean:
-	rm -rf $(VENV) *.egg-info
+	rm -rf $(VENV) build/python build/tools build/wheels *.egg-info
 
 $(BIN)/python:
-	@python="$$($(FIND_PYTHON))"; \
-	if [ -z "$$python" ]; then echo "make: Python 3.11 or 3.12 is needed (ur-rtde has no wheels for others); install one and run again" >&2; exit 1; fi; \
-	"$$python" -m venv $(VENV)
+	requirements/environment.sh $(VENV)
 
 # From the lock file: the same versions, byte for byte, whenever it is. `dev` takes the newest that pyproject.toml allows.
 $(VENV)/demo.installed: pyproject.toml requirements/demo.txt | $(BIN)/python
