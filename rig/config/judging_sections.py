@@ -2,11 +2,11 @@
 
 from datetime import date
 from typing import Annotated, Literal, Self
-from urllib.parse import urlsplit
 
 import numpy as np
 from pydantic import Field, field_validator, model_validator
 
+from rig.config.history_address import history_url
 from rig.config.section import (
     RATIO,
     Positive,
@@ -15,7 +15,6 @@ from rig.config.section import (
     Words,
 )
 
-HISTORY_SCHEMES = ("postgresql", "sqlite")
 MIN_LEVEL = 0.1  # sine of the angle between the vertical and what a heading is given of
 
 
@@ -277,15 +276,6 @@ class HistorySection(Section):
     @classmethod
     def a_place_without_a_password(cls, value: str | None) -> str | None:
         """A recording keeps the configuration, so a password in it would go wherever recordings go."""
-        if value is None or "://" not in value:
-            return value
-        try:
-            parts = urlsplit(value)
-            known, secret = parts.scheme in HISTORY_SCHEMES, parts.password is not None or "password" in parts.query
-        except ValueError:
-            known, secret = False, False
-        if secret:
+        if value is not None and "://" in value and history_url(value).password is not None:
             raise ValueError("holds a password, which every recording would keep; put it into ~/.pgpass")
-        if not known:
-            raise ValueError(f"must be a file or begin with {' or '.join(f'{each}://' for each in HISTORY_SCHEMES)}")
         return value

@@ -3,38 +3,60 @@
 from pathlib import Path
 from typing import Any
 
-from sqlalchemy import Connection, Engine, create_engine, event
+from sqlalchemy import URL, Connection, Engine, create_engine, event
 
-from rig.errors import Refused
+from rig.history.libpq import connect_arguments
 from rig.history.migrations import bring_up_to_date, version_of
 from rig.history.place import Place
 from rig.history.schema import VERSION
+from rig.history.sqlite_file import history_is_there, made_whole
 from rig.study.files import missing_extra
 
 WAIT_S = 30  # for others who write; for nobody so long, since an entry takes milliseconds
-CONNECT_S = 5
 WRITES = "rig_writes"  # execution option of a connection that will write
 
 
 def engine_of(place: Place) -> Engine:
-    """Up to date and ready. Raises Refused as `bring_up_to_date`, `missing_extra`; SQLAlchemyError and OSError."""
-    engine = _sqlite(place.file, place.url) if place.file is not None else _postgresql(place)
+    """Up to date and ready.
+
+    Raises Refused as `bring_up_to_date`, `history_is_there`, `missing_extra`; SQLAlchemyError and OSError.
+    """
+    if place.server is not None:
+        engine = _postgresql(place.server)
+    else:
+        assert place.file is not None
+        engine = _of_file(place.file, place.label)
     try:
         with engine.connect() as connection:
             current = version_of(connection, place.label) == VERSION
         if not current:
-            with engine.connect().execution_options(**{WRITES: True}) as connection, connection.begin():
-                bring_up_to_date(connection, place.label)
+            _bring_up_to_date(engine, place.label)
     except BaseException:
         engine.dispose()
         raise
     return engine
 
 
-def _sqlite(file: Path, url: str) -> Engine:
+def _bring_up_to_date(engine: Engine, label: str) -> None:
+    with engine.connect().execution_options(**{WRITES: True}) as connection, connection.begin():
+        bring_up_to_date(connection, label)
+
+
+def _of_file(file: Path, label: str) -> Engine:
+    """Looked at before it is opened to be written; where there is none, one with all its tables is put there."""
+    if not history_is_there(file):
+        with made_whole(file) as beside:
+            engine = _sqlite(beside)
+            try:
+                _bring_up_to_date(engine, label)
+            finally:
+                engine.dispose()
+    return _sqlite(file)
+
+
+def _sqlite(file: Path) -> Engine:
     """Write-ahead log, so that readers and a writer do not wait for each other. Not for network shares."""
-    file.parent.mkdir(parents=True, exist_ok=True)
-    engine = create_engine(url, connect_args={"timeout": WAIT_S})
+    engine = create_engine(URL.create("sqlite", database=str(file)), connect_args={"timeout": WAIT_S})
 
     @event.listens_for(engine, "connect")
     def prepare(connection: Any, _: Any) -> None:
@@ -51,11 +73,9 @@ def _sqlite(file: Path, url: str) -> Engine:
     return engine
 
 
-def _postgresql(place: Place) -> Engine:
+def _postgresql(server: URL) -> Engine:
     limits = f"-c lock_timeout={WAIT_S}s -c statement_timeout={WAIT_S}s"
     try:
-        return create_engine(place.url, connect_args={"connect_timeout": CONNECT_S, "options": limits})
+        return create_engine(server, connect_args={"options": limits, **connect_arguments(server)})
     except ImportError as error:
         raise missing_extra(error, "postgres") from error
-    except Exception as error:  # what the URL says is no database of this kind
-        raise Refused("history_unreachable", f"{place.label}: {error}", "Correct the URL of the history") from error

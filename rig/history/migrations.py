@@ -11,6 +11,7 @@ from sqlalchemy import Connection, insert, inspect, select, text, update
 
 from rig.errors import Refused
 from rig.history import schema
+from rig.history.sqlite_file import APPLICATION_ID
 
 LOCK = 7_245_118  # any number, the same for everybody: makers of tables wait for one another
 
@@ -60,6 +61,8 @@ def bring_up_to_date(connection: Connection, label: str) -> None:
     """Make the tables or migrate them, in the connection's transaction. Raises Refused as `version_of`."""
     if connection.dialect.name == "postgresql":
         connection.execute(text("SELECT pg_advisory_xact_lock(:lock)"), {"lock": LOCK})
+    if connection.dialect.name == "sqlite":
+        connection.execute(text(f"PRAGMA application_id = {APPLICATION_ID}"))
     version = version_of(connection, label)
     if version == 0:
         schema.metadata.create_all(connection)

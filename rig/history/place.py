@@ -4,8 +4,14 @@ import os
 from collections.abc import Mapping
 from dataclasses import dataclass
 from pathlib import Path
+from typing import TYPE_CHECKING
 
+from rig.config.history_address import history_url
 from rig.config.judging_sections import HistorySection
+from rig.errors import Refused
+
+if TYPE_CHECKING:
+    from sqlalchemy import URL
 
 ENVIRONMENT = "RIG_HISTORY"
 OFF = "off"
@@ -14,19 +20,19 @@ NAME = "history.sqlite"
 
 @dataclass(frozen=True, slots=True)
 class Place:
-    """A history's `url` as SQLAlchemy takes it; `label` is what people are told, without any password."""
+    """An SQLite `file`, or a database's URL on a `server`; `label` is what people are told, without any password."""
 
-    url: str
     label: str
-
-    @property
-    def file(self) -> Path | None:
-        """The SQLite file, None of a server's."""
-        return Path(self.url.removeprefix("sqlite:///")) if self.url.startswith("sqlite:") else None
+    file: Path | None = None
+    server: "URL | None" = None
 
 
 def chosen_place(section: HistorySection, environment: Mapping[str, str] = os.environ) -> Place | None:
-    """Where a run is entered: by the environment's `RIG_HISTORY`, else by the configuration; None for nowhere."""
+    """Where a run is entered: by the environment's `RIG_HISTORY`, else by its configuration; None for nowhere.
+
+    `section` is of a configuration that the user has named or knows, never of a folder that came from somewhere.
+    Raises Refused `history_address`.
+    """
     said = environment.get(ENVIRONMENT)
     if said == OFF or (section.off and not said):
         return None
@@ -34,17 +40,23 @@ def chosen_place(section: HistorySection, environment: Mapping[str, str] = os.en
 
 
 def place(said: str | None) -> Place:
-    """A file's name or a URL; None is the user's own file."""
+    """A file's name or a URL; None is the user's own file. Raises Refused `history_address`."""
     if not said:
         from platformdirs import user_data_path
 
         said = str(user_data_path("calibration-rig", appauthor=False) / NAME)
-    scheme, mark, rest = said.partition("://")
-    if not mark:
+    if "://" not in said:
         path = Path(said).expanduser().absolute()
-        return Place(f"sqlite:///{path}", str(path))
-    if scheme == "sqlite":
-        return place(rest.removeprefix("/") if rest.startswith("/") else rest)
-    user, at, host = rest.rpartition("@")
-    label = f"{scheme}://{user.partition(':')[0]}{at}{host.partition('?')[0]}"
-    return Place(f"postgresql+psycopg://{rest}" if scheme == "postgresql" else said, label)
+        return Place(str(path), file=path)
+    try:
+        url = history_url(said)
+    except ValueError as error:
+        # Not with what was said: it may hold a password.
+        raise Refused(
+            "history_address",
+            f"the address of the history, {said.partition('://')[0]}://…, {error}",
+            "Correct it in --history, RIG_HISTORY or the configuration; docs/how-to/shared-history.md says how",
+        ) from error
+    if url.drivername == "sqlite":
+        return place(url.database)
+    return Place(url.set(password=None).render_as_string(), server=url.set(drivername="postgresql+psycopg"))

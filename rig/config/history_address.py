@@ -1,0 +1,35 @@
+"""Which addresses a history may have: a file, or a database whose URL holds nothing that is better kept secret."""
+
+from typing import TYPE_CHECKING
+
+if TYPE_CHECKING:
+    from sqlalchemy import URL
+
+SCHEMES = ("postgresql", "sqlite")
+# What a URL may say beside user, host and name. Everything else of libpq's (passwords and where they lie, keys,
+# services, options of the session) is for the files and variables of whoever runs the rig: recordings keep the URL.
+ALLOWED = {"postgresql": ("host", "port", "sslmode", "sslrootcert"), "sqlite": ()}
+ENCRYPTED = ("require", "verify-ca", "verify-full")
+
+
+def history_url(text: str) -> "URL":
+    """A URL with nothing in it but what is allowed, percent signs resolved. Raises ValueError, which says why not."""
+    from sqlalchemy import make_url
+    from sqlalchemy.exc import ArgumentError
+
+    try:
+        url = make_url(text)
+    except (ArgumentError, ValueError) as error:
+        raise ValueError("is no URL") from error
+    if url.drivername not in SCHEMES:
+        raise ValueError(f"must be a file or begin with {' or '.join(f'{each}://' for each in SCHEMES)}")
+    allowed = ALLOWED[url.drivername]
+    for key in url.query:
+        if key not in allowed:
+            may = f"; it may say {', '.join(allowed)}" if allowed else ""
+            raise ValueError(f"says {key!r} after its question mark, which is not for a URL of a history{may}")
+    if url.query.get("sslmode", ENCRYPTED[0]) not in ENCRYPTED:
+        raise ValueError(f"has an sslmode other than {', '.join(ENCRYPTED)}")
+    if url.drivername == "sqlite" and (not url.database or url.host or url.username):
+        raise ValueError("names no file; write sqlite:////folder/history.sqlite")
+    return url
