@@ -10,6 +10,7 @@ from typing import TYPE_CHECKING, Any
 
 from rig import __version__
 from rig.commands import history_arguments, page_arguments, solve_arguments
+from rig.commands.named_history import add_history
 from rig.commands.standard_streams import keep_streams_usable
 from rig.errors import Fault, RigError
 from rig.errors.quoting import printable_lines
@@ -128,6 +129,7 @@ def _parser() -> argparse.ArgumentParser:
     )
     report.add_argument("--dcc", action="store_true", help="the digital certificate (DCC 3.2.1, XML) too")
     report.add_argument("--out", type=Path, metavar="DIR", help="where to (default: the run folder)")
+    add_history(report)
     _add_set(report, "say something else on the certificate, for example certificate.customer=Example")
     export = add("export", _export, "what was calibrated and recorded, in the files of other programs")
     export.add_argument("run", type=Path, metavar="RUN", help="a run folder")
@@ -321,7 +323,8 @@ def _reversal(options: argparse.Namespace) -> int:
 def _report(options: argparse.Namespace) -> int:
     from rig.commands.report import report
 
-    return report(options.run, options.out, options.overrides, options.reversal, pdf=options.pdf, dcc=options.dcc)
+    forms = {"pdf": options.pdf, "dcc": options.dcc}
+    return report(options.run, options.out, options.overrides, options.reversal, **forms, history=options.history)
 
 
 def _export(options: argparse.Namespace) -> int:

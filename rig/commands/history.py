@@ -1,7 +1,6 @@
 """`rig history …`: what the laboratory remembers."""
 
 import json
-import os
 import sys
 from argparse import Namespace
 from collections.abc import Iterator
@@ -10,13 +9,13 @@ from pathlib import Path
 
 from rich.console import Console
 
-from rig.config.load import load
+from rig.commands.named_history import named_history
 from rig.data.run_folder import RESULT, recordings
 from rig.errors import Refused, RigError
 from rig.history.documents import change_entry, history_csv, history_document, rigs_document
 from rig.history.finished import Finished, finished_run
 from rig.history.integrity import examined
-from rig.history.place import ENVIRONMENT, OFF, Place, place
+from rig.history.place import own_place, place
 from rig.history.series import changes, effects, rig_states, subjects, trends
 from rig.history.store import History, Past, Selection, open_history
 from rig.history.tables import (
@@ -43,7 +42,7 @@ def listed(options: Namespace) -> int:
         pasts = _selected(history, selection)
     found = {subject: trends(each) for subject, each in subjects(pasts).items()}
     if options.csv:
-        for line in history_csv(pasts).splitlines():
+        for line in history_csv(pasts).rstrip("\n").split("\n"):
             say(line)
     elif options.json:
         document = history_document(pasts, found if selection.serial_number is not None else None)
@@ -179,15 +178,7 @@ def void(options: Namespace) -> int:
 
 def opened(options: Namespace) -> AbstractContextManager[History]:
     """The history that is meant. Raises Refused as `open_history`, and as `load` where a configuration names it."""
-    return open_history(_place(options.history))
-
-
-def _place(said: str | None) -> Place:
-    if said is not None and said.endswith((".yaml", ".yml")):
-        said = load(Path(said), sections=None).config.history.url
-    elif said is None:
-        said = os.environ.get(ENVIRONMENT)
-    return place(None if said == OFF else said)
+    return open_history(own_place(named_history(options.history)) or place(None))
 
 
 def _selection(options: Namespace) -> Selection:

@@ -6,6 +6,9 @@ from datetime import date
 from pathlib import Path
 from typing import Any
 
+from rig.commands.named_history import add_history
+from rig.commands.waiting import answer_of
+
 LIST = "list"
 _COMMANDS = (LIST, "show", "plot", "rigs", "import", "verify", "compare", "void")
 
@@ -25,12 +28,7 @@ def add_arguments(history: argparse.ArgumentParser) -> None:
     def add(name: str, text: str) -> argparse.ArgumentParser:
         command: argparse.ArgumentParser = commands.add_parser(name, help=text, description=text)
         command.set_defaults(command=_command(name))
-        command.add_argument(
-            "--history",
-            metavar="PLACE",
-            help="an SQLite file, a postgresql:// URL, or a configuration file that names one (default: RIG_HISTORY, "
-            "else the user's own)",
-        )
+        add_history(command)
         return command
 
     listed = add(LIST, "calibrations, and of one sensor their trends; the usual one, its name may be left out")
@@ -90,7 +88,7 @@ def _command(name: str) -> Callable[[argparse.Namespace], int]:
             "compare": history.compare,
             "void": history.void,
         }
-        status: int = commands[name](options)
+        status: int = answer_of(lambda: commands[name](options))
         return status
 
     return run

@@ -4,6 +4,7 @@ import sys
 from collections.abc import Sequence
 from pathlib import Path
 
+from rig.commands.named_history import named_history
 from rig.commands.remember import remember_certificate
 from rig.data.magnetometer_entries import read_reversal
 from rig.data.result_file import read_result
@@ -25,10 +26,12 @@ def report(
     *,
     pdf: bool = False,
     dcc: bool = False,
+    history: str | None = None,
 ) -> int:
     """Certificate of a run folder or its result.json: HTML, and with `dcc` and `pdf` in these forms, into `out`.
 
-    `reversal` is what `rig reversal` wrote of its magnetometers. Returns 0. Raises Refused as `read_result`,
+    `reversal` is what `rig reversal` wrote of its magnetometers; `history` where it is noted, the user's own history by
+    default, and never one that the folder names. Returns 0. Raises Refused as `read_result`,
     `read_reversal`, `certificate_of`, `stated_in`, `digital_certificate` and `write_pdf` do, `report_folder`.
     """
     file = run / RESULT if run.is_dir() else run
@@ -53,9 +56,8 @@ def report(
         raise Refused("report_folder", f"{folder} cannot be written: {error}", "Choose another with --out") from error
     for name in written:
         say(str(folder / name))
-    missed = remember_certificate(
-        file.parent, file.read_text(encoding="utf-8"), issued_certificate(certificate, written)
-    )
+    issued = issued_certificate(certificate, written)
+    missed = remember_certificate(file.parent, file.read_text(encoding="utf-8"), issued, named_history(history))
     if missed is not None:
         say(f"rig: the certificate is in no history: {missed}", sys.stderr)
     return 0

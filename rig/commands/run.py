@@ -19,7 +19,7 @@ from rig.report.document import document_of
 from rig.report.table import print_outcome
 from rig.runner.phases import Run
 from rig.station.confirm import ask_operator
-from rig.station.events import RunFolderWritten
+from rig.station.events import NotRemembered, RunFolderWritten
 from rig.station.log import log
 from rig.station.station import Stations, always_yes
 from rig.station.view import view
@@ -80,7 +80,11 @@ def _carry_out(folder: Path, found: Configured, *, assume_yes: bool, as_json: bo
                 if found.loaded.simulated:
                     held.enter_context(simulated_laboratory(folder / CONFIG))
             outcome = this.carry_out(found.phase)
-            entered, beside = remember(folder, found.loaded.config.history)
+            try:
+                entered, beside = remember(folder, found.loaded.config.history)
+            except KeyboardInterrupt:
+                station.event(NotRemembered(folder, "interrupted"))
+                raise
             if entered is not None:
                 station.event(entered)
             station.event(RunFolderWritten(folder))

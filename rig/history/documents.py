@@ -14,6 +14,7 @@ from rig.history.statistics.rig_effects import RigEffect
 from rig.history.store import Past
 
 SCHEMA = "rig.history/1"
+FORMULA = ("=", "+", "-", "@")  # what one begins with, in one spreadsheet or another, after white space too
 COLUMNS = (
     "calibration",
     "run",
@@ -56,7 +57,10 @@ def history_document(
 
 
 def history_csv(pasts: Sequence[Past]) -> str:
-    """Comma-separated, with a heading; empty where nothing is known."""
+    """Comma-separated, with a heading; empty where nothing is known.
+
+    A text that a spreadsheet would take for a formula has an apostrophe before it, as somebody would type it there.
+    """
     out = io.StringIO(newline="")
     writer = csv.DictWriter(out, COLUMNS, lineterminator="\n")
     writer.writeheader()
@@ -64,7 +68,7 @@ def history_csv(pasts: Sequence[Past]) -> str:
         entry = calibration_entry(past)
         shared = {name: entry[name] for name in COLUMNS if name in entry}
         for name, values in entry["parameters"].items():
-            writer.writerow({**shared, "parameter": name, **values})
+            writer.writerow({column: _cell(value) for column, value in {**shared, "parameter": name, **values}.items()})
     return out.getvalue()
 
 
@@ -174,6 +178,13 @@ def _parameter(parameter: Parameter) -> dict[str, Any]:
         "unit": parameter.unit,
         "max_deviation": parameter.max_deviation,
     }
+
+
+def _cell(value: object) -> object:
+    if not isinstance(value, str):
+        return value
+    line = " ".join(value.splitlines())
+    return f"'{line}" if line[:1].isspace() or line.startswith(FORMULA) else line
 
 
 def _numbers(values: np.ndarray) -> list[float | None]:

@@ -39,6 +39,15 @@ def chosen_place(section: HistorySection, environment: Mapping[str, str] = os.en
     return place(said or section.url)
 
 
+def own_place(said: str | None, environment: Mapping[str, str] = os.environ) -> Place | None:
+    """The user's: as `said` in a command, else in `RIG_HISTORY`, else the file of their own; None where it is off.
+
+    Raises Refused `history_address`.
+    """
+    said = said or environment.get(ENVIRONMENT)
+    return None if said == OFF else place(said)
+
+
 def place(said: str | None) -> Place:
     """A file's name or a URL; None is the user's own file. Raises Refused `history_address`."""
     if not said:

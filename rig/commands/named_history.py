@@ -1,0 +1,23 @@
+"""The history that somebody names in a command: itself, or by the configuration that names it."""
+
+import argparse
+from pathlib import Path
+
+
+def add_history(parser: argparse.ArgumentParser) -> None:
+    """`--history PLACE`."""
+    parser.add_argument(
+        "--history",
+        metavar="PLACE",
+        help="an SQLite file, a postgresql:// URL, or a configuration file that names one (default: RIG_HISTORY, "
+        "else the user's own)",
+    )
+
+
+def named_history(said: str | None) -> str | None:
+    """A file's name or a URL, None where nothing is said. Raises Refused as `load`."""
+    if said is None or not said.endswith((".yaml", ".yml")):
+        return said
+    from rig.config.load import load
+
+    return load(Path(said), sections=None).config.history.url

@@ -1,0 +1,44 @@
+"""A PostgreSQL that freezes: a relay before it passes everything on until it hears certain words, and nothing after."""
+
+import select
+import socket
+import threading
+from collections.abc import Iterator
+from contextlib import ExitStack, contextmanager
+from pathlib import Path
+from urllib.parse import parse_qs, urlsplit
+
+
+@contextmanager
+def freezing_at(words: bytes, url: str) -> Iterator[tuple[str, threading.Event]]:
+    """The relay's URL before the database of `url`, and whether it is frozen. Its connections stay open."""
+    folder = Path(parse_qs(urlsplit(url).query)["host"][0])
+    frozen = threading.Event()
+    with ExitStack() as held:
+        server = held.enter_context(socket.create_server(("127.0.0.1", 0)))
+
+        def serve() -> None:
+            try:
+                while True:
+                    client = held.enter_context(server.accept()[0])
+                    database = held.enter_context(socket.socket(socket.AF_UNIX))
+                    database.connect(str(folder / ".s.PGSQL.5432"))
+                    _pass_on(client, database, words, frozen)
+            except OSError:
+                return
+
+        threading.Thread(target=serve, daemon=True).start()
+        yield f"postgresql://rig@127.0.0.1:{server.getsockname()[1]}/postgres", frozen
+        server.shutdown(socket.SHUT_RDWR)
+
+
+def _pass_on(client: socket.socket, database: socket.socket, words: bytes, frozen: threading.Event) -> None:
+    while not frozen.is_set():
+        for each in select.select([client, database], [], [])[0]:
+            said = each.recv(65536)
+            if not said:
+                return
+            if each is client and words in said:
+                frozen.set()
+                return
+            (database if each is client else client).sendall(said)
