@@ -10,6 +10,7 @@ from pathlib import Path
 from rich.console import Console
 
 from rig.commands.named_history import named_history
+from rig.config.regular_file import UnfitFile
 from rig.data.run_folder import RESULT, recordings
 from rig.errors import Refused, RigError
 from rig.history.documents import change_entry, history_csv, history_document, rigs_document
@@ -126,7 +127,7 @@ def imported(options: Namespace) -> int:
         for folder in _run_folders(options.folders, unsolved=options.solve):
             try:
                 entered = history.enter(_finished(folder, solve=options.solve))
-            except (RigError, OSError) as error:
+            except (RigError, UnfitFile, OSError) as error:
                 refused += 1
                 say(f"{folder}: {error}", sys.stderr)
                 continue
@@ -137,13 +138,13 @@ def imported(options: Namespace) -> int:
 
 
 def verify(options: Namespace) -> int:
-    """Hold results and recordings against their hashes; names what is wrong. Returns 1 when anything is."""
+    """Hold rows against their journal and results, files against hashes; names what is wrong. Returns 1 then."""
     counts = {"ok": 0, "changed": 0, "missing": 0, "elsewhere": 0}
     with opened(options) as history:
-        for found in examined(history.kept()):
+        for found in examined(history):
             counts[found.state] += 1
             if found.state != "ok":
-                say(f"{found.state}: {found.what} (run {found.run_id}): {found.why}")
+                say(f"{found.state}: {found.what}: {found.why}")
     say(", ".join(f"{count} {state}" for state, count in counts.items()))
     return DISAGREE if counts["changed"] or counts["missing"] else 0
 

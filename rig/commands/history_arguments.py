@@ -50,7 +50,7 @@ def add_arguments(history: argparse.ArgumentParser) -> None:
     imported = add("import", "enter runs that are in no history yet; what is there already stays as it is")
     imported.add_argument("folders", nargs="+", type=Path, metavar="DIR", help="run folders, or folders that hold some")
     imported.add_argument("--solve", action="store_true", help="solve recordings that have no result.json")
-    add("verify", "whether results and recordings are what was entered; exit status 1 when they are not")
+    add("verify", "whether rows, results and files are what was entered; exit status 1 when they are not")
     compare = add("compare", "two calibrations of one sensor, with E_n")
     compare.add_argument("first", type=int, metavar="A")
     compare.add_argument("second", type=int, metavar="B")

@@ -2,6 +2,7 @@
 
 from sqlalchemy import Connection, insert, select
 
+from rig.history import journal
 from rig.history.issued import Issued
 from rig.history.schema import certificate, certificate_file
 
@@ -22,6 +23,8 @@ def enter(connection: Connection, run_id: int, issued: Issued, now_utc: str) -> 
         }
         connection.execute(insert(certificate).values(row))
         number = connection.scalar(known)
+        assert number is not None
+        journal.note(connection, certificate, number)
     files = certificate_file.c
     there = select(files.name, files.sha256).where(files.certificate_id == number)
     entered = {(row.name, row.sha256) for row in connection.execute(there)}
@@ -29,6 +32,7 @@ def enter(connection: Connection, run_id: int, issued: Issued, now_utc: str) -> 
         if (name, sha256) not in entered:
             row = {"certificate_id": number, "name": name, "sha256": sha256, "entered_utc": now_utc}
             connection.execute(insert(certificate_file).values(row))
+            journal.note(connection, certificate_file, number, name, sha256)
 
 
 def of_run(connection: Connection, run_id: int) -> tuple[Issued, ...]:

@@ -11,13 +11,14 @@ from rig.config.judging_sections import HistorySection
 from rig.config.load import Loaded, load
 from rig.config.regular_file import UnfitFile, read_regular_file
 from rig.data.result_file import SIZE_MAX_BYTES, ResultDocument, read_result
-from rig.data.run_folder import CONFIG, RESULT, recordings
+from rig.data.run_folder import CONFIG, RESULT, SCRIPT, SCRIPT_IDENTITY, recordings
 from rig.errors import Refused
 from rig.history.issued import Issued, issued_certificate
-from rig.report.certificate.content import CONFORMITY, SIMULATED_ARM, certificate_of
+from rig.report.certificate.content import SIMULATED_ARM, certificate_of
 from rig.report.certificate.stated import Stated, of_configuration
 
-PAGE = "certificate.html"
+PAGE, HEADER = "certificate.html", "calibration.h"
+DOCUMENTS = (CONFIG, SCRIPT, SCRIPT_IDENTITY, HEADER)
 CHUNK_BYTES = 1 << 20
 PAGE_MAX_BYTES = 64_000_000  # of a run of six sweeps it has 30,000
 
@@ -36,7 +37,8 @@ class Finished:
     """`text` is all of result.json, compact; `rig` what the rig is called; `computer` and `path` where it lies.
 
     `check_standards` are the serial numbers of sensors that are there to watch the rig; `operator` and `note` what the
-    configuration says of them; `certificate` is that in the folder.
+    configuration says of them; `certificate` is that in the folder, and `documents` what else a run leaves there: name
+    and SHA-256, of result.json that of what it says.
     """
 
     text: str
@@ -50,23 +52,12 @@ class Finished:
     operator: str | None = None
     note: str | None = None
     certificate: Issued | None = None
+    documents: tuple[tuple[str, str], ...] = ()
 
     @property
     def content_sha256(self) -> str:
         """Of the result without the time it was computed: the same numbers again are no other result."""
         return content_sha256(self.text)
-
-    @property
-    def measurement_sha256(self) -> str:
-        """Of what was measured: arm, board, configuration, time of its beginning."""
-        of = self.document.provenance
-        said = (of.started_utc, of.arm_serial_number, of.board_unique_id, of.configuration_sha256)
-        return hashlib.sha256("\n".join(said).encode()).hexdigest()
-
-    @property
-    def fit(self) -> bool:
-        """Whether the measurement passed its own checks; a value beyond its limit is a result like any other."""
-        return all(check.passed for check in self.document.checks if not CONFORMITY.search(check.name))
 
 
 def finished_run(folder: Path, document: ResultDocument | None = None) -> Finished:
@@ -79,12 +70,14 @@ def finished_run(folder: Path, document: ResultDocument | None = None) -> Finish
         text = read_regular_file(folder / RESULT, SIZE_MAX_BYTES)
     else:
         text = document.text().encode()
+    result = compact(json.loads(text))
     loaded = configured_in(folder)
     section = HistorySection() if loaded is None else loaded.config.history
     simulated = loaded is not None and loaded.simulated
     provenance = document.provenance
+    certificate = _certificate(folder, document, Stated() if loaded is None else of_configuration(loaded))
     return Finished(
-        text=compact(json.loads(text)),
+        text=result,
         document=document,
         rig=section.rig or provenance.arm_serial_number,
         check_standards=section.check_standards,
@@ -96,8 +89,30 @@ def finished_run(folder: Path, document: ResultDocument | None = None) -> Finish
         ),
         operator=section.operator,
         note=section.note,
-        certificate=_certificate(folder, document, Stated() if loaded is None else of_configuration(loaded)),
+        certificate=certificate,
+        documents=(
+            *((name, sha256) for name in DOCUMENTS if (sha256 := document_sha256(folder, name)) is not None),
+            *([(RESULT, content_sha256(result))] if (folder / RESULT).exists() else []),
+            *(() if certificate is None else certificate.files),
+        ),
     )
+
+
+def document_sha256(folder: Path, name: str) -> str | None:
+    """Of a file that a run leaves beside its recordings, of result.json that of what it says; None where there is none.
+
+    Raises OSError, and UnfitFile for what is no file of a run.
+    """
+    try:
+        content = read_regular_file(folder / name, PAGE_MAX_BYTES)
+    except FileNotFoundError:
+        return None
+    if name == RESULT:
+        try:
+            return content_sha256(content.decode())
+        except (ValueError, KeyError, TypeError, AttributeError) as error:
+            raise UnfitFile("it is no result") from error
+    return hashlib.sha256(content).hexdigest()
 
 
 def recording_of(file: Path) -> Recording:

@@ -1,22 +1,29 @@
-"""Whether what a history knows is still what lies on the disk."""
+"""Whether what a history knows is still what was entered, and what lies on the disk."""
 
 import platform
-from collections.abc import Iterable, Iterator
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Literal
 
-from rig.history.finished import content_sha256, recording_of
-from rig.history.store import Kept
+from pydantic import ValidationError
+
+from rig.config.regular_file import UnfitFile
+from rig.data.result_file import ResultDocument
+from rig.data.run_folder import RESULT
+from rig.history.finished import content_sha256, document_sha256, recording_of
+from rig.history.index import run_row, unlike
+from rig.history.parameters import Calibrated
+from rig.history.store import History, Kept, Past
 
 State = Literal["ok", "changed", "missing", "elsewhere"]
+MOST_TOLD = 3
 
 
 @dataclass(frozen=True, slots=True)
 class Found:
-    """What became of one thing: a recording's `what` is its path, an entry's its number."""
+    """What became of one thing: of a file `what` is its path, of an entry its number."""
 
-    run_id: int
     what: str
     state: State
     why: str = ""
@@ -27,56 +34,104 @@ class Found:
         return self.state in ("changed", "missing")
 
 
-def examined(runs: Iterable[Kept], computer: str | None = None) -> Iterator[Found]:
-    """Every entry against its hash, every recording against its own, wherever its folder was seen last.
+def examined(history: History, computer: str | None = None) -> Iterator[Found]:
+    """Rows against the journal, every run's against its result, files against their hashes where they were seen last.
 
     What was entered on another computer and is not to be seen from here is `elsewhere`.
     """
     here = computer or platform.node()
-    for run in runs:
+    for each in history.broken():
+        yield Found(each.what, each.state, each.why)
+    documents = _documents_by_folder(history)
+    for run in history.kept():
+        why = "; ".join(_contradictions(run, history.of_run(run.run_id)))
+        yield Found(f"run {run.run_id}", "changed" if why else "ok", why)
+        yield from _files(run, here, documents)
+
+
+def _contradictions(run: Kept, pasts: Sequence[Past]) -> Iterator[str]:
+    """In what the rows of a run contradict its result, the first few."""
+    try:
         if content_sha256(run.result) != run.content_sha256:
-            yield Found(run.run_id, f"run {run.run_id}", "changed", "the result in the history is not what was entered")
-        else:
-            yield Found(run.run_id, f"run {run.run_id}", "ok")
-        yield from _recordings(run, here)
-        yield from _certificates(run)
+            yield "the result in the history is not what was entered"
+        document = ResultDocument.model_validate_json(run.result)
+    except (ValidationError, ValueError, LookupError, AttributeError, TypeError):
+        yield "the result in the history is none"
+        return
+    rows = [f"{name} is {run.row[name]}" for name, value in run_row(document).items() if run.row[name] != value]
+    found = [*rows, *unlike(document, list(map(_calibrated, pasts)))]
+    yield from found[:MOST_TOLD]
+    if len(found) > MOST_TOLD:
+        yield f"and {len(found) - MOST_TOLD} more"
 
 
-def _recordings(run: Kept, here: str) -> Iterator[Found]:
-    folders = [Path(path) for _, path in run.places]
-    folder = next((path for path in folders if path.is_dir()), None)
+def _calibrated(past: Past) -> Calibrated:
+    return Calibrated(
+        past.sensor,
+        past.quantity,
+        past.part,
+        past.serial_number,
+        past.full_scale,
+        past.estimator,
+        past.temperature_c,
+        tuple(past.parameters.values()),
+    )
+
+
+def _documents_by_folder(history: History) -> Mapping[str, frozenset[tuple[str, str]]]:
+    """What the files of a folder may be, by its path: a run that was resumed there was entered again."""
+    found: dict[str, frozenset[tuple[str, str]]] = {}
+    for run in history.kept():
+        files = {*run.documents, (RESULT, run.content_sha256)}
+        files |= {file for certificate in run.certificates for file in certificate.files}
+        for _, path in run.places:
+            found[path] = found.get(path, frozenset()) | files
+    return found
+
+
+def _files(run: Kept, here: str, documents: Mapping[str, frozenset[tuple[str, str]]]) -> Iterator[Found]:
+    if not run.recordings and not run.documents:
+        return
+    folder = next((Path(path) for _, path in run.places if Path(path).is_dir()), None)
     if folder is None:
         elsewhere = [name for name, _ in run.places if name != here]
         state: State = "elsewhere" if elsewhere else "missing"
         why = f"on {elsewhere[0]}" if elsewhere else "the folder is not there any more"
-        if run.recordings:
-            yield Found(run.run_id, str(folders[0]), state, why)
+        yield Found(run.places[0][1] if run.places else f"the folder of run {run.run_id}", state, why)
         return
     for recording in run.recordings:
         file = folder / recording.name
         try:
             now = recording_of(file)
-        except OSError as error:
-            yield Found(run.run_id, str(file), "missing", error.strerror or str(error))
+        except (UnfitFile, OSError) as error:
+            yield _unreadable(file, error)
             continue
-        if now == recording:
-            yield Found(run.run_id, str(file), "ok")
+        yield _held(file, now.sha256, {recording.sha256})
+    allowed = documents[next(path for _, path in run.places if Path(path) == folder)]
+    for name in sorted(_names(run, folder)):
+        try:
+            sha256 = document_sha256(folder, name)
+        except (UnfitFile, OSError) as error:
+            yield _unreadable(folder / name, error)
+            continue
+        if sha256 is None:
+            yield Found(str(folder / name), "missing", "it was there when the run was entered")
         else:
-            yield Found(run.run_id, str(file), "changed", f"SHA-256 {now.sha256[:12]}…, was {recording.sha256[:12]}…")
+            yield _held(folder / name, sha256, {each for known, each in allowed if known == name})
 
 
-def _certificates(run: Kept) -> Iterator[Found]:
-    """Of those in the folder; one that was written elsewhere is not looked for."""
-    folder = next((Path(path) for _, path in run.places if Path(path).is_dir()), None)
-    if folder is None:
-        return
-    entered = {file for certificate in run.certificates for file in certificate.files}
-    for name in sorted({name for name, _ in entered}):
-        file = folder / name
-        if not file.is_file():
-            continue
-        now = recording_of(file).sha256
-        if (name, now) in entered:
-            yield Found(run.run_id, str(file), "ok")
-        else:
-            yield Found(run.run_id, str(file), "changed", f"SHA-256 {now[:12]}…, which no certificate of this run had")
+def _names(run: Kept, folder: Path) -> set[str]:
+    """What was there when the run was entered; and of what may have been written elsewhere, what is there now."""
+    possible = {RESULT, *(name for certificate in run.certificates for name, _ in certificate.files)}
+    return {name for name, _ in run.documents} | {name for name in possible if (folder / name).exists()}
+
+
+def _held(file: Path, sha256: str, entered: set[str]) -> Found:
+    if sha256 in entered:
+        return Found(str(file), "ok")
+    return Found(str(file), "changed", f"SHA-256 {sha256[:12]}…, which was never entered of it")
+
+
+def _unreadable(file: Path, error: Exception) -> Found:
+    missing = isinstance(error, FileNotFoundError)
+    return Found(str(file), "missing" if missing else "changed", getattr(error, "strerror", None) or str(error))

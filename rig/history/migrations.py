@@ -10,10 +10,9 @@ from datetime import UTC, datetime
 from sqlalchemy import Connection, insert, inspect, select, text, update
 
 from rig.errors import Refused
-from rig.history import schema
+from rig.history import journal, schema
 from rig.history.sqlite_file import APPLICATION_ID
-
-LOCK = 7_245_118  # any number, the same for everybody: makers of tables wait for one another
+from rig.history.triggers import create_triggers
 
 
 def migrate_1_to_2(connection: Connection) -> None:
@@ -29,7 +28,15 @@ def migrate_2_to_3(connection: Connection) -> None:
     schema.certificate_file.create(connection)
 
 
-MIGRATIONS: Mapping[int, Callable[[Connection], None]] = {1: migrate_1_to_2, 2: migrate_2_to_3}
+def migrate_3_to_4(connection: Connection) -> None:
+    """Rows are kept as they are: by triggers, and by a journal that begins with what is there."""
+    schema.document.create(connection)
+    schema.journal.create(connection)
+    journal.note_all(connection)
+    create_triggers(connection)
+
+
+MIGRATIONS: Mapping[int, Callable[[Connection], None]] = {1: migrate_1_to_2, 2: migrate_2_to_3, 3: migrate_3_to_4}
 
 
 def version_of(connection: Connection, label: str) -> int:
@@ -59,13 +66,13 @@ def version_of(connection: Connection, label: str) -> int:
 
 def bring_up_to_date(connection: Connection, label: str) -> None:
     """Make the tables or migrate them, in the connection's transaction. Raises Refused as `version_of`."""
-    if connection.dialect.name == "postgresql":
-        connection.execute(text("SELECT pg_advisory_xact_lock(:lock)"), {"lock": LOCK})
+    journal.alone(connection)
     if connection.dialect.name == "sqlite":
         connection.execute(text(f"PRAGMA application_id = {APPLICATION_ID}"))
     version = version_of(connection, label)
     if version == 0:
         schema.metadata.create_all(connection)
+        create_triggers(connection)
         created = {"key": "created_utc", "value": datetime.now(UTC).isoformat(timespec="seconds")}
         connection.execute(insert(schema.meta), [created, {"key": "version", "value": str(schema.VERSION)}])
         return

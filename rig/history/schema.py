@@ -1,4 +1,4 @@
-"""The tables of a history. Rows are only ever added: what was entered stays as it was.
+"""The tables of a history. Rows are only ever added: what was entered stays as it was (`triggers`, `journal`).
 
 `run.result` is the whole `result.json`; every other column of a run, its calibrations and parameters is an index of it.
 """
@@ -18,7 +18,7 @@ from sqlalchemy import (
     UniqueConstraint,
 )
 
-VERSION = 3
+VERSION = 4
 HASH, TIME, NAME, NOTE = 64, 40, 400, 1000  # longest texts of their kind
 
 metadata = MetaData()
@@ -131,4 +131,25 @@ certificate_file = Table(
     Column("name", String(NAME), primary_key=True),
     Column("sha256", String(HASH), primary_key=True),
     Column("entered_utc", String(TIME), nullable=False),
+)
+
+# Since version 4. What lay beside the recordings when the run was entered; of result.json the hash of what it says.
+document = Table(
+    "document",
+    metadata,
+    Column("run_id", ForeignKey("run.id"), primary_key=True),
+    Column("name", String(NAME), primary_key=True),
+    Column("sha256", String(HASH), nullable=False),
+)
+
+# Since version 4. Every entry a second time, as the hash of its rows, numbered without gaps.
+journal = Table(
+    "journal",
+    metadata,
+    Column("number", Integer, primary_key=True, autoincrement=False),
+    Column("kind", String(40), nullable=False),  # the table
+    Column("key", String(1000), nullable=False),  # what finds the row there, as JSON
+    Column("sha256", String(HASH), nullable=False),
+    Column("entered_utc", String(TIME), nullable=False),
+    UniqueConstraint("kind", "key"),
 )

@@ -8,18 +8,19 @@ with open_history() as history:                    # or open_history("postgresql
 from collections.abc import Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from dataclasses import dataclass
-from datetime import UTC, date, datetime
+from datetime import date
 from typing import Any
 
-from sqlalchemy import Connection, Engine, Row, Select, and_, exists, insert, or_, select
+from sqlalchemy import Connection, Engine, Select, and_, exists, insert, or_, select
 from sqlalchemy.exc import IntegrityError, SQLAlchemyError
 
 from rig.errors import Refused
-from rig.history import certificates, schema
+from rig.history import certificates, journal, schema
 from rig.history.engine import WRITES, engine_of
+from rig.history.entering import enter_run, note_place, now_utc
 from rig.history.finished import Finished, Recording
 from rig.history.issued import Issued
-from rig.history.parameters import ORDER, Parameter, Quantity, calibrated
+from rig.history.parameters import ORDER, Parameter, Quantity
 from rig.history.place import Place, place
 
 _MANY = 500  # keys in one question: SQLite takes no more than some thousands
@@ -85,7 +86,8 @@ class Entered:
 class Kept:
     """A run as it was entered: its result, its recordings, and where its folder was seen, the newest place first.
 
-    `certificates` in the order they were entered.
+    `certificates` in the order they were entered; `documents` the other files of its folder, name and SHA-256; `row`
+    all that stands beside the result.
     """
 
     run_id: int
@@ -93,7 +95,9 @@ class Kept:
     result: str
     recordings: tuple[Recording, ...]
     places: tuple[tuple[str, str], ...]
-    certificates: tuple[Issued, ...] = ()
+    certificates: tuple[Issued, ...]
+    documents: tuple[tuple[str, str], ...]
+    row: Mapping[str, Any]
 
 
 @contextmanager
@@ -131,10 +135,10 @@ class History:
         try:
             with self._writing() as connection:
                 known = self._run_id(connection, content)
-                run_id = _enter(connection, finished, content) if known is None else known
-                _note_place(connection, run_id, finished)
+                run_id = enter_run(connection, finished, content) if known is None else known
+                note_place(connection, run_id, finished)
                 if finished.certificate is not None:
-                    certificates.enter(connection, run_id, finished.certificate, _now())
+                    certificates.enter(connection, run_id, finished.certificate, now_utc())
                 return Entered(run_id, known is None)
         except IntegrityError:
             # Somebody else entered the same at the same moment, and was first.
@@ -149,7 +153,7 @@ class History:
         with self._writing() as connection:
             run_id = self._run_id(connection, content_sha256)
             if run_id is not None:
-                certificates.enter(connection, run_id, certificate, _now())
+                certificates.enter(connection, run_id, certificate, now_utc())
             return run_id is not None
 
     def calibrations(self, selection: Selection = Selection()) -> list[Past]:
@@ -178,31 +182,29 @@ class History:
                 "Look at it with `rig history show`",
             )
         with self._writing() as connection:
-            row = {"calibration_id": number, "reason": reason, "voided_utc": _now()}
+            row = {"calibration_id": number, "reason": reason, "voided_utc": now_utc()}
             connection.execute(insert(schema.voided).values(row))
+            journal.note(connection, schema.voided, number)
 
     def kept(self, run_id: int | None = None) -> Iterator[Kept]:
         """Runs as they were entered, one or all, in the order they were."""
-        runs, places, files = schema.run, schema.location, schema.recording
-        question = select(runs.c.id, runs.c.content_sha256, runs.c.result).order_by(runs.c.id)
+        question = select(schema.run).order_by(schema.run.c.id)
         if run_id is not None:
-            question = question.where(runs.c.id == run_id)
+            question = question.where(schema.run.c.id == run_id)
         with self.engine.connect() as connection:
-            for number, sha256, result in connection.execute(question).all():
-                seen = select(places.c.computer, places.c.path).where(places.c.run_id == number)
-                had = select(files.c.name, files.c.bytes, files.c.sha256).where(files.c.run_id == number)
-                yield Kept(
-                    number,
-                    sha256,
-                    result,
-                    tuple(Recording(*row) for row in connection.execute(had.order_by(files.c.name))),
-                    tuple((row[0], row[1]) for row in connection.execute(seen.order_by(places.c.id.desc()))),
-                    certificates.of_run(connection, number),
-                )
+            numbers = [row.id for row in connection.execute(question.with_only_columns(schema.run.c.id)).all()]
+            for number in numbers:
+                yield _kept(connection, number)
+
+    def broken(self) -> Iterator[journal.Broken]:
+        """What is not as it was entered, as `journal.broken`."""
+        with self.engine.connect() as connection:
+            yield from journal.broken(connection)
 
     @contextmanager
     def _writing(self) -> Iterator[Connection]:
         with self.engine.connect().execution_options(**{WRITES: True}) as connection, connection.begin():
+            journal.alone(connection)
             yield connection
 
     @staticmethod
@@ -245,6 +247,24 @@ _ROWS = schema.run.join(schema.calibration).outerjoin(schema.voided)
 _IN_TIME = (_RUN.started_utc, _RUN.id, _CALIBRATION.id)
 
 
+def _kept(connection: Connection, number: int) -> Kept:
+    places, files, documents = schema.location.c, schema.recording.c, schema.document.c
+    row = connection.execute(select(schema.run).where(_RUN.id == number)).mappings().one()
+    seen = select(places.computer, places.path).where(places.run_id == number).order_by(places.id.desc())
+    had = select(files.name, files.bytes, files.sha256).where(files.run_id == number).order_by(files.name)
+    beside = select(documents.name, documents.sha256).where(documents.run_id == number).order_by(documents.name)
+    return Kept(
+        number,
+        row["content_sha256"],
+        row["result"],
+        tuple(Recording(*each) for each in connection.execute(had)),
+        tuple((computer, path) for computer, path in connection.execute(seen)),
+        certificates.of_run(connection, number),
+        tuple((name, sha256) for name, sha256 in connection.execute(beside)),
+        dict(row),
+    )
+
+
 def _replaced() -> Any:
     """Whether there is a later result of the same measurement."""
     later = schema.run.alias("later")
@@ -272,71 +292,3 @@ def _parameters(connection: Connection, numbers: Sequence[int]) -> dict[int, dic
             number, name, *values = row
             found.setdefault(number, {})[name] = Parameter(name, *values)
     return {number: {name: each[name] for name in ORDER if name in each} for number, each in found.items()}
-
-
-def _enter(connection: Connection, finished: Finished, content_sha256: str) -> int:
-    origin = finished.document.provenance
-    row = {
-        "content_sha256": content_sha256,
-        "measurement_sha256": finished.measurement_sha256,
-        "started_utc": _utc(origin.started_utc),
-        "solved_utc": _utc(origin.solved_utc),
-        "entered_utc": _now(),
-        "rig": finished.rig,
-        "arm_serial_number": origin.arm_serial_number,
-        "board_unique_id": origin.board_unique_id,
-        "configuration_sha256": origin.configuration_sha256,
-        "verdict": finished.document.verdict,
-        "fit": finished.fit,
-        "simulated": finished.simulated,
-        "result": finished.text,
-        "operator": finished.operator,
-        "note": finished.note,
-    }
-    run_id = _inserted(connection.execute(insert(schema.run).values(row)).inserted_primary_key)
-    if finished.recordings:
-        rows = [{"run_id": run_id, "name": r.name, "bytes": r.size, "sha256": r.sha256} for r in finished.recordings]
-        connection.execute(insert(schema.recording), rows)
-    for each in calibrated(finished.document):
-        number = _inserted(
-            connection.execute(
-                insert(schema.calibration).values(
-                    run_id=run_id,
-                    sensor=each.sensor,
-                    quantity=each.quantity,
-                    part=each.part,
-                    serial_number=each.serial_number,
-                    full_scale=each.full_scale,
-                    estimator=each.estimator,
-                    temperature_c=each.temperature_c,
-                    check_standard=each.serial_number in finished.check_standards,
-                )
-            ).inserted_primary_key
-        )
-        columns = [column.name for column in schema.parameter.c if column.name != "calibration_id"]
-        rows = [{"calibration_id": number, **{name: getattr(p, name) for name in columns}} for p in each.parameters]
-        if rows:
-            connection.execute(insert(schema.parameter), rows)
-    return run_id
-
-
-def _note_place(connection: Connection, run_id: int, finished: Finished) -> None:
-    places = schema.location.c
-    same = (places.run_id == run_id, places.computer == finished.computer, places.path == finished.path)
-    if connection.scalar(select(places.id).where(*same)) is None:
-        where = {"run_id": run_id, "computer": finished.computer, "path": finished.path, "noted_utc": _now()}
-        connection.execute(insert(schema.location).values(where))
-
-
-def _inserted(key: Row[Any] | None) -> int:
-    assert key is not None
-    return int(key[0])
-
-
-def _utc(text: str) -> str:
-    """In one form, so that texts sort as times do."""
-    return datetime.fromisoformat(text).astimezone(UTC).isoformat(timespec="seconds")
-
-
-def _now() -> str:
-    return datetime.now(UTC).isoformat(timespec="milliseconds")

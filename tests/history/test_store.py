@@ -155,7 +155,9 @@ def test_a_history_of_an_old_version_is_migrated_with_equal_numbers(version: int
             migrated = columns_of(connection)
         history.void(1, "to see that it can be")
         history.enter(replace(finished(0), operator="A. Person", certificate=ISSUED))
-        assert [each.certificates for each in history.kept()] == [(), (ISSUED,)]
+        before_that, now = (each.certificates for each in history.kept())
+        assert len(before_that) == (version >= 3) and now == (ISSUED,)
+        assert list(history.broken()) == []
     assert after == before and len(before["parameter"]) == 20
     assert [set(each.parameters.values()) for each in found] == [
         set(each.parameters) for each in calibrated(read_result(FIXTURES / "verified"))

@@ -1,0 +1,75 @@
+"""The rows of a run, within somebody's transaction."""
+
+from datetime import UTC, datetime
+from typing import Any
+
+from sqlalchemy import Connection, Row, insert, select
+
+from rig.history import journal, schema
+from rig.history.finished import Finished
+from rig.history.index import run_row
+from rig.history.parameters import Calibrated, calibrated
+
+
+def enter_run(connection: Connection, finished: Finished, content_sha256: str) -> int:
+    """Add a run with all that belongs to it; its number."""
+    row = {
+        **run_row(finished.document),
+        "content_sha256": content_sha256,
+        "entered_utc": now_utc(),
+        "rig": finished.rig,
+        "simulated": finished.simulated,
+        "result": finished.text,
+        "operator": finished.operator,
+        "note": finished.note,
+    }
+    run_id = _inserted(connection.execute(insert(schema.run).values(row)).inserted_primary_key)
+    if finished.recordings:
+        rows = [{"run_id": run_id, "name": r.name, "bytes": r.size, "sha256": r.sha256} for r in finished.recordings]
+        connection.execute(insert(schema.recording), rows)
+    if finished.documents:
+        rows = [{"run_id": run_id, "name": name, "sha256": sha256} for name, sha256 in finished.documents]
+        connection.execute(insert(schema.document), rows)
+    for each in calibrated(finished.document):
+        _enter_calibration(connection, run_id, each, check_standard=each.serial_number in finished.check_standards)
+    journal.note(connection, schema.run, run_id)
+    return run_id
+
+
+def note_place(connection: Connection, run_id: int, finished: Finished) -> None:
+    """Where the run's folder was seen, unless that is known."""
+    places = schema.location.c
+    same = (places.run_id == run_id, places.computer == finished.computer, places.path == finished.path)
+    if connection.scalar(select(places.id).where(*same)) is None:
+        where = {"run_id": run_id, "computer": finished.computer, "path": finished.path, "noted_utc": now_utc()}
+        number = _inserted(connection.execute(insert(schema.location).values(where)).inserted_primary_key)
+        journal.note(connection, schema.location, number)
+
+
+def now_utc() -> str:
+    """To the millisecond."""
+    return datetime.now(UTC).isoformat(timespec="milliseconds")
+
+
+def _enter_calibration(connection: Connection, run_id: int, each: Calibrated, *, check_standard: bool) -> None:
+    row = {
+        "run_id": run_id,
+        "sensor": each.sensor,
+        "quantity": each.quantity,
+        "part": each.part,
+        "serial_number": each.serial_number,
+        "full_scale": each.full_scale,
+        "estimator": each.estimator,
+        "temperature_c": each.temperature_c,
+        "check_standard": check_standard,
+    }
+    number = _inserted(connection.execute(insert(schema.calibration).values(row)).inserted_primary_key)
+    columns = [column.name for column in schema.parameter.c if column.name != "calibration_id"]
+    rows = [{"calibration_id": number, **{name: getattr(p, name) for name in columns}} for p in each.parameters]
+    if rows:
+        connection.execute(insert(schema.parameter), rows)
+
+
+def _inserted(key: Row[Any] | None) -> int:
+    assert key is not None
+    return int(key[0])

@@ -1,0 +1,83 @@
+"""What the rows of a run repeat of its result: made of it when it is entered, and held against it ever after. Pure."""
+
+import hashlib
+import math
+from collections.abc import Iterator, Sequence
+from datetime import UTC, datetime
+
+from rig.data.result_file import ResultDocument
+from rig.history.parameters import Calibrated, Parameter, calibrated
+from rig.report.certificate.content import CONFORMITY
+
+SAME = 1e-6  # of the standard uncertainty: what a processor's rounding may change of a number
+
+
+def run_row(document: ResultDocument) -> dict[str, str | bool]:
+    """The columns of a run that its result says."""
+    origin = document.provenance
+    return {
+        "measurement_sha256": measurement_sha256(document),
+        "started_utc": utc(origin.started_utc),
+        "solved_utc": utc(origin.solved_utc),
+        "arm_serial_number": origin.arm_serial_number,
+        "board_unique_id": origin.board_unique_id,
+        "configuration_sha256": origin.configuration_sha256,
+        "verdict": document.verdict,
+        "fit": fit(document),
+    }
+
+
+def measurement_sha256(document: ResultDocument) -> str:
+    """Of what was measured: arm, board, configuration, time of its beginning."""
+    of = document.provenance
+    said = (of.started_utc, of.arm_serial_number, of.board_unique_id, of.configuration_sha256)
+    return hashlib.sha256("\n".join(said).encode()).hexdigest()
+
+
+def fit(document: ResultDocument) -> bool:
+    """Whether the measurement passed its own checks; a value beyond its limit is a result like any other."""
+    return all(check.passed for check in document.checks if not CONFORMITY.search(check.name))
+
+
+def utc(text: str) -> str:
+    """In one form, so that texts sort as times do."""
+    return datetime.fromisoformat(text).astimezone(UTC).isoformat(timespec="seconds")
+
+
+def unlike(document: ResultDocument, found: Sequence[Calibrated]) -> Iterator[str]:
+    """In what `found` differs from the calibrations that a result states, beyond a processor's rounding."""
+    stated = {(each.sensor, each.quantity): each for each in calibrated(document)}
+    beside = {(each.sensor, each.quantity): each for each in found}
+    for sensor, quantity in sorted(stated.keys() ^ beside.keys()):
+        yield f"{quantity} of {sensor}, which only one of them has"
+    for key in sorted(stated.keys() & beside.keys()):
+        yield from _differences(stated[key], beside[key])
+
+
+def _differences(stated: Calibrated, found: Calibrated) -> Iterator[str]:
+    for name in ("part", "serial_number", "estimator"):
+        if getattr(stated, name) != getattr(found, name):
+            yield f"{name} of {stated.sensor}: {getattr(found, name)}, stated {getattr(stated, name)}"
+    for name in ("full_scale", "temperature_c"):
+        if not _close(getattr(stated, name), getattr(found, name)):
+            yield f"{name} of {stated.sensor}: {getattr(found, name)}, stated {getattr(stated, name)}"
+    ours, theirs = ({each.name: each for each in of.parameters} for of in (stated, found))
+    for name in sorted(ours.keys() ^ theirs.keys()):
+        yield f"{name} of {stated.sensor}, which only one of them has"
+    for name in sorted(ours.keys() & theirs.keys()):
+        if not _same(ours[name], theirs[name]):
+            yield f"{name} of {stated.sensor}: {theirs[name].value:.9g}, stated {ours[name].value:.9g}"
+
+
+def _same(stated: Parameter, found: Parameter) -> bool:
+    return (
+        abs(stated.value - found.value) <= SAME * stated.std
+        and _close(stated.std_statistical, found.std_statistical)
+        and _close(stated.std_combined, found.std_combined)
+        and _close(stated.max_deviation, found.max_deviation)
+        and stated.unit == found.unit
+    )
+
+
+def _close(stated: float | None, found: float | None) -> bool:
+    return stated == found if stated is None or found is None else math.isclose(stated, found, rel_tol=SAME)

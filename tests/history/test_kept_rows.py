@@ -1,0 +1,174 @@
+"""What was entered stays as it was: the database says no, and whoever gets around that is found out."""
+
+import json
+import os
+import shutil
+from collections.abc import Callable, Iterator
+from dataclasses import replace
+from pathlib import Path
+
+import pytest
+from sqlalchemy import text
+from sqlalchemy.exc import DBAPIError
+
+from rig.history import schema
+from rig.history.engine import WRITES
+from rig.history.finished import content_sha256, finished_run
+from rig.history.integrity import examined
+from rig.history.issued import Issued
+from rig.history.store import History, open_history
+from rig.report.certificate.content import certificate_of
+from rig.report.certificate.page import certificate_page
+from rig.report.certificate.stated import stated_in
+from support.kept_rows import forge
+from support.past_runs import finished
+from support.paths import CONFIGS, FIXTURES
+from support.postgres import postgresql
+
+ISSUED = Issued("RIG-1", "Calibration certificate", "2025-01-06", None, "", (("certificate.html", "ab" * 32),))
+TABLES = [table.name for table in schema.metadata.sorted_tables]
+
+
+def fill(history: History) -> None:
+    history.enter(replace(finished(0), certificate=ISSUED, documents=(("config.yaml", "cd" * 32),)))
+    history.void(1, "another sensor was mounted")
+
+
+@pytest.fixture(params=["sqlite", pytest.param("postgresql", marks=pytest.mark.slow)])
+def place(request: pytest.FixtureRequest, tmp_path: Path) -> Iterator[str]:
+    if request.param == "sqlite":
+        yield str(tmp_path / "history.sqlite")
+        return
+    with postgresql() as url:
+        yield url
+
+
+def test_no_row_is_changed_taken_away_or_replaced(place: str) -> None:
+    with open_history(place) as history:
+        fill(history)
+        sqlite = history.engine.dialect.name == "sqlite"
+        for table in TABLES:
+            column = schema.metadata.tables[table].columns.values()[-1].name
+            attempts = [f"UPDATE {table} SET {column} = {column}", f"DELETE FROM {table}"]
+            attempts += (
+                [f"INSERT OR REPLACE INTO {table} SELECT * FROM {table}"] if sqlite else [f"TRUNCATE {table} CASCADE"]
+            )
+            for attempt in attempts:
+                with (
+                    pytest.raises(DBAPIError, match="a history keeps its rows"),
+                    history.engine.connect().execution_options(**{WRITES: True}) as connection,
+                    connection.begin(),
+                ):
+                    connection.execute(text(attempt))
+        assert list(history.broken()) == [] and history.calibration(1).voided is not None
+
+
+def run_folder(folder: Path) -> Path:
+    """A run with its certificate, header and configuration."""
+    shutil.copytree(FIXTURES / "verified", folder)
+    shutil.copy(CONFIGS / "demo.yaml", folder / "config.yaml")
+    (folder / "calibration.h").write_text("#define KX 1.01f\n", encoding="utf-8")
+    document = finished_run(folder).document
+    page = certificate_page(certificate_of(document, stated_in(folder)))
+    (folder / "certificate.html").write_text(page, encoding="utf-8")
+    return folder
+
+
+def append(name: str) -> Callable[[Path], None]:
+    def attack(folder: Path) -> None:
+        with (folder / name).open("a", encoding="utf-8") as file:
+            file.write("\n# better\n")
+
+    return attack
+
+
+def another_value(folder: Path) -> None:
+    result = json.loads((folder / "result.json").read_text(encoding="utf-8"))
+    result["sensors"]["gyro"]["scale"][0] *= 1.001
+    (folder / "result.json").write_text(json.dumps(result), encoding="utf-8")
+
+
+def pipe(folder: Path) -> None:
+    (folder / "config.yaml").unlink()
+    os.mkfifo(folder / "config.yaml")
+
+
+@pytest.mark.parametrize(
+    ("state", "name", "attack"),
+    [
+        ("changed", "result.json", another_value),
+        ("changed", "result.json", append("result.json")),
+        ("missing", "result.json", lambda folder: (folder / "result.json").unlink()),
+        ("missing", "certificate.html", lambda folder: (folder / "certificate.html").unlink()),
+        ("changed", "certificate.html", append("certificate.html")),
+        ("changed", "calibration.h", append("calibration.h")),
+        ("changed", "config.yaml", append("config.yaml")),
+        ("changed", "config.yaml", pipe),
+    ],
+)
+def test_a_file_that_is_not_what_was_entered_is_named(
+    state: str, name: str, attack: Callable[[Path], None], tmp_path: Path
+) -> None:
+    folder = run_folder(tmp_path / "run")
+    with open_history(str(tmp_path / "history.sqlite")) as history:
+        history.enter(finished_run(folder))
+        assert {each.state for each in examined(history)} == {"ok"}
+        attack(folder)
+        assert [(each.state, each.what) for each in examined(history) if each.wrong] == [(state, str(folder / name))]
+
+
+@pytest.mark.parametrize(
+    ("statements", "named"),
+    [
+        (["UPDATE parameter SET value = 2 * value WHERE calibration_id = 1 AND name = 'kx'"], "kx of gyro"),
+        (["INSERT INTO parameter SELECT calibration_id, 'k2', value, std_statistical, NULL, unit, NULL FROM parameter "
+          "WHERE name = 'kx'"], "its rows are not those entered"),
+        (["UPDATE run SET verdict = 'fail'"], "verdict is fail"),
+        (["UPDATE calibration SET serial_number = 'G-9'"], "serial_number of gyro: G-9, stated G-1"),
+        (["UPDATE run SET operator = 'Somebody else'"], "its rows are not those entered"),
+        (["UPDATE calibration SET check_standard = 1"], "its rows are not those entered"),
+        (["DELETE FROM voided"], "voided [1]: entered"),
+        (["DELETE FROM certificate_file", "DELETE FROM certificate"], "certificate [1]: entered"),
+        (["DELETE FROM document"], "its rows are not those entered"),
+        (["DELETE FROM journal WHERE number = 1"], "journal 1 to 1"),
+    ],
+)  # fmt: skip
+def test_a_row_that_is_not_what_was_entered_is_named(statements: list[str], named: str, tmp_path: Path) -> None:
+    file = str(tmp_path / "history.sqlite")
+    with open_history(file) as history:
+        fill(history)
+        assert "changed" not in {each.state for each in examined(history)}
+    forge(file, *statements)
+    with open_history(file) as history:
+        assert named in "\n".join(f"{each.what}: {each.why}" for each in examined(history) if each.wrong)
+
+
+def test_a_result_that_was_changed_with_its_own_hash_is_named(tmp_path: Path) -> None:
+    file = str(tmp_path / "history.sqlite")
+    run = finished(0)
+    with open_history(file) as history:
+        history.enter(run)
+    other = run.text.replace("1.01", "1.02")
+    forge(file, "UPDATE run SET result = ?, content_sha256 = ?", values=(other, content_sha256(other)))
+    with open_history(file) as history:
+        found = "\n".join(f"{each.what}: {each.why}" for each in examined(history) if each.wrong)
+    assert "run [1]: its rows are not those entered" in found and "run 1: k of gyro" in found
+
+
+def test_a_run_that_was_deleted_with_all_its_rows_is_named(tmp_path: Path) -> None:
+    file = str(tmp_path / "history.sqlite")
+    with open_history(file) as history:
+        for day in range(3):
+            history.enter(finished(day))
+    without = (
+        "parameter WHERE calibration_id = 2",
+        *(f"{each} WHERE run_id = 2" for each in ("calibration", "location")),
+    )
+    gone = [f"DELETE FROM {each}" for each in (*without, "recording WHERE run_id = 2", "run WHERE id = 2")]
+    forge(file, *gone)
+    with open_history(file) as history:
+        missing = [each.what for each in examined(history) if each.state == "missing" and "[" in each.what]
+    assert missing == ["run [2]", "location [2]"]
+    forge(file, "DELETE FROM journal WHERE kind IN ('run', 'location') AND key = '[2]'")
+    with open_history(file) as history:
+        assert "journal 3 to 4" in [each.what for each in examined(history)]
