@@ -14,9 +14,10 @@ from rig.config.regular_file import UnfitFile
 from rig.data.run_folder import RESULT, recordings
 from rig.errors import Refused, RigError
 from rig.history.documents import change_entry, history_csv, history_document, rigs_document
-from rig.history.finished import Finished, finished_run
-from rig.history.integrity import examined
+from rig.history.finished import PAGE, Finished, finished_run
+from rig.history.integrity import MOST_TOLD, examined
 from rig.history.place import own_place, place
+from rig.history.recomputed import not_given
 from rig.history.series import changes, effects, rig_states, subjects, trends
 from rig.history.store import History, Past, Selection, open_history
 from rig.history.tables import (
@@ -121,18 +122,22 @@ def rigs(options: Namespace) -> int:
 
 
 def imported(options: Namespace) -> int:
-    """Enter runs; tells of each what became of it. Returns 1 when one could not be entered."""
+    """Enter runs as their recordings give them; tells of each what became of it. Returns 1 when one was refused."""
     new = known = refused = 0
     with opened(options) as history:
         for folder in _run_folders(options.folders, unsolved=options.solve):
             try:
-                entered = history.enter(_finished(folder, solve=options.solve))
+                run = _finished(folder, history, solve=options.solve)
+                entered = history.enter(run)
             except (RigError, UnfitFile, OSError) as error:
                 refused += 1
                 say(f"{folder}: {error}", sys.stderr)
                 continue
             new, known = new + entered.new, known + (not entered.new)
             say(f"{folder}: {'entered' if entered.new else 'there already'}, run {entered.run_id}")
+            if entered.new and run.certificate is None and (folder / PAGE).exists():
+                said = f"its {PAGE} is not what this version writes of its result, and was not entered"
+                say(f"{folder}: {said}; rig report writes it anew", sys.stderr)
     say(f"{new} entered, {known} there already, {refused} refused")
     return DISAGREE if refused else 0
 
@@ -207,11 +212,34 @@ def _run_folders(given: list[Path], *, unsolved: bool) -> Iterator[Path]:
         yield from sorted(inner) or [folder]
 
 
-def _finished(folder: Path, *, solve: bool) -> Finished:
-    if solve and not (folder / RESULT).exists():
-        from rig.analysis.calibration import DEFAULT_ESTIMATOR
-        from rig.plans.recorded import judged, open_run
-        from rig.report.document import document_of
+def _finished(folder: Path, history: History, *, solve: bool) -> Finished:
+    """The run as its recordings give it, which a result.json alone only claims; what is there already is not solved.
 
-        return finished_run(folder, document_of(judged(open_run(folder), DEFAULT_ESTIMATOR)))
-    return finished_run(folder)
+    Raises Refused `no_recording`, `result_not_of_recording`, and as the recordings' solution does.
+    """
+    claimed = None if solve and not (folder / RESULT).exists() else finished_run(folder)
+    if claimed is not None:
+        if history.has(claimed.content_sha256):
+            return claimed
+        if not claimed.recordings:
+            raise Refused(
+                "no_recording",
+                f"{folder} has a {RESULT} and no recording that gives it",
+                "Import the folder with its recordings",
+            )
+    from rig.analysis.calibration import DEFAULT_ESTIMATOR
+    from rig.plans.recorded import judged, open_run
+    from rig.report.document import document_of
+
+    given = document_of(judged(open_run(folder), DEFAULT_ESTIMATOR))
+    differing = [] if claimed is None else not_given(claimed.document, given)
+    if claimed is not None and not differing:
+        return claimed
+    if not solve:
+        more = f", and {len(differing) - MOST_TOLD} more" if len(differing) > MOST_TOLD else ""
+        raise Refused(
+            "result_not_of_recording",
+            f"the {RESULT} in {folder} is not what its recordings give: {'; '.join(differing[:MOST_TOLD])}{more}",
+            "Enter what they give by `rig history import --solve DIR`; a result of an older version may differ too",
+        )
+    return finished_run(folder, given)

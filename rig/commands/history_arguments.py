@@ -49,7 +49,9 @@ def add_arguments(history: argparse.ArgumentParser) -> None:
     rigs.add_argument("--json", action="store_true", help="for machines")
     imported = add("import", "enter runs that are in no history yet; what is there already stays as it is")
     imported.add_argument("folders", nargs="+", type=Path, metavar="DIR", help="run folders, or folders that hold some")
-    imported.add_argument("--solve", action="store_true", help="solve recordings that have no result.json")
+    imported.add_argument(
+        "--solve", action="store_true", help="enter what the recordings give, whatever a result.json says"
+    )
     add("verify", "whether rows, results and files are what was entered; exit status 1 when they are not")
     compare = add("compare", "two calibrations of one sensor, with E_n")
     compare.add_argument("first", type=int, metavar="A")

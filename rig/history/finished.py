@@ -15,10 +15,11 @@ from rig.data.run_folder import CONFIG, RESULT, SCRIPT, SCRIPT_IDENTITY, recordi
 from rig.errors import Refused
 from rig.history.issued import Issued, issued_certificate
 from rig.report.certificate.content import SIMULATED_ARM, certificate_of
+from rig.report.certificate.page import certificate_page
 from rig.report.certificate.stated import Stated, of_configuration
 
 PAGE, HEADER = "certificate.html", "calibration.h"
-DOCUMENTS = (CONFIG, SCRIPT, SCRIPT_IDENTITY, HEADER)
+DOCUMENTS = (RESULT, CONFIG, SCRIPT, SCRIPT_IDENTITY, HEADER)
 CHUNK_BYTES = 1 << 20
 PAGE_MAX_BYTES = 64_000_000  # of a run of six sweeps it has 30,000
 
@@ -70,14 +71,13 @@ def finished_run(folder: Path, document: ResultDocument | None = None) -> Finish
         text = read_regular_file(folder / RESULT, SIZE_MAX_BYTES)
     else:
         text = document.text().encode()
-    result = compact(json.loads(text))
     loaded = configured_in(folder)
     section = HistorySection() if loaded is None else loaded.config.history
     simulated = loaded is not None and loaded.simulated
     provenance = document.provenance
     certificate = _certificate(folder, document, Stated() if loaded is None else of_configuration(loaded))
     return Finished(
-        text=result,
+        text=compact(json.loads(text)),
         document=document,
         rig=section.rig or provenance.arm_serial_number,
         check_standards=section.check_standards,
@@ -92,7 +92,6 @@ def finished_run(folder: Path, document: ResultDocument | None = None) -> Finish
         certificate=certificate,
         documents=(
             *((name, sha256) for name in DOCUMENTS if (sha256 := document_sha256(folder, name)) is not None),
-            *([(RESULT, content_sha256(result))] if (folder / RESULT).exists() else []),
             *(() if certificate is None else certificate.files),
         ),
     )
@@ -152,10 +151,13 @@ def configured_in(folder: Path) -> Loaded | None:
 
 
 def _certificate(folder: Path, document: ResultDocument, stated: Stated) -> Issued | None:
-    """The page in the folder, if it is the certificate of this result; an amended one was entered when it was made."""
+    """The page in the folder, if it is to the letter the certificate of this result: its number alone proves nothing.
+
+    An amended one was entered when it was made.
+    """
     try:
         page = read_regular_file(folder / PAGE, PAGE_MAX_BYTES)
     except (UnfitFile, OSError):
         return None
     certificate = certificate_of(document, stated)
-    return issued_certificate(certificate, {PAGE: page}) if certificate.number.encode() in page else None
+    return issued_certificate(certificate, {PAGE: page}) if certificate_page(certificate).encode() == page else None

@@ -65,18 +65,17 @@ def _differences(stated: Calibrated, found: Calibrated) -> Iterator[str]:
     for name in sorted(ours.keys() ^ theirs.keys()):
         yield f"{name} of {stated.sensor}, which only one of them has"
     for name in sorted(ours.keys() & theirs.keys()):
-        if not _same(ours[name], theirs[name]):
-            yield f"{name} of {stated.sensor}: {theirs[name].value:.9g}, stated {ours[name].value:.9g}"
+        yield from (f"{each} of {stated.sensor}" for each in _otherwise(ours[name], theirs[name]))
 
 
-def _same(stated: Parameter, found: Parameter) -> bool:
-    return (
-        abs(stated.value - found.value) <= SAME * stated.std
-        and _close(stated.std_statistical, found.std_statistical)
-        and _close(stated.std_combined, found.std_combined)
-        and _close(stated.max_deviation, found.max_deviation)
-        and stated.unit == found.unit
-    )
+def _otherwise(stated: Parameter, found: Parameter) -> Iterator[str]:
+    if not abs(stated.value - found.value) <= SAME * stated.std:
+        yield f"{stated.name} {found.value:.9g}, stated {stated.value:.9g},"
+    for name in ("std_statistical", "std_combined", "max_deviation"):
+        if not _close(getattr(stated, name), getattr(found, name)):
+            yield f"{name} {getattr(found, name)} of {stated.name}, stated {getattr(stated, name)},"
+    if stated.unit != found.unit:
+        yield f"unit of {stated.name}"
 
 
 def _close(stated: float | None, found: float | None) -> bool:

@@ -130,7 +130,10 @@ class History:
     engine: Engine
 
     def enter(self, finished: Finished) -> Entered:
-        """Add a run; one that is there already only gets the place of its folder noted, if that is another."""
+        """Add a run; one that is there already only gets the place of its folder noted, if that is another.
+
+        It is taken at its word: whether its recordings give its result, `rig history import` finds out.
+        """
         content = finished.content_sha256
         try:
             with self._writing() as connection:
@@ -147,6 +150,11 @@ class History:
             if known is None:
                 raise
             return Entered(known, False)
+
+    def has(self, content_sha256: str) -> bool:
+        """Whether a run with that result was entered."""
+        with self.engine.connect() as connection:
+            return self._run_id(connection, content_sha256) is not None
 
     def certify(self, content_sha256: str, certificate: Issued) -> bool:
         """Note a certificate of the run with that result; False where the history does not have it."""

@@ -40,7 +40,7 @@ def heard() -> Iterator[tuple[int, socket.socket]]:
 
 
 def folder_that_names(url: str, folder: Path) -> Path:
-    shutil.copytree(FIXTURES / "verified", folder)
+    shutil.copytree(FIXTURES / "calibration", folder)
     demo = (CONFIGS / "demo.yaml").read_text(encoding="utf-8")
     (folder / "config.yaml").write_text(f"{demo}history: {{url: '{url}'}}\n", encoding="utf-8")
     return folder

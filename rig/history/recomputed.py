@@ -1,0 +1,69 @@
+"""Whether a result says what its recordings give: all of its numbers, its checks and where it comes from. Pure."""
+
+import json
+from collections.abc import Iterator, Mapping, Sequence
+
+from rig.data.result_file import ResultDocument
+from rig.history.index import SAME, unlike
+from rig.history.parameters import calibrated
+
+ROUNDING = 1e-15  # of what is zero but for the last digits: no quantity of a result is so small
+# What the same numbers may be reached with, and when.
+AS_IT_COMES = ("iterations", "solved_utc")
+
+
+def not_given(claimed: ResultDocument, given: ResultDocument) -> list[str]:
+    """What of a `claimed` result its recordings do not give, beyond a processor's rounding; `given` is solved anew.
+
+    Calibrations agree within 1e-6 of their standard uncertainty, other numbers within 1e-6 of the largest beside them.
+    Words are not compared, and what the claim leaves out is not missed: both change from version to version.
+    """
+    origin = _origin(given)
+    rows = [f"provenance.{name}" for name, said in _origin(claimed).items() if said != origin.get(name)]
+    rows += ["verdict"] if claimed.verdict != given.verdict else []
+    checks = {check.name: (check.passed, check.unit) for check in given.checks}
+    rows += [check.name for check in claimed.checks if checks.get(check.name) != (check.passed, check.unit)]
+    numbers = _differences(_numbers_of(claimed), _numbers_of(given), "")
+    return [*rows, *unlike(claimed, calibrated(given)), *numbers]
+
+
+def _origin(document: ResultDocument) -> dict[str, object]:
+    found: dict[str, object] = json.loads(document.provenance.model_dump_json(exclude_unset=True))
+    return {name: each for name, each in found.items() if name not in AS_IT_COMES}
+
+
+def _numbers_of(document: ResultDocument) -> dict[str, object]:
+    """As JSON, checks by their names: one that a later version adds moves no other."""
+    found: dict[str, object] = json.loads(document.text())
+    checks = {check.name: [check.value, check.limit, check.uncertainty] for check in document.checks}
+    return {**{name: each for name, each in found.items() if name != "provenance"}, "checks": checks}
+
+
+def _differences(claimed: object, given: object, where: str, scale: float = 0.0) -> Iterator[str]:
+    if isinstance(claimed, Mapping) and isinstance(given, Mapping):
+        for name, each in claimed.items():
+            if name not in given:
+                yield f"{where}{name}"
+            elif name not in AS_IT_COMES:
+                yield from _differences(each, given[name], f"{where}{name}.")
+    elif isinstance(claimed, Sequence) and isinstance(given, Sequence) and not isinstance(claimed, str):
+        if len(claimed) != len(given):
+            yield where.rstrip(".")
+            return
+        largest = scale or _largest(given)
+        for number, (each, other) in enumerate(zip(claimed, given, strict=True)):
+            yield from _differences(each, other, f"{where}{number}.", largest)
+    elif isinstance(claimed, float | int) and isinstance(given, float | int):
+        if abs(claimed - given) > max(SAME * max(scale, abs(given)), ROUNDING):
+            yield f"{where.rstrip('.')} {claimed:.9g}, which is {given:.9g}"
+    elif type(claimed) is not type(given):
+        yield where.rstrip(".")
+
+
+def _largest(numbers: object) -> float:
+    """Of the numbers in a list or a matrix."""
+    if isinstance(numbers, float | int):
+        return abs(numbers)
+    if isinstance(numbers, Sequence) and not isinstance(numbers, str):
+        return max(map(_largest, numbers), default=0.0)
+    return 0.0
