@@ -17,6 +17,7 @@ from pathlib import Path
 from typing import Any, NoReturn
 
 from rig.arm.dashboard import Dashboard
+from rig.arm.identity import series_problem, version_text
 from rig.arm.messages import (
     Connected,
     ControlTaken,
@@ -32,7 +33,7 @@ from rig.arm.messages import (
 )
 from rig.arm.silence import Silence
 from rig.arm.state import ArmState
-from rig.arm.state_stream import Packet, StateStream
+from rig.arm.state_stream import NotSpoken, Packet, StateStream
 from rig.arm.stopping import BRAKE_RAD_S2
 from rig.errors import Problem
 
@@ -61,7 +62,7 @@ def main(pipe: "Connection[Message, Request]", host: str, state_rate_hz: float, 
         try:
             child.connect()
         except OSError as error:
-            child.send(Failed(_connection_failure(host, str(error))))
+            child.send(Failed(_connection_failure(host, error)))
             requests.join()  # the parent reads this and ends the process
         child.stream()
     except BaseException:
@@ -91,7 +92,7 @@ class _Child:
         """Let the controller send its states and wait for the first; `OSError` when none comes."""
         self._states = StateStream(self._host, self._state_rate_hz, FIRST_PACKET_S)
         first = self._latest = self._states.first
-        self.send(Connected(first.payload_kg, first.payload_centre_m))
+        self.send(Connected(self._states.version, first.payload_kg, first.payload_centre_m))
         self.send(Heartbeat((first.state,)))
 
     def stream(self) -> NoReturn:
@@ -261,10 +262,16 @@ def _payload_failure(reported_kg: float, wanted_kg: float) -> Problem:
     )
 
 
-def _connection_failure(host: str, reason: str) -> Problem:
+def _connection_failure(host: str, error: OSError) -> Problem:
+    if isinstance(error, NotSpoken):
+        return series_problem(host, error.version) or Problem(
+            "controller_too_old",
+            f"the controller at {host} does not know {error.what}; its software is {version_text(error.version)}",
+            "Update it: the rig is tried with PolyScope 5.14",
+        )
     return Problem(
         "no_arm_states",
-        f"the controller at {host} accepts connections but sends no states ({reason})",
+        f"the controller at {host} accepts connections but sends no states ({error})",
         "Check that the arm has finished booting and that no firewall blocks port 30004",
     )
 

@@ -6,7 +6,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from rig.arm.kinematics import distance_to_forearm, distance_to_upper_arm
+from rig.arm.kinematics import NOMINAL, DenavitHartenberg, distance_to_forearm, distance_to_upper_arm
 from rig.arm.motion import Dwell, Plan, Rest, travel
 from rig.arm.state import Joints
 from rig.config.ur10e_limits import JOINT_LIMIT_RAD
@@ -39,11 +39,13 @@ class _Way(NamedTuple):
     remedy: str
 
 
-def clearance_problems(plan: Plan, payload_centre_mm: Offset, extension_mm: Offset = NONE) -> list[Problem]:
+def clearance_problems(
+    plan: Plan, payload_centre_mm: Offset, extension_mm: Offset = NONE, arm: DenavitHartenberg = NOMINAL
+) -> list[Problem]:
     """Dwells and motions that bring the flange or its payload's centre, x y z in its frame, too near the forearm.
 
-    So with an extension from the flange to `extension_mm`, which keeps clear of the upper arm as well. By the nominal
-    arm. What begins or ends at an attitude keeps `FOREARM_CLEARANCE_M`, all else `SWEEP_CLEARANCE_M`.
+    So with an extension from the flange to `extension_mm`, which keeps clear of the upper arm as well. By lengths of
+    `arm`. What begins or ends at an attitude keeps `FOREARM_CLEARANCE_M`, all else `SWEEP_CLEARANCE_M`.
     The way from where the arm stands is judged where the plan begins there.
     """
     near = [
@@ -54,7 +56,7 @@ def clearance_problems(plan: Plan, payload_centre_mm: Offset, extension_mm: Offs
             way.remedy,
         )
         for way in _ways(plan)
-        for what, distance_m in [_nearest(way.q_rad, payload_centre_mm, extension_mm)]
+        for what, distance_m in [_nearest(way.q_rad, payload_centre_mm, extension_mm, arm)]
         if distance_m < way.least_m
     ]
     return near + [
@@ -65,7 +67,7 @@ def clearance_problems(plan: Plan, payload_centre_mm: Offset, extension_mm: Offs
             "Take a shorter extension, or open the elbow in arm.home_deg",
         )
         for way in (_ways(plan) if any(extension_mm) else ())
-        for distance_m in [min(float(distance_to_upper_arm(way.q_rad, p).min()) for p in _along(extension_mm))]
+        for distance_m in [min(float(distance_to_upper_arm(way.q_rad, p, arm).min()) for p in _along(extension_mm))]
         if distance_m < SWEEP_CLEARANCE_M
     ]
 
@@ -75,19 +77,22 @@ def keeps_clear(
 ) -> bool:
     """Whether a straight way in joint space is clear enough of the forearm for sweeps and what lies between them.
 
+    By the nominal arm, of which plans are made before an arm is there.
     Nothing is said against one beyond the joints' limits, which is refused as that.
     """
     if not _within_limits(start_q_rad, target_q_rad):
         return True
-    _, distance_m = _nearest(_between(start_q_rad, target_q_rad), payload_centre_mm, extension_mm)
+    _, distance_m = _nearest(_between(start_q_rad, target_q_rad), payload_centre_mm, extension_mm, NOMINAL)
     return distance_m >= SWEEP_CLEARANCE_M
 
 
-def _nearest(q_rad: Array, payload_centre_mm: Offset, extension_mm: Offset) -> tuple[str, float]:
+def _nearest(
+    q_rad: Array, payload_centre_mm: Offset, extension_mm: Offset, arm: DenavitHartenberg
+) -> tuple[str, float]:
     """What comes nearest to the forearm in the poses (N, 6), and how near, m."""
     points = [("flange", np.zeros(3)), ("payload", np.array(payload_centre_mm) / 1000)]
     points += [("extension", point) for point in (_along(extension_mm) if any(extension_mm) else ())]
-    distances = [(what, float(distance_to_forearm(q_rad, point).min())) for what, point in points]
+    distances = [(what, float(distance_to_forearm(q_rad, point, arm).min())) for what, point in points]
     return min(distances, key=lambda each: each[1])
 
 

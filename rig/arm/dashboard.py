@@ -54,6 +54,10 @@ class Dashboard:
         """The arm's serial number."""
         return self.ask("get serial number")
 
+    def robot_model(self) -> str:
+        """What it calls the arm; other words from one that does not know the question."""
+        return self.ask("get robot model")
+
     def close(self) -> None:
         self._socket.close()
 

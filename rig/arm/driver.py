@@ -11,16 +11,20 @@ from typing import Self
 from rig.arm.child_link import ChildLink
 from rig.arm.condition import program_interruption, readiness
 from rig.arm.dashboard import Dashboard
+from rig.arm.identity import series_problem
 from rig.arm.messages import Connected, Failed, Heartbeat, Message, Move, MoveFinished, TakeControl
 from rig.arm.motion import Motion, travel
 from rig.arm.primary import Account, read_account
 from rig.arm.state import ArmReport, ArmState, RuntimeState
+from rig.arm.state_stream import NotSpoken, StateStream
 from rig.arm.stopping import StopOutcome, Stopper
 from rig.errors import Fault, Problem, Refused, RigError
 
 WATCH_S = 0.02  # the caller's watch is called at least this often
 ARRIVAL_RAD = 0.01  # the joint servo's ripple and lag stay below this
 START_S = 5.0  # a move begins within this (wall time), or not at all
+LOOK_S = 2.0  # for whoever answers where no dashboard does
+LOOK_HZ = 125.0
 LAST_STOP_S = 0.8  # … and so long once more when no state has confirmed the stop
 ANSWER_S = 5.0  # the dashboard has so long to answer while nothing moves
 SLOWNESS = 1.1  # a move may take this much longer than planned …
@@ -73,13 +77,9 @@ class Arm:
     def start(self) -> None:
         """Connect and receive; moves nothing and stops no program. Raises `Refused` when no arm answers."""
         try:
-            Dashboard(self._host, timeout_s=2.0).close()
+            Dashboard(self._host, timeout_s=LOOK_S).close()
         except OSError as error:
-            raise Refused(
-                "no_arm",
-                f"no arm answers at {self._host} ({error})",
-                "Check arm.host in the configuration, the network cable, and that the arm is switched on",
-            ) from error
+            raise Refused.of(_no_dashboard(self._host, error)) from error
         with self._link.patience():
             self._link.start()
             self._wait(lambda: self._latest is not None or self._answer is not None)
@@ -103,6 +103,7 @@ class Arm:
                 account = _account(self._host)
                 return ArmReport(
                     host=self._host,
+                    version=self._connected.version,
                     polyscope=dashboard.polyscope(),
                     serial_number=dashboard.serial_number(),
                     remote_control=dashboard.in_remote_control(),
@@ -112,13 +113,11 @@ class Arm:
                     state=self.latest,
                     kinematics=account.kinematics,
                     tcp_offset=account.tcp_offset,
+                    setup=account.setup,
+                    called=dashboard.robot_model(),
                 )
         except OSError as error:
-            raise Refused(
-                "no_dashboard",
-                f"the dashboard server at {self._host} does not answer ({error})",
-                "Enable the dashboard server in the arm's security settings",
-            ) from error
+            raise Refused.of(_silent_dashboard(self._host, error)) from error
 
     def check(self) -> None:
         """Raise what a supervising thread has met. The arm is stopped by then, if it was ours to stop."""
@@ -349,6 +348,30 @@ def _not_started(motion: Motion) -> Problem:
         "move_refused",
         f"{motion.name} was not begun within {START_S:g} s",
         "Read the pendant's log, then start again",
+    )
+
+
+def _no_dashboard(host: str, error: OSError) -> Problem:
+    """What is there instead, for whoever looks for the mistake: no arm, or one that has no dashboard."""
+    try:
+        with StateStream(host, LOOK_HZ, LOOK_S) as states:
+            version = states.version
+    except NotSpoken as answer:
+        version = answer.version
+    except OSError:
+        return Problem(
+            "no_arm",
+            f"no arm answers at {host} ({error})",
+            "Check arm.host in the configuration, the network cable, and that the arm is switched on",
+        )
+    return series_problem(host, version) or _silent_dashboard(host, error)
+
+
+def _silent_dashboard(host: str, error: OSError) -> Problem:
+    return Problem(
+        "no_dashboard",
+        f"the dashboard server at {host} does not answer ({error})",
+        "Enable the dashboard server in the arm's security settings",
     )
 
 

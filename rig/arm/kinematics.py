@@ -1,4 +1,4 @@
-"""Kinematics of the UR10e: where the flange is and how it turns, from joint angles and speeds.
+"""Kinematics of an arm like the UR10e: where the flange is and how it turns, from joint angles and speeds.
 
 Every function takes arrays whose last axis holds the six joints, base to wrist 3, and broadcasts over the others.
 """
@@ -20,6 +20,15 @@ WAVES = ("cos", "sin", "cos 2", "sin 2")  # an eccentric or tilted graduation er
 AXIS_ERRORS = (  # all that can be wrong with the angles between the wrists' axes
     *(f"twist of wrist_{number}" for number in (1, 2, 3)),
     *(name for wrist in ("wrist_2", "wrist_3") for name in (f"zero of {wrist}", *(f"{w} of {wrist}" for w in WAVES))),
+)
+
+LENGTHS = (
+    "height of the shoulder",
+    "upper arm",
+    "forearm",
+    "offset of wrist 1",
+    "offset of wrist 2",
+    "offset of wrist 3",
 )
 
 Finite = Annotated[float, Field(allow_inf_nan=False)]
@@ -115,23 +124,56 @@ def flange_attitude(q_rad: ArrayLike, arm: DenavitHartenberg = NOMINAL) -> Array
     return rotations
 
 
-def distance_to_forearm(q_rad: ArrayLike, point_m: ArrayLike = (0.0, 0.0, 0.0)) -> Array:
+def distance_to_forearm(
+    q_rad: ArrayLike, point_m: ArrayLike = (0.0, 0.0, 0.0), arm: DenavitHartenberg = NOMINAL
+) -> Array:
     """(…,) m from a point of the flange's frame, its centre if none is given, to the line from elbow to wrist 1.
 
-    For joint angles `q_rad` (…, 6) of the nominal arm.
+    For joint angles `q_rad` (…, 6).
     """
-    frames = _frames(q_rad, NOMINAL)
-    return _distance(_on_flange(frames, point_m), frames[2][..., :3, 3], frames[3][..., :3, 3])
+    frames = _frames(q_rad, arm)
+    _, elbow, wrist = _bends(frames)
+    return _distance(_on_flange(frames, point_m), elbow, wrist)
 
 
-def distance_to_upper_arm(q_rad: ArrayLike, point_m: ArrayLike) -> Array:
+def distance_to_upper_arm(q_rad: ArrayLike, point_m: ArrayLike, arm: DenavitHartenberg = NOMINAL) -> Array:
     """(…,) m from a point of the flange's frame to the middle of the upper arm, shoulder to elbow; as above.
 
     It lies beside the line that the drawing has for it (`UPPER_ARM_BESIDE_M`), on the side of wrist 1.
     """
-    frames = _frames(q_rad, NOMINAL)
+    frames = _frames(q_rad, arm)
+    shoulder, elbow, _ = _bends(frames)
     beside = UPPER_ARM_BESIDE_M * frames[1][..., :3, 2]
-    return _distance(_on_flange(frames, point_m), frames[1][..., :3, 3] + beside, frames[2][..., :3, 3] + beside)
+    return _distance(_on_flange(frames, point_m), shoulder + beside, elbow + beside)
+
+
+def lengths_m(arm: DenavitHartenberg) -> Array:
+    """(6,) m, named by `LENGTHS`: what can be measured on the arm itself, whatever its parameters make of it."""
+    frames = _frames(np.zeros(6), arm)
+    base, wrist_2, wrist_3, flange = (frames[joint][:3, 3] for joint in (0, 4, 5, 6))
+    shoulder, elbow, wrist_1 = _bends(frames)
+    along = [(base, shoulder, 0), (wrist_1, wrist_2, 3), (wrist_2, wrist_3, 4), (wrist_3, flange, 5)]
+    height, *offsets = ((end - start) @ frames[joint][:3, 2] for start, end, joint in along)
+    return np.array([height, np.linalg.norm(elbow - shoulder), np.linalg.norm(wrist_1 - elbow), *offsets])
+
+
+def _bends(frames: list[Array]) -> tuple[Array, Array, Array]:
+    """(…, 3) m each: shoulder, elbow and wrist 1, each beside the one before it.
+
+    The axes of these three are parallel but for what the factory found, and meet hundreds of metres away: a calibrated
+    arm's frames have their origins anywhere along them.
+    """
+    shoulder = frames[1][..., :3, 3]
+    elbow = _beside(shoulder, frames[1][..., :3, 2], frames[2])
+    return shoulder, elbow, _beside(elbow, frames[2][..., :3, 2], frames[3])
+
+
+def _beside(point: Array, axis: Array, frame: Array) -> Array:
+    """(…, 3) m where the axis of a frame meets the plane through a point at right angles to its own joint's axis."""
+    other = frame[..., :3, 2]
+    away = np.sum((point - frame[..., :3, 3]) * axis, axis=-1) / np.sum(other * axis, axis=-1)
+    beside: Array = frame[..., :3, 3] + away[..., None] * other
+    return beside
 
 
 def _on_flange(frames: list[Array], point_m: ArrayLike) -> Array:

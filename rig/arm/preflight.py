@@ -7,16 +7,13 @@ import numpy as np
 
 from rig.arm.clearance import NONE, Offset, clearance_problems
 from rig.arm.condition import readiness
+from rig.arm.identity import identity_problems
 from rig.arm.kinematics import NOMINAL, DenavitHartenberg, flange_axes
 from rig.arm.motion import SAME_PLACE_RAD, Motion, Plan, travel
-from rig.arm.state import JOINT_NAMES, ArmReport, Joints
+from rig.arm.motion_limits import motion_problems
+from rig.arm.state import JOINT_NAMES, ArmReport, JointLimits, Joints
 from rig.config.models import ArmSection
-from rig.config.ur10e_limits import (
-    ACCELERATION_LIMIT_RAD_S2,
-    JOINT_LIMIT_RAD,
-    PAYLOAD_LIMIT_KG,
-    SPEED_LIMIT_RAD_S,
-)
+from rig.config.ur10e_limits import PAYLOAD_LIMIT_KG
 from rig.errors import Problem, Refused
 
 # How far the first motion may swing the large joints through the room, and the wrists.
@@ -26,16 +23,45 @@ MAX_DISAGREEMENT_RAD = math.radians(1)  # what factories find differs from the n
 MAX_TOOL_TURN_RAD = 1e-3  # what a pendant rounds is less, what somebody means is more
 
 
+def preflight_problems(plans: Sequence[Plan], arm: ArmSection, report: ArmReport) -> list[Problem]:
+    """All that is known to speak against moving: the arm is another, a plan breaks a limit, the arm is not ready.
+
+    The last of the `plans` is the one that is driven. Of another arm nothing else is said: all else is of this one.
+    """
+    if others := identity_problems(arm, report):
+        return others
+    problems = [problem for plan in plans for problem in _plan_problems_on(plan, arm, report)]
+    return list(dict.fromkeys([*problems, *arm_problems(plans[-1], report), *kinematics_problems(arm, report)]))
+
+
+def _plan_problems_on(plan: Plan, arm: ArmSection, report: ArmReport) -> list[Problem]:
+    return plan_problems(
+        plan,
+        arm.payload_kg,
+        arm.payload_centre_mm,
+        arm.extension_mm,
+        arm=_geometry(arm, report),
+        told=None if report.setup is None else report.setup.limits,
+    )
+
+
 def plan_problems(
-    plan: Plan, payload_kg: float, payload_centre_mm: Offset = NONE, extension_mm: Offset = NONE
+    plan: Plan,
+    payload_kg: float,
+    payload_centre_mm: Offset = NONE,
+    extension_mm: Offset = NONE,
+    *,
+    arm: DenavitHartenberg = NOMINAL,
+    told: JointLimits | None = None,
 ) -> list[Problem]:
     """What is wrong with the plan itself: steps that are none, limits of position, speed, acceleration and payload.
 
-    And what brings the flange or what it carries too near the arm.
+    And what brings the flange or what it carries too near the arm. `told` are the controller's own limits, which count
+    where they are narrower; the lengths are those of `arm`.
     """
     problems = step_problems(plan)
-    problems += [problem for motion in plan.motions if _travels(motion) for problem in _motion_problems(motion)]
-    problems += clearance_problems(plan, payload_centre_mm, extension_mm)
+    problems += [problem for motion in plan.motions if _travels(motion) for problem in motion_problems(motion, told)]
+    problems += clearance_problems(plan, payload_centre_mm, extension_mm, arm)
     if not 0 <= payload_kg <= PAYLOAD_LIMIT_KG:
         problems.append(
             Problem(
@@ -170,6 +196,10 @@ def used_kinematics(arm: ArmSection, report: ArmReport) -> DenavitHartenberg:
     Raises Refused `no_kinematics`, `kinematics_disagree`.
     """
     refuse(kinematics_problems(arm, report))
+    return _geometry(arm, report)
+
+
+def _geometry(arm: ArmSection, report: ArmReport) -> DenavitHartenberg:
     return NOMINAL if arm.kinematics == "nominal" or report.kinematics is None else report.kinematics
 
 
@@ -190,40 +220,3 @@ def refuse(problems: Sequence[Problem]) -> None:
 def _travels(motion: Motion) -> bool:
     way = travel(motion.start_q_rad, motion.target_q_rad)
     return all(map(math.isfinite, way)) and max(map(abs, way)) > SAME_PLACE_RAD
-
-
-def _motion_problems(motion: Motion) -> list[Problem]:
-    problems = []
-    ends = (motion.start_q_rad, motion.target_q_rad)
-    for joint, name in enumerate(JOINT_NAMES):
-        if max(abs(end[joint]) for end in ends) > JOINT_LIMIT_RAD:
-            low, high = sorted(math.degrees(end[joint]) for end in ends)
-            problems.append(
-                Problem(
-                    "joint_limit",
-                    f"{motion.name} takes {name} from {low:.1f}° to {high:.1f}°, beyond ±360°",
-                    "Raise procedure.acceleration_deg_s2, lower procedure.speed_deg_s, or bring arm.home_deg near 0",
-                )
-            )
-    way = np.abs(travel(*ends))
-    speeds = motion.speed_rad_s * way / way.max()
-    for name, speed, limit in zip(JOINT_NAMES, speeds, SPEED_LIMIT_RAD_S, strict=True):
-        if speed > limit:
-            problems.append(
-                Problem(
-                    "joint_speed",
-                    f"{motion.name} turns {name} at {math.degrees(speed):.1f}°/s, "
-                    f"the limit is {math.degrees(limit):.1f}°/s",
-                    "Lower procedure.speed_deg_s or arm.transfer_speed_deg_s",
-                )
-            )
-    if motion.acceleration_rad_s2 > ACCELERATION_LIMIT_RAD_S2:
-        problems.append(
-            Problem(
-                "joint_acceleration",
-                f"{motion.name} accelerates with {math.degrees(motion.acceleration_rad_s2):.0f}°/s², "
-                f"the limit is {math.degrees(ACCELERATION_LIMIT_RAD_S2):.0f}°/s²",
-                "Lower procedure.acceleration_deg_s2",
-            )
-        )
-    return problems

@@ -1,9 +1,10 @@
-"""What the controller says of its arm's geometry and of its tool's frame: primary interface, port 30001. Receives only.
+"""What the controller says of its arm and of its tool's frame: primary interface, port 30001. Receives only.
 
 Every UR is measured in the factory, and its controller reckons with what was found. (Client interface description of
 the maker for PolyScope 5: packages of a big-endian size, i32, a type, u8, and a payload; a robot state, type 16, holds
-sub-packages of the same form. Of these KinematicsInfo, type 5, is sent once after connecting; Cartesian Info, type 4,
-in every state: the tool centre point's pose, and where it stands in the flange's frame.)
+sub-packages of the same form. Of these KinematicsInfo, type 5, and Configuration Data, type 6, are sent once after
+connecting: how the factory measured this arm, and for which arm the controller is set up; Cartesian Info, type 4, in
+every state: the tool centre point's pose, and where it stands in the flange's frame.)
 """
 
 import socket
@@ -11,28 +12,36 @@ import struct
 import time
 from collections.abc import Iterator
 from dataclasses import dataclass, replace
+from math import isnan
 
 from rig.arm.kinematics import DenavitHartenberg, Pose
+from rig.arm.state import ArmSetup, JointLimits
 
 PORT = 30001
 HEADER = struct.Struct(">iB")
-ROBOT_STATE, CARTESIAN_INFO, KINEMATICS_INFO = 16, 4, 5
+ROBOT_STATE, CARTESIAN_INFO, KINEMATICS_INFO, CONFIGURATION_DATA = 16, 4, 5, 6
 KINEMATICS = struct.Struct(">6I 6d 6d 6d 6d I".replace(" ", ""))  # checksums; θ, a, d, α; how well it was calibrated
 CARTESIAN = struct.Struct(">6d 6d".replace(" ", ""))  # the tool centre point in the base's frame, and in the flange's
+# Of each joint least and greatest angle; of each speed and acceleration; defaults; a, d, α, θ; boards, type, sub-type.
+CONFIGURATION = struct.Struct(">12d 12d 5d 6d 6d 6d 6d 4i".replace(" ", ""))
 SIZE_MAX = 1 << 20  # a robot state has some 1500 bytes
 VALUE_MAX = 1e4  # m or rad: axes that are almost parallel meet some hundred metres away, which stands in a calibration
 
 
 @dataclass(frozen=True, slots=True)
 class Account:
-    """The arm's geometry, and where its tool centre point stands in the flange's frame; None where it is not told."""
+    """The arm's geometry, where its tool centre point stands in the flange's frame, and which arm it is.
+
+    None where it is not told.
+    """
 
     kinematics: DenavitHartenberg | None = None
     tcp_offset: Pose | None = None
+    setup: ArmSetup | None = None
 
     @property
     def complete(self) -> bool:
-        return self.kinematics is not None and self.tcp_offset is not None
+        return None not in (self.kinematics, self.tcp_offset, self.setup)
 
 
 def read_account(host: str, timeout_s: float) -> Account:
@@ -62,7 +71,25 @@ def _completed(account: Account, state: bytes) -> Account:
             account = replace(account, kinematics=told)
         elif kind == CARTESIAN_INFO and (values := _numbers(CARTESIAN, payload)[6:]):
             account = replace(account, tcp_offset=values)
+        elif kind == CONFIGURATION_DATA and (setup := _setup(payload)):
+            account = replace(account, setup=setup)
     return account
+
+
+def _setup(payload: bytes) -> ArmSetup | None:
+    """None where it is too short, or no arm is made so."""
+    if len(payload) < CONFIGURATION.size:
+        return None
+    values = CONFIGURATION.unpack_from(payload)
+    limits, drawing, robot_type = values[:24], values[29:53], values[55]
+    if any(map(isnan, limits)) or not all(abs(each) <= VALUE_MAX for each in drawing):
+        return None
+    least, greatest = limits[0:12:2], limits[1:12:2]
+    speed, acceleration = limits[12::2], limits[13::2]
+    a, d, alpha, theta = (drawing[first : first + 6] for first in (0, 6, 12, 18))
+    return ArmSetup(
+        robot_type, DenavitHartenberg(theta, a, d, alpha), JointLimits(least, greatest, speed, acceleration)
+    )
 
 
 def _numbers(layout: struct.Struct, payload: bytes) -> tuple[float, ...]:

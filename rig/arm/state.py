@@ -111,14 +111,39 @@ _IN_ORDER: Callable[[ArmState], Row] = attrgetter(*(each.name for each in fields
 
 
 @dataclass(frozen=True, slots=True)
+class JointLimits:
+    """What the controller lets the joints do, base to wrist 3 (6,): angles from least to greatest, speed, acceleration.
+
+    A joint that turns without end has none of the first two: they may be infinite.
+    """
+
+    least_rad: Joints
+    greatest_rad: Joints
+    speed_rad_s: Joints
+    acceleration_rad_s2: Joints
+
+
+@dataclass(frozen=True, slots=True)
+class ArmSetup:
+    """Which arm the controller is set up for: the maker's number of its type, its lengths, its joints' limits."""
+
+    robot_type: int
+    drawing: DenavitHartenberg
+    limits: JointLimits
+
+
+@dataclass(frozen=True, slots=True)
 class ArmReport:
     """What a look at the arm shows; None where the controller does not tell.
 
-    `payload_kg` and `payload_centre_m` (3,) are what the controller reckons with at present, `kinematics` is its arm's
-    geometry as the factory has measured it, `tcp_offset` where its tool centre point stands in the flange's frame.
+    `version` is its software's (major, minor, bugfix, build), `polyscope` the same in its own words; `payload_kg` and
+    `payload_centre_m` (3,) are what the controller reckons with at present, `kinematics` is its arm's geometry as the
+    factory has measured it, `tcp_offset` where its tool centre point stands in the flange's frame, `setup` the arm it
+    is set up for, `called` that arm's name as the dashboard has it.
     """
 
     host: str
+    version: tuple[int, ...]
     polyscope: str
     serial_number: str
     remote_control: bool | None
@@ -128,3 +153,5 @@ class ArmReport:
     state: ArmState
     kinematics: DenavitHartenberg | None = None
     tcp_offset: Pose | None = None
+    setup: ArmSetup | None = None
+    called: str | None = None

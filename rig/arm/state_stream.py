@@ -37,6 +37,7 @@ VARIABLES = {
     "payload": "DOUBLE",
     "payload_cog": "VECTOR3D",
 }
+CONTROLLER_VERSION = struct.Struct(">4I")  # major, minor, bugfix, build
 PACKET = struct.Struct(">B d 6d 6d d d i i I I I d 3d".replace(" ", ""))  # the recipe's number, then these
 
 ANGLE_RAD, SPEED_RAD_S, MODES = 13.0, 20.0, range(-1, 64)  # no arm turns so far or so fast, or has other modes
@@ -53,14 +54,26 @@ class Packet:
     payload_centre_m: tuple[float, float, float]
 
 
+class NotSpoken(ConnectionError):
+    """The controller answers, but does not know `what` is asked of it; `version` is its software's."""
+
+    def __init__(self, what: str, version: tuple[int, ...]) -> None:
+        super().__init__(f"it does not know {what}")
+        self.what, self.version = what, version
+
+
 class StateStream:
     """A connection over which the controller at `host` sends its state at `rate_hz` of its own time."""
 
     def __init__(self, host: str, rate_hz: float, timeout_s: float) -> None:
-        """Connects and waits for the first packet. Raises `OSError` when none comes within `timeout_s`."""
+        """Connects and waits for the first packet.
+
+        Raises `OSError` when none comes within `timeout_s`, `NotSpoken` when none can come.
+        """
         self._deadline_s = time.monotonic() + timeout_s
         self._buffer = bytearray()
         self.closed = False  # by the controller
+        self.version: tuple[int, ...] = ()  # of the controller's software: major, minor, bugfix, build
         self.silent_s = 0.0  # nothing has come for so long at least, however late it was looked for
         self._heard_s = time.monotonic()
         self._socket = socket.create_connection((host, PORT), timeout_s)
@@ -110,13 +123,18 @@ class StateStream:
             return []
 
     def _set_up(self, rate_hz: float) -> None:
-        if self._ask("V", struct.pack(">H", VERSION)) != b"\1":
-            raise ConnectionError(f"it does not speak version {VERSION} of RTDE")
+        spoken = self._ask("V", struct.pack(">H", VERSION)) == b"\1"
+        told = self._ask("v", b"")
+        if len(told) != CONTROLLER_VERSION.size:
+            raise ConnectionError("it does not tell its version")
+        self.version = CONTROLLER_VERSION.unpack(told)
+        if not spoken:
+            raise NotSpoken(f"version {VERSION} of RTDE", self.version)
         answer = self._ask("O", struct.pack(">d", rate_hz) + ",".join(VARIABLES).encode())
         types = answer[1:].decode(errors="replace").split(",")
         wrong = [name for name, type_ in zip_longest(VARIABLES, types[: len(VARIABLES)]) if type_ != VARIABLES[name]]
         if wrong:
-            raise ConnectionError(f"it does not send {', '.join(wrong)}")
+            raise NotSpoken(", ".join(wrong), self.version)
         if self._ask("S", b"") != b"\1":
             raise ConnectionError("it does not start to send")
 

@@ -8,7 +8,8 @@ from pathlib import Path
 
 from firmware_host.client import Board
 from rig.arm.driver import look
-from rig.arm.preflight import arm_problems, kinematics_problems, plan_problems
+from rig.arm.identity import arm_words
+from rig.arm.preflight import preflight_problems
 from rig.board.identify import configured_board, find_sensor, refuse_other_firmware, refusing, stored_calibration
 from rig.commands.claims import claimed_arm, claimed_board, claimed_sensor
 from rig.commands.configured import Configured, configured
@@ -91,14 +92,9 @@ def _look_at_arm(found: Configured) -> list[str]:
     report = look(section.host)
     state = report.state
     angles = " ".join(f"{degrees(angle):.1f}" for angle in state.q_rad)
-    say(f"arm at {report.host}: serial number {report.serial_number}, PolyScope {report.polyscope}")
+    say(f"arm at {report.host}: {arm_words(report)}")
     say(f"arm joints: {angles} °, speed slider {100 * state.target_speed_fraction:.0f} %")
-    plan = found.phase.plan(state.q_rad)
-    problems = [
-        *plan_problems(plan, section.payload_kg, section.payload_centre_mm, section.extension_mm),
-        *arm_problems(plan, report),
-        *kinematics_problems(section, report),
-    ]
+    problems = preflight_problems([found.phase.plan(state.q_rad)], section, report)
     return [*_claims_of_others(section.host), *map(str, problems)]
 
 

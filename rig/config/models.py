@@ -59,7 +59,7 @@ class ArmSection(Section):
     kinematics: Literal["controller", "nominal"] = Field(
         default="controller",
         description="whose account of the arm's geometry is used: `controller`, as the factory has measured this arm; "
-        "`nominal`, that of every UR10e",
+        "`nominal`, that of every UR10e, once the controller has said that it drives one",
     )
 
     @field_validator("host")

@@ -10,6 +10,7 @@ from typing import Any
 
 from firmware_host.answers import BoardIdentity, StoredCalibration
 from rig import __version__
+from rig.arm.identity import MAKER, model_found
 from rig.arm.kinematics import NOMINAL, DenavitHartenberg, Pose
 from rig.arm.preflight import used_kinematics
 from rig.arm.state import ArmReport
@@ -29,7 +30,9 @@ class Provenance:
     `stored_calibrations` are those by which the board corrected what it streamed, by sensor name. `arm_kinematics` is
     the arm's geometry that was reckoned with; older recordings do not say (None): that was the nominal one.
     `tcp_offset` is where the controller's tool centre point stood in the flange's frame, which nothing is reckoned
-    with; None where it was not told. Files of schema "rig.run/1" do not name the script; that was an installed one.
+    with; None where it was not told. `arm_maker` and `arm_model` are those of the arm that was found; older recordings
+    do not say (None): any arm was taken for a UR10e. Files of schema "rig.run/1" do not name the script; that was an
+    installed one.
     """
 
     started_utc: str
@@ -48,6 +51,8 @@ class Provenance:
     script_installed: bool = True
     arm_kinematics: DenavitHartenberg | None = None
     tcp_offset: Pose | None = None
+    arm_maker: str | None = None
+    arm_model: str | None = None
 
     @property
     def kinematics(self) -> DenavitHartenberg:
@@ -64,7 +69,9 @@ class Provenance:
         stored = {name: entry.model_dump(mode="json") for name, entry in self.stored_calibrations.items()}
         document = {**asdict(self), "stored_calibrations": stored}
         unknown = {"script", "script_sha256", "script_installed"} if self.script_sha256 is None else set()
-        unknown |= {name for name in ("arm_kinematics", "tcp_offset") if document[name] is None}
+        unknown |= {
+            name for name in ("arm_kinematics", "tcp_offset", "arm_maker", "arm_model") if document[name] is None
+        }
         return {key: value for key, value in document.items() if key not in unknown}
 
 
@@ -97,4 +104,6 @@ def provenance_of(
         script_installed=script_installed,
         arm_kinematics=used_kinematics(loaded.config.arm, arm),
         tcp_offset=arm.tcp_offset,
+        arm_maker=MAKER,
+        arm_model=model_found(arm),
     )

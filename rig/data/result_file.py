@@ -87,6 +87,8 @@ class ProvenanceEntry(Entry):
     solved_utc: str
     arm_kinematics: KinematicsEntry | None = None
     tcp_offset: Vector6 | None = None
+    arm_maker: str | None = None
+    arm_model: str | None = None
 
 
 class EstimateEntry(Entry):

@@ -4,6 +4,7 @@ from dataclasses import asdict, dataclass, field
 from math import degrees
 from typing import Any
 
+from rig.arm.identity import model_found
 from rig.arm.kinematics import NOMINAL, DenavitHartenberg
 from rig.arm.motion import Dwell, Rest, Step, Sweep
 from rig.arm.state import JOINT_NAMES, ArmReport, ArmState, RobotMode, RuntimeState, SafetyMode
@@ -250,7 +251,12 @@ def _geometry(arm: DenavitHartenberg) -> dict[str, Any]:
 
 
 def _arm(report: ArmReport) -> dict[str, Any]:
-    known = {"serial_number": report.serial_number, "host": report.host, "polyscope": report.polyscope}
+    known = {
+        "model": model_found(report),
+        "serial_number": report.serial_number,
+        "host": report.host,
+        "polyscope": report.polyscope,
+    }
     return {**_geometry(report.kinematics or NOMINAL), **known, **_stance(report.state)}
 
 

@@ -7,6 +7,8 @@ from pathlib import Path
 
 from firmware_host.client import Calibration
 from rig.arm.driver import Arm
+from rig.arm.identity import identity_problems
+from rig.arm.preflight import refuse
 from rig.arm.state import ArmReport
 from rig.board.identify import configured_board, refusing
 from rig.board.store import Solved, calibration_of
@@ -119,6 +121,7 @@ class Connector:
         arm = stack.enter_context(Arm(section.host, acquisition.on_state, section.state_rate_hz, log))
         report = arm.report()
         self.station.event(ArmConnected(report))
+        refuse(identity_problems(section, report))
         return arm, report
 
     def _record(

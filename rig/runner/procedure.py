@@ -10,10 +10,9 @@ from contextlib import contextmanager
 from dataclasses import dataclass
 from math import degrees, radians
 
-from rig.arm.clearance import clearance_problems
 from rig.arm.kinematics import DenavitHartenberg
 from rig.arm.motion import Dwell, Motion, Plan, Rest, Step, Sweep, Transfer, travel
-from rig.arm.preflight import arm_problems, plan_problems, refuse, step_problems, way_to_home
+from rig.arm.preflight import preflight_problems, refuse, way_to_home
 from rig.arm.state import ArmReport
 from rig.config.models import ArmSection
 from rig.data.events import (
@@ -119,11 +118,7 @@ class Rig:
         Raises `Refused` naming every problem found; nothing has moved then.
         """
         report, payload = self.devices.report, self.devices.payload
-        problems = plan_problems(self.whole_plan, payload.payload_kg, payload.payload_centre_mm, payload.extension_mm)
-        problems += step_problems(self.plan)
-        # Other ways, where steps are left out.
-        problems += clearance_problems(self.plan, payload.payload_centre_mm, payload.extension_mm)
-        refuse(list(dict.fromkeys([*problems, *arm_problems(self.plan, report)])))
+        refuse(preflight_problems([self.whole_plan, self.plan], payload, report))
         self.recording.station.event(PreflightPassed(self.plan, report))
         away_rad = max(map(abs, way_to_home(self.plan, report.state.q_rad)))
         if not (self.phase.agreed and away_rad <= SAME_POSE_RAD):

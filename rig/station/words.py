@@ -3,6 +3,7 @@
 import shlex
 from traceback import format_exception
 
+from rig.arm.identity import arm_words
 from rig.data.run_folder import resuming
 from rig.station.events import (
     Advice,
@@ -42,7 +43,7 @@ def line(event: RunEvent) -> str | None:
                 f"; {name} was {before}, corrected" for name, before in corrected.items()
             )
         case ArmConnected(report):
-            text = f"arm: serial number {report.serial_number}, PolyScope {report.polyscope} at {report.host}"
+            text = f"arm: {arm_words(report)} at {report.host}"
         case PreflightPassed(plan, report):
             text = (
                 f"pre-flight: arm {report.serial_number} at {report.host} is ready; "

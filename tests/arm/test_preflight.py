@@ -45,6 +45,7 @@ READY = ArmState(
 )
 REPORT = ArmReport(
     host="10.0.0.2",
+    version=(5, 14, 0, 0),
     polyscope="URSoftware 5.14.0.0",
     serial_number="20265500123",
     remote_control=True,

@@ -5,6 +5,8 @@ import struct
 import threading
 from collections.abc import Iterator
 from contextlib import contextmanager
+from dataclasses import replace
+from math import inf
 
 import numpy as np
 import pytest
@@ -12,6 +14,7 @@ import pytest
 from rig.arm.driver import look
 from rig.arm.kinematics import DenavitHartenberg, flange_axes
 from rig.arm.primary import PORT, Account, read_account
+from rig.arm.state import ArmSetup, JointLimits
 from support.worlds import World
 
 HOST = "127.0.3.252"
@@ -38,6 +41,27 @@ def cartesian(tcp_offset: tuple[float, ...]) -> bytes:
     return package(4, struct.pack(">12d", 0.4, -0.2, 0.6, 3.1, 0.0, 0.0, *tcp_offset))
 
 
+UR3E = ArmSetup(
+    3,
+    DenavitHartenberg(
+        (0.0,) * 6,
+        (0.0, -0.24355, -0.2132, 0.0, 0.0, 0.0),
+        (0.15185, 0.0, 0.0, 0.13105, 0.08535, 0.0921),
+        (1.5708, 0.0, 0.0, 1.5708, -1.5708, 0.0),
+    ),
+    JointLimits((*(-3.1,) * 5, -inf), (*(3.2,) * 5, inf), (3.0, 3.1, 3.2, 6.1, 6.2, 6.3), (40.0,) * 6),
+)
+
+
+def configuration(setup: ArmSetup) -> bytes:
+    """Configuration Data, as the maker describes it for PolyScope 5."""
+    limits, arm = setup.limits, setup.drawing
+    values = [value for pair in zip(limits.least_rad, limits.greatest_rad, strict=True) for value in pair]
+    values += [value for pair in zip(limits.speed_rad_s, limits.acceleration_rad_s2, strict=True) for value in pair]
+    values += [1.05, 1.4, 0.25, 1.2, 0.5, *arm.a_m, *arm.d_m, *arm.alpha_rad, *arm.theta_rad]
+    return package(6, struct.pack(">53d4i", *values, 4, 2, setup.robot_type, 1))
+
+
 @contextmanager
 def saying(*pieces: bytes) -> Iterator[None]:
     """A controller that sends these bytes to whoever connects, and waits until he goes."""
@@ -58,14 +82,15 @@ def saying(*pieces: bytes) -> Iterator[None]:
 
 
 @pytest.mark.parametrize("tool_first", [True, False])
-def test_both_are_found_among_other_packages_in_whatever_state_they_come_and_however_they_are_cut(
+def test_all_are_found_among_other_packages_in_whatever_state_they_come_and_however_they_are_cut(
     tool_first: bool,
 ) -> None:
-    geometry, tool = package(16, package(1, b"q") + info(CALIBRATED)), package(16, cartesian(TURNED) + package(0, b""))
+    geometry = package(16, package(1, b"q") + configuration(UR3E) + info(CALIBRATED))
+    tool = package(16, cartesian(TURNED) + package(0, b""))
     told = tool + geometry if tool_first else geometry + tool
     stream = package(20, b"a message") + package(16, package(0, b"mode")) + told
     with saying(stream[:30], stream[30:80], stream[80:]):
-        assert read_account(HOST, 5.0) == Account(CALIBRATED, TURNED)
+        assert read_account(HOST, 5.0) == Account(CALIBRATED, TURNED, UR3E)
 
 
 def test_a_controller_that_does_not_tell_is_none() -> None:
@@ -78,6 +103,12 @@ def test_what_one_package_tells_holds_without_the_other() -> None:
         assert read_account(HOST, 0.3) == Account(CALIBRATED)
     with saying(package(16, cartesian(TURNED))):
         assert read_account(HOST, 0.3) == Account(tcp_offset=TURNED)
+
+
+def test_an_arm_that_no_number_describes_is_not_told() -> None:
+    nowhere = replace(UR3E, limits=replace(UR3E.limits, speed_rad_s=(float("nan"),) * 6))
+    with saying(package(16, configuration(nowhere) + configuration(UR3E)[:100])):
+        assert read_account(HOST, 0.3) == Account()
 
 
 def test_what_is_no_primary_interface_is_an_error_of_the_link() -> None:

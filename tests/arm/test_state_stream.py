@@ -1,6 +1,7 @@
 """The arm's states as they come over the wire, whole or in pieces, and controllers that do not send them."""
 
 import socket
+import struct
 import threading
 import time
 from collections.abc import Callable, Iterator
@@ -8,7 +9,9 @@ from contextlib import suppress
 
 import pytest
 
+from rig.arm.driver import look
 from rig.arm.state_stream import HEADER, PACKET, PORT, VARIABLES, StateStream
+from rig.errors import Refused
 from support.worlds import fresh_host
 
 TYPES = ",".join(VARIABLES.values()).encode()
@@ -23,7 +26,8 @@ def data(time_s: float) -> bytes:
 
 
 MESSAGE = package("M", b"\2hi\4RTDE\1")
-ANSWERS = {"V": package("V", b"\1"), "O": package("O", b"\1" + TYPES), "S": package("S", b"\1")}
+VERSION = package("v", struct.pack(">4I", 5, 14, 0, 0))
+ANSWERS = {"V": package("V", b"\1"), "v": VERSION, "O": package("O", b"\1" + TYPES), "S": package("S", b"\1")}
 
 Send = Callable[[bytes], None]
 
@@ -42,7 +46,7 @@ class Controller:
     def _serve(self) -> None:
         self._client, _ = self._listener.accept()
         with suppress(OSError):  # a client that has heard enough hangs up, and a test that has seen enough
-            for kind in "VOS":
+            for kind in "VvOS":
                 asked = b""
                 while len(asked) < HEADER.size or len(asked) < HEADER.unpack_from(asked)[0]:
                     if not (more := self._client.recv(4096)):
@@ -189,3 +193,25 @@ def test_a_controller_that_sends_no_states_is_an_error_that_says_why(
 ) -> None:
     with pytest.raises(OSError, match=said):
         StateStream(controllers(**answers).host, 125.0, 0.5)
+
+
+@pytest.mark.parametrize(
+    ("changed", "unknown"),
+    [
+        ({"V": package("V", b"\0")}, "version 2 of RTDE"),
+        ({"O": package("O", b"\1" + TYPES.replace(b"VECTOR3D", b"NOT_FOUND"))}, "payload_cog"),
+    ],
+    ids=["protocol", "field"],
+)
+@pytest.mark.parametrize(
+    ("version", "name"), [((5, 3, 0, 1), "controller_too_old"), ((3, 2, 1, 0), "cb3_not_supported")]
+)
+def test_a_controller_that_is_too_old_is_told_so_and_not_to_look_at_its_firewall(
+    controllers: Controllers, changed: dict[str, bytes], unknown: str, version: tuple[int, ...], name: str
+) -> None:
+    controller = controllers(**changed, v=package("v", struct.pack(">4I", *version)))
+    with socket.create_server((controller.host, 29999)), pytest.raises(Refused) as refused:
+        look(controller.host)
+    assert refused.value.name == name and "firewall" not in refused.value.remedy
+    assert ".".join(map(str, version[:3])) in refused.value.what
+    assert name != "controller_too_old" or unknown in refused.value.what

@@ -40,6 +40,14 @@ def test_news_hold_what_has_changed_and_each_point_once() -> None:
     assert times[:200] == [round(STEP_S * number, 2) for number in range(200)]
 
 
+def test_the_arm_is_named_as_it_was_found() -> None:
+    feed = fed()
+    for event in before_it_moves(planned()):
+        feed.event(event)
+    arm = read(feed.whole())[1]["arm"]
+    assert arm["model"] == "UR10e or UR12e" and arm["serial_number"] == "20225500001"
+
+
 def test_a_minute_is_kept_and_no_more() -> None:
     feed = fed()
     for number in range(3 * POINTS):

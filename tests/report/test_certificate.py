@@ -140,6 +140,18 @@ def test_what_was_not_said_reads_so_and_nobody_is_invented() -> None:
         assert words in said.text
 
 
+def test_the_arm_is_the_one_that_was_found_and_one_that_nobody_asked_is_said_so() -> None:
+    document = result()
+    found = {"arm_maker": "Universal Robots", "arm_model": "UR5e or UR7e"}
+    provenance = document.provenance.model_copy(update=found)
+    told = read(certificate(document.model_copy(update={"provenance": provenance}))).text
+    assert "Equipment: robot arm Universal Robots UR5e or UR7e, serial number 2026, software" in told
+    assert "UR10e" not in told
+    assert (
+        "robot arm whose model was not recorded; it was taken for a Universal Robots UR10e," in read(certificate()).text
+    )
+
+
 def test_a_simulated_laboratory_is_told_across_every_page() -> None:
     document = result()
     for stated, software in ((Stated(simulated=True), "5.14"), (LABORATORY, "URSoftware 5.14.0.0 (simulated)")):

@@ -9,7 +9,7 @@ import pytest
 
 from rig.config.judging_sections import CertificateSection, SiteSection
 from rig.data.earth_rate_entries import EarthRateEntry
-from rig.data.result_file import VectorEntry, read_result
+from rig.data.result_file import ResultDocument, VectorEntry, read_result
 from rig.errors import Refused
 from rig.report.certificate.dcc import digital_certificate
 from rig.report.certificate.dcc_results import JOINT_FACTOR_3
@@ -255,3 +255,16 @@ def test_it_takes_no_time() -> None:
     started_s = time.perf_counter()
     digital_certificate(made)
     assert time.perf_counter() - started_s < 0.5
+
+
+def test_the_equipment_is_the_arm_that_was_found_and_valid_with_it_or_without() -> None:
+    def equipment(document: ResultDocument) -> list[str]:
+        xml = digital_certificate(certificate(document))
+        assert not schema_faults(xml) and not rule_faults(xml)
+        (arm,) = fromstring(xml).iterfind(".//dcc:measuringEquipment", NAMES)
+        return [element.text or "" for element in arm.iter() if element.text]
+
+    found = {"arm_maker": "Universal Robots", "arm_model": "UR5e or UR7e"}
+    told = result().model_copy(update={"provenance": result().provenance.model_copy(update=found)})
+    assert equipment(told)[:3] == ["robot arm Universal Robots UR5e or UR7e", "Universal Robots", "UR5e or UR7e"]
+    assert "model was not recorded" in equipment(result())[0]

@@ -71,6 +71,8 @@ def test_a_run_leaves_everything_in_its_folder(finished: tuple[Path, dict[str, A
     assert f"gyro_scale[3] = {{{result['sensors']['gyro']['scale'][0]:.9e}f" in (out / "calibration.h").read_text()
     certificate = (out / "certificate.html").read_text(encoding="utf-8")
     assert "Simulated laboratory: no real item was calibrated" in certificate and "± U" in certificate
+    assert "Equipment: robot arm Universal Robots UR10e or UR12e, serial number 20265500123" in certificate
+    assert result["provenance"]["arm_model"] == "UR10e or UR12e"
     assert ", vector" in done.stdout and "six_observation: k" in done.stdout and "non-orthogonality" in done.stdout
     assert "verdict: PASS" in done.stdout and f"{result['sensors']['gyro']['scale'][0]:.5f}" in done.stdout
     with h5py.File(out / "run.h5", "r") as file:

@@ -68,13 +68,28 @@ def state(time_s: float, q_rad: Joints, qd_rad_s: Joints) -> ArmState:
     return ArmState(time_s, time_s, q_rad, qd_rad_s, 1.0, 1.0, *playing, 3, 1)
 
 
+def report(q_rad: Joints) -> ArmReport:
+    """An arm that stands so, of which its dashboard alone tells the model."""
+    return ArmReport(
+        host="127.0.0.2",
+        version=(5, 14, 0, 0),
+        polyscope="5.14",
+        serial_number="20225500001",
+        remote_control=True,
+        program_running=False,
+        payload_kg=0.35,
+        payload_centre_m=(0.0, 0.0, 0.025),
+        state=state(0.0, q_rad, (0.0,) * 6),
+        called="UR10",
+    )
+
+
 def before_it_moves(plan: Plan) -> Iterator[RunEvent]:
     """Up to the question."""
-    still = state(0.0, plan.start_q_rad, (0.0,) * 6)
-    report = ArmReport("127.0.0.2", "5.14", "20225500001", True, False, 0.35, (0.0, 0.0, 0.025), still)
-    yield ArmConnected(report)
+    stands = report(plan.start_q_rad)
+    yield ArmConnected(stands)
     yield PhaseStarted("six_observation", plan, SENSORS)
-    yield PreflightPassed(plan, report)
+    yield PreflightPassed(plan, stands)
 
 
 def moving(plan: Plan, until_s: float, step_s: float = STEP_S) -> Iterator[RunEvent]:

@@ -46,7 +46,7 @@ const SHOW = {
     drawBar(step);
   },
   arm(arm) {
-    $("arm-name").textContent = [arm.serial_number, arm.host].filter(Boolean).join(" · ");
+    $("arm-name").textContent = [arm.model, arm.serial_number, arm.host].filter(Boolean).join(" · ");
     $("missed").textContent = arm.missed ?? "not recorded";
     $("missed").className = arm.missed ? "odd-number" : "";
     if (!arm.q_rad) return;

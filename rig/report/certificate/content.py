@@ -64,6 +64,14 @@ class Certificate:
     reversals: Mapping[str, ReversalEntry]
 
     @property
+    def arm(self) -> str:
+        """What turned the items, by what was found of it."""
+        found = self.provenance
+        if found.arm_model is None:
+            return "robot arm whose model was not recorded; it was taken for a Universal Robots UR10e"
+        return f"robot arm {found.arm_maker} {found.arm_model}"
+
+    @property
     def provenance(self) -> ProvenanceEntry:
         """What was measured with what, and when."""
         return self.result.provenance

@@ -227,12 +227,24 @@ def _measured(c: Certificate, item: str, name: str, results: Iterator[Element], 
                                text("description", "docs/method.md and docs/uncertainty.md of calibration-rig"),
                                words("norm", "JCGM 100:2008"))),
         dcc("usedSoftware", _software(c)),
-        dcc("measuringEquipments", dcc("measuringEquipment", text("name", "robot arm UR10e"), words("model", "UR10e"),
-            dcc("identifications", _identified("manufacturer", c.provenance.arm_serial_number, "serial number")))),
+        dcc("measuringEquipments", _arm(c)),
         dcc("influenceConditions", *conditions) if any(each is not None for each in conditions) else UNKNOWN_AIR,
         dcc("results", *results),
         refId=item,
     )  # fmt: skip
+
+
+def _arm(c: Certificate) -> Element:
+    """What turned the items, by the model that was found."""
+    found = c.provenance
+    known = found.arm_maker is not None and found.arm_model is not None
+    return dcc(
+        "measuringEquipment",
+        text("name", c.arm),
+        dcc("manufacturer", text("name", found.arm_maker)) if known else None,
+        words("model", found.arm_model) if known else None,
+        dcc("identifications", _identified("manufacturer", found.arm_serial_number, "serial number")),
+    )
 
 
 def _condition(name: str, value: float | None, unit: str) -> Part:
