@@ -3,20 +3,25 @@
 from collections.abc import Mapping
 from dataclasses import dataclass
 from functools import partial
-from typing import get_args
+from typing import Literal, get_args
 
 import numpy as np
 
 from rig.analysis.calibration import or_fault
+from rig.analysis.increments import InIncrements, solve_turning
 from rig.errors import Fault, Refused
 from rig.estimation.arrays import Array
+from rig.estimation.earth_rate import check_earth_seen
+from rig.estimation.known_increments import KnownIncrements
 from rig.estimation.reference_budget import scale_and_bias
-from rig.estimation.reference_model import Known, KnownNorm, KnownVector
+from rig.estimation.reference_model import REFERENCE, Known, KnownNorm, KnownVector
 from rig.estimation.refusals import check_axes
 from rig.estimation.triaxial import EqualWeights, Method, TriaxialSolution, solve_triaxial
 from rig.observation.attitude_import import PlacedReadings, Quantity
 
+Chosen = Method | Literal["increments"]
 METHODS: tuple[Method, ...] = (*get_args(EqualWeights), "attitude_weighted")
+CHOICES: tuple[Chosen, ...] = ("increments", *METHODS)
 SEEN = 3.0  # standard deviations that the largest second-order term must have
 NOT_SEEN = "Leave out --second-order: it would triple the uncertainty of the bias for nothing; or dwell longer"
 UPWARDS = dict(zip(("+x", "+y", "+z", "-x", "-y", "-z"), np.concatenate([np.eye(3), -np.eye(3)]), strict=True))
@@ -36,17 +41,18 @@ class Surrounding:
     field_upwards: bool = False
     any_mounting: bool = False
 
-    def known(self, quantity: Quantity, placed: PlacedReadings) -> Known:
+    def known(self, quantity: Quantity, placed: PlacedReadings, *, exact_rates: bool) -> Known:
         """What the reference of a quantity is. Raises Fault `no_rates`, `field_strength_unknown`."""
         up = UPWARDS[self.up]
         if quantity == "acceleration":
             return KnownNorm(self.gravity_m_s2, up)
         if quantity == "rate":
-            if placed.rates_rad_s is None:
+            if placed.rates_rad_s is None or not exact_rates:
                 raise Fault(
                     "no_rates",
-                    "the attitudes do not say how the table turned; at rest a gyroscope shows the Earth's rate alone",
-                    "Give the columns rate_x_rad_s, rate_y_rad_s, rate_z_rad_s, in body coordinates",
+                    "the attitudes do not say how the table turned, or not that it is exact",
+                    "Use increments, which need no rates; or give the columns rate_x_rad_s, rate_y_rad_s, rate_z_rad_s "
+                    "in body coordinates, with --exact-rates where their noise is far below the sensor's",
                 )
             return KnownVector(placed.rates_rad_s)
         if self.field_t is None:
@@ -60,48 +66,69 @@ class Surrounding:
 
 @dataclass(frozen=True, slots=True)
 class InAttitudes:
-    """One quantity's calibration by the chosen method, and by each of the others, or the Fault that it ends in."""
+    """One quantity's calibration by the chosen method, and by each of the others, or the Fault that it ends in.
+
+    `reference_fault` says why what was found as the reference, a gyroscope's Earth's rate, is not it.
+    """
 
     solution: TriaxialSolution
     beside: Mapping[Method, TriaxialSolution | Fault]
+    reference_fault: Fault | None = None
+
+
+Result = InAttitudes | InIncrements
 
 
 def solve_placed(
-    placed: PlacedReadings, surrounding: Surrounding, method: Method | None, *, second_order: bool
-) -> dict[Quantity, InAttitudes | Fault]:
+    placed: PlacedReadings,
+    surrounding: Surrounding,
+    method: Chosen | None,
+    *,
+    second_order: bool,
+    exact_rates: bool = False,
+    window_s: float | None = None,
+) -> dict[Quantity, Result | Fault]:
     """Every quantity that was recorded, by `method`; None chooses the one that suits it.
 
-    That is "maximum_likelihood" for a gyroscope, whose reference is the Earth's rate, and "attitude_weighted" else.
+    That is "attitude_weighted", and for a gyroscope "increments" (over windows of `window_s`), or with `exact_rates`
+    "maximum_likelihood".
     """
-    return {
-        quantity: or_fault(
-            partial(
-                _solved,
-                placed,
-                quantity,
-                surrounding,
-                method or ("maximum_likelihood" if quantity == "rate" else "attitude_weighted"),
-                second_order=second_order and quantity == "acceleration",
-            )
-        )
-        for quantity in placed.means
-    }
+
+    def solved(quantity: Quantity) -> Result:
+        if quantity == "rate":
+            chosen = method or ("maximum_likelihood" if exact_rates else "increments")
+            if chosen == "increments":
+                assert placed.turning is not None  # there are readings of the rate
+                return solve_turning(placed.turning, window_s, any_mounting=surrounding.any_mounting)
+        else:
+            chosen = "attitude_weighted" if method is None or method == "increments" else method
+        known = surrounding.known(quantity, placed, exact_rates=exact_rates)
+        second = second_order and quantity == "acceleration"
+        return _solved(placed, quantity, known, chosen, second_order=second, any_mounting=surrounding.any_mounting)
+
+    return {quantity: or_fault(partial(solved, quantity)) for quantity in placed.means}
 
 
-def known_method(name: str | None) -> Method | None:
+def known_method(name: str | None) -> Chosen | None:
     """Raises Refused `unknown_estimator`."""
-    for method in METHODS:
+    for method in CHOICES:
         if name == method:
             return method
     if name is None:
         return None
-    raise Refused("unknown_estimator", f"there is no {name} for readings in attitudes", f"Use {', '.join(METHODS)}")
+    raise Refused("unknown_estimator", f"there is no {name} for readings in attitudes", f"Use {', '.join(CHOICES)}")
 
 
 def _solved(
-    placed: PlacedReadings, quantity: Quantity, surrounding: Surrounding, method: Method, *, second_order: bool
+    placed: PlacedReadings,
+    quantity: Quantity,
+    known: Known,
+    method: Method,
+    *,
+    second_order: bool,
+    any_mounting: bool,
 ) -> InAttitudes:
-    known, means = surrounding.known(quantity, placed), placed.means[quantity]
+    means = placed.means[quantity]
     if placed.variances is None:
         variances = _scatter(placed, means, known, second_order=second_order)
     else:
@@ -111,10 +138,20 @@ def _solved(
     if second_order:
         std = np.sqrt(np.diag(solution.covariance)[15:18])
         check_seen(solution.second_order, std, NOT_SEEN)
-    if not surrounding.any_mounting:
+    if not any_mounting:
         check_axes(solution.matrix / np.linalg.norm(solution.matrix, axis=1, keepdims=True), np.eye(3))
     others = [each for each in METHODS if each != method and (each != "attitude_weighted" or quantity != "rate")]
-    return InAttitudes(solution, {other: or_fault(partial(solve, method=other)) for other in others})
+    beside = {other: or_fault(partial(solve, method=other)) for other in others}
+    return InAttitudes(solution, beside, _not_the_earth(solution) if quantity == "rate" else None)
+
+
+def _not_the_earth(solution: TriaxialSolution) -> Fault | None:
+    """Why what a gyroscope's rates leave over is not the Earth's rate: as in a run, it must be seen to a tenth."""
+    try:
+        check_earth_seen(solution.reference, solution.covariance[REFERENCE, REFERENCE])
+    except Fault as fault:
+        return fault
+    return None
 
 
 def _solve(
@@ -178,7 +215,7 @@ def check_seen(second_order: Array | None, std: Array, remedy: str) -> None:
         )
 
 
-def in_unit(solution: TriaxialSolution) -> tuple[Array, Array]:
+def in_unit(solution: TriaxialSolution | KnownIncrements) -> tuple[Array, Array]:
     """Scale factors 1/‖row of F‖ (3,), and the standard deviations of them and of the bias (6,)."""
     scale = 1 / np.linalg.norm(solution.matrix, axis=1)
     return scale, np.sqrt(np.diag(scale_and_bias_covariance(solution.matrix, scale, solution.covariance)))

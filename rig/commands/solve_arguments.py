@@ -19,7 +19,7 @@ def add_arguments(solve: argparse.ArgumentParser) -> None:
         "--estimator",
         metavar="NAME",
         help="vector (default), newton, levenberg_marquardt, or algorithm_1, as published; with --attitudes "
-        "attitude_weighted, maximum_likelihood, or as_published",
+        "increments (gyroscope), attitude_weighted, maximum_likelihood, or as_published",
     )
     solve.add_argument(
         "--set",
@@ -52,6 +52,17 @@ def add_arguments(solve: argparse.ArgumentParser) -> None:
         action="store_true",
         help="the attitudes are on a clock of their own: find it by the turning that both files show",
     )
+    place.add_argument(
+        "--exact-rates",
+        action="store_true",
+        help="the attitudes' rates are exact, as a rate table's are: solve the gyroscope by them, not by increments",
+    )
+    place.add_argument(
+        "--window-s",
+        type=float,
+        metavar="SECONDS",
+        help="over which attitudes are averaged for a gyroscope's increments (default: 1, less for short recordings)",
+    )
     place.add_argument("--second-order", action="store_true", help="find the accelerometer's second-order terms too")
 
 
@@ -69,7 +80,11 @@ def solve(options: argparse.Namespace) -> int:
         from rig.commands.solve_csv import solve_external
 
         return solve_external(options.run, options.sweeps, options.estimator or DEFAULT_ESTIMATOR, as_json=options.json)
-    for name, value in (("--gravity-m-s2", options.gravity_m_s2), ("--field-t", options.field_t)):
+    for name, value in (
+        ("--gravity-m-s2", options.gravity_m_s2),
+        ("--field-t", options.field_t),
+        ("--window-s", options.window_s),
+    ):
         if value is not None and not 0 < value < float("inf"):
             raise Refused("bad_option", f"{name} is {value:g}", "Give its size, in SI units")
     from rig.analysis.attitudes import Surrounding
@@ -82,5 +97,7 @@ def solve(options: argparse.Namespace) -> int:
         Surrounding(options.gravity_m_s2, options.field_t, options.up, options.field_upwards, options.any_mounting),
         second_order=options.second_order,
         find_clock=options.find_clock,
+        exact_rates=options.exact_rates,
+        window_s=options.window_s,
         as_json=options.json,
     )

@@ -19,6 +19,8 @@ def solve_attitudes(
     *,
     second_order: bool,
     find_clock: bool,
+    exact_rates: bool,
+    window_s: float | None,
     as_json: bool,
 ) -> int:
     """Solve two CSV files and print what they give; returns 0.
@@ -29,7 +31,9 @@ def solve_attitudes(
     method = known_method(estimator)
     with raised_as(Refused):  # nothing runs here: whatever is wrong with the data, no arm had to be stopped for it
         placed = read_placed(samples, attitudes, find_clock=find_clock)
-        results = solve_placed(placed, surrounding, method, second_order=second_order)
+        results = solve_placed(
+            placed, surrounding, method, second_order=second_order, exact_rates=exact_rates, window_s=window_s
+        )
         faults = [result for result in results.values() if isinstance(result, Fault)]
         if len(faults) == len(results):
             raise faults[0]

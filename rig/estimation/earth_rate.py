@@ -145,7 +145,9 @@ def find_earth_rate(seen: Seen, nominal_mounting: Array, known: Known) -> EarthR
         vertical_held=len(directions) < 3,
         scatter=scatter,
     )
-    _check_seen(found, held)
+    expected = float(np.sqrt(EARTH_RATE_RAD_S**2 - held @ held))
+    what = "its level part" if found.vertical_held else "it"
+    check_earth_seen(found.rate_rad_s - held, found.covariance_rad2_s2, expected, what)
     return found
 
 
@@ -239,12 +241,15 @@ def _told(seen: Seen, directions: Array, gravity: Array | None) -> tuple[refusal
     return refusals.conditioning(design, needed), needed
 
 
-def _check_seen(found: EarthRate, held: Array) -> None:
-    """Raises Fault `earth_rate_not_observable`."""
-    free = float(np.linalg.norm(found.rate_rad_s - held))
-    expected = float(np.sqrt(EARTH_RATE_RAD_S**2 - held @ held))
-    what = "its level part" if found.vertical_held else "it"
-    worst = float(np.sqrt(np.linalg.eigvalsh(found.covariance_rad2_s2)[-1]))
+def check_earth_seen(
+    free_rad_s: Array, covariance_rad2_s2: Array, expected_rad_s: float = EARTH_RATE_RAD_S, what: str = "it"
+) -> None:
+    """Whether what was found (3,) of the Earth's rate, or of a part of it, is as large as it is and known to a tenth.
+
+    Raises Fault `earth_rate_not_observable`.
+    """
+    free = float(np.linalg.norm(free_rad_s))
+    worst = float(np.sqrt(np.linalg.eigvalsh(covariance_rad2_s2)[-1]))
     if free < SEEN * worst:
         raise Fault(
             "earth_rate_not_observable",
@@ -252,12 +257,12 @@ def _check_seen(found: EarthRate, held: Array) -> None:
             f"not to a tenth",
             "Take a gyroscope with a steadier bias and less noise, or rest longer; give latitude and heading instead",
         )
-    along = (found.rate_rad_s - held) / free
-    std = float(np.sqrt(along @ found.covariance_rad2_s2 @ along))
-    if abs(free - expected) > AGREES * std:
+    along = free_rad_s / free
+    std = float(np.sqrt(along @ covariance_rad2_s2 @ along))
+    if abs(free - expected_rad_s) > AGREES * std:
         raise Fault(
             "earth_rate_not_observable",
             f"the gyroscope finds {what} to be {free / DEG_H:.4g} ± {std / DEG_H:.2g} deg/h, where "
-            f"{expected / DEG_H:.4g} is right: something else turns with the attitude",
+            f"{expected_rad_s / DEG_H:.4g} is right: something else turns with the attitude",
             "Look at the gyroscope's residuals, for warming and for a sensitivity to gravity; repeat the movement",
         )

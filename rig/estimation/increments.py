@@ -3,14 +3,15 @@
     m = F ω + b,   Ċ = C [ω]×,   C(t₁)ᵀ C(t₂) = exp(φ₁) exp(φ₂) … exp(φₙ)
 
 C takes body coordinates at t to those of the first reading; ω is the rate against the stars, in body coordinates.
-Between readings at ω₀ and ω₁ the rate goes along a cubic whose slopes, per step, are those of the chords,
-ω̇ₖ = (ωₖ₊₁ − ωₖ₋₁)/2, so that the rotation vector of a step h is, to its fourth order (Magnus, Comm. Pure Appl. Math. 7
-(1954) 649),
+Between readings at ω₀ and ω₁ the rate goes along a cubic whose slopes, per step, are those of five readings,
+ω̇ₖ = (8 (ωₖ₊₁ − ωₖ₋₁) − ωₖ₊₂ + ωₖ₋₂)/12, so that the rotation vector of a step h is, to its fourth order (Magnus, Comm.
+Pure Appl. Math. 7 (1954) 649),
 
     φ = h (ω₀ + ω₁)/2 + h (ω̇₀ − ω̇₁)/12 + h² ω₀ × ω₁/12
 
 with the second term for what a straight line would cut off, the third for coning. Slopes are counted per step, not per
-second: where time stamps jitter they stay as small as the readings' differences are.
+second: where time stamps jitter they stay as small as the readings' differences are. A swing with n readings to its
+period is taken for (2π/n)⁴/720 less than it is: 5e-6 at n = 25.
 
 A small error of the parameters δθ = (δF row by row, δb) adds δω = −F⁻¹ (δF ω + δb) to the rate and turns the attitude:
 
@@ -72,7 +73,8 @@ def course(time_s: Array, readings: Array, matrix: Array, bias: Array, at_s: Arr
         raise ValueError("instants must rise, and lie within the readings' times")
     inverse = np.asarray(np.linalg.inv(matrix), dtype=np.float64)
     rates = (readings - bias) @ inverse.T
-    slopes = np.gradient(rates, axis=0)
+    slopes = np.asarray(np.gradient(rates, axis=0), dtype=np.float64)
+    slopes[2:-2] = (8 * (rates[3:-1] - rates[1:-3]) - rates[4:] + rates[:-4]) / 12
     found = [
         _in_block(_Stretch(time_s[taken], rates[taken], slopes[taken]), at_s[asked], inverse)
         for taken, asked in _blocks(time_s, at_s)

@@ -25,6 +25,7 @@ from rig.errors import Fault, Refused
 from rig.estimation.arrays import Array
 from rig.observation.csv_table import read_columns
 from rig.observation.csv_windows import MIN_SAMPLES, check_complete, check_times, inside, overlapping, scatter_of
+from rig.observation.fixes import Turning
 from rig.observation.table_motion import TableMotion
 from rig.observation.timebase import TimeBase, estimate_time_base
 from rig.observation.windows import Window
@@ -50,6 +51,7 @@ class PlacedReadings:
 
     No variances where rows hold too few samples to show their noise. `samples` (N,); `attitudes` (N, 3, 3), body to
     table; `rates_rad_s` (N, 3) of the table in body coordinates and `attitude_std_rad` (N,), if they were given.
+    `turning` holds a gyroscope's own readings and all rows, for what is solved from how far the body turned.
     """
 
     means: Mapping[Quantity, Array]
@@ -59,6 +61,7 @@ class PlacedReadings:
     rates_rad_s: Array | None
     attitude_std_rad: Array | None
     clock: TimeBase | None = None
+    turning: Turning | None = None
 
 
 def read_placed(samples_path: Path, attitudes_path: Path, *, find_clock: bool = False) -> PlacedReadings:
@@ -92,6 +95,10 @@ def read_placed(samples_path: Path, attitudes_path: Path, *, find_clock: bool = 
         seen = [row for row, window in enumerate(windows) if time_s[0] <= window.start_s and window.end_s <= time_s[-1]]
         windows, attitudes = [windows[row] for row in seen], attitudes[seen]
         rates, stated = (None if each is None else each[seen] for each in (rates, stated))
+    turning = None
+    if "rate" in readings:
+        rows_s = np.array([(window.start_s, window.end_s) for window in windows])
+        turning = Turning(time_s, readings["rate"], rows_s, attitudes, stated)
     cuts = [inside(time_s, window) for window in windows]
     counts = np.array([cut.stop - cut.start for cut in cuts])
     interval_s = float(np.median(np.diff(time_s)))
@@ -111,6 +118,7 @@ def read_placed(samples_path: Path, attitudes_path: Path, *, find_clock: bool = 
         rates,
         stated,
         clock,
+        turning,
     )
 
 

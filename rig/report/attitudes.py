@@ -10,12 +10,15 @@ import numpy as np
 from rich.console import Console
 from rich.table import Table
 
-from rig.analysis.attitudes import InAttitudes, Surrounding, in_unit
+from rig.analysis.attitudes import Result, Surrounding, in_unit
+from rig.analysis.increments import InIncrements
 from rig.errors import Fault
 from rig.estimation import accelerometer, magnetometer
+from rig.estimation.known_increments import KnownIncrements
 from rig.estimation.triaxial import TriaxialSolution
 from rig.observation.attitude_import import UNITS, Quantity
 from rig.observation.timebase import TimeBase
+from rig.report.increments import increment_entry, increment_lines
 from rig.station.plain_text import plain
 
 SCHEMA = "rig.attitudes/1"
@@ -38,7 +41,7 @@ class Found:
     samples: Path
     attitudes: Path
     surrounding: Surrounding
-    results: Mapping[Quantity, InAttitudes | Fault]
+    results: Mapping[Quantity, Result | Fault]
     clock: TimeBase | None = None
 
 
@@ -76,7 +79,7 @@ def _clock_entry(clock: TimeBase) -> dict[str, float]:
     }
 
 
-def _table(title: str, quantity: Quantity, solution: TriaxialSolution) -> Table:
+def _table(title: str, quantity: Quantity, solution: TriaxialSolution | KnownIncrements) -> Table:
     """The scale factor and the bias of each axis; ± 2σ."""
     table = Table(title=plain(title, "table.title"), title_justify="left")
     unit = UNITS[quantity]
@@ -89,12 +92,18 @@ def _table(title: str, quantity: Quantity, solution: TriaxialSolution) -> Table:
     return table
 
 
-def _lines(quantity: Quantity, result: InAttitudes, surrounding: Surrounding) -> Iterator[str]:
-    solution, unit = result.solution, UNITS[quantity]
-    for axis, row in zip("xyz", solution.matrix.tolist(), strict=True):
+def _lines(quantity: Quantity, result: Result, surrounding: Surrounding) -> Iterator[str]:
+    for axis, row in zip("xyz", result.solution.matrix.tolist(), strict=True):
         yield f"F {axis}: " + "  ".join(f"{element:+.6f}" for element in row)
-    reference = " ".join(f"{each:+.6g}" for each in solution.reference)
-    yield f"{REFERENCES[quantity]} in table coordinates: {reference} {unit}"
+    if isinstance(result, InIncrements):
+        yield from increment_lines(result)
+        return
+    solution, unit = result.solution, UNITS[quantity]
+    if result.reference_fault is None:
+        reference = " ".join(f"{each:+.6g}" for each in solution.reference)
+        yield f"{REFERENCES[quantity]} in table coordinates: {reference} {unit}"
+    else:
+        yield f"{REFERENCES[quantity]}: {result.reference_fault}"
     if quantity == "acceleration":
         yield f"gravity {surrounding.gravity_m_s2:g} m/s², to which the scale factors are relative"
     if solution.second_order is not None:
@@ -134,17 +143,22 @@ def _document(found: Found) -> dict[str, Any]:
     }
 
 
-def _entry(quantity: Quantity, result: InAttitudes) -> dict[str, Any]:
+def _entry(quantity: Quantity, result: Result) -> dict[str, Any]:
+    order = [
+        *(f"f{i}{j}" for i in "xyz" for j in "xyz"),
+        *(f"reference_{axis}" for axis in "xyz"),
+        *(f"bias_{axis}" for axis in "xyz"),
+    ]
+    model = {"model": MODELS[quantity], "unit": UNITS[quantity], "covariance_order": order}
+    if isinstance(result, InIncrements):
+        return {**model, **_parameters(result.solution), **increment_entry(result), "beside": {}}
+    if result.solution.second_order is not None:
+        order += [f"phi_{axis}" for axis in "xyz"]
+    fault = result.reference_fault
     return {
-        "model": MODELS[quantity],
-        "unit": UNITS[quantity],
+        **model,
         **_solution(result.solution),
-        "covariance_order": [
-            *(f"f{i}{j}" for i in "xyz" for j in "xyz"),
-            *(f"reference_{axis}" for axis in "xyz"),
-            *(f"bias_{axis}" for axis in "xyz"),
-            *(f"phi_{axis}" for axis in "xyz" if result.solution.second_order is not None),
-        ],
+        **({} if fault is None else {"reference_table": None, "reference_error": str(fault)}),
         "beside": {
             method: {"error": str(other)} if isinstance(other, Fault) else _solution(other)
             for method, other in result.beside.items()
@@ -152,16 +166,22 @@ def _entry(quantity: Quantity, result: InAttitudes) -> dict[str, Any]:
     }
 
 
+def _parameters(solution: TriaxialSolution | KnownIncrements) -> dict[str, Any]:
+    return {
+        "matrix": solution.matrix.tolist(),
+        "scale": in_unit(solution)[0].tolist(),
+        "bias": solution.bias.tolist(),
+        "covariance": solution.covariance.tolist(),
+    }
+
+
 def _solution(solution: TriaxialSolution) -> dict[str, Any]:
     error = solution.attitude_error
     return {
         "estimator": solution.method,
-        "matrix": solution.matrix.tolist(),
-        "scale": in_unit(solution)[0].tolist(),
-        "bias": solution.bias.tolist(),
+        **_parameters(solution),
         "reference_table": solution.reference.tolist(),
         "second_order": None if solution.second_order is None else solution.second_order.tolist(),
-        "covariance": solution.covariance.tolist(),
         "attitude_error_rad": None if error is None else error.std_rad,
         "attitude_error_std_rad": None
         if error is None or not np.isfinite(error.uncertainty_rad)

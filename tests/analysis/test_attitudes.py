@@ -80,7 +80,7 @@ def test_the_papers_accelerometer_and_a_magnetometer_are_found(capsys: pytest.Ca
 
 
 def test_the_papers_gyroscope_is_found_with_the_earths_rate(capsys: pytest.CaptureFixture[str]) -> None:
-    found = solved(capsys, example(SWINGING))["rate"]
+    found = solved(capsys, example(SWINGING), "--exact-rates")["rate"]
     assert off(found, GYRO_MATRIX, GYRO_REFERENCE_RAD_S, GYRO_BIAS_RAD_S) < 4
     assert found["std"][9:12].max() < 0.1 * np.linalg.norm(GYRO_REFERENCE_RAD_S)
 
@@ -114,10 +114,17 @@ def test_the_clock_of_a_table_is_found_by_the_turning_both_saw(
     assert "the samples' clock on the table's: +731." in capsys.readouterr().out
 
 
-def test_quaternions_alone_tell_the_clock_but_no_rates(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+def test_the_papers_gyroscope_is_found_without_its_rates(capsys: pytest.CaptureFixture[str]) -> None:
+    found = solved(capsys, example(SWINGING))["rate"]
+    assert off(found, GYRO_MATRIX, GYRO_REFERENCE_RAD_S, GYRO_BIAS_RAD_S) < 4
+
+
+def test_quaternions_alone_tell_the_clock_and_the_sensor(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
     files = on_another_clock(tmp_path, late_s=12.5, fast=0.0, rates=False)
-    assert main(solve(files, "--find-clock")) == 2
-    assert "no_rates" in capsys.readouterr().err, "its clock was found"
+    assert main([*solve(files, "--find-clock"), "--json"]) == 0
+    rate = json.loads(capsys.readouterr().out)["quantities"]["rate"]
+    std = np.sqrt(np.diag(rate["covariance"]))
+    assert (np.abs(np.ravel(rate["matrix"]) - np.ravel(GYRO_MATRIX)) < 4 * std[:9]).all()
 
 
 def test_a_file_of_stops_alone_tells_no_clock(capsys: pytest.CaptureFixture[str]) -> None:
@@ -229,7 +236,7 @@ def test_what_is_wrong_is_refused_by_name(what: str, tmp_path: Path, capsys: pyt
 
 
 def test_what_the_sensor_does_not_need_is_refused(capsys: pytest.CaptureFixture[str], tmp_path: Path) -> None:
-    """A linear sensor has no second order; a gyroscope at rest, no scale."""
+    """A linear sensor has no second order; nobody's rates are exact unless it is said."""
     assert main(solve(example(STILL), "--estimator", "vector")) == 2
     assert "unknown_estimator" in capsys.readouterr().err
     still = written(
@@ -238,7 +245,9 @@ def test_what_the_sensor_does_not_need_is_refused(capsys: pytest.CaptureFixture[
             read(EXAMPLES / SWINGING[1])
         ),
     )
-    assert main(solve([EXAMPLES / SWINGING[0], still])) == 2
+    assert main(solve([EXAMPLES / SWINGING[0], still], "--exact-rates")) == 2
+    assert "no_rates" in capsys.readouterr().err
+    assert main(solve(example(SWINGING), "--estimator", "maximum_likelihood")) == 2
     assert "no_rates" in capsys.readouterr().err
 
 
