@@ -106,6 +106,13 @@ def _parser() -> argparse.ArgumentParser:
     _add_record(add("record", _record, "record the sensors alone, while something else turns them; nothing moves"))
     resume = add("resume", _resume, "go on with an interrupted run")
     resume.add_argument("run_folder", type=Path, metavar="RUN_DIR")
+    resume.add_argument(
+        "--connect",
+        action="append",
+        default=[],
+        metavar="ADDRESS",
+        help="an address in a folder that is not of a run of yours, to which it may connect; for each of them",
+    )
     _add_outcome(resume)
     page_arguments.add_watching(add("watch", _watch, "a recorded run in a browser, as it was"))
     solve = add("solve", solve_arguments.solve, "recompute the calibration from a recording")
@@ -281,7 +288,7 @@ def _resume(options: argparse.Namespace) -> int:
     from rig.commands.run import resume
 
     page = page_arguments.wish(options)
-    return resume(options.run_folder, assume_yes=options.yes, as_json=options.json, page=page)
+    return resume(options.run_folder, connect=options.connect, assume_yes=options.yes, as_json=options.json, page=page)
 
 
 def _watch(options: argparse.Namespace) -> int:

@@ -1,6 +1,8 @@
 """What every test has: simulated laboratories, and a Hypothesis without a stopwatch."""
 
+import atexit
 import os
+import tempfile
 from collections.abc import Iterator
 from typing import TYPE_CHECKING
 
@@ -17,7 +19,11 @@ __all__ = ["world"]
 settings.register_profile("rig", deadline=None)  # a shared machine stalls now and then, which is no failure
 settings.load_profile("rig")
 
-os.environ["RIG_HISTORY"] = "off"  # nothing that a test runs enters the history of whoever runs the tests
+# Nothing that a test runs enters the history of whoever runs the tests, or is known as a run of theirs.
+os.environ["RIG_HISTORY"] = "off"
+_share = tempfile.TemporaryDirectory(prefix="rig-share-")
+atexit.register(_share.cleanup)
+os.environ["XDG_DATA_HOME"] = _share.name
 
 
 def pytest_addoption(parser: pytest.Parser) -> None:

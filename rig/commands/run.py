@@ -8,9 +8,12 @@ from typing import TYPE_CHECKING
 from rig.analysis.contradictions import names_a_sweep
 from rig.commands.claims import claimed
 from rig.commands.configured import Configured, configured
+from rig.commands.consent import refuse_foreign_addresses
 from rig.commands.laboratory import simulated_laboratory
 from rig.commands.page_arguments import PageWish, operators_page
 from rig.commands.remember import print_beside, remember
+from rig.config.load import load
+from rig.data.own_texts import note_own
 from rig.data.result_file import read_result
 from rig.data.run_folder import CONFIG, RESULT, SCRIPT, new_folder, script_identity
 from rig.errors import Refused
@@ -44,14 +47,23 @@ def run(
     """
     found = configured(config_path, overrides, script)
     folder = new_folder(out, found.loaded, found.script.text, found.script.identity)
+    note_own(found.loaded.text, found.script.text)
     return _carry_out(folder, found, assume_yes=assume_yes, as_json=as_json, page=page)
 
 
-def resume(folder: Path, *, assume_yes: bool = False, as_json: bool = False, page: PageWish | None = None) -> int:
+def resume(
+    folder: Path,
+    *,
+    connect: Sequence[str] = (),
+    assume_yes: bool = False,
+    as_json: bool = False,
+    page: PageWish | None = None,
+) -> int:
     """Go on with an interrupted run by the script it was begun with: sweeps it has finished count, the others are done.
 
-    A sweep that the verdict named as disturbed is repeated. Returns as `run` does. Raises Refused `no_run`,
-    `already_finished`, and as `read_result`, `script_identity` and `load_script`.
+    A sweep that the verdict named as disturbed is repeated. `connect` are the addresses that may be connected to where
+    the folder is somebody else's. Returns as `run` does. Raises Refused `no_run`, `already_finished`, and as
+    `read_result`, `refuse_foreign_addresses`, `script_identity` and `load_script`.
     """
     if not (folder / CONFIG).exists():
         raise Refused("no_run", f"{folder} holds no {CONFIG}", "Give the folder of an interrupted run")
@@ -63,6 +75,7 @@ def resume(folder: Path, *, assume_yes: bool = False, as_json: bool = False, pag
             f"{folder} keeps no {SCRIPT}, so the script it was begun with is not known",
             "Start a new run with `rig run`",
         )
+    refuse_foreign_addresses(folder, load(folder / CONFIG, sections=None), connect)
     found = configured(folder / CONFIG, script=load_script(folder / SCRIPT, script_identity(folder)))
     return _carry_out(folder, found, assume_yes=assume_yes, as_json=as_json, page=page)
 

@@ -1,0 +1,56 @@
+"""A run folder may have come from anywhere: to the addresses it names one connects if they are the user's own."""
+
+import hashlib
+import os
+import shlex
+from collections.abc import Iterator, Sequence
+from pathlib import Path
+
+from rig.config.load import Loaded
+from rig.config.regular_file import UnfitFile, read_regular_file
+from rig.data.own_texts import is_own
+from rig.data.run_folder import CONFIG, resuming
+from rig.errors import Refused
+from rig.history.place import ENVIRONMENT
+
+CONFIG_MAX_BYTES = 10_000_000
+
+
+def refuse_foreign_addresses(folder: Path, loaded: Loaded, agreed: Sequence[str] = ()) -> None:
+    """Where the folder's configuration is none that this user has run here, every address has to be in `agreed`.
+
+    Raises Refused `foreign_folder`.
+    """
+    if is_own(_sha256(folder / CONFIG)):
+        return
+    addresses = [(what, where) for what, where in _addresses(loaded) if where not in agreed]
+    if not addresses:
+        return
+    named = " ".join(f"--connect {shlex.quote(where)}" for _, where in addresses)
+    raise Refused(
+        "foreign_folder",
+        f"the {CONFIG} in {folder} is none that you have run on this computer; it would connect to "
+        + ", ".join(f"{what} {where}" for what, where in addresses),
+        f"If all of that is yours, say so: {resuming(folder)} {named}",
+    )
+
+
+def _sha256(file: Path) -> str:
+    try:
+        return hashlib.sha256(read_regular_file(file, CONFIG_MAX_BYTES)).hexdigest()
+    except (UnfitFile, OSError):
+        return ""
+
+
+def _addresses(loaded: Loaded) -> Iterator[tuple[str, str]]:
+    """What a run would connect to. A simulated laboratory is on this computer, and answers there itself."""
+    config = loaded.config
+    if not loaded.simulated:
+        yield "the arm", config.arm.host
+        if config.board is not None:
+            yield "the board", config.board.port
+        for name, section in config.sensors.items():
+            if section.serial is not None:
+                yield f"the sensor {name}", section.serial.port
+    if config.history.url is not None and not config.history.off and not os.environ.get(ENVIRONMENT):
+        yield "the history", config.history.url

@@ -1,0 +1,28 @@
+"""What the user of this computer has run: configurations and scripts, known by their text wherever they lie.
+
+An empty file for each, named by its SHA-256, in a folder of the user's own: nothing to parse, nothing to lock.
+"""
+
+import hashlib
+from contextlib import suppress
+from pathlib import Path
+
+
+def note_own(*texts: str) -> None:
+    """These were run by this user. One that cannot be noted is not known later, and then asked about."""
+    with suppress(OSError):
+        folder = _folder()
+        folder.mkdir(mode=0o700, parents=True, exist_ok=True)
+        for text in texts:
+            (folder / hashlib.sha256(text.encode()).hexdigest()).touch()
+
+
+def is_own(sha256: str) -> bool:
+    """Whether the text with this hash, in hexadecimal, was run by this user on this computer."""
+    return len(sha256) == 64 and sha256.isalnum() and (_folder() / sha256).is_file()
+
+
+def _folder() -> Path:
+    from platformdirs import user_data_path
+
+    return user_data_path("calibration-rig", appauthor=False) / "own"
