@@ -78,18 +78,15 @@ def _calibrated(past: Past) -> Calibrated:
     )
 
 
-def _documents_by_folder(history: History) -> Mapping[str, frozenset[tuple[str, str]]]:
+def _documents_by_folder(history: History) -> Mapping[str, set[tuple[str, str]]]:
     """What the files of a folder may be, by its path: a run that was resumed there was entered again."""
-    found: dict[str, frozenset[tuple[str, str]]] = {}
-    for run in history.kept():
-        files = {*run.documents, (RESULT, run.content_sha256)}
-        files |= {file for certificate in run.certificates for file in certificate.files}
-        for _, path in run.places:
-            found[path] = found.get(path, frozenset()) | files
+    found: dict[str, set[tuple[str, str]]] = {}
+    for path, name, sha256 in history.files():
+        found.setdefault(path, set()).add((name, sha256))
     return found
 
 
-def _files(run: Kept, here: str, documents: Mapping[str, frozenset[tuple[str, str]]]) -> Iterator[Found]:
+def _files(run: Kept, here: str, documents: Mapping[str, set[tuple[str, str]]]) -> Iterator[Found]:
     if not run.recordings and not run.documents:
         return
     folder = next((Path(path) for _, path in run.places if Path(path).is_dir()), None)
@@ -107,7 +104,7 @@ def _files(run: Kept, here: str, documents: Mapping[str, frozenset[tuple[str, st
             yield _unreadable(file, error)
             continue
         yield _held(file, now.sha256, {recording.sha256})
-    allowed = documents[next(path for _, path in run.places if Path(path) == folder)]
+    allowed = documents.get(str(folder), set())
     for name in sorted(_names(run, folder)):
         try:
             sha256 = document_sha256(folder, name)

@@ -14,6 +14,7 @@ from typing import Any
 from sqlalchemy import Connection, Engine, Select, and_, exists, insert, or_, select
 from sqlalchemy.exc import IntegrityError, SQLAlchemyError
 
+from rig.data.run_folder import RESULT
 from rig.errors import Refused
 from rig.history import certificates, journal, schema
 from rig.history.engine import WRITES, engine_of
@@ -203,6 +204,19 @@ class History:
             numbers = [row.id for row in connection.execute(question.with_only_columns(schema.run.c.id)).all()]
             for number in numbers:
                 yield _kept(connection, number)
+
+    def files(self) -> Iterator[tuple[str, str, str]]:
+        """Where runs were seen, and what lies there beside the recordings: path, name, SHA-256."""
+        places, files = schema.location, schema.certificate_file
+        beside = places.join(schema.document, schema.document.c.run_id == places.c.run_id)
+        issued = places.join(schema.certificate, schema.certificate.c.run_id == places.c.run_id).join(files)
+        with self.engine.connect() as connection:
+            for table, of in ((schema.document, beside), (files, issued)):
+                yield from map(
+                    tuple, connection.execute(select(places.c.path, table.c.name, table.c.sha256).select_from(of))
+                )
+            result = select(places.c.path, schema.run.c.content_sha256).select_from(places.join(schema.run))
+            yield from ((path, RESULT, sha256) for path, sha256 in connection.execute(result))
 
     def broken(self) -> Iterator[journal.Broken]:
         """What is not as it was entered, as `journal.broken`."""
