@@ -52,8 +52,10 @@ def _about(folder: Path, runs: list[RunData]) -> About:
     for run in runs:
         parts |= {name: f"{each.part} {each.serial_number}" for name, each in run.sensors.items()}
         parts |= {name: f"{each.part} {each.serial_number}" for name, each in run.magnetometers.items()}
-    simulated = runs[0].provenance.arm_software.endswith("(simulated)")
-    return About(str(folder), runs[0].settings.procedure, replayed=True, parts=parts, simulated=simulated)
+    made_with = runs[0].provenance
+    simulated = made_with.arm_software.endswith("(simulated)")
+    arm = {"model": made_with.arm_model, "serial_number": made_with.arm_serial_number}
+    return About(str(folder), runs[0].settings.procedure, replayed=True, parts=parts, simulated=simulated, arm=arm)
 
 
 def _replay(recorded: Iterator[Moment], feed: Feed, speed: float) -> None:

@@ -100,7 +100,7 @@ class ResidueSection(Section):
 class SimulatedArmSection(Section):
     """The simulated UR10e. Its ripple is locked to the joint angle: it integrates to nothing over whole turns."""
 
-    model: Literal["ur10e", "ur3e", "ur5e", "ur16e", "ur20", "ur10"] = Field(
+    model: Literal["ur10e", "ur5e", "ur20", "ur10"] = Field(
         default="ur10e", description="which arm its controller says it is; another than a UR10e is there to be refused"
     )
 

@@ -50,7 +50,7 @@ ENDINGS = (VerdictReached, Failed, Interrupted, Crashed)
 @dataclass(frozen=True, slots=True)
 class About:
     """What is known before anything has happened: the run's folder, whether it is replayed, whether the page may answer
-    the operator's questions, each sensor's part and serial number."""
+    the operator's questions, each sensor's part and serial number; of a recorded run what it says of its `arm`."""
 
     folder: str
     procedure: str
@@ -58,6 +58,7 @@ class About:
     may_answer: bool = False
     parts: dict[str, str] = field(default_factory=dict)
     simulated: bool = False
+    arm: dict[str, str | None] = field(default_factory=dict)
 
 
 class Shown:
@@ -68,7 +69,7 @@ class Shown:
             "about": asdict(about),
             "state": {"kind": "connecting", "text": "Connecting to arm and board"},
             "step": None,
-            "arm": _geometry(NOMINAL),
+            "arm": {**_geometry(NOMINAL), **about.arm},
             "sensors": [],
             "prompt": None,
             "observations": [],

@@ -87,15 +87,13 @@ def refusal(host: str) -> Problem:
 @pytest.mark.parametrize(
     ("arm", "name", "words"),
     [
-        ({"model": "ur3e"}, "other_arm", "the controller says UR3e"),
-        ({"model": "ur16e"}, "other_arm", "the controller says UR16e"),
         ({"model": "ur20"}, "other_arm", "the controller says UR20"),
         ({"model": "ur10"}, "other_arm", "its height of the shoulder is 0.127 m, a UR10e's 0.181 m"),
         ({"model": "ur10", "polyscope": "3.15.8.0"}, "cb3_not_supported", "one of the CB3 series (software 3.15.8)"),
         (X, "polyscope_x", "PolyScope X (10.8.0)"),
         ({"dashboard": False}, "no_dashboard", "does not answer"),
     ],
-    ids=["UR3e", "UR16e", "UR20", "lengths", "CB3", "PolyScope X with a dashboard", "closed dashboard"],
+    ids=["UR20", "lengths", "CB3", "PolyScope X with a dashboard", "closed dashboard"],
 )
 def test_a_look_tells_any_other_arm_by_name(world: World, arm: Mapping[str, Any], name: str, words: str) -> None:
     problem = refusal(world({"world": {"arm": arm}}).host)
@@ -128,6 +126,14 @@ def test_an_arm_that_cannot_be_told_is_not_moved(world: World, seen: ArmReport) 
         "arm_not_identified"
     ]
     assert names(ARM, replace(closed, called=None, kinematics=seen.kinematics)) == []  # made as a UR10e is
+
+
+@pytest.mark.parametrize(("robot_type", "model"), [(3, "UR3e"), (4, "UR16e"), (9, "UR15"), (12, "arm of type 12")])
+def test_the_maker_has_other_sizes_which_are_refused_by_type(seen: ArmReport, robot_type: int, model: str) -> None:
+    assert seen.setup is not None
+    told = replace(seen, setup=replace(seen.setup, robot_type=robot_type))
+    assert names(ARM, told) == names(BY_NOMINAL, told) == ["other_arm"]
+    assert model_found(told) == model
 
 
 def test_lengths_decide_where_the_type_is_right(seen: ArmReport) -> None:

@@ -54,11 +54,12 @@ def test_the_arm_and_the_samples_are_those_of_that_moment(run: RunData, replayed
 
 
 def test_what_is_shown_at_the_end_is_all_of_it(replayed: list[Moment]) -> None:
-    shown = Shown(About("", "", replayed=True))
+    shown = Shown(About("", "", replayed=True, arm={"model": "UR10e or UR12e", "serial_number": "2026"}))
     for moment in replayed:
         if isinstance(moment.event, Look):
             shown.look(moment.event)
         else:
             shown.take(moment.event)
+    assert (shown.sections["arm"]["model"], shown.sections["arm"]["serial_number"]) == ("UR10e or UR12e", "2026")
     assert [(row["sweep"], row["by"]) for row in shown.sections["observations"]] == [(n, "host") for n in range(6)]
     assert shown.sections["parameters"][0]["scale"][0] == pytest.approx(1.1771, rel=1e-3)
