@@ -14,7 +14,7 @@ Where the table wrote its attitudes by a clock of its own, the samples' is found
 board's is on the arm (`rig.observation.timebase`).
 """
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Literal, get_args
@@ -102,8 +102,9 @@ def read_placed(samples_path: Path, attitudes_path: Path, *, find_clock: bool = 
     cuts = [inside(time_s, window) for window in windows]
     counts = np.array([cut.stop - cut.start for cut in cuts])
     interval_s = float(np.median(np.diff(time_s)))
-    for row, (window, count) in enumerate(zip(windows, counts.tolist(), strict=True), start=1):
-        check_complete(count, window, interval_s, f"attitude {row}", least=1)
+    whole = _whole(windows, counts.tolist(), interval_s)
+    cuts, counts, attitudes = [cuts[row] for row in whole], counts[whole], attitudes[whole]
+    rates, stated = (None if each is None else each[whole] for each in (rates, stated))
     means = {quantity: np.array([each[cut].mean(axis=0) for cut in cuts]) for quantity, each in readings.items()}
     variances = None
     if counts.min() >= MIN_SAMPLES:
@@ -120,6 +121,22 @@ def read_placed(samples_path: Path, attitudes_path: Path, *, find_clock: bool = 
         clock,
         turning,
     )
+
+
+def _whole(windows: Sequence[Window], counts: Sequence[int], interval_s: float) -> list[int]:
+    """The rows whose samples are there. Raises Fault `lost_samples`: a short row among many may fall into a gap."""
+    whole = []
+    for row, (window, count) in enumerate(zip(windows, counts, strict=True)):
+        try:
+            check_complete(count, window, interval_s, f"attitude {row + 1}", least=1)
+        except Fault:
+            if window.end_s - window.start_s >= MIN_SAMPLES * interval_s:
+                raise
+        else:
+            whole.append(row)
+    if not whole:
+        check_complete(counts[0], windows[0], interval_s, "attitude 1", least=1)
+    return whole
 
 
 def _check_has_rates(readings: Mapping[Quantity, Array]) -> None:

@@ -22,7 +22,7 @@ WINDOW_S, SHORTEST_S = (
     0.5,
 )  # cameras' errors are coloured over tenths of a second; a short recording needs windows too
 WINDOWS, MOST = 40, 300  # at least, while they are longer than the shortest; at most
-STILL_S, STILL_SAMPLES, STILL_RAD_S = 0.2, 20, 5e-3  # a row that may be a rest; how far apart rests may read
+STILL_S, STILL_SAMPLES, STILL_RAD_S = 0.5, 20, 5e-3  # a row that may be a rest; how far apart rests may read
 GAP = 2.5  # intervals
 MAX_STEP_RAD = 0.35  # between two readings: a cubic through rates tells the way to microradians up to here
 CLIPPED, CLIPPED_RAD_S = 4, 1.0  # equal readings in a row at the very end of what an axis reads, and how much it reads
@@ -121,7 +121,7 @@ def _suitable_s(span_s: float) -> float:
 
 
 def _still(turning: Turning) -> NDArray[np.bool_]:
-    """(N,) rows in which the body lay still: long ones that all read the same, and as quietly as the quietest."""
+    """(N,) rows in which the body lay still: long ones that all read the same, and nothing but noise."""
     rows_s = turning.rows_s
     start, end = np.searchsorted(turning.time_s, rows_s.T)
     still: NDArray[np.bool_] = (rows_s[:, 1] - rows_s[:, 0] >= STILL_S) & (end - start >= STILL_SAMPLES)
@@ -129,12 +129,11 @@ def _still(turning: Turning) -> NDArray[np.bool_]:
     if not len(long):
         return still
     cuts = [turning.readings_rad_s[start[row] : end[row]] for row in long]
-    spread = np.array([cut.std(axis=0).max() for cut in cuts])
-    quiet = spread <= 3 * spread.min() + STILL_RAD_S
+    noise = min(float(np.diff(cut, axis=0).std(axis=0).max()) for cut in cuts) / np.sqrt(2)
+    quiet = np.array([cut.std(axis=0).max() for cut in cuts]) <= 2 * noise + STILL_RAD_S
     means = np.array([cut.mean(axis=0) for cut in cuts])
-    away = np.abs(means - np.median(means[quiet], axis=0)).max(axis=1)
-    noise = 4 * spread / np.sqrt(end[long] - start[long])
-    still[long] = quiet & (away <= STILL_RAD_S + noise)
+    away = np.abs(means - np.median(means[quiet] if quiet.any() else means, axis=0)).max(axis=1)
+    still[long] = quiet & (away <= STILL_RAD_S + 4 * noise / np.sqrt(end[long] - start[long]))
     return still
 
 

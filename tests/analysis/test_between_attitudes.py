@@ -156,6 +156,24 @@ def test_a_gyroscope_is_not_followed_where_it_cannot_be(name: str) -> None:
     assert (np.abs(off(found, followed)) < 4).all()
 
 
+def test_a_gap_in_the_samples_costs_its_windows_alone(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    followed = follow(World(duration_s=20), 12)
+    spoilt = (followed.time_s > 10) & (followed.time_s < 10.5)
+    files = write(tmp_path, replace(followed, time_s=followed.time_s[~spoilt], readings=followed.readings[~spoilt]))
+    rate = document(capsys, files)
+    assert rate["left_out"][0]["error"] == "lost_samples" and rate["left_out"][0]["count"] <= 3
+    assert main(command(files)) == 0
+    assert "left out: lost_samples:" in " ".join(capsys.readouterr().out.split())
+
+
+def test_rows_that_last_while_the_body_turns_are_no_rests() -> None:
+    """Rows of 0.6 s, one after the other, from a reference that looks in their middle."""
+    followed = follow(World(duration_s=60, looks_hz=1 / 0.6, fastest_s=6), 13)
+    found = solved(followed)
+    assert len(found.solution.residuals_rad) < 100, "a row at rest would be two fixes"
+    assert (np.abs(off(found, followed)) < 4).all()
+
+
 def test_a_marker_taken_for_another_is_set_aside() -> None:
     followed = follow(HAND, 6)
     attitudes = followed.attitudes.copy()
