@@ -36,6 +36,7 @@ _ENDING_SIGNALS = tuple(
     for name in ("SIGINT", "SIGTERM", "SIGHUP", "SIGQUIT", "SIGTSTP")
     if hasattr(signal, name)  # Windows has the first two
 )
+_HANGING_UP = getattr(signal, "SIGHUP", None)
 
 
 def main(arguments: Sequence[str] | None = None) -> int:
@@ -49,7 +50,9 @@ def guarded(command: Callable[[], int]) -> int:
     """Run a command; turn every named error into one message on stderr and its exit status."""
     keep_streams_usable()
     for number in _ENDING_SIGNALS:
-        if signal.getsignal(number) != signal.SIG_IGN:  # ignored by who started us (nohup): so it stays
+        # A script's `&` starts programs that ignore Ctrl-C: an arm must stop by it all the same. That a run is to
+        # outlive its terminal is said by ignoring SIGHUP alone (nohup).
+        if number != _HANGING_UP or signal.getsignal(number) != signal.SIG_IGN:
             signal.signal(number, _interrupt)
     try:
         status = command()

@@ -2,6 +2,7 @@
 
 import atexit
 import os
+import signal
 import tempfile
 from collections.abc import Iterator
 from typing import TYPE_CHECKING
@@ -24,6 +25,9 @@ os.environ["RIG_HISTORY"] = "off"
 _share = tempfile.TemporaryDirectory(prefix="rig-share-")
 atexit.register(_share.cleanup)
 os.environ["XDG_DATA_HOME"] = _share.name
+
+# Ctrl-C ends the tests, and what they start, also where the shell that started them had it ignored (`make test &`).
+signal.signal(signal.SIGINT, signal.default_int_handler)
 
 
 def pytest_addoption(parser: pytest.Parser) -> None:

@@ -220,6 +220,7 @@ def serve(loaded: Loaded, until_eof: bool) -> None:
     world = World(loaded)
     try:
         signal.signal(signal.SIGTERM, lambda *_: world.end())
+        signal.signal(signal.SIGINT, signal.default_int_handler)  # also where who started us had it ignored
         if until_eof:
             signal.signal(signal.SIGINT, signal.SIG_IGN)
             # A thread, because select() takes no pipe on Windows; it only waits.

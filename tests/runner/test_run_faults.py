@@ -10,7 +10,7 @@ import subprocess
 import sys
 import time
 from collections.abc import Callable, Iterator
-from contextlib import suppress
+from contextlib import contextmanager, suppress
 from pathlib import Path
 from typing import Any
 
@@ -99,6 +99,16 @@ def start(world: World, tmp_path: Path) -> Iterator[Start]:
         each.process.communicate()
 
 
+@contextmanager
+def ignored(number: signal.Signals) -> Iterator[None]:
+    """What is started within ignores the signal at first."""
+    before = signal.signal(number, signal.SIG_IGN)
+    try:
+        yield
+    finally:
+        signal.signal(number, before)
+
+
 @pytest.mark.parametrize(
     "number",
     [signal.SIGINT, signal.SIGTERM, pytest.param(signal.SIGQUIT, marks=THOROUGH), signal.SIGTSTP],
@@ -116,6 +126,25 @@ def test_an_interrupt_stops_the_arm_within_a_second(start: Start, number: signal
     assert not rig.world.state()["program_running"]
     run = read_run(rig.out / "run.h5")
     assert len(run.samples["gyro"]) > 0 and len(run.arm) > 0
+
+
+def test_a_run_that_a_script_has_started_in_the_background_stops_by_an_interrupt_too(start: Start) -> None:
+    with ignored(signal.SIGINT):
+        rig = start()
+    rig.until_sweeping()
+    rig.send(signal.SIGINT)
+    assert rig.stopped_after_s() < 1.0
+    status, errors = rig.end()
+    assert status == 130 and "interrupted; the arm is stopped and at rest; " in errors
+
+
+def test_a_run_under_nohup_goes_on_when_its_terminal_closes(start: Start) -> None:
+    with ignored(signal.SIGHUP):
+        rig = start()
+    rig.until_sweeping()
+    rig.send(signal.SIGHUP)
+    status, errors = rig.end()
+    assert status == 0, errors
 
 
 def test_three_ctrl_c_at_once_leave_the_word_that_the_arm_stands(start: Start) -> None:

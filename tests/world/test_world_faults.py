@@ -311,13 +311,20 @@ def test_the_world_ends_with_its_input_and_ignores_the_terminals_interrupt(world
     assert running.process.returncode == 0
 
 
-def test_ctrl_c_ends_a_world_in_the_foreground(world: World) -> None:
+@pytest.mark.parametrize("inherited", [signal.SIG_DFL, signal.SIG_IGN], ids=["by hand", "by a script's &"])
+def test_ctrl_c_ends_a_world_in_the_foreground(world: World, inherited: signal.Handlers) -> None:
     running = world()
     text = running.config_path.read_text().replace(running.host, fresh_host())
     running.config_path.write_text(text)
-    process = subprocess.Popen(
-        [sys.executable, "-m", "rig.world", str(running.config_path)], stdout=subprocess.PIPE, stderr=subprocess.PIPE
-    )
+    before = signal.signal(signal.SIGINT, inherited)
+    try:
+        process = subprocess.Popen(
+            [sys.executable, "-m", "rig.world", str(running.config_path)],
+            stdout=subprocess.PIPE,
+            stderr=subprocess.PIPE,
+        )
+    finally:
+        signal.signal(signal.SIGINT, before)
     assert process.stdout is not None and process.stdout.readline()
     os.kill(process.pid, signal.SIGINT)
     output, errors = process.communicate(timeout=10)
