@@ -109,6 +109,7 @@ def _parser() -> argparse.ArgumentParser:
     _add_record(add("record", _record, "record the sensors alone, while something else turns them; nothing moves"))
     resume = add("resume", _resume, "go on with an interrupted run")
     resume.add_argument("run_folder", type=Path, metavar="RUN_DIR")
+    resume.add_argument("--script", type=Path, metavar="FILE", help="the script it was begun with, of another's folder")
     resume.add_argument(
         "--connect",
         action="append",
@@ -290,8 +291,14 @@ def _run(options: argparse.Namespace) -> int:
 def _resume(options: argparse.Namespace) -> int:
     from rig.commands.run import resume
 
-    page = page_arguments.wish(options)
-    return resume(options.run_folder, connect=options.connect, assume_yes=options.yes, as_json=options.json, page=page)
+    return resume(
+        options.run_folder,
+        script=options.script,
+        connect=options.connect,
+        assume_yes=options.yes,
+        as_json=options.json,
+        page=page_arguments.wish(options),
+    )
 
 
 def _watch(options: argparse.Namespace) -> int:

@@ -17,7 +17,7 @@ from rig.data.own_texts import note_own
 from rig.data.result_file import read_result
 from rig.data.run_folder import CONFIG, RESULT, SCRIPT, new_folder, script_identity
 from rig.errors import Refused
-from rig.plans.script_file import ScriptFile, load_script
+from rig.plans.script_file import ScriptFile, kept_script, load_script
 from rig.report.document import document_of
 from rig.report.table import print_outcome
 from rig.runner.phases import Run
@@ -54,6 +54,7 @@ def run(
 def resume(
     folder: Path,
     *,
+    script: Path | None = None,
     connect: Sequence[str] = (),
     assume_yes: bool = False,
     as_json: bool = False,
@@ -61,9 +62,10 @@ def resume(
 ) -> int:
     """Go on with an interrupted run by the script it was begun with: sweeps it has finished count, the others are done.
 
-    A sweep that the verdict named as disturbed is repeated. `connect` are the addresses that may be connected to where
-    the folder is somebody else's. Returns as `run` does. Raises Refused `no_run`, `already_finished`, and as
-    `read_result`, `refuse_foreign_addresses`, `script_identity` and `load_script`.
+    A sweep that the verdict named as disturbed is repeated. Of a folder that is somebody else's `script` names the
+    script, which is executed, and `connect` the addresses that may be connected to. Returns as `run` does. Raises
+    Refused `no_run`, `already_finished`, and as `read_result`, `refuse_foreign_addresses`, `script_identity` and
+    `kept_script`.
     """
     if not (folder / CONFIG).exists():
         raise Refused("no_run", f"{folder} holds no {CONFIG}", "Give the folder of an interrupted run")
@@ -76,7 +78,8 @@ def resume(
             "Start a new run with `rig run`",
         )
     refuse_foreign_addresses(folder, load(folder / CONFIG, sections=None), connect)
-    found = configured(folder / CONFIG, script=load_script(folder / SCRIPT, script_identity(folder)))
+    named = None if script is None else load_script(script)
+    found = configured(folder / CONFIG, script=kept_script(folder, script_identity(folder), named))
     return _carry_out(folder, found, assume_yes=assume_yes, as_json=as_json, page=page)
 
 

@@ -29,6 +29,9 @@ def add_arguments(solve: argparse.ArgumentParser) -> None:
         dest="overrides",
         help="judge by another threshold or limit than was recorded, for example observation.max_lost_fraction=0.01",
     )
+    solve.add_argument(
+        "--script", type=Path, metavar="FILE", help="the script it was recorded by, where that is another's; executed"
+    )
     solve.add_argument("--json", action="store_true", help="for machines")
     place = solve.add_argument_group("with --attitudes")
     place.add_argument(
@@ -72,7 +75,13 @@ def solve(options: argparse.Namespace) -> int:
         from rig.analysis.calibration import DEFAULT_ESTIMATOR
         from rig.commands.solve import solve
 
-        return solve(options.run, options.estimator or DEFAULT_ESTIMATOR, options.overrides, as_json=options.json)
+        return solve(
+            options.run,
+            options.estimator or DEFAULT_ESTIMATOR,
+            options.overrides,
+            script=options.script,
+            as_json=options.json,
+        )
     if options.overrides:
         raise Refused("unknown_setting", "samples as CSV come without settings", "Leave out --set")
     if options.sweeps is not None:

@@ -6,7 +6,10 @@ from typing import Any, TextIO
 
 
 class _Unbroken:
-    """A text stream whose loss is no error: what it refuses with one of `lost` is thrown away from then on."""
+    """A text stream whose loss is no error where it is refused with one of `lost`, and an error once where it is not.
+
+    What it refuses is thrown away, and all that follows.
+    """
 
     def __init__(self, stream: TextIO, lost: type[OSError]) -> None:
         self._stream = stream
@@ -15,24 +18,26 @@ class _Unbroken:
     def write(self, text: str) -> int:
         try:
             return self._stream.write(text)
-        except self._lost:
-            self._throw_away()
+        except OSError as error:
+            self._lose(error)
             return len(text)
 
     def flush(self) -> None:
         try:
             self._stream.flush()
-        except self._lost:
-            self._throw_away()
+        except OSError as error:
+            self._lose(error)
 
     def __getattr__(self, name: str) -> Any:
         return getattr(self._stream, name)
 
-    def _throw_away(self) -> None:
+    def _lose(self, error: OSError) -> None:
         # On the descriptor itself: what is still buffered would fail again when the interpreter ends.
         nothing = os.open(os.devnull, os.O_WRONLY)
         os.dup2(nothing, self._stream.fileno())
         os.close(nothing)
+        if not isinstance(error, self._lost):
+            raise error
 
 
 def keep_streams_usable() -> None:

@@ -158,6 +158,10 @@ class Run(Mapping[str, Readings]):
         return table(title, HEADINGS, [readings.row() for readings in self.values()])
 
 
-def load(path: str | Path) -> Run:
-    """A run folder, or a run file alone. Raises Refused `no_run`, and as `read_run`."""
-    return Run(open_run(Path(path)))
+def load(path: str | Path, script: str | Path | None = None) -> Run:
+    """A run folder, or a run file alone; nothing that lies beside the recordings is executed unless it is one's own.
+
+    `script` names the script it was recorded by, where that is another's: it is executed. Raises Refused `no_run`, and
+    as `read_run` and `load_script`.
+    """
+    return Run(open_run(Path(path), None if script is None else Path(script)))

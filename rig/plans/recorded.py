@@ -9,20 +9,24 @@ from rig.data.run_file import RunData, read_run
 from rig.data.run_folder import SCRIPT, recordings
 from rig.errors import Refused
 from rig.plans.registry import AnyProcedure, installed
-from rig.plans.script_file import load_script
+from rig.plans.script_file import ScriptFile, kept_script, load_script
+
+RAW, CORRECTED = "six_observation", "verify"  # procedures that judge any recording of raw, of corrected readings
 
 
 @dataclass(frozen=True, slots=True)
 class RecordedRun:
     """The recordings of a run, oldest first: of `raw` readings, and of those the board `corrected`.
 
-    `path` is the run folder, or the run file when a recording stands `alone`.
+    `path` is the run folder, or the run file when a recording stands `alone`. `script` is the one that the user has
+    named for it, None where none was.
     """
 
     path: Path
     raw: tuple[RunData, ...]
     corrected: tuple[RunData, ...]
     alone: bool = False
+    script: ScriptFile | None = None
 
     @property
     def movement(self) -> tuple[RunData, ...]:
@@ -39,18 +43,22 @@ class RecordedRun:
         return replace(self, raw=raw, corrected=corrected)
 
 
-def open_run(path: Path) -> RecordedRun:
-    """The recordings in a run folder, or a run file. Raises Refused `no_run`, and as `read_run`."""
+def open_run(path: Path, script: Path | None = None) -> RecordedRun:
+    """The recordings in a run folder, or a run file; `script` is executed, if it is named.
+
+    Raises Refused `no_run`, and as `read_run` and `load_script`.
+    """
+    named = None if script is None else load_script(script)
     if not path.is_dir():
         run = read_run(path)
         corrected = _is_corrected(run)
-        return RecordedRun(path, () if corrected else (run,), (run,) if corrected else (), alone=True)
+        return RecordedRun(path, () if corrected else (run,), (run,) if corrected else (), alone=True, script=named)
     # Corrected readings are compared as one whole movement: what was interrupted before it does not count.
     files = recordings(path, "raw"), recordings(path, "calibrated")[-1:]
     raw, repeated = (tuple(map(read_run, each)) for each in files)
     if not raw and not repeated:
         raise Refused("no_run", f"{path} holds no run.h5", "Give a run folder or a run file")
-    return RecordedRun(path, raw, repeated)
+    return RecordedRun(path, raw, repeated, script=named)
 
 
 def judged(run: RecordedRun, estimator: str) -> Outcome:
@@ -59,15 +67,25 @@ def judged(run: RecordedRun, estimator: str) -> Outcome:
     Of a recording that stands alone it is what that recording says. Raises Fault and Refused by name as the
     procedure's analysis does.
     """
-    folder = run.path if run.path.is_dir() else run.path.parent
-    procedure = procedure_of(run.movement[0], folder)
+    procedure = _procedure_of(run, run.movement[0])
     outcome = procedure.analyse(run.movement, None, estimator)
     if run.raw and run.corrected:
-        return procedure_of(run.corrected[0], folder).analyse(run.corrected, outcome, estimator)
+        return _procedure_of(run, run.corrected[0]).analyse(run.corrected, outcome, estimator)
     if run.raw and not run.alone and run.raw[0].settings.then_verify:
         missing = procedure.following(installed())
         return outcome if missing is None else missing.analyse([], outcome, estimator)
     return outcome
+
+
+def left_out(run: RecordedRun) -> str | None:
+    """What is not in the solution of a run, as a sentence: the analysis of a script that is not executed here."""
+    for each in (*run.raw, *run.corrected):
+        if _script_of(run, each) is None and not _by_installed(each):
+            return (
+                f"recorded by the script {each.provenance.script}, which no run of yours on this computer was begun "
+                "with: it is not executed, and what it adds to the analysis is left out (--script FILE names it)"
+            )
+    return None
 
 
 def _is_corrected(run: RunData) -> bool:
@@ -75,18 +93,38 @@ def _is_corrected(run: RunData) -> bool:
     return any(sensor.mode == "calibrated" for sensor in run.sensors.values())
 
 
-def procedure_of(run: RunData, folder: Path) -> AnyProcedure:
-    """The procedure the recording names: an installed one, or the script kept in its `folder`.
+def _procedure_of(run: RecordedRun, recording: RunData) -> AnyProcedure:
+    """The procedure a recording names: an installed one, or that of a script of the user's own.
 
-    Raises Refused `another_script` when the script there is not the one it was recorded with, and as `load_script`.
+    Where neither is known here, an installed one that reads what was recorded: to solve a recording needs no script.
+    Raises Refused `another_script` when the script there is not the one it was recorded with, and as `kept_script`.
     """
-    name = run.settings.procedure
-    procedures = installed()
-    if name not in procedures or not run.provenance.script_installed:
-        script = load_script(folder / SCRIPT, run.provenance.script_identity)
-        procedures = {**procedures, name: script.procedure}
-    found = procedures[name]
+    procedures, corrected = installed(), _is_corrected(recording)
+    if _by_installed(recording):
+        found = procedures[recording.settings.procedure]
+    elif (script := _script_of(run, recording)) is not None:
+        found = script.procedure
+        procedures = {**procedures, found.name: found}
+    else:
+        found = procedures[CORRECTED if corrected else RAW]
     # Recordings of before there were phases name the procedure that the run began with.
-    if found.reads_corrected != _is_corrected(run):
+    if found.reads_corrected != corrected:
         return found.following(procedures) or found
     return found
+
+
+def _by_installed(recording: RunData) -> bool:
+    return recording.provenance.script_installed and recording.settings.procedure in installed()
+
+
+def _script_of(run: RecordedRun, recording: RunData) -> ScriptFile | None:
+    """The script a recording was made by, where it may be executed: named by the user, or known from an own run."""
+    folder = run.path if run.path.is_dir() else run.path.parent
+    if _by_installed(recording) or (run.script is None and not (folder / SCRIPT).exists()):
+        return None
+    try:
+        return kept_script(folder, recording.provenance.script_identity, run.script)
+    except Refused as refused:
+        if refused.name == "foreign_script":
+            return None
+        raise

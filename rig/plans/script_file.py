@@ -2,15 +2,17 @@
 
 import hashlib
 import inspect
+import shlex
 import sys
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from importlib.machinery import ModuleSpec
 from importlib.util import module_from_spec
 from pathlib import Path
 from types import ModuleType
 
 from rig.config.regular_file import UnfitFile, read_regular_file
-from rig.data.run_folder import ScriptIdentity
+from rig.data.own_texts import is_own
+from rig.data.run_folder import SCRIPT, ScriptIdentity
 from rig.errors import Refused
 from rig.plans.registry import AnyProcedure, Procedure, installed, module_of
 from rig.plans.script_errors import script_errors
@@ -56,19 +58,52 @@ def installed_script(name: str) -> ScriptFile:
     return script_in(sys.modules[module_of(name)], installed()[name])
 
 
-def load_script(path: Path, kept: ScriptIdentity | None = None) -> ScriptFile:
-    """The procedure a file defines as `PROCEDURE`; it stands alone, whatever folder it lies in.
+def load_script(path: Path) -> ScriptFile:
+    """The procedure a file defines as `PROCEDURE`; it stands alone, whatever folder it lies in. Executes the file.
 
-    `kept` is what a run knows of its script where `path` is the copy in its folder: of another text nothing is
-    executed. Raises Refused `no_script`, `another_script`, `script_failed`, `not_a_script`.
+    Raises Refused `no_script`, `script_failed`, `not_a_script`.
     """
+    return _executed(path, path.name, _text(path))
+
+
+def kept_script(folder: Path, kept: ScriptIdentity, named: ScriptFile | None = None) -> ScriptFile:
+    """The script a run folder knows as `kept`; the text in the folder is executed only where it is the user's own.
+
+    An installed script is taken from where it is installed, and one that the user has `named` is the consent to it; the
+    text in the folder may be executed when a run of the user's own was begun with the same. Raises Refused
+    `another_script`, `foreign_script`, and as `load_script`.
+    """
+    if named is not None:
+        if named.sha256 != kept.sha256:
+            raise another_script(named.name)
+        return replace(named, name=kept.name)
+    path = folder / SCRIPT
     text = _text(path)
-    if kept is not None and kept.sha256 != _sha256(text):
+    if kept.sha256 != _sha256(text):
+        raise another_script(str(path))
+    for name in installed():
+        if (script := installed_script(name)).sha256 == kept.sha256:
+            return replace(script, name=kept.name)
+    if not is_own(kept.sha256):
         raise Refused(
-            "another_script",
-            f"{path} is not the script the run was begun with",
-            "Undo the change in it, or start a new run with `rig run`",
+            "foreign_script",
+            f"no run of yours on this computer was begun with {path} (SHA-256 {kept.sha256[:16]}…), "
+            "and a script can do anything that you can",
+            f"Read it; if it is what it should be: --script {shlex.quote(str(path))}",
         )
+    return _executed(path, kept.name, text)
+
+
+def another_script(what: str) -> Refused:
+    """The refusal of a script that a run was not begun with."""
+    return Refused(
+        "another_script",
+        f"{what} is not the script the run was begun with",
+        "Undo the change in it, or start a new run with `rig run`",
+    )
+
+
+def _executed(path: Path, name: str, text: str) -> ScriptFile:
     # Not in `sys.path`: the text alone is kept in the run folder, so it must do without its neighbours.
     spec = ModuleSpec("rig_script", None, origin=str(path))
     module = module_from_spec(spec)
@@ -79,7 +114,7 @@ def load_script(path: Path, kept: ScriptIdentity | None = None) -> ScriptFile:
     procedure = getattr(module, "PROCEDURE", None)
     if not isinstance(procedure, Procedure):
         raise Refused("not_a_script", f"the script {path} defines no PROCEDURE", REMEDY)
-    return ScriptFile(procedure, path.name if kept is None else kept.name, text)
+    return ScriptFile(procedure, name, text)
 
 
 def _text(path: Path) -> str:

@@ -9,9 +9,10 @@ import yaml
 
 from rig.cli import guarded, main
 from rig.commands.configured import configured
+from rig.data.own_texts import note_own
 from rig.data.run_folder import ScriptIdentity, script_identity
 from rig.errors import Refused
-from rig.plans.script_file import SIZE_MAX_BYTES, load_script
+from rig.plans.script_file import SIZE_MAX_BYTES, installed_script, kept_script, load_script
 from support.commands import configuration
 from support.paths import CONFIGS, ROOT
 from support.worlds import hardware
@@ -53,12 +54,24 @@ def test_what_ends_the_program_inside_a_command_is_no_verdict(
 
 
 def test_nothing_of_another_script_than_the_kept_one_is_executed(tmp_path: Path) -> None:
-    path = script(tmp_path, f"open({str(tmp_path / 'trace')!r}, 'w').close()\n{OWN.read_text(encoding='utf-8')}")
+    path = tmp_path / "script.py"
+    path.write_text(f"open({str(tmp_path / 'trace')!r}, 'w').close()\n{OWN.read_text(encoding='utf-8')}")
     with pytest.raises(Refused, match="another_script"):
-        load_script(path, ScriptIdentity("mine.py", hashlib.sha256(OWN.read_bytes()).hexdigest()))
+        kept_script(tmp_path, ScriptIdentity("mine.py", hashlib.sha256(OWN.read_bytes()).hexdigest()))
+    kept = ScriptIdentity("mine.py", hashlib.sha256(path.read_bytes()).hexdigest())
+    with pytest.raises(Refused, match="foreign_script"):
+        kept_script(tmp_path, kept)
     assert not (tmp_path / "trace").exists()
-    found = load_script(path, ScriptIdentity("mine.py", hashlib.sha256(path.read_bytes()).hexdigest()))
+    note_own(path.read_text(encoding="utf-8"))
+    found = kept_script(tmp_path, kept)
     assert found.name == "mine.py" and (tmp_path / "trace").exists()
+
+
+def test_a_kept_script_that_is_installed_is_taken_from_where_it_is_installed(tmp_path: Path) -> None:
+    stock = installed_script("six_observation")
+    (tmp_path / "script.py").write_text(stock.text, encoding="utf-8")
+    found = kept_script(tmp_path, stock.identity)
+    assert found.procedure is stock.procedure
 
 
 @pytest.mark.parametrize("kind", ["pipe", "device", "huge"])
@@ -85,7 +98,7 @@ def test_a_run_that_was_refused_before_its_first_recording_goes_on_by_its_own_sc
     config.write_text(yaml.safe_dump(document), encoding="utf-8")
     assert main(["run", str(hardware(config, tmp_path)), "--script", str(mine), "--out", str(out), "--yes"]) == 2
     assert "rig: no_port: " in capsys.readouterr().err and not list(out.glob("*.h5"))
-    assert load_script(out / "script.py", script_identity(out)).name == "mine.py"
+    assert kept_script(out, script_identity(out)).name == "mine.py"
     kept = (out / "script.py").read_bytes()
     (out / "script.py").write_bytes(f"open({str(tmp_path / 'trace')!r}, 'w').close()\n".encode() + kept)
     assert main(["resume", str(out)]) == 2 and "rig: another_script: " in capsys.readouterr().err
