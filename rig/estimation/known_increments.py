@@ -36,7 +36,7 @@ from rig.estimation.variance_components import SPREAD, Mixed, MixedModel, Sizes,
 PASSES, SIZED = 12, 3  # of the fit; of these, how many find the sizes anew
 SETTLED = 1e-2  # of the standard uncertainty
 ODD, ODD_RAD = 4.0, 1e-3  # an increment off by so many times the ninth decile, and by so much, is none of the body's
-SOME_ODD, MOST_ODD, SETTINGS_ASIDE = 4, 0.05, 3  # so many may be, or such a share; passes
+SOME_ODD, MOST_ODD, SETTINGS_ASIDE = 4, 0.1, 3  # so many may be, or such a share; passes
 UNTRUSTWORTHY_RAD = 0.1  # increments that are further off are those of another body
 STATED_SPREAD = 1.0  # of the logarithm of a stated standard deviation
 UNTOLD = 0.1  # standard deviation of an element of F that nothing has told
