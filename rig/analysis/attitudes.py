@@ -17,7 +17,8 @@ from rig.estimation.reference_budget import scale_and_bias
 from rig.estimation.reference_model import REFERENCE, Known, KnownNorm, KnownVector
 from rig.estimation.refusals import check_axes
 from rig.estimation.triaxial import EqualWeights, Method, TriaxialSolution, solve_triaxial
-from rig.observation.attitude_import import PlacedReadings, Quantity
+from rig.observation.attitude_import import PlacedReadings
+from rig.observation.csv_samples import Quantity
 
 Chosen = Method | Literal["increments"]
 METHODS: tuple[Method, ...] = (*get_args(EqualWeights), "attitude_weighted")

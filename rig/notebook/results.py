@@ -53,15 +53,15 @@ class Calibration:
         return estimate_entry(self.found.solution).model_dump(mode="json")
 
     def rows(self) -> list[tuple[str, ...]]:
-        """Axis, scale factor and bias with their standard deviations, in words."""
-        std = self.std
+        """Axis, scale factor and bias with twice their standard deviations, in words."""
+        expanded = 2 * self.std
         return [
             (
                 f"{self.name} {axis}",
                 f"{self.scale[i]:.6f}",
-                f"{std[i]:.6f}",
+                f"{expanded[i]:.6f}",
                 f"{self.bias_rad_s[i]:+.6f}",
-                f"{std[3 + i]:.6f}",
+                f"{expanded[3 + i]:.6f}",
             )
             for i, axis in enumerate("xyz")
         ]
@@ -77,7 +77,7 @@ class Calibration:
         return table(f"{self.found.sensor.part} {self.found.serial_number}", HEADINGS, self.rows())
 
 
-HEADINGS = ("axis", "scale factor", "± 1σ", "bias rad/s", "± 1σ rad/s")
+HEADINGS = ("axis", "scale factor", "± 2σ", "bias rad/s", "± 2σ rad/s")
 
 
 @dataclass(frozen=True, eq=False)

@@ -1,7 +1,6 @@
 """Data recorded elsewhere in known attitudes: a CSV file of samples and one of attitudes, as TRIAX uses them.
 
-samples: `time_s`, which must increase, and any of `x_rad_s y_rad_s z_rad_s` (rate), `x_m_s2 y_m_s2 z_m_s2` (what an
-accelerometer feels: at rest the opposite of gravity) and `x_t y_t z_t` (magnetic field, tesla).
+samples: as `rig.observation.csv_samples` says.
 
 attitudes: `start_s`, `end_s` on the same clock and `qw qx qy qz`, the unit quaternion that takes body to table
 coordinates; where the table turns `rate_x_rad_s rate_y_rad_s rate_z_rad_s`, its rate in body coordinates; where it is
@@ -17,31 +16,23 @@ board's is on the arm (`rig.observation.timebase`).
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Literal, get_args
 
 import numpy as np
 
 from rig.errors import Fault, Refused
 from rig.estimation.arrays import Array
+from rig.observation.csv_samples import COLUMNS, Quantity, read_samples
 from rig.observation.csv_table import read_columns
-from rig.observation.csv_windows import MIN_SAMPLES, check_complete, check_times, inside, overlapping, scatter_of
+from rig.observation.csv_windows import MIN_SAMPLES, check_complete, inside, overlapping, scatter_of
 from rig.observation.fixes import Turning
 from rig.observation.table_motion import TableMotion
 from rig.observation.timebase import TimeBase, estimate_time_base
 from rig.observation.windows import Window
 
-Quantity = Literal["rate", "acceleration", "field"]
-QUANTITIES: tuple[Quantity, ...] = get_args(Quantity)
-UNITS: Mapping[Quantity, str] = {"rate": "rad/s", "acceleration": "m/s²", "field": "T"}
-COLUMNS: Mapping[Quantity, tuple[str, ...]] = {
-    "rate": ("x_rad_s", "y_rad_s", "z_rad_s"),
-    "acceleration": ("x_m_s2", "y_m_s2", "z_m_s2"),
-    "field": ("x_t", "y_t", "z_t"),
-}
 PLACE_COLUMNS = ("start_s", "end_s", "qw", "qx", "qy", "qz")
 RATE_COLUMNS = ("rate_x_rad_s", "rate_y_rad_s", "rate_z_rad_s")
 STD_COLUMN = "attitude_std_rad"
-SAMPLES_MB, ATTITUDES_MB = 256, 32  # an hour at 1 kHz; an hour's table at 50 Hz
+ATTITUDES_MB = 32  # an hour's table at 50 Hz
 NORM_TOLERANCE = 1e-3
 
 
@@ -71,21 +62,12 @@ def read_placed(samples_path: Path, attitudes_path: Path, *, find_clock: bool = 
     `bad_attitude_row`, `overlapping_attitudes`; Fault `lost_samples`, `too_few_observations`, and with `find_clock` as
     `TableMotion` and `estimate_time_base`.
     """
-    samples = read_columns(samples_path, ("time_s",), (), SAMPLES_MB, tuple(COLUMNS.values()))
+    samples = read_samples(samples_path)
     rows = read_columns(attitudes_path, PLACE_COLUMNS, (), ATTITUDES_MB, (RATE_COLUMNS, (STD_COLUMN,)))
-    given = [quantity for quantity in QUANTITIES if COLUMNS[quantity][0] in samples]
-    if not given:
-        raise Refused(
-            "wrong_columns",
-            f"{samples_path} holds no readings",
-            f"Its first row must name time_s and {', or '.join(' '.join(names) for names in COLUMNS.values())}",
-        )
-    time_s = samples["time_s"]
-    check_times(time_s)
+    time_s, readings = samples.time_s, samples.readings
     windows, attitudes = _windows(rows), _rotations(rows)
     rates = np.column_stack([rows[name] for name in RATE_COLUMNS]) if RATE_COLUMNS[0] in rows else None
     stated = _stated(rows)
-    readings = {quantity: np.column_stack([samples[name] for name in COLUMNS[quantity]]) for quantity in given}
     clock = None
     if find_clock:
         _check_has_rates(readings)

@@ -1,7 +1,6 @@
 """Data recorded elsewhere: a CSV file of samples and one of sweeps, solved as the rig solves its own recordings.
 
-samples: `time_s`, `x_rad_s`, `y_rad_s`, `z_rad_s`. The gyroscope's readings; the time must increase. `temperature_c`
-may stand there too, as `rig export` writes it; nothing here depends on it.
+samples: as `rig.observation.csv_samples` says, a gyroscope's among them; other sensors' are left alone.
 
 sweeps: `start_s`, `end_s` on the same clock, `axis_x`, `axis_y`, `axis_z` (unit vector of the turn in a frame fixed to
 the sensor's carrier, right-handed), and either `speed_rad_s` (mean speed) or `angle_rad` (angle turned from start to
@@ -21,16 +20,16 @@ from rig.errors import Fault, Refused
 from rig.estimation.arrays import Array
 from rig.estimation.refusals import check_reading_ratio
 from rig.observation.average import Average
+from rig.observation.csv_samples import read_samples
 from rig.observation.csv_table import read_columns
 from rig.observation.csv_windows import check_complete, check_times, inside, overlapping, scatter_of
 from rig.observation.observe import Observation, nearest_axis
 from rig.observation.windows import Window
 
-SAMPLE_COLUMNS = ("time_s", "x_rad_s", "y_rad_s", "z_rad_s")
 SWEEP_COLUMNS = ("start_s", "end_s", "axis_x", "axis_y", "axis_z")
 MOTION_COLUMNS = ("speed_rad_s", "angle_rad")
 MIN_DURATION_S = 1e-3  # so many samples need longer at any rate
-SAMPLES_MB, SWEEPS_MB = 256, 1  # an hour at 1 kHz, and some ten thousand sweeps
+SWEEPS_MB = 1  # some ten thousand sweeps
 
 
 @dataclass(frozen=True, slots=True)
@@ -47,10 +46,10 @@ def read(samples_path: Path, sweeps_path: Path) -> ExternalData:
     Raises Refused `no_file`, `wrong_columns`, `wrong_unit`, `not_a_number`, `time_not_increasing`, `bad_sweep`,
     `overlapping_sweeps`; Fault as `average` does.
     """
-    samples = read_columns(samples_path, SAMPLE_COLUMNS, (), SAMPLES_MB, (("temperature_c",),))
+    samples = read_samples(samples_path, ["rate"])
     sweeps = read_columns(sweeps_path, SWEEP_COLUMNS, MOTION_COLUMNS, SWEEPS_MB)
     return average(
-        np.column_stack([samples[name] for name in SAMPLE_COLUMNS]),
+        np.column_stack([samples.time_s, samples.readings["rate"]]),
         np.column_stack([sweeps["start_s"], sweeps["end_s"], _speeds(sweeps)]),
         np.column_stack([sweeps[name] for name in SWEEP_COLUMNS[2:]]),
     )

@@ -79,7 +79,8 @@ def _check_columns(
 ) -> None:
     known = (*columns, *alternatives, *(name for group in optional for name in group))
     for name in names:
-        meant = [each for each in known if _quantity(each) == _quantity(name) and each not in names]
+        alike = [each for each in known if _quantity(each) == _quantity(name) and each not in names]
+        meant = [each for each in alike if each in columns] or alike
         if name not in known and "_" in name and meant and not name.startswith("axis"):
             raise Refused(
                 "wrong_unit",

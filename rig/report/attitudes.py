@@ -16,8 +16,9 @@ from rig.errors import Fault
 from rig.estimation import accelerometer, magnetometer
 from rig.estimation.known_increments import KnownIncrements
 from rig.estimation.triaxial import TriaxialSolution
-from rig.observation.attitude_import import UNITS, Quantity
+from rig.observation.csv_samples import UNITS, Quantity
 from rig.observation.timebase import TimeBase
+from rig.report.axes import matrix_lines
 from rig.report.increments import increment_entry, increment_lines
 from rig.station.plain_text import plain
 
@@ -80,10 +81,10 @@ def _clock_entry(clock: TimeBase) -> dict[str, float]:
 
 
 def _table(title: str, quantity: Quantity, solution: TriaxialSolution | KnownIncrements) -> Table:
-    """The scale factor and the bias of each axis; ± 2σ."""
+    """The scale factor and the bias of each axis, ± U (k = 2)."""
     table = Table(title=plain(title, "table.title"), title_justify="left")
     unit = UNITS[quantity]
-    for heading in ("axis", "scale factor", "± 2σ", f"bias {unit}", f"± 2σ {unit}"):
+    for heading in ("axis", "scale factor", "± U (k = 2)", f"bias {unit}", f"± U {unit}"):
         table.add_column(heading, justify="left" if heading == "axis" else "right")
     scale, std = in_unit(solution)
     for i, axis in enumerate("xyz"):
@@ -93,8 +94,7 @@ def _table(title: str, quantity: Quantity, solution: TriaxialSolution | KnownInc
 
 
 def _lines(quantity: Quantity, result: Result, surrounding: Surrounding) -> Iterator[str]:
-    for axis, row in zip("xyz", result.solution.matrix.tolist(), strict=True):
-        yield f"F {axis}: " + "  ".join(f"{element:+.6f}" for element in row)
+    yield from matrix_lines(result.solution.matrix, result.solution.covariance[:9, :9])
     if isinstance(result, InIncrements):
         yield from increment_lines(result)
         return

@@ -1,11 +1,12 @@
 """What tables and entries of all three kinds of sensors share: three numbers in a line, three axes in a table."""
 
-from collections.abc import Iterable, Sequence
+from collections.abc import Iterable, Iterator, Sequence
 
 import numpy as np
 from rich.table import Table
 
 from rig.estimation.arrays import Array
+from rig.estimation.sensor_axes import angle_jacobian, nearest_rotation, non_orthogonality
 from rig.observation.acceleration import DwellReading
 from rig.observation.field import FieldReading
 from rig.report.entry import EntryT, entry
@@ -42,6 +43,21 @@ def axes_table(
             axis, f"{scale[i]:.6f}", f"{expanded[i]:.6f}", f"{bias[i]:+.{digits}f}", f"{expanded[3 + i]:.{digits}f}"
         )
     return table
+
+
+def matrix_lines(matrix: Array, covariance: Array) -> Iterator[str]:
+    """F row by row and the angles between its axes, ± U (k = 2); `covariance` (9, 9) is that of F, row by row."""
+    spread = 2 * np.sqrt(np.diag(covariance)).reshape(3, 3)
+    for axis, row, known in zip("xyz", matrix.tolist(), spread.tolist(), strict=True):
+        elements = (f"{element:+.6f} ± {each:.1e}" for element, each in zip(row, known, strict=True))
+        yield f"F {axis}: " + "  ".join(elements)
+    scale = 1 / np.linalg.norm(matrix, axis=1)
+    axes = matrix * scale[:, None]
+    turned = angle_jacobian(axes, scale, nearest_rotation(axes))[:3]
+    angles_std = np.sqrt(np.diag(turned @ covariance @ turned.T))
+    angles = zip(1e3 * non_orthogonality(axes), 2e3 * angles_std, strict=True)
+    told = "  ".join(f"{angle:+.3f} ± {known:.2g}" for angle, known in angles)
+    yield f"non-orthogonality yz zx xy: {told} mrad (U, k = 2)"
 
 
 def dwell_entry(kind: type[EntryT], unit: str, dwell: DwellReading | FieldReading, residual: Array) -> EntryT:

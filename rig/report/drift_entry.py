@@ -7,7 +7,7 @@ from rig.data.result_types import ErrorEntry, Vector3
 from rig.errors import Fault
 from rig.estimation.arrays import Array
 from rig.estimation.bias_by_repeat import FALSE_ALARM
-from rig.observation.attitude_import import UNITS
+from rig.observation.csv_samples import UNITS
 
 
 def drift_entry(quantity: Quantity, drift: BiasDrift) -> DriftEntry:

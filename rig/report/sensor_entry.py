@@ -39,7 +39,7 @@ def sensor_entry(result: SensorResult, role: Role = "calibrate", agreed: Agreeme
         observations=[entry(ObservationEntry, turn, turn.average, joint=turn.joint_name) for turn in turns],
         rests=[entry(AverageEntry, each) for each in result.rests],
         time_bases=[entry(TimeBaseEntry, each, reference_board_s=each.reference_s) for each in result.time_bases],
-        vector_model=_vector(result.vector_model),
+        vector_model=_vector_or_error(result.vector_model),
         six_observation=estimate_entry(result.six_observation),
         algorithm_1=entry_or_error(result.algorithm_1),
     )  # fmt: skip
@@ -71,9 +71,12 @@ def entry_or_error(outcome: Estimate | Fault) -> EstimateEntry | ErrorEntry:
     return ErrorEntry(error=str(outcome)) if isinstance(outcome, Fault) else estimate_entry(outcome)
 
 
-def _vector(outcome: vector_model.VectorSolution | Fault) -> VectorEntry | ErrorEntry:
-    if isinstance(outcome, Fault):
-        return ErrorEntry(error=str(outcome))
+def _vector_or_error(outcome: vector_model.VectorSolution | Fault) -> VectorEntry | ErrorEntry:
+    return ErrorEntry(error=str(outcome)) if isinstance(outcome, Fault) else vector_entry(outcome)
+
+
+def vector_entry(outcome: vector_model.VectorSolution) -> VectorEntry:
+    """The vector model's solution, how the axes lie to each other included."""
     angles = np.sqrt(np.diag(outcome.angles_covariance_rad2))
     sensitivity: dict[str, object] = {}
     if outcome.g_sensitivity is not None and outcome.g_sensitivity_covariance is not None:

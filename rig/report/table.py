@@ -76,12 +76,11 @@ def print_result(result: ResultDocument, console: Console) -> None:
 
 
 def estimate_table(title: str, estimate: Estimated, expanded: Sequence[float] | None = None) -> Table:
-    """Scale and bias of each axis with their uncertainties: `expanded` (k = 2) where all of it is known, else 1σ."""
+    """Scale and bias of each axis ± U (k = 2): `expanded` where all of it is known, else twice the solution's std."""
     table = Table(title=plain(title, "table.title"), title_justify="left")
-    headings = ("± 1σ", "± 1σ rad/s") if expanded is None else ("± U", "± U rad/s")
-    for heading in ("axis", "scale factor", headings[0], "bias rad/s", headings[1]):
+    for heading in ("axis", "scale factor", "± U (k = 2)", "bias rad/s", "± U rad/s"):
         table.add_column(heading, justify="left" if heading == "axis" else "right")
-    shown = expanded or [estimate.covariance[i][i] ** 0.5 for i in range(6)]
+    shown = expanded or [2 * estimate.covariance[i][i] ** 0.5 for i in range(6)]
     scale, bias = decimals(shown[:3]), decimals(shown[3:])
     for i, axis in enumerate("xyz"):
         table.add_row(
@@ -128,8 +127,8 @@ def _beside(sensor: SensorEntry) -> Iterator[str]:
         yield from _on_the_board(sensor.board)
     if not isinstance(vector, ErrorEntry):
         skew = triple(np.degrees(vector.non_orthogonality_rad), "+.3f")
-        std = max(np.degrees(vector.non_orthogonality_std_rad))
-        yield f"non-orthogonality yz zx xy: {skew} ° (± {std:.3f})"
+        expanded = 2 * max(np.degrees(vector.non_orthogonality_std_rad))
+        yield f"non-orthogonality yz zx xy: {skew} ° (± {expanded:.3f}, k = 2)"
         yield from (f"warning: {warning}" for warning in vector.warnings)
 
 

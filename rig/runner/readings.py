@@ -15,7 +15,7 @@ from rig.board.identify import refusing
 from rig.config.models import RigConfig
 from rig.data.run_file import RecordedMagnetometer
 from rig.errors import Fault, Refused
-from rig.observation.attitude_import import COLUMNS
+from rig.observation.csv_samples import COLUMNS
 from rig.runner.acquisition import SensorCount
 from rig.runner.sensors import board_source
 from rig.sensors.registry import OWN_PORT

@@ -298,3 +298,15 @@ def test_a_sensor_that_lies_otherwise_is_refused_unless_it_may(
 def test_options_that_make_no_sense_are_refused(options: list[str], capsys: pytest.CaptureFixture[str]) -> None:
     assert main(solve(example(STILL), *options)) == 2
     assert capsys.readouterr().err.startswith(("rig: bad_option", "rig: unknown_setting"))
+
+
+def test_every_reason_is_said_where_several_sensors_have_no_solution(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    """One attitude tells no accelerometer, and a magnetometer's field is not given."""
+    lines = (EXAMPLES / STILL[1]).read_text().splitlines()
+    (tmp_path / "one.csv").write_text("\n".join(lines[:2]) + "\n")
+    assert main(solve([EXAMPLES / STILL[0], tmp_path / "one.csv"])) == 2
+    said = " ".join(capsys.readouterr().err.split())
+    assert "nothing_solved: no sensor has a solution: acceleration: too_few_observations" in said
+    assert "; field: field_strength_unknown" in said

@@ -179,3 +179,31 @@ def test_axes_with_a_wrong_sign_are_refused(tmp_path: Path, capsys: pytest.Captu
     sweeps = edited(tmp_path, "sweeps.csv", mirrored)
     assert main(["solve", str(EXAMPLES / "samples.csv"), "--sweeps", str(sweeps)]) == 2
     assert "mirrored_axis" in capsys.readouterr().err
+
+
+def test_readings_of_other_sensors_in_the_samples_change_nothing(tmp_path: Path) -> None:
+    def beside(lines: list[str]) -> list[str]:
+        rows = (f"{line},0,0,9.81,2e-5,0,4e-5,25" for line in lines[1:])
+        return [f"{lines[0]},x_m_s2,y_m_s2,z_m_s2,x_t,y_t,z_t,temperature_c", *rows]
+
+    alone, together = read_with(tmp_path), read_with(tmp_path, beside)
+    assert np.array_equal(
+        [turn.average.mean_rad_s for turn in alone.sweeps], [turn.average.mean_rad_s for turn in together.sweeps]
+    )
+    with pytest.raises(Refused, match=r"wrong_columns: .*unknown humidity"):
+        read_with(tmp_path, lambda lines: [f"{lines[0]},humidity", *(f"{line},0" for line in lines[1:])])
+
+
+def test_people_see_uncertainties_with_one_coverage_factor_and_the_angles_between_the_axes(
+    capsys: pytest.CaptureFixture[str],
+) -> None:
+    files = [str(EXAMPLES / "samples.csv"), "--sweeps", str(EXAMPLES / "sweeps.csv")]
+    assert main(["solve", *files, "--json"]) == 0
+    found = json.loads(capsys.readouterr().out)
+    assert main(["solve", *files]) == 0
+    printed = capsys.readouterr().out
+    scale_x = next(line for line in printed.splitlines() if "scale" not in line and " x " in line)
+    assert f"{2 * found['covariance'][0][0] ** 0.5:.5f}" in scale_x
+    assert "± U (k = 2)" in printed and "1σ" not in printed
+    skew, known = (1e3 * found["vector_model"][f"non_orthogonality_{each}"][0] for each in ("rad", "std_rad"))
+    assert f"non-orthogonality yz zx xy: {skew:+.3f} ± {2 * known:.2g}" in printed
