@@ -94,6 +94,8 @@ def _bias_process(
     freedom = 3 * (len(z) - z.shape[1])
     if freedom < 3:
         return BiasProcess(0.0, 0.0, max(freedom, 0))
+    # The likelihood does not know what the parameters explain. Left in, it would cost a quiet sensor half the digits.
+    means = means - z @ np.linalg.lstsq(z, means)[0]
     unit = walk_covariance(windows_s)
     typical = float(np.median(variances))
     grid = np.concatenate([[0.0], typical * np.geomspace(SPAN**-0.5, SPAN, STEPS) ** 2])

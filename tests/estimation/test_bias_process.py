@@ -89,3 +89,15 @@ def test_a_steady_bias_is_stated_hardly_less_well_than_if_it_were_known_to_be(th
     print(f"std over that of a steady bias {np.mean(widths):.3f}, RMS of error over std {rms:.2f}")
     assert np.mean(widths) < 1.1
     assert 0.85 < rms < 1.1
+
+
+def test_what_the_sweeps_turn_is_nothing_to_the_walk_that_is_found() -> None:
+    """Of a sensor so quiet that its means lie a million standard deviations from zero."""
+    windows_s, rates = session()
+    variances, rng = np.full((12, 3), 1e-12), np.random.default_rng(4)
+    wandered = wandering(windows_s, 3e-6, rng)[0] + 1e-6 * rng.standard_normal((12, 3))
+    design = design_matrix(rates, None)
+    still = expected_bias_process(design, wandered, variances, windows_s)
+    turned = expected_bias_process(design, rates + wandered, variances, windows_s)
+    assert turned.walk_rad_s_sqrt_s == pytest.approx(still.walk_rad_s_sqrt_s, rel=1e-7)
+    assert turned.scatter_rad_s == pytest.approx(still.scatter_rad_s, rel=1e-7)
