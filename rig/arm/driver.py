@@ -143,6 +143,7 @@ class Arm:
             problem = Problem("program_running", f"a program runs on the arm at {self._host}", "Stop it on the pendant")
         if problem is not None:
             raise Refused.of(problem)
+        self._stopper.descriptors.keep()
         with self._stopping_on_error(), self._link.patience():
             self._holds_arm = True
             self._request(TakeControl(payload_kg, payload_centre_m))
@@ -212,6 +213,7 @@ class Arm:
             outcome = self.stop()
         finally:
             self._link.close()
+            self._stopper.descriptors.release()
         if self._holds_arm and (self._problem is not None or not outcome.at_rest):
             # A client that had lost the arm and found it again may have started its program anew, behind that stop.
             with suppress(OSError), Dashboard(self._host, LAST_STOP_S) as dashboard:

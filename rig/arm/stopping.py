@@ -7,6 +7,7 @@ from dataclasses import dataclass
 
 from rig.arm.dashboard import Dashboard
 from rig.arm.messages import Stop
+from rig.arm.spare import SpareDescriptors
 
 STOP_S = 0.9  # a stop is confirmed within this, or not at all
 DASHBOARD_S = 0.8  # the dashboard has so long to answer
@@ -39,6 +40,7 @@ class Stopper:
         self._thread = threading.Thread(target=self._stop, name="arm stop")
         self._ended = threading.Event()
         self._outcome = StopOutcome(False, "the stop has not ended", "Look at the arm")
+        self.descriptors = SpareDescriptors()  # to be kept before the arm is under control
 
     @property
     def begun(self) -> bool:
@@ -78,6 +80,7 @@ class Stopper:
         began_s = time.monotonic()
         # In a thread of its own: a child that does not listen must not keep the stop from the controller.
         threading.Thread(target=self._send, args=(Stop(BRAKE_RAD_S2),), name="arm brake", daemon=True).start()
+        self.descriptors.release()
         try:
             with Dashboard(self._host, timeout_s=DASHBOARD_S) as dashboard:
                 dashboard.stop_program()

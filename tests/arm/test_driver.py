@@ -3,6 +3,7 @@
 import math
 import multiprocessing
 import os
+import resource
 import signal
 import socket
 import subprocess
@@ -10,7 +11,7 @@ import sys
 import threading
 import time
 from collections.abc import Callable
-from contextlib import suppress
+from contextlib import ExitStack, suppress
 from dataclasses import replace
 from pathlib import Path
 from typing import Any
@@ -245,6 +246,26 @@ def test_a_child_that_dies_or_hangs_mid_move_leaves_a_standing_arm_within_a_seco
         assert "the controller says that its program has ended" in fault.value.what
         assert "Look at the arm" in fault.value.remedy and "emergency stop" not in fault.value.remedy
         assert stood_s[0] < 1.0 * crowding()
+
+
+def test_a_hung_child_is_answered_by_a_stop_also_when_no_descriptor_is_left(laboratory: WorldHandle) -> None:
+    with Arm(laboratory.host) as arm, ExitStack() as used:
+        arm.take_control(*PAYLOAD)
+        (child,) = multiprocessing.active_children()
+
+        def use_up_and_hang_the_child() -> None:
+            with suppress(OSError):
+                while True:
+                    used.enter_context(Path(os.devnull).open("rb"))
+            os.kill(child.pid or 0, signal.SIGSTOP)
+
+        limits = resource.getrlimit(resource.RLIMIT_NOFILE)
+        resource.setrlimit(resource.RLIMIT_NOFILE, (256, limits[1]))
+        used.callback(resource.setrlimit, resource.RLIMIT_NOFILE, limits)
+        with pytest.raises(Fault) as fault:
+            arm.move(turn(arm.latest.q_rad, 6.0), AtSpeed(arm, use_up_and_hang_the_child))
+        assert fault.value.name == "arm_driver_hung" and "its program has ended" in fault.value.what
+        until(lambda: stands(laboratory), 1.0)
 
 
 @pytest.mark.parametrize("where", ["move", "rest"])
