@@ -304,7 +304,11 @@ def _resume(options: argparse.Namespace) -> int:
 def _watch(options: argparse.Namespace) -> int:
     from rig.commands.watch import watch
 
-    return watch(options.run_folder, page_arguments.PageWish(options.page_address, options.page_token), options.speed)
+    return watch(
+        options.run_folder,
+        page_arguments.PageWish(options.page_address, page_arguments.token_said(options)),
+        options.speed,
+    )
 
 
 def _plan(options: argparse.Namespace) -> int:

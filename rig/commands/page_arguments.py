@@ -2,6 +2,8 @@
 
 import argparse
 import math
+import os
+import stat
 import sys
 import threading
 from collections.abc import Callable, Iterator, Sequence
@@ -10,7 +12,9 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING
 
+from rig.config.regular_file import UnfitFile, read_regular_file
 from rig.errors import Refused
+from rig.station.confirm import ask_operator
 from rig.station.plain_text import say
 
 if TYPE_CHECKING:
@@ -19,6 +23,8 @@ if TYPE_CHECKING:
     from rig.station.station import Listener
 
 Answer = Callable[[Sequence[str], str], bool]
+TOKEN_VARIABLE = "RIG_PAGE_TOKEN"
+LONGEST_TOKEN = 1000  # bytes of its file
 
 
 @dataclass(frozen=True, slots=True)
@@ -77,7 +83,37 @@ def _add_place(parser: argparse.ArgumentParser) -> None:
         metavar="ADDRESS[:PORT]",
         help="where (default: 127.0.0.1:8137); one that others reach needs a token",
     )
-    parser.add_argument("--page-token", metavar="TOKEN", help="of the page's address (default: a new one each time)")
+    token = parser.add_mutually_exclusive_group()
+    token.add_argument(
+        "--page-token-file",
+        type=Path,
+        metavar="FILE",
+        help=f"holds the page's token (default: what {TOKEN_VARIABLE} says, or a new one each time)",
+    )
+    token.add_argument(
+        "--page-token", metavar="TOKEN", help="the token itself, which whoever lists this computer's processes sees"
+    )
+
+
+def token_said(options: argparse.Namespace) -> str | None:
+    """The page's token where one is given: by the command line, a file or the environment.
+
+    Raises Refused `page_address` for a file that cannot be read, or that others can.
+    """
+    path: Path | None = options.page_token_file
+    if path is None:
+        given: str | None = options.page_token
+        return given if given is not None else os.environ.get(TOKEN_VARIABLE)
+    try:
+        if os.name == "posix" and stat.S_IMODE(path.stat().st_mode) & (stat.S_IRWXG | stat.S_IRWXO):
+            raise UnfitFile("others than you may read or write it")
+        return read_regular_file(path, LONGEST_TOKEN).decode("utf-8", errors="replace").strip()
+    except (OSError, UnfitFile) as error:
+        raise Refused(
+            "page_address",
+            f"the page's token is not taken from {path}: {error}",
+            "Give a file that holds the token alone and that is yours alone: chmod 600 FILE",
+        ) from error
 
 
 def wish(options: argparse.Namespace) -> PageWish | None:
@@ -88,12 +124,12 @@ def wish(options: argparse.Namespace) -> PageWish | None:
     wanted = getattr(options, "page", True)
     may_answer = getattr(options, "confirm_on_page", False)
     if not wanted:
-        if may_answer or options.page_address or options.page_token:
+        if may_answer or options.page_address or options.page_token or options.page_token_file:
             raise Refused("page_address", "there is no page to say that of", "Give --page as well")
         return None
     from rig.page.serving import check
 
-    made = PageWish(options.page_address, options.page_token, may_answer)
+    made = PageWish(options.page_address, token_said(options), may_answer)
     check(made.address())  # before there is a run folder
     return made
 
@@ -122,7 +158,8 @@ def operators_page(wanted: PageWish | None, folder: Path, about: "Callable[[], A
 
         def asked(announcement: Sequence[str], to_do: str) -> bool:
             say(f"The operator is asked on the page, whether to {to_do}.", sys.stderr)
-            return control.ask(announcement, to_do)
+            agreed = control.ask(announcement, to_do)
+            return ask_operator(announcement, to_do) if agreed is None else agreed
 
         yield OperatorsPage((feed, lookout), asked if wanted.may_answer else None, stay_for_the_operator)
 

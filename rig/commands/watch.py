@@ -6,6 +6,7 @@ from collections.abc import Iterator
 from pathlib import Path
 
 from rig.commands.page_arguments import PageWish, wait_for_interrupt
+from rig.config.regular_file import UnfitFile, read_regular_file
 from rig.data.result_file import ResultDocument, read_result
 from rig.data.run_file import RunData, read_run
 from rig.data.run_folder import RESULT, recordings
@@ -21,6 +22,7 @@ from rig.station.events import DocumentWritten, Interrupted, RunEvent
 from rig.station.plain_text import say
 
 LOG_TAIL = 3  # lines of the log that say how a run without a result ended
+LARGEST_LOG = 50_000_000  # bytes
 
 
 def watch(folder: Path, wanted: PageWish, speed: float) -> int:
@@ -74,17 +76,18 @@ def _ending(folder: Path, result: ResultDocument | None) -> Iterator[RunEvent]:
     if (folder / CERTIFICATE).is_file():
         yield DocumentWritten(folder / CERTIFICATE)
     if result is None:
-        yield Interrupted(_last_words(folder))
+        yield Interrupted(last_words(folder))
         return
     yield DocumentWritten(folder / RESULT)
     yield from ended(result)
 
 
-def _last_words(folder: Path) -> str:
+def last_words(folder: Path) -> str:
     """How the log of a run without a result ends."""
     try:
-        lines = (folder / "log.txt").read_text(encoding="utf-8").splitlines()
-    except OSError:
-        lines = []
+        log = read_regular_file(folder / "log.txt", LARGEST_LOG, follow_links=False)
+    except (OSError, UnfitFile):
+        log = b""
+    lines = log.decode("utf-8", errors="replace").splitlines()
     said = [line.partition(" INFO ")[2] for line in lines if " INFO " in line]
     return "; ".join(["this run has no result", *said[-LOG_TAIL:][-1:]])

@@ -1,5 +1,6 @@
 """Opens files that anybody may have named: regular ones of a sensible size. A pipe or a device may never end."""
 
+import os
 import stat
 from collections.abc import Iterator
 from contextlib import contextmanager
@@ -12,21 +13,39 @@ class UnfitFile(Exception):
 
 
 @contextmanager
-def open_regular_file(path: Path, max_bytes: int) -> Iterator[BinaryIO]:
-    """A regular file of at most `max_bytes`, open for reading. Raises `UnfitFile`, and OSError as `open` does."""
-    status = path.stat()
-    if not stat.S_ISREG(status.st_mode):
-        raise UnfitFile("it is no regular file")
-    if status.st_size > max_bytes:
-        raise UnfitFile(f"it is longer than {max_bytes} bytes")
-    with path.open("rb") as file:
+def open_regular_file(path: Path, max_bytes: int, *, follow_links: bool = True) -> Iterator[BinaryIO]:
+    """A regular file of at most `max_bytes`, open for reading. Raises `UnfitFile`, and OSError as `open` does.
+
+    A link in place of the file leads out of the folder it lies in: where the folder is not ours, it is not followed.
+    """
+    _check(path.stat() if follow_links else path.lstat(), max_bytes)  # before: to open a device may do something
+    with open(path, "rb", opener=_without_waiting if follow_links else _without_links) as file:
+        _check(os.fstat(file.fileno()), max_bytes)  # another may have come to lie there meanwhile
         yield file
 
 
-def read_regular_file(path: Path, max_bytes: int) -> bytes:
+def read_regular_file(path: Path, max_bytes: int, *, follow_links: bool = True) -> bytes:
     """What is in it. Raises as `open_regular_file`."""
-    with open_regular_file(path, max_bytes) as file:
+    with open_regular_file(path, max_bytes, follow_links=follow_links) as file:
         content = file.read(max_bytes + 1)
     if len(content) > max_bytes:  # it has grown meanwhile, or its size is not told (those of /proc say 0)
         raise UnfitFile(f"it is longer than {max_bytes} bytes")
     return content
+
+
+def _check(status: os.stat_result, max_bytes: int) -> None:
+    if stat.S_ISLNK(status.st_mode):
+        raise UnfitFile("it is a link")
+    if not stat.S_ISREG(status.st_mode):
+        raise UnfitFile("it is no regular file")
+    if status.st_size > max_bytes:
+        raise UnfitFile(f"it is longer than {max_bytes} bytes")
+
+
+def _without_waiting(path: str, flags: int) -> int:
+    """For a pipe, that nobody may ever write into."""
+    return os.open(path, flags | getattr(os, "O_NONBLOCK", 0))
+
+
+def _without_links(path: str, flags: int) -> int:
+    return _without_waiting(path, flags | getattr(os, "O_NOFOLLOW", 0))

@@ -5,10 +5,13 @@ from collections.abc import Awaitable, Callable
 from pathlib import Path
 
 from starlette.applications import Starlette
+from starlette.concurrency import run_in_threadpool
 from starlette.requests import Request
-from starlette.responses import FileResponse, PlainTextResponse, Response, StreamingResponse
+from starlette.responses import PlainTextResponse, Response, StreamingResponse
 from starlette.routing import Route
 
+from rig.config.regular_file import UnfitFile, read_regular_file
+from rig.page.connections import Connections
 from rig.page.control import Control
 from rig.page.feed import Broadcast
 from rig.page.guard import CERTIFICATE_POLICY, COOKIE, Door, Guard
@@ -17,19 +20,12 @@ from rig.report.certificate.writer import PAGE as CERTIFICATE
 STATIC = Path(__file__).with_name("static")
 MEDIA = {".html": "text/html", ".css": "text/css", ".js": "text/javascript", ".svg": "image/svg+xml"}
 LARGEST_BODY = 1000  # bytes
+LARGEST_CERTIFICATE = 8_000_000
 Handler = Callable[[Request], Awaitable[Response]]
 
 
-def application(broadcast: Broadcast, control: Control, door: Door, folder: Path) -> Guard:
+def application(broadcast: Broadcast, control: Control, door: Door, folder: Path, connections: Connections) -> Guard:
     """Of a run in `folder`, behind its door."""
-
-    def looking(handler: Handler) -> Handler:
-        async def allowed(request: Request) -> Response:
-            if not door.may_look(request.headers, request.cookies):
-                return _refused()
-            return await handler(request)
-
-        return allowed
 
     def acting(handler: Handler) -> Handler:
         async def allowed(request: Request) -> Response:
@@ -38,18 +34,29 @@ def application(broadcast: Broadcast, control: Control, door: Door, folder: Path
         return allowed
 
     async def stream(request: Request) -> Response:
-        if broadcast.full:
+        if not door.may_look(request.headers):
+            return _refused()
+        known = door.may_act(request.headers)
+        if broadcast.full(known=known):
             return PlainTextResponse("too many browsers look on\n", 503)
-        streaming = StreamingResponse(broadcast.frames(), media_type="text/event-stream")
-        if door.may_act(request.headers):  # for the certificate, which opens by a link that can carry no header
-            streaming.set_cookie(COOKIE, door.token, path=f"/{CERTIFICATE}", httponly=True, samesite="strict")
+        streaming = StreamingResponse(broadcast.frames(known=known), media_type="text/event-stream")
+        if door.looking_needs_token:
+            streaming.set_cookie(COOKIE, door.pass_to_look, path=f"/{CERTIFICATE}", httponly=True, samesite="strict")
         return streaming
 
     async def certificate(request: Request) -> Response:
-        path = folder / CERTIFICATE
-        if not path.is_file():
+        if not door.may_open(request.headers, request.cookies):
+            return _refused()
+        try:
+            text = await run_in_threadpool(
+                read_regular_file, folder / CERTIFICATE, LARGEST_CERTIFICATE, follow_links=False
+            )
+        except FileNotFoundError:
             return PlainTextResponse("there is no certificate yet\n", 404)
-        return FileResponse(path, headers={"content-security-policy": CERTIFICATE_POLICY}, media_type="text/html")
+        except (OSError, UnfitFile) as error:
+            why = error if isinstance(error, UnfitFile) else "it cannot be read"
+            return PlainTextResponse(f"the certificate is not shown: {why}\n", 404)
+        return Response(text, headers={"content-security-policy": CERTIFICATE_POLICY}, media_type="text/html")
 
     async def stop(request: Request) -> Response:
         if broadcast.over or not control.stop():
@@ -72,12 +79,12 @@ def application(broadcast: Broadcast, control: Control, door: Door, folder: Path
     files += [Route(f"/{path.name}", _file(path.name)) for path in STATIC.iterdir() if path.suffix in MEDIA]
     routes = [
         *files,
-        Route("/events", looking(stream)),
-        Route(f"/{CERTIFICATE}", looking(certificate)),
+        Route("/events", stream),
+        Route(f"/{CERTIFICATE}", certificate),
         Route("/stop", acting(stop), methods=["POST"]),
         Route("/answer", acting(answer), methods=["POST"]),
     ]
-    return Guard(Starlette(routes=routes), door)
+    return Guard(Starlette(routes=routes), door, connections)
 
 
 def _file(name: str) -> Handler:

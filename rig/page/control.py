@@ -25,6 +25,7 @@ class Control:
         self._asked = 0
         self._answer: bool | None = None
         self._waiting = False
+        self._gone = False
 
     @contextmanager
     def stoppable(self) -> Iterator[None]:
@@ -51,13 +52,16 @@ class Control:
             self._stop()
             return True
 
-    def ask(self, announcement: Sequence[str], to_do: str) -> bool:
-        """Wait for the operator's answer from a browser; the page shows the question as it shows all that happens."""
+    def ask(self, announcement: Sequence[str], to_do: str) -> bool | None:
+        """Wait for the operator's answer from a browser; None when no page is left that could bring one.
+
+        The page shows the question as it shows all that happens.
+        """
         with self._changed:
             self._asked += 1
             self._answer, self._waiting = None, True
             try:
-                while self._answer is None:
+                while self._answer is None and not self._gone:
                     self._changed.wait(1.0)
                 return self._answer
             finally:
@@ -71,6 +75,12 @@ class Control:
             self._answer = agreed
             self._changed.notify_all()
             return True
+
+    def leave(self) -> None:
+        """No browser can ask for anything any more."""
+        with self._changed:
+            self._gone = True
+            self._changed.notify_all()
 
 
 def _interrupt_the_main_thread() -> None:

@@ -17,7 +17,8 @@ from rig.station.events import RunEvent
 
 FRAME_S = 0.1
 SIGN_OF_LIFE_S = 5.0  # without news
-CLIENTS = 32  # browsers at a time
+CLIENTS = 32  # browsers at a time that have the token
+STRANGERS = 16  # … and that have none
 
 
 class Feed:
@@ -99,13 +100,12 @@ class Broadcast:
 
     def __init__(self, feed: Feed) -> None:
         self._feed = feed
-        self._mailboxes: set[Mailbox] = set()
+        self._mailboxes: dict[Mailbox, bool] = {}  # whether its browser is known by the token
         self._closing = False
 
-    @property
-    def full(self) -> bool:
-        """Whether there is room for no more browsers."""
-        return len(self._mailboxes) >= CLIENTS
+    def full(self, *, known: bool) -> bool:
+        """Whether there is room for no more browsers with the token, or without: neither takes the others' places."""
+        return sum(each == known for each in self._mailboxes.values()) >= (CLIENTS if known else STRANGERS)
 
     @property
     def over(self) -> bool:
@@ -145,10 +145,10 @@ class Broadcast:
         while self._mailboxes and asyncio.get_running_loop().time() < deadline_s:
             await asyncio.sleep(FRAME_S / 4)
 
-    async def frames(self) -> AsyncGenerator[bytes, None]:
+    async def frames(self, *, known: bool = True) -> AsyncGenerator[bytes, None]:
         """For one browser: everything, then what changes."""
         mailbox = Mailbox()
-        self._mailboxes.add(mailbox)
+        self._mailboxes[mailbox] = known
         if self._closing:
             mailbox.close()
         try:
@@ -159,7 +159,7 @@ class Broadcast:
                 elif mailbox.closed:
                     return
         finally:
-            self._mailboxes.discard(mailbox)
+            self._mailboxes.pop(mailbox, None)
 
 
 def _frame(name: str, document: dict[str, Any]) -> bytes:

@@ -13,9 +13,11 @@ from rig.arm.motion import Dwell, Rest, Sweep
 from rig.page.feed import Feed
 from rig.page.rows import Look
 from rig.station.events import PhaseStarted, RunEvent, StepFinished
+from rig.station.plain_text import say
 
 WRITTEN_S = 0.6  # after which an event is in the file
 SHARE = 0.1  # of the time looking may take: a recording of hours is long to read
+ENDING_S = 5.0
 
 
 class Lookout:
@@ -37,34 +39,61 @@ class Lookout:
 
 @contextmanager
 def looking_out(folder: Path, feed: Feed) -> Iterator[Lookout]:
-    """For the length of the block; what is seen is shown by `feed`."""
+    """For the length of the block; what is seen is shown by `feed`.
+
+    A process that fails says so on stderr: the page goes without what it would see, and the run goes on.
+    """
     lookout = Lookout()
     command = [sys.executable, "-P", "-m", "rig.page.looking", str(folder)]
-    # In a session of its own: Ctrl-C is the run's.
-    with subprocess.Popen(
-        command, stdin=subprocess.PIPE, stdout=subprocess.PIPE, text=True, start_new_session=True
-    ) as process:
-        thread = threading.Thread(target=_ask, args=(process, lookout, feed), name="lookout", daemon=True)
-        thread.start()
-        try:
-            yield lookout
-        finally:
-            lookout.over.set()
-            lookout.wanted.set()
-            process.kill()
-            thread.join()
+    try:  # In a session of its own: Ctrl-C is the run's.
+        process = subprocess.Popen(
+            command, stdin=subprocess.PIPE, stdout=subprocess.PIPE, text=True, start_new_session=True
+        )
+    except OSError as error:
+        _say_that_it_ended(str(error))
+        yield lookout
+        return
+    thread = threading.Thread(target=_ask, args=(process, lookout, feed), name="lookout", daemon=True)
+    thread.start()
+    try:
+        yield lookout
+    finally:
+        lookout.over.set()
+        lookout.wanted.set()
+        process.kill()
+        process.wait()
+        thread.join(ENDING_S)
+        for pipe in (process.stdin, process.stdout):
+            with suppress(OSError):  # what it was asked last may never have reached it
+                assert pipe is not None
+                pipe.close()
 
 
 def _ask(process: "subprocess.Popen[str]", lookout: Lookout, feed: Feed) -> None:
+    why = "its process has ended"
+    try:
+        _follow(process, lookout, feed)
+    except Exception as error:  # whatever it may be: no part of the run hangs on it
+        why = f"{type(error).__name__}: {error}"
+    if not lookout.over.is_set():
+        _say_that_it_ended(why)
+
+
+def _say_that_it_ended(why: str) -> None:
+    what = "The page shows no more of observations and parameters until the verdict"
+    say(f"{what} ({why}). The run goes on.", sys.stderr)
+
+
+def _follow(process: "subprocess.Popen[str]", lookout: Lookout, feed: Feed) -> None:
+    """Ask for what has come, whenever that is wanted; returns when all is over, or when nobody answers."""
     assert process.stdin is not None and process.stdout is not None
     while lookout.wanted.wait() and not lookout.over.wait(WRITTEN_S):
         lookout.wanted.clear()
         asked_s = time.monotonic()
-        with suppress(OSError):  # it is killed at the end
-            process.stdin.write("\n")
-            process.stdin.flush()
+        process.stdin.write("\n")
+        process.stdin.flush()
         line = process.stdout.readline()
-        if not line:
+        if not line.endswith("\n"):
             return
         seen = json.loads(line)
         if "observations" in seen:

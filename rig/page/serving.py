@@ -2,6 +2,7 @@
 
 import asyncio
 import socket
+import sys
 import threading
 from collections.abc import Iterator
 from contextlib import contextmanager
@@ -10,14 +11,20 @@ from ipaddress import ip_address
 from pathlib import Path
 
 from rig.errors import Refused
+from rig.page.connections import Connections, counted
 from rig.page.control import Control
 from rig.page.feed import Broadcast, Feed
 from rig.page.guard import Door, new_token
+from rig.station.plain_text import say
 
 ADDRESS, PORT = "127.0.0.1", 8137
 LAST_NEWS_S = 2.0  # for browsers to take what was shown last
 ENDING_S = 5.0
 SHORTEST_TOKEN = 22  # characters of base64, 128 bits
+AT_ONCE = 8  # connections accepted between two looks at those that are there
+WAITING = 128  # … and as many may wait for that
+IDLE_S = 3  # a browser's connection is kept for its next request
+LARGEST_HEADERS = 8192  # bytes
 
 
 @dataclass(frozen=True, slots=True)
@@ -41,7 +48,7 @@ class Address:
 def serving(feed: Feed, control: Control, folder: Path, address: Address) -> Iterator[str]:
     """Show `feed` to browsers for the length of the block; yields the page's address, with the token.
 
-    Raises Refused `page_address`.
+    A page that fails says so on stderr and is gone: what it shows goes on. Raises Refused `page_address`.
     """
     import uvicorn
 
@@ -54,10 +61,16 @@ def serving(feed: Feed, control: Control, folder: Path, address: Address) -> Ite
     names = {host, "localhost"} if address.loopback else {host}
     token = address.token or new_token()
     door = Door(frozenset(f"{name}:{port}".lower() for name in names), token, not address.loopback)
-    broadcast = Broadcast(feed)
+    broadcast, connections = Broadcast(feed), Connections()
     config = uvicorn.Config(
-        application(broadcast, control, door, folder),
+        application(broadcast, control, door, folder, connections),
+        http=counted(connections),
+        h11_max_incomplete_event_size=LARGEST_HEADERS,
+        backlog=AT_ONCE,
+        timeout_keep_alive=IDLE_S,
+        proxy_headers=False,  # anybody can write one, and a connection is known by where it comes from
         log_config=None,
+        log_level="critical",  # what strangers send is not to fill the terminal
         access_log=False,
         lifespan="off",
         ws="none",
@@ -70,13 +83,32 @@ def serving(feed: Feed, control: Control, folder: Path, address: Address) -> Ite
     async def serve() -> None:
         posting = asyncio.create_task(broadcast.run())
         served = asyncio.create_task(server.serve([listening]))
-        while not over.is_set() and not served.done():
+        while not server.started and not served.done():
+            await asyncio.sleep(0.01)
+        listening.listen(WAITING)  # the server has made it AT_ONCE
+        while not (over.is_set() or served.done() or posting.done()):
             await asyncio.sleep(0.05)
-        await broadcast.close(LAST_NEWS_S)
-        server.should_exit = True
-        await asyncio.gather(posting, served)
+        try:
+            await broadcast.close(LAST_NEWS_S)
+        finally:
+            server.should_exit = True
+            await asyncio.wait((posting, served))
+            for task in (posting, served):
+                task.result()
 
-    thread = threading.Thread(target=lambda: asyncio.run(serve()), name="page", daemon=True)
+    def work() -> None:
+        try:
+            asyncio.run(serve())
+            why = "" if over.is_set() else "its server ended"
+        except (Exception, SystemExit) as error:
+            why = f"{type(error).__name__}: {error}"
+        finally:
+            listening.close()
+            control.leave()
+        if why:
+            say(f"The page has ended ({why}). What it showed goes on without it.", sys.stderr)
+
+    thread = threading.Thread(target=work, name="page", daemon=True)
     thread.start()
     try:
         yield f"http://{host}:{port}/#{token}"
@@ -105,7 +137,7 @@ def check(address: Address) -> None:
         raise Refused(
             "page_address",
             f"others than this computer reach {address.host}, so the page there needs a token",
-            "Give --page-token TOKEN as well, or leave the address out",
+            "Give --page-token-file FILE as well, or leave the address out",
         )
 
 

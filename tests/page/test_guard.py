@@ -1,20 +1,25 @@
 """Who may speak to the page's server, asked over a real socket."""
 
+import argparse
 import http.client
 import json
+import os
+import socket
 import threading
 import time
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from pathlib import Path
 from urllib.parse import urlsplit
 
 import pytest
 
-from rig.commands.page_arguments import PageWish
+from rig.commands.page_arguments import PageWish, add_arguments, wish
+from rig.commands.watch import last_words
 from rig.errors import Refused
 from rig.page.control import STOPPED, Control
 from rig.page.feed import Feed
+from rig.page.guard import Door
 from rig.page.serving import Address, serving
 from rig.page.shown import About, Shown
 from rig.station.events import Prompt
@@ -99,15 +104,70 @@ def test_everything_comes_with_a_policy_and_loads_nothing_from_elsewhere(ask: As
         assert headers["x-content-type-options"] == "nosniff" and "access-control-allow-origin" not in headers
     status, text, headers = ask("GET", "/certificate.html")
     assert status == 200 and text == "<p>signed</p>" and "script" not in headers["content-security-policy"]
+    assert headers["content-security-policy"].startswith("sandbox; ")
     assert ask("GET", "/../serving.py")[0] == ask("GET", "/config.yaml")[0] == 404
 
 
 def test_others_than_this_computer_need_the_token_to_look(tmp_path: Path) -> None:
-    from rig.page.guard import Door
-
     door = Door(frozenset({"192.0.2.1:8137"}), TOKEN, looking_needs_token=True)
-    assert not door.may_look({}, {}) and door.may_look({}, {"rig_page": TOKEN})
-    assert door.may_look({"authorization": f"Bearer {TOKEN}"}, {})
+    assert not door.may_look({}) and door.may_look({"authorization": f"Bearer {TOKEN}"})
+    assert not door.may_open({}, {}) and door.may_open({"authorization": f"Bearer {TOKEN}"}, {})
+
+
+def test_a_cookie_opens_the_certificate_and_is_not_the_token() -> None:
+    door = Door(frozenset({"192.0.2.1:8137"}), TOKEN, looking_needs_token=True)
+    assert door.may_open({}, {"rig_page": door.pass_to_look}) and not door.may_open({}, {"rig_page": TOKEN})
+    assert not door.may_act({"authorization": f"Bearer {door.pass_to_look}", "cookie": f"rig_page={TOKEN}"})
+
+
+def test_no_cookie_is_set_where_every_port_of_this_computer_would_get_it(ask: Asking) -> None:
+    assert all("set-cookie" not in ask("GET", path)[2] for path in ("/", "/events", "/certificate.html"))
+
+
+@pytest.mark.parametrize("site", ["cross-site", "same-site"])
+@pytest.mark.parametrize("path", ["/events", "/certificate.html", "/page.js", "/"])
+def test_what_another_page_loads_from_here_is_refused(ask: Asking, path: str, site: str) -> None:
+    assert ask("GET", path, Sec_Fetch_Site=site, Sec_Fetch_Dest="image")[0] == 403
+    assert ask("POST", "/stop", Sec_Fetch_Site=site)[0] == 403
+    assert ask("GET", path, Sec_Fetch_Site="same-origin")[0] == ask("GET", path, Sec_Fetch_Site="none")[0] == 200
+
+
+def test_a_link_elsewhere_leads_to_the_page_and_to_nothing_that_it_shows(ask: Asking) -> None:
+    followed = {"Sec_Fetch_Site": "cross-site", "Sec_Fetch_Mode": "navigate", "Sec_Fetch_Dest": "document"}
+    assert ask("GET", "/", **followed)[0] == 200
+    assert ask("GET", "/events", **followed)[0] == ask("GET", "/certificate.html", **followed)[0] == 403
+
+
+def a_link(folder: Path) -> None:
+    (folder / "private").write_text("a private file", encoding="utf-8")
+    (folder / "certificate.html").symlink_to(folder / "private")
+
+
+def a_pipe(folder: Path) -> None:
+    os.mkfifo(folder / "certificate.html")
+
+
+def a_sea(folder: Path) -> None:
+    with (folder / "certificate.html").open("wb") as file:
+        file.truncate(1 << 30)
+
+
+@pytest.mark.parametrize("planted", [a_link, a_pipe, a_sea])
+def test_what_is_planted_as_a_certificate_is_not_shown(tmp_path: Path, planted: Callable[[Path], None]) -> None:
+    planted(tmp_path)
+    with server(tmp_path) as asking:
+        status, text, _ = asking("GET", "/certificate.html")
+    assert status == 404 and text.startswith("the certificate is not shown")
+
+
+def test_a_port_that_is_taken_is_refused_by_name(tmp_path: Path) -> None:
+    with socket.create_server(("127.0.0.1", 0)) as taken:
+        address = Address(port=taken.getsockname()[1])
+        with (
+            pytest.raises(Refused, match=r"page_address: .*in use"),
+            serving(Feed(Shown(About("", ""))), Control(may_answer=False), tmp_path, address),
+        ):
+            pass
 
 
 @pytest.mark.parametrize(
@@ -137,7 +197,7 @@ def test_a_page_that_may_not_answer_does_not(tmp_path: Path) -> None:
 
 def test_an_answer_counts_once_and_for_the_question_that_is_asked(tmp_path: Path) -> None:
     control = Control(may_answer=True)
-    answers: list[bool] = []
+    answers: list[bool | None] = []
     feed = Feed(Shown(About("", "")))
     asked = threading.Thread(target=lambda: answers.append(control.ask((), "start")))
     with server(tmp_path, control, feed) as asking:
@@ -178,3 +238,52 @@ def test_where_the_page_is_wanted(place: str | None, host: str, port: int | None
 def test_a_port_that_is_none_is_refused(place: str) -> None:
     with pytest.raises(Refused, match="page_address"):
         PageWish(place).address()
+
+
+def said(*words: str) -> PageWish | None:
+    parser = argparse.ArgumentParser()
+    add_arguments(parser)
+    return wish(parser.parse_args(["--page", *words]))
+
+
+def test_a_token_comes_from_a_file_or_the_environment_too(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setenv("RIG_PAGE_TOKEN", TOKEN)
+    file = tmp_path / "token"
+    file.write_text(f"{TOKEN}-of-a-file\n", encoding="utf-8")
+    file.chmod(0o600)
+    given = [said(), said("--page-token-file", str(file)), said("--page-token", f"{TOKEN}-said")]
+    assert [each and each.token for each in given] == [TOKEN, f"{TOKEN}-of-a-file", f"{TOKEN}-said"]
+
+
+@pytest.mark.parametrize("mode", [0o644, 0o640, None])
+def test_a_tokens_file_that_others_read_or_that_is_missing_is_refused(tmp_path: Path, mode: int | None) -> None:
+    file = tmp_path / "token"
+    if mode is not None:
+        file.write_text(TOKEN, encoding="utf-8")
+        file.chmod(mode)
+    with pytest.raises(Refused, match="page_address: the page's token is not taken") as refused:
+        said("--page-token-file", str(file))
+    assert TOKEN not in str(refused.value)
+
+
+def no_text(log: Path) -> None:
+    log.write_bytes(b"2026-11-23 12:00:00,000 INFO stopped \xff\n")
+
+
+def a_pipe_instead(log: Path) -> None:
+    os.mkfifo(log)
+
+
+def a_link_instead(log: Path) -> None:
+    (log.parent / "private").write_text("now INFO a private matter\n", encoding="utf-8")
+    log.symlink_to(log.parent / "private")
+
+
+@pytest.mark.parametrize(
+    ("planted", "words"), [(no_text, "; stopped \ufffd"), (a_pipe_instead, ""), (a_link_instead, "")]
+)
+def test_a_log_of_a_foreign_folder_is_read_as_far_as_it_is_one(
+    tmp_path: Path, planted: Callable[[Path], None], words: str
+) -> None:
+    planted(tmp_path / "log.txt")
+    assert last_words(tmp_path) == "this run has no result" + words

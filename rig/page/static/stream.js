@@ -3,7 +3,7 @@
 const SILENT_MS = 15000; // the server says something every 5 s
 const WHY = {
   403: "the address lacks its token: take the one the terminal shows",
-  503: "too many browsers look on: close one of them",
+  503: "too many browsers look on: close one, or take the address the terminal shows",
 };
 
 export const token = window.location.hash.slice(1);

@@ -1,0 +1,56 @@
+"""A run does not depend on the process that looks at its recording for the page."""
+
+import os
+import signal
+from pathlib import Path
+
+import pytest
+
+from rig.arm.motion import Sweep
+from rig.page.feed import Feed
+from rig.page.lookout import looking_out
+from rig.page.shown import About, Shown
+from rig.station.events import StepFinished
+from support.told_runs import moving, planned
+from support.waiting import wait_for
+
+
+def helper() -> int:
+    """The process that looks, a child of this one."""
+    for path in Path("/proc").glob("[0-9]*"):
+        try:
+            parent = int((path / "stat").read_text().rpartition(")")[2].split()[1])
+            if parent == os.getpid() and b"rig.page.looking" in (path / "cmdline").read_bytes():
+                return int(path.name)
+        except OSError:
+            continue
+    raise AssertionError("no process looks")
+
+
+def swept() -> StepFinished:
+    finished = (event for event in moving(planned(), 100.0) if isinstance(event, StepFinished))
+    return next(event for event in finished if isinstance(event.step, Sweep))
+
+
+@pytest.mark.parametrize("kind", ["SIGKILL", "SIGTERM"])
+@pytest.mark.parametrize("asked", ["before", "after"])
+def test_a_helper_that_is_killed_is_told_of_and_harms_nothing(
+    tmp_path: Path, capfd: pytest.CaptureFixture[str], kind: str, asked: str
+) -> None:
+    said = ""
+
+    def told() -> bool:
+        nonlocal said
+        said += capfd.readouterr().err
+        return "The page shows no more of observations" in said
+
+    with looking_out(tmp_path, Feed(Shown(About("", "")))) as lookout:
+        wait_for(lambda: helper() > 0, "the helper")
+        if asked == "after":
+            lookout.event(swept())
+            wait_for(lambda: not lookout.wanted.is_set(), "that it is asked", 10)
+        os.kill(helper(), getattr(signal, kind))
+        lookout.event(swept())
+        wait_for(told, "what is said of it", 10)
+        lookout.event(swept())
+    assert "Traceback" not in said and said.count("\n") == 1
