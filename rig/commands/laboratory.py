@@ -14,13 +14,16 @@ STOP_TIMEOUT_S = 5.0
 
 
 @contextmanager
-def simulated_laboratory(config_path: Path) -> Iterator[None]:
+def simulated_laboratory(config_path: Path, late: Path | None = None) -> Iterator[None]:
     """Run the world of `config_path` for the length of the `with` block.
+
+    Should steps of it come late, it writes to the file `late` what held them; to stderr where it is None.
 
     The world ends when its standard input closes, so it cannot outlive this process, however this process ends.
     Raises Refused: what the world refused, or `world_not_ready` when it ends without a word of its own.
     """
     command = [sys.executable, "-P", "-m", "rig.world", str(config_path), "--until-eof"]
+    command += [] if late is None else ["--late", str(late)]
     # A session of its own: Ctrl-C in the terminal must stop the arm first, not the laboratory under it.
     with subprocess.Popen(command, stdin=subprocess.PIPE, stdout=subprocess.PIPE, start_new_session=True) as process:
         assert process.stdin is not None and process.stdout is not None

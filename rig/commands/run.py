@@ -15,7 +15,7 @@ from rig.commands.remember import print_beside, remember
 from rig.config.load import load
 from rig.data.own_texts import note_own
 from rig.data.result_file import read_result
-from rig.data.run_folder import CONFIG, RESULT, SCRIPT, new_folder, script_identity
+from rig.data.run_folder import CONFIG, RESULT, SCRIPT, WORLD_LATE, new_folder, script_identity
 from rig.errors import Refused
 from rig.plans.script_file import ScriptFile, kept_script, load_script
 from rig.report.document import document_of
@@ -94,7 +94,7 @@ def _carry_out(folder: Path, found: Configured, *, assume_yes: bool, as_json: bo
             with this.reported():
                 held.enter_context(claimed(found.loaded.config))
                 if found.loaded.simulated:
-                    held.enter_context(simulated_laboratory(folder / CONFIG))
+                    held.enter_context(simulated_laboratory(folder / CONFIG, folder / WORLD_LATE))
             outcome = this.carry_out(found.phase)
             try:
                 entered, beside = remember(folder, found.loaded.config.history)

@@ -16,6 +16,7 @@ from rig.errors import Refused
 
 CONFIG, SCRIPT, RESULT = "config.yaml", "script.py", "result.json"
 SCRIPT_IDENTITY = "script.json"
+WORLD_LATE = "world_late.txt"  # what held steps of the simulated laboratory that came late
 IDENTITY_MAX_BYTES = 10_000
 _BEGINNINGS = {"raw": "run", "calibrated": "verify"}  # of the names of recordings, by what is streamed
 

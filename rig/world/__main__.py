@@ -1,4 +1,4 @@
-"""`python -m rig.world CONFIG [--until-eof]`: the simulated laboratory in the foreground, for any client.
+"""`python -m rig.world CONFIG [--until-eof] [--late FILE]`: the simulated laboratory in the foreground, for any client.
 
 Its first line on stdout is JSON: `ready` and where everything listens. With --until-eof whoever started it reads that
 line, so a refusal is said there too: `ready` false and the `problem`.
@@ -7,6 +7,7 @@ line, so a refusal is said there too: `ready` false and the `problem`.
 import argparse
 import json
 import sys
+from pathlib import Path
 
 from rig.config.load import load
 from rig.errors import Refused
@@ -16,6 +17,9 @@ def main(arguments: list[str] | None = None) -> int:
     parser = argparse.ArgumentParser(prog="python -m rig.world", description="The simulated laboratory.")
     parser.add_argument("config", metavar="CONFIG", help="a configuration file with a world: section")
     parser.add_argument("--until-eof", action="store_true", help="ignore Ctrl-C and end when standard input closes")
+    parser.add_argument(
+        "--late", type=Path, metavar="FILE", help="where to say what held steps that came late (stderr)"
+    )
     options = parser.parse_args(arguments)
     try:
         loaded = load(options.config, sections=None)
@@ -27,7 +31,7 @@ def main(arguments: list[str] | None = None) -> int:
                 f"the simulated laboratory needs the package {error.name}, which is not installed",
                 "Install the optional extra: pip install 'calibration-rig[world]'",
             ) from error
-        serve(loaded, options.until_eof)
+        serve(loaded, options.until_eof, options.late)
     except Refused as error:
         if options.until_eof:
             print(json.dumps({"ready": False, "problem": error.problem._asdict()}), flush=True)

@@ -48,7 +48,17 @@ class Connection:
         peer.setblocking(False)
         with suppress(OSError):
             peer.setsockopt(socket.IPPROTO_TCP, socket.TCP_NODELAY, 1)
+        self.wait_s = 0.0  # that the last `deliver` asked for
         self._watched = 0  # the events the selector looks for
+
+    @property
+    def client(self) -> str:
+        """Who it is, in words."""
+        try:
+            (host, port), (_, own_port) = self._peer.getpeername(), self._peer.getsockname()
+        except OSError:
+            return "a client that has hung up"
+        return f"client {host}:{port} of port {own_port}"
 
     def greet(self) -> None:
         self.watch()
@@ -84,13 +94,13 @@ class Connection:
         self._ticks += 1
         self._due = (b"" if self.listener.silent else self._due) + self.session.tick()
 
-    def deliver(self, idle: bool) -> float:
-        """Send what ticks made if the client is not too far behind; else the wall time to wait."""
+    def deliver(self, idle: bool, patient: bool) -> float:
+        """Send what ticks made, unless `patient` and the client is too far behind: then the wall time to wait."""
         if not self._due or self.listener.silent:
             return 0.0
         if self.listener.gathers and not idle and time.monotonic() - self._delivered_s < GATHER_S:
             return 0.0
-        wait_s = self._wire.wait_s(self._ticks * TICK_S)
+        wait_s = self.wait_s = self._wire.wait_s(self._ticks * TICK_S) if patient else 0.0
         if wait_s <= 0.0:
             due, self._due = self._due, b""
             self._delivered_s = time.monotonic()
@@ -271,12 +281,18 @@ class Network:
         for connection in tuple(self.connections):
             connection.tick()
 
-    def deliver(self, idle: bool = True) -> float:
+    def deliver(self, idle: bool = True, patient: bool = True) -> float:
         """Send what ticks made to every client whose wire is free; the wall time to wait for the others.
 
         A tick is over when this returns 0. `idle`: the next one is not due yet, so that nothing is gathered any longer.
+        `patient`: clients that are behind are waited for, as no real controller and no real board does.
         """
-        return max([connection.deliver(idle) for connection in tuple(self.connections)], default=0.0)
+        return max([connection.deliver(idle, patient) for connection in tuple(self.connections)], default=0.0)
+
+    def waited_for(self) -> str:
+        """The clients that are behind, in words; any thread may ask."""
+        behind = [connection.client for connection in tuple(self.connections) if connection.wait_s > 0.0]
+        return ", ".join(behind) or "no client"
 
     def close(self) -> None:
         for listener in self.listeners:

@@ -9,7 +9,9 @@ import sys
 import threading
 import time
 from collections.abc import Callable
+from contextlib import closing
 from functools import partial
+from pathlib import Path
 from typing import TYPE_CHECKING
 from urllib.parse import urlsplit
 
@@ -20,6 +22,7 @@ from rig.errors import Refused
 from rig.world.board.serial_line import SerialLine, SerialSession
 from rig.world.clock import Clock
 from rig.world.fault_channel import ControlSession
+from rig.world.flight_recorder import FlightRecorder
 from rig.world.laboratory import Laboratory
 from rig.world.network import UNPACED, Listener, Network, Session
 from rig.world.section import world_section
@@ -131,12 +134,15 @@ class World:
     def end(self) -> None:
         self._ended = True
 
-    def run(self) -> None:
-        """Serve until `end`. A tick ends when its clients have been given theirs, and they have their own pace."""
+    def run(self, alive: Callable[[], None] = lambda: None) -> None:
+        """Serve until `end`. A tick ends when its clients have been given theirs, and they have their own pace.
+
+        `alive` is called after every tick, and whenever none is due.
+        """
         polled_s = 0.0
         while not self._ended:
             wait_s = self.clock.wait_s()
-            behind_s = self.network.deliver(idle=wait_s > 0.0)
+            behind_s = self.network.deliver(idle=wait_s > 0.0, patient=self.clock.time_scale > 1.0)
             if behind_s or wait_s > 0.0 or time.monotonic() - polled_s >= BUSY_POLL_S:
                 self.network.poll(behind_s or min(wait_s, IDLE_POLL_S))
                 polled_s = time.monotonic()
@@ -146,6 +152,9 @@ class World:
                     listener.set_silent(False)
             if not behind_s and not self._ended and self.clock.wait_s() <= 0.0:
                 self._tick()
+                alive()
+            elif wait_s > 0.0:
+                alive()
 
     def _tick(self) -> None:
         """One tick; while nothing but a client can let the arm move, all that are due now, `LEAP` at most.
@@ -215,8 +224,11 @@ def _open_pty(line: SerialLine, selector: selectors.BaseSelector) -> "PtyPort":
     return PtyPort(line, selector)
 
 
-def serve(loaded: Loaded, until_eof: bool) -> None:
-    """Run the world until end of input (`until_eof`) or Ctrl-C. Raises `Refused` when a port cannot be had."""
+def serve(loaded: Loaded, until_eof: bool, late: Path | None = None) -> None:
+    """Run the world until end of input (`until_eof`) or Ctrl-C. Raises `Refused` when a port cannot be had.
+
+    What held steps that came late is written to the file `late`; to stderr where it is None.
+    """
     world = World(loaded)
     try:
         signal.signal(signal.SIGTERM, lambda *_: world.end())
@@ -229,8 +241,9 @@ def serve(loaded: Loaded, until_eof: bool) -> None:
         gc.collect()
         gc.freeze()
         gc.set_threshold(GARBAGE)
-        print(world.describe(), flush=True)
-        world.run()
+        with closing(FlightRecorder(late, world.network.waited_for)) as recorder:
+            print(world.describe(), flush=True)
+            world.run(recorder.alive)
     except KeyboardInterrupt:
         pass
     finally:

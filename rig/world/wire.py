@@ -10,11 +10,11 @@ import socket
 import struct
 from collections.abc import Callable
 
-# So long (wall time) a client is waited for; until it has caught up it then gets what it is sent as fast as from a real
-# controller. One that often lets the world wait longer than the least is waited for less.
-LEAST_PATIENCE_S, PATIENCE_S = 0.3, 0.7
-REGAINED = 0.1  # of the time that passes, in patience
-GONE_S = 5.0  # one that has taken nothing for so long reads no more, and slows the world for nobody else
+# Wall time, all of it. Patience is earned by keeping pace: a client that never does costs the others only the first.
+FIRST_PATIENCE_S, PATIENCE_S = 0.1, 5.0
+EARNED = 0.5  # of the time in which a client keeps pace, in patience
+IN_PACE_S = 0.05  # a wait no longer than this costs no patience: it is how fast the client works, not that it sleeps
+STANDS_S = 0.7  # so long the world stands for a client; while patience lasts it then goes as fast as a real one
 LOOK_S = (0.0001, 0.001)  # time between two looks at a client that is waited for: a quarter of its delay, within these
 
 Unread = Callable[[], int]
@@ -79,13 +79,18 @@ class SocketTable:
 
 
 class Wire:
-    """One client's pace: it may be `lag_s` of the world's time behind before the world waits for it."""
+    """One client's pace: it may be `lag_s` of the world's time behind before the world waits for it.
+
+    A client that takes what it is sent as fast as it can is waited for, however slow that is; one that lets it lie
+    only as long as its patience lasts, and then no more until it has kept pace again.
+    """
 
     def __init__(self, unread: Unread, lag_s: float, wall: Callable[[], float]) -> None:
         self._unread, self._lag_s, self._wall = unread, lag_s, wall
         self._behind_since_s: float | None = None  # the world's time of the first packet that is not known to be taken
         self._waiting_since_s: float | None = None  # wall time, as everything below
-        self._patience_s = PATIENCE_S
+        self._patience_s = FIRST_PATIENCE_S
+        self._in_pace = True
         self._settled_s = wall()
         self._sent_s, self._sent_time_s = 0.0, 0.0  # of the last packet, and the world's time then
 
@@ -106,16 +111,16 @@ class Wire:
         if self._waiting_since_s is None:
             self._waiting_since_s = now_s
         waited_s = now_s - self._waiting_since_s
-        if waited_s > GONE_S:
+        if waited_s >= max(self._patience_s, IN_PACE_S if self._in_pace else 0.0):
             return 0.0
-        if waited_s > self._patience_s:
+        if waited_s > STANDS_S:
             return max(0.0, self._sent_s + time_s - self._sent_time_s - now_s)
         return min(max(LOOK_S[0], waited_s / 4), LOOK_S[1])
 
     def _settle(self, now_s: float) -> None:
         """The client has caught up."""
         waited_s = 0.0 if self._waiting_since_s is None else now_s - self._waiting_since_s
-        spent_s = max(0.0, min(waited_s, self._patience_s) - LEAST_PATIENCE_S)
-        regained_s = REGAINED * (now_s - self._settled_s)
-        self._patience_s = min(self._patience_s - spent_s + regained_s, PATIENCE_S)
+        self._in_pace = waited_s <= IN_PACE_S
+        change_s = EARNED * (now_s - self._settled_s) if self._in_pace else -waited_s
+        self._patience_s = min(max(self._patience_s + change_s, 0.0), PATIENCE_S)
         self._settled_s, self._behind_since_s, self._waiting_since_s = now_s, None, None

@@ -57,6 +57,11 @@ def hardware(config: Path, folder: Path) -> Path:
     return path
 
 
+def late_path(config_path: Path) -> Path:
+    """Where a world says what held steps that came late."""
+    return config_path.with_suffix(".late.txt")
+
+
 class WorldHandle:
     """A running world. `control` asks its control channel, so that tests can make the laboratory misbehave."""
 
@@ -109,7 +114,10 @@ def worlds(folder: Path) -> Iterator[World]:
         config_path = folder / f"world-{len(running)}.yaml"
         config_path.write_text(yaml.safe_dump(document, sort_keys=False, allow_unicode=True), encoding="utf-8")
         process = subprocess.Popen(
-            [sys.executable, "-m", "rig.world", str(config_path), "--until-eof"],
+            [
+                *(sys.executable, "-m", "rig.world", str(config_path), "--until-eof"),
+                *("--late", str(late_path(config_path))),
+            ],
             stdin=subprocess.PIPE,
             stdout=subprocess.PIPE,
             start_new_session=True,
