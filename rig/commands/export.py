@@ -3,6 +3,7 @@
 from pathlib import Path
 
 from rig.data.result_file import ResultDocument, passed_result, read_result
+from rig.data.run_folder import refuse_links
 from rig.errors import Refused
 from rig.observation.observed_run import observe_runs
 from rig.plans.recorded import open_run
@@ -15,8 +16,8 @@ def export(run: Path, name: str, out: Path | None, moved: tuple[str, str] | None
     """Readings of the first movement, or the calibrations of a run that passed, into `out`.
 
     `moved`: a temperature in °C, and the run of `bias_drift` that tells how to get there.
-    Returns 0. Raises Refused `report_folder`, `bad_option`, of readings as `open_run` and `observe_runs`, of
-    calibrations as `passed_result`, `at_temperature` and `exported` do, `missing_extra`.
+    Returns 0. Raises Refused `report_folder`, `bad_option`, `missing_extra`, as `refuse_links` does, of readings as
+    `open_run` and `observe_runs`, of calibrations as `passed_result`, `at_temperature` and `exported`.
     """
     if moved is not None and name in OF_READINGS:
         raise Refused("bad_option", f"--at-temperature is for calibrations, and {name} holds readings", "Leave it out")
@@ -26,11 +27,11 @@ def export(run: Path, name: str, out: Path | None, moved: tuple[str, str] | None
             recordings = observe_runs(open_run(run).movement)
             if not recordings:
                 raise Refused("nothing_to_export", "no sweep or dwell was finished", "Resume the run")
-            folder.mkdir(parents=True, exist_ok=True)
+            _made(folder)
             written = writer_of_readings(name)(recordings, folder)
         else:
             texts = texts_of_calibrations(name)(_calibration(run, moved))
-            folder.mkdir(parents=True, exist_ok=True)
+            _made(folder)
             written = [folder / file for file in texts]
             for path, text in zip(written, texts.values(), strict=True):
                 path.write_text(text, encoding="utf-8")
@@ -39,6 +40,13 @@ def export(run: Path, name: str, out: Path | None, moved: tuple[str, str] | None
     for path in written:
         say(str(path))
     return 0
+
+
+def _made(folder: Path) -> None:
+    """Make the folder, unless a link leads elsewhere, from it or from what lies in it. Raises Refused and OSError."""
+    refuse_links(folder.parent, folder)
+    folder.mkdir(parents=True, exist_ok=True)
+    refuse_links(*folder.rglob("*"))
 
 
 def _calibration(run: Path, moved: tuple[str, str] | None) -> ResultDocument:

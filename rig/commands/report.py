@@ -8,7 +8,7 @@ from rig.commands.named_history import named_history
 from rig.commands.remember import remember_certificate
 from rig.data.magnetometer_entries import read_reversal
 from rig.data.result_file import read_result
-from rig.data.run_folder import RESULT
+from rig.data.run_folder import RESULT, refuse_links
 from rig.errors import Refused
 from rig.history.issued import issued_certificate
 from rig.report.certificate.content import Certificate, certificate_of
@@ -31,8 +31,8 @@ def report(
     """Certificate of a run folder or its result.json: HTML, and with `dcc` and `pdf` in these forms, into `out`.
 
     `reversal` is what `rig reversal` wrote of its magnetometers; `history` where it is noted, the user's own history by
-    default, and never one that the folder names. Returns 0. Raises Refused as `read_result`,
-    `read_reversal`, `certificate_of`, `stated_in`, `digital_certificate` and `write_pdf` do, `report_folder`.
+    default, and never one that the folder names. Returns 0. Raises Refused `report_folder`, and as `read_result`,
+    `read_reversal`, `refuse_links`, `certificate_of`, `stated_in`, `digital_certificate` and `write_pdf` do.
     """
     file = run / RESULT if run.is_dir() else run
     result = read_result(file)
@@ -45,11 +45,13 @@ def report(
     folder = out or file.parent
     try:
         folder.mkdir(parents=True, exist_ok=True)
+        refuse_links(folder, *(folder / name for name in written))
         for name, content in written.items():
             (folder / name).write_bytes(content)
         if pdf:
             from rig.report.certificate.pdf import PDF, write_pdf
 
+            refuse_links(folder / PDF)
             write_pdf(written[PAGE].decode(), {RESULT: file.read_bytes(), **digital}, folder / PDF)
             written[PDF] = (folder / PDF).read_bytes()
     except OSError as error:

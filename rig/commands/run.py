@@ -15,7 +15,7 @@ from rig.commands.remember import print_beside, remember
 from rig.config.load import load
 from rig.data.own_texts import note_own
 from rig.data.result_file import read_result
-from rig.data.run_folder import CONFIG, RESULT, SCRIPT, WORLD_LATE, new_folder, script_identity
+from rig.data.run_folder import CONFIG, RESULT, SCRIPT, WORLD_LATE, new_folder, refuse_links, script_identity
 from rig.errors import Refused
 from rig.plans.script_file import ScriptFile, kept_script, load_script
 from rig.report.document import document_of
@@ -64,8 +64,8 @@ def resume(
 
     A sweep that the verdict named as disturbed is repeated. Of a folder that is somebody else's `script` names the
     script, which is executed, and `connect` the addresses that may be connected to. Returns as `run` does. Raises
-    Refused `no_run`, `already_finished`, and as `read_result`, `refuse_foreign_addresses`, `script_identity` and
-    `kept_script`.
+    Refused `no_run`, `already_finished`, and as `refuse_links`, `read_result`, `refuse_foreign_addresses`,
+    `script_identity` and `kept_script`.
     """
     if not (folder / CONFIG).exists():
         raise Refused("no_run", f"{folder} holds no {CONFIG}", "Give the folder of an interrupted run")
@@ -77,6 +77,7 @@ def resume(
             f"{folder} keeps no {SCRIPT}, so the script it was begun with is not known",
             "Start a new run with `rig run`",
         )
+    refuse_links(folder, *folder.iterdir())
     refuse_foreign_addresses(folder, load(folder / CONFIG, sections=None), connect)
     named = None if script is None else load_script(script)
     found = configured(folder / CONFIG, script=kept_script(folder, script_identity(folder), named))

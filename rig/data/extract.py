@@ -23,6 +23,7 @@ from rig.data.layout import EVENTS_DTYPE, SCHEMA, TEXTS, sample_dtype
 
 OPEN_FOR_WRITING = 0x01  # of the superblock's consistency flags
 NO_ROOM = 2
+MAX_UNPACKED = 50  # times the stored size: readings with noise come to a fifth, zeros to a thousandth
 MAX_UNWRITTEN_ROWS = 100_000  # announced and not there: what a kill leaves of one flush, and more
 
 
@@ -92,6 +93,8 @@ def _rows(dataset: Any, name: str, dtype: np.dtype[Any]) -> NDArray[Any]:
     stored = _stored_rows(dataset)
     if len(dataset) > stored + MAX_UNWRITTEN_ROWS:
         raise ValueError(f"{name} announces {len(dataset)} rows and holds {stored}")
+    if dataset.nbytes > MAX_UNPACKED * dataset.id.get_storage_size() + MAX_UNWRITTEN_ROWS * dtype.itemsize:
+        raise ValueError(f"{name} unpacks {dataset.id.get_storage_size()} bytes to {dataset.nbytes}")
     rows: NDArray[Any] = dataset[:]
     return rows
 

@@ -9,6 +9,7 @@ from typing import Final, Literal
 
 from pydantic import ConfigDict, Field, JsonValue
 
+from rig.config.section import SensorName
 from rig.data.accelerometer_entries import AccelerometerEntry
 from rig.data.budget_entries import BiasProcessEntry, BudgetEntry, ClockEntry
 from rig.data.checked import read_document
@@ -307,6 +308,7 @@ class ResultDocument(Entry):
     It is also empty where no sweeps were made, `accelerometers` where none were calibrated, `magnetometers` where none
     were recorded; one that was recorded and not calibrated says why.
     `bias_drift` holds the biases by repeat of a run of that procedure, by sensor, then by "rate" and "acceleration".
+    A sensor's name becomes that of files: what a configuration does not take for one is none here either.
     """
 
     schema_name: Literal["rig.result/1"] = Field(alias="schema")  # as SCHEMA
@@ -314,11 +316,11 @@ class ResultDocument(Entry):
     checks: tuple[CheckEntry, ...]
     provenance: ProvenanceEntry
     clock: ClockEntry | None = None
-    sensors: dict[str, SensorEntry]
-    verification: dict[str, VerificationEntry]
-    accelerometers: dict[str, AccelerometerEntry] = Field(default_factory=dict)
-    magnetometers: dict[str, MagnetometerEntry | ErrorEntry] = Field(default_factory=dict)
-    bias_drift: dict[str, dict[str, DriftEntry]] = Field(default_factory=dict)
+    sensors: dict[SensorName, SensorEntry]
+    verification: dict[SensorName, VerificationEntry]
+    accelerometers: dict[SensorName, AccelerometerEntry] = Field(default_factory=dict)
+    magnetometers: dict[SensorName, MagnetometerEntry | ErrorEntry] = Field(default_factory=dict)
+    bias_drift: dict[SensorName, dict[str, DriftEntry]] = Field(default_factory=dict)
 
     def text(self) -> str:
         """The JSON; what was left out stays out."""

@@ -25,6 +25,7 @@ from pydantic import Field
 
 from rig.arm.silence import Silence
 from rig.arm.state import ARM_STATE_DTYPE, ArmState
+from rig.config.section import SensorName
 from rig.config.sensor_catalogue import has_own_port
 from rig.data.checked import Finite, Positive, checked
 from rig.data.events import Event, Recorded, from_lines, to_line
@@ -265,6 +266,7 @@ def read_run(path: Path, timeout_s: float | None = None) -> RunData:
     """
     contents = _contents(path, timeout_s)
     try:
+        checked(_Named, {"sensors": [*contents.described]}, "samples")
         return RunData(
             config=contents.texts["config"],
             settings=_settings(contents),
@@ -394,6 +396,13 @@ def _whole_rows(rows: NDArray[Any]) -> NDArray[Any]:
     written = np.flatnonzero(rows["host_time_s"])
     count = int(written[-1]) + 1 if len(written) else 0
     return rows if count == len(rows) else rows[: max(count - 1, 0)]  # the last one may be torn
+
+
+@dataclass(frozen=True, slots=True)
+class _Named:
+    """The names of the sensors: they become those of files, so what a configuration does not take is none."""
+
+    sensors: tuple[SensorName, ...]
 
 
 @dataclass(slots=True)

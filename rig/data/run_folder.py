@@ -108,3 +108,17 @@ def next_recording(folder: Path, readings: str) -> Path:
 def resuming(folder: Path) -> str:
     """The command that goes on with an interrupted run."""
     return f"rig resume {shlex.quote(str(folder))}"
+
+
+def refuse_links(*places: Path) -> None:
+    """Nothing of the rig's is written through a link, or into a pipe, that somebody may have laid into a folder.
+
+    Raises Refused `not_written_through` where one of the places is there and neither a regular file nor a folder.
+    """
+    for place in places:
+        if place.is_symlink() or (place.exists() and not (place.is_file() or place.is_dir())):
+            raise Refused(
+                "not_written_through",
+                f"{place} is a link, a pipe or a device, and nothing is written through it",
+                "Look where it leads; remove it, or name another folder with --out",
+            )

@@ -9,7 +9,7 @@ from typing import Any
 
 from rig.config.judging_sections import HistorySection
 from rig.config.load import Loaded, load
-from rig.config.regular_file import UnfitFile, read_regular_file
+from rig.config.regular_file import UnfitFile, open_regular_file, read_regular_file
 from rig.data.result_file import SIZE_MAX_BYTES, ResultDocument, read_result
 from rig.data.run_folder import CONFIG, RESULT, SCRIPT, SCRIPT_IDENTITY, recordings
 from rig.errors import Refused
@@ -21,6 +21,7 @@ from rig.report.certificate.stated import Stated, of_configuration
 PAGE, HEADER = "certificate.html", "calibration.h"
 DOCUMENTS = (RESULT, CONFIG, SCRIPT, SCRIPT_IDENTITY, HEADER)
 CHUNK_BYTES = 1 << 20
+RECORDING_MAX_BYTES = 1 << 40  # more than a disk full of days
 PAGE_MAX_BYTES = 64_000_000  # of a run of six sweeps it has 30,000
 
 
@@ -115,9 +116,9 @@ def document_sha256(folder: Path, name: str) -> str | None:
 
 
 def recording_of(file: Path) -> Recording:
-    """A recording with its hash. Raises OSError."""
+    """A recording with its hash. Raises OSError, and UnfitFile for what is no file of a run."""
     digest, size = hashlib.sha256(), 0
-    with file.open("rb") as stream:
+    with open_regular_file(file, RECORDING_MAX_BYTES) as stream:
         while chunk := stream.read(CHUNK_BYTES):
             digest.update(chunk)
             size += len(chunk)

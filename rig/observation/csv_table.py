@@ -13,6 +13,7 @@ from rig.errors import Refused
 from rig.errors.quoting import quote, shorten
 from rig.estimation.arrays import Array
 
+LONGEST_LINE = 10_000  # characters: of a hundred columns, where there are at most twenty
 LARGEST_NUMBER = 1e12  # either sign, in any SI unit: what is beyond is a mistake, and its square might overflow
 
 
@@ -52,9 +53,17 @@ def _rows(path: Path, largest_mb: int) -> Iterator[list[str]]:
             open_regular_file(path, largest_mb * 1_000_000) as file,
             TextIOWrapper(file, encoding="utf-8-sig", newline="") as text,
         ):
-            yield from csv.reader(text)
+            yield from csv.reader(_lines(text))
     except (UnfitFile, OSError, ValueError, csv.Error) as error:
         raise _unreadable(path, str(error)) from error
+
+
+def _lines(text: TextIOWrapper) -> Iterator[str]:
+    """The lines, none of which is endless."""
+    while line := text.readline(LONGEST_LINE):
+        if len(line) == LONGEST_LINE:
+            raise UnfitFile(f"a line is longer than {LONGEST_LINE} characters")
+        yield line
 
 
 def _unreadable(path: Path, why: str) -> Refused:

@@ -2,6 +2,7 @@
 
 import hashlib
 import json
+import os
 import shutil
 from collections.abc import Callable
 from pathlib import Path
@@ -10,6 +11,8 @@ import h5py
 import pytest
 
 import rig as public
+from rig.errors import Refused
+from rig.world.board.flash_file import flash_of
 from support.commands import configuration, rig_here
 from support.paths import FIXTURES, ROOT
 
@@ -87,3 +90,87 @@ def test_a_run_by_anothers_script_goes_on_by_a_script_that_the_user_names_or_not
     assert refused.returncode == 2 and "rig: foreign_script: " in refused.stderr, refused.stderr
     assert f"--script '{foreign / 'script.py'}'" in refused.stderr
     assert not (tmp_path / "trace").exists()
+
+
+@pytest.mark.parametrize(
+    ("laid", "command"),
+    [
+        ("certificate.html", ["report"]),
+        ("export", ["export", "--format", "csv"]),
+        ("log.txt", ["resume", "--yes"]),
+    ],
+)
+@pytest.mark.parametrize("kind", ["link", "pipe"])
+def test_nothing_is_written_through_what_somebody_laid_into_a_folder(
+    foreign: Path, tmp_path: Path, laid: str, command: list[str], kind: str
+) -> None:
+    target = tmp_path / "precious"
+    target.write_text("mine", encoding="utf-8")
+    (foreign / laid).unlink(missing_ok=True)
+    if kind == "pipe":
+        os.mkfifo(foreign / laid)
+    else:
+        (foreign / laid).symlink_to(target)
+    if command[0] == "resume":
+        (foreign / "result.json").unlink()
+    refused = rig_here(command[0], foreign, *command[1:])
+    assert refused.returncode == 2 and "rig: not_written_through: " in refused.stderr, refused.stderr
+    assert target.read_text(encoding="utf-8") == "mine"
+
+
+@pytest.mark.parametrize("endless", ["pipe", "/dev/zero"])
+def test_a_recording_that_never_ends_ends_no_import(foreign: Path, endless: str) -> None:
+    (foreign / "run.h5").unlink()
+    if endless == "pipe":
+        os.mkfifo(foreign / "run.h5")
+    else:
+        (foreign / "run.h5").symlink_to(endless)
+    for solved in ((), ("--solve",)):
+        done = rig_here("history", "import", foreign, *solved, "--history", foreign.parent / "history.sqlite")
+        assert done.returncode == 1 and "it is no regular file" in done.stderr, done.stderr
+
+
+@pytest.mark.parametrize("name", ["../../x", "a\nb", "a\x1b[2J", ".."])
+def test_a_name_that_is_no_sensors_names_no_file(foreign: Path, tmp_path: Path, name: str) -> None:
+    document = json.loads((foreign / "result.json").read_text(encoding="utf-8"))
+    document["sensors"][name] = document["sensors"].pop("gyro")
+    (foreign / "result.json").write_text(json.dumps(document), encoding="utf-8")
+    before = {*tmp_path.rglob("*")}
+    refused = rig_here("export", foreign, "--format", "kalibr")
+    assert refused.returncode == 2 and "rig: not_a_result: " in refused.stderr and {*tmp_path.rglob("*")} == before
+
+
+def test_a_recording_that_unpacks_without_end_is_refused_before_it_does(foreign: Path) -> None:
+    with h5py.File(foreign / "run.h5", "r+") as file:
+        rows = file["samples/gyro"]
+        attributes, dtype = dict(rows.attrs), rows.dtype
+        del file["samples/gyro"]
+        packed = file.create_dataset(
+            "samples/gyro", (3_000_000,), dtype, chunks=(100_000,), compression="gzip", compression_opts=1
+        )
+        packed[:] = 0
+        packed.attrs.update(attributes)
+    refused = rig_here("solve", foreign)
+    assert refused.returncode == 2 and "rig: not_a_run_file: " in refused.stderr and "unpacks" in refused.stderr
+
+
+def test_a_line_of_ten_million_columns_is_refused(tmp_path: Path) -> None:
+    samples, sweeps = tmp_path / "samples.csv", ROOT / "docs" / "examples" / "sweeps.csv"
+    samples.write_text("time_s" + ",x_rad_s" * 1_000_000, encoding="utf-8")
+    refused = rig_here("solve", samples, "--sweeps", sweeps)
+    assert refused.returncode == 2 and "a line is longer than 10000 characters" in refused.stderr
+
+
+@pytest.mark.parametrize("kind", ["another file", "link", "pipe"])
+def test_a_configuration_cannot_have_a_file_replaced_that_is_no_boards_flash(tmp_path: Path, kind: str) -> None:
+    file, target = tmp_path / "flash.bin", tmp_path / "precious"
+    target.write_bytes(bytes(300_000))
+    if kind == "another file":
+        file.write_bytes(target.read_bytes())
+    elif kind == "link":
+        file.symlink_to(target)
+    else:
+        os.mkfifo(file)
+    with pytest.raises(Refused, match=r"flash_file: .* is no flash that a simulated board left"):
+        flash_of(file)
+    assert target.read_bytes() == bytes(300_000)

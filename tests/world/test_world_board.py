@@ -159,7 +159,7 @@ def test_a_flash_file_keeps_the_calibration_for_the_next_world_but_never_the_pro
     assert stored_scale(booted(kept)) == (1.25, 1.0, 0.75)
     data = file.read_bytes()
     assert data.startswith(firmware("bin"))
-    file.write_bytes(bytes(STORE_OFFSET) + data[STORE_OFFSET:])  # another program, long ago
+    file.write_bytes(data[:8] + bytes(STORE_OFFSET - 8) + data[STORE_OFFSET:])  # another program, long ago
     assert stored_scale(booted(kept)) == (1.25, 1.0, 0.75)
 
 
