@@ -8,9 +8,11 @@ import numpy as np
 import pytest
 
 import rig
+from rig.data.result_file import ResultDocument, read_result
 from rig.errors import Refused
 from rig.observation.windows import swept
 from support.paths import DOCS, FIXTURES
+from support.stated import SHARE, differences
 
 
 @pytest.fixture(scope="module")
@@ -47,15 +49,15 @@ def test_readings_are_in_rad_s_on_the_arms_clock(run: rig.Run) -> None:
 
 
 def test_the_result_is_that_of_the_run(result: rig.Result) -> None:
-    then = json.loads((FIXTURES / "verified" / "result.json").read_text(encoding="utf-8"))
-    gyro = then["sensors"]["gyro"]
-    np.testing.assert_allclose(result["gyro"].scale, gyro["scale"], rtol=1e-12)
-    np.testing.assert_allclose(result["gyro"].bias_rad_s, gyro["bias_rad_s"], rtol=1e-12)
-    np.testing.assert_allclose(result["gyro"].std ** 2, np.diag(gyro["covariance"]), rtol=1e-12)
-    assert result.verdict == then["verdict"] == "pass"
-    document = result.to_dict()
+    then, document = read_result(FIXTURES / "verified"), result.to_dict()
+    now = ResultDocument.model_validate(document)
+    assert differences(then, now) == []
+    gyro = now.sensors["gyro"]
+    assert (*result["gyro"].scale, *result["gyro"].bias_rad_s) == (*gyro.scale, *gyro.bias_rad_s)
+    np.testing.assert_allclose(result["gyro"].std ** 2, np.diag(gyro.covariance))
+    assert result.verdict == then.verdict == "pass"
     assert json.loads(json.dumps(document)) == document
-    assert set(document) == set(then)
+    assert set(document) == set(json.loads(then.text()))
 
 
 def test_another_estimator_and_another_threshold(run: rig.Run) -> None:
@@ -68,9 +70,10 @@ def test_another_estimator_and_another_threshold(run: rig.Run) -> None:
 def test_two_sensors_beside_each_other(run: rig.Run) -> None:
     beside = rig.compare(run, "gyro", "reference")
     assert beside.before is not None and beside.after is not None
-    then = json.loads((FIXTURES / "verified" / "result.json").read_text(encoding="utf-8"))["verification"]["gyro"]
-    np.testing.assert_allclose(beside.after.movement.rms_rad_s, then["after"]["movement"]["rms_rad_s"], rtol=1e-12)
-    np.testing.assert_allclose(beside.before.movement.rms_rad_s, then["before"]["movement"]["rms_rad_s"], rtol=1e-12)
+    then = read_result(FIXTURES / "verified").verification["gyro"]
+    assert then.before is not None
+    np.testing.assert_allclose(beside.after.movement.rms_rad_s, then.after.movement.rms_rad_s, rtol=SHARE)
+    np.testing.assert_allclose(beside.before.movement.rms_rad_s, then.before.movement.rms_rad_s, rtol=SHARE)
     other_way = rig.compare(run, "reference", "gyro")  # the calibrated one is the reference of the reference
     assert other_way.after is not None
     assert other_way.after.movement.rms_rad_s.max() < 0.006
