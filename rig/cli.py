@@ -124,7 +124,9 @@ def _parser() -> argparse.ArgumentParser:
     allan = add(
         "allan", _allan, "random walk and bias instability, by the Allan deviation of what was recorded at rest"
     )
-    allan.add_argument("run", type=Path, metavar="RUN", help="a run folder or its run.h5")
+    allan.add_argument(
+        "run", type=Path, metavar="RECORDING", help="a run folder, its run.h5, or a log of a sensor at rest as CSV"
+    )
     allan.add_argument("--plot", type=Path, metavar="DIR", help="draw the curves into this folder")
     allan.add_argument("--json", action="store_true", help="for machines")
     _add_reversal(add("reversal", _reversal, "a magnetometer's own bias, from runs between which it was turned over"))

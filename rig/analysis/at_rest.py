@@ -1,7 +1,7 @@
-"""How the sensors of a recording behave while the arm stands still: Allan deviation of every rest and dwell. Pure."""
+"""How sensors behave at rest, by the Allan deviation of every rest and dwell, or of a log made elsewhere. Pure."""
 
-from collections.abc import Iterator, Sequence
-from dataclasses import dataclass
+from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import dataclass, replace
 from functools import partial
 from itertools import pairwise
 from typing import Literal
@@ -15,7 +15,10 @@ from rig.estimation.allan import AllanAxis, AllanCurve, allan_curve, read_axis, 
 from rig.estimation.arrays import Array
 from rig.observation.acceleration import accelerations
 from rig.observation.average import Stream, between, on_the_arms_clock
+from rig.observation.csv_samples import Quantity as Measured
+from rig.observation.csv_samples import Samples
 from rig.observation.observe import MAX_REST_TRAVEL_RAD, REST_SETTLING_S
+from rig.observation.steadiness import check_at_rest, whole_stretches
 from rig.observation.timebase import ArmMotion
 from rig.observation.windows import rested
 
@@ -28,7 +31,8 @@ FEWEST_TO_JUDGE = 20  # readings: fewer may be alike
 class AtRest:
     """One quantity of a sensor at rest: its Allan deviation in rad/s or m/s², what each axis tells, what it rests on.
 
-    `longest_s` is the longest stretch without a gap, `total_s` that of all; `temperature_c` the least and the largest.
+    `longest_s` is the longest stretch without a gap, `total_s` that of all; `temperature_c` the least and the largest,
+    None where no thermometer was recorded.
     """
 
     curve: AllanCurve
@@ -36,15 +40,15 @@ class AtRest:
     stretches: int
     longest_s: float
     total_s: float
-    temperature_c: tuple[float, float]
+    temperature_c: tuple[float, float] | None
 
 
 @dataclass(frozen=True, slots=True)
 class SensorAtRest:
-    """A sensor, and each quantity it sends, or the Fault it ends in."""
+    """A sensor, None where the readings do not say which, and each quantity it sends, or the Fault it ends in."""
 
-    sensor: RecordedSensor
-    quantities: dict[Quantity, AtRest | Fault]
+    sensor: RecordedSensor | None
+    quantities: Mapping[Measured, AtRest | Fault]
 
 
 def at_rest(runs: Sequence[RunData]) -> dict[str, SensorAtRest]:
@@ -64,6 +68,25 @@ def at_rest(runs: Sequence[RunData]) -> dict[str, SensorAtRest]:
     return found
 
 
+def log_at_rest(samples: Samples) -> SensorAtRest:
+    """What a log of readings says that was made elsewhere, with the sensor at rest all the time.
+
+    Raises Fault `not_at_rest`.
+    """
+    for quantity, readings in samples.readings.items():
+        check_at_rest(samples.time_s, readings, quantity)
+    pieces = [inside for inside in whole_stretches(samples.time_s) if inside.stop - inside.start > 2]
+    return SensorAtRest(
+        None,
+        {
+            quantity: or_fault(
+                partial(_told, [samples.time_s[each] for each in pieces], [readings[each] for each in pieces], quantity)
+            )
+            for quantity, readings in samples.readings.items()
+        },
+    )
+
+
 def _stretches(run: RunData, stream: Stream, motion: ArmMotion) -> Iterator[slice]:
     """The samples of every rest and dwell in which the arm stood still, apart where one is missing."""
     for window in rested(run):
@@ -80,26 +103,32 @@ def _stretches(run: RunData, stream: Stream, motion: ArmMotion) -> Iterator[slic
 
 def _of(pieces: Sequence[tuple[Stream, slice]], quantity: Quantity) -> AtRest:
     long = [(stream, inside) for stream, inside in pieces if inside.stop - inside.start > 2]
-    if not long:
-        raise too_short("the arm never stood still for longer than a few readings")
     readings = [_readings(stream, inside, quantity) for stream, inside in long]
+    told = _told([stream.time_s[inside] for stream, inside in long], readings, quantity)
+    temperatures = [_temperatures(stream, inside) for stream, inside in long]
+    return replace(told, temperature_c=(min(low for low, _ in temperatures), max(high for _, high in temperatures)))
+
+
+def _told(times_s: Sequence[Array], readings: Sequence[Array], quantity: Measured) -> AtRest:
+    """Of stretches at rest, each of (nᵢ,) times and (nᵢ, 3) readings."""
+    if not readings:
+        raise too_short("nothing stood still for longer than a few readings")
     if any(not np.ptp(each, axis=0).all() for each in readings if len(each) > FEWEST_TO_JUDGE):
         raise Fault(
             "stuck_sensor",
             f"an axis repeats one {quantity} through a whole rest",
             "Check the sensor's supply and its wiring; a sensor whose noise is below its resolution has no such curve",
         )
-    times = [(stream.time_s[inside.stop - 1] - stream.time_s[inside.start]) for stream, inside in long]
-    interval_s = float(np.sum(times) / np.sum([len(each) - 1 for each in readings]))
+    durations_s = [float(each[-1] - each[0]) for each in times_s]
+    interval_s = float(np.sum(durations_s) / np.sum([len(each) - 1 for each in readings]))
     curve = allan_curve(readings, interval_s)
-    temperatures = [_temperatures(stream, inside) for stream, inside in long]
     return AtRest(
         curve=curve,
         axes=(read_axis(curve, 0), read_axis(curve, 1), read_axis(curve, 2)),
-        stretches=len(long),
-        longest_s=float(np.max(times)),
-        total_s=float(np.sum(times)),
-        temperature_c=(min(low for low, _ in temperatures), max(high for _, high in temperatures)),
+        stretches=len(readings),
+        longest_s=max(durations_s),
+        total_s=float(np.sum(durations_s)),
+        temperature_c=None,
     )
 
 

@@ -202,6 +202,12 @@ def _instability(curve: AllanCurve, axis: int, walk: Read | Fault) -> Read | Fau
     last = int(usable[-1])
     least = int(usable[np.argmin(curve.deviation[usable, axis])])
     tau_s, deviation = float(curve.tau_s[least]), float(curve.deviation[least, axis])
+    if least == 0:
+        return Fault(
+            "not_white_noise",
+            f"the deviation is least at {tau_s:.2g} s, the shortest there is, and only rises from there",
+            "Look at the curve: something moves or vibrates, or the readings are filtered that long",
+        )
     by_noise = walk.value / np.sqrt(tau_s) if isinstance(walk, Read) else 0.0
     if least == last or deviation < by_noise * (1 + BEYOND * known[least]):
         return too_short(

@@ -9,10 +9,11 @@ import numpy as np
 from rich.console import Console
 from rich.table import Table
 
-from rig.analysis.at_rest import AtRest, Quantity, SensorAtRest
+from rig.analysis.at_rest import AtRest, SensorAtRest
 from rig.errors import Fault
 from rig.estimation.allan import FLICKER, Read
 from rig.estimation.earth import MICRO_G_M_S2
+from rig.observation.csv_samples import Quantity
 from rig.report.figures import save, style
 from rig.station.plain_text import plain
 
@@ -23,12 +24,21 @@ SCHEMA = "rig.allan/1"
 MINUTE_S = 60.0  # √(3600 s): from √s to √h
 DEG_H = np.pi / 180 / 3600  # rad/s
 # By the quantity: SI units of N and B, and those on the screen with their size in SI.
-SI: Mapping[Quantity, tuple[str, str]] = {"rate": ("rad_sqrt_s", "rad_s"), "acceleration": ("m_s_sqrt_s", "m_s2")}
+SI: Mapping[Quantity, tuple[str, str]] = {
+    "rate": ("rad_sqrt_s", "rad_s"),
+    "acceleration": ("m_s_sqrt_s", "m_s2"),
+    "field": ("t_sqrt_s", "t"),
+}
 SHOWN: Mapping[Quantity, tuple[tuple[str, float], tuple[str, float]]] = {
     "rate": (("°/√h", np.pi / 180 / MINUTE_S), ("°/h", DEG_H)),
     "acceleration": (("m/s/√h", 1 / MINUTE_S), ("µg", MICRO_G_M_S2)),
+    "field": (("nT √s", 1e-9), ("nT", 1e-9)),
 }
-WALKS: Mapping[Quantity, str] = {"rate": "angle random walk", "acceleration": "velocity random walk"}
+WALKS: Mapping[Quantity, str] = {
+    "rate": "angle random walk",
+    "acceleration": "velocity random walk",
+    "field": "white noise",
+}
 
 
 def print_at_rest(found: Mapping[str, SensorAtRest], *, as_json: bool) -> None:
@@ -42,7 +52,7 @@ def print_at_rest(found: Mapping[str, SensorAtRest], *, as_json: bool) -> None:
             if isinstance(seen, Fault):
                 console.print(plain(f"{name}, {quantity}: {seen}"))
                 continue
-            console.print(_table(f"{name}, {quantity}: {each.sensor.part} {each.sensor.serial_number}", quantity, seen))
+            console.print(_table(_titled(f"{name}, {quantity}", each), quantity, seen))
             for line in _lines(seen):
                 console.print(plain(line))
 
@@ -53,8 +63,7 @@ def document(found: Mapping[str, SensorAtRest]) -> dict[str, Any]:
         "schema": SCHEMA,
         "sensors": {
             name: {
-                "part": each.sensor.part,
-                "serial_number": each.sensor.serial_number,
+                **({} if (s := each.sensor) is None else {"part": s.part, "serial_number": s.serial_number}),
                 **{
                     quantity: {"error": str(seen)} if isinstance(seen, Fault) else _entry(quantity, seen)
                     for quantity, seen in each.quantities.items()
@@ -78,10 +87,14 @@ def draw_at_rest(found: Mapping[str, SensorAtRest], folder: Path) -> list[Path]:
             figure = Figure(figsize=(5.5 * len(curves), 4.6), layout="constrained")
             for axes, (quantity, seen) in zip(np.ravel(figure.subplots(1, len(curves))), curves.items(), strict=True):
                 _draw(axes, quantity, seen)
-            figure.suptitle(f"{name}: {each.sensor.part} {each.sensor.serial_number} at rest; bands hold 95 %")
+            figure.suptitle(f"{_titled(name, each)} at rest; bands hold 95 %")
             save(figure, folder, f"allan_{name}")
         written += [folder / f"allan_{name}.png", folder / f"allan_{name}.svg"]
     return written
+
+
+def _titled(name: str, seen: SensorAtRest) -> str:
+    return name if seen.sensor is None else f"{name}: {seen.sensor.part} {seen.sensor.serial_number}"
 
 
 def _table(title: str, quantity: Quantity, seen: AtRest) -> Table:
@@ -104,11 +117,8 @@ def _cells(told: Read | Fault, size: float) -> tuple[str, str]:
 
 
 def _lines(seen: AtRest) -> Iterator[str]:
-    low, high = seen.temperature_c
-    yield (
-        f"{seen.stretches} stretches at rest, {seen.total_s:.4g} s in all, the longest {seen.longest_s:.4g} s; "
-        f"{low:.1f} to {high:.1f} °C"
-    )
+    felt = "" if seen.temperature_c is None else "; {:.1f} to {:.1f} °C".format(*seen.temperature_c)
+    yield f"{seen.stretches} stretches at rest, {seen.total_s:.4g} s in all, the longest {seen.longest_s:.4g} s{felt}"
     for what in ("random_walk", "bias_instability"):
         said = {str(told) for axis in seen.axes if isinstance(told := getattr(axis, what), Fault)}
         yield from (f"{what.replace('_', ' ')}: {text}" for text in sorted(said))
@@ -120,7 +130,7 @@ def _entry(quantity: Quantity, seen: AtRest) -> dict[str, Any]:
         "stretches": seen.stretches,
         "longest_s": seen.longest_s,
         "total_s": seen.total_s,
-        "temperature_c": list(seen.temperature_c),
+        "temperature_c": None if seen.temperature_c is None else list(seen.temperature_c),
         f"random_walk_{walk}": [_read(axis.random_walk) for axis in seen.axes],
         f"bias_instability_{floor}": [_read(axis.bias_instability) for axis in seen.axes],
         "tau_s": seen.curve.tau_s.tolist(),

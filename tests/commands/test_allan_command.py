@@ -1,5 +1,6 @@
 """`rig allan`: tables, JSON and plots from a run file."""
 
+import gzip
 import json
 from dataclasses import replace
 from pathlib import Path
@@ -11,6 +12,7 @@ from rig.cli import main
 from rig.data.events import to_line
 from rig.data.layout import EVENTS_DTYPE, SCHEMA, Contents, lay_out
 from rig.data.run_file import RunData
+from support.paths import REAL
 from support.synthetic_run import Setup, synthetic_run
 
 
@@ -66,3 +68,70 @@ def test_corrected_readings_are_refused(run: Path, tmp_path: Path, capsys: pytes
     write(replace(made, sensors=corrected), tmp_path / "run.h5")
     assert main(["allan", str(tmp_path / "run.h5")]) == 2
     assert "no_raw_readings" in capsys.readouterr().err
+
+
+def log(path: Path, columns: dict[str, np.ndarray]) -> Path:
+    rows = np.column_stack(list(columns.values()))
+    np.savetxt(path, rows, fmt="%.9g", delimiter=",", header=",".join(columns), comments="")
+    return path
+
+
+@pytest.fixture(scope="module")
+def still() -> dict[str, np.ndarray]:
+    """Ten minutes of a noisy part that lies still, whose bias wanders and whose package warms up."""
+    rng, time_s = np.random.default_rng(5), np.arange(0, 600, 1 / 100)
+    walk = np.cumsum(rng.normal(0, 2e-5, (len(time_s), 3)), axis=0)
+    rate = 0.03 + walk + 5e-6 * time_s[:, None] + rng.normal(0, 0.035, (len(time_s), 3))
+    force = np.array([0.1, -0.2, 9.81]) + rng.normal(0, 0.02, (len(time_s), 3))
+    named = {f"{axis}_rad_s": rate[:, i] for i, axis in enumerate("xyz")}
+    return {"time_s": time_s, **named, **{f"{axis}_m_s2": force[:, i] for i, axis in enumerate("xyz")}}
+
+
+def test_a_log_made_elsewhere_tells_the_noise_of_its_sensors(
+    still: dict[str, np.ndarray], tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    assert main(["allan", str(log(tmp_path / "desk.csv", still)), "--json"]) == 0
+    found = json.loads(capsys.readouterr().out)["sensors"]["desk"]
+    for quantity, unit, noise in (("rate", "rad_sqrt_s", 0.035), ("acceleration", "m_s_sqrt_s", 0.02)):
+        for walk in found[quantity][f"random_walk_{unit}"]:
+            assert walk["value"] == pytest.approx(noise / 10, abs=4 * walk["std"])
+    assert main(["allan", str(tmp_path / "desk.csv")]) == 0
+    assert "desk, acceleration" in capsys.readouterr().out
+
+
+def test_a_log_with_a_gap_is_two_stretches(
+    still: dict[str, np.ndarray], tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    kept = np.abs(still["time_s"] - 200) > 5
+    path = log(tmp_path / "desk.csv", {name: column[kept] for name, column in still.items()})
+    assert main(["allan", str(path)]) == 0
+    assert "2 stretches at rest" in capsys.readouterr().out
+
+
+@pytest.mark.parametrize("turn_deg", [1.0, 90.0])
+def test_a_log_in_which_the_sensor_was_turned_is_refused(
+    still: dict[str, np.ndarray], tmp_path: Path, capsys: pytest.CaptureFixture[str], turn_deg: float
+) -> None:
+    turned = {name: column.copy() for name, column in still.items()}
+    turning = np.abs(still["time_s"] - 300) < 0.5
+    turned["y_rad_s"][turning] += np.radians(turn_deg)
+    turned["x_m_s2"][still["time_s"] > 300] += 9.81 * np.sin(np.radians(turn_deg))
+    assert main(["allan", str(log(tmp_path / "hand.csv", turned))]) == 2
+    assert "rig: not_at_rest: about 2" in (said := capsys.readouterr().err) or "rig: not_at_rest: about 30" in said
+
+
+@pytest.mark.parametrize("name", ["imucal", "broad"])
+def test_a_body_that_a_hand_moved_was_not_at_rest(
+    name: str, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    (tmp_path / "moved.csv").write_bytes(gzip.decompress((REAL / name / "samples.csv.gz").read_bytes()))
+    assert main(["allan", str(tmp_path / "moved.csv")]) == 2
+    assert "rig: not_at_rest: " in capsys.readouterr().err
+
+
+def test_the_still_part_of_a_recording_by_hand_has_a_curve(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    lines = gzip.decompress((REAL / "imucal" / "samples.csv.gz").read_bytes()).decode().splitlines()
+    held = [line for line in lines[1:] if 5.5 < float(line.partition(",")[0]) < 12.2]
+    (tmp_path / "held.csv").write_text("\n".join([lines[0], *held]) + "\n", encoding="utf-8")
+    assert main(["allan", str(tmp_path / "held.csv"), "--json"]) == 0
+    assert len(json.loads(capsys.readouterr().out)["sensors"]["held"]["rate"]["tau_s"]) > 5

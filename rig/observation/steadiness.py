@@ -1,0 +1,47 @@
+"""Whether a log of readings was made at rest, as far as the readings themselves tell."""
+
+from collections.abc import Iterator, Mapping
+from itertools import pairwise
+
+import numpy as np
+
+from rig.errors import Fault
+from rig.estimation.arrays import Array
+from rig.observation.csv_samples import UNITS, Quantity
+
+BLOCK_S = 1.0
+# By how much the means of neighbouring blocks may differ beside their noise: no bias moves so fast, but a hand does,
+# and half a degree of tilt is more. A field within a room changes by a tenth of the third.
+STEADY: Mapping[Quantity, float] = {"rate": 5e-3, "acceleration": 0.05, "field": 2e-6}
+BEYOND = 6.0  # standard deviations of the noise of a difference
+NORMAL = 1.4826  # standard deviation over median deviation
+GAP = 1.5  # intervals: one reading is missing
+
+
+def whole_stretches(time_s: Array) -> Iterator[slice]:
+    """The rows between the gaps of a log with increasing times (n,)."""
+    steps_s = np.diff(time_s)
+    gaps = 1 + np.flatnonzero(steps_s > GAP * np.median(steps_s))
+    yield from (slice(start, end) for start, end in pairwise([0, *gaps.tolist(), len(time_s)]))
+
+
+def check_at_rest(time_s: Array, readings: Array, quantity: Quantity) -> None:
+    """Readings (n, 3) at times (n,) must be as steady from second to second as their own noise lets them be.
+
+    Raises Fault `not_at_rest`.
+    """
+    block = np.floor((time_s - time_s[0]) / BLOCK_S).astype(np.intp)
+    block = np.unique(block, return_inverse=True)[1]  # none is empty
+    count = np.bincount(block)
+    means = np.column_stack([np.bincount(block, weights=each) / count for each in readings.T])
+    noise = NORMAL * np.median(np.abs(np.diff(readings, axis=0)), axis=0) / np.sqrt(2)
+    fewest = np.minimum(count[1:], count[:-1])[:, None]
+    off = np.abs(np.diff(means, axis=0)) - BEYOND * noise * np.sqrt(2 / fewest)
+    if len(off) and (worst := float(off.max())) > STEADY[quantity]:
+        at_s = float(time_s[np.searchsorted(block, int(off.max(axis=1).argmax()) + 1)])
+        raise Fault(
+            "not_at_rest",
+            f"about {at_s:.1f} s the {quantity} changes by {worst:.2g} {UNITS[quantity]} within a second or two beside "
+            "its noise",
+            "Give a log of a sensor that lay still all the time; cut off its beginning and its end, where it was moved",
+        )
