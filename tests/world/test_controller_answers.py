@@ -31,13 +31,13 @@ def robot() -> Robot:
 
 def test_the_dashboard_keeps_the_operational_mode_that_it_is_given(robot: Robot) -> None:
     dashboard = DashboardSession(robot)
-    assert dashboard.answer("get operational mode") == "AUTOMATIC"
-    assert dashboard.answer("set operational mode manual").startswith("Setting")
+    assert dashboard.answer("get operational mode") == "NONE"
+    assert dashboard.answer("set operational mode manual") == "Operational mode 'MANUAL' is set"
     assert dashboard.answer("get operational mode") == "MANUAL"
     assert dashboard.answer("set operational mode foo") == "Failed setting operational mode: 'foo'"
     assert dashboard.answer("get operational mode") == "MANUAL"
-    dashboard.answer("clear operational mode")
-    assert dashboard.answer("get operational mode") == "AUTOMATIC"
+    assert dashboard.answer("clear operational mode").endswith("Current operational mode: 'NONE'.")
+    assert dashboard.answer("get operational mode") == "NONE"
 
 
 def test_the_dashboard_saves_its_log_and_loads_no_installation_without_a_name(robot: Robot) -> None:

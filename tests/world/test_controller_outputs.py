@@ -116,11 +116,18 @@ def test_a_controller_does_not_know_the_outputs_of_later_ones(polyscope: str, kn
         assert answer[3] == known  # the recipe's number, 0 for none
 
 
-def test_a_list_of_names_has_an_end() -> None:
+def test_a_recipe_as_long_as_the_makers_test_program_sends_is_taken() -> None:
+    """It asks for 9.2 kB of names at once."""
     one = laboratory()
-    assert asked(one, ",".join(["timestamp"] * 200))[3] == 1  # 1999 bytes and the frequency
-    answer = asked(one, ",".join(["timestamp"] * 210))
-    assert b"2048" in answer and answer.endswith(package("O", b"\0"))
+    names = ["timestamp", *["actual_q"] * 1020]
+    answer = asked(one, ",".join(names))
+    assert len(",".join(names)) > 9_000 and answer[3] == 1 and answer[4:].count(b"VECTOR6D") == 1020
+    assert len(Output(names, 500.0, 1).pack(one.robot)) == 3 + 1 + 8 + 1020 * 48
+
+
+def test_values_that_no_package_has_room_for_are_refused() -> None:
+    answer = asked(laboratory(), ",".join(["actual_q"] * 1400))
+    assert b"a recipe of values of 67200 bytes" in answer and answer.endswith(package("O", b"\0"))
 
 
 def test_slider_and_scaling_multiply_to_what_the_joints_do() -> None:

@@ -253,6 +253,7 @@ def test_the_controller_reports_the_calibration_of_its_arm() -> None:
     assert a == pytest.approx(np.array(A_M) + EXTRA["a"])
     assert d == pytest.approx(np.array(D_M) + EXTRA["d"])
     assert alpha == pytest.approx(np.array(ALPHA) + EXTRA["alpha"])
+    assert struct.unpack_from(">I", package, at + 5 + 24 + 24 * 8) == (2,)  # a calibrated arm
     stand(one, TILTED)
     (pose,) = states(one, 1, "actual_TCP_pose")
     place = chain(TILTED, EXTRA)  # without the residue, which it does not know

@@ -54,7 +54,7 @@ class DashboardSession:
             "get serial number": lambda: robot.identity.serial_number,
             "get robot model": lambda: robot.model.name,
             "is in remote control": lambda: str(robot.remote_control).lower(),
-            "get operational mode": lambda: self._mode or ("AUTOMATIC" if robot.remote_control else "MANUAL"),
+            "get operational mode": lambda: self._mode or "NONE",  # as where no password for modes is set
             "getuserrole": self._get_role,
             "stop": self._stop,
             "pause": lambda: "Pausing program" if robot.pause() else "Failed to execute: pause",
@@ -194,11 +194,11 @@ class DashboardSession:
         if name.upper() not in OPERATIONAL_MODES:
             return f"Failed setting operational mode: '{name}'"
         self._mode = name.upper()
-        return f"Setting operational mode: {self._mode}"
+        return f"Operational mode '{self._mode}' is set"
 
     def _clear_mode(self) -> str:
         self._mode = None
-        return "No longer controlling the operational mode."
+        return "No longer controlling the operational mode. Current operational mode: 'NONE'."
 
     def _get_role(self) -> str:
         return self._role.upper()

@@ -19,6 +19,7 @@ STATE_HZ = 10
 ROBOT_STATE, ROBOT_MESSAGE = 16, 20
 VERSION_MESSAGE = 3
 ACCELERATION_LIMIT_RAD_S2 = 40.0  # of every joint
+NOT_CALIBRATED, CALIBRATED = 0, 2  # what KinematicsInfo says of the links: those of the model, those of this arm
 PROJECT = b"URControl"
 
 
@@ -132,9 +133,10 @@ def _denavit_hartenberg(links: Links) -> list[float]:
 
 
 def _kinematics(robot: Robot) -> bytes:
-    """The arm's own links, its maker's calibration included."""
+    """The arm's own links, its maker's calibration included, and whether they are the maker's or the model's."""
     angles = [link.theta_rad for link in robot.links]
-    return struct.pack(">6I24dI", *[1] * 6, *angles, *_denavit_hartenberg(robot.links), 0)
+    status = CALIBRATED if robot.links != links(drawing=robot.model.drawing) else NOT_CALIBRATED
+    return struct.pack(">6I24dI", *[1] * 6, *angles, *_denavit_hartenberg(robot.links), status)
 
 
 def _configuration(robot: Robot) -> bytes:
