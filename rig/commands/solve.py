@@ -4,10 +4,10 @@ import sys
 from collections.abc import Sequence
 from pathlib import Path
 
-from rig.errors.quoting import printable_lines
 from rig.plans.recorded import judged, left_out, open_run
 from rig.report.document import document_of
 from rig.report.table import print_outcome
+from rig.station.plain_text import say
 
 
 def solve(
@@ -21,6 +21,6 @@ def solve(
     run = open_run(path, script).judged_by(overrides)
     outcome = judged(run, estimator)
     if (said := left_out(run)) is not None:
-        print(printable_lines(said), file=sys.stderr)
+        say(said, sys.stderr)
     print_outcome(document_of(outcome), as_json=as_json)
     return 0 if outcome.passed else 1

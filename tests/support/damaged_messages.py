@@ -36,9 +36,17 @@ HOSTS = tuple(f"127.19.{number}.1" for number in range(1, 9))  # so that there a
 # -- the rig's side ----------------------------------------------------------------------------------------------------
 _TYPES = ",".join(state_stream.VARIABLES.values()).encode()
 _STATE = state_stream.PACKET.pack(1, 12.5, *range(6), *[0.1] * 6, 1.0, 1.0, 7, 1, 2, 3, 1, 0.35, 0.0, 0.0, 0.025)
+_VERSION = struct.pack(">4I", 5, 14, 0, 0)
 RTDE_ANSWERS = tuple(
     rtde_package(kind, payload)
-    for kind, payload in (("V", b"\1"), ("O", b"\1" + _TYPES), ("S", b"\1"), ("U", _STATE), ("M", b"\2hi\4RTDE\1"))
+    for kind, payload in (
+        ("V", b"\1"),
+        ("v", _VERSION),
+        ("O", b"\1" + _TYPES),
+        ("S", b"\1"),
+        ("U", _STATE),
+        ("M", b"\2hi\4RTDE\1"),
+    )
 )
 DASHBOARD_ANSWERS = tuple(
     f"{line}\n".encode()
@@ -144,15 +152,15 @@ def _dialogue(name: str, random: Random, sound: Sequence[bytes]) -> tuple[list[b
     """An answer for each question, with what comes unasked, one message of it all damaged; and that message."""
     bad = damaged(random, sound)
     if name == "RTDE":
-        version, recipe, begun, state, message = sound
-        messages = [version, recipe, begun, state, message, state]
+        protocol, version, recipe, begun, state, message = sound
+        messages = [protocol, version, recipe, begun, state, message, state]
     elif name == "dashboard":
         messages = [sound[0], sound[2], sound[4], sound[6], sound[7]]
     else:
         messages = [sound[0], sound[1]]
     messages[random.randrange(len(messages))] = bad
     if name == "RTDE":
-        return [*messages[:2], b"".join(messages[2:])], bad
+        return [*messages[:3], b"".join(messages[3:])], bad
     if name == "dashboard":
         return [messages[0] + messages[1], *messages[2:]], bad
     return [b"".join(messages)], bad
