@@ -6,12 +6,13 @@ import pytest
 from scipy.spatial.transform import Rotation
 
 from rig.config.load import load
+from rig.world.clock import TICKS_PER_SECOND
 from rig.world.laboratory import Laboratory
 from rig.world.section import world_section
 from rig.world.ur10e.controller_messages import MessageKind, ProgramError
 from rig.world.ur10e.dashboard_server import DashboardSession
 from rig.world.ur10e.forward_kinematics import flange_pose
-from rig.world.ur10e.modes import SafetyMode
+from rig.world.ur10e.modes import RobotMode, RuntimeState, SafetyMode
 from rig.world.ur10e.primary import ROBOT_MESSAGE, PrimarySession
 from rig.world.ur10e.robot import Robot
 from rig.world.ur10e.ur_rtde_questions import questions
@@ -70,21 +71,120 @@ def test_the_forward_kinematics_of_given_joints(robot: Robot) -> None:
     )
 
 
+def told(session: PrimarySession, kind: MessageKind) -> list[bytes]:
+    """The robot messages of a kind that a client of the primary interface gets now: what comes after their header."""
+    data, contents = session.tick(), []
+    while data:
+        size, package = struct.unpack_from(">iB", data)
+        if package == ROBOT_MESSAGE and data[14] == kind:
+            contents.append(data[15:size])
+        data = data[size:]
+    return contents
+
+
+def errors(session: PrimarySession) -> list[tuple[int, ...]]:
+    """Code, argument and level of the errors, as the maker's fake_primary_server.cpp lays them out."""
+    return [struct.unpack_from(">iii", content) for content in told(session, MessageKind.ERROR_CODE)]
+
+
+def exceptions(session: PrimarySession) -> list[tuple[int, int, str]]:
+    """Line, column and text of what is wrong with a program."""
+    return [
+        (*struct.unpack_from(">ii", content), content[8:].decode()) for content in told(session, MessageKind.EXCEPTION)
+    ]
+
+
+def ticks(robot: Robot, time_s: float) -> None:
+    for _ in range(round(time_s * TICKS_PER_SECOND)):
+        robot.step()
+
+
 def test_a_change_of_the_safety_mode_is_told_at_the_primary_interface(robot: Robot) -> None:
     session = PrimarySession(robot)
     robot.protective_stop()
     robot.step()
-    told, modes = session.tick(), []
-    while told:
-        size, kind = struct.unpack_from(">iB", told)
-        if kind == ROBOT_MESSAGE and told[14] == MessageKind.SAFETY_MODE:
-            modes.append(told[23])
-        told = told[size:]
-    assert modes == [SafetyMode.PROTECTIVE_STOP]
+    assert [content[8] for content in told(session, MessageKind.SAFETY_MODE)] == [SafetyMode.PROTECTIVE_STOP]
 
 
-def test_an_unlock_that_comes_too_early_is_refused_in_words(robot: Robot) -> None:
+def test_errors_are_told_by_their_codes_at_the_primary_interface(robot: Robot) -> None:
+    """Those of the maker's table that this robot can come to: the mode changed, stopped for a test, read-only."""
+    session = PrimarySession(robot)
+    robot.power_off()
+    robot.power_on()
+    ticks(robot, 1.0)
+    robot.brake_release()
+    ticks(robot, 1.0)
+    assert errors(session) == [(100, mode, 1) for mode in (3, 4, 5, 7)]
+    session.receive(b"protective_stop()\n")
+    ticks(robot, 0.1)
+    assert errors(session) == [(209, 0, 3)]
+    robot.remote_control = False
+    session.receive(b"set unlock protective stop\n")
+    assert errors(session) == [(210, 0, 2)] and robot.safety_mode == SafetyMode.PROTECTIVE_STOP
+
+
+def test_a_line_out_of_reach_ends_in_a_protective_stop(robot: Robot) -> None:
+    session = PrimarySession(robot)
+    session.receive(b"movel(p[0,0,0,0,0,0])\n")
+    ticks(robot, 0.5)
+    assert robot.safety_mode == SafetyMode.PROTECTIVE_STOP and robot.runtime_state == RuntimeState.STOPPED
+    assert [code for code, _, _ in errors(session)] == [204]
+
+
+def test_the_pendant_waits_with_an_unlock_and_the_primary_interface_does_not(robot: Robot) -> None:
     robot.protective_stop()
+    assert DashboardSession(robot).answer("unlock protective stop").startswith("Cannot unlock")
     PrimarySession(robot).receive(b"set unlock protective stop\n")
-    assert robot.safety_mode == SafetyMode.PROTECTIVE_STOP
-    assert any("until 5s after" in message.text for message in robot.messages.after(0))
+    assert robot.safety_mode == SafetyMode.NORMAL
+    robot.protective_stop()
+    ticks(robot, 5.0)
+    assert DashboardSession(robot).answer("unlock protective stop") == "Protective stop releasing"
+
+
+@pytest.mark.parametrize(
+    ("program", "said"),
+    [
+        ("def illegal():\n  calldoesntexist()\nend", (2, 3, "compile_error_name_not_found:calldoesntexist:")),
+        ("def open():\n    textmsg('(', (1)\nend", (3, 1, "syntax_error_on_line:3:end:")),
+        ("def shut():\n    sync())\nend", (2, 1, "syntax_error_on_line:2:    sync()):")),
+    ],
+)
+def test_a_program_that_does_not_compile_is_told_in_the_words_of_the_compiler(
+    robot: Robot, program: str, said: tuple[int, int, str]
+) -> None:
+    """The maker's test_primary_client.cpp has the first, notes of others who sent such programs the second."""
+    session = PrimarySession(robot)
+    session.receive(program.encode() + b"\n")
+    ticks(robot, 0.1)
+    assert robot.runtime_state == RuntimeState.STOPPED
+    assert exceptions(session) == [said]
+
+
+def test_a_program_that_comes_before_the_brakes_are_released_stands_paused(robot: Robot) -> None:
+    session, dashboard = PrimarySession(robot), DashboardSession(robot)
+    program = b"def wait():\n  sleep(60)\nend\n"
+    robot.power_off()
+    session.receive(program)
+    ticks(robot, 0.1)
+    assert dashboard.answer("programState") == "PAUSED wait"
+    assert dashboard.answer("play") == "Failed to execute: play"
+    robot.brake_release()
+    ticks(robot, 2.0)
+    assert robot.robot_mode == RobotMode.RUNNING
+    assert dashboard.answer("programState") == "PAUSED wait"
+    session.receive(program)
+    ticks(robot, 0.1)
+    assert dashboard.answer("programState").startswith("STOPPED")
+    session.receive(program)
+    ticks(robot, 0.1)
+    assert dashboard.answer("programState") == "PLAYING wait"
+
+
+def test_a_paused_program_can_be_played_once_the_brakes_are_released(robot: Robot) -> None:
+    robot.power_off()
+    PrimarySession(robot).receive(b"def wait():\n  sleep(60)\nend\n")
+    robot.brake_release()
+    ticks(robot, 2.0)
+    assert DashboardSession(robot).answer("play") == "Starting program"
+    robot.step()
+    assert DashboardSession(robot).answer("programState") == "PLAYING wait"

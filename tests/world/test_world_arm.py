@@ -333,8 +333,8 @@ def test_a_program_sent_as_text_is_played(world: World) -> None:
 def test_a_statement_the_simulation_does_not_know_is_named(world: World) -> None:
     running = world()
     with socket.create_connection((running.host, 30002), 5.0) as script:
-        script.sendall(b"def odd():\n  movec(p[0,0,0,0,0,0], p[0,0,0,0,0,0])\nend\n")
-        wait_for(lambda: any("not simulated: movec" in text for text in running.state()["messages"]), "the message")
+        script.sendall(b"def odd():\n  turn = 1\nend\n")
+        wait_for(lambda: any("not simulated: turn = 1" in text for text in running.state()["messages"]), "the message")
 
 
 class Dashboard:
@@ -492,11 +492,15 @@ def test_orders_over_the_secondary_interface(world: World) -> None:
         client.until(lambda: client.robot_mode == 3)
         client.send("power on")
         client.until(lambda: client.robot_mode == 5)
+        client.send("def early():\n  sleep(60)\nend")
+        client.until(lambda: client.flags[6] and not client.flags[5])
         client.send("set robotmode run")
         client.until(lambda: client.robot_mode == 7)
+        assert client.flags[6]
+        client.send("protective_stop()")  # comes while a program is paused, and only stops that
+        client.until(lambda: not client.flags[6])
+        assert not client.flags[4]
         client.send("protective_stop()")
         client.until(lambda: client.flags[4])
-        for _ in range(60):  # six seconds
-            client.read()
         client.send("set unlock protective stop")
         client.until(lambda: not client.flags[4])

@@ -6,7 +6,7 @@ from math import hypot, inf, sqrt
 import numpy as np
 from numpy.typing import NDArray
 
-from rig.world.ur10e.controller_messages import ProgramError
+from rig.world.ur10e.controller_messages import OutOfReach, ProgramError
 from rig.world.ur10e.forward_kinematics import flange_frame, frames, rotation_from_vector, rotation_vector
 from rig.world.ur10e.joint_motion import JOINT_SPEED_LIMIT_RAD_S
 from rig.world.ur10e.links import NOMINAL, Links
@@ -83,7 +83,7 @@ def straight_line(
 ) -> Generator[None, None, Trajectory]:
     """A moveL from rest to rest, planned in small parts, so that the world goes on meanwhile.
 
-    Where a joint would be too fast the whole line is made so much slower. Raises `ProgramError` when that would be
+    Where a joint would be too fast the whole line is made so much slower. Raises `OutOfReach` when that would be
     slower than `SLOWEST`, because the line leads through a singularity, and when the pose is out of reach.
     """
     rotation, position = np.array(rotation_from_vector(pose[3:])), np.array(pose[:3])
@@ -91,7 +91,10 @@ def straight_line(
     length = _length(twist)
     if length < ACCURACY:
         return rest(start)
-    joints_for(pose, start, links)  # a pose out of reach is not planned for
+    try:
+        joints_for(pose, start, links)
+    except ProgramError as error:  # that pose is not planned for
+        raise OutOfReach(str(error)) from None
     top = min(speed_m_s, sqrt(length * acceleration_m_s2))
     slowest = SLOWEST * top
     while top > slowest:
@@ -100,7 +103,7 @@ def straight_line(
             end_rad, _, _ = pieces[-1].at(pieces[-1].duration_s)
             return Trajectory(pieces, joints_for(pose, end_rad, links))
         top /= 1.001 * excess
-    raise ProgramError("joint speed limit exceeded on the way of movel")
+    raise OutOfReach("joint speed limit exceeded on the way of movel")
 
 
 def _along(

@@ -1,4 +1,4 @@
-"""What the controller tells everybody who listens: texts, programs started and stopped, what a program did wrong."""
+"""What the controller tells everybody who listens: texts, programs started and stopped, errors, programs' faults."""
 
 from collections import deque
 from dataclasses import dataclass
@@ -13,8 +13,33 @@ class MessageKind(IntEnum):
 
     TEXT = 0
     SAFETY_MODE = 5
+    ERROR_CODE = 6
     KEY = 7
     EXCEPTION = 10
+
+
+class ReportLevel(IntEnum):
+    """How bad an error is."""
+
+    INFO = 1
+    WARNING = 2
+    VIOLATION = 3
+
+
+@dataclass(frozen=True, slots=True)
+class ErrorCode:
+    """What the pendant shows as `C100A7`: code and argument (error_code_texts.h of the maker's client library)."""
+
+    code: int
+    argument: int
+    level: ReportLevel
+
+
+MODE_CHANGED = 100  # the argument is the mode
+# The levels are assumed, and that a line out of reach is an invalid setpoint: the maker's tests want an error there.
+INVALID_SETPOINT = ErrorCode(204, 5, ReportLevel.VIOLATION)
+STOPPED_FOR_TEST = ErrorCode(209, 0, ReportLevel.VIOLATION)
+READ_ONLY = ErrorCode(210, 0, ReportLevel.WARNING)  # the socket, in local control
 
 
 @dataclass(frozen=True, slots=True)
@@ -29,6 +54,7 @@ class Message:
     text: str
     title: str = ""
     place: tuple[int, int] = (0, 0)
+    error: ErrorCode | None = None
 
 
 class ProgramError(Exception):
@@ -37,6 +63,10 @@ class ProgramError(Exception):
     def __init__(self, text: str, place: tuple[int, int] = (0, 0)) -> None:
         super().__init__(text)
         self.place = place
+
+
+class OutOfReach(ProgramError):
+    """A straight line led to where the arm cannot be: the controller answers with a protective stop."""
 
 
 class Messages:
@@ -49,12 +79,19 @@ class Messages:
     def say(
         self, text: str, kind: MessageKind = MessageKind.TEXT, title: str = "", place: tuple[int, int] = (0, 0)
     ) -> None:
-        self.last += 1
-        self._messages.append(Message(self.last, kind, text[:TEXT_MAX], title, place))
+        self._keep(Message(self.last + 1, kind, text[:TEXT_MAX], title, place))
+
+    def report(self, error: ErrorCode) -> None:
+        """Say an error by its code."""
+        self._keep(Message(self.last + 1, MessageKind.ERROR_CODE, "", error=error))
 
     def complain(self, error: ProgramError) -> None:
         """Say what a program did wrong."""
         self.say(str(error), MessageKind.EXCEPTION, place=error.place)
+
+    def _keep(self, message: Message) -> None:
+        self.last = message.number
+        self._messages.append(message)
 
     def after(self, number: int) -> list[Message]:
         """What has been said since the message `number`; since ever with 0."""

@@ -11,6 +11,7 @@ from rig.world.ur10e.robot import Robot
 
 PORT = 29999
 LINE_BYTES = 1 << 16  # no command is so long
+UNLOCK_AFTER_S = 5.0
 PROGRAMS = ("wait_program.urp",)
 OPERATIONAL_MODES = ("MANUAL", "AUTOMATIC")
 TOO_EARLY = (
@@ -177,7 +178,11 @@ class DashboardSession:
         return "Brake releasing"
 
     def _unlock(self) -> str:
-        return "Protective stop releasing" if self._robot.unlock_protective_stop() else TOO_EARLY
+        """Refused until 5 s after the stop: a rule of the pendant, which the primary interface does not know."""
+        if self._robot.safety_mode == SafetyMode.PROTECTIVE_STOP and self._robot.stopped_for_s < UNLOCK_AFTER_S:
+            return TOO_EARLY
+        self._robot.unlock_protective_stop()
+        return "Protective stop releasing"
 
     def _restart_safety(self) -> str:
         self._robot.power_off()

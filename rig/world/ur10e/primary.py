@@ -76,6 +76,8 @@ def _content(message: Message) -> bytes:
         return struct.pack(
             ">iiBII", 0, 0, SafetyMode[message.text], 0, 0
         )  # which cause has which code is not simulated
+    if message.error is not None:
+        return struct.pack(">iiiII", *(message.error.code, message.error.argument, message.error.level), 0, 0) + text
     if message.kind == MessageKind.EXCEPTION:
         return struct.pack(">ii", *message.place) + text
     return text

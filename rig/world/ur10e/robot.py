@@ -6,7 +6,17 @@ from math import isfinite
 from typing import Protocol
 
 from rig.world.clock import TICK_S, TICKS_PER_SECOND
-from rig.world.ur10e.controller_messages import MessageKind, Messages, ProgramError
+from rig.world.ur10e.controller_messages import (
+    INVALID_SETPOINT,
+    MODE_CHANGED,
+    STOPPED_FOR_TEST,
+    ErrorCode,
+    MessageKind,
+    Messages,
+    OutOfReach,
+    ProgramError,
+    ReportLevel,
+)
 from rig.world.ur10e.forward_kinematics import Vector, flange_pose, rotation_from_vector, turned_pose
 from rig.world.ur10e.joint_motion import Motion
 from rig.world.ur10e.links import NOMINAL, Links
@@ -18,7 +28,6 @@ ROUNDING_RAD = 1e-6  # a target on a joint's limit is within it
 PROGRAM_STOP_RAD_S2 = 4.0
 PROTECTIVE_STOP_RAD_S2 = 15.0
 BRAKE_RAD_S2 = 40.0
-UNLOCK_AFTER_S = 5.0
 START_DELAY_S = 0.02  # between the last byte of a program and its first line
 POWER_STEP_S = 0.5  # powering on, releasing the brakes
 
@@ -77,7 +86,7 @@ class Robot:
         self.motion = motion
         self.remote_control = remote_control
         self.tick = 0
-        self.robot_mode = RobotMode.RUNNING
+        self._robot_mode = RobotMode.RUNNING
         self._safety_mode = SafetyMode.NORMAL
         self.runtime_state = RuntimeState.STOPPED
         self.inputs = Registers()
@@ -101,12 +110,22 @@ class Robot:
         self.motion.fraction_wanted = speed_slider
 
     @property
+    def robot_mode(self) -> RobotMode:
+        return self._robot_mode
+
+    @robot_mode.setter
+    def robot_mode(self, mode: RobotMode) -> None:
+        """Every change is told at the primary interface, this and the safety mode's."""
+        if mode != self._robot_mode:
+            self.messages.report(ErrorCode(MODE_CHANGED, mode, ReportLevel.INFO))
+        self._robot_mode = mode
+
+    @property
     def safety_mode(self) -> SafetyMode:
         return self._safety_mode
 
     @safety_mode.setter
     def safety_mode(self, mode: SafetyMode) -> None:
-        """Every change is told at the primary interface."""
         if mode != self._safety_mode:
             self.messages.say(mode.name, MessageKind.SAFETY_MODE)
         self._safety_mode = mode
@@ -151,6 +170,9 @@ class Robot:
         assert self._program is not None
         try:
             running = self._program.step()
+        except OutOfReach:
+            self.protective_stop(INVALID_SETPOINT)
+            return
         except (ProgramError, ValueError, ArithmeticError) as error:  # the last two: numbers that lead to none
             self.messages.complain(error if isinstance(error, ProgramError) else ProgramError(str(error)))
             self.stop_program("")
@@ -178,11 +200,20 @@ class Robot:
         return self.robot_mode == RobotMode.RUNNING and self.safety_mode in (SafetyMode.NORMAL, SafetyMode.REDUCED)
 
     def start_program(self, program: Program) -> None:
-        """Play a program instead of what runs now."""
+        """Play a program instead of what runs now.
+
+        While the brakes are on it is taken and stands paused, and whatever comes while a program is paused only stops
+        that one. (Universal Robots Client Library, issue 123, seen with the maker's simulator.)
+        """
+        paused = self.runtime_state in (RuntimeState.PAUSING, RuntimeState.PAUSED)
         if self.runtime_state != RuntimeState.STOPPED:
             self.stop_program("another program was started")
-        if not self.ready:
-            self.messages.say(f"{program.name} was not started: {self.robot_mode.name}, {self.safety_mode.name}")
+        if paused:
+            return
+        if self.safety_mode not in (SafetyMode.NORMAL, SafetyMode.REDUCED):
+            self.messages.say(f"{program.name} was not started: {self.safety_mode.name}")
+        elif self.robot_mode != RobotMode.RUNNING:
+            self._program, self.runtime_state = program, RuntimeState.PAUSED
         else:
             self._start = (self.tick + round(START_DELAY_S * TICKS_PER_SECOND), program)
 
@@ -217,8 +248,9 @@ class Robot:
         return True
 
     # -- safety and power ------------------------------------------------------------------------------------------
-    def protective_stop(self) -> None:
+    def protective_stop(self, why: ErrorCode = STOPPED_FOR_TEST) -> None:
         if self.safety_mode in (SafetyMode.NORMAL, SafetyMode.REDUCED):
+            self.messages.report(why)
             self._safety_stop(SafetyMode.PROTECTIVE_STOP)
 
     def emergency_stop(self) -> None:
@@ -237,14 +269,14 @@ class Robot:
         self.stop_program(f"safety mode {mode.name}")
         self.motion.stop(PROTECTIVE_STOP_RAD_S2)
 
-    def unlock_protective_stop(self) -> bool:
-        """Refused until 5 s after the stop."""
-        if self.safety_mode != SafetyMode.PROTECTIVE_STOP:
-            return True
-        if (self.tick - self._stopped_tick) * TICK_S < UNLOCK_AFTER_S:
-            return False
-        self.safety_mode = SafetyMode.NORMAL
-        return True
+    @property
+    def stopped_for_s(self) -> float:
+        """Since the last protective or emergency stop."""
+        return (self.tick - self._stopped_tick) * TICK_S
+
+    def unlock_protective_stop(self) -> None:
+        if self.safety_mode == SafetyMode.PROTECTIVE_STOP:
+            self.safety_mode = SafetyMode.NORMAL
 
     def release(self) -> None:
         """Pull the emergency stop button out again, the robot stays without power; or close the safeguard and reset it,

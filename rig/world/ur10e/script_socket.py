@@ -8,14 +8,13 @@ statements listed in `urscript`.
 import re
 from collections.abc import Callable, Iterator
 
-from rig.world.ur10e.controller_messages import ProgramError
+from rig.world.ur10e.controller_messages import READ_ONLY, ProgramError
 from rig.world.ur10e.program_threads import Move
 from rig.world.ur10e.robot import Program, Robot
 from rig.world.ur10e.ur_rtde_program import ControlProgram
 from rig.world.ur10e.urscript import Arguments, ScriptProgram, move
 
 PRIMARY_PORT, SECONDARY_PORT, REALTIME_PORT = 30001, 30002, 30003
-TOO_EARLY = "Cannot unlock protective stop until 5s after occurrence"
 TEXT_BYTES = 1 << 20  # a program is not longer; that of ur_rtde has some 60 000
 REGISTER_OFFSETS = (0, 24)  # the lower and the upper half of the registers: ur_rtde takes either
 BLOCK = re.compile(r"(def|sec|thread|if|while|for)\b.*:$")
@@ -82,16 +81,11 @@ def _path(lines: list[str]) -> Iterator[Move]:
             raise ProgramError(f"not simulated: {statement} in a path")
 
 
-def _unlock(robot: Robot) -> None:
-    if not robot.unlock_protective_stop():
-        robot.messages.say(TOO_EARLY)
-
-
 ORDERS: dict[str, Callable[[Robot], object]] = {
     "power on": Robot.power_on,
     "power off": Robot.power_off,
     "set robotmode run": Robot.brake_release,
-    "set unlock protective stop": _unlock,
+    "set unlock protective stop": Robot.unlock_protective_stop,  # at once: the maker's test_primary_client.cpp
     "stop program": lambda robot: robot.stop_program("stopped by a client"),
     "pause program": Robot.pause,
     "resume program": Robot.resume,
@@ -117,7 +111,7 @@ class ScriptSession:
                 if self._robot.remote_control:
                     self._obey(lines)
                 else:
-                    self._robot.messages.say("a program was ignored: the robot is in local control")
+                    self._robot.messages.report(READ_ONLY)
         except ProgramError as error:
             self._robot.messages.complain(error)
             self._reader = ScriptReader()

@@ -8,13 +8,14 @@ from dataclasses import dataclass
 from typing import Any
 
 from rig.world.clock import TICKS_PER_SECOND
-from rig.world.ur10e.controller_messages import ProgramError
+from rig.world.ur10e.controller_messages import OutOfReach, ProgramError
 from rig.world.ur10e.program_threads import Move, Steps, Threads, finite
 from rig.world.ur10e.robot import Robot
 from rig.world.ur10e.trajectory import Joints
 
 NESTED = 50  # loops in one another
 CALL = re.compile(r"([a-z_][a-z_0-9]*)\((.*)\)$", re.IGNORECASE)
+TEXT = re.compile(r'"[^"]*"|\'[^\']*\'')  # in which brackets and # mean nothing
 FRAME = re.compile(r"^(def|sec)\s+(\w+)\s*\(\s*\)\s*:$")
 
 
@@ -81,8 +82,28 @@ class Loop:
 Block = tuple[Call | Loop, ...]
 
 
+def syntax(lines: Sequence[str]) -> None:
+    """Raises `ProgramError` at the line at which the controller's compiler finds that brackets do not match.
+
+    A bracket that is left open is noticed on the line after, and the line is said as it is written.
+    """
+    depth = 0
+    for number, line in enumerate(lines, 1):
+        text = TEXT.sub("", line).split("#", 1)[0]
+        if text.strip() and depth > 0:
+            raise ProgramError(f"syntax_error_on_line:{number}:{line}:", (number, 1))
+        depth += sum(text.count(bracket) for bracket in "([") - sum(text.count(bracket) for bracket in ")]")
+        if depth < 0:
+            raise ProgramError(f"syntax_error_on_line:{number}:{line}:", (number, 1))
+
+
 def parse(lines: Sequence[str]) -> tuple[str, Block]:
-    """The name and body of a program. Raises `ProgramError` at the first line the simulation does not know."""
+    """The name and body of a program.
+
+    Raises `ProgramError` at the first line the simulation does not know, in the words of the maker's compiler where the
+    line is one that this would not know either.
+    """
+    syntax(lines)
     name = "unnamed"
     stack: list[list[Call | Loop]] = [[]]
     for number, line in enumerate(lines, 1):
@@ -103,7 +124,8 @@ def parse(lines: Sequence[str]) -> tuple[str, Block]:
         elif call and call.group(1) in STATEMENTS:
             stack[-1].append(Call(text, (number, len(line) - len(line.lstrip()) + 1)))
         elif text != "end":
-            raise ProgramError(f"not simulated: {text}", (number, len(line) - len(line.lstrip()) + 1))
+            what = f"compile_error_name_not_found:{call.group(1)}:" if call else f"not simulated: {text}"
+            raise ProgramError(what, (number, len(line) - len(line.lstrip()) + 1))
     return name, tuple(stack[0])
 
 
@@ -129,6 +151,8 @@ class ScriptProgram:
                     yield  # a loop that takes no time would never give way
             try:
                 yield from STATEMENTS[item.text.split("(", 1)[0]](self._robot, self._threads, Arguments(item.text))
+            except OutOfReach:
+                raise
             except (ProgramError, TypeError, ValueError, IndexError, ArithmeticError) as error:
                 raise ProgramError(str(error), item.place) from None
 
