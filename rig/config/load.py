@@ -8,6 +8,7 @@ from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any, TypeVar
+from urllib.parse import urlsplit
 
 import yaml
 from pydantic import BaseModel, ValidationError
@@ -215,8 +216,11 @@ def _world_fits(config: RigConfig, world: WorldSection) -> Iterator[str]:
     if not _is_loopback(host):
         yield f"arm.host: {quote(host)} must be a loopback address (127.x.y.z) when the file has a world: section"
     for place, port in ports.items():
-        if not port.startswith("socket://"):
-            yield f"{place}: {quote(port)} must be socket://host:port when the file has a world: section"
+        if not (port.startswith("socket://") and _is_loopback(urlsplit(port).hostname or "")):
+            yield (
+                f"{place}: {quote(port)} must be socket://host:port, at a loopback address (127.x.y.z), "
+                "when the file has a world: section"
+            )
     for kind, named, simulated in (
         ("sensors", config.sensors, world.sensors),
         ("magnetometers", config.magnetometers, world.magnetometers),

@@ -36,13 +36,16 @@ def checked_host(name: str) -> str:
 
 
 def checked_port(value: str) -> str:
-    """A serial port's name, or `socket://host:port`. Raises ValueError when it cannot be one."""
-    if value.startswith("socket://"):
+    """A serial port's name, or `socket://host:port`. Raises ValueError when it cannot be one.
+
+    pyserial knows other addresses, and one of them, `spy://`, empties and writes a file that it names.
+    """
+    if "://" in value:
         try:
             parts = urlsplit(value)
-            complete = bool(checked_host(parts.hostname or "") and parts.port)
+            complete = value.startswith("socket://") and bool(checked_host(parts.hostname or "") and parts.port)
         except ValueError:
             complete = False
         if not complete:
-            raise ValueError("must be socket://host:port with a port from 1 to 65535")
+            raise ValueError("must be the name of a port, or socket://host:port with a port from 1 to 65535")
     return value

@@ -23,8 +23,10 @@ from rig.data.layout import EVENTS_DTYPE, SCHEMA, TEXTS, sample_dtype
 
 OPEN_FOR_WRITING = 0x01  # of the superblock's consistency flags
 NO_ROOM = 2
-MAX_UNPACKED = 50  # times the stored size: readings with noise come to a fifth, zeros to a thousandth
+MAX_SENSORS = 64
+MAX_UNPACKED = 20  # times what lies on the disk: readings with noise come to a fifth of that, zeros to a thousandth
 MAX_UNWRITTEN_ROWS = 100_000  # announced and not there: what a kill leaves of one flush, and more
+MAX_UNWRITTEN_BYTES = 50_000_000  # of all of them
 
 
 def extract(path: Path) -> Iterator[dict[str, Any] | NDArray[Any]]:
@@ -39,16 +41,24 @@ def extract(path: Path) -> Iterator[dict[str, Any] | NDArray[Any]]:
         if schema not in TEXTS:
             raise ValueError(f"its schema is {schema!r:.60}, not {SCHEMA!r}")
         sensors = _member(file, "samples", h5py.Group)
+        if len(sensors) > MAX_SENSORS:
+            raise ValueError(f"it announces {len(sensors)} sensors")
         samples = {name: _member(sensors, name, h5py.Dataset) for name in sensors}
+        rows = {
+            **{f"samples/{name}": (each, sample_dtype(each.attrs)) for name, each in samples.items()},
+            "arm": (_member(file, "arm", h5py.Dataset), ARM_STATE_DTYPE),
+            "events": (_member(file, "events", h5py.Dataset), EVENTS_DTYPE),
+        }
+        for name, (dataset, dtype) in rows.items():
+            _check(dataset, name, dtype)
+        _refuse_endless(path, sum(int(dataset.nbytes) for dataset, _ in rows.values()))
         yield {
             "schema": schema,
             "texts": {name: _text(file, name) for name in TEXTS[schema]},
             "described": {name: _attributes(dataset) for name, dataset in samples.items()},
         }
-        for name, dataset in samples.items():
-            yield _rows(dataset, f"samples/{name}", sample_dtype(dataset.attrs))
-        for name, dtype in (("arm", ARM_STATE_DTYPE), ("events", EVENTS_DTYPE)):
-            yield _rows(_member(file, name, h5py.Dataset), name, dtype)
+        for dataset, _ in rows.values():
+            yield dataset[:]
 
 
 def reason(error: Exception) -> str:
@@ -85,7 +95,8 @@ def _member(group: Any, name: str, kind: type) -> Any:
     return member
 
 
-def _rows(dataset: Any, name: str, dtype: np.dtype[Any]) -> NDArray[Any]:
+def _check(dataset: Any, name: str, dtype: np.dtype[Any]) -> None:
+    """Raises ValueError unless it holds rows of that type, for which there is room in the file."""
     if dataset.dtype != dtype or dataset.ndim != 1:
         raise ValueError(f"{name} holds {dataset.dtype} in {dataset.ndim} dimensions, not rows of {dtype}")
     if dataset.external or dataset.is_virtual:
@@ -93,10 +104,29 @@ def _rows(dataset: Any, name: str, dtype: np.dtype[Any]) -> NDArray[Any]:
     stored = _stored_rows(dataset)
     if len(dataset) > stored + MAX_UNWRITTEN_ROWS:
         raise ValueError(f"{name} announces {len(dataset)} rows and holds {stored}")
-    if dataset.nbytes > MAX_UNPACKED * dataset.id.get_storage_size() + MAX_UNWRITTEN_ROWS * dtype.itemsize:
-        raise ValueError(f"{name} unpacks {dataset.id.get_storage_size()} bytes to {dataset.nbytes}")
-    rows: NDArray[Any] = dataset[:]
-    return rows
+
+
+def _refuse_endless(path: Path, unpacked: int) -> None:
+    """Raises ValueError for what would not fit a computer, though it fits an e-mail: packed, or full of holes."""
+    stored = _stored_bytes(path)
+    for what, size in (("its rows unpack", unpacked), ("it swells", path.stat().st_size)):
+        if size > MAX_UNPACKED * stored + MAX_UNWRITTEN_BYTES:
+            raise ValueError(f"{what} {stored} bytes to {size}")
+
+
+def _stored_bytes(path: Path) -> int:
+    """Without the file's holes, which take no room on the disk; where the system does not tell, its size."""
+    if not hasattr(os, "SEEK_DATA"):
+        return path.stat().st_size
+    stored = end = 0
+    with path.open("rb") as file:
+        while True:
+            try:
+                start = os.lseek(file.fileno(), end, os.SEEK_DATA)
+            except OSError:  # no more data
+                return stored
+            end = os.lseek(file.fileno(), start, os.SEEK_HOLE)
+            stored += end - start
 
 
 def _stored_rows(dataset: Any) -> int:

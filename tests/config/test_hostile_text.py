@@ -207,13 +207,21 @@ def test_a_host_that_cannot_be_looked_up_is_refused(host: str) -> None:
         assert problem.strip().startswith(override.partition("=")[0])
 
 
-@pytest.mark.parametrize("port", ["socket://", "socket://a", "socket://a:0", "socket://a:65536", "socket://[a:1", ""])
-def test_an_address_without_host_or_port_is_refused(port: str) -> None:
+@pytest.mark.parametrize(
+    "port",
+    [
+        *("socket://", "socket://a", "socket://a:0", "socket://a:65536", "socket://[a:1", ""),
+        *("spy:///dev/ttyACM0?file=/home/me/thesis.tex", "SPY:///dev/ttyACM0", "rfc2217://a:1", "SOCKET://a:1"),
+    ],
+)
+def test_an_address_without_host_or_port_or_of_another_kind_is_refused(port: str) -> None:
     assert "board.port" in refusal(DEMO_TEXT, "world=null", f"board.port='{port}'")
 
 
 def test_a_world_answers_on_this_machine_alone() -> None:
     assert "must be a loopback address" in refusal(DEMO_TEXT, "arm.host=127.example.org")
+    for host in ("192.0.2.7", "0.0.0.0", "127.example.org"):
+        assert "board.port" in refusal(DEMO_TEXT, f"board.port=socket://{host}:7321")
 
 
 def test_thousands_of_errors_are_counted_and_the_first_are_told() -> None:

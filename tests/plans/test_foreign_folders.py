@@ -154,6 +154,33 @@ def test_a_recording_that_unpacks_without_end_is_refused_before_it_does(foreign:
     assert refused.returncode == 2 and "rig: not_a_run_file: " in refused.stderr and "unpacks" in refused.stderr
 
 
+def test_a_recording_of_sensors_that_are_announced_alone_is_refused(foreign: Path) -> None:
+    with h5py.File(foreign / "run.h5", "r+") as file:
+        rows = file["samples/gyro"]
+        attributes, dtype = dict(rows.attrs), rows.dtype
+        for number in range(60):
+            file.create_dataset(f"samples/s{number}", (100_000,), dtype, chunks=(100_000,)).attrs.update(attributes)
+    refused = rig_here("solve", foreign)
+    assert refused.returncode == 2 and "rig: not_a_run_file: " in refused.stderr and "unpack" in refused.stderr
+
+
+@pytest.mark.skipif(not hasattr(os, "SEEK_DATA"), reason="holes are not told apart here")
+def test_a_recording_full_of_holes_is_refused(foreign: Path) -> None:
+    with h5py.File(foreign / "run.h5", "r+") as file:
+        rows = file["samples/gyro"]
+        attributes, kind, first = dict(rows.attrs), h5py.h5t.py_create(rows.dtype, logical=True), rows[:]
+        del file["samples/gyro"]
+        allotted = h5py.h5p.create(h5py.h5p.DATASET_CREATE)
+        allotted.set_alloc_time(h5py.h5d.ALLOC_TIME_EARLY)
+        allotted.set_fill_time(h5py.h5d.FILL_TIME_NEVER)
+        space = h5py.h5s.create_simple((30_000_000,))
+        holed = h5py.Dataset(h5py.h5d.create(file["samples"].id, b"gyro", kind, space, allotted))
+        holed.attrs.update(attributes)
+        holed[: len(first)] = first
+    refused = rig_here("solve", foreign)
+    assert refused.returncode == 2 and "rig: not_a_run_file: " in refused.stderr and " bytes to " in refused.stderr
+
+
 def test_a_line_of_ten_million_columns_is_refused(tmp_path: Path) -> None:
     samples, sweeps = tmp_path / "samples.csv", ROOT / "docs" / "examples" / "sweeps.csv"
     samples.write_text("time_s" + ",x_rad_s" * 1_000_000, encoding="utf-8")
