@@ -18,8 +18,9 @@ def add_arguments(solve: argparse.ArgumentParser) -> None:
     solve.add_argument(
         "--estimator",
         metavar="NAME",
-        help="vector (default), newton, levenberg_marquardt, or algorithm_1, as published; with --attitudes "
-        "increments (gyroscope), attitude_weighted, maximum_likelihood, or as_published",
+        help="vector (default), newton, levenberg_marquardt, or algorithm_1, as published; with --sweeps increments "
+        "too (default for turns from rest to rest); with --attitudes increments (gyroscope), attitude_weighted, "
+        "maximum_likelihood, or as_published",
     )
     solve.add_argument(
         "--set",
@@ -85,10 +86,9 @@ def solve(options: argparse.Namespace) -> int:
     if options.overrides:
         raise Refused("unknown_setting", "samples as CSV come without settings", "Leave out --set")
     if options.sweeps is not None:
-        from rig.analysis.calibration import DEFAULT_ESTIMATOR
-        from rig.commands.solve_csv import solve_external
+        from rig.commands.solve_csv import solve_sweeps
 
-        return solve_external(options.run, options.sweeps, options.estimator or DEFAULT_ESTIMATOR, as_json=options.json)
+        return solve_sweeps(options.run, options.sweeps, options.estimator, as_json=options.json)
     for name, value in (
         ("--gravity-m-s2", options.gravity_m_s2),
         ("--field-t", options.field_t),

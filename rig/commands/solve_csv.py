@@ -5,26 +5,24 @@ There is no configuration, so there are no limits to judge it by.
 
 from pathlib import Path
 
-from rig.analysis.calibration import known_estimator, or_fault, solve_observations, solve_six_observation
+from rig.analysis.calibration import or_fault, solve_six_observation
+from rig.analysis.external import known_external, solve_external
 from rig.errors import Refused, raised_as
-from rig.estimation.vector_model import VectorSolution
 from rig.observation.csv_import import read
 from rig.report.external import External, print_external
-from rig.report.sensor_entry import entry_or_error, estimate_entry, vector_entry
+from rig.report.sensor_entry import entry_or_error
 
 
-def solve_external(samples: Path, sweeps: Path, estimator: str, *, as_json: bool) -> int:
+def solve_sweeps(samples: Path, sweeps: Path, estimator: str | None, *, as_json: bool) -> int:
     """Solve two CSV files and print the result, the six-observation solution beside it; returns 0.
 
     Raises Refused `unknown_estimator`, and whatever `csv_import.read` and the estimator find wrong.
     """
-    chosen = known_estimator(estimator)
+    chosen = known_external(estimator)
     with raised_as(Refused):  # nothing runs here: whatever is wrong with the data, no arm had to be stopped for it
         data = read(samples, sweeps)
-        solution = solve_observations(data.sweeps, chosen, data.rests)
+        solved = solve_external(data, chosen)
     # Three sweeps may do for the vector model, not for the six observations.
     beside = entry_or_error(or_fault(lambda: solve_six_observation(data.sweeps, "newton")))
-    vector = vector_entry(solution) if isinstance(solution, VectorSolution) else None
-    found = External(samples, sweeps, len(data.rests), estimate_entry(solution), vector, beside)
-    print_external(found, as_json=as_json)
+    print_external(External(samples, sweeps, data, solved, beside), as_json=as_json)
     return 0

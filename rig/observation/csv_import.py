@@ -5,13 +5,17 @@ samples: as `rig.observation.csv_samples` says, a gyroscope's among them; other 
 sweeps: `start_s`, `end_s` on the same clock, `axis_x`, `axis_y`, `axis_z` (unit vector of the turn in a frame fixed to
 the sensor's carrier, right-handed), and either `speed_rad_s` (mean speed) or `angle_rad` (angle turned from start to
 end). A row of speed or angle 0 is a rest; its axis means nothing. Where the table or servo vibrates, let the sweep be a
-whole turn: over that its mean speed is 2π/T all the same.
+whole turn: over that its mean speed is 2π/T all the same. It may say how well it is known: `angle_std_rad`, how far the
+body may have ended off where it was said to, and `axis_std_rad`, how far the axis may have leaned.
+
+A row with an angle at both ends of which the body lay still is solved by how far the gyroscope turned meanwhile
+(`rig.estimation.turned`): that is how a hand turns, or a servo that starts and stops.
 
 Columns may stand in any order; the first row holds their names.
 """
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 
 import numpy as np
@@ -24,20 +28,23 @@ from rig.observation.csv_samples import read_samples
 from rig.observation.csv_table import read_columns
 from rig.observation.csv_windows import check_complete, check_times, inside, overlapping, scatter_of
 from rig.observation.observe import Observation, nearest_axis
+from rig.observation.turns import Known, TurnedData, turned
 from rig.observation.windows import Window
 
 SWEEP_COLUMNS = ("start_s", "end_s", "axis_x", "axis_y", "axis_z")
 MOTION_COLUMNS = ("speed_rad_s", "angle_rad")
+STD_COLUMNS = ("angle_std_rad", "axis_std_rad")
 MIN_DURATION_S = 1e-3  # so many samples need longer at any rate
 SWEEPS_MB = 1  # some ten thousand sweeps
 
 
 @dataclass(frozen=True, slots=True)
 class ExternalData:
-    """What the two files tell: averaged sweeps and rests, in the order of the rows."""
+    """What the two files tell: averaged sweeps and rests, in the order of the rows; `turned` where a body was."""
 
     sweeps: tuple[Observation, ...]
     rests: tuple[Average, ...]
+    turned: TurnedData | None = None
 
 
 def read(samples_path: Path, sweeps_path: Path) -> ExternalData:
@@ -47,12 +54,16 @@ def read(samples_path: Path, sweeps_path: Path) -> ExternalData:
     `overlapping_sweeps`; Fault as `average` does.
     """
     samples = read_samples(samples_path, ["rate"])
-    sweeps = read_columns(sweeps_path, SWEEP_COLUMNS, MOTION_COLUMNS, SWEEPS_MB)
-    return average(
+    sweeps = read_columns(sweeps_path, SWEEP_COLUMNS, MOTION_COLUMNS, SWEEPS_MB, [(name,) for name in STD_COLUMNS])
+    found = average(
         np.column_stack([samples.time_s, samples.readings["rate"]]),
         np.column_stack([sweeps["start_s"], sweeps["end_s"], _speeds(sweeps)]),
         np.column_stack([sweeps[name] for name in SWEEP_COLUMNS[2:]]),
     )
+    if "angle_rad" not in sweeps:
+        return found
+    known = Known(sweeps["angle_rad"], *(sweeps.get(name) for name in STD_COLUMNS))
+    return replace(found, turned=turned(samples.time_s, samples.readings["rate"], known, found.sweeps, found.rests))
 
 
 def average(samples: Array, sweeps: Array, axes: Array) -> ExternalData:
@@ -100,11 +111,14 @@ def _speeds(sweeps: dict[str, Array]) -> Array:
             what = "turns by less than nothing"
         elif moved > 0 and abs(norm - 1) > 1e-3:
             what = f"has an axis of length {norm:.3g}"
+        elif any(sweeps[name][row - 1] <= 0 for name in STD_COLUMNS if name in sweeps and moved > 0):
+            what = "is said to be known exactly"
         if what:
             raise Refused(
                 "bad_sweep",
                 f"sweep {row} {what}",
-                "Give start before end, a positive speed or angle, and the direction of the turn as a unit vector",
+                "Give start before end, a positive speed or angle, and the direction of the turn as a unit vector; "
+                "standard deviations above zero",
             )
     return np.asarray(motion / durations if by_angle else motion, dtype=np.float64)
 

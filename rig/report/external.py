@@ -1,33 +1,51 @@
 """A calibration from data recorded elsewhere, for people and for machines."""
 
 import json
+from collections.abc import Iterator
 from dataclasses import dataclass
 from pathlib import Path
 
 import numpy as np
 from rich.console import Console
 
+from rig.analysis.external import budget_of
 from rig.data.result_file import EstimateEntry, VectorEntry
 from rig.data.result_types import ErrorEntry
+from rig.estimation.estimate import Estimate
 from rig.estimation.six_observation import MODEL, PARAMETER_UNITS, PARAMETERS
+from rig.estimation.turned import TurnedSolution
+from rig.estimation.vector_model import VectorSolution
+from rig.observation.csv_import import ExternalData
 from rig.report.axes import matrix_lines
+from rig.report.budget_entry import budget_entry
+from rig.report.budget_table import budget_table
+from rig.report.sensor_entry import estimate_entry, vector_entry
 from rig.report.table import estimate_table
 from rig.station.plain_text import plain
 
 
 @dataclass(frozen=True, slots=True)
 class External:
-    """The chosen estimator's solution of two CSV files, and the six-observation solution of the same sweeps.
-
-    `vector` is the same solution with its matrix, where the estimator is the vector model.
-    """
+    """The chosen estimator's solution of two CSV files, and the six-observation solution of the same sweeps."""
 
     samples: Path
     sweeps: Path
-    rests: int
-    estimate: EstimateEntry
-    vector: VectorEntry | None
+    data: ExternalData
+    solution: Estimate
     six_observation: EstimateEntry | ErrorEntry
+
+    @property
+    def vector(self) -> VectorEntry | None:
+        """The same solution with its matrix, of an estimator that finds one."""
+        solution = self.solution
+        return vector_entry(solution) if isinstance(solution, VectorSolution | TurnedSolution) else None
+
+    @property
+    def ways(self) -> list[str]:
+        """How each sweep was solved, in the order of the rows."""
+        turned = self.data.turned
+        by_angle = turned.rows if turned is not None and isinstance(self.solution, TurnedSolution) else ()
+        return ["increment" if sweep.sweep in by_angle else "mean" for sweep in self.data.sweeps]
 
 
 def print_external(found: External, *, as_json: bool) -> None:
@@ -44,24 +62,46 @@ def _document(found: External) -> dict[str, object]:
         "samples": str(found.samples),
         "sweeps": str(found.sweeps),
         "model": MODEL,
-        **found.estimate.model_dump(),
+        **estimate_entry(found.solution).model_dump(),
         "covariance_order": list(PARAMETERS),
         "covariance_units": list(PARAMETER_UNITS),
-        "rests": found.rests,
+        "rests": len(found.data.rests),
+        "ways": found.ways,
+        "budget": budget_entry(budget_of(found.solution)).model_dump(),
         "vector_model": None if found.vector is None else found.vector.model_dump(),
         "six_observation": found.six_observation.model_dump(),
     }
 
 
 def _print(found: External, console: Console) -> None:
-    estimate, vector, beside = found.estimate, found.vector, found.six_observation
+    estimate, vector, beside = estimate_entry(found.solution), found.vector, found.six_observation
     console.print(estimate_table(f"{found.samples}, {MODEL}, {estimate.estimator}", estimate))
+    console.print(budget_table(budget_entry(budget_of(found.solution))))
     if vector is not None:
         covariance = np.array(vector.matrix_covariance)[:9, :9]
         for line in matrix_lines(np.array(vector.matrix), covariance):
             console.print(plain(line))
-        console.print("The axes of the sweeps are taken as given: an error of theirs is an error of F across its rows.")
+        for line in _how(found):
+            console.print(plain(line))
     if isinstance(beside, ErrorEntry):
         console.print(plain(f"six_observation: {beside.error}"))
     elif beside.estimator != estimate.estimator:
         console.print(estimate_table("six observations alone, the rests and the axes left out", beside))
+
+
+def _how(found: External) -> Iterator[str]:
+    """How the rows were read, and what was taken as known of them."""
+    solution, data = found.solution, found.data
+    if not isinstance(solution, TurnedSolution) or data.turned is None:
+        yield "The axes of the sweeps are taken as given: an error of theirs is an error of F across its rows."
+        return
+    turns = data.turned.turns
+    ends, axes = (max(std) for std in zip(*((turn.angle_std_rad, turn.axis_std_rad) for turn in turns), strict=True))
+    rows = ", ".join(map(str, data.turned.rows))
+    yield f"by the angle turned from rest to rest: {len(turns)} of {len(data.sweeps)} sweeps (rows {rows})"
+    yield (
+        f"a turn ends within {1e3 * ends:.1f} mrad of what is said of it, its axis leans by {1e3 * axes:.0f} mrad (one "
+        "standard deviation: angle_std_rad, axis_std_rad)"
+    )
+    if solution.widened > 1:
+        yield f"the turns contradict each other by more, and count as {solution.widened:.2g} times as uncertain"

@@ -21,6 +21,7 @@ from rig.estimation import vector_model
 from rig.estimation.arrays import Array
 from rig.estimation.estimate import Estimate
 from rig.estimation.six_observation import MODEL, PARAMETER_UNITS, PARAMETERS
+from rig.estimation.turned import TurnedSolution
 from rig.report.budget_entry import bias_process_entry, budget_entry
 from rig.report.earth_rate import earth_rate_entry
 from rig.report.entry import entry
@@ -75,7 +76,7 @@ def _vector_or_error(outcome: vector_model.VectorSolution | Fault) -> VectorEntr
     return ErrorEntry(error=str(outcome)) if isinstance(outcome, Fault) else vector_entry(outcome)
 
 
-def vector_entry(outcome: vector_model.VectorSolution) -> VectorEntry:
+def vector_entry(outcome: vector_model.VectorSolution | TurnedSolution) -> VectorEntry:
     """The vector model's solution, how the axes lie to each other included."""
     angles = np.sqrt(np.diag(outcome.angles_covariance_rad2))
     sensitivity: dict[str, object] = {}

@@ -19,9 +19,8 @@ from rig.estimation.arrays import Array
 from rig.estimation.reference_budget import scale_and_bias
 from rig.observation.fixes import Turning
 from support.followed_body import EARTH_RAD_S, Followed, World, follow, write
-from support.paths import REAL
+from support.real import recording
 
-CAMERAS = REAL / "broad"
 BY_INTEGRAL, KNOWN_TO = np.array([1.0008, 1.0038, 1.0009]), np.array([0.0003, 0.0015, 0.0013])  # its README
 
 HAND = World()
@@ -57,7 +56,7 @@ def off(found: InIncrements, followed: Followed) -> Array:
 def before_cameras() -> Turning:
     tables = []
     for name in ("samples", "attitudes"):
-        with gzip.open(CAMERAS / f"{name}.csv.gz", "rt") as file:
+        with gzip.open(recording("broad") / f"{name}.csv.gz", "rt") as file:
             tables.append(np.loadtxt(file, delimiter=",", skiprows=1))
     samples, rows = tables
     attitudes = Rotation.from_quat(rows[:, [3, 4, 5, 2]]).as_matrix()

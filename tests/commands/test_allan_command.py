@@ -1,6 +1,5 @@
 """`rig allan`: tables, JSON and plots from a run file."""
 
-import gzip
 import json
 from dataclasses import replace
 from pathlib import Path
@@ -12,7 +11,7 @@ from rig.cli import main
 from rig.data.events import to_line
 from rig.data.layout import EVENTS_DTYPE, SCHEMA, Contents, lay_out
 from rig.data.run_file import RunData
-from support.paths import REAL
+from support.real import unpacked
 from support.synthetic_run import Setup, synthetic_run
 
 
@@ -124,13 +123,12 @@ def test_a_log_in_which_the_sensor_was_turned_is_refused(
 def test_a_body_that_a_hand_moved_was_not_at_rest(
     name: str, tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
-    (tmp_path / "moved.csv").write_bytes(gzip.decompress((REAL / name / "samples.csv.gz").read_bytes()))
-    assert main(["allan", str(tmp_path / "moved.csv")]) == 2
+    assert main(["allan", str(unpacked(name, "samples.csv", tmp_path))]) == 2
     assert "rig: not_at_rest: " in capsys.readouterr().err
 
 
 def test_the_still_part_of_a_recording_by_hand_has_a_curve(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
-    lines = gzip.decompress((REAL / "imucal" / "samples.csv.gz").read_bytes()).decode().splitlines()
+    lines = unpacked("imucal", "samples.csv", tmp_path).read_text(encoding="utf-8").splitlines()
     held = [line for line in lines[1:] if 5.5 < float(line.partition(",")[0]) < 12.2]
     (tmp_path / "held.csv").write_text("\n".join([lines[0], *held]) + "\n", encoding="utf-8")
     assert main(["allan", str(tmp_path / "held.csv"), "--json"]) == 0

@@ -9,4 +9,3 @@ DOCS = ROOT / "docs"
 FIRMWARE = ROOT / "firmware_host" / "firmware"
 IMAGE = FIRMWARE / "image"
 FIXTURES = ROOT / "tests" / "fixtures" / "af3b9f0"  # runs recorded by the rig of that commit
-REAL = ROOT.parent / "shared" / "real"  # recordings that nobody here made; its README says whose they are

@@ -1,0 +1,62 @@
+"""When a body lay still, as its sensors' readings alone tell.
+
+A recording is cut into blocks of a quarter of a second. A block is at rest where the readings scatter no more than a
+few times as much as in the quietest tenth of all blocks, and where a gyroscope reads what it reads at rest: the blocks
+that agree with its smallest reading. Blocks that follow each other and read the same are one rest.
+
+A gyroscope alone decides where there is one: it feels every turn, and no knock against the table.
+"""
+
+from collections.abc import Mapping, Sequence
+
+import numpy as np
+from numpy.typing import NDArray
+
+from rig.estimation.arrays import Array
+from rig.observation.csv_samples import QUANTITIES, Quantity
+from rig.observation.steadiness import BEYOND, STEADY
+from rig.observation.windows import Window
+
+BLOCK_S, FEWEST = 0.25, 5  # samples of a block
+QUIETEST, AS_QUIET = 0.1, 3.0  # share of the blocks that tell the noise; times as much is at rest as well
+COUNTS = 0.2  # of what is steady: so much may always scatter, where the noise is below the resolution
+GAP = 2.5  # intervals
+
+
+def find_rests(time_s: Array, readings: Mapping[Quantity, Array]) -> tuple[Window, ...]:
+    """Rests of two blocks and longer, by readings (n, 3) of one quantity or several at rising times (n,)."""
+    quantity = next(each for each in QUANTITIES if each in readings)
+    interval_s = float(np.median(np.diff(time_s)))
+    width = max(FEWEST, int(np.ceil(BLOCK_S / interval_s)))
+    count = len(time_s) // width
+    if count < 2:
+        return ()
+    times = time_s[: count * width].reshape(count, width)
+    blocks = readings[quantity][: count * width].reshape(count, width, 3)
+    means, scatter = blocks.mean(axis=1), blocks.std(axis=1)
+    noise = np.maximum(np.quantile(scatter, QUIETEST, axis=0), COUNTS * STEADY[quantity])
+    apart = STEADY[quantity] + BEYOND * noise * np.sqrt(2 / width)
+    still = (scatter <= AS_QUIET * noise).all(axis=1) & (np.diff(times, axis=1).max(axis=1) <= GAP * interval_s)
+    if quantity == "rate" and still.any():
+        still &= _unturned(means, still, apart)
+    follows = times[1:, 0] - times[:-1, -1] <= GAP * interval_s
+    follows &= (np.abs(np.diff(means, axis=0)) <= apart).all(axis=1)
+    joined = np.concatenate([[False], still[:-1] & still[1:] & follows, [False]])
+    edges = np.flatnonzero(np.diff(joined.astype(np.int8))).reshape(-1, 2)
+    return tuple(Window(float(times[first, 0]), float(times[last, -1])) for first, last in edges.tolist())
+
+
+def number_of_rest(time_s: Array, rests: Sequence[Window]) -> NDArray[np.intp]:
+    """(n,) the number of the rest that each time falls into, −1 where it falls into none."""
+    found = np.full(len(time_s), -1)
+    for number, rest in enumerate(rests):
+        found[(time_s >= rest.start_s) & (time_s <= rest.end_s)] = number
+    return found
+
+
+def _unturned(means: Array, still: NDArray[np.bool_], apart: Array) -> NDArray[np.bool_]:
+    """(count,) blocks that read what a gyroscope reads at rest."""
+    smallest = means[still][np.argmin(np.linalg.norm(means[still], axis=1))]
+    near = still & (np.abs(means - smallest) <= apart).all(axis=1)
+    agreeing: NDArray[np.bool_] = (np.abs(means - np.median(means[near], axis=0)) <= apart).all(axis=1)
+    return agreeing
