@@ -140,7 +140,7 @@ class ChildLink:
     def _guard(self) -> None:
         while not self._ended.wait(TICK_S):
             self._say_alive()
-            self._silent.tick()
+            self._silent.tick(unheard=_readable(self._pipe))
             self._frozen_ticks += self._beaten
             self._beaten = False
             if self._silent.lasts_over(PATIENT_TICKS if self._patient else SILENT_TICKS):
@@ -178,6 +178,11 @@ def _on_this_machine(host: str) -> bool:
         return ipaddress.ip_address(socket.gethostbyname(host)).is_loopback
     except OSError:
         return False
+
+
+def _readable(pipe: "Connection[Request, Message]") -> bool:
+    """Whether a message lies in the pipe that this process has not come to; False where the system cannot be asked."""
+    return os.name == "posix" and bool(select.select([pipe.fileno()], [], [], 0)[0])
 
 
 def _writable(pipe: "Connection[Request, Message]") -> bool:

@@ -153,6 +153,7 @@ class Arm:
                 raise Refused.of(self._answer.problem)
             self._wait(lambda: self.latest.runtime_state == RuntimeState.PLAYING)
             self._supervising = True
+        self._silent_s = 0.0  # there was no client yet to lose
 
     def move(self, motion: Motion, watch: Callable[[], None] = _nothing) -> None:
         """Make one movement and return when the arm has arrived and stands still.

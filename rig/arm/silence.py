@@ -35,12 +35,15 @@ class Silence:
         """A sign of life."""
         self.ticks = self._all_ticks = 0
 
-    def tick(self) -> None:
-        """Once more nothing was heard, or not yet: call this at even intervals."""
+    def tick(self, unheard: bool = False) -> None:
+        """Once more nothing was heard, or not yet: call this at even intervals.
+
+        `unheard`: what it has said lies there, and whoever is to hear it has not come to it; that is not its silence.
+        """
         self._all_ticks += 1
         # The first tick of a silence is nothing yet; only then is it worth a look at what the process does.
         starved = self._all_ticks > 1 and self._starved(known=self._all_ticks > 2)
-        self.ticks += not starved
+        self.ticks += not (starved or unheard)
 
     def lasts_over(self, limit: float) -> bool:
         """Whether there were more than `limit` silent ticks, or far more when the machine was too busy to tell.
@@ -73,10 +76,21 @@ class Silence:
 
 
 def crowding() -> float:
-    """How many programs a processor of this machine has to serve, 1 to CROWDED: what is late may be late by that."""
+    """How many programs a processor of this machine has to serve, 1 to CROWDED: what is late may be late by that.
+
+    In the mean of the last minute, or now: after a quarter of a minute the mean tells of a quarter of a crowd.
+    """
     if not hasattr(os, "getloadavg"):  # Windows
         return 1.0
-    return min(max(os.getloadavg()[0] / (os.cpu_count() or 1), 1.0), CROWDED)
+    return min(max(max(os.getloadavg()[0], _runnable()) / (os.cpu_count() or 1), 1.0), CROWDED)
+
+
+def _runnable() -> int:
+    """How many threads of the machine run or wait for a processor now; 0 where proc(5) does not tell."""
+    try:
+        return int(Path("/proc/loadavg").read_text().split()[3].partition("/")[0])
+    except (OSError, ValueError, IndexError):
+        return 0
 
 
 def _times(tasks: Path) -> _Times:

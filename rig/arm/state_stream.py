@@ -22,6 +22,9 @@ from rig.arm.state import ArmState
 PORT = 30004
 VERSION = 2
 HEADER = struct.Struct(">HB")
+# Ten seconds at the fastest rate, if the system gives it. What does not fit waits at the controller, and nobody says
+# how long that keeps it.
+ROOM_BYTES = 1 << 20
 # What is asked for, with the type it must have. Asking for nothing else keeps the packets small.
 VARIABLES = {
     "timestamp": "DOUBLE",
@@ -79,6 +82,7 @@ class StateStream:
         self._socket = socket.create_connection((host, PORT), timeout_s)
         try:
             self._socket.setsockopt(socket.IPPROTO_TCP, socket.TCP_NODELAY, 1)
+            self._socket.setsockopt(socket.SOL_SOCKET, socket.SO_RCVBUF, ROOM_BYTES)
             self._socket.setblocking(False)
             self._set_up(rate_hz)
             self._first = self._await_packet()

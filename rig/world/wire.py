@@ -14,7 +14,6 @@ from collections.abc import Callable
 FIRST_PATIENCE_S, PATIENCE_S = 0.1, 5.0
 EARNED = 0.5  # of the time in which a client keeps pace, in patience
 IN_PACE_S = 0.05  # a wait no longer than this costs no patience: it is how fast the client works, not that it sleeps
-STANDS_S = 0.7  # so long the world stands for a client; while patience lasts it then goes as fast as a real one
 LOOK_S = (0.0001, 0.001)  # time between two looks at a client that is waited for: a quarter of its delay, within these
 
 Unread = Callable[[], int]
@@ -81,8 +80,9 @@ class SocketTable:
 class Wire:
     """One client's pace: it may be `lag_s` of the world's time behind before the world waits for it.
 
-    A client that takes what it is sent as fast as it can is waited for, however slow that is; one that lets it lie
-    only as long as its patience lasts, and then no more until it has kept pace again.
+    Waiting is to go on as a real laboratory would, 1 s in 1 s: what others are sent comes no slower than from that, or
+    they would take the world for one that has gone. A client that lets lie what it is sent is waited for only as long
+    as its patience lasts, and then no more until it has kept pace again.
     """
 
     def __init__(self, unread: Unread, lag_s: float, wall: Callable[[], float]) -> None:
@@ -113,9 +113,8 @@ class Wire:
         waited_s = now_s - self._waiting_since_s
         if waited_s >= max(self._patience_s, IN_PACE_S if self._in_pace else 0.0):
             return 0.0
-        if waited_s > STANDS_S:
-            return max(0.0, self._sent_s + time_s - self._sent_time_s - now_s)
-        return min(max(LOOK_S[0], waited_s / 4), LOOK_S[1])
+        due_s = self._sent_s + time_s - self._sent_time_s - now_s
+        return max(0.0, min(due_s, max(LOOK_S[0], waited_s / 4), LOOK_S[1]))
 
     def _settle(self, now_s: float) -> None:
         """The client has caught up."""

@@ -29,6 +29,7 @@ from rig.config.procedure_sections import SixObservationSection
 from rig.errors import Fault, Refused
 from rig.plans.six_sweeps import plan_six_observation
 from support.arm_relay import relay
+from support.rtde_reader import RtdeReader
 from support.worlds import World, WorldHandle
 
 pytestmark = pytest.mark.slow
@@ -370,6 +371,77 @@ def test_an_arm_elsewhere_that_falls_silent_is_missed_at_once_on_a_crowded_compu
             assert time.monotonic() - cut.acted_s < 3.0, "as long as a crowd here excuses a controller here"
         wire.stalled.clear()
     assert fault.value.name == "arm_link_lost"
+
+
+def test_a_program_that_comes_late_to_the_states_does_not_take_its_driver_for_hung(
+    laboratory: WorldHandle, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """The driver's heartbeats lie in the pipe meanwhile: whoever reads them is held up."""
+    monkeypatch.setattr("rig.arm.silence.crowding", lambda: 1.0)
+    held_up = iter([1.0])
+
+    def take(state: ArmState) -> None:
+        if abs(state.qd_rad_s[WRIST_3]) > 0.8:
+            time.sleep(next(held_up, 0.0))
+
+    with Arm(laboratory.host, take) as arm:
+        arm.take_control(*PAYLOAD)
+        arm.move(turn(arm.latest.q_rad, 6.0))
+        assert next(held_up, None) is None, "nothing was held up"
+        assert arm.missed_states == 0
+
+
+def test_a_program_that_takes_no_more_states_is_noticed(world: World, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr("rig.arm.silence.crowding", lambda: 1.0)
+    laboratory = world({"world": {"time_scale": 1}})
+    stuck = threading.Event()
+
+    def take(state: ArmState) -> None:
+        if abs(state.qd_rad_s[WRIST_3]) > 0.8:
+            stuck.wait(30.0)
+
+    with Arm(laboratory.host, take) as arm:
+        arm.take_control(*PAYLOAD)
+        try:
+            with pytest.raises(Fault) as fault:
+                arm.move(turn(arm.latest.q_rad, 6.0))
+            assert fault.value.name == "arm_driver_hung"
+            assert laboratory.state()["q_rad"][WRIST_3] < 5.0, "the arm went on to the end of its way"
+        finally:
+            stuck.set()
+
+
+@pytest.mark.skipif(sys.platform != "linux", reason="only Linux tells what another program has not read")
+def test_a_slow_reader_beside_and_a_controller_held_up_for_a_moment_are_no_lost_link(
+    laboratory: WorldHandle, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """Neither is one alone. As in a busy moment: a part of the rig reads late, the laboratory gets no turn."""
+    monkeypatch.setattr("rig.arm.child_link.crowding", lambda: 1.0)
+    beside = RtdeReader(laboratory.host)
+    read_until_s = math.inf
+
+    def read() -> None:
+        with suppress(OSError):
+            while time.monotonic() < read_until_s:
+                beside.newest_s()
+
+    reading = threading.Thread(target=read)
+    reading.start()
+    with Arm(laboratory.host) as arm:
+        arm.take_control(*PAYLOAD)
+        arm.rest(12.0)  # in which the other reader earns patience
+
+        def hold_up() -> None:
+            nonlocal read_until_s
+            read_until_s = 0.0
+            reading.join()
+            time.sleep(0.6)
+            os.kill(laboratory.process.pid, signal.SIGSTOP)
+            time.sleep(0.5)
+            os.kill(laboratory.process.pid, signal.SIGCONT)
+
+        arm.move(turn(arm.latest.q_rad, 6.0), AtSpeed(arm, hold_up))
+    beside.close()
 
 
 def test_a_controller_that_was_silent_before_a_move_has_not_refused_it(

@@ -6,11 +6,12 @@ import subprocess
 import sys
 import time
 from collections.abc import Iterator
-from contextlib import contextmanager
+from contextlib import ExitStack, contextmanager
 
 import pytest
 
-from rig.arm.silence import Silence
+from rig.arm.silence import CROWDED, Silence, crowding
+from support.waiting import wait_for
 
 TICK_S = 0.05
 SPARED = 10
@@ -44,6 +45,25 @@ def test_a_sign_of_life_ends_a_silence() -> None:
         silence.tick()
     silence.heard()
     assert not silence.lasts_over(0)
+
+
+def test_what_a_process_has_said_and_nobody_has_come_to_is_not_its_silence_for_ever() -> None:
+    silence = Silence(os.getpid(), spared=SPARED, thread=0)  # one that waits for no processor
+    for _ in range(5 * SPARED):
+        silence.tick(unheard=True)
+    assert silence.ticks == 0 and not silence.lasts_over(5)
+    assert silence.lasts_over(0.9 * 5 / CROWDED), "nobody may be watching any more"
+
+
+@pytest.mark.skipif(sys.platform != "linux", reason="only Linux tells how many want a processor")
+def test_a_crowd_is_noticed_at_once(monkeypatch: pytest.MonkeyPatch) -> None:
+    """The mean of the last minute would tell of it in half a minute."""
+    monkeypatch.setattr(os, "getloadavg", lambda: (0.0, 0.0, 0.0))
+    crowd = 3 * (os.cpu_count() or 1)
+    with ExitStack() as busy:
+        for _ in range(crowd):
+            busy.enter_context(process("while True: pass"))
+        wait_for(lambda: crowding() > 2.0, "the crowd")
 
 
 def test_where_nothing_is_known_of_a_process_every_tick_counts() -> None:

@@ -2,6 +2,7 @@
 
 import socket
 import struct
+import sys
 import threading
 import time
 from collections.abc import Callable, Iterator
@@ -59,6 +60,12 @@ class Controller:
         assert self._client is not None
         self._client.sendall(sent)
 
+    def keeps_nothing(self) -> None:
+        """From now on what the client's system has no room for is not taken from the test."""
+        assert self._client is not None
+        self._client.setsockopt(socket.SOL_SOCKET, socket.SO_SNDBUF, 1)
+        self._client.settimeout(2.0)
+
     def hang_up(self) -> None:
         if self._client is not None:
             self._client.close()
@@ -108,6 +115,16 @@ def test_states_wait_for_a_reader_that_is_held_up(controllers: Controllers) -> N
     with StateStream(controller.host, 125.0, 5.0) as stream:
         controller.send(b"".join(data(float(k)) for k in range(1, 300)))
         assert times_of(stream, 299) == [float(k) for k in range(1, 300)]
+
+
+@pytest.mark.skipif(sys.platform != "linux", reason="others may give less room")
+def test_two_seconds_of_states_wait_also_where_the_controller_keeps_none(controllers: Controllers) -> None:
+    controller = controllers(S=ANSWERS["S"] + data(0.0))
+    with StateStream(controller.host, 500.0, 5.0) as stream:
+        controller.keeps_nothing()
+        for k in range(1, 1001):
+            controller.send(data(float(k)))  # waits, and times out, where there is no more room
+        assert times_of(stream, 1000) == [float(k) for k in range(1, 1001)]
 
 
 def test_a_silence_is_what_has_not_come_however_late_one_looks(controllers: Controllers) -> None:

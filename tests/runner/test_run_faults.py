@@ -14,6 +14,7 @@ from contextlib import contextmanager, suppress
 from pathlib import Path
 from typing import Any
 
+import numpy as np
 import pytest
 
 from rig.data.run_file import read_run
@@ -180,6 +181,17 @@ def test_resuming_a_run_that_still_goes_on_leaves_it_alone(start: Start) -> None
     rig.end()
     run = read_run(rig.out / "run.h5")
     assert run.arm["time_s"][-1] > time_s + 0.5, "what came after the second command is lost"
+
+
+def test_a_program_held_up_for_a_second_misses_no_state(start: Start) -> None:
+    rig = start({"world": {"time_scale": 8}})
+    rig.until_sweeping()
+    rig.process.send_signal(signal.SIGSTOP)
+    time.sleep(1.0)
+    rig.process.send_signal(signal.SIGCONT)
+    status, errors = rig.end()
+    assert status in (0, 1), errors
+    np.testing.assert_allclose(np.diff(read_run(rig.out / "run.h5").arm["time_s"]), 1 / 125, atol=1e-6)
 
 
 def test_the_arm_stops_when_the_program_freezes(start: Start) -> None:

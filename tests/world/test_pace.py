@@ -16,7 +16,7 @@ from rig.arm.motion import Transfer, trapezoid_duration
 from rig.world import network
 from rig.world.clock import DIALOGUE_S, TICK_S, Clock
 from rig.world.process import ARM_LAG_S
-from rig.world.wire import EARNED, FIRST_PATIENCE_S, IN_PACE_S, PATIENCE_S, STANDS_S, Wire
+from rig.world.wire import EARNED, FIRST_PATIENCE_S, IN_PACE_S, PATIENCE_S, Wire
 from support.arm_relay import relay
 from support.rtde_reader import RtdeReader
 from support.waiting import wait_for
@@ -24,6 +24,7 @@ from support.worlds import World, fresh_host
 
 PERIOD_S = 0.008  # between packets at 125 Hz
 LAG_S = 5.5 * PERIOD_S
+AWAY = 5  # times as long as it meant to be a sleeper is away at most, on a busy machine; the world is 50 times as fast
 FAST = {"world": {"time_scale": 50}}
 linux = pytest.mark.skipif(sys.platform != "linux", reason="only Linux tells what another program has not read")
 
@@ -83,16 +84,17 @@ def test_the_world_waits_for_a_client_that_is_behind() -> None:
 
 
 def test_a_client_that_hangs_gets_what_a_real_controller_sends_while_patience_lasts() -> None:
+    """Neither more, so that it catches up, nor less: the world never stands still for it."""
     client = Client()
     client.keeps_pace(2.0 / EARNED)
     client.is_sent(6)
-    assert client.wait_s > 0.0
-    client.wall.passes(STANDS_S * 1.01)
-    assert client.wait_s == 0.0
-    client.is_sent(1)
-    assert client.wait_s == pytest.approx(PERIOD_S)
-    client.wall.passes(PERIOD_S * 1.01)
-    assert client.wait_s == 0.0, "it has not caught up"
+    began_s, began_world_s = client.wall.now_s, client.time_s
+    while (passed_s := client.wall.now_s - began_s) < 1.0:
+        if wait_s := client.wait_s:
+            client.wall.passes(wait_s)
+        else:
+            client.is_sent(1)
+    assert client.time_s - began_world_s == pytest.approx(passed_s, abs=2 * PERIOD_S), "and it has not caught up"
 
 
 def test_a_client_that_reads_no_more_slows_the_world_for_nobody() -> None:
@@ -165,7 +167,7 @@ def test_the_world_does_not_run_ahead_of_a_slow_client(world: World, pause_s: fl
         time.sleep(pause_s)
         times_s.append(reader.newest_s())
     reader.close()
-    assert max(after - before for before, after in pairwise(times_s)) < ARM_LAG_S + 2 * PERIOD_S
+    assert max(after - before for before, after in pairwise(times_s)) < ARM_LAG_S + AWAY * pause_s + 2 * PERIOD_S
 
 
 @pytest.mark.slow
@@ -190,7 +192,7 @@ def test_a_client_that_comes_back_after_long_is_waited_for_again(world: World) -
         reader.newest_s()
     before_s = reader.newest_s()
     time.sleep(0.5 * IN_PACE_S)
-    assert reader.newest_s() - before_s < ARM_LAG_S + 2 * PERIOD_S
+    assert reader.newest_s() - before_s < ARM_LAG_S + AWAY * 0.5 * IN_PACE_S + 2 * PERIOD_S
     reader.close()
 
 
