@@ -13,7 +13,6 @@ import threading
 import time
 import traceback
 from multiprocessing.connection import Connection
-from pathlib import Path
 from typing import Any, NoReturn
 
 from rig.arm.dashboard import Dashboard
@@ -35,6 +34,7 @@ from rig.arm.silence import Silence
 from rig.arm.state import ArmState
 from rig.arm.state_stream import NotSpoken, Packet, StateStream
 from rig.arm.stopping import BRAKE_RAD_S2
+from rig.config.written_file import opened_to_append
 from rig.errors import Problem
 
 HEARTBEAT_S = 0.01
@@ -244,10 +244,11 @@ def _outlive_the_parent() -> None:
 
 def _send_output_to(log: str | None) -> None:
     """The client writes to stdout and stderr as it likes; stdout belongs to results."""
-    with Path(log or os.devnull).open("ab") as sink:
-        for stream in (sys.stdout, sys.stderr):
-            stream.flush()
-            os.dup2(sink.fileno(), stream.fileno())
+    sink = os.open(os.devnull, os.O_WRONLY) if log is None else opened_to_append(log)
+    for stream in (sys.stdout, sys.stderr):
+        stream.flush()
+        os.dup2(sink, stream.fileno())
+    os.close(sink)
 
 
 def _move_failure(what: str) -> Problem:

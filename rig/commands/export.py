@@ -2,6 +2,7 @@
 
 from pathlib import Path
 
+from rig.config.written_file import write_new
 from rig.data.result_file import ResultDocument, passed_result, read_result
 from rig.data.run_folder import refuse_links
 from rig.errors import Refused
@@ -27,14 +28,14 @@ def export(run: Path, name: str, out: Path | None, moved: tuple[str, str] | None
             recordings = observe_runs(open_run(run).movement)
             if not recordings:
                 raise Refused("nothing_to_export", "no sweep or dwell was finished", "Resume the run")
-            _made(folder)
+            _made(folder, own=out is not None)
             written = writer_of_readings(name)(recordings, folder)
         else:
             texts = texts_of_calibrations(name)(_calibration(run, moved))
-            _made(folder)
+            _made(folder, own=out is not None)
             written = [folder / file for file in texts]
             for path, text in zip(written, texts.values(), strict=True):
-                path.write_text(text, encoding="utf-8")
+                write_new(path, text)
     except OSError as error:
         raise Refused("report_folder", f"{folder} cannot be written: {error}", "Choose another with --out") from error
     for path in written:
@@ -42,9 +43,11 @@ def export(run: Path, name: str, out: Path | None, moved: tuple[str, str] | None
     return 0
 
 
-def _made(folder: Path) -> None:
-    """Make the folder, unless a link leads elsewhere, from it or from what lies in it. Raises Refused and OSError."""
-    refuse_links(folder.parent, folder)
+def _made(folder: Path, *, own: bool) -> None:
+    """Make the folder, unless a link leads elsewhere, from what lies in it or, if it is not named by the user as their
+    `own`, from itself. Raises Refused and OSError.
+    """
+    refuse_links(*(() if own else (folder.parent, folder)))
     folder.mkdir(parents=True, exist_ok=True)
     refuse_links(*folder.rglob("*"))
 

@@ -6,6 +6,7 @@ from pathlib import Path
 
 from rig.commands.named_history import named_history
 from rig.commands.remember import remember_certificate
+from rig.config.written_file import write_new
 from rig.data.magnetometer_entries import read_reversal
 from rig.data.result_file import read_result
 from rig.data.run_folder import RESULT, refuse_links
@@ -32,7 +33,7 @@ def report(
 
     `reversal` is what `rig reversal` wrote of its magnetometers; `history` where it is noted, the user's own history by
     default, and never one that the folder names. Returns 0. Raises Refused `report_folder`, and as `read_result`,
-    `read_reversal`, `refuse_links`, `certificate_of`, `stated_in`, `digital_certificate` and `write_pdf` do.
+    `read_reversal`, `refuse_links`, `certificate_of`, `stated_in`, `digital_certificate` and `pdf_of` do.
     """
     file = run / RESULT if run.is_dir() else run
     result = read_result(file)
@@ -45,15 +46,15 @@ def report(
     folder = out or file.parent
     try:
         folder.mkdir(parents=True, exist_ok=True)
-        refuse_links(folder, *(folder / name for name in written))
+        refuse_links(*(folder / name for name in written))
         for name, content in written.items():
-            (folder / name).write_bytes(content)
+            write_new(folder / name, content)
         if pdf:
-            from rig.report.certificate.pdf import PDF, write_pdf
+            from rig.report.certificate.pdf import PDF, pdf_of
 
             refuse_links(folder / PDF)
-            write_pdf(written[PAGE].decode(), {RESULT: file.read_bytes(), **digital}, folder / PDF)
-            written[PDF] = (folder / PDF).read_bytes()
+            written[PDF] = pdf_of(written[PAGE].decode(), {RESULT: file.read_bytes(), **digital})
+            write_new(folder / PDF, written[PDF])
     except OSError as error:
         raise Refused("report_folder", f"{folder} cannot be written: {error}", "Choose another with --out") from error
     for name in written:

@@ -5,6 +5,7 @@ from pathlib import Path
 
 from rig.analysis.calibration import DEFAULT_ESTIMATOR
 from rig.analysis.reversal import reversals
+from rig.config.written_file import write_new
 from rig.errors import Refused
 from rig.plans.recorded import judged, open_run
 from rig.report.reversal import print_reversal, reversal_document
@@ -19,7 +20,7 @@ def reversal(runs: Sequence[Path], out: Path | None, *, as_json: bool) -> int:
     print_reversal(document, as_json=as_json)
     if out is not None:
         try:
-            out.write_text(document.text() + "\n", encoding="utf-8")
+            write_new(out, document.text() + "\n")
         except OSError as error:
             raise Refused("report_folder", f"{out} cannot be written: {error}", "Choose another with --out") from error
     return 0

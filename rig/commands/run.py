@@ -77,7 +77,7 @@ def resume(
             f"{folder} keeps no {SCRIPT}, so the script it was begun with is not known",
             "Start a new run with `rig run`",
         )
-    refuse_links(folder, *folder.iterdir())
+    refuse_links(*folder.iterdir())
     refuse_foreign_addresses(folder, load(folder / CONFIG, sections=None), connect)
     named = None if script is None else load_script(script)
     found = configured(folder / CONFIG, script=kept_script(folder, script_identity(folder), named))

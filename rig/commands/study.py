@@ -10,6 +10,7 @@ from rich.console import Console
 from rich.progress import track
 from rich.table import Table
 
+from rig.data.run_folder import refuse_links
 from rig.errors import Refused
 from rig.station.plain_text import say
 from rig.study.catalogue import STUDIES, find
@@ -38,7 +39,7 @@ def run_study(
 ) -> int:
     """Run one study, print its findings and write its files into `out`.
 
-    Raises Refused `unknown_study`, `bad_option`, `missing_extra`, `study_folder`.
+    Raises Refused `unknown_study`, `bad_option`, `missing_extra`, `study_folder`, and as `refuse_links`.
     """
     entry = find(name)
     for option, value, least in (("--seed", seed, 0), ("--runs", runs, 10), ("--jobs", jobs, 1)):
@@ -49,6 +50,7 @@ def run_study(
         import matplotlib  # noqa: F401
     except ImportError as error:
         raise missing_extra(error, "study") from error
+    refuse_links(*out.glob("*"))
     with _cluster(dask) if dask else nullcontext():
         report = entry.run(Settings(seed, runs, jobs, _bar))
     paths = write(report, out, name, table_format)

@@ -16,6 +16,7 @@ from numpy.typing import NDArray
 
 from firmware_host.samples import FIELD_SAMPLE_DTYPE, IMU_SAMPLE_DTYPE, SAMPLE_DTYPE
 from rig.arm.state import ARM_STATE_DTYPE
+from rig.config.written_file import PART
 
 SCHEMA = "rig.run/2"
 SCHEMA_BEFORE = "rig.run/1"
@@ -66,8 +67,9 @@ def lay_out(path: Path, contents: Contents, *, swmr: bool) -> None:
     """
     import h5py
 
-    whole = path.with_name(path.name + ".part")
-    with h5py.File(whole, "w", libver="latest" if swmr else None) as file:
+    whole = path.with_name(path.name + PART)
+    whole.unlink(missing_ok=True)
+    with h5py.File(whole, "x", libver="latest" if swmr else None) as file:  # not through a link that came to lie there
         file.attrs.update(schema=contents.schema, **contents.texts)
         _dataset(file, "arm", contents.arm, CHUNK_ROWS)
         _dataset(file, "events", contents.events, CHUNK_BYTES)

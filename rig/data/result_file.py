@@ -10,6 +10,7 @@ from typing import Final, Literal
 from pydantic import ConfigDict, Field, JsonValue
 
 from rig.config.section import SensorName
+from rig.config.written_file import write_new
 from rig.data.accelerometer_entries import AccelerometerEntry
 from rig.data.budget_entries import BiasProcessEntry, BudgetEntry, ClockEntry
 from rig.data.checked import read_document
@@ -335,9 +336,7 @@ def schema_text() -> str:
 
 def write_result(document: ResultDocument, folder: Path) -> None:
     """`result.json` into a run folder, whole or not at all: it ends the run."""
-    part = folder / f"{RESULT}.part"
-    part.write_text(document.text() + "\n", encoding="utf-8")
-    part.replace(folder / RESULT)
+    write_new(folder / RESULT, document.text() + "\n")
 
 
 def read_result(path: Path) -> ResultDocument:

@@ -10,6 +10,7 @@ import numpy as np
 from rig.analysis.comparison import Comparison
 from rig.analysis.outcome import Outcome
 from rig.analysis.verification import Verification
+from rig.config.written_file import new_file
 from rig.data.result_file import ResultDocument
 from rig.estimation.arrays import Array
 from rig.station.events import NotPlotted, Plotted, RunEvent
@@ -68,8 +69,9 @@ def style() -> AbstractContextManager[None]:
 
 def save(figure: "Figure", folder: Path, name: str) -> None:
     """As PNG and as SVG."""
-    figure.savefig(folder / f"{name}.png", dpi=110)
-    figure.savefig(folder / f"{name}.svg", dpi=110, metadata={"Date": None})
+    with new_file(folder / f"{name}.png") as png, new_file(folder / f"{name}.svg") as svg:
+        figure.savefig(png, format="png", dpi=110)
+        figure.savefig(svg, format="svg", dpi=110, metadata={"Date": None})
 
 
 def draw_comparison(figure: "Figure", comparison: Comparison, sensor: str, reference: str) -> None:

@@ -9,6 +9,7 @@ import numpy as np
 
 from rig.analysis.calibration import SensorResult
 from rig.analysis.outcome import Outcome
+from rig.config.written_file import write_new
 from rig.data.accelerometer_entries import AccelerometerEntry
 from rig.data.result_file import ResultDocument, SensorEntry
 from rig.errors.quoting import printable
@@ -25,7 +26,7 @@ def write_header(outcome: Outcome, document: ResultDocument, folder: Path) -> tu
         path = folder / "calibration.h"
         found = {name: g_sensitivity(result) for name, result in outcome.results.items()}
         sensed = {name: matrix for name, matrix in found.items() if matrix is not None}
-        path.write_text(calibration_header(document, sensed), encoding="utf-8")
+        write_new(path, calibration_header(document, sensed))
         return (DocumentWritten(path),)
     return ()
 

@@ -15,6 +15,7 @@ from rig.board.store import Solved, calibration_of
 from rig.config.load import Loaded
 from rig.data.provenance import provenance_of
 from rig.data.run_file import RunRecorder
+from rig.data.run_folder import refuse_links
 from rig.data.settings import RunSettings
 from rig.errors import Refused
 from rig.plans.phase import Phase
@@ -118,6 +119,7 @@ class Connector:
     def _connect_arm(self, stack: ExitStack, acquisition: Acquisition) -> tuple[Arm, ArmReport]:
         section = self.loaded.config.arm
         log = self.path.with_name("arm_client.log")
+        refuse_links(log)
         arm = stack.enter_context(Arm(section.host, acquisition.on_state, section.state_rate_hz, log))
         report = arm.report()
         self.station.event(ArmConnected(report))

@@ -1,11 +1,13 @@
 """The run's log: a line with the time for everything that happened."""
 
+import os
 from collections.abc import Iterator
 from contextlib import contextmanager, suppress
 from datetime import datetime
 from pathlib import Path
 from typing import TextIO
 
+from rig.config.written_file import opened_to_append
 from rig.errors.quoting import printable_lines
 from rig.station.events import RunEvent
 from rig.station.words import line, reason
@@ -30,7 +32,7 @@ class Log:
 @contextmanager
 def log(path: Path) -> Iterator[Log]:
     """The log at `path`, for the length of the `with` block; what is there already stays. Raises OSError."""
-    file = path.open("a", encoding="utf-8")
+    file = os.fdopen(opened_to_append(path), "a", encoding="utf-8")
     try:
         yield Log(file)
     finally:

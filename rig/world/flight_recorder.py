@@ -13,6 +13,8 @@ from collections.abc import Callable
 from contextlib import suppress
 from pathlib import Path
 
+from rig.config.written_file import opened_to_append
+
 LATE_S = 0.5  # wall time
 LOOK_S = 0.1  # between two looks of the thread
 RECORDS = 40  # that are written at most, so that a world that is late for good fills no disk
@@ -76,8 +78,7 @@ class FlightRecorder:
             if self._records >= RECORDS:
                 return
             self._records += 1
-            flags = os.O_WRONLY | os.O_CREAT | os.O_APPEND | getattr(os, "O_NOFOLLOW", 0) | getattr(os, "O_NONBLOCK", 0)
-            file = os.dup(sys.stderr.fileno()) if self._path is None else os.open(self._path, flags, 0o644)
+            file = os.dup(sys.stderr.fileno()) if self._path is None else opened_to_append(self._path)
             try:
                 os.write(file, f"{time.strftime('%Y-%m-%d %H:%M:%S')} {text}\n".encode())
                 if stacks:

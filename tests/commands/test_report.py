@@ -86,7 +86,7 @@ def test_a_folder_that_cannot_be_written_is_named(run: Path, capsys: pytest.Capt
 def test_without_weasyprint_the_page_can_be_printed(monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> None:
     monkeypatch.setitem(__import__("sys").modules, "weasyprint", None)
     with pytest.raises(Refused, match="no_weasyprint"):
-        pdf.write_pdf("", {}, tmp_path / "certificate.pdf")
+        pdf.pdf_of("", {})
 
 
 def told(*command: str | Path) -> str:

@@ -19,6 +19,7 @@ from rig.analysis.outcome import calibrated
 from rig.arm.silence import crowding
 from rig.data.run_file import read_run
 from rig.errors import Fault, Refused
+from support.full_disk import full_disk
 from support.paths import FIXTURES
 
 pytestmark = pytest.mark.slow
@@ -127,15 +128,9 @@ def test_a_signal_ends_the_reading(recording: Path) -> None:
 
 @pytest.mark.skipif(sys.platform == "win32", reason="no limit for files there")
 def test_a_full_temporary_folder_is_not_the_recordings_fault(recording: Path) -> None:
-    import resource
-
-    before = resource.getrlimit(resource.RLIMIT_FSIZE)
-    resource.setrlimit(resource.RLIMIT_FSIZE, (10_000, before[1]))  # the reading process inherits it
-    try:
-        with pytest.raises(Refused, match="no room") as refusal:
-            read_run(recording)
-    finally:
-        resource.setrlimit(resource.RLIMIT_FSIZE, before)
+    # The reading process inherits the limit.
+    with full_disk(10_000), pytest.raises(Refused, match="no room") as refusal:
+        read_run(recording)
     assert refusal.value.name == "temporary_folder_full"
 
 

@@ -8,6 +8,7 @@ import pytest
 from rig.config.load import load
 from rig.data.run_folder import ScriptIdentity, new_folder
 from rig.errors import Refused
+from support.full_disk import full_disk
 from support.paths import DEMO
 
 IDENTITY = ScriptIdentity("six_observation.py", "")
@@ -15,16 +16,9 @@ IDENTITY = ScriptIdentity("six_observation.py", "")
 
 @pytest.mark.skipif(sys.platform == "win32", reason="no limit for files there")
 def test_a_disk_that_is_full_from_the_start_leaves_nothing_to_resume(tmp_path: Path) -> None:
-    import resource
-
     loaded, out = load(DEMO), tmp_path / "run"
-    before = resource.getrlimit(resource.RLIMIT_FSIZE)
-    resource.setrlimit(resource.RLIMIT_FSIZE, (len(loaded.text) // 2, before[1]))  # as a disk with so much room
-    try:
-        with pytest.raises(Refused, match=r"run_folder: .* cannot be written"):
-            new_folder(out, loaded, "", IDENTITY)
-    finally:
-        resource.setrlimit(resource.RLIMIT_FSIZE, before)
+    with full_disk(len(loaded.text) // 2), pytest.raises(Refused, match=r"run_folder: .* cannot be written"):
+        new_folder(out, loaded, "", IDENTITY)
     assert list(out.iterdir()) == []
     new_folder(out, loaded, "", IDENTITY)
     assert (out / "config.yaml").read_text(encoding="utf-8") == loaded.text

@@ -2,6 +2,8 @@
 
 from pathlib import Path
 
+import pytest
+
 from rig.errors import Fault
 from rig.station.events import (
     Advice,
@@ -25,6 +27,7 @@ from rig.station.events import (
 from rig.station.log import log
 from rig.station.station import Stations, always_yes
 from rig.station.words import line, reason
+from support.full_disk import full_disk
 
 SAMPLES = (SensorSamples("gyro", 100, 2, (0.0, 0.0, 1.0)), SensorSamples("reference", 50, 1, None))
 
@@ -76,9 +79,18 @@ def test_the_log_keeps_lines_and_reasons_with_the_time(tmp_path: Path) -> None:
     assert reason(SamplingStarted()) is None
 
 
-def test_a_log_on_a_full_disk_is_no_error() -> None:
-    with log(Path("/dev/full")) as listener:
+def test_a_log_on_a_full_disk_is_no_error(tmp_path: Path) -> None:
+    with full_disk(), log(tmp_path / "log.txt") as listener:
         listener.event(SamplingStarted())
+    assert (tmp_path / "log.txt").read_bytes() == b""
+
+
+def test_a_log_is_not_written_into_a_device_or_through_a_link(tmp_path: Path) -> None:
+    (tmp_path / "log.txt").symlink_to(tmp_path / "elsewhere")
+    for path in (Path("/dev/full"), tmp_path / "log.txt"):
+        with pytest.raises(OSError, match=r"regular file|symbolic links"), log(path):
+            pass
+    assert not (tmp_path / "elsewhere").exists()
 
 
 def test_everyone_hears_everything_and_one_answers() -> None:

@@ -1,7 +1,6 @@
 """The certificate as PDF/A-3b: the page of `certificate.html` with the data it was made from attached."""
 
 from collections.abc import Mapping
-from pathlib import Path
 
 from rig.errors import Refused
 
@@ -9,7 +8,7 @@ PDF = "certificate.pdf"
 DESCRIBED = {"result.json": "the result, of schema rig.result/1", "certificate.xml": "the digital certificate (DCC)"}
 
 
-def write_pdf(page: str, attachments: Mapping[str, bytes], path: Path) -> None:
+def pdf_of(page: str, attachments: Mapping[str, bytes]) -> bytes:
     """`attachments` by name. Raises Refused `no_weasyprint` where the extra `pdf` or a library it needs is absent."""
     try:
         from weasyprint import HTML, Attachment
@@ -23,4 +22,5 @@ def write_pdf(page: str, attachments: Mapping[str, bytes], path: Path) -> None:
         Attachment(string=content, name=name, description=DESCRIBED[name], relationship="Source")
         for name, content in attachments.items()
     ]
-    HTML(string=page).write_pdf(path, pdf_variant="pdf/a-3b", attachments=enclosed)
+    made: bytes = HTML(string=page).write_pdf(pdf_variant="pdf/a-3b", attachments=enclosed)
+    return made

@@ -3,6 +3,7 @@
 from pathlib import Path
 
 from rig.analysis.outcome import Outcome
+from rig.config.written_file import write_new
 from rig.data.result_file import ResultDocument
 from rig.report.certificate.content import certificate_of
 from rig.report.certificate.page import certificate_page
@@ -15,5 +16,5 @@ PAGE = "certificate.html"
 def write_certificate(outcome: Outcome, document: ResultDocument, folder: Path) -> tuple[RunEvent, ...]:
     """Whatever the verdict: what failed stands there too, across every page where it makes the measurement unfit."""
     path = folder / PAGE
-    path.write_text(certificate_page(certificate_of(document, stated_in(folder))), encoding="utf-8")
+    write_new(path, certificate_page(certificate_of(document, stated_in(folder))))
     return (DocumentWritten(path),)

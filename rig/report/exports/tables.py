@@ -11,6 +11,7 @@ from pathlib import Path
 import numpy as np
 
 from rig.arm.state import JOINT_NAMES
+from rig.config.written_file import new_file, write_new
 from rig.estimation.arrays import Array
 from rig.observation.acceleration import accelerations
 from rig.observation.average import Stream
@@ -91,11 +92,12 @@ def write_csv(recordings: Sequence[ObservedRun], folder: Path) -> list[Path]:
     for table in tables_of(recordings):
         path = folder / f"{table.name}.csv"
         rows = np.column_stack(list(table.columns.values()))
-        np.savetxt(path, rows, fmt="%.17g", delimiter=",", header=",".join(table.columns), comments="")
+        with new_file(path) as file:
+            np.savetxt(file, rows, fmt="%.17g", delimiter=",", header=",".join(table.columns), comments="")
         written.append(path)
         said.append(f"{path.name}: {table.said}\n")
     readme = folder / "README.txt"
-    readme.write_text("".join(said), encoding="utf-8")
+    write_new(readme, "".join(said))
     return [*written, readme]
 
 
@@ -110,7 +112,8 @@ def write_parquet(recordings: Sequence[ObservedRun], folder: Path) -> list[Path]
     for table in tables_of(recordings):
         path = folder / f"{table.name}.parquet"
         columns = pyarrow.table({name: np.ascontiguousarray(column) for name, column in table.columns.items()})
-        pyarrow.parquet.write_table(columns.replace_schema_metadata({"convention": table.said}), path)
+        with new_file(path) as file:
+            pyarrow.parquet.write_table(columns.replace_schema_metadata({"convention": table.said}), file)
         written.append(path)
     return written
 
@@ -123,7 +126,8 @@ def write_mat(recordings: Sequence[ObservedRun], folder: Path) -> list[Path]:
     names = plain_names(table.name for table in tables)
     structs = {names[table.name]: {**_columns(table), "convention": table.said} for table in tables}
     path = folder / "run.mat"
-    savemat(path, structs, do_compression=True, long_field_names=True)
+    with new_file(path) as file:
+        savemat(file, structs, do_compression=True, long_field_names=True)  # type: ignore[arg-type]  # says scipy-stubs
     return [path]
 
 

@@ -10,6 +10,7 @@ from pathlib import Path
 
 from firmware_host.emulator.flash_memory import FLASH_BYTES, STORE_OFFSET, FlashMemory
 from rig.config.regular_file import UnfitFile, read_regular_file
+from rig.config.written_file import write_new
 from rig.errors import Refused
 from rig.world.board.mounting import firmware
 
@@ -55,6 +56,4 @@ def _check(data: bytes) -> None:
 
 def _save(memory: FlashMemory, path: Path) -> None:
     """In one go: whoever reads the file meets the old flash or the new one."""
-    fresh = path.with_name(path.name + ".new")
-    fresh.write_bytes(bytes(memory.data) + b"".join(struct.pack("<I", offset) for offset in sorted(memory.torn)))
-    fresh.replace(path)
+    write_new(path, bytes(memory.data) + b"".join(struct.pack("<I", offset) for offset in sorted(memory.torn)))

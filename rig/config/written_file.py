@@ -1,0 +1,50 @@
+"""Writes files into folders that somebody else may have laid something into: never through a link or into a pipe."""
+
+import os
+import stat
+from collections.abc import Iterator
+from contextlib import contextmanager, suppress
+from pathlib import Path
+from typing import BinaryIO
+
+PART = ".part"
+NO_LINK = getattr(os, "O_NOFOLLOW", 0)
+
+
+@contextmanager
+def new_file(path: Path) -> Iterator[BinaryIO]:
+    """A file to be written in this block, which then takes the place of `path`: whole, or not at all.
+
+    What lies at `path` is replaced, a link itself and not what it leads to. Raises OSError as writing does, and where
+    somebody lays something beside it at the same moment.
+    """
+    part = path.with_name(path.name + PART)
+    part.unlink(missing_ok=True)
+    try:
+        with open(part, "xb", opener=_alone) as file:
+            yield file
+        part.replace(path)
+    except BaseException:
+        with suppress(OSError):
+            part.unlink()
+        raise
+
+
+def write_new(path: Path, content: bytes | str) -> None:
+    """A file with this content in the place of `path`. Raises as `new_file`."""
+    with new_file(path) as file:
+        file.write(content.encode() if isinstance(content, str) else content)
+
+
+def opened_to_append(path: str | Path) -> int:
+    """The descriptor of a regular file that is added to, and made where there is none. Raises OSError."""
+    flags = os.O_WRONLY | os.O_CREAT | os.O_APPEND | NO_LINK | getattr(os, "O_NONBLOCK", 0)
+    descriptor = os.open(path, flags, 0o666)
+    if not stat.S_ISREG(os.fstat(descriptor).st_mode):
+        os.close(descriptor)
+        raise OSError(f"{path} is no regular file")
+    return descriptor
+
+
+def _alone(path: str, flags: int) -> int:
+    return os.open(path, flags | NO_LINK, 0o666)
