@@ -1,9 +1,11 @@
 """Puts the shipped image onto a Nucleo-L432KC: through its debug probe, or by a copy to the drive it shows over USB."""
 
 import contextlib
+import hashlib
 import io
 import os
 import re
+import stat
 import struct
 import sys
 import time
@@ -21,6 +23,8 @@ FLASH_BYTES = 256 * 1024
 CALIBRATION_BYTES = 6 * 2048  # the last pages: an image that reached into them would erase the calibrations
 RAM_START, RAM_BYTES = 0x2000_0000, 64 * 1024
 DEVICE_ID_REGISTER, DEVICE_ID = 0xE004_2000, 0x435  # DBGMCU_IDCODE of all STM32L43x and L44x (RM0394)
+# What tells an STM32L432KC from the others of that code (RM0394, chapter 47): kilobytes of flash, and package.
+SIZE_REGISTER, PACKAGE_REGISTER, UFQFPN32 = 0x1FFF_75E0, 0x1FFF_7500, 0x08
 DEBUG_REGISTER = 0xE004_2004  # DBGMCU_CR: what keeps its clock while the core sleeps; a reset does not clear it
 # Under reset first: firmware that sleeps most of the time may not let a probe in. A probe that cannot do that halts it.
 CONNECT_MODES = ("under-reset", "halt")
@@ -28,14 +32,28 @@ CONNECT_MODES = ("under-reset", "halt")
 IMAGE_NAME = "rig_l432.bin"
 NUCLEO_CODE = "0770"  # of the Nucleo-L432KC in the link of its MBED.HTM, as in mbed-ls' table of platforms
 DRIVE_TIMEOUT_S = 20.0
+LONGEST_TEXT = 10_000  # bytes of what a Nucleo's drive says in a file
 _POLL_S = 0.05
 
 
 def shipped_image() -> bytes:
-    """The image that comes with this program. Raises BoardError `bad_image` when it cannot be that."""
-    image = (resources.files("firmware_host") / "firmware" / "image" / IMAGE_NAME).read_bytes()
+    """The image that comes with this program. Raises BoardError `bad_image` when it cannot be that, or has changed."""
+    folder = resources.files("firmware_host") / "firmware" / "image"
+    image = (folder / IMAGE_NAME).read_bytes()
     check_image(image)
+    check_hash(image, (folder / f"{IMAGE_NAME}.sha256").read_text(encoding="ascii").split()[0])
     return image
+
+
+def sha256(image: bytes) -> str:
+    """In hexadecimal."""
+    return hashlib.sha256(image).hexdigest()
+
+
+def check_hash(image: bytes, stated: str) -> None:
+    """Raises BoardError `bad_image` where an image is not the one whose SHA-256 was `stated`, in hexadecimal."""
+    if sha256(image) != stated.lower():
+        raise _bad_image(f"its SHA-256 is {sha256(image)}, and not {stated}")
 
 
 def check_image(image: bytes) -> None:
@@ -60,7 +78,7 @@ def _bad_image(why: str) -> BoardError:
 def find_probe(probe_id: str | None = None) -> Any:
     """The only connected debug probe, or the one whose id contains `probe_id`: a pyocd probe with its `unique_id`.
 
-    Raises BoardError: flash_extra_missing, no_probe, several_probes.
+    Raises BoardError: flash_extra_missing, no_probe, several_probes, other_microcontroller.
     """
     try:
         from pyocd.core.helpers import ConnectHelper
@@ -80,7 +98,19 @@ def find_probe(probe_id: str | None = None) -> Any:
     if len(probes) > 1:
         found = ", ".join(f"{probe.unique_id} ({probe.description})" for probe in probes)
         raise BoardError("several_probes", f"several debug probes are connected: {found}", "Choose one with --probe ID")
+    _refuse_other_board(probes[0])
     return probes[0]
+
+
+def _refuse_other_board(probe: Any) -> None:
+    """A probe that is part of a board may know of which."""
+    board = getattr(probe, "associated_board_info", None)
+    if board is not None and not board.target.startswith(TARGET):
+        raise _other_microcontroller(f"the probe {probe.unique_id} is that of a {board.name}, with an {board.target}")
+
+
+def _other_microcontroller(what: str) -> BoardError:
+    return BoardError("other_microcontroller", what, "Choose the Nucleo-L432KC's probe with --probe ID")
 
 
 def flash_by_probe(image: bytes, probe: Any) -> None:
@@ -113,10 +143,15 @@ def _program(session: Any, image: bytes) -> None:
 
     device = session.target.read32(DEVICE_ID_REGISTER) & 0xFFF
     if device != DEVICE_ID:
-        raise BoardError(
-            "other_microcontroller",
-            f"at the probe hangs a microcontroller of device code 0x{device:03x}, not an STM32L432 (0x{DEVICE_ID:03x})",
-            "Choose the Nucleo-L432KC's probe with --probe ID",
+        raise _other_microcontroller(
+            f"at the probe hangs a microcontroller of device code 0x{device:03x}, not an STM32L432 (0x{DEVICE_ID:03x})"
+        )
+    kilobytes = session.target.read32(SIZE_REGISTER) & 0xFFFF
+    package = session.target.read32(PACKAGE_REGISTER) & 0x1F
+    if (kilobytes * 1024, package) != (FLASH_BYTES, UFQFPN32):
+        raise _other_microcontroller(
+            f"at the probe hangs a microcontroller of the STM32L432's family with {kilobytes} KB of flash in package "
+            f"{package}, not an STM32L432KC ({FLASH_BYTES // 1024} KB, {UFQFPN32})"
         )
     # What runs there would be interrupted while its vectors are erased, and its watchdog would bite
     session.target.reset_and_halt()
@@ -143,7 +178,7 @@ def flash_by_drive(image: bytes, drive: Path, timeout_s: float = DRIVE_TIMEOUT_S
     copied, failure = drive / IMAGE_NAME, drive / "FAIL.TXT"
     try:
         failure.unlink(missing_ok=True)  # of an earlier attempt
-        with copied.open("wb") as file:
+        with open(copied, "wb", opener=_no_link) as file:
             file.write(image)
             file.flush()
             with contextlib.suppress(OSError):  # the drive may be gone already: then the board has it all
@@ -160,7 +195,7 @@ def flash_by_drive(image: bytes, drive: Path, timeout_s: float = DRIVE_TIMEOUT_S
             if failure.exists():
                 raise BoardError(
                     "flash_failed",
-                    f"the board did not take the image: {' '.join(failure.read_text(errors='replace').split())}",
+                    f"the board did not take the image: {' '.join(_short_text(failure).split())}",
                     "Unplug the board, plug it in, and try again, or flash through the probe",
                 )
             if back:
@@ -216,11 +251,23 @@ def _is_mounted(drive: Path) -> bool:
 def _code(drive: Path) -> str | None:
     """The kind of board a drive belongs to, by the link in its MBED.HTM; None when it is no such drive."""
     try:
-        page = (drive / "MBED.HTM").read_text(errors="replace")
+        page = _short_text(drive / "MBED.HTM")
     except OSError:
         return None
     found = re.search(r"code=(\w{4})", page)
     return found[1].upper() if found else "unknown"
+
+
+def _short_text(path: Path) -> str:
+    """The beginning of a file on a drive that may be anybody's: not of a pipe, a device or through a link."""
+    with open(path, "rb", opener=_no_link) as file:
+        if not stat.S_ISREG(os.fstat(file.fileno()).st_mode):
+            raise OSError(f"{path} is no regular file")
+        return file.read(LONGEST_TEXT).decode(errors="replace")
+
+
+def _no_link(path: str, flags: int) -> int:
+    return os.open(path, flags | getattr(os, "O_NOFOLLOW", 0) | getattr(os, "O_NONBLOCK", 0), 0o666)
 
 
 def _mounted_drives() -> list[Path]:

@@ -28,6 +28,7 @@ def flash(probe_id: str | None, drive: Path | None, *, by_drive: bool, assume_ye
     agreed_or_refused(
         [
             f"The board at {way} gets the firmware {FIRMWARE_VERSION} ({len(image)} bytes).",
+            f"SHA-256 {flashing.sha256(image)}.",
             f"Nothing else may use the board meanwhile. Calibrations it has stored {calibrations}.",
         ],
         "flash",
@@ -35,5 +36,5 @@ def flash(probe_id: str | None, drive: Path | None, *, by_drive: bool, assume_ye
     )
     with changing():
         put()
-    say(f"flashed: firmware {FIRMWARE_VERSION}; see it with `rig board info CONFIG`")
+    say(f"flashed: firmware {FIRMWARE_VERSION}, SHA-256 {flashing.sha256(image)}; see it with `rig board info CONFIG`")
     return 0

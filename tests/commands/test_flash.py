@@ -1,5 +1,7 @@
 """`rig board flash`: the shipped image, the drive a Nucleo shows over USB, and what is missing said by name."""
 
+import os
+import shutil
 import subprocess
 import sys
 import threading
@@ -14,6 +16,8 @@ import pytest
 from firmware_host import flashing
 from firmware_host.errors import BoardError
 from firmware_host.protocol import FIRMWARE_VERSION
+from support.full_disk import full_disk
+from support.paths import IMAGE
 
 PAGE = '<html><head><meta http-equiv="refresh" content="0; url=http://mbed.org/device/?code=%s0221066DFF53"/></head></html>'
 
@@ -115,9 +119,41 @@ def test_a_board_that_does_not_take_the_image_is_not_taken_for_flashed(tmp_path:
 
 def test_a_drive_that_is_full(tmp_path: Path) -> None:
     nucleo = drive(tmp_path / "NODE_L432KC")
-    (nucleo / flashing.IMAGE_NAME).symlink_to("/dev/full")
-    error = refused(lambda: flashing.flash_by_drive(flashing.shipped_image(), nucleo))
-    assert error.name == "flash_failed" and "No space left" in error.what
+    image = flashing.shipped_image()
+    with full_disk(1000):
+        error = refused(lambda: flashing.flash_by_drive(image, nucleo))
+    assert error.name == "flash_failed" and "File too large" in error.what
+
+
+def test_an_image_that_is_not_the_one_it_was_is_refused(monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> None:
+    shutil.copytree(IMAGE, tmp_path / "firmware" / "image")
+    monkeypatch.setattr("firmware_host.flashing.resources.files", lambda package: tmp_path)
+    shipped = tmp_path / "firmware" / "image" / flashing.IMAGE_NAME
+    assert flashing.shipped_image() == shipped.read_bytes()
+    changed = bytearray(shipped.read_bytes())
+    changed[5000] ^= 1
+    shipped.write_bytes(changed)
+    error = refused(flashing.shipped_image)
+    assert error.name == "bad_image" and flashing.sha256(bytes(changed)) in error.what
+
+
+@pytest.mark.parametrize("laid", ["link", "endless", "pipe"])
+def test_a_stick_that_passes_for_a_nucleo_s_drive_is_not_read_or_written_beyond_itself(
+    tmp_path: Path, laid: str
+) -> None:
+    stick, precious = drive(tmp_path / "stick"), tmp_path / "precious"
+    precious.write_text("mine", encoding="utf-8")
+    if laid == "link":
+        (stick / flashing.IMAGE_NAME).symlink_to(precious)
+        error = refused(lambda: flashing.flash_by_drive(flashing.shipped_image(), stick))
+        assert error.name == "flash_failed" and precious.read_text(encoding="utf-8") == "mine"
+        return
+    (stick / "MBED.HTM").unlink()
+    if laid == "endless":
+        (stick / "MBED.HTM").symlink_to("/dev/zero")
+    else:
+        os.mkfifo(stick / "MBED.HTM")
+    assert refused(lambda: flashing.find_drive([stick])).name == "no_drive"
 
 
 def test_the_drive_is_found_among_others(tmp_path: Path) -> None:
@@ -166,12 +202,17 @@ def test_a_probe_that_is_not_there_is_named(monkeypatch: pytest.MonkeyPatch) -> 
 class Chip:
     """A microcontroller at a probe, as far as programming it goes: what was done to it, in order."""
 
-    def __init__(self) -> None:
+    def __init__(self, kilobytes: int = 256, package: int = flashing.UFQFPN32) -> None:
         self.done: list[str] = []
         self.contents = b""
+        self.registers = {
+            flashing.DEVICE_ID_REGISTER: 0x1000_6435,
+            flashing.SIZE_REGISTER: 0xFFFF_0000 | kilobytes,
+            flashing.PACKAGE_REGISTER: package,
+        }
 
     def read32(self, address: int) -> int:
-        return 0x1000_6435 if address == flashing.DEVICE_ID_REGISTER else 0
+        return self.registers.get(address, 0)
 
     def read_memory_block8(self, address: int, size: int) -> list[int]:
         return list(self.contents[:size])
@@ -203,6 +244,24 @@ def test_what_runs_on_the_board_is_stopped_by_a_reset_before_its_flash_is_erased
     flashing._program(SimpleNamespace(target=chip), flashing.shipped_image())
     debug_bits_cleared = "0xe0042004 = 0"
     assert chip.done == ["halted after a reset", "programmed", debug_bits_cleared, "reset"]
+
+
+@pytest.mark.parametrize(("kilobytes", "package"), [(128, flashing.UFQFPN32), (256, 0x0B)], ids=["L432KB", "L433CC"])
+def test_another_part_of_the_family_is_refused_before_it_is_touched(kilobytes: int, package: int) -> None:
+    chip = Chip(kilobytes, package)
+    error = refused(lambda: flashing._program(SimpleNamespace(target=chip), flashing.shipped_image()))
+    assert error.name == "other_microcontroller" and f"{kilobytes} KB" in error.what and chip.done == []
+
+
+def test_the_probe_of_another_board_is_refused(monkeypatch: pytest.MonkeyPatch) -> None:
+    from pyocd.board.board_ids import BOARD_ID_TO_INFO
+
+    probe = SimpleNamespace(unique_id="0123", associated_board_info=BOARD_ID_TO_INFO[flashing.NUCLEO_CODE])
+    monkeypatch.setattr("pyocd.core.helpers.ConnectHelper.get_all_connected_probes", lambda **options: [probe])
+    assert flashing.find_probe() is probe
+    probe.associated_board_info = BOARD_ID_TO_INFO["0705"]
+    error = refused(flashing.find_probe)
+    assert error.name == "other_microcontroller" and "F302R8" in error.what.upper()
 
 
 @pytest.mark.parametrize("works", ["under-reset", "halt", "neither"])

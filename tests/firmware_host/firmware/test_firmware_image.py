@@ -39,7 +39,7 @@ def test_the_sources_build_the_committed_image_byte_for_byte_wherever_they_lie(t
     assert compiler_of(elsewhere / "image" / "rig_l432.elf") == compiler_of(IMAGE / "rig_l432.elf"), (
         "another compiler gives other bytes: build with the one the committed image names"
     )
-    for name in ("rig_l432.bin", "rig_l432.elf"):
+    for name in ("rig_l432.bin", "rig_l432.elf", "rig_l432.bin.sha256"):
         assert (elsewhere / "image" / name).read_bytes() == (IMAGE / name).read_bytes(), (
             f"{name}: run `make -C firmware_host/firmware` and commit the image"
         )
