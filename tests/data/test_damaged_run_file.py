@@ -115,15 +115,44 @@ def test_a_sound_recording_is_read_however_little_of_a_processor_there_is() -> N
         os.sched_setaffinity(0, before)
 
 
+@pytest.mark.skipif(sys.platform != "linux", reason="only Linux tells who has opened what")
 def test_a_signal_ends_the_reading(recording: Path) -> None:
     data = bytearray(recording.read_bytes())
     data[11] |= 0x05
     recording.write_bytes(data[:5000])
-    process = subprocess.Popen([sys.executable, "-m", "rig", "solve", str(recording)], stderr=subprocess.PIPE)
-    time.sleep(1.5)
-    process.terminate()
-    _, said = process.communicate(timeout=10)
+    interrupted_while_it_reads(recording, "solve", recording)
+
+
+@pytest.mark.skipif(sys.platform != "linux", reason="only Linux tells who has opened what")
+def test_a_signal_ends_the_reading_of_a_log_of_millions_of_lines(tmp_path: Path) -> None:
+    log = tmp_path / "log.csv"
+    log.write_text("time_s,x_rad_s,y_rad_s,z_rad_s\n" + "0.001,0.1,0.2,0.3\n" * 10_000_000, encoding="utf-8")
+    interrupted_while_it_reads(log, "allan", log)
+
+
+def interrupted_while_it_reads(file: Path, *words: str | Path) -> None:
+    command = [sys.executable, "-m", "rig", *map(str, words)]
+    with subprocess.Popen(command, stderr=subprocess.PIPE) as process:
+        try:
+            while not is_open_in(process.pid, file):
+                assert process.poll() is None
+                time.sleep(0.01)
+            process.terminate()
+            _, said = process.communicate(timeout=10)
+        finally:
+            process.kill()
     assert (process.returncode, said) == (130, b"rig: interrupted\n")
+
+
+def is_open_in(pid: int, file: Path) -> bool:
+    """In the process, or in one that it has started."""
+    within = Path(f"/proc/{pid}")
+    try:
+        opened = {each.readlink() for each in (within / "fd").iterdir()}
+        children = (within / "task" / str(pid) / "children").read_text().split()
+    except OSError:  # a descriptor, or the process, has just gone
+        return False
+    return file in opened or any(is_open_in(int(child), file) for child in children)
 
 
 @pytest.mark.skipif(sys.platform == "win32", reason="no limit for files there")
