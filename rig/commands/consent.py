@@ -43,8 +43,12 @@ def _sha256(file: Path) -> str:
 
 
 def _addresses(loaded: Loaded) -> Iterator[tuple[str, str]]:
-    """What a run would connect to. A simulated laboratory is on this computer, and answers there itself."""
+    """What a run would connect to. A simulated laboratory is on this computer, and answers there itself; it may keep
+    its board's flash in a file.
+    """
     config = loaded.config
+    if loaded.flash_file is not None:
+        yield "the file of a simulated board's flash", str(loaded.flash_file)
     if not loaded.simulated:
         yield "the arm", config.arm.host
         if config.board is not None:

@@ -10,7 +10,8 @@ from rig.config.regular_file import UnfitFile, read_regular_file
 from rig.data.result_file import ResultDocument, read_result
 from rig.data.run_file import RunData, read_run
 from rig.data.run_folder import RESULT, recordings
-from rig.errors import Refused
+from rig.errors import Refused, raised_as
+from rig.observation.timebase import check_arms_times
 from rig.page.control import Control
 from rig.page.feed import Feed
 from rig.page.replay import Moment, ended, moments
@@ -28,11 +29,14 @@ LARGEST_LOG = 50_000_000  # bytes
 def watch(folder: Path, wanted: PageWish, speed: float) -> int:
     """Replay every recording in a run folder, `speed` times as fast as it was; the page stays until Ctrl-C.
 
-    Returns 0. Raises Refused `no_run`, `page_address`, and as `read_run` and `read_result` do.
+    Returns 0. Raises Refused `no_run`, `page_address`, and as `read_run`, `check_arms_times` and `read_result` do.
     """
     runs = [read_run(path) for readings in ("raw", "calibrated") for path in recordings(folder, readings)]
     if not runs:
         raise Refused("no_run", f"{folder} holds no recording", "Give the folder of a run")
+    with raised_as(Refused):  # nothing runs here
+        for run in runs:
+            check_arms_times(run.arm)
     result = read_result(folder / RESULT) if (folder / RESULT).exists() else None
     feed = Feed(Shown(_about(folder, runs)))
     with serving(feed, Control(may_answer=False), folder, wanted.address()) as url:

@@ -294,6 +294,15 @@ def _refined(clock: TimeBase, board_time_s: Array, readings: Array, motion: Know
     )
 
 
+def check_arms_times(states: NDArray[Any]) -> None:
+    """Of a recording whose times nobody could follow. Raises Fault `not_finite`, `impossible_times`."""
+    time_s = np.unique(states["time_s"])
+    if not np.isfinite(time_s).all():
+        raise _not_finite("an arm state")
+    if len(time_s):
+        _check_span(time_s, "the arm's states")
+
+
 def _check_span(time_s: Array, what: str) -> None:
     span_s = time_s[-1] - time_s[0]
     if span_s > MAX_SPAN_S:

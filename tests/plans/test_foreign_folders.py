@@ -181,11 +181,34 @@ def test_a_recording_full_of_holes_is_refused(foreign: Path) -> None:
     assert refused.returncode == 2 and "rig: not_a_run_file: " in refused.stderr and " bytes to " in refused.stderr
 
 
+@pytest.mark.parametrize(("time_s", "name"), [(3e7, "impossible_times"), (float("nan"), "not_finite")])
+def test_a_recording_that_claims_to_last_for_a_year_is_not_replayed(foreign: Path, time_s: float, name: str) -> None:
+    with h5py.File(foreign / "run.h5", "r+") as file:
+        last = file["arm"][-1]
+        last["time_s"] = time_s
+        file["arm"][-1] = last
+    refused = rig_here("watch", foreign, "--page-address", "127.0.0.1:0")
+    assert refused.returncode == 2 and f"rig: {name}: " in refused.stderr
+
+
 def test_a_line_of_ten_million_columns_is_refused(tmp_path: Path) -> None:
     samples, sweeps = tmp_path / "samples.csv", ROOT / "docs" / "examples" / "sweeps.csv"
     samples.write_text("time_s" + ",x_rad_s" * 1_000_000, encoding="utf-8")
     refused = rig_here("solve", samples, "--sweeps", sweeps)
     assert refused.returncode == 2 and "a line is longer than 10000 characters" in refused.stderr
+
+
+def test_a_foreign_simulation_keeps_its_board_s_flash_in_no_file_that_is_not_named(
+    foreign: Path, tmp_path: Path
+) -> None:
+    (foreign / "result.json").unlink()
+    kept = tmp_path / "in your home"
+    config = configuration(tmp_path, {"world": {"board": {"flash_file": str(kept)}}})
+    shutil.copy(config, foreign / "config.yaml")
+    refused = rig_here("resume", foreign, "--yes")
+    assert refused.returncode == 2 and "rig: foreign_folder: " in refused.stderr, refused.stderr
+    assert f"--connect '{kept}'" in refused.stderr
+    assert "foreign_script" in rig_here("resume", foreign, "--yes", "--connect", kept).stderr and not kept.exists()
 
 
 @pytest.mark.parametrize("kind", ["another file", "link", "pipe"])
