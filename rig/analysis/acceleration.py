@@ -7,7 +7,7 @@ from types import MappingProxyType
 
 import numpy as np
 
-from rig.analysis.attitudes import check_seen, scale_and_bias_covariance
+from rig.analysis.attitudes import check_seen
 from rig.analysis.calibration import SensorResult, or_fault
 from rig.analysis.reference_budgets import accelerometer_budget
 from rig.data.run_file import RecordedSensor
@@ -18,6 +18,7 @@ from rig.estimation.arrays import Array
 from rig.estimation.budget import Budget
 from rig.estimation.felt import LEVER, NO_SWEEPS, SECOND, Dwells, Sweeps
 from rig.estimation.imu import ImuSolution, solve_imu
+from rig.estimation.reference_budget import scale_and_bias_covariance
 from rig.estimation.reference_model import F
 from rig.estimation.refusals import check_axes
 from rig.estimation.sensor_axes import angle_jacobian, nearest_rotation, non_orthogonality

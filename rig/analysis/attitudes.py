@@ -1,7 +1,7 @@
 """From readings in known attitudes to calibrations: gyroscope, accelerometer and magnetometer, as TRIAX has them."""
 
 from collections.abc import Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import partial
 from typing import Literal, get_args
 
@@ -9,21 +9,27 @@ import numpy as np
 
 from rig.analysis.calibration import or_fault
 from rig.analysis.increments import InIncrements, solve_turning
+from rig.analysis.placed_budget import budget_by_causes
+from rig.analysis.placed_equations import Equations
 from rig.errors import Fault, Refused
 from rig.estimation.arrays import Array
+from rig.estimation.budget import Budget
 from rig.estimation.earth_rate import check_earth_seen
 from rig.estimation.known_increments import KnownIncrements
-from rig.estimation.reference_budget import scale_and_bias
-from rig.estimation.reference_model import REFERENCE, Known, KnownNorm, KnownVector
+from rig.estimation.placement import NOISE, LaidDown, laid_down
+from rig.estimation.reference_budget import scale_and_bias_covariance
+from rig.estimation.reference_model import BIAS, REFERENCE, F, KnownNorm
 from rig.estimation.refusals import check_axes
-from rig.estimation.triaxial import EqualWeights, Method, TriaxialSolution, solve_triaxial
+from rig.estimation.triaxial import EqualWeights, Method, TriaxialSolution
 from rig.observation.attitude_import import PlacedReadings
 from rig.observation.csv_samples import Quantity
+from rig.observation.placements import Placements
 
 Chosen = Method | Literal["increments"]
 METHODS: tuple[Method, ...] = (*get_args(EqualWeights), "attitude_weighted")
 CHOICES: tuple[Chosen, ...] = ("increments", *METHODS)
 SEEN = 3.0  # standard deviations that the largest second-order term must have
+TOO_LITTLE = ("too_few_observations", "rank_deficient", "ill_conditioned")
 NOT_SEEN = "Leave out --second-order: it would triple the uncertainty of the bias for nothing; or dwell longer"
 UPWARDS = dict(zip(("+x", "+y", "+z", "-x", "-y", "-z"), np.concatenate([np.eye(3), -np.eye(3)]), strict=True))
 
@@ -42,20 +48,11 @@ class Surrounding:
     field_upwards: bool = False
     any_mounting: bool = False
 
-    def known(self, quantity: Quantity, placed: PlacedReadings, *, exact_rates: bool) -> Known:
-        """What the reference of a quantity is. Raises Fault `no_rates`, `field_strength_unknown`."""
+    def known(self, quantity: Quantity) -> KnownNorm:
+        """What is known of gravity or the field. Raises Fault `field_strength_unknown`."""
         up = UPWARDS[self.up]
         if quantity == "acceleration":
             return KnownNorm(self.gravity_m_s2, up)
-        if quantity == "rate":
-            if placed.rates_rad_s is None or not exact_rates:
-                raise Fault(
-                    "no_rates",
-                    "the attitudes do not say how the table turned, or not that it is exact",
-                    "Use increments, which need no rates; or give the columns rate_x_rad_s, rate_y_rad_s, rate_z_rad_s "
-                    "in body coordinates, with --exact-rates where their noise is far below the sensor's",
-                )
-            return KnownVector(placed.rates_rad_s)
         if self.field_t is None:
             raise Fault(
                 "field_strength_unknown",
@@ -69,12 +66,19 @@ class Surrounding:
 class InAttitudes:
     """One quantity's calibration by the chosen method, and by each of the others, or the Fault that it ends in.
 
-    `reference_fault` says why what was found as the reference, a gyroscope's Earth's rate, is not it.
+    `reference_fault` says why what was found as the reference, a gyroscope's Earth's rate, is not it. Of a body that
+    was laid down, `laid` is how its placements differ, told by `elsewhere` rests without an attitude too, and `moving`
+    how many rows were left out for its movement.
+    `budget` is what the uncertainty of the chosen method is made of.
     """
 
     solution: TriaxialSolution
     beside: Mapping[Method, TriaxialSolution | Fault]
+    budget: Budget
     reference_fault: Fault | None = None
+    laid: LaidDown | None = None
+    elsewhere: int = 0
+    moving: int = 0
 
 
 Result = InAttitudes | InIncrements
@@ -96,18 +100,23 @@ def solve_placed(
     """
 
     def solved(quantity: Quantity) -> Result:
-        if quantity == "rate":
-            chosen = method or ("maximum_likelihood" if exact_rates else "increments")
-            if chosen == "increments":
-                assert placed.turning is not None  # there are readings of the rate
-                return solve_turning(placed.turning, window_s, any_mounting=surrounding.any_mounting)
-        else:
+        any_mounting = surrounding.any_mounting
+        if quantity != "rate":
             chosen = "attitude_weighted" if method is None or method == "increments" else method
-        known = surrounding.known(quantity, placed, exact_rates=exact_rates)
-        second = second_order and quantity == "acceleration"
-        return _solved(placed, quantity, known, chosen, second_order=second, any_mounting=surrounding.any_mounting)
+            return _of_placements(
+                placed,
+                quantity,
+                Equations.of_placements(placed, quantity, surrounding.known(quantity), second_order=second_order),
+                chosen,
+                any_mounting=any_mounting,
+            )
+        asked = method or ("maximum_likelihood" if exact_rates else "increments")
+        if asked != "increments":
+            return _of_rows(Equations.of_rows(placed, exact_rates=exact_rates), asked, any_mounting=any_mounting)
+        assert placed.turning is not None  # there are readings of the rate
+        return solve_turning(placed.turning, window_s, any_mounting=any_mounting)
 
-    return {quantity: or_fault(partial(solved, quantity)) for quantity in placed.means}
+    return {quantity: or_fault(partial(solved, quantity)) for quantity in placed.quantities}
 
 
 def known_method(name: str | None) -> Chosen | None:
@@ -120,30 +129,69 @@ def known_method(name: str | None) -> Chosen | None:
     raise Refused("unknown_estimator", f"there is no {name} for readings in attitudes", f"Use {', '.join(CHOICES)}")
 
 
-def _solved(
-    placed: PlacedReadings,
-    quantity: Quantity,
-    known: Known,
-    method: Method,
-    *,
-    second_order: bool,
-    any_mounting: bool,
+def _of_rows(equations: Equations, method: Method, *, any_mounting: bool) -> InAttitudes:
+    solution = equations.solve(method)
+    _check_mounting(solution.matrix, any_mounting=any_mounting)
+    budget = budget_by_causes(solution.matrix, {NOISE: solution.covariance})
+    return InAttitudes(solution, equations.beside(method, *get_args(EqualWeights)), budget, _not_the_earth(solution))
+
+
+def _of_placements(
+    placed: PlacedReadings, quantity: Quantity, equations: Equations, method: Method, *, any_mounting: bool
 ) -> InAttitudes:
-    means = placed.means[quantity]
-    if placed.variances is None:
-        variances = _scatter(placed, means, known, second_order=second_order)
-    else:
-        variances = placed.variances[quantity]
-    solve = partial(_solve, placed, means, variances, known, second_order=second_order)
-    solution = solve(method=method)
-    if second_order:
-        std = np.sqrt(np.diag(solution.covariance)[15:18])
-        check_seen(solution.second_order, std, NOT_SEEN)
+    """By the method that allows for attitudes that are off, what placements do beside counts as well."""
+    assert isinstance(placed.placements, Placements)
+    elsewhere, moving = placed.placements.elsewhere, placed.placements.left_out
+    solution, laid = _solved(equations, method, moving), None
+    if method == "attitude_weighted":
+        laid = laid_down(
+            np.concatenate([np.ravel(solution.matrix), solution.reference, solution.bias, *_listed(solution)]),
+            equations.placed,
+            elsewhere.means[quantity],
+            elsewhere.variances[quantity],
+        )
+        solution = _as_laid_down(solution, laid)
+    if solution.second_order is not None:
+        check_seen(solution.second_order, np.sqrt(np.diag(solution.covariance)[15:18]), NOT_SEEN)
+    _check_mounting(solution.matrix, any_mounting=any_mounting)
+    budget = budget_by_causes(solution.matrix, {NOISE: solution.covariance} if laid is None else laid.causes)
+    others = equations.beside(method, *METHODS)
+    return InAttitudes(solution, others, budget, None, laid, len(elsewhere.means[quantity]), moving)
+
+
+def _solved(equations: Equations, method: Method, moving: int) -> TriaxialSolution:
+    """Where the rests are not enough, it is said that rows were left out."""
+    try:
+        return equations.solve(method)
+    except Fault as fault:
+        if not moving or fault.name not in TOO_LITTLE:
+            raise
+        what = (
+            f"{fault.problem.what}; {moving} rows in which the body moves are left out, for only rests tell a reference"
+        )
+        raise Fault(fault.name, what, fault.problem.remedy) from None
+
+
+def _listed(solution: TriaxialSolution) -> list[Array]:
+    return [] if solution.second_order is None else [solution.second_order]
+
+
+def _as_laid_down(solution: TriaxialSolution, laid: LaidDown) -> TriaxialSolution:
+    theta = laid.theta
+    return replace(
+        solution,
+        matrix=theta[F].reshape(3, 3),
+        reference=theta[REFERENCE],
+        bias=theta[BIAS],
+        second_order=None if solution.second_order is None else theta[15:],
+        covariance=laid.covariance,
+        attitude_error=laid.attitude_error,
+    )
+
+
+def _check_mounting(matrix: Array, *, any_mounting: bool) -> None:
     if not any_mounting:
-        check_axes(solution.matrix / np.linalg.norm(solution.matrix, axis=1, keepdims=True), np.eye(3))
-    others = [each for each in METHODS if each != method and (each != "attitude_weighted" or quantity != "rate")]
-    beside = {other: or_fault(partial(solve, method=other)) for other in others}
-    return InAttitudes(solution, beside, _not_the_earth(solution) if quantity == "rate" else None)
+        check_axes(matrix / np.linalg.norm(matrix, axis=1, keepdims=True), np.eye(3))
 
 
 def _not_the_earth(solution: TriaxialSolution) -> Fault | None:
@@ -153,57 +201,6 @@ def _not_the_earth(solution: TriaxialSolution) -> Fault | None:
     except Fault as fault:
         return fault
     return None
-
-
-def _solve(
-    placed: PlacedReadings, means: Array, variances: Array, known: Known, *, method: Method, second_order: bool
-) -> TriaxialSolution:
-    """Raises Fault as `solve_triaxial` does, and `inverted_attitudes`."""
-
-    def solved(attitudes: Array) -> TriaxialSolution:
-        return solve_triaxial(
-            means,
-            attitudes,
-            variances,
-            known,
-            second_order=second_order,
-            method=method,
-            attitude_std_rad=placed.attitude_std_rad,
-        )
-
-    try:
-        return solved(placed.attitudes)
-    except Fault as fault:
-        if fault.name != "attitude_untrustworthy":
-            raise
-        try:
-            solved(np.swapaxes(placed.attitudes, -1, -2))
-        except Fault:
-            raise fault from None
-        raise Fault(
-            "inverted_attitudes",
-            "the readings contradict the attitudes and agree with their inverses",
-            "Give quaternions that take body to table coordinates: conjugate those that take table to body",
-        ) from None
-
-
-def _scatter(placed: PlacedReadings, means: Array, known: Known, *, second_order: bool) -> Array:
-    """(N, 3) variances of the means from how they scatter about the model, each axis' noise alike in all rows.
-
-    Equal weights: the model that weighs attitude errors would take them for noise here.
-    """
-    counts = placed.samples[:, None]
-    quiet = np.full_like(means, (1e-9 * np.abs(means).max()) ** 2) / counts
-    left = solve_triaxial(means, placed.attitudes, quiet, known, second_order=second_order).residuals
-    freedom = len(means) - (18 if second_order else 15) / 3
-    if freedom < 1:
-        raise Fault(
-            "too_few_observations",
-            f"{len(means)} rows of few samples do not show their noise",
-            "Give longer rows, or more of them",
-        )
-    variances: Array = np.maximum(np.sum(left**2 * counts, axis=0) / freedom, 1e-30) / counts
-    return variances
 
 
 def check_seen(second_order: Array | None, std: Array, remedy: str) -> None:
@@ -220,10 +217,3 @@ def in_unit(solution: TriaxialSolution | KnownIncrements) -> tuple[Array, Array]
     """Scale factors 1/‖row of F‖ (3,), and the standard deviations of them and of the bias (6,)."""
     scale = 1 / np.linalg.norm(solution.matrix, axis=1)
     return scale, np.sqrt(np.diag(scale_and_bias_covariance(solution.matrix, scale, solution.covariance)))
-
-
-def scale_and_bias_covariance(matrix: Array, scale: Array, covariance: Array) -> Array:
-    """(6, 6) from that of a reference model's parameters; b is part of the reading, a gyroscope's is added to it."""
-    jacobian = scale_and_bias(matrix, scale, len(covariance))
-    found: Array = jacobian @ covariance @ jacobian.T
-    return found

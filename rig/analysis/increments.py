@@ -4,7 +4,9 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
+from rig.analysis.placed_budget import budget_by_causes
 from rig.errors import Fault
+from rig.estimation.budget import Budget
 from rig.estimation.known_increments import KnownIncrements, solve_known_increments
 from rig.estimation.refusals import check_axes, check_unit
 from rig.observation.fixes import LeftOut, Turning, gather, rough_matrix
@@ -19,6 +21,11 @@ class InIncrements:
     solution: KnownIncrements
     window_s: float
     left_out: tuple[LeftOut, ...]
+
+    @property
+    def budget(self) -> Budget:
+        """What the uncertainty is made of."""
+        return budget_by_causes(self.solution.matrix, self.solution.causes)
 
 
 def solve_turning(turning: Turning, window_s: float | None, *, any_mounting: bool) -> InIncrements:

@@ -11,7 +11,6 @@ from functools import partial
 import numpy as np
 
 from rig.analysis.acceleration import AccelerometerResult
-from rig.analysis.attitudes import scale_and_bias_covariance
 from rig.analysis.calibration import or_fault
 from rig.analysis.reference_budgets import magnetometer_budget
 from rig.data.run_file import RecordedMagnetometer
@@ -27,6 +26,7 @@ from rig.estimation.magnetometer import (
     solve_magnetometer,
     uniformity,
 )
+from rig.estimation.reference_budget import scale_and_bias_covariance
 from rig.estimation.reference_model import F
 from rig.estimation.refusals import check_axes
 from rig.estimation.sensor_axes import angle_jacobian, nearest_rotation, non_orthogonality

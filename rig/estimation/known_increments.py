@@ -19,6 +19,7 @@ from rig.estimation.arrays import Array
 from rig.estimation.attitude_drift import (
     BIAS,
     CLOCK,
+    CLOCK_STD_S,
     COMMON,
     EARTH,
     EARTH_PRECISION,
@@ -42,6 +43,8 @@ STATED_SPREAD = 1.0  # of the logarithm of a stated standard deviation
 UNTOLD = 0.1  # standard deviation of an element of F that nothing has told
 LARGEST_STEP = 10.0  # of F: beyond, nothing converges
 MAX_CONDITION = 1e4
+NOISE, ATTITUDES, DELAY = "noise", "attitudes", "delay between the files"
+EARTHS_RATE, STRETCHES = "Earth's rate", "differences between stretches"
 REMEDY = "Turn the body about all its axes, by a right angle and more"
 
 
@@ -57,6 +60,7 @@ class EarthSeen:
 class KnownIncrements:
     """`matrix` F (3, 3) and `bias` b (3,) with their `covariance` (15, 15) [F row by row, ω_E, b], and what else is.
 
+    - `causes`, by name, what the covariance is the sum of (15, 15).
     - `earth` what the increments say of the Earth's rate, or why they do not.
     - `clock_s`: the reference's attitude of the moment t was that of t + τ; `clock_std_s`.
     - `fix_std_rad`: error of a fix about each axis; `random_walk_rad_sqrt_s` of the gyroscope's angle.
@@ -67,6 +71,7 @@ class KnownIncrements:
     matrix: Array
     bias: Array
     covariance: Array
+    causes: dict[str, Array]
     earth: EarthSeen | Fault
     clock_s: float
     clock_std_s: float
@@ -203,11 +208,13 @@ def _found(settled: _Settled, set_aside: int) -> KnownIncrements:
     wanted = np.eye(len(solved.theta))[np.r_[MATRIX, EARTH, BIAS]]
     for each in range(stretches):
         wanted[12:, COMMON + 12 * each :][:, BIAS] = np.eye(3) / stretches
-    covariance = wanted @ solved.covariance @ wanted.T
+    freedom = settled.model.freedom(sizes, wanted)
+    causes = {name: widened(wanted @ each @ wanted.T, freedom) for name, each in _causes(settled).items()}
     return KnownIncrements(
         matrix=state.matrix,
         bias=state.bias + wanted[12:, COMMON:] @ solved.theta[COMMON:],
-        covariance=widened(covariance, settled.model.freedom(sizes, wanted)),
+        covariance=np.sum(list(causes.values()), axis=0),
+        causes=causes,
         earth=_earth(solved.theta[EARTH], solved.covariance[EARTH, EARTH]),
         clock_s=state.clock_s,
         clock_std_s=float(np.sqrt(solved.covariance[CLOCK, CLOCK])),
@@ -220,6 +227,23 @@ def _found(settled: _Settled, set_aside: int) -> KnownIncrements:
         condition=_conditioning(settled.model.mixed).condition,
         iterations=settled.iterations,
     )
+
+
+def _causes(settled: _Settled) -> dict[str, Array]:
+    """What θ's covariance is made of: the errors that were found, and what is not known of θ itself."""
+    covariance = settled.solved.covariance
+    attitudes, noise = settled.model.causes(settled.sizes, covariance)
+    precision = np.zeros(len(covariance))
+    precision[CLOCK], precision[EARTH] = CLOCK_STD_S**-2.0, EARTH_PRECISION
+    for group, size in zip(settled.model.mixed.groups, settled.sizes.groups, strict=True):
+        precision[group] = size**-2.0
+    return {
+        NOISE: noise,
+        ATTITUDES: attitudes,
+        DELAY: np.outer(covariance[CLOCK], covariance[CLOCK]) * precision[CLOCK],
+        EARTHS_RATE: covariance[:, EARTH] * precision[EARTH] @ covariance[EARTH],
+        STRETCHES: covariance[:, COMMON:] * precision[COMMON:] @ covariance[COMMON:],
+    }
 
 
 def _earth(rate_rad_s: Array, covariance: Array) -> EarthSeen | Fault:

@@ -68,6 +68,13 @@ def scale_and_bias(matrix: Array, scale: Array, parameters: int) -> Array:
     return whole
 
 
+def scale_and_bias_covariance(matrix: Array, scale: Array, covariance: Array) -> Array:
+    """(6, 6) from that of a reference model's parameters; b is part of the reading, a gyroscope's is added to it."""
+    to_parameters = scale_and_bias(matrix, scale, len(covariance))
+    found: Array = to_parameters @ covariance @ to_parameters.T
+    return found
+
+
 def response_in_attitudes(theta: Array, attitudes: Array, variances: Array, attitude_std_rad: float) -> Array:
     """(p, 3 N): how θ (p,) changes with readings (N, 3) in attitudes off by so much, ‖v_ref‖ given."""
     v_bar = np.zeros_like(variances)

@@ -205,7 +205,7 @@ def untrustworthy(what: str) -> Fault:
     return Fault(
         "attitude_untrustworthy",
         what,
-        "Check the attitudes: their frame, their direction (body to table), one that was not reached",
+        "Check the attitudes: their frame, their direction (body to table), headings nobody measured, one not reached",
     )
 
 

@@ -123,11 +123,9 @@ def solve_triaxial(
         placed = Placed(m, v, r, v_bar, stated, norm_known)
         try:
             found = solve_attitude_weighted(start, placed)
+            _check_attitudes(start, placed, found)
         except np.linalg.LinAlgError:
-            raise refusals.untrustworthy(
-                "the readings contradict the attitudes so much that no fit converges"
-            ) from None
-        _check_attitudes(start, placed, found)
+            raise refusals.untrustworthy(refusals.NO_FIT) from None
         theta, covariance, iterations = found.theta, found.covariance, found.iterations
         attitude_error, white = found.attitude_error, found.white
     f = theta[F].reshape(3, 3)

@@ -79,6 +79,18 @@ class MixedModel:
         theta, covariance, likelihood = self._fit(sizes)
         return Solved(theta, covariance, likelihood, self.mixed.observed - self.mixed.design @ theta)
 
+    def causes(self, sizes: Sizes, covariance: Array) -> tuple[Array, Array]:
+        """What δ and what σ make of θ's `covariance` (p, p); the rest of it is what was known of θ before."""
+        variances = sizes.scattered**2 * self._spread + sizes.walked**2
+        columns = self._design.shape[2]
+
+        def of(part: Array) -> Array:
+            design = (self._design * (np.sqrt(part) / variances)[:, None, None]).reshape(-1, columns)
+            effect = covariance @ design.T
+            return np.asarray(effect @ effect.T, dtype=np.float64)
+
+        return of(sizes.scattered**2 * self._spread), of(np.full_like(variances, sizes.walked**2))
+
     def freedom(self, sizes: Sizes, wanted: Array) -> Array:
         """Degrees of freedom (q,) of the variances of `wanted` (q, p) combinations of θ.
 

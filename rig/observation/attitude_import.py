@@ -5,7 +5,9 @@ samples: as `rig.observation.csv_samples` says.
 attitudes: `start_s`, `end_s` on the same clock and `qw qx qy qz`, the unit quaternion that takes body to table
 coordinates; where the table turns `rate_x_rad_s rate_y_rad_s rate_z_rad_s`, its rate in body coordinates; where it is
 known how good the attitude is, `attitude_std_rad` about each axis. While the table turns, a row holds for its middle
-and should be short: down to one sample, whose noise is then taken from how all rows scatter about the model.
+and should be short: down to one sample, whose noise is then taken from how all rows scatter about the model. Only a
+gyroscope is solved from rows in which the body moves; accelerometers and magnetometers use those at rest
+(`rig.observation.placements`).
 
 Columns may stand in any order; the first row holds their names.
 
@@ -18,6 +20,7 @@ from dataclasses import dataclass
 from pathlib import Path
 
 import numpy as np
+from numpy.typing import NDArray
 
 from rig.errors import Fault, Refused
 from rig.estimation.arrays import Array
@@ -25,6 +28,7 @@ from rig.observation.csv_samples import COLUMNS, Quantity, read_samples
 from rig.observation.csv_table import read_columns
 from rig.observation.csv_windows import MIN_SAMPLES, check_complete, inside, overlapping, scatter_of
 from rig.observation.fixes import Turning
+from rig.observation.placements import Placements, find_placements
 from rig.observation.table_motion import TableMotion
 from rig.observation.timebase import TimeBase, estimate_time_base
 from rig.observation.windows import Window
@@ -37,22 +41,34 @@ NORM_TOLERANCE = 1e-3
 
 
 @dataclass(frozen=True, slots=True)
-class PlacedReadings:
-    """What the two files tell, N attitudes: `means` (N, 3) of every quantity, and the variances (N, 3) of these means.
+class Rows:
+    """What a gyroscope read in N rows: `means` (N, 3) and the `variances` (N, 3) of these means.
 
     No variances where rows hold too few samples to show their noise. `samples` (N,); `attitudes` (N, 3, 3), body to
     table; `rates_rad_s` (N, 3) of the table in body coordinates and `attitude_std_rad` (N,), if they were given.
-    `turning` holds a gyroscope's own readings and all rows, for what is solved from how far the body turned.
     """
 
-    means: Mapping[Quantity, Array]
-    variances: Mapping[Quantity, Array] | None
+    means: Array
+    variances: Array | None
     samples: Array
     attitudes: Array
     rates_rad_s: Array | None
     attitude_std_rad: Array | None
+
+
+@dataclass(frozen=True, slots=True)
+class PlacedReadings:
+    """What the two files tell of the `quantities` that were recorded.
+
+    A gyroscope's `rows`, and in `turning` its own readings and all rows, for what is solved from how far the body
+    turned; for the other sensors `placements`, or why there are none. `clock` where it had to be found.
+    """
+
+    quantities: tuple[Quantity, ...]
+    rows: Rows | None
+    turning: Turning | None
+    placements: Placements | Fault | None
     clock: TimeBase | None = None
-    turning: Turning | None = None
 
 
 def read_placed(samples_path: Path, attitudes_path: Path, *, find_clock: bool = False) -> PlacedReadings:
@@ -63,49 +79,70 @@ def read_placed(samples_path: Path, attitudes_path: Path, *, find_clock: bool = 
     `TableMotion` and `estimate_time_base`.
     """
     samples = read_samples(samples_path)
-    rows = read_columns(attitudes_path, PLACE_COLUMNS, (), ATTITUDES_MB, (RATE_COLUMNS, (STD_COLUMN,)))
+    table = read_columns(attitudes_path, PLACE_COLUMNS, (), ATTITUDES_MB, (RATE_COLUMNS, (STD_COLUMN,)))
     time_s, readings = samples.time_s, samples.readings
-    windows, attitudes = _windows(rows), _rotations(rows)
-    rates = np.column_stack([rows[name] for name in RATE_COLUMNS]) if RATE_COLUMNS[0] in rows else None
-    stated = _stated(rows)
+    rates = np.column_stack([table[name] for name in RATE_COLUMNS]) if RATE_COLUMNS[0] in table else None
+    said = _Said(_windows(table), _rotations(table), rates, _stated(table))
     clock = None
     if find_clock:
         _check_has_rates(readings)
-        middles_s = np.array([(window.start_s + window.end_s) / 2 for window in windows])
-        clock = estimate_time_base(time_s, readings["rate"], TableMotion(middles_s, attitudes, rates))
+        clock = estimate_time_base(
+            time_s, readings["rate"], TableMotion(said.rows_s.mean(axis=1), said.attitudes, rates)
+        )
         time_s = clock.controller_time_s(time_s)
-        seen = [row for row, window in enumerate(windows) if time_s[0] <= window.start_s and window.end_s <= time_s[-1]]
-        windows, attitudes = [windows[row] for row in seen], attitudes[seen]
-        rates, stated = (None if each is None else each[seen] for each in (rates, stated))
-    turning = None
-    if "rate" in readings:
-        rows_s = np.array([(window.start_s, window.end_s) for window in windows])
-        turning = Turning(time_s, readings["rate"], rows_s, attitudes, stated)
-    cuts = [inside(time_s, window) for window in windows]
-    counts = np.array([cut.stop - cut.start for cut in cuts])
-    interval_s = float(np.median(np.diff(time_s)))
-    whole = _whole(windows, counts.tolist(), interval_s)
-    cuts, counts, attitudes = [cuts[row] for row in whole], counts[whole], attitudes[whole]
-    rates, stated = (None if each is None else each[whole] for each in (rates, stated))
-    means = {quantity: np.array([each[cut].mean(axis=0) for cut in cuts]) for quantity, each in readings.items()}
-    variances = None
-    if counts.min() >= MIN_SAMPLES:
-        variances = {
-            quantity: np.array([scatter_of(each[cut])[0] for cut in cuts]) for quantity, each in readings.items()
-        }
+        said = said.of(np.flatnonzero((said.rows_s[:, 0] >= time_s[0]) & (said.rows_s[:, 1] <= time_s[-1])))
+    counts = np.diff(np.searchsorted(time_s, said.rows_s), axis=1)[:, 0]
+    whole = said.of(_whole(said.windows, counts.tolist(), float(np.median(np.diff(time_s)))))
+    rate = readings.get("rate")
     return PlacedReadings(
-        means,
-        variances,
-        counts.astype(np.float64),
-        attitudes,
-        rates,
-        stated,
+        tuple(readings),
+        None if rate is None else _rows(time_s, rate, whole),
+        None if rate is None else Turning(time_s, rate, said.rows_s, said.attitudes, said.std_rad),
+        None if set(readings) == {"rate"} else _placements(time_s, readings, whole),
         clock,
-        turning,
     )
 
 
-def _whole(windows: Sequence[Window], counts: Sequence[int], interval_s: float) -> list[int]:
+@dataclass(frozen=True, slots=True)
+class _Said:
+    """The rows of a reference: `attitudes` (N, 3, 3), `rates_rad_s` (N, 3) and `std_rad` (N,), if they were given."""
+
+    windows: list[Window]
+    attitudes: Array
+    rates_rad_s: Array | None
+    std_rad: Array | None
+
+    @property
+    def rows_s(self) -> Array:
+        return np.array([(window.start_s, window.end_s) for window in self.windows])
+
+    def of(self, rows: NDArray[np.intp]) -> "_Said":
+        rates, std = (None if each is None else each[rows] for each in (self.rates_rad_s, self.std_rad))
+        return _Said([self.windows[row] for row in rows], self.attitudes[rows], rates, std)
+
+
+def _placements(time_s: Array, readings: Mapping[Quantity, Array], said: _Said) -> Placements | Fault:
+    """A gyroscope needs none."""
+    try:
+        return find_placements(time_s, readings, said.windows, said.attitudes, said.std_rad)
+    except Fault as fault:
+        return fault
+
+
+def _rows(time_s: Array, rate: Array, said: _Said) -> Rows:
+    cuts = [rate[inside(time_s, window)] for window in said.windows]
+    counts = np.array([len(cut) for cut in cuts])
+    return Rows(
+        np.array([cut.mean(axis=0) for cut in cuts]),
+        np.array([scatter_of(cut)[0] for cut in cuts]) if counts.min() >= MIN_SAMPLES else None,
+        counts.astype(np.float64),
+        said.attitudes,
+        said.rates_rad_s,
+        said.std_rad,
+    )
+
+
+def _whole(windows: Sequence[Window], counts: Sequence[int], interval_s: float) -> NDArray[np.intp]:
     """The rows whose samples are there. Raises Fault `lost_samples`: a short row among many may fall into a gap."""
     whole = []
     for row, (window, count) in enumerate(zip(windows, counts, strict=True)):
@@ -118,7 +155,7 @@ def _whole(windows: Sequence[Window], counts: Sequence[int], interval_s: float) 
             whole.append(row)
     if not whole:
         check_complete(counts[0], windows[0], interval_s, "attitude 1", least=1)
-    return whole
+    return np.array(whole)
 
 
 def _check_has_rates(readings: Mapping[Quantity, Array]) -> None:

@@ -10,7 +10,7 @@ import numpy as np
 from rich.console import Console
 from rich.table import Table
 
-from rig.analysis.attitudes import Result, Surrounding, in_unit
+from rig.analysis.attitudes import InAttitudes, Result, Surrounding, in_unit
 from rig.analysis.increments import InIncrements
 from rig.errors import Fault
 from rig.estimation import accelerometer, magnetometer
@@ -19,6 +19,8 @@ from rig.estimation.triaxial import TriaxialSolution
 from rig.observation.csv_samples import UNITS, Quantity
 from rig.observation.timebase import TimeBase
 from rig.report.axes import matrix_lines
+from rig.report.budget_entry import budget_entry
+from rig.report.budget_table import budget_table
 from rig.report.increments import increment_entry, increment_lines
 from rig.station.plain_text import plain
 
@@ -59,6 +61,7 @@ def print_found(found: Found, *, as_json: bool) -> None:
             console.print(plain(f"{quantity}: {result}"))
             continue
         console.print(_table(f"{found.samples}: {quantity}, {MODELS[quantity]}", quantity, result.solution))
+        console.print(budget_table(budget_entry(result.budget), UNITS[quantity]))
         for line in _lines(quantity, result, found.surrounding):
             console.print(plain(line))
 
@@ -116,6 +119,7 @@ def _lines(quantity: Quantity, result: Result, surrounding: Surrounding) -> Iter
         error = solution.attitude_error
         off, known = 1e3 * error.std_rad, 2e3 * error.uncertainty_rad
         yield f"attitude error found: {off:.3f} ± {known:.3f} mrad about each axis"
+    yield from _of_placements(result, unit)
     rms = float(np.sqrt(np.mean(solution.residuals**2)))
     judged = f"condition {solution.condition:.1f}, residuals {rms:.2g} {unit}"
     yield f"{solution.method}: {solution.observations} attitudes, {judged}"
@@ -126,6 +130,19 @@ def _lines(quantity: Quantity, result: Result, surrounding: Surrounding) -> Iter
         else:
             scale, bias = (" ".join(f"{each:.6g}" for each in values) for values in (in_unit(other)[0], other.bias))
             yield f"{method}: scale {scale}, bias {bias} {unit}"
+
+
+def _of_placements(result: InAttitudes, unit: str) -> Iterator[str]:
+    """What laying it down again does, and which rows and rests counted."""
+    laid = result.laid
+    if laid is not None:
+        told = f"{laid.placement_std:.2g} ± {2 * laid.placement_uncertainty:.2g} {unit}"
+        elsewhere = f", {result.elsewhere} rests beside the rows have told of it" if result.elsewhere else ""
+        yield f"a placement found to change each reading by {told} beside its attitude{elsewhere}"
+        if laid.placement_uncertainty > laid.placement_std / 2:
+            yield "which is hardly told: lay it down in the same attitudes again, and the uncertainty becomes smaller"
+    if result.moving:
+        yield f"left out: not_at_rest: {result.moving} rows in which the body moves"
 
 
 def _document(found: Found) -> dict[str, Any]:
@@ -151,19 +168,32 @@ def _entry(quantity: Quantity, result: Result) -> dict[str, Any]:
     ]
     model = {"model": MODELS[quantity], "unit": UNITS[quantity], "covariance_order": order}
     if isinstance(result, InIncrements):
-        return {**model, **_parameters(result.solution), **increment_entry(result), "beside": {}}
+        return {
+            **model,
+            **_parameters(result.solution),
+            **increment_entry(result),
+            "budget": _budget(result),
+            "beside": {},
+        }
     if result.solution.second_order is not None:
         order += [f"phi_{axis}" for axis in "xyz"]
     fault = result.reference_fault
     return {
         **model,
         **_solution(result.solution),
+        "budget": _budget(result),
+        "placement_std": None if result.laid is None else result.laid.placement_std,
+        "rows_left_out": result.moving,
         **({} if fault is None else {"reference_table": None, "reference_error": str(fault)}),
         "beside": {
             method: {"error": str(other)} if isinstance(other, Fault) else _solution(other)
             for method, other in result.beside.items()
         },
     }
+
+
+def _budget(result: Result) -> dict[str, Any]:
+    return budget_entry(result.budget).model_dump()
 
 
 def _parameters(solution: TriaxialSolution | KnownIncrements) -> dict[str, Any]:

@@ -1,0 +1,141 @@
+"""What sensors read in the attitudes in which a body was laid down: only rests tell gravity, or a field.
+
+A placement is a rest of the recording (`rig.observation.rests`) and the rows of a reference that fall into it: rows
+that follow each other without a movement in between are one placement, however many they are. Rests of which the
+reference says nothing tell the size of what is felt all the same.
+"""
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from rig.errors import Fault
+from rig.estimation.arrays import Array
+from rig.observation.csv_samples import Quantity
+from rig.observation.csv_windows import MIN_SAMPLES, inside, scatter_of
+from rig.observation.rests import BLOCK_S, find_rests
+from rig.observation.windows import Window
+
+TURNED_RAD = 0.02  # rows of one rest that are farther apart: it was turned about what it feels
+
+
+@dataclass(frozen=True, slots=True)
+class Rested:
+    """Readings of rests: `means` (N, 3) of every quantity and their `variances` (N, 3)."""
+
+    means: Mapping[Quantity, Array]
+    variances: Mapping[Quantity, Array]
+
+
+@dataclass(frozen=True, slots=True)
+class Placements:
+    """N placements: what was `read`, `attitudes` (N, 3, 3), body to table, and `attitude_std_rad` (N,) as stated.
+
+    `elsewhere` are rests without an attitude; `left_out` how many rows were none, for the body moved.
+    """
+
+    read: Rested
+    attitudes: Array
+    attitude_std_rad: Array | None
+    elsewhere: Rested
+    left_out: int
+
+
+def find_placements(
+    time_s: Array,
+    readings: Mapping[Quantity, Array],
+    windows: Sequence[Window],
+    attitudes: Array,
+    std_rad: Array | None,
+) -> Placements:
+    """From readings (n, 3) at rising times (n,) and a reference's rows.
+
+    Raises Fault `not_at_rest` where the body moves in every row.
+    """
+    rests = find_rests(time_s, readings)
+    rest = np.array([_rest_of(window, rests) for window in windows])
+    groups = _groups(rest, attitudes)
+    if not groups:
+        raise Fault(
+            "not_at_rest",
+            f"the body moves in all of {len(windows)} rows, and only a body at rest feels gravity or a field alone",
+            "Give attitudes in which it lies still for half a second and longer, among the others or instead of them",
+        )
+    covered = [_covered(time_s, rests[rest[group[0]]], [windows[row] for row in group]) for group in groups]
+    named = {int(each) for each in rest}
+    others = [inside(time_s, each) for number, each in enumerate(rests) if number not in named]
+    return Placements(
+        _read(readings, covered),
+        np.array([_middle(attitudes[group]) for group in groups]),
+        None if std_rad is None else np.array([np.sqrt(np.mean(std_rad[group] ** 2)) for group in groups]),
+        _read(readings, [np.arange(each.start, each.stop) for each in others]),
+        int((rest < 0).sum()),
+    )
+
+
+def _rest_of(window: Window, rests: Sequence[Window]) -> int:
+    """The number of the rest that a row lies in, to a block at either end; −1 of none."""
+    for number, rest in enumerate(rests):
+        if rest.start_s - BLOCK_S <= window.start_s and window.end_s <= rest.end_s + BLOCK_S:
+            overlap_s = min(window.end_s, rest.end_s) - max(window.start_s, rest.start_s)
+            if overlap_s > 0:
+                return number
+    return -1
+
+
+def _groups(rest: NDArray[np.intp], attitudes: Array) -> list[NDArray[np.intp]]:
+    """The rows of each placement."""
+    groups: list[list[int]] = []
+    last: dict[int, list[int]] = {}
+    for row in np.flatnonzero(rest >= 0).tolist():
+        before = last.get(int(rest[row]))
+        if before is not None and _apart(attitudes[before[0]], attitudes[row]) <= TURNED_RAD:
+            before.append(row)
+            continue
+        groups.append([row])
+        last[int(rest[row])] = groups[-1]
+    return [np.array(group) for group in groups]
+
+
+def _apart(one: Array, other: Array) -> float:
+    """By what angle two rotations (3, 3) differ, rad."""
+    return float(np.arccos(np.clip((np.trace(one.T @ other) - 1) / 2, -1, 1)))
+
+
+def _middle(attitudes: Array) -> Array:
+    """The rotation (3, 3) nearest to those of some rows (k, 3, 3)."""
+    left, _, right = np.linalg.svd(attitudes.mean(axis=0))
+    left[:, -1] *= np.linalg.det(left @ right)
+    middle: Array = left @ right
+    return middle
+
+
+def _covered(time_s: Array, rest: Window, windows: Sequence[Window]) -> NDArray[np.intp]:
+    """The samples of a rest that rows name."""
+    cuts = [inside(time_s, Window(max(each.start_s, rest.start_s), min(each.end_s, rest.end_s))) for each in windows]
+    return np.unique(np.concatenate([np.arange(each.start, each.stop) for each in cuts]))
+
+
+def _read(readings: Mapping[Quantity, Array], cuts: Sequence[NDArray[np.intp]]) -> Rested:
+    """Of few samples, the noise of all that are long enough."""
+    means, variances = {}, {}
+    for quantity, each in readings.items():
+        means[quantity] = np.array([each[cut].mean(axis=0) for cut in cuts]).reshape(-1, 3)
+        found = np.array([scatter_of(each[cut])[0] if len(cut) >= MIN_SAMPLES else np.full(3, np.nan) for cut in cuts])
+        variances[quantity] = _filled(found.reshape(-1, 3), np.array([len(cut) for cut in cuts]), each)
+    return Rested(means, variances)
+
+
+def _filled(variances: Array, counts: NDArray[np.intp], readings: Array) -> Array:
+    """(N, 3) with what too few samples do not tell, from the others or from how readings (n, 3) jump."""
+    unknown = np.isnan(variances[:, 0])
+    if not unknown.any():
+        return variances
+    of_one = (
+        np.diff(readings, axis=0).var(axis=0) / 2
+        if unknown.all()
+        else np.median((variances * counts[:, None])[~unknown], axis=0)
+    )
+    return np.where(unknown[:, None], of_one / np.maximum(counts, 1)[:, None], variances)

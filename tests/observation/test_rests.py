@@ -1,0 +1,47 @@
+"""Rests, found in what a gyroscope or an accelerometer read."""
+
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from rig.observation.csv_samples import read_samples
+from rig.observation.rests import find_rests
+from support.paths import DOCS
+from support.real import unpacked
+from support.turned_body import Hand, turn
+
+
+def test_a_hands_rests_are_found_as_they_are_known_of_a_real_recording(tmp_path: Path) -> None:
+    """Thirteen, say those who looked at it."""
+    samples = read_samples(unpacked("imucal", "samples.csv", tmp_path))
+    rests = find_rests(samples.time_s, samples.readings)
+    assert len(rests) == 13
+    assert (rests[1].start_s, rests[1].end_s) == pytest.approx((3.8, 13.4), abs=0.3)
+
+
+@pytest.mark.parametrize("noise_rad_s", [0.0, 1e-3, 0.035])
+def test_between_two_turns_there_is_one_rest(noise_rad_s: float) -> None:
+    session = turn(Hand(np.vstack([np.eye(3), -np.eye(3)]), noise_rad_s=noise_rad_s), 1)
+    rests = find_rests(session.time_s, {"rate": session.readings})
+    turns = session.rows[session.rows[:, 5] > 0]
+    assert len(rests) == len(turns) + 1
+    for rest, begins_s in zip(rests, turns[:, 0], strict=False):
+        assert rest.end_s <= begins_s + 0.1  # a push begins gently
+    for rest, ended_s in zip(rests[1:], turns[:, 1], strict=True):
+        assert rest.start_s >= ended_s - 0.25
+
+
+def test_a_steady_turn_is_no_rest() -> None:
+    """A turntable's sweeps are as quiet as its stops."""
+    samples = read_samples(DOCS / "examples" / "samples.csv")
+    rests = find_rests(samples.time_s, samples.readings)
+    assert len(rests) == 7 and sum(rest.end_s - rest.start_s for rest in rests) < 30
+
+
+def test_a_gap_ends_a_rest() -> None:
+    time_s = np.arange(1000) / 100
+    readings = np.random.default_rng(1).normal(size=(1000, 3)) * 1e-3
+    time_s[500:] += 3.0
+    before, after = find_rests(time_s, {"rate": readings})
+    assert before.end_s <= 5 and after.start_s >= 8
