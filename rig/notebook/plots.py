@@ -12,6 +12,7 @@ from rig.analysis.calibration import SensorResult
 from rig.analysis.comparison import Comparison
 from rig.errors import Fault, Refused
 from rig.estimation.arrays import Array
+from rig.estimation.budget import COVERAGE_FACTOR
 from rig.observation.windows import Window
 from rig.report.figures import draw_comparison
 
@@ -66,10 +67,10 @@ def plot_residuals(results: Mapping[str, SensorResult]) -> Plot:
     panels = figure.subplots(len(sensors), sharex=True, squeeze=False)[:, 0]
     for axes, (name, (found, model)) in zip(panels, sensors.items(), strict=True):
         averages = [*(observation.average for observation in found.observations), *found.rests]
-        std = np.sqrt([average.variance_rad2_s2 for average in averages])
+        expanded = COVERAGE_FACTOR * np.sqrt([average.variance_rad2_s2 for average in averages])
         for i, axis in enumerate("xyz"):
             places = np.arange(len(averages)) + (i - 1) * 0.15
-            axes.errorbar(places, model.residuals_rad_s[:, i], std[:, i], fmt="o", ms=3, lw=0.8, label=axis)
+            axes.errorbar(places, model.residuals_rad_s[:, i], expanded[:, i], fmt="o", ms=3, lw=0.8, label=axis)
         axes.axhline(0, color="0.5", lw=0.8)
         axes.set(ylabel="residual rad/s")
         axes.set_xticks(
@@ -78,7 +79,7 @@ def plot_residuals(results: Mapping[str, SensorResult]) -> Plot:
             rotation=60,
             ha="right",
         )
-        _finish(axes, f"{name}: reading − model, ± 1σ")
+        _finish(axes, f"{name}: reading − model, ± U of the mean (k = 2)")
     return Plot(figure)
 
 

@@ -77,7 +77,7 @@ class Calibration:
         return table(f"{self.found.sensor.part} {self.found.serial_number}", HEADINGS, self.rows())
 
 
-HEADINGS = ("axis", "scale factor", "± 2σ", "bias rad/s", "± 2σ rad/s")
+HEADINGS = ("axis", "scale factor", "± U (k = 2)", "bias rad/s", "± U rad/s")
 
 
 @dataclass(frozen=True, eq=False)

@@ -56,7 +56,7 @@ def _draw_residuals(axes: "Axes", result: AccelerometerResult) -> None:
     noise = np.sqrt([dwell.reading.variance for dwell in result.dwells])
     turned = result.solution.attitude_error.std_rad * result.gravity_m_s2
     expected = 2 * np.hypot(noise.max(axis=1), turned) / MICRO_G_M_S2
-    axes.fill_between(count, -expected, expected, color="0.9", label="±2σ of noise and attitude", step="mid")
+    axes.fill_between(count, -expected, expected, color="0.9", label="± U (k = 2) of noise and attitude", step="mid")
     for i, axis in enumerate("xyz"):
         left = result.solution.dwell_residuals_m_s2[:, i] / MICRO_G_M_S2
         axes.errorbar(count + 0.15 * (i - 1), left, 2 * noise[:, i] / MICRO_G_M_S2, fmt="o", ms=3, lw=0.8, label=axis)

@@ -16,8 +16,8 @@ def accelerometer_table(name: str, found: AccelerometerEntry) -> Table:
     """Scale and bias of each axis, ± U (k = 2)."""
     model = "a = F s + b" if found.second_order_s2_m is None else "a = F (s + φ s²) + b"
     title = f"{name}, accelerometer: {found.part} {found.serial_number}, {model}, {found.estimator}"
-    expanded, known = expanded_uncertainties(found.budget, found.covariance), found.budget is not None
-    return axes_table(title, found.scale, found.bias_m_s2, expanded, unit="m/s²", digits=5, known=known)
+    expanded = expanded_uncertainties(found.budget, found.covariance)
+    return axes_table(title, found.scale, found.bias_m_s2, expanded, unit="m/s²", digits=5)
 
 
 def accelerometer_lines(found: AccelerometerEntry) -> Iterator[str]:

@@ -100,7 +100,7 @@ def _titled(name: str, seen: SensorAtRest) -> str:
 def _table(title: str, quantity: Quantity, seen: AtRest) -> Table:
     table = Table(title=plain(title, "table.title"), title_justify="left")
     (walk_unit, walk_size), (bias_unit, bias_size) = SHOWN[quantity]
-    headings = ("axis", f"{WALKS[quantity]} {walk_unit}", "± 2σ", f"bias instability {bias_unit}", "± 2σ", "at s")
+    headings = ("axis", f"{WALKS[quantity]} {walk_unit}", "± U (k = 2)", f"bias instability {bias_unit}", "± U", "at s")
     for heading in headings:
         table.add_column(heading, justify="left" if heading == "axis" else "right")
     for axis, told in zip("xyz", seen.axes, strict=True):

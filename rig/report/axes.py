@@ -28,15 +28,10 @@ def axes_table(
     *,
     unit: str,
     digits: int,
-    known: bool,
 ) -> Table:
-    """Scale factor and bias of each axis, ± twice their standard uncertainties (6,); bias and its own in `unit`.
-
-    `known` where all that is known is in these, and not the solution's spread alone.
-    """
+    """Scale factor and bias of each axis, ± twice their standard uncertainties (6,); bias and its own in `unit`."""
     table = Table(title=plain(title, "table.title"), title_justify="left")
-    spread = "± U" if known else "± 2σ"
-    for heading in ("axis", "scale factor", spread, f"bias {unit}", f"{spread} {unit}"):
+    for heading in ("axis", "scale factor", "± U (k = 2)", f"bias {unit}", f"± U {unit}"):
         table.add_column(heading, justify="left" if heading == "axis" else "right")
     for i, axis in enumerate("xyz"):
         table.add_row(

@@ -62,5 +62,5 @@ def draw_drift(axes: "Axes", quantity: str, drift: BiasDrift) -> None:
     for move in drift.held.moves:
         axes.axvline(move.repeat + 0.5, color="0.5", ls=":", lw=0.8)
     axes.locator_params("x", integer=True)
-    axes.set(xlabel="repeat", ylabel=f"bias   {unit}", title=f"{what}; ±2σ, × found anew")
+    axes.set(xlabel="repeat", ylabel=f"bias   {unit}", title=f"{what}; ± U (k = 2), × found anew")
     axes.legend(frameon=False, ncols=3, fontsize=8)

@@ -24,12 +24,12 @@ def print_drifts(found: Mapping[str, Mapping[str, DriftEntry]], console: Console
 
 
 def drift_table(name: str, quantity: str, found: DriftEntry) -> Table:
-    """The bias of each repeat, scale and axes held, and its largest ± 2σ; a mark where it moved."""
+    """The bias of each repeat, scale and axes held, and its largest ± U; a mark where it moved."""
     unit, size, what = SHOWN[quantity]
     table = Table(title=plain(f"{name}, {what}: bias by repeat, scale and axes held", "table.title"))
     table.title_justify = "left"
     moved = {move.repeat: move.axis for move in found.moves}
-    for heading in ("repeat", "hours", "°C", *(f"{axis} {unit}" for axis in "xyz"), "± 2σ", "moved"):
+    for heading in ("repeat", "hours", "°C", *(f"{axis} {unit}" for axis in "xyz"), "± U (k = 2)", "moved"):
         table.add_column(heading, justify="right")
     for number, repeat in enumerate(found.repeats, 1):
         table.add_row(
@@ -54,7 +54,7 @@ def drift_lines(quantity: str, found: DriftEntry) -> Iterator[str]:
         yield "the bias did not move beyond its noise"
     yield f"a steady one is said to have moved in {100 * found.false_alarm:g} % of runs"
     if max(found.excess) > 1.5:
-        yield f"repeats scatter {max(found.excess):.1f} times as much as noise would have it; ± 2σ allows for that"
+        yield f"repeats scatter {max(found.excess):.1f} times as much as noise would have it; U allows for that"
     anew = [repeat.anew for repeat in found.repeats]
     refused = [each for each in anew if isinstance(each, ErrorEntry)]
     if refused:

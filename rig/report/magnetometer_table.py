@@ -20,8 +20,8 @@ def magnetometer_table(name: str, found: MagnetometerEntry) -> Table:
     title = f"{name}, magnetometer as mounted: {found.part} {found.serial_number}, {found.model}, {found.estimator}"
     per_unit = np.array([1, 1, 1, MICROTESLA, MICROTESLA, MICROTESLA])
     expanded = (expanded_uncertainties(found.budget, found.covariance) * per_unit).tolist()
-    bias, known = (MICROTESLA * np.array(found.bias_t)).tolist(), found.budget is not None
-    return axes_table(title, found.scale, bias, expanded, unit="µT", digits=3, known=known)
+    bias = (MICROTESLA * np.array(found.bias_t)).tolist()
+    return axes_table(title, found.scale, bias, expanded, unit="µT", digits=3)
 
 
 def magnetometer_lines(found: MagnetometerEntry) -> Iterator[str]:

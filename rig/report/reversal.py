@@ -29,7 +29,7 @@ def print_reversal(document: ReversalDocument, *, as_json: bool) -> None:
         title = f"{name}, magnetometer turned over: {found.part} {found.serial_number}, {len(found.runs)} runs"
         expanded = [2 * std for std in (*found.scale_std, *np.multiply(MICROTESLA, found.bias_std_t).tolist())]
         bias = np.multiply(MICROTESLA, found.bias_t).tolist()
-        console.print(axes_table(title, found.scale, bias, expanded, unit="µT", digits=3, known=True))
+        console.print(axes_table(title, found.scale, bias, expanded, unit="µT", digits=3))
         for line in _lines(found):
             console.print(plain(line))
 

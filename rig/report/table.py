@@ -144,7 +144,7 @@ def _speeds(sensor: SensorEntry) -> Iterator[str]:
         ("even", found.even_per_rad_s, found.even_std_per_rad_s),
     ):
         percent = triple(np.multiply(100, values), "+.4f")
-        yield f"nonlinearity, {name}: {percent} % per rad/s (± {100 * max(std):.4f}), from {speeds} °/s"
+        yield f"nonlinearity, {name}: {percent} % per rad/s (± {200 * max(std):.4f}, k = 2), from {speeds} °/s"
 
 
 def _on_the_board(board: BoardEntry) -> Iterator[str]:
