@@ -81,14 +81,17 @@ class Wire:
     """One client's pace: it may be `lag_s` of the world's time behind before the world waits for it.
 
     Waiting is to go on as a real laboratory would, 1 s in 1 s: what others are sent comes no slower than from that, or
-    they would take the world for one that has gone. A client that lets lie what it is sent is waited for only as long
-    as its patience lasts, and then no more until it has kept pace again.
+    they would take the world for one that has gone. A client that takes what it is sent as fast as it can is waited for
+    however slow that is, one that lets it lie only as long as its patience lasts, and then no more until it has kept
+    pace again.
     """
 
     def __init__(self, unread: Unread, lag_s: float, wall: Callable[[], float]) -> None:
         self._unread, self._lag_s, self._wall = unread, lag_s, wall
         self._behind_since_s: float | None = None  # the world's time of the first packet that is not known to be taken
-        self._waiting_since_s: float | None = None  # wall time, as everything below
+        self._waiting_since_s: float | None = None  # for it to take something; wall time, as everything below
+        self._left = 0  # bytes that it had not taken at the last look
+        self._slept = False  # it let them lie since it was in pace
         self._patience_s = FIRST_PATIENCE_S
         self._in_pace = True
         self._settled_s = wall()
@@ -105,7 +108,11 @@ class Wire:
         if self._behind_since_s is None or time_s - self._behind_since_s <= self._lag_s:
             return 0.0
         now_s = self._wall()
-        if not self._unread():
+        unread = self._unread()
+        if unread < self._left or not unread:
+            self._take(now_s)
+        self._left = unread
+        if not unread:
             self._settle(now_s)
             return 0.0
         if self._waiting_since_s is None:
@@ -116,10 +123,17 @@ class Wire:
         due_s = self._sent_s + time_s - self._sent_time_s - now_s
         return max(0.0, min(due_s, max(LOOK_S[0], waited_s / 4), LOOK_S[1]))
 
+    def _take(self, now_s: float) -> None:
+        """The client has taken something, and paid with patience if it slept before."""
+        waited_s = 0.0 if self._waiting_since_s is None else now_s - self._waiting_since_s
+        if waited_s > IN_PACE_S:
+            self._slept = True
+            self._patience_s = max(0.0, self._patience_s - waited_s)
+        self._waiting_since_s = now_s
+
     def _settle(self, now_s: float) -> None:
         """The client has caught up."""
-        waited_s = 0.0 if self._waiting_since_s is None else now_s - self._waiting_since_s
-        self._in_pace = waited_s <= IN_PACE_S
-        change_s = EARNED * (now_s - self._settled_s) if self._in_pace else -waited_s
-        self._patience_s = min(max(self._patience_s + change_s, 0.0), PATIENCE_S)
+        self._in_pace, self._slept = not self._slept, False
+        if self._in_pace:
+            self._patience_s = min(self._patience_s + EARNED * (now_s - self._settled_s), PATIENCE_S)
         self._settled_s, self._behind_since_s, self._waiting_since_s = now_s, None, None

@@ -122,6 +122,24 @@ def test_a_client_that_is_slow_again_and_again_is_waited_for_once_until_it_keeps
     assert client.wait_s > 0.0, "it took what it was sent at once"
 
 
+def test_a_client_that_does_what_it_can_is_waited_for_however_long() -> None:
+    """Half as fast as the world would be, it has never taken all: it stays less than a second behind."""
+    client, time_scale, capacity = Client(), 8, 4
+    end_s = client.wall.now_s + 60.0
+    owed, most = 0.0, 0
+    while client.wall.now_s < end_s:
+        passes_s = client.wait_s
+        if not passes_s:
+            client.is_sent(1)
+            passes_s = PERIOD_S / time_scale
+        client.wall.passes(passes_s)
+        owed += capacity * passes_s / PERIOD_S
+        taken = 100 * int(owed)
+        client.unread, owed = max(100, client.unread - taken), owed % 1.0
+        most = max(most, client.unread)
+    assert most < 100 * 1.0 / PERIOD_S
+
+
 @pytest.mark.parametrize("reads_per_s", [1, 5])
 @pytest.mark.parametrize("time_scale", [2, 8, 50])
 def test_a_client_that_reads_now_and_then_changes_the_pace_by_less_than_two_percent(
