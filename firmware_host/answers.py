@@ -38,13 +38,13 @@ class SampleBatch(NamedTuple):
 
         They are put together as bytes and taken apart once: most of what a frame costs alone is the same for many.
         """
-        first, counts = frames[0], [frame.values["count"] for frame in frames]
+        first, heads = frames[0], [frame.values for frame in frames]
         items = first._replace(content=b"".join([frame.content for frame in frames])).items
         samples = np.empty(len(items), _DTYPES.get(first.name, SAMPLE_DTYPE))
-        sequence = first.values["sequence"]
+        sequence = heads[0]["sequence"]
         samples["sequence"] = np.arange(sequence, sequence + len(items))
-        base_times_us = np.array([frame.values["base_time_us"] for frame in frames], np.uint64)
-        samples["board_time_us"] = np.repeat(base_times_us, counts) + items["delta_us"]
+        base_times_us = np.array([head["base_time_us"] for head in heads], np.uint64)
+        samples["board_time_us"] = base_times_us.repeat([head["count"] for head in heads]) + items["delta_us"]
         samples["host_time_s"] = host_time_s
         if first.name == "field_samples":
             samples["field_counts"] = items["field"]
@@ -53,8 +53,8 @@ class SampleBatch(NamedTuple):
             samples["temperature_counts"] = items["temperature_counts"]
         if first.name == "imu_samples":
             samples["acceleration_counts"] = items["acceleration"]
-        values = frames[-1].values
-        return cls(values["sensor"], protocol.MODES[values["mode"]], values["dropped"], samples)
+        last = heads[-1]
+        return cls(last["sensor"], protocol.MODES[last["mode"]], last["dropped"], samples)
 
 
 def sample_batches(frames: Iterable[Frame], host_time_s: float) -> Iterator[SampleBatch]:

@@ -1,6 +1,7 @@
 """Frames to bytes and back, as `protocol.py` describes them."""
 
 from collections import OrderedDict
+from collections.abc import Callable
 from typing import Any, NamedTuple
 from zlib import crc32
 
@@ -16,6 +17,7 @@ from firmware_host.protocol import (
     PROTOCOL_VERSION,
     QUANTITIES,
     SOLUTION_STATUSES,
+    Message,
 )
 from firmware_host.stuffing import stuff, unstuff
 
@@ -72,27 +74,47 @@ def encode(name: str, sequence: int, values: dict[str, Any] | None = None, items
     return stuff(body + crc32(body).to_bytes(4, "little")) + b"\0"
 
 
+class _Layout(NamedTuple):
+    """What decoding needs of a message, looked up once."""
+
+    name: str
+    head: Callable[[bytes, int], tuple[Any, ...]]
+    named: Callable[[tuple[Any, ...]], dict[str, Any]]
+    items_at: int
+    item_size: int
+    least: int  # bytes of a body without items
+    checked: tuple[tuple[str, int], ...]
+
+    @classmethod
+    def of(cls, message: Message) -> "_Layout":
+        at, size = 2 + message.head.size, message.item_dtype.itemsize
+        least = OVERHEAD + message.head.size
+        return cls(message.name, message.head.unpack_from, message.named, at, size, least, _CHECKED[message.name])
+
+
+_LAYOUTS = {code: _Layout.of(message) for code, message in MESSAGE_BY_CODE.items()}
+
+
 def decode(block: bytes) -> Frame | None:
     """One COBS block (without its delimiter) → frame; None when damaged or not in the table, or of no meaning there.
 
     An identity of another protocol version comes back with only the two fields every version has.
     """
     body = unstuff(block) if len(block) <= _BLOCK_MAX else None
-    if body is None or len(body) < OVERHEAD or crc32(body) != _CRC_OF_INTACT or body[0] not in MESSAGE_BY_CODE:
+    if body is None or len(body) < OVERHEAD or crc32(body) != _CRC_OF_INTACT or body[0] not in _LAYOUTS:
         return None
-    message = MESSAGE_BY_CODE[body[0]]
-    if message.name == "identity" and len(body) >= OVERHEAD + 2 and body[3] != PROTOCOL_VERSION:
+    name, head, named, items_at, item_size, least, checked = _LAYOUTS[body[0]]
+    if name == "identity" and len(body) >= OVERHEAD + 2 and body[3] != PROTOCOL_VERSION:
         return Frame("identity", body[1], {"reply_to": body[2], "protocol": body[3]}, b"")
-    head, each = message.head, message.item_dtype.itemsize
-    length = len(body) - OVERHEAD - head.size
-    if length < 0 or length % each if each else length != 0:
+    length = len(body) - least
+    if length < 0 or length % item_size if item_size else length != 0:
         return None
-    values = message.named(head.unpack_from(body, 2))
-    if each and values.get("count", length // each) != length // each:
+    values = named(head(body, 2))
+    if item_size and values.get("count", length // item_size) != length // item_size:
         return None
-    frame = Frame(message.name, body[1], values, body[2 + head.size : -4])
-    for name, limit in _CHECKED[message.name]:
-        if values[name] >= limit if name in values else np.any(frame.items[name] >= limit):
+    frame = Frame(name, body[1], values, body[items_at:-4])
+    for field, limit in checked:
+        if values[field] >= limit if field in values else np.any(frame.items[field] >= limit):
             return None
     return frame
 
