@@ -17,6 +17,7 @@ from typing import Any
 from firmware_host.errors import BoardError
 from firmware_host.protocol import FIRMWARE_VERSION
 
+HERE = Path(__file__).parent
 TARGET = "stm32l432kc"
 FLASH_START = 0x0800_0000
 FLASH_BYTES = 256 * 1024
@@ -88,7 +89,8 @@ def find_probe(probe_id: str | None = None) -> Any:
             f"the library for debug probes is not installed ({error})",
             "Install it with `pip install 'calibration-rig[flash]'`, or copy to the board's drive with --drive",
         ) from error
-    probes = ConnectHelper.get_all_connected_probes(blocking=False, unique_id=probe_id)
+    with contextlib.chdir(HERE):
+        probes = ConnectHelper.get_all_connected_probes(blocking=False, unique_id=probe_id)
     if not probes:
         raise BoardError(
             "no_probe",
@@ -126,7 +128,8 @@ def flash_by_probe(image: bytes, probe: Any) -> None:
     for mode in CONNECT_MODES:
         options = {"target_override": TARGET, "hide_programming_progress": True, "connect_mode": mode}
         try:
-            with Session(probe, options=options) as session:
+            # pyocd executes a pyocd_user.py that lies in the working folder, whoever may have sent that.
+            with contextlib.chdir(HERE), Session(probe, options=options) as session:
                 _program(session, image)
             return
         except (Error, OSError) as error:

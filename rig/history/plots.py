@@ -10,7 +10,8 @@ from rig.history.series import Subject, Trend
 from rig.history.statistics.charts import SHEWHART_LIMIT
 from rig.history.tables import title_of
 from rig.report.exports.names import plain_names
-from rig.report.figures import save, style
+from rig.report.figures import save
+from rig.study.style import style
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes

@@ -11,8 +11,9 @@ from rig.analysis.outcome import Outcome
 from rig.data.result_file import ResultDocument
 from rig.estimation.arrays import Array
 from rig.estimation.earth import MICRO_G_M_S2
-from rig.report.figures import save, style
+from rig.report.figures import save
 from rig.station.events import NotPlotted, Plotted, RunEvent
+from rig.study.style import style
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes

@@ -14,8 +14,9 @@ from rig.errors import Fault
 from rig.estimation.allan import FLICKER, Read
 from rig.estimation.earth import MICRO_G_M_S2
 from rig.observation.csv_samples import Quantity
-from rig.report.figures import save, style
+from rig.report.figures import save
 from rig.station.plain_text import plain
+from rig.study.style import style
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes

@@ -9,8 +9,9 @@ from rig.analysis.bias_drift import Anew, BiasDrift
 from rig.analysis.outcome import Outcome
 from rig.data.result_file import ResultDocument
 from rig.report.drift_table import SHOWN
-from rig.report.figures import save, style
+from rig.report.figures import save
 from rig.station.events import NotPlotted, Plotted, RunEvent
+from rig.study.style import style
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes

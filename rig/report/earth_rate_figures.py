@@ -11,8 +11,9 @@ from rig.arm.kinematics import flange_attitude
 from rig.data.result_file import ResultDocument
 from rig.estimation.arrays import Array
 from rig.observation.observed_run import ObservedRun
-from rig.report.figures import envelope, save, style
+from rig.report.figures import envelope, save
 from rig.station.events import NotPlotted, Plotted, RunEvent
+from rig.study.style import style
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure

@@ -1,7 +1,6 @@
 """A verification's plots, in the manner of SIX, Figs. 7–10: sensor and reference over time, before and after."""
 
 from collections.abc import Iterable
-from contextlib import AbstractContextManager
 from pathlib import Path
 from typing import TYPE_CHECKING
 
@@ -14,6 +13,7 @@ from rig.config.written_file import new_file
 from rig.data.result_file import ResultDocument
 from rig.estimation.arrays import Array
 from rig.station.events import NotPlotted, Plotted, RunEvent
+from rig.study.style import style
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
@@ -58,13 +58,6 @@ def _write(verification: Verification, when: str, comparison: Comparison, folder
         )
         save(figure, folder, name)
     return name
-
-
-def style() -> AbstractContextManager[None]:
-    """What is drawn within looks alike, and its SVG has the same bytes each time."""
-    import matplotlib as mpl
-
-    return mpl.rc_context({"font.size": 9, "svg.hashsalt": "rig", "axes.grid": True, "grid.alpha": 0.3})
 
 
 def save(figure: "Figure", folder: Path, name: str) -> None:

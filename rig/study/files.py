@@ -9,6 +9,7 @@ import numpy as np
 
 from rig.errors import Refused
 from rig.study.report import Columns, Finding, Report, table
+from rig.study.style import style
 
 Format = Literal["csv", "parquet"]
 
@@ -83,10 +84,9 @@ def _write_parquet(columns: Columns, path: Path) -> None:
 
 
 def _write_plots(report: Report, paths: Sequence[Path]) -> None:
-    import matplotlib as mpl
     from matplotlib.figure import Figure
 
-    with mpl.rc_context({"font.size": 9, "svg.hashsalt": "rig", "axes.grid": True, "grid.alpha": 0.3}):
+    with style():
         figure = Figure(figsize=report.size_inches, layout="constrained")
         report.draw(figure)
         for path in paths:

@@ -1,5 +1,6 @@
 """`rig board flash`: the shipped image, the drive a Nucleo shows over USB, and what is missing said by name."""
 
+import contextlib
 import os
 import shutil
 import subprocess
@@ -262,6 +263,16 @@ def test_the_probe_of_another_board_is_refused(monkeypatch: pytest.MonkeyPatch) 
     probe.associated_board_info = BOARD_ID_TO_INFO["0705"]
     error = refused(flashing.find_probe)
     assert error.name == "other_microcontroller" and "F302R8" in error.what.upper()
+
+
+def test_no_script_of_the_working_folder_is_executed(monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> None:
+    (tmp_path / "pyocd_user.py").write_text(f"open({str(tmp_path / 'trace')!r}, 'w')", encoding="utf-8")
+    (tmp_path / "pyocd.yaml").write_text("user_script: pyocd_user.py\n", encoding="utf-8")
+    monkeypatch.chdir(tmp_path)
+    probe = SimpleNamespace(unique_id="0123", session=None, associated_board_info=None, create_associated_board=None)
+    with contextlib.suppress(Exception):  # there is nothing to flash at this probe
+        flashing.flash_by_probe(flashing.shipped_image(), probe)
+    assert probe.session is not None and not (tmp_path / "trace").exists() and Path.cwd() == tmp_path
 
 
 @pytest.mark.parametrize("works", ["under-reset", "halt", "neither"])
