@@ -4,8 +4,8 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
+from rig.analysis.inverted import solved_in
 from rig.analysis.placed_budget import budget_by_causes
-from rig.errors import Fault
 from rig.estimation.budget import Budget
 from rig.estimation.known_increments import KnownIncrements, solve_known_increments
 from rig.estimation.refusals import check_axes, check_unit
@@ -33,20 +33,9 @@ def solve_turning(turning: Turning, window_s: float | None, *, any_mounting: boo
 
     Raises Fault as `gather`, `solve_known_increments` and `check_axes` do, and `inverted_attitudes`.
     """
-    try:
-        found = _solved(turning, window_s)
-    except Fault as fault:
-        if fault.name not in CONTRADICTING:
-            raise
-        try:
-            _solved(replace(turning, attitudes=np.swapaxes(turning.attitudes, -1, -2)), window_s)
-        except Fault:
-            raise fault from None
-        raise Fault(
-            "inverted_attitudes",
-            "the readings contradict the attitudes and agree with their inverses",
-            "Give quaternions that take body to table coordinates: conjugate those that take table to body",
-        ) from None
+    found = solved_in(
+        turning.attitudes, lambda each: _solved(replace(turning, attitudes=each), window_s), CONTRADICTING
+    )
     if not any_mounting:
         matrix = found.solution.matrix
         check_axes(matrix / np.linalg.norm(matrix, axis=1, keepdims=True), np.eye(3))

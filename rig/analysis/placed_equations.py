@@ -6,6 +6,7 @@ from functools import partial
 import numpy as np
 
 from rig.analysis.calibration import or_fault
+from rig.analysis.inverted import solved_in
 from rig.errors import Fault
 from rig.estimation.arrays import Array
 from rig.estimation.attitude_error import Placed
@@ -68,20 +69,7 @@ class Equations:
 
     def solve(self, method: Method) -> TriaxialSolution:
         """Raises Fault as `solve_triaxial` does, and `inverted_attitudes`."""
-        try:
-            return self._solve(method, self.attitudes)
-        except Fault as fault:
-            if fault.name != "attitude_untrustworthy":
-                raise
-            try:
-                self._solve(method, np.swapaxes(self.attitudes, -1, -2))
-            except Fault:
-                raise fault from None
-            raise Fault(
-                "inverted_attitudes",
-                "the readings contradict the attitudes and agree with their inverses",
-                "Give quaternions that take body to table coordinates: conjugate those that take table to body",
-            ) from None
+        return solved_in(self.attitudes, partial(self._solve, method), ["attitude_untrustworthy"])
 
     def _solve(self, method: Method, attitudes: Array) -> TriaxialSolution:
         return solve_triaxial(

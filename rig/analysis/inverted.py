@@ -1,0 +1,32 @@
+"""Attitudes that were given the wrong way round, named by trying."""
+
+from collections.abc import Callable, Collection
+from typing import TypeVar
+
+import numpy as np
+
+from rig.errors import Fault
+from rig.estimation.arrays import Array
+
+Solved = TypeVar("Solved")
+
+
+def solved_in(attitudes: Array, solve: Callable[[Array], Solved], contradicting: Collection[str]) -> Solved:
+    """What `solve` makes of attitudes (N, 3, 3).
+
+    Raises Fault as it does, and `inverted_attitudes` where it raises one of `contradicting` and their inverses agree.
+    """
+    try:
+        return solve(attitudes)
+    except Fault as fault:
+        if fault.name not in contradicting:
+            raise
+        try:
+            solve(np.swapaxes(attitudes, -1, -2))
+        except Fault:
+            raise fault from None
+        raise Fault(
+            "inverted_attitudes",
+            "the readings contradict the attitudes and agree with their inverses",
+            "Give quaternions that take body to table coordinates: conjugate those that take table to body",
+        ) from None
