@@ -13,6 +13,8 @@ Finite = Annotated[float, Field(allow_inf_nan=False)]
 Positive = Annotated[float, Field(gt=0, allow_inf_nan=False)]
 Kind = TypeVar("Kind")
 Document = TypeVar("Document", bound=BaseModel)
+MOST_VALUES = 200_000  # the largest of a run has 3,000; every wrong one of them costs a thousand bytes to tell
+SEPARATORS = (b",", b"[", b"{")  # in JSON, before each value but the first
 _adapters: dict[type[Any], TypeAdapter[Any]] = {}
 
 
@@ -30,7 +32,10 @@ def checked(kind: type[Kind], document: Any, where: str) -> Kind:
 def read_document(kind: type[Document], file: Path, limit_bytes: int, *, what: str, remedy: str) -> Document:
     """A JSON file of that kind; `what` it is a result of, for messages. Raises Refused `no_result`, `not_a_result`."""
     try:
-        return kind.model_validate_json(read_regular_file(file, limit_bytes))
+        content = read_regular_file(file, limit_bytes)
+        if sum(map(content.count, SEPARATORS)) > MOST_VALUES:
+            raise Refused("not_a_result", f"{file} is no result of {what}: it holds over {MOST_VALUES} values", remedy)
+        return kind.model_validate_json(content)
     except (UnfitFile, OSError) as error:
         why = error.strerror if isinstance(error, OSError) else error
         raise Refused("no_result", f"{file} cannot be read: {why}", remedy) from error

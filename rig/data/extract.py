@@ -25,6 +25,7 @@ OPEN_FOR_WRITING = 0x01  # of the superblock's consistency flags
 NO_ROOM = 2
 MAX_SENSORS = 64
 MAX_UNPACKED = 20  # times what lies on the disk: readings with noise come to a fifth of that, zeros to a thousandth
+LONGEST_TEXT, LONGEST_ATTRIBUTE = 1_000_000, 1000  # characters: configurations have 65,536 at most; numbers
 MAX_UNWRITTEN_ROWS = 100_000  # announced and not there: what a kill leaves of one flush, and more
 MAX_UNWRITTEN_BYTES = 50_000_000  # of all of them
 
@@ -148,7 +149,12 @@ def _text(file: Any, name: str) -> str:
 
 
 def _plain(value: Any) -> Any:
-    """An attribute in Python's own types; one that JSON does not have ends in the TypeError of `_encoded`."""
+    """An attribute in Python's own types; one that JSON does not have ends in the TypeError of `_encoded`.
+
+    Raises ValueError for one that no run file has.
+    """
+    if np.size(value) > LONGEST_ATTRIBUTE or (isinstance(value, str | bytes) and len(value) > LONGEST_TEXT):
+        raise ValueError("an attribute of it is longer than any a run has")
     return value.tolist() if isinstance(value, np.ndarray | np.generic) else value
 
 

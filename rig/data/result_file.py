@@ -22,7 +22,7 @@ from rig.data.run_folder import RESULT
 from rig.errors import Refused
 
 SCHEMA: Final = "rig.result/1"
-SIZE_MAX_BYTES = 64_000_000  # a run of six sweeps with its verification has 66,000
+SIZE_MAX_BYTES = 16_000_000  # a run of six sweeps with its verification has 66,000
 
 
 class CheckEntry(Entry):

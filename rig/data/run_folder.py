@@ -85,7 +85,7 @@ def script_identity(folder: Path) -> ScriptIdentity:
     path = folder / SCRIPT_IDENTITY
     try:
         return checked(ScriptIdentity, json.loads(read_regular_file(path, IDENTITY_MAX_BYTES)), "script")
-    except (UnfitFile, OSError, ValueError) as error:
+    except (UnfitFile, OSError, ValueError, RecursionError) as error:
         why = error.strerror if isinstance(error, OSError) else error
         raise Refused(
             "another_script",

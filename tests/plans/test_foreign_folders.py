@@ -130,6 +130,30 @@ def test_a_recording_that_never_ends_ends_no_import(foreign: Path, endless: str)
         assert done.returncode == 1 and "it is no regular file" in done.stderr, done.stderr
 
 
+@pytest.mark.parametrize("command", [("report",), ("history", "import")])
+def test_a_result_of_millions_of_wrong_values_is_refused_before_they_are_told(
+    foreign: Path, tmp_path: Path, command: tuple[str, ...]
+) -> None:
+    (foreign / "result.json").write_text('{"checks": [' + "{}," * 300_000 + "{}]}", encoding="utf-8")
+    refused = rig_here(*command, foreign)
+    assert refused.returncode in (1, 2) and "it holds over 200000 values" in refused.stderr
+
+
+def test_a_recording_with_an_endless_text_is_refused(foreign: Path) -> None:
+    with h5py.File(foreign / "run.h5", "r+", libver="latest") as file:
+        file.attrs["config"] = "# " + "x" * 2_000_000
+    refused = rig_here("solve", foreign)
+    assert refused.returncode == 2 and "rig: not_a_run_file: " in refused.stderr and "longer than any" in refused.stderr
+
+
+def test_a_deeply_nested_script_identity_is_refused_by_name(foreign: Path, tmp_path: Path) -> None:
+    (foreign / "result.json").unlink()
+    shutil.copy(configuration(tmp_path), foreign / "config.yaml")
+    (foreign / "script.json").write_text("[" * 9000, encoding="utf-8")
+    refused = rig_here("resume", foreign, "--yes")
+    assert refused.returncode == 2 and "rig: another_script: " in refused.stderr
+
+
 @pytest.mark.parametrize("name", ["../../x", "a\nb", "a\x1b[2J", ".."])
 def test_a_name_that_is_no_sensors_names_no_file(foreign: Path, tmp_path: Path, name: str) -> None:
     document = json.loads((foreign / "result.json").read_text(encoding="utf-8"))
