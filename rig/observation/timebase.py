@@ -119,6 +119,7 @@ def estimate_time_base(board_time_s: Array, readings_rad_s: Array, motion: Known
     `stuck_axis`, `time_base_not_found`.
     """
     _check_samples(board_time_s, readings_rad_s)
+    _check_span(motion.time_s, "the states or attitudes")
     clock, known = _begun(board_time_s, readings_rad_s, motion)
     while True:
         # The clock so far says which samples to use; a choice that followed the fine one might never settle.

@@ -215,6 +215,15 @@ def test_a_recording_that_claims_to_last_for_a_year_is_not_replayed(foreign: Pat
     assert refused.returncode == 2 and f"rig: {name}: " in refused.stderr
 
 
+def test_attitudes_over_thousands_of_years_are_put_on_no_grid(tmp_path: Path) -> None:
+    examples, attitudes = ROOT / "docs" / "examples", tmp_path / "attitudes.csv"
+    text = (examples / "swinging_attitudes.csv").read_text(encoding="utf-8").rstrip()
+    last = text.splitlines()[-1].split(",")
+    attitudes.write_text("\n".join([text, ",".join(["99999999998", "1e11", *last[2:]])]), encoding="utf-8")
+    refused = rig_here("solve", examples / "swinging_samples.csv", "--attitudes", attitudes, "--find-clock")
+    assert refused.returncode == 2 and "rig: impossible_times: the states or attitudes" in refused.stderr
+
+
 def test_a_line_of_ten_million_columns_is_refused(tmp_path: Path) -> None:
     samples, sweeps = tmp_path / "samples.csv", ROOT / "docs" / "examples" / "sweeps.csv"
     samples.write_text("time_s" + ",x_rad_s" * 1_000_000, encoding="utf-8")
