@@ -42,6 +42,8 @@ Seen = tuple[dict[int, Observation | Fault], dict[int, DwellReading | Fault], Se
 
 def so_far(runs: Sequence[RunData]) -> dict[str, SoFar]:
     """What recordings of raw readings hold, by sensor; a sweep or dwell that several hold counts in the last one."""
+    if not runs:
+        return {}
     sweeps: dict[str, dict[int, Observation | Fault]] = {}
     rests: dict[str, list[Average]] = {}
     dwells: dict[str, dict[int, DwellReading | Fault]] = {}

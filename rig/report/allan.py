@@ -101,7 +101,7 @@ def _titled(name: str, seen: SensorAtRest) -> str:
 def _table(title: str, quantity: Quantity, seen: AtRest) -> Table:
     table = Table(title=plain(title, "table.title"), title_justify="left")
     (walk_unit, walk_size), (bias_unit, bias_size) = SHOWN[quantity]
-    headings = ("axis", f"{WALKS[quantity]} {walk_unit}", "± U (k = 2)", f"bias instability {bias_unit}", "± U", "at s")
+    headings = ("axis", f"{WALKS[quantity]} {walk_unit}", "± U", f"bias instability {bias_unit}", "± U", "at s")
     for heading in headings:
         table.add_column(heading, justify="left" if heading == "axis" else "right")
     for axis, told in zip("xyz", seen.axes, strict=True):
@@ -119,7 +119,8 @@ def _cells(told: Read | Fault, size: float) -> tuple[str, str]:
 
 def _lines(seen: AtRest) -> Iterator[str]:
     felt = "" if seen.temperature_c is None else "; {:.1f} to {:.1f} °C".format(*seen.temperature_c)
-    yield f"{seen.stretches} stretches at rest, {seen.total_s:.4g} s in all, the longest {seen.longest_s:.4g} s{felt}"
+    lasting = f"{seen.total_s:.4g} s in all, the longest {seen.longest_s:.4g} s"
+    yield f"{seen.stretches} stretches at rest, {lasting}{felt}; U with k = 2"
     for what in ("random_walk", "bias_instability"):
         said = {str(told) for axis in seen.axes if isinstance(told := getattr(axis, what), Fault)}
         yield from (f"{what.replace('_', ' ')}: {text}" for text in sorted(said))
