@@ -141,7 +141,7 @@ def test_a_run_that_a_script_has_started_in_the_background_stops_by_an_interrupt
 
 def test_a_run_under_nohup_goes_on_when_its_terminal_closes(start: Start) -> None:
     with ignored(signal.SIGHUP):
-        rig = start()
+        rig = start({"world": {"time_scale": 8}})
     rig.until_sweeping()
     rig.send(signal.SIGHUP)
     status, errors = rig.end()
