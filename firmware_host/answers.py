@@ -64,21 +64,23 @@ def sample_batches(frames: Iterable[Frame], host_time_s: float) -> Iterator[Samp
     """
     runs: dict[int, list[Frame]] = {}
     for frame in frames:
-        run = runs.setdefault(frame.values["sensor"], [])
-        if run and not _goes_on(run[-1], frame):
+        sensor = frame.values["sensor"]
+        run = runs.get(sensor)
+        if run is not None and _goes_on(run[-1], frame):
+            run.append(frame)
+            continue
+        if run is not None:
             yield SampleBatch.of(run, host_time_s)
-            run.clear()
-        run.append(frame)
+        runs[sensor] = [frame]
     for run in runs.values():
         yield SampleBatch.of(run, host_time_s)
 
 
 def _goes_on(before: Frame, frame: Frame) -> bool:
     """Whether the samples of a sensor's frame follow those of the one before, of the same kind."""
-    return (
-        frame.name == before.name
-        and frame.values["mode"] == before.values["mode"]
-        and frame.values["sequence"] == before.values["sequence"] + before.values["count"]
+    was, now = before.values, frame.values
+    return bool(
+        frame.name == before.name and now["mode"] == was["mode"] and now["sequence"] == was["sequence"] + was["count"]
     )
 
 

@@ -149,15 +149,18 @@ class FrameReader:
         self._rest = rest[: _BLOCK_MAX + 1]  # of noise, or of another baud rate, no more than tells that it is no frame
         frames = []
         for block in blocks:
-            if block:
-                frame = decode(block)
-                if frame is None:
-                    self.damaged += 1
-                elif self._came_before(block, frame):
-                    self.repeated += 1
-                else:
-                    self._count(frame.sequence)
-                    frames.append(frame)
+            if not block:
+                continue
+            frame = decode(block)
+            if frame is None:
+                self.damaged += 1
+            elif self._came_before(block, frame):
+                self.repeated += 1
+            else:
+                if self._expected is not None:
+                    self.lost += (frame.sequence - self._expected) & 0xFF
+                self._expected = frame.sequence + 1 & 0xFF
+                frames.append(frame)
         return frames
 
     def _came_before(self, block: bytes, frame: Frame) -> bool:
@@ -176,8 +179,3 @@ class FrameReader:
         if len(self._recent) > _REMEMBERED:
             self._recent.popitem(last=False)
         return False
-
-    def _count(self, sequence: int) -> None:
-        if self._expected is not None:
-            self.lost += (sequence - self._expected) & 0xFF
-        self._expected = sequence + 1 & 0xFF

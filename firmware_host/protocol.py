@@ -117,7 +117,7 @@ class Message:
     def named(self, values: tuple[Any, ...]) -> dict[str, Any]:
         """What `head` unpacks, by field name; a vector is a tuple of three, a matrix of its three rows."""
         if self._names is not None:  # the frequent frames, made short
-            return dict(zip(self._names, values, strict=True))
+            return dict(zip(self._names, values))  # noqa: B905 - as many as `head` unpacks
         rest = iter(values)
         return {field.name: _next(field.rows, rest) for field in self.fields}
 
