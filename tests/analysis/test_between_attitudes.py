@@ -23,6 +23,8 @@ from support.real import recording
 
 BY_INTEGRAL, KNOWN_TO = np.array([1.0008, 1.0038, 1.0009]), np.array([0.0003, 0.0015, 0.0013])  # its README
 
+pytestmark = pytest.mark.slow
+
 HAND = World()
 WORLDS = {
     "as cameras are": HAND,

@@ -13,6 +13,8 @@ from rig.estimation.reference_budget import scale_and_bias
 from support.laid_down import GRAVITY_M_S2, Box, Laid, lay_down, write
 from support.real import recording, unpacked
 
+pytestmark = pytest.mark.slow
+
 BOXES = {
     "six rests named of eighteen": Box(rounds=3),
     "all eighteen named": Box(rounds=3, named=18),
