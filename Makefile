@@ -14,7 +14,7 @@ BIN := $(VENV)/bin
 LONG := $(addprefix benchmarks/, faults.py long_life.py damaged_frames.py)
 STUDIES := normal extreme speed convergence sine averaging estimators misalignment budget kvh-gyro kvh-accelerometer
 
-.PHONY: demo system check test proof lint firmware bench lock sbom figures clean
+.PHONY: demo system check fast test whole proof lint firmware bench lock sbom figures clean
 .DELETE_ON_ERROR:
 
 demo: $(VENV)/demo.installed
@@ -32,10 +32,17 @@ NUMERIC := -m "not slow and not proof" tests/estimation $(wildcard tests/*/test_
 system:
 	requirements/system.sh test
 
-check: system $(VENV)/dev.installed lint
+# The type checker has one processor to itself while tests wait for their laboratories.
+check: system $(VENV)/dev.installed
+	$(MAKE) --jobs=2 lint fast
+
+test: system $(VENV)/dev.installed
+	$(MAKE) --jobs=2 lint whole
+
+fast: $(VENV)/dev.installed
 	$(PYTEST) -m "not slow"
 
-test: system $(VENV)/dev.installed lint
+whole: $(VENV)/dev.installed
 	rm -rf build/coverage
 	RIG_COVERAGE=$(CURDIR)/build/coverage $(PYTEST)
 	for kernel in $(KERNELS); do OPENBLAS_CORETYPE=$$kernel $(PYTEST) $(NUMERIC) || exit 1; done

@@ -64,6 +64,7 @@ class Controller:
         """From now on what the client's system has no room for is not taken from the test."""
         assert self._client is not None
         self._client.setsockopt(socket.SOL_SOCKET, socket.SO_SNDBUF, 1)
+        self._client.setsockopt(socket.IPPROTO_TCP, socket.TCP_NODELAY, 1)  # nor is it waited for more to send at once
         self._client.settimeout(2.0)
 
     def hang_up(self) -> None:

@@ -53,6 +53,7 @@ def test_a_run_of_somebody_else_connects_to_what_the_user_names(
         assert "foreign_folder" not in rig_here("resume", folder, "--yes", *named).stderr
 
 
+@pytest.mark.slow
 def test_a_configuration_that_was_changed_since_is_not_one_s_own(tmp_path: Path) -> None:
     with socket.create_server(("127.0.0.1", 0)) as board, socket.create_server(("127.0.0.1", 0)) as history:
         folder, (host, *_) = interrupted_run(tmp_path, [board, history])
