@@ -1,6 +1,5 @@
 """The parent's end of the supervised child: starts it, passes messages on, and notices when it falls silent."""
 
-import ipaddress
 import multiprocessing
 import os
 import select
@@ -9,17 +8,20 @@ import socket
 import threading
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager, suppress
+from ipaddress import IPv4Address
 from multiprocessing.connection import Connection
 from pathlib import Path
 
 from rig.arm import child
+from rig.arm.listener import listener
 from rig.arm.messages import Alive, Heartbeat, Message, Request
-from rig.arm.silence import Silence, crowding
+from rig.arm.silence import Silence
+from rig.arm.state_stream import PORT
 from rig.errors import Problem
 
 TICK_S = 0.05
 SILENT_TICKS = 10  # 0.5 s without a heartbeat
-SPARED = 4  # … and at most so many times that, when the child's main thread is ready to run and gets no processor
+SPARED = 4  # … and at most so many times that, when the main thread in question is ready to run and gets no processor
 FROZEN_TICKS = 16  # 0.8 s with heartbeats but no new state
 LINK_S = 0.8  # the same of a controller elsewhere, by what has not come: no crowd on this machine holds that one up
 STALE_TICKS = 2  # when the child ends after 0.1 s without a new state, it had lost the arm before
@@ -46,7 +48,7 @@ class ChildLink:
         self._patient = False
         self._silent = Silence(0, spared=SPARED)  # no message; counted once the child runs
         self._beaten = False  # there was a heartbeat since the guard's last tick
-        self._frozen_ticks = 0  # with a heartbeat, without a new state
+        self._frozen = Silence(0, spared=SPARED)  # heartbeats, but no new state
         self._silent_s = 0.0  # nothing has come from the controller for so long
         self._elsewhere = False  # it has processors of its own
         context = multiprocessing.get_context("spawn")
@@ -65,7 +67,10 @@ class ChildLink:
 
     def start(self) -> None:
         """Start the child; `on_message` gets `Connected` or `Failed`."""
-        self._elsewhere = not _on_this_machine(self._host)
+        address = _address(self._host)
+        self._elsewhere = address is None or not address.is_loopback
+        if address is not None and not self._elsewhere and (controller := listener(address, PORT)) is not None:
+            self._frozen = Silence(controller, spared=SPARED, thread=controller)
         with _interrupts_held():
             self._process.start()
         self._child_pipe.close()
@@ -91,7 +96,7 @@ class ChildLink:
             yield
         finally:
             self._silent.heard()
-            self._frozen_ticks = 0
+            self._frozen.heard()
             self._patient = False
 
     @property
@@ -126,12 +131,13 @@ class ChildLink:
                 self._silent.heard()
                 if isinstance(message, Heartbeat):
                     self._beaten, self._silent_s = True, message.silent_s
-                    self._frozen_ticks *= not message.states
+                    if message.states:
+                        self._frozen.heard()
                 self._on_message(message)
         except (EOFError, OSError):
             if not self._ended.is_set():
                 self._ended.set()
-                stale = self._frozen_ticks > STALE_TICKS
+                stale = self._frozen.ticks > STALE_TICKS
                 self._process.join(0.2)
                 status = self._process.exitcode
                 name = "arm_link_lost" if stale or status in CRASHES else "arm_driver_died"
@@ -141,11 +147,12 @@ class ChildLink:
         while not self._ended.wait(TICK_S):
             self._say_alive()
             self._silent.tick(unheard=_readable(self._pipe))
-            self._frozen_ticks += self._beaten
+            if self._beaten:
+                self._frozen.tick()
             self._beaten = False
             if self._silent.lasts_over(PATIENT_TICKS if self._patient else SILENT_TICKS):
                 return self._give_up("arm_driver_hung", "the process that talks to the arm no longer answers")
-            frozen = self._frozen_ticks > (PATIENT_TICKS if self._patient else FROZEN_TICKS * crowding())
+            frozen = self._frozen.lasts_over(PATIENT_TICKS if self._patient else FROZEN_TICKS)
             if frozen or (self._elsewhere and not self._patient and self._silent_s > LINK_S):
                 return self._give_up("arm_link_lost", f"no new state comes from the arm at {self._host}")
         return None
@@ -172,12 +179,11 @@ class ChildLink:
         self._on_lost(Problem(name, what, "Look at the arm and its network cable, then start again"))
 
 
-def _on_this_machine(host: str) -> bool:
-    """Whether whoever answers there has to share this machine's processors."""
+def _address(host: str) -> IPv4Address | None:
     try:
-        return ipaddress.ip_address(socket.gethostbyname(host)).is_loopback
+        return IPv4Address(socket.gethostbyname(host))
     except OSError:
-        return False
+        return None
 
 
 def _readable(pipe: "Connection[Request, Message]") -> bool:

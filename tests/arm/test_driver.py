@@ -13,12 +13,14 @@ import time
 from collections.abc import Callable
 from contextlib import ExitStack, suppress
 from dataclasses import replace
+from itertools import pairwise
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 import pytest
 
+from rig.arm.child_link import FROZEN_TICKS, TICK_S
 from rig.arm.driver import Arm, look
 from rig.arm.motion import Transfer, trapezoid_duration
 from rig.arm.preflight import arm_problems, plan_problems
@@ -411,12 +413,40 @@ def test_a_program_that_takes_no_more_states_is_noticed(world: World, monkeypatc
             stuck.set()
 
 
+@pytest.mark.proof
+@pytest.mark.skipif(sys.platform != "linux" or os.geteuid() != 0, reason="only root takes a processor away, on Linux")
+def test_a_controller_on_this_machine_that_gets_no_processor_is_no_lost_link(
+    laboratory: WorldHandle, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """As where a virtual machine's host takes one of its processors away, without a crowd on the others."""
+    monkeypatch.setattr("rig.arm.silence.crowding", lambda: 1.0)
+    states: list[ArmState] = []
+    controller, processors = laboratory.process.pid, os.sched_getaffinity(0)
+    taken = {max(processors)}
+
+    def hold_up() -> None:
+        with subprocess.Popen([sys.executable, "-c", "while True: pass"]) as greedy:
+            os.sched_setaffinity(greedy.pid, taken)
+            os.sched_setaffinity(controller, taken)
+            os.sched_setscheduler(greedy.pid, os.SCHED_FIFO, os.sched_param(1))  # leaves the others 5 %, once a second
+            time.sleep(2.0)
+            greedy.kill()
+        os.sched_setaffinity(controller, processors)
+
+    with Arm(laboratory.host, states.append) as arm:
+        arm.take_control(*PAYLOAD)
+        arm.move(turn(arm.latest.q_rad, 6.0), AtSpeed(arm, hold_up))
+        assert arm.missed_states == 0
+    held_s = max(after.host_time_s - before.host_time_s for before, after in pairwise(states))
+    assert held_s > TICK_S * (FROZEN_TICKS + 1), "it was not held up"
+
+
 @pytest.mark.skipif(sys.platform != "linux", reason="only Linux tells what another program has not read")
 def test_a_slow_reader_beside_and_a_controller_held_up_for_a_moment_are_no_lost_link(
     laboratory: WorldHandle, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     """Neither is one alone. As in a busy moment: a part of the rig reads late, the laboratory gets no turn."""
-    monkeypatch.setattr("rig.arm.child_link.crowding", lambda: 1.0)
+    monkeypatch.setattr("rig.arm.silence.crowding", lambda: 1.0)
     beside = RtdeReader(laboratory.host)
     read_until_s = math.inf
 
@@ -447,7 +477,7 @@ def test_a_slow_reader_beside_and_a_controller_held_up_for_a_moment_are_no_lost_
 def test_a_controller_that_was_silent_before_a_move_has_not_refused_it(
     laboratory: WorldHandle, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    monkeypatch.setattr("rig.arm.child_link.crowding", lambda: 5.0)  # so crowded that 3 s of silence are excused
+    monkeypatch.setattr("rig.arm.silence.crowding", lambda: 5.0)  # so crowded that 3 s of silence are excused
     with Arm(laboratory.host) as arm:
         arm.take_control(*PAYLOAD)
         laboratory.control({"do": "silence_arm", "duration_s": 3.0})
