@@ -166,10 +166,8 @@ def _solved(equations: Equations, method: Method, moving: int) -> TriaxialSoluti
     except Fault as fault:
         if not moving or fault.name not in TOO_LITTLE:
             raise
-        what = (
-            f"{fault.problem.what}; {moving} rows in which the body moves are left out, for only rests tell a reference"
-        )
-        raise Fault(fault.name, what, fault.problem.remedy) from None
+        what = f"{fault.what}; {moving} rows in which the body moves are left out, for only rests tell a reference"
+        raise Fault(fault.name, what, fault.remedy) from None
 
 
 def _listed(solution: TriaxialSolution) -> list[Array]:

@@ -32,7 +32,7 @@ PASSES, SETTLED = 20, 1e-3  # of the standard uncertainty
 FARTHEST_RAD = 0.02  # that a turn may end off what was said of it: beyond, it was another turn
 MAX_CONDITION = 100.0
 REMEDY = "Turn about three different axes, either way round, or let it lie still once more"
-NOISE, BIAS, SPEEDS, ENDS, AXES = "noise", "bias from rest to rest", "speeds", "ends of the turns", "axes of the turns"
+NOISE, BIAS, ENDS, AXES = "noise", "bias from rest to rest", "ends of the turns", "axes of the turns"
 
 
 @dataclass(frozen=True, slots=True)
@@ -58,7 +58,6 @@ class Mean:
     reading: Array
     variance: Array
     rate: Array
-    speed_std_rad_s: float
 
 
 @dataclass(frozen=True, slots=True)
@@ -142,6 +141,8 @@ def solve_turned(
     iterations, settled = 0, False
     while not settled and iterations < PASSES:
         equations = _equations(gyroscope, turns, means, state)
+        if not iterations:
+            _conditioning(equations)
         step, covariance = _solve(equations)
         state, iterations = state.moved(step), iterations + 1
         settled = bool((np.abs(step) < SETTLED * np.sqrt(np.diag(covariance))).all())
@@ -191,12 +192,7 @@ def _equations(gyroscope: Gyroscope, turns: Sequence[Turn], means: Sequence[Mean
 
 
 def _of_mean(mean: Mean, gyroscope: Gyroscope, state: _State) -> _Equations:
-    speed = float(np.linalg.norm(mean.rate))
-    causes = {
-        NOISE: np.diag(np.sqrt(mean.variance)),
-        BIAS: np.diag(gyroscope.bias_std_rad_s),
-        SPEEDS: (state.matrix @ mean.rate * (mean.speed_std_rad_s / speed if speed else 0.0))[:, None],
-    }
+    causes = {NOISE: np.diag(np.sqrt(mean.variance)), BIAS: np.diag(gyroscope.bias_std_rad_s)}
     return _Equations(mean.reading - state.matrix @ mean.rate - state.offset, _linear(mean.rate, np.eye(3)), causes)
 
 
@@ -240,8 +236,7 @@ def _across(axis: Array) -> Array:
 
 
 def _solve(equations: Sequence[_Equations]) -> tuple[Array, Array]:
-    """δθ (12,) and its covariance. Raises Fault `rank_deficient`, `ill_conditioned`."""
-    _conditioning(equations)
+    """δθ (12,) and its covariance."""
     information, told = np.zeros((12, 12)), np.zeros(12)
     for each in equations:
         weighted = each.design.T @ np.linalg.inv(each.covariance)
@@ -252,7 +247,7 @@ def _solve(equations: Sequence[_Equations]) -> tuple[Array, Array]:
 
 
 def _conditioning(equations: Sequence[_Equations]) -> refusals.Conditioning:
-    """Of the design with rates and offsets brought to one size."""
+    """Of the design with rates and offsets brought to one size. Raises Fault `rank_deficient`, `ill_conditioned`."""
     design = np.vstack([each.design for each in equations])
     sizes = [np.linalg.norm(design[:, each]) for each in (slice(0, 9), slice(9, 12))]
     told = refusals.conditioning(design / np.repeat(sizes, [9, 3]), 12)
@@ -293,18 +288,19 @@ def _budget(equations: Sequence[_Equations], gain: Array) -> Budget:
     sources = {
         NOISE: "scatter of the readings",
         BIAS: "scatter of the rests",
-        SPEEDS: "angle_std_rad",
         ENDS: "angle_std_rad, wider where the turns contradict each other",
         AXES: "axis_std_rad, wider where the turns contradict each other",
     }
-    return Budget(tuple(_contributor(name, source, equations, gain) for name, source in sources.items()))
-
-
-def _contributor(name: str, source: str, equations: Sequence[_Equations], gain: Array) -> Contributor:
-    spread = np.zeros((6, 6))
+    spread = {name: np.zeros((6, 6)) for name in sources}
     for each in equations:
-        if name in each.causes:
-            effect = gain @ each.design.T @ np.linalg.inv(each.covariance) @ each.causes[name]
-            spread += effect @ effect.T
-    kind: Literal["A", "B"] = "A" if name in (NOISE, BIAS) else "B"
-    return Contributor(name, kind, "normal", None, "", source, np.inf, spread)
+        told = gain @ each.design.T @ np.linalg.inv(each.covariance)
+        for name, patterns in each.causes.items():
+            effect = told @ patterns
+            spread[name] += effect @ effect.T
+    kinds: dict[str, Literal["A", "B"]] = {NOISE: "A", BIAS: "A", ENDS: "B", AXES: "B"}
+    return Budget(
+        tuple(
+            Contributor(name, kinds[name], "normal", None, "", source, np.inf, spread[name])
+            for name, source in sources.items()
+        )
+    )

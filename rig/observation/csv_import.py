@@ -26,7 +26,7 @@ from rig.estimation.refusals import check_reading_ratio
 from rig.observation.average import Average
 from rig.observation.csv_samples import read_samples
 from rig.observation.csv_table import read_columns
-from rig.observation.csv_windows import check_complete, check_times, inside, overlapping, scatter_of
+from rig.observation.csv_windows import average_of, check_complete, check_times, inside, overlapping
 from rig.observation.observe import Observation, nearest_axis
 from rig.observation.turns import Known, TurnedData, turned
 from rig.observation.windows import Window
@@ -86,7 +86,9 @@ def average(samples: Array, sweeps: Array, axes: Array) -> ExternalData:
     interval_s = float(np.median(np.diff(time_s)))
     turns, rests = [], []
     for row, (window, speed) in enumerate(zip(windows, sweeps[:, 2].tolist(), strict=True), start=1):
-        mean = _average(readings[inside(time_s, window)], window, interval_s, row)
+        cut = readings[inside(time_s, window)]
+        check_complete(len(cut), window, interval_s, f"sweep {row}")
+        mean = average_of(cut, window)
         if speed == 0:
             rests.append(mean)
         else:
@@ -121,20 +123,6 @@ def _speeds(sweeps: dict[str, Array]) -> Array:
                 "standard deviations above zero",
             )
     return np.asarray(motion / durations if by_angle else motion, dtype=np.float64)
-
-
-def _average(readings: Array, window: Window, interval_s: float, row: int) -> Average:
-    check_complete(len(readings), window, interval_s, f"sweep {row}")
-    variance, noise = scatter_of(readings)
-    return Average(
-        mean_rad_s=readings.mean(axis=0),
-        variance_rad2_s2=variance,
-        noise_rad_s=noise,
-        samples=len(readings),
-        start_s=window.start_s,
-        end_s=window.end_s,
-        temperature_c=float("nan"),
-    )
 
 
 def _observation(row: int, mean: Average, speed_rad_s: float, axis: Array) -> Observation:

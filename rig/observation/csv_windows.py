@@ -7,6 +7,7 @@ import numpy as np
 
 from rig.errors import Fault, Refused
 from rig.estimation.arrays import Array
+from rig.observation.average import Average
 from rig.observation.colour import widening
 from rig.observation.windows import Window
 
@@ -47,6 +48,20 @@ def scatter_of(readings: Array) -> tuple[Array, Array]:
     variance = readings.var(axis=0, ddof=1)
     wider = np.array([widening(readings[:, axis] - readings[:, axis].mean()) for axis in range(3)])
     return variance * wider / len(readings), np.sqrt(variance)
+
+
+def average_of(readings: Array, window: Window) -> Average:
+    """Of the readings (n, 3) that a window has; nothing tells their temperature."""
+    variance, noise = scatter_of(readings)
+    return Average(
+        mean_rad_s=readings.mean(axis=0),
+        variance_rad2_s2=variance,
+        noise_rad_s=noise,
+        samples=len(readings),
+        start_s=window.start_s,
+        end_s=window.end_s,
+        temperature_c=float("nan"),
+    )
 
 
 def check_complete(count: int, window: Window, interval_s: float, where: str, least: int = MIN_SAMPLES) -> None:

@@ -13,6 +13,7 @@ from numpy.typing import NDArray
 
 from rig.errors import Fault
 from rig.estimation.arrays import Array
+from rig.estimation.sensor_axes import nearest_rotation
 from rig.observation.csv_samples import Quantity
 from rig.observation.csv_windows import MIN_SAMPLES, inside, scatter_of
 from rig.observation.rests import BLOCK_S, find_rests
@@ -68,7 +69,7 @@ def find_placements(
     others = [inside(time_s, each) for number, each in enumerate(rests) if number not in named]
     return Placements(
         _read(readings, covered),
-        np.array([_middle(attitudes[group]) for group in groups]),
+        np.array([nearest_rotation(attitudes[group].mean(axis=0)) for group in groups]),
         None if std_rad is None else np.array([np.sqrt(np.mean(std_rad[group] ** 2)) for group in groups]),
         _read(readings, [np.arange(each.start, each.stop) for each in others]),
         int((rest < 0).sum()),
@@ -102,14 +103,6 @@ def _groups(rest: NDArray[np.intp], attitudes: Array) -> list[NDArray[np.intp]]:
 def _apart(one: Array, other: Array) -> float:
     """By what angle two rotations (3, 3) differ, rad."""
     return float(np.arccos(np.clip((np.trace(one.T @ other) - 1) / 2, -1, 1)))
-
-
-def _middle(attitudes: Array) -> Array:
-    """The rotation (3, 3) nearest to those of some rows (k, 3, 3)."""
-    left, _, right = np.linalg.svd(attitudes.mean(axis=0))
-    left[:, -1] *= np.linalg.det(left @ right)
-    middle: Array = left @ right
-    return middle
 
 
 def _covered(time_s: Array, rest: Window, windows: Sequence[Window]) -> NDArray[np.intp]:

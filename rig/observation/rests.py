@@ -7,7 +7,7 @@ that agree with its smallest reading. Blocks that follow each other and read the
 A gyroscope alone decides where there is one: it feels every turn, and no knock against the table.
 """
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Mapping
 
 import numpy as np
 from numpy.typing import NDArray
@@ -44,14 +44,6 @@ def find_rests(time_s: Array, readings: Mapping[Quantity, Array]) -> tuple[Windo
     joined = np.concatenate([[False], still[:-1] & still[1:] & follows, [False]])
     edges = np.flatnonzero(np.diff(joined.astype(np.int8))).reshape(-1, 2)
     return tuple(Window(float(times[first, 0]), float(times[last, -1])) for first, last in edges.tolist())
-
-
-def number_of_rest(time_s: Array, rests: Sequence[Window]) -> NDArray[np.intp]:
-    """(n,) the number of the rest that each time falls into, −1 where it falls into none."""
-    found = np.full(len(time_s), -1)
-    for number, rest in enumerate(rests):
-        found[(time_s >= rest.start_s) & (time_s <= rest.end_s)] = number
-    return found
 
 
 def _unturned(means: Array, still: NDArray[np.bool_], apart: Array) -> NDArray[np.bool_]:

@@ -11,7 +11,7 @@ import numpy as np
 from rig.estimation.arrays import Array
 from rig.estimation.turned import Gyroscope, Mean, Turn
 from rig.observation.average import Average
-from rig.observation.csv_windows import inside, scatter_of
+from rig.observation.csv_windows import average_of, inside
 from rig.observation.observe import Observation, bias_drift
 from rig.observation.rests import find_rests
 from rig.observation.windows import Window
@@ -49,21 +49,16 @@ def turned(
     lying = find_rests(time_s, {"rate": readings})
     if not lying:
         return None
-    resting = rests or [_average(time_s, readings, window) for window in lying]
+    resting = rests or [average_of(readings[inside(time_s, window)], window) for window in lying]
     bias = np.median([rest.mean_rad_s for rest in resting], axis=0)
-    turns, rows, means = [], [], [_mean_of(rest.mean_rad_s, rest.variance_rad2_s2) for rest in resting]
+    rates = readings - bias
+    turns, rows, means = [], [], [Mean(rest.mean_rad_s, rest.variance_rad2_s2, np.zeros(3)) for rest in resting]
     for sweep in sweeps:
         row = sweep.sweep - 1
         window = _between(sweep, lying)
-        if window is None or not _stood(time_s, readings - bias, sweep):
-            means.append(
-                _mean_of(
-                    sweep.average.mean_rad_s,
-                    sweep.average.variance_rad2_s2,
-                    sweep.speed_rad_s * sweep.axis_flange,
-                    sweep.speed_std_rad_s,
-                )
-            )
+        if window is None or not _stood(time_s, rates, sweep):
+            average = sweep.average
+            means.append(Mean(average.mean_rad_s, average.variance_rad2_s2, sweep.speed_rad_s * sweep.axis_flange))
             continue
         angle_std = BY_HAND_ANGLE_RAD if known.angle_std_rad is None else float(known.angle_std_rad[row])
         axis_std = BY_HAND_AXIS_RAD if known.axis_std_rad is None else float(known.axis_std_rad[row])
@@ -75,16 +70,6 @@ def turned(
     noise = np.sqrt(np.mean([np.square(rest.noise_rad_s) for rest in resting]) * np.median(np.diff(time_s)))
     gyroscope = Gyroscope(time_s, readings, float(noise), np.sqrt(bias_drift(resting)))
     return TurnedData(gyroscope, tuple(turns), tuple(rows), tuple(means))
-
-
-def _mean_of(reading: Array, variance: Array, rate: Array | None = None, speed_std_rad_s: float = 0.0) -> Mean:
-    return Mean(reading, variance, np.zeros(3) if rate is None else rate, speed_std_rad_s)
-
-
-def _average(time_s: Array, readings: Array, window: Window) -> Average:
-    cut = readings[inside(time_s, window)]
-    variance, noise = scatter_of(cut)
-    return Average(cut.mean(axis=0), variance, noise, len(cut), window.start_s, window.end_s, float("nan"))
 
 
 def _between(sweep: Observation, lying: Sequence[Window]) -> Window | None:
