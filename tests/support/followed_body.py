@@ -11,6 +11,7 @@ from scipy.signal import lfilter
 from scipy.spatial.transform import Rotation
 
 from rig.estimation.arrays import Array
+from support.csv_tables import write_table
 
 EARTH_RAD_S = 7.292e-5 * np.array([0.6, 0.0, 0.8])  # in room coordinates
 
@@ -100,8 +101,8 @@ def _coloured(world: World, count: int, rng: np.random.Generator) -> Array:
 
 def write(folder: Path, followed: Followed, rates_rad_s: Array | None = None) -> list[Path]:
     """As `rig solve --attitudes` takes them; with rates (k, 3) if they are given."""
-    samples, attitudes = folder / "samples.csv", folder / "attitudes.csv"
-    _write(samples, ["time_s", "x_rad_s", "y_rad_s", "z_rad_s"], [followed.time_s, followed.readings])
+    read = ["time_s", "x_rad_s", "y_rad_s", "z_rad_s"]
+    samples = write_table(folder / "samples.csv", read, followed.time_s, followed.readings)
     half_s = np.median(np.diff(followed.looks_s)) / 2.1
     quaternions = Rotation.from_matrix(followed.attitudes).as_quat()[:, [3, 0, 1, 2]]
     columns = ["start_s", "end_s", "qw", "qx", "qy", "qz"]
@@ -109,9 +110,4 @@ def write(folder: Path, followed: Followed, rates_rad_s: Array | None = None) ->
     if rates_rad_s is not None:
         columns += ["rate_x_rad_s", "rate_y_rad_s", "rate_z_rad_s"]
         parts.append(rates_rad_s)
-    _write(attitudes, columns, parts)
-    return [samples, attitudes]
-
-
-def _write(path: Path, columns: list[str], parts: list[Array]) -> None:
-    np.savetxt(path, np.column_stack(parts), "%.10g", ",", header=",".join(columns), comments="")
+    return [samples, write_table(folder / "attitudes.csv", columns, *parts)]

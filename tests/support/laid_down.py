@@ -7,6 +7,7 @@ import numpy as np
 from scipy.spatial.transform import Rotation
 
 from rig.estimation.arrays import Array
+from support.csv_tables import write_table
 
 GRAVITY_M_S2 = 9.81
 FACES = Rotation.from_euler(
@@ -60,10 +61,6 @@ def lay_down(box: Box, seed: int) -> Laid:
 
 def write(folder: Path, laid: Laid) -> tuple[Path, Path]:
     """The two files of `rig solve --attitudes`."""
-    samples, attitudes = folder / "samples.csv", folder / "attitudes.csv"
-    for path, columns, table in (
-        (samples, "time_s,x_m_s2,y_m_s2,z_m_s2", np.column_stack([laid.time_s, laid.readings])),
-        (attitudes, "start_s,end_s,qw,qx,qy,qz", laid.rows),
-    ):
-        np.savetxt(path, table, delimiter=",", header=columns, comments="", fmt="%.9g")
-    return samples, attitudes
+    columns = ("time_s", "x_m_s2", "y_m_s2", "z_m_s2")
+    samples = write_table(folder / "samples.csv", columns, laid.time_s, laid.readings)
+    return samples, write_table(folder / "attitudes.csv", ("start_s", "end_s", "qw", "qx", "qy", "qz"), laid.rows)

@@ -10,6 +10,7 @@ from pathlib import Path
 import numpy as np
 
 from rig.estimation.arrays import Array
+from support.csv_tables import write_table
 
 REST_S, PAUSE_S = 1.5, 0.15
 
@@ -78,10 +79,7 @@ def across(axis: Array, rng: np.random.Generator) -> Array:
 
 def write(folder: Path, session: Session) -> tuple[Path, Path]:
     """The two files of `rig solve --sweeps`."""
-    samples, sweeps = folder / "samples.csv", folder / "sweeps.csv"
-    for path, columns, table in (
-        (samples, "time_s,x_rad_s,y_rad_s,z_rad_s", np.column_stack([session.time_s, session.readings])),
-        (sweeps, "start_s,end_s,axis_x,axis_y,axis_z,angle_rad", session.rows),
-    ):
-        np.savetxt(path, table, delimiter=",", header=columns, comments="", fmt="%.9g")
-    return samples, sweeps
+    columns = ("time_s", "x_rad_s", "y_rad_s", "z_rad_s")
+    samples = write_table(folder / "samples.csv", columns, session.time_s, session.readings)
+    turns = ("start_s", "end_s", "axis_x", "axis_y", "axis_z", "angle_rad")
+    return samples, write_table(folder / "sweeps.csv", turns, session.rows)

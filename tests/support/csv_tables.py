@@ -1,0 +1,14 @@
+"""CSV files as `rig solve` takes them."""
+
+from collections.abc import Sequence
+from pathlib import Path
+
+import numpy as np
+
+from rig.estimation.arrays import Array
+
+
+def write_table(path: Path, columns: Sequence[str], *parts: Array) -> Path:
+    """Parts (n,) or (n, k) side by side."""
+    np.savetxt(path, np.column_stack(parts), "%.10g", ",", header=",".join(columns), comments="")
+    return path
