@@ -26,6 +26,7 @@ COARSE_REACH_S = 0.15  # what the clock may be off at either end of the data whe
 CANDIDATES = 12  # peaks of the correlation looked at: six equal sweeps give eleven
 MIN_EXPLAINED = 0.5  # share of the readings' variance that the arm's motion must explain
 MIN_RATE_RAD_S = 0.01
+RATE_STEP_S = 0.008  # joint angles that are closer in time tell more of their encoders' noise than of a rate
 MAX_STATE_STEP_S = 0.02  # between arm states that still show the servo's vibration
 ATTITUDES = 72  # of which a mean is made: over a whole turn what is perpendicular to the axis averages out
 LONG_RUN_S = 1800.0  # so much of a recording the coarse search looks at, and more only where it finds nothing
@@ -91,10 +92,12 @@ class ArmMotion:
             raise _not_finite("an arm state")
         _check_span(self.time_s, "the arm's states")
         self.angles = CubicSpline(self.time_s, self.states["q_rad"])
-        rates = flange_rate(self.states["q_rad"], self.angles(self.time_s, 1), kinematics)
+        every = min(round(RATE_STEP_S / float(np.median(np.diff(self.time_s)))), len(self.time_s) // 4)
+        times_s, angles = self.time_s[:: max(every, 1)], self.states["q_rad"][:: max(every, 1)]
+        rates = flange_rate(angles, CubicSpline(times_s, angles)(times_s, 1), kinematics)
         if not np.linalg.norm(rates, axis=1).max() > MIN_RATE_RAD_S:
             raise Fault("no_motion", "the arm stands still in the whole recording", "Record a run with sweeps")
-        self.rate = CubicSpline(self.time_s, rates)
+        self.rate = CubicSpline(times_s, rates)
         close = np.diff(self.time_s) <= MAX_STATE_STEP_S
         self._covered = close & np.append(close[1:], True) & np.append(True, close[:-1])
 

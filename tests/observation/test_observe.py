@@ -81,6 +81,7 @@ def clock_errors(setup: Setup, clock: TimeBase) -> tuple[float, float]:
         Setup(speed_deg_s=10.0, rest_s=0.5),
         Setup(noise_rad_s=0.2),
         Setup(state_rate_hz=500.0, sample_rate_hz=952.0, speed_deg_s=120.0, noise_rad_s=0.005),
+        Setup(state_rate_hz=500.0, encoder_step_rad=80e-6),  # whose steps are more than what the arm does in between
         Setup(bias_rad_s=(0.2, -0.15, 0.1), scale=(1.9, 1.6, 0.8)),
         Setup(sample_rate_hz=14.9, noise_rad_s=0.005),  # the part's slowest rate: few samples meet the vibration
         Setup(sample_rate_hz=14.9, noise_rad_s=0.001, speed_deg_s=163.0, seed=100),

@@ -60,6 +60,7 @@ class Setup:
     mounting_error_rad: tuple[float, ...] = (0.05, -0.035, 0.06)
     vibration: float = 0.05  # RMS of the rate ripple over the rate
     state_rate_hz: float = 125.0
+    encoder_step_rad: float = 6e-6
     sample_rate_hz: float = 238.0
     boot_s: float = -4321.0  # controller time at which the board's clock stood at zero
     drift: float = -35e-6  # of the controller against the board
@@ -174,7 +175,7 @@ def run_data(setup: Setup, motion: Motion, board_s: Array, counts: Array) -> Run
     arm = np.zeros(len(times), ARM_STATE_DTYPE)
     q, qd = motion.joints(times)
     arm["time_s"], arm["host_time_s"] = times, times + 1e4
-    arm["q_rad"], arm["qd_rad_s"] = np.round(q / 6e-6) * 6e-6, qd
+    arm["q_rad"], arm["qd_rad_s"] = np.round(q / setup.encoder_step_rad) * setup.encoder_step_rad, qd
     arm["target_speed_fraction"] = arm["speed_scaling"] = 1.0
     arm["robot_mode"], arm["safety_mode"], arm["runtime_state"] = 7, 1, 2
     provenance = replace(PROVENANCE, arm_kinematics=setup.told)
