@@ -7,11 +7,11 @@ from typing import Literal, get_args
 
 import numpy as np
 
-from rig.analysis.calibration import or_fault
+from rig.analysis.calibration import estimator_among, or_fault
 from rig.analysis.increments import InIncrements, solve_turning
 from rig.analysis.placed_budget import budget_by_causes
 from rig.analysis.placed_equations import Equations
-from rig.errors import Fault, Refused
+from rig.errors import Fault
 from rig.estimation.arrays import Array
 from rig.estimation.budget import Budget
 from rig.estimation.earth_rate import check_earth_seen
@@ -121,12 +121,7 @@ def solve_placed(
 
 def known_method(name: str | None) -> Chosen | None:
     """Raises Refused `unknown_estimator`."""
-    for method in CHOICES:
-        if name == method:
-            return method
-    if name is None:
-        return None
-    raise Refused("unknown_estimator", f"there is no {name} for readings in attitudes", f"Use {', '.join(CHOICES)}")
+    return None if name is None else estimator_among(CHOICES, name)
 
 
 def _of_rows(equations: Equations, method: Method, *, any_mounting: bool) -> InAttitudes:

@@ -32,6 +32,7 @@ ESTIMATORS: tuple[Estimator, ...] = get_args(Estimator)
 DEFAULT_ESTIMATOR: Estimator = "vector"
 
 Result = TypeVar("Result")
+Choice = TypeVar("Choice", bound=str)
 
 
 @dataclass(frozen=True, slots=True)
@@ -95,10 +96,17 @@ class SensorResult:
 
 def known_estimator(name: str) -> Estimator:
     """The estimator of that name. Raises Refused `unknown_estimator`."""
-    for known in ESTIMATORS:
+    return estimator_among(ESTIMATORS, name)
+
+
+def estimator_among(choices: Sequence[Choice], name: str) -> Choice:
+    """The one of that name. Raises Refused `unknown_estimator`."""
+    for known in choices:
         if known == name:
             return known
-    raise Refused("unknown_estimator", f"there is no estimator {name!r}", f"Choose one of {', '.join(ESTIMATORS)}")
+    raise Refused(
+        "unknown_estimator", f"there is no estimator {name!r} here", f"Choose one of {', '.join(choices)}"
+    )
 
 
 def observe_recordings(runs: Sequence[RunData]) -> tuple[ObservedRun, ...]:

@@ -4,8 +4,8 @@ from typing import Literal
 
 import numpy as np
 
-from rig.analysis.calibration import ESTIMATORS, Estimator, solve_observations
-from rig.errors import Fault, Refused
+from rig.analysis.calibration import ESTIMATORS, Estimator, estimator_among, solve_observations
+from rig.errors import Fault
 from rig.estimation.budget import Budget, Contributor
 from rig.estimation.estimate import Estimate
 from rig.estimation.turned import TurnedSolution, solve_turned
@@ -18,12 +18,7 @@ CHOICES: tuple[Chosen, ...] = (*ESTIMATORS, "increments")
 
 def known_external(name: str | None) -> Chosen | None:
     """Raises Refused `unknown_estimator`."""
-    for each in CHOICES:
-        if name == each:
-            return each
-    if name is None:
-        return None
-    raise Refused("unknown_estimator", f"there is no estimator {name!r}", f"Choose one of {', '.join(CHOICES)}")
+    return None if name is None else estimator_among(CHOICES, name)
 
 
 def solve_external(data: ExternalData, estimator: Chosen | None) -> Estimate:
