@@ -104,9 +104,7 @@ def estimator_among(choices: Sequence[Choice], name: str) -> Choice:
     for known in choices:
         if known == name:
             return known
-    raise Refused(
-        "unknown_estimator", f"there is no estimator {name!r} here", f"Choose one of {', '.join(choices)}"
-    )
+    raise Refused("unknown_estimator", f"there is no estimator {name!r} here", f"Choose one of {', '.join(choices)}")
 
 
 def observe_recordings(runs: Sequence[RunData]) -> tuple[ObservedRun, ...]:

@@ -123,9 +123,9 @@ def _row(name: str, unit: str, scale: Any, bias: Any, std: Array, *, of: str) ->
     return {
         "sensor": name,
         "unit": unit,
-        "scale": [float(f"{each:.8g}") for each in scale],
+        "scale": [float(each) for each in scale],  # rounded on the screen alone
         "scale_u": rounded(tuple(expanded[:3])),
-        "bias": [float(f"{each:.8g}") for each in bias],
+        "bias": [float(each) for each in bias],
         "bias_u": rounded(tuple(expanded[3:])),
         "of": of,
         "missing": None,

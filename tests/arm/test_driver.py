@@ -24,13 +24,13 @@ from rig.arm.child_link import FROZEN_TICKS, TICK_S
 from rig.arm.driver import Arm, look
 from rig.arm.motion import Transfer, trapezoid_duration
 from rig.arm.preflight import arm_problems, plan_problems
-from rig.arm.silence import crowding
 from rig.arm.state import ARM_STATE_DTYPE, ArmState, Joints
 from rig.config.models import ArmSection
 from rig.config.procedure_sections import SixObservationSection
 from rig.errors import Fault, Refused
 from rig.plans.six_sweeps import plan_six_observation
 from support.arm_relay import relay
+from support.crowd import watched_crowd
 from support.rtde_reader import RtdeReader
 from support.worlds import World, WorldHandle
 
@@ -182,9 +182,9 @@ def test_a_fault_during_a_move_is_named_and_the_arm_stands_still(
     with Arm(laboratory.host) as arm:
         arm.take_control(*PAYLOAD)
         watch = AtSpeed(arm, lambda: laboratory.control(order))
-        with pytest.raises(Fault) as fault:
+        with watched_crowd() as crowd, pytest.raises(Fault) as fault:
             arm.move(turn(arm.latest.q_rad, 6.0), watch)
-        assert time.monotonic() - watch.acted_s < 2.0 * crowding() ** 2  # who watches is held up as well
+        assert time.monotonic() - watch.acted_s < crowd.stretched(2.0)
         assert fault.value.name == name
         assert "test move" in fault.value.what or "127." in fault.value.what
         assert fault.value.remedy
@@ -243,12 +243,12 @@ def test_a_child_that_dies_or_hangs_mid_move_leaves_a_standing_arm_within_a_seco
             until(lambda: stands(laboratory), 5.0)
             stood_s.append(time.monotonic() - killed_s)
 
-        with pytest.raises(Fault) as fault:
+        with watched_crowd() as crowd, pytest.raises(Fault) as fault:
             arm.move(turn(arm.latest.q_rad, 6.0), AtSpeed(arm, end_child_and_await_the_stop))
         assert fault.value.name == name
         assert "the controller says that its program has ended" in fault.value.what
         assert "Look at the arm" in fault.value.remedy and "emergency stop" not in fault.value.remedy
-        assert stood_s[0] < 1.0 * crowding()
+        assert stood_s[0] < crowd.stretched(1.0)
 
 
 def test_a_hung_child_is_answered_by_a_stop_also_when_no_descriptor_is_left(laboratory: WorldHandle) -> None:
@@ -282,12 +282,12 @@ def test_ctrl_c_stops_the_arm_at_once_and_goes_on_to_the_caller(laboratory: Worl
             interrupted_s = time.monotonic()
             os.kill(os.getpid(), signal.SIGINT)
 
-        with pytest.raises(KeyboardInterrupt):
+        with watched_crowd() as crowd, pytest.raises(KeyboardInterrupt):
             if where == "move":
                 arm.move(turn(arm.latest.q_rad, 6.0), AtSpeed(arm, interrupt))
             else:
                 arm.rest(60.0, interrupt)
-        assert time.monotonic() - interrupted_s < 1.0
+        assert time.monotonic() - interrupted_s < crowd.stretched(1.0)
         assert stands(laboratory)
         assert arm.stop().at_rest
         with pytest.raises(Fault) as fault:
@@ -501,9 +501,9 @@ def test_a_dashboard_that_is_gone_too_is_said_honestly(laboratory: WorldHandle) 
     with Arm(laboratory.host) as arm:
         arm.take_control(*PAYLOAD)
         cut = AtSpeed(arm, lambda: laboratory.control({"do": "close_arm", "listen": False}))
-        with pytest.raises(Fault) as fault:
+        with watched_crowd() as crowd, pytest.raises(Fault) as fault:
             arm.move(turn(arm.latest.q_rad, 6.0), cut)
-        assert time.monotonic() - cut.acted_s < 2.0 * crowding() ** 2  # who watches is held up as well
+        assert time.monotonic() - cut.acted_s < crowd.stretched(2.0)
     assert fault.value.name == "arm_link_lost"
     assert "dashboard did not take the stop" in fault.value.what
     assert "press the emergency stop" in fault.value.remedy

@@ -6,9 +6,11 @@ from itertools import pairwise
 import numpy as np
 import pytest
 
+from rig.analysis.so_far import so_far
 from rig.data.run_file import RunData
+from rig.estimation.vector_model import VectorSolution
 from rig.page.replay import Moment, moments
-from rig.page.rows import Look
+from rig.page.rows import Look, look_of
 from rig.page.shown import About, Shown
 from rig.station.events import ArmSeen, PhaseStarted, Progress, SamplesTaken, StepFinished, StepStarted
 from support.synthetic_run import Setup, synthetic_run
@@ -63,3 +65,12 @@ def test_what_is_shown_at_the_end_is_all_of_it(replayed: list[Moment]) -> None:
     assert (shown.sections["arm"]["model"], shown.sections["arm"]["serial_number"]) == ("UR10e or UR12e", "2026")
     assert [(row["sweep"], row["by"]) for row in shown.sections["observations"]] == [(n, "host") for n in range(6)]
     assert shown.sections["parameters"][0]["scale"][0] == pytest.approx(1.1771, rel=1e-3)
+
+
+def test_a_value_is_rounded_on_the_screen_alone(run: RunData) -> None:
+    """Rounded twice, its last digit there would be another than at the terminal."""
+    found = so_far([run])
+    solution = found["gyro"].solution
+    (parameters,) = look_of(found).parameters
+    assert isinstance(solution, VectorSolution)
+    assert parameters["scale"] == solution.scale.tolist() and parameters["bias"] == solution.bias_rad_s.tolist()

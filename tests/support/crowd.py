@@ -1,0 +1,47 @@
+"""How busy this machine was while a limit ran: what is late may be late by that, and a limit says nothing beyond it."""
+
+import threading
+import time
+from collections.abc import Iterator
+from contextlib import contextmanager
+
+from rig.arm.silence import crowding
+
+LOOK_S = 0.02
+
+
+class Crowd:
+    """The greatest `crowding` so far, and for how long whoever looked was held up itself."""
+
+    def __init__(self) -> None:
+        self.greatest, self.held_up_s = crowding(), 0.0
+
+    def look(self, late_s: float) -> None:
+        """Once more, so much later than was meant."""
+        self.greatest = max(self.greatest, crowding())
+        self.held_up_s += late_s
+
+    def stretched(self, limit_s: float) -> float:
+        """A limit of a quiet machine: the rig stretches its own by the crowd, and the crowd holds up what follows."""
+        return limit_s * self.greatest**2 + self.held_up_s
+
+
+@contextmanager
+def watched_crowd() -> Iterator[Crowd]:
+    """Looks at the machine all the time inside."""
+    crowd, over = Crowd(), threading.Event()
+
+    def watch() -> None:
+        before_s = time.monotonic()
+        while not over.wait(LOOK_S):
+            now_s = time.monotonic()
+            crowd.look(now_s - before_s - LOOK_S)
+            before_s = now_s
+
+    watching = threading.Thread(target=watch, name="crowd", daemon=True)
+    watching.start()
+    try:
+        yield crowd
+    finally:
+        over.set()
+        watching.join()
