@@ -197,10 +197,8 @@ def test_a_wrong_baud_rate_is_named() -> None:
 
 
 def test_a_dead_line_and_a_missing_port_are_named() -> None:
-    with kvh_on_a_wire() as wire:
-        wire.line.silent = True
-        with pytest.raises(SensorError) as caught:
-            Kvh1775("kvh", wire.port, 921600, timeout_s=0.3)
+    with kvh_on_a_wire(dead=True) as wire, pytest.raises(SensorError) as caught:
+        Kvh1775("kvh", wire.port, 921600, timeout_s=0.3)
     assert caught.value.name == "no_kvh"
     with pytest.raises(SensorError) as caught:
         Kvh1775("kvh", "/dev/there-is-none", 921600)

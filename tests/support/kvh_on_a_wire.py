@@ -44,6 +44,8 @@ class KvhOnAWire:
         pace: float = 1.0,
         on_for_s: float = 3.0,
         field_at: Callable[[float], Sequence[float]] = no_field,
+        *,
+        dead: bool = False,
     ) -> None:
         self.memory = Memory(left)
         self._field_at = field_at
@@ -51,6 +53,7 @@ class KvhOnAWire:
         self.time_s = 0.0
         self.kvh: Kvh1775 | None = None
         self.line = SerialLine(lambda: self.kvh, seed=5)
+        self.line.silent = dead  # before a byte is under way
         self.limit_s, self.at_once = np.inf, False
         self._selector = selectors.DefaultSelector()
         self._pty = PtyPort(self.line, self._selector)
@@ -120,9 +123,10 @@ def kvh_on_a_wire(
     pace: float = 1.0,
     on_for_s: float = 3.0,
     field_at: Callable[[float], Sequence[float]] = no_field,
+    dead: bool = False,
 ) -> Iterator[KvhOnAWire]:
-    """For the length of the `with` block."""
-    wire = KvhOnAWire(left or {}, motion_at, pace, on_for_s, field_at)
+    """For the length of the `with` block; over a `dead` line nothing has ever come."""
+    wire = KvhOnAWire(left or {}, motion_at, pace, on_for_s, field_at, dead=dead)
     try:
         yield wire
     finally:
