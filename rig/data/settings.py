@@ -25,10 +25,11 @@ if TYPE_CHECKING:
     from rig.config.judging_sections import SiteSection
     from rig.config.models import RigConfig
 
-SCHEMA = "rig.settings/6"
+SCHEMA = "rig.settings/7"
 # The first knows no site, the second no dwells, the third no magnetic field, the fourth no Earth's rate to be found,
-# the fifth no extension.
-SCHEMAS = (*(f"rig.settings/{number}" for number in range(1, 6)), SCHEMA)
+# the fifth no extension, the sixth one way of reckoning.
+SCHEMAS = (*(f"rig.settings/{number}" for number in range(1, 7)), SCHEMA)
+RECKONING = 2  # of new recordings; see `RunSettings`
 
 DecisionRule = Literal["simple", "guard_band"]
 Vector3 = tuple[Finite, Finite, Finite]
@@ -149,7 +150,9 @@ class RunSettings:
     looked for, and a bias that wanders widens the variance of every average alike. Nor do they have an `uncertainty`
     beyond the noise. `second_order` says that accelerometers are looked for terms of that order, `finds_earth_rate`
     that the Earth's rate is to be found from what the gyroscopes read, not taken from the site. `extension_m` is where
-    the extension ends on which the sensors sit, in the flange's frame.
+    the extension ends on which the sensors sit, in the flange's frame. `reckoning` numbers the way of solving and
+    checking, so that a recording keeps its numbers when a better one comes: 1, all of before; 2, what
+    docs/uncertainty.md says of today.
     """
 
     procedure: str
@@ -167,6 +170,7 @@ class RunSettings:
     second_order: bool = False
     finds_earth_rate: bool = False
     extension_m: Vector3 = (0.0, 0.0, 0.0)
+    reckoning: Annotated[int, Field(ge=1, le=RECKONING)] = 1
 
     @property
     def movement(self) -> tuple[object, ...]:
@@ -174,7 +178,7 @@ class RunSettings:
         return self.procedure, self.then_verify, self.home_q_rad, self.planned_sweeps, self.planned_dwells
 
     def with_overrides(self, overrides: Sequence[str]) -> "RunSettings":
-        """The same with other thresholds or limits: `observation.max_lost_fraction=0.01`, `limits.scale_std=0.001`.
+        """The same with other thresholds or limits, or reckoned otherwise: `limits.scale_std=0.001`, `reckoning=2`.
 
         Raises Refused `unknown_setting` or `wrong_setting`, which say what can be set.
         """
@@ -221,6 +225,7 @@ def settings_of(config: "RigConfig", plan: "Plan") -> RunSettings:
         second_order=config.procedure.accelerometer_order == 2,
         finds_earth_rate=config.procedure.finds_earth_rate,
         extension_m=_metres(config.arm.extension_mm),
+        reckoning=RECKONING,
     )
 
 
@@ -290,18 +295,20 @@ def _overridden(settings: RunSettings, item: str) -> RunSettings:
             f"Set one of {', '.join(_settable())}",
         )
     document = asdict(settings)
-    document[section][key] = value.strip()
+    (document[section] if key else document)[key or section] = value.strip()
     try:
         return checked(RunSettings, document, "settings")
     except ValueError as error:
-        raise Refused("wrong_setting", str(error), f"Give a number, as in {path.strip()}=0.001") from None
+        raise Refused(
+            "wrong_setting", str(error), f"Give a number, as in {path.strip()}={'0.001' if key else 1}"
+        ) from None
 
 
 def setting(key: str) -> str:
     """The full path of a threshold or limit: `max_lost_fraction` is `observation.max_lost_fraction`."""
-    return next((path for path in _settable() if path.partition(".")[2] == key), key)
+    return next((path for path in _settable() if path.rpartition(".")[2] == key), key)
 
 
 def _settable() -> tuple[str, ...]:
     sections = {"observation": ObservationThresholds, "limits": Limits}
-    return tuple(f"{name}.{field.name}" for name, section in sections.items() for field in fields(section))
+    return (*(f"{name}.{field.name}" for name, section in sections.items() for field in fields(section)), "reckoning")

@@ -35,7 +35,7 @@ def test_what_is_recorded_comes_back() -> None:
 def test_a_configuration_of_commit_af3b9f0_reads_as_it_did_then(name: str) -> None:
     text = (FIXTURES / name / "config.yaml").read_text(encoding="utf-8")
     # Nothing has changed its meaning so far; that there is a site, and what follows from it, is new.
-    assert settings_of_configuration(text) == replace(settings(text), site=None, uncertainty=None)
+    assert settings_of_configuration(text) == replace(settings(text), site=None, uncertainty=None, reckoning=1)
 
 
 @pytest.mark.parametrize(
@@ -70,6 +70,12 @@ def test_thresholds_and_limits_can_be_changed_for_another_judgement() -> None:
     assert changed.observation.max_lost_fraction == 0.01
     assert changed.limits.scale_std == 0.001
     assert changed.limits.bias_rad_s == settings().limits.bias_rad_s
+
+
+def test_a_recording_of_before_can_be_reckoned_as_of_today() -> None:
+    text = json.dumps({**json.loads(settings().to_json()), "schema": "rig.settings/6"})
+    before = settings_from_json(text.replace('"reckoning": 2', '"reckoning": 1'))
+    assert before.reckoning == 1 and before.with_overrides(["reckoning=2"]).reckoning == settings().reckoning == 2
 
 
 @pytest.mark.parametrize(
