@@ -7,22 +7,20 @@ of freedom as columns. The process of the bias comes from what is left within th
 a wrong sweep does not excuse itself.
 """
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
 
 from rig.analysis.pieces import Pieces
+from rig.analysis.suspicion import Statistic, Suspicions, basis, explained, told_by, unlike_the_others
 from rig.estimation.arrays import Array
 from rig.estimation.bias_process import likeliest_bias_process
 
 # Of the speed: twists of a real arm's wrists (−8e-4, +4e-4 rad, UR's own calibration), and what 0.1 % of full scale,
 # a common statement of nonlinearity, amounts to at a quarter of the range.
 TOLERANCE = 5e-4
-ALIKE = 10.0  # of χ²: what explains less than the best by no more than this might be the cause as well
 WITHIN_A_TURN = 3e-4  # of the speed: graduation and eccentricity of an encoder, which cancel over the turn
-
-
-Statistic = tuple[float, float]  # and its limit
 
 
 @dataclass(frozen=True, slots=True)
@@ -37,47 +35,43 @@ class Consistency:
     disturbed: dict[int, Statistic]
 
 
+@dataclass(frozen=True, slots=True)
+class HeldRates:
+    """A gyroscope's pieces: white readings (3 N,), the model's white columns (3 N, p), what whitens others."""
+
+    seen: Array
+    base: Array
+    white: Array
+
+    def explained(self, suspicions: Sequence[Array], beside: Sequence[Array]) -> list[float]:
+        """Of columns (3, N, k): see `Held`."""
+        return [self._told(columns, beside)[0] for columns in suspicions]
+
+    def judged(self, columns: Array | None, beside: Sequence[Array], rate: float) -> Statistic | None:
+        """See `Held`."""
+        from scipy.special import chdtri
+
+        value, freedom = self._told(columns, beside)
+        return (value, float(chdtri(freedom, rate))) if freedom else None
+
+    def _told(self, columns: Array | None, beside: Sequence[Array]) -> tuple[float, int]:
+        base = np.concatenate([self.base, *(_whiten(self.white, each) for each in beside)], axis=1)
+        return explained(self.seen, base, None if columns is None else _whiten(self.white, columns))
+
+
 def consistency(pieces: Pieces, matrix: Array, rate: float) -> Consistency:
     """Every statistic with its critical value; `rate` is that of false alarms for each, `matrix` (3, 3) F."""
-    from scipy.special import chdtri
-
     felt = pieces.rates_rad_s @ matrix.T
     white = _whitening(_covariance(pieces, felt, _steady(pieces)), pieces.variances_rad2_s2.min(axis=0))
     seen = _whiten(white, pieces.means_rad_s.T[:, :, None])[:, 0]
-    base = _whiten(white, _each_axis(_known(pieces)))
-    found: dict[str, Statistic] = {}
-    for name, columns in _suspicions(pieces, felt).items():
-        explained, freedom = _explained(seen, base, None if columns is None else _whiten(white, columns))
-        if freedom:
-            found[name] = explained, float(chdtri(freedom, rate))
+    held = HeldRates(seen, _whiten(white, _each_axis(_known(pieces))), white)
+    found = told_by(held, _suspicions(pieces, felt), rate)
     jumped = _jumped(pieces, felt, rate)
     if jumped is not None:
         found["bias_jumped"] = jumped
-    ranked = _disturbed(pieces, white, seen, base, rate)
+    sweeps = np.unique(pieces.sweep[pieces.sweep >= 0]).tolist()
+    ranked = unlike_the_others(held, sweeps, lambda sweep: _of_sweep(pieces, sweep), rate)
     return Consistency(found, ranked[0][1], {sweep: each for sweep, each in ranked if each[0] > each[1]})
-
-
-def _disturbed(pieces: Pieces, white: Array, seen: Array, base: Array, rate: float) -> list[tuple[int, Statistic]]:
-    """The sweep least like the others, then the next once that is taken out, until they agree or half are out.
-
-    Where one turn each way about an axis is all there is, either of the two may be the one: then both are named.
-    """
-    from scipy.special import chdtri
-
-    left = np.unique(pieces.sweep[pieces.sweep >= 0]).tolist()
-    each_rate, most, found = rate / len(left), (len(left) + 1) // 2, list[tuple[int, Statistic]]()
-    while len(found) < most:
-        explained = {sweep: _explained(seen, base, _whiten(white, _of_sweep(pieces, sweep))) for sweep in left}
-        worst = max(left, key=lambda sweep: explained[sweep][0])
-        value, freedom = explained[worst]
-        limit = float(chdtri(freedom, each_rate))
-        if value <= limit:
-            return found or [(worst, (value, limit))]
-        alike = [sweep for sweep in left if explained[sweep][0] > value - ALIKE]
-        found += [(sweep, (value, limit)) for sweep in alike]
-        left = [sweep for sweep in left if sweep not in alike]
-        base = np.concatenate([base, _whiten(white, _of_sweep(pieces, worst))], axis=1)
-    return found
 
 
 def _jumped(pieces: Pieces, felt: Array, rate: float) -> Statistic | None:
@@ -96,17 +90,17 @@ def _jumped(pieces: Pieces, felt: Array, rate: float) -> Statistic | None:
     if len(steps) < 2:
         return None
 
-    def explained(step: Array, beside: Array) -> float:
+    def told(step: Array, beside: Array) -> float:
         white = _whitening(_covariance(pieces, felt, beside), pieces.variances_rad2_s2.min(axis=0))
         seen = _whiten(white, (pieces.means_rad_s - felt).T[:, :, None])[:, 0]
-        return _explained(seen, _whiten(white, _each_axis(steady)), _whiten(white, _each_axis(step)))[0]
+        return explained(seen, _whiten(white, _each_axis(steady)), _whiten(white, _each_axis(step)))[0]
 
     left = pieces.means_rad_s - felt
     left = left - steady @ (steady.T @ left)
     aside = [step - steady @ (steady.T @ step) for step in steps]
     best = max(range(len(steps)), key=lambda k: float(np.sum((aside[k].T @ left) ** 2 / np.sum(aside[k] ** 2))))
-    beside = _basis(np.column_stack([steady, steps[best]]))
-    return explained(steps[best], beside), 3 * float(fdtri(3, len(steps), 1 - rate / len(steps)))
+    beside = basis(np.column_stack([steady, steps[best]]))
+    return told(steps[best], beside), 3 * float(fdtri(3, len(steps), 1 - rate / len(steps)))
 
 
 def _covariance(pieces: Pieces, felt: Array, steady: Array) -> Array:
@@ -128,7 +122,7 @@ def _covariance(pieces: Pieces, felt: Array, steady: Array) -> Array:
 def _steady(pieces: Pieces) -> Array:
     """(N, k) orthonormal columns: whatever each sweep reads as a whole, the rests alike, gravity, a steady drift."""
     places = [pieces.sweep == sweep for sweep in np.unique(pieces.sweep)]
-    return _basis(np.column_stack([*places, pieces.gravity_m_s2, _time(pieces)]))
+    return basis(np.column_stack([*places, pieces.gravity_m_s2, _time(pieces)]))
 
 
 def _known(pieces: Pieces) -> Array:
@@ -137,7 +131,7 @@ def _known(pieces: Pieces) -> Array:
     return np.column_stack([pieces.rates_rad_s, ones, pieces.gravity_m_s2, _time(pieces)])
 
 
-def _suspicions(pieces: Pieces, felt: Array) -> dict[str, Array | None]:
+def _suspicions(pieces: Pieces, felt: Array) -> Suspicions:
     """By name of the check (3, N, k): what each would add to the three axes' readings; None is anything at all."""
     time = _time(pieces)
     for sweep in np.unique(pieces.sweep):  # what changes within a sweep is that sweep's own matter
@@ -193,29 +187,3 @@ def _whitening(covariance: Array, least: Array) -> Array:
 def _whiten(white: Array, columns: Array) -> Array:
     """(3 N, k) of columns (3, N, k)."""
     return np.asarray((white @ columns).reshape(-1, columns.shape[2]), dtype=np.float64)
-
-
-def _basis(columns: Array) -> Array:
-    """Orthonormal columns that span the same."""
-    sizes = np.linalg.norm(columns, axis=0)
-    left, singular, _ = np.linalg.svd(columns / np.where(sizes > 0, sizes, 1.0), full_matrices=False)
-    basis: Array = left[:, singular > 1e-6 * singular[0]]
-    return basis
-
-
-def _explained(seen: Array, base: Array, columns: Array | None) -> tuple[float, int]:
-    """How much of what `base` leaves of the readings these columns explain, and how many they are beside it.
-
-    None explains all of it. (Decomposing that many columns is slow, and LAPACK's quick way does not always converge.)
-    """
-    known = _basis(base)
-    unexplained = seen - known @ (known.T @ seen)
-    if columns is None:
-        return float(unexplained @ unexplained), len(seen) - known.shape[1]
-    sizes = np.linalg.norm(columns, axis=0)
-    new = columns / np.where(sizes > 0, sizes, 1.0)
-    new = new - known @ (known.T @ new)
-    left, singular, _ = np.linalg.svd(new, full_matrices=False)
-    told = left[:, singular > 1e-3]
-    explained = told.T @ unexplained
-    return float(explained @ explained), told.shape[1]
