@@ -73,11 +73,15 @@ def in_reference(
     steadily where it is `drifting`.
     """
     run = recordings[0].run
-    if not run.settings.holds_all_kinds:
+    known = run.settings.uncertainty
+    if known is None or not run.settings.holds_all_kinds:
         return ()
-    found = {f"{name}.acceleration_": of_accelerometer(name, recordings, each) for name, each in accelerometers.items()}
+    found = {
+        f"{name}.acceleration_": of_accelerometer(name, recordings, each, known)
+        for name, each in accelerometers.items()
+    }
     found |= {
-        f"{name}.field_": of_magnetometer(name, recordings, each)
+        f"{name}.field_": of_magnetometer(name, recordings, each, known)
         for name, each in magnetometers.items()
         if not isinstance(each, Fault)
     }

@@ -13,7 +13,7 @@ import numpy as np
 
 from rig.analysis.suspicion import Statistic, Suspicions, basis, told_beside, told_by, unlike_the_others
 from rig.estimation.arrays import Array
-from rig.estimation.felt import Movement, cross, effects, felt, noise, predicted
+from rig.estimation.felt import SECOND, Movement, cross, effects, felt, jacobian, noise, predicted
 from rig.estimation.imu import slopes
 from rig.estimation.reference_model import matrix
 from rig.estimation.shared_errors import Apart, apart, information, likeliest_error, more_likely
@@ -82,7 +82,8 @@ class HeldReadings:
     def judged(self, columns: Array | None, beside: Sequence[Array], rate: float) -> Statistic | None:
         """Twice the logarithm of how much likelier the readings are with the columns, which is χ² where δ is known.
 
-        Where it is not, the limit is that of F. Of anything at all it is χ² of what the model leaves.
+        Where it is not, the limit is that of F, as far as δ is what the columns stand out against. Of anything at all
+        it is χ² of what the model leaves.
         """
         from scipy.special import chdtri, fdtri
 
@@ -95,10 +96,10 @@ class HeldReadings:
         new = told_beside(basis(base), self.turn @ columns)
         if not (count := new.shape[1]):
             return None
-        limit, freedom = float(chdtri(count, rate)), self._freedom(base, std_rad)
-        if freedom > count + 1:
-            told = count / (freedom - count) * float(fdtri(count, freedom - count, 1 - rate))
-            limit = max(limit, freedom * float(np.log1p(told)))
+        of_known, freedom = float(chdtri(count, rate)), max(self._freedom(base, std_rad), count + 1.0)
+        told = count / (freedom - count) * float(fdtri(count, freedom - count, 1 - rate))
+        of_unknown, share = freedom * float(np.log1p(told)), self._share(base, new, std_rad)
+        limit = of_known + share * max(of_unknown - of_known, 0.0)
         return more_likely(self._apart(), self.left, base, new), limit
 
     def _beside(self, beside: Sequence[Array]) -> Array:
@@ -125,6 +126,13 @@ class HeldReadings:
     def _freedom(self, base: Array, std_rad: float) -> float:
         """Of δ²: how many readings tell it."""
         return 2 * information(self._apart(), std_rad, base) * std_rad**4
+
+    def _share(self, base: Array, columns: Array, std_rad: float) -> float:
+        """Of δ in the variance along columns, from 0 to 1."""
+        variance = 1 + std_rad**2 * self.growth
+        known, _ = self._unexplained(base, std_rad)
+        told = told_beside(known, columns / np.sqrt(variance)[:, None])
+        return float(np.mean(np.sum((1 - 1 / variance)[:, None] * told**2, axis=0)))
 
 
 def reference_consistency(read: Read, rate: float, *, drifting: bool = False) -> ReferenceConsistency:
@@ -158,7 +166,7 @@ def _suspicions(read: Read) -> Suspicions:
         "bias_changed": _bias_over_time(read),
         "scale_changed": _per_axis((s @ f.T) * time[:, None]),
         "loose_mounting": ((f @ -cross(s)) * time[:, None, None]).reshape(-1, 3),
-        "even_term": _of_sensor(read, np.square),
+        "even_term": jacobian(read.theta, read.movement)[:, SECOND],
         "odd_term": _of_sensor(read, lambda along: along**3),
         "asymmetry": _of_sensor(read, np.abs),
         "residuals": None,

@@ -1,12 +1,13 @@
 """What accelerometers and magnetometers are held against: their readings' bits and noise, their dwells, their model."""
 
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
 
 from rig.analysis.acceleration import AccelerometerResult
+from rig.analysis.arm_patterns import Known, Stood, arm_patterns
 from rig.analysis.magnetic_field import MagnetometerResult
 from rig.analysis.pieces import Window
 from rig.analysis.readings import judge_readings
@@ -22,6 +23,8 @@ from rig.analysis.reference_readings import (
 )
 from rig.analysis.seen import since_first_s
 from rig.analysis.suspicion import Statistic
+from rig.arm.kinematics import WRIST_1
+from rig.data.settings import Uncertainty
 from rig.estimation.arrays import Array
 from rig.estimation.felt import DELAY, LEVER, NO_SWEEPS, PARAMETERS, SECOND, Movement
 from rig.observation.observed_run import ObservedRun
@@ -43,64 +46,84 @@ class ReadInReference:
     pieces: Sequence[str]
 
 
-def of_accelerometer(name: str, recordings: Sequence[ObservedRun], result: AccelerometerResult) -> ReadInReference:
-    """From all recordings of a run, in the order its solution was made from."""
+def of_accelerometer(
+    name: str, recordings: Sequence[ObservedRun], result: AccelerometerResult, known: Uncertainty
+) -> ReadInReference:
+    """From all recordings of a run, in the order its solution was made from; `known` is of what no recording shows."""
     timed = list(zip(recordings, since_first_s(recordings), strict=True))
-    dwells = [(dwell, since_s) for each, since_s in timed for dwell in acceleration_dwells(name, each)]
+    dwells = [dwell for each, since_s in timed for dwell in acceleration_dwells(name, each, since_s)]
     used = {dwell.index for dwell in result.dwells}
-    stood = [
-        (f"{DISTURBED_DWELL}.{dwell.index}", dwell.middle_s + since_s)
-        for dwell, since_s in dwells
-        if dwell.index in used
-    ]
-    turned = [
-        (f"{DISTURBED_SWEEP}.{turn.sweep}", (turn.average.start_s + turn.average.end_s) / 2 + since_s)
-        for each, since_s in timed
-        for turn in each.sensors[name].revolutions
-        if turn.acceleration is not None
-    ]
-    pieces, solution, movement = [*stood, *turned], result.solution, result.movement
-    settings = recordings[0].run.settings
-    lag_s = 0.0 if settings.uncertainty is None else 1e-3 * settings.uncertainty.acceleration_lag_ms
+    pieces = [_Piece.of_dwell(dwell) for dwell in dwells if dwell.index in used]
+    pieces += [piece for each, since_s in timed for piece in _swept(name, each, since_s)]
+    solution, movement = result.solution, result.movement
     theta = _theta(solution.matrix, solution.reference_m_s2, solution.bias_m_s2)
     if solution.lever_arm_m is not None:
         theta[LEVER], theta[DELAY] = solution.lever_arm_m, solution.delay_s
     if solution.second_order_s2_m is not None:
         theta[SECOND] = solution.second_order_s2_m
+    lag = lag_pattern(movement.dwells, movement.sweeps, 1e-3 * known.acceleration_lag_ms) / np.sqrt(3)
+    arm = Known(recordings[0].motion.kinematics, known.axis_deg, np.array(result.sensor.mounting))
     return ReadInReference(
         counts=[recording.run.samples[name]["acceleration_counts"].astype(np.int64) for recording in recordings],
-        dwells=[dwell for dwell, _ in dwells],
+        dwells=dwells,
         sweeps=[sweep for each in recordings for sweep in acceleration_sweeps(name, each)],
         read=Read(
             theta=theta,
             movement=movement,
-            known=lag_pattern(movement.dwells, movement.sweeps, lag_s) / np.sqrt(3),
-            times_s=np.array([time_s for _, time_s in pieces]),
+            known=np.concatenate([lag, arm_patterns(theta, movement, [each.stood for each in pieces], arm)]),
+            times_s=np.array([each.time_s for each in pieces]),
             second_order=solution.second_order_s2_m is not None,
         ),
-        pieces=[piece for piece, _ in pieces],
+        pieces=[each.name for each in pieces],
     )
 
 
-def of_magnetometer(name: str, recordings: Sequence[ObservedRun], result: MagnetometerResult) -> ReadInReference:
+def of_magnetometer(
+    name: str, recordings: Sequence[ObservedRun], result: MagnetometerResult, known: Uncertainty
+) -> ReadInReference:
     """The same: a magnetometer in attitudes is an accelerometer that nothing swept."""
     solution, movement = result.solution, Movement(result.seen, NO_SWEEPS)
-    patterns, _ = drift_patterns(solution.matrix, result.seen.attitudes, result.drift)
     timed = zip(recordings, since_first_s(recordings), strict=True)
-    dwells = [(dwell, since_s) for each, since_s in timed for dwell in field_dwells(name, each)]
+    dwells = [dwell for each, since_s in timed for dwell in field_dwells(name, each, since_s)]
+    pieces = [_Piece.of_dwell(dwell) for dwell in dwells]
+    theta = _theta(solution.matrix, solution.field_table_t, solution.bias_t)
+    drift, _ = drift_patterns(solution.matrix, result.seen.attitudes, result.drift)
+    arm = Known(recordings[0].motion.kinematics, known.axis_deg, np.array(result.sensor.mounting))
+    of_arm = arm_patterns(theta, movement, [each.stood for each in pieces], arm)
     return ReadInReference(
         counts=[recording.run.samples[name]["field_counts"].astype(np.int64) for recording in recordings],
-        dwells=[dwell for dwell, _ in dwells],
+        dwells=dwells,
         sweeps=(),
         read=Read(
-            theta=_theta(solution.matrix, solution.field_table_t, solution.bias_t),
+            theta=theta,
             movement=movement,
-            known=patterns / (np.sqrt(3) if result.drift is None else 1.0),
-            times_s=np.array([dwell.middle_s + since_s for dwell, since_s in dwells]),
+            known=np.concatenate([drift / (np.sqrt(3) if result.drift is None else 1.0), of_arm]),
+            times_s=np.array([each.time_s for each in pieces]),
             second_order=False,
         ),
-        pieces=[f"{DISTURBED_DWELL}.{dwell.index}" for dwell, _ in dwells],
+        pieces=[each.name for each in pieces],
     )
+
+
+@dataclass(frozen=True, slots=True)
+class _Piece:
+    """A dwell or a sweep: its name, its middle on the clock of the first recording, where the arm stood."""
+
+    name: str
+    time_s: float
+    stood: Stood
+
+    @classmethod
+    def of_dwell(cls, dwell: Dwelt) -> "_Piece":
+        return cls(f"{DISTURBED_DWELL}.{dwell.index}", dwell.middle_s + dwell.since_s, Stood(dwell.q_rad))
+
+
+def _swept(name: str, recording: ObservedRun, since_s: float) -> Iterator[_Piece]:
+    for turn in recording.sensors[name].revolutions:
+        if turn.acceleration is not None:
+            start_s, end_s = turn.average.start_s, turn.average.end_s
+            stood = Stood(recording.motion.angles(start_s), turn.acceleration.joint - WRIST_1)
+            yield _Piece(f"{DISTURBED_SWEEP}.{turn.sweep}", (start_s + end_s) / 2 + since_s, stood)
 
 
 def reference_statistics(held: ReadInReference, rate: float, *, drifting: bool) -> dict[str, Statistic]:

@@ -13,6 +13,7 @@ from numpy.typing import NDArray
 from rig.analysis.pieces import Window as Read
 from rig.analysis.suspicion import Statistic
 from rig.estimation.arrays import Array
+from rig.observation.acceleration import DwellReading
 from rig.observation.average import Stream, between, mean_at_rest
 from rig.observation.field import dwelt_field
 from rig.observation.observed_run import ObservedRun
@@ -23,12 +24,17 @@ FEWEST_IN_HALF = 40  # readings: fewer do not tell how their mean scatters
 
 @dataclass(frozen=True, slots=True)
 class Dwelt:
-    """The readings of one dwell: counts (n, 3) at times (n,) of the controller's, within the `window`."""
+    """The readings of one dwell: counts (n, 3) at times (n,) of the controller's, within the `window`.
+
+    The arm stood at `q_rad` (6,); `since_s` takes those times to the clock of the first recording.
+    """
 
     index: int
     counts: NDArray[np.int64]
     time_s: Array
     window: Window
+    q_rad: Array
+    since_s: float
 
     @property
     def middle_s(self) -> float:
@@ -36,13 +42,13 @@ class Dwelt:
         return (self.window.start_s + self.window.end_s) / 2
 
 
-def acceleration_dwells(name: str, recording: ObservedRun) -> list[Dwelt]:
+def acceleration_dwells(name: str, recording: ObservedRun, since_s: float = 0.0) -> list[Dwelt]:
     """Of a sensor's accelerometer."""
     stream = recording.stream(name)
     found = []
     for dwell in recording.sensors[name].dwells:
         inside = between(stream, dwell.window.start_s, dwell.window.end_s)
-        found.append(Dwelt(dwell.index, _counts(stream, inside), stream.time_s[inside], dwell.window))
+        found.append(_dwelt(dwell, _counts(stream, inside), stream.time_s[inside], recording, since_s))
     return found
 
 
@@ -58,12 +64,20 @@ def acceleration_sweeps(name: str, recording: ObservedRun) -> list[Read]:
     return found
 
 
-def field_dwells(name: str, recording: ObservedRun) -> list[Dwelt]:
+def field_dwells(name: str, recording: ObservedRun, since_s: float = 0.0) -> list[Dwelt]:
     """Of a magnetometer."""
     return [
-        Dwelt(dwell.index, counts.astype(np.int64), time_s, dwell.window)
+        _dwelt(dwell, counts.astype(np.int64), time_s, recording, since_s)
         for dwell, counts, time_s in dwelt_field(recording, name)
     ]
+
+
+def _dwelt(
+    dwell: DwellReading, counts: NDArray[np.int64], time_s: Array, recording: ObservedRun, since_s: float
+) -> Dwelt:
+    window = dwell.window
+    q_rad = recording.motion.angles((window.start_s + window.end_s) / 2)
+    return Dwelt(dwell.index, counts, time_s, window, q_rad, since_s)
 
 
 def resting(dwells: Sequence[Dwelt]) -> list[Read]:
