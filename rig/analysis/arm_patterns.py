@@ -23,11 +23,15 @@ class Stood:
 
 @dataclass(frozen=True, slots=True)
 class Known:
-    """The arm as it says it is, by how much its angles may be off either way, the sensor's nominal mounting (3, 3)."""
+    """The arm as it says it is, by how much its angles may be off either way, the sensor's nominal mounting (3, 3).
+
+    `found_rad` is how far off the readings say it is, a standard deviation: it may be a poorer arm than was stated.
+    """
 
     arm: DenavitHartenberg
     axis_deg: float
     mounting: Array
+    found_rad: float
 
 
 def arm_patterns(theta: Array, movement: Movement, stood: Sequence[Stood], known: Known) -> Array:
@@ -35,9 +39,9 @@ def arm_patterns(theta: Array, movement: Movement, stood: Sequence[Stood], known
     alone = replace(movement.sweeps, stations=np.arange(len(movement.sweeps.stations)))
     by_turns = effects(theta, replace(movement, sweeps=alone))
     turns = np.concatenate([_turns(each, known) for each in stood], axis=1)
-    std_rad = (
-        np.radians(known.axis_deg) / np.sqrt(3) * np.where(np.arange(turns.shape[0] // 3) < STEADY, 1.0, WAVE_SHARE)
-    )
+    steady = np.arange(len(turns) // 3) < STEADY
+    stated_rad = np.radians(known.axis_deg) / np.sqrt(3) * np.where(steady, 1.0, WAVE_SHARE)
+    std_rad = np.maximum(stated_rad, known.found_rad)
     patterns: Array = np.tile(std_rad, 3)[:, None] * (turns @ by_turns.T)
     return patterns
 

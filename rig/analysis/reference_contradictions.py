@@ -62,7 +62,8 @@ def of_accelerometer(
     if solution.second_order_s2_m is not None:
         theta[SECOND] = solution.second_order_s2_m
     lag = lag_pattern(movement.dwells, movement.sweeps, 1e-3 * known.acceleration_lag_ms) / np.sqrt(3)
-    arm = Known(recordings[0].motion.kinematics, known.axis_deg, np.array(result.sensor.mounting))
+    off_rad = solution.attitude_error.std_rad
+    arm = Known(recordings[0].motion.kinematics, known.axis_deg, np.array(result.sensor.mounting), off_rad)
     return ReadInReference(
         counts=[recording.run.samples[name]["acceleration_counts"].astype(np.int64) for recording in recordings],
         dwells=dwells,
@@ -88,7 +89,8 @@ def of_magnetometer(
     pieces = [_Piece.of_dwell(dwell) for dwell in dwells]
     theta = _theta(solution.matrix, solution.field_table_t, solution.bias_t)
     drift, _ = drift_patterns(solution.matrix, result.seen.attitudes, result.drift)
-    arm = Known(recordings[0].motion.kinematics, known.axis_deg, np.array(result.sensor.mounting))
+    off_rad = 0.0 if solution.fit.attitude_error is None else solution.fit.attitude_error.std_rad
+    arm = Known(recordings[0].motion.kinematics, known.axis_deg, np.array(result.sensor.mounting), off_rad)
     of_arm = arm_patterns(theta, movement, [each.stood for each in pieces], arm)
     return ReadInReference(
         counts=[recording.run.samples[name]["field_counts"].astype(np.int64) for recording in recordings],
