@@ -75,7 +75,7 @@ class Readings:
 
     def recording(self) -> RunData:
         samples = self.run.samples[self.sensor].copy()
-        samples[next(name for name in COUNTS.values() if name in samples.dtype.names)] = self.counts
+        samples[COUNTS["field" if self.sensor in self.run.magnetometers else "acceleration"]] = self.counts
         return replace(self.run, samples={**self.run.samples, self.sensor: samples})
 
 
