@@ -284,7 +284,7 @@ def test_what_a_number_in_single_precision_rounds_is_no_stuck_bit() -> None:
     """A KVH 1775 says g in single precision, which is recorded in steps of 10 g / 2³⁰."""
     rng = np.random.default_rng(1)
     said = np.float32(0.7 + 0.005 * rng.standard_normal((4000, 3))).astype(np.float64)
-    counts = np.round(said * 2**30 / 10).astype(np.int64)
+    counts = np.asarray(np.round(said * 2**30 / 10), dtype=np.int64)
     assert np.mean(counts & 1) < 0.45  # which it would be taken for
     window = Window(-1, counts, counts - counts.mean(axis=0), np.zeros(3))
     assert judge_readings([counts], [window], FALSE_ALARMS / 10)["stuck_bit"][0] == 0
