@@ -37,12 +37,24 @@ class Consistency:
     disturbed: dict[int, Statistic]
 
 
-def consistency(pieces: Pieces, matrix: Array, rate: float) -> Consistency:
-    """Every statistic with its critical value; `rate` is that of false alarms for each, `matrix` (3, 3) F."""
+@dataclass(frozen=True, slots=True)
+class _Known:
+    """What the pieces' means may be off by: `variances_rad2_s2` (N, 3) each for itself, `common_rad2_s2` (3 N, 3 N)."""
+
+    variances_rad2_s2: Array
+    common_rad2_s2: Array
+
+
+def consistency(pieces: Pieces, matrix: Array, rate: float, off: Array | None = None) -> Consistency:
+    """Every statistic with its critical value; `rate` is that of false alarms for each, `matrix` (3, 3) F.
+
+    `off` (P, N, 3) are the patterns of what arm and sensor may be off by; None takes the tolerances of before.
+    """
     from scipy.special import chdtri
 
     felt = pieces.rates_rad_s @ matrix.T
-    white = _whitening(_covariance(pieces, felt, _steady(pieces)), pieces.variances_rad2_s2.min(axis=0))
+    known = _tolerated(pieces, felt) if off is None else _Known(pieces.variances_rad2_s2, _together(off))
+    white = _whitening(_covariance(pieces, felt, _steady(pieces), known), pieces.variances_rad2_s2.min())
     seen = _whiten(white, pieces.means_rad_s.T[:, :, None])[:, 0]
     base = _whiten(white, _each_axis(_known(pieces)))
     found: dict[str, Statistic] = {}
@@ -50,7 +62,7 @@ def consistency(pieces: Pieces, matrix: Array, rate: float) -> Consistency:
         explained, freedom = _explained(seen, base, None if columns is None else _whiten(white, columns))
         if freedom:
             found[name] = explained, float(chdtri(freedom, rate))
-    jumped = _jumped(pieces, felt, rate)
+    jumped = _jumped(pieces, felt, known, rate)
     if jumped is not None:
         found["bias_jumped"] = jumped
     ranked = _disturbed(pieces, white, seen, base, rate)
@@ -80,7 +92,7 @@ def _disturbed(pieces: Pieces, white: Array, seen: Array, base: Array, rate: flo
     return found
 
 
-def _jumped(pieces: Pieces, felt: Array, rate: float) -> Statistic | None:
+def _jumped(pieces: Pieces, felt: Array, known: _Known, rate: float) -> Statistic | None:
     """How much a jump of the bias between two rests explains beside its wandering; None without three rests.
 
     The process is estimated anew beside the jump that explains most, for that jump would be taken for wandering. Few
@@ -97,7 +109,7 @@ def _jumped(pieces: Pieces, felt: Array, rate: float) -> Statistic | None:
         return None
 
     def explained(step: Array, beside: Array) -> float:
-        white = _whitening(_covariance(pieces, felt, beside), pieces.variances_rad2_s2.min(axis=0))
+        white = _whitening(_covariance(pieces, felt, beside, known), pieces.variances_rad2_s2.min())
         seen = _whiten(white, (pieces.means_rad_s - felt).T[:, :, None])[:, 0]
         return _explained(seen, _whiten(white, _each_axis(steady)), _whiten(white, _each_axis(step)))[0]
 
@@ -109,20 +121,32 @@ def _jumped(pieces: Pieces, felt: Array, rate: float) -> Statistic | None:
     return explained(steps[best], beside), 3 * float(fdtri(3, len(steps), 1 - rate / len(steps)))
 
 
-def _covariance(pieces: Pieces, felt: Array, steady: Array) -> Array:
-    """(3, N, N) of the pieces' means: noise, a bias that wanders, and what arm and sensor may be off by.
+def _covariance(pieces: Pieces, felt: Array, steady: Array, known: _Known) -> Array:
+    """(3 N, 3 N) of the pieces' means, axis by axis: what is known of them, and a bias that wanders.
 
-    How the bias wanders is found from what `steady` (N, k), orthonormal columns, leaves of the readings.
+    How it wanders is found from what `steady` (N, k), orthonormal columns, leaves of the readings.
     """
-    own = np.arange(len(pieces.sweep))
+    each, count = np.arange(3), len(pieces.sweep)
+    covariance = known.common_rad2_s2.reshape(3, count, 3, count).copy()
+    left, common = pieces.means_rad_s - felt, covariance[each, :, each]
+    bias = likeliest_bias_process(steady, left, known.variances_rad2_s2, pieces.times_s, common)
+    noise = np.array([np.diag(each) for each in known.variances_rad2_s2.T])
+    covariance[each, :, each] += noise + bias.covariance(pieces.times_s)
+    return covariance.reshape(3 * count, 3 * count)
+
+
+def _together(off: Array) -> Array:
+    """(3 N, 3 N) covariance of independent patterns (P, N, 3)."""
+    columns = np.moveaxis(off, 0, -1).swapaxes(0, 1).reshape(-1, len(off))
+    return np.asarray(columns @ columns.T, dtype=np.float64)
+
+
+def _tolerated(pieces: Pieces, felt: Array) -> _Known:
+    """What was allowed to every sensor alike: in all of a sweep, and within it."""
     same = (pieces.sweep[:, None] == pieces.sweep) & (pieces.sweep >= 0)
     speed = np.linalg.norm(felt, axis=1)
     off = (TOLERANCE**2 + np.outer(pieces.speed_std, pieces.speed_std)) * same * np.outer(speed, speed)
-    off[own, own] += (WITHIN_A_TURN * speed) ** 2
-    variances = pieces.variances_rad2_s2 + ((WITHIN_A_TURN * speed) ** 2)[:, None]
-    bias = likeliest_bias_process(steady, pieces.means_rad_s - felt, variances, pieces.times_s)
-    noise = np.array([np.diag(each) for each in pieces.variances_rad2_s2.T])
-    return np.asarray(noise + off + bias.covariance(pieces.times_s), dtype=np.float64)
+    return _Known(pieces.variances_rad2_s2 + ((WITHIN_A_TURN * speed) ** 2)[:, None], np.kron(np.eye(3), off))
 
 
 def _steady(pieces: Pieces) -> Array:
@@ -180,19 +204,18 @@ def _per_axis(columns: Array) -> Array:
     return stacked
 
 
-def _whitening(covariance: Array, least: Array) -> Array:
-    """(3, N, N) what makes noise of covariance (3, N, N) one and independent; no variance is below `least` (3,).
+def _whitening(covariance: Array, least: float) -> Array:
+    """(3 N, 3 N) what makes noise of that covariance one and independent; no variance is below `least`.
 
     Windows overlap when a computer's clock was put back between two recordings, and what is computed is no covariance.
     """
     variances, directions = np.linalg.eigh(covariance)
-    sizes = np.sqrt(np.maximum(variances, least[:, None]))
-    return np.asarray(directions.swapaxes(1, 2) / sizes[:, :, None], dtype=np.float64)
+    return np.asarray(directions.T / np.sqrt(np.maximum(variances, least))[:, None], dtype=np.float64)
 
 
 def _whiten(white: Array, columns: Array) -> Array:
     """(3 N, k) of columns (3, N, k)."""
-    return np.asarray((white @ columns).reshape(-1, columns.shape[2]), dtype=np.float64)
+    return np.asarray(white @ columns.reshape(len(white), -1), dtype=np.float64)
 
 
 def _basis(columns: Array) -> Array:

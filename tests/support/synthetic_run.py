@@ -151,7 +151,7 @@ def sample_times(setup: Setup, motion: Motion) -> tuple[Array, Array]:
 
 def readings(setup: Setup, rate: Array, rng: np.random.Generator) -> Array:
     """Counts (n, 3) of a sensor that feels the flange's rate (n, 3)."""
-    turned = rate @ _rotation(np.array(setup.mounting_error_rad)).T
+    turned = rate @ rotation(np.array(setup.mounting_error_rad)).T
     turned = turned * (1 + setup.odd_per_rad_s * np.abs(turned) + setup.even_per_rad_s * turned)
     noise = rng.normal(size=turned.shape)
     if setup.noise_correlation:
@@ -216,7 +216,7 @@ def _trapezoid(since_s: Array, step: Sweep | Transfer) -> tuple[Array, Array]:
     return np.where(since_s < step.duration_s / 2, half, way - half) / way, rate / way
 
 
-def _rotation(vector: Array) -> Array:
+def rotation(vector: Array) -> Array:
     angle = float(np.linalg.norm(vector))
     if angle == 0:
         return np.eye(3)
