@@ -213,5 +213,5 @@ def _means(values: Array, part: NDArray[np.intp], parts: int) -> Array:
     """(parts, k) means of values (n, k) by part; zero where a part has none."""
     counts = np.maximum(np.bincount(part, minlength=parts), 1)
     sums = [np.bincount(part, values[:, column], minlength=parts) for column in range(values.shape[1])]
-    means: Array = np.stack(sums, axis=1) / counts[:, None]
+    means: Array = np.reshape(sums, (values.shape[1], parts)).T / counts[:, None]
     return means
