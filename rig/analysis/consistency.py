@@ -152,13 +152,13 @@ def _tolerated(pieces: Pieces, felt: Array) -> _Known:
 def _steady(pieces: Pieces) -> Array:
     """(N, k) orthonormal columns: whatever each sweep reads as a whole, the rests alike, gravity, a steady drift."""
     places = [pieces.sweep == sweep for sweep in np.unique(pieces.sweep)]
-    return _basis(np.column_stack([*places, pieces.gravity_m_s2, _time(pieces)]))
+    return _basis(np.column_stack([*places, pieces.pull_m_s2, _time(pieces)]))
 
 
 def _known(pieces: Pieces) -> Array:
     """(N, 8) columns of the model, for each axis alike."""
     ones = np.ones(len(pieces.sweep))
-    return np.column_stack([pieces.rates_rad_s, ones, pieces.gravity_m_s2, _time(pieces)])
+    return np.column_stack([pieces.rates_rad_s, ones, pieces.pull_m_s2, _time(pieces)])
 
 
 def _suspicions(pieces: Pieces, felt: Array) -> dict[str, Array | None]:

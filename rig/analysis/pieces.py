@@ -60,9 +60,9 @@ class Pieces:
     """N pieces of revolutions and rests, and the windows they were cut from.
 
     `sweep` (N,) is the place of the revolution, −1 for a rest; `place` (N,) runs from −1 in its first part to 1 in its
-    last; `means_rad_s`, `variances_rad2_s2` (N, 3); `rates_rad_s` (N, 3) of the flange, `gravity_m_s2` (N, 3) in its
-    frame, `attitudes` (N, 3, 3) from the base into it; `speed_std` (N,) relative; `times_s` (N, 2) from start to end on
-    the clock of the first recording, `stretches` on that of their own.
+    last; `means_rad_s`, `variances_rad2_s2` (N, 3); `rates_rad_s` (N, 3) of the flange, `pull_m_s2` (N, 3) what is
+    felt as gravity, in its frame, `attitudes` (N, 3, 3) from the base into it; `speed_std` (N,) relative; `times_s`
+    (N, 2) from start to end on the clock of the first recording, `stretches` on that of their own.
     """
 
     sweep: Array
@@ -70,7 +70,7 @@ class Pieces:
     means_rad_s: Array
     variances_rad2_s2: Array
     rates_rad_s: Array
-    gravity_m_s2: Array
+    pull_m_s2: Array
     attitudes: Array
     speed_std: Array
     times_s: Array
@@ -108,11 +108,14 @@ def cut(name: str, recordings: Sequence[ObservedRun], result: SensorResult, expl
         *(cut_up(stream, recording.motion, rest, parts=max(1, parts // 2)) for recording, stream, rest in rests),
     ]
     averages = [*(turn.average for *_, turn in turns), *(rest for *_, rest in rests)]
-    pieces, times_s = [], []
-    for (_, made), average, began_s in zip(found, averages, explained.seen.windows_s[:, 0], strict=True):
+    seen, pieces, pull_m_s2, times_s = explained.seen, list[_Piece](), list[Array](), list[Array]()
+    for (_, made), average, began_s, acceleration_m_s2 in zip(
+        found, averages, seen.windows_s[:, 0], seen.acceleration_m_s2, strict=True
+    ):
         if made and made[0].sweep < 0 and average.samples < FEWEST_AT_REST:
             continue
         pieces += made
+        pull_m_s2 += [piece.gravity_m_s2 - acceleration_m_s2 for piece in made]
         times_s += [
             np.array([piece.stretch.start_s, piece.stretch.end_s]) - average.start_s + began_s for piece in made
         ]
@@ -122,7 +125,7 @@ def cut(name: str, recordings: Sequence[ObservedRun], result: SensorResult, expl
         means_rad_s=np.array([piece.mean_rad_s for piece in pieces]),
         variances_rad2_s2=np.array([piece.variance_rad2_s2 for piece in pieces]),
         rates_rad_s=np.array([piece.rate_rad_s for piece in pieces]),
-        gravity_m_s2=np.array([piece.gravity_m_s2 for piece in pieces]),
+        pull_m_s2=np.array(pull_m_s2),
         attitudes=np.array([piece.attitude for piece in pieces]),
         speed_std=np.array([piece.speed_std for piece in pieces]),
         times_s=np.array(times_s),

@@ -178,6 +178,11 @@ class RunSettings:
         return self.reckoning >= 2
 
     @property
+    def knows_own_motion(self) -> bool:
+        """Whether a gyroscope is taken to feel what the arm's turning makes of its place as it feels gravity."""
+        return self.reckoning >= 2
+
+    @property
     def movement(self) -> tuple[object, ...]:
         """What two recordings must have in common for their sweeps and dwells to be those of one run."""
         return self.procedure, self.then_verify, self.home_q_rad, self.planned_sweeps, self.planned_dwells
