@@ -6,16 +6,17 @@ along the swept axis but what the arm's clock, encoders and times can do there.
 """
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
+from rig.analysis.calibration import SensorResult, found_earth_rate
+from rig.analysis.consistency import Allowance
 from rig.analysis.pieces import REST, Pieces, Stretch
 from rig.analysis.seen import WAVE_SHARE, unknown_of
 from rig.analysis.surroundings import Surroundings
 from rig.arm.kinematics import AXIS_ERRORS, WAVES, WRIST_1, WRIST_2, WRIST_3, axis_errors, flange_axes
 from rig.config.sensor_catalogue import PARTS
-from rig.data.run_file import RecordedSensor
 from rig.estimation.arrays import Array
 from rig.estimation.earth import EARTH_RATE_RAD_S
 from rig.estimation.earth_rate import EarthRate
@@ -35,7 +36,7 @@ class Allowed:
 
     `angles_rad` (17,) of each of `ANGLES`; `repeatability_rad` of a joint that was moved away and back; `jitter_s` of
     the times of the arm's states; `earth_rad_s` (3, k) of the Earth's rate in the base's frame, for each way in which
-    it is not known; `odd_per_rad_s`, `even_per_rad_s` of the sensor's nonlinearity.
+    it is not known; `odd_per_rad_s`, `even_per_rad_s` of the sensor's nonlinearity, which the solve finds or does not.
     """
 
     angles_rad: Array
@@ -44,27 +45,37 @@ class Allowed:
     earth_rad_s: Array
     odd_per_rad_s: float
     even_per_rad_s: float
+    finds_curve: bool
 
 
-def allowed(
-    surroundings: Surroundings, name: str, sensor: RecordedSensor, earth_rate: EarthRate | None, *, finds_curve: bool
-) -> Allowed:
+def allowed(surroundings: Surroundings, name: str, result: SensorResult) -> Allowed:
     """By what the configuration states and the recording tells.
 
-    A solve that `finds_curve`, from several speeds, takes nothing of it as known. One of a single speed knows of no
-    even part: what there is of it puts the bias off.
+    A solve that finds the curve, from several speeds, takes nothing of it as known.
     """
-    uncertainty = surroundings.uncertainty
+    uncertainty, sensor = surroundings.uncertainty, result.sensor
     steady = np.array([each.startswith(("twist", "zero")) for each in ANGLES])
+    finds_curve = result.explained is not None and result.explained.nonlinearity is not None
     of_part = float(PARTS[sensor.part].nonlinearity / sensor.range_rad_s / np.sqrt(3))
     return Allowed(
         angles_rad=np.radians(uncertainty.axis_deg) / np.sqrt(3) * np.where(steady, 1.0, WAVE_SHARE),
         repeatability_rad=float(np.radians(uncertainty.repeatability_deg) / np.sqrt(3)),
         jitter_s=surroundings.state_jitter_s,
-        earth_rad_s=_earth(surroundings, name, sensor.part, earth_rate),
+        earth_rad_s=_earth(surroundings, name, sensor.part, found_earth_rate(result.earth)),
         odd_per_rad_s=FREE_PER_RAD_S if finds_curve else of_part,
-        even_per_rad_s=FREE_PER_RAD_S if finds_curve else 0.0,
+        even_per_rad_s=FREE_PER_RAD_S if finds_curve else of_part,
+        finds_curve=finds_curve,
     )
+
+
+def allow(known: Allowed, pieces: Pieces, ways: Pieces, matrix: Array) -> Allowance:
+    """For a sensor of that F (3, 3).
+
+    A solve of one speed has no even part of the sensor's curve, and what there is of it puts the bias off: sweeps and
+    rests are not excused by it.
+    """
+    of_sweeps = known if known.finds_curve else replace(known, even_per_rad_s=0.0)
+    return Allowance(patterns(pieces, matrix, of_sweeps), ways, patterns(ways, matrix, known))
 
 
 def _earth(surroundings: Surroundings, name: str, part: str, earth_rate: EarthRate | None) -> Array:

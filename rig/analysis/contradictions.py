@@ -5,17 +5,16 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from rig.analysis.allowance import allowed, patterns
-from rig.analysis.calibration import SensorResult, found_earth_rate, observe_recordings, solve_observed
+from rig.analysis.allowance import allow, allowed
+from rig.analysis.calibration import SensorResult, observe_recordings, solve_observed
 from rig.analysis.consistency import consistency
-from rig.analysis.pieces import Pieces, cut
+from rig.analysis.pieces import cut
 from rig.analysis.readings import judge_readings
-from rig.analysis.surroundings import Surroundings, surroundings_of
+from rig.analysis.surroundings import surroundings_of
 from rig.analysis.verdict import Check
+from rig.analysis.ways import with_ways
 from rig.data.run_file import RunData
 from rig.errors import RigError
-from rig.estimation.arrays import Array
-from rig.estimation.explained import Explained
 from rig.observation.observed_run import ObservedRun
 
 FALSE_ALARMS = 0.001  # how often one of these checks, of any sensor, fails an undamaged run, at most
@@ -50,8 +49,11 @@ def contradictions(
         if explained is None:
             continue
         pieces = cut(name, recordings, results[name], explained, settings.site)
-        off = None if surroundings is None else _off(pieces, surroundings, name, results[name], explained)
-        found = consistency(pieces, explained.solution.matrix, rate, off)
+        allowance = None
+        if surroundings is not None:
+            known = allowed(surroundings, name, results[name])
+            allowance = allow(known, pieces, with_ways(pieces, name, recordings, explained), explained.solution.matrix)
+        found = consistency(pieces, explained.solution.matrix, rate, allowance)
         counts = [recording.run.samples[name]["counts"].astype(np.int64) for recording in recordings]
         named = {results[name].observations[place].sweep: each for place, each in found.disturbed.items()}
         sweeps = {f"{DISTURBED}.{sweep}": each for sweep, each in sorted(named.items())} or {DISTURBED: found.sweep}
@@ -59,20 +61,6 @@ def contradictions(
         checks += [Check(f"{name}.{what}", value, limit, "1") for what, (value, limit) in statistics.items()]
         disturbed |= named.keys()
     return Contradictions(tuple(checks), frozenset(disturbed))
-
-
-def _off(
-    pieces: Pieces, surroundings: Surroundings, name: str, result: SensorResult, explained: Explained
-) -> Array:
-    """(P, N, 3) what arm and sensor may be off by in these pieces."""
-    known = allowed(
-        surroundings,
-        name,
-        result.sensor,
-        found_earth_rate(result.earth),
-        finds_curve=explained.nonlinearity is not None,
-    )
-    return patterns(pieces, explained.solution.matrix, known)
 
 
 def names_a_sweep(check: str) -> bool:

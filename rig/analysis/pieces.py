@@ -65,7 +65,7 @@ class Pieces:
     (N, 2) from start to end on the clock of the first recording, `stretches` on that of their own.
     """
 
-    sweep: Array
+    sweep: NDArray[np.intp]
     place: Array
     means_rad_s: Array
     variances_rad2_s2: Array
@@ -172,8 +172,8 @@ def _cut(
     if finds_lines:
         columns = lines(readings - means[part])
         taken = columns.shape[1]
-        means, left = _beside(columns, readings, part, parts)
-        rates, known_rate = _beside(columns, rate, part, parts)
+        means, left = beside(columns, readings, part, parts)
+        rates, known_rate = beside(columns, rate, part, parts)
         if turn is not None:
             along = known_rate @ turn.axis_flange[:, None]
             left = left - along @ np.linalg.lstsq(along, left, rcond=None)[0]
@@ -204,7 +204,7 @@ def _cut(
     return Window(sweep, seen, residual / count, np.sqrt(np.mean(shaken**2, axis=0)) / count), pieces
 
 
-def _beside(columns: Array, values: Array, part: NDArray[np.intp], parts: int) -> tuple[Array, Array]:
+def beside(columns: Array, values: Array, part: NDArray[np.intp], parts: int) -> tuple[Array, Array]:
     """(parts, 3) means of values (n, 3) beside what `columns` (n, k) explain, and (n, 3) what neither does."""
     means, apart = _means(values, part, parts), _means(columns, part, parts)
     within, left = columns - apart[part], values - means[part]

@@ -7,8 +7,9 @@ sheet: so p-values of checks that know as much, and no more, are uniform.
 from dataclasses import dataclass, replace
 
 import numpy as np
+from scipy.interpolate import CubicSpline
 
-from rig.arm.kinematics import NOMINAL, DenavitHartenberg, flange_attitude, flange_rate
+from rig.arm.kinematics import NOMINAL, DenavitHartenberg, flange_attitude, flange_pose, flange_rate
 from rig.arm.motion import Sweep, Transfer
 from rig.config.sensor_catalogue import PARTS
 from rig.data.run_file import RecordedSensor, RunData
@@ -75,9 +76,11 @@ def drawn(seed: int, kind: Kind, setup: Setup | None = None) -> Drawn:
     assert known is not None
     board_s, time_s = sample_times(setup, motion)
     q_rad, qd_rad_s, arm = _beside_the_encoders(motion, time_s, known, rng)
-    pull = flange_attitude(q_rad, arm) @ np.array([0.0, 0.0, -STANDARD_GRAVITY_M_S2])
+    to_flange = flange_attitude(q_rad, arm)
+    place_m = CubicSpline(time_s, flange_pose(q_rad, arm)[:, :3, 3])
+    pull = np.einsum("nij,nj->ni", to_flange, [0.0, 0.0, -STANDARD_GRAVITY_M_S2] - place_m(time_s, 2))
     room = EARTH_RATE_RAD_S * rng.uniform(-1, 1, 3)
-    turned = flange_rate(q_rad, qd_rad_s, arm) + flange_attitude(q_rad, arm) @ room
+    turned = flange_rate(q_rad, qd_rad_s, arm) + to_flange @ room
     felt = _felt(turned, pull, kind, rng)
     bias = rng.uniform(-0.02, 0.02, 3) + _wandering(len(time_s), kind, rng)
     read = felt + bias + kind.noise_rad_s * rng.standard_normal(felt.shape)
