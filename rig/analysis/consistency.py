@@ -11,13 +11,14 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from rig.analysis.pieces import Pieces
+from rig.analysis.pieces import REST, Pieces
 from rig.estimation.arrays import Array
 from rig.estimation.bias_process import likeliest_bias_process
 
 # Of the speed: twists of a real arm's wrists (−8e-4, +4e-4 rad, UR's own calibration), and what 0.1 % of full scale,
 # a common statement of nonlinearity, amounts to at a quarter of the range.
 TOLERANCE = 5e-4
+TOLD = 1e-3  # of a column's size, what the model must leave of it
 ALIKE = 10.0  # of χ²: what explains less than the best by no more than this might be the cause as well
 WITHIN_A_TURN = 3e-4  # of the speed: graduation and eccentricity of an encoder, which cancel over the turn
 
@@ -66,6 +67,20 @@ class _Held:
     seen: Array
     base: Array
 
+    def most_by_one(self, columns: Array, rate: float) -> Statistic | None:
+        """What the one of columns (3, N, k) explains that explains most; None where all of them are in the model."""
+        from scipy.special import chdtri
+
+        known, new = _basis(self.base), _whiten(self.white, columns)
+        sizes = np.linalg.norm(new, axis=0)
+        new = new - known @ (known.T @ new)
+        left = np.linalg.norm(new, axis=0)
+        told = left > TOLD * sizes
+        if not told.any():
+            return None
+        explained = (new[:, told].T @ (self.seen - known @ (known.T @ self.seen))) / left[told]
+        return float(np.max(explained**2)), float(chdtri(1, rate / np.count_nonzero(told)))
+
     def explained(self, columns: Array | None) -> tuple[float, int]:
         """As `_explained` has it, of columns (3, N, k)."""
         return _explained(self.seen, self.base, None if columns is None else _whiten(self.white, columns))
@@ -83,7 +98,7 @@ def consistency(pieces: Pieces, matrix: Array, rate: float, allowance: Allowance
         scatter = _tolerated(pieces, felt)
         held = _held(pieces, felt, scatter)
         suspected = {name: (held, columns) for name, columns in _changes(pieces, felt).items()}
-        whole = None
+        whole, of_an_axis = None, None
     else:
         scatter = _Scatter(pieces.variances_rad2_s2, _together(allowance.off_rad_s))
         held, ways = _held(pieces, felt, scatter), allowance.ways
@@ -92,17 +107,31 @@ def consistency(pieces: Pieces, matrix: Array, rate: float, allowance: Allowance
         held_on_ways = _held(ways, felt_on_ways, on_ways)
         suspected = {name: (held_on_ways, columns) for name, columns in _changes(ways, felt_on_ways).items()}
         whole = _each_axis(np.column_stack(_sweeps(pieces)))
+        of_an_axis = _axis_changed(ways, felt_on_ways, held_on_ways, rate)
     suspected |= {name: (held, columns) for name, columns in _differences(pieces, felt, whole).items()}
     found: dict[str, Statistic] = {}
     for name, (held_by, columns) in suspected.items():
         explained, freedom = held_by.explained(columns)
         if freedom:
             found[name] = explained, float(chdtri(freedom, rate))
+    if of_an_axis is not None:
+        found["axis_changed"] = of_an_axis
     jumped = _jumped(pieces, felt, scatter, rate)
     if jumped is not None:
         found["bias_jumped"] = jumped
     ranked = _disturbed(pieces, held, rate)
     return Consistency(found, ranked[0][1], {sweep: each for sweep, each in ranked if each[0] > each[1]})
+
+
+def _axis_changed(ways: Pieces, felt: Array, held: _Held, rate: float) -> Statistic | None:
+    """How much another scale factor of one axis explains, from one sweep or way on; None where none would be told.
+
+    It is that of the axis and the time for which it explains most.
+    """
+    starts = np.unique([ways.times_s[ways.sweep == sweep].min() for sweep in np.unique(ways.sweep[ways.sweep != REST])])
+    later = ways.times_s.mean(axis=1)[:, None] > starts[1:]
+    columns = np.concatenate([_per_axis(felt * since[:, None]) for since in later.T], axis=2)
+    return held.most_by_one(columns, rate)
 
 
 def _held(pieces: Pieces, felt: Array, scatter: _Scatter) -> _Held:
@@ -291,6 +320,6 @@ def _explained(seen: Array, base: Array, columns: Array | None) -> tuple[float, 
     new = columns / np.where(sizes > 0, sizes, 1.0)
     new = new - known @ (known.T @ new)
     left, singular, _ = np.linalg.svd(new, full_matrices=False)
-    told = left[:, singular > 1e-3]
+    told = left[:, singular > TOLD]
     explained = told.T @ unexplained
     return float(explained @ explained), told.shape[1]

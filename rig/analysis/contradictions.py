@@ -18,7 +18,7 @@ from rig.errors import RigError
 from rig.observation.observed_run import ObservedRun
 
 FALSE_ALARMS = 0.001  # how often one of these checks, of any sensor, fails an undamaged run, at most
-SHARES = 13  # of each sensor: its statistics, each with a share of its own
+SHARES = 13  # of each sensor: its statistics, each with a share of its own; one more where ways are looked at
 DISTURBED = "disturbed_sweep"
 
 
@@ -43,7 +43,7 @@ def contradictions(
     surroundings = surroundings_of(recordings) if settings.checked_by_model else None
     checks: list[Check] = []
     disturbed: set[int] = set()
-    rate = FALSE_ALARMS / (SHARES * len(sensors))
+    rate = FALSE_ALARMS / ((SHARES + settings.checked_by_model) * len(sensors))
     for name in sensors:
         explained = results[name].explained
         if explained is None:
