@@ -112,10 +112,11 @@ def _of_angles(pieces: Pieces, known: Allowed) -> Array:
         if sweep < REST:
             for ends in _ends(stretch):
                 again.append(np.zeros(pieces.means_rad_s.shape))
-                again[-1][place] = ends
+                again[-1][place] = np.hypot(known.repeatability_rad, stretch.unseen_rad) * ends
     for visit in _visits(pieces):
-        again += [np.where(np.isin(pieces.sweep, visit)[:, None], each[zero], 0.0) for zero in ZEROS]
-    return np.concatenate([known.angles_rad[:, None, None] * each, known.repeatability_rad * np.array(again)])
+        there = np.isin(pieces.sweep, visit)[:, None]
+        again += [known.repeatability_rad * np.where(there, each[zero], 0.0) for zero in ZEROS]
+    return np.concatenate([known.angles_rad[:, None, None] * each, again])
 
 
 def _visits(pieces: Pieces) -> list[list[int]]:

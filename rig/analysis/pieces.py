@@ -17,7 +17,7 @@ from rig.estimation.arrays import Array
 from rig.estimation.explained import Explained
 from rig.observation.average import Average, Stream, between, rounding_left
 from rig.observation.colour import widening
-from rig.observation.lines import fitted, lines
+from rig.observation.lines import fitted, lines, waves
 from rig.observation.observe import Observation
 from rig.observation.observed_run import ObservedRun
 from rig.observation.tapered import noise_at_zero
@@ -28,6 +28,7 @@ MOST_PIECES = 48  # of all revolutions: beyond twelve sweeps these are cut into 
 FEWEST_SAMPLES = 20
 PREVAILS = 0.7  # of the residuals' variance, what is left in a long mean where the rest of them is a vibration
 FEWEST_AT_REST = 60  # of a whole rest: fewer do not tell its noise well enough to weigh it by
+FINER = 3.0  # than the arm's states follow each other, what its rate is looked at
 REST = -1  # in the place of a sweep; ways between sweeps and rests count down from there
 
 
@@ -48,11 +49,15 @@ class Window:
 
 @dataclass(frozen=True, slots=True)
 class Stretch:
-    """From when to when the arm made a motion, on the clock of its states."""
+    """From when to when the arm made a motion, on the clock of its states.
+
+    `unseen_rad` is what samples may miss of where a motion begins or ends.
+    """
 
     motion: ArmMotion
     start_s: float
     end_s: float
+    unseen_rad: float = 0.0
 
 
 @dataclass(frozen=True, slots=True)
@@ -170,13 +175,14 @@ def _cut(
         residual = residual - shaken
     left, taken = residual, 0
     if finds_lines:
-        columns = lines(readings - means[part])
+        cycles, share = lines(readings - means[part]), (time_s - average.start_s) / average.duration_s
+        columns = waves(cycles, share)
         taken = columns.shape[1]
         means, left = beside(columns, readings, part, parts)
-        rates, known_rate = beside(columns, rate, part, parts)
         if turn is not None:
-            along = known_rate @ turn.axis_flange[:, None]
+            along = beside(columns, rate, part, parts)[1] @ turn.axis_flange[:, None]
             left = left - along @ np.linalg.lstsq(along, left, rcond=None)[0]
+            rates = turned(motion, average.start_s, average.end_s, cycles, parts)
     count = stream.sensor.sensitivity_rad_s_per_count
     scatter = np.maximum(np.sum(left**2, axis=0) / max(len(left) - len(enough) - taken, 1), count**2 / 12)
     noise = scatter * np.array([widening(left[:, axis]) for axis in range(3)])
@@ -210,6 +216,17 @@ def beside(columns: Array, values: Array, part: NDArray[np.intp], parts: int) ->
     within, left = columns - apart[part], values - means[part]
     sizes = fitted(within, left)
     return means - apart @ sizes, left - within @ sizes
+
+
+def turned(motion: ArmMotion, start_s: float, end_s: float, cycles: Array, parts: int) -> Array:
+    """(parts, 3) mean rates of the flange beside lines that make so many cycles (k,) from start to end.
+
+    All states count, where samples are farther apart than these: what one of them errs by the next takes back.
+    """
+    count = round(FINER * (end_s - start_s) / float(np.median(np.diff(motion.time_s))))
+    share = (np.arange(count) + 0.5) / count
+    part = np.asarray(parts * share, dtype=np.intp)
+    return beside(waves(cycles, share), motion.rate(start_s + share * (end_s - start_s)), part, parts)[0]
 
 
 def _means(values: Array, part: NDArray[np.intp], parts: int) -> Array:

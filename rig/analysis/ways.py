@@ -11,20 +11,21 @@ from itertools import pairwise
 
 import numpy as np
 
-from rig.analysis.pieces import REST, Pieces, Stretch, beside
+from rig.analysis.pieces import REST, Pieces, Stretch, beside, turned
 from rig.analysis.seen import since_first_s
 from rig.arm.kinematics import WRIST_1, flange_pose
 from rig.data.run_file import RunData
 from rig.estimation.arrays import Array
 from rig.estimation.explained import Explained
 from rig.observation.average import Stream, between
-from rig.observation.lines import lines
+from rig.observation.lines import lines, waves
 from rig.observation.observed_run import ObservedRun
 from rig.observation.timebase import MIN_RATE_RAD_S, ArmMotion
 from rig.observation.windows import rested, swept
 
 BEYOND_S = 0.1  # before it moves and after, in which an arm stands still that was slower than can be told
 SHORTEST_S, LONGEST_S = 0.5, 30.0
+SPARSE_S = 0.01  # samples that are farther apart miss what the servo's vibration does while it grows faster
 LOST = 0.01  # of the samples, at most
 STANDS_RAD = 1e-3
 STEPS = 48
@@ -48,12 +49,13 @@ def with_ways(pieces: Pieces, name: str, recordings: Sequence[ObservedRun], expl
     for way, stream, _, each in found:
         inside = between(stream, way.start_s, way.end_s)
         rate, readings = way.motion.rate(stream.time_s[inside]), stream.readings_rad_s[inside]
-        columns, all_of_it = lines(readings - rate @ explained.solution.matrix.T), np.zeros(len(rate), dtype=np.intp)
+        cycles, share = lines(readings - rate @ explained.solution.matrix.T), _share(way, stream.time_s[inside])
         attitude = way.motion.attitude(way.start_s, way.end_s)
         site = each.run.settings.site
         assert site is not None
-        means.append(beside(columns, readings, all_of_it, 1)[0][0])
-        rates.append(beside(columns, rate, all_of_it, 1)[0][0] + attitude @ explained.seen.earth_rate_rad_s)
+        means.append(beside(waves(cycles, share), readings, np.zeros(len(rate), dtype=np.intp), 1)[0][0])
+        turn = turned(way.motion, way.start_s, way.end_s, cycles, 1)[0]
+        rates.append(turn + attitude @ explained.seen.earth_rate_rad_s)
         attitudes.append(attitude)
         pulls.append(_pull(way, site.down_m_s2, np.array(each.run.settings.extension_m)))
     times_s = np.array([(way.start_s + since_s, way.end_s + since_s) for way, _, since_s, _ in found])
@@ -88,9 +90,15 @@ def _moved(start_s: float, end_s: float, stream: Stream, motion: ArmMotion) -> I
     moving = motion.time_s[inside][np.linalg.norm(motion.rate(motion.time_s[inside]), axis=1) > MIN_RATE_RAD_S]
     if not len(moving):
         return
-    way = Stretch(motion, max(start_s, moving[0] - BEYOND_S), min(end_s, moving[-1] + BEYOND_S))
-    samples = between(stream, way.start_s, way.end_s)
+    start_s, end_s = max(start_s, moving[0] - BEYOND_S), min(end_s, moving[-1] + BEYOND_S)
+    samples = between(stream, start_s, end_s)
     time_s = stream.time_s[samples]
+    if len(time_s) < 2 or np.diff(time_s).mean() > SPARSE_S:
+        return
+    # Samples add up to all of a way but for the corners of the rate: for each at most its change of slope times dt²/12.
+    step_s = float(time_s[-1] - time_s[0]) / (len(time_s) - 1)
+    unseen_rad = float(np.linalg.norm(motion.rate(moving, 1), axis=1).max() * step_s**2 / 6)
+    way = Stretch(motion, float(time_s[0]) - step_s / 2, float(time_s[-1]) + step_s / 2, unseen_rad)
     whole = len(time_s) >= (1 - LOST) * (way.end_s - way.start_s) * stream.sensor.rate_hz
     ends = np.linalg.norm(motion.rate(np.array([way.start_s, way.end_s])), axis=1)
     others = motion.angles(np.linspace(way.start_s, way.end_s, STEPS))[:, :WRIST_1]
@@ -104,6 +112,11 @@ def _moved(start_s: float, end_s: float, stream: Stream, motion: ArmMotion) -> I
         and motion.covered(time_s).all()
     ):
         yield way
+
+
+def _share(way: Stretch, time_s: Array) -> Array:
+    share: Array = (time_s - way.start_s) / (way.end_s - way.start_s)
+    return share
 
 
 def _pull(way: Stretch, down_m_s2: Array, extension_m: Array) -> Array:

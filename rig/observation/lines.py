@@ -20,32 +20,33 @@ FEWEST_SAMPLES = 64
 
 
 def lines(residuals: Array) -> Array:
-    """(n, 8 k) cosine and sine of k lines in residuals (n, 3); k may be zero.
+    """(k,) how many cycles each line makes in all of the residuals (n, 3); k may be zero."""
+    count, cycles = len(residuals), np.zeros(0)
+    share = np.arange(count) / count
+    while FEWEST_SAMPLES <= count and len(cycles) < MOST_LINES:
+        known = waves(cycles, share)
+        strongest = _strongest(residuals - known @ fitted(known, residuals), cycles)
+        if strongest is None:
+            break
+        cycles = _refined(np.append(cycles, strongest), residuals)
+    return cycles
+
+
+def waves(cycles: Array, share: Array) -> Array:
+    """(n, 8 k) cosine and sine of k lines where a share (n,) of the time is over.
 
     Beside each stand both growing steadily, for a line that comes or goes, and both of one cycle more and one less: what
     shakes in the room is felt so by a sensor that makes a turn.
     """
-    count, cycles = len(residuals), np.zeros(0)
-    while FEWEST_SAMPLES <= count and len(cycles) < MOST_LINES:
-        columns = _columns(cycles, count)
-        strongest = _strongest(residuals - columns @ fitted(columns, residuals), cycles)
-        if strongest is None:
-            break
-        cycles = _refined(np.append(cycles, strongest), residuals)
-    return _columns(cycles, count)
+    each = [wave(2 * np.pi * np.outer(share, cycles + more)) for more in (0, -1, 1) for wave in (np.cos, np.sin)]
+    grown = [(2 * share - 1)[:, None] * wave for wave in each[:2]]
+    return np.stack(each[:2] + grown + each[2:], axis=2).reshape(len(share), WIDE * len(cycles))
 
 
 def fitted(columns: Array, values: Array) -> Array:
     """(k, m) least squares of values (n, m) by such columns (n, k), some of which may be nearly alike."""
     sizes: Array = np.linalg.lstsq(columns, values, rcond=ALIKE)[0]
     return sizes
-
-
-def _columns(cycles: Array, count: int) -> Array:
-    share = np.arange(count) / count
-    each = [wave(2 * np.pi * np.outer(share, cycles + more)) for more in (0, -1, 1) for wave in (np.cos, np.sin)]
-    grown = [(2 * share - 1)[:, None] * wave for wave in each[:2]]
-    return np.stack(each[:2] + grown + each[2:], axis=2).reshape(count, WIDE * len(cycles))
 
 
 def _strongest(left: Array, known: Array) -> float | None:
@@ -65,8 +66,9 @@ def _strongest(left: Array, known: Array) -> float | None:
 
 def _refined(cycles: Array, residuals: Array) -> Array:
     """By what grows of a line a quarter of a cycle behind it: its phase."""
+    share = np.arange(len(residuals)) / len(residuals)
     for _ in range(PASSES):
-        sizes = fitted(_columns(cycles, len(residuals)), residuals).reshape(len(cycles), WIDE, -1)
+        sizes = fitted(waves(cycles, share), residuals).reshape(len(cycles), WIDE, -1)
         cosine, sine, cosine_grown, sine_grown = np.moveaxis(sizes, 1, 0)[:4]
         late = np.sum(cosine_grown * sine - sine_grown * cosine, axis=1) / np.sum(cosine**2 + sine**2, axis=1)
         cycles = cycles + np.clip(late / np.pi, -0.5, 0.5)
