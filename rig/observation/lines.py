@@ -23,7 +23,7 @@ def lines(residuals: Array) -> Array:
     """(k,) how many cycles each line makes in all of the residuals (n, 3); k may be zero."""
     count, cycles = len(residuals), np.zeros(0)
     share = np.arange(count) / count
-    while FEWEST_SAMPLES <= count and len(cycles) < MOST_LINES:
+    while count >= FEWEST_SAMPLES and len(cycles) < MOST_LINES:
         known = waves(cycles, share)
         strongest = _strongest(residuals - known @ fitted(known, residuals), cycles)
         if strongest is None:
