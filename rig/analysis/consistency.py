@@ -7,17 +7,18 @@ of freedom as columns. The process of the bias comes from what is left within th
 a wrong sweep does not excuse itself.
 """
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
-from rig.analysis.pieces import Pieces
+from rig.analysis.pieces import REST, Pieces
 from rig.estimation.arrays import Array
 from rig.estimation.bias_process import likeliest_bias_process
 
 # Of the speed: twists of a real arm's wrists (−8e-4, +4e-4 rad, UR's own calibration), and what 0.1 % of full scale,
 # a common statement of nonlinearity, amounts to at a quarter of the range.
 TOLERANCE = 5e-4
+TOLD = 1e-3  # of a column's size, what the model must leave of it
 ALIKE = 10.0  # of χ²: what explains less than the best by no more than this might be the cause as well
 WITHIN_A_TURN = 3e-4  # of the speed: graduation and eccentricity of an encoder, which cancel over the turn
 
@@ -37,27 +38,109 @@ class Consistency:
     disturbed: dict[int, Statistic]
 
 
-def consistency(pieces: Pieces, matrix: Array, rate: float) -> Consistency:
-    """Every statistic with its critical value; `rate` is that of false alarms for each, `matrix` (3, 3) F."""
+@dataclass(frozen=True, slots=True)
+class Allowance:
+    """What pieces may be off by, a pattern for each thing of one standard deviation: `off_rad_s` (P, N, 3).
+
+    `ways` are the same pieces and the ways between them, `off_on_ways_rad_s` (Q, M, 3) what these may be off by.
+    """
+
+    off_rad_s: Array
+    ways: Pieces
+    off_on_ways_rad_s: Array
+
+
+@dataclass(frozen=True, slots=True)
+class _Scatter:
+    """Of the pieces' means beside a bias that wanders: `variances_rad2_s2` (N, 3) each for itself, and what they have in
+    common, `common_rad2_s2` (3 N, 3 N)."""
+
+    variances_rad2_s2: Array
+    common_rad2_s2: Array
+
+
+@dataclass(frozen=True, slots=True)
+class _Held:
+    """Readings (3 N,) and the columns of the model (3 N, k) as `white` (3 N, 3 N) makes them."""
+
+    white: Array
+    seen: Array
+    base: Array
+
+    def most_by_one(self, columns: Array, rate: float) -> Statistic | None:
+        """What the one of columns (3, N, k) explains that explains most; None where all of them are in the model."""
+        from scipy.special import chdtri
+
+        known, new = _basis(self.base), _whiten(self.white, columns)
+        sizes = np.linalg.norm(new, axis=0)
+        new = new - known @ (known.T @ new)
+        left = np.linalg.norm(new, axis=0)
+        told = left > TOLD * sizes
+        if not told.any():
+            return None
+        explained = (new[:, told].T @ (self.seen - known @ (known.T @ self.seen))) / left[told]
+        return float(np.max(explained**2)), float(chdtri(1, rate / np.count_nonzero(told)))
+
+    def explained(self, columns: Array | None) -> tuple[float, int]:
+        """As `_explained` has it, of columns (3, N, k)."""
+        return _explained(self.seen, self.base, None if columns is None else _whiten(self.white, columns))
+
+
+def consistency(pieces: Pieces, matrix: Array, rate: float, allowance: Allowance | None = None) -> Consistency:
+    """Every statistic with its critical value; `rate` is that of false alarms for each, `matrix` (3, 3) F.
+
+    Without an `allowance` every sensor is allowed what all were before, and the ways between the sweeps tell nothing.
+    """
     from scipy.special import chdtri
 
     felt = pieces.rates_rad_s @ matrix.T
-    white = _whitening(_covariance(pieces, felt, _steady(pieces)), pieces.variances_rad2_s2.min(axis=0))
-    seen = _whiten(white, pieces.means_rad_s.T[:, :, None])[:, 0]
-    base = _whiten(white, _each_axis(_known(pieces)))
+    if allowance is None:
+        scatter = _tolerated(pieces, felt)
+        held = _held(pieces, felt, scatter)
+        suspected = {name: (held, columns) for name, columns in _changes(pieces, felt).items()}
+        whole, of_an_axis = None, None
+    else:
+        scatter = _Scatter(pieces.variances_rad2_s2, _together(allowance.off_rad_s))
+        held, ways = _held(pieces, felt, scatter), allowance.ways
+        felt_on_ways = ways.rates_rad_s @ matrix.T
+        on_ways = _Scatter(ways.variances_rad2_s2, _together(allowance.off_on_ways_rad_s))
+        held_on_ways = _held(ways, felt_on_ways, on_ways)
+        suspected = {name: (held_on_ways, columns) for name, columns in _changes(ways, felt_on_ways).items()}
+        whole = _each_axis(np.column_stack(_sweeps(pieces)))
+        of_an_axis = _axis_changed(ways, felt_on_ways, held_on_ways, rate)
+    suspected |= {name: (held, columns) for name, columns in _differences(pieces, felt, whole).items()}
     found: dict[str, Statistic] = {}
-    for name, columns in _suspicions(pieces, felt).items():
-        explained, freedom = _explained(seen, base, None if columns is None else _whiten(white, columns))
+    for name, (held_by, columns) in suspected.items():
+        explained, freedom = held_by.explained(columns)
         if freedom:
             found[name] = explained, float(chdtri(freedom, rate))
-    jumped = _jumped(pieces, felt, rate)
+    if of_an_axis is not None:
+        found["axis_changed"] = of_an_axis
+    jumped = _jumped(pieces, felt, scatter, rate)
     if jumped is not None:
         found["bias_jumped"] = jumped
-    ranked = _disturbed(pieces, white, seen, base, rate)
+    ranked = _disturbed(pieces, held, rate)
     return Consistency(found, ranked[0][1], {sweep: each for sweep, each in ranked if each[0] > each[1]})
 
 
-def _disturbed(pieces: Pieces, white: Array, seen: Array, base: Array, rate: float) -> list[tuple[int, Statistic]]:
+def _axis_changed(ways: Pieces, felt: Array, held: _Held, rate: float) -> Statistic | None:
+    """How much another scale factor of one axis explains, from one sweep or way on; None where none would be told.
+
+    It is that of the axis and the time for which it explains most.
+    """
+    starts = np.unique([ways.times_s[ways.sweep == sweep].min() for sweep in np.unique(ways.sweep[ways.sweep != REST])])
+    later = ways.times_s.mean(axis=1)[:, None] > starts[1:]
+    columns = np.concatenate([_per_axis(felt * since[:, None]) for since in later.T], axis=2)
+    return held.most_by_one(columns, rate)
+
+
+def _held(pieces: Pieces, felt: Array, scatter: _Scatter) -> _Held:
+    white = _whitening(_covariance(pieces, felt, _steady(pieces), scatter), pieces.variances_rad2_s2.min())
+    seen = _whiten(white, pieces.means_rad_s.T[:, :, None])[:, 0]
+    return _Held(white, seen, _whiten(white, _each_axis(_known(pieces))))
+
+
+def _disturbed(pieces: Pieces, held: _Held, rate: float) -> list[tuple[int, Statistic]]:
     """The sweep least like the others, then the next once that is taken out, until they agree or half are out.
 
     Where one turn each way about an axis is all there is, either of the two may be the one: then both are named.
@@ -67,7 +150,7 @@ def _disturbed(pieces: Pieces, white: Array, seen: Array, base: Array, rate: flo
     left = np.unique(pieces.sweep[pieces.sweep >= 0]).tolist()
     each_rate, most, found = rate / len(left), (len(left) + 1) // 2, list[tuple[int, Statistic]]()
     while len(found) < most:
-        explained = {sweep: _explained(seen, base, _whiten(white, _of_sweep(pieces, sweep))) for sweep in left}
+        explained = {sweep: held.explained(_of_sweep(pieces, sweep)) for sweep in left}
         worst = max(left, key=lambda sweep: explained[sweep][0])
         value, freedom = explained[worst]
         limit = float(chdtri(freedom, each_rate))
@@ -76,11 +159,12 @@ def _disturbed(pieces: Pieces, white: Array, seen: Array, base: Array, rate: flo
         alike = [sweep for sweep in left if explained[sweep][0] > value - ALIKE]
         found += [(sweep, (value, limit)) for sweep in alike]
         left = [sweep for sweep in left if sweep not in alike]
-        base = np.concatenate([base, _whiten(white, _of_sweep(pieces, worst))], axis=1)
+        base = np.concatenate([held.base, _whiten(held.white, _of_sweep(pieces, worst))], axis=1)
+        held = replace(held, base=base)
     return found
 
 
-def _jumped(pieces: Pieces, felt: Array, rate: float) -> Statistic | None:
+def _jumped(pieces: Pieces, felt: Array, scatter: _Scatter, rate: float) -> Statistic | None:
     """How much a jump of the bias between two rests explains beside its wandering; None without three rests.
 
     The process is estimated anew beside the jump that explains most, for that jump would be taken for wandering. Few
@@ -97,7 +181,7 @@ def _jumped(pieces: Pieces, felt: Array, rate: float) -> Statistic | None:
         return None
 
     def explained(step: Array, beside: Array) -> float:
-        white = _whitening(_covariance(pieces, felt, beside), pieces.variances_rad2_s2.min(axis=0))
+        white = _whitening(_covariance(pieces, felt, beside, scatter), pieces.variances_rad2_s2.min())
         seen = _whiten(white, (pieces.means_rad_s - felt).T[:, :, None])[:, 0]
         return _explained(seen, _whiten(white, _each_axis(steady)), _whiten(white, _each_axis(step)))[0]
 
@@ -109,50 +193,71 @@ def _jumped(pieces: Pieces, felt: Array, rate: float) -> Statistic | None:
     return explained(steps[best], beside), 3 * float(fdtri(3, len(steps), 1 - rate / len(steps)))
 
 
-def _covariance(pieces: Pieces, felt: Array, steady: Array) -> Array:
-    """(3, N, N) of the pieces' means: noise, a bias that wanders, and what arm and sensor may be off by.
+def _covariance(pieces: Pieces, felt: Array, steady: Array, scatter: _Scatter) -> Array:
+    """(3 N, 3 N) of the pieces' means, axis by axis: their scatter, and a bias that wanders.
 
-    How the bias wanders is found from what `steady` (N, k), orthonormal columns, leaves of the readings.
+    How it wanders is found from what `steady` (N, k), orthonormal columns, leaves of the readings.
     """
-    own = np.arange(len(pieces.sweep))
+    each, count = np.arange(3), len(pieces.sweep)
+    covariance = scatter.common_rad2_s2.reshape(3, count, 3, count).copy()
+    left, common = pieces.means_rad_s - felt, covariance[each, :, each]
+    bias = likeliest_bias_process(steady, left, scatter.variances_rad2_s2, pieces.times_s, common)
+    noise = np.array([np.diag(each) for each in scatter.variances_rad2_s2.T])
+    covariance[each, :, each] += noise + bias.covariance(pieces.times_s)
+    return covariance.reshape(3 * count, 3 * count)
+
+
+def _together(off: Array) -> Array:
+    """(3 N, 3 N) covariance of independent patterns (P, N, 3)."""
+    columns = np.moveaxis(off, 0, -1).swapaxes(0, 1).reshape(-1, len(off))
+    return np.asarray(columns @ columns.T, dtype=np.float64)
+
+
+def _tolerated(pieces: Pieces, felt: Array) -> _Scatter:
+    """What was allowed to every sensor alike: in all of a sweep, and within it."""
     same = (pieces.sweep[:, None] == pieces.sweep) & (pieces.sweep >= 0)
     speed = np.linalg.norm(felt, axis=1)
     off = (TOLERANCE**2 + np.outer(pieces.speed_std, pieces.speed_std)) * same * np.outer(speed, speed)
-    off[own, own] += (WITHIN_A_TURN * speed) ** 2
-    variances = pieces.variances_rad2_s2 + ((WITHIN_A_TURN * speed) ** 2)[:, None]
-    bias = likeliest_bias_process(steady, pieces.means_rad_s - felt, variances, pieces.times_s)
-    noise = np.array([np.diag(each) for each in pieces.variances_rad2_s2.T])
-    return np.asarray(noise + off + bias.covariance(pieces.times_s), dtype=np.float64)
+    return _Scatter(pieces.variances_rad2_s2 + ((WITHIN_A_TURN * speed) ** 2)[:, None], np.kron(np.eye(3), off))
 
 
 def _steady(pieces: Pieces) -> Array:
     """(N, k) orthonormal columns: whatever each sweep reads as a whole, the rests alike, gravity, a steady drift."""
     places = [pieces.sweep == sweep for sweep in np.unique(pieces.sweep)]
-    return _basis(np.column_stack([*places, pieces.gravity_m_s2, _time(pieces)]))
+    return _basis(np.column_stack([*places, pieces.pull_m_s2, _time(pieces)]))
 
 
 def _known(pieces: Pieces) -> Array:
     """(N, 8) columns of the model, for each axis alike."""
     ones = np.ones(len(pieces.sweep))
-    return np.column_stack([pieces.rates_rad_s, ones, pieces.gravity_m_s2, _time(pieces)])
+    return np.column_stack([pieces.rates_rad_s, ones, pieces.pull_m_s2, _time(pieces)])
 
 
-def _suspicions(pieces: Pieces, felt: Array) -> dict[str, Array | None]:
-    """By name of the check (3, N, k): what each would add to the three axes' readings; None is anything at all."""
+def _changes(pieces: Pieces, felt: Array) -> dict[str, Array | None]:
+    """By name of the check (3, N, k): what another scale factor of each axis, or another mounting, with time adds."""
     time = _time(pieces)
     for sweep in np.unique(pieces.sweep):  # what changes within a sweep is that sweep's own matter
         time[pieces.sweep == sweep] = time[pieces.sweep == sweep].mean()
     turned = np.cross(np.eye(3)[:, None], felt[None]) * time[None, :, None]  # (k, N, 3)
-    found: dict[str, Array | None] = {
-        "scale_changed": _per_axis(felt * time[:, None]),
-        "loose_mounting": np.transpose(turned, (2, 1, 0)),
-        "cw_against_ccw": _per_axis(np.abs(felt)),
-        "residuals": None,
-    }
+    return {"scale_changed": _per_axis(felt * time[:, None]), "loose_mounting": np.transpose(turned, (2, 1, 0))}
+
+
+def _differences(pieces: Pieces, felt: Array, whole: Array | None) -> dict[str, Array | None]:
+    """The same of what differs between directions, sweeps and rests.
+
+    What else may differ is `whole` (3, N, k), each sweep from what the model says; None is anything at all, but of that
+    the scatter within sweeps is made which the bias' wandering is found from.
+    """
+    found: dict[str, Array | None] = {"cw_against_ccw": _per_axis(np.abs(felt)), "residuals": whole}
     moving = pieces.sweep >= 0
     if not moving.all():
         found["sweeps_against_rests"] = _per_axis(np.outer(moving, np.ones(3)))
     return found
+
+
+def _sweeps(pieces: Pieces) -> list[Array]:
+    """(N,) one in each sweep, zero elsewhere."""
+    return [(pieces.sweep == sweep).astype(np.float64) for sweep in np.unique(pieces.sweep[pieces.sweep >= 0])]
 
 
 def _of_sweep(pieces: Pieces, sweep: int) -> Array:
@@ -180,19 +285,18 @@ def _per_axis(columns: Array) -> Array:
     return stacked
 
 
-def _whitening(covariance: Array, least: Array) -> Array:
-    """(3, N, N) what makes noise of covariance (3, N, N) one and independent; no variance is below `least` (3,).
+def _whitening(covariance: Array, least: float) -> Array:
+    """(3 N, 3 N) what makes noise of that covariance one and independent; no variance is below `least`.
 
     Windows overlap when a computer's clock was put back between two recordings, and what is computed is no covariance.
     """
     variances, directions = np.linalg.eigh(covariance)
-    sizes = np.sqrt(np.maximum(variances, least[:, None]))
-    return np.asarray(directions.swapaxes(1, 2) / sizes[:, :, None], dtype=np.float64)
+    return np.asarray(directions.T / np.sqrt(np.maximum(variances, least))[:, None], dtype=np.float64)
 
 
 def _whiten(white: Array, columns: Array) -> Array:
     """(3 N, k) of columns (3, N, k)."""
-    return np.asarray((white @ columns).reshape(-1, columns.shape[2]), dtype=np.float64)
+    return np.asarray(white @ columns.reshape(len(white), -1), dtype=np.float64)
 
 
 def _basis(columns: Array) -> Array:
@@ -216,6 +320,6 @@ def _explained(seen: Array, base: Array, columns: Array | None) -> tuple[float, 
     new = columns / np.where(sizes > 0, sizes, 1.0)
     new = new - known @ (known.T @ new)
     left, singular, _ = np.linalg.svd(new, full_matrices=False)
-    told = left[:, singular > 1e-3]
+    told = left[:, singular > TOLD]
     explained = told.T @ unexplained
     return float(explained @ explained), told.shape[1]

@@ -5,18 +5,20 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from rig.analysis.allowance import allow, allowed
 from rig.analysis.calibration import SensorResult, observe_recordings, solve_observed
 from rig.analysis.consistency import consistency
 from rig.analysis.pieces import cut
 from rig.analysis.readings import judge_readings
 from rig.analysis.surroundings import surroundings_of
 from rig.analysis.verdict import Check
+from rig.analysis.ways import with_ways
 from rig.data.run_file import RunData
 from rig.errors import RigError
 from rig.observation.observed_run import ObservedRun
 
 FALSE_ALARMS = 0.001  # how often one of these checks, of any sensor, fails an undamaged run, at most
-SHARES = 13  # of each sensor: its statistics, each with a share of its own
+SHARES = 13  # of each sensor: its statistics, each with a share of its own; one more where ways are looked at
 DISTURBED = "disturbed_sweep"
 
 
@@ -35,18 +37,23 @@ def contradictions(
 
     A sweep that is named is part of the name, `gyro.disturbed_sweep.3`.
     """
-    site = recordings[0].run.settings.site
-    if site is None:
+    settings = recordings[0].run.settings
+    if settings.site is None:
         return Contradictions((), frozenset())
+    surroundings = surroundings_of(recordings) if settings.checked_by_model else None
     checks: list[Check] = []
     disturbed: set[int] = set()
-    rate = FALSE_ALARMS / (SHARES * len(sensors))
+    rate = FALSE_ALARMS / ((SHARES + settings.checked_by_model) * len(sensors))
     for name in sensors:
         explained = results[name].explained
         if explained is None:
             continue
-        pieces = cut(name, recordings, results[name], explained, site)
-        found = consistency(pieces, explained.solution.matrix, rate)
+        pieces = cut(name, recordings, results[name], explained, settings.site)
+        allowance = None
+        if surroundings is not None:
+            known = allowed(surroundings, name, results[name])
+            allowance = allow(known, pieces, with_ways(pieces, name, recordings, explained), explained.solution.matrix)
+        found = consistency(pieces, explained.solution.matrix, rate, allowance)
         counts = [recording.run.samples[name]["counts"].astype(np.int64) for recording in recordings]
         named = {results[name].observations[place].sweep: each for place, each in found.disturbed.items()}
         sweeps = {f"{DISTURBED}.{sweep}": each for sweep, each in sorted(named.items())} or {DISTURBED: found.sweep}

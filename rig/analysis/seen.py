@@ -9,7 +9,7 @@ import numpy as np
 from rig.analysis.surroundings import Surroundings
 from rig.arm.kinematics import AXIS_ERRORS
 from rig.config.sensor_catalogue import PARTS
-from rig.data.settings import Uncertainty
+from rig.data.settings import RunSettings, Uncertainty
 from rig.estimation.arrays import Array
 from rig.estimation.budget import Unknown
 from rig.estimation.earth_rate import EarthRate, Known
@@ -35,6 +35,7 @@ def see(recordings: Sequence[ObservedRun], sensor: str, surroundings: Surroundin
     averages = [average for average, _ in placed]
     attitudes = np.array([average.attitude for average in averages], dtype=np.float64)
     turned = np.array([turn.speed_rad_s * turn.axis_flange for turn, _ in turns])
+    arms_m = arms_of([turn for turn, _ in turns], recordings[0].run.settings)
     earth = np.zeros(3) if site.earth_rate_rad_s is None else np.array(site.earth_rate_rad_s)
     return Seen(
         means_rad_s=np.array([average.mean_rad_s for average in averages]),
@@ -47,7 +48,14 @@ def see(recordings: Sequence[ObservedRun], sensor: str, surroundings: Surroundin
         windows_s=np.array([(average.start_s + since_s, average.end_s + since_s) for average, since_s in placed]),
         joints=(*(turn.joint_name for turn, _ in turns), *[None] * len(rests)),
         axis_errors_rad_s=_axis_errors([turn for turn, _ in turns], len(rests), surroundings.uncertainty.axis_deg),
+        arms_m=np.concatenate([arms_m, np.zeros((len(rests), 3))]),
     )
+
+
+def arms_of(turns: Sequence[Observation], settings: RunSettings) -> Array:
+    """(M, 3) from the axis that turns to where the sensors sit, in the flange's frame; zero where it is left out."""
+    known = [turn.arm_m + np.array(settings.extension_m) if turn.arm_m is not None else np.zeros(3) for turn in turns]
+    return np.reshape(known, (-1, 3)) * settings.knows_own_motion
 
 
 def _axis_errors(turns: Sequence[Observation], rests: int, axis_deg: float) -> Array:

@@ -207,7 +207,11 @@ class UncertaintySection(Section):
         "Nubiola and Bonev, 2012)",
     )
     sensor_offset_mm: float = Field(
-        default=50.0, ge=0, le=1000, description="how far from the flange's axes the sensor sits, either way"
+        default=50.0,
+        ge=0,
+        le=1000,
+        description="how far the sensor sits from the flange's centre, or from the end of `arm.extension_mm`, along "
+        "each axis, either way",
     )
     acceleration_lag_ms: float = Field(
         default=5.0,

@@ -292,7 +292,9 @@ class SimulatedSensorSection(Section):
         json_schema_extra={"unit": "rad/s/g", "allowed": "3 rows of 3 numbers, each -0.1 to 0.1"},
     )
     offset_mm: Vector3 = Field(
-        default=NO_ROW, description="where it sits, x y z from the flange's centre in the flange's frame"
+        default=NO_ROW,
+        description="where it sits, x y z from the flange's centre in the flange's frame; left out, at the end of "
+        "`arm.extension_mm`",
     )
     nonlinearity_even_per_rad_s: float = Field(
         default=0.0,

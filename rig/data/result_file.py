@@ -270,7 +270,10 @@ class DeviationEntry(Entry):
 
 
 class RevolutionErrorEntry(Entry):
-    """Mean reading less mean reference over one revolution; `gravity_rad_s` is what of it gravity adds, if known."""
+    """Mean reading less mean reference over one revolution; `gravity_rad_s` is what of it gravity adds, if known.
+
+    With gravity the flange's circling, which is felt as gravity is.
+    """
 
     sweep: int
     joint: str

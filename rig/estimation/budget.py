@@ -158,7 +158,7 @@ def _contributors(explained: Explained, unknown: Unknown) -> Iterator[Contributo
             float(np.degrees(unknown.g_sensitivity_rad_s_per_g)),
             "°/s/g",
             "what is known of the part; rests at more attitudes would tell it",
-            np.array([seen.gravity_m_s2 @ each.T for each in any_sensitivity]),
+            np.array([seen.pull_m_s2 @ each.T for each in any_sensitivity]),
         )
     outwards = np.array([seen.centripetal_m_s2(offset) for offset in unknown.sensor_offset_m * np.eye(3)])
     felt = any_sensitivity if sensitivity is None else [sensitivity]

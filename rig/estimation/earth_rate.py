@@ -135,7 +135,8 @@ def find_earth_rate(seen: Seen, nominal_mounting: Array, known: Known) -> EarthR
         directions = _across(known.up)
     gravity = seen.gravity_m_s2 if known.g_sensitivity else None
     _check_told(seen, directions, gravity)
-    fit = _fit(replace(seen, earth_rate_rad_s=held), nominal_mounting, directions, gravity, known)
+    pull = None if gravity is None else seen.pull_m_s2
+    fit = _fit(replace(seen, earth_rate_rad_s=held), nominal_mounting, directions, pull, known)
     free, covariance = _of_the_earth(fit, len(directions))
     scatter = _scatter(fit, len(directions))
     found = EarthRate(

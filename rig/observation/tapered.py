@@ -43,13 +43,17 @@ def noise_at_zero(readings: Array) -> Array:
 
     The median over low frequencies, which lines do not move, over that of χ² of two degrees of freedom.
     """
-    count = len(readings)
-    phase = 2 * np.pi * (np.arange(count) + 0.5) / count
-    window: Array = np.cos(np.outer(phase, np.arange(len(BLACKMAN_HARRIS)))) @ np.array(BLACKMAN_HARRIS)
-    shaped = window[:, None] * (readings - readings.mean(axis=0))
-    powers = np.abs(np.fft.rfft(shaped, axis=0)[MAIN_LOBE : _highest(count)]) ** 2 / np.sum(window**2)
+    powers = np.abs(np.fft.rfft(shaped(readings), axis=0)[MAIN_LOBE : _highest(len(readings))]) ** 2
     found: Array = np.median(powers, axis=0) / np.log(2)
     return found
+
+
+def shaped(readings: Array) -> Array:
+    """Readings (n, 3) less their mean under Blackman and Harris' window, of which the squares add up to 1."""
+    phase = 2 * np.pi * (np.arange(len(readings)) + 0.5) / len(readings)
+    window: Array = np.cos(np.outer(phase, np.arange(len(BLACKMAN_HARRIS)))) @ np.array(BLACKMAN_HARRIS)
+    under: Array = window[:, None] / np.sqrt(np.sum(window**2)) * (readings - readings.mean(axis=0))
+    return under
 
 
 def _highest(count: int) -> int:
