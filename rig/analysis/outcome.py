@@ -23,7 +23,15 @@ from rig.analysis.magnetic_field import MagnetometerResult, calibrate_magnetomet
 from rig.analysis.onboard_check import Agreement, agreement
 from rig.analysis.seen import arms_of
 from rig.analysis.surroundings import surroundings_of
-from rig.analysis.verdict import Check, acceleration_checks, drift_checks, judge, verdict, verification_checks
+from rig.analysis.verdict import (
+    Check,
+    acceleration_checks,
+    clock_checks,
+    drift_checks,
+    judge,
+    verdict,
+    verification_checks,
+)
 from rig.analysis.verification import Verification, verify
 from rig.data.provenance import Provenance
 from rig.data.result_file import StoredCalibrationEntry
@@ -118,6 +126,7 @@ def calibrated(runs: Sequence[RunData], estimator: str = DEFAULT_ESTIMATOR) -> O
             *checks,
             *(check for name, agreed in onboard.items() for check in agreed.checks(name)),
             *contradictions(recordings, results, settings.to_calibrate).checks,
+            *(clock_checks(surroundings.clock) if surroundings is not None and settings.holds_every_clock else ()),
             *_acceleration_checks(accelerometers, settings),
         ),
         provenance=_origin(runs),

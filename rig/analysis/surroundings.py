@@ -28,6 +28,6 @@ def surroundings_of(recordings: Sequence[ObservedRun]) -> Surroundings | None:
     if settings.site is None or settings.uncertainty is None:
         return None
     longest = max(recordings, key=lambda each: float(each.motion.time_s[-1] - each.motion.time_s[0]))
-    clock = check_clock(longest, settings.uncertainty)
+    clock = check_clock(longest, settings.uncertainty, holds_every=settings.holds_every_clock)
     jitter_s = state_jitter_s(longest)
     return Surroundings(settings.site, settings.uncertainty, clock, jitter_s, settings.finds_earth_rate)

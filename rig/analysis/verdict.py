@@ -11,6 +11,7 @@ import numpy as np
 from rig.analysis.acceleration import AccelerometerResult
 from rig.analysis.at_rest import Quantity
 from rig.analysis.bias_drift import BiasDrift
+from rig.analysis.clock import PPM, ClockCheck
 from rig.analysis.verification import Verification
 from rig.data.settings import DecisionRule, Limits
 from rig.estimation.arrays import Array
@@ -80,6 +81,15 @@ def verification_checks(sensor: str, verification: Verification | None, limits: 
         Check(f"{sensor}.verification_rms", rms, limits.verification_rms_rad_s, "rad/s"),
         Check(f"{sensor}.verification_mean", mean, limits.verification_mean_rad_s, "rad/s"),
         Check(f"{sensor}.verification_reference", known, limits.verification_mean_rad_s, "rad/s"),
+    )
+
+
+def clock_checks(clock: ClockCheck) -> tuple[Check, ...]:
+    """Whether the clocks of a run agree: every two of them, or what is stated of them, to within what both may err."""
+    return tuple(
+        Check(f"clocks_agree.{one}_and_{other}", each.size / PPM, each.limit / PPM, "ppm")
+        for each in clock.differences()
+        for one, other in [each.clocks]
     )
 
 

@@ -91,6 +91,7 @@ class ProvenanceEntry(Entry):
     tcp_offset: Vector6 | None = None
     arm_maker: str | None = None
     arm_model: str | None = None
+    board_follows_crystal: bool | None = None
 
 
 class EstimateEntry(Entry):

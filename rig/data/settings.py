@@ -183,6 +183,11 @@ class RunSettings:
         return self.reckoning >= 2
 
     @property
+    def holds_every_clock(self) -> bool:
+        """Whether a clock counts however far off it is, and what contradicts fails a check."""
+        return self.reckoning >= 2
+
+    @property
     def movement(self) -> tuple[object, ...]:
         """What two recordings must have in common for their sweeps and dwells to be those of one run."""
         return self.procedure, self.then_verify, self.home_q_rad, self.planned_sweeps, self.planned_dwells
