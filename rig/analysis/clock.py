@@ -25,11 +25,16 @@ EVEN_S = 1e-4  # states whose steps in time differ by less follow each other eve
 
 @dataclass(frozen=True, slots=True)
 class ClockComparison:
-    """How much too fast the controller's clock runs by another one, and the standard uncertainty of that: fractions."""
+    """How much too fast the controller's clock runs by another one, and the standard uncertainty of that: fractions.
+
+    `scatter` is the part of it that was found from readings, with so much `freedom`; the rest is stated.
+    """
 
     by: str
     error: float
     std: float
+    scatter: float = 0.0
+    freedom: float = np.inf
 
 
 @dataclass(frozen=True, slots=True)
@@ -43,6 +48,20 @@ class ClockCheck:
     std: float
     comparisons: tuple[ClockComparison, ...]
 
+    @property
+    def freedom(self) -> float:
+        """Degrees of freedom of `std`, infinite where nothing was found from readings."""
+        found = [(each.scatter * (self.std / each.std) ** 2) ** 4 / each.freedom for each in self.comparisons]
+        return self.std**4 / sum(found) if any(found) else np.inf
+
+
+@dataclass(frozen=True, slots=True)
+class Jitter:
+    """Of the times the arm's states are of: standard deviation in s, and its degrees of freedom."""
+
+    std_s: float
+    freedom: float
+
 
 def check_clock(recording: ObservedRun, known: Uncertainty) -> ClockCheck:
     """The clock of one recording's controller."""
@@ -53,13 +72,14 @@ def check_clock(recording: ObservedRun, known: Uncertainty) -> ClockCheck:
     return ClockCheck(float(weights @ errors / weights.sum()), float(weights.sum() ** -0.5), tuple(found))
 
 
-def state_jitter_s(recording: ObservedRun) -> float:
-    """Standard deviation of the times the arm's states are of, from how the joint angles of the sweeps scatter.
+def state_jitter(recording: ObservedRun) -> Jitter:
+    """Of the times the arm's states are of, from how the joint angles of the sweeps scatter.
 
     Differences of the sixth order: of what the servo does, slow beside the states, nothing is left in them. What is
-    left are the times, and the encoder's steps.
+    left are the times, and the encoder's steps. Neighbouring differences share states: n of them have the freedom of
+    n / Σ ρ², where Σ ρ² over all lags is C(24, 12) / C(12, 6)².
     """
-    scatter = []
+    scatter, count = [], 0
     for finished in swept(recording.run):
         inside = slice(*np.searchsorted(recording.motion.time_s, [finished.window.start_s, finished.window.end_s]))
         states = recording.motion.states[inside]
@@ -68,7 +88,10 @@ def state_jitter_s(recording: ObservedRun) -> float:
         steps = steps[even < EVEN_S]
         if len(steps):
             scatter.append(np.mean(steps**2) / comb(2 * ORDER, ORDER) / finished.sweep.speed_rad_s**2)
-    return float(np.sqrt(np.mean(scatter))) if scatter else 0.0
+            count += len(steps)
+    if not scatter:
+        return Jitter(0.0, np.inf)
+    return Jitter(float(np.sqrt(np.mean(scatter))), count * comb(2 * ORDER, ORDER) ** 2 / comb(4 * ORDER, 2 * ORDER))
 
 
 def _by_computer(recording: ObservedRun, known: Uncertainty) -> ClockComparison | None:
@@ -80,9 +103,10 @@ def _by_computer(recording: ObservedRun, known: Uncertainty) -> ClockComparison 
     if not abs(slope - 1) < REAL_TIME:
         return None
     late = arm_s - design @ (offset, slope)
-    of_the_line = late.std() / host_s.std() * np.sqrt(widening(late) / len(late))  # states come late in bursts
+    alone = len(late) / widening(late)  # states come late in bursts
+    of_the_line = float(late.std() / host_s.std() / np.sqrt(alone))
     std = float(np.hypot(of_the_line, known.computer_clock_ppm * PPM / np.sqrt(3)))
-    return ClockComparison("the computer's clock", float(slope - 1), std)
+    return ClockComparison("the computer's clock", float(slope - 1), std, of_the_line, max(alone - 2, 1.0))
 
 
 def _by_crystal(recording: ObservedRun, known: Uncertainty) -> ClockComparison | None:

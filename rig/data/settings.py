@@ -173,6 +173,11 @@ class RunSettings:
     reckoning: Annotated[int, Field(ge=1, le=RECKONING)] = 1
 
     @property
+    def counts_freedom(self) -> bool:
+        """Whether U has the coverage factor of its degrees of freedom; in results of before it is twice u."""
+        return self.reckoning >= 2
+
+    @property
     def movement(self) -> tuple[object, ...]:
         """What two recordings must have in common for their sweeps and dwells to be those of one run."""
         return self.procedure, self.then_verify, self.home_q_rad, self.planned_sweeps, self.planned_dwells

@@ -30,7 +30,7 @@ class Seen:
     `attitudes` (N, 3, 3) from the base into the flange; `gravity_m_s2` (N, 3) downwards, in the flange's frame;
     `windows_s` (N, 2) on the clock of the first recording; `joints` (N) which of the arm's joints turned, None for a
     rest; `axis_errors_rad_s` (P, N, 3) how far the turns would be off for one standard uncertainty of each of the arm's
-    own angles, as far as it is known.
+    own angles, as far as it is known. `noise_freedom` (N, 3): with how many degrees of freedom the variances are known.
     """
 
     means_rad_s: Array
@@ -43,6 +43,7 @@ class Seen:
     windows_s: Array
     joints: tuple[str | None, ...]
     axis_errors_rad_s: Array | None = None
+    noise_freedom: Array | float = np.inf
 
     @property
     def speeds_rad_s(self) -> tuple[float, ...]:

@@ -5,20 +5,24 @@ from decimal import Decimal
 from pathlib import Path
 from typing import Any
 
+import numpy as np
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
 from rig.config.judging_sections import CertificateSection, SiteSection
 from rig.config.load import parse
+from rig.data.budget_entries import BudgetEntry
 from rig.data.result_file import CheckEntry, ResultDocument, read_result
 from rig.data.result_types import ErrorEntry
 from rig.errors import Refused
+from rig.estimation.budget import Budget, Contributor
+from rig.report.budget_entry import budget_entry
+from rig.report.certificate.budget_tables import coverage_sentence
 from rig.report.certificate.content import is_simulated
 from rig.report.certificate.page import certificate_page
 from rig.report.certificate.rounding import rounded
 from rig.report.certificate.stated import Stated, of_configuration, stated_in
-from rig.report.certificate.tables import coverage_sentence
 from support.certified import (
     LABORATORY,
     accelerometer,
@@ -68,6 +72,14 @@ def kinds() -> dict[str, ResultDocument]:
         "everything": whole,
         "verification": read_result(FIXTURES / "verified").model_copy(update={"sensors": {}}),
     }
+
+
+def budget_of(freedom: float) -> BudgetEntry:
+    """Of one contributor that tells scale factors with so much freedom, and biases with no end of it."""
+    scale, bias = (np.diag([size] * 3 + [other] * 3) for size, other in ((1e-8, 0.0), (0.0, 1e-6)))
+    lines = (Contributor("noise", "A", "normal", None, "", "", freedom, scale),
+             Contributor("offset", "B", "rectangular", 1e-3, "rad/s", "", np.inf, bias))  # fmt: skip
+    return budget_entry(Budget(lines))
 
 
 KINDS = ("gyroscope", "accelerometer", "magnetometer", "drift", "everything", "verification")
@@ -218,7 +230,7 @@ def test_an_accelerometer_stands_there_with_its_uncertainty_and_its_budget() -> 
     page = read(certificate(compared(document)))
     assert "1.01235 ± 0.00022" in page.text  # 1e-4 of noise, 0.5e-4 of gravity, k = 2
     assert "0.3000 ± 0.0020" in page.text  # gravity's size leaves the bias alone
-    assert "gravity B normal ±0.000981 m/s² (k = 2) ∞ 5.1 × 10⁻⁵ 20.4 %" in page.text
+    assert "gravity B normal ±0.000981 m/s² (k = 2) ∞ 49 19.6 % 0.00 < 0.1 %" in page.text  # u(k) in 10⁻⁶
     assert "relative to the stated gravity of 9.81 m/s²" in page.text
     assert "traceable through it" in page.under["7.8.4.1c"]
     assert (
@@ -339,13 +351,27 @@ def test_a_vector_model_without_a_solution_leaves_out_what_it_would_tell() -> No
     assert not [tag for tag, _ in page.tags if tag == "svg"]
 
 
-def test_scarce_freedom_is_said() -> None:
-    budget = result().sensors["gyro"].budget
-    assert budget is not None
-    assert "normal distribution" in coverage_sentence(budget)
-    scarce = coverage_sentence(budget.model_copy(update={"freedom": (8.0, *[None] * 5)}))
-    assert "ν_eff\u00a0=\u00a08" in scarce
-    assert "approximately 92 %" in scarce  # of Student's t with 8 degrees of freedom within ± 2
+def test_scarce_freedom_widens_u_and_is_said() -> None:
+    sensor = result().sensors["gyro"]
+    assert sensor.budget is not None
+    assert "normal distribution" in coverage_sentence(sensor.budget)
+    scarce = budget_of(freedom=8.0)
+    assert "scale factors k\u00a0=\u00a02.37 (ν_eff\u00a0≥\u00a08); biases k\u00a0=\u00a02.00" in coverage_sentence(
+        scarce
+    )
+    assert "approximately 95 % (95.45 %)" in coverage_sentence(scarce)
+    assert scarce.expanded[0] == pytest.approx(2.366 * scarce.std[0], rel=1e-3)
+    page = read(
+        certificate(result().model_copy(update={"sensors": {"gyro": sensor.model_copy(update={"budget": scarce})}}))
+    )
+    assert "± U, expanded uncertainty, k as stated below" in page.text
+
+
+def test_of_results_of_before_the_probability_that_k_2_has_is_said() -> None:
+    before = budget_of(freedom=8.0).model_copy(update={"coverage_factor": 2.0, "coverage_factors": None})
+    said = coverage_sentence(before.model_copy(update={"coverage_probabilities": None}))
+    assert "ν_eff\u00a0=\u00a08" in said
+    assert "approximately 92 %" in said  # of Student's t with 8 degrees of freedom within ± 2
 
 
 def test_no_resource_is_loaded_from_anywhere() -> None:

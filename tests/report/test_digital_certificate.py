@@ -45,7 +45,7 @@ FAULTS = {
     "a day there is not": ("<dcc:issueDate>2026-11-", "<dcc:issueDate>2026-13-"),
     "a number that is none": ("<si:valueXMLList>1.", "<si:valueXMLList>x1."),
     "an uncertainty below zero": ("<si:uncertaintyXMLList>0", "<si:uncertaintyXMLList>-0"),
-    "a probability above one": ("XMLList>0.95<", "XMLList>1.95<"),
+    "a probability above one": ("XMLList>0.9545<", "XMLList>1.9545<"),
     "a schema of another version": ('schemaVersion="3.2.1"', 'schemaVersion="2.4.0"'),
     "a truth between true and false": ("traceable>false<", "traceable>perhaps<"),
     "no certificate's number": ("uniqueIdentifier>", "identifier>"),
