@@ -109,7 +109,10 @@ class EstimateEntry(Entry):
 
 
 class VectorEntry(Entry):
-    """The vector model's solution: the six parameters, and how the three axes lie to each other and to the flange."""
+    """The vector model's solution: the six parameters, and how the three axes lie to each other and to the flange.
+
+    `residuals_std_rad_s` is what the solve expects each residual to scatter by; results of before do not say it.
+    """
 
     model: str
     estimator: str
@@ -132,6 +135,7 @@ class VectorEntry(Entry):
     g_sensitivity_std_rad_s_per_m_s2: Matrix3 | None = None
     residuals_rad_s: tuple[Vector3, ...]
     warnings: tuple[str, ...]
+    residuals_std_rad_s: tuple[Vector3, ...] | None = None
 
 
 class NonlinearityEntry(Entry):

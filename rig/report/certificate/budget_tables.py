@@ -108,8 +108,9 @@ def _column(budget: BudgetEntry, place: int, size: _Size) -> Column:
 
 def _line(line: ContributorEntry, places: tuple[int, int], sizes: Sequence[_Size]) -> Line:
     stated = " (k = 2)" if line.distribution == "normal" else ""
-    assumed = "found" if line.half_width is None else f"±{line.half_width:.3g} {line.unit}{stated}"
-    counted = "∞" if line.kind == "B" else "not counted"  # of results of before
+    found = "found" if line.kind == "A" else "–"
+    assumed = found if line.half_width is None else f"±{line.half_width:.3g} {line.unit}{stated}"
+    counted = "∞" if line.kind == "B" else "–"  # not counted in results of before
     freedom = counted if line.freedom is None else freedom_text(line.freedom)
     return Line(line.name, line.kind, line.distribution, assumed, freedom, _parts(line.std, line.share, places, sizes))
 
@@ -167,7 +168,7 @@ def _group(budget: BudgetEntry, factors: Sequence[str], first: int, name: str) -
     if len(set(own)) == 1:
         return f"{name} k\u00a0=\u00a0{own[0]} (ν_eff\u00a0≥\u00a0{freedom_text(min(known))})"
     each = (f"{axis} {k} ({freedom_text(freedom)})" for axis, k, freedom in zip(AXES, own, known, strict=True))
-    return f"{name} k (ν_eff) of {', '.join(each)}"
+    return f"{name} k (ν_eff): {', '.join(each)}"
 
 
 def _percent(probability: float) -> str:
