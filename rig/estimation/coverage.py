@@ -47,9 +47,9 @@ def effective_freedom(variances: ArrayLike, freedom: ArrayLike) -> Array:
 
     JCGM 100, G.4.1; infinite where all are known.
     """
-    parts = np.asarray(variances, dtype=np.float64)
+    parts, known = np.asarray(variances, dtype=np.float64), np.asarray(freedom, dtype=np.float64)
     with np.errstate(divide="ignore", invalid="ignore"):
-        found = parts.sum(axis=0) ** 2 / np.sum(parts**2 / freedom, axis=0)
+        found = parts.sum(axis=0) ** 2 / np.sum(parts**2 / known, axis=0)
     whole: Array = np.where(np.isnan(found), np.inf, found)  # of nothing at all
     return whole
 

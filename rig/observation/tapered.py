@@ -58,7 +58,7 @@ def freedom_at_zero(count: int) -> float:
 
     Its relative variance is 1 / (m ln² 2), and ν is two over that (JCGM 100, G.4.2).
     """
-    return 2 * np.log(2) ** 2 * (_highest(count) - MAIN_LOBE) / NOISE_BINS
+    return float(2 * np.log(2) ** 2 * (_highest(count) - MAIN_LOBE) / NOISE_BINS)
 
 
 def _highest(count: int) -> int:

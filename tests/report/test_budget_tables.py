@@ -11,9 +11,10 @@ import pytest
 from lxml import html
 
 from rig.config.judging_sections import SiteSection
+from rig.data.accelerometer_entries import AccelerometerEntry
 from rig.data.budget_entries import BudgetEntry
 from rig.data.magnetometer_entries import MagnetometerEntry
-from rig.data.result_file import ResultDocument, read_result
+from rig.data.result_file import ResultDocument, SensorEntry, read_result
 from rig.report.certificate.budget_tables import coverage_sentence, freedom_text
 from rig.report.certificate.dcc import digital_certificate
 from rig.report.certificate.page import certificate_page
@@ -30,12 +31,13 @@ BUDGETED = [each for each in frozen() if "budget" in (each / "result.json").read
 def budgets(document: ResultDocument) -> Iterator[tuple[BudgetEntry, tuple[float, ...]]]:
     """In the order of the certificate, each with its scale factors."""
     rest = dict(document.accelerometers)
+    found: list[SensorEntry | AccelerometerEntry | MagnetometerEntry] = []
     for name, sensor in document.sensors.items():
         if sensor.role == "calibrate":
-            found = [sensor, rest.pop(name, None)]
-            yield from ((each.budget, each.scale) for each in found if each is not None and each.budget is not None)
-    others = [*rest.values(), *(m for m in document.magnetometers.values() if isinstance(m, MagnetometerEntry))]
-    yield from ((each.budget, each.scale) for each in others if each.budget is not None)
+            found += [sensor, *([rest.pop(name)] if name in rest else [])]
+    found += rest.values()
+    found += [each for each in document.magnetometers.values() if isinstance(each, MagnetometerEntry)]
+    yield from ((each.budget, each.scale) for each in found if each.budget is not None)
 
 
 def named(folder: Path) -> str:

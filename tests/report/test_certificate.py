@@ -23,6 +23,7 @@ from rig.report.certificate.content import is_simulated
 from rig.report.certificate.page import certificate_page
 from rig.report.certificate.rounding import rounded
 from rig.report.certificate.stated import Stated, of_configuration, stated_in
+from rig.report.certificate.validity import left_out_of_rates
 from support.certified import (
     LABORATORY,
     accelerometer,
@@ -150,6 +151,45 @@ def test_what_was_not_said_reads_so_and_nobody_is_invented() -> None:
     assert "not stated" not in "".join(said.under[clause] for clause in CLAUSES)
     for words in ("Bench Laboratory", "1 Long Lane", "room 2", "Example & Sons", "2026-11-19", "A. Person", "21.5 °C"):
         assert words in said.text
+
+
+def test_nobody_s_place_is_invented_from_an_address() -> None:
+    assert LABORATORY.site is not None
+    silent = Stated(LABORATORY.site.model_copy(update={"place": None}), LABORATORY.certificate)
+    assert read(certificate(stated=silent)).under["7.8.2.1c"].endswith("not stated")
+    assert "room 2" in read(certificate()).under["7.8.2.1c"]
+
+
+def test_the_script_that_moved_the_arm_stands_there_with_its_hash() -> None:
+    document = result()
+    script = {"script": "six_observation.py", "script_sha256": "ab" * 32, "script_installed": True}
+    provenance = type(document.provenance).model_validate({**document.provenance.model_dump(), **script})
+    said = read(certificate(document.model_copy(update={"provenance": provenance}))).under["7.8.2.1f"]
+    assert f"script six_observation.py, SHA-256 {'ab' * 32}" in said
+    without = type(document.provenance).model_validate(
+        {key: each for key, each in document.provenance.model_dump().items() if not key.startswith("script")}
+    )
+    unknown = read(certificate(document.model_copy(update={"provenance": without}))).under["7.8.2.1f"]
+    assert "a script of the rig's own, whose hash was not recorded" in unknown
+
+
+@pytest.mark.parametrize("kind", ["gyroscope", "accelerometer", "magnetometer", "drift"])
+def test_every_quantity_says_when_it_holds_and_what_its_uncertainty_leaves_out(kind: str) -> None:
+    said = " ".join(read(certificate(kinds()[kind])).under["7.8.4.1b"].split())
+    assert "Time: " in said and "as mounted and powered then" in said
+    left_out = said.partition("Not in the uncertainty: ")[2]
+    for words in ("switching off and on", "mounting anew and its stress", "ageing and transport"):
+        assert words in left_out
+    if kind != "drift":
+        assert "nonlinearity" in left_out and "other temperatures" in left_out
+
+
+def test_what_the_budget_has_is_not_said_to_be_left_out() -> None:
+    sensor = result().sensors["gyro"]
+    assert sensor.budget is not None and "other temperatures" in left_out_of_rates(sensor)
+    warm = sensor.budget.contributors[0].model_copy(update={"name": "temperature within the run"})
+    budget = sensor.budget.model_copy(update={"contributors": (*sensor.budget.contributors, warm)})
+    assert "other temperatures" not in left_out_of_rates(sensor.model_copy(update={"budget": budget}))
 
 
 def test_the_arm_is_the_one_that_was_found_and_one_that_nobody_asked_is_said_so() -> None:

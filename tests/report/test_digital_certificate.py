@@ -250,6 +250,12 @@ def test_what_cannot_be_certified_is_refused(refused, why: str) -> None:  # type
     assert error.value.name == "no_digital_certificate"
 
 
+def test_it_states_no_place_and_the_script_with_its_hash() -> None:
+    xml = digital_certificate(certificate())
+    assert [each.text for each in found(xml, "dcc:performanceLocation")] == ["other"]
+    assert certificate().procedure in xml.decode()
+
+
 def test_it_takes_no_time() -> None:
     made = certificate(everything())
     started_s = time.perf_counter()
