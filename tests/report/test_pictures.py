@@ -3,8 +3,9 @@
 import numpy as np
 import pytest
 
-from rig.data.result_file import VectorEntry, read_result
+from rig.data.result_file import ResultDocument, VectorEntry, read_result
 from rig.report.certificate.budget_tables import budget_table
+from rig.report.certificate.page import certificate_page
 from rig.report.certificate.plots import (
     EXPECTED,
     HEIGHT,
@@ -87,3 +88,24 @@ def test_every_picture_has_words_of_its_own() -> None:
     page = read(certificate(everything()))
     assert HEIGHT > 0 and page.text.count("hold zero.") == 5
     assert "What makes up the uncertainty of the scale factor of" in page.text
+
+
+def filled(document: ResultDocument) -> list[float]:
+    """How far down each printed sheet has lines, as a part of what it has room for."""
+    from weasyprint import HTML
+
+    parts = []
+    for page in HTML(string=certificate_page(certificate(document))).render().pages:
+        sheet = page._page_box
+        lines = [each for each in sheet.children[0].descendants() if type(each).__name__ == "LineBox"]
+        lowest = max(line.position_y + line.height for line in lines)
+        parts.append((lowest - sheet.margin_top) / sheet.height)
+    return parts
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("kind", ["imu", "verified", "bias_drift", "everything"])
+def test_no_sheet_but_the_last_is_left_half_empty(kind: str) -> None:
+    document = everything() if kind == "everything" else read_result(RECORDINGS / "rig.settings-6" / kind)
+    *before, _ = filled(document)
+    assert before and min(before) > 0.7
