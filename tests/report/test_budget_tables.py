@@ -10,18 +10,22 @@ import numpy as np
 import pytest
 from lxml import html
 
+from rig.analysis.calibration import DEFAULT_ESTIMATOR
 from rig.config.judging_sections import SiteSection
 from rig.data.accelerometer_entries import AccelerometerEntry
 from rig.data.budget_entries import BudgetEntry
 from rig.data.magnetometer_entries import MagnetometerEntry
 from rig.data.result_file import ResultDocument, SensorEntry, read_result
+from rig.estimation.coverage import coverage_factors
+from rig.plans.recorded import judged, open_run
 from rig.report.certificate.budget_tables import coverage_sentence, freedom_text
 from rig.report.certificate.dcc import digital_certificate
 from rig.report.certificate.page import certificate_page
 from rig.report.certificate.stated import Stated
+from rig.report.document import document_of
 from support.certified import certificate, everything, result
 from support.dcc_rules import schema_faults
-from support.frozen import frozen
+from support.frozen import RECORDINGS, frozen
 
 NAMES = {"dcc": "https://ptb.de/dcc", "si": "https://ptb.de/si"}
 GERMAN = Stated(SiteSection(country="DE"))
@@ -139,6 +143,26 @@ def test_k_and_its_probability_are_the_same_on_the_page_and_in_the_digital_certi
         assert covers == round(100 * min(probabilities))
         assert ("95.45 %" in sentence) == (abs(min(probabilities) - 0.9545) < 5e-5)
         assert ks_of(sentence) == [f"{each:.2f}" for each in factors]
+
+
+@pytest.mark.slow
+def test_a_recording_of_before_has_two_u_and_today_s_coverage_when_it_is_asked_for() -> None:
+    """A KVH 1775 that was at rest for little time: what its bias does is known from fifteen differences."""
+    run = open_run(RECORDINGS / "rig.settings-6" / "kvh1775")
+    before, today = (document_of(judged(each, DEFAULT_ESTIMATOR)) for each in (run, run.judged_by(["reckoning=2"])))
+    two, by_freedom = before.sensors["kvh"].budget, today.sensors["kvh"].budget
+    assert two is not None and by_freedom is not None
+    assert set(two.factors) == {2.0} and two.expanded == pytest.approx([2 * each for each in two.std])
+    np.testing.assert_allclose(by_freedom.std, two.std, rtol=1e-9)
+    assert by_freedom.factors == pytest.approx(coverage_factors(by_freedom.known))
+    assert 2.0 < by_freedom.factors[0] < 2.01 and by_freedom.factors[4] > 2.1
+    noise = {each.name: each.freedom for each in by_freedom.contributors}["noise"]
+    assert noise is not None and 20 < noise < 1e6 and two.contributors[0].freedom is None
+    for document in (before, today):
+        for rows, (budget, _) in zip(printed(document), budgets(document), strict=True):
+            check_adds_up(rows, budget)
+    bias = next(check for check in today.checks if check.name == "kvh.bias")
+    assert bias.uncertainty in by_freedom.expanded[3:] and bias.coverage_factor in by_freedom.factors[3:]
 
 
 def listed(found, name: str) -> list[float]:  # type: ignore[no-untyped-def]
