@@ -35,13 +35,15 @@ SHORT = {BY_COMPUTER: "computer", BY_CRYSTAL: "crystal"}
 class ClockComparison:
     """How much too fast the controller's clock runs by another one, and the standard uncertainty of that: fractions.
 
-    `half_width` is what is stated of the other clock, `noise_std` what the recording leaves uncertain; `std` is both.
+    `half_width` is what is stated of the other clock, `noise_std` what the recording leaves uncertain, with so much
+    `freedom`; `std` is both.
     """
 
     by: str
     error: float
     half_width: float
     noise_std: float
+    freedom: float = np.inf
 
     @property
     def std(self) -> float:
@@ -78,6 +80,20 @@ class ClockCheck:
             limit = width + its_width + CERTAIN * float(np.hypot(noise, its_noise))
             yield ClockDifference((one, other), abs(error - its_error), limit)
 
+    @property
+    def freedom(self) -> float:
+        """Degrees of freedom of `std`, infinite where nothing was found from readings."""
+        found = [(each.noise_std * (self.std / each.std) ** 2) ** 4 / each.freedom for each in self.comparisons]
+        return self.std**4 / sum(found) if any(found) else np.inf
+
+
+@dataclass(frozen=True, slots=True)
+class Jitter:
+    """Of the times the arm's states are of: standard deviation in s, and its degrees of freedom."""
+
+    std_s: float
+    freedom: float
+
 
 def check_clock(recording: ObservedRun, known: Uncertainty, *, holds_every: bool = True) -> ClockCheck:
     """The clock of one recording's controller, held against others: against every one, or as before against near ones.
@@ -94,13 +110,14 @@ def check_clock(recording: ObservedRun, known: Uncertainty, *, holds_every: bool
     return ClockCheck(error, std, tuple(found), half_width)
 
 
-def state_jitter_s(recording: ObservedRun) -> float:
-    """Standard deviation of the times the arm's states are of, from how the joint angles of the sweeps scatter.
+def state_jitter(recording: ObservedRun) -> Jitter:
+    """Of the times the arm's states are of, from how the joint angles of the sweeps scatter.
 
     Differences of the sixth order: of what the servo does, slow beside the states, nothing is left in them. What is
-    left are the times, and the encoder's steps.
+    left are the times, and the encoder's steps. Neighbouring differences share states: n of them have the freedom of
+    n / Σ ρ², where Σ ρ² over all lags is C(24, 12) / C(12, 6)².
     """
-    scatter = []
+    scatter, count = [], 0
     for finished in swept(recording.run):
         inside = slice(*np.searchsorted(recording.motion.time_s, [finished.window.start_s, finished.window.end_s]))
         states = recording.motion.states[inside]
@@ -109,7 +126,10 @@ def state_jitter_s(recording: ObservedRun) -> float:
         steps = steps[even < EVEN_S]
         if len(steps):
             scatter.append(np.mean(steps**2) / comb(2 * ORDER, ORDER) / finished.sweep.speed_rad_s**2)
-    return float(np.sqrt(np.mean(scatter))) if scatter else 0.0
+            count += len(steps)
+    if not scatter:
+        return Jitter(0.0, np.inf)
+    return Jitter(float(np.sqrt(np.mean(scatter))), count * comb(2 * ORDER, ORDER) ** 2 / comb(4 * ORDER, 2 * ORDER))
 
 
 def _by_computer(recording: ObservedRun, known: Uncertainty) -> ClockComparison:
@@ -119,8 +139,11 @@ def _by_computer(recording: ObservedRun, known: Uncertainty) -> ClockComparison:
     design = np.column_stack([np.ones_like(host_s), host_s])
     (offset, slope), *_ = np.linalg.lstsq(design, arm_s, rcond=None)
     late = arm_s - design @ (offset, slope)
-    of_the_line = late.std() / host_s.std() * np.sqrt(widening(late) / len(late))  # states come late in bursts
-    return ClockComparison(BY_COMPUTER, float(slope - 1), known.computer_clock_ppm * PPM, float(of_the_line))
+    alone = len(late) / widening(late)  # states come late in bursts
+    of_the_line = float(late.std() / host_s.std() / np.sqrt(alone))
+    return ClockComparison(
+        BY_COMPUTER, float(slope - 1), known.computer_clock_ppm * PPM, of_the_line, max(alone - 2, 1.0)
+    )
 
 
 def _by_crystal(recording: ObservedRun, known: Uncertainty) -> ClockComparison | None:

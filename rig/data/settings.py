@@ -183,6 +183,11 @@ class RunSettings:
         return self.reckoning >= 2
 
     @property
+    def counts_freedom(self) -> bool:
+        """Whether U has the coverage factor of its degrees of freedom; in results of before it is twice u."""
+        return self.reckoning >= 2
+
+    @property
     def holds_every_clock(self) -> bool:
         """Whether a clock counts however far off it is, and what contradicts fails a check."""
         return self.reckoning >= 2

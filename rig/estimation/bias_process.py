@@ -110,7 +110,9 @@ def _bias_process(
     likelihood = np.zeros(len(squares))
     for axis in range(3):
         own = np.diag(variances[:, axis])
-        noise = (own if shared is None else own + shared[axis]) + _added(squares[:, :1, None], squares[:, 1:, None], unit)
+        noise = (own if shared is None else own + shared[axis]) + _added(
+            squares[:, :1, None], squares[:, 1:, None], unit
+        )
         likelihood += _restricted_likelihood(z, means[:, axis], noise)
     walk, scatter = chosen(np.sqrt(squares), likelihood).tolist()
     return BiasProcess(walk, scatter, freedom)
