@@ -16,7 +16,7 @@ from rig.errors import Fault
 from rig.estimation.accelerometer import AccelerometerSolution, solve_accelerometer, specific_force
 from rig.estimation.arrays import Array
 from rig.estimation.budget import Budget
-from rig.estimation.felt import LEVER, NO_SWEEPS, SECOND, Dwells, Sweeps
+from rig.estimation.felt import LEVER, NO_SWEEPS, SECOND, Dwells, Movement, Sweeps
 from rig.estimation.imu import ImuSolution, solve_imu
 from rig.estimation.reference_budget import scale_and_bias_covariance
 from rig.estimation.reference_model import F
@@ -56,6 +56,8 @@ class AccelerometerResult:
     The body of the `solution` is the sensor as it is nominally mounted: F is nearly diagonal, and φ the sensor's own.
     `alignment` is to the gyroscope beside it, None where that was not calibrated.
 
+    The `movement` is all that the solution was found from.
+
     `scale` (3,) is 1/‖row of F‖, `covariance` (6, 6) that of scale and bias by the solution alone; the `budget` has
     all that is known of their uncertainty, None for recordings that say nothing of it. Beside it stand the solutions
     from the attitudes alone, by method, or the Fault each ends in. `held_out`: when the attitudes were repeated.
@@ -63,6 +65,7 @@ class AccelerometerResult:
 
     sensor: RecordedSensor
     gravity_m_s2: float
+    movement: Movement
     solution: ImuSolution
     scale: Array
     covariance: Array
@@ -169,6 +172,7 @@ def _calibrated(
     return AccelerometerResult(
         sensor=sensor,
         gravity_m_s2=site.gravity_m_s2,
+        movement=Movement(seen, sweeps, _repeatability_rad(settings)),
         solution=solution,
         scale=scale,
         covariance=scale_and_bias_covariance(solution.matrix, scale, solution.covariance),

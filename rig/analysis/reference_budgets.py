@@ -102,21 +102,32 @@ def _field(site: Site) -> KnownSize:
     return KnownSize(SIZE_OF_FIELD, UNSTATED_FIELD, False, size_ut, "µT", f"{said} {NOT_GIVEN}")
 
 
-def _lagging(spread: Spread, dwells: Dwells, sweeps: Sweeps, lag_s: float) -> Contributor:
-    """The sensor's own filter makes a turn's wave smaller by (ω τ)²/2, which the model leaves out."""
+def lag_pattern(dwells: Dwells, sweeps: Sweeps, lag_s: float) -> Array:
+    """(1, 3 K) what the sensor's own filter takes of a turn's wave: (ω τ)²/2, which the model leaves out."""
     smaller = sweeps.harmonics_m_s2 * np.square(sweeps.speeds_rad_s * lag_s)[:, None, None] / 2
     smaller[:, 0] = 0.0  # the mean passes whole
-    pattern = np.concatenate([np.zeros(dwells.readings_m_s2.size), smaller.ravel()])
-    return assumed("filter's lag", 1e3 * lag_s, "ms", "uncertainty.acceleration_lag_ms", spread.of(pattern[None]))
+    return np.concatenate([np.zeros(dwells.readings_m_s2.size), smaller.ravel()])[None]
 
 
-def _drifting(spread: Spread, matrix: Array, attitudes: Array, drift: FieldDrift | None) -> Contributor:
-    """A field that changes evenly from the first attitude to the last, along each axis of the base."""
+def drift_patterns(matrix: Array, attitudes: Array, drift: FieldDrift | None) -> tuple[Array, float]:
+    """(3, 3 N) of a field that changes evenly from the first attitude to the last, along each axis of the base.
+
+    By one standard uncertainty where its `drift` was tested, else by half of all that is possible; and how much, T.
+    """
     change_t = UNTESTED_DRIFT_T
     if drift is not None:
         change_t = max(float(np.linalg.norm(each)) for each in (drift.change_t, drift.std_t)) / np.sqrt(3)
     along = np.linspace(-0.5, 0.5, len(attitudes))[:, None, None] * (matrix @ np.swapaxes(attitudes, -1, -2))
-    patterns = change_t * np.moveaxis(along, -1, 0).reshape(3, -1)
+    return change_t * np.moveaxis(along, -1, 0).reshape(3, -1), change_t
+
+
+def _lagging(spread: Spread, dwells: Dwells, sweeps: Sweeps, lag_s: float) -> Contributor:
+    said = "uncertainty.acceleration_lag_ms"
+    return assumed("filter's lag", 1e3 * lag_s, "ms", said, spread.of(lag_pattern(dwells, sweeps, lag_s)))
+
+
+def _drifting(spread: Spread, matrix: Array, attitudes: Array, drift: FieldDrift | None) -> Contributor:
+    patterns, change_t = drift_patterns(matrix, attitudes, drift)
     if drift is None:
         said = f"procedure.field_test_s {NOT_GIVEN}"
         return assumed("drift of the field", MICROTESLA * change_t, "µT", said, spread.of(patterns))
