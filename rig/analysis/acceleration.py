@@ -16,7 +16,7 @@ from rig.errors import Fault
 from rig.estimation.accelerometer import AccelerometerSolution, solve_accelerometer, specific_force
 from rig.estimation.arrays import Array
 from rig.estimation.budget import Budget
-from rig.estimation.felt import LEVER, NO_SWEEPS, SECOND, Dwells, Sweeps
+from rig.estimation.felt import LEVER, NO_SWEEPS, SECOND, Dwells, Movement, Sweeps
 from rig.estimation.imu import ImuSolution, solve_imu
 from rig.estimation.reference_budget import scale_and_bias_covariance
 from rig.estimation.reference_model import F
@@ -26,6 +26,7 @@ from rig.estimation.triads import Alignment, alignment
 from rig.estimation.triaxial import Method, TriaxialSolution
 from rig.observation.acceleration import DwellReading
 from rig.observation.observed_run import ObservedRun
+from rig.observation.swept_acceleration import SweptAcceleration
 
 BESIDE: tuple[Method, ...] = ("attitude_weighted", "maximum_likelihood", "as_published")
 NO_GYROSCOPES: Mapping[str, SensorResult] = MappingProxyType({})
@@ -55,6 +56,8 @@ class AccelerometerResult:
     The body of the `solution` is the sensor as it is nominally mounted: F is nearly diagonal, and φ the sensor's own.
     `alignment` is to the gyroscope beside it, None where that was not calibrated.
 
+    The `movement` is all that the solution was found from.
+
     `scale` (3,) is 1/‖row of F‖, `covariance` (6, 6) that of scale and bias by the solution alone; the `budget` has
     all that is known of their uncertainty, None for recordings that say nothing of it. Beside it stand the solutions
     from the attitudes alone, by method, or the Fault each ends in. `held_out`: when the attitudes were repeated.
@@ -62,6 +65,7 @@ class AccelerometerResult:
 
     sensor: RecordedSensor
     gravity_m_s2: float
+    movement: Movement
     solution: ImuSolution
     scale: Array
     covariance: Array
@@ -168,12 +172,20 @@ def _calibrated(
     return AccelerometerResult(
         sensor=sensor,
         gravity_m_s2=site.gravity_m_s2,
+        movement=Movement(seen, sweeps, _repeatability_rad(settings)),
         solution=solution,
         scale=scale,
         covariance=scale_and_bias_covariance(solution.matrix, scale, solution.covariance),
         budget=None
         if settings.uncertainty is None
-        else accelerometer_budget(solution, seen, sweeps, site, 1e-3 * settings.uncertainty.acceleration_lag_ms),
+        else accelerometer_budget(
+            solution,
+            seen,
+            sweeps,
+            site,
+            1e-3 * settings.uncertainty.acceleration_lag_ms,
+            noise_freedom=_noise_freedom(used, _swept(name, recordings)) if settings.counts_freedom else None,
+        ),
         non_orthogonality_rad=non_orthogonality(axes),
         non_orthogonality_std_rad=np.sqrt(np.diag(angles @ solution.covariance[F, F] @ angles.T))[:3],
         alignment=None if gyroscope is None else _alignment(gyroscope, solution, mounting),
@@ -211,8 +223,7 @@ def _dwells(dwells: Sequence[DwellReading], mounting: Array) -> Dwells:
 
 def _sweeps(name: str, recordings: Sequence[ObservedRun], mounting: Array) -> Sweeps:
     """All that was swept, in the axes of the sensor as it is nominally mounted."""
-    turns = [turn for recording in recordings for turn in recording.sensors[name].revolutions]
-    found = [turn.acceleration for turn in turns if turn.acceleration is not None]
+    found = _swept(name, recordings)
     if not found:
         return NO_SWEEPS
     stations = list(dict.fromkeys(each.station for each in found))
@@ -225,6 +236,17 @@ def _sweeps(name: str, recordings: Sequence[ObservedRun], mounting: Array) -> Sw
         arms_m=np.array([each.arm_m for each in found]) @ mounting.T,
         stations=np.array([stations.index(each.station) for each in found], dtype=np.intp),
     )
+
+
+def _swept(name: str, recordings: Sequence[ObservedRun]) -> list[SweptAcceleration]:
+    turns = [turn for recording in recordings for turn in recording.sensors[name].revolutions]
+    return [turn.acceleration for turn in turns if turn.acceleration is not None]
+
+
+def _noise_freedom(dwells: Sequence[DwellReading], swept: Sequence[SweptAcceleration]) -> Array:
+    """(3 N + 9 M,) of the readings of dwells, then of the harmonics of sweeps."""
+    still = [np.broadcast_to(dwell.reading.freedom, 3) for dwell in dwells]
+    return np.concatenate([*still, *(np.full(9, float(each.harmonic.freedom)) for each in swept)])
 
 
 def _repeatability_rad(settings: RunSettings) -> float:

@@ -7,23 +7,20 @@ of freedom as columns. The process of the bias comes from what is left within th
 a wrong sweep does not excuse itself.
 """
 
-from dataclasses import dataclass, replace
+from collections.abc import Sequence
+from dataclasses import dataclass
 
 import numpy as np
 
 from rig.analysis.pieces import REST, Pieces
+from rig.analysis.suspicion import TOLD, Statistic, Suspicions, basis, explained, told_by, unlike_the_others
 from rig.estimation.arrays import Array
 from rig.estimation.bias_process import likeliest_bias_process
 
 # Of the speed: twists of a real arm's wrists (−8e-4, +4e-4 rad, UR's own calibration), and what 0.1 % of full scale,
 # a common statement of nonlinearity, amounts to at a quarter of the range.
 TOLERANCE = 5e-4
-TOLD = 1e-3  # of a column's size, what the model must leave of it
-ALIKE = 10.0  # of χ²: what explains less than the best by no more than this might be the cause as well
 WITHIN_A_TURN = 3e-4  # of the speed: graduation and eccentricity of an encoder, which cancel over the turn
-
-
-Statistic = tuple[float, float]  # and its limit
 
 
 @dataclass(frozen=True, slots=True)
@@ -52,8 +49,8 @@ class Allowance:
 
 @dataclass(frozen=True, slots=True)
 class _Scatter:
-    """Of the pieces' means beside a bias that wanders: `variances_rad2_s2` (N, 3) each for itself, and what they have in
-    common, `common_rad2_s2` (3 N, 3 N)."""
+    """Of the pieces' means beside a bias that wanders: `variances_rad2_s2` (N, 3) each for itself, and what they have
+    in common, `common_rad2_s2` (3 N, 3 N)."""
 
     variances_rad2_s2: Array
     common_rad2_s2: Array
@@ -67,23 +64,34 @@ class _Held:
     seen: Array
     base: Array
 
+    def explained(self, suspicions: Sequence[Array], beside: Sequence[Array]) -> list[float]:
+        """Of columns (3, N, k): see `Held`."""
+        return [self._told(columns, beside)[0] for columns in suspicions]
+
+    def judged(self, columns: Array | None, beside: Sequence[Array], rate: float) -> Statistic | None:
+        """See `Held`."""
+        from scipy.special import chdtri
+
+        value, freedom = self._told(columns, beside)
+        return (value, float(chdtri(freedom, rate))) if freedom else None
+
     def most_by_one(self, columns: Array, rate: float) -> Statistic | None:
         """What the one of columns (3, N, k) explains that explains most; None where all of them are in the model."""
         from scipy.special import chdtri
 
-        known, new = _basis(self.base), _whiten(self.white, columns)
+        known, new = basis(self.base), _whiten(self.white, columns)
         sizes = np.linalg.norm(new, axis=0)
         new = new - known @ (known.T @ new)
         left = np.linalg.norm(new, axis=0)
         told = left > TOLD * sizes
         if not told.any():
             return None
-        explained = (new[:, told].T @ (self.seen - known @ (known.T @ self.seen))) / left[told]
-        return float(np.max(explained**2)), float(chdtri(1, rate / np.count_nonzero(told)))
+        most = (new[:, told].T @ (self.seen - known @ (known.T @ self.seen))) / left[told]
+        return float(np.max(most**2)), float(chdtri(1, rate / np.count_nonzero(told)))
 
-    def explained(self, columns: Array | None) -> tuple[float, int]:
-        """As `_explained` has it, of columns (3, N, k)."""
-        return _explained(self.seen, self.base, None if columns is None else _whiten(self.white, columns))
+    def _told(self, columns: Array | None, beside: Sequence[Array]) -> tuple[float, int]:
+        base = np.concatenate([self.base, *(_whiten(self.white, each) for each in beside)], axis=1)
+        return explained(self.seen, base, None if columns is None else _whiten(self.white, columns))
 
 
 def consistency(pieces: Pieces, matrix: Array, rate: float, allowance: Allowance | None = None) -> Consistency:
@@ -91,13 +99,11 @@ def consistency(pieces: Pieces, matrix: Array, rate: float, allowance: Allowance
 
     Without an `allowance` every sensor is allowed what all were before, and the ways between the sweeps tell nothing.
     """
-    from scipy.special import chdtri
-
     felt = pieces.rates_rad_s @ matrix.T
     if allowance is None:
         scatter = _tolerated(pieces, felt)
         held = _held(pieces, felt, scatter)
-        suspected = {name: (held, columns) for name, columns in _changes(pieces, felt).items()}
+        found = told_by(held, _changes(pieces, felt), rate)
         whole, of_an_axis = None, None
     else:
         scatter = _Scatter(pieces.variances_rad2_s2, _together(allowance.off_rad_s))
@@ -105,21 +111,17 @@ def consistency(pieces: Pieces, matrix: Array, rate: float, allowance: Allowance
         felt_on_ways = ways.rates_rad_s @ matrix.T
         on_ways = _Scatter(ways.variances_rad2_s2, _together(allowance.off_on_ways_rad_s))
         held_on_ways = _held(ways, felt_on_ways, on_ways)
-        suspected = {name: (held_on_ways, columns) for name, columns in _changes(ways, felt_on_ways).items()}
+        found = told_by(held_on_ways, _changes(ways, felt_on_ways), rate)
         whole = _each_axis(np.column_stack(_sweeps(pieces)))
         of_an_axis = _axis_changed(ways, felt_on_ways, held_on_ways, rate)
-    suspected |= {name: (held, columns) for name, columns in _differences(pieces, felt, whole).items()}
-    found: dict[str, Statistic] = {}
-    for name, (held_by, columns) in suspected.items():
-        explained, freedom = held_by.explained(columns)
-        if freedom:
-            found[name] = explained, float(chdtri(freedom, rate))
+    found |= told_by(held, _differences(pieces, felt, whole), rate)
     if of_an_axis is not None:
         found["axis_changed"] = of_an_axis
     jumped = _jumped(pieces, felt, scatter, rate)
     if jumped is not None:
         found["bias_jumped"] = jumped
-    ranked = _disturbed(pieces, held, rate)
+    sweeps = np.unique(pieces.sweep[pieces.sweep >= 0]).tolist()
+    ranked = unlike_the_others(held, sweeps, lambda sweep: _of_sweep(pieces, sweep), rate)
     return Consistency(found, ranked[0][1], {sweep: each for sweep, each in ranked if each[0] > each[1]})
 
 
@@ -140,30 +142,6 @@ def _held(pieces: Pieces, felt: Array, scatter: _Scatter) -> _Held:
     return _Held(white, seen, _whiten(white, _each_axis(_known(pieces))))
 
 
-def _disturbed(pieces: Pieces, held: _Held, rate: float) -> list[tuple[int, Statistic]]:
-    """The sweep least like the others, then the next once that is taken out, until they agree or half are out.
-
-    Where one turn each way about an axis is all there is, either of the two may be the one: then both are named.
-    """
-    from scipy.special import chdtri
-
-    left = np.unique(pieces.sweep[pieces.sweep >= 0]).tolist()
-    each_rate, most, found = rate / len(left), (len(left) + 1) // 2, list[tuple[int, Statistic]]()
-    while len(found) < most:
-        explained = {sweep: held.explained(_of_sweep(pieces, sweep)) for sweep in left}
-        worst = max(left, key=lambda sweep: explained[sweep][0])
-        value, freedom = explained[worst]
-        limit = float(chdtri(freedom, each_rate))
-        if value <= limit:
-            return found or [(worst, (value, limit))]
-        alike = [sweep for sweep in left if explained[sweep][0] > value - ALIKE]
-        found += [(sweep, (value, limit)) for sweep in alike]
-        left = [sweep for sweep in left if sweep not in alike]
-        base = np.concatenate([held.base, _whiten(held.white, _of_sweep(pieces, worst))], axis=1)
-        held = replace(held, base=base)
-    return found
-
-
 def _jumped(pieces: Pieces, felt: Array, scatter: _Scatter, rate: float) -> Statistic | None:
     """How much a jump of the bias between two rests explains beside its wandering; None without three rests.
 
@@ -180,17 +158,17 @@ def _jumped(pieces: Pieces, felt: Array, scatter: _Scatter, rate: float) -> Stat
     if len(steps) < 2:
         return None
 
-    def explained(step: Array, beside: Array) -> float:
+    def told(step: Array, beside: Array) -> float:
         white = _whitening(_covariance(pieces, felt, beside, scatter), pieces.variances_rad2_s2.min())
         seen = _whiten(white, (pieces.means_rad_s - felt).T[:, :, None])[:, 0]
-        return _explained(seen, _whiten(white, _each_axis(steady)), _whiten(white, _each_axis(step)))[0]
+        return explained(seen, _whiten(white, _each_axis(steady)), _whiten(white, _each_axis(step)))[0]
 
     left = pieces.means_rad_s - felt
     left = left - steady @ (steady.T @ left)
     aside = [step - steady @ (steady.T @ step) for step in steps]
     best = max(range(len(steps)), key=lambda k: float(np.sum((aside[k].T @ left) ** 2 / np.sum(aside[k] ** 2))))
-    beside = _basis(np.column_stack([steady, steps[best]]))
-    return explained(steps[best], beside), 3 * float(fdtri(3, len(steps), 1 - rate / len(steps)))
+    beside = basis(np.column_stack([steady, steps[best]]))
+    return told(steps[best], beside), 3 * float(fdtri(3, len(steps), 1 - rate / len(steps)))
 
 
 def _covariance(pieces: Pieces, felt: Array, steady: Array, scatter: _Scatter) -> Array:
@@ -224,7 +202,7 @@ def _tolerated(pieces: Pieces, felt: Array) -> _Scatter:
 def _steady(pieces: Pieces) -> Array:
     """(N, k) orthonormal columns: whatever each sweep reads as a whole, the rests alike, gravity, a steady drift."""
     places = [pieces.sweep == sweep for sweep in np.unique(pieces.sweep)]
-    return _basis(np.column_stack([*places, pieces.pull_m_s2, _time(pieces)]))
+    return basis(np.column_stack([*places, pieces.pull_m_s2, _time(pieces)]))
 
 
 def _known(pieces: Pieces) -> Array:
@@ -233,7 +211,7 @@ def _known(pieces: Pieces) -> Array:
     return np.column_stack([pieces.rates_rad_s, ones, pieces.pull_m_s2, _time(pieces)])
 
 
-def _changes(pieces: Pieces, felt: Array) -> dict[str, Array | None]:
+def _changes(pieces: Pieces, felt: Array) -> Suspicions:
     """By name of the check (3, N, k): what another scale factor of each axis, or another mounting, with time adds."""
     time = _time(pieces)
     for sweep in np.unique(pieces.sweep):  # what changes within a sweep is that sweep's own matter
@@ -297,29 +275,3 @@ def _whitening(covariance: Array, least: float) -> Array:
 def _whiten(white: Array, columns: Array) -> Array:
     """(3 N, k) of columns (3, N, k)."""
     return np.asarray(white @ columns.reshape(len(white), -1), dtype=np.float64)
-
-
-def _basis(columns: Array) -> Array:
-    """Orthonormal columns that span the same."""
-    sizes = np.linalg.norm(columns, axis=0)
-    left, singular, _ = np.linalg.svd(columns / np.where(sizes > 0, sizes, 1.0), full_matrices=False)
-    basis: Array = left[:, singular > 1e-6 * singular[0]]
-    return basis
-
-
-def _explained(seen: Array, base: Array, columns: Array | None) -> tuple[float, int]:
-    """How much of what `base` leaves of the readings these columns explain, and how many they are beside it.
-
-    None explains all of it. (Decomposing that many columns is slow, and LAPACK's quick way does not always converge.)
-    """
-    known = _basis(base)
-    unexplained = seen - known @ (known.T @ seen)
-    if columns is None:
-        return float(unexplained @ unexplained), len(seen) - known.shape[1]
-    sizes = np.linalg.norm(columns, axis=0)
-    new = columns / np.where(sizes > 0, sizes, 1.0)
-    new = new - known @ (known.T @ new)
-    left, singular, _ = np.linalg.svd(new, full_matrices=False)
-    told = left[:, singular > TOLD]
-    explained = told.T @ unexplained
-    return float(explained @ explained), told.shape[1]

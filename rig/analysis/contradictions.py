@@ -5,20 +5,24 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from rig.analysis.acceleration import AccelerometerResult
 from rig.analysis.allowance import allow, allowed
 from rig.analysis.calibration import SensorResult, observe_recordings, solve_observed
 from rig.analysis.consistency import consistency
+from rig.analysis.magnetic_field import MagnetometerResult
 from rig.analysis.pieces import cut
 from rig.analysis.readings import judge_readings
+from rig.analysis.reference_contradictions import of_accelerometer, of_magnetometer, reference_statistics
 from rig.analysis.surroundings import surroundings_of
+from rig.analysis.suspicion import Statistic
 from rig.analysis.verdict import Check
 from rig.analysis.ways import with_ways
 from rig.data.run_file import RunData
-from rig.errors import RigError
+from rig.errors import Fault, RigError
 from rig.observation.observed_run import ObservedRun
 
 FALSE_ALARMS = 0.001  # how often one of these checks, of any sensor, fails an undamaged run, at most
-SHARES = 13  # of each sensor: its statistics, each with a share of its own; one more where ways are looked at
+SHARES = 13  # of each kind of readings of a sensor, its statistics; one more where the ways between sweeps are held
 DISTURBED = "disturbed_sweep"
 
 
@@ -43,7 +47,7 @@ def contradictions(
     surroundings = surroundings_of(recordings) if settings.checked_by_model else None
     checks: list[Check] = []
     disturbed: set[int] = set()
-    rate = FALSE_ALARMS / ((SHARES + settings.checked_by_model) * len(sensors))
+    rate = _rate(recordings[0].run, sensors)
     for name in sensors:
         explained = results[name].explained
         if explained is None:
@@ -57,10 +61,53 @@ def contradictions(
         counts = [recording.run.samples[name]["counts"].astype(np.int64) for recording in recordings]
         named = {results[name].observations[place].sweep: each for place, each in found.disturbed.items()}
         sweeps = {f"{DISTURBED}.{sweep}": each for sweep, each in sorted(named.items())} or {DISTURBED: found.sweep}
-        statistics = {**sweeps, **found.statistics, **judge_readings(counts, pieces.windows, rate)}
-        checks += [Check(f"{name}.{what}", value, limit, "1") for what, (value, limit) in statistics.items()]
+        of_readings = judge_readings(counts, pieces.windows, rate, as_before=not settings.holds_all_kinds)
+        checks += _checks(f"{name}.", {**sweeps, **found.statistics, **of_readings})
         disturbed |= named.keys()
     return Contradictions(tuple(checks), frozenset(disturbed))
+
+
+def in_reference(
+    recordings: Sequence[ObservedRun],
+    accelerometers: Mapping[str, AccelerometerResult],
+    magnetometers: Mapping[str, MagnetometerResult | Fault],
+    *,
+    drifting: bool = False,
+) -> tuple[Check, ...]:
+    """The same of what gravity and the magnetic field calibrate, of recordings that hold all kinds of readings so.
+
+    Dwell and sweep are named as a gyroscope's sweep is: `gyro.acceleration_disturbed_dwell.13`. The bias may change
+    steadily where it is `drifting`.
+    """
+    run = recordings[0].run
+    known = run.settings.uncertainty
+    if known is None or not run.settings.holds_all_kinds:
+        return ()
+    found = {
+        f"{name}.acceleration_": of_accelerometer(name, recordings, each, known)
+        for name, each in accelerometers.items()
+    }
+    found |= {
+        f"{name}.field_": of_magnetometer(name, recordings, each, known)
+        for name, each in magnetometers.items()
+        if not isinstance(each, Fault)
+    }
+    rate = _rate(run, run.settings.to_calibrate)
+    statistics = {of: reference_statistics(held, rate, drifting=drifting) for of, held in found.items()}
+    return tuple(check for of, each in statistics.items() for check in _checks(of, each))
+
+
+def _rate(run: RunData, sensors: Sequence[str]) -> float:
+    """Of false alarms for each statistic: all kinds of readings that are held against themselves share them."""
+    kinds = len(sensors)
+    if run.settings.holds_all_kinds:
+        accelerometers = [name for name in run.settings.to_calibrate if run.sensors[name].has_acceleration]
+        kinds += len(accelerometers) + len(run.magnetometers)
+    return FALSE_ALARMS / ((SHARES + run.settings.checked_by_model) * kinds)
+
+
+def _checks(of: str, statistics: Mapping[str, Statistic]) -> list[Check]:
+    return [Check(f"{of}{what}", value, limit, "1") for what, (value, limit) in statistics.items()]
 
 
 def names_a_sweep(check: str) -> bool:

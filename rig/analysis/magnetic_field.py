@@ -18,6 +18,7 @@ from rig.data.settings import RunSettings, Site
 from rig.errors import Fault
 from rig.estimation.arrays import Array
 from rig.estimation.budget import Budget
+from rig.estimation.felt import Dwells
 from rig.estimation.magnetometer import (
     FieldDrift,
     MagnetometerSolution,
@@ -46,7 +47,8 @@ class MagnetometerResult:
     `scale` (3,) is 1/‖row of F‖, relative to the field's size `field_t`; `covariance` (6, 6) that of scale and bias by
     the solution alone, the `budget` all that is known of their uncertainty.
     `extension_m` (3,) is where it sits on the flange, `drift` how the field changed between tests at home, None where
-    there were fewer than two. `beside` are the other methods' solutions, or the Fault each ends in.
+    there were fewer than two. `seen` is what it was found from, in tesla. `beside` are the other methods' solutions, or
+    the Fault each ends in.
     """
 
     sensor: RecordedMagnetometer
@@ -62,6 +64,7 @@ class MagnetometerResult:
     non_orthogonality_std_rad: Array
     beside: Mapping[Method, MagnetometerSolution | Fault]
     dwells: tuple[FieldReading, ...]
+    seen: Dwells
 
     @property
     def correction_matrix(self) -> Array:
@@ -119,12 +122,25 @@ def _calibrated(
         drift=drift,
         scale=scale,
         covariance=scale_and_bias_covariance(solution.matrix, scale, solution.covariance),
-        budget=magnetometer_budget(solution, attitudes, variances, (alike, drift), site),
+        budget=magnetometer_budget(
+            solution,
+            attitudes,
+            variances,
+            (alike, drift),
+            site,
+            noise_freedom=_noise_freedom(dwells) if settings.counts_freedom else None,
+        ),
         non_orthogonality_rad=non_orthogonality(axes),
         non_orthogonality_std_rad=np.sqrt(np.diag(angles @ solution.covariance[F, F] @ angles.T))[:3],
         beside={method: or_fault(partial(solve, method=method)) for method in BESIDE},
         dwells=dwells,
+        seen=Dwells(means, variances, attitudes),
     )
+
+
+def _noise_freedom(dwells: Sequence[FieldReading]) -> Array:
+    """(3 N,)."""
+    return np.concatenate([np.broadcast_to(dwell.reading.freedom, 3) for dwell in dwells])
 
 
 def _known_field(settings: RunSettings) -> tuple[Site, float]:

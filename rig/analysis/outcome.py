@@ -18,12 +18,20 @@ from rig.analysis.calibration import (
 )
 from rig.analysis.clock import ClockCheck
 from rig.analysis.comparison import Reference, turns_of
-from rig.analysis.contradictions import contradictions
+from rig.analysis.contradictions import contradictions, in_reference
 from rig.analysis.magnetic_field import MagnetometerResult, calibrate_magnetometers
 from rig.analysis.onboard_check import Agreement, agreement
 from rig.analysis.seen import arms_of
 from rig.analysis.surroundings import surroundings_of
-from rig.analysis.verdict import Check, acceleration_checks, drift_checks, judge, verdict, verification_checks
+from rig.analysis.verdict import (
+    Check,
+    acceleration_checks,
+    clock_checks,
+    drift_checks,
+    judge,
+    verdict,
+    verification_checks,
+)
 from rig.analysis.verification import Verification, verify
 from rig.data.provenance import Provenance
 from rig.data.result_file import StoredCalibrationEntry
@@ -82,10 +90,11 @@ class Outcome:
         return self.verdict == "pass"
 
 
-def calibrated(runs: Sequence[RunData], estimator: str = DEFAULT_ESTIMATOR) -> Outcome:
+def calibrated(runs: Sequence[RunData], estimator: str = DEFAULT_ESTIMATOR, *, drifting: bool = False) -> Outcome:
     """Solve and judge the recordings of a calibration, at least one: the same for a run that just ended and from files.
 
-    Raises Fault or Refused by name when the recordings do not hold what they should.
+    Where biases may be `drifting`, that they do contradicts nothing. Raises Fault or Refused by name when the
+    recordings do not hold what they should.
     """
     settings = runs[0].settings
     chosen = known_estimator(estimator)
@@ -97,10 +106,11 @@ def calibrated(runs: Sequence[RunData], estimator: str = DEFAULT_ESTIMATOR) -> O
             "Record the movement; resume the run if it was interrupted",
         )
     if not settings.planned_sweeps:
-        return _in_attitudes(runs, recordings)
+        return _in_attitudes(runs, recordings, drifting=drifting)
     surroundings = surroundings_of(recordings)
     results = solve_observed(runs[0].sensors, recordings, chosen, surroundings, settings.matrix_corrected)
     accelerometers = calibrate_accelerometers(recordings, settings, results)
+    magnetometers = calibrate_magnetometers(recordings, settings, accelerometers)
     onboard = {name: agreement(runs, name) for name in settings.to_calibrate if runs[0].sensors[name].on_board}
     checks = judge(
         {name: results[name].solution for name in settings.to_calibrate},
@@ -118,12 +128,14 @@ def calibrated(runs: Sequence[RunData], estimator: str = DEFAULT_ESTIMATOR) -> O
             *checks,
             *(check for name, agreed in onboard.items() for check in agreed.checks(name)),
             *contradictions(recordings, results, settings.to_calibrate).checks,
+            *(clock_checks(surroundings.clock) if surroundings is not None and settings.holds_every_clock else ()),
             *_acceleration_checks(accelerometers, settings),
+            *in_reference(recordings, accelerometers, magnetometers, drifting=drifting),
         ),
         provenance=_origin(runs),
         clock=None if surroundings is None else surroundings.clock,
         accelerometers=accelerometers,
-        magnetometers=calibrate_magnetometers(recordings, settings, accelerometers),
+        magnetometers=magnetometers,
     )
 
 
@@ -132,18 +144,22 @@ def drifted(runs: Sequence[RunData], estimator: str = DEFAULT_ESTIMATOR) -> Outc
 
     Raises Fault as `calibrated` and `bias_drifts` do.
     """
-    outcome = calibrated(runs, estimator)
+    outcome = calibrated(runs, estimator, drifting=True)
     settings = outcome.settings
     found, rule = bias_drifts(outcome.recordings, settings), _decision_rule(settings)
     checks = [check for name, each in found.items() for check in drift_checks(name, each, settings.limits, rule)]
     return replace(outcome, drifts=found, checks=(*outcome.checks, *checks))
 
 
-def _in_attitudes(runs: Sequence[RunData], recordings: tuple[ObservedRun, ...]) -> Outcome:
+def _in_attitudes(runs: Sequence[RunData], recordings: tuple[ObservedRun, ...], *, drifting: bool) -> Outcome:
     """Accelerometers alone: no sweep was planned, from which a gyroscope could be calibrated."""
     settings = runs[0].settings
     found = calibrate_accelerometers(recordings, settings)
-    checks = _acceleration_checks(found, settings)
+    magnetometers = calibrate_magnetometers(recordings, settings, found)
+    checks = (
+        *_acceleration_checks(found, settings),
+        *in_reference(recordings, found, magnetometers, drifting=drifting),
+    )
     return Outcome(
         recordings,
         settings,
@@ -153,7 +169,7 @@ def _in_attitudes(runs: Sequence[RunData], recordings: tuple[ObservedRun, ...]) 
         checks,
         _origin(runs),
         accelerometers=found,
-        magnetometers=calibrate_magnetometers(recordings, settings, found),
+        magnetometers=magnetometers,
     )
 
 

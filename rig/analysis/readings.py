@@ -1,4 +1,4 @@
-"""Whether readings are what a converter makes of a noisy rate: their bits, their range, their repetitions. Pure.
+"""Whether readings are what a converter makes of a noisy quantity: their bits, their range, their repetitions. Pure.
 
 Noise above one count sets every low bit as often as not, has no gap and no heap at an end of its range, no run of equal
 readings and no two stretches alike. Where the noise is below a count none of this can be said, and nothing is.
@@ -23,30 +23,36 @@ MEMORY = 12  # readings
 FEWEST_VALUES = 24  # of an axis, to say that a bit ought to have changed
 ONE_BIT = 0.8  # of the spikes off by the same power of two: they are a bit's doing
 FEWEST_SPIKES = 5
+SINGLE = 21  # bits that a number in single precision sets as often as not; its last three it rounds
 FEWEST_OF_NOISE = 4 * MEMORY  # readings of a window that tell their noise
 VIBRATION_LEFT = 0.1  # of the arm's vibration, which the sensor's filter changes and the arm's states tell in part
 HEAP = 10  # readings
 
 
-def judge_readings(counts: Sequence[NDArray[np.int64]], windows: Sequence[Window], rate: float) -> Statistics:
+def judge_readings(
+    counts: Sequence[NDArray[np.int64]], windows: Sequence[Window], rate: float, *, as_before: bool = False
+) -> Statistics:
     """By name of the check its statistic and limit, from all readings (n, 3) of each recording and from the windows.
 
-    `rate` is that of false alarms for each, where it is not far smaller.
+    `rate` is that of false alarms for each, where it is not far smaller. The noise is that of most windows: one in
+    which an axis stands still does not make it a sensor without noise. `as_before`: that of the quietest.
     """
     from scipy.special import ndtri
 
     sure = -float(ndtri(rate / (2 * 3 * 16)))  # of a normal variable, over three axes and their bits
     at_rest = [window for window in windows if window.sweep < 0] or windows
-    noise = np.min([_noise(window.counts) for window in at_rest], axis=0)
+    noises = [_noise(window.counts) for window in at_rest]
+    noise = np.asarray(np.min(noises, axis=0) if as_before else np.median(noises, axis=0), dtype=np.float64)
     spikes, of_a_bit = _spikes(windows)
     stuck = _constant_bits(np.concatenate(counts)) + _uneven_bits(windows, noise, sure) + of_a_bit
     found = {"stuck_bit": (float(stuck), 0.0), "spikes": (spikes, SPIKE)}
-    if len(at_rest) < len(windows):
+    if any(window.sweep < 0 for window in windows):
         found["skewed_noise"] = _skewness(at_rest, sure)
     if noise.min() >= 1:
         found["stuck_axis"] = max(map(_longest_run, counts)), LONGEST_RUN
         found["repeated_readings"] = sum(map(_repeated, counts)), 0.0
-        found["clipping"] = _heaped(np.concatenate([each.counts for each in windows if each.sweep >= 0]), sure), 0.0
+        turning = [window for window in windows if window.sweep >= 0] or windows
+        found["clipping"] = _heaped(np.concatenate([each.counts for each in turning]), sure), 0.0
     return found
 
 
@@ -82,7 +88,8 @@ def _uneven_bits(windows: Sequence[Window], noise: Array, sure: float) -> int:
     uneven = 0
     counts = np.concatenate([window.counts for window in windows])
     for axis in range(3):
-        for bit in range(16):
+        first = int(np.abs(counts[:, axis]).max()).bit_length() - SINGLE
+        for bit in range(max(first, 0), 16):
             if 1.5 * 2**bit > noise[axis]:
                 break
             ones = float(np.mean((counts[:, axis] >> bit) & 1))

@@ -27,14 +27,26 @@ LOCAL_GRAVITY_M_S2: Final = 0.0005
 ANY_GRAVITY_M_S2: Final = 0.03
 UNSTATED_FIELD: Final = 0.01  # of the field: an ordinary fluxgate
 UNTESTED_DRIFT_T: Final = 1e-7  # in a run: a magnetic storm, a lift some floors away
+TESTED_AXES: Final = 3  # of one change of the field, by which its standard deviation is known
 SIZE_OF_FIELD: Final = "size of the field"
 MICROTESLA: Final = 1e6
 
 
-def accelerometer_budget(solution: ImuSolution, dwells: Dwells, sweeps: Sweeps, site: Site, lag_s: float) -> Budget:
-    """Of the solution found from these; `lag_s` is how late the sensor's own filter may be."""
+def accelerometer_budget(
+    solution: ImuSolution,
+    dwells: Dwells,
+    sweeps: Sweeps,
+    site: Site,
+    lag_s: float,
+    *,
+    noise_freedom: Array | None = None,
+) -> Budget:
+    """Of the solution found from these; `lag_s` is how late the sensor's own filter may be.
+
+    `noise_freedom` (3 N + 9 M,) as in `Spread`: of the dwells' readings, then of the sweeps' harmonics.
+    """
     noise, left = Movement(dwells, sweeps).noise(), (solution.chi_square, solution.freedom)
-    spread = _spread(solution, solution.response, noise, solution.attitude_error, left)
+    spread = _spread(solution, solution.response, noise, solution.attitude_error, left, noise_freedom=noise_freedom)
     others = [_lagging(spread, dwells, sweeps, lag_s)] if len(sweeps.speeds_rad_s) else []
     return reference_budget(spread, _gravity(site), others)
 
@@ -45,6 +57,8 @@ def magnetometer_budget(
     variances_t2: Array,
     tested: tuple[Uniformity, FieldDrift | None],
     site: Site,
+    *,
+    noise_freedom: Array | None = None,
 ) -> Budget:
     """Of the solution found in attitudes (N, 3, 3), flange to base, with these variances (N, 3) of the means."""
     alike, drift = tested
@@ -52,7 +66,7 @@ def magnetometer_budget(
     theta = np.concatenate([solution.matrix.ravel(), solution.field_table_t, solution.bias_t])
     response = response_in_attitudes(theta, attitudes, variances_t2, error.std_rad)
     left = alike.chi_square, alike.degrees_of_freedom
-    spread = _spread(solution, response, np.diag(variances_t2.ravel()), error, left)
+    spread = _spread(solution, response, np.diag(variances_t2.ravel()), error, left, noise_freedom=noise_freedom)
     return reference_budget(spread, _field(site), [_drifting(spread, solution.matrix, attitudes, drift)])
 
 
@@ -62,11 +76,13 @@ def _spread(
     noise: Array,
     error: AttitudeError,
     left: tuple[float, int],
+    *,
+    noise_freedom: Array | None,
 ) -> Spread:
     """Of scale and bias, from the `response` (p, n) of all that was found; `left`: χ² of the residuals, its freedom."""
     scale = 1 / np.linalg.norm(solution.matrix, axis=1)
     told = scale_and_bias(solution.matrix, scale, len(solution.covariance))
-    return Spread(scale, told @ solution.covariance @ told.T, told @ response, noise, error, *left)
+    return Spread(scale, told @ solution.covariance @ told.T, told @ response, noise, error, *left, noise_freedom)
 
 
 def _gravity(site: Site) -> KnownSize:
@@ -86,23 +102,34 @@ def _field(site: Site) -> KnownSize:
     return KnownSize(SIZE_OF_FIELD, UNSTATED_FIELD, False, size_ut, "µT", f"{said} {NOT_GIVEN}")
 
 
-def _lagging(spread: Spread, dwells: Dwells, sweeps: Sweeps, lag_s: float) -> Contributor:
-    """The sensor's own filter makes a turn's wave smaller by (ω τ)²/2, which the model leaves out."""
+def lag_pattern(dwells: Dwells, sweeps: Sweeps, lag_s: float) -> Array:
+    """(1, 3 K) what the sensor's own filter takes of a turn's wave: (ω τ)²/2, which the model leaves out."""
     smaller = sweeps.harmonics_m_s2 * np.square(sweeps.speeds_rad_s * lag_s)[:, None, None] / 2
     smaller[:, 0] = 0.0  # the mean passes whole
-    pattern = np.concatenate([np.zeros(dwells.readings_m_s2.size), smaller.ravel()])
-    return assumed("filter's lag", 1e3 * lag_s, "ms", "uncertainty.acceleration_lag_ms", spread.of(pattern[None]))
+    return np.concatenate([np.zeros(dwells.readings_m_s2.size), smaller.ravel()])[None]
 
 
-def _drifting(spread: Spread, matrix: Array, attitudes: Array, drift: FieldDrift | None) -> Contributor:
-    """A field that changes evenly from the first attitude to the last, along each axis of the base."""
+def drift_patterns(matrix: Array, attitudes: Array, drift: FieldDrift | None) -> tuple[Array, float]:
+    """(3, 3 N) of a field that changes evenly from the first attitude to the last, along each axis of the base.
+
+    By one standard uncertainty where its `drift` was tested, else by half of all that is possible; and how much, T.
+    """
     change_t = UNTESTED_DRIFT_T
     if drift is not None:
         change_t = max(float(np.linalg.norm(each)) for each in (drift.change_t, drift.std_t)) / np.sqrt(3)
     along = np.linspace(-0.5, 0.5, len(attitudes))[:, None, None] * (matrix @ np.swapaxes(attitudes, -1, -2))
-    patterns = change_t * np.moveaxis(along, -1, 0).reshape(3, -1)
+    return change_t * np.moveaxis(along, -1, 0).reshape(3, -1), change_t
+
+
+def _lagging(spread: Spread, dwells: Dwells, sweeps: Sweeps, lag_s: float) -> Contributor:
+    said = "uncertainty.acceleration_lag_ms"
+    return assumed("filter's lag", 1e3 * lag_s, "ms", said, spread.of(lag_pattern(dwells, sweeps, lag_s)))
+
+
+def _drifting(spread: Spread, matrix: Array, attitudes: Array, drift: FieldDrift | None) -> Contributor:
+    patterns, change_t = drift_patterns(matrix, attitudes, drift)
     if drift is None:
         said = f"procedure.field_test_s {NOT_GIVEN}"
         return assumed("drift of the field", MICROTESLA * change_t, "µT", said, spread.of(patterns))
-    source = "tests at home"
-    return Contributor("drift of the field", "A", "normal", None, "", source, np.inf, spread.of(patterns))
+    freedom = float(TESTED_AXES) if spread.noise_freedom is not None else np.inf
+    return Contributor("drift of the field", "A", "normal", None, "", "tests at home", freedom, spread.of(patterns))

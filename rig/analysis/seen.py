@@ -11,9 +11,10 @@ from rig.arm.kinematics import AXIS_ERRORS
 from rig.config.sensor_catalogue import PARTS
 from rig.data.settings import RunSettings, Uncertainty
 from rig.estimation.arrays import Array
-from rig.estimation.budget import Unknown
+from rig.estimation.budget import Unknown, uncounted
 from rig.estimation.earth_rate import EarthRate, Known
 from rig.estimation.explained import Seen
+from rig.observation.average import Average
 from rig.observation.observe import Observation
 from rig.observation.observed_run import ObservedRun
 
@@ -49,6 +50,7 @@ def see(recordings: Sequence[ObservedRun], sensor: str, surroundings: Surroundin
         joints=(*(turn.joint_name for turn, _ in turns), *[None] * len(rests)),
         axis_errors_rad_s=_axis_errors([turn for turn, _ in turns], len(rests), surroundings.uncertainty.axis_deg),
         arms_m=np.concatenate([arms_m, np.zeros((len(rests), 3))]),
+        noise_freedom=_noise_freedom(averages) if surroundings.counts_freedom else np.inf,
     )
 
 
@@ -56,6 +58,11 @@ def arms_of(turns: Sequence[Observation], settings: RunSettings) -> Array:
     """(M, 3) from the axis that turns to where the sensors sit, in the flange's frame; zero where it is left out."""
     known = [turn.arm_m + np.array(settings.extension_m) if turn.arm_m is not None else np.zeros(3) for turn in turns]
     return np.reshape(known, (-1, 3)) * settings.knows_own_motion
+
+
+def _noise_freedom(averages: Sequence[Average]) -> Array:
+    """(N, 3)."""
+    return np.array([np.broadcast_to(average.freedom, 3) for average in averages])
 
 
 def _axis_errors(turns: Sequence[Observation], rests: int, axis_deg: float) -> Array:
@@ -105,13 +112,17 @@ def g_sensitivity_deg_s_g(known: Uncertainty, name: str, part: str) -> float:
 def unknown_of(surroundings: Surroundings, name: str, part: str, earth_rate: EarthRate | None) -> Unknown:
     """What no recording shows of the surroundings of a sensor of that name and kind, and the Earth's rate it found."""
     known, clock = surroundings.uncertainty, surroundings.clock
-    return Unknown(
+    found = Unknown(
         clock_std=clock.std,
+        clock_freedom=clock.freedom,
         clock_source="held against " + (" and ".join(each.by for each in clock.comparisons) or "no other clock"),
         state_jitter_s=surroundings.state_jitter_s,
+        state_jitter_freedom=surroundings.state_jitter_freedom,
         axis_rad=float(np.radians(known.axis_deg)),
         sensor_offset_m=known.sensor_offset_mm / 1000,
         g_sensitivity_rad_s_per_g=float(np.radians(g_sensitivity_deg_s_g(known, name, part))),
         earth_rate=earth_rate is None and surroundings.site.earth_rate_rad_s is None,
         earth_covariance_rad2_s2=None if earth_rate is None else earth_rate.covariance_rad2_s2,
+        earth_freedom=np.inf if earth_rate is None else earth_rate.freedom,
     )
+    return found if surroundings.counts_freedom else uncounted(found)

@@ -71,10 +71,27 @@ def axis_errors(q_rad: ArrayLike, joint: int, arm: DenavitHartenberg = NOMINAL) 
     changes = [turned(frames[link + 1][:, 0], link) for link in (WRIST_1, WRIST_2, WRIST_3)]
     for link in (WRIST_2, WRIST_3):
         by_zero = turned(frames[link][:, 2], link)
-        angle = q[link]
-        waves = (np.cos(angle), np.sin(angle), np.cos(2 * angle), np.sin(2 * angle))
-        changes += [by_zero, *(wave * by_zero for wave in waves)]
+        changes += [by_zero, *(wave * by_zero for wave in angle_waves(q[link]))]
     return np.array(changes)
+
+
+def flange_errors(q_rad: ArrayLike, arm: DenavitHartenberg = NOMINAL) -> Array:
+    """(3, 6, 3) small turns of the flange, by radian of what is wrong with each wrist, in the base's frame.
+
+    At joint angles `q_rad` (6,): of its twist, its zero, and the waves of its angle as `WAVES` has them.
+    """
+    q = np.asarray(q_rad, dtype=np.float64)
+    frames = np.array(_frames(q, arm))[:, :3, :3]
+    found = []
+    for link in (WRIST_1, WRIST_2, WRIST_3):
+        by_zero = frames[link][:, 2]
+        found.append([frames[link + 1][:, 0], by_zero, *(wave * by_zero for wave in angle_waves(q[link]))])
+    return np.array(found)
+
+
+def angle_waves(angle_rad: float) -> Array:
+    """(4,) as `WAVES` has them."""
+    return np.array([np.cos(angle_rad), np.sin(angle_rad), np.cos(2 * angle_rad), np.sin(2 * angle_rad)])
 
 
 def _link(angle_rad: Array, a_m: float, d_m: float, alpha_rad: float) -> Array:

@@ -95,7 +95,9 @@ class SiteSection(Section):
         description="the country it is in, for digital certificates",
         json_schema_extra={"allowed": "two capital letters (ISO 3166-1)"},
     )
-    place: Words | None = Field(default=None, description="where the arm stands, if not at that address: site, room")
+    place: Words | None = Field(
+        default=None, description="where the arm stands: site, room; left out, a certificate does not state it"
+    )
     time_reference: Words | None = Field(
         default=None,
         description="what disciplines this computer's clock, such as `NTP, ptbtime1.ptb.de`; without it a certificate "

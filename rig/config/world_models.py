@@ -177,8 +177,9 @@ class SimulatedBoardSection(Section):
         description="the microcontroller's own number",
         json_schema_extra={"allowed": "24 hexadecimal digits, small letters"},
     )
+    crystal: bool = Field(default=True, description="whether its 32768 Hz crystal swings, which its clock then follows")
     crystal_ppm: float = Field(
-        default=35.0,
+        default=12.0,
         ge=-25_000,
         le=25_000,
         description="how much too fast its clock runs; without its crystal up to 2 % off",

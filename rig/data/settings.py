@@ -183,9 +183,29 @@ class RunSettings:
         return self.reckoning >= 2
 
     @property
+    def counts_freedom(self) -> bool:
+        """Whether U has the coverage factor of its degrees of freedom; in results of before it is twice u."""
+        return self.reckoning >= 2
+
+    @property
+    def holds_every_clock(self) -> bool:
+        """Whether a clock counts however far off it is, and what contradicts fails a check."""
+        return self.reckoning >= 2
+
+    @property
     def movement(self) -> tuple[object, ...]:
         """What two recordings must have in common for their sweeps and dwells to be those of one run."""
         return self.procedure, self.then_verify, self.home_q_rad, self.planned_sweeps, self.planned_dwells
+
+    @property
+    def holds_all_kinds(self) -> bool:
+        """Whether accelerometers and magnetometers are held against themselves as gyroscopes are."""
+        return self.reckoning >= 2
+
+    @property
+    def leaves_dwells_early(self) -> bool:
+        """Whether a dwell's last readings are left out."""
+        return self.reckoning >= 2
 
     def with_overrides(self, overrides: Sequence[str]) -> "RunSettings":
         """The same with other thresholds or limits, or reckoned otherwise: `limits.scale_std=0.001`, `reckoning=2`.

@@ -32,7 +32,8 @@ class Seen:
     `windows_s` (N, 2) on the clock of the first recording; `joints` (N) which of the arm's joints turned, None for a
     rest; `axis_errors_rad_s` (P, N, 3) how far the turns would be off for one standard uncertainty of each of the arm's
     own angles, as far as it is known; `arms_m` (N, 3) a way from the axis that turns to where the sensor is taken to
-    sit, in the flange's frame, None where its own motion is left out.
+    sit, in the flange's frame, None where its own motion is left out. `noise_freedom` (N, 3): with how many degrees of
+    freedom the variances are known.
     """
 
     means_rad_s: Array
@@ -46,6 +47,7 @@ class Seen:
     joints: tuple[str | None, ...]
     axis_errors_rad_s: Array | None = None
     arms_m: Array | None = None
+    noise_freedom: Array | float = np.inf
 
     @property
     def speeds_rad_s(self) -> tuple[float, ...]:

@@ -122,18 +122,16 @@ def solve_imu(
     held = _held(movement, second_order=second_order)
     needed = PARAMETERS - 1 - len(held)
     _check(movement, needed)
-    start = linear_start(movement, gravity_m_s2, np.asarray(up, dtype=np.float64))
-    free = _free(start, held)
-    slopes = jacobian(start, movement) @ free
-    told = refusals.conditioning(slopes / _sizes(slopes), needed)
-    refusals.check_conditioning(told, needed, MAX_CONDITION, "some of F, bias, reference, lever arm and delay", REMEDY)
-    try:
+    with refusals.converging():
+        start = linear_start(movement, gravity_m_s2, np.asarray(up, dtype=np.float64))
+        columns = jacobian(start, movement) @ _free(start, held)
+        told = refusals.conditioning(columns / _sizes(columns), needed)
+        what = "some of F, bias, reference, lever arm and delay"
+        refusals.check_conditioning(told, needed, MAX_CONDITION, what, REMEDY)
         fit = most_likely(start, movement, held, attitude_std_rad)
-        covariance = fit.covariance()
+        covariance, response = fit.covariance(), fit.response()
         if attitude_std_rad is None:
             _check_attitudes(start, movement, held, fit)
-    except np.linalg.LinAlgError:
-        raise refusals.untrustworthy(refusals.NO_FIT) from None
     f = matrix(fit.theta)
     refusals.check_unit(1 / np.linalg.norm(f, axis=1))
     refusals.check_handedness(f)
@@ -148,7 +146,7 @@ def solve_imu(
         delay_s=float(fit.theta[DELAY]) if swept else None,
         second_order_s2_m=fit.theta[SECOND] if second_order else None,
         covariance=covariance,
-        response=fit.response(),
+        response=response,
         attitude_error=with_uncertainty(fit.readings, fit.std_rad, fit.jacobian)
         if attitude_std_rad is None
         else AttitudeError(attitude_std_rad, 0.0),
@@ -174,6 +172,11 @@ def covariance_bound(
     free = _free(theta, _held(movement, second_order=second_order))
     readings = apart(noise(theta, movement), effects(theta, movement))
     return Fit(theta, readings, jacobian(theta, movement) @ free, free, attitude_std_rad, 0).covariance()
+
+
+def slopes(theta: Array, movement: Movement, *, second_order: bool) -> Array:
+    """(3 K, q) derivative of the readings in the ways θ (22,) may move."""
+    return np.asarray(jacobian(theta, movement) @ _free(theta, _held(movement, second_order=second_order)))
 
 
 def most_likely(start: Array, movement: Movement, held: list[int], attitude_std_rad: float | None) -> Fit:

@@ -15,6 +15,7 @@ from numpy.typing import ArrayLike
 from rig.estimation.arrays import Array
 from rig.estimation.attitude_error import effects, whitening_with
 from rig.estimation.reference_model import KnownNorm, most_likely, predicted, whitened
+from rig.estimation.refusals import converging
 from rig.estimation.triaxial import Method, TriaxialSolution, solve_triaxial
 
 MODEL = "m_m = F Rᵀ m + b"
@@ -89,14 +90,18 @@ def uniformity(
     variances_t2: ArrayLike,
     attitude_error_rad: float,
 ) -> Uniformity:
-    """What the best fit with attitudes off by so much leaves, from the `solution` of these readings."""
+    """What the best fit with attitudes off by so much leaves, from the `solution` of these readings.
+
+    Raises Fault `attitude_untrustworthy` where there is none.
+    """
     from scipy.special import chdtri
 
     m, r, v = (np.asarray(a, dtype=np.float64) for a in (readings_t, attitudes, variances_t2))
     v_bar = np.zeros_like(m)
     start = np.concatenate([solution.matrix.ravel(), solution.field_table_t, solution.bias_t])
-    white = whitening_with(v, effects(start, r, v_bar), np.full(len(m), attitude_error_rad))
-    theta, _ = most_likely(start, m, r, v_bar, white, norm_known=True)
+    with converging():
+        white = whitening_with(v, effects(start, r, v_bar), np.full(len(m), attitude_error_rad))
+        theta, _ = most_likely(start, m, r, v_bar, white, norm_known=True)
     left = whitened(white, m - predicted(theta, r, v_bar))
     freedom = left.size - FREE
     return Uniformity(float(np.sum(left**2)), freedom, float(chdtri(freedom, FALSE_ALARM)), attitude_error_rad)

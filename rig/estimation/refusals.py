@@ -3,6 +3,8 @@
 Each function looks at one thing and raises `rig.errors.Fault`. `conditioning` judges what a design can tell.
 """
 
+from collections.abc import Iterator
+from contextlib import contextmanager
 from dataclasses import dataclass
 
 import numpy as np
@@ -207,6 +209,15 @@ def untrustworthy(what: str) -> Fault:
         what,
         "Check the attitudes: their frame, their direction (body to table), headings nobody measured, one not reached",
     )
+
+
+@contextmanager
+def converging() -> Iterator[None]:
+    """Raises Fault `attitude_untrustworthy` where the linear algebra of a fit in attitudes comes to no end."""
+    try:
+        yield
+    except np.linalg.LinAlgError:
+        raise untrustworthy(NO_FIT) from None
 
 
 @dataclass(frozen=True, slots=True)

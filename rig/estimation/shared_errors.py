@@ -35,25 +35,46 @@ def apart(noise: Array, effects: Array) -> Apart:
 
 def likeliest_error(readings: Apart, residuals: Array, jacobian: Array) -> float:
     """δ, rad, from residuals (n,) and J (n, q)."""
-    turned, slopes = readings.turn @ residuals, readings.turn @ jacobian
+    return likeliest(lambda log_delta: _lost(np.exp(log_delta), readings, residuals, jacobian, jacobian))
 
-    def lost(log_delta: float) -> float:
-        variance = 1 + np.exp(2 * log_delta) * readings.growth
-        orthogonal, triangle = np.linalg.qr(slopes / np.sqrt(variance)[:, None])
-        left = turned / np.sqrt(variance)
-        left = left - orthogonal @ (orthogonal.T @ left)
-        return float(0.5 * (left @ left + np.log(variance).sum()) + np.log(np.abs(np.diag(triangle))).sum())
 
-    return likeliest(lost)
+def more_likely(readings: Apart, residuals: Array, jacobian: Array, columns: Array) -> float:
+    """Twice the logarithm of how much likelier residuals (n,) are with `columns` (n, k) beside J (n, q).
+
+    Each with the δ that makes them likeliest, of what J leaves of the readings (Welham and Thompson, J. R. Stat. Soc. B
+    59 (1997) 701). Where δ is known it is χ² of what the columns explain.
+    """
+    more = np.column_stack([jacobian, columns])
+
+    def least(whole: Array) -> float:
+        std_rad = likeliest(lambda log_delta: _lost(np.exp(log_delta), readings, residuals, jacobian, whole))
+        return _lost(std_rad, readings, residuals, jacobian, whole)
+
+    return 2 * (least(jacobian) - least(more))
+
+
+def _lost(std_rad: float, readings: Apart, residuals: Array, jacobian: Array, whole: Array) -> float:
+    """− ln of the likelihood of what J leaves, where `whole` (n, p), of which J is the first columns, explains more."""
+    variance = 1 + std_rad**2 * readings.growth
+    orthogonal, triangle = np.linalg.qr((readings.turn @ whole) / np.sqrt(variance)[:, None])
+    left = (readings.turn @ residuals) / np.sqrt(variance)
+    left = left - orthogonal @ (orthogonal.T @ left)
+    sizes = np.abs(np.diag(triangle))[: jacobian.shape[1]]
+    return float(0.5 * (left @ left + np.log(variance).sum()) + np.log(sizes).sum())
 
 
 def with_uncertainty(readings: Apart, std_rad: float, jacobian: Array) -> AttitudeError:
-    """By the expected information on δ²: half the trace of (P G)², G = E Eᵀ and P what the fit leaves, whitened."""
+    """What the expected information on δ² makes of it."""
+    told = information(readings, std_rad, jacobian)
+    if told <= 0:
+        return AttitudeError(std_rad, float("inf"))
+    return AttitudeError(std_rad, float(np.sqrt(std_rad**2 + told**-0.5) - std_rad))
+
+
+def information(readings: Apart, std_rad: float, jacobian: Array) -> float:
+    """On δ²: half the trace of (P G)², G = E Eᵀ and P what the fit of J (n, q) leaves, whitened."""
     variance = 1 + std_rad**2 * readings.growth
     growth = readings.growth / variance
     orthogonal = np.linalg.qr((readings.turn @ jacobian) / np.sqrt(variance)[:, None])[0]
     taken = orthogonal.T @ (growth[:, None] * orthogonal)
-    information = 0.5 * float(growth @ growth - 2 * growth**2 @ np.sum(orthogonal**2, axis=1) + np.sum(taken**2))
-    if information <= 0:
-        return AttitudeError(std_rad, float("inf"))
-    return AttitudeError(std_rad, float(np.sqrt(std_rad**2 + information**-0.5) - std_rad))
+    return 0.5 * float(growth @ growth - 2 * growth**2 @ np.sum(orthogonal**2, axis=1) + np.sum(taken**2))

@@ -104,30 +104,28 @@ def solve_triaxial(
     needed = parameters - norm_known
     _check(m, r, v, known, parameters)
 
-    start, solutions = published_estimate(m, r, known, second_order=second_order)
-    squares = sensed(start, r, v_bar) ** 2 if second_order else None
-    told = _conditioning(stack(m, r, squares) / column_sizes(m, squares), m, v, needed)
-    refusals.check_conditioning(told, needed, MAX_CONDITION, "some of F, reference and bias", REMEDY)
-    if isinstance(known, KnownNorm):
-        refusals.check_side(start[REFERENCE], np.asarray(known.side, dtype=np.float64))
-    attitude_error = None
-    white = whitening(v)
-    if method == "as_published":
-        theta, iterations = start, solutions
-        covariance = published_covariance(theta, m, r, known, v)
-    elif method == "maximum_likelihood":
-        theta, iterations = most_likely(start, m, r, v_bar, white, norm_known=norm_known)
-        covariance = covariance_bound(theta, r, v_bar, white, norm_known=norm_known)
-    else:
-        stated = np.zeros(len(m)) if attitude_std_rad is None else np.asarray(attitude_std_rad, dtype=np.float64)
-        placed = Placed(m, v, r, v_bar, stated, norm_known)
-        try:
+    with refusals.converging():
+        start, solutions = published_estimate(m, r, known, second_order=second_order)
+        squares = sensed(start, r, v_bar) ** 2 if second_order else None
+        told = _conditioning(stack(m, r, squares) / column_sizes(m, squares), m, v, needed)
+        refusals.check_conditioning(told, needed, MAX_CONDITION, "some of F, reference and bias", REMEDY)
+        if isinstance(known, KnownNorm):
+            refusals.check_side(start[REFERENCE], np.asarray(known.side, dtype=np.float64))
+        attitude_error = None
+        white = whitening(v)
+        if method == "as_published":
+            theta, iterations = start, solutions
+            covariance = published_covariance(theta, m, r, known, v)
+        elif method == "maximum_likelihood":
+            theta, iterations = most_likely(start, m, r, v_bar, white, norm_known=norm_known)
+            covariance = covariance_bound(theta, r, v_bar, white, norm_known=norm_known)
+        else:
+            stated = np.zeros(len(m)) if attitude_std_rad is None else np.asarray(attitude_std_rad, dtype=np.float64)
+            placed = Placed(m, v, r, v_bar, stated, norm_known)
             found = solve_attitude_weighted(start, placed)
             _check_attitudes(start, placed, found)
-        except np.linalg.LinAlgError:
-            raise refusals.untrustworthy(refusals.NO_FIT) from None
-        theta, covariance, iterations = found.theta, found.covariance, found.iterations
-        attitude_error, white = found.attitude_error, found.white
+            theta, covariance, iterations = found.theta, found.covariance, found.iterations
+            attitude_error, white = found.attitude_error, found.white
     f = theta[F].reshape(3, 3)
     refusals.check_unit(1 / np.linalg.norm(f, axis=1))
     refusals.check_handedness(f)

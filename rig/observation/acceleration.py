@@ -17,6 +17,7 @@ from rig.observation.windows import Dwelt, Window, dwelt
 
 MAX_DWELL_TRAVEL_RAD = 1e-3  # of any joint, while it stands
 MIN_DWELL_SAMPLES = 20
+LEAVING_S = 0.05  # before a dwell's end: the board's times are those of the gyroscope, whose filter is the later one
 
 
 @dataclass(frozen=True, slots=True)
@@ -43,7 +44,7 @@ def dwell_readings(
     """
     for each in dwelt(run):
         if each.dwell.index not in superseded:
-            yield dwell_reading(stream, motion, each, settings)
+            yield dwell_reading(stream, motion, _standing(run, each), settings)
 
 
 def each_dwell(
@@ -55,7 +56,7 @@ def each_dwell(
     found: dict[int, DwellReading | Fault] = {}
     for each in dwelt(run):
         try:
-            found[each.dwell.index] = dwell_reading(stream, motion, each, settings)
+            found[each.dwell.index] = dwell_reading(stream, motion, _standing(run, each), settings)
         except Fault as fault:
             found[each.dwell.index] = fault
     return found
@@ -111,6 +112,14 @@ def dwell_reading(stream: Stream, motion: ArmMotion, finished: Dwelt, settings: 
         window=window,
         temperature_c=stream.temperature_c(inside),
     )
+
+
+def _standing(run: RunData, finished: Dwelt) -> Dwelt:
+    """Without its last readings, which may have felt the arm leave; recordings of before keep them."""
+    if not run.settings.leaves_dwells_early:
+        return finished
+    start_s, end_s = finished.window.start_s, finished.window.end_s
+    return Dwelt(finished.dwell, Window(start_s, max(end_s - LEAVING_S, start_s)))
 
 
 def _check_standing(motion: ArmMotion, window: Window, where: str) -> None:

@@ -1,6 +1,6 @@
 """What a magnetometer read at rest: its means in dwells, each with the attitude the arm stood in, and at home. Pure."""
 
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 from typing import Any
 
@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 from rig.data.settings import ObservationThresholds
 from rig.errors import Fault
 from rig.estimation.arrays import Array
-from rig.observation.acceleration import MIN_DWELL_SAMPLES, check_complete
+from rig.observation.acceleration import MIN_DWELL_SAMPLES, DwellReading, check_complete
 from rig.observation.average import Mean, mean_of
 from rig.observation.observed_run import ObservedRun
 from rig.observation.windows import Window, rested
@@ -89,6 +89,16 @@ def field_readings(recording: ObservedRun, name: str, thresholds: ObservationThr
         )
         for dwell in recording.sensors[other].dwells
     )
+
+
+def dwelt_field(recording: ObservedRun, name: str) -> Iterator[tuple[DwellReading, NDArray[Any], Array]]:
+    """Of the same dwells the readings as recorded (n, 3), and their times (n,) on the arm's clock."""
+    other = beside(recording, name)
+    if other is not None:
+        time_s = _time_s(recording, name, other)
+        for dwell in recording.sensors[other].dwells:
+            inside = slice(*np.searchsorted(time_s, [dwell.window.start_s, dwell.window.end_s]).tolist())
+            yield dwell, recording.run.samples[name]["field_counts"][inside], time_s[inside]
 
 
 def field_tests(

@@ -21,10 +21,11 @@ class SweptAcceleration:
 
     There `attitude` (3, 3) takes a vector of the arm's base frame into the flange's. `axis_flange` (3,) is the unit
     vector of a growing angle, `arm_m` (3,) a way from the axis to the flange's origin, in the flange's frame.
-    `station` names the joint and the pose it turned in.
+    `station` names the `joint`, from 0 at the base, and the pose it turned in.
     """
 
     sweep: int
+    joint: int
     harmonic: FirstHarmonic
     attitude: Array
     axis_flange: Array
@@ -44,6 +45,7 @@ def swept_acceleration(stream: Stream, motion: ArmMotion, sweep: Sweep, turn: Re
     growing = 1.0 if sweep.direction == "ccw" else -1.0
     return SweptAcceleration(
         sweep=sweep.index,
+        joint=sweep.joint,
         harmonic=first_harmonic(
             time_s,
             accelerations(stream, inside)[known],

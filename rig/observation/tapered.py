@@ -16,6 +16,7 @@ FLANK_SHARE = 0.125  # of the window, at most
 PREVAILS = 0.5  # of the residuals' variance, what is left in a long mean where the rest of them is a vibration
 BLACKMAN_HARRIS = (0.35875, -0.48829, 0.14128, -0.01168)  # Harris 1978, table 1: side lobes below −92 dB
 MAIN_LOBE = 4  # bins to either side
+NOISE_BINS = 2.0  # that neighbouring bins have in common: the window's equivalent noise bandwidth, table 1
 LOW = 0.1  # of the data rate: frequencies at which the noise is as at zero, but for where the arm vibrates
 FEWEST_BINS = 16
 
@@ -54,6 +55,14 @@ def shaped(readings: Array) -> Array:
     window: Array = np.cos(np.outer(phase, np.arange(len(BLACKMAN_HARRIS)))) @ np.array(BLACKMAN_HARRIS)
     under: Array = window[:, None] / np.sqrt(np.sum(window**2)) * (readings - readings.mean(axis=0))
     return under
+
+
+def freedom_at_zero(count: int) -> float:
+    """Degrees of freedom of `noise_at_zero` by so many readings: those of the median of m independent powers.
+
+    Its relative variance is 1 / (m ln² 2), and ν is two over that (JCGM 100, G.4.2).
+    """
+    return float(2 * np.log(2) ** 2 * (_highest(count) - MAIN_LOBE) / NOISE_BINS)
 
 
 def _highest(count: int) -> int:

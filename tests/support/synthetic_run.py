@@ -68,6 +68,7 @@ class Setup:
     sample_rate_hz: float = 238.0
     boot_s: float = -4321.0  # controller time at which the board's clock stood at zero
     drift: float = -35e-6  # of the controller against the board
+    follows_crystal: bool | None = False  # the board's word on its clock
     kinematics: DenavitHartenberg = NOMINAL  # how the arm is made
     procedure: tuple[tuple[str, str], ...] = ()  # further keys of its section, and their values
     odd_per_rad_s: float = 0.0  # of each axis
@@ -200,7 +201,7 @@ def run_data(setup: Setup, motion: Motion, board_s: Array, counts: Array) -> Run
     arm["q_rad"], arm["qd_rad_s"] = np.round(q / setup.encoder_step_rad) * setup.encoder_step_rad, qd
     arm["target_speed_fraction"] = arm["speed_scaling"] = 1.0
     arm["robot_mode"], arm["safety_mode"], arm["runtime_state"] = 7, 1, 2
-    provenance = replace(PROVENANCE, arm_kinematics=setup.told)
+    provenance = replace(PROVENANCE, arm_kinematics=setup.told, board_follows_crystal=setup.follows_crystal)
     return RunData(
         motion.config, motion.settings, provenance, {"gyro": SENSOR}, {"gyro": samples}, arm, motion.events()
     )

@@ -1,0 +1,71 @@
+"""What an arm that is not quite where it says does to readings in attitudes: a few errors, shared by all of them."""
+
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from rig.analysis.seen import WAVE_SHARE
+from rig.arm.kinematics import WRIST_1, DenavitHartenberg, angle_waves, flange_attitude, flange_errors
+from rig.estimation.arrays import Array
+from rig.estimation.felt import OWN_ERRORS, SHARE, SHARED_ERRORS, TURNS, Movement, effects
+
+STEADY = 2  # of a wrist's errors, its twist and its zero; the others are waves of its angle
+
+
+@dataclass(frozen=True, slots=True)
+class Stood:
+    """The arm's angles (6,) in a dwell, or where a sweep's are counted from; which wrist it turns (0 to 2), if any."""
+
+    q_rad: Array
+    wrist: int | None = None
+
+
+@dataclass(frozen=True, slots=True)
+class Known:
+    """The arm as it says it is, by how much its angles may be off either way, the sensor's nominal mounting (3, 3).
+
+    `found_rad` is how far off the readings say it is, a standard deviation: it may be a poorer arm than was stated.
+    """
+
+    arm: DenavitHartenberg
+    axis_deg: float
+    mounting: Array
+    found_rad: float
+
+
+def arm_patterns(theta: Array, movement: Movement, stood: Sequence[Stood], known: Known) -> Array:
+    """(18, 3 K) change of the readings by one standard uncertainty of each of the wrists' errors."""
+    alone = replace(movement.sweeps, stations=np.arange(len(movement.sweeps.stations)))
+    by_turns = effects(theta, replace(movement, sweeps=alone))
+    turns = np.concatenate([_turns(each, known) for each in stood], axis=1)
+    steady = np.arange(len(turns) // 3) < STEADY
+    stated_rad = np.radians(known.axis_deg) / np.sqrt(3) * np.where(steady, 1.0, WAVE_SHARE)
+    std_rad = np.maximum(stated_rad, known.found_rad)
+    patterns: Array = np.tile(std_rad, 3)[:, None] * (turns @ by_turns.T)
+    return patterns
+
+
+def _turns(stood: Stood, known: Known) -> Array:
+    """(18, 3 or 10) of the errors that `effects` knows of a dwell or a sweep, by radian of each of the wrists'."""
+    in_base = flange_errors(stood.q_rad, known.arm)
+    in_flange = in_base @ (known.mounting @ flange_attitude(stood.q_rad, known.arm)).T
+    if stood.wrist is None:
+        return in_flange.reshape(-1, OWN_ERRORS)
+    found = np.zeros((*in_base.shape[:2], SHARED_ERRORS))
+    for wrist in range(len(in_base)):
+        beyond = wrist > stood.wrist
+        found[wrist, :, slice(0, 3) if beyond else slice(3, TURNS)] = in_flange[wrist] if beyond else in_base[wrist]
+    found[stood.wrist, 0, :TURNS] = [*in_flange[stood.wrist, 0], 0.0, 0.0, 0.0]  # the twist lies beyond its joint
+    found[stood.wrist, STEADY:] = 0.0
+    found[stood.wrist, STEADY:, TURNS:] = _counted_from(float(stood.q_rad[WRIST_1 + stood.wrist]))
+    return found.reshape(-1, SHARED_ERRORS) / SHARE
+
+
+def _counted_from(angle_rad: float) -> Array:
+    """(4, 4) waves of an angle by those of what it has grown from here."""
+    cos, sin, cos_2, sin_2 = angle_waves(angle_rad)
+    found: Array = np.zeros((4, 4))
+    found[:2, :2] = [[cos, -sin], [sin, cos]]
+    found[2:, 2:] = [[cos_2, -sin_2], [sin_2, cos_2]]
+    return found

@@ -1,0 +1,148 @@
+"""What accelerometers and magnetometers are held against: their readings' bits and noise, their dwells, their model."""
+
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from rig.analysis.acceleration import AccelerometerResult
+from rig.analysis.arm_patterns import Known, Stood, arm_patterns
+from rig.analysis.magnetic_field import MagnetometerResult
+from rig.analysis.pieces import Window
+from rig.analysis.readings import judge_readings
+from rig.analysis.reference_budgets import drift_patterns, lag_pattern
+from rig.analysis.reference_consistency import Read, reference_consistency
+from rig.analysis.reference_readings import (
+    Dwelt,
+    acceleration_dwells,
+    acceleration_sweeps,
+    field_dwells,
+    knocked,
+    resting,
+)
+from rig.analysis.seen import since_first_s
+from rig.analysis.suspicion import Statistic
+from rig.arm.kinematics import WRIST_1
+from rig.data.settings import Uncertainty
+from rig.estimation.arrays import Array
+from rig.estimation.felt import DELAY, LEVER, NO_SWEEPS, PARAMETERS, SECOND, Movement
+from rig.observation.observed_run import ObservedRun
+
+DISTURBED_DWELL, DISTURBED_SWEEP = "disturbed_dwell", "disturbed_sweep"
+
+
+@dataclass(frozen=True, slots=True)
+class ReadInReference:
+    """One sensor's readings: `counts` (n, 3) of each recording, the windows and dwells cut from them, and the model.
+
+    `pieces` name the dwells and sweeps of `read`, in its order.
+    """
+
+    counts: Sequence[NDArray[np.int64]]
+    dwells: Sequence[Dwelt]
+    sweeps: Sequence[Window]
+    read: Read
+    pieces: Sequence[str]
+
+
+def of_accelerometer(
+    name: str, recordings: Sequence[ObservedRun], result: AccelerometerResult, known: Uncertainty
+) -> ReadInReference:
+    """From all recordings of a run, in the order its solution was made from; `known` is of what no recording shows."""
+    timed = list(zip(recordings, since_first_s(recordings), strict=True))
+    dwells = [dwell for each, since_s in timed for dwell in acceleration_dwells(name, each, since_s)]
+    used = {dwell.index for dwell in result.dwells}
+    pieces = [_Piece.of_dwell(dwell) for dwell in dwells if dwell.index in used]
+    pieces += [piece for each, since_s in timed for piece in _swept(name, each, since_s)]
+    solution, movement = result.solution, result.movement
+    theta = _theta(solution.matrix, solution.reference_m_s2, solution.bias_m_s2)
+    if solution.lever_arm_m is not None:
+        theta[LEVER], theta[DELAY] = solution.lever_arm_m, solution.delay_s
+    if solution.second_order_s2_m is not None:
+        theta[SECOND] = solution.second_order_s2_m
+    lag = lag_pattern(movement.dwells, movement.sweeps, 1e-3 * known.acceleration_lag_ms) / np.sqrt(3)
+    off_rad = solution.attitude_error.std_rad
+    arm = Known(recordings[0].motion.kinematics, known.axis_deg, np.array(result.sensor.mounting), off_rad)
+    return ReadInReference(
+        counts=[recording.run.samples[name]["acceleration_counts"].astype(np.int64) for recording in recordings],
+        dwells=dwells,
+        sweeps=[sweep for each in recordings for sweep in acceleration_sweeps(name, each)],
+        read=Read(
+            theta=theta,
+            movement=movement,
+            known=np.concatenate([lag, arm_patterns(theta, movement, [each.stood for each in pieces], arm)]),
+            times_s=np.array([each.time_s for each in pieces]),
+            second_order=solution.second_order_s2_m is not None,
+        ),
+        pieces=[each.name for each in pieces],
+    )
+
+
+def of_magnetometer(
+    name: str, recordings: Sequence[ObservedRun], result: MagnetometerResult, known: Uncertainty
+) -> ReadInReference:
+    """The same: a magnetometer in attitudes is an accelerometer that nothing swept."""
+    solution, movement = result.solution, Movement(result.seen, NO_SWEEPS)
+    timed = zip(recordings, since_first_s(recordings), strict=True)
+    dwells = [dwell for each, since_s in timed for dwell in field_dwells(name, each, since_s)]
+    pieces = [_Piece.of_dwell(dwell) for dwell in dwells]
+    theta = _theta(solution.matrix, solution.field_table_t, solution.bias_t)
+    drift, _ = drift_patterns(solution.matrix, result.seen.attitudes, result.drift)
+    off_rad = 0.0 if solution.fit.attitude_error is None else solution.fit.attitude_error.std_rad
+    arm = Known(recordings[0].motion.kinematics, known.axis_deg, np.array(result.sensor.mounting), off_rad)
+    of_arm = arm_patterns(theta, movement, [each.stood for each in pieces], arm)
+    return ReadInReference(
+        counts=[recording.run.samples[name]["field_counts"].astype(np.int64) for recording in recordings],
+        dwells=dwells,
+        sweeps=(),
+        read=Read(
+            theta=theta,
+            movement=movement,
+            known=np.concatenate([drift / (np.sqrt(3) if result.drift is None else 1.0), of_arm]),
+            times_s=np.array([each.time_s for each in pieces]),
+            second_order=False,
+        ),
+        pieces=[each.name for each in pieces],
+    )
+
+
+@dataclass(frozen=True, slots=True)
+class _Piece:
+    """A dwell or a sweep: its name, its middle on the clock of the first recording, where the arm stood."""
+
+    name: str
+    time_s: float
+    stood: Stood
+
+    @classmethod
+    def of_dwell(cls, dwell: Dwelt) -> "_Piece":
+        return cls(f"{DISTURBED_DWELL}.{dwell.index}", dwell.middle_s + dwell.since_s, Stood(dwell.q_rad))
+
+
+def _swept(name: str, recording: ObservedRun, since_s: float) -> Iterator[_Piece]:
+    for turn in recording.sensors[name].revolutions:
+        if turn.acceleration is not None:
+            start_s, end_s = turn.average.start_s, turn.average.end_s
+            stood = Stood(recording.motion.angles(start_s), turn.acceleration.joint - WRIST_1)
+            yield _Piece(f"{DISTURBED_SWEEP}.{turn.sweep}", (start_s + end_s) / 2 + since_s, stood)
+
+
+def reference_statistics(held: ReadInReference, rate: float, *, drifting: bool) -> dict[str, Statistic]:
+    """Every statistic with its limit, by the name of its check; `rate` is that of false alarms for each."""
+    found = reference_consistency(held.read, rate, drifting=drifting)
+    named = {held.pieces[place]: statistic for place, statistic in sorted(found.disturbed.items())}
+    windows = [*resting(held.dwells), *held.sweeps]
+    return {
+        **(named or {DISTURBED_DWELL if held.read.dwells else DISTURBED_SWEEP: found.piece}),
+        **found.statistics,
+        **knocked(held.dwells, rate),
+        **judge_readings(held.counts, windows, rate),
+    }
+
+
+def _theta(matrix: Array, reference: Array, bias: Array) -> Array:
+    """(22,) as `rig.estimation.felt` orders it, of what dwells tell."""
+    theta = np.zeros(PARAMETERS)
+    theta[: LEVER.start] = np.concatenate([matrix.ravel(), reference, bias])
+    return theta

@@ -1,0 +1,107 @@
+"""What accelerometers and magnetometers read in dwells and sweeps, and in which of them something knocked. Pure.
+
+Of each the readings as recorded, of which `rig.analysis.readings` judges bits and noise; and of each dwell its halves,
+which noise alone may tell apart.
+"""
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from rig.analysis.pieces import Window as Read
+from rig.analysis.suspicion import Statistic
+from rig.estimation.arrays import Array
+from rig.observation.acceleration import DwellReading
+from rig.observation.average import Stream, between, mean_at_rest
+from rig.observation.field import dwelt_field
+from rig.observation.observed_run import ObservedRun
+from rig.observation.windows import Window
+
+FEWEST_IN_HALF = 40  # readings: fewer do not tell how their mean scatters
+
+
+@dataclass(frozen=True, slots=True)
+class Dwelt:
+    """The readings of one dwell: counts (n, 3) at times (n,) of the controller's, within the `window`.
+
+    The arm stood at `q_rad` (6,); `since_s` takes those times to the clock of the first recording.
+    """
+
+    index: int
+    counts: NDArray[np.int64]
+    time_s: Array
+    window: Window
+    q_rad: Array
+    since_s: float
+
+    @property
+    def middle_s(self) -> float:
+        """By the controller's time."""
+        return (self.window.start_s + self.window.end_s) / 2
+
+
+def acceleration_dwells(name: str, recording: ObservedRun, since_s: float = 0.0) -> list[Dwelt]:
+    """Of a sensor's accelerometer."""
+    stream = recording.stream(name)
+    found = []
+    for dwell in recording.sensors[name].dwells:
+        inside = between(stream, dwell.window.start_s, dwell.window.end_s)
+        found.append(_dwelt(dwell, _counts(stream, inside), stream.time_s[inside], recording, since_s))
+    return found
+
+
+def acceleration_sweeps(name: str, recording: ObservedRun) -> list[Read]:
+    """The same in its revolutions, each with its place among the recording's."""
+    stream, found = recording.stream(name), []
+    count = stream.sensor.sensitivity_m_s2_per_count
+    for place, turn in enumerate(recording.sensors[name].revolutions):
+        if turn.acceleration is not None and count is not None:
+            inside, wave = between(stream, turn.average.start_s, turn.average.end_s), turn.acceleration.harmonic
+            counts = _counts(stream, inside)
+            found.append(Read(place, counts, wave.residuals_m_s2 / count, wave.vibration_m_s2 / count))
+    return found
+
+
+def field_dwells(name: str, recording: ObservedRun, since_s: float = 0.0) -> list[Dwelt]:
+    """Of a magnetometer."""
+    return [
+        _dwelt(dwell, counts.astype(np.int64), time_s, recording, since_s)
+        for dwell, counts, time_s in dwelt_field(recording, name)
+    ]
+
+
+def _dwelt(
+    dwell: DwellReading, counts: NDArray[np.int64], time_s: Array, recording: ObservedRun, since_s: float
+) -> Dwelt:
+    window = dwell.window
+    q_rad = recording.motion.angles((window.start_s + window.end_s) / 2)
+    return Dwelt(dwell.index, counts, time_s, window, q_rad, since_s)
+
+
+def resting(dwells: Sequence[Dwelt]) -> list[Read]:
+    """As rests: what of a reading its dwell's mean does not explain."""
+    return [Read(-1, dwell.counts, dwell.counts - dwell.counts.mean(axis=0), np.zeros(3)) for dwell in dwells]
+
+
+def knocked(dwells: Sequence[Dwelt], rate: float) -> Mapping[str, Statistic]:
+    """How much the halves of a dwell differ where they differ most, as χ² of three axes; nothing of short dwells."""
+    from scipy.special import chdtri
+
+    apart = [_apart(dwell) for dwell in dwells if len(dwell.counts) >= 2 * FEWEST_IN_HALF]
+    return {"knocked_dwell": (max(apart), float(chdtri(3, rate / len(apart))))} if apart else {}
+
+
+def _apart(dwell: Dwelt) -> float:
+    halves = Window(dwell.window.start_s, dwell.middle_s), Window(dwell.middle_s, dwell.window.end_s)
+    early, means = dwell.time_s < dwell.middle_s, []
+    for half, inside in zip(halves, (early, ~early), strict=True):
+        means.append(mean_at_rest(dwell.counts[inside].astype(np.float64), dwell.time_s[inside], half, 1.0)[0])
+    first, last = means
+    return float(np.sum((last.mean - first.mean) ** 2 / (first.variance + last.variance)))
+
+
+def _counts(stream: Stream, inside: slice) -> NDArray[np.int64]:
+    counts: NDArray[np.int64] = stream.raw["acceleration_counts"][inside].astype(np.int64)
+    return counts
