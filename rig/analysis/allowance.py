@@ -83,7 +83,8 @@ def _earth(surroundings: Surroundings, name: str, part: str, earth_rate: EarthRa
     if unknown.earth_covariance_rad2_s2 is not None:
         size, way = np.linalg.eigh(unknown.earth_covariance_rad2_s2)
         return np.asarray(way * np.sqrt(size.clip(min=0.0)), dtype=np.float64)
-    return EARTH_RATE_RAD_S / np.sqrt(3) * np.eye(3)[:, : 3 if unknown.earth_rate else 0]
+    ways = 3 if unknown.earth_rate else 0
+    return np.asarray(EARTH_RATE_RAD_S / np.sqrt(3) * np.eye(3)[:, :ways], dtype=np.float64)
 
 
 def patterns(pieces: Pieces, matrix: Array, known: Allowed) -> Array:

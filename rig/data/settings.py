@@ -174,7 +174,7 @@ class RunSettings:
 
     @property
     def checked_by_model(self) -> bool:
-        """Whether a recording is held against itself by what is known of arm and sensor, not by one tolerance for all."""
+        """Whether a recording is held against itself by what is known of arm and sensor, not one tolerance."""
         return self.reckoning >= 2
 
     @property

@@ -85,7 +85,7 @@ def likeliest_bias_process(
     It holds no walk where noise alone would do: what is held against it is not excused by what is not there.
     `shared_rad2_s2` (3, N, N) are covariances of what the averages have in common beside their noise.
     """
-    return _bias_process(design, means_rad_s, variances_rad2_s2, windows_s, _likeliest, shared_rad2_s2)
+    return _bias_process(design, means_rad_s, variances_rad2_s2, windows_s, _likeliest, shared=shared_rad2_s2)
 
 
 def _bias_process(
@@ -94,6 +94,7 @@ def _bias_process(
     variances_rad2_s2: ArrayLike,
     windows_s: ArrayLike,
     chosen: Callable[[Array, Array], Array],
+    *,
     shared: Array | None = None,
 ) -> BiasProcess:
     z, means, variances = (np.asarray(a, dtype=np.float64) for a in (design, means_rad_s, variances_rad2_s2))

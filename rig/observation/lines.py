@@ -35,12 +35,13 @@ def lines(residuals: Array) -> Array:
 def waves(cycles: Array, share: Array) -> Array:
     """(n, 8 k) cosine and sine of k lines where a share (n,) of the time is over.
 
-    Beside each stand both growing steadily, for a line that comes or goes, and both of one cycle more and one less: what
-    shakes in the room is felt so by a sensor that makes a turn.
+    Beside each stand both growing steadily, for a line that comes or goes, and both of one cycle more and one less:
+    what shakes in the room is felt so by a sensor that makes a turn.
     """
     each = [wave(2 * np.pi * np.outer(share, cycles + more)) for more in (0, -1, 1) for wave in (np.cos, np.sin)]
     grown = [(2 * share - 1)[:, None] * wave for wave in each[:2]]
-    return np.stack(each[:2] + grown + each[2:], axis=2).reshape(len(share), WIDE * len(cycles))
+    columns = np.stack(each[:2] + grown + each[2:], axis=2, dtype=np.float64)
+    return columns.reshape(len(share), WIDE * len(cycles))
 
 
 def fitted(columns: Array, values: Array) -> Array:

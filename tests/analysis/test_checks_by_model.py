@@ -35,8 +35,9 @@ def probability(check: Check) -> float:
     """Of χ² as large, with as many degrees of freedom as the limit shows."""
     from scipy.special import chdtrc, chdtri
 
-    freedom = min(range(1, 100), key=lambda each: abs(float(chdtri(each, RATE)) - check.limit))
-    return float(chdtrc(freedom, check.value))
+    limit = float(check.limit or 0.0)
+    freedom = min(range(1, 100), key=lambda each: abs(float(chdtri(each, RATE)) - limit))
+    return float(chdtrc(freedom, float(check.value or 0.0)))
 
 
 @pytest.mark.slow
@@ -67,7 +68,8 @@ def later(seen: Drawn) -> Array:
 
 def sweep_2(seen: Drawn) -> Array:
     window = next(each.window for each in swept(seen.run) if each.sweep.index == 2)
-    return ((seen.time_s >= window.start_s) & (seen.time_s <= window.end_s))[:, None].astype(np.float64)
+    inside = (seen.time_s >= window.start_s) & (seen.time_s <= window.end_s)
+    return np.asarray(inside[:, None], dtype=np.float64)
 
 
 def turned(angle_deg: float) -> Array:

@@ -52,12 +52,11 @@ KINDS = {
 
 @dataclass(frozen=True, slots=True)
 class Drawn:
-    """A recording, and what its damage is planted with: the controller's time of each sample, and the sensor's bias."""
+    """A recording, and what its damage is planted with: the controller's time of each sample, and what was felt."""
 
     run: RunData
     time_s: Array
     felt_rad_s: Array
-    bias_rad_s: Array
 
 
 def drawn(seed: int, kind: Kind, setup: Setup | None = None) -> Drawn:
@@ -85,7 +84,7 @@ def drawn(seed: int, kind: Kind, setup: Setup | None = None) -> Drawn:
     bias = rng.uniform(-0.02, 0.02, 3) + _wandering(len(time_s), kind, rng)
     read = felt + bias + kind.noise_rad_s * rng.standard_normal(felt.shape)
     run = _looked_at_late(run_data(setup, motion, board_s, _counts(read, kind)), motion, setup, rng)
-    return Drawn(replace(run, sensors={"gyro": kind.sensor}), time_s, felt, bias)
+    return Drawn(replace(run, sensors={"gyro": kind.sensor}), time_s, felt)
 
 
 def damaged(seen: Drawn, kind: Kind, by_rad_s: Array) -> RunData:
