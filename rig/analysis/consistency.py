@@ -15,7 +15,7 @@ import numpy as np
 from rig.analysis.pieces import REST, Pieces
 from rig.analysis.suspicion import TOLD, Statistic, Suspicions, basis, explained, told_by, unlike_the_others
 from rig.estimation.arrays import Array
-from rig.estimation.bias_process import likeliest_bias_process
+from rig.estimation.bias_process import BiasProcess, likeliest_bias_process
 
 # Of the speed: twists of a real arm's wrists (−8e-4, +4e-4 rad, UR's own calibration), and what 0.1 % of full scale,
 # a common statement of nonlinearity, amounts to at a quarter of the range.
@@ -102,15 +102,16 @@ def consistency(pieces: Pieces, matrix: Array, rate: float, allowance: Allowance
     felt = pieces.rates_rad_s @ matrix.T
     if allowance is None:
         scatter = _tolerated(pieces, felt)
-        held = _held(pieces, felt, scatter)
+        held = _held(pieces, scatter, _wandering(pieces, felt, _steady(pieces), scatter))
         found = told_by(held, _changes(pieces, felt), rate)
         whole, of_an_axis = None, None
     else:
         scatter = _Scatter(pieces.variances_rad2_s2, _together(allowance.off_rad_s))
-        held, ways = _held(pieces, felt, scatter), allowance.ways
+        bias, ways = _wandering(pieces, felt, _steady(pieces), scatter), allowance.ways
+        held = _held(pieces, scatter, bias)
         felt_on_ways = ways.rates_rad_s @ matrix.T
         on_ways = _Scatter(ways.variances_rad2_s2, _together(allowance.off_on_ways_rad_s))
-        held_on_ways = _held(ways, felt_on_ways, on_ways)
+        held_on_ways = _held(ways, on_ways, bias)
         found = told_by(held_on_ways, _changes(ways, felt_on_ways), rate)
         whole = _each_axis(np.column_stack(_sweeps(pieces)))
         of_an_axis = _axis_changed(ways, felt_on_ways, held_on_ways, rate)
@@ -136,8 +137,8 @@ def _axis_changed(ways: Pieces, felt: Array, held: _Held, rate: float) -> Statis
     return held.most_by_one(columns, rate)
 
 
-def _held(pieces: Pieces, felt: Array, scatter: _Scatter) -> _Held:
-    white = _whitening(_covariance(pieces, felt, _steady(pieces), scatter), pieces.variances_rad2_s2.min())
+def _held(pieces: Pieces, scatter: _Scatter, bias: BiasProcess) -> _Held:
+    white = _whitening(_covariance(pieces, scatter, bias), pieces.variances_rad2_s2.min())
     seen = _whiten(white, pieces.means_rad_s.T[:, :, None])[:, 0]
     return _Held(white, seen, _whiten(white, _each_axis(_known(pieces))))
 
@@ -159,7 +160,8 @@ def _jumped(pieces: Pieces, felt: Array, scatter: _Scatter, rate: float) -> Stat
         return None
 
     def told(step: Array, beside: Array) -> float:
-        white = _whitening(_covariance(pieces, felt, beside, scatter), pieces.variances_rad2_s2.min())
+        bias = _wandering(pieces, felt, beside, scatter)
+        white = _whitening(_covariance(pieces, scatter, bias), pieces.variances_rad2_s2.min())
         seen = _whiten(white, (pieces.means_rad_s - felt).T[:, :, None])[:, 0]
         return explained(seen, _whiten(white, _each_axis(steady)), _whiten(white, _each_axis(step)))[0]
 
@@ -171,15 +173,18 @@ def _jumped(pieces: Pieces, felt: Array, scatter: _Scatter, rate: float) -> Stat
     return told(steps[best], beside), 3 * float(fdtri(3, len(steps), 1 - rate / len(steps)))
 
 
-def _covariance(pieces: Pieces, felt: Array, steady: Array, scatter: _Scatter) -> Array:
-    """(3 N, 3 N) of the pieces' means, axis by axis: their scatter, and a bias that wanders.
+def _wandering(pieces: Pieces, felt: Array, steady: Array, scatter: _Scatter) -> BiasProcess:
+    """How the bias wanders, by what `steady` (N, k), orthonormal columns, leaves of the readings."""
+    each, count = np.arange(3), len(pieces.sweep)
+    common = scatter.common_rad2_s2.reshape(3, count, 3, count)[each, :, each]
+    left = pieces.means_rad_s - felt
+    return likeliest_bias_process(steady, left, scatter.variances_rad2_s2, pieces.times_s, common)
 
-    How it wanders is found from what `steady` (N, k), orthonormal columns, leaves of the readings.
-    """
+
+def _covariance(pieces: Pieces, scatter: _Scatter, bias: BiasProcess) -> Array:
+    """(3 N, 3 N) of the pieces' means, axis by axis: their scatter, and a bias that wanders."""
     each, count = np.arange(3), len(pieces.sweep)
     covariance = scatter.common_rad2_s2.reshape(3, count, 3, count).copy()
-    left, common = pieces.means_rad_s - felt, covariance[each, :, each]
-    bias = likeliest_bias_process(steady, left, scatter.variances_rad2_s2, pieces.times_s, common)
     noise = np.array([np.diag(each) for each in scatter.variances_rad2_s2.T])
     covariance[each, :, each] += noise + bias.covariance(pieces.times_s)
     return covariance.reshape(3 * count, 3 * count)

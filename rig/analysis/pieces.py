@@ -180,9 +180,11 @@ def _cut(
         taken = columns.shape[1]
         means, left = beside(columns, readings, part, parts)
         if turn is not None:
-            along = beside(columns, rate, part, parts)[1] @ turn.axis_flange[:, None]
+            rates, unexplained = beside(columns, rate, part, parts)
+            along = unexplained @ turn.axis_flange[:, None]
             left = left - along @ np.linalg.lstsq(along, left, rcond=None)[0]
-            rates = turned(motion, average.start_s, average.end_s, cycles, parts)
+            if known.all():
+                rates = turned(motion, average.start_s, average.end_s, cycles, parts)
     count = stream.sensor.sensitivity_rad_s_per_count
     scatter = np.maximum(np.sum(left**2, axis=0) / max(len(left) - len(enough) - taken, 1), count**2 / 12)
     noise = scatter * np.array([widening(left[:, axis]) for axis in range(3)])

@@ -15,15 +15,16 @@ SLOWEST = 8  # cycles in all the readings: what is slower is told badly from wha
 APART = 2.5  # cycles in all the readings, from a line that was found
 PASSES = 2
 WIDE = 8  # columns of a line
+SAMPLES_EACH = 5  # are needed to find what one column has in them
 ALIKE = 1e-2  # columns that differ by less are one
-FEWEST_SAMPLES = 64
 
 
 def lines(residuals: Array) -> Array:
     """(k,) how many cycles each line makes in all of the residuals (n, 3); k may be zero."""
     count, cycles = len(residuals), np.zeros(0)
+    most = min(MOST_LINES, count // (WIDE * SAMPLES_EACH))
     share = np.arange(count) / count
-    while count >= FEWEST_SAMPLES and len(cycles) < MOST_LINES:
+    while len(cycles) < most:
         known = waves(cycles, share)
         strongest = _strongest(residuals - known @ fitted(known, residuals), cycles)
         if strongest is None:
