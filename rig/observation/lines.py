@@ -47,8 +47,7 @@ def waves(cycles: Array, share: Array) -> Array:
 
 def fitted(columns: Array, values: Array) -> Array:
     """(k, m) least squares of values (n, m) by such columns (n, k), some of which may be nearly alike."""
-    sizes: Array = np.linalg.lstsq(columns, values, rcond=ALIKE)[0]
-    return sizes
+    return np.asarray(np.linalg.lstsq(columns, values, rcond=ALIKE)[0], dtype=np.float64)
 
 
 def _strongest(left: Array, known: Array) -> float | None:

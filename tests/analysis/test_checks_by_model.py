@@ -63,7 +63,8 @@ def test_what_chance_says_of_undamaged_recordings_is_uniform(kind: str, thorough
 
 def later(seen: Drawn) -> Array:
     """(n, 1) one in the second half, else zero."""
-    return (seen.time_s > (seen.time_s[0] + seen.time_s[-1]) / 2)[:, None].astype(np.float64)
+    second = seen.time_s > (seen.time_s[0] + seen.time_s[-1]) / 2
+    return np.asarray(second[:, None], dtype=np.float64)
 
 
 def sweep_2(seen: Drawn) -> Array:
