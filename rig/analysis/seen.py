@@ -6,6 +6,7 @@ from itertools import pairwise
 
 import numpy as np
 
+from rig.analysis.clock import PPM
 from rig.analysis.surroundings import Surroundings
 from rig.arm.kinematics import AXIS_ERRORS
 from rig.config.sensor_catalogue import PARTS
@@ -115,6 +116,7 @@ def unknown_of(surroundings: Surroundings, name: str, part: str, earth_rate: Ear
     found = Unknown(
         clock_std=clock.std,
         clock_freedom=clock.freedom,
+        clock_half_width=None if clock.comparisons else PPM * known.controller_clock_ppm,
         clock_source="held against " + (" and ".join(each.by for each in clock.comparisons) or "no other clock"),
         state_jitter_s=surroundings.state_jitter_s,
         state_jitter_freedom=surroundings.state_jitter_freedom,

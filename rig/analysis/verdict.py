@@ -165,8 +165,9 @@ def _checks(
 
 
 def _spreads(budget: Budget) -> tuple[Spread, Spread]:
-    """Of scale factors and of biases."""
-    of = budget.expanded, budget.coverage_factors, budget.freedom
+    """Of scale factors and of biases; twice a standard uncertainty is taken for a normal distribution's."""
+    freedom = budget.freedom if budget.by_freedom else np.full(6, np.inf)
+    of = budget.expanded, budget.coverage_factors, freedom
     return Spread(*(each[:3] for each in of)), Spread(*(each[3:] for each in of))
 
 

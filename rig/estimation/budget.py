@@ -16,6 +16,7 @@ from rig.estimation.coverage import COVERAGE_FACTOR, coverage_factors, effective
 from rig.estimation.earth import EARTH_RATE_RAD_S, STANDARD_GRAVITY_M_S2
 from rig.estimation.explained import Explained, Seen
 
+CLOCK = "controller clock"
 NOT_GIVEN = "is not given"  # ends the source of what is assumed because the configuration does not say it
 
 
@@ -99,7 +100,8 @@ class Budget:
 class Unknown:
     """What no recording shows: half-widths, but for `clock_std` and `state_jitter_s`, which are standard uncertainties.
 
-    `clock_std` is a fraction, `clock_source` says how it is known; `axis_rad` is the direction of each swept axis,
+    `clock_std` is a fraction, `clock_source` says how it is known, `clock_half_width` is there where it is that of any
+    such clock; `axis_rad` is the direction of each swept axis,
     `earth_rate` whether the Earth's rate is among the unknown, `earth_covariance_rad2_s2` (3, 3), in the base's frame,
     how well it was found where it was. `…_freedom` are the degrees of freedom of what was found from readings,
     `counts_freedom` says whether they make the coverage factor.
@@ -114,6 +116,7 @@ class Unknown:
     earth_rate: bool
     earth_covariance_rad2_s2: Array | None = None
     clock_freedom: float = np.inf
+    clock_half_width: float | None = None
     state_jitter_freedom: float = np.inf
     earth_freedom: float = np.inf
     counts_freedom: bool = True
@@ -155,8 +158,12 @@ def _contributors(explained: Explained, unknown: Unknown) -> Iterator[Contributo
         source = "scatter of rests and sweeps about each other"
         yield found("bias instability", source, walk, float(explained.bias.freedom))
     turned = seen.turns_rad_s @ matrix.T
-    timed = found("controller clock", unknown.clock_source, of(unknown.clock_std * turned[None]), unknown.clock_freedom)
-    yield timed if np.isfinite(timed.freedom) else replace(timed, kind="B")  # of what is stated of clocks alone
+    wide, said = unknown.clock_half_width, unknown.clock_source
+    if wide is None:
+        timed = found(CLOCK, said, of(unknown.clock_std * turned[None]), unknown.clock_freedom)
+        yield timed if np.isfinite(timed.freedom) else replace(timed, kind="B")  # of what is stated of clocks alone
+    else:
+        yield assumed(CLOCK, 1e6 * wide, "ppm", said, wide * turned[None])
     jitter = np.sqrt(2) * unknown.state_jitter_s / np.diff(seen.windows_s).T[0]
     each_turn = np.eye(len(turned))[:, :, None] * (jitter[:, None] * turned)[None]
     source = "scatter of the joint angles"

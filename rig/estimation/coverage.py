@@ -35,10 +35,13 @@ def covered(factors: ArrayLike, freedom: ArrayLike) -> Array:
 
 def beyond(distances: ArrayLike, freedom: ArrayLike) -> Array:
     """The probability that the true value lies farther than this on one side, in standard uncertainties."""
-    from scipy.special import ndtr, stdtr
+    away, whole = np.broadcast_arrays(np.asarray(distances, dtype=np.float64), _whole(freedom))
+    found = np.array([math.erfc(each / math.sqrt(2)) / 2 for each in away.ravel()]).reshape(away.shape)
+    if np.isfinite(whole).any():
+        from scipy.special import stdtr
 
-    away, whole = -np.asarray(distances, dtype=np.float64), _whole(freedom)
-    found: Array = np.where(np.isfinite(whole), stdtr(np.where(np.isfinite(whole), whole, 1.0), away), ndtr(away))
+        known = np.isfinite(whole)
+        found[known] = stdtr(whole[known], -away[known])
     return found
 
 
@@ -50,8 +53,8 @@ def effective_freedom(variances: ArrayLike, freedom: ArrayLike) -> Array:
     parts, known = np.asarray(variances, dtype=np.float64), np.asarray(freedom, dtype=np.float64)
     with np.errstate(divide="ignore", invalid="ignore"):
         found = parts.sum(axis=0) ** 2 / np.sum(parts**2 / known, axis=0)
-    whole: Array = np.where(np.isnan(found), np.inf, found)  # of nothing at all
-    return whole
+    freedom_of_sums: Array = np.where(np.isnan(found), np.inf, found)  # of nothing at all
+    return freedom_of_sums
 
 
 def _whole(freedom: ArrayLike) -> Array:

@@ -39,12 +39,14 @@ def migrate_3_to_4(connection: Connection) -> None:
 
 def migrate_4_to_5(connection: Connection) -> None:
     """U has a coverage factor by its degrees of freedom: of results before it is 2."""
-    if not any(column["name"] == "coverage_factor" for column in inspect(connection).get_columns("parameter")):
-        _add_coverage_factor(connection)
+    _add_coverage_factor(connection)
 
 
 def _add_coverage_factor(connection: Connection) -> None:
-    connection.execute(text("ALTER TABLE parameter ADD COLUMN coverage_factor FLOAT"))
+    """Unless an earlier step has."""
+    columns = {column["name"] for column in inspect(connection).get_columns(schema.parameter.name)}
+    if "coverage_factor" not in columns:
+        connection.execute(text("ALTER TABLE parameter ADD COLUMN coverage_factor FLOAT"))
 
 
 MIGRATIONS: Mapping[int, Callable[[Connection], None]] = {

@@ -93,6 +93,7 @@ def test_an_uncertainty_known_from_few_readings_keeps_a_wider_guard_at_the_same_
     assert wide.guard == pytest.approx(2.649 * 4e-4, rel=1e-3)  # t of five degrees of freedom, EA-4/02, annex E
     assert twice.guard == pytest.approx(8e-4)
     assert wide.coverage_factor == pytest.approx(2.649, rel=1e-3) and twice.coverage_factor == 2.0
+    assert replace(twice, limit=0.01 + 4e-4, guard=0.0).false_acceptance == pytest.approx(0.1587, abs=1e-4)  # as before
     just = replace(wide, limit=0.01 + wide.guard)
     assert just.passed and just.false_acceptance == pytest.approx((1 - 0.9545) / 2, rel=1e-3)
 
