@@ -63,7 +63,7 @@ class Outcome:
     and `onboard` the board's own of the sensors on it to calibrate; all three are empty where stored calibrations were
     verified. `verifications` hold those that could be made. `clock` is the controller's, None where recordings of
     before say nothing of its uncertainty. Where no sweep was planned there are `accelerometers` alone, and beside them
-    the `magnetometers`, of which no check judges any.
+    the `magnetometers`, which no limit of scale and bias judges.
     `drifts` are there where attitudes were repeated to watch the bias.
     """
 

@@ -74,8 +74,8 @@ class HeldReadings:
         """With the arm as far off as it is beside the worst of them: see `Held`."""
         base = self._beside(beside)
         turned = [self.turn @ columns for columns in suspicions]
-        found = [self._explained(base, each, self._off(base)) for each in turned]
-        worst = turned[int(np.argmax(found))]
+        std_rad = self._off(base)
+        worst = turned[int(np.argmax([self._explained(base, each, std_rad) for each in turned]))]
         std_rad = self._off(np.column_stack([base, told_beside(basis(base), worst)]))
         return [self._explained(base, each, std_rad) for each in turned]
 

@@ -19,7 +19,7 @@ from rig.observation.field import dwelt_field
 from rig.observation.observed_run import ObservedRun
 from rig.observation.windows import Window
 
-FEWEST_IN_HALF = 40  # readings: fewer do not tell how their mean scatters
+FEWEST_IN_HALF = 20  # readings: fewer do not tell how their mean scatters
 
 
 @dataclass(frozen=True, slots=True)
@@ -86,11 +86,17 @@ def resting(dwells: Sequence[Dwelt]) -> list[Read]:
 
 
 def knocked(dwells: Sequence[Dwelt], rate: float) -> Mapping[str, Statistic]:
-    """How much the halves of a dwell differ where they differ most, as χ² of three axes; nothing of short dwells."""
-    from scipy.special import chdtri
+    """How much the halves of a dwell differ where they differ most, as χ² of three axes; nothing of short dwells.
 
-    apart = [_apart(dwell) for dwell in dwells if len(dwell.counts) >= 2 * FEWEST_IN_HALF]
-    return {"knocked_dwell": (max(apart), float(chdtri(3, rate / len(apart))))} if apart else {}
+    The limit is that of F: how readings scatter is found from those of the dwell.
+    """
+    from scipy.special import fdtri
+
+    told = [dwell for dwell in dwells if len(dwell.counts) >= 2 * FEWEST_IN_HALF]
+    if not told:
+        return {}
+    freedom = min(len(dwell.counts) for dwell in told) - 2
+    return {"knocked_dwell": (max(map(_apart, told)), 3 * float(fdtri(3, freedom, 1 - rate / len(told))))}
 
 
 def _apart(dwell: Dwelt) -> float:

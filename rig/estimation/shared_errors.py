@@ -35,7 +35,8 @@ def apart(noise: Array, effects: Array) -> Apart:
 
 def likeliest_error(readings: Apart, residuals: Array, jacobian: Array) -> float:
     """δ, rad, from residuals (n,) and J (n, q)."""
-    return likeliest(lambda log_delta: _lost(np.exp(log_delta), readings, residuals, jacobian, jacobian))
+    turned, slopes = readings.turn @ residuals, readings.turn @ jacobian
+    return likeliest(lambda log_delta: _lost(np.exp(log_delta), readings.growth, turned, slopes, slopes.shape[1]))
 
 
 def more_likely(readings: Apart, residuals: Array, jacobian: Array, columns: Array) -> float:
@@ -44,22 +45,23 @@ def more_likely(readings: Apart, residuals: Array, jacobian: Array, columns: Arr
     Each with the δ that makes them likeliest, of what J leaves of the readings (Welham and Thompson, J. R. Stat. Soc. B
     59 (1997) 701). Where δ is known it is χ² of what the columns explain.
     """
-    more = np.column_stack([jacobian, columns])
+    turned, slopes = readings.turn @ residuals, readings.turn @ np.column_stack([jacobian, columns])
+    count = jacobian.shape[1]
 
     def least(whole: Array) -> float:
-        std_rad = likeliest(lambda log_delta: _lost(np.exp(log_delta), readings, residuals, jacobian, whole))
-        return _lost(std_rad, readings, residuals, jacobian, whole)
+        std_rad = likeliest(lambda log_delta: _lost(np.exp(log_delta), readings.growth, turned, whole, count))
+        return _lost(std_rad, readings.growth, turned, whole, count)
 
-    return 2 * (least(jacobian) - least(more))
+    return 2 * (least(slopes[:, :count]) - least(slopes))
 
 
-def _lost(std_rad: float, readings: Apart, residuals: Array, jacobian: Array, whole: Array) -> float:
-    """− ln of the likelihood of what J leaves, where `whole` (n, p), of which J is the first columns, explains more."""
-    variance = 1 + std_rad**2 * readings.growth
-    orthogonal, triangle = np.linalg.qr((readings.turn @ whole) / np.sqrt(variance)[:, None])
-    left = (readings.turn @ residuals) / np.sqrt(variance)
+def _lost(std_rad: float, growth: Array, residuals: Array, slopes: Array, count: int) -> float:
+    """− ln of the likelihood of what the first `count` of the slopes (n, p) leave, where the others explain more."""
+    variance = 1 + std_rad**2 * growth
+    orthogonal, triangle = np.linalg.qr(slopes / np.sqrt(variance)[:, None])
+    left = residuals / np.sqrt(variance)
     left = left - orthogonal @ (orthogonal.T @ left)
-    sizes = np.abs(np.diag(triangle))[: jacobian.shape[1]]
+    sizes = np.abs(np.diag(triangle))[:count]
     return float(0.5 * (left @ left + np.log(variance).sum()) + np.log(sizes).sum())
 
 

@@ -70,8 +70,11 @@ def accelerations(stream: Stream, inside: slice) -> Array:
     return readings
 
 
-def check_acceleration(stream: Stream, inside: slice, where: str) -> None:
-    """Raises Fault `saturation`, `stuck_sensor` of what the accelerometer read there."""
+def check_acceleration(stream: Stream, inside: slice, where: str, *, turning: bool = False) -> None:
+    """Raises Fault `saturation`, `stuck_sensor` of what the accelerometer read there.
+
+    While it is `turning` one axis alone that repeats one reading is stuck, too.
+    """
     counts = stream.raw["acceleration_counts"][inside].astype(np.int64)
     saturated = np.any(np.abs(counts) >= stream.sensor.full_scale_counts, axis=1)
     if saturated.any():
@@ -80,7 +83,8 @@ def check_acceleration(stream: Stream, inside: slice, where: str) -> None:
             f"in {where} {int(saturated.sum())} accelerations stand at the end of the sensor's range",
             "Choose a wider acceleration.range_g",
         )
-    if len(counts) and not np.ptp(counts, axis=0).any() and _is_noisy(stream):
+    changing = np.ptp(counts, axis=0).astype(np.bool_) if len(counts) else np.ones(3, dtype=np.bool_)
+    if not (changing.all() if turning else changing.any()) and _is_noisy(stream):
         raise Fault(
             "stuck_sensor",
             f"in {where} the accelerometer repeats one reading {len(counts)} times",

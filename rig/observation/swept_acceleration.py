@@ -36,7 +36,7 @@ class SweptAcceleration:
 def swept_acceleration(stream: Stream, motion: ArmMotion, sweep: Sweep, turn: Revolution) -> SweptAcceleration:
     """Raises Fault `saturation`, `stuck_sensor`, `incomplete_revolution`, `not_finite`."""
     inside = between(stream, turn.start_s, turn.end_s)
-    check_acceleration(stream, inside, describe(sweep))
+    check_acceleration(stream, inside, describe(sweep), turning=True)
     time_s = stream.time_s[inside]
     known = motion.covered(time_s)
     time_s = time_s[known]

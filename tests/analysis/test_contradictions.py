@@ -270,6 +270,26 @@ def test_a_rest_of_few_readings_is_held_against_the_noise_of_longer_ones() -> No
     assert judge_readings([window.counts for window in windows], windows, FALSE_ALARMS / 10)["spikes"][0] > limit
 
 
+def test_a_rest_in_which_an_axis_stands_still_makes_no_sensor_without_noise() -> None:
+    rng = np.random.default_rng(1)
+    windows = [Window(-1, *_noisy(rng, 280), np.zeros(3)) for _ in range(6)]
+    windows[2].counts[:, 0] = windows[2].counts[0, 0]
+    counts = [np.concatenate([window.counts for window in windows])]
+    longest, limit = judge_readings(counts, windows, FALSE_ALARMS / 10)["stuck_axis"]
+    assert longest >= 280 > limit
+    assert "stuck_axis" not in judge_readings(counts, windows, FALSE_ALARMS / 10, as_before=True)
+
+
+def test_what_a_number_in_single_precision_rounds_is_no_stuck_bit() -> None:
+    """A KVH 1775 says g in single precision, which is recorded in steps of 10 g / 2³⁰."""
+    rng = np.random.default_rng(1)
+    said = np.float32(0.7 + 0.005 * rng.standard_normal((4000, 3))).astype(np.float64)
+    counts = np.asarray(np.round(said * 2**30 / 10), dtype=np.int64)
+    assert np.mean(counts & 1) < 0.45  # which it would be taken for
+    window = Window(-1, counts, counts - counts.mean(axis=0), np.zeros(3))
+    assert judge_readings([counts], [window], FALSE_ALARMS / 10)["stuck_bit"][0] == 0
+
+
 def _noisy(rng: np.random.Generator, readings: int) -> tuple[np.ndarray, np.ndarray]:
     """(n, 3) counts, and what of them is noise: 15 counts."""
     counts = np.round(15 * rng.standard_normal((readings, 3)))

@@ -18,6 +18,7 @@ from rig.estimation.refusals import (
     check_reading_ratio,
     check_unit,
     conditioning,
+    converging,
     inconsistency,
 )
 from rig.estimation.six_observation import closed_form
@@ -217,3 +218,8 @@ def test_a_wrong_unit_is_named_alike_by_scale_factor_and_by_turn_rate() -> None:
     with pytest.raises(Fault, match="wrong_unit"):
         check_reading_ratio(0.25, "sweep 1")
     check_reading_ratio(3.9, "sweep 1")
+
+
+def test_a_fit_that_comes_to_no_end_is_refused_by_name() -> None:
+    with pytest.raises(Fault, match=r"^attitude_untrustworthy: .* no fit converges"), converging():
+        np.linalg.cholesky(-np.eye(3))

@@ -96,9 +96,11 @@ def test_attitudes_alone_calibrate_the_accelerometer(in_attitudes: Finished) -> 
     assert len(found["dwells"]) == 9 and found["held_out"]["dwells"] == 9
     skew = np.array(found["non_orthogonality_rad"]) - np.radians([0.1, -0.2, 0.3])
     assert np.all(np.abs(skew) < 4 * np.array(found["non_orthogonality_std_rad"]))
-    assert {check["name"] for check in result["checks"]} == {
-        f"gyro.acceleration_{name}" for name in ("scale_deviation", "scale_std", "bias", "bias_std", "verification")
+    assert {check["name"] for check in result["checks"] if check["unit"] != "1" or "scale" in check["name"]} == {
+        f"gyro.acceleration_{name}"
+        for name in ("scale_deviation", "scale_std", "bias", "bias_std", "verification", "scale_changed")
     }
+    assert {"gyro.acceleration_even_term", "gyro.acceleration_stuck_axis"} <= {c["name"] for c in result["checks"]}
     assert "attitude error found" in printed and "held out" in printed
     lines = {line["name"]: line for line in found["budget"]["contributors"]}
     assert {"noise", "arm's attitudes", "gravity"} <= lines.keys() and "filter's lag" not in lines  # nothing was swept
