@@ -33,8 +33,8 @@ class FirstHarmonic:
     """`harmonic_m_s2` (3, 3): mean, cosine, sine (rows) of the axes x y z; `covariance_m2_s4` (9, 9), row by row.
 
     `speed_rad_s`: 2π over the time of a turn, negative where the angle falls. `noise_m_s2` (3,) of one sample, by so
-    many degrees of `freedom`; `residuals_m_s2` (n, 3) are samples less what was fitted. `vibration_m_s2` (3,) is the RMS
-    of what was taken out as the servo's or a swing.
+    many degrees of `freedom`; `residuals_m_s2` (n, 3) are samples less what was fitted. `vibration_m_s2` (3,) is the
+    RMS of what was taken out as the servo's or a swing.
     """
 
     harmonic_m_s2: Array
