@@ -41,6 +41,7 @@ class Chip:
         devices: Sequence[SpiDevice],
         on_reset: Callable[[int], None],
         on_clock: Callable[[], None],
+        has_crystal: bool = True,
     ) -> None:
         self._on_clock = on_clock
         self.clocks = clocks = Clocks()
@@ -69,6 +70,7 @@ class Chip:
             power=power,
             on_gate=self._gate,
             on_clock=self._clock_changed,
+            has_crystal=has_crystal,
         )
         watchdog = Watchdog(timeline, lambda: on_reset(rcc.RESET_WATCHDOG))
         peripherals, ports, core = RegisterBus(_PERIPHERALS), RegisterBus(_PORTS), RegisterBus(_CORE)

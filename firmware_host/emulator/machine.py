@@ -31,9 +31,10 @@ class EmulatedBoard:
     """An STM32L432KC with the rig's wiring, running the program in `flash`.
 
     `flash`: its contents, which outlive the board; `elf`: the same program with symbols; `devices`: what hangs on
-    SPI1; `unique_id`: 12 bytes; `crystal_ppm`: how fast the board's crystal runs; `boot_time_s`: virtual time of
-    power-up. Instructions are counted exactly and take one core cycle each; every doubleword of a block is fetched anew
-    with the wait states of the flash, as if there were neither cache nor prefetch, and an exception takes its cycles.
+    SPI1; `unique_id`: 12 bytes; `crystal_ppm`: how fast the board's crystal runs, or what stands in for one that it
+    has not (`has_crystal`); `boot_time_s`: virtual time of power-up. Instructions are counted exactly and take one core
+    cycle each; every doubleword of a block is fetched anew with the wait states of the flash, as if there were neither
+    cache nor prefetch, and an exception takes its cycles.
     The same inputs at the same virtual times give the same bytes.
     """
 
@@ -46,6 +47,7 @@ class EmulatedBoard:
         unique_id: bytes,
         crystal_ppm: float,
         boot_time_s: float,
+        has_crystal: bool = True,
     ) -> None:
         self._symbols = Symbols(elf)
         self._clock = BoardClock(boot_time_s, crystal_ppm)
@@ -62,6 +64,7 @@ class EmulatedBoard:
             devices=devices,
             on_reset=self._request_reset,
             on_clock=self._costs.clear,
+            has_crystal=has_crystal,
         )
         self._cortex = Cortex(self._engine, self._chip.nvic)
         self._engine.meter(self._timeline, self._costs, self._measure)

@@ -65,9 +65,11 @@ class Rcc:
         power: Power,
         on_gate: Callable[[str, bool], None],
         on_clock: Callable[[], None],
+        has_crystal: bool = True,
     ) -> None:
         self._timeline = timeline
         self._power = power
+        self._has_crystal = has_crystal
         self._crystal_since: int | None = None  # the backup domain survives resets
         self._clocks = clocks
         self._flash = flash
@@ -125,7 +127,7 @@ class Rcc:
     def _read_backup(self) -> int:
         if self._crystal_since is None:
             return 0
-        swings = self._timeline.now - self._crystal_since >= _CRYSTAL_START_TICKS
+        swings = self._has_crystal and self._timeline.now - self._crystal_since >= _CRYSTAL_START_TICKS
         return _LSEON | (_LSERDY if swings else 0)
 
     def _write_backup(self, value: int) -> None:

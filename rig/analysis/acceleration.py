@@ -26,6 +26,7 @@ from rig.estimation.triads import Alignment, alignment
 from rig.estimation.triaxial import Method, TriaxialSolution
 from rig.observation.acceleration import DwellReading
 from rig.observation.observed_run import ObservedRun
+from rig.observation.swept_acceleration import SweptAcceleration
 
 BESIDE: tuple[Method, ...] = ("attitude_weighted", "maximum_likelihood", "as_published")
 NO_GYROSCOPES: Mapping[str, SensorResult] = MappingProxyType({})
@@ -177,7 +178,14 @@ def _calibrated(
         covariance=scale_and_bias_covariance(solution.matrix, scale, solution.covariance),
         budget=None
         if settings.uncertainty is None
-        else accelerometer_budget(solution, seen, sweeps, site, 1e-3 * settings.uncertainty.acceleration_lag_ms),
+        else accelerometer_budget(
+            solution,
+            seen,
+            sweeps,
+            site,
+            1e-3 * settings.uncertainty.acceleration_lag_ms,
+            noise_freedom=_noise_freedom(used, _swept(name, recordings)) if settings.counts_freedom else None,
+        ),
         non_orthogonality_rad=non_orthogonality(axes),
         non_orthogonality_std_rad=np.sqrt(np.diag(angles @ solution.covariance[F, F] @ angles.T))[:3],
         alignment=None if gyroscope is None else _alignment(gyroscope, solution, mounting),
@@ -215,8 +223,7 @@ def _dwells(dwells: Sequence[DwellReading], mounting: Array) -> Dwells:
 
 def _sweeps(name: str, recordings: Sequence[ObservedRun], mounting: Array) -> Sweeps:
     """All that was swept, in the axes of the sensor as it is nominally mounted."""
-    turns = [turn for recording in recordings for turn in recording.sensors[name].revolutions]
-    found = [turn.acceleration for turn in turns if turn.acceleration is not None]
+    found = _swept(name, recordings)
     if not found:
         return NO_SWEEPS
     stations = list(dict.fromkeys(each.station for each in found))
@@ -229,6 +236,17 @@ def _sweeps(name: str, recordings: Sequence[ObservedRun], mounting: Array) -> Sw
         arms_m=np.array([each.arm_m for each in found]) @ mounting.T,
         stations=np.array([stations.index(each.station) for each in found], dtype=np.intp),
     )
+
+
+def _swept(name: str, recordings: Sequence[ObservedRun]) -> list[SweptAcceleration]:
+    turns = [turn for recording in recordings for turn in recording.sensors[name].revolutions]
+    return [turn.acceleration for turn in turns if turn.acceleration is not None]
+
+
+def _noise_freedom(dwells: Sequence[DwellReading], swept: Sequence[SweptAcceleration]) -> Array:
+    """(3 N + 9 M,) of the readings of dwells, then of the harmonics of sweeps."""
+    still = [np.broadcast_to(dwell.reading.freedom, 3) for dwell in dwells]
+    return np.concatenate([*still, *(np.full(9, float(each.harmonic.freedom)) for each in swept)])
 
 
 def _repeatability_rad(settings: RunSettings) -> float:

@@ -1,10 +1,12 @@
 """The controller's clock, the only standard of size: held against this computer's and the board's crystal.
 
 Both stand in every recording. A speed is 2π over a time of the controller's, so every scale factor errs by what that
-clock errs by.
+clock errs by. No clock is left out for being far off: what two differ by is held against what is stated of both.
 """
 
+from collections.abc import Iterator
 from dataclasses import dataclass
+from itertools import combinations
 from math import comb
 
 import numpy as np
@@ -16,50 +18,106 @@ from rig.observation.windows import swept
 
 # The board's counter runs from its 32768 Hz crystal by way of a PLL, 576 ppm below the nominal rate (docs/board.md).
 NOMINAL_DRIFT = 4e6 / (122 * 32768) - 1
-LOCKED = 150e-6  # an oscillator farther from that is not held by the crystal
-REAL_TIME = 1e-3  # a controller's clock is that close to a computer's; a simulated one may run at any pace
+# A computer that is farther off counts no seconds of the controller's: a simulated laboratory goes as fast as it can.
+# No quartz errs by a twentieth of that, nor does a time server's correction (500 ppm at most: RFC 5905, MAXFREQ).
+ONE_PACE = 1e-2
+LOCKED, REAL_TIME = 150e-6, 1e-3  # beyond these no comparison was made, before what contradicts was told
+CERTAIN = 4.0  # standard deviations of what is found beside what is stated
 PPM = 1e-6
 ORDER = 6
 EVEN_S = 1e-4  # states whose steps in time differ by less follow each other evenly
 
+BY_COMPUTER, BY_CRYSTAL = "the computer's clock", "the board's crystal"
+SHORT = {BY_COMPUTER: "computer", BY_CRYSTAL: "crystal"}
+
 
 @dataclass(frozen=True, slots=True)
 class ClockComparison:
-    """How much too fast the controller's clock runs by another one, and the standard uncertainty of that: fractions."""
+    """How much too fast the controller's clock runs by another one, and the standard uncertainty of that: fractions.
+
+    `half_width` is what is stated of the other clock, `noise_std` what the recording leaves uncertain, with so much
+    `freedom`; `std` is both.
+    """
 
     by: str
     error: float
-    std: float
+    half_width: float
+    noise_std: float
+    freedom: float = np.inf
+
+    @property
+    def std(self) -> float:
+        """As a fraction."""
+        return float(np.hypot(self.noise_std, self.half_width / np.sqrt(3)))
+
+
+@dataclass(frozen=True, slots=True)
+class ClockDifference:
+    """What two clocks, by name, differ by, and the most that is stated of them and found allows: fractions."""
+
+    clocks: tuple[str, str]
+    size: float
+    limit: float
 
 
 @dataclass(frozen=True, slots=True)
 class ClockCheck:
     """What is known of the controller's clock: `error` is how much too fast it runs, `std` its standard uncertainty.
 
-    Made of all `comparisons` and of what such a clock may be off at all, weighted by their variances.
+    Made of all `comparisons` and of what such a clock may be off at all, `half_width`, weighted by their variances.
     """
 
     error: float
     std: float
     comparisons: tuple[ClockComparison, ...]
+    half_width: float
+
+    def differences(self) -> Iterator[ClockDifference]:
+        """Of every two: of two half-widths the sum, for all values within are equally likely."""
+        known = [("controller", 0.0, self.half_width, 0.0)]
+        known += [(SHORT[each.by], each.error, each.half_width, each.noise_std) for each in self.comparisons]
+        for (one, error, width, noise), (other, its_error, its_width, its_noise) in combinations(known, 2):
+            limit = width + its_width + CERTAIN * float(np.hypot(noise, its_noise))
+            yield ClockDifference((one, other), abs(error - its_error), limit)
+
+    @property
+    def freedom(self) -> float:
+        """Degrees of freedom of `std`, infinite where nothing was found from readings."""
+        found = [(each.noise_std * (self.std / each.std) ** 2) ** 4 / each.freedom for each in self.comparisons]
+        return self.std**4 / sum(found) if any(found) else np.inf
 
 
-def check_clock(recording: ObservedRun, known: Uncertainty) -> ClockCheck:
-    """The clock of one recording's controller."""
-    found = [each for each in (_by_computer(recording, known), _by_crystal(recording, known)) if each is not None]
-    prior = known.controller_clock_ppm * PPM / np.sqrt(3)
-    weights = np.array([1 / prior**2, *(1 / each.std**2 for each in found)])
+@dataclass(frozen=True, slots=True)
+class Jitter:
+    """Of the times the arm's states are of: standard deviation in s, and its degrees of freedom."""
+
+    std_s: float
+    freedom: float
+
+
+def check_clock(recording: ObservedRun, known: Uncertainty, *, holds_every: bool = True) -> ClockCheck:
+    """The clock of one recording's controller, held against others: against every one, or as before against near ones.
+
+    A recording of before does not say whether a crystal holds its board's clock: it is taken to, as it is built.
+    """
+    compared = (_by_computer(recording, known), _by_crystal(recording, known))
+    far = {BY_COMPUTER: ONE_PACE if holds_every else REAL_TIME, BY_CRYSTAL: np.inf if holds_every else LOCKED}
+    found = [each for each in compared if each is not None and abs(each.error) < far[each.by]]
+    half_width = known.controller_clock_ppm * PPM
+    weights = np.array([3 / half_width**2, *(1 / each.std**2 for each in found)])
     errors = np.array([0.0, *(each.error for each in found)])
-    return ClockCheck(float(weights @ errors / weights.sum()), float(weights.sum() ** -0.5), tuple(found))
+    error, std = float(weights @ errors / weights.sum()), float(weights.sum() ** -0.5)
+    return ClockCheck(error, std, tuple(found), half_width)
 
 
-def state_jitter_s(recording: ObservedRun) -> float:
-    """Standard deviation of the times the arm's states are of, from how the joint angles of the sweeps scatter.
+def state_jitter(recording: ObservedRun) -> Jitter:
+    """Of the times the arm's states are of, from how the joint angles of the sweeps scatter.
 
     Differences of the sixth order: of what the servo does, slow beside the states, nothing is left in them. What is
-    left are the times, and the encoder's steps.
+    left are the times, and the encoder's steps. Neighbouring differences share states: n of them have the freedom of
+    n / Σ ρ², where Σ ρ² over all lags is C(24, 12) / C(12, 6)².
     """
-    scatter = []
+    scatter, count = [], 0
     for finished in swept(recording.run):
         inside = slice(*np.searchsorted(recording.motion.time_s, [finished.window.start_s, finished.window.end_s]))
         states = recording.motion.states[inside]
@@ -68,32 +126,31 @@ def state_jitter_s(recording: ObservedRun) -> float:
         steps = steps[even < EVEN_S]
         if len(steps):
             scatter.append(np.mean(steps**2) / comb(2 * ORDER, ORDER) / finished.sweep.speed_rad_s**2)
-    return float(np.sqrt(np.mean(scatter))) if scatter else 0.0
+            count += len(steps)
+    if not scatter:
+        return Jitter(0.0, np.inf)
+    return Jitter(float(np.sqrt(np.mean(scatter))), count * comb(2 * ORDER, ORDER) ** 2 / comb(4 * ORDER, 2 * ORDER))
 
 
-def _by_computer(recording: ObservedRun, known: Uncertainty) -> ClockComparison | None:
-    """By the times at which the states came; None where the two clocks do not go at one pace."""
+def _by_computer(recording: ObservedRun, known: Uncertainty) -> ClockComparison:
+    """By the times at which the states came."""
     states = recording.motion.states
     host_s, arm_s = states["host_time_s"] - states["host_time_s"][0], states["time_s"] - states["time_s"][0]
     design = np.column_stack([np.ones_like(host_s), host_s])
     (offset, slope), *_ = np.linalg.lstsq(design, arm_s, rcond=None)
-    if not abs(slope - 1) < REAL_TIME:
-        return None
     late = arm_s - design @ (offset, slope)
-    of_the_line = late.std() / host_s.std() * np.sqrt(widening(late) / len(late))  # states come late in bursts
-    std = float(np.hypot(of_the_line, known.computer_clock_ppm * PPM / np.sqrt(3)))
-    return ClockComparison("the computer's clock", float(slope - 1), std)
+    alone = len(late) / widening(late)  # states come late in bursts
+    of_the_line = float(late.std() / host_s.std() / np.sqrt(alone))
+    return ClockComparison(
+        BY_COMPUTER, float(slope - 1), known.computer_clock_ppm * PPM, of_the_line, max(alone - 2, 1.0)
+    )
 
 
 def _by_crystal(recording: ObservedRun, known: Uncertainty) -> ClockComparison | None:
-    """By the board's counter; None where no crystal holds it, or no board was there."""
+    """By the board's counter; None where no board was there, or by its own word no crystal holds it."""
     bases = [each.time_base for name, each in recording.sensors.items() if recording.run.sensors[name].on_board]
-    if not bases:
+    if not bases or recording.run.provenance.board_follows_crystal is False:
         return None
     best = min(bases, key=lambda base: base.drift_std)
     error = (1 + best.drift) / (1 + NOMINAL_DRIFT) - 1
-    if not abs(error) < LOCKED:
-        return None
-    return ClockComparison(
-        "the board's crystal", error, float(np.hypot(best.drift_std, known.crystal_ppm * PPM / np.sqrt(3)))
-    )
+    return ClockComparison(BY_CRYSTAL, error, known.crystal_ppm * PPM, best.drift_std)

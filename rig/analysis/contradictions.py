@@ -6,6 +6,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from rig.analysis.acceleration import AccelerometerResult
+from rig.analysis.allowance import allow, allowed
 from rig.analysis.calibration import SensorResult, observe_recordings, solve_observed
 from rig.analysis.consistency import consistency
 from rig.analysis.magnetic_field import MagnetometerResult
@@ -15,12 +16,13 @@ from rig.analysis.reference_contradictions import of_accelerometer, of_magnetome
 from rig.analysis.surroundings import surroundings_of
 from rig.analysis.suspicion import Statistic
 from rig.analysis.verdict import Check
+from rig.analysis.ways import with_ways
 from rig.data.run_file import RunData
 from rig.errors import Fault, RigError
 from rig.observation.observed_run import ObservedRun
 
 FALSE_ALARMS = 0.001  # how often one of these checks, of any sensor, fails an undamaged run, at most
-SHARES = 13  # of each kind of readings of a sensor: its statistics, each with a share of its own
+SHARES = 13  # of each kind of readings of a sensor, its statistics; one more where the ways between sweeps are held
 DISTURBED = "disturbed_sweep"
 
 
@@ -42,6 +44,7 @@ def contradictions(
     settings = recordings[0].run.settings
     if settings.site is None:
         return Contradictions((), frozenset())
+    surroundings = surroundings_of(recordings) if settings.checked_by_model else None
     checks: list[Check] = []
     disturbed: set[int] = set()
     rate = _rate(recordings[0].run, sensors)
@@ -50,7 +53,11 @@ def contradictions(
         if explained is None:
             continue
         pieces = cut(name, recordings, results[name], explained, settings.site)
-        found = consistency(pieces, explained.solution.matrix, rate)
+        allowance = None
+        if surroundings is not None:
+            known = allowed(surroundings, name, results[name])
+            allowance = allow(known, pieces, with_ways(pieces, name, recordings, explained), explained.solution.matrix)
+        found = consistency(pieces, explained.solution.matrix, rate, allowance)
         counts = [recording.run.samples[name]["counts"].astype(np.int64) for recording in recordings]
         named = {results[name].observations[place].sweep: each for place, each in found.disturbed.items()}
         sweeps = {f"{DISTURBED}.{sweep}": each for sweep, each in sorted(named.items())} or {DISTURBED: found.sweep}
@@ -96,7 +103,7 @@ def _rate(run: RunData, sensors: Sequence[str]) -> float:
     if run.settings.holds_all_kinds:
         accelerometers = [name for name in run.settings.to_calibrate if run.sensors[name].has_acceleration]
         kinds += len(accelerometers) + len(run.magnetometers)
-    return FALSE_ALARMS / (SHARES * kinds)
+    return FALSE_ALARMS / ((SHARES + run.settings.checked_by_model) * kinds)
 
 
 def _checks(of: str, statistics: Mapping[str, Statistic]) -> list[Check]:

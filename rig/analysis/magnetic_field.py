@@ -122,13 +122,25 @@ def _calibrated(
         drift=drift,
         scale=scale,
         covariance=scale_and_bias_covariance(solution.matrix, scale, solution.covariance),
-        budget=magnetometer_budget(solution, attitudes, variances, (alike, drift), site),
+        budget=magnetometer_budget(
+            solution,
+            attitudes,
+            variances,
+            (alike, drift),
+            site,
+            noise_freedom=_noise_freedom(dwells) if settings.counts_freedom else None,
+        ),
         non_orthogonality_rad=non_orthogonality(axes),
         non_orthogonality_std_rad=np.sqrt(np.diag(angles @ solution.covariance[F, F] @ angles.T))[:3],
         beside={method: or_fault(partial(solve, method=method)) for method in BESIDE},
         dwells=dwells,
         seen=Dwells(means, variances, attitudes),
     )
+
+
+def _noise_freedom(dwells: Sequence[FieldReading]) -> Array:
+    """(3 N,)."""
+    return np.concatenate([np.broadcast_to(dwell.reading.freedom, 3) for dwell in dwells])
 
 
 def _known_field(settings: RunSettings) -> tuple[Site, float]:

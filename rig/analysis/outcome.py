@@ -21,15 +21,25 @@ from rig.analysis.comparison import Reference, turns_of
 from rig.analysis.contradictions import contradictions, in_reference
 from rig.analysis.magnetic_field import MagnetometerResult, calibrate_magnetometers
 from rig.analysis.onboard_check import Agreement, agreement
+from rig.analysis.seen import arms_of
 from rig.analysis.surroundings import surroundings_of
-from rig.analysis.verdict import Check, acceleration_checks, drift_checks, judge, verdict, verification_checks
+from rig.analysis.verdict import (
+    Check,
+    acceleration_checks,
+    clock_checks,
+    drift_checks,
+    judge,
+    verdict,
+    verification_checks,
+)
 from rig.analysis.verification import Verification, verify
 from rig.data.provenance import Provenance
 from rig.data.result_file import StoredCalibrationEntry
 from rig.data.run_file import RunData
-from rig.data.settings import DecisionRule, RunSettings, Site
+from rig.data.settings import DecisionRule, RunSettings
 from rig.errors import Fault
 from rig.estimation.arrays import Array
+from rig.estimation.explained import centripetal_m_s2
 from rig.estimation.vector_model import VectorSolution
 from rig.observation.observed_run import ObservedRun, observe_runs
 
@@ -118,6 +128,7 @@ def calibrated(runs: Sequence[RunData], estimator: str = DEFAULT_ESTIMATOR, *, d
             *checks,
             *(check for name, agreed in onboard.items() for check in agreed.checks(name)),
             *contradictions(recordings, results, settings.to_calibrate).checks,
+            *(clock_checks(surroundings.clock) if surroundings is not None and settings.holds_every_clock else ()),
             *_acceleration_checks(accelerometers, settings),
             *in_reference(recordings, accelerometers, magnetometers, drifting=drifting),
         ),
@@ -191,7 +202,7 @@ def verified(outcome: Outcome, repeated: Sequence[RunData]) -> Outcome:
                 after,
                 outcome.recordings,
                 outcome.results.get(name),
-                gravity_rad_s=_gravity_left(outcome.results, (name, reference), after, settings.site),
+                gravity_rad_s=_gravity_left(outcome.results, (name, reference), after, settings),
             )
             for name in settings.to_calibrate
         }
@@ -209,11 +220,14 @@ def verified(outcome: Outcome, repeated: Sequence[RunData]) -> Outcome:
 
 
 def _gravity_left(
-    results: Mapping[str, SensorResult], pair: tuple[str, Reference], after: Sequence[ObservedRun], site: Site | None
+    results: Mapping[str, SensorResult],
+    pair: tuple[str, Reference],
+    after: Sequence[ObservedRun],
+    settings: RunSettings,
 ) -> tuple[Array, Array] | None:
     """(N, 3) what gravity adds to the corrected readings of sensor and reference, neither of which knows where down is.
 
-    None where the calibration did not find it.
+    With what their circling adds, which is felt as gravity is. None where the calibration did not find it.
     """
     name, reference = pair
     corrections = {name: results[name].correction_matrix} if name in results else {}
@@ -221,10 +235,13 @@ def _gravity_left(
     left = []
     for each, matrix in corrections.items():
         solution = results[each].vector_model if each in results else None
-        if site is None or not isinstance(solution, VectorSolution) or solution.g_sensitivity is None:
+        if settings.site is None or not isinstance(solution, VectorSolution) or solution.g_sensitivity is None:
             return None
-        attitudes = np.array([turn.average.attitude for turn in turns_of(each, after)], dtype=np.float64)
-        left.append(attitudes @ site.down_m_s2 @ (matrix @ solution.g_sensitivity).T)
+        turns = turns_of(each, after)
+        attitudes = np.array([turn.average.attitude for turn in turns], dtype=np.float64)
+        turned = np.array([turn.speed_rad_s * turn.axis_flange for turn in turns])
+        pull = attitudes @ settings.site.down_m_s2 - centripetal_m_s2(turned, arms_of(turns, settings))
+        left.append(pull @ (matrix @ solution.g_sensitivity).T)
     of_sensor, of_reference = left
     return of_sensor, of_reference
 

@@ -6,6 +6,7 @@ and so is what the sensor's filter delays of it.
 
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
+from functools import partial
 
 import numpy as np
 from numpy.typing import NDArray
@@ -16,14 +17,19 @@ from rig.estimation.arrays import Array
 from rig.estimation.explained import Explained
 from rig.observation.average import Average, Stream, between, rounding_left
 from rig.observation.colour import widening
+from rig.observation.lines import fitted, lines, waves
 from rig.observation.observe import Observation
 from rig.observation.observed_run import ObservedRun
+from rig.observation.tapered import noise_at_zero
 from rig.observation.timebase import ArmMotion
 
 PARTS = 4  # of a revolution; a rest has half as many
 MOST_PIECES = 48  # of all revolutions: beyond twelve sweeps these are cut into fewer parts
 FEWEST_SAMPLES = 20
+PREVAILS = 0.7  # of the residuals' variance, what is left in a long mean where the rest of them is a vibration
 FEWEST_AT_REST = 60  # of a whole rest: fewer do not tell its noise well enough to weigh it by
+FINER = 3.0  # than the arm's states follow each other, what its rate is looked at
+REST = -1  # in the place of a sweep; ways between sweeps and rests count down from there
 
 
 @dataclass(frozen=True, slots=True)
@@ -42,22 +48,38 @@ class Window:
 
 
 @dataclass(frozen=True, slots=True)
+class Stretch:
+    """From when to when the arm made a motion, on the clock of its states.
+
+    `unseen_rad` is what samples may miss of where a motion begins or ends.
+    """
+
+    motion: ArmMotion
+    start_s: float
+    end_s: float
+    unseen_rad: float = 0.0
+
+
+@dataclass(frozen=True, slots=True)
 class Pieces:
     """N pieces of revolutions and rests, and the windows they were cut from.
 
     `sweep` (N,) is the place of the revolution, −1 for a rest; `place` (N,) runs from −1 in its first part to 1 in its
-    last; `means_rad_s`, `variances_rad2_s2` (N, 3); `rates_rad_s` (N, 3) of the flange, `gravity_m_s2` (N, 3) in its
-    frame; `speed_std` (N,) relative; `times_s` (N, 2) from start to end on the clock of the first recording.
+    last; `means_rad_s`, `variances_rad2_s2` (N, 3); `rates_rad_s` (N, 3) of the flange, `pull_m_s2` (N, 3) what is
+    felt as gravity, in its frame, `attitudes` (N, 3, 3) from the base into it; `speed_std` (N,) relative; `times_s`
+    (N, 2) from start to end on the clock of the first recording, `stretches` on that of their own.
     """
 
-    sweep: Array
+    sweep: NDArray[np.intp]
     place: Array
     means_rad_s: Array
     variances_rad2_s2: Array
     rates_rad_s: Array
-    gravity_m_s2: Array
+    pull_m_s2: Array
+    attitudes: Array
     speed_std: Array
     times_s: Array
+    stretches: tuple[Stretch, ...]
     windows: tuple[Window, ...]
 
 
@@ -69,9 +91,9 @@ class _Piece:
     variance_rad2_s2: Array
     rate_rad_s: Array
     gravity_m_s2: Array
+    attitude: Array
     speed_std: float
-    start_s: float
-    end_s: float
+    stretch: Stretch
 
 
 def cut(name: str, recordings: Sequence[ObservedRun], result: SensorResult, explained: Explained, site: Site) -> Pieces:
@@ -82,29 +104,37 @@ def cut(name: str, recordings: Sequence[ObservedRun], result: SensorResult, expl
     streams = [(recording, recording.stream(name)) for recording in recordings]
     turns = [(*each, turn) for each in streams for turn in each[0].sensors[name].revolutions]
     rests = [(*each, rest) for each in streams for rest in each[0].sensors[name].rests]
+    cut_up = partial(_cut, site=site, finds_lines=recordings[0].run.settings.checked_by_model)
     found = [
         *(
-            _cut(stream, recording.motion, turn.average, site, parts, sweep=sweep, turn=turn)
+            cut_up(stream, recording.motion, turn.average, sweep=sweep, turn=turn, parts=parts)
             for sweep, (recording, stream, turn) in enumerate(turns)
         ),
-        *(_cut(stream, recording.motion, rest, site, max(1, parts // 2)) for recording, stream, rest in rests),
+        *(cut_up(stream, recording.motion, rest, parts=max(1, parts // 2)) for recording, stream, rest in rests),
     ]
     averages = [*(turn.average for *_, turn in turns), *(rest for *_, rest in rests)]
-    pieces, times_s = [], []
-    for (_, made), average, began_s in zip(found, averages, explained.seen.windows_s[:, 0], strict=True):
+    seen, pieces, pull_m_s2, times_s = explained.seen, list[_Piece](), list[Array](), list[Array]()
+    for (_, made), average, began_s, acceleration_m_s2 in zip(
+        found, averages, seen.windows_s[:, 0], seen.acceleration_m_s2, strict=True
+    ):
         if made and made[0].sweep < 0 and average.samples < FEWEST_AT_REST:
             continue
         pieces += made
-        times_s += [np.array([piece.start_s, piece.end_s]) - average.start_s + began_s for piece in made]
+        pull_m_s2 += [piece.gravity_m_s2 - acceleration_m_s2 for piece in made]
+        times_s += [
+            np.array([piece.stretch.start_s, piece.stretch.end_s]) - average.start_s + began_s for piece in made
+        ]
     return Pieces(
         sweep=np.array([piece.sweep for piece in pieces]),
         place=np.array([piece.place for piece in pieces]),
         means_rad_s=np.array([piece.mean_rad_s for piece in pieces]),
         variances_rad2_s2=np.array([piece.variance_rad2_s2 for piece in pieces]),
         rates_rad_s=np.array([piece.rate_rad_s for piece in pieces]),
-        gravity_m_s2=np.array([piece.gravity_m_s2 for piece in pieces]),
+        pull_m_s2=np.array(pull_m_s2),
+        attitudes=np.array([piece.attitude for piece in pieces]),
         speed_std=np.array([piece.speed_std for piece in pieces]),
         times_s=np.array(times_s),
+        stretches=tuple(piece.stretch for piece in pieces),
         windows=tuple(window for window, _ in found),
     )
 
@@ -113,13 +143,18 @@ def _cut(
     stream: Stream,
     motion: ArmMotion,
     average: Average,
+    *,
     site: Site,
     parts: int,
-    *,
-    sweep: int = -1,
+    finds_lines: bool,
+    sweep: int = REST,
     turn: Observation | None = None,
 ) -> tuple[Window, list[_Piece]]:
-    """A revolution (`turn`) or a rest in parts of equal length; one of which too little is known is left out."""
+    """A revolution (`turn`) or a rest in parts of equal length; one of which too little is known is left out.
+
+    Where it `finds_lines`, what vibrates is taken out of the means of readings and rates alike, and out of the noise:
+    the encoders do not see all of it.
+    """
     inside = between(stream, average.start_s, average.end_s)
     time_s = stream.time_s[inside]
     known = motion.covered(time_s) if turn is not None else np.ones(len(time_s), dtype=np.bool_)
@@ -138,9 +173,24 @@ def _cut(
         vibration -= _means(vibration, part, parts)[part]
         shaken = vibration @ np.linalg.lstsq(vibration, residual, rcond=None)[0]
         residual = residual - shaken
+    left, taken = residual, 0
+    if finds_lines:
+        cycles, share = lines(readings - means[part]), (time_s - average.start_s) / average.duration_s
+        columns = waves(cycles, share)
+        taken = columns.shape[1]
+        means, left = beside(columns, readings, part, parts)
+        if turn is not None:
+            rates, unexplained = beside(columns, rate, part, parts)
+            along = unexplained @ turn.axis_flange[:, None]
+            left = left - along @ np.linalg.lstsq(along, left, rcond=None)[0]
+            if known.all():
+                rates = turned(motion, average.start_s, average.end_s, cycles, parts)
     count = stream.sensor.sensitivity_rad_s_per_count
-    scatter = np.maximum(np.sum(residual**2, axis=0) / max(len(residual) - len(enough), 1), count**2 / 12)
-    wider = np.array([widening(residual[:, axis]) for axis in range(3)])
+    scatter = np.maximum(np.sum(left**2, axis=0) / max(len(left) - len(enough) - taken, 1), count**2 / 12)
+    noise = scatter * np.array([widening(left[:, axis]) for axis in range(3)])
+    if taken:
+        at_zero = np.maximum(noise_at_zero(left), count**2 / 12)
+        noise = np.where(at_zero < PREVAILS * scatter, at_zero, noise)
     earth = np.zeros(3) if site.earth_rate_rad_s is None else np.array(site.earth_rate_rad_s)
     pieces = []
     for each in enough:
@@ -150,21 +200,40 @@ def _cut(
                 sweep=sweep,
                 place=2 * each / (parts - 1) - 1 if parts > 1 else 0.0,
                 mean_rad_s=means[each],
-                variance_rad2_s2=scatter * wider / np.sum(part == each) + rounding_left(scatter, count),
+                variance_rad2_s2=noise / np.sum(part == each) + rounding_left(scatter, count),
                 rate_rad_s=rates[each] + attitude @ earth,
                 gravity_m_s2=attitude @ site.down_m_s2,
+                attitude=attitude,
                 speed_std=0.0 if turn is None else turn.speed_std_rad_s / turn.speed_rad_s,
-                start_s=float(ends[each]),
-                end_s=float(ends[each + 1]),
+                stretch=Stretch(motion, float(ends[each]), float(ends[each + 1])),
             )
         )
     seen = stream.raw["counts"][inside].astype(np.int64)
     return Window(sweep, seen, residual / count, np.sqrt(np.mean(shaken**2, axis=0)) / count), pieces
 
 
+def beside(columns: Array, values: Array, part: NDArray[np.intp], parts: int) -> tuple[Array, Array]:
+    """(parts, 3) means of values (n, 3) beside what `columns` (n, k) explain, and (n, 3) what neither does."""
+    means, apart = _means(values, part, parts), _means(columns, part, parts)
+    within, left = columns - apart[part], values - means[part]
+    sizes = fitted(within, left)
+    return means - apart @ sizes, left - within @ sizes
+
+
+def turned(motion: ArmMotion, start_s: float, end_s: float, cycles: Array, parts: int) -> Array:
+    """(parts, 3) mean rates of the flange beside lines that make so many cycles (k,) from start to end.
+
+    All states count, where samples are farther apart than these: what one of them errs by the next takes back.
+    """
+    count = round(FINER * (end_s - start_s) / float(np.median(np.diff(motion.time_s))))
+    share = (np.arange(count) + 0.5) / count
+    part = np.asarray(parts * share, dtype=np.intp)
+    return beside(waves(cycles, share), motion.rate(start_s + share * (end_s - start_s)), part, parts)[0]
+
+
 def _means(values: Array, part: NDArray[np.intp], parts: int) -> Array:
     """(parts, k) means of values (n, k) by part; zero where a part has none."""
     counts = np.maximum(np.bincount(part, minlength=parts), 1)
     sums = [np.bincount(part, values[:, column], minlength=parts) for column in range(values.shape[1])]
-    means: Array = np.stack(sums, axis=1) / counts[:, None]
+    means: Array = np.reshape(sums, (values.shape[1], parts)).T / counts[:, None]
     return means

@@ -27,14 +27,26 @@ LOCAL_GRAVITY_M_S2: Final = 0.0005
 ANY_GRAVITY_M_S2: Final = 0.03
 UNSTATED_FIELD: Final = 0.01  # of the field: an ordinary fluxgate
 UNTESTED_DRIFT_T: Final = 1e-7  # in a run: a magnetic storm, a lift some floors away
+TESTED_AXES: Final = 3  # of one change of the field, by which its standard deviation is known
 SIZE_OF_FIELD: Final = "size of the field"
 MICROTESLA: Final = 1e6
 
 
-def accelerometer_budget(solution: ImuSolution, dwells: Dwells, sweeps: Sweeps, site: Site, lag_s: float) -> Budget:
-    """Of the solution found from these; `lag_s` is how late the sensor's own filter may be."""
+def accelerometer_budget(
+    solution: ImuSolution,
+    dwells: Dwells,
+    sweeps: Sweeps,
+    site: Site,
+    lag_s: float,
+    *,
+    noise_freedom: Array | None = None,
+) -> Budget:
+    """Of the solution found from these; `lag_s` is how late the sensor's own filter may be.
+
+    `noise_freedom` (3 N + 9 M,) as in `Spread`: of the dwells' readings, then of the sweeps' harmonics.
+    """
     noise, left = Movement(dwells, sweeps).noise(), (solution.chi_square, solution.freedom)
-    spread = _spread(solution, solution.response, noise, solution.attitude_error, left)
+    spread = _spread(solution, solution.response, noise, solution.attitude_error, left, noise_freedom=noise_freedom)
     others = [_lagging(spread, dwells, sweeps, lag_s)] if len(sweeps.speeds_rad_s) else []
     return reference_budget(spread, _gravity(site), others)
 
@@ -45,6 +57,8 @@ def magnetometer_budget(
     variances_t2: Array,
     tested: tuple[Uniformity, FieldDrift | None],
     site: Site,
+    *,
+    noise_freedom: Array | None = None,
 ) -> Budget:
     """Of the solution found in attitudes (N, 3, 3), flange to base, with these variances (N, 3) of the means."""
     alike, drift = tested
@@ -52,7 +66,7 @@ def magnetometer_budget(
     theta = np.concatenate([solution.matrix.ravel(), solution.field_table_t, solution.bias_t])
     response = response_in_attitudes(theta, attitudes, variances_t2, error.std_rad)
     left = alike.chi_square, alike.degrees_of_freedom
-    spread = _spread(solution, response, np.diag(variances_t2.ravel()), error, left)
+    spread = _spread(solution, response, np.diag(variances_t2.ravel()), error, left, noise_freedom=noise_freedom)
     return reference_budget(spread, _field(site), [_drifting(spread, solution.matrix, attitudes, drift)])
 
 
@@ -62,11 +76,13 @@ def _spread(
     noise: Array,
     error: AttitudeError,
     left: tuple[float, int],
+    *,
+    noise_freedom: Array | None,
 ) -> Spread:
     """Of scale and bias, from the `response` (p, n) of all that was found; `left`: χ² of the residuals, its freedom."""
     scale = 1 / np.linalg.norm(solution.matrix, axis=1)
     told = scale_and_bias(solution.matrix, scale, len(solution.covariance))
-    return Spread(scale, told @ solution.covariance @ told.T, told @ response, noise, error, *left)
+    return Spread(scale, told @ solution.covariance @ told.T, told @ response, noise, error, *left, noise_freedom)
 
 
 def _gravity(site: Site) -> KnownSize:
@@ -115,5 +131,5 @@ def _drifting(spread: Spread, matrix: Array, attitudes: Array, drift: FieldDrift
     if drift is None:
         said = f"procedure.field_test_s {NOT_GIVEN}"
         return assumed("drift of the field", MICROTESLA * change_t, "µT", said, spread.of(patterns))
-    source = "tests at home"
-    return Contributor("drift of the field", "A", "normal", None, "", source, np.inf, spread.of(patterns))
+    freedom = float(TESTED_AXES) if spread.noise_freedom is not None else np.inf
+    return Contributor("drift of the field", "A", "normal", None, "", "tests at home", freedom, spread.of(patterns))

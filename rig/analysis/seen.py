@@ -6,14 +6,16 @@ from itertools import pairwise
 
 import numpy as np
 
+from rig.analysis.clock import PPM
 from rig.analysis.surroundings import Surroundings
 from rig.arm.kinematics import AXIS_ERRORS
 from rig.config.sensor_catalogue import PARTS
-from rig.data.settings import Uncertainty
+from rig.data.settings import RunSettings, Uncertainty
 from rig.estimation.arrays import Array
-from rig.estimation.budget import Unknown
+from rig.estimation.budget import Unknown, uncounted
 from rig.estimation.earth_rate import EarthRate, Known
 from rig.estimation.explained import Seen
+from rig.observation.average import Average
 from rig.observation.observe import Observation
 from rig.observation.observed_run import ObservedRun
 
@@ -35,6 +37,7 @@ def see(recordings: Sequence[ObservedRun], sensor: str, surroundings: Surroundin
     averages = [average for average, _ in placed]
     attitudes = np.array([average.attitude for average in averages], dtype=np.float64)
     turned = np.array([turn.speed_rad_s * turn.axis_flange for turn, _ in turns])
+    arms_m = arms_of([turn for turn, _ in turns], recordings[0].run.settings)
     earth = np.zeros(3) if site.earth_rate_rad_s is None else np.array(site.earth_rate_rad_s)
     return Seen(
         means_rad_s=np.array([average.mean_rad_s for average in averages]),
@@ -47,7 +50,20 @@ def see(recordings: Sequence[ObservedRun], sensor: str, surroundings: Surroundin
         windows_s=np.array([(average.start_s + since_s, average.end_s + since_s) for average, since_s in placed]),
         joints=(*(turn.joint_name for turn, _ in turns), *[None] * len(rests)),
         axis_errors_rad_s=_axis_errors([turn for turn, _ in turns], len(rests), surroundings.uncertainty.axis_deg),
+        arms_m=np.concatenate([arms_m, np.zeros((len(rests), 3))]),
+        noise_freedom=_noise_freedom(averages) if surroundings.counts_freedom else np.inf,
     )
+
+
+def arms_of(turns: Sequence[Observation], settings: RunSettings) -> Array:
+    """(M, 3) from the axis that turns to where the sensors sit, in the flange's frame; zero where it is left out."""
+    known = [turn.arm_m + np.array(settings.extension_m) if turn.arm_m is not None else np.zeros(3) for turn in turns]
+    return np.reshape(known, (-1, 3)) * settings.knows_own_motion
+
+
+def _noise_freedom(averages: Sequence[Average]) -> Array:
+    """(N, 3)."""
+    return np.array([np.broadcast_to(average.freedom, 3) for average in averages])
 
 
 def _axis_errors(turns: Sequence[Observation], rests: int, axis_deg: float) -> Array:
@@ -97,13 +113,18 @@ def g_sensitivity_deg_s_g(known: Uncertainty, name: str, part: str) -> float:
 def unknown_of(surroundings: Surroundings, name: str, part: str, earth_rate: EarthRate | None) -> Unknown:
     """What no recording shows of the surroundings of a sensor of that name and kind, and the Earth's rate it found."""
     known, clock = surroundings.uncertainty, surroundings.clock
-    return Unknown(
+    found = Unknown(
         clock_std=clock.std,
+        clock_freedom=clock.freedom,
+        clock_half_width=None if clock.comparisons else PPM * known.controller_clock_ppm,
         clock_source="held against " + (" and ".join(each.by for each in clock.comparisons) or "no other clock"),
         state_jitter_s=surroundings.state_jitter_s,
+        state_jitter_freedom=surroundings.state_jitter_freedom,
         axis_rad=float(np.radians(known.axis_deg)),
         sensor_offset_m=known.sensor_offset_mm / 1000,
         g_sensitivity_rad_s_per_g=float(np.radians(g_sensitivity_deg_s_g(known, name, part))),
         earth_rate=earth_rate is None and surroundings.site.earth_rate_rad_s is None,
         earth_covariance_rad2_s2=None if earth_rate is None else earth_rate.covariance_rad2_s2,
+        earth_freedom=np.inf if earth_rate is None else earth_rate.freedom,
     )
+    return found if surroundings.counts_freedom else uncounted(found)

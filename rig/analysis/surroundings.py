@@ -2,8 +2,9 @@
 
 from collections.abc import Sequence
 from dataclasses import dataclass
+from math import inf
 
-from rig.analysis.clock import ClockCheck, check_clock, state_jitter_s
+from rig.analysis.clock import ClockCheck, check_clock, state_jitter
 from rig.data.settings import Site, Uncertainty
 from rig.observation.observed_run import ObservedRun
 
@@ -12,7 +13,7 @@ from rig.observation.observed_run import ObservedRun
 class Surroundings:
     """The site, what no recording shows of it, the controller's clock, and the jitter of its states' times (s).
 
-    `finds_earth_rate` says that the site is not asked for the Earth's rate.
+    `finds_earth_rate` says that the site is not asked for the Earth's rate, `counts_freedom` as `RunSettings` does.
     """
 
     site: Site
@@ -20,6 +21,8 @@ class Surroundings:
     clock: ClockCheck
     state_jitter_s: float
     finds_earth_rate: bool = False
+    state_jitter_freedom: float = inf
+    counts_freedom: bool = True
 
 
 def surroundings_of(recordings: Sequence[ObservedRun]) -> Surroundings | None:
@@ -28,6 +31,14 @@ def surroundings_of(recordings: Sequence[ObservedRun]) -> Surroundings | None:
     if settings.site is None or settings.uncertainty is None:
         return None
     longest = max(recordings, key=lambda each: float(each.motion.time_s[-1] - each.motion.time_s[0]))
-    clock = check_clock(longest, settings.uncertainty)
-    jitter_s = state_jitter_s(longest)
-    return Surroundings(settings.site, settings.uncertainty, clock, jitter_s, settings.finds_earth_rate)
+    clock = check_clock(longest, settings.uncertainty, holds_every=settings.holds_every_clock)
+    jitter = state_jitter(longest)
+    return Surroundings(
+        settings.site,
+        settings.uncertainty,
+        clock,
+        jitter.std_s,
+        settings.finds_earth_rate,
+        jitter.freedom,
+        settings.counts_freedom,
+    )

@@ -11,6 +11,7 @@ import numpy as np
 
 from rig.estimation.arrays import Array
 
+TOLD = 1e-3  # of a column's size, what the model must leave of it
 ALIKE = 10.0  # of χ²: what explains less than the best by no more than this might be the cause as well
 
 Statistic = tuple[float, float]  # and its limit
@@ -72,7 +73,7 @@ def told_beside(known: Array, columns: Array) -> Array:
     new = columns / np.where(sizes > 0, sizes, 1.0)
     new = new - known @ (known.T @ new)
     left, singular, _ = np.linalg.svd(new, full_matrices=False)
-    told: Array = left[:, singular > 1e-3]
+    told: Array = left[:, singular > TOLD]
     return told
 
 

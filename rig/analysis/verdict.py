@@ -11,10 +11,12 @@ import numpy as np
 from rig.analysis.acceleration import AccelerometerResult
 from rig.analysis.at_rest import Quantity
 from rig.analysis.bias_drift import BiasDrift
+from rig.analysis.clock import PPM, ClockCheck
 from rig.analysis.verification import Verification
 from rig.data.settings import DecisionRule, Limits
 from rig.estimation.arrays import Array
-from rig.estimation.budget import COVERAGE_FACTOR, Budget
+from rig.estimation.budget import Budget
+from rig.estimation.coverage import COVERAGE_FACTOR, beyond
 from rig.estimation.estimate import Estimate
 
 
@@ -22,8 +24,9 @@ from rig.estimation.estimate import Estimate
 class Check:
     """One limit: it passes when `value` is a number not above `limit` less `guard`. `unit` belongs to all of them.
 
-    `value` is None where nothing was measured, `limit` where none was set, `uncertainty` (expanded, k = 2) where the
-    value has none. The `guard` is that uncertainty where the decision rule is the guard band (ILAC-G8, 4.2).
+    `value` is None where nothing was measured, `limit` where none was set, `uncertainty` where the value has none. It
+    is the expanded one, by `coverage_factor` and so many degrees of `freedom`. The `guard` is that uncertainty where
+    the decision rule is the guard band (ILAC-G8, 4.2).
     """
 
     name: str
@@ -32,6 +35,8 @@ class Check:
     unit: str
     uncertainty: float | None = None
     guard: float = 0.0
+    coverage_factor: float = COVERAGE_FACTOR
+    freedom: float = math.inf
 
     @property
     def passed(self) -> bool:
@@ -45,7 +50,16 @@ class Check:
         """The probability that what passed is beyond the limit all the same; None where nothing passed."""
         if self.value is None or self.limit is None or not self.uncertainty or not self.passed:
             return None
-        return 0.5 * math.erfc((self.limit - self.value) * COVERAGE_FACTOR / self.uncertainty / math.sqrt(2))
+        return float(beyond((self.limit - self.value) * self.coverage_factor / self.uncertainty, self.freedom))
+
+
+@dataclass(frozen=True, slots=True)
+class Spread:
+    """Expanded uncertainties (3,) with their coverage factors and degrees of freedom, (3,) each."""
+
+    expanded: Array
+    factors: Array
+    freedom: Array
 
 
 def judge(
@@ -83,6 +97,15 @@ def verification_checks(sensor: str, verification: Verification | None, limits: 
     )
 
 
+def clock_checks(clock: ClockCheck) -> tuple[Check, ...]:
+    """Whether the clocks of a run agree: every two of them, or what is stated of them, to within what both may err."""
+    return tuple(
+        Check(f"clocks_agree.{one}_and_{other}", each.size / PPM, each.limit / PPM, "ppm")
+        for each in clock.differences()
+        for one, other in [each.clocks]
+    )
+
+
 def acceleration_checks(
     sensor: str, result: AccelerometerResult, limits: Limits, rule: DecisionRule = "simple"
 ) -> tuple[Check, ...]:
@@ -92,7 +115,7 @@ def acceleration_checks(
     """
     std = np.sqrt(np.diag(result.covariance)) if result.budget is None else result.budget.std
     of = f"{sensor}.acceleration"
-    scale, bias = COVERAGE_FACTOR * std[:3], COVERAGE_FACTOR * std[3:]
+    scale, bias = (_twice(std[:3]), _twice(std[3:])) if result.budget is None else _spreads(result.budget)
     found = [
         _held(f"{of}_scale_deviation", (result.scale - 1, scale), limits.acceleration_scale_deviation, "1", rule),
         Check(f"{of}_scale_std", _largest(std[:3]), limits.acceleration_scale_std, "1"),
@@ -117,8 +140,8 @@ def drift_checks(
     for quantity, drift in drifts.items():
         name, limit, unit = allowed[quantity]
         held = drift.held
-        expanded = COVERAGE_FACTOR * held.largest_change_std
-        found.append(_held(f"{sensor}.{name}", (held.largest_change, expanded), limit, unit, rule))
+        spread = _twice(held.largest_change_std)
+        found.append(_held(f"{sensor}.{name}", (held.largest_change, spread), limit, unit, rule))
     return tuple(found)
 
 
@@ -131,7 +154,7 @@ def _checks(
     sensor: str, solution: Estimate, limits: Limits, budget: Budget | None, rule: DecisionRule
 ) -> tuple[Check, ...]:
     std = np.sqrt(np.diag(solution.covariance)) if budget is None else budget.std
-    scale, bias = (None, None) if budget is None else (budget.expanded[:3], budget.expanded[3:])
+    scale, bias = (None, None) if budget is None else _spreads(budget)
     return (
         _held(f"{sensor}.scale_deviation", (solution.scale - 1, scale), limits.scale_deviation, "1", rule),
         Check(f"{sensor}.scale_std", _largest(std[:3]), limits.scale_std, "1"),
@@ -141,15 +164,28 @@ def _checks(
     )
 
 
-def _held(name: str, found: tuple[Array, Array | None], limit: float | None, unit: str, rule: DecisionRule) -> Check:
+def _spreads(budget: Budget) -> tuple[Spread, Spread]:
+    """Of scale factors and of biases; twice a standard uncertainty is taken for a normal distribution's."""
+    freedom = budget.freedom if budget.by_freedom else np.full(6, np.inf)
+    of = budget.expanded, budget.coverage_factors, freedom
+    return Spread(*(each[:3] for each in of)), Spread(*(each[3:] for each in of))
+
+
+def _twice(std: Array) -> Spread:
+    """Of what has no budget."""
+    return Spread(COVERAGE_FACTOR * std, np.full(3, COVERAGE_FACTOR), np.full(3, np.inf))
+
+
+def _held(name: str, found: tuple[Array, Spread | None], limit: float | None, unit: str, rule: DecisionRule) -> Check:
     """Of values (3,) and their uncertainties that which comes nearest to its limit, and what the rule makes of it."""
-    values, uncertainties = found
+    values, spread = found
     largest = _largest(values)
-    if uncertainties is None or largest is None:
+    if spread is None or largest is None:
         return Check(name, largest, limit, unit)
-    guards = uncertainties * (rule == "guard_band")
+    guards = spread.expanded * (rule == "guard_band")
     worst = int(np.argmax(np.abs(values) + guards))
-    return Check(name, abs(float(values[worst])), limit, unit, float(uncertainties[worst]), float(guards[worst]))
+    of_the_worst = (float(each[worst]) for each in (spread.expanded, guards, spread.factors, spread.freedom))
+    return Check(name, abs(float(values[worst])), limit, unit, *of_the_worst)
 
 
 def _largest(values: np.ndarray) -> float | None:

@@ -95,7 +95,9 @@ class SiteSection(Section):
         description="the country it is in, for digital certificates",
         json_schema_extra={"allowed": "two capital letters (ISO 3166-1)"},
     )
-    place: Words | None = Field(default=None, description="where the arm stands, if not at that address: site, room")
+    place: Words | None = Field(
+        default=None, description="where the arm stands: site, room; left out, a certificate does not state it"
+    )
     time_reference: Words | None = Field(
         default=None,
         description="what disciplines this computer's clock, such as `NTP, ptbtime1.ptb.de`; without it a certificate "
@@ -207,7 +209,11 @@ class UncertaintySection(Section):
         "Nubiola and Bonev, 2012)",
     )
     sensor_offset_mm: float = Field(
-        default=50.0, ge=0, le=1000, description="how far from the flange's axes the sensor sits, either way"
+        default=50.0,
+        ge=0,
+        le=1000,
+        description="how far the sensor sits from the flange's centre, or from the end of `arm.extension_mm`, along "
+        "each axis, either way",
     )
     acceleration_lag_ms: float = Field(
         default=5.0,

@@ -11,7 +11,8 @@ RATE_TOLERANCE = 2e-4  # relative: 333.33 stands for 1000/3, and the closest two
 class Part:
     """One kind of sensor: `rates_hz` and `ranges_deg_s` are all its gyroscope can do, `rates_rule` says rates in words.
 
-    `g_sensitivity_deg_s_g` is how much a reading may change for 1 g, at most. `ranges_g` are those of its
+    `g_sensitivity_deg_s_g` is how much a reading may change for 1 g, at most, `nonlinearity` how far it may be from a
+    straight line, as a share of full scale. `ranges_g` are those of its
     accelerometer, which shares its data rate, the usual one first; `acceleration_noise_ug_sqrt_hz` is the noise density
     of that, in µg/√Hz. A part with a port of its own stands beside the board, with a clock of its own.
     """
@@ -22,6 +23,7 @@ class Part:
     default_rate_hz: float
     default_range_deg_s: float
     g_sensitivity_deg_s_g: float
+    nonlinearity: float
     ranges_g: tuple[float, ...]
     acceleration_noise_ug_sqrt_hz: float
     own_port: bool = False
@@ -79,6 +81,7 @@ PARTS: Mapping[str, Part] = MappingProxyType(
             default_rate_hz=238,
             default_range_deg_s=245,
             g_sensitivity_deg_s_g=0.1,  # not stated; that of the MPU-6050, a part of the same kind, PS-MPU-6000A 6.1
+            nonlinearity=0.001,  # not stated; that of the MPU-9250
             ranges_g=(2, 4, 8, 16),
             acceleration_noise_ug_sqrt_hz=150,  # not stated; assumed
         ),
@@ -89,6 +92,7 @@ PARTS: Mapping[str, Part] = MappingProxyType(
             default_rate_hz=200,
             default_range_deg_s=250,
             g_sensitivity_deg_s_g=0.1,  # not stated; that of the MPU-6050, PS-MPU-6000A 6.1
+            nonlinearity=0.001,  # PS-MPU-9250A-01, table 1
             ranges_g=(2, 4, 8, 16),
             acceleration_noise_ug_sqrt_hz=300,  # PS-MPU-9250A-01, section 3.2
         ),
@@ -99,6 +103,7 @@ PARTS: Mapping[str, Part] = MappingProxyType(
             default_rate_hz=200,
             default_range_deg_s=500,
             g_sensitivity_deg_s_g=0.015,  # as the datasheet of the ADIS16445 states
+            nonlinearity=0.002,  # assumed: the data sheet of the part has it, not looked up
             ranges_g=(8,),
             acceleration_noise_ug_sqrt_hz=23,  # assumed: the data sheet of the part has it, not looked up
         ),
@@ -109,6 +114,7 @@ PARTS: Mapping[str, Part] = MappingProxyType(
             default_rate_hz=1000,
             default_range_deg_s=490,
             g_sensitivity_deg_s_g=0.0003,  # not stated; assumed: 1 °/h/g, light does not feel force
+            nonlinearity=5e-5,  # assumed: 50 ppm, as of a scale factor of light
             ranges_g=(10, 25),
             acceleration_noise_ug_sqrt_hz=119,  # TRIAX, table 1: 0.0701 m/s/√h
             own_port=True,

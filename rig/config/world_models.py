@@ -177,8 +177,9 @@ class SimulatedBoardSection(Section):
         description="the microcontroller's own number",
         json_schema_extra={"allowed": "24 hexadecimal digits, small letters"},
     )
+    crystal: bool = Field(default=True, description="whether its 32768 Hz crystal swings, which its clock then follows")
     crystal_ppm: float = Field(
-        default=35.0,
+        default=12.0,
         ge=-25_000,
         le=25_000,
         description="how much too fast its clock runs; without its crystal up to 2 % off",
@@ -292,7 +293,9 @@ class SimulatedSensorSection(Section):
         json_schema_extra={"unit": "rad/s/g", "allowed": "3 rows of 3 numbers, each -0.1 to 0.1"},
     )
     offset_mm: Vector3 = Field(
-        default=NO_ROW, description="where it sits, x y z from the flange's centre in the flange's frame"
+        default=NO_ROW,
+        description="where it sits, x y z from the flange's centre in the flange's frame; left out, at the end of "
+        "`arm.extension_mm`",
     )
     nonlinearity_even_per_rad_s: float = Field(
         default=0.0,

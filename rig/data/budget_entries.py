@@ -1,11 +1,13 @@
 """The uncertainty's part of `result.json`."""
 
+import math
 from collections.abc import Sequence
 from typing import Annotated, Literal
 
 from pydantic import Field
 
 from rig.data.result_types import Entry, Vector6
+from rig.estimation.coverage import COVERAGE_FACTOR, covered
 
 # Infinite degrees of freedom are null.
 Freedom6 = Annotated[tuple[float | None, ...], Field(min_length=6, max_length=6)]
@@ -30,20 +32,42 @@ class ContributorEntry(Entry):
 
 
 class BudgetEntry(Entry):
-    """What makes up `covariance_combined`; `expanded` is `coverage_factor` × `std`."""
+    """What makes up `covariance_combined`; `expanded` is `coverage_factors` × `std`.
+
+    These are Student's t of the effective degrees of `freedom`, so that each interval holds the true value with its
+    part of `coverage_probabilities`. `coverage_factor` is the largest of them: in results of before all are that one,
+    and it alone stands there.
+    """
 
     contributors: tuple[ContributorEntry, ...]
     std: Vector6
     coverage_factor: float
     expanded: Vector6
     freedom: Freedom6
+    coverage_factors: Vector6 | None = None
+    coverage_probabilities: Vector6 | None = None
+
+    @property
+    def factors(self) -> tuple[float, ...]:
+        """k of each."""
+        return self.coverage_factors or (self.coverage_factor,) * 6
+
+    @property
+    def known(self) -> tuple[float, ...]:
+        """Effective degrees of freedom of each, infinite ones too."""
+        return tuple(math.inf if each is None else each for each in self.freedom)
+
+    @property
+    def probabilities(self) -> tuple[float, ...]:
+        """With which each U covers the true value: of results of before by Student's t as well."""
+        return self.coverage_probabilities or tuple(covered(self.factors, self.known).tolist())
 
 
 def expanded_uncertainties(budget: BudgetEntry | None, covariance: Sequence[Sequence[float]]) -> Sequence[float]:
     """(6,) of scale and bias: U of the budget; without one, two standard deviations by the solution's covariance."""
     if budget is not None:
         return budget.expanded
-    return [2 * covariance[i][i] ** 0.5 for i in range(len(covariance))]
+    return [COVERAGE_FACTOR * covariance[i][i] ** 0.5 for i in range(len(covariance))]
 
 
 class BiasProcessEntry(Entry):

@@ -31,7 +31,8 @@ class Provenance:
     the arm's geometry that was reckoned with; older recordings do not say (None): that was the nominal one.
     `tcp_offset` is where the controller's tool centre point stood in the flange's frame, which nothing is reckoned
     with; None where it was not told. `arm_maker` and `arm_model` are those of the arm that was found; older recordings
-    do not say (None): any arm was taken for a UR10e. Files of schema "rig.run/1" do not name the script; that was an
+    do not say (None): any arm was taken for a UR10e. `board_follows_crystal` is the board's own word on its clock, None
+    where there is no board and in older recordings. Files of schema "rig.run/1" do not name the script; that was an
     installed one.
     """
 
@@ -53,6 +54,7 @@ class Provenance:
     tcp_offset: Pose | None = None
     arm_maker: str | None = None
     arm_model: str | None = None
+    board_follows_crystal: bool | None = None
 
     @property
     def kinematics(self) -> DenavitHartenberg:
@@ -69,9 +71,8 @@ class Provenance:
         stored = {name: entry.model_dump(mode="json") for name, entry in self.stored_calibrations.items()}
         document = {**asdict(self), "stored_calibrations": stored}
         unknown = {"script", "script_sha256", "script_installed"} if self.script_sha256 is None else set()
-        unknown |= {
-            name for name in ("arm_kinematics", "tcp_offset", "arm_maker", "arm_model") if document[name] is None
-        }
+        optional = ("arm_kinematics", "tcp_offset", "arm_maker", "arm_model", "board_follows_crystal")
+        unknown |= {name for name in optional if document[name] is None}
         return {key: value for key, value in document.items() if key not in unknown}
 
 
@@ -83,6 +84,7 @@ def provenance_of(
     script: ScriptIdentity,
     *,
     script_installed: bool,
+    follows_crystal: bool | None,
 ) -> Provenance:
     """That of a recording which begins now; `stored` as in `Provenance`. Raises Refused as `used_kinematics` does."""
     return Provenance(
@@ -106,4 +108,5 @@ def provenance_of(
         tcp_offset=arm.tcp_offset,
         arm_maker=MAKER,
         arm_model=model_found(arm),
+        board_follows_crystal=follows_crystal,
     )

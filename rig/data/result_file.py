@@ -28,8 +28,9 @@ SIZE_MAX_BYTES = 16_000_000  # a run of six sweeps with its verification has 66,
 class CheckEntry(Entry):
     """One limit of the verdict; `value` is null where nothing was measured, `limit` where none was set.
 
-    Where the value has an expanded uncertainty: `uncertainty`, by how much the `decision_rule` has it stay below the
-    limit (`guard`), and the probability that it is accepted although it is beyond the limit.
+    Where the value has an expanded uncertainty: `uncertainty` and its `coverage_factor` (results of before do not say
+    it: 2), by how much the `decision_rule` has it stay below the limit (`guard`), and the probability that it is
+    accepted although it is beyond the limit.
     """
 
     name: str
@@ -40,6 +41,7 @@ class CheckEntry(Entry):
     uncertainty: float | None = None
     guard: float = 0.0
     false_acceptance: float | None = None
+    coverage_factor: float | None = None
 
 
 class StoredCalibrationEntry(Entry):
@@ -91,6 +93,7 @@ class ProvenanceEntry(Entry):
     tcp_offset: Vector6 | None = None
     arm_maker: str | None = None
     arm_model: str | None = None
+    board_follows_crystal: bool | None = None
 
 
 class EstimateEntry(Entry):
@@ -107,7 +110,10 @@ class EstimateEntry(Entry):
 
 
 class VectorEntry(Entry):
-    """The vector model's solution: the six parameters, and how the three axes lie to each other and to the flange."""
+    """The vector model's solution: the six parameters, and how the three axes lie to each other and to the flange.
+
+    `residuals_std_rad_s` is what the solve expects each residual to scatter by; results of before do not say it.
+    """
 
     model: str
     estimator: str
@@ -130,6 +136,7 @@ class VectorEntry(Entry):
     g_sensitivity_std_rad_s_per_m_s2: Matrix3 | None = None
     residuals_rad_s: tuple[Vector3, ...]
     warnings: tuple[str, ...]
+    residuals_std_rad_s: tuple[Vector3, ...] | None = None
 
 
 class NonlinearityEntry(Entry):
@@ -270,7 +277,10 @@ class DeviationEntry(Entry):
 
 
 class RevolutionErrorEntry(Entry):
-    """Mean reading less mean reference over one revolution; `gravity_rad_s` is what of it gravity adds, if known."""
+    """Mean reading less mean reference over one revolution; `gravity_rad_s` is what of it gravity adds, if known.
+
+    With gravity the flange's circling, which is felt as gravity is.
+    """
 
     sweep: int
     joint: str

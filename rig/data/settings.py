@@ -173,6 +173,26 @@ class RunSettings:
     reckoning: Annotated[int, Field(ge=1, le=RECKONING)] = 1
 
     @property
+    def checked_by_model(self) -> bool:
+        """Whether a recording is held against itself by what is known of arm and sensor, not one tolerance."""
+        return self.reckoning >= 2
+
+    @property
+    def knows_own_motion(self) -> bool:
+        """Whether a gyroscope is taken to feel what the arm's turning makes of its place as it feels gravity."""
+        return self.reckoning >= 2
+
+    @property
+    def counts_freedom(self) -> bool:
+        """Whether U has the coverage factor of its degrees of freedom; in results of before it is twice u."""
+        return self.reckoning >= 2
+
+    @property
+    def holds_every_clock(self) -> bool:
+        """Whether a clock counts however far off it is, and what contradicts fails a check."""
+        return self.reckoning >= 2
+
+    @property
     def movement(self) -> tuple[object, ...]:
         """What two recordings must have in common for their sweeps and dwells to be those of one run."""
         return self.procedure, self.then_verify, self.home_q_rad, self.planned_sweeps, self.planned_dwells

@@ -74,13 +74,18 @@ def expected_bias_process(
 
 
 def likeliest_bias_process(
-    design: ArrayLike, means_rad_s: ArrayLike, variances_rad2_s2: ArrayLike, windows_s: ArrayLike
+    design: ArrayLike,
+    means_rad_s: ArrayLike,
+    variances_rad2_s2: ArrayLike,
+    windows_s: ArrayLike,
+    shared_rad2_s2: Array | None = None,
 ) -> BiasProcess:
     """The same with the likeliest sizes, zero where they do not make the averages likelier by Akaike's price.
 
     It holds no walk where noise alone would do: what is held against it is not excused by what is not there.
+    `shared_rad2_s2` (3, N, N) are covariances of what the averages have in common beside their noise.
     """
-    return _bias_process(design, means_rad_s, variances_rad2_s2, windows_s, _likeliest)
+    return _bias_process(design, means_rad_s, variances_rad2_s2, windows_s, _likeliest, shared=shared_rad2_s2)
 
 
 def _bias_process(
@@ -89,6 +94,8 @@ def _bias_process(
     variances_rad2_s2: ArrayLike,
     windows_s: ArrayLike,
     chosen: Callable[[Array, Array], Array],
+    *,
+    shared: Array | None = None,
 ) -> BiasProcess:
     z, means, variances = (np.asarray(a, dtype=np.float64) for a in (design, means_rad_s, variances_rad2_s2))
     freedom = 3 * (len(z) - z.shape[1])
@@ -103,7 +110,10 @@ def _bias_process(
     squares = np.array([(walk, scatter) for walk in walks for scatter in grid])
     likelihood = np.zeros(len(squares))
     for axis in range(3):
-        noise = np.diag(variances[:, axis]) + _added(squares[:, :1, None], squares[:, 1:, None], unit)
+        own = np.diag(variances[:, axis])
+        noise = (own if shared is None else own + shared[axis]) + _added(
+            squares[:, :1, None], squares[:, 1:, None], unit
+        )
         likelihood += _restricted_likelihood(z, means[:, axis], noise)
     walk, scatter = chosen(np.sqrt(squares), likelihood).tolist()
     return BiasProcess(walk, scatter, freedom)

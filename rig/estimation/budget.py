@@ -6,17 +6,18 @@ uncertainty is the half-width over √3.
 """
 
 from collections.abc import Iterator
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Literal
 
 import numpy as np
 
 from rig.estimation.arrays import Array
+from rig.estimation.coverage import COVERAGE_FACTOR, coverage_factors, effective_freedom
 from rig.estimation.earth import EARTH_RATE_RAD_S, STANDARD_GRAVITY_M_S2
 from rig.estimation.explained import Explained, Seen
 
+CLOCK = "controller clock"
 NOT_GIVEN = "is not given"  # ends the source of what is assumed because the configuration does not say it
-COVERAGE_FACTOR = 2.0
 
 
 @dataclass(frozen=True, slots=True)
@@ -46,9 +47,13 @@ class Contributor:
 
 @dataclass(frozen=True, slots=True)
 class Budget:
-    """All contributors; independent of each other."""
+    """All contributors; independent of each other.
+
+    `by_freedom` says that U has the coverage factor of its degrees of freedom; it is 2 u for recordings of before.
+    """
 
     contributors: tuple[Contributor, ...]
+    by_freedom: bool = True
 
     @property
     def covariance(self) -> Array:
@@ -68,18 +73,21 @@ class Budget:
         return std
 
     @property
+    def coverage_factors(self) -> Array:
+        """(6,) k of each."""
+        return coverage_factors(self.freedom) if self.by_freedom else np.full(6, COVERAGE_FACTOR)
+
+    @property
     def expanded(self) -> Array:
-        """(6,) expanded uncertainties U, k = 2."""
-        expanded: Array = COVERAGE_FACTOR * self.std
+        """(6,) expanded uncertainties U = k u."""
+        expanded: Array = self.coverage_factors * self.std
         return expanded
 
     @property
     def freedom(self) -> Array:
         """(6,) effective degrees of freedom (Welch–Satterthwaite, JCGM 100, G.4); infinite where all is known."""
-        parts = np.array([each.std**4 / each.freedom for each in self.contributors]).sum(axis=0)
-        with np.errstate(divide="ignore"):
-            freedom: Array = self.std**4 / parts
-        return freedom
+        variances = np.array([each.std**2 for each in self.contributors])
+        return effective_freedom(variances, np.array([[each.freedom] for each in self.contributors]))
 
     @property
     def shares(self) -> Array:
@@ -92,9 +100,11 @@ class Budget:
 class Unknown:
     """What no recording shows: half-widths, but for `clock_std` and `state_jitter_s`, which are standard uncertainties.
 
-    `clock_std` is a fraction, `clock_source` says how it is known; `axis_rad` is the direction of each swept axis,
+    `clock_std` is a fraction, `clock_source` says how it is known, `clock_half_width` is there where it is that of any
+    such clock; `axis_rad` is the direction of each swept axis,
     `earth_rate` whether the Earth's rate is among the unknown, `earth_covariance_rad2_s2` (3, 3), in the base's frame,
-    how well it was found where it was.
+    how well it was found where it was. `…_freedom` are the degrees of freedom of what was found from readings,
+    `counts_freedom` says whether they make the coverage factor.
     """
 
     clock_std: float
@@ -105,11 +115,23 @@ class Unknown:
     g_sensitivity_rad_s_per_g: float
     earth_rate: bool
     earth_covariance_rad2_s2: Array | None = None
+    clock_freedom: float = np.inf
+    clock_half_width: float | None = None
+    state_jitter_freedom: float = np.inf
+    earth_freedom: float = np.inf
+    counts_freedom: bool = True
+
+
+def uncounted(unknown: Unknown) -> Unknown:
+    """As recordings of before are reckoned: U is 2 u, and nobody counts by how many readings a scatter is known."""
+    return replace(
+        unknown, clock_freedom=np.inf, state_jitter_freedom=np.inf, earth_freedom=np.inf, counts_freedom=False
+    )
 
 
 def budget(explained: Explained, unknown: Unknown) -> Budget:
     """The budget of one sensor's vector solution."""
-    return Budget(tuple(_contributors(explained, unknown)))
+    return Budget(tuple(_contributors(explained, unknown)), unknown.counts_freedom)
 
 
 def _contributors(explained: Explained, unknown: Unknown) -> Iterator[Contributor]:
@@ -131,21 +153,28 @@ def _contributors(explained: Explained, unknown: Unknown) -> Iterator[Contributo
         return Contributor(name, "A", "normal", None, "", source, freedom, covariance)
 
     walk = _of_walk(explained)
-    yield found("noise", "scatter of the readings", solution.covariance - walk)
+    yield found("noise", "scatter of the readings", solution.covariance - walk, _noise_freedom(explained))
     if not explained.bias.steady:
         source = "scatter of rests and sweeps about each other"
         yield found("bias instability", source, walk, float(explained.bias.freedom))
     turned = seen.turns_rad_s @ matrix.T
-    yield found("controller clock", unknown.clock_source, of(unknown.clock_std * turned[None]))
+    wide, said = unknown.clock_half_width, unknown.clock_source
+    if wide is None:
+        timed = found(CLOCK, said, of(unknown.clock_std * turned[None]), unknown.clock_freedom)
+        yield timed if np.isfinite(timed.freedom) else replace(timed, kind="B")  # of what is stated of clocks alone
+    else:
+        yield assumed(CLOCK, 1e6 * wide, "ppm", said, wide * turned[None])
     jitter = np.sqrt(2) * unknown.state_jitter_s / np.diff(seen.windows_s).T[0]
     each_turn = np.eye(len(turned))[:, :, None] * (jitter[:, None] * turned)[None]
-    yield found("times of the arm's states", "scatter of the joint angles", of(each_turn))
+    source = "scatter of the joint angles"
+    yield found("times of the arm's states", source, of(each_turn), unknown.state_jitter_freedom)
     tilted = _tilted(seen, unknown.axis_rad) if seen.axis_errors_rad_s is None else np.sqrt(3) * seen.axis_errors_rad_s
     yield assumed("arm's axes", float(np.degrees(unknown.axis_rad)), "°", "uncertainty.axis_deg", tilted @ matrix.T)
     if unknown.earth_covariance_rad2_s2 is not None:
         size, way = np.linalg.eigh(unknown.earth_covariance_rad2_s2)
         spread = seen.attitudes @ (way * np.sqrt(size.clip(min=0.0)))  # of each way the rate found may be off
-        yield found("Earth's rate", "found from sweeps and rests", of(np.moveaxis(spread, -1, 0) @ matrix.T))
+        source, patterns = "found from sweeps and rests", np.moveaxis(spread, -1, 0) @ matrix.T
+        yield found("Earth's rate", source, of(patterns), unknown.earth_freedom)
     elif unknown.earth_rate:
         along = EARTH_RATE_RAD_S * np.moveaxis(seen.attitudes, -1, 0) @ matrix.T  # for each axis of the base
         yield assumed("Earth's rate", EARTH_RATE_RAD_S, "rad/s", f"site.latitude_deg {NOT_GIVEN}", along)
@@ -158,7 +187,7 @@ def _contributors(explained: Explained, unknown: Unknown) -> Iterator[Contributo
             float(np.degrees(unknown.g_sensitivity_rad_s_per_g)),
             "°/s/g",
             "what is known of the part; rests at more attitudes would tell it",
-            np.array([seen.gravity_m_s2 @ each.T for each in any_sensitivity]),
+            np.array([seen.pull_m_s2 @ each.T for each in any_sensitivity]),
         )
     outwards = np.array([seen.centripetal_m_s2(offset) for offset in unknown.sensor_offset_m * np.eye(3)])
     felt = any_sensitivity if sensitivity is None else [sensitivity]
@@ -169,6 +198,14 @@ def _contributors(explained: Explained, unknown: Unknown) -> Iterator[Contributo
         "uncertainty.sensor_offset_mm",
         np.concatenate([outwards @ each.T for each in felt]),
     )
+
+
+def _noise_freedom(explained: Explained) -> float:
+    """Of scale and bias the fewest, from those of the readings' variances (JCGM 100, G.4.1)."""
+    variances = explained.solution.response**2 * explained.seen.variances_rad2_s2
+    freedom = np.broadcast_to(explained.seen.noise_freedom, variances.shape)
+    parts, counted = (each.reshape(len(variances), -1).T for each in (variances, freedom))
+    return float(effective_freedom(parts, counted).min())
 
 
 def _of_walk(explained: Explained) -> Array:

@@ -63,7 +63,8 @@ class EarthRate:
     """The Earth's rate as found: `rate_rad_s` (3,) in the frame of the arm's base, `covariance_rad2_s2` (3, 3).
 
     `up` (3,) is upwards there; `vertical` says whether the vertical part was found or held to a known latitude.
-    `scatter` is the ratio of residuals to what was expected of them; above 1 it has widened the covariance.
+    `scatter` is the ratio of residuals to what was expected of them, of so many degrees of `freedom`; above 1 it has
+    widened the covariance.
     """
 
     rate_rad_s: Array
@@ -71,6 +72,7 @@ class EarthRate:
     up: Array
     vertical_held: bool
     scatter: float
+    freedom: float = np.inf
 
     @property
     def norm_rad_s(self) -> float:
@@ -135,15 +137,18 @@ def find_earth_rate(seen: Seen, nominal_mounting: Array, known: Known) -> EarthR
         directions = _across(known.up)
     gravity = seen.gravity_m_s2 if known.g_sensitivity else None
     _check_told(seen, directions, gravity)
-    fit = _fit(replace(seen, earth_rate_rad_s=held), nominal_mounting, directions, gravity, known)
+    pull = None if gravity is None else seen.pull_m_s2
+    fit = _fit(replace(seen, earth_rate_rad_s=held), nominal_mounting, directions, pull, known)
     free, covariance = _of_the_earth(fit, len(directions))
-    scatter = _scatter(fit, len(directions))
+    freedom = 3 * (fit.solution.observations - (4 if gravity is None else 7)) - len(directions)
+    scatter = _scatter(fit, freedom)
     found = EarthRate(
         rate_rad_s=held + free @ directions,
         covariance_rad2_s2=directions.T @ covariance @ directions * max(1.0, scatter) ** 2,
         up=known.up,
         vertical_held=len(directions) < 3,
         scatter=scatter,
+        freedom=max(freedom, 1),
     )
     expected = float(np.sqrt(EARTH_RATE_RAD_S**2 - held @ held))
     what = "its level part" if found.vertical_held else "it"
@@ -191,10 +196,8 @@ def _of_the_earth(fit: _Fit, directions: int) -> tuple[Array, Array]:
     return FREE_RAD_S * sizes, FREE_RAD_S**2 * covariance
 
 
-def _scatter(fit: _Fit, directions: int) -> float:
+def _scatter(fit: _Fit, freedom: int) -> float:
     """Residuals over their expected standard deviations, as an RMS; what the arm's errors take up is not counted."""
-    columns = 4 if fit.solution.g_sensitivity is None else 7
-    freedom = 3 * (fit.solution.observations - columns) - directions
     squares = float(np.sum(fit.solution.residuals_rad_s**2 / fit.expected_rad2_s2))
     return float(np.sqrt(squares / freedom)) if freedom > 0 else 1.0
 

@@ -1,7 +1,8 @@
 """The vector model with all that a recording tells beside the sweeps: gravity, the Earth's rate, a bias that wanders.
 
 Gravity stands still in the room and turns in the flange's frame, so attitudes tell what of a reading is sensitivity
-to it; at rest the sensor reads bias, Earth and gravity alone. Sweeps about more than three axes tell the angles between
+to it; at rest the sensor reads bias, Earth and gravity alone. In a sweep the flange circles about the swept axis, which
+a sensor feels as it feels gravity, and the arm knows both. Sweeps about more than three axes tell the angles between
 the sensor's axes from those between the arm's, sweeps at several speeds how nonlinear the sensor is. None of this is
 assumed: what sweeps and rests do not tell apart stays out of the model and belongs into the uncertainty.
 """
@@ -16,7 +17,7 @@ from rig.estimation.arrays import Array
 from rig.estimation.bias_process import BiasProcess, expected_bias_process
 from rig.estimation.common_errors import CommonErrors, solve_with_common_errors
 from rig.estimation.nonlinearity import Nonlinearity, curvature, distinct_speeds, nonlinearity
-from rig.estimation.vector_model import VectorSolution, design_matrix, of_the_speed
+from rig.estimation.vector_model import VectorSolution, check_told, design_matrix, of_the_speed
 
 UNTOLD = ("rank_deficient", "ill_conditioned", "too_few_observations")  # what more columns than sweeps bear ends in
 
@@ -30,7 +31,9 @@ class Seen:
     `attitudes` (N, 3, 3) from the base into the flange; `gravity_m_s2` (N, 3) downwards, in the flange's frame;
     `windows_s` (N, 2) on the clock of the first recording; `joints` (N) which of the arm's joints turned, None for a
     rest; `axis_errors_rad_s` (P, N, 3) how far the turns would be off for one standard uncertainty of each of the arm's
-    own angles, as far as it is known.
+    own angles, as far as it is known; `arms_m` (N, 3) a way from the axis that turns to where the sensor is taken to
+    sit, in the flange's frame, None where its own motion is left out. `noise_freedom` (N, 3): with how many degrees of
+    freedom the variances are known.
     """
 
     means_rad_s: Array
@@ -43,6 +46,8 @@ class Seen:
     windows_s: Array
     joints: tuple[str | None, ...]
     axis_errors_rad_s: Array | None = None
+    arms_m: Array | None = None
+    noise_freedom: Array | float = np.inf
 
     @property
     def speeds_rad_s(self) -> tuple[float, ...]:
@@ -56,10 +61,20 @@ class Seen:
         rates: Array = self.turns_rad_s + self.attitudes @ self.earth_rate_rad_s
         return rates
 
-    def centripetal_m_s2(self, offset_m: Array) -> Array:
-        """(N, 3) acceleration at `offset_m` (3,) from the flange while it turns, in the flange's frame."""
-        outwards: Array = np.cross(self.turns_rad_s, np.cross(self.turns_rad_s, offset_m))
-        return outwards
+    @property
+    def acceleration_m_s2(self) -> Array:
+        """(N, 3) of where the sensor is taken to sit, in the flange's frame."""
+        return np.zeros(self.turns_rad_s.shape) if self.arms_m is None else self.centripetal_m_s2(self.arms_m)
+
+    @property
+    def pull_m_s2(self) -> Array:
+        """(N, 3) what is felt as gravity, in the flange's frame: gravity less the acceleration."""
+        pull: Array = self.gravity_m_s2 - self.acceleration_m_s2
+        return pull
+
+    def centripetal_m_s2(self, way_m: Array) -> Array:
+        """(N, 3) acceleration at `way_m` (3,) or (N, 3) from the axis that turns, in the flange's frame."""
+        return centripetal_m_s2(self.turns_rad_s, way_m)
 
 
 @dataclass(frozen=True, slots=True)
@@ -75,13 +90,22 @@ class Explained:
     nonlinearity: Nonlinearity | None
 
 
+def centripetal_m_s2(turns_rad_s: Array, way_m: Array) -> Array:
+    """(…, 3) ω × (ω × p) of points that are `way_m` (…, 3) away from the axis of `turns_rad_s` (…, 3)."""
+    inwards: Array = np.cross(turns_rad_s, np.cross(turns_rad_s, way_m))
+    return inwards
+
+
 def explain(seen: Seen, nominal_mounting: Array) -> Explained:
     """Scale, bias and mounting, with gravity's share where the attitudes tell it.
 
     Raises Fault as the vector model does.
     """
     try:
-        return _explain(seen, nominal_mounting, seen.gravity_m_s2)
+        found = _explain(seen, nominal_mounting, seen.pull_m_s2)
+        # By the attitudes alone: circles that are a fiftieth of gravity would tell it, worse than it is known anyway.
+        check_told(seen.rates_rad_s, seen.gravity_m_s2)
+        return found
     except Fault as fault:
         if fault.name not in UNTOLD:
             raise
@@ -97,7 +121,8 @@ def solver(
 ) -> Callable[[Array | None], tuple[VectorSolution, CommonErrors]]:
     """The vector model of what was seen, as a function of the covariance (N, N) its means share, if any.
 
-    `effects` are those of `solve_with_common_errors`, `gravity_m_s2` is None where no sensitivity to it is to be found.
+    `effects` are those of `solve_with_common_errors`, `gravity_m_s2` is what is felt as gravity, None where no
+    sensitivity to it is to be found.
     """
 
     def solve(shared: Array | None) -> tuple[VectorSolution, CommonErrors]:

@@ -13,7 +13,8 @@ import numpy as np
 
 from rig.estimation.arrays import Array
 from rig.estimation.attitude_error import AttitudeError, effects, whitening_with
-from rig.estimation.budget import COVERAGE_FACTOR, Budget, Contributor
+from rig.estimation.budget import Budget, Contributor
+from rig.estimation.coverage import COVERAGE_FACTOR, effective_freedom
 from rig.estimation.reference_model import BIAS, F, covariance_bound, jacobian
 from rig.estimation.sensor_axes import parameter_jacobian
 
@@ -26,6 +27,8 @@ class Spread:
     - `noise` (n, n): covariance of the readings' own.
     - `attitude_error`: how far the attitudes are off.
     - `chi_square` of what the model leaves, and its `freedom`.
+    - `noise_freedom` (n,): with how many degrees of freedom the readings' variances are known; None for recordings of
+      before, of which nobody counts them and U is 2 u.
     """
 
     scale: Array
@@ -35,6 +38,15 @@ class Spread:
     attitude_error: AttitudeError
     chi_square: float
     freedom: int
+    noise_freedom: Array | None = None
+
+    @property
+    def known_noise(self) -> float:
+        """Degrees of freedom of the noise's part in scale and bias, the fewest of the six."""
+        if self.noise_freedom is None:
+            return np.inf
+        parts = (self.response**2 * np.diag(self.noise)).T
+        return float(effective_freedom(parts, self.noise_freedom[:, None]).min())
 
     def of(self, patterns: Array) -> Array:
         """(6, 6) of independent patterns (k, n) of errors in the readings, each of one standard uncertainty."""
@@ -89,7 +101,7 @@ def reference_budget(spread: Spread, size: KnownSize, others: Sequence[Contribut
     """What the readings tell, how well the reference's size is known, and what else there is."""
     noise = spread.response @ spread.noise @ spread.response.T
     told = [
-        _found("noise", "scatter of the readings", noise),
+        _found("noise", "scatter of the readings", noise, spread.known_noise),
         _found(
             "arm's attitudes",
             "what the readings say of them",
@@ -103,7 +115,7 @@ def reference_budget(spread: Spread, size: KnownSize, others: Sequence[Contribut
         told.append(
             _found("what the model leaves", "residuals beside noise and attitudes", left, float(spread.freedom))
         )
-    return Budget((*told, _of_size(spread.scale, size), *others))
+    return Budget((*told, _of_size(spread.scale, size), *others), by_freedom=spread.noise_freedom is not None)
 
 
 def assumed(name: str, half_width: float, unit: str, source: str, covariance: Array) -> Contributor:

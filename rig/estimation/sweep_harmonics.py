@@ -32,14 +32,16 @@ PADDED = 16  # finer than a turn's own frequencies
 class FirstHarmonic:
     """`harmonic_m_s2` (3, 3): mean, cosine, sine (rows) of the axes x y z; `covariance_m2_s4` (9, 9), row by row.
 
-    `speed_rad_s`: 2π over the time of a turn, negative where the angle falls. `noise_m_s2` (3,) of one sample,
-    `residuals_m_s2` (n, 3) of all. `vibration_m_s2` (3,) is the RMS of what was taken out as the servo's or a swing.
+    `speed_rad_s`: 2π over the time of a turn, negative where the angle falls. `noise_m_s2` (3,) of one sample, by so
+    many degrees of `freedom`; `residuals_m_s2` (n, 3) are samples less what was fitted. `vibration_m_s2` (3,) is the
+    RMS of what was taken out as the servo's or a swing.
     """
 
     harmonic_m_s2: Array
     covariance_m2_s4: Array
     speed_rad_s: float
     noise_m_s2: Array
+    freedom: int
     residuals_m_s2: Array
     vibration_m_s2: Array
 
@@ -84,6 +86,7 @@ def first_harmonic(
         covariance_m2_s4=np.asarray(np.kron(gain @ gain.T, left), dtype=np.float64),
         speed_rad_s=mean_speed,
         noise_m_s2=np.sqrt(np.diag(scatter)),
+        freedom=count - int(unknown),
         residuals_m_s2=residuals,
         vibration_m_s2=np.sqrt(np.mean(shaking**2, axis=0)),
     )

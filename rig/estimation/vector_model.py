@@ -20,6 +20,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from rig.estimation.arrays import Array
 from rig.estimation.refusals import (
+    Conditioning,
     check_axes,
     check_conditioning,
     check_count,
@@ -99,9 +100,9 @@ def solve_vector_model(
 
     `means_rad_s`, `variances_rad2_s2` (N, 3): mean readings and the variances of these means; `rates_rad_s` (N, 3):
     the mean rate in the flange frame, zero for a rest; `speed_std_rad_s` (N,): how well its size is known;
-    `gravity_m_s2` (N, 3): mean gravity in the flange frame; `nominal_mounting` (3, 3): flange to sensor, to be held to;
-    `shared_covariance_rad2_s2` (N, N): of what the observations have in common beside their own variances, as a bias
-    that wanders, alike and independent for the three axes.
+    `gravity_m_s2` (N, 3): the mean of what is felt as gravity, in the flange frame; `nominal_mounting` (3, 3): flange
+    to sensor, to be held to; `shared_covariance_rad2_s2` (N, N): of what the observations have in common beside their
+    own variances, as a bias that wanders, alike and independent for the three axes.
 
     Raises Fault `too_few_observations`, `not_finite`, `bad_variance`, `zero_reading`, `duplicated_observation`,
     `rank_deficient`, `ill_conditioned`, `wrong_unit`, `mirrored_axis`, `swapped_axes`, `wrong_mounting`.
@@ -121,8 +122,7 @@ def solve_vector_model(
     check_signal(means[moving])
     check_duplicates(means[moving])
     scaled = design / _unit(design)
-    told = conditioning(scaled, columns)
-    check_conditioning(told, columns, MAX_CONDITION, "axis, bias or g-sensitivity", REMEDY)
+    told = _check_told(scaled)
     found = conditioning(scaled[:, :4], 4) if columns > 4 else told
 
     speed_noise = np.zeros_like(means)
@@ -175,6 +175,22 @@ def solve_vector_batch(means_rad_s: ArrayLike, rates_rad_s: ArrayLike, variances
     coefficients, _ = regress(design_matrix(rates, None), means, variances)
     matrix = np.swapaxes(coefficients[..., :3, :], -1, -2)
     return VectorBatch(1 / np.linalg.norm(matrix, axis=-1), -coefficients[..., 3, :], matrix)
+
+
+def check_told(rates: Array, gravity: Array | None) -> None:
+    """Whether rates and gravity (N, 3) tell axes, bias and sensitivity to gravity from each other.
+
+    Raises Fault `rank_deficient`, `ill_conditioned`.
+    """
+    design = design_matrix(rates, gravity)
+    _check_told(design / _unit(design))
+
+
+def _check_told(scaled: Array) -> Conditioning:
+    columns = scaled.shape[1]
+    told = conditioning(scaled, columns)
+    check_conditioning(told, columns, MAX_CONDITION, "axis, bias or g-sensitivity", REMEDY)
+    return told
 
 
 def design_matrix(rates: Array, gravity: Array | None) -> Array:

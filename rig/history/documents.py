@@ -7,6 +7,7 @@ from typing import Any
 
 import numpy as np
 
+from rig.estimation.coverage import COVERAGE_FACTOR
 from rig.history.parameters import Parameter
 from rig.history.series import YEAR_DAYS, Change, RigState, Subject, Trend
 from rig.history.statistics.charts import Chart
@@ -40,6 +41,7 @@ COLUMNS = (
     "std_combined",
     "unit",
     "max_deviation",
+    "coverage_factor",
 )
 
 
@@ -177,6 +179,7 @@ def _parameter(parameter: Parameter) -> dict[str, Any]:
         "std_combined": parameter.std_combined,
         "unit": parameter.unit,
         "max_deviation": parameter.max_deviation,
+        "coverage_factor": parameter.coverage_factor or COVERAGE_FACTOR,
     }
 
 

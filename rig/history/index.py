@@ -71,7 +71,7 @@ def _differences(stated: Calibrated, found: Calibrated) -> Iterator[str]:
 def _otherwise(stated: Parameter, found: Parameter) -> Iterator[str]:
     if not abs(stated.value - found.value) <= SAME * stated.std:
         yield f"{stated.name} {found.value:.9g}, stated {stated.value:.9g},"
-    for name in ("std_statistical", "std_combined", "max_deviation"):
+    for name in ("std_statistical", "std_combined", "max_deviation", "coverage_factor"):
         if not _close(getattr(stated, name), getattr(found, name)):
             yield f"{name} {getattr(found, name)} of {stated.name}, stated {getattr(stated, name)},"
     if stated.unit != found.unit:

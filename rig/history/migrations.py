@@ -30,13 +30,31 @@ def migrate_2_to_3(connection: Connection) -> None:
 
 def migrate_3_to_4(connection: Connection) -> None:
     """Rows are kept as they are: by triggers, and by a journal that begins with what is there."""
+    _add_coverage_factor(connection)  # the journal reads rows as they are today
     schema.document.create(connection)
     schema.journal.create(connection)
     journal.note_all(connection)
     create_triggers(connection)
 
 
-MIGRATIONS: Mapping[int, Callable[[Connection], None]] = {1: migrate_1_to_2, 2: migrate_2_to_3, 3: migrate_3_to_4}
+def migrate_4_to_5(connection: Connection) -> None:
+    """U has a coverage factor by its degrees of freedom: of results before it is 2."""
+    _add_coverage_factor(connection)
+
+
+def _add_coverage_factor(connection: Connection) -> None:
+    """Unless an earlier step has."""
+    columns = {column["name"] for column in inspect(connection).get_columns(schema.parameter.name)}
+    if "coverage_factor" not in columns:
+        connection.execute(text("ALTER TABLE parameter ADD COLUMN coverage_factor FLOAT"))
+
+
+MIGRATIONS: Mapping[int, Callable[[Connection], None]] = {
+    1: migrate_1_to_2,
+    2: migrate_2_to_3,
+    3: migrate_3_to_4,
+    4: migrate_4_to_5,
+}
 
 
 def version_of(connection: Connection, label: str) -> int:

@@ -16,9 +16,9 @@ from rig.data.magnetometer_entries import MagnetometerEntry
 from rig.data.result_file import ResultDocument, SensorEntry, VectorEntry
 from rig.data.result_types import ErrorEntry
 from rig.estimation.arrays import Array
+from rig.estimation.coverage import COVERAGE_FACTOR
 
 Quantity = Literal["rate", "acceleration", "field"]
-COVERAGE_FACTOR = 2.0
 BIAS_UNITS: dict[Quantity, str] = {"rate": "rad/s", "acceleration": "m/s²", "field": "T"}
 CHECKED_AS = {  # the checks whose limits hold for scale and bias
     "rate": ("scale_deviation", "bias"),
@@ -33,7 +33,8 @@ ORDER = ("k", "kx", "ky", "kz", "bx", "by", "bz", *ANGLES, *(f"g{row}{column}" f
 class Parameter:
     """One number of a calibration. `std_combined` is None where no more than noise is known of its uncertainty.
 
-    `max_deviation` from the nominal value is what the run's limits allowed, None without one.
+    `max_deviation` from the nominal value is what the run's limits allowed, None without one. `coverage_factor` is that
+    of U by its degrees of freedom, None where it is 2.
     """
 
     name: str
@@ -42,6 +43,7 @@ class Parameter:
     std_combined: float | None
     unit: str
     max_deviation: float | None = None
+    coverage_factor: float | None = None
 
     @property
     def std(self) -> float:
@@ -50,8 +52,8 @@ class Parameter:
 
     @property
     def expanded(self) -> float:
-        """U with k = 2."""
-        return COVERAGE_FACTOR * self.std
+        """U as the result states it."""
+        return (self.coverage_factor or COVERAGE_FACTOR) * self.std
 
     @property
     def nominal(self) -> float:
@@ -96,7 +98,7 @@ def calibrated(document: ResultDocument) -> tuple[Calibrated, ...]:
 def _gyroscope(name: str, entry: SensorEntry, document: ResultDocument) -> Calibrated:
     values = (*entry.scale, *entry.bias_rad_s)
     limits = _limits(name, "rate", document)
-    parameters = list(_scale_and_bias(values, entry.covariance, entry.covariance_combined, "rate", limits))
+    parameters = list(_scale_and_bias(values, entry, "rate", limits))
     if isinstance(entry.vector_model, VectorEntry):
         vector = entry.vector_model
         stds = vector.non_orthogonality_std_rad
@@ -122,7 +124,7 @@ def _accelerometer(name: str, entry: AccelerometerEntry, document: ResultDocumen
     values = (*entry.scale, *entry.bias_m_s2)
     limits = _limits(name, "acceleration", document)
     parameters = [
-        *_scale_and_bias(values, entry.covariance, entry.covariance_combined, "acceleration", limits),
+        *_scale_and_bias(values, entry, "acceleration", limits),
         *_angles(entry.non_orthogonality_rad, entry.non_orthogonality_std_rad),
     ]
     return Calibrated(
@@ -140,7 +142,7 @@ def _accelerometer(name: str, entry: AccelerometerEntry, document: ResultDocumen
 def _magnetometer(name: str, entry: MagnetometerEntry) -> Calibrated:
     values = (*entry.scale, *entry.bias_t)
     parameters = [
-        *_scale_and_bias(values, entry.covariance, entry.covariance_combined, "field", (None, None)),
+        *_scale_and_bias(values, entry, "field", (None, None)),
         *_angles(entry.non_orthogonality_rad, entry.non_orthogonality_std_rad),
     ]
     return Calibrated(
@@ -157,13 +159,14 @@ def _magnetometer(name: str, entry: MagnetometerEntry) -> Calibrated:
 
 def _scale_and_bias(
     values: Sequence[float],
-    covariance: Sequence[Sequence[float]],
-    combined: Sequence[Sequence[float]] | None,
+    entry: SensorEntry | AccelerometerEntry | MagnetometerEntry,
     quantity: Quantity,
     limits: tuple[float | None, float | None],
 ) -> Iterator[Parameter]:
-    """Of the six parameters, and the mean scale factor with the scale factors' covariance."""
+    """Of the six parameters, and the mean scale factor by their covariance, with the largest k of theirs."""
     mean = np.array([1 / 3, 1 / 3, 1 / 3, 0, 0, 0])
+    combined = entry.covariance_combined
+    factors = np.full(6, COVERAGE_FACTOR) if entry.budget is None else np.array(entry.budget.factors)
     rows: list[tuple[str, Array, str, float | None]] = [("k", mean, "1", None)]
     rows += [(f"k{axis}", np.eye(6)[i], "1", limits[0]) for i, axis in enumerate("xyz")]
     rows += [(f"b{axis}", np.eye(6)[3 + i], BIAS_UNITS[quantity], limits[1]) for i, axis in enumerate("xyz")]
@@ -171,10 +174,11 @@ def _scale_and_bias(
         yield Parameter(
             name,
             float(row @ np.array(values)),
-            _std(row, covariance),
+            _std(row, entry.covariance),
             None if combined is None else _std(row, combined),
             unit,
             limit,
+            None if (factor := float(factors[row > 0].max())) == COVERAGE_FACTOR else factor,
         )
 
 

@@ -39,7 +39,7 @@ def draw_trends(found: Mapping[Subject, Mapping[str, Trend]], folder: Path) -> l
                 row, column = 2 * (i // 3), i % 3
                 _draw_values(rows[row, column], trend)
                 _draw_chart(rows[row + 1, column], trend)
-            figure.suptitle(f"{title_of(subject)}; bars are U (k = 2), the band holds the line with 95 %")
+            figure.suptitle(f"{title_of(subject)}; bars are U, the band holds the line with 95 %")
             for axes in rows[-1]:
                 axes.tick_params(axis="x", rotation=30)
             save(figure, folder, name)

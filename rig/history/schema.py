@@ -18,7 +18,7 @@ from sqlalchemy import (
     UniqueConstraint,
 )
 
-VERSION = 4
+VERSION = 5
 HASH, TIME, NAME, NOTE = 64, 40, 400, 1000  # longest texts of their kind
 
 metadata = MetaData()
@@ -96,6 +96,7 @@ parameter = Table(
     Column("std_combined", Float),  # null where no more than noise is known
     Column("unit", String(40), nullable=False),
     Column("max_deviation", Float),  # from the nominal value, by the limits of that run
+    Column("coverage_factor", Float),  # of U; since version 5, null where it is 2
 )
 
 # Since version 2. A wrong entry is not taken away: it is said that it is wrong, and why.

@@ -12,7 +12,7 @@ from rig.analysis.calibration import SensorResult
 from rig.analysis.comparison import Comparison
 from rig.errors import Fault, Refused
 from rig.estimation.arrays import Array
-from rig.estimation.budget import COVERAGE_FACTOR
+from rig.estimation.coverage import COVERAGE_FACTOR
 from rig.observation.windows import Window
 from rig.report.figures import draw_comparison
 

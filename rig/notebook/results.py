@@ -11,6 +11,7 @@ from rig.analysis.outcome import Outcome
 from rig.analysis.verdict import Check
 from rig.data.settings import setting
 from rig.estimation.arrays import Array
+from rig.estimation.coverage import COVERAGE_FACTOR
 from rig.notebook.html import table
 from rig.notebook.runs import NoSuchSensor, Run
 from rig.plans.recorded import judged
@@ -53,8 +54,9 @@ class Calibration:
         return estimate_entry(self.found.solution).model_dump(mode="json")
 
     def rows(self) -> list[tuple[str, ...]]:
-        """Axis, scale factor and bias with twice their standard deviations, in words."""
-        expanded = 2 * self.std
+        """Axis, scale factor and bias with U, or with twice their standard deviations where no more is known."""
+        budget = self.found.uncertainty
+        expanded = COVERAGE_FACTOR * self.std if budget is None else budget.expanded
         return [
             (
                 f"{self.name} {axis}",
@@ -77,7 +79,7 @@ class Calibration:
         return table(f"{self.found.sensor.part} {self.found.serial_number}", HEADINGS, self.rows())
 
 
-HEADINGS = ("axis", "scale factor", "± U (k = 2)", "bias rad/s", "± U rad/s")
+HEADINGS = ("axis", "scale factor", "± U (about 95 %)", "bias rad/s", "± U rad/s")
 
 
 @dataclass(frozen=True, eq=False)

@@ -8,8 +8,8 @@ from numpy.typing import NDArray
 
 from rig.data.run_file import RecordedSensor
 from rig.estimation.arrays import Array
-from rig.observation.colour import noise_left, widening
-from rig.observation.tapered import flank_s, noise_at_zero, vibrates, weights
+from rig.observation.colour import Left, left_of, widening
+from rig.observation.tapered import flank_s, freedom_at_zero, noise_at_zero, vibrates, weights
 from rig.observation.timebase import ArmMotion, TimeBase, estimate_time_base
 from rig.observation.windows import Window
 
@@ -20,7 +20,8 @@ class Average:
 
     The variance of a revolution or a rest also holds the drift of the bias from rest to rest, `drift_rad2_s2` (3,).
     `start_s`, `end_s`: between which times, on the controller's clock. `attitude` (3, 3) is the mean rotation from the
-    arm's base frame into the flange's, None where no arm tells it.
+    arm's base frame into the flange's, None where no arm tells it. `freedom` (3,): with how many degrees of freedom the
+    noise's part of the variance is known, infinite where nobody counted.
     """
 
     mean_rad_s: Array
@@ -32,6 +33,7 @@ class Average:
     temperature_c: float
     attitude: Array | None = None
     drift_rad2_s2: Array | float = 0.0
+    freedom: Array | float = np.inf
 
     @property
     def duration_s(self) -> float:
@@ -47,12 +49,16 @@ class Average:
 
 @dataclass(frozen=True, slots=True)
 class Mean:
-    """Of readings in any unit: mean (3,), variance (3,) of that mean, `noise` (3,) of one, and how many there were."""
+    """Of readings in any unit: mean (3,), variance (3,) of that mean, `noise` (3,) of one, and how many there were.
+
+    `freedom` (3,) are the variance's degrees of freedom: fewer than samples where these are not independent.
+    """
 
     mean: Array
     variance: Array
     noise: Array
     samples: int
+    freedom: Array | float = np.inf
 
 
 @dataclass(frozen=True, slots=True)
@@ -123,6 +129,7 @@ def _averaged(stream: Stream, inside: slice, window: Window, found: Mean) -> Ave
         start_s=window.start_s,
         end_s=window.end_s,
         temperature_c=stream.temperature_c(inside),
+        freedom=found.freedom,
     )
 
 
@@ -142,15 +149,20 @@ def mean_of(readings: Array, count: float, passing: Array, covered: NDArray[np.b
     residual = known - columns @ coefficients
     scatter = np.sum(residual**2, axis=0) / (len(known) - rank)
     variance = np.maximum(scatter, count**2 / 12)
-    coloured = widening if as_before else noise_left
-    factor = np.array([coloured(residual[:, axis]) for axis in range(3)])
+    left = [_left_as_before(each) if as_before else left_of(each) for each in residual.T]
+    factor = np.array([each.factor for each in left])
     of_the_mean = np.linalg.pinv(columns.T @ columns, hermitian=True)[0, 0]  # 1/n where the excess averages out
     return Mean(
         mean=coefficients[0],
         variance=variance * factor * of_the_mean + rounding_left(variance, count),
         noise=np.sqrt(variance),
         samples=len(known),
+        freedom=np.array([each.freedom for each in left]),
     )
+
+
+def _left_as_before(residuals: Array) -> Left:
+    return Left(widening(residuals), np.inf)
 
 
 def mean_at_rest(
@@ -183,6 +195,7 @@ def tapered_mean(readings: Array, time_s: Array, window: Window, count: float) -
         variance=at_zero * float(shares @ shares) + rounding_left(variance, count),
         noise=np.sqrt(variance),
         samples=len(readings),
+        freedom=np.full(3, freedom_at_zero(len(readings))),
     )
 
 

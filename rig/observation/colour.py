@@ -1,5 +1,7 @@
 """How far the mean of residuals scatters that are not white: neighbours alike average out worse, vibration better."""
 
+from dataclasses import dataclass
+
 import numpy as np
 
 from rig.estimation.arrays import Array
@@ -8,6 +10,14 @@ LAGS = 20
 WHITE = 45.3  # χ² of 20 degrees of freedom at 0.999
 MEMORIES = (1, 2, 4, 8, 16, 32)  # residuals that tell something of the next; 32: a whole wave of 7 Hz at 238 a second
 SAMPLES_EACH = 12  # are needed to find one coefficient
+
+
+@dataclass(frozen=True, slots=True)
+class Left:
+    """What a mean of residuals scatters by: the `factor` on its variance, and with how many degrees of freedom."""
+
+    factor: float
+    freedom: float
 
 
 def widening(residuals: Array) -> float:
@@ -26,22 +36,40 @@ def noise_left(residuals: Array) -> float:
     mean is the spectrum at zero: of an autoregression with coefficients a and innovations e, var(e) / (1 − Σ a)². Its
     memory is the one that Akaike's criterion asks for.
     """
+    return left_of(residuals).factor
+
+
+def left_of(residuals: Array) -> Left:
+    """The factor of `noise_left`, and the degrees of freedom of the variance it makes.
+
+    White residuals have one less than there are. Of others twice the inverse of the spectrum's relative variance (JCGM
+    100, G.4.2): 2/n of the innovations, 4 var(Σ a) / (1 − Σ a)² of the coefficients.
+    """
     if _correlations(residuals) is None:
-        return 1.0
+        return Left(1.0, max(len(residuals) - 1.0, 1.0))
     centred = residuals - residuals.mean()
     memories = [memory for memory in MEMORIES if memory * SAMPLES_EACH <= len(centred)]
-    _, spectrum_at_zero = min(_autoregression(centred, memory, memories[-1]) for memory in memories)
-    return spectrum_at_zero / float(np.mean(centred**2))
+    _, spectrum_at_zero, memory = min(_autoregression(centred, memory, memories[-1]) for memory in memories)
+    return Left(spectrum_at_zero / float(np.mean(centred**2)), _freedom(centred, memory))
 
 
-def _autoregression(centred: Array, memory: int, longest: int) -> tuple[float, float]:
-    """Akaike's criterion and the spectrum at zero, by as many residuals as with the `longest` memory."""
+def _freedom(centred: Array, memory: int) -> float:
+    before = np.lib.stride_tricks.sliding_window_view(centred[:-1], memory)
+    coefficients, innovations = predicted(centred, memory)
+    count, damped = len(innovations), 1 - float(coefficients.sum())
+    information = np.linalg.pinv(before.T @ before, hermitian=True)
+    of_the_sum = float(innovations @ innovations) / (count - memory) * float(information.sum())
+    return max(2 / (2 / count + 4 * of_the_sum / damped**2), 1.0) if damped else 1.0
+
+
+def _autoregression(centred: Array, memory: int, longest: int) -> tuple[float, float, int]:
+    """Akaike's criterion and the spectrum at zero, by as many residuals as with the `longest` memory; this one."""
     coefficients, innovations = predicted(centred[longest - memory :], memory)
     count, power = len(innovations), float(innovations @ innovations)
     likelihood = count * float(np.log(power / count)) if power else -np.inf
     criterion = likelihood + 2 * memory
     damped = (1 - float(coefficients.sum())) ** 2
-    return criterion, power / (count - memory) / damped if damped else np.inf  # what never returns has no mean
+    return criterion, power / (count - memory) / damped if damped else np.inf, memory  # what never returns has no mean
 
 
 def predicted(residuals: Array, memory: int) -> tuple[Array, Array]:

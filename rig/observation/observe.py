@@ -12,7 +12,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from rig.arm.kinematics import axis_errors
+from rig.arm.kinematics import axis_errors, flange_arm
 from rig.arm.motion import Sweep
 from rig.data.run_file import RunData
 from rig.data.settings import ObservationThresholds
@@ -42,9 +42,10 @@ class Observation:
     What turned the sensor is not known (None) of data recorded elsewhere.
     `axis` ("x", "y", "z") and `sign` name the sensor axis nominally along the turn; `axis_flange` (3,) is the unit
     vector of the turn in the flange frame by the measured joints, `axis_errors` (13, 3) how the arm's own errors change
-    it, per radian (`rig.arm.kinematics.AXIS_ERRORS`); `speed_std_rad_s` comes from arm states too far apart to tell the
-    turn's ends exactly; `lost` samples are missing from the average. `acceleration` is what the accelerometer beside it
-    read, where one is to be calibrated.
+    it, per radian (`rig.arm.kinematics.AXIS_ERRORS`); `arm_m` (3,) is a way from the joint's axis to the flange's
+    origin, in the flange's frame. `speed_std_rad_s` comes from arm states too far apart to tell the turn's ends
+    exactly; `lost` samples are missing from the average. `acceleration` is what the accelerometer beside it read, where
+    one is to be calibrated.
     """
 
     sweep: int
@@ -58,6 +59,7 @@ class Observation:
     lost: int
     average: Average
     axis_errors: Array | None = None
+    arm_m: Array | None = None
     acceleration: SweptAcceleration | None = None
 
 
@@ -216,6 +218,7 @@ def _observation(
     _check_direction(turned, expected, where, settings)
     check_reading_ratio(float(np.linalg.norm(turned)) / turn.speed_rad_s, where)
     axis, sign = nearest_axis(expected)
+    began = motion.angles(turn.start_s)
     return Observation(
         sweep=sweep.index,
         joint_name=sweep.joint_name,
@@ -227,8 +230,8 @@ def _observation(
         speed_std_rad_s=turn.speed_std_rad_s,
         lost=lost,
         average=averaged,
-        axis_errors=(1 if sweep.direction == "ccw" else -1)
-        * axis_errors(motion.angles(turn.start_s), sweep.joint, motion.kinematics),
+        axis_errors=(1 if sweep.direction == "ccw" else -1) * axis_errors(began, sweep.joint, motion.kinematics),
+        arm_m=flange_arm(began, sweep.joint, motion.kinematics),
     )
 
 

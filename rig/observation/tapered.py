@@ -16,6 +16,7 @@ FLANK_SHARE = 0.125  # of the window, at most
 PREVAILS = 0.5  # of the residuals' variance, what is left in a long mean where the rest of them is a vibration
 BLACKMAN_HARRIS = (0.35875, -0.48829, 0.14128, -0.01168)  # Harris 1978, table 1: side lobes below −92 dB
 MAIN_LOBE = 4  # bins to either side
+NOISE_BINS = 2.0  # that neighbouring bins have in common: the window's equivalent noise bandwidth, table 1
 LOW = 0.1  # of the data rate: frequencies at which the noise is as at zero, but for where the arm vibrates
 FEWEST_BINS = 16
 
@@ -43,13 +44,25 @@ def noise_at_zero(readings: Array) -> Array:
 
     The median over low frequencies, which lines do not move, over that of χ² of two degrees of freedom.
     """
-    count = len(readings)
-    phase = 2 * np.pi * (np.arange(count) + 0.5) / count
-    window: Array = np.cos(np.outer(phase, np.arange(len(BLACKMAN_HARRIS)))) @ np.array(BLACKMAN_HARRIS)
-    shaped = window[:, None] * (readings - readings.mean(axis=0))
-    powers = np.abs(np.fft.rfft(shaped, axis=0)[MAIN_LOBE : _highest(count)]) ** 2 / np.sum(window**2)
+    powers = np.abs(np.fft.rfft(shaped(readings), axis=0)[MAIN_LOBE : _highest(len(readings))]) ** 2
     found: Array = np.median(powers, axis=0) / np.log(2)
     return found
+
+
+def shaped(readings: Array) -> Array:
+    """Readings (n, 3) less their mean under Blackman and Harris' window, of which the squares add up to 1."""
+    phase = 2 * np.pi * (np.arange(len(readings)) + 0.5) / len(readings)
+    window: Array = np.cos(np.outer(phase, np.arange(len(BLACKMAN_HARRIS)))) @ np.array(BLACKMAN_HARRIS)
+    under: Array = window[:, None] / np.sqrt(np.sum(window**2)) * (readings - readings.mean(axis=0))
+    return under
+
+
+def freedom_at_zero(count: int) -> float:
+    """Degrees of freedom of `noise_at_zero` by so many readings: those of the median of m independent powers.
+
+    Its relative variance is 1 / (m ln² 2), and ν is two over that (JCGM 100, G.4.2).
+    """
+    return float(2 * np.log(2) ** 2 * (_highest(count) - MAIN_LOBE) / NOISE_BINS)
 
 
 def _highest(count: int) -> int:

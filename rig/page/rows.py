@@ -1,16 +1,17 @@
 """Rows of the page's tables: observations and parameters, of a run that goes on and of one with its result."""
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
 
 from rig.analysis.so_far import SoFar
-from rig.data.result_file import ResultDocument
+from rig.data.accelerometer_entries import AccelerometerEntry
+from rig.data.budget_entries import expanded_uncertainties
+from rig.data.result_file import ResultDocument, SensorEntry
 from rig.errors import Fault
-from rig.estimation.arrays import Array
-from rig.estimation.budget import COVERAGE_FACTOR
+from rig.estimation.coverage import COVERAGE_FACTOR
 from rig.estimation.vector_model import VectorSolution
 from rig.observation.acceleration import DwellReading
 from rig.observation.observe import Observation, nearest_axis
@@ -81,17 +82,18 @@ def look_of(found: Mapping[str, SoFar]) -> Look:
 
 
 def parameter_rows(result: ResultDocument) -> list[Row]:
-    """Of a run's result: gyroscopes, then accelerometers; U is k = 2 of what the result states, noise where no more."""
+    """Of a run's result: gyroscopes, then accelerometers; U is what the result states, or twice its noise."""
     rows = []
     for name, sensor in result.sensors.items():
-        combined = sensor.covariance_combined
-        std = np.sqrt(np.diag(combined or sensor.covariance))
-        rows.append(_row(name, "rad/s", sensor.scale, sensor.bias_rad_s, std, of=COMBINED if combined else NOISE_ONLY))
+        rows.append(_stated(name, "rad/s", sensor.scale, sensor.bias_rad_s, sensor))
     for name, found in result.accelerometers.items():
-        of = COMBINED if found.covariance_combined else NOISE_ONLY
-        std = np.sqrt(np.diag(found.covariance_combined or found.covariance))
-        rows.append(_row(accelerometer(name), "m/s²", found.scale, found.bias_m_s2, std, of=of))
+        rows.append(_stated(accelerometer(name), "m/s²", found.scale, found.bias_m_s2, found))
     return rows
+
+
+def _stated(name: str, unit: str, scale: Any, bias: Any, found: SensorEntry | AccelerometerEntry) -> Row:
+    expanded = expanded_uncertainties(found.budget, found.covariance)
+    return _row(name, unit, scale, bias, expanded, of=NOISE_ONLY if found.budget is None else COMBINED)
 
 
 def _sweep(sensor: str, sweep: int, found: Observation | Fault) -> Row:
@@ -109,8 +111,8 @@ def _dwell(sensor: str, index: int, found: DwellReading | Fault, gravity_m_s2: f
 def _parameters_so_far(name: str, found: SoFar) -> Row:
     solution = found.solution
     if isinstance(solution, VectorSolution):
-        std = np.sqrt(np.diag(solution.covariance))
-        return _row(name, "rad/s", solution.scale, solution.bias_rad_s, std, of=NOISE_ONLY)
+        expanded = (COVERAGE_FACTOR * np.sqrt(np.diag(solution.covariance))).tolist()
+        return _row(name, "rad/s", solution.scale, solution.bias_rad_s, expanded, of=NOISE_ONLY)
     row = {"sensor": name, "unit": "rad/s", "scale": None, "scale_u": None, "of": NOISE_ONLY, "missing": solution.what}
     if found.bias_rad_s is None:
         return {**row, "bias": None, "bias_u": None}
@@ -118,8 +120,7 @@ def _parameters_so_far(name: str, found: SoFar) -> Row:
     return {**row, "bias": rounded(tuple(bias.tolist())), "bias_u": rounded(tuple((COVERAGE_FACTOR * std).tolist()))}
 
 
-def _row(name: str, unit: str, scale: Any, bias: Any, std: Array, *, of: str) -> Row:
-    expanded = (COVERAGE_FACTOR * std).tolist()
+def _row(name: str, unit: str, scale: Any, bias: Any, expanded: Sequence[float], *, of: str) -> Row:
     return {
         "sensor": name,
         "unit": unit,

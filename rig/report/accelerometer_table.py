@@ -9,15 +9,16 @@ from rig.data.accelerometer_entries import AccelerometerEntry
 from rig.data.budget_entries import expanded_uncertainties
 from rig.data.result_types import ErrorEntry
 from rig.report.axes import axes_table, triple
-from rig.report.budget_table import assumed_lines
+from rig.report.budget_table import assumed_lines, expanded_heading
 
 
 def accelerometer_table(name: str, found: AccelerometerEntry) -> Table:
-    """Scale and bias of each axis, ± U (k = 2)."""
+    """Scale and bias of each axis, ± U."""
     model = "a = F s + b" if found.second_order_s2_m is None else "a = F (s + φ s²) + b"
     title = f"{name}, accelerometer: {found.part} {found.serial_number}, {model}, {found.estimator}"
     expanded = expanded_uncertainties(found.budget, found.covariance)
-    return axes_table(title, found.scale, found.bias_m_s2, expanded, unit="m/s²", digits=5)
+    heading = expanded_heading(found.budget)
+    return axes_table(title, found.scale, found.bias_m_s2, expanded, heading=heading, unit="m/s²", digits=5)
 
 
 def accelerometer_lines(found: AccelerometerEntry) -> Iterator[str]:

@@ -26,13 +26,14 @@ def axes_table(
     bias: Sequence[float],
     expanded: Sequence[float],
     *,
+    heading: str,
     unit: str,
     digits: int,
 ) -> Table:
-    """Scale factor and bias of each axis, ± twice their standard uncertainties (6,); bias and its own in `unit`."""
+    """Scale factor and bias of each axis, ± their expanded uncertainties (6,), which are headed so; bias in `unit`."""
     table = Table(title=plain(title, "table.title"), title_justify="left")
-    for heading in ("axis", "scale factor", "± U (k = 2)", f"bias {unit}", f"± U {unit}"):
-        table.add_column(heading, justify="left" if heading == "axis" else "right")
+    for each in ("axis", "scale factor", heading, f"bias {unit}", f"± U {unit}"):
+        table.add_column(each, justify="left" if each == "axis" else "right")
     for i, axis in enumerate("xyz"):
         table.add_row(
             axis, f"{scale[i]:.6f}", f"{expanded[i]:.6f}", f"{bias[i]:+.{digits}f}", f"{expanded[3 + i]:.{digits}f}"

@@ -10,7 +10,8 @@ from rig.data.budget_entries import (
     ClockEntry,
     ContributorEntry,
 )
-from rig.estimation.budget import COVERAGE_FACTOR, Budget
+from rig.estimation.budget import Budget
+from rig.estimation.coverage import covered
 from rig.estimation.explained import Explained
 from rig.report.entry import entry
 
@@ -23,8 +24,15 @@ def budget_entry(found: Budget) -> BudgetEntry:
         entry(ContributorEntry, each, share=share, freedom=_finite(each.freedom))
         for each, share in zip(found.contributors, found.shares, strict=True)
     ]
-    freedom = [_finite(each) for each in found.freedom.tolist()]
-    return entry(BudgetEntry, found, contributors=lines, coverage_factor=COVERAGE_FACTOR, freedom=freedom)
+    factors = found.coverage_factors
+    return entry(
+        BudgetEntry,
+        found,
+        contributors=lines,
+        coverage_factor=float(factors.max()),
+        freedom=[_finite(each) for each in found.freedom.tolist()],
+        coverage_probabilities=covered(factors, found.freedom),
+    )
 
 
 def bias_process_entry(explained: Explained) -> BiasProcessEntry:

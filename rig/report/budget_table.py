@@ -1,14 +1,31 @@
 """The uncertainty budget as a person reads it in the terminal."""
 
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 
 from rich.table import Table
 
 from rig.data.budget_entries import BudgetEntry
 from rig.estimation.budget import NOT_GIVEN
+from rig.estimation.coverage import COVERAGE_FACTOR
 from rig.station.plain_text import plain
 
 NEGLIGIBLE = 0.001  # of every variance: such lines are in result.json alone
+
+
+def expanded_heading(budget: BudgetEntry | None) -> str:
+    """Of a column of U: with its coverage factor, or with the largest where they differ as they are printed."""
+    factors = _printed((COVERAGE_FACTOR,) if budget is None else budget.factors)
+    return f"± U (k {'=' if len(factors) == 1 else '≤'} {factors[-1]:g})"
+
+
+def _times(factors: Sequence[float]) -> str:
+    printed = _printed(factors)
+    return f"{printed[0]:g} ×" if len(printed) == 1 else f"{printed[0]:.2f} to {printed[-1]:.2f} ×"
+
+
+def _printed(factors: Sequence[float]) -> list[float]:
+    """The different ones, rounded, the smallest first."""
+    return sorted({round(each, 2) for each in factors})
 
 
 def assumed_lines(budget: BudgetEntry | None) -> Iterator[str]:
@@ -23,7 +40,7 @@ def budget_table(budget: BudgetEntry, unit: str = "rad/s", per_unit: float = 1.0
 
     That of the biases times `per_unit`, in `unit`.
     """
-    coverage = f"U = {budget.coverage_factor:g} × the combined standard uncertainty, about 95 %"
+    coverage = f"U = {_times(budget.factors)} the combined standard uncertainty, about 95 %"
     table = Table(title="uncertainty budget", title_justify="left", caption=coverage, caption_justify="left")
     for heading in ("contributor", "type", "scale u", "share", f"bias u {unit}", "share"):
         table.add_column(heading, justify="left" if heading in ("contributor", "type") else "right")

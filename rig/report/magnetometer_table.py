@@ -9,19 +9,20 @@ from rig.data.budget_entries import expanded_uncertainties
 from rig.data.magnetometer_entries import MagnetometerEntry
 from rig.data.result_types import ErrorEntry
 from rig.report.axes import axes_table, triple
-from rig.report.budget_table import assumed_lines
+from rig.report.budget_table import assumed_lines, expanded_heading
 
 MICROTESLA = 1e6
 FAR_ENOUGH_M = 0.3  # from the flange: a housing of 0.2 A m² is 0.4 to 1.2 µT at 20 to 40 cm
 
 
 def magnetometer_table(name: str, found: MagnetometerEntry) -> Table:
-    """Scale and bias of each axis, ± U (k = 2)."""
+    """Scale and bias of each axis, ± U."""
     title = f"{name}, magnetometer as mounted: {found.part} {found.serial_number}, {found.model}, {found.estimator}"
     per_unit = np.array([1, 1, 1, MICROTESLA, MICROTESLA, MICROTESLA])
     expanded = (expanded_uncertainties(found.budget, found.covariance) * per_unit).tolist()
     bias = (MICROTESLA * np.array(found.bias_t)).tolist()
-    return axes_table(title, found.scale, bias, expanded, unit="µT", digits=3)
+    heading = expanded_heading(found.budget)
+    return axes_table(title, found.scale, bias, expanded, heading=heading, unit="µT", digits=3)
 
 
 def magnetometer_lines(found: MagnetometerEntry) -> Iterator[str]:

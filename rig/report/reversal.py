@@ -8,6 +8,7 @@ from rich.console import Console
 from rig.analysis.reversal import AsMounted, MagnetometerReversal
 from rig.data.magnetometer_entries import AsMountedEntry, ReversalDocument, ReversalEntry
 from rig.report.axes import axes_table, triple
+from rig.report.budget_table import expanded_heading
 from rig.report.entry import entry
 from rig.report.magnetometer_table import MICROTESLA
 from rig.station.plain_text import plain
@@ -29,7 +30,9 @@ def print_reversal(document: ReversalDocument, *, as_json: bool) -> None:
         title = f"{name}, magnetometer turned over: {found.part} {found.serial_number}, {len(found.runs)} runs"
         expanded = [2 * std for std in (*found.scale_std, *np.multiply(MICROTESLA, found.bias_std_t).tolist())]
         bias = np.multiply(MICROTESLA, found.bias_t).tolist()
-        console.print(axes_table(title, found.scale, bias, expanded, unit="µT", digits=3))
+        console.print(
+            axes_table(title, found.scale, bias, expanded, heading=expanded_heading(None), unit="µT", digits=3)
+        )
         for line in _lines(found):
             console.print(plain(line))
 

@@ -20,6 +20,7 @@ from rig.errors import Fault
 from rig.estimation import vector_model
 from rig.estimation.arrays import Array
 from rig.estimation.estimate import Estimate
+from rig.estimation.residuals import residual_std_rad_s
 from rig.estimation.six_observation import MODEL, PARAMETER_UNITS, PARAMETERS
 from rig.estimation.turned import TurnedSolution
 from rig.report.budget_entry import bias_process_entry, budget_entry
@@ -40,7 +41,7 @@ def sensor_entry(result: SensorResult, role: Role = "calibrate", agreed: Agreeme
         observations=[entry(ObservationEntry, turn, turn.average, joint=turn.joint_name) for turn in turns],
         rests=[entry(AverageEntry, each) for each in result.rests],
         time_bases=[entry(TimeBaseEntry, each, reference_board_s=each.reference_s) for each in result.time_bases],
-        vector_model=_vector_or_error(result.vector_model),
+        vector_model=_vector_or_error(result),
         six_observation=estimate_entry(result.six_observation),
         algorithm_1=entry_or_error(result.algorithm_1),
     )  # fmt: skip
@@ -72,8 +73,14 @@ def entry_or_error(outcome: Estimate | Fault) -> EstimateEntry | ErrorEntry:
     return ErrorEntry(error=str(outcome)) if isinstance(outcome, Fault) else estimate_entry(outcome)
 
 
-def _vector_or_error(outcome: vector_model.VectorSolution | Fault) -> VectorEntry | ErrorEntry:
-    return ErrorEntry(error=str(outcome)) if isinstance(outcome, Fault) else vector_entry(outcome)
+def _vector_or_error(result: SensorResult) -> VectorEntry | ErrorEntry:
+    outcome = result.vector_model
+    if isinstance(outcome, Fault):
+        return ErrorEntry(error=str(outcome))
+    found = vector_entry(outcome)
+    if result.explained is None:
+        return found
+    return found.model_copy(update={"residuals_std_rad_s": _rows(residual_std_rad_s(result.explained))})
 
 
 def vector_entry(outcome: vector_model.VectorSolution | TurnedSolution) -> VectorEntry:

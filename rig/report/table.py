@@ -8,11 +8,12 @@ import numpy as np
 from rich.console import Console
 from rich.table import Table
 
+from rig.data.budget_entries import BudgetEntry, expanded_uncertainties
 from rig.data.result_file import BoardEntry, CheckEntry, ResultDocument, SensorEntry
 from rig.data.result_types import ErrorEntry
 from rig.report.accelerometer_table import accelerometer_lines, accelerometer_table
 from rig.report.axes import triple
-from rig.report.budget_table import budget_table
+from rig.report.budget_table import budget_table, expanded_heading
 from rig.report.drift_table import print_drifts
 from rig.report.earth_rate import earth_rate_lines
 from rig.report.magnetometer_table import MICROTESLA, magnetometer_lines, magnetometer_table
@@ -46,7 +47,7 @@ def print_result(result: ResultDocument, console: Console) -> None:
     for name, sensor in result.sensors.items():
         known = " (known)" if sensor.role == "reference" else ""
         title = f"{name}{known}: {sensor.part} {sensor.serial_number}, {sensor.model}, {sensor.estimator}"
-        console.print(estimate_table(title, sensor, None if sensor.budget is None else sensor.budget.expanded))
+        console.print(estimate_table(title, sensor, sensor.budget))
         if sensor.budget is not None:
             console.print(budget_table(sensor.budget))
         for line in _beside(sensor):
@@ -75,12 +76,12 @@ def print_result(result: ResultDocument, console: Console) -> None:
     console.print(f"verdict: {result.verdict.upper()}", style="bold green" if result.verdict == "pass" else "bold red")
 
 
-def estimate_table(title: str, estimate: Estimated, expanded: Sequence[float] | None = None) -> Table:
-    """Scale and bias of each axis ± U (k = 2): `expanded` where all of it is known, else twice the solution's std."""
+def estimate_table(title: str, estimate: Estimated, budget: BudgetEntry | None = None) -> Table:
+    """Scale and bias of each axis ± U: that of the `budget` where all of it is known, else twice the solution's std."""
     table = Table(title=plain(title, "table.title"), title_justify="left")
-    for heading in ("axis", "scale factor", "± U (k = 2)", "bias rad/s", "± U rad/s"):
+    for heading in ("axis", "scale factor", expanded_heading(budget), "bias rad/s", "± U rad/s"):
         table.add_column(heading, justify="left" if heading == "axis" else "right")
-    shown = expanded or [2 * estimate.covariance[i][i] ** 0.5 for i in range(6)]
+    shown = expanded_uncertainties(budget, estimate.covariance)
     scale, bias = decimals(shown[:3]), decimals(shown[3:])
     for i, axis in enumerate("xyz"):
         table.add_row(

@@ -10,6 +10,7 @@ from rig.arm.driver import Arm
 from rig.arm.identity import identity_problems
 from rig.arm.preflight import refuse
 from rig.arm.state import ArmReport
+from rig.board.crystal import follows_crystal
 from rig.board.identify import configured_board, refusing
 from rig.board.store import Solved, calibration_of
 from rig.config.load import Loaded
@@ -133,6 +134,8 @@ class Connector:
         described: Mapping[str, Recorded],
         report: ArmReport,
     ) -> Recording:
+        with refusing():
+            crystal = None if board is None else follows_crystal(board.board)
         made_with = provenance_of(
             self.loaded,
             None if board is None else board.board.identity,
@@ -140,6 +143,7 @@ class Connector:
             {} if board is None else board.stored,
             self.script.identity,
             script_installed=self.script.is_installed,
+            follows_crystal=crystal,
         )
         self.resumed.refuse_other_instruments(made_with, described)
         with refusing():

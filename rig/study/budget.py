@@ -15,7 +15,7 @@ import numpy as np
 from rig.estimation.arrays import Array
 from rig.estimation.budget import Unknown, budget
 from rig.estimation.earth import EARTH_RATE_RAD_S, STANDARD_GRAVITY_M_S2
-from rig.estimation.explained import Seen, explain
+from rig.estimation.explained import Seen, centripetal_m_s2, explain
 from rig.estimation.vector_model import solve_vector_model
 from rig.study.report import Finding, Report, Settings, table
 from rig.study.work import in_parallel
@@ -24,46 +24,51 @@ if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
 DRAWS, BATCHES = 1500, 30
-SPEED_RAD_S = np.pi / 3
-SWEEP_S, REST_S = 2 * np.pi / SPEED_RAD_S, 2.6
+REST_S = 2.6
+# How far wrists 3, 1 and 2 swing the flange's centre: offsets d5 and d6 of a UR10e (maker's article 45257).
+ARMS_M = np.array([[0.0, 0.0, 0.0], [0.11985, 0.0, 0.11655], [0.0, 0.0, 0.11655]])
 STEP_S = 0.05  # of the bias's walk
 ATTITUDES = 72  # of a turn
 MOUNTING_RAD, SKEW_RAD = np.radians(5.0), np.radians(0.25)
-SAMPLE_RATE_HZ, NOISE_RAD_S = 238.0, 0.002  # a LSM9DS1 at its data sheet's 0.01 °/s/√Hz
+SAMPLE_RATE_HZ = 238.0
 PARAMETERS = ("kx", "ky", "kz", "bx", "by", "bz")
 
 
 @dataclass(frozen=True, slots=True)
 class Effects:
-    """How large what may be wrong is drawn: standard deviations, but for the clock's half-width.
+    """How large what may be wrong is drawn: standard deviations, but for half-widths of the clock and the offset.
 
-    g-sensitivity for every element, rad/s/g; twist of each wrist's axis; jitter of the states' times; walk of the bias.
+    g-sensitivity for every element, rad/s/g; twist of each wrist's axis; jitter of the states' times; walk of the bias;
+    how far from the flange's centre the sensor sits along each axis. The noise is that of a LSM9DS1 by its data sheet,
+    0.01 °/s/√Hz.
     """
 
+    speed_rad_s: float = np.pi / 3
+    noise_rad_s: float = 0.002
     g_sensitivity_rad_s_g: float = float(np.radians(0.1))
     axis_rad: float = 6e-4
     clock: float = 50e-6
     clock_known: float = 1e-6
     jitter_s: float = 100e-6
     walk_rad_s_sqrt_s: float = 3e-5
+    offset_m: float = 0.05
     latitude_deg: float = 48.0
 
 
 @dataclass(frozen=True, slots=True)
 class Session:
-    """The arm's movement as it really is: attitudes (N, 72, 3, 3) from base to flange, rates (N, 3) in the flange."""
+    """The arm's movement: attitudes (N, 72, 3, 3) from base to flange, in the flange rates (N, 3) and arms (N, 3)."""
 
     attitudes: Array
     rates_rad_s: Array
+    arms_m: Array
     windows_s: Array
     joints: tuple[str | None, ...]
 
 
 def study(settings: Settings) -> Report:
     """Coverage of ± U, and RMS of error over standard uncertainty, with and without the remedies."""
-    draws = settings.runs or DRAWS
-    shares = [draws // BATCHES + (batch < draws % BATCHES) for batch in range(BATCHES)]
-    drawn = np.concatenate(in_parallel(partial(_batch, Effects()), [share for share in shares if share], settings))
+    drawn = errors(Effects(), settings)
     rows = [
         {
             "parameter": parameter,
@@ -77,15 +82,21 @@ def study(settings: Settings) -> Report:
     return Report(table(rows), _findings(rows), partial(_draw, rows), (8.0, 4.5))
 
 
+def errors(effects: Effects, settings: Settings) -> Array:
+    """(draws, 2, 6) of scale and bias over their standard uncertainties, with and without the remedies."""
+    draws = settings.runs or DRAWS
+    shares = [draws // BATCHES + (batch < draws % BATCHES) for batch in range(BATCHES)]
+    return np.concatenate(in_parallel(partial(_batch, effects), [share for share in shares if share], settings))
+
+
 def _batch(effects: Effects, rng: np.random.Generator, draws: int) -> Array:
-    """(draws, 2, 6) errors over standard uncertainties, with and without remedies."""
     return np.array([_one(effects, rng) for _ in range(draws)])
 
 
 def _one(effects: Effects, rng: np.random.Generator) -> Array:
     scale, bias = rng.uniform(0.9, 1.1, 3), rng.uniform(-0.02, 0.02, 3)
-    true = _session(rng.normal(0, effects.axis_rad, (3, 2)))
-    told = _session(np.zeros((3, 2)))
+    true = _session(rng.normal(0, effects.axis_rad, (3, 2)), effects.speed_rad_s)
+    told = _session(np.zeros((3, 2)), effects.speed_rad_s)
     wandered, whole = _walk(rng, true.windows_s, effects.walk_rad_s_sqrt_s)
     axes = _skewed(rng) @ _turned(rng, MOUNTING_RAD)
     heading, latitude = rng.uniform(0, 2 * np.pi), np.radians(effects.latitude_deg)
@@ -95,10 +106,12 @@ def _one(effects: Effects, rng: np.random.Generator) -> Array:
     up = np.array([0.0, 0.0, 1.0])
     sensitivity = rng.normal(0, effects.g_sensitivity_rad_s_g, (3, 3))  # of the sensor's axes to what they feel
     attitudes = true.attitudes.mean(axis=1)
-    felt = attitudes @ up @ axes.T @ sensitivity.T
+    ways = true.arms_m + rng.uniform(-effects.offset_m, effects.offset_m, 3)
+    force = attitudes @ up + centripetal_m_s2(true.rates_rad_s, ways) / STANDARD_GRAVITY_M_S2
+    felt = force @ axes.T @ sensitivity.T
     turned = true.rates_rad_s + attitudes @ earth
     durations = np.diff(true.windows_s).T[0]
-    variances = np.tile(NOISE_RAD_S**2 / (SAMPLE_RATE_HZ * durations)[:, None], 3)
+    variances = np.tile(effects.noise_rad_s**2 / (SAMPLE_RATE_HZ * durations)[:, None], 3)
     noise = np.sqrt(variances) * rng.standard_normal((len(durations), 3))
     means = turned @ axes.T / scale - bias + felt + wandered + noise
     clock = rng.uniform(-effects.clock, effects.clock)
@@ -116,6 +129,7 @@ def _one(effects: Effects, rng: np.random.Generator) -> Array:
         gravity_m_s2=told.attitudes.mean(axis=1) @ (-STANDARD_GRAVITY_M_S2 * up),
         windows_s=told.windows_s,
         joints=told.joints,
+        arms_m=told.arms_m,
     )
     explained = explain(seen, np.eye(3))
     unknown = Unknown(
@@ -123,7 +137,7 @@ def _one(effects: Effects, rng: np.random.Generator) -> Array:
         clock_source="",
         state_jitter_s=effects.jitter_s,
         axis_rad=effects.axis_rad * np.sqrt(3),
-        sensor_offset_m=0.0,
+        sensor_offset_m=effects.offset_m,
         g_sensitivity_rad_s_per_g=effects.g_sensitivity_rad_s_g,
         earth_rate=True,
     )
@@ -133,14 +147,14 @@ def _one(effects: Effects, rng: np.random.Generator) -> Array:
     return np.array([with_all, without])
 
 
-def _session(twists: Array) -> Session:
+def _session(twists: Array, speed_rad_s: float) -> Session:
     """Six sweeps of wrists 3, 1 and 2 about flange z, y and x, each with the rest after it; then the rests.
 
     In the flange's frame a wrist's axis is fixed while that wrist turns, and `twists` (3, 2) tilt it. At home the
     flange's x, y and z point forward, left and up in the base.
     """
-    attitudes, rates, rest_attitudes, windows, rests = [], [], [], [], []
-    start_s = 0.0
+    attitudes, rates, arms, rest_attitudes, windows, rests = [], [], [], [], [], []
+    start_s, sweep_s = 0.0, 2 * np.pi / speed_rad_s
     turn = np.linspace(-np.pi, np.pi, ATTITUDES, endpoint=False) + np.pi / ATTITUDES
     for number, joint in enumerate((2, 1, 0)):
         axis = np.eye(3)[joint].copy()
@@ -148,15 +162,17 @@ def _session(twists: Array) -> Session:
         axis /= np.linalg.norm(axis)
         for sign in (-1.0, 1.0):
             attitudes.append(_about(axis, -turn))
-            rates.append(sign * SPEED_RAD_S * axis)
-            windows.append((start_s, start_s + SWEEP_S))
+            rates.append(sign * speed_rad_s * axis)
+            arms.append(ARMS_M[number])
+            windows.append((start_s, start_s + sweep_s))
             rest_attitudes.append(np.repeat(_about(axis, np.array([-sign * np.radians(190)])), ATTITUDES, axis=0))
-            rests.append((start_s + SWEEP_S + 0.4, start_s + SWEEP_S + 0.4 + REST_S))
-            start_s += SWEEP_S + 3.6
+            rests.append((start_s + sweep_s + 0.4, start_s + sweep_s + 0.4 + REST_S))
+            start_s += sweep_s + 3.6
         start_s += 2.0
     return Session(
         np.array([*attitudes, *rest_attitudes]),
         np.array([*rates, *np.zeros((6, 3))]),
+        np.array([*arms, *np.zeros((6, 3))]),
         np.array([*windows, *rests]),
         ("wrist_3", "wrist_3", "wrist_1", "wrist_1", "wrist_2", "wrist_2", *[None] * 6),
     )

@@ -1,11 +1,14 @@
-"""The controller's clock is held against others that are in the recording."""
+"""The controller's clock is held against others that are in the recording, and all of them against each other."""
 
+from collections.abc import Sequence
 from dataclasses import replace
 
 import numpy as np
 import pytest
 
-from rig.analysis.clock import NOMINAL_DRIFT, check_clock, state_jitter_s
+from rig.analysis.clock import NOMINAL_DRIFT, check_clock, state_jitter
+from rig.analysis.outcome import calibrated
+from rig.analysis.verdict import Check, clock_checks
 from rig.data.run_file import RunData
 from rig.data.settings import Uncertainty
 from rig.observation.observed_run import ObservedRun, observe_runs
@@ -15,18 +18,44 @@ PPM = 1e-6
 KNOWN = Uncertainty(50.0, 1.0, 20.0, 0.06, 50.0, {}, "simple")
 
 
-def observed(setup: Setup, host_slope: float) -> ObservedRun:
+FAST = Setup(speed_deg_s=120, noise_rad_s=0.002)
+
+
+def recorded(setup: Setup, host_slope: float) -> RunData:
     """A recording whose states came at a computer that counts `host_slope` seconds for one of the controller's."""
-    run: RunData = synthetic_run(setup)
+    run = synthetic_run(setup)
     arm = run.arm.copy()
     late = np.random.default_rng(5).exponential(5e-4, len(arm))
     arm["host_time_s"] = 1000.0 + host_slope * (arm["time_s"] - arm["time_s"][0]) + late
-    (seen,) = observe_runs([replace(run, arm=arm)])
+    return replace(run, arm=arm)
+
+
+def observed(setup: Setup, host_slope: float) -> ObservedRun:
+    (seen,) = observe_runs([recorded(setup, host_slope)])
     return seen
 
 
+def with_crystal(controller_ppm: float, crystal_ppm: float = 0.0) -> Setup:
+    """A board whose counter a crystal holds, by its own word, and a controller: how much too fast each of them is."""
+    drift = (1 + controller_ppm * PPM) * (1 + NOMINAL_DRIFT) / (1 + crystal_ppm * PPM) - 1
+    return replace(FAST, drift=drift, follows_crystal=True)
+
+
+def of_clocks(setup: Setup, host_slope: float = 0.2) -> dict[str, Check]:
+    """The checks of the clocks, by the two they name.
+
+    A computer that counts a fifth of the controller's seconds is a simulated laboratory's.
+    """
+    return named(clock_checks(check_clock(observed(setup, host_slope), KNOWN)))
+
+
+def named(checks: Sequence[Check]) -> dict[str, Check]:
+    begins = "clocks_agree."
+    return {check.name.removeprefix(begins): check for check in checks if check.name.startswith(begins)}
+
+
 def test_a_clock_that_runs_too_fast_is_found_by_the_computers() -> None:
-    seen = observed(Setup(speed_deg_s=120, noise_rad_s=0.002), 1 - 40 * PPM)
+    seen = observed(FAST, 1 - 40 * PPM)
     check = check_clock(seen, KNOWN)
     assert [each.by for each in check.comparisons] == ["the computer's clock"]  # no crystal drives that board
     assert check.error == pytest.approx(40 * PPM, abs=2 * PPM)
@@ -34,8 +63,7 @@ def test_a_clock_that_runs_too_fast_is_found_by_the_computers() -> None:
 
 
 def test_where_the_computers_clock_says_nothing_the_crystal_does() -> None:
-    drift = (1 + 40 * PPM) * (1 + NOMINAL_DRIFT) / (1 + 5 * PPM) - 1  # a crystal that is 5 ppm fast itself
-    seen = observed(Setup(speed_deg_s=120, noise_rad_s=0.002, drift=drift), 0.2)
+    seen = observed(with_crystal(40, crystal_ppm=5), 0.2)
     check = check_clock(seen, KNOWN)
     assert [each.by for each in check.comparisons] == ["the board's crystal"]
     assert abs(check.error - 40 * PPM) < 2 * check.std
@@ -55,5 +83,51 @@ def test_the_jitter_of_the_states_is_measured() -> None:
     jitter = np.random.default_rng(6).normal(0, 1e-4, len(arm))
     arm["q_rad"] = motion.angles(arm["time_s"] + jitter)
     (seen,) = observe_runs([replace(run, arm=arm)])
-    assert state_jitter_s(seen) == pytest.approx(1e-4, rel=0.1)
-    assert state_jitter_s(observe_runs([run])[0]) < 1e-5
+    assert state_jitter(seen).std_s == pytest.approx(1e-4, rel=0.1)
+    assert state_jitter(observe_runs([run])[0]).std_s < 1e-5
+
+
+def test_clocks_that_agree_pass_and_are_named_in_pairs() -> None:
+    checks = of_clocks(with_crystal(40, crystal_ppm=-15), 1 - 40 * PPM)
+    assert set(checks) == {"controller_and_computer", "controller_and_crystal", "computer_and_crystal"}
+    assert all(check.passed and check.unit == "ppm" for check in checks.values())
+
+
+@pytest.mark.parametrize("controller_ppm", [-146, 500, 20_000])
+def test_a_controllers_clock_beyond_what_is_stated_fails_by_how_far_it_is_off(controller_ppm: float) -> None:
+    check = of_clocks(with_crystal(controller_ppm))["controller_and_crystal"]
+    assert not check.passed
+    assert check.value == pytest.approx(abs(controller_ppm), abs=5)
+    assert check.limit == pytest.approx(70, abs=15)  # 50 of the controller's, 20 of the crystal's
+
+
+@pytest.mark.parametrize("computer", [-9e-3, 1e-3])
+def test_a_computers_clock_that_contradicts_both_fails_with_both(computer: float) -> None:
+    checks = of_clocks(with_crystal(10), 1 + computer)
+    failed = {name for name, check in checks.items() if not check.passed}
+    assert failed == {"controller_and_computer", "computer_and_crystal"}
+
+
+def test_two_others_that_agree_name_the_controller() -> None:
+    checks = of_clocks(with_crystal(300), 1 - 300 * PPM)
+    assert checks["computer_and_crystal"].passed
+    assert not checks["controller_and_computer"].passed and not checks["controller_and_crystal"].passed
+
+
+@pytest.mark.parametrize("pace", [0.98, 1.02, 8.0])
+def test_a_laboratory_that_is_simulated_at_a_pace_of_its_own_is_held_against_no_computer(pace: float) -> None:
+    checks = of_clocks(with_crystal(10), 1 / pace)
+    assert set(checks) == {"controller_and_crystal"} and checks["controller_and_crystal"].passed
+
+
+def test_a_board_that_says_it_follows_no_crystal_is_compared_with_nothing_however_near_it_runs() -> None:
+    assert of_clocks(replace(with_crystal(40), follows_crystal=False)) == {}
+    assert set(of_clocks(replace(with_crystal(40), follows_crystal=None))) == {"controller_and_crystal"}
+
+
+@pytest.mark.parametrize(("reckoning", "failed"), [(1, set()), (2, {"controller_and_crystal"})])
+def test_clocks_are_in_the_verdict_but_of_recordings_made_before(reckoning: int, failed: set[str]) -> None:
+    found = calibrated([recorded(with_crystal(500), 0.2).judged_by([f"reckoning={reckoning}"])])
+    checks = named(found.checks)
+    assert {name for name, check in checks.items() if not check.passed} == failed
+    assert found.clock is not None and len(found.clock.comparisons) == len(failed)

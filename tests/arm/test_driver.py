@@ -30,8 +30,9 @@ from rig.config.procedure_sections import SixObservationSection
 from rig.errors import Fault, Refused
 from rig.plans.six_sweeps import plan_six_observation
 from support.arm_relay import relay
-from support.crowd import watched_crowd
+from support.crowd import soon, watched_crowd
 from support.rtde_reader import RtdeReader
+from support.waiting import wait_for
 from support.worlds import World, WorldHandle
 
 pytestmark = pytest.mark.slow
@@ -49,13 +50,6 @@ def turn(start: Joints, angle_rad: float) -> Transfer:
     """A move of wrist 3 alone at 1 rad/s."""
     target = (*start[:WRIST_3], start[WRIST_3] + angle_rad)
     return Transfer("test move", start, target, 1.0, 2.0, trapezoid_duration(abs(angle_rad), 1.0, 2.0))
-
-
-def until(condition: Callable[[], bool], timeout_s: float) -> None:
-    deadline_s = time.monotonic() + timeout_s
-    while not condition():
-        assert time.monotonic() < deadline_s, "the condition did not come true in time"
-        time.sleep(0.002)
 
 
 def stands(world: WorldHandle) -> bool:
@@ -189,7 +183,7 @@ def test_a_fault_during_a_move_is_named_and_the_arm_stands_still(
         assert "test move" in fault.value.what or "127." in fault.value.what
         assert fault.value.remedy
         laboratory.control({"do": "run"})
-        until(lambda: stands(laboratory), 3.0)
+        soon(lambda: stands(laboratory), "rest", 3.0)
 
 
 def test_somebody_elses_program_in_place_of_ours_is_noticed_and_stopped(laboratory: WorldHandle) -> None:
@@ -210,10 +204,10 @@ def test_a_program_that_a_reconnecting_client_leaves_behind_is_stopped(laborator
         with pytest.raises(Fault):
             arm.move(turn(arm.latest.q_rad, 6.0), AtSpeed(arm, lambda: laboratory.control({"do": "hold"})))
         laboratory.control({"do": "run"})
-        until(lambda: not laboratory.state()["program_running"], 5.0)
+        wait_for(lambda: not laboratory.state()["program_running"], "the end of the program")
         upload(laboratory, b"def rtde_control():\nend\n")
-        until(lambda: laboratory.state()["program_running"], 5.0)
-    until(lambda: not laboratory.state()["program_running"], 5.0)
+        wait_for(lambda: laboratory.state()["program_running"], "the program")
+    wait_for(lambda: not laboratory.state()["program_running"], "the end of the program")
 
 
 def test_one_that_it_leaves_behind_a_stop_that_was_seen_is_stopped_too(laboratory: WorldHandle) -> None:
@@ -223,8 +217,8 @@ def test_one_that_it_leaves_behind_a_stop_that_was_seen_is_stopped_too(laborator
             arm.move(turn(arm.latest.q_rad, 6.0), AtSpeed(arm, lambda: laboratory.control({"do": "stop_program"})))
         assert "at rest" in fault.value.what
         upload(laboratory, b"def rtde_control():\n while True:\n  sync()\n end\nend\n")
-        until(lambda: laboratory.state()["program_running"], 5.0)
-    until(lambda: not laboratory.state()["program_running"], 5.0)
+        wait_for(lambda: laboratory.state()["program_running"], "the program")
+    wait_for(lambda: not laboratory.state()["program_running"], "the end of the program")
 
 
 @pytest.mark.parametrize(("name", "kind"), [("arm_driver_died", "SIGKILL"), ("arm_driver_hung", "SIGSTOP")])
@@ -240,7 +234,7 @@ def test_a_child_that_dies_or_hangs_mid_move_leaves_a_standing_arm_within_a_seco
         def end_child_and_await_the_stop() -> None:
             os.kill(child.pid or 0, getattr(signal, kind))
             killed_s = time.monotonic()
-            until(lambda: stands(laboratory), 5.0)
+            wait_for(lambda: stands(laboratory), "rest")
             stood_s.append(time.monotonic() - killed_s)
 
         with watched_crowd() as crowd, pytest.raises(Fault) as fault:
@@ -268,7 +262,7 @@ def test_a_hung_child_is_answered_by_a_stop_also_when_no_descriptor_is_left(labo
         with pytest.raises(Fault) as fault:
             arm.move(turn(arm.latest.q_rad, 6.0), AtSpeed(arm, use_up_and_hang_the_child))
         assert fault.value.name == "arm_driver_hung" and "its program has ended" in fault.value.what
-        until(lambda: stands(laboratory), 1.0)
+        soon(lambda: stands(laboratory), "rest", 1.0)
 
 
 @pytest.mark.parametrize("where", ["move", "rest"])
@@ -592,7 +586,7 @@ def test_the_arm_is_stopped_when_the_program_itself_dies(laboratory: WorldHandle
     ) as parent:
         assert parent.stdout is not None
         assert parent.stdout.readline() == b"moving\n"
-        until(lambda: bool(laboratory.state()["moving"]), 5.0)
+        wait_for(lambda: laboratory.state()["moving"], "motion")
         if kind.startswith("SIGINT"):  # Ctrl-C in a terminal reaches the whole group
             os.killpg(parent.pid, signal.SIGINT)
             if kind.endswith("twice"):
@@ -600,5 +594,5 @@ def test_the_arm_is_stopped_when_the_program_itself_dies(laboratory: WorldHandle
                 os.killpg(parent.pid, signal.SIGINT)
         else:
             parent.send_signal(getattr(signal, kind))
-        until(lambda: stands(laboratory), 1.0)
+        soon(lambda: stands(laboratory), "rest", 1.0)
         parent.wait(10.0)

@@ -22,6 +22,7 @@ from firmware_host.samples import IMU_SAMPLE_DTYPE, SAMPLE_DTYPE
 from firmware_host.serial_port import SerialPort
 from rig.config.link_budget import Stream
 from support.host_board import HostBoard, configured, convert, settle
+from support.waiting import wait_for
 from support.worlds import fresh_host
 
 PERIOD_US = 4202  # 238 Hz
@@ -109,13 +110,6 @@ def ignore(batch: SampleBatch) -> None:
     """A consumer for tests that look at something else."""
 
 
-def wait_for(condition: Callable[[], bool], deadline_s: float = 60.0) -> None:
-    end_s = time.monotonic() + deadline_s
-    while not condition():
-        assert time.monotonic() < end_s, "waited in vain"
-        time.sleep(0.002)
-
-
 def fault_of(board: Board, deadline_s: float = 60.0) -> tuple[BoardError, float]:
     """The error that check() raises, and how long it took, s."""
     start_s = time.monotonic()
@@ -141,7 +135,7 @@ def test_a_board_is_greeted_set_up_streams_and_stops(wire: tuple[BoardOnAWire, s
         setup = board.configure(0, rate_hz=200, range_deg_s=245)
         assert (setup.rate_hz, setup.range_deg_s) == (238.0, 245.0)
         board.start()
-        wait_for(lambda: sum(len(batch.samples) for batch in batches) >= 100)
+        wait_for(lambda: sum(len(batch.samples) for batch in batches) >= 100, "samples")
         board.check()
         assert board.status().streaming
         board.stop()
@@ -172,7 +166,7 @@ def test_a_stream_left_running_is_stopped_by_the_next_program_and_restarts_at_ze
     with Board(wire[1], protocol.BAUD_RATE, batches.append) as client:
         assert batches == [] and not client.status().streaming
         client.start()
-        wait_for(lambda: len(batches) > 0)
+        wait_for(lambda: len(batches) > 0, "samples")
     assert batches[0].samples["sequence"][0] == 0
 
 
@@ -248,7 +242,7 @@ def test_accelerations_come_along_where_a_range_is_asked_for_and_not_in_a_calibr
         assert setup.range_m_s2 == pytest.approx(4 * 9.80665)
         assert setup.sensitivity_m_s2 == pytest.approx(0.122e-3 * 9.80665)
         board.start()
-        wait_for(lambda: sum(len(batch.samples) for batch in batches) >= 30)
+        wait_for(lambda: sum(len(batch.samples) for batch in batches) >= 30, "samples")
         board.stop()
         samples = np.concatenate([batch.samples for batch in batches])
         assert samples.dtype == IMU_SAMPLE_DTYPE
@@ -261,7 +255,7 @@ def test_accelerations_come_along_where_a_range_is_asked_for_and_not_in_a_calibr
         board.write_calibration(0, CALIBRATION)
         batches.clear()
         board.start(calibrated=[0])
-        wait_for(lambda: len(batches) > 0)
+        wait_for(lambda: len(batches) > 0, "samples")
         board.stop()
         assert batches[0].samples.dtype == SAMPLE_DTYPE and batches[0].mode == "calibrated"
 
@@ -269,7 +263,7 @@ def test_accelerations_come_along_where_a_range_is_asked_for_and_not_in_a_calibr
         assert (setup.range_m_s2, setup.sensitivity_m_s2) == (0.0, 0.0)
         batches.clear()
         board.start()
-        wait_for(lambda: len(batches) > 0)
+        wait_for(lambda: len(batches) > 0, "samples")
         board.stop()
         assert batches[0].samples.dtype == SAMPLE_DTYPE and batches[0].mode == "raw"
 
@@ -281,7 +275,7 @@ def test_calibrated_readings_come_in_microradians_per_second(wire: tuple[BoardOn
         sensitivity = board.configure(0, 238, 245).sensitivity_rad_s
         board.write_calibration(0, CALIBRATION)
         board.start(calibrated=[0])
-        wait_for(lambda: len(batches) > 0)
+        wait_for(lambda: len(batches) > 0, "samples")
         board.stop()
     assert {batch.mode for batch in batches} == {"calibrated"}
     z_rad_s = CALIBRATION.scale[2] * (7 * sensitivity + CALIBRATION.bias_rad_s[2])
@@ -294,13 +288,13 @@ def test_what_was_kept_is_averaged_between_two_board_times(wire: tuple[BoardOnAW
     with Board(wire[1], protocol.BAUD_RATE, batches.append) as board:
         sensitivity = board.configure(0, 238, 245).sensitivity_rad_s
         board.start()
-        wait_for(lambda: len(batches) > 0)
+        wait_for(lambda: len(batches) > 0, "samples")
         with pytest.raises(BoardError) as refusal:
             board.observe(0, 0, 0, 1_000_000, speed_rad_s=1.0)
         assert refusal.value.name == "not_kept"
         board.keep([0], duration_s=2)
         first = len(batches)
-        wait_for(lambda: len(batches) > first + 8)
+        wait_for(lambda: len(batches) > first + 8, "samples")
         samples = np.concatenate([batch.samples for batch in batches[first + 1 : first + 6]])
         start_us, end_us = (int(samples["board_time_us"][i]) for i in (0, -1))
         observed = board.observe(0, 0, start_us, end_us, speed_rad_s=1.0)
@@ -399,11 +393,11 @@ def test_frames_lost_on_the_way_are_counted_and_a_reboot_loses_none(wire: tuple[
     with Board(wire[1], protocol.BAUD_RATE, batches.append) as board:
         board.configure(0, rate_hz=238, range_deg_s=245)
         board.start()
-        wait_for(lambda: len(batches) >= 2)
+        wait_for(lambda: len(batches) >= 2, "samples")
         wire[0].on_send = losing
-        wait_for(lambda: len(lost) >= 3)
+        wait_for(lambda: len(lost) >= 3, "losses")
         received = len(batches)
-        wait_for(lambda: len(batches) >= received + 2)
+        wait_for(lambda: len(batches) >= received + 2, "samples")
         board.stop()
         assert board.status().frames_lost == len(lost)
         sequences = np.concatenate([batch.samples["sequence"] for batch in batches])
@@ -438,7 +432,7 @@ def test_frames_that_come_twice_are_taken_once_and_counted(wire: tuple[BoardOnAW
     with Board(wire[1], protocol.BAUD_RATE, batches.append) as board:
         board.configure(0, rate_hz=238, range_deg_s=245)
         board.start()
-        wait_for(lambda: sum(len(batch.samples) for batch in batches) >= 200 and doubled[0] > 0)
+        wait_for(lambda: sum(len(batch.samples) for batch in batches) >= 200 and doubled[0] > 0, "samples")
         board.check()
         board.stop()
         wire[0].on_send = bytes
@@ -471,7 +465,7 @@ def test_bytes_that_come_twice_cost_the_frames_they_damage_and_no_others(wire: t
         board.configure(0, rate_hz=238, range_deg_s=245)
         board.start()
         wire[0].on_send = twice
-        wait_for(lambda: sent.count(0) >= 40)
+        wait_for(lambda: sent.count(0) >= 40, "what was sent")
         wire[0].on_send = bytes
         board.check()
         board.stop()
@@ -569,7 +563,7 @@ def test_a_board_that_restarts_and_is_asked_before_it_says_so_is_reported(wire: 
     with closing(streaming(wire)) as board:
         board.keep([0], duration_s=1)
         wire[0].reset.set()
-        wait_for(lambda: not wire[0].reset.is_set())
+        wait_for(lambda: not wire[0].reset.is_set(), "the reset")
         with pytest.raises(BoardError, match="restarted while streaming"):
             board.observe(0, 0, 0, 1_000_000, speed_rad_s=1.0)
         with pytest.raises(BoardError, match="restarted while streaming"):  # known from then on, whatever it is asked
@@ -619,7 +613,7 @@ def test_an_error_in_the_consumer_reaches_the_caller(wire: tuple[BoardOnAWire, s
                 return True
             return False
 
-        wait_for(failed)
+        wait_for(failed, "the failure")
 
 
 def test_an_answer_to_somebody_before_is_none_to_the_first_request() -> None:

@@ -121,8 +121,8 @@ def test_a_file_that_is_not_what_was_entered_is_named(
     ("statements", "named"),
     [
         (["UPDATE parameter SET value = 2 * value WHERE name = 'kx'"], "kx 2.02, stated 1.01, of gyro"),
-        (["INSERT INTO parameter SELECT calibration_id, 'k2', value, std_statistical, NULL, unit, NULL FROM parameter "
-          "WHERE name = 'kx'"], "its rows are not those entered"),
+        (["INSERT INTO parameter SELECT calibration_id, 'k2', value, std_statistical, NULL, unit, NULL, NULL "
+          "FROM parameter WHERE name = 'kx'"], "its rows are not those entered"),
         (["UPDATE run SET verdict = 'fail'"], "verdict is fail"),
         (["UPDATE calibration SET serial_number = 'G-9'"], "serial_number of gyro: G-9, stated G-1"),
         (["UPDATE run SET operator = 'Somebody else'"], "its rows are not those entered"),

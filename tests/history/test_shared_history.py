@@ -61,6 +61,7 @@ def test_a_history_of_version_1_is_migrated_there_too(url: str) -> None:
                 table.drop(connection)
             for column in ("operator", "note"):
                 connection.execute(text(f"ALTER TABLE run DROP COLUMN {column}"))
+            connection.execute(text("ALTER TABLE parameter DROP COLUMN coverage_factor"))
             connection.execute(delete(schema.meta).where(schema.meta.c.key == "version"))
             connection.execute(schema.meta.insert().values(key="version", value="1"))
     with open_history(url) as history:

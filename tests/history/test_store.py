@@ -1,11 +1,13 @@
 """A history: what is entered is found again, nothing is lost, nothing stands there twice, nothing is taken away."""
 
+import json
 import sqlite3
 from collections.abc import Iterator
 from dataclasses import replace
 from datetime import timedelta
 from pathlib import Path
 
+import numpy as np
 import pytest
 from sqlalchemy import event, inspect, text
 
@@ -13,14 +15,16 @@ from rig.config.judging_sections import HistorySection
 from rig.config.load import ConfigurationRefused, load
 from rig.data.result_file import read_result
 from rig.errors import Refused
+from rig.estimation.budget import Budget, Contributor
 from rig.history import schema
 from rig.history.engine import engine_of
-from rig.history.finished import content_sha256, finished_run
+from rig.history.finished import Finished, compact, content_sha256, finished_run
 from rig.history.issued import Issued
 from rig.history.parameters import calibrated
 from rig.history.place import chosen_place, place
 from rig.history.series import Trend, changes, effects, rig_states, subjects, trends
 from rig.history.store import History, Selection, open_history
+from rig.report.budget_entry import budget_entry
 from support.past_runs import FIRST, finished
 from support.paths import DEMO, FIXTURES, ROOT
 from support.stated import moved_parameters
@@ -79,6 +83,27 @@ def test_a_result_of_the_same_recordings_replaces_the_one_before(history: Histor
     (counted,) = history.calibrations()
     assert counted.value("kx") == 1.02
     assert [history.calibration(number).value("kx") for number in (1, 2)] == [1.02, 1.01]
+
+
+def test_u_in_a_history_and_its_comparisons_are_those_that_the_results_state(history: History) -> None:
+    def scarce(day: float, bias_rad_s: float, freedom: float) -> Finished:
+        run = finished(day, bias_rad_s=(bias_rad_s, 0.0, 0.0))
+        sensor = run.document.sensors["gyro"]
+        line = Contributor("noise", "A", "normal", None, "", "", freedom, np.array(sensor.covariance))
+        found = {"budget": budget_entry(Budget((line,))), "covariance_combined": sensor.covariance}
+        document = run.document.model_copy(update={"sensors": {"gyro": sensor.model_copy(update=found)}})
+        return replace(run, document=document, text=compact(json.loads(document.text())))
+
+    u = 2e-5
+    history.enter(scarce(0, 0.01, np.inf))
+    history.enter(scarce(1, 0.01 + 3.2 * u, 5.0))
+    before, now = history.calibrations()
+    assert before.parameters["bx"].expanded == pytest.approx(2 * u)
+    assert now.parameters["bx"].expanded == pytest.approx(2.649 * u, rel=1e-3)
+    (change,) = (each for each in changes(before, now) if each.name == "bx")
+    assert change.normalised_error == pytest.approx(3.2 / np.hypot(2, 2.649), rel=1e-3) and not change.beyond
+    assert now.parameters["k"].coverage_factor == now.parameters["kx"].coverage_factor
+    assert list(history.broken()) == []
 
 
 def test_a_voided_calibration_stands_there_with_its_reason_and_counts_no_more(history: History) -> None:

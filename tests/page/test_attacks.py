@@ -5,7 +5,6 @@ import re
 import signal
 import subprocess
 import sys
-import time
 from collections.abc import Callable, Iterator
 from dataclasses import dataclass
 from http.client import HTTPConnection
@@ -17,7 +16,7 @@ import pytest
 
 from rig.arm.state import REST_SPEED_RAD_S
 from support.commands import configuration, wait_for_log
-from support.crowd import watched_crowd
+from support.crowd import soon
 from support.flood import flooded
 from support.waiting import wait_for
 from support.worlds import World, WorldHandle, hardware
@@ -89,13 +88,6 @@ def moving(laboratory: WorldHandle) -> bool:
     return bool(max(map(abs, laboratory.state()["qd_rad_s"])) > 10 * REST_SPEED_RAD_S)
 
 
-def rests_soon(laboratory: WorldHandle) -> None:
-    began_s = time.monotonic()
-    with watched_crowd() as crowd:
-        wait_for(lambda: not moving(laboratory), "rest")
-    assert time.monotonic() - began_s < crowd.stretched(1.0)
-
-
 def test_half_requests_end_no_run(start: Start, tmp_path: Path) -> None:
     running = start(configuration(tmp_path))
     with flooded(running.url, MANY):
@@ -115,7 +107,7 @@ def test_the_stop_button_works_while_half_requests_are_held(
         asking.request("POST", "/stop", headers={"Authorization": f"Bearer {place.fragment}"})
         assert asking.getresponse().status == 202
         asking.close()
-        rests_soon(laboratory)
+        soon(lambda: not moving(laboratory), "rest", 1.0)
         assert running.process.wait(60) == 130, running.told()
 
 
@@ -126,7 +118,7 @@ def test_a_frozen_driver_is_answered_by_a_stop_while_half_requests_are_held(
     with flooded(running.url, MANY):
         wait_for(lambda: moving(laboratory), "motion")
         os.kill(running.child(b"multiprocessing.spawn"), signal.SIGSTOP)
-        rests_soon(laboratory)
+        soon(lambda: not moving(laboratory), "rest", 1.0)
         assert running.process.wait(60) == 3
     assert "the controller says that its program has ended" in running.told()
 

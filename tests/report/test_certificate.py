@@ -5,20 +5,25 @@ from decimal import Decimal
 from pathlib import Path
 from typing import Any
 
+import numpy as np
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
 from rig.config.judging_sections import CertificateSection, SiteSection
 from rig.config.load import parse
+from rig.data.budget_entries import BudgetEntry
 from rig.data.result_file import CheckEntry, ResultDocument, read_result
 from rig.data.result_types import ErrorEntry
 from rig.errors import Refused
+from rig.estimation.budget import Budget, Contributor
+from rig.report.budget_entry import budget_entry
+from rig.report.certificate.budget_tables import coverage_sentence
 from rig.report.certificate.content import is_simulated
 from rig.report.certificate.page import certificate_page
 from rig.report.certificate.rounding import rounded
 from rig.report.certificate.stated import Stated, of_configuration, stated_in
-from rig.report.certificate.tables import coverage_sentence
+from rig.report.certificate.validity import left_out_of_rates
 from support.certified import (
     LABORATORY,
     accelerometer,
@@ -68,6 +73,14 @@ def kinds() -> dict[str, ResultDocument]:
         "everything": whole,
         "verification": read_result(FIXTURES / "verified").model_copy(update={"sensors": {}}),
     }
+
+
+def budget_of(freedom: float) -> BudgetEntry:
+    """Of one contributor that tells scale factors with so much freedom, and biases with no end of it."""
+    scale, bias = (np.diag([size] * 3 + [other] * 3) for size, other in ((1e-8, 0.0), (0.0, 1e-6)))
+    lines = (Contributor("noise", "A", "normal", None, "", "", freedom, scale),
+             Contributor("offset", "B", "rectangular", 1e-3, "rad/s", "", np.inf, bias))  # fmt: skip
+    return budget_entry(Budget(lines))
 
 
 KINDS = ("gyroscope", "accelerometer", "magnetometer", "drift", "everything", "verification")
@@ -138,6 +151,45 @@ def test_what_was_not_said_reads_so_and_nobody_is_invented() -> None:
     assert "not stated" not in "".join(said.under[clause] for clause in CLAUSES)
     for words in ("Bench Laboratory", "1 Long Lane", "room 2", "Example & Sons", "2026-11-19", "A. Person", "21.5 °C"):
         assert words in said.text
+
+
+def test_nobody_s_place_is_invented_from_an_address() -> None:
+    assert LABORATORY.site is not None
+    silent = Stated(LABORATORY.site.model_copy(update={"place": None}), LABORATORY.certificate)
+    assert read(certificate(stated=silent)).under["7.8.2.1c"].endswith("not stated")
+    assert "room 2" in read(certificate()).under["7.8.2.1c"]
+
+
+def test_the_script_that_moved_the_arm_stands_there_with_its_hash() -> None:
+    document = result()
+    script = {"script": "six_observation.py", "script_sha256": "ab" * 32, "script_installed": True}
+    provenance = type(document.provenance).model_validate({**document.provenance.model_dump(), **script})
+    said = read(certificate(document.model_copy(update={"provenance": provenance}))).under["7.8.2.1f"]
+    assert f"script six_observation.py, SHA-256 {'ab' * 32}" in said
+    without = type(document.provenance).model_validate(
+        {key: each for key, each in document.provenance.model_dump().items() if not key.startswith("script")}
+    )
+    unknown = read(certificate(document.model_copy(update={"provenance": without}))).under["7.8.2.1f"]
+    assert "a script of the rig's own, whose hash was not recorded" in unknown
+
+
+@pytest.mark.parametrize("kind", ["gyroscope", "accelerometer", "magnetometer", "drift"])
+def test_every_quantity_says_when_it_holds_and_what_its_uncertainty_leaves_out(kind: str) -> None:
+    said = " ".join(read(certificate(kinds()[kind])).under["7.8.4.1b"].split())
+    assert "Time: " in said and "as mounted and powered then" in said
+    left_out = said.partition("Not in the uncertainty: ")[2]
+    for words in ("switching off and on", "mounting anew and its stress", "ageing and transport"):
+        assert words in left_out
+    if kind != "drift":
+        assert "nonlinearity" in left_out and "other temperatures" in left_out
+
+
+def test_what_the_budget_has_is_not_said_to_be_left_out() -> None:
+    sensor = result().sensors["gyro"]
+    assert sensor.budget is not None and "other temperatures" in left_out_of_rates(sensor)
+    warm = sensor.budget.contributors[0].model_copy(update={"name": "temperature within the run"})
+    budget = sensor.budget.model_copy(update={"contributors": (*sensor.budget.contributors, warm)})
+    assert "other temperatures" not in left_out_of_rates(sensor.model_copy(update={"budget": budget}))
 
 
 def test_the_arm_is_the_one_that_was_found_and_one_that_nobody_asked_is_said_so() -> None:
@@ -218,7 +270,7 @@ def test_an_accelerometer_stands_there_with_its_uncertainty_and_its_budget() -> 
     page = read(certificate(compared(document)))
     assert "1.01235 ± 0.00022" in page.text  # 1e-4 of noise, 0.5e-4 of gravity, k = 2
     assert "0.3000 ± 0.0020" in page.text  # gravity's size leaves the bias alone
-    assert "gravity B normal ±0.000981 m/s² (k = 2) ∞ 5.1 × 10⁻⁵ 20.4 %" in page.text
+    assert "gravity B normal ±0.000981 m/s² (k = 2) ∞ 49 19.6 % 0.00 < 0.1 %" in page.text  # u(k) in 10⁻⁶
     assert "relative to the stated gravity of 9.81 m/s²" in page.text
     assert "traceable through it" in page.under["7.8.4.1c"]
     assert (
@@ -317,7 +369,7 @@ def test_a_clock_that_was_compared_with_none_was_not_found_to_be_anything() -> N
 def test_a_sensor_with_a_port_of_its_own_is_on_no_board() -> None:
     sensor = result().sensors["gyro"].model_copy(update={"part": "kvh1775"})
     page = read(certificate(result().model_copy(update={"sensors": {"gyro": sensor}})))
-    assert "none, it has a port of its own" in page.under["7.8.2.1g"] and "firmware" not in page.under["7.8.2.1g"]
+    assert "on no board, with a port of its own" in page.under["7.8.2.1g"] and "firmware" not in page.under["7.8.2.1g"]
 
 
 def test_a_verification_alone_is_reported_as_that() -> None:
@@ -339,13 +391,27 @@ def test_a_vector_model_without_a_solution_leaves_out_what_it_would_tell() -> No
     assert not [tag for tag, _ in page.tags if tag == "svg"]
 
 
-def test_scarce_freedom_is_said() -> None:
-    budget = result().sensors["gyro"].budget
-    assert budget is not None
-    assert "normal distribution" in coverage_sentence(budget)
-    scarce = coverage_sentence(budget.model_copy(update={"freedom": (8.0, *[None] * 5)}))
-    assert "ν_eff\u00a0=\u00a08" in scarce
-    assert "approximately 92 %" in scarce  # of Student's t with 8 degrees of freedom within ± 2
+def test_scarce_freedom_widens_u_and_is_said() -> None:
+    sensor = result().sensors["gyro"]
+    assert sensor.budget is not None
+    assert "normal distribution" in coverage_sentence(sensor.budget)
+    scarce = budget_of(freedom=8.0)
+    assert "scale factors k\u00a0=\u00a02.37 (ν_eff\u00a0≥\u00a08); biases k\u00a0=\u00a02.00" in coverage_sentence(
+        scarce
+    )
+    assert "approximately 95 % (95.45 %)" in coverage_sentence(scarce)
+    assert scarce.expanded[0] == pytest.approx(2.366 * scarce.std[0], rel=1e-3)
+    page = read(
+        certificate(result().model_copy(update={"sensors": {"gyro": sensor.model_copy(update={"budget": scarce})}}))
+    )
+    assert "± U, expanded uncertainty, k as stated below" in page.text
+
+
+def test_of_results_of_before_the_probability_that_k_2_has_is_said() -> None:
+    before = budget_of(freedom=8.0).model_copy(update={"coverage_factor": 2.0, "coverage_factors": None})
+    said = coverage_sentence(before.model_copy(update={"coverage_probabilities": None}))
+    assert "ν_eff\u00a0=\u00a08" in said
+    assert "approximately 92 %" in said  # of Student's t with 8 degrees of freedom within ± 2
 
 
 def test_no_resource_is_loaded_from_anywhere() -> None:

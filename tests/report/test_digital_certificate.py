@@ -45,7 +45,7 @@ FAULTS = {
     "a day there is not": ("<dcc:issueDate>2026-11-", "<dcc:issueDate>2026-13-"),
     "a number that is none": ("<si:valueXMLList>1.", "<si:valueXMLList>x1."),
     "an uncertainty below zero": ("<si:uncertaintyXMLList>0", "<si:uncertaintyXMLList>-0"),
-    "a probability above one": ("XMLList>0.95<", "XMLList>1.95<"),
+    "a probability above one": ("XMLList>0.9545<", "XMLList>1.9545<"),
     "a schema of another version": ('schemaVersion="3.2.1"', 'schemaVersion="2.4.0"'),
     "a truth between true and false": ("traceable>false<", "traceable>perhaps<"),
     "no certificate's number": ("uniqueIdentifier>", "identifier>"),
@@ -248,6 +248,12 @@ def test_what_cannot_be_certified_is_refused(refused, why: str) -> None:  # type
     with pytest.raises(Refused, match=why) as error:
         digital_certificate(refused())
     assert error.value.name == "no_digital_certificate"
+
+
+def test_it_states_no_place_and_the_script_with_its_hash() -> None:
+    xml = digital_certificate(certificate())
+    assert [each.text for each in found(xml, "dcc:performanceLocation")] == ["other"]
+    assert certificate().procedure in xml.decode()
 
 
 def test_it_takes_no_time() -> None:

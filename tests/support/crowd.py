@@ -2,10 +2,11 @@
 
 import threading
 import time
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 
 from rig.arm.silence import crowding
+from support.waiting import wait_for
 
 LOOK_S = 0.02
 
@@ -45,3 +46,11 @@ def watched_crowd() -> Iterator[Crowd]:
     finally:
         over.set()
         watching.join()
+
+
+def soon(condition: Callable[[], object], what: str, limit_s: float) -> None:
+    """Wait until `condition` is true, which on a quiet machine it is within `limit_s`."""
+    began_s = time.monotonic()
+    with watched_crowd() as crowd:
+        wait_for(condition, what)
+    assert time.monotonic() - began_s < crowd.stretched(limit_s), f"it took too long: {what}"

@@ -8,6 +8,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
+from firmware_host.emulator.accelerometer import STANDARD_GRAVITY_M_S2
 from firmware_host.samples import SAMPLE_DTYPE
 from rig.arm.kinematics import NOMINAL, DenavitHartenberg, flange_rate
 from rig.arm.motion import Dwell, Plan, Rest, Step, Sweep, Transfer
@@ -20,6 +21,9 @@ from rig.data.run_file import RecordedSensor, RunData
 from rig.data.settings import settings_of
 from rig.estimation.arrays import Array
 from rig.plans.six_sweeps import plan_six_observation
+from rig.world.site import Site
+from rig.world.ur10e.flange_motion import felt_of_turns, moved
+from rig.world.ur10e.links import links
 
 CONFIG = """
 arm: {{host: 192.0.2.1, payload_kg: 0.35}}
@@ -64,11 +68,14 @@ class Setup:
     sample_rate_hz: float = 238.0
     boot_s: float = -4321.0  # controller time at which the board's clock stood at zero
     drift: float = -35e-6  # of the controller against the board
+    follows_crystal: bool | None = False  # the board's word on its clock
     kinematics: DenavitHartenberg = NOMINAL  # how the arm is made
     procedure: tuple[tuple[str, str], ...] = ()  # further keys of its section, and their values
     odd_per_rad_s: float = 0.0  # of each axis
     even_per_rad_s: float = 0.0
     told: DenavitHartenberg | None = None  # how its controller says it is made
+    g_sensitivity_rad_s_per_g: tuple[tuple[float, ...], ...] = ()  # of the sensor's axes to what they feel
+    offset_m: tuple[float, ...] = (0.0, 0.0, 0.0)  # from the flange's centre
 
 
 def truth(setup: Setup) -> Array:
@@ -140,7 +147,20 @@ def synthetic_run(setup: Setup) -> RunData:
     rng = np.random.default_rng(setup.seed)
     motion = Motion(setup, rng)
     board_s, controller_s = sample_times(setup, motion)
-    return run_data(setup, motion, board_s, readings(setup, true_rate(motion, controller_s, setup.kinematics), rng))
+    rate = true_rate(motion, controller_s, setup.kinematics)
+    force = true_force(setup, motion, controller_s) if setup.g_sensitivity_rad_s_per_g else None
+    return run_data(setup, motion, board_s, readings(setup, rate, rng, force))
+
+
+def true_force(setup: Setup, motion: Motion, time_s: Array) -> Array:
+    """(n, 3) specific force in g where the sensor sits, as the simulated laboratory has it."""
+    (q, qd), step_s = motion.joints(time_s), 1e-4
+    qdd = (motion.joints(time_s + step_s)[1] - motion.joints(time_s - step_s)[1]) / (2 * step_s)
+    turns = [(np.cos(angle), np.sin(angle)) for angle in q.T]
+    felt = felt_of_turns(
+        turns, list(qd.T), list(qdd.T), links(), Site((0.0, 0.0, 0.0), (0.0, 0.0, STANDARD_GRAVITY_M_S2))
+    )
+    return np.column_stack(moved(*felt, setup.offset_m)) / STANDARD_GRAVITY_M_S2
 
 
 def sample_times(setup: Setup, motion: Motion) -> tuple[Array, Array]:
@@ -149,9 +169,10 @@ def sample_times(setup: Setup, motion: Motion) -> tuple[Array, Array]:
     return (controller - setup.boot_s) / (1 + setup.drift), controller
 
 
-def readings(setup: Setup, rate: Array, rng: np.random.Generator) -> Array:
-    """Counts (n, 3) of a sensor that feels the flange's rate (n, 3)."""
-    turned = rate @ _rotation(np.array(setup.mounting_error_rad)).T
+def readings(setup: Setup, rate: Array, rng: np.random.Generator, force_g: Array | None = None) -> Array:
+    """Counts (n, 3) of a sensor that feels the flange's rate (n, 3) and what force there is."""
+    mounted = rotation(np.array(setup.mounting_error_rad))
+    turned = rate @ mounted.T
     turned = turned * (1 + setup.odd_per_rad_s * np.abs(turned) + setup.even_per_rad_s * turned)
     noise = rng.normal(size=turned.shape)
     if setup.noise_correlation:
@@ -159,6 +180,8 @@ def readings(setup: Setup, rate: Array, rng: np.random.Generator) -> Array:
         for i in range(1, len(noise)):
             noise[i] = setup.noise_correlation * noise[i - 1] + fresh[i]
     m = turned / np.array(setup.scale) - np.array(setup.bias_rad_s) + setup.noise_rad_s * noise
+    if force_g is not None:
+        m += force_g @ mounted.T @ np.array(setup.g_sensitivity_rad_s_per_g).T
     counts: Array = np.clip(np.round(m / SENSITIVITY), -32768, 32767)
     return counts
 
@@ -178,7 +201,7 @@ def run_data(setup: Setup, motion: Motion, board_s: Array, counts: Array) -> Run
     arm["q_rad"], arm["qd_rad_s"] = np.round(q / setup.encoder_step_rad) * setup.encoder_step_rad, qd
     arm["target_speed_fraction"] = arm["speed_scaling"] = 1.0
     arm["robot_mode"], arm["safety_mode"], arm["runtime_state"] = 7, 1, 2
-    provenance = replace(PROVENANCE, arm_kinematics=setup.told)
+    provenance = replace(PROVENANCE, arm_kinematics=setup.told, board_follows_crystal=setup.follows_crystal)
     return RunData(
         motion.config, motion.settings, provenance, {"gyro": SENSOR}, {"gyro": samples}, arm, motion.events()
     )
@@ -216,7 +239,7 @@ def _trapezoid(since_s: Array, step: Sweep | Transfer) -> tuple[Array, Array]:
     return np.where(since_s < step.duration_s / 2, half, way - half) / way, rate / way
 
 
-def _rotation(vector: Array) -> Array:
+def rotation(vector: Array) -> Array:
     angle = float(np.linalg.norm(vector))
     if angle == 0:
         return np.eye(3)

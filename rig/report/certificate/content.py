@@ -72,6 +72,15 @@ class Certificate:
         return f"robot arm {found.arm_maker} {found.arm_model}"
 
     @property
+    def procedure(self) -> str:
+        """The script that moved the arm, and its hash."""
+        said = self.provenance.model_dump()
+        name, sha256 = said.get("script"), said.get("script_sha256")
+        if name is None or sha256 is None:
+            return "a script of the rig's own, whose hash was not recorded"
+        return f"script {name}, SHA-256 {sha256}"
+
+    @property
     def provenance(self) -> ProvenanceEntry:
         """What was measured with what, and when."""
         return self.result.provenance

@@ -26,6 +26,7 @@ from rig.report.certificate.xml_parts import UNSAID, XSI, Part, dcc, real, text,
 
 DCC: Final = "certificate.xml"
 SCHEMA_VERSION = "3.2.1"
+DESCRIBED = "docs/method.md and docs/uncertainty.md of calibration-rig"
 # PTB's rules want a condition to each quantity.
 UNKNOWN_AIR = dcc(
     "influenceConditions",
@@ -97,7 +98,7 @@ def _core(c: Certificate) -> Element:
         None if order.received is None else words("receiptDate", order.received),
         words("beginPerformanceDate", begin),
         words("endPerformanceDate", end),
-        words("performanceLocation", "laboratory"),
+        words("performanceLocation", "other"),  # of the schema's words the one that states nothing
         words("issueDate", c.issued),
         amended or None,
     )
@@ -224,7 +225,7 @@ def _measured(c: Certificate, item: str, name: str, results: Iterator[Element], 
         "measurementResult",
         text("name", name),
         dcc("usedMethods", dcc("usedMethod", text("name", "whole turns and attitudes at rest on a robot arm"),
-                               text("description", "docs/method.md and docs/uncertainty.md of calibration-rig"),
+                               text("description", f"{DESCRIBED}; {c.procedure}"),
                                words("norm", "JCGM 100:2008"))),
         dcc("usedSoftware", _software(c)),
         dcc("measuringEquipments", _arm(c)),

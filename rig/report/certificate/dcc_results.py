@@ -4,14 +4,17 @@ from collections.abc import Iterator, Sequence
 from xml.etree.ElementTree import Element
 
 from rig.data.accelerometer_entries import AccelerometerEntry
+from rig.data.budget_entries import BudgetEntry
 from rig.data.drift_entries import DriftEntry
 from rig.data.earth_rate_entries import EarthRateEntry
 from rig.data.magnetometer_entries import MagnetometerEntry, ReversalEntry
 from rig.data.result_file import VectorEntry, VerificationEntry
 from rig.data.result_types import ErrorEntry
+from rig.estimation.coverage import COVERAGE_FACTOR, PROBABILITY
+from rig.report.certificate.budget_tables import coverage_sentence
 from rig.report.certificate.content import Gyroscope
-from rig.report.certificate.tables import ANGLES, AXES, JOINT_FACTOR, coverage_sentence
-from rig.report.certificate.xml_parts import dcc, real_list, text
+from rig.report.certificate.tables import ANGLES, AXES, JOINT_FACTOR
+from rig.report.certificate.xml_parts import Expanded, dcc, real_list, text
 
 ONE, RATE, ACCELERATION = r"\one", r"\radian\second\tothe{-1}", r"\metre\second\tothe{-2}"
 FIELD, ANGLE, PER_FORCE = r"\tesla", r"\radian", r"\second\tothe{2}\metre\tothe{-1}"
@@ -19,7 +22,6 @@ PER_ACCELERATION, KELVIN = r"\radian\second\metre\tothe{-1}", r"\kelvin\tothe{-1
 SIX = ("kx", "ky", "kz", "bx", "by", "bz")
 # Of three values at once: √χ² of three degrees of freedom at 95 %.
 JOINT_FACTOR_3 = 2.795
-TWO = 2.0
 SOLUTION = "Two standard deviations of the solution, k = 2."
 
 
@@ -27,12 +29,12 @@ def gyroscope(each: Gyroscope) -> Iterator[Element]:
     """Scale factors and biases with U of the budget, and with the combined covariance; what else was found of it."""
     sensor, budget = each.sensor, each.sensor.budget
     assert budget is not None and sensor.covariance_combined is not None  # or there is no digital certificate
-    covered, factor = coverage_sentence(budget), budget.coverage_factor
+    covered, (scale, bias) = coverage_sentence(budget), _expanded(budget)
     model = f"{sensor.model}: true rate g, reading m, K = diag(k)."
     yield _result("scale factor", f"{model} {covered}",
-                  real_list(AXES, sensor.scale, [ONE], expanded=(budget.expanded[:3], factor)))  # fmt: skip
+                  real_list(AXES, sensor.scale, [ONE], expanded=scale))  # fmt: skip
     yield _result("bias", f"{model} {covered}",
-                  real_list(AXES, sensor.bias_rad_s, [RATE], expanded=(budget.expanded[3:], factor)))  # fmt: skip
+                  real_list(AXES, sensor.bias_rad_s, [RATE], expanded=bias))  # fmt: skip
     yield _joint([*sensor.scale, *sensor.bias_rad_s], sensor.covariance_combined, RATE)
     if isinstance(sensor.vector_model, VectorEntry):
         yield _skew(sensor.vector_model.non_orthogonality_rad, sensor.vector_model.non_orthogonality_std_rad)
@@ -130,10 +132,16 @@ def _relative(
 ) -> Iterator[Element]:
     budget = found.budget
     assert budget is not None and found.covariance_combined is not None  # or there is no digital certificate
-    widths, factor, said = budget.expanded, budget.coverage_factor, f"{said} {coverage_sentence(budget)}"
-    yield _result(f"scale factor{how}", said, real_list(AXES, numbers[:3], [ONE], expanded=(widths[:3], factor)))
-    yield _result(f"bias{how}", said, real_list(AXES, numbers[3:], [unit], expanded=(widths[3:], factor)))
+    said, (scale, bias) = f"{said} {coverage_sentence(budget)}", _expanded(budget)
+    yield _result(f"scale factor{how}", said, real_list(AXES, numbers[:3], [ONE], expanded=scale))
+    yield _result(f"bias{how}", said, real_list(AXES, numbers[3:], [unit], expanded=bias))
     yield _joint(numbers, found.covariance_combined, unit, how)
+
+
+def _expanded(budget: BudgetEntry) -> tuple[Expanded, Expanded]:
+    """Of scale factors and of biases."""
+    of = budget.expanded, budget.factors, budget.probabilities
+    return Expanded(*(each[:3] for each in of)), Expanded(*(each[3:] for each in of))
 
 
 def _joint(numbers: list[float], covariance: Sequence[Sequence[float]], unit: str, how: str = "") -> Element:
@@ -153,7 +161,8 @@ def _spread(
 ) -> Element:
     """Values, from these and their standard deviations."""
     numbers, stds = found
-    return _result(name, said, real_list(labels, numbers, [unit], expanded=([TWO * std for std in stds], TWO)))
+    twice = Expanded([COVERAGE_FACTOR * std for std in stds], [COVERAGE_FACTOR], [PROBABILITY])
+    return _result(name, said, real_list(labels, numbers, [unit], expanded=twice))
 
 
 def _result(name: str, said: str, quantity: Element) -> Element:

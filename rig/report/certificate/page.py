@@ -5,7 +5,8 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 from rig.config.sensor_catalogue import has_own_port
-from rig.report.certificate import at_rest_tables, plots, tables
+from rig.data.provenance import NO_BOARD
+from rig.report.certificate import at_rest_tables, budget_tables, plots, rounding, tables, validity
 from rig.report.certificate.content import Certificate
 from rig.report.certificate.tables import DEG, JOINT_FACTOR
 
@@ -29,7 +30,7 @@ def _template() -> "Template":
     environment = Environment(
         loader=loader, autoescape=True, undefined=StrictUndefined, trim_blocks=True, lstrip_blocks=True
     )
-    environment.globals["has_own_port"] = has_own_port
-    for module in (tables, at_rest_tables, plots):
+    environment.globals |= {"has_own_port": has_own_port, "no_board": NO_BOARD}
+    for module in (rounding, tables, budget_tables, at_rest_tables, validity, plots):
         environment.globals |= {name: value for name, value in vars(module).items() if callable(value)}
     return environment.get_template(TEMPLATE)

@@ -12,6 +12,8 @@ from rig.data.magnetometer_entries import MagnetometerEntry
 from rig.data.result_file import AverageEntry, ObservationEntry, SensorEntry
 from rig.data.result_types import ErrorEntry
 from rig.estimation.arrays import Array
+from rig.report.certificate.budget_tables import shown_places
+from rig.report.certificate.tables import AXES
 
 WIDTH, LEFT, RIGHT = 340.0, 42.0, 8.0
 TOP, HEIGHT = 18.0, 104.0
@@ -19,6 +21,11 @@ NAMES, ROW, DECADES = 106.0, 13.0, 4
 RATES = ((1e3, "mrad/s"), (1e6, "µrad/s"))
 ACCELERATIONS = ((1.0, "m/s²"), (1e3, "mm/s²"), (1e6, "µm/s²"))
 FIELDS = ((1e6, "µT"), (1e9, "nT"))
+EXPECTED = "what noise, a wandering bias and the ends of turns are expected to leave"
+OF_SAMPLES = "the samples' scatter over the root of their number, which holds vibration that a mean leaves out"
+OF_ATTITUDES = "noise and of the arm's attitudes"
+OF_REPEATS = "what differs between repeats"
+FROM_MEAN = "less its mean"
 
 
 @dataclass(frozen=True, slots=True)
@@ -34,7 +41,10 @@ class Point:
 
 @dataclass(frozen=True, slots=True)
 class Residuals:
-    """Three values of each sweep, attitude or repeat; `ticks` are heights with their labels, rests begin at `split`."""
+    """Three values of each sweep, attitude or repeat; `ticks` are heights with their labels, rests begin at `split`.
+
+    `shown` is what the points are, `of` what the bars, two standard deviations, are of.
+    """
 
     points: tuple[Point, ...]
     ticks: tuple[tuple[float, str], ...]
@@ -42,12 +52,18 @@ class Residuals:
     split: float | None
     unit: str
     within: int
+    shown: str
+    of: str
 
 
 @dataclass(frozen=True, slots=True)
 class Contributions:
-    """How much each contributor makes of the combined uncertainty, on a logarithmic axis: (name, y, x of k, x of b)."""
+    """How much each contributor makes of the combined uncertainty, on a logarithmic axis: (name, y, x of k, x of b).
 
+    Of the values the budget is printed for, their `axes`.
+    """
+
+    axes: tuple[str, str]
     rows: tuple[tuple[str, float, float, float], ...]
     ticks: tuple[tuple[float, str], ...]
     end: float
@@ -59,32 +75,60 @@ def residuals(sensor: SensorEntry) -> Residuals | None:
     averages: list[ObservationEntry | AverageEntry] = [*sensor.observations, *sensor.rests]
     if isinstance(vector, ErrorEntry) or len(vector.residuals_rad_s) != len(averages) or not averages:
         return None
+    split = len(sensor.observations) if sensor.rests else None
+    left = np.array(vector.residuals_rad_s)
+    if vector.residuals_std_rad_s is not None:
+        return _marked(left, np.array(vector.residuals_std_rad_s), RATES, EXPECTED, split=split)
     # Not the average's own standard deviation, which counts as drift of the bias what gravity does to the rests.
     std = np.array([each.noise_rad_s for each in averages]) / np.sqrt([[each.samples] for each in averages])
-    split = len(sensor.observations) if sensor.rests else None
-    return _marked(np.array(vector.residuals_rad_s), std, RATES, split)
+    return _marked(left, std, RATES, OF_SAMPLES, split=split)
 
 
 def acceleration_residuals(found: AccelerometerEntry) -> Residuals:
     """What the model leaves of each attitude."""
-    left, std = ([getattr(each, name) for each in found.dwells] for name in ("residual_m_s2", "mean_std_m_s2"))
-    return _marked(np.array(left), np.array(std), ACCELERATIONS)
+    left, std, mean = (
+        np.array([getattr(each, name) for each in found.dwells])
+        for name in ("residual_m_s2", "mean_std_m_s2", "mean_m_s2")
+    )
+    turned = _turned(np.array(found.matrix), mean - np.array(found.bias_m_s2), found.attitude_error_rad)
+    return _marked(left, np.hypot(std, turned), ACCELERATIONS, OF_ATTITUDES)
 
 
 def field_residuals(found: MagnetometerEntry) -> Residuals:
     """The same of a magnetometer."""
-    left, std = ([getattr(each, name) for each in found.dwells] for name in ("residual_t", "mean_std_t"))
-    return _marked(np.array(left), np.array(std), FIELDS)
+    left, std, mean = (
+        np.array([getattr(each, name) for each in found.dwells]) for name in ("residual_t", "mean_std_t", "mean_t")
+    )
+    turned = _turned(np.array(found.matrix), mean - np.array(found.bias_t), found.attitude_error_rad)
+    return _marked(left, np.hypot(std, turned), FIELDS, OF_ATTITUDES)
+
+
+def _turned(matrix: Array, readings: Array, attitude_error_rad: float) -> Array:
+    """(n, 3) what readings (n, 3), the bias taken out, change by for attitudes off by that about each axis."""
+    reference = readings @ np.linalg.inv(matrix).T  # in the sensor's own frame
+    turns = attitude_error_rad * np.cross(np.eye(3)[None], reference[:, None])  # (n, 3 axes, 3)
+    found: Array = np.linalg.norm(turns @ matrix.T, axis=1)
+    return found
 
 
 def biases_by_repeat(quantity: str, found: DriftEntry) -> Residuals:
     """Less their mean over the repeats."""
     bias = np.array([each.held.bias for each in found.repeats])
     std = np.array([each.held.std for each in found.repeats])
-    return _marked(bias - bias.mean(axis=0), std, RATES if quantity == "rate" else ACCELERATIONS)
+    return _marked(
+        bias - bias.mean(axis=0), std, RATES if quantity == "rate" else ACCELERATIONS, OF_REPEATS, shown=FROM_MEAN
+    )
 
 
-def _marked(left: Array, std: Array, units: Sequence[tuple[float, str]], split: int | None = None) -> Residuals:
+def _marked(
+    left: Array,
+    std: Array,
+    units: Sequence[tuple[float, str]],
+    of: str,
+    *,
+    shown: str = "mean reading less model",
+    split: int | None = None,
+) -> Residuals:
     """Values (n, 3) side by side, their bars two standard deviations, in a unit that suits the largest."""
     bars = 2 * std
     reach, unit, factor = _scale(float((np.abs(left) + bars).max()), units)
@@ -101,7 +145,7 @@ def _marked(left: Array, std: Array, units: Sequence[tuple[float, str]], split: 
     points = tuple(point(place, axis) for place in range(len(left)) for axis in range(3))
     ticks = tuple((height(at / factor), f"{at:g}".replace("-", "−")) for at in (-reach / 1.1, 0.0, reach / 1.1))
     begins = None if split is None else round(LEFT + across * split, 1)
-    return Residuals(points, ticks, height(0.0), begins, unit, int((np.abs(left) <= bars).sum()))
+    return Residuals(points, ticks, height(0.0), begins, unit, int((np.abs(left) <= bars).sum()), shown, of)
 
 
 def _scale(largest: float, units: Sequence[tuple[float, str]]) -> tuple[float, str, float]:
@@ -112,18 +156,18 @@ def _scale(largest: float, units: Sequence[tuple[float, str]]) -> tuple[float, s
     return 1.1 * float(reach), unit, factor
 
 
-def contributions(budget: BudgetEntry) -> Contributions:
-    """Standard uncertainty over the combined one, of the axis for which that is the largest; at least 1e-4 is drawn."""
+def contributions(budget: BudgetEntry, scale: Sequence[float]) -> Contributions:
+    """Standard uncertainty over the combined one, for the values of the printed budget; at least 1e-4 is drawn."""
+    k, b = shown_places(budget, scale)
     across = (WIDTH - NAMES - RIGHT) / DECADES
 
     def place(share: float) -> float:
         return round(NAMES + across * (DECADES + float(np.log10(np.clip(np.sqrt(share), 10.0**-DECADES, 1.0)))), 1)
 
-    lines = sorted(budget.contributors, key=lambda line: -max(line.share))
+    lines = sorted(budget.contributors, key=lambda line: -max(line.share[k], line.share[b]))
     rows = tuple(
-        (line.name, TOP + ROW * (i + 0.5), place(max(line.share[:3])), place(max(line.share[3:])))
-        for i, line in enumerate(lines)
+        (line.name, TOP + ROW * (i + 0.5), place(line.share[k]), place(line.share[b])) for i, line in enumerate(lines)
     )
     labels = ("0.01 %", "0.1 %", "1 %", "10 %", "100 %")
     ticks = tuple((NAMES + across * i, label) for i, label in enumerate(labels))
-    return Contributions(rows, ticks, TOP + ROW * len(rows))
+    return Contributions((AXES[k], AXES[b - 3]), rows, ticks, TOP + ROW * len(rows))

@@ -4,6 +4,7 @@ from dataclasses import dataclass
 from decimal import ROUND_HALF_UP, Context, Decimal
 
 DIGITS = 2  # significant, of an uncertainty
+RAISED = str.maketrans("-0123456789", "⁻⁰¹²³⁴⁵⁶⁷⁸⁹")
 WIDE = Context(prec=1000)  # a value may have any size beside its uncertainty
 
 
@@ -37,6 +38,24 @@ def rounded(value: float, uncertainty: float) -> Rounded:
     if _to(wide, last).adjusted() > wide.adjusted():  # 0.0996 is 0.10
         last += 1
     return Rounded(_to(exact, last), _to(wide, last))
+
+
+def small(value: float) -> str:
+    """Two digits, in powers of ten."""
+    if value == 0:
+        return "0"
+    mantissa, exponent = f"{value:.1e}".split("e")
+    return f"{mantissa}\u00a0×\u00a0{power_of_ten(int(exponent))}"
+
+
+def power_of_ten(exponent: int) -> str:
+    """10 with its exponent raised."""
+    return f"10{str(exponent).translate(RAISED)}"
+
+
+def percent(share: float) -> str:
+    """Of the variance."""
+    return "<\u00a00.1\u00a0%" if share < 0.001 else f"{100 * share:.1f}\u00a0%"
 
 
 def _to(number: Decimal, exponent: int) -> Decimal:

@@ -6,16 +6,12 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from rig.data.budget_entries import BudgetEntry, ContributorEntry
 from rig.data.earth_rate_entries import EarthRateEntry
 from rig.data.result_file import CheckEntry, SensorEntry, VectorEntry, VerificationEntry
-from rig.report.certificate.rounding import rounded
+from rig.report.certificate.rounding import percent, rounded
 
 AXES = ("x", "y", "z")
 ANGLES = ("yz", "zx", "xy")
-NEGLIGIBLE = 0.001  # of every variance: lines below are summed up in one
-NOTHING = 1e-12  # of a variance
-ENOUGH_FREEDOM = 50.0  # degrees of it, for k = 2 to cover 95 % (EA-4/02 M:2022, annex E)
 JOINT_FACTOR = 3.548  # of six values at once: √χ² of six degrees of freedom at 95 %
 DEG = math.degrees(1)
 FINE_DEG_S = 1e-3
@@ -37,21 +33,6 @@ class AxisRow:
     scale: Pair
     bias: Pair
     bias_too: Pair
-
-
-@dataclass(frozen=True, slots=True)
-class BudgetRow:
-    """One contributor: what it does to the axis it matters most to, and its share of that variance."""
-
-    name: str
-    kind: str
-    distribution: str
-    assumed: str
-    freedom: str
-    scale: str
-    scale_share: str
-    bias: str
-    bias_share: str
 
 
 @dataclass(frozen=True, slots=True)
@@ -105,87 +86,6 @@ def _spread(sensor: SensorEntry) -> Sequence[float]:
 
 def _noise(sensor: SensorEntry) -> list[float]:
     return [sensor.covariance[i][i] ** 0.5 for i in range(6)]
-
-
-def budget_rows(budget: BudgetEntry, per_unit: float = 1.0) -> list[BudgetRow]:
-    """The largest of three axes, largest shares first; all negligible ones in one line.
-
-    Uncertainties of biases times `per_unit`.
-    """
-    lines = sorted(budget.contributors, key=lambda line: -max(line.share))
-    rows = [_budget_row(line, per_unit) for line in lines if max(line.share) >= NEGLIGIBLE]
-    small = [line for line in lines if max(line.share) < NEGLIGIBLE]
-    if small:
-        std = np.sqrt(np.sum(np.square([line.std for line in small]), axis=0))
-        names = ", ".join(line.name for line in small)
-        shares = np.square(std) / np.square(budget.std)
-        rows.append(_row((f"below 0.1 %: {names}", "", "", "", ""), std, shares, per_unit))
-    return rows
-
-
-def _budget_row(line: ContributorEntry, per_unit: float) -> BudgetRow:
-    stated = " (k = 2)" if line.distribution == "normal" else ""
-    assumed = "from readings" if line.half_width is None else f"±{line.half_width:.3g} {line.unit}{stated}"
-    said = line.name, line.kind, line.distribution, assumed, freedom_text(line.freedom)
-    return _row(said, line.std, line.share, per_unit)
-
-
-def _row(
-    said: tuple[str, str, str, str, str], std: Sequence[float], share: Sequence[float], per_unit: float
-) -> BudgetRow:
-    numbers = [
-        text
-        for part, unit in ((slice(0, 3), 1.0), (slice(3, 6), per_unit))
-        for text in (_part(unit * max(std[part]), max(share[part])), percent(max(share[part])))
-    ]
-    return BudgetRow(*said, *numbers)
-
-
-def _part(std: float, share: float) -> str:
-    """What is nothing but the arithmetic's rounding is not printed."""
-    return "0" if share < NOTHING else small(std)
-
-
-def small(value: float) -> str:
-    """Two digits, in powers of ten."""
-    if value == 0:
-        return "0"
-    mantissa, exponent = f"{value:.1e}".split("e")
-    return f"{mantissa}\u00a0×\u00a010{str(int(exponent)).translate(str.maketrans('-0123456789', '⁻⁰¹²³⁴⁵⁶⁷⁸⁹'))}"
-
-
-def percent(share: float) -> str:
-    """Of the variance."""
-    return "<\u00a00.1\u00a0%" if share < 0.001 else f"{100 * share:.1f}\u00a0%"
-
-
-def freedom_text(freedom: float | None) -> str:
-    """Degrees of freedom."""
-    return "∞" if freedom is None or freedom > 1e4 else f"{freedom:.0f}"
-
-
-def fewest_freedom(budget: BudgetEntry) -> float:
-    """Effective degrees of freedom of the result that has the fewest."""
-    return min(math.inf if each is None else each for each in budget.freedom)
-
-
-def coverage_sentence(budget: BudgetEntry) -> str:
-    """What k = 2 stands for: the sentence of EA-4/02 M:2022, 6.4, or that of its annex E where freedom is scarce."""
-    k = f"{budget.coverage_factor:g}"
-    begins = (
-        "The reported expanded uncertainty of measurement is the standard uncertainty of measurement multiplied by the "
-        f"coverage factor k\u00a0=\u00a0{k}, which for a "
-    )
-    freedom = fewest_freedom(budget)
-    if freedom >= ENOUGH_FREEDOM:
-        return f"{begins}normal distribution corresponds to a coverage probability of approximately 95 %."
-    from scipy.special import stdtr
-
-    covered = 1 - 2 * float(stdtr(freedom, -budget.coverage_factor))
-    return (
-        f"{begins}t-distribution with ν_eff\u00a0=\u00a0{freedom:.0f} effective degrees of freedom, the fewest "
-        f"of any value here, corresponds to a coverage probability of approximately {100 * covered:.0f} %."
-    )
 
 
 def check_row(check: CheckEntry) -> CheckRow:

@@ -1,6 +1,7 @@
 """The pieces of PTB's digital certificate: elements of DCC 3.2.1 and of D-SI 2.1, nothing about this rig."""
 
 from collections.abc import Iterable, Sequence
+from dataclasses import dataclass
 from datetime import date
 from xml.etree.ElementTree import Element, register_namespace
 
@@ -8,12 +9,22 @@ from rig.errors.quoting import printable
 
 DCC, SI = "https://ptb.de/dcc", "https://ptb.de/si"
 XSI = "http://www.w3.org/2001/XMLSchema-instance"
-PROBABILITY = 0.95
+JOINT_PROBABILITY = 0.95  # of an ellipsoid
+DIGITS = 4  # of a probability
 UNSAID = "not stated"
 for _prefix, _name in (("dcc", DCC), ("si", SI), ("xsi", XSI)):
     register_namespace(_prefix, _name)
 
 Part = Element | None
+
+
+@dataclass(frozen=True, slots=True)
+class Expanded:
+    """Expanded uncertainties U with coverage factors and probabilities: one of these for each U, or one for all."""
+
+    widths: Sequence[float]
+    factors: Sequence[float]
+    probabilities: Sequence[float]
 
 
 def dcc(name: str, *parts: Part, **attributes: str) -> Element:
@@ -67,21 +78,20 @@ def real_list(
     numbers: Sequence[float],
     units: Sequence[str],
     *,
-    expanded: tuple[Sequence[float], float] | None = None,
+    expanded: Expanded | None = None,
     region: tuple[Sequence[Sequence[float]], float] | None = None,
 ) -> Element:
-    """Values with U and its coverage factor, or with a covariance matrix and the factor of their joint region.
+    """Values with U and its coverage, or with a covariance matrix and the factor of their joint region.
 
     One unit stands for all values if there is but one.
     """
     uncertainty = covered = None
     if expanded is not None:
-        widths, factor = expanded
         uncertainty = si(
             "expandedUncXMLList",
-            values("uncertaintyXMLList", widths),
-            values("coverageFactorXMLList", [factor]),
-            values("coverageProbabilityXMLList", [PROBABILITY]),
+            values("uncertaintyXMLList", expanded.widths),
+            values("coverageFactorXMLList", _shortest(expanded.factors)),
+            values("coverageProbabilityXMLList", _shortest([round(each, DIGITS) for each in expanded.probabilities])),
         )
     if region is not None:
         covariance, factor = region
@@ -89,7 +99,7 @@ def real_list(
             "ellipsoidalRegionXMLList",
             _covariance(covariance, units if len(units) > 1 else [*units] * len(covariance)),
             values("coverageFactor", [factor]),
-            values("coverageProbability", [PROBABILITY]),
+            values("coverageProbability", [JOINT_PROBABILITY]),
         )
     return si(
         "realListXMLList",
@@ -99,6 +109,11 @@ def real_list(
         uncertainty,
         covered,
     )
+
+
+def _shortest(numbers: Sequence[float]) -> Sequence[float]:
+    """One number stands for as many that are the same."""
+    return numbers[:1] if len(set(numbers)) == 1 else numbers
 
 
 def _covariance(matrix: Sequence[Sequence[float]], units: Sequence[str]) -> Element:

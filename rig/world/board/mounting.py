@@ -77,6 +77,7 @@ def power_up(world: WorldSection, flash: FlashMemory, sensors: Collection[SpiDev
         unique_id=bytes.fromhex(world.board.unique_id),
         crystal_ppm=world.board.crystal_ppm,
         boot_time_s=time_s + world.board.boot_time_s,
+        has_crystal=world.board.crystal,
     )
 
 

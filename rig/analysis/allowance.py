@@ -1,0 +1,190 @@
+"""What arm and sensor may be off by in the pieces of a recording: a pattern for each thing that is not known.
+
+Each pattern is what one standard deviation of one thing does to all readings at once, as in the model of common errors
+(`rig.estimation.common_errors`), so that what they have in common excuses nothing that they do not. Nothing is allowed
+along the swept axis but what the arm's clock, encoders and times can do there.
+"""
+
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from rig.analysis.calibration import SensorResult, found_earth_rate
+from rig.analysis.consistency import Allowance
+from rig.analysis.pieces import REST, Pieces, Stretch
+from rig.analysis.seen import WAVE_SHARE, unknown_of
+from rig.analysis.surroundings import Surroundings
+from rig.arm.kinematics import AXIS_ERRORS, WAVES, WRIST_1, WRIST_2, WRIST_3, axis_errors, flange_axes
+from rig.config.sensor_catalogue import PARTS
+from rig.estimation.arrays import Array
+from rig.estimation.earth import EARTH_RATE_RAD_S
+from rig.estimation.earth_rate import EarthRate
+from rig.estimation.nonlinearity import FREE_PER_RAD_S, curvature
+
+ANGLES = (*AXIS_ERRORS, *(f"{wave} of wrist_1" for wave in WAVES))  # those of wrist 1 turn no axis, but its own speed
+WAVES_OF = {WRIST_1: ANGLES.index("cos of wrist_1"), WRIST_2: ANGLES.index("cos of wrist_2"),
+            WRIST_3: ANGLES.index("cos of wrist_3")}  # fmt: skip
+ZEROS = (ANGLES.index("zero of wrist_2"), ANGLES.index("zero of wrist_3"))  # of joints that stand beside one that turns
+STEPS = 24  # of a way, in which directions are taken to stand still
+STANDS_RAD = 1e-3  # what a joint that does not turn seems to
+
+
+@dataclass(frozen=True, slots=True)
+class Allowed:
+    """What is known of arm, site and sensor, each as a standard deviation.
+
+    `angles_rad` (17,) of each of `ANGLES`; `repeatability_rad` of a joint that was moved away and back; `jitter_s` of
+    the times of the arm's states; `earth_rad_s` (3, k) of the Earth's rate in the base's frame, for each way in which
+    it is not known; `odd_per_rad_s`, `even_per_rad_s` of the sensor's nonlinearity, which the solve finds or does not.
+    """
+
+    angles_rad: Array
+    repeatability_rad: float
+    jitter_s: float
+    earth_rad_s: Array
+    odd_per_rad_s: float
+    even_per_rad_s: float
+    finds_curve: bool
+
+
+def allowed(surroundings: Surroundings, name: str, result: SensorResult) -> Allowed:
+    """By what the configuration states and the recording tells.
+
+    A solve that finds the curve, from several speeds, takes nothing of it as known.
+    """
+    uncertainty, sensor = surroundings.uncertainty, result.sensor
+    steady = np.array([each.startswith(("twist", "zero")) for each in ANGLES])
+    finds_curve = result.explained is not None and result.explained.nonlinearity is not None
+    of_part = float(PARTS[sensor.part].nonlinearity / sensor.range_rad_s / np.sqrt(3))
+    return Allowed(
+        angles_rad=np.radians(uncertainty.axis_deg) / np.sqrt(3) * np.where(steady, 1.0, WAVE_SHARE),
+        repeatability_rad=float(np.radians(uncertainty.repeatability_deg) / np.sqrt(3)),
+        jitter_s=surroundings.state_jitter_s,
+        earth_rad_s=_earth(surroundings, name, sensor.part, found_earth_rate(result.earth)),
+        odd_per_rad_s=FREE_PER_RAD_S if finds_curve else of_part,
+        even_per_rad_s=FREE_PER_RAD_S if finds_curve else of_part,
+        finds_curve=finds_curve,
+    )
+
+
+def allow(known: Allowed, pieces: Pieces, ways: Pieces, matrix: Array) -> Allowance:
+    """For a sensor of that F (3, 3).
+
+    A solve of one speed has no even part of the sensor's curve, and what there is of it puts the bias off: sweeps and
+    rests are not excused by it.
+    """
+    of_sweeps = known if known.finds_curve else replace(known, even_per_rad_s=0.0)
+    return Allowance(patterns(pieces, matrix, of_sweeps), ways, patterns(ways, matrix, known))
+
+
+def _earth(surroundings: Surroundings, name: str, part: str, earth_rate: EarthRate | None) -> Array:
+    unknown = unknown_of(surroundings, name, part, earth_rate)
+    if unknown.earth_covariance_rad2_s2 is not None:
+        size, way = np.linalg.eigh(unknown.earth_covariance_rad2_s2)
+        return np.asarray(way * np.sqrt(size.clip(min=0.0)), dtype=np.float64)
+    ways = 3 if unknown.earth_rate else 0
+    return np.asarray(EARTH_RATE_RAD_S / np.sqrt(3) * np.eye(3)[:, :ways], dtype=np.float64)
+
+
+def patterns(pieces: Pieces, matrix: Array, known: Allowed) -> Array:
+    """(P, N, 3) rad/s in the readings of pieces, for a sensor of that F (3, 3)."""
+    of_the_arm = np.concatenate(
+        [
+            _of_angles(pieces, known),
+            _of_times(pieces, known.jitter_s),
+            *_of_speeds(pieces),
+            np.moveaxis(pieces.attitudes @ known.earth_rad_s, -1, 0),
+        ]
+    )
+    sizes = np.repeat([known.odd_per_rad_s, known.even_per_rad_s], 3)[:, None, None] / FREE_PER_RAD_S
+    found = np.concatenate([of_the_arm @ matrix.T, sizes * _curved(pieces.stretches, matrix)])
+    return np.asarray(found[found.any(axis=(1, 2))], dtype=np.float64)
+
+
+def _of_angles(pieces: Pieces, known: Allowed) -> Array:
+    """Of the arm's angles, and of those that do not come back to where they were: from sweep to sweep, way to way."""
+    each = np.zeros((len(ANGLES), *pieces.means_rad_s.shape))
+    again = []
+    for place, (sweep, stretch) in enumerate(zip(pieces.sweep, pieces.stretches, strict=True)):
+        if sweep == REST:
+            continue
+        each[:, place] = turned_by(stretch, 1 if sweep > REST else STEPS)
+        if sweep < REST:
+            for ends in _ends(stretch):
+                again.append(np.zeros(pieces.means_rad_s.shape))
+                again[-1][place] = np.hypot(known.repeatability_rad, stretch.unseen_rad) * ends
+    for visit in _visits(pieces):
+        there = np.isin(pieces.sweep, visit)[:, None]
+        again += [known.repeatability_rad * np.where(there, each[zero], 0.0) for zero in ZEROS]
+    return np.concatenate([known.angles_rad[:, None, None] * each, again])
+
+
+def _visits(pieces: Pieces) -> list[list[int]]:
+    """Sweeps that follow each other, of one joint, beside which the others stood where they were."""
+    found: list[list[int]] = []
+    stood = np.full(6, np.nan)
+    for sweep in np.unique(pieces.sweep[pieces.sweep > REST]).tolist():
+        stretch = pieces.stretches[int(np.argmax(pieces.sweep == sweep))]
+        q_rad = stretch.motion.angles(np.array([stretch.start_s, stretch.end_s]))
+        here = np.where(np.ptp(q_rad, axis=0) < STANDS_RAD, q_rad[0], np.inf)
+        if np.allclose(here, stood, rtol=0.0, atol=STANDS_RAD):
+            found[-1].append(sweep)
+        else:
+            found.append([sweep])
+        stood = here
+    return found
+
+
+def turned_by(stretch: Stretch, steps: int) -> Array:
+    """(17, 3) rad/s by which the mean rate of the flange is off in a stretch, for a radian of each of `ANGLES`."""
+    motion = stretch.motion
+    q_rad = motion.angles(np.linspace(stretch.start_s, stretch.end_s, steps + 1))
+    middle, moved = (q_rad[1:] + q_rad[:-1]) / 2, np.diff(q_rad, axis=0)
+    axes = flange_axes(middle, motion.kinematics)
+    off = np.zeros((len(ANGLES), 3))
+    for joint, first in WAVES_OF.items():
+        if np.ptp(q_rad[:, joint]) < STANDS_RAD:
+            continue
+        for here, by in zip(middle, moved[:, joint], strict=True):
+            off[: len(AXIS_ERRORS)] += by * axis_errors(here, joint, motion.kinematics)
+        waves = [wave(times * q_rad[:, joint]) for times in (1, 2) for wave in (np.cos, np.sin)]
+        off[first : first + len(WAVES)] += np.diff(waves) @ axes[:, :, joint]
+    return off / (stretch.end_s - stretch.start_s)
+
+
+def _ends(stretch: Stretch) -> list[Array]:
+    """(3,) rad/s for a radian by which one joint that moved was elsewhere before a way, or after it; for each."""
+    q_rad = stretch.motion.angles(np.array([stretch.start_s, stretch.end_s]))
+    axes = flange_axes(q_rad, stretch.motion.kinematics) / (stretch.end_s - stretch.start_s)
+    return [end[:, joint] for joint in WAVES_OF if np.ptp(q_rad[:, joint]) >= STANDS_RAD for end in axes]
+
+
+def _of_times(pieces: Pieces, jitter_s: float) -> Array:
+    """Of the times at which a sweep passes from one of its parts to the next: what one part gains the other loses."""
+    edges = [
+        (sweep, time_s)
+        for sweep in np.unique(pieces.sweep[pieces.sweep > REST])
+        for time_s in np.unique(pieces.times_s[pieces.sweep == sweep].round(6))
+    ]
+    lengths = np.diff(pieces.times_s)
+    found = np.zeros((len(edges), *pieces.means_rad_s.shape))
+    for place, (sweep, time_s) in enumerate(edges):
+        start, end = (np.abs(pieces.times_s - time_s) < 1e-5).T & (pieces.sweep == sweep)
+        found[place] = jitter_s * (end.astype(np.float64) - start)[:, None] * pieces.rates_rad_s / lengths
+    return found
+
+
+def _of_speeds(pieces: Pieces) -> list[Array]:
+    """Of sweeps whose ends lie between arm states that are far apart."""
+    off = pieces.speed_std[:, None] * pieces.rates_rad_s
+    return [np.where((pieces.sweep == sweep)[:, None], off, 0.0)[None] for sweep in np.unique(pieces.sweep)]
+
+
+def _curved(stretches: Sequence[Stretch], matrix: Array) -> Array:
+    """(6, N, 3) as `curvature`, means of what was felt at each moment."""
+    found = []
+    for stretch in stretches:
+        edges = np.linspace(stretch.start_s, stretch.end_s, STEPS + 1)
+        found.append(curvature(matrix, stretch.motion.rate((edges[1:] + edges[:-1]) / 2)).mean(axis=1))
+    return np.stack(found, axis=1)

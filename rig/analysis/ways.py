@@ -1,0 +1,129 @@
+"""The ways between sweeps and rests, each as one piece: the only turns that some axes make at another time.
+
+Each axis is swept in one stretch of time, so that the sweeps alone do not show that its scale factor changed before or
+after. On the ways the wrists turn by half a turn, from standing to standing, two of them at a time: so the sensor's
+mean reading is as well known by the arm as in a sweep, about axes that are not being swept.
+"""
+
+from collections.abc import Iterator, Sequence
+from dataclasses import replace
+from itertools import pairwise
+
+import numpy as np
+
+from rig.analysis.pieces import REST, Pieces, Stretch, beside, turned
+from rig.analysis.seen import since_first_s
+from rig.arm.kinematics import WRIST_1, flange_pose
+from rig.data.run_file import RunData
+from rig.estimation.arrays import Array
+from rig.estimation.explained import Explained
+from rig.observation.average import Stream, between
+from rig.observation.lines import lines, waves
+from rig.observation.observed_run import ObservedRun
+from rig.observation.timebase import MIN_RATE_RAD_S, ArmMotion
+from rig.observation.windows import rested, swept
+
+BEYOND_S = 0.1  # before it moves and after, in which an arm stands still that was slower than can be told
+SHORTEST_S, LONGEST_S = 0.5, 30.0
+SPARSE_S = 0.01  # samples that are farther apart miss what the servo's vibration does while it grows faster
+LOST = 0.01  # of the samples, at most
+STANDS_RAD = 1e-3
+STEPS = 48
+
+
+def with_ways(pieces: Pieces, name: str, recordings: Sequence[ObservedRun], explained: Explained) -> Pieces:
+    """The same pieces, and all ways on which only the wrists turned; their places count down from below `REST`.
+
+    Their noise is that of the other pieces, for as long as they last.
+    """
+    found = [
+        (way, stream, since_s, each)
+        for each, since_s in zip(recordings, since_first_s(recordings), strict=True)
+        for stream in [each.stream(name)]
+        for way in _ways(each.run, stream, each.motion)
+    ]
+    if not found:
+        return pieces
+    density = np.median(pieces.variances_rad2_s2 * np.diff(pieces.times_s), axis=0)
+    means, rates, attitudes, pulls = [], [], [], []
+    for way, stream, _, each in found:
+        inside = between(stream, way.start_s, way.end_s)
+        rate, readings = way.motion.rate(stream.time_s[inside]), stream.readings_rad_s[inside]
+        cycles, share = lines(readings - rate @ explained.solution.matrix.T), _share(way, stream.time_s[inside])
+        attitude = way.motion.attitude(way.start_s, way.end_s)
+        site = each.run.settings.site
+        assert site is not None
+        means.append(beside(waves(cycles, share), readings, np.zeros(len(rate), dtype=np.intp), 1)[0][0])
+        turn = turned(way.motion, way.start_s, way.end_s, cycles, 1)[0]
+        rates.append(turn + attitude @ explained.seen.earth_rate_rad_s)
+        attitudes.append(attitude)
+        pulls.append(_pull(way, site.down_m_s2, np.array(each.run.settings.extension_m)))
+    times_s = np.array([(way.start_s + since_s, way.end_s + since_s) for way, _, since_s, _ in found])
+    count = len(found)
+    return replace(
+        pieces,
+        sweep=np.concatenate([pieces.sweep, REST - 1 - np.arange(count)]),
+        place=np.concatenate([pieces.place, np.zeros(count)]),
+        means_rad_s=np.concatenate([pieces.means_rad_s, means]),
+        variances_rad2_s2=np.concatenate([pieces.variances_rad2_s2, density / np.diff(times_s)]),
+        rates_rad_s=np.concatenate([pieces.rates_rad_s, rates]),
+        pull_m_s2=np.concatenate([pieces.pull_m_s2, pulls]),
+        attitudes=np.concatenate([pieces.attitudes, attitudes]),
+        speed_std=np.concatenate([pieces.speed_std, np.zeros(count)]),
+        times_s=np.concatenate([pieces.times_s, times_s]),
+        stretches=(*pieces.stretches, *(way for way, *_ in found)),
+    )
+
+
+def _ways(run: RunData, stream: Stream, motion: ArmMotion) -> Iterator[Stretch]:
+    """Every one, from before the arm moves to when it stands, in which nothing is missing."""
+    windows = sorted([*(each.window for each in swept(run)), *rested(run)], key=lambda window: window.start_s)
+    for before, after in pairwise(windows):
+        yield from _moved(before.end_s, after.start_s, stream, motion)
+    if windows:
+        yield from _moved(float(motion.time_s[0]), windows[0].start_s, stream, motion)
+        yield from _moved(windows[-1].end_s, float(motion.time_s[-1]), stream, motion)
+
+
+def _moved(start_s: float, end_s: float, stream: Stream, motion: ArmMotion) -> Iterator[Stretch]:
+    inside = (motion.time_s >= start_s) & (motion.time_s <= end_s)
+    moving = motion.time_s[inside][np.linalg.norm(motion.rate(motion.time_s[inside]), axis=1) > MIN_RATE_RAD_S]
+    if not len(moving):
+        return
+    start_s, end_s = max(start_s, moving[0] - BEYOND_S), min(end_s, moving[-1] + BEYOND_S)
+    samples = between(stream, start_s, end_s)
+    time_s = stream.time_s[samples]
+    if len(time_s) < 2 or np.diff(time_s).mean() > SPARSE_S:
+        return
+    # Samples add up to all of a way but for the corners of the rate: for each at most its change of slope times dt²/12.
+    step_s = float(time_s[-1] - time_s[0]) / (len(time_s) - 1)
+    unseen_rad = float(np.linalg.norm(motion.rate(moving, 1), axis=1).max() * step_s**2 / 6)
+    way = Stretch(motion, float(time_s[0]) - step_s / 2, float(time_s[-1]) + step_s / 2, unseen_rad)
+    whole = len(time_s) >= (1 - LOST) * (way.end_s - way.start_s) * stream.sensor.rate_hz
+    ends = np.linalg.norm(motion.rate(np.array([way.start_s, way.end_s])), axis=1)
+    others = motion.angles(np.linspace(way.start_s, way.end_s, STEPS))[:, :WRIST_1]
+    in_range = np.abs(stream.raw["counts"][samples].astype(np.int64)).max(initial=0) < stream.sensor.full_scale_counts
+    if (
+        SHORTEST_S < way.end_s - way.start_s < LONGEST_S
+        and whole
+        and in_range
+        and ends.max() < 2 * MIN_RATE_RAD_S
+        and np.ptp(others, axis=0).max() < STANDS_RAD
+        and motion.covered(time_s).all()
+    ):
+        yield way
+
+
+def _share(way: Stretch, time_s: Array) -> Array:
+    share: Array = (time_s - way.start_s) / (way.end_s - way.start_s)
+    return share
+
+
+def _pull(way: Stretch, down_m_s2: Array, extension_m: Array) -> Array:
+    """(3,) what is felt as gravity in the mean: gravity less the acceleration of where the sensors sit."""
+    time_s, step_s = np.linspace(way.start_s, way.end_s, STEPS, retstep=True)
+    pose = flange_pose(way.motion.angles(time_s), way.motion.kinematics)
+    place_m = pose[:, :3, 3] + pose[:, :3, :3] @ extension_m
+    acceleration = np.diff(place_m, n=2, axis=0) / step_s**2
+    felt = np.einsum("nji,nj->ni", pose[1:-1, :3, :3], down_m_s2 - acceleration)
+    return np.asarray(felt.mean(axis=0), dtype=np.float64)

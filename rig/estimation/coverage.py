@@ -1,0 +1,63 @@
+"""Coverage: by what a standard uncertainty u is multiplied, so that value ± U holds the true value 95.45 times in 100.
+
+An uncertainty that is itself known from few readings needs more than two of it: U = k u with k of Student's t for the
+effective degrees of freedom ν (JCGM 100, G.3 and G.6.4; EA-4/02 M:2022, annex E). 95.45 % is what two standard
+deviations of a normal distribution hold, so that k goes to 2 where ν has no end.
+"""
+
+import math
+
+import numpy as np
+from numpy.typing import ArrayLike
+
+from rig.estimation.arrays import Array
+
+COVERAGE_FACTOR = 2.0  # for ν → ∞, and where nobody counts ν
+PROBABILITY = math.erf(COVERAGE_FACTOR / math.sqrt(2))
+ROUNDING = 1e-9  # of ν, which may be a whole number but for the arithmetic
+
+
+def coverage_factors(freedom: ArrayLike) -> Array:
+    """k for degrees of freedom of any shape, infinite ones among them."""
+    whole, factors = _whole(freedom), np.full(np.shape(freedom), COVERAGE_FACTOR)
+    if np.isfinite(whole).any():
+        from scipy.special import stdtrit
+
+        known = np.isfinite(whole)
+        factors[known] = stdtrit(whole[known], (1 + PROBABILITY) / 2)
+    return factors
+
+
+def covered(factors: ArrayLike, freedom: ArrayLike) -> Array:
+    """The probability that value ± k u holds the true value, for k and ν of one shape."""
+    return 1 - 2 * beyond(factors, freedom)
+
+
+def beyond(distances: ArrayLike, freedom: ArrayLike) -> Array:
+    """The probability that the true value lies farther than this on one side, in standard uncertainties."""
+    away, whole = np.broadcast_arrays(np.asarray(distances, dtype=np.float64), _whole(freedom))
+    found = np.array([math.erfc(each / math.sqrt(2)) / 2 for each in away.ravel()]).reshape(away.shape)
+    if np.isfinite(whole).any():
+        from scipy.special import stdtr
+
+        known = np.isfinite(whole)
+        found[known] = stdtr(whole[known], -away[known])
+    return found
+
+
+def effective_freedom(variances: ArrayLike, freedom: ArrayLike) -> Array:
+    """ν (…) of sums of independent `variances` (n, …), each known with `freedom` (n, …): Welch–Satterthwaite.
+
+    JCGM 100, G.4.1; infinite where all are known.
+    """
+    parts, known = np.asarray(variances, dtype=np.float64), np.asarray(freedom, dtype=np.float64)
+    with np.errstate(divide="ignore", invalid="ignore"):
+        found = parts.sum(axis=0) ** 2 / np.sum(parts**2 / known, axis=0)
+    freedom_of_sums: Array = np.where(np.isnan(found), np.inf, found)  # of nothing at all
+    return freedom_of_sums
+
+
+def _whole(freedom: ArrayLike) -> Array:
+    """ν as a table has it: the next lower whole number (JCGM 100, G.6.4), one at least."""
+    whole: Array = np.floor(np.maximum(np.asarray(freedom, dtype=np.float64) * (1 + ROUNDING), 1.0))
+    return whole

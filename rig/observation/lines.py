@@ -1,0 +1,76 @@
+"""Vibrations found in readings: lines that stand out of the noise's spectrum, whether the encoders see them or not.
+
+A part of a revolution is too short for a vibration to average out in it: 4 mrad/s at 8 Hz leave 0.1 mrad/s in a second
+and a half, several times what the noise of a good gyroscope does.
+"""
+
+import numpy as np
+
+from rig.estimation.arrays import Array
+from rig.observation.tapered import MAIN_LOBE, shaped
+
+STANDS_OUT = 30.0  # over the median power: of white noise one bin in 10⁹ does
+MOST_LINES = 6
+SLOWEST = 8  # cycles in all the readings: what is slower is told badly from what the parts differ by
+APART = 2.5  # cycles in all the readings, from a line that was found
+PASSES = 2
+WIDE = 8  # columns of a line
+SAMPLES_EACH = 5  # are needed to find what one column has in them
+ALIKE = 1e-2  # columns that differ by less are one
+
+
+def lines(residuals: Array) -> Array:
+    """(k,) how many cycles each line makes in all of the residuals (n, 3); k may be zero."""
+    count, cycles = len(residuals), np.zeros(0)
+    most = min(MOST_LINES, count // (WIDE * SAMPLES_EACH))
+    share = np.arange(count) / count
+    while len(cycles) < most:
+        known = waves(cycles, share)
+        strongest = _strongest(residuals - known @ fitted(known, residuals), cycles)
+        if strongest is None:
+            break
+        cycles = _refined(np.append(cycles, strongest), residuals)
+    return cycles
+
+
+def waves(cycles: Array, share: Array) -> Array:
+    """(n, 8 k) cosine and sine of k lines where a share (n,) of the time is over.
+
+    Beside each stand both growing steadily, for a line that comes or goes, and both of one cycle more and one less:
+    what shakes in the room is felt so by a sensor that makes a turn.
+    """
+    each = [wave(2 * np.pi * np.outer(share, cycles + more)) for more in (0, -1, 1) for wave in (np.cos, np.sin)]
+    grown = [(2 * share - 1)[:, None] * wave for wave in each[:2]]
+    columns = np.stack(each[:2] + grown + each[2:], axis=2, dtype=np.float64)
+    return columns.reshape(len(share), WIDE * len(cycles))
+
+
+def fitted(columns: Array, values: Array) -> Array:
+    """(k, m) least squares of values (n, m) by such columns (n, k), some of which may be nearly alike."""
+    return np.asarray(np.linalg.lstsq(columns, values, rcond=ALIKE)[0], dtype=np.float64)
+
+
+def _strongest(left: Array, known: Array) -> float | None:
+    """Cycles of the line in readings (n, 3) that stands out most; None where there is none beside those known."""
+    powers = np.abs(np.fft.rfft(shaped(left), axis=0)) ** 2
+    powers /= np.median(powers[MAIN_LOBE:], axis=0) + np.finfo(np.float64).tiny
+    bins = np.arange(len(powers))
+    free = (bins >= SLOWEST) & (bins < len(powers) - 1) & (np.abs(bins[:, None] - known) > APART).all(axis=1)
+    best = int(np.argmax(np.where(free, powers.max(axis=1), 0.0)))
+    axis = int(np.argmax(powers[best]))
+    if not (free[best] and powers[best, axis] > STANDS_OUT):
+        return None
+    below, here, above = np.log(powers[best - 1 : best + 2, axis])
+    bend = below - 2 * here + above
+    return best + (float(np.clip(0.5 * (below - above) / bend, -0.5, 0.5)) if bend < 0 else 0.0)
+
+
+def _refined(cycles: Array, residuals: Array) -> Array:
+    """By what grows of a line a quarter of a cycle behind it: its phase."""
+    share = np.arange(len(residuals)) / len(residuals)
+    for _ in range(PASSES):
+        sizes = fitted(waves(cycles, share), residuals).reshape(len(cycles), WIDE, -1)
+        cosine, sine, cosine_grown, sine_grown = np.moveaxis(sizes, 1, 0)[:4]
+        late = np.sum(cosine_grown * sine - sine_grown * cosine, axis=1) / np.sum(cosine**2 + sine**2, axis=1)
+        cycles = cycles + np.clip(late / np.pi, -0.5, 0.5)
+    return cycles

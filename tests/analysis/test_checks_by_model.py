@@ -1,0 +1,136 @@
+"""What arm and sensor may be off by is allowed, and no more: p-values of undamaged recordings, and the least damage."""
+
+from collections.abc import Callable, Sequence
+
+import numpy as np
+import pytest
+
+from rig.analysis.calibration import observe_recordings, solve_observed
+from rig.analysis.contradictions import FALSE_ALARMS, SHARES, contradictions
+from rig.analysis.surroundings import surroundings_of
+from rig.analysis.verdict import Check
+from rig.data.run_file import RunData
+from rig.data.settings import RunSettings
+from rig.estimation.arrays import Array
+from rig.observation.windows import swept
+from support.drawn_recording import KINDS, Drawn, damaged, drawn
+from support.synthetic_run import Setup
+
+RATE = FALSE_ALARMS / (SHARES + 1)
+CHI_SQUARE = ("scale_changed", "loose_mounting", "cw_against_ccw", "residuals", "sweeps_against_rests")
+DIRECTION = np.array([1.0, -0.7, 0.5])
+
+
+def checked(run: RunData) -> tuple[Check, ...]:
+    recordings = observe_recordings([run])
+    results = solve_observed(run.sensors, recordings, surroundings=surroundings_of(recordings))
+    return contradictions(recordings, results, ["gyro"]).checks
+
+
+def failed(checks: Sequence[Check]) -> set[str]:
+    return {check.name.split(".")[1] for check in checks if not check.passed}
+
+
+def probability(check: Check) -> float:
+    """Of χ² as large, with as many degrees of freedom as the limit shows."""
+    from scipy.special import chdtrc, chdtri
+
+    limit = float(check.limit or 0.0)
+    freedom = min(range(1, 100), key=lambda each: abs(float(chdtri(each, RATE)) - limit))
+    return float(chdtrc(freedom, float(check.value or 0.0)))
+
+
+@pytest.mark.slow
+@pytest.mark.proof
+@pytest.mark.parametrize("kind", KINDS)
+def test_what_chance_says_of_undamaged_recordings_is_uniform(kind: str, thorough: bool) -> None:
+    """Over 120 recordings Kolmogorov and Smirnov refuse one true uniform distribution in 100, for each of 15."""
+    from scipy.stats import kstest
+
+    found: dict[str, list[float]] = {name: [] for name in CHI_SQUARE}
+    alarms = []
+    for seed in range(120 if thorough else 4):
+        checks = checked(drawn(seed, KINDS[kind]).run)
+        alarms.append(failed(checks))
+        for check in checks:
+            name = check.name.split(".")[1]
+            if name in found:
+                found[name].append(probability(check))
+    assert not any(alarms), alarms
+    for name, values in found.items():
+        assert kstest(values, "uniform").pvalue > 0.01 / len(CHI_SQUARE) / len(KINDS), (name, sorted(values))
+
+
+def later(seen: Drawn) -> Array:
+    """(n, 1) one in the second half, else zero."""
+    second = seen.time_s > (seen.time_s[0] + seen.time_s[-1]) / 2
+    return np.asarray(second[:, None], dtype=np.float64)
+
+
+def sweep_2(seen: Drawn) -> Array:
+    window = next(each.window for each in swept(seen.run) if each.sweep.index == 2)
+    inside = (seen.time_s >= window.start_s) & (seen.time_s <= window.end_s)
+    return np.asarray(inside[:, None], dtype=np.float64)
+
+
+def turned(angle_deg: float) -> Array:
+    from scipy.spatial.transform import Rotation
+
+    turn = Rotation.from_rotvec(np.radians(angle_deg) * np.array([0.6, -0.48, 0.64])).as_matrix()
+    return np.asarray(turn.T - np.eye(3), dtype=np.float64)
+
+
+# Each with the size that is told of an ADIS16465, and of a LSM9DS1 whose noise is 0.002 rad/s.
+DAMAGES: dict[str, tuple[float, float, Callable[[Drawn, float], Array]]] = {
+    "gain of all axes half-way": (6e-4, 9.5e-4, lambda seen, by: by * later(seen) * seen.felt_rad_s),
+    "gain of x half-way": (1.5e-3, 2e-3, lambda seen, by: by * later(seen) * seen.felt_rad_s * [1, 0, 0]),
+    "gain of y half-way": (1.5e-3, 2e-3, lambda seen, by: by * later(seen) * seen.felt_rad_s * [0, 1, 0]),
+    "gain of z half-way": (1.5e-3, 2e-3, lambda seen, by: by * later(seen) * seen.felt_rad_s * [0, 0, 1]),
+    "mounting half-way, °": (0.02, 0.075, lambda seen, by: later(seen) * (seen.felt_rad_s @ turned(by))),
+    "cw against ccw": (5e-4, 5.3e-4, lambda seen, by: by * np.maximum(seen.felt_rad_s, 0.0)),
+    "offset of one sweep, rad/s": (4e-4, 8e-4, lambda seen, by: by * sweep_2(seen) * DIRECTION),
+    "gain of one sweep": (6e-4, 1e-3, lambda seen, by: by * sweep_2(seen) * seen.felt_rad_s),
+}
+GOOD = {"ADIS16465": 0, "quiet LSM9DS1": 1}
+
+
+@pytest.mark.slow
+@pytest.mark.proof
+@pytest.mark.parametrize("name", DAMAGES)
+def test_the_least_damage_that_matters_is_told(name: str, thorough: bool) -> None:
+    *sizes, damage = DAMAGES[name]
+    for kind, place in GOOD.items():
+        for seed in range(20 if thorough else 1):
+            seen = drawn(500 + seed, KINDS[kind])
+            run = damaged(seen, KINDS[kind], damage(seen, float(sizes[place])))
+            assert failed(checked(run)), (kind, seed)
+
+
+@pytest.mark.slow
+def test_what_changes_on_one_axis_alone_is_told_by_the_ways_between_the_sweeps() -> None:
+    """The axis is swept in one stretch of time, and its gain changes after it: no sweep shows that."""
+    kind = KINDS["ADIS16465"]
+    seen = drawn(3, kind)
+    checks = checked(damaged(seen, kind, 2e-3 * later(seen) * seen.felt_rad_s * [0, 0, 1]))
+    assert failed(checks) <= {"axis_changed", "scale_changed"} and "axis_changed" in failed(checks)
+
+
+@pytest.mark.slow
+def test_a_recording_without_rests_or_with_several_speeds_is_held_to_the_model_too() -> None:
+    kind = KINDS["quiet LSM9DS1"]
+    without = Setup(rest_s=0.0)
+    several = Setup(procedure=(("speeds_deg_s", "[40, 90]"),))
+    for setup in (without, several):
+        checks = checked(drawn(11, kind, setup).run)
+        assert {check.name.split(".")[1] for check in checks} >= {"axis_changed", "scale_changed", "residuals"}
+        assert not failed(checks)
+
+
+@pytest.mark.slow
+def test_a_recording_of_before_is_held_to_the_tolerances_of_before() -> None:
+    from dataclasses import replace
+
+    run = drawn(1, KINDS["ADIS16465"]).run
+    before: RunSettings = replace(run.settings, reckoning=1)
+    checks = checked(replace(run, settings=before))
+    assert "axis_changed" not in {check.name.split(".")[1] for check in checks}

@@ -1,0 +1,39 @@
+"""Vibrations are found in readings as lines, and what a part of the readings keeps of them is taken out."""
+
+import numpy as np
+import pytest
+
+from rig.observation.lines import fitted, lines, waves
+
+COUNT, RATE_HZ, NOISE = 1200, 200.0, 4.5e-4
+
+
+def residuals(seed: int, hertz: float = 0.0, size: float = 0.0, turns: float = 0.0) -> np.ndarray:
+    """(n, 3) white noise and a vibration about one direction, of a sensor that meanwhile makes so many turns."""
+    rng = np.random.default_rng(seed)
+    time_s = np.arange(COUNT) / RATE_HZ
+    shaken = size * np.sqrt(2) * np.sin(2 * np.pi * hertz * time_s + rng.uniform(0, 6))
+    turned = 2 * np.pi * turns * np.arange(COUNT) / COUNT
+    felt = shaken[:, None] * np.column_stack([np.cos(turned), np.sin(turned), np.zeros(COUNT)])
+    return np.asarray(felt + NOISE * rng.standard_normal((COUNT, 3)))
+
+
+def test_white_noise_has_no_lines() -> None:
+    assert all(lines(residuals(seed)).size == 0 for seed in range(50))
+
+
+@pytest.mark.parametrize("turns", [0.0, 1.0])
+def test_of_a_vibration_hardly_more_is_left_than_the_noise(turns: float) -> None:
+    """Wherever its frequency lies between two bins, and though a sensor that turns feels it come and go."""
+    share = np.arange(COUNT) / COUNT
+    for seed, hertz in enumerate(np.linspace(8, 30, 12)):
+        seen = residuals(seed, float(hertz), 0.004, turns)
+        cycles = lines(seen)
+        columns = waves(cycles, share)
+        left = seen - columns @ fitted(columns, seen)
+        assert turns or np.abs(cycles - hertz * COUNT / RATE_HZ).min() < 0.05
+        assert left.std(axis=0).max() < 1.5 * NOISE  # of nine times the noise
+
+
+def test_readings_too_few_to_tell_a_line_have_none() -> None:
+    assert lines(residuals(1, 20.0, 0.1)[:40]).size == 0

@@ -1,0 +1,183 @@
+"""The budget on a certificate adds up to the U beside the value, and the digital certificate says the same of k."""
+
+import math
+import re
+from collections.abc import Iterator
+from pathlib import Path
+from xml.etree.ElementTree import fromstring
+
+import numpy as np
+import pytest
+from lxml import html
+
+from rig.analysis.calibration import DEFAULT_ESTIMATOR
+from rig.config.judging_sections import SiteSection
+from rig.data.accelerometer_entries import AccelerometerEntry
+from rig.data.budget_entries import BudgetEntry
+from rig.data.magnetometer_entries import MagnetometerEntry
+from rig.data.result_file import ResultDocument, SensorEntry, read_result
+from rig.estimation.coverage import coverage_factors
+from rig.plans.recorded import judged, open_run
+from rig.report.certificate.budget_tables import coverage_sentence, freedom_text
+from rig.report.certificate.dcc import digital_certificate
+from rig.report.certificate.page import certificate_page
+from rig.report.certificate.stated import Stated
+from rig.report.document import document_of
+from support.certified import certificate, everything, result
+from support.dcc_rules import schema_faults
+from support.frozen import RECORDINGS, frozen
+
+NAMES = {"dcc": "https://ptb.de/dcc", "si": "https://ptb.de/si"}
+GERMAN = Stated(SiteSection(country="DE"))
+BUDGETED = [each for each in frozen() if "budget" in (each / "result.json").read_text(encoding="utf-8")]
+
+
+def budgets(document: ResultDocument) -> Iterator[tuple[BudgetEntry, tuple[float, ...]]]:
+    """In the order of the certificate, each with its scale factors."""
+    rest = dict(document.accelerometers)
+    found: list[SensorEntry | AccelerometerEntry | MagnetometerEntry] = []
+    for name, sensor in document.sensors.items():
+        if sensor.role == "calibrate":
+            found += [sensor, *([rest.pop(name)] if name in rest else [])]
+    found += rest.values()
+    found += [each for each in document.magnetometers.values() if isinstance(each, MagnetometerEntry)]
+    yield from ((each.budget, each.scale) for each in found if each.budget is not None)
+
+
+def named(folder: Path) -> str:
+    return "/".join(folder.parts[-2:])
+
+
+def printed(document: ResultDocument) -> list[list[list[str]]]:
+    """The budgets on the page: rows of cells."""
+    page = html.fromstring(certificate_page(certificate(document, GERMAN)))
+    return [
+        [[" ".join(cell.text_content().split()) for cell in row] for row in table.iter("tr")]
+        for table in page.find_class("budget")
+    ]
+
+
+def check_adds_up(rows: list[list[str]], budget: BudgetEntry) -> None:
+    heading, *lines, combined, expanded = rows
+    for column, quantity in ((5, slice(0, 3)), (7, slice(3, 6))):
+        parts = [line[column] for line in lines]
+        u, big_u, k = combined[column - 4], expanded[column - 4], expanded[column - 3]
+        step = 10.0 ** -len(u.partition(".")[2])
+        together = math.sqrt(sum(float(part) ** 2 for part in parts))
+        assert together == pytest.approx(float(u), abs=step * (0.5 + 0.5 * math.sqrt(len(parts)))), heading[column]
+        assert float(big_u) == pytest.approx(float(k.removeprefix("× ")) * float(u), rel=0.004, abs=step)
+        axis = "xyz".index(re.findall(r"[kb]([xyz])", heading[column])[0])
+        known = " ".join(freedom_text(budget.known[quantity][axis]).split())
+        assert combined[column - 3] == f"ν {known}"
+
+
+@pytest.mark.parametrize("folder", BUDGETED, ids=named)
+def test_the_lines_of_every_budget_add_up_to_the_uncertainty_that_is_printed(folder: Path) -> None:
+    document = read_result(folder)
+    tables, stated = printed(document), list(budgets(document))
+    assert len(tables) == len(stated) > 0
+    for rows, (budget, scale) in zip(tables, stated, strict=True):
+        check_adds_up(rows, budget)
+        for first, relative in ((0, np.array(scale)), (3, np.ones(3))):
+            axis = int(np.argmax(np.array(budget.expanded[first : first + 3]) / relative))
+            (shown,) = re.findall(rf"u\({'kb'[first // 3]}([xyz])\)", " ".join(rows[0]))
+            assert shown == "xyz"[axis], "of the axis that is known least"
+        every = np.sqrt(np.sum(np.square([line.std for line in budget.contributors]), axis=0))
+        np.testing.assert_allclose(every, budget.std, rtol=1e-9, err_msg="of the others in result.json")
+
+
+def test_a_budget_with_counted_freedom_adds_up_and_every_scatter_has_a_number() -> None:
+    document = everything()
+    for rows, (budget, _) in zip(printed(document), budgets(document), strict=True):
+        check_adds_up(rows, budget)
+    (sensor,) = result().sensors.values()
+    assert sensor.budget is not None
+    (rows,) = printed(result())
+    of_type = {line[0]: (line[1], line[4]) for line in rows[1:-2]}
+    assert of_type["noise"][0] == "A" and re.fullmatch(r"\d+(\.\d)?( × 10[⁰¹²³⁴⁵⁶⁷⁸⁹]+)?", of_type["noise"][1])
+    assert all(freedom == "∞" for kind, freedom in of_type.values() if kind == "B")
+    assert not any(freedom == "∞" for kind, freedom in of_type.values() if kind == "A")
+
+
+def scarce(document: ResultDocument) -> ResultDocument:
+    """The same where biases are known with few degrees of freedom, differently along each axis."""
+    sensor = document.sensors["gyro"]
+    assert sensor.budget is not None
+    known, factors = (4000.0, 5000.0, 6000.0, 9.0, 17.0, 26.0), (2.0, 2.0, 2.0, 2.32, 2.16, 2.10)
+    changed = {
+        "freedom": known,
+        "coverage_factors": factors,
+        "coverage_factor": max(factors),
+        "expanded": tuple(np.multiply(factors, sensor.budget.std).tolist()),
+    }
+    budget = sensor.budget.model_copy(update=changed)
+    return document.model_copy(update={"sensors": {"gyro": sensor.model_copy(update={"budget": budget})}})
+
+
+@pytest.mark.parametrize(
+    "document",
+    [result(), scarce(result()), *map(read_result, BUDGETED)],
+    ids=["today", "scarce", *map(named, BUDGETED)],
+)
+def test_k_and_its_probability_are_the_same_on_the_page_and_in_the_digital_certificate(
+    document: ResultDocument,
+) -> None:
+    made = certificate(document, GERMAN)
+    xml, page = digital_certificate(made), " ".join(html.fromstring(certificate_page(made)).text_content().split())
+    assert schema_faults(xml) == []
+    results = fromstring(xml).iterfind(".//dcc:result", NAMES)
+    stated = [
+        each for each in results if "reported expanded" in (each.findtext("dcc:description/dcc:content", "", NAMES))
+    ]
+    of = list(budgets(document))
+    assert len(stated) == 2 * len(of)
+    for (scale, bias), (budget, _) in zip(zip(stated[::2], stated[1::2], strict=True), of, strict=True):
+        sentence = " ".join(coverage_sentence(budget).split())
+        assert sentence in page
+        factors, probabilities, widths = (
+            [number for each in (scale, bias) for number in listed(each, name)]
+            for name in ("coverageFactorXMLList", "coverageProbabilityXMLList", "uncertaintyXMLList")
+        )
+        np.testing.assert_allclose(np.divide(widths, factors), budget.std, rtol=1e-9)
+        covers = int(re.findall(r"approximately (\d+) %", sentence)[0])
+        assert covers == round(100 * min(probabilities))
+        assert ("95.45 %" in sentence) == (abs(min(probabilities) - 0.9545) < 5e-5)
+        assert ks_of(sentence) == [f"{each:.2f}" for each in factors]
+
+
+@pytest.mark.slow
+def test_a_recording_of_before_has_two_u_and_today_s_coverage_when_it_is_asked_for() -> None:
+    """A KVH 1775 that was at rest for little time: what its bias does is known from fifteen differences."""
+    run = open_run(RECORDINGS / "rig.settings-6" / "kvh1775")
+    before, today = (document_of(judged(each, DEFAULT_ESTIMATOR)) for each in (run, run.judged_by(["reckoning=2"])))
+    two, by_freedom = before.sensors["kvh"].budget, today.sensors["kvh"].budget
+    assert two is not None and by_freedom is not None
+    assert set(two.factors) == {2.0} and two.expanded == pytest.approx([2 * each for each in two.std])
+    np.testing.assert_allclose(by_freedom.std, two.std, rtol=1e-9)
+    assert by_freedom.factors == pytest.approx(coverage_factors(by_freedom.known))
+    assert 2.0 < by_freedom.factors[0] < 2.01 and by_freedom.factors[4] > 2.1
+    noise = {each.name: each.freedom for each in by_freedom.contributors}["noise"]
+    assert noise is not None and 20 < noise < 1e6 and two.contributors[0].freedom is None
+    for document in (before, today):
+        for rows, (budget, _) in zip(printed(document), budgets(document), strict=True):
+            check_adds_up(rows, budget)
+    bias = next(check for check in today.checks if check.name == "kvh.bias")
+    assert bias.uncertainty in by_freedom.expanded[3:] and bias.coverage_factor in by_freedom.factors[3:]
+
+
+def listed(found, name: str) -> list[float]:  # type: ignore[no-untyped-def]
+    """One for each of three values, of which one may stand for all."""
+    numbers = [float(each) for each in found.findtext(f".//si:{name}", "", NAMES).split()]
+    return numbers * 3 if len(numbers) == 1 else numbers
+
+
+def ks_of(sentence: str) -> list[str]:
+    """Of six values, from the words of the page."""
+    if "scale factors k" not in sentence:
+        (alike,) = re.findall(r"coverage factor k = ([\d.]+)", sentence)
+        return [f"{float(alike):.2f}"] * 6
+    found = []
+    for group in sentence.partition("scale factors k")[2].split("biases k"):
+        alike = re.findall(r"^ = ([\d.]+) ", group)
+        found += alike * 3 if alike else re.findall(r"[xyz] ([\d.]+) \(", group)
+    return found

@@ -1,0 +1,111 @@
+"""A certificate's pictures: their bars hold what the caption says, and what they say is said by the budget."""
+
+import numpy as np
+import pytest
+
+from rig.data.result_file import ResultDocument, VectorEntry, read_result
+from rig.report.certificate.budget_tables import budget_table
+from rig.report.certificate.page import certificate_page
+from rig.report.certificate.plots import (
+    EXPECTED,
+    HEIGHT,
+    OF_ATTITUDES,
+    OF_SAMPLES,
+    Residuals,
+    acceleration_residuals,
+    contributions,
+    field_residuals,
+    residuals,
+)
+from support.certified import accelerometer, certificate, everything, magnetometer, read, result
+from support.frozen import RECORDINGS
+
+
+def bars(picture: Residuals) -> np.ndarray:
+    """(n, 3) in the picture's unit: half their heights."""
+    (low, first), (high, second) = picture.ticks[0], picture.ticks[2]
+    unit = (float(second.replace("−", "-")) - float(first.replace("−", "-"))) / (low - high)
+    return unit * np.array([(each.low - each.high) / 2 for each in picture.points]).reshape(-1, 3)
+
+
+def test_bars_of_sweeps_and_rests_are_what_the_solve_expects_of_them() -> None:
+    sensor = result().sensors["gyro"]
+    assert isinstance(sensor.vector_model, VectorEntry) and sensor.vector_model.residuals_std_rad_s is not None
+    picture = residuals(sensor)
+    assert picture is not None and picture.of == EXPECTED
+    factor = {"mrad/s": 1e3, "µrad/s": 1e6}[picture.unit]
+    expected = 2 * factor * np.array(sensor.vector_model.residuals_std_rad_s)
+    np.testing.assert_allclose(bars(picture), expected, atol=0.01 * expected.max())
+    assert EXPECTED in read(certificate()).text
+
+
+def test_bars_of_results_of_before_are_called_what_they_are() -> None:
+    sensor = read_result(RECORDINGS / "rig.settings-6" / "imu").sensors["gyro"]
+    picture = residuals(sensor)
+    assert picture is not None and picture.of == OF_SAMPLES
+    assert "which holds vibration" in picture.of
+
+
+def test_bars_of_attitudes_hold_the_arm_s_error_across_gravity_and_noise_alone_along_it() -> None:
+    found = accelerometer()
+    noise, off = 1e-4, found.attitude_error_rad
+    one = found.dwells[0].model_copy(
+        update={"mean_m_s2": (9.81 + 0.3, -0.2, 0.1), "mean_std_m_s2": (noise, noise, noise)}
+    )
+    picture = acceleration_residuals(found.model_copy(update={"dwells": (one,)}))
+    assert picture.of == OF_ATTITUDES and picture.unit == "mm/s²"
+    across = 2e3 * np.hypot(noise, 9.81 * off)
+    np.testing.assert_allclose(bars(picture), [[2e3 * noise, across, across]], atol=0.02 * across)
+    field = magnetometer()
+    assert field_residuals(field).of == OF_ATTITUDES
+
+
+def test_frozen_attitudes_agree_with_their_bars() -> None:
+    """By noise alone most of them seemed to have failed."""
+    for name, kind in (("imu", "accelerometers"), ("magnetometer", "magnetometers")):
+        document = read_result(RECORDINGS / "rig.settings-6" / name)
+        for found in getattr(document, kind).values():
+            picture = (acceleration_residuals if kind == "accelerometers" else field_residuals)(found)
+            assert picture.within >= 0.85 * len(picture.points)
+
+
+def test_the_picture_of_contributions_is_of_the_values_of_the_budget() -> None:
+    sensor = result().sensors["gyro"]
+    assert sensor.budget is not None
+    table = budget_table(sensor.budget, sensor.scale, "rad/s")
+    picture = contributions(sensor.budget, sensor.scale)
+    assert picture.axes == tuple(each.axis for each in table.columns)
+    places = [each.place for each in table.columns]
+    for name, _, *drawn in picture.rows:
+        (line,) = (each for each in sensor.budget.contributors if each.name == name)
+        for place, x in zip(places, drawn, strict=True):
+            decades = np.log10(np.clip(line.std[place] / sensor.budget.std[place], 1e-4, 1.0))
+            assert x == pytest.approx(332 + decades * (332 - 106) / 4, abs=0.1)
+    assert picture.end > picture.rows[-1][1] and picture.end - 18 >= 13 * len(picture.rows) - 1
+
+
+def test_every_picture_has_words_of_its_own() -> None:
+    page = read(certificate(everything()))
+    assert HEIGHT > 0 and page.text.count("hold zero.") == 5
+    assert "What makes up the uncertainty of the scale factor of" in page.text
+
+
+def filled(document: ResultDocument) -> list[float]:
+    """How far down each printed sheet has lines, as a part of what it has room for."""
+    from weasyprint import HTML
+
+    parts = []
+    for page in HTML(string=certificate_page(certificate(document))).render().pages:
+        sheet = page._page_box
+        lines = [each for each in sheet.children[0].descendants() if type(each).__name__ == "LineBox"]
+        lowest = max(line.position_y + line.height for line in lines)
+        parts.append((lowest - sheet.margin_top) / sheet.height)
+    return parts
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("kind", ["imu", "verified", "bias_drift", "everything"])
+def test_no_sheet_but_the_last_is_left_half_empty(kind: str) -> None:
+    document = everything() if kind == "everything" else read_result(RECORDINGS / "rig.settings-6" / kind)
+    *before, _ = filled(document)
+    assert before and min(before) > 0.7

@@ -1,0 +1,169 @@
+"""Recordings of whole sensors on whole arms, drawn from what the configuration states of both: nothing is damaged.
+
+What the arm's encoders do not see lies within `uncertainty.*`, what the sensor does beside its noise within its data
+sheet: so p-values of checks that know as much, and no more, are uniform.
+"""
+
+from dataclasses import dataclass, replace
+
+import numpy as np
+from scipy.interpolate import CubicSpline
+
+from rig.arm.kinematics import NOMINAL, DenavitHartenberg, flange_attitude, flange_pose, flange_rate
+from rig.arm.motion import Sweep, Transfer
+from rig.config.sensor_catalogue import PARTS
+from rig.data.run_file import RecordedSensor, RunData
+from rig.data.settings import Uncertainty
+from rig.estimation.arrays import Array
+from rig.estimation.earth import EARTH_RATE_RAD_S, STANDARD_GRAVITY_M_S2
+from support.synthetic_run import SENSOR, Motion, Setup, rotation, run_data, sample_times
+
+WRISTS = (3, 4, 5)
+WAVE_SHARE = 0.3  # as the solver has it
+OUTWARDS_S = 0.1  # in which a joint that begins to move comes to where its friction holds it
+OCTAVES_S = (0.5, 2.0, 8.0, 32.0, 128.0)
+
+
+@dataclass(frozen=True, slots=True)
+class Kind:
+    """Of sensors: what is recorded of one, and standard deviations of what it does."""
+
+    sensor: RecordedSensor
+    noise_rad_s: float
+    flicker_rad_s: float
+    walk_rad_s_sqrt_s: float
+
+
+ADIS16465 = replace(
+    SENSOR,
+    part="adis16465",
+    serial_number="ADIS16465-001",
+    rate_hz=200.0,
+    range_rad_s=float(np.radians(500)),
+    sensitivity_rad_s_per_count=float(np.radians(0.025)) / 2**10,  # of its 32 bits, but for the last six
+    full_scale_counts=500 * 40 * 2**10,
+)
+KINDS = {
+    "noisy LSM9DS1": Kind(SENSOR, 0.035, 4.8e-5, 1e-5),
+    "quiet LSM9DS1": Kind(SENSOR, 0.002, 4.8e-5, 1e-5),
+    "ADIS16465": Kind(ADIS16465, 0.00045, 9.7e-6, 3e-7),
+}
+
+
+@dataclass(frozen=True, slots=True)
+class Drawn:
+    """A recording, and what its damage is planted with: the controller's time of each sample, and what was felt."""
+
+    run: RunData
+    time_s: Array
+    felt_rad_s: Array
+
+
+def drawn(seed: int, kind: Kind, setup: Setup | None = None) -> Drawn:
+    """The movement is that of `setup`, if any."""
+    rng = np.random.default_rng(seed)
+    setup = replace(
+        Setup() if setup is None else setup,
+        seed=seed,
+        sample_rate_hz=kind.sensor.rate_hz,
+        vibration=float(rng.uniform(0.0, 0.05)),
+        boot_s=float(rng.uniform(-1e4, 0.0)),
+        drift=float(rng.uniform(-5e-5, 5e-5)),
+    )
+    motion = Motion(setup, rng)
+    known = motion.settings.uncertainty
+    assert known is not None
+    board_s, time_s = sample_times(setup, motion)
+    q_rad, qd_rad_s, arm = _beside_the_encoders(motion, time_s, known, rng)
+    to_flange = flange_attitude(q_rad, arm)
+    place_m = CubicSpline(time_s, flange_pose(q_rad, arm)[:, :3, 3])
+    pull = np.einsum("nij,nj->ni", to_flange, [0.0, 0.0, -STANDARD_GRAVITY_M_S2] - place_m(time_s, 2))
+    room = EARTH_RATE_RAD_S * rng.uniform(-1, 1, 3)
+    turned = flange_rate(q_rad, qd_rad_s, arm) + to_flange @ room
+    felt = _felt(turned, pull, kind, rng)
+    bias = rng.uniform(-0.02, 0.02, 3) + _wandering(len(time_s), kind, rng)
+    read = felt + bias + kind.noise_rad_s * rng.standard_normal(felt.shape)
+    run = _looked_at_late(run_data(setup, motion, board_s, _counts(read, kind)), motion, setup, rng)
+    return Drawn(replace(run, sensors={"gyro": kind.sensor}), time_s, felt)
+
+
+def damaged(seen: Drawn, kind: Kind, by_rad_s: Array) -> RunData:
+    """With so much (n, 3) added to the readings."""
+    samples = seen.run.samples["gyro"].copy()
+    samples["counts"] += np.round(by_rad_s / kind.sensor.sensitivity_rad_s_per_count).astype(samples["counts"].dtype)
+    return replace(seen.run, samples={"gyro": samples})
+
+
+def _counts(read: Array, kind: Kind) -> Array:
+    full = kind.sensor.full_scale_counts
+    counts: Array = np.clip(np.round(read / kind.sensor.sensitivity_rad_s_per_count), -full, full)
+    return counts
+
+
+def _beside_the_encoders(
+    motion: Motion, time_s: Array, known: Uncertainty, rng: np.random.Generator
+) -> tuple[Array, Array, DenavitHartenberg]:
+    """True angles and speeds, and how the arm is made; the encoders see neither."""
+    q, qd = motion.joints(time_s)
+    axis_rad, again_rad = np.radians([known.axis_deg, known.repeatability_deg])
+    true, speed = q.copy(), qd.copy()
+    once, twice = WAVE_SHARE * axis_rad / np.sqrt(3) * rng.standard_normal((2, 2, 6))
+    for joint in WRISTS:
+        e = q[:, joint]
+        (a, b), (c, d) = once[:, joint], twice[:, joint]
+        true[:, joint] += a * np.cos(e) + b * np.sin(e) + c * np.cos(2 * e) + d * np.sin(2 * e)
+        speed[:, joint] *= 1 - a * np.sin(e) + b * np.cos(e) - 2 * c * np.sin(2 * e) + 2 * d * np.cos(2 * e)
+        true[:, joint] += axis_rad * rng.uniform(-1, 1)
+    off = np.zeros(6)
+    for step, end in zip(motion.plan.steps, motion.ends, strict=True):
+        if not isinstance(step, (Sweep, Transfer)):
+            continue
+        moves = np.not_equal(step.start_q_rad, step.target_q_rad)
+        then = np.where(moves, again_rad * rng.uniform(-1, 1, 6), off)
+        share = np.clip((time_s - (end - step.duration_s)) / OUTWARDS_S, 0, 1)
+        true += share[:, None] * (then - off)
+        speed += ((share > 0) & (share < 1))[:, None] * (then - off) / OUTWARDS_S
+        off = then
+    vibration, hertz = rng.uniform(0, 0.004), rng.uniform(8, 30)
+    speed[:, WRISTS] += vibration * np.sqrt(2) * np.cos(2 * np.pi * hertz * time_s[:, None] + rng.uniform(0, 6, 3))
+    twist = np.zeros(6)
+    twist[list(WRISTS)] = axis_rad * rng.uniform(-1, 1, 3)
+    alpha = tuple((np.array(NOMINAL.alpha_rad) + twist).tolist())
+    return true, speed, replace(NOMINAL, alpha_rad=alpha)
+
+
+def _felt(turned: Array, pull: Array, kind: Kind, rng: np.random.Generator) -> Array:
+    """(n, 3) by a sensor askew, whose axes are not square, not linear, and feel gravity."""
+    part = PARTS[kind.sensor.part]
+    along = turned @ rotation(rng.normal(0, np.radians(2), 3)).T
+    along = along @ (np.eye(3) + rng.normal(0, np.radians(0.2), (3, 3)))
+    curve = part.nonlinearity / kind.sensor.range_rad_s
+    along *= 1 + curve * rng.uniform(-1, 1, 3) * np.abs(along)
+    to_gravity = np.radians(part.g_sensitivity_deg_s_g) / STANDARD_GRAVITY_M_S2 * rng.uniform(-1, 1, (3, 3))
+    felt: Array = along / rng.uniform(0.9, 1.1, 3) + pull @ to_gravity.T
+    return felt
+
+
+def _wandering(count: int, kind: Kind, rng: np.random.Generator) -> Array:
+    """(n, 3) of a random walk and of processes that forget in times an octave or two apart."""
+    from scipy.signal import lfilter
+
+    step_s = 1 / kind.sensor.rate_hz
+    walk = rng.uniform(0.5, 3) * kind.walk_rad_s_sqrt_s * np.sqrt(step_s)
+    wandered = np.cumsum(walk * rng.standard_normal((count, 3)), axis=0)
+    size = rng.uniform(0.5, 1.5) * kind.flicker_rad_s / 2
+    for octave_s in OCTAVES_S:
+        memory = np.exp(-step_s / octave_s)
+        steps = size * np.sqrt(1 - memory**2) * rng.standard_normal((count, 3))
+        steps[0] = size * rng.standard_normal(3)
+        wandered += lfilter([1.0], [1.0, -memory], steps, axis=0)
+    return wandered
+
+
+def _looked_at_late(run: RunData, motion: Motion, setup: Setup, rng: np.random.Generator) -> RunData:
+    """The encoders are not looked at quite when a state says."""
+    arm = run.arm.copy()
+    late_s = rng.uniform(0, 1e-4) * rng.standard_normal(len(arm))
+    q_rad, _ = motion.joints(arm["time_s"] + late_s)
+    arm["q_rad"] = np.round(q_rad / setup.encoder_step_rad) * setup.encoder_step_rad
+    return replace(run, arm=arm)
