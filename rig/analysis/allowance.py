@@ -36,7 +36,7 @@ class Allowed:
 
     `angles_rad` (17,) of each of `ANGLES`; `repeatability_rad` of a joint that was moved away and back; `jitter_s` of
     the times of the arm's states; `earth_rad_s` (3, k) of the Earth's rate in the base's frame, for each way in which
-    it is not known; `odd_per_rad_s`, `even_per_rad_s` of the sensor's nonlinearity, which the solve finds or does not.
+    it is not known; `odd_per_rad_s`, `even_per_rad_s` of the sensor's nonlinearity.
     """
 
     angles_rad: Array
@@ -45,13 +45,13 @@ class Allowed:
     earth_rad_s: Array
     odd_per_rad_s: float
     even_per_rad_s: float
-    finds_curve: bool
 
 
 def allowed(surroundings: Surroundings, name: str, result: SensorResult) -> Allowed:
     """By what the configuration states and the recording tells.
 
-    A solve that finds the curve, from several speeds, takes nothing of it as known.
+    A solve that finds the curve, from several speeds, takes nothing of it as known. One of a single speed has no even
+    part, and what there is of it puts the bias off: sweeps and rests are not excused by it.
     """
     uncertainty, sensor = surroundings.uncertainty, result.sensor
     steady = np.array([each.startswith(("twist", "zero")) for each in ANGLES])
@@ -63,19 +63,17 @@ def allowed(surroundings: Surroundings, name: str, result: SensorResult) -> Allo
         jitter_s=surroundings.state_jitter_s,
         earth_rad_s=_earth(surroundings, name, sensor.part, found_earth_rate(result.earth)),
         odd_per_rad_s=FREE_PER_RAD_S if finds_curve else of_part,
-        even_per_rad_s=FREE_PER_RAD_S if finds_curve else of_part,
-        finds_curve=finds_curve,
+        even_per_rad_s=FREE_PER_RAD_S if finds_curve else 0.0,
     )
 
 
 def allow(known: Allowed, pieces: Pieces, ways: Pieces, matrix: Array) -> Allowance:
     """For a sensor of that F (3, 3).
 
-    A solve of one speed has no even part of the sensor's curve, and what there is of it puts the bias off: sweeps and
-    rests are not excused by it.
+    What is even of its curve is left free on the ways, which are faster than sweeps: it is no change with time.
     """
-    of_sweeps = known if known.finds_curve else replace(known, even_per_rad_s=0.0)
-    return Allowance(patterns(pieces, matrix, of_sweeps), ways, patterns(ways, matrix, known))
+    on_ways = replace(known, even_per_rad_s=FREE_PER_RAD_S)
+    return Allowance(patterns(pieces, matrix, known), ways, patterns(ways, matrix, on_ways))
 
 
 def _earth(surroundings: Surroundings, name: str, part: str, earth_rate: EarthRate | None) -> Array:
