@@ -153,7 +153,7 @@ def test_a_recording_of_before_has_two_u_and_today_s_coverage_when_it_is_asked_f
     two, by_freedom = before.sensors["kvh"].budget, today.sensors["kvh"].budget
     assert two is not None and by_freedom is not None
     assert set(two.factors) == {2.0} and two.expanded == pytest.approx([2 * each for each in two.std])
-    np.testing.assert_allclose(by_freedom.std, two.std, rtol=1e-9)
+    np.testing.assert_allclose(by_freedom.expanded, np.multiply(by_freedom.factors, by_freedom.std), rtol=1e-9)
     assert by_freedom.factors == pytest.approx(coverage_factors(by_freedom.known))
     assert 2.0 < by_freedom.factors[0] < 2.01 and by_freedom.factors[4] > 2.1
     noise = {each.name: each.freedom for each in by_freedom.contributors}["noise"]

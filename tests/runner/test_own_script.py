@@ -14,6 +14,7 @@ import yaml
 
 from support.commands import configuration, python, rig, rig_here, wait_for_log
 from support.paths import ROOT
+from support.stated import solved_otherwise
 from support.worlds import merge
 
 OWN = ROOT / "tests" / "support" / "unequal_sweeps.py"
@@ -78,7 +79,7 @@ def test_an_interrupted_script_of_ones_own_is_resumed_by_itself(interrupted: Pat
     assert result["provenance"]["script"] == "mine.py"
     assert result["provenance"]["script_sha256"] == hashlib.sha256(OWN.read_bytes()).hexdigest()
     solved = rig_here("solve", interrupted, "--json")
-    assert json.loads(solved.stdout)["sensors"] == result["sensors"], solved.stderr
+    assert solved_otherwise(interrupted, solved.stdout) == [], solved.stderr
     (interrupted / "script.py").write_text("PROCEDURE = None", encoding="utf-8")
     assert "rig: another_script: " in rig_here("solve", interrupted).stderr, "it is judged as it was, or not at all"
 

@@ -15,6 +15,7 @@ import pytest
 import yaml
 
 from support.commands import configuration, rig, rig_here, wait_for_log
+from support.stated import solved_otherwise
 from support.worlds import merge
 
 pytestmark = pytest.mark.slow
@@ -84,10 +85,10 @@ def test_a_run_leaves_everything_in_its_folder(finished: tuple[Path, dict[str, A
 
 
 def test_solve_gives_the_numbers_of_the_run(finished: tuple[Path, dict[str, Any], Any]) -> None:
-    out, result, _ = finished
+    out, *_ = finished
     again = rig("solve", out / "run.h5", "--json")
     assert again.returncode == 0, again.stderr
-    assert json.loads(again.stdout)["sensors"] == result["sensors"]
+    assert solved_otherwise(out, again.stdout) == []
 
 
 def test_the_papers_algorithm_agrees(finished: tuple[Path, dict[str, Any], Any]) -> None:
@@ -141,7 +142,7 @@ def test_an_interrupted_run_is_kept_and_resumed(start: Start, tmp_path: Path) ->
     assert [o["sweep"] for o in result["sensors"]["gyro"]["observations"]] == [0, 1, 2, 3, 4, 5]
     assert len(result["sensors"]["gyro"]["time_bases"]) == 2
     assert resumed.stderr.count("done: sweep") == 4
-    assert json.loads(rig_here("solve", out, "--json").stdout)["sensors"] == result["sensors"]
+    assert solved_otherwise(out, rig_here("solve", out, "--json").stdout) == []
 
 
 @pytest.mark.proof

@@ -4,10 +4,11 @@ A processor's rounding is no difference, and neither is the order in which its k
 """
 
 from collections.abc import Iterable, Iterator, Sequence
+from pathlib import Path
 
 from rig.data.earth_rate_entries import EarthRateEntry
 from rig.data.magnetometer_entries import MagnetometerEntry
-from rig.data.result_file import AverageEntry, ComparisonEntry, ObservationEntry, ResultDocument
+from rig.data.result_file import AverageEntry, ComparisonEntry, ObservationEntry, ResultDocument, read_result
 from rig.history.parameters import Parameter, calibrated
 
 SHARE = 1e-6
@@ -27,6 +28,11 @@ def differences(expected: ResultDocument, found: ResultDocument) -> list[str]:
         if passed.get(check.name) is not check.passed
     ]
     return told if expected.verdict == found.verdict else [*told, f"verdict: {expected.verdict}, now {found.verdict}"]
+
+
+def solved_otherwise(run: Path, printed: str) -> list[str]:
+    """The same of a run's result and of what `rig solve --json` prints of it."""
+    return differences(read_result(run), ResultDocument.model_validate_json(printed))
 
 
 def moved_parameters(expected: Iterable[Parameter], found: Iterable[Parameter]) -> list[str]:
