@@ -13,7 +13,7 @@ from rig.analysis.magnetic_field import MagnetometerResult
 from rig.analysis.pieces import cut
 from rig.analysis.readings import judge_readings
 from rig.analysis.reference_contradictions import of_accelerometer, of_magnetometer, reference_statistics
-from rig.analysis.surroundings import surroundings_of
+from rig.analysis.surroundings import Surroundings, surroundings_of
 from rig.analysis.suspicion import Statistic
 from rig.analysis.verdict import Check
 from rig.analysis.ways import with_ways
@@ -35,16 +35,18 @@ class Contradictions:
 
 
 def contradictions(
-    recordings: Sequence[ObservedRun], results: Mapping[str, SensorResult], sensors: Sequence[str]
+    recordings: Sequence[ObservedRun],
+    results: Mapping[str, SensorResult],
+    sensors: Sequence[str],
+    surroundings: Surroundings | None,
 ) -> Contradictions:
     """Of these sensors' results; none in recordings of before there was a site, which keep the verdicts they had.
 
-    A sweep that is named is part of the name, `gyro.disturbed_sweep.3`.
+    `surroundings` are those of the recordings. A sweep that is named is part of the name, `gyro.disturbed_sweep.3`.
     """
     settings = recordings[0].run.settings
     if settings.site is None:
         return Contradictions((), frozenset())
-    surroundings = surroundings_of(recordings) if settings.checked_by_model else None
     checks: list[Check] = []
     disturbed: set[int] = set()
     rate = _rate(recordings[0].run, sensors)
@@ -54,7 +56,7 @@ def contradictions(
             continue
         pieces = cut(name, recordings, results[name], explained, settings.site)
         allowance = None
-        if surroundings is not None:
+        if surroundings is not None and settings.checked_by_model:
             known = allowed(surroundings, name, results[name])
             allowance = allow(known, pieces, with_ways(pieces, name, recordings, explained), explained.solution.matrix)
         found = consistency(pieces, explained.solution.matrix, rate, allowance)
@@ -123,7 +125,8 @@ def disturbed_sweeps(runs: Sequence[RunData]) -> frozenset[int]:
             return frozenset()
         sensors = runs[0].settings.to_calibrate
         chosen = {name: runs[0].sensors[name] for name in sensors}
-        results = solve_observed(chosen, recordings, surroundings=surroundings_of(recordings))
-        return contradictions(recordings, results, sensors).disturbed
+        surroundings = surroundings_of(recordings)
+        results = solve_observed(chosen, recordings, surroundings=surroundings)
+        return contradictions(recordings, results, sensors, surroundings).disturbed
     except RigError:
         return frozenset()

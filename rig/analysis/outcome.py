@@ -127,7 +127,7 @@ def calibrated(runs: Sequence[RunData], estimator: str = DEFAULT_ESTIMATOR, *, d
         checks=(
             *checks,
             *(check for name, agreed in onboard.items() for check in agreed.checks(name)),
-            *contradictions(recordings, results, settings.to_calibrate).checks,
+            *contradictions(recordings, results, settings.to_calibrate, surroundings).checks,
             *(clock_checks(surroundings.clock) if surroundings is not None and settings.holds_every_clock else ()),
             *_acceleration_checks(accelerometers, settings),
             *in_reference(recordings, accelerometers, magnetometers, drifting=drifting),

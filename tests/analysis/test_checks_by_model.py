@@ -23,8 +23,9 @@ DIRECTION = np.array([1.0, -0.7, 0.5])
 
 def checked(run: RunData) -> tuple[Check, ...]:
     recordings = observe_recordings([run])
-    results = solve_observed(run.sensors, recordings, surroundings=surroundings_of(recordings))
-    return contradictions(recordings, results, ["gyro"]).checks
+    surroundings = surroundings_of(recordings)
+    results = solve_observed(run.sensors, recordings, surroundings=surroundings)
+    return contradictions(recordings, results, ["gyro"], surroundings).checks
 
 
 def failed(checks: Sequence[Check]) -> set[str]:

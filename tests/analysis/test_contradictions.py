@@ -138,10 +138,12 @@ DAMAGES: dict[str, tuple[tuple[str, ...], Damage]] = {
 def judged(run: RunData) -> tuple[tuple[Check, ...], Array, Array]:
     """The checks, the six parameters and their standard deviations. Raises Fault."""
     recordings = observe_recordings([run])
-    results = solve_observed(run.sensors, recordings, surroundings=surroundings_of(recordings))
+    surroundings = surroundings_of(recordings)
+    results = solve_observed(run.sensors, recordings, surroundings=surroundings)
     solution = results["gyro"].solution
     found = np.concatenate([solution.scale, solution.bias_rad_s])
-    return contradictions(recordings, results, ["gyro"]).checks, found, np.sqrt(np.diag(solution.covariance))
+    checks = contradictions(recordings, results, ["gyro"], surroundings).checks
+    return checks, found, np.sqrt(np.diag(solution.covariance))
 
 
 def failed(checks: Sequence[Check]) -> set[str]:

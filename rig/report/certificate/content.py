@@ -7,6 +7,7 @@ from dataclasses import dataclass
 from datetime import date, datetime
 from types import MappingProxyType
 
+from rig.analysis.clock import BY_COMPUTER
 from rig.data.accelerometer_entries import AccelerometerEntry
 from rig.data.budget_entries import BudgetEntry
 from rig.data.drift_entries import DriftEntry
@@ -21,7 +22,6 @@ CONFORMITY = re.compile(
     r"\.(acceleration_)?(scale_deviation|bias|bias_drift|verification_rms|verification_mean|verification)$"
 )
 SIMULATED_ARM = "(simulated)"  # so ends the version of a controller that is none
-BY_COMPUTER = "the computer's clock"
 
 
 @dataclass(frozen=True, slots=True)
