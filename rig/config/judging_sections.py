@@ -248,6 +248,11 @@ class UncertaintySection(Section):
         description="change of a gyroscope's scale factor for 1 K; left out, what is known of the part",
         json_schema_extra={"unit": "ppm/K"},
     )
+    non_orthogonality_deg: float | None = Field(
+        default=None,
+        ge=0,
+        description="how far from 90° two axes of a gyroscope may stand; left out, what is known of the part",
+    )
     decision_rule: Literal["simple", "guard_band"] = Field(
         default="simple",
         description="what a limit is held against: `simple`, the value; `guard_band`, the value and its expanded "

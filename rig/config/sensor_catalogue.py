@@ -13,7 +13,7 @@ class Part:
 
     `g_sensitivity_deg_s_g` is how much a reading may change for 1 g, at most, `nonlinearity_percent` how far it may be
     from a straight line, of full scale, `bias_deg_s_k` and `scale_ppm_k` how much bias and scale may change with
-    temperature. `ranges_g` are those of its
+    temperature, `non_orthogonality_deg` how far from 90° two of its axes may stand. `ranges_g` are those of its
     accelerometer, which shares its data rate, the usual one first; `acceleration_noise_ug_sqrt_hz` is the noise density
     of that, in µg/√Hz. A part with a port of its own stands beside the board, with a clock of its own.
     """
@@ -27,6 +27,7 @@ class Part:
     nonlinearity_percent: float
     bias_deg_s_k: float
     scale_ppm_k: float
+    non_orthogonality_deg: float
     ranges_g: tuple[float, ...]
     acceleration_noise_ug_sqrt_hz: float
     own_port: bool = False
@@ -87,6 +88,7 @@ PARTS: Mapping[str, Part] = MappingProxyType(
             nonlinearity_percent=0.1,  # not stated; that of the MPU-9250, as what follows
             bias_deg_s_k=30 / 65,
             scale_ppm_k=4e4 / 65,
+            non_orthogonality_deg=1.15,
             ranges_g=(2, 4, 8, 16),
             acceleration_noise_ug_sqrt_hz=150,  # not stated; assumed
         ),
@@ -100,6 +102,7 @@ PARTS: Mapping[str, Part] = MappingProxyType(
             nonlinearity_percent=0.1,  # PS-MPU-9250A-01, table 1
             bias_deg_s_k=30 / 65,  # ±30 °/s from −40 to 85 °C (table 1), straight from 25 °C
             scale_ppm_k=4e4 / 65,  # ±4 % (table 1)
+            non_orthogonality_deg=1.15,  # cross-axis sensitivity ±2 % (table 1)
             ranges_g=(2, 4, 8, 16),
             acceleration_noise_ug_sqrt_hz=300,  # PS-MPU-9250A-01, section 3.2
         ),
@@ -113,6 +116,7 @@ PARTS: Mapping[str, Part] = MappingProxyType(
             nonlinearity_percent=0.2,  # assumed, as what follows: the data sheet of the part has it, not looked up
             bias_deg_s_k=0.2 / 60,
             scale_ppm_k=3e3 / 60,
+            non_orthogonality_deg=0.15,  # axis to axis ±0.05° (data sheet, features), taken for a standard deviation
             ranges_g=(8,),
             acceleration_noise_ug_sqrt_hz=23,  # assumed: the data sheet of the part has it, not looked up
         ),
@@ -126,6 +130,7 @@ PARTS: Mapping[str, Part] = MappingProxyType(
             nonlinearity_percent=0.005,  # assumed: 50 ppm, as of a scale factor of light
             bias_deg_s_k=1 / 3600 / 60,  # assumed: 1 °/h over 60 K
             scale_ppm_k=200 / 60,  # assumed: 200 ppm over as much
+            non_orthogonality_deg=0.06,  # assumed: 1 mrad
             ranges_g=(10, 25),
             acceleration_noise_ug_sqrt_hz=119,  # TRIAX, table 1: 0.0701 m/s/√h
             own_port=True,

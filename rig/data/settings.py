@@ -32,7 +32,9 @@ SCHEMAS = (*(f"rig.settings/{number}" for number in range(1, 7)), SCHEMA)
 RECKONING = 2  # of new recordings; see `RunSettings`
 
 DecisionRule = Literal["simple", "guard_band"]
-OfSensor = Literal["g_sensitivity_deg_s_g", "nonlinearity_percent", "bias_deg_s_k", "scale_ppm_k"]
+OfSensor = Literal[
+    "g_sensitivity_deg_s_g", "nonlinearity_percent", "bias_deg_s_k", "scale_ppm_k", "non_orthogonality_deg"
+]
 OF_SENSORS: tuple[OfSensor, ...] = get_args(OfSensor)
 Vector3 = tuple[Finite, Finite, Finite]
 
@@ -124,6 +126,7 @@ class Uncertainty:
     nonlinearity_percent: dict[str, Annotated[float, Field(ge=0)]] = field(default_factory=dict)
     bias_deg_s_k: dict[str, Annotated[float, Field(ge=0)]] = field(default_factory=dict)
     scale_ppm_k: dict[str, Annotated[float, Field(ge=0)]] = field(default_factory=dict)
+    non_orthogonality_deg: dict[str, Annotated[float, Field(ge=0)]] = field(default_factory=dict)
 
     def of(self, what: OfSensor, name: str, part: str) -> float:
         """That of a sensor of that name and kind; what is known of the part where nothing is said of the sensor."""
