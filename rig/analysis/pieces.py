@@ -15,9 +15,10 @@ from rig.analysis.calibration import SensorResult
 from rig.data.settings import Site
 from rig.estimation.arrays import Array
 from rig.estimation.explained import Explained
-from rig.observation.average import Average, Stream, between, rounding_left
+from rig.observation.average import Average, Stream, between
 from rig.observation.colour import widening
 from rig.observation.lines import fitted, lines, waves
+from rig.observation.mean import rounding_left
 from rig.observation.observe import Observation
 from rig.observation.observed_run import ObservedRun
 from rig.observation.tapered import noise_at_zero

@@ -14,8 +14,9 @@ from rig.analysis.pieces import Window as Read
 from rig.analysis.suspicion import Statistic
 from rig.estimation.arrays import Array
 from rig.observation.acceleration import DwellReading
-from rig.observation.average import Stream, between, mean_at_rest
+from rig.observation.average import Stream, between
 from rig.observation.field import dwelt_field
+from rig.observation.mean import mean_at_rest
 from rig.observation.observed_run import ObservedRun
 from rig.observation.windows import Window
 

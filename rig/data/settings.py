@@ -203,6 +203,11 @@ class RunSettings:
         return self.reckoning >= 2
 
     @property
+    def averages_beside_lines(self) -> bool:
+        """Whether what vibrates is taken out of a mean, and of its noise, as lines."""
+        return self.reckoning >= 2
+
+    @property
     def knows_returns(self) -> bool:
         """Whether an arm is taken to come back to a sweep's axis a little elsewhere every time."""
         return self.reckoning >= 2

@@ -11,7 +11,8 @@ from rig.data.run_file import RunData
 from rig.data.settings import ObservationThresholds
 from rig.errors import Fault
 from rig.estimation.arrays import Array
-from rig.observation.average import Mean, Stream, between, mean_at_rest
+from rig.observation.average import Stream, between
+from rig.observation.mean import Mean, mean_at_rest
 from rig.observation.timebase import ArmMotion
 from rig.observation.windows import Dwelt, Window, dwelt
 

@@ -1,5 +1,6 @@
 """How far the mean of residuals scatters that are not white: neighbours alike average out worse, vibration better."""
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -39,7 +40,7 @@ def noise_left(residuals: Array) -> float:
     return left_of(residuals).factor
 
 
-def left_of(residuals: Array) -> Left:
+def left_of(residuals: Array, memories: Sequence[int] = MEMORIES) -> Left:
     """The factor of `noise_left`, and the degrees of freedom of the variance it makes.
 
     White residuals have one less than there are. Of others twice the inverse of the spectrum's relative variance (JCGM
@@ -48,7 +49,7 @@ def left_of(residuals: Array) -> Left:
     if _correlations(residuals) is None:
         return Left(1.0, max(len(residuals) - 1.0, 1.0))
     centred = residuals - residuals.mean()
-    memories = [memory for memory in MEMORIES if memory * SAMPLES_EACH <= len(centred)]
+    memories = [memory for memory in memories if memory * SAMPLES_EACH <= len(centred)]
     _, spectrum_at_zero, memory = min(_autoregression(centred, memory, memories[-1]) for memory in memories)
     return Left(spectrum_at_zero / float(np.mean(centred**2)), _freedom(centred, memory))
 

@@ -11,7 +11,7 @@ from rig.data.settings import ObservationThresholds
 from rig.errors import Fault
 from rig.estimation.arrays import Array
 from rig.observation.acceleration import MIN_DWELL_SAMPLES, DwellReading, check_complete
-from rig.observation.average import Mean, mean_of
+from rig.observation.mean import Mean, mean_of
 from rig.observation.observed_run import ObservedRun
 from rig.observation.windows import Window, rested
 

@@ -9,7 +9,8 @@ import numpy as np
 from rig.estimation.arrays import Array
 from rig.observation.tapered import MAIN_LOBE, shaped
 
-STANDS_OUT = 30.0  # over the median power: of white noise one bin in 10⁹ does
+STANDS_OUT = 30.0  # over the median power: of noise one bin in 10⁹ does
+AROUND = 161  # bins, of which the median is taken
 MOST_LINES = 6
 SLOWEST = 8  # cycles in all the readings: what is slower is told badly from what the parts differ by
 APART = 2.5  # cycles in all the readings, from a line that was found
@@ -19,14 +20,17 @@ SAMPLES_EACH = 5  # are needed to find what one column has in them
 ALIKE = 1e-2  # columns that differ by less are one
 
 
-def lines(residuals: Array) -> Array:
-    """(k,) how many cycles each line makes in all of the residuals (n, 3); k may be zero."""
+def lines(residuals: Array, stands_out: float = STANDS_OUT) -> Array:
+    """(k,) how many cycles each line makes in all of the residuals (n, 3); k may be zero.
+
+    A line `stands_out` so far over the median power around it.
+    """
     count, cycles = len(residuals), np.zeros(0)
     most = min(MOST_LINES, count // (WIDE * SAMPLES_EACH))
     share = np.arange(count) / count
     while len(cycles) < most:
         known = waves(cycles, share)
-        strongest = _strongest(residuals - known @ fitted(known, residuals), cycles)
+        strongest = _strongest(residuals - known @ fitted(known, residuals), cycles, stands_out)
         if strongest is None:
             break
         cycles = _refined(np.append(cycles, strongest), residuals)
@@ -50,15 +54,18 @@ def fitted(columns: Array, values: Array) -> Array:
     return np.asarray(np.linalg.lstsq(columns, values, rcond=ALIKE)[0], dtype=np.float64)
 
 
-def _strongest(left: Array, known: Array) -> float | None:
+def _strongest(left: Array, known: Array, stands_out: float) -> float | None:
     """Cycles of the line in readings (n, 3) that stands out most; None where there is none beside those known."""
+    from scipy.ndimage import median_filter
+
     powers = np.abs(np.fft.rfft(shaped(left), axis=0)) ** 2
-    powers /= np.median(powers[MAIN_LOBE:], axis=0) + np.finfo(np.float64).tiny
+    powers[:MAIN_LOBE] = powers[MAIN_LOBE]
+    powers /= median_filter(powers, (AROUND, 1)) + np.finfo(np.float64).tiny  # noise may have a colour
     bins = np.arange(len(powers))
     free = (bins >= SLOWEST) & (bins < len(powers) - 1) & (np.abs(bins[:, None] - known) > APART).all(axis=1)
     best = int(np.argmax(np.where(free, powers.max(axis=1), 0.0)))
     axis = int(np.argmax(powers[best]))
-    if not (free[best] and powers[best, axis] > STANDS_OUT):
+    if not (free[best] and powers[best, axis] > stands_out):
         return None
     below, here, above = np.log(powers[best - 1 : best + 2, axis])
     bend = below - 2 * here + above

@@ -20,7 +20,16 @@ from rig.errors import Fault
 from rig.estimation.arrays import Array
 from rig.estimation.refusals import check_reading_ratio
 from rig.observation.acceleration import DwellReading, dwell_readings
-from rig.observation.average import Average, Stream, average, average_at_rest, between, on_the_arms_clock
+from rig.observation.average import (
+    Average,
+    Averaging,
+    Passing,
+    Stream,
+    average,
+    average_at_rest,
+    between,
+    on_the_arms_clock,
+)
 from rig.observation.feeling import check_dwells, check_other_way, check_rests
 from rig.observation.revolution import Revolution, arm_states_lost, describe, find_revolution
 from rig.observation.swept_acceleration import SweptAcceleration, swept_acceleration
@@ -142,7 +151,7 @@ def check_feeling(run: RunData, rests: Sequence[Average], dwells: Sequence[Dwell
 
 def rests_of(run: RunData, stream: Stream, motion: ArmMotion, superseded: Collection[int] = ()) -> tuple[Average, ...]:
     """Those in which the arm stood still for long enough, without those beside a step in `superseded`."""
-    found = (_rest(stream, motion, window, as_before=_as_before(run)) for window in rested(run, superseded))
+    found = (_rest(stream, motion, window, _way(run)) for window in rested(run, superseded))
     return tuple(rest for rest in found if rest is not None)
 
 
@@ -150,15 +159,17 @@ def _revolution(
     run: RunData, stream: Stream, motion: ArmMotion, finished: Finished, settings: ObservationThresholds
 ) -> Observation:
     turn = find_revolution(motion, finished.sweep, finished.window, settings)
-    seen = _observation(stream, motion, finished.sweep, turn, settings, as_before=_as_before(run))
+    seen = _observation(stream, motion, finished.sweep, turn, settings, way=_way(run))
     if stream.sensor.has_acceleration and run.settings.planned_dwells:
         return replace(seen, acceleration=swept_acceleration(stream, motion, finished.sweep, turn))
     return seen
 
 
-def _as_before(run: RunData) -> bool:
-    """Recordings of before there was a site are observed as they were then."""
-    return run.settings.site is None
+def _way(run: RunData) -> Averaging:
+    """Recordings of before are averaged as they were then."""
+    if run.settings.site is None:
+        return "correlated"
+    return "beside_lines" if run.settings.averages_beside_lines else "autoregressive"
 
 
 def bias_drift(rests: Sequence[Average]) -> Array:
@@ -193,11 +204,11 @@ def _observation(
     turn: Revolution,
     settings: ObservationThresholds,
     *,
-    as_before: bool,
+    way: Averaging,
 ) -> Observation:
     """Nothing is left in a mean of what comes once or twice in a turn: gravity, and the encoder's own error.
 
-    `as_before`: takes these for noise, and all that vibrates.
+    But where it is "correlated", which takes these for noise, and all that vibrates.
     """
     where = describe(sweep)
     inside = between(stream, turn.start_s, turn.end_s)
@@ -207,12 +218,14 @@ def _observation(
     covered = motion.covered(stream.time_s[inside])
     if covered.mean() < 0.5:
         raise arm_states_lost(where, "more than half the time")
-    passing = [motion.rate(stream.time_s[inside]) @ turn.axis_flange - turn.speed_rad_s]
-    if not as_before:
-        turned_rad = turn.speed_rad_s * (stream.time_s[inside] - turn.start_s)
-        passing += [wave(times * turned_rad) for times in (1, 2) for wave in (np.cos, np.sin)]
-    window = Window(turn.start_s, turn.end_s)
-    averaged = _placed(average(stream, inside, window, np.column_stack(passing), covered, as_before=as_before), motion)
+    turned_rad = turn.speed_rad_s * (stream.time_s[inside] - turn.start_s)
+    waves = [wave(times * turned_rad) for times in (1, 2) for wave in (np.cos, np.sin)] if way != "correlated" else []
+    passing = Passing(
+        motion.rate(stream.time_s[inside]) @ turn.axis_flange - turn.speed_rad_s,
+        covered,
+        np.reshape(waves, (len(waves), len(turned_rad))).T,
+    )
+    averaged = _placed(average(stream, inside, Window(turn.start_s, turn.end_s), passing, way), motion)
     expected = np.array(stream.sensor.mounting) @ turn.axis_flange
     turned = averaged.mean_rad_s - stream.clock.zero_rate_rad_s
     _check_direction(turned, expected, where, settings)
@@ -235,7 +248,7 @@ def _observation(
     )
 
 
-def _rest(stream: Stream, motion: ArmMotion, window: Window, *, as_before: bool) -> Average | None:
+def _rest(stream: Stream, motion: ArmMotion, window: Window, way: Averaging) -> Average | None:
     """The mean reading of a rest; None where the arm did not stand still or the rest is too short to say anything."""
     start, end = window.start_s + REST_SETTLING_S, window.end_s - REST_SETTLING_S
     inside = between(stream, start, end)
@@ -244,7 +257,7 @@ def _rest(stream: Stream, motion: ArmMotion, window: Window, *, as_before: bool)
         return None
     if np.ptp(states["q_rad"], axis=0).max() > MAX_REST_TRAVEL_RAD:
         return None
-    return _placed(average_at_rest(stream, inside, Window(start, end), as_before=as_before), motion)
+    return _placed(average_at_rest(stream, inside, Window(start, end), way), motion)
 
 
 def _lost(stream: Stream, inside: slice, where: str, settings: ObservationThresholds) -> int:

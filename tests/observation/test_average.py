@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from rig.observation.average import rounding_left
+from rig.observation.mean import rounding_left
 
 
 @pytest.mark.parametrize("sigma_counts", [0.0, 0.1, 0.2, 0.3, 0.5])

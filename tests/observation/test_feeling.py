@@ -8,8 +8,8 @@ import pytest
 from rig.data.run_file import RunData
 from rig.errors import Fault
 from rig.observation.acceleration import DwellReading
-from rig.observation.average import Mean
 from rig.observation.feeling import check_dwells
+from rig.observation.mean import Mean
 from rig.observation.observed_run import observe_run
 from rig.observation.sound import sound_sweeps
 from rig.observation.windows import Window, swept

@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 from rig.estimation.arrays import Array
-from rig.observation.average import tapered_mean
+from rig.observation.mean import tapered_mean
 from rig.observation.tapered import flank_s, noise_at_zero, vibrates, weights
 from rig.observation.windows import Window
 
