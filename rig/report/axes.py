@@ -41,9 +41,12 @@ def axes_table(
     return table
 
 
-def matrix_lines(matrix: Array, covariance: Array) -> Iterator[str]:
-    """F row by row and the angles between its axes, ± U (k = 2); `covariance` (9, 9) is that of F, row by row."""
-    spread = 2 * np.sqrt(np.diag(covariance)).reshape(3, 3)
+def matrix_lines(matrix: Array, covariance: Array, factor: float) -> Iterator[str]:
+    """F row by row and the angles between its axes, ± U; `covariance` (9, 9) is that of F, row by row.
+
+    The coverage `factor` is that of the scale factors, the largest of them.
+    """
+    spread = factor * np.sqrt(np.diag(covariance)).reshape(3, 3)
     for axis, row, known in zip("xyz", matrix.tolist(), spread.tolist(), strict=True):
         elements = (f"{element:+.6f} ± {each:.1e}" for element, each in zip(row, known, strict=True))
         yield f"F {axis}: " + "  ".join(elements)
@@ -51,9 +54,9 @@ def matrix_lines(matrix: Array, covariance: Array) -> Iterator[str]:
     axes = matrix * scale[:, None]
     turned = angle_jacobian(axes, scale, nearest_rotation(axes))[:3]
     angles_std = np.sqrt(np.diag(turned @ covariance @ turned.T))
-    angles = zip(1e3 * non_orthogonality(axes), 2e3 * angles_std, strict=True)
+    angles = zip(1e3 * non_orthogonality(axes), 1e3 * factor * angles_std, strict=True)
     told = "  ".join(f"{angle:+.3f} ± {known:.2g}" for angle, known in angles)
-    yield f"non-orthogonality yz zx xy: {told} mrad (U, k = 2)"
+    yield f"non-orthogonality yz zx xy: {told} mrad (U, k = {factor:.3g})"
 
 
 def dwell_entry(kind: type[EntryT], unit: str, dwell: DwellReading | FieldReading, residual: Array) -> EntryT:

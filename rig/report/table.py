@@ -49,13 +49,13 @@ def print_result(result: ResultDocument, console: Console) -> None:
         title = f"{name}{known}: {sensor.part} {sensor.serial_number}, {sensor.model}, {sensor.estimator}"
         console.print(estimate_table(title, sensor, sensor.budget))
         if sensor.budget is not None:
-            console.print(budget_table(sensor.budget))
+            console.print(budget_table(sensor.budget, sensor.scale))
         for line in _beside(sensor):
             console.print(plain(line))
     for name, accelerometer in result.accelerometers.items():
         console.print(accelerometer_table(name, accelerometer))
         if accelerometer.budget is not None:
-            console.print(budget_table(accelerometer.budget, "m/s²"))
+            console.print(budget_table(accelerometer.budget, accelerometer.scale, "m/s²"))
         for line in accelerometer_lines(accelerometer):
             console.print(plain(line))
     for name, magnetometer in result.magnetometers.items():
@@ -64,7 +64,7 @@ def print_result(result: ResultDocument, console: Console) -> None:
             continue
         console.print(magnetometer_table(name, magnetometer))
         if magnetometer.budget is not None:
-            console.print(budget_table(magnetometer.budget, "µT", MICROTESLA))
+            console.print(budget_table(magnetometer.budget, magnetometer.scale, "µT", MICROTESLA))
         for line in magnetometer_lines(magnetometer):
             console.print(plain(line))
     print_drifts(result.bias_drift, console)

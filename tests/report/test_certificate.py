@@ -18,12 +18,12 @@ from rig.data.result_types import ErrorEntry
 from rig.errors import Refused
 from rig.estimation.budget import Budget, Contributor
 from rig.report.budget_entry import budget_entry
-from rig.report.certificate.budget_tables import coverage_sentence
 from rig.report.certificate.content import is_simulated
+from rig.report.certificate.coverage_words import coverage_sentence
 from rig.report.certificate.page import certificate_page
-from rig.report.certificate.rounding import rounded
 from rig.report.certificate.stated import Stated, of_configuration, stated_in
 from rig.report.certificate.validity import left_out_of_rates
+from rig.report.rounding import rounded
 from support.certified import (
     LABORATORY,
     accelerometer,

@@ -11,8 +11,8 @@ from rig.data.magnetometer_entries import MagnetometerEntry, ReversalEntry
 from rig.data.result_file import VectorEntry, VerificationEntry
 from rig.data.result_types import ErrorEntry
 from rig.estimation.coverage import COVERAGE_FACTOR, PROBABILITY
-from rig.report.certificate.budget_tables import coverage_sentence
 from rig.report.certificate.content import Gyroscope
+from rig.report.certificate.coverage_words import coverage_sentence
 from rig.report.certificate.tables import ANGLES, AXES, JOINT_FACTOR
 from rig.report.certificate.xml_parts import Expanded, dcc, real_list, text
 

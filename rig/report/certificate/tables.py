@@ -8,7 +8,7 @@ import numpy as np
 
 from rig.data.earth_rate_entries import EarthRateEntry
 from rig.data.result_file import CheckEntry, SensorEntry, VectorEntry, VerificationEntry
-from rig.report.certificate.rounding import percent, rounded
+from rig.report.rounding import percent, rounded
 
 AXES = ("x", "y", "z")
 ANGLES = ("yz", "zx", "xy")
