@@ -8,7 +8,7 @@ from pydantic import Field
 
 from rig.data.budget_entries import BudgetEntry
 from rig.data.checked import read_document
-from rig.data.result_types import Entry, ErrorEntry, Matrix3, Matrix6, PositiveVector3, Vector3
+from rig.data.result_types import Entry, ErrorEntry, Matrix3, Matrix6, PositiveVector3, Vector3, WhenEntry
 
 REVERSAL_MAX_BYTES: Final = 4_000_000  # of two runs it has 4,000
 
@@ -76,6 +76,7 @@ class MagnetometerEntry(Entry):
       says what makes it up; null in results of before there was one. `field_t` is what the scale is relative to.
     - `field_base_t` is the field in the arm's base frame, `attitude_error_rad` how far the arm's attitudes are off
       about each axis, by the readings' own account.
+    - `found_at`: when scale and bias were read.
     - `correction_matrix` is M of B = M (m − b), in the right-angled frame nearest to the magnetometer's own axes.
     """
 
@@ -109,6 +110,7 @@ class MagnetometerEntry(Entry):
     warnings: tuple[str, ...]
     covariance_combined: Matrix6 | None = None
     budget: BudgetEntry | None = None
+    found_at: WhenEntry | None = None
 
 
 class AsMountedEntry(Entry):

@@ -5,6 +5,7 @@ from typing import Annotated, Literal
 from pydantic import BaseModel, ConfigDict, Field
 
 Positive = Annotated[float, Field(gt=0)]
+Vector2 = tuple[float, float]
 Vector3 = tuple[float, float, float]
 Vector6 = tuple[float, float, float, float, float, float]
 PositiveVector3 = tuple[Positive, Positive, Positive]
@@ -18,6 +19,20 @@ class Entry(BaseModel):
 
     # What a later version has added is ignored when it is read.
     model_config = ConfigDict(frozen=True, allow_inf_nan=False)
+
+
+class WhenEntry(Entry):
+    """From when to when readings were taken (UTC, by the arm controller's clock since the recording's start).
+
+    `mean_utc` is the middle of the readings, `temperature_c` their mean by the sensor's own thermometer, which stayed
+    between the two of `temperature_range_c`; null where it has none.
+    """
+
+    from_utc: str
+    to_utc: str
+    mean_utc: str
+    temperature_c: float | None
+    temperature_range_c: tuple[float, float] | None
 
 
 class ErrorEntry(Entry):

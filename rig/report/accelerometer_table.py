@@ -10,6 +10,7 @@ from rig.data.budget_entries import expanded_uncertainties
 from rig.data.result_types import ErrorEntry
 from rig.report.axes import axes_table, triple
 from rig.report.budget_table import assumed_lines, expanded_heading
+from rig.report.validity_words import when_words
 
 
 def accelerometer_table(name: str, found: AccelerometerEntry) -> Table:
@@ -24,6 +25,8 @@ def accelerometer_table(name: str, found: AccelerometerEntry) -> Table:
 def accelerometer_lines(found: AccelerometerEntry) -> Iterator[str]:
     """What stands below the table."""
     yield f"relative to gravity, {found.gravity_m_s2:.6g} m/s²; {len(found.dwells)} attitudes, {found.sweeps} sweeps"
+    if found.found_at is not None:
+        yield f"scale and bias: {when_words(found.found_at)}"
     yield from assumed_lines(found.budget)
     skew, std = np.degrees(found.non_orthogonality_rad), np.degrees(found.non_orthogonality_std_rad)
     yield f"non-orthogonality yz zx xy: {triple(skew, '+.4f')} ° (± {2 * std.max():.4f})"

@@ -10,6 +10,7 @@ from rig.data.magnetometer_entries import MagnetometerEntry
 from rig.data.result_types import ErrorEntry
 from rig.report.axes import axes_table, triple
 from rig.report.budget_table import assumed_lines, expanded_heading
+from rig.report.validity_words import when_words
 
 MICROTESLA = 1e6
 FAR_ENOUGH_M = 0.3  # from the flange: a housing of 0.2 A m² is 0.4 to 1.2 µT at 20 to 40 cm
@@ -28,6 +29,8 @@ def magnetometer_table(name: str, found: MagnetometerEntry) -> Table:
 def magnetometer_lines(found: MagnetometerEntry) -> Iterator[str]:
     """What stands below the table."""
     yield f"relative to a field of {MICROTESLA * found.field_t:g} µT; {len(found.dwells)} attitudes; no limit judges it"
+    if found.found_at is not None:
+        yield f"scale and bias: {when_words(found.found_at)}; its temperature was not measured"
     yield from assumed_lines(found.budget)
     yield "iron and currents that turn with it are part of what is found"
     yield "the arm's own field is in the bias; runs with the sensor turned over tell it apart: rig reversal"

@@ -3,6 +3,7 @@
 import numpy as np
 
 from rig.analysis.calibration import SensorResult
+from rig.analysis.loads import loads_rad_s
 from rig.analysis.onboard_check import Agreement
 from rig.data.result_file import (
     AverageEntry,
@@ -52,6 +53,7 @@ def sensor_entry(result: SensorResult, role: Role = "calibrate", agreed: Agreeme
     if result.explained is not None:
         more["bias_process"] = bias_process_entry(result.explained)
         more["speeds_rad_s"] = result.explained.seen.speeds_rad_s
+        more["loads_rad_s"] = _rows(loads_rad_s(result.explained))
         if result.explained.nonlinearity is not None:
             more["nonlinearity"] = entry(NonlinearityEntry, result.explained.nonlinearity)
     if result.earth is not None:

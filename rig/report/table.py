@@ -17,6 +17,7 @@ from rig.report.budget_table import budget_table, expanded_heading
 from rig.report.drift_table import print_drifts
 from rig.report.earth_rate import earth_rate_lines
 from rig.report.magnetometer_table import MICROTESLA, magnetometer_lines, magnetometer_table
+from rig.report.validity_words import load_words, speed_words, when_words
 from rig.report.verification_table import verification_lines, verification_table
 from rig.station.plain_text import plain
 
@@ -114,6 +115,9 @@ def _checks(checks: Iterable[CheckEntry]) -> Table:
 def _beside(sensor: SensorEntry) -> Iterator[str]:
     """At what speeds it holds, what the other estimators make of it, and what the vector model says about the axes."""
     yield from _speeds(sensor)
+    if sensor.scale_at is not None and sensor.bias_at is not None:
+        yield f"scale: {when_words(sensor.scale_at)}"
+        yield f"bias: {when_words(sensor.bias_at)}"
     yield from earth_rate_lines(sensor.earth_rate)
     vector = sensor.vector_model
     std = [sensor.covariance[i][i] ** 0.5 for i in range(6)]
@@ -135,10 +139,11 @@ def _beside(sensor: SensorEntry) -> Iterator[str]:
 
 def _speeds(sensor: SensorEntry) -> Iterator[str]:
     """Where it is valid: one speed does not tell how far the sensor is from linear."""
-    speeds = ", ".join(f"±{speed:.1f}" for speed in np.degrees(sensor.speeds_rad_s))
-    found = sensor.nonlinearity
+    speeds, loads, found = speed_words(sensor), load_words(sensor), sensor.nonlinearity
+    if loads is not None:
+        yield f"along its own axes the sweeps turned it by {loads} °/s"
     if found is None:
-        yield from [f"valid at {speeds} °/s"] if speeds else []
+        yield from [f"the scale factors are those at {speeds} °/s"] if speeds else []
         return
     for name, values, std in (
         ("odd", found.odd_per_rad_s, found.odd_std_per_rad_s),

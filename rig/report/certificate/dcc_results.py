@@ -8,13 +8,14 @@ from rig.data.budget_entries import BudgetEntry
 from rig.data.drift_entries import DriftEntry
 from rig.data.earth_rate_entries import EarthRateEntry
 from rig.data.magnetometer_entries import MagnetometerEntry, ReversalEntry
-from rig.data.result_file import VectorEntry, VerificationEntry
-from rig.data.result_types import ErrorEntry
+from rig.data.result_file import SensorEntry, VectorEntry, VerificationEntry
+from rig.data.result_types import ErrorEntry, WhenEntry
 from rig.estimation.coverage import COVERAGE_FACTOR, PROBABILITY
 from rig.report.certificate.content import Gyroscope
 from rig.report.certificate.coverage_words import coverage_sentence
 from rig.report.certificate.tables import ANGLES, AXES, JOINT_FACTOR
 from rig.report.certificate.xml_parts import Expanded, dcc, real_list, text
+from rig.report.validity_words import load_words, speed_words, when_words
 
 ONE, RATE, ACCELERATION = r"\one", r"\radian\second\tothe{-1}", r"\metre\second\tothe{-2}"
 FIELD, ANGLE, PER_FORCE = r"\tesla", r"\radian", r"\second\tothe{2}\metre\tothe{-1}"
@@ -31,9 +32,9 @@ def gyroscope(each: Gyroscope) -> Iterator[Element]:
     assert budget is not None and sensor.covariance_combined is not None  # or there is no digital certificate
     covered, (scale, bias) = coverage_sentence(budget), _expanded(budget)
     model = f"{sensor.model}: true rate g, reading m, K = diag(k)."
-    yield _result("scale factor", f"{model} {covered}",
+    yield _result("scale factor", f"{model} {_speed(sensor)}{_at(sensor.scale_at)}{covered}",
                   real_list(AXES, sensor.scale, [ONE], expanded=scale))  # fmt: skip
-    yield _result("bias", f"{model} {covered}",
+    yield _result("bias", f"{model} {_at(sensor.bias_at)}{covered}",
                   real_list(AXES, sensor.bias_rad_s, [RATE], expanded=bias))  # fmt: skip
     yield _joint([*sensor.scale, *sensor.bias_rad_s], sensor.covariance_combined, RATE)
     if isinstance(sensor.vector_model, VectorEntry):
@@ -132,10 +133,23 @@ def _relative(
 ) -> Iterator[Element]:
     budget = found.budget
     assert budget is not None and found.covariance_combined is not None  # or there is no digital certificate
-    said, (scale, bias) = f"{said} {coverage_sentence(budget)}", _expanded(budget)
+    said, (scale, bias) = f"{said} {_at(found.found_at)}{coverage_sentence(budget)}", _expanded(budget)
     yield _result(f"scale factor{how}", said, real_list(AXES, numbers[:3], [ONE], expanded=scale))
     yield _result(f"bias{how}", said, real_list(AXES, numbers[3:], [unit], expanded=bias))
     yield _joint(numbers, found.covariance_combined, unit, how)
+
+
+def _at(when: WhenEntry | None) -> str:
+    """When it was read, and how warm it was; of results of before the temperature is a condition alone."""
+    words = "" if when is None else f"{when_words(when)}. "
+    return words[:1].upper() + words[1:]
+
+
+def _speed(sensor: SensorEntry) -> str:
+    """At what rates it was found."""
+    loads = load_words(sensor)
+    along = "" if loads is None else f"; along the item's own axes the sweeps turned it by {loads} °/s"
+    return f"At {speed_words(sensor)} °/s{along}. " if sensor.speeds_rad_s else ""
 
 
 def _expanded(budget: BudgetEntry) -> tuple[Expanded, Expanded]:

@@ -7,21 +7,22 @@ from rig.data.budget_entries import BudgetEntry
 from rig.data.magnetometer_entries import MagnetometerEntry
 from rig.data.result_file import SensorEntry
 
-NONLINEARITY, TEMPERATURE, POWER, MOUNTING = "nonlinearity", "temperature", "switching", "mounting"
+NONLINEARITY = "nonlinearity"
+# What no budget holds: a value is that of one temperature, one power-up and one mounting.
+ALWAYS = ("other temperatures", "switching off and on", "mounting anew and its stress", "ageing and transport")
 # What each is called in words. A budget with a line of that name has it in, and it is not left out.
-ALWAYS = {
-    TEMPERATURE: "other temperatures",
-    POWER: "switching off and on",
-    MOUNTING: "mounting anew and its stress",
-    "vibration": "vibration that the item rectifies",
-    "ageing": "ageing and transport",
-}
+UNLESS_IN_BUDGET = {"vibration": "vibration that the item rectifies"}
+
+
+def in_budget(budget: BudgetEntry | None, name: str) -> bool:
+    """Whether a line of that name is in it."""
+    return budget is not None and any(name in line.name for line in budget.contributors)
 
 
 def left_out_of_rates(sensor: SensorEntry) -> str:
     """Of a gyroscope's U."""
-    straight = {} if sensor.nonlinearity is not None else {NONLINEARITY: "nonlinearity at other speeds"}
-    return _left_out(sensor.budget, straight)
+    straight = [] if sensor.nonlinearity is not None else ["nonlinearity at other speeds"]
+    return _left_out(sensor.budget, {}, straight)
 
 
 def left_out_of_accelerations(found: AccelerometerEntry) -> str:
@@ -35,7 +36,6 @@ def left_out_of_fields(found: MagnetometerEntry) -> str:
     return _left_out(found.budget, {NONLINEARITY: "nonlinearity", "magnetised": "iron magnetised since"})
 
 
-def _left_out(budget: BudgetEntry | None, more: dict[str, str]) -> str:
-    counted: Sequence[str] = () if budget is None else [line.name for line in budget.contributors]
-    said = [words for name, words in {**more, **ALWAYS}.items() if not any(name in line for line in counted)]
-    return ", ".join(said)
+def _left_out(budget: BudgetEntry | None, more: dict[str, str], always: Sequence[str] = ()) -> str:
+    some = [words for name, words in {**more, **UNLESS_IN_BUDGET}.items() if not in_budget(budget, name)]
+    return ", ".join([*always, *some, *ALWAYS])
