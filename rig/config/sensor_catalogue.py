@@ -11,8 +11,9 @@ RATE_TOLERANCE = 2e-4  # relative: 333.33 stands for 1000/3, and the closest two
 class Part:
     """One kind of sensor: `rates_hz` and `ranges_deg_s` are all its gyroscope can do, `rates_rule` says rates in words.
 
-    `g_sensitivity_deg_s_g` is how much a reading may change for 1 g, at most, `nonlinearity` how far it may be from a
-    straight line, as a share of full scale. `ranges_g` are those of its
+    `g_sensitivity_deg_s_g` is how much a reading may change for 1 g, at most, `nonlinearity_percent` how far it may be
+    from a straight line, of full scale, `bias_deg_s_k` and `scale_ppm_k` how much bias and scale may change with
+    temperature, `non_orthogonality_deg` how far from 90° two of its axes may stand. `ranges_g` are those of its
     accelerometer, which shares its data rate, the usual one first; `acceleration_noise_ug_sqrt_hz` is the noise density
     of that, in µg/√Hz. A part with a port of its own stands beside the board, with a clock of its own.
     """
@@ -23,7 +24,10 @@ class Part:
     default_rate_hz: float
     default_range_deg_s: float
     g_sensitivity_deg_s_g: float
-    nonlinearity: float
+    nonlinearity_percent: float
+    bias_deg_s_k: float
+    scale_ppm_k: float
+    non_orthogonality_deg: float
     ranges_g: tuple[float, ...]
     acceleration_noise_ug_sqrt_hz: float
     own_port: bool = False
@@ -81,7 +85,10 @@ PARTS: Mapping[str, Part] = MappingProxyType(
             default_rate_hz=238,
             default_range_deg_s=245,
             g_sensitivity_deg_s_g=0.1,  # not stated; that of the MPU-6050, a part of the same kind, PS-MPU-6000A 6.1
-            nonlinearity=0.001,  # not stated; that of the MPU-9250
+            nonlinearity_percent=0.1,  # not stated; that of the MPU-9250, as what follows
+            bias_deg_s_k=30 / 65,
+            scale_ppm_k=4e4 / 65,
+            non_orthogonality_deg=1.15,
             ranges_g=(2, 4, 8, 16),
             acceleration_noise_ug_sqrt_hz=150,  # not stated; assumed
         ),
@@ -92,7 +99,10 @@ PARTS: Mapping[str, Part] = MappingProxyType(
             default_rate_hz=200,
             default_range_deg_s=250,
             g_sensitivity_deg_s_g=0.1,  # not stated; that of the MPU-6050, PS-MPU-6000A 6.1
-            nonlinearity=0.001,  # PS-MPU-9250A-01, table 1
+            nonlinearity_percent=0.1,  # PS-MPU-9250A-01, table 1
+            bias_deg_s_k=30 / 65,  # ±30 °/s from −40 to 85 °C (table 1), straight from 25 °C
+            scale_ppm_k=4e4 / 65,  # ±4 % (table 1)
+            non_orthogonality_deg=1.15,  # cross-axis sensitivity ±2 % (table 1)
             ranges_g=(2, 4, 8, 16),
             acceleration_noise_ug_sqrt_hz=300,  # PS-MPU-9250A-01, section 3.2
         ),
@@ -103,7 +113,10 @@ PARTS: Mapping[str, Part] = MappingProxyType(
             default_rate_hz=200,
             default_range_deg_s=500,
             g_sensitivity_deg_s_g=0.015,  # as the datasheet of the ADIS16445 states
-            nonlinearity=0.002,  # assumed: the data sheet of the part has it, not looked up
+            nonlinearity_percent=0.2,  # assumed, as what follows: the data sheet of the part has it, not looked up
+            bias_deg_s_k=0.2 / 60,
+            scale_ppm_k=3e3 / 60,
+            non_orthogonality_deg=0.15,  # axis to axis ±0.05° (data sheet, features), taken for a standard deviation
             ranges_g=(8,),
             acceleration_noise_ug_sqrt_hz=23,  # assumed: the data sheet of the part has it, not looked up
         ),
@@ -114,7 +127,10 @@ PARTS: Mapping[str, Part] = MappingProxyType(
             default_rate_hz=1000,
             default_range_deg_s=490,
             g_sensitivity_deg_s_g=0.0003,  # not stated; assumed: 1 °/h/g, light does not feel force
-            nonlinearity=5e-5,  # assumed: 50 ppm, as of a scale factor of light
+            nonlinearity_percent=0.005,  # assumed: 50 ppm, as of a scale factor of light
+            bias_deg_s_k=1 / 3600 / 60,  # assumed: 1 °/h over 60 K
+            scale_ppm_k=200 / 60,  # assumed: 200 ppm over as much
+            non_orthogonality_deg=0.06,  # assumed: 1 mrad
             ranges_g=(10, 25),
             acceleration_noise_ug_sqrt_hz=119,  # TRIAX, table 1: 0.0701 m/s/√h
             own_port=True,
