@@ -20,6 +20,7 @@ from rig.data.magnetometer_entries import MagnetometerEntry
 from rig.data.result_types import (
     Entry,
     ErrorEntry,
+    Freedom3,
     Matrix3,
     Matrix6,
     Positive,
@@ -124,7 +125,8 @@ class EstimateEntry(Entry):
 class VectorEntry(Entry):
     """The vector model's solution: the six parameters, and how the three axes lie to each other and to the flange.
 
-    `residuals_std_rad_s` is what the solve expects each residual to scatter by; results of before do not say it.
+    `residuals_std_rad_s` is what the solve expects each residual to scatter by; `…_freedom` are the degrees of freedom
+    of the standard deviations of that name, null where they have no end. Results of before have neither.
     """
 
     model: str
@@ -149,6 +151,9 @@ class VectorEntry(Entry):
     residuals_rad_s: tuple[Vector3, ...]
     warnings: tuple[str, ...]
     residuals_std_rad_s: tuple[Vector3, ...] | None = None
+    non_orthogonality_freedom: Freedom3 | None = None
+    mounting_freedom: Freedom3 | None = None
+    g_sensitivity_freedom: tuple[Freedom3, Freedom3, Freedom3] | None = None
 
 
 class NonlinearityEntry(Entry):

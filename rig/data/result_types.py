@@ -1,8 +1,9 @@
 """What the entries of `result.json` are made of."""
 
+from datetime import datetime
 from typing import Annotated, Literal
 
-from pydantic import BaseModel, ConfigDict, Field
+from pydantic import AfterValidator, BaseModel, ConfigDict, Field
 
 Positive = Annotated[float, Field(gt=0)]
 Vector2 = tuple[float, float]
@@ -11,6 +12,9 @@ Vector6 = tuple[float, float, float, float, float, float]
 PositiveVector3 = tuple[Positive, Positive, Positive]
 Matrix3 = tuple[Vector3, Vector3, Vector3]
 Matrix6 = Annotated[tuple[Vector6, ...], Field(min_length=6, max_length=6)]
+# Degrees of freedom; infinite ones are null.
+Freedom = float | None
+Freedom3 = tuple[Freedom, Freedom, Freedom]
 Role = Literal["calibrate", "reference"]
 
 
@@ -21,6 +25,14 @@ class Entry(BaseModel):
     model_config = ConfigDict(frozen=True, allow_inf_nan=False)
 
 
+def _iso(text: str) -> str:
+    datetime.fromisoformat(text)
+    return text
+
+
+Utc = Annotated[str, AfterValidator(_iso)]
+
+
 class WhenEntry(Entry):
     """From when to when readings were taken (UTC, by the arm controller's clock since the recording's start).
 
@@ -28,9 +40,9 @@ class WhenEntry(Entry):
     between the two of `temperature_range_c`; null where it has none.
     """
 
-    from_utc: str
-    to_utc: str
-    mean_utc: str
+    from_utc: Utc
+    to_utc: Utc
+    mean_utc: Utc
     temperature_c: float | None
     temperature_range_c: tuple[float, float] | None
 

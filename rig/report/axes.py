@@ -1,16 +1,29 @@
 """What tables and entries of all three kinds of sensors share: three numbers in a line, three axes in a table."""
 
 from collections.abc import Iterable, Iterator, Sequence
+from typing import Protocol
 
 import numpy as np
 from rich.table import Table
 
+from rig.data.result_types import Freedom
 from rig.estimation.arrays import Array
 from rig.estimation.sensor_axes import angle_jacobian, nearest_rotation, non_orthogonality
 from rig.observation.acceleration import DwellReading
 from rig.observation.field import FieldReading
 from rig.report.entry import EntryT, entry
+from rig.report.expanded import expanded, factor_words
 from rig.station.plain_text import plain
+
+
+class Skewed(Protocol):
+    """What says how its axes lie to each other."""
+
+    @property
+    def non_orthogonality_std_rad(self) -> Sequence[float]: ...
+    @property
+    def non_orthogonality_freedom(self) -> Sequence[Freedom] | None: ...
+
 
 PARAMETERS = ("kx", "ky", "kz", "bx", "by", "bz")
 
@@ -39,6 +52,12 @@ def axes_table(
             axis, f"{scale[i]:.6f}", f"{expanded[i]:.6f}", f"{bias[i]:+.{digits}f}", f"{expanded[3 + i]:.{digits}f}"
         )
     return table
+
+
+def skew_known(found: Skewed) -> str:
+    """U of the angles between the axes, the largest, in degrees, and what k is."""
+    widths = expanded(found.non_orthogonality_std_rad, found.non_orthogonality_freedom).widths
+    return f"{np.degrees(max(widths)):.2g}, {factor_words(found.non_orthogonality_freedom)}"
 
 
 def matrix_lines(matrix: Array, covariance: Array, factor: float) -> Iterator[str]:

@@ -12,14 +12,14 @@ from rig.station.plain_text import plain
 
 
 def expanded_heading(budget: BudgetEntry | None) -> str:
+    """Of a column of U by a budget; without one it is two standard deviations."""
+    return heading_of((COVERAGE_FACTOR,) if budget is None else budget.factors)
+
+
+def heading_of(factors: Sequence[float]) -> str:
     """Of a column of U: with its coverage factor, or with the largest where they differ as they are printed."""
-    factors = _printed((COVERAGE_FACTOR,) if budget is None else budget.factors)
-    return f"± U (k {'=' if len(factors) == 1 else '≤'} {factors[-1]:g})"
-
-
-def _printed(factors: Sequence[float]) -> list[float]:
-    """The different ones, rounded, the smallest first."""
-    return sorted({round(each, 2) for each in factors})
+    printed = sorted({round(each, 2) for each in factors})
+    return f"± U (k {'=' if len(printed) == 1 else '≤'} {printed[-1]:g})"
 
 
 def assumed_lines(budget: BudgetEntry | None) -> Iterator[str]:

@@ -8,7 +8,7 @@ from rich.table import Table
 from rig.data.budget_entries import expanded_uncertainties
 from rig.data.magnetometer_entries import MagnetometerEntry
 from rig.data.result_types import ErrorEntry
-from rig.report.axes import axes_table, triple
+from rig.report.axes import axes_table, skew_known, triple
 from rig.report.budget_table import assumed_lines, expanded_heading
 from rig.report.validity_words import when_words
 
@@ -36,8 +36,8 @@ def magnetometer_lines(found: MagnetometerEntry) -> Iterator[str]:
     yield "the arm's own field is in the bias; runs with the sensor turned over tell it apart: rig reversal"
     yield from _tests(found)
     yield f"field in the arm's base: {triple(np.multiply(MICROTESLA, found.field_base_t), '+.3f')} µT"
-    skew, std = np.degrees(found.non_orthogonality_rad), np.degrees(found.non_orthogonality_std_rad)
-    yield f"non-orthogonality yz zx xy: {triple(skew, '+.4f')} ° (± {2 * std.max():.4f})"
+    skew = triple(np.degrees(found.non_orthogonality_rad), "+.4f")
+    yield f"non-orthogonality yz zx xy: {skew} ° (± {skew_known(found)})"
     known = "" if found.attitude_error_std_rad is None else f" (± {2e3 * found.attitude_error_std_rad:.2f})"
     yield f"attitude error found: {1e3 * found.attitude_error_rad:.2f} mrad about each axis{known}"
     for method, other in found.beside.items():

@@ -12,7 +12,7 @@ from rig.data.budget_entries import BudgetEntry, expanded_uncertainties
 from rig.data.result_file import BoardEntry, CheckEntry, ResultDocument, SensorEntry
 from rig.data.result_types import ErrorEntry
 from rig.report.accelerometer_table import accelerometer_lines, accelerometer_table
-from rig.report.axes import triple
+from rig.report.axes import skew_known, triple
 from rig.report.budget_table import budget_table, expanded_heading
 from rig.report.drift_table import print_drifts
 from rig.report.earth_rate import earth_rate_lines
@@ -132,8 +132,7 @@ def _beside(sensor: SensorEntry) -> Iterator[str]:
         yield from _on_the_board(sensor.board)
     if not isinstance(vector, ErrorEntry):
         skew = triple(np.degrees(vector.non_orthogonality_rad), "+.3f")
-        expanded = 2 * max(np.degrees(vector.non_orthogonality_std_rad))
-        yield f"non-orthogonality yz zx xy: {skew} ° (± {expanded:.3f}, k = 2)"
+        yield f"non-orthogonality yz zx xy: {skew} ° (± {skew_known(vector)})"
         yield from (f"warning: {warning}" for warning in vector.warnings)
 
 
