@@ -8,7 +8,7 @@ from rig.data.result_file import SensorEntry
 from rig.data.result_types import WhenEntry
 
 DEG = math.degrees(1)
-ALIKE = 0.002  # of a rate: what the arm's timing and a small tilt make of one speed
+ALIKE = 0.005  # of a rate: what the arm's timing and a sensor that leans by 5° make of one speed
 
 
 def when_words(found: WhenEntry) -> str:
@@ -19,8 +19,9 @@ def when_words(found: WhenEntry) -> str:
     over = f"mean over {day}{began:%H:%M:%S} to {until} UTC"
     if found.temperature_c is None or found.temperature_range_c is None:
         return over
-    low, high = found.temperature_range_c
-    return f"at {found.temperature_c:.1f} °C, {over}, in which it was {low:.2f} to {high:.2f} °C"
+    low, high = (f"{each:.2f}" for each in found.temperature_range_c)
+    went = f"stayed at {low} °C" if low == high else f"was between {low} and {high} °C"
+    return f"at {found.temperature_c:.1f} °C, {over}, in which it {went}"
 
 
 def speed_words(sensor: SensorEntry) -> str:
