@@ -39,7 +39,7 @@ def budget_by_causes(matrix: Array, causes: Mapping[str, Array], noise_freedom: 
     """From what each cause does to the covariance (p, p) of a reference model's parameters, F (3, 3) first.
 
     Sizes of errors that were found are uncertain themselves. Where their likelihood was integrated over, or the
-    covariance widened as Student's t is, that is in u already (JCGM 101, 5.11.4, note) and no freedom is left to count:
+    covariance widened as Student's t is, that is in u already (JCGM 101, 6.4.9) and no freedom is left to count:
     so it is of the noise too, where no `noise_freedom` is given.
     """
     scale = 1 / np.linalg.norm(matrix, axis=1)

@@ -37,7 +37,8 @@ def budget_table(budget: BudgetEntry, scale: Sequence[float], unit: str = "rad/s
     found = printed_budget(budget, scale, unit, per_unit)
     k, b = found.columns
     title = f"uncertainty budget of the scale factor of {k.axis} and of the bias of {b.axis}, whose U are the largest"
-    table = Table(title=title, title_justify="left")
+    small = "; ".join(line.name for line in found.lines if not line.kind)
+    table = Table(title=title, title_justify="left", caption=small or None, caption_justify="left")
     headings = ("contributor", "type", "ν", f"u(k{k.axis}) {k.unit}", "share", f"u(b{b.axis}) {b.unit}", "share")
     for heading in headings:
         table.add_column(heading, justify="left" if heading in ("contributor", "type") else "right")
@@ -50,5 +51,7 @@ def budget_table(budget: BudgetEntry, scale: Sequence[float], unit: str = "rad/s
 
 
 def _named(line: Line) -> str:
-    """With what it was assumed to be."""
+    """With what it was assumed to be; all that are negligible stand below the table."""
+    if not line.kind:
+        return line.name.partition(":")[0]
     return f"{line.name} {line.assumed}" if line.assumed.startswith("±") else line.name

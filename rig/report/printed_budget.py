@@ -10,7 +10,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from rig.data.budget_entries import IN_U, BudgetEntry, ContributorEntry
-from rig.report.rounding import percent, power_of_ten, small
+from rig.report.rounding import figures, percent, power_of_ten, small
 
 NEGLIGIBLE = 0.001  # of both variances: lines below are summed up in one
 DIGITS = 3  # of a combined standard uncertainty: its parts are printed to the same decimal
@@ -111,7 +111,7 @@ def _column(budget: BudgetEntry, place: int, size: _Size) -> Column:
 def _line(line: ContributorEntry, places: tuple[int, int], sizes: Sequence[_Size]) -> Line:
     stated = " (k = 2)" if line.distribution == "normal" else ""
     found = "found" if line.kind == "A" else "–"
-    assumed = found if line.half_width is None else f"±{line.half_width:.3g} {line.unit}{stated}"
+    assumed = found if line.half_width is None else f"±{figures(line.half_width)} {line.unit}{stated}"
     freedom = _uncounted(line) if line.freedom is None else freedom_text(line.freedom)
     return Line(line.name, line.kind, line.distribution, assumed, freedom, _parts(line.std, line.share, places, sizes))
 

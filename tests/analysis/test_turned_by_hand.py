@@ -67,8 +67,11 @@ def test_uncertainties_are_those_of_many_sessions(tmp_path: Path, hand: Hand, th
         assert (0.93 if thorough else 0.87) < within
 
 
-def test_real_turns_by_hand_tell_as_much_as_they_can(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+def test_real_turns_by_hand_tell_as_much_as_they_can(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
+) -> None:
     """A foot-sized IMU against a box: its turns and its flips disagree by 2e-3, says its README."""
+    monkeypatch.setenv("COLUMNS", "200")
     files = unpacked("imucal", "samples.csv", tmp_path), "--sweeps", recording("imucal") / "sweeps.csv"
     found = document(capsys, *files)
     expanded = 2 * np.sqrt(np.diag(found["covariance"]))[:3]
