@@ -89,6 +89,35 @@ def test_u_of_a_drift_is_by_its_freedom_at_the_terminal_and_on_the_page() -> Non
     assert f"{printed.value} ± {printed.uncertainty}" in page
 
 
+@pytest.mark.parametrize("document", [everything(), scarce()], ids=["uncounted", "scarce"])
+def test_k_of_every_uncertainty_in_the_digital_certificate_is_the_page_s(document: ResultDocument) -> None:
+    """Of scale and bias the sentence of EA-4/02, of the rest k beside the values; each probability is Student's t's."""
+    made = certificate(document, GERMAN)
+    page, xml = " ".join(read(made).text.split()), fromstring(digital_certificate(made))
+    stated = 0
+    for each in xml.iterfind(".//dcc:result", NAMES):
+        if each.find(".//si:uncertaintyXMLList", NAMES) is None:
+            continue
+        stated += 1
+        name, said = (
+            " ".join(each.findtext(f"dcc:{of}/dcc:content", "", NAMES).split()) for of in ("name", "description")
+        )
+        factors, probabilities = (
+            [float(number) for number in each.findtext(f".//si:{of}XMLList", "", NAMES).split()]
+            for of in ("coverageFactor", "coverageProbability")
+        )
+        if "The reported expanded uncertainty" in said:
+            assert said[said.index("The reported expanded") :] in page, name
+            continue
+        assert probabilities == [round(PROBABILITY, 4)], name
+        low, high = f"{min(factors):.3g}", f"{max(factors):.3g}"
+        words = f"k = {low}" if low == high else f"k = {low} to {high}"
+        assert words in said, name
+        if "by repeat" not in name and "by that rate" not in name:
+            assert words in page, name
+    assert stated >= 12
+
+
 def test_where_nobody_counted_it_says_so_and_is_two_standard_deviations() -> None:
     assert expanded([1.0, 2.0], None).widths == [2.0, 4.0]
     assert factor_words(None) == "k = 2, degrees of freedom not counted"

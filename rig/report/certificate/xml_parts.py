@@ -48,8 +48,8 @@ def text(name: str, said: str | None) -> Element:
 
 
 def _plain(said: str | date | None) -> str:
-    """Printable, since XML knows no control characters, and without blanks at its ends."""
-    return UNSAID if said is None else " ".join(printable(str(said)).split()) or UNSAID
+    """Printable, since XML knows no control characters; with one blank for any, those that do not break among them."""
+    return UNSAID if said is None else printable(" ".join(str(said).split())) or UNSAID
 
 
 def values(name: str, numbers: Iterable[object]) -> Element:
