@@ -58,7 +58,8 @@ def sensor_entry(result: SensorResult, role: Role = "calibrate", agreed: Agreeme
         if result.explained.nonlinearity is not None:
             more["nonlinearity"] = entry(NonlinearityEntry, result.explained.nonlinearity)
     if result.earth is not None:
-        more["earth_rate"] = earth_rate_entry(result.earth)
+        counts = result.uncertainty is not None and result.uncertainty.by_freedom
+        more["earth_rate"] = earth_rate_entry(result.earth, counts_freedom=counts)
     return found.model_copy(update=more)
 
 

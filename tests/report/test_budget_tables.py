@@ -30,6 +30,7 @@ from rig.report.certificate.page import certificate_page
 from rig.report.certificate.stated import Stated
 from rig.report.document import document_of
 from rig.report.printed_budget import freedom_text
+from rig.report.rounding import figures
 from rig.report.table import print_outcome
 from support.certified import certificate, everything, result
 from support.dcc_rules import schema_faults
@@ -277,3 +278,8 @@ def ks_of(sentence: str) -> list[str]:
         alike = re.findall(r"^ = ([\d.]+) ", group)
         found += alike * 3 if alike else re.findall(r"[xyz] ([\d.]+) \(", group)
     return found
+
+
+@pytest.mark.parametrize(("value", "said"), [(0.06, "0.06"), (615.0, "615"), (7.292115e-5, "7.29\u00a0×\u00a010⁻⁵")])
+def test_a_half_width_is_printed_with_three_digits(value: float, said: str) -> None:
+    assert figures(value) == said

@@ -131,11 +131,15 @@ def _earth_rate(found: EarthRateEntry) -> Iterator[Element]:
     rate = real_list(AXES, found.rate_rad_s, [RATE], region=(found.covariance_rad2_s2, JOINT_FACTOR_3))
     yield _result("Earth's rate", said, rate)
     yield _spread(
-        "latitude by that rate", SOLUTION, ["latitude"], ([found.latitude_rad], [found.latitude_std_rad], None), ANGLE
+        "latitude by that rate",
+        SOLUTION,
+        ["latitude"],
+        ([found.latitude_rad], [found.latitude_std_rad], found.freedoms(1)),
+        ANGLE,
     )
     if found.heading_rad is not None and found.heading_std_rad is not None:
         said = f"Where the x axis of the arm's base points, from north over east. {SOLUTION}"
-        heading = [found.heading_rad], [found.heading_std_rad], None
+        heading = [found.heading_rad], [found.heading_std_rad], found.freedoms(1)
         yield _spread("heading by that rate", said, ["heading"], heading, ANGLE)
 
 

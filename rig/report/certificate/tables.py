@@ -136,11 +136,12 @@ def gravity_rows(vector: VectorEntry) -> list[tuple[str, list[Pair]]]:
 
 
 def earth_rate_rows(found: EarthRateEntry) -> list[tuple[str, str, Pair]]:
-    """Name, unit, and value with two standard deviations."""
+    """Name, unit, and value with U."""
+    (k,) = expanded([1.0], found.freedoms(1)).factors
     std = np.sqrt(np.diag(found.covariance_rad2_s2))
-    rows = [("size", "rad/s", pair(found.norm_rad_s, 2 * found.norm_std_rad_s))]
-    rows += [(axis, "rad/s", pair(found.rate_rad_s[i], 2 * float(std[i]))) for i, axis in enumerate(AXES)]
-    rows.append(("latitude", "°", pair(DEG * found.latitude_rad, 2 * DEG * found.latitude_std_rad)))
+    rows = [("size", "rad/s", pair(found.norm_rad_s, k * found.norm_std_rad_s))]
+    rows += [(axis, "rad/s", pair(found.rate_rad_s[i], k * float(std[i]))) for i, axis in enumerate(AXES)]
+    rows.append(("latitude", "°", pair(DEG * found.latitude_rad, k * DEG * found.latitude_std_rad)))
     if found.heading_rad is not None and found.heading_std_rad is not None:
-        rows.append(("heading", "°", pair(DEG * found.heading_rad % 360, 2 * DEG * found.heading_std_rad)))
+        rows.append(("heading", "°", pair(DEG * found.heading_rad % 360, k * DEG * found.heading_std_rad)))
     return rows
