@@ -203,6 +203,11 @@ class RunSettings:
         return self.reckoning >= 2
 
     @property
+    def knows_returns(self) -> bool:
+        """Whether an arm is taken to come back to a sweep's axis a little elsewhere every time."""
+        return self.reckoning >= 2
+
+    @property
     def counts_freedom(self) -> bool:
         """Whether U has the coverage factor of its degrees of freedom; in results of before it is twice u."""
         return self.reckoning >= 2
