@@ -54,4 +54,5 @@ def _named(line: Line) -> str:
     """With what it was assumed to be; all that are negligible stand below the table."""
     if not line.kind:
         return line.name.partition(":")[0]
-    return f"{line.name} {line.assumed}" if line.assumed.startswith("±") else line.name
+    assumed = " ".join(line.assumed.split())  # a terminal shows blanks that do not break by their number
+    return f"{line.name} {assumed}" if assumed.startswith("±") else line.name

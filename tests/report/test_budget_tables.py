@@ -142,7 +142,9 @@ def test_the_terminal_shows_the_budgets_of_the_certificate(
     calibrated = {name: each for name, each in document.sensors.items() if each.role == "calibrate"}
     document = document.model_copy(update={"sensors": calibrated})
     print_outcome(document, as_json=False)
-    tables, numbers = at_the_terminal(capsys.readouterr().out), slice(-4, None)
+    shown = capsys.readouterr().out
+    assert "\\x" not in shown
+    tables, numbers = at_the_terminal(shown), slice(-4, None)
     for rows, budget in zip(tables, of_the_terminal(document), strict=True):
         check_adds_up(rows, budget)
     pages = printed(document)
