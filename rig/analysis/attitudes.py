@@ -9,7 +9,7 @@ import numpy as np
 
 from rig.analysis.calibration import estimator_among, or_fault
 from rig.analysis.increments import InIncrements, solve_turning
-from rig.analysis.placed_budget import budget_by_causes
+from rig.analysis.placed_budget import budget_by_causes, noise_freedom
 from rig.analysis.placed_equations import Equations
 from rig.errors import Fault
 from rig.estimation.arrays import Array
@@ -127,7 +127,7 @@ def known_method(name: str | None) -> Chosen | None:
 def _of_rows(equations: Equations, method: Method, *, any_mounting: bool) -> InAttitudes:
     solution = equations.solve(method)
     _check_mounting(solution.matrix, any_mounting=any_mounting)
-    budget = budget_by_causes(solution.matrix, {NOISE: solution.covariance})
+    budget = budget_by_causes(solution.matrix, {NOISE: solution.covariance}, float(equations.freedom.min()))
     return InAttitudes(solution, equations.beside(method, *get_args(EqualWeights)), budget, _not_the_earth(solution))
 
 
@@ -149,7 +149,8 @@ def _of_placements(
     if solution.second_order is not None:
         check_seen(solution.second_order, np.sqrt(np.diag(solution.covariance)[15:18]), NOT_SEEN)
     _check_mounting(solution.matrix, any_mounting=any_mounting)
-    budget = budget_by_causes(solution.matrix, {NOISE: solution.covariance} if laid is None else laid.causes)
+    causes = {NOISE: solution.covariance} if laid is None else laid.causes
+    budget = budget_by_causes(solution.matrix, causes, noise_freedom(solution, equations))
     others = equations.beside(method, *METHODS)
     return InAttitudes(solution, others, budget, None, laid, len(elsewhere.means[quantity]), moving)
 

@@ -4,7 +4,7 @@ sections III-A and III-B, Figs. 4 and 6. Pure.
 
 from collections import defaultdict
 from collections.abc import Callable, Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import partial
 
 import numpy as np
@@ -18,6 +18,7 @@ from rig.errors import Fault
 from rig.estimation.arrays import Array
 from rig.estimation.bias_by_repeat import BiasByRepeat, bias_by_repeat
 from rig.estimation.bias_over_temperature import BiasOverTemperature, bias_over_temperature
+from rig.estimation.coverage import effective_freedom
 from rig.estimation.reference_model import BIAS, KnownNorm
 from rig.estimation.sensor_axes import nearest_rotation
 from rig.estimation.triaxial import TriaxialSolution, solve_triaxial
@@ -43,7 +44,8 @@ class BiasDrift:
     gyroscope's bias has what a scale that is not nominal makes of the Earth's rate in it, and all of the Earth's rate
     where the site does not say it (`earth_rate_known`): the same in every repeat. `common_std` (3,) is what all biases
     share beside that. `anew` is each repeat for itself, or the Fault it ends in. `time_s` and `temperature_c` (R,) are
-    means over each repeat, times since the first.
+    means over each repeat, times since the first. `freedom` (3,) is that of
+    `held.std`, `slope_freedom` (3,) that of the slope's standard deviation; None where nobody counts.
     """
 
     held: BiasByRepeat
@@ -53,6 +55,8 @@ class BiasDrift:
     temperature_c: Array
     over_temperature: BiasOverTemperature | Fault
     earth_rate_known: bool
+    freedom: Array | None
+    slope_freedom: Array | None
 
 
 Drifts = Mapping[str, Mapping[Quantity, BiasDrift]]
@@ -60,13 +64,17 @@ Drifts = Mapping[str, Mapping[Quantity, BiasDrift]]
 
 @dataclass(frozen=True, slots=True)
 class Stand:
-    """What a sensor read in one dwell: means (3,), their variances, the attitude base → sensor, when, how warm."""
+    """What a sensor read in one dwell: means (3,), their variances, the attitude base → sensor, when, how warm.
+
+    `freedom` (3,) is the variances'.
+    """
 
     mean: Array
     variance: Array
     attitude: Array
     time_s: float
     temperature_c: float
+    freedom: Array | float = np.inf
 
 
 def bias_drifts(recordings: Sequence[ObservedRun], settings: RunSettings) -> Drifts:
@@ -88,7 +96,12 @@ def bias_drifts(recordings: Sequence[ObservedRun], settings: RunSettings) -> Dri
         if sensor.has_acceleration:
             accelerations = _whole(_accelerations(recordings, name, sensor), table)
             drifts[name]["acceleration"] = acceleration_drift(accelerations, site, second_order=settings.second_order)
-    return drifts
+    return drifts if settings.counts_freedom else {name: _uncounted(each) for name, each in drifts.items()}
+
+
+def _uncounted(drifts: Mapping[Quantity, BiasDrift]) -> dict[Quantity, BiasDrift]:
+    """As recordings of before are reckoned."""
+    return {quantity: replace(drift, freedom=None, slope_freedom=None) for quantity, drift in drifts.items()}
 
 
 def _whole(found: Mapping[int, Stand], table: Sequence[Sequence[int]]) -> list[list[Stand]]:
@@ -113,6 +126,7 @@ def _accelerations(recordings: Sequence[ObservedRun], name: str, sensor: Recorde
             mounting @ nearest_rotation(dwell.attitude),
             (dwell.window.start_s + dwell.window.end_s) / 2 + since_s,
             dwell.temperature_c,
+            dwell.reading.freedom,
         )
         for recording, since_s in zip(recordings, since_first_s(recordings), strict=True)
         for dwell in recording.sensors[name].dwells
@@ -133,6 +147,7 @@ def _rates(recordings: Sequence[ObservedRun], name: str, sensor: RecordedSensor)
                         mounting @ nearest_rotation(rest.attitude),
                         (rest.start_s + rest.end_s) / 2 + since_s,
                         rest.temperature_c,
+                        rest.freedom,
                     )
     return found
 
@@ -194,15 +209,24 @@ def _drift(
 ) -> BiasDrift:
     times = np.array([np.mean([each.time_s for each in repeat]) for repeat in repeats])
     temperatures = np.array([np.mean([each.temperature_c for each in repeat]) for repeat in repeats])
+    slope = or_fault(partial(bias_over_temperature, held.bias, held.std, temperatures, times))
+    freedom = np.minimum(held.freedom, np.min([_noise_freedom(repeat) for repeat in repeats], axis=0))
     return BiasDrift(
         held=held,
         common_std=common_std,
         anew=tuple(or_fault(partial(_anew, solve, repeat)) for repeat in range(len(repeats))),
         time_s=times - times[0],
         temperature_c=temperatures,
-        over_temperature=or_fault(partial(bias_over_temperature, held.bias, held.std, temperatures, times)),
+        over_temperature=slope,
         earth_rate_known=earth_rate_known,
+        freedom=freedom,
+        slope_freedom=freedom if isinstance(slope, Fault) else np.minimum(slope.freedom, freedom),
     )
+
+
+def _noise_freedom(repeat: Sequence[Stand]) -> Array:
+    """(3,) of the mean over its attitudes."""
+    return effective_freedom([each.variance for each in repeat], [np.broadcast_to(each.freedom, 3) for each in repeat])
 
 
 def _anew(solve: Callable[[int], TriaxialSolution], repeat: int) -> Anew:

@@ -1,18 +1,22 @@
 """From sweeps recorded elsewhere to a calibration, and to what its uncertainty is made of."""
 
+from dataclasses import replace
 from typing import Literal
 
 import numpy as np
 
 from rig.analysis.calibration import ESTIMATORS, Estimator, estimator_among, solve_observations
 from rig.errors import Fault
+from rig.estimation.arrays import Array
 from rig.estimation.budget import Budget, Contributor
+from rig.estimation.coverage import effective_freedom
 from rig.estimation.estimate import Estimate
-from rig.estimation.turned import TurnedSolution, solve_turned
+from rig.estimation.turned import BIAS, NOISE, TurnedSolution, solve_turned
 from rig.estimation.vector_model import VectorSolution
 from rig.observation.csv_import import ExternalData
 
 Chosen = Estimator | Literal["increments"]
+FROM_READINGS = "scatter of the readings"
 CHOICES: tuple[Chosen, ...] = (*ESTIMATORS, "increments")
 
 
@@ -42,10 +46,22 @@ def solve_external(data: ExternalData, estimator: Chosen | None) -> Estimate:
     return solve_turned(turned.gyroscope, turned.turns, turned.means, start.matrix, start.bias_rad_s)
 
 
-def budget_of(solution: Estimate) -> Budget:
+def budget_of(solution: Estimate, data: ExternalData) -> Budget:
     """What its covariance is made of: of means nothing but their scatter."""
-    if isinstance(solution, TurnedSolution):
-        return solution.budget
-    return Budget(
-        (Contributor("noise", "A", "normal", None, "", "scatter of the readings", np.inf, solution.covariance),)
-    )
+    if not isinstance(solution, TurnedSolution):
+        freedom = _noise_freedom(solution, data)
+        return Budget((Contributor(NOISE, "A", "normal", None, "", FROM_READINGS, freedom, solution.covariance),))
+    assert data.turned is not None, "or nothing was solved by turns"
+    known = {NOISE: float(data.turned.noise_freedom), BIAS: float(data.turned.bias_freedom)}
+    lines = solution.budget.contributors
+    return Budget(tuple(replace(line, freedom=known.get(line.name, line.freedom)) for line in lines))
+
+
+def _noise_freedom(solution: Estimate, data: ExternalData) -> float:
+    """Of scale and bias the fewest: by how the vector model weighs the means, of others the fewest of any mean."""
+    averages = [*(sweep.average for sweep in data.sweeps), *data.rests]
+    freedom = np.array([np.broadcast_to(each.freedom, 3) for each in averages])
+    if not isinstance(solution, VectorSolution):
+        return float(freedom.min())
+    parts: Array = solution.response**2 * np.array([each.variance_rad2_s2 for each in averages])
+    return float(effective_freedom(parts.reshape(6, -1).T, freedom.reshape(-1, 1)).min())

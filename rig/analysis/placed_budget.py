@@ -5,27 +5,53 @@ from typing import Literal
 
 import numpy as np
 
+from rig.analysis.placed_equations import Equations
+from rig.data.budget_entries import IN_U
 from rig.estimation import known_increments, placement
 from rig.estimation.arrays import Array
 from rig.estimation.budget import Budget, Contributor
-from rig.estimation.reference_budget import scale_and_bias_covariance
+from rig.estimation.coverage import effective_freedom
+from rig.estimation.reference_budget import response_in_attitudes, scale_and_bias, scale_and_bias_covariance
+from rig.estimation.triaxial import TriaxialSolution
 
 SOURCES: Mapping[str, tuple[Literal["A", "B"], str]] = {
     placement.NOISE: ("A", "scatter of the readings"),
-    placement.ATTITUDES: ("A", "what the readings say of them"),
-    placement.PLACEMENTS: ("A", "how the placements differ beside their attitudes"),
-    known_increments.DELAY: ("A", "found, within 50 ms of none"),
+    placement.ATTITUDES: ("A", f"what the readings say of them, {IN_U}"),
+    placement.PLACEMENTS: ("A", f"how the placements differ beside their attitudes, {IN_U}"),
+    known_increments.DELAY: ("A", f"found, within 50 ms of none, {IN_U}"),
     known_increments.EARTHS_RATE: ("B", "its size, whichever way it points"),
-    known_increments.STRETCHES: ("A", "how six stretches of the recording differ"),
+    known_increments.STRETCHES: ("A", f"how six stretches of the recording differ, {IN_U}"),
 }
 
 
-def budget_by_causes(matrix: Array, causes: Mapping[str, Array]) -> Budget:
-    """From what each cause does to the covariance (p, p) of a reference model's parameters, F (3, 3) first."""
+def noise_freedom(solution: TriaxialSolution, equations: Equations) -> float:
+    """Degrees of freedom of the noise's part in scale and bias, the fewest of the six, by how the readings weigh."""
+    theta = np.concatenate([solution.matrix.ravel(), solution.reference, solution.bias])
+    error = solution.attitude_error
+    off_rad = 0.0 if error is None else error.std_rad
+    response = response_in_attitudes(theta, equations.attitudes, equations.variances, off_rad)
+    told = scale_and_bias(solution.matrix, 1 / np.linalg.norm(solution.matrix, axis=1), len(theta)) @ response
+    parts = (told**2 * equations.variances.ravel()).T
+    return float(effective_freedom(parts, equations.freedom.reshape(-1, 1)).min())
+
+
+def budget_by_causes(matrix: Array, causes: Mapping[str, Array], noise_freedom: float | None = None) -> Budget:
+    """From what each cause does to the covariance (p, p) of a reference model's parameters, F (3, 3) first.
+
+    Sizes of errors that were found are uncertain themselves. Where their likelihood was integrated over, or the
+    covariance widened as Student's t is, that is in u already (JCGM 101, 6.4.9) and no freedom is left to count:
+    so it is of the noise too, where no `noise_freedom` is given.
+    """
     scale = 1 / np.linalg.norm(matrix, axis=1)
     lines = []
     for name, each in causes.items():
         kind, source = SOURCES[name]
-        spread = scale_and_bias_covariance(matrix, scale, each)
-        lines.append(Contributor(name, kind, "normal", None, "", source, np.inf, spread))
+        freedom = np.inf
+        if name == placement.NOISE and noise_freedom is not None:
+            freedom = noise_freedom
+        elif name == placement.NOISE:
+            source = f"{source}, {IN_U}"
+        lines.append(
+            Contributor(name, kind, "normal", None, "", source, freedom, scale_and_bias_covariance(matrix, scale, each))
+        )
     return Budget(tuple(lines))

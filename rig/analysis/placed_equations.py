@@ -18,13 +18,17 @@ from rig.observation.csv_samples import Quantity
 
 @dataclass(frozen=True, slots=True)
 class Equations:
-    """Readings `means` (N, 3) with `variances` (N, 3) in `attitudes` (N, 3, 3), of which `std_rad` (N,) is stated."""
+    """Readings `means` (N, 3) with `variances` (N, 3) in `attitudes` (N, 3, 3), of which `std_rad` (N,) is stated.
+
+    `freedom` (N, 3): with how many degrees of freedom the variances are known.
+    """
 
     means: Array
     variances: Array
     attitudes: Array
     std_rad: Array | None
     known: Known
+    freedom: Array
     second_order: bool = False
 
     @staticmethod
@@ -39,8 +43,11 @@ class Equations:
                 "in body coordinates, with --exact-rates where their noise is far below the sensor's",
             )
         known = KnownVector(rows.rates_rad_s)
-        variances = _scatter(rows, known) if rows.variances is None else rows.variances
-        return Equations(rows.means, variances, rows.attitudes, rows.attitude_std_rad, known)
+        if rows.variances is None or rows.freedom is None:
+            variances, freedom = _scatter(rows, known)
+        else:
+            variances, freedom = rows.variances, rows.freedom
+        return Equations(rows.means, variances, rows.attitudes, rows.attitude_std_rad, known, freedom)
 
     @staticmethod
     def of_placements(
@@ -57,6 +64,7 @@ class Equations:
             placements.attitudes,
             placements.attitude_std_rad,
             known,
+            placements.read.freedom[quantity],
             second_order and quantity == "acceleration",
         )
 
@@ -87,8 +95,10 @@ class Equations:
         return {other: or_fault(partial(self.solve, other)) for other in others if other != method}
 
 
-def _scatter(rows: Rows, known: KnownVector) -> Array:
+def _scatter(rows: Rows, known: KnownVector) -> tuple[Array, Array]:
     """(N, 3) variances of the means from how they scatter about the model, each axis' noise alike in all rows.
+
+    And with how many degrees of freedom.
 
     Equal weights: the model that weighs attitude errors would take them for noise here.
     """
@@ -103,4 +113,4 @@ def _scatter(rows: Rows, known: KnownVector) -> Array:
             "Give longer rows, or more of them",
         )
     variances: Array = np.maximum(np.sum(left**2 * counts, axis=0) / freedom, 1e-30) / counts
-    return variances
+    return variances, np.full_like(variances, freedom)

@@ -16,7 +16,7 @@ from rig.analysis.verification import Verification
 from rig.data.settings import DecisionRule, Limits
 from rig.estimation.arrays import Array
 from rig.estimation.budget import Budget
-from rig.estimation.coverage import COVERAGE_FACTOR, beyond
+from rig.estimation.coverage import COVERAGE_FACTOR, beyond, coverage_factors
 from rig.estimation.estimate import Estimate
 
 
@@ -140,7 +140,8 @@ def drift_checks(
     for quantity, drift in drifts.items():
         name, limit, unit = allowed[quantity]
         held = drift.held
-        spread = _twice(held.largest_change_std)
+        std = held.largest_change_std
+        spread = _twice(std) if drift.freedom is None else _by_freedom(std, drift.freedom)
         found.append(_held(f"{sensor}.{name}", (held.largest_change, spread), limit, unit, rule))
     return tuple(found)
 
@@ -174,6 +175,11 @@ def _spreads(budget: Budget) -> tuple[Spread, Spread]:
 def _twice(std: Array) -> Spread:
     """Of what has no budget."""
     return Spread(COVERAGE_FACTOR * std, np.full(3, COVERAGE_FACTOR), np.full(3, np.inf))
+
+
+def _by_freedom(std: Array, freedom: Array) -> Spread:
+    factors = coverage_factors(freedom)
+    return Spread(factors * std, factors, freedom)
 
 
 def _held(name: str, found: tuple[Array, Spread | None], limit: float | None, unit: str, rule: DecisionRule) -> Check:

@@ -3,7 +3,17 @@
 from typing import Literal
 
 from rig.data.budget_entries import BudgetEntry
-from rig.data.result_types import Entry, ErrorEntry, Matrix3, Matrix6, PositiveVector3, Role, Vector3
+from rig.data.result_types import (
+    Entry,
+    ErrorEntry,
+    Freedom3,
+    Matrix3,
+    Matrix6,
+    PositiveVector3,
+    Role,
+    Vector3,
+    WhenEntry,
+)
 
 
 class InAttitudesEntry(Entry):
@@ -59,6 +69,8 @@ class AccelerometerEntry(Entry):
       attitudes are off about each axis, by the readings' own account.
     - `lever_arm_m`, from the sweeps' axes to the sensor in the flange's frame, and `delay_s`, by which it lags behind
       the gyroscope, are there where sweeps were made.
+    - `found_at`: when scale and bias were read, and how warm it was then; `temperature_c` is the mean over the dwells.
+    - `…_freedom`: degrees of freedom of the standard deviations of that name, null where they have no end.
     - `correction_matrix` is M of s = M (a − b), first order: in the frame of the gyroscope's corrected rates (whole
       matrix) where there is an `alignment`, else in the right-angled frame nearest to the accelerometer's own axes.
     """
@@ -99,3 +111,6 @@ class AccelerometerEntry(Entry):
     warnings: tuple[str, ...]
     covariance_combined: Matrix6 | None = None
     budget: BudgetEntry | None = None
+    found_at: WhenEntry | None = None
+    non_orthogonality_freedom: Freedom3 | None = None
+    second_order_freedom: Freedom3 | None = None

@@ -9,6 +9,7 @@ from pydantic import Field
 from rig.data.result_types import Entry, Vector6
 from rig.estimation.coverage import COVERAGE_FACTOR, covered
 
+IN_U = "how well is in u"  # ends the source of what was found, and of which no degrees of freedom are left to count
 # Infinite degrees of freedom are null.
 Freedom6 = Annotated[tuple[float | None, ...], Field(min_length=6, max_length=6)]
 

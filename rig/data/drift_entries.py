@@ -1,6 +1,6 @@
 """What `result.json` says of biases by repeat."""
 
-from rig.data.result_types import Entry, ErrorEntry, Vector3
+from rig.data.result_types import Entry, ErrorEntry, Freedom3, Vector3
 
 
 class BiasEntry(Entry):
@@ -38,13 +38,16 @@ class SlopeEntry(Entry):
     std: Vector3
     range_c: tuple[float, float]
     correlation_with_time: float
+    freedom: Freedom3 | None = None
 
 
 class DriftEntry(Entry):
     """One quantity's bias by repeat, in its `unit`.
 
     `common_std` is what all biases share beside their own; `excess` how many times more the readings scatter from
-    repeat to repeat than they do within a dwell. A steady bias has `moves` in a share of `false_alarm` of all runs.
+    repeat to repeat than they do within a dwell. `freedom` are the degrees of freedom of the `held` biases' standard
+    deviations, null where they have no end; results of before do not count them. A steady bias has `moves` in a share
+    of `false_alarm` of all runs.
     """
 
     unit: str
@@ -56,3 +59,4 @@ class DriftEntry(Entry):
     largest_change: Vector3
     over_temperature: SlopeEntry | ErrorEntry
     earth_rate_known: bool
+    freedom: Freedom3 | None = None

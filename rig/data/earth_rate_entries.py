@@ -1,6 +1,6 @@
 """What `result.json` says of the Earth's rate that a gyroscope has found."""
 
-from rig.data.result_types import Entry, Matrix3, Vector3
+from rig.data.result_types import Entry, Freedom, Matrix3, Vector3
 
 
 class EarthRateEntry(Entry):
@@ -11,6 +11,7 @@ class EarthRateEntry(Entry):
     - `vertical_held` says that its vertical part was not found but held to what a given latitude makes of it, for the
       sake of the g-sensitivity; then `latitude_rad` says how well the level part found fits that latitude.
     - `scatter` is the ratio of the residuals to what was expected; above 1 it has widened `covariance_rad2_s2`.
+    - `freedom`: degrees of freedom of the standard deviations; null where nobody counts, as in results of before.
     """
 
     rate_rad_s: Vector3
@@ -24,3 +25,8 @@ class EarthRateEntry(Entry):
     up: Vector3
     vertical_held: bool
     scatter: float
+    freedom: float | None = None
+
+    def freedoms(self, count: int) -> list[Freedom] | None:
+        """Of so many of its numbers; None where nobody counts."""
+        return None if self.freedom is None else [self.freedom] * count

@@ -8,7 +8,7 @@ from pydantic import Field
 
 from rig.data.budget_entries import BudgetEntry
 from rig.data.checked import read_document
-from rig.data.result_types import Entry, ErrorEntry, Matrix3, Matrix6, PositiveVector3, Vector3
+from rig.data.result_types import Entry, ErrorEntry, Freedom3, Matrix3, Matrix6, PositiveVector3, Vector3, WhenEntry
 
 REVERSAL_MAX_BYTES: Final = 4_000_000  # of two runs it has 4,000
 
@@ -76,6 +76,8 @@ class MagnetometerEntry(Entry):
       says what makes it up; null in results of before there was one. `field_t` is what the scale is relative to.
     - `field_base_t` is the field in the arm's base frame, `attitude_error_rad` how far the arm's attitudes are off
       about each axis, by the readings' own account.
+    - `found_at`: when scale and bias were read; `non_orthogonality_freedom`: degrees of freedom of these standard
+      deviations, null where they have no end.
     - `correction_matrix` is M of B = M (m − b), in the right-angled frame nearest to the magnetometer's own axes.
     """
 
@@ -109,6 +111,8 @@ class MagnetometerEntry(Entry):
     warnings: tuple[str, ...]
     covariance_combined: Matrix6 | None = None
     budget: BudgetEntry | None = None
+    found_at: WhenEntry | None = None
+    non_orthogonality_freedom: Freedom3 | None = None
 
 
 class AsMountedEntry(Entry):
@@ -129,7 +133,8 @@ class ReversalEntry(Entry):
       is the bias as mounted.
     - `arm_field_t` is the arm's field in the sensor's axes as it was mounted in the first run; 0 on such an axis.
     - `covariance` is that of bias and arm's field; `chi_square` whether the runs agree on what they share.
-    - `scale` and `correction_matrix` are the means of the runs'.
+    - `scale` and `correction_matrix` are the means of the runs'. `…_freedom`: degrees of freedom of the standard
+      deviations of that name, null where they have no end; files of before do not count them.
     """
 
     part: str
@@ -147,6 +152,9 @@ class ReversalEntry(Entry):
     degrees_of_freedom: int
     limit: float
     runs: tuple[AsMountedEntry, ...]
+    scale_freedom: Freedom3 | None = None
+    bias_freedom: Freedom3 | None = None
+    arm_field_freedom: Freedom3 | None = None
 
 
 class ReversalDocument(Entry):

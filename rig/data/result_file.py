@@ -17,7 +17,20 @@ from rig.data.checked import read_document
 from rig.data.drift_entries import DriftEntry
 from rig.data.earth_rate_entries import EarthRateEntry
 from rig.data.magnetometer_entries import MagnetometerEntry
-from rig.data.result_types import Entry, ErrorEntry, Matrix3, Matrix6, Positive, PositiveVector3, Role, Vector3, Vector6
+from rig.data.result_types import (
+    Entry,
+    ErrorEntry,
+    Freedom3,
+    Matrix3,
+    Matrix6,
+    Positive,
+    PositiveVector3,
+    Role,
+    Vector2,
+    Vector3,
+    Vector6,
+    WhenEntry,
+)
 from rig.data.run_folder import RESULT
 from rig.errors import Refused
 
@@ -112,7 +125,8 @@ class EstimateEntry(Entry):
 class VectorEntry(Entry):
     """The vector model's solution: the six parameters, and how the three axes lie to each other and to the flange.
 
-    `residuals_std_rad_s` is what the solve expects each residual to scatter by; results of before do not say it.
+    `residuals_std_rad_s` is what the solve expects each residual to scatter by; `…_freedom` are the degrees of freedom
+    of the standard deviations of that name, null where they have no end. Results of before have neither.
     """
 
     model: str
@@ -137,6 +151,9 @@ class VectorEntry(Entry):
     residuals_rad_s: tuple[Vector3, ...]
     warnings: tuple[str, ...]
     residuals_std_rad_s: tuple[Vector3, ...] | None = None
+    non_orthogonality_freedom: Freedom3 | None = None
+    mounting_freedom: Freedom3 | None = None
+    g_sensitivity_freedom: tuple[Freedom3, Freedom3, Freedom3] | None = None
 
 
 class NonlinearityEntry(Entry):
@@ -215,12 +232,17 @@ class BoardEntry(Entry):
 class SensorEntry(Entry):
     """A sensor's calibration by the chosen estimator, what it rests on, and what the other estimators say.
 
-    `covariance` is that of noise and of a bias that wanders, `covariance_combined` holds all of the `budget`; both are
-    there where the vector model was chosen. `correction_matrix` is M of g = M (m + b), by which the board and the C
-    header correct readings; results of before have none, and it is K. `speeds_rad_s` are those of the sweeps: found at
-    one speed, either way, the calibration is valid at that speed, and there is no `nonlinearity`. `temperature_c` is
-    the mean over all averaged samples. A reference has no `board`: the board solves only for the sensors that are to be
-    calibrated. `earth_rate` is there where it was to be found, or says why it was not.
+    - `covariance` is that of noise and of a bias that wanders, `covariance_combined` holds all of the `budget`; both
+      are there where the vector model was chosen.
+    - `correction_matrix` is M of g = M (m + b), by which the board and the C header correct readings; results of before
+      have none, and it is K.
+    - `speeds_rad_s` are those of the sweeps: found at one speed, either way, the calibration is valid at that speed,
+      and there is no `nonlinearity`. `loads_rad_s`: the smallest and the largest rate along each of the sensor's own
+      axes in the sweeps that tell its scale factor.
+    - `temperature_c` is the mean over all averaged samples of the sweeps. `scale_at` and `bias_at` say when each was
+      read, and how warm it was then: scale factors are found from sweeps, biases from rests too.
+    - A reference has no `board`: the board solves only for the sensors that are to be calibrated.
+    - `earth_rate` is there where it was to be found, or says why it was not.
     """
 
     part: str
@@ -254,6 +276,9 @@ class SensorEntry(Entry):
     correction: Literal["matrix", "diagonal"] = "diagonal"
     correction_matrix: Matrix3 | None = None
     earth_rate: EarthRateEntry | ErrorEntry | None = None
+    scale_at: WhenEntry | None = None
+    bias_at: WhenEntry | None = None
+    loads_rad_s: tuple[Vector2, Vector2, Vector2] | None = None
 
 
 class RotationEntry(Entry):

@@ -1,15 +1,20 @@
 """What the entries of `result.json` are made of."""
 
+from datetime import datetime
 from typing import Annotated, Literal
 
-from pydantic import BaseModel, ConfigDict, Field
+from pydantic import AfterValidator, BaseModel, ConfigDict, Field
 
 Positive = Annotated[float, Field(gt=0)]
+Vector2 = tuple[float, float]
 Vector3 = tuple[float, float, float]
 Vector6 = tuple[float, float, float, float, float, float]
 PositiveVector3 = tuple[Positive, Positive, Positive]
 Matrix3 = tuple[Vector3, Vector3, Vector3]
 Matrix6 = Annotated[tuple[Vector6, ...], Field(min_length=6, max_length=6)]
+# Degrees of freedom; infinite ones are null.
+Freedom = float | None
+Freedom3 = tuple[Freedom, Freedom, Freedom]
 Role = Literal["calibrate", "reference"]
 
 
@@ -18,6 +23,28 @@ class Entry(BaseModel):
 
     # What a later version has added is ignored when it is read.
     model_config = ConfigDict(frozen=True, allow_inf_nan=False)
+
+
+def _iso(text: str) -> str:
+    datetime.fromisoformat(text)
+    return text
+
+
+Utc = Annotated[str, AfterValidator(_iso)]
+
+
+class WhenEntry(Entry):
+    """From when to when readings were taken (UTC, by the arm controller's clock since the recording's start).
+
+    `mean_utc` is the middle of the readings, `temperature_c` their mean by the sensor's own thermometer, which stayed
+    between the two of `temperature_range_c`; null where it has none.
+    """
+
+    from_utc: Utc
+    to_utc: Utc
+    mean_utc: Utc
+    temperature_c: float | None
+    temperature_range_c: tuple[float, float] | None
 
 
 class ErrorEntry(Entry):

@@ -37,6 +37,8 @@ class Move:
 class BiasByRepeat:
     """`bias` (R, 3), what differs between repeats known to `std` (R, 3); when it `moved`.
 
+    `freedom` (3,) of these: those of the excess where there is one, else infinite.
+
     `excess` (3,) is the standard deviation of a mean in an attitude over what its variance says, where it is larger: an
     arm that comes back differently, a bias that moves within a repeat. `std` has it in it.
     """
@@ -45,6 +47,7 @@ class BiasByRepeat:
     std: Array
     excess: Array
     moves: tuple[Move, ...]
+    freedom: Array
 
     @property
     def largest_change(self) -> Array:
@@ -84,13 +87,25 @@ def bias_by_repeat(readings: Array, variances: Array, modelled: Array, bias: Arr
     excess = _excess(off, variances)
     std = np.sqrt(variances.mean(axis=1) / attitudes) * excess
     moves = tuple(sorted(_moves(found, std, 0, len(found), len(found) - 1), key=lambda move: move.repeat))
-    return BiasByRepeat(found if bias is None else bias + found - found[0], std, excess, moves)
+    return BiasByRepeat(
+        found if bias is None else bias + found - found[0],
+        std,
+        excess,
+        moves,
+        np.where(excess > 1.0, _left_over(off), np.inf),
+    )
+
+
+def _left_over(off: Array) -> int:
+    """Degrees of freedom of what is left of (R, N, 3) when each attitude has an error and each repeat a bias."""
+    repeats, attitudes = off.shape[:2]
+    return int((repeats - 1) * (attitudes - 1))
 
 
 def _excess(off: Array, variances: Array) -> Array:
     """(3,) by what is left when each attitude has an error of its own and each repeat a bias; 1 at least."""
     left = off - off.mean(axis=0) - off.mean(axis=1, keepdims=True) + off.mean(axis=(0, 1))
-    freedom = (off.shape[0] - 1) * (off.shape[1] - 1)
+    freedom = _left_over(off)
     if freedom == 0:
         return np.ones(3)
     scatter = np.sum(left**2, axis=(0, 1)) / freedom

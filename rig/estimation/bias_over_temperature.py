@@ -22,6 +22,8 @@ FEWEST = 4  # repeats, for three parameters
 class BiasOverTemperature:
     """`slope` (3,) per °C, its standard deviation (3,), and the range of temperatures it was seen in, and holds in.
 
+    `freedom` (3,) of the deviations: those of the residuals where these made them, else infinite.
+
     `correlation` is that of temperature and time, which are found together.
     """
 
@@ -29,6 +31,7 @@ class BiasOverTemperature:
     std: Array
     range_c: tuple[float, float]
     correlation: float
+    freedom: Array
 
 
 def bias_over_temperature(bias: Array, std: Array, temperature_c: Array, time_s: Array) -> BiasOverTemperature:
@@ -54,16 +57,18 @@ def bias_over_temperature(bias: Array, std: Array, temperature_c: Array, time_s:
             "two parts of it (`rig resume`)",
         )
     columns = np.column_stack([np.ones(len(bias)), _scaled(temperature_c), _scaled(time_s)])
-    slope, known = np.empty(3), np.empty(3)
+    slope, known, freedom = np.empty(3), np.empty(3), np.full(3, np.inf)
+    left_over = len(bias) - columns.shape[1]
     for axis in range(3):
         white = 1 / std[:, axis]
         design = columns * white[:, None]
         found, *_ = np.linalg.lstsq(design, bias[:, axis] * white, rcond=None)
         left = bias[:, axis] * white - design @ found
-        excess = max(1.0, float(np.sqrt(np.sum(left**2) / (len(bias) - 3))))
+        excess = max(1.0, float(np.sqrt(np.sum(left**2) / left_over)))
+        freedom[axis] = left_over if excess > 1.0 else np.inf
         slope[axis] = found[1] / float(np.std(temperature_c))
         known[axis] = excess * float(np.sqrt(np.linalg.inv(design.T @ design)[1, 1]) / np.std(temperature_c))
-    return BiasOverTemperature(slope, known, (low, high), correlation)
+    return BiasOverTemperature(slope, known, (low, high), correlation, freedom)
 
 
 def _scaled(values: Array) -> Array:

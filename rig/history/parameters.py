@@ -14,9 +14,10 @@ import numpy as np
 from rig.data.accelerometer_entries import AccelerometerEntry
 from rig.data.magnetometer_entries import MagnetometerEntry
 from rig.data.result_file import ResultDocument, SensorEntry, VectorEntry
-from rig.data.result_types import ErrorEntry
+from rig.data.result_types import ErrorEntry, Freedom
 from rig.estimation.arrays import Array
 from rig.estimation.coverage import COVERAGE_FACTOR
+from rig.report.expanded import expanded, flat
 
 Quantity = Literal["rate", "acceleration", "field"]
 BIAS_UNITS: dict[Quantity, str] = {"rate": "rad/s", "acceleration": "m/s²", "field": "T"}
@@ -102,12 +103,14 @@ def _gyroscope(name: str, entry: SensorEntry, document: ResultDocument) -> Calib
     if isinstance(entry.vector_model, VectorEntry):
         vector = entry.vector_model
         stds = vector.non_orthogonality_std_rad
-        parameters += _angles(vector.non_orthogonality_rad, stds)
+        parameters += _angles(vector.non_orthogonality_rad, stds, vector.non_orthogonality_freedom)
         if vector.g_sensitivity_rad_s_per_m_s2 is not None and vector.g_sensitivity_std_rad_s_per_m_s2 is not None:
-            felt = zip(vector.g_sensitivity_rad_s_per_m_s2, vector.g_sensitivity_std_rad_s_per_m_s2, strict=True)
-            for row, (values_of_row, stds_of_row) in zip("xyz", felt, strict=True):
-                for column, value, std in zip("xyz", values_of_row, stds_of_row, strict=True):
-                    parameters.append(Parameter(f"g{row}{column}", value, std, None, "rad/s per m/s²"))
+            names = [f"g{row}{column}" for row in "xyz" for column in "xyz"]
+            felt = np.ravel(vector.g_sensitivity_rad_s_per_m_s2)
+            known = np.ravel(vector.g_sensitivity_std_rad_s_per_m_s2)
+            factors = _factors(9, flat(vector.g_sensitivity_freedom))
+            for name_of, value, std, factor in zip(names, felt.tolist(), known.tolist(), factors, strict=True):
+                parameters.append(Parameter(name_of, value, std, None, "rad/s per m/s²", coverage_factor=factor))
     return Calibrated(
         name,
         "rate",
@@ -125,7 +128,7 @@ def _accelerometer(name: str, entry: AccelerometerEntry, document: ResultDocumen
     limits = _limits(name, "acceleration", document)
     parameters = [
         *_scale_and_bias(values, entry, "acceleration", limits),
-        *_angles(entry.non_orthogonality_rad, entry.non_orthogonality_std_rad),
+        *_angles(entry.non_orthogonality_rad, entry.non_orthogonality_std_rad, entry.non_orthogonality_freedom),
     ]
     return Calibrated(
         name,
@@ -143,7 +146,7 @@ def _magnetometer(name: str, entry: MagnetometerEntry) -> Calibrated:
     values = (*entry.scale, *entry.bias_t)
     parameters = [
         *_scale_and_bias(values, entry, "field", (None, None)),
-        *_angles(entry.non_orthogonality_rad, entry.non_orthogonality_std_rad),
+        *_angles(entry.non_orthogonality_rad, entry.non_orthogonality_std_rad, entry.non_orthogonality_freedom),
     ]
     return Calibrated(
         name,
@@ -186,9 +189,14 @@ def _std(row: Array, covariance: Sequence[Sequence[float]]) -> float:
     return float(np.sqrt(row @ np.array(covariance) @ row))
 
 
-def _angles(angles: Sequence[float], stds: Sequence[float]) -> list[Parameter]:
-    each = zip(ANGLES, angles, stds, strict=True)
-    return [Parameter(name, value, std, None, "rad") for name, value, std in each]
+def _angles(angles: Sequence[float], stds: Sequence[float], freedom: Sequence[Freedom] | None) -> list[Parameter]:
+    each = zip(ANGLES, angles, stds, _factors(3, freedom), strict=True)
+    return [Parameter(name, value, std, None, "rad", coverage_factor=factor) for name, value, std, factor in each]
+
+
+def _factors(count: int, freedom: Sequence[Freedom] | None) -> list[float | None]:
+    """k of each; None where it is 2."""
+    return [None if each == COVERAGE_FACTOR else each for each in expanded([1.0] * count, freedom).factors]
 
 
 def _known(parameters: Sequence[Parameter]) -> Iterator[Parameter]:

@@ -9,7 +9,7 @@ from rig.history.series import YEAR_DAYS, Change, RigState, Subject, Trend
 from rig.history.statistics.charts import FEWEST
 from rig.history.statistics.rig_effects import RigEffect
 from rig.history.store import Kept, Past
-from rig.report.certificate.rounding import rounded
+from rig.report.rounding import rounded
 from rig.station.plain_text import plain
 
 PPM = 1e6

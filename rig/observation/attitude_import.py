@@ -42,7 +42,7 @@ NORM_TOLERANCE = 1e-3
 
 @dataclass(frozen=True, slots=True)
 class Rows:
-    """What a gyroscope read in N rows: `means` (N, 3) and the `variances` (N, 3) of these means.
+    """What a gyroscope read in N rows: `means` (N, 3), the `variances` (N, 3) of these, known with `freedom` (N, 3).
 
     No variances where rows hold too few samples to show their noise. `samples` (N,); `attitudes` (N, 3, 3), body to
     table; `rates_rad_s` (N, 3) of the table in body coordinates and `attitude_std_rad` (N,), if they were given.
@@ -50,6 +50,7 @@ class Rows:
 
     means: Array
     variances: Array | None
+    freedom: Array | None
     samples: Array
     attitudes: Array
     rates_rad_s: Array | None
@@ -132,9 +133,11 @@ def _placements(time_s: Array, readings: Mapping[Quantity, Array], said: _Said) 
 def _rows(time_s: Array, rate: Array, said: _Said) -> Rows:
     cuts = [rate[inside(time_s, window)] for window in said.windows]
     counts = np.array([len(cut) for cut in cuts])
+    told = np.array([scatter_of(cut)[:2] for cut in cuts]) if counts.min() >= MIN_SAMPLES else None
     return Rows(
         np.array([cut.mean(axis=0) for cut in cuts]),
-        np.array([scatter_of(cut)[0] for cut in cuts]) if counts.min() >= MIN_SAMPLES else None,
+        None if told is None else told[:, 0],
+        None if told is None else told[:, 1],
         counts.astype(np.float64),
         said.attitudes,
         said.rates_rad_s,

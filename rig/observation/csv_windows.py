@@ -8,7 +8,7 @@ import numpy as np
 from rig.errors import Fault, Refused
 from rig.estimation.arrays import Array
 from rig.observation.average import Average
-from rig.observation.colour import widening
+from rig.observation.colour import left_of, widening
 from rig.observation.windows import Window
 
 MIN_SAMPLES = 20
@@ -40,19 +40,20 @@ def inside(time_s: Array, window: Window) -> slice:
     return slice(start, end)
 
 
-def scatter_of(readings: Array) -> tuple[Array, Array]:
-    """The variance of the mean of readings (n, 3), and the standard deviation of one of them, (3,) each.
+def scatter_of(readings: Array) -> tuple[Array, Array, Array]:
+    """Of readings (n, 3) the variance of their mean, its degrees of freedom, and the standard deviation of one, (3,).
 
     From the scatter about the mean; vibration counts as noise here, for no arm reports it.
     """
     variance = readings.var(axis=0, ddof=1)
-    wider = np.array([widening(readings[:, axis] - readings[:, axis].mean()) for axis in range(3)])
-    return variance * wider / len(readings), np.sqrt(variance)
+    left = (readings - readings.mean(axis=0)).T
+    wider, freedom = np.array([widening(each) for each in left]), np.array([left_of(each).freedom for each in left])
+    return variance * wider / len(readings), freedom, np.sqrt(variance)
 
 
 def average_of(readings: Array, window: Window) -> Average:
     """Of the readings (n, 3) that a window has; nothing tells their temperature."""
-    variance, noise = scatter_of(readings)
+    variance, freedom, noise = scatter_of(readings)
     return Average(
         mean_rad_s=readings.mean(axis=0),
         variance_rad2_s2=variance,
@@ -61,6 +62,7 @@ def average_of(readings: Array, window: Window) -> Average:
         start_s=window.start_s,
         end_s=window.end_s,
         temperature_c=float("nan"),
+        freedom=freedom,
     )
 
 

@@ -19,15 +19,17 @@ from rig.observation.csv_windows import MIN_SAMPLES, inside, scatter_of
 from rig.observation.rests import BLOCK_S, find_rests
 from rig.observation.windows import Window
 
+UNTOLD = (np.full(3, np.nan), np.full(3, np.nan))  # variances and their freedom, of too few samples
 TURNED_RAD = 0.02  # rows of one rest that are farther apart: it was turned about what it feels
 
 
 @dataclass(frozen=True, slots=True)
 class Rested:
-    """Readings of rests: `means` (N, 3) of every quantity and their `variances` (N, 3)."""
+    """Of rests `means` (N, 3) of every quantity, their `variances` (N, 3), and the `freedom` (N, 3) of these."""
 
     means: Mapping[Quantity, Array]
     variances: Mapping[Quantity, Array]
+    freedom: Mapping[Quantity, Array]
 
 
 @dataclass(frozen=True, slots=True)
@@ -113,12 +115,15 @@ def _covered(time_s: Array, rest: Window, windows: Sequence[Window]) -> NDArray[
 
 def _read(readings: Mapping[Quantity, Array], cuts: Sequence[NDArray[np.intp]]) -> Rested:
     """Of few samples, the noise of all that are long enough."""
-    means, variances = {}, {}
+    means, variances, freedom = {}, {}, {}
     for quantity, each in readings.items():
         means[quantity] = np.array([each[cut].mean(axis=0) for cut in cuts]).reshape(-1, 3)
-        found = np.array([scatter_of(each[cut])[0] if len(cut) >= MIN_SAMPLES else np.full(3, np.nan) for cut in cuts])
-        variances[quantity] = _filled(found.reshape(-1, 3), np.array([len(cut) for cut in cuts]), each)
-    return Rested(means, variances)
+        found = [scatter_of(each[cut])[:2] if len(cut) >= MIN_SAMPLES else UNTOLD for cut in cuts]
+        told, counted = np.array(found).reshape(-1, 2, 3).swapaxes(0, 1)
+        variances[quantity] = _filled(told, np.array([len(cut) for cut in cuts]), each)
+        fewest = len(each) - 1.0 if np.isnan(counted).all() else np.nanmin(counted)
+        freedom[quantity] = np.where(np.isnan(counted), fewest, counted)
+    return Rested(means, variances, freedom)
 
 
 def _filled(variances: Array, counts: NDArray[np.intp], readings: Array) -> Array:

@@ -25,12 +25,18 @@ BY_HAND_AXIS_RAD = 0.02  # how far it leans on the way
 
 @dataclass(frozen=True, slots=True)
 class TurnedData:
-    """What is solved by increments: the gyroscope, the turns, by the rows' numbers, and the means beside them."""
+    """What is solved by increments: the gyroscope, the turns, by the rows' numbers, and the means beside them.
+
+    `noise_freedom`, `bias_freedom`: with how many degrees of freedom the rests tell its noise, and how its bias
+    differs between them.
+    """
 
     gyroscope: Gyroscope
     turns: tuple[Turn, ...]
     rows: tuple[int, ...]
     means: tuple[Mean, ...]
+    noise_freedom: int
+    bias_freedom: int
 
 
 @dataclass(frozen=True, slots=True)
@@ -69,7 +75,8 @@ def turned(
         return None
     noise = np.sqrt(np.mean([np.square(rest.noise_rad_s) for rest in resting]) * np.median(np.diff(time_s)))
     gyroscope = Gyroscope(time_s, readings, float(noise), np.sqrt(bias_drift(resting)))
-    return TurnedData(gyroscope, tuple(turns), tuple(rows), tuple(means))
+    samples = sum(rest.samples - 1 for rest in resting)
+    return TurnedData(gyroscope, tuple(turns), tuple(rows), tuple(means), samples, max(len(resting) - 1, 1))
 
 
 def _between(sweep: Observation, lying: Sequence[Window]) -> Window | None:

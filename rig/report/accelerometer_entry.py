@@ -3,6 +3,7 @@
 import numpy as np
 
 from rig.analysis.acceleration import AccelerometerResult, HeldOut
+from rig.analysis.freedom_beside import of_acceleration_angles, of_second_order
 from rig.data.accelerometer_entries import (
     AccelerometerEntry,
     AlignmentEntry,
@@ -18,7 +19,7 @@ from rig.estimation.triads import Alignment
 from rig.estimation.triaxial import TriaxialSolution
 from rig.report.axes import PARAMETERS, dwell_entry
 from rig.report.budget_entry import budget_entry
-from rig.report.entry import entry
+from rig.report.entry import counted, entry
 
 UNITS = ("1", "1", "1", "m/s²", "m/s²", "m/s²")
 
@@ -48,6 +49,8 @@ def accelerometer_entry(result: AccelerometerResult) -> AccelerometerEntry:
             for each, left in zip(result.dwells, solution.dwell_residuals_m_s2, strict=True)
         ],
         beside={name: _beside(found) for name, found in result.beside.items()},
+        non_orthogonality_freedom=counted(of_acceleration_angles(result)),
+        second_order_freedom=counted(of_second_order(result)),
         held_out=None if result.held_out is None else _held_out(result.held_out),
     )  # fmt: skip
 

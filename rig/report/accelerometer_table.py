@@ -8,8 +8,10 @@ from rich.table import Table
 from rig.data.accelerometer_entries import AccelerometerEntry
 from rig.data.budget_entries import expanded_uncertainties
 from rig.data.result_types import ErrorEntry
-from rig.report.axes import axes_table, triple
+from rig.report.axes import axes_table, skew_known, triple
 from rig.report.budget_table import assumed_lines, expanded_heading
+from rig.report.expanded import expanded, factor_words
+from rig.report.validity_words import when_words
 
 
 def accelerometer_table(name: str, found: AccelerometerEntry) -> Table:
@@ -24,14 +26,18 @@ def accelerometer_table(name: str, found: AccelerometerEntry) -> Table:
 def accelerometer_lines(found: AccelerometerEntry) -> Iterator[str]:
     """What stands below the table."""
     yield f"relative to gravity, {found.gravity_m_s2:.6g} m/s²; {len(found.dwells)} attitudes, {found.sweeps} sweeps"
+    if found.found_at is not None:
+        yield f"scale and bias: {when_words(found.found_at)}"
     yield from assumed_lines(found.budget)
-    skew, std = np.degrees(found.non_orthogonality_rad), np.degrees(found.non_orthogonality_std_rad)
-    yield f"non-orthogonality yz zx xy: {triple(skew, '+.4f')} ° (± {2 * std.max():.4f})"
+    skew = triple(np.degrees(found.non_orthogonality_rad), "+.4f")
+    yield f"non-orthogonality yz zx xy: {skew} ° (± {skew_known(found)})"
     off, known = 1e3 * found.attitude_error_rad, 2e3 * found.attitude_error_std_rad
     yield f"attitude error found: {off:.2f} mrad about each axis (± {known:.2f})"
     if found.second_order_s2_m is not None and found.second_order_std_s2_m is not None:
         terms = triple(found.second_order_s2_m, "+.2e")
-        yield f"second order: {terms} s²/m (± {2 * max(found.second_order_std_s2_m):.1e})"
+        widths = expanded(found.second_order_std_s2_m, found.second_order_freedom).widths
+        words = factor_words(found.second_order_freedom)
+        yield f"second order: {terms} s²/m (± {max(widths):.1e}, {words})"
     if found.lever_arm_m is not None and found.lever_arm_std_m is not None:
         lever = triple(np.multiply(1e3, found.lever_arm_m), "+.1f")
         yield f"sits at {lever} mm from the wrists' axes (± {2e3 * max(found.lever_arm_std_m):.1f})"

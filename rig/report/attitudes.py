@@ -12,6 +12,7 @@ from rich.table import Table
 
 from rig.analysis.attitudes import InAttitudes, Result, Surrounding, in_unit
 from rig.analysis.increments import InIncrements
+from rig.data.budget_entries import BudgetEntry
 from rig.errors import Fault
 from rig.estimation import accelerometer, magnetometer
 from rig.estimation.known_increments import KnownIncrements
@@ -20,7 +21,7 @@ from rig.observation.csv_samples import UNITS, Quantity
 from rig.observation.timebase import TimeBase
 from rig.report.axes import matrix_lines
 from rig.report.budget_entry import budget_entry
-from rig.report.budget_table import budget_table
+from rig.report.budget_table import budget_table, expanded_heading
 from rig.report.increments import increment_entry, increment_lines
 from rig.station.plain_text import plain
 
@@ -60,8 +61,9 @@ def print_found(found: Found, *, as_json: bool) -> None:
         if isinstance(result, Fault):
             console.print(plain(f"{quantity}: {result}"))
             continue
-        console.print(_table(f"{found.samples}: {quantity}, {MODELS[quantity]}", quantity, result.solution))
-        console.print(budget_table(budget_entry(result.budget), UNITS[quantity]))
+        budget = budget_entry(result.budget)
+        console.print(_table(f"{found.samples}: {quantity}, {MODELS[quantity]}", quantity, result.solution, budget))
+        console.print(budget_table(budget, in_unit(result.solution)[0].tolist(), UNITS[quantity]))
         for line in _lines(quantity, result, found.surrounding):
             console.print(plain(line))
 
@@ -83,21 +85,22 @@ def _clock_entry(clock: TimeBase) -> dict[str, float]:
     }
 
 
-def _table(title: str, quantity: Quantity, solution: TriaxialSolution | KnownIncrements) -> Table:
-    """The scale factor and the bias of each axis, ± U (k = 2)."""
+def _table(title: str, quantity: Quantity, solution: TriaxialSolution | KnownIncrements, budget: BudgetEntry) -> Table:
+    """The scale factor and the bias of each axis, ± U."""
     table = Table(title=plain(title, "table.title"), title_justify="left")
     unit = UNITS[quantity]
-    for heading in ("axis", "scale factor", "± U (k = 2)", f"bias {unit}", f"± U {unit}"):
+    for heading in ("axis", "scale factor", expanded_heading(budget), f"bias {unit}", f"± U {unit}"):
         table.add_column(heading, justify="left" if heading == "axis" else "right")
-    scale, std = in_unit(solution)
+    scale, _ = in_unit(solution)
     for i, axis in enumerate("xyz"):
-        bias = f"{solution.bias[i]:+.4e}", f"{2 * std[3 + i]:.1e}"
-        table.add_row(axis, f"{scale[i]:.6f}", f"{2 * std[i]:.6f}", *bias)
+        bias = f"{solution.bias[i]:+.4e}", f"{budget.expanded[3 + i]:.1e}"
+        table.add_row(axis, f"{scale[i]:.6f}", f"{budget.expanded[i]:.6f}", *bias)
     return table
 
 
 def _lines(quantity: Quantity, result: Result, surrounding: Surrounding) -> Iterator[str]:
-    yield from matrix_lines(result.solution.matrix, result.solution.covariance[:9, :9])
+    factor = float(result.budget.coverage_factors[:3].max())
+    yield from matrix_lines(result.solution.matrix, result.solution.covariance[:9, :9], factor)
     if isinstance(result, InIncrements):
         yield from increment_lines(result)
         return

@@ -1,16 +1,29 @@
 """What tables and entries of all three kinds of sensors share: three numbers in a line, three axes in a table."""
 
 from collections.abc import Iterable, Iterator, Sequence
+from typing import Protocol
 
 import numpy as np
 from rich.table import Table
 
+from rig.data.result_types import Freedom
 from rig.estimation.arrays import Array
 from rig.estimation.sensor_axes import angle_jacobian, nearest_rotation, non_orthogonality
 from rig.observation.acceleration import DwellReading
 from rig.observation.field import FieldReading
 from rig.report.entry import EntryT, entry
+from rig.report.expanded import expanded, factor_words
 from rig.station.plain_text import plain
+
+
+class Skewed(Protocol):
+    """What says how its axes lie to each other."""
+
+    @property
+    def non_orthogonality_std_rad(self) -> Sequence[float]: ...
+    @property
+    def non_orthogonality_freedom(self) -> Sequence[Freedom] | None: ...
+
 
 PARAMETERS = ("kx", "ky", "kz", "bx", "by", "bz")
 
@@ -41,9 +54,18 @@ def axes_table(
     return table
 
 
-def matrix_lines(matrix: Array, covariance: Array) -> Iterator[str]:
-    """F row by row and the angles between its axes, ± U (k = 2); `covariance` (9, 9) is that of F, row by row."""
-    spread = 2 * np.sqrt(np.diag(covariance)).reshape(3, 3)
+def skew_known(found: Skewed) -> str:
+    """U of the angles between the axes, the largest, in degrees, and what k is."""
+    widths = expanded(found.non_orthogonality_std_rad, found.non_orthogonality_freedom).widths
+    return f"{np.degrees(max(widths)):.2g}, {factor_words(found.non_orthogonality_freedom)}"
+
+
+def matrix_lines(matrix: Array, covariance: Array, factor: float) -> Iterator[str]:
+    """F row by row and the angles between its axes, ± U; `covariance` (9, 9) is that of F, row by row.
+
+    The coverage `factor` is that of the scale factors, the largest of them.
+    """
+    spread = factor * np.sqrt(np.diag(covariance)).reshape(3, 3)
     for axis, row, known in zip("xyz", matrix.tolist(), spread.tolist(), strict=True):
         elements = (f"{element:+.6f} ± {each:.1e}" for element, each in zip(row, known, strict=True))
         yield f"F {axis}: " + "  ".join(elements)
@@ -51,9 +73,9 @@ def matrix_lines(matrix: Array, covariance: Array) -> Iterator[str]:
     axes = matrix * scale[:, None]
     turned = angle_jacobian(axes, scale, nearest_rotation(axes))[:3]
     angles_std = np.sqrt(np.diag(turned @ covariance @ turned.T))
-    angles = zip(1e3 * non_orthogonality(axes), 2e3 * angles_std, strict=True)
+    angles = zip(1e3 * non_orthogonality(axes), 1e3 * factor * angles_std, strict=True)
     told = "  ".join(f"{angle:+.3f} ± {known:.2g}" for angle, known in angles)
-    yield f"non-orthogonality yz zx xy: {told} mrad (U, k = 2)"
+    yield f"non-orthogonality yz zx xy: {told} mrad (U, k = {factor:.3g})"
 
 
 def dwell_entry(kind: type[EntryT], unit: str, dwell: DwellReading | FieldReading, residual: Array) -> EntryT:

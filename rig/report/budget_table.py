@@ -7,25 +7,19 @@ from rich.table import Table
 from rig.data.budget_entries import BudgetEntry
 from rig.estimation.budget import NOT_GIVEN
 from rig.estimation.coverage import COVERAGE_FACTOR
+from rig.report.printed_budget import Line, printed_budget
 from rig.station.plain_text import plain
-
-NEGLIGIBLE = 0.001  # of every variance: such lines are in result.json alone
 
 
 def expanded_heading(budget: BudgetEntry | None) -> str:
+    """Of a column of U by a budget; without one it is two standard deviations."""
+    return heading_of((COVERAGE_FACTOR,) if budget is None else budget.factors)
+
+
+def heading_of(factors: Sequence[float]) -> str:
     """Of a column of U: with its coverage factor, or with the largest where they differ as they are printed."""
-    factors = _printed((COVERAGE_FACTOR,) if budget is None else budget.factors)
-    return f"± U (k {'=' if len(factors) == 1 else '≤'} {factors[-1]:g})"
-
-
-def _times(factors: Sequence[float]) -> str:
-    printed = _printed(factors)
-    return f"{printed[0]:g} ×" if len(printed) == 1 else f"{printed[0]:.2f} to {printed[-1]:.2f} ×"
-
-
-def _printed(factors: Sequence[float]) -> list[float]:
-    """The different ones, rounded, the smallest first."""
-    return sorted({round(each, 2) for each in factors})
+    printed = sorted({round(each, 2) for each in factors})
+    return f"± U (k {'=' if len(printed) == 1 else '≤'} {printed[-1]:g})"
 
 
 def assumed_lines(budget: BudgetEntry | None) -> Iterator[str]:
@@ -35,25 +29,30 @@ def assumed_lines(budget: BudgetEntry | None) -> Iterator[str]:
             yield f"{line.name}: ± {line.half_width:.3g} {line.unit} is assumed, for {line.source}"
 
 
-def budget_table(budget: BudgetEntry, unit: str = "rad/s", per_unit: float = 1.0) -> Table:
-    """What matters of the budget: the standard uncertainty of the axis it matters most to, and its share there.
+def budget_table(budget: BudgetEntry, scale: Sequence[float], unit: str = "rad/s", per_unit: float = 1.0) -> Table:
+    """Of one scale factor and one bias, as the certificate has it: squared, the lines add up to the combined one.
 
-    That of the biases times `per_unit`, in `unit`.
+    Biases times `per_unit` are in `unit`.
     """
-    coverage = f"U = {_times(budget.factors)} the combined standard uncertainty, about 95 %"
-    table = Table(title="uncertainty budget", title_justify="left", caption=coverage, caption_justify="left")
-    for heading in ("contributor", "type", "scale u", "share", f"bias u {unit}", "share"):
+    found = printed_budget(budget, scale, unit, per_unit)
+    k, b = found.columns
+    title = f"uncertainty budget of the scale factor of {k.axis} and of the bias of {b.axis}, whose U are the largest"
+    small = "; ".join(line.name for line in found.lines if not line.kind)
+    table = Table(title=title, title_justify="left", caption=small or None, caption_justify="left")
+    headings = ("contributor", "type", "ν", f"u(k{k.axis}) {k.unit}", "share", f"u(b{b.axis}) {b.unit}", "share")
+    for heading in headings:
         table.add_column(heading, justify="left" if heading in ("contributor", "type") else "right")
-    for line in sorted(budget.contributors, key=lambda each: -max(each.share)):
-        if max(line.share) < NEGLIGIBLE:
-            continue
-        assumed = "" if line.half_width is None else f" ±{line.half_width:.3g} {line.unit}"
-        table.add_row(
-            plain(line.name + assumed),
-            line.kind,
-            f"{max(line.std[:3]):.1e}",
-            f"{100 * max(line.share[:3]):.0f} %",
-            f"{per_unit * max(line.std[3:]):.1e}",
-            f"{100 * max(line.share[3:]):.0f} %",
-        )
+    for line in found.lines:
+        cells = (cell for part in line.parts for cell in part)
+        table.add_row(plain(_named(line)), line.kind, line.freedom, *cells, end_section=line is found.lines[-1])
+    table.add_row("combined u", "", "", k.combined, f"ν {k.freedom}", b.combined, f"ν {b.freedom}")
+    table.add_row("expanded U", "", "", k.expanded, f"× {k.factor}", b.expanded, f"× {b.factor}")
     return table
+
+
+def _named(line: Line) -> str:
+    """With what it was assumed to be; all that are negligible stand below the table."""
+    if not line.kind:
+        return line.name.partition(":")[0]
+    assumed = " ".join(line.assumed.split())  # a terminal shows blanks that do not break by their number
+    return f"{line.name} {assumed}" if assumed.startswith("±") else line.name

@@ -1,8 +1,16 @@
 """The typed outcome of a run as the document of `result.json`."""
 
+from rig.analysis.acceleration import AccelerometerResult
+from rig.analysis.calibration import SensorResult
+from rig.analysis.magnetic_field import MagnetometerResult
 from rig.analysis.outcome import Origin, Outcome
 from rig.analysis.verdict import Check
-from rig.data.result_file import SCHEMA, CheckEntry, ProvenanceEntry, ResultDocument
+from rig.analysis.when import of_accelerometer, of_gyroscope, of_magnetometer
+from rig.data.accelerometer_entries import AccelerometerEntry
+from rig.data.magnetometer_entries import MagnetometerEntry
+from rig.data.result_file import SCHEMA, CheckEntry, ProvenanceEntry, ResultDocument, SensorEntry
+from rig.data.result_types import ErrorEntry, Role
+from rig.errors import Fault
 from rig.report.accelerometer_entry import accelerometer_entry
 from rig.report.budget_entry import clock_entry
 from rig.report.drift_entry import drift_entry
@@ -10,6 +18,7 @@ from rig.report.entry import entry
 from rig.report.magnetometer_entry import magnetometer_entry
 from rig.report.sensor_entry import sensor_entry
 from rig.report.verification_entry import verification_entry
+from rig.report.when_entry import when_entry
 
 
 def document_of(outcome: Outcome) -> ResultDocument:
@@ -19,29 +28,44 @@ def document_of(outcome: Outcome) -> ResultDocument:
         verdict=outcome.verdict,
         checks=tuple(map(_check, outcome.checks)),
         provenance=_provenance(outcome.provenance),
-        sensors={
-            name: sensor_entry(
-                result,
-                "calibrate" if name in outcome.settings.to_calibrate else "reference",
-                outcome.onboard.get(name),
-            )
-            for name, result in outcome.results.items()
-        },
+        sensors={name: _sensor(outcome, name, result) for name, result in outcome.results.items()},
         verification={name: verification_entry(found) for name, found in outcome.verifications.items()},
     )
     more: dict[str, object] = {}
     if outcome.clock is not None:
         more["clock"] = clock_entry(outcome.clock)
     if outcome.accelerometers:
-        more["accelerometers"] = {name: accelerometer_entry(found) for name, found in outcome.accelerometers.items()}
+        more["accelerometers"] = {
+            name: _accelerometer(outcome, name, found) for name, found in outcome.accelerometers.items()
+        }
     if outcome.magnetometers:
-        more["magnetometers"] = {name: magnetometer_entry(found) for name, found in outcome.magnetometers.items()}
+        more["magnetometers"] = {name: _magnetometer(outcome, found) for name, found in outcome.magnetometers.items()}
     if outcome.drifts:
         more["bias_drift"] = {
             name: {quantity: drift_entry(quantity, drift) for quantity, drift in each.items()}
             for name, each in outcome.drifts.items()
         }
     return document.model_copy(update=more)
+
+
+def _sensor(outcome: Outcome, name: str, result: SensorResult) -> SensorEntry:
+    role: Role = "calibrate" if name in outcome.settings.to_calibrate else "reference"
+    held = of_gyroscope(outcome.recordings, name)
+    told = {"scale_at": when_entry(held.scale), "bias_at": when_entry(held.bias)}
+    return sensor_entry(result, role, outcome.onboard.get(name)).model_copy(update=told)
+
+
+def _accelerometer(outcome: Outcome, name: str, result: AccelerometerResult) -> AccelerometerEntry:
+    found = of_accelerometer(outcome.recordings, name, (dwell.index for dwell in result.dwells))
+    return accelerometer_entry(result).model_copy(update={"found_at": when_entry(found)})
+
+
+def _magnetometer(outcome: Outcome, result: MagnetometerResult | Fault) -> MagnetometerEntry | ErrorEntry:
+    made = magnetometer_entry(result)
+    if isinstance(result, Fault):
+        return made
+    found = of_magnetometer(outcome.recordings, (dwell.index for dwell in result.dwells))
+    return made.model_copy(update={"found_at": when_entry(found)})
 
 
 def _check(check: Check) -> CheckEntry:

@@ -8,6 +8,7 @@ from rig.errors import Fault
 from rig.estimation.arrays import Array
 from rig.estimation.bias_by_repeat import FALSE_ALARM
 from rig.observation.csv_samples import UNITS
+from rig.report.entry import counted
 
 
 def drift_entry(quantity: Quantity, drift: BiasDrift) -> DriftEntry:
@@ -39,8 +40,10 @@ def drift_entry(quantity: Quantity, drift: BiasDrift) -> DriftEntry:
             std=_vector(slope.std),
             range_c=slope.range_c,
             correlation_with_time=slope.correlation,
+            freedom=counted(drift.slope_freedom),
         ),
         earth_rate_known=drift.earth_rate_known,
+        freedom=counted(drift.freedom),
     )
 
 

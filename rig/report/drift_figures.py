@@ -9,6 +9,8 @@ from rig.analysis.bias_drift import Anew, BiasDrift
 from rig.analysis.outcome import Outcome
 from rig.data.result_file import ResultDocument
 from rig.report.drift_table import SHOWN
+from rig.report.entry import counted
+from rig.report.expanded import expanded, factor_words
 from rig.report.figures import save
 from rig.station.events import NotPlotted, Plotted, RunEvent
 from rig.study.style import style
@@ -45,15 +47,16 @@ def draw_drift(axes: "Axes", quantity: str, drift: BiasDrift) -> None:
     unit, size, what = SHOWN[quantity]
     repeat = np.arange(1, len(drift.held.bias) + 1)
     again = [(number, found) for number, found in zip(repeat, drift.anew, strict=True) if isinstance(found, Anew)]
+    factors = expanded((1.0, 1.0, 1.0), counted(drift.freedom)).factors
     for i, axis in enumerate("xyz"):
         held, std = drift.held.bias[:, i] / size, drift.held.std[:, i] / size
-        axes.errorbar(repeat, held, 2 * std, fmt="o-", ms=3, lw=0.8, color=f"C{i}", label=axis)
+        axes.errorbar(repeat, held, factors[i] * std, fmt="o-", ms=3, lw=0.8, color=f"C{i}", label=axis)
         if again:
             biases, stds = ([getattr(found, of)[i] / size for _, found in again] for of in ("bias", "std"))
             axes.errorbar(
                 [number + 0.15 for number, _ in again],
                 biases,
-                2 * np.array(stds),
+                factors[i] * np.array(stds),
                 fmt="x",
                 ms=4,
                 lw=0.6,
@@ -63,5 +66,9 @@ def draw_drift(axes: "Axes", quantity: str, drift: BiasDrift) -> None:
     for move in drift.held.moves:
         axes.axvline(move.repeat + 0.5, color="0.5", ls=":", lw=0.8)
     axes.locator_params("x", integer=True)
-    axes.set(xlabel="repeat", ylabel=f"bias   {unit}", title=f"{what}; ± U (k = 2), × found anew")
+    axes.set(
+        xlabel="repeat",
+        ylabel=f"bias   {unit}",
+        title=f"{what}; ± U ({factor_words(counted(drift.freedom))}), × found anew",
+    )
     axes.legend(frameon=False, ncols=3, fontsize=8)

@@ -9,6 +9,8 @@ from rich.table import Table
 from rig.data.drift_entries import DriftEntry
 from rig.data.result_types import ErrorEntry
 from rig.estimation.earth import MICRO_G_M_S2
+from rig.report.budget_table import heading_of
+from rig.report.expanded import expanded, factor_words
 from rig.station.plain_text import plain
 
 SHOWN = {"rate": ("°/h", np.pi / 180 / 3600, "gyroscope"), "acceleration": ("µg", MICRO_G_M_S2, "accelerometer")}
@@ -26,10 +28,11 @@ def print_drifts(found: Mapping[str, Mapping[str, DriftEntry]], console: Console
 def drift_table(name: str, quantity: str, found: DriftEntry) -> Table:
     """The bias of each repeat, scale and axes held, and its largest ± U; a mark where it moved."""
     unit, size, what = SHOWN[quantity]
+    known = expanded((1.0, 1.0, 1.0), found.freedom)
     table = Table(title=plain(f"{name}, {what}: bias by repeat, scale and axes held", "table.title"))
     table.title_justify = "left"
     moved = {move.repeat: move.axis for move in found.moves}
-    for heading in ("repeat", "hours", "°C", *(f"{axis} {unit}" for axis in "xyz"), "± U (k = 2)", "moved"):
+    for heading in ("repeat", "hours", "°C", *(f"{axis} {unit}" for axis in "xyz"), heading_of(known.factors), "moved"):
         table.add_column(heading, justify="right")
     for number, repeat in enumerate(found.repeats, 1):
         table.add_row(
@@ -37,7 +40,7 @@ def drift_table(name: str, quantity: str, found: DriftEntry) -> Table:
             f"{repeat.time_s / 3600:.2f}",
             f"{repeat.temperature_c:.1f}",
             *(f"{bias / size:+.4g}" for bias in repeat.held.bias),
-            f"{2 * max(repeat.held.std) / size:.2g}",
+            f"{max(np.multiply(known.factors, repeat.held.std)) / size:.2g}",
             moved.get(number, ""),
         )
     return table
@@ -71,7 +74,10 @@ def drift_lines(quantity: str, found: DriftEntry) -> Iterator[str]:
     if isinstance(slope, ErrorEntry):
         yield f"over temperature: {slope.error}"
     else:
-        terms = "  ".join(f"{a / size:+.3g} ± {2 * b / size:.1g}" for a, b in zip(slope.slope, slope.std, strict=True))
-        yield f"over temperature: {terms} {unit} per °C, from {slope.range_c[0]:.1f} to {slope.range_c[1]:.1f} °C only"
+        widths = expanded(slope.std, slope.freedom).widths
+        terms = "  ".join(f"{a / size:+.3g} ± {b / size:.1g}" for a, b in zip(slope.slope, widths, strict=True))
+        low, high = slope.range_c
+        words = factor_words(slope.freedom)
+        yield f"over temperature: {terms} {unit} per °C ({words}), from {low:.1f} to {high:.1f} °C only"
     if quantity == "rate" and not found.earth_rate_known:
         yield "the Earth's rate is in these biases; site.latitude_deg and site.heading_deg take it out"

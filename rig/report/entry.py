@@ -5,6 +5,8 @@ from typing import Any, TypeVar
 import numpy as np
 from pydantic import BaseModel
 
+from rig.estimation.arrays import Array
+
 EntryT = TypeVar("EntryT", bound=BaseModel)
 
 
@@ -18,6 +20,15 @@ def entry(kind: type[EntryT], *sources: object, **more: Any) -> EntryT:
         raise TypeError(f"{kind.__name__} has no {', '.join(sorted(unknown))}")
     said = {name: getattr(source, name) for source in reversed(sources) for name in _shared(kind, source)}
     return kind.model_validate({name: _plain(value) for name, value in {**said, **more}.items()})
+
+
+def counted(freedom: Array | None) -> list[Any] | None:
+    """Degrees of freedom of any shape, infinite ones as null; None where nobody counted."""
+    if freedom is None:
+        return None
+    found = freedom.astype(object)
+    found[~np.isfinite(freedom)] = None
+    return list(found.tolist())
 
 
 def _shared(kind: type[BaseModel], source: object) -> list[str]:

@@ -11,6 +11,7 @@ from rich.console import Console
 from rig.analysis.external import budget_of
 from rig.data.result_file import EstimateEntry, VectorEntry
 from rig.data.result_types import ErrorEntry
+from rig.estimation.budget import Budget
 from rig.estimation.estimate import Estimate
 from rig.estimation.six_observation import MODEL, PARAMETER_UNITS, PARAMETERS
 from rig.estimation.turned import TurnedSolution
@@ -33,6 +34,11 @@ class External:
     data: ExternalData
     solution: Estimate
     six_observation: EstimateEntry | ErrorEntry
+
+    @property
+    def budget(self) -> Budget:
+        """What its uncertainty is made of."""
+        return budget_of(self.solution, self.data)
 
     @property
     def vector(self) -> VectorEntry | None:
@@ -67,7 +73,7 @@ def _document(found: External) -> dict[str, object]:
         "covariance_units": list(PARAMETER_UNITS),
         "rests": len(found.data.rests),
         "ways": found.ways,
-        "budget": budget_entry(budget_of(found.solution)).model_dump(),
+        "budget": budget_entry(found.budget).model_dump(),
         "vector_model": None if found.vector is None else found.vector.model_dump(),
         "six_observation": found.six_observation.model_dump(),
     }
@@ -75,11 +81,12 @@ def _document(found: External) -> dict[str, object]:
 
 def _print(found: External, console: Console) -> None:
     estimate, vector, beside = estimate_entry(found.solution), found.vector, found.six_observation
-    console.print(estimate_table(f"{found.samples}, {MODEL}, {estimate.estimator}", estimate))
-    console.print(budget_table(budget_entry(budget_of(found.solution))))
+    budget = budget_entry(found.budget)
+    console.print(estimate_table(f"{found.samples}, {MODEL}, {estimate.estimator}", estimate, budget))
+    console.print(budget_table(budget, estimate.scale))
     if vector is not None:
         covariance = np.array(vector.matrix_covariance)[:9, :9]
-        for line in matrix_lines(np.array(vector.matrix), covariance):
+        for line in matrix_lines(np.array(vector.matrix), covariance, max(budget.factors[:3])):
             console.print(plain(line))
         for line in _how(found):
             console.print(plain(line))

@@ -2,6 +2,7 @@
 
 import numpy as np
 
+from rig.analysis.freedom_beside import of_field_angles
 from rig.analysis.magnetic_field import ESTIMATOR, MagnetometerResult
 from rig.data.magnetometer_entries import (
     FieldDriftEntry,
@@ -15,7 +16,7 @@ from rig.errors import Fault
 from rig.estimation.magnetometer import MODEL, MagnetometerSolution
 from rig.report.axes import PARAMETERS, dwell_entry
 from rig.report.budget_entry import budget_entry
-from rig.report.entry import entry
+from rig.report.entry import counted, entry
 
 UNITS = ("1", "1", "1", "T", "T", "T")
 
@@ -38,6 +39,7 @@ def magnetometer_entry(result: MagnetometerResult | Fault) -> MagnetometerEntry 
         uniformity=entry(UniformityEntry, result.uniformity),
         drift=None if result.drift is None else entry(FieldDriftEntry, result.drift),
         field_base_t=solution.field_table_t,
+        non_orthogonality_freedom=counted(of_field_angles(result)),
         attitude_error_rad=error.std_rad,
         attitude_error_std_rad=error.uncertainty_rad if np.isfinite(error.uncertainty_rad) else None,
         dwells=[

@@ -8,8 +8,9 @@ from rich.table import Table
 from rig.data.budget_entries import expanded_uncertainties
 from rig.data.magnetometer_entries import MagnetometerEntry
 from rig.data.result_types import ErrorEntry
-from rig.report.axes import axes_table, triple
+from rig.report.axes import axes_table, skew_known, triple
 from rig.report.budget_table import assumed_lines, expanded_heading
+from rig.report.validity_words import when_words
 
 MICROTESLA = 1e6
 FAR_ENOUGH_M = 0.3  # from the flange: a housing of 0.2 A m² is 0.4 to 1.2 µT at 20 to 40 cm
@@ -28,13 +29,15 @@ def magnetometer_table(name: str, found: MagnetometerEntry) -> Table:
 def magnetometer_lines(found: MagnetometerEntry) -> Iterator[str]:
     """What stands below the table."""
     yield f"relative to a field of {MICROTESLA * found.field_t:g} µT; {len(found.dwells)} attitudes; no limit judges it"
+    if found.found_at is not None:
+        yield f"scale and bias: {when_words(found.found_at)}; its temperature was not measured"
     yield from assumed_lines(found.budget)
     yield "iron and currents that turn with it are part of what is found"
     yield "the arm's own field is in the bias; runs with the sensor turned over tell it apart: rig reversal"
     yield from _tests(found)
     yield f"field in the arm's base: {triple(np.multiply(MICROTESLA, found.field_base_t), '+.3f')} µT"
-    skew, std = np.degrees(found.non_orthogonality_rad), np.degrees(found.non_orthogonality_std_rad)
-    yield f"non-orthogonality yz zx xy: {triple(skew, '+.4f')} ° (± {2 * std.max():.4f})"
+    skew = triple(np.degrees(found.non_orthogonality_rad), "+.4f")
+    yield f"non-orthogonality yz zx xy: {skew} ° (± {skew_known(found)})"
     known = "" if found.attitude_error_std_rad is None else f" (± {2e3 * found.attitude_error_std_rad:.2f})"
     yield f"attitude error found: {1e3 * found.attitude_error_rad:.2f} mrad about each axis{known}"
     for method, other in found.beside.items():

@@ -5,11 +5,13 @@ from collections.abc import Iterator, Mapping
 import numpy as np
 from rich.console import Console
 
+from rig.analysis.freedom_beside import of_reversal
 from rig.analysis.reversal import AsMounted, MagnetometerReversal
 from rig.data.magnetometer_entries import AsMountedEntry, ReversalDocument, ReversalEntry
 from rig.report.axes import axes_table, triple
-from rig.report.budget_table import expanded_heading
-from rig.report.entry import entry
+from rig.report.budget_table import heading_of
+from rig.report.entry import counted, entry
+from rig.report.expanded import expanded
 from rig.report.magnetometer_table import MICROTESLA
 from rig.station.plain_text import plain
 
@@ -28,10 +30,19 @@ def print_reversal(document: ReversalDocument, *, as_json: bool) -> None:
     console = Console(highlight=False)
     for name, found in document.magnetometers.items():
         title = f"{name}, magnetometer turned over: {found.part} {found.serial_number}, {len(found.runs)} runs"
-        expanded = [2 * std for std in (*found.scale_std, *np.multiply(MICROTESLA, found.bias_std_t).tolist())]
+        scale = expanded(found.scale_std, found.scale_freedom)
+        own = expanded(np.multiply(MICROTESLA, found.bias_std_t).tolist(), found.bias_freedom)
         bias = np.multiply(MICROTESLA, found.bias_t).tolist()
         console.print(
-            axes_table(title, found.scale, bias, expanded, heading=expanded_heading(None), unit="µT", digits=3)
+            axes_table(
+                title,
+                found.scale,
+                bias,
+                [*scale.widths, *own.widths],
+                heading=heading_of([*scale.factors, *own.factors]),
+                unit="µT",
+                digits=3,
+            )
         )
         for line in _lines(found):
             console.print(plain(line))
@@ -43,8 +54,9 @@ def _lines(found: ReversalEntry) -> Iterator[str]:
         yield f"{' '.join(mixed)}: never turned over, so the arm's field is in the bias there, as mounted"
     else:
         yield "the sensor's own on all axes: the arm's field is told apart"
-    field = triple(np.multiply(MICROTESLA, found.arm_field_t), "+.3f")
-    yield f"arm's field in its axes in the first run: {field} µT (± {2 * MICROTESLA * max(found.arm_field_std_t):.3f})"
+    felt = triple(np.multiply(MICROTESLA, found.arm_field_t), "+.3f")
+    field = MICROTESLA * max(expanded(found.arm_field_std_t, found.arm_field_freedom).widths)
+    yield f"arm's field in its axes in the first run: {felt} µT (± {field:.3f})"
     yield f"the runs agree: χ² {found.chi_square:.1f}, at most {found.limit:.1f}"
     for run in found.runs:
         yield f"as mounted in {run.run}: b {triple(np.multiply(MICROTESLA, run.bias_t), '+.3f')} µT"
@@ -52,10 +64,14 @@ def _lines(found: ReversalEntry) -> Iterator[str]:
 
 def _entry(reversal: MagnetometerReversal) -> ReversalEntry:
     std = np.sqrt(np.diag(reversal.found.covariance))
+    scale, both = of_reversal(reversal) or (None, None)
     return entry(
         ReversalEntry, reversal.found, reversal, reversal.runs[0].result.sensor,
         bias_std_t=std[:3],
         arm_field_std_t=std[3:],
+        scale_freedom=counted(scale),
+        bias_freedom=None if both is None else counted(both[:3]),
+        arm_field_freedom=None if both is None else counted(both[3:]),
         runs=tuple(map(_as_mounted, reversal.runs)),
     )  # fmt: skip
 

@@ -3,6 +3,8 @@
 import numpy as np
 
 from rig.analysis.calibration import SensorResult
+from rig.analysis.freedom_beside import of_angles, of_sensitivity
+from rig.analysis.loads import loads_rad_s
 from rig.analysis.onboard_check import Agreement
 from rig.data.result_file import (
     AverageEntry,
@@ -25,7 +27,7 @@ from rig.estimation.six_observation import MODEL, PARAMETER_UNITS, PARAMETERS
 from rig.estimation.turned import TurnedSolution
 from rig.report.budget_entry import bias_process_entry, budget_entry
 from rig.report.earth_rate import earth_rate_entry
-from rig.report.entry import entry
+from rig.report.entry import counted, entry
 
 
 def sensor_entry(result: SensorResult, role: Role = "calibrate", agreed: Agreement | None = None) -> SensorEntry:
@@ -52,10 +54,12 @@ def sensor_entry(result: SensorResult, role: Role = "calibrate", agreed: Agreeme
     if result.explained is not None:
         more["bias_process"] = bias_process_entry(result.explained)
         more["speeds_rad_s"] = result.explained.seen.speeds_rad_s
+        more["loads_rad_s"] = _rows(loads_rad_s(result.explained))
         if result.explained.nonlinearity is not None:
             more["nonlinearity"] = entry(NonlinearityEntry, result.explained.nonlinearity)
     if result.earth is not None:
-        more["earth_rate"] = earth_rate_entry(result.earth)
+        counts = result.uncertainty is not None and result.uncertainty.by_freedom
+        more["earth_rate"] = earth_rate_entry(result.earth, counts_freedom=counts)
     return found.model_copy(update=more)
 
 
@@ -80,7 +84,12 @@ def _vector_or_error(result: SensorResult) -> VectorEntry | ErrorEntry:
     found = vector_entry(outcome)
     if result.explained is None:
         return found
-    return found.model_copy(update={"residuals_std_rad_s": _rows(residual_std_rad_s(result.explained))})
+    more: dict[str, object] = {"residuals_std_rad_s": _rows(residual_std_rad_s(result.explained))}
+    if (angles := counted(of_angles(result))) is not None:
+        more |= {"non_orthogonality_freedom": tuple(angles[:3]), "mounting_freedom": tuple(angles[3:])}
+    if (felt := counted(of_sensitivity(result))) is not None:
+        more["g_sensitivity_freedom"] = tuple(map(tuple, felt))
+    return found.model_copy(update=more)
 
 
 def vector_entry(outcome: vector_model.VectorSolution | TurnedSolution) -> VectorEntry:

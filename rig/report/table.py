@@ -12,11 +12,12 @@ from rig.data.budget_entries import BudgetEntry, expanded_uncertainties
 from rig.data.result_file import BoardEntry, CheckEntry, ResultDocument, SensorEntry
 from rig.data.result_types import ErrorEntry
 from rig.report.accelerometer_table import accelerometer_lines, accelerometer_table
-from rig.report.axes import triple
+from rig.report.axes import skew_known, triple
 from rig.report.budget_table import budget_table, expanded_heading
 from rig.report.drift_table import print_drifts
 from rig.report.earth_rate import earth_rate_lines
 from rig.report.magnetometer_table import MICROTESLA, magnetometer_lines, magnetometer_table
+from rig.report.validity_words import load_words, speed_words, when_words
 from rig.report.verification_table import verification_lines, verification_table
 from rig.station.plain_text import plain
 
@@ -49,13 +50,13 @@ def print_result(result: ResultDocument, console: Console) -> None:
         title = f"{name}{known}: {sensor.part} {sensor.serial_number}, {sensor.model}, {sensor.estimator}"
         console.print(estimate_table(title, sensor, sensor.budget))
         if sensor.budget is not None:
-            console.print(budget_table(sensor.budget))
+            console.print(budget_table(sensor.budget, sensor.scale))
         for line in _beside(sensor):
             console.print(plain(line))
     for name, accelerometer in result.accelerometers.items():
         console.print(accelerometer_table(name, accelerometer))
         if accelerometer.budget is not None:
-            console.print(budget_table(accelerometer.budget, "m/s²"))
+            console.print(budget_table(accelerometer.budget, accelerometer.scale, "m/s²"))
         for line in accelerometer_lines(accelerometer):
             console.print(plain(line))
     for name, magnetometer in result.magnetometers.items():
@@ -64,7 +65,7 @@ def print_result(result: ResultDocument, console: Console) -> None:
             continue
         console.print(magnetometer_table(name, magnetometer))
         if magnetometer.budget is not None:
-            console.print(budget_table(magnetometer.budget, "µT", MICROTESLA))
+            console.print(budget_table(magnetometer.budget, magnetometer.scale, "µT", MICROTESLA))
         for line in magnetometer_lines(magnetometer):
             console.print(plain(line))
     print_drifts(result.bias_drift, console)
@@ -114,6 +115,9 @@ def _checks(checks: Iterable[CheckEntry]) -> Table:
 def _beside(sensor: SensorEntry) -> Iterator[str]:
     """At what speeds it holds, what the other estimators make of it, and what the vector model says about the axes."""
     yield from _speeds(sensor)
+    if sensor.scale_at is not None and sensor.bias_at is not None:
+        yield f"scale: {when_words(sensor.scale_at)}"
+        yield f"bias: {when_words(sensor.bias_at)}"
     yield from earth_rate_lines(sensor.earth_rate)
     vector = sensor.vector_model
     std = [sensor.covariance[i][i] ** 0.5 for i in range(6)]
@@ -128,17 +132,17 @@ def _beside(sensor: SensorEntry) -> Iterator[str]:
         yield from _on_the_board(sensor.board)
     if not isinstance(vector, ErrorEntry):
         skew = triple(np.degrees(vector.non_orthogonality_rad), "+.3f")
-        expanded = 2 * max(np.degrees(vector.non_orthogonality_std_rad))
-        yield f"non-orthogonality yz zx xy: {skew} ° (± {expanded:.3f}, k = 2)"
+        yield f"non-orthogonality yz zx xy: {skew} ° (± {skew_known(vector)})"
         yield from (f"warning: {warning}" for warning in vector.warnings)
 
 
 def _speeds(sensor: SensorEntry) -> Iterator[str]:
     """Where it is valid: one speed does not tell how far the sensor is from linear."""
-    speeds = ", ".join(f"±{speed:.1f}" for speed in np.degrees(sensor.speeds_rad_s))
-    found = sensor.nonlinearity
+    speeds, loads, found = speed_words(sensor), load_words(sensor), sensor.nonlinearity
+    if loads is not None:
+        yield f"along its own axes the sweeps turned it by {loads} °/s"
     if found is None:
-        yield from [f"valid at {speeds} °/s"] if speeds else []
+        yield from [f"the scale factors are those at {speeds} °/s"] if speeds else []
         return
     for name, values, std in (
         ("odd", found.odd_per_rad_s, found.odd_std_per_rad_s),

@@ -67,14 +67,19 @@ def test_uncertainties_are_those_of_many_sessions(tmp_path: Path, hand: Hand, th
         assert (0.93 if thorough else 0.87) < within
 
 
-def test_real_turns_by_hand_tell_as_much_as_they_can(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+def test_real_turns_by_hand_tell_as_much_as_they_can(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
+) -> None:
     """A foot-sized IMU against a box: its turns and its flips disagree by 2e-3, says its README."""
+    monkeypatch.setenv("COLUMNS", "200")
     files = unpacked("imucal", "samples.csv", tmp_path), "--sweeps", recording("imucal") / "sweeps.csv"
     found = document(capsys, *files)
     expanded = 2 * np.sqrt(np.diag(found["covariance"]))[:3]
     assert (np.abs(np.array(found["scale"]) - [0.9728, 1.0179, 1.0017]) < 0.5 * expanded).all()
     assert (expanded > 1e-3).all() and (expanded < 5e-3).all()
     assert (found["estimator"], found["ways"]) == ("increments", ["increment"] * 3)
+    freedom = {line["name"]: line["freedom"] for line in found["budget"]["contributors"] if line["kind"] == "A"}
+    assert freedom["bias from rest to rest"] >= 3 and freedom["noise"] > 1000
     by_means = document(capsys, *files, "--estimator", "vector")
     assert (2 * np.sqrt(np.diag(by_means["covariance"]))[:3] > 0.1).all(), "how it was before"
     assert main(["solve", *map(str, files)]) == 0

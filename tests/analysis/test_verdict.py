@@ -107,6 +107,9 @@ def _line(name: str, scale: float, bias: float) -> Contributor:
     return Contributor(name, "A", "normal", None, "", "", np.inf, np.diag(np.square([scale] * 3 + [bias] * 3)))
 
 
+FOREVER = np.full(3, np.inf)
+
+
 @pytest.mark.parametrize(("rule", "passes"), [("simple", True), ("guard_band", False)])
 def test_accelerometers_and_drifts_are_held_against_their_limits_with_their_uncertainty(
     rule: DecisionRule, passes: bool
@@ -127,8 +130,10 @@ def test_accelerometers_and_drifts_are_held_against_their_limits_with_their_unce
         held_out=None,
     )
     checks = {each.name: each for each in acceleration_checks("a", cast(AccelerometerResult, found), limits, rule)}
-    held = BiasByRepeat(np.array([[0.0, 0, 0], [9.5e-5, 0, 0], [4e-5, 0, 0]]), np.full((3, 3), 3e-6), np.ones(3), ())
-    drift = cast(BiasDrift, SimpleNamespace(held=held))
+    held = BiasByRepeat(
+        np.array([[0.0, 0, 0], [9.5e-5, 0, 0], [4e-5, 0, 0]]), np.full((3, 3), 3e-6), np.ones(3), (), FOREVER
+    )
+    drift = cast(BiasDrift, SimpleNamespace(held=held, freedom=FOREVER))
     checks |= {each.name: each for each in drift_checks("a", {"rate": drift}, limits, rule)}
     for name, uncertainty in (
         ("a.acceleration_scale_deviation", 1.4e-3),

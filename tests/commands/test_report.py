@@ -10,7 +10,7 @@ from rig.data.magnetometer_entries import ReversalDocument
 from rig.data.result_file import write_result
 from rig.errors import Refused
 from rig.report.certificate import pdf
-from rig.report.certificate.rounding import rounded
+from rig.report.rounding import rounded
 from support.certified import everything, result, reversal
 from support.commands import rig
 from support.paths import CONFIGS, FIXTURES

@@ -1,31 +1,41 @@
-"""The budget on a certificate adds up to the U beside the value, and the digital certificate says the same of k."""
+"""A budget adds up to the U beside the value wherever it is printed, and the digital certificate says the same of k."""
 
+import json
 import math
 import re
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from pathlib import Path
+from typing import Any
 from xml.etree.ElementTree import fromstring
 
 import numpy as np
 import pytest
 from lxml import html
 
+from rig.analysis.attitudes import Surrounding
 from rig.analysis.calibration import DEFAULT_ESTIMATOR
+from rig.commands.solve_attitudes import solve_attitudes
+from rig.commands.solve_csv import solve_sweeps
 from rig.config.judging_sections import SiteSection
 from rig.data.accelerometer_entries import AccelerometerEntry
 from rig.data.budget_entries import BudgetEntry
 from rig.data.magnetometer_entries import MagnetometerEntry
 from rig.data.result_file import ResultDocument, SensorEntry, read_result
+from rig.data.result_types import ErrorEntry
 from rig.estimation.coverage import coverage_factors
 from rig.plans.recorded import judged, open_run
-from rig.report.certificate.budget_tables import coverage_sentence, freedom_text
+from rig.report.certificate.coverage_words import coverage_sentence
 from rig.report.certificate.dcc import digital_certificate
 from rig.report.certificate.page import certificate_page
 from rig.report.certificate.stated import Stated
 from rig.report.document import document_of
+from rig.report.printed_budget import freedom_text
+from rig.report.rounding import figures
+from rig.report.table import print_outcome
 from support.certified import certificate, everything, result
 from support.dcc_rules import schema_faults
 from support.frozen import RECORDINGS, frozen
+from support.paths import DOCS
 
 NAMES = {"dcc": "https://ptb.de/dcc", "si": "https://ptb.de/si"}
 GERMAN = Stated(SiteSection(country="DE"))
@@ -44,6 +54,28 @@ def budgets(document: ResultDocument) -> Iterator[tuple[BudgetEntry, tuple[float
     yield from ((each.budget, each.scale) for each in found if each.budget is not None)
 
 
+def of_the_terminal(document: ResultDocument) -> list[BudgetEntry]:
+    """In the order of the terminal: kind by kind."""
+    kinds = [*document.sensors.values(), *document.accelerometers.values(), *document.magnetometers.values()]
+    return [each.budget for each in kinds if not isinstance(each, ErrorEntry) and each.budget is not None]
+
+
+def elsewhere(samples: str, table: str, estimator: str | None) -> Callable[[bool], int]:
+    """`rig solve` of an example's readings, as a table or for machines."""
+    files = DOCS / "examples" / samples, DOCS / "examples" / table
+    if table == "sweeps.csv":
+        return lambda as_json: solve_sweeps(*files, estimator, as_json=as_json)
+    options = {"second_order": False, "find_clock": False, "exact_rates": estimator is not None, "window_s": None}
+    surrounding = Surrounding(9.80061, 47.98e-6, "-z")
+    return lambda as_json: solve_attitudes(*files, estimator, surrounding, as_json=as_json, **options)  # type: ignore[arg-type]
+
+
+def budgets_in(found: dict[str, Any]) -> list[BudgetEntry]:
+    """Of a document of `rig solve`."""
+    of = found["quantities"].values() if "quantities" in found else [found]
+    return [BudgetEntry.model_validate(each["budget"]) for each in of]
+
+
 def named(folder: Path) -> str:
     return "/".join(folder.parts[-2:])
 
@@ -57,6 +89,20 @@ def printed(document: ResultDocument) -> list[list[list[str]]]:
     ]
 
 
+def at_the_terminal(text: str) -> list[list[list[str]]]:
+    """The same rows as on the page, from what a terminal shows."""
+    found: list[list[list[str]]] = []
+    for line in text.splitlines():
+        cells = [" ".join(cell.split()) for cell in re.split("[│┃]", line)[1:-1]]
+        if cells[:1] == ["contributor"]:
+            found.append([])
+        if found and len(cells) == 7 and (not found[-1] or found[-1][-1][0] != "expanded U"):
+            name, kind, freedom, *parts = cells
+            summed = name in ("combined u", "expanded U")
+            found[-1].append([name, *parts] if summed else [name, kind, "", "", freedom, *parts])
+    return found
+
+
 def check_adds_up(rows: list[list[str]], budget: BudgetEntry) -> None:
     heading, *lines, combined, expanded = rows
     for column, quantity in ((5, slice(0, 3)), (7, slice(3, 6))):
@@ -65,7 +111,8 @@ def check_adds_up(rows: list[list[str]], budget: BudgetEntry) -> None:
         step = 10.0 ** -len(u.partition(".")[2])
         together = math.sqrt(sum(float(part) ** 2 for part in parts))
         assert together == pytest.approx(float(u), abs=step * (0.5 + 0.5 * math.sqrt(len(parts)))), heading[column]
-        assert float(big_u) == pytest.approx(float(k.removeprefix("× ")) * float(u), rel=0.004, abs=step)
+        factor, rounding = float(k.removeprefix("× ")), 0.005 * float(u) + 0.5 * step
+        assert float(big_u) == pytest.approx(factor * float(u), abs=rounding + 0.5 * factor * step)
         axis = "xyz".index(re.findall(r"[kb]([xyz])", heading[column])[0])
         known = " ".join(freedom_text(budget.known[quantity][axis]).split())
         assert combined[column - 3] == f"ν {known}"
@@ -84,6 +131,58 @@ def test_the_lines_of_every_budget_add_up_to_the_uncertainty_that_is_printed(fol
             assert shown == "xyz"[axis], "of the axis that is known least"
         every = np.sqrt(np.sum(np.square([line.std for line in budget.contributors]), axis=0))
         np.testing.assert_allclose(every, budget.std, rtol=1e-9, err_msg="of the others in result.json")
+
+
+@pytest.mark.parametrize("folder", BUDGETED, ids=named)
+def test_the_terminal_shows_the_budgets_of_the_certificate(
+    folder: Path, capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setenv("COLUMNS", "400")
+    document = read_result(folder)
+    calibrated = {name: each for name, each in document.sensors.items() if each.role == "calibrate"}
+    document = document.model_copy(update={"sensors": calibrated})
+    print_outcome(document, as_json=False)
+    shown = capsys.readouterr().out
+    assert "\\x" not in shown
+    tables, numbers = at_the_terminal(shown), slice(-4, None)
+    for rows, budget in zip(tables, of_the_terminal(document), strict=True):
+        check_adds_up(rows, budget)
+    pages = printed(document)
+    assert sorted(row[numbers] for rows in tables for row in rows[1:]) == sorted(
+        row[numbers] for rows in pages for row in rows[1:]
+    )
+
+
+@pytest.mark.parametrize(
+    ("samples", "table", "estimator"),
+    [
+        ("samples.csv", "sweeps.csv", None),
+        ("samples.csv", "sweeps.csv", "newton"),
+        ("still_samples.csv", "still_attitudes.csv", None),
+        ("swinging_samples.csv", "swinging_attitudes.csv", None),
+        ("swinging_samples.csv", "swinging_attitudes.csv", "maximum_likelihood"),
+    ],
+)
+def test_a_budget_of_readings_made_elsewhere_adds_up_and_every_scatter_is_counted_or_in_u(
+    samples: str,
+    table: str,
+    estimator: str | None,
+    capsys: pytest.CaptureFixture[str],
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    monkeypatch.setenv("COLUMNS", "400")
+    solve = elsewhere(samples, table, estimator)
+    solve(False)
+    tables = at_the_terminal(capsys.readouterr().out)
+    solve(True)
+    stated = budgets_in(json.loads(capsys.readouterr().out))
+    assert len(tables) == len(stated) > 0
+    for rows, budget in zip(tables, stated, strict=True):
+        check_adds_up(rows, budget)
+        np.testing.assert_allclose(budget.factors, coverage_factors(budget.known))
+        freedom = {line[0]: (line[1], line[4]) for line in rows[1:-2]}
+        assert all(number == "∞" for kind, number in freedom.values() if kind == "B")
+        assert all(number == "in u" or float(number) >= 1 for kind, number in freedom.values() if kind == "A")
 
 
 def test_a_budget_with_counted_freedom_adds_up_and_every_scatter_has_a_number() -> None:
@@ -181,3 +280,8 @@ def ks_of(sentence: str) -> list[str]:
         alike = re.findall(r"^ = ([\d.]+) ", group)
         found += alike * 3 if alike else re.findall(r"[xyz] ([\d.]+) \(", group)
     return found
+
+
+@pytest.mark.parametrize(("value", "said"), [(0.06, "0.06"), (615.0, "615"), (7.292115e-5, "7.29\u00a0×\u00a010⁻⁵")])
+def test_a_half_width_is_printed_with_three_digits(value: float, said: str) -> None:
+    assert figures(value) == said

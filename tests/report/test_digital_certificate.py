@@ -11,6 +11,7 @@ from rig.config.judging_sections import CertificateSection, SiteSection
 from rig.data.earth_rate_entries import EarthRateEntry
 from rig.data.result_file import ResultDocument, VectorEntry, read_result
 from rig.errors import Refused
+from rig.estimation.coverage import coverage_factors
 from rig.report.certificate.dcc import digital_certificate
 from rig.report.certificate.dcc_results import JOINT_FACTOR_3
 from rig.report.certificate.stated import Stated
@@ -190,9 +191,12 @@ def test_values_uncertainties_and_covariance_are_the_result_s() -> None:
     expanded = [number for each in found(xml, "si:uncertaintyXMLList") for number in numbers(each)]
     assert isinstance(sensor.vector_model, VectorEntry)
     assert skew == [*sensor.vector_model.non_orthogonality_rad]
-    stds = [*sensor.vector_model.non_orthogonality_std_rad]
-    stds += np.ravel(sensor.vector_model.g_sensitivity_std_rad_s_per_m_s2).tolist()  # type: ignore[arg-type]
-    assert len(felt) == 9 and expanded == [*sensor.budget.expanded, *(2 * std for std in stds)]
+    vector = sensor.vector_model
+    stds = [*vector.non_orthogonality_std_rad, *np.ravel(vector.g_sensitivity_std_rad_s_per_m_s2)]  # type: ignore[arg-type]
+    freedom = [*vector.non_orthogonality_freedom, *np.ravel(vector.g_sensitivity_freedom)]  # type: ignore[arg-type,misc]
+    factors = coverage_factors([np.inf if each is None else each for each in freedom])
+    assert len(felt) == 9 and min(factors) > 2
+    np.testing.assert_allclose(expanded, [*sensor.budget.expanded, *(factors * stds)], rtol=1e-12)
     covariance = np.array([float(each.text or "") for each in found(xml, "si:covariance/si:value")]).reshape(6, 6).T
     np.testing.assert_allclose(covariance, np.array(sensor.covariance_combined), rtol=1e-9)
     units = [each.text for each in found(xml, "si:covariance/si:unit")]

@@ -30,7 +30,10 @@ def test_the_keys_stand_in_the_order_they_always_had(outcome: Outcome) -> None:
     new = json.loads(document_of(outcome).text())
     assert list(new) == list(old)
     assert list(new["provenance"]) == list(old["provenance"])
-    assert list(new["sensors"]["gyro"]) == [*old["sensors"]["gyro"], "correction", "correction_matrix"]
+    assert list(new["sensors"]["gyro"]) == [
+        *old["sensors"]["gyro"],
+        *("correction", "correction_matrix", "scale_at", "bias_at"),
+    ]
 
 
 def test_a_limit_that_was_not_set_is_not_written_as_a_number(outcome: Outcome) -> None:
@@ -69,4 +72,4 @@ def test_the_result_says_which_arm_was_reckoned_with_and_at_what_speed_it_is_val
     assert "nonlinearity" not in sensor
     console = Console(width=150, file=io.StringIO(), record=True)
     print_result(document, console)
-    assert "valid at ±60.0 °/s" in console.export_text()
+    assert "the scale factors are those at ±60.0 °/s" in console.export_text()

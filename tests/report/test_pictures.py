@@ -4,7 +4,6 @@ import numpy as np
 import pytest
 
 from rig.data.result_file import ResultDocument, VectorEntry, read_result
-from rig.report.certificate.budget_tables import budget_table
 from rig.report.certificate.page import certificate_page
 from rig.report.certificate.plots import (
     EXPECTED,
@@ -17,6 +16,7 @@ from rig.report.certificate.plots import (
     field_residuals,
     residuals,
 )
+from rig.report.printed_budget import printed_budget
 from support.certified import accelerometer, certificate, everything, magnetometer, read, result
 from support.frozen import RECORDINGS
 
@@ -72,7 +72,7 @@ def test_frozen_attitudes_agree_with_their_bars() -> None:
 def test_the_picture_of_contributions_is_of_the_values_of_the_budget() -> None:
     sensor = result().sensors["gyro"]
     assert sensor.budget is not None
-    table = budget_table(sensor.budget, sensor.scale, "rad/s")
+    table = printed_budget(sensor.budget, sensor.scale, "rad/s")
     picture = contributions(sensor.budget, sensor.scale)
     assert picture.axes == tuple(each.axis for each in table.columns)
     places = [each.place for each in table.columns]

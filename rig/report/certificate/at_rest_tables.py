@@ -13,6 +13,7 @@ from rig.data.magnetometer_entries import MagnetometerEntry, ReversalEntry
 from rig.data.result_types import ErrorEntry
 from rig.estimation.bias_by_repeat import largest_change_std
 from rig.report.certificate.tables import AXES, AxisRow, Pair, pair
+from rig.report.expanded import expanded
 
 MICRO = 1e6
 
@@ -63,11 +64,12 @@ def acceleration_rows(found: AccelerometerEntry) -> list[AxisRow]:
 
 
 def second_order_rows(found: AccelerometerEntry) -> list[tuple[str, Pair]]:
-    """φ of each axis in s²/m with two standard deviations; none where it was not looked for."""
+    """φ of each axis in s²/m with U; none where it was not looked for."""
     if found.second_order_s2_m is None or found.second_order_std_s2_m is None:
         return []
-    each = zip(AXES, found.second_order_s2_m, found.second_order_std_s2_m, strict=True)
-    return [(axis, pair(value, 2 * std)) for axis, value, std in each]
+    widths = expanded(found.second_order_std_s2_m, found.second_order_freedom).widths
+    each = zip(AXES, found.second_order_s2_m, widths, strict=True)
+    return [(axis, pair(value, width)) for axis, value, width in each]
 
 
 def field_rows(found: MagnetometerEntry) -> list[FieldRow]:
@@ -80,13 +82,16 @@ def field_rows(found: MagnetometerEntry) -> list[FieldRow]:
 
 
 def reversal_rows(found: ReversalEntry) -> list[ReversalRow]:
-    """The sensor's own bias, and the arm's field in its axes as it was mounted first, in µT."""
+    """The sensor's own bias, and the arm's field in its axes as it was mounted first, in µT, with U."""
+    scale = expanded(found.scale_std, found.scale_freedom).widths
+    bias = expanded(found.bias_std_t, found.bias_freedom).widths
+    field = expanded(found.arm_field_std_t, found.arm_field_freedom).widths
     return [
         ReversalRow(
             axis,
-            pair(found.scale[i], 2 * found.scale_std[i]),
-            pair(MICRO * found.bias_t[i], 2 * MICRO * found.bias_std_t[i]),
-            None if mixed else pair(MICRO * found.arm_field_t[i], 2 * MICRO * found.arm_field_std_t[i]),
+            pair(found.scale[i], scale[i]),
+            pair(MICRO * found.bias_t[i], MICRO * bias[i]),
+            None if mixed else pair(MICRO * found.arm_field_t[i], MICRO * field[i]),
             mixed,
         )
         for i, (axis, mixed) in enumerate(zip(AXES, found.arm_field_in_bias, strict=True))
@@ -94,17 +99,19 @@ def reversal_rows(found: ReversalEntry) -> list[ReversalRow]:
 
 
 def drift_rows(found: DriftEntry) -> list[DriftRow]:
-    """In the drift's own unit, with two standard deviations."""
+    """In the drift's own unit, with U."""
     bias, std = (np.array([getattr(each.held, name) for each in found.repeats]) for name in ("bias", "std"))
     whole = np.hypot(std, found.common_std)  # what all repeats share is no part of a change
     changed, slope = largest_change_std(bias, std), found.over_temperature
+    first, last, change = (expanded(each.tolist(), found.freedom).widths for each in (whole[0], whole[-1], changed))
+    per_c = () if isinstance(slope, ErrorEntry) else expanded(slope.std, slope.freedom).widths
     return [
         DriftRow(
             axis,
-            pair(float(bias[0, i]), 2 * float(whole[0, i])),
-            pair(float(bias[-1, i]), 2 * float(whole[-1, i])),
-            pair(found.largest_change[i], 2 * float(changed[i])),
-            None if isinstance(slope, ErrorEntry) else pair(slope.slope[i], 2 * slope.std[i]),
+            pair(float(bias[0, i]), first[i]),
+            pair(float(bias[-1, i]), last[i]),
+            pair(found.largest_change[i], change[i]),
+            None if isinstance(slope, ErrorEntry) else pair(slope.slope[i], per_c[i]),
         )
         for i, axis in enumerate(AXES)
     ]

@@ -8,21 +8,24 @@ from rig.data.budget_entries import BudgetEntry
 from rig.data.drift_entries import DriftEntry
 from rig.data.earth_rate_entries import EarthRateEntry
 from rig.data.magnetometer_entries import MagnetometerEntry, ReversalEntry
-from rig.data.result_file import VectorEntry, VerificationEntry
-from rig.data.result_types import ErrorEntry
-from rig.estimation.coverage import COVERAGE_FACTOR, PROBABILITY
-from rig.report.certificate.budget_tables import coverage_sentence
+from rig.data.result_file import SensorEntry, VectorEntry, VerificationEntry
+from rig.data.result_types import ErrorEntry, Freedom, WhenEntry
 from rig.report.certificate.content import Gyroscope
+from rig.report.certificate.coverage_words import coverage_sentence
 from rig.report.certificate.tables import ANGLES, AXES, JOINT_FACTOR
-from rig.report.certificate.xml_parts import Expanded, dcc, real_list, text
+from rig.report.certificate.xml_parts import dcc, real_list, text
+from rig.report.expanded import Expanded, expanded, factor_words, flat
+from rig.report.validity_words import load_words, speed_words, when_words
 
 ONE, RATE, ACCELERATION = r"\one", r"\radian\second\tothe{-1}", r"\metre\second\tothe{-2}"
 FIELD, ANGLE, PER_FORCE = r"\tesla", r"\radian", r"\second\tothe{2}\metre\tothe{-1}"
 PER_ACCELERATION, KELVIN = r"\radian\second\metre\tothe{-1}", r"\kelvin\tothe{-1}"
+Known = tuple[Sequence[float], Sequence[float], Sequence[Freedom] | None]
+Skewed = VectorEntry | AccelerometerEntry | MagnetometerEntry
 SIX = ("kx", "ky", "kz", "bx", "by", "bz")
 # Of three values at once: √χ² of three degrees of freedom at 95 %.
 JOINT_FACTOR_3 = 2.795
-SOLUTION = "Two standard deviations of the solution, k = 2."
+SOLUTION = "± U of the solution"
 
 
 def gyroscope(each: Gyroscope) -> Iterator[Element]:
@@ -31,13 +34,13 @@ def gyroscope(each: Gyroscope) -> Iterator[Element]:
     assert budget is not None and sensor.covariance_combined is not None  # or there is no digital certificate
     covered, (scale, bias) = coverage_sentence(budget), _expanded(budget)
     model = f"{sensor.model}: true rate g, reading m, K = diag(k)."
-    yield _result("scale factor", f"{model} {covered}",
+    yield _result("scale factor", f"{model} {_speed(sensor)}{_at(sensor.scale_at)}{covered}",
                   real_list(AXES, sensor.scale, [ONE], expanded=scale))  # fmt: skip
-    yield _result("bias", f"{model} {covered}",
+    yield _result("bias", f"{model} {_at(sensor.bias_at)}{covered}",
                   real_list(AXES, sensor.bias_rad_s, [RATE], expanded=bias))  # fmt: skip
     yield _joint([*sensor.scale, *sensor.bias_rad_s], sensor.covariance_combined, RATE)
     if isinstance(sensor.vector_model, VectorEntry):
-        yield _skew(sensor.vector_model.non_orthogonality_rad, sensor.vector_model.non_orthogonality_std_rad)
+        yield _skew(sensor.vector_model)
         yield from _g_sensitivity(sensor.vector_model)
     if isinstance(sensor.earth_rate, EarthRateEntry):
         yield from _earth_rate(sensor.earth_rate)
@@ -47,9 +50,10 @@ def accelerometer(found: AccelerometerEntry) -> Iterator[Element]:
     """Relative to the stated gravity, with U of the budget and the combined covariance."""
     said = f"{found.model}: specific force s, reading a, k = 1/‖row of F‖, gravity {found.gravity_m_s2!r} m/s²."
     yield from _relative(found, [*found.scale, *found.bias_m_s2], ACCELERATION, said)
-    yield _skew(found.non_orthogonality_rad, found.non_orthogonality_std_rad)
+    yield _skew(found)
     if found.second_order_s2_m is not None and found.second_order_std_s2_m is not None:
-        yield _spread("second order", SOLUTION, AXES, (found.second_order_s2_m, found.second_order_std_s2_m), PER_FORCE)
+        known = found.second_order_std_s2_m, found.second_order_freedom
+        yield _spread("second order", SOLUTION, AXES, (found.second_order_s2_m, *known), PER_FORCE)
 
 
 def magnetometer(found: MagnetometerEntry) -> Iterator[Element]:
@@ -58,18 +62,18 @@ def magnetometer(found: MagnetometerEntry) -> Iterator[Element]:
     if found.arm_field_in_bias:
         said += " As mounted in this run: the field of the arm is in the bias, and the uncertainty does not cover it."
     yield from _relative(found, [*found.scale, *found.bias_t], FIELD, said, ", as mounted")
-    yield _skew(found.non_orthogonality_rad, found.non_orthogonality_std_rad)
+    yield _skew(found)
 
 
 def reversed_magnetometer(found: ReversalEntry) -> Iterator[Element]:
     """Its own bias and the arm's field, with the covariance of both."""
     mixed = [axis for axis, held in zip(AXES, found.arm_field_in_bias, strict=True) if held]
     began = ", ".join(run.started_utc for run in found.runs)
-    said = f"From runs of {began}, between which it was turned over. Two combined standard uncertainties, k = 2."
+    said = f"From runs of {began}, between which it was turned over. ± U"
     if mixed:
         said += f" Along {', '.join(mixed)} it was never turned over: there the arm's field is in the bias."
-    yield _spread("scale factor", said, AXES, (found.scale, found.scale_std), ONE)
-    yield _spread("own bias", said, AXES, (found.bias_t, found.bias_std_t), FIELD)
+    yield _spread("scale factor", said, AXES, (found.scale, found.scale_std, found.scale_freedom), ONE)
+    yield _spread("own bias", said, AXES, (found.bias_t, found.bias_std_t, found.bias_freedom), FIELD)
     names = ("bx", "by", "bz", "arm x", "arm y", "arm z")
     values = [*found.bias_t, *found.arm_field_t]
     yield _result(
@@ -85,14 +89,15 @@ def bias_drift(found: DriftEntry) -> Iterator[Element]:
     labels = [str(number) for number in range(1, len(found.repeats) + 1)]
     for i, axis in enumerate(AXES):
         values, stds = zip(*((each.held.bias[i], each.held.std[i]) for each in found.repeats), strict=True)
-        said = f"What the reading adds, scale and axes held; two standard deviations of what differs between repeats, \
-k = 2; beside them all repeats share one of {found.common_std[i]!r} {found.unit}."
-        yield _spread(f"bias along {axis} by repeat", said, labels, (values, stds), unit)
+        said = f"What the reading adds, scale and axes held; beside what differs between repeats all share a standard \
+deviation of {found.common_std[i]!r} {found.unit}. ± U of what differs"
+        freedom = None if found.freedom is None else [found.freedom[i]] * len(labels)
+        yield _spread(f"bias along {axis} by repeat", said, labels, (values, stds, freedom), unit)
     slope = found.over_temperature
     if not isinstance(slope, ErrorEntry):
         low, high = slope.range_c
         said = f"Holds from {low!r} to {high!r} °C only. {SOLUTION}"
-        yield _spread("bias over temperature", said, AXES, (slope.slope, slope.std), unit + KELVIN)
+        yield _spread("bias over temperature", said, AXES, (slope.slope, slope.std, slope.freedom), unit + KELVIN)
 
 
 def verification(found: VerificationEntry) -> Iterator[Element]:
@@ -112,7 +117,13 @@ def _g_sensitivity(found: VectorEntry) -> Iterator[Element]:
     said = (
         "What a specific force along the flange's axis (second letter) adds to the reading of an axis (first letter)."
     )
-    yield _spread("g-sensitivity", f"{said} {SOLUTION}", labels, (values, stds), PER_ACCELERATION)
+    yield _spread(
+        "g-sensitivity",
+        f"{said} {SOLUTION}",
+        labels,
+        (values, stds, flat(found.g_sensitivity_freedom)),
+        PER_ACCELERATION,
+    )
 
 
 def _earth_rate(found: EarthRateEntry) -> Iterator[Element]:
@@ -120,11 +131,16 @@ def _earth_rate(found: EarthRateEntry) -> Iterator[Element]:
     rate = real_list(AXES, found.rate_rad_s, [RATE], region=(found.covariance_rad2_s2, JOINT_FACTOR_3))
     yield _result("Earth's rate", said, rate)
     yield _spread(
-        "latitude by that rate", SOLUTION, ["latitude"], ([found.latitude_rad], [found.latitude_std_rad]), ANGLE
+        "latitude by that rate",
+        SOLUTION,
+        ["latitude"],
+        ([found.latitude_rad], [found.latitude_std_rad], found.freedoms(1)),
+        ANGLE,
     )
     if found.heading_rad is not None and found.heading_std_rad is not None:
         said = f"Where the x axis of the arm's base points, from north over east. {SOLUTION}"
-        yield _spread("heading by that rate", said, ["heading"], ([found.heading_rad], [found.heading_std_rad]), ANGLE)
+        heading = [found.heading_rad], [found.heading_std_rad], found.freedoms(1)
+        yield _spread("heading by that rate", said, ["heading"], heading, ANGLE)
 
 
 def _relative(
@@ -132,10 +148,23 @@ def _relative(
 ) -> Iterator[Element]:
     budget = found.budget
     assert budget is not None and found.covariance_combined is not None  # or there is no digital certificate
-    said, (scale, bias) = f"{said} {coverage_sentence(budget)}", _expanded(budget)
+    said, (scale, bias) = f"{said} {_at(found.found_at)}{coverage_sentence(budget)}", _expanded(budget)
     yield _result(f"scale factor{how}", said, real_list(AXES, numbers[:3], [ONE], expanded=scale))
     yield _result(f"bias{how}", said, real_list(AXES, numbers[3:], [unit], expanded=bias))
     yield _joint(numbers, found.covariance_combined, unit, how)
+
+
+def _at(when: WhenEntry | None) -> str:
+    """When it was read, and how warm it was; of results of before the temperature is a condition alone."""
+    words = "" if when is None else f"{when_words(when)}. "
+    return words[:1].upper() + words[1:]
+
+
+def _speed(sensor: SensorEntry) -> str:
+    """At what rates it was found."""
+    loads = load_words(sensor)
+    along = "" if loads is None else f"; along the item's own axes the sweeps turned it by {loads} °/s"
+    return f"At {speed_words(sensor)} °/s{along}. " if sensor.speeds_rad_s else ""
 
 
 def _expanded(budget: BudgetEntry) -> tuple[Expanded, Expanded]:
@@ -152,17 +181,16 @@ def _joint(numbers: list[float], covariance: Sequence[Sequence[float]], unit: st
     )
 
 
-def _skew(angles: Sequence[float], stds: Sequence[float]) -> Element:
-    return _spread("angles between the axes less a right one", SOLUTION, ANGLES, (angles, stds), ANGLE)
+def _skew(found: Skewed) -> Element:
+    known = found.non_orthogonality_rad, found.non_orthogonality_std_rad, found.non_orthogonality_freedom
+    return _spread("angles between the axes less a right one", SOLUTION, ANGLES, known, ANGLE)
 
 
-def _spread(
-    name: str, said: str, labels: Sequence[str], found: tuple[Sequence[float], Sequence[float]], unit: str
-) -> Element:
-    """Values, from these and their standard deviations."""
-    numbers, stds = found
-    twice = Expanded([COVERAGE_FACTOR * std for std in stds], [COVERAGE_FACTOR], [PROBABILITY])
-    return _result(name, said, real_list(labels, numbers, [unit], expanded=twice))
+def _spread(name: str, said: str, labels: Sequence[str], found: Known, unit: str) -> Element:
+    """Values with U, from these, their standard deviations and the degrees of freedom."""
+    numbers, stds, freedom = found
+    words = f"{said}, {factor_words(freedom)}."
+    return _result(name, words, real_list(labels, numbers, [unit], expanded=expanded(stds, freedom)))
 
 
 def _result(name: str, said: str, quantity: Element) -> Element:

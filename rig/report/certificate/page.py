@@ -6,13 +6,17 @@ from typing import TYPE_CHECKING
 
 from rig.config.sensor_catalogue import has_own_port
 from rig.data.provenance import NO_BOARD
-from rig.report.certificate import at_rest_tables, budget_tables, plots, rounding, tables, validity
+from rig.report import expanded, printed_budget, rounding, validity_words
+from rig.report.certificate import at_rest_tables, coverage_words, plots, tables, validity
 from rig.report.certificate.content import Certificate
 from rig.report.certificate.tables import DEG, JOINT_FACTOR
 
 if TYPE_CHECKING:
     from jinja2 import Template
 
+MODULES = (
+    rounding, expanded, validity_words, printed_budget, tables, coverage_words, at_rest_tables, validity, plots,
+)  # fmt: skip
 TEMPLATE = "certificate.html.j2"
 FOOTING = "Relates only to the items calibrated. Not issued under an accreditation."
 
@@ -31,6 +35,6 @@ def _template() -> "Template":
         loader=loader, autoescape=True, undefined=StrictUndefined, trim_blocks=True, lstrip_blocks=True
     )
     environment.globals |= {"has_own_port": has_own_port, "no_board": NO_BOARD}
-    for module in (rounding, tables, budget_tables, at_rest_tables, validity, plots):
+    for module in MODULES:
         environment.globals |= {name: value for name, value in vars(module).items() if callable(value)}
     return environment.get_template(TEMPLATE)

@@ -12,8 +12,8 @@ from rig.data.magnetometer_entries import MagnetometerEntry
 from rig.data.result_file import AverageEntry, ObservationEntry, SensorEntry
 from rig.data.result_types import ErrorEntry
 from rig.estimation.arrays import Array
-from rig.report.certificate.budget_tables import shown_places
 from rig.report.certificate.tables import AXES
+from rig.report.printed_budget import shown_places
 
 WIDTH, LEFT, RIGHT = 340.0, 42.0, 8.0
 TOP, HEIGHT = 18.0, 104.0

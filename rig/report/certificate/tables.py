@@ -8,7 +8,8 @@ import numpy as np
 
 from rig.data.earth_rate_entries import EarthRateEntry
 from rig.data.result_file import CheckEntry, SensorEntry, VectorEntry, VerificationEntry
-from rig.report.certificate.rounding import percent, rounded
+from rig.report.expanded import expanded
+from rig.report.rounding import percent, rounded
 
 AXES = ("x", "y", "z")
 ANGLES = ("yz", "zx", "xy")
@@ -115,28 +116,32 @@ def _largest_turn(errors: Sequence[Sequence[float]], axis: int) -> str:
     return f"{max(abs(error[axis]) for error in errors):.5f}" if errors else "–"
 
 
-def skew_rows(angles_rad: Sequence[float], stds_rad: Sequence[float]) -> list[tuple[str, Pair]]:
-    """Angles by which the axes are off right ones, in degrees, with two standard deviations."""
-    return [
-        (name, pair(DEG * angle, 2 * DEG * std)) for name, angle, std in zip(ANGLES, angles_rad, stds_rad, strict=True)
-    ]
+def skew_rows(angles_rad: Sequence[float], widths_rad: Sequence[float]) -> list[tuple[str, Pair]]:
+    """Angles by which the axes are off right ones, in degrees, with U."""
+    each = zip(ANGLES, angles_rad, widths_rad, strict=True)
+    return [(name, pair(DEG * angle, DEG * width)) for name, angle, width in each]
 
 
 def gravity_rows(vector: VectorEntry) -> list[tuple[str, list[Pair]]]:
-    """What 1 m/s² along x, y, z of the flange adds to each axis' reading, in rad/s, with two standard deviations."""
+    """What 1 m/s² along x, y, z of the flange adds to each axis' reading, in rad/s, with U."""
     assert vector.g_sensitivity_rad_s_per_m_s2 is not None and vector.g_sensitivity_std_rad_s_per_m_s2 is not None
+    freedom = vector.g_sensitivity_freedom or (None, None, None)
     rows = zip(
-        AXES, vector.g_sensitivity_rad_s_per_m_s2, vector.g_sensitivity_std_rad_s_per_m_s2, strict=True
+        AXES, vector.g_sensitivity_rad_s_per_m_s2, vector.g_sensitivity_std_rad_s_per_m_s2, freedom, strict=True
     )  # gravity points down where the specific force points up
-    return [(axis, [pair(-g, 2 * std) for g, std in zip(row, stds, strict=True)]) for axis, row, stds in rows]
+    return [
+        (axis, [pair(-g, width) for g, width in zip(row, expanded(stds, known).widths, strict=True)])
+        for axis, row, stds, known in rows
+    ]
 
 
 def earth_rate_rows(found: EarthRateEntry) -> list[tuple[str, str, Pair]]:
-    """Name, unit, and value with two standard deviations."""
+    """Name, unit, and value with U."""
+    (k,) = expanded([1.0], found.freedoms(1)).factors
     std = np.sqrt(np.diag(found.covariance_rad2_s2))
-    rows = [("size", "rad/s", pair(found.norm_rad_s, 2 * found.norm_std_rad_s))]
-    rows += [(axis, "rad/s", pair(found.rate_rad_s[i], 2 * float(std[i]))) for i, axis in enumerate(AXES)]
-    rows.append(("latitude", "°", pair(DEG * found.latitude_rad, 2 * DEG * found.latitude_std_rad)))
+    rows = [("size", "rad/s", pair(found.norm_rad_s, k * found.norm_std_rad_s))]
+    rows += [(axis, "rad/s", pair(found.rate_rad_s[i], k * float(std[i]))) for i, axis in enumerate(AXES)]
+    rows.append(("latitude", "°", pair(DEG * found.latitude_rad, k * DEG * found.latitude_std_rad)))
     if found.heading_rad is not None and found.heading_std_rad is not None:
-        rows.append(("heading", "°", pair(DEG * found.heading_rad % 360, 2 * DEG * found.heading_std_rad)))
+        rows.append(("heading", "°", pair(DEG * found.heading_rad % 360, k * DEG * found.heading_std_rad)))
     return rows

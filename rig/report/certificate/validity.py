@@ -1,35 +1,36 @@
 """What a certificate's uncertainties leave out, quantity by quantity: nobody should take it for included."""
 
 from rig.data.accelerometer_entries import AccelerometerEntry
-from rig.data.magnetometer_entries import MagnetometerEntry
+from rig.data.budget_entries import BudgetEntry
 from rig.data.result_file import SensorEntry
 
-NONLINEARITY, TEMPERATURE, POWER, MOUNTING = "nonlinearity", "temperature", "switching", "mounting"
-# What each is called in words. What a budget has of it, it has of the run, and not of other times and temperatures.
-ALWAYS = {
-    TEMPERATURE: "other temperatures",
-    POWER: "switching off and on",
-    MOUNTING: "mounting anew and its stress",
-    "vibration": "vibration that the item rectifies",
-    "ageing": "ageing and transport",
-}
+# What a budget has of it, it has of the run: a value is that of one temperature, one power-up and one mounting.
+ALWAYS = (
+    "other temperatures",
+    "switching off and on",
+    "mounting anew and its stress",
+    "vibration that the item rectifies",
+    "ageing and transport",
+)
+
+
+def in_budget(budget: BudgetEntry | None, name: str) -> bool:
+    """Whether a line of that name is in it."""
+    return budget is not None and any(name in line.name for line in budget.contributors)
 
 
 def left_out_of_rates(sensor: SensorEntry) -> str:
     """Of a gyroscope's U."""
-    return _left_out({} if sensor.nonlinearity is not None else {NONLINEARITY: "nonlinearity at other speeds"})
+    return ", ".join(ALWAYS if sensor.nonlinearity is not None else ("nonlinearity at other speeds", *ALWAYS))
 
 
 def left_out_of_accelerations(found: AccelerometerEntry) -> str:
     """Of an accelerometer's U."""
     bent = "nonlinearity" if found.second_order_s2_m is None else "nonlinearity beyond the second order"
-    return _left_out({NONLINEARITY: bent})
+    bent = "nonlinearity beyond gravity's size" if in_budget(found.budget, "nonlinearity") else bent
+    return ", ".join((bent, *ALWAYS))
 
 
-def left_out_of_fields(found: MagnetometerEntry) -> str:
+def left_out_of_fields() -> str:
     """Of a magnetometer's U; what it reads of the arm is told beside its bias."""
-    return _left_out({NONLINEARITY: "nonlinearity", "magnetised": "iron magnetised since"})
-
-
-def _left_out(more: dict[str, str]) -> str:
-    return ", ".join({**more, **ALWAYS}.values())
+    return ", ".join(("nonlinearity", "iron magnetised since", *ALWAYS))

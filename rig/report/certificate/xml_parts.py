@@ -1,11 +1,11 @@
 """The pieces of PTB's digital certificate: elements of DCC 3.2.1 and of D-SI 2.1, nothing about this rig."""
 
 from collections.abc import Iterable, Sequence
-from dataclasses import dataclass
 from datetime import date
 from xml.etree.ElementTree import Element, register_namespace
 
 from rig.errors.quoting import printable
+from rig.report.expanded import Expanded
 
 DCC, SI = "https://ptb.de/dcc", "https://ptb.de/si"
 XSI = "http://www.w3.org/2001/XMLSchema-instance"
@@ -16,15 +16,6 @@ for _prefix, _name in (("dcc", DCC), ("si", SI), ("xsi", XSI)):
     register_namespace(_prefix, _name)
 
 Part = Element | None
-
-
-@dataclass(frozen=True, slots=True)
-class Expanded:
-    """Expanded uncertainties U with coverage factors and probabilities: one of these for each U, or one for all."""
-
-    widths: Sequence[float]
-    factors: Sequence[float]
-    probabilities: Sequence[float]
 
 
 def dcc(name: str, *parts: Part, **attributes: str) -> Element:
@@ -57,8 +48,8 @@ def text(name: str, said: str | None) -> Element:
 
 
 def _plain(said: str | date | None) -> str:
-    """Printable, since XML knows no control characters, and without blanks at its ends."""
-    return UNSAID if said is None else " ".join(printable(str(said)).split()) or UNSAID
+    """Printable, since XML knows no control characters; with one blank for any, those that do not break among them."""
+    return UNSAID if said is None else printable(" ".join(str(said).split())) or UNSAID
 
 
 def values(name: str, numbers: Iterable[object]) -> Element:

@@ -48,6 +48,12 @@ def small(value: float) -> str:
     return f"{mantissa}\u00a0×\u00a0{power_of_ten(int(exponent))}"
 
 
+def figures(value: float) -> str:
+    """Three digits at most, and a power of ten where it is far from one."""
+    mantissa, _, exponent = f"{value:.3g}".partition("e")
+    return f"{mantissa}\u00a0×\u00a0{power_of_ten(int(exponent))}" if exponent else mantissa
+
+
 def power_of_ten(exponent: int) -> str:
     """10 with its exponent raised."""
     return f"10{str(exponent).translate(RAISED)}"

@@ -1,4 +1,7 @@
-"""The uncertainty budget as it is printed: for one axis, its lines adding up to the U that stands beside the value."""
+"""The uncertainty budget as it is printed: for one axis, its lines adding up to the U that stands beside the value.
+
+The same at the terminal and on the certificate; all six budgets are in `result.json`.
+"""
 
 import math
 from collections.abc import Sequence
@@ -6,14 +9,11 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from rig.data.budget_entries import BudgetEntry, ContributorEntry
-from rig.estimation.coverage import PROBABILITY
-from rig.report.certificate.rounding import percent, power_of_ten, small
-from rig.report.certificate.tables import AXES
+from rig.data.budget_entries import IN_U, BudgetEntry, ContributorEntry
+from rig.report.rounding import figures, percent, power_of_ten, small
 
 NEGLIGIBLE = 0.001  # of both variances: lines below are summed up in one
 DIGITS = 3  # of a combined standard uncertainty: its parts are printed to the same decimal
-QUANTITIES = ("scale factors", "biases")
 
 
 @dataclass(frozen=True, slots=True)
@@ -30,7 +30,7 @@ class Column:
     @property
     def axis(self) -> str:
         """Its axis."""
-        return AXES[self.place % 3]
+        return "xyz"[self.place % 3]
 
 
 @dataclass(frozen=True, slots=True)
@@ -46,14 +46,14 @@ class Line:
 
 
 @dataclass(frozen=True, slots=True)
-class BudgetTable:
+class PrintedBudget:
     """Of one scale factor and of one bias: those of the axes with the largest U, of scale factors relative to them."""
 
     columns: tuple[Column, Column]
     lines: tuple[Line, ...]
 
 
-def budget_table(budget: BudgetEntry, scale: Sequence[float], unit: str, per_unit: float = 1.0) -> BudgetTable:
+def printed_budget(budget: BudgetEntry, scale: Sequence[float], unit: str, per_unit: float = 1.0) -> PrintedBudget:
     """The largest shares first, all negligible lines in one. Biases times `per_unit` are in `unit`."""
     places = shown_places(budget, scale)
     sizes = [_Size.of(budget.std[places[0]], 1.0, ""), _Size.of(budget.std[places[1]], per_unit, unit)]
@@ -67,7 +67,7 @@ def budget_table(budget: BudgetEntry, scale: Sequence[float], unit: str, per_uni
         share = np.divide(std, budget.std) ** 2
         printed.append(Line(names, "", "", "", "", _parts(std, share.tolist(), places, sizes)))
     first, second = (_column(budget, place, size) for place, size in zip(places, sizes, strict=True))
-    return BudgetTable((first, second), tuple(printed))
+    return PrintedBudget((first, second), tuple(printed))
 
 
 def shown_places(budget: BudgetEntry, scale: Sequence[float]) -> tuple[int, int]:
@@ -85,6 +85,8 @@ class _Size:
 
     @classmethod
     def of(cls, std: float, per_unit: float, unit: str) -> "_Size":
+        if not std > 0:
+            return cls(unit or "1", per_unit, 0)
         power = 3 * math.floor(math.log10(std * per_unit) / 3)
         factor = per_unit * 10.0**-power
         decimals = max(DIGITS - 1 - math.floor(math.log10(std * factor)), 0)
@@ -109,10 +111,16 @@ def _column(budget: BudgetEntry, place: int, size: _Size) -> Column:
 def _line(line: ContributorEntry, places: tuple[int, int], sizes: Sequence[_Size]) -> Line:
     stated = " (k = 2)" if line.distribution == "normal" else ""
     found = "found" if line.kind == "A" else "–"
-    assumed = found if line.half_width is None else f"±{line.half_width:.3g} {line.unit}{stated}"
-    counted = "∞" if line.kind == "B" else "–"  # not counted in results of before
-    freedom = counted if line.freedom is None else freedom_text(line.freedom)
+    assumed = found if line.half_width is None else f"±{figures(line.half_width)} {line.unit}{stated}"
+    freedom = _uncounted(line) if line.freedom is None else freedom_text(line.freedom)
     return Line(line.name, line.kind, line.distribution, assumed, freedom, _parts(line.std, line.share, places, sizes))
+
+
+def _uncounted(line: ContributorEntry) -> str:
+    """Why there is no number: it is known, it is in u already, or nobody counted it, as in results of before."""
+    if line.kind == "B":
+        return "∞"
+    return "in u" if line.source.endswith(IN_U) else "–"
 
 
 def _parts(
@@ -127,55 +135,3 @@ def freedom_text(freedom: float) -> str:
     if not math.isfinite(freedom):
         return "∞"
     return f"{math.floor(freedom)}" if freedom < 1e4 else small(freedom)
-
-
-def factor_note(budget: BudgetEntry) -> str:
-    """What stands beside ± U: k where it is one number for all values, as it is printed."""
-    printed = {f"{each:.2f}" for each in budget.factors}
-    return f"k\u00a0=\u00a0{_short(printed.pop())}" if len(printed) == 1 else "k as stated below"
-
-
-def coverage_sentence(budget: BudgetEntry) -> str:
-    """What k stands for: the sentence of EA-4/02 M:2022, 6.4, or that of its annex E where freedom is scarce."""
-    begins = (
-        "The reported expanded uncertainty of measurement is the standard uncertainty of measurement multiplied by the "
-        "coverage factor k"
-    )
-    factors = [f"{each:.2f}" for each in budget.factors]
-    covers = min(budget.probabilities)
-    if len(set(factors)) > 1:
-        groups = [_group(budget, factors, 3 * i, name) for i, name in enumerate(QUANTITIES)]
-        return (
-            f"{begins}, which for a t-distribution with ν_eff effective degrees of freedom corresponds to a coverage "
-            f"probability of approximately {_percent(covers)}: {'; '.join(groups)}."
-        )
-    k, fewest = _short(factors[0]), min(budget.known)
-    if k == "2" and round(100 * covers) == round(100 * PROBABILITY):
-        return (
-            f"{begins}\u00a0=\u00a0{k}, which for a normal distribution corresponds to a coverage probability of "
-            f"approximately {_percent(covers)}."
-        )
-    return (
-        f"{begins}\u00a0=\u00a0{k}, which for a t-distribution with ν_eff\u00a0=\u00a0{freedom_text(fewest)} effective "
-        f"degrees of freedom, the fewest of any value here, corresponds to a coverage probability of approximately "
-        f"{_percent(covers)}."
-    )
-
-
-def _group(budget: BudgetEntry, factors: Sequence[str], first: int, name: str) -> str:
-    """k of the three axes, once where it is the same."""
-    own, known = factors[first : first + 3], budget.known[first : first + 3]
-    if len(set(own)) == 1:
-        return f"{name} k\u00a0=\u00a0{own[0]} (ν_eff\u00a0≥\u00a0{freedom_text(min(known))})"
-    each = (f"{axis} {k} ({freedom_text(freedom)})" for axis, k, freedom in zip(AXES, own, known, strict=True))
-    return f"{name} k (ν_eff): {', '.join(each)}"
-
-
-def _percent(probability: float) -> str:
-    """Whole, and in full where it is what the coverage factor was chosen for."""
-    full = f" ({100 * PROBABILITY:.2f} %)" if math.isclose(probability, PROBABILITY, abs_tol=5e-5) else ""
-    return f"{100 * probability:.0f} %{full}"
-
-
-def _short(factor: str) -> str:
-    return "2" if factor == "2.00" else factor

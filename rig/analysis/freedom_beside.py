@@ -1,0 +1,142 @@
+"""Degrees of freedom of what is found beside scale and bias and has no budget of its own: angles, gravity's share.
+
+Its variance is split into what the budget's own lines of type A make of it, and each part has the freedom of its line
+(Welch and Satterthwaite's, JCGM 100, G.4); what is left, errors of the arm of a stated size, is known.
+"""
+
+from collections.abc import Sequence
+
+import numpy as np
+
+from rig.analysis.acceleration import AccelerometerResult
+from rig.analysis.calibration import SensorResult
+from rig.analysis.magnetic_field import MagnetometerResult
+from rig.analysis.reversal import MagnetometerReversal
+from rig.estimation.arrays import Array
+from rig.estimation.attitude_error import AttitudeError
+from rig.estimation.budget import Budget
+from rig.estimation.coverage import effective_freedom
+from rig.estimation.explained import Explained
+from rig.estimation.felt import SECOND
+from rig.estimation.reference_budget import response_in_attitudes
+from rig.estimation.reference_model import F
+from rig.estimation.sensor_axes import angle_jacobian, nearest_rotation
+from rig.estimation.vector_model import VectorSolution, design_matrix, regress
+
+NOISE, WANDERING, ATTITUDES = "noise", "bias instability", "arm's attitudes"
+
+
+def of_angles(result: SensorResult) -> Array | None:
+    """(6,) of a gyroscope's non-orthogonality, then of its mounting; None where nobody counts."""
+    explained, budget = result.explained, result.uncertainty
+    if explained is None or budget is None or not budget.by_freedom:
+        return None
+    solution = explained.solution
+    turned = _to_angles(solution.matrix, solution.mounting)
+    readings = np.einsum("aij,ijkl,akl->a", turned, _of_matrix(solution), turned)
+    walk = np.einsum("aij,ijl,ail->a", turned, _walk(explained)[:, :3, :3], turned)
+    return _split(np.diag(solution.angles_covariance_rad2), {NOISE: readings - walk, WANDERING: walk}, budget)
+
+
+def of_sensitivity(result: SensorResult) -> Array | None:
+    """(3, 3) of what gravity adds to a gyroscope's readings; None where nobody counts or it was not found."""
+    explained, budget = result.explained, result.uncertainty
+    if explained is None or budget is None or not budget.by_freedom:
+        return None
+    covariance = explained.solution.g_sensitivity_covariance
+    if covariance is None:
+        return None
+    whole = np.diag(covariance).reshape(3, 3)
+    walk = np.diagonal(_walk(explained)[:, 4:, 4:], axis1=1, axis2=2)
+    return _split(whole, {NOISE: whole - walk, WANDERING: walk}, budget)
+
+
+def of_acceleration_angles(result: AccelerometerResult) -> Array | None:
+    """(3,) of an accelerometer's non-orthogonality; None where nobody counts."""
+    turned = _to_angles(result.solution.matrix)[:3].reshape(3, 9)
+    return _of_accelerometer(result, turned @ result.solution.response[F], result.non_orthogonality_std_rad)
+
+
+def of_second_order(result: AccelerometerResult) -> Array | None:
+    """(3,) of an accelerometer's φ; None where nobody counts or it was not looked for."""
+    if result.solution.second_order_s2_m is None:
+        return None
+    std = np.sqrt(np.diag(result.solution.covariance)[SECOND])
+    return _of_accelerometer(result, result.solution.response[SECOND], std)
+
+
+def of_field_angles(result: MagnetometerResult) -> Array | None:
+    """(3,) of a magnetometer's non-orthogonality; None where nobody counts."""
+    if not result.budget.by_freedom:
+        return None
+    solution, seen = result.solution, result.seen
+    error = solution.fit.attitude_error or AttitudeError(0.0, 0.0)
+    theta = np.concatenate([solution.matrix.ravel(), solution.field_table_t, solution.bias_t])
+    response = response_in_attitudes(theta, seen.attitudes, seen.variances_m2_s4, error.std_rad)[F]
+    noise = (_to_angles(solution.matrix)[:3].reshape(3, 9) @ response) ** 2 @ seen.variances_m2_s4.ravel()
+    whole = result.non_orthogonality_std_rad**2
+    return _split(whole, {NOISE: noise, ATTITUDES: whole - noise}, result.budget)
+
+
+def of_reversal(reversal: MagnetometerReversal) -> tuple[Array, Array] | None:
+    """(3,) of the mean scale factors, (6,) of bias and arm's field; None where nobody counts.
+
+    Of the latter the fewest of any run's bias: a sum of independent parts never has fewer than its scarcest.
+    """
+    budgets = [each.result.budget for each in reversal.runs]
+    if not all(budget.by_freedom for budget in budgets):
+        return None
+    # (Σ u_i²)² / ν of each run is Σ u_i⁴ / ν_i: what the runs share is known, and adds nothing to it.
+    scarce = np.sum([budget.std[:3] ** 4 / budget.freedom[:3] for budget in budgets], axis=0) / len(budgets) ** 4
+    with np.errstate(divide="ignore"):
+        scale: Array = reversal.scale_std**4 / scarce
+    return scale, np.full(6, min(float(budget.freedom[3:].min()) for budget in budgets))
+
+
+def _of_accelerometer(result: AccelerometerResult, response: Array, std: Array) -> Array | None:
+    """From the `response` (3, n) to the readings."""
+    if result.budget is None or not result.budget.by_freedom:
+        return None
+    noise = np.einsum("qn,nm,qm->q", response, result.movement.noise(), response)
+    return _split(std**2, {NOISE: noise, ATTITUDES: std**2 - noise}, result.budget)
+
+
+def _split(whole: Array, parts: dict[str, Array], budget: Budget) -> Array:
+    """Freedom (…) of variances (…) from their `parts`, by the name of the budget's lines; the rest is known."""
+    made = [np.clip(each, 0.0, whole) for each in parts.values()]
+    rest = np.clip(whole - np.sum(made, axis=0), 0.0, None)
+    freedom = [_line(budget, name) for name in parts]
+    shape = (-1, *np.ones(np.ndim(whole), dtype=np.intp))
+    return effective_freedom(np.array([*made, rest]), np.reshape([*freedom, np.inf], shape))
+
+
+def _line(budget: Budget, name: str) -> float:
+    """Its freedom; of a line that is not there nothing comes."""
+    found: Sequence[float] = [each.freedom for each in budget.contributors if each.name == name]
+    return found[0] if found else np.inf
+
+
+def _to_angles(matrix: Array, rotation: Array | None = None) -> Array:
+    """(6, 3, 3) derivative of angles between the axes and of their mounting with respect to F."""
+    scale = 1 / np.linalg.norm(matrix, axis=1)
+    axes = matrix * scale[:, None]
+    found = angle_jacobian(axes, scale, nearest_rotation(axes) if rotation is None else rotation)
+    return found.reshape(6, 3, 3)
+
+
+def _of_matrix(solution: VectorSolution) -> Array:
+    """(3, 3, 3, 3) covariance of F by the readings."""
+    return solution.matrix_covariance[:9, :9].reshape(3, 3, 3, 3)
+
+
+def _walk(explained: Explained) -> Array:
+    """(3, p, p) that the wandering bias adds to the covariance of each axis' coefficients F, c (and G)."""
+    seen = explained.seen
+    gravity = None if explained.solution.g_sensitivity is None else seen.pull_m_s2
+    design = design_matrix(seen.rates_rad_s, gravity)
+    if explained.bias.steady:
+        return np.zeros((3, design.shape[1], design.shape[1]))
+    shared = explained.bias.covariance(seen.windows_s)
+    _, gain = regress(design, seen.means_rad_s, seen.variances_rad2_s2, shared)
+    walk: Array = gain @ shared @ np.swapaxes(gain, -1, -2)
+    return walk

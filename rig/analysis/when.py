@@ -1,0 +1,113 @@
+"""When and how warm it was while what was found of a sensor was read: no value holds at another time or temperature.
+
+A gyroscope's scale factors come from the sweeps alone, its bias from the rests between them as well: a sensor that
+warms up has them at different temperatures.
+"""
+
+from collections.abc import Iterable, Sequence
+from dataclasses import dataclass
+from datetime import datetime, timedelta
+
+import numpy as np
+
+from rig.analysis.seen import since_first_s
+from rig.observation.average import Average
+from rig.observation.observed_run import ObservedRun
+from rig.observation.windows import Window, dwelt
+
+
+@dataclass(frozen=True, slots=True)
+class When:
+    """From when to when, in UTC, and the `mean_utc` of the readings; of these the mean temperature and how it ranged.
+
+    No temperatures where no thermometer tells them.
+    """
+
+    from_utc: datetime
+    to_utc: datetime
+    mean_utc: datetime
+    temperature_c: float | None
+    temperature_range_c: tuple[float, float] | None
+
+
+@dataclass(frozen=True, slots=True)
+class Held:
+    """When a gyroscope's scale factors hold, and when its bias does."""
+
+    scale: When
+    bias: When
+
+
+@dataclass(frozen=True, slots=True)
+class _Read:
+    """Readings of one window, which is on the clock of the first recording; how many, and how warm it was."""
+
+    window: Window
+    weight: float
+    temperature_c: float | None
+
+
+def of_gyroscope(recordings: Sequence[ObservedRun], name: str) -> Held:
+    """Of the sensor of that name: its sweeps, and sweeps and rests."""
+    parts = [(each.sensors[name], since_s) for each, since_s in _on_one_clock(recordings)]
+    turns = [_averaged(turn.average, since_s) for part, since_s in parts for turn in part.revolutions]
+    rests = [_averaged(rest, since_s) for part, since_s in parts for rest in part.rests]
+    return Held(_when(recordings, turns), _when(recordings, [*turns, *rests]))
+
+
+def of_accelerometer(recordings: Sequence[ObservedRun], name: str, dwells: Iterable[int]) -> When:
+    """Of the accelerometer of that name: the dwells of these indices, and its sweeps."""
+    wanted, read = frozenset(dwells), []
+    for each, since_s in _on_one_clock(recordings):
+        part = each.sensors[name]
+        read += [_averaged(turn.average, since_s) for turn in part.revolutions if turn.acceleration is not None]
+        read += [
+            _Read(_moved(dwell.window, since_s), dwell.reading.samples, dwell.temperature_c)
+            for dwell in part.dwells
+            if dwell.index in wanted
+        ]
+    return _when(recordings, read)
+
+
+def of_magnetometer(recordings: Sequence[ObservedRun], dwells: Iterable[int]) -> When:
+    """Of a magnetometer, which has no thermometer: the dwells of these indices, as the last recording has them."""
+    wanted = frozenset(dwells)
+    windows = {
+        each.dwell.index: _moved(each.window, since_s)
+        for recording, since_s in _on_one_clock(recordings)
+        for each in dwelt(recording.run)
+        if each.dwell.index in wanted
+    }
+    return _when(recordings, [_Read(each, each.end_s - each.start_s, None) for each in windows.values()])
+
+
+def _on_one_clock(recordings: Sequence[ObservedRun]) -> Iterable[tuple[ObservedRun, float]]:
+    return zip(recordings, since_first_s(recordings), strict=True)
+
+
+def _averaged(average: Average, since_s: float) -> _Read:
+    window = Window(average.start_s, average.end_s)
+    return _Read(_moved(window, since_s), average.samples, average.temperature_c)
+
+
+def _moved(window: Window, since_s: float) -> Window:
+    return Window(window.start_s + since_s, window.end_s + since_s)
+
+
+def _when(recordings: Sequence[ObservedRun], read: Sequence[_Read]) -> When:
+    """Each window counts by its weight; a recording's wall time is that of its first state."""
+    began = datetime.fromisoformat(recordings[0].run.provenance.started_utc)
+    first_s, weights = float(recordings[0].motion.time_s[0]), [each.weight for each in read]
+
+    def utc(time_s: float) -> datetime:
+        return began + timedelta(seconds=time_s - first_s)
+
+    middles = [(each.window.start_s + each.window.end_s) / 2 for each in read]
+    warm = [each.temperature_c for each in read if each.temperature_c is not None]
+    return When(
+        utc(min(each.window.start_s for each in read)),
+        utc(max(each.window.end_s for each in read)),
+        utc(float(np.average(middles, weights=weights))),
+        float(np.average(warm, weights=weights)) if warm else None,
+        (min(warm), max(warm)) if warm else None,
+    )

@@ -1,0 +1,48 @@
+"""When a value holds, how warm it was, and at what rates, in words: the same at the terminal and on certificates."""
+
+import math
+from collections.abc import Sequence
+from datetime import datetime
+
+from rig.data.result_file import SensorEntry
+from rig.data.result_types import WhenEntry
+
+DEG = math.degrees(1)
+ALIKE = 0.005  # of a rate: what the arm's timing and a sensor that leans by 5° make of one speed
+
+
+def when_words(found: WhenEntry) -> str:
+    """At what temperature, and over what time, a value is a mean."""
+    began, ended = (datetime.fromisoformat(each) for each in (found.from_utc, found.to_utc))
+    day = f"{began:%Y-%m-%d} "
+    until = f"{ended:%H:%M:%S}" if ended.date() == began.date() else f"{ended:%Y-%m-%d %H:%M:%S}"
+    over = f"mean over {day}{began:%H:%M:%S} to {until} UTC"
+    if found.temperature_c is None or found.temperature_range_c is None:
+        return over
+    low, high = (f"{each:.2f}" for each in found.temperature_range_c)
+    went = f"stayed at {low} °C" if low == high else f"was between {low} and {high} °C"
+    return f"at {found.temperature_c:.1f} °C, {over}, in which it {went}"
+
+
+def speed_words(sensor: SensorEntry) -> str:
+    """The speeds of the sweeps, °/s, either way."""
+    return ", ".join(f"±{DEG * speed:.1f}" for speed in sensor.speeds_rad_s)
+
+
+def load_words(sensor: SensorEntry) -> str | None:
+    """With what rates its own axes were loaded, °/s; None where these are the speeds of the sweeps."""
+    loads, speeds = sensor.loads_rad_s, sensor.speeds_rad_s
+    if loads is None or not speeds:
+        return None
+    if all(_alike(low, speeds[0]) and _alike(high, speeds[-1]) for low, high in loads):
+        return None
+    return ", ".join(f"{axis} {_between(load)}" for axis, load in zip("xyz", loads, strict=True))
+
+
+def _between(load: Sequence[float]) -> str:
+    low, high = load
+    return f"{DEG * high:.1f}" if _alike(low, high) else f"{DEG * low:.1f} to {DEG * high:.1f}"
+
+
+def _alike(one: float, other: float) -> bool:
+    return math.isclose(one, other, rel_tol=ALIKE)

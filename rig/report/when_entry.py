@@ -1,0 +1,11 @@
+"""When something was found, as an entry of `result.json`."""
+
+from rig.analysis.when import When
+from rig.data.result_types import WhenEntry
+from rig.report.entry import entry
+
+
+def when_entry(found: When) -> WhenEntry:
+    """Times to the second."""
+    times = {name: getattr(found, name).isoformat(timespec="seconds") for name in ("from_utc", "to_utc", "mean_utc")}
+    return entry(WhenEntry, found, **times)

@@ -1,0 +1,79 @@
+"""Scale factors and biases say when they were read, how warm it was then, and how fast the sensor's own axes turned."""
+
+from dataclasses import replace
+from datetime import datetime, timedelta
+
+import numpy as np
+import pytest
+
+from rig.analysis.calibration import observe_recordings
+from rig.analysis.loads import loads_rad_s
+from rig.analysis.outcome import calibrated
+from rig.analysis.when import of_gyroscope
+from rig.data.run_file import RunData
+from rig.report.document import document_of
+from rig.report.validity_words import load_words, when_words
+from support.synthetic_run import Setup, synthetic_run
+
+COUNTS_PER_K = 16
+PER_MINUTE_K = 3.0
+
+
+def warming(run: RunData) -> RunData:
+    """The same while its sensor warms up steadily."""
+    samples = run.samples["gyro"].copy()
+    minutes = (samples["board_time_us"] - samples["board_time_us"][0].astype(np.int64)) / 60e6
+    samples["temperature_counts"] += np.round(COUNTS_PER_K * PER_MINUTE_K * minutes).astype(np.int64)
+    return replace(run, samples={"gyro": samples})
+
+
+def test_a_sensor_that_warms_up_has_its_scale_and_its_bias_at_the_temperatures_of_their_own_readings() -> None:
+    run = warming(synthetic_run(Setup()))
+    recordings = observe_recordings([run])
+    held, seen = of_gyroscope(recordings, "gyro"), recordings[0].sensors["gyro"]
+    started = datetime.fromisoformat(run.provenance.started_utc)
+    first_s = float(recordings[0].motion.time_s[0])
+    windows = [*(turn.average for turn in seen.revolutions), *seen.rests]
+    assert held.bias.from_utc == started + timedelta(seconds=min(each.start_s for each in windows) - first_s)
+    assert held.bias.to_utc == started + timedelta(seconds=max(each.end_s for each in windows) - first_s)
+    assert held.bias.from_utc <= held.scale.from_utc < held.scale.mean_utc < held.scale.to_utc < held.bias.to_utc
+    for each in (held.scale, held.bias):
+        assert each.temperature_c is not None and each.temperature_range_c is not None
+        since_min = (each.mean_utc - started).total_seconds() / 60
+        assert each.temperature_c == pytest.approx(22 + PER_MINUTE_K * since_min, abs=0.1)
+        assert each.temperature_range_c[1] - each.temperature_range_c[0] > 2
+    assert held.scale.temperature_c != held.bias.temperature_c
+
+
+def test_a_result_keeps_its_temperature_and_says_both_beside_it() -> None:
+    document = document_of(calibrated([warming(synthetic_run(Setup()))]))
+    sensor = document.sensors["gyro"]
+    assert sensor.scale_at is not None and sensor.bias_at is not None
+    assert sensor.scale_at.temperature_c == pytest.approx(sensor.temperature_c)
+    low, high = sensor.bias_at.temperature_range_c or (0.0, 0.0)
+    assert f"was between {low:.2f} and {high:.2f} °C" in when_words(sensor.bias_at)
+
+
+def test_what_was_recorded_again_was_read_when_it_was_recorded_last() -> None:
+    first, again = (synthetic_run(Setup(seed=seed)) for seed in (1, 2))
+    later = datetime.fromisoformat(first.provenance.started_utc) + timedelta(hours=2)
+    again = replace(again, provenance=replace(again.provenance, started_utc=later.isoformat()))
+    held = of_gyroscope(observe_recordings([first, again]), "gyro")
+    assert later < held.bias.from_utc < held.bias.to_utc < later + timedelta(minutes=3)
+
+
+def test_axes_that_lean_are_loaded_with_less_than_the_speed_of_the_sweeps() -> None:
+    lean = np.radians(12)
+    result = calibrated([synthetic_run(Setup(noise_rad_s=0.002, mounting_error_rad=(float(lean), 0.0, 0.0)))])
+    explained = result.results["gyro"].explained
+    assert explained is not None
+    upright, *leaning = np.degrees(loads_rad_s(explained)).tolist()
+    assert upright == pytest.approx([60, 60], rel=1e-3)  # what turns it across that axis tells nothing of it
+    for each in leaning:
+        assert each == pytest.approx([60 * float(np.cos(lean))] * 2, rel=2e-3)
+    assert load_words(document_of(result).sensors["gyro"]) == "x 60.0, y 58.7, z 58.7"
+
+
+def test_upright_axes_are_loaded_with_the_speed_of_the_sweeps_and_nothing_is_said() -> None:
+    result = calibrated([synthetic_run(Setup(mounting_error_rad=(0.0, 0.0, 0.0)))])
+    assert load_words(document_of(result).sensors["gyro"]) is None
