@@ -8,13 +8,29 @@ RATE_TOLERANCE = 2e-4  # relative: 333.33 stands for 1000/3, and the closest two
 
 
 @dataclass(frozen=True, slots=True)
+class AccelerometerSheet:
+    """What a data sheet says of an accelerometer, or of one of its kind: half-widths.
+
+    `nonlinearity` is how far it may be from the best straight line, as a share of the range `nonlinear_over_g` either
+    way, the one that is set where that is None. `bias_mg_k` and `scale_per_k` are what a degree changes; `anew_mg` what
+    its bias may change by when it is switched off and on, soldered or screwed down, None where nobody states it.
+    """
+
+    nonlinearity: float
+    bias_mg_k: float
+    scale_per_k: float
+    nonlinear_over_g: float | None = None
+    anew_mg: float | None = None
+
+
+@dataclass(frozen=True, slots=True)
 class Part:
     """One kind of sensor: `rates_hz` and `ranges_deg_s` are all its gyroscope can do, `rates_rule` says rates in words.
 
     `g_sensitivity_deg_s_g` is how much a reading may change for 1 g, at most, `nonlinearity` how far it may be from a
-    straight line, as a share of full scale. `ranges_g` are those of its
-    accelerometer, which shares its data rate, the usual one first; `acceleration_noise_ug_sqrt_hz` is the noise density
-    of that, in µg/√Hz. A part with a port of its own stands beside the board, with a clock of its own.
+    straight line, as a share of full scale. `ranges_g` are those of its accelerometer, which shares its data rate, the
+    usual one first; `acceleration_noise_ug_sqrt_hz` is the noise density of that, in µg/√Hz, and `accelerometer` what
+    else is known of it. A part with a port of its own stands beside the board, with a clock of its own.
     """
 
     rates_hz: tuple[float, ...]
@@ -26,6 +42,7 @@ class Part:
     nonlinearity: float
     ranges_g: tuple[float, ...]
     acceleration_noise_ug_sqrt_hz: float
+    accelerometer: AccelerometerSheet
     own_port: bool = False
 
     def accept_rate(self, rate_hz: float) -> float:
@@ -84,6 +101,9 @@ PARTS: Mapping[str, Part] = MappingProxyType(
             nonlinearity=0.001,  # not stated; that of the MPU-9250
             ranges_g=(2, 4, 8, 16),
             acceleration_noise_ug_sqrt_hz=150,  # not stated; assumed
+            accelerometer=AccelerometerSheet(  # not stated; that of the MPU-9250
+                nonlinearity=0.005, bias_mg_k=1.5, scale_per_k=2.6e-4
+            ),
         ),
         "mpu9250": Part(  # register map RM-MPU-9250A-00, registers 25 (SMPLRT_DIV) and 27 (GYRO_CONFIG)
             rates_hz=tuple(1000 / (1 + divider) for divider in range(250)),
@@ -95,6 +115,9 @@ PARTS: Mapping[str, Part] = MappingProxyType(
             nonlinearity=0.001,  # PS-MPU-9250A-01, table 1
             ranges_g=(2, 4, 8, 16),
             acceleration_noise_ug_sqrt_hz=300,  # PS-MPU-9250A-01, section 3.2
+            accelerometer=AccelerometerSheet(  # PS-MPU-9250A-01, table 2; changes by its -40 to 85 °C
+                nonlinearity=0.005, bias_mg_k=1.5, scale_per_k=2.6e-4
+            ),
         ),
         "adis16465": Part(  # datasheet, register DEC_RATE; the range is the model's: -1, -2 and -3 have one each
             rates_hz=tuple(2000 / (1 + divider) for divider in range(2000)),
@@ -106,6 +129,9 @@ PARTS: Mapping[str, Part] = MappingProxyType(
             nonlinearity=0.002,  # assumed: the data sheet of the part has it, not looked up
             ranges_g=(8,),
             acceleration_noise_ug_sqrt_hz=23,  # assumed: the data sheet of the part has it, not looked up
+            accelerometer=AccelerometerSheet(  # assumed: the data sheet of the part has it, not looked up
+                nonlinearity=0.0025, nonlinear_over_g=2, bias_mg_k=0.05, scale_per_k=2e-5
+            ),
         ),
         "kvh1775": Part(  # ICD 56-0298 Rev. B, command =DR; -01 and -25 have one range of acceleration each
             rates_hz=(1, 5, 10, 25, 50, 100, 250, 500, 750, 1000, 3600, 5000),
@@ -117,6 +143,9 @@ PARTS: Mapping[str, Part] = MappingProxyType(
             nonlinearity=5e-5,  # assumed: 50 ppm, as of a scale factor of light
             ranges_g=(10, 25),
             acceleration_noise_ug_sqrt_hz=119,  # TRIAX, table 1: 0.0701 m/s/√h
+            accelerometer=AccelerometerSheet(  # assumed: the maker's data sheet has it, not looked up
+                nonlinearity=0.009, nonlinear_over_g=10, bias_mg_k=0.05, scale_per_k=1e-4
+            ),
             own_port=True,
         ),
     }

@@ -23,6 +23,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 from numpy.typing import NDArray
 
+from rig.estimation.accelerometer_errors import AccelerometerErrors
 from rig.estimation.arrays import Array
 from rig.estimation.reference_model import BIAS, REFERENCE, matrix
 
@@ -82,17 +83,28 @@ class Movement:
 
     `repeatability_rad`: the standard deviation of the small turns by which each sweep is off for itself, about each
     axis, where those of one station share all else: a joint that is come to from the other side stands elsewhere.
+    `own`: what the sensor itself adds; None of recordings of before, and of sensors of which nothing is known.
     """
 
     dwells: Dwells
     sweeps: Sweeps
     repeatability_rad: float = 0.0
+    own: AccelerometerErrors | None = None
 
     def without(self, dwell: int) -> "Movement":
         """All but one dwell."""
         left = np.arange(len(self.dwells.readings_m_s2)) != dwell
-        own = self.dwells
-        return replace(self, dwells=Dwells(own.readings_m_s2[left], own.variances_m2_s4[left], own.attitudes[left]))
+        kept = self.dwells
+        return replace(
+            self,
+            dwells=Dwells(kept.readings_m_s2[left], kept.variances_m2_s4[left], kept.attitudes[left]),
+            own=None if self.own is None else self.own.without(dwell),
+        )
+
+    def walking_by(self, rate_m_s2_sqrt_s: float) -> "Movement":
+        """The same of a sensor whose bias walks by so much in a second."""
+        assert self.own is not None, "or nothing walks"
+        return replace(self, own=replace(self.own, walk_m_s2_sqrt_s=rate_m_s2_sqrt_s))
 
     def readings(self) -> Array:
         """(K, 3) m/s²."""
@@ -199,17 +211,6 @@ def effects(theta: Array, movement: Movement) -> Array:
         own[..., 6:10] = _of_angle(gravity[rows] @ theta[REFERENCE], axis, speed**2, arm)
         own *= SHARE
     return _read(changes, theta, movement).reshape(3 * len(gravity), -1)
-
-
-def noise(theta: Array, movement: Movement) -> Array:
-    """(3 K, 3 K) covariance of what is off in each reading for itself: its noise, and the arm's repeatability."""
-    whole, sweeps = movement.noise(), movement.sweeps
-    if movement.repeatability_rad == 0.0:
-        return whole
-    alone = replace(sweeps, stations=np.arange(len(sweeps.stations)))
-    own = effects(theta, replace(movement, sweeps=alone))[:, OWN_ERRORS * len(movement.dwells.readings_m_s2) :]
-    turns = own[:, np.arange(own.shape[1]) % SHARED_ERRORS < TURNS] * (movement.repeatability_rad / SHARE)
-    return np.asarray(whole + turns @ turns.T, dtype=np.float64)
 
 
 def _of_angle(pulled: Array, axis: Array, speed_squared: float, arm: Array) -> Array:

@@ -6,14 +6,16 @@ the points of a sweep by errors that they share, all of the common size δ: rest
 together finds it (`rig.estimation.shared_errors`).
 """
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.typing import ArrayLike
 
 from rig.estimation import refusals
+from rig.estimation.accelerometer_errors import AccelerometerErrors
 from rig.estimation.arrays import Array
 from rig.estimation.attitude_error import PASSES, SETTLED, AttitudeError
+from rig.estimation.expected_sizes import Scattered, expected_sizes
 from rig.estimation.felt import (
     DELAY,
     LEVER,
@@ -26,10 +28,10 @@ from rig.estimation.felt import (
     Sweeps,
     effects,
     jacobian,
-    noise,
     predicted,
 )
 from rig.estimation.linear_start import MAX_CONDITION, REMEDY, linear_start
+from rig.estimation.reading_errors import noise, walking
 from rig.estimation.reference_model import BIAS, REFERENCE, STEP_LIMIT, STEP_TOLERANCE, free_directions, matrix
 from rig.estimation.shared_errors import Apart, apart, likeliest_error, with_uncertainty
 from rig.estimation.triaxial import ODD, SUSPICIOUS_RAD, UNTRUSTWORTHY_RAD
@@ -50,6 +52,7 @@ class ImuSolution:
     - `dwell_residuals_m_s2` (N, 3), `sweep_residuals_m_s2` (M, 3, 3): reading less model; `chi_square` of them, which
       left `freedom`.
     - `rank`, `condition`: of the readings' derivatives, each column in its own size.
+    - `walk_m_s2_sqrt_s`: by how much the bias walked in a second, where it may.
     """
 
     matrix: Array
@@ -69,6 +72,18 @@ class ImuSolution:
     condition: float
     iterations: int
     warnings: tuple[str, ...]
+    walk_m_s2_sqrt_s: float = 0.0
+
+    @property
+    def theta(self) -> Array:
+        """(22,) as `rig.estimation.felt` orders it."""
+        found = np.zeros(PARAMETERS)
+        found[: LEVER.start] = np.concatenate([self.matrix.ravel(), self.reference_m_s2, self.bias_m_s2])
+        if self.lever_arm_m is not None:
+            found[LEVER], found[DELAY] = self.lever_arm_m, self.delay_s
+        if self.second_order_s2_m is not None:
+            found[SECOND] = self.second_order_s2_m
+        return found
 
 
 @dataclass(frozen=True, slots=True)
@@ -108,17 +123,18 @@ def solve_imu(
     second_order: bool = False,
     attitude_std_rad: float | None = None,
     repeatability_rad: float = 0.0,
+    own: AccelerometerErrors | None = None,
 ) -> ImuSolution:
     """Calibrate from dwells, sweeps or both.
 
     `gravity_m_s2` is the size of v_ref, `up` (3,) says to which side of the base it points, roughly;
-    `attitude_std_rad` holds δ, 0 for an exact arm, instead of finding it. `repeatability_rad`: see `Movement`.
+    `attitude_std_rad` holds δ, 0 for an exact arm, instead of finding it. `repeatability_rad`, `own`: see `Movement`.
 
     Raises Fault `too_few_observations`, `not_finite`, `bad_variance`, `bad_speed`, `zero_reading`,
     `duplicated_observation`, `bad_attitude`, `rank_deficient`, `ill_conditioned`, `sign_unknown`, `wrong_unit`,
     `mirrored_axis`, `attitude_untrustworthy`; ValueError for a wrong shape, or axes that are no unit vectors.
     """
-    movement = Movement(dwells, sweeps, repeatability_rad)
+    movement = Movement(dwells, sweeps, repeatability_rad, own)
     held = _held(movement, second_order=second_order)
     needed = PARAMETERS - 1 - len(held)
     _check(movement, needed)
@@ -129,6 +145,8 @@ def solve_imu(
         what = "some of F, bias, reference, lever arm and delay"
         refusals.check_conditioning(told, needed, MAX_CONDITION, what, REMEDY)
         fit = most_likely(start, movement, held, attitude_std_rad)
+        if own is not None:
+            movement, fit = _as_expected(fit, movement, held, attitude_std_rad)
         covariance, response = fit.covariance(), fit.response()
         if attitude_std_rad is None:
             _check_attitudes(start, movement, held, fit)
@@ -157,21 +175,22 @@ def solve_imu(
         rank=told.rank,
         condition=told.condition,
         iterations=fit.iterations,
+        walk_m_s2_sqrt_s=0.0 if movement.own is None else movement.own.walk_m_s2_sqrt_s,
         warnings=refusals.inconsistency(white, np.ones_like(white), freedom),
     )
 
 
 def covariance_bound(
-    theta: Array, dwells: Dwells, sweeps: Sweeps, attitude_std_rad: float, *, second_order: bool = False
-) -> Array:
-    """(22, 22) Cramér–Rao bound at the true θ (22,) and δ, for movement and noise as given.
+    theta: Array, movement: Movement, attitude_std_rad: float, *, second_order: bool = False
+) -> tuple[Array, Array]:
+    """(22, 22) Cramér–Rao bound at the true θ (22,) and δ, for movement and noise as given, and (22, 3 K) the response.
 
     The readings themselves do not matter.
     """
-    movement = Movement(dwells, sweeps)
     free = _free(theta, _held(movement, second_order=second_order))
     readings = apart(noise(theta, movement), effects(theta, movement))
-    return Fit(theta, readings, jacobian(theta, movement) @ free, free, attitude_std_rad, 0).covariance()
+    fit = Fit(theta, readings, jacobian(theta, movement) @ free, free, attitude_std_rad, 0)
+    return fit.covariance(), fit.response()
 
 
 def slopes(theta: Array, movement: Movement, *, second_order: bool) -> Array:
@@ -211,6 +230,16 @@ def _least_squares(theta: Array, movement: Movement, held: list[int], white: Arr
         theta[REFERENCE] *= norm / np.linalg.norm(theta[REFERENCE])
         steps, moved = steps + 1, float(np.linalg.norm(step))
     return theta, steps
+
+
+def _as_expected(fit: Fit, movement: Movement, held: list[int], attitude_std_rad: float | None) -> tuple[Movement, Fit]:
+    """With the walk of the bias, and the δ, that are to be expected by what the fit leaves."""
+    left = (movement.readings() - predicted(fit.theta, movement)).ravel()
+    known, of_arm, own = noise(fit.theta, movement), effects(fit.theta, movement), np.diag(movement.noise())
+    scattered = Scattered(left, fit.jacobian, known, of_arm, walking(movement), own)
+    walk, delta = expected_sizes(scattered, attitude_std_rad)
+    movement = movement.walking_by(walk)
+    return movement, replace(most_likely(fit.theta, movement, held, delta), iterations=fit.iterations)
 
 
 def _check_attitudes(start: Array, movement: Movement, held: list[int], fit: Fit) -> None:

@@ -12,6 +12,7 @@ from rig.config.attitude_sets import EIGHTEEN
 from rig.data.settings import Site
 from rig.estimation.arrays import Array
 from rig.estimation.budget import Budget
+from rig.estimation.felt import Movement
 from rig.estimation.imu import solve_imu
 from rig.estimation.magnetometer import field_drift, solve_magnetometer, uniformity
 from support.arm_attitudes import attitudes_of, crooked, crooked_arm, joints_rad
@@ -50,7 +51,7 @@ def accelerometer(seed: int, site: Site = SITE, lag_s: float = LAG_S) -> Session
     sweeps.harmonics_m_s2[:, 1:] *= smaller[:, None, None]
     dwells = recorded_dwells(truth, arm, JOINTS, DENSITY_UG, rng)
     solution = solve_imu(dwells, sweeps, gravity_m_s2=GRAVITY)
-    budget = accelerometer_budget(solution, dwells, sweeps, site, lag_s)
+    budget = accelerometer_budget(solution, Movement(dwells, sweeps), site, lag_s)
     scale = 1 / np.linalg.norm(solution.matrix, axis=1)
     off = np.concatenate([scale - 1 / np.linalg.norm(truth.matrix, axis=1), solution.bias_m_s2 - truth.bias_m_s2])
     return off / budget.std, budget, off / own_spread(budget)
