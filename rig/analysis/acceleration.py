@@ -1,13 +1,14 @@
 """Accelerometers from dwells in known attitudes and from sweeps: TRIAX, section III-B, on an arm."""
 
 from collections.abc import Callable, Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import partial
 from types import MappingProxyType
 
 import numpy as np
 
-from rig.analysis.accelerometer_errors import errors_of
+from rig.analysis.accelerometer_errors import errors_of, pieces_of
+from rig.analysis.arm_patterns import arm_turns
 from rig.analysis.attitudes import check_seen
 from rig.analysis.calibration import SensorResult, or_fault
 from rig.analysis.reference_budgets import accelerometer_budget
@@ -155,14 +156,16 @@ def _calibrated(
         down=-np.array(site.up),
         second_order=settings.second_order,
     )
-    own = None
+    movement = Movement(seen, sweeps, _repeatability_rad(settings))
     if settings.knows_accelerometers:
-        own = errors_of(name, recordings, used, second_order=settings.second_order)
-    movement = Movement(seen, sweeps, _repeatability_rad(settings), own)
+        pieces = pieces_of(name, recordings, used)
+        own = errors_of(sensor, pieces, second_order=settings.second_order)
+        turns = arm_turns([each.stood for each in pieces], recordings[0].motion.kinematics, mounting)
+        movement = replace(movement, own=own, arm_turns=turns)
     weighted = _beside(partial(solve, method="attitude_weighted"))
     if not isinstance(weighted, Fault):
         check_axes(_axes(weighted.matrix), np.eye(3))
-    elif own is None:
+    elif movement.own is None:
         raise weighted  # one attitude is off alone; what it is with a sensor that bends, `solve_imu` says
     solution = solve_imu(
         seen,
@@ -171,7 +174,8 @@ def _calibrated(
         up=site.up,
         second_order=settings.second_order,
         repeatability_rad=movement.repeatability_rad,
-        own=own,
+        own=movement.own,
+        arm_turns=movement.arm_turns,
     )
     check_axes(_axes(solution.matrix), np.eye(3))
     if settings.second_order:

@@ -6,7 +6,9 @@ from itertools import pairwise
 
 import numpy as np
 
+from rig.analysis.arm_patterns import Stood
 from rig.analysis.seen import since_first_s
+from rig.arm.kinematics import WRIST_1
 from rig.config.sensor_catalogue import PARTS
 from rig.data.run_file import RecordedSensor
 from rig.estimation.accelerometer_errors import AccelerometerErrors
@@ -26,22 +28,46 @@ SMALL = 1e-3  # share of the arm in a variance that is not worth its degrees of 
 STANDARD = np.sqrt(3)  # a half-width is so many standard uncertainties
 
 
-def errors_of(
-    name: str, recordings: Sequence[ObservedRun], dwells: Sequence[DwellReading], *, second_order: bool
-) -> AccelerometerErrors:
-    """Of the sensor `name` in `dwells` and in all sweeps; an even part is not among them where it is looked for."""
-    sensor = recordings[0].run.sensors[name]
+@dataclass(frozen=True, slots=True)
+class Piece:
+    """A dwell or a sweep: when, on the clock of the first recording, how warm the sensor was, where the arm stood."""
+
+    window_s: tuple[float, float]
+    temperature_c: float
+    stood: Stood
+
+
+def pieces_of(name: str, recordings: Sequence[ObservedRun], dwells: Sequence[DwellReading]) -> list[Piece]:
+    """Of the sensor `name`: these dwells, then all sweeps."""
+    timed, used = list(zip(recordings, since_first_s(recordings), strict=True)), {dwell.index for dwell in dwells}
+    found = [
+        _piece(each, since_s, (dwell.window.start_s, dwell.window.end_s), dwell.temperature_c)
+        for each, since_s in timed
+        for dwell in each.sensors[name].dwells
+        if dwell.index in used
+    ]
+    return found + [
+        _piece(each, since_s, (turn.average.start_s, turn.average.end_s), turn.average.temperature_c, joint)
+        for each, since_s in timed
+        for turn in each.sensors[name].revolutions
+        for joint in ([] if turn.acceleration is None else [turn.acceleration.joint])
+    ]
+
+
+def errors_of(sensor: RecordedSensor, pieces: Sequence[Piece], *, second_order: bool) -> AccelerometerErrors:
+    """Of a sensor in these pieces; an even part is not among them where it is looked for."""
     even, odd = bending_of(sensor)
     sheet = PARTS[sensor.part].accelerometer
-    when, warm = _when_and_how_warm(name, recordings, dwells)
+    warm_c = np.array([each.temperature_c for each in pieces])
+    standing = [each.temperature_c for each in pieces if each.stood.wrist is None]
     return AccelerometerErrors(
         even_s2_m=0.0 if second_order else even / STANDARD,
         odd_s4_m2=odd / STANDARD,
         norm_m_s2=STANDARD_GRAVITY_M_S2,
         bias_m_s2_k=1e-3 * sheet.bias_mg_k * STANDARD_GRAVITY_M_S2 / STANDARD,
         scale_per_k=sheet.scale_per_k / STANDARD,
-        warmer_k=warm - float(np.mean(warm[: len(dwells)])),
-        windows_s=when,
+        warmer_k=warm_c - float(np.mean(standing)),
+        windows_s=np.array([each.window_s for each in pieces]),
     )
 
 
@@ -114,18 +140,14 @@ def _known(spread: Spread, solution: ImuSolution, movement: Movement) -> _Known:
     return _Known(solution.attitude_error, whole, whole - response @ noise(theta, movement) @ response.T, response)
 
 
-def _when_and_how_warm(
-    name: str, recordings: Sequence[ObservedRun], dwells: Sequence[DwellReading]
-) -> tuple[Array, Array]:
-    """(K', 2) beginnings and ends on the clock of the first recording, (K',) °C: of the dwells, then of all sweeps."""
-    timed = list(zip(recordings, since_first_s(recordings), strict=True))
-    since = {dwell.index: since_s for each, since_s in timed for dwell in each.sensors[name].dwells}
-    seen = [(each.window.start_s, each.window.end_s, since[each.index], each.temperature_c) for each in dwells]
-    seen += [
-        (turn.average.start_s, turn.average.end_s, since_s, turn.average.temperature_c)
-        for each, since_s in timed
-        for turn in each.sensors[name].revolutions
-        if turn.acceleration is not None
-    ]
-    start, end, since_s, warm = np.array(seen).T
-    return np.column_stack([start + since_s, end + since_s]), warm
+def _piece(
+    recording: ObservedRun,
+    since_s: float,
+    window_s: tuple[float, float],
+    temperature_c: float,
+    joint: int | None = None,
+) -> Piece:
+    start_s, end_s = window_s
+    stands_s = (start_s + end_s) / 2 if joint is None else start_s
+    stood = Stood(recording.motion.angles(stands_s), None if joint is None else joint - WRIST_1)
+    return Piece((start_s + since_s, end_s + since_s), temperature_c, stood)

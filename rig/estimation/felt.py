@@ -32,6 +32,7 @@ PARAMETERS = 22
 OWN_ERRORS = 3  # of a dwell: a small turn of the flange
 SHARED_ERRORS = 10  # of a station: a small turn in the flange's frame, one in the base's, four waves of the angle
 TURNS = 6  # of these ten, both turns
+OWN_SHARE, ARM_SHARE = 0.2**0.5, 0.8**0.5  # of δ, in what is off anew each time, and in what each wrist always errs by
 SHARE = 0.5**0.5  # of δ, in each: so both turns together are off as far as a dwell is, and so are all waves together
 
 
@@ -64,6 +65,10 @@ class Sweeps:
     arms_m: Array
     stations: NDArray[np.intp]
 
+    def alone(self) -> "Sweeps":
+        """The same, each at a station of its own."""
+        return replace(self, stations=np.arange(len(self.stations)))
+
 
 NO_DWELLS = Dwells(np.zeros((0, 3)), np.zeros((0, 3)), np.zeros((0, 3, 3)))
 NO_SWEEPS = Sweeps(
@@ -84,21 +89,25 @@ class Movement:
     `repeatability_rad`: the standard deviation of the small turns by which each sweep is off for itself, about each
     axis, where those of one station share all else: a joint that is come to from the other side stands elsewhere.
     `own`: what the sensor itself adds; None of recordings of before, and of sensors of which nothing is known.
+    `arm_turns` (P, 3 N + 10 M): what P errors of the arm's do to each dwell and sweep, by δ, as `effects` counts their
+    turns; None where nothing is known of the arm but that it errs.
     """
 
     dwells: Dwells
     sweeps: Sweeps
     repeatability_rad: float = 0.0
     own: AccelerometerErrors | None = None
+    arm_turns: Array | None = None
 
     def without(self, dwell: int) -> "Movement":
         """All but one dwell."""
         left = np.arange(len(self.dwells.readings_m_s2)) != dwell
-        kept = self.dwells
+        kept, places = self.dwells, np.arange(OWN_ERRORS * dwell, OWN_ERRORS * (dwell + 1))
         return replace(
             self,
             dwells=Dwells(kept.readings_m_s2[left], kept.variances_m2_s4[left], kept.attitudes[left]),
             own=None if self.own is None else self.own.without(dwell),
+            arm_turns=None if self.arm_turns is None else np.delete(self.arm_turns, places, axis=1),
         )
 
     def walking_by(self, rate_m_s2_sqrt_s: float) -> "Movement":
@@ -193,8 +202,18 @@ def effects(theta: Array, movement: Movement) -> Array:
     """(3 K, P) change of the readings by each of the arm's errors, per radian; P = 3 N + 10 for each station.
 
     A dwell has three of its own. All points of a station's sweeps share ten: small turns of the flange and of the base,
-    and waves of the joint's angle, A cos θ + B sin θ + C cos 2θ + D sin 2θ, of which the first harmonic is kept.
+    and waves of the joint's angle, A cos θ + B sin θ + C cos 2θ + D sin 2θ, of which the first harmonic is kept. Where
+    the wrists' errors are known by kind they follow, shared by all.
     """
+    own = turned(theta, movement)
+    if movement.arm_turns is None:
+        return own
+    by_turns = turned(theta, replace(movement, sweeps=movement.sweeps.alone()))
+    return np.concatenate([OWN_SHARE * own, by_turns @ movement.arm_turns.T], axis=1)
+
+
+def turned(theta: Array, movement: Movement) -> Array:
+    """The same of dwells and stations each for itself."""
     count, sweeps = len(movement.dwells.readings_m_s2), movement.sweeps
     gravity, s = of_gravity(theta[DELAY], movement), felt(theta, movement)
     stations, places = np.unique(sweeps.stations, return_inverse=True)

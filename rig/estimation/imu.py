@@ -29,6 +29,7 @@ from rig.estimation.felt import (
     effects,
     jacobian,
     predicted,
+    turned,
 )
 from rig.estimation.linear_start import MAX_CONDITION, REMEDY, linear_start
 from rig.estimation.reading_errors import noise, walking
@@ -124,17 +125,19 @@ def solve_imu(
     attitude_std_rad: float | None = None,
     repeatability_rad: float = 0.0,
     own: AccelerometerErrors | None = None,
+    arm_turns: Array | None = None,
 ) -> ImuSolution:
     """Calibrate from dwells, sweeps or both.
 
     `gravity_m_s2` is the size of v_ref, `up` (3,) says to which side of the base it points, roughly;
-    `attitude_std_rad` holds δ, 0 for an exact arm, instead of finding it. `repeatability_rad`, `own`: see `Movement`.
+    `attitude_std_rad` holds δ, 0 for an exact arm, instead of finding it. `repeatability_rad`, `own`,
+    `arm_turns`: see `Movement`.
 
     Raises Fault `too_few_observations`, `not_finite`, `bad_variance`, `bad_speed`, `zero_reading`,
     `duplicated_observation`, `bad_attitude`, `rank_deficient`, `ill_conditioned`, `sign_unknown`, `wrong_unit`,
     `mirrored_axis`, `attitude_untrustworthy`; ValueError for a wrong shape, or axes that are no unit vectors.
     """
-    movement = Movement(dwells, sweeps, repeatability_rad, own)
+    movement = Movement(dwells, sweeps, repeatability_rad, own, arm_turns)
     held = _held(movement, second_order=second_order)
     needed = PARAMETERS - 1 - len(held)
     _check(movement, needed)
@@ -261,13 +264,13 @@ def _furthest_off(start: Array, movement: Movement, held: list[int], fit: Fit) -
     """The dwell that fits worst, by how much the others say it is off, rad, and their own δ."""
     count = len(movement.dwells.readings_m_s2)
     residuals = (movement.readings() - predicted(fit.theta, movement))[:count]
-    turned = effects(fit.theta, movement)[: 3 * count].reshape(count, 3, -1)
-    spread = movement.dwells.variances_m2_s4[..., None] * np.eye(3) + fit.std_rad**2 * turned @ turned.swapaxes(1, 2)
+    off_by = effects(fit.theta, movement)[: 3 * count].reshape(count, 3, -1)
+    spread = movement.dwells.variances_m2_s4[..., None] * np.eye(3) + fit.std_rad**2 * off_by @ off_by.swapaxes(1, 2)
     misfit = np.sum(residuals * np.linalg.solve(spread, residuals[..., None])[..., 0], axis=1)
     worst = int(np.argmax(misfit))
     rest = most_likely(start, movement.without(worst), held, None)
     missed = (movement.readings() - predicted(rest.theta, movement))[worst]
-    own = effects(rest.theta, movement)[3 * worst : 3 * worst + 3, 3 * worst : 3 * worst + 3]
+    own = turned(rest.theta, movement)[3 * worst : 3 * worst + 3, 3 * worst : 3 * worst + 3]
     off = np.linalg.lstsq(own, missed, rcond=1e-6)[0]  # about the reference itself nothing can be told
     return worst, float(np.linalg.norm(off)), rest.std_rad
 

@@ -11,7 +11,7 @@ import numpy as np
 
 from rig.estimation.arrays import Array
 from rig.estimation.bias_process import walk_covariance
-from rig.estimation.felt import OWN_ERRORS, SHARE, SHARED_ERRORS, TURNS, Movement, effects, felt
+from rig.estimation.felt import OWN_ERRORS, SHARE, SHARED_ERRORS, TURNS, Movement, felt, turned
 from rig.estimation.reference_model import matrix
 
 ANGLES = 72  # of a turn, over which what is not linear in the acceleration is averaged
@@ -86,7 +86,6 @@ def _not_repeated(theta: Array, movement: Movement) -> Array:
     sweeps = movement.sweeps
     if movement.repeatability_rad == 0.0:
         return np.zeros((movement.readings().size,) * 2)
-    alone = replace(sweeps, stations=np.arange(len(sweeps.stations)))
-    own = effects(theta, replace(movement, sweeps=alone))[:, OWN_ERRORS * len(movement.dwells.readings_m_s2) :]
+    own = turned(theta, replace(movement, sweeps=sweeps.alone()))[:, OWN_ERRORS * len(movement.dwells.readings_m_s2) :]
     turns = own[:, np.arange(own.shape[1]) % SHARED_ERRORS < TURNS] * (movement.repeatability_rad / SHARE)
     return np.asarray(turns @ turns.T, dtype=np.float64)
