@@ -89,14 +89,14 @@ def of_its_own(
     """The `spread` of a sensor of which all of this were known, and what each adds because it is not.
 
     One after the other in the readings' covariance. A bent sensor's noise counts for more, because the readings must
-    tell the bending as well: that is in the line of the bending. `movement` is without the walk that was found.
+    tell the bending as well: that is in the line of the bending.
     """
-    walked = movement.walking_by(solution.walk_m_s2_sqrt_s).own
-    assert walked is not None, "or there is nothing"
-    straight = walked.straight()
+    found = solution.own
+    assert found is not None, "or there is nothing"
+    straight = found.straight()
     steps = [
         _known(spread, solution, replace(movement, own=own))
-        for own in (straight.as_warm().standing(), straight.as_warm(), straight, walked)
+        for own in (straight.as_warm().standing(), straight.as_warm(), straight, found)
     ]
     sheet = PARTS[part].accelerometer
     by_sheet = f"{sheet.bias_mg_k:g} mg/K", f"{100 * sheet.nonlinearity:g} %"
@@ -105,11 +105,11 @@ def of_its_own(
         WITHIN_RUN: f"recorded temperature, {by_sheet[0]} by the data sheet at most",
         NONLINEARITY: f"what attitudes tell of it, {by_sheet[1]} by the data sheet at most",
     }
-    found = [
+    lines = [
         Contributor(name, "A", "normal", None, "", source, after.freedom_since(before), after.beyond(before))
         for (name, source), (before, after) in zip(sources.items(), pairwise(steps), strict=True)
     ]
-    return replace(spread, covariance=steps[0].covariance, response=steps[0].response), found
+    return replace(spread, covariance=steps[0].covariance, response=steps[0].response), lines
 
 
 @dataclass(frozen=True, slots=True)

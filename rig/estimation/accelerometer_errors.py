@@ -22,7 +22,10 @@ class AccelerometerErrors:
 
     - `even_s2_m` φ, zero where it is looked for; `odd_s4_m2` χ; `norm_m_s2` g.
     - `bias_m_s2_k` β, `scale_per_k` κ, and `warmer_k` (K',): ΔT.
-    - `windows_s` (K', 2): when each began and ended; `walk_m_s2_sqrt_s`: what w adds in a second, as the readings say.
+    - `windows_s` (K', 2): when each began and ended.
+
+    Beside these, as the readings themselves say: `walk_m_s2_sqrt_s`, what w adds in a second; `louder` (K',), the
+    variance of a dwell or sweep that was disturbed for itself, in that of its noise.
     """
 
     even_s2_m: float
@@ -33,11 +36,12 @@ class AccelerometerErrors:
     warmer_k: Array
     windows_s: Array
     walk_m_s2_sqrt_s: float = 0.0
+    louder: Array | None = None
 
     def without(self, piece: int) -> "AccelerometerErrors":
         """All but one dwell or sweep."""
         left = np.arange(len(self.warmer_k)) != piece
-        return replace(self, warmer_k=self.warmer_k[left], windows_s=self.windows_s[left])
+        return replace(self, warmer_k=self.warmer_k[left], windows_s=self.windows_s[left], louder=None)
 
     def straight(self) -> "AccelerometerErrors":
         """The same of a sensor that does not bend."""
@@ -48,5 +52,5 @@ class AccelerometerErrors:
         return replace(self, bias_m_s2_k=0.0, scale_per_k=0.0)
 
     def standing(self) -> "AccelerometerErrors":
-        """The same of a sensor whose bias does not walk."""
-        return replace(self, walk_m_s2_sqrt_s=0.0)
+        """The same of a sensor whose bias does not walk, and that nothing disturbs."""
+        return replace(self, walk_m_s2_sqrt_s=0.0, louder=None)

@@ -1,9 +1,11 @@
-"""How far an arm is off and how far a bias walks, of readings that other unknown errors share: expected, not likeliest.
+"""What only the readings tell the size of, beside errors that they share: expected, not likeliest.
 
-As `rig.estimation.bias_process` and `rig.estimation.shared_errors`, together. Few readings tell either; the likeliest
-would by chance be none at all in one run and too large in the next, and so would be every uncertainty.
+How far an arm is off, how far a bias walks, and what disturbed one dwell alone: as `rig.estimation.bias_process` and
+`rig.estimation.shared_errors`, together. Few readings tell any; the likeliest would by chance be none at all in one run
+and too large in the next, and so would be every uncertainty.
 """
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -14,6 +16,8 @@ from rig.estimation.shared_errors import apart
 WALKS = 12  # on their grid
 SPAN = 100.0  # largest walk over the smallest
 SMALLEST_RAD, LARGEST_RAD, SIZES = 1e-5, 0.03, 25  # of δ: no arm is better than the first
+
+LOUDEST, VOLUMES = 30.0, 8  # of a disturbance, in standard deviations of the noise
 
 
 @dataclass(frozen=True, slots=True)
@@ -47,6 +51,33 @@ def expected_sizes(seen: Scattered, std_rad: float | None) -> tuple[float, float
     weights = np.exp(belief - belief.max())
     weights /= weights.sum()
     return float(np.sqrt(weights.sum(axis=1) @ walks**2)), float(np.sqrt(weights.sum(axis=0) @ sizes**2))
+
+
+def expected_disturbances(seen: Scattered, walk: float, std_rad: float, pieces: Sequence[slice]) -> Array:
+    """(k,) variance that a disturbance added to each of the `pieces`, in that of its noise.
+
+    Before, one of them was as likely to be disturbed as none, by any order of magnitude.
+    """
+    white = np.linalg.inv(
+        np.linalg.cholesky(seen.known + walk**2 * seen.walk + std_rad**2 * seen.effects @ seen.effects.T)
+    )
+    basis = np.linalg.qr(white @ seen.slopes)[0]
+    left = white @ seen.left
+    left = left - basis @ (basis.T @ left)
+    volumes = np.geomspace(1.0, LOUDEST, VOLUMES) ** 2
+    belief = np.zeros((len(pieces), VOLUMES))
+    for place, piece in enumerate(pieces):
+        columns = white[:, piece] * np.sqrt(seen.noise[piece])
+        told = columns - basis @ (basis.T @ columns)
+        sizes, directions = np.linalg.eigh(told.T @ told)
+        seen_so = np.square(directions.T @ (told.T @ left))
+        grown = 1 + volumes[:, None] * sizes.clip(min=0.0)
+        belief[place] = 0.5 * np.sum(volumes[:, None] * seen_so / grown - np.log(grown), axis=1)
+    belief -= np.log(belief.size)
+    most = max(float(belief.max()), 0.0)
+    weights = np.exp(belief - most)
+    expected: Array = weights @ volumes / (weights.sum() + np.exp(-most))
+    return expected
 
 
 def _likelihood(seen: Scattered, noise: Array, sizes: Array) -> Array:

@@ -19,6 +19,7 @@ Dwells and sweeps are one list of K = N + 3 M vectors: the N dwells, then mean, 
 """
 
 from dataclasses import dataclass, replace
+from itertools import pairwise
 
 import numpy as np
 from numpy.typing import NDArray
@@ -110,11 +111,6 @@ class Movement:
             arm_turns=None if self.arm_turns is None else np.delete(self.arm_turns, places, axis=1),
         )
 
-    def walking_by(self, rate_m_s2_sqrt_s: float) -> "Movement":
-        """The same of a sensor whose bias walks by so much in a second."""
-        assert self.own is not None, "or nothing walks"
-        return replace(self, own=replace(self.own, walk_m_s2_sqrt_s=rate_m_s2_sqrt_s))
-
     def readings(self) -> Array:
         """(K, 3) m/s²."""
         return np.concatenate([self.dwells.readings_m_s2, self.sweeps.harmonics_m_s2.reshape(-1, 3)])
@@ -128,6 +124,12 @@ class Movement:
             place = slice(own + 9 * sweep, own + 9 * sweep + 9)
             whole[place, place] = covariance
         return whole
+
+    def pieces(self) -> list[slice]:
+        """Where the readings of each dwell stand among all 3 K, then those of each sweep."""
+        still, swept = len(self.dwells.readings_m_s2), len(self.sweeps.speeds_rad_s)
+        first = [3 * dwell for dwell in range(still)] + [3 * still + 9 * sweep for sweep in range(swept + 1)]
+        return [slice(*ends) for ends in pairwise(first)]
 
     def constant(self) -> Array:
         """(K,) 1 where the bias is read, 0 in a cosine and a sine."""

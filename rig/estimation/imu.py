@@ -15,7 +15,7 @@ from rig.estimation import refusals
 from rig.estimation.accelerometer_errors import AccelerometerErrors
 from rig.estimation.arrays import Array
 from rig.estimation.attitude_error import PASSES, SETTLED, AttitudeError
-from rig.estimation.expected_sizes import Scattered, expected_sizes
+from rig.estimation.expected_sizes import Scattered, expected_disturbances, expected_sizes
 from rig.estimation.felt import (
     DELAY,
     LEVER,
@@ -53,7 +53,7 @@ class ImuSolution:
     - `dwell_residuals_m_s2` (N, 3), `sweep_residuals_m_s2` (M, 3, 3): reading less model; `chi_square` of them, which
       left `freedom`.
     - `rank`, `condition`: of the readings' derivatives, each column in its own size.
-    - `walk_m_s2_sqrt_s`: by how much the bias walked in a second, where it may.
+    - `own`: what the sensor adds, with what the readings say of it; None where nothing is known.
     """
 
     matrix: Array
@@ -73,7 +73,7 @@ class ImuSolution:
     condition: float
     iterations: int
     warnings: tuple[str, ...]
-    walk_m_s2_sqrt_s: float = 0.0
+    own: AccelerometerErrors | None = None
 
     @property
     def theta(self) -> Array:
@@ -178,7 +178,7 @@ def solve_imu(
         rank=told.rank,
         condition=told.condition,
         iterations=fit.iterations,
-        walk_m_s2_sqrt_s=0.0 if movement.own is None else movement.own.walk_m_s2_sqrt_s,
+        own=movement.own,
         warnings=refusals.inconsistency(white, np.ones_like(white), freedom),
     )
 
@@ -236,12 +236,14 @@ def _least_squares(theta: Array, movement: Movement, held: list[int], white: Arr
 
 
 def _as_expected(fit: Fit, movement: Movement, held: list[int], attitude_std_rad: float | None) -> tuple[Movement, Fit]:
-    """With the walk of the bias, and the δ, that are to be expected by what the fit leaves."""
+    """With the walk of the bias, the δ and the disturbances that are to be expected by what the fit leaves."""
+    assert movement.own is not None, "or nothing is expected"
     left = (movement.readings() - predicted(fit.theta, movement)).ravel()
     known, of_arm, own = noise(fit.theta, movement), effects(fit.theta, movement), np.diag(movement.noise())
     scattered = Scattered(left, fit.jacobian, known, of_arm, walking(movement), own)
     walk, delta = expected_sizes(scattered, attitude_std_rad)
-    movement = movement.walking_by(walk)
+    louder = expected_disturbances(scattered, walk, delta, movement.pieces())
+    movement = replace(movement, own=replace(movement.own, walk_m_s2_sqrt_s=walk, louder=louder))
     return movement, replace(most_likely(fit.theta, movement, held, delta), iterations=fit.iterations)
 
 

@@ -24,6 +24,8 @@ def noise(theta: Array, movement: Movement) -> Array:
         whole += patterns.T @ patterns
     if movement.own is not None and movement.own.walk_m_s2_sqrt_s:
         whole += movement.own.walk_m_s2_sqrt_s**2 * walking(movement)
+    if movement.own is not None and movement.own.louder is not None:
+        whole += np.diag(np.repeat(of_pieces(movement.own.louder, movement), 3) * np.diag(movement.noise()))
     return np.asarray(whole, dtype=np.float64)
 
 
