@@ -65,7 +65,7 @@ def errors_of(sensor: RecordedSensor, pieces: Sequence[Piece], *, second_order: 
         odd_s4_m2=odd / STANDARD,
         norm_m_s2=STANDARD_GRAVITY_M_S2,
         bias_m_s2_k=1e-3 * sheet.bias_mg_k * STANDARD_GRAVITY_M_S2 / STANDARD,
-        scale_per_k=sheet.scale_per_k / STANDARD,
+        scale_per_k=1e-6 * sheet.scale_ppm_k / STANDARD,
         warmer_k=warm_c - float(np.mean(standing)),
         windows_s=np.array([each.window_s for each in pieces]),
     )
@@ -80,7 +80,7 @@ def bending_of(sensor: RecordedSensor) -> tuple[float, float]:
     assert whole_m_s2 is not None, "or it has no accelerometer"
     if sheet.nonlinear_over_g is not None:
         whole_m_s2 = sheet.nonlinear_over_g * STANDARD_GRAVITY_M_S2
-    return 2 * sheet.nonlinearity / whole_m_s2, 4 * sheet.nonlinearity / whole_m_s2**2
+    return 0.02 * sheet.nonlinearity_percent / whole_m_s2, 0.04 * sheet.nonlinearity_percent / whole_m_s2**2
 
 
 def of_its_own(
@@ -99,7 +99,7 @@ def of_its_own(
         for own in (straight.as_warm().standing(), straight.as_warm(), straight, found)
     ]
     sheet = PARTS[part].accelerometer
-    by_sheet = f"{sheet.bias_mg_k:g} mg/K", f"{100 * sheet.nonlinearity:g} %"
+    by_sheet = f"{sheet.bias_mg_k:g} mg/K", f"{sheet.nonlinearity_percent:g} %"
     sources = {
         INSTABILITY: "how the readings scatter",
         WITHIN_RUN: f"recorded temperature, {by_sheet[0]} by the data sheet at most",

@@ -16,11 +16,11 @@ from rig.analysis.pieces import REST, Pieces, Stretch
 from rig.analysis.seen import WAVE_SHARE, unknown_of
 from rig.analysis.surroundings import Surroundings
 from rig.arm.kinematics import AXIS_ERRORS, WAVES, WRIST_1, WRIST_2, WRIST_3, axis_errors, flange_axes
-from rig.config.sensor_catalogue import PARTS
 from rig.estimation.arrays import Array
 from rig.estimation.earth import EARTH_RATE_RAD_S
 from rig.estimation.earth_rate import EarthRate
 from rig.estimation.nonlinearity import FREE_PER_RAD_S, curvature
+from rig.estimation.own_errors import KnownSensor, own_errors
 
 ANGLES = (*AXIS_ERRORS, *(f"{wave} of wrist_1" for wave in WAVES))  # those of wrist 1 turn no axis, but its own speed
 WAVES_OF = {WRIST_1: ANGLES.index("cos of wrist_1"), WRIST_2: ANGLES.index("cos of wrist_2"),
@@ -36,7 +36,8 @@ class Allowed:
 
     `angles_rad` (17,) of each of `ANGLES`; `repeatability_rad` of a joint that was moved away and back; `jitter_s` of
     the times of the arm's states; `earth_rad_s` (3, k) of the Earth's rate in the base's frame, for each way in which
-    it is not known; `odd_per_rad_s`, `even_per_rad_s` of the sensor's nonlinearity.
+    it is not known; `odd_per_rad_s`, `even_per_rad_s` of the sensor's nonlinearity, `sensor` how warm it was at times
+    `at_s` and what that may do.
     """
 
     angles_rad: Array
@@ -45,25 +46,29 @@ class Allowed:
     earth_rad_s: Array
     odd_per_rad_s: float
     even_per_rad_s: float
+    sensor: KnownSensor | None
+    at_s: Array
 
 
 def allowed(surroundings: Surroundings, name: str, result: SensorResult) -> Allowed:
     """By what the configuration states and the recording tells.
 
-    A solve that finds the curve, from several speeds, takes nothing of it as known. One of a single speed has no even
-    part, and what there is of it puts the bias off: sweeps and rests are not excused by it.
+    A solve that finds the curve, from several speeds, takes nothing of it as known. One of a single speed states one
+    scale factor for either way, which an even part makes two: it excuses nothing.
     """
-    uncertainty, sensor = surroundings.uncertainty, result.sensor
+    uncertainty, sensor, explained = surroundings.uncertainty, result.sensor, result.explained
     steady = np.array([each.startswith(("twist", "zero")) for each in ANGLES])
-    finds_curve = result.explained is not None and result.explained.nonlinearity is not None
-    of_part = float(PARTS[sensor.part].nonlinearity / sensor.range_rad_s / np.sqrt(3))
+    finds_curve = explained is not None and explained.nonlinearity is not None
+    share = uncertainty.of("nonlinearity_percent", name, sensor.part) / 100
     return Allowed(
         angles_rad=np.radians(uncertainty.axis_deg) / np.sqrt(3) * np.where(steady, 1.0, WAVE_SHARE),
         repeatability_rad=float(np.radians(uncertainty.repeatability_deg) / np.sqrt(3)),
         jitter_s=surroundings.state_jitter_s,
         earth_rad_s=_earth(surroundings, name, sensor.part, found_earth_rate(result.earth)),
-        odd_per_rad_s=FREE_PER_RAD_S if finds_curve else of_part,
+        odd_per_rad_s=FREE_PER_RAD_S if finds_curve else share / sensor.range_rad_s / float(np.sqrt(3)),
         even_per_rad_s=FREE_PER_RAD_S if finds_curve else 0.0,
+        sensor=None if explained is None else explained.seen.sensor,
+        at_s=np.zeros(0) if explained is None else explained.seen.windows_s.mean(axis=1),
     )
 
 
@@ -96,7 +101,8 @@ def patterns(pieces: Pieces, matrix: Array, known: Allowed) -> Array:
         ]
     )
     sizes = np.repeat([known.odd_per_rad_s, known.even_per_rad_s], 3)[:, None, None] / FREE_PER_RAD_S
-    found = np.concatenate([of_the_arm @ matrix.T, sizes * _curved(pieces.stretches, matrix)])
+    of_the_sensor = [sizes * _curved(pieces.stretches, matrix), *_of_temperature(pieces, matrix, known)]
+    found = np.concatenate([of_the_arm @ matrix.T, *of_the_sensor])
     return np.asarray(found[found.any(axis=(1, 2))], dtype=np.float64)
 
 
@@ -186,3 +192,13 @@ def _curved(stretches: Sequence[Stretch], matrix: Array) -> Array:
         edges = np.linspace(stretch.start_s, stretch.end_s, STEPS + 1)
         found.append(curvature(matrix, stretch.motion.rate((edges[1:] + edges[:-1]) / 2)).mean(axis=1))
     return np.stack(found, axis=1)
+
+
+def _of_temperature(pieces: Pieces, matrix: Array, known: Allowed) -> list[Array]:
+    """Of one standard deviation of what warming does to bias and scale."""
+    if known.sensor is None:
+        return []
+    inside, order = pieces.times_s.mean(axis=1), np.argsort(known.at_s)
+    warm = replace(known.sensor, temperature_c=np.interp(inside, known.at_s[order], known.sensor.temperature_c[order]))
+    turns = np.where((pieces.sweep == REST)[:, None], 0.0, pieces.rates_rad_s)
+    return [each.patterns / np.sqrt(3) for each in own_errors(warm, matrix, turns, pieces.times_s, ())]

@@ -9,6 +9,7 @@ from rig.analysis.acceleration import AccelerometerResult
 from rig.analysis.allowance import allow, allowed
 from rig.analysis.calibration import SensorResult, observe_recordings, solve_observed
 from rig.analysis.consistency import consistency
+from rig.analysis.leaning import leaning_deg
 from rig.analysis.magnetic_field import MagnetometerResult
 from rig.analysis.pieces import cut
 from rig.analysis.readings import judge_readings
@@ -22,7 +23,8 @@ from rig.errors import Fault, RigError
 from rig.observation.observed_run import ObservedRun
 
 FALSE_ALARMS = 0.001  # how often one of these checks, of any sensor, fails an undamaged run, at most
-SHARES = 13  # of each kind of readings of a sensor, its statistics; one more where the ways between sweeps are held
+SHARES = 13  # of each kind of readings of a sensor, its statistics
+OF_THE_MODEL = 2  # more where they are held to the model: the ways between sweeps, the angles between axes
 DISTURBED = "disturbed_sweep"
 
 
@@ -65,6 +67,9 @@ def contradictions(
         sweeps = {f"{DISTURBED}.{sweep}": each for sweep, each in sorted(named.items())} or {DISTURBED: found.sweep}
         of_readings = judge_readings(counts, pieces.windows, rate, as_before=not settings.holds_all_kinds)
         checks += _checks(f"{name}.", {**sweeps, **found.statistics, **of_readings})
+        if surroundings is not None and settings.checked_by_model:
+            stated_deg = surroundings.uncertainty.of("non_orthogonality_deg", name, results[name].sensor.part)
+            checks.append(Check(f"{name}.non_orthogonality", *leaning_deg(explained.solution, stated_deg, rate), "°"))
         disturbed |= named.keys()
     return Contradictions(tuple(checks), frozenset(disturbed))
 
@@ -105,7 +110,7 @@ def _rate(run: RunData, sensors: Sequence[str]) -> float:
     if run.settings.holds_all_kinds:
         accelerometers = [name for name in run.settings.to_calibrate if run.sensors[name].has_acceleration]
         kinds += len(accelerometers) + len(run.magnetometers)
-    return FALSE_ALARMS / ((SHARES + run.settings.checked_by_model) * kinds)
+    return FALSE_ALARMS / ((SHARES + OF_THE_MODEL * run.settings.checked_by_model) * kinds)
 
 
 def _checks(of: str, statistics: Mapping[str, Statistic]) -> list[Check]:

@@ -9,16 +9,19 @@ import numpy as np
 from rig.analysis.clock import PPM
 from rig.analysis.surroundings import Surroundings
 from rig.arm.kinematics import AXIS_ERRORS
-from rig.config.sensor_catalogue import PARTS
+from rig.data.run_file import RecordedSensor
 from rig.data.settings import RunSettings, Uncertainty
 from rig.estimation.arrays import Array
 from rig.estimation.budget import Unknown, uncounted
 from rig.estimation.earth_rate import EarthRate, Known
 from rig.estimation.explained import Seen
+from rig.estimation.own_errors import KnownSensor
 from rig.observation.average import Average
 from rig.observation.observe import Observation
 from rig.observation.observed_run import ObservedRun
 
+ZEROS = tuple(place for place, name in enumerate(AXIS_ERRORS) if name.startswith("zero"))
+SAME_AXIS = 1 - 1e-6  # of the scalar product: the joints beside it stand where they were to 1.4 mrad
 WAVE_SHARE = 0.3  # of the error of a joint's zero, what its encoder errs once or twice a turn; assumed
 
 
@@ -27,7 +30,7 @@ def see(recordings: Sequence[ObservedRun], sensor: str, surroundings: Surroundin
 
     Speeds by a controller's clock that runs too fast are too small by that.
     """
-    site = surroundings.site
+    site, run = surroundings.site, recordings[0].run
     parts = [
         (each.sensors[sensor], since_s) for each, since_s in zip(recordings, since_first_s(recordings), strict=True)
     ]
@@ -37,7 +40,7 @@ def see(recordings: Sequence[ObservedRun], sensor: str, surroundings: Surroundin
     averages = [average for average, _ in placed]
     attitudes = np.array([average.attitude for average in averages], dtype=np.float64)
     turned = np.array([turn.speed_rad_s * turn.axis_flange for turn, _ in turns])
-    arms_m = arms_of([turn for turn, _ in turns], recordings[0].run.settings)
+    arms_m = arms_of([turn for turn, _ in turns], run.settings)
     earth = np.zeros(3) if site.earth_rate_rad_s is None else np.array(site.earth_rate_rad_s)
     return Seen(
         means_rad_s=np.array([average.mean_rad_s for average in averages]),
@@ -50,8 +53,28 @@ def see(recordings: Sequence[ObservedRun], sensor: str, surroundings: Surroundin
         windows_s=np.array([(average.start_s + since_s, average.end_s + since_s) for average, since_s in placed]),
         joints=(*(turn.joint_name for turn, _ in turns), *[None] * len(rests)),
         axis_errors_rad_s=_axis_errors([turn for turn, _ in turns], len(rests), surroundings.uncertainty.axis_deg),
+        return_errors_rad_s=_return_errors([turn for turn, _ in turns], len(rests), surroundings.uncertainty)
+        if run.settings.knows_returns
+        else None,
         arms_m=np.concatenate([arms_m, np.zeros((len(rests), 3))]),
         noise_freedom=_noise_freedom(averages) if surroundings.counts_freedom else np.inf,
+        sensor=_known_sensor(surroundings, sensor, run.sensors[sensor], averages)
+        if run.settings.knows_sensor
+        else None,
+    )
+
+
+def _known_sensor(
+    surroundings: Surroundings, name: str, sensor: RecordedSensor, averages: Sequence[Average]
+) -> KnownSensor:
+    known = surroundings.uncertainty
+    return KnownSensor(
+        nonlinearity=known.of("nonlinearity_percent", name, sensor.part) / 100,
+        full_scale_rad_s=sensor.range_rad_s,
+        bias_rad_s_per_k=float(np.radians(known.of("bias_deg_s_k", name, sensor.part))),
+        scale_per_k=PPM * known.of("scale_ppm_k", name, sensor.part),
+        temperature_c=np.array([average.temperature_c for average in averages]),
+        temperature_step_k=abs(sensor.temperature_c_per_count),
     )
 
 
@@ -72,6 +95,27 @@ def _axis_errors(turns: Sequence[Observation], rests: int, axis_deg: float) -> A
     std = np.radians(axis_deg) / np.sqrt(3) * np.where(steady, 1.0, WAVE_SHARE)
     off = [std[:, None] * turn.speed_rad_s * turn.axis_errors for turn in turns if turn.axis_errors is not None]
     return np.concatenate([np.swapaxes(off, 0, 1), np.zeros((len(std), rests, 3))], axis=1)
+
+
+def _return_errors(turns: Sequence[Observation], rests: int, known: Uncertainty) -> Array:
+    """(P, N, 3) as in `Seen`: joints that turn the axis of a sweep come back to it a little elsewhere every time."""
+    errors = np.array([turn.speed_rad_s * turn.axis_errors for turn in turns if turn.axis_errors is not None])
+    leaning = np.radians(known.repeatability_deg) / np.sqrt(3) * np.swapaxes(errors[:, ZEROS], 0, 1)
+    visits = np.array([np.isin(np.arange(len(turns)), visit) for visit in _visits(turns)])
+    off = (visits[:, None, :, None] * leaning).reshape(-1, len(turns), 3)
+    off = off[off.any(axis=(1, 2))]
+    return np.concatenate([off, np.zeros((len(off), rests, 3))], axis=1)
+
+
+def _visits(turns: Sequence[Observation]) -> list[list[int]]:
+    """The places of sweeps that follow each other about one axis."""
+    found: list[list[int]] = [[0]]
+    for place, (last, turn) in enumerate(pairwise(turns), start=1):
+        if turn.joint_name == last.joint_name and abs(turn.axis_flange @ last.axis_flange) > SAME_AXIS:
+            found[-1].append(place)
+        else:
+            found.append([place])
+    return found
 
 
 def since_first_s(recordings: Sequence[ObservedRun]) -> list[float]:
@@ -99,15 +143,10 @@ def known_of(surroundings: Surroundings, name: str, part: str) -> Known:
     return Known(
         up=np.array(site.up),
         latitude_rad=site.latitude_rad,
-        g_sensitivity=g_sensitivity_deg_s_g(uncertainty, name, part) > 0,
+        g_sensitivity=uncertainty.of("g_sensitivity_deg_s_g", name, part) > 0,
         repeatability_rad=float(np.radians(uncertainty.repeatability_deg) / np.sqrt(3)),
         state_jitter_s=surroundings.state_jitter_s,
     )
-
-
-def g_sensitivity_deg_s_g(known: Uncertainty, name: str, part: str) -> float:
-    """Half-width; that of the part where nothing else is said of the sensor."""
-    return known.g_sensitivity_deg_s_g.get(name, PARTS[part].g_sensitivity_deg_s_g)
 
 
 def unknown_of(surroundings: Surroundings, name: str, part: str, earth_rate: EarthRate | None) -> Unknown:
@@ -121,8 +160,9 @@ def unknown_of(surroundings: Surroundings, name: str, part: str, earth_rate: Ear
         state_jitter_s=surroundings.state_jitter_s,
         state_jitter_freedom=surroundings.state_jitter_freedom,
         axis_rad=float(np.radians(known.axis_deg)),
+        repeatability_rad=float(np.radians(known.repeatability_deg)),
         sensor_offset_m=known.sensor_offset_mm / 1000,
-        g_sensitivity_rad_s_per_g=float(np.radians(g_sensitivity_deg_s_g(known, name, part))),
+        g_sensitivity_rad_s_per_g=float(np.radians(known.of("g_sensitivity_deg_s_g", name, part))),
         earth_rate=earth_rate is None and surroundings.site.earth_rate_rad_s is None,
         earth_covariance_rad2_s2=None if earth_rate is None else earth_rate.covariance_rad2_s2,
         earth_freedom=np.inf if earth_rate is None else earth_rate.freedom,

@@ -229,6 +229,30 @@ class UncertaintySection(Section):
         description="change of a reading for 1 g, where attitudes do not tell it; left out, what is known of the part",
         json_schema_extra={"unit": "°/s/g"},
     )
+    nonlinearity_percent: float | None = Field(
+        default=None,
+        ge=0,
+        description="how far a gyroscope may be off a straight line, in per cent of full scale, by what is odd of its "
+        "curve and by what is even of it, where not several speeds tell it; left out, what is known of the part",
+        json_schema_extra={"unit": "%"},
+    )
+    bias_deg_s_k: float | None = Field(
+        default=None,
+        ge=0,
+        description="change of a gyroscope's bias for 1 K; left out, what is known of the part",
+        json_schema_extra={"unit": "°/s/K"},
+    )
+    scale_ppm_k: float | None = Field(
+        default=None,
+        ge=0,
+        description="change of a gyroscope's scale factor for 1 K; left out, what is known of the part",
+        json_schema_extra={"unit": "ppm/K"},
+    )
+    non_orthogonality_deg: float | None = Field(
+        default=None,
+        ge=0,
+        description="how far from 90° two axes of a gyroscope may stand; left out, what is known of the part",
+    )
     decision_rule: Literal["simple", "guard_band"] = Field(
         default="simple",
         description="what a limit is held against: `simple`, the value; `guard_band`, the value and its expanded "

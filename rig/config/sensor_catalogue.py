@@ -11,26 +11,26 @@ RATE_TOLERANCE = 2e-4  # relative: 333.33 stands for 1000/3, and the closest two
 class AccelerometerSheet:
     """What a data sheet says of an accelerometer, or of one of its kind: half-widths.
 
-    `nonlinearity` is how far it may be from the best straight line, as a share of the range `nonlinear_over_g` either
-    way, the one that is set where that is None. `bias_mg_k` and `scale_per_k` are what a degree changes; `anew_mg` what
-    its bias may change by when it is switched off and on, soldered or screwed down, None where nobody states it.
+    `nonlinearity_percent` is how far it may be from the best straight line, of the range `nonlinear_over_g` either way,
+    the one that is set where that is None; `bias_mg_k` and `scale_ppm_k` what a degree changes of bias and scale.
     """
 
-    nonlinearity: float
+    nonlinearity_percent: float
     bias_mg_k: float
-    scale_per_k: float
+    scale_ppm_k: float
     nonlinear_over_g: float | None = None
-    anew_mg: float | None = None
 
 
 @dataclass(frozen=True, slots=True)
 class Part:
     """One kind of sensor: `rates_hz` and `ranges_deg_s` are all its gyroscope can do, `rates_rule` says rates in words.
 
-    `g_sensitivity_deg_s_g` is how much a reading may change for 1 g, at most, `nonlinearity` how far it may be from a
-    straight line, as a share of full scale. `ranges_g` are those of its accelerometer, which shares its data rate, the
-    usual one first; `acceleration_noise_ug_sqrt_hz` is the noise density of that, in µg/√Hz, and `accelerometer` what
-    else is known of it. A part with a port of its own stands beside the board, with a clock of its own.
+    `g_sensitivity_deg_s_g` is how much a reading may change for 1 g, at most, `nonlinearity_percent` how far it may be
+    from a straight line, of full scale, `bias_deg_s_k` and `scale_ppm_k` how much bias and scale may change with
+    temperature, `non_orthogonality_deg` how far from 90° two of its axes may stand. `ranges_g` are those of its
+    accelerometer, which shares its data rate, the usual one first; `acceleration_noise_ug_sqrt_hz` is the noise density
+    of that, in µg/√Hz, and `accelerometer` what else is known of it. A part with a port of its own stands beside the
+    board, with a clock of its own.
     """
 
     rates_hz: tuple[float, ...]
@@ -39,7 +39,10 @@ class Part:
     default_rate_hz: float
     default_range_deg_s: float
     g_sensitivity_deg_s_g: float
-    nonlinearity: float
+    nonlinearity_percent: float
+    bias_deg_s_k: float
+    scale_ppm_k: float
+    non_orthogonality_deg: float
     ranges_g: tuple[float, ...]
     acceleration_noise_ug_sqrt_hz: float
     accelerometer: AccelerometerSheet
@@ -98,11 +101,14 @@ PARTS: Mapping[str, Part] = MappingProxyType(
             default_rate_hz=238,
             default_range_deg_s=245,
             g_sensitivity_deg_s_g=0.1,  # not stated; that of the MPU-6050, a part of the same kind, PS-MPU-6000A 6.1
-            nonlinearity=0.001,  # not stated; that of the MPU-9250
+            nonlinearity_percent=0.1,  # not stated; that of the MPU-9250, as what follows
+            bias_deg_s_k=30 / 65,
+            scale_ppm_k=4e4 / 65,
+            non_orthogonality_deg=1.15,
             ranges_g=(2, 4, 8, 16),
             acceleration_noise_ug_sqrt_hz=150,  # not stated; assumed
             accelerometer=AccelerometerSheet(  # not stated; that of the MPU-9250
-                nonlinearity=0.005, bias_mg_k=1.5, scale_per_k=2.6e-4
+                nonlinearity_percent=0.5, bias_mg_k=1.5, scale_ppm_k=260
             ),
         ),
         "mpu9250": Part(  # register map RM-MPU-9250A-00, registers 25 (SMPLRT_DIV) and 27 (GYRO_CONFIG)
@@ -112,11 +118,14 @@ PARTS: Mapping[str, Part] = MappingProxyType(
             default_rate_hz=200,
             default_range_deg_s=250,
             g_sensitivity_deg_s_g=0.1,  # not stated; that of the MPU-6050, PS-MPU-6000A 6.1
-            nonlinearity=0.001,  # PS-MPU-9250A-01, table 1
+            nonlinearity_percent=0.1,  # PS-MPU-9250A-01, table 1
+            bias_deg_s_k=30 / 65,  # ±30 °/s from −40 to 85 °C (table 1), straight from 25 °C
+            scale_ppm_k=4e4 / 65,  # ±4 % (table 1)
+            non_orthogonality_deg=1.15,  # cross-axis sensitivity ±2 % (table 1)
             ranges_g=(2, 4, 8, 16),
             acceleration_noise_ug_sqrt_hz=300,  # PS-MPU-9250A-01, section 3.2
             accelerometer=AccelerometerSheet(  # PS-MPU-9250A-01, table 2; changes by its -40 to 85 °C
-                nonlinearity=0.005, bias_mg_k=1.5, scale_per_k=2.6e-4
+                nonlinearity_percent=0.5, bias_mg_k=1.5, scale_ppm_k=260
             ),
         ),
         "adis16465": Part(  # datasheet, register DEC_RATE; the range is the model's: -1, -2 and -3 have one each
@@ -126,11 +135,14 @@ PARTS: Mapping[str, Part] = MappingProxyType(
             default_rate_hz=200,
             default_range_deg_s=500,
             g_sensitivity_deg_s_g=0.015,  # as the datasheet of the ADIS16445 states
-            nonlinearity=0.002,  # assumed: the data sheet of the part has it, not looked up
+            nonlinearity_percent=0.2,  # assumed, as what follows: the data sheet of the part has it, not looked up
+            bias_deg_s_k=0.2 / 60,
+            scale_ppm_k=3e3 / 60,
+            non_orthogonality_deg=0.15,  # axis to axis ±0.05° (data sheet, features), taken for a standard deviation
             ranges_g=(8,),
             acceleration_noise_ug_sqrt_hz=23,  # assumed: the data sheet of the part has it, not looked up
             accelerometer=AccelerometerSheet(  # assumed: the data sheet of the part has it, not looked up
-                nonlinearity=0.0025, nonlinear_over_g=2, bias_mg_k=0.05, scale_per_k=2e-5
+                nonlinearity_percent=0.25, nonlinear_over_g=2, bias_mg_k=0.05, scale_ppm_k=20
             ),
         ),
         "kvh1775": Part(  # ICD 56-0298 Rev. B, command =DR; -01 and -25 have one range of acceleration each
@@ -140,11 +152,14 @@ PARTS: Mapping[str, Part] = MappingProxyType(
             default_rate_hz=1000,
             default_range_deg_s=490,
             g_sensitivity_deg_s_g=0.0003,  # not stated; assumed: 1 °/h/g, light does not feel force
-            nonlinearity=5e-5,  # assumed: 50 ppm, as of a scale factor of light
+            nonlinearity_percent=0.005,  # assumed: 50 ppm, as of a scale factor of light
+            bias_deg_s_k=1 / 3600 / 60,  # assumed: 1 °/h over 60 K
+            scale_ppm_k=200 / 60,  # assumed: 200 ppm over as much
+            non_orthogonality_deg=0.06,  # assumed: 1 mrad
             ranges_g=(10, 25),
             acceleration_noise_ug_sqrt_hz=119,  # TRIAX, table 1: 0.0701 m/s/√h
             accelerometer=AccelerometerSheet(  # assumed: the maker's data sheet has it, not looked up
-                nonlinearity=0.009, nonlinear_over_g=10, bias_mg_k=0.05, scale_per_k=1e-4
+                nonlinearity_percent=0.9, nonlinear_over_g=10, bias_mg_k=0.05, scale_ppm_k=100
             ),
             own_port=True,
         ),

@@ -7,8 +7,8 @@ the next; these do not, so that an old recording is judged as it was, or by what
 import json
 from collections import Counter
 from collections.abc import Sequence
-from dataclasses import asdict, dataclass, fields
-from typing import TYPE_CHECKING, Annotated, Literal
+from dataclasses import asdict, dataclass, field, fields
+from typing import TYPE_CHECKING, Annotated, Any, Literal, get_args
 
 import numpy as np
 from numpy.typing import NDArray
@@ -32,6 +32,10 @@ SCHEMAS = (*(f"rig.settings/{number}" for number in range(1, 7)), SCHEMA)
 RECKONING = 2  # of new recordings; see `RunSettings`
 
 DecisionRule = Literal["simple", "guard_band"]
+OfSensor = Literal[
+    "g_sensitivity_deg_s_g", "nonlinearity_percent", "bias_deg_s_k", "scale_ppm_k", "non_orthogonality_deg"
+]
+OF_SENSORS: tuple[OfSensor, ...] = get_args(OfSensor)
 Vector3 = tuple[Finite, Finite, Finite]
 
 
@@ -105,6 +109,7 @@ class Site:
 class Uncertainty:
     """Half-widths of what no recording shows: all values between, either way, are equally likely.
 
+    Those of sensors stand by name: recordings of before do not say all of them, and take what is known of the part.
     `decision_rule` says whether a limit is held against the value alone ("simple") or against the value with its
     expanded uncertainty ("guard_band").
     """
@@ -118,6 +123,16 @@ class Uncertainty:
     decision_rule: DecisionRule
     repeatability_deg: Annotated[float, Field(ge=0)] = 0.0  # unknown to recordings of before
     acceleration_lag_ms: Annotated[float, Field(ge=0)] = 5.0
+    nonlinearity_percent: dict[str, Annotated[float, Field(ge=0)]] = field(default_factory=dict)
+    bias_deg_s_k: dict[str, Annotated[float, Field(ge=0)]] = field(default_factory=dict)
+    scale_ppm_k: dict[str, Annotated[float, Field(ge=0)]] = field(default_factory=dict)
+    non_orthogonality_deg: dict[str, Annotated[float, Field(ge=0)]] = field(default_factory=dict)
+
+    def of(self, what: OfSensor, name: str, part: str) -> float:
+        """That of a sensor of that name and kind; what is known of the part where nothing is said of the sensor."""
+        said: dict[str, float] = getattr(self, what)
+        of_part: float = getattr(PARTS[part], what)
+        return said.get(name, of_part)
 
 
 @dataclass(frozen=True, slots=True)
@@ -180,6 +195,16 @@ class RunSettings:
     @property
     def knows_own_motion(self) -> bool:
         """Whether a gyroscope is taken to feel what the arm's turning makes of its place as it feels gravity."""
+        return self.reckoning >= 2
+
+    @property
+    def knows_sensor(self) -> bool:
+        """Whether what a gyroscope may do beside the model, by its data sheet, counts."""
+        return self.reckoning >= 2
+
+    @property
+    def knows_returns(self) -> bool:
+        """Whether an arm is taken to come back to a sweep's axis a little elsewhere every time."""
         return self.reckoning >= 2
 
     @property
@@ -307,16 +332,16 @@ def _tesla(microtesla: float | None) -> float | None:
 
 
 def _uncertainty(config: "RigConfig") -> Uncertainty:
-    """As the file says; a sensor's g-sensitivity is its part's where the file does not say."""
-    section = config.uncertainty
-    said = section.g_sensitivity_deg_s_g
-    return Uncertainty(
-        **section.model_dump(exclude={"g_sensitivity_deg_s_g"}),
-        g_sensitivity_deg_s_g={
-            name: PARTS[sensor.part].g_sensitivity_deg_s_g if said is None else said
+    """As the file says; what it does not say of a sensor is its part's."""
+    said: dict[str, Any] = config.uncertainty.model_dump()
+    of_sensors: dict[str, Any] = {
+        what: {
+            name: getattr(PARTS[sensor.part], what) if said[what] is None else said[what]
             for name, sensor in config.sensors.items()
-        },
-    )
+        }
+        for what in OF_SENSORS
+    }
+    return Uncertainty(**{**said, **of_sensors})
 
 
 def _overridden(settings: RunSettings, item: str) -> RunSettings:

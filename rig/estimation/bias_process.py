@@ -61,16 +61,21 @@ def walk_covariance(windows_s: ArrayLike) -> Array:
 
 
 def expected_bias_process(
-    design: ArrayLike, means_rad_s: ArrayLike, variances_rad2_s2: ArrayLike, windows_s: ArrayLike
+    design: ArrayLike,
+    means_rad_s: ArrayLike,
+    variances_rad2_s2: ArrayLike,
+    windows_s: ArrayLike,
+    shared_rad2_s2: Array | None = None,
 ) -> BiasProcess:
     """The process behind the mean readings (N, 3), which without it are `design` (N, p) × parameters + noise.
 
     `variances_rad2_s2` (N, 3) are those of the noise, `windows_s` (N, 2) when was averaged. One process for the three
     axes, so that few averages tell it. Walk and scatter are their means over all sizes, each as likely as it makes the
     averages; before, each was as likely to be there as not, and of any order of magnitude. The likeliest sizes would by
-    chance be far too small in one run and too large in the next, and so would be every uncertainty.
+    chance be far too small in one run and too large in the next, and so would be every uncertainty. `shared_rad2_s2`
+    (3, N, N) are covariances of what the averages have in common beside their noise.
     """
-    return _bias_process(design, means_rad_s, variances_rad2_s2, windows_s, _mean)
+    return _bias_process(design, means_rad_s, variances_rad2_s2, windows_s, _mean, shared=shared_rad2_s2)
 
 
 def likeliest_bias_process(
@@ -83,7 +88,6 @@ def likeliest_bias_process(
     """The same with the likeliest sizes, zero where they do not make the averages likelier by Akaike's price.
 
     It holds no walk where noise alone would do: what is held against it is not excused by what is not there.
-    `shared_rad2_s2` (3, N, N) are covariances of what the averages have in common beside their noise.
     """
     return _bias_process(design, means_rad_s, variances_rad2_s2, windows_s, _likeliest, shared=shared_rad2_s2)
 

@@ -101,7 +101,7 @@ class Unknown:
     """What no recording shows: half-widths, but for `clock_std` and `state_jitter_s`, which are standard uncertainties.
 
     `clock_std` is a fraction, `clock_source` says how it is known, `clock_half_width` is there where it is that of any
-    such clock; `axis_rad` is the direction of each swept axis,
+    such clock; `axis_rad` is the direction of each swept axis, `repeatability_rad` an angle that is come back to,
     `earth_rate` whether the Earth's rate is among the unknown, `earth_covariance_rad2_s2` (3, 3), in the base's frame,
     how well it was found where it was. `…_freedom` are the degrees of freedom of what was found from readings,
     `counts_freedom` says whether they make the coverage factor.
@@ -120,6 +120,7 @@ class Unknown:
     state_jitter_freedom: float = np.inf
     earth_freedom: float = np.inf
     counts_freedom: bool = True
+    repeatability_rad: float = 0.0
 
 
 def uncounted(unknown: Unknown) -> Unknown:
@@ -170,6 +171,12 @@ def _contributors(explained: Explained, unknown: Unknown) -> Iterator[Contributo
     yield found("times of the arm's states", source, of(each_turn), unknown.state_jitter_freedom)
     tilted = _tilted(seen, unknown.axis_rad) if seen.axis_errors_rad_s is None else np.sqrt(3) * seen.axis_errors_rad_s
     yield assumed("arm's axes", float(np.degrees(unknown.axis_rad)), "°", "uncertainty.axis_deg", tilted @ matrix.T)
+    if seen.return_errors_rad_s is not None:
+        again, half_width = (
+            np.sqrt(3) * seen.return_errors_rad_s @ matrix.T,
+            float(np.degrees(unknown.repeatability_rad)),
+        )
+        yield assumed("arm's repeatability", half_width, "°", "uncertainty.repeatability_deg", again)
     if unknown.earth_covariance_rad2_s2 is not None:
         size, way = np.linalg.eigh(unknown.earth_covariance_rad2_s2)
         spread = seen.attitudes @ (way * np.sqrt(size.clip(min=0.0)))  # of each way the rate found may be off
@@ -178,6 +185,8 @@ def _contributors(explained: Explained, unknown: Unknown) -> Iterator[Contributo
     elif unknown.earth_rate:
         along = EARTH_RATE_RAD_S * np.moveaxis(seen.attitudes, -1, 0) @ matrix.T  # for each axis of the base
         yield assumed("Earth's rate", EARTH_RATE_RAD_S, "rad/s", f"site.latitude_deg {NOT_GIVEN}", along)
+    for each in seen.own_errors(matrix):
+        yield assumed(each.name, each.half_width, each.unit, "what is known of the part", each.patterns)
     per_m_s2 = unknown.g_sensitivity_rad_s_per_g / STANDARD_GRAVITY_M_S2
     any_sensitivity = [per_m_s2 * np.outer(row, column) for row in np.eye(3) for column in np.eye(3)]
     sensitivity = solution.g_sensitivity

@@ -178,7 +178,7 @@ def _fit(seen: Seen, nominal_mounting: Array, directions: Array, gravity: Array 
 
     def effects(matrix: Array) -> Array:
         bent = [curvature(matrix, seen.rates_rad_s)] if several else []
-        return np.concatenate([*bent, turned @ matrix.T])
+        return np.concatenate([*bent, seen.own_patterns(matrix), turned @ matrix.T])
 
     solve = solver(seen, nominal_mounting, gravity, timed, effects)
     solution, errors = solve(None)

@@ -17,6 +17,7 @@ from rig.estimation.arrays import Array
 from rig.estimation.bias_process import BiasProcess, expected_bias_process
 from rig.estimation.common_errors import CommonErrors, solve_with_common_errors
 from rig.estimation.nonlinearity import Nonlinearity, curvature, distinct_speeds, nonlinearity
+from rig.estimation.own_errors import KnownSensor, OwnError, own_errors
 from rig.estimation.vector_model import VectorSolution, check_told, design_matrix, of_the_speed
 
 UNTOLD = ("rank_deficient", "ill_conditioned", "too_few_observations")  # what more columns than sweeps bear ends in
@@ -31,9 +32,11 @@ class Seen:
     `attitudes` (N, 3, 3) from the base into the flange; `gravity_m_s2` (N, 3) downwards, in the flange's frame;
     `windows_s` (N, 2) on the clock of the first recording; `joints` (N) which of the arm's joints turned, None for a
     rest; `axis_errors_rad_s` (P, N, 3) how far the turns would be off for one standard uncertainty of each of the arm's
-    own angles, as far as it is known; `arms_m` (N, 3) a way from the axis that turns to where the sensor is taken to
-    sit, in the flange's frame, None where its own motion is left out. `noise_freedom` (N, 3): with how many degrees of
-    freedom the variances are known.
+    own angles, as far as it is known; `return_errors_rad_s` (P, N, 3) the same of joints that come back to an angle,
+    for each time they do, None in recordings of before; `arms_m` (N, 3) a way from the axis that turns to where the
+    sensor is taken to sit, in the flange's frame, None where its own motion is left out. `noise_freedom` (N, 3): with
+    how many degrees of freedom the variances are known. `sensor` is what is known of the sensor beforehand, None in
+    recordings of before.
     """
 
     means_rad_s: Array
@@ -46,8 +49,10 @@ class Seen:
     windows_s: Array
     joints: tuple[str | None, ...]
     axis_errors_rad_s: Array | None = None
+    return_errors_rad_s: Array | None = None
     arms_m: Array | None = None
     noise_freedom: Array | float = np.inf
+    sensor: KnownSensor | None = None
 
     @property
     def speeds_rad_s(self) -> tuple[float, ...]:
@@ -71,6 +76,23 @@ class Seen:
         """(N, 3) what is felt as gravity, in the flange's frame: gravity less the acceleration."""
         pull: Array = self.gravity_m_s2 - self.acceleration_m_s2
         return pull
+
+    @property
+    def arm_errors_rad_s(self) -> Array:
+        """(P, N, 3) of both kinds of errors of its angles."""
+        none = np.zeros((0, *self.means_rad_s.shape))
+        return np.concatenate([none, *(e for e in (self.axis_errors_rad_s, self.return_errors_rad_s) if e is not None)])
+
+    def own_errors(self, matrix: Array) -> tuple[OwnError, ...]:
+        """What a sensor of that F (3, 3) may do beside the model."""
+        if self.sensor is None:
+            return ()
+        return tuple(own_errors(self.sensor, matrix, self.turns_rad_s, self.windows_s, self.speeds_rad_s))
+
+    def own_patterns(self, matrix: Array) -> Array:
+        """(P, N, 3) of one standard deviation of each."""
+        none = np.zeros((0, *self.means_rad_s.shape))
+        return np.concatenate([none, *(each.patterns / np.sqrt(3) for each in self.own_errors(matrix))])
 
     def centripetal_m_s2(self, way_m: Array) -> Array:
         """(N, 3) acceleration at `way_m` (3,) or (N, 3) from the axis that turns, in the flange's frame."""
@@ -142,23 +164,28 @@ def solver(
 
 def _explain(seen: Seen, nominal_mounting: Array, gravity_m_s2: Array | None) -> Explained:
     several = len(seen.speeds_rad_s) > 1
-    no_errors = np.zeros((0, *seen.means_rad_s.shape))
-    axis_errors = no_errors if seen.axis_errors_rad_s is None else seen.axis_errors_rad_s
+    arm_errors = seen.arm_errors_rad_s
+
+    def of_arm_and_speeds(matrix: Array) -> Array:
+        """(P, N, 3) on the readings, of one standard deviation each."""
+        curved = [curvature(matrix, seen.rates_rad_s)] if several else []
+        return np.concatenate([arm_errors @ matrix.T, *curved])
 
     def effects(matrix: Array) -> Array:
-        """(P, N, 3) on the readings, of one standard deviation each."""
-        return np.concatenate([axis_errors @ matrix.T, curvature(matrix, seen.rates_rad_s) if several else no_errors])
+        return np.concatenate([of_arm_and_speeds(matrix), seen.own_patterns(matrix)])
 
     solve = solver(seen, nominal_mounting, gravity_m_s2, seen.speed_std_rad_s, effects)
     steady, errors = solve(None)
+    known, own = of_arm_and_speeds(steady.matrix), seen.own_patterns(steady.matrix)
     of_the_speeds = of_the_speed(seen.rates_rad_s, seen.speed_std_rad_s, steady.matrix) ** 2
     bias = expected_bias_process(
         design_matrix(seen.rates_rad_s, gravity_m_s2),
-        seen.means_rad_s - errors.readings_rad_s,
+        seen.means_rad_s - np.einsum("p,pni->ni", errors.sizes[: len(known)], known),
         seen.variances_rad2_s2 + of_the_speeds,
         seen.windows_s,
+        np.einsum("pni,pmi->inm", own, own) if len(own) else None,  # each is of one axis alone
     )
     solution, errors = (steady, errors) if bias.steady else solve(bias.covariance(seen.windows_s))
-    curved = slice(len(axis_errors), None)
+    curved = slice(len(arm_errors), len(known))
     found = nonlinearity(errors.sizes[curved], errors.covariance[curved, curved]) if several else None
     return Explained(solution, bias, seen, found)

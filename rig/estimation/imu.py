@@ -244,7 +244,9 @@ def _as_expected(fit: Fit, movement: Movement, held: list[int], attitude_std_rad
     walk, delta = expected_sizes(scattered, attitude_std_rad)
     louder = expected_disturbances(scattered, walk, delta, movement.pieces())
     movement = replace(movement, own=replace(movement.own, walk_m_s2_sqrt_s=walk, louder=louder))
-    return movement, replace(most_likely(fit.theta, movement, held, delta), iterations=fit.iterations)
+    found = most_likely(fit.theta, movement, held, delta)
+    readings = apart(noise(found.theta, movement), effects(found.theta, movement))
+    return movement, replace(found, readings=readings, iterations=fit.iterations + found.iterations)
 
 
 def _check_attitudes(start: Array, movement: Movement, held: list[int], fit: Fit) -> None:

@@ -31,14 +31,14 @@ def distinct_speeds(speeds_rad_s: Array) -> tuple[float, ...]:
     return tuple(float(group.mean()) for group in np.split(ordered, steps))
 
 
-def curvature(matrix: Array, rates_rad_s: Array) -> Array:
+def curvature(matrix: Array, rates_rad_s: Array, true_at_rad_s: float = 0.0) -> Array:
     """(6, N, 3) what readings gain by odd parts of x, y, z and even parts of x, y, z of `FREE_PER_RAD_S`.
 
-    Of mean rates (N, 3) in the flange's frame, and F (3, 3).
+    Of mean rates (N, 3) in the flange's frame, and F (3, 3), which holds at the speed `true_at_rad_s`.
     """
     readings = rates_rad_s @ matrix.T
     along = readings / np.linalg.norm(matrix, axis=1)
-    gains = (np.abs(along) * readings, along * readings)
+    gains = ((np.abs(along) - true_at_rad_s) * readings, along * readings)
     return FREE_PER_RAD_S * np.array([gain * axis for gain in gains for axis in np.eye(3)])
 
 

@@ -16,6 +16,7 @@ from rig.estimation.arrays import Array
 from rig.estimation.budget import Unknown, budget
 from rig.estimation.earth import EARTH_RATE_RAD_S, STANDARD_GRAVITY_M_S2
 from rig.estimation.explained import Seen, centripetal_m_s2, explain
+from rig.estimation.own_errors import KnownSensor
 from rig.estimation.vector_model import solve_vector_model
 from rig.study.report import Finding, Report, Settings, table
 from rig.study.work import in_parallel
@@ -31,6 +32,7 @@ STEP_S = 0.05  # of the bias's walk
 ATTITUDES = 72  # of a turn
 MOUNTING_RAD, SKEW_RAD = np.radians(5.0), np.radians(0.25)
 SAMPLE_RATE_HZ = 238.0
+WARM_UP_S, STEP_K = 300.0, 1 / 16  # of the thermometer of a LSM9DS1: DocID025715, table 4
 PARAMETERS = ("kx", "ky", "kz", "bx", "by", "bz")
 
 
@@ -39,8 +41,9 @@ class Effects:
     """How large what may be wrong is drawn: standard deviations, but for half-widths of the clock and the offset.
 
     g-sensitivity for every element, rad/s/g; twist of each wrist's axis; jitter of the states' times; walk of the bias;
-    how far from the flange's centre the sensor sits along each axis. The noise is that of a LSM9DS1 by its data sheet,
-    0.01 °/s/√Hz.
+    how far from the flange's centre the sensor sits along each axis. Half-widths, too, are odd and even nonlinearity as
+    a share of full scale, by how much the sensor warms, and what that does to bias and scale. The noise is that of a
+    LSM9DS1 by its data sheet, 0.01 °/s/√Hz, the nonlinearity that of a MPU-9250 (PS-MPU-9250A-01, table 1).
     """
 
     speed_rad_s: float = np.pi / 3
@@ -53,6 +56,11 @@ class Effects:
     walk_rad_s_sqrt_s: float = 3e-5
     offset_m: float = 0.05
     latitude_deg: float = 48.0
+    nonlinearity: float = 1e-3
+    full_scale_rad_s: float = float(np.radians(245))
+    warming_k: float = 0.3
+    bias_rad_s_per_k: float = 5e-4
+    scale_per_k: float = 6e-4
 
 
 @dataclass(frozen=True, slots=True)
@@ -113,7 +121,14 @@ def _one(effects: Effects, rng: np.random.Generator) -> Array:
     durations = np.diff(true.windows_s).T[0]
     variances = np.tile(effects.noise_rad_s**2 / (SAMPLE_RATE_HZ * durations)[:, None], 3)
     noise = np.sqrt(variances) * rng.standard_normal((len(durations), 3))
-    means = turned @ axes.T / scale - bias + felt + wandered + noise
+    warmth, recorded_k = _warmth(rng, effects, true)
+    slope, change = (size * rng.uniform(-1, 1, 3) for size in (effects.bias_rad_s_per_k, effects.scale_per_k))
+    wandered = wandered + (warmth - np.average(warmth, weights=durations))[:, None] * slope
+    sweeps = durations * true.rates_rad_s.any(axis=1)
+    along = _curved(turned @ axes.T, effects, rng) * (
+        1 + (warmth - np.average(warmth, weights=sweeps))[:, None] * change
+    )
+    means = along / scale - bias + felt + wandered + noise
     clock = rng.uniform(-effects.clock, effects.clock)
     jitter = rng.normal(0, np.sqrt(2) * effects.jitter_s, len(durations)) / durations
     said = told.rates_rad_s * (1 - clock + jitter)[:, None]
@@ -130,6 +145,14 @@ def _one(effects: Effects, rng: np.random.Generator) -> Array:
         windows_s=told.windows_s,
         joints=told.joints,
         arms_m=told.arms_m,
+        sensor=KnownSensor(
+            nonlinearity=effects.nonlinearity,
+            full_scale_rad_s=effects.full_scale_rad_s,
+            bias_rad_s_per_k=effects.bias_rad_s_per_k,
+            scale_per_k=effects.scale_per_k,
+            temperature_c=recorded_k,
+            temperature_step_k=STEP_K,
+        ),
     )
     explained = explain(seen, np.eye(3))
     unknown = Unknown(
@@ -145,6 +168,20 @@ def _one(effects: Effects, rng: np.random.Generator) -> Array:
     with_all = (np.concatenate([solved.scale, solved.bias_rad_s]) - truth) / budget(explained, unknown).std
     without = (np.concatenate([plain.scale, plain.bias_rad_s]) - truth) / np.sqrt(np.diag(plain.covariance))
     return np.array([with_all, without])
+
+
+def _curved(along_rad_s: Array, effects: Effects, rng: np.random.Generator) -> Array:
+    """(N, 3) of rates along the axes what a sensor takes them for that is right at the speed of the sweeps."""
+    odd, even = effects.nonlinearity / effects.full_scale_rad_s * rng.uniform(-1, 1, (2, 3))
+    curve = odd * (np.abs(along_rad_s) - effects.speed_rad_s) + even * along_rad_s
+    return np.asarray(along_rad_s * (1 + curve), dtype=np.float64)
+
+
+def _warmth(rng: np.random.Generator, effects: Effects, session: Session) -> tuple[Array, Array]:
+    """(N,) K above the start in the mean of each average, and as recorded in steps."""
+    middle_s = session.windows_s.mean(axis=1)
+    warmth = effects.warming_k * rng.uniform(-1, 1) * (1 - np.exp(-middle_s / WARM_UP_S))
+    return warmth, STEP_K * np.round(warmth / STEP_K)
 
 
 def _session(twists: Array, speed_rad_s: float) -> Session:

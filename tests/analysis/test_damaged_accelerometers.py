@@ -60,7 +60,7 @@ def just_below(damage: Damage, session: Session) -> tuple[float, float]:
 @pytest.mark.parametrize("part", PARTS)
 @pytest.mark.parametrize("name", DAMAGES)
 def test_what_is_just_not_told_is_within_the_uncertainty(part: str, name: str) -> None:
-    """Half of the sessions: noise alone puts the worst of six parameters off by 0.8 U, and by 1.3 U in one of twenty."""
+    """Half of the sessions: noise alone puts the worst of six parameters off by 0.8 U, and in one of twenty by 1.3."""
     damage, most = DAMAGES[name]
     found = [just_below(damage, drawn(part, seed)) for seed in range(8)]
     sizes, passed = np.median(found, axis=0)

@@ -81,7 +81,7 @@ def drawn(part: str, seed: int, arm_rad: float = 1e-4) -> Session:
         recorded_dwells(truth, arm, JOINTS, density, rng), recorded_sweeps(truth, arm, turned, density, rng)
     )
     whole = (sheet.nonlinear_over_g or RANGES_G[part]) * GRAVITY
-    even, odd = 2 * sheet.nonlinearity / whole, 4 * sheet.nonlinearity / whole**2
+    even, odd = 0.02 * sheet.nonlinearity_percent / whole, 0.04 * sheet.nonlinearity_percent / whole**2
     bias_k = 1e-3 * sheet.bias_mg_k * GRAVITY
     start_s = BETWEEN_S * np.concatenate([len(turned) + np.arange(len(JOINTS)), np.arange(len(turned))])
     length_s = np.repeat([DWELL_S, SWEEP_S], [len(JOINTS), len(turned)])
@@ -93,7 +93,7 @@ def drawn(part: str, seed: int, arm_rad: float = 1e-4) -> Session:
         odd_s4_m2=odd / STANDARD,
         norm_m_s2=GRAVITY,
         bias_m_s2_k=bias_k / STANDARD,
-        scale_per_k=sheet.scale_per_k / STANDARD,
+        scale_per_k=1e-6 * sheet.scale_ppm_k / STANDARD,
         warmer_k=warmer_k,
         windows_s=np.column_stack([start_s, start_s + length_s]),
     )
@@ -104,7 +104,7 @@ def drawn(part: str, seed: int, arm_rad: float = 1e-4) -> Session:
     bent = of_sensor(theta, movement, np.square) @ rng.uniform(-even, even, 3)
     bent += of_sensor(theta, movement, lambda along: along**3) @ chi
     bent += per_axis((warm * movement.constant())[:, None] * np.ones(3)) @ rng.uniform(-bias_k, bias_k, 3)
-    bent += per_axis(_along(session) * warm[:, None]) @ rng.uniform(-sheet.scale_per_k, sheet.scale_per_k, 3)
+    bent += per_axis(_along(session) * warm[:, None]) @ (1e-6 * sheet.scale_ppm_k * rng.uniform(-1, 1, 3))
     return session.reading(bent, _parameters(truth, chi) - session.parameters)
 
 

@@ -1,0 +1,80 @@
+"""What a gyroscope may do beside the vector model, of which only the likely size is known: its data sheet says it.
+
+It is not quite linear, and it feels how warm it is. Each is an error that many readings have in common
+(`rig.estimation.common_errors`): what sweeps and rests tell of it is taken out of the result, what they do not tell is
+a line of the budget.
+"""
+
+from collections.abc import Iterator
+from dataclasses import dataclass
+
+import numpy as np
+
+from rig.estimation.arrays import Array
+from rig.estimation.nonlinearity import FREE_PER_RAD_S, curvature
+
+NONLINEARITY = "nonlinearity"
+BIAS_OVER_TEMPERATURE, SCALE_OVER_TEMPERATURE = "bias over temperature", "scale over temperature"
+MOVES = 3.0  # steps of the thermometer, by which temperature must change for the bias to be looked at by it
+
+
+@dataclass(frozen=True, slots=True)
+class KnownSensor:
+    """Half-widths as its data sheet states them, and how warm it was in each of N averages.
+
+    `nonlinearity` is how far a reading may be off a straight line, as a share of `full_scale_rad_s`: by its odd part,
+    and by its even part. `bias_rad_s_per_k` and `scale_per_k` are changes with temperature, `temperature_c` (N,) is
+    recorded in steps of `temperature_step_k`.
+    """
+
+    nonlinearity: float
+    full_scale_rad_s: float
+    bias_rad_s_per_k: float
+    scale_per_k: float
+    temperature_c: Array
+    temperature_step_k: float
+
+
+@dataclass(frozen=True, slots=True)
+class OwnError:
+    """A line of the budget: `patterns` (P, N, 3) rad/s in the readings for the `half_width`, which is in `unit`."""
+
+    name: str
+    half_width: float
+    unit: str
+    patterns: Array
+
+
+def own_errors(
+    known: KnownSensor, matrix: Array, turns_rad_s: Array, windows_s: Array, speeds_rad_s: tuple[float, ...]
+) -> Iterator[OwnError]:
+    """Of a sensor of F (3, 3) on a flange that turned at `turns_rad_s` (N, 3), zero at rest, in `windows_s` (N, 2).
+
+    Swept at one speed, scale is what it is at that speed along an axis: one that turned obliquely was slower, and so
+    its scale may differ. Several speeds tell the nonlinearity, whatever is known of it.
+    """
+    if len(speeds_rad_s) == 1:
+        curved = curvature(matrix, turns_rad_s, speeds_rad_s[0]) / FREE_PER_RAD_S
+        of_reading = known.nonlinearity / known.full_scale_rad_s
+        yield OwnError(NONLINEARITY, 100 * known.nonlinearity, "% of full scale", of_reading * curved)
+    lasting = np.diff(windows_s)[:, 0]
+    warmer = _from_their_mean(known.temperature_c, lasting)
+    if np.ptp(warmer) >= MOVES * known.temperature_step_k > 0:
+        patterns = known.bias_rad_s_per_k * np.einsum("n,ij->inj", warmer, np.eye(3))
+        yield OwnError(BIAS_OVER_TEMPERATURE, float(np.degrees(known.bias_rad_s_per_k)), "°/s/K", patterns)
+    turning = lasting * turns_rad_s.any(axis=1)
+    warmer_k = _from_their_mean(known.temperature_c, turning), _unseen(known, windows_s, turning)
+    patterns = known.scale_per_k * np.einsum("kn,ni,ij->kinj", warmer_k, turns_rad_s @ matrix.T, np.eye(3))
+    yield OwnError(SCALE_OVER_TEMPERATURE, 1e6 * known.scale_per_k, "ppm/K", patterns.reshape(6, -1, 3))
+
+
+def _unseen(known: KnownSensor, windows_s: Array, weights: Array) -> Array:
+    """(N,) K by which temperature may have changed evenly in the course of the run while its recorded steps did not."""
+    middle = windows_s.mean(axis=1)
+    share = _from_their_mean(middle, weights) / np.ptp(middle)
+    return np.asarray(known.temperature_step_k * share, dtype=np.float64)
+
+
+def _from_their_mean(values: Array, weights: Array) -> Array:
+    away: Array = values - np.average(values, weights=weights)
+    return away

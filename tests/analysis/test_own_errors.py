@@ -1,0 +1,108 @@
+"""What a data sheet says a gyroscope may do, a single speed does not tell: it puts neither scale nor bias beyond U."""
+
+from dataclasses import replace
+from functools import cache
+
+import numpy as np
+import pytest
+
+from rig.analysis.calibration import SensorResult
+from rig.analysis.outcome import calibrated
+from rig.config.sensor_catalogue import PARTS
+from rig.data.run_file import RunData
+from rig.estimation.arrays import Array
+from rig.estimation.budget import Budget
+from support.synthetic_run import Setup, synthetic_run
+
+PER_RAD_S = (
+    PARTS["lsm9ds1"].nonlinearity_percent / 100 / np.radians(245)
+)  # of an LSM9DS1 that just keeps its data sheet
+SIX_AXES = (("axes", "6"),)
+ODD = Setup(noise_rad_s=3e-4, odd_per_rad_s=PER_RAD_S, procedure=SIX_AXES)
+EVEN = Setup(noise_rad_s=3e-4, even_per_rad_s=PER_RAD_S)
+SPEED_RAD_S = np.pi / 3
+
+
+@cache
+def solved(setup: Setup, reckoning: int = 2) -> SensorResult:
+    made = synthetic_run(setup)
+    return calibrated([replace(made, settings=made.settings.with_overrides([f"reckoning={reckoning}"]))]).results[
+        "gyro"
+    ]
+
+
+def stated(result: SensorResult) -> Budget:
+    assert result.uncertainty is not None
+    return result.uncertainty
+
+
+def scale_off(setup: Setup, reckoning: int = 2) -> Array:
+    """(3,) over U, from what reads right at the speed of the sweeps."""
+    result = solved(setup, reckoning)
+    truth = np.array(setup.scale) / (1 + setup.odd_per_rad_s * SPEED_RAD_S)
+    off: Array = np.abs(result.scale - truth) / stated(result).expanded[:3]
+    return off
+
+
+def bias_off(setup: Setup, reckoning: int = 2) -> tuple[Array, Array]:
+    """(3,) rad/s, and U."""
+    result = solved(setup, reckoning)
+    return np.abs(result.bias_rad_s - setup.bias_rad_s), stated(result).expanded[3:]
+
+
+def test_a_scale_found_about_oblique_axes_is_that_at_the_speed_of_the_sweeps() -> None:
+    assert scale_off(ODD).max() < 1
+    assert scale_off(ODD, reckoning=1).max() > 1.1
+
+
+def test_a_bias_is_that_at_rest_whatever_is_even_in_the_sensors_curve_which_is_no_wandering() -> None:
+    (off, expanded), (off_before, expanded_before) = bias_off(EVEN), bias_off(EVEN, reckoning=1)
+    assert (off < expanded).all()
+    assert off.max() < 0.3 * off_before.max()
+    assert (expanded < 0.3 * expanded_before).all()
+
+
+def test_the_budget_names_what_the_data_sheet_says() -> None:
+    known = [each for each in stated(solved(ODD)).contributors if each.half_width is not None]
+    lines = {each.name: f"{each.half_width:.4g} {each.unit}" for each in known}
+    assert lines["nonlinearity"] == "0.1 % of full scale"
+    assert lines["scale over temperature"] == "615.4 ppm/K"
+    assert not {"nonlinearity", "scale over temperature"} & {
+        each.name for each in stated(solved(ODD, reckoning=1)).contributors
+    }
+
+
+def test_several_speeds_find_the_nonlinearity_whatever_the_data_sheet_says() -> None:
+    several = replace(ODD, procedure=(("speeds_deg_s", "[30, 60, 120]"),))
+    assert "nonlinearity" not in {each.name for each in stated(solved(several)).contributors}
+
+
+@pytest.mark.parametrize(("steps", "looked_at"), [(2, False), (40, True)])
+def test_a_bias_that_follows_the_recorded_temperature_is_that_at_the_mean_one(steps: int, looked_at: bool) -> None:
+    """So far from a ramp in time that a walk of the bias would not make much of it."""
+    setup = Setup(noise_rad_s=3e-4)
+    warmed = _warmed(synthetic_run(setup), steps, bias_rad_s_per_k=2e-3)
+    found = stated(calibrated([warmed]).results["gyro"])
+    line = [each for each in found.contributors if each.name == "bias over temperature"]
+    assert bool(line) == looked_at
+    if looked_at:
+        unseen = stated(calibrated([_thermometer_broken(warmed)]).results["gyro"])
+        assert found.of("bias instability")[3:].max() < 0.3 * unseen.of("bias instability")[3:].max()
+
+
+def _warmed(run: RunData, steps: int, bias_rad_s_per_k: float) -> RunData:
+    """By so many steps of its thermometer, up and down again, and what that does to the readings."""
+    sensor, samples = run.sensors["gyro"], run.samples["gyro"].copy()
+    wave = np.sin(2 * np.pi * np.linspace(0, 1.5, len(samples)))
+    samples["temperature_counts"] += np.round(steps * (1 + wave) / 2).astype(np.int16)
+    kelvin = steps * wave / 2 * sensor.temperature_c_per_count
+    samples["counts"] += np.round(bias_rad_s_per_k * kelvin / sensor.sensitivity_rad_s_per_count).astype(np.int32)[
+        :, None
+    ]
+    return replace(run, samples={"gyro": samples})
+
+
+def _thermometer_broken(run: RunData) -> RunData:
+    samples = run.samples["gyro"].copy()
+    samples["temperature_counts"] = 0
+    return replace(run, samples={"gyro": samples})
