@@ -92,7 +92,7 @@ def test_sound_readings_are_beyond_a_limit_as_often_as_it_says(
 @pytest.mark.timeout(1800)
 @pytest.mark.parametrize("part", ["lsm9ds1", "mpu9250", "adis16465"])
 def test_p_values_of_sensors_as_their_data_sheets_let_them_be_are_uniform(part: str) -> None:
-    """Kolmogorov and Smirnov do not refuse at 1 % that they are no smaller; a half-width that is kept makes some large."""
+    """Kolmogorov and Smirnov do not refuse at 1 % that they are no smaller than that."""
     found: dict[str, list[float]] = {}
     for seed in range(50):
         session = drawn_accelerations.drawn(part, seed)
