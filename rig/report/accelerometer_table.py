@@ -5,6 +5,7 @@ from collections.abc import Iterator
 import numpy as np
 from rich.table import Table
 
+from rig.analysis.accelerometer_errors import NONLINEARITY
 from rig.data.accelerometer_entries import AccelerometerEntry
 from rig.data.budget_entries import expanded_uncertainties
 from rig.data.result_types import ErrorEntry
@@ -24,6 +25,8 @@ def accelerometer_table(name: str, found: AccelerometerEntry) -> Table:
 def accelerometer_lines(found: AccelerometerEntry) -> Iterator[str]:
     """What stands below the table."""
     yield f"relative to gravity, {found.gravity_m_s2:.6g} m/s²; {len(found.dwells)} attitudes, {found.sweeps} sweeps"
+    if found.budget is not None and any(line.name == NONLINEARITY for line in found.budget.contributors):
+        yield f"k by the readings at 1 g up and down, b at 0 g; as mounted and powered, at {found.temperature_c:.1f} °C"
     yield from assumed_lines(found.budget)
     skew, std = np.degrees(found.non_orthogonality_rad), np.degrees(found.non_orthogonality_std_rad)
     yield f"non-orthogonality yz zx xy: {triple(skew, '+.4f')} ° (± {2 * std.max():.4f})"
