@@ -15,7 +15,7 @@ from rig.analysis.suspicion import Statistic, Suspicions, basis, told_beside, to
 from rig.estimation.arrays import Array
 from rig.estimation.felt import SECOND, Movement, cross, effects, felt, jacobian, predicted
 from rig.estimation.imu import slopes
-from rig.estimation.reading_errors import noise, of_pieces, of_sensor, per_axis
+from rig.estimation.reading_errors import in_sweeps, noise, of_pieces, of_sensor, per_axis
 from rig.estimation.reference_model import matrix
 from rig.estimation.shared_errors import Apart, apart, information, likeliest_error, more_likely
 
@@ -171,7 +171,7 @@ def _suspicions(read: Read) -> Suspicions:
         "residuals": None,
     }
     if read.dwells and read.sweeps:
-        found["sweeps_against_dwells"] = per_axis(_swept(read)[:, None] * np.ones(3))
+        found["sweeps_against_dwells"] = in_sweeps(read.movement)
     return found
 
 
@@ -185,11 +185,6 @@ def _of_piece(read: Read, piece: int) -> Array:
 
 def _bias_over_time(read: Read) -> Array:
     return per_axis((_time(read) * read.movement.constant())[:, None] * np.ones(3))
-
-
-def _swept(read: Read) -> Array:
-    """(K,) 1 in the means of sweeps."""
-    return np.concatenate([np.zeros(read.dwells), read.movement.constant()[read.dwells :]])
 
 
 def _time(read: Read) -> Array:

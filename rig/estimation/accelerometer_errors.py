@@ -25,7 +25,8 @@ class AccelerometerErrors:
     - `windows_s` (K', 2): when each began and ended.
 
     Beside these, as the readings themselves say: `walk_m_s2_sqrt_s`, what w adds in a second; `louder` (K',), the
-    variance of a dwell or sweep that was disturbed for itself, in that of its noise.
+    variance of a dwell or sweep that was disturbed for itself, in that of its noise; `turning_m_s2`, by how much the
+    bias is another in all sweeps.
     """
 
     even_s2_m: float
@@ -37,6 +38,7 @@ class AccelerometerErrors:
     windows_s: Array
     walk_m_s2_sqrt_s: float = 0.0
     louder: Array | None = None
+    turning_m_s2: float = 0.0
 
     def without(self, piece: int) -> "AccelerometerErrors":
         """All but one dwell or sweep."""
@@ -53,4 +55,4 @@ class AccelerometerErrors:
 
     def standing(self) -> "AccelerometerErrors":
         """The same of a sensor whose bias does not walk, and that nothing disturbs."""
-        return replace(self, walk_m_s2_sqrt_s=0.0, louder=None)
+        return replace(self, walk_m_s2_sqrt_s=0.0, louder=None, turning_m_s2=0.0)

@@ -53,10 +53,10 @@ def expected_sizes(seen: Scattered, std_rad: float | None) -> tuple[float, float
     return float(np.sqrt(weights.sum(axis=1) @ walks**2)), float(np.sqrt(weights.sum(axis=0) @ sizes**2))
 
 
-def expected_disturbances(seen: Scattered, walk: float, std_rad: float, pieces: Sequence[slice]) -> Array:
-    """(k,) variance that a disturbance added to each of the `pieces`, in that of its noise.
+def expected_disturbances(seen: Scattered, walk: float, std_rad: float, causes: Sequence[Array]) -> Array:
+    """(k,) variance of each of the `causes`, of which (n, …) are the columns by one standard deviation.
 
-    Before, one of them was as likely to be disturbed as none, by any order of magnitude.
+    Before, one of them was as likely to be there as none, by any order of magnitude.
     """
     white = np.linalg.inv(
         np.linalg.cholesky(seen.known + walk**2 * seen.walk + std_rad**2 * seen.effects @ seen.effects.T)
@@ -65,14 +65,14 @@ def expected_disturbances(seen: Scattered, walk: float, std_rad: float, pieces: 
     left = white @ seen.left
     left = left - basis @ (basis.T @ left)
     volumes = np.geomspace(1.0, LOUDEST, VOLUMES) ** 2
-    belief = np.zeros((len(pieces), VOLUMES))
-    for place, piece in enumerate(pieces):
-        columns = white[:, piece] * np.sqrt(seen.noise[piece])
-        told = columns - basis @ (basis.T @ columns)
+    belief = np.zeros((len(causes), VOLUMES))
+    for place, columns in enumerate(causes):
+        told = white @ columns
+        told = told - basis @ (basis.T @ told)
         sizes, directions = np.linalg.eigh(told.T @ told)
-        seen_so = np.square(directions.T @ (told.T @ left))
+        along = np.square(directions.T @ (told.T @ left))
         grown = 1 + volumes[:, None] * sizes.clip(min=0.0)
-        belief[place] = 0.5 * np.sum(volumes[:, None] * seen_so / grown - np.log(grown), axis=1)
+        belief[place] = 0.5 * np.sum(volumes[:, None] * along / grown - np.log(grown), axis=1)
     belief -= np.log(belief.size)
     most = max(float(belief.max()), 0.0)
     weights = np.exp(belief - most)

@@ -32,7 +32,7 @@ from rig.estimation.felt import (
     turned,
 )
 from rig.estimation.linear_start import MAX_CONDITION, REMEDY, linear_start
-from rig.estimation.reading_errors import noise, walking
+from rig.estimation.reading_errors import in_sweeps, noise, walking
 from rig.estimation.reference_model import BIAS, REFERENCE, STEP_LIMIT, STEP_TOLERANCE, free_directions, matrix
 from rig.estimation.shared_errors import Apart, apart, likeliest_error, with_uncertainty
 from rig.estimation.triaxial import ODD, SUSPICIOUS_RAD, UNTRUSTWORTHY_RAD
@@ -242,8 +242,13 @@ def _as_expected(fit: Fit, movement: Movement, held: list[int], attitude_std_rad
     known, of_arm, own = noise(fit.theta, movement), effects(fit.theta, movement), np.diag(movement.noise())
     scattered = Scattered(left, fit.jacobian, known, of_arm, walking(movement), own)
     walk, delta = expected_sizes(scattered, attitude_std_rad)
-    louder = expected_disturbances(scattered, walk, delta, movement.pieces())
-    movement = replace(movement, own=replace(movement.own, walk_m_s2_sqrt_s=walk, louder=louder))
+    unit = float(np.sqrt(np.median(own)))
+    alone = [np.diag(np.sqrt(own))[:, piece] for piece in movement.pieces()]
+    *louder, turning = expected_disturbances(scattered, walk, delta, [*alone, unit * in_sweeps(movement)])
+    disturbed = replace(
+        movement.own, walk_m_s2_sqrt_s=walk, louder=np.array(louder), turning_m_s2=float(np.sqrt(turning)) * unit
+    )
+    movement = replace(movement, own=disturbed)
     found = most_likely(fit.theta, movement, held, delta)
     readings = apart(noise(found.theta, movement), effects(found.theta, movement))
     return movement, replace(found, readings=readings, iterations=fit.iterations + found.iterations)

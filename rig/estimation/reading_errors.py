@@ -26,6 +26,8 @@ def noise(theta: Array, movement: Movement) -> Array:
         whole += movement.own.walk_m_s2_sqrt_s**2 * walking(movement)
     if movement.own is not None and movement.own.louder is not None:
         whole += np.diag(np.repeat(of_pieces(movement.own.louder, movement), 3) * np.diag(movement.noise()))
+        turning = movement.own.turning_m_s2 * in_sweeps(movement)
+        whole += turning @ turning.T
     return np.asarray(whole, dtype=np.float64)
 
 
@@ -59,6 +61,13 @@ def walking(movement: Movement) -> Array:
     whole = np.zeros((len(steady),) * 2)
     whole[np.ix_(steady, steady)] = walk_covariance(movement.own.windows_s)
     return np.asarray(np.kron(whole, np.eye(3)), dtype=np.float64)
+
+
+def in_sweeps(movement: Movement) -> Array:
+    """(3 K, 3) another bias of each axis in sweeps alone."""
+    turning = movement.constant()
+    turning[: len(movement.dwells.readings_m_s2)] = 0.0
+    return per_axis(turning[:, None] * np.ones(3))
 
 
 def of_pieces(values: Array, movement: Movement) -> Array:

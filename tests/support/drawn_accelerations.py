@@ -146,7 +146,9 @@ def bent(change: Callable[[Array], Array], scale: float = 0.0) -> Damage:
         more = of_sensor(
             session.truth.theta(), session.movement, lambda along: size * change(along / GRAVITY) * GRAVITY
         )
-        return session.reading(more @ np.ones(3), np.repeat([-size * scale, 0.0], 3) * session.parameters)
+        then = np.zeros(6)
+        then[:3] = 1 / (1 / session.parameters[:3] + size * scale) - session.parameters[:3]
+        return session.reading(more @ np.ones(3), then)
 
     return damage
 
