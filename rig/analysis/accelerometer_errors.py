@@ -17,7 +17,8 @@ from rig.estimation.attitude_error import AttitudeError
 from rig.estimation.budget import Contributor
 from rig.estimation.earth import STANDARD_GRAVITY_M_S2
 from rig.estimation.felt import Movement
-from rig.estimation.imu import ImuSolution, covariance_bound
+from rig.estimation.imu import ImuSolution
+from rig.estimation.imu_fit import covariance_bound
 from rig.estimation.reading_errors import noise
 from rig.estimation.reference_budget import Spread, freedom_of, scale_and_bias
 from rig.observation.acceleration import DwellReading

@@ -14,7 +14,7 @@ import numpy as np
 from rig.analysis.suspicion import Statistic, Suspicions, basis, told_beside, told_by, unlike_the_others
 from rig.estimation.arrays import Array
 from rig.estimation.felt import SECOND, Movement, cross, effects, felt, jacobian, predicted
-from rig.estimation.imu import slopes
+from rig.estimation.imu_fit import slopes
 from rig.estimation.reading_errors import in_sweeps, noise, of_pieces, of_sensor, per_axis
 from rig.estimation.reference_model import matrix
 from rig.estimation.shared_errors import Apart, apart, information, likeliest_error, more_likely

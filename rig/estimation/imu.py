@@ -6,7 +6,7 @@ the points of a sweep by errors that they share, all of the common size δ: rest
 together finds it (`rig.estimation.shared_errors`).
 """
 
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -14,8 +14,7 @@ from numpy.typing import ArrayLike
 from rig.estimation import refusals
 from rig.estimation.accelerometer_errors import AccelerometerErrors
 from rig.estimation.arrays import Array
-from rig.estimation.attitude_error import PASSES, SETTLED, AttitudeError
-from rig.estimation.expected_sizes import Scattered, expected_disturbances, expected_sizes
+from rig.estimation.attitude_error import AttitudeError
 from rig.estimation.felt import (
     DELAY,
     LEVER,
@@ -31,10 +30,10 @@ from rig.estimation.felt import (
     predicted,
     turned,
 )
+from rig.estimation.imu_fit import Fit, as_expected, free_ways, held_still, most_likely, sizes_of
 from rig.estimation.linear_start import MAX_CONDITION, REMEDY, linear_start
-from rig.estimation.reading_errors import in_sweeps, noise, walking
-from rig.estimation.reference_model import BIAS, REFERENCE, STEP_LIMIT, STEP_TOLERANCE, free_directions, matrix
-from rig.estimation.shared_errors import Apart, apart, likeliest_error, with_uncertainty
+from rig.estimation.reference_model import BIAS, REFERENCE, matrix
+from rig.estimation.shared_errors import with_uncertainty
 from rig.estimation.triaxial import ODD, SUSPICIOUS_RAD, UNTRUSTWORTHY_RAD
 
 MODEL = "m = F (s + φ s²) + b, s = Rᵀ v_ref + ω × (ω × (p + r)) + α × (p + r)"
@@ -87,34 +86,6 @@ class ImuSolution:
         return found
 
 
-@dataclass(frozen=True, slots=True)
-class Fit:
-    """θ (22,), how readings are told apart, J (3 K, q) of what is free, its directions (22, q), δ, and the steps."""
-
-    theta: Array
-    readings: Apart
-    jacobian: Array
-    free: Array
-    std_rad: float
-    iterations: int
-
-    def covariance(self) -> Array:
-        """(22, 22) by the Fisher information."""
-        return np.asarray(self.free @ self._inverse() @ self.free.T, dtype=np.float64)
-
-    def response(self) -> Array:
-        """(22, 3 K): how θ changes with the readings."""
-        white = self.readings.white(self.std_rad)
-        return np.asarray(self.free @ self._inverse() @ (white @ self.jacobian).T @ white, dtype=np.float64)
-
-    def _inverse(self) -> Array:
-        """(q, q) of the Fisher information."""
-        weighted = self.readings.white(self.std_rad) @ self.jacobian
-        size = np.linalg.norm(weighted, axis=0)
-        inverse: Array = np.linalg.inv((weighted / size).T @ (weighted / size)) / np.outer(size, size)
-        return inverse
-
-
 def solve_imu(
     dwells: Dwells = NO_DWELLS,
     sweeps: Sweeps = NO_SWEEPS,
@@ -138,18 +109,18 @@ def solve_imu(
     `mirrored_axis`, `attitude_untrustworthy`; ValueError for a wrong shape, or axes that are no unit vectors.
     """
     movement = Movement(dwells, sweeps, repeatability_rad, own, arm_turns)
-    held = _held(movement, second_order=second_order)
+    held = held_still(movement, second_order=second_order)
     needed = PARAMETERS - 1 - len(held)
     _check(movement, needed)
     with refusals.converging():
         start = linear_start(movement, gravity_m_s2, np.asarray(up, dtype=np.float64))
-        columns = jacobian(start, movement) @ _free(start, held)
-        told = refusals.conditioning(columns / _sizes(columns), needed)
+        columns = jacobian(start, movement) @ free_ways(start, held)
+        told = refusals.conditioning(columns / sizes_of(columns), needed)
         what = "some of F, bias, reference, lever arm and delay"
         refusals.check_conditioning(told, needed, MAX_CONDITION, what, REMEDY)
         fit = most_likely(start, movement, held, attitude_std_rad)
         if own is not None:
-            movement, fit = _as_expected(fit, movement, held, attitude_std_rad)
+            movement, fit = as_expected(fit, movement, held, attitude_std_rad)
         covariance, response = fit.covariance(), fit.response()
         if attitude_std_rad is None:
             _check_attitudes(start, movement, held, fit)
@@ -183,77 +154,6 @@ def solve_imu(
     )
 
 
-def covariance_bound(
-    theta: Array, movement: Movement, attitude_std_rad: float, *, second_order: bool = False
-) -> tuple[Array, Array]:
-    """(22, 22) Cramér–Rao bound at the true θ (22,) and δ, for movement and noise as given, and (22, 3 K) the response.
-
-    The readings themselves do not matter.
-    """
-    free = _free(theta, _held(movement, second_order=second_order))
-    readings = apart(noise(theta, movement), effects(theta, movement))
-    fit = Fit(theta, readings, jacobian(theta, movement) @ free, free, attitude_std_rad, 0)
-    return fit.covariance(), fit.response()
-
-
-def slopes(theta: Array, movement: Movement, *, second_order: bool) -> Array:
-    """(3 K, q) derivative of the readings in the ways θ (22,) may move."""
-    return np.asarray(jacobian(theta, movement) @ _free(theta, _held(movement, second_order=second_order)))
-
-
-def most_likely(start: Array, movement: Movement, held: list[int], attitude_std_rad: float | None) -> Fit:
-    """The most likely θ and δ from `start` (22,), alternately, until δ stands still; `held` elements of θ stay."""
-    theta, steps = start, 0
-    delta, last = attitude_std_rad or 0.0, np.inf
-    for _ in range(PASSES):
-        readings = apart(noise(theta, movement), effects(theta, movement))
-        theta, taken = _least_squares(theta, movement, held, readings.white(delta))
-        steps += taken
-        if attitude_std_rad is not None or abs(delta - last) <= SETTLED * delta:
-            break
-        slopes = jacobian(theta, movement) @ _free(theta, held)
-        residuals = (movement.readings() - predicted(theta, movement)).ravel()
-        last, delta = delta, likeliest_error(apart(noise(theta, movement), effects(theta, movement)), residuals, slopes)
-    free = _free(theta, held)
-    return Fit(theta, readings, jacobian(theta, movement) @ free, free, delta, steps)
-
-
-def _least_squares(theta: Array, movement: Movement, held: list[int], white: Array) -> tuple[Array, int]:
-    """θ by Gauss–Newton, and the steps it took."""
-    readings, norm = movement.readings(), np.linalg.norm(theta[REFERENCE])
-    rounding = 1e-13 * float(np.linalg.norm(white @ readings.ravel()))
-    steps, moved = 0, np.inf
-    while steps < STEP_LIMIT and moved > STEP_TOLERANCE + rounding:
-        free = _free(theta, held)
-        slopes = white @ jacobian(theta, movement) @ free
-        size = _sizes(slopes)
-        residuals = white @ (readings - predicted(theta, movement)).ravel()
-        step = np.linalg.lstsq(slopes / size, residuals)[0]
-        theta = theta + free @ (step / size)
-        theta[REFERENCE] *= norm / np.linalg.norm(theta[REFERENCE])
-        steps, moved = steps + 1, float(np.linalg.norm(step))
-    return theta, steps
-
-
-def _as_expected(fit: Fit, movement: Movement, held: list[int], attitude_std_rad: float | None) -> tuple[Movement, Fit]:
-    """With the walk of the bias, the δ and the disturbances that are to be expected by what the fit leaves."""
-    assert movement.own is not None, "or nothing is expected"
-    left = (movement.readings() - predicted(fit.theta, movement)).ravel()
-    known, of_arm, own = noise(fit.theta, movement), effects(fit.theta, movement), np.diag(movement.noise())
-    scattered = Scattered(left, fit.jacobian, known, of_arm, walking(movement), own)
-    walk, delta = expected_sizes(scattered, attitude_std_rad)
-    unit = float(np.sqrt(np.median(own)))
-    alone = [np.diag(np.sqrt(own))[:, piece] for piece in movement.pieces()]
-    *louder, turning = expected_disturbances(scattered, walk, delta, [*alone, unit * in_sweeps(movement)])
-    disturbed = replace(
-        movement.own, walk_m_s2_sqrt_s=walk, louder=np.array(louder), turning_m_s2=float(np.sqrt(turning)) * unit
-    )
-    movement = replace(movement, own=disturbed)
-    found = most_likely(fit.theta, movement, held, delta)
-    readings = apart(noise(found.theta, movement), effects(found.theta, movement))
-    return movement, replace(found, readings=readings, iterations=fit.iterations + found.iterations)
-
-
 def _check_attitudes(start: Array, movement: Movement, held: list[int], fit: Fit) -> None:
     """All of them, and the dwell that fits worst where enough others are left to tell."""
     off, readings = fit.std_rad, movement.readings().size
@@ -282,25 +182,6 @@ def _furthest_off(start: Array, movement: Movement, held: list[int], fit: Fit) -
     own = turned(rest.theta, movement)[3 * worst : 3 * worst + 3, 3 * worst : 3 * worst + 3]
     off = np.linalg.lstsq(own, missed, rcond=1e-6)[0]  # about the reference itself nothing can be told
     return worst, float(np.linalg.norm(off)), rest.std_rad
-
-
-def _held(movement: Movement, *, second_order: bool) -> list[int]:
-    """The elements of θ that are not looked for."""
-    held = [] if second_order else list(range(PARAMETERS))[SECOND]
-    return held if len(movement.sweeps.speeds_rad_s) else [*range(LEVER.start, LEVER.stop), DELAY, *held]
-
-
-def _free(theta: Array, held: list[int]) -> Array:
-    """(22, q) the ways θ may move: v_ref across itself, what is held not at all."""
-    whole = free_directions(theta, norm_known=True)
-    free: Array = np.delete(whole, [each - 1 for each in held], axis=1)  # one column of v_ref stands before them
-    return free
-
-
-def _sizes(columns: Array) -> Array:
-    """(q,) norms; 1 for a column of zeros."""
-    sizes: Array = np.linalg.norm(columns, axis=0)
-    return np.where(sizes > 0, sizes, 1.0)
 
 
 def _check(movement: Movement, needed: int) -> None:

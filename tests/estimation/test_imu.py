@@ -26,7 +26,8 @@ from rig.estimation.felt import (
     effects,
     predicted,
 )
-from rig.estimation.imu import ImuSolution, covariance_bound, most_likely, solve_imu
+from rig.estimation.imu import ImuSolution, solve_imu
+from rig.estimation.imu_fit import covariance_bound, most_likely
 from rig.estimation.reference_model import BIAS
 from rig.estimation.sensor_axes import non_orthogonality
 from support.arm_attitudes import crooked_arm, joints_rad

@@ -7,7 +7,8 @@ import pytest
 
 from rig.errors import Fault
 from rig.estimation.felt import DELAY, LEVER, NO_DWELLS, Movement
-from rig.estimation.imu import covariance_bound, solve_imu
+from rig.estimation.imu import solve_imu
+from rig.estimation.imu_fit import covariance_bound
 from rig.estimation.reference_model import BIAS, REFERENCE
 from rig.estimation.sweep_harmonics import FirstHarmonic, first_harmonic
 from rig.observation.colour import noise_left
