@@ -1,12 +1,14 @@
 """Accelerometers from dwells in known attitudes and from sweeps: TRIAX, section III-B, on an arm."""
 
 from collections.abc import Callable, Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import partial
 from types import MappingProxyType
 
 import numpy as np
 
+from rig.analysis.accelerometer_errors import errors_of, pieces_of
+from rig.analysis.arm_patterns import arm_turns
 from rig.analysis.attitudes import check_seen
 from rig.analysis.calibration import SensorResult, or_fault
 from rig.analysis.reference_budgets import accelerometer_budget
@@ -154,25 +156,36 @@ def _calibrated(
         down=-np.array(site.up),
         second_order=settings.second_order,
     )
-    weighted = solve(method="attitude_weighted").fit  # refuses one attitude that is off alone
-    check_axes(weighted.matrix / np.linalg.norm(weighted.matrix, axis=1, keepdims=True), np.eye(3))
+    movement = Movement(seen, sweeps, _repeatability_rad(settings))
+    if settings.knows_accelerometers:
+        pieces = pieces_of(name, recordings, used)
+        own = errors_of(sensor, pieces, second_order=settings.second_order)
+        turns = arm_turns([each.stood for each in pieces], recordings[0].motion.kinematics, mounting)
+        movement = replace(movement, own=own, arm_turns=turns)
+    weighted = _beside(partial(solve, method="attitude_weighted"))
+    if not isinstance(weighted, Fault):
+        check_axes(_axes(weighted.matrix), np.eye(3))
+    elif movement.own is None:
+        raise weighted  # one attitude is off alone; what it is with a sensor that bends, `solve_imu` says
     solution = solve_imu(
         seen,
         sweeps,
         gravity_m_s2=site.gravity_m_s2,
         up=site.up,
         second_order=settings.second_order,
-        repeatability_rad=_repeatability_rad(settings),
+        repeatability_rad=movement.repeatability_rad,
+        own=movement.own,
+        arm_turns=movement.arm_turns,
     )
+    check_axes(_axes(solution.matrix), np.eye(3))
     if settings.second_order:
         check_seen(solution.second_order_s2_m, np.sqrt(np.diag(solution.covariance)[SECOND]), NOT_SEEN)
-    scale = 1 / np.linalg.norm(solution.matrix, axis=1)
-    axes = solution.matrix * scale[:, None]
+    scale, axes = 1 / np.linalg.norm(solution.matrix, axis=1), _axes(solution.matrix)
     angles = angle_jacobian(axes, scale, nearest_rotation(axes))
     return AccelerometerResult(
         sensor=sensor,
         gravity_m_s2=site.gravity_m_s2,
-        movement=Movement(seen, sweeps, _repeatability_rad(settings)),
+        movement=movement,
         solution=solution,
         scale=scale,
         covariance=scale_and_bias_covariance(solution.matrix, scale, solution.covariance),
@@ -180,10 +193,10 @@ def _calibrated(
         if settings.uncertainty is None
         else accelerometer_budget(
             solution,
-            seen,
-            sweeps,
+            movement,
             site,
             1e-3 * settings.uncertainty.acceleration_lag_ms,
+            part=sensor.part,
             noise_freedom=_noise_freedom(used, _swept(name, recordings)) if settings.counts_freedom else None,
         ),
         non_orthogonality_rad=non_orthogonality(axes),
@@ -194,6 +207,11 @@ def _calibrated(
         sweeps=len(sweeps.speeds_rad_s),
         held_out=_held_out(left_out, solution, site.gravity_m_s2) if left_out else None,
     )
+
+
+def _axes(matrix: Array) -> Array:
+    """(3, 3) unit vectors, the rows of F."""
+    return np.asarray(matrix / np.linalg.norm(matrix, axis=1, keepdims=True), dtype=np.float64)
 
 
 def _apart(

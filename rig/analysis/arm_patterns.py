@@ -8,9 +8,9 @@ import numpy as np
 from rig.analysis.seen import WAVE_SHARE
 from rig.arm.kinematics import WRIST_1, DenavitHartenberg, angle_waves, flange_attitude, flange_errors
 from rig.estimation.arrays import Array
-from rig.estimation.felt import OWN_ERRORS, SHARE, SHARED_ERRORS, TURNS, Movement, effects
+from rig.estimation.felt import ARM_SHARE, OWN_ERRORS, SHARE, SHARED_ERRORS, TURNS, Movement, turned
 
-STEADY = 2  # of a wrist's errors, its twist and its zero; the others are waves of its angle
+ERRORS, STEADY = 6, 2  # of each wrist; of these, its twist and its zero; the others are waves of its angle
 
 
 @dataclass(frozen=True, slots=True)
@@ -36,20 +36,32 @@ class Known:
 
 def arm_patterns(theta: Array, movement: Movement, stood: Sequence[Stood], known: Known) -> Array:
     """(18, 3 K) change of the readings by one standard uncertainty of each of the wrists' errors."""
-    alone = replace(movement.sweeps, stations=np.arange(len(movement.sweeps.stations)))
-    by_turns = effects(theta, replace(movement, sweeps=alone))
-    turns = np.concatenate([_turns(each, known) for each in stood], axis=1)
-    steady = np.arange(len(turns) // 3) < STEADY
-    stated_rad = np.radians(known.axis_deg) / np.sqrt(3) * np.where(steady, 1.0, WAVE_SHARE)
+    by_turns = turned(theta, replace(movement, sweeps=movement.sweeps.alone()))
+    stated_rad = np.radians(known.axis_deg) / np.sqrt(3) * _shares()
     std_rad = np.maximum(stated_rad, known.found_rad)
-    patterns: Array = np.tile(std_rad, 3)[:, None] * (turns @ by_turns.T)
+    patterns: Array = std_rad[:, None] * (_all_turns(stood, known.arm, known.mounting) @ by_turns.T)
     return patterns
 
 
-def _turns(stood: Stood, known: Known) -> Array:
+def arm_turns(stood: Sequence[Stood], arm: DenavitHartenberg, mounting: Array) -> Array:
+    """(18, 3 N + 10 M) of a `Movement`, for an arm that is off by δ = 1."""
+    turns: Array = ARM_SHARE * _shares()[:, None] * _all_turns(stood, arm, mounting)
+    return turns
+
+
+def _shares() -> Array:
+    """(18,) of an error of the arm's, in each of its wrists'."""
+    return np.tile(np.where(np.arange(ERRORS) < STEADY, 1.0, WAVE_SHARE), 3)
+
+
+def _all_turns(stood: Sequence[Stood], arm: DenavitHartenberg, mounting: Array) -> Array:
+    return np.concatenate([_turns(each, arm, mounting) for each in stood], axis=1)
+
+
+def _turns(stood: Stood, arm: DenavitHartenberg, mounting: Array) -> Array:
     """(18, 3 or 10) of the errors that `effects` knows of a dwell or a sweep, by radian of each of the wrists'."""
-    in_base = flange_errors(stood.q_rad, known.arm)
-    in_flange = in_base @ (known.mounting @ flange_attitude(stood.q_rad, known.arm)).T
+    in_base = flange_errors(stood.q_rad, arm)
+    in_flange = in_base @ (mounting @ flange_attitude(stood.q_rad, arm)).T
     if stood.wrist is None:
         return in_flange.reshape(-1, OWN_ERRORS)
     found = np.zeros((*in_base.shape[:2], SHARED_ERRORS))

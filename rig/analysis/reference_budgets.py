@@ -4,12 +4,13 @@ from typing import Final
 
 import numpy as np
 
+from rig.analysis.accelerometer_errors import of_its_own
 from rig.data.settings import Site
 from rig.estimation.arrays import Array
 from rig.estimation.attitude_error import AttitudeError
 from rig.estimation.budget import NOT_GIVEN, Budget, Contributor
 from rig.estimation.earth import STANDARD_GRAVITY_M_S2
-from rig.estimation.felt import Dwells, Movement, Sweeps
+from rig.estimation.felt import Movement
 from rig.estimation.imu import ImuSolution
 from rig.estimation.magnetometer import FieldDrift, MagnetometerSolution, Uniformity
 from rig.estimation.reference_budget import (
@@ -34,21 +35,31 @@ MICROTESLA: Final = 1e6
 
 def accelerometer_budget(
     solution: ImuSolution,
-    dwells: Dwells,
-    sweeps: Sweeps,
+    movement: Movement,
     site: Site,
     lag_s: float,
     *,
     noise_freedom: Array | None = None,
+    part: str = "",
 ) -> Budget:
-    """Of the solution found from these; `lag_s` is how late the sensor's own filter may be.
+    """Of the solution found from the `movement`; `lag_s` is how late the sensor's own filter may be.
 
-    `noise_freedom` (3 N + 9 M,) as in `Spread`: of the dwells' readings, then of the sweeps' harmonics.
+    `noise_freedom` (3 N + 9 M,) as in `Spread`: of the dwells' readings, then of the sweeps' harmonics. `part` names
+    the sensor by whose data sheet the movement's `own` errors are known.
     """
-    noise, left = Movement(dwells, sweeps).noise(), (solution.chi_square, solution.freedom)
-    spread = _spread(solution, solution.response, noise, solution.attitude_error, left, noise_freedom=noise_freedom)
-    others = [_lagging(spread, dwells, sweeps, lag_s)] if len(sweeps.speeds_rad_s) else []
-    return reference_budget(spread, _gravity(site), others)
+    spread = _spread(
+        solution,
+        solution.response,
+        movement.noise(),
+        solution.attitude_error,
+        (solution.chi_square, solution.freedom),
+        noise_freedom=noise_freedom,
+    )
+    others = [_lagging(spread, movement, lag_s)] if len(movement.sweeps.speeds_rad_s) else []
+    if movement.own is None:
+        return reference_budget(spread, _gravity(site), others)
+    bare, own = of_its_own(spread, solution, movement, part)
+    return reference_budget(bare, _gravity(site), [*own, *others])
 
 
 def magnetometer_budget(
@@ -66,7 +77,14 @@ def magnetometer_budget(
     theta = np.concatenate([solution.matrix.ravel(), solution.field_table_t, solution.bias_t])
     response = response_in_attitudes(theta, attitudes, variances_t2, error.std_rad)
     left = alike.chi_square, alike.degrees_of_freedom
-    spread = _spread(solution, response, np.diag(variances_t2.ravel()), error, left, noise_freedom=noise_freedom)
+    spread = _spread(
+        solution,
+        response,
+        np.diag(variances_t2.ravel()),
+        error,
+        left,
+        noise_freedom=noise_freedom,
+    )
     return reference_budget(spread, _field(site), [_drifting(spread, solution.matrix, attitudes, drift)])
 
 
@@ -102,8 +120,9 @@ def _field(site: Site) -> KnownSize:
     return KnownSize(SIZE_OF_FIELD, UNSTATED_FIELD, False, size_ut, "µT", f"{said} {NOT_GIVEN}")
 
 
-def lag_pattern(dwells: Dwells, sweeps: Sweeps, lag_s: float) -> Array:
+def lag_pattern(movement: Movement, lag_s: float) -> Array:
     """(1, 3 K) what the sensor's own filter takes of a turn's wave: (ω τ)²/2, which the model leaves out."""
+    dwells, sweeps = movement.dwells, movement.sweeps
     smaller = sweeps.harmonics_m_s2 * np.square(sweeps.speeds_rad_s * lag_s)[:, None, None] / 2
     smaller[:, 0] = 0.0  # the mean passes whole
     return np.concatenate([np.zeros(dwells.readings_m_s2.size), smaller.ravel()])[None]
@@ -121,9 +140,9 @@ def drift_patterns(matrix: Array, attitudes: Array, drift: FieldDrift | None) ->
     return change_t * np.moveaxis(along, -1, 0).reshape(3, -1), change_t
 
 
-def _lagging(spread: Spread, dwells: Dwells, sweeps: Sweeps, lag_s: float) -> Contributor:
+def _lagging(spread: Spread, movement: Movement, lag_s: float) -> Contributor:
     said = "uncertainty.acceleration_lag_ms"
-    return assumed("filter's lag", 1e3 * lag_s, "ms", said, spread.of(lag_pattern(dwells, sweeps, lag_s)))
+    return assumed("filter's lag", 1e3 * lag_s, "ms", said, spread.of(lag_pattern(movement, lag_s)))
 
 
 def _drifting(spread: Spread, matrix: Array, attitudes: Array, drift: FieldDrift | None) -> Contributor:

@@ -6,19 +6,18 @@ stated of the rest. How far the arm is off is found anew beside every suspicion,
 itself: a suspicion is told by how much likelier it makes the readings.
 """
 
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
 
 from rig.analysis.suspicion import Statistic, Suspicions, basis, told_beside, told_by, unlike_the_others
 from rig.estimation.arrays import Array
-from rig.estimation.felt import SECOND, Movement, cross, effects, felt, jacobian, noise, predicted
-from rig.estimation.imu import slopes
+from rig.estimation.felt import SECOND, Movement, cross, effects, felt, jacobian, predicted
+from rig.estimation.imu_fit import slopes
+from rig.estimation.reading_errors import in_sweeps, noise, of_pieces, of_sensor, per_axis
 from rig.estimation.reference_model import matrix
 from rig.estimation.shared_errors import Apart, apart, information, likeliest_error, more_likely
-
-ANGLES = 72  # of a turn, over which what is not linear in the acceleration is averaged
 
 
 @dataclass(frozen=True, slots=True)
@@ -164,15 +163,15 @@ def _suspicions(read: Read) -> Suspicions:
     s, f, time = felt(read.theta, read.movement), matrix(read.theta), _time(read)
     found: dict[str, Array | None] = {
         "bias_changed": _bias_over_time(read),
-        "scale_changed": _per_axis((s @ f.T) * time[:, None]),
+        "scale_changed": per_axis((s @ f.T) * time[:, None]),
         "loose_mounting": ((f @ -cross(s)) * time[:, None, None]).reshape(-1, 3),
         "even_term": jacobian(read.theta, read.movement)[:, SECOND],
-        "odd_term": _of_sensor(read, lambda along: along**3),
-        "asymmetry": _of_sensor(read, np.abs),
+        "odd_term": of_sensor(read.theta, read.movement, lambda along: along**3),
+        "asymmetry": of_sensor(read.theta, read.movement, np.abs),
         "residuals": None,
     }
     if read.dwells and read.sweeps:
-        found["sweeps_against_dwells"] = _per_axis(_swept(read)[:, None] * np.ones(3))
+        found["sweeps_against_dwells"] = in_sweeps(read.movement)
     return found
 
 
@@ -185,31 +184,11 @@ def _of_piece(read: Read, piece: int) -> Array:
 
 
 def _bias_over_time(read: Read) -> Array:
-    return _per_axis((_time(read) * read.movement.constant())[:, None] * np.ones(3))
-
-
-def _swept(read: Read) -> Array:
-    """(K,) 1 in the means of sweeps."""
-    return np.concatenate([np.zeros(read.dwells), read.movement.constant()[read.dwells :]])
+    return per_axis((_time(read) * read.movement.constant())[:, None] * np.ones(3))
 
 
 def _time(read: Read) -> Array:
     """(K,) of the middles, from −1 to 1."""
-    middle = np.concatenate([read.times_s[: read.dwells], np.repeat(read.times_s[read.dwells :], 3)])
+    middle = of_pieces(read.times_s, read.movement)
     time: Array = (2 * middle - middle.max() - middle.min()) / np.ptp(middle)
     return time
-
-
-def _per_axis(columns: Array) -> Array:
-    """(3 K, 3) from (K, 3): each axis' own column, with a coefficient of its own."""
-    return np.asarray((columns[:, :, None] * np.eye(3)).reshape(-1, 3), dtype=np.float64)
-
-
-def _of_sensor(read: Read, change: Callable[[Array], Array]) -> Array:
-    """(3 K, 3) what an axis adds that reads `change` of what it feels: in a sweep, mean and first harmonic of it."""
-    felt_along = felt(read.theta, read.movement) @ matrix(read.theta).T
-    mean, cos, sin = np.moveaxis(felt_along[read.dwells :].reshape(-1, 3, 3), 1, 0)
-    angle = 2 * np.pi * np.arange(ANGLES)[:, None, None] / ANGLES
-    turning = change(mean + cos * np.cos(angle) + sin * np.sin(angle))
-    waves = [turning.mean(axis=0), *(2 * (turning * wave(angle)).mean(axis=0) for wave in (np.cos, np.sin))]
-    return _per_axis(np.concatenate([change(felt_along[: read.dwells]), np.stack(waves, axis=1).reshape(-1, 3)]))

@@ -26,7 +26,7 @@ from rig.analysis.suspicion import Statistic
 from rig.arm.kinematics import WRIST_1
 from rig.data.settings import Uncertainty
 from rig.estimation.arrays import Array
-from rig.estimation.felt import DELAY, LEVER, NO_SWEEPS, PARAMETERS, SECOND, Movement
+from rig.estimation.felt import LEVER, NO_SWEEPS, PARAMETERS, Movement
 from rig.observation.observed_run import ObservedRun
 
 DISTURBED_DWELL, DISTURBED_SWEEP = "disturbed_dwell", "disturbed_sweep"
@@ -55,13 +55,8 @@ def of_accelerometer(
     used = {dwell.index for dwell in result.dwells}
     pieces = [_Piece.of_dwell(dwell) for dwell in dwells if dwell.index in used]
     pieces += [piece for each, since_s in timed for piece in _swept(name, each, since_s)]
-    solution, movement = result.solution, result.movement
-    theta = _theta(solution.matrix, solution.reference_m_s2, solution.bias_m_s2)
-    if solution.lever_arm_m is not None:
-        theta[LEVER], theta[DELAY] = solution.lever_arm_m, solution.delay_s
-    if solution.second_order_s2_m is not None:
-        theta[SECOND] = solution.second_order_s2_m
-    lag = lag_pattern(movement.dwells, movement.sweeps, 1e-3 * known.acceleration_lag_ms) / np.sqrt(3)
+    solution, movement, theta = result.solution, result.movement, result.solution.theta
+    lag = lag_pattern(movement, 1e-3 * known.acceleration_lag_ms) / np.sqrt(3)
     off_rad = solution.attitude_error.std_rad
     arm = Known(recordings[0].motion.kinematics, known.axis_deg, np.array(result.sensor.mounting), off_rad)
     return ReadInReference(

@@ -8,6 +8,20 @@ RATE_TOLERANCE = 2e-4  # relative: 333.33 stands for 1000/3, and the closest two
 
 
 @dataclass(frozen=True, slots=True)
+class AccelerometerSheet:
+    """What a data sheet says of an accelerometer, or of one of its kind: half-widths.
+
+    `nonlinearity_percent` is how far it may be from the best straight line, of the range `nonlinear_over_g` either way,
+    the one that is set where that is None; `bias_mg_k` and `scale_ppm_k` what a degree changes of bias and scale.
+    """
+
+    nonlinearity_percent: float
+    bias_mg_k: float
+    scale_ppm_k: float
+    nonlinear_over_g: float | None = None
+
+
+@dataclass(frozen=True, slots=True)
 class Part:
     """One kind of sensor: `rates_hz` and `ranges_deg_s` are all its gyroscope can do, `rates_rule` says rates in words.
 
@@ -15,7 +29,8 @@ class Part:
     from a straight line, of full scale, `bias_deg_s_k` and `scale_ppm_k` how much bias and scale may change with
     temperature, `non_orthogonality_deg` how far from 90° two of its axes may stand. `ranges_g` are those of its
     accelerometer, which shares its data rate, the usual one first; `acceleration_noise_ug_sqrt_hz` is the noise density
-    of that, in µg/√Hz. A part with a port of its own stands beside the board, with a clock of its own.
+    of that, in µg/√Hz, and `accelerometer` what else is known of it. A part with a port of its own stands beside the
+    board, with a clock of its own.
     """
 
     rates_hz: tuple[float, ...]
@@ -30,6 +45,7 @@ class Part:
     non_orthogonality_deg: float
     ranges_g: tuple[float, ...]
     acceleration_noise_ug_sqrt_hz: float
+    accelerometer: AccelerometerSheet
     own_port: bool = False
 
     def accept_rate(self, rate_hz: float) -> float:
@@ -91,6 +107,9 @@ PARTS: Mapping[str, Part] = MappingProxyType(
             non_orthogonality_deg=1.15,
             ranges_g=(2, 4, 8, 16),
             acceleration_noise_ug_sqrt_hz=150,  # not stated; assumed
+            accelerometer=AccelerometerSheet(  # not stated; that of the MPU-9250
+                nonlinearity_percent=0.5, bias_mg_k=1.5, scale_ppm_k=260
+            ),
         ),
         "mpu9250": Part(  # register map RM-MPU-9250A-00, registers 25 (SMPLRT_DIV) and 27 (GYRO_CONFIG)
             rates_hz=tuple(1000 / (1 + divider) for divider in range(250)),
@@ -105,6 +124,9 @@ PARTS: Mapping[str, Part] = MappingProxyType(
             non_orthogonality_deg=1.15,  # cross-axis sensitivity ±2 % (table 1)
             ranges_g=(2, 4, 8, 16),
             acceleration_noise_ug_sqrt_hz=300,  # PS-MPU-9250A-01, section 3.2
+            accelerometer=AccelerometerSheet(  # PS-MPU-9250A-01, table 2; changes by its -40 to 85 °C
+                nonlinearity_percent=0.5, bias_mg_k=1.5, scale_ppm_k=260
+            ),
         ),
         "adis16465": Part(  # datasheet, register DEC_RATE; the range is the model's: -1, -2 and -3 have one each
             rates_hz=tuple(2000 / (1 + divider) for divider in range(2000)),
@@ -119,6 +141,9 @@ PARTS: Mapping[str, Part] = MappingProxyType(
             non_orthogonality_deg=0.15,  # axis to axis ±0.05° (data sheet, features), taken for a standard deviation
             ranges_g=(8,),
             acceleration_noise_ug_sqrt_hz=23,  # assumed: the data sheet of the part has it, not looked up
+            accelerometer=AccelerometerSheet(  # assumed: the data sheet of the part has it, not looked up
+                nonlinearity_percent=0.25, nonlinear_over_g=2, bias_mg_k=0.05, scale_ppm_k=20
+            ),
         ),
         "kvh1775": Part(  # ICD 56-0298 Rev. B, command =DR; -01 and -25 have one range of acceleration each
             rates_hz=(1, 5, 10, 25, 50, 100, 250, 500, 750, 1000, 3600, 5000),
@@ -133,6 +158,9 @@ PARTS: Mapping[str, Part] = MappingProxyType(
             non_orthogonality_deg=0.06,  # assumed: 1 mrad
             ranges_g=(10, 25),
             acceleration_noise_ug_sqrt_hz=119,  # TRIAX, table 1: 0.0701 m/s/√h
+            accelerometer=AccelerometerSheet(  # assumed: the maker's data sheet has it, not looked up
+                nonlinearity_percent=0.9, nonlinear_over_g=10, bias_mg_k=0.05, scale_ppm_k=100
+            ),
             own_port=True,
         ),
     }

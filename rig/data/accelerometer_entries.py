@@ -65,6 +65,8 @@ class AccelerometerEntry(Entry):
 
     - `covariance` is that of scale and bias by the solution alone, `covariance_combined` all of it, of which `budget`
       says what makes it up; null in results of before there was one. `gravity_m_s2` is what the scale is relative to.
+    - With its `nonlinearity` in the `budget`, `scale` is that of the readings at 1 g up and 1 g down, `bias_m_s2` the
+      reading at 0 g, whatever curve the sensor has between.
     - `reference_m_s2` is the specific force at rest in the arm's base frame, `attitude_error_rad` how far the arm's
       attitudes are off about each axis, by the readings' own account.
     - `lever_arm_m`, from the sweeps' axes to the sensor in the flange's frame, and `delay_s`, by which it lags behind

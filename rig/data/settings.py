@@ -233,6 +233,11 @@ class RunSettings:
         return self.reckoning >= 2
 
     @property
+    def knows_accelerometers(self) -> bool:
+        """Whether accelerometers are taken to bend and to drift as their data sheets let them."""
+        return self.reckoning >= 2
+
+    @property
     def leaves_dwells_early(self) -> bool:
         """Whether a dwell's last readings are left out."""
         return self.reckoning >= 2

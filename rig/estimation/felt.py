@@ -19,10 +19,12 @@ Dwells and sweeps are one list of K = N + 3 M vectors: the N dwells, then mean, 
 """
 
 from dataclasses import dataclass, replace
+from itertools import pairwise
 
 import numpy as np
 from numpy.typing import NDArray
 
+from rig.estimation.accelerometer_errors import AccelerometerErrors
 from rig.estimation.arrays import Array
 from rig.estimation.reference_model import BIAS, REFERENCE, matrix
 
@@ -31,6 +33,7 @@ PARAMETERS = 22
 OWN_ERRORS = 3  # of a dwell: a small turn of the flange
 SHARED_ERRORS = 10  # of a station: a small turn in the flange's frame, one in the base's, four waves of the angle
 TURNS = 6  # of these ten, both turns
+OWN_SHARE, ARM_SHARE = 0.2**0.5, 0.8**0.5  # of δ, in what is off anew each time, and in what each wrist always errs by
 SHARE = 0.5**0.5  # of δ, in each: so both turns together are off as far as a dwell is, and so are all waves together
 
 
@@ -63,6 +66,10 @@ class Sweeps:
     arms_m: Array
     stations: NDArray[np.intp]
 
+    def alone(self) -> "Sweeps":
+        """The same, each at a station of its own."""
+        return replace(self, stations=np.arange(len(self.stations)))
+
 
 NO_DWELLS = Dwells(np.zeros((0, 3)), np.zeros((0, 3)), np.zeros((0, 3, 3)))
 NO_SWEEPS = Sweeps(
@@ -82,17 +89,27 @@ class Movement:
 
     `repeatability_rad`: the standard deviation of the small turns by which each sweep is off for itself, about each
     axis, where those of one station share all else: a joint that is come to from the other side stands elsewhere.
+    `own`: what the sensor itself adds; None of recordings of before, and of sensors of which nothing is known.
+    `arm_turns` (P, 3 N + 10 M): what P errors of the arm's do to each dwell and sweep, by δ, as `effects` counts their
+    turns; None where nothing is known of the arm but that it errs.
     """
 
     dwells: Dwells
     sweeps: Sweeps
     repeatability_rad: float = 0.0
+    own: AccelerometerErrors | None = None
+    arm_turns: Array | None = None
 
     def without(self, dwell: int) -> "Movement":
         """All but one dwell."""
         left = np.arange(len(self.dwells.readings_m_s2)) != dwell
-        own = self.dwells
-        return replace(self, dwells=Dwells(own.readings_m_s2[left], own.variances_m2_s4[left], own.attitudes[left]))
+        kept, places = self.dwells, np.arange(OWN_ERRORS * dwell, OWN_ERRORS * (dwell + 1))
+        return replace(
+            self,
+            dwells=Dwells(kept.readings_m_s2[left], kept.variances_m2_s4[left], kept.attitudes[left]),
+            own=None if self.own is None else self.own.without(dwell),
+            arm_turns=None if self.arm_turns is None else np.delete(self.arm_turns, places, axis=1),
+        )
 
     def readings(self) -> Array:
         """(K, 3) m/s²."""
@@ -107,6 +124,12 @@ class Movement:
             place = slice(own + 9 * sweep, own + 9 * sweep + 9)
             whole[place, place] = covariance
         return whole
+
+    def pieces(self) -> list[slice]:
+        """Where the readings of each dwell stand among all 3 K, then those of each sweep."""
+        still, swept = len(self.dwells.readings_m_s2), len(self.sweeps.speeds_rad_s)
+        first = [3 * dwell for dwell in range(still)] + [3 * still + 9 * sweep for sweep in range(swept + 1)]
+        return [slice(*ends) for ends in pairwise(first)]
 
     def constant(self) -> Array:
         """(K,) 1 where the bias is read, 0 in a cosine and a sine."""
@@ -181,8 +204,18 @@ def effects(theta: Array, movement: Movement) -> Array:
     """(3 K, P) change of the readings by each of the arm's errors, per radian; P = 3 N + 10 for each station.
 
     A dwell has three of its own. All points of a station's sweeps share ten: small turns of the flange and of the base,
-    and waves of the joint's angle, A cos θ + B sin θ + C cos 2θ + D sin 2θ, of which the first harmonic is kept.
+    and waves of the joint's angle, A cos θ + B sin θ + C cos 2θ + D sin 2θ, of which the first harmonic is kept. Where
+    the wrists' errors are known by kind they follow, shared by all.
     """
+    own = turned(theta, movement)
+    if movement.arm_turns is None:
+        return own
+    by_turns = turned(theta, replace(movement, sweeps=movement.sweeps.alone()))
+    return np.concatenate([OWN_SHARE * own, by_turns @ movement.arm_turns.T], axis=1)
+
+
+def turned(theta: Array, movement: Movement) -> Array:
+    """The same of dwells and stations each for itself."""
     count, sweeps = len(movement.dwells.readings_m_s2), movement.sweeps
     gravity, s = of_gravity(theta[DELAY], movement), felt(theta, movement)
     stations, places = np.unique(sweeps.stations, return_inverse=True)
@@ -199,17 +232,6 @@ def effects(theta: Array, movement: Movement) -> Array:
         own[..., 6:10] = _of_angle(gravity[rows] @ theta[REFERENCE], axis, speed**2, arm)
         own *= SHARE
     return _read(changes, theta, movement).reshape(3 * len(gravity), -1)
-
-
-def noise(theta: Array, movement: Movement) -> Array:
-    """(3 K, 3 K) covariance of what is off in each reading for itself: its noise, and the arm's repeatability."""
-    whole, sweeps = movement.noise(), movement.sweeps
-    if movement.repeatability_rad == 0.0:
-        return whole
-    alone = replace(sweeps, stations=np.arange(len(sweeps.stations)))
-    own = effects(theta, replace(movement, sweeps=alone))[:, OWN_ERRORS * len(movement.dwells.readings_m_s2) :]
-    turns = own[:, np.arange(own.shape[1]) % SHARED_ERRORS < TURNS] * (movement.repeatability_rad / SHARE)
-    return np.asarray(whole + turns @ turns.T, dtype=np.float64)
 
 
 def _of_angle(pulled: Array, axis: Array, speed_squared: float, arm: Array) -> Array:

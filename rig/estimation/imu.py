@@ -12,8 +12,9 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from rig.estimation import refusals
+from rig.estimation.accelerometer_errors import AccelerometerErrors
 from rig.estimation.arrays import Array
-from rig.estimation.attitude_error import PASSES, SETTLED, AttitudeError
+from rig.estimation.attitude_error import AttitudeError
 from rig.estimation.felt import (
     DELAY,
     LEVER,
@@ -26,12 +27,13 @@ from rig.estimation.felt import (
     Sweeps,
     effects,
     jacobian,
-    noise,
     predicted,
+    turned,
 )
+from rig.estimation.imu_fit import Fit, as_expected, free_ways, held_still, most_likely, sizes_of
 from rig.estimation.linear_start import MAX_CONDITION, REMEDY, linear_start
-from rig.estimation.reference_model import BIAS, REFERENCE, STEP_LIMIT, STEP_TOLERANCE, free_directions, matrix
-from rig.estimation.shared_errors import Apart, apart, likeliest_error, with_uncertainty
+from rig.estimation.reference_model import BIAS, REFERENCE, matrix
+from rig.estimation.shared_errors import with_uncertainty
 from rig.estimation.triaxial import ODD, SUSPICIOUS_RAD, UNTRUSTWORTHY_RAD
 
 MODEL = "m = F (s + φ s²) + b, s = Rᵀ v_ref + ω × (ω × (p + r)) + α × (p + r)"
@@ -50,6 +52,7 @@ class ImuSolution:
     - `dwell_residuals_m_s2` (N, 3), `sweep_residuals_m_s2` (M, 3, 3): reading less model; `chi_square` of them, which
       left `freedom`.
     - `rank`, `condition`: of the readings' derivatives, each column in its own size.
+    - `own`: what the sensor adds, with what the readings say of it; None where nothing is known.
     """
 
     matrix: Array
@@ -69,34 +72,18 @@ class ImuSolution:
     condition: float
     iterations: int
     warnings: tuple[str, ...]
+    own: AccelerometerErrors | None = None
 
-
-@dataclass(frozen=True, slots=True)
-class Fit:
-    """θ (22,), how readings are told apart, J (3 K, q) of what is free, its directions (22, q), δ, and the steps."""
-
-    theta: Array
-    readings: Apart
-    jacobian: Array
-    free: Array
-    std_rad: float
-    iterations: int
-
-    def covariance(self) -> Array:
-        """(22, 22) by the Fisher information."""
-        return np.asarray(self.free @ self._inverse() @ self.free.T, dtype=np.float64)
-
-    def response(self) -> Array:
-        """(22, 3 K): how θ changes with the readings."""
-        white = self.readings.white(self.std_rad)
-        return np.asarray(self.free @ self._inverse() @ (white @ self.jacobian).T @ white, dtype=np.float64)
-
-    def _inverse(self) -> Array:
-        """(q, q) of the Fisher information."""
-        weighted = self.readings.white(self.std_rad) @ self.jacobian
-        size = np.linalg.norm(weighted, axis=0)
-        inverse: Array = np.linalg.inv((weighted / size).T @ (weighted / size)) / np.outer(size, size)
-        return inverse
+    @property
+    def theta(self) -> Array:
+        """(22,) as `rig.estimation.felt` orders it."""
+        found = np.zeros(PARAMETERS)
+        found[: LEVER.start] = np.concatenate([self.matrix.ravel(), self.reference_m_s2, self.bias_m_s2])
+        if self.lever_arm_m is not None:
+            found[LEVER], found[DELAY] = self.lever_arm_m, self.delay_s
+        if self.second_order_s2_m is not None:
+            found[SECOND] = self.second_order_s2_m
+        return found
 
 
 def solve_imu(
@@ -108,27 +95,32 @@ def solve_imu(
     second_order: bool = False,
     attitude_std_rad: float | None = None,
     repeatability_rad: float = 0.0,
+    own: AccelerometerErrors | None = None,
+    arm_turns: Array | None = None,
 ) -> ImuSolution:
     """Calibrate from dwells, sweeps or both.
 
     `gravity_m_s2` is the size of v_ref, `up` (3,) says to which side of the base it points, roughly;
-    `attitude_std_rad` holds δ, 0 for an exact arm, instead of finding it. `repeatability_rad`: see `Movement`.
+    `attitude_std_rad` holds δ, 0 for an exact arm, instead of finding it. `repeatability_rad`, `own`,
+    `arm_turns`: see `Movement`.
 
     Raises Fault `too_few_observations`, `not_finite`, `bad_variance`, `bad_speed`, `zero_reading`,
     `duplicated_observation`, `bad_attitude`, `rank_deficient`, `ill_conditioned`, `sign_unknown`, `wrong_unit`,
     `mirrored_axis`, `attitude_untrustworthy`; ValueError for a wrong shape, or axes that are no unit vectors.
     """
-    movement = Movement(dwells, sweeps, repeatability_rad)
-    held = _held(movement, second_order=second_order)
+    movement = Movement(dwells, sweeps, repeatability_rad, own, arm_turns)
+    held = held_still(movement, second_order=second_order)
     needed = PARAMETERS - 1 - len(held)
     _check(movement, needed)
     with refusals.converging():
         start = linear_start(movement, gravity_m_s2, np.asarray(up, dtype=np.float64))
-        columns = jacobian(start, movement) @ _free(start, held)
-        told = refusals.conditioning(columns / _sizes(columns), needed)
+        columns = jacobian(start, movement) @ free_ways(start, held)
+        told = refusals.conditioning(columns / sizes_of(columns), needed)
         what = "some of F, bias, reference, lever arm and delay"
         refusals.check_conditioning(told, needed, MAX_CONDITION, what, REMEDY)
         fit = most_likely(start, movement, held, attitude_std_rad)
+        if own is not None:
+            movement, fit = as_expected(fit, movement, held, attitude_std_rad)
         covariance, response = fit.covariance(), fit.response()
         if attitude_std_rad is None:
             _check_attitudes(start, movement, held, fit)
@@ -157,60 +149,9 @@ def solve_imu(
         rank=told.rank,
         condition=told.condition,
         iterations=fit.iterations,
+        own=movement.own,
         warnings=refusals.inconsistency(white, np.ones_like(white), freedom),
     )
-
-
-def covariance_bound(
-    theta: Array, dwells: Dwells, sweeps: Sweeps, attitude_std_rad: float, *, second_order: bool = False
-) -> Array:
-    """(22, 22) Cramér–Rao bound at the true θ (22,) and δ, for movement and noise as given.
-
-    The readings themselves do not matter.
-    """
-    movement = Movement(dwells, sweeps)
-    free = _free(theta, _held(movement, second_order=second_order))
-    readings = apart(noise(theta, movement), effects(theta, movement))
-    return Fit(theta, readings, jacobian(theta, movement) @ free, free, attitude_std_rad, 0).covariance()
-
-
-def slopes(theta: Array, movement: Movement, *, second_order: bool) -> Array:
-    """(3 K, q) derivative of the readings in the ways θ (22,) may move."""
-    return np.asarray(jacobian(theta, movement) @ _free(theta, _held(movement, second_order=second_order)))
-
-
-def most_likely(start: Array, movement: Movement, held: list[int], attitude_std_rad: float | None) -> Fit:
-    """The most likely θ and δ from `start` (22,), alternately, until δ stands still; `held` elements of θ stay."""
-    theta, steps = start, 0
-    delta, last = attitude_std_rad or 0.0, np.inf
-    for _ in range(PASSES):
-        readings = apart(noise(theta, movement), effects(theta, movement))
-        theta, taken = _least_squares(theta, movement, held, readings.white(delta))
-        steps += taken
-        if attitude_std_rad is not None or abs(delta - last) <= SETTLED * delta:
-            break
-        slopes = jacobian(theta, movement) @ _free(theta, held)
-        residuals = (movement.readings() - predicted(theta, movement)).ravel()
-        last, delta = delta, likeliest_error(apart(noise(theta, movement), effects(theta, movement)), residuals, slopes)
-    free = _free(theta, held)
-    return Fit(theta, readings, jacobian(theta, movement) @ free, free, delta, steps)
-
-
-def _least_squares(theta: Array, movement: Movement, held: list[int], white: Array) -> tuple[Array, int]:
-    """θ by Gauss–Newton, and the steps it took."""
-    readings, norm = movement.readings(), np.linalg.norm(theta[REFERENCE])
-    rounding = 1e-13 * float(np.linalg.norm(white @ readings.ravel()))
-    steps, moved = 0, np.inf
-    while steps < STEP_LIMIT and moved > STEP_TOLERANCE + rounding:
-        free = _free(theta, held)
-        slopes = white @ jacobian(theta, movement) @ free
-        size = _sizes(slopes)
-        residuals = white @ (readings - predicted(theta, movement)).ravel()
-        step = np.linalg.lstsq(slopes / size, residuals)[0]
-        theta = theta + free @ (step / size)
-        theta[REFERENCE] *= norm / np.linalg.norm(theta[REFERENCE])
-        steps, moved = steps + 1, float(np.linalg.norm(step))
-    return theta, steps
 
 
 def _check_attitudes(start: Array, movement: Movement, held: list[int], fit: Fit) -> None:
@@ -232,34 +173,15 @@ def _furthest_off(start: Array, movement: Movement, held: list[int], fit: Fit) -
     """The dwell that fits worst, by how much the others say it is off, rad, and their own δ."""
     count = len(movement.dwells.readings_m_s2)
     residuals = (movement.readings() - predicted(fit.theta, movement))[:count]
-    turned = effects(fit.theta, movement)[: 3 * count].reshape(count, 3, -1)
-    spread = movement.dwells.variances_m2_s4[..., None] * np.eye(3) + fit.std_rad**2 * turned @ turned.swapaxes(1, 2)
+    off_by = effects(fit.theta, movement)[: 3 * count].reshape(count, 3, -1)
+    spread = movement.dwells.variances_m2_s4[..., None] * np.eye(3) + fit.std_rad**2 * off_by @ off_by.swapaxes(1, 2)
     misfit = np.sum(residuals * np.linalg.solve(spread, residuals[..., None])[..., 0], axis=1)
     worst = int(np.argmax(misfit))
     rest = most_likely(start, movement.without(worst), held, None)
     missed = (movement.readings() - predicted(rest.theta, movement))[worst]
-    own = effects(rest.theta, movement)[3 * worst : 3 * worst + 3, 3 * worst : 3 * worst + 3]
+    own = turned(rest.theta, movement)[3 * worst : 3 * worst + 3, 3 * worst : 3 * worst + 3]
     off = np.linalg.lstsq(own, missed, rcond=1e-6)[0]  # about the reference itself nothing can be told
     return worst, float(np.linalg.norm(off)), rest.std_rad
-
-
-def _held(movement: Movement, *, second_order: bool) -> list[int]:
-    """The elements of θ that are not looked for."""
-    held = [] if second_order else list(range(PARAMETERS))[SECOND]
-    return held if len(movement.sweeps.speeds_rad_s) else [*range(LEVER.start, LEVER.stop), DELAY, *held]
-
-
-def _free(theta: Array, held: list[int]) -> Array:
-    """(22, q) the ways θ may move: v_ref across itself, what is held not at all."""
-    whole = free_directions(theta, norm_known=True)
-    free: Array = np.delete(whole, [each - 1 for each in held], axis=1)  # one column of v_ref stands before them
-    return free
-
-
-def _sizes(columns: Array) -> Array:
-    """(q,) norms; 1 for a column of zeros."""
-    sizes: Array = np.linalg.norm(columns, axis=0)
-    return np.where(sizes > 0, sizes, 1.0)
 
 
 def _check(movement: Movement, needed: int) -> None:

@@ -106,7 +106,7 @@ def reference_budget(spread: Spread, size: KnownSize, others: Sequence[Contribut
             "arm's attitudes",
             "what the readings say of them",
             spread.covariance - noise,
-            _freedom(spread.attitude_error),
+            freedom_of(spread.attitude_error),
         ),
     ]
     beyond = spread.chi_square / max(spread.freedom, 1) - 1.0
@@ -137,7 +137,7 @@ def _found(name: str, source: str, covariance: Array, freedom: float = np.inf) -
     return Contributor(name, "A", "normal", None, "", source, freedom, covariance)
 
 
-def _freedom(error: AttitudeError) -> float:
+def freedom_of(error: AttitudeError) -> float:
     """Degrees of freedom of an uncertainty that is itself uncertain (JCGM 100, G.4.2)."""
     if error.uncertainty_rad == 0.0:
         return np.inf

@@ -5,6 +5,7 @@ from collections.abc import Iterator
 import numpy as np
 from rich.table import Table
 
+from rig.analysis.accelerometer_errors import NONLINEARITY
 from rig.data.accelerometer_entries import AccelerometerEntry
 from rig.data.budget_entries import expanded_uncertainties
 from rig.data.result_types import ErrorEntry
@@ -28,6 +29,8 @@ def accelerometer_lines(found: AccelerometerEntry) -> Iterator[str]:
     yield f"relative to gravity, {found.gravity_m_s2:.6g} m/s²; {len(found.dwells)} attitudes, {found.sweeps} sweeps"
     if found.found_at is not None:
         yield f"scale and bias: {when_words(found.found_at)}"
+    if found.budget is not None and any(line.name == NONLINEARITY for line in found.budget.contributors):
+        yield "k by the readings at 1 g up and down, b at 0 g"
     yield from assumed_lines(found.budget)
     skew = triple(np.degrees(found.non_orthogonality_rad), "+.4f")
     yield f"non-orthogonality yz zx xy: {skew} ° (± {skew_known(found)})"

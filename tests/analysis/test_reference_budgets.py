@@ -12,8 +12,11 @@ from rig.config.attitude_sets import EIGHTEEN
 from rig.data.settings import Site
 from rig.estimation.arrays import Array
 from rig.estimation.budget import Budget
+from rig.estimation.felt import Movement
 from rig.estimation.imu import solve_imu
 from rig.estimation.magnetometer import field_drift, solve_magnetometer, uniformity
+from rig.estimation.reference_budget import scale_and_bias_covariance
+from support import drawn_accelerations
 from support.arm_attitudes import attitudes_of, crooked, crooked_arm, joints_rad
 from support.arm_sweeps import Truth, planned, recorded_dwells, recorded_sweeps
 
@@ -50,7 +53,7 @@ def accelerometer(seed: int, site: Site = SITE, lag_s: float = LAG_S) -> Session
     sweeps.harmonics_m_s2[:, 1:] *= smaller[:, None, None]
     dwells = recorded_dwells(truth, arm, JOINTS, DENSITY_UG, rng)
     solution = solve_imu(dwells, sweeps, gravity_m_s2=GRAVITY)
-    budget = accelerometer_budget(solution, dwells, sweeps, site, lag_s)
+    budget = accelerometer_budget(solution, Movement(dwells, sweeps), site, lag_s)
     scale = 1 / np.linalg.norm(solution.matrix, axis=1)
     off = np.concatenate([scale - 1 / np.linalg.norm(truth.matrix, axis=1), solution.bias_m_s2 - truth.bias_m_s2])
     return off / budget.std, budget, off / own_spread(budget)
@@ -110,6 +113,37 @@ def test_the_stated_uncertainty_covers_the_truth(
 ) -> None:
     seeds, within = (200, (0.85, 1.1)) if thorough else (12, (0.6, 1.3))
     check([session(seed) for seed in range(seeds)], within, without)
+
+
+@pytest.mark.proof
+@pytest.mark.timeout(600)
+@pytest.mark.parametrize("part", ["lsm9ds1", "mpu9250", "adis16465"])
+def test_the_stated_uncertainty_covers_what_a_data_sheet_lets_a_sensor_do(part: str, thorough: bool) -> None:
+    """It bends, and follows its temperature, as far as its data sheet says at most; its arm always errs alike."""
+    seeds, within = (200, (0.85, 1.15)) if thorough else (10, (0.6, 1.4))
+    off = []
+    for seed in range(seeds):
+        _, budget, error = drawn_accelerations.solved(drawn_accelerations.drawn(part, seed))
+        off.append((error / budget.std, error / budget.expanded))
+    over_u, over_expanded = np.swapaxes(off, 0, 1)
+    rms = [float(np.sqrt(np.mean(each**2))) for each in (over_u[:, :3], over_u[:, 3:])]
+    share = [float(np.mean(np.abs(each) < 1)) for each in (over_expanded[:, :3], over_expanded[:, 3:])]
+    print(f"{part}: error / u {rms[0]:.2f} (scale), {rms[1]:.2f} (bias); within U {share[0]:.3f}, {share[1]:.3f}")
+    assert all(within[0] < each < within[1] for each in rms)
+    assert all(each > (0.92 if thorough else 0.8) for each in share)
+
+
+def test_how_far_a_sensor_bends_is_in_its_budget_where_attitudes_do_not_tell() -> None:
+    """Named lines make up the whole, and what each leaves unknown is less where nothing else is."""
+    session = drawn_accelerations.drawn("adis16465", 0)
+    solution, budget, _ = drawn_accelerations.solved(session)
+    lines = {line.name for line in budget.contributors}
+    assert {"nonlinearity", "temperature within the run", "bias instability"} <= lines
+    whole = scale_and_bias_covariance(solution.matrix, 1 / np.linalg.norm(solution.matrix, axis=1), solution.covariance)
+    readings = {"noise", "arm's attitudes", "bias instability", "temperature within the run", "nonlinearity"}
+    parts = sum(line.covariance for line in budget.contributors if line.name in readings)
+    np.testing.assert_allclose(np.diag(parts), np.diag(whole), rtol=1e-6)
+    assert np.all(budget.of("nonlinearity")[3:] > budget.of("noise")[3:])  # the bias is the reading at 0 g
 
 
 @pytest.mark.parametrize(

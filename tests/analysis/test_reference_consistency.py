@@ -6,6 +6,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 from scipy.spatial.transform import Rotation
+from scipy.stats import kstest
 
 from rig.analysis.arm_patterns import Known, Stood, arm_patterns
 from rig.analysis.reference_consistency import Read, reference_consistency
@@ -14,6 +15,7 @@ from rig.config.attitude_sets import EIGHTEEN
 from rig.estimation.arrays import Array
 from rig.estimation.felt import DELAY, LEVER, NO_SWEEPS, Movement
 from rig.estimation.imu import solve_imu
+from support import drawn_accelerations
 from support.arm_attitudes import crooked_arm, joints_rad
 from support.arm_sweeps import Truth, joints_at, planned, recorded_dwells, recorded_sweeps
 
@@ -82,6 +84,38 @@ def test_sound_readings_are_beyond_a_limit_as_often_as_it_says(
     expected = rate * judged
     print(f"{beyond} of {judged} beyond their limit, {expected:.1f} expected")
     assert beyond < expected + 3 * 1.5 * np.sqrt(expected)  # of one recording several may be beyond
+
+
+@pytest.mark.slow
+@pytest.mark.proof
+@pytest.mark.thorough
+@pytest.mark.timeout(1800)
+@pytest.mark.parametrize("part", ["lsm9ds1", "mpu9250", "adis16465"])
+def test_p_values_of_sensors_as_their_data_sheets_let_them_be_are_uniform(part: str) -> None:
+    """Kolmogorov and Smirnov do not refuse at 1 % that they are no smaller than that."""
+    found: dict[str, list[float]] = {}
+    for seed in range(50):
+        session = drawn_accelerations.drawn(part, seed)
+        solution, _, _ = drawn_accelerations.solved(session)
+        held = drawn_accelerations.read_of(session, solution)
+        for name, rate in p_values(held).items():
+            found.setdefault(name, []).append(rate)
+    for name, values in found.items():
+        print(f"{part}, {name}: {kstest(values, 'uniform', alternative='greater').pvalue:.3f}, least {min(values):.4f}")
+    assert all(kstest(values, "uniform", alternative="greater").pvalue > 0.01 for values in found.values())
+
+
+def p_values(read: Read) -> dict[str, float]:
+    """The rate of false alarms at which each statistic is just beyond its limit."""
+    rates = np.concatenate([np.geomspace(1e-4, 0.02, 5), np.linspace(0.05, 0.95, 19)])
+    beyond: dict[str, float] = {}
+    for rate in rates:
+        for name, (value, limit) in reference_consistency(read, float(rate)).statistics.items():
+            if value > limit:
+                beyond.setdefault(name, float(rate))
+            elif rate == rates[-1]:
+                beyond.setdefault(name, 1.0)
+    return beyond
 
 
 def test_what_a_wrist_errs_by_is_told_as_such_an_arm_makes_it() -> None:

@@ -26,7 +26,8 @@ from rig.estimation.felt import (
     effects,
     predicted,
 )
-from rig.estimation.imu import ImuSolution, covariance_bound, most_likely, solve_imu
+from rig.estimation.imu import ImuSolution, solve_imu
+from rig.estimation.imu_fit import covariance_bound, most_likely
 from rig.estimation.reference_model import BIAS
 from rig.estimation.sensor_axes import non_orthogonality
 from support.arm_attitudes import crooked_arm, joints_rad
@@ -114,7 +115,7 @@ def errors(design: Design, rms_rad: float, part: str, runs: int) -> Errors:
         solution, theta = solve(dwells, sweeps), truth.theta()
         off.append(told(found(solution, truth)) - told(theta))
         stated.append(told_variance(theta, solution.covariance))
-        bound.append(told_variance(theta, covariance_bound(theta, dwells, sweeps, rms_rad)))
+        bound.append(told_variance(theta, covariance_bound(theta, Movement(dwells, sweeps), rms_rad)[0]))
         delta.append(solution.attitude_error.std_rad)
     squares = np.square(off)
     places = [slice(first, first + 3) for first in (0, 3, 6, 9)] + [slice(12, 13)]

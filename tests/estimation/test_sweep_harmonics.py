@@ -6,8 +6,9 @@ import numpy as np
 import pytest
 
 from rig.errors import Fault
-from rig.estimation.felt import DELAY, LEVER, NO_DWELLS
-from rig.estimation.imu import covariance_bound, solve_imu
+from rig.estimation.felt import DELAY, LEVER, NO_DWELLS, Movement
+from rig.estimation.imu import solve_imu
+from rig.estimation.imu_fit import covariance_bound
 from rig.estimation.reference_model import BIAS, REFERENCE
 from rig.estimation.sweep_harmonics import FirstHarmonic, first_harmonic
 from rig.observation.colour import noise_left
@@ -108,7 +109,7 @@ def test_a_calibration_from_samples_reaches_the_bound_of_their_noise(part: str, 
     """Ripple, encoder steps, a clock that is late by 0.2 ms: this is part of the delay."""
     sweeps, theta = planned(6), TRUTH.theta()
     ideal = recorded_sweeps(TRUTH, EXACT, sweeps, density_ug, np.random.default_rng(0))
-    bound = np.diag(covariance_bound(theta, NO_DWELLS, ideal, 0.0))
+    bound = np.diag(covariance_bound(theta, Movement(NO_DWELLS, ideal), 0.0)[0])
     theta[DELAY] += Sampling(0.0).clock_error_s
     off, stated = [], []
     for seed in range(10):

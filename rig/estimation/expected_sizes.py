@@ -1,0 +1,95 @@
+"""What only the readings tell the size of, beside errors that they share: expected, not likeliest.
+
+How far an arm is off, how far a bias walks, and what disturbed one dwell alone: as `rig.estimation.bias_process` and
+`rig.estimation.shared_errors`, together. Few readings tell any; the likeliest would by chance be none at all in one run
+and too large in the next, and so would be every uncertainty.
+"""
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+
+from rig.estimation.arrays import Array
+from rig.estimation.shared_errors import apart
+
+WALKS = 12  # on their grid
+SPAN = 100.0  # largest walk over the smallest
+SMALLEST_RAD, LARGEST_RAD, SIZES = 1e-5, 0.03, 25  # of δ: no arm is better than the first
+
+LOUDEST, VOLUMES = 30.0, 8  # of a disturbance, in standard deviations of the noise
+
+
+@dataclass(frozen=True, slots=True)
+class Scattered:
+    """What a fit leaves (n,) of readings, its columns `slopes` (n, q), and what is known of their errors.
+
+    `known` (n, n) is the covariance without arm and walk, `effects` (n, P) what the arm's errors do, `walk` (n, n) the
+    covariance of a walk of rate 1; `noise` (n,) the variances of the readings' own, by which a walk's order of
+    magnitude is reckoned.
+    """
+
+    left: Array
+    slopes: Array
+    known: Array
+    effects: Array
+    walk: Array
+    noise: Array
+
+
+def expected_sizes(seen: Scattered, std_rad: float | None) -> tuple[float, float]:
+    """The walk's rate, and δ: root mean squares over all, each as likely as it makes the readings.
+
+    Before, the walk was as likely to be there as not, and both were of any order of magnitude. `std_rad` holds δ.
+    """
+    standing = np.diag(seen.walk) > 0
+    typical = np.sqrt(np.median(seen.noise[standing]) / np.median(np.diag(seen.walk)[standing]))
+    walks = np.concatenate([[0.0], typical * np.geomspace(SPAN**-0.5, SPAN**0.5, WALKS)])
+    sizes = np.geomspace(SMALLEST_RAD, LARGEST_RAD, SIZES) if std_rad is None else np.array([std_rad])
+    belief = np.array([_likelihood(seen, seen.known + rate**2 * seen.walk, sizes) for rate in walks])
+    belief[1:] -= np.log(WALKS)
+    weights = np.exp(belief - belief.max())
+    weights /= weights.sum()
+    return float(np.sqrt(weights.sum(axis=1) @ walks**2)), float(np.sqrt(weights.sum(axis=0) @ sizes**2))
+
+
+def expected_disturbances(seen: Scattered, walk: float, std_rad: float, causes: Sequence[Array]) -> Array:
+    """(k,) variance of each of the `causes`, of which (n, …) are the columns by one standard deviation.
+
+    Before, one of them was as likely to be there as none, by any order of magnitude.
+    """
+    white = np.linalg.inv(
+        np.linalg.cholesky(seen.known + walk**2 * seen.walk + std_rad**2 * seen.effects @ seen.effects.T)
+    )
+    basis = np.linalg.qr(white @ seen.slopes)[0]
+    left = white @ seen.left
+    left = left - basis @ (basis.T @ left)
+    volumes = np.geomspace(1.0, LOUDEST, VOLUMES) ** 2
+    belief = np.zeros((len(causes), VOLUMES))
+    for place, columns in enumerate(causes):
+        told = white @ columns
+        told = told - basis @ (basis.T @ told)
+        sizes, directions = np.linalg.eigh(told.T @ told)
+        along = np.square(directions.T @ (told.T @ left))
+        grown = 1 + volumes[:, None] * sizes.clip(min=0.0)
+        belief[place] = 0.5 * np.sum(volumes[:, None] * along / grown - np.log(grown), axis=1)
+    belief -= np.log(belief.size)
+    most = max(float(belief.max()), 0.0)
+    weights = np.exp(belief - most)
+    expected: Array = weights @ volumes / (weights.sum() + np.exp(-most))
+    return expected
+
+
+def _likelihood(seen: Scattered, noise: Array, sizes: Array) -> Array:
+    """(k,) logarithms of the restricted likelihood, up to a constant, for `sizes` (k,) of δ."""
+    found = apart(noise, seen.effects)
+    basis, triangle = np.linalg.qr(found.turn @ seen.slopes)
+    left = found.turn @ seen.left
+    left = left - basis @ (basis.T @ left)  # the likelihood does not know what the columns explain
+    variance = 1 + np.square(sizes)[:, None] * found.growth
+    weighted = basis / variance[..., None]
+    information, rest = basis.T @ weighted, left @ weighted
+    explained = np.sum(rest * np.linalg.solve(information, rest[..., None])[..., 0], axis=1)
+    lost = np.log(variance).sum(axis=1) + np.linalg.slogdet(information)[1] + (left**2 / variance).sum(axis=1)
+    turned = np.linalg.slogdet(found.turn)[1] - np.log(np.abs(np.diag(triangle))).sum()
+    return np.asarray(turned - (lost - explained) / 2, dtype=np.float64)
