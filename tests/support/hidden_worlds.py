@@ -194,8 +194,13 @@ def _accelerometer(rng: np.random.Generator, part: str) -> dict[str, Any]:
         "scale": rng.uniform(1 - scale, 1 + scale, 3).tolist(),
         "bias_m_s2": rng.uniform(-bias_m_s2, bias_m_s2, 3).tolist(),
         "non_orthogonality_deg": rng.normal(0, SQUARE_DEG.get(part, 0.3), 3).tolist(),
-        "delay_ms": float(rng.uniform(0, 0.8 * STATED.acceleration_lag_ms)),
+        **_lag(float(rng.uniform(0.1, 1)) * STATED.acceleration_lag_ms),
     }
+
+
+def _lag(whole_ms: float) -> dict[str, float]:
+    """Half of it a low-pass, half of it a delay."""
+    return {"bandwidth_hz": 1e3 / (np.pi * whole_ms), "delay_ms": whole_ms / 2}
 
 
 def _odd(rng: np.random.Generator, part: str, section: Mapping[str, Any]) -> float:
