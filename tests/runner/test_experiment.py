@@ -64,7 +64,7 @@ def test_scale_and_bias_agree_with_the_turntable(finished: Finished) -> None:
     scale_error = np.array(gyro["scale"]) - turntable["gyro"]["scale"]
     arm_s = read_run(out / "run.h5").arm["time_s"]
     document = yaml.safe_load((out / "config.yaml").read_text(encoding="utf-8"))
-    bias_error = np.array(gyro["bias_rad_s"]) - truth(document, "gyro", arm_s[0], arm_s[-1])[3:]
+    bias_error = np.array(gyro["bias_rad_s"]) - truth(document, "gyro", [(arm_s[0], arm_s[-1])])[3:]
     print(f"scale off by {scale_error}, bias by {bias_error / std[3:]} standard deviations")
     assert np.abs(scale_error).max() < 1e-3
     assert np.all(np.abs(bias_error) < 4 * std[3:])

@@ -1,6 +1,6 @@
 """Simulated laboratories in which everything that can be wrong is, drawn from its distribution, and their truth."""
 
-from collections.abc import Mapping
+from collections.abc import Iterable, Mapping
 from dataclasses import replace
 from typing import Any
 
@@ -109,18 +109,25 @@ def _sensor(rng: np.random.Generator, part: str) -> dict[str, Any]:
 
 
 def truth(
-    document: Mapping[str, Any], name: str, from_s: float, to_s: float, speed_rad_s: float = SPEED_RAD_S
+    document: Mapping[str, Any], name: str, windows_s: Iterable[tuple[float, float]], speed_rad_s: float = SPEED_RAD_S
 ) -> np.ndarray:
-    """(6,) scale at plus and minus a speed and bias without gravity of a sensor, as means over a time of the world.
+    """(6,) scale at plus and minus a speed and bias without gravity of a sensor, as means over times of the world.
 
     Made of what the simulated part reads without noise, at rest and turning about each of its axes.
     """
     loaded = parse(yaml.safe_dump(dict(document)))
     world = world_section(loaded)
     sensor = SensorTruth(loaded.config.sensors[name], world.sensors[name])
-    quiet = replace(sensor.gyro, noise_rad_s=0.0, g_sensitivity_rad_s_per_g=(), non_orthogonality_rad=(0.0, 0.0, 0.0))
+    quiet = replace(
+        sensor.gyro,
+        noise_rad_s=0.0,
+        g_sensitivity_rad_s_per_g=(),
+        non_orthogonality_rad=(0.0, 0.0, 0.0),
+        bandwidth_hz=None,
+        delay_s=0.0,
+    )
     seed = np.random.SeedSequence([world.seed, sorted(world.sensors).index(name)])
-    time_s = np.arange(from_s, to_s, 0.05)
+    time_s = np.concatenate([np.arange(from_s, to_s, 0.05) for from_s, to_s in sorted(windows_s)])
 
     def read(rate_rad_s: float) -> np.ndarray:
         turning = np.full((len(time_s), 3), rate_rad_s)

@@ -38,7 +38,7 @@ class WholeRun:
         seen = self.observed.sensors[sensor]
         averages = [*(turn.average for turn in seen.revolutions), *seen.rests]
         from_s, to_s = min(a.start_s for a in averages), max(a.end_s for a in averages)
-        return truth(self.document, sensor, from_s, to_s, speed_rad_s)
+        return truth(self.document, sensor, [(from_s, to_s)], speed_rad_s)
 
 
 def whole_run(document: dict[str, Any], folder: Path) -> WholeRun:

@@ -1,0 +1,247 @@
+"""Whole simulated laboratories that nobody has seen: everything drawn within what the configuration states of it.
+
+Each is a configuration for `rig run`, with `uncertainty` as it stands when nobody changes it. What arm, clocks and
+sensors are off by lies within it and within the data sheets of rig/config/sensor_catalogue.py.
+"""
+
+from collections.abc import Callable, Mapping
+from itertools import permutations, product
+from pathlib import Path
+from types import MappingProxyType
+from typing import Any
+
+import numpy as np
+import yaml
+
+from rig.config.judging_sections import UncertaintySection
+from rig.config.load import load
+from rig.config.sensor_catalogue import PARTS
+from support.drawn_laboratory import PART_ERRORS, WAVE_RAD
+from support.paths import CONFIGS
+from support.worlds import merge
+
+JOINTS = 6
+WRISTS = np.array([0, 0, 0, 1, 1, 1])
+QUIET_RAD_S, NOISY_RAD_S = 0.002, 0.035
+STATED = UncertaintySection()
+SQUARE_DEG = {"adis16465": 0.05, "kvh1775": 0.03}  # how far axes are from right angles, one standard deviation
+ASKEW_DEG = 8.0
+WARMER_K = 0.3
+PART_WANDERS = {**PART_ERRORS, "mpu9250": PART_ERRORS["lsm9ds1"]}
+ACCELEROMETERS = {  # how far scale and bias (m/s²) may be off
+    "lsm9ds1": (0.03, 0.8), "mpu9250": (0.03, 0.8), "adis16465": (0.003, 0.02), "kvh1775": (1e-3, 0.01),
+}  # fmt: skip
+UNLIMITED = {"scale_std": 1, "bias_std_rad_s": 1, "verification_rms_rad_s": None, "verification_mean_rad_s": None}
+
+
+def quiet(seed: int) -> dict[str, Any]:
+    """One LSM9DS1 with little noise."""
+    return _single(seed, QUIET_RAD_S)
+
+
+def noisy(seed: int) -> dict[str, Any]:
+    """One LSM9DS1 with the noise of demo.yaml."""
+    return _single(seed, NOISY_RAD_S)
+
+
+def _single(seed: int, noise_rad_s: float) -> dict[str, Any]:
+    rng = np.random.default_rng(seed)
+    document = merge(_document("demo"), _laboratory(seed, rng, speed_deg_s=float(rng.uniform(35, 120))))
+    return _with_sensors(document, rng, {"lsm9ds1": noise_rad_s})
+
+
+def pair(seed: int) -> dict[str, Any]:
+    """A quiet LSM9DS1 and an ADIS16465, both calibrated."""
+    rng = np.random.default_rng(seed)
+    document = merge(_document("lsm9ds1_adis16465"), _laboratory(seed, rng, speed_deg_s=float(rng.uniform(35, 120))))
+    document["procedure"]["verify"] = False
+    for name in ("role", "turntable"):
+        document["sensors"]["reference"].pop(name)
+    return _with_sensors(document, rng, {"lsm9ds1": QUIET_RAD_S, "adis16465": 0.00045})
+
+
+def imu(seed: int) -> dict[str, Any]:
+    """Three gyroscopes and the accelerometers beside them."""
+    rng = np.random.default_rng(seed)
+    document = merge(_document("imu"), _laboratory(seed, rng, speed_deg_s=float(rng.uniform(45, 90))))
+    site = document["site"]
+    expanded = site["gravity_uncertainty_m_s2"]
+    document["world"]["site"]["gravity_m_s2"] = float(rng.normal(site["gravity_m_s2"], expanded / 2))
+    return _with_sensors(document, rng, {"lsm9ds1": 0.0014, "mpu9250": 0.0014, "adis16465": 0.00032})
+
+
+def kvh(seed: int) -> dict[str, Any]:
+    """A KVH 1775 that finds the Earth's rate."""
+    rng = np.random.default_rng(seed)
+    document = merge(_document("kvh1775_earth"), _laboratory(seed, rng, speed_deg_s=60.0))
+    for section in (document["site"], document["world"]["site"]):
+        section["gravity_m_s2"] = 9.80061
+    document["site"] = {"gravity_m_s2": 9.80061}  # it finds latitude and heading
+    sensor = {
+        "scale": rng.uniform(0.998, 1.002, 3).tolist(),
+        "bias_rad_s": rng.uniform(-1e-5, 1e-5, 3).tolist(),
+        "mounting_error_deg": _askew(rng, 0.5),
+        "non_orthogonality_deg": rng.normal(0, SQUARE_DEG["kvh1775"], 3).tolist(),
+        "offset_mm": _offset(rng),
+        "bias_instability_rad_s": 1.5e-7 * float(rng.uniform(0.5, 1.5)),
+        "nonlinearity_odd_per_rad_s": _odd(rng, "kvh1775", document["sensors"]["kvh"]),
+        "accelerometer": {
+            **_accelerometer(rng, "kvh1775"),
+            "second_order_s2_m": rng.uniform(-1e-4, 1e-4, 3).tolist(),
+        },
+        "kvh1775": {"oscillator_ppm": float(rng.uniform(-20, 20)), "on_for_s": float(rng.uniform(1, 4000))},
+    }
+    changed: dict[str, Any] = merge(document, {"world": {"sensors": {"kvh": sensor}}})
+    return changed
+
+
+FAMILIES: Mapping[str, Callable[[int], dict[str, Any]]] = MappingProxyType(
+    {"quiet": quiet, "noisy": noisy, "pair": pair, "imu": imu, "kvh": kvh}
+)
+WORLDS = MappingProxyType({"quiet": 60, "noisy": 40, "pair": 20, "imu": 20, "kvh": 10})
+
+
+def _document(name: str) -> dict[str, Any]:
+    document: dict[str, Any] = yaml.safe_load(load(Path(CONFIGS / f"{name}.yaml")).text)
+    return document
+
+
+def _laboratory(seed: int, rng: np.random.Generator, *, speed_deg_s: float) -> dict[str, Any]:
+    """Site, arm and board, and limits that no part of these could be beyond."""
+    site = {"latitude_deg": float(rng.uniform(-65, 65)), "heading_deg": float(rng.uniform(0, 360))}
+    return {
+        "site": site,
+        "limits": UNLIMITED,
+        "history": {"off": True},
+        "procedure": {"speed_deg_s": speed_deg_s},
+        "world": {
+            "seed": seed,
+            "time_scale": 50,
+            "site": {**site, "base_tilt_deg": rng.normal(0, 0.15, 2).tolist()},
+            "arm": _arm(rng),
+            "board": {
+                "crystal_ppm": float(rng.uniform(-1, 1)) * STATED.crystal_ppm,
+                "boot_time_s": float(rng.uniform(0.05, 2)),
+            },
+        },
+    }
+
+
+def _arm(rng: np.random.Generator) -> dict[str, Any]:
+    axis_rad, again_rad = np.radians([STATED.axis_deg, STATED.repeatability_deg])
+    return {
+        "vibration_fraction": float(rng.uniform(0, 0.05)),
+        "vibration_rms_rad_s": float(rng.uniform(0, 0.004)),
+        "vibration_hz": float(rng.uniform(8, 30)),
+        "settling_rad": 5.0e-5,
+        "settling_hz": 12,
+        "settling_decay_s": 0.15,
+        "clock_ppm": float(rng.uniform(-1, 1)) * STATED.controller_clock_ppm,
+        "state_jitter_s": float(rng.uniform(0, 1e-4)),
+        "calibration": {
+            "delta_alpha_rad": (6e-4 * WRISTS * rng.standard_normal(JOINTS)).tolist(),
+            "delta_theta_rad": (6e-4 * WRISTS * rng.standard_normal(JOINTS)).tolist(),
+            "delta_d_mm": rng.normal(0, 0.2, JOINTS).tolist(),
+        },
+        "residue": {
+            "twist_rad": (axis_rad * WRISTS * rng.uniform(-1, 1, JOINTS)).tolist(),
+            "zero_rad": (axis_rad * WRISTS * rng.uniform(-1, 1, JOINTS)).tolist(),
+            "encoder_once_rad": float(rng.rayleigh(WAVE_RAD)),
+            "encoder_twice_rad": float(rng.rayleigh(WAVE_RAD)),
+            "hysteresis_rad": float(again_rad * rng.uniform(0, 1)),
+        },
+    }
+
+
+def _with_sensors(document: dict[str, Any], rng: np.random.Generator, noise: Mapping[str, float]) -> dict[str, Any]:
+    sensors = {name: each for name, each in document["sensors"].items() if each is not None}
+    changes = {
+        "sensors": {name: {"mounting": _mounting(rng)} for name in sensors},
+        "world": {"sensors": {name: _sensor(rng, each, noise[each["part"]]) for name, each in sensors.items()}},
+    }
+    changed: dict[str, Any] = merge(document, changes)
+    return changed
+
+
+def _sensor(rng: np.random.Generator, section: Mapping[str, Any], noise_rad_s: float) -> dict[str, Any]:
+    part = section["part"]
+    errors = PART_WANDERS[part]
+    g_rad_s = np.radians(PARTS[part].g_sensitivity_deg_s_g)
+    of_force = {"accelerometer": _accelerometer(rng, part)} if "acceleration" in section else {}
+    return {
+        "scale": rng.uniform(0.9, 1.1, 3).tolist(),
+        "bias_rad_s": rng.uniform(-0.02, 0.02, 3).tolist(),
+        "noise_rad_s": noise_rad_s,
+        "mounting_error_deg": _askew(rng, ASKEW_DEG),
+        "non_orthogonality_deg": rng.normal(0, SQUARE_DEG.get(part, 0.2), 3).tolist(),
+        "offset_mm": _offset(rng),
+        "start_temperature_c": 22 - float(rng.uniform(0, WARMER_K)),
+        "warm_up_s": 300,
+        "bias_rad_s_per_k": rng.normal(0, errors["bias_per_k"], 3).tolist(),
+        "scale_per_k": rng.normal(0, errors["scale_per_k"], 3).tolist(),
+        "g_sensitivity_rad_s_per_g": rng.uniform(-g_rad_s, g_rad_s, (3, 3)).tolist(),
+        "bias_instability_rad_s": errors["flicker_rad_s"] * float(rng.uniform(0.5, 1.5)),
+        "bias_random_walk_rad_s_per_sqrt_s": errors["walk"] * float(rng.uniform(0.5, 3)),
+        "nonlinearity_odd_per_rad_s": _odd(rng, part, section),
+        "nonlinearity_even_per_rad_s": float(rng.normal(0, errors["even"])),
+        **of_force,
+    }
+
+
+def _accelerometer(rng: np.random.Generator, part: str) -> dict[str, Any]:
+    scale, bias_m_s2 = ACCELEROMETERS[part]
+    return {
+        "scale": rng.uniform(1 - scale, 1 + scale, 3).tolist(),
+        "bias_m_s2": rng.uniform(-bias_m_s2, bias_m_s2, 3).tolist(),
+        "non_orthogonality_deg": rng.normal(0, SQUARE_DEG.get(part, 0.3), 3).tolist(),
+        **_lag(float(rng.uniform(0.1, 1)) * STATED.acceleration_lag_ms),
+    }
+
+
+def _lag(whole_ms: float) -> dict[str, float]:
+    """Half of it a low-pass, half of it a delay."""
+    return {"bandwidth_hz": 1e3 / (np.pi * whole_ms), "delay_ms": whole_ms / 2}
+
+
+def _odd(rng: np.random.Generator, part: str, section: Mapping[str, Any]) -> float:
+    """Per rad/s; at full scale the reading is no farther from a straight line than the part's data sheet says."""
+    full_rad_s = np.radians(section.get("range_deg_s", PARTS[part].default_range_deg_s))
+    return float(rng.uniform(-1, 1) * PARTS[part].nonlinearity / full_rad_s)
+
+
+def _askew(rng: np.random.Generator, most_deg: float) -> list[float]:
+    way = rng.standard_normal(3)
+    turn: list[float] = (rng.uniform(0, most_deg) * way / np.linalg.norm(way)).tolist()
+    return turn
+
+
+def _offset(rng: np.random.Generator) -> list[float]:
+    offset: list[float] = rng.uniform(-STATED.sensor_offset_mm, STATED.sensor_offset_mm, 3).tolist()
+    return offset
+
+
+def _mounting(rng: np.random.Generator) -> dict[str, str]:
+    """One of the 24 right-handed ones."""
+    all_of_them = [
+        {axis: f"{'+' if sign > 0 else '-'}{'xyz'[way]}" for axis, sign, way in zip("xyz", signs, order, strict=True)}
+        for order in permutations(range(3))
+        for signs in product((1, -1), repeat=3)
+        if np.linalg.det(np.eye(3)[list(order)]) * np.prod(signs) > 0
+    ]
+    return all_of_them[int(rng.integers(len(all_of_them)))]
+
+
+def first_seed(family: str) -> int:
+    """Those of a family follow each other, and no two families share one."""
+    return 1000 * (1 + list(FAMILIES).index(family))
+
+
+def at_address(document: dict[str, Any], host: str) -> dict[str, Any]:
+    """The laboratory on a loopback address of its own: `document`, changed."""
+    document["arm"]["host"] = host
+    if "board" in document:
+        document["board"]["port"] = f"socket://{host}:7321"
+    for sensor in document["sensors"].values():
+        if sensor and "serial" in sensor:
+            sensor["serial"]["port"] = f"socket://{host}:7331"
+    return document
