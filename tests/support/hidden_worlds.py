@@ -206,7 +206,7 @@ def _lag(whole_ms: float) -> dict[str, float]:
 def _odd(rng: np.random.Generator, part: str, section: Mapping[str, Any]) -> float:
     """Per rad/s; at full scale the reading is no farther from a straight line than the part's data sheet says."""
     full_rad_s = np.radians(section.get("range_deg_s", PARTS[part].default_range_deg_s))
-    return float(rng.uniform(-1, 1) * PARTS[part].nonlinearity / full_rad_s)
+    return float(rng.uniform(-1, 1) * PARTS[part].nonlinearity_percent / 100 / full_rad_s)
 
 
 def _askew(rng: np.random.Generator, most_deg: float) -> list[float]:
