@@ -16,6 +16,7 @@ from rig.analysis.pieces import REST, Pieces, Stretch
 from rig.analysis.seen import WAVE_SHARE, unknown_of
 from rig.analysis.surroundings import Surroundings
 from rig.arm.kinematics import AXIS_ERRORS, WAVES, WRIST_1, WRIST_2, WRIST_3, axis_errors, flange_axes
+from rig.data.settings import OfSensor
 from rig.estimation.arrays import Array
 from rig.estimation.earth import EARTH_RATE_RAD_S
 from rig.estimation.earth_rate import EarthRate
@@ -26,6 +27,7 @@ ANGLES = (*AXIS_ERRORS, *(f"{wave} of wrist_1" for wave in WAVES))  # those of w
 WAVES_OF = {WRIST_1: ANGLES.index("cos of wrist_1"), WRIST_2: ANGLES.index("cos of wrist_2"),
             WRIST_3: ANGLES.index("cos of wrist_3")}  # fmt: skip
 ZEROS = (ANGLES.index("zero of wrist_2"), ANGLES.index("zero of wrist_3"))  # of joints that stand beside one that turns
+CURVE: tuple[OfSensor, OfSensor] = ("nonlinearity_percent", "asymmetry_percent")  # its odd and its even part
 STEPS = 24  # of a way, in which directions are taken to stand still
 STANDS_RAD = 1e-3  # what a joint that does not turn seems to
 
@@ -54,19 +56,20 @@ def allowed(surroundings: Surroundings, name: str, result: SensorResult) -> Allo
     """By what the configuration states and the recording tells.
 
     A solve that finds the curve, from several speeds, takes nothing of it as known. One of a single speed states one
-    scale factor for either way, which an even part makes two: it excuses nothing.
+    scale factor for either way, which an even part makes two: it excuses no more than what is stated of that alone.
     """
     uncertainty, sensor, explained = surroundings.uncertainty, result.sensor, result.explained
     steady = np.array([each.startswith(("twist", "zero")) for each in ANGLES])
     finds_curve = explained is not None and explained.nonlinearity is not None
-    share = uncertainty.of("nonlinearity_percent", name, sensor.part) / 100
+    full_scale = sensor.range_rad_s * np.sqrt(3)
+    odd, even = (uncertainty.of(of, name, sensor.part) / 100 / full_scale for of in CURVE)
     return Allowed(
         angles_rad=np.radians(uncertainty.axis_deg) / np.sqrt(3) * np.where(steady, 1.0, WAVE_SHARE),
         repeatability_rad=float(np.radians(uncertainty.repeatability_deg) / np.sqrt(3)),
         jitter_s=surroundings.state_jitter_s,
         earth_rad_s=_earth(surroundings, name, sensor.part, found_earth_rate(result.earth)),
-        odd_per_rad_s=FREE_PER_RAD_S if finds_curve else share / sensor.range_rad_s / float(np.sqrt(3)),
-        even_per_rad_s=FREE_PER_RAD_S if finds_curve else 0.0,
+        odd_per_rad_s=FREE_PER_RAD_S if finds_curve else float(odd),
+        even_per_rad_s=FREE_PER_RAD_S if finds_curve else float(even),
         sensor=None if explained is None else explained.seen.sensor,
         at_s=np.zeros(0) if explained is None else explained.seen.windows_s.mean(axis=1),
     )

@@ -236,6 +236,13 @@ class UncertaintySection(Section):
         "curve and by what is even of it, where not several speeds tell it; left out, what is known of the part",
         json_schema_extra={"unit": "%"},
     )
+    asymmetry_percent: float | None = Field(
+        default=None,
+        ge=0,
+        description="what is even of a gyroscope's curve, in per cent of full scale, that one scale factor for both "
+        "ways may leave out: more of it fails `cw_against_ccw`; left out, what is known of the part",
+        json_schema_extra={"unit": "%"},
+    )
     bias_deg_s_k: float | None = Field(
         default=None,
         ge=0,

@@ -26,11 +26,11 @@ class Part:
     """One kind of sensor: `rates_hz` and `ranges_deg_s` are all its gyroscope can do, `rates_rule` says rates in words.
 
     `g_sensitivity_deg_s_g` is how much a reading may change for 1 g, at most, `nonlinearity_percent` how far it may be
-    from a straight line, of full scale, `bias_deg_s_k` and `scale_ppm_k` how much bias and scale may change with
-    temperature, `non_orthogonality_deg` how far from 90° two of its axes may stand. `ranges_g` are those of its
-    accelerometer, which shares its data rate, the usual one first; `acceleration_noise_ug_sqrt_hz` is the noise density
-    of that, in µg/√Hz, and `accelerometer` what else is known of it. A part with a port of its own stands beside the
-    board, with a clock of its own.
+    from a straight line, of full scale, `asymmetry_percent` by what is even of its curve; `bias_deg_s_k` and
+    `scale_ppm_k` how much bias and scale may change with temperature, `non_orthogonality_deg` how far from 90° two of
+    its axes may stand. `ranges_g` are those of its accelerometer, which shares its data rate, the usual one first;
+    `acceleration_noise_ug_sqrt_hz` is the noise density of that, in µg/√Hz, and `accelerometer` what else is known of
+    it. A part with a port of its own stands beside the board, with a clock of its own.
     """
 
     rates_hz: tuple[float, ...]
@@ -40,6 +40,7 @@ class Part:
     default_range_deg_s: float
     g_sensitivity_deg_s_g: float
     nonlinearity_percent: float
+    asymmetry_percent: float
     bias_deg_s_k: float
     scale_ppm_k: float
     non_orthogonality_deg: float
@@ -102,6 +103,7 @@ PARTS: Mapping[str, Part] = MappingProxyType(
             default_range_deg_s=245,
             g_sensitivity_deg_s_g=0.1,  # not stated; that of the MPU-6050, a part of the same kind, PS-MPU-6000A 6.1
             nonlinearity_percent=0.1,  # not stated; that of the MPU-9250, as what follows
+            asymmetry_percent=0.02,
             bias_deg_s_k=30 / 65,
             scale_ppm_k=4e4 / 65,
             non_orthogonality_deg=1.15,
@@ -119,6 +121,7 @@ PARTS: Mapping[str, Part] = MappingProxyType(
             default_range_deg_s=250,
             g_sensitivity_deg_s_g=0.1,  # not stated; that of the MPU-6050, PS-MPU-6000A 6.1
             nonlinearity_percent=0.1,  # PS-MPU-9250A-01, table 1
+            asymmetry_percent=0.02,  # not stated; assumed: what vibrates to and fro does so alike
             bias_deg_s_k=30 / 65,  # ±30 °/s from −40 to 85 °C (table 1), straight from 25 °C
             scale_ppm_k=4e4 / 65,  # ±4 % (table 1)
             non_orthogonality_deg=1.15,  # cross-axis sensitivity ±2 % (table 1)
@@ -136,6 +139,7 @@ PARTS: Mapping[str, Part] = MappingProxyType(
             default_range_deg_s=500,
             g_sensitivity_deg_s_g=0.015,  # as the datasheet of the ADIS16445 states
             nonlinearity_percent=0.2,  # assumed, as what follows: the data sheet of the part has it, not looked up
+            asymmetry_percent=0.004,
             bias_deg_s_k=0.2 / 60,
             scale_ppm_k=3e3 / 60,
             non_orthogonality_deg=0.15,  # axis to axis ±0.05° (data sheet, features), taken for a standard deviation
@@ -153,6 +157,7 @@ PARTS: Mapping[str, Part] = MappingProxyType(
             default_range_deg_s=490,
             g_sensitivity_deg_s_g=0.0003,  # not stated; assumed: 1 °/h/g, light does not feel force
             nonlinearity_percent=0.005,  # assumed: 50 ppm, as of a scale factor of light
+            asymmetry_percent=0.0005,
             bias_deg_s_k=1 / 3600 / 60,  # assumed: 1 °/h over 60 K
             scale_ppm_k=200 / 60,  # assumed: 200 ppm over as much
             non_orthogonality_deg=0.06,  # assumed: 1 mrad

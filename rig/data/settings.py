@@ -33,7 +33,12 @@ RECKONING = 2  # of new recordings; see `RunSettings`
 
 DecisionRule = Literal["simple", "guard_band"]
 OfSensor = Literal[
-    "g_sensitivity_deg_s_g", "nonlinearity_percent", "bias_deg_s_k", "scale_ppm_k", "non_orthogonality_deg"
+    "g_sensitivity_deg_s_g",
+    "nonlinearity_percent",
+    "asymmetry_percent",
+    "bias_deg_s_k",
+    "scale_ppm_k",
+    "non_orthogonality_deg",
 ]
 OF_SENSORS: tuple[OfSensor, ...] = get_args(OfSensor)
 Vector3 = tuple[Finite, Finite, Finite]
@@ -124,6 +129,7 @@ class Uncertainty:
     repeatability_deg: Annotated[float, Field(ge=0)] = 0.0  # unknown to recordings of before
     acceleration_lag_ms: Annotated[float, Field(ge=0)] = 5.0
     nonlinearity_percent: dict[str, Annotated[float, Field(ge=0)]] = field(default_factory=dict)
+    asymmetry_percent: dict[str, Annotated[float, Field(ge=0)]] = field(default_factory=dict)
     bias_deg_s_k: dict[str, Annotated[float, Field(ge=0)]] = field(default_factory=dict)
     scale_ppm_k: dict[str, Annotated[float, Field(ge=0)]] = field(default_factory=dict)
     non_orthogonality_deg: dict[str, Annotated[float, Field(ge=0)]] = field(default_factory=dict)

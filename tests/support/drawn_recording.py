@@ -138,9 +138,11 @@ def _felt(turned: Array, pull: Array, kind: Kind, rng: np.random.Generator) -> A
     along = turned @ rotation(rng.normal(0, np.radians(2), 3)).T
     along = along @ (np.eye(3) + rng.normal(0, np.radians(0.2), (3, 3)))
     curve = part.nonlinearity_percent / 100 / kind.sensor.range_rad_s
-    along *= 1 + curve * rng.uniform(-1, 1, 3) * np.abs(along)
+    odd = curve * rng.uniform(-1, 1, 3)
     to_gravity = np.radians(part.g_sensitivity_deg_s_g) / STANDARD_GRAVITY_M_S2 * rng.uniform(-1, 1, (3, 3))
-    felt: Array = along / rng.uniform(0.9, 1.1, 3) + pull @ to_gravity.T
+    scale = rng.uniform(0.9, 1.1, 3)
+    even = part.asymmetry_percent / 100 / kind.sensor.range_rad_s * rng.uniform(-1, 1, 3)
+    felt: Array = along * (1 + odd * np.abs(along) + even * along) / scale + pull @ to_gravity.T
     return felt
 
 

@@ -183,7 +183,7 @@ def _sensor(rng: np.random.Generator, section: Mapping[str, Any], noise_rad_s: f
         "bias_instability_rad_s": errors["flicker_rad_s"] * float(rng.uniform(0.5, 1.5)),
         "bias_random_walk_rad_s_per_sqrt_s": errors["walk"] * float(rng.uniform(0.5, 3)),
         "nonlinearity_odd_per_rad_s": _odd(rng, part, section),
-        "nonlinearity_even_per_rad_s": float(rng.normal(0, errors["even"])),
+        "nonlinearity_even_per_rad_s": _even(rng, part, section),
         **of_force,
     }
 
@@ -205,8 +205,15 @@ def _lag(whole_ms: float) -> dict[str, float]:
 
 def _odd(rng: np.random.Generator, part: str, section: Mapping[str, Any]) -> float:
     """Per rad/s; at full scale the reading is no farther from a straight line than the part's data sheet says."""
-    full_rad_s = np.radians(section.get("range_deg_s", PARTS[part].default_range_deg_s))
-    return float(rng.uniform(-1, 1) * PARTS[part].nonlinearity_percent / 100 / full_rad_s)
+    return float(rng.uniform(-1, 1) * PARTS[part].nonlinearity_percent / 100 / _full_rad_s(part, section))
+
+
+def _even(rng: np.random.Generator, part: str, section: Mapping[str, Any]) -> float:
+    return float(rng.uniform(-1, 1) * PARTS[part].asymmetry_percent / 100 / _full_rad_s(part, section))
+
+
+def _full_rad_s(part: str, section: Mapping[str, Any]) -> float:
+    return float(np.radians(section.get("range_deg_s", PARTS[part].default_range_deg_s)))
 
 
 def _askew(rng: np.random.Generator, most_deg: float) -> list[float]:
