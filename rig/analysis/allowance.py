@@ -81,7 +81,8 @@ def allow(known: Allowed, pieces: Pieces, ways: Pieces, matrix: Array) -> Allowa
     What is even of its curve is left free on the ways, which are faster than sweeps: it is no change with time.
     """
     on_ways = replace(known, even_per_rad_s=FREE_PER_RAD_S)
-    return Allowance(patterns(pieces, matrix, known), ways, patterns(ways, matrix, on_ways))
+    unstable = 0.0 if known.sensor is None else known.sensor.instability_rad_s
+    return Allowance(patterns(pieces, matrix, known), ways, patterns(ways, matrix, on_ways), unstable)
 
 
 def _earth(surroundings: Surroundings, name: str, part: str, earth_rate: EarthRate | None) -> Array:

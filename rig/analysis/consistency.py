@@ -39,21 +39,24 @@ class Consistency:
 class Allowance:
     """What pieces may be off by, a pattern for each thing of one standard deviation: `off_rad_s` (P, N, 3).
 
-    `ways` are the same pieces and the ways between them, `off_on_ways_rad_s` (Q, M, 3) what these may be off by.
+    `ways` are the same pieces and the ways between them, `off_on_ways_rad_s` (Q, M, 3) what these may be off by;
+    `instability_rad_s` is the sensor's known bias instability.
     """
 
     off_rad_s: Array
     ways: Pieces
     off_on_ways_rad_s: Array
+    instability_rad_s: float = 0.0
 
 
 @dataclass(frozen=True, slots=True)
 class _Scatter:
     """Of the pieces' means beside a bias that wanders: `variances_rad2_s2` (N, 3) each for itself, and what they have
-    in common, `common_rad2_s2` (3 N, 3 N)."""
+    in common, `common_rad2_s2` (3 N, 3 N); `instability_rad_s` is that of the bias, as far as it is known."""
 
     variances_rad2_s2: Array
     common_rad2_s2: Array
+    instability_rad_s: float = 0.0
 
 
 @dataclass(frozen=True, slots=True)
@@ -106,11 +109,12 @@ def consistency(pieces: Pieces, matrix: Array, rate: float, allowance: Allowance
         found = told_by(held, _changes(pieces, felt), rate)
         whole, of_an_axis = None, None
     else:
-        scatter = _Scatter(pieces.variances_rad2_s2, _together(allowance.off_rad_s))
+        unstable = allowance.instability_rad_s
+        scatter = _Scatter(pieces.variances_rad2_s2, _together(allowance.off_rad_s), unstable)
         bias, ways = _wandering(pieces, felt, _steady(pieces), scatter), allowance.ways
         held = _held(pieces, scatter, bias)
         felt_on_ways = ways.rates_rad_s @ matrix.T
-        on_ways = _Scatter(ways.variances_rad2_s2, _together(allowance.off_on_ways_rad_s))
+        on_ways = _Scatter(ways.variances_rad2_s2, _together(allowance.off_on_ways_rad_s), unstable)
         held_on_ways = _held(ways, on_ways, bias)
         found = told_by(held_on_ways, _changes(ways, felt_on_ways), rate)
         whole = _each_axis(np.column_stack(_sweeps(pieces)))
@@ -178,7 +182,10 @@ def _wandering(pieces: Pieces, felt: Array, steady: Array, scatter: _Scatter) ->
     each, count = np.arange(3), len(pieces.sweep)
     common = scatter.common_rad2_s2.reshape(3, count, 3, count)[each, :, each]
     left = pieces.means_rad_s - felt
-    return likeliest_bias_process(steady, left, scatter.variances_rad2_s2, pieces.times_s, common)
+    known = scatter.instability_rad_s
+    return likeliest_bias_process(
+        steady, left, scatter.variances_rad2_s2, pieces.times_s, common, instability_rad_s=known
+    )
 
 
 def _covariance(pieces: Pieces, scatter: _Scatter, bias: BiasProcess) -> Array:

@@ -73,6 +73,7 @@ def _known_sensor(
         full_scale_rad_s=sensor.range_rad_s,
         bias_rad_s_per_k=float(np.radians(known.of("bias_deg_s_k", name, sensor.part))),
         scale_per_k=PPM * known.of("scale_ppm_k", name, sensor.part),
+        instability_rad_s=float(np.radians(known.of("bias_instability_deg_h", name, sensor.part) / 3600)),
         temperature_c=np.array([average.temperature_c for average in averages]),
         temperature_step_k=abs(sensor.temperature_c_per_count),
     )

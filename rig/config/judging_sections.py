@@ -255,6 +255,13 @@ class UncertaintySection(Section):
         description="change of a gyroscope's scale factor for 1 K; left out, what is known of the part",
         json_schema_extra={"unit": "ppm/K"},
     )
+    bias_instability_deg_h: float | None = Field(
+        default=None,
+        ge=0,
+        description="a gyroscope's bias instability, as IEEE Std 952 has it: by how much its bias wanders however long "
+        "it is averaged; left out, what is known of the part",
+        json_schema_extra={"unit": "°/h"},
+    )
     non_orthogonality_deg: float | None = Field(
         default=None,
         ge=0,

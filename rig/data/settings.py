@@ -38,6 +38,7 @@ OfSensor = Literal[
     "asymmetry_percent",
     "bias_deg_s_k",
     "scale_ppm_k",
+    "bias_instability_deg_h",
     "non_orthogonality_deg",
 ]
 OF_SENSORS: tuple[OfSensor, ...] = get_args(OfSensor)
@@ -132,6 +133,7 @@ class Uncertainty:
     asymmetry_percent: dict[str, Annotated[float, Field(ge=0)]] = field(default_factory=dict)
     bias_deg_s_k: dict[str, Annotated[float, Field(ge=0)]] = field(default_factory=dict)
     scale_ppm_k: dict[str, Annotated[float, Field(ge=0)]] = field(default_factory=dict)
+    bias_instability_deg_h: dict[str, Annotated[float, Field(ge=0)]] = field(default_factory=dict)
     non_orthogonality_deg: dict[str, Annotated[float, Field(ge=0)]] = field(default_factory=dict)
 
     def of(self, what: OfSensor, name: str, part: str) -> float:

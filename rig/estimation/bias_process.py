@@ -1,9 +1,10 @@
-"""A bias that does not stand still: a random walk, and what scatters from one average to the next.
+"""A bias that does not stand still: flicker, a random walk, and what scatters from one average to the next.
 
 The readings are averaged over windows. A random walk of rate q (rad/s per √s) makes the bias of a later window differ
 from that of an earlier one the more the farther they are apart; flicker noise is between that and a scatter s that has
-no memory. Both are found from the averages themselves by restricted maximum likelihood (Patterson and Thompson,
-Biometrika 58 (1971) 545), which takes into account how much of the scatter the fitted parameters have taken up.
+no memory. How much of flicker a part of its kind has is known, for few averages tell it; walk and scatter beside that
+are found from the averages themselves by restricted maximum likelihood (Patterson and Thompson, Biometrika 58 (1971)
+545), which takes into account how much of the scatter the fitted parameters have taken up.
 """
 
 from collections.abc import Callable
@@ -17,31 +18,43 @@ from rig.estimation.arrays import Array
 STEPS = 25  # of either size on its grid
 PRICE = 1.0  # of walk, and of scatter, in the logarithm of the likelihood
 SPAN = 300.0  # largest size over the smallest that is looked at
+CHANGED = float(np.sqrt(4 * np.log(2) / np.pi))  # by which flicker of instability 1 changes from one mean to the next
 
 
 @dataclass(frozen=True, slots=True)
 class BiasProcess:
-    """How the bias wanders: `walk_rad_s_sqrt_s` (q) and `scatter_rad_s` (s), zero where it is steady.
+    """How the bias wanders: `walk_rad_s_sqrt_s` (q) and `scatter_rad_s` (s), zero where nothing but noise was seen.
 
-    `freedom` is how many differences it was found from.
+    `freedom` is how many differences these were found from, `instability_rad_s` the bias instability that the part is
+    known to have.
     """
 
     walk_rad_s_sqrt_s: float
     scatter_rad_s: float
     freedom: int
+    instability_rad_s: float = 0.0
+
+    @property
+    def found(self) -> bool:
+        """Whether more than noise and the known was seen."""
+        return self.walk_rad_s_sqrt_s > 0.0 or self.scatter_rad_s > 0.0
 
     @property
     def steady(self) -> bool:
-        """Whether nothing but noise was seen."""
-        return self.walk_rad_s_sqrt_s == 0.0 and self.scatter_rad_s == 0.0
+        """Whether there is nothing but noise."""
+        return not self.found and self.instability_rad_s == 0.0
 
     def covariance(self, windows_s: ArrayLike) -> Array:
         """(N, N) that it adds to means over the windows (N, 2), about the mean bias over all the time they span."""
-        return _added(self.walk_rad_s_sqrt_s**2, self.scatter_rad_s**2, walk_covariance(windows_s))
+        found = _added(self.walk_rad_s_sqrt_s**2, self.scatter_rad_s**2, walk_covariance(windows_s))
+        return found if self.instability_rad_s == 0.0 else found + _flicker(self.instability_rad_s, windows_s)
 
     def wandered_rad_s(self, duration_s: float) -> float:
         """Standard deviation of the change of the bias in so much time."""
-        return float(np.hypot(self.walk_rad_s_sqrt_s * np.sqrt(duration_s), self.scatter_rad_s))
+        flickered_rad_s = CHANGED * self.instability_rad_s
+        return float(
+            np.hypot(self.walk_rad_s_sqrt_s * np.sqrt(duration_s), np.hypot(self.scatter_rad_s, flickered_rad_s))
+        )
 
 
 def walk_covariance(windows_s: ArrayLike) -> Array:
@@ -60,12 +73,47 @@ def walk_covariance(windows_s: ArrayLike) -> Array:
     return covariance
 
 
+def flicker_covariance(windows_s: ArrayLike) -> Array:
+    """(N, N) covariance of the means of flicker noise of bias instability 1 over windows (N, 2) [start, end].
+
+    Its power is 1/(2π f) (IEEE Std 952-1997, C.1.3), so that values a time τ apart vary together by −ln(τ)/π, but for
+    a constant without end. Counted from the mean over the whole time from the first start to the last end it has none.
+    """
+    windows = np.asarray(windows_s, dtype=np.float64)
+    whole = [windows.min(), windows.max()]
+    start, end = np.vstack([windows, whole]).T
+    between = (
+        _twice_integrated_logarithm(end[:, None] - start)
+        - _twice_integrated_logarithm(start[:, None] - start)
+        - _twice_integrated_logarithm(end[:, None] - end)
+        + _twice_integrated_logarithm(start[:, None] - end)
+    )
+    together = -between / np.outer(end - start, end - start) / np.pi
+    covariance: Array = together[:-1, :-1] - together[:-1, -1:] - together[-1:, :-1] + together[-1, -1]
+    return covariance
+
+
+def _twice_integrated_logarithm(x: Array) -> Array:
+    """Of |x|: x² (2 ln |x| − 3) / 4."""
+    squares = x**2
+    logarithms = np.log(squares, out=np.zeros_like(squares), where=squares > 0)
+    integrated: Array = squares * (logarithms - 3) / 4
+    return integrated
+
+
+def _flicker(instability_rad_s: float, windows_s: ArrayLike) -> Array:
+    covariance: Array = instability_rad_s**2 * flicker_covariance(windows_s)
+    return covariance
+
+
 def expected_bias_process(
     design: ArrayLike,
     means_rad_s: ArrayLike,
     variances_rad2_s2: ArrayLike,
     windows_s: ArrayLike,
     shared_rad2_s2: Array | None = None,
+    *,
+    instability_rad_s: float = 0.0,
 ) -> BiasProcess:
     """The process behind the mean readings (N, 3), which without it are `design` (N, p) × parameters + noise.
 
@@ -73,9 +121,11 @@ def expected_bias_process(
     axes, so that few averages tell it. Walk and scatter are their means over all sizes, each as likely as it makes the
     averages; before, each was as likely to be there as not, and of any order of magnitude. The likeliest sizes would by
     chance be far too small in one run and too large in the next, and so would be every uncertainty. `shared_rad2_s2`
-    (3, N, N) are covariances of what the averages have in common beside their noise.
+    (3, N, N) are covariances of what the averages have in common beside their noise, `instability_rad_s` is what is
+    known of the part, zero where nothing is.
     """
-    return _bias_process(design, means_rad_s, variances_rad2_s2, windows_s, _mean, shared=shared_rad2_s2)
+    known = instability_rad_s
+    return _bias_process(design, means_rad_s, variances_rad2_s2, windows_s, _mean, shared=shared_rad2_s2, known=known)
 
 
 def likeliest_bias_process(
@@ -84,12 +134,17 @@ def likeliest_bias_process(
     variances_rad2_s2: ArrayLike,
     windows_s: ArrayLike,
     shared_rad2_s2: Array | None = None,
+    *,
+    instability_rad_s: float = 0.0,
 ) -> BiasProcess:
     """The same with the likeliest sizes, zero where they do not make the averages likelier by Akaike's price.
 
     It holds no walk where noise alone would do: what is held against it is not excused by what is not there.
     """
-    return _bias_process(design, means_rad_s, variances_rad2_s2, windows_s, _likeliest, shared=shared_rad2_s2)
+    known = instability_rad_s
+    return _bias_process(
+        design, means_rad_s, variances_rad2_s2, windows_s, _likeliest, shared=shared_rad2_s2, known=known
+    )
 
 
 def _bias_process(
@@ -99,28 +154,30 @@ def _bias_process(
     windows_s: ArrayLike,
     chosen: Callable[[Array, Array], Array],
     *,
-    shared: Array | None = None,
+    shared: Array | None,
+    known: float,
 ) -> BiasProcess:
     z, means, variances = (np.asarray(a, dtype=np.float64) for a in (design, means_rad_s, variances_rad2_s2))
     freedom = 3 * (len(z) - z.shape[1])
     if freedom < 3:
-        return BiasProcess(0.0, 0.0, max(freedom, 0))
+        return BiasProcess(0.0, 0.0, max(freedom, 0), known)
     # The likelihood does not know what the parameters explain. Left in, it would cost a quiet sensor half the digits.
     means = means - z @ np.linalg.lstsq(z, means)[0]
     unit = walk_covariance(windows_s)
+    flicker = _flicker(known, windows_s) if known else np.zeros(unit.shape)
     typical = float(np.median(variances))
     grid = np.concatenate([[0.0], typical * np.geomspace(SPAN**-0.5, SPAN, STEPS) ** 2])
     walks = grid / float(np.median(np.diag(unit)))
     squares = np.array([(walk, scatter) for walk in walks for scatter in grid])
     likelihood = np.zeros(len(squares))
     for axis in range(3):
-        own = np.diag(variances[:, axis])
+        own = np.diag(variances[:, axis]) + flicker
         noise = (own if shared is None else own + shared[axis]) + _added(
             squares[:, :1, None], squares[:, 1:, None], unit
         )
         likelihood += _restricted_likelihood(z, means[:, axis], noise)
     walk, scatter = chosen(np.sqrt(squares), likelihood).tolist()
-    return BiasProcess(walk, scatter, freedom)
+    return BiasProcess(walk, scatter, freedom, known)
 
 
 def _mean(sizes: Array, likelihood: Array) -> Array:

@@ -12,6 +12,7 @@ from typing import Literal
 import numpy as np
 
 from rig.estimation.arrays import Array
+from rig.estimation.bias_process import BiasProcess
 from rig.estimation.coverage import COVERAGE_FACTOR, coverage_factors, effective_freedom
 from rig.estimation.earth import EARTH_RATE_RAD_S, STANDARD_GRAVITY_M_S2
 from rig.estimation.explained import Explained, Seen
@@ -150,25 +151,18 @@ def _contributors(explained: Explained, unknown: Unknown) -> Iterator[Contributo
         spread = of(patterns / np.sqrt(3))
         return Contributor(name, "B", "rectangular", half_width, unit, source, np.inf, spread)
 
-    def found(name: str, source: str, covariance: Array, freedom: float = np.inf) -> Contributor:
-        return Contributor(name, "A", "normal", None, "", source, freedom, covariance)
-
-    walk = _of_walk(explained)
-    yield found("noise", "scatter of the readings", solution.covariance - walk, _noise_freedom(explained))
-    if not explained.bias.steady:
-        source = "scatter of rests and sweeps about each other"
-        yield found("bias instability", source, walk, float(explained.bias.freedom))
+    yield from _of_the_readings(explained)
     turned = seen.turns_rad_s @ matrix.T
     wide, said = unknown.clock_half_width, unknown.clock_source
     if wide is None:
-        timed = found(CLOCK, said, of(unknown.clock_std * turned[None]), unknown.clock_freedom)
+        timed = _found(CLOCK, said, of(unknown.clock_std * turned[None]), unknown.clock_freedom)
         yield timed if np.isfinite(timed.freedom) else replace(timed, kind="B")  # of what is stated of clocks alone
     else:
         yield assumed(CLOCK, 1e6 * wide, "ppm", said, wide * turned[None])
     jitter = np.sqrt(2) * unknown.state_jitter_s / np.diff(seen.windows_s).T[0]
     each_turn = np.eye(len(turned))[:, :, None] * (jitter[:, None] * turned)[None]
     source = "scatter of the joint angles"
-    yield found("times of the arm's states", source, of(each_turn), unknown.state_jitter_freedom)
+    yield _found("times of the arm's states", source, of(each_turn), unknown.state_jitter_freedom)
     tilted = _tilted(seen, unknown.axis_rad) if seen.axis_errors_rad_s is None else np.sqrt(3) * seen.axis_errors_rad_s
     yield assumed("arm's axes", float(np.degrees(unknown.axis_rad)), "°", "uncertainty.axis_deg", tilted @ matrix.T)
     if seen.return_errors_rad_s is not None:
@@ -181,7 +175,7 @@ def _contributors(explained: Explained, unknown: Unknown) -> Iterator[Contributo
         size, way = np.linalg.eigh(unknown.earth_covariance_rad2_s2)
         spread = seen.attitudes @ (way * np.sqrt(size.clip(min=0.0)))  # of each way the rate found may be off
         source, patterns = "found from sweeps and rests", np.moveaxis(spread, -1, 0) @ matrix.T
-        yield found("Earth's rate", source, of(patterns), unknown.earth_freedom)
+        yield _found("Earth's rate", source, of(patterns), unknown.earth_freedom)
     elif unknown.earth_rate:
         along = EARTH_RATE_RAD_S * np.moveaxis(seen.attitudes, -1, 0) @ matrix.T  # for each axis of the base
         yield assumed("Earth's rate", EARTH_RATE_RAD_S, "rad/s", f"site.latitude_deg {NOT_GIVEN}", along)
@@ -217,14 +211,33 @@ def _noise_freedom(explained: Explained) -> float:
     return float(effective_freedom(parts, counted).min())
 
 
-def _of_walk(explained: Explained) -> Array:
-    """(6, 6) that the wandering bias adds to the solution's covariance."""
-    if explained.bias.steady:
-        return np.zeros((6, 6))
-    response = explained.solution.response
-    shared = explained.bias.covariance(explained.seen.windows_s)
-    walk: Array = np.einsum("pni,nm,qmi->pq", response, shared, response)
-    return walk
+def _found(name: str, source: str, covariance: Array, freedom: float = np.inf) -> Contributor:
+    """Type A."""
+    return Contributor(name, "A", "normal", None, "", source, freedom, covariance)
+
+
+def _of_the_readings(explained: Explained) -> Iterator[Contributor]:
+    """Their noise, and a bias that does not stand still."""
+    bias, (flicker, wandering) = explained.bias, _of_bias(explained)
+    noise = explained.solution.covariance - flicker - wandering
+    yield _found("noise", "scatter of the readings", noise, _noise_freedom(explained))
+    if bias.found:
+        source = "scatter of rests and sweeps about each other"
+        yield _found("bias instability", source, wandering, float(bias.freedom))
+    if bias.instability_rad_s:
+        source = f"parts of its kind: {np.degrees(bias.instability_rad_s) * 3600:.3g} °/h"
+        yield Contributor("flicker of the bias", "B", "normal", None, "", source, np.inf, flicker)
+
+
+def _of_bias(explained: Explained) -> tuple[Array, Array]:
+    """(6, 6) that flicker of the bias adds to the solution's covariance, and what was found of its wandering beside."""
+    bias, response, windows_s = explained.bias, explained.solution.response, explained.seen.windows_s
+
+    def of(part: BiasProcess) -> Array:
+        covariance: Array = np.einsum("pni,nm,qmi->pq", response, part.covariance(windows_s), response)
+        return covariance
+
+    return of(replace(bias, walk_rad_s_sqrt_s=0.0, scatter_rad_s=0.0)), of(replace(bias, instability_rad_s=0.0))
 
 
 def _tilted(seen: Seen, angle_rad: float) -> Array:

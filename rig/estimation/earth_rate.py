@@ -184,7 +184,8 @@ def _fit(seen: Seen, nominal_mounting: Array, directions: Array, gravity: Array 
     solution, errors = solve(None)
     own = seen.variances_rad2_s2 + of_the_speed(seen.rates_rad_s, timed, solution.matrix) ** 2
     design = design_matrix(seen.rates_rad_s, gravity)
-    bias = expected_bias_process(design, seen.means_rad_s - errors.readings_rad_s, own, seen.windows_s)
+    means = seen.means_rad_s - errors.readings_rad_s
+    bias = expected_bias_process(design, means, own, seen.windows_s, instability_rad_s=seen.instability_rad_s)
     shared = bias.covariance(seen.windows_s)
     solution, errors = solve(shared)
     return _Fit(solution, errors, own + np.diag(shared)[:, None])

@@ -78,6 +78,11 @@ class Seen:
         return pull
 
     @property
+    def instability_rad_s(self) -> float:
+        """The sensor's bias instability, zero where nothing is known of it."""
+        return 0.0 if self.sensor is None else self.sensor.instability_rad_s
+
+    @property
     def arm_errors_rad_s(self) -> Array:
         """(P, N, 3) of both kinds of errors of its angles."""
         none = np.zeros((0, *self.means_rad_s.shape))
@@ -184,6 +189,7 @@ def _explain(seen: Seen, nominal_mounting: Array, gravity_m_s2: Array | None) ->
         seen.variances_rad2_s2 + of_the_speeds,
         seen.windows_s,
         np.einsum("pni,pmi->inm", own, own) if len(own) else None,  # each is of one axis alone
+        instability_rad_s=seen.instability_rad_s,
     )
     solution, errors = (steady, errors) if bias.steady else solve(bias.covariance(seen.windows_s))
     curved = slice(len(arm_errors), len(known))

@@ -24,13 +24,14 @@ class KnownSensor:
 
     `nonlinearity` is how far a reading may be off a straight line, as a share of `full_scale_rad_s`: by its odd part,
     and by its even part. `bias_rad_s_per_k` and `scale_per_k` are changes with temperature, `temperature_c` (N,) is
-    recorded in steps of `temperature_step_k`.
+    recorded in steps of `temperature_step_k`. `instability_rad_s` is the bias instability of parts of its kind.
     """
 
     nonlinearity: float
     full_scale_rad_s: float
     bias_rad_s_per_k: float
     scale_per_k: float
+    instability_rad_s: float
     temperature_c: Array
     temperature_step_k: float
 

@@ -13,6 +13,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from rig.estimation.arrays import Array
+from rig.estimation.bias_process import flicker_covariance
 from rig.estimation.budget import Unknown, budget
 from rig.estimation.earth import EARTH_RATE_RAD_S, STANDARD_GRAVITY_M_S2
 from rig.estimation.explained import Seen, centripetal_m_s2, explain
@@ -61,6 +62,7 @@ class Effects:
     warming_k: float = 0.3
     bias_rad_s_per_k: float = 5e-4
     scale_per_k: float = 6e-4
+    instability_rad_s: float = 4.8e-5  # 10 °/h
 
 
 @dataclass(frozen=True, slots=True)
@@ -106,6 +108,8 @@ def _one(effects: Effects, rng: np.random.Generator) -> Array:
     true = _session(rng.normal(0, effects.axis_rad, (3, 2)), effects.speed_rad_s)
     told = _session(np.zeros((3, 2)), effects.speed_rad_s)
     wandered, whole = _walk(rng, true.windows_s, effects.walk_rad_s_sqrt_s)
+    flicker = effects.instability_rad_s**2 * flicker_covariance(true.windows_s)
+    wandered = wandered + rng.multivariate_normal(np.zeros(len(flicker)), flicker, 3).T
     axes = _skewed(rng) @ _turned(rng, MOUNTING_RAD)
     heading, latitude = rng.uniform(0, 2 * np.pi), np.radians(effects.latitude_deg)
     earth = EARTH_RATE_RAD_S * np.array(
@@ -150,6 +154,7 @@ def _one(effects: Effects, rng: np.random.Generator) -> Array:
             full_scale_rad_s=effects.full_scale_rad_s,
             bias_rad_s_per_k=effects.bias_rad_s_per_k,
             scale_per_k=effects.scale_per_k,
+            instability_rad_s=effects.instability_rad_s,
             temperature_c=recorded_k,
             temperature_step_k=STEP_K,
         ),

@@ -74,8 +74,7 @@ def kvh(seed: int) -> dict[str, Any]:
     """A KVH 1775 that finds the Earth's rate."""
     rng = np.random.default_rng(seed)
     document = merge(_document("kvh1775_earth"), _laboratory(seed, rng, speed_deg_s=60.0))
-    for section in (document["site"], document["world"]["site"]):
-        section["gravity_m_s2"] = 9.80061
+    document["world"]["site"]["gravity_m_s2"] = 9.80061 + float(rng.uniform(-5e-4, 5e-4))  # what rocks make of it
     document["site"] = {"gravity_m_s2": 9.80061}  # it finds latitude and heading
     sensor = {
         "scale": rng.uniform(0.998, 1.002, 3).tolist(),
@@ -83,7 +82,8 @@ def kvh(seed: int) -> dict[str, Any]:
         "mounting_error_deg": _askew(rng, 0.5),
         "non_orthogonality_deg": rng.normal(0, SQUARE_DEG["kvh1775"], 3).tolist(),
         "offset_mm": _offset(rng),
-        "bias_instability_rad_s": 1.5e-7 * float(rng.uniform(0.5, 1.5)),
+        "bias_instability_rad_s": 2.4e-7 * float(rng.uniform(0.5, 1.5)),
+        "g_sensitivity_rad_s_per_g": _of_force(rng, "kvh1775"),
         "nonlinearity_odd_per_rad_s": _odd(rng, "kvh1775", document["sensors"]["kvh"]),
         "accelerometer": {
             **_accelerometer(rng, "kvh1775"),
@@ -166,7 +166,6 @@ def _with_sensors(document: dict[str, Any], rng: np.random.Generator, noise: Map
 def _sensor(rng: np.random.Generator, section: Mapping[str, Any], noise_rad_s: float) -> dict[str, Any]:
     part = section["part"]
     errors = PART_WANDERS[part]
-    g_rad_s = np.radians(PARTS[part].g_sensitivity_deg_s_g)
     of_force = {"accelerometer": _accelerometer(rng, part)} if "acceleration" in section else {}
     return {
         "scale": rng.uniform(0.9, 1.1, 3).tolist(),
@@ -179,13 +178,19 @@ def _sensor(rng: np.random.Generator, section: Mapping[str, Any], noise_rad_s: f
         "warm_up_s": 300,
         "bias_rad_s_per_k": rng.normal(0, errors["bias_per_k"], 3).tolist(),
         "scale_per_k": rng.normal(0, errors["scale_per_k"], 3).tolist(),
-        "g_sensitivity_rad_s_per_g": rng.uniform(-g_rad_s, g_rad_s, (3, 3)).tolist(),
+        "g_sensitivity_rad_s_per_g": _of_force(rng, part),
         "bias_instability_rad_s": errors["flicker_rad_s"] * float(rng.uniform(0.5, 1.5)),
         "bias_random_walk_rad_s_per_sqrt_s": errors["walk"] * float(rng.uniform(0.5, 3)),
         "nonlinearity_odd_per_rad_s": _odd(rng, part, section),
         "nonlinearity_even_per_rad_s": _even(rng, part, section),
         **of_force,
     }
+
+
+def _of_force(rng: np.random.Generator, part: str) -> list[list[float]]:
+    g_rad_s = np.radians(PARTS[part].g_sensitivity_deg_s_g)
+    drawn: list[list[float]] = rng.uniform(-g_rad_s, g_rad_s, (3, 3)).tolist()
+    return drawn
 
 
 def _accelerometer(rng: np.random.Generator, part: str) -> dict[str, Any]:
