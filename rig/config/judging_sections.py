@@ -258,8 +258,8 @@ class UncertaintySection(Section):
     bias_instability_deg_h: float | None = Field(
         default=None,
         ge=0,
-        description="a gyroscope's bias instability, as IEEE Std 952 has it: by how much its bias wanders however long "
-        "it is averaged; left out, what is known of the part",
+        description="the least Allan deviation of a gyroscope at rest, its in-run bias stability: by how much its bias "
+        "wanders however long it is averaged; left out, what is known of the part",
         json_schema_extra={"unit": "°/h"},
     )
     non_orthogonality_deg: float | None = Field(

@@ -27,8 +27,8 @@ class Part:
 
     `g_sensitivity_deg_s_g` is how much a reading may change for 1 g, at most, `nonlinearity_percent` how far it may be
     from a straight line, of full scale, `asymmetry_percent` by what is even of its curve; `bias_deg_s_k` and
-    `scale_ppm_k` how much bias and scale may change with temperature, `bias_instability_deg_h` how much the bias
-    flickers (IEEE Std 952), `non_orthogonality_deg` how far from 90° two of its axes may stand. `ranges_g` are those of
+    `scale_ppm_k` how much bias and scale may change with temperature, `bias_instability_deg_h` is the least Allan
+    deviation of the bias, `non_orthogonality_deg` how far from 90° two of its axes may stand. `ranges_g` are those of
     its accelerometer, which shares its data rate, the usual one first; `acceleration_noise_ug_sqrt_hz` is the noise
     density of that, in µg/√Hz, and `accelerometer` what else is known of it. A part with a port of its own stands
     beside the board, with a clock of its own.

@@ -18,15 +18,15 @@ from rig.estimation.arrays import Array
 STEPS = 25  # of either size on its grid
 PRICE = 1.0  # of walk, and of scatter, in the logarithm of the likelihood
 SPAN = 300.0  # largest size over the smallest that is looked at
-CHANGED = float(np.sqrt(4 * np.log(2) / np.pi))  # by which flicker of instability 1 changes from one mean to the next
+CHANGED = float(np.sqrt(2))  # times its Allan deviation, by which flicker changes from one mean to the next
 
 
 @dataclass(frozen=True, slots=True)
 class BiasProcess:
     """How the bias wanders: `walk_rad_s_sqrt_s` (q) and `scatter_rad_s` (s), zero where nothing but noise was seen.
 
-    `freedom` is how many differences these were found from, `instability_rad_s` the bias instability that the part is
-    known to have.
+    `freedom` is how many differences these were found from, `instability_rad_s` the Allan deviation
+    that its flicker is known to have.
     """
 
     walk_rad_s_sqrt_s: float
@@ -74,10 +74,11 @@ def walk_covariance(windows_s: ArrayLike) -> Array:
 
 
 def flicker_covariance(windows_s: ArrayLike) -> Array:
-    """(N, N) covariance of the means of flicker noise of bias instability 1 over windows (N, 2) [start, end].
+    """(N, N) covariance of the means of flicker noise, whose Allan deviation is 1, over windows (N, 2) [start, end].
 
-    Its power is 1/(2π f) (IEEE Std 952-1997, C.1.3), so that values a time τ apart vary together by −ln(τ)/π, but for
-    a constant without end. Counted from the mean over the whole time from the first start to the last end it has none.
+    Values a time τ apart vary together by −ln(τ)/(2 ln 2), but for a constant without end: that deviation is the one of
+    noise of power B²/(2π f), B √(2 ln 2/π) (IEEE Std 952-1997, C.1.3). Counted from the mean over the whole time from
+    the first start to the last end there is no such constant.
     """
     windows = np.asarray(windows_s, dtype=np.float64)
     whole = [windows.min(), windows.max()]
@@ -88,7 +89,7 @@ def flicker_covariance(windows_s: ArrayLike) -> Array:
         - _twice_integrated_logarithm(end[:, None] - end)
         + _twice_integrated_logarithm(start[:, None] - end)
     )
-    together = -between / np.outer(end - start, end - start) / np.pi
+    together = -between / np.outer(end - start, end - start) / (2 * np.log(2))
     covariance: Array = together[:-1, :-1] - together[:-1, -1:] - together[-1:, :-1] + together[-1, -1]
     return covariance
 

@@ -225,7 +225,7 @@ def _of_the_readings(explained: Explained) -> Iterator[Contributor]:
         source = "scatter of rests and sweeps about each other"
         yield _found("bias instability", source, wandering, float(bias.freedom))
     if bias.instability_rad_s:
-        source = f"parts of its kind: {np.degrees(bias.instability_rad_s) * 3600:.3g} °/h"
+        source = f"least Allan deviation: {np.degrees(bias.instability_rad_s) * 3600:.3g} °/h"
         yield Contributor("flicker of the bias", "B", "normal", None, "", source, np.inf, flicker)
 
 

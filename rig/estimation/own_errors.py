@@ -24,7 +24,7 @@ class KnownSensor:
 
     `nonlinearity` is how far a reading may be off a straight line, as a share of `full_scale_rad_s`: by its odd part,
     and by its even part. `bias_rad_s_per_k` and `scale_per_k` are changes with temperature, `temperature_c` (N,) is
-    recorded in steps of `temperature_step_k`. `instability_rad_s` is the bias instability of parts of its kind.
+    recorded in steps of `temperature_step_k`. `instability_rad_s` is the least Allan deviation of its bias.
     """
 
     nonlinearity: float

@@ -5,6 +5,7 @@ sheet: so p-values of checks that know as much, and no more, are uniform.
 """
 
 from dataclasses import dataclass, replace
+from typing import Any
 
 import numpy as np
 from scipy.interpolate import CubicSpline
@@ -13,7 +14,7 @@ from rig.arm.kinematics import NOMINAL, DenavitHartenberg, flange_attitude, flan
 from rig.arm.motion import Sweep, Transfer
 from rig.config.sensor_catalogue import PARTS
 from rig.data.run_file import RecordedSensor, RunData
-from rig.data.settings import Uncertainty
+from rig.data.settings import OF_SENSORS, Uncertainty
 from rig.estimation.arrays import Array
 from rig.estimation.earth import EARTH_RATE_RAD_S, STANDARD_GRAVITY_M_S2
 from support.synthetic_run import SENSOR, Motion, Setup, rotation, run_data, sample_times
@@ -84,7 +85,10 @@ def drawn(seed: int, kind: Kind, setup: Setup | None = None) -> Drawn:
     bias = rng.uniform(-0.02, 0.02, 3) + _wandering(len(time_s), kind, rng)
     read = felt + bias + kind.noise_rad_s * rng.standard_normal(felt.shape)
     run = _looked_at_late(run_data(setup, motion, board_s, _counts(read, kind)), motion, setup, rng)
-    return Drawn(replace(run, sensors={"gyro": kind.sensor}), time_s, felt)
+    nothing: dict[str, Any] = {of: {} for of in OF_SENSORS}  # is stated of this sensor beside what is of its kind
+    of_its_kind = replace(known, **nothing)
+    settings = replace(run.settings, uncertainty=of_its_kind)
+    return Drawn(replace(run, sensors={"gyro": kind.sensor}, settings=settings), time_s, felt)
 
 
 def damaged(seen: Drawn, kind: Kind, by_rad_s: Array) -> RunData:
@@ -153,7 +157,7 @@ def _wandering(count: int, kind: Kind, rng: np.random.Generator) -> Array:
     step_s = 1 / kind.sensor.rate_hz
     walk = rng.uniform(0.5, 3) * kind.walk_rad_s_sqrt_s * np.sqrt(step_s)
     wandered = np.cumsum(walk * rng.standard_normal((count, 3)), axis=0)
-    size = rng.uniform(0.5, 1.5) * kind.flicker_rad_s / 2
+    size = rng.uniform(0.5, 1.5) * kind.flicker_rad_s  # two octaves of flicker make its Allan deviation
     for octave_s in OCTAVES_S:
         memory = np.exp(-step_s / octave_s)
         steps = size * np.sqrt(1 - memory**2) * rng.standard_normal((count, 3))
