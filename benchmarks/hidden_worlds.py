@@ -8,31 +8,14 @@ which undamaged runs were refused and by what. `--solve-only` runs nothing. `--f
 """
 
 import argparse
-import subprocess
 import sys
 from pathlib import Path
-
-import yaml
 
 sys.path.insert(0, str(Path(__file__).parents[1] / "tests"))
 sys.path.insert(0, str(Path(__file__).parents[1]))  # before the tests' folders of the same names
 
 from support.hidden_results import Judged, held, solved
-from support.hidden_worlds import FAMILIES, WORLDS, at_address, first_seed
-
-TIMEOUT_S = 3000.0
-
-
-def recorded(family: str, seed: int, folder: Path) -> None:
-    """`rig run` in `folder`, which keeps its configuration, its run folder and what it said."""
-    folder.mkdir(parents=True)
-    config = folder / "config.yaml"
-    document = at_address(FAMILIES[family](seed), f"127.{100 + seed // 1000}.{seed % 1000 // 200 + 1}.{seed % 200 + 1}")
-    config.write_text(yaml.safe_dump(document, sort_keys=False), encoding="utf-8")
-    command = [sys.executable, "-m", "rig", "run", str(config), "--out", str(folder / "run")]
-    done = subprocess.run(command, capture_output=True, text=True, timeout=TIMEOUT_S, check=False)
-    (folder / "said").write_text(done.stdout + done.stderr, encoding="utf-8")
-    (folder / "status").write_text(f"{done.returncode}\n", encoding="utf-8")
+from support.hidden_worlds import FAMILIES, WORLDS, first_seed, recorded
 
 
 def table(family: str, runs: list[Judged]) -> None:

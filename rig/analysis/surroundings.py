@@ -2,16 +2,19 @@
 
 from collections.abc import Sequence
 from dataclasses import dataclass
-from math import inf
+from math import inf, sqrt
 
 from rig.analysis.clock import ClockCheck, check_clock, state_jitter
 from rig.data.settings import Site, Uncertainty
 from rig.observation.observed_run import ObservedRun
 
+# Of the jitter of one state, by that of a moment between two: √(f² + (1 − f)²), in the mean over all shares f.
+BETWEEN_TWO = sqrt(2 / 3)
+
 
 @dataclass(frozen=True, slots=True)
 class Surroundings:
-    """The site, what no recording shows of it, the controller's clock, and the jitter of its states' times (s).
+    """The site, what no recording shows of it, the controller's clock, and its states' jitter (s).
 
     `finds_earth_rate` says that the site is not asked for the Earth's rate, `counts_freedom` as `RunSettings` does.
     """
@@ -37,7 +40,7 @@ def surroundings_of(recordings: Sequence[ObservedRun]) -> Surroundings | None:
         settings.site,
         settings.uncertainty,
         clock,
-        jitter.std_s,
+        jitter.std_s * (BETWEEN_TWO if settings.knows_returns else 1.0),
         settings.finds_earth_rate,
         jitter.freedom,
         settings.counts_freedom,

@@ -41,7 +41,7 @@ def error_over_std(run: WholeRun, sensor: str) -> np.ndarray:
 
 
 def test_the_stated_uncertainty_holds_in_imperfect_laboratories(tmp_path: Path) -> None:
-    """The short version of this is test_truth.py: the demonstration, which is as imperfect, with few seeds."""
+    """The short version of this is one world of test_hidden_worlds.py, which is as imperfect."""
     finished = runs(drawn, SEEDS, tmp_path)
     errors = {name: np.swapaxes([error_over_std(run, name) for run in finished], 0, 1) for name in SENSORS}
     for name, (stated, plain) in errors.items():

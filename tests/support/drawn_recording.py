@@ -140,7 +140,8 @@ def _felt(turned: Array, pull: Array, kind: Kind, rng: np.random.Generator) -> A
     """(n, 3) by a sensor askew, whose axes are not square, not linear, and feel gravity."""
     part = PARTS[kind.sensor.part]
     along = turned @ rotation(rng.normal(0, np.radians(2), 3)).T
-    along = along @ (np.eye(3) + rng.normal(0, np.radians(0.2), (3, 3)))
+    leaning_rad = np.radians(part.non_orthogonality_deg) / 3 / np.sqrt(2)  # two axes lean by twice as much squared
+    along = along @ (np.eye(3) + rng.normal(0, leaning_rad, (3, 3)))
     curve = part.nonlinearity_percent / 100 / kind.sensor.range_rad_s
     odd = curve * rng.uniform(-1, 1, 3)
     to_gravity = np.radians(part.g_sensitivity_deg_s_g) / STANDARD_GRAVITY_M_S2 * rng.uniform(-1, 1, (3, 3))

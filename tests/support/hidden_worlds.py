@@ -4,6 +4,8 @@ Each is a configuration for `rig run`, with `uncertainty` as it stands when nobo
 sensors are off by lies within it and within the data sheets of rig/config/sensor_catalogue.py.
 """
 
+import subprocess
+import sys
 from collections.abc import Callable, Mapping
 from itertools import permutations, product
 from pathlib import Path
@@ -31,6 +33,7 @@ PART_WANDERS = {**PART_ERRORS, "mpu9250": PART_ERRORS["lsm9ds1"]}
 ACCELEROMETERS = {  # how far scale and bias (m/s²) may be off
     "lsm9ds1": (0.03, 0.8), "mpu9250": (0.03, 0.8), "adis16465": (0.003, 0.02), "kvh1775": (1e-3, 0.01),
 }  # fmt: skip
+TIMEOUT_S = 3000.0
 UNLIMITED = {"scale_std": 1, "bias_std_rad_s": 1, "verification_rms_rad_s": None, "verification_mean_rad_s": None}
 
 
@@ -246,6 +249,18 @@ def _mounting(rng: np.random.Generator) -> dict[str, str]:
 def first_seed(family: str) -> int:
     """Those of a family follow each other, and no two families share one."""
     return 1000 * (1 + list(FAMILIES).index(family))
+
+
+def recorded(family: str, seed: int, folder: Path) -> None:
+    """`rig run` in `folder`, which keeps its configuration, its run folder and what it said."""
+    folder.mkdir(parents=True)
+    config = folder / "config.yaml"
+    document = at_address(FAMILIES[family](seed), f"127.{100 + seed // 1000}.{seed % 1000 // 200 + 1}.{seed % 200 + 1}")
+    config.write_text(yaml.safe_dump(document, sort_keys=False), encoding="utf-8")
+    command = [sys.executable, "-m", "rig", "run", str(config), "--out", str(folder / "run")]
+    done = subprocess.run(command, capture_output=True, text=True, timeout=TIMEOUT_S, check=False)
+    (folder / "said").write_text(done.stdout + done.stderr, encoding="utf-8")
+    (folder / "status").write_text(f"{done.returncode}\n", encoding="utf-8")
 
 
 def at_address(document: dict[str, Any], host: str) -> dict[str, Any]:
