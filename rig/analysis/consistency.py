@@ -7,13 +7,33 @@ of freedom as columns. The process of the bias comes from what is left within th
 a wrong sweep does not excuse itself.
 """
 
-from collections.abc import Sequence
-from dataclasses import dataclass
+from collections.abc import Callable, Iterable, Iterator, Sequence
+from dataclasses import dataclass, field, replace
 
 import numpy as np
 
-from rig.analysis.pieces import REST, Pieces
-from rig.analysis.suspicion import TOLD, Statistic, Suspicions, basis, explained, told_by, unlike_the_others
+from rig.analysis.pieces import Pieces
+from rig.analysis.suspected import (
+    DAMAGES,
+    Means,
+    changes,
+    differences,
+    each_axis,
+    in_time,
+    jumps,
+    of_one_axis,
+    of_sweep,
+)
+from rig.analysis.suspicion import (
+    TOLD,
+    Statistic,
+    Suspected,
+    basis,
+    explained,
+    told_by,
+    told_from,
+    unlike_the_others,
+)
 from rig.estimation.arrays import Array
 from rig.estimation.bias_process import BiasProcess, likeliest_bias_process
 
@@ -27,12 +47,14 @@ WITHIN_A_TURN = 3e-4  # of the speed: graduation and eccentricity of an encoder,
 class Consistency:
     """The statistics of one sensor by the name of their check, each with its limit.
 
-    `sweep` is that of the sweep least like the others; `disturbed` are those beyond the limit, by place.
+    `sweep` is that of the sweep least like the others; `disturbed` are those beyond the limit, by place. `told_from` is
+    the size from which on each damage is told, by what happens; there where an allowance says what is legitimate.
     """
 
     statistics: dict[str, Statistic]
     sweep: Statistic
     disturbed: dict[int, Statistic]
+    told_from: dict[str, float] = field(default_factory=dict)
 
 
 @dataclass(frozen=True, slots=True)
@@ -73,28 +95,54 @@ class _Held:
 
     def judged(self, columns: Array | None, beside: Sequence[Array], rate: float) -> Statistic | None:
         """See `Held`."""
-        from scipy.special import chdtri
-
         value, freedom = self._told(columns, beside)
-        return (value, float(chdtri(freedom, rate))) if freedom else None
+        return (value, _beyond_chance(rate)(freedom)) if freedom else None
 
     def most_by_one(self, columns: Array, rate: float) -> Statistic | None:
         """What the one of columns (3, N, k) explains that explains most; None where all of them are in the model."""
-        from scipy.special import chdtri
+        alone = self._alone(columns)
+        if not alone.shape[1]:
+            return None
+        known = basis(self.base)
+        most = alone.T @ (self.seen - known @ (known.T @ self.seen))
+        return float(np.max(most**2)), _beyond_chance(rate / alone.shape[1])(1)
 
+    def told_from(self, patterns: Array, suspected: Iterable[Suspected]) -> float:
+        """As `rig.analysis.suspicion.told_from`, of patterns (k, N, 3) and columns (3, N, c)."""
+        whitened = ((_whiten(self.white, columns), limit) for columns, limit in suspected)
+        return told_from(basis(self.base), _whiten(self.white, np.moveaxis(patterns, 0, -1).swapaxes(0, 1)), whitened)
+
+    def each_alone(self, columns: Array, rate: float) -> Iterator[Suspected]:
+        """What `most_by_one` holds against each other, columns (3, N, 1) each."""
+        limit = _beyond_chance(rate / max(self._alone(columns).shape[1], 1))
+        yield from ((column[..., None], limit) for column in np.moveaxis(columns, -1, 0))
+
+    def _alone(self, columns: Array) -> Array:
+        """(3 N, k) unit columns, each for itself less what the model holds of it; those that it holds are left out."""
         known, new = basis(self.base), _whiten(self.white, columns)
         sizes = np.linalg.norm(new, axis=0)
         new = new - known @ (known.T @ new)
         left = np.linalg.norm(new, axis=0)
         told = left > TOLD * sizes
-        if not told.any():
-            return None
-        most = (new[:, told].T @ (self.seen - known @ (known.T @ self.seen))) / left[told]
-        return float(np.max(most**2)), float(chdtri(1, rate / np.count_nonzero(told)))
+        return np.asarray(new[:, told] / left[told], dtype=np.float64)
 
     def _told(self, columns: Array | None, beside: Sequence[Array]) -> tuple[float, int]:
         base = np.concatenate([self.base, *(_whiten(self.white, each) for each in beside)], axis=1)
         return explained(self.seen, base, None if columns is None else _whiten(self.white, columns))
+
+
+@dataclass(frozen=True, slots=True)
+class _Look:
+    """Pieces, what each axis of the sensor feels in them (N, 3), and both held against their model."""
+
+    pieces: Pieces
+    felt: Array
+    held: _Held
+
+    @property
+    def means(self) -> Means:
+        """They too are means."""
+        return Means(self.felt, self.pieces.times_s, self.pieces.sweep)
 
 
 def consistency(pieces: Pieces, matrix: Array, rate: float, allowance: Allowance | None = None) -> Consistency:
@@ -103,48 +151,62 @@ def consistency(pieces: Pieces, matrix: Array, rate: float, allowance: Allowance
     Without an `allowance` every sensor is allowed what all were before, and the ways between the sweeps tell nothing.
     """
     felt = pieces.rates_rad_s @ matrix.T
-    if allowance is None:
-        scatter = _tolerated(pieces, felt)
-        held = _held(pieces, scatter, _wandering(pieces, felt, _steady(pieces), scatter))
-        found = told_by(held, _changes(pieces, felt), rate)
-        whole, of_an_axis = None, None
-    else:
-        unstable = allowance.instability_rad_s
-        scatter = _Scatter(pieces.variances_rad2_s2, _together(allowance.off_rad_s), unstable)
-        bias, ways = _wandering(pieces, felt, _steady(pieces), scatter), allowance.ways
-        held = _held(pieces, scatter, bias)
-        felt_on_ways = ways.rates_rad_s @ matrix.T
-        on_ways = _Scatter(ways.variances_rad2_s2, _together(allowance.off_on_ways_rad_s), unstable)
-        held_on_ways = _held(ways, on_ways, bias)
-        found = told_by(held_on_ways, _changes(ways, felt_on_ways), rate)
-        whole = _each_axis(np.column_stack(_sweeps(pieces)))
-        of_an_axis = _axis_changed(ways, felt_on_ways, held_on_ways, rate)
-    found |= told_by(held, _differences(pieces, felt, whole), rate)
-    if of_an_axis is not None:
-        found["axis_changed"] = of_an_axis
+    scatter = _tolerated(pieces, felt) if allowance is None else _allowed(pieces, allowance.off_rad_s, allowance)
+    bias = _wandering(pieces, felt, _steady(pieces), scatter)
+    here = _Look(pieces, felt, _held(pieces, scatter, bias))
+    later, whole = here, None
+    if allowance is not None:
+        ways, of_ways = allowance.ways, _allowed(allowance.ways, allowance.off_on_ways_rad_s, allowance)
+        later = _Look(ways, ways.rates_rad_s @ matrix.T, _held(ways, of_ways, bias))
+        whole = each_axis(here.means.sweeps)
+    found = told_by(later.held, changes(later.pieces, later.felt), rate)
+    found |= told_by(here.held, differences(pieces, felt, whole), rate)
+    if allowance is not None and (told := later.held.most_by_one(of_one_axis(later.pieces, later.felt), rate)):
+        found["axis_changed"] = told
     jumped = _jumped(pieces, felt, scatter, rate)
     if jumped is not None:
         found["bias_jumped"] = jumped
     sweeps = np.unique(pieces.sweep[pieces.sweep >= 0]).tolist()
-    ranked = unlike_the_others(held, sweeps, lambda sweep: _of_sweep(pieces, sweep), rate)
-    return Consistency(found, ranked[0][1], {sweep: each for sweep, each in ranked if each[0] > each[1]})
+    ranked = unlike_the_others(here.held, sweeps, lambda sweep: of_sweep(pieces, sweep), rate)
+    disturbed = {sweep: each for sweep, each in ranked if each[0] > each[1]}
+    return Consistency(found, ranked[0][1], disturbed, {} if allowance is None else dict(_told_from(here, later, rate)))
 
 
-def _axis_changed(ways: Pieces, felt: Array, held: _Held, rate: float) -> Statistic | None:
-    """How much another scale factor of one axis explains, from one sweep or way on; None where none would be told.
+def _told_from(here: _Look, later: _Look, rate: float) -> Iterator[tuple[str, float]]:
+    """What may happen, and the size from which on the check that is to tell it does."""
+    pieces, chance = here.pieces, _beyond_chance(rate)
+    steps, sweeps = jumps(pieces), np.unique(pieces.sweep[pieces.sweep >= 0]).tolist()
+    among_ways, among_pieces = changes(later.pieces, later.felt), differences(pieces, here.felt, None)
+    asked: dict[str, tuple[_Look, list[Suspected]]] = {
+        name: (look, [(columns, chance)])
+        for look, suspicions in ((later, among_ways), (here, among_pieces))
+        for name, columns in suspicions.items()
+        if columns is not None
+    }
+    asked["axis_changed"] = later, list(later.held.each_alone(of_one_axis(later.pieces, later.felt), rate))
+    of_one = _beyond_chance(rate / len(sweeps))
+    asked["disturbed_sweep"] = here, [(of_sweep(pieces, sweep), of_one) for sweep in sweeps]
+    if len(steps) > 1:
+        steady = replace(here.held, base=_whiten(here.held.white, each_axis(_steady(pieces))))
+        limit = _beyond_jumps(len(steps), rate)
+        asked["bias_jumped"] = replace(here, held=steady), [(each_axis(step), lambda _: limit) for step in steps]
+    for damage in DAMAGES:
+        if damage.check in asked:
+            look, suspected = asked[damage.check]
+            yield damage.what, look.held.told_from(damage.patterns(look.means), suspected)
 
-    It is that of the axis and the time for which it explains most.
-    """
-    starts = np.unique([ways.times_s[ways.sweep == sweep].min() for sweep in np.unique(ways.sweep[ways.sweep != REST])])
-    later = ways.times_s.mean(axis=1)[:, None] > starts[1:]
-    columns = np.concatenate([_per_axis(felt * since[:, None]) for since in later.T], axis=2)
-    return held.most_by_one(columns, rate)
+
+def _beyond_chance(rate: float) -> Callable[[int], float]:
+    """Of χ² with so many degrees of freedom, in a share `rate` of recordings."""
+    from scipy.special import chdtri
+
+    return lambda freedom: float(chdtri(freedom, rate))
 
 
 def _held(pieces: Pieces, scatter: _Scatter, bias: BiasProcess) -> _Held:
     white = _whitening(_covariance(pieces, scatter, bias), pieces.variances_rad2_s2.min())
     seen = _whiten(white, pieces.means_rad_s.T[:, :, None])[:, 0]
-    return _Held(white, seen, _whiten(white, _each_axis(_known(pieces))))
+    return _Held(white, seen, _whiten(white, each_axis(_known(pieces))))
 
 
 def _jumped(pieces: Pieces, felt: Array, scatter: _Scatter, rate: float) -> Statistic | None:
@@ -154,12 +216,7 @@ def _jumped(pieces: Pieces, felt: Array, scatter: _Scatter, rate: float) -> Stat
     rests tell that process, and least of all beside the jump that suits them best: simulated random walks exceed
     the critical value about as often as F does with one degree of freedom for each place a jump might have.
     """
-    from scipy.special import fdtri
-
-    steady, middle = _steady(pieces), pieces.times_s.mean(axis=1)
-    ends = [pieces.times_s[pieces.sweep == sweep].max() for sweep in np.unique(pieces.sweep[pieces.sweep >= 0])]
-    steps = [np.where(middle < end, 0.0, 1.0)[:, None] for end in ends]
-    steps = [step for step in steps if len(np.unique(step[pieces.sweep < 0])) > 1]
+    steady, steps = _steady(pieces), jumps(pieces)
     if len(steps) < 2:
         return None
 
@@ -167,14 +224,21 @@ def _jumped(pieces: Pieces, felt: Array, scatter: _Scatter, rate: float) -> Stat
         bias = _wandering(pieces, felt, beside, scatter)
         white = _whitening(_covariance(pieces, scatter, bias), pieces.variances_rad2_s2.min())
         seen = _whiten(white, (pieces.means_rad_s - felt).T[:, :, None])[:, 0]
-        return explained(seen, _whiten(white, _each_axis(steady)), _whiten(white, _each_axis(step)))[0]
+        return explained(seen, _whiten(white, each_axis(steady)), _whiten(white, each_axis(step)))[0]
 
     left = pieces.means_rad_s - felt
     left = left - steady @ (steady.T @ left)
     aside = [step - steady @ (steady.T @ step) for step in steps]
     best = max(range(len(steps)), key=lambda k: float(np.sum((aside[k].T @ left) ** 2 / np.sum(aside[k] ** 2))))
     beside = basis(np.column_stack([steady, steps[best]]))
-    return told(steps[best], beside), 3 * float(fdtri(3, len(steps), 1 - rate / len(steps)))
+    return told(steps[best], beside), _beyond_jumps(len(steps), rate)
+
+
+def _beyond_jumps(places: int, rate: float) -> float:
+    """The critical value of a jump that may be in so many places."""
+    from scipy.special import fdtri
+
+    return 3 * float(fdtri(3, places, 1 - rate / places))
 
 
 def _wandering(pieces: Pieces, felt: Array, steady: Array, scatter: _Scatter) -> BiasProcess:
@@ -203,6 +267,11 @@ def _together(off: Array) -> Array:
     return np.asarray(columns @ columns.T, dtype=np.float64)
 
 
+def _allowed(pieces: Pieces, off_rad_s: Array, allowance: Allowance) -> _Scatter:
+    """What is known of arm and sensor."""
+    return _Scatter(pieces.variances_rad2_s2, _together(off_rad_s), allowance.instability_rad_s)
+
+
 def _tolerated(pieces: Pieces, felt: Array) -> _Scatter:
     """What was allowed to every sensor alike: in all of a sweep, and within it."""
     same = (pieces.sweep[:, None] == pieces.sweep) & (pieces.sweep >= 0)
@@ -214,65 +283,13 @@ def _tolerated(pieces: Pieces, felt: Array) -> _Scatter:
 def _steady(pieces: Pieces) -> Array:
     """(N, k) orthonormal columns: whatever each sweep reads as a whole, the rests alike, gravity, a steady drift."""
     places = [pieces.sweep == sweep for sweep in np.unique(pieces.sweep)]
-    return basis(np.column_stack([*places, pieces.pull_m_s2, _time(pieces)]))
+    return basis(np.column_stack([*places, pieces.pull_m_s2, in_time(pieces)]))
 
 
 def _known(pieces: Pieces) -> Array:
     """(N, 8) columns of the model, for each axis alike."""
     ones = np.ones(len(pieces.sweep))
-    return np.column_stack([pieces.rates_rad_s, ones, pieces.pull_m_s2, _time(pieces)])
-
-
-def _changes(pieces: Pieces, felt: Array) -> Suspicions:
-    """By name of the check (3, N, k): what another scale factor of each axis, or another mounting, with time adds."""
-    time = _time(pieces)
-    for sweep in np.unique(pieces.sweep):  # what changes within a sweep is that sweep's own matter
-        time[pieces.sweep == sweep] = time[pieces.sweep == sweep].mean()
-    turned = np.cross(np.eye(3)[:, None], felt[None]) * time[None, :, None]  # (k, N, 3)
-    return {"scale_changed": _per_axis(felt * time[:, None]), "loose_mounting": np.transpose(turned, (2, 1, 0))}
-
-
-def _differences(pieces: Pieces, felt: Array, whole: Array | None) -> dict[str, Array | None]:
-    """The same of what differs between directions, sweeps and rests.
-
-    What else may differ is `whole` (3, N, k), each sweep from what the model says; None is anything at all, but of that
-    the scatter within sweeps is made which the bias' wandering is found from.
-    """
-    found: dict[str, Array | None] = {"cw_against_ccw": _per_axis(np.abs(felt)), "residuals": whole}
-    moving = pieces.sweep >= 0
-    if not moving.all():
-        found["sweeps_against_rests"] = _per_axis(np.outer(moving, np.ones(3)))
-    return found
-
-
-def _sweeps(pieces: Pieces) -> list[Array]:
-    """(N,) one in each sweep, zero elsewhere."""
-    return [(pieces.sweep == sweep).astype(np.float64) for sweep in np.unique(pieces.sweep[pieces.sweep >= 0])]
-
-
-def _of_sweep(pieces: Pieces, sweep: int) -> Array:
-    """(3, N, 6): another reading in this sweep, and another in its second half than in its first."""
-    inside = (pieces.sweep == sweep).astype(np.float64)
-    return _each_axis(np.column_stack([inside, inside * pieces.place]))
-
-
-def _time(pieces: Pieces) -> Array:
-    """(N,) of the pieces' middles, from −1 to 1."""
-    middle = pieces.times_s.mean(axis=1)
-    time: Array = (2 * middle - middle.max() - middle.min()) / np.ptp(middle)
-    return time
-
-
-def _each_axis(columns: Array) -> Array:
-    """(3, N, 3 k): columns (N, k) for each axis with a coefficient of its own."""
-    count, wide = columns.shape
-    return np.asarray(np.einsum("ij,nk->injk", np.eye(3), columns).reshape(3, count, 3 * wide), dtype=np.float64)
-
-
-def _per_axis(columns: Array) -> Array:
-    """(3, N, 3) from (N, 3): each axis' own column, with a coefficient of its own."""
-    stacked: Array = np.einsum("ij,ni->inj", np.eye(3), columns)
-    return stacked
+    return np.column_stack([pieces.rates_rad_s, ones, pieces.pull_m_s2, in_time(pieces)])
 
 
 def _whitening(covariance: Array, least: float) -> Array:

@@ -1,7 +1,7 @@
 """What contradicts itself does not pass: the checks of the verdict that hold a recording against itself."""
 
-from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
+from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import dataclass, field
 
 import numpy as np
 
@@ -11,10 +11,12 @@ from rig.analysis.calibration import SensorResult, observe_recordings, solve_obs
 from rig.analysis.consistency import consistency
 from rig.analysis.leaning import leaning_deg
 from rig.analysis.magnetic_field import MagnetometerResult
-from rig.analysis.pieces import cut
+from rig.analysis.pieces import REST, cut
 from rig.analysis.readings import judge_readings
 from rig.analysis.reference_contradictions import of_accelerometer, of_magnetometer, reference_statistics
+from rig.analysis.reference_suspected import DAMAGES as REFERENCE_DAMAGES
 from rig.analysis.surroundings import Surroundings, surroundings_of
+from rig.analysis.suspected import DAMAGES, Means
 from rig.analysis.suspicion import Statistic
 from rig.analysis.verdict import Check
 from rig.analysis.ways import with_ways
@@ -29,11 +31,30 @@ DISTURBED = "disturbed_sweep"
 
 
 @dataclass(frozen=True, slots=True)
+class ToldFrom:
+    """The size, in `unit`, from which on a check tells that `what` happened, in 95 of 100 recordings.
+
+    Infinite where no size is told. Just below it the scale factor or bias farthest off is off by so many times its U,
+    where that is known.
+    """
+
+    what: str
+    check: str
+    size: float
+    unit: str
+    off_by_expanded: float | None = None
+
+
+@dataclass(frozen=True, slots=True)
 class Contradictions:
-    """The checks, in order, and the sweeps of the plan, by index, that they name."""
+    """The checks, in order, the sweeps of the plan, by index, that they name, and what of each sensor is told."""
 
     checks: tuple[Check, ...]
     disturbed: frozenset[int]
+    told_from: Mapping[str, tuple[ToldFrom, ...]] = field(default_factory=dict)
+
+
+NOTHING = Contradictions((), frozenset())
 
 
 def contradictions(
@@ -48,9 +69,10 @@ def contradictions(
     """
     settings = recordings[0].run.settings
     if settings.site is None:
-        return Contradictions((), frozenset())
+        return NOTHING
     checks: list[Check] = []
     disturbed: set[int] = set()
+    told_from: dict[str, tuple[ToldFrom, ...]] = {}
     rate = _rate(recordings[0].run, sensors)
     for name in sensors:
         explained = results[name].explained
@@ -71,7 +93,26 @@ def contradictions(
             stated_deg = surroundings.uncertainty.of("non_orthogonality_deg", name, results[name].sensor.part)
             checks.append(Check(f"{name}.non_orthogonality", *leaning_deg(explained.solution, stated_deg, rate), "°"))
         disturbed |= named.keys()
-    return Contradictions(tuple(checks), frozenset(disturbed))
+        told_from[name] = tuple(_told_from(found.told_from, results[name]))
+    return Contradictions(tuple(checks), frozenset(disturbed), told_from)
+
+
+def _told_from(sizes: Mapping[str, float], result: SensorResult) -> Iterator[ToldFrom]:
+    explained, budget = result.explained, result.uncertainty
+    assert explained is not None
+    seen, solution = explained.seen, explained.solution
+    turns = np.flatnonzero(seen.turns_rad_s.any(axis=1))
+    sweep = np.full(len(seen.turns_rad_s), REST)
+    sweep[turns] = np.arange(len(turns))
+    means = Means(seen.rates_rad_s @ solution.matrix.T, seen.windows_s, sweep)
+    for damage in DAMAGES:
+        if (size := sizes.get(damage.what)) is None:
+            continue
+        off_by = None
+        if budget is not None and np.isfinite(size):
+            effects = size * np.einsum("qni,kni->kq", solution.response, damage.patterns(means))
+            off_by = float(np.max(np.abs(effects) / budget.expanded))
+        yield ToldFrom(damage.what, damage.check, size, damage.unit, off_by)
 
 
 def in_reference(
@@ -80,7 +121,7 @@ def in_reference(
     magnetometers: Mapping[str, MagnetometerResult | Fault],
     *,
     drifting: bool = False,
-) -> tuple[Check, ...]:
+) -> Contradictions:
     """The same of what gravity and the magnetic field calibrate, of recordings that hold all kinds of readings so.
 
     Dwell and sweep are named as a gyroscope's sweep is: `gyro.acceleration_disturbed_dwell.13`. The bias may change
@@ -89,19 +130,23 @@ def in_reference(
     run = recordings[0].run
     known = run.settings.uncertainty
     if known is None or not run.settings.holds_all_kinds:
-        return ()
-    found = {
-        f"{name}.acceleration_": of_accelerometer(name, recordings, each, known)
-        for name, each in accelerometers.items()
-    }
-    found |= {
-        f"{name}.field_": of_magnetometer(name, recordings, each, known)
-        for name, each in magnetometers.items()
-        if not isinstance(each, Fault)
-    }
+        return NOTHING
+    asked = {(name, "acceleration", "m/s²"): of_accelerometer(name, recordings, each, known)
+             for name, each in accelerometers.items()} | {
+             (name, "field", "T"): of_magnetometer(name, recordings, each, known)
+             for name, each in magnetometers.items() if not isinstance(each, Fault)}  # fmt: skip
     rate = _rate(run, run.settings.to_calibrate)
-    statistics = {of: reference_statistics(held, rate, drifting=drifting) for of, held in found.items()}
-    return tuple(check for of, each in statistics.items() for check in _checks(of, each))
+    checks: list[Check] = []
+    told_from: dict[str, tuple[ToldFrom, ...]] = {}
+    for (name, kind, unit), held in asked.items():
+        found = reference_statistics(held, rate, drifting=drifting)
+        checks += _checks(f"{name}.{kind}_", found.statistics)
+        told_from[name] = tuple(
+            ToldFrom(damage.what, f"{kind}_{damage.check}", found.told_from[damage.what], damage.unit or unit)
+            for damage in REFERENCE_DAMAGES
+            if damage.what in found.told_from
+        )
+    return Contradictions(tuple(checks), frozenset(), told_from)
 
 
 def _rate(run: RunData, sensors: Sequence[str]) -> float:

@@ -18,7 +18,7 @@ from rig.analysis.calibration import (
 )
 from rig.analysis.clock import ClockCheck
 from rig.analysis.comparison import Reference, turns_of
-from rig.analysis.contradictions import contradictions, in_reference
+from rig.analysis.contradictions import ToldFrom, contradictions, in_reference
 from rig.analysis.magnetic_field import MagnetometerResult, calibrate_magnetometers
 from rig.analysis.onboard_check import Agreement, agreement
 from rig.analysis.seen import arms_of
@@ -64,7 +64,8 @@ class Outcome:
     verified. `verifications` hold those that could be made. `clock` is the controller's, None where recordings of
     before say nothing of its uncertainty. Where no sweep was planned there are `accelerometers` alone, and beside them
     the `magnetometers`, which no limit of scale and bias judges.
-    `drifts` are there where attitudes were repeated to watch the bias.
+    `drifts` are there where attitudes were repeated to watch the bias. `told_from` says of gyroscopes what may happen
+    in the run and from what size on the checks tell it, `told_from_in_reference` of accelerometers and magnetometers.
     """
 
     recordings: tuple[ObservedRun, ...]
@@ -78,6 +79,8 @@ class Outcome:
     accelerometers: Mapping[str, AccelerometerResult] = field(default_factory=dict)
     magnetometers: Mapping[str, MagnetometerResult | Fault] = field(default_factory=dict)
     drifts: Drifts = field(default_factory=dict)
+    told_from: Mapping[str, tuple[ToldFrom, ...]] = field(default_factory=dict)
+    told_from_in_reference: Mapping[str, tuple[ToldFrom, ...]] = field(default_factory=dict)
 
     @property
     def verdict(self) -> Literal["pass", "fail"]:
@@ -111,6 +114,8 @@ def calibrated(runs: Sequence[RunData], estimator: str = DEFAULT_ESTIMATOR, *, d
     results = solve_observed(runs[0].sensors, recordings, chosen, surroundings, settings.matrix_corrected)
     accelerometers = calibrate_accelerometers(recordings, settings, results)
     magnetometers = calibrate_magnetometers(recordings, settings, accelerometers)
+    among_rates = contradictions(recordings, results, settings.to_calibrate, surroundings)
+    among_dwells = in_reference(recordings, accelerometers, magnetometers, drifting=drifting)
     onboard = {name: agreement(runs, name) for name in settings.to_calibrate if runs[0].sensors[name].on_board}
     checks = judge(
         {name: results[name].solution for name in settings.to_calibrate},
@@ -127,15 +132,17 @@ def calibrated(runs: Sequence[RunData], estimator: str = DEFAULT_ESTIMATOR, *, d
         checks=(
             *checks,
             *(check for name, agreed in onboard.items() for check in agreed.checks(name)),
-            *contradictions(recordings, results, settings.to_calibrate, surroundings).checks,
+            *among_rates.checks,
             *(clock_checks(surroundings.clock) if surroundings is not None and settings.holds_every_clock else ()),
             *_acceleration_checks(accelerometers, settings),
-            *in_reference(recordings, accelerometers, magnetometers, drifting=drifting),
+            *among_dwells.checks,
         ),
         provenance=_origin(runs),
         clock=None if surroundings is None else surroundings.clock,
         accelerometers=accelerometers,
         magnetometers=magnetometers,
+        told_from=among_rates.told_from,
+        told_from_in_reference=among_dwells.told_from,
     )
 
 
@@ -156,10 +163,8 @@ def _in_attitudes(runs: Sequence[RunData], recordings: tuple[ObservedRun, ...], 
     settings = runs[0].settings
     found = calibrate_accelerometers(recordings, settings)
     magnetometers = calibrate_magnetometers(recordings, settings, found)
-    checks = (
-        *_acceleration_checks(found, settings),
-        *in_reference(recordings, found, magnetometers, drifting=drifting),
-    )
+    among_dwells = in_reference(recordings, found, magnetometers, drifting=drifting)
+    checks = (*_acceleration_checks(found, settings), *among_dwells.checks)
     return Outcome(
         recordings,
         settings,
@@ -170,6 +175,7 @@ def _in_attitudes(runs: Sequence[RunData], recordings: tuple[ObservedRun, ...], 
         _origin(runs),
         accelerometers=found,
         magnetometers=magnetometers,
+        told_from_in_reference=among_dwells.told_from,
     )
 
 

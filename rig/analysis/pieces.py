@@ -24,13 +24,28 @@ from rig.observation.observed_run import ObservedRun
 from rig.observation.tapered import noise_at_zero
 from rig.observation.timebase import ArmMotion
 
-PARTS = 4  # of a revolution; a rest has half as many
-MOST_PIECES = 48  # of all revolutions: beyond twelve sweeps these are cut into fewer parts
 FEWEST_SAMPLES = 20
 PREVAILS = 0.7  # of the residuals' variance, what is left in a long mean where the rest of them is a vibration
 FEWEST_AT_REST = 60  # of a whole rest: fewer do not tell its noise well enough to weigh it by
 FINER = 3.0  # than the arm's states follow each other, what its rate is looked at
 REST = -1  # in the place of a sweep; ways between sweeps and rests count down from there
+
+
+@dataclass(frozen=True, slots=True)
+class Cuts:
+    """Parts of a revolution, and how many times fewer a rest has.
+
+    There are `most` of all revolutions: where these are many, each is cut into fewer.
+    """
+
+    parts: int
+    times_a_rest: int
+    most: int
+
+
+BEFORE = Cuts(parts=4, times_a_rest=2, most=48)
+# Not four: at the ends of quarters one of an encoder's waves that come twice a turn is zero, and no part shows it.
+BY_MODEL = Cuts(parts=6, times_a_rest=3, most=72)
 
 
 @dataclass(frozen=True, slots=True)
@@ -101,17 +116,20 @@ def cut(name: str, recordings: Sequence[ObservedRun], result: SensorResult, expl
     """The sensor's revolutions and rests of all recordings in pieces, in the order `explained` was made from."""
     x, y, z = explained.seen.earth_rate_rad_s.tolist()  # known by the site, or found
     site = replace(site, earth_rate_rad_s=(x, y, z))
-    parts = max(1, min(PARTS, MOST_PIECES // len(result.observations)))
+    by_model = recordings[0].run.settings.checked_by_model
+    cuts = BY_MODEL if by_model else BEFORE
+    parts = max(1, min(cuts.parts, cuts.most // len(result.observations)))
+    of_rest = max(1, parts // cuts.times_a_rest)
     streams = [(recording, recording.stream(name)) for recording in recordings]
     turns = [(*each, turn) for each in streams for turn in each[0].sensors[name].revolutions]
     rests = [(*each, rest) for each in streams for rest in each[0].sensors[name].rests]
-    cut_up = partial(_cut, site=site, finds_lines=recordings[0].run.settings.checked_by_model)
+    cut_up = partial(_cut, site=site, finds_lines=by_model)
     found = [
         *(
             cut_up(stream, recording.motion, turn.average, sweep=sweep, turn=turn, parts=parts)
             for sweep, (recording, stream, turn) in enumerate(turns)
         ),
-        *(cut_up(stream, recording.motion, rest, parts=max(1, parts // 2)) for recording, stream, rest in rests),
+        *(cut_up(stream, recording.motion, rest, parts=of_rest) for recording, stream, rest in rests),
     ]
     averages = [*(turn.average for *_, turn in turns), *(rest for *_, rest in rests)]
     seen, pieces, pull_m_s2, times_s = explained.seen, list[_Piece](), list[Array](), list[Array]()

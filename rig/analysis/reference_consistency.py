@@ -7,54 +7,31 @@ itself: a suspicion is told by how much likelier it makes the readings.
 """
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 
 import numpy as np
 
-from rig.analysis.suspicion import Statistic, Suspicions, basis, told_beside, told_by, unlike_the_others
+from rig.analysis.reference_suspected import DAMAGES, Read, bias_over_time, of_piece, suspicions
+from rig.analysis.suspicion import Statistic, basis, told_beside, told_by, told_from, unlike_the_others
 from rig.estimation.arrays import Array
-from rig.estimation.felt import SECOND, Movement, cross, effects, felt, jacobian, predicted
+from rig.estimation.felt import effects, predicted
 from rig.estimation.imu_fit import slopes
-from rig.estimation.reading_errors import in_sweeps, noise, of_pieces, of_sensor, per_axis
-from rig.estimation.reference_model import matrix
+from rig.estimation.reading_errors import noise
 from rig.estimation.shared_errors import Apart, apart, information, likeliest_error, more_likely
-
-
-@dataclass(frozen=True, slots=True)
-class Read:
-    """What is held against its model: θ (22,) found from the `movement`, and what else is known of both.
-
-    `known` (P, 3 K) are independent patterns of errors in the readings, each of one standard uncertainty; `times_s`
-    (N + M,) the middles of dwells and sweeps.
-    """
-
-    theta: Array
-    movement: Movement
-    known: Array
-    times_s: Array
-    second_order: bool
-
-    @property
-    def dwells(self) -> int:
-        """N."""
-        return len(self.movement.dwells.readings_m_s2)
-
-    @property
-    def sweeps(self) -> int:
-        """M."""
-        return len(self.movement.sweeps.speeds_rad_s)
 
 
 @dataclass(frozen=True, slots=True)
 class ReferenceConsistency:
     """The statistics by the name of their check; `piece` is that of the dwell or sweep least like the others.
 
-    `disturbed` are those beyond the limit, by place: the dwells, then the sweeps.
+    `disturbed` are those beyond the limit, by place: the dwells, then the sweeps. `told_from` is the size from which on
+    each of `DAMAGES` is told, by what happens.
     """
 
     statistics: dict[str, Statistic]
     piece: Statistic
     disturbed: dict[int, Statistic]
+    told_from: dict[str, float] = field(default_factory=dict)
 
 
 @dataclass(frozen=True, slots=True)
@@ -84,7 +61,7 @@ class HeldReadings:
         Where it is not, the limit is that of F, as far as δ is what the columns stand out against. Of anything at all
         it is χ² of what the model leaves.
         """
-        from scipy.special import chdtri, fdtri
+        from scipy.special import chdtri
 
         base = self._beside(beside)
         std_rad = self._off(base)
@@ -93,13 +70,29 @@ class HeldReadings:
             left = self._unexplained(base, std_rad)[1]
             return (float(left @ left), float(chdtri(freedom, rate))) if freedom else None
         new = told_beside(basis(base), self.turn @ columns)
-        if not (count := new.shape[1]):
+        if not new.shape[1]:
             return None
+        return more_likely(self._apart(), self.left, base, new), self._limit(base, new, std_rad, rate)
+
+    def told_from(self, damages: Array, suspected: Sequence[Array], rate: float) -> float:
+        """The size from which on damages (n, k) are told by what is suspected: as `rig.analysis.suspicion` has it."""
+        base = self._beside(())
+        std_rad = self._off(base)
+        size = np.sqrt(1 + std_rad**2 * self.growth)[:, None]
+        turned = [self.turn @ columns for columns in suspected]
+        limits = [self._limit(base, told_beside(basis(base), columns), std_rad, rate) for columns in turned]
+        found = [(columns / size, lambda _, limit=limit: limit) for columns, limit in zip(turned, limits, strict=True)]
+        return told_from(basis(base / size), self.turn @ damages / size, found)
+
+    def _limit(self, base: Array, new: Array, std_rad: float, rate: float) -> float:
+        """Of what orthonormal columns explain beside `base`, in a share `rate` of recordings."""
+        from scipy.special import chdtri, fdtri
+
+        count = new.shape[1]
         of_known, freedom = float(chdtri(count, rate)), max(self._freedom(base, std_rad), count + 1.0)
-        told = count / (freedom - count) * float(fdtri(count, freedom - count, 1 - rate))
+        told = count / (freedom - count) * fdtri(count, freedom - count, 1 - rate)
         of_unknown, share = freedom * float(np.log1p(told)), self._share(base, new, std_rad)
-        limit = of_known + share * max(of_unknown - of_known, 0.0)
-        return more_likely(self._apart(), self.left, base, new), limit
+        return float(of_known + share * max(of_unknown - of_known, 0.0))
 
     def _beside(self, beside: Sequence[Array]) -> Array:
         return basis(np.column_stack([self.base, *(self.turn @ each for each in beside)]))
@@ -139,12 +132,21 @@ def reference_consistency(read: Read, rate: float, *, drifting: bool = False) ->
 
     The bias may change steadily where it is `drifting`.
     """
-    held = _held(read, drifting=drifting)
-    ranked = unlike_the_others(held, range(read.dwells + read.sweeps), lambda piece: _of_piece(read, piece), rate)
+    held, suspected = _held(read, drifting=drifting), suspicions(read)
+    pieces = range(read.dwells + read.sweeps)
+    ranked = unlike_the_others(held, pieces, lambda piece: of_piece(read, piece), rate)
+    statistics = told_by(held, suspected, rate)
+    asked = {name: ([columns], rate) for name in statistics if (columns := suspected[name]) is not None}
+    asked["disturbed_dwell"] = [of_piece(read, piece) for piece in pieces[: read.dwells]], rate / len(pieces)
     return ReferenceConsistency(
-        told_by(held, _suspicions(read), rate),
+        statistics,
         ranked[0][1],
         {piece: statistic for piece, statistic in ranked if statistic[0] > statistic[1]},
+        {
+            damage.what: held.told_from(damage.patterns(read), *asked[damage.check])
+            for damage in DAMAGES
+            if damage.check in asked
+        },
     )
 
 
@@ -153,42 +155,6 @@ def _held(read: Read, *, drifting: bool) -> HeldReadings:
     found = apart(noise(theta, movement) + read.known.T @ read.known, effects(theta, movement))
     base = slopes(theta, movement, second_order=read.second_order)
     if drifting:
-        base = np.column_stack([base, _bias_over_time(read)])
+        base = np.column_stack([base, bias_over_time(read)])
     left = (movement.readings() - predicted(theta, movement)).ravel()
     return HeldReadings(found.turn @ left, found.turn @ base, found.turn, found.growth)
-
-
-def _suspicions(read: Read) -> Suspicions:
-    """By name of the check (3 K, k): what each would add to the readings; None is anything at all."""
-    s, f, time = felt(read.theta, read.movement), matrix(read.theta), _time(read)
-    found: dict[str, Array | None] = {
-        "bias_changed": _bias_over_time(read),
-        "scale_changed": per_axis((s @ f.T) * time[:, None]),
-        "loose_mounting": ((f @ -cross(s)) * time[:, None, None]).reshape(-1, 3),
-        "even_term": jacobian(read.theta, read.movement)[:, SECOND],
-        "odd_term": of_sensor(read.theta, read.movement, lambda along: along**3),
-        "asymmetry": of_sensor(read.theta, read.movement, np.abs),
-        "residuals": None,
-    }
-    if read.dwells and read.sweeps:
-        found["sweeps_against_dwells"] = in_sweeps(read.movement)
-    return found
-
-
-def _of_piece(read: Read, piece: int) -> Array:
-    """(3 K, 3 or 9): other readings in this dwell, or sweep."""
-    first, wide = (3 * piece, 3) if piece < read.dwells else (3 * read.dwells + 9 * (piece - read.dwells), 9)
-    columns = np.zeros((read.movement.readings().size, wide))
-    columns[first : first + wide] = np.eye(wide)
-    return columns
-
-
-def _bias_over_time(read: Read) -> Array:
-    return per_axis((_time(read) * read.movement.constant())[:, None] * np.ones(3))
-
-
-def _time(read: Read) -> Array:
-    """(K,) of the middles, from −1 to 1."""
-    middle = of_pieces(read.times_s, read.movement)
-    time: Array = (2 * middle - middle.max() - middle.min()) / np.ptp(middle)
-    return time

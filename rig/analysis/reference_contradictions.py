@@ -12,7 +12,7 @@ from rig.analysis.magnetic_field import MagnetometerResult
 from rig.analysis.pieces import Window
 from rig.analysis.readings import judge_readings
 from rig.analysis.reference_budgets import drift_patterns, lag_pattern
-from rig.analysis.reference_consistency import Read, reference_consistency
+from rig.analysis.reference_consistency import reference_consistency
 from rig.analysis.reference_readings import (
     Dwelt,
     acceleration_dwells,
@@ -21,6 +21,7 @@ from rig.analysis.reference_readings import (
     knocked,
     resting,
 )
+from rig.analysis.reference_suspected import Read
 from rig.analysis.seen import since_first_s
 from rig.analysis.suspicion import Statistic
 from rig.arm.kinematics import WRIST_1
@@ -44,6 +45,14 @@ class ReadInReference:
     sweeps: Sequence[Window]
     read: Read
     pieces: Sequence[str]
+
+
+@dataclass(frozen=True, slots=True)
+class ReferenceStatistics:
+    """Every statistic with its limit, by the name of its check; the size from which on it is told, by what happens."""
+
+    statistics: dict[str, Statistic]
+    told_from: dict[str, float]
 
 
 def of_accelerometer(
@@ -123,17 +132,18 @@ def _swept(name: str, recording: ObservedRun, since_s: float) -> Iterator[_Piece
             yield _Piece(f"{DISTURBED_SWEEP}.{turn.sweep}", (start_s + end_s) / 2 + since_s, stood)
 
 
-def reference_statistics(held: ReadInReference, rate: float, *, drifting: bool) -> dict[str, Statistic]:
-    """Every statistic with its limit, by the name of its check; `rate` is that of false alarms for each."""
+def reference_statistics(held: ReadInReference, rate: float, *, drifting: bool) -> ReferenceStatistics:
+    """`rate` is that of false alarms for each."""
     found = reference_consistency(held.read, rate, drifting=drifting)
     named = {held.pieces[place]: statistic for place, statistic in sorted(found.disturbed.items())}
     windows = [*resting(held.dwells), *held.sweeps]
-    return {
+    statistics = {
         **(named or {DISTURBED_DWELL if held.read.dwells else DISTURBED_SWEEP: found.piece}),
         **found.statistics,
         **knocked(held.dwells, rate),
         **judge_readings(held.counts, windows, rate),
     }
+    return ReferenceStatistics(statistics, found.told_from)
 
 
 def _theta(matrix: Array, reference: Array, bias: Array) -> Array:

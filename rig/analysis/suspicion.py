@@ -12,9 +12,11 @@ import numpy as np
 from rig.estimation.arrays import Array
 
 TOLD = 1e-3  # of a column's size, what the model must leave of it
+TOLD_IN = 0.95  # of recordings, a damage of the size from which on it is told
 ALIKE = 10.0  # of χ²: what explains less than the best by no more than this might be the cause as well
 
 Statistic = tuple[float, float]  # and its limit
+Suspected = tuple[Array, Callable[[int], float]]  # white columns, and what so many of them are beyond if they tell
 Suspicions = Mapping[str, Array | None]  # by name of the check; None is anything at all
 
 
@@ -89,3 +91,20 @@ def explained(seen: Array, base: Array, columns: Array | None) -> tuple[float, i
     told = told_beside(known, columns)
     found = told.T @ unexplained
     return float(found @ found), told.shape[1]
+
+
+def told_from(known: Array, patterns: Array, suspected: Iterable[Suspected]) -> float:
+    """The size from which on damages are told, whichever of `patterns` (n, k) they have: infinite where one never is.
+
+    All is white; `known` (n, p) orthonormal is the model, and each that is `suspected` may tell. What its columns
+    explain is χ² about the damage then, no central one.
+    """
+    from scipy.special import chndtrinc
+
+    told = np.zeros(patterns.shape[1])
+    for columns, limit in suspected:
+        new = told_beside(known, columns)
+        if count := new.shape[1]:
+            size = np.sqrt(chndtrinc(limit(count), count, 1 - TOLD_IN))
+            told = np.maximum(told, np.linalg.norm(new.T @ patterns, axis=0) / size)
+    return float(1 / told.min()) if told.all() else float(np.inf)

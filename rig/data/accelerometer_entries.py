@@ -11,6 +11,7 @@ from rig.data.result_types import (
     Matrix6,
     PositiveVector3,
     Role,
+    ToldFromEntry,
     Vector3,
     WhenEntry,
 )
@@ -71,6 +72,7 @@ class AccelerometerEntry(Entry):
       attitudes are off about each axis, by the readings' own account.
     - `lever_arm_m`, from the sweeps' axes to the sensor in the flange's frame, and `delay_s`, by which it lags behind
       the gyroscope, are there where sweeps were made.
+    - `told_from`: what may happen while it is recorded, and from what size on that contradicts itself.
     - `found_at`: when scale and bias were read, and how warm it was then; `temperature_c` is the mean over the dwells.
     - `…_freedom`: degrees of freedom of the standard deviations of that name, null where they have no end.
     - `correction_matrix` is M of s = M (a − b), first order: in the frame of the gyroscope's corrected rates (whole
@@ -116,3 +118,4 @@ class AccelerometerEntry(Entry):
     found_at: WhenEntry | None = None
     non_orthogonality_freedom: Freedom3 | None = None
     second_order_freedom: Freedom3 | None = None
+    told_from: tuple[ToldFromEntry, ...] = ()

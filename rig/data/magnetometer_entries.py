@@ -8,7 +8,17 @@ from pydantic import Field
 
 from rig.data.budget_entries import BudgetEntry
 from rig.data.checked import read_document
-from rig.data.result_types import Entry, ErrorEntry, Freedom3, Matrix3, Matrix6, PositiveVector3, Vector3, WhenEntry
+from rig.data.result_types import (
+    Entry,
+    ErrorEntry,
+    Freedom3,
+    Matrix3,
+    Matrix6,
+    PositiveVector3,
+    ToldFromEntry,
+    Vector3,
+    WhenEntry,
+)
 
 REVERSAL_MAX_BYTES: Final = 4_000_000  # of two runs it has 4,000
 
@@ -76,6 +86,7 @@ class MagnetometerEntry(Entry):
       says what makes it up; null in results of before there was one. `field_t` is what the scale is relative to.
     - `field_base_t` is the field in the arm's base frame, `attitude_error_rad` how far the arm's attitudes are off
       about each axis, by the readings' own account.
+    - `told_from`: what may happen while it is recorded, and from what size on that contradicts itself.
     - `found_at`: when scale and bias were read; `non_orthogonality_freedom`: degrees of freedom of these standard
       deviations, null where they have no end.
     - `correction_matrix` is M of B = M (m − b), in the right-angled frame nearest to the magnetometer's own axes.
@@ -113,6 +124,7 @@ class MagnetometerEntry(Entry):
     budget: BudgetEntry | None = None
     found_at: WhenEntry | None = None
     non_orthogonality_freedom: Freedom3 | None = None
+    told_from: tuple[ToldFromEntry, ...] = ()
 
 
 class AsMountedEntry(Entry):

@@ -26,6 +26,7 @@ from rig.data.result_types import (
     Positive,
     PositiveVector3,
     Role,
+    ToldFromEntry,
     Vector2,
     Vector3,
     Vector6,
@@ -243,6 +244,7 @@ class SensorEntry(Entry):
       read, and how warm it was then: scale factors are found from sweeps, biases from rests too.
     - A reference has no `board`: the board solves only for the sensors that are to be calibrated.
     - `earth_rate` is there where it was to be found, or says why it was not.
+    - `told_from`: what may happen while it is recorded, and from what size on that contradicts itself.
     """
 
     part: str
@@ -279,6 +281,7 @@ class SensorEntry(Entry):
     scale_at: WhenEntry | None = None
     bias_at: WhenEntry | None = None
     loads_rad_s: tuple[Vector2, Vector2, Vector2] | None = None
+    told_from: tuple[ToldFromEntry, ...] = ()
 
 
 class RotationEntry(Entry):

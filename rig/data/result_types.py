@@ -47,6 +47,20 @@ class WhenEntry(Entry):
     temperature_range_c: tuple[float, float] | None
 
 
+class ToldFromEntry(Entry):
+    """The size from which on a `check` tells that `what` happened, in 95 of 100 recordings; null where none is told.
+
+    Of what changes half-way it is the whole change. `off_by_expanded`: by how many times its U the scale factor or bias
+    farthest off is off just below that size; null where that was not reckoned.
+    """
+
+    what: str
+    check: str
+    size: float | None
+    unit: str
+    off_by_expanded: float | None
+
+
 class ErrorEntry(Entry):
     """Why an estimator that stands beside the chosen one has no solution."""
 

@@ -12,6 +12,7 @@ from rig.data.result_types import ErrorEntry
 from rig.report.axes import axes_table, skew_known, triple
 from rig.report.budget_table import assumed_lines, expanded_heading
 from rig.report.expanded import expanded, factor_words
+from rig.report.told_words import told_lines
 from rig.report.validity_words import when_words
 
 
@@ -32,6 +33,7 @@ def accelerometer_lines(found: AccelerometerEntry) -> Iterator[str]:
     if found.budget is not None and any(line.name == NONLINEARITY for line in found.budget.contributors):
         yield "k by the readings at 1 g up and down, b at 0 g"
     yield from assumed_lines(found.budget)
+    yield from told_lines(found.told_from)
     skew = triple(np.degrees(found.non_orthogonality_rad), "+.4f")
     yield f"non-orthogonality yz zx xy: {skew} ° (± {skew_known(found)})"
     off, known = 1e3 * found.attitude_error_rad, 2e3 * found.attitude_error_std_rad

@@ -1,7 +1,11 @@
 """The typed outcome of a run as the document of `result.json`."""
 
+from collections.abc import Sequence
+from math import isfinite
+
 from rig.analysis.acceleration import AccelerometerResult
 from rig.analysis.calibration import SensorResult
+from rig.analysis.contradictions import ToldFrom
 from rig.analysis.magnetic_field import MagnetometerResult
 from rig.analysis.outcome import Origin, Outcome
 from rig.analysis.verdict import Check
@@ -9,7 +13,7 @@ from rig.analysis.when import of_accelerometer, of_gyroscope, of_magnetometer
 from rig.data.accelerometer_entries import AccelerometerEntry
 from rig.data.magnetometer_entries import MagnetometerEntry
 from rig.data.result_file import SCHEMA, CheckEntry, ProvenanceEntry, ResultDocument, SensorEntry
-from rig.data.result_types import ErrorEntry, Role
+from rig.data.result_types import ErrorEntry, Role, ToldFromEntry
 from rig.errors import Fault
 from rig.report.accelerometer_entry import accelerometer_entry
 from rig.report.budget_entry import clock_entry
@@ -39,7 +43,9 @@ def document_of(outcome: Outcome) -> ResultDocument:
             name: _accelerometer(outcome, name, found) for name, found in outcome.accelerometers.items()
         }
     if outcome.magnetometers:
-        more["magnetometers"] = {name: _magnetometer(outcome, found) for name, found in outcome.magnetometers.items()}
+        more["magnetometers"] = {
+            name: _magnetometer(outcome, name, found) for name, found in outcome.magnetometers.items()
+        }
     if outcome.drifts:
         more["bias_drift"] = {
             name: {quantity: drift_entry(quantity, drift) for quantity, drift in each.items()}
@@ -51,21 +57,34 @@ def document_of(outcome: Outcome) -> ResultDocument:
 def _sensor(outcome: Outcome, name: str, result: SensorResult) -> SensorEntry:
     role: Role = "calibrate" if name in outcome.settings.to_calibrate else "reference"
     held = of_gyroscope(outcome.recordings, name)
-    told = {"scale_at": when_entry(held.scale), "bias_at": when_entry(held.bias)}
+    told = {
+        "scale_at": when_entry(held.scale),
+        "bias_at": when_entry(held.bias),
+        **_told_from(outcome.told_from.get(name, ())),
+    }
     return sensor_entry(result, role, outcome.onboard.get(name)).model_copy(update=told)
 
 
 def _accelerometer(outcome: Outcome, name: str, result: AccelerometerResult) -> AccelerometerEntry:
     found = of_accelerometer(outcome.recordings, name, (dwell.index for dwell in result.dwells))
-    return accelerometer_entry(result).model_copy(update={"found_at": when_entry(found)})
+    return accelerometer_entry(result).model_copy(
+        update={"found_at": when_entry(found), **_told_from(outcome.told_from_in_reference.get(name, ()))}
+    )
 
 
-def _magnetometer(outcome: Outcome, result: MagnetometerResult | Fault) -> MagnetometerEntry | ErrorEntry:
+def _magnetometer(outcome: Outcome, name: str, result: MagnetometerResult | Fault) -> MagnetometerEntry | ErrorEntry:
     made = magnetometer_entry(result)
     if isinstance(result, Fault):
         return made
     found = of_magnetometer(outcome.recordings, (dwell.index for dwell in result.dwells))
-    return made.model_copy(update={"found_at": when_entry(found)})
+    told_from = _told_from(outcome.told_from_in_reference.get(name, ()))
+    return made.model_copy(update={"found_at": when_entry(found), **told_from})
+
+
+def _told_from(found: Sequence[ToldFrom]) -> dict[str, object]:
+    """A size that is never told is null."""
+    told = (entry(ToldFromEntry, each, size=each.size if isfinite(each.size) else None) for each in found)
+    return {"told_from": tuple(told)} if found else {}
 
 
 def _check(check: Check) -> CheckEntry:

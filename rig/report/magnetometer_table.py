@@ -10,6 +10,7 @@ from rig.data.magnetometer_entries import MagnetometerEntry
 from rig.data.result_types import ErrorEntry
 from rig.report.axes import axes_table, skew_known, triple
 from rig.report.budget_table import assumed_lines, expanded_heading
+from rig.report.told_words import told_lines
 from rig.report.validity_words import when_words
 
 MICROTESLA = 1e6
@@ -32,6 +33,7 @@ def magnetometer_lines(found: MagnetometerEntry) -> Iterator[str]:
     if found.found_at is not None:
         yield f"scale and bias: {when_words(found.found_at)}; its temperature was not measured"
     yield from assumed_lines(found.budget)
+    yield from told_lines(found.told_from)
     yield "iron and currents that turn with it are part of what is found"
     yield "the arm's own field is in the bias; runs with the sensor turned over tell it apart: rig reversal"
     yield from _tests(found)

@@ -17,6 +17,7 @@ from rig.report.budget_table import budget_table, expanded_heading
 from rig.report.drift_table import print_drifts
 from rig.report.earth_rate import earth_rate_lines
 from rig.report.magnetometer_table import MICROTESLA, magnetometer_lines, magnetometer_table
+from rig.report.told_words import told_lines
 from rig.report.validity_words import load_words, speed_words, when_words
 from rig.report.verification_table import verification_lines, verification_table
 from rig.station.plain_text import plain
@@ -118,6 +119,7 @@ def _beside(sensor: SensorEntry) -> Iterator[str]:
     if sensor.scale_at is not None and sensor.bias_at is not None:
         yield f"scale: {when_words(sensor.scale_at)}"
         yield f"bias: {when_words(sensor.bias_at)}"
+    yield from told_lines(sensor.told_from)
     yield from earth_rate_lines(sensor.earth_rate)
     vector = sensor.vector_model
     std = [sensor.covariance[i][i] ** 0.5 for i in range(6)]

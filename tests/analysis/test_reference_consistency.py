@@ -9,7 +9,8 @@ from scipy.spatial.transform import Rotation
 from scipy.stats import kstest
 
 from rig.analysis.arm_patterns import Known, Stood, arm_patterns
-from rig.analysis.reference_consistency import Read, reference_consistency
+from rig.analysis.reference_consistency import reference_consistency
+from rig.analysis.reference_suspected import Read
 from rig.arm.kinematics import NOMINAL, flange_pose
 from rig.config.attitude_sets import EIGHTEEN
 from rig.estimation.arrays import Array

@@ -8,7 +8,8 @@ import numpy as np
 from rig.analysis.accelerometer_errors import STANDARD
 from rig.analysis.arm_patterns import Known, Stood, arm_patterns, arm_turns
 from rig.analysis.reference_budgets import accelerometer_budget
-from rig.analysis.reference_consistency import Read, reference_consistency
+from rig.analysis.reference_consistency import reference_consistency
+from rig.analysis.reference_suspected import Read
 from rig.arm.kinematics import NOMINAL, WRIST_1
 from rig.config.attitude_sets import EIGHTEEN
 from rig.config.sensor_catalogue import PARTS

@@ -9,12 +9,13 @@ from rig.data.drift_entries import DriftEntry
 from rig.data.earth_rate_entries import EarthRateEntry
 from rig.data.magnetometer_entries import MagnetometerEntry, ReversalEntry
 from rig.data.result_file import SensorEntry, VectorEntry, VerificationEntry
-from rig.data.result_types import ErrorEntry, Freedom, WhenEntry
+from rig.data.result_types import ErrorEntry, Freedom, ToldFromEntry, WhenEntry
 from rig.report.certificate.content import Gyroscope
 from rig.report.certificate.coverage_words import coverage_sentence
 from rig.report.certificate.tables import ANGLES, AXES, JOINT_FACTOR
 from rig.report.certificate.xml_parts import dcc, real_list, text
 from rig.report.expanded import Expanded, expanded, factor_words, flat
+from rig.report.told_words import told_words
 from rig.report.validity_words import load_words, speed_words, when_words
 
 ONE, RATE, ACCELERATION = r"\one", r"\radian\second\tothe{-1}", r"\metre\second\tothe{-2}"
@@ -34,7 +35,7 @@ def gyroscope(each: Gyroscope) -> Iterator[Element]:
     assert budget is not None and sensor.covariance_combined is not None  # or there is no digital certificate
     covered, (scale, bias) = coverage_sentence(budget), _expanded(budget)
     model = f"{sensor.model}: true rate g, reading m, K = diag(k)."
-    yield _result("scale factor", f"{model} {_speed(sensor)}{_at(sensor.scale_at)}{covered}",
+    yield _result("scale factor", f"{model} {_speed(sensor)}{_at(sensor.scale_at)}{_told(sensor.told_from)}{covered}",
                   real_list(AXES, sensor.scale, [ONE], expanded=scale))  # fmt: skip
     yield _result("bias", f"{model} {_at(sensor.bias_at)}{covered}",
                   real_list(AXES, sensor.bias_rad_s, [RATE], expanded=bias))  # fmt: skip
@@ -148,7 +149,8 @@ def _relative(
 ) -> Iterator[Element]:
     budget = found.budget
     assert budget is not None and found.covariance_combined is not None  # or there is no digital certificate
-    said, (scale, bias) = f"{said} {_at(found.found_at)}{coverage_sentence(budget)}", _expanded(budget)
+    said = f"{said} {_at(found.found_at)}{_told(found.told_from)}{coverage_sentence(budget)}"
+    scale, bias = _expanded(budget)
     yield _result(f"scale factor{how}", said, real_list(AXES, numbers[:3], [ONE], expanded=scale))
     yield _result(f"bias{how}", said, real_list(AXES, numbers[3:], [unit], expanded=bias))
     yield _joint(numbers, found.covariance_combined, unit, how)
@@ -158,6 +160,11 @@ def _at(when: WhenEntry | None) -> str:
     """When it was read, and how warm it was; of results of before the temperature is a condition alone."""
     words = "" if when is None else f"{when_words(when)}. "
     return words[:1].upper() + words[1:]
+
+
+def _told(found: Sequence[ToldFromEntry]) -> str:
+    """What would have contradicted itself."""
+    return f"Told in 95 of 100 measurements: {told_words(found)}. " if found else ""
 
 
 def _speed(sensor: SensorEntry) -> str:

@@ -6,7 +6,7 @@ from typing import TYPE_CHECKING
 
 from rig.config.sensor_catalogue import has_own_port
 from rig.data.provenance import NO_BOARD
-from rig.report import expanded, printed_budget, rounding, validity_words
+from rig.report import expanded, printed_budget, rounding, told_words, validity_words
 from rig.report.certificate import at_rest_tables, coverage_words, plots, tables, validity
 from rig.report.certificate.content import Certificate
 from rig.report.certificate.tables import DEG, JOINT_FACTOR
@@ -15,7 +15,7 @@ if TYPE_CHECKING:
     from jinja2 import Template
 
 MODULES = (
-    rounding, expanded, validity_words, printed_budget, tables, coverage_words, at_rest_tables, validity, plots,
+    rounding, expanded, validity_words, told_words, printed_budget, tables, coverage_words, at_rest_tables, validity, plots,
 )  # fmt: skip
 TEMPLATE = "certificate.html.j2"
 FOOTING = "Relates only to the items calibrated. Not issued under an accreditation."

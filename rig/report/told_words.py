@@ -1,0 +1,31 @@
+"""What may happen in a run, and from what size on it is told: the same words at the terminal and on certificates."""
+
+import math
+from collections.abc import Iterator, Sequence
+
+from rig.data.result_types import ToldFromEntry
+
+FACTORS = {"1": (100.0, " %"), "rad": (math.degrees(1), "°"), "T": (1e6, " µT")}  # by which a unit is shown
+
+
+def told_lines(found: Sequence[ToldFromEntry]) -> Iterator[str]:
+    """A line at the terminal, where anything is known of it."""
+    if found:
+        yield f"in this run it would be told from: {told_words(found)}"
+
+
+def told_words(found: Sequence[ToldFromEntry]) -> str:
+    """All of it in one sentence."""
+    return "; ".join(f"{each.what}: {size_words(each.size, each.unit)}{_off_by(each)}" for each in found)
+
+
+def size_words(size: float | None, unit: str) -> str:
+    """With two significant digits."""
+    if size is None:
+        return "never"
+    factor, shown = FACTORS.get(unit, (1.0, f" {unit}"))
+    return f"{factor * size:#.2g}{shown}"
+
+
+def _off_by(found: ToldFromEntry) -> str:
+    return "" if found.off_by_expanded is None else f" ({found.off_by_expanded:.1f} U)"
