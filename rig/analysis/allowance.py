@@ -20,7 +20,7 @@ from rig.data.settings import OfSensor
 from rig.estimation.arrays import Array
 from rig.estimation.earth import EARTH_RATE_RAD_S
 from rig.estimation.earth_rate import EarthRate
-from rig.estimation.nonlinearity import FREE_PER_RAD_S, curvature
+from rig.estimation.nonlinearity import CUBE_MISSED, bending, curvature
 from rig.estimation.own_errors import KnownSensor, own_errors
 
 ANGLES = (*AXIS_ERRORS, *(f"{wave} of wrist_1" for wave in WAVES))  # those of wrist 1 turn no axis, but its own speed
@@ -33,21 +33,32 @@ STANDS_RAD = 1e-3  # what a joint that does not turn seems to
 
 
 @dataclass(frozen=True, slots=True)
+class Curve:
+    """Of a sensor: standard deviations of its `cube` and `square` at `full_scale_rad_s`, as shares of that.
+
+    Where it is `free`, nothing is known of it, not even that it has no kink at zero.
+    """
+
+    cube: float
+    square: float
+    full_scale_rad_s: float
+    free: bool = False
+
+
+@dataclass(frozen=True, slots=True)
 class Allowed:
     """What is known of arm, site and sensor, each as a standard deviation.
 
     `angles_rad` (17,) of each of `ANGLES`; `repeatability_rad` of a joint that was moved away and back; `jitter_s` of
     the times of the arm's states; `earth_rad_s` (3, k) of the Earth's rate in the base's frame, for each way in which
-    it is not known; `odd_per_rad_s`, `even_per_rad_s` of the sensor's nonlinearity, `sensor` how warm it was at times
-    `at_s` and what that may do.
+    it is not known; `curve` is the sensor's nonlinearity, `sensor` how warm it was at times `at_s` and what that does.
     """
 
     angles_rad: Array
     repeatability_rad: float
     jitter_s: float
     earth_rad_s: Array
-    odd_per_rad_s: float
-    even_per_rad_s: float
+    curve: Curve
     sensor: KnownSensor | None
     at_s: Array
 
@@ -61,15 +72,13 @@ def allowed(surroundings: Surroundings, name: str, result: SensorResult) -> Allo
     uncertainty, sensor, explained = surroundings.uncertainty, result.sensor, result.explained
     steady = np.array([each.startswith(("twist", "zero")) for each in ANGLES])
     finds_curve = explained is not None and explained.nonlinearity is not None
-    full_scale = sensor.range_rad_s * np.sqrt(3)
-    odd, even = (uncertainty.of(of, name, sensor.part) / 100 / full_scale for of in CURVE)
+    cube, square = (uncertainty.of(of, name, sensor.part) / 100 / np.sqrt(3) for of in CURVE)
     return Allowed(
         angles_rad=np.radians(uncertainty.axis_deg) / np.sqrt(3) * np.where(steady, 1.0, WAVE_SHARE),
         repeatability_rad=float(np.radians(uncertainty.repeatability_deg) / np.sqrt(3)),
         jitter_s=surroundings.state_jitter_s,
         earth_rad_s=_earth(surroundings, name, sensor.part, found_earth_rate(result.earth)),
-        odd_per_rad_s=FREE_PER_RAD_S if finds_curve else float(odd),
-        even_per_rad_s=FREE_PER_RAD_S if finds_curve else float(even),
+        curve=Curve(float(cube / CUBE_MISSED), float(square), sensor.range_rad_s, free=finds_curve),
         sensor=None if explained is None else explained.seen.sensor,
         at_s=np.zeros(0) if explained is None else explained.seen.windows_s.mean(axis=1),
     )
@@ -80,7 +89,7 @@ def allow(known: Allowed, pieces: Pieces, ways: Pieces, matrix: Array) -> Allowa
 
     What is even of its curve is left free on the ways, which are faster than sweeps: it is no change with time.
     """
-    on_ways = replace(known, even_per_rad_s=FREE_PER_RAD_S)
+    on_ways = replace(known, curve=replace(known.curve, square=1.0))
     unstable = 0.0 if known.sensor is None else known.sensor.instability_rad_s
     return Allowance(patterns(pieces, matrix, known), ways, patterns(ways, matrix, on_ways), unstable)
 
@@ -104,8 +113,7 @@ def patterns(pieces: Pieces, matrix: Array, known: Allowed) -> Array:
             np.moveaxis(pieces.attitudes @ known.earth_rad_s, -1, 0),
         ]
     )
-    sizes = np.repeat([known.odd_per_rad_s, known.even_per_rad_s], 3)[:, None, None] / FREE_PER_RAD_S
-    of_the_sensor = [sizes * _curved(pieces.stretches, matrix), *_of_temperature(pieces, matrix, known)]
+    of_the_sensor = [_curved(pieces.stretches, matrix, known.curve), *_of_temperature(pieces, matrix, known)]
     found = np.concatenate([of_the_arm @ matrix.T, *of_the_sensor])
     return np.asarray(found[found.any(axis=(1, 2))], dtype=np.float64)
 
@@ -189,13 +197,16 @@ def _of_speeds(pieces: Pieces) -> list[Array]:
     return [np.where((pieces.sweep == sweep)[:, None], off, 0.0)[None] for sweep in np.unique(pieces.sweep)]
 
 
-def _curved(stretches: Sequence[Stretch], matrix: Array) -> Array:
-    """(6, N, 3) as `curvature`, means of what was felt at each moment."""
+def _curved(stretches: Sequence[Stretch], matrix: Array, curve: Curve) -> Array:
+    """(6, N, 3) of one standard deviation, means of what was felt at each moment."""
     found = []
     for stretch in stretches:
         edges = np.linspace(stretch.start_s, stretch.end_s, STEPS + 1)
-        found.append(curvature(matrix, stretch.motion.rate((edges[1:] + edges[:-1]) / 2)).mean(axis=1))
-    return np.stack(found, axis=1)
+        rates = stretch.motion.rate((edges[1:] + edges[:-1]) / 2)
+        bent = curvature(matrix, rates) if curve.free else bending(matrix, rates, curve.full_scale_rad_s)
+        found.append(bent.mean(axis=1))
+    sizes = np.ones(6) if curve.free else np.repeat([curve.cube, curve.square], 3)
+    return np.asarray(sizes[:, None, None] * np.stack(found, axis=1), dtype=np.float64)
 
 
 def _of_temperature(pieces: Pieces, matrix: Array, known: Allowed) -> list[Array]:

@@ -1,7 +1,8 @@
 """How a gyroscope's reading departs from proportion: m = (g + odd |g| g + even g²) / k − b.
 
 g is the rate along the sensor's axis. At one speed the odd part is a part of the scale factor; several speeds tell
-both.
+both. Data sheets say how far a reading is from the best straight line through ± full scale: a smooth curve is a cubic
+and a square, of which that line misses a quarter and a half of what they are at full scale.
 """
 
 from dataclasses import dataclass
@@ -11,6 +12,7 @@ import numpy as np
 from rig.estimation.arrays import Array
 
 FREE_PER_RAD_S = 1.0  # no sensor is that far from linear: what the sweeps say is all that counts
+CUBE_MISSED, SQUARE_MISSED = 0.25, 0.5
 DISTINCT = 1.05  # ratio of two speeds that are not the same
 
 
@@ -40,6 +42,17 @@ def curvature(matrix: Array, rates_rad_s: Array, true_at_rad_s: float = 0.0) -> 
     along = readings / np.linalg.norm(matrix, axis=1)
     gains = ((np.abs(along) - true_at_rad_s) * readings, along * readings)
     return FREE_PER_RAD_S * np.array([gain * axis for gain in gains for axis in np.eye(3)])
+
+
+def bending(matrix: Array, rates_rad_s: Array, full_scale_rad_s: float, true_at_rad_s: float = 0.0) -> Array:
+    """(6, N, 3) what readings gain by cubes along x, y, z and squares along x, y, z that are full scale at full scale.
+
+    As `curvature`.
+    """
+    readings = rates_rad_s @ matrix.T
+    along = readings / np.linalg.norm(matrix, axis=1) / full_scale_rad_s
+    gains = ((along**2 - (true_at_rad_s / full_scale_rad_s) ** 2) * readings, along * readings)
+    return np.array([gain * axis for gain in gains for axis in np.eye(3)])
 
 
 def nonlinearity(sizes: Array, covariance: Array) -> Nonlinearity:

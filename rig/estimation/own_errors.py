@@ -11,7 +11,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from rig.estimation.arrays import Array
-from rig.estimation.nonlinearity import FREE_PER_RAD_S, curvature
+from rig.estimation.nonlinearity import CUBE_MISSED, SQUARE_MISSED, bending
 
 NONLINEARITY = "nonlinearity"
 BIAS_OVER_TEMPERATURE, SCALE_OVER_TEMPERATURE = "bias over temperature", "scale over temperature"
@@ -22,9 +22,9 @@ MOVES = 3.0  # steps of the thermometer, by which temperature must change for th
 class KnownSensor:
     """Half-widths as its data sheet states them, and how warm it was in each of N averages.
 
-    `nonlinearity` is how far a reading may be off a straight line, as a share of `full_scale_rad_s`: by its odd part,
-    and by its even part. `bias_rad_s_per_k` and `scale_per_k` are changes with temperature, `temperature_c` (N,) is
-    recorded in steps of `temperature_step_k`. `instability_rad_s` is the least Allan deviation of its bias.
+    `nonlinearity` is how far a reading may be off the best straight line, as a share of `full_scale_rad_s`: by its odd
+    part, and by its even part. `bias_rad_s_per_k` and `scale_per_k` are changes with temperature, `temperature_c` (N,)
+    is recorded in steps of `temperature_step_k`. `instability_rad_s` is the least Allan deviation of its bias.
     """
 
     nonlinearity: float
@@ -55,9 +55,9 @@ def own_errors(
     its scale may differ. Several speeds tell the nonlinearity, whatever is known of it.
     """
     if len(speeds_rad_s) == 1:
-        curved = curvature(matrix, turns_rad_s, speeds_rad_s[0]) / FREE_PER_RAD_S
-        of_reading = known.nonlinearity / known.full_scale_rad_s
-        yield OwnError(NONLINEARITY, 100 * known.nonlinearity, "% of full scale", of_reading * curved)
+        bent = bending(matrix, turns_rad_s, known.full_scale_rad_s, speeds_rad_s[0])
+        sizes = known.nonlinearity / np.repeat([CUBE_MISSED, SQUARE_MISSED], 3)[:, None, None]
+        yield OwnError(NONLINEARITY, 100 * known.nonlinearity, "% of full scale", sizes * bent)
     lasting = np.diff(windows_s)[:, 0]
     warmer = _from_their_mean(known.temperature_c, lasting)
     if np.ptp(warmer) >= MOVES * known.temperature_step_k > 0:

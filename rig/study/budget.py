@@ -17,6 +17,7 @@ from rig.estimation.bias_process import flicker_covariance
 from rig.estimation.budget import Unknown, budget
 from rig.estimation.earth import EARTH_RATE_RAD_S, STANDARD_GRAVITY_M_S2
 from rig.estimation.explained import Seen, centripetal_m_s2, explain
+from rig.estimation.nonlinearity import CUBE_MISSED, SQUARE_MISSED
 from rig.estimation.own_errors import KnownSensor
 from rig.estimation.vector_model import solve_vector_model
 from rig.study.report import Finding, Report, Settings, table
@@ -177,8 +178,9 @@ def _one(effects: Effects, rng: np.random.Generator) -> Array:
 
 def _curved(along_rad_s: Array, effects: Effects, rng: np.random.Generator) -> Array:
     """(N, 3) of rates along the axes what a sensor takes them for that is right at the speed of the sweeps."""
-    odd, even = effects.nonlinearity / effects.full_scale_rad_s * rng.uniform(-1, 1, (2, 3))
-    curve = odd * (np.abs(along_rad_s) - effects.speed_rad_s) + even * along_rad_s
+    cube, square = effects.nonlinearity / np.array([[CUBE_MISSED], [SQUARE_MISSED]]) * rng.uniform(-1, 1, (2, 3))
+    share, swept = along_rad_s / effects.full_scale_rad_s, effects.speed_rad_s / effects.full_scale_rad_s
+    curve = cube * (share**2 - swept**2) + square * share
     return np.asarray(along_rad_s * (1 + curve), dtype=np.float64)
 
 

@@ -115,7 +115,8 @@ def test_what_changes_on_one_axis_alone_is_told_by_the_ways_between_the_sweeps()
     kind = KINDS["ADIS16465"]
     seen = drawn(3, kind)
     checks = checked(damaged(seen, kind, 2e-3 * later(seen) * seen.felt_rad_s * [0, 0, 1]))
-    assert failed(checks) <= {"axis_changed", "scale_changed"} and "axis_changed" in failed(checks)
+    assert max(checks, key=lambda check: (check.value or 0.0) / (check.limit or np.inf)).name == "gyro.axis_changed"
+    assert failed(checks) <= {"axis_changed", "scale_changed", "loose_mounting"}
 
 
 @pytest.mark.slow

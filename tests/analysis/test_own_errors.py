@@ -12,14 +12,13 @@ from rig.config.sensor_catalogue import PARTS
 from rig.data.run_file import RunData
 from rig.estimation.arrays import Array
 from rig.estimation.budget import Budget
+from rig.estimation.nonlinearity import SQUARE_MISSED
 from support.synthetic_run import Setup, synthetic_run
 
-PER_RAD_S = (
-    PARTS["lsm9ds1"].nonlinearity_percent / 100 / np.radians(245)
-)  # of an LSM9DS1 that just keeps its data sheet
+PER_RAD_S = PARTS["lsm9ds1"].nonlinearity_percent / 100 / np.radians(245)
 SIX_AXES = (("axes", "6"),)
 ODD = Setup(noise_rad_s=3e-4, odd_per_rad_s=PER_RAD_S, procedure=SIX_AXES)
-EVEN = Setup(noise_rad_s=3e-4, even_per_rad_s=PER_RAD_S)
+EVEN = Setup(noise_rad_s=3e-4, even_per_rad_s=PER_RAD_S / SQUARE_MISSED)
 SPEED_RAD_S = np.pi / 3
 
 

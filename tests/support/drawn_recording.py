@@ -17,6 +17,7 @@ from rig.data.run_file import RecordedSensor, RunData
 from rig.data.settings import OF_SENSORS, Uncertainty
 from rig.estimation.arrays import Array
 from rig.estimation.earth import EARTH_RATE_RAD_S, STANDARD_GRAVITY_M_S2
+from rig.estimation.nonlinearity import CUBE_MISSED
 from support.synthetic_run import SENSOR, Motion, Setup, rotation, run_data, sample_times
 
 WRISTS = (3, 4, 5)
@@ -142,12 +143,11 @@ def _felt(turned: Array, pull: Array, kind: Kind, rng: np.random.Generator) -> A
     along = turned @ rotation(rng.normal(0, np.radians(2), 3)).T
     leaning_rad = np.radians(part.non_orthogonality_deg) / 3 / np.sqrt(2)  # two axes lean by twice as much squared
     along = along @ (np.eye(3) + rng.normal(0, leaning_rad, (3, 3)))
-    curve = part.nonlinearity_percent / 100 / kind.sensor.range_rad_s
-    odd = curve * rng.uniform(-1, 1, 3)
+    cube = part.nonlinearity_percent / 100 / CUBE_MISSED / kind.sensor.range_rad_s**2 * rng.uniform(-1, 1, 3)
     to_gravity = np.radians(part.g_sensitivity_deg_s_g) / STANDARD_GRAVITY_M_S2 * rng.uniform(-1, 1, (3, 3))
     scale = rng.uniform(0.9, 1.1, 3)
     even = part.asymmetry_percent / 100 / kind.sensor.range_rad_s * rng.uniform(-1, 1, 3)
-    felt: Array = along * (1 + odd * np.abs(along) + even * along) / scale + pull @ to_gravity.T
+    felt: Array = along * (1 + cube * along**2 + even * along) / scale + pull @ to_gravity.T
     return felt
 
 
