@@ -16,7 +16,7 @@ from rig.analysis.pieces import REST, Pieces, Stretch
 from rig.analysis.seen import WAVE_SHARE, unknown_of
 from rig.analysis.surroundings import Surroundings
 from rig.arm.kinematics import AXIS_ERRORS, WAVES, WRIST_1, WRIST_2, WRIST_3, axis_errors, flange_axes
-from rig.data.settings import OfSensor
+from rig.data.settings import OfSensor, Uncertainty
 from rig.estimation.arrays import Array
 from rig.estimation.earth import EARTH_RATE_RAD_S
 from rig.estimation.earth_rate import EarthRate
@@ -69,18 +69,40 @@ def allowed(surroundings: Surroundings, name: str, result: SensorResult) -> Allo
     A solve that finds the curve, from several speeds, takes nothing of it as known. One of a single speed states one
     scale factor for either way, which an even part makes two: it excuses no more than what is stated of that alone.
     """
-    uncertainty, sensor, explained = surroundings.uncertainty, result.sensor, result.explained
+    sensor, explained = result.sensor, result.explained
+    return allowed_of(
+        surroundings.uncertainty,
+        (name, sensor.part, sensor.range_rad_s),
+        finds_curve=explained is not None and explained.nonlinearity is not None,
+        jitter_s=surroundings.state_jitter_s,
+        earth_rad_s=_earth(surroundings, name, sensor.part, found_earth_rate(result.earth)),
+        sensor=None if explained is None else explained.seen.sensor,
+        at_s=np.zeros(0) if explained is None else explained.seen.windows_s.mean(axis=1),
+    )
+
+
+def allowed_of(
+    uncertainty: Uncertainty,
+    of: tuple[str, str, float],
+    *,
+    finds_curve: bool,
+    jitter_s: float,
+    earth_rad_s: Array,
+    sensor: KnownSensor | None,
+    at_s: Array,
+) -> Allowed:
+    """The same `of` a sensor of that name, part and range (rad/s)."""
+    name, part, full_scale_rad_s = of
     steady = np.array([each.startswith(("twist", "zero")) for each in ANGLES])
-    finds_curve = explained is not None and explained.nonlinearity is not None
-    cube, square = (uncertainty.of(of, name, sensor.part) / 100 / np.sqrt(3) for of in CURVE)
+    cube, square = (uncertainty.of(what, name, part) / 100 / np.sqrt(3) for what in CURVE)
     return Allowed(
         angles_rad=np.radians(uncertainty.axis_deg) / np.sqrt(3) * np.where(steady, 1.0, WAVE_SHARE),
         repeatability_rad=float(np.radians(uncertainty.repeatability_deg) / np.sqrt(3)),
-        jitter_s=surroundings.state_jitter_s,
-        earth_rad_s=_earth(surroundings, name, sensor.part, found_earth_rate(result.earth)),
-        curve=Curve(float(cube / CUBE_MISSED), float(square), sensor.range_rad_s, free=finds_curve),
-        sensor=None if explained is None else explained.seen.sensor,
-        at_s=np.zeros(0) if explained is None else explained.seen.windows_s.mean(axis=1),
+        jitter_s=jitter_s,
+        earth_rad_s=earth_rad_s,
+        curve=Curve(float(cube / CUBE_MISSED), float(square), full_scale_rad_s, free=finds_curve),
+        sensor=sensor,
+        at_s=at_s,
     )
 
 
@@ -99,8 +121,12 @@ def _earth(surroundings: Surroundings, name: str, part: str, earth_rate: EarthRa
     if unknown.earth_covariance_rad2_s2 is not None:
         size, way = np.linalg.eigh(unknown.earth_covariance_rad2_s2)
         return np.asarray(way * np.sqrt(size.clip(min=0.0)), dtype=np.float64)
-    ways = 3 if unknown.earth_rate else 0
-    return np.asarray(EARTH_RATE_RAD_S / np.sqrt(3) * np.eye(3)[:, :ways], dtype=np.float64)
+    return any_earth_rate(known=not unknown.earth_rate)
+
+
+def any_earth_rate(*, known: bool) -> Array:
+    """(3, k) rad/s as in `Allowed`, of the Earth's rate where the site says it, and where it does not."""
+    return np.asarray(EARTH_RATE_RAD_S / np.sqrt(3) * np.eye(3)[:, : 0 if known else 3], dtype=np.float64)
 
 
 def patterns(pieces: Pieces, matrix: Array, known: Allowed) -> Array:

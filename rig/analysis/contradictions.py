@@ -155,7 +155,12 @@ def _rate(run: RunData, sensors: Sequence[str]) -> float:
     if run.settings.holds_all_kinds:
         accelerometers = [name for name in run.settings.to_calibrate if run.sensors[name].has_acceleration]
         kinds += len(accelerometers) + len(run.magnetometers)
-    return FALSE_ALARMS / ((SHARES + OF_THE_MODEL * run.settings.checked_by_model) * kinds)
+    return rate_of_each(kinds, by_model=run.settings.checked_by_model)
+
+
+def rate_of_each(kinds: int, *, by_model: bool) -> float:
+    """The same where so many kinds of readings of all sensors are held against themselves."""
+    return FALSE_ALARMS / ((SHARES + OF_THE_MODEL * by_model) * kinds)
 
 
 def _checks(of: str, statistics: Mapping[str, Statistic]) -> list[Check]:

@@ -30,7 +30,7 @@ SPARSE_S = 0.01  # samples that are farther apart miss what the servo's vibratio
 # interval it may lie (Euler and Maclaurin); B₂, Bernoulli's second polynomial, is √(1/180) RMS, and either end has two.
 CORNERS = (2 / 180) ** 0.5 / 2
 LOST = 0.01  # of the samples, at most
-STANDS_RAD = 1e-3
+STANDS_RAD = 1e-3  # what a joint that does not turn seems to
 STEPS = 48
 
 
@@ -60,7 +60,7 @@ def with_ways(pieces: Pieces, name: str, recordings: Sequence[ObservedRun], expl
         turn = turned(way.motion, way.start_s, way.end_s, cycles, 1)[0]
         rates.append(turn + attitude @ explained.seen.earth_rate_rad_s)
         attitudes.append(attitude)
-        pulls.append(_pull(way, site.down_m_s2, np.array(each.run.settings.extension_m)))
+        pulls.append(pull_m_s2(way, site.down_m_s2, np.array(each.run.settings.extension_m)))
     times_s = np.array([(way.start_s + since_s, way.end_s + since_s) for way, _, since_s, _ in found])
     count = len(found)
     return replace(
@@ -88,31 +88,38 @@ def _ways(run: RunData, stream: Stream, motion: ArmMotion) -> Iterator[Stretch]:
         yield from _moved(windows[-1].end_s, float(motion.time_s[-1]), stream, motion)
 
 
-def _moved(start_s: float, end_s: float, stream: Stream, motion: ArmMotion) -> Iterator[Stretch]:
+def moved(motion: ArmMotion, start_s: float, end_s: float) -> Stretch | None:
+    """From before the arm moves to when it stands again; None where it does not move between these times."""
     inside = (motion.time_s >= start_s) & (motion.time_s <= end_s)
     moving = motion.time_s[inside][np.linalg.norm(motion.rate(motion.time_s[inside]), axis=1) > MIN_RATE_RAD_S]
     if not len(moving):
+        return None
+    return Stretch(motion, max(start_s, float(moving[0]) - BEYOND_S), min(end_s, float(moving[-1]) + BEYOND_S))
+
+
+def by_the_wrists(way: Stretch) -> bool:
+    """Whether it is one that counts: neither too short nor too long, and no other joint turns."""
+    others = way.motion.angles(np.linspace(way.start_s, way.end_s, STEPS))[:, :WRIST_1]
+    return SHORTEST_S < way.end_s - way.start_s < LONGEST_S and np.ptp(others, axis=0).max() < STANDS_RAD
+
+
+def _moved(start_s: float, end_s: float, stream: Stream, motion: ArmMotion) -> Iterator[Stretch]:
+    way = moved(motion, start_s, end_s)
+    if way is None:
         return
-    start_s, end_s = max(start_s, moving[0] - BEYOND_S), min(end_s, moving[-1] + BEYOND_S)
-    samples = between(stream, start_s, end_s)
+    samples = between(stream, way.start_s, way.end_s)
     time_s = stream.time_s[samples]
     if len(time_s) < 2 or np.diff(time_s).mean() > SPARSE_S:
         return
     step_s = float(time_s[-1] - time_s[0]) / (len(time_s) - 1)
-    unseen_rad = float(np.linalg.norm(motion.rate(moving, 1), axis=1).max() * CORNERS * step_s**2)
+    turning = motion.time_s[(motion.time_s >= way.start_s) & (motion.time_s <= way.end_s)]
+    unseen_rad = float(np.linalg.norm(motion.rate(turning, 1), axis=1).max() * CORNERS * step_s**2)
     way = Stretch(motion, float(time_s[0]) - step_s / 2, float(time_s[-1]) + step_s / 2, unseen_rad)
     whole = len(time_s) >= (1 - LOST) * (way.end_s - way.start_s) * stream.sensor.rate_hz
     ends = np.linalg.norm(motion.rate(np.array([way.start_s, way.end_s])), axis=1)
-    others = motion.angles(np.linspace(way.start_s, way.end_s, STEPS))[:, :WRIST_1]
     in_range = np.abs(stream.raw["counts"][samples].astype(np.int64)).max(initial=0) < stream.sensor.full_scale_counts
-    if (
-        SHORTEST_S < way.end_s - way.start_s < LONGEST_S
-        and whole
-        and in_range
-        and ends.max() < 2 * MIN_RATE_RAD_S
-        and np.ptp(others, axis=0).max() < STANDS_RAD
-        and motion.covered(time_s).all()
-    ):
+    stands = ends.max() < 2 * MIN_RATE_RAD_S
+    if by_the_wrists(way) and whole and in_range and stands and motion.covered(time_s).all():
         yield way
 
 
@@ -121,7 +128,7 @@ def _share(way: Stretch, time_s: Array) -> Array:
     return share
 
 
-def _pull(way: Stretch, down_m_s2: Array, extension_m: Array) -> Array:
+def pull_m_s2(way: Stretch, down_m_s2: Array, extension_m: Array) -> Array:
     """(3,) what is felt as gravity in the mean: gravity less the acceleration of where the sensors sit."""
     time_s, step_s = np.linspace(way.start_s, way.end_s, STEPS, retstep=True)
     pose = flange_pose(way.motion.angles(time_s), way.motion.kinematics)

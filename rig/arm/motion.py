@@ -5,6 +5,9 @@ import math
 from dataclasses import dataclass
 from typing import Protocol
 
+import numpy as np
+from numpy.typing import NDArray
+
 from rig.arm.state import Joints
 from rig.config.section import Direction, Vector3
 
@@ -138,6 +141,17 @@ def trapezoid_duration(distance_rad: float, speed_rad_s: float, acceleration_rad
     if distance_rad < speed_rad_s**2 / acceleration_rad_s2:
         return 2 * math.sqrt(distance_rad / acceleration_rad_s2)
     return distance_rad / speed_rad_s + speed_rad_s / acceleration_rad_s2
+
+
+def progress(motion: Motion, since_s: NDArray[np.float64]) -> NDArray[np.float64]:
+    """(n,) share of the way, from 0 to 1, that a motion has come at times (n,) since it began."""
+    way = max(map(abs, travel(motion.start_q_rad, motion.target_q_rad)))
+    ramp_s = min(motion.speed_rad_s / motion.acceleration_rad_s2, motion.duration_s / 2)
+    since_s = since_s.clip(0.0, motion.duration_s)
+    left_s = np.minimum(since_s, motion.duration_s - since_s)
+    gone = motion.acceleration_rad_s2 * (np.minimum(left_s, ramp_s) ** 2 / 2 + ramp_s * (left_s - ramp_s).clip(min=0.0))
+    share: NDArray[np.float64] = np.where(since_s < motion.duration_s / 2, gone, way - gone) / way
+    return share
 
 
 def travel(start_q_rad: Joints, target_q_rad: Joints) -> Joints:

@@ -4,13 +4,14 @@ from collections.abc import Sequence
 from pathlib import Path
 
 from rig.analysis.attitude_account import attitude_account
+from rig.analysis.planned import planned_told_from
 from rig.arm.preflight import plan_problems, refuse
 from rig.commands.configured import configured
 from rig.report.plan_table import print_plan
 
 
 def plan(config_path: Path, overrides: Sequence[str], script: Path | None, *, as_json: bool) -> int:
-    """Print the plan from the home pose, and what its attitudes will tell; returns 0.
+    """Print the plan from the home pose, what its attitudes will tell, and which damage its checks; returns 0.
 
     Raises `Refused` when a motion breaks a limit, and when the attitudes do not tell enough.
     """
@@ -19,6 +20,6 @@ def plan(config_path: Path, overrides: Sequence[str], script: Path | None, *, as
     config = found.loaded.config
     arm = config.arm
     refuse(plan_problems(steps, arm.payload_kg, arm.payload_centre_mm, arm.extension_mm))
-    account = attitude_account(config, steps)
-    print_plan(steps, account, repeated=found.phase.follows is not None, as_json=as_json)
+    account, told_from = attitude_account(config, steps), planned_told_from(config, steps)
+    print_plan(steps, account, told_from, repeated=found.phase.follows is not None, as_json=as_json)
     return 0

@@ -26,12 +26,12 @@ class Part:
     """One kind of sensor: `rates_hz` and `ranges_deg_s` are all its gyroscope can do, `rates_rule` says rates in words.
 
     `g_sensitivity_deg_s_g` is how much a reading may change for 1 g, at most, `nonlinearity_percent` how far it may be
-    from a straight line, of full scale, `asymmetry_percent` by what is even of its curve; `bias_deg_s_k` and
-    `scale_ppm_k` how much bias and scale may change with temperature, `bias_instability_deg_h` is the least Allan
-    deviation of the bias, `non_orthogonality_deg` how far from 90° two of its axes may stand. `ranges_g` are those of
-    its accelerometer, which shares its data rate, the usual one first; `acceleration_noise_ug_sqrt_hz` is the noise
-    density of that, in µg/√Hz, and `accelerometer` what else is known of it. A part with a port of its own stands
-    beside the board, with a clock of its own.
+    from the best straight line, of full scale, `asymmetry_percent` by what is even of its curve; `bias_deg_s_k` and
+    `scale_ppm_k` how much bias and scale may change with temperature, `angle_random_walk_deg_sqrt_h` is its white
+    noise, `bias_instability_deg_h` the least Allan deviation of its bias, `non_orthogonality_deg` how far from 90° two
+    of its axes may stand. `ranges_g` are those of its accelerometer, which shares its data rate, the usual one first;
+    `acceleration_noise_ug_sqrt_hz` is the noise density of that, in µg/√Hz, and `accelerometer` what else is known of
+    it. A part with a port of its own stands beside the board, with a clock of its own.
     """
 
     rates_hz: tuple[float, ...]
@@ -44,6 +44,7 @@ class Part:
     asymmetry_percent: float
     bias_deg_s_k: float
     scale_ppm_k: float
+    angle_random_walk_deg_sqrt_h: float
     bias_instability_deg_h: float
     non_orthogonality_deg: float
     ranges_g: tuple[float, ...]
@@ -108,6 +109,7 @@ PARTS: Mapping[str, Part] = MappingProxyType(
             asymmetry_percent=0.02,
             bias_deg_s_k=30 / 65,
             scale_ppm_k=4e4 / 65,
+            angle_random_walk_deg_sqrt_h=0.42,
             bias_instability_deg_h=10,  # not stated; assumed, as consumer parts have it
             non_orthogonality_deg=1.15,
             ranges_g=(2, 4, 8, 16),
@@ -127,6 +129,7 @@ PARTS: Mapping[str, Part] = MappingProxyType(
             asymmetry_percent=0.02,  # not stated; assumed: what vibrates to and fro does so alike
             bias_deg_s_k=30 / 65,  # ±30 °/s from −40 to 85 °C (table 1), straight from 25 °C
             scale_ppm_k=4e4 / 65,  # ±4 % (table 1)
+            angle_random_walk_deg_sqrt_h=0.42,  # 0.01 °/s/√Hz, of one side (table 1): 60 / √2 times that
             bias_instability_deg_h=10,  # not stated; assumed, as that of the LSM9DS1
             non_orthogonality_deg=1.15,  # cross-axis sensitivity ±2 % (table 1)
             ranges_g=(2, 4, 8, 16),
@@ -146,6 +149,7 @@ PARTS: Mapping[str, Part] = MappingProxyType(
             asymmetry_percent=0.004,
             bias_deg_s_k=0.2 / 60,
             scale_ppm_k=3e3 / 60,
+            angle_random_walk_deg_sqrt_h=0.15,  # data sheet, features
             bias_instability_deg_h=2,  # data sheet, features
             non_orthogonality_deg=0.15,  # axis to axis ±0.05° (data sheet, features), taken for a standard deviation
             ranges_g=(8,),
@@ -165,6 +169,7 @@ PARTS: Mapping[str, Part] = MappingProxyType(
             asymmetry_percent=0.0005,
             bias_deg_s_k=1 / 3600 / 60,  # assumed: 1 °/h over 60 K
             scale_ppm_k=200 / 60,  # assumed: 200 ppm over as much
+            angle_random_walk_deg_sqrt_h=0.012,  # TRIAX, table 1
             bias_instability_deg_h=0.05,  # assumed: as its maker has it of the typical one
             non_orthogonality_deg=0.06,  # assumed: 1 mrad
             ranges_g=(10, 25),

@@ -1,7 +1,6 @@
 """The typed outcome of a run as the document of `result.json`."""
 
 from collections.abc import Sequence
-from math import isfinite
 
 from rig.analysis.acceleration import AccelerometerResult
 from rig.analysis.calibration import SensorResult
@@ -13,7 +12,7 @@ from rig.analysis.when import of_accelerometer, of_gyroscope, of_magnetometer
 from rig.data.accelerometer_entries import AccelerometerEntry
 from rig.data.magnetometer_entries import MagnetometerEntry
 from rig.data.result_file import SCHEMA, CheckEntry, ProvenanceEntry, ResultDocument, SensorEntry
-from rig.data.result_types import ErrorEntry, Role, ToldFromEntry
+from rig.data.result_types import ErrorEntry, Role
 from rig.errors import Fault
 from rig.report.accelerometer_entry import accelerometer_entry
 from rig.report.budget_entry import clock_entry
@@ -21,6 +20,7 @@ from rig.report.drift_entry import drift_entry
 from rig.report.entry import entry
 from rig.report.magnetometer_entry import magnetometer_entry
 from rig.report.sensor_entry import sensor_entry
+from rig.report.told_words import told_from_entries
 from rig.report.verification_entry import verification_entry
 from rig.report.when_entry import when_entry
 
@@ -82,9 +82,7 @@ def _magnetometer(outcome: Outcome, name: str, result: MagnetometerResult | Faul
 
 
 def _told_from(found: Sequence[ToldFrom]) -> dict[str, object]:
-    """A size that is never told is null."""
-    told = (entry(ToldFromEntry, each, size=each.size if isfinite(each.size) else None) for each in found)
-    return {"told_from": tuple(told)} if found else {}
+    return {"told_from": told_from_entries(found)} if found else {}
 
 
 def _check(check: Check) -> CheckEntry:

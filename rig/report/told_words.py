@@ -3,9 +3,16 @@
 import math
 from collections.abc import Iterator, Sequence
 
+from rig.analysis.contradictions import ToldFrom
 from rig.data.result_types import ToldFromEntry
+from rig.report.entry import entry
 
 FACTORS = {"1": (100.0, " %"), "rad": (math.degrees(1), "°"), "T": (1e6, " µT")}  # by which a unit is shown
+
+
+def told_from_entries(found: Sequence[ToldFrom]) -> tuple[ToldFromEntry, ...]:
+    """As `result.json` has them: a size that is never told is null."""
+    return tuple(entry(ToldFromEntry, each, size=each.size if math.isfinite(each.size) else None) for each in found)
 
 
 def told_lines(found: Sequence[ToldFromEntry]) -> Iterator[str]:

@@ -75,6 +75,16 @@ def test_a_procedures_help_is_the_instruction_for_the_technician(procedure: str)
     assert done.returncode == 0 and "Before you start:" in done.stdout and "What happens:" in done.stdout, done
 
 
+def test_a_plan_says_what_its_checks_will_tell() -> None:
+    document = json.loads(shell(f"{PLAN} --json").stdout)
+    told = {each["what"]: each for each in document["told_from"]["gyro"]}
+    assert told["all scale factors change half-way"]["check"] == "scale_changed"
+    said = " ".join(shell(PLAN).stdout.split())
+    assert "told in 95 of 100 runs" in said and "another reading in one sweep" in said
+    twice = json.loads(shell(f"{PLAN} --json --set procedure.repeats=2").stdout)["told_from"]["gyro"]
+    assert all(each["size"] < told[each["what"]]["size"] for each in twice if "half-way" in each["what"])
+
+
 @pytest.mark.slow
 def test_the_plan_of_a_verification_is_not_said_to_be_repeated() -> None:
     plan = f"{sys.executable} -m rig plan {ROOT / 'configs' / 'lsm9ds1_adis16465.yaml'}"

@@ -1,0 +1,65 @@
+"""What the checks of a run will tell, by its plan: the same checks, of readings that nothing is wrong with. Pure."""
+
+from collections.abc import Mapping
+
+import numpy as np
+
+from rig.analysis.allowance import allow, allowed_of, any_earth_rate
+from rig.analysis.consistency import would_tell
+from rig.analysis.contradictions import ToldFrom, rate_of_each
+from rig.analysis.planned_pieces import Planned, planned_pieces
+from rig.analysis.suspected import DAMAGES
+from rig.arm.motion import Plan
+from rig.config.models import RigConfig
+from rig.config.sensor_catalogue import PARTS
+from rig.config.sensor_sections import SensorSection, mounting_matrix
+from rig.data.settings import RunSettings, settings_of
+from rig.estimation.nonlinearity import distinct_speeds
+from rig.estimation.own_errors import KnownSensor
+
+
+def planned_told_from(config: RigConfig, plan: Plan) -> Mapping[str, tuple[ToldFrom, ...]]:
+    """Of each gyroscope to calibrate, by name; empty where nothing is swept.
+
+    For the nominal arm, and for a sensor as its data sheet has it, which nothing but its noise and its flicker makes
+    wander.
+    """
+    if not plan.sweeps:
+        return {}
+    settings = settings_of(config, plan)
+    assert settings.site is not None, "or these are no settings of today"
+    turned = planned_pieces(plan, settings.site, np.array(settings.extension_m))
+    kinds = sum(1 + (each.acceleration is not None) for each in config.to_calibrate.values())
+    rate = rate_of_each(kinds + len(config.all_sensors) - len(config.sensors), by_model=True)
+    return {name: _told_from(name, each, turned, settings, rate) for name, each in config.to_calibrate.items()}
+
+
+def _told_from(
+    name: str, sensor: SensorSection, turned: Planned, settings: RunSettings, rate: float
+) -> tuple[ToldFrom, ...]:
+    site, known = settings.site, settings.uncertainty
+    assert site is not None and known is not None, "or these are no settings of today"
+    matrix, full_scale_rad_s = mounting_matrix(sensor.mounting), float(np.radians(sensor.range_deg_s))
+    noise_rad_s_sqrt_hz = np.radians(PARTS[sensor.part].angle_random_walk_deg_sqrt_h) / 60
+    seen = turned.read_by(matrix, float(noise_rad_s_sqrt_hz))
+    at_s = seen.pieces.times_s.mean(axis=1)
+    speeds = distinct_speeds(np.array([sweep.speed_rad_s for sweep in settings.planned_sweeps]))
+    allowed = allowed_of(
+        known,
+        (name, sensor.part, full_scale_rad_s),
+        finds_curve=len(speeds) > 1,
+        jitter_s=0.0,
+        earth_rad_s=any_earth_rate(known=site.earth_rate_rad_s is not None or settings.finds_earth_rate),
+        sensor=KnownSensor(
+            nonlinearity=known.of("nonlinearity_percent", name, sensor.part) / 100,
+            full_scale_rad_s=full_scale_rad_s,
+            bias_rad_s_per_k=float(np.radians(known.of("bias_deg_s_k", name, sensor.part))),
+            scale_per_k=1e-6 * known.of("scale_ppm_k", name, sensor.part),
+            instability_rad_s=float(np.radians(known.of("bias_instability_deg_h", name, sensor.part) / 3600)),
+            temperature_c=np.zeros(len(at_s)),
+            temperature_step_k=0.0,
+        ),
+        at_s=at_s,
+    )
+    found = would_tell(seen.pieces, matrix, rate, allow(allowed, seen.pieces, seen.ways, matrix))
+    return tuple(ToldFrom(each.what, each.check, found[each.what], each.unit) for each in DAMAGES if each.what in found)

@@ -1,0 +1,58 @@
+"""A plan as if it had been recorded: when the arm would be where. Pure."""
+
+from collections.abc import Iterator
+from dataclasses import dataclass
+
+import numpy as np
+
+from rig.arm.motion import Dwell, Plan, Rest, Step, Sweep, Transfer, progress
+from rig.arm.state import ARM_STATE_DTYPE
+from rig.observation.timebase import ArmMotion
+
+STATE_RATE_HZ = 125.0
+STANDING_S = 1.0  # before the first step and after the last
+
+
+@dataclass(frozen=True, slots=True)
+class Timed:
+    """A step, and when it begins and ends."""
+
+    step: Step
+    start_s: float
+    end_s: float
+
+    @property
+    def revolution_s(self) -> tuple[float, float]:
+        """When a sweep's whole turn at constant speed begins and ends."""
+        assert isinstance(self.step, Sweep)
+        middle, half = (self.start_s + self.end_s) / 2, np.pi / self.step.speed_rad_s
+        return middle - half, middle + half
+
+
+def timed(plan: Plan) -> Iterator[Timed]:
+    """Every step of it, one after the other; no sensor takes long to settle before a dwell."""
+    time_s = STANDING_S
+    for step in plan.steps:
+        yield Timed(step, time_s, time_s + step.duration_s)
+        time_s += step.duration_s
+
+
+def planned_motion(plan: Plan) -> ArmMotion:
+    """Of the nominal arm, without vibration. Raises Fault `no_motion` where nothing moves."""
+    time_s = np.arange(0.0, plan.duration_s + 2 * STANDING_S, 1 / STATE_RATE_HZ)
+    states = np.zeros(len(time_s), ARM_STATE_DTYPE)
+    states["time_s"] = time_s
+    q_rad = np.tile(np.array(plan.start_q_rad), (len(time_s), 1))
+    for each in timed(plan):
+        step, since = each.step, time_s >= each.start_s
+        if isinstance(step, (Sweep, Transfer)):
+            share = progress(step, time_s[since] - each.start_s)[:, None]
+            start, target = np.array(step.start_q_rad), np.array(step.target_q_rad)
+            q_rad[since] = start + share * (target - start)
+    states["q_rad"] = q_rad
+    return ArmMotion(states)
+
+
+def measured(plan: Plan) -> Iterator[Timed]:
+    """Its sweeps, rests and dwells."""
+    return (each for each in timed(plan) if isinstance(each.step, (Sweep, Rest, Dwell)))

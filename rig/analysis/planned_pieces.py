@@ -1,0 +1,101 @@
+"""A plan cut into pieces as a recording is, with readings that nothing is wrong with: what checks would see. Pure."""
+
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass, replace
+from itertools import pairwise
+
+import numpy as np
+
+from rig.analysis.pieces import BY_MODEL, REST, Pieces, Stretch
+from rig.analysis.planned_motion import measured, planned_motion
+from rig.analysis.ways import STEPS, by_the_wrists, moved, pull_m_s2
+from rig.arm.motion import Plan, Sweep
+from rig.data.settings import Site
+from rig.estimation.arrays import Array
+from rig.observation.timebase import ArmMotion
+
+
+@dataclass(frozen=True, slots=True)
+class Planned:
+    """The pieces of sweeps and rests, and these with the ways between them, as the flange turns."""
+
+    pieces: Pieces
+    ways: Pieces
+
+    def read_by(self, matrix: Array, noise_rad_s_sqrt_hz: float) -> "Planned":
+        """By a sensor of F (3, 3) that noise walks the angle of: its means over T have that over √T."""
+
+        def read(pieces: Pieces) -> Pieces:
+            variances = noise_rad_s_sqrt_hz**2 / np.diff(pieces.times_s) * np.ones(3)
+            return replace(pieces, means_rad_s=pieces.rates_rad_s @ matrix.T, variances_rad2_s2=variances)
+
+        return Planned(read(self.pieces), read(self.ways))
+
+
+@dataclass(frozen=True, slots=True)
+class _Part:
+    sweep: int
+    place: float
+    stretch: Stretch
+
+
+def planned_pieces(plan: Plan, site: Site, extension_m: Array) -> Planned:
+    """Of the nominal arm, with sensors at `extension_m` (3,) from the flange. Raises Fault `no_motion`."""
+    motion = planned_motion(plan)
+    parts = list(_parts(plan, motion))
+    ways = [_Part(REST - 1 - place, 0.0, way) for place, way in enumerate(_ways(plan, motion))]
+
+    def pieces(of: Sequence[_Part]) -> Pieces:
+        stretches = tuple(each.stretch for each in of)
+        nothing = np.zeros((len(of), 3))
+        return Pieces(
+            sweep=np.array([each.sweep for each in of]),
+            place=np.array([each.place for each in of]),
+            means_rad_s=nothing,
+            variances_rad2_s2=nothing,
+            rates_rad_s=np.array([np.zeros(3) if each.sweep == REST else _rate(each.stretch) for each in of]),
+            pull_m_s2=np.array([pull_m_s2(each, site.down_m_s2, extension_m) for each in stretches]),
+            attitudes=np.array([motion.attitude(each.start_s, each.end_s) for each in stretches]),
+            speed_std=np.zeros(len(of)),
+            times_s=np.array([(each.start_s, each.end_s) for each in stretches]),
+            stretches=stretches,
+            windows=(),
+        )
+
+    return Planned(pieces(parts), pieces([*parts, *ways]))
+
+
+def _parts(plan: Plan, motion: ArmMotion) -> Iterator[_Part]:
+    """As `rig.analysis.pieces` cuts a recording: the sweeps, then the rests."""
+    parts = max(1, min(BY_MODEL.parts, BY_MODEL.most // max(len(plan.sweeps), 1)))
+    of_rest = max(1, parts // BY_MODEL.times_a_rest)
+    steps = list(measured(plan))
+    sweeps = [each for each in steps if isinstance(each.step, Sweep)]
+    rests = [each for each in steps if not isinstance(each.step, Sweep)]
+    for place, each in enumerate(sweeps):
+        yield from _cut(motion, each.revolution_s, place, parts)
+    for each in rests:
+        yield from _cut(motion, (each.start_s, each.end_s), REST, of_rest)
+
+
+def _cut(motion: ArmMotion, window_s: tuple[float, float], sweep: int, parts: int) -> Iterator[_Part]:
+    for each, ends in enumerate(pairwise(np.linspace(*window_s, parts + 1).tolist())):
+        yield _Part(sweep, 2 * each / (parts - 1) - 1 if parts > 1 else 0.0, Stretch(motion, *ends))
+
+
+def _ways(plan: Plan, motion: ArmMotion) -> Iterator[Stretch]:
+    """Between all that is measured, before it and after."""
+    steps = list(measured(plan))
+    begins = [0.0, *(each.end_s for each in steps)]
+    ends = [*(each.start_s for each in steps), float(motion.time_s[-1])]
+    for start_s, end_s in zip(begins, ends, strict=True):
+        way = moved(motion, start_s, end_s)
+        if way is not None and by_the_wrists(way):
+            yield way
+
+
+def _rate(stretch: Stretch) -> Array:
+    """(3,) rad/s of the flange, in the mean."""
+    edges = np.linspace(stretch.start_s, stretch.end_s, 8 * STEPS + 1)
+    rate: Array = stretch.motion.rate((edges[1:] + edges[:-1]) / 2).mean(axis=0)
+    return rate
