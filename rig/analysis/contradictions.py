@@ -1,6 +1,6 @@
 """What contradicts itself does not pass: the checks of the verdict that hold a recording against itself."""
 
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 
 import numpy as np
@@ -11,13 +11,13 @@ from rig.analysis.calibration import SensorResult, observe_recordings, solve_obs
 from rig.analysis.consistency import consistency
 from rig.analysis.leaning import leaning_deg
 from rig.analysis.magnetic_field import MagnetometerResult
-from rig.analysis.pieces import REST, cut
+from rig.analysis.pieces import cut
 from rig.analysis.readings import judge_readings
 from rig.analysis.reference_contradictions import of_accelerometer, of_magnetometer, reference_statistics
 from rig.analysis.reference_suspected import DAMAGES as REFERENCE_DAMAGES
 from rig.analysis.surroundings import Surroundings, surroundings_of
-from rig.analysis.suspected import DAMAGES, Means
 from rig.analysis.suspicion import Statistic
+from rig.analysis.told_from import ToldFrom, of_gyroscope
 from rig.analysis.verdict import Check
 from rig.analysis.ways import with_ways
 from rig.data.run_file import RunData
@@ -28,21 +28,6 @@ FALSE_ALARMS = 0.001  # how often one of these checks, of any sensor, fails an u
 SHARES = 13  # of each kind of readings of a sensor, its statistics
 OF_THE_MODEL = 2  # more where they are held to the model: the ways between sweeps, the angles between axes
 DISTURBED = "disturbed_sweep"
-
-
-@dataclass(frozen=True, slots=True)
-class ToldFrom:
-    """The size, in `unit`, from which on a check tells that `what` happened, in 95 of 100 recordings.
-
-    Infinite where no size is told. Just below it the scale factor or bias farthest off is off by so many times its U,
-    where that is known.
-    """
-
-    what: str
-    check: str
-    size: float
-    unit: str
-    off_by_expanded: float | None = None
 
 
 @dataclass(frozen=True, slots=True)
@@ -93,26 +78,9 @@ def contradictions(
             stated_deg = surroundings.uncertainty.of("non_orthogonality_deg", name, results[name].sensor.part)
             checks.append(Check(f"{name}.non_orthogonality", *leaning_deg(explained.solution, stated_deg, rate), "°"))
         disturbed |= named.keys()
-        told_from[name] = tuple(_told_from(found.told_from, results[name]))
+        if surroundings is not None:
+            told_from[name] = tuple(of_gyroscope(found.told_from, name, results[name], surroundings))
     return Contradictions(tuple(checks), frozenset(disturbed), told_from)
-
-
-def _told_from(sizes: Mapping[str, float], result: SensorResult) -> Iterator[ToldFrom]:
-    explained, budget = result.explained, result.uncertainty
-    assert explained is not None
-    seen, solution = explained.seen, explained.solution
-    turns = np.flatnonzero(seen.turns_rad_s.any(axis=1))
-    sweep = np.full(len(seen.turns_rad_s), REST)
-    sweep[turns] = np.arange(len(turns))
-    means = Means(seen.rates_rad_s @ solution.matrix.T, seen.windows_s, sweep)
-    for damage in DAMAGES:
-        if (size := sizes.get(damage.what)) is None:
-            continue
-        off_by = None
-        if budget is not None and np.isfinite(size):
-            effects = size * np.einsum("qni,kni->kq", solution.response, damage.patterns(means))
-            off_by = float(np.max(np.abs(effects) / budget.expanded))
-        yield ToldFrom(damage.what, damage.check, size, damage.unit, off_by)
 
 
 def in_reference(

@@ -6,9 +6,10 @@ import numpy as np
 
 from rig.analysis.allowance import allow, allowed_of, any_earth_rate
 from rig.analysis.consistency import would_tell
-from rig.analysis.contradictions import ToldFrom, rate_of_each
+from rig.analysis.contradictions import rate_of_each
 from rig.analysis.planned_pieces import Planned, planned_pieces
 from rig.analysis.suspected import DAMAGES
+from rig.analysis.told_from import ToldFrom
 from rig.arm.motion import Plan
 from rig.config.models import RigConfig
 from rig.config.sensor_catalogue import PARTS

@@ -4,9 +4,9 @@ from collections.abc import Sequence
 
 from rig.analysis.acceleration import AccelerometerResult
 from rig.analysis.calibration import SensorResult
-from rig.analysis.contradictions import ToldFrom
 from rig.analysis.magnetic_field import MagnetometerResult
 from rig.analysis.outcome import Origin, Outcome
+from rig.analysis.told_from import ToldFrom
 from rig.analysis.verdict import Check
 from rig.analysis.when import of_accelerometer, of_gyroscope, of_magnetometer
 from rig.data.accelerometer_entries import AccelerometerEntry

@@ -11,7 +11,7 @@ from rich.console import Console
 from rich.table import Table
 
 from rig.analysis.attitude_account import AttitudeAccount
-from rig.analysis.contradictions import ToldFrom
+from rig.analysis.told_from import ToldFrom
 from rig.arm.motion import SAME_PLACE_RAD, Dwell, Plan, Rest, Step, Sweep
 from rig.arm.state import JOINT_NAMES
 from rig.report.attitude_account import account_document, print_account

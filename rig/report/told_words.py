@@ -3,7 +3,7 @@
 import math
 from collections.abc import Iterator, Sequence
 
-from rig.analysis.contradictions import ToldFrom
+from rig.analysis.told_from import ToldFrom
 from rig.data.result_types import ToldFromEntry
 from rig.report.entry import entry
 

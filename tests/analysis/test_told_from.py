@@ -7,9 +7,10 @@ import numpy as np
 import pytest
 
 from rig.analysis.calibration import observe_recordings, solve_observed
-from rig.analysis.contradictions import Contradictions, ToldFrom, contradictions
+from rig.analysis.contradictions import Contradictions, contradictions
 from rig.analysis.planned import planned_told_from
 from rig.analysis.surroundings import surroundings_of
+from rig.analysis.told_from import ToldFrom
 from rig.config.load import parse
 from rig.data.run_file import RunData
 from rig.estimation.arrays import Array
