@@ -89,7 +89,7 @@ class SensorResult:
 
     @property
     def temperature_c(self) -> float:
-        """Mean over all averaged samples."""
+        """Mean over the samples of all sweeps."""
         averages = [observation.average for observation in self.observations]
         return float(np.average([a.temperature_c for a in averages], weights=[a.samples for a in averages]))
 

@@ -4,13 +4,14 @@ Both stand in every recording. A speed is 2π over a time of the controller's, s
 clock errs by. No clock is left out for being far off: what two differ by is held against what is stated of both.
 """
 
-from collections.abc import Iterator
+from collections.abc import Iterable, Iterator, Sequence
 from dataclasses import dataclass
 from itertools import combinations
 from math import comb
 
 import numpy as np
 
+from rig.arm.identity import calls_itself_simulated
 from rig.data.settings import Uncertainty
 from rig.observation.colour import widening
 from rig.observation.observed_run import ObservedRun
@@ -18,8 +19,7 @@ from rig.observation.windows import swept
 
 # The board's counter runs from its 32768 Hz crystal by way of a PLL, 576 ppm below the nominal rate (docs/board.md).
 NOMINAL_DRIFT = 4e6 / (122 * 32768) - 1
-# A computer that is farther off counts no seconds of the controller's: a simulated laboratory goes as fast as it can.
-# No quartz errs by a twentieth of that, nor does a time server's correction (500 ppm at most: RFC 5905, MAXFREQ).
+# A simulated controller goes as fast as it can: a computer that is farther off counts no seconds of it.
 ONE_PACE = 1e-2
 LOCKED, REAL_TIME = 150e-6, 1e-3  # beyond these no comparison was made, before what contradicts was told
 CERTAIN = 4.0  # standard deviations of what is found beside what is stated
@@ -58,6 +58,11 @@ class ClockDifference:
     clocks: tuple[str, str]
     size: float
     limit: float
+
+    @property
+    def share(self) -> float:
+        """Of the limit; beyond one the clocks contradict each other."""
+        return self.size / self.limit
 
 
 @dataclass(frozen=True, slots=True)
@@ -101,7 +106,8 @@ def check_clock(recording: ObservedRun, known: Uncertainty, *, holds_every: bool
     A recording of before does not say whether a crystal holds its board's clock: it is taken to, as it is built.
     """
     compared = (_by_computer(recording, known), _by_crystal(recording, known))
-    far = {BY_COMPUTER: ONE_PACE if holds_every else REAL_TIME, BY_CRYSTAL: np.inf if holds_every else LOCKED}
+    pace = ONE_PACE if calls_itself_simulated(recording.run.provenance.arm_software) else np.inf
+    far = {BY_COMPUTER: pace if holds_every else REAL_TIME, BY_CRYSTAL: np.inf if holds_every else LOCKED}
     found = [each for each in compared if each is not None and abs(each.error) < far[each.by]]
     half_width = known.controller_clock_ppm * PPM
     weights = np.array([3 / half_width**2, *(1 / each.std**2 for each in found)])
@@ -110,15 +116,24 @@ def check_clock(recording: ObservedRun, known: Uncertainty, *, holds_every: bool
     return ClockCheck(error, std, tuple(found), half_width)
 
 
-def state_jitter(recording: ObservedRun) -> Jitter:
-    """Of the times the arm's states are of, from how the joint angles of the sweeps scatter.
+def worst_differences(clocks: Iterable[ClockCheck]) -> list[ClockDifference]:
+    """Of every two clocks that some recording compares, that of the recording in which they agree least."""
+    worst: dict[tuple[str, str], ClockDifference] = {}
+    for found in (each for check in clocks for each in check.differences()):
+        worst[found.clocks] = max(worst.get(found.clocks, found), found, key=lambda each: each.share)
+    return list(worst.values())
+
+
+def state_jitter(recordings: Sequence[ObservedRun]) -> Jitter:
+    """Of the times the arm's states are of, from how the joint angles of all sweeps of a run scatter.
 
     Differences of the sixth order: of what the servo does, slow beside the states, nothing is left in them. What is
     left are the times, and the encoder's steps. Neighbouring differences share states: n of them have the freedom of
     n / Σ ρ², where Σ ρ² over all lags is C(24, 12) / C(12, 6)².
     """
     scatter, count = [], 0
-    for finished in swept(recording.run):
+    sweeps = [(each, finished) for each in recordings for finished in swept(each.run)]
+    for recording, finished in sweeps:
         inside = slice(*np.searchsorted(recording.motion.time_s, [finished.window.start_s, finished.window.end_s]))
         states = recording.motion.states[inside]
         steps = np.diff(states["q_rad"][:, finished.sweep.joint], n=ORDER)

@@ -47,10 +47,13 @@ def contradictions(
     results: Mapping[str, SensorResult],
     sensors: Sequence[str],
     surroundings: Surroundings | None,
+    *,
+    false_alarms: float = FALSE_ALARMS,
 ) -> Contradictions:
     """Of these sensors' results; none in recordings of before there was a site, which keep the verdicts they had.
 
-    `surroundings` are those of the recordings. A sweep that is named is part of the name, `gyro.disturbed_sweep.3`.
+    `surroundings` are those of the recordings, `false_alarms` is the share of undamaged runs that may fail. A sweep
+    that is named is part of the name, `gyro.disturbed_sweep.3`.
     """
     settings = recordings[0].run.settings
     if settings.site is None:
@@ -58,7 +61,7 @@ def contradictions(
     checks: list[Check] = []
     disturbed: set[int] = set()
     told_from: dict[str, tuple[ToldFrom, ...]] = {}
-    rate = _rate(recordings[0].run, sensors)
+    rate = _rate(recordings[0].run, sensors, false_alarms)
     for name in sensors:
         explained = results[name].explained
         if explained is None:
@@ -103,7 +106,7 @@ def in_reference(
              for name, each in accelerometers.items()} | {
              (name, "field", "T"): of_magnetometer(name, recordings, each, known)
              for name, each in magnetometers.items() if not isinstance(each, Fault)}  # fmt: skip
-    rate = _rate(run, run.settings.to_calibrate)
+    rate = _rate(run, run.settings.to_calibrate, FALSE_ALARMS)
     checks: list[Check] = []
     told_from: dict[str, tuple[ToldFrom, ...]] = {}
     for (name, kind, unit), held in asked.items():
@@ -117,18 +120,18 @@ def in_reference(
     return Contradictions(tuple(checks), frozenset(), told_from)
 
 
-def _rate(run: RunData, sensors: Sequence[str]) -> float:
+def _rate(run: RunData, sensors: Sequence[str], false_alarms: float) -> float:
     """Of false alarms for each statistic: all kinds of readings that are held against themselves share them."""
     kinds = len(sensors)
     if run.settings.holds_all_kinds:
         accelerometers = [name for name in run.settings.to_calibrate if run.sensors[name].has_acceleration]
         kinds += len(accelerometers) + len(run.magnetometers)
-    return rate_of_each(kinds, by_model=run.settings.checked_by_model)
+    return rate_of_each(kinds, by_model=run.settings.checked_by_model, of_all=false_alarms)
 
 
-def rate_of_each(kinds: int, *, by_model: bool) -> float:
+def rate_of_each(kinds: int, *, by_model: bool, of_all: float = FALSE_ALARMS) -> float:
     """The same where so many kinds of readings of all sensors are held against themselves."""
-    return FALSE_ALARMS / ((SHARES + OF_THE_MODEL * by_model) * kinds)
+    return of_all / ((SHARES + OF_THE_MODEL * by_model) * kinds)
 
 
 def _checks(of: str, statistics: Mapping[str, Statistic]) -> list[Check]:

@@ -134,7 +134,7 @@ def calibrated(runs: Sequence[RunData], estimator: str = DEFAULT_ESTIMATOR, *, d
             *checks,
             *(check for name, agreed in onboard.items() for check in agreed.checks(name)),
             *among_rates.checks,
-            *(clock_checks(surroundings.clock) if surroundings is not None and settings.holds_every_clock else ()),
+            *clock_checks(surroundings.clocks if surroundings is not None else ()),
             *_acceleration_checks(accelerometers, settings),
             *among_dwells.checks,
         ),

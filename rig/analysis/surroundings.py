@@ -16,6 +16,7 @@ BETWEEN_TWO = sqrt(2 / 3)
 class Surroundings:
     """The site, what no recording shows of it, the controller's clock, and its states' jitter (s).
 
+    `clock` is the one that speeds are corrected by, `clocks` what every recording that is held against others says.
     `finds_earth_rate` says that the site is not asked for the Earth's rate, `counts_freedom` as `RunSettings` does.
     """
 
@@ -26,16 +27,24 @@ class Surroundings:
     finds_earth_rate: bool = False
     state_jitter_freedom: float = inf
     counts_freedom: bool = True
+    clocks: tuple[ClockCheck, ...] = ()
 
 
 def surroundings_of(recordings: Sequence[ObservedRun]) -> Surroundings | None:
-    """By the first recording's settings and its longest motion; None where those of before know no site."""
+    """By the first recording's settings; None where those of before know no site.
+
+    The clock is that of the longest motion, which tells it best: the controller's is one quartz in all recordings, and
+    where it was another, or its computer's time was, the others tell. What was made before knows the longest alone.
+    """
     settings = recordings[0].run.settings
     if settings.site is None or settings.uncertainty is None:
         return None
     longest = max(recordings, key=lambda each: float(each.motion.time_s[-1] - each.motion.time_s[0]))
-    clock = check_clock(longest, settings.uncertainty, holds_every=settings.holds_every_clock)
-    jitter = state_jitter(longest)
+    held = recordings if settings.holds_every_clock else [longest]
+    known, holds_every = settings.uncertainty, settings.holds_every_clock
+    clocks = tuple(check_clock(each, known, holds_every=holds_every) for each in held)
+    clock = next(check for each, check in zip(held, clocks, strict=True) if each is longest)
+    jitter = state_jitter(held)
     return Surroundings(
         settings.site,
         settings.uncertainty,
@@ -44,4 +53,5 @@ def surroundings_of(recordings: Sequence[ObservedRun]) -> Surroundings | None:
         settings.finds_earth_rate,
         jitter.freedom,
         settings.counts_freedom,
+        clocks if settings.holds_every_clock else (),
     )

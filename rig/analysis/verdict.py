@@ -11,7 +11,7 @@ import numpy as np
 from rig.analysis.acceleration import AccelerometerResult
 from rig.analysis.at_rest import Quantity
 from rig.analysis.bias_drift import BiasDrift
-from rig.analysis.clock import PPM, ClockCheck
+from rig.analysis.clock import PPM, ClockCheck, worst_differences
 from rig.analysis.verification import Verification
 from rig.data.settings import DecisionRule, Limits
 from rig.estimation.arrays import Array
@@ -97,11 +97,14 @@ def verification_checks(sensor: str, verification: Verification | None, limits: 
     )
 
 
-def clock_checks(clock: ClockCheck) -> tuple[Check, ...]:
-    """Whether the clocks of a run agree: every two of them, or what is stated of them, to within what both may err."""
+def clock_checks(clocks: Sequence[ClockCheck]) -> tuple[Check, ...]:
+    """Whether the clocks of a run agree: every two of them, or what is stated of them, to within what both may err.
+
+    Of several recordings those in which they agree least, each pair for itself.
+    """
     return tuple(
         Check(f"clocks_agree.{one}_and_{other}", each.size / PPM, each.limit / PPM, "ppm")
-        for each in clock.differences()
+        for each in worst_differences(clocks)
         for one, other in [each.clocks]
     )
 

@@ -28,6 +28,7 @@ E_SERIES_MODELS = {
 }
 CB3_MODELS = {1: "UR5", UR10: "UR10", 3: "UR3"}
 DASHBOARD_NAMES = ("UR10", "UR10E", "UR12E")
+SIMULATED = "(simulated)"  # so ends the version of a controller that is none
 LENGTH_TOLERANCE_M = 0.01  # what factories find differs from the drawing by a few millimetres
 OTHER_ARM = (
     "Correct arm.host, or mount the sensors on a UR10e or UR12e: no other arm's clearances and limits are known here"
@@ -37,6 +38,11 @@ OTHER_ARM = (
 def version_text(version: tuple[int, ...]) -> str:
     """As the maker writes it, without the build."""
     return ".".join(map(str, version[:3]))
+
+
+def calls_itself_simulated(software: str) -> bool:
+    """Whether a controller that says its version so drives no arm: its seconds are as long as it likes."""
+    return software.endswith(SIMULATED)
 
 
 def model_found(report: ArmReport) -> str | None:

@@ -5,6 +5,7 @@ import time
 from collections.abc import Iterator
 from pathlib import Path
 
+from rig.arm.identity import calls_itself_simulated
 from rig.commands.page_arguments import PageWish, wait_for_interrupt
 from rig.config.regular_file import UnfitFile, read_regular_file
 from rig.data.result_file import ResultDocument, read_result
@@ -59,7 +60,7 @@ def _about(folder: Path, runs: list[RunData]) -> About:
         parts |= {name: f"{each.part} {each.serial_number}" for name, each in run.sensors.items()}
         parts |= {name: f"{each.part} {each.serial_number}" for name, each in run.magnetometers.items()}
     made_with = runs[0].provenance
-    simulated = made_with.arm_software.endswith("(simulated)")
+    simulated = calls_itself_simulated(made_with.arm_software)
     arm = {"model": made_with.arm_model, "serial_number": made_with.arm_serial_number}
     return About(str(folder), runs[0].settings.procedure, replayed=True, parts=parts, simulated=simulated, arm=arm)
 

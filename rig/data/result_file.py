@@ -240,7 +240,7 @@ class SensorEntry(Entry):
     - `speeds_rad_s` are those of the sweeps: found at one speed, either way, the calibration is valid at that speed,
       and there is no `nonlinearity`. `loads_rad_s`: the smallest and the largest rate along each of the sensor's own
       axes in the sweeps that tell its scale factor.
-    - `temperature_c` is the mean over all averaged samples of the sweeps. `scale_at` and `bias_at` say when each was
+    - `temperature_c` is the mean over the samples of all sweeps. `scale_at` and `bias_at` say when each was
       read, and how warm it was then: scale factors are found from sweeps, biases from rests too.
     - A reference has no `board`: the board solves only for the sensors that are to be calibrated.
     - `earth_rate` is there where it was to be found, or says why it was not.

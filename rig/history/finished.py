@@ -7,6 +7,7 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
+from rig.arm.identity import calls_itself_simulated
 from rig.config.judging_sections import HistorySection
 from rig.config.load import Loaded, load
 from rig.config.regular_file import UnfitFile, open_regular_file, read_regular_file
@@ -14,7 +15,7 @@ from rig.data.result_file import SIZE_MAX_BYTES, ResultDocument, read_result
 from rig.data.run_folder import CONFIG, RESULT, SCRIPT, SCRIPT_IDENTITY, recordings
 from rig.errors import Refused
 from rig.history.issued import Issued, issued_certificate
-from rig.report.certificate.content import SIMULATED_ARM, certificate_of
+from rig.report.certificate.content import certificate_of
 from rig.report.certificate.page import certificate_page
 from rig.report.certificate.stated import Stated, of_configuration
 
@@ -82,7 +83,7 @@ def finished_run(folder: Path, document: ResultDocument | None = None) -> Finish
         document=document,
         rig=section.rig or provenance.arm_serial_number,
         check_standards=section.check_standards,
-        simulated=simulated or provenance.arm_software.endswith(SIMULATED_ARM),
+        simulated=simulated or calls_itself_simulated(provenance.arm_software),
         computer=platform.node(),
         path=str(folder.resolve()),
         recordings=tuple(

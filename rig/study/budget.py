@@ -1,7 +1,7 @@
 """Whether the stated uncertainty holds: sessions in which everything that may be wrong is, drawn from its distribution.
 
 JCGM 101: a draw is a session with a gyroscope, an arm and a controller of its own. Its mean readings are computed from
-the true movement, what the solver is given is what the controller would say. The interval ± U of the budget must then
+the true movement, what the solver is given is what the controller would say. The interval ± 2 u of the budget must then
 cover the truth in 95 of 100 draws. Beside it stands the solver without what this rig has against each effect: no
 gravity columns, no wandering bias, the clock taken for true, and the noise alone for uncertainty.
 """
@@ -78,7 +78,7 @@ class Session:
 
 
 def study(settings: Settings) -> Report:
-    """Coverage of ± U, and RMS of error over standard uncertainty, with and without the remedies."""
+    """Coverage of ± 2 u, and RMS of error over standard uncertainty, with and without the remedies."""
     drawn = errors(Effects(), settings)
     rows = [
         {
@@ -254,7 +254,7 @@ def _walk(rng: np.random.Generator, windows_s: Array, rate: float) -> tuple[Arra
 
 def _findings(rows: list[dict[str, Any]]) -> tuple[Finding, ...]:
     return tuple(
-        Finding(f"± U covers {row['parameter']}, {row['remedies']} the remedies", row["coverage_percent"], "%")
+        Finding(f"± 2 u covers {row['parameter']}, {row['remedies']} the remedies", row["coverage_percent"], "%")
         for row in rows
     )
 
@@ -266,5 +266,5 @@ def _draw(rows: list[dict[str, Any]], figure: "Figure") -> None:
         panel.bar(np.arange(len(PARAMETERS)) + offset, covered, 0.4, label=f"{remedies} the remedies")
     panel.axhline(95.45, color="black", linestyle="--", linewidth=0.8)
     panel.set_xticks(range(len(PARAMETERS)), PARAMETERS)
-    panel.set(ylabel="sessions whose truth lies within ± U, %", ylim=(0, 100))
+    panel.set(ylabel="sessions whose truth lies within ± 2 u, %", ylim=(0, 100))
     panel.legend(loc="lower center", bbox_to_anchor=(0.5, 1.0), ncols=2, frameon=False)

@@ -1,67 +1,20 @@
-"""What arm and sensor may be off by is allowed, and no more: p-values of undamaged recordings, and the least damage."""
+"""What arm and sensor may be off by is allowed, and no more: the least damage that is told."""
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable
 from dataclasses import replace
 
 import numpy as np
 import pytest
 
-from rig.analysis.calibration import observe_recordings, solve_observed
-from rig.analysis.contradictions import FALSE_ALARMS, OF_THE_MODEL, SHARES, contradictions
-from rig.analysis.surroundings import surroundings_of
-from rig.analysis.verdict import Check
 from rig.arm.kinematics import NOMINAL
-from rig.data.run_file import RunData
 from rig.data.settings import RunSettings
 from rig.estimation.arrays import Array
 from rig.observation.windows import swept
+from support.checked_runs import checked, failed
 from support.drawn_recording import KINDS, Drawn, damaged, drawn
 from support.synthetic_run import Setup, synthetic_run
 
-RATE = FALSE_ALARMS / (SHARES + OF_THE_MODEL)
-CHI_SQUARE = ("scale_changed", "loose_mounting", "cw_against_ccw", "residuals", "sweeps_against_rests")
 DIRECTION = np.array([1.0, -0.7, 0.5])
-
-
-def checked(run: RunData) -> tuple[Check, ...]:
-    recordings = observe_recordings([run])
-    surroundings = surroundings_of(recordings)
-    results = solve_observed(run.sensors, recordings, surroundings=surroundings)
-    return contradictions(recordings, results, ["gyro"], surroundings).checks
-
-
-def failed(checks: Sequence[Check]) -> set[str]:
-    return {check.name.split(".")[1] for check in checks if not check.passed}
-
-
-def probability(check: Check) -> float:
-    """Of χ² as large, with as many degrees of freedom as the limit shows."""
-    from scipy.special import chdtrc, chdtri
-
-    limit = float(check.limit or 0.0)
-    freedom = min(range(1, 100), key=lambda each: abs(float(chdtri(each, RATE)) - limit))
-    return float(chdtrc(freedom, float(check.value or 0.0)))
-
-
-@pytest.mark.slow
-@pytest.mark.proof
-@pytest.mark.parametrize("kind", KINDS)
-def test_what_chance_says_of_undamaged_recordings_is_uniform(kind: str, thorough: bool) -> None:
-    """Over 120 recordings Kolmogorov and Smirnov refuse one true uniform distribution in 100, for each of 15."""
-    from scipy.stats import kstest
-
-    found: dict[str, list[float]] = {name: [] for name in CHI_SQUARE}
-    alarms = []
-    for seed in range(120 if thorough else 4):
-        checks = checked(drawn(seed, KINDS[kind]).run)
-        alarms.append(failed(checks))
-        for check in checks:
-            name = check.name.split(".")[1]
-            if name in found:
-                found[name].append(probability(check))
-    assert not any(alarms), alarms
-    for name, values in found.items():
-        assert kstest(values, "uniform").pvalue > 0.01 / len(CHI_SQUARE) / len(KINDS), (name, sorted(values))
 
 
 def later(seen: Drawn) -> Array:

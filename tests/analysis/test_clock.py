@@ -18,20 +18,21 @@ PPM = 1e-6
 KNOWN = Uncertainty(50.0, 1.0, 20.0, 0.06, 50.0, {}, "simple")
 
 
+SIMULATED, REAL = "URSoftware 5.14.0.0 (simulated)", "URSoftware 5.14.0.0"
 FAST = Setup(speed_deg_s=120, noise_rad_s=0.002)
 
 
-def recorded(setup: Setup, host_slope: float) -> RunData:
+def recorded(setup: Setup, host_slope: float, software: str = SIMULATED) -> RunData:
     """A recording whose states came at a computer that counts `host_slope` seconds for one of the controller's."""
     run = synthetic_run(setup)
     arm = run.arm.copy()
     late = np.random.default_rng(5).exponential(5e-4, len(arm))
     arm["host_time_s"] = 1000.0 + host_slope * (arm["time_s"] - arm["time_s"][0]) + late
-    return replace(run, arm=arm)
+    return replace(run, arm=arm, provenance=replace(run.provenance, arm_software=software))
 
 
-def observed(setup: Setup, host_slope: float) -> ObservedRun:
-    (seen,) = observe_runs([recorded(setup, host_slope)])
+def observed(setup: Setup, host_slope: float, software: str = SIMULATED) -> ObservedRun:
+    (seen,) = observe_runs([recorded(setup, host_slope, software)])
     return seen
 
 
@@ -41,12 +42,23 @@ def with_crystal(controller_ppm: float, crystal_ppm: float = 0.0) -> Setup:
     return replace(FAST, drift=drift, follows_crystal=True)
 
 
-def of_clocks(setup: Setup, host_slope: float = 0.2) -> dict[str, Check]:
+def of_clocks(setup: Setup, host_slope: float = 0.2, software: str = SIMULATED) -> dict[str, Check]:
     """The checks of the clocks, by the two they name.
 
     A computer that counts a fifth of the controller's seconds is a simulated laboratory's.
     """
-    return named(clock_checks(check_clock(observed(setup, host_slope), KNOWN)))
+    return named(clock_checks([check_clock(observed(setup, host_slope, software), KNOWN)]))
+
+
+def in_two(whole: RunData) -> tuple[RunData, RunData]:
+    """The recordings of a run that was resumed, an hour later and with a computer that is 200 ppm slow by then."""
+    arm, half = whole.arm.copy(), len(whole.events) // 2
+    arm["host_time_s"] = 5000.0 + (1 - 200 * PPM) * (arm["host_time_s"] - arm["host_time_s"][0])
+    later = replace(whole.provenance, started_utc="2026-11-21T01:00:00+00:00")
+    return (
+        replace(whole, events=whole.events[:half]),
+        replace(whole, arm=arm, provenance=later, events=whole.events[half:]),
+    )
 
 
 def named(checks: Sequence[Check]) -> dict[str, Check]:
@@ -83,8 +95,10 @@ def test_the_jitter_of_the_states_is_measured() -> None:
     jitter = np.random.default_rng(6).normal(0, 1e-4, len(arm))
     arm["q_rad"] = motion.angles(arm["time_s"] + jitter)
     (seen,) = observe_runs([replace(run, arm=arm)])
-    assert state_jitter(seen).std_s == pytest.approx(1e-4, rel=0.1)
-    assert state_jitter(observe_runs([run])[0]).std_s < 1e-5
+    exact = observe_runs([run])
+    assert state_jitter([seen]).std_s == pytest.approx(1e-4, rel=0.1)
+    assert state_jitter(exact).std_s < 1e-5
+    assert state_jitter([seen, *exact]).std_s == pytest.approx(1e-4 / np.sqrt(2), rel=0.1)
 
 
 def test_clocks_that_agree_pass_and_are_named_in_pairs() -> None:
@@ -118,6 +132,27 @@ def test_two_others_that_agree_name_the_controller() -> None:
 def test_a_laboratory_that_is_simulated_at_a_pace_of_its_own_is_held_against_no_computer(pace: float) -> None:
     checks = of_clocks(with_crystal(10), 1 / pace)
     assert set(checks) == {"controller_and_crystal"} and checks["controller_and_crystal"].passed
+
+
+def test_the_computer_of_a_controller_that_is_real_is_a_clock_however_far_off_it_is() -> None:
+    """Without a board, as of an instrument with a port of its own, nothing else tells."""
+    checks = of_clocks(FAST, 1 / 1.02, REAL)
+    assert set(checks) == {"controller_and_computer"} and not checks["controller_and_computer"].passed
+    assert checks["controller_and_computer"].value == pytest.approx(2e4, rel=0.01)
+
+
+def test_every_recording_of_a_run_is_held_against_its_computer_and_the_worst_is_told() -> None:
+    whole = recorded(FAST, 1.0, REAL)
+    assert named(calibrated([whole]).checks)["controller_and_computer"].passed
+    both = calibrated(in_two(whole))
+    check = named(both.checks)["controller_and_computer"]
+    assert not check.passed and check.value == pytest.approx(200, abs=5)
+    assert both.clock is not None and abs(both.clock.error) < 5 * PPM  # speeds go by the longest
+
+
+def test_of_recordings_made_before_the_longest_alone_counts() -> None:
+    before = [each.judged_by(["reckoning=1"]) for each in in_two(recorded(FAST, 1.0, REAL))]
+    assert named(calibrated(before).checks) == {}
 
 
 def test_a_board_that_says_it_follows_no_crystal_is_compared_with_nothing_however_near_it_runs() -> None:

@@ -19,6 +19,7 @@ from rig.estimation.imu import solve_imu
 from support import drawn_accelerations
 from support.arm_attitudes import crooked_arm, joints_rad
 from support.arm_sweeps import Truth, joints_at, planned, recorded_dwells, recorded_sweeps
+from support.reference_p_values import p_values
 
 NORM = 9.80665
 JOINTS = joints_rad(EIGHTEEN)
@@ -104,19 +105,6 @@ def test_p_values_of_sensors_as_their_data_sheets_let_them_be_are_uniform(part: 
     for name, values in found.items():
         print(f"{part}, {name}: {kstest(values, 'uniform', alternative='greater').pvalue:.3f}, least {min(values):.4f}")
     assert all(kstest(values, "uniform", alternative="greater").pvalue > 0.01 for values in found.values())
-
-
-def p_values(read: Read) -> dict[str, float]:
-    """The rate of false alarms at which each statistic is just beyond its limit."""
-    rates = np.concatenate([np.geomspace(1e-4, 0.02, 5), np.linspace(0.05, 0.95, 19)])
-    beyond: dict[str, float] = {}
-    for rate in rates:
-        for name, (value, limit) in reference_consistency(read, float(rate)).statistics.items():
-            if value > limit:
-                beyond.setdefault(name, float(rate))
-            elif rate == rates[-1]:
-                beyond.setdefault(name, 1.0)
-    return beyond
 
 
 def test_what_a_wrist_errs_by_is_told_as_such_an_arm_makes_it() -> None:

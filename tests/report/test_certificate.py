@@ -14,7 +14,7 @@ from rig.config.judging_sections import CertificateSection, SiteSection
 from rig.config.load import parse
 from rig.data.budget_entries import BudgetEntry
 from rig.data.result_file import CheckEntry, ResultDocument, read_result
-from rig.data.result_types import ErrorEntry
+from rig.data.result_types import ErrorEntry, ToldFromEntry
 from rig.errors import Refused
 from rig.estimation.budget import Budget, Contributor
 from rig.report.budget_entry import budget_entry
@@ -216,6 +216,14 @@ def test_a_simulated_laboratory_is_told_across_every_page() -> None:
         assert page.text.count("Simulated laboratory: no real item was calibrated") == 2  # across, and to be read out
         assert 'content: "Simulated laboratory' in page.style  # in the margin of each sheet
     assert "Simulated" not in certificate_page(certificate())
+
+
+def test_what_a_gyroscopes_recording_would_have_told_stands_there() -> None:
+    document = result()
+    told = ToldFromEntry(what="gain half-way", check="scale_changed", size=6e-4, unit="1", off_by_expanded=1.2)
+    sensors = {name: each.model_copy(update={"told_from": (told,)}) for name, each in document.sensors.items()}
+    text = read(certificate(document.model_copy(update={"sensors": sensors}))).text
+    assert "What would have contradicted itself" in text and "gain half-way" in text
 
 
 def test_a_measurement_that_contradicts_itself_is_not_valid() -> None:

@@ -8,10 +8,12 @@ from pathlib import Path
 
 import pytest
 
-from support.hidden_results import held, solved
+from support.hidden_bounds import asked_of
+from support.hidden_results import SCALE, held, solved
 from support.hidden_worlds import WORLDS, first_seed, recorded
 
 BEYOND = 2.2  # U: farther off is none of 720 values that are normal
+FOLD = 7.0  # the largest u of a scale factor of like parts over the smallest, at whatever speed
 
 
 @pytest.mark.slow
@@ -27,10 +29,20 @@ def test_what_is_stated_in_hidden_worlds_holds(family: str, tmp_path: Path) -> N
     lines = held(runs)
     for of, line in lines.items():
         print(family, *of, line)
+        print("  asked:", asked_of(line.values))
     assert not [(run.folder.name, run.refused) for run in runs if run.refused]
     assert all(line.largest < BEYOND for line in lines.values())
-    # Three axes of a run share an arm and a clock: three standard deviations of an RMS of a third as many values.
-    assert all(abs(line.rms - 1) < 3 / (2 * line.values / 3) ** 0.5 for line in lines.values())
+    assert not [of for of, line in lines.items() if not asked_of(line.values).kept(line.rms, line.within)]
+    assert not [of for of, line in lines.items() if of[1] == SCALE and line.std[2] / line.std[0] >= FOLD]
+
+
+@pytest.mark.parametrize(("values", "rms", "within"), [(180, 1.1, 0.93), (60, 1.5, 0.85), (30, 0.5, 1.0)])
+def test_what_so_many_values_allow_is_what_is_asked_or_what_chance_makes_of_it(
+    values: int, rms: float, within: float
+) -> None:
+    assert asked_of(values).kept(rms, within)
+    assert not asked_of(values).kept(2.0, within) and not asked_of(values).kept(rms, 0.5)
+    assert not asked_of(180).kept(1.2, 0.95) and not asked_of(180).kept(1.0, 0.99)
 
 
 @pytest.mark.slow

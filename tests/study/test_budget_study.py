@@ -16,7 +16,7 @@ def test_the_stated_uncertainty_covers_the_truth(speed_deg_s: float, noise_rad_s
     effects = Effects(speed_rad_s=float(np.radians(speed_deg_s)), noise_rad_s=noise_rad_s)
     found = errors(effects, Settings(runs=1500 if thorough else 60))[:, 0]
     coverage, rms = 100 * np.mean(np.abs(found) < 2, axis=0), np.sqrt(np.mean(found**2, axis=0))
-    print(f"{speed_deg_s}°/s, {noise_rad_s} rad/s: ± U covers {coverage} %; RMS of error over u {rms}")
+    print(f"{speed_deg_s}°/s, {noise_rad_s} rad/s: ± 2 u covers {coverage} %; RMS of error over u {rms}")
     within = 2.0 if thorough else 9.0  # by chance alone they differ by 0.6 and 2.8
     assert np.all(np.abs(coverage - 95) <= within)
     assert np.all(np.abs(rms - 1) < (0.1 if thorough else 0.3))
@@ -26,5 +26,5 @@ def test_the_stated_uncertainty_covers_the_truth(speed_deg_s: float, noise_rad_s
 @pytest.mark.proof
 def test_without_the_remedies_it_does_not(thorough: bool) -> None:
     coverage = np.array(study(Settings(runs=600 if thorough else 60)).columns["coverage_percent"]).reshape(2, 6)
-    print(f"± U covers {coverage[0]} %, without the remedies {coverage[1]} %")
+    print(f"± 2 u covers {coverage[0]} %, without the remedies {coverage[1]} %")
     assert np.all(coverage[1] < 80)

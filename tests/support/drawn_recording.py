@@ -45,10 +45,33 @@ ADIS16465 = replace(
     sensitivity_rad_s_per_count=float(np.radians(0.025)) / 2**10,  # of its 32 bits, but for the last six
     full_scale_counts=500 * 40 * 2**10,
 )
+MPU9250 = replace(
+    SENSOR,
+    part="mpu9250",
+    serial_number="MPU9250-001",
+    rate_hz=200.0,
+    range_rad_s=float(np.radians(250)),
+    sensitivity_rad_s_per_count=float(np.radians(250)) / 2**15,
+    temperature_c_per_count=1 / 333.87,
+    temperature_offset_c=21.0,
+)
+KVH1775 = replace(
+    SENSOR,
+    part="kvh1775",
+    serial_number="1775-0042",
+    rate_hz=250.0,
+    range_rad_s=float(np.radians(490)),
+    sensitivity_rad_s_per_count=float(np.radians(490)) / 2**30,
+    full_scale_counts=2**30,
+    temperature_c_per_count=0.01,
+    temperature_offset_c=0.0,
+)
 KINDS = {
     "noisy LSM9DS1": Kind(SENSOR, 0.035, 4.8e-5, 1e-5),
     "quiet LSM9DS1": Kind(SENSOR, 0.002, 4.8e-5, 1e-5),
     "ADIS16465": Kind(ADIS16465, 0.00045, 9.7e-6, 3e-7),
+    "MPU-9250": Kind(MPU9250, 0.002, 4.8e-5, 1e-5),
+    "KVH 1775": Kind(KVH1775, 5.5e-5, 2.4e-7, 1e-8),  # 0.012 °/√h at 250 Hz, 0.05 °/h
 }
 
 

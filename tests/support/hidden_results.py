@@ -71,7 +71,8 @@ def _stated(outcome: Outcome, document: Mapping[str, Any]) -> Iterable[Stated]:
         yield from _split(result.sensor.part, (SCALE, BIAS), found - true, result.uncertainty)
     for name, accelerometer in outcome.accelerometers.items():
         assert accelerometer.budget is not None
-        error = _of_accelerometer(document, name, accelerometer)
+        found = np.concatenate([accelerometer.scale, accelerometer.bias_m_s2])
+        error = found - true_accelerometer(document, name, accelerometer)
         yield from _split(accelerometer.sensor.part, OF_GRAVITY, error, accelerometer.budget)
 
 
@@ -85,9 +86,24 @@ def true_gyroscope(document: Mapping[str, Any], name: str, recording: ObservedRu
     return np.concatenate([scale, truth(document, name, [whole], speed_rad_s)[3:]])
 
 
-def _of_accelerometer(document: Mapping[str, Any], name: str, found: AccelerometerResult) -> np.ndarray:
-    drawn = document["world"]["sensors"][name]["accelerometer"]
-    return np.concatenate([found.scale - drawn["scale"], found.bias_m_s2 - drawn["bias_m_s2"]])
+def true_accelerometer(document: Mapping[str, Any], name: str, found: AccelerometerResult) -> np.ndarray:
+    """(6,) the scale of the readings at 1 g up and down, the bias of that at 0 g, as warm as in the mean of the dwells.
+
+    Neither moves by φ, for what is even is the same up and down, and nothing at 0 g.
+    """
+    sensor = document["world"]["sensors"][name]
+    drawn = sensor["accelerometer"]
+    at_s = [(dwell.window.start_s + dwell.window.end_s) / 2 for dwell in found.dwells]
+    warmer_k = float(np.mean([_warmer_k(sensor, each) for each in at_s]))
+    scale = np.array(drawn["scale"]) * (1 + warmer_k * np.array(drawn.get("scale_per_k", 0.0)))
+    return np.concatenate([scale, drawn["bias_m_s2"] + warmer_k * np.array(drawn.get("bias_m_s2_per_k", np.zeros(3)))])
+
+
+def _warmer_k(sensor: Mapping[str, Any], time_s: float) -> float:
+    """Than where its errors hold, `temperature_c`, of a part that gets power at zero."""
+    if sensor.get("start_temperature_c") is None:
+        return 0.0
+    return float((sensor["start_temperature_c"] - sensor["temperature_c"]) * np.exp(-time_s / sensor["warm_up_s"]))
 
 
 def _split(part: str, names: Sequence[str], error: np.ndarray, budget: Budget) -> Iterable[Stated]:

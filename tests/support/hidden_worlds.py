@@ -18,6 +18,7 @@ import yaml
 from rig.config.judging_sections import UncertaintySection
 from rig.config.load import load
 from rig.config.sensor_catalogue import PARTS
+from rig.estimation.earth import STANDARD_GRAVITY_M_S2
 from support.drawn_laboratory import PART_ERRORS, WAVE_RAD
 from support.paths import CONFIGS
 from support.worlds import merge
@@ -88,10 +89,7 @@ def kvh(seed: int) -> dict[str, Any]:
         "bias_instability_rad_s": 2.4e-7 * float(rng.uniform(0.5, 1.5)),
         "g_sensitivity_rad_s_per_g": _of_force(rng, "kvh1775"),
         "nonlinearity_odd_per_rad_s": _odd(rng, "kvh1775", document["sensors"]["kvh"]),
-        "accelerometer": {
-            **_accelerometer(rng, "kvh1775"),
-            "second_order_s2_m": rng.uniform(-1e-4, 1e-4, 3).tolist(),
-        },
+        "accelerometer": _accelerometer(rng, document["sensors"]["kvh"]),
         "kvh1775": {"oscillator_ppm": float(rng.uniform(-20, 20)), "on_for_s": float(rng.uniform(1, 4000))},
     }
     changed: dict[str, Any] = merge(document, {"world": {"sensors": {"kvh": sensor}}})
@@ -169,7 +167,7 @@ def _with_sensors(document: dict[str, Any], rng: np.random.Generator, noise: Map
 def _sensor(rng: np.random.Generator, section: Mapping[str, Any], noise_rad_s: float) -> dict[str, Any]:
     part = section["part"]
     errors = PART_WANDERS[part]
-    of_force = {"accelerometer": _accelerometer(rng, part)} if "acceleration" in section else {}
+    of_force = {"accelerometer": _accelerometer(rng, section)} if "acceleration" in section else {}
     return {
         "scale": rng.uniform(0.9, 1.1, 3).tolist(),
         "bias_rad_s": rng.uniform(-0.02, 0.02, 3).tolist(),
@@ -196,12 +194,20 @@ def _of_force(rng: np.random.Generator, part: str) -> list[list[float]]:
     return drawn
 
 
-def _accelerometer(rng: np.random.Generator, part: str) -> dict[str, Any]:
-    scale, bias_m_s2 = ACCELEROMETERS[part]
+def _accelerometer(rng: np.random.Generator, section: Mapping[str, Any]) -> dict[str, Any]:
+    """What bends it and what a degree changes are half-widths of its data sheet."""
+    part = section["part"]
+    (scale, bias_m_s2), sheet = ACCELEROMETERS[part], PARTS[part].accelerometer
+    over_g = sheet.nonlinear_over_g or section["acceleration"]["range_g"]
+    bent_s2_m = 2 * sheet.nonlinearity_percent / 100 / (over_g * STANDARD_GRAVITY_M_S2)
+    bias_m_s2_k, scale_per_k = 1e-3 * sheet.bias_mg_k * STANDARD_GRAVITY_M_S2, 1e-6 * sheet.scale_ppm_k
     return {
         "scale": rng.uniform(1 - scale, 1 + scale, 3).tolist(),
         "bias_m_s2": rng.uniform(-bias_m_s2, bias_m_s2, 3).tolist(),
         "non_orthogonality_deg": rng.normal(0, SQUARE_DEG.get(part, 0.3), 3).tolist(),
+        "second_order_s2_m": rng.uniform(-bent_s2_m, bent_s2_m, 3).tolist(),
+        "bias_m_s2_per_k": rng.uniform(-bias_m_s2_k, bias_m_s2_k, 3).tolist(),
+        "scale_per_k": rng.uniform(-scale_per_k, scale_per_k, 3).tolist(),
         **_lag(float(rng.uniform(0.1, 1)) * STATED.acceleration_lag_ms),
     }
 

@@ -8,6 +8,7 @@ from datetime import date, datetime
 from types import MappingProxyType
 
 from rig.analysis.clock import BY_COMPUTER
+from rig.arm.identity import calls_itself_simulated
 from rig.data.accelerometer_entries import AccelerometerEntry
 from rig.data.budget_entries import BudgetEntry
 from rig.data.drift_entries import DriftEntry
@@ -21,7 +22,6 @@ from rig.report.certificate.stated import Stated
 CONFORMITY = re.compile(
     r"\.(acceleration_)?(scale_deviation|bias|bias_drift|verification_rms|verification_mean|verification)$"
 )
-SIMULATED_ARM = "(simulated)"  # so ends the version of a controller that is none
 
 
 @dataclass(frozen=True, slots=True)
@@ -159,7 +159,7 @@ def certificate_of(
 
 def is_simulated(result: ResultDocument, stated: Stated) -> bool:
     """Whether a simulated laboratory was measured in, by the configuration or by what the controller calls itself."""
-    return stated.simulated or result.provenance.arm_software.endswith(SIMULATED_ARM)
+    return stated.simulated or calls_itself_simulated(result.provenance.arm_software)
 
 
 def _number(result: ResultDocument, stated: Stated, reversals: Mapping[str, ReversalEntry]) -> str:
