@@ -15,9 +15,10 @@ from rig.analysis.calibration import SensorResult
 from rig.data.settings import Site
 from rig.estimation.arrays import Array
 from rig.estimation.explained import Explained
+from rig.observation.arm_beside_lines import beside, means_of_parts, turned
 from rig.observation.average import Average, Stream, between
 from rig.observation.colour import widening
-from rig.observation.lines import fitted, lines, waves
+from rig.observation.lines import in_hertz, lines, waves
 from rig.observation.mean import rounding_left
 from rig.observation.observe import Observation
 from rig.observation.observed_run import ObservedRun
@@ -27,7 +28,6 @@ from rig.observation.timebase import ArmMotion
 FEWEST_SAMPLES = 20
 PREVAILS = 0.7  # of the residuals' variance, what is left in a long mean where the rest of them is a vibration
 FEWEST_AT_REST = 60  # of a whole rest: fewer do not tell its noise well enough to weigh it by
-FINER = 3.0  # than the arm's states follow each other, what its rate is looked at
 REST = -1  # in the place of a sweep; ways between sweeps and rests count down from there
 
 
@@ -185,17 +185,17 @@ def _cut(
     enough = [each for each in range(parts) if np.sum(part == each) >= FEWEST_SAMPLES / 2]
     used = np.isin(part, enough)
     part, rate, readings, time_s = part[used], rate[used], readings[used], time_s[used]
-    means, rates = _means(readings, part, parts), _means(rate, part, parts)
+    means, rates = means_of_parts(readings, part, parts), means_of_parts(rate, part, parts)
     residual, shaken = readings - means[part], np.zeros(readings.shape)
     if turn is not None:
         vibration = np.column_stack([rate @ turn.axis_flange, motion.rate(time_s, 1) @ turn.axis_flange])
-        vibration -= _means(vibration, part, parts)[part]
+        vibration -= means_of_parts(vibration, part, parts)[part]
         shaken = vibration @ np.linalg.lstsq(vibration, residual, rcond=None)[0]
         residual = residual - shaken
     left, taken = residual, 0
     if finds_lines:
-        cycles, share = lines(readings - means[part]), (time_s - average.start_s) / average.duration_s
-        columns = waves(cycles, share)
+        cycles = lines(readings - means[part])
+        columns = waves(cycles, np.arange(len(readings)) / len(readings))  # as they were found, some missing or none
         taken = columns.shape[1]
         means, left = beside(columns, readings, part, parts)
         if turn is not None:
@@ -203,7 +203,7 @@ def _cut(
             along = unexplained @ turn.axis_flange[:, None]
             left = left - along @ np.linalg.lstsq(along, left, rcond=None)[0]
             if known.all():
-                rates = turned(motion, average.start_s, average.end_s, cycles, parts)
+                rates = turned(motion, average.start_s, average.end_s, in_hertz(cycles, time_s), parts)
     count = stream.sensor.sensitivity_rad_s_per_count
     scatter = np.maximum(np.sum(left**2, axis=0) / max(len(left) - len(enough) - taken, 1), count**2 / 12)
     noise = scatter * np.array([widening(left[:, axis]) for axis in range(3)])
@@ -229,30 +229,3 @@ def _cut(
         )
     seen = stream.raw["counts"][inside].astype(np.int64)
     return Window(sweep, seen, residual / count, np.sqrt(np.mean(shaken**2, axis=0)) / count), pieces
-
-
-def beside(columns: Array, values: Array, part: NDArray[np.intp], parts: int) -> tuple[Array, Array]:
-    """(parts, 3) means of values (n, 3) beside what `columns` (n, k) explain, and (n, 3) what neither does."""
-    means, apart = _means(values, part, parts), _means(columns, part, parts)
-    within, left = columns - apart[part], values - means[part]
-    sizes = fitted(within, left)
-    return means - apart @ sizes, left - within @ sizes
-
-
-def turned(motion: ArmMotion, start_s: float, end_s: float, cycles: Array, parts: int) -> Array:
-    """(parts, 3) mean rates of the flange beside lines that make so many cycles (k,) from start to end.
-
-    All states count, where samples are farther apart than these: what one of them errs by the next takes back.
-    """
-    count = round(FINER * (end_s - start_s) / float(np.median(np.diff(motion.time_s))))
-    share = (np.arange(count) + 0.5) / count
-    part = np.asarray(parts * share, dtype=np.intp)
-    return beside(waves(cycles, share), motion.rate(start_s + share * (end_s - start_s)), part, parts)[0]
-
-
-def _means(values: Array, part: NDArray[np.intp], parts: int) -> Array:
-    """(parts, k) means of values (n, k) by part; zero where a part has none."""
-    counts = np.maximum(np.bincount(part, minlength=parts), 1)
-    sums = [np.bincount(part, values[:, column], minlength=parts) for column in range(values.shape[1])]
-    means: Array = np.reshape(sums, (values.shape[1], parts)).T / counts[:, None]
-    return means

@@ -11,14 +11,15 @@ from itertools import pairwise
 
 import numpy as np
 
-from rig.analysis.pieces import REST, Pieces, Stretch, beside, turned
+from rig.analysis.pieces import REST, Pieces, Stretch
 from rig.analysis.seen import since_first_s
 from rig.arm.kinematics import WRIST_1, flange_pose
 from rig.data.run_file import RunData
 from rig.estimation.arrays import Array
 from rig.estimation.explained import Explained
+from rig.observation.arm_beside_lines import beside, turned
 from rig.observation.average import Stream, between
-from rig.observation.lines import lines, waves
+from rig.observation.lines import in_hertz, lines, waves
 from rig.observation.observed_run import ObservedRun
 from rig.observation.timebase import MIN_RATE_RAD_S, ArmMotion
 from rig.observation.windows import rested, swept
@@ -57,7 +58,7 @@ def with_ways(pieces: Pieces, name: str, recordings: Sequence[ObservedRun], expl
         site = each.run.settings.site
         assert site is not None
         means.append(beside(waves(cycles, share), readings, np.zeros(len(rate), dtype=np.intp), 1)[0][0])
-        turn = turned(way.motion, way.start_s, way.end_s, cycles, 1)[0]
+        turn = turned(way.motion, way.start_s, way.end_s, in_hertz(cycles, stream.time_s[inside]), 1)[0]
         rates.append(turn + attitude @ explained.seen.earth_rate_rad_s)
         attitudes.append(attitude)
         pulls.append(pull_m_s2(way, site.down_m_s2, np.array(each.run.settings.extension_m)))

@@ -149,6 +149,13 @@ class SimulatedArmSection(Section):
         description="RMS of a vibration of each wrist that nothing is locked to and no encoder sees",
     )
     vibration_hz: float = Field(default=10.0, ge=0.1, le=200, description="its frequency")
+    vibration_seen_rms_rad_s: float = Field(
+        default=0.0,
+        ge=0,
+        le=1,
+        description="RMS of a vibration of each wrist that nothing is locked to either, and that encoders see",
+    )
+    vibration_seen_hz: float = Field(default=10.0, ge=0.1, le=200, description="its frequency")
     settling_rad: float = Field(
         default=0.0,
         ge=0,

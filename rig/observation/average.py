@@ -1,6 +1,7 @@
 """A sensor's samples on the controller's clock, and their averages with the variance of the mean."""
 
-from dataclasses import dataclass
+from dataclasses import dataclass, field
+from functools import partial
 from typing import Any, Literal
 
 import numpy as np
@@ -9,6 +10,7 @@ from numpy.typing import NDArray
 from rig.data.run_file import RecordedSensor
 from rig.estimation.arrays import Array
 from rig.observation.beside_lines import FEWEST, mean_beside_lines, rest_beside_lines
+from rig.observation.lines import in_hertz
 from rig.observation.mean import Mean, mean_at_rest, mean_of
 from rig.observation.timebase import ArmMotion, TimeBase, estimate_time_base
 from rig.observation.windows import Window
@@ -25,7 +27,8 @@ class Average:
     The variance of a revolution or a rest also holds the drift of the bias from rest to rest, `drift_rad2_s2` (3,).
     `start_s`, `end_s`: between which times, on the controller's clock. `attitude` (3, 3) is the mean rotation from the
     arm's base frame into the flange's, None where no arm tells it. `freedom` (3,): with how many degrees of freedom the
-    noise's part of the variance is known, infinite where nobody counted.
+    noise's part of the variance is known, infinite where nobody counted. `lines_hz` (k,): frequencies of what vibrates
+    and was taken out of the mean, and so has to be taken out of the arm's rate.
     """
 
     mean_rad_s: Array
@@ -38,6 +41,7 @@ class Average:
     attitude: Array | None = None
     drift_rad2_s2: Array | float = 0.0
     freedom: Array | float = np.inf
+    lines_hz: Array = field(default_factory=partial(np.zeros, 0))
 
     @property
     def duration_s(self) -> float:
@@ -130,4 +134,5 @@ def _averaged(stream: Stream, inside: slice, window: Window, found: Mean) -> Ave
         end_s=window.end_s,
         temperature_c=stream.temperature_c(inside),
         freedom=found.freedom,
+        lines_hz=in_hertz(found.cycles, stream.time_s[inside]),
     )

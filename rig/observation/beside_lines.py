@@ -37,10 +37,12 @@ def mean_beside_lines(readings: Array, count: float, turning: Array, rate: Array
     """Of readings (n, 3) in steps of `count`, evenly spaced, over a whole turn.
 
     `turning` (n, k) comes and goes in a turn. `rate` (n,) is the arm's less its mean, as the encoders have it: they see
-    not all that vibrates, and some that does not, so it counts only for what no line explains.
+    not all that vibrates, and some that does not, so it counts only for what no line explains. What it has of the lines
+    themselves is missing from the mean: see `rig.observation.arm_beside_lines`.
     """
     steady = np.column_stack([np.ones(len(readings)), turning])
-    shaking = lines_in(readings - steady @ fitted(steady, readings))
+    cycles = lines(readings - steady @ fitted(steady, readings), STANDS_OUT)
+    shaking = _columns(cycles, len(readings))
     columns = np.column_stack([steady, shaking, rate])
     coefficients, _, rank, _ = np.linalg.lstsq(columns, readings, rcond=None)
     noise = noise_of(readings - columns @ coefficients, int(rank), count, BRIEF if shaking.size else MEMORIES)
@@ -51,13 +53,14 @@ def mean_beside_lines(readings: Array, count: float, turning: Array, rate: Array
         noise=np.sqrt(noise.scatter),
         samples=len(readings),
         freedom=noise.freedom,
+        cycles=cycles,
     )
 
 
 def rest_beside_lines(readings: Array, time_s: Array, window: Window, count: float) -> Mean:
     """As `tapered_mean`, of which the weights leave nothing of a vibration, by the noise beside its lines."""
     left = readings - readings.mean(axis=0)
-    shaking = lines_in(left)
+    shaking = _columns(lines(left, STANDS_OUT), len(left))
     columns = np.column_stack([np.ones(len(left)), shaking])
     noise = noise_of(
         left - columns @ fitted(columns, left), columns.shape[1], count, BRIEF if shaking.size else MEMORIES
@@ -72,9 +75,9 @@ def rest_beside_lines(readings: Array, time_s: Array, window: Window, count: flo
     )
 
 
-def lines_in(residuals: Array) -> Array:
-    """(n, 8 k) columns of the k lines in residuals (n, 3)."""
-    return waves(lines(residuals, STANDS_OUT), np.arange(len(residuals)) / len(residuals))
+def _columns(cycles: Array, count: int) -> Array:
+    """(n, 8 k) of k lines in n readings."""
+    return waves(cycles, np.arange(count) / count)
 
 
 def noise_of(residuals: Array, taken: int, count: float, memories: Sequence[int]) -> Noise:

@@ -37,6 +37,12 @@ def lines(residuals: Array, stands_out: float = STANDS_OUT) -> Array:
     return cycles
 
 
+def in_hertz(cycles: Array, time_s: Array) -> Array:
+    """(k,) frequencies of lines that make so many cycles (k,) in readings at times (n,), evenly spaced."""
+    hertz: Array = cycles * (len(time_s) - 1) / len(time_s) / (time_s[-1] - time_s[0])
+    return hertz
+
+
 def waves(cycles: Array, share: Array) -> Array:
     """(n, 8 k) cosine and sine of k lines where a share (n,) of the time is over.
 

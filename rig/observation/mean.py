@@ -1,6 +1,7 @@
 """Means of readings in any unit, with the variance of the mean: where something passes, where the arm shakes."""
 
-from dataclasses import dataclass
+from dataclasses import dataclass, field
+from functools import partial
 
 import numpy as np
 from numpy.typing import NDArray
@@ -15,7 +16,8 @@ from rig.observation.windows import Window
 class Mean:
     """Of readings in any unit: mean (3,), variance (3,) of that mean, `noise` (3,) of one, and how many there were.
 
-    `freedom` (3,) are the variance's degrees of freedom: fewer than samples where these are not independent.
+    `freedom` (3,) are the variance's degrees of freedom: fewer than samples where these are not independent. `cycles`
+    (k,): how often lines come in the readings that were taken out of the mean.
     """
 
     mean: Array
@@ -23,6 +25,7 @@ class Mean:
     noise: Array
     samples: int
     freedom: Array | float = np.inf
+    cycles: Array = field(default_factory=partial(np.zeros, 0))
 
 
 def mean_of(readings: Array, count: float, passing: Array, covered: NDArray[np.bool_], *, as_before: bool) -> Mean:

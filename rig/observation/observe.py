@@ -2,7 +2,8 @@
 
 An observation is the mean reading over exactly one turn of a joint. Over a whole turn the mean speed is 2π/T whatever
 the servo's vibration, so the vibration is no noise either: the noise's variance comes from what is left of the readings
-once the arm's measured rate is taken out of them. The mean comes first; squaring is the estimator's business.
+once lines and the arm's measured rate are taken out of them. What of a line the encoders see is taken out of 2π/T too.
+The mean comes first; squaring is the estimator's business.
 
 Nothing doubtful is averaged: whatever does not belong into a calibration raises a Fault with a name of its own.
 """
@@ -20,6 +21,7 @@ from rig.errors import Fault
 from rig.estimation.arrays import Array
 from rig.estimation.refusals import check_reading_ratio
 from rig.observation.acceleration import DwellReading, dwell_readings
+from rig.observation.arm_beside_lines import turned_beside
 from rig.observation.average import (
     Average,
     Averaging,
@@ -47,6 +49,8 @@ MIN_RESTS = 3  # to tell whether the bias drifts
 @dataclass(frozen=True, slots=True)
 class Observation:
     """One revolution: sweep `sweep` of the plan turned `joint_name` in `direction` at the mean speed 2π/T.
+
+    Of a mean beside lines, `speed_rad_s` and `axis_flange` are beside what the encoders see of the same lines.
 
     What turned the sensor is not known (None) of data recorded elsewhere.
     `axis` ("x", "y", "z") and `sign` name the sensor axis nominally along the turn; `axis_flange` (3,) is the unit
@@ -231,6 +235,7 @@ def _observation(
     _check_direction(turned, expected, where, settings)
     check_reading_ratio(float(np.linalg.norm(turned)) / turn.speed_rad_s, where)
     axis, sign = nearest_axis(expected)
+    speed_rad_s, axis_flange = turned_beside(motion, turn, averaged.lines_hz)
     began = motion.angles(turn.start_s)
     return Observation(
         sweep=sweep.index,
@@ -238,8 +243,8 @@ def _observation(
         direction=sweep.direction,
         axis=axis,
         sign=sign,
-        axis_flange=turn.axis_flange,
-        speed_rad_s=turn.speed_rad_s,
+        axis_flange=axis_flange,
+        speed_rad_s=speed_rad_s,
         speed_std_rad_s=turn.speed_std_rad_s,
         lost=lost,
         average=averaged,

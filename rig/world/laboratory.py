@@ -2,13 +2,13 @@
 
 from collections.abc import Sequence
 from functools import partial
-from math import radians
+from math import pi, radians
 from random import Random
 
 from firmware_host.emulator.machine import EmulatedBoard
 from firmware_host.emulator.spi_device import Fault, SpiDevice
 from rig.config.models import RigConfig
-from rig.config.world_models import WorldSection
+from rig.config.world_models import SimulatedArmSection, WorldSection
 from rig.world.board.flash_file import flash_of
 from rig.world.board.magnetometer_truth import MountedMagnetometer
 from rig.world.board.mounting import mount_magnetometers, mount_sensors, power_up
@@ -23,6 +23,7 @@ from rig.world.ur10e.models import simulated_model
 from rig.world.ur10e.ripple import ripple
 from rig.world.ur10e.robot import Identity, Robot
 from rig.world.ur10e.true_arm import TrueArm, known_links
+from rig.world.ur10e.vibration import WRISTS, Vibration
 
 JOINTS = 6
 
@@ -47,6 +48,7 @@ class Laboratory:
             lateness_s=partial(Random(f"jitter {world.seed}").gauss, 0.0, arm.state_jitter_s)
             if arm.state_jitter_s
             else None,
+            vibration=_seen_vibration(arm, world.seed),
             speed_limit_rad_s=model.speed_rad_s,
         )
         self.arm = TrueArm(arm, site_of(world.site), motion, random)
@@ -160,3 +162,11 @@ class Laboratory:
     def _field_of(self, sensor: MountedMagnetometer) -> MotionAt:
         """What a magnetometer on the flange feels at such a time."""
         return lambda time_s: sensor.feels(self._field, self.arm.frames_at(time_s), time_s)
+
+
+def _seen_vibration(arm: SimulatedArmSection, seed: int) -> Vibration | None:
+    if not arm.vibration_seen_rms_rad_s:
+        return None
+    random = Random(f"vibration {seed}")
+    phases_rad = [random.uniform(0.0, 2.0 * pi) for _ in WRISTS]
+    return Vibration(arm.vibration_seen_rms_rad_s, 2.0 * pi * arm.vibration_seen_hz, phases_rad)

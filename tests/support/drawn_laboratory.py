@@ -70,6 +70,7 @@ def _arm(rng: np.random.Generator) -> dict[str, Any]:
     return {
         "vibration_rms_rad_s": float(rng.uniform(0, 0.004)),
         "vibration_hz": float(rng.uniform(8, 30)),
+        **seen_vibration(rng),
         "settling_rad": 5.0e-5,
         "clock_ppm": float(rng.uniform(-50, 50)),
         "state_jitter_s": float(rng.uniform(0, 1e-4)),
@@ -85,6 +86,15 @@ def _arm(rng: np.random.Generator) -> dict[str, Any]:
             "encoder_twice_rad": float(rng.rayleigh(WAVE_RAD)),
             "hysteresis_rad": 5.0e-5,
         },
+    }
+
+
+def seen_vibration(rng: np.random.Generator) -> dict[str, float]:
+    """Of the servo, beside the one that no encoder sees; what is drawn after it is what it was without."""
+    of_its_own = rng.spawn(1)[0]
+    return {
+        "vibration_seen_rms_rad_s": float(of_its_own.uniform(0, 0.002)),
+        "vibration_seen_hz": float(of_its_own.uniform(8, 30)),
     }
 
 

@@ -87,11 +87,14 @@ class Drawn:
 def drawn(seed: int, kind: Kind, setup: Setup | None = None) -> Drawn:
     """The movement is that of `setup`, if any."""
     rng = np.random.default_rng(seed)
+    seen = rng.spawn(1)[0]
     setup = replace(
         Setup() if setup is None else setup,
         seed=seed,
         sample_rate_hz=kind.sensor.rate_hz,
         vibration=float(rng.uniform(0.0, 0.05)),
+        seen_vibration_rad_s=float(seen.uniform(0.0, 0.002)),
+        seen_vibration_hz=float(seen.uniform(8.0, 30.0)),
         boot_s=float(rng.uniform(-1e4, 0.0)),
         drift=float(rng.uniform(-5e-5, 5e-5)),
     )

@@ -19,7 +19,7 @@ from rig.config.judging_sections import UncertaintySection
 from rig.config.load import load
 from rig.config.sensor_catalogue import PARTS
 from rig.estimation.earth import STANDARD_GRAVITY_M_S2
-from support.drawn_laboratory import PART_ERRORS, WAVE_RAD
+from support.drawn_laboratory import PART_ERRORS, WAVE_RAD, seen_vibration
 from support.paths import CONFIGS
 from support.worlds import merge
 
@@ -134,6 +134,7 @@ def _arm(rng: np.random.Generator) -> dict[str, Any]:
         "vibration_fraction": float(rng.uniform(0, 0.05)),
         "vibration_rms_rad_s": float(rng.uniform(0, 0.004)),
         "vibration_hz": float(rng.uniform(8, 30)),
+        **seen_vibration(rng),
         "settling_rad": 5.0e-5,
         "settling_hz": 12,
         "settling_decay_s": 0.15,

@@ -63,6 +63,8 @@ class Setup:
     noise_correlation: float = 0.0  # from sample to sample
     mounting_error_rad: tuple[float, ...] = (0.05, -0.035, 0.06)
     vibration: float = 0.05  # RMS of the rate ripple over the rate
+    seen_vibration_rad_s: float = 0.0  # RMS, of each wrist, that is not locked to its turning
+    seen_vibration_hz: float = 10.0
     state_rate_hz: float = 125.0
     encoder_step_rad: float = 6e-6
     sample_rate_hz: float = 238.0
@@ -101,6 +103,8 @@ class Motion:
         self.cycles = np.array([18, 31, 50])
         self.rates = np.full(3, setup.vibration * np.sqrt(2 / 3))
         self.phases = rng.uniform(0, 2 * np.pi, 3)
+        self.seen_rad_s, self.seen_hz = setup.seen_vibration_rad_s, setup.seen_vibration_hz
+        self.seen_phases = rng.spawn(1)[0].uniform(0, 2 * np.pi, 3)  # what is drawn after it stays what it was
         self.end_s = float(self.ends[-1]) + 1.0
 
     def joints(self, time_s: Array) -> tuple[Array, Array]:
@@ -125,7 +129,11 @@ class Motion:
         for cycles, rate_share, phase in zip(self.cycles, self.rates, self.phases, strict=True):
             q[:, 3:] += rate_share / cycles * np.sin(cycles * smooth[:, 3:] + phase)
             gain[:, 3:] += rate_share * np.cos(cycles * smooth[:, 3:] + phase)
-        return q, gain * speed
+        qd, turn = gain * speed, 2 * np.pi * self.seen_hz
+        phase = turn * time_s[:, None] + self.seen_phases
+        q[:, 3:] += np.sqrt(2) * self.seen_rad_s / turn * np.sin(phase)
+        qd[:, 3:] += np.sqrt(2) * self.seen_rad_s * np.cos(phase)
+        return q, qd
 
     def events(self) -> tuple[Recorded, ...]:
         """As the procedure writes them."""

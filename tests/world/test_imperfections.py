@@ -18,6 +18,7 @@ from rig.world.clock import TICK_S, TICKS_PER_SECOND, Clock
 from rig.world.section import world_section
 from rig.world.ur10e.controller_messages import ProgramError
 from rig.world.ur10e.flange_motion import Felt
+from rig.world.ur10e.forward_kinematics import flange_rate
 from rig.world.ur10e.primary import PrimarySession
 from rig.world.ur10e.rtde import Output
 from support.ideal import ideal_document
@@ -354,6 +355,35 @@ def test_a_standing_arm_vibrates_unseen_by_its_encoders() -> None:
     frequency = np.abs(np.fft.rfft(seen[:, 0])).argmax() * 238 / len(seen)
     assert frequency == pytest.approx(17, abs=0.5)
     assert not np.ptp(states(one, 50, "actual_q"), axis=0).any()
+
+
+def test_a_vibration_that_encoders_see_is_in_their_angles_and_speeds_as_sensors_feel_it() -> None:
+    one = laboratory(arm={"vibration_seen_rms_rad_s": 0.01, "vibration_seen_hz": 17})
+    felt = rates(one, 1000)
+    assert np.sqrt(np.mean(felt**2, axis=0)) == pytest.approx([0.01] * 3, rel=0.05)
+    *seen, time_s = np.transpose(states(one, 500, "actual_q", "actual_qd", "timestamp"))
+    angles, speeds = seen[3:6], seen[9:]
+    assert not np.ptp(seen[:3], axis=1).any()
+    turn = 2 * math.pi * 17
+    columns = np.column_stack([np.cos(turn * time_s), np.sin(turn * time_s), np.ones(len(time_s))])
+    for angle, speed in zip(angles, speeds, strict=True):
+        (c, s, _), (by_c, by_s, mean) = (np.linalg.lstsq(columns, each, rcond=None)[0] for each in (angle, speed))
+        assert math.hypot(by_c, by_s) == pytest.approx(math.sqrt(2) * 0.01, rel=1e-6)
+        assert (by_c, by_s, mean) == pytest.approx((turn * s, -turn * c, 0), abs=1e-8)
+
+
+def test_a_vibration_that_encoders_see_is_felt_when_they_see_it() -> None:
+    """Standing and turning."""
+    one = laboratory(arm={"vibration_seen_rms_rad_s": 0.05, "vibration_seen_hz": 11})
+    robot, arm = one.laboratory.robot, one.laboratory.arm
+    for speed_rad_s in (0.0, 1.0):
+        turning(one, 5, speed_rad_s)
+        for _ in range(50):
+            one.ticks(1)
+            q_rad, qd_rad_s, _ = robot.motion.actual
+            rate, _, _ = arm.felt_at(arm.true_s(robot.time_s))
+            assert rate == pytest.approx(flange_rate(q_rad, qd_rad_s), abs=1e-9)
+            assert robot.motion.actual_q_rad == q_rad
 
 
 def test_a_stopped_arm_swings_out() -> None:

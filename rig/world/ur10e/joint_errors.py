@@ -3,16 +3,17 @@
 A joint's true angle is e + zero + A₁ sin(e + φ₁) + A₂ sin(2e + φ₂) − h(e) + vibration(t) + settling(t), with e the
 angle its encoder sees. Eccentric and tilted graduations err once and twice a turn; h is the friction's hysteresis in
 Dahl's form (A solid friction model, 1968): after a reversal it goes exponentially to half its width on the other side.
+A vibration that the encoder sees, too, is no part of this: it is added to e and to the true angle alike.
 """
 
 from collections.abc import Sequence
 from dataclasses import dataclass
-from math import cos, exp, inf, pi, sin, sqrt
+from math import cos, exp, inf, pi, sin
 from random import Random
 
 from rig.world.ur10e.trajectory import ZERO, Joints
+from rig.world.ur10e.vibration import WRISTS, Vibration
 
-WRISTS = (3, 4, 5)
 REVERSAL_RAD = 0.01  # way in which hysteresis comes about: inside the ramps
 STANDING_RAD_S = 1e-6  # a joint that need not move may be asked to by rounding
 FORGOTTEN = 12.0  # settling times after which nothing is left of it
@@ -58,8 +59,8 @@ class JointErrors:
         self._reversal = [(0.0, 0.0)] * 6  # encoder's angle, and the hysteresis there
         self._moving = [False] * 6
         self._stops = [(-inf, 0.0)] * 6  # when, and from which direction
-        self._vibration = errors.vibration_rad_s
-        self._vibration_rad = sqrt(2.0) * errors.vibration_rms_rad_s / self._vibration
+        phases_rad = [self._phases[joint][2] for joint in WRISTS]
+        self._vibration = Vibration(errors.vibration_rms_rad_s, errors.vibration_rad_s, phases_rad)
         self._settling = errors.settling_rad_s
         self._patience_s = FORGOTTEN * errors.settling_decay_s
         self._placed = [(0.0, 0.0, 1.0, 0.0)] * 6  # last worked out: encoder's angle; angle and its two derivatives
@@ -82,7 +83,7 @@ class JointErrors:
 
     def quiet(self, time_s: float) -> bool:
         """Whether joints that stand stand still."""
-        return not self._vibration_rad and not (
+        return not self._errors.vibration_rms_rad_s and not (
             self._errors.settling_rad and any(time_s - stop_s < self._patience_s for stop_s, _ in self._stops)
         )
 
@@ -94,13 +95,6 @@ class JointErrors:
             angles, speeds, accelerations = self._carried(q_rad, qd_rad_s, qdd_rad_s2)
             if qd_rad_s is ZERO:
                 self._stood = q_rad, tuple(angles)
-        if self._vibration_rad:
-            for joint in WRISTS:
-                phase = self._vibration * time_s + self._phases[joint][2]
-                swing = self._vibration_rad * sin(phase)
-                angles[joint] += swing
-                speeds[joint] += self._vibration_rad * self._vibration * cos(phase)
-                accelerations[joint] -= self._vibration**2 * swing
         if self._errors.settling_rad:
             for joint, (stop_s, direction) in enumerate(self._stops):
                 if 0.0 <= time_s - stop_s < self._patience_s:
@@ -108,6 +102,8 @@ class JointErrors:
                     angles[joint] += angle
                     speeds[joint] += speed
                     accelerations[joint] += acceleration
+        if self._errors.vibration_rms_rad_s:
+            return self._vibration.added(time_s, angles, speeds, accelerations)
         return tuple(angles), tuple(speeds), tuple(accelerations)
 
     def _carried(

@@ -9,6 +9,7 @@ from typing import NamedTuple
 from rig.world.clock import TICK_S
 from rig.world.ur10e.ripple import Ripple
 from rig.world.ur10e.trajectory import ZERO, Joints, Trajectory, change_speed, line, rest
+from rig.world.ur10e.vibration import Vibration
 
 # ROS 2 description of the UR10e, from the 5.8 manual: base and shoulder 120°/s, elbow and wrists 180°/s.
 JOINT_SPEED_LIMIT_RAD_S: Joints = (2.0943951, 2.0943951, 3.1415927, 3.1415927, 3.1415927, 3.1415927)
@@ -42,7 +43,8 @@ class Motion:
     """Positions and velocities of the six joints. `step` makes a tick; `at` answers for any time inside the last one.
 
     `memory_s`: how long before the end of the last tick `at` answers as well. `lateness_s`: drawn once a tick, how much
-    later than at its end the encoders are read.
+    later than at its end the encoders are read. `vibration`: that they see, of joints that stand or move by all else
+    that is said here; it is added where somebody looks.
 
     Three angles are in play: `target` (what a program asked for), `smooth` (the same with the servo's static error
     taken out, so that the joint comes to rest exactly on target) and the joint's own, with the ripple.
@@ -56,9 +58,11 @@ class Motion:
         memory_s: float = 0.0,
         lateness_s: Callable[[], float] | None = None,
         *,
+        vibration: Vibration | None = None,
         speed_limit_rad_s: Joints = JOINT_SPEED_LIMIT_RAD_S,
     ) -> None:
         self.speed_limit_rad_s = speed_limit_rad_s
+        self.vibration = vibration
         self._ripples = tuple(ripples)
         self._encoder_step_rad = encoder_step_rad
         self._lateness_s, self._late_s = lateness_s, 0.0
@@ -112,7 +116,12 @@ class Motion:
     @property
     def qdd_rad_s2(self) -> Joints:
         """Accelerations at the end of the last tick."""
-        return ZERO if self.still else self.with_accelerations(self._ticks[-1].start_s + TICK_S)[2]
+        return ZERO if self.still else self.with_accelerations(self._end_s)[2]
+
+    @property
+    def _end_s(self) -> float:
+        """When the last tick ended."""
+        return self._ticks[-1].start_s + TICK_S
 
     @property
     def moving(self) -> bool:
@@ -121,10 +130,24 @@ class Motion:
     @property
     def actual_q_rad(self) -> Joints:
         """The joints' angles as the encoders see them, at the end of the last tick."""
-        step, q_rad = self._encoder_step_rad, self.q_rad
+        step, (q_rad, qd_rad_s, _) = self._encoder_step_rad, self._vibrating(ZERO)
         if self._late_s:
-            q_rad = tuple(q + v * self._late_s for q, v in zip(q_rad, self.qd_rad_s, strict=True))
+            q_rad = tuple(q + v * self._late_s for q, v in zip(q_rad, qd_rad_s, strict=True))
         return tuple(round(q / step) * step for q in q_rad) if step else q_rad
+
+    @property
+    def actual_qd_rad_s(self) -> Joints:
+        """The joints' speeds as the encoders see them."""
+        return self._vibrating(ZERO)[1]
+
+    @property
+    def actual(self) -> tuple[Joints, Joints, Joints]:
+        """Angles, speeds and accelerations as finer encoders would see them."""
+        return self._vibrating(self.qdd_rad_s2)
+
+    def _vibrating(self, qdd_rad_s2: Joints) -> tuple[Joints, Joints, Joints]:
+        joints = self.q_rad, self.qd_rad_s, qdd_rad_s2
+        return joints if self.vibration is None else self.vibration.added(self._end_s, *joints)
 
     def at(self, time_s: float) -> tuple[Joints, Joints]:
         """True angles and speeds of the joints at a virtual time inside the last tick, or `memory_s` before it."""

@@ -113,7 +113,7 @@ def _robot_mode(robot: Robot) -> bytes:
 
 def _joints(robot: Robot) -> bytes:
     motion, modes = robot.motion, joint_modes(robot)
-    columns = zip(motion.actual_q_rad, motion.now.target_q_rad, motion.qd_rad_s, modes, strict=True)
+    columns = zip(motion.actual_q_rad, motion.now.target_q_rad, motion.actual_qd_rad_s, modes, strict=True)
     return b"".join(
         struct.pack(">3d4fB", q, target, qd, 0.0, 48.0, 28.0, 28.0, mode) for q, target, qd, mode in columns
     )

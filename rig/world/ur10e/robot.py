@@ -355,8 +355,7 @@ class Robot:
     @property
     def tcp_motion(self) -> TcpMotion:
         """How the tool centre point moves by the encoders."""
-        motion = self.motion
-        return tcp_motion(motion.q_rad, motion.qd_rad_s, motion.qdd_rad_s2, self.links)
+        return tcp_motion(*self.motion.actual, self.links)
 
     @property
     def target_tcp_motion(self) -> TcpMotion:

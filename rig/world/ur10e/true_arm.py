@@ -50,6 +50,7 @@ class TrueArm:
             self._speed == 1.0
             and self._links == links(drawing=drawing)
             and self._errors is None
+            and motion.vibration is None
             and not any(site.earth_rate_rad_s)
         )
 
@@ -76,7 +77,11 @@ class TrueArm:
     def felt_at(self, time_s: float) -> Felt:
         """All that a body on the flange feels at a time inside the last tick or the motion's memory."""
         controller_s = time_s * self._speed
-        resting = self._motion.still and (self._errors is None or self._errors.quiet(controller_s))
+        resting = (
+            self._motion.still
+            and self._motion.vibration is None
+            and (self._errors is None or self._errors.quiet(controller_s))
+        )
         if resting and self._at_rest is not None:
             return self._at_rest
         q, qd, qdd = self._joints_at(controller_s)
@@ -100,8 +105,10 @@ class TrueArm:
 
     def _joints_at(self, controller_s: float) -> tuple[Joints, Joints, Joints]:
         """Angles, speeds and accelerations of the joints by the controller's seconds."""
-        q, qd, qdd = self._motion.with_accelerations(controller_s)
-        return (q, qd, qdd) if self._errors is None else self._errors.at(controller_s, q, qd, qdd)
+        joints, seen = self._motion.with_accelerations(controller_s), self._motion.vibration
+        if self._errors is not None:
+            joints = self._errors.at(controller_s, *joints)
+        return joints if seen is None else seen.added(controller_s, *joints)
 
 
 def _errors(section: SimulatedArmSection) -> Errors:

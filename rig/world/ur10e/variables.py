@@ -77,7 +77,7 @@ OUTPUTS: dict[str, tuple[str, Get]] = {
     "target_qd": ("VECTOR6D", lambda r: r.motion.now.target_qd_rad_s),
     "target_qdd": ("VECTOR6D", lambda r: r.motion.now.target_qdd_rad_s2),
     "actual_q": ("VECTOR6D", lambda r: r.motion.actual_q_rad),
-    "actual_qd": ("VECTOR6D", lambda r: r.motion.qd_rad_s),
+    "actual_qd": ("VECTOR6D", lambda r: r.motion.actual_qd_rad_s),
     "actual_TCP_pose": ("VECTOR6D", lambda r: r.tcp_pose(r.motion.actual_q_rad)),
     "actual_TCP_speed": ("VECTOR6D", lambda r: r.tcp_motion.speed),
     "actual_TCP_acceleration": ("VECTOR6D", lambda r: r.tcp_motion.acceleration),
