@@ -15,7 +15,8 @@ if TYPE_CHECKING:
     from jinja2 import Template
 
 MODULES = (
-    rounding, expanded, validity_words, told_words, printed_budget, tables, coverage_words, at_rest_tables, validity, plots,
+    rounding, expanded, validity_words, told_words, printed_budget, tables, coverage_words, at_rest_tables, validity,
+    plots,
 )  # fmt: skip
 TEMPLATE = "certificate.html.j2"
 FOOTING = "Relates only to the items calibrated. Not issued under an accreditation."
