@@ -1,14 +1,13 @@
 """Accelerometers from dwells in known attitudes and from sweeps: TRIAX, section III-B, on an arm."""
 
 from collections.abc import Callable, Mapping, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from functools import partial
 from types import MappingProxyType
 
 import numpy as np
 
-from rig.analysis.accelerometer_errors import errors_of, pieces_of
-from rig.analysis.arm_patterns import arm_turns
+from rig.analysis.accelerometer_errors import mean_temperature_c, pieces_of, sheet_of, with_errors
 from rig.analysis.attitudes import check_seen
 from rig.analysis.calibration import SensorResult, or_fault
 from rig.analysis.reference_budgets import accelerometer_budget
@@ -63,6 +62,7 @@ class AccelerometerResult:
     `scale` (3,) is 1/‖row of F‖, `covariance` (6, 6) that of scale and bias by the solution alone; the `budget` has
     all that is known of their uncertainty, None for recordings that say nothing of it. Beside it stand the solutions
     from the attitudes alone, by method, or the Fault each ends in. `held_out`: when the attitudes were repeated.
+    `temperature_c` is the mean of all readings, in recordings of before that of the dwells.
     """
 
     sensor: RecordedSensor
@@ -79,6 +79,7 @@ class AccelerometerResult:
     dwells: tuple[DwellReading, ...]
     sweeps: int
     held_out: HeldOut | None
+    temperature_c: float
 
     @property
     def correction_matrix(self) -> Array:
@@ -110,11 +111,6 @@ class AccelerometerResult:
             return None
         std: Array = np.abs(np.array(self.sensor.mounting)).T @ np.sqrt(np.diag(self.solution.covariance)[LEVER])
         return std
-
-    @property
-    def temperature_c(self) -> float:
-        """Mean over all dwells."""
-        return float(np.mean([dwell.temperature_c for dwell in self.dwells]))
 
 
 def calibrate_accelerometers(
@@ -156,12 +152,12 @@ def _calibrated(
         down=-np.array(site.up),
         second_order=settings.second_order,
     )
-    movement = Movement(seen, sweeps, _repeatability_rad(settings))
-    if settings.knows_accelerometers:
-        pieces = pieces_of(name, recordings, used)
-        own = errors_of(sensor, pieces, second_order=settings.second_order)
-        turns = arm_turns([each.stood for each in pieces], recordings[0].motion.kinematics, mounting)
-        movement = replace(movement, own=own, arm_turns=turns)
+    movement, sheet = Movement(seen, sweeps, _repeatability_rad(settings)), None
+    temperature_c = float(np.mean([dwell.temperature_c for dwell in used]))
+    if settings.knows_accelerometers and settings.uncertainty is not None:
+        pieces, sheet = pieces_of(name, recordings, used), sheet_of(settings.uncertainty, name, sensor)
+        arm, temperature_c = recordings[0].motion.kinematics, mean_temperature_c(pieces)
+        movement = with_errors(movement, pieces, sensor, sheet, arm, second_order=settings.second_order)
     weighted = _beside(partial(solve, method="attitude_weighted"))
     if not isinstance(weighted, Fault):
         check_axes(_axes(weighted.matrix), np.eye(3))
@@ -196,7 +192,7 @@ def _calibrated(
             movement,
             site,
             1e-3 * settings.uncertainty.acceleration_lag_ms,
-            part=sensor.part,
+            sheet=sheet,
             noise_freedom=_noise_freedom(used, _swept(name, recordings)) if settings.counts_freedom else None,
         ),
         non_orthogonality_rad=non_orthogonality(axes),
@@ -206,6 +202,7 @@ def _calibrated(
         dwells=used,
         sweeps=len(sweeps.speeds_rad_s),
         held_out=_held_out(left_out, solution, site.gravity_m_s2) if left_out else None,
+        temperature_c=temperature_c,
     )
 
 

@@ -2,38 +2,83 @@
 
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
-from itertools import pairwise
 
 import numpy as np
 
-from rig.analysis.arm_patterns import Stood
+from rig.analysis.arm_patterns import Stood, arm_turns
 from rig.analysis.seen import since_first_s
-from rig.arm.kinematics import WRIST_1
-from rig.config.sensor_catalogue import PARTS
+from rig.arm.kinematics import WRIST_1, DenavitHartenberg
+from rig.data.budget_entries import IN_U
 from rig.data.run_file import RecordedSensor
+from rig.data.settings import OfSensor, Uncertainty
 from rig.estimation.accelerometer_errors import AccelerometerErrors
 from rig.estimation.arrays import Array
-from rig.estimation.attitude_error import AttitudeError
 from rig.estimation.budget import Contributor
-from rig.estimation.earth import STANDARD_GRAVITY_M_S2
+from rig.estimation.earth import MICRO_G_M_S2, STANDARD_GRAVITY_M_S2
 from rig.estimation.felt import Movement
-from rig.estimation.imu import ImuSolution
-from rig.estimation.imu_fit import covariance_bound
-from rig.estimation.reading_errors import noise
-from rig.estimation.reference_budget import Spread, freedom_of, scale_and_bias
+from rig.estimation.own_errors import from_their_mean, unseen_k
+from rig.estimation.reading_errors import bending, bias_warming, flickering, scale_warming, wandering
+from rig.estimation.reference_budget import Spread
 from rig.observation.acceleration import DwellReading
+from rig.observation.average import Average
 from rig.observation.observed_run import ObservedRun
 
-NONLINEARITY, WITHIN_RUN, INSTABILITY = "nonlinearity", "temperature within the run", "bias instability"
-SMALL = 1e-3  # share of the arm in a variance that is not worth its degrees of freedom
+NONLINEARITY, INSTABILITY, FLICKER = "nonlinearity", "bias instability", "flicker of the bias"
+BIAS_OVER_TEMPERATURE, SCALE_OVER_TEMPERATURE = "bias over temperature", "scale over temperature"
+KNOWN = "what is known of the part"
 STANDARD = np.sqrt(3)  # a half-width is so many standard uncertainties
+MILLI_G = 1000  # µg
+
+
+@dataclass(frozen=True, slots=True)
+class Sheet:
+    """What is stated of one accelerometer, or known of its part: half-widths, but for the least Allan deviation.
+
+    `nonlinearity_percent` of `over_g`, either way.
+    """
+
+    nonlinearity_percent: float
+    over_g: float
+    bias_mg_k: float
+    scale_ppm_k: float
+    bias_instability_ug: float
+
+    @property
+    def even_s2_m(self) -> float:
+        """Of φ, as if it were all that the sensor is not linear by: over ± V the best line misses φ v² by φ V²/2."""
+        return 0.02 * self.nonlinearity_percent / (self.over_g * STANDARD_GRAVITY_M_S2)
+
+    @property
+    def odd_s4_m2(self) -> float:
+        """Of χ likewise: the best line misses χ v³ by χ V³/4."""
+        return 0.04 * self.nonlinearity_percent / (self.over_g * STANDARD_GRAVITY_M_S2) ** 2
+
+
+def sheet_of(known: Uncertainty, name: str, sensor: RecordedSensor) -> Sheet:
+    """Of the sensor of that name."""
+    assert sensor.range_m_s2 is not None, "or it has no accelerometer"
+
+    def of(what: OfSensor) -> float:
+        return known.of(what, name, sensor.part)
+
+    return Sheet(
+        nonlinearity_percent=of("acceleration_nonlinearity_percent"),
+        over_g=of("acceleration_nonlinear_over_g") or sensor.range_m_s2 / STANDARD_GRAVITY_M_S2,
+        bias_mg_k=of("acceleration_bias_mg_k"),
+        scale_ppm_k=of("acceleration_scale_ppm_k"),
+        bias_instability_ug=of("acceleration_bias_instability_ug"),
+    )
 
 
 @dataclass(frozen=True, slots=True)
 class Piece:
-    """A dwell or a sweep: when, on the clock of the first recording, how warm the sensor was, where the arm stood."""
+    """A dwell or a sweep: when, on the clock of the first recording, where the arm stood, how warm the sensor was.
+
+    That in the mean over so many `samples`.
+    """
 
     window_s: tuple[float, float]
+    samples: int
     temperature_c: float
     stood: Stood
 
@@ -41,114 +86,93 @@ class Piece:
 def pieces_of(name: str, recordings: Sequence[ObservedRun], dwells: Sequence[DwellReading]) -> list[Piece]:
     """Of the sensor `name`: these dwells, then all sweeps."""
     timed, used = list(zip(recordings, since_first_s(recordings), strict=True)), {dwell.index for dwell in dwells}
-    found = [
-        _piece(each, since_s, (dwell.window.start_s, dwell.window.end_s), dwell.temperature_c)
-        for each, since_s in timed
-        for dwell in each.sensors[name].dwells
-        if dwell.index in used
-    ]
-    return found + [
-        _piece(each, since_s, (turn.average.start_s, turn.average.end_s), turn.average.temperature_c, joint)
-        for each, since_s in timed
-        for turn in each.sensors[name].revolutions
-        for joint in ([] if turn.acceleration is None else [turn.acceleration.joint])
+    return [
+        *(
+            _dwelt(each, since_s, dwell)
+            for each, since_s in timed
+            for dwell in each.sensors[name].dwells
+            if dwell.index in used
+        ),
+        *(
+            _swept(each, since_s, turn.average, turn.acceleration.joint)
+            for each, since_s in timed
+            for turn in each.sensors[name].revolutions
+            if turn.acceleration is not None
+        ),
     ]
 
 
-def errors_of(sensor: RecordedSensor, pieces: Sequence[Piece], *, second_order: bool) -> AccelerometerErrors:
-    """Of a sensor in these pieces; an even part is not among them where it is looked for."""
-    even, odd = bending_of(sensor)
-    sheet = PARTS[sensor.part].accelerometer
-    warm_c = np.array([each.temperature_c for each in pieces])
-    standing = [each.temperature_c for each in pieces if each.stood.wrist is None]
+def mean_temperature_c(pieces: Sequence[Piece]) -> float:
+    """Of their readings, that scale and bias are referred to: the one that `rig.analysis.when` says they hold at."""
+    return float(np.average([each.temperature_c for each in pieces], weights=[each.samples for each in pieces]))
+
+
+def errors_of(
+    sheet: Sheet, pieces: Sequence[Piece], temperature_step_k: float, *, second_order: bool
+) -> AccelerometerErrors:
+    """Of a sensor in these pieces, with a thermometer of such steps; no even part where that is looked for."""
+    windows_s, samples = np.array([each.window_s for each in pieces]), np.array([each.samples for each in pieces])
     return AccelerometerErrors(
-        even_s2_m=0.0 if second_order else even / STANDARD,
-        odd_s4_m2=odd / STANDARD,
+        even_s2_m=0.0 if second_order else sheet.even_s2_m / STANDARD,
+        odd_s4_m2=sheet.odd_s4_m2 / STANDARD,
         norm_m_s2=STANDARD_GRAVITY_M_S2,
-        bias_m_s2_k=1e-3 * sheet.bias_mg_k * STANDARD_GRAVITY_M_S2 / STANDARD,
+        bias_m_s2_k=MILLI_G * MICRO_G_M_S2 * sheet.bias_mg_k / STANDARD,
         scale_per_k=1e-6 * sheet.scale_ppm_k / STANDARD,
-        warmer_k=warm_c - float(np.mean(standing)),
-        windows_s=np.array([each.window_s for each in pieces]),
+        warmer_k=from_their_mean(np.array([each.temperature_c for each in pieces]), samples),
+        unseen_k=unseen_k(temperature_step_k, windows_s, samples),
+        windows_s=windows_s,
+        instability_m_s2=MICRO_G_M_S2 * sheet.bias_instability_ug,
     )
 
 
-def bending_of(sensor: RecordedSensor) -> tuple[float, float]:
-    """Half-widths of φ, s²/m, and χ, s⁴/m², each as if it were all that the part is not linear by.
+def with_errors(
+    movement: Movement,
+    pieces: Sequence[Piece],
+    sensor: RecordedSensor,
+    sheet: Sheet,
+    arm: DenavitHartenberg,
+    *,
+    second_order: bool,
+) -> Movement:
+    """With what is known of the sensor and of the arm in these pieces of it."""
+    own = errors_of(sheet, pieces, abs(sensor.temperature_c_per_count), second_order=second_order)
+    turns = arm_turns([each.stood for each in pieces], arm, np.array(sensor.mounting))
+    return replace(movement, own=own, arm_turns=turns)
 
-    Over ± V the best line misses φ v² by φ V²/2, χ v³ by χ V³/4.
+
+def of_its_own(spread: Spread, theta: Array, movement: Movement, sheet: Sheet) -> tuple[Spread, list[Contributor]]:
+    """What of the `spread` noise and arm make, and the lines of what the sensor itself does in this `movement`.
+
+    The response is that of a solution which looks for all of it, so a bent sensor's noise counts for more.
     """
-    sheet, whole_m_s2 = PARTS[sensor.part].accelerometer, sensor.range_m_s2
-    assert whole_m_s2 is not None, "or it has no accelerometer"
-    if sheet.nonlinear_over_g is not None:
-        whole_m_s2 = sheet.nonlinear_over_g * STANDARD_GRAVITY_M_S2
-    return 0.02 * sheet.nonlinearity_percent / whole_m_s2, 0.04 * sheet.nonlinearity_percent / whole_m_s2**2
-
-
-def of_its_own(
-    spread: Spread, solution: ImuSolution, movement: Movement, part: str
-) -> tuple[Spread, list[Contributor]]:
-    """The `spread` of a sensor of which all of this were known, and what each adds because it is not.
-
-    One after the other in the readings' covariance. A bent sensor's noise counts for more, because the readings must
-    tell the bending as well: that is in the line of the bending.
-    """
-    found = solution.own
-    assert found is not None, "or there is nothing"
-    straight = found.straight()
-    steps = [
-        _known(spread, solution, replace(movement, own=own))
-        for own in (straight.as_warm().standing(), straight.as_warm(), straight, found)
-    ]
-    sheet = PARTS[part].accelerometer
-    by_sheet = f"{sheet.bias_mg_k:g} mg/K", f"{sheet.nonlinearity_percent:g} %"
-    sources = {
-        INSTABILITY: "how the readings scatter",
-        WITHIN_RUN: f"recorded temperature, {by_sheet[0]} by the data sheet at most",
-        NONLINEARITY: f"what attitudes tell of it, {by_sheet[1]} by the data sheet at most",
+    wandered, flickered = (
+        spread.response @ each @ spread.response.T for each in (wandering(movement), flickering(movement))
+    )
+    by_sheet = {
+        BIAS_OVER_TEMPERATURE: (sheet.bias_mg_k, "mg/K", bias_warming(movement)),
+        SCALE_OVER_TEMPERATURE: (sheet.scale_ppm_k, "ppm/K", scale_warming(theta, movement)),
+        NONLINEARITY: (sheet.nonlinearity_percent, f"% of {sheet.over_g:.3g} g", bending(theta, movement)),
     }
+    stability = f"least Allan deviation: {sheet.bias_instability_ug:.3g} µg"
     lines = [
-        Contributor(name, "A", "normal", None, "", source, after.freedom_since(before), after.beyond(before))
-        for (name, source), (before, after) in zip(sources.items(), pairwise(steps), strict=True)
+        Contributor(INSTABILITY, "A", "normal", None, "", f"how the readings scatter, {IN_U}", np.inf, wandered),
+        Contributor(FLICKER, "B", "normal", None, "", stability, np.inf, flickered),
+        *(
+            Contributor(name, "B", "rectangular", half_width, unit, KNOWN, np.inf, spread.of(patterns))
+            for name, (half_width, unit, patterns) in by_sheet.items()
+        ),
     ]
-    return replace(spread, covariance=steps[0].covariance, response=steps[0].response), lines
+    own = np.sum([each.covariance for each in lines], axis=0)
+    return replace(spread, covariance=spread.covariance - own), lines
 
 
-@dataclass(frozen=True, slots=True)
-class _Known:
-    """Covariance (6, 6) of scale and bias, what of it the arm's `error` makes, and the response (6, n)."""
-
-    error: AttitudeError
-    covariance: Array
-    of_arm: Array
-    response: Array
-
-    def beyond(self, before: "_Known") -> Array:
-        """(6, 6) what is added to the covariance."""
-        return self.covariance - before.covariance
-
-    def freedom_since(self, before: "_Known") -> float:
-        """Of that: as the arm's for the share that it makes of it."""
-        added, of_arm = np.diag(self.beyond(before)), np.diag(self.of_arm - before.of_arm)
-        share = float(np.max(of_arm[added > 0] / added[added > 0], initial=0.0))
-        return freedom_of(self.error) / share**2 if share > SMALL else np.inf
+def _dwelt(recording: ObservedRun, since_s: float, dwell: DwellReading) -> Piece:
+    start_s, end_s = dwell.window.start_s, dwell.window.end_s
+    stood = Stood(recording.motion.angles((start_s + end_s) / 2), None)
+    return Piece((start_s + since_s, end_s + since_s), dwell.reading.samples, dwell.temperature_c, stood)
 
 
-def _known(spread: Spread, solution: ImuSolution, movement: Movement) -> _Known:
-    second_order, theta = solution.second_order_s2_m is not None, solution.theta
-    told = scale_and_bias(solution.matrix, spread.scale, len(solution.covariance))
-    covariance, response = covariance_bound(theta, movement, solution.attitude_error.std_rad, second_order=second_order)
-    whole, response = told @ covariance @ told.T, told @ response
-    return _Known(solution.attitude_error, whole, whole - response @ noise(theta, movement) @ response.T, response)
-
-
-def _piece(
-    recording: ObservedRun,
-    since_s: float,
-    window_s: tuple[float, float],
-    temperature_c: float,
-    joint: int | None = None,
-) -> Piece:
-    start_s, end_s = window_s
-    stands_s = (start_s + end_s) / 2 if joint is None else start_s
-    stood = Stood(recording.motion.angles(stands_s), None if joint is None else joint - WRIST_1)
-    return Piece((start_s + since_s, end_s + since_s), temperature_c, stood)
+def _swept(recording: ObservedRun, since_s: float, average: Average, joint: int) -> Piece:
+    stood = Stood(recording.motion.angles(average.start_s), joint - WRIST_1)
+    window_s = average.start_s + since_s, average.end_s + since_s
+    return Piece(window_s, average.samples, average.temperature_c, stood)

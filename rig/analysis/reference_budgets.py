@@ -1,10 +1,11 @@
 """What belongs into the uncertainty of accelerometers and magnetometers beside what their readings tell."""
 
+from dataclasses import replace
 from typing import Final
 
 import numpy as np
 
-from rig.analysis.accelerometer_errors import of_its_own
+from rig.analysis.accelerometer_errors import Sheet, of_its_own
 from rig.data.settings import Site
 from rig.estimation.arrays import Array
 from rig.estimation.attitude_error import AttitudeError
@@ -40,12 +41,12 @@ def accelerometer_budget(
     lag_s: float,
     *,
     noise_freedom: Array | None = None,
-    part: str = "",
+    sheet: Sheet | None = None,
 ) -> Budget:
     """Of the solution found from the `movement`; `lag_s` is how late the sensor's own filter may be.
 
-    `noise_freedom` (3 N + 9 M,) as in `Spread`: of the dwells' readings, then of the sweeps' harmonics. `part` names
-    the sensor by whose data sheet the movement's `own` errors are known.
+    `noise_freedom` (3 N + 9 M,) as in `Spread`: of the dwells' readings, then of the sweeps' harmonics. `sheet`
+    is that by which the solution's `own` errors are known.
     """
     spread = _spread(
         solution,
@@ -56,9 +57,9 @@ def accelerometer_budget(
         noise_freedom=noise_freedom,
     )
     others = [_lagging(spread, movement, lag_s)] if len(movement.sweeps.speeds_rad_s) else []
-    if movement.own is None:
+    if solution.own is None or sheet is None:
         return reference_budget(spread, _gravity(site), others)
-    bare, own = of_its_own(spread, solution, movement, part)
+    bare, own = of_its_own(spread, solution.theta, replace(movement, own=solution.own), sheet)
     return reference_budget(bare, _gravity(site), [*own, *others])
 
 

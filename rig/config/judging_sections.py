@@ -267,6 +267,38 @@ class UncertaintySection(Section):
         ge=0,
         description="how far from 90° two axes of a gyroscope may stand; left out, what is known of the part",
     )
+    acceleration_nonlinearity_percent: float | None = Field(
+        default=None,
+        ge=0,
+        description="how far an accelerometer may be off the best straight line, in per cent of "
+        "`acceleration_nonlinear_over_g`; left out, what is known of the part",
+        json_schema_extra={"unit": "%"},
+    )
+    acceleration_nonlinear_over_g: float | None = Field(
+        default=None,
+        ge=0,
+        description="over what acceleration either way that is stated, 0 for the range that is set; left out, what is "
+        "known of the part",
+        json_schema_extra={"unit": "g"},
+    )
+    acceleration_bias_mg_k: float | None = Field(
+        default=None,
+        ge=0,
+        description="change of an accelerometer's bias for 1 K; left out, what is known of the part",
+        json_schema_extra={"unit": "mg/K"},
+    )
+    acceleration_scale_ppm_k: float | None = Field(
+        default=None,
+        ge=0,
+        description="change of an accelerometer's scale factor for 1 K; left out, what is known of the part",
+        json_schema_extra={"unit": "ppm/K"},
+    )
+    acceleration_bias_instability_ug: float | None = Field(
+        default=None,
+        ge=0,
+        description="the least Allan deviation of an accelerometer at rest; left out, what is known of the part",
+        json_schema_extra={"unit": "µg"},
+    )
     decision_rule: Literal["simple", "guard_band"] = Field(
         default="simple",
         description="what a limit is held against: `simple`, the value; `guard_band`, the value and its expanded "

@@ -12,13 +12,15 @@ class AccelerometerSheet:
     """What a data sheet says of an accelerometer, or of one of its kind: half-widths.
 
     `nonlinearity_percent` is how far it may be from the best straight line, of the range `nonlinear_over_g` either way,
-    the one that is set where that is None; `bias_mg_k` and `scale_ppm_k` what a degree changes of bias and scale.
+    the one that is set where that is 0; `bias_mg_k` and `scale_ppm_k` what a degree changes of bias and scale.
+    `bias_instability_ug` is the least Allan deviation of the bias.
     """
 
     nonlinearity_percent: float
     bias_mg_k: float
     scale_ppm_k: float
-    nonlinear_over_g: float | None = None
+    bias_instability_ug: float
+    nonlinear_over_g: float = 0.0
 
 
 @dataclass(frozen=True, slots=True)
@@ -51,6 +53,27 @@ class Part:
     acceleration_noise_ug_sqrt_hz: float
     accelerometer: AccelerometerSheet
     own_port: bool = False
+
+    @property
+    def acceleration_nonlinearity_percent(self) -> float:
+        """Of its accelerometer, as what follows."""
+        return self.accelerometer.nonlinearity_percent
+
+    @property
+    def acceleration_nonlinear_over_g(self) -> float:
+        return self.accelerometer.nonlinear_over_g
+
+    @property
+    def acceleration_bias_mg_k(self) -> float:
+        return self.accelerometer.bias_mg_k
+
+    @property
+    def acceleration_scale_ppm_k(self) -> float:
+        return self.accelerometer.scale_ppm_k
+
+    @property
+    def acceleration_bias_instability_ug(self) -> float:
+        return self.accelerometer.bias_instability_ug
 
     def accept_rate(self, rate_hz: float) -> float:
         """The part's own rate that `rate_hz` means. Raises ValueError naming the nearest when there is none."""
@@ -115,7 +138,7 @@ PARTS: Mapping[str, Part] = MappingProxyType(
             ranges_g=(2, 4, 8, 16),
             acceleration_noise_ug_sqrt_hz=150,  # not stated; assumed
             accelerometer=AccelerometerSheet(  # not stated; that of the MPU-9250
-                nonlinearity_percent=0.5, bias_mg_k=1.5, scale_ppm_k=260
+                nonlinearity_percent=0.5, bias_mg_k=1.5, scale_ppm_k=260, bias_instability_ug=30
             ),
         ),
         "mpu9250": Part(  # register map RM-MPU-9250A-00, registers 25 (SMPLRT_DIV) and 27 (GYRO_CONFIG)
@@ -135,7 +158,10 @@ PARTS: Mapping[str, Part] = MappingProxyType(
             ranges_g=(2, 4, 8, 16),
             acceleration_noise_ug_sqrt_hz=300,  # PS-MPU-9250A-01, section 3.2
             accelerometer=AccelerometerSheet(  # PS-MPU-9250A-01, table 2; changes by its -40 to 85 °C
-                nonlinearity_percent=0.5, bias_mg_k=1.5, scale_ppm_k=260
+                nonlinearity_percent=0.5,
+                bias_mg_k=1.5,
+                scale_ppm_k=260,
+                bias_instability_ug=30,  # not stated; assumed, as consumer parts have it
             ),
         ),
         "adis16465": Part(  # datasheet, register DEC_RATE; the range is the model's: -1, -2 and -3 have one each
@@ -155,7 +181,11 @@ PARTS: Mapping[str, Part] = MappingProxyType(
             ranges_g=(8,),
             acceleration_noise_ug_sqrt_hz=23,  # assumed: the data sheet of the part has it, not looked up
             accelerometer=AccelerometerSheet(  # assumed: the data sheet of the part has it, not looked up
-                nonlinearity_percent=0.25, nonlinear_over_g=2, bias_mg_k=0.05, scale_ppm_k=20
+                nonlinearity_percent=0.25,
+                nonlinear_over_g=2,
+                bias_mg_k=0.05,
+                scale_ppm_k=20,
+                bias_instability_ug=3.6,  # data sheet, features
             ),
         ),
         "kvh1775": Part(  # ICD 56-0298 Rev. B, command =DR; -01 and -25 have one range of acceleration each
@@ -175,7 +205,7 @@ PARTS: Mapping[str, Part] = MappingProxyType(
             ranges_g=(10, 25),
             acceleration_noise_ug_sqrt_hz=119,  # TRIAX, table 1: 0.0701 m/s/√h
             accelerometer=AccelerometerSheet(  # assumed: the maker's data sheet has it, not looked up
-                nonlinearity_percent=0.9, nonlinear_over_g=10, bias_mg_k=0.05, scale_ppm_k=100
+                nonlinearity_percent=0.9, nonlinear_over_g=10, bias_mg_k=0.05, scale_ppm_k=100, bias_instability_ug=50
             ),
             own_port=True,
         ),

@@ -31,7 +31,8 @@ class InAttitudesEntry(Entry):
 class DwellEntry(Entry):
     """A dwell: the mean reading in an attitude, its standard deviation, and what the model leaves of it.
 
-    `attitude` takes a vector of the arm's base frame into the flange's.
+    `residual_std_m_s2` is what the solve expects that to scatter by, null in results of before. `attitude` takes a
+    vector of the arm's base frame into the flange's.
     """
 
     index: int
@@ -44,6 +45,7 @@ class DwellEntry(Entry):
     samples: int
     duration_s: float
     temperature_c: float
+    residual_std_m_s2: Vector3 | None = None
 
 
 class HeldOutEntry(Entry):
@@ -73,7 +75,8 @@ class AccelerometerEntry(Entry):
     - `lever_arm_m`, from the sweeps' axes to the sensor in the flange's frame, and `delay_s`, by which it lags behind
       the gyroscope, are there where sweeps were made.
     - `told_from`: what may happen while it is recorded, and from what size on that contradicts itself.
-    - `found_at`: when scale and bias were read, and how warm it was then; `temperature_c` is the mean over the dwells.
+    - `found_at`: when scale and bias were read, and how warm it was then; `temperature_c` is that
+      temperature, in results of before the mean over the dwells.
     - `…_freedom`: degrees of freedom of the standard deviations of that name, null where they have no end.
     - `correction_matrix` is M of s = M (a − b), first order: in the frame of the gyroscope's corrected rates (whole
       matrix) where there is an `alignment`, else in the right-angled frame nearest to the accelerometer's own axes.

@@ -37,7 +37,8 @@ class FieldSolutionEntry(Entry):
 class FieldDwellEntry(Entry):
     """A dwell: the mean reading in an attitude, its standard deviation, and what the model leaves of it.
 
-    `attitude` takes a vector of the arm's base frame into the flange's.
+    `residual_std_t` is what the solve expects that to scatter by, null in results of before. `attitude` takes a vector
+    of the arm's base frame into the flange's.
     """
 
     index: int
@@ -49,6 +50,7 @@ class FieldDwellEntry(Entry):
     residual_t: Vector3
     samples: int
     duration_s: float
+    residual_std_t: Vector3 | None = None
 
 
 class UniformityEntry(Entry):

@@ -40,6 +40,11 @@ OfSensor = Literal[
     "scale_ppm_k",
     "bias_instability_deg_h",
     "non_orthogonality_deg",
+    "acceleration_nonlinearity_percent",
+    "acceleration_nonlinear_over_g",
+    "acceleration_bias_mg_k",
+    "acceleration_scale_ppm_k",
+    "acceleration_bias_instability_ug",
 ]
 OF_SENSORS: tuple[OfSensor, ...] = get_args(OfSensor)
 Vector3 = tuple[Finite, Finite, Finite]
@@ -135,6 +140,11 @@ class Uncertainty:
     scale_ppm_k: dict[str, Annotated[float, Field(ge=0)]] = field(default_factory=dict)
     bias_instability_deg_h: dict[str, Annotated[float, Field(ge=0)]] = field(default_factory=dict)
     non_orthogonality_deg: dict[str, Annotated[float, Field(ge=0)]] = field(default_factory=dict)
+    acceleration_nonlinearity_percent: dict[str, Annotated[float, Field(ge=0)]] = field(default_factory=dict)
+    acceleration_nonlinear_over_g: dict[str, Annotated[float, Field(ge=0)]] = field(default_factory=dict)
+    acceleration_bias_mg_k: dict[str, Annotated[float, Field(ge=0)]] = field(default_factory=dict)
+    acceleration_scale_ppm_k: dict[str, Annotated[float, Field(ge=0)]] = field(default_factory=dict)
+    acceleration_bias_instability_ug: dict[str, Annotated[float, Field(ge=0)]] = field(default_factory=dict)
 
     def of(self, what: OfSensor, name: str, part: str) -> float:
         """That of a sensor of that name and kind; what is known of the part where nothing is said of the sensor."""

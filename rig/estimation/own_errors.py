@@ -15,7 +15,6 @@ from rig.estimation.nonlinearity import CUBE_MISSED, SQUARE_MISSED, bending
 
 NONLINEARITY = "nonlinearity"
 BIAS_OVER_TEMPERATURE, SCALE_OVER_TEMPERATURE = "bias over temperature", "scale over temperature"
-MOVES = 3.0  # steps of the thermometer, by which temperature must change for the bias to be looked at by it
 
 
 @dataclass(frozen=True, slots=True)
@@ -59,23 +58,32 @@ def own_errors(
         sizes = known.nonlinearity / np.repeat([CUBE_MISSED, SQUARE_MISSED], 3)[:, None, None]
         yield OwnError(NONLINEARITY, 100 * known.nonlinearity, "% of full scale", sizes * bent)
     lasting = np.diff(windows_s)[:, 0]
-    warmer = _from_their_mean(known.temperature_c, lasting)
-    if np.ptp(warmer) >= MOVES * known.temperature_step_k > 0:
-        patterns = known.bias_rad_s_per_k * np.einsum("n,ij->inj", warmer, np.eye(3))
-        yield OwnError(BIAS_OVER_TEMPERATURE, float(np.degrees(known.bias_rad_s_per_k)), "°/s/K", patterns)
-    turning = lasting * turns_rad_s.any(axis=1)
-    warmer_k = _from_their_mean(known.temperature_c, turning), _unseen(known, windows_s, turning)
+    warmer_k = _warmer_k(known, windows_s, lasting)
+    patterns = known.bias_rad_s_per_k * np.einsum("kn,ij->kinj", warmer_k, np.eye(3))
+    yield OwnError(
+        BIAS_OVER_TEMPERATURE, float(np.degrees(known.bias_rad_s_per_k)), "°/s/K", patterns.reshape(6, -1, 3)
+    )
+    warmer_k = _warmer_k(known, windows_s, lasting * turns_rad_s.any(axis=1))
     patterns = known.scale_per_k * np.einsum("kn,ni,ij->kinj", warmer_k, turns_rad_s @ matrix.T, np.eye(3))
     yield OwnError(SCALE_OVER_TEMPERATURE, 1e6 * known.scale_per_k, "ppm/K", patterns.reshape(6, -1, 3))
 
 
-def _unseen(known: KnownSensor, windows_s: Array, weights: Array) -> Array:
-    """(N,) K by which temperature may have changed evenly in the course of the run while its recorded steps did not."""
+def _warmer_k(known: KnownSensor, windows_s: Array, weights: Array) -> Array:
+    """(2, N) K above the mean by these weights: as recorded, and what the steps of that may hide."""
+    recorded = from_their_mean(known.temperature_c, weights)
+    return np.array([recorded, unseen_k(known.temperature_step_k, windows_s, weights)])
+
+
+def unseen_k(step_k: float, windows_s: Array, weights: Array) -> Array:
+    """(N,) K by which temperature may have changed evenly in the course of the run while its recorded steps did not.
+
+    By half a step either way, from the mean over the windows (N, 2) by their weights (N,).
+    """
     middle = windows_s.mean(axis=1)
-    share = _from_their_mean(middle, weights) / np.ptp(middle)
-    return np.asarray(known.temperature_step_k * share, dtype=np.float64)
+    return np.asarray(step_k * from_their_mean(middle, weights) / np.ptp(middle), dtype=np.float64)
 
 
-def _from_their_mean(values: Array, weights: Array) -> Array:
+def from_their_mean(values: Array, weights: Array) -> Array:
+    """(N,) values less their mean by these weights."""
     away: Array = values - np.average(values, weights=weights)
     return away

@@ -9,8 +9,9 @@ from dataclasses import replace
 
 import numpy as np
 
+from rig.estimation.accelerometer_errors import AccelerometerErrors
 from rig.estimation.arrays import Array
-from rig.estimation.bias_process import walk_covariance
+from rig.estimation.bias_process import flicker_covariance, walk_covariance
 from rig.estimation.felt import OWN_ERRORS, SHARE, SHARED_ERRORS, TURNS, Movement, felt, turned
 from rig.estimation.reference_model import matrix
 
@@ -19,15 +20,9 @@ ANGLES = 72  # of a turn, over which what is not linear in the acceleration is a
 
 def noise(theta: Array, movement: Movement) -> Array:
     """(3 K, 3 K) covariance of all that is off in the readings but for the arm's attitudes."""
-    whole = movement.noise() + _not_repeated(theta, movement)
-    for patterns in (bending(theta, movement), warming(theta, movement)):
+    whole = movement.noise() + _not_repeated(theta, movement) + flickering(movement) + wandering(movement)
+    for patterns in (bending(theta, movement), bias_warming(movement), scale_warming(theta, movement)):
         whole += patterns.T @ patterns
-    if movement.own is not None and movement.own.walk_m_s2_sqrt_s:
-        whole += movement.own.walk_m_s2_sqrt_s**2 * walking(movement)
-    if movement.own is not None and movement.own.louder is not None:
-        whole += np.diag(np.repeat(of_pieces(movement.own.louder, movement), 3) * np.diag(movement.noise()))
-        turning = movement.own.turning_m_s2 * in_sweeps(movement)
-        whole += turning @ turning.T
     return np.asarray(whole, dtype=np.float64)
 
 
@@ -43,23 +38,63 @@ def bending(theta: Array, movement: Movement) -> Array:
     )
 
 
-def warming(theta: Array, movement: Movement) -> Array:
-    """(P, 3 K) patterns of β and κ of each axis, by one standard uncertainty."""
+def bias_warming(movement: Movement) -> Array:
+    """(6, 3 K) patterns of β of each axis, by one standard uncertainty: as recorded, and what the steps hide."""
     own = movement.own
     if own is None:
         return np.zeros((0, movement.readings().size))
-    warmer_k = of_pieces(own.warmer_k, movement)
+    return own.bias_m_s2_k * np.concatenate(
+        [per_axis((movement.constant() * warmer_k)[:, None] * np.ones(3)).T for warmer_k in _warmer_k(own, movement)]
+    )
+
+
+def scale_warming(theta: Array, movement: Movement) -> Array:
+    """(6, 3 K) the same of κ."""
+    own = movement.own
+    if own is None:
+        return np.zeros((0, movement.readings().size))
     along = felt(theta, movement) @ matrix(theta).T
-    bias = per_axis((movement.constant() * warmer_k)[:, None] * np.ones(3)).T
-    return np.concatenate([own.bias_m_s2_k * bias, own.scale_per_k * per_axis(along * warmer_k[:, None]).T])
+    return own.scale_per_k * np.concatenate(
+        [per_axis(along * warmer_k[:, None]).T for warmer_k in _warmer_k(own, movement)]
+    )
+
+
+def _warmer_k(own: AccelerometerErrors, movement: Movement) -> tuple[Array, Array]:
+    """Both (K,)."""
+    return of_pieces(own.warmer_k, movement), of_pieces(own.unseen_k, movement)
+
+
+def flickering(movement: Movement) -> Array:
+    """(3 K, 3 K) covariance of the flicker that the bias is known to have."""
+    own = movement.own
+    if own is None or not own.instability_m_s2:
+        return np.zeros((movement.readings().size,) * 2)
+    return own.instability_m_s2**2 * _of_bias(flicker_covariance(own.windows_s), movement)
+
+
+def wandering(movement: Movement) -> Array:
+    """(3 K, 3 K) covariance of what the readings themselves say of the bias: a walk, and what was disturbed."""
+    own, whole = movement.own, np.zeros((movement.readings().size,) * 2)
+    if own is not None and own.walk_m_s2_sqrt_s:
+        whole += own.walk_m_s2_sqrt_s**2 * walking(movement)
+    if own is not None and own.louder is not None:
+        whole += np.diag(np.repeat(of_pieces(own.louder, movement), 3) * np.diag(movement.noise()))
+        turning = own.turning_m_s2 * in_sweeps(movement)
+        whole += turning @ turning.T
+    return whole
 
 
 def walking(movement: Movement) -> Array:
     """(3 K, 3 K) covariance of a bias that walks by 1 m/s² in a second, the axes each for itself."""
     assert movement.own is not None, "or nothing walks"
+    return _of_bias(walk_covariance(movement.own.windows_s), movement)
+
+
+def _of_bias(covariance: Array, movement: Movement) -> Array:
+    """(3 K, 3 K) of a bias whose means in dwells and sweeps (N + M,) vary together so, the axes each for itself."""
     steady = movement.constant() > 0
     whole = np.zeros((len(steady),) * 2)
-    whole[np.ix_(steady, steady)] = walk_covariance(movement.own.windows_s)
+    whole[np.ix_(steady, steady)] = covariance
     return np.asarray(np.kron(whole, np.eye(3)), dtype=np.float64)
 
 

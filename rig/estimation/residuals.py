@@ -1,9 +1,17 @@
-"""What a solve expects of its own residuals: noise, ends of turns and a wandering bias, less what the fit takes up."""
+"""What a solve expects of its own residuals: all that it knows to be off in readings, less what the fit takes up."""
+
+from dataclasses import replace
 
 import numpy as np
 
+from rig.estimation import attitude_error, felt, reference_model
 from rig.estimation.arrays import Array
 from rig.estimation.explained import Explained
+from rig.estimation.felt import Dwells, Movement
+from rig.estimation.imu import ImuSolution
+from rig.estimation.reading_errors import noise
+from rig.estimation.reference_budget import response_in_attitudes
+from rig.estimation.triaxial import TriaxialSolution
 from rig.estimation.vector_model import design_matrix, of_the_speed, regress
 
 
@@ -20,3 +28,37 @@ def residual_std_rad_s(explained: Explained) -> Array:
     variances = np.einsum("inm,imk,ink->ni", left, noise, left)
     std: Array = np.sqrt(variances.clip(min=0.0))
     return std
+
+
+def dwell_residual_std_m_s2(solution: ImuSolution, movement: Movement) -> Array:
+    """(N, 3) the same of an accelerometer's dwells, of a solution found from the `movement`."""
+    movement, theta = replace(movement, own=solution.own), solution.theta
+    arm = solution.attitude_error.std_rad * felt.effects(theta, movement)
+    fit = felt.jacobian(theta, movement) @ solution.response
+    return _left(fit, noise(theta, movement) + arm @ arm.T)[: len(movement.dwells.readings_m_s2)]
+
+
+def attitude_residual_std(solution: TriaxialSolution, seen: Dwells) -> Array:
+    """(N, 3) the same of a sensor in attitudes alone, as `seen`, in the unit of its readings."""
+    theta = np.concatenate([solution.matrix.ravel(), solution.reference, solution.bias])
+    v_bar = np.zeros_like(seen.readings_m_s2)
+    off_rad = 0.0 if solution.attitude_error is None else solution.attitude_error.std_rad
+    turned = off_rad * attitude_error.effects(theta, seen.attitudes, v_bar)
+    own = np.eye(3) * seen.variances_m2_s4[:, :, None] + turned @ np.swapaxes(turned, -1, -2)
+    slopes = reference_model.jacobian(theta, seen.attitudes, v_bar).reshape(-1, len(theta))
+    fit = slopes @ response_in_attitudes(theta, seen.attitudes, seen.variances_m2_s4, off_rad)
+    return _left(fit, _along_diagonal(own))
+
+
+def _left(fit: Array, covariance: Array) -> Array:
+    """(K, 3) standard deviations of what a fit (3 K, 3 K) leaves of readings with that covariance."""
+    left = np.eye(len(fit)) - fit
+    std: Array = np.sqrt(np.diag(left @ covariance @ left.T).clip(min=0.0)).reshape(-1, 3)
+    return std
+
+
+def _along_diagonal(blocks: Array) -> Array:
+    """(3 N, 3 N) of (N, 3, 3)."""
+    whole = np.zeros((len(blocks), 3, len(blocks), 3))
+    whole[np.arange(len(blocks)), :, np.arange(len(blocks))] = blocks
+    return whole.reshape(3 * len(blocks), -1)

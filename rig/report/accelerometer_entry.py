@@ -15,6 +15,7 @@ from rig.data.result_types import ErrorEntry
 from rig.errors import Fault
 from rig.estimation.felt import DELAY, SECOND
 from rig.estimation.imu import MODEL
+from rig.estimation.residuals import dwell_residual_std_m_s2
 from rig.estimation.triads import Alignment
 from rig.estimation.triaxial import TriaxialSolution
 from rig.report.axes import PARAMETERS, dwell_entry
@@ -27,7 +28,7 @@ UNITS = ("1", "1", "1", "m/s²", "m/s²", "m/s²")
 def accelerometer_entry(result: AccelerometerResult) -> AccelerometerEntry:
     """Scale, bias and covariance; beside them the other methods from the attitudes alone."""
     solution = result.solution
-    std = np.sqrt(np.diag(solution.covariance))
+    std, expected = np.sqrt(np.diag(solution.covariance)), dwell_residual_std_m_s2(solution, result.movement)
     return entry(
         AccelerometerEntry, result, result.sensor, solution,
         role="calibrate",
@@ -45,8 +46,8 @@ def accelerometer_entry(result: AccelerometerResult) -> AccelerometerEntry:
         delay_std_s=None if solution.delay_s is None else float(std[DELAY]),
         alignment=None if result.alignment is None else _alignment(result.alignment),
         dwells=[
-            dwell_entry(DwellEntry, "m_s2", each, left)
-            for each, left in zip(result.dwells, solution.dwell_residuals_m_s2, strict=True)
+            dwell_entry(DwellEntry, "m_s2", *each)
+            for each in zip(result.dwells, solution.dwell_residuals_m_s2, expected, strict=True)
         ],
         beside={name: _beside(found) for name, found in result.beside.items()},
         non_orthogonality_freedom=counted(of_acceleration_angles(result)),

@@ -11,6 +11,7 @@ from rig.analysis.outcome import Outcome
 from rig.data.result_file import ResultDocument
 from rig.estimation.arrays import Array
 from rig.estimation.earth import MICRO_G_M_S2
+from rig.estimation.residuals import dwell_residual_std_m_s2
 from rig.report.figures import save
 from rig.station.events import NotPlotted, Plotted, RunEvent
 from rig.study.style import style
@@ -55,9 +56,8 @@ def draw_accelerometer(figure: "Figure", result: AccelerometerResult) -> None:
 def _draw_residuals(axes: "Axes", result: AccelerometerResult) -> None:
     count = np.arange(1, len(result.dwells) + 1)
     noise = np.sqrt([dwell.reading.variance for dwell in result.dwells])
-    turned = result.solution.attitude_error.std_rad * result.gravity_m_s2
-    expected = 2 * np.hypot(noise.max(axis=1), turned) / MICRO_G_M_S2
-    axes.fill_between(count, -expected, expected, color="0.9", label="± U (k = 2) of noise and attitude", step="mid")
+    expected = 2 * dwell_residual_std_m_s2(result.solution, result.movement).max(axis=1) / MICRO_G_M_S2
+    axes.fill_between(count, -expected, expected, color="0.9", label="expected, ± 2 σ", step="mid")
     for i, axis in enumerate("xyz"):
         left = result.solution.dwell_residuals_m_s2[:, i] / MICRO_G_M_S2
         axes.errorbar(count + 0.15 * (i - 1), left, 2 * noise[:, i] / MICRO_G_M_S2, fmt="o", ms=3, lw=0.8, label=axis)

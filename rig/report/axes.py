@@ -78,8 +78,13 @@ def matrix_lines(matrix: Array, covariance: Array, factor: float) -> Iterator[st
     yield f"non-orthogonality yz zx xy: {told} mrad (U, k = {factor:.3g})"
 
 
-def dwell_entry(kind: type[EntryT], unit: str, dwell: DwellReading | FieldReading, residual: Array) -> EntryT:
-    """A dwell as an entry whose names end with the `unit` of its readings; `residual` (3,) is what the model leaves."""
+def dwell_entry(
+    kind: type[EntryT], unit: str, dwell: DwellReading | FieldReading, residual: Array, residual_std: Array
+) -> EntryT:
+    """A dwell as an entry whose names end with the `unit` of its readings.
+
+    `residual` (3,) is what the model leaves, `residual_std` (3,) what it is expected to leave.
+    """
     return entry(
         kind, dwell, dwell.reading,
         duration_s=dwell.window.end_s - dwell.window.start_s,
@@ -88,5 +93,6 @@ def dwell_entry(kind: type[EntryT], unit: str, dwell: DwellReading | FieldReadin
             f"mean_std_{unit}": np.sqrt(dwell.reading.variance),
             f"noise_{unit}": dwell.reading.noise,
             f"residual_{unit}": residual,
+            f"residual_std_{unit}": residual_std,
         },
     )  # fmt: skip

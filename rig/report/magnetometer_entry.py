@@ -14,6 +14,7 @@ from rig.data.magnetometer_entries import (
 from rig.data.result_types import ErrorEntry
 from rig.errors import Fault
 from rig.estimation.magnetometer import MODEL, MagnetometerSolution
+from rig.estimation.residuals import attitude_residual_std
 from rig.report.axes import PARAMETERS, dwell_entry
 from rig.report.budget_entry import budget_entry
 from rig.report.entry import counted, entry
@@ -27,6 +28,7 @@ def magnetometer_entry(result: MagnetometerResult | Fault) -> MagnetometerEntry 
         return ErrorEntry(error=str(result))
     solution, error = result.solution, result.solution.fit.attitude_error
     assert error is not None, "the method finds it"
+    expected = attitude_residual_std(solution.fit, result.seen)
     return entry(
         MagnetometerEntry, result, result.sensor, solution, solution.fit,
         model=MODEL,
@@ -43,8 +45,8 @@ def magnetometer_entry(result: MagnetometerResult | Fault) -> MagnetometerEntry 
         attitude_error_rad=error.std_rad,
         attitude_error_std_rad=error.uncertainty_rad if np.isfinite(error.uncertainty_rad) else None,
         dwells=[
-            dwell_entry(FieldDwellEntry, "t", each, left)
-            for each, left in zip(result.dwells, solution.fit.residuals, strict=True)
+            dwell_entry(FieldDwellEntry, "t", *each)
+            for each in zip(result.dwells, solution.fit.residuals, expected, strict=True)
         ],
         beside={method: _beside(found) for method, found in result.beside.items()},
     )  # fmt: skip

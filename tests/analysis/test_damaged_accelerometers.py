@@ -17,7 +17,7 @@ from support.drawn_accelerations import (
     told_of,
 )
 
-PARTS = ("lsm9ds1", "mpu9250", "adis16465")
+PARTS = ("lsm9ds1", "mpu9250", "adis16465", "kvh1775")
 RATE = 1e-3 / 14  # of false alarms for each check: docs/method.md
 SMALLEST, LARGEST, STEP = 1e-6, 1.0, 1.2
 # What is planted, and how many U it may pass by: one and a half, the sizes are in docs/uncertainty.md.
@@ -84,7 +84,7 @@ def test_what_is_large_is_told(part: str, name: str, size: float) -> None:
     assert passes(DAMAGES[name][0](drawn(part, 1), size)) is None
 
 
-@pytest.mark.parametrize("part", [*PARTS, "kvh1775"])
+@pytest.mark.parametrize("part", PARTS)
 def test_a_sensor_as_its_data_sheet_lets_it_be_is_told_nothing_of_and_within_its_uncertainty(part: str) -> None:
     by = passes(drawn(part, 2))
     assert by is not None and by < 1.5

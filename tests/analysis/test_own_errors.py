@@ -13,6 +13,7 @@ from rig.data.run_file import RunData
 from rig.estimation.arrays import Array
 from rig.estimation.budget import Budget
 from rig.estimation.nonlinearity import SQUARE_MISSED
+from rig.estimation.own_errors import KnownSensor, own_errors
 from support.synthetic_run import Setup, synthetic_run
 
 PER_RAD_S = PARTS["lsm9ds1"].nonlinearity_percent / 100 / np.radians(245)
@@ -58,7 +59,7 @@ def test_a_bias_is_that_at_rest_whatever_is_even_in_the_sensors_curve_which_is_n
     (off, expanded), (off_before, expanded_before) = bias_off(EVEN), bias_off(EVEN, reckoning=1)
     assert (off < expanded).all()
     assert off.max() < 0.3 * off_before.max()
-    assert (expanded < 0.3 * expanded_before).all()
+    assert (expanded < 0.35 * expanded_before).all()
 
 
 def test_the_budget_names_what_the_data_sheet_says() -> None:
@@ -76,17 +77,54 @@ def test_several_speeds_find_the_nonlinearity_whatever_the_data_sheet_says() -> 
     assert "nonlinearity" not in {each.name for each in stated(solved(several)).contributors}
 
 
-@pytest.mark.parametrize(("steps", "looked_at"), [(2, False), (40, True)])
-def test_a_bias_that_follows_the_recorded_temperature_is_that_at_the_mean_one(steps: int, looked_at: bool) -> None:
+def test_a_bias_that_follows_the_recorded_temperature_is_that_at_the_mean_one() -> None:
     """So far from a ramp in time that a walk of the bias would not make much of it."""
     setup = Setup(noise_rad_s=3e-4)
-    warmed = _warmed(synthetic_run(setup), steps, bias_rad_s_per_k=2e-3)
+    warmed = _warmed(synthetic_run(setup), 40, bias_rad_s_per_k=2e-3)
     found = stated(calibrated([warmed]).results["gyro"])
-    line = [each for each in found.contributors if each.name == "bias over temperature"]
-    assert bool(line) == looked_at
-    if looked_at:
-        unseen = stated(calibrated([_thermometer_broken(warmed)]).results["gyro"])
-        assert found.of("bias instability")[3:].max() < 0.3 * unseen.of("bias instability")[3:].max()
+    unseen = stated(calibrated([_thermometer_broken(warmed)]).results["gyro"])
+    assert found.of("bias instability")[3:].max() < 0.3 * unseen.of("bias instability")[3:].max()
+
+
+@pytest.mark.parametrize("steps", [0, 1, 2, 3])
+def test_a_bias_follows_a_temperature_of_few_steps_and_one_that_its_steps_hide(steps: int) -> None:
+    """A pattern of each axis by what was recorded, and by half a step either way in the course of the run."""
+    step_k, per_k, windows_s = 0.1, 6e-5, 10.0 * np.arange(8)[:, None] + [0.0, 6.0]
+    recorded_c = 22 + step_k * np.round(np.linspace(0, steps, 8))
+    known = KnownSensor(0.0, 1.0, per_k, 0.0, 0.0, recorded_c, step_k)
+    errors = own_errors(known, np.eye(3), np.ones((8, 3)), windows_s, ())
+    (line,) = (each for each in errors if each.name == "bias over temperature")
+    seen, hidden = line.patterns[:3], line.patterns[3:]
+    for axis in range(3):
+        np.testing.assert_allclose(seen[axis, :, axis], per_k * (recorded_c - recorded_c.mean()), atol=1e-15)
+        np.testing.assert_allclose(hidden[axis, :, axis], per_k * step_k * np.linspace(-0.5, 0.5, 8), atol=1e-15)
+
+
+def test_a_ramp_that_a_step_of_the_thermometer_hides_is_no_walk_of_the_bias() -> None:
+    """By half a step either way, while the thermometer shows none."""
+    setup = Setup(noise_rad_s=3e-4)
+    per_k, part = 4e-3, "lsm9ds1"
+    ramp = _ramping(synthetic_run(setup), per_k / 16)
+    known = ramp.settings.uncertainty
+    assert known is not None
+    found, without = (
+        calibrated(
+            [replace(ramp, settings=replace(ramp.settings, uncertainty=replace(known, bias_deg_s_k={"gyro": said})))]
+        ).results["gyro"]
+        for said in (PARTS[part].bias_deg_s_k, 0.0)
+    )
+    assert (np.abs(found.bias_rad_s - setup.bias_rad_s) < stated(found).expanded[3:]).all()
+    assert stated(found).of("bias over temperature")[3:].max() > 0
+    instability = [stated(each).of("bias instability")[3:].max() for each in (found, without)]
+    assert instability[0] < 0.8 * instability[1]
+
+
+def _ramping(run: RunData, change_rad_s: float) -> RunData:
+    """With a bias that changes evenly by so much from the first sample to the last."""
+    samples = run.samples["gyro"].copy()
+    count = run.sensors["gyro"].sensitivity_rad_s_per_count
+    samples["counts"] += np.round(change_rad_s / count * np.linspace(-0.5, 0.5, len(samples)))[:, None].astype(np.int16)
+    return replace(run, samples={"gyro": samples})
 
 
 def _warmed(run: RunData, steps: int, bias_rad_s_per_k: float) -> RunData:

@@ -7,6 +7,7 @@ import numpy as np
 import pytest
 from scipy.spatial.transform import Rotation
 
+from rig.analysis.accelerometer_errors import Sheet, sheet_of
 from rig.analysis.reference_budgets import accelerometer_budget, magnetometer_budget
 from rig.config.attitude_sets import EIGHTEEN
 from rig.data.settings import Site
@@ -16,9 +17,11 @@ from rig.estimation.felt import Movement
 from rig.estimation.imu import solve_imu
 from rig.estimation.magnetometer import field_drift, solve_magnetometer, uniformity
 from rig.estimation.reference_budget import scale_and_bias_covariance
+from rig.plans.recorded import open_run
 from support import drawn_accelerations
 from support.arm_attitudes import attitudes_of, crooked, crooked_arm, joints_rad
 from support.arm_sweeps import Truth, planned, recorded_dwells, recorded_sweeps
+from support.frozen import RECORDINGS
 
 GRAVITY, FIELD_T = 9.81, 48e-6
 GRAVITY_U, FIELD_U = 3e-4, 2e-7  # expanded, k = 2
@@ -105,6 +108,13 @@ def check(sessions: list[Session], within: tuple[float, float], without: float) 
     assert np.sqrt(np.mean(alone[:, :3] ** 2)) > without  # or the test would pass without a budget
 
 
+BY_SHEET = {
+    "nonlinearity": "0.25 % of 2 g",
+    "bias over temperature": "0.05 mg/K",
+    "scale over temperature": "20 ppm/K",
+}
+
+
 @pytest.mark.proof
 @pytest.mark.timeout(300)
 @pytest.mark.parametrize(("session", "without"), [(accelerometer, 1.25), (magnetometer, 2.0)])
@@ -134,16 +144,43 @@ def test_the_stated_uncertainty_covers_what_a_data_sheet_lets_a_sensor_do(part: 
 
 
 def test_how_far_a_sensor_bends_is_in_its_budget_where_attitudes_do_not_tell() -> None:
-    """Named lines make up the whole, and what each leaves unknown is less where nothing else is."""
+    """Named lines make up the whole; what a data sheet bounds is of type B, and known by more than its half-width."""
     session = drawn_accelerations.drawn("adis16465", 0)
     solution, budget, _ = drawn_accelerations.solved(session)
-    lines = {line.name for line in budget.contributors}
-    assert {"nonlinearity", "temperature within the run", "bias instability"} <= lines
+    stated = {line.name: f"{line.half_width:g} {line.unit}" for line in budget.contributors if line.name in BY_SHEET}
+    assert stated == BY_SHEET
+    for line in budget.contributors:
+        if line.name in BY_SHEET:
+            assert (line.kind, line.distribution, line.freedom) == ("B", "rectangular", np.inf)
     whole = scale_and_bias_covariance(solution.matrix, 1 / np.linalg.norm(solution.matrix, axis=1), solution.covariance)
-    readings = {"noise", "arm's attitudes", "bias instability", "temperature within the run", "nonlinearity"}
+    readings = {"noise", "arm's attitudes", "bias instability", "flicker of the bias", *BY_SHEET}
     parts = sum(line.covariance for line in budget.contributors if line.name in readings)
     np.testing.assert_allclose(np.diag(parts), np.diag(whole), rtol=1e-6)
-    assert np.all(budget.of("nonlinearity")[3:] > budget.of("noise")[3:])  # the bias is the reading at 0 g
+    own = session.movement.own
+    assert own is not None
+    assert np.all(budget.of("nonlinearity")[3:] < 0.01 * own.even_s2_m * GRAVITY**2)  # the attitudes tell the rest
+
+
+def test_a_quiet_sensor_s_flicker_and_what_its_thermometer_hides_are_in_its_budget() -> None:
+    """By the least Allan deviation, and by half a step over the run: no more than that makes of a mean."""
+    _, budget, _ = drawn_accelerations.solved(drawn_accelerations.drawn("adis16465", 0))
+    (line,) = (line for line in budget.contributors if line.name == "flicker of the bias")
+    assert (line.kind, line.distribution, line.source) == ("B", "normal", "least Allan deviation: 3.6 µg")
+    assert np.all((line.std[3:] > 0.2 * 3.6e-6 * GRAVITY) & (line.std[3:] < 3.6e-6 * GRAVITY))
+    assert np.all(budget.of("bias over temperature")[3:] > 0)
+
+
+def test_a_sheet_is_what_the_recording_says_and_the_part_s_where_it_says_nothing() -> None:
+    recording = open_run(RECORDINGS / "rig.settings-7" / "imu").movement[0]
+    known, sensor = recording.settings.uncertainty, recording.sensors["gyro"]
+    assert known is not None
+    assert sheet_of(known, "gyro", sensor) == Sheet(0.5, 2.0, 1.5, 260, 30)
+    said = replace(
+        known, acceleration_nonlinearity_percent={"gyro": 0.1}, acceleration_nonlinear_over_g={"gyro": 1.0},
+        acceleration_bias_mg_k={"gyro": 0.2}, acceleration_scale_ppm_k={"gyro": 30.0},
+        acceleration_bias_instability_ug={"gyro": 4.0},
+    )  # fmt: skip
+    assert sheet_of(said, "gyro", sensor) == Sheet(0.1, 1.0, 0.2, 30.0, 4.0)
 
 
 @pytest.mark.parametrize(

@@ -11,8 +11,10 @@ from rig.analysis.loads import loads_rad_s
 from rig.analysis.outcome import calibrated
 from rig.analysis.when import of_gyroscope
 from rig.data.run_file import RunData
+from rig.plans.recorded import open_run
 from rig.report.document import document_of
 from rig.report.validity_words import load_words, when_words
+from support.frozen import RECORDINGS
 from support.synthetic_run import Setup, synthetic_run
 
 COUNTS_PER_K = 16
@@ -52,6 +54,16 @@ def test_a_result_keeps_its_temperature_and_says_both_beside_it() -> None:
     assert sensor.scale_at.temperature_c == pytest.approx(sensor.temperature_c)
     low, high = sensor.bias_at.temperature_range_c or (0.0, 0.0)
     assert f"was between {low:.2f} and {high:.2f} °C" in when_words(sensor.bias_at)
+
+
+def test_an_accelerometer_s_scale_and_bias_are_those_at_the_temperature_that_is_said() -> None:
+    run = open_run(RECORDINGS / "rig.settings-7" / "imu").movement[0]
+    result = calibrated([warming(run)])
+    entry, found = document_of(result).accelerometers["gyro"], result.accelerometers["gyro"]
+    assert entry.found_at is not None and entry.temperature_c == pytest.approx(entry.found_at.temperature_c)
+    dwells_c, own = [dwell.temperature_c for dwell in found.dwells], found.movement.own
+    assert own is not None and abs(entry.temperature_c - float(np.mean(dwells_c))) > 0.1
+    np.testing.assert_allclose(own.warmer_k[: len(dwells_c)], np.subtract(dwells_c, entry.temperature_c))
 
 
 def test_what_was_recorded_again_was_read_when_it_was_recorded_last() -> None:

@@ -8,7 +8,8 @@ import pytest
 from rig.arm.motion import Plan
 from rig.config.load import load, parse
 from rig.config.procedure_sections import SixSweepsSection
-from rig.data.settings import RunSettings, settings_from_json, settings_of
+from rig.config.sensor_catalogue import PARTS
+from rig.data.settings import OF_SENSORS, RunSettings, settings_from_json, settings_of
 from rig.data.settings_of_run_1 import settings_of_configuration
 from rig.errors import Refused
 from rig.plans.six_sweeps import plan_six_observation
@@ -29,6 +30,16 @@ def test_what_is_recorded_comes_back() -> None:
     assert made.then_verify
     assert made.reference is not None
     assert settings_from_json(made.to_json()) == made
+
+
+def test_what_is_known_of_a_sensor_is_recorded_its_part_s_where_nothing_is_said() -> None:
+    """So that a catalogue of tomorrow changes no recording."""
+    said = settings("uncertainty: {acceleration_bias_mg_k: 0.7}\n" + VERIFIED).uncertainty
+    assert said is not None
+    for what in OF_SENSORS:
+        part = getattr(PARTS["adis16465"], what)
+        assert getattr(said, what)["reference"] == (0.7 if what == "acceleration_bias_mg_k" else part)
+    assert said.of("acceleration_bias_instability_ug", "another", "adis16465") == 3.6
 
 
 @pytest.mark.parametrize("name", ["calibration", "verified"])

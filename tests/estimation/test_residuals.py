@@ -4,7 +4,8 @@ import numpy as np
 import pytest
 
 from rig.estimation.explained import Explained, Seen, explain
-from rig.estimation.residuals import residual_std_rad_s
+from rig.estimation.residuals import dwell_residual_std_m_s2, residual_std_rad_s
+from support import drawn_accelerations
 
 SPEED_RAD_S, NOISE_RAD_S, SPEED_STD_RAD_S = 1.0, 2e-4, 1.5e-4
 MATRIX = np.array([[1.1, 0.02, 0.0], [0.0, 0.9, 0.01], [0.01, 0.0, 1.05]])
@@ -42,3 +43,15 @@ def test_residuals_scatter_by_what_is_expected_of_them(walk_rad_s_sqrt_s: float,
     ratio = np.array([each.solution.residuals_rad_s / residual_std_rad_s(each) for each in sessions])
     assert np.sqrt(np.mean(ratio**2)) == pytest.approx(1.0, abs=within)
     assert 0.92 < np.mean(np.abs(ratio) < 2) < 0.985
+
+
+@pytest.mark.parametrize("part", ["lsm9ds1", "mpu9250", "adis16465", "kvh1775"])
+def test_sensors_within_their_data_sheets_leave_what_the_solve_expects_of_them(part: str) -> None:
+    """Two standard deviations hold nine tenths and more; noise and attitudes alone would make it two to six."""
+    within = []
+    for seed in range(8):
+        session = drawn_accelerations.drawn(part, seed)
+        solution, _, _ = drawn_accelerations.solved(session)
+        expected = dwell_residual_std_m_s2(solution, session.movement)
+        within.append(np.abs(solution.dwell_residuals_m_s2) <= 2 * expected)
+    assert 0.9 < np.mean(within) < 0.99

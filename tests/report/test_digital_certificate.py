@@ -82,6 +82,24 @@ def test_accelerometers_and_verifications_are_valid_too(stated: Stated) -> None:
     assert schema_faults(xml) == []
 
 
+def test_scale_factors_and_biases_say_each_how_warm_their_item_was() -> None:
+    sensor = result().sensors["gyro"]
+    assert sensor.scale_at is not None and sensor.bias_at is not None
+    colder = sensor.bias_at.model_copy(update={"temperature_c": 21.25})
+    changed = {"sensors": {"gyro": sensor.model_copy(update={"bias_at": colder})}}
+    xml = digital_certificate(certificate(result().model_copy(update=changed), SILENT))
+    conditions = {
+        str(each.findtext("dcc:name/dcc:content", namespaces=NAMES)): float(
+            str(each.findtext(".//si:value", None, NAMES))
+        )
+        for each in found(xml, "dcc:influenceCondition")
+    }
+    assert conditions == {
+        "temperature of the item at the scale factors, by its own thermometer": sensor.scale_at.temperature_c,
+        "temperature of the item at the biases, by its own thermometer": 21.25,
+    }
+
+
 def of_everything(stated: Stated = LABORATORY, *, turned: bool = True) -> bytes:
     document = everything()
     reversals = {"compass": reversal(document)} if turned else {}

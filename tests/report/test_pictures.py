@@ -3,10 +3,15 @@
 import numpy as np
 import pytest
 
+from rig.analysis.calibration import DEFAULT_ESTIMATOR
+from rig.data.magnetometer_entries import MagnetometerEntry
 from rig.data.result_file import ResultDocument, VectorEntry, read_result
+from rig.plans.recorded import judged, open_run
 from rig.report.certificate.page import certificate_page
 from rig.report.certificate.plots import (
     EXPECTED,
+    EXPECTED_OF_ACCELERATIONS,
+    EXPECTED_OF_FIELDS,
     HEIGHT,
     OF_ATTITUDES,
     OF_SAMPLES,
@@ -16,6 +21,7 @@ from rig.report.certificate.plots import (
     field_residuals,
     residuals,
 )
+from rig.report.document import document_of
 from rig.report.printed_budget import printed_budget
 from support.certified import accelerometer, certificate, everything, magnetometer, read, result
 from support.frozen import RECORDINGS
@@ -58,6 +64,22 @@ def test_bars_of_attitudes_hold_the_arm_s_error_across_gravity_and_noise_alone_a
     np.testing.assert_allclose(bars(picture), [[2e3 * noise, across, across]], atol=0.02 * across)
     field = magnetometer()
     assert field_residuals(field).of == OF_ATTITUDES
+
+
+def test_bars_of_attitudes_are_what_the_solve_expects_of_them_where_it_says_so() -> None:
+    document = document_of(judged(open_run(RECORDINGS / "rig.settings-6" / "magnetometer"), DEFAULT_ESTIMATOR))
+    (acceleration,), (field,) = document.accelerometers.values(), document.magnetometers.values()
+    assert isinstance(field, MagnetometerEntry)
+    pictures = (
+        (acceleration_residuals(acceleration), [each.residual_std_m_s2 for each in acceleration.dwells]),
+        (field_residuals(field), [each.residual_std_t for each in field.dwells]),
+    )
+    for picture, expected in pictures:
+        assert picture.of in (EXPECTED_OF_ACCELERATIONS, EXPECTED_OF_FIELDS)
+        told = 2 * np.array(expected, dtype=np.float64)
+        drawn = bars(picture)
+        np.testing.assert_allclose(drawn * (told.max() / drawn.max()), told, atol=0.02 * told.max())
+        assert 0.85 * len(picture.points) <= picture.within
 
 
 def test_frozen_attitudes_agree_with_their_bars() -> None:

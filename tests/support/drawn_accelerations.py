@@ -5,7 +5,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from rig.analysis.accelerometer_errors import STANDARD
+from rig.analysis.accelerometer_errors import MILLI_G, STANDARD, Piece, Sheet, errors_of
 from rig.analysis.arm_patterns import Known, Stood, arm_patterns, arm_turns
 from rig.analysis.reference_budgets import accelerometer_budget
 from rig.analysis.reference_consistency import reference_consistency
@@ -14,9 +14,10 @@ from rig.arm.kinematics import NOMINAL, WRIST_1
 from rig.config.attitude_sets import EIGHTEEN
 from rig.config.sensor_catalogue import PARTS
 from rig.data.settings import Site
-from rig.estimation.accelerometer_errors import AccelerometerErrors
 from rig.estimation.arrays import Array
+from rig.estimation.bias_process import flicker_covariance
 from rig.estimation.budget import Budget
+from rig.estimation.earth import MICRO_G_M_S2
 from rig.estimation.felt import Movement, felt
 from rig.estimation.imu import ImuSolution, solve_imu
 from rig.estimation.reading_errors import of_pieces, of_sensor, per_axis
@@ -26,9 +27,11 @@ from support.arm_sweeps import DWELL_S, Truth, joints_at, planned, recorded_dwel
 GRAVITY = 9.80665
 SITE = Site(up=(0.0, 0.0, 1.0), gravity_m_s2=GRAVITY, earth_rate_rad_s=None, gravity_expanded_m_s2=1e-5)
 RANGES_G = {"lsm9ds1": 2.0, "mpu9250": 2.0, "adis16465": 8.0, "kvh1775": 10.0}
+STEPS_K = {"lsm9ds1": 1 / 16, "mpu9250": 1 / 333.87, "adis16465": 0.1, "kvh1775": 1.0}
 JOINTS, AXES = joints_rad(EIGHTEEN), 6
 SWEEP_S, BETWEEN_S = 6.0, 8.0
 ASKEW = np.array([1.0, -0.7, 0.5])
+SAMPLE_RATE_HZ = 200.0
 WARMER_K = 0.3  # either way, in a run
 AVERAGED = 500.0  # readings in a mean
 
@@ -66,9 +69,21 @@ class Session:
         return replace(self, movement=movement, parameters=self.parameters + then)
 
 
+def sheet_of(part: str) -> Sheet:
+    """What is known of an accelerometer of that kind."""
+    known = PARTS[part].accelerometer
+    return Sheet(
+        known.nonlinearity_percent,
+        known.nonlinear_over_g or RANGES_G[part],
+        known.bias_mg_k,
+        known.scale_ppm_k,
+        known.bias_instability_ug,
+    )
+
+
 def drawn(part: str, seed: int, arm_rad: float = 1e-4) -> Session:
     """Eighteen dwells after sweeps about six axes, at temperatures that stray."""
-    rng, sheet = np.random.default_rng([seed, 7]), PARTS[part].accelerometer
+    rng, sheet = np.random.default_rng([seed, 7]), sheet_of(part)
     density = PARTS[part].acceleration_noise_ug_sqrt_hz
     truth = Truth(
         matrix=np.diag(1 + 0.02 * rng.normal(size=3)) @ (np.eye(3) + 0.005 * rng.normal(size=(3, 3))),
@@ -81,31 +96,27 @@ def drawn(part: str, seed: int, arm_rad: float = 1e-4) -> Session:
     straight = Movement(
         recorded_dwells(truth, arm, JOINTS, density, rng), recorded_sweeps(truth, arm, turned, density, rng)
     )
-    whole = (sheet.nonlinear_over_g or RANGES_G[part]) * GRAVITY
-    even, odd = 0.02 * sheet.nonlinearity_percent / whole, 0.04 * sheet.nonlinearity_percent / whole**2
-    bias_k = 1e-3 * sheet.bias_mg_k * GRAVITY
+    even, odd, bias_k = sheet.even_s2_m, sheet.odd_s4_m2, MILLI_G * MICRO_G_M_S2 * sheet.bias_mg_k
     start_s = BETWEEN_S * np.concatenate([len(turned) + np.arange(len(JOINTS)), np.arange(len(turned))])
     length_s = np.repeat([DWELL_S, SWEEP_S], [len(JOINTS), len(turned)])
-    warmer_k = WARMER_K * np.sin(start_s / 60 + rng.uniform(0, 2 * np.pi))
-    warmer_k -= warmer_k[: len(JOINTS)].mean()
+    warm_c = 22 + WARMER_K * np.sin(start_s / 60 + rng.uniform(0, 2 * np.pi))
     stood = [*map(Stood, JOINTS), *(Stood(joints_at(each, np.zeros(1))[0], each.joint - WRIST_1) for each in turned)]
-    own = AccelerometerErrors(
-        even_s2_m=even / STANDARD,
-        odd_s4_m2=odd / STANDARD,
-        norm_m_s2=GRAVITY,
-        bias_m_s2_k=bias_k / STANDARD,
-        scale_per_k=1e-6 * sheet.scale_ppm_k / STANDARD,
-        warmer_k=warmer_k,
-        windows_s=np.column_stack([start_s, start_s + length_s]),
-    )
+    pieces = [
+        Piece((start, start + length), round(SAMPLE_RATE_HZ * length), warm, place)
+        for start, length, warm, place in zip(start_s, length_s, warm_c, stood, strict=True)
+    ]
+    own = errors_of(sheet, pieces, STEPS_K[part], second_order=False)
     movement = replace(straight, own=own, arm_turns=arm_turns(stood, NOMINAL, np.eye(3)))
     session = Session(part, truth, movement, _parameters(truth, np.zeros(3)), arm_rad)
     chi, theta = rng.uniform(-odd, odd, 3), truth.theta()
-    warm = of_pieces(warmer_k, movement)
+    warm = of_pieces(own.warmer_k + rng.uniform(-1, 1) * own.unseen_k, movement)
     bent = of_sensor(theta, movement, np.square) @ rng.uniform(-even, even, 3)
     bent += of_sensor(theta, movement, lambda along: along**3) @ chi
     bent += per_axis((warm * movement.constant())[:, None] * np.ones(3)) @ rng.uniform(-bias_k, bias_k, 3)
     bent += per_axis(_along(session) * warm[:, None]) @ (1e-6 * sheet.scale_ppm_k * rng.uniform(-1, 1, 3))
+    flickered = rng.multivariate_normal(np.zeros(len(pieces)), flicker_covariance(own.windows_s), 3)
+    flickering = movement.constant() * [of_pieces(each, movement) for each in flickered]
+    bent += own.instability_m_s2 * flickering.T.ravel()
     return session.reading(bent, _parameters(truth, chi) - session.parameters)
 
 
@@ -116,7 +127,7 @@ def solved(session: Session) -> tuple[ImuSolution, Budget, Array]:
         movement.dwells, movement.sweeps, gravity_m_s2=GRAVITY, own=movement.own, arm_turns=movement.arm_turns
     )
     freedom = np.full(movement.readings().size, AVERAGED)
-    budget = accelerometer_budget(solution, movement, SITE, 0.0, part=session.part, noise_freedom=freedom)
+    budget = accelerometer_budget(solution, movement, SITE, 0.0, sheet=sheet_of(session.part), noise_freedom=freedom)
     found = np.concatenate([1 / np.linalg.norm(solution.matrix, axis=1), solution.bias_m_s2])
     return solution, budget, found - session.parameters
 

@@ -4,12 +4,14 @@ Numbers stand in full here; the page rounds them. What the laboratory has not st
 which PTB's rules want to be one of ISO 3166-1.
 """
 
-from collections.abc import Iterator
+from collections.abc import Iterator, Mapping
+from types import MappingProxyType
 from typing import Final
 from xml.etree.ElementTree import Element, tostring
 
 from rig.config.sensor_catalogue import has_own_port
-from rig.data.result_file import CheckEntry
+from rig.data.accelerometer_entries import AccelerometerEntry
+from rig.data.result_file import CheckEntry, SensorEntry
 from rig.errors import Refused
 from rig.report.certificate.content import Certificate
 from rig.report.certificate.dcc_results import (
@@ -27,6 +29,7 @@ from rig.report.certificate.xml_parts import UNSAID, XSI, Part, dcc, real, text,
 DCC: Final = "certificate.xml"
 SCHEMA_VERSION = "3.2.1"
 DESCRIBED = "docs/method.md and docs/uncertainty.md of calibration-rig"
+NOT_MEASURED: Mapping[str, float | None] = MappingProxyType({})
 # PTB's rules want a condition to each quantity.
 UNKNOWN_AIR = dcc(
     "influenceConditions",
@@ -196,28 +199,49 @@ def _conformity(check: CheckEntry, rule: str) -> Element:
 def _results(c: Certificate) -> Iterator[Element]:
     for i, each in enumerate(c.gyroscopes):
         yield _measured(c, f"gyroscope-{i}", f"calibration of gyroscope {each.name}", gyroscope(each),
-                        each.sensor.temperature_c)  # fmt: skip
+                        _while_turned(each.sensor))  # fmt: skip
         if each.verification is not None:
             results = verification(each.verification)
-            yield _measured(c, f"gyroscope-{i}", f"verification of gyroscope {each.name}", results, None)
+            yield _measured(c, f"gyroscope-{i}", f"verification of gyroscope {each.name}", results)
     for i, (name, found) in enumerate(c.accelerometers.items()):
         yield _measured(c, f"accelerometer-{i}", f"calibration of accelerometer {name}", accelerometer(found),
-                        found.temperature_c)  # fmt: skip
+                        _of_readings(found))  # fmt: skip
     for i, (name, field) in enumerate(c.magnetometers.items()):
         turned = c.reversals.get(name)
         own = () if turned is None else tuple(reversed_magnetometer(turned))
         results = iter((*own, *magnetometer(field)))
-        yield _measured(c, f"magnetometer-{i}", f"calibration of magnetometer {name}", results, None)
+        yield _measured(c, f"magnetometer-{i}", f"calibration of magnetometer {name}", results)
     watched = _watched(c)
     for name, quantity, drift in c.drifts:
         key = _calibrated_as(c, name, quantity) or f"watched-{watched.index(name)}"
-        yield _measured(c, key, f"bias by repeat of {name}, {quantity}", bias_drift(drift), None)
+        yield _measured(c, key, f"bias by repeat of {name}, {quantity}", bias_drift(drift))
 
 
-def _measured(c: Certificate, item: str, name: str, results: Iterator[Element], temperature_c: float | None) -> Element:
+def _while_turned(sensor: SensorEntry) -> dict[str, float | None]:
+    """How warm a gyroscope was, by what of it was read then: scale factors come from the sweeps alone."""
+    if sensor.scale_at is None or sensor.bias_at is None:
+        return {"": sensor.temperature_c}
+    return {" at the scale factors": sensor.scale_at.temperature_c, " at the biases": sensor.bias_at.temperature_c}
+
+
+def _of_readings(found: AccelerometerEntry) -> dict[str, float | None]:
+    """How warm an accelerometer was, scale factors and biases the same."""
+    return {"": found.temperature_c if found.found_at is None else found.found_at.temperature_c}
+
+
+def _measured(
+    c: Certificate,
+    item: str,
+    name: str,
+    results: Iterator[Element],
+    temperatures_c: Mapping[str, float | None] = NOT_MEASURED,
+) -> Element:
     site = c.stated.where
     conditions = [
-        _condition("temperature of the item, by its own thermometer", temperature_c, r"\degreecelsius"),
+        *(
+            _condition(f"temperature of the item{of}, by its own thermometer", each, r"\degreecelsius")
+            for of, each in temperatures_c.items()
+        ),
         _condition("ambient temperature", site.ambient_temperature_c, r"\degreecelsius"),
         _condition("ambient relative humidity", site.ambient_humidity_percent, r"\percent"),
     ]

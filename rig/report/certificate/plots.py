@@ -22,6 +22,8 @@ RATES = ((1e3, "mrad/s"), (1e6, "µrad/s"))
 ACCELERATIONS = ((1.0, "m/s²"), (1e3, "mm/s²"), (1e6, "µm/s²"))
 FIELDS = ((1e6, "µT"), (1e9, "nT"))
 EXPECTED = "what noise, a wandering bias and the ends of turns are expected to leave"
+EXPECTED_OF_ACCELERATIONS = "what noise, the arm's attitudes and a sensor within its data sheet are expected to leave"
+EXPECTED_OF_FIELDS = "what noise and the arm's attitudes are expected to leave"
 OF_SAMPLES = "the samples' scatter over the root of their number, which holds vibration that a mean leaves out"
 OF_ATTITUDES = "noise and of the arm's attitudes"
 OF_REPEATS = "what differs between repeats"
@@ -86,19 +88,22 @@ def residuals(sensor: SensorEntry) -> Residuals | None:
 
 def acceleration_residuals(found: AccelerometerEntry) -> Residuals:
     """What the model leaves of each attitude."""
-    left, std, mean = (
-        np.array([getattr(each, name) for each in found.dwells])
-        for name in ("residual_m_s2", "mean_std_m_s2", "mean_m_s2")
-    )
+    left = np.array([each.residual_m_s2 for each in found.dwells])
+    expected = [each.residual_std_m_s2 for each in found.dwells if each.residual_std_m_s2 is not None]
+    if len(expected) == len(left):
+        return _marked(left, np.array(expected), ACCELERATIONS, EXPECTED_OF_ACCELERATIONS)
+    std, mean = np.array([(each.mean_std_m_s2, each.mean_m_s2) for each in found.dwells]).swapaxes(0, 1)
     turned = _turned(np.array(found.matrix), mean - np.array(found.bias_m_s2), found.attitude_error_rad)
     return _marked(left, np.hypot(std, turned), ACCELERATIONS, OF_ATTITUDES)
 
 
 def field_residuals(found: MagnetometerEntry) -> Residuals:
     """The same of a magnetometer."""
-    left, std, mean = (
-        np.array([getattr(each, name) for each in found.dwells]) for name in ("residual_t", "mean_std_t", "mean_t")
-    )
+    left = np.array([each.residual_t for each in found.dwells])
+    expected = [each.residual_std_t for each in found.dwells if each.residual_std_t is not None]
+    if len(expected) == len(left):
+        return _marked(left, np.array(expected), FIELDS, EXPECTED_OF_FIELDS)
+    std, mean = np.array([(each.mean_std_t, each.mean_t) for each in found.dwells]).swapaxes(0, 1)
     turned = _turned(np.array(found.matrix), mean - np.array(found.bias_t), found.attitude_error_rad)
     return _marked(left, np.hypot(std, turned), FIELDS, OF_ATTITUDES)
 
