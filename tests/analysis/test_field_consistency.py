@@ -41,7 +41,7 @@ def read_of(seed: int) -> Read:
     known = Known(NOMINAL, float(np.degrees(np.sqrt(3) * ARM_RAD)), np.eye(3), off_rad)
     drift, _ = drift_patterns(found.matrix, told, None)
     of_arm = arm_patterns(theta, movement, [Stood(each) for each in JOINTS], known)
-    times_s = 5.0 * np.arange(len(JOINTS), dtype=np.float64)
+    times_s = np.linspace(0.0, 5.0 * len(JOINTS), len(JOINTS))
     return Read(theta, movement, np.concatenate([drift / np.sqrt(3), of_arm]), times_s, second_order=False)
 
 
