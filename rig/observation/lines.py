@@ -11,7 +11,7 @@ from rig.observation.tapered import MAIN_LOBE, shaped
 
 STANDS_OUT = 30.0  # over the median power: of noise one bin in 10⁹ does
 AROUND = 161  # bins, of which the median is taken
-MOST_LINES = 6
+MOST_LINES = 8  # three of a servo, and what shakes in the room, which a turning sensor may feel as two
 SLOWEST = 8  # cycles in all the readings: what is slower is told badly from what the parts differ by
 APART = 2.5  # cycles in all the readings, from a line that was found
 PASSES = 2
