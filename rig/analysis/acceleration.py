@@ -155,7 +155,9 @@ def _calibrated(
     movement, sheet = Movement(seen, sweeps, _repeatability_rad(settings)), None
     temperature_c = float(np.mean([dwell.temperature_c for dwell in used]))
     if settings.knows_accelerometers and settings.uncertainty is not None:
-        pieces, sheet = pieces_of(name, recordings, used), sheet_of(settings.uncertainty, name, sensor)
+        assert sensor.range_m_s2 is not None, "or it has no accelerometer"
+        sheet = sheet_of(settings.uncertainty, name, sensor.part, sensor.range_m_s2)
+        pieces = pieces_of(name, recordings, used)
         arm, temperature_c = recordings[0].motion.kinematics, mean_temperature_c(pieces)
         movement = with_errors(movement, pieces, sensor, sheet, arm, second_order=settings.second_order)
     weighted = _beside(partial(solve, method="attitude_weighted"))

@@ -54,16 +54,15 @@ class Sheet:
         return 0.04 * self.nonlinearity_percent / (self.over_g * STANDARD_GRAVITY_M_S2) ** 2
 
 
-def sheet_of(known: Uncertainty, name: str, sensor: RecordedSensor) -> Sheet:
+def sheet_of(known: Uncertainty, name: str, part: str, range_m_s2: float) -> Sheet:
     """Of the sensor of that name."""
-    assert sensor.range_m_s2 is not None, "or it has no accelerometer"
 
     def of(what: OfSensor) -> float:
-        return known.of(what, name, sensor.part)
+        return known.of(what, name, part)
 
     return Sheet(
         nonlinearity_percent=of("acceleration_nonlinearity_percent"),
-        over_g=of("acceleration_nonlinear_over_g") or sensor.range_m_s2 / STANDARD_GRAVITY_M_S2,
+        over_g=of("acceleration_nonlinear_over_g") or range_m_s2 / STANDARD_GRAVITY_M_S2,
         bias_mg_k=of("acceleration_bias_mg_k"),
         scale_ppm_k=of("acceleration_scale_ppm_k"),
         bias_instability_ug=of("acceleration_bias_instability_ug"),

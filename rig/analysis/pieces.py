@@ -53,9 +53,9 @@ class Window:
     """The samples of one revolution or rest.
 
     `sweep` is the place of the revolution among all of the sensor's, −1 for a rest; `counts` (n, 3) are the readings
-    as recorded, `residual_counts` (m, 3) what of a reading neither its part's mean nor the arm's vibration explains, nor
-    in a rest what vibrates beside it, where the arm's motion is known; `vibration_counts` (3,) is the RMS of the arm's
-    vibration, `lines_hz` (k,) are the frequencies of what vibrates.
+    as recorded, `residual_counts` (m, 3) what of a reading neither its part's mean nor the arm's vibration explains,
+    nor in a rest what vibrates beside it, where the arm's motion is known; `vibration_counts` (3,) is the RMS of the
+    arm's vibration, `lines_hz` (k,) are the frequencies of what vibrates.
     """
 
     sweep: int

@@ -1,13 +1,16 @@
 """What the checks of a run will tell, by its plan: the same checks, of readings that nothing is wrong with. Pure."""
 
 from collections.abc import Mapping
+from dataclasses import dataclass
 
 import numpy as np
 
+from rig.analysis import reference_consistency, reference_suspected
 from rig.analysis.allowance import allow, allowed_of, any_earth_rate
 from rig.analysis.consistency import would_tell
 from rig.analysis.contradictions import rate_of_each
 from rig.analysis.planned_pieces import Planned, planned_pieces
+from rig.analysis.planned_reference import planned_read
 from rig.analysis.suspected import DAMAGES
 from rig.analysis.told_from import ToldFrom
 from rig.arm.motion import Plan
@@ -19,19 +22,44 @@ from rig.estimation.nonlinearity import distinct_speeds
 from rig.estimation.own_errors import KnownSensor
 
 
-def planned_told_from(config: RigConfig, plan: Plan) -> Mapping[str, tuple[ToldFrom, ...]]:
-    """Of each gyroscope to calibrate, by name; empty where nothing is swept.
+@dataclass(frozen=True, slots=True)
+class Told:
+    """By sensor: of gyroscopes where anything is swept, of accelerometers where attitudes are held."""
+
+    rates: Mapping[str, tuple[ToldFrom, ...]]
+    accelerations: Mapping[str, tuple[ToldFrom, ...]]
+
+
+def planned_told_from(config: RigConfig, plan: Plan) -> Told:
+    """Of all that is to be calibrated but magnetometers.
 
     For the nominal arm, and for a sensor as its data sheet has it, which nothing but its noise and its flicker makes
     wander.
     """
-    if not plan.sweeps:
-        return {}
     settings = settings_of(config, plan)
-    assert settings.site is not None, "or these are no settings of today"
-    turned = planned_pieces(plan, settings.site, np.array(settings.extension_m))
     kinds = sum(1 + (each.acceleration is not None) for each in config.to_calibrate.values())
     rate = rate_of_each(kinds + len(config.all_sensors) - len(config.sensors), by_model=True)
+    rates = _of_rates(config, plan, settings, rate) if plan.sweeps else {}
+    at_rest = {
+        name: each for name, each in config.to_calibrate.items() if plan.dwells and each.acceleration is not None
+    }
+    return Told(rates, {name: _of_accelerations(name, each, plan, settings, rate) for name, each in at_rest.items()})
+
+
+def _of_accelerations(
+    name: str, sensor: SensorSection, plan: Plan, settings: RunSettings, rate: float
+) -> tuple[ToldFrom, ...]:
+    found = reference_consistency.would_tell(planned_read(name, sensor, plan, settings), rate)
+    return tuple(
+        ToldFrom(each.what, f"acceleration_{each.check}", found[each.what], each.unit or "m/s²")
+        for each in reference_suspected.DAMAGES
+        if each.what in found
+    )
+
+
+def _of_rates(config: RigConfig, plan: Plan, settings: RunSettings, rate: float) -> Mapping[str, tuple[ToldFrom, ...]]:
+    assert settings.site is not None, "or these are no settings of today"
+    turned = planned_pieces(plan, settings.site, np.array(settings.extension_m))
     return {name: _told_from(name, each, turned, settings, rate) for name, each in config.to_calibrate.items()}
 
 

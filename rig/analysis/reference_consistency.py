@@ -135,19 +135,30 @@ def reference_consistency(read: Read, rate: float, *, drifting: bool = False) ->
     held, suspected = _held(read, drifting=drifting), suspicions(read)
     pieces = range(read.dwells + read.sweeps)
     ranked = unlike_the_others(held, pieces, lambda piece: of_piece(read, piece), rate)
-    statistics = told_by(held, suspected, rate)
-    asked = {name: ([columns], rate) for name in statistics if (columns := suspected[name]) is not None}
-    asked["disturbed_dwell"] = [of_piece(read, piece) for piece in pieces[: read.dwells]], rate / len(pieces)
     return ReferenceConsistency(
-        statistics,
+        told_by(held, suspected, rate),
         ranked[0][1],
         {piece: statistic for piece, statistic in ranked if statistic[0] > statistic[1]},
-        {
-            damage.what: held.told_from(damage.patterns(read), *asked[damage.check])
-            for damage in DAMAGES
-            if damage.check in asked
-        },
+        _told_from(held, read, rate),
     )
+
+
+def would_tell(read: Read, rate: float, *, drifting: bool = False) -> dict[str, float]:
+    """`told_from` alone."""
+    return _told_from(_held(read, drifting=drifting), read, rate)
+
+
+def _told_from(held: HeldReadings, read: Read, rate: float) -> dict[str, float]:
+    """By what happens; nothing of what the model takes up."""
+    pieces = read.dwells + read.sweeps
+    asked = {name: ([columns], rate) for name, columns in suspicions(read).items() if columns is not None}
+    asked["disturbed_dwell"] = [of_piece(read, dwell) for dwell in range(read.dwells)], rate / pieces
+    found = {
+        damage.what: held.told_from(damage.patterns(read), *asked[damage.check])
+        for damage in DAMAGES
+        if damage.check in asked
+    }
+    return {what: size for what, size in found.items() if np.isfinite(size)}
 
 
 def _held(read: Read, *, drifting: bool) -> HeldReadings:

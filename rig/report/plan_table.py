@@ -11,6 +11,7 @@ from rich.console import Console
 from rich.table import Table
 
 from rig.analysis.attitude_account import AttitudeAccount
+from rig.analysis.planned import Told
 from rig.analysis.told_from import ToldFrom
 from rig.arm.motion import SAME_PLACE_RAD, Dwell, Plan, Rest, Step, Sweep
 from rig.arm.state import JOINT_NAMES
@@ -18,26 +19,24 @@ from rig.report.attitude_account import account_document, print_account
 from rig.report.told_words import size_words, told_from_entries
 from rig.station.plain_text import plain
 
-Told = Mapping[str, Sequence[ToldFrom]]  # by sensor
 
-
-def plan_document(plan: Plan, account: AttitudeAccount | None, told_from: Told, *, repeated: bool) -> dict[str, Any]:
+def plan_document(plan: Plan, account: AttitudeAccount | None, told: Told, *, repeated: bool) -> dict[str, Any]:
     """The plan for machines: SI units, every field of every step; `repeated` if it is done once more, to verify."""
     steps = [{"kind": type(step).__name__.lower(), **asdict(step)} for step in plan.steps]
     document = {"schema": "rig.plan/1", "duration_s": plan.duration_s, "repeated": repeated, "steps": steps}
     if account is not None:
         document |= {"settling_s": plan.settling_s, "attitudes": account_document(account)}
-    if told_from:
-        document["told_from"] = {
-            name: [each.model_dump() for each in told_from_entries(found)] for name, found in told_from.items()
-        }
+    for key, by_sensor in (("told_from", told.rates), ("acceleration_told_from", told.accelerations)):
+        if by_sensor:
+            found = {name: told_from_entries(each) for name, each in by_sensor.items()}
+            document[key] = {name: [each.model_dump() for each in entries] for name, entries in found.items()}
     return document
 
 
-def print_plan(plan: Plan, account: AttitudeAccount | None, told_from: Told, *, repeated: bool, as_json: bool) -> None:
+def print_plan(plan: Plan, account: AttitudeAccount | None, told: Told, *, repeated: bool, as_json: bool) -> None:
     """The plan on stdout: a table in degrees for people, JSON in SI units for machines."""
     if as_json:
-        print(json.dumps(plan_document(plan, account, told_from, repeated=repeated), indent=2, allow_nan=False))
+        print(json.dumps(plan_document(plan, account, told, repeated=repeated), indent=2, allow_nan=False))
         return
     console = Console(highlight=False)
     table = Table(title="plan, from the home pose", title_justify="left", box=SIMPLE)
@@ -61,22 +60,24 @@ def print_plan(plan: Plan, account: AttitudeAccount | None, told_from: Told, *, 
         console.print(f"If the calibration passes, the same once more to verify it: {2 * plan.duration_s:.1f} s in all")
     if account is not None:
         print_account(console, account)
-    if told_from:
-        _print_told(console, told_from)
+    if told.rates or told.accelerations:
+        console.print(
+            "What happens meanwhile is told in 95 of 100 runs from these sizes on, of parts as data sheets have them:"
+        )
+    for what, by_sensor in (("to gyroscopes", told.rates), ("to accelerometers", told.accelerations)):
+        if by_sensor:
+            console.print(_told_table(what, by_sensor))
 
 
-def _print_told(console: Console, told_from: Told) -> None:
-    """What would contradict itself, a row for each thing that may happen, a column for each gyroscope."""
-    console.print(
-        "What happens meanwhile is told in 95 of 100 runs from these sizes on, of parts as their data sheets say:"
-    )
+def _told_table(what: str, by_sensor: Mapping[str, Sequence[ToldFrom]]) -> Table:
+    """A row for each thing that may happen, a column for each sensor."""
     table = Table(box=SIMPLE)
-    table.add_column("what happens")
-    for name in told_from:
+    table.add_column(f"what happens {what}")
+    for name in by_sensor:
         table.add_column(plain(name), justify="right")
-    for row in zip(*(told_from_entries(found) for found in told_from.values()), strict=True):
+    for row in zip(*map(told_from_entries, by_sensor.values()), strict=True):
         table.add_row(row[0].what, *(size_words(each.size, each.unit) for each in row))
-    console.print(table)
+    return table
 
 
 def _motion(step: Step) -> tuple[str, str, str]:

@@ -174,13 +174,13 @@ def test_a_sheet_is_what_the_recording_says_and_the_part_s_where_it_says_nothing
     recording = open_run(RECORDINGS / "rig.settings-7" / "imu").movement[0]
     known, sensor = recording.settings.uncertainty, recording.sensors["gyro"]
     assert known is not None
-    assert sheet_of(known, "gyro", sensor) == Sheet(0.5, 2.0, 1.5, 260, 30)
+    assert sheet_of(known, "gyro", sensor.part, sensor.range_m_s2 or 0.0) == Sheet(0.5, 2.0, 1.5, 260, 30)
     said = replace(
         known, acceleration_nonlinearity_percent={"gyro": 0.1}, acceleration_nonlinear_over_g={"gyro": 1.0},
         acceleration_bias_mg_k={"gyro": 0.2}, acceleration_scale_ppm_k={"gyro": 30.0},
         acceleration_bias_instability_ug={"gyro": 4.0},
     )  # fmt: skip
-    assert sheet_of(said, "gyro", sensor) == Sheet(0.1, 1.0, 0.2, 30.0, 4.0)
+    assert sheet_of(said, "gyro", sensor.part, sensor.range_m_s2 or 0.0) == Sheet(0.1, 1.0, 0.2, 30.0, 4.0)
 
 
 @pytest.mark.parametrize(

@@ -61,6 +61,9 @@ def test_the_plan_of_attitudes_says_what_they_will_tell_of_each_accelerometer() 
     assert set(found) == {"lsm9ds1", "mpu9250", "adis16465"}
     assert found["mpu9250"]["scale_std"] == pytest.approx(94e-6, rel=0.02)
     assert found["adis16465"]["second_order_std_s2_m"] < found["mpu9250"]["second_order_std_s2_m"]
+    told = {each["what"]: each for each in document["acceleration_told_from"]["adis16465"]}
+    assert "an even part, of v²/g" not in told, "it is found"
+    assert told["another reading in one dwell"]["size"] < 0.004
 
 
 def test_attitudes_of_ones_own_that_tell_too_little_are_refused_by_the_plan() -> None:
