@@ -5,7 +5,7 @@ and so is what the sensor's filter delays of it.
 """
 
 from collections.abc import Sequence
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass, replace
 from functools import partial
 
 import numpy as np
@@ -55,14 +55,13 @@ class Window:
     `sweep` is the place of the revolution among all of the sensor's, −1 for a rest; `counts` (n, 3) are the readings
     as recorded, `residual_counts` (m, 3) what of a reading neither its part's mean nor the arm's vibration explains,
     nor in a rest what vibrates beside it, where the arm's motion is known; `vibration_counts` (3,) is the RMS of the
-    arm's vibration, `lines_hz` (k,) are the frequencies of what vibrates.
+    arm's vibration.
     """
 
     sweep: int
     counts: NDArray[np.int64]
     residual_counts: Array
     vibration_counts: Array
-    lines_hz: Array = field(default_factory=partial(np.zeros, 0))
 
 
 @dataclass(frozen=True, slots=True)
@@ -194,10 +193,9 @@ def _cut(
         vibration -= means_of_parts(vibration, part, parts)[part]
         shaken = vibration @ np.linalg.lstsq(vibration, residual, rcond=None)[0]
         residual = residual - shaken
-    left, taken, lines_hz = residual, 0, np.zeros(0)
+    left, taken = residual, 0
     if finds_lines:
         cycles = lines(readings - means[part])
-        lines_hz = in_hertz(cycles, time_s)
         columns = waves(cycles, np.arange(len(readings)) / len(readings))  # as they were found, some missing or none
         taken = columns.shape[1]
         means, left = beside(columns, readings, part, parts)
@@ -208,7 +206,7 @@ def _cut(
             along = unexplained @ turn.axis_flange[:, None]
             left = left - along @ np.linalg.lstsq(along, left, rcond=None)[0]
             if known.all():
-                rates = turned(motion, average.start_s, average.end_s, lines_hz, parts)
+                rates = turned(motion, average.start_s, average.end_s, in_hertz(cycles, time_s), parts)
     count = stream.sensor.sensitivity_rad_s_per_count
     scatter = np.maximum(np.sum(left**2, axis=0) / max(len(left) - len(enough) - taken, 1), count**2 / 12)
     noise = scatter * np.array([widening(left[:, axis]) for axis in range(3)])
@@ -235,4 +233,4 @@ def _cut(
             )
         )
     seen = stream.raw["counts"][inside].astype(np.int64)
-    return Window(sweep, seen, residual / count, np.sqrt(np.mean(shaken**2, axis=0)) / count, lines_hz), pieces
+    return Window(sweep, seen, residual / count, np.sqrt(np.mean(shaken**2, axis=0)) / count), pieces

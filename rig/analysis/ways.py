@@ -11,7 +11,7 @@ from itertools import pairwise
 
 import numpy as np
 
-from rig.analysis.pieces import REST, Pieces, Stretch, Window
+from rig.analysis.pieces import REST, Pieces, Stretch
 from rig.analysis.seen import since_first_s
 from rig.arm.kinematics import WRIST_1, flange_pose
 from rig.data.run_file import RunData
@@ -19,7 +19,7 @@ from rig.estimation.arrays import Array
 from rig.estimation.explained import Explained
 from rig.observation.arm_beside_lines import beside, turned
 from rig.observation.average import Stream, between
-from rig.observation.lines import waves
+from rig.observation.lines import in_hertz, lines, waves
 from rig.observation.observed_run import ObservedRun
 from rig.observation.timebase import MIN_RATE_RAD_S, ArmMotion
 from rig.observation.windows import rested, swept
@@ -38,8 +38,7 @@ STEPS = 48
 def with_ways(pieces: Pieces, name: str, recordings: Sequence[ObservedRun], explained: Explained) -> Pieces:
     """The same pieces, and all ways on which only the wrists turned; their places count down from below `REST`.
 
-    Their noise is that of the other pieces, for as long as they last. What vibrates on a way is what did in the rest
-    next to it: lines that stand out of a way's own readings may be its ramps.
+    Their noise is that of the other pieces, for as long as they last.
     """
     found = [
         (way, stream, since_s, each)
@@ -51,11 +50,11 @@ def with_ways(pieces: Pieces, name: str, recordings: Sequence[ObservedRun], expl
         return pieces
     density = np.median(pieces.variances_rad2_s2 * np.diff(pieces.times_s), axis=0)
     means, rates, attitudes, pulls = [], [], [], []
-    for way, stream, since_s, each in found:
+    for way, stream, _, each in found:
         inside = between(stream, way.start_s, way.end_s)
         rate, readings = way.motion.rate(stream.time_s[inside]), stream.readings_rad_s[inside]
-        lines_hz = _vibrating(pieces.windows, explained, (way.start_s + way.end_s) / 2 + since_s)
-        cycles, share = lines_hz * (way.end_s - way.start_s), _share(way, stream.time_s[inside])
+        cycles, share = lines(readings - rate @ explained.solution.matrix.T), _share(way, stream.time_s[inside])
+        lines_hz = in_hertz(cycles, stream.time_s[inside])
         attitude = way.motion.attitude(way.start_s, way.end_s)
         site = each.run.settings.site
         assert site is not None
@@ -124,13 +123,6 @@ def _moved(start_s: float, end_s: float, stream: Stream, motion: ArmMotion) -> I
     stands = ends.max() < 2 * MIN_RATE_RAD_S
     if by_the_wrists(way) and whole and in_range and stands and motion.covered(time_s).all():
         yield way
-
-
-def _vibrating(windows: Sequence[Window], explained: Explained, at_s: float) -> Array:
-    """(k,) Hz of the lines in the rest nearest to a time on the clock of the first recording, or in a sweep."""
-    still = [place for place, window in enumerate(windows) if window.sweep == REST] or range(len(windows))
-    middles_s = explained.seen.windows_s.mean(axis=1)
-    return windows[min(still, key=lambda place: abs(float(middles_s[place]) - at_s))].lines_hz
 
 
 def _share(way: Stretch, time_s: Array) -> Array:

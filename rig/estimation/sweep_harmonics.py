@@ -52,12 +52,15 @@ def first_harmonic(
     angle_rad: ArrayLike,
     speed_rad_s: ArrayLike,
     coloured: Callable[[Array], float] = lambda _: 1.0,
+    *,
+    swings: Callable[[Array], Array] | None = None,
 ) -> FirstHarmonic:
     """Reduce one whole revolution of n samples.
 
     `time_s` (n,) on the arm's clock, `readings_m_s2` (n, 3); `angle_rad`, `speed_rad_s` (n,): of the joint at these
     times, by the arm's states, the angle counted from where the attitude is known. `coloured` gives the factor by which
-    the variance of a mean of residuals (n,) differs from that of white noise.
+    the variance of a mean of residuals (n,) differs from that of white noise. `swings` gives columns (n, k) of all that
+    stands out of residuals (n, 3) as a line; None looks for one alone, as in recordings of before.
 
     Raises Fault `not_finite`, `incomplete_revolution`; ValueError for a wrong shape.
     """
@@ -71,9 +74,9 @@ def first_harmonic(
     mean_speed = _mean_speed(t, angle)
     columns = np.hstack([_waves(angle, WAVES), _of_vibration(t, angle, speed, mean_speed)])
     inverse, residuals = _regression(columns, m)
-    swinging = np.hstack([columns, _line(t, residuals)])
+    swinging = np.hstack([columns, _line(t, residuals) if swings is None else swings(residuals)])
     without = _regression(swinging, m)
-    if np.sum(without[1] ** 2) < (1 - LINE) * np.sum(residuals**2):
+    if swings is not None or np.sum(without[1] ** 2) < (1 - LINE) * np.sum(residuals**2):
         columns, (inverse, residuals) = swinging, without
     size = np.linalg.norm(columns, axis=0)
     unknown = np.linalg.matrix_rank(columns / np.where(size > 0, size, 1.0), rtol=EMPTY)

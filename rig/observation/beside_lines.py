@@ -60,7 +60,7 @@ def mean_beside_lines(readings: Array, count: float, turning: Array, rate: Array
 def rest_beside_lines(readings: Array, time_s: Array, window: Window, count: float) -> Mean:
     """As `tapered_mean`, of which the weights leave nothing of a vibration, by the noise beside its lines."""
     left = readings - readings.mean(axis=0)
-    shaking = _columns(lines(left, STANDS_OUT), len(left))
+    shaking = swinging(left)
     columns = np.column_stack([np.ones(len(left)), shaking])
     noise = noise_of(
         left - columns @ fitted(columns, left), columns.shape[1], count, BRIEF if shaking.size else MEMORIES
@@ -73,6 +73,16 @@ def rest_beside_lines(readings: Array, time_s: Array, window: Window, count: flo
         samples=len(readings),
         freedom=noise.freedom,
     )
+
+
+def swinging(residuals: Array) -> Array:
+    """(n, 8 k) columns of the k lines in residuals (n, 3)."""
+    return _columns(lines(residuals, STANDS_OUT), len(residuals))
+
+
+def colour_left(residuals: Array) -> float:
+    """As `noise_left`, of residuals (n,) that may hold what is left of a line."""
+    return left_of(residuals, BRIEF).factor
 
 
 def _columns(cycles: Array, count: int) -> Array:

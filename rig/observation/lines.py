@@ -14,6 +14,7 @@ AROUND = 161  # bins, of which the median is taken
 MOST_LINES = 8  # three of a servo, and what shakes in the room, which a turning sensor may feel as two
 SLOWEST = 8  # cycles in all the readings: what is slower is told badly from what the parts differ by
 APART = 2.5  # cycles in all the readings, from a line that was found
+SAME = 1.5  # cycles in all the readings: lines that come so near each other are no lines, but a jerk
 PASSES = 2
 WIDE = 8  # columns of a line
 SAMPLES_EACH = 5  # are needed to find what one column has in them
@@ -23,7 +24,7 @@ ALIKE = 1e-2  # columns that differ by less are one
 def lines(residuals: Array, stands_out: float = STANDS_OUT) -> Array:
     """(k,) how many cycles each line makes in all of the residuals (n, 3); k may be zero.
 
-    A line `stands_out` so far over the median power around it.
+    A line `stands_out` so far over the median power around it. No more are looked for where two come to be one.
     """
     count, cycles = len(residuals), np.zeros(0)
     most = min(MOST_LINES, count // (WIDE * SAMPLES_EACH))
@@ -33,7 +34,10 @@ def lines(residuals: Array, stands_out: float = STANDS_OUT) -> Array:
         strongest = _strongest(residuals - known @ fitted(known, residuals), cycles, stands_out)
         if strongest is None:
             break
-        cycles = _refined(np.append(cycles, strongest), residuals)
+        refined = _refined(np.append(cycles, strongest), residuals)
+        if np.diff(np.sort(refined)).min(initial=np.inf) < SAME:
+            break
+        cycles = refined
     return cycles
 
 

@@ -165,7 +165,9 @@ def _revolution(
     turn = find_revolution(motion, finished.sweep, finished.window, settings)
     seen = _observation(stream, motion, finished.sweep, turn, settings, way=_way(run))
     if stream.sensor.has_acceleration and run.settings.planned_dwells:
-        return replace(seen, acceleration=swept_acceleration(stream, motion, finished.sweep, turn))
+        beside = run.settings.averages_beside_lines
+        found = swept_acceleration(stream, motion, finished.sweep, turn, beside_lines=beside)
+        return replace(seen, acceleration=found)
     return seen
 
 

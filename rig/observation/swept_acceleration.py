@@ -10,6 +10,7 @@ from rig.estimation.arrays import Array
 from rig.estimation.sweep_harmonics import FirstHarmonic, first_harmonic
 from rig.observation.acceleration import accelerations, check_acceleration
 from rig.observation.average import Stream, between
+from rig.observation.beside_lines import colour_left, swinging
 from rig.observation.colour import noise_left
 from rig.observation.revolution import Revolution, describe
 from rig.observation.timebase import ArmMotion
@@ -33,8 +34,13 @@ class SweptAcceleration:
     station: tuple[float, ...]
 
 
-def swept_acceleration(stream: Stream, motion: ArmMotion, sweep: Sweep, turn: Revolution) -> SweptAcceleration:
-    """Raises Fault `saturation`, `stuck_sensor`, `incomplete_revolution`, `not_finite`."""
+def swept_acceleration(
+    stream: Stream, motion: ArmMotion, sweep: Sweep, turn: Revolution, *, beside_lines: bool
+) -> SweptAcceleration:
+    """Beside all lines that stand out, or the strongest alone.
+
+    Raises Fault `saturation`, `stuck_sensor`, `incomplete_revolution`, `not_finite`.
+    """
     inside = between(stream, turn.start_s, turn.end_s)
     check_acceleration(stream, inside, describe(sweep), turning=True)
     time_s = stream.time_s[inside]
@@ -51,7 +57,8 @@ def swept_acceleration(stream: Stream, motion: ArmMotion, sweep: Sweep, turn: Re
             accelerations(stream, inside)[known],
             motion.angles(time_s)[:, sweep.joint] - began[sweep.joint],
             motion.angles(time_s, 1)[:, sweep.joint],
-            noise_left,
+            colour_left if beside_lines else noise_left,
+            swings=swinging if beside_lines else None,
         ),
         attitude=flange_attitude(began, motion.kinematics),
         axis_flange=growing * turn.axis_flange,
