@@ -5,7 +5,7 @@ and so is what the sensor's filter delays of it.
 """
 
 from collections.abc import Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 from functools import partial
 
 import numpy as np
@@ -18,7 +18,7 @@ from rig.estimation.explained import Explained
 from rig.observation.arm_beside_lines import beside, means_of_parts, turned
 from rig.observation.average import Average, Stream, between
 from rig.observation.colour import widening
-from rig.observation.lines import in_hertz, lines, waves
+from rig.observation.lines import in_hertz, lines, swings, waves
 from rig.observation.mean import rounding_left
 from rig.observation.observe import Observation
 from rig.observation.observed_run import ObservedRun
@@ -55,13 +55,15 @@ class Window:
     `sweep` is the place of the revolution among all of the sensor's, −1 for a rest; `counts` (n, 3) are the readings
     as recorded, `residual_counts` (m, 3) what of a reading neither its part's mean nor the arm's vibration explains,
     nor in a rest what vibrates beside it, where the arm's motion is known; `vibration_counts` (3,) is the RMS of the
-    arm's vibration.
+    arm's vibration. `swing_rad2` (3,): by how much the angle of what vibrates in a rest differs between two moments, in
+    the mean square.
     """
 
     sweep: int
     counts: NDArray[np.int64]
     residual_counts: Array
     vibration_counts: Array
+    swing_rad2: Array = field(default_factory=partial(np.zeros, 3))
 
 
 @dataclass(frozen=True, slots=True)
@@ -193,13 +195,14 @@ def _cut(
         vibration -= means_of_parts(vibration, part, parts)[part]
         shaken = vibration @ np.linalg.lstsq(vibration, residual, rcond=None)[0]
         residual = residual - shaken
-    left, taken = residual, 0
+    left, taken, swing_rad2 = residual, 0, np.zeros(3)
     if finds_lines:
         cycles = lines(readings - means[part])
         columns = waves(cycles, np.arange(len(readings)) / len(readings))  # as they were found, some missing or none
         taken = columns.shape[1]
         means, left = beside(columns, readings, part, parts)
         if turn is None:
+            swing_rad2 = swings(residual, columns, in_hertz(cycles, time_s))
             residual = left
         else:
             rates, unexplained = beside(columns, rate, part, parts)
@@ -233,4 +236,4 @@ def _cut(
             )
         )
     seen = stream.raw["counts"][inside].astype(np.int64)
-    return Window(sweep, seen, residual / count, np.sqrt(np.mean(shaken**2, axis=0)) / count), pieces
+    return Window(sweep, seen, residual / count, np.sqrt(np.mean(shaken**2, axis=0)) / count, swing_rad2), pieces

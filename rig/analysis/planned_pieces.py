@@ -8,7 +8,7 @@ import numpy as np
 
 from rig.analysis.pieces import BY_MODEL, REST, Pieces, Stretch
 from rig.analysis.planned_motion import measured, planned_motion
-from rig.analysis.ways import STEPS, by_the_wrists, moved, pull_m_s2
+from rig.analysis.ways import SPARSE_S, STEPS, by_the_wrists, moved, pull_m_s2
 from rig.arm.motion import Plan, Sweep
 from rig.data.settings import Site
 from rig.estimation.arrays import Array
@@ -22,14 +22,17 @@ class Planned:
     pieces: Pieces
     ways: Pieces
 
-    def read_by(self, matrix: Array, noise_rad_s_sqrt_hz: float) -> "Planned":
-        """By a sensor of F (3, 3) that noise walks the angle of: its means over T have that over √T."""
+    def read_by(self, matrix: Array, noise_rad_s_sqrt_hz: float, rate_hz: float) -> "Planned":
+        """By a sensor of F (3, 3) that noise walks the angle of: its means over T have that over √T.
+
+        Samples that are too far apart tell nothing of the ways.
+        """
 
         def read(pieces: Pieces) -> Pieces:
             variances = noise_rad_s_sqrt_hz**2 / np.diff(pieces.times_s) * np.ones(3)
             return replace(pieces, means_rad_s=pieces.rates_rad_s @ matrix.T, variances_rad2_s2=variances)
 
-        return Planned(read(self.pieces), read(self.ways))
+        return Planned(read(self.pieces), read(self.ways if 1 / rate_hz <= SPARSE_S else self.pieces))
 
 
 @dataclass(frozen=True, slots=True)

@@ -12,6 +12,7 @@ import numpy as np
 from rig.estimation.arrays import Array
 
 TOLD = 1e-3  # of a column's size, what the model must leave of it
+SEEN = 1e-6  # of a damage, what a check must see of it: less is rounding
 TOLD_IN = 0.95  # of recordings, a damage of the size from which on it is told
 ALIKE = 10.0  # of χ²: what explains less than the best by no more than this might be the cause as well
 
@@ -107,4 +108,5 @@ def told_from(known: Array, patterns: Array, suspected: Iterable[Suspected]) -> 
         if count := new.shape[1]:
             size = np.sqrt(chndtrinc(limit(count), count, 1 - TOLD_IN))
             told = np.maximum(told, np.linalg.norm(new.T @ patterns, axis=0) / size)
-    return float(1 / told.min()) if told.all() else float(np.inf)
+    seen = told.min() > SEEN * np.linalg.norm(patterns, axis=0).max(initial=0.0)
+    return float(1 / told.min()) if seen else float(np.inf)

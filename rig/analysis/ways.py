@@ -17,9 +17,8 @@ from rig.arm.kinematics import WRIST_1, flange_pose
 from rig.data.run_file import RunData
 from rig.estimation.arrays import Array
 from rig.estimation.explained import Explained
-from rig.observation.arm_beside_lines import beside, turned
+from rig.observation.arm_beside_lines import turned
 from rig.observation.average import Stream, between
-from rig.observation.lines import in_hertz, lines, waves
 from rig.observation.observed_run import ObservedRun
 from rig.observation.timebase import MIN_RATE_RAD_S, ArmMotion
 from rig.observation.windows import rested, swept
@@ -38,7 +37,8 @@ STEPS = 48
 def with_ways(pieces: Pieces, name: str, recordings: Sequence[ObservedRun], explained: Explained) -> Pieces:
     """The same pieces, and all ways on which only the wrists turned; their places count down from below `REST`.
 
-    Their noise is that of the other pieces, for as long as they last.
+    Their noise is that of the other pieces, for as long as they last, and what a vibration leaves of which the rests
+    tell. (No lines are sought on a way: it is short, and the servo's own vibration grows faster and slower on it.)
     """
     found = [
         (way, stream, since_s, each)
@@ -48,29 +48,27 @@ def with_ways(pieces: Pieces, name: str, recordings: Sequence[ObservedRun], expl
     ]
     if not found:
         return pieces
+    swing_rad2 = max(float(window.swing_rad2.max()) for window in pieces.windows)
     density = np.median(pieces.variances_rad2_s2 * np.diff(pieces.times_s), axis=0)
     means, rates, attitudes, pulls = [], [], [], []
     for way, stream, _, each in found:
-        inside = between(stream, way.start_s, way.end_s)
-        rate, readings = way.motion.rate(stream.time_s[inside]), stream.readings_rad_s[inside]
-        cycles, share = lines(readings - rate @ explained.solution.matrix.T), _share(way, stream.time_s[inside])
-        lines_hz = in_hertz(cycles, stream.time_s[inside])
+        readings = stream.readings_rad_s[between(stream, way.start_s, way.end_s)]
         attitude = way.motion.attitude(way.start_s, way.end_s)
         site = each.run.settings.site
         assert site is not None
-        means.append(beside(waves(cycles, share), readings, np.zeros(len(rate), dtype=np.intp), 1)[0][0])
-        turn = turned(way.motion, way.start_s, way.end_s, lines_hz, 1)[0]
+        means.append(readings.mean(axis=0))
+        turn = turned(way.motion, way.start_s, way.end_s, np.zeros(0), 1)[0]
         rates.append(turn + attitude @ explained.seen.earth_rate_rad_s)
         attitudes.append(attitude)
         pulls.append(pull_m_s2(way, site.down_m_s2, np.array(each.run.settings.extension_m)))
     times_s = np.array([(way.start_s + since_s, way.end_s + since_s) for way, _, since_s, _ in found])
-    count = len(found)
+    lasting_s, count = np.diff(times_s), len(found)
     return replace(
         pieces,
         sweep=np.concatenate([pieces.sweep, REST - 1 - np.arange(count)]),
         place=np.concatenate([pieces.place, np.zeros(count)]),
         means_rad_s=np.concatenate([pieces.means_rad_s, means]),
-        variances_rad2_s2=np.concatenate([pieces.variances_rad2_s2, density / np.diff(times_s)]),
+        variances_rad2_s2=np.concatenate([pieces.variances_rad2_s2, density / lasting_s + swing_rad2 / lasting_s**2]),
         rates_rad_s=np.concatenate([pieces.rates_rad_s, rates]),
         pull_m_s2=np.concatenate([pieces.pull_m_s2, pulls]),
         attitudes=np.concatenate([pieces.attitudes, attitudes]),
@@ -123,11 +121,6 @@ def _moved(start_s: float, end_s: float, stream: Stream, motion: ArmMotion) -> I
     stands = ends.max() < 2 * MIN_RATE_RAD_S
     if by_the_wrists(way) and whole and in_range and stands and motion.covered(time_s).all():
         yield way
-
-
-def _share(way: Stretch, time_s: Array) -> Array:
-    share: Array = (time_s - way.start_s) / (way.end_s - way.start_s)
-    return share
 
 
 def pull_m_s2(way: Stretch, down_m_s2: Array, extension_m: Array) -> Array:

@@ -64,6 +64,18 @@ def fitted(columns: Array, values: Array) -> Array:
     return np.asarray(np.linalg.lstsq(columns, values, rcond=ALIKE)[0], dtype=np.float64)
 
 
+def swings(residuals: Array, columns: Array, lines_hz: Array) -> Array:
+    """(3,) mean square, over (rad/s)² s², by which the angle of all lines differs between two moments.
+
+    The lines are those of columns (n, 8 k) in residuals (n, 3): one of the mean square P and the frequency f swings by
+    √(2 P) / (2π f) either way, and so its angle differs between two moments by P / (2 π² f²) in the mean square.
+    """
+    sizes = fitted(columns, residuals).reshape(len(lines_hz), WIDE, residuals.shape[1])
+    each = np.einsum("nlw,lwm->lnm", columns.reshape(len(residuals), len(lines_hz), WIDE), sizes)
+    found: Array = np.sum(np.mean(each**2, axis=1) / (2 * np.pi**2 * lines_hz[:, None] ** 2), axis=0)
+    return found
+
+
 def _strongest(left: Array, known: Array, stands_out: float) -> float | None:
     """Cycles of the line in readings (n, 3) that stands out most; None where there is none beside those known."""
     from scipy.ndimage import median_filter
