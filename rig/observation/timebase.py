@@ -33,7 +33,7 @@ LONG_RUN_S = 1800.0  # so much of a recording the coarse search looks at, and mo
 MAX_DRIFT = 0.03  # an oscillator that no crystal holds is within 2 %
 MAX_DRIFT_LONG_RUN = 1e-3  # one that a crystal holds is within 600 ppm
 MAX_DRIFT_STEPS = 20  # to either side
-FINE_STEPS = 100
+FINE_STEPS = 400  # each may be nearly as long as the last where the arm vibrates and little of it turns
 
 
 @dataclass(frozen=True, slots=True)
