@@ -127,9 +127,10 @@ def cut(name: str, recordings: Sequence[ObservedRun], result: SensorResult, expl
     turns = [(*each, turn) for each in streams for turn in each[0].sensors[name].revolutions]
     rests = [(*each, rest) for each in streams for rest in each[0].sensors[name].rests]
     cut_up = partial(_cut, site=site, finds_lines=by_model)
+    room_hz = _in_the_room([(stream, rest) for _, stream, rest in rests]) if by_model else np.zeros(0)
     found = [
         *(
-            cut_up(stream, recording.motion, turn.average, sweep=sweep, turn=turn, parts=parts)
+            cut_up(stream, recording.motion, turn.average, sweep=sweep, turn=turn, parts=parts, room_hz=room_hz)
             for sweep, (recording, stream, turn) in enumerate(turns)
         ),
         *(cut_up(stream, recording.motion, rest, parts=of_rest) for recording, stream, rest in rests),
@@ -161,6 +162,16 @@ def cut(name: str, recordings: Sequence[ObservedRun], result: SensorResult, expl
     )
 
 
+def _in_the_room(rests: Sequence[tuple[Stream, Average]]) -> Array:
+    """(k,) Hz of what vibrates in the longest of the rests."""
+    if not rests:
+        return np.zeros(0)
+    stream, rest = max(rests, key=lambda each: each[1].duration_s)
+    inside = between(stream, rest.start_s, rest.end_s)
+    readings = stream.readings_rad_s[inside]
+    return in_hertz(lines(readings - readings.mean(axis=0)), stream.time_s[inside])
+
+
 def _cut(
     stream: Stream,
     motion: ArmMotion,
@@ -171,11 +182,13 @@ def _cut(
     finds_lines: bool,
     sweep: int = REST,
     turn: Observation | None = None,
+    room_hz: Array | None = None,
 ) -> tuple[Window, list[_Piece]]:
     """A revolution (`turn`) or a rest in parts of equal length; one of which too little is known is left out.
 
     Where it `finds_lines`, what vibrates is taken out of the means of readings and rates alike, and out of the noise:
-    the encoders do not see all of it.
+    the encoders do not see all of it. What vibrates in the room, at `room_hz`, a turning sensor feels beside these
+    frequencies alone.
     """
     inside = between(stream, average.start_s, average.end_s)
     time_s = stream.time_s[inside]
@@ -197,7 +210,8 @@ def _cut(
         residual = residual - shaken
     left, taken, swing_rad2 = residual, 0, np.zeros(3)
     if finds_lines:
-        cycles = lines(readings - means[part])
+        room = np.zeros(0) if room_hz is None else room_hz * (average.end_s - average.start_s)
+        cycles = lines(readings - means[part], known_cycles=room)
         columns = waves(cycles, np.arange(len(readings)) / len(readings))  # as they were found, some missing or none
         taken = columns.shape[1]
         means, left = beside(columns, readings, part, parts)
@@ -213,7 +227,7 @@ def _cut(
     count = stream.sensor.sensitivity_rad_s_per_count
     scatter = np.maximum(np.sum(left**2, axis=0) / max(len(left) - len(enough) - taken, 1), count**2 / 12)
     noise = scatter * np.array([widening(left[:, axis]) for axis in range(3)])
-    if finds_lines and turn is not None and known.all():  # what the encoders miss of a ripple is no noise of a part's
+    if finds_lines and turn is not None:  # what the encoders miss of a ripple is no noise of a part's
         noise = (average.variance_rad2_s2 - average.drift_rad2_s2) * average.samples
     elif taken:
         at_zero = np.maximum(noise_at_zero(left), count**2 / 12)

@@ -18,26 +18,31 @@ SAME = 1.5  # cycles in all the readings: lines that come so near each other are
 PASSES = 2
 WIDE = 8  # columns of a line
 SAMPLES_EACH = 5  # are needed to find what one column has in them
+NONE: Array = np.zeros(0)
 ALIKE = 1e-2  # columns that differ by less are one
 
 
-def lines(residuals: Array, stands_out: float = STANDS_OUT) -> Array:
+def lines(residuals: Array, stands_out: float = STANDS_OUT, known_cycles: Array = NONE) -> Array:
     """(k,) how many cycles each line makes in all of the residuals (n, 3); k may be zero.
 
-    A line `stands_out` so far over the median power around it. No more are looked for where two come to be one.
+    A line `stands_out` so far over the median power around it. One that comes to be another is none. Those that are
+    known are among them, as they are.
     """
-    count, cycles = len(residuals), np.zeros(0)
+    count, merged, held = len(residuals), NONE, len(known_cycles)
+    cycles = known_cycles
     most = min(MOST_LINES, count // (WIDE * SAMPLES_EACH))
     share = np.arange(count) / count
-    while len(cycles) < most:
-        known = waves(cycles, share)
-        strongest = _strongest(residuals - known @ fitted(known, residuals), cycles, stands_out)
+    while len(cycles) < most and len(merged) < most:
+        found = waves(cycles, share)
+        beside = np.append(cycles, merged)
+        strongest = _strongest(residuals - found @ fitted(found, residuals), beside, stands_out)
         if strongest is None:
             break
-        refined = _refined(np.append(cycles, strongest), residuals)
+        refined = _refined(np.append(cycles, strongest), residuals, held)
         if np.diff(np.sort(refined)).min(initial=np.inf) < SAME:
-            break
-        cycles = refined
+            merged = np.append(merged, strongest)
+        else:
+            cycles = refined
     return cycles
 
 
@@ -94,12 +99,12 @@ def _strongest(left: Array, known: Array, stands_out: float) -> float | None:
     return best + (float(np.clip(0.5 * (below - above) / bend, -0.5, 0.5)) if bend < 0 else 0.0)
 
 
-def _refined(cycles: Array, residuals: Array) -> Array:
-    """By what grows of a line a quarter of a cycle behind it: its phase."""
+def _refined(cycles: Array, residuals: Array, held: int) -> Array:
+    """By what grows of a line a quarter of a cycle behind it: its phase. The first so many are held."""
     share = np.arange(len(residuals)) / len(residuals)
     for _ in range(PASSES):
         sizes = fitted(waves(cycles, share), residuals).reshape(len(cycles), WIDE, -1)
         cosine, sine, cosine_grown, sine_grown = np.moveaxis(sizes, 1, 0)[:4]
         late = np.sum(cosine_grown * sine - sine_grown * cosine, axis=1) / np.sum(cosine**2 + sine**2, axis=1)
-        cycles = cycles + np.clip(late / np.pi, -0.5, 0.5)
+        cycles = cycles + np.where(np.arange(len(cycles)) < held, 0.0, np.clip(late / np.pi, -0.5, 0.5))
     return cycles
