@@ -25,6 +25,8 @@ def test_what_is_stated_in_hidden_worlds_holds(family: str, tmp_path: Path) -> N
     seeds = range(first_seed(family), first_seed(family) + WORLDS[family])
     with ThreadPoolExecutor(2) as two_at_once:  # each run is mostly one process that simulates, and waits for its arm
         list(two_at_once.map(lambda seed: recorded(family, seed, tmp_path / str(seed)), seeds))
+    ended = {seed: (tmp_path / str(seed) / "status").read_text(encoding="utf-8").strip() for seed in seeds}
+    assert set(ended.values()) == {"0"}, ended
     runs = [solved(tmp_path / str(seed)) for seed in seeds]
     lines = held(runs)
     for of, line in lines.items():
