@@ -232,8 +232,8 @@ class UncertaintySection(Section):
     nonlinearity_percent: float | None = Field(
         default=None,
         ge=0,
-        description="how far a gyroscope may be off a straight line, in per cent of full scale, by what is odd of its "
-        "curve and by what is even of it, where not several speeds tell it; left out, what is known of the part",
+        description="how far a gyroscope may be off the best straight line, in per cent of full scale, by what is odd "
+        "of its curve and by what is even of it, where not several speeds tell it; left out, what is known of the part",
         json_schema_extra={"unit": "%"},
     )
     asymmetry_percent: float | None = Field(
