@@ -80,8 +80,9 @@ class HeldReadings:
         std_rad = self._off(base)
         size = np.sqrt(1 + std_rad**2 * self.growth)[:, None]
         turned = [self.turn @ columns for columns in suspected]
-        limits = [self._limit(base, told_beside(basis(base), columns), std_rad, rate) for columns in turned]
-        found = [(columns / size, lambda _, limit=limit: limit) for columns, limit in zip(turned, limits, strict=True)]
+        beside = [(columns, told_beside(basis(base), columns)) for columns in turned]
+        limits = [(columns, self._limit(base, new, std_rad, rate)) for columns, new in beside if new.shape[1]]
+        found = [(columns / size, lambda _, limit=limit: limit) for columns, limit in limits]
         return told_from(basis(base / size), self.turn @ damages / size, found)
 
     def _limit(self, base: Array, new: Array, std_rad: float, rate: float) -> float:

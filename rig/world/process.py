@@ -231,8 +231,9 @@ def serve(loaded: Loaded, until_eof: bool, late: Path | None = None) -> None:
     """
     world = World(loaded)
     try:
-        signal.signal(signal.SIGTERM, lambda *_: world.end())
-        signal.signal(signal.SIGINT, signal.default_int_handler)  # also where who started us had it ignored
+        # Also where who started us had it ignored. Not by an exception, which ends nothing inside a call of the emulator's.
+        for each in (signal.SIGTERM, signal.SIGINT):
+            signal.signal(each, lambda *_: world.end())
         if until_eof:
             signal.signal(signal.SIGINT, signal.SIG_IGN)
             # A thread, because select() takes no pipe on Windows; it only waits.
@@ -244,8 +245,6 @@ def serve(loaded: Loaded, until_eof: bool, late: Path | None = None) -> None:
         with closing(FlightRecorder(late, world.network.waited_for)) as recorder:
             print(world.describe(), flush=True)
             world.run(recorder.alive)
-    except KeyboardInterrupt:
-        pass
     finally:
         world.close()
 
