@@ -231,7 +231,7 @@ def serve(loaded: Loaded, until_eof: bool, late: Path | None = None) -> None:
     """
     world = World(loaded)
     try:
-        # Also where who started us had it ignored. Not by an exception, which ends nothing inside a call of the emulator's.
+        # Also where who started us had it ignored. An exception would end nothing inside a call of the emulator's.
         for each in (signal.SIGTERM, signal.SIGINT):
             signal.signal(each, lambda *_: world.end())
         if until_eof:
