@@ -25,7 +25,7 @@ from rig.observation.windows import rested, swept
 
 BEYOND_S = 0.1  # before it moves and after, in which an arm stands still that was slower than can be told
 SHORTEST_S, LONGEST_S = 0.5, 30.0
-SPARSE_S = 0.01  # samples that are farther apart miss what the servo's vibration does while it grows faster
+SPARSE_S = 0.0105  # samples that are farther apart miss what the servo's vibration does while it grows faster
 # Samples add up to a way but for the corners of its rate: each by its change of slope times dt² B₂(x) / 2, where in the
 # interval it may lie (Euler and Maclaurin); B₂, Bernoulli's second polynomial, is √(1/180) RMS, and either end has two.
 CORNERS = (2 / 180) ** 0.5 / 2
