@@ -48,7 +48,7 @@ def with_ways(pieces: Pieces, name: str, recordings: Sequence[ObservedRun], expl
     ]
     if not found:
         return pieces
-    swing_rad2 = max(float(window.swing_rad2.max()) for window in pieces.windows)
+    swing_rad2 = max(float(window.swing_rad2.sum()) for window in pieces.windows)  # along any axis of one that turns
     density = np.median(pieces.variances_rad2_s2 * np.diff(pieces.times_s), axis=0)
     means, rates, attitudes, pulls = [], [], [], []
     for way, stream, _, each in found:
