@@ -11,6 +11,7 @@ from rig.analysis.consistency import would_tell
 from rig.analysis.contradictions import rate_of_each
 from rig.analysis.planned_pieces import Planned, planned_pieces
 from rig.analysis.planned_reference import planned_read
+from rig.analysis.seen import known_sensor
 from rig.analysis.suspected import DAMAGES
 from rig.analysis.told_from import ToldFrom
 from rig.arm.motion import Plan
@@ -19,7 +20,6 @@ from rig.config.sensor_catalogue import PARTS
 from rig.config.sensor_sections import SensorSection, mounting_matrix
 from rig.data.settings import RunSettings, settings_of
 from rig.estimation.nonlinearity import distinct_speeds
-from rig.estimation.own_errors import KnownSensor
 
 
 @dataclass(frozen=True, slots=True)
@@ -68,26 +68,18 @@ def _told_from(
 ) -> tuple[ToldFrom, ...]:
     site, known = settings.site, settings.uncertainty
     assert site is not None and known is not None, "or these are no settings of today"
-    matrix, full_scale_rad_s = mounting_matrix(sensor.mounting), float(np.radians(sensor.range_deg_s))
+    matrix, of = mounting_matrix(sensor.mounting), (name, sensor.part, float(np.radians(sensor.range_deg_s)))
     noise_rad_s_sqrt_hz = np.radians(PARTS[sensor.part].angle_random_walk_deg_sqrt_h) / 60
     seen = turned.read_by(matrix, float(noise_rad_s_sqrt_hz), sensor.rate_hz)
     at_s = seen.pieces.times_s.mean(axis=1)
     speeds = distinct_speeds(np.array([sweep.speed_rad_s for sweep in settings.planned_sweeps]))
     allowed = allowed_of(
         known,
-        (name, sensor.part, full_scale_rad_s),
+        of,
         finds_curve=len(speeds) > 1,
         jitter_s=0.0,
         earth_rad_s=any_earth_rate(known=site.earth_rate_rad_s is not None or settings.finds_earth_rate),
-        sensor=KnownSensor(
-            nonlinearity=known.of("nonlinearity_percent", name, sensor.part) / 100,
-            full_scale_rad_s=full_scale_rad_s,
-            bias_rad_s_per_k=float(np.radians(known.of("bias_deg_s_k", name, sensor.part))),
-            scale_per_k=1e-6 * known.of("scale_ppm_k", name, sensor.part),
-            instability_rad_s=float(np.radians(known.of("bias_instability_deg_h", name, sensor.part) / 3600)),
-            temperature_c=np.zeros(len(at_s)),
-            temperature_step_k=0.0,
-        ),
+        sensor=known_sensor(known, of, np.zeros(len(at_s)), 0.0),
         at_s=at_s,
     )
     found = would_tell(seen.pieces, matrix, rate, allow(allowed, seen.pieces, seen.ways, matrix))

@@ -58,24 +58,31 @@ def see(recordings: Sequence[ObservedRun], sensor: str, surroundings: Surroundin
         else None,
         arms_m=np.concatenate([arms_m, np.zeros((len(rests), 3))]),
         noise_freedom=_noise_freedom(averages) if surroundings.counts_freedom else np.inf,
-        sensor=_known_sensor(surroundings, sensor, run.sensors[sensor], averages)
-        if run.settings.knows_sensor
-        else None,
+        sensor=_sensor_of(surroundings, sensor, run.sensors[sensor], averages) if run.settings.knows_sensor else None,
     )
 
 
-def _known_sensor(
+def _sensor_of(
     surroundings: Surroundings, name: str, sensor: RecordedSensor, averages: Sequence[Average]
 ) -> KnownSensor:
-    known = surroundings.uncertainty
+    temperature_c = np.array([average.temperature_c for average in averages])
+    of = name, sensor.part, sensor.range_rad_s
+    return known_sensor(surroundings.uncertainty, of, temperature_c, abs(sensor.temperature_c_per_count))
+
+
+def known_sensor(
+    known: Uncertainty, of: tuple[str, str, float], temperature_c: Array, temperature_step_k: float
+) -> KnownSensor:
+    """What is stated `of` a sensor of that name, part and range (rad/s), and how warm it was in each average (N,)."""
+    name, part, full_scale_rad_s = of
     return KnownSensor(
-        nonlinearity=known.of("nonlinearity_percent", name, sensor.part) / 100,
-        full_scale_rad_s=sensor.range_rad_s,
-        bias_rad_s_per_k=float(np.radians(known.of("bias_deg_s_k", name, sensor.part))),
-        scale_per_k=PPM * known.of("scale_ppm_k", name, sensor.part),
-        instability_rad_s=float(np.radians(known.of("bias_instability_deg_h", name, sensor.part) / 3600)),
-        temperature_c=np.array([average.temperature_c for average in averages]),
-        temperature_step_k=abs(sensor.temperature_c_per_count),
+        nonlinearity=known.of("nonlinearity_percent", name, part) / 100,
+        full_scale_rad_s=full_scale_rad_s,
+        bias_rad_s_per_k=float(np.radians(known.of("bias_deg_s_k", name, part))),
+        scale_per_k=PPM * known.of("scale_ppm_k", name, part),
+        instability_rad_s=float(np.radians(known.of("bias_instability_deg_h", name, part) / 3600)),
+        temperature_c=temperature_c,
+        temperature_step_k=temperature_step_k,
     )
 
 
