@@ -14,10 +14,9 @@ from rig.analysis.magnetic_field import MagnetometerResult
 from rig.analysis.pieces import cut
 from rig.analysis.readings import judge_readings
 from rig.analysis.reference_contradictions import of_accelerometer, of_magnetometer, reference_statistics
-from rig.analysis.reference_suspected import DAMAGES as REFERENCE_DAMAGES
 from rig.analysis.surroundings import Surroundings, surroundings_of
 from rig.analysis.suspicion import Statistic
-from rig.analysis.told_from import ToldFrom, of_gyroscope
+from rig.analysis.told_from import ToldFrom, of_gyroscope, of_reference
 from rig.analysis.verdict import Check
 from rig.analysis.ways import with_ways
 from rig.data.run_file import RunData
@@ -112,11 +111,7 @@ def in_reference(
     for (name, kind, unit), held in asked.items():
         found = reference_statistics(held, rate, drifting=drifting)
         checks += _checks(f"{name}.{kind}_", found.statistics)
-        told_from[name] = tuple(
-            ToldFrom(damage.what, f"{kind}_{damage.check}", found.told_from[damage.what], damage.unit or unit)
-            for damage in REFERENCE_DAMAGES
-            if damage.what in found.told_from
-        )
+        told_from[name] = of_reference(found.told_from, kind, unit)
     return Contradictions(tuple(checks), frozenset(), told_from)
 
 

@@ -18,7 +18,7 @@ from rig.estimation.explained import Explained
 from rig.observation.arm_beside_lines import beside, means_of_parts, turned
 from rig.observation.average import Average, Stream, between
 from rig.observation.colour import widening
-from rig.observation.lines import in_hertz, lines, swings, waves
+from rig.observation.lines import NONE, in_hertz, lines, swings, waves
 from rig.observation.mean import rounding_left
 from rig.observation.observe import Observation
 from rig.observation.observed_run import ObservedRun
@@ -127,7 +127,7 @@ def cut(name: str, recordings: Sequence[ObservedRun], result: SensorResult, expl
     turns = [(*each, turn) for each in streams for turn in each[0].sensors[name].revolutions]
     rests = [(*each, rest) for each in streams for rest in each[0].sensors[name].rests]
     cut_up = partial(_cut, site=site, finds_lines=by_model)
-    room_hz = _in_the_room([(stream, rest) for _, stream, rest in rests]) if by_model else np.zeros(0)
+    room_hz = _in_the_room([(stream, rest) for _, stream, rest in rests]) if by_model else NONE
     found = [
         *(
             cut_up(stream, recording.motion, turn.average, sweep=sweep, turn=turn, parts=parts, room_hz=room_hz)
@@ -165,7 +165,7 @@ def cut(name: str, recordings: Sequence[ObservedRun], result: SensorResult, expl
 def _in_the_room(rests: Sequence[tuple[Stream, Average]]) -> Array:
     """(k,) Hz of what vibrates in the longest of the rests."""
     if not rests:
-        return np.zeros(0)
+        return NONE
     stream, rest = max(rests, key=lambda each: each[1].duration_s)
     inside = between(stream, rest.start_s, rest.end_s)
     readings = stream.readings_rad_s[inside]
@@ -182,7 +182,7 @@ def _cut(
     finds_lines: bool,
     sweep: int = REST,
     turn: Observation | None = None,
-    room_hz: Array | None = None,
+    room_hz: Array = NONE,
 ) -> tuple[Window, list[_Piece]]:
     """A revolution (`turn`) or a rest in parts of equal length; one of which too little is known is left out.
 
@@ -210,8 +210,7 @@ def _cut(
         residual = residual - shaken
     left, taken, swing_rad2 = residual, 0, np.zeros(3)
     if finds_lines:
-        room = np.zeros(0) if room_hz is None else room_hz * (average.end_s - average.start_s)
-        cycles = lines(readings - means[part], known_cycles=room)
+        cycles = lines(readings - means[part], known_cycles=room_hz * average.duration_s)
         columns = waves(cycles, np.arange(len(readings)) / len(readings))  # as they were found, some missing or none
         taken = columns.shape[1]
         means, left = beside(columns, readings, part, parts)
@@ -226,12 +225,13 @@ def _cut(
                 rates = turned(motion, average.start_s, average.end_s, in_hertz(cycles, time_s), parts)
     count = stream.sensor.sensitivity_rad_s_per_count
     scatter = np.maximum(np.sum(left**2, axis=0) / max(len(left) - len(enough) - taken, 1), count**2 / 12)
-    noise = scatter * np.array([widening(left[:, axis]) for axis in range(3)])
     if finds_lines and turn is not None:  # what the encoders miss of a ripple is no noise of a part's
         noise = (average.variance_rad2_s2 - average.drift_rad2_s2) * average.samples
-    elif taken:
-        at_zero = np.maximum(noise_at_zero(left), count**2 / 12)
-        noise = np.where(at_zero < PREVAILS * scatter, at_zero, noise)
+    else:
+        noise = scatter * np.array([widening(left[:, axis]) for axis in range(3)])
+        if taken:
+            at_zero = np.maximum(noise_at_zero(left), count**2 / 12)
+            noise = np.where(at_zero < PREVAILS * scatter, at_zero, noise)
     earth = np.zeros(3) if site.earth_rate_rad_s is None else np.array(site.earth_rate_rad_s)
     pieces = []
     for each in enough:

@@ -5,7 +5,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from rig.analysis import reference_consistency, reference_suspected
+from rig.analysis import reference_consistency
 from rig.analysis.allowance import allow, allowed_of, any_earth_rate
 from rig.analysis.consistency import would_tell
 from rig.analysis.contradictions import rate_of_each
@@ -13,7 +13,7 @@ from rig.analysis.planned_pieces import Planned, planned_pieces
 from rig.analysis.planned_reference import planned_read
 from rig.analysis.seen import known_sensor
 from rig.analysis.suspected import DAMAGES
-from rig.analysis.told_from import ToldFrom
+from rig.analysis.told_from import ToldFrom, of_reference
 from rig.arm.motion import Plan
 from rig.config.models import RigConfig
 from rig.config.sensor_catalogue import PARTS
@@ -50,11 +50,7 @@ def _of_accelerations(
     name: str, sensor: SensorSection, plan: Plan, settings: RunSettings, rate: float
 ) -> tuple[ToldFrom, ...]:
     found = reference_consistency.would_tell(planned_read(name, sensor, plan, settings), rate)
-    return tuple(
-        ToldFrom(each.what, f"acceleration_{each.check}", found[each.what], each.unit or "m/s²")
-        for each in reference_suspected.DAMAGES
-        if each.what in found
-    )
+    return of_reference(found, "acceleration", "m/s²")
 
 
 def _of_rates(config: RigConfig, plan: Plan, settings: RunSettings, rate: float) -> Mapping[str, tuple[ToldFrom, ...]]:

@@ -7,6 +7,7 @@ import numpy as np
 
 from rig.analysis.calibration import SensorResult, found_earth_rate
 from rig.analysis.pieces import REST
+from rig.analysis.reference_suspected import DAMAGES as REFERENCE_DAMAGES
 from rig.analysis.seen import unknown_of
 from rig.analysis.surroundings import Surroundings
 from rig.analysis.suspected import DAMAGES, Means
@@ -46,6 +47,15 @@ def of_gyroscope(
         if np.isfinite(size) and result.uncertainty is not None:
             off_by = _off_by(size * each.patterns(means), explained, mounting, unknown)
         yield ToldFrom(each.what, each.check, size, each.unit, off_by)
+
+
+def of_reference(sizes: Mapping[str, float], kind: str, unit: str) -> tuple[ToldFrom, ...]:
+    """Of an accelerometer or a magnetometer, whose checks are named by its `kind` and whose readings have that unit."""
+    return tuple(
+        ToldFrom(each.what, f"{kind}_{each.check}", sizes[each.what], each.unit or unit)
+        for each in REFERENCE_DAMAGES
+        if each.what in sizes
+    )
 
 
 def _means(explained: Explained) -> Means:
