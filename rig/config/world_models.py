@@ -238,6 +238,9 @@ class SimulatedAccelerometerSection(Section):
         json_schema_extra={"unit": "m/s²/K"},
     )
     scale_per_k: ScalePerK = NO_ROW
+    bias_instability_m_s2: float = Field(
+        default=0.0, ge=0, le=0.1, description="flicker of the bias: the floor of its Allan deviation"
+    )
 
 
 class SimulatedKvhSection(Section):

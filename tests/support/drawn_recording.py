@@ -167,8 +167,8 @@ def _felt(turned: Array, pull: Array, kind: Kind, rng: np.random.Generator) -> A
     """(n, 3) by a sensor askew, whose axes are not square, not linear, and feel gravity."""
     part = PARTS[kind.sensor.part]
     along = turned @ rotation(rng.normal(0, np.radians(2), 3)).T
-    leaning_rad = np.radians(part.non_orthogonality_deg) / 3 / np.sqrt(2)  # two axes lean by twice as much squared
-    along = along @ (np.eye(3) + rng.normal(0, leaning_rad, (3, 3)))
+    most_rad = np.radians(part.non_orthogonality_deg) / 2  # the other axis of an angle may lean as far
+    along = along @ (np.eye(3) + np.clip(rng.normal(0, np.sqrt(2) / 3 * most_rad, (3, 3)), -most_rad, most_rad))
     cube = part.nonlinearity_percent / 100 / CUBE_MISSED / kind.sensor.range_rad_s**2 * rng.uniform(-1, 1, 3)
     to_gravity = np.radians(part.g_sensitivity_deg_s_g) / STANDARD_GRAVITY_M_S2 * rng.uniform(-1, 1, (3, 3))
     scale = rng.uniform(0.9, 1.1, 3)

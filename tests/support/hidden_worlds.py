@@ -75,7 +75,7 @@ def imu(seed: int) -> dict[str, Any]:
 
 
 def kvh(seed: int) -> dict[str, Any]:
-    """A KVH 1775 that finds the Earth's rate."""
+    """A KVH 1775 that finds the Earth's rate, and feels nothing of gravity, as its configuration states."""
     rng = np.random.default_rng(seed)
     document = merge(_document("kvh1775_earth"), _laboratory(seed, rng, speed_deg_s=60.0))
     document["world"]["site"]["gravity_m_s2"] = 9.80061 + float(rng.uniform(-5e-4, 5e-4))  # what rocks make of it
@@ -87,7 +87,6 @@ def kvh(seed: int) -> dict[str, Any]:
         "non_orthogonality_deg": rng.normal(0, SQUARE_DEG["kvh1775"], 3).tolist(),
         "offset_mm": _offset(rng),
         "bias_instability_rad_s": 2.4e-7 * float(rng.uniform(0.5, 1.5)),
-        "g_sensitivity_rad_s_per_g": _of_force(rng, "kvh1775"),
         "nonlinearity_odd_per_rad_s": _odd(rng, "kvh1775", document["sensors"]["kvh"]),
         "accelerometer": _accelerometer(rng, document["sensors"]["kvh"]),
         "kvh1775": {"oscillator_ppm": float(rng.uniform(-20, 20)), "on_for_s": float(rng.uniform(1, 4000))},
@@ -209,6 +208,7 @@ def _accelerometer(rng: np.random.Generator, section: Mapping[str, Any]) -> dict
         "second_order_s2_m": rng.uniform(-bent_s2_m, bent_s2_m, 3).tolist(),
         "bias_m_s2_per_k": rng.uniform(-bias_m_s2_k, bias_m_s2_k, 3).tolist(),
         "scale_per_k": rng.uniform(-scale_per_k, scale_per_k, 3).tolist(),
+        "bias_instability_m_s2": 1e-6 * sheet.bias_instability_ug * STANDARD_GRAVITY_M_S2 * float(rng.uniform(0.5, 1.5)),
         **_lag(float(rng.uniform(0.1, 1)) * STATED.acceleration_lag_ms),
     }
 

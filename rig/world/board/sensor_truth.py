@@ -105,4 +105,5 @@ def _accelerometer(simulated: SimulatedAccelerometerSection, holds_at_c: float) 
         holds_at_c=holds_at_c,
         bandwidth_hz=simulated.bandwidth_hz,
         delay_s=1e-3 * simulated.delay_ms,
+        instability_m_s2=simulated.bias_instability_m_s2,
     )
