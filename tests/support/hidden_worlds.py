@@ -201,6 +201,7 @@ def _accelerometer(rng: np.random.Generator, section: Mapping[str, Any]) -> dict
     over_g = sheet.nonlinear_over_g or section["acceleration"]["range_g"]
     bent_s2_m = 2 * sheet.nonlinearity_percent / 100 / (over_g * STANDARD_GRAVITY_M_S2)
     bias_m_s2_k, scale_per_k = 1e-3 * sheet.bias_mg_k * STANDARD_GRAVITY_M_S2, 1e-6 * sheet.scale_ppm_k
+    flicker_m_s2 = 1e-6 * sheet.bias_instability_ug * STANDARD_GRAVITY_M_S2
     return {
         "scale": rng.uniform(1 - scale, 1 + scale, 3).tolist(),
         "bias_m_s2": rng.uniform(-bias_m_s2, bias_m_s2, 3).tolist(),
@@ -208,7 +209,7 @@ def _accelerometer(rng: np.random.Generator, section: Mapping[str, Any]) -> dict
         "second_order_s2_m": rng.uniform(-bent_s2_m, bent_s2_m, 3).tolist(),
         "bias_m_s2_per_k": rng.uniform(-bias_m_s2_k, bias_m_s2_k, 3).tolist(),
         "scale_per_k": rng.uniform(-scale_per_k, scale_per_k, 3).tolist(),
-        "bias_instability_m_s2": 1e-6 * sheet.bias_instability_ug * STANDARD_GRAVITY_M_S2 * float(rng.uniform(0.5, 1.5)),
+        "bias_instability_m_s2": flicker_m_s2 * float(rng.uniform(0.5, 1.5)),
         **_lag(float(rng.uniform(0.1, 1)) * STATED.acceleration_lag_ms),
     }
 
