@@ -4,25 +4,22 @@ from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
 from functools import partial
 from itertools import pairwise
-from typing import Literal
 
 import numpy as np
 
 from rig.analysis.calibration import or_fault
+from rig.data.quantity import ACCELERATION, RATE, Quantity
 from rig.data.run_file import RecordedSensor, RunData
 from rig.errors import Fault
 from rig.estimation.allan import AllanAxis, AllanCurve, allan_curve, read_axis, too_short
 from rig.estimation.arrays import Array
 from rig.observation.acceleration import accelerations
 from rig.observation.average import Stream, between, on_the_arms_clock
-from rig.observation.csv_samples import Quantity as Measured
 from rig.observation.csv_samples import Samples
 from rig.observation.observe import MAX_REST_TRAVEL_RAD, REST_SETTLING_S
 from rig.observation.steadiness import check_at_rest, whole_stretches
 from rig.observation.timebase import ArmMotion
 from rig.observation.windows import rested
-
-Quantity = Literal["rate", "acceleration"]
 
 FEWEST_TO_JUDGE = 20  # readings: fewer may be alike
 
@@ -48,7 +45,7 @@ class SensorAtRest:
     """A sensor, None where the readings do not say which, and each quantity it sends, or the Fault it ends in."""
 
     sensor: RecordedSensor | None
-    quantities: Mapping[Measured, AtRest | Fault]
+    quantities: Mapping[Quantity, AtRest | Fault]
 
 
 def at_rest(runs: Sequence[RunData]) -> dict[str, SensorAtRest]:
@@ -63,7 +60,7 @@ def at_rest(runs: Sequence[RunData]) -> dict[str, SensorAtRest]:
         for run, motion in zip(runs, motions, strict=True):
             stream = on_the_arms_clock(run.samples[name], sensor, motion)
             pieces += [(stream, inside) for inside in _stretches(run, stream, motion)]
-        quantities: list[Quantity] = ["rate", "acceleration"] if sensor.has_acceleration else ["rate"]
+        quantities = [RATE, ACCELERATION] if sensor.has_acceleration else [RATE]
         found[name] = SensorAtRest(sensor, {each: or_fault(partial(_of, pieces, each)) for each in quantities})
     return found
 
@@ -109,7 +106,7 @@ def _of(pieces: Sequence[tuple[Stream, slice]], quantity: Quantity) -> AtRest:
     return replace(told, temperature_c=(min(low for low, _ in temperatures), max(high for _, high in temperatures)))
 
 
-def _told(times_s: Sequence[Array], readings: Sequence[Array], quantity: Measured) -> AtRest:
+def _told(times_s: Sequence[Array], readings: Sequence[Array], quantity: Quantity) -> AtRest:
     """Of stretches at rest, each of (nᵢ,) times and (nᵢ, 3) readings."""
     if not readings:
         raise too_short("nothing stood still for longer than a few readings")
@@ -133,7 +130,7 @@ def _told(times_s: Sequence[Array], readings: Sequence[Array], quantity: Measure
 
 
 def _readings(stream: Stream, inside: slice, quantity: Quantity) -> Array:
-    return stream.readings_rad_s[inside] if quantity == "rate" else accelerations(stream, inside)
+    return stream.readings_rad_s[inside] if quantity == RATE else accelerations(stream, inside)
 
 
 def _temperatures(stream: Stream, inside: slice) -> tuple[float, float]:

@@ -11,6 +11,7 @@ from rig.analysis.calibration import estimator_among, or_fault
 from rig.analysis.increments import InIncrements, solve_turning
 from rig.analysis.placed_budget import budget_by_causes, noise_freedom
 from rig.analysis.placed_equations import Equations
+from rig.data.quantity import ACCELERATION, RATE, Quantity
 from rig.errors import Fault
 from rig.estimation.arrays import Array
 from rig.estimation.budget import Budget
@@ -22,7 +23,6 @@ from rig.estimation.reference_model import BIAS, REFERENCE, F, KnownNorm
 from rig.estimation.refusals import check_axes
 from rig.estimation.triaxial import EqualWeights, Method, TriaxialSolution
 from rig.observation.attitude_import import PlacedReadings
-from rig.observation.csv_samples import Quantity
 from rig.observation.placements import Placements
 
 Chosen = Method | Literal["increments"]
@@ -51,7 +51,7 @@ class Surrounding:
     def known(self, quantity: Quantity) -> KnownNorm:
         """What is known of gravity or the field. Raises Fault `field_strength_unknown`."""
         up = UPWARDS[self.up]
-        if quantity == "acceleration":
+        if quantity == ACCELERATION:
             return KnownNorm(self.gravity_m_s2, up)
         if self.field_t is None:
             raise Fault(
@@ -101,7 +101,7 @@ def solve_placed(
 
     def solved(quantity: Quantity) -> Result:
         any_mounting = surrounding.any_mounting
-        if quantity != "rate":
+        if quantity != RATE:
             chosen = "attitude_weighted" if method is None or method == "increments" else method
             return _of_placements(
                 placed,

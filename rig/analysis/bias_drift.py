@@ -9,9 +9,9 @@ from functools import partial
 
 import numpy as np
 
-from rig.analysis.at_rest import Quantity
 from rig.analysis.calibration import or_fault
 from rig.analysis.seen import since_first_s
+from rig.data.quantity import ACCELERATION, RATE, Quantity
 from rig.data.run_file import RecordedSensor
 from rig.data.settings import RunSettings, Site
 from rig.errors import Fault
@@ -92,10 +92,10 @@ def bias_drifts(recordings: Sequence[ObservedRun], settings: RunSettings) -> Dri
     drifts: dict[str, dict[Quantity, BiasDrift]] = {}
     for name in settings.to_calibrate:
         sensor = recordings[0].run.sensors[name]
-        drifts[name] = {"rate": rate_drift(_whole(_rates(recordings, name, sensor), table), site)}
+        drifts[name] = {RATE: rate_drift(_whole(_rates(recordings, name, sensor), table), site)}
         if sensor.has_acceleration:
             accelerations = _whole(_accelerations(recordings, name, sensor), table)
-            drifts[name]["acceleration"] = acceleration_drift(accelerations, site, second_order=settings.second_order)
+            drifts[name][ACCELERATION] = acceleration_drift(accelerations, site, second_order=settings.second_order)
     return drifts if settings.counts_freedom else {name: _uncounted(each) for name, each in drifts.items()}
 
 

@@ -7,13 +7,13 @@ import numpy as np
 
 from rig.analysis.calibration import or_fault
 from rig.analysis.inverted import solved_in
+from rig.data.quantity import ACCELERATION, Quantity
 from rig.errors import Fault
 from rig.estimation.arrays import Array
 from rig.estimation.attitude_error import Placed
 from rig.estimation.reference_model import Known, KnownNorm, KnownVector
 from rig.estimation.triaxial import Method, TriaxialSolution, solve_triaxial
 from rig.observation.attitude_import import PlacedReadings, Rows
-from rig.observation.csv_samples import Quantity
 
 
 @dataclass(frozen=True, slots=True)
@@ -65,7 +65,7 @@ class Equations:
             placements.attitude_std_rad,
             known,
             placements.read.freedom[quantity],
-            second_order and quantity == "acceleration",
+            second_order and quantity == ACCELERATION,
         )
 
     @property

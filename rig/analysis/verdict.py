@@ -9,10 +9,10 @@ from typing import Literal
 import numpy as np
 
 from rig.analysis.acceleration import AccelerometerResult
-from rig.analysis.at_rest import Quantity
 from rig.analysis.bias_drift import BiasDrift
 from rig.analysis.clock import PPM, ClockCheck, worst_differences
 from rig.analysis.verification import Verification
+from rig.data.quantity import ACCELERATION, RATE, Quantity
 from rig.data.settings import DecisionRule, Limits
 from rig.estimation.arrays import Array
 from rig.estimation.budget import Budget
@@ -136,8 +136,8 @@ def drift_checks(
 ) -> tuple[Check, ...]:
     """The largest change of a bias between any two repeats."""
     allowed: Mapping[Quantity, tuple[str, float | None, str]] = {
-        "rate": ("bias_drift", limits.bias_drift_rad_s, "rad/s"),
-        "acceleration": ("acceleration_bias_drift", limits.acceleration_bias_drift_m_s2, "m/s²"),
+        RATE: ("bias_drift", limits.bias_drift_rad_s, "rad/s"),
+        ACCELERATION: ("acceleration_bias_drift", limits.acceleration_bias_drift_m_s2, "m/s²"),
     }
     found = []
     for quantity, drift in drifts.items():

@@ -7,9 +7,9 @@ from collections.abc import Mapping
 from pathlib import Path
 
 from rig.analysis.attitudes import Surrounding, known_method, solve_placed
+from rig.data.quantity import Quantity
 from rig.errors import Fault, Refused, raised_as
 from rig.observation.attitude_import import read_placed
-from rig.observation.csv_samples import Quantity
 from rig.report.attitudes import Found, print_found
 
 

@@ -7,20 +7,18 @@ because the only standard of size of a gyroscope, the clock, moves all three ali
 
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
-from typing import Literal
 
 import numpy as np
 
 from rig.data.accelerometer_entries import AccelerometerEntry
 from rig.data.magnetometer_entries import MagnetometerEntry
+from rig.data.quantity import QUANTITIES
 from rig.data.result_file import ResultDocument, SensorEntry, VectorEntry
 from rig.data.result_types import ErrorEntry, Freedom
 from rig.estimation.arrays import Array
 from rig.estimation.coverage import COVERAGE_FACTOR
 from rig.report.expanded import expanded, flat
 
-Quantity = Literal["rate", "acceleration", "field"]
-BIAS_UNITS: dict[Quantity, str] = {"rate": "rad/s", "acceleration": "m/s²", "field": "T"}
 CHECKED_AS = {  # the checks whose limits hold for scale and bias
     "rate": ("scale_deviation", "bias"),
     "acceleration": ("acceleration_scale_deviation", "acceleration_bias"),
@@ -67,7 +65,7 @@ class Calibrated:
     """One sensor's calibration in a run; `full_scale` in the unit of its biases."""
 
     sensor: str
-    quantity: Quantity
+    quantity: str
     part: str
     serial_number: str
     full_scale: float
@@ -163,7 +161,7 @@ def _magnetometer(name: str, entry: MagnetometerEntry) -> Calibrated:
 def _scale_and_bias(
     values: Sequence[float],
     entry: SensorEntry | AccelerometerEntry | MagnetometerEntry,
-    quantity: Quantity,
+    quantity: str,
     limits: tuple[float | None, float | None],
 ) -> Iterator[Parameter]:
     """Of the six parameters, and the mean scale factor by their covariance, with the largest k of theirs."""
@@ -172,7 +170,7 @@ def _scale_and_bias(
     factors = np.full(6, COVERAGE_FACTOR) if entry.budget is None else np.array(entry.budget.factors)
     rows: list[tuple[str, Array, str, float | None]] = [("k", mean, "1", None)]
     rows += [(f"k{axis}", np.eye(6)[i], "1", limits[0]) for i, axis in enumerate("xyz")]
-    rows += [(f"b{axis}", np.eye(6)[3 + i], BIAS_UNITS[quantity], limits[1]) for i, axis in enumerate("xyz")]
+    rows += [(f"b{axis}", np.eye(6)[3 + i], QUANTITIES[quantity].unit, limits[1]) for i, axis in enumerate("xyz")]
     for name, row, unit, limit in rows:
         yield Parameter(
             name,
@@ -204,7 +202,7 @@ def _known(parameters: Sequence[Parameter]) -> Iterator[Parameter]:
     return (each for each in parameters if each.std_statistical > 0)
 
 
-def _limits(sensor: str, quantity: Quantity, document: ResultDocument) -> tuple[float | None, float | None]:
+def _limits(sensor: str, quantity: str, document: ResultDocument) -> tuple[float | None, float | None]:
     limits = {check.name: check.limit for check in document.checks}
     scale, bias = CHECKED_AS[quantity]
     return limits.get(f"{sensor}.{scale}"), limits.get(f"{sensor}.{bias}")

@@ -21,7 +21,7 @@ from rig.history.engine import WRITES, engine_of
 from rig.history.entering import enter_run, note_place, now_utc
 from rig.history.finished import Finished, Recording
 from rig.history.issued import Issued
-from rig.history.parameters import ORDER, Parameter, Quantity
+from rig.history.parameters import ORDER, Parameter
 from rig.history.place import Place, place
 
 _MANY = 500  # keys in one question: SQLite takes no more than some thousands
@@ -53,7 +53,7 @@ class Past:
     fit: bool
     simulated: bool
     sensor: str
-    quantity: Quantity
+    quantity: str
     part: str
     serial_number: str
     full_scale: float

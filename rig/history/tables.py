@@ -4,6 +4,7 @@ from collections.abc import Iterable, Iterator, Mapping, Sequence
 
 from rich.table import Table
 
+from rig.data.quantity import QUANTITIES
 from rig.history.parameters import Parameter, is_scale
 from rig.history.series import YEAR_DAYS, Change, RigState, Subject, Trend
 from rig.history.statistics.charts import FEWEST
@@ -130,7 +131,7 @@ def effects_table(effects: Mapping[str, Sequence[RigEffect]]) -> Table:
 def title_of(subject: Subject) -> str:
     """What was calibrated, in words."""
     part, serial_number, quantity, full_scale, simulated = subject
-    unit = {"rate": "rad/s", "acceleration": "m/s²", "field": "T"}.get(quantity, "")
+    unit = QUANTITIES[quantity].unit if quantity in QUANTITIES else ""
     return f"{part} {serial_number}, {quantity}, ±{full_scale:.4g} {unit}" + (", simulated" if simulated else "")
 
 

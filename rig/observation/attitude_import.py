@@ -22,9 +22,10 @@ from pathlib import Path
 import numpy as np
 from numpy.typing import NDArray
 
+from rig.data.quantity import RATE, Quantity
 from rig.errors import Fault, Refused
 from rig.estimation.arrays import Array
-from rig.observation.csv_samples import COLUMNS, Quantity, read_samples
+from rig.observation.csv_samples import read_samples
 from rig.observation.csv_table import read_columns
 from rig.observation.csv_windows import MIN_SAMPLES, check_complete, inside, overlapping, scatter_of
 from rig.observation.fixes import Turning
@@ -87,19 +88,17 @@ def read_placed(samples_path: Path, attitudes_path: Path, *, find_clock: bool = 
     clock = None
     if find_clock:
         _check_has_rates(readings)
-        clock = estimate_time_base(
-            time_s, readings["rate"], TableMotion(said.rows_s.mean(axis=1), said.attitudes, rates)
-        )
+        clock = estimate_time_base(time_s, readings[RATE], TableMotion(said.rows_s.mean(axis=1), said.attitudes, rates))
         time_s = clock.controller_time_s(time_s)
         said = said.of(np.flatnonzero((said.rows_s[:, 0] >= time_s[0]) & (said.rows_s[:, 1] <= time_s[-1])))
     counts = np.diff(np.searchsorted(time_s, said.rows_s), axis=1)[:, 0]
     whole = said.of(_whole(said.windows, counts.tolist(), float(np.median(np.diff(time_s)))))
-    rate = readings.get("rate")
+    rate = readings.get(RATE)
     return PlacedReadings(
         tuple(readings),
         None if rate is None else _rows(time_s, rate, whole),
         None if rate is None else Turning(time_s, rate, said.rows_s, said.attitudes, said.std_rad),
-        None if set(readings) == {"rate"} else _placements(time_s, readings, whole),
+        None if set(readings) == {RATE} else _placements(time_s, readings, whole),
         clock,
     )
 
@@ -162,11 +161,11 @@ def _whole(windows: Sequence[Window], counts: Sequence[int], interval_s: float) 
 
 
 def _check_has_rates(readings: Mapping[Quantity, Array]) -> None:
-    if "rate" not in readings:
+    if RATE not in readings:
         raise Refused(
             "wrong_columns",
             "the samples hold no turn rate, by which their clock would be found",
-            f"Give {', '.join(COLUMNS['rate'])} beside them, or both files on one clock",
+            f"Give {', '.join(RATE.columns)} beside them, or both files on one clock",
         )
 
 

@@ -20,6 +20,7 @@ from pathlib import Path
 
 import numpy as np
 
+from rig.data.quantity import RATE
 from rig.errors import Fault, Refused
 from rig.estimation.arrays import Array
 from rig.estimation.refusals import check_reading_ratio
@@ -53,17 +54,17 @@ def read(samples_path: Path, sweeps_path: Path) -> ExternalData:
     Raises Refused `no_file`, `wrong_columns`, `wrong_unit`, `not_a_number`, `time_not_increasing`, `bad_sweep`,
     `overlapping_sweeps`; Fault as `average` does.
     """
-    samples = read_samples(samples_path, ["rate"])
+    samples = read_samples(samples_path, [RATE])
     sweeps = read_columns(sweeps_path, SWEEP_COLUMNS, MOTION_COLUMNS, SWEEPS_MB, [(name,) for name in STD_COLUMNS])
     found = average(
-        np.column_stack([samples.time_s, samples.readings["rate"]]),
+        np.column_stack([samples.time_s, samples.readings[RATE]]),
         np.column_stack([sweeps["start_s"], sweeps["end_s"], _speeds(sweeps)]),
         np.column_stack([sweeps[name] for name in SWEEP_COLUMNS[2:]]),
     )
     if "angle_rad" not in sweeps:
         return found
     known = Known(sweeps["angle_rad"], *(sweeps.get(name) for name in STD_COLUMNS))
-    return replace(found, turned=turned(samples.time_s, samples.readings["rate"], known, found.sweeps, found.rests))
+    return replace(found, turned=turned(samples.time_s, samples.readings[RATE], known, found.sweeps, found.rests))
 
 
 def average(samples: Array, sweeps: Array, axes: Array) -> ExternalData:

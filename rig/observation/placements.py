@@ -11,10 +11,10 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
+from rig.data.quantity import Quantity
 from rig.errors import Fault
 from rig.estimation.arrays import Array
 from rig.estimation.sensor_axes import nearest_rotation
-from rig.observation.csv_samples import Quantity
 from rig.observation.csv_windows import MIN_SAMPLES, inside, scatter_of
 from rig.observation.rests import BLOCK_S, find_rests
 from rig.observation.windows import Window

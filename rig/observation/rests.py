@@ -12,9 +12,9 @@ from collections.abc import Mapping
 import numpy as np
 from numpy.typing import NDArray
 
+from rig.data.quantity import QUANTITIES, RATE, Quantity
 from rig.estimation.arrays import Array
-from rig.observation.csv_samples import QUANTITIES, Quantity
-from rig.observation.steadiness import BEYOND, STEADY
+from rig.observation.steadiness import BEYOND
 from rig.observation.windows import Window
 
 BLOCK_S, FEWEST = 0.25, 5  # samples of a block
@@ -25,7 +25,7 @@ GAP = 2.5  # intervals
 
 def find_rests(time_s: Array, readings: Mapping[Quantity, Array]) -> tuple[Window, ...]:
     """Rests of two blocks and longer, by readings (n, 3) of one quantity or several at rising times (n,)."""
-    quantity = next(each for each in QUANTITIES if each in readings)
+    quantity = next(each for each in QUANTITIES.values() if each in readings)
     interval_s = float(np.median(np.diff(time_s)))
     width = max(FEWEST, int(np.ceil(BLOCK_S / interval_s)))
     count = len(time_s) // width
@@ -34,10 +34,10 @@ def find_rests(time_s: Array, readings: Mapping[Quantity, Array]) -> tuple[Windo
     times = time_s[: count * width].reshape(count, width)
     blocks = readings[quantity][: count * width].reshape(count, width, 3)
     means, scatter = blocks.mean(axis=1), blocks.std(axis=1)
-    noise = np.maximum(np.quantile(scatter, QUIETEST, axis=0), COUNTS * STEADY[quantity])
-    apart = STEADY[quantity] + BEYOND * noise * np.sqrt(2 / width)
+    noise = np.maximum(np.quantile(scatter, QUIETEST, axis=0), COUNTS * quantity.steady)
+    apart = quantity.steady + BEYOND * noise * np.sqrt(2 / width)
     still = (scatter <= AS_QUIET * noise).all(axis=1) & (np.diff(times, axis=1).max(axis=1) <= GAP * interval_s)
-    if quantity == "rate" and still.any():
+    if quantity == RATE and still.any():
         still &= _unturned(means, still, apart)
     follows = times[1:, 0] - times[:-1, -1] <= GAP * interval_s
     follows &= (np.abs(np.diff(means, axis=0)) <= apart).all(axis=1)

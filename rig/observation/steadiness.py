@@ -1,18 +1,15 @@
 """Whether a log of readings was made at rest, as far as the readings themselves tell."""
 
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterator
 from itertools import pairwise
 
 import numpy as np
 
+from rig.data.quantity import Quantity
 from rig.errors import Fault
 from rig.estimation.arrays import Array
-from rig.observation.csv_samples import UNITS, Quantity
 
 BLOCK_S = 1.0
-# By how much the means of neighbouring blocks may differ beside their noise: no bias moves so fast, but a hand does,
-# and half a degree of tilt is more. A field within a room changes by a tenth of the third.
-STEADY: Mapping[Quantity, float] = {"rate": 5e-3, "acceleration": 0.05, "field": 2e-6}
 BEYOND = 6.0  # standard deviations of the noise of a difference
 NORMAL = 1.4826  # standard deviation over median deviation
 GAP = 1.5  # intervals: one reading is missing
@@ -37,11 +34,11 @@ def check_at_rest(time_s: Array, readings: Array, quantity: Quantity) -> None:
     noise = NORMAL * np.median(np.abs(np.diff(readings, axis=0)), axis=0) / np.sqrt(2)
     fewest = np.minimum(count[1:], count[:-1])[:, None]
     off = np.abs(np.diff(means, axis=0)) - BEYOND * noise * np.sqrt(2 / fewest)
-    if len(off) and (worst := float(off.max())) > STEADY[quantity]:
+    if len(off) and (worst := float(off.max())) > quantity.steady:
         at_s = float(time_s[np.searchsorted(block, int(off.max(axis=1).argmax()) + 1)])
         raise Fault(
             "not_at_rest",
-            f"about {at_s:.1f} s the {quantity} changes by {worst:.2g} {UNITS[quantity]} within a second or two beside "
+            f"about {at_s:.1f} s the {quantity} changes by {worst:.2g} {quantity.unit} within a second or two beside "
             "its noise",
             "Give a log of a sensor that lay still all the time; cut off its beginning and its end, where it was moved",
         )

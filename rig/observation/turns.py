@@ -8,6 +8,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from rig.data.quantity import RATE
 from rig.estimation.arrays import Array
 from rig.estimation.turned import Gyroscope, Mean, Turn
 from rig.observation.average import Average
@@ -52,7 +53,7 @@ def turned(
     time_s: Array, readings: Array, known: Known, sweeps: Sequence[Observation], rests: Sequence[Average]
 ) -> TurnedData | None:
     """The turns from rest to rest among sweeps; None where there are none. `readings` (n, 3) in rad/s at `time_s`."""
-    lying = find_rests(time_s, {"rate": readings})
+    lying = find_rests(time_s, {RATE: readings})
     if not lying:
         return None
     resting = rests or [average_of(readings[inside(time_s, window)], window) for window in lying]

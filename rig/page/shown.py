@@ -1,7 +1,6 @@
 """What the page shows, made of a run's events. No thread, no clock, and of files only the result that is told of."""
 
 from dataclasses import asdict, dataclass, field
-from math import degrees
 from typing import Any
 
 from rig.arm.identity import model_found
@@ -9,6 +8,7 @@ from rig.arm.kinematics import NOMINAL, DenavitHartenberg
 from rig.arm.motion import Dwell, Rest, Step, Sweep
 from rig.arm.state import JOINT_NAMES, ArmReport, ArmState, RobotMode, RuntimeState, SafetyMode
 from rig.data.events import BoardNotObserved, BoardObserved
+from rig.data.quantity import QUANTITIES
 from rig.data.result_file import read_result
 from rig.data.run_folder import RESULT
 from rig.errors import RigError
@@ -43,7 +43,7 @@ from rig.station.events import (
 from rig.station.words import line
 
 LINES = 40  # of what was said last
-FACTOR = {"rate_rad_s": degrees(1.0), "acceleration_m_s2": 1.0, "field_t": 1e6}  # to °/s, m/s², µT
+READINGS = {each.named(each.name): each.reading.size for each in QUANTITIES.values()}
 ENDINGS = (VerdictReached, Failed, Interrupted, Crashed)
 
 
@@ -204,9 +204,9 @@ class Shown:
                 "lost": sensor.lost,
                 "temperature_c": sensor.temperature_c,
             }
-            for quantity, factor in FACTOR.items():
+            for quantity, size in READINGS.items():
                 if (vector := getattr(sensor, quantity)) is not None:
-                    values[f"{sensor.sensor}.{quantity}"] = tuple(factor * component for component in vector)
+                    values[f"{sensor.sensor}.{quantity}"] = tuple(component / size for component in vector)
             rows.append(row)
         self._values = values
         self.put("sensors", rows)

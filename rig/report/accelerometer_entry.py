@@ -11,6 +11,7 @@ from rig.data.accelerometer_entries import (
     HeldOutEntry,
     InAttitudesEntry,
 )
+from rig.data.quantity import ACCELERATION
 from rig.data.result_types import ErrorEntry
 from rig.errors import Fault
 from rig.estimation.felt import DELAY, SECOND
@@ -21,8 +22,6 @@ from rig.estimation.triaxial import TriaxialSolution
 from rig.report.axes import PARAMETERS, dwell_entry
 from rig.report.budget_entry import budget_entry
 from rig.report.entry import counted, entry
-
-UNITS = ("1", "1", "1", "m/s²", "m/s²", "m/s²")
 
 
 def accelerometer_entry(result: AccelerometerResult) -> AccelerometerEntry:
@@ -37,7 +36,7 @@ def accelerometer_entry(result: AccelerometerResult) -> AccelerometerEntry:
         covariance_combined=None if result.budget is None else result.budget.covariance,
         budget=None if result.budget is None else budget_entry(result.budget),
         covariance_order=PARAMETERS,
-        covariance_units=UNITS,
+        covariance_units=ACCELERATION.parameter_units,
         second_order_std_s2_m=None if solution.second_order_s2_m is None else std[SECOND],
         attitude_error_rad=solution.attitude_error.std_rad,
         attitude_error_std_rad=solution.attitude_error.uncertainty_rad,
@@ -46,7 +45,7 @@ def accelerometer_entry(result: AccelerometerResult) -> AccelerometerEntry:
         delay_std_s=None if solution.delay_s is None else float(std[DELAY]),
         alignment=None if result.alignment is None else _alignment(result.alignment),
         dwells=[
-            dwell_entry(DwellEntry, "m_s2", *each)
+            dwell_entry(DwellEntry, ACCELERATION, *each)
             for each in zip(result.dwells, solution.dwell_residuals_m_s2, expected, strict=True)
         ],
         beside={name: _beside(found) for name, found in result.beside.items()},

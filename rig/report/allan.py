@@ -10,10 +10,9 @@ from rich.console import Console
 from rich.table import Table
 
 from rig.analysis.at_rest import AtRest, SensorAtRest
+from rig.data.quantity import Quantity
 from rig.errors import Fault
 from rig.estimation.allan import FLICKER, Read
-from rig.estimation.earth import MICRO_G_M_S2
-from rig.observation.csv_samples import Quantity
 from rig.report.figures import save
 from rig.station.plain_text import plain
 from rig.study.style import style
@@ -22,24 +21,6 @@ if TYPE_CHECKING:
     from matplotlib.axes import Axes
 
 SCHEMA = "rig.allan/1"
-MINUTE_S = 60.0  # √(3600 s): from √s to √h
-DEG_H = np.pi / 180 / 3600  # rad/s
-# By the quantity: SI units of N and B, and those on the screen with their size in SI.
-SI: Mapping[Quantity, tuple[str, str]] = {
-    "rate": ("rad_sqrt_s", "rad_s"),
-    "acceleration": ("m_s_sqrt_s", "m_s2"),
-    "field": ("t_sqrt_s", "t"),
-}
-SHOWN: Mapping[Quantity, tuple[tuple[str, float], tuple[str, float]]] = {
-    "rate": (("°/√h", np.pi / 180 / MINUTE_S), ("°/h", DEG_H)),
-    "acceleration": (("m/s/√h", 1 / MINUTE_S), ("µg", MICRO_G_M_S2)),
-    "field": (("nT √s", 1e-9), ("nT", 1e-9)),
-}
-WALKS: Mapping[Quantity, str] = {
-    "rate": "angle random walk",
-    "acceleration": "velocity random walk",
-    "field": "white noise",
-}
 
 
 def print_at_rest(found: Mapping[str, SensorAtRest], *, as_json: bool) -> None:
@@ -66,7 +47,7 @@ def document(found: Mapping[str, SensorAtRest]) -> dict[str, Any]:
             name: {
                 **({} if (s := each.sensor) is None else {"part": s.part, "serial_number": s.serial_number}),
                 **{
-                    quantity: {"error": str(seen)} if isinstance(seen, Fault) else _entry(quantity, seen)
+                    quantity.name: {"error": str(seen)} if isinstance(seen, Fault) else _entry(quantity, seen)
                     for quantity, seen in each.quantities.items()
                 },
             }
@@ -100,14 +81,14 @@ def _titled(name: str, seen: SensorAtRest) -> str:
 
 def _table(title: str, quantity: Quantity, seen: AtRest) -> Table:
     table = Table(title=plain(title, "table.title"), title_justify="left")
-    (walk_unit, walk_size), (bias_unit, bias_size) = SHOWN[quantity]
-    headings = ("axis", f"{WALKS[quantity]} {walk_unit}", "± U", f"bias instability {bias_unit}", "± U", "at s")
+    walk, bias = quantity.walk_unit, quantity.drift
+    headings = ("axis", f"{quantity.walk} {walk.name}", "± U", f"bias instability {bias.name}", "± U", "at s")
     for heading in headings:
         table.add_column(heading, justify="left" if heading == "axis" else "right")
     for axis, told in zip("xyz", seen.axes, strict=True):
         floor = told.bias_instability
         at = f"{floor.tau_s:.3g}" if isinstance(floor, Read) else ""
-        table.add_row(axis, *_cells(told.random_walk, walk_size), *_cells(floor, bias_size), at)
+        table.add_row(axis, *_cells(told.random_walk, walk.size), *_cells(floor, bias.size), at)
     return table
 
 
@@ -127,18 +108,17 @@ def _lines(seen: AtRest) -> Iterator[str]:
 
 
 def _entry(quantity: Quantity, seen: AtRest) -> dict[str, Any]:
-    walk, floor = SI[quantity]
     return {
         "stretches": seen.stretches,
         "longest_s": seen.longest_s,
         "total_s": seen.total_s,
         "temperature_c": None if seen.temperature_c is None else list(seen.temperature_c),
-        f"random_walk_{walk}": [_read(axis.random_walk) for axis in seen.axes],
-        f"bias_instability_{floor}": [_read(axis.bias_instability) for axis in seen.axes],
+        f"random_walk_{quantity.walk_suffix}": [_read(axis.random_walk) for axis in seen.axes],
+        quantity.named("bias_instability"): [_read(axis.bias_instability) for axis in seen.axes],
         "tau_s": seen.curve.tau_s.tolist(),
-        f"deviation_{floor}": seen.curve.deviation.tolist(),
-        f"deviation_low_{floor}": seen.curve.low.tolist(),
-        f"deviation_high_{floor}": seen.curve.high.tolist(),
+        quantity.named("deviation"): seen.curve.deviation.tolist(),
+        quantity.named("deviation_low"): seen.curve.low.tolist(),
+        quantity.named("deviation_high"): seen.curve.high.tolist(),
         "degrees_of_freedom": seen.curve.freedom.tolist(),
     }
 
@@ -151,7 +131,7 @@ def _read(told: Read | Fault) -> dict[str, Any]:
 
 def _draw(axes: "Axes", quantity: Quantity, seen: AtRest) -> None:
     """The curves with their bands, and what was read off them."""
-    unit, size = SHOWN[quantity][1]
+    size = quantity.drift.size
     curve = seen.curve
     for i, (axis, told) in enumerate(zip("xyz", seen.axes, strict=True)):
         axes.loglog(curve.tau_s, curve.deviation[:, i] / size, "o-", ms=3, lw=1, color=f"C{i}", label=axis)
@@ -162,6 +142,6 @@ def _draw(axes: "Axes", quantity: Quantity, seen: AtRest) -> None:
         if isinstance(told.bias_instability, Read):
             floor = told.bias_instability
             axes.plot(floor.tau_s, floor.value * FLICKER / size, "v", color=f"C{i}")
-    axes.set(xlabel="τ s", ylabel=f"Allan deviation   {unit}", title=quantity)
+    axes.set(xlabel="τ s", ylabel=f"Allan deviation   {quantity.drift.name}", title=quantity.name)
     axes.plot([], [], "k:", lw=0.8, label="random walk")
     axes.legend(frameon=False, ncols=2, fontsize=8)

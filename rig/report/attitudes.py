@@ -13,11 +13,11 @@ from rich.table import Table
 from rig.analysis.attitudes import InAttitudes, Result, Surrounding, in_unit
 from rig.analysis.increments import InIncrements
 from rig.data.budget_entries import BudgetEntry
+from rig.data.quantity import ACCELERATION, FIELD, RATE, Quantity
 from rig.errors import Fault
 from rig.estimation import accelerometer, magnetometer
 from rig.estimation.known_increments import KnownIncrements
 from rig.estimation.triaxial import TriaxialSolution
-from rig.observation.csv_samples import UNITS, Quantity
 from rig.observation.timebase import TimeBase
 from rig.report.axes import matrix_lines
 from rig.report.budget_entry import budget_entry
@@ -27,14 +27,14 @@ from rig.station.plain_text import plain
 
 SCHEMA = "rig.attitudes/1"
 MODELS: Mapping[Quantity, str] = {
-    "rate": "ω_m = F (Rᵀ ω_E + ω) + b",
-    "acceleration": accelerometer.MODEL,
-    "field": magnetometer.MODEL,
+    RATE: "ω_m = F (Rᵀ ω_E + ω) + b",
+    ACCELERATION: accelerometer.MODEL,
+    FIELD: magnetometer.MODEL,
 }
 REFERENCES: Mapping[Quantity, str] = {
-    "rate": "Earth's rate",
-    "acceleration": "specific force at rest",
-    "field": "magnetic field",
+    RATE: "Earth's rate",
+    ACCELERATION: "specific force at rest",
+    FIELD: "magnetic field",
 }
 
 
@@ -63,7 +63,7 @@ def print_found(found: Found, *, as_json: bool) -> None:
             continue
         budget = budget_entry(result.budget)
         console.print(_table(f"{found.samples}: {quantity}, {MODELS[quantity]}", quantity, result.solution, budget))
-        console.print(budget_table(budget, in_unit(result.solution)[0].tolist(), UNITS[quantity]))
+        console.print(budget_table(budget, in_unit(result.solution)[0].tolist(), quantity.unit))
         for line in _lines(quantity, result, found.surrounding):
             console.print(plain(line))
 
@@ -88,7 +88,7 @@ def _clock_entry(clock: TimeBase) -> dict[str, float]:
 def _table(title: str, quantity: Quantity, solution: TriaxialSolution | KnownIncrements, budget: BudgetEntry) -> Table:
     """The scale factor and the bias of each axis, ± U."""
     table = Table(title=plain(title, "table.title"), title_justify="left")
-    unit = UNITS[quantity]
+    unit = quantity.unit
     for heading in ("axis", "scale factor", expanded_heading(budget), f"bias {unit}", f"± U {unit}"):
         table.add_column(heading, justify="left" if heading == "axis" else "right")
     scale, _ = in_unit(solution)
@@ -104,13 +104,13 @@ def _lines(quantity: Quantity, result: Result, surrounding: Surrounding) -> Iter
     if isinstance(result, InIncrements):
         yield from increment_lines(result)
         return
-    solution, unit = result.solution, UNITS[quantity]
+    solution, unit = result.solution, quantity.unit
     if result.reference_fault is None:
         reference = " ".join(f"{each:+.6g}" for each in solution.reference)
         yield f"{REFERENCES[quantity]} in table coordinates: {reference} {unit}"
     else:
         yield f"{REFERENCES[quantity]}: {result.reference_fault}"
-    if quantity == "acceleration":
+    if quantity == ACCELERATION:
         yield f"gravity {surrounding.gravity_m_s2:g} m/s², to which the scale factors are relative"
     if solution.second_order is not None:
         std = np.sqrt(np.diag(solution.covariance)[15:18])
@@ -157,7 +157,7 @@ def _document(found: Found) -> dict[str, Any]:
         "field_t": found.surrounding.field_t,
         **({} if found.clock is None else {"clock": _clock_entry(found.clock)}),
         "quantities": {
-            quantity: {"error": str(result)} if isinstance(result, Fault) else _entry(quantity, result)
+            quantity.name: {"error": str(result)} if isinstance(result, Fault) else _entry(quantity, result)
             for quantity, result in found.results.items()
         },
     }
@@ -169,7 +169,7 @@ def _entry(quantity: Quantity, result: Result) -> dict[str, Any]:
         *(f"reference_{axis}" for axis in "xyz"),
         *(f"bias_{axis}" for axis in "xyz"),
     ]
-    model = {"model": MODELS[quantity], "unit": UNITS[quantity], "covariance_order": order}
+    model = {"model": MODELS[quantity], "unit": quantity.unit, "covariance_order": order}
     if isinstance(result, InIncrements):
         return {
             **model,

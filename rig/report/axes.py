@@ -6,6 +6,7 @@ from typing import Protocol
 import numpy as np
 from rich.table import Table
 
+from rig.data.quantity import Quantity
 from rig.data.result_types import Freedom
 from rig.estimation.arrays import Array
 from rig.estimation.sensor_axes import angle_jacobian, nearest_rotation, non_orthogonality
@@ -79,9 +80,9 @@ def matrix_lines(matrix: Array, covariance: Array, factor: float) -> Iterator[st
 
 
 def dwell_entry(
-    kind: type[EntryT], unit: str, dwell: DwellReading | FieldReading, residual: Array, residual_std: Array
+    kind: type[EntryT], quantity: Quantity, dwell: DwellReading | FieldReading, residual: Array, residual_std: Array
 ) -> EntryT:
-    """A dwell as an entry whose names end with the `unit` of its readings.
+    """A dwell as an entry whose names end with the unit of its readings.
 
     `residual` (3,) is what the model leaves, `residual_std` (3,) what it is expected to leave.
     """
@@ -89,10 +90,10 @@ def dwell_entry(
         kind, dwell, dwell.reading,
         duration_s=dwell.window.end_s - dwell.window.start_s,
         **{
-            f"mean_{unit}": dwell.reading.mean,
-            f"mean_std_{unit}": np.sqrt(dwell.reading.variance),
-            f"noise_{unit}": dwell.reading.noise,
-            f"residual_{unit}": residual,
-            f"residual_std_{unit}": residual_std,
+            quantity.named("mean"): dwell.reading.mean,
+            quantity.named("mean_std"): np.sqrt(dwell.reading.variance),
+            quantity.named("noise"): dwell.reading.noise,
+            quantity.named("residual"): residual,
+            quantity.named("residual_std"): residual_std,
         },
     )  # fmt: skip

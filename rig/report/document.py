@@ -48,7 +48,7 @@ def document_of(outcome: Outcome) -> ResultDocument:
         }
     if outcome.drifts:
         more["bias_drift"] = {
-            name: {quantity: drift_entry(quantity, drift) for quantity, drift in each.items()}
+            name: {quantity.name: drift_entry(quantity, drift) for quantity, drift in each.items()}
             for name, each in outcome.drifts.items()
         }
     return document.model_copy(update=more)

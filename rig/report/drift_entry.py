@@ -1,13 +1,12 @@
 """A bias by repeat as `result.json` has it."""
 
-from rig.analysis.at_rest import Quantity
 from rig.analysis.bias_drift import Anew, BiasDrift
 from rig.data.drift_entries import BiasEntry, DriftEntry, MoveEntry, RepeatEntry, SlopeEntry
+from rig.data.quantity import Quantity
 from rig.data.result_types import ErrorEntry, Vector3
 from rig.errors import Fault
 from rig.estimation.arrays import Array
 from rig.estimation.bias_by_repeat import FALSE_ALARM
-from rig.observation.csv_samples import UNITS
 from rig.report.entry import counted
 
 
@@ -15,7 +14,7 @@ def drift_entry(quantity: Quantity, drift: BiasDrift) -> DriftEntry:
     """In SI units."""
     held, slope = drift.held, drift.over_temperature
     return DriftEntry(
-        unit=UNITS[quantity],
+        unit=quantity.unit,
         repeats=tuple(
             RepeatEntry(
                 time_s=float(drift.time_s[repeat]),

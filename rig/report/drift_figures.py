@@ -7,8 +7,8 @@ import numpy as np
 
 from rig.analysis.bias_drift import Anew, BiasDrift
 from rig.analysis.outcome import Outcome
+from rig.data.quantity import Quantity
 from rig.data.result_file import ResultDocument
-from rig.report.drift_table import SHOWN
 from rig.report.entry import counted
 from rig.report.expanded import expanded, factor_words
 from rig.report.figures import save
@@ -42,9 +42,9 @@ def write_drift_figures(outcome: Outcome, document: ResultDocument, folder: Path
     return (Plotted(tuple(names)),)
 
 
-def draw_drift(axes: "Axes", quantity: str, drift: BiasDrift) -> None:
+def draw_drift(axes: "Axes", quantity: Quantity, drift: BiasDrift) -> None:
     """Dots: scale and axes held. Crosses: everything found anew. A line before each repeat at which the bias moved."""
-    unit, size, what = SHOWN[quantity]
+    size = quantity.drift.size
     repeat = np.arange(1, len(drift.held.bias) + 1)
     again = [(number, found) for number, found in zip(repeat, drift.anew, strict=True) if isinstance(found, Anew)]
     factors = expanded((1.0, 1.0, 1.0), counted(drift.freedom)).factors
@@ -68,7 +68,7 @@ def draw_drift(axes: "Axes", quantity: str, drift: BiasDrift) -> None:
     axes.locator_params("x", integer=True)
     axes.set(
         xlabel="repeat",
-        ylabel=f"bias   {unit}",
-        title=f"{what}; ± U ({factor_words(counted(drift.freedom))}), × found anew",
+        ylabel=f"bias   {quantity.drift.name}",
+        title=f"{quantity.sensor}; ± U ({factor_words(counted(drift.freedom))}), × found anew",
     )
     axes.legend(frameon=False, ncols=3, fontsize=8)

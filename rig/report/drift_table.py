@@ -7,13 +7,11 @@ from rich.console import Console
 from rich.table import Table
 
 from rig.data.drift_entries import DriftEntry
+from rig.data.quantity import QUANTITIES, RATE
 from rig.data.result_types import ErrorEntry
-from rig.estimation.earth import MICRO_G_M_S2
 from rig.report.budget_table import heading_of
 from rig.report.expanded import expanded, factor_words
 from rig.station.plain_text import plain
-
-SHOWN = {"rate": ("°/h", np.pi / 180 / 3600, "gyroscope"), "acceleration": ("µg", MICRO_G_M_S2, "accelerometer")}
 
 
 def print_drifts(found: Mapping[str, Mapping[str, DriftEntry]], console: Console) -> None:
@@ -27,9 +25,10 @@ def print_drifts(found: Mapping[str, Mapping[str, DriftEntry]], console: Console
 
 def drift_table(name: str, quantity: str, found: DriftEntry) -> Table:
     """The bias of each repeat, scale and axes held, and its largest ± U; a mark where it moved."""
-    unit, size, what = SHOWN[quantity]
+    of = QUANTITIES[quantity]
+    unit, size = of.drift.name, of.drift.size
     known = expanded((1.0, 1.0, 1.0), found.freedom)
-    table = Table(title=plain(f"{name}, {what}: bias by repeat, scale and axes held", "table.title"))
+    table = Table(title=plain(f"{name}, {of.sensor}: bias by repeat, scale and axes held", "table.title"))
     table.title_justify = "left"
     moved = {move.repeat: move.axis for move in found.moves}
     for heading in ("repeat", "hours", "°C", *(f"{axis} {unit}" for axis in "xyz"), heading_of(known.factors), "moved"):
@@ -48,7 +47,8 @@ def drift_table(name: str, quantity: str, found: DriftEntry) -> Table:
 
 def drift_lines(quantity: str, found: DriftEntry) -> Iterator[str]:
     """What stands below the table."""
-    unit, size, _ = SHOWN[quantity]
+    shown = QUANTITIES[quantity].drift
+    unit, size = shown.name, shown.size
     if found.moves:
         for move in found.moves:
             change = " ".join(f"{each / size:+.3g}" for each in move.change)
@@ -79,5 +79,5 @@ def drift_lines(quantity: str, found: DriftEntry) -> Iterator[str]:
         low, high = slope.range_c
         words = factor_words(slope.freedom)
         yield f"over temperature: {terms} {unit} per °C ({words}), from {low:.1f} to {high:.1f} °C only"
-    if quantity == "rate" and not found.earth_rate_known:
+    if quantity == RATE.name and not found.earth_rate_known:
         yield "the Earth's rate is in these biases; site.latitude_deg and site.heading_deg take it out"

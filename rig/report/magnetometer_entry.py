@@ -11,6 +11,7 @@ from rig.data.magnetometer_entries import (
     MagnetometerEntry,
     UniformityEntry,
 )
+from rig.data.quantity import FIELD
 from rig.data.result_types import ErrorEntry
 from rig.errors import Fault
 from rig.estimation.magnetometer import MODEL, MagnetometerSolution
@@ -18,8 +19,6 @@ from rig.estimation.residuals import attitude_residual_std
 from rig.report.axes import PARAMETERS, dwell_entry
 from rig.report.budget_entry import budget_entry
 from rig.report.entry import counted, entry
-
-UNITS = ("1", "1", "1", "T", "T", "T")
 
 
 def magnetometer_entry(result: MagnetometerResult | Fault) -> MagnetometerEntry | ErrorEntry:
@@ -36,7 +35,7 @@ def magnetometer_entry(result: MagnetometerResult | Fault) -> MagnetometerEntry 
         covariance_combined=result.budget.covariance,
         budget=budget_entry(result.budget),
         covariance_order=PARAMETERS,
-        covariance_units=UNITS,
+        covariance_units=FIELD.parameter_units,
         arm_field_in_bias=True,
         uniformity=entry(UniformityEntry, result.uniformity),
         drift=None if result.drift is None else entry(FieldDriftEntry, result.drift),
@@ -45,7 +44,7 @@ def magnetometer_entry(result: MagnetometerResult | Fault) -> MagnetometerEntry 
         attitude_error_rad=error.std_rad,
         attitude_error_std_rad=error.uncertainty_rad if np.isfinite(error.uncertainty_rad) else None,
         dwells=[
-            dwell_entry(FieldDwellEntry, "t", *each)
+            dwell_entry(FieldDwellEntry, FIELD, *each)
             for each in zip(result.dwells, solution.fit.residuals, expected, strict=True)
         ],
         beside={method: _beside(found) for method, found in result.beside.items()},

@@ -13,9 +13,9 @@ from numpy.typing import NDArray
 
 from rig.board.identify import refusing
 from rig.config.models import RigConfig
+from rig.data.quantity import ACCELERATION, FIELD, RATE
 from rig.data.run_file import RecordedMagnetometer
 from rig.errors import Fault, Refused
-from rig.observation.csv_samples import COLUMNS
 from rig.runner.acquisition import SensorCount
 from rig.runner.sensors import board_source
 from rig.sensors.registry import OWN_PORT
@@ -48,14 +48,14 @@ class ReadingsFile:
         self.path = path
         self._scales: list[tuple[str, float]]
         if isinstance(sensor, RecordedMagnetometer):
-            self._scales, quantities = [("field_counts", sensor.sensitivity_t_per_count)], [COLUMNS["field"]]
+            self._scales, quantities = [("field_counts", sensor.sensitivity_t_per_count)], [FIELD.columns]
             self._count = SensorCount(name, sensor.sensitivity_t_per_count, "field_counts")
         else:
-            self._scales, quantities = [("counts", sensor.sensitivity_rad_s_per_count)], [COLUMNS["rate"]]
+            self._scales, quantities = [("counts", sensor.sensitivity_rad_s_per_count)], [RATE.columns]
             self._count = SensorCount(name, sensor.sensitivity_rad_s_per_count)
             if sensor.sensitivity_m_s2_per_count is not None:
                 self._scales.append(("acceleration_counts", sensor.sensitivity_m_s2_per_count))
-                quantities.append(COLUMNS["acceleration"])
+                quantities.append(ACCELERATION.columns)
         self._file: TextIO = path.open("x", encoding="utf-8", newline="\n")
         self._file.write(",".join(["time_s", *(name for names in quantities for name in names)]) + "\n")
         self._format = ",".join(["%.6f", *["%.9g"] * 3 * len(quantities)])

@@ -6,6 +6,7 @@ import numpy as np
 import pytest
 
 from rig.analysis.at_rest import AtRest, at_rest
+from rig.data.quantity import RATE
 from rig.data.run_file import RunData
 from rig.errors import Fault
 from rig.estimation.allan import Read
@@ -22,7 +23,7 @@ def run() -> RunData:
 
 
 def rates(run: RunData) -> AtRest:
-    found = at_rest([run])["gyro"].quantities["rate"]
+    found = at_rest([run])["gyro"].quantities[RATE]
     assert isinstance(found, AtRest)
     return found
 

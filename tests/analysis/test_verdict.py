@@ -10,6 +10,7 @@ import pytest
 from rig.analysis.acceleration import AccelerometerResult
 from rig.analysis.bias_drift import BiasDrift
 from rig.analysis.verdict import Check, acceleration_checks, drift_checks, judge, verdict, verification_checks
+from rig.data.quantity import RATE
 from rig.data.settings import DecisionRule, Limits
 from rig.estimation.accumulator import Solution
 from rig.estimation.bias_by_repeat import BiasByRepeat
@@ -134,7 +135,7 @@ def test_accelerometers_and_drifts_are_held_against_their_limits_with_their_unce
         np.array([[0.0, 0, 0], [9.5e-5, 0, 0], [4e-5, 0, 0]]), np.full((3, 3), 3e-6), np.ones(3), (), FOREVER
     )
     drift = cast(BiasDrift, SimpleNamespace(held=held, freedom=FOREVER))
-    checks |= {each.name: each for each in drift_checks("a", {"rate": drift}, limits, rule)}
+    checks |= {each.name: each for each in drift_checks("a", {RATE: drift}, limits, rule)}
     for name, uncertainty in (
         ("a.acceleration_scale_deviation", 1.4e-3),
         ("a.acceleration_bias", 8e-3),

@@ -5,6 +5,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
+from rig.data.quantity import RATE
 from rig.observation.csv_samples import read_samples
 from rig.observation.rests import find_rests
 from support.paths import DOCS
@@ -23,7 +24,7 @@ def test_a_hands_rests_are_found_as_they_are_known_of_a_real_recording(tmp_path:
 @pytest.mark.parametrize("noise_rad_s", [0.0, 1e-3, 0.035])
 def test_between_two_turns_there_is_one_rest(noise_rad_s: float) -> None:
     session = turn(Hand(np.vstack([np.eye(3), -np.eye(3)]), noise_rad_s=noise_rad_s), 1)
-    rests = find_rests(session.time_s, {"rate": session.readings})
+    rests = find_rests(session.time_s, {RATE: session.readings})
     turns = session.rows[session.rows[:, 5] > 0]
     assert len(rests) == len(turns) + 1
     for rest, begins_s in zip(rests, turns[:, 0], strict=False):
@@ -43,5 +44,5 @@ def test_a_gap_ends_a_rest() -> None:
     time_s = np.arange(1000) / 100
     readings = np.random.default_rng(1).normal(size=(1000, 3)) * 1e-3
     time_s[500:] += 3.0
-    before, after = find_rests(time_s, {"rate": readings})
+    before, after = find_rests(time_s, {RATE: readings})
     assert before.end_s <= 5 and after.start_s >= 8

@@ -9,6 +9,7 @@ from rig.data.accelerometer_entries import AccelerometerEntry
 from rig.data.budget_entries import BudgetEntry
 from rig.data.drift_entries import DriftEntry
 from rig.data.magnetometer_entries import MagnetometerEntry
+from rig.data.quantity import ACCELERATION, FIELD, QUANTITIES, RATE, Quantity, Unit
 from rig.data.result_file import AverageEntry, ObservationEntry, SensorEntry
 from rig.data.result_types import ErrorEntry
 from rig.estimation.arrays import Array
@@ -18,9 +19,6 @@ from rig.report.printed_budget import shown_places
 WIDTH, LEFT, RIGHT = 340.0, 42.0, 8.0
 TOP, HEIGHT = 18.0, 104.0
 NAMES, ROW, DECADES = 106.0, 13.0, 4
-RATES = ((1e3, "mrad/s"), (1e6, "µrad/s"))
-ACCELERATIONS = ((1.0, "m/s²"), (1e3, "mm/s²"), (1e6, "µm/s²"))
-FIELDS = ((1e6, "µT"), (1e9, "nT"))
 EXPECTED = "what noise, a wandering bias and the ends of turns are expected to leave"
 EXPECTED_OF_ACCELERATIONS = "what noise, the arm's attitudes and a sensor within its data sheet are expected to leave"
 EXPECTED_OF_FIELDS = "what noise and the arm's attitudes are expected to leave"
@@ -80,10 +78,10 @@ def residuals(sensor: SensorEntry) -> Residuals | None:
     split = len(sensor.observations) if sensor.rests else None
     left = np.array(vector.residuals_rad_s)
     if vector.residuals_std_rad_s is not None:
-        return _marked(left, np.array(vector.residuals_std_rad_s), RATES, EXPECTED, split=split)
+        return _marked(left, np.array(vector.residuals_std_rad_s), RATE, EXPECTED, split=split)
     # Not the average's own standard deviation, which counts as drift of the bias what gravity does to the rests.
     std = np.array([each.noise_rad_s for each in averages]) / np.sqrt([[each.samples] for each in averages])
-    return _marked(left, std, RATES, OF_SAMPLES, split=split)
+    return _marked(left, std, RATE, OF_SAMPLES, split=split)
 
 
 def acceleration_residuals(found: AccelerometerEntry) -> Residuals:
@@ -91,10 +89,10 @@ def acceleration_residuals(found: AccelerometerEntry) -> Residuals:
     left = np.array([each.residual_m_s2 for each in found.dwells])
     expected = [each.residual_std_m_s2 for each in found.dwells if each.residual_std_m_s2 is not None]
     if len(expected) == len(left):
-        return _marked(left, np.array(expected), ACCELERATIONS, EXPECTED_OF_ACCELERATIONS)
+        return _marked(left, np.array(expected), ACCELERATION, EXPECTED_OF_ACCELERATIONS)
     std, mean = np.array([(each.mean_std_m_s2, each.mean_m_s2) for each in found.dwells]).swapaxes(0, 1)
     turned = _turned(np.array(found.matrix), mean - np.array(found.bias_m_s2), found.attitude_error_rad)
-    return _marked(left, np.hypot(std, turned), ACCELERATIONS, OF_ATTITUDES)
+    return _marked(left, np.hypot(std, turned), ACCELERATION, OF_ATTITUDES)
 
 
 def field_residuals(found: MagnetometerEntry) -> Residuals:
@@ -102,10 +100,10 @@ def field_residuals(found: MagnetometerEntry) -> Residuals:
     left = np.array([each.residual_t for each in found.dwells])
     expected = [each.residual_std_t for each in found.dwells if each.residual_std_t is not None]
     if len(expected) == len(left):
-        return _marked(left, np.array(expected), FIELDS, EXPECTED_OF_FIELDS)
+        return _marked(left, np.array(expected), FIELD, EXPECTED_OF_FIELDS)
     std, mean = np.array([(each.mean_std_t, each.mean_t) for each in found.dwells]).swapaxes(0, 1)
     turned = _turned(np.array(found.matrix), mean - np.array(found.bias_t), found.attitude_error_rad)
-    return _marked(left, np.hypot(std, turned), FIELDS, OF_ATTITUDES)
+    return _marked(left, np.hypot(std, turned), FIELD, OF_ATTITUDES)
 
 
 def _turned(matrix: Array, readings: Array, attitude_error_rad: float) -> Array:
@@ -120,15 +118,13 @@ def biases_by_repeat(quantity: str, found: DriftEntry) -> Residuals:
     """Less their mean over the repeats."""
     bias = np.array([each.held.bias for each in found.repeats])
     std = np.array([each.held.std for each in found.repeats])
-    return _marked(
-        bias - bias.mean(axis=0), std, RATES if quantity == "rate" else ACCELERATIONS, OF_REPEATS, shown=FROM_MEAN
-    )
+    return _marked(bias - bias.mean(axis=0), std, QUANTITIES[quantity], OF_REPEATS, shown=FROM_MEAN)
 
 
 def _marked(
     left: Array,
     std: Array,
-    units: Sequence[tuple[float, str]],
+    quantity: Quantity,
     of: str,
     *,
     shown: str = "mean reading less model",
@@ -136,11 +132,11 @@ def _marked(
 ) -> Residuals:
     """Values (n, 3) side by side, their bars two standard deviations, in a unit that suits the largest."""
     bars = 2 * std
-    reach, unit, factor = _scale(float((np.abs(left) + bars).max()), units)
+    reach, unit = _scale(float((np.abs(left) + bars).max()), quantity.residuals)
     across = (WIDTH - LEFT - RIGHT) / len(left)
 
     def height(value: float) -> float:
-        return round(TOP + HEIGHT / 2 * (1 - value * factor / reach), 1)
+        return round(TOP + HEIGHT / 2 * (1 - value / unit.size / reach), 1)
 
     def point(place: int, axis: int) -> Point:
         value, bar = left[place, axis], bars[place, axis]
@@ -148,17 +144,18 @@ def _marked(
         return Point(round(x, 1), height(value), height(value - bar), height(value + bar), axis)
 
     points = tuple(point(place, axis) for place in range(len(left)) for axis in range(3))
-    ticks = tuple((height(at / factor), f"{at:g}".replace("-", "−")) for at in (-reach / 1.1, 0.0, reach / 1.1))
+    ticks = tuple((height(at * unit.size), f"{at:g}".replace("-", "−")) for at in (-reach / 1.1, 0.0, reach / 1.1))
     begins = None if split is None else round(LEFT + across * split, 1)
-    return Residuals(points, ticks, height(0.0), begins, unit, int((np.abs(left) <= bars).sum()), shown, of)
+    return Residuals(points, ticks, height(0.0), begins, unit.name, int((np.abs(left) <= bars).sum()), shown, of)
 
 
-def _scale(largest: float, units: Sequence[tuple[float, str]]) -> tuple[float, str, float]:
-    """A round reach above it, the unit's prefix, and what takes SI there: the first unit in which it is above 1."""
-    factor, unit = next((each for each in units if largest * each[0] >= 1), units[-1])
-    decade = 10 ** np.floor(np.log10(max(largest * factor, 1e-9)))
-    reach = next(step * decade for step in (1, 2, 3, 4, 5, 6, 8, 10) if step * decade >= largest * factor)
-    return 1.1 * float(reach), unit, factor
+def _scale(largest: float, units: Sequence[Unit]) -> tuple[float, Unit]:
+    """A round reach above it, and the unit that is in: the first in which it is above 1."""
+    unit = next((each for each in units if largest >= each.size), units[-1])
+    shown = largest / unit.size
+    decade = 10 ** np.floor(np.log10(max(shown, 1e-9)))
+    reach = next(step * decade for step in (1, 2, 3, 4, 5, 6, 8, 10) if step * decade >= shown)
+    return 1.1 * float(reach), unit
 
 
 def contributions(budget: BudgetEntry, scale: Sequence[float]) -> Contributions:

@@ -12,6 +12,7 @@ import numpy as np
 
 from rig.arm.state import JOINT_NAMES
 from rig.config.written_file import new_file, write_new
+from rig.data.quantity import ACCELERATION, FIELD, RATE
 from rig.estimation.arrays import Array
 from rig.observation.acceleration import accelerations
 from rig.observation.average import Stream
@@ -20,9 +21,6 @@ from rig.observation.observed_run import ObservedRun
 from rig.report.exports.names import plain_names
 from rig.study.files import missing_extra
 
-RATES = ("x_rad_s", "y_rad_s", "z_rad_s")
-ACCELERATIONS = ("x_m_s2", "y_m_s2", "z_m_s2")
-FIELDS = ("x_t", "y_t", "z_t")
 CLOCK = "Times are seconds of the arm controller's clock."
 LOST = "Not here: counts, the board's and the computer's times, events, settings; they are in run.h5."
 
@@ -48,7 +46,7 @@ def tables_of(recordings: Sequence[ObservedRun]) -> Iterator[Table]:
             whose = f"{name}, {sensor.part} {sensor.serial_number}, {sensor.mode} readings in the sensor's own axes."
             yield Table(f"{name}{after}", _readings(stream), f"{whose} {CLOCK} {LOST}")
             if sensor.has_acceleration:
-                columns = {"time_s": stream.time_s, **_split(ACCELERATIONS, accelerations(stream, slice(None)))}
+                columns = {"time_s": stream.time_s, **_split(ACCELERATION.columns, accelerations(stream, slice(None)))}
                 yield Table(f"{name}_acceleration{after}", columns, f"{whose} Upwards at rest. {CLOCK} {LOST}")
             turned = "Whole turns about a unit vector in the flange's frame; those of angle 0 are rests."
             yield Table(f"{name}_sweeps{after}", _sweeps(recording, name), f"{turned} {CLOCK} {LOST}")
@@ -57,7 +55,7 @@ def tables_of(recordings: Sequence[ObservedRun]) -> Iterator[Table]:
             if found is not None:
                 part = f"{magnetometer.part} {magnetometer.serial_number}"
                 whose = f"{name}, {part}, raw readings in tesla in the magnetometer's own axes."
-                columns = {"time_s": found[0], **_split(FIELDS, found[1])}
+                columns = {"time_s": found[0], **_split(FIELD.columns, found[1])}
                 yield Table(f"{name}{after}", columns, f"{whose} {CLOCK} {LOST}")
 
 
@@ -71,7 +69,7 @@ def _arm(recording: ObservedRun) -> dict[str, Array]:
 def _readings(stream: Stream) -> dict[str, Array]:
     sensor = stream.sensor
     temperature = stream.raw["temperature_counts"] * sensor.temperature_c_per_count + sensor.temperature_offset_c
-    return {"time_s": stream.time_s, **_split(RATES, stream.readings_rad_s), "temperature_c": temperature}
+    return {"time_s": stream.time_s, **_split(RATE.columns, stream.readings_rad_s), "temperature_c": temperature}
 
 
 def _sweeps(recording: ObservedRun, name: str) -> dict[str, Array]:

@@ -1,0 +1,112 @@
+"""What sensors measure: every name, unit and size that is written or shown of a quantity, in one table.
+
+A quantity's names in files end with its `suffix`: `bias_m_s2`, `x_m_s2`. A new quantity is a row here.
+"""
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+from math import pi
+from types import MappingProxyType
+from typing import Final
+
+from rig.estimation.earth import MICRO_G_M_S2
+
+DEG_H: Final = pi / 180 / 3600  # rad/s
+MINUTE_S: Final = 60.0  # √(3600 s): from √s to √h
+
+
+@dataclass(frozen=True, slots=True)
+class Unit:
+    """A unit that numbers are shown in, and its `size` in SI."""
+
+    name: str
+    size: float
+
+
+@dataclass(frozen=True, slots=True)
+class Quantity:
+    """One vector quantity that a sensor of three axes measures.
+
+    - `sensor` is what measures it. `unit` is that of SI, `suffix` the same in names.
+    - `reading` is the unit of a reading on a screen, `drift` that of what its bias does over hours, `residuals` those
+      that what a model leaves of it is drawn in, from the largest.
+    - `walk` is what its white noise is called, `walk_suffix` the SI unit of that in names, `walk_unit` a shown one.
+    - `steady` is how far the means of two neighbouring seconds may be apart at rest, beside their noise: no bias moves
+      so fast, but a hand does, and half a degree of tilt is more. A field within a room changes by a tenth of that.
+    - `limits` is what the names of its limits and checks begin with.
+    """
+
+    name: str
+    sensor: str
+    unit: str
+    suffix: str
+    reading: Unit
+    drift: Unit
+    residuals: tuple[Unit, ...]
+    walk: str
+    walk_suffix: str
+    walk_unit: Unit
+    steady: float
+    limits: str
+
+    def __str__(self) -> str:
+        return self.name
+
+    def named(self, what: str) -> str:
+        """The name in a file of `what` in this quantity's unit: `bias_rad_s`."""
+        return f"{what}_{self.suffix}"
+
+    @property
+    def columns(self) -> tuple[str, ...]:
+        """The columns x, y, z of its readings in a table."""
+        return tuple(self.named(axis) for axis in "xyz")
+
+    @property
+    def parameter_units(self) -> tuple[str, ...]:
+        """The units of three scale factors and three biases."""
+        return ("1", "1", "1", self.unit, self.unit, self.unit)
+
+
+RATE: Final = Quantity(
+    name="rate",
+    sensor="gyroscope",
+    unit="rad/s",
+    suffix="rad_s",
+    reading=Unit("°/s", pi / 180),
+    drift=Unit("°/h", DEG_H),
+    residuals=(Unit("mrad/s", 1e-3), Unit("µrad/s", 1e-6)),
+    walk="angle random walk",
+    walk_suffix="rad_sqrt_s",
+    walk_unit=Unit("°/√h", pi / 180 / MINUTE_S),
+    steady=5e-3,
+    limits="",
+)
+ACCELERATION: Final = Quantity(
+    name="acceleration",
+    sensor="accelerometer",
+    unit="m/s²",
+    suffix="m_s2",
+    reading=Unit("m/s²", 1.0),
+    drift=Unit("µg", MICRO_G_M_S2),
+    residuals=(Unit("m/s²", 1.0), Unit("mm/s²", 1e-3), Unit("µm/s²", 1e-6)),
+    walk="velocity random walk",
+    walk_suffix="m_s_sqrt_s",
+    walk_unit=Unit("m/s/√h", 1 / MINUTE_S),
+    steady=0.05,
+    limits="acceleration_",
+)
+FIELD: Final = Quantity(
+    name="field",
+    sensor="magnetometer",
+    unit="T",
+    suffix="t",
+    reading=Unit("µT", 1e-6),
+    drift=Unit("nT", 1e-9),
+    residuals=(Unit("µT", 1e-6), Unit("nT", 1e-9)),
+    walk="white noise",
+    walk_suffix="t_sqrt_s",
+    walk_unit=Unit("nT √s", 1e-9),
+    steady=2e-6,
+    limits="field_",
+)
+QUANTITIES: Final[Mapping[str, Quantity]] = MappingProxyType({each.name: each for each in (RATE, ACCELERATION, FIELD)})
