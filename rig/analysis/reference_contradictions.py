@@ -27,6 +27,7 @@ from rig.analysis.suspicion import Statistic
 from rig.arm.kinematics import WRIST_1
 from rig.data.settings import Uncertainty
 from rig.estimation.arrays import Array
+from rig.estimation.earth import MICRO_G_M_S2
 from rig.estimation.felt import LEVER, NO_SWEEPS, PARAMETERS, Movement
 from rig.observation.observed_run import ObservedRun
 
@@ -37,7 +38,8 @@ DISTURBED_DWELL, DISTURBED_SWEEP = "disturbed_dwell", "disturbed_sweep"
 class ReadInReference:
     """One sensor's readings: `counts` (n, 3) of each recording, the windows and dwells cut from them, and the model.
 
-    `pieces` name the dwells and sweeps of `read`, in its order.
+    `pieces` name the dwells and sweeps of `read`, in its order; `flicker_counts` is the least Allan deviation of the
+    bias, by which the halves of a dwell differ beside their noise.
     """
 
     counts: Sequence[NDArray[np.int64]]
@@ -45,6 +47,7 @@ class ReadInReference:
     sweeps: Sequence[Window]
     read: Read
     pieces: Sequence[str]
+    flicker_counts: float = 0.0
 
 
 @dataclass(frozen=True, slots=True)
@@ -65,9 +68,11 @@ def of_accelerometer(
     pieces = [_Piece.of_dwell(dwell) for dwell in dwells if dwell.index in used]
     pieces += [piece for each, since_s in timed for piece in _swept(name, each, since_s)]
     solution, movement, theta = result.solution, result.movement, result.solution.theta
+    sensor = result.sensor
+    flicker_m_s2 = MICRO_G_M_S2 * known.of("acceleration_bias_instability_ug", name, sensor.part)
     lag = lag_pattern(movement, 1e-3 * known.acceleration_lag_ms) / np.sqrt(3)
     off_rad = solution.attitude_error.std_rad
-    arm = Known(recordings[0].motion.kinematics, known.axis_deg, np.array(result.sensor.mounting), off_rad)
+    arm = Known(recordings[0].motion.kinematics, known.axis_deg, np.array(sensor.mounting), off_rad)
     return ReadInReference(
         counts=[recording.run.samples[name]["acceleration_counts"].astype(np.int64) for recording in recordings],
         dwells=dwells,
@@ -80,6 +85,7 @@ def of_accelerometer(
             second_order=solution.second_order_s2_m is not None,
         ),
         pieces=[each.name for each in pieces],
+        flicker_counts=flicker_m_s2 / (sensor.sensitivity_m_s2_per_count or np.inf),
     )
 
 
@@ -140,7 +146,7 @@ def reference_statistics(held: ReadInReference, rate: float, *, drifting: bool) 
     statistics = {
         **(named or {DISTURBED_DWELL if held.read.dwells else DISTURBED_SWEEP: found.piece}),
         **found.statistics,
-        **knocked(held.dwells, rate),
+        **knocked(held.dwells, held.flicker_counts, rate),
         **judge_readings(held.counts, windows, rate),
     }
     return ReferenceStatistics(statistics, found.told_from)

@@ -86,10 +86,11 @@ def resting(dwells: Sequence[Dwelt]) -> list[Read]:
     return [Read(-1, dwell.counts, dwell.counts - dwell.counts.mean(axis=0), np.zeros(3)) for dwell in dwells]
 
 
-def knocked(dwells: Sequence[Dwelt], rate: float) -> Mapping[str, Statistic]:
+def knocked(dwells: Sequence[Dwelt], flicker_counts: float, rate: float) -> Mapping[str, Statistic]:
     """How much the halves of a dwell differ where they differ most, as χ² of three axes; nothing of short dwells.
 
-    The limit is that of F: how readings scatter is found from those of the dwell.
+    The limit is that of F: how readings scatter is found from those of the dwell. A bias that flickers by an Allan
+    deviation of `flicker_counts` makes the halves differ by √2 times as much.
     """
     from scipy.special import fdtri
 
@@ -97,16 +98,17 @@ def knocked(dwells: Sequence[Dwelt], rate: float) -> Mapping[str, Statistic]:
     if not told:
         return {}
     freedom = min(len(dwell.counts) for dwell in told) - 2
-    return {"knocked_dwell": (max(map(_apart, told)), 3 * float(fdtri(3, freedom, 1 - rate / len(told))))}
+    limit = 3 * float(fdtri(3, freedom, 1 - rate / len(told)))
+    return {"knocked_dwell": (max(_apart(each, flicker_counts) for each in told), limit)}
 
 
-def _apart(dwell: Dwelt) -> float:
+def _apart(dwell: Dwelt, flicker_counts: float) -> float:
     halves = Window(dwell.window.start_s, dwell.middle_s), Window(dwell.middle_s, dwell.window.end_s)
     early, means = dwell.time_s < dwell.middle_s, []
     for half, inside in zip(halves, (early, ~early), strict=True):
         means.append(mean_at_rest(dwell.counts[inside].astype(np.float64), dwell.time_s[inside], half, 1.0)[0])
     first, last = means
-    return float(np.sum((last.mean - first.mean) ** 2 / (first.variance + last.variance)))
+    return float(np.sum((last.mean - first.mean) ** 2 / (first.variance + last.variance + 2 * flicker_counts**2)))
 
 
 def _counts(stream: Stream, inside: slice) -> NDArray[np.int64]:

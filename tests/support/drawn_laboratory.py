@@ -7,6 +7,7 @@ from typing import Any
 import numpy as np
 import yaml
 
+from firmware_host.emulator.accelerometer import accelerations
 from firmware_host.emulator.gyroscope import readings
 from rig.config.load import parse
 from rig.world.board.sensor_truth import SensorTruth
@@ -125,9 +126,7 @@ def truth(
 
     Made of what the simulated part reads without noise, at rest and turning about each of its axes.
     """
-    loaded = parse(yaml.safe_dump(dict(document)))
-    world = world_section(loaded)
-    sensor = SensorTruth(loaded.config.sensors[name], world.sensors[name])
+    sensor, seed = _sensor_and_seed(document, name)
     quiet = replace(
         sensor.gyro,
         noise_rad_s=0.0,
@@ -136,8 +135,7 @@ def truth(
         bandwidth_hz=None,
         delay_s=0.0,
     )
-    seed = np.random.SeedSequence([world.seed, sorted(world.sensors).index(name)])
-    time_s = np.concatenate([np.arange(from_s, to_s, 0.05) for from_s, to_s in sorted(windows_s)])
+    time_s = _times(windows_s)
 
     def read(rate_rad_s: float) -> np.ndarray:
         turning = np.full((len(time_s), 3), rate_rad_s)
@@ -146,3 +144,25 @@ def truth(
     scale = np.mean(2 * speed_rad_s / (read(speed_rad_s) - read(-speed_rad_s)), axis=0)
     bias = -read(0.0).mean(axis=0)
     return np.concatenate([scale, bias])
+
+
+def bias_at_0_g(document: Mapping[str, Any], name: str, windows_s: Iterable[tuple[float, float]]) -> np.ndarray:
+    """(3,) what the accelerometer in a sensor reads without noise where it feels nothing, as a mean over such times."""
+    sensor, seed = _sensor_and_seed(document, name)
+    assert sensor.accelerometer is not None
+    quiet = replace(sensor.accelerometer, noise_m_s2=0.0, bandwidth_hz=None, delay_s=0.0)
+    time_s = _times(windows_s)
+    read = accelerations(quiet, time_s, np.zeros((len(time_s), 3)), seed, sensor.temperature_c)
+    mean: np.ndarray = read.mean(axis=0)
+    return mean
+
+
+def _sensor_and_seed(document: Mapping[str, Any], name: str) -> tuple[SensorTruth, np.random.SeedSequence]:
+    loaded = parse(yaml.safe_dump(dict(document)))
+    world = world_section(loaded)
+    sensor = SensorTruth(loaded.config.sensors[name], world.sensors[name])
+    return sensor, np.random.SeedSequence([world.seed, sorted(world.sensors).index(name)])
+
+
+def _times(windows_s: Iterable[tuple[float, float]]) -> np.ndarray:
+    return np.concatenate([np.arange(from_s, to_s, 0.05) for from_s, to_s in sorted(windows_s)])

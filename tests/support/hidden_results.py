@@ -16,7 +16,7 @@ from rig.errors import RigError
 from rig.estimation.budget import Budget
 from rig.observation.observed_run import ObservedRun
 from rig.plans.recorded import judged, open_run
-from support.drawn_laboratory import truth
+from support.drawn_laboratory import bias_at_0_g, truth
 
 SCALE, BIAS = "gyroscope scale", "gyroscope bias"
 OF_GRAVITY = "accelerometer scale", "accelerometer bias"
@@ -89,14 +89,16 @@ def true_gyroscope(document: Mapping[str, Any], name: str, recording: ObservedRu
 def true_accelerometer(document: Mapping[str, Any], name: str, found: AccelerometerResult) -> np.ndarray:
     """(6,) the scale of the readings at 1 g up and down, the bias of that at 0 g, as warm as in the mean of the dwells.
 
-    Neither moves by φ, for what is even is the same up and down, and nothing at 0 g.
+    Neither moves by φ, for what is even is the same up and down, and nothing at 0 g. A bias that wanders is its mean
+    over the dwells.
     """
     sensor = document["world"]["sensors"][name]
     drawn = sensor["accelerometer"]
     at_s = [(dwell.window.start_s + dwell.window.end_s) / 2 for dwell in found.dwells]
     warmer_k = float(np.mean([_warmer_k(sensor, each) for each in at_s]))
     scale = np.array(drawn["scale"]) * (1 + warmer_k * np.array(drawn.get("scale_per_k", 0.0)))
-    return np.concatenate([scale, drawn["bias_m_s2"] + warmer_k * np.array(drawn.get("bias_m_s2_per_k", np.zeros(3)))])
+    windows_s = sorted((dwell.window.start_s, dwell.window.end_s) for dwell in found.dwells)
+    return np.concatenate([scale, bias_at_0_g(document, name, windows_s)])
 
 
 def _warmer_k(sensor: Mapping[str, Any], time_s: float) -> float:
