@@ -47,7 +47,8 @@ class DriftEntry(Entry):
     `common_std` is what all biases share beside their own; `excess` how many times more the readings scatter from
     repeat to repeat than they do within a dwell. `freedom` are the degrees of freedom of the `held` biases' standard
     deviations, null where they have no end; results of before do not count them. A steady bias has `moves` in a share
-    of `false_alarm` of all runs.
+    of `false_alarm` of all runs. Results of before do not say whose bias it is: `part`, `serial_number`, `full_scale`
+    in the same unit.
     """
 
     unit: str
@@ -60,3 +61,6 @@ class DriftEntry(Entry):
     over_temperature: SlopeEntry | ErrorEntry
     earth_rate_known: bool
     freedom: Freedom3 | None = None
+    part: str | None = None
+    serial_number: str | None = None
+    full_scale: float | None = None

@@ -28,8 +28,8 @@ class Quantity:
     """One vector quantity that a sensor of three axes measures.
 
     - `sensor` is what measures it. `unit` is that of SI, `suffix` the same in names.
-    - `reading` is the unit of a reading on a screen, `drift` that of what its bias does over hours, `residuals` those
-      that what a model leaves of it is drawn in, from the largest.
+    - `reading` is the unit of a reading on a screen, `bias` that of a bias with at least so many `decimals`, `drift`
+      that of what the bias does over hours, `residuals` those that what a model leaves is drawn in, from the largest.
     - `walk` is what its white noise is called, `walk_suffix` the SI unit of that in names, `walk_unit` a shown one.
     - `steady` is how far the means of two neighbouring seconds may be apart at rest, beside their noise: no bias moves
       so fast, but a hand does, and half a degree of tilt is more. A field within a room changes by a tenth of that.
@@ -41,6 +41,8 @@ class Quantity:
     unit: str
     suffix: str
     reading: Unit
+    bias: Unit
+    decimals: int
     drift: Unit
     residuals: tuple[Unit, ...]
     walk: str
@@ -73,6 +75,8 @@ RATE: Final = Quantity(
     unit="rad/s",
     suffix="rad_s",
     reading=Unit("°/s", pi / 180),
+    bias=Unit("rad/s", 1.0),
+    decimals=5,  # a MEMS gyroscope's uncertainty
     drift=Unit("°/h", DEG_H),
     residuals=(Unit("mrad/s", 1e-3), Unit("µrad/s", 1e-6)),
     walk="angle random walk",
@@ -87,6 +91,8 @@ ACCELERATION: Final = Quantity(
     unit="m/s²",
     suffix="m_s2",
     reading=Unit("m/s²", 1.0),
+    bias=Unit("m/s²", 1.0),
+    decimals=5,
     drift=Unit("µg", MICRO_G_M_S2),
     residuals=(Unit("m/s²", 1.0), Unit("mm/s²", 1e-3), Unit("µm/s²", 1e-6)),
     walk="velocity random walk",
@@ -101,6 +107,8 @@ FIELD: Final = Quantity(
     unit="T",
     suffix="t",
     reading=Unit("µT", 1e-6),
+    bias=Unit("µT", 1e-6),
+    decimals=3,
     drift=Unit("nT", 1e-9),
     residuals=(Unit("µT", 1e-6), Unit("nT", 1e-9)),
     walk="white noise",

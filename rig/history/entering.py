@@ -8,7 +8,8 @@ from sqlalchemy import Connection, Row, insert, select
 from rig.history import journal, schema
 from rig.history.finished import Finished
 from rig.history.index import run_row
-from rig.history.parameters import Calibrated, calibrated
+from rig.report.kinds.followed import Followed
+from rig.report.kinds.registry import followed
 
 
 def enter_run(connection: Connection, finished: Finished, content_sha256: str) -> int:
@@ -30,7 +31,7 @@ def enter_run(connection: Connection, finished: Finished, content_sha256: str) -
     if finished.documents:
         rows = [{"run_id": run_id, "name": name, "sha256": sha256} for name, sha256 in finished.documents]
         connection.execute(insert(schema.document), rows)
-    for each in calibrated(finished.document):
+    for each in followed(finished.document):
         _enter_calibration(connection, run_id, each, check_standard=each.serial_number in finished.check_standards)
     journal.note(connection, schema.run, run_id)
     return run_id
@@ -51,7 +52,7 @@ def now_utc() -> str:
     return datetime.now(UTC).isoformat(timespec="milliseconds")
 
 
-def _enter_calibration(connection: Connection, run_id: int, each: Calibrated, *, check_standard: bool) -> None:
+def _enter_calibration(connection: Connection, run_id: int, each: Followed, *, check_standard: bool) -> None:
     row = {
         "run_id": run_id,
         "sensor": each.sensor,

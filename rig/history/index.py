@@ -5,9 +5,11 @@ import math
 from collections.abc import Iterator, Sequence
 from datetime import UTC, datetime
 
+from rig.data.quantity import QUANTITIES
 from rig.data.result_file import ResultDocument
-from rig.history.parameters import Calibrated, Parameter, calibrated
 from rig.report.certificate.content import CONFORMITY
+from rig.report.kinds.followed import Followed, Parameter
+from rig.report.kinds.registry import followed
 
 SAME = 1e-6  # of the standard uncertainty: what a processor's rounding may change of a number
 
@@ -44,17 +46,18 @@ def utc(text: str) -> str:
     return datetime.fromisoformat(text).astimezone(UTC).isoformat(timespec="seconds")
 
 
-def unlike(document: ResultDocument, found: Sequence[Calibrated]) -> Iterator[str]:
+def unlike(document: ResultDocument, found: Sequence[Followed]) -> Iterator[str]:
     """In what `found` differs from the calibrations that a result states, beyond a processor's rounding."""
-    stated = {(each.sensor, each.quantity): each for each in calibrated(document)}
+    stated = {(each.sensor, each.quantity): each for each in followed(document)}
     beside = {(each.sensor, each.quantity): each for each in found}
     for sensor, quantity in sorted(stated.keys() ^ beside.keys()):
-        yield f"{quantity} of {sensor}, which only one of them has"
+        if quantity in QUANTITIES or (sensor, quantity) in beside:  # drift and Earth's rate were not followed before
+            yield f"{quantity} of {sensor}, which only one of them has"
     for key in sorted(stated.keys() & beside.keys()):
         yield from _differences(stated[key], beside[key])
 
 
-def _differences(stated: Calibrated, found: Calibrated) -> Iterator[str]:
+def _differences(stated: Followed, found: Followed) -> Iterator[str]:
     for name in ("part", "serial_number", "estimator"):
         if getattr(stated, name) != getattr(found, name):
             yield f"{name} of {stated.sensor}: {getattr(found, name)}, stated {getattr(stated, name)}"

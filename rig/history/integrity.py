@@ -13,8 +13,8 @@ from rig.data.result_file import ResultDocument
 from rig.data.run_folder import RESULT
 from rig.history.finished import content_sha256, document_sha256, recording_of
 from rig.history.index import run_row, unlike
-from rig.history.parameters import Calibrated
 from rig.history.store import History, Kept, Past
+from rig.report.kinds.followed import Followed
 
 State = Literal["ok", "changed", "missing", "elsewhere"]
 MOST_TOLD = 3
@@ -65,8 +65,8 @@ def _contradictions(run: Kept, pasts: Sequence[Past]) -> Iterator[str]:
         yield f"and {len(found) - MOST_TOLD} more"
 
 
-def _calibrated(past: Past) -> Calibrated:
-    return Calibrated(
+def _calibrated(past: Past) -> Followed:
+    return Followed(
         past.sensor,
         past.quantity,
         past.part,

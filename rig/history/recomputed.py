@@ -5,7 +5,7 @@ from collections.abc import Iterator, Mapping, Sequence
 
 from rig.data.result_file import ResultDocument
 from rig.history.index import SAME, unlike
-from rig.history.parameters import calibrated
+from rig.report.kinds.registry import followed
 
 ROUNDING = 1e-15  # of what is zero but for the last digits: no quantity of a result is so small
 # What the same numbers may be reached with, and when.
@@ -24,7 +24,7 @@ def not_given(claimed: ResultDocument, given: ResultDocument) -> list[str]:
     checks = {check.name: (check.passed, check.unit) for check in given.checks}
     rows += [check.name for check in claimed.checks if checks.get(check.name) != (check.passed, check.unit)]
     numbers = _differences(_numbers_of(claimed), _numbers_of(given), "")
-    return [*rows, *unlike(claimed, calibrated(given)), *numbers]
+    return [*rows, *unlike(claimed, followed(given)), *numbers]
 
 
 def _origin(document: ResultDocument) -> dict[str, object]:

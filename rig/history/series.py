@@ -8,13 +8,13 @@ from functools import cached_property
 import numpy as np
 
 from rig.estimation.arrays import Array
-from rig.history.parameters import Parameter, is_scale, nominal
 from rig.history.statistics.agreement import normalised_error
 from rig.history.statistics.charts import FEWEST, Chart, chart, merged
 from rig.history.statistics.random_effects import CONFIDENCE, Fitted, fit
 from rig.history.statistics.recall import days_to_limit
 from rig.history.statistics.rig_effects import RigEffect, rig_effects
 from rig.history.store import Past
+from rig.report.kinds.followed import Parameter, is_scale, nominal
 
 YEAR_DAYS = 365.25
 DAY_S = 86400.0

@@ -5,11 +5,11 @@ from collections.abc import Iterable, Iterator, Mapping, Sequence
 from rich.table import Table
 
 from rig.data.quantity import QUANTITIES
-from rig.history.parameters import Parameter, is_scale
 from rig.history.series import YEAR_DAYS, Change, RigState, Subject, Trend
 from rig.history.statistics.charts import FEWEST
 from rig.history.statistics.rig_effects import RigEffect
 from rig.history.store import Kept, Past
+from rig.report.kinds.followed import Parameter, is_scale
 from rig.report.rounding import rounded
 from rig.station.plain_text import plain
 

@@ -1,46 +1,68 @@
 """A run's result: each sensor's calibration with its uncertainty, the checks, the verdict."""
 
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
+from functools import cached_property
 from typing import TYPE_CHECKING, Any, Literal
 
 import numpy as np
 
-from rig.analysis.calibration import DEFAULT_ESTIMATOR, SensorResult
+from rig.analysis.calibration import DEFAULT_ESTIMATOR
 from rig.analysis.outcome import Outcome
 from rig.analysis.verdict import Check
+from rig.data.result_file import ResultDocument
 from rig.data.settings import setting
 from rig.estimation.arrays import Array
-from rig.estimation.coverage import COVERAGE_FACTOR
 from rig.notebook.html import table
 from rig.notebook.runs import NoSuchSensor, Run
 from rig.plans.recorded import judged
+from rig.report.document import document_of
+from rig.report.kinds.kind import Found, Shown, Without
+from rig.report.kinds.registry import KINDS, shown
+from rig.report.kinds.triad import bias_of
 
 if TYPE_CHECKING:
     from rig.notebook.plots import Plot
 
 
+HEADINGS = ("axis", "scale factor", "± U (about 95 %)", "bias", "± U", "unit")
+
+
 @dataclass(frozen=True, eq=False)
 class Calibration:
-    """One sensor's calibration: rate = `scale` × (reading + `bias_rad_s`)."""
+    """Scale factors and biases of one sensor; of a gyroscope rate = `scale` × (reading + `bias`).
+
+    `entry` is all that `result.json` has of it.
+    """
 
     name: str
-    found: SensorResult
+    found: Found[Any]
+    shown: Shown
+
+    @property
+    def entry(self) -> Any:
+        """What `result.json` says of it."""
+        return self.found.entry
 
     @property
     def scale(self) -> Array:
         """(3,)"""
-        return self.found.scale
+        return np.array(self.entry.scale)
+
+    @property
+    def bias(self) -> Array:
+        """(3,) in the SI unit of what the sensor measures."""
+        return np.array(bias_of(self.found.quantity, self.entry))
 
     @property
     def bias_rad_s(self) -> Array:
-        """(3,)"""
-        return self.found.bias_rad_s
+        """(3,), of a gyroscope."""
+        return np.array(self.entry.bias_rad_s)
 
     @property
     def covariance(self) -> Array:
         """(6, 6) in the order kx ky kz bx by bz."""
-        return self.found.solution.covariance
+        return np.array(self.entry.covariance)
 
     @property
     def std(self) -> Array:
@@ -48,45 +70,45 @@ class Calibration:
         return np.asarray(np.sqrt(np.diag(self.covariance)), dtype=np.float64)
 
     def to_dict(self) -> dict[str, Any]:
-        """Scale, bias and covariance as `result.json` has them."""
-        from rig.report.sensor_entry import estimate_entry
-
-        return estimate_entry(self.found.solution).model_dump(mode="json")
-
-    def rows(self) -> list[tuple[str, ...]]:
-        """Axis, scale factor and bias with U, or with twice their standard deviations where no more is known."""
-        budget = self.found.uncertainty
-        expanded = COVERAGE_FACTOR * self.std if budget is None else budget.expanded
-        return [
-            (
-                f"{self.name} {axis}",
-                f"{self.scale[i]:.6f}",
-                f"{expanded[i]:.6f}",
-                f"{self.bias_rad_s[i]:+.6f}",
-                f"{expanded[3 + i]:.6f}",
-            )
-            for i, axis in enumerate("xyz")
-        ]
+        """What `result.json` says of it: plain numbers, lists and texts."""
+        made: dict[str, Any] = self.entry.model_dump(mode="json", exclude_unset=True)
+        return made
 
     def __repr__(self) -> str:
-        scale, bias = (" ".join(f"{value:{form}}" for value in each) for each, form in self._forms())
-        return f"<{self.name} by {self.found.solution.estimator}: scale {scale}, bias {bias} rad/s>"
+        scale, bias = (" ".join(f"{each:{form}}" for each in values) for values, form in self._forms())
+        return f"<{self.name} by {self.entry.estimator}: scale {scale}, bias {bias} {self.shown.unit.name}>"
 
-    def _forms(self) -> tuple[tuple[Array, str], tuple[Array, str]]:
-        return (self.scale, ".5f"), (self.bias_rad_s, "+.5f")
+    def _forms(self) -> tuple[tuple[Sequence[float], str], tuple[Sequence[float], str]]:
+        return (self.entry.scale, ".5f"), (self.shown.numbers.values, "+.5f")
 
     def _repr_html_(self) -> str:
-        return table(f"{self.found.sensor.part} {self.found.serial_number}", HEADINGS, self.rows())
-
-
-HEADINGS = ("axis", "scale factor", "± U (about 95 %)", "bias rad/s", "± U rad/s")
+        return table(f"{self.entry.part} {self.entry.serial_number}", HEADINGS, _rows(self.shown))
 
 
 @dataclass(frozen=True, eq=False)
 class Result(Mapping[str, Calibration]):
-    """What a run amounts to: `result["gyro"]` is a sensor's calibration."""
+    """What a run amounts to: `result["gyro"]` is a sensor's calibration, `result["gyro, accelerometer"]` one beside it.
+
+    Where a sensor has but one, its own name finds it.
+    """
 
     outcome: Outcome
+
+    @cached_property
+    def document(self) -> ResultDocument:
+        """The result as `result.json` has it."""
+        return document_of(self.outcome)
+
+    @cached_property
+    def _calibrations(self) -> dict[str, Calibration]:
+        found = (
+            Calibration(shown.name, each, shown)
+            for kind in KINDS
+            if not isinstance(kind.shown, Without)
+            for each in kind.found(self.document)
+            if (shown := kind.shown(each)).scale is not None
+        )
+        return {each.name: each for each in found}
 
     @property
     def verdict(self) -> Literal["pass", "fail"]:
@@ -99,10 +121,8 @@ class Result(Mapping[str, Calibration]):
         return self.outcome.checks
 
     def to_dict(self) -> dict[str, Any]:
-        """As `result.json` has it: plain numbers, lists and texts."""
-        from rig.report.document import document_of
-
-        return document_of(self.outcome).model_dump(mode="json", by_alias=True, exclude_unset=True)
+        """The result as `result.json` has it: plain numbers, lists and texts."""
+        return self.document.model_dump(mode="json", by_alias=True, exclude_unset=True)
 
     def plot(self) -> "Plot":
         """What each sweep and rest leaves unexplained, sensor by sensor."""
@@ -111,23 +131,26 @@ class Result(Mapping[str, Calibration]):
         return plot_residuals(self.outcome.results)
 
     def __getitem__(self, name: str) -> Calibration:
-        results = self.outcome.results
-        if name not in results:
-            known = f"Choose one of: {', '.join(results)}" if results else "Solve the recording of a calibration"
-            raise NoSuchSensor("no_such_sensor", f"this result has no calibration of {name}", known)
-        return Calibration(name, results[name])
+        known = self._calibrations
+        of_that_sensor = [each for each in known.values() if each.found.sensor == name]
+        if name not in known and len(of_that_sensor) != 1:
+            choices = f"Choose one of: {', '.join(known)}" if known else "Solve the recording of a calibration"
+            raise NoSuchSensor("no_such_sensor", f"this result has no calibration of {name}", choices)
+        return known[name] if name in known else of_that_sensor[0]
 
     def __iter__(self) -> Iterator[str]:
-        return iter(self.outcome.results)
+        return iter(self._calibrations)
 
     def __len__(self) -> int:
-        return len(self.outcome.results)
+        return len(self._calibrations)
 
     def __repr__(self) -> str:
         return f"<result: {self.verdict}, {', '.join(map(repr, self.values()))}>"
 
     def _repr_html_(self) -> str:
-        calibrated = table(f"verdict: {self.verdict}", HEADINGS, [row for each in self.values() for row in each.rows()])
+        calibrated = table(
+            f"verdict: {self.verdict}", HEADINGS, [row for each in shown(self.document) for row in _rows(each)]
+        )
         checks = table("checks", ("check", "value", "limit", "unit", ""), map(_row, self.checks))
         return calibrated + checks
 
@@ -141,6 +164,16 @@ def solve(run: Run, estimator: str = DEFAULT_ESTIMATOR, **changes: float) -> Res
     return Result(
         judged(run.recorded.judged_by([f"{setting(key)}={value!r}" for key, value in changes.items()]), estimator)
     )
+
+
+def _rows(found: Shown) -> Iterator[tuple[str, ...]]:
+    """Axis by axis, with U, or with twice the standard deviations where no more is known."""
+    for i, axis in enumerate("xyz"):
+        scale = ("–", "–")
+        if found.scale is not None:
+            scale = f"{found.scale.values[i]:.6f}", f"{found.scale.expanded[i]:.6f}"
+        number, width = f"{found.numbers.values[i]:+.6f}", f"{found.numbers.expanded[i]:.6f}"
+        yield f"{found.name} {axis}", *scale, number, width, found.unit.name
 
 
 def _row(check: Check) -> tuple[str, ...]:

@@ -1,21 +1,23 @@
 """Rows of the page's tables: observations and parameters, of a run that goes on and of one with its result."""
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Mapping
 from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
 
 from rig.analysis.so_far import SoFar
-from rig.data.accelerometer_entries import AccelerometerEntry
-from rig.data.budget_entries import expanded_uncertainties
-from rig.data.result_file import ResultDocument, SensorEntry
+from rig.data.quantity import ACCELERATION, RATE, Unit
+from rig.data.result_file import ResultDocument
 from rig.errors import Fault
 from rig.estimation.coverage import COVERAGE_FACTOR
 from rig.estimation.vector_model import VectorSolution
 from rig.observation.acceleration import DwellReading
 from rig.observation.observe import Observation, nearest_axis
 from rig.page.history import rounded
+from rig.report.kinds.kind import Shown, Three
+from rig.report.kinds.registry import shown
+from rig.report.kinds.triad import beside
 
 NOISE_ONLY, COMBINED = "noise only", "combined"
 Row = dict[str, Any]
@@ -54,7 +56,7 @@ def dwell_row(sensor: str, dwell: DwellReading, gravity_m_s2: float | None) -> R
     mean, size = dwell.reading.mean, float(np.linalg.norm(dwell.reading.mean))
     axis, sign = nearest_axis(mean)
     return {
-        "sensor": accelerometer(sensor),
+        "sensor": beside(sensor, ACCELERATION),
         "sweep": dwell.index,
         "by": "host",
         "dwell": dwell.name,
@@ -68,11 +70,6 @@ def dwell_row(sensor: str, dwell: DwellReading, gravity_m_s2: float | None) -> R
     }
 
 
-def accelerometer(sensor: str) -> str:
-    """How the tables call the accelerometer in a sensor."""
-    return f"{sensor}, accelerometer"
-
-
 def look_of(found: Mapping[str, SoFar]) -> Look:
     """Of a run that goes on."""
     observations = [_sweep(name, sweep, each) for name, one in found.items() for sweep, each in one.sweeps.items()]
@@ -82,18 +79,8 @@ def look_of(found: Mapping[str, SoFar]) -> Look:
 
 
 def parameter_rows(result: ResultDocument) -> list[Row]:
-    """Of a run's result: gyroscopes, then accelerometers; U is what the result states, or twice its noise."""
-    rows = []
-    for name, sensor in result.sensors.items():
-        rows.append(_stated(name, "rad/s", sensor.scale, sensor.bias_rad_s, sensor))
-    for name, found in result.accelerometers.items():
-        rows.append(_stated(accelerometer(name), "m/s²", found.scale, found.bias_m_s2, found))
-    return rows
-
-
-def _stated(name: str, unit: str, scale: Any, bias: Any, found: SensorEntry | AccelerometerEntry) -> Row:
-    expanded = expanded_uncertainties(found.budget, found.covariance)
-    return _row(name, unit, scale, bias, expanded, of=NOISE_ONLY if found.budget is None else COMBINED)
+    """Of a run's result, kind by kind; U is what the result states, or twice its noise."""
+    return [_row(each) for each in shown(result)]
 
 
 def _sweep(sensor: str, sweep: int, found: Observation | Fault) -> Row:
@@ -105,29 +92,30 @@ def _sweep(sensor: str, sweep: int, found: Observation | Fault) -> Row:
 def _dwell(sensor: str, index: int, found: DwellReading | Fault, gravity_m_s2: float | None) -> Row:
     if isinstance(found, DwellReading):
         return dwell_row(sensor, found, gravity_m_s2)
-    return {"sensor": accelerometer(sensor), "sweep": index, "by": "host", "dwell": "", "refused": str(found)}
+    return {"sensor": beside(sensor, ACCELERATION), "sweep": index, "by": "host", "dwell": "", "refused": str(found)}
 
 
 def _parameters_so_far(name: str, found: SoFar) -> Row:
     solution = found.solution
     if isinstance(solution, VectorSolution):
-        expanded = (COVERAGE_FACTOR * np.sqrt(np.diag(solution.covariance))).tolist()
-        return _row(name, "rad/s", solution.scale, solution.bias_rad_s, expanded, of=NOISE_ONLY)
-    row = {"sensor": name, "unit": "rad/s", "scale": None, "scale_u": None, "of": NOISE_ONLY, "missing": solution.what}
+        u = (COVERAGE_FACTOR * np.sqrt(np.diag(solution.covariance))).tolist()
+        bias, scale = Three(solution.bias_rad_s.tolist(), u[3:]), Three(solution.scale.tolist(), u[:3])
+        return _row(Shown(name, RATE.bias, bias, combined=False, scale=scale))
     if found.bias_rad_s is None:
-        return {**row, "bias": None, "bias_u": None}
-    bias, std = found.bias_rad_s
-    return {**row, "bias": rounded(tuple(bias.tolist())), "bias_u": rounded(tuple((COVERAGE_FACTOR * std).tolist()))}
+        return {**_row_of(name, RATE.bias, None, None, of=NOISE_ONLY), "missing": solution.what}
+    mean, std = found.bias_rad_s
+    bias = Three(mean.tolist(), (COVERAGE_FACTOR * std).tolist())
+    return {**_row_of(name, RATE.bias, bias, None, of=NOISE_ONLY), "missing": solution.what}
 
 
-def _row(name: str, unit: str, scale: Any, bias: Any, expanded: Sequence[float], *, of: str) -> Row:
-    return {
-        "sensor": name,
-        "unit": unit,
-        "scale": [float(each) for each in scale],  # rounded on the screen alone
-        "scale_u": rounded(tuple(expanded[:3])),
-        "bias": [float(each) for each in bias],
-        "bias_u": rounded(tuple(expanded[3:])),
-        "of": of,
-        "missing": None,
-    }
+def _row(found: Shown) -> Row:
+    of = COMBINED if found.combined else NOISE_ONLY
+    return {**_row_of(found.name, found.unit, found.numbers, found.scale, of=of), "missing": None}
+
+
+def _row_of(name: str, unit: Unit, bias: Three | None, scale: Three | None, *, of: str) -> Row:
+    row: Row = {"sensor": name, "unit": unit.name, "of": of}
+    for what, each in (("scale", scale), ("bias", bias)):
+        row[what] = None if each is None else [float(value) for value in each.values]  # rounded on the screen alone
+        row[f"{what}_u"] = None if each is None else rounded(tuple(each.expanded))
+    return row

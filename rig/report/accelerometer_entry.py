@@ -1,5 +1,7 @@
 """An accelerometer's entry in `result.json`."""
 
+from typing import Any
+
 import numpy as np
 
 from rig.analysis.acceleration import AccelerometerResult, HeldOut
@@ -24,8 +26,8 @@ from rig.report.budget_entry import budget_entry
 from rig.report.entry import counted, entry
 
 
-def accelerometer_entry(result: AccelerometerResult) -> AccelerometerEntry:
-    """Scale, bias and covariance; beside them the other methods from the attitudes alone."""
+def accelerometer_entry(result: AccelerometerResult, **more: Any) -> AccelerometerEntry:
+    """Scale, bias and covariance; beside them the other methods from the attitudes alone, and what `more` there is."""
     solution = result.solution
     std, expected = np.sqrt(np.diag(solution.covariance)), dwell_residual_std_m_s2(solution, result.movement)
     return entry(
@@ -52,6 +54,7 @@ def accelerometer_entry(result: AccelerometerResult) -> AccelerometerEntry:
         non_orthogonality_freedom=counted(of_acceleration_angles(result)),
         second_order_freedom=counted(of_second_order(result)),
         held_out=None if result.held_out is None else _held_out(result.held_out),
+        **more,
     )  # fmt: skip
 
 

@@ -19,7 +19,7 @@ from rig.estimation import accelerometer, magnetometer
 from rig.estimation.known_increments import KnownIncrements
 from rig.estimation.triaxial import TriaxialSolution
 from rig.observation.timebase import TimeBase
-from rig.report.axes import matrix_lines
+from rig.report.axes import matrix_lines, scale_and_bias_table
 from rig.report.budget_entry import budget_entry
 from rig.report.budget_table import budget_table, expanded_heading
 from rig.report.increments import increment_entry, increment_lines
@@ -63,7 +63,7 @@ def print_found(found: Found, *, as_json: bool) -> None:
             continue
         budget = budget_entry(result.budget)
         console.print(_table(f"{found.samples}: {quantity}, {MODELS[quantity]}", quantity, result.solution, budget))
-        console.print(budget_table(budget, in_unit(result.solution)[0].tolist(), quantity.unit))
+        console.print(budget_table(budget, in_unit(result.solution)[0].tolist(), quantity.bias))
         for line in _lines(quantity, result, found.surrounding):
             console.print(plain(line))
 
@@ -87,15 +87,8 @@ def _clock_entry(clock: TimeBase) -> dict[str, float]:
 
 def _table(title: str, quantity: Quantity, solution: TriaxialSolution | KnownIncrements, budget: BudgetEntry) -> Table:
     """The scale factor and the bias of each axis, ± U."""
-    table = Table(title=plain(title, "table.title"), title_justify="left")
-    unit = quantity.unit
-    for heading in ("axis", "scale factor", expanded_heading(budget), f"bias {unit}", f"± U {unit}"):
-        table.add_column(heading, justify="left" if heading == "axis" else "right")
-    scale, _ = in_unit(solution)
-    for i, axis in enumerate("xyz"):
-        bias = f"{solution.bias[i]:+.4e}", f"{budget.expanded[3 + i]:.1e}"
-        table.add_row(axis, f"{scale[i]:.6f}", f"{budget.expanded[i]:.6f}", *bias)
-    return table
+    scale, bias = in_unit(solution)[0].tolist(), solution.bias.tolist()
+    return scale_and_bias_table(title, quantity, scale, bias, budget.expanded, heading=expanded_heading(budget))
 
 
 def _lines(quantity: Quantity, result: Result, surrounding: Surrounding) -> Iterator[str]:

@@ -1,5 +1,6 @@
 """What tables and entries of all three kinds of sensors share: three numbers in a line, three axes in a table."""
 
+import math
 from collections.abc import Iterable, Iterator, Sequence
 from typing import Protocol
 
@@ -26,6 +27,7 @@ class Skewed(Protocol):
     def non_orthogonality_freedom(self) -> Sequence[Freedom] | None: ...
 
 
+FEWEST_DECIMALS = 5
 PARAMETERS = ("kx", "ky", "kz", "bx", "by", "bz")
 
 
@@ -34,25 +36,40 @@ def triple(values: Iterable[float], form: str) -> str:
     return " ".join(f"{value:{form}}" for value in values)
 
 
-def axes_table(
+def scale_and_bias_table(
     title: str,
+    quantity: Quantity,
     scale: Sequence[float],
     bias: Sequence[float],
     expanded: Sequence[float],
     *,
     heading: str,
-    unit: str,
-    digits: int,
 ) -> Table:
-    """Scale factor and bias of each axis, ± their expanded uncertainties (6,), which are headed so; bias in `unit`."""
+    """Scale factor and bias (SI) of each axis, ± their expanded uncertainties (6,), which are headed so.
+
+    With as many decimals as the smallest uncertainty warrants.
+    """
+    unit, size = quantity.bias.name, quantity.bias.size
     table = Table(title=plain(title, "table.title"), title_justify="left")
     for each in ("axis", "scale factor", heading, f"bias {unit}", f"± U {unit}"):
         table.add_column(each, justify="left" if each == "axis" else "right")
+    biases, widths = ([float(each) / size for each in values] for values in (bias, expanded[3:]))
+    of_scale, of_bias = decimals(expanded[:3]), decimals(widths, quantity.decimals)
     for i, axis in enumerate("xyz"):
         table.add_row(
-            axis, f"{scale[i]:.6f}", f"{expanded[i]:.6f}", f"{bias[i]:+.{digits}f}", f"{expanded[3 + i]:.{digits}f}"
+            axis,
+            f"{scale[i]:.{of_scale}f}",
+            f"{expanded[i]:.{of_scale}f}",
+            f"{biases[i]:+.{of_bias}f}",
+            f"{widths[i]:.{of_bias}f}",
         )
     return table
+
+
+def decimals(uncertainties: Sequence[float], fewest: int = FEWEST_DECIMALS) -> int:
+    """How many the smallest of them warrants, which is printed with two digits; so many at least."""
+    smallest = min(uncertainties)
+    return max(fewest, 1 - math.floor(math.log10(smallest))) if smallest > 0 else fewest
 
 
 def skew_known(found: Skewed) -> str:

@@ -5,6 +5,7 @@ from collections.abc import Iterator, Sequence
 from rich.table import Table
 
 from rig.data.budget_entries import BudgetEntry
+from rig.data.quantity import Unit
 from rig.estimation.budget import NOT_GIVEN
 from rig.estimation.coverage import COVERAGE_FACTOR
 from rig.report.printed_budget import Line, printed_budget
@@ -29,12 +30,9 @@ def assumed_lines(budget: BudgetEntry | None) -> Iterator[str]:
             yield f"{line.name}: ± {line.half_width:.3g} {line.unit} is assumed, for {line.source}"
 
 
-def budget_table(budget: BudgetEntry, scale: Sequence[float], unit: str = "rad/s", per_unit: float = 1.0) -> Table:
-    """Of one scale factor and one bias, as the certificate has it: squared, the lines add up to the combined one.
-
-    Biases times `per_unit` are in `unit`.
-    """
-    found = printed_budget(budget, scale, unit, per_unit)
+def budget_table(budget: BudgetEntry, scale: Sequence[float], bias: Unit) -> Table:
+    """The budget of one scale factor and of one bias, in that unit, as the certificate has it: lines add up squared."""
+    found = printed_budget(budget, scale, bias)
     k, b = found.columns
     title = f"uncertainty budget of the scale factor of {k.axis} and of the bias of {b.axis}, whose U are the largest"
     small = "; ".join(line.name for line in found.lines if not line.kind)

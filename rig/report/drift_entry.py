@@ -2,16 +2,17 @@
 
 from rig.analysis.bias_drift import Anew, BiasDrift
 from rig.data.drift_entries import BiasEntry, DriftEntry, MoveEntry, RepeatEntry, SlopeEntry
-from rig.data.quantity import Quantity
+from rig.data.quantity import RATE, Quantity
 from rig.data.result_types import ErrorEntry, Vector3
+from rig.data.run_file import RecordedSensor
 from rig.errors import Fault
 from rig.estimation.arrays import Array
 from rig.estimation.bias_by_repeat import FALSE_ALARM
 from rig.report.entry import counted
 
 
-def drift_entry(quantity: Quantity, drift: BiasDrift) -> DriftEntry:
-    """In SI units."""
+def drift_entry(quantity: Quantity, drift: BiasDrift, sensor: RecordedSensor) -> DriftEntry:
+    """The bias of that sensor by repeat, in SI units."""
     held, slope = drift.held, drift.over_temperature
     return DriftEntry(
         unit=quantity.unit,
@@ -43,6 +44,9 @@ def drift_entry(quantity: Quantity, drift: BiasDrift) -> DriftEntry:
         ),
         earth_rate_known=drift.earth_rate_known,
         freedom=counted(drift.freedom),
+        part=sensor.part,
+        serial_number=sensor.serial_number,
+        full_scale=sensor.range_rad_s if quantity == RATE else sensor.range_m_s2,
     )
 
 

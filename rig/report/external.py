@@ -1,27 +1,29 @@
 """A calibration from data recorded elsewhere, for people and for machines."""
 
 import json
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 
 import numpy as np
 from rich.console import Console
+from rich.table import Table
 
 from rig.analysis.external import budget_of
+from rig.data.budget_entries import expanded_uncertainties
+from rig.data.quantity import RATE
 from rig.data.result_file import EstimateEntry, VectorEntry
 from rig.data.result_types import ErrorEntry
 from rig.estimation.budget import Budget
 from rig.estimation.estimate import Estimate
-from rig.estimation.six_observation import MODEL, PARAMETER_UNITS, PARAMETERS
+from rig.estimation.six_observation import MODEL, PARAMETERS
 from rig.estimation.turned import TurnedSolution
 from rig.estimation.vector_model import VectorSolution
 from rig.observation.csv_import import ExternalData
-from rig.report.axes import matrix_lines
+from rig.report.axes import matrix_lines, scale_and_bias_table
 from rig.report.budget_entry import budget_entry
-from rig.report.budget_table import budget_table
+from rig.report.budget_table import budget_table, expanded_heading
 from rig.report.sensor_entry import estimate_entry, vector_entry
-from rig.report.table import estimate_table
 from rig.station.plain_text import plain
 
 
@@ -70,7 +72,7 @@ def _document(found: External) -> dict[str, object]:
         "model": MODEL,
         **estimate_entry(found.solution).model_dump(),
         "covariance_order": list(PARAMETERS),
-        "covariance_units": list(PARAMETER_UNITS),
+        "covariance_units": list(RATE.parameter_units),
         "rests": len(found.data.rests),
         "ways": found.ways,
         "budget": budget_entry(found.budget).model_dump(),
@@ -82,8 +84,9 @@ def _document(found: External) -> dict[str, object]:
 def _print(found: External, console: Console) -> None:
     estimate, vector, beside = estimate_entry(found.solution), found.vector, found.six_observation
     budget = budget_entry(found.budget)
-    console.print(estimate_table(f"{found.samples}, {MODEL}, {estimate.estimator}", estimate, budget))
-    console.print(budget_table(budget, estimate.scale))
+    title = f"{found.samples}, {MODEL}, {estimate.estimator}"
+    console.print(_table(title, estimate, budget.expanded, heading=expanded_heading(budget)))
+    console.print(budget_table(budget, estimate.scale, RATE.bias))
     if vector is not None:
         covariance = np.array(vector.matrix_covariance)[:9, :9]
         for line in matrix_lines(np.array(vector.matrix), covariance, max(budget.factors[:3])):
@@ -93,7 +96,13 @@ def _print(found: External, console: Console) -> None:
     if isinstance(beside, ErrorEntry):
         console.print(plain(f"six_observation: {beside.error}"))
     elif beside.estimator != estimate.estimator:
-        console.print(estimate_table("six observations alone, the rests and the axes left out", beside))
+        title = "six observations alone, the rests and the axes left out"
+        widths = expanded_uncertainties(None, beside.covariance)
+        console.print(_table(title, beside, widths, expanded_heading(None)))
+
+
+def _table(title: str, estimate: EstimateEntry, expanded: Sequence[float], heading: str) -> Table:
+    return scale_and_bias_table(title, RATE, estimate.scale, estimate.bias_rad_s, expanded, heading=heading)
 
 
 def _how(found: External) -> Iterator[str]:

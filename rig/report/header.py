@@ -1,9 +1,10 @@
 """The calibration as a C header, for firmware that corrects its own readings."""
 
 import re
-from collections.abc import Iterable, Iterator, Mapping
+from collections.abc import Iterable, Iterator, Mapping, Sequence
 from pathlib import Path
 from types import MappingProxyType
+from typing import Any
 
 import numpy as np
 
@@ -11,10 +12,12 @@ from rig.analysis.calibration import SensorResult
 from rig.analysis.outcome import Outcome
 from rig.config.written_file import write_new
 from rig.data.accelerometer_entries import AccelerometerEntry
+from rig.data.magnetometer_entries import MagnetometerEntry
 from rig.data.result_file import ResultDocument, SensorEntry
 from rig.errors.quoting import printable
 from rig.estimation.arrays import Array
 from rig.estimation.vector_model import VectorSolution
+from rig.report.kinds.kind import Found, said
 from rig.station.events import DocumentWritten, RunEvent
 
 NOTHING: Mapping[str, Array] = MappingProxyType({})
@@ -22,13 +25,13 @@ NOTHING: Mapping[str, Array] = MappingProxyType({})
 
 def write_header(outcome: Outcome, document: ResultDocument, folder: Path) -> tuple[RunEvent, ...]:
     """`calibration.h`, unless the calibration failed its limits: nobody should compile it in then."""
-    if outcome.passed and (outcome.results or outcome.accelerometers):
-        path = folder / "calibration.h"
-        found = {name: g_sensitivity(result) for name, result in outcome.results.items()}
-        sensed = {name: matrix for name, matrix in found.items() if matrix is not None}
-        write_new(path, calibration_header(document, sensed))
-        return (DocumentWritten(path),)
-    return ()
+    found = {name: g_sensitivity(result) for name, result in outcome.results.items()}
+    sensed = {name: matrix for name, matrix in found.items() if matrix is not None}
+    if not outcome.passed or not any(_calibrations(document, sensed)):
+        return ()
+    path = folder / "calibration.h"
+    write_new(path, calibration_header(document, sensed))
+    return (DocumentWritten(path),)
 
 
 def g_sensitivity(result: SensorResult) -> Array | None:
@@ -43,30 +46,62 @@ def g_sensitivity(result: SensorResult) -> Array | None:
     return matrix
 
 
-def calibration_header(result: ResultDocument, g_sensitivity: Mapping[str, Array] = NOTHING) -> str:
+def calibration_header(document: ResultDocument, g_sensitivity: Mapping[str, Array] = NOTHING) -> str:
     """C source text for the sensors of a result.
 
     For each calibrated sensor its scale factors (no unit), its biases in rad/s, the matrix M of g = M (m + b) by which
     the board corrects it, and the function that does the same; where `g_sensitivity` (3, 3), rad/s per m/s², is known,
-    that too and a function that takes it out first. Of each calibrated accelerometer bias, matrix and function. Names
-    are those of the sensors, with everything that C does not allow written as `_`.
+    that too and a function that takes it out first. Of each calibrated accelerometer and magnetometer bias, matrix and
+    function. Names are those of the sensors, with everything that C does not allow written as `_`.
     """
     lines = [
         "/* Gyroscope calibration, g = M (m + b): rate_rad_s = matrix * (reading_rad_s + bias_rad_s).",
         " * M is diag(scale), or the whole matrix, which also brings the axes to right angles.",
-        f" * Verdict: {result.verdict}. Solved {result.provenance.solved_utc}. */",
+        f" * Verdict: {document.verdict}. Solved {document.provenance.solved_utc}. */",
         "#ifndef CALIBRATION_H",
         "#define CALIBRATION_H",
+        *_calibrations(document, g_sensitivity),
     ]
-    for name, sensor in result.sensors.items():
-        if sensor.role == "calibrate":
-            prefix = _prefix(name)
-            lines += _correction(prefix, sensor)
-            if name in g_sensitivity:
-                lines += _without_gravity(prefix, g_sensitivity[name])
-    for name, accelerometer in result.accelerometers.items():
-        lines += _acceleration(_prefix(name), accelerometer)
     return "\n".join([*lines, "", "#endif", ""])
+
+
+def _calibrations(document: ResultDocument, sensed: Mapping[str, Array]) -> Iterator[str]:
+    from rig.report.kinds.registry import KINDS  # which hold this file's functions
+
+    for kind in KINDS:
+        for found in kind.found(document):
+            yield from said(kind.header, found, sensed)
+
+
+def gyroscope_lines(found: Found[SensorEntry], sensed: Mapping[str, Array]) -> Iterator[str]:
+    """C of a gyroscope that was calibrated; none of a reference."""
+    if found.entry.role != "calibrate":
+        return
+    prefix, sensitivity = _prefix(found.sensor), sensed.get(found.sensor)
+    yield from _correction(prefix, found.entry)
+    if sensitivity is not None:
+        yield from _without_gravity(prefix, sensitivity)
+
+
+def accelerometer_lines(found: Found[AccelerometerEntry], _: Mapping[str, Array]) -> Iterator[str]:
+    """C of an accelerometer."""
+    entry = found.entry
+    axes = "its own axes" if entry.alignment is None else "the gyroscope beside it"
+    left_out = "" if entry.second_order_s2_m is None else "\n * The second order that result.json has is left out."
+    about = f"{entry.part}, serial number {entry.serial_number}, at {entry.temperature_c:.1f} °C"
+    return _subtracting(found, entry.bias_m_s2, entry.correction_matrix, "force_m_s2", (
+        f"/* Accelerometer of {_comment(about)}: s = M (a - b), specific force: at rest it points up.",
+        f" * In the right-angled frame of {axes}, relative to gravity, {entry.gravity_m_s2:g} m/s^2.{left_out} */",
+    ))  # fmt: skip
+
+
+def magnetometer_lines(found: Found[MagnetometerEntry], _: Mapping[str, Array]) -> Iterator[str]:
+    """C of a magnetometer, as it was mounted."""
+    entry = found.entry
+    return _subtracting(found, entry.bias_t, entry.correction_matrix, "field_t", (
+        f"/* Magnetometer {_comment(f'{entry.part}, serial number {entry.serial_number}')}: B = M (m - b), in tesla.",
+        f" * In the right-angled frame of its own axes, as mounted, relative to a field of {entry.field_t:g} T. */",
+    ))  # fmt: skip
 
 
 def _prefix(name: str) -> str:
@@ -116,24 +151,24 @@ def _without_gravity(prefix: str, sensitivity: Array) -> Iterator[str]:
     )
 
 
-def _acceleration(prefix: str, found: AccelerometerEntry) -> Iterator[str]:
-    about = f"{found.part}, serial number {found.serial_number}, at {found.temperature_c:.1f} °C"
-    axes = "its own axes" if found.alignment is None else "the gyroscope beside it"
-    left_out = "" if found.second_order_s2_m is None else "\n * The second order that result.json has is left out."
+def _subtracting(
+    found: Found[Any], bias: Sequence[float], matrix: Sequence[Sequence[float]], true: str, about: Sequence[str]
+) -> Iterator[str]:
+    """Bias, matrix and function of a sensor whose bias is part of its reading; `true` is what the function finds."""
+    of, unit = f"{_prefix(found.sensor)}_{found.quantity}", found.quantity.suffix
     yield from (
         "",
-        f"/* Accelerometer of {_comment(about)}: s = M (a - b), specific force: at rest it points up.",
-        f" * In the right-angled frame of {axes}, relative to gravity, {found.gravity_m_s2:g} m/s^2.{left_out} */",
-        f"static const float {prefix}_acceleration_bias_m_s2[3] = {_array(found.bias_m_s2)};",
-        f"static const float {prefix}_acceleration_matrix[3][3] = {_rows(found.correction_matrix)};",
+        *about,
+        f"static const float {of}_bias_{unit}[3] = {_array(bias)};",
+        f"static const float {of}_matrix[3][3] = {_rows(matrix)};",
         "",
-        f"static inline void {prefix}_calibrate_acceleration(const float reading_m_s2[3], float force_m_s2[3])",
+        f"static inline void {_prefix(found.sensor)}_calibrate_{found.quantity}("
+        f"const float reading_{unit}[3], float {true}[3])",
         "{",
         "    for (int i = 0; i < 3; i++) {",
-        "        force_m_s2[i] = 0.0f;",
+        f"        {true}[i] = 0.0f;",
         "        for (int j = 0; j < 3; j++)",
-        f"            force_m_s2[i] += {prefix}_acceleration_matrix[i][j]"
-        f" * (reading_m_s2[j] - {prefix}_acceleration_bias_m_s2[j]);",
+        f"            {true}[i] += {of}_matrix[i][j] * (reading_{unit}[j] - {of}_bias_{unit}[j]);",
         "    }",
         "}",
     )

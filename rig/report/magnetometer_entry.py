@@ -1,5 +1,7 @@
 """A magnetometer's entry in `result.json`."""
 
+from typing import Any
+
 import numpy as np
 
 from rig.analysis.freedom_beside import of_field_angles
@@ -21,10 +23,8 @@ from rig.report.budget_entry import budget_entry
 from rig.report.entry import counted, entry
 
 
-def magnetometer_entry(result: MagnetometerResult | Fault) -> MagnetometerEntry | ErrorEntry:
-    """Scale, bias and covariance, and beside them the other methods; or why there are none."""
-    if isinstance(result, Fault):
-        return ErrorEntry(error=str(result))
+def magnetometer_entry(result: MagnetometerResult, **more: Any) -> MagnetometerEntry:
+    """Scale, bias and covariance, beside them the other methods, and what `more` there is."""
     solution, error = result.solution, result.solution.fit.attitude_error
     assert error is not None, "the method finds it"
     expected = attitude_residual_std(solution.fit, result.seen)
@@ -48,6 +48,7 @@ def magnetometer_entry(result: MagnetometerResult | Fault) -> MagnetometerEntry 
             for each in zip(result.dwells, solution.fit.residuals, expected, strict=True)
         ],
         beside={method: _beside(found) for method, found in result.beside.items()},
+        **more,
     )  # fmt: skip
 
 

@@ -10,6 +10,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from rig.data.budget_entries import IN_U, BudgetEntry, ContributorEntry
+from rig.data.quantity import Unit
 from rig.report.rounding import figures, percent, power_of_ten, small
 
 NEGLIGIBLE = 0.001  # of both variances: lines below are summed up in one
@@ -53,10 +54,10 @@ class PrintedBudget:
     lines: tuple[Line, ...]
 
 
-def printed_budget(budget: BudgetEntry, scale: Sequence[float], unit: str, per_unit: float = 1.0) -> PrintedBudget:
-    """The largest shares first, all negligible lines in one. Biases times `per_unit` are in `unit`."""
+def printed_budget(budget: BudgetEntry, scale: Sequence[float], bias: Unit) -> PrintedBudget:
+    """The budget with the largest shares first, all negligible lines in one, and what makes up a bias in that unit."""
     places = shown_places(budget, scale)
-    sizes = [_Size.of(budget.std[places[0]], 1.0, ""), _Size.of(budget.std[places[1]], per_unit, unit)]
+    sizes = [_Size.of(budget.std[places[0]], 1.0, ""), _Size.of(budget.std[places[1]], 1 / bias.size, bias.name)]
     lines = sorted(budget.contributors, key=lambda line: -max(line.share[place] for place in places))
     kept = [line for line in lines if max(line.share[place] for place in places) >= NEGLIGIBLE]
     printed = [_line(line, places, sizes) for line in kept]

@@ -8,11 +8,11 @@ from rich.console import Console
 from rig.analysis.freedom_beside import of_reversal
 from rig.analysis.reversal import AsMounted, MagnetometerReversal
 from rig.data.magnetometer_entries import AsMountedEntry, ReversalDocument, ReversalEntry
-from rig.report.axes import axes_table, triple
+from rig.data.quantity import FIELD
+from rig.report.axes import scale_and_bias_table, triple
 from rig.report.budget_table import heading_of
 from rig.report.entry import counted, entry
 from rig.report.expanded import expanded
-from rig.report.magnetometer_table import MICROTESLA
 from rig.station.plain_text import plain
 
 
@@ -31,19 +31,9 @@ def print_reversal(document: ReversalDocument, *, as_json: bool) -> None:
     for name, found in document.magnetometers.items():
         title = f"{name}, magnetometer turned over: {found.part} {found.serial_number}, {len(found.runs)} runs"
         scale = expanded(found.scale_std, found.scale_freedom)
-        own = expanded(np.multiply(MICROTESLA, found.bias_std_t).tolist(), found.bias_freedom)
-        bias = np.multiply(MICROTESLA, found.bias_t).tolist()
-        console.print(
-            axes_table(
-                title,
-                found.scale,
-                bias,
-                [*scale.widths, *own.widths],
-                heading=heading_of([*scale.factors, *own.factors]),
-                unit="µT",
-                digits=3,
-            )
-        )
+        own = expanded(found.bias_std_t, found.bias_freedom)
+        heading, widths = heading_of([*scale.factors, *own.factors]), [*scale.widths, *own.widths]
+        console.print(scale_and_bias_table(title, FIELD, found.scale, found.bias_t, widths, heading=heading))
         for line in _lines(found):
             console.print(plain(line))
 
@@ -54,12 +44,12 @@ def _lines(found: ReversalEntry) -> Iterator[str]:
         yield f"{' '.join(mixed)}: never turned over, so the arm's field is in the bias there, as mounted"
     else:
         yield "the sensor's own on all axes: the arm's field is told apart"
-    felt = triple(np.multiply(MICROTESLA, found.arm_field_t), "+.3f")
-    field = MICROTESLA * max(expanded(found.arm_field_std_t, found.arm_field_freedom).widths)
+    felt = triple(np.divide(found.arm_field_t, FIELD.bias.size), "+.3f")
+    field = max(expanded(found.arm_field_std_t, found.arm_field_freedom).widths) / FIELD.bias.size
     yield f"arm's field in its axes in the first run: {felt} µT (± {field:.3f})"
     yield f"the runs agree: χ² {found.chi_square:.1f}, at most {found.limit:.1f}"
     for run in found.runs:
-        yield f"as mounted in {run.run}: b {triple(np.multiply(MICROTESLA, run.bias_t), '+.3f')} µT"
+        yield f"as mounted in {run.run}: b {triple(np.divide(run.bias_t, FIELD.bias.size), '+.3f')} µT"
 
 
 def _entry(reversal: MagnetometerReversal) -> ReversalEntry:

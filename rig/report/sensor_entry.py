@@ -1,11 +1,14 @@
 """One sensor's entry in `result.json`."""
 
+from typing import Any
+
 import numpy as np
 
 from rig.analysis.calibration import SensorResult
 from rig.analysis.freedom_beside import of_angles, of_sensitivity
 from rig.analysis.loads import loads_rad_s
 from rig.analysis.onboard_check import Agreement
+from rig.data.quantity import RATE
 from rig.data.result_file import (
     AverageEntry,
     BoardEntry,
@@ -20,51 +23,58 @@ from rig.data.result_file import (
 from rig.data.result_types import ErrorEntry, Role
 from rig.errors import Fault
 from rig.estimation import vector_model
-from rig.estimation.arrays import Array
 from rig.estimation.estimate import Estimate
 from rig.estimation.residuals import residual_std_rad_s
-from rig.estimation.six_observation import MODEL, PARAMETER_UNITS, PARAMETERS
+from rig.estimation.six_observation import MODEL, PARAMETERS
 from rig.estimation.turned import TurnedSolution
 from rig.report.budget_entry import bias_process_entry, budget_entry
 from rig.report.earth_rate import earth_rate_entry
 from rig.report.entry import counted, entry
 
 
-def sensor_entry(result: SensorResult, role: Role = "calibrate", agreed: Agreement | None = None) -> SensorEntry:
-    """Scale, bias and covariance by the chosen estimator; beside them the others, or the error each ends in."""
+def sensor_entry(
+    result: SensorResult, role: Role = "calibrate", agreed: Agreement | None = None, **more: Any
+) -> SensorEntry:
+    """Scale, bias and covariance by the chosen estimator; beside them the others, or the error each ends in.
+
+    And what `more` there is to say. What a result does not have is left out.
+    """
     solution, turns = result.solution, result.observations
-    found = entry(
+    return entry(
         SensorEntry, result.sensor, solution, result,
         role=role,
         model=MODEL,
         observations_used=solution.observations,
         covariance_order=PARAMETERS,
-        covariance_units=PARAMETER_UNITS,
+        covariance_units=RATE.parameter_units,
         observations=[entry(ObservationEntry, turn, turn.average, joint=turn.joint_name) for turn in turns],
         rests=[entry(AverageEntry, each) for each in result.rests],
         time_bases=[entry(TimeBaseEntry, each, reference_board_s=each.reference_s) for each in result.time_bases],
         vector_model=_vector_or_error(result),
         six_observation=estimate_entry(result.six_observation),
         algorithm_1=entry_or_error(result.algorithm_1),
+        **({} if agreed is None else {"board": _board(agreed)}),
+        **_uncertain(result),
+        **more,
     )  # fmt: skip
-    more: dict[str, object] = {} if agreed is None else {"board": _board(agreed)}
+
+
+def _uncertain(result: SensorResult) -> dict[str, Any]:
+    """What is known of it beside the solution."""
+    found: dict[str, Any] = {}
     if result.uncertainty is not None:
         combined = result.uncertainty.covariance
-        more |= {"covariance_combined": _rows(combined), "budget": budget_entry(result.uncertainty)}
-    if result.explained is not None:
-        more["bias_process"] = bias_process_entry(result.explained)
-        more["speeds_rad_s"] = result.explained.seen.speeds_rad_s
-        more["loads_rad_s"] = _rows(loads_rad_s(result.explained))
-        if result.explained.nonlinearity is not None:
-            more["nonlinearity"] = entry(NonlinearityEntry, result.explained.nonlinearity)
+        found |= {"covariance_combined": combined, "budget": budget_entry(result.uncertainty)}
+    if (explained := result.explained) is not None:
+        found["bias_process"] = bias_process_entry(explained)
+        found["speeds_rad_s"] = explained.seen.speeds_rad_s
+        found["loads_rad_s"] = loads_rad_s(explained)
+        if explained.nonlinearity is not None:
+            found["nonlinearity"] = entry(NonlinearityEntry, explained.nonlinearity)
     if result.earth is not None:
         counts = result.uncertainty is not None and result.uncertainty.by_freedom
-        more["earth_rate"] = earth_rate_entry(result.earth, counts_freedom=counts)
-    return found.model_copy(update=more)
-
-
-def _rows(matrix: Array) -> tuple[tuple[float, ...], ...]:
-    return tuple(map(tuple, matrix.tolist()))
+        found["earth_rate"] = earth_rate_entry(result.earth, counts_freedom=counts)
+    return found
 
 
 def estimate_entry(solution: Estimate) -> EstimateEntry:
@@ -81,21 +91,20 @@ def _vector_or_error(result: SensorResult) -> VectorEntry | ErrorEntry:
     outcome = result.vector_model
     if isinstance(outcome, Fault):
         return ErrorEntry(error=str(outcome))
-    found = vector_entry(outcome)
-    if result.explained is None:
-        return found
-    more: dict[str, object] = {"residuals_std_rad_s": _rows(residual_std_rad_s(result.explained))}
-    if (angles := counted(of_angles(result))) is not None:
-        more |= {"non_orthogonality_freedom": tuple(angles[:3]), "mounting_freedom": tuple(angles[3:])}
-    if (felt := counted(of_sensitivity(result))) is not None:
-        more["g_sensitivity_freedom"] = tuple(map(tuple, felt))
-    return found.model_copy(update=more)
+    more: dict[str, Any] = {}
+    if result.explained is not None:
+        more["residuals_std_rad_s"] = residual_std_rad_s(result.explained)
+        if (angles := counted(of_angles(result))) is not None:
+            more |= {"non_orthogonality_freedom": angles[:3], "mounting_freedom": angles[3:]}
+        if (felt := counted(of_sensitivity(result))) is not None:
+            more["g_sensitivity_freedom"] = felt
+    return vector_entry(outcome, **more)
 
 
-def vector_entry(outcome: vector_model.VectorSolution | TurnedSolution) -> VectorEntry:
-    """The vector model's solution, how the axes lie to each other included."""
+def vector_entry(outcome: vector_model.VectorSolution | TurnedSolution, **more: Any) -> VectorEntry:
+    """The vector model's solution, how the axes lie to each other included, and what `more` is known of it."""
     angles = np.sqrt(np.diag(outcome.angles_covariance_rad2))
-    sensitivity: dict[str, object] = {}
+    sensitivity: dict[str, Any] = {}
     if outcome.g_sensitivity is not None and outcome.g_sensitivity_covariance is not None:
         std = np.sqrt(np.diag(outcome.g_sensitivity_covariance)).reshape(3, 3)
         sensitivity = {
@@ -111,6 +120,7 @@ def vector_entry(outcome: vector_model.VectorSolution | TurnedSolution) -> Vecto
         non_orthogonality_order=("yz", "zx", "xy"),
         mounting_std_rad=angles[3:],
         **sensitivity,
+        **more,
     )  # fmt: skip
 
 

@@ -10,8 +10,13 @@ from rig.report.entry import entry
 FACTORS = {"1": (100.0, " %"), "rad": (math.degrees(1), "°"), "T": (1e6, " µT")}  # by which a unit is shown
 
 
+def told_from(found: Sequence[ToldFrom]) -> dict[str, tuple[ToldFromEntry, ...]]:
+    """The field of `result.json`, if there is anything to say."""
+    return {"told_from": told_from_entries(found)} if found else {}
+
+
 def told_from_entries(found: Sequence[ToldFrom]) -> tuple[ToldFromEntry, ...]:
-    """As `result.json` has them: a size that is never told is null."""
+    """What `result.json` has of it: a size that is never told is null."""
     return tuple(entry(ToldFromEntry, each, size=each.size if math.isfinite(each.size) else None) for each in found)
 
 

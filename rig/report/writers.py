@@ -9,14 +9,13 @@ from rig.analysis.outcome import Outcome
 from rig.data.result_file import ResultDocument, write_result
 from rig.data.run_folder import RESULT
 from rig.report.document import document_of
+from rig.report.kinds.kind import Without
+from rig.report.kinds.registry import KINDS
 from rig.station.events import DocumentWritten, RunEvent
 
-# `module:function`, imported when a run has ended.
+# `module:function`, imported when a run has ended: pictures by the kinds of results, then the others.
 WRITERS: Sequence[str] = (
-    "rig.report.figures:write_figures",
-    "rig.report.accelerometer_figures:write_accelerometer_figures",
-    "rig.report.earth_rate_figures:write_earth_rate_figures",
-    "rig.report.drift_figures:write_drift_figures",
+    *dict.fromkeys(kind.figures for kind in KINDS if not isinstance(kind.figures, Without)),
     "rig.report.header:write_header",
     "rig.report.certificate.writer:write_certificate",
 )

@@ -11,9 +11,9 @@ from rig.config.load import ConfigurationRefused, load
 from rig.data.settings import settings_from_json
 from rig.errors import Fault
 from rig.estimation.earth_rate import DEG_H, EarthRate
+from rig.report.axes import decimals
 from rig.report.earth_rate import earth_rate_entry, earth_rate_lines
 from rig.report.sensor_entry import sensor_entry
-from rig.report.table import decimals
 from support.paths import CONFIGS
 from support.synthetic_run import Setup, synthetic_run
 

@@ -20,11 +20,11 @@ from rig.history import schema
 from rig.history.engine import engine_of
 from rig.history.finished import Finished, compact, content_sha256, finished_run
 from rig.history.issued import Issued
-from rig.history.parameters import calibrated
 from rig.history.place import chosen_place, place
 from rig.history.series import Trend, changes, effects, rig_states, subjects, trends
 from rig.history.store import History, Selection, open_history
 from rig.report.budget_entry import budget_entry
+from rig.report.kinds.registry import followed
 from support.past_runs import FIRST, finished
 from support.paths import DEMO, FIXTURES, ROOT
 from support.stated import moved_parameters
@@ -51,7 +51,7 @@ def test_a_run_is_found_again_with_all_its_numbers(history: History) -> None:
     assert kept.result == run.text and content_sha256(kept.result) == kept.content_sha256
     assert [each.name for each in kept.recordings] == ["run.h5", "verify.h5"]
     found = history.of_run(entered.run_id)
-    stated = calibrated(read_result(FIXTURES / "verified"))
+    stated = followed(read_result(FIXTURES / "verified"))
     assert [(f.part, f.serial_number, f.estimator, f.temperature_c) for f in found] == [
         (s.part, s.serial_number, s.estimator, s.temperature_c) for s in stated
     ]
@@ -60,7 +60,7 @@ def test_a_run_is_found_again_with_all_its_numbers(history: History) -> None:
 
 def test_the_mean_scale_factor_has_the_uncertainty_of_all_three() -> None:
     sensor = read_result(FIXTURES / "verified").sensors["gyro"]
-    mean = {each.name: each for each in calibrated(read_result(FIXTURES / "verified"))[0].parameters}["k"]
+    mean = {each.name: each for each in followed(read_result(FIXTURES / "verified"))[0].parameters}["k"]
     assert mean.value == pytest.approx(sum(sensor.scale) / 3)
     variance = sum(sensor.covariance[i][j] for i in range(3) for j in range(3)) / 9
     assert mean.std_statistical == pytest.approx(variance**0.5)
@@ -185,7 +185,7 @@ def test_a_history_of_an_old_version_is_migrated_with_equal_numbers(version: int
         assert len(before_that) == (version >= 3) and now == (ISSUED,)
         assert list(history.broken()) == []
     assert after == before and len(before["parameter"]) == 20
-    for stated, kept in zip(calibrated(read_result(FIXTURES / "verified")), found, strict=True):
+    for stated, kept in zip(followed(read_result(FIXTURES / "verified")), found, strict=True):
         assert kept.parameters.keys() == {each.name for each in stated.parameters}
         assert moved_parameters(stated.parameters, kept.parameters.values()) == []
     with open_history(str(tmp_path / "new.sqlite")) as new, new.engine.connect() as connection:

@@ -8,14 +8,15 @@ import pytest
 from rich.console import Console
 
 from rig.config.judging_sections import SiteSection
+from rig.data.quantity import RATE
 from rig.data.result_file import ResultDocument, VectorEntry
 from rig.estimation.coverage import PROBABILITY, coverage_factors, covered
-from rig.history.parameters import calibrated
 from rig.report.certificate.dcc import digital_certificate
 from rig.report.certificate.stated import Stated
 from rig.report.certificate.tables import DEG, pair
-from rig.report.drift_table import drift_table
 from rig.report.expanded import expanded, factor_words
+from rig.report.kinds.bias_drift import drift_table
+from rig.report.kinds.registry import followed
 from rig.report.table import print_result
 from support.certified import certificate, everything, read, result
 
@@ -57,7 +58,7 @@ def test_u_of_angles_is_the_same_wherever_it_is_told() -> None:
         assert f"{printed.value}° ± {printed.uncertainty}°" in page
     assert f"(± U, {k})" in page
     assert f"(± {DEG * max(widths):.2g}, {k})" in terminal(document)
-    (kept,) = (each for each in calibrated(document) if each.quantity == "rate")
+    (kept,) = (each for each in followed(document) if each.quantity == "rate")
     parameters = {each.name: each.expanded for each in kept.parameters}
     assert [parameters[f"nonorth_{each}"] for each in ("yz", "zx", "xy")] == pytest.approx(widths)
     assert parameters["gxx"] == pytest.approx(factors[0] * vector.g_sensitivity_std_rad_s_per_m_s2[0][0])  # type: ignore[index]
@@ -81,7 +82,7 @@ def test_u_of_a_drift_is_by_its_freedom_at_the_terminal_and_on_the_page() -> Non
     document = scarce()
     drift = document.bias_drift["gyro"]["rate"]
     console = Console(width=200, file=io.StringIO(), record=True)
-    console.print(drift_table("gyro", "rate", drift))
+    console.print(drift_table("gyro", RATE, drift))
     assert f"± U (k ≤ {coverage_factors(7.0):.2f})" in console.export_text()
     page = " ".join(read(certificate(document)).text.split())
     whole = np.hypot(drift.repeats[0].held.std, drift.common_std)

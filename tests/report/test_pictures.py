@@ -5,6 +5,7 @@ import pytest
 
 from rig.analysis.calibration import DEFAULT_ESTIMATOR
 from rig.data.magnetometer_entries import MagnetometerEntry
+from rig.data.quantity import RATE
 from rig.data.result_file import ResultDocument, VectorEntry, read_result
 from rig.plans.recorded import judged, open_run
 from rig.report.certificate.page import certificate_page
@@ -94,7 +95,7 @@ def test_frozen_attitudes_agree_with_their_bars() -> None:
 def test_the_picture_of_contributions_is_of_the_values_of_the_budget() -> None:
     sensor = result().sensors["gyro"]
     assert sensor.budget is not None
-    table = printed_budget(sensor.budget, sensor.scale, "rad/s")
+    table = printed_budget(sensor.budget, sensor.scale, RATE.bias)
     picture = contributions(sensor.budget, sensor.scale)
     assert picture.axes == tuple(each.axis for each in table.columns)
     places = [each.place for each in table.columns]

@@ -9,7 +9,8 @@ from pathlib import Path
 from rig.data.earth_rate_entries import EarthRateEntry
 from rig.data.magnetometer_entries import MagnetometerEntry
 from rig.data.result_file import AverageEntry, ComparisonEntry, ObservationEntry, ResultDocument, read_result
-from rig.history.parameters import Parameter, calibrated
+from rig.report.kinds.followed import Parameter
+from rig.report.kinds.registry import followed
 
 SHARE = 1e-6
 Number = tuple[str, float, float]  # its name, its value, and of what it may move by that share
@@ -50,7 +51,7 @@ def _moved(expected: Iterable[Number], found: Iterable[Number]) -> list[str]:
 
 
 def _numbers(document: ResultDocument) -> Iterator[Number]:
-    for sensor in calibrated(document):
+    for sensor in followed(document):
         yield from _of_parameters(f"{sensor.sensor} {sensor.quantity} ", sensor.parameters)
     for check in document.checks:
         if check.value is not None:

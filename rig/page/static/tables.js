@@ -86,13 +86,14 @@ const largest = (vector) => Math.max(...vector.map(Math.abs));
 export function parameters(rows) {
   fill("parameters", rows.flatMap((p) => {
     if (!p.scale && !p.bias) return [spanning(row([p.sensor, [p.missing ?? "", "words"]], "new-sensor"), 7)];
+    const digits = p.scale || p.missing ? 5 : 2;
     const axes = [..."xyz"].map((axis, i) =>
       row([
         i === 0 ? p.sensor : "", axis,
         p.scale ? fixed(p.scale[i], 5) : "–", [p.scale_u ? fixed(p.scale_u[i], 5) : "–", "u"],
-        p.bias ? signed(p.bias[i], 5) : "–", [p.bias_u ? fixed(p.bias_u[i], 5) : "–", "u"], p.unit, p.of,
+        p.bias ? signed(p.bias[i], digits) : "–", [p.bias_u ? fixed(p.bias_u[i], digits) : "–", "u"], p.unit, p.of,
       ], i === 0 ? "new-sensor" : ""));
-    if (!p.scale) axes.push(spanning(row(["", [`no scale factors yet: ${p.missing}`, "words"]]), 7));
+    if (p.missing) axes.push(spanning(row(["", [`no scale factors yet: ${p.missing}`, "words"]]), 7));
     return axes;
   }));
 }

@@ -6,6 +6,7 @@ from typing import TYPE_CHECKING
 
 from rig.config.sensor_catalogue import has_own_port
 from rig.data.provenance import NO_BOARD
+from rig.data.quantity import QUANTITIES
 from rig.report import expanded, printed_budget, rounding, told_words, validity_words
 from rig.report.certificate import at_rest_tables, coverage_words, plots, tables, validity
 from rig.report.certificate.content import Certificate
@@ -35,7 +36,7 @@ def _template() -> "Template":
     environment = Environment(
         loader=loader, autoescape=True, undefined=StrictUndefined, trim_blocks=True, lstrip_blocks=True
     )
-    environment.globals |= {"has_own_port": has_own_port, "no_board": NO_BOARD}
+    environment.globals |= {"has_own_port": has_own_port, "no_board": NO_BOARD, "quantities": QUANTITIES}
     for module in MODULES:
         environment.globals |= {name: value for name, value in vars(module).items() if callable(value)}
     return environment.get_template(TEMPLATE)

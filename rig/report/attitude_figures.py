@@ -1,0 +1,138 @@
+"""Plots of what attitudes calibrate: what the model leaves in each of them, and where gravity or the field pointed."""
+
+from collections.abc import Iterator
+from dataclasses import dataclass
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from rig.analysis.acceleration import AccelerometerResult
+from rig.analysis.magnetic_field import MagnetometerResult
+from rig.analysis.outcome import Outcome
+from rig.data.quantity import ACCELERATION, FIELD, Quantity
+from rig.data.result_file import ResultDocument
+from rig.errors import Fault
+from rig.estimation.arrays import Array
+from rig.estimation.residuals import attitude_residual_std, dwell_residual_std_m_s2
+from rig.report.figures import save
+from rig.station.events import NotPlotted, Plotted, RunEvent
+from rig.study.style import style
+
+if TYPE_CHECKING:
+    from matplotlib.axes import Axes
+    from matplotlib.figure import Figure
+
+TOWARDS = {ACCELERATION: "up", FIELD: "the field"}
+
+
+@dataclass(frozen=True, slots=True)
+class HeldStill:
+    """Of N attitudes: (N, 3) what the model leaves, what it was expected to leave (one standard deviation), the noise.
+
+    `towards` (N, 3): where the reference pointed, in the sensor's nominal axes.
+    """
+
+    quantity: Quantity
+    residuals: Array
+    expected: Array
+    noise: Array
+    towards: Array
+
+
+def write_attitude_figures(outcome: Outcome, document: ResultDocument, folder: Path) -> tuple[RunEvent, ...]:
+    """`accelerometer_<sensor>`, `magnetometer_<sensor>` of a run that has any, PNG and SVG; none without matplotlib."""
+    found = list(_held_still(outcome))
+    if not found:
+        return ()
+    try:
+        import matplotlib  # noqa: F401
+    except ImportError:
+        return (NotPlotted(),)
+    from matplotlib.figure import Figure
+
+    names = []
+    for sensor, each in found:
+        name = f"{each.quantity.sensor}_{sensor}"
+        with style():
+            figure = Figure(figsize=(10.0, 4.6), layout="constrained")
+            draw(figure, each)
+            figure.suptitle(f"{sensor}: {each.quantity.sensor} in {len(each.residuals)} attitudes")
+            save(figure, folder, name)
+        names.append(name)
+    return (Plotted(tuple(names)),)
+
+
+def draw(figure: "Figure", held: HeldStill) -> None:
+    """Left: reading less model by attitude, with what noise and the arm's error let expect. Right: the sphere."""
+    residuals, sphere = figure.subplots(1, 2, width_ratios=(3, 2))
+    _draw_residuals(residuals, held)
+    _draw_sphere(sphere, held)
+
+
+def of_accelerometer(result: AccelerometerResult) -> HeldStill:
+    """What an accelerometer's plots are made of."""
+    solution = result.solution
+    up = np.array([dwell.attitude @ solution.reference_m_s2 for dwell in result.dwells])
+    return HeldStill(
+        ACCELERATION,
+        solution.dwell_residuals_m_s2,
+        dwell_residual_std_m_s2(solution, result.movement),
+        np.sqrt([dwell.reading.variance for dwell in result.dwells]),
+        up @ np.array(result.sensor.mounting).T,
+    )
+
+
+def of_magnetometer(result: MagnetometerResult) -> HeldStill:
+    """What a magnetometer's plots are made of."""
+    fit = result.solution.fit
+    field = np.array([dwell.attitude @ result.solution.field_table_t for dwell in result.dwells])
+    return HeldStill(
+        FIELD,
+        fit.residuals,
+        attitude_residual_std(fit, result.seen),
+        np.sqrt([dwell.reading.variance for dwell in result.dwells]),
+        field @ np.array(result.sensor.mounting).T,
+    )
+
+
+def _held_still(outcome: Outcome) -> Iterator[tuple[str, HeldStill]]:
+    yield from ((name, of_accelerometer(result)) for name, result in outcome.accelerometers.items())
+    for name, found in outcome.magnetometers.items():
+        if not isinstance(found, Fault):
+            yield name, of_magnetometer(found)
+
+
+def _draw_residuals(axes: "Axes", held: HeldStill) -> None:
+    unit, count = held.quantity.drift, np.arange(1, len(held.residuals) + 1)
+    expected = 2 * held.expected.max(axis=1) / unit.size
+    axes.fill_between(count, -expected, expected, color="0.9", label="expected, ± 2 σ", step="mid")
+    for i, axis in enumerate("xyz"):
+        left, noise = held.residuals[:, i] / unit.size, 2 * held.noise[:, i] / unit.size
+        axes.errorbar(count + 0.15 * (i - 1), left, noise, fmt="o", ms=3, lw=0.8, label=axis)
+    axes.locator_params("x", integer=True)
+    axes.set_xlabel("attitude")
+    axes.set_ylabel(f"reading − model   {unit.name}")
+    axes.legend(frameon=False, ncols=4, fontsize=8)
+
+
+def _draw_sphere(axes: "Axes", held: HeldStill) -> None:
+    """The reference in the sensor's nominal axes, seen from above z (Lambert's equal-area map of both halves)."""
+    towards = held.towards / np.linalg.norm(held.towards, axis=1, keepdims=True)
+    for centre, side in ((-1.1, 1.0), (1.1, -1.0)):
+        half = towards[np.sign(towards[:, 2] + 1e-12) == side]
+        x, y = _lambert(half * (1.0, 1.0, side))
+        circle = np.linspace(0, 2 * np.pi, 200)
+        axes.plot(centre + np.cos(circle), np.sin(circle), color="0.6", lw=0.8)
+        axes.plot(centre + x, y, "o", ms=4)
+        axes.text(centre, -1.25, "z upwards" if side > 0 else "z downwards", ha="center")
+    of = TOWARDS[held.quantity]
+    axes.set_title(f"where {of} was in the sensor's axes, x to the right, y up the page", fontsize=8)
+    axes.set_aspect("equal")
+    axes.set_axis_off()
+
+
+def _lambert(unit: Array) -> tuple[Array, Array]:
+    """Of unit vectors (n, 3) in the half z ≥ 0, into the unit circle."""
+    size = np.sqrt(1 / (1 + np.clip(unit[:, 2], 0, 1)))
+    return unit[:, 0] * size, unit[:, 1] * size

@@ -1,0 +1,147 @@
+"""Biases by repeat: attitudes that were gone through again and again (TRIAX, section IV)."""
+
+from collections.abc import Iterator, Mapping
+
+import numpy as np
+from rich.table import Table
+
+from rig.analysis.outcome import Outcome
+from rig.data.drift_entries import DriftEntry
+from rig.data.quantity import QUANTITIES, RATE, Quantity
+from rig.data.result_file import ResultDocument
+from rig.data.result_types import ErrorEntry
+from rig.estimation.bias_by_repeat import largest_change_std
+from rig.report.budget_table import heading_of
+from rig.report.drift_entry import drift_entry
+from rig.report.expanded import expanded, factor_words
+from rig.report.kinds.followed import CHANGES, SLOPES, Followed, known, parameters
+from rig.report.kinds.kind import Found, ResultKind, Shown, Three, Without
+from rig.station.plain_text import plain
+
+
+def _entries(outcome: Outcome) -> Mapping[str, Mapping[str, DriftEntry]]:
+    return {
+        name: {
+            quantity.name: drift_entry(quantity, drift, outcome.recordings[0].run.sensors[name])
+            for quantity, drift in each.items()
+        }
+        for name, each in outcome.drifts.items()
+    }
+
+
+def _found(document: ResultDocument) -> Iterator[Found[DriftEntry]]:
+    for name, drifts in document.bias_drift.items():
+        yield from (Found(name, QUANTITIES[quantity], entry) for quantity, entry in drifts.items())
+
+
+def _printed(found: Found[DriftEntry]) -> Iterator[Table | str]:
+    yield drift_table(found.sensor, found.quantity, found.entry)
+    yield from _lines(found.quantity, found.entry)
+
+
+def _shown(found: Found[DriftEntry]) -> Shown:
+    """The largest change that there was."""
+    entry, unit = found.entry, found.quantity.drift
+    widths = expanded(_change_std(entry), entry.freedom).widths
+    change, known_to = ([each / unit.size for each in values] for values in (entry.largest_change, widths))
+    name = f"{found.sensor}, {found.quantity.sensor}: largest change of the bias"
+    return Shown(name, unit, Three(change, known_to), combined=True)
+
+
+def _followed(found: Found[DriftEntry], document: ResultDocument) -> Followed | None:
+    """Of results that say whose bias it is."""
+    entry, slope = found.entry, found.entry.over_temperature
+    if entry.part is None or entry.serial_number is None or entry.full_scale is None:
+        return None
+    followed = [*parameters(CHANGES, entry.largest_change, _change_std(entry), entry.freedom, entry.unit)]
+    if not isinstance(slope, ErrorEntry):
+        followed += parameters(SLOPES, slope.slope, slope.std, slope.freedom, f"{entry.unit}/K")
+    return Followed(
+        found.sensor,
+        f"{found.quantity} bias drift",
+        entry.part,
+        entry.serial_number,
+        entry.full_scale,
+        "bias_by_repeat",
+        float(np.mean([repeat.temperature_c for repeat in entry.repeats])),
+        known(followed),
+    )
+
+
+def _change_std(found: DriftEntry) -> list[float]:
+    bias, std = (np.array([getattr(each.held, name) for each in found.repeats]) for name in ("bias", "std"))
+    stds: list[float] = largest_change_std(bias, std).tolist()
+    return stds
+
+
+def drift_table(name: str, of: Quantity, found: DriftEntry) -> Table:
+    """The bias of each repeat, scale and axes held, and its largest ± U; a mark where it moved."""
+    unit, size = of.drift.name, of.drift.size
+    known = expanded((1.0, 1.0, 1.0), found.freedom)
+    table = Table(title=plain(f"{name}, {of.sensor}: bias by repeat, scale and axes held", "table.title"))
+    table.title_justify = "left"
+    moved = {move.repeat: move.axis for move in found.moves}
+    for heading in ("repeat", "hours", "°C", *(f"{axis} {unit}" for axis in "xyz"), heading_of(known.factors), "moved"):
+        table.add_column(heading, justify="right")
+    for number, repeat in enumerate(found.repeats, 1):
+        table.add_row(
+            str(number),
+            f"{repeat.time_s / 3600:.2f}",
+            f"{repeat.temperature_c:.1f}",
+            *(f"{bias / size:+.4g}" for bias in repeat.held.bias),
+            f"{max(np.multiply(known.factors, repeat.held.std)) / size:.2g}",
+            moved.get(number, ""),
+        )
+    return table
+
+
+def _lines(quantity: Quantity, found: DriftEntry) -> Iterator[str]:
+    """What stands below the table."""
+    shown = quantity.drift
+    unit, size = shown.name, shown.size
+    if found.moves:
+        for move in found.moves:
+            change = " ".join(f"{each / size:+.3g}" for each in move.change)
+            yield f"moved before repeat {move.repeat}, most along {move.axis}: {change} {unit}"
+    else:
+        yield "the bias did not move beyond its noise"
+    yield f"a steady one is said to have moved in {100 * found.false_alarm:g} % of runs"
+    if max(found.excess) > 1.5:
+        yield f"repeats scatter {max(found.excess):.1f} times as much as noise would have it; U allows for that"
+    anew = [repeat.anew for repeat in found.repeats]
+    refused = [each for each in anew if isinstance(each, ErrorEntry)]
+    if refused:
+        yield f"everything found anew: not in {len(refused)} of {len(anew)} repeats; {refused[0].error}"
+    else:
+        apart = [
+            np.subtract(each.bias, repeat.held.bias)
+            for each, repeat in zip(anew, found.repeats, strict=True)
+            if not isinstance(each, ErrorEntry)
+        ]
+        rms = float(np.sqrt(np.mean(np.square(apart)))) / size
+        yield f"everything found anew in each repeat: {rms:.3g} {unit} RMS from these"
+    slope = found.over_temperature
+    if isinstance(slope, ErrorEntry):
+        yield f"over temperature: {slope.error}"
+    else:
+        widths = expanded(slope.std, slope.freedom).widths
+        terms = "  ".join(f"{a / size:+.3g} ± {b / size:.1g}" for a, b in zip(slope.slope, widths, strict=True))
+        low, high = slope.range_c
+        words = factor_words(slope.freedom)
+        yield f"over temperature: {terms} {unit} per °C ({words}), from {low:.1f} to {high:.1f} °C only"
+    if quantity == RATE and not found.earth_rate_known:
+        yield "the Earth's rate is in these biases; site.latitude_deg and site.heading_deg take it out"
+
+
+BIAS_DRIFT = ResultKind(
+    name="bias drift",
+    key="bias_drift",
+    entries=_entries,
+    found=_found,
+    unsolved=lambda _: iter(()),
+    printed=_printed,
+    shown=_shown,
+    followed=_followed,
+    header=Without("firmware corrects by one bias; `rig export` makes that of a temperature"),
+    figures="rig.report.drift_figures:write_drift_figures",
+)

@@ -1,0 +1,62 @@
+"""The Earth's rate, where a gyroscope was to find it (TRIAX, section III-A)."""
+
+from collections.abc import Iterator
+
+import numpy as np
+
+from rig.data.earth_rate_entries import EarthRateEntry
+from rig.data.quantity import RATE
+from rig.data.result_file import ResultDocument
+from rig.report.expanded import expanded
+from rig.report.kinds.followed import EARTH, Followed, known, parameters
+from rig.report.kinds.kind import Found, ResultKind, Shown, Three, Without
+
+
+def _found(document: ResultDocument) -> Iterator[Found[EarthRateEntry]]:
+    for name, sensor in document.sensors.items():
+        if isinstance(sensor.earth_rate, EarthRateEntry):
+            yield Found(name, RATE, sensor.earth_rate)
+
+
+def _shown(found: Found[EarthRateEntry]) -> Shown:
+    """Its parts in the axes of the arm's base."""
+    entry, unit = found.entry, RATE.drift
+    widths = expanded(_stds(entry), entry.freedoms(3)).widths
+    name = f"{found.sensor}: the Earth's rate in the arm's base"
+    rates, known_to = ([each / unit.size for each in values] for values in (entry.rate_rad_s, widths))
+    return Shown(name, unit, Three(rates, known_to), combined=True)
+
+
+def _followed(found: Found[EarthRateEntry], document: ResultDocument) -> Followed:
+    entry, sensor = found.entry, document.sensors[found.sensor]
+    values, stds = (entry.norm_rad_s, *entry.rate_rad_s), (entry.norm_std_rad_s, *_stds(entry))
+    return Followed(
+        found.sensor,
+        "Earth's rate",
+        sensor.part,
+        sensor.serial_number,
+        sensor.range_rad_s,
+        sensor.estimator,
+        sensor.temperature_c,
+        known([*parameters(EARTH, values, stds, entry.freedoms(4), RATE.unit)]),
+    )
+
+
+def _stds(found: EarthRateEntry) -> list[float]:
+    stds: list[float] = np.sqrt(np.diag(found.covariance_rad2_s2)).tolist()
+    return stds
+
+
+AMONG = Without("it stands among the lines of its gyroscope")
+EARTH_RATE = ResultKind(
+    name="Earth's rate",
+    key="sensors",
+    entries=Without("it is part of its gyroscope's entry"),
+    found=_found,
+    unsolved=lambda _: iter(()),
+    printed=AMONG,
+    shown=_shown,
+    followed=_followed,
+    header=Without("it is the place's, not the sensor's"),
+    figures="rig.report.earth_rate_figures:write_earth_rate_figures",
+)

@@ -1,0 +1,140 @@
+"""What a history keeps of a result: parameters with their uncertainties, by sensor. Pure.
+
+Names: kx ky kz scale factors, k their mean, bx by bz biases; nonorth_yz nonorth_zx nonorth_xy the angles between axes
+less 90°; gxx … gzz what an acceleration adds to a rate (first letter the gyroscope's axis); dx dy dz the largest change
+of a bias between repeats, sx sy sz its slope over temperature; e ex ey ez the Earth's rate found and its parts in the
+axes of the base. The mean is one of its own because a gyroscope's only standard of size, the clock, moves all alike.
+"""
+
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass
+from typing import Protocol
+
+import numpy as np
+
+from rig.data.budget_entries import BudgetEntry
+from rig.data.quantity import Quantity
+from rig.data.result_file import ResultDocument
+from rig.data.result_types import Freedom
+from rig.estimation.arrays import Array
+from rig.estimation.coverage import COVERAGE_FACTOR
+from rig.report.expanded import expanded
+
+ANGLES = ("nonorth_yz", "nonorth_zx", "nonorth_xy")
+SENSITIVITIES = tuple(f"g{row}{column}" for row in "xyz" for column in "xyz")
+CHANGES, SLOPES, EARTH = ("dx", "dy", "dz"), ("sx", "sy", "sz"), ("e", "ex", "ey", "ez")
+ORDER = ("k", "kx", "ky", "kz", "bx", "by", "bz", *ANGLES, *SENSITIVITIES, *CHANGES, *SLOPES, *EARTH)
+
+
+@dataclass(frozen=True, slots=True)
+class Parameter:
+    """One number of a calibration. `std_combined` is None where no more than noise is known of its uncertainty.
+
+    `max_deviation` from the nominal value is what the run's limits allowed, None without one. `coverage_factor` is that
+    of U by its degrees of freedom, None where it is 2.
+    """
+
+    name: str
+    value: float
+    std_statistical: float
+    std_combined: float | None
+    unit: str
+    max_deviation: float | None = None
+    coverage_factor: float | None = None
+
+    @property
+    def std(self) -> float:
+        """The larger account of its standard uncertainty that there is."""
+        return self.std_statistical if self.std_combined is None else self.std_combined
+
+    @property
+    def expanded(self) -> float:
+        """U as the result states it."""
+        return (self.coverage_factor or COVERAGE_FACTOR) * self.std
+
+    @property
+    def nominal(self) -> float:
+        """What an ideal sensor has."""
+        return nominal(self.name)
+
+
+@dataclass(frozen=True, slots=True)
+class Followed:
+    """What one sensor's result in a run is followed by, under the name of a `quantity`.
+
+    `full_scale` is in the unit of its biases, None where the result does not say it.
+    """
+
+    sensor: str
+    quantity: str
+    part: str
+    serial_number: str
+    full_scale: float
+    estimator: str
+    temperature_c: float | None
+    parameters: tuple[Parameter, ...]
+
+
+class Calibrated(Protocol):
+    """Scale factors and biases in `result.json`, whatever the sensor."""
+
+    @property
+    def scale(self) -> Sequence[float]: ...
+    @property
+    def covariance(self) -> Sequence[Sequence[float]]: ...
+    @property
+    def covariance_combined(self) -> Sequence[Sequence[float]] | None: ...
+    @property
+    def budget(self) -> BudgetEntry | None: ...
+
+
+def nominal(name: str) -> float:
+    """1 for scale factors, else 0."""
+    return float(is_scale(name))
+
+
+def is_scale(name: str) -> bool:
+    """Whether a parameter of this name is a scale factor, whose changes are fractions."""
+    return name in ("k", "kx", "ky", "kz")
+
+
+def scale_and_bias(
+    sensor: str, quantity: Quantity, entry: Calibrated, bias: Sequence[float], document: ResultDocument
+) -> Iterator[Parameter]:
+    """The six parameters, and the mean scale factor by their covariance, with the largest k of theirs."""
+    mean = np.array([1 / 3, 1 / 3, 1 / 3, 0, 0, 0])
+    values, combined = np.array([*entry.scale, *bias]), entry.covariance_combined
+    factors = np.full(6, COVERAGE_FACTOR) if entry.budget is None else np.array(entry.budget.factors)
+    limits = {check.name: check.limit for check in document.checks}
+    scale_limit, bias_limit = (limits.get(f"{sensor}.{quantity.limits}{of}") for of in ("scale_deviation", "bias"))
+    rows: list[tuple[str, Array, str, float | None]] = [("k", mean, "1", None)]
+    rows += [(f"k{axis}", np.eye(6)[i], "1", scale_limit) for i, axis in enumerate("xyz")]
+    rows += [(f"b{axis}", np.eye(6)[3 + i], quantity.unit, bias_limit) for i, axis in enumerate("xyz")]
+    for name, row, unit, limit in rows:
+        yield Parameter(
+            name,
+            float(row @ values),
+            _std(row, entry.covariance),
+            None if combined is None else _std(row, combined),
+            unit,
+            limit,
+            None if (factor := float(factors[row > 0].max())) == COVERAGE_FACTOR else factor,
+        )
+
+
+def parameters(
+    names: Sequence[str], values: Sequence[float], stds: Sequence[float], freedom: Sequence[Freedom] | None, unit: str
+) -> Iterator[Parameter]:
+    """Others by their standard deviations and the degrees of freedom of these."""
+    factors = expanded([1.0] * len(names), freedom).factors
+    for name, value, std, factor in zip(names, values, stds, factors, strict=True):
+        yield Parameter(name, value, std, None, unit, coverage_factor=None if factor == COVERAGE_FACTOR else factor)
+
+
+def known(found: Sequence[Parameter]) -> tuple[Parameter, ...]:
+    """Those with an uncertainty: of another, nothing can be said over time."""
+    return tuple(each for each in found if each.std_statistical > 0)
+
+
+def _std(row: Array, covariance: Sequence[Sequence[float]]) -> float:
+    return float(np.sqrt(row @ np.array(covariance) @ row))

@@ -1,0 +1,144 @@
+"""Gyroscopes: scale, bias, axes and g-sensitivity from whole turns (SIX, TRIAX)."""
+
+from collections.abc import Iterator
+
+import numpy as np
+from rich.table import Table
+
+from rig.analysis.outcome import Outcome
+from rig.analysis.when import of_gyroscope
+from rig.data.quantity import RATE
+from rig.data.result_file import BoardEntry, ResultDocument, SensorEntry, VectorEntry
+from rig.data.result_types import ErrorEntry
+from rig.report.axes import decimals, skew_known, triple
+from rig.report.earth_rate import earth_rate_lines
+from rig.report.expanded import flat
+from rig.report.header import gyroscope_lines
+from rig.report.kinds.followed import ANGLES, SENSITIVITIES, Followed, known, parameters, scale_and_bias
+from rig.report.kinds.kind import Found, ResultKind, Shown, Without
+from rig.report.kinds.triad import shown_of, tables
+from rig.report.sensor_entry import sensor_entry
+from rig.report.told_words import told_from, told_lines
+from rig.report.validity_words import load_words, speed_words, when_words
+from rig.report.when_entry import when_entry
+
+
+def _entries(outcome: Outcome) -> dict[str, SensorEntry]:
+    """The entry is there of every run, empty where no sweeps were made."""
+    made = {}
+    for name, result in outcome.results.items():
+        held, agreed = of_gyroscope(outcome.recordings, name), outcome.onboard.get(name)
+        made[name] = sensor_entry(
+            result,
+            "calibrate" if name in outcome.settings.to_calibrate else "reference",
+            agreed,
+            scale_at=when_entry(held.scale),
+            bias_at=when_entry(held.bias),
+            **told_from(outcome.told_from.get(name, ())),
+        )
+    return made
+
+
+def _found(document: ResultDocument) -> Iterator[Found[SensorEntry]]:
+    return (Found(name, RATE, entry) for name, entry in document.sensors.items())
+
+
+def _printed(found: Found[SensorEntry]) -> Iterator[Table | str]:
+    sensor, reference = found.entry, " (known)" if found.entry.role == "reference" else ""
+    title = f"{found.sensor}{reference}: {sensor.part} {sensor.serial_number}, {sensor.model}, {sensor.estimator}"
+    yield from tables(title, RATE, sensor)
+    yield from _beside(sensor)
+
+
+def _shown(found: Found[SensorEntry]) -> Shown:
+    return shown_of(found.sensor, RATE, found.entry)
+
+
+def _followed(found: Found[SensorEntry], document: ResultDocument) -> Followed:
+    entry, vector = found.entry, found.entry.vector_model
+    followed = list(scale_and_bias(found.sensor, RATE, entry, entry.bias_rad_s, document))
+    if isinstance(vector, VectorEntry):
+        stds = vector.non_orthogonality_std_rad
+        followed += parameters(ANGLES, vector.non_orthogonality_rad, stds, vector.non_orthogonality_freedom, "rad")
+        if vector.g_sensitivity_rad_s_per_m_s2 is not None and vector.g_sensitivity_std_rad_s_per_m_s2 is not None:
+            felt = np.ravel(vector.g_sensitivity_rad_s_per_m_s2).tolist()
+            stds_of = np.ravel(vector.g_sensitivity_std_rad_s_per_m_s2).tolist()
+            freedom = flat(vector.g_sensitivity_freedom)
+            followed += parameters(SENSITIVITIES, felt, stds_of, freedom, "rad/s per m/s²")
+    return Followed(
+        found.sensor,
+        RATE.name,
+        entry.part,
+        entry.serial_number,
+        entry.range_rad_s,
+        entry.estimator,
+        entry.temperature_c,
+        known(followed),
+    )
+
+
+def _beside(sensor: SensorEntry) -> Iterator[str]:
+    """At what speeds it holds, what the other estimators make of it, and what the vector model says about the axes."""
+    yield from _speeds(sensor)
+    if sensor.scale_at is not None and sensor.bias_at is not None:
+        yield f"scale: {when_words(sensor.scale_at)}"
+        yield f"bias: {when_words(sensor.bias_at)}"
+    yield from told_lines(sensor.told_from)
+    yield from earth_rate_lines(sensor.earth_rate)
+    vector = sensor.vector_model
+    std = [sensor.covariance[i][i] ** 0.5 for i in range(6)]
+    scale, bias = f".{decimals(std[:3])}f", f"+.{decimals(std[3:])}f"
+    others = {"vector_model": vector, "six_observation": sensor.six_observation, "algorithm_1": sensor.algorithm_1}
+    for name, other in others.items():
+        if isinstance(other, ErrorEntry):
+            yield f"{name}: {other.error}"
+        elif other.estimator != sensor.estimator:
+            yield f"{name}: k {triple(other.scale, scale)}, b {triple(other.bias_rad_s, bias)} rad/s"
+    if sensor.board is not None:
+        yield from _on_the_board(sensor.board)
+    if not isinstance(vector, ErrorEntry):
+        skew = triple(np.degrees(vector.non_orthogonality_rad), "+.3f")
+        yield f"non-orthogonality yz zx xy: {skew} ° (± {skew_known(vector)})"
+        yield from (f"warning: {warning}" for warning in vector.warnings)
+
+
+def _speeds(sensor: SensorEntry) -> Iterator[str]:
+    """Where it is valid: one speed does not tell how far the sensor is from linear."""
+    speeds, loads, found = speed_words(sensor), load_words(sensor), sensor.nonlinearity
+    if loads is not None:
+        yield f"along its own axes the sweeps turned it by {loads} °/s"
+    if found is None:
+        yield from [f"the scale factors are those at {speeds} °/s"] if speeds else []
+        return
+    for name, values, std in (
+        ("odd", found.odd_per_rad_s, found.odd_std_per_rad_s),
+        ("even", found.even_per_rad_s, found.even_std_per_rad_s),
+    ):
+        percent = triple(np.multiply(100, values), "+.4f")
+        yield f"nonlinearity, {name}: {percent} % per rad/s (± {200 * max(std):.4f}, k = 2), from {speeds} °/s"
+
+
+def _on_the_board(board: BoardEntry) -> Iterator[str]:
+    """The board's solution, or why it has none."""
+    found = board.solutions.get("closed_form")
+    if found is None:
+        yield "on the board: nothing was solved"
+    elif found.status == "solved":
+        yield f"on the board: k {triple(found.scale, '.5f')}, b {triple(found.bias_rad_s, '+.5f')} rad/s"
+    else:
+        yield f"on the board: {found.status}, from {found.observations} sweeps"
+    yield from (f"not observed by the board: {sweep}" for sweep in board.not_observed)
+
+
+GYROSCOPE = ResultKind(
+    name="gyroscope",
+    key="sensors",
+    entries=_entries,
+    found=_found,
+    unsolved=lambda _: iter(()),
+    printed=_printed,
+    shown=_shown,
+    followed=_followed,
+    header=gyroscope_lines,
+    figures=Without("its residuals are on the certificate and in the notebook"),
+)

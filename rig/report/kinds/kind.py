@@ -1,0 +1,84 @@
+"""What a kind of result says to every outlet: terminal, page, notebook, certificate, history, header, exports."""
+
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
+from dataclasses import dataclass
+from typing import Generic, TypeVar
+
+from rich.table import Table
+
+from rig.analysis.outcome import Outcome
+from rig.data.quantity import Quantity, Unit
+from rig.data.result_file import ResultDocument
+from rig.data.result_types import Entry
+from rig.estimation.arrays import Array
+from rig.report.kinds.followed import Followed
+
+EntryT = TypeVar("EntryT", bound=Entry)
+SaidT = TypeVar("SaidT")
+
+
+@dataclass(frozen=True, slots=True)
+class Without:
+    """Why a kind of result has no such outlet."""
+
+    why: str
+
+
+@dataclass(frozen=True, slots=True)
+class Found(Generic[EntryT]):
+    """One entry of a result, the sensor it is of, and the quantity that sensor measures."""
+
+    sensor: str
+    quantity: Quantity
+    entry: EntryT
+
+
+@dataclass(frozen=True, slots=True)
+class Three:
+    """Values x, y, z and their expanded uncertainties."""
+
+    values: Sequence[float]
+    expanded: Sequence[float]
+
+
+@dataclass(frozen=True, slots=True)
+class Shown:
+    """Three numbers as page and notebook show them, in `unit`; where there are any, scale factors beside.
+
+    `combined` tells whether U holds all that is known, else it is two standard deviations of noise.
+    """
+
+    name: str
+    unit: Unit
+    numbers: Three
+    combined: bool
+    scale: Three | None = None
+
+
+@dataclass(frozen=True, slots=True)
+class ResultKind(Generic[EntryT]):
+    """A kind of result, by what it says to each outlet, or why it says nothing there.
+
+    - `name` is what people call it; `key` is its place in `result.json`, and `entries` makes what stands there: nothing
+      where a run has none. `found` finds it there again.
+    - `printed` makes what the terminal shows of one: tables and lines; `unsolved` says of all why they were not found.
+    - `shown` makes the row of the page and of the notebook, `followed` what a history keeps.
+    - `figures` names the writer of its pictures in a run folder (`module:function`), `header` makes the lines of
+      `calibration.h`, by the g-sensitivities (3, 3) of the gyroscopes that have one.
+    """
+
+    name: str
+    key: str
+    entries: Callable[[Outcome], Mapping[str, object]] | Without
+    found: Callable[[ResultDocument], Iterator[Found[EntryT]]]
+    unsolved: Callable[[ResultDocument], Iterator[str]]
+    printed: Callable[[Found[EntryT]], Iterator[Table | str]] | Without
+    shown: Callable[[Found[EntryT]], Shown] | Without
+    followed: Callable[[Found[EntryT], ResultDocument], Followed | None] | Without
+    header: Callable[[Found[EntryT], Mapping[str, Array]], Iterable[str]] | Without
+    figures: str | Without
+
+
+def said(outlet: Callable[..., Iterable[SaidT]] | Without, *about: object) -> Iterable[SaidT]:
+    """All that an outlet makes of what it is asked `about`; nothing where a kind has none."""
+    return () if isinstance(outlet, Without) else outlet(*about)

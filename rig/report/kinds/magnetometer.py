@@ -1,0 +1,120 @@
+"""Magnetometers: scale, bias and axes from attitudes to a field of known size, as mounted (TRIAX, Eq. (7))."""
+
+from collections.abc import Iterator
+
+import numpy as np
+from rich.table import Table
+
+from rig.analysis.outcome import Outcome
+from rig.analysis.when import of_magnetometer
+from rig.data.magnetometer_entries import MagnetometerEntry
+from rig.data.quantity import FIELD
+from rig.data.result_file import ResultDocument
+from rig.data.result_types import ErrorEntry
+from rig.errors import Fault
+from rig.report.axes import skew_known, triple
+from rig.report.budget_table import assumed_lines
+from rig.report.header import magnetometer_lines
+from rig.report.kinds.followed import Followed
+from rig.report.kinds.kind import Found, ResultKind, Shown
+from rig.report.kinds.triad import beside, followed_of, shown_of, tables
+from rig.report.magnetometer_entry import magnetometer_entry
+from rig.report.told_words import told_from, told_lines
+from rig.report.validity_words import when_words
+from rig.report.when_entry import when_entry
+
+MICROTESLA = 1e6
+FAR_ENOUGH_M = 0.3  # from the flange: a housing of 0.2 A m² is 0.4 to 1.2 µT at 20 to 40 cm
+
+
+def _entries(outcome: Outcome) -> dict[str, MagnetometerEntry | ErrorEntry]:
+    return {
+        name: ErrorEntry(error=str(result))
+        if isinstance(result, Fault)
+        else magnetometer_entry(
+            result,
+            found_at=when_entry(of_magnetometer(outcome.recordings, (dwell.index for dwell in result.dwells))),
+            **told_from(outcome.told_from_in_reference.get(name, ())),
+        )
+        for name, result in outcome.magnetometers.items()
+    }
+
+
+def _found(document: ResultDocument) -> Iterator[Found[MagnetometerEntry]]:
+    for name, entry in document.magnetometers.items():
+        if isinstance(entry, MagnetometerEntry):
+            yield Found(name, FIELD, entry)
+
+
+def _unsolved(document: ResultDocument) -> Iterator[str]:
+    for name, entry in document.magnetometers.items():
+        if isinstance(entry, ErrorEntry):
+            yield f"{beside(name, FIELD)}, not calibrated: {entry.error}"
+
+
+def _printed(found: Found[MagnetometerEntry]) -> Iterator[Table | str]:
+    entry, name = found.entry, beside(found.sensor, FIELD)
+    title = f"{name} as mounted: {entry.part} {entry.serial_number}, {entry.model}, {entry.estimator}"
+    yield from tables(title, FIELD, entry)
+    yield from _lines(entry)
+
+
+def _shown(found: Found[MagnetometerEntry]) -> Shown:
+    return shown_of(beside(found.sensor, FIELD), FIELD, found.entry)
+
+
+def _followed(found: Found[MagnetometerEntry], document: ResultDocument) -> Followed:
+    return followed_of(found.sensor, FIELD, found.entry, document, None)
+
+
+def _lines(found: MagnetometerEntry) -> Iterator[str]:
+    """What stands below the table."""
+    yield f"relative to a field of {MICROTESLA * found.field_t:g} µT; {len(found.dwells)} attitudes; no limit judges it"
+    if found.found_at is not None:
+        yield f"scale and bias: {when_words(found.found_at)}; its temperature was not measured"
+    yield from assumed_lines(found.budget)
+    yield from told_lines(found.told_from)
+    yield "iron and currents that turn with it are part of what is found"
+    yield "the arm's own field is in the bias; runs with the sensor turned over tell it apart: rig reversal"
+    yield from _tests(found)
+    yield f"field in the arm's base: {triple(np.multiply(MICROTESLA, found.field_base_t), '+.3f')} µT"
+    skew = triple(np.degrees(found.non_orthogonality_rad), "+.4f")
+    yield f"non-orthogonality yz zx xy: {skew} ° (± {skew_known(found)})"
+    known = "" if found.attitude_error_std_rad is None else f" (± {2e3 * found.attitude_error_std_rad:.2f})"
+    yield f"attitude error found: {1e3 * found.attitude_error_rad:.2f} mrad about each axis{known}"
+    for method, other in found.beside.items():
+        if isinstance(other, ErrorEntry):
+            yield f"{method}: {other.error}"
+        else:
+            bias = triple(np.multiply(MICROTESLA, other.bias_t), "+.3f")
+            yield f"{method}: k {triple(other.scale, '.6f')}, b {bias} µT"
+    yield from (f"warning: {warning}" for warning in found.warnings)
+
+
+def _tests(found: MagnetometerEntry) -> Iterator[str]:
+    """What shows, and what does not, that the field was the same everywhere and all the time."""
+    if (alike := found.uniformity) is not None:
+        yield f"uniform field: χ² of the residuals {alike.chi_square:.1f}, at most {alike.limit:.1f}"
+    if (drift := found.drift) is not None:
+        change, std = np.linalg.norm(drift.change_t), np.linalg.norm(drift.std_t)
+        yield f"at home before and after: changed by {MICROTESLA * change:.3f} µT (± {2 * MICROTESLA * std:.3f})"
+    else:
+        yield "no field test at home before and after: a field that drifts is not noticed (procedure.field_test_s)"
+    away_m = float(np.linalg.norm(found.extension_m))
+    if away_m < FAR_ENOUGH_M:
+        advised = f"{1e3 * FAR_ENOUGH_M:.0f} mm are advised (arm.extension_mm)"
+        yield f"it sits {1e3 * away_m:.0f} mm from the flange; {advised}"
+
+
+MAGNETOMETER = ResultKind(
+    name="magnetometer",
+    key="magnetometers",
+    entries=_entries,
+    found=_found,
+    unsolved=_unsolved,
+    printed=_printed,
+    shown=_shown,
+    followed=_followed,
+    header=magnetometer_lines,
+    figures="rig.report.attitude_figures:write_attitude_figures",
+)

@@ -1,0 +1,40 @@
+"""Verifications: calibrated readings against a reference (SIX, Tables IV and V)."""
+
+from collections.abc import Iterator
+
+from rich.table import Table
+
+from rig.analysis.outcome import Outcome
+from rig.data.quantity import RATE
+from rig.data.result_file import ResultDocument, VerificationEntry
+from rig.report.kinds.kind import Found, ResultKind, Without
+from rig.report.verification_entry import verification_entry
+from rig.report.verification_table import verification_lines, verification_table
+
+
+def _entries(outcome: Outcome) -> dict[str, VerificationEntry]:
+    return {name: verification_entry(found) for name, found in outcome.verifications.items()}
+
+
+def _found(document: ResultDocument) -> Iterator[Found[VerificationEntry]]:
+    return (Found(name, RATE, entry) for name, entry in document.verification.items())
+
+
+def _printed(found: Found[VerificationEntry]) -> Iterator[Table | str]:
+    yield verification_table(found.sensor, found.entry)
+    yield from verification_lines(found.entry)
+
+
+NO_PARAMETER = Without("an error of readings is no parameter, and has no uncertainty of its own")
+VERIFICATION = ResultKind(
+    name="verification",
+    key="verification",
+    entries=_entries,
+    found=_found,
+    unsolved=lambda _: iter(()),
+    printed=_printed,
+    shown=NO_PARAMETER,
+    followed=NO_PARAMETER,
+    header=NO_PARAMETER,
+    figures="rig.report.figures:write_figures",
+)
