@@ -13,12 +13,17 @@ from rig.analysis.leaning import leaning_deg
 from rig.analysis.magnetic_field import MagnetometerResult
 from rig.analysis.pieces import cut
 from rig.analysis.readings import judge_readings
-from rig.analysis.reference_contradictions import of_accelerometer, of_magnetometer, reference_statistics
+from rig.analysis.reference_contradictions import (
+    ReadInReference,
+    of_accelerometer,
+    of_magnetometer,
+    reference_statistics,
+)
 from rig.analysis.surroundings import Surroundings, surroundings_of
-from rig.analysis.suspicion import Statistic
 from rig.analysis.told_from import ToldFrom, of_gyroscope, of_reference
-from rig.analysis.verdict import Check
+from rig.analysis.verdict import Check, fitness
 from rig.analysis.ways import with_ways
+from rig.data.quantity import ACCELERATION, FIELD, Quantity
 from rig.data.run_file import RunData
 from rig.errors import Fault, RigError
 from rig.observation.observed_run import ObservedRun
@@ -52,7 +57,7 @@ def contradictions(
     """Of these sensors' results; none in recordings of before there was a site, which keep the verdicts they had.
 
     `surroundings` are those of the recordings, `false_alarms` is the share of undamaged runs that may fail. A sweep
-    that is named is part of the name, `gyro.disturbed_sweep.3`.
+    that is named is part of the name, `gyro.disturbed_sweep.3`, and the check's.
     """
     settings = recordings[0].run.settings
     if settings.site is None:
@@ -73,12 +78,14 @@ def contradictions(
         found = consistency(pieces, explained.solution.matrix, rate, allowance)
         counts = [recording.run.samples[name]["counts"].astype(np.int64) for recording in recordings]
         named = {results[name].observations[place].sweep: each for place, each in found.disturbed.items()}
-        sweeps = {f"{DISTURBED}.{sweep}": each for sweep, each in sorted(named.items())} or {DISTURBED: found.sweep}
+        sweeps = [fitness(name, "rate", f"{DISTURBED}.{sweep}", *named[sweep], sweep=sweep) for sweep in sorted(named)]
+        checks += sweeps or [fitness(name, "rate", DISTURBED, *found.sweep)]
         of_readings = judge_readings(counts, pieces.windows, rate, as_before=not settings.holds_all_kinds)
-        checks += _checks(f"{name}.", {**sweeps, **found.statistics, **of_readings})
+        checks += [fitness(name, "rate", what, *each) for what, each in {**found.statistics, **of_readings}.items()]
         if surroundings is not None and settings.checked_by_model:
             stated_deg = surroundings.uncertainty.of("non_orthogonality_deg", name, results[name].sensor.part)
-            checks.append(Check(f"{name}.non_orthogonality", *leaning_deg(explained.solution, stated_deg, rate), "°"))
+            leaning = leaning_deg(explained.solution, stated_deg, rate)
+            checks.append(fitness(name, "rate", "non_orthogonality", *leaning, unit="°"))
         disturbed |= named.keys()
         if surroundings is not None:
             told_from[name] = tuple(of_gyroscope(found.told_from, name, results[name], surroundings))
@@ -101,17 +108,18 @@ def in_reference(
     known = run.settings.uncertainty
     if known is None or not run.settings.holds_all_kinds:
         return NOTHING
-    asked = {(name, "acceleration", "m/s²"): of_accelerometer(name, recordings, each, known)
-             for name, each in accelerometers.items()} | {
-             (name, "field", "T"): of_magnetometer(name, recordings, each, known)
-             for name, each in magnetometers.items() if not isinstance(each, Fault)}  # fmt: skip
+    asked: dict[tuple[str, Quantity], ReadInReference] = {
+        **{(name, ACCELERATION): of_accelerometer(name, recordings, each, known)
+           for name, each in accelerometers.items()},
+        **{(name, FIELD): of_magnetometer(name, recordings, each, known)
+           for name, each in magnetometers.items() if not isinstance(each, Fault)}}  # fmt: skip
     rate = _rate(run, run.settings.to_calibrate, FALSE_ALARMS)
     checks: list[Check] = []
     told_from: dict[str, tuple[ToldFrom, ...]] = {}
-    for (name, kind, unit), held in asked.items():
+    for (name, quantity), held in asked.items():
         found = reference_statistics(held, rate, drifting=drifting)
-        checks += _checks(f"{name}.{kind}_", found.statistics)
-        told_from[name] = of_reference(found.told_from, kind, unit)
+        checks += [fitness(name, quantity.name, what, *each) for what, each in found.statistics.items()]
+        told_from[name] = of_reference(found.told_from, quantity)
     return Contradictions(tuple(checks), frozenset(), told_from)
 
 
@@ -127,15 +135,6 @@ def _rate(run: RunData, sensors: Sequence[str], false_alarms: float) -> float:
 def rate_of_each(kinds: int, *, by_model: bool, of_all: float = FALSE_ALARMS) -> float:
     """The same where so many kinds of readings of all sensors are held against themselves."""
     return of_all / ((SHARES + OF_THE_MODEL * by_model) * kinds)
-
-
-def _checks(of: str, statistics: Mapping[str, Statistic]) -> list[Check]:
-    return [Check(f"{of}{what}", value, limit, "1") for what, (value, limit) in statistics.items()]
-
-
-def names_a_sweep(check: str) -> bool:
-    """Whether a check of that name is one a disturbed sweep has failed."""
-    return f".{DISTURBED}." in check
 
 
 def disturbed_sweeps(runs: Sequence[RunData]) -> frozenset[int]:

@@ -12,7 +12,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from rig.analysis.verdict import Check
+from rig.analysis.verdict import Check, fitness
 from rig.data.events import BoardNotObserved, BoardObserved, BoardRecalled, BoardSolved, OfTheBoard
 from rig.data.run_file import RunData
 from rig.errors import Fault
@@ -42,9 +42,10 @@ class Agreement:
 
     def checks(self, sensor: str) -> tuple[Check, ...]:
         """The two checks of the verdict: no board may be trusted whose arithmetic was not seen to be right."""
+        scale, bias = self.scale_difference, self.bias_difference_rad_s
         return (
-            Check(f"{sensor}.board_scale", self.scale_difference, SCALE_LIMIT, "1"),
-            Check(f"{sensor}.board_bias", self.bias_difference_rad_s, BIAS_LIMIT_RAD_S, "rad/s"),
+            fitness(sensor, "rate", "board_scale", scale, SCALE_LIMIT, parameter="scale"),
+            fitness(sensor, "rate", "board_bias", bias, BIAS_LIMIT_RAD_S, unit="rad/s", parameter="bias"),
         )
 
 

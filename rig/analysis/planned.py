@@ -18,6 +18,7 @@ from rig.arm.motion import Plan
 from rig.config.models import RigConfig
 from rig.config.sensor_catalogue import PARTS
 from rig.config.sensor_sections import SensorSection, mounting_matrix
+from rig.data.quantity import ACCELERATION
 from rig.data.settings import RunSettings, settings_of
 from rig.estimation.nonlinearity import distinct_speeds
 
@@ -50,7 +51,7 @@ def _of_accelerations(
     name: str, sensor: SensorSection, plan: Plan, settings: RunSettings, rate: float
 ) -> tuple[ToldFrom, ...]:
     found = reference_consistency.would_tell(planned_read(name, sensor, plan, settings), rate)
-    return of_reference(found, "acceleration", "m/s²")
+    return of_reference(found, ACCELERATION)
 
 
 def _of_rates(config: RigConfig, plan: Plan, settings: RunSettings, rate: float) -> Mapping[str, tuple[ToldFrom, ...]]:

@@ -11,6 +11,7 @@ from rig.analysis.reference_suspected import DAMAGES as REFERENCE_DAMAGES
 from rig.analysis.seen import unknown_of
 from rig.analysis.surroundings import Surroundings
 from rig.analysis.suspected import DAMAGES, Means
+from rig.data.quantity import Quantity
 from rig.errors import Fault
 from rig.estimation.arrays import Array
 from rig.estimation.budget import Unknown, budget
@@ -49,10 +50,10 @@ def of_gyroscope(
         yield ToldFrom(each.what, each.check, size, each.unit, off_by)
 
 
-def of_reference(sizes: Mapping[str, float], kind: str, unit: str) -> tuple[ToldFrom, ...]:
-    """Of an accelerometer or a magnetometer, whose checks are named by its `kind` and whose readings have that unit."""
+def of_reference(sizes: Mapping[str, float], quantity: Quantity) -> tuple[ToldFrom, ...]:
+    """The damages that are told of what gravity or the field calibrates, whose checks are named by its quantity."""
     return tuple(
-        ToldFrom(each.what, f"{kind}_{each.check}", sizes[each.what], each.unit or unit)
+        ToldFrom(each.what, f"{quantity}_{each.check}", sizes[each.what], each.unit or quantity.unit)
         for each in REFERENCE_DAMAGES
         if each.what in sizes
     )

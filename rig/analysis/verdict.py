@@ -2,7 +2,7 @@
 
 import math
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from types import MappingProxyType
 from typing import Literal
 
@@ -12,8 +12,10 @@ from rig.analysis.acceleration import AccelerometerResult
 from rig.analysis.bias_drift import BiasDrift
 from rig.analysis.clock import PPM, ClockCheck, worst_differences
 from rig.analysis.verification import Verification
-from rig.data.quantity import ACCELERATION, RATE, Quantity
-from rig.data.settings import DecisionRule, Limits
+from rig.config.limits import Limits, Parameter
+from rig.data.meaning import Meaning
+from rig.data.quantity import Quantity
+from rig.data.settings import DecisionRule
 from rig.estimation.arrays import Array
 from rig.estimation.budget import Budget
 from rig.estimation.coverage import COVERAGE_FACTOR, beyond, coverage_factors
@@ -24,6 +26,7 @@ from rig.estimation.estimate import Estimate
 class Check:
     """One limit: it passes when `value` is a number not above `limit` less `guard`. `unit` belongs to all of them.
 
+    What it `means` is said by whoever makes it: `name` is for people, and nothing is read out of how it is spelt.
     `value` is None where nothing was measured, `limit` where none was set, `uncertainty` where the value has none. It
     is the expanded one, by `coverage_factor` and so many degrees of `freedom`. The `guard` is that uncertainty where
     the decision rule is the guard band (ILAC-G8, 4.2).
@@ -33,6 +36,7 @@ class Check:
     value: float | None
     limit: float | None
     unit: str
+    means: Meaning
     uncertainty: float | None = None
     guard: float = 0.0
     coverage_factor: float = COVERAGE_FACTOR
@@ -62,21 +66,83 @@ class Spread:
     freedom: Array
 
 
+@dataclass(frozen=True, slots=True)
+class _Held:
+    """One quantity of a sensor, held against its limits by a decision rule."""
+
+    sensor: str
+    quantity: str
+    limits: Limits
+    rule: DecisionRule = "simple"
+
+    def check(self, what: str, value: float | None) -> Check:
+        """The check of one limit."""
+        row, limit = self.limits.of(self.quantity, what)
+        means = Meaning(row.kind, self.sensor, self.quantity, row.parameter)
+        return Check(_name(self.sensor, self.quantity, what), value, limit, row.unit, means)
+
+    def nearest(self, what: str, values: Array, spread: Spread | None) -> Check:
+        """The check of the value, of three, that comes nearest to its limit, and what the rule makes of it."""
+        check = self.check(what, _largest(values))
+        if spread is None or check.value is None:
+            return check
+        guards = spread.expanded * (self.rule == "guard_band")
+        worst = int(np.argmax(np.abs(values) + guards))
+        return replace(
+            check,
+            value=abs(float(values[worst])),
+            uncertainty=float(spread.expanded[worst]),
+            guard=float(guards[worst]),
+            coverage_factor=float(spread.factors[worst]),
+            freedom=float(spread.freedom[worst]),
+        )
+
+    def calibration(
+        self, scale: Array, bias: Array, std: Array, spreads: tuple[Spread | None, Spread | None]
+    ) -> tuple[Check, ...]:
+        """The checks of scale and bias, (3,) each, and of their standard deviations (6,)."""
+        return (
+            self.nearest("scale_deviation", scale - 1, spreads[0]),
+            self.check("scale_std", _largest(std[:3])),
+            self.nearest("bias", bias, spreads[1]),
+            self.check("bias_std", _largest(std[3:])),
+        )
+
+
+def fitness(
+    sensor: str,
+    quantity: str,
+    what: str,
+    value: float | None,
+    limit: float,
+    *,
+    unit: str = "1",
+    parameter: Parameter | None = None,
+    sweep: int | None = None,
+) -> Check:
+    """A check whether the measurement of a sensor's quantity is fit for use, by a limit that no configuration sets."""
+    means = Meaning("fitness", sensor, quantity, parameter, sweep)
+    return Check(_name(sensor, quantity, what), value, limit, unit, means)
+
+
 def judge(
     solutions: Mapping[str, Estimate],
     limits: Limits,
     budgets: Mapping[str, Budget] = MappingProxyType({}),
     rule: DecisionRule = "simple",
 ) -> tuple[Check, ...]:
-    """The checks of every sensor, by sensor name; what the limits mean is said in the names.
+    """The checks of every gyroscope, by its name.
 
     With a sensor's budget its combined uncertainties are judged, and values by the decision rule; else the noise alone.
     """
-    return tuple(
-        check
-        for name, solution in solutions.items()
-        for check in _checks(name, solution, limits, budgets.get(name), rule)
-    )
+    checks: list[Check] = []
+    for name, solution in solutions.items():
+        held, budget = _Held(name, "rate", limits, rule), budgets.get(name)
+        std = np.sqrt(np.diag(solution.covariance)) if budget is None else budget.std
+        spreads = (None, None) if budget is None else _spreads(budget)
+        checks += held.calibration(solution.scale, solution.bias_rad_s, std, spreads)
+        checks.append(held.check("condition", _largest(np.array([solution.condition]))))
+    return tuple(checks)
 
 
 def verification_checks(sensor: str, verification: Verification | None, limits: Limits) -> tuple[Check, ...]:
@@ -90,11 +156,10 @@ def verification_checks(sensor: str, verification: Verification | None, limits: 
         rms = _largest(verification.after.movement.rms_rad_s)
         mean = _largest(np.array([turn.error_rad_s for turn in verification.after.revolutions]))
         known = verification.reference_error_rad_s
-    return (
-        Check(f"{sensor}.verification_rms", rms, limits.verification_rms_rad_s, "rad/s"),
-        Check(f"{sensor}.verification_mean", mean, limits.verification_mean_rad_s, "rad/s"),
-        Check(f"{sensor}.verification_reference", known, limits.verification_mean_rad_s, "rad/s"),
-    )
+    held = _Held(sensor, "rate", limits)
+    of_means = held.check("verification_mean", mean)
+    means, name = Meaning("fitness", sensor, "rate"), _name(sensor, "rate", "verification_reference")
+    return held.check("verification_rms", rms), of_means, replace(of_means, name=name, value=known, means=means)
 
 
 def clock_checks(clocks: Sequence[ClockCheck]) -> tuple[Check, ...]:
@@ -103,7 +168,7 @@ def clock_checks(clocks: Sequence[ClockCheck]) -> tuple[Check, ...]:
     Of several recordings those in which they agree least, each pair for itself.
     """
     return tuple(
-        Check(f"clocks_agree.{one}_and_{other}", each.size / PPM, each.limit / PPM, "ppm")
+        Check(f"clocks_agree.{one}_and_{other}", each.size / PPM, each.limit / PPM, "ppm", Meaning("fitness"))
         for each in worst_differences(clocks)
         for one, other in [each.clocks]
     )
@@ -117,36 +182,24 @@ def acceleration_checks(
     With a budget its combined uncertainties are judged; else the solution's, relative to the stated gravity.
     """
     std = np.sqrt(np.diag(result.covariance)) if result.budget is None else result.budget.std
-    of = f"{sensor}.acceleration"
-    scale, bias = (_twice(std[:3]), _twice(std[3:])) if result.budget is None else _spreads(result.budget)
-    found = [
-        _held(f"{of}_scale_deviation", (result.scale - 1, scale), limits.acceleration_scale_deviation, "1", rule),
-        Check(f"{of}_scale_std", _largest(std[:3]), limits.acceleration_scale_std, "1"),
-        _held(f"{of}_bias", (result.bias_m_s2, bias), limits.acceleration_bias_m_s2, "m/s²", rule),
-        Check(f"{of}_bias_std", _largest(std[3:]), limits.acceleration_bias_std_m_s2, "m/s²"),
-    ]
-    if result.held_out is not None:
-        limit = limits.acceleration_verification_m_s2
-        found.append(Check(f"{of}_verification", result.held_out.rms_m_s2, limit, "m/s²"))
-    return tuple(found)
+    spreads = (_twice(std[:3]), _twice(std[3:])) if result.budget is None else _spreads(result.budget)
+    held = _Held(sensor, "acceleration", limits, rule)
+    checks = held.calibration(result.scale, result.bias_m_s2, std, spreads)
+    return checks if result.held_out is None else (*checks, held.check("verification", result.held_out.rms_m_s2))
 
 
 def drift_checks(
     sensor: str, drifts: Mapping[Quantity, BiasDrift], limits: Limits, rule: DecisionRule = "simple"
 ) -> tuple[Check, ...]:
     """The largest change of a bias between any two repeats."""
-    allowed: Mapping[Quantity, tuple[str, float | None, str]] = {
-        RATE: ("bias_drift", limits.bias_drift_rad_s, "rad/s"),
-        ACCELERATION: ("acceleration_bias_drift", limits.acceleration_bias_drift_m_s2, "m/s²"),
-    }
-    found = []
+    checks = []
     for quantity, drift in drifts.items():
-        name, limit, unit = allowed[quantity]
-        held = drift.held
-        std = held.largest_change_std
+        std = drift.held.largest_change_std
         spread = _twice(std) if drift.freedom is None else _by_freedom(std, drift.freedom)
-        found.append(_held(f"{sensor}.{name}", (held.largest_change, spread), limit, unit, rule))
-    return tuple(found)
+        checks.append(
+            _Held(sensor, quantity.name, limits, rule).nearest("bias_drift", drift.held.largest_change, spread)
+        )
+    return tuple(checks)
 
 
 def verdict(checks: Sequence[Check]) -> Literal["pass", "fail"]:
@@ -154,18 +207,9 @@ def verdict(checks: Sequence[Check]) -> Literal["pass", "fail"]:
     return "pass" if checks and all(check.passed for check in checks) else "fail"
 
 
-def _checks(
-    sensor: str, solution: Estimate, limits: Limits, budget: Budget | None, rule: DecisionRule
-) -> tuple[Check, ...]:
-    std = np.sqrt(np.diag(solution.covariance)) if budget is None else budget.std
-    scale, bias = (None, None) if budget is None else _spreads(budget)
-    return (
-        _held(f"{sensor}.scale_deviation", (solution.scale - 1, scale), limits.scale_deviation, "1", rule),
-        Check(f"{sensor}.scale_std", _largest(std[:3]), limits.scale_std, "1"),
-        _held(f"{sensor}.bias", (solution.bias_rad_s, bias), limits.bias_rad_s, "rad/s", rule),
-        Check(f"{sensor}.bias_std", _largest(std[3:]), limits.bias_std_rad_s, "rad/s"),
-        Check(f"{sensor}.condition", _largest(np.array([solution.condition])), limits.condition, "1"),
-    )
+def _name(sensor: str, quantity: str, what: str) -> str:
+    """What a check of a sensor is called: that a gyroscope reads rates goes without saying."""
+    return f"{sensor}.{what}" if quantity == "rate" else f"{sensor}.{quantity}_{what}"
 
 
 def _spreads(budget: Budget) -> tuple[Spread, Spread]:
@@ -183,18 +227,6 @@ def _twice(std: Array) -> Spread:
 def _by_freedom(std: Array, freedom: Array) -> Spread:
     factors = coverage_factors(freedom)
     return Spread(factors * std, factors, freedom)
-
-
-def _held(name: str, found: tuple[Array, Spread | None], limit: float | None, unit: str, rule: DecisionRule) -> Check:
-    """Of values (3,) and their uncertainties that which comes nearest to its limit, and what the rule makes of it."""
-    values, spread = found
-    largest = _largest(values)
-    if spread is None or largest is None:
-        return Check(name, largest, limit, unit)
-    guards = spread.expanded * (rule == "guard_band")
-    worst = int(np.argmax(np.abs(values) + guards))
-    of_the_worst = (float(each[worst]) for each in (spread.expanded, guards, spread.factors, spread.freedom))
-    return Check(name, abs(float(values[worst])), limit, unit, *of_the_worst)
 
 
 def _largest(values: np.ndarray) -> float | None:

@@ -5,7 +5,6 @@ from contextlib import ExitStack
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from rig.analysis.contradictions import names_a_sweep
 from rig.commands.claims import claimed
 from rig.commands.configured import Configured, configured
 from rig.commands.consent import refuse_foreign_addresses
@@ -69,7 +68,7 @@ def resume(
     """
     if not (folder / CONFIG).exists():
         raise Refused("no_run", f"{folder} holds no {CONFIG}", "Give the folder of an interrupted run")
-    if (folder / RESULT).exists() and not any(names_a_sweep(check.name) for check in read_result(folder).checks):
+    if (folder / RESULT).exists() and all(check.means.sweep is None for check in read_result(folder).checks):
         raise Refused("already_finished", f"{folder} has its {RESULT}", "Start a new run with `rig run`")
     if not (folder / SCRIPT).exists():
         raise Refused(

@@ -1,4 +1,4 @@
-"""The sections by which a recording is judged and its result stated: thresholds, limits, site, uncertainty."""
+"""The sections by which a recording is judged and its result stated: thresholds, site, uncertainty."""
 
 from datetime import date
 from typing import Annotated, Literal, Self
@@ -36,52 +36,6 @@ class ObservationSection(Section):
         gt=0,
         lt=45,
         description="how far the measured rotation may lie from the nominal axis of the sensor",
-    )
-
-
-class LimitsSection(Section):
-    """The verdict's limits, for every sensor that is calibrated. There are no usual ones: state them all."""
-
-    scale_deviation: Positive = Field(description="of a scale factor from 1, |k − 1|", json_schema_extra=RATIO)
-    scale_std: Positive = Field(description="standard deviation of a scale factor", json_schema_extra=RATIO)
-    bias_rad_s: Positive = Field(description="magnitude of a bias")
-    bias_std_rad_s: Positive = Field(description="standard deviation of a bias")
-    condition: Positive = Field(
-        description="condition number of the equations: how well the sweeps tell the parameters apart",
-        json_schema_extra=RATIO,
-    )
-    verification_rms_rad_s: Positive | None = Field(
-        default=None,
-        description="RMS of the calibrated reading less the reference's, sample by sample; a verification needs it",
-    )
-    verification_mean_rad_s: Positive | None = Field(
-        default=None,
-        description="the same difference averaged over each revolution, and the reference's from the arm; a "
-        "verification needs it",
-    )
-    acceleration_scale_deviation: Positive | None = Field(
-        default=None,
-        description="of an accelerometer's scale factor from 1; a calibration of one needs it",
-        json_schema_extra=RATIO,
-    )
-    acceleration_scale_std: Positive | None = Field(
-        default=None, description="standard deviation of such a scale factor; needed too", json_schema_extra=RATIO
-    )
-    acceleration_bias_m_s2: Positive | None = Field(
-        default=None, description="magnitude of an accelerometer's bias; needed too"
-    )
-    acceleration_bias_std_m_s2: Positive | None = Field(
-        default=None, description="standard deviation of such a bias; needed too"
-    )
-    acceleration_verification_m_s2: Positive | None = Field(
-        default=None,
-        description="how far the size of a calibrated acceleration at rest may be from gravity's; needed with repeats",
-    )
-    bias_drift_rad_s: Positive | None = Field(
-        default=None, description="change of a gyroscope's bias between any two repeats; `bias_drift` needs it"
-    )
-    acceleration_bias_drift_m_s2: Positive | None = Field(
-        default=None, description="change of an accelerometer's bias between any two repeats; `bias_drift` needs it"
     )
 
 

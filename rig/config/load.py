@@ -13,8 +13,8 @@ from urllib.parse import urlsplit
 import yaml
 from pydantic import BaseModel, ValidationError
 
-from rig.config.judging_sections import LimitsSection
 from rig.config.layers import BASE, Layered, Places, put_together, read_layers
+from rig.config.limits import LimitsSection
 from rig.config.models import ProcedureSection, RigConfig
 from rig.config.procedure_sections import DEFAULT_PROCEDURE, STOCK_SECTIONS
 from rig.config.world_models import WorldSection

@@ -12,11 +12,11 @@ from pydantic import Field, ValidationInfo, field_validator
 from rig.config.judging_sections import (
     CertificateSection,
     HistorySection,
-    LimitsSection,
     ObservationSection,
     SiteSection,
     UncertaintySection,
 )
+from rig.config.limits import LimitsSection
 from rig.config.link_budget import Stream, over_budget
 from rig.config.section import (
     AccelerometerOrder,

@@ -28,7 +28,6 @@ __all__ = [
 Wrist = Literal["wrist_1", "wrist_2", "wrist_3"]
 Speed = Annotated[float, Field(ge=0.5, le=SPEED_LIMIT_DEG_S)]  # slower, and the board cannot keep a sweep's readings
 DEFAULT_PROCEDURE = "six_observation"
-DRIFT_LIMITS = ("bias_drift_rad_s", "acceleration_bias_drift_m_s2")
 SPEED_TO_RANGE = 1.5  # scale error, bias, ripple and noise come on top of a sweep's speed
 
 
@@ -217,11 +216,10 @@ class AttitudesSection(ProcedureSection):
         """What the calibration of an accelerometer lacks."""
         if not any(sensor.acceleration for sensor in config.to_calibrate.values()):
             yield "attitudes calibrate accelerometers: give a sensor with role: calibrate its section acceleration"
-        needed = ["scale_deviation", "scale_std", "bias_m_s2", "bias_std_m_s2"]
+        lacking = config.limits.lacking("accelerometer")
         if self.repeats > 1:
-            needed.append("verification_m_s2")  # by the last repeat
-        limits = [f"acceleration_{name}" for name in needed]
-        if lacking := [f"limits.{name}" for name in limits if getattr(config.limits, name) is None]:
+            lacking += config.limits.lacking("repeated attitudes")  # it is verified by the last repeat
+        if lacking:
             yield f"an accelerometer's calibration needs {', '.join(lacking)}"
 
 
@@ -243,9 +241,8 @@ class BiasDriftSection(AttitudesSection):
     def problems(self, config: RigConfig) -> Iterator[str]:
         """What the calibration of an accelerometer lacks, and limits of the drift."""
         yield from AttitudesSection.problems(self, config)
-        limits = [f"limits.{name}" for name in DRIFT_LIMITS if getattr(config.limits, name) is None]
-        if limits:
-            yield f"a bias that is watched needs {', '.join(limits)}"
+        if lacking := config.limits.lacking("bias drift"):
+            yield f"a bias that is watched needs {', '.join(lacking)}"
 
 
 class ImuSection(SixSweepsSection, AttitudesSection):
@@ -281,7 +278,7 @@ def verification_problems(config: RigConfig) -> Iterator[str]:
     lacking = []
     if config.reference is None:
         lacking.append("a sensor with role: reference to compare with")
-    if None in (config.limits.verification_rms_rad_s, config.limits.verification_mean_rad_s):
-        lacking.append("limits.verification_rms_rad_s and limits.verification_mean_rad_s")
+    if limits := config.limits.lacking("verification"):
+        lacking.append(" and ".join(limits))
     if lacking:
         yield f"a verification needs {', and '.join(lacking)}"

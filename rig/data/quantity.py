@@ -33,7 +33,6 @@ class Quantity:
     - `walk` is what its white noise is called, `walk_suffix` the SI unit of that in names, `walk_unit` a shown one.
     - `steady` is how far the means of two neighbouring seconds may be apart at rest, beside their noise: no bias moves
       so fast, but a hand does, and half a degree of tilt is more. A field within a room changes by a tenth of that.
-    - `limits` is what the names of its limits and checks begin with.
     """
 
     name: str
@@ -49,7 +48,6 @@ class Quantity:
     walk_suffix: str
     walk_unit: Unit
     steady: float
-    limits: str
 
     def __str__(self) -> str:
         return self.name
@@ -83,7 +81,6 @@ RATE: Final = Quantity(
     walk_suffix="rad_sqrt_s",
     walk_unit=Unit("°/√h", pi / 180 / MINUTE_S),
     steady=5e-3,
-    limits="",
 )
 ACCELERATION: Final = Quantity(
     name="acceleration",
@@ -99,7 +96,6 @@ ACCELERATION: Final = Quantity(
     walk_suffix="m_s_sqrt_s",
     walk_unit=Unit("m/s/√h", 1 / MINUTE_S),
     steady=0.05,
-    limits="acceleration_",
 )
 FIELD: Final = Quantity(
     name="field",
@@ -115,6 +111,5 @@ FIELD: Final = Quantity(
     walk_suffix="t_sqrt_s",
     walk_unit=Unit("nT √s", 1e-9),
     steady=2e-6,
-    limits="field_",
 )
 QUANTITIES: Final[Mapping[str, Quantity]] = MappingProxyType({each.name: each for each in (RATE, ACCELERATION, FIELD)})

@@ -9,6 +9,7 @@ from typing import Final, Literal
 
 from pydantic import ConfigDict, Field, JsonValue
 
+from rig.config.limits import Kind, Parameter
 from rig.config.section import SensorName
 from rig.config.written_file import write_new
 from rig.data.accelerometer_entries import AccelerometerEntry
@@ -17,6 +18,7 @@ from rig.data.checked import read_document
 from rig.data.drift_entries import DriftEntry
 from rig.data.earth_rate_entries import EarthRateEntry
 from rig.data.magnetometer_entries import MagnetometerEntry
+from rig.data.meaning import Meaning, meaning_by_name
 from rig.data.result_types import (
     Entry,
     ErrorEntry,
@@ -45,6 +47,10 @@ class CheckEntry(Entry):
     Where the value has an expanded uncertainty: `uncertainty` and its `coverage_factor` (results of before do not say
     it: 2), by how much the `decision_rule` has it stay below the limit (`guard`), and the probability that it is
     accepted although it is beyond the limit.
+
+    `kind` says whether it holds a property of the item (conformity) or asks whether the measurement is fit for use;
+    `sensor`, `quantity` and `parameter` what of which sensor is held, where it is of a single one; `sweep` which sweep
+    contradicts the others. Results of before say none of these.
     """
 
     name: str
@@ -56,6 +62,18 @@ class CheckEntry(Entry):
     guard: float = 0.0
     false_acceptance: float | None = None
     coverage_factor: float | None = None
+    kind: Kind | None = None
+    sensor: str | None = None
+    quantity: str | None = None
+    parameter: Parameter | None = None
+    sweep: int | None = None
+
+    @property
+    def means(self) -> Meaning:
+        """What it says it is of; in results of before, what its name was taken to say."""
+        if self.kind is None:
+            return meaning_by_name(self.name)
+        return Meaning(self.kind, self.sensor, self.quantity, self.parameter, self.sweep)
 
 
 class StoredCalibrationEntry(Entry):

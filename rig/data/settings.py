@@ -14,6 +14,7 @@ import numpy as np
 from numpy.typing import NDArray
 from pydantic import Field
 
+from rig.config.limits import LIMITS, Limits
 from rig.config.sensor_catalogue import PARTS
 from rig.data.checked import Finite, Positive, checked
 from rig.errors import Refused
@@ -61,26 +62,6 @@ class ObservationThresholds:
     max_lost_fraction: Annotated[float, Field(ge=0, lt=1)]
     max_speed_deviation: Annotated[float, Field(gt=0, lt=1)]
     max_axis_deviation_deg: Annotated[float, Field(gt=0, lt=45)]
-
-
-@dataclass(frozen=True, slots=True)
-class Limits:
-    """The verdict's limits; those of a verification and of accelerometers are None where none were asked for."""
-
-    scale_deviation: Positive
-    scale_std: Positive
-    bias_rad_s: Positive
-    bias_std_rad_s: Positive
-    condition: Positive
-    verification_rms_rad_s: Positive | None = None
-    verification_mean_rad_s: Positive | None = None
-    acceleration_scale_deviation: Positive | None = None
-    acceleration_scale_std: Positive | None = None
-    acceleration_bias_m_s2: Positive | None = None
-    acceleration_bias_std_m_s2: Positive | None = None
-    acceleration_verification_m_s2: Positive | None = None
-    bias_drift_rad_s: Positive | None = None
-    acceleration_bias_drift_m_s2: Positive | None = None
 
 
 @dataclass(frozen=True, slots=True)
@@ -270,9 +251,13 @@ class RunSettings:
             changed = _overridden(changed, item)
         return changed
 
+    def document(self) -> dict[str, Any]:
+        """All of it as plain values, by key."""
+        return {**asdict(self), "limits": self.limits.model_dump()}
+
     def to_json(self) -> str:
         """As it stands in a run file."""
-        return json.dumps({"schema": SCHEMA, **asdict(self)}, allow_nan=False)
+        return json.dumps({"schema": SCHEMA, **self.document()}, allow_nan=False)
 
 
 def settings_from_json(text: str) -> RunSettings:
@@ -377,7 +362,7 @@ def _overridden(settings: RunSettings, item: str) -> RunSettings:
             f"a recording has no setting {quote(path.strip())} that could be changed",
             f"Set one of {', '.join(_settable())}",
         )
-    document = asdict(settings)
+    document = settings.document()
     (document[section] if key else document)[key or section] = value.strip()
     try:
         return checked(RunSettings, document, "settings")
@@ -393,5 +378,5 @@ def setting(key: str) -> str:
 
 
 def _settable() -> tuple[str, ...]:
-    sections = {"observation": ObservationThresholds, "limits": Limits}
-    return (*(f"{name}.{field.name}" for name, section in sections.items() for field in fields(section)), "reckoning")
+    thresholds = (f"observation.{field.name}" for field in fields(ObservationThresholds))
+    return (*thresholds, *(f"limits.{key}" for key in LIMITS), "reckoning")

@@ -7,7 +7,6 @@ from datetime import UTC, datetime
 
 from rig.data.quantity import QUANTITIES
 from rig.data.result_file import ResultDocument
-from rig.report.certificate.content import CONFORMITY
 from rig.report.kinds.followed import Followed, Parameter
 from rig.report.kinds.registry import followed
 
@@ -38,7 +37,7 @@ def measurement_sha256(document: ResultDocument) -> str:
 
 def fit(document: ResultDocument) -> bool:
     """Whether the measurement passed its own checks; a value beyond its limit is a result like any other."""
-    return all(check.passed for check in document.checks if not CONFORMITY.search(check.name))
+    return all(check.passed for check in document.checks if check.means.kind == "fitness")
 
 
 def utc(text: str) -> str:

@@ -3,7 +3,8 @@
 import json
 from collections.abc import Iterator, Mapping, Sequence
 
-from rig.data.result_file import ResultDocument
+from rig.config.limits import Kind
+from rig.data.result_file import CheckEntry, ResultDocument
 from rig.history.index import SAME, unlike
 from rig.report.kinds.registry import followed
 
@@ -21,10 +22,14 @@ def not_given(claimed: ResultDocument, given: ResultDocument) -> list[str]:
     origin = _origin(given)
     rows = [f"provenance.{name}" for name, said in _origin(claimed).items() if said != origin.get(name)]
     rows += ["verdict"] if claimed.verdict != given.verdict else []
-    checks = {check.name: (check.passed, check.unit) for check in given.checks}
-    rows += [check.name for check in claimed.checks if checks.get(check.name) != (check.passed, check.unit)]
+    checks = {check.name: _said(check) for check in given.checks}
+    rows += [check.name for check in claimed.checks if checks.get(check.name) != _said(check)]
     numbers = _differences(_numbers_of(claimed), _numbers_of(given), "")
     return [*rows, *unlike(claimed, followed(given)), *numbers]
+
+
+def _said(check: CheckEntry) -> tuple[bool, str, Kind]:
+    return check.passed, check.unit, check.means.kind
 
 
 def _origin(document: ResultDocument) -> dict[str, object]:

@@ -131,7 +131,7 @@ class Run(Mapping[str, Readings]):
     def to_dict(self) -> dict[str, Any]:
         """What was recorded and what it is judged by, as plain numbers, lists and texts; not the samples."""
         sensors = {name: readings.to_dict() for name, readings in self.items()}
-        return {"path": str(self.path), "settings": asdict(self.settings), "sensors": sensors}
+        return {"path": str(self.path), "settings": self.settings.document(), "sensors": sensors}
 
     @cached_property
     def _readings(self) -> Mapping[str, Readings]:

@@ -90,7 +90,7 @@ def moments(run: RunData) -> Iterator[Moment]:
 def ended(result: ResultDocument) -> Iterator[RunEvent]:
     """What was told when the run had its result."""
     for each in result.checks:
-        yield Checked(Check(each.name, each.value, each.limit, each.unit, each.uncertainty, each.guard))
+        yield Checked(Check(each.name, each.value, each.limit, each.unit, each.means, each.uncertainty, each.guard))
     yield VerdictReached(result.verdict == "pass")
 
 

@@ -1,5 +1,7 @@
 """The typed outcome of a run as the document of `result.json`."""
 
+from dataclasses import asdict
+
 from rig.analysis.outcome import Origin, Outcome
 from rig.analysis.verdict import Check
 from rig.data.result_file import SCHEMA, CheckEntry, ProvenanceEntry, ResultDocument
@@ -29,9 +31,12 @@ def document_of(outcome: Outcome) -> ResultDocument:
 
 
 def _check(check: Check) -> CheckEntry:
+    told = {name: each for name, each in asdict(check.means).items() if each is not None}
     if check.uncertainty is not None:
-        return entry(CheckEntry, check)
-    return CheckEntry(name=check.name, value=check.value, limit=check.limit, unit=check.unit, passed=check.passed)
+        return entry(CheckEntry, check, **told)
+    return CheckEntry(
+        name=check.name, value=check.value, limit=check.limit, unit=check.unit, passed=check.passed, **told
+    )
 
 
 def _provenance(origin: Origin) -> ProvenanceEntry:

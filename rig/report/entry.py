@@ -10,7 +10,7 @@ from rig.estimation.arrays import Array
 EntryT = TypeVar("EntryT", bound=BaseModel)
 
 
-def entry(kind: type[EntryT], *sources: object, **more: Any) -> EntryT:
+def entry(kind: type[EntryT], /, *sources: object, **more: Any) -> EntryT:
     """An entry of that kind: each field is in `more`, or is the attribute of that name of the first source that has it.
 
     Arrays become tuples. Raises ValueError for a field that nothing says or whose value does not fit, TypeError for one

@@ -8,7 +8,7 @@ import pytest
 
 from rig.analysis.calibration import observe_recordings, solve_observed
 from rig.analysis.contradictions import DISTURBED as NAMED
-from rig.analysis.contradictions import FALSE_ALARMS, contradictions, disturbed_sweeps, names_a_sweep
+from rig.analysis.contradictions import FALSE_ALARMS, contradictions, disturbed_sweeps
 from rig.analysis.outcome import calibrated
 from rig.analysis.pieces import Window
 from rig.analysis.readings import judge_readings
@@ -204,7 +204,7 @@ def test_a_disturbed_sweep_is_named_and_fails_the_verdict() -> None:
     run = offset(0.02, sweep_2)(readings_of(Setup(noise_rad_s=0.005))).recording()
     outcome = calibrated([run])
     assert not outcome.passed
-    named = [check.name for check in outcome.checks if names_a_sweep(check.name)]
+    named = [check.name for check in outcome.checks if check.means.sweep is not None]
     assert named == [f"gyro.{NAMED}.2", f"gyro.{NAMED}.3"]
     assert disturbed_sweeps([run]) == {2, 3}
 

@@ -6,7 +6,7 @@ from dataclasses import dataclass, field
 
 import pytest
 
-from rig.analysis.verdict import Check
+from rig.analysis.verdict import fitness
 from support.checked_runs import checks_of, failed, kind_of, probability, solved
 from support.drawn_recording import KINDS, Kind, drawn
 from support.synthetic_run import Setup
@@ -101,4 +101,4 @@ def test_a_p_value_is_what_the_limit_is_set_by() -> None:
 
     for freedom in (1, 3, 9, 90):
         limit = float(chdtri(freedom, LARGER))
-        assert probability(Check("gyro.residuals", limit, limit, "1"), LARGER) == pytest.approx(LARGER)
+        assert probability(fitness("gyro", "rate", "residuals", limit, limit), LARGER) == pytest.approx(LARGER)

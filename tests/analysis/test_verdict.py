@@ -10,13 +10,16 @@ import pytest
 from rig.analysis.acceleration import AccelerometerResult
 from rig.analysis.bias_drift import BiasDrift
 from rig.analysis.verdict import Check, acceleration_checks, drift_checks, judge, verdict, verification_checks
+from rig.config.limits import Limits
+from rig.data.meaning import Meaning
 from rig.data.quantity import RATE
-from rig.data.settings import DecisionRule, Limits
+from rig.data.settings import DecisionRule
 from rig.estimation.accumulator import Solution
 from rig.estimation.bias_by_repeat import BiasByRepeat
 from rig.estimation.budget import Budget, Contributor
 
 LIMITS = Limits(scale_deviation=0.3, scale_std=0.002, bias_rad_s=0.1, bias_std_rad_s=0.001, condition=100)
+BIAS = Meaning("conformity", "gyro", "rate", "bias")
 GOOD = Solution(
     estimator="newton",
     scale=np.array([1.1771, 1.1554, 0.9]),
@@ -61,16 +64,16 @@ def test_one_value_beyond_its_limit_or_missing_fails_the_run(solution: Solution,
 
 @pytest.mark.parametrize("value", [None, float("nan"), float("inf"), 1.0001])
 def test_a_measurement_that_is_missing_does_not_pass(value: float | None) -> None:
-    assert not Check("gyro.bias", value, 1.0, "rad/s").passed
-    assert Check("gyro.bias", 1.0, 1.0, "rad/s").passed
+    assert not Check("gyro.bias", value, 1.0, "rad/s", BIAS).passed
+    assert Check("gyro.bias", 1.0, 1.0, "rad/s", BIAS).passed
 
 
 def test_without_a_limit_nothing_passes() -> None:
     """A limit that nobody set is no limit of zero, which a perfect reading would pass and `result.json` would state."""
-    unset = replace(LIMITS, verification_rms_rad_s=0.1)
+    unset = LIMITS.model_copy(update={"verification_rms_rad_s": 0.1})
     checks = verification_checks("gyro", None, unset)
     assert [check.limit for check in checks] == [0.1, None, None]
-    assert not Check("gyro.verification_mean", 0.0, None, "rad/s").passed
+    assert not Check("gyro.verification_mean", 0.0, None, "rad/s", BIAS).passed
 
 
 def test_the_guard_band_keeps_the_expanded_uncertainty_away_from_the_limit() -> None:
@@ -115,8 +118,8 @@ FOREVER = np.full(3, np.inf)
 def test_accelerometers_and_drifts_are_held_against_their_limits_with_their_uncertainty(
     rule: DecisionRule, passes: bool
 ) -> None:
-    limits = replace(
-        LIMITS,
+    limits = Limits(
+        **{name: limit for name, limit in LIMITS if limit is not None},
         acceleration_scale_deviation=0.02,
         acceleration_scale_std=1e-3,
         acceleration_bias_m_s2=0.5,

@@ -12,9 +12,9 @@ from rich.console import Console
 from rig.analysis.comparison import Reference
 from rig.analysis.verdict import verdict, verification_checks
 from rig.analysis.verification import Verification, verify
+from rig.config.limits import Limits
 from rig.data.events import SweepStarted
 from rig.data.run_file import RunData
-from rig.data.settings import Limits
 from rig.errors import Fault
 from rig.estimation.arrays import Array
 from rig.observation.observed_run import observe_runs

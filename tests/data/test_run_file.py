@@ -19,6 +19,7 @@ from firmware_host.answers import BoardObservation, BoardSolution
 from firmware_host.samples import FIELD_SAMPLE_DTYPE, SAMPLE_DTYPE
 from rig.arm.motion import Sweep
 from rig.arm.state import ARM_STATE_DTYPE, ArmState
+from rig.config.limits import Limits
 from rig.data.events import (
     BoardNotObserved,
     BoardObserved,
@@ -31,7 +32,7 @@ from rig.data.events import (
     SweepStarted,
 )
 from rig.data.run_file import RecordedMagnetometer, RecordedSensor, RunRecorder, make_plain, read_run
-from rig.data.settings import Limits, ObservationThresholds, PlannedSweep, RunSettings
+from rig.data.settings import ObservationThresholds, PlannedSweep, RunSettings
 from rig.errors import Fault, Refused
 from support.paths import ROOT
 from support.results import VERIFIED
@@ -52,7 +53,7 @@ SETTINGS = RunSettings(
     procedure="six_observation",
     then_verify=False,
     observation=ObservationThresholds(0.001, 0.25, 20.0),
-    limits=Limits(0.3, 0.002, 0.1, 0.002, 100.0),
+    limits=Limits(scale_deviation=0.3, scale_std=0.002, bias_rad_s=0.1, bias_std_rad_s=0.002, condition=100.0),
     to_calibrate=("gyro",),
     reference=None,
     home_q_rad=(0.0, -1.5, 1.5, -1.5, -1.5, 0.0),

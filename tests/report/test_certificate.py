@@ -48,7 +48,18 @@ MARKUP = "<script>alert(1)</script>\"'><img src=x onerror=y>&amp;"
 # What a result's model holds to a few words, and times.
 FIXED = {
     *("schema", "verdict", "role", "kind", "distribution", "axis", "direction", "joint", "correction", "name", "by"),
-    *("unit", "model", "estimator", "started_utc", "solved_utc", "resumed_utc", "verified_utc", "status"),
+    *(
+        "quantity",
+        "parameter",
+        "unit",
+        "model",
+        "estimator",
+        "started_utc",
+        "solved_utc",
+        "resumed_utc",
+        "verified_utc",
+        "status",
+    ),
     *("from_utc", "to_utc", "mean_utc"),
     *("non_orthogonality_order", "covariance_order", "covariance_units"),
 }

@@ -11,6 +11,7 @@ from rich.console import Console
 from rig.analysis.outcome import Outcome, calibrated
 from rig.analysis.verdict import Check
 from rig.arm.kinematics import NOMINAL
+from rig.data.meaning import Meaning
 from rig.data.result_file import CheckEntry
 from rig.data.run_file import read_run
 from rig.report.document import document_of
@@ -37,7 +38,7 @@ def test_the_keys_stand_in_the_order_they_always_had(outcome: Outcome) -> None:
 
 
 def test_a_limit_that_was_not_set_is_not_written_as_a_number(outcome: Outcome) -> None:
-    unset = Check("gyro.verification_rms", 0.0, None, "rad/s")
+    unset = Check("gyro.verification_rms", 0.0, None, "rad/s", Meaning("conformity", "gyro", "rate"))
     document = json.loads(document_of(replace(outcome, checks=(*outcome.checks, unset))).text())
     assert document["checks"][-1] == {
         "name": "gyro.verification_rms",
@@ -45,6 +46,9 @@ def test_a_limit_that_was_not_set_is_not_written_as_a_number(outcome: Outcome) -
         "limit": None,
         "unit": "rad/s",
         "passed": False,
+        "kind": "conformity",
+        "sensor": "gyro",
+        "quantity": "rate",
     }
     assert document["verdict"] == "fail"
 

@@ -5,11 +5,12 @@ from collections.abc import Iterator
 from pathlib import Path
 
 from firmware_host.answers import BoardObservation
-from rig.analysis.verdict import Check
+from rig.analysis.verdict import Check, fitness
 from rig.arm.motion import Plan, Sweep, Transfer, travel
 from rig.arm.state import ArmReport, ArmState, Joints, RobotMode, RuntimeState, SafetyMode
 from rig.commands.configured import configured
 from rig.data.events import BoardNotObserved, BoardObserved
+from rig.data.meaning import Meaning
 from rig.page.rows import Look
 from rig.page.shown import About
 from rig.station.events import (
@@ -200,11 +201,11 @@ def judged(folder: Path, *, passed: bool) -> Iterator[RunEvent]:
     yield DocumentWritten(folder / "certificate.html")
     limit = 0.002 if passed else 0.0002
     for check in (
-        Check("gyro.scale_deviation", 0.17776, 0.3, "1", 0.00175),
-        Check("gyro.scale_std", 0.00088, limit, "1"),
-        Check("gyro.bias", 0.00977, 0.1, "rad/s", 0.00065),
-        Check("gyro.bias_std", 0.00033, 0.002, "rad/s"),
-        Check("gyro.condition", 1.62, 10.0, "1"),
+        Check("gyro.scale_deviation", 0.17776, 0.3, "1", Meaning("conformity", "gyro", "rate", "scale"), 0.00175),
+        fitness("gyro", "rate", "scale_std", 0.00088, limit),
+        Check("gyro.bias", 0.00977, 0.1, "rad/s", Meaning("conformity", "gyro", "rate", "bias"), 0.00065),
+        fitness("gyro", "rate", "bias_std", 0.00033, 0.002, unit="rad/s"),
+        fitness("gyro", "rate", "condition", 1.62, 10.0),
     ):
         yield Checked(check)
     yield VerdictReached(passed)

@@ -1,7 +1,6 @@
 """What a certificate holds, from a result and from what the laboratory says: texts and numbers, no layout."""
 
 import hashlib
-import re
 from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from datetime import date, datetime
@@ -17,11 +16,6 @@ from rig.data.result_file import CheckEntry, ProvenanceEntry, ResultDocument, Se
 from rig.data.result_types import ErrorEntry
 from rig.errors import Refused
 from rig.report.certificate.stated import Stated
-
-# The checks that hold a property of the item against a limit; the others ask whether the measurement is fit for use.
-CONFORMITY = re.compile(
-    r"\.(acceleration_)?(scale_deviation|bias|bias_drift|verification_rms|verification_mean|verification)$"
-)
 
 
 @dataclass(frozen=True, slots=True)
@@ -134,8 +128,9 @@ def certificate_of(
         if sensor.role == "calibrate"
     )
     verified = {name: found for name, found in result.verification.items() if name not in result.sensors}
-    conformity = tuple(check for check in result.checks if CONFORMITY.search(check.name))
-    fitness = tuple(check for check in result.checks if check not in conformity)
+    conformity, fitness = (
+        tuple(check for check in result.checks if check.means.kind == kind) for kind in ("conformity", "fitness")
+    )
     return Certificate(
         number=_number(result, stated, reversals),
         title=_title(result, gyroscopes),

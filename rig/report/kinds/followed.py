@@ -13,6 +13,7 @@ from typing import Protocol
 import numpy as np
 
 from rig.data.budget_entries import BudgetEntry
+from rig.data.meaning import Meaning
 from rig.data.quantity import Quantity
 from rig.data.result_file import ResultDocument
 from rig.data.result_types import Freedom
@@ -105,8 +106,8 @@ def scale_and_bias(
     mean = np.array([1 / 3, 1 / 3, 1 / 3, 0, 0, 0])
     values, combined = np.array([*entry.scale, *bias]), entry.covariance_combined
     factors = np.full(6, COVERAGE_FACTOR) if entry.budget is None else np.array(entry.budget.factors)
-    limits = {check.name: check.limit for check in document.checks}
-    scale_limit, bias_limit = (limits.get(f"{sensor}.{quantity.limits}{of}") for of in ("scale_deviation", "bias"))
+    limits = {check.means: check.limit for check in document.checks}
+    scale_limit, bias_limit = (limits.get(Meaning("conformity", sensor, quantity.name, of)) for of in ("scale", "bias"))
     rows: list[tuple[str, Array, str, float | None]] = [("k", mean, "1", None)]
     rows += [(f"k{axis}", np.eye(6)[i], "1", scale_limit) for i, axis in enumerate("xyz")]
     rows += [(f"b{axis}", np.eye(6)[3 + i], quantity.unit, bias_limit) for i, axis in enumerate("xyz")]

@@ -1,0 +1,123 @@
+"""The verdict's limits, a row each: its key, what it holds, in what unit, what its words are, and what needs it.
+
+One table for the section of a configuration, the settings that are recorded, the checks of the verdict, and all that is
+made of them.
+"""
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+from typing import Annotated, Literal
+
+from pydantic import BaseModel, ConfigDict, Field
+
+from rig.config.section import RATIO, Positive
+
+Kind = Literal["conformity", "fitness"]
+Parameter = Literal["scale", "bias", "bias_drift"]
+Need = Literal["verification", "accelerometer", "repeated attitudes", "bias drift"]
+
+
+@dataclass(frozen=True, slots=True)
+class Limit:
+    """What a limit holds of a sensor's `quantity`, by its name: `what` its check is called, and the unit of both.
+
+    One of "conformity" holds a property of the item, one of "fitness" asks whether the measurement is fit for use.
+    `parameter` is that of the calibration that is held, None where it is none. `needed_by` is what cannot pass without
+    the limit; None where every configuration states it.
+    """
+
+    quantity: str
+    what: str
+    unit: str
+    kind: Kind
+    parameter: Parameter | None = None
+    needed_by: Need | None = None
+
+
+class Limits(BaseModel):
+    """The verdict's limits; None where what needs one was not asked for."""
+
+    # What a later version limits too is ignored when a recording is read.
+    model_config = ConfigDict(frozen=True, allow_inf_nan=False)
+
+    scale_deviation: Annotated[Positive, Limit("rate", "scale_deviation", "1", "conformity", "scale")] = Field(
+        description="of a scale factor from 1, |k − 1|", json_schema_extra=RATIO
+    )
+    scale_std: Annotated[Positive, Limit("rate", "scale_std", "1", "fitness", "scale")] = Field(
+        description="standard deviation of a scale factor", json_schema_extra=RATIO
+    )
+    bias_rad_s: Annotated[Positive, Limit("rate", "bias", "rad/s", "conformity", "bias")] = Field(
+        description="magnitude of a bias"
+    )
+    bias_std_rad_s: Annotated[Positive, Limit("rate", "bias_std", "rad/s", "fitness", "bias")] = Field(
+        description="standard deviation of a bias"
+    )
+    condition: Annotated[Positive, Limit("rate", "condition", "1", "fitness")] = Field(
+        description="condition number of the equations: how well the sweeps tell the parameters apart",
+        json_schema_extra=RATIO,
+    )
+    verification_rms_rad_s: Annotated[
+        Positive | None, Limit("rate", "verification_rms", "rad/s", "conformity", needed_by="verification")
+    ] = Field(
+        default=None,
+        description="RMS of the calibrated reading less the reference's, sample by sample; a verification needs it",
+    )
+    verification_mean_rad_s: Annotated[
+        Positive | None, Limit("rate", "verification_mean", "rad/s", "conformity", needed_by="verification")
+    ] = Field(
+        default=None,
+        description="the same difference averaged over each revolution, and the reference's from the arm; a "
+        "verification needs it",
+    )
+    acceleration_scale_deviation: Annotated[
+        Positive | None, Limit("acceleration", "scale_deviation", "1", "conformity", "scale", "accelerometer")
+    ] = Field(
+        default=None,
+        description="of an accelerometer's scale factor from 1; a calibration of one needs it",
+        json_schema_extra=RATIO,
+    )
+    acceleration_scale_std: Annotated[
+        Positive | None, Limit("acceleration", "scale_std", "1", "fitness", "scale", "accelerometer")
+    ] = Field(
+        default=None, description="standard deviation of such a scale factor; needed too", json_schema_extra=RATIO
+    )
+    acceleration_bias_m_s2: Annotated[
+        Positive | None, Limit("acceleration", "bias", "m/s²", "conformity", "bias", "accelerometer")
+    ] = Field(default=None, description="magnitude of an accelerometer's bias; needed too")
+    acceleration_bias_std_m_s2: Annotated[
+        Positive | None, Limit("acceleration", "bias_std", "m/s²", "fitness", "bias", "accelerometer")
+    ] = Field(default=None, description="standard deviation of such a bias; needed too")
+    acceleration_verification_m_s2: Annotated[
+        Positive | None, Limit("acceleration", "verification", "m/s²", "conformity", needed_by="repeated attitudes")
+    ] = Field(
+        default=None,
+        description="how far the size of a calibrated acceleration at rest may be from gravity's; needed with repeats",
+    )
+    bias_drift_rad_s: Annotated[
+        Positive | None, Limit("rate", "bias_drift", "rad/s", "conformity", "bias_drift", "bias drift")
+    ] = Field(default=None, description="change of a gyroscope's bias between any two repeats; `bias_drift` needs it")
+    acceleration_bias_drift_m_s2: Annotated[
+        Positive | None, Limit("acceleration", "bias_drift", "m/s²", "conformity", "bias_drift", "bias drift")
+    ] = Field(
+        default=None, description="change of an accelerometer's bias between any two repeats; `bias_drift` needs it"
+    )
+
+    def of(self, quantity: str, what: str) -> tuple[Limit, float | None]:
+        """The row of that name, and the limit itself, None where none is set. Raises KeyError without such a row."""
+        key = _KEYS[quantity, what]
+        limit: float | None = getattr(self, key)
+        return LIMITS[key], limit
+
+    def lacking(self, need: Need) -> list[str]:
+        """The paths in a configuration of the limits that are needed so and not set."""
+        return [f"limits.{key}" for key, row in LIMITS.items() if row.needed_by == need and getattr(self, key) is None]
+
+
+LIMITS: Mapping[str, Limit] = {
+    key: row for key, field in Limits.model_fields.items() for row in field.metadata if isinstance(row, Limit)
+}
+_KEYS: Mapping[tuple[str, str], str] = {(row.quantity, row.what): key for key, row in LIMITS.items()}
+
+
+class LimitsSection(Limits, extra="forbid"):
+    """The verdict's limits, for every sensor that is calibrated. There are no usual ones: state them all."""
