@@ -311,6 +311,18 @@ def test_a_sensor_s_drift_and_recall_come_out_of_its_history(history: History) -
     assert found["bx"].recall is None  # the result states no limit for it
 
 
+def test_a_limit_stands_beside_its_parameter_whatever_its_check_is_called(history: History) -> None:
+    entered = finished(0)
+    (scale,) = (check for check in entered.document.checks if check.means.parameter == "scale")
+    said = {"name": "gyro.k_minus_1", "kind": "conformity", "sensor": "gyro", "quantity": "rate", "parameter": "scale"}
+    beyond = scale.model_copy(update={**said, "limit": 0.005, "passed": False})
+    document = entered.document.model_copy(update={"checks": (beyond,)})
+    history.enter(replace(entered, document=document, text=compact(json.loads(document.text()))))
+    (found,) = history.calibrations()
+    assert found.fit, "a value beyond its limit is a result like any other"
+    assert (found.parameters["kx"].max_deviation, found.parameters["bx"].max_deviation) == (0.005, None)
+
+
 def test_check_standards_chart_their_rig_and_shared_sensors_tell_rigs_apart(history: History) -> None:
     """Two sensors watch rig A, whose clock jumps by 300 ppm; B calibrates them too, 40 ppm off."""
     scatter = [((7 * i) % 11 - 5) * 8e-6 for i in range(24)]

@@ -48,19 +48,8 @@ MARKUP = "<script>alert(1)</script>\"'><img src=x onerror=y>&amp;"
 # What a result's model holds to a few words, and times.
 FIXED = {
     *("schema", "verdict", "role", "kind", "distribution", "axis", "direction", "joint", "correction", "name", "by"),
-    *(
-        "quantity",
-        "parameter",
-        "unit",
-        "model",
-        "estimator",
-        "started_utc",
-        "solved_utc",
-        "resumed_utc",
-        "verified_utc",
-        "status",
-    ),
-    *("from_utc", "to_utc", "mean_utc"),
+    *("unit", "model", "estimator", "started_utc", "solved_utc", "resumed_utc", "verified_utc", "status"),
+    *("from_utc", "to_utc", "mean_utc", "quantity", "parameter"),
     *("non_orthogonality_order", "covariance_order", "covariance_units"),
 }
 
@@ -249,6 +238,16 @@ def test_a_value_beyond_its_limit_is_a_statement_and_no_spoilt_measurement() -> 
     found = certificate(result().model_copy(update={"checks": (*result().checks, beyond)}))
     assert not found.marks
     assert re.search(r"gyro\.bias 0\.200 0\.010 0\.1 rad/s – fail", read(found).text)
+
+
+def test_a_check_of_any_name_stands_where_it_says_it_belongs() -> None:
+    of_item = CheckEntry(name="gyro.offset", value=0.2, limit=0.1, unit="rad/s", passed=False, kind="conformity")
+    of_measurement = CheckEntry(name="gyro.bias", value=0.2, limit=0.1, unit="rad/s", passed=False, kind="fitness")
+    for failed, fit in ((of_item, True), (of_measurement, False)):
+        found = certificate(result().model_copy(update={"checks": (*result().checks, failed)}))
+        assert (failed in found.conformity, failed in found.fitness) == (fit, not fit)
+        assert any("Not valid" in mark for mark in found.marks) is not fit
+        assert ("gyro.offset 0.2 not stated 0.1 rad/s – fail" in read(found).text) is fit
 
 
 @pytest.mark.parametrize(("guard", "words"), [(0.0, "simple acceptance"), (0.01, "guard band of w = U")])

@@ -111,7 +111,7 @@ def test_a_finished_run_repeats_the_sweep_that_its_verdict_named(tmp_path: Path)
         samples["counts"][(time_s > turn.start_s) & (time_s < turn.end_s), 0] += 300
         file["samples/gyro"][:] = samples
     result = json.loads((out / "result.json").read_text(encoding="utf-8"))
-    named = {**result["checks"][-1], "name": "gyro.disturbed_sweep.4", "passed": False}
+    named = {**result["checks"][-1], "name": "gyro.disturbed_sweep.4", "sweep": 4, "passed": False}
     (out / "result.json").write_text(json.dumps({**result, "verdict": "fail", "checks": [*result["checks"], named]}))
 
     resumed = rig("resume", out)

@@ -8,7 +8,14 @@ from pathlib import Path
 
 from rig.data.earth_rate_entries import EarthRateEntry
 from rig.data.magnetometer_entries import MagnetometerEntry
-from rig.data.result_file import AverageEntry, ComparisonEntry, ObservationEntry, ResultDocument, read_result
+from rig.data.result_file import (
+    AverageEntry,
+    CheckEntry,
+    ComparisonEntry,
+    ObservationEntry,
+    ResultDocument,
+    read_result,
+)
 from rig.report.kinds.followed import Parameter
 from rig.report.kinds.registry import followed
 
@@ -22,13 +29,19 @@ def differences(expected: ResultDocument, found: ResultDocument) -> list[str]:
     A value is held by its standard uncertainty, an uncertainty by its own size, a check by its limit, a count as it is.
     """
     told = _moved(_numbers(expected), _numbers(found))
-    passed = {check.name: check.passed for check in found.checks}
+    said = {check.name: _said(check) for check in found.checks}
     told += [
-        f"check {check.name} passed: {check.passed}, now {passed.get(check.name)}"
+        f"check {check.name}: {_said(check)}, now {said.get(check.name)}"
         for check in expected.checks
-        if passed.get(check.name) is not check.passed
+        if said.get(check.name) != _said(check)
     ]
     return told if expected.verdict == found.verdict else [*told, f"verdict: {expected.verdict}, now {found.verdict}"]
+
+
+def _said(check: CheckEntry) -> tuple[object, ...]:
+    """Whether it passed, and what it is of: one of fitness may say more of that than it did."""
+    means = check.means
+    return check.passed, means if means.kind == "conformity" else (means.kind, means.sweep)
 
 
 def solved_otherwise(run: Path, printed: str) -> list[str]:
