@@ -114,13 +114,13 @@ def fitness(
     quantity: str,
     what: str,
     value: float | None,
-    limit: float,
+    limit: float | None,
     *,
     unit: str = "1",
     parameter: Parameter | None = None,
     sweep: int | None = None,
 ) -> Check:
-    """A check whether the measurement of a sensor's quantity is fit for use, by a limit that no configuration sets."""
+    """A check whether the measurement of a sensor's quantity is fit for use, by a `limit` without a row of its own."""
     means = Meaning("fitness", sensor, quantity, parameter, sweep)
     return Check(_name(sensor, quantity, what), value, limit, unit, means)
 
@@ -157,9 +157,11 @@ def verification_checks(sensor: str, verification: Verification | None, limits: 
         mean = _largest(np.array([turn.error_rad_s for turn in verification.after.revolutions]))
         known = verification.reference_error_rad_s
     held = _Held(sensor, "rate", limits)
-    of_means = held.check("verification_mean", mean)
-    means, name = Meaning("fitness", sensor, "rate"), _name(sensor, "rate", "verification_reference")
-    return held.check("verification_rms", rms), of_means, replace(of_means, name=name, value=known, means=means)
+    return (
+        held.check("verification_rms", rms),
+        held.check("verification_mean", mean),
+        fitness(sensor, "rate", "verification_reference", known, limits.verification_mean_rad_s, unit="rad/s"),
+    )
 
 
 def clock_checks(clocks: Sequence[ClockCheck]) -> tuple[Check, ...]:
