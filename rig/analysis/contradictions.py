@@ -57,7 +57,7 @@ def contradictions(
     """Of these sensors' results; none in recordings of before there was a site, which keep the verdicts they had.
 
     `surroundings` are those of the recordings, `false_alarms` is the share of undamaged runs that may fail. A sweep
-    that is named is part of the name, `gyro.disturbed_sweep.3`, and the check's.
+    that is named is part of the name, `gyro.disturbed_sweep.3`, and of what the check means.
     """
     settings = recordings[0].run.settings
     if settings.site is None:
