@@ -15,8 +15,8 @@ from rig.data.result_types import ErrorEntry
 from rig.report.accelerometer_entry import accelerometer_entry
 from rig.report.axes import skew_known, triple
 from rig.report.budget_table import assumed_lines
+from rig.report.c_functions import accelerometer_lines
 from rig.report.expanded import expanded, factor_words
-from rig.report.header import accelerometer_lines
 from rig.report.kinds.followed import Followed
 from rig.report.kinds.kind import Found, ResultKind, Shown
 from rig.report.kinds.triad import beside, followed_of, shown_of, tables

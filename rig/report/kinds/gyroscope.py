@@ -11,9 +11,9 @@ from rig.data.quantity import RATE
 from rig.data.result_file import BoardEntry, ResultDocument, SensorEntry, VectorEntry
 from rig.data.result_types import ErrorEntry
 from rig.report.axes import decimals, skew_known, triple
+from rig.report.c_functions import gyroscope_lines
 from rig.report.earth_rate import earth_rate_lines
 from rig.report.expanded import flat
-from rig.report.header import gyroscope_lines
 from rig.report.kinds.followed import ANGLES, SENSITIVITIES, Followed, known, parameters, scale_and_bias
 from rig.report.kinds.kind import Found, ResultKind, Shown, Without
 from rig.report.kinds.triad import shown_of, tables

@@ -14,7 +14,7 @@ from rig.data.result_types import ErrorEntry
 from rig.errors import Fault
 from rig.report.axes import skew_known, triple
 from rig.report.budget_table import assumed_lines
-from rig.report.header import magnetometer_lines
+from rig.report.c_functions import magnetometer_lines
 from rig.report.kinds.followed import Followed
 from rig.report.kinds.kind import Found, ResultKind, Shown
 from rig.report.kinds.triad import beside, followed_of, shown_of, tables

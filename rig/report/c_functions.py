@@ -1,0 +1,128 @@
+"""C source that corrects readings, for each kind of sensor."""
+
+import re
+from collections.abc import Iterable, Iterator, Mapping, Sequence
+from typing import Any
+
+import numpy as np
+
+from rig.data.accelerometer_entries import AccelerometerEntry
+from rig.data.magnetometer_entries import MagnetometerEntry
+from rig.data.result_file import SensorEntry
+from rig.errors.quoting import printable
+from rig.estimation.arrays import Array
+from rig.report.kinds.kind import Found
+
+
+def gyroscope_lines(found: Found[SensorEntry], sensed: Mapping[str, Array]) -> Iterator[str]:
+    """C of a gyroscope that was calibrated; none of a reference."""
+    if found.entry.role != "calibrate":
+        return
+    prefix, sensitivity = _prefix(found.sensor), sensed.get(found.sensor)
+    yield from _correction(prefix, found.entry)
+    if sensitivity is not None:
+        yield from _without_gravity(prefix, sensitivity)
+
+
+def accelerometer_lines(found: Found[AccelerometerEntry], _: Mapping[str, Array]) -> Iterator[str]:
+    """C of an accelerometer."""
+    entry = found.entry
+    axes = "its own axes" if entry.alignment is None else "the gyroscope beside it"
+    left_out = "" if entry.second_order_s2_m is None else "\n * The second order that result.json has is left out."
+    about = f"{entry.part}, serial number {entry.serial_number}, at {entry.temperature_c:.1f} °C"
+    return _subtracting(found, entry.bias_m_s2, entry.correction_matrix, "force_m_s2", (
+        f"/* Accelerometer of {_comment(about)}: s = M (a - b), specific force: at rest it points up.",
+        f" * In the right-angled frame of {axes}, relative to gravity, {entry.gravity_m_s2:g} m/s^2.{left_out} */",
+    ))  # fmt: skip
+
+
+def magnetometer_lines(found: Found[MagnetometerEntry], _: Mapping[str, Array]) -> Iterator[str]:
+    """C of a magnetometer, as it was mounted."""
+    entry = found.entry
+    return _subtracting(found, entry.bias_t, entry.correction_matrix, "field_t", (
+        f"/* Magnetometer {_comment(f'{entry.part}, serial number {entry.serial_number}')}: B = M (m - b), in tesla.",
+        f" * In the right-angled frame of its own axes, as mounted, relative to a field of {entry.field_t:g} T. */",
+    ))  # fmt: skip
+
+
+def _prefix(name: str) -> str:
+    """Of a sensor's names in C."""
+    return re.sub(r"^(?=[^a-z])", "sensor_", re.sub(r"[^a-z0-9]", "_", name.lower()))
+
+
+def _correction(prefix: str, sensor: SensorEntry) -> Iterator[str]:
+    about = f"{sensor.part}, serial number {sensor.serial_number}, at {sensor.temperature_c:.1f} °C"
+    whole = sensor.correction_matrix
+    yield from (
+        "",
+        f"/* {_comment(about)}. */",
+        f"static const float {prefix}_scale[3] = {_array(sensor.scale)};",
+        f"static const float {prefix}_bias_rad_s[3] = {_array(sensor.bias_rad_s)};",
+        f"static const float {prefix}_matrix[3][3] = {_rows(np.diag(sensor.scale) if whole is None else whole)};",
+        "",
+        f"static inline void {prefix}_calibrate(const float reading_rad_s[3], float rate_rad_s[3])",
+        "{",
+        "    for (int i = 0; i < 3; i++) {",
+        "        rate_rad_s[i] = 0.0f;",
+        "        for (int j = 0; j < 3; j++)",
+        f"            rate_rad_s[i] += {prefix}_matrix[i][j] * (reading_rad_s[j] + {prefix}_bias_rad_s[j]);",
+        "    }",
+        "}",
+    )
+
+
+def _without_gravity(prefix: str, sensitivity: Array) -> Iterator[str]:
+    yield from (
+        "",
+        "/* The same without what gravity adds to a reading: gravity_m_s2 points down, in the frame of the corrected",
+        " * rates; it is an accelerometer's reading at rest with the other sign. */",
+        f"static const float {prefix}_g_sensitivity_rad_s_per_m_s2[3][3] = {_rows(sensitivity)};",
+        "",
+        f"static inline void {prefix}_calibrate_with_gravity(",
+        "    const float reading_rad_s[3], const float gravity_m_s2[3], float rate_rad_s[3])",
+        "{",
+        "    float level_rad_s[3];",
+        "    for (int i = 0; i < 3; i++) {",
+        "        level_rad_s[i] = reading_rad_s[i];",
+        "        for (int j = 0; j < 3; j++)",
+        f"            level_rad_s[i] -= {prefix}_g_sensitivity_rad_s_per_m_s2[i][j] * gravity_m_s2[j];",
+        "    }",
+        f"    {prefix}_calibrate(level_rad_s, rate_rad_s);",
+        "}",
+    )
+
+
+def _subtracting(
+    found: Found[Any], bias: Sequence[float], matrix: Sequence[Sequence[float]], true: str, about: Sequence[str]
+) -> Iterator[str]:
+    """Bias, matrix and function of a sensor whose bias is part of its reading; `true` is what the function finds."""
+    of, unit = f"{_prefix(found.sensor)}_{found.quantity}", found.quantity.suffix
+    yield from (
+        "",
+        *about,
+        f"static const float {of}_bias_{unit}[3] = {_array(bias)};",
+        f"static const float {of}_matrix[3][3] = {_rows(matrix)};",
+        "",
+        f"static inline void {_prefix(found.sensor)}_calibrate_{found.quantity}("
+        f"const float reading_{unit}[3], float {true}[3])",
+        "{",
+        "    for (int i = 0; i < 3; i++) {",
+        f"        {true}[i] = 0.0f;",
+        "        for (int j = 0; j < 3; j++)",
+        f"            {true}[i] += {of}_matrix[i][j] * (reading_{unit}[j] - {of}_bias_{unit}[j]);",
+        "    }",
+        "}",
+    )
+
+
+def _rows(matrix: Iterable[Iterable[float]]) -> str:
+    return "{" + ", ".join(_array(row) for row in matrix) + "}"
+
+
+def _array(values: Iterable[float]) -> str:
+    return "{" + ", ".join(f"{value:.9e}f" for value in values) + "}"
+
+
+def _comment(text: str) -> str:
+    """What a serial number may hold must not end the comment it stands in."""
+    return printable(" ".join(text.split())).replace("*/", "* /").replace("/*", "/ *")
