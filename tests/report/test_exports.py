@@ -1,6 +1,7 @@
 """Other programs read what is exported, with the values, units and signs of the result."""
 
 import json
+from collections.abc import Callable
 from dataclasses import replace
 from pathlib import Path
 from typing import Any
@@ -11,6 +12,7 @@ import yaml
 
 from firmware_host.samples import IMU_SAMPLE_DTYPE
 from rig.cli import main
+from rig.data.magnetometer_entries import MagnetometerEntry
 from rig.data.result_file import ResultDocument, VectorEntry, read_result
 from rig.errors import Refused
 from rig.estimation.arrays import Array
@@ -23,6 +25,7 @@ from rig.report.exports.kalibr import kalibr_files, triangular
 from rig.report.exports.names import plain_names
 from rig.report.exports.parameters import exported
 from support.certified import accelerometer, result
+from support.frozen import RECORDINGS
 from support.paths import FIXTURES
 
 GRAVITY_M_S2 = 9.81
@@ -134,14 +137,57 @@ def test_autopilots_subtract_minus_b(sensed: ResultDocument) -> None:
     bias = sensed.sensors["gyro"].bias_rad_s
     px4, ardupilot = px4_files(sensed)["px4.params"], ardupilot_files(sensed)["ardupilot.param"]
     lines = [line.split("\t") for line in px4.splitlines() if not line.startswith("#")]
-    assert [line[2] for line in lines] == ["CAL_GYRO0_XOFF", "CAL_GYRO0_YOFF", "CAL_GYRO0_ZOFF"]
-    assert [float(line[3]) for line in lines] == [-b for b in bias]
+    assert [line[2] for line in lines[:3]] == ["CAL_GYRO0_XOFF", "CAL_GYRO0_YOFF", "CAL_GYRO0_ZOFF"]
+    assert [float(line[3]) for line in lines[:3]] == [-b for b in bias]
     pairs = dict(line.split(",") for line in ardupilot.splitlines() if not line.startswith("#"))
     assert [float(pairs[f"INS_GYROFFS_{axis}"]) for axis in "XYZ"] == [-b for b in bias]
     assert pairs["INS_GYR_CAL"] == "0"
     assert float(pairs["INS_GYR1_CALTEMP"]) == sensed.sensors["gyro"].temperature_c
     for text in (px4, ardupilot):
         assert "Lost: scale factors" in text and "rad/s" in text
+
+
+def test_autopilots_correct_accelerometers_as_the_result_does(sensed: ResultDocument) -> None:
+    found, reading = sensed.accelerometers["gyro"], np.array([0.3, -9.7, 1.1])
+    px4, ardupilot = parameters_of(sensed)
+    for offset, scale in ((px4("CAL_ACC0_{}OFF"), px4("CAL_ACC0_{}SCALE")),
+                          (ardupilot("INS_ACCOFFS_{}"), ardupilot("INS_ACCSCAL_{}"))):  # fmt: skip
+        np.testing.assert_allclose((reading - offset) * scale, (reading - found.bias_m_s2) * found.scale)
+
+
+def test_autopilots_correct_a_magnetometer_to_the_size_that_the_result_makes_it() -> None:
+    document = read_result(RECORDINGS / "rig.settings-6" / "magnetometer")
+    ((_, found),) = document.magnetometers.items()
+    assert isinstance(found, MagnetometerEntry)
+    px4, ardupilot = parameters_of(document)
+    reading_t = np.array([31e-6, -12e-6, 38e-6])
+    right = np.array(found.correction_matrix) @ (reading_t - found.bias_t)
+    gauss = ellipsoid(px4("CAL_MAG0_{}SCALE"), px4("CAL_MAG0_{}ODIAG")) @ (reading_t / 1e-4 - px4("CAL_MAG0_{}OFF"))
+    milli = ellipsoid(ardupilot("COMPASS_DIA_{}"), ardupilot("COMPASS_ODI_{}"))
+    milli = milli @ (reading_t / 1e-7 + ardupilot("COMPASS_OFS_{}"))
+    for field_t in (1e-4 * gauss, 1e-7 * milli):
+        assert np.linalg.norm(field_t) == pytest.approx(np.linalg.norm(right))
+        assert np.linalg.norm(field_t - right) < 0.02 * np.linalg.norm(right)  # it is turned by what axes lean
+
+
+def parameters_of(document: ResultDocument) -> tuple[Callable[[str], Array], Callable[[str], Array]]:
+    """What the files of PX4 and ArduPilot say: three values by the name with `{}` for the axis."""
+    px4, ardupilot = px4_files(document)["px4.params"], ardupilot_files(document)["ardupilot.param"]
+    found = [
+        {line.split("\t")[2]: float(line.split("\t")[3]) for line in px4.splitlines() if line[0] != "#"},
+        {name: float(value) for name, value in (line.split(",") for line in ardupilot.splitlines() if line[0] != "#")},
+    ]
+
+    def of(said: dict[str, float]) -> Callable[[str], Array]:
+        return lambda name: np.array([said[name.format(axis)] for axis in "XYZ"])
+
+    return of(found[0]), of(found[1])
+
+
+def ellipsoid(diagonal: Array, beside: Array) -> Array:
+    """As both autopilots put it together."""
+    (xx, yy, zz), (xy, xz, yz) = diagonal, beside
+    return np.array([[xx, xy, xz], [xy, yy, yz], [xz, yz, zz]])
 
 
 def test_a_second_gyroscope_has_parameters_of_its_own(sensed: ResultDocument) -> None:

@@ -1,50 +1,142 @@
-"""Parameter files of PX4 and ArduPilot: both know a gyroscope's offset and nothing else of its calibration.
+"""Parameter files of PX4 and ArduPilot: what each of them corrects of gyroscopes, accelerometers and magnetometers.
 
-PX4 (Gyroscope.hpp, Correct): R (data − thermal − offset). ArduPilot (AP_InertialSensor): INS_GYROFFS_X, …, replaced at
-each boot unless INS_GYR_CAL is 0. Neither has a scale factor.
+PX4 (src/lib/sensor_calibration): gyroscopes data − offset, accelerometers (data − offset) scale, magnetometers
+S (data − offset), S symmetric, in gauss. ArduPilot (AP_InertialSensor_Backend, AP_Compass): the same, but that offsets
+of a compass are added and in milligauss. Offsets of gyroscopes, INS_GYROFFS_X, …, are replaced at each boot unless
+INS_GYR_CAL is 0. Neither has a scale factor of a gyroscope.
 """
 
-from collections.abc import Iterator, Mapping
+from collections.abc import Callable, Iterable, Iterator, Mapping
+from dataclasses import dataclass
 
-from rig.data.result_file import ResultDocument
-from rig.report.exports.parameters import Exported, comments, exported
+import numpy as np
 
+from rig.data.accelerometer_entries import AccelerometerEntry
+from rig.data.magnetometer_entries import MagnetometerEntry
+from rig.data.result_file import ResultDocument, SensorEntry
+from rig.errors import Refused
+from rig.estimation.arrays import Array
+from rig.report.exports.parameters import origin
+
+GAUSS_T, MILLIGAUSS_T = 1e-4, 1e-7
 PX4_FLOAT = 9  # MAV_PARAM_TYPE_REAL32
-HEADING = "# Offsets in rad/s, in each sensor's own axes: rate = reading - offset, offset = -b at zero gravity."
-LOST = "Lost: scale factors, axes, g-sensitivity, accelerometer, uncertainties; there is no parameter for them."
+HEADING = (
+    "# Offsets in each sensor's own axes. Gyroscopes, rad/s: rate = reading - offset, offset = -b at zero gravity.",
+    "# Accelerometers, m/s^2: (reading - offset) * scale. Magnetometers: a symmetric matrix times what is left,",
+    "# in the right-angled axes in which it is symmetric.",
+    "# Lost: scale factors and axes of gyroscopes, axes of accelerometers, g-sensitivity, second order, uncertainties;",
+    "# there is no parameter for them.",
+)
+AXES = "XYZ"
+Parameters = Iterator[tuple[str, float]]
+
+
+@dataclass(frozen=True, slots=True)
+class Autopilot:
+    """How one calls the parameters of its sensor of that number, the first of which is 0."""
+
+    gyroscope: Callable[[int, SensorEntry], Parameters]
+    accelerometer: Callable[[int, AccelerometerEntry], Parameters]
+    magnetometer: Callable[[int, MagnetometerEntry], Parameters]
+
+    def lines(self, result: ResultDocument, form: Callable[[str, float], str]) -> Iterator[str]:
+        """A line for each parameter, and comments whose it is. Raises Refused `nothing_to_export`."""
+        gyroscopes = [(name, each) for name, each in result.sensors.items() if each.role == "calibrate"]
+        fields = [(name, each) for name, each in result.magnetometers.items() if isinstance(each, MagnetometerEntry)]
+        if not (gyroscopes or result.accelerometers or fields):
+            raise Refused("nothing_to_export", "the run calibrated no sensor", "Give a run that calibrates one")
+        sections: list[tuple[Iterator[str], Parameters]] = [
+            *((origin(result, name, g, g.temperature_c), self.gyroscope(i, g))
+              for i, (name, g) in enumerate(gyroscopes)),
+            *((origin(result, name, a, a.temperature_c), self.accelerometer(i, a))
+              for i, (name, a) in enumerate(result.accelerometers.items())),
+            *((origin(result, name, m, None), self.magnetometer(i, m)) for i, (name, m) in enumerate(fields)),
+        ]  # fmt: skip
+        for said, parameters in sections:
+            yield from (f"# {line}" for line in said)
+            yield from (form(name, value) for name, value in parameters)
 
 
 def px4_files(result: ResultDocument) -> Mapping[str, str]:
     """`px4.params`, as QGroundControl loads it: vehicle, component, name, value, type, between tabs."""
     lines = [
-        HEADING,
-        f"# {LOST}",
+        *HEADING,
+        "# Lost too: CAL_GYROn_ID, CAL_ACCn_ID, CAL_MAGn_ID, which only the vehicle knows; PX4 heeds what has its",
+        "# sensor's ID. Magnetic fields are in gauss.",
+        *PX4.lines(result, lambda name, value: f"1\t1\t{name}\t{value!r}\t{PX4_FLOAT}"),
     ]
-    lines.append(
-        "# Lost too: CAL_GYROn_ID, which only the vehicle knows; PX4 heeds an offset whose ID is its sensor's."
-    )
-    for index, each in enumerate(exported(result)):
-        lines += _commented(result, each)
-        for axis, offset in zip("XYZ", each.offset_rad_s.tolist(), strict=True):
-            lines.append(f"1\t1\tCAL_GYRO{index}_{axis}OFF\t{offset!r}\t{PX4_FLOAT}")
     return {"px4.params": "\n".join(lines) + "\n"}
 
 
 def ardupilot_files(result: ResultDocument) -> Mapping[str, str]:
     """`ardupilot.param`: name, value."""
     lines = [
-        HEADING,
-        f"# {LOST}",
+        *HEADING,
+        "# Magnetic fields are in milligauss, and a compass' offset is added.",
+        "# Without INS_GYR_CAL 0 ArduPilot finds offsets of its own at each boot.",
+        "INS_GYR_CAL,0",
+        *ARDUPILOT.lines(result, lambda name, value: f"{name},{value!r}"),
     ]
-    lines += ["# Without INS_GYR_CAL 0 ArduPilot finds offsets of its own at each boot.", "INS_GYR_CAL,0"]
-    for index, each in enumerate(exported(result), start=1):
-        lines += _commented(result, each)
-        name = "INS_GYROFFS" if index == 1 else f"INS_GYR{index}OFFS"
-        for axis, offset in zip("XYZ", each.offset_rad_s.tolist(), strict=True):
-            lines.append(f"{name}_{axis},{offset!r}")
-        lines.append(f"INS_GYR{index}_CALTEMP,{each.temperature_c!r}")
     return {"ardupilot.param": "\n".join(lines) + "\n"}
 
 
-def _commented(result: ResultDocument, each: Exported) -> Iterator[str]:
-    yield from (f"# {line}" for line in comments(result, each))
+def symmetric(matrix: Array) -> Array:
+    """(3, 3) symmetric P of matrix = R P with a rotation R: it brings a reading to the same size as the matrix does."""
+    squared, vectors = np.linalg.eigh(matrix.T @ matrix)
+    found: Array = vectors @ np.diag(np.sqrt(squared)) @ vectors.T
+    return found
+
+
+def _each(form: str, values: Iterable[float]) -> Parameters:
+    """A parameter for each axis, whose letter stands at `{}`."""
+    for axis, value in zip(AXES, values, strict=True):
+        yield form.format(axis), float(value)
+
+
+def _ellipsoid(found: MagnetometerEntry) -> tuple[Array, Array]:
+    """(3,) the diagonal and (3,) what is beside it: xy, xz, yz."""
+    matrix = symmetric(np.array(found.correction_matrix))
+    return np.diag(matrix), matrix[[0, 0, 1], [1, 2, 2]]
+
+
+def _px4_gyroscope(number: int, found: SensorEntry) -> Parameters:
+    yield from _each(f"CAL_GYRO{number}_{{}}OFF", np.negative(found.bias_rad_s))
+
+
+def _px4_accelerometer(number: int, found: AccelerometerEntry) -> Parameters:
+    yield from _each(f"CAL_ACC{number}_{{}}OFF", found.bias_m_s2)
+    yield from _each(f"CAL_ACC{number}_{{}}SCALE", found.scale)
+
+
+def _px4_magnetometer(number: int, found: MagnetometerEntry) -> Parameters:
+    diagonal, beside = _ellipsoid(found)
+    yield from _each(f"CAL_MAG{number}_{{}}OFF", np.divide(found.bias_t, GAUSS_T))
+    yield from _each(f"CAL_MAG{number}_{{}}SCALE", diagonal)
+    yield from _each(f"CAL_MAG{number}_{{}}ODIAG", beside)
+
+
+def _ardupilot_gyroscope(number: int, found: SensorEntry) -> Parameters:
+    name = f"INS_GYR{number + 1}OFFS" if number else "INS_GYROFFS"
+    yield from _each(f"{name}_{{}}", np.negative(found.bias_rad_s))
+    yield f"INS_GYR{number + 1}_CALTEMP", found.temperature_c
+
+
+def _ardupilot_accelerometer(number: int, found: AccelerometerEntry) -> Parameters:
+    yield from _each(f"INS_ACC{_nth(number)}OFFS_{{}}", found.bias_m_s2)
+    yield from _each(f"INS_ACC{_nth(number)}SCAL_{{}}", found.scale)
+
+
+def _ardupilot_magnetometer(number: int, found: MagnetometerEntry) -> Parameters:
+    diagonal, beside = _ellipsoid(found)
+    yield from _each(f"COMPASS_OFS{_nth(number)}_{{}}", np.divide(found.bias_t, -MILLIGAUSS_T))
+    yield from _each(f"COMPASS_DIA{_nth(number)}_{{}}", diagonal)
+    yield from _each(f"COMPASS_ODI{_nth(number)}_{{}}", beside)
+
+
+def _nth(number: int) -> str:
+    """The first has no number."""
+    return str(number + 1) if number else ""
+
+
+PX4 = Autopilot(_px4_gyroscope, _px4_accelerometer, _px4_magnetometer)
+ARDUPILOT = Autopilot(_ardupilot_gyroscope, _ardupilot_accelerometer, _ardupilot_magnetometer)

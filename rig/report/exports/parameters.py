@@ -10,6 +10,7 @@ Without a solution of the vector model F = K⁻¹ and no g-sensitivity.
 
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
+from typing import Protocol
 
 import numpy as np
 
@@ -18,6 +19,15 @@ from rig.data.result_file import ResultDocument, SensorEntry, VectorEntry
 from rig.errors import Refused
 from rig.errors.quoting import printable
 from rig.estimation.arrays import Array
+
+
+class Named(Protocol):
+    """What is one of a maker's parts."""
+
+    @property
+    def part(self) -> str: ...
+    @property
+    def serial_number(self) -> str: ...
 
 
 @dataclass(frozen=True, slots=True)
@@ -54,11 +64,6 @@ class Exported:
     found_g_sensitivity: bool
     accelerometer: Triad | None
     second_order: bool
-
-    @property
-    def offset_rad_s(self) -> Array:
-        """(3,) what is subtracted of a reading: −b."""
-        return self.gyroscope.offset
 
 
 def exported(result: ResultDocument) -> tuple[Exported, ...]:
@@ -113,8 +118,11 @@ def _density(noises: Sequence[tuple[Sequence[float], int]], rate_hz: float) -> f
 
 def comments(result: ResultDocument, each: Exported) -> Iterator[str]:
     """Whose calibration it is and when it was found."""
-    made = result.provenance
-    yield printable(
-        f"{each.name}: {each.part} {each.serial_number}, at {each.temperature_c:.1f} degC, {made.started_utc}"
-    )
+    return origin(result, each.name, each, each.temperature_c)
+
+
+def origin(result: ResultDocument, name: str, found: Named, temperature_c: float | None) -> Iterator[str]:
+    """Whose calibration it is, when and how warm it was found, and by what."""
+    made, warm = result.provenance, "" if temperature_c is None else f" at {temperature_c:.1f} degC,"
+    yield printable(f"{name}: {found.part} {found.serial_number},{warm} {made.started_utc}")
     yield printable(f"by calibration-rig {made.rig_version}, configuration {made.configuration_sha256[:16]}")
