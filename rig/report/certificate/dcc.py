@@ -4,32 +4,23 @@ Numbers stand in full here; the page rounds them. What the laboratory has not st
 which PTB's rules want to be one of ISO 3166-1.
 """
 
-from collections.abc import Iterator, Mapping
-from types import MappingProxyType
+from collections.abc import Iterable, Iterator
 from typing import Final
 from xml.etree.ElementTree import Element, tostring
 
 from rig.config.sensor_catalogue import has_own_port
-from rig.data.accelerometer_entries import AccelerometerEntry
-from rig.data.result_file import CheckEntry, SensorEntry
+from rig.data.result_file import CheckEntry
 from rig.errors import Refused
 from rig.report.certificate.content import Certificate
-from rig.report.certificate.dcc_results import (
-    accelerometer,
-    bias_drift,
-    gyroscope,
-    magnetometer,
-    reversed_magnetometer,
-    verification,
-)
 from rig.report.certificate.tables import kind
 from rig.report.certificate.xml_parts import DCC as NAMESPACE
 from rig.report.certificate.xml_parts import UNSAID, XSI, Part, dcc, real, text, words
+from rig.report.kinds.kind import Measured, Without
+from rig.report.kinds.registry import KINDS
 
 DCC: Final = "certificate.xml"
 SCHEMA_VERSION = "3.2.1"
 DESCRIBED = "docs/method.md and docs/uncertainty.md of calibration-rig"
-NOT_MEASURED: Mapping[str, float | None] = MappingProxyType({})
 # PTB's rules want a condition to each quantity.
 UNKNOWN_AIR = dcc(
     "influenceConditions",
@@ -111,30 +102,28 @@ def _contact(name: str, who: str | None, address: str | None) -> Element:
     return dcc(name, text("name", who), dcc("location", text("further", address)))
 
 
+def _measured(c: Certificate) -> Iterator[Measured]:
+    """Everything that was measured, kind by kind."""
+    for each in KINDS:
+        if not isinstance(each.measured, Without):
+            yield from filter(None, (each.measured(found, c.reversals) for found in each.found(c.result)))
+
+
+def _keys(found: Iterable[Measured]) -> dict[tuple[str, str], str]:
+    """Of every item, by what it is and its name: items of a kind are numbered."""
+    keys: dict[tuple[str, str], str] = {}
+    for each in found:
+        of = each.item, each.sensor
+        keys.setdefault(of, f"{each.item}-{sum(item == each.item for item, _ in keys)}")
+    return keys
+
+
 def _items(c: Certificate) -> Iterator[Element]:
-    for i, each in enumerate(c.gyroscopes):
-        yield _item(f"gyroscope-{i}", f"gyroscope {each.name}", each.sensor.part, each.sensor.serial_number, c)
-    for i, (name, found) in enumerate(c.accelerometers.items()):
-        yield _item(f"accelerometer-{i}", f"accelerometer {name}", found.part, found.serial_number, c)
-    for i, (name, field) in enumerate(c.magnetometers.items()):
-        yield _item(f"magnetometer-{i}", f"magnetometer {name}", field.part, field.serial_number, c)
-    for i, name in enumerate(_watched(c)):
-        part = c.accelerometers[name].part if name in c.accelerometers else UNSAID
-        serial = c.provenance.sensor_serial_numbers.get(name, UNSAID)
-        yield _item(f"watched-{i}", f"gyroscope {name}", part, serial, c)
-
-
-def _watched(c: Certificate) -> list[str]:
-    """Sensors of which a drift alone is told, no calibration."""
-    return sorted({name for name, quantity, _ in c.drifts if _calibrated_as(c, name, quantity) is None})
-
-
-def _calibrated_as(c: Certificate, name: str, quantity: str) -> str | None:
-    """The item's key of what drifted, where it was calibrated."""
-    if quantity == "acceleration":
-        return f"accelerometer-{list(c.accelerometers).index(name)}" if name in c.accelerometers else None
-    names = [each.name for each in c.gyroscopes]
-    return f"gyroscope-{names.index(name)}" if name in names else None
+    measured = list(_measured(c))
+    for (item, sensor), key in _keys(measured).items():
+        found = next(each for each in measured if (each.item, each.sensor) == (item, sensor))
+        serial = found.serial_number or c.provenance.sensor_serial_numbers.get(sensor, UNSAID)
+        yield _item(key, f"{item} {sensor}", found.part or UNSAID, serial, c)
 
 
 def _item(key: str, name: str, part: str, serial: str, c: Certificate) -> Element:
@@ -197,64 +186,31 @@ def _conformity(check: CheckEntry, rule: str) -> Element:
 
 
 def _results(c: Certificate) -> Iterator[Element]:
-    for i, each in enumerate(c.gyroscopes):
-        yield _measured(c, f"gyroscope-{i}", f"calibration of gyroscope {each.name}", gyroscope(each),
-                        _while_turned(each.sensor))  # fmt: skip
-        if each.verification is not None:
-            results = verification(each.verification)
-            yield _measured(c, f"gyroscope-{i}", f"verification of gyroscope {each.name}", results)
-    for i, (name, found) in enumerate(c.accelerometers.items()):
-        yield _measured(c, f"accelerometer-{i}", f"calibration of accelerometer {name}", accelerometer(found),
-                        _of_readings(found))  # fmt: skip
-    for i, (name, field) in enumerate(c.magnetometers.items()):
-        turned = c.reversals.get(name)
-        own = () if turned is None else tuple(reversed_magnetometer(turned))
-        results = iter((*own, *magnetometer(field)))
-        yield _measured(c, f"magnetometer-{i}", f"calibration of magnetometer {name}", results)
-    watched = _watched(c)
-    for name, quantity, drift in c.drifts:
-        key = _calibrated_as(c, name, quantity) or f"watched-{watched.index(name)}"
-        yield _measured(c, key, f"bias by repeat of {name}, {quantity}", bias_drift(drift))
+    measured = list(_measured(c))
+    keys = _keys(measured)
+    return (_result(c, keys[each.item, each.sensor], each) for each in measured)
 
 
-def _while_turned(sensor: SensorEntry) -> dict[str, float | None]:
-    """How warm a gyroscope was, by what of it was read then: scale factors come from the sweeps alone."""
-    if sensor.scale_at is None or sensor.bias_at is None:
-        return {"": sensor.temperature_c}
-    return {" at the scale factors": sensor.scale_at.temperature_c, " at the biases": sensor.bias_at.temperature_c}
-
-
-def _of_readings(found: AccelerometerEntry) -> dict[str, float | None]:
-    """How warm an accelerometer was, scale factors and biases the same."""
-    return {"": found.temperature_c if found.found_at is None else found.found_at.temperature_c}
-
-
-def _measured(
-    c: Certificate,
-    item: str,
-    name: str,
-    results: Iterator[Element],
-    temperatures_c: Mapping[str, float | None] = NOT_MEASURED,
-) -> Element:
+def _result(c: Certificate, item: str, found: Measured) -> Element:
     site = c.stated.where
     conditions = [
         *(
             _condition(f"temperature of the item{of}, by its own thermometer", each, r"\degreecelsius")
-            for of, each in temperatures_c.items()
+            for of, each in found.temperatures_c.items()
         ),
         _condition("ambient temperature", site.ambient_temperature_c, r"\degreecelsius"),
         _condition("ambient relative humidity", site.ambient_humidity_percent, r"\percent"),
     ]
     return dcc(
         "measurementResult",
-        text("name", name),
+        text("name", found.name),
         dcc("usedMethods", dcc("usedMethod", text("name", "whole turns and attitudes at rest on a robot arm"),
                                text("description", f"{DESCRIBED}; {c.procedure}"),
                                words("norm", "JCGM 100:2008"))),
         dcc("usedSoftware", _software(c)),
         dcc("measuringEquipments", _arm(c)),
         dcc("influenceConditions", *conditions) if any(each is not None for each in conditions) else UNKNOWN_AIR,
-        dcc("results", *results),
+        dcc("results", *found.results),
         refId=item,
     )  # fmt: skip
 

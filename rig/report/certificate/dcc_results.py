@@ -10,7 +10,6 @@ from rig.data.earth_rate_entries import EarthRateEntry
 from rig.data.magnetometer_entries import MagnetometerEntry, ReversalEntry
 from rig.data.result_file import SensorEntry, VectorEntry, VerificationEntry
 from rig.data.result_types import ErrorEntry, Freedom, ToldFromEntry, WhenEntry
-from rig.report.certificate.content import Gyroscope
 from rig.report.certificate.coverage_words import coverage_sentence
 from rig.report.certificate.tables import ANGLES, AXES, JOINT_FACTOR
 from rig.report.certificate.xml_parts import dcc, real_list, text
@@ -29,9 +28,9 @@ JOINT_FACTOR_3 = 2.795
 SOLUTION = "± U of the solution"
 
 
-def gyroscope(each: Gyroscope) -> Iterator[Element]:
+def gyroscope(sensor: SensorEntry) -> Iterator[Element]:
     """Scale factors and biases with U of the budget, and with the combined covariance; what else was found of it."""
-    sensor, budget = each.sensor, each.sensor.budget
+    budget = sensor.budget
     assert budget is not None and sensor.covariance_combined is not None  # or there is no digital certificate
     covered, (scale, bias) = coverage_sentence(budget), _expanded(budget)
     model = f"{sensor.model}: true rate g, reading m, K = diag(k)."
@@ -43,8 +42,6 @@ def gyroscope(each: Gyroscope) -> Iterator[Element]:
     if isinstance(sensor.vector_model, VectorEntry):
         yield _skew(sensor.vector_model)
         yield from _g_sensitivity(sensor.vector_model)
-    if isinstance(sensor.earth_rate, EarthRateEntry):
-        yield from _earth_rate(sensor.earth_rate)
 
 
 def accelerometer(found: AccelerometerEntry) -> Iterator[Element]:
@@ -57,8 +54,13 @@ def accelerometer(found: AccelerometerEntry) -> Iterator[Element]:
         yield _spread("second order", SOLUTION, AXES, (found.second_order_s2_m, *known), PER_FORCE)
 
 
-def magnetometer(found: MagnetometerEntry) -> Iterator[Element]:
-    """Relative to the stated field, as mounted, with U of the budget and the combined covariance."""
+def magnetometer(found: MagnetometerEntry, turned: ReversalEntry | None) -> Iterator[Element]:
+    """Relative to the stated field, as mounted, with U of the budget and the combined covariance.
+
+    First, of a sensor that was turned over, its own bias.
+    """
+    if turned is not None:
+        yield from _reversed(turned)
     said = f"{found.model}: magnetic flux density B, reading m, k = 1/‖row of F‖, for a field of {found.field_t!r} T."
     if found.arm_field_in_bias:
         said += " As mounted in this run: the field of the arm is in the bias, and the uncertainty does not cover it."
@@ -66,7 +68,7 @@ def magnetometer(found: MagnetometerEntry) -> Iterator[Element]:
     yield _skew(found)
 
 
-def reversed_magnetometer(found: ReversalEntry) -> Iterator[Element]:
+def _reversed(found: ReversalEntry) -> Iterator[Element]:
     """Its own bias and the arm's field, with the covariance of both."""
     mixed = [axis for axis, held in zip(AXES, found.arm_field_in_bias, strict=True) if held]
     began = ", ".join(run.started_utc for run in found.runs)
@@ -127,7 +129,8 @@ def _g_sensitivity(found: VectorEntry) -> Iterator[Element]:
     )
 
 
-def _earth_rate(found: EarthRateEntry) -> Iterator[Element]:
+def earth_rate(found: EarthRateEntry) -> Iterator[Element]:
+    """The rate with its covariance, and the place by that rate."""
     said = "As found in the frame of the arm's base. The ellipsoid holds all three values with a probability of 95 %."
     rate = real_list(AXES, found.rate_rad_s, [RATE], region=(found.covariance_rad2_s2, JOINT_FACTOR_3))
     yield _result("Earth's rate", said, rate)

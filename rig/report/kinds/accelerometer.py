@@ -16,9 +16,10 @@ from rig.report.accelerometer_entry import accelerometer_entry
 from rig.report.axes import skew_known, triple
 from rig.report.budget_table import assumed_lines
 from rig.report.c_functions import accelerometer_lines
+from rig.report.certificate import dcc_results
 from rig.report.expanded import expanded, factor_words
 from rig.report.kinds.followed import Followed
-from rig.report.kinds.kind import Found, ResultKind, Shown
+from rig.report.kinds.kind import Found, Measured, ResultKind, Shown
 from rig.report.kinds.triad import beside, followed_of, shown_of, tables
 from rig.report.told_words import told_from, told_lines
 from rig.report.validity_words import when_words
@@ -54,6 +55,13 @@ def _shown(found: Found[AccelerometerEntry]) -> Shown:
 
 def _followed(found: Found[AccelerometerEntry], document: ResultDocument) -> Followed:
     return followed_of(found.sensor, ACCELERATION, found.entry, document, found.entry.temperature_c)
+
+
+def _measured(found: Found[AccelerometerEntry], _: object) -> Measured:
+    entry = found.entry
+    warm = {"": entry.temperature_c if entry.found_at is None else entry.found_at.temperature_c}
+    name, results = f"calibration of accelerometer {found.sensor}", dcc_results.accelerometer(entry)
+    return Measured("accelerometer", found.sensor, entry.part, entry.serial_number, name, results, warm)
 
 
 def _lines(found: AccelerometerEntry) -> Iterator[str]:
@@ -109,4 +117,5 @@ ACCELEROMETER = ResultKind(
     followed=_followed,
     header=accelerometer_lines,
     figures="rig.report.attitude_figures:write_attitude_figures",
+    measured=_measured,
 )

@@ -12,10 +12,11 @@ from rig.data.result_file import ResultDocument
 from rig.data.result_types import ErrorEntry
 from rig.estimation.bias_by_repeat import largest_change_std
 from rig.report.budget_table import heading_of
+from rig.report.certificate import dcc_results
 from rig.report.drift_entry import drift_entry
 from rig.report.expanded import expanded, factor_words
 from rig.report.kinds.followed import CHANGES, SLOPES, Followed, known, parameters
-from rig.report.kinds.kind import Found, ResultKind, Shown, Three, Without
+from rig.report.kinds.kind import Found, Measured, ResultKind, Shown, Three, Without
 from rig.station.plain_text import plain
 
 
@@ -66,6 +67,12 @@ def _followed(found: Found[DriftEntry], document: ResultDocument) -> Followed | 
         float(np.mean([repeat.temperature_c for repeat in entry.repeats])),
         known(followed),
     )
+
+
+def _measured(found: Found[DriftEntry], _: object) -> Measured:
+    entry, of = found.entry, found.quantity
+    name, results = f"bias by repeat of {found.sensor}, {of}", dcc_results.bias_drift(entry)
+    return Measured(of.sensor, found.sensor, entry.part, entry.serial_number, name, results)
 
 
 def _change_std(found: DriftEntry) -> list[float]:
@@ -144,4 +151,5 @@ BIAS_DRIFT = ResultKind(
     followed=_followed,
     header=Without("firmware corrects by one bias; `rig export` makes that of a temperature"),
     figures="rig.report.drift_figures:write_drift_figures",
+    measured=_measured,
 )

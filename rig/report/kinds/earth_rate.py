@@ -7,9 +7,10 @@ import numpy as np
 from rig.data.earth_rate_entries import EarthRateEntry
 from rig.data.quantity import RATE
 from rig.data.result_file import ResultDocument
+from rig.report.certificate import dcc_results
 from rig.report.expanded import expanded
 from rig.report.kinds.followed import EARTH, Followed, known, parameters
-from rig.report.kinds.kind import Found, ResultKind, Shown, Three, Without
+from rig.report.kinds.kind import Found, Measured, ResultKind, Shown, Three, Without
 
 
 def _found(document: ResultDocument) -> Iterator[Found[EarthRateEntry]]:
@@ -42,6 +43,11 @@ def _followed(found: Found[EarthRateEntry], document: ResultDocument) -> Followe
     )
 
 
+def _measured(found: Found[EarthRateEntry], _: object) -> Measured:
+    name, results = f"the Earth's rate found by gyroscope {found.sensor}", dcc_results.earth_rate(found.entry)
+    return Measured("gyroscope", found.sensor, None, None, name, results)
+
+
 def _stds(found: EarthRateEntry) -> list[float]:
     stds: list[float] = np.sqrt(np.diag(found.covariance_rad2_s2)).tolist()
     return stds
@@ -59,4 +65,5 @@ EARTH_RATE = ResultKind(
     followed=_followed,
     header=Without("it is the place's, not the sensor's"),
     figures="rig.report.earth_rate_figures:write_earth_rate_figures",
+    measured=_measured,
 )

@@ -12,10 +12,11 @@ from rig.data.result_file import BoardEntry, ResultDocument, SensorEntry, Vector
 from rig.data.result_types import ErrorEntry
 from rig.report.axes import decimals, skew_known, triple
 from rig.report.c_functions import gyroscope_lines
+from rig.report.certificate import dcc_results
 from rig.report.earth_rate import earth_rate_lines
 from rig.report.expanded import flat
 from rig.report.kinds.followed import ANGLES, SENSITIVITIES, Followed, known, parameters, scale_and_bias
-from rig.report.kinds.kind import Found, ResultKind, Shown, Without
+from rig.report.kinds.kind import Found, Measured, ResultKind, Shown, Without
 from rig.report.kinds.triad import shown_of, tables
 from rig.report.sensor_entry import sensor_entry
 from rig.report.told_words import told_from, told_lines
@@ -75,6 +76,18 @@ def _followed(found: Found[SensorEntry], document: ResultDocument) -> Followed:
         entry.temperature_c,
         known(followed),
     )
+
+
+def _measured(found: Found[SensorEntry], _: object) -> Measured | None:
+    """How warm it was by what of it was read: scale factors come from the sweeps alone. Nothing of a reference."""
+    sensor = found.entry
+    if sensor.role == "reference":
+        return None
+    warm: dict[str, float | None] = {"": sensor.temperature_c}
+    if sensor.scale_at is not None and sensor.bias_at is not None:
+        warm = {" at the scale factors": sensor.scale_at.temperature_c, " at the biases": sensor.bias_at.temperature_c}
+    name, results = f"calibration of gyroscope {found.sensor}", dcc_results.gyroscope(sensor)
+    return Measured("gyroscope", found.sensor, sensor.part, sensor.serial_number, name, results, warm)
 
 
 def _beside(sensor: SensorEntry) -> Iterator[str]:
@@ -141,4 +154,5 @@ GYROSCOPE = ResultKind(
     followed=_followed,
     header=gyroscope_lines,
     figures=Without("its residuals are on the certificate and in the notebook"),
+    measured=_measured,
 )

@@ -1,12 +1,14 @@
 """What a kind of result says to every outlet: terminal, page, notebook, certificate, history, header, exports."""
 
 from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from typing import Generic, TypeVar
+from xml.etree.ElementTree import Element
 
 from rich.table import Table
 
 from rig.analysis.outcome import Outcome
+from rig.data.magnetometer_entries import ReversalEntry
 from rig.data.quantity import Quantity, Unit
 from rig.data.result_file import ResultDocument
 from rig.data.result_types import Entry
@@ -56,6 +58,23 @@ class Shown:
 
 
 @dataclass(frozen=True, slots=True)
+class Measured:
+    """What a digital certificate says of one item: its results under a name, and how warm it was when they were read.
+
+    The item is the `sensor` of that name of one kind (`item`: gyroscope), with its part and serial number if the result
+    says them.
+    """
+
+    item: str
+    sensor: str
+    part: str | None
+    serial_number: str | None
+    name: str
+    results: Iterable[Element]
+    temperatures_c: Mapping[str, float | None] = field(default_factory=dict)
+
+
+@dataclass(frozen=True, slots=True)
 class ResultKind(Generic[EntryT]):
     """A kind of result, by what it says to each outlet, or why it says nothing there.
 
@@ -65,6 +84,7 @@ class ResultKind(Generic[EntryT]):
     - `shown` makes the row of the page and of the notebook, `followed` what a history keeps.
     - `figures` names the writer of its pictures in a run folder (`module:function`), `header` makes the lines of
       `calibration.h`, by the g-sensitivities (3, 3) of the gyroscopes that have one.
+    - `measured` is what the digital certificate says of one, with what turning it over has told, by sensor.
     """
 
     name: str
@@ -77,6 +97,7 @@ class ResultKind(Generic[EntryT]):
     followed: Callable[[Found[EntryT], ResultDocument], Followed | None] | Without
     header: Callable[[Found[EntryT], Mapping[str, Array]], Iterable[str]] | Without
     figures: str | Without
+    measured: Callable[[Found[EntryT], Mapping[str, ReversalEntry]], Measured | None] | Without
 
 
 def said(outlet: Callable[..., Iterable[SaidT]] | Without, *about: object) -> Iterable[SaidT]:

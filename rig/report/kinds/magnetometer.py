@@ -1,13 +1,13 @@
 """Magnetometers: scale, bias and axes from attitudes to a field of known size, as mounted (TRIAX, Eq. (7))."""
 
-from collections.abc import Iterator
+from collections.abc import Iterator, Mapping
 
 import numpy as np
 from rich.table import Table
 
 from rig.analysis.outcome import Outcome
 from rig.analysis.when import of_magnetometer
-from rig.data.magnetometer_entries import MagnetometerEntry
+from rig.data.magnetometer_entries import MagnetometerEntry, ReversalEntry
 from rig.data.quantity import FIELD
 from rig.data.result_file import ResultDocument
 from rig.data.result_types import ErrorEntry
@@ -15,8 +15,9 @@ from rig.errors import Fault
 from rig.report.axes import skew_known, triple
 from rig.report.budget_table import assumed_lines
 from rig.report.c_functions import magnetometer_lines
+from rig.report.certificate import dcc_results
 from rig.report.kinds.followed import Followed
-from rig.report.kinds.kind import Found, ResultKind, Shown
+from rig.report.kinds.kind import Found, Measured, ResultKind, Shown
 from rig.report.kinds.triad import beside, followed_of, shown_of, tables
 from rig.report.magnetometer_entry import magnetometer_entry
 from rig.report.told_words import told_from, told_lines
@@ -65,6 +66,13 @@ def _shown(found: Found[MagnetometerEntry]) -> Shown:
 
 def _followed(found: Found[MagnetometerEntry], document: ResultDocument) -> Followed:
     return followed_of(found.sensor, FIELD, found.entry, document, None)
+
+
+def _measured(found: Found[MagnetometerEntry], turned: Mapping[str, ReversalEntry]) -> Measured:
+    entry = found.entry
+    results = dcc_results.magnetometer(entry, turned.get(found.sensor))
+    name = f"calibration of magnetometer {found.sensor}"
+    return Measured("magnetometer", found.sensor, entry.part, entry.serial_number, name, results)
 
 
 def _lines(found: MagnetometerEntry) -> Iterator[str]:
@@ -117,4 +125,5 @@ MAGNETOMETER = ResultKind(
     followed=_followed,
     header=magnetometer_lines,
     figures="rig.report.attitude_figures:write_attitude_figures",
+    measured=_measured,
 )

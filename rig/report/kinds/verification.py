@@ -7,7 +7,8 @@ from rich.table import Table
 from rig.analysis.outcome import Outcome
 from rig.data.quantity import RATE
 from rig.data.result_file import ResultDocument, VerificationEntry
-from rig.report.kinds.kind import Found, ResultKind, Without
+from rig.report.certificate import dcc_results
+from rig.report.kinds.kind import Found, Measured, ResultKind, Without
 from rig.report.verification_entry import verification_entry
 from rig.report.verification_table import verification_lines, verification_table
 
@@ -25,6 +26,11 @@ def _printed(found: Found[VerificationEntry]) -> Iterator[Table | str]:
     yield from verification_lines(found.entry)
 
 
+def _measured(found: Found[VerificationEntry], _: object) -> Measured:
+    name, results = f"verification of gyroscope {found.sensor}", dcc_results.verification(found.entry)
+    return Measured("gyroscope", found.sensor, None, None, name, results)
+
+
 NO_PARAMETER = Without("an error of readings is no parameter, and has no uncertainty of its own")
 VERIFICATION = ResultKind(
     name="verification",
@@ -37,4 +43,5 @@ VERIFICATION = ResultKind(
     followed=NO_PARAMETER,
     header=NO_PARAMETER,
     figures="rig.report.figures:write_figures",
+    measured=_measured,
 )
