@@ -14,12 +14,13 @@ from rig.errors import Fault
 from rig.estimation.allan import AllanAxis, AllanCurve, allan_curve, read_axis, too_short
 from rig.estimation.arrays import Array
 from rig.observation.acceleration import accelerations
+from rig.observation.arm_motion import motion_of
 from rig.observation.average import Stream, between, on_the_arms_clock
 from rig.observation.csv_samples import Samples
+from rig.observation.known_motion import Motion
 from rig.observation.observe import MAX_REST_TRAVEL_RAD, REST_SETTLING_S
 from rig.observation.steadiness import check_at_rest, whole_stretches
-from rig.observation.timebase import ArmMotion
-from rig.observation.windows import rested
+from rig.observation.windows import Window, rested
 
 FEWEST_TO_JUDGE = 20  # readings: fewer may be alike
 
@@ -51,9 +52,9 @@ class SensorAtRest:
 def at_rest(runs: Sequence[RunData]) -> dict[str, SensorAtRest]:
     """Every sensor with rates, by name, over all recordings of a run; readings the board corrected are left out.
 
-    Raises Fault as `ArmMotion` and `on_the_arms_clock` do.
+    Raises Fault as `motion_of` and `on_the_arms_clock` do.
     """
-    motions = [ArmMotion(run.arm, run.provenance.kinematics) for run in runs]
+    motions = [motion_of(run) for run in runs]
     found = {}
     for name, sensor in runs[0].sensors.items():
         pieces = []
@@ -84,14 +85,14 @@ def log_at_rest(samples: Samples) -> SensorAtRest:
     )
 
 
-def _stretches(run: RunData, stream: Stream, motion: ArmMotion) -> Iterator[slice]:
+def _stretches(run: RunData, stream: Stream, motion: Motion) -> Iterator[slice]:
     """The samples of every rest and dwell in which the arm stood still, apart where one is missing."""
     for window in rested(run):
-        start_s, end_s = window.start_s + REST_SETTLING_S, window.end_s - REST_SETTLING_S
-        states = motion.states[(motion.time_s >= start_s) & (motion.time_s <= end_s)]
-        inside = between(stream, start_s, end_s)
-        if len(states) < 2 or np.ptp(states["q_rad"], axis=0).max() > MAX_REST_TRAVEL_RAD:
+        settled = Window(window.start_s + REST_SETTLING_S, window.end_s - REST_SETTLING_S)
+        moved_rad = motion.moved_rad(settled)
+        if moved_rad is None or moved_rad > MAX_REST_TRAVEL_RAD:
             continue
+        inside = between(stream, settled.start_s, settled.end_s)
         sequence = stream.raw["sequence"][inside].astype(np.int64)
         gaps = inside.start + 1 + np.flatnonzero(np.diff(sequence) != 1)
         edges = [inside.start, *gaps.tolist(), inside.stop]

@@ -134,10 +134,10 @@ def state_jitter(recordings: Sequence[ObservedRun]) -> Jitter:
     scatter, count = [], 0
     sweeps = [(each, finished) for each in recordings for finished in swept(each.run)]
     for recording, finished in sweeps:
-        inside = slice(*np.searchsorted(recording.motion.time_s, [finished.window.start_s, finished.window.end_s]))
-        states = recording.motion.states[inside]
-        steps = np.diff(states["q_rad"][:, finished.sweep.joint], n=ORDER)
-        even = np.ptp(np.lib.stride_tricks.sliding_window_view(np.diff(states["time_s"]), ORDER), axis=1)
+        motion, window = recording.motion, finished.window
+        time_s = motion.time_s[slice(*np.searchsorted(motion.time_s, [window.start_s, window.end_s]))]
+        steps = np.diff(motion.angle(finished.sweep, time_s), n=ORDER)
+        even = np.ptp(np.lib.stride_tricks.sliding_window_view(np.diff(time_s), ORDER), axis=1)
         steps = steps[even < EVEN_S]
         if len(steps):
             scatter.append(np.mean(steps**2) / comb(2 * ORDER, ORDER) / finished.sweep.speed_rad_s**2)
@@ -149,8 +149,8 @@ def state_jitter(recordings: Sequence[ObservedRun]) -> Jitter:
 
 def _by_computer(recording: ObservedRun, known: Uncertainty) -> ClockComparison:
     """By the times at which the states came."""
-    states = recording.motion.states
-    host_s, arm_s = states["host_time_s"] - states["host_time_s"][0], states["time_s"] - states["time_s"][0]
+    motion = recording.motion
+    host_s, arm_s = motion.host_time_s - motion.host_time_s[0], motion.time_s - motion.time_s[0]
     design = np.column_stack([np.ones_like(host_s), host_s])
     (offset, slope), *_ = np.linalg.lstsq(design, arm_s, rcond=None)
     late = arm_s - design @ (offset, slope)

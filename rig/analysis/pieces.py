@@ -16,6 +16,7 @@ from rig.data.settings import Site
 from rig.estimation.arrays import Array
 from rig.estimation.explained import Explained
 from rig.observation.arm_beside_lines import beside, means_of_parts, turned
+from rig.observation.arm_motion import ArmMotion
 from rig.observation.average import Average, Stream, between
 from rig.observation.colour import widening
 from rig.observation.lines import NONE, in_hertz, lines, swings, waves
@@ -23,7 +24,6 @@ from rig.observation.mean import rounding_left
 from rig.observation.observe import Observation
 from rig.observation.observed_run import ObservedRun
 from rig.observation.tapered import noise_at_zero
-from rig.observation.timebase import ArmMotion
 
 FEWEST_SAMPLES = 20
 PREVAILS = 0.7  # of the residuals' variance, what is left in a long mean where the rest of them is a vibration

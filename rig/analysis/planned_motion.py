@@ -7,7 +7,7 @@ import numpy as np
 
 from rig.arm.motion import Dwell, Plan, Rest, Step, Sweep, Transfer, progress
 from rig.arm.state import ARM_STATE_DTYPE
-from rig.observation.timebase import ArmMotion
+from rig.observation.arm_motion import ArmMotion
 
 STATE_RATE_HZ = 125.0
 STANDING_S = 1.0  # before the first step and after the last

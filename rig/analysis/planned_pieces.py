@@ -12,7 +12,7 @@ from rig.analysis.ways import SPARSE_S, STEPS, by_the_wrists, moved, pull_m_s2
 from rig.arm.motion import Plan, Sweep
 from rig.data.settings import Site
 from rig.estimation.arrays import Array
-from rig.observation.timebase import ArmMotion
+from rig.observation.arm_motion import ArmMotion
 
 
 @dataclass(frozen=True, slots=True)

@@ -15,9 +15,10 @@ from rig.errors import Fault
 from rig.estimation.arrays import Array
 from rig.estimation.vector_model import VectorSolution
 from rig.observation.acceleration import DwellReading, each_dwell
+from rig.observation.arm_motion import motion_of
 from rig.observation.average import Average, Stream, on_the_arms_clock
+from rig.observation.known_motion import Motion
 from rig.observation.observe import Observation, each_sweep, observe_sensor
-from rig.observation.timebase import ArmMotion
 from rig.observation.windows import finished_dwells, finished_sweeps
 
 
@@ -49,7 +50,7 @@ def so_far(runs: Sequence[RunData]) -> dict[str, SoFar]:
     dwells: dict[str, dict[int, DwellReading | Fault]] = {}
     for run in runs:
         try:
-            motion = ArmMotion(run.arm, run.provenance.kinematics)
+            motion = motion_of(run)
         except Fault:
             continue  # nothing has moved yet
         for name in run.sensors:
@@ -70,7 +71,7 @@ def so_far(runs: Sequence[RunData]) -> dict[str, SoFar]:
     }
 
 
-def _seen(run: RunData, name: str, motion: ArmMotion) -> Seen:
+def _seen(run: RunData, name: str, motion: Motion) -> Seen:
     sensor = run.sensors[name]
     try:
         stream = on_the_arms_clock(run.samples[name], sensor, motion)
@@ -82,7 +83,7 @@ def _seen(run: RunData, name: str, motion: ArmMotion) -> Seen:
 
 
 def _observed(
-    run: RunData, name: str, stream: Stream, motion: ArmMotion
+    run: RunData, name: str, stream: Stream, motion: Motion
 ) -> tuple[dict[int, Observation | Fault], Sequence[Average]]:
     thresholds = run.settings.observation
     found = each_sweep(run, stream, motion, thresholds)

@@ -18,9 +18,9 @@ from rig.data.run_file import RunData
 from rig.estimation.arrays import Array
 from rig.estimation.explained import Explained
 from rig.observation.arm_beside_lines import turned
+from rig.observation.arm_motion import MIN_RATE_RAD_S, ArmMotion
 from rig.observation.average import Stream, between
 from rig.observation.observed_run import ObservedRun
-from rig.observation.timebase import MIN_RATE_RAD_S, ArmMotion
 from rig.observation.windows import rested, swept
 
 BEYOND_S = 0.1  # before it moves and after, in which an arm stands still that was slower than can be told

@@ -12,7 +12,7 @@ from rig.data.result_file import ResultDocument, read_result
 from rig.data.run_file import RunData, read_run
 from rig.data.run_folder import RESULT, recordings
 from rig.errors import Refused, raised_as
-from rig.observation.timebase import check_arms_times
+from rig.observation.arm_motion import check_arms_times
 from rig.page.control import Control
 from rig.page.feed import Feed
 from rig.page.replay import Moment, ended, moments

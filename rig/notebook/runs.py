@@ -44,13 +44,10 @@ class Readings:
 
     @cached_property
     def _on_arm_clock(self) -> tuple[Array, Array]:
+        from rig.observation.arm_motion import motion_of
         from rig.observation.average import on_the_arms_clock
-        from rig.observation.timebase import ArmMotion
 
-        streams = [
-            on_the_arms_clock(run.samples[self.name], self.sensor, ArmMotion(run.arm, run.provenance.kinematics))
-            for run in self.recordings
-        ]
+        streams = [on_the_arms_clock(run.samples[self.name], self.sensor, motion_of(run)) for run in self.recordings]
         return (
             np.concatenate([stream.time_s for stream in streams]),
             np.concatenate([stream.readings_rad_s for stream in streams]),

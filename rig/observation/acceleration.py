@@ -12,8 +12,8 @@ from rig.data.settings import ObservationThresholds
 from rig.errors import Fault
 from rig.estimation.arrays import Array
 from rig.observation.average import Stream, between
+from rig.observation.known_motion import Motion
 from rig.observation.mean import Mean, mean_at_rest
-from rig.observation.timebase import ArmMotion
 from rig.observation.windows import Dwelt, Window, dwelt
 
 MAX_DWELL_TRAVEL_RAD = 1e-3  # of any joint, while it stands
@@ -37,7 +37,7 @@ class DwellReading:
 
 
 def dwell_readings(
-    run: RunData, stream: Stream, motion: ArmMotion, settings: ObservationThresholds, superseded: Collection[int] = ()
+    run: RunData, stream: Stream, motion: Motion, settings: ObservationThresholds, superseded: Collection[int] = ()
 ) -> Iterator[DwellReading]:
     """Every finished dwell of a recording whose index is not in `superseded`, of a sensor with accelerations.
 
@@ -49,7 +49,7 @@ def dwell_readings(
 
 
 def each_dwell(
-    run: RunData, stream: Stream, motion: ArmMotion, settings: ObservationThresholds
+    run: RunData, stream: Stream, motion: Motion, settings: ObservationThresholds
 ) -> dict[int, DwellReading | Fault]:
     """Every finished dwell's reading, or why there is none, by its index; nothing of a sensor without accelerations."""
     if not stream.sensor.has_acceleration:
@@ -99,7 +99,7 @@ def _is_noisy(stream: Stream) -> bool:
     return bool(len(steps)) and np.median(steps, axis=0).min() >= 1
 
 
-def dwell_reading(stream: Stream, motion: ArmMotion, finished: Dwelt, settings: ObservationThresholds) -> DwellReading:
+def dwell_reading(stream: Stream, motion: Motion, finished: Dwelt, settings: ObservationThresholds) -> DwellReading:
     """One finished dwell. Raises Fault as `dwell_readings` does."""
     dwell, window = finished.dwell, finished.window
     where = f"dwell {dwell.index} ({dwell.name})"
@@ -127,19 +127,18 @@ def _standing(run: RunData, finished: Dwelt) -> Dwelt:
     return Dwelt(finished.dwell, Window(start_s, max(end_s - LEAVING_S, start_s)))
 
 
-def _check_standing(motion: ArmMotion, window: Window, where: str) -> None:
-    states = motion.states[(motion.time_s >= window.start_s) & (motion.time_s <= window.end_s)]
-    if len(states) < 2:
+def _check_standing(motion: Motion, window: Window, where: str) -> None:
+    moved_rad = motion.moved_rad(window)
+    if moved_rad is None:
         raise Fault(
             "arm_states_lost",
             f"in {where} the arm's states are missing",
             "Check the network to the robot and the load of this computer, then repeat the run",
         )
-    travelled = float(np.ptp(states["q_rad"], axis=0).max())
-    if travelled > MAX_DWELL_TRAVEL_RAD:
+    if moved_rad > MAX_DWELL_TRAVEL_RAD:
         raise Fault(
             "arm_moved_in_dwell",
-            f"in {where} a joint moved by {np.degrees(travelled):.2f}°",
+            f"in {where} a joint moved by {np.degrees(moved_rad):.2f}°",
             "Let nothing move the arm while it stands, then repeat the run",
         )
 

@@ -9,14 +9,14 @@ import numpy as np
 from numpy.typing import NDArray
 
 from rig.estimation.arrays import Array
+from rig.observation.known_motion import KnownMotion
 from rig.observation.lines import fitted, waves
 from rig.observation.revolution import Revolution
-from rig.observation.timebase import ArmMotion
 
 FINER = 3.0  # than the arm's states follow each other, what its rate is looked at
 
 
-def turned_beside(motion: ArmMotion, turn: Revolution, lines_hz: Array) -> tuple[float, Array]:
+def turned_beside(motion: KnownMotion, turn: Revolution, lines_hz: Array) -> tuple[float, Array]:
     """A revolution's mean speed, and the unit vector (3,) of its turn in the flange's frame, beside lines (k,).
 
     2π/T and the turn's own axis, but for what the encoders see of the lines: so the turn's ends are as well known as
@@ -30,7 +30,7 @@ def turned_beside(motion: ArmMotion, turn: Revolution, lines_hz: Array) -> tuple
     return speed_rad_s, rate / speed_rad_s
 
 
-def turned(motion: ArmMotion, start_s: float, end_s: float, lines_hz: Array, parts: int) -> Array:
+def turned(motion: KnownMotion, start_s: float, end_s: float, lines_hz: Array, parts: int) -> Array:
     """(parts, 3) mean rates of the flange from start to end beside lines of these frequencies (k,).
 
     All states count, where samples are farther apart than these: what one of them errs by the next takes back.

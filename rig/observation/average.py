@@ -10,9 +10,10 @@ from numpy.typing import NDArray
 from rig.data.run_file import RecordedSensor
 from rig.estimation.arrays import Array
 from rig.observation.beside_lines import FEWEST, mean_beside_lines, rest_beside_lines
+from rig.observation.known_motion import KnownMotion
 from rig.observation.lines import in_hertz
 from rig.observation.mean import Mean, mean_at_rest, mean_of
-from rig.observation.timebase import ArmMotion, TimeBase, estimate_time_base
+from rig.observation.timebase import TimeBase, estimate_time_base
 from rig.observation.windows import Window
 
 # How a mean allows for readings that are not independent: by their correlations, before there was a site; by an
@@ -85,7 +86,7 @@ class Stream:
         return counts * self.sensor.temperature_c_per_count + self.sensor.temperature_offset_c
 
 
-def on_the_arms_clock(raw: NDArray[Any], sensor: RecordedSensor, motion: ArmMotion) -> Stream:
+def on_the_arms_clock(raw: NDArray[Any], sensor: RecordedSensor, motion: KnownMotion) -> Stream:
     """Samples (n,) SAMPLE_DTYPE in rad/s at the controller's times. Raises Fault as `estimate_time_base` does."""
     readings = raw["counts"] * sensor.sensitivity_rad_s_per_count
     return on_clock(raw, sensor, estimate_time_base(raw["board_time_us"] * 1e-6, readings, motion))

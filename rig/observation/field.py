@@ -121,9 +121,8 @@ def field_tests(
 
 
 def _at_home(recording: ObservedRun, rest: Window, home_q_rad: Sequence[float]) -> bool:
-    motion = recording.motion
-    states = motion.states[(motion.time_s >= rest.start_s) & (motion.time_s <= rest.end_s)]
-    return bool(len(states)) and bool(np.abs(states["q_rad"] - np.array(home_q_rad)).max() < AT_HOME_RAD)
+    away_rad = recording.motion.away_rad(rest, home_q_rad)
+    return away_rad is not None and away_rad < AT_HOME_RAD
 
 
 def _mean(recording: ObservedRun, name: str, window: Window, what: str, thresholds: ObservationThresholds) -> Mean:

@@ -1,11 +1,18 @@
-"""What turned the sensors, as far as their clock is found by it: an arm's states, or a table's own file."""
+"""What turned the sensors, as far as observations are made by it: an arm's states, or a table's own file."""
 
 from typing import Protocol
 
 import numpy as np
 from numpy.typing import NDArray
 
+from rig.arm.motion import Sweep
+from rig.data.settings import ObservationThresholds
+from rig.errors import Fault
 from rig.estimation.arrays import Array
+from rig.observation.revolution import Revolution
+from rig.observation.windows import Window
+
+MAX_SPAN_S = 48 * 3600.0  # of a recording; what lies farther apart is damage, and would fill the memory
 
 
 class KnownMotion(Protocol):
@@ -26,3 +33,47 @@ class KnownMotion(Protocol):
     def covered(self, time_s: Array) -> NDArray[np.bool_]:
         """(n,) where looks follow each other closely enough for `rate` to be true."""
         ...
+
+
+class Motion(KnownMotion, Protocol):
+    """A body's turning that sweeps, rests and dwells are observed by; the base is what stands still."""
+
+    def attitude(self, start_s: float, end_s: float) -> Array:
+        """(3, 3) the mean rotation from the base's axes into the body's between two times."""
+        ...
+
+    def moved_rad(self, window: Window) -> float | None:
+        """How far it was moved in a window: nearly nothing where it stood; None where too few looks tell."""
+        ...
+
+    def angle(self, sweep: Sweep, time_s: Array | float, derivative: int = 0) -> Array:
+        """(n,) rad that it has turned by about a sweep's axis, at times (n,); with `derivative` 1 its rate, rad/s."""
+        ...
+
+    def turn(self, sweep: Sweep, window: Window, thresholds: ObservationThresholds) -> Revolution:
+        """The whole turn of a sweep made in a window. Raises Fault where there is none, or no proper one."""
+        ...
+
+
+def closely_followed(looks_s: Array, close: NDArray[np.bool_], time_s: Array) -> NDArray[np.bool_]:
+    """Which of the times (n,) lie between two of the looks (m,) that are `close` (m − 1,)."""
+    interval = np.searchsorted(looks_s, time_s, side="right") - 1
+    inside = (interval >= 0) & (interval < len(close))
+    known: NDArray[np.bool_] = inside & close[np.clip(interval, 0, len(close) - 1)]
+    return known
+
+
+def check_span(time_s: Array, what: str) -> None:
+    """Times (n,) that rise are refused where they reach too far. Raises Fault `impossible_times`."""
+    span_s = time_s[-1] - time_s[0]
+    if span_s > MAX_SPAN_S:
+        raise Fault(
+            "impossible_times",
+            f"{what} in the recording reach over {span_s / 3600:.3g} h",
+            "Do not use this recording, which is damaged; make a new one",
+        )
+
+
+def not_finite(what: str) -> Fault:
+    """The error for a recording that holds what is no number."""
+    return Fault("not_finite", f"{what} in the recording is not a number", "Do not use this recording; make a new one")

@@ -13,7 +13,6 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from rig.arm.kinematics import axis_errors, flange_arm
 from rig.arm.motion import Sweep
 from rig.data.run_file import RunData
 from rig.data.settings import ObservationThresholds
@@ -33,9 +32,10 @@ from rig.observation.average import (
     on_the_arms_clock,
 )
 from rig.observation.feeling import check_dwells, check_other_way, check_rests
-from rig.observation.revolution import Revolution, arm_states_lost, describe, find_revolution
+from rig.observation.known_motion import Motion
+from rig.observation.revolution import Revolution, arm_states_lost, describe
 from rig.observation.swept_acceleration import SweptAcceleration, swept_acceleration
-from rig.observation.timebase import ArmMotion, TimeBase
+from rig.observation.timebase import TimeBase
 from rig.observation.windows import Finished, Window, rested, swept
 
 STUCK_REPEATS = 10  # equal readings in a row, of a sensor whose noise exceeds a count
@@ -90,7 +90,7 @@ class SensorObservations:
 
 
 def observe_sensor(
-    run: RunData, sensor: str, motion: ArmMotion, settings: ObservationThresholds, superseded: Collection[int] = ()
+    run: RunData, sensor: str, motion: Motion, settings: ObservationThresholds, superseded: Collection[int] = ()
 ) -> SensorObservations:
     """Average every finished sweep of a recording, in which the arm moved by `motion`.
 
@@ -125,7 +125,7 @@ def observe_sensor(
 
 
 def each_sweep(
-    run: RunData, stream: Stream, motion: ArmMotion, settings: ObservationThresholds
+    run: RunData, stream: Stream, motion: Motion, settings: ObservationThresholds
 ) -> dict[int, Observation | Fault]:
     """Every finished sweep's observation, or why there is none, by the sweep's index."""
     found: dict[int, Observation | Fault] = {}
@@ -153,16 +153,16 @@ def check_feeling(run: RunData, rests: Sequence[Average], dwells: Sequence[Dwell
     check_dwells(dwells, run.settings.site)
 
 
-def rests_of(run: RunData, stream: Stream, motion: ArmMotion, superseded: Collection[int] = ()) -> tuple[Average, ...]:
+def rests_of(run: RunData, stream: Stream, motion: Motion, superseded: Collection[int] = ()) -> tuple[Average, ...]:
     """Those in which the arm stood still for long enough, without those beside a step in `superseded`."""
     found = (_rest(stream, motion, window, _way(run)) for window in rested(run, superseded))
     return tuple(rest for rest in found if rest is not None)
 
 
 def _revolution(
-    run: RunData, stream: Stream, motion: ArmMotion, finished: Finished, settings: ObservationThresholds
+    run: RunData, stream: Stream, motion: Motion, finished: Finished, settings: ObservationThresholds
 ) -> Observation:
-    turn = find_revolution(motion, finished.sweep, finished.window, settings)
+    turn = motion.turn(finished.sweep, finished.window, settings)
     seen = _observation(stream, motion, finished.sweep, turn, settings, way=_way(run))
     if stream.sensor.has_acceleration and run.settings.planned_dwells:
         beside = run.settings.averages_beside_lines
@@ -195,7 +195,7 @@ def bias_drift(rests: Sequence[Average]) -> Array:
     return np.maximum(scatter - noise, 0.0) if significant else np.zeros(3)
 
 
-def _placed(average: Average, motion: ArmMotion) -> Average:
+def _placed(average: Average, motion: Motion) -> Average:
     return replace(average, attitude=motion.attitude(average.start_s, average.end_s))
 
 
@@ -205,7 +205,7 @@ def _drifting(average: Average, drift: Array) -> Average:
 
 def _observation(
     stream: Stream,
-    motion: ArmMotion,
+    motion: Motion,
     sweep: Sweep,
     turn: Revolution,
     settings: ObservationThresholds,
@@ -238,7 +238,6 @@ def _observation(
     check_reading_ratio(float(np.linalg.norm(turned)) / turn.speed_rad_s, where)
     axis, sign = nearest_axis(expected)
     speed_rad_s, axis_flange = turned_beside(motion, turn, averaged.lines_hz)
-    began = motion.angles(turn.start_s)
     return Observation(
         sweep=sweep.index,
         joint_name=sweep.joint_name,
@@ -250,21 +249,19 @@ def _observation(
         speed_std_rad_s=turn.speed_std_rad_s,
         lost=lost,
         average=averaged,
-        axis_errors=(1 if sweep.direction == "ccw" else -1) * axis_errors(began, sweep.joint, motion.kinematics),
-        arm_m=flange_arm(began, sweep.joint, motion.kinematics),
+        axis_errors=turn.axis_errors,
+        arm_m=turn.arm_m,
     )
 
 
-def _rest(stream: Stream, motion: ArmMotion, window: Window, way: Averaging) -> Average | None:
+def _rest(stream: Stream, motion: Motion, window: Window, way: Averaging) -> Average | None:
     """The mean reading of a rest; None where the arm did not stand still or the rest is too short to say anything."""
-    start, end = window.start_s + REST_SETTLING_S, window.end_s - REST_SETTLING_S
-    inside = between(stream, start, end)
-    states = motion.states[(motion.time_s >= start) & (motion.time_s <= end)]
-    if inside.stop - inside.start < MIN_REST_SAMPLES or len(states) == 0:
+    settled = Window(window.start_s + REST_SETTLING_S, window.end_s - REST_SETTLING_S)
+    inside = between(stream, settled.start_s, settled.end_s)
+    moved_rad = motion.moved_rad(settled)
+    if inside.stop - inside.start < MIN_REST_SAMPLES or moved_rad is None or moved_rad > MAX_REST_TRAVEL_RAD:
         return None
-    if np.ptp(states["q_rad"], axis=0).max() > MAX_REST_TRAVEL_RAD:
-        return None
-    return _placed(average_at_rest(stream, inside, Window(start, end), way), motion)
+    return _placed(average_at_rest(stream, inside, settled, way), motion)
 
 
 def _lost(stream: Stream, inside: slice, where: str, settings: ObservationThresholds) -> int:

@@ -7,9 +7,9 @@ import numpy as np
 
 from rig.data.run_file import RunData
 from rig.data.settings import ObservationThresholds
+from rig.observation.arm_motion import ArmMotion, motion_of
 from rig.observation.average import Stream, on_clock
 from rig.observation.observe import SensorObservations, observe_sensor
-from rig.observation.timebase import ArmMotion
 from rig.observation.windows import finished_dwells, finished_sweeps
 
 
@@ -47,8 +47,8 @@ class ObservedRun:
 
 
 def observe_run(run: RunData, thresholds: ObservationThresholds, superseded: Collection[int] = ()) -> ObservedRun:
-    """Observe every sensor of a recording; raises Fault as `ArmMotion` and `observe_sensor` do."""
-    motion = ArmMotion(run.arm, run.provenance.kinematics)
+    """Observe every sensor of a recording; raises Fault as `motion_of` and `observe_sensor` do."""
+    motion = motion_of(run)
     sensors = {name: observe_sensor(run, name, motion, thresholds, superseded) for name in run.sensors}
     return ObservedRun(run, motion, sensors)
 

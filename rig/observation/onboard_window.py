@@ -10,9 +10,8 @@ from rig.arm.motion import Sweep
 from rig.data.events import BoardObserved
 from rig.data.run_file import RecordedSensor, RunData
 from rig.data.settings import ObservationThresholds
+from rig.observation.arm_motion import ArmMotion
 from rig.observation.average import on_the_arms_clock
-from rig.observation.revolution import find_revolution
-from rig.observation.timebase import ArmMotion
 from rig.observation.windows import Window, finished_sweeps
 
 
@@ -30,12 +29,12 @@ def revolution_on_the_board(
 
     `samples` (n,) SAMPLE_DTYPE and `arm` (m,) ARM_STATE_DTYPE may reach further back than the sweep, which began after
     the state `first`, and should: a slow sweep alone may not stand out from the noise or hold too few samples, where
-    a fast motion to where sweeps begin tells the time. Raises Fault as `estimate_time_base` and `find_revolution` do.
+    a fast motion to where sweeps begin tells the time. Raises Fault as `estimate_time_base` and `ArmMotion.turn` do.
     """
     motion = ArmMotion(arm, kinematics)
     clock = on_the_arms_clock(samples, sensor, motion).clock
     window = Window(float(arm["time_s"][min(first, len(arm) - 1)]), float(arm["time_s"][-1]))
-    revolution = find_revolution(motion, sweep, window, settings)
+    revolution = motion.turn(sweep, window, settings)
     start_s, end_s = (clock.board_time_s(time_s) for time_s in (revolution.start_s, revolution.end_s))
     return round(start_s * 1e6), round(end_s * 1e6), revolution.speed_rad_s
 

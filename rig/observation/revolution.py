@@ -10,9 +10,8 @@ from rig.arm.motion import Sweep
 from rig.data.settings import ObservationThresholds
 from rig.errors import Fault
 from rig.estimation.arrays import Array
-from rig.observation.timebase import MAX_STATE_STEP_S, ArmMotion
-from rig.observation.windows import Window
 
+MAX_STATE_STEP_S = 0.02  # between arm states that still show the servo's vibration
 SMOOTHING_S = 0.05  # of the joint's rate before it is judged constant or not
 MAX_STATE_GAP_S = 1.0  # over less, a halt shows in the angle that is missing afterwards
 MAX_OTHER_TRAVEL_RAD = 0.01
@@ -24,13 +23,20 @@ class Revolution:
     """Exactly 2π of joint travel between two controller times.
 
     `duration_std_s` is what interpolating between arm states leaves uncertain; `axis_flange` (3,) is the unit vector of
-    the turn in the flange frame.
+    the turn in the flange frame by the measured joints, `axis_errors` (13, 3) how the arm's own errors change it, per
+    radian (`rig.arm.kinematics.AXIS_ERRORS`). Where it began, `attitude` (3, 3) takes a vector of the arm's base frame
+    into the flange's; `arm_m` (3,) is a way from the joint's axis to the flange's origin, in the flange's frame;
+    `station` names the joint, from 0 at the base, and the pose it turned in.
     """
 
     start_s: float
     end_s: float
     duration_std_s: float
     axis_flange: Array
+    attitude: Array
+    axis_errors: Array
+    arm_m: Array
+    station: tuple[float, ...]
 
     @property
     def duration_s(self) -> float:
@@ -48,15 +54,23 @@ class Revolution:
         return self.speed_rad_s * self.duration_std_s / self.duration_s
 
 
-def find_revolution(motion: ArmMotion, sweep: Sweep, window: Window, settings: ObservationThresholds) -> Revolution:
-    """The revolution of one sweep, which was made between two controller times.
+@dataclass(frozen=True, slots=True)
+class Ends:
+    """When a revolution began and ended, how uncertain the time between is, and the times (k,) of the states in it."""
+
+    start_s: float
+    end_s: float
+    duration_std_s: float
+    time_s: Array
+
+
+def find_revolution(states: NDArray[Any], sweep: Sweep, settings: ObservationThresholds) -> Ends:
+    """The revolution of one sweep, of which `states` (n,) ARM_STATE_DTYPE tell, in the order of their times.
 
     Its ends are where the recorded joint angle crosses the ends of `revolution_rad`. Raises Fault
     `incomplete_revolution`, `arm_states_lost`, `slider_below_100`, `speed_not_constant`, `other_joint_moved`.
     """
     where, (low, high) = describe(sweep), sweep.revolution_rad
-    begin, end = np.searchsorted(motion.time_s, [window.start_s, window.end_s])
-    states = motion.states[max(begin - 1, 0) : end + 1]
     time_s, angle = states["time_s"], states["q_rad"][:, sweep.joint]
     travelled = angle - low if sweep.direction == "ccw" else high - angle
     first, last = _inside(travelled, high - low, where)
@@ -67,9 +81,7 @@ def find_revolution(motion: ArmMotion, sweep: Sweep, window: Window, settings: O
     _check_slider(turning, where)
     _check_speed(time_s[first : last + 1], travelled[first : last + 1], where, settings)
     _check_other_joints(turning, sweep.joint, where)
-    start_s, end_s, deviation_s = _ends(time_s, travelled, first, last, high - low)
-    rate = motion.rate(turning["time_s"]).mean(axis=0)
-    return Revolution(start_s, end_s, deviation_s, rate / np.linalg.norm(rate))
+    return Ends(*_ends(time_s, travelled, first, last, high - low), turning["time_s"])
 
 
 def describe(sweep: Sweep) -> str:

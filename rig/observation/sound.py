@@ -6,9 +6,10 @@ from rig.data.run_file import RunData
 from rig.data.settings import ObservationThresholds
 from rig.errors import Fault
 from rig.observation.acceleration import DwellReading, each_dwell
+from rig.observation.arm_motion import motion_of
 from rig.observation.average import Stream, between, on_the_arms_clock
+from rig.observation.known_motion import Motion
 from rig.observation.observe import check_feeling, each_sweep, rests_of
-from rig.observation.timebase import ArmMotion
 from rig.observation.windows import Window, finished_dwells, finished_sweeps
 
 SPIKE = 8.0  # of the readings' own deviation: one reading in 1e15
@@ -27,14 +28,14 @@ def sound_dwells(run: RunData, settings: ObservationThresholds) -> frozenset[int
 
 def _sound(run: RunData, settings: ObservationThresholds) -> frozenset[int]:
     try:
-        motion = ArmMotion(run.arm, run.provenance.kinematics)
+        motion = motion_of(run)
     except Fault:
         return frozenset()
     sound = (_sound_for(run, sensor, motion, settings) for sensor in run.sensors)
     return frozenset.intersection(*sound)
 
 
-def _sound_for(run: RunData, sensor: str, motion: ArmMotion, settings: ObservationThresholds) -> frozenset[int]:
+def _sound_for(run: RunData, sensor: str, motion: Motion, settings: ObservationThresholds) -> frozenset[int]:
     """Nothing of a sensor that once did not feel what the arm did: when it began nobody knows."""
     try:
         stream = on_the_arms_clock(run.samples[sensor], run.sensors[sensor], motion)

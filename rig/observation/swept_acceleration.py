@@ -2,9 +2,6 @@
 
 from dataclasses import dataclass
 
-import numpy as np
-
-from rig.arm.kinematics import flange_arm, flange_attitude
 from rig.arm.motion import Sweep
 from rig.estimation.arrays import Array
 from rig.estimation.sweep_harmonics import FirstHarmonic, first_harmonic
@@ -12,8 +9,8 @@ from rig.observation.acceleration import accelerations, check_acceleration
 from rig.observation.average import Stream, between
 from rig.observation.beside_lines import colour_left, swinging
 from rig.observation.colour import noise_left
+from rig.observation.known_motion import Motion
 from rig.observation.revolution import Revolution, describe
-from rig.observation.timebase import ArmMotion
 
 
 @dataclass(frozen=True, slots=True)
@@ -35,7 +32,7 @@ class SweptAcceleration:
 
 
 def swept_acceleration(
-    stream: Stream, motion: ArmMotion, sweep: Sweep, turn: Revolution, *, beside_lines: bool
+    stream: Stream, motion: Motion, sweep: Sweep, turn: Revolution, *, beside_lines: bool
 ) -> SweptAcceleration:
     """Beside all lines that stand out, or the strongest alone.
 
@@ -46,8 +43,6 @@ def swept_acceleration(
     time_s = stream.time_s[inside]
     known = motion.covered(time_s)
     time_s = time_s[known]
-    began = motion.angles(turn.start_s)
-    others = np.delete(began, sweep.joint)
     growing = 1.0 if sweep.direction == "ccw" else -1.0
     return SweptAcceleration(
         sweep=sweep.index,
@@ -55,13 +50,13 @@ def swept_acceleration(
         harmonic=first_harmonic(
             time_s,
             accelerations(stream, inside)[known],
-            motion.angles(time_s)[:, sweep.joint] - began[sweep.joint],
-            motion.angles(time_s, 1)[:, sweep.joint],
+            motion.angle(sweep, time_s) - motion.angle(sweep, turn.start_s),
+            motion.angle(sweep, time_s, 1),
             colour_left if beside_lines else noise_left,
             swings=swinging if beside_lines else None,
         ),
-        attitude=flange_attitude(began, motion.kinematics),
+        attitude=turn.attitude,
         axis_flange=growing * turn.axis_flange,
-        arm_m=flange_arm(began, sweep.joint, motion.kinematics),
-        station=(sweep.joint, *np.round(others, 2).tolist()),
+        arm_m=turn.arm_m,
+        station=turn.station,
     )

@@ -5,6 +5,7 @@ from numpy.typing import NDArray
 
 from rig.errors import Fault
 from rig.estimation.arrays import Array
+from rig.observation.known_motion import closely_followed
 
 MAX_STEP_S = 0.05  # between rows that still show how the table turned
 MIN_ROWS = 20
@@ -47,10 +48,7 @@ class TableMotion:
 
     def covered(self, time_s: Array) -> NDArray[np.bool_]:
         """As of `KnownMotion`."""
-        interval = np.searchsorted(self.time_s, time_s, side="right") - 1
-        inside = (interval >= 0) & (interval < len(self._close))
-        known: NDArray[np.bool_] = inside & self._close[np.clip(interval, 0, len(self._close) - 1)]
-        return known
+        return closely_followed(self.time_s, self._close, time_s)
 
 
 def _turned(time_s: Array, attitudes: Array) -> tuple[Array, Array]:

@@ -8,27 +8,20 @@ filter is part of the offset.
 """
 
 from dataclasses import dataclass, replace
-from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
-from rig.arm.kinematics import NOMINAL, DenavitHartenberg, flange_attitude, flange_rate
 from rig.errors import Fault
 from rig.estimation.arrays import Array
 from rig.observation.colour import widening
-from rig.observation.known_motion import KnownMotion
+from rig.observation.known_motion import KnownMotion, check_span, not_finite
 
 MIN_SAMPLES = 100
-MAX_SPAN_S = 48 * 3600.0  # of a recording; what lies farther apart is damage, and would fill the memory
 COARSE_STEP_S = 0.02  # far below the ramps of a sweep, so that the fine fit starts inside its reach
 COARSE_REACH_S = 0.15  # what the clock may be off at either end of the data when the fine fit starts
 CANDIDATES = 12  # peaks of the correlation looked at: six equal sweeps give eleven
 MIN_EXPLAINED = 0.5  # share of the readings' variance that the arm's motion must explain
-MIN_RATE_RAD_S = 0.01
-RATE_STEP_S = 0.008  # joint angles that are closer in time tell more of their encoders' noise than of a rate
-MAX_STATE_STEP_S = 0.02  # between arm states that still show the servo's vibration
-ATTITUDES = 72  # of which a mean is made: over a whole turn what is perpendicular to the axis averages out
 LONG_RUN_S = 1800.0  # so much of a recording the coarse search looks at, and more only where it finds nothing
 MAX_DRIFT = 0.03  # an oscillator that no crystal holds is within 2 %
 MAX_DRIFT_LONG_RUN = 1e-3  # one that a crystal holds is within 600 ppm
@@ -71,50 +64,6 @@ class TimeBase:
         return self.reference_s + since_reference_s
 
 
-class ArmMotion:
-    """The recorded arm as functions of controller time: `angles(t)` (n, 6) rad, `rate(t)` (n, 3) flange rate rad/s.
-
-    `rate(t, 1)` is the flange's angular acceleration. `states` is (m,) ARM_STATE_DTYPE of an arm of that `kinematics`.
-    Raises Fault `no_motion`, `not_finite`, `impossible_times`.
-    """
-
-    def __init__(self, states: NDArray[Any], kinematics: DenavitHartenberg = NOMINAL) -> None:
-        from scipy.interpolate import CubicSpline
-
-        self.kinematics = kinematics
-        self.time_s, first = np.unique(states["time_s"], return_index=True)
-        self.states = states[first]
-        if len(self.time_s) < 4:
-            raise Fault(
-                "no_motion", f"the recording holds {len(self.time_s)} arm states", "Record a run with the arm on"
-            )
-        if not (np.isfinite(self.time_s).all() and np.isfinite(self.states["q_rad"]).all()):
-            raise _not_finite("an arm state")
-        _check_span(self.time_s, "the arm's states")
-        self.angles = CubicSpline(self.time_s, self.states["q_rad"])
-        every = min(round(RATE_STEP_S / float(np.median(np.diff(self.time_s)))), len(self.time_s) // 4)
-        times_s, angles = self.time_s[:: max(every, 1)], self.states["q_rad"][:: max(every, 1)]
-        rates = flange_rate(angles, CubicSpline(times_s, angles)(times_s, 1), kinematics)
-        if not np.linalg.norm(rates, axis=1).max() > MIN_RATE_RAD_S:
-            raise Fault("no_motion", "the arm stands still in the whole recording", "Record a run with sweeps")
-        self.rate = CubicSpline(times_s, rates)
-        close = np.diff(self.time_s) <= MAX_STATE_STEP_S
-        self._covered = close & np.append(close[1:], True) & np.append(True, close[:-1])
-
-    def attitude(self, start_s: float, end_s: float) -> Array:
-        """(3, 3) mean rotation from the base frame into the flange's between two controller times."""
-        times_s = np.linspace(start_s, end_s, ATTITUDES, endpoint=False) + (end_s - start_s) / (2 * ATTITUDES)
-        mean: Array = flange_attitude(self.angles(times_s), self.kinematics).mean(axis=0)
-        return mean
-
-    def covered(self, time_s: Array) -> NDArray[np.bool_]:
-        """Which of these times (n,) lie where states follow each other closely enough for `rate` to be true."""
-        interval = np.searchsorted(self.time_s, time_s, side="right") - 1
-        inside = (interval >= 0) & (interval < len(self._covered))
-        known: NDArray[np.bool_] = inside & self._covered[np.clip(interval, 0, len(self._covered) - 1)]
-        return known
-
-
 def estimate_time_base(board_time_s: Array, readings_rad_s: Array, motion: KnownMotion) -> TimeBase:
     """The board's clock against that of what turned it, from readings (n, 3) taken at board times (n,).
 
@@ -122,7 +71,7 @@ def estimate_time_base(board_time_s: Array, readings_rad_s: Array, motion: Known
     `stuck_axis`, `time_base_not_found`.
     """
     _check_samples(board_time_s, readings_rad_s)
-    _check_span(motion.time_s, "the states or attitudes")
+    check_span(motion.time_s, "the states or attitudes")
     clock, known = _begun(board_time_s, readings_rad_s, motion)
     while True:
         # The clock so far says which samples to use; a choice that followed the fine one might never settle.
@@ -145,7 +94,7 @@ def _check_samples(board_time_s: Array, readings: Array) -> None:
     if len(board_time_s) < MIN_SAMPLES:
         raise _not_found(f"the recording holds {len(board_time_s)} samples")
     if not np.isfinite(readings).all():
-        raise _not_finite("a reading")
+        raise not_finite("a reading")
     if np.any(np.diff(board_time_s) == 0):
         raise Fault(
             "duplicated_samples",
@@ -158,7 +107,7 @@ def _check_samples(board_time_s: Array, readings: Array) -> None:
             "the board's clock goes back within the recording: the board was reset",
             "Check the board's power and cable, then record again",
         )
-    _check_span(board_time_s, "the samples")
+    check_span(board_time_s, "the samples")
     still = np.ptp(readings, axis=0) == 0
     if still.all():
         raise Fault(
@@ -298,31 +247,8 @@ def _refined(clock: TimeBase, board_time_s: Array, readings: Array, motion: Know
     )
 
 
-def check_arms_times(states: NDArray[Any]) -> None:
-    """Of a recording whose times nobody could follow. Raises Fault `not_finite`, `impossible_times`."""
-    time_s = np.unique(states["time_s"])
-    if not np.isfinite(time_s).all():
-        raise _not_finite("an arm state")
-    if len(time_s):
-        _check_span(time_s, "the arm's states")
-
-
-def _check_span(time_s: Array, what: str) -> None:
-    span_s = time_s[-1] - time_s[0]
-    if span_s > MAX_SPAN_S:
-        raise Fault(
-            "impossible_times",
-            f"{what} in the recording reach over {span_s / 3600:.3g} h",
-            "Do not use this recording, which is damaged; make a new one",
-        )
-
-
 def _triple(values: Array) -> str:
     return ", ".join(f"{value:.4g}" for value in values)
-
-
-def _not_finite(what: str) -> Fault:
-    return Fault("not_finite", f"{what} in the recording is not a number", "Do not use this recording; make a new one")
 
 
 def _not_found(what: str) -> Fault:

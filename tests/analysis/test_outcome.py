@@ -14,8 +14,9 @@ from rig.analysis.outcome import calibrated, verified, verified_alone
 from rig.data.run_file import RunData, read_run
 from rig.errors import Fault, Refused
 from rig.estimation.vector_model import solve_vector_model
+from rig.observation.arm_motion import ArmMotion
 from rig.observation.observe import observe_sensor
-from rig.observation.timebase import ArmMotion, estimate_time_base
+from rig.observation.timebase import estimate_time_base
 from support.paths import FIXTURES
 
 

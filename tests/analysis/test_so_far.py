@@ -10,9 +10,9 @@ from rig.data.events import SweepFinished
 from rig.data.run_file import RunData
 from rig.errors import Fault
 from rig.estimation.vector_model import VectorSolution
+from rig.observation.arm_motion import ArmMotion
 from rig.observation.average import on_the_arms_clock
 from rig.observation.observe import Observation
-from rig.observation.timebase import ArmMotion
 from rig.observation.windows import swept
 from support.synthetic_run import BIAS_RAD_S, SCALE, Setup, synthetic_run
 

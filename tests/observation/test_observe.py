@@ -14,10 +14,11 @@ from rig.data.run_file import RunData
 from rig.data.settings import ObservationThresholds
 from rig.errors import Fault, Refused
 from rig.estimation.arrays import Array
+from rig.observation.arm_motion import ArmMotion
 from rig.observation.colour import noise_left, widening
 from rig.observation.observe import SensorObservations
 from rig.observation.observed_run import observe_run
-from rig.observation.timebase import ArmMotion, TimeBase, estimate_time_base
+from rig.observation.timebase import TimeBase, estimate_time_base
 from rig.observation.windows import swept
 from rig.report.sensor_entry import sensor_entry
 from support.solving import solve_runs

@@ -10,7 +10,6 @@ from pathlib import Path
 
 import numpy as np
 
-from rig.arm.state import JOINT_NAMES
 from rig.config.written_file import new_file, write_new
 from rig.data.quantity import ACCELERATION, FIELD, RATE
 from rig.estimation.arrays import Array
@@ -40,7 +39,7 @@ def tables_of(recordings: Sequence[ObservedRun]) -> Iterator[Table]:
     """
     for number, recording in enumerate(recordings, start=1):
         after = "" if number == 1 else f"-{number}"
-        yield Table(f"arm{after}", _arm(recording), f"Joint angles and rates, base to wrist 3. {CLOCK} {LOST}")
+        yield Table(f"arm{after}", recording.motion.table(), f"Joint angles and rates, base to wrist 3. {CLOCK} {LOST}")
         for name, sensor in recording.run.sensors.items():
             stream = recording.stream(name)
             whose = f"{name}, {sensor.part} {sensor.serial_number}, {sensor.mode} readings in the sensor's own axes."
@@ -57,13 +56,6 @@ def tables_of(recordings: Sequence[ObservedRun]) -> Iterator[Table]:
                 whose = f"{name}, {part}, raw readings in tesla in the magnetometer's own axes."
                 columns = {"time_s": found[0], **_split(FIELD.columns, found[1])}
                 yield Table(f"{name}{after}", columns, f"{whose} {CLOCK} {LOST}")
-
-
-def _arm(recording: ObservedRun) -> dict[str, Array]:
-    states = recording.motion.states
-    angles = {f"{joint}_rad": states["q_rad"][:, i] for i, joint in enumerate(JOINT_NAMES)}
-    rates = {f"{joint}_rad_s": states["qd_rad_s"][:, i] for i, joint in enumerate(JOINT_NAMES)}
-    return {"time_s": states["time_s"], **angles, **rates}
 
 
 def _readings(stream: Stream) -> dict[str, Array]:

@@ -1,0 +1,131 @@
+"""The recorded arm as a function of time: all that is read of its states is read here."""
+
+from collections.abc import Sequence
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from rig.arm.kinematics import NOMINAL, DenavitHartenberg, axis_errors, flange_arm, flange_attitude, flange_rate
+from rig.arm.motion import Sweep
+from rig.arm.state import JOINT_NAMES
+from rig.data.run_file import RunData
+from rig.data.settings import ObservationThresholds
+from rig.errors import Fault
+from rig.estimation.arrays import Array
+from rig.observation.known_motion import check_span, closely_followed, not_finite
+from rig.observation.revolution import MAX_STATE_STEP_S, Revolution, find_revolution
+from rig.observation.windows import Window
+
+MIN_RATE_RAD_S = 0.01
+RATE_STEP_S = 0.008  # joint angles that are closer in time tell more of their encoders' noise than of a rate
+ATTITUDES = 72  # of which a mean is made: over a whole turn what is perpendicular to the axis averages out
+
+
+class ArmMotion:
+    """A `Motion` of an arm: `angles(t)` (n, 6) rad of its joints, `rate(t)` (n, 3) rad/s of its flange.
+
+    Rates come from the recorded joint angles rather than from the controller's velocity signal, which is filtered.
+    `states` is (m,) ARM_STATE_DTYPE of an arm of that `kinematics`.
+    Raises Fault `no_motion`, `not_finite`, `impossible_times`.
+    """
+
+    def __init__(self, states: NDArray[Any], kinematics: DenavitHartenberg = NOMINAL) -> None:
+        from scipy.interpolate import CubicSpline
+
+        self.kinematics = kinematics
+        self.time_s, first = np.unique(states["time_s"], return_index=True)
+        self._states = states[first]
+        if len(self.time_s) < 4:
+            raise Fault(
+                "no_motion", f"the recording holds {len(self.time_s)} arm states", "Record a run with the arm on"
+            )
+        if not (np.isfinite(self.time_s).all() and np.isfinite(self._states["q_rad"]).all()):
+            raise not_finite("an arm state")
+        check_span(self.time_s, "the arm's states")
+        self.angles = CubicSpline(self.time_s, self._states["q_rad"])
+        every = min(round(RATE_STEP_S / float(np.median(np.diff(self.time_s)))), len(self.time_s) // 4)
+        times_s, angles = self.time_s[:: max(every, 1)], self._states["q_rad"][:: max(every, 1)]
+        rates = flange_rate(angles, CubicSpline(times_s, angles)(times_s, 1), kinematics)
+        if not np.linalg.norm(rates, axis=1).max() > MIN_RATE_RAD_S:
+            raise Fault("no_motion", "the arm stands still in the whole recording", "Record a run with sweeps")
+        self.rate = CubicSpline(times_s, rates)
+        close = np.diff(self.time_s) <= MAX_STATE_STEP_S
+        self._covered = close & np.append(close[1:], True) & np.append(True, close[:-1])
+
+    @property
+    def host_time_s(self) -> Array:
+        """The times (m,) of this computer at which the states of `time_s` came."""
+        times_s: Array = self._states["host_time_s"]
+        return times_s
+
+    def attitude(self, start_s: float, end_s: float) -> Array:
+        """The mean rotation (3, 3) from the base frame into the flange's between two controller times."""
+        times_s = np.linspace(start_s, end_s, ATTITUDES, endpoint=False) + (end_s - start_s) / (2 * ATTITUDES)
+        mean: Array = flange_attitude(self.angles(times_s), self.kinematics).mean(axis=0)
+        return mean
+
+    def covered(self, time_s: Array) -> NDArray[np.bool_]:
+        """Which of these times (n,) lie where states follow each other closely enough for `rate` to be true."""
+        return closely_followed(self.time_s, self._covered, time_s)
+
+    def moved_rad(self, window: Window) -> float | None:
+        """How far the joint that moved most was moved in a window; None where no two states tell."""
+        q_rad = self._q_rad(window)
+        return float(np.ptp(q_rad, axis=0).max()) if len(q_rad) > 1 else None
+
+    def away_rad(self, window: Window, q_rad: Sequence[float]) -> float | None:
+        """How far any joint ever was from the pose `q_rad` (6,) in a window; None where no state tells."""
+        seen_rad = self._q_rad(window)
+        return float(np.abs(seen_rad - np.array(q_rad)).max()) if len(seen_rad) else None
+
+    def angle(self, sweep: Sweep, time_s: Array | float, derivative: int = 0) -> Array:
+        """The angle (n,) rad of the joint that a sweep turns, at times (n,); with `derivative` 1 its rate in rad/s."""
+        angle: Array = self.angles(time_s, derivative)[..., sweep.joint]
+        return angle
+
+    def turn(self, sweep: Sweep, window: Window, thresholds: ObservationThresholds) -> Revolution:
+        """The whole turn of a sweep that was made in a window.
+
+        Raises Fault `incomplete_revolution`, `arm_states_lost`, `slider_below_100`, `speed_not_constant`,
+        `other_joint_moved`.
+        """
+        begin, end = np.searchsorted(self.time_s, [window.start_s, window.end_s])
+        found = find_revolution(self._states[max(begin - 1, 0) : end + 1], sweep, thresholds)
+        began = self.angles(found.start_s)
+        rate = self.rate(found.time_s).mean(axis=0)
+        growing = 1 if sweep.direction == "ccw" else -1
+        return Revolution(
+            found.start_s,
+            found.end_s,
+            found.duration_std_s,
+            axis_flange=rate / np.linalg.norm(rate),
+            attitude=flange_attitude(began, self.kinematics),
+            axis_errors=growing * axis_errors(began, sweep.joint, self.kinematics),
+            arm_m=flange_arm(began, sweep.joint, self.kinematics),
+            station=(sweep.joint, *np.round(np.delete(began, sweep.joint), 2).tolist()),
+        )
+
+    def table(self) -> dict[str, Array]:
+        """The states as columns (m,) by name: times, and the joints' angles and rates as the controller tells them."""
+        angles = {f"{joint}_rad": self._states["q_rad"][:, i] for i, joint in enumerate(JOINT_NAMES)}
+        rates = {f"{joint}_rad_s": self._states["qd_rad_s"][:, i] for i, joint in enumerate(JOINT_NAMES)}
+        return {"time_s": self.time_s, **angles, **rates}
+
+    def _q_rad(self, window: Window) -> Array:
+        q_rad: Array = self._states["q_rad"][(self.time_s >= window.start_s) & (self.time_s <= window.end_s)]
+        return q_rad
+
+
+def motion_of(run: RunData) -> ArmMotion:
+    """The arm of a recording. Raises Fault `no_motion`, `not_finite`, `impossible_times`."""
+    return ArmMotion(run.arm, run.provenance.kinematics)
+
+
+def check_arms_times(states: NDArray[Any]) -> None:
+    """A recording's times are looked at that nobody could follow. Raises Fault `not_finite`, `impossible_times`."""
+    time_s = np.unique(states["time_s"])
+    if not np.isfinite(time_s).all():
+        raise not_finite("an arm state")
+    if len(time_s):
+        check_span(time_s, "the arm's states")
