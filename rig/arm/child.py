@@ -174,8 +174,8 @@ class _Child:
         except RuntimeError as error:
             self._holds_arm = False
             return Failed(_control_failure(self._host, str(error)))
-        self._control.setPayload(request.payload_kg, list(request.payload_centre_m))
-        return self._await_payload(request.payload_kg)
+        self._control.setPayload(request.carried.payload_kg, list(request.carried.centre_m))
+        return self._await_payload(request.carried.payload_kg)
 
     def _await_payload(self, wanted_kg: float) -> Message:
         """Wait until the states show the payload."""

@@ -6,6 +6,7 @@ from typing import NamedTuple
 
 import numpy as np
 
+from rig.arm.carried import Carried
 from rig.arm.kinematics import NOMINAL, DenavitHartenberg, distance_to_forearm, distance_to_upper_arm
 from rig.arm.motion import Dwell, Plan, Rest, travel
 from rig.arm.state import Joints
@@ -26,9 +27,6 @@ OTHER_ATTITUDES = "Bring wrist 2 nearer to -90 or 90 in procedure.attitudes, or 
 OTHER_HOME = "Set wrist 1 in arm.home_deg between -180 and 0: then wrist 2 sweeps beside the forearm"
 NEARER_HOME = "Bring the arm near its home pose from the pendant"
 
-Offset = tuple[float, float, float]
-NONE: Offset = (0.0, 0.0, 0.0)
-
 
 class _Way(NamedTuple):
     """The poses (N, 6) of a step, how near the forearm they may come, and what to do about it."""
@@ -39,15 +37,14 @@ class _Way(NamedTuple):
     remedy: str
 
 
-def clearance_problems(
-    plan: Plan, payload_centre_mm: Offset, extension_mm: Offset = NONE, arm: DenavitHartenberg = NOMINAL
-) -> list[Problem]:
-    """Dwells and motions that bring the flange or its payload's centre, x y z in its frame, too near the forearm.
+def clearance_problems(plan: Plan, carried: Carried, arm: DenavitHartenberg = NOMINAL) -> list[Problem]:
+    """Dwells and motions that bring the flange, its payload's centre or its extension too near the forearm.
 
-    So with an extension from the flange to `extension_mm`, which keeps clear of the upper arm as well. By lengths of
-    `arm`. What begins or ends at an attitude keeps `FOREARM_CLEARANCE_M`, all else `SWEEP_CLEARANCE_M`.
-    The way from where the arm stands is judged where the plan begins there.
+    An extension keeps clear of the upper arm as well. By lengths of `arm`. What begins or ends at an attitude keeps
+    `FOREARM_CLEARANCE_M`, all else `SWEEP_CLEARANCE_M`. The way from where the arm stands is judged where the plan
+    begins there.
     """
+    extension = _along(carried)
     near = [
         Problem(
             "forearm_too_near",
@@ -56,7 +53,7 @@ def clearance_problems(
             way.remedy,
         )
         for way in _ways(plan)
-        for what, distance_m in [_nearest(way.q_rad, payload_centre_mm, extension_mm, arm)]
+        for what, distance_m in [_nearest(way.q_rad, carried, arm)]
         if distance_m < way.least_m
     ]
     return near + [
@@ -66,15 +63,13 @@ def clearance_problems(
             f"{SWEEP_CLEARANCE_M:g} m is the least",
             "Take a shorter extension, or open the elbow in arm.home_deg",
         )
-        for way in (_ways(plan) if any(extension_mm) else ())
-        for distance_m in [min(float(distance_to_upper_arm(way.q_rad, p, arm).min()) for p in _along(extension_mm))]
+        for way in (_ways(plan) if extension else ())
+        for distance_m in [min(float(distance_to_upper_arm(way.q_rad, p, arm).min()) for p in extension)]
         if distance_m < SWEEP_CLEARANCE_M
     ]
 
 
-def keeps_clear(
-    start_q_rad: Joints, target_q_rad: Joints, payload_centre_mm: Offset, extension_mm: Offset = NONE
-) -> bool:
+def keeps_clear(start_q_rad: Joints, target_q_rad: Joints, carried: Carried) -> bool:
     """Whether a straight way in joint space is clear enough of the forearm for sweeps and what lies between them.
 
     By the nominal arm, of which plans are made before an arm is there.
@@ -82,25 +77,23 @@ def keeps_clear(
     """
     if not _within_limits(start_q_rad, target_q_rad):
         return True
-    _, distance_m = _nearest(_between(start_q_rad, target_q_rad), payload_centre_mm, extension_mm, NOMINAL)
+    _, distance_m = _nearest(_between(start_q_rad, target_q_rad), carried, NOMINAL)
     return distance_m >= SWEEP_CLEARANCE_M
 
 
-def _nearest(
-    q_rad: Array, payload_centre_mm: Offset, extension_mm: Offset, arm: DenavitHartenberg
-) -> tuple[str, float]:
+def _nearest(q_rad: Array, carried: Carried, arm: DenavitHartenberg) -> tuple[str, float]:
     """What comes nearest to the forearm in the poses (N, 6), and how near, m."""
-    points = [("flange", np.zeros(3)), ("payload", np.array(payload_centre_mm) / 1000)]
-    points += [("extension", point) for point in (_along(extension_mm) if any(extension_mm) else ())]
+    points = [("flange", np.zeros(3)), ("payload", np.array(carried.centre_m))]
+    points += [("extension", point) for point in _along(carried)]
     distances = [(what, float(distance_to_forearm(q_rad, point, arm).min())) for what, point in points]
     return min(distances, key=lambda each: each[1])
 
 
-def _along(extension_mm: Offset) -> list[Array]:
-    """Points of an extension in the flange's frame, m, its end the last; those at the flange are the flange's own."""
-    end = np.array(extension_mm) / 1000
+def _along(carried: Carried) -> list[Array]:
+    """Points of an extension in the flange's frame, m, its end the last; none at the flange, nor without one."""
+    end = np.array(carried.extension_m)
     count = 1 + int(np.linalg.norm(end) / ALONG_THE_EXTENSION_M)
-    return [end * part / count for part in range(1, count + 1)]
+    return [end * part / count for part in range(1, count + 1)] if end.any() else []
 
 
 def _within_limits(*poses: Joints) -> bool:

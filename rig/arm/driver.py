@@ -8,6 +8,7 @@ from pathlib import Path
 from types import TracebackType
 from typing import Self
 
+from rig.arm.carried import Carried
 from rig.arm.child_link import ChildLink
 from rig.arm.condition import program_interruption, readiness
 from rig.arm.dashboard import Dashboard
@@ -132,8 +133,8 @@ class Arm:
 
     # Moving -------------------------------------------------------------------------------------------------------
 
-    def take_control(self, payload_kg: float, payload_centre_m: tuple[float, float, float]) -> None:
-        """Upload the control script and set the payload (kg; m from the flange). Raises `Refused` by name.
+    def take_control(self, carried: Carried) -> None:
+        """Upload the control script and set the payload. Raises `Refused` by name.
 
         The client would end a program that runs, so a running program is refused here.
         """
@@ -146,7 +147,7 @@ class Arm:
         self._stopper.descriptors.keep()
         with self._stopping_on_error(), self._link.patience():
             self._holds_arm = True
-            self._request(TakeControl(payload_kg, payload_centre_m))
+            self._request(TakeControl(carried))
             self._wait(lambda: self._answer is not None)
             if isinstance(self._answer, Failed):
                 self._holds_arm = False

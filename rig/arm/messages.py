@@ -2,6 +2,7 @@
 
 from dataclasses import dataclass
 
+from rig.arm.carried import Carried
 from rig.arm.state import ArmState, Joints
 from rig.errors import Problem
 
@@ -12,8 +13,7 @@ from rig.errors import Problem
 class TakeControl:
     """Upload the control script and set the payload. Answered by `ControlTaken` or `Failed`."""
 
-    payload_kg: float
-    payload_centre_m: tuple[float, float, float]
+    carried: Carried
 
 
 @dataclass(frozen=True, slots=True)

@@ -5,7 +5,8 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from rig.arm.clearance import NONE, Offset, clearance_problems
+from rig.arm.carried import Carried, carried_by
+from rig.arm.clearance import clearance_problems
 from rig.arm.condition import readiness
 from rig.arm.identity import identity_problems
 from rig.arm.kinematics import NOMINAL, DenavitHartenberg, flange_axes
@@ -37,9 +38,7 @@ def preflight_problems(plans: Sequence[Plan], arm: ArmSection, report: ArmReport
 def _plan_problems_on(plan: Plan, arm: ArmSection, report: ArmReport) -> list[Problem]:
     return plan_problems(
         plan,
-        arm.payload_kg,
-        arm.payload_centre_mm,
-        arm.extension_mm,
+        carried_by(arm),
         arm=_geometry(arm, report),
         told=None if report.setup is None else report.setup.limits,
     )
@@ -47,9 +46,7 @@ def _plan_problems_on(plan: Plan, arm: ArmSection, report: ArmReport) -> list[Pr
 
 def plan_problems(
     plan: Plan,
-    payload_kg: float,
-    payload_centre_mm: Offset = NONE,
-    extension_mm: Offset = NONE,
+    carried: Carried,
     *,
     arm: DenavitHartenberg = NOMINAL,
     told: JointLimits | None = None,
@@ -61,12 +58,12 @@ def plan_problems(
     """
     problems = step_problems(plan)
     problems += [problem for motion in plan.motions if _travels(motion) for problem in motion_problems(motion, told)]
-    problems += clearance_problems(plan, payload_centre_mm, extension_mm, arm)
-    if not 0 <= payload_kg <= PAYLOAD_LIMIT_KG:
+    problems += clearance_problems(plan, carried, arm)
+    if not 0 <= carried.payload_kg <= PAYLOAD_LIMIT_KG:
         problems.append(
             Problem(
                 "payload_too_heavy",
-                f"the payload of {payload_kg:g} kg is outside 0 to {PAYLOAD_LIMIT_KG:g} kg",
+                f"the payload of {carried.payload_kg:g} kg is outside 0 to {PAYLOAD_LIMIT_KG:g} kg",
                 "Weigh the fixture and correct arm.payload_kg",
             )
         )

@@ -5,6 +5,7 @@ from pathlib import Path
 
 from rig.analysis.attitude_account import attitude_account
 from rig.analysis.planned import planned_told_from
+from rig.arm.carried import carried_by
 from rig.arm.preflight import plan_problems, refuse
 from rig.commands.configured import configured
 from rig.report.plan_table import print_plan
@@ -18,8 +19,7 @@ def plan(config_path: Path, overrides: Sequence[str], script: Path | None, *, as
     found = configured(config_path, overrides, script)
     steps = found.phase.plan()
     config = found.loaded.config
-    arm = config.arm
-    refuse(plan_problems(steps, arm.payload_kg, arm.payload_centre_mm, arm.extension_mm))
+    refuse(plan_problems(steps, carried_by(config.arm)))
     account, told_from = attitude_account(config, steps), planned_told_from(config, steps)
     print_plan(steps, account, told_from, repeated=found.phase.follows is not None, as_json=as_json)
     return 0

@@ -8,6 +8,7 @@ from itertools import permutations, product
 
 import numpy as np
 
+from rig.arm.carried import carried_by
 from rig.arm.clearance import keeps_clear
 from rig.arm.kinematics import flange_axes
 from rig.arm.motion import Plan, Rest, Step, Sweep, trapezoid_duration
@@ -181,9 +182,9 @@ def _connected(
     """
     speed, acceleration = math.radians(arm.transfer_speed_deg_s), math.radians(procedure.acceleration_deg_s2)
     yield from approach(start, home, speed, acceleration)
-    here = home
+    here, carried = home, carried_by(arm)
     for sweep in sweeps:
-        if not _clear(here, sweep.start_q_rad, arm.payload_centre_mm, arm.extension_mm):
+        if not _clear(here, sweep.start_q_rad, carried):
             yield from transfer("transfer home", here, home, speed, acceleration)
             here = home
         yield from transfer(f"transfer to the start of {sweep.name}", here, sweep.start_q_rad, speed, acceleration)

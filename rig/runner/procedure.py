@@ -10,6 +10,7 @@ from contextlib import contextmanager
 from dataclasses import dataclass
 from math import degrees, radians
 
+from rig.arm.carried import carried_by
 from rig.arm.kinematics import DenavitHartenberg
 from rig.arm.motion import Dwell, Motion, Plan, Rest, Step, Sweep, Transfer, travel
 from rig.arm.preflight import preflight_problems, refuse, way_to_home
@@ -54,13 +55,13 @@ SAME_POSE_RAD = radians(1)  # what was announced and agreed to still holds
 class Devices:
     """What is connected.
 
-    `turner` turns the sensors; `report` is how it stood, `payload` what it carries; `sources` are where samples come
+    `turner` turns the sensors; `report` is how it stood, `arm` how it is configured; `sources` are where samples come
     from.
     """
 
     turner: Turner
     report: ArmReport
-    payload: ArmSection
+    arm: ArmSection
     sources: tuple[SampleSource, ...]
     acquisition: Acquisition
 
@@ -117,15 +118,14 @@ class Rig:
         A movement that was agreed to before begins without asking, unless the arm no longer stands where it was left.
         Raises `Refused` naming every problem found; nothing has moved then.
         """
-        report, payload = self.devices.report, self.devices.payload
-        refuse(preflight_problems([self.whole_plan, self.plan], payload, report))
+        report, arm = self.devices.report, self.devices.arm
+        refuse(preflight_problems([self.whole_plan, self.plan], arm, report))
         self.recording.station.event(PreflightPassed(self.plan, report))
         away_rad = max(map(abs, way_to_home(self.plan, report.state.q_rad)))
         if not (self.phase.agreed and away_rad <= SAME_POSE_RAD):
             self._agree()
         self._refuse_moved()
-        x, y, z = (millimetres / 1000 for millimetres in payload.payload_centre_mm)
-        self.devices.turner.take_control(payload.payload_kg, (x, y, z))
+        self.devices.turner.take_control(carried_by(arm))
         self._motions = iter(self.plan.motions)
 
     def _agree(self) -> None:

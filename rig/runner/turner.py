@@ -3,6 +3,7 @@
 from collections.abc import Callable
 from typing import Protocol
 
+from rig.arm.carried import Carried
 from rig.arm.motion import Motion
 from rig.arm.state import ArmReport, ArmState
 
@@ -34,8 +35,8 @@ class Turner(Protocol):
         """Raise what has gone wrong meanwhile."""
         ...
 
-    def take_control(self, payload_kg: float, payload_centre_m: tuple[float, float, float]) -> None:
-        """Make it ready to move what it carries (kg; m from the flange). Raises `Refused` by name."""
+    def take_control(self, carried: Carried) -> None:
+        """Make it ready to move what it carries. Raises `Refused` by name."""
         ...
 
     def move(self, motion: Motion, watch: Callable[[], None] = ...) -> None:

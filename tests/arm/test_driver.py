@@ -20,6 +20,7 @@ from typing import Any
 import numpy as np
 import pytest
 
+from rig.arm.carried import Carried
 from rig.arm.child_link import FROZEN_TICKS, TICK_S
 from rig.arm.driver import Arm, look
 from rig.arm.motion import Transfer, trapezoid_duration
@@ -37,7 +38,7 @@ from support.worlds import World, WorldHandle
 
 pytestmark = pytest.mark.slow
 
-PAYLOAD = (0.35, (0.0, 0.0, 0.025))
+PAYLOAD = Carried(0.35, (0.0, 0.0, 0.025))
 WRIST_3 = 5
 
 
@@ -76,14 +77,14 @@ class AtSpeed:
 
 def test_a_look_moves_nothing_and_stops_no_program(laboratory: WorldHandle) -> None:
     with Arm(laboratory.host) as other:
-        other.take_control(*PAYLOAD)
+        other.take_control(PAYLOAD)
         report = look(laboratory.host)
         assert report.program_running
         assert report.remote_control
-        assert report.payload_kg == pytest.approx(PAYLOAD[0])
+        assert report.payload_kg == pytest.approx(PAYLOAD.payload_kg)
         assert report.serial_number.isdigit()
         with Arm(laboratory.host) as second, pytest.raises(Refused) as refused:
-            second.take_control(*PAYLOAD)
+            second.take_control(PAYLOAD)
         assert refused.value.name == "program_running"
         assert laboratory.state()["program_running"]
     assert stands(laboratory)
@@ -114,8 +115,8 @@ def test_moves_arrive_in_time_and_states_come_without_gaps(world: World) -> None
     laboratory = world({"world": {"time_scale": 1}})
     states: list[ArmState] = []
     with Arm(laboratory.host, states.append, state_rate_hz=500) as arm:
-        arm.take_control(*PAYLOAD)
-        assert laboratory.state()["payload_kg"] == pytest.approx(PAYLOAD[0])
+        arm.take_control(PAYLOAD)
+        assert laboratory.state()["payload_kg"] == pytest.approx(PAYLOAD.payload_kg)
         out = turn(arm.latest.q_rad, 1.0)
         began_s = arm.latest.time_s
         arm.move(out)
@@ -141,11 +142,11 @@ def test_a_planned_sweep_turns_a_whole_revolution_at_its_speed(laboratory: World
     report = look(laboratory.host)
     procedure = SixObservationSection(speed_deg_s=120, acceleration_deg_s2=400)
     plan = plan_six_observation(ArmSection(host=laboratory.host, payload_kg=0.35), procedure, report.state.q_rad)
-    assert plan_problems(plan, 0.35) + arm_problems(plan, report) == []
+    assert plan_problems(plan, PAYLOAD) + arm_problems(plan, report) == []
     states: list[ArmState] = []
     sweep = plan.sweeps[0]
     with Arm(laboratory.host, states.append) as arm:
-        arm.take_control(*PAYLOAD)
+        arm.take_control(PAYLOAD)
         for motion in plan.motions[: plan.motions.index(sweep) + 1]:
             began_s = arm.latest.time_s
             arm.move(motion)
@@ -174,7 +175,7 @@ def test_a_fault_during_a_move_is_named_and_the_arm_stands_still(
     laboratory: WorldHandle, name: str, order: dict[str, Any]
 ) -> None:
     with Arm(laboratory.host) as arm:
-        arm.take_control(*PAYLOAD)
+        arm.take_control(PAYLOAD)
         watch = AtSpeed(arm, lambda: laboratory.control(order))
         with watched_crowd() as crowd, pytest.raises(Fault) as fault:
             arm.move(turn(arm.latest.q_rad, 6.0), watch)
@@ -190,7 +191,7 @@ def test_somebody_elses_program_in_place_of_ours_is_noticed_and_stopped(laborato
     """It runs a moment later: the states show ours stopped for 20 ms."""
     nudge = b"def nudge():\n movej([0.0, -1.57, 1.57, -1.57, -1.57, -6.0], a=2, v=1)\nend\n"
     with Arm(laboratory.host) as arm:
-        arm.take_control(*PAYLOAD)
+        arm.take_control(PAYLOAD)
         with pytest.raises(Fault) as fault:
             arm.move(turn(arm.latest.q_rad, 6.0), AtSpeed(arm, lambda: upload(laboratory, nudge)))
         assert fault.value.name == "program_stopped"
@@ -200,7 +201,7 @@ def test_somebody_elses_program_in_place_of_ours_is_noticed_and_stopped(laborato
 def test_a_program_that_a_reconnecting_client_leaves_behind_is_stopped(laboratory: WorldHandle) -> None:
     """No state confirms the stop, and the client's own program runs again before the client is ended."""
     with Arm(laboratory.host) as arm:
-        arm.take_control(*PAYLOAD)
+        arm.take_control(PAYLOAD)
         with pytest.raises(Fault):
             arm.move(turn(arm.latest.q_rad, 6.0), AtSpeed(arm, lambda: laboratory.control({"do": "hold"})))
         laboratory.control({"do": "run"})
@@ -212,7 +213,7 @@ def test_a_program_that_a_reconnecting_client_leaves_behind_is_stopped(laborator
 
 def test_one_that_it_leaves_behind_a_stop_that_was_seen_is_stopped_too(laboratory: WorldHandle) -> None:
     with Arm(laboratory.host) as arm:
-        arm.take_control(*PAYLOAD)
+        arm.take_control(PAYLOAD)
         with pytest.raises(Fault) as fault:
             arm.move(turn(arm.latest.q_rad, 6.0), AtSpeed(arm, lambda: laboratory.control({"do": "stop_program"})))
         assert "at rest" in fault.value.what
@@ -227,7 +228,7 @@ def test_a_child_that_dies_or_hangs_mid_move_leaves_a_standing_arm_within_a_seco
 ) -> None:
     others = set(multiprocessing.active_children())
     with Arm(laboratory.host) as arm:
-        arm.take_control(*PAYLOAD)
+        arm.take_control(PAYLOAD)
         (child,) = set(multiprocessing.active_children()) - others
         assert child.pid is not None
         stood_s: list[float] = []
@@ -249,7 +250,7 @@ def test_a_child_that_dies_or_hangs_mid_move_leaves_a_standing_arm_within_a_seco
 def test_a_hung_child_is_answered_by_a_stop_also_when_no_descriptor_is_left(laboratory: WorldHandle) -> None:
     others = set(multiprocessing.active_children())
     with Arm(laboratory.host) as arm, ExitStack() as used:
-        arm.take_control(*PAYLOAD)
+        arm.take_control(PAYLOAD)
         (child,) = set(multiprocessing.active_children()) - others
 
         def use_up_and_hang_the_child() -> None:
@@ -270,7 +271,7 @@ def test_a_hung_child_is_answered_by_a_stop_also_when_no_descriptor_is_left(labo
 @pytest.mark.parametrize("where", ["move", "rest"])
 def test_ctrl_c_stops_the_arm_at_once_and_goes_on_to_the_caller(laboratory: WorldHandle, where: str) -> None:
     with Arm(laboratory.host) as arm:
-        arm.take_control(*PAYLOAD)
+        arm.take_control(PAYLOAD)
         interrupted_s = 0.0
 
         def interrupt() -> None:
@@ -303,7 +304,7 @@ def test_three_ctrl_c_at_once_end_with_how_the_arm_was_left(world: World) -> Non
         interrupt()
 
     with pytest.raises(KeyboardInterrupt) as interrupted, Arm(laboratory.host) as arm:
-        arm.take_control(*PAYLOAD)
+        arm.take_control(PAYLOAD)
         arm.move(turn(arm.latest.q_rad, 6.0), AtSpeed(arm, interrupt_thrice))
     assert interrupted.value.__notes__ == ["the arm is stopped and at rest"]
     assert stands(laboratory)
@@ -314,7 +315,7 @@ def test_an_error_of_the_watch_stops_the_arm_and_is_kept(laboratory: WorldHandle
         raise Fault("board_link_lost", "the board is gone", "plug it in")
 
     with Arm(laboratory.host) as arm:
-        arm.take_control(*PAYLOAD)
+        arm.take_control(PAYLOAD)
         with pytest.raises(Fault) as fault:
             arm.move(turn(arm.latest.q_rad, 6.0), AtSpeed(arm, complain))
         assert fault.value.name == "board_link_lost"
@@ -327,7 +328,7 @@ def test_what_the_watch_knows_already_keeps_the_arm_from_moving(laboratory: Worl
 
     states: list[ArmState] = []
     with Arm(laboratory.host, states.append) as arm:
-        arm.take_control(*PAYLOAD)
+        arm.take_control(PAYLOAD)
         with pytest.raises(Fault):
             arm.move(turn(arm.latest.q_rad, 6.0), complain)
     assert states and not any(map(any, (state.qd_rad_s for state in states)))
@@ -339,7 +340,7 @@ def test_a_state_that_cannot_be_passed_on_stops_the_arm(laboratory: WorldHandle)
             raise OSError("no space left on device")
 
     with Arm(laboratory.host, full) as arm:
-        arm.take_control(*PAYLOAD)
+        arm.take_control(PAYLOAD)
         with pytest.raises(Fault) as fault:
             arm.move(turn(arm.latest.q_rad, 6.0))
         assert "no space left on device" in fault.value.what
@@ -362,7 +363,7 @@ def test_an_arm_elsewhere_that_falls_silent_is_missed_at_once_on_a_crowded_compu
     monkeypatch.setattr(os, "getloadavg", lambda: (100.0, 100.0, 100.0))
     with relay(laboratory.host, outside_address()) as wire:
         with Arm(wire.host) as arm:
-            arm.take_control(*PAYLOAD)
+            arm.take_control(PAYLOAD)
             cut = AtSpeed(arm, wire.stalled.set)
             with pytest.raises(Fault) as fault:
                 arm.move(turn(arm.latest.q_rad, 6.0), cut)
@@ -383,7 +384,7 @@ def test_a_program_that_comes_late_to_the_states_does_not_take_its_driver_for_hu
             time.sleep(next(held_up, 0.0))
 
     with Arm(laboratory.host, take) as arm:
-        arm.take_control(*PAYLOAD)
+        arm.take_control(PAYLOAD)
         arm.move(turn(arm.latest.q_rad, 6.0))
         assert next(held_up, None) is None, "nothing was held up"
         assert arm.missed_states == 0
@@ -399,7 +400,7 @@ def test_a_program_that_takes_no_more_states_is_noticed(world: World, monkeypatc
             stuck.wait(30.0)
 
     with Arm(laboratory.host, take) as arm:
-        arm.take_control(*PAYLOAD)
+        arm.take_control(PAYLOAD)
         try:
             with pytest.raises(Fault) as fault:
                 arm.move(turn(arm.latest.q_rad, 6.0))
@@ -430,7 +431,7 @@ def test_a_controller_on_this_machine_that_gets_no_processor_is_no_lost_link(
         os.sched_setaffinity(controller, processors)
 
     with Arm(laboratory.host, states.append) as arm:
-        arm.take_control(*PAYLOAD)
+        arm.take_control(PAYLOAD)
         arm.move(turn(arm.latest.q_rad, 6.0), AtSpeed(arm, hold_up))
         assert arm.missed_states == 0
     held_s = max(after.host_time_s - before.host_time_s for before, after in pairwise(states))
@@ -454,7 +455,7 @@ def test_a_slow_reader_beside_and_a_controller_held_up_for_a_moment_are_no_lost_
     reading = threading.Thread(target=read)
     reading.start()
     with Arm(laboratory.host) as arm:
-        arm.take_control(*PAYLOAD)
+        arm.take_control(PAYLOAD)
         arm.rest(12.0)  # in which the other reader earns patience
 
         def hold_up() -> None:
@@ -475,7 +476,7 @@ def test_a_controller_that_was_silent_before_a_move_has_not_refused_it(
 ) -> None:
     monkeypatch.setattr("rig.arm.silence.crowding", lambda: 5.0)  # so crowded that 3 s of silence are excused
     with Arm(laboratory.host) as arm:
-        arm.take_control(*PAYLOAD)
+        arm.take_control(PAYLOAD)
         laboratory.control({"do": "silence_arm", "duration_s": 3.0})
         with pytest.raises(Fault) as fault:
             arm.move(turn(arm.latest.q_rad, 1.0))
@@ -484,7 +485,7 @@ def test_a_controller_that_was_silent_before_a_move_has_not_refused_it(
 
 def test_an_arm_slower_than_planned_is_stopped(laboratory: WorldHandle) -> None:
     with Arm(laboratory.host) as arm:
-        arm.take_control(*PAYLOAD)
+        arm.take_control(PAYLOAD)
         move = turn(arm.latest.q_rad, 6.0)
         hurried = Transfer(move.name, move.start_q_rad, move.target_q_rad, 1.0, 2.0, duration_s=1.0)
         with pytest.raises(Fault) as fault:
@@ -495,7 +496,7 @@ def test_an_arm_slower_than_planned_is_stopped(laboratory: WorldHandle) -> None:
 
 def test_a_dashboard_that_is_gone_too_is_said_honestly(laboratory: WorldHandle) -> None:
     with Arm(laboratory.host) as arm:
-        arm.take_control(*PAYLOAD)
+        arm.take_control(PAYLOAD)
         cut = AtSpeed(arm, lambda: laboratory.control({"do": "close_arm", "listen": False}))
         with watched_crowd() as crowd, pytest.raises(Fault) as fault:
             arm.move(turn(arm.latest.q_rad, 6.0), cut)
@@ -507,7 +508,7 @@ def test_a_dashboard_that_is_gone_too_is_said_honestly(laboratory: WorldHandle) 
 
 def test_a_speed_the_client_refuses_is_named(laboratory: WorldHandle) -> None:
     with Arm(laboratory.host) as arm:
-        arm.take_control(*PAYLOAD)
+        arm.take_control(PAYLOAD)
         with pytest.raises(Fault) as fault:
             arm.move(replace(turn(arm.latest.q_rad, 1.0), speed_rad_s=4.0))
         assert fault.value.name == "move_refused"
@@ -516,7 +517,7 @@ def test_a_speed_the_client_refuses_is_named(laboratory: WorldHandle) -> None:
 
 def test_a_move_beyond_the_limits_is_refused_by_the_controller_and_named(laboratory: WorldHandle) -> None:
     with Arm(laboratory.host) as arm:
-        arm.take_control(*PAYLOAD)
+        arm.take_control(PAYLOAD)
         with pytest.raises(Fault) as fault:
             arm.move(turn(arm.latest.q_rad, 7.0))
         assert fault.value.name == "program_stopped"
@@ -539,7 +540,7 @@ def test_control_is_refused_by_name_before_anything_moves(
         laboratory.control(order)
     with Arm(laboratory.host) as arm:
         with pytest.raises(Refused) as refused:
-            arm.take_control(*PAYLOAD)
+            arm.take_control(PAYLOAD)
         assert refused.value.name == name
         assert refused.value.remedy
     assert not laboratory.state()["program_running"]
@@ -547,7 +548,7 @@ def test_control_is_refused_by_name_before_anything_moves(
 
 def test_a_payload_the_controller_does_not_take_is_refused(laboratory: WorldHandle) -> None:
     with Arm(laboratory.host) as arm, pytest.raises(Refused) as refused:
-        arm.take_control(20.0, PAYLOAD[1])
+        arm.take_control(replace(PAYLOAD, payload_kg=20.0))
     assert refused.value.name == "payload_not_set"
     assert "20 kg" in refused.value.what
     assert stands(laboratory)
@@ -564,12 +565,13 @@ def test_a_speed_slider_below_full_is_refused_in_preflight(laboratory: WorldHand
 
 PARENT = """
 import sys
+from rig.arm.carried import Carried
 from rig.arm.driver import Arm
 from rig.arm.motion import Transfer
 
 if __name__ == "__main__":
     with Arm(sys.argv[1]) as arm:
-        arm.take_control(0.35, (0.0, 0.0, 0.025))
+        arm.take_control(Carried(0.35, (0.0, 0.0, 0.025)))
         here = arm.latest.q_rad
         print("moving", flush=True)
         arm.move(Transfer("test move", here, (*here[:5], here[5] + 6.0), 1.0, 2.0, 6.5))

@@ -7,6 +7,7 @@ from typing import Any
 import numpy as np
 import pytest
 
+from rig.arm.carried import Carried
 from rig.arm.condition import program_interruption, readiness
 from rig.arm.kinematics import NOMINAL, distance_to_forearm
 from rig.arm.motion import Dwell, Motion, Plan, Rest, Transfer
@@ -28,6 +29,7 @@ from rig.plans.static_attitudes import plan_static_attitudes
 
 HOME_DEG = (0.0, -90.0, 90.0, -90.0, -90.0, 0.0)
 ARM = ArmSection(host="10.0.0.2", payload_kg=0.3)
+LIGHT = Carried(0.3)
 HOME: Joints = tuple(math.radians(angle) for angle in HOME_DEG)
 
 READY = ArmState(
@@ -69,18 +71,18 @@ def names(problems: list[Problem]) -> list[str]:
 
 
 def test_the_default_plan_and_a_ready_arm_have_no_problems() -> None:
-    assert plan_problems(plan(), 0.3) == []
+    assert plan_problems(plan(), LIGHT) == []
     assert arm_problems(plan(), REPORT) == []
 
 
 def test_too_slow_an_acceleration_takes_the_wrist_beyond_its_joint_limit() -> None:
-    problems = plan_problems(plan(speed_deg_s=150, acceleration_deg_s2=80), 0.3)
+    problems = plan_problems(plan(speed_deg_s=150, acceleration_deg_s2=80), LIGHT)
     assert names(problems) == ["joint_limit"]
     assert "wrist_1" in problems[0].what
 
 
 def test_wrists_stay_below_the_speed_that_the_client_accepts() -> None:
-    problems = plan_problems(plan(speed_deg_s=180, acceleration_deg_s2=800), 0.3)
+    problems = plan_problems(plan(speed_deg_s=180, acceleration_deg_s2=800), LIGHT)
     assert names(problems) == ["joint_speed"]
     assert "179.9°/s" in problems[0].what
 
@@ -88,7 +90,7 @@ def test_wrists_stay_below_the_speed_that_the_client_accepts() -> None:
 def test_a_base_that_leads_a_motion_is_held_to_its_own_limit() -> None:
     away = (math.radians(90), *HOME[1:])
     swing = Transfer("swing", HOME, away, math.radians(150), 4.0, 1.0)
-    problems = plan_problems(replace(plan(), steps=(*plan().steps, swing)), 0.3)
+    problems = plan_problems(replace(plan(), steps=(*plan().steps, swing)), LIGHT)
     assert names(problems) == ["joint_speed"]
     assert "base" in problems[0].what
 
@@ -106,15 +108,15 @@ def test_a_base_that_leads_a_motion_is_held_to_its_own_limit() -> None:
 )
 def test_a_step_that_is_none_is_refused_by_name(change: dict[str, Any], name: str) -> None:
     step = replace(Transfer("there", HOME, (*HOME[:5], 0.5), 0.5, 1.0, 2.0), **change)
-    assert names(plan_problems(Plan((step,), HOME, HOME), 0.3)) == [name]
+    assert names(plan_problems(Plan((step,), HOME, HOME), LIGHT)) == [name]
 
 
 def test_a_rest_takes_time() -> None:
-    assert names(plan_problems(Plan((Rest("a rest", 0.0),), HOME, HOME), 0.3)) == ["no_duration"]
+    assert names(plan_problems(Plan((Rest("a rest", 0.0),), HOME, HOME), LIGHT)) == ["no_duration"]
 
 
 def test_payload_beyond_the_arm_is_refused() -> None:
-    assert names(plan_problems(plan(), 13.0)) == ["payload_too_heavy"]
+    assert names(plan_problems(plan(), Carried(13.0))) == ["payload_too_heavy"]
 
 
 @pytest.mark.parametrize(
@@ -199,18 +201,20 @@ def attitudes(*wrists_deg: tuple[float, float, float]) -> Plan:
 
 def test_an_attitude_that_brings_the_flange_to_the_forearm_is_refused() -> None:
     """Wrist 2 at -135° turns it towards the forearm: to 0.092 m, or a little more, by wrist 1."""
-    near = [problem for problem in plan_problems(attitudes((45, -135, 0)), 0.3) if problem.what.startswith("dwell at")]
+    near = [
+        problem for problem in plan_problems(attitudes((45, -135, 0)), LIGHT) if problem.what.startswith("dwell at")
+    ]
     assert names(near) == ["forearm_too_near"]
     assert (
         near[0].what == "dwell at 45 -135 0 brings the flange within 0.095 m of the forearm's line, 0.15 m is the least"
     )
-    assert plan_problems(attitudes((45, -45, 0)), 0.3) == []  # away from it
+    assert plan_problems(attitudes((45, -45, 0)), LIGHT) == []  # away from it
 
 
 def test_a_way_between_sound_attitudes_that_passes_the_forearm_is_refused() -> None:
     made = attitudes((45, -90, 0), (45, -270, 0))
     assert distance_to_forearm(np.array([dwell.q_rad for dwell in made.dwells])).min() > 0.17
-    problems = plan_problems(made, 0.3)
+    problems = plan_problems(made, LIGHT)
     assert names(problems) == ["forearm_too_near"]
     assert all(problem.what.startswith("transfer") for problem in problems)
 
@@ -218,28 +222,31 @@ def test_a_way_between_sound_attitudes_that_passes_the_forearm_is_refused() -> N
 def test_what_the_flange_carries_is_kept_from_the_forearm_too() -> None:
     """Ten degrees beyond -90° the flange itself is clear, at 0.154 m."""
     made = attitudes((45, -100, 0))
-    assert plan_problems(made, 0.3) == []
-    said = {problem.what.split(" brings the ")[1].split()[0] for problem in plan_problems(made, 0.3, (0.0, 0.0, 60.0))}
+    assert plan_problems(made, LIGHT) == []
+    said = {
+        problem.what.split(" brings the ")[1].split()[0]
+        for problem in plan_problems(made, Carried(0.3, (0.0, 0.0, 0.06)))
+    }
     assert said == {"payload"}
 
 
 def test_an_extension_is_kept_from_the_forearm_and_from_the_upper_arm() -> None:
-    def problems(made: Plan, extension_mm: tuple[float, float, float]) -> set[str]:
-        return set(names(plan_problems(made, 0.3, extension_mm=extension_mm)))
+    def problems(made: Plan, extension_m: tuple[float, float, float]) -> set[str]:
+        return set(names(plan_problems(made, Carried(0.3, extension_m=extension_m))))
 
     magnetic = plan_static_attitudes(ARM, StaticAttitudesSection.model_validate({"attitudes": "magnetic"}))
-    assert problems(magnetic, (0.0, 0.0, 320.0)) == set()
+    assert problems(magnetic, (0.0, 0.0, 0.32)) == set()
     # Along the forearm, to which wrist 1 at 0 turns it, it ends near the elbow.
-    assert problems(magnetic, (0.0, 0.0, 350.0)) == {"upper_arm_too_near"}
-    assert problems(attitudes((0, -90, 0)), (120.0, 0.0, 200.0)) == {"forearm_too_near"}, "to the side of the flange"
+    assert problems(magnetic, (0.0, 0.0, 0.35)) == {"upper_arm_too_near"}
+    assert problems(attitudes((0, -90, 0)), (0.12, 0.0, 0.2)) == {"forearm_too_near"}, "to the side of the flange"
     # Half of it may be nearer than its end.
-    assert problems(attitudes((45, -60, 0)), (0.0, 0.0, 300.0)) == set()
+    assert problems(attitudes((45, -60, 0)), (0.0, 0.0, 0.3)) == set()
 
 
 def test_a_way_home_from_an_attitude_is_judged_too() -> None:
     back = Transfer("transfer home", (*HOME[:3], math.radians(45), math.radians(-200), 0.0), HOME, 1.0, 2.0, 3.0)
     dwell = Dwell(0, back.start_q_rad, 3.0, 5.0)
-    problems = plan_problems(Plan((dwell, back), back.start_q_rad, HOME), 0.3)
+    problems = plan_problems(Plan((dwell, back), back.start_q_rad, HOME), LIGHT)
     assert [problem.what.split(" brings")[0] for problem in problems] == [dwell.name, "transfer home"]
 
 
@@ -267,7 +274,7 @@ def test_sweeps_and_the_ways_between_them_keep_clear_of_the_forearm(
 ) -> None:
     """Turning together, wrists 1 and 2 would take the flange to 0.087 m with wrist 2 at 90°: they go through home."""
     made = plan((*HOME_DEG[:4], wrist_2_deg, 0.0), **changes)
-    assert plan_problems(made, 0.3) == []
+    assert plan_problems(made, LIGHT) == []
     assert all(nearest_m(motion) > 0.115 for motion in made.motions)
 
 
@@ -276,8 +283,8 @@ def nearest_m(motion: Motion) -> float:
 
 
 def test_a_home_about_which_wrist_2_sweeps_into_the_forearm_is_refused() -> None:
-    assert plan_problems(plan(SWEPT_BESIDE), 0.3) == []
-    problems = plan_problems(plan(SWEPT_INTO), 0.3)
+    assert plan_problems(plan(SWEPT_BESIDE), LIGHT) == []
+    problems = plan_problems(plan(SWEPT_INTO), LIGHT)
     assert names(problems) == ["forearm_too_near"]
     assert {problem.what for problem in problems} >= {
         f"sweep wrist_2 {way} brings the flange within 0.058 m of the forearm's line, 0.115 m is the least"
@@ -286,22 +293,22 @@ def test_a_home_about_which_wrist_2_sweeps_into_the_forearm_is_refused() -> None
     assert all("wrist 1 in arm.home_deg" in problem.remedy for problem in problems)
 
 
-@pytest.mark.parametrize("below_mm", [25.0, 57.0, 120.0])
-def test_a_fixture_below_the_flange_passes_beside_the_forearm_too(below_mm: float) -> None:
-    assert plan_problems(plan(), 0.3, (0.0, 0.0, below_mm)) == []
-    assert names(plan_problems(plan(), 0.3, (0.0, 60.0, below_mm))) == ["forearm_too_near"]
+@pytest.mark.parametrize("below_m", [0.025, 0.057, 0.12])
+def test_a_fixture_below_the_flange_passes_beside_the_forearm_too(below_m: float) -> None:
+    assert plan_problems(plan(), Carried(0.3, (0.0, 0.0, below_m))) == []
+    assert names(plan_problems(plan(), Carried(0.3, (0.0, 0.06, below_m)))) == ["forearm_too_near"]
 
 
 def test_sweeps_left_out_do_not_lead_the_rest_to_the_forearm() -> None:
     """Straight from the last sweep of wrist 1 that way, the flange would come to 0.087 m."""
     rest = plan_six_observation(ARM, SixObservationSection(), done=(0, 1, 2, 4))
     assert [sweep.index for sweep in rest.sweeps] == [3, 5]
-    assert plan_problems(rest, 0.3) == []
+    assert plan_problems(rest, LIGHT) == []
 
 
 def test_the_way_from_where_the_arm_stands_is_judged() -> None:
     stands = (*HOME[:3], math.radians(90), math.radians(-180), 0.0)
-    (problem,) = plan_problems(plan_six_observation(ARM, SixObservationSection(), start_q_rad=stands), 0.3)
+    (problem,) = plan_problems(plan_six_observation(ARM, SixObservationSection(), start_q_rad=stands), LIGHT)
     assert problem.name == "forearm_too_near" and problem.what.startswith("approach home brings")
     assert "from the pendant" in problem.remedy
 
@@ -309,7 +316,7 @@ def test_the_way_from_where_the_arm_stands_is_judged() -> None:
 @pytest.mark.parametrize("made", [attitudes(*EIGHTEEN), attitudes(*FACES)])
 def test_the_stock_attitudes_keep_clear_of_the_forearm(made: Plan) -> None:
     """0.174 m, the length of the link before wrist 2, is the least there is with wrist 2 at -90°."""
-    assert plan_problems(made, 0.3) == []
+    assert plan_problems(made, LIGHT) == []
     for way in made.motions:
         poses = np.linspace(way.start_q_rad, way.target_q_rad, 100)
         assert distance_to_forearm(poses).min() > 0.174
@@ -317,4 +324,4 @@ def test_the_stock_attitudes_keep_clear_of_the_forearm(made: Plan) -> None:
 
 def test_a_dwell_takes_time_and_the_poses_must_be_numbers() -> None:
     nowhere = Dwell(0, (math.nan,) * 6, 0.0, 5.0)
-    assert names(plan_problems(Plan((nowhere,), HOME, HOME), 0.3)) == ["no_duration"]
+    assert names(plan_problems(Plan((nowhere,), HOME, HOME), LIGHT)) == ["no_duration"]

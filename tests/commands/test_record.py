@@ -10,6 +10,7 @@ import pytest
 import yaml
 from scipy.spatial.transform import Rotation
 
+from rig.arm.carried import Carried
 from rig.arm.driver import Arm
 from rig.arm.kinematics import flange_attitude, flange_rate
 from rig.arm.motion import Transfer, trapezoid_duration, travel
@@ -64,7 +65,7 @@ def test_a_sensor_on_a_table_with_a_clock_of_its_own(tmp_path: Path, capsys: pyt
             while not (out / "kvh.csv").exists():
                 table.check()
                 assert recording.poll() is None
-            table.take_control(0.95, (0.0, 0.0, 0.04))
+            table.take_control(Carried(0.95, (0.0, 0.0, 0.04)))
             for way in WAYS:
                 table.move(to(table.latest.q_rad, way))
             said, _ = recording.communicate(timeout=120)

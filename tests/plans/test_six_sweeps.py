@@ -5,6 +5,7 @@ import math
 import numpy as np
 import pytest
 
+from rig.arm.carried import Carried
 from rig.arm.kinematics import flange_axes, flange_pose, flange_rate
 from rig.arm.motion import Plan, Rest, Sweep, Transfer, trapezoid_duration, travel
 from rig.arm.preflight import plan_problems
@@ -38,7 +39,7 @@ def test_six_axes_are_the_three_and_three_between_them() -> None:
     axes = {tuple(np.round(np.abs(sweep.axis_flange) * np.sqrt(2), 3) ** 2 / 2) for sweep in made.sweeps}
     assert len(made.sweeps) == 12
     assert len(axes) == 6
-    assert plan_problems(made, 0.35) == []
+    assert plan_problems(made, Carried(0.35)) == []
 
 
 @pytest.mark.parametrize("wrist_2_deg", [-90.0, 90.0])
@@ -46,7 +47,7 @@ def test_the_flange_never_turns_towards_the_forearm(wrist_2_deg: float) -> None:
     """Wrist 1 turns in the forearm's plane: along its axis the flange keeps its distance, 0.174 m, or has more."""
     arm = ArmSection(host="127.0.0.2", payload_kg=0.35, home_deg=(0, -90, 90, -90, wrist_2_deg, 0))
     made = plan_six_observation(arm, SixObservationSection(axes=6))
-    assert plan_problems(made, 0.35) == []
+    assert plan_problems(made, Carried(0.35)) == []
     for sweep in made.sweeps:
         if sweep.joint_name == "wrist_1":
             pose = flange_pose(sweep.start_q_rad)

@@ -7,6 +7,7 @@ import numpy as np
 import pytest
 from pydantic import ValidationError
 
+from rig.arm.carried import Carried
 from rig.arm.motion import Dwell, Plan, Rest, Sweep, Transfer, trapezoid_duration
 from rig.arm.preflight import plan_problems
 from rig.config.attitude_sets import EIGHTEEN, FACES
@@ -59,7 +60,7 @@ def test_every_attitude_is_held_once_with_base_shoulder_and_elbow_at_home() -> N
     assert {dwell.q_rad[:3] for dwell in made.dwells} == {HOME[:3]}
     assert [dwell.index for dwell in made.dwells] == list(range(18))
     assert {(dwell.duration_s, dwell.settle_s) for dwell in made.dwells} == {(3.0, 5.0)}
-    assert stands_where_it_came(made) and plan_problems(made, 0.35) == []
+    assert stands_where_it_came(made) and plan_problems(made, Carried(0.35)) == []
     assert made.dwells[0].name == "dwell at -45 -90 -45"
 
 
@@ -138,7 +139,7 @@ def test_sweeps_and_attitudes_take_five_minutes_with_every_wait_for_settling() -
     made = imu()
     assert (len(made.sweeps), len(made.dwells)) == (12, 18)
     assert made.duration_s < 205 and made.duration_s + made.settling_s < 300
-    assert stands_where_it_came(made) and plan_problems(made, 0.35) == []
+    assert stands_where_it_came(made) and plan_problems(made, Carried(0.35)) == []
 
 
 def test_sweeps_come_first_and_are_counted_first() -> None:

@@ -11,6 +11,7 @@ from itertools import pairwise
 
 import pytest
 
+from rig.arm.carried import Carried
 from rig.arm.driver import Arm
 from rig.arm.motion import Transfer, trapezoid_duration
 from rig.world import network
@@ -240,7 +241,7 @@ def test_a_stalled_wire_does_not_end_a_move(world: World) -> None:
     times_s: list[float] = []
     laboratory = world({"world": {"time_scale": 8}})
     with relay(laboratory.host) as wire, Arm(wire.host, lambda state: times_s.append(state.time_s)) as arm:
-        arm.take_control(0.35, (0.0, 0.0, 0.025))
+        arm.take_control(Carried(0.35, (0.0, 0.0, 0.025)))
         ends = threading.Timer(0.5, wire.stalled.clear)
 
         def stall() -> None:
@@ -260,7 +261,7 @@ def test_a_stalled_wire_does_not_end_a_move(world: World) -> None:
 def test_a_driver_that_stalls_for_a_moment_misses_no_state(world: World) -> None:
     others = set(multiprocessing.active_children())
     with Arm(world({"world": {"time_scale": 8}}).host) as arm:
-        arm.take_control(0.35, (0.0, 0.0, 0.025))
+        arm.take_control(Carried(0.35, (0.0, 0.0, 0.025)))
         (child,) = set(multiprocessing.active_children()) - others
         assert child.pid is not None
         pid, missed = child.pid, arm.missed_states
