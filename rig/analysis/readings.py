@@ -4,7 +4,8 @@ Noise above one count sets every low bit as often as not, has no gap and no heap
 readings and no two stretches alike. Where the noise is below a count none of this can be said, and nothing is.
 """
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -15,6 +16,7 @@ from rig.observation.colour import predicted
 from rig.observation.sound import SPIKE
 
 Statistics = dict[str, tuple[float, float]]
+Usual = Callable[..., Any]  # `np.median`, `np.min`
 
 SKEWNESS = 0.15  # below, hardly a fiftieth of the noise's deviation is left in a mean
 LONGEST_RUN = 25  # equal readings of one axis: at one count of noise every fourth reading equals the one before
@@ -30,19 +32,19 @@ HEAP = 10  # readings
 
 
 def judge_readings(
-    counts: Sequence[NDArray[np.int64]], windows: Sequence[Window], rate: float, *, as_before: bool = False
+    counts: Sequence[NDArray[np.int64]], windows: Sequence[Window], rate: float, usual: Usual = np.median
 ) -> Statistics:
     """By name of the check its statistic and limit, from all readings (n, 3) of each recording and from the windows.
 
-    `rate` is that of false alarms for each, where it is not far smaller. The noise is that of most windows: one in
-    which an axis stands still does not make it a sensor without noise. `as_before`: that of the quietest.
+    `rate` is that of false alarms for each, where it is not far smaller. The noise is the `usual` one of the windows,
+    the median: one in which an axis stands still does not make it a sensor without noise.
     """
     from scipy.special import ndtri
 
     sure = -float(ndtri(rate / (2 * 3 * 16)))  # of a normal variable, over three axes and their bits
     at_rest = [window for window in windows if window.sweep < 0] or windows
     noises = [_noise(window.counts) for window in at_rest]
-    noise = np.asarray(np.min(noises, axis=0) if as_before else np.median(noises, axis=0), dtype=np.float64)
+    noise = np.asarray(usual(noises, axis=0), dtype=np.float64)
     spikes, of_a_bit = _spikes(windows)
     stuck = _constant_bits(np.concatenate(counts)) + _uneven_bits(windows, noise, sure) + of_a_bit
     found = {"stuck_bit": (float(stuck), 0.0), "spikes": (spikes, SPIKE)}

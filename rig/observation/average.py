@@ -2,23 +2,18 @@
 
 from dataclasses import dataclass, field
 from functools import partial
-from typing import Any, Literal
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
 from rig.data.run_file import RecordedSensor
 from rig.estimation.arrays import Array
-from rig.observation.beside_lines import FEWEST, mean_beside_lines, rest_beside_lines
 from rig.observation.known_motion import KnownMotion
 from rig.observation.lines import in_hertz
-from rig.observation.mean import Mean, mean_at_rest, mean_of
+from rig.observation.mean import Mean
 from rig.observation.timebase import TimeBase, estimate_time_base
 from rig.observation.windows import Window
-
-# How a mean allows for readings that are not independent: by their correlations, before there was a site; by an
-# autoregression, before settings knew a way of reckoning; beside what vibrates.
-Averaging = Literal["correlated", "autoregressive", "beside_lines"]
 
 
 @dataclass(frozen=True, slots=True)
@@ -57,19 +52,6 @@ class Average:
 
 
 @dataclass(frozen=True, slots=True)
-class Passing:
-    """What comes and goes in a turn of n readings.
-
-    The arm's rate less its mean (n,), as the encoders have it where that is `covered` (n,); columns `turning` (n, k) of
-    once and twice a turn, of which recordings of before have none.
-    """
-
-    rate_rad_s: Array
-    covered: NDArray[np.bool_]
-    turning: Array
-
-
-@dataclass(frozen=True, slots=True)
 class Stream:
     """A sensor's samples in physical units, on the controller's clock."""
 
@@ -104,28 +86,8 @@ def between(stream: Stream, start_s: float, end_s: float) -> slice:
     return slice(*np.searchsorted(stream.time_s, [start_s, end_s]).tolist())
 
 
-def average(stream: Stream, inside: slice, window: Window, passing: Passing, way: Averaging) -> Average:
-    """The readings inside, over a whole turn: see `mean_beside_lines`; `mean_of` if they are few, or of before."""
-    readings, count = stream.readings_rad_s[inside], stream.sensor.sensitivity_rad_s_per_count
-    if way == "beside_lines" and len(readings) >= FEWEST and passing.covered.all():
-        found = mean_beside_lines(readings, count, passing.turning, passing.rate_rad_s)
-    else:
-        together = np.column_stack([passing.rate_rad_s, passing.turning])
-        found = mean_of(readings, count, together, passing.covered, as_before=way == "correlated")
-    return _averaged(stream, inside, window, found)
-
-
-def average_at_rest(stream: Stream, inside: slice, window: Window, way: Averaging) -> Average:
-    """The readings inside, of an arm that stands: see `mean_at_rest`, and `rest_beside_lines`."""
-    readings, time_s = stream.readings_rad_s[inside], stream.time_s[inside]
-    count = stream.sensor.sensitivity_rad_s_per_count
-    found, lasting = mean_at_rest(readings, time_s, window, count, as_before=way == "correlated")
-    if way == "beside_lines" and len(readings) >= FEWEST and lasting != window:
-        found = rest_beside_lines(readings, time_s, window, count)
-    return _averaged(stream, inside, lasting, found)
-
-
-def _averaged(stream: Stream, inside: slice, window: Window, found: Mean) -> Average:
+def averaged(stream: Stream, inside: slice, window: Window, found: Mean) -> Average:
+    """What was `found` of the samples inside, and over which window, with when and how warm it was."""
     return Average(
         mean_rad_s=found.mean,
         variance_rad2_s2=found.variance,

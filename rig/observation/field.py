@@ -11,7 +11,7 @@ from rig.data.settings import ObservationThresholds
 from rig.errors import Fault
 from rig.estimation.arrays import Array
 from rig.observation.acceleration import MIN_DWELL_SAMPLES, DwellReading, check_complete
-from rig.observation.mean import Mean, mean_of
+from rig.observation.mean import Mean, even_mean
 from rig.observation.observed_run import ObservedRun
 from rig.observation.windows import Window, rested
 
@@ -136,9 +136,7 @@ def _mean(recording: ObservedRun, name: str, window: Window, what: str, threshol
             f"in {where} the field is beyond the magnetometer's range",
             "Choose a wider range_gauss, or take away the iron beside it",
         )
-    per_count_t = magnetometer.sensitivity_t_per_count
-    steady, known = np.zeros((len(inside), 1)), np.ones(len(inside), dtype=np.bool_)
-    return mean_of(_field_t(recording, name, inside), per_count_t, steady, known, as_before=False)
+    return even_mean(_field_t(recording, name, inside), magnetometer.sensitivity_t_per_count)
 
 
 def _inside(recording: ObservedRun, name: str, window: Window) -> NDArray[Any]:

@@ -1,5 +1,6 @@
 """Means of readings in any unit, with the variance of the mean: where something passes, where the arm shakes."""
 
+from collections.abc import Callable
 from dataclasses import dataclass, field
 from functools import partial
 
@@ -7,7 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from rig.estimation.arrays import Array
-from rig.observation.colour import Left, left_of, widening
+from rig.observation.colour import Left, left_of
 from rig.observation.tapered import flank_s, freedom_at_zero, noise_at_zero, vibrates, weights
 from rig.observation.windows import Window
 
@@ -28,7 +29,9 @@ class Mean:
     cycles: Array = field(default_factory=partial(np.zeros, 0))
 
 
-def mean_of(readings: Array, count: float, passing: Array, covered: NDArray[np.bool_], *, as_before: bool) -> Mean:
+def mean_of(
+    readings: Array, count: float, passing: Array, covered: NDArray[np.bool_], left: Callable[[Array], Left] = left_of
+) -> Mean:
     """Mean and its variance of readings (n, 3) in steps of `count`.
 
     `passing` (n, k) comes and goes in the window and is zero in its mean, such as the arm's rate less its mean 2π/T;
@@ -36,45 +39,44 @@ def mean_of(readings: Array, count: float, passing: Array, covered: NDArray[np.b
 
     A straight line of reading against what passes says what is read without it: few samples do not meet a vibration
     evenly. The noise is what is left of that line, and never below the rounding to counts; the variance of the mean
-    allows for residuals that are not white, `as_before` by what their correlations add up to. What rounding leaves in a
-    mean however many samples there are is added.
+    allows for residuals that are not white, which `left` tells of each axis. What rounding leaves in a mean however
+    many samples there are is added.
     """
     columns, known = np.column_stack([np.ones(int(covered.sum())), passing[covered]]), readings[covered]
     coefficients, _, rank, _ = np.linalg.lstsq(columns, known, rcond=None)
     residual = known - columns @ coefficients
     scatter = np.sum(residual**2, axis=0) / (len(known) - rank)
     variance = np.maximum(scatter, count**2 / 12)
-    left = [_left_as_before(each) if as_before else left_of(each) for each in residual.T]
-    factor = np.array([each.factor for each in left])
+    coloured = [left(each) for each in residual.T]
+    factor = np.array([each.factor for each in coloured])
     of_the_mean = np.linalg.pinv(columns.T @ columns, hermitian=True)[0, 0]  # 1/n where the excess averages out
     return Mean(
         mean=coefficients[0],
         variance=variance * factor * of_the_mean + rounding_left(variance, count),
         noise=np.sqrt(variance),
         samples=len(known),
-        freedom=np.array([each.freedom for each in left]),
+        freedom=np.array([each.freedom for each in coloured]),
     )
 
 
-def _left_as_before(residuals: Array) -> Left:
-    return Left(widening(residuals), np.inf)
+def even_mean(readings: Array, count: float, left: Callable[[Array], Left] = left_of) -> Mean:
+    """The mean of readings (n, 3) in steps of `count` in which nothing passes: all of them count alike."""
+    steady, known = np.zeros((len(readings), 1)), np.ones(len(readings), dtype=np.bool_)
+    return mean_of(readings, count, steady, known, left)
 
 
-def mean_at_rest(
-    readings: Array, time_s: Array, window: Window, count: float, *, as_before: bool = False
-) -> tuple[Mean, Window]:
+def mean_at_rest(readings: Array, time_s: Array, window: Window, count: float) -> tuple[Mean, Window]:
     """Of readings (n, 3) in steps of `count`, at times (n,), and from when to when it is said to last.
 
     Where the arm vibrates weights come and go, see `tapered_mean`: 2 mg at 14 Hz leave 10 µg in an even mean of three
     seconds. Such a mean lasts from where the weights have come half-way to where they have gone half-way: so long an
-    even one is as far from another, for a bias that walks, to a thousandth. `as_before`: as `mean_of` has it, always.
+    even one is as far from another, for a bias that walks, to a thousandth.
     """
-    if not as_before and vibrates(readings):
+    if vibrates(readings):
         half_s = flank_s(window.end_s - window.start_s) / 2
         lasting = Window(window.start_s + half_s, window.end_s - half_s)
         return tapered_mean(readings, time_s, window, count), lasting
-    steady, known = np.zeros((len(readings), 1)), np.ones(len(readings), dtype=np.bool_)
-    return mean_of(readings, count, steady, known, as_before=as_before), window
+    return even_mean(readings, count), window
 
 
 def tapered_mean(readings: Array, time_s: Array, window: Window, count: float) -> Mean:

@@ -21,16 +21,8 @@ from rig.estimation.arrays import Array
 from rig.estimation.refusals import check_reading_ratio
 from rig.observation.acceleration import DwellReading, dwell_readings
 from rig.observation.arm_beside_lines import turned_beside
-from rig.observation.average import (
-    Average,
-    Averaging,
-    Passing,
-    Stream,
-    average,
-    average_at_rest,
-    between,
-    on_the_arms_clock,
-)
+from rig.observation.average import Average, Stream, averaged, between, on_the_arms_clock
+from rig.observation.averaging import Averaging, Passing, averaging_of
 from rig.observation.feeling import check_dwells, check_other_way, check_rests
 from rig.observation.known_motion import Motion
 from rig.observation.revolution import Revolution, arm_states_lost, describe
@@ -155,7 +147,7 @@ def check_feeling(run: RunData, rests: Sequence[Average], dwells: Sequence[Dwell
 
 def rests_of(run: RunData, stream: Stream, motion: Motion, superseded: Collection[int] = ()) -> tuple[Average, ...]:
     """Those in which the arm stood still for long enough, without those beside a step in `superseded`."""
-    found = (_rest(stream, motion, window, _way(run)) for window in rested(run, superseded))
+    found = (_rest(stream, motion, window, averaging_of(run.settings)) for window in rested(run, superseded))
     return tuple(rest for rest in found if rest is not None)
 
 
@@ -163,19 +155,11 @@ def _revolution(
     run: RunData, stream: Stream, motion: Motion, finished: Finished, settings: ObservationThresholds
 ) -> Observation:
     turn = motion.turn(finished.sweep, finished.window, settings)
-    seen = _observation(stream, motion, finished.sweep, turn, settings, way=_way(run))
+    averaging = averaging_of(run.settings)
+    seen = _observation(stream, motion, finished.sweep, turn, settings, averaging=averaging)
     if stream.sensor.has_acceleration and run.settings.planned_dwells:
-        beside = run.settings.averages_beside_lines
-        found = swept_acceleration(stream, motion, finished.sweep, turn, beside_lines=beside)
-        return replace(seen, acceleration=found)
+        return replace(seen, acceleration=swept_acceleration(stream, motion, finished.sweep, turn, averaging))
     return seen
-
-
-def _way(run: RunData) -> Averaging:
-    """Recordings of before are averaged as they were then."""
-    if run.settings.site is None:
-        return "correlated"
-    return "beside_lines" if run.settings.averages_beside_lines else "autoregressive"
 
 
 def bias_drift(rests: Sequence[Average]) -> Array:
@@ -210,12 +194,8 @@ def _observation(
     turn: Revolution,
     settings: ObservationThresholds,
     *,
-    way: Averaging,
+    averaging: Averaging,
 ) -> Observation:
-    """Nothing is left in a mean of what comes once or twice in a turn: gravity, and the encoder's own error.
-
-    But where it is "correlated", which takes these for noise, and all that vibrates.
-    """
     where = describe(sweep)
     inside = between(stream, turn.start_s, turn.end_s)
     lost = _lost(stream, inside, where, settings)
@@ -225,19 +205,20 @@ def _observation(
     if covered.mean() < 0.5:
         raise arm_states_lost(where, "more than half the time")
     turned_rad = turn.speed_rad_s * (stream.time_s[inside] - turn.start_s)
-    waves = [wave(times * turned_rad) for times in (1, 2) for wave in (np.cos, np.sin)] if way != "correlated" else []
+    waves = [wave(times * turned_rad) for times in (1, 2) for wave in (np.cos, np.sin)]
     passing = Passing(
         motion.rate(stream.time_s[inside]) @ turn.axis_flange - turn.speed_rad_s,
         covered,
-        np.reshape(waves, (len(waves), len(turned_rad))).T,
+        np.array(waves).T,
     )
-    averaged = _placed(average(stream, inside, Window(turn.start_s, turn.end_s), passing, way), motion)
+    found = averaging.turned(stream.readings_rad_s[inside], stream.sensor.sensitivity_rad_s_per_count, passing)
+    average = _placed(averaged(stream, inside, Window(turn.start_s, turn.end_s), found), motion)
     expected = np.array(stream.sensor.mounting) @ turn.axis_flange
-    turned = averaged.mean_rad_s - stream.clock.zero_rate_rad_s
+    turned = average.mean_rad_s - stream.clock.zero_rate_rad_s
     _check_direction(turned, expected, where, settings)
     check_reading_ratio(float(np.linalg.norm(turned)) / turn.speed_rad_s, where)
     axis, sign = nearest_axis(expected)
-    speed_rad_s, axis_flange = turned_beside(motion, turn, averaged.lines_hz)
+    speed_rad_s, axis_flange = turned_beside(motion, turn, average.lines_hz)
     return Observation(
         sweep=sweep.index,
         joint_name=sweep.joint_name,
@@ -248,20 +229,23 @@ def _observation(
         speed_rad_s=speed_rad_s,
         speed_std_rad_s=turn.speed_std_rad_s,
         lost=lost,
-        average=averaged,
+        average=average,
         axis_errors=turn.axis_errors,
         arm_m=turn.arm_m,
     )
 
 
-def _rest(stream: Stream, motion: Motion, window: Window, way: Averaging) -> Average | None:
+def _rest(stream: Stream, motion: Motion, window: Window, averaging: Averaging) -> Average | None:
     """The mean reading of a rest; None where the arm did not stand still or the rest is too short to say anything."""
     settled = Window(window.start_s + REST_SETTLING_S, window.end_s - REST_SETTLING_S)
     inside = between(stream, settled.start_s, settled.end_s)
     moved_rad = motion.moved_rad(settled)
     if inside.stop - inside.start < MIN_REST_SAMPLES or moved_rad is None or moved_rad > MAX_REST_TRAVEL_RAD:
         return None
-    return _placed(average_at_rest(stream, inside, settled, way), motion)
+    found, lasting = averaging.rested(
+        stream.readings_rad_s[inside], stream.time_s[inside], settled, stream.sensor.sensitivity_rad_s_per_count
+    )
+    return _placed(averaged(stream, inside, lasting, found), motion)
 
 
 def _lost(stream: Stream, inside: slice, where: str, settings: ObservationThresholds) -> int:

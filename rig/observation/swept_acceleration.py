@@ -7,8 +7,7 @@ from rig.estimation.arrays import Array
 from rig.estimation.sweep_harmonics import FirstHarmonic, first_harmonic
 from rig.observation.acceleration import accelerations, check_acceleration
 from rig.observation.average import Stream, between
-from rig.observation.beside_lines import colour_left, swinging
-from rig.observation.colour import noise_left
+from rig.observation.averaging import Averaging
 from rig.observation.known_motion import Motion
 from rig.observation.revolution import Revolution, describe
 
@@ -32,9 +31,9 @@ class SweptAcceleration:
 
 
 def swept_acceleration(
-    stream: Stream, motion: Motion, sweep: Sweep, turn: Revolution, *, beside_lines: bool
+    stream: Stream, motion: Motion, sweep: Sweep, turn: Revolution, averaging: Averaging
 ) -> SweptAcceleration:
-    """Beside all lines that stand out, or the strongest alone.
+    """What one sweep's revolution tells, beside what swings in it.
 
     Raises Fault `saturation`, `stuck_sensor`, `incomplete_revolution`, `not_finite`.
     """
@@ -52,8 +51,8 @@ def swept_acceleration(
             accelerations(stream, inside)[known],
             motion.angle(sweep, time_s) - motion.angle(sweep, turn.start_s),
             motion.angle(sweep, time_s, 1),
-            colour_left if beside_lines else noise_left,
-            swings=swinging if beside_lines else None,
+            averaging.colour,
+            swings=averaging.swings,
         ),
         attitude=turn.attitude,
         axis_flange=growing * turn.axis_flange,
