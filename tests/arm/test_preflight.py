@@ -15,6 +15,7 @@ from rig.arm.preflight import (
     arm_problems,
     kinematics_problems,
     plan_problems,
+    preflight_problems,
     refuse,
     used_kinematics,
     way_to_home,
@@ -30,6 +31,8 @@ from rig.plans.static_attitudes import plan_static_attitudes
 HOME_DEG = (0.0, -90.0, 90.0, -90.0, -90.0, 0.0)
 ARM = ArmSection(host="10.0.0.2", payload_kg=0.3)
 LIGHT = Carried(0.3)
+SWEPT_BESIDE = (*HOME_DEG[:3], 0.0, *HOME_DEG[4:])
+SWEPT_INTO = (*HOME_DEG[:3], 90.0, *HOME_DEG[4:])
 HOME: Joints = tuple(math.radians(angle) for angle in HOME_DEG)
 
 READY = ArmState(
@@ -79,6 +82,14 @@ def test_too_slow_an_acceleration_takes_the_wrist_beyond_its_joint_limit() -> No
     problems = plan_problems(plan(speed_deg_s=150, acceleration_deg_s2=80), LIGHT)
     assert names(problems) == ["joint_limit"]
     assert "wrist_1" in problems[0].what
+
+
+@pytest.mark.parametrize("driven", [plan(speed_deg_s=180, acceleration_deg_s2=800), plan(SWEPT_INTO)])
+def test_the_plan_that_is_driven_is_judged_as_the_one_announced(driven: Plan) -> None:
+    arm, report = ARM.model_copy(update={"kinematics": "nominal"}), replace(REPORT, called="UR10")
+    wrong = names(plan_problems(driven, LIGHT))
+    for plans in ([driven, plan()], [plan(), driven]):
+        assert names(preflight_problems(plans, arm, report)) == wrong != []
 
 
 def test_wrists_stay_below_the_speed_that_the_client_accepts() -> None:
@@ -261,10 +272,6 @@ def test_it_says_by_how_much_the_frame_is_turned() -> None:
     told = replace(REPORT, tcp_offset=(0.0, 0.0, 0.0, 0.0, 0.0, math.radians(45)))
     (problem,) = arm_problems(attitudes((45, -90, 0)), told)
     assert "turned by 45° against the flange's" in problem.what and "TCP to zero" in problem.remedy
-
-
-SWEPT_BESIDE = (*HOME_DEG[:3], 0.0, *HOME_DEG[4:])
-SWEPT_INTO = (*HOME_DEG[:3], 90.0, *HOME_DEG[4:])
 
 
 @pytest.mark.parametrize("wrist_2_deg", [-110.0, -90.0, 90.0])
