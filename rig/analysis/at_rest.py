@@ -18,9 +18,9 @@ from rig.observation.arm_motion import motion_of
 from rig.observation.average import Stream, between, on_the_arms_clock
 from rig.observation.csv_samples import Samples
 from rig.observation.known_motion import Motion
-from rig.observation.observe import MAX_REST_TRAVEL_RAD, REST_SETTLING_S
+from rig.observation.observe import standing
 from rig.observation.steadiness import check_at_rest, whole_stretches
-from rig.observation.windows import Window, rested
+from rig.observation.windows import rested
 
 FEWEST_TO_JUDGE = 20  # readings: fewer may be alike
 
@@ -88,11 +88,10 @@ def log_at_rest(samples: Samples) -> SensorAtRest:
 def _stretches(run: RunData, stream: Stream, motion: Motion) -> Iterator[slice]:
     """The samples of every rest and dwell in which the arm stood still, apart where one is missing."""
     for window in rested(run):
-        settled = Window(window.start_s + REST_SETTLING_S, window.end_s - REST_SETTLING_S)
-        moved_rad = motion.moved_rad(settled)
-        if moved_rad is None or moved_rad > MAX_REST_TRAVEL_RAD:
+        still = standing(motion, window)
+        if still is None:
             continue
-        inside = between(stream, settled.start_s, settled.end_s)
+        inside = between(stream, still.start_s, still.end_s)
         sequence = stream.raw["sequence"][inside].astype(np.int64)
         gaps = inside.start + 1 + np.flatnonzero(np.diff(sequence) != 1)
         edges = [inside.start, *gaps.tolist(), inside.stop]

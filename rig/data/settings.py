@@ -271,6 +271,8 @@ def settings_from_json(text: str) -> RunSettings:
 
 def settings_of(config: "RigConfig", plan: "Plan") -> RunSettings:
     """The settings of a new run; `plan` is that of the whole procedure."""
+    from rig.arm.carried import carried_by
+
     reference = None
     if config.reference is not None:
         name, section = config.reference
@@ -292,14 +294,9 @@ def settings_of(config: "RigConfig", plan: "Plan") -> RunSettings:
         planned_dwells=_planned(plan.dwells),
         second_order=config.procedure.accelerometer_order == 2,
         finds_earth_rate=config.procedure.finds_earth_rate,
-        extension_m=_metres(config.arm.extension_mm),
+        extension_m=carried_by(config.arm).extension_m,
         reckoning=RECKONING,
     )
-
-
-def _metres(millimetres: Vector3) -> Vector3:
-    x, y, z = (each / 1000 for each in millimetres)
-    return x, y, z
 
 
 def _planned(dwells: "Sequence[Dwell]") -> tuple[PlannedDwell, ...]:

@@ -151,6 +151,13 @@ def rests_of(run: RunData, stream: Stream, motion: Motion, superseded: Collectio
     return tuple(rest for rest in found if rest is not None)
 
 
+def standing(motion: Motion, rest: Window) -> Window | None:
+    """A rest without its beginning and its end; None where the arm moved in it or too few states tell."""
+    still = Window(rest.start_s + REST_SETTLING_S, rest.end_s - REST_SETTLING_S)
+    moved_rad = motion.moved_rad(still)
+    return still if moved_rad is not None and moved_rad <= MAX_REST_TRAVEL_RAD else None
+
+
 def _revolution(
     run: RunData, stream: Stream, motion: Motion, finished: Finished, settings: ObservationThresholds
 ) -> Observation:
@@ -237,14 +244,14 @@ def _observation(
 
 def _rest(stream: Stream, motion: Motion, window: Window, averaging: Averaging) -> Average | None:
     """The mean reading of a rest; None where the arm did not stand still or the rest is too short to say anything."""
-    settled = Window(window.start_s + REST_SETTLING_S, window.end_s - REST_SETTLING_S)
-    inside = between(stream, settled.start_s, settled.end_s)
-    moved_rad = motion.moved_rad(settled)
-    if inside.stop - inside.start < MIN_REST_SAMPLES or moved_rad is None or moved_rad > MAX_REST_TRAVEL_RAD:
+    still = standing(motion, window)
+    if still is None:
         return None
-    found, lasting = averaging.rested(
-        stream.readings_rad_s[inside], stream.time_s[inside], settled, stream.sensor.sensitivity_rad_s_per_count
-    )
+    inside = between(stream, still.start_s, still.end_s)
+    if inside.stop - inside.start < MIN_REST_SAMPLES:
+        return None
+    count = stream.sensor.sensitivity_rad_s_per_count
+    found, lasting = averaging.rested(stream.readings_rad_s[inside], stream.time_s[inside], still, count)
     return _placed(averaged(stream, inside, lasting, found), motion)
 
 
