@@ -25,8 +25,8 @@ ATTITUDES = 72  # of which a mean is made: over a whole turn what is perpendicul
 class ArmMotion:
     """A `Motion` of an arm: `angles(t)` (n, 6) rad of its joints, `rate(t)` (n, 3) rad/s of its flange.
 
-    Rates come from the recorded joint angles rather than from the controller's velocity signal, which is filtered.
-    `states` is (m,) ARM_STATE_DTYPE of an arm of that `kinematics`.
+    Rates come from the recorded joint angles rather than from the controller's velocity signal, which is filtered: what
+    counts is when the joint was where. `states` is (m,) ARM_STATE_DTYPE of an arm of that `kinematics`.
     Raises Fault `no_motion`, `not_finite`, `impossible_times`.
     """
 

@@ -2,9 +2,7 @@
 
 The gyroscope and the arm see the same turning. A coarse search correlates turn rate with joint rate over all data (the
 board may have been switched on at any time); a weighted least-squares fit of the vector readings to the flange's rate
-then finds the offset to a fraction of a millisecond. Rates come from the recorded joint angles rather than from the
-controller's velocity signal, which is filtered: what counts is when the joint was where. The delay of the sensor's own
-filter is part of the offset.
+then finds the offset to a fraction of a millisecond. The delay of the sensor's own filter is part of the offset.
 """
 
 from dataclasses import dataclass, replace
