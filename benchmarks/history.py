@@ -29,7 +29,7 @@ FIRST = datetime(2025, 1, 1, tzinfo=UTC)
 END_OF_RUN = """
 import sys, time
 from pathlib import Path
-import rig.commands.run
+import rig.commands.carry_out
 from rig.commands.remember import remember
 from rig.config.judging_sections import HistorySection
 from rig.data.result_file import read_result

@@ -1,38 +1,57 @@
 """`rig allan`: random walk and bias instability of what was recorded at rest."""
 
 import sys
+from argparse import ArgumentParser, Namespace
 from collections.abc import Mapping
 from pathlib import Path
+from typing import TYPE_CHECKING
 
-from rig.analysis.at_rest import SensorAtRest, at_rest, log_at_rest
+from rig.commands.config_arguments import add_json
 from rig.errors import Refused, raised_as
-from rig.observation.csv_samples import read_samples
-from rig.plans.recorded import open_run
-from rig.report.allan import draw_at_rest, print_at_rest
 from rig.station.plain_text import say
-from rig.study.files import missing_extra
+
+if TYPE_CHECKING:
+    from rig.analysis.at_rest import SensorAtRest
 
 CSV = ".csv"
 
 
-def allan(recording: Path, plot: Path | None, *, as_json: bool) -> int:
-    """Print the Allan deviations of a run folder, a run file or a log as CSV; draw them into the folder `plot`.
+def add(parser: ArgumentParser) -> None:
+    """The arguments of `rig allan`."""
+    parser.add_argument(
+        "run", type=Path, metavar="RECORDING", help="a run folder, its run.h5, or a log of a sensor at rest as CSV"
+    )
+    parser.add_argument("--plot", type=Path, metavar="DIR", help="draw the curves into this folder")
+    add_json(parser)
+
+
+def run(options: Namespace) -> int:
+    """Print the Allan deviations of a run folder, a run file or a log as CSV; draw them into the folder `--plot`.
 
     Returns 0. Raises Refused `report_folder`, `missing_extra`, `not_at_rest`, and as `read_samples` does of a log, of a
     run `no_raw_readings`, and as `open_run` and `at_rest` do.
     """
+    from rig.report.allan import print_at_rest
+
     with raised_as(Refused):  # nothing runs here
-        if recording.suffix.lower() == CSV:
-            found = {recording.stem: log_at_rest(read_samples(recording))}
-        else:
-            found = _of_run(recording)
-    print_at_rest(found, as_json=as_json)
-    if plot is not None:
-        _draw(found, plot)
+        found = _of_log(options.run) if options.run.suffix.lower() == CSV else _of_run(options.run)
+    print_at_rest(found, as_json=options.json)
+    if options.plot is not None:
+        _draw(found, options.plot)
     return 0
 
 
-def _of_run(path: Path) -> dict[str, SensorAtRest]:
+def _of_log(path: Path) -> "dict[str, SensorAtRest]":
+    from rig.analysis.at_rest import log_at_rest
+    from rig.observation.csv_samples import read_samples
+
+    return {path.stem: log_at_rest(read_samples(path))}
+
+
+def _of_run(path: Path) -> "dict[str, SensorAtRest]":
+    from rig.analysis.at_rest import at_rest
+    from rig.plans.recorded import open_run
+
     recorded = open_run(path).raw
     if not recorded:
         raise Refused(
@@ -43,7 +62,10 @@ def _of_run(path: Path) -> dict[str, SensorAtRest]:
     return at_rest(recorded)
 
 
-def _draw(found: Mapping[str, SensorAtRest], folder: Path) -> None:
+def _draw(found: "Mapping[str, SensorAtRest]", folder: Path) -> None:
+    from rig.report.allan import draw_at_rest
+    from rig.study.files import missing_extra
+
     try:
         import matplotlib  # noqa: F401
     except ImportError as error:

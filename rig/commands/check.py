@@ -1,29 +1,32 @@
 """`rig check`: connect and look. Receives only, so nothing moves and no program on the arm is stopped."""
 
 import sys
-from collections.abc import Callable, Sequence
+from argparse import ArgumentParser, Namespace
+from collections.abc import Callable
 from contextlib import nullcontext
 from math import degrees
-from pathlib import Path
+from typing import TYPE_CHECKING
 
-from firmware_host.client import Board
-from rig.arm.driver import look
-from rig.arm.identity import arm_words
-from rig.arm.preflight import preflight_problems
-from rig.board.identify import configured_board, find_sensor, refuse_other_firmware, refusing, stored_calibration
-from rig.commands.claims import claimed_arm, claimed_board, claimed_sensor
-from rig.commands.configured import Configured, configured
+from rig.commands.config_arguments import add_config, add_script
 from rig.commands.laboratory import simulated_laboratory, written
-from rig.config.models import RigConfig
 from rig.errors import Refused, RigError
-from rig.sensors.errors import SensorError
-from rig.sensors.registry import OWN_PORT
 from rig.station.plain_text import say
 
+if TYPE_CHECKING:
+    from rig.commands.configured import Configured
 
-def check(config_path: Path, overrides: Sequence[str], script: Path | None = None) -> int:
+
+def add(parser: ArgumentParser) -> None:
+    """The arguments of `rig check`."""
+    add_config(parser)
+    add_script(parser)
+
+
+def run(options: Namespace) -> int:
     """Look at the board and the arm; print what is there and what is missing. 0 when a run could start, else 2."""
-    found = configured(config_path, overrides, script)
+    from rig.commands.configured import configured
+
+    found = configured(options.config, options.overrides, options.script)
     with written(found.loaded.text) as used, simulated_laboratory(used) if found.loaded.simulated else nullcontext():
         looks = [_look_at_board, _look_at_instruments, _look_at_arm]
         missing = [problem for look_at in looks for problem in _named(look_at, found)]
@@ -33,7 +36,7 @@ def check(config_path: Path, overrides: Sequence[str], script: Path | None = Non
     return 2 if missing else 0
 
 
-def _named(look_at: Callable[[Configured], list[str]], found: Configured) -> list[str]:
+def _named(look_at: "Callable[[Configured], list[str]]", found: "Configured") -> list[str]:
     """The problems found, including the one that ended the looking."""
     try:
         return look_at(found)
@@ -41,8 +44,12 @@ def _named(look_at: Callable[[Configured], list[str]], found: Configured) -> lis
         return [str(error)]
 
 
-def _look_at_board(found: Configured) -> list[str]:
-    config: RigConfig = found.loaded.config
+def _look_at_board(found: "Configured") -> list[str]:
+    from firmware_host.client import Board
+    from rig.board.identify import configured_board, find_sensor, refuse_other_firmware, refusing, stored_calibration
+    from rig.commands.claims import claimed_board
+
+    config = found.loaded.config
     missing: list[str] = []
     if not config.parts_on_board:
         return missing
@@ -70,8 +77,12 @@ def _look_at_board(found: Configured) -> list[str]:
     return missing
 
 
-def _look_at_instruments(found: Configured) -> list[str]:
+def _look_at_instruments(found: "Configured") -> list[str]:
     """The sensors with a port of their own; nothing in their memories is changed."""
+    from rig.commands.claims import claimed_sensor
+    from rig.sensors.errors import SensorError
+    from rig.sensors.registry import OWN_PORT
+
     missing = []
     for name, section in found.loaded.config.sensors.items():
         if section.serial is not None:
@@ -87,7 +98,11 @@ def _look_at_instruments(found: Configured) -> list[str]:
     return missing
 
 
-def _look_at_arm(found: Configured) -> list[str]:
+def _look_at_arm(found: "Configured") -> list[str]:
+    from rig.arm.driver import look
+    from rig.arm.identity import arm_words
+    from rig.arm.preflight import preflight_problems
+
     section = found.loaded.config.arm
     report = look(section.host)
     state = report.state
@@ -100,6 +115,8 @@ def _look_at_arm(found: Configured) -> list[str]:
 
 def _claims_of_others(host: str) -> list[str]:
     """That another rig has the arm; looking at it disturbs nobody, so it is claimed for no longer than this."""
+    from rig.commands.claims import claimed_arm
+
     try:
         with claimed_arm(host):
             return []

@@ -1,28 +1,48 @@
 """`rig export`: a run in the files of other programs."""
 
+from argparse import ArgumentParser, Namespace
 from pathlib import Path
+from typing import TYPE_CHECKING
 
 from rig.config.written_file import write_new
-from rig.data.result_file import ResultDocument, passed_result, read_result
-from rig.data.run_folder import refuse_links
 from rig.errors import Refused
-from rig.observation.observed_run import observe_runs
-from rig.plans.recorded import open_run
-from rig.report.exports.formats import OF_READINGS, texts_of_calibrations, writer_of_readings
-from rig.report.exports.temperature import at_temperature
+from rig.report.exports.formats import FORMATS, OF_READINGS, texts_of_calibrations, writer_of_readings
 from rig.station.plain_text import say
 
+if TYPE_CHECKING:
+    from rig.data.result_file import ResultDocument
 
-def export(run: Path, name: str, out: Path | None, moved: tuple[str, str] | None = None) -> int:
-    """Readings of the first movement, or the calibrations of a run that passed, into `out`.
 
-    `moved`: a temperature in °C, and the run of `bias_drift` that tells how to get there.
+def add(parser: ArgumentParser) -> None:
+    """The arguments of `rig export`."""
+    parser.add_argument("run", type=Path, metavar="RUN", help="a run folder")
+    parser.add_argument(
+        "--format", choices=FORMATS, required=True, help="whose; docs/how-to/export.md says what each holds"
+    )
+    parser.add_argument("--out", type=Path, metavar="DIR", help="where to (default: export/FORMAT in the run folder)")
+    parser.add_argument(
+        "--at-temperature",
+        nargs=2,
+        metavar=("CELSIUS", "DRIFT_RUN"),
+        help="biases as they are at that temperature, by the slopes a run of bias_drift has found",
+    )
+
+
+def run(options: Namespace) -> int:
+    """Readings of the first movement, or the calibrations of a run that passed, into `--out`.
+
+    `--at-temperature`: a temperature in °C, and the run of `bias_drift` that tells how to get there.
     Returns 0. Raises Refused `report_folder`, `bad_option`, `missing_extra`, as `refuse_links` does, of readings as
     `open_run` and `observe_runs`, of calibrations as `passed_result`, `at_temperature` and `exported`.
     """
+    from rig.observation.observed_run import observe_runs
+    from rig.plans.recorded import open_run
+
+    run, name, out = options.run, options.format, options.out
+    moved: tuple[str, str] | None = options.at_temperature
     if moved is not None and name in OF_READINGS:
         raise Refused("bad_option", f"--at-temperature is for calibrations, and {name} holds readings", "Leave it out")
-    folder = out or (run if run.is_dir() else run.parent) / "export" / name
+    folder: Path = out or (run if run.is_dir() else run.parent) / "export" / name
     try:
         if name in OF_READINGS:
             recordings = observe_runs(open_run(run).movement)
@@ -47,12 +67,17 @@ def _made(folder: Path, *, own: bool) -> None:
     """Make the folder, unless a link leads elsewhere, from what lies in it or, if it is not named by the user as their
     `own`, from itself. Raises Refused and OSError.
     """
+    from rig.data.run_folder import refuse_links
+
     refuse_links(*(() if own else (folder.parent, folder)))
     folder.mkdir(parents=True, exist_ok=True)
     refuse_links(*folder.rglob("*"))
 
 
-def _calibration(run: Path, moved: tuple[str, str] | None) -> ResultDocument:
+def _calibration(run: Path, moved: tuple[str, str] | None) -> "ResultDocument":
+    from rig.data.result_file import passed_result, read_result
+    from rig.report.exports.temperature import at_temperature
+
     result = passed_result(run)
     if moved is None:
         return result

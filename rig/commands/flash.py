@@ -1,5 +1,6 @@
-"""`rig board flash`: the firmware that comes with this program onto the board."""
+"""What `rig board flash` does: put the firmware that comes with this program onto the board."""
 
+from argparse import Namespace
 from collections.abc import Callable
 from functools import partial
 from pathlib import Path
@@ -11,18 +12,18 @@ from rig.station.confirm import agreed_or_refused
 from rig.station.plain_text import say
 
 
-def flash(probe_id: str | None, drive: Path | None, *, by_drive: bool, assume_yes: bool) -> int:
+def flash(options: Namespace) -> int:
     """Put the shipped image onto the board, through its debug probe or by a copy to its USB drive."""
     with refusing():
         image = flashing.shipped_image()
         put: Callable[[], object]
-        if by_drive:
-            target = drive or flashing.find_drive()
+        if options.drive is not None:
+            target = Path(options.drive) if options.drive else flashing.find_drive()
             flashing.refuse_other_drive(target)
             put = partial(flashing.flash_by_drive, image, target)
             way, calibrations = f"the drive {target}", "may be lost: read them out first"
         else:
-            probe = flashing.find_probe(probe_id)
+            probe = flashing.find_probe(options.probe)
             put = partial(flashing.flash_by_probe, image, probe)
             way, calibrations = f"the debug probe {probe.unique_id}", "stay"
     agreed_or_refused(
@@ -32,7 +33,7 @@ def flash(probe_id: str | None, drive: Path | None, *, by_drive: bool, assume_ye
             f"Nothing else may use the board meanwhile. Calibrations it has stored {calibrations}.",
         ],
         "flash",
-        assume_yes,
+        options.yes,
     )
     with changing():
         put()

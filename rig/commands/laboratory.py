@@ -46,12 +46,6 @@ def simulated_laboratory(config_path: Path, late: Path | None = None) -> Iterato
                 process.kill()
 
 
-def foreground_laboratory(config_text: str) -> int:
-    """Run only the world of a configuration, given as text, until Ctrl-C; returns its exit status."""
-    with written(config_text) as config_path:
-        return subprocess.call([sys.executable, "-P", "-m", "rig.world", str(config_path)])
-
-
 @contextmanager
 def written(config_text: str) -> Iterator[Path]:
     """The configuration as a file that is there for the length of the `with` block."""

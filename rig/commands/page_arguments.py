@@ -1,7 +1,6 @@
 """The operator's page on the command line: whether it is wanted, where, and what it may answer."""
 
 import argparse
-import math
 import os
 import stat
 import sys
@@ -56,28 +55,15 @@ class OperatorsPage:
     stay: Callable[[], None] = lambda: None
 
 
-def add_arguments(parser: argparse.ArgumentParser) -> None:
+def add_page(parser: argparse.ArgumentParser) -> None:
     """Of `rig run` and `rig resume`."""
     parser.add_argument("--page", action="store_true", help="show the run in a browser as well")
     parser.add_argument("--confirm-on-page", action="store_true", help="ask the operator there, not on the terminal")
-    _add_place(parser)
+    add_place(parser)
 
 
-def add_watching(parser: argparse.ArgumentParser) -> None:
-    """Of `rig watch`, which has a page in any case."""
-    parser.add_argument("run_folder", type=Path, metavar="RUN_DIR")
-    parser.add_argument("--speed", type=_speed, default=1.0, metavar="N", help="times as fast as it was (default: 1)")
-    _add_place(parser)
-
-
-def _speed(text: str) -> float:
-    speed = float(text)
-    if not 0 < speed < math.inf:
-        raise ValueError(text)
-    return speed
-
-
-def _add_place(parser: argparse.ArgumentParser) -> None:
+def add_place(parser: argparse.ArgumentParser) -> None:
+    """Where the page is, and its token."""
     parser.add_argument(
         "--page-address",
         metavar="ADDRESS[:PORT]",

@@ -1,25 +1,33 @@
 """`rig plan`: the dry run. Connects to nothing."""
 
-from collections.abc import Sequence
-from pathlib import Path
+from argparse import ArgumentParser, Namespace
 
-from rig.analysis.attitude_account import attitude_account
-from rig.analysis.planned import planned_told_from
-from rig.arm.carried import carried_by
-from rig.arm.preflight import plan_problems, refuse
-from rig.commands.configured import configured
-from rig.report.plan_table import print_plan
+from rig.commands.config_arguments import add_config, add_json, add_script
 
 
-def plan(config_path: Path, overrides: Sequence[str], script: Path | None, *, as_json: bool) -> int:
+def add(parser: ArgumentParser) -> None:
+    """The arguments of `rig plan`."""
+    add_config(parser)
+    add_script(parser)
+    add_json(parser)
+
+
+def run(options: Namespace) -> int:
     """Print the plan from the home pose, what its attitudes will tell, and which damage its checks; returns 0.
 
     Raises `Refused` when a motion breaks a limit, and when the attitudes do not tell enough.
     """
-    found = configured(config_path, overrides, script)
+    from rig.analysis.attitude_account import attitude_account
+    from rig.analysis.planned import planned_told_from
+    from rig.arm.carried import carried_by
+    from rig.arm.preflight import plan_problems, refuse
+    from rig.commands.configured import configured
+    from rig.report.plan_table import print_plan
+
+    found = configured(options.config, options.overrides, options.script)
     steps = found.phase.plan()
     config = found.loaded.config
     refuse(plan_problems(steps, carried_by(config.arm)))
     account, told_from = attitude_account(config, steps), planned_told_from(config, steps)
-    print_plan(steps, account, told_from, repeated=found.phase.follows is not None, as_json=as_json)
+    print_plan(steps, account, told_from, repeated=found.phase.follows is not None, as_json=options.json)
     return 0

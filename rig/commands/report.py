@@ -1,55 +1,69 @@
 """`rig report`: the documents of a finished run once more, in other forms or with the customer's name in them."""
 
 import sys
-from collections.abc import Sequence
+from argparse import ArgumentParser, Namespace
 from pathlib import Path
+from typing import TYPE_CHECKING
 
-from rig.commands.named_history import named_history
-from rig.commands.remember import remember_certificate
+from rig.commands.config_arguments import add_set
+from rig.commands.named_history import add_history, named_history
 from rig.config.written_file import write_new
-from rig.data.magnetometer_entries import read_reversal
-from rig.data.result_file import read_result
-from rig.data.run_folder import RESULT, refuse_links
 from rig.errors import Refused
-from rig.history.issued import issued_certificate
-from rig.report.certificate.content import Certificate, certificate_of
-from rig.report.certificate.page import certificate_page
-from rig.report.certificate.stated import stated_in
-from rig.report.certificate.writer import PAGE
 from rig.station.plain_text import say
 
+if TYPE_CHECKING:
+    from rig.report.certificate.content import Certificate
 
-def report(
-    run: Path,
-    out: Path | None,
-    overrides: Sequence[str] = (),
-    reversal: Path | None = None,
-    *,
-    pdf: bool = False,
-    dcc: bool = False,
-    history: str | None = None,
-) -> int:
-    """Certificate of a run folder or its result.json: HTML, and with `dcc` and `pdf` in these forms, into `out`.
 
-    `reversal` is what `rig reversal` wrote of its magnetometers; `history` where it is noted, the user's own history by
-    default, and never one that the folder names. Returns 0. Raises Refused `report_folder`, and as `read_result`,
-    `read_reversal`, `refuse_links`, `certificate_of`, `stated_in`, `digital_certificate` and `pdf_of` do.
+def add(parser: ArgumentParser) -> None:
+    """The arguments of `rig report`."""
+    parser.add_argument("run", type=Path, metavar="RUN", help="a run folder or its result.json")
+    parser.add_argument(
+        "--pdf",
+        action="store_true",
+        help="PDF/A-3b too, with result.json and the digital certificate attached (extra `pdf`)",
+    )
+    parser.add_argument(
+        "--reversal", type=Path, metavar="FILE", help="what `rig reversal … --out FILE` has found of its magnetometers"
+    )
+    parser.add_argument("--dcc", action="store_true", help="the digital certificate (DCC 3.2.1, XML) too")
+    parser.add_argument("--out", type=Path, metavar="DIR", help="where to (default: the run folder)")
+    add_history(parser)
+    add_set(parser, "say something else on the certificate, for example certificate.customer=Example")
+
+
+def run(options: Namespace) -> int:
+    """Certificate of a run folder or its result.json: HTML, and with `--dcc` and `--pdf` in these forms, into `--out`.
+
+    `--reversal` is what `rig reversal` wrote of its magnetometers; `--history` where it is noted, the user's own
+    history by default, and never one that the folder names. Returns 0. Raises Refused `report_folder`, and as
+    `read_result`, `read_reversal`, `refuse_links`, `certificate_of`, `stated_in`, `digital_certificate` and `pdf_of`.
     """
-    file = run / RESULT if run.is_dir() else run
+    from rig.commands.remember import remember_certificate
+    from rig.data.magnetometer_entries import read_reversal
+    from rig.data.result_file import read_result
+    from rig.data.run_folder import RESULT, refuse_links
+    from rig.history.issued import issued_certificate
+    from rig.report.certificate.content import certificate_of
+    from rig.report.certificate.page import certificate_page
+    from rig.report.certificate.stated import stated_in
+    from rig.report.certificate.writer import PAGE
+
+    file: Path = options.run / RESULT if options.run.is_dir() else options.run
     result = read_result(file)
-    turned = {} if reversal is None else read_reversal(reversal).magnetometers
-    certificate = certificate_of(result, stated_in(file.parent, overrides), turned)
+    turned = {} if options.reversal is None else read_reversal(options.reversal).magnetometers
+    certificate = certificate_of(result, stated_in(file.parent, options.overrides), turned)
     written: dict[str, bytes] = {PAGE: certificate_page(certificate).encode()}
-    digital = _digital(certificate, wanted=dcc) if dcc or pdf else {}
-    if dcc:
+    digital = _digital(certificate, wanted=options.dcc) if options.dcc or options.pdf else {}
+    if options.dcc:
         written |= digital
-    folder = out or file.parent
+    folder: Path = options.out or file.parent
     try:
         folder.mkdir(parents=True, exist_ok=True)
         refuse_links(*(folder / name for name in written))
         for name, content in written.items():
             write_new(folder / name, content)
-        if pdf:
+        if options.pdf:
             from rig.report.certificate.pdf import PDF, pdf_of
 
             refuse_links(folder / PDF)
@@ -60,13 +74,13 @@ def report(
     for name in written:
         say(str(folder / name))
     issued = issued_certificate(certificate, written)
-    missed = remember_certificate(file.parent, file.read_text(encoding="utf-8"), issued, named_history(history))
+    missed = remember_certificate(file.parent, file.read_text(encoding="utf-8"), issued, named_history(options.history))
     if missed is not None:
         say(f"rig: the certificate is in no history: {missed}", sys.stderr)
     return 0
 
 
-def _digital(certificate: Certificate, *, wanted: bool) -> dict[str, bytes]:
+def _digital(certificate: "Certificate", *, wanted: bool) -> dict[str, bytes]:
     """The digital certificate by its file's name; one that is only to be attached may be missing, which is told."""
     from rig.report.certificate.dcc import DCC, digital_certificate
 

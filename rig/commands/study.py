@@ -1,25 +1,42 @@
 """`rig study`: lists the studies, or runs one with a progress bar and writes what it found."""
 
 import sys
+from argparse import ArgumentParser, Namespace
 from collections.abc import Iterable, Iterator
 from contextlib import contextmanager, nullcontext
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
-from rich.console import Console
-from rich.progress import track
-from rich.table import Table
-
-from rig.data.run_folder import refuse_links
 from rig.errors import Refused
 from rig.station.plain_text import say
-from rig.study.catalogue import STUDIES, find
-from rig.study.files import Format, missing_extra, write
-from rig.study.report import Finding, Settings
+
+if TYPE_CHECKING:
+    from rig.study.report import Finding
 
 
-def list_studies() -> int:
+def add(parser: ArgumentParser) -> None:
+    """The arguments of `rig study`."""
+    parser.add_argument("name", nargs="?", metavar="NAME")
+    parser.add_argument("--out", type=Path, default=Path("studies"), metavar="DIR", help="default: studies")
+    parser.add_argument("--seed", type=int, default=1, metavar="N", help="default: 1")
+    parser.add_argument("--runs", type=int, metavar="N", help="per parameter set (default: as many as the paper)")
+    parser.add_argument("--jobs", type=int, metavar="N", help="processes; the results do not depend on it")
+    parser.add_argument("--dask", metavar="ADDRESS", help="compute on the cluster of this Dask scheduler")
+    parser.add_argument("--format", choices=("csv", "parquet"), default="csv", help="of the table (default: csv)")
+
+
+def run(options: Namespace) -> int:
+    """List the studies, or run the one that is named. Returns 0."""
+    return _listed() if options.name is None else _run(options)
+
+
+def _listed() -> int:
     """Print the names of the studies and what each shows."""
+    from rich.console import Console
+    from rich.table import Table
+
+    from rig.study.catalogue import STUDIES
+
     listed = Table(box=None, show_header=False)
     for name, entry in STUDIES.items():
         listed.add_row(name, entry.summary)
@@ -27,34 +44,31 @@ def list_studies() -> int:
     return 0
 
 
-def run_study(
-    name: str,
-    out: Path,
-    *,
-    seed: int,
-    runs: int | None,
-    jobs: int | None,
-    dask: str | None,
-    table_format: Format,
-) -> int:
-    """Run one study, print its findings and write its files into `out`.
+def _run(options: Namespace) -> int:
+    """Run one study, print its findings and write its files into `--out`.
 
     Raises Refused `unknown_study`, `bad_option`, `missing_extra`, `study_folder`, and as `refuse_links`.
     """
-    entry = find(name)
-    for option, value, least in (("--seed", seed, 0), ("--runs", runs, 10), ("--jobs", jobs, 1)):
+    from rig.data.run_folder import refuse_links
+    from rig.study.catalogue import find
+    from rig.study.files import missing_extra, write
+    from rig.study.report import Settings
+
+    entry = find(options.name)
+    for option, least in (("seed", 0), ("runs", 10), ("jobs", 1)):
+        value = getattr(options, option)
         if value is not None and value < least:
-            raise Refused("bad_option", f"{option} {value} is too small", f"Give {least} or more")
+            raise Refused("bad_option", f"--{option} {value} is too small", f"Give {least} or more")
     try:
         import joblib  # noqa: F401
         import matplotlib  # noqa: F401
     except ImportError as error:
         raise missing_extra(error, "study") from error
-    refuse_links(*out.glob("*"))
-    with _cluster(dask) if dask else nullcontext():
-        report = entry.run(Settings(seed, runs, jobs, _bar))
-    paths = write(report, out, name, table_format)
-    _print_findings(name, report.findings)
+    refuse_links(*options.out.glob("*"))
+    with _cluster(options.dask) if options.dask else nullcontext():
+        report = entry.run(Settings(options.seed, options.runs, options.jobs, _bar))
+    paths = write(report, options.out, options.name, options.format)
+    _print_findings(options.name, report.findings)
     for path in paths:
         say(f"written: {path}", file=sys.stderr)
     return 0
@@ -63,6 +77,8 @@ def run_study(
 @contextmanager
 def _cluster(address: str) -> Iterator[None]:
     """Everything joblib does inside goes to the Dask scheduler at `address`."""
+    from rig.study.files import missing_extra
+
     try:
         from distributed import Client
     except ImportError as error:
@@ -80,11 +96,17 @@ def _cluster(address: str) -> Iterator[None]:
 
 
 def _bar(results: Iterable[Any], total: int) -> Iterable[Any]:
+    from rich.console import Console
+    from rich.progress import track
+
     console = Console(stderr=True)
     return track(results, total=total, description="study", console=console, disable=not console.is_terminal)
 
 
-def _print_findings(name: str, findings: tuple[Finding, ...]) -> None:
+def _print_findings(name: str, findings: "tuple[Finding, ...]") -> None:
+    from rich.console import Console
+    from rich.table import Table
+
     shown = Table(title=f"study {name}", title_justify="left")
     for heading in ("quantity", "ours", "published", "unit", "ours/published"):
         shown.add_column(heading, justify="left" if heading in ("quantity", "unit") else "right")

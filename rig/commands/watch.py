@@ -1,37 +1,61 @@
 """`rig watch`: a run that is recorded, replayed on the operator's page."""
 
+import math
 import sys
 import time
+from argparse import ArgumentParser, Namespace
 from collections.abc import Iterator
 from pathlib import Path
+from typing import TYPE_CHECKING
 
-from rig.arm.identity import calls_itself_simulated
-from rig.commands.page_arguments import PageWish, wait_for_interrupt
+from rig.commands.page_arguments import PageWish, add_place, token_said, wait_for_interrupt
 from rig.config.regular_file import UnfitFile, read_regular_file
-from rig.data.result_file import ResultDocument, read_result
-from rig.data.run_file import RunData, read_run
-from rig.data.run_folder import RESULT, recordings
 from rig.errors import Refused, raised_as
-from rig.observation.arm_motion import check_arms_times
-from rig.page.control import Control
-from rig.page.feed import Feed
-from rig.page.replay import Moment, ended, moments
-from rig.page.rows import Look
-from rig.page.serving import serving
-from rig.page.shown import About, Shown
-from rig.report.certificate.writer import PAGE as CERTIFICATE
-from rig.station.events import DocumentWritten, Interrupted, RunEvent
 from rig.station.plain_text import say
+
+if TYPE_CHECKING:
+    from rig.data.result_file import ResultDocument
+    from rig.data.run_file import RunData
+    from rig.page.feed import Feed
+    from rig.page.replay import Moment
+    from rig.page.shown import About
+    from rig.station.events import RunEvent
 
 LOG_TAIL = 3  # lines of the log that say how a run without a result ended
 LARGEST_LOG = 50_000_000  # bytes
 
 
-def watch(folder: Path, wanted: PageWish, speed: float) -> int:
-    """Replay every recording in a run folder, `speed` times as fast as it was; the page stays until Ctrl-C.
+def add(parser: ArgumentParser) -> None:
+    """The arguments of `rig watch`, which has a page in any case."""
+    parser.add_argument("run_folder", type=Path, metavar="RUN_DIR")
+    parser.add_argument("--speed", type=_speed, default=1.0, metavar="N", help="times as fast as it was (default: 1)")
+    add_place(parser)
+
+
+def _speed(text: str) -> float:
+    speed = float(text)
+    if not 0 < speed < math.inf:
+        raise ValueError(text)
+    return speed
+
+
+def run(options: Namespace) -> int:
+    """Replay every recording in a run folder, `--speed` times as fast as it was; the page stays until Ctrl-C.
 
     Returns 0. Raises Refused `no_run`, `page_address`, and as `read_run`, `check_arms_times` and `read_result` do.
     """
+    from rig.data.result_file import read_result
+    from rig.data.run_file import read_run
+    from rig.data.run_folder import RESULT, recordings
+    from rig.observation.arm_motion import check_arms_times
+    from rig.page.control import Control
+    from rig.page.feed import Feed
+    from rig.page.replay import moments
+    from rig.page.serving import serving
+    from rig.page.shown import Shown
+
+    folder: Path = options.run_folder
+    wanted = PageWish(options.page_address, token_said(options))
     runs = [read_run(path) for readings in ("raw", "calibrated") for path in recordings(folder, readings)]
     if not runs:
         raise Refused("no_run", f"{folder} holds no recording", "Give the folder of a run")
@@ -44,7 +68,7 @@ def watch(folder: Path, wanted: PageWish, speed: float) -> int:
         say(f"page: {url}", sys.stderr)
         try:
             for run in runs:
-                _replay(moments(run), feed, speed)
+                _replay(moments(run), feed, options.speed)
             for event in _ending(folder, result):
                 feed.event(event)
             say("All is replayed. The page stays until Ctrl-C.", sys.stderr)
@@ -54,7 +78,10 @@ def watch(folder: Path, wanted: PageWish, speed: float) -> int:
     return 0
 
 
-def _about(folder: Path, runs: list[RunData]) -> About:
+def _about(folder: Path, runs: "list[RunData]") -> "About":
+    from rig.arm.identity import calls_itself_simulated
+    from rig.page.shown import About
+
     parts: dict[str, str] = {}
     for run in runs:
         parts |= {name: f"{each.part} {each.serial_number}" for name, each in run.sensors.items()}
@@ -65,7 +92,9 @@ def _about(folder: Path, runs: list[RunData]) -> About:
     return About(str(folder), runs[0].settings.procedure, replayed=True, parts=parts, simulated=simulated, arm=arm)
 
 
-def _replay(recorded: Iterator[Moment], feed: Feed, speed: float) -> None:
+def _replay(recorded: "Iterator[Moment]", feed: "Feed", speed: float) -> None:
+    from rig.page.rows import Look
+
     began_s = time.monotonic()
     for moment in recorded:
         wait_s = began_s + moment.at_s / speed - time.monotonic()
@@ -77,7 +106,12 @@ def _replay(recorded: Iterator[Moment], feed: Feed, speed: float) -> None:
             feed.event(moment.event)
 
 
-def _ending(folder: Path, result: ResultDocument | None) -> Iterator[RunEvent]:
+def _ending(folder: Path, result: "ResultDocument | None") -> "Iterator[RunEvent]":
+    from rig.data.run_folder import RESULT
+    from rig.page.replay import ended
+    from rig.report.certificate.writer import PAGE as CERTIFICATE
+    from rig.station.events import DocumentWritten, Interrupted
+
     if (folder / CERTIFICATE).is_file():
         yield DocumentWritten(folder / CERTIFICATE)
     if result is None:

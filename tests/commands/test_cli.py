@@ -2,6 +2,7 @@
 
 import json
 import os
+import re
 import subprocess
 import sys
 from pathlib import Path
@@ -76,6 +77,25 @@ def test_attitudes_of_ones_own_that_tell_too_little_are_refused_by_the_plan() ->
 def test_a_procedures_help_is_the_instruction_for_the_technician(procedure: str) -> None:
     done = shell(f"{sys.executable} {ROOT / 'procedures' / procedure}.py --help")
     assert done.returncode == 0 and "Before you start:" in done.stdout and "What happens:" in done.stdout, done
+
+
+HEAVY = {"h5py", "numpy", "pydantic", "rich", "scipy", "serial", "sqlalchemy", "starlette", "yaml"}
+ASKED = """
+import sys
+from contextlib import suppress
+from rig.cli import main
+for command in sys.argv[1:]:
+    with suppress(SystemExit):
+        main([command, "--help"])
+print(*sys.modules, file=sys.stderr)
+"""
+
+
+def test_help_comes_at_once_whatever_the_command() -> None:
+    listed = re.findall(r"^ {4}(\w+)", shell(f"{sys.executable} -m rig --help").stdout, re.MULTILINE)
+    asked = subprocess.run([sys.executable, "-c", ASKED, *listed], capture_output=True, text=True, check=True)
+    assert all(f"usage: rig {command} " in asked.stdout for command in listed) and len(listed) == 16
+    assert not HEAVY & {*asked.stderr.split()}
 
 
 def test_a_plan_says_what_its_checks_will_tell() -> None:

@@ -14,7 +14,7 @@ from urllib.parse import urlsplit
 
 import pytest
 
-from rig.commands.page_arguments import PageWish, add_arguments, wish
+from rig.commands.page_arguments import PageWish, add_page, wish
 from rig.commands.watch import last_words
 from rig.errors import Refused
 from rig.page.control import STOPPED, Control
@@ -242,7 +242,7 @@ def test_a_port_that_is_none_is_refused(place: str) -> None:
 
 def said(*words: str) -> PageWish | None:
     parser = argparse.ArgumentParser()
-    add_arguments(parser)
+    add_page(parser)
     return wish(parser.parse_args(["--page", *words]))
 
 

@@ -14,7 +14,7 @@ from typing import Protocol
 from support.paths import ROOT
 
 NEEDED = [
-    "rig.commands.run",
+    "rig.commands.carry_out",
     "rig.analysis.outcome",
     "rig.history.finished",
     "rig.history.series",

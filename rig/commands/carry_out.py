@@ -1,0 +1,67 @@
+"""One run from its configuration to its verdict, in its folder and its laboratory: `rig run` and `rig resume`."""
+
+from contextlib import ExitStack
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+from rig.commands.claims import claimed
+from rig.commands.configured import Configured
+from rig.commands.laboratory import simulated_laboratory
+from rig.commands.page_arguments import PageWish, operators_page
+from rig.commands.remember import print_beside, remember
+from rig.data.run_folder import CONFIG, WORLD_LATE
+from rig.report.document import document_of
+from rig.report.table import print_outcome
+from rig.runner.phases import Run
+from rig.station.confirm import ask_operator
+from rig.station.events import NotRemembered, RunFolderWritten
+from rig.station.log import log
+from rig.station.station import Stations, always_yes
+from rig.station.view import view
+
+if TYPE_CHECKING:
+    from rig.page.shown import About
+
+
+def carry_out(folder: Path, found: Configured, *, assume_yes: bool, as_json: bool, page: PageWish | None) -> int:
+    """Run, or go on with, the phases in a run folder; on a `page` too if wanted. Returns 0 passed, 1 verdict failed."""
+    with operators_page(page, folder, lambda: _about(folder, found, page)) as shown:
+        # Nobody stands beside a laboratory that this process starts itself, so there nobody need be asked.
+        on_terminal = always_yes if assume_yes or found.loaded.simulated else ask_operator
+        answer = shown.answer if shown.answer is not None and not assume_yes else on_terminal
+        with log(folder / "log.txt") as logged, view() as seen, ExitStack() as held:
+            station = Stations((logged, seen, *shown.listeners), answer)
+            this = Run(folder, found.loaded, found.script, station)
+            with this.reported():
+                held.enter_context(claimed(found.loaded.config))
+                if found.loaded.simulated:
+                    held.enter_context(simulated_laboratory(folder / CONFIG, folder / WORLD_LATE))
+            outcome = this.carry_out(found.phase)
+            try:
+                entered, beside = remember(folder, found.loaded.config.history)
+            except KeyboardInterrupt:
+                station.event(NotRemembered(folder, "interrupted"))
+                raise
+            if entered is not None:
+                station.event(entered)
+            station.event(RunFolderWritten(folder))
+        print_outcome(document_of(outcome), as_json=as_json)
+        if not as_json:
+            print_beside(beside)
+        shown.stay()
+    return 0 if outcome.passed else 1
+
+
+def _about(folder: Path, found: Configured, page: PageWish | None) -> "About":
+    from rig.page.shown import About
+
+    config = found.loaded.config
+    parts = {name: f"{each.part} {each.serial_number}" for name, each in config.sensors.items()}
+    parts |= {name: f"{each.part} {each.serial_number}" for name, each in config.magnetometers.items()}
+    return About(
+        folder=str(folder),
+        procedure=config.procedure.name,
+        may_answer=page is not None and page.may_answer,
+        parts=parts,
+        simulated=found.loaded.simulated,
+    )
