@@ -11,16 +11,17 @@ that was interrupted. Ctrl-C stops the arm at any moment and keeps what was meas
 
 from collections.abc import Sequence
 
-from rig.cli import run_script  # first: it keeps linear algebra to one thread
-
-# isort: split
 from procedures.static_attitudes import static_attitudes
-from rig.analysis.outcome import Outcome, drifted
-from rig.config.procedure_sections import BiasDriftSection
-from rig.data.run_file import RunData
-from rig.plans.registry import Procedure
-from rig.plans.static_attitudes import plan_static_attitudes
-from rig.plans.verbs import Verbs
+from rig.procedure import (
+    BiasDriftSection,
+    Outcome,
+    Procedure,
+    RunData,
+    Verbs,
+    drifted,
+    plan_static_attitudes,
+    run_script,
+)
 
 
 def bias_drift(rig: Verbs) -> None:

@@ -8,14 +8,7 @@ What happens: the arm goes home and makes twelve sweeps about six axes with a re
 attitudes and stands still in each. Five minutes in all. Ctrl-C stops the arm at any moment and keeps what was measured.
 """
 
-from rig.cli import run_script  # first: it keeps linear algebra to one thread
-
-# isort: split
-from rig.arm.motion import Dwell, Rest, Sweep, Transfer
-from rig.config.procedure_sections import ImuSection
-from rig.plans.imu import plan_imu
-from rig.plans.registry import Procedure
-from rig.plans.verbs import Verbs
+from rig.procedure import Dwell, ImuSection, Procedure, Rest, Sweep, Transfer, Verbs, plan_imu, run_script
 
 
 def imu(rig: Verbs) -> None:

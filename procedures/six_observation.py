@@ -11,14 +11,16 @@ What happens: the arm goes home; wrist 3 turns 360° clockwise, rests, turns bac
 Ctrl-C stops the arm at any moment and keeps what was measured.
 """
 
-from rig.cli import run_script  # first: it keeps linear algebra to one thread
-
-# isort: split
-from rig.arm.motion import Rest, Sweep, Transfer
-from rig.config.procedure_sections import SixObservationSection
-from rig.plans.registry import Procedure
-from rig.plans.six_sweeps import plan_six_observation
-from rig.plans.verbs import Verbs
+from rig.procedure import (
+    Procedure,
+    Rest,
+    SixObservationSection,
+    Sweep,
+    Transfer,
+    Verbs,
+    plan_six_observation,
+    run_script,
+)
 
 
 def six_observation(rig: Verbs) -> None:
@@ -36,9 +38,8 @@ def movement(rig: Verbs) -> None:
             case Transfer():
                 rig.move(step)  # to where the next sweep begins
             case Sweep():
-                rig.sweep(
-                    step
-                )  # ramp up, one revolution at constant speed, ramp down; the board averages it while it rests
+                # Ramp up, one revolution at constant speed, ramp down; the board averages it while the arm rests.
+                rig.sweep(step)
             case Rest():
                 rig.rest(step)  # stand still
 

@@ -9,14 +9,16 @@ each it waits until the sensors have settled and stands still for three seconds.
 keeps what was measured.
 """
 
-from rig.cli import run_script  # first: it keeps linear algebra to one thread
-
-# isort: split
-from rig.arm.motion import Dwell, Rest, Transfer
-from rig.config.procedure_sections import StaticAttitudesSection
-from rig.plans.registry import Procedure
-from rig.plans.static_attitudes import plan_static_attitudes
-from rig.plans.verbs import Verbs
+from rig.procedure import (
+    Dwell,
+    Procedure,
+    Rest,
+    StaticAttitudesSection,
+    Transfer,
+    Verbs,
+    plan_static_attitudes,
+    run_script,
+)
 
 
 def static_attitudes(rig: Verbs) -> None:

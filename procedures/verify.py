@@ -12,16 +12,18 @@ says `verify: true`. Ctrl-C stops the arm at any moment and keeps what was measu
 
 from collections.abc import Sequence
 
-from rig.cli import run_script  # first: it keeps linear algebra to one thread
-
-# isort: split
 from procedures.six_observation import movement
-from rig.analysis.outcome import Outcome, verified, verified_alone
-from rig.config.procedure_sections import VerifySection
-from rig.data.run_file import RunData
-from rig.plans.registry import Procedure
-from rig.plans.six_sweeps import plan_six_observation
-from rig.plans.verbs import Verbs
+from rig.procedure import (
+    Outcome,
+    Procedure,
+    RunData,
+    Verbs,
+    VerifySection,
+    plan_six_observation,
+    run_script,
+    verified,
+    verified_alone,
+)
 
 
 def verify(rig: Verbs) -> None:

@@ -23,7 +23,7 @@ from support.paths import CONFIGS, ROOT
 OWN = """
 from dataclasses import replace
 from procedures.six_observation import PROCEDURE as STOCK
-from rig.cli import run_script
+from rig.procedure import run_script
 
 PROCEDURE = replace(STOCK, then=None)
 

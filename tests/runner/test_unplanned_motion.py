@@ -7,9 +7,7 @@ import pytest
 from support.commands import configuration, rig
 
 SCRIPT = """
-from rig.config.procedure_sections import SixObservationSection
-from rig.plans.registry import Procedure
-from rig.plans.six_sweeps import plan_six_observation
+from rig.procedure import Procedure, SixObservationSection, plan_six_observation
 
 
 def own(rig):

@@ -1,0 +1,65 @@
+"""The one door for procedures: all that a script in procedures/, or a laboratory's own, is written with.
+
+    from rig.procedure import Plan, Procedure, Rest, Sweep, Transfer, Verbs, run_script
+
+These names are the public ones; where they are made may change. docs/how-to/own-procedure.md shows their use.
+"""
+
+from rig.cli import run_script  # first: it keeps linear algebra to one thread
+
+# isort: split
+from rig.analysis.outcome import Outcome, calibrated, drifted, verified, verified_alone
+from rig.arm.motion import Dwell, Plan, Rest, Step, Sweep, Transfer, trapezoid_duration, travel
+from rig.arm.state import Joints
+from rig.config.models import ArmSection, ProcedureSection, RigConfig
+from rig.config.procedure_sections import (
+    AttitudesSection,
+    BiasDriftSection,
+    ImuSection,
+    SixObservationSection,
+    SixSweepsSection,
+    StaticAttitudesSection,
+    VerifySection,
+)
+from rig.data.run_file import RunData
+from rig.errors import Refused
+from rig.plans.imu import plan_imu
+from rig.plans.registry import Procedure
+from rig.plans.six_sweeps import plan_six_observation
+from rig.plans.static_attitudes import plan_static_attitudes
+from rig.plans.verbs import Verbs
+
+__all__ = [
+    "ArmSection",
+    "AttitudesSection",
+    "BiasDriftSection",
+    "Dwell",
+    "ImuSection",
+    "Joints",
+    "Outcome",
+    "Plan",
+    "Procedure",
+    "ProcedureSection",
+    "Refused",
+    "Rest",
+    "RigConfig",
+    "RunData",
+    "SixObservationSection",
+    "SixSweepsSection",
+    "StaticAttitudesSection",
+    "Step",
+    "Sweep",
+    "Transfer",
+    "Verbs",
+    "VerifySection",
+    "calibrated",
+    "drifted",
+    "plan_imu",
+    "plan_six_observation",
+    "plan_static_attitudes",
+    "run_script",
+    "trapezoid_duration",
+    "travel",
+    "verified",
+    "verified_alone",
+]
