@@ -5,7 +5,7 @@ from math import isclose
 
 from firmware_host.client import Board, BoardIdentity, SensorInfo, StoredCalibration
 from firmware_host.protocol import FIRMWARE_VERSION
-from rig.config.models import BoardSection, RigConfig
+from rig.config.models import BoardSection, SensorsConfig
 from rig.config.sensor_sections import MagnetometerSection, SensorSection
 from rig.errors import Fault, Refused, raised_as
 
@@ -40,7 +40,7 @@ refusing = partial(raised_as, Refused)  # before anything has moved
 changing = partial(raised_as, Fault)  # while the board is being changed: no refusal any more
 
 
-def configured_board(config: RigConfig) -> BoardSection:
+def configured_board(config: SensorsConfig) -> BoardSection:
     """Raises Refused `no_board_section` where every sensor has a port of its own."""
     if config.board is None:
         raise Refused(

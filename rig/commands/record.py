@@ -1,7 +1,7 @@
 """`rig record`: the readings of the sensors alone, while something else turns them. No arm is connected to."""
 
 from argparse import ArgumentParser, Namespace
-from contextlib import nullcontext
+from contextlib import ExitStack
 from pathlib import Path
 
 from rig.commands.config_arguments import add_config
@@ -29,8 +29,10 @@ def run(options: Namespace) -> int:
     from rig.config.load import load_sensors
     from rig.runner.readings import record_readings
 
-    loaded = load_sensors(options.config, options.overrides)
-    with written(loaded.text) as used, simulated_laboratory(used) if loaded.simulated else nullcontext():
-        for path, seen in record_readings(loaded.config, options.out, options.duration_s).items():
+    config, simulated = load_sensors(options.config, options.overrides)
+    with ExitStack() as stack:
+        if simulated is not None:
+            stack.enter_context(simulated_laboratory(stack.enter_context(written(simulated))))
+        for path, seen in record_readings(config, options.out, options.duration_s).items():
             say(f"{path}: {seen.samples} samples, {seen.lost} lost")
     return 0

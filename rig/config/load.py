@@ -5,7 +5,7 @@ import ipaddress
 import types
 import typing
 from collections.abc import Iterator, Mapping, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from pathlib import Path
 from typing import Any, TypeVar
 from urllib.parse import urlsplit
@@ -14,8 +14,7 @@ import yaml
 from pydantic import BaseModel, ValidationError
 
 from rig.config.layers import BASE, Layered, Places, put_together, read_layers
-from rig.config.limits import LimitsSection
-from rig.config.models import ProcedureSection, RigConfig
+from rig.config.models import ProcedureSection, RigConfig, SensorsConfig
 from rig.config.procedure_sections import DEFAULT_PROCEDURE, STOCK_SECTIONS
 from rig.config.world_models import WorldSection
 from rig.config.yaml_text import Location, Unreadable, dotted
@@ -25,10 +24,6 @@ from rig.errors.quoting import printable, quote
 Model = TypeVar("Model", bound=BaseModel)
 Sections = Mapping[str, type[ProcedureSection]] | None  # None: the procedure is no matter of the reader's
 PROBLEMS_SHOWN = 25
-_UNUSED: Mapping[str, Any] = {
-    "arm": {"host": "none", "payload_kg": 0},
-    "limits": {name: 1 for name, field in LimitsSection.model_fields.items() if field.is_required()},
-}
 
 
 @dataclass(frozen=True, slots=True)
@@ -73,10 +68,19 @@ def load(path: str | Path, overrides: Sequence[str] = (), sections: Sections = S
     return _validated(_layered(path, overrides), str(path), sections)
 
 
-def load_sensors(path: str | Path, overrides: Sequence[str] = ()) -> Loaded:
-    """As `load`, for who only reads sensors: how they are turned and judged may be missing, and is then filled in."""
+def load_sensors(path: str | Path, overrides: Sequence[str] = ()) -> tuple[SensorsConfig, str | None]:
+    """A configuration for who only reads sensors, and the file as used where it has a `world:` section, else None.
+
+    Such a file has to be whole, because the laboratory simulates all of it. Raises `ConfigurationRefused` as `load`.
+    """
     layered = _layered(path, overrides)
-    return _validated(replace(layered, document={**_UNUSED, **layered.document}), str(path), None)
+    if "world" in layered.document:
+        loaded = _validated(layered, str(path), None)
+        return loaded.config, loaded.text
+    config, problems = _validate(SensorsConfig, layered.document, (), layered.places)
+    if layered.problems or config is None:
+        raise ConfigurationRefused(str(path), [*layered.problems, *problems])
+    return config, None
 
 
 def _layered(path: str | Path, overrides: Sequence[str]) -> Layered:

@@ -5,7 +5,7 @@ says what it means: docs/configuration.md is made of these descriptions.
 """
 
 from collections.abc import Iterable, Mapping
-from typing import Literal
+from typing import Any, Literal
 
 from pydantic import Field, ValidationInfo, field_validator
 
@@ -126,18 +126,18 @@ class OutputSection(Section):
     )
 
 
-class RigConfig(Section):
-    """Everything the rig reads. It has no knowledge of whether the far end is simulated."""
+class SensorsConfig(Section):
+    """What who only reads sensors needs of a configuration: how they are turned and judged may be left out."""
 
-    arm: ArmSection
+    arm: ArmSection | None = None
     board: BoardSection | None = None
     sensors: dict[SensorName, SensorSection] = Field(min_length=1)
     magnetometers: dict[SensorName, MagnetometerSection] = Field(default={}, max_length=len(MAGNETOMETERS))
-    procedure: ProcedureSection
+    procedure: Any = None
     observation: ObservationSection = ObservationSection()
     site: SiteSection = SiteSection()
     uncertainty: UncertaintySection = UncertaintySection()
-    limits: LimitsSection
+    limits: LimitsSection | None = None
     certificate: CertificateSection = CertificateSection()
     history: HistorySection = HistorySection()
     output: OutputSection = OutputSection()
@@ -217,6 +217,14 @@ class RigConfig(Section):
     def reference(self) -> tuple[str, SensorSection] | None:
         """The sensor whose calibration is known, with its name, if there is one."""
         return next(((name, s) for name, s in self.sensors.items() if s.role == "reference"), None)
+
+
+class RigConfig(SensorsConfig):
+    """Everything the rig reads. It has no knowledge of whether the far end is simulated."""
+
+    arm: ArmSection
+    procedure: ProcedureSection
+    limits: LimitsSection
 
 
 def _fields_of_kvhs(sensors: Mapping[str, SensorSection]) -> set[str]:

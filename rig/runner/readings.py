@@ -12,7 +12,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from rig.board.identify import refusing
-from rig.config.models import RigConfig
+from rig.config.models import SensorsConfig
 from rig.data.quantity import ACCELERATION, FIELD, RATE
 from rig.data.run_file import RecordedMagnetometer
 from rig.errors import Fault, Refused
@@ -27,7 +27,7 @@ FIRST_SAMPLE_S = 2.0
 
 
 @contextmanager
-def connected(config: RigConfig, on_samples: OnSamples) -> Iterator[tuple[SampleSource, ...]]:
+def connected(config: SensorsConfig, on_samples: OnSamples) -> Iterator[tuple[SampleSource, ...]]:
     """Every sensor of a configuration, set up and silent. Raises Refused by name for what is not as it says."""
     with ExitStack() as stack:
         sources: list[SampleSource] = []
@@ -87,7 +87,7 @@ class ReadingsFile:
         self._file.flush()
 
 
-def record_readings(config: RigConfig, folder: Path, duration_s: float) -> Mapping[Path, SensorSamples]:
+def record_readings(config: SensorsConfig, folder: Path, duration_s: float) -> Mapping[Path, SensorSamples]:
     """Record every sensor for so long by its own clock, into `folder`/<sensor>.csv; what each file holds.
 
     Nothing is moved. What was recorded stays when it ends early. Raises Refused as `connected`, and `run_folder`;

@@ -10,7 +10,7 @@ import numpy as np
 from firmware_host.client import Board, Calibration, SampleBatch, StoredCalibration
 from firmware_host.protocol import CALIBRATED_RAD_S, FULL_SCALE_COUNTS
 from rig.board.identify import configured_board, find_sensor, refuse_other_firmware, stored_calibration
-from rig.config.models import RigConfig
+from rig.config.models import SensorsConfig
 from rig.config.sensor_sections import MagnetometerSection, SensorSection, mounting_matrix
 from rig.data.run_file import RecordedMagnetometer, RecordedSensor
 from rig.sensors.source import OnSamples, Recorded
@@ -67,7 +67,7 @@ class BoardSource:
 
 
 @contextmanager
-def board_source(config: RigConfig, on_samples: OnSamples, *, calibrated: bool) -> Iterator[BoardSource]:
+def board_source(config: SensorsConfig, on_samples: OnSamples, *, calibrated: bool) -> Iterator[BoardSource]:
     """The board for the length of the `with` block.
 
     Raises BoardError as `Board`, Refused as `configured_board`, `refuse_other_firmware` and `set_up_sensors`.
@@ -87,7 +87,7 @@ def board_source(config: RigConfig, on_samples: OnSamples, *, calibrated: bool) 
         yield BoardSource(board, set_up, magnetometers)
 
 
-def set_up_sensors(board: Board, config: RigConfig, *, calibrated: bool) -> Mapping[str, BoardSensor]:
+def set_up_sensors(board: Board, config: SensorsConfig, *, calibrated: bool) -> Mapping[str, BoardSensor]:
     """Every configured sensor on the board by its name; those to calibrate stream corrected readings when `calibrated`.
 
     Raises Refused as `find_sensor` and `stored_calibration`.
@@ -100,7 +100,7 @@ def set_up_sensors(board: Board, config: RigConfig, *, calibrated: bool) -> Mapp
     }
 
 
-def set_up_magnetometers(board: Board, config: RigConfig) -> Mapping[str, BoardMagnetometer]:
+def set_up_magnetometers(board: Board, config: SensorsConfig) -> Mapping[str, BoardMagnetometer]:
     """Every configured magnetometer by its name. Raises Refused as `find_sensor`."""
     return {name: _magnetometer(board, name, section) for name, section in config.magnetometers.items()}
 

@@ -82,10 +82,15 @@ def test_a_sensor_on_a_table_with_a_clock_of_its_own(tmp_path: Path, capsys: pyt
     assert np.allclose(rate["bias"], -np.array(truth["bias_rad_s"]), atol=1.5e-3)
 
 
+def sensors_alone(folder: Path, **more: object) -> Path:
+    config = folder / "table.yaml"
+    sensor = {"part": "kvh1775", "serial_number": "1", "rate_hz": 250, "serial": {"port": str(folder / "no_port")}}
+    config.write_text(yaml.safe_dump({"sensors": {"kvh": sensor}, **more}), encoding="utf-8")
+    return config
+
+
 def test_sensors_are_all_that_a_configuration_needs(tmp_path: Path) -> None:
-    config = tmp_path / "table.yaml"
-    sensor = {"part": "kvh1775", "serial_number": "1", "rate_hz": 250, "serial": {"port": str(tmp_path / "no_port")}}
-    config.write_text(yaml.safe_dump({"sensors": {"kvh": sensor}}), encoding="utf-8")
+    config = sensors_alone(tmp_path)
     done = rig_here("record", config, "--out", tmp_path / "out", "--duration-s", "1")
     assert done.returncode == 2 and "no_port" in done.stderr, done
 
@@ -93,3 +98,17 @@ def test_sensors_are_all_that_a_configuration_needs(tmp_path: Path) -> None:
 def test_a_duration_that_is_none_is_refused(tmp_path: Path) -> None:
     done = rig_here("record", KVH, "--out", tmp_path, "--duration-s", "0")
     assert done.returncode == 2 and "bad_option" in done.stderr, done
+
+
+def test_what_else_a_configuration_says_must_be_right_all_the_same(tmp_path: Path) -> None:
+    config = sensors_alone(tmp_path, arm={"host": "192.0.2.1", "payload_kg": -1}, site={"altitude": 3})
+    done = rig_here("record", config, "--out", tmp_path / "out", "--duration-s", "1")
+    assert done.returncode == 2 and "arm.payload_kg" in done.stderr and "site.altitude" in done.stderr, done
+
+
+def test_who_turns_the_sensors_needs_to_know_the_arm(tmp_path: Path) -> None:
+    planned = rig_here("plan", sensors_alone(tmp_path))
+    assert planned.returncode == 2 and "arm: missing" in planned.stderr and "limits: missing" in planned.stderr, planned
+    config = sensors_alone(tmp_path, world={"sensors": {}})
+    simulated = rig_here("record", config, "--out", tmp_path / "out", "--duration-s", "1")
+    assert simulated.returncode == 2 and "arm: missing" in simulated.stderr, simulated
