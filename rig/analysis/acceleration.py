@@ -154,8 +154,7 @@ def _calibrated(
     )
     movement, sheet = Movement(seen, sweeps, _repeatability_rad(settings)), None
     temperature_c = float(np.mean([dwell.temperature_c for dwell in used]))
-    if settings.knows_accelerometers and settings.uncertainty is not None:
-        assert sensor.range_m_s2 is not None, "or it has no accelerometer"
+    if settings.knows_accelerometers and settings.uncertainty is not None and sensor.range_m_s2 is not None:
         sheet = sheet_of(settings.uncertainty, name, sensor.part, sensor.range_m_s2)
         pieces = pieces_of(name, recordings, used)
         arm, temperature_c = recordings[0].motion.kinematics, mean_temperature_c(pieces)
@@ -176,7 +175,7 @@ def _calibrated(
         arm_turns=movement.arm_turns,
     )
     check_axes(_axes(solution.matrix), np.eye(3))
-    if settings.second_order:
+    if solution.second_order_s2_m is not None:
         check_seen(solution.second_order_s2_m, np.sqrt(np.diag(solution.covariance)[SECOND]), NOT_SEEN)
     scale, axes = 1 / np.linalg.norm(solution.matrix, axis=1), _axes(solution.matrix)
     angles = angle_jacobian(axes, scale, nearest_rotation(axes))

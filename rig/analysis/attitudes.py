@@ -11,7 +11,7 @@ from rig.analysis.calibration import estimator_among, or_fault
 from rig.analysis.increments import InIncrements, solve_turning
 from rig.analysis.placed_budget import budget_by_causes, noise_freedom
 from rig.analysis.placed_equations import Equations
-from rig.data.quantity import ACCELERATION, RATE, Quantity
+from rig.data.quantity import ACCELERATION, Quantity
 from rig.errors import Fault
 from rig.estimation.arrays import Array
 from rig.estimation.budget import Budget
@@ -23,6 +23,7 @@ from rig.estimation.reference_model import BIAS, REFERENCE, F, KnownNorm
 from rig.estimation.refusals import check_axes
 from rig.estimation.triaxial import EqualWeights, Method, TriaxialSolution
 from rig.observation.attitude_import import PlacedReadings
+from rig.observation.fixes import Turning
 from rig.observation.placements import Placements
 
 Chosen = Method | Literal["increments"]
@@ -98,25 +99,29 @@ def solve_placed(
     That is "attitude_weighted", and for a gyroscope "increments" (over windows of `window_s`), or with `exact_rates`
     "maximum_likelihood".
     """
+    any_mounting = surrounding.any_mounting
 
-    def solved(quantity: Quantity) -> Result:
-        any_mounting = surrounding.any_mounting
-        if quantity != RATE:
-            chosen = "attitude_weighted" if method is None or method == "increments" else method
-            return _of_placements(
-                placed,
-                quantity,
-                Equations.of_placements(placed, quantity, surrounding.known(quantity), second_order=second_order),
-                chosen,
-                any_mounting=any_mounting,
-            )
+    def of_rate(turning: Turning) -> Result:
         asked = method or ("maximum_likelihood" if exact_rates else "increments")
         if asked != "increments":
             return _of_rows(Equations.of_rows(placed, exact_rates=exact_rates), asked, any_mounting=any_mounting)
-        assert placed.turning is not None  # there are readings of the rate
-        return solve_turning(placed.turning, window_s, any_mounting=any_mounting)
+        return solve_turning(turning, window_s, any_mounting=any_mounting)
 
-    return {quantity: or_fault(partial(solved, quantity)) for quantity in placed.quantities}
+    def of_reference(quantity: Quantity, placements: Placements | Fault) -> Result:
+        known = surrounding.known(quantity)
+        if isinstance(placements, Fault):
+            raise placements
+        chosen = "attitude_weighted" if method is None or method == "increments" else method
+        equations = Equations.of_placements(placements, quantity, known, second_order=second_order)
+        return _of_placements(placements, quantity, equations, chosen, any_mounting=any_mounting)
+
+    found: dict[Quantity, Result | Fault] = {}
+    for quantity in placed.quantities:
+        if quantity == RATE and placed.turning is not None:
+            found[quantity] = or_fault(partial(of_rate, placed.turning))
+        elif placed.placements is not None:
+            found[quantity] = or_fault(partial(of_reference, quantity, placed.placements))
+    return found
 
 
 def known_method(name: str | None) -> Chosen | None:
@@ -132,15 +137,14 @@ def _of_rows(equations: Equations, method: Method, *, any_mounting: bool) -> InA
 
 
 def _of_placements(
-    placed: PlacedReadings, quantity: Quantity, equations: Equations, method: Method, *, any_mounting: bool
+    placements: Placements, quantity: Quantity, equations: Equations, method: Method, *, any_mounting: bool
 ) -> InAttitudes:
     """By the method that allows for attitudes that are off, what placements do beside counts as well."""
-    assert isinstance(placed.placements, Placements)
-    elsewhere, moving = placed.placements.elsewhere, placed.placements.left_out
+    elsewhere, moving = placements.elsewhere, placements.left_out
     solution, laid = _solved(equations, method, moving), None
     if method == "attitude_weighted":
         laid = laid_down(
-            np.concatenate([np.ravel(solution.matrix), solution.reference, solution.bias, *_listed(solution)]),
+            solution.theta,
             equations.placed,
             elsewhere.means[quantity],
             elsewhere.variances[quantity],
@@ -164,10 +168,6 @@ def _solved(equations: Equations, method: Method, moving: int) -> TriaxialSoluti
             raise
         what = f"{fault.what}; {moving} rows in which the body moves are left out, for only rests tell a reference"
         raise Fault(fault.name, what, fault.remedy) from None
-
-
-def _listed(solution: TriaxialSolution) -> list[Array]:
-    return [] if solution.second_order is None else [solution.second_order]
 
 
 def _as_laid_down(solution: TriaxialSolution, laid: LaidDown) -> TriaxialSolution:
@@ -197,9 +197,8 @@ def _not_the_earth(solution: TriaxialSolution) -> Fault | None:
     return None
 
 
-def check_seen(second_order: Array | None, std: Array, remedy: str) -> None:
+def check_seen(second_order: Array, std: Array, remedy: str) -> None:
     """Whether any of the terms φ (3,) that were asked for is told. Raises Fault `second_order_not_seen`."""
-    assert second_order is not None
     largest = float(np.max(np.abs(second_order) / std))
     if largest < SEEN:
         raise Fault(

@@ -5,7 +5,7 @@ from typing import Literal
 
 import numpy as np
 
-from rig.analysis.calibration import ESTIMATORS, Estimator, estimator_among, solve_observations
+from rig.analysis.calibration import ESTIMATORS, Estimator, estimator_among, solve_observations, solve_vector
 from rig.errors import Fault
 from rig.estimation.arrays import Array
 from rig.estimation.budget import Budget, Contributor
@@ -40,18 +40,15 @@ def solve_external(data: ExternalData, estimator: Chosen | None) -> Estimate:
             "no row of the sweeps has an angle and begins and ends at rest",
             "Let the body lie still for a second before and after each turn, and give angle_rad; or use vector",
         )
-    start = solve_observations(data.sweeps, "vector", data.rests)
-    assert isinstance(start, VectorSolution)
-    turned = data.turned
+    start, turned = solve_vector(data.sweeps, data.rests), data.turned
     return solve_turned(turned.gyroscope, turned.turns, turned.means, start.matrix, start.bias_rad_s)
 
 
 def budget_of(solution: Estimate, data: ExternalData) -> Budget:
     """What its covariance is made of: of means nothing but their scatter."""
-    if not isinstance(solution, TurnedSolution):
+    if data.turned is None or not isinstance(solution, TurnedSolution):
         freedom = _noise_freedom(solution, data)
         return Budget((Contributor(NOISE, "A", "normal", None, "", FROM_READINGS, freedom, solution.covariance),))
-    assert data.turned is not None, "or nothing was solved by turns"
     known = {NOISE: float(data.turned.noise_freedom), BIAS: float(data.turned.bias_freedom)}
     lines = solution.budget.contributors
     return Budget(tuple(replace(line, freedom=known.get(line.name, line.freedom)) for line in lines))

@@ -128,6 +128,7 @@ def _calibrated(
             variances,
             (alike, drift),
             site,
+            field_t=field_t,
             noise_freedom=_noise_freedom(dwells) if settings.counts_freedom else None,
         ),
         non_orthogonality_rad=non_orthogonality(axes),

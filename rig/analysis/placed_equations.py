@@ -14,6 +14,7 @@ from rig.estimation.attitude_error import Placed
 from rig.estimation.reference_model import Known, KnownNorm, KnownVector
 from rig.estimation.triaxial import Method, TriaxialSolution, solve_triaxial
 from rig.observation.attitude_import import PlacedReadings, Rows
+from rig.observation.placements import Placements
 
 
 @dataclass(frozen=True, slots=True)
@@ -51,13 +52,9 @@ class Equations:
 
     @staticmethod
     def of_placements(
-        placed: PlacedReadings, quantity: Quantity, known: KnownNorm, *, second_order: bool
+        placements: Placements, quantity: Quantity, known: KnownNorm, *, second_order: bool
     ) -> "Equations":
-        """Of a sensor that feels a constant reference. Raises Fault `not_at_rest`."""
-        placements = placed.placements
-        if isinstance(placements, Fault):
-            raise placements
-        assert placements is not None  # there are readings of something else than rates
+        """Of a sensor that feels a constant reference."""
         return Equations(
             placements.read.means[quantity],
             placements.read.variances[quantity],

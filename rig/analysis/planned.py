@@ -19,7 +19,7 @@ from rig.config.models import RigConfig
 from rig.config.sensor_catalogue import PARTS
 from rig.config.sensor_sections import SensorSection, mounting_matrix
 from rig.data.quantity import ACCELERATION
-from rig.data.settings import RunSettings, settings_of
+from rig.data.settings import RunSettings, Site, Uncertainty, settings_of
 from rig.estimation.nonlinearity import distinct_speeds
 
 
@@ -38,33 +38,37 @@ def planned_told_from(config: RigConfig, plan: Plan) -> Told:
     wander.
     """
     settings = settings_of(config, plan)
+    site, known = settings.site, settings.uncertainty
+    if site is None or known is None:  # as in settings of before
+        return Told({}, {})
     kinds = sum(1 + (each.acceleration is not None) for each in config.to_calibrate.values())
     rate = rate_of_each(kinds + len(config.all_sensors) - len(config.sensors), by_model=True)
-    rates = _of_rates(config, plan, settings, rate) if plan.sweeps else {}
-    at_rest = {
-        name: each for name, each in config.to_calibrate.items() if plan.dwells and each.acceleration is not None
+    rates: dict[str, tuple[ToldFrom, ...]] = {}
+    if plan.sweeps:
+        turned = planned_pieces(plan, site, np.array(settings.extension_m))
+        rates = {
+            name: _told_from(name, each, turned, settings, rate, site=site, known=known)
+            for name, each in config.to_calibrate.items()
+        }
+    read = {
+        name: planned_read(name, each, plan, settings, site=site, known=known, range_g=each.acceleration.range_g)
+        for name, each in config.to_calibrate.items()
+        if plan.dwells and each.acceleration is not None and each.acceleration.range_g is not None
     }
-    return Told(rates, {name: _of_accelerations(name, each, plan, settings, rate) for name, each in at_rest.items()})
-
-
-def _of_accelerations(
-    name: str, sensor: SensorSection, plan: Plan, settings: RunSettings, rate: float
-) -> tuple[ToldFrom, ...]:
-    found = reference_consistency.would_tell(planned_read(name, sensor, plan, settings), rate)
-    return of_reference(found, ACCELERATION)
-
-
-def _of_rates(config: RigConfig, plan: Plan, settings: RunSettings, rate: float) -> Mapping[str, tuple[ToldFrom, ...]]:
-    assert settings.site is not None, "or these are no settings of today"
-    turned = planned_pieces(plan, settings.site, np.array(settings.extension_m))
-    return {name: _told_from(name, each, turned, settings, rate) for name, each in config.to_calibrate.items()}
+    found = {name: reference_consistency.would_tell(each, rate) for name, each in read.items()}
+    return Told(rates, {name: of_reference(each, ACCELERATION) for name, each in found.items()})
 
 
 def _told_from(
-    name: str, sensor: SensorSection, turned: Planned, settings: RunSettings, rate: float
+    name: str,
+    sensor: SensorSection,
+    turned: Planned,
+    settings: RunSettings,
+    rate: float,
+    *,
+    site: Site,
+    known: Uncertainty,
 ) -> tuple[ToldFrom, ...]:
-    site, known = settings.site, settings.uncertainty
-    assert site is not None and known is not None, "or these are no settings of today"
     matrix, of = mounting_matrix(sensor.mounting), (name, sensor.part, float(np.radians(sensor.range_deg_s)))
     noise_rad_s_sqrt_hz = np.radians(PARTS[sensor.part].angle_random_walk_deg_sqrt_h) / 60
     seen = turned.read_by(matrix, float(noise_rad_s_sqrt_hz), sensor.rate_hz)

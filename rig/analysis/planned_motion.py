@@ -2,6 +2,7 @@
 
 from collections.abc import Iterator
 from dataclasses import dataclass
+from typing import Generic, TypeVar
 
 import numpy as np
 
@@ -11,25 +12,28 @@ from rig.observation.arm_motion import ArmMotion
 
 STATE_RATE_HZ = 125.0
 STANDING_S = 1.0  # before the first step and after the last
+StepT = TypeVar("StepT", Sweep, Dwell)
+StepT_co = TypeVar("StepT_co", bound=Step, covariant=True)
 
 
 @dataclass(frozen=True, slots=True)
-class Timed:
+class Timed(Generic[StepT_co]):
     """A step, and when it begins and ends."""
 
-    step: Step
+    step: StepT_co
     start_s: float
     end_s: float
 
     @property
-    def revolution_s(self) -> tuple[float, float]:
-        """When a sweep's whole turn at constant speed begins and ends."""
-        assert isinstance(self.step, Sweep)
+    def window_s(self) -> tuple[float, float]:
+        """When what counts of it begins and ends: of a sweep its whole turn at constant speed."""
+        if not isinstance(self.step, Sweep):
+            return self.start_s, self.end_s
         middle, half = (self.start_s + self.end_s) / 2, np.pi / self.step.speed_rad_s
         return middle - half, middle + half
 
 
-def timed(plan: Plan) -> Iterator[Timed]:
+def timed(plan: Plan) -> Iterator[Timed[Step]]:
     """Every step of it, one after the other; no sensor takes long to settle before a dwell."""
     time_s = STANDING_S
     for step in plan.steps:
@@ -53,6 +57,11 @@ def planned_motion(plan: Plan) -> ArmMotion:
     return ArmMotion(states)
 
 
-def measured(plan: Plan) -> Iterator[Timed]:
+def timed_of(plan: Plan, kind: type[StepT]) -> list[Timed[StepT]]:
+    """Its sweeps alone, or its dwells."""
+    return [Timed(each.step, each.start_s, each.end_s) for each in timed(plan) if isinstance(each.step, kind)]
+
+
+def measured(plan: Plan) -> Iterator[Timed[Step]]:
     """Its sweeps, rests and dwells."""
     return (each for each in timed(plan) if isinstance(each.step, (Sweep, Rest, Dwell)))

@@ -76,9 +76,9 @@ def _parts(plan: Plan, motion: ArmMotion) -> Iterator[_Part]:
     sweeps = [each for each in steps if isinstance(each.step, Sweep)]
     rests = [each for each in steps if not isinstance(each.step, Sweep)]
     for place, each in enumerate(sweeps):
-        yield from _cut(motion, each.revolution_s, place, parts)
+        yield from _cut(motion, each.window_s, place, parts)
     for each in rests:
-        yield from _cut(motion, (each.start_s, each.end_s), REST, of_rest)
+        yield from _cut(motion, each.window_s, REST, of_rest)
 
 
 def _cut(motion: ArmMotion, window_s: tuple[float, float], sweep: int, parts: int) -> Iterator[_Part]:

@@ -7,41 +7,51 @@ import numpy as np
 
 from rig.analysis.accelerometer_errors import Piece, errors_of, sheet_of
 from rig.analysis.arm_patterns import Known, Stood, arm_patterns, arm_turns
-from rig.analysis.planned_motion import Timed, timed
+from rig.analysis.planned_motion import Timed, timed_of
 from rig.analysis.reference_budgets import lag_pattern
 from rig.analysis.reference_suspected import Read
 from rig.arm.kinematics import NOMINAL, WRIST_1, flange_arm, flange_attitude
 from rig.arm.motion import Dwell, Plan, Sweep
 from rig.config.sensor_catalogue import PARTS
 from rig.config.sensor_sections import SensorSection, mounting_matrix
-from rig.data.settings import RunSettings
+from rig.data.settings import RunSettings, Site, Uncertainty
 from rig.estimation.arrays import Array
 from rig.estimation.earth import MICRO_G_M_S2, STANDARD_GRAVITY_M_S2
 from rig.estimation.felt import NO_SWEEPS, PARAMETERS, Dwells, Movement, Sweeps, predicted
 from rig.estimation.reference_model import REFERENCE
 
 
-def planned_read(name: str, sensor: SensorSection, plan: Plan, settings: RunSettings) -> Read:
-    """Of the sensor of that name, with noise as its data sheet has it, on the nominal arm; it has an accelerometer.
+def planned_read(
+    name: str,
+    sensor: SensorSection,
+    plan: Plan,
+    settings: RunSettings,
+    *,
+    site: Site,
+    known: Uncertainty,
+    range_g: float,
+) -> Read:
+    """What the accelerometer of that sensor would read, with noise as its data sheet has it, on the nominal arm.
 
     Of attitudes that are gone through several times the last is held out, as in a run.
     """
-    site, known, accelerometer = settings.site, settings.uncertainty, sensor.acceleration
-    assert site is not None and known is not None, "or these are no settings of today"
-    assert accelerometer is not None and accelerometer.range_g is not None, "or it has no accelerometer"
     mounting, noise = mounting_matrix(sensor.mounting), PARTS[sensor.part].acceleration_noise_ug_sqrt_hz * MICRO_G_M_S2
     repeats = {dwell.index: dwell.repeat for dwell in settings.planned_dwells}
     last = max(repeats.values())
-    steps = list(timed(plan))
-    dwells = [each for each in steps if isinstance(each.step, Dwell) and (last == 0 or repeats[each.step.index] < last)]
-    sweeps = [each for each in steps if isinstance(each.step, Sweep)]
+    dwells = [each for each in timed_of(plan, Dwell) if last == 0 or repeats[each.step.index] < last]
+    sweeps = timed_of(plan, Sweep)
     theta = np.zeros(PARAMETERS)
     theta[:9], theta[REFERENCE] = np.eye(3).ravel(), site.gravity_m_s2 * np.array(site.up)
     repeatability_rad = float(np.radians(known.repeatability_deg) / np.sqrt(3))
     movement = Movement(_dwells(dwells, mounting, noise), _sweeps(sweeps, mounting, noise), repeatability_rad)
-    pieces = [*map(_piece, dwells), *map(_piece, sweeps)]
-    stood = [each.stood for each in pieces]
-    sheet = sheet_of(known, name, sensor.part, accelerometer.range_g * STANDARD_GRAVITY_M_S2)
+    stood = [
+        *(Stood(np.array(each.step.q_rad), None) for each in dwells),
+        *(Stood(_began(each.step), each.step.joint - WRIST_1) for each in sweeps),
+    ]
+    windows_s = [*(each.window_s for each in dwells), *(each.window_s for each in sweeps)]
+    # At a temperature that stays.
+    pieces = [Piece(window_s, 1, 0.0, at) for window_s, at in zip(windows_s, stood, strict=True)]
+    sheet = sheet_of(known, name, sensor.part, range_g * STANDARD_GRAVITY_M_S2)
     movement = replace(
         _reading(theta, movement),
         own=errors_of(sheet, pieces, 0.0, second_order=settings.second_order),
@@ -53,24 +63,24 @@ def planned_read(name: str, sensor: SensorSection, plan: Plan, settings: RunSett
     return Read(theta, movement, np.concatenate([lag, arm]), middles_s, second_order=settings.second_order)
 
 
-def _dwells(dwells: Sequence[Timed], mounting: Array, noise_m_s2_sqrt_hz: float) -> Dwells:
-    attitudes = np.array([(mounting @ flange_attitude(_began(each))).T for each in dwells])
+def _dwells(dwells: Sequence[Timed[Dwell]], mounting: Array, noise_m_s2_sqrt_hz: float) -> Dwells:
+    attitudes = np.array([(mounting @ flange_attitude(np.array(each.step.q_rad))).T for each in dwells])
     lasting_s = np.array([each.end_s - each.start_s for each in dwells])
     variances = noise_m_s2_sqrt_hz**2 / lasting_s[:, None] * np.ones(3)
     return Dwells(np.zeros((len(dwells), 3)), variances, attitudes)
 
 
-def _sweeps(sweeps: Sequence[Timed], mounting: Array, noise_m_s2_sqrt_hz: float) -> Sweeps:
+def _sweeps(sweeps: Sequence[Timed[Sweep]], mounting: Array, noise_m_s2_sqrt_hz: float) -> Sweeps:
     if not sweeps:
         return NO_SWEEPS
-    steps = [each.step for each in sweeps if isinstance(each.step, Sweep)]
-    began = [_began(each) for each in sweeps]
+    steps = [each.step for each in sweeps]
+    began = [_began(step) for step in steps]
     growing = np.array([1.0 if step.direction == "ccw" else -1.0 for step in steps])
     stood = [tuple(np.round(q_rad, 2).tolist()) for q_rad in began]
     stations = [(step.joint, *q[: step.joint], *q[step.joint + 1 :]) for step, q in zip(steps, stood, strict=True)]
     places = list(dict.fromkeys(stations))
     waves = np.diag(np.repeat([1.0, 2.0, 2.0], 3))  # mean, cosine and sine of so many readings
-    lasting_s = np.array([np.subtract(*each.revolution_s[::-1]) for each in sweeps])
+    lasting_s = np.array([np.subtract(*each.window_s[::-1]) for each in sweeps])
     arms_m = np.array([flange_arm(q_rad, step.joint) for q_rad, step in zip(began, steps, strict=True)])
     return Sweeps(
         harmonics_m_s2=np.zeros((len(sweeps), 3, 3)),
@@ -83,22 +93,11 @@ def _sweeps(sweeps: Sequence[Timed], mounting: Array, noise_m_s2_sqrt_hz: float)
     )
 
 
-def _began(each: Timed) -> Array:
-    """(6,) where the arm stands in a dwell, and where the revolution of a sweep begins."""
-    step = each.step
-    if isinstance(step, Dwell):
-        return np.array(step.q_rad)
-    assert isinstance(step, Sweep)
+def _began(step: Sweep) -> Array:
+    """(6,) joint angles, rad, where the revolution of a sweep begins."""
     began = np.array(step.start_q_rad)
     began[step.joint] = step.revolution_rad[0 if step.direction == "ccw" else 1]
     return began
-
-
-def _piece(each: Timed) -> Piece:
-    """At a temperature that stays."""
-    wrist = each.step.joint - WRIST_1 if isinstance(each.step, Sweep) else None
-    window_s = each.revolution_s if isinstance(each.step, Sweep) else (each.start_s, each.end_s)
-    return Piece(window_s, 1, 0.0, Stood(_began(each), wrist))
 
 
 def _reading(theta: Array, movement: Movement) -> Movement:

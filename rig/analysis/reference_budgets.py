@@ -70,6 +70,7 @@ def magnetometer_budget(
     tested: tuple[Uniformity, FieldDrift | None],
     site: Site,
     *,
+    field_t: float,
     noise_freedom: Array | None = None,
 ) -> Budget:
     """Of the solution found in attitudes (N, 3, 3), flange to base, with these variances (N, 3) of the means."""
@@ -86,7 +87,7 @@ def magnetometer_budget(
         left,
         noise_freedom=noise_freedom,
     )
-    return reference_budget(spread, _field(site), [_drifting(spread, solution.matrix, attitudes, drift)])
+    return reference_budget(spread, _field(site, field_t), [_drifting(spread, solution.matrix, attitudes, drift)])
 
 
 def _spread(
@@ -112,11 +113,10 @@ def _gravity(site: Site) -> KnownSize:
     return KnownSize("gravity", half_width / size, False, size, "m/s²", f"{said} {NOT_GIVEN}")
 
 
-def _field(site: Site) -> KnownSize:
-    assert site.magnetic_field_t is not None, "or it was not calibrated"
-    size_ut, said = MICROTESLA * site.magnetic_field_t, "site.magnetic_field_uncertainty_ut"
+def _field(site: Site, field_t: float) -> KnownSize:
+    size_ut, said = MICROTESLA * field_t, "site.magnetic_field_uncertainty_ut"
     if site.magnetic_field_expanded_t is not None:
-        relative = site.magnetic_field_expanded_t / site.magnetic_field_t
+        relative = site.magnetic_field_expanded_t / field_t
         return KnownSize(SIZE_OF_FIELD, relative, True, size_ut, "µT", said)
     return KnownSize(SIZE_OF_FIELD, UNSTATED_FIELD, False, size_ut, "µT", f"{said} {NOT_GIVEN}")
 

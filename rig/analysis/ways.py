@@ -41,8 +41,9 @@ def with_ways(pieces: Pieces, name: str, recordings: Sequence[ObservedRun], expl
     tell. (No lines are sought on a way: it is short, and the servo's own vibration grows faster and slower on it.)
     """
     found = [
-        (way, stream, since_s, each)
+        (way, stream, since_s, each.run.settings, site)
         for each, since_s in zip(recordings, since_first_s(recordings), strict=True)
+        if (site := each.run.settings.site) is not None
         for stream in [each.stream(name)]
         for way in _ways(each.run, stream, each.motion)
     ]
@@ -51,17 +52,15 @@ def with_ways(pieces: Pieces, name: str, recordings: Sequence[ObservedRun], expl
     swing_rad2 = max(float(window.swing_rad2.sum()) for window in pieces.windows)  # along any axis of one that turns
     density = np.median(pieces.variances_rad2_s2 * np.diff(pieces.times_s), axis=0)
     means, rates, attitudes, pulls = [], [], [], []
-    for way, stream, _, each in found:
+    for way, stream, _, settings, site in found:
         readings = stream.readings_rad_s[between(stream, way.start_s, way.end_s)]
         attitude = way.motion.attitude(way.start_s, way.end_s)
-        site = each.run.settings.site
-        assert site is not None
         means.append(readings.mean(axis=0))
         turn = turned(way.motion, way.start_s, way.end_s, np.zeros(0), 1)[0]
         rates.append(turn + attitude @ explained.seen.earth_rate_rad_s)
         attitudes.append(attitude)
-        pulls.append(pull_m_s2(way, site.down_m_s2, np.array(each.run.settings.extension_m)))
-    times_s = np.array([(way.start_s + since_s, way.end_s + since_s) for way, _, since_s, _ in found])
+        pulls.append(pull_m_s2(way, site.down_m_s2, np.array(settings.extension_m)))
+    times_s = np.array([(way.start_s + since_s, way.end_s + since_s) for way, _, since_s, *_ in found])
     lasting_s, count = np.diff(times_s), len(found)
     return replace(
         pieces,

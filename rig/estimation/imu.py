@@ -120,7 +120,7 @@ def solve_imu(
         refusals.check_conditioning(told, needed, MAX_CONDITION, what, REMEDY)
         fit = most_likely(start, movement, held, attitude_std_rad)
         if own is not None:
-            movement, fit = as_expected(fit, movement, held, attitude_std_rad)
+            movement, fit = as_expected(fit, movement, own, held, attitude_std_rad)
         covariance, response = fit.covariance(), fit.response()
         if attitude_std_rad is None:
             _check_attitudes(start, movement, held, fit)

@@ -4,6 +4,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
+from rig.estimation.accelerometer_errors import AccelerometerErrors
 from rig.estimation.arrays import Array
 from rig.estimation.attitude_error import PASSES, SETTLED
 from rig.estimation.expected_sizes import Scattered, expected_disturbances, expected_sizes
@@ -93,18 +94,19 @@ def _least_squares(theta: Array, movement: Movement, held: list[int], white: Arr
     return theta, steps
 
 
-def as_expected(fit: Fit, movement: Movement, held: list[int], attitude_std_rad: float | None) -> tuple[Movement, Fit]:
+def as_expected(
+    fit: Fit, movement: Movement, own: AccelerometerErrors, held: list[int], attitude_std_rad: float | None
+) -> tuple[Movement, Fit]:
     """With the walk of the bias, the δ and the disturbances that are to be expected by what the fit leaves."""
-    assert movement.own is not None, "or nothing is expected"
     left = (movement.readings() - predicted(fit.theta, movement)).ravel()
-    known, of_arm, own = noise(fit.theta, movement), effects(fit.theta, movement), np.diag(movement.noise())
-    scattered = Scattered(left, fit.jacobian, known, of_arm, walking(movement), own)
+    known, of_arm, alike = noise(fit.theta, movement), effects(fit.theta, movement), np.diag(movement.noise())
+    scattered = Scattered(left, fit.jacobian, known, of_arm, walking(own, movement), alike)
     walk, delta = expected_sizes(scattered, attitude_std_rad)
-    unit = float(np.sqrt(np.median(own)))
-    alone = [np.diag(np.sqrt(own))[:, piece] for piece in movement.pieces()]
+    unit = float(np.sqrt(np.median(alike)))
+    alone = [np.diag(np.sqrt(alike))[:, piece] for piece in movement.pieces()]
     *louder, turning = expected_disturbances(scattered, walk, delta, [*alone, unit * in_sweeps(movement)])
     disturbed = replace(
-        movement.own, walk_m_s2_sqrt_s=walk, louder=np.array(louder), turning_m_s2=float(np.sqrt(turning)) * unit
+        own, walk_m_s2_sqrt_s=walk, louder=np.array(louder), turning_m_s2=float(np.sqrt(turning)) * unit
     )
     movement = replace(movement, own=disturbed)
     found = most_likely(fit.theta, movement, held, delta)

@@ -129,11 +129,11 @@ def _settle(recorded: Recorded, state: State, sizes: Sizes | None) -> _Settled:
         if not np.linalg.norm(solved.theta[MATRIX]) < LARGEST_STEP:
             raise refusals.untrustworthy(refusals.NO_FIT)
         state = state.moved(solved.theta)
+        settled = _Settled(state, model, sizes, solved, iteration)
         std = np.sqrt(np.diag(solved.covariance))[: CLOCK + 1]
         if iteration > 2 and (np.abs(solved.theta[: CLOCK + 1]) < SETTLED * std).all():
             break
-    assert sizes is not None
-    return _Settled(state, model, sizes, solved, iteration)
+    return settled
 
 
 def _expected(model: MixedModel, fixes: Fixes) -> tuple[Sizes, Array]:

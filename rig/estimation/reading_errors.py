@@ -76,7 +76,7 @@ def wandering(movement: Movement) -> Array:
     """(3 K, 3 K) covariance of what the readings themselves say of the bias: a walk, and what was disturbed."""
     own, whole = movement.own, np.zeros((movement.readings().size,) * 2)
     if own is not None and own.walk_m_s2_sqrt_s:
-        whole += own.walk_m_s2_sqrt_s**2 * walking(movement)
+        whole += own.walk_m_s2_sqrt_s**2 * walking(own, movement)
     if own is not None and own.louder is not None:
         whole += np.diag(np.repeat(of_pieces(own.louder, movement), 3) * np.diag(movement.noise()))
         turning = own.turning_m_s2 * in_sweeps(movement)
@@ -84,10 +84,9 @@ def wandering(movement: Movement) -> Array:
     return whole
 
 
-def walking(movement: Movement) -> Array:
+def walking(own: AccelerometerErrors, movement: Movement) -> Array:
     """(3 K, 3 K) covariance of a bias that walks by 1 m/s² in a second, the axes each for itself."""
-    assert movement.own is not None, "or nothing walks"
-    return _of_bias(walk_covariance(movement.own.windows_s), movement)
+    return _of_bias(walk_covariance(own.windows_s), movement)
 
 
 def _of_bias(covariance: Array, movement: Movement) -> Array:

@@ -77,6 +77,12 @@ class TriaxialSolution:
     warnings: tuple[str, ...]
     attitude_error: AttitudeError | None = None
 
+    @property
+    def theta(self) -> Array:
+        """All that was found, (15,) or (18,), in the covariance's order."""
+        second_order = () if self.second_order is None else self.second_order
+        return np.concatenate([np.ravel(self.matrix), self.reference, self.bias, second_order])
+
 
 def solve_triaxial(
     readings: ArrayLike,

@@ -5,11 +5,13 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from rig.analysis.calibration import SensorResult, found_earth_rate
+from rig.analysis.calibration import found_earth_rate
 from rig.analysis.outcome import Outcome
 from rig.arm.kinematics import flange_attitude
 from rig.data.result_file import ResultDocument
 from rig.estimation.arrays import Array
+from rig.estimation.earth_rate import EarthRate
+from rig.estimation.explained import Explained
 from rig.observation.observed_run import ObservedRun
 from rig.report.figures import envelope, save
 from rig.station.events import NotPlotted, Plotted, RunEvent
@@ -24,7 +26,11 @@ GAP_S = 1.0
 
 def write_earth_rate_figures(outcome: Outcome, document: ResultDocument, folder: Path) -> tuple[RunEvent, ...]:
     """`earth_rate_<sensor>` of every sensor that has found it, as PNG and SVG; none without matplotlib."""
-    found = {name: result for name, result in outcome.results.items() if found_earth_rate(result.earth) is not None}
+    found = {
+        name: (result.explained, earth)
+        for name, result in outcome.results.items()
+        if result.explained is not None and (earth := found_earth_rate(result.earth)) is not None
+    }
     if not found:
         return ()
     try:
@@ -34,24 +40,22 @@ def write_earth_rate_figures(outcome: Outcome, document: ResultDocument, folder:
     from matplotlib.figure import Figure
 
     names = []
-    for sensor, result in found.items():
+    for sensor, (explained, earth) in found.items():
         with style():
             figure = Figure(figsize=(11.0, 4.6), layout="constrained")
-            draw_errors(figure, *errors(outcome.recordings[0], sensor, result))
+            draw_errors(figure, *errors(outcome.recordings[0], sensor, explained, earth))
             figure.suptitle(f"{sensor}: rate of the flange, and error of the calibrated gyroscope, at {RATE_HZ:g} Hz")
             save(figure, folder, f"earth_rate_{sensor}")
         names.append(f"earth_rate_{sensor}")
     return (Plotted(tuple(names)),)
 
 
-def errors(recording: ObservedRun, sensor: str, result: SensorResult) -> tuple[Array, Array, Array]:
+def errors(recording: ObservedRun, sensor: str, explained: Explained, earth: EarthRate) -> tuple[Array, Array, Array]:
     """Times (n,), rates of the flange (n, 3), and calibrated readings less these and the Earth's rate (n, 3), rad/s.
 
     Means over 1 / `RATE_HZ`, in the flange's frame, where the arm's states follow each other closely.
     """
-    stream, motion, earth = recording.stream(sensor), recording.motion, found_earth_rate(result.earth)
-    assert result.explained is not None and earth is not None, "asked of a sensor that has found it"
-    solution = result.explained.solution
+    stream, motion, solution = recording.stream(sensor), recording.motion, explained.solution
     many = max(1, round(stream.sensor.rate_hz / RATE_HZ))
     count = len(stream.time_s) // many * many
     time_s = stream.time_s[:count].reshape(-1, many).mean(axis=1)

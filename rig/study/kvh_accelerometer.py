@@ -72,10 +72,8 @@ def _calibrate(rng: np.random.Generator, _: int) -> tuple[Array, Array, Array]:
     full, first = _solve(means, turned, second_order=True), _solve(means, turned, second_order=False)
     predicted = means - full.residuals
     deviation = (samples - predicted[:, None]).reshape(-1, 3) @ np.linalg.inv(full.matrix).T
-    assert full.second_order is not None
-    theta = np.concatenate([full.matrix.ravel(), full.reference, full.bias, full.second_order])
     residuals = np.array([deviation.std(axis=0).max(), np.abs(full.residuals).max(), np.abs(first.residuals).max()])
-    return theta, np.sqrt(np.diag(full.covariance)), residuals
+    return full.theta, np.sqrt(np.diag(full.covariance)), residuals
 
 
 def _solve(means: Array, turned: Array, *, second_order: bool) -> TriaxialSolution:

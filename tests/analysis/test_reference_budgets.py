@@ -85,7 +85,7 @@ def magnetometer(seed: int, site: Site = SITE) -> Session:
         uniformity(solution, readings, told, variances, solution.fit.attitude_error.std_rad),
         field_drift(tests, np.full((2, 3), TEST_NOISE_T**2 / 2), 0.0),
     )
-    budget = magnetometer_budget(solution, told, variances, tested, site)
+    budget = magnetometer_budget(solution, told, variances, tested, site, field_t=FIELD_T)
     scale = 1 / np.linalg.norm(solution.matrix, axis=1)
     off = np.concatenate([scale - 1 / np.linalg.norm(matrix, axis=1), solution.bias_t - bias])
     return off / budget.std, budget, off / own_spread(budget)
