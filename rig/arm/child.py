@@ -76,8 +76,8 @@ class _Child:
         self._host = host
         self._state_rate_hz = state_rate_hz
         self._sending = threading.Lock()
-        self._states: StateStream | None = None
-        self._latest: Packet | None = None
+        self._states: StateStream  # these two once it is connected
+        self._latest: Packet
         self._control: Any = None
         self._holds_arm = False  # our program may run on the controller
         self._operations_before: int | None = None  # change count before the running move; None when none runs
@@ -97,7 +97,6 @@ class _Child:
 
     def stream(self) -> NoReturn:
         """Send every state to the parent, in order, until the parent is gone."""
-        assert self._states is not None
         batch: list[ArmState] = []
         beat_s = time.monotonic()
         while True:
@@ -179,7 +178,6 @@ class _Child:
 
     def _await_payload(self, wanted_kg: float) -> Message:
         """Wait until the states show the payload."""
-        assert self._latest is not None
         host_s, arm_s = time.monotonic(), self._latest.state.time_s
         while abs((latest := self._latest).payload_kg - wanted_kg) > PAYLOAD_TOLERANCE_KG:
             if min(time.monotonic() - host_s, latest.state.time_s - arm_s) > PAYLOAD_S:

@@ -26,9 +26,9 @@ def simulated_laboratory(config_path: Path, late: Path | None = None) -> Iterato
     command += [] if late is None else ["--late", str(late)]
     # A session of its own: Ctrl-C in the terminal must stop the arm first, not the laboratory under it.
     with subprocess.Popen(command, stdin=subprocess.PIPE, stdout=subprocess.PIPE, start_new_session=True) as process:
-        assert process.stdin is not None and process.stdout is not None
+        kept_open, answers = filter(None, (process.stdin, process.stdout))
         try:
-            answer = json.loads(process.stdout.readline() or "{}")
+            answer = json.loads(answers.readline() or "{}")
             if "problem" in answer:
                 raise Refused.of(Problem(**answer["problem"]))
             if not answer.get("ready"):
@@ -39,7 +39,7 @@ def simulated_laboratory(config_path: Path, late: Path | None = None) -> Iterato
                 )
             yield
         finally:
-            process.stdin.close()
+            kept_open.close()
             try:
                 process.wait(STOP_TIMEOUT_S)
             except subprocess.TimeoutExpired:

@@ -101,12 +101,12 @@ def _entered(where: "Place", run: "Finished") -> "tuple[int, tuple[Beside, ...]]
         return run_id, tuple(_beside(history, run_id))
 
 
-def _certified(where: "Place", content_sha256: str, certificate: "Issued") -> bool:
+def _certified(place: "Place", content_sha256: str, certificate: "Issued") -> bool:
     from rig.history.store import open_history
 
-    if where.file is not None and not where.file.exists():
+    if isinstance(place.where, Path) and not place.where.exists():
         return False
-    with open_history(where) as history:
+    with open_history(place) as history:
         return history.certify(content_sha256, certificate)
 
 

@@ -22,8 +22,7 @@ def enter(connection: Connection, run_id: int, issued: Issued, now_utc: str) -> 
             "entered_utc": now_utc,
         }
         connection.execute(insert(certificate).values(row))
-        number = connection.scalar(known)
-        assert number is not None
+        number = connection.scalars(known).one()
         journal.note(connection, certificate, number)
     files = certificate_file.c
     there = select(files.name, files.sha256).where(files.certificate_id == number)

@@ -21,11 +21,8 @@ def engine_of(place: Place) -> Engine:
 
     Raises Refused as `bring_up_to_date`, `history_is_there`, `missing_extra`; SQLAlchemyError and OSError.
     """
-    if place.server is not None:
-        engine = _postgresql(place.server)
-    else:
-        assert place.file is not None
-        engine = _of_file(place.file, place.label)
+    where = place.where
+    engine = _of_file(where, place.label) if isinstance(where, Path) else _postgresql(where)
     try:
         with engine.connect() as connection:
             current = version_of(connection, place.label) == VERSION

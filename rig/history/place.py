@@ -20,11 +20,10 @@ NAME = "history.sqlite"
 
 @dataclass(frozen=True, slots=True)
 class Place:
-    """An SQLite `file`, or a database's URL on a `server`; `label` is what people are told, without any password."""
+    """`where` is an SQLite file or a server's URL; `label` is what people are told, without any password."""
 
     label: str
-    file: Path | None = None
-    server: "URL | None" = None
+    where: "Path | URL"
 
 
 def chosen_place(section: HistorySection, environment: Mapping[str, str] = os.environ) -> Place | None:
@@ -56,7 +55,7 @@ def place(said: str | None) -> Place:
         said = str(user_data_path("calibration-rig", appauthor=False) / NAME)
     if "://" not in said:
         path = Path(said).expanduser().absolute()
-        return Place(str(path), file=path)
+        return Place(str(path), path)
     try:
         url = history_url(said)
     except ValueError as error:
@@ -68,4 +67,4 @@ def place(said: str | None) -> Place:
         ) from error
     if url.drivername == "sqlite":
         return place(url.database)
-    return Place(url.set(password=None).render_as_string(), server=url.set(drivername="postgresql+psycopg"))
+    return Place(url.set(password=None).render_as_string(), url.set(drivername="postgresql+psycopg"))

@@ -35,9 +35,7 @@ class SensorComparison:
     @property
     def shown(self) -> Comparison:
         """What is plotted: calibrated readings where there are any."""
-        found = self.after or self.before
-        assert found is not None  # compare() makes none without either
-        return found
+        return next(found for found in (self.after, self.before) if found is not None)
 
     def plot(self) -> "Plot":
         """Both over time, and their difference."""

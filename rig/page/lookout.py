@@ -8,6 +8,7 @@ import time
 from collections.abc import Iterator
 from contextlib import contextmanager, suppress
 from pathlib import Path
+from typing import TextIO
 
 from rig.arm.motion import Dwell, Rest, Sweep
 from rig.page.feed import Feed
@@ -53,7 +54,8 @@ def looking_out(folder: Path, feed: Feed) -> Iterator[Lookout]:
         _say_that_it_ended(str(error))
         yield lookout
         return
-    thread = threading.Thread(target=_ask, args=(process, lookout, feed), name="lookout", daemon=True)
+    pipes = [pipe for pipe in (process.stdin, process.stdout) if pipe is not None]
+    thread = threading.Thread(target=_ask, args=(*pipes, lookout, feed), name="lookout", daemon=True)
     thread.start()
     try:
         yield lookout
@@ -63,16 +65,15 @@ def looking_out(folder: Path, feed: Feed) -> Iterator[Lookout]:
         process.kill()
         process.wait()
         thread.join(ENDING_S)
-        for pipe in (process.stdin, process.stdout):
+        for pipe in pipes:
             with suppress(OSError):  # what it was asked last may never have reached it
-                assert pipe is not None
                 pipe.close()
 
 
-def _ask(process: "subprocess.Popen[str]", lookout: Lookout, feed: Feed) -> None:
+def _ask(questions: TextIO, answers: TextIO, lookout: Lookout, feed: Feed) -> None:
     why = "its process has ended"
     try:
-        _follow(process, lookout, feed)
+        _follow(questions, answers, lookout, feed)
     except Exception as error:  # whatever it may be: no part of the run hangs on it
         why = f"{type(error).__name__}: {error}"
     if not lookout.over.is_set():
@@ -84,15 +85,14 @@ def _say_that_it_ended(why: str) -> None:
     say(f"{what} ({why}). The run goes on.", sys.stderr)
 
 
-def _follow(process: "subprocess.Popen[str]", lookout: Lookout, feed: Feed) -> None:
+def _follow(questions: TextIO, answers: TextIO, lookout: Lookout, feed: Feed) -> None:
     """Ask for what has come, whenever that is wanted; returns when all is over, or when nobody answers."""
-    assert process.stdin is not None and process.stdout is not None
     while lookout.wanted.wait() and not lookout.over.wait(WRITTEN_S):
         lookout.wanted.clear()
         asked_s = time.monotonic()
-        process.stdin.write("\n")
-        process.stdin.flush()
-        line = process.stdout.readline()
+        questions.write("\n")
+        questions.flush()
+        line = answers.readline()
         if not line.endswith("\n"):
             return
         seen = json.loads(line)

@@ -13,7 +13,7 @@ from rig.arm.motion import Dwell, Plan, Rest, Step, Sweep
 from rig.arm.state import ARM_STATE_DTYPE, ArmState
 from rig.data.events import DwellFinished, DwellStarted, RestFinished, RestStarted, SweepFinished, SweepStarted
 from rig.data.result_file import ResultDocument
-from rig.data.run_file import RecordedSensor, RunData
+from rig.data.run_file import RecordedMagnetometer, RecordedSensor, RunData
 from rig.page.rows import Look, look_of
 from rig.station.events import (
     ArmSeen,
@@ -161,8 +161,7 @@ class _Samples:
 
     def __init__(self, run: RunData, name: str) -> None:
         self._name, self._samples = name, run.samples[name]
-        self._gyroscope = run.sensors.get(name)
-        self._magnetometer = run.magnetometers.get(name)
+        self._sensor = run.magnetometers.get(name) or run.sensors[name]
 
     def until(self, host_time_s: float) -> SensorSamples:
         count = int(np.searchsorted(self._samples["host_time_s"], host_time_s, side="right"))
@@ -170,13 +169,12 @@ class _Samples:
         if count == 0:
             return SensorSamples(self._name, 0, 0, None)
         lost = int(newest["sequence"][-1]) + 1 - count
-        if self._magnetometer is not None:
-            field_t = _mean(newest["field_counts"], self._magnetometer.sensitivity_t_per_count)
+        if isinstance(self._sensor, RecordedMagnetometer):
+            field_t = _mean(newest["field_counts"], self._sensor.sensitivity_t_per_count)
             return SensorSamples(self._name, count, lost, None, field_t)
-        return self._of_gyroscope(self._gyroscope, newest, SensorSamples(self._name, count, lost, None))
+        return self._of_gyroscope(self._sensor, newest, SensorSamples(self._name, count, lost, None))
 
-    def _of_gyroscope(self, sensor: RecordedSensor | None, newest: NDArray[Any], seen: SensorSamples) -> SensorSamples:
-        assert sensor is not None, "a sensor that is no magnetometer"
+    def _of_gyroscope(self, sensor: RecordedSensor, newest: NDArray[Any], seen: SensorSamples) -> SensorSamples:
         temperature = float(newest["temperature_counts"][-1]) * sensor.temperature_c_per_count
         acceleration = sensor.sensitivity_m_s2_per_count
         return replace(

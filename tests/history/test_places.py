@@ -10,6 +10,7 @@ from contextlib import closing, contextmanager
 from pathlib import Path
 
 import pytest
+from sqlalchemy import URL
 
 from rig.config.load import ConfigurationRefused, load
 from rig.errors import Refused
@@ -111,8 +112,8 @@ def test_a_password_is_said_to_no_server_that_asks_for_it(
 
 def test_another_computer_has_to_prove_that_it_knows_the_password() -> None:
     def arguments(url: str, **environment: str) -> tuple[object, object]:
-        server = place(url).server
-        assert server is not None
+        server = place(url).where
+        assert isinstance(server, URL)
         said = connect_arguments(server, environment)
         return said["require_auth"], said.get("sslmode")
 

@@ -9,7 +9,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from sqlalchemy import event, inspect, text
+from sqlalchemy import URL, event, inspect, text
 
 from rig.config.judging_sections import HistorySection
 from rig.config.load import ConfigurationRefused, load
@@ -264,18 +264,18 @@ def test_what_is_no_history_is_not_made_one(tmp_path: Path) -> None:
 def test_a_history_is_in_the_user_s_folder_unless_somebody_says_otherwise(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setenv("XDG_DATA_HOME", "/somewhere/share")
     usual = chosen_place(HistorySection(), {})
-    assert usual is not None and usual.file == Path("/somewhere/share/calibration-rig/history.sqlite")
+    assert usual is not None and usual.where == Path("/somewhere/share/calibration-rig/history.sqlite")
     said = chosen_place(HistorySection(url="/data/rig.sqlite"), {})
-    assert said is not None and said.file == Path("/data/rig.sqlite")
+    assert said is not None and said.where == Path("/data/rig.sqlite")
     told = chosen_place(HistorySection(url="/data/rig.sqlite", off=True), {"RIG_HISTORY": "/tmp/other.sqlite"})
-    assert told is not None and told.file == Path("/tmp/other.sqlite")
+    assert told is not None and told.where == Path("/tmp/other.sqlite")
     assert chosen_place(HistorySection(off=True), {}) is None
     assert chosen_place(HistorySection(), {"RIG_HISTORY": "off"}) is None
 
 
 def test_a_password_is_not_told_and_not_taken_from_a_file_that_recordings_keep() -> None:
     secret = place("postgresql://rig:secret@lab/history")
-    assert secret.server is not None and secret.server.password == "secret" and "secret" not in secret.label
+    assert isinstance(secret.where, URL) and secret.where.password == "secret" and "secret" not in secret.label
     for url in ("postgresql://rig:secret@lab/history", "postgresql://lab/history?password=secret", "mysql://lab/x"):
         with pytest.raises(ConfigurationRefused) as refused:
             load(DEMO, [f"history.url={url}"])

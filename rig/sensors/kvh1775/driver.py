@@ -228,9 +228,8 @@ class Kvh1775:
             with self._news:
                 self._heard.clear()
             self._write(command)
-            if self._wait(lambda: answer.search(self._heard) is not None, wait_s):
-                found = answer.search(self._heard)
-                assert found is not None
+            self._wait(lambda: answer.search(self._heard) is not None, wait_s)
+            if (found := answer.search(self._heard)) is not None:
                 return found.group(1).decode("ascii", "replace").strip()
             # Only now: what it finds invalid may have been half a command of somebody else's, or the empty line before.
             if (invalid := re.search(rb"INVALID[^\r\n]*", self._heard)) is not None:
