@@ -107,15 +107,13 @@ def wish(options: argparse.Namespace) -> PageWish | None:
 
     Raises Refused `page_address` for a place that will not do, and for what goes with a page alone.
     """
-    wanted = getattr(options, "page", True)
-    may_answer = getattr(options, "confirm_on_page", False)
-    if not wanted:
-        if may_answer or options.page_address or options.page_token or options.page_token_file:
+    if not options.page:
+        if options.confirm_on_page or options.page_address or options.page_token or options.page_token_file:
             raise Refused("page_address", "there is no page to say that of", "Give --page as well")
         return None
     from rig.page.serving import check
 
-    made = PageWish(options.page_address, token_said(options), may_answer)
+    made = PageWish(options.page_address, token_said(options), options.confirm_on_page)
     check(made.address())  # before there is a run folder
     return made
 
