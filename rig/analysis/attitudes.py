@@ -11,7 +11,7 @@ from rig.analysis.calibration import estimator_among, or_fault
 from rig.analysis.increments import InIncrements, solve_turning
 from rig.analysis.placed_budget import budget_by_causes, noise_freedom
 from rig.analysis.placed_equations import Equations
-from rig.data.quantity import ACCELERATION, Quantity
+from rig.data.quantity import ACCELERATION, RATE, Quantity
 from rig.errors import Fault
 from rig.estimation.arrays import Array
 from rig.estimation.budget import Budget
