@@ -5,6 +5,7 @@ from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from datetime import date, datetime
 from types import MappingProxyType
+from typing import Any
 
 from rig.analysis.clock import BY_COMPUTER
 from rig.arm.identity import calls_itself_simulated
@@ -16,6 +17,8 @@ from rig.data.result_file import CheckEntry, ProvenanceEntry, ResultDocument, Se
 from rig.data.result_types import ErrorEntry
 from rig.errors import Refused
 from rig.report.certificate.stated import Stated
+from rig.report.kinds.kind import Found, Without
+from rig.report.kinds.registry import KINDS
 
 
 @dataclass(frozen=True, slots=True)
@@ -30,6 +33,24 @@ class Gyroscope:
     def has_uncertainty(self) -> bool:
         """Whether more than noise is known of its uncertainty."""
         return self.sensor.budget is not None and self.sensor.covariance_combined is not None
+
+
+@dataclass(frozen=True, slots=True)
+class Block:
+    """What of a result a macro of a template prints, which `place` names: `template:macro`."""
+
+    place: str
+    found: Found[Any]
+
+    @property
+    def template(self) -> str:
+        """The file beside this one."""
+        return self.place.partition(":")[0]
+
+    @property
+    def macro(self) -> str:
+        """What of the file prints it."""
+        return self.place.partition(":")[2]
 
 
 @dataclass(frozen=True, slots=True)
@@ -97,6 +118,19 @@ class Certificate:
         """Sensor, quantity, and its bias by repeat."""
         found = self.result.bias_drift.items()
         return tuple((name, quantity, each) for name, drifts in found for quantity, each in drifts.items())
+
+    @property
+    def blocks(self) -> tuple[Block, ...]:
+        """What the page prints of each sensor, one after the other; of a reference nothing."""
+        blocks = [
+            Block(kind.block, found)
+            for kind in KINDS
+            if not isinstance(kind.block, Without)
+            for found in kind.found(self.result)
+            if getattr(found.entry, "role", "calibrate") == "calibrate"
+        ]
+        order = list(dict.fromkeys(block.found.sensor for block in blocks))
+        return tuple(sorted(blocks, key=lambda block: order.index(block.found.sensor)))
 
     @property
     def calibrates(self) -> bool:

@@ -9,7 +9,7 @@ from rig.data.accelerometer_entries import AccelerometerEntry
 from rig.data.budget_entries import BudgetEntry
 from rig.data.drift_entries import DriftEntry
 from rig.data.magnetometer_entries import MagnetometerEntry
-from rig.data.quantity import ACCELERATION, FIELD, QUANTITIES, RATE, Quantity, Unit
+from rig.data.quantity import ACCELERATION, FIELD, RATE, Quantity, Unit
 from rig.data.result_file import AverageEntry, ObservationEntry, SensorEntry
 from rig.data.result_types import ErrorEntry
 from rig.estimation.arrays import Array
@@ -114,11 +114,11 @@ def _turned(matrix: Array, readings: Array, attitude_error_rad: float) -> Array:
     return found
 
 
-def biases_by_repeat(quantity: str, found: DriftEntry) -> Residuals:
+def biases_by_repeat(quantity: Quantity, found: DriftEntry) -> Residuals:
     """Less their mean over the repeats."""
     bias = np.array([each.held.bias for each in found.repeats])
     std = np.array([each.held.std for each in found.repeats])
-    return _marked(bias - bias.mean(axis=0), std, QUANTITIES[quantity], OF_REPEATS, shown=FROM_MEAN)
+    return _marked(bias - bias.mean(axis=0), std, quantity, OF_REPEATS, shown=FROM_MEAN)
 
 
 def _marked(

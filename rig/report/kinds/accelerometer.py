@@ -117,5 +117,6 @@ ACCELEROMETER = ResultKind(
     followed=_followed,
     header=accelerometer_lines,
     figures="rig.report.attitude_figures:write_attitude_figures",
+    block="at_rest.html.j2:accelerometer",
     measured=_measured,
 )

@@ -151,5 +151,6 @@ BIAS_DRIFT = ResultKind(
     followed=_followed,
     header=Without("firmware corrects by one bias; `rig export` makes that of a temperature"),
     figures="rig.report.drift_figures:write_drift_figures",
+    block="at_rest.html.j2:drift",
     measured=_measured,
 )

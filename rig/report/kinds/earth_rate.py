@@ -65,5 +65,6 @@ EARTH_RATE = ResultKind(
     followed=_followed,
     header=Without("it is the place's, not the sensor's"),
     figures="rig.report.earth_rate_figures:write_earth_rate_figures",
+    block=Without("it stands in the block of its gyroscope"),
     measured=_measured,
 )

@@ -154,5 +154,6 @@ GYROSCOPE = ResultKind(
     followed=_followed,
     header=gyroscope_lines,
     figures=Without("its residuals are on the certificate and in the notebook"),
+    block="gyroscope.html.j2:gyroscope",
     measured=_measured,
 )

@@ -84,6 +84,7 @@ class ResultKind(Generic[EntryT]):
     - `shown` makes the row of the page and of the notebook, `followed` what a history keeps.
     - `figures` names the writer of its pictures in a run folder (`module:function`), `header` makes the lines of
       `calibration.h`, by the g-sensitivities (3, 3) of the gyroscopes that have one.
+    - `block` names the macro of the certificate's page (`template:macro`, in rig/report/certificate) that prints one.
     - `measured` is what the digital certificate says of one, with what turning it over has told, by sensor.
     """
 
@@ -97,6 +98,7 @@ class ResultKind(Generic[EntryT]):
     followed: Callable[[Found[EntryT], ResultDocument], Followed | None] | Without
     header: Callable[[Found[EntryT], Mapping[str, Array]], Iterable[str]] | Without
     figures: str | Without
+    block: str | Without
     measured: Callable[[Found[EntryT], Mapping[str, ReversalEntry]], Measured | None] | Without
 
 

@@ -125,5 +125,6 @@ MAGNETOMETER = ResultKind(
     followed=_followed,
     header=magnetometer_lines,
     figures="rig.report.attitude_figures:write_attitude_figures",
+    block="at_rest.html.j2:magnetometer",
     measured=_measured,
 )

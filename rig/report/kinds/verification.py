@@ -43,5 +43,6 @@ VERIFICATION = ResultKind(
     followed=NO_PARAMETER,
     header=NO_PARAMETER,
     figures="rig.report.figures:write_figures",
+    block=Without("it stands in the block of its gyroscope, or alone where nothing was calibrated"),
     measured=_measured,
 )
