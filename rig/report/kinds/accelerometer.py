@@ -3,14 +3,12 @@
 from collections.abc import Iterator
 
 import numpy as np
-from rich.table import Table
 
 from rig.analysis.accelerometer_errors import NONLINEARITY
 from rig.analysis.outcome import Outcome
 from rig.analysis.when import of_accelerometer
 from rig.data.accelerometer_entries import AccelerometerEntry
 from rig.data.quantity import ACCELERATION
-from rig.data.result_file import ResultDocument
 from rig.data.result_types import ErrorEntry
 from rig.report.accelerometer_entry import accelerometer_entry
 from rig.report.axes import skew_known, triple
@@ -18,9 +16,7 @@ from rig.report.budget_table import assumed_lines
 from rig.report.c_functions import accelerometer_lines
 from rig.report.certificate import dcc_results
 from rig.report.expanded import expanded, factor_words
-from rig.report.kinds.followed import Followed
-from rig.report.kinds.kind import Found, Measured, ResultKind, Shown
-from rig.report.kinds.triad import beside, followed_of, shown_of, tables
+from rig.report.kinds.triad import Words, triad_kind
 from rig.report.told_words import told_from, told_lines
 from rig.report.validity_words import when_words
 from rig.report.when_entry import when_entry
@@ -35,33 +31,6 @@ def _entries(outcome: Outcome) -> dict[str, AccelerometerEntry]:
         )
         for name, result in outcome.accelerometers.items()
     }
-
-
-def _found(document: ResultDocument) -> Iterator[Found[AccelerometerEntry]]:
-    return (Found(name, ACCELERATION, entry) for name, entry in document.accelerometers.items())
-
-
-def _printed(found: Found[AccelerometerEntry]) -> Iterator[Table | str]:
-    entry = found.entry
-    model = "a = F s + b" if entry.second_order_s2_m is None else "a = F (s + φ s²) + b"
-    name = beside(found.sensor, ACCELERATION)
-    yield from tables(f"{name}: {entry.part} {entry.serial_number}, {model}, {entry.estimator}", ACCELERATION, entry)
-    yield from _lines(entry)
-
-
-def _shown(found: Found[AccelerometerEntry]) -> Shown:
-    return shown_of(beside(found.sensor, ACCELERATION), ACCELERATION, found.entry)
-
-
-def _followed(found: Found[AccelerometerEntry], document: ResultDocument) -> Followed:
-    return followed_of(found.sensor, ACCELERATION, found.entry, document, found.entry.temperature_c)
-
-
-def _measured(found: Found[AccelerometerEntry], _: object) -> Measured:
-    entry = found.entry
-    warm = {"": entry.temperature_c if entry.found_at is None else entry.found_at.temperature_c}
-    name, results = f"calibration of accelerometer {found.sensor}", dcc_results.accelerometer(entry)
-    return Measured("accelerometer", found.sensor, entry.part, entry.serial_number, name, results, warm)
 
 
 def _lines(found: AccelerometerEntry) -> Iterator[str]:
@@ -106,17 +75,19 @@ def _lines(found: AccelerometerEntry) -> Iterator[str]:
     yield from (f"warning: {warning}" for warning in found.warnings)
 
 
-ACCELEROMETER = ResultKind(
-    name="accelerometer",
-    key="accelerometers",
-    entries=_entries,
-    found=_found,
-    unsolved=lambda _: iter(()),
-    printed=_printed,
-    shown=_shown,
-    followed=_followed,
+def _model(found: AccelerometerEntry) -> str:
+    return "a = F s + b" if found.second_order_s2_m is None else "a = F (s + φ s²) + b"
+
+
+def _temperatures_c(found: AccelerometerEntry) -> dict[str, float | None]:
+    return {"": found.temperature_c if found.found_at is None else found.found_at.temperature_c}
+
+
+ACCELEROMETER = triad_kind(
+    ACCELERATION,
+    "accelerometers",
+    _entries,
+    Words("", _model, _lines, lambda entry, _: dcc_results.accelerometer(entry), _temperatures_c),
     header=accelerometer_lines,
-    figures="rig.report.attitude_figures:write_attitude_figures",
     block="at_rest.html.j2:accelerometer",
-    measured=_measured,
 )

@@ -148,7 +148,6 @@ GYROSCOPE = ResultKind(
     key="sensors",
     entries=_entries,
     found=_found,
-    unsolved=lambda _: iter(()),
     printed=_printed,
     shown=_shown,
     followed=_followed,

@@ -92,7 +92,6 @@ class ResultKind(Generic[EntryT]):
     key: str
     entries: Callable[[Outcome], Mapping[str, object]] | Without
     found: Callable[[ResultDocument], Iterator[Found[EntryT]]]
-    unsolved: Callable[[ResultDocument], Iterator[str]]
     printed: Callable[[Found[EntryT]], Iterator[Table | str]] | Without
     shown: Callable[[Found[EntryT]], Shown] | Without
     followed: Callable[[Found[EntryT], ResultDocument], Followed | None] | Without
@@ -100,6 +99,7 @@ class ResultKind(Generic[EntryT]):
     figures: str | Without
     block: str | Without
     measured: Callable[[Found[EntryT], Mapping[str, ReversalEntry]], Measured | None] | Without
+    unsolved: Callable[[ResultDocument], Iterable[str]] = lambda _: ()
 
 
 def said(outlet: Callable[..., Iterable[SaidT]] | Without, *about: object) -> Iterable[SaidT]:

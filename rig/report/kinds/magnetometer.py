@@ -1,24 +1,20 @@
 """Magnetometers: scale, bias and axes from attitudes to a field of known size, as mounted (TRIAX, Eq. (7))."""
 
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterator
 
 import numpy as np
-from rich.table import Table
 
 from rig.analysis.outcome import Outcome
 from rig.analysis.when import of_magnetometer
-from rig.data.magnetometer_entries import MagnetometerEntry, ReversalEntry
+from rig.data.magnetometer_entries import MagnetometerEntry
 from rig.data.quantity import FIELD
-from rig.data.result_file import ResultDocument
 from rig.data.result_types import ErrorEntry
 from rig.errors import Fault
 from rig.report.axes import skew_known, triple
 from rig.report.budget_table import assumed_lines
 from rig.report.c_functions import magnetometer_lines
 from rig.report.certificate import dcc_results
-from rig.report.kinds.followed import Followed
-from rig.report.kinds.kind import Found, Measured, ResultKind, Shown
-from rig.report.kinds.triad import beside, followed_of, shown_of, tables
+from rig.report.kinds.triad import Words, triad_kind
 from rig.report.magnetometer_entry import magnetometer_entry
 from rig.report.told_words import told_from, told_lines
 from rig.report.validity_words import when_words
@@ -39,40 +35,6 @@ def _entries(outcome: Outcome) -> dict[str, MagnetometerEntry | ErrorEntry]:
         )
         for name, result in outcome.magnetometers.items()
     }
-
-
-def _found(document: ResultDocument) -> Iterator[Found[MagnetometerEntry]]:
-    for name, entry in document.magnetometers.items():
-        if isinstance(entry, MagnetometerEntry):
-            yield Found(name, FIELD, entry)
-
-
-def _unsolved(document: ResultDocument) -> Iterator[str]:
-    for name, entry in document.magnetometers.items():
-        if isinstance(entry, ErrorEntry):
-            yield f"{beside(name, FIELD)}, not calibrated: {entry.error}"
-
-
-def _printed(found: Found[MagnetometerEntry]) -> Iterator[Table | str]:
-    entry, name = found.entry, beside(found.sensor, FIELD)
-    title = f"{name} as mounted: {entry.part} {entry.serial_number}, {entry.model}, {entry.estimator}"
-    yield from tables(title, FIELD, entry)
-    yield from _lines(entry)
-
-
-def _shown(found: Found[MagnetometerEntry]) -> Shown:
-    return shown_of(beside(found.sensor, FIELD), FIELD, found.entry)
-
-
-def _followed(found: Found[MagnetometerEntry], document: ResultDocument) -> Followed:
-    return followed_of(found.sensor, FIELD, found.entry, document, None)
-
-
-def _measured(found: Found[MagnetometerEntry], turned: Mapping[str, ReversalEntry]) -> Measured:
-    entry = found.entry
-    results = dcc_results.magnetometer(entry, turned.get(found.sensor))
-    name = f"calibration of magnetometer {found.sensor}"
-    return Measured("magnetometer", found.sensor, entry.part, entry.serial_number, name, results)
 
 
 def _lines(found: MagnetometerEntry) -> Iterator[str]:
@@ -114,17 +76,11 @@ def _tests(found: MagnetometerEntry) -> Iterator[str]:
         yield f"it sits {1e3 * away_m:.0f} mm from the flange; {advised}"
 
 
-MAGNETOMETER = ResultKind(
-    name="magnetometer",
-    key="magnetometers",
-    entries=_entries,
-    found=_found,
-    unsolved=_unsolved,
-    printed=_printed,
-    shown=_shown,
-    followed=_followed,
+MAGNETOMETER = triad_kind(
+    FIELD,
+    "magnetometers",
+    _entries,
+    Words(" as mounted", lambda entry: str(entry.model), _lines, dcc_results.magnetometer, lambda _: {}),
     header=magnetometer_lines,
-    figures="rig.report.attitude_figures:write_attitude_figures",
     block="at_rest.html.j2:magnetometer",
-    measured=_measured,
 )

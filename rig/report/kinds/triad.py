@@ -1,35 +1,37 @@
 """What all sensors of three axes share in a result: scale factors, biases and axes by one account of uncertainty."""
 
-from collections.abc import Iterator, Sequence
-from typing import Protocol
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
+from dataclasses import dataclass
+from typing import Any
+from xml.etree.ElementTree import Element
 
 from rich.table import Table
 
+from rig.analysis.outcome import Outcome
 from rig.data.budget_entries import expanded_uncertainties
+from rig.data.magnetometer_entries import ReversalEntry
 from rig.data.quantity import Quantity
 from rig.data.result_file import ResultDocument
-from rig.data.result_types import Freedom
+from rig.data.result_types import ErrorEntry
+from rig.estimation.arrays import Array
 from rig.report.axes import scale_and_bias_table
 from rig.report.budget_table import budget_table, expanded_heading
 from rig.report.kinds.followed import ANGLES, Calibrated, Followed, known, parameters, scale_and_bias
-from rig.report.kinds.kind import Shown, Three
+from rig.report.kinds.kind import Found, Measured, ResultKind, Shown, Three
 
 
-class Triad(Calibrated, Protocol):
-    """A calibration from attitudes in `result.json`; its bias is of the name that its quantity makes."""
+@dataclass(frozen=True, slots=True)
+class Words:
+    """What is said of one such sensor, by its entry: behind its name, its model, lines below its table.
 
-    @property
-    def part(self) -> str: ...
-    @property
-    def serial_number(self) -> str: ...
-    @property
-    def estimator(self) -> str: ...
-    @property
-    def non_orthogonality_rad(self) -> Sequence[float]: ...
-    @property
-    def non_orthogonality_std_rad(self) -> Sequence[float]: ...
-    @property
-    def non_orthogonality_freedom(self) -> Sequence[Freedom] | None: ...
+    Of the digital certificate its results, with what turning it over has told, and how warm it was.
+    """
+
+    title: str
+    model: Callable[[Any], str]
+    lines: Callable[[Any], Iterator[str]]
+    digital: Callable[[Any, ReversalEntry | None], Iterator[Element]]
+    temperatures_c: Callable[[Any], Mapping[str, float | None]]
 
 
 def bias_of(quantity: Quantity, entry: object) -> Sequence[float]:
@@ -50,26 +52,17 @@ def shown_of(name: str, quantity: Quantity, entry: Calibrated) -> Shown:
     return Shown(name, quantity.bias, bias, entry.budget is not None, Three(entry.scale, expanded[:3]))
 
 
-def followed_of(
-    sensor: str, quantity: Quantity, entry: Triad, document: ResultDocument, temperature_c: float | None
-) -> Followed:
+def followed_of(found: Found[Any], document: ResultDocument, temperature_c: float | None) -> Followed:
     """Scale, bias and axes as a history keeps them."""
+    quantity, entry = found.quantity, found.entry
     stds, freedom = entry.non_orthogonality_std_rad, entry.non_orthogonality_freedom
     followed = [
-        *scale_and_bias(sensor, quantity, entry, bias_of(quantity, entry), document),
+        *scale_and_bias(found.sensor, quantity, entry, bias_of(quantity, entry), document),
         *parameters(ANGLES, entry.non_orthogonality_rad, stds, freedom, "rad"),
     ]
     full_scale: float = getattr(entry, quantity.named("range"))
-    return Followed(
-        sensor,
-        quantity.name,
-        entry.part,
-        entry.serial_number,
-        full_scale,
-        entry.estimator,
-        temperature_c,
-        known(followed),
-    )
+    of = entry.part, entry.serial_number, full_scale, entry.estimator, temperature_c
+    return Followed(found.sensor, quantity.name, *of, known(followed))
 
 
 def tables(title: str, quantity: Quantity, entry: Calibrated) -> Iterator[Table]:
@@ -80,3 +73,57 @@ def tables(title: str, quantity: Quantity, entry: Calibrated) -> Iterator[Table]
     )
     if budget is not None:
         yield budget_table(budget, entry.scale, quantity.bias)
+
+
+def triad_kind(
+    quantity: Quantity,
+    key: str,
+    entries: Callable[[Outcome], Mapping[str, object]],
+    words: Words,
+    *,
+    header: Callable[[Found[Any], Mapping[str, Array]], Iterable[str]],
+    block: str,
+) -> ResultKind[Any]:
+    """The kind of a sensor that attitudes calibrate, whose entries stand at `key`; its `words` are its own."""
+
+    def found(document: ResultDocument) -> Iterator[Found[Any]]:
+        of_all: Mapping[str, Any] = getattr(document, key)
+        return (Found(name, quantity, each) for name, each in of_all.items() if not isinstance(each, ErrorEntry))
+
+    def unsolved(document: ResultDocument) -> Iterator[str]:
+        of_all: Mapping[str, Any] = getattr(document, key)
+        for name, each in of_all.items():
+            if isinstance(each, ErrorEntry):
+                yield f"{beside(name, quantity)}, not calibrated: {each.error}"
+
+    def printed(each: Found[Any]) -> Iterator[Table | str]:
+        entry = each.entry
+        title = f"{beside(each.sensor, quantity)}{words.title}: {entry.part} {entry.serial_number}"
+        yield from tables(f"{title}, {words.model(entry)}, {entry.estimator}", quantity, entry)
+        yield from words.lines(entry)
+
+    def shown(each: Found[Any]) -> Shown:
+        return shown_of(beside(each.sensor, quantity), quantity, each.entry)
+
+    def followed(each: Found[Any], document: ResultDocument) -> Followed:
+        return followed_of(each, document, getattr(each.entry, "temperature_c", None))
+
+    def measured(each: Found[Any], turned: Mapping[str, ReversalEntry]) -> Measured:
+        entry, name = each.entry, f"calibration of {quantity.sensor} {each.sensor}"
+        results, warm = words.digital(entry, turned.get(each.sensor)), words.temperatures_c(entry)
+        return Measured(quantity.sensor, each.sensor, entry.part, entry.serial_number, name, results, warm)
+
+    return ResultKind(
+        name=quantity.sensor,
+        key=key,
+        entries=entries,
+        found=found,
+        unsolved=unsolved,
+        printed=printed,
+        shown=shown,
+        followed=followed,
+        header=header,
+        figures="rig.report.attitude_figures:write_attitude_figures",
+        block=block,
+        measured=measured,
+    )

@@ -37,7 +37,6 @@ VERIFICATION = ResultKind(
     key="verification",
     entries=_entries,
     found=_found,
-    unsolved=lambda _: iter(()),
     printed=_printed,
     shown=NO_PARAMETER,
     followed=NO_PARAMETER,
