@@ -17,6 +17,7 @@ from rig.runner.settling import Settling
 from rig.station.events import SensorSamples, Vector
 
 KEPT_PARTS = 3
+REACHES_BACK_S = 300.0  # before a sweep, of what its clock is found by: more tells no more, and takes longer
 WHOLE_S = 5.0  # of a dwell, in which every state of the arm is recorded
 STANDING_S = 0.25  # between those recorded after: an arm that stands needs no more, and hours of it would fill the disk
 
@@ -159,15 +160,22 @@ class Acquisition:
             self._kept.append(_Part(defaultdict(list), []))
 
     def kept(self, sensor: str) -> tuple[np.ndarray, list[ArmState], int]:
-        """All samples (n,) of one sensor and all arm states that are held, and how many of these are new.
+        """Samples (n,) of one sensor and arm states that are held, and how many of these are new.
 
-        New are those since the latest `keep`.
+        New are those since the latest `keep`; what is older reaches back `REACHES_BACK_S` from there, however long
+        somebody or something was waited for.
         """
         with self._lock:
             batches = [batch for part in self._kept for batch in part.batches[sensor]]
             states = [state for part in self._kept for state in part.states]
             new = len(self._kept[-1].states) if self._kept else 0
-        return np.concatenate(batches or [np.empty(0, SAMPLE_DTYPE)]), states, new
+        samples = np.concatenate(batches or [np.empty(0, SAMPLE_DTYPE)])
+        if not new or not len(samples):
+            return samples, states, new
+        from_s = states[-new].time_s - REACHES_BACK_S
+        span_us = round(1e6 * (states[-1].time_s - from_s))
+        recent = samples["board_time_us"] + np.uint64(span_us) >= samples["board_time_us"][-1]
+        return samples[recent], [state for state in states if state.time_s >= from_s], new
 
     def samples(self) -> tuple[SensorSamples, ...]:
         """What every sensor has delivered so far."""
