@@ -56,7 +56,7 @@ class Origin:
     solved_utc: datetime
 
 
-@dataclass(frozen=True, slots=True)
+@dataclass(frozen=True, slots=True, kw_only=True)
 class Outcome:
     """What a run's recordings amount to, by sensor name.
 
@@ -69,13 +69,13 @@ class Outcome:
     in the run and from what size on the checks tell it, `told_from_in_reference` of accelerometers and magnetometers.
     """
 
-    recordings: tuple[ObservedRun, ...]
     settings: RunSettings
-    results: Mapping[str, SensorResult]
-    onboard: Mapping[str, Agreement]
-    verifications: Mapping[str, Verification]
-    checks: tuple[Check, ...]
     provenance: Origin
+    recordings: tuple[ObservedRun, ...] = ()
+    checks: tuple[Check, ...] = ()
+    results: Mapping[str, SensorResult] = field(default_factory=dict)
+    onboard: Mapping[str, Agreement] = field(default_factory=dict)
+    verifications: Mapping[str, Verification] = field(default_factory=dict)
     clock: ClockCheck | None = None
     accelerometers: Mapping[str, AccelerometerResult] = field(default_factory=dict)
     magnetometers: Mapping[str, MagnetometerResult | Fault] = field(default_factory=dict)
@@ -129,7 +129,6 @@ def calibrated(runs: Sequence[RunData], estimator: str = DEFAULT_ESTIMATOR, *, d
         settings=settings,
         results=results,
         onboard=onboard,
-        verifications={},
         checks=(
             *checks,
             *(check for name, agreed in onboard.items() for check in agreed.checks(name)),
@@ -167,13 +166,10 @@ def _in_attitudes(runs: Sequence[RunData], recordings: tuple[ObservedRun, ...], 
     among_dwells = in_reference(recordings, found, magnetometers, drifting=drifting)
     checks = (*_acceleration_checks(found, settings), *among_dwells.checks)
     return Outcome(
-        recordings,
-        settings,
-        {},
-        {},
-        {},
-        checks,
-        _origin(runs),
+        settings=settings,
+        provenance=_origin(runs),
+        recordings=recordings,
+        checks=checks,
         accelerometers=found,
         magnetometers=magnetometers,
         told_from_in_reference=among_dwells.told_from,
@@ -258,7 +254,7 @@ def verified_alone(repeated: Sequence[RunData]) -> Outcome:
 
     Raises Fault as `verified` does.
     """
-    nothing_calibrated = Outcome((), repeated[0].settings, {}, {}, {}, (), _origin(repeated[:1]))
+    nothing_calibrated = Outcome(settings=repeated[0].settings, provenance=_origin(repeated[:1]))
     return verified(nothing_calibrated, repeated)
 
 
