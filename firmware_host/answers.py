@@ -278,7 +278,7 @@ class Calibration:
         )
 
     def values(self) -> dict[str, Any]:
-        """The same as those fields."""
+        """The stored calibration as the fields of its message."""
         return {
             "model": protocol.MODELS.index(self.model),
             "serial_number": self.serial_number,
@@ -289,7 +289,7 @@ class Calibration:
         }
 
     def as_kept(self) -> Self:
-        """The same as it comes back from the board: single precision, whole seconds."""
+        """The stored calibration as it comes back from the board: single precision, whole seconds."""
         temperature_c, *matrix, bx, by, bz = struct.unpack(
             "<13f", struct.pack("<13f", self.temperature_c, *(k for row in self.matrix for k in row), *self.bias_rad_s)
         )
@@ -329,7 +329,7 @@ class StoredCalibration:
         )
 
     def document(self) -> dict[str, Any]:
-        """The same as plain numbers, strings and lists."""
+        """The record as plain numbers, strings and lists."""
         calibration = self.calibration
         return {
             "sequence": self.sequence,

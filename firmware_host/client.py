@@ -82,7 +82,7 @@ class Board:
         return self._configure(sensor, rate_hz, range_deg_s=range_deg_s, range_g=range_g)
 
     def configure_magnetometer(self, sensor: int, rate_hz: float, range_gauss: float) -> SensorSetup:
-        """The same of a magnetometer."""
+        """Sets a magnetometer to the nearest data rate and the next range up."""
         return self._configure(sensor, rate_hz, range_gauss=range_gauss)
 
     def start(self, calibrated: Collection[int] = ()) -> None:
@@ -234,13 +234,13 @@ class Board:
         return answer
 
     def _take_samples(self, frames: Iterable[Frame], host_time_s: float) -> None:
-        """On the reader thread: the stream as it comes; what is left of another program's is dropped."""
+        """Hand over the stream as it comes, on the reader thread; what is left of another program's is dropped."""
         if self._streaming:
             for batch in sample_batches(frames, host_time_s):
                 self._on_samples(batch)
 
     def _take(self, frame: Frame, request: str | None) -> None:
-        """On the reader thread: every other frame as it comes."""
+        """Take every other frame as it comes, on the reader thread."""
         if frame.name == "ack" and request in ("start", "stop", "reboot"):
             # Here and not in the caller's thread: the samples of a started stream may already be in the next frame.
             self._streaming = request == "start"

@@ -47,7 +47,7 @@ def shipped_image() -> bytes:
 
 
 def sha256(image: bytes) -> str:
-    """In hexadecimal."""
+    """SHA-256 of an image, in hexadecimal."""
     return hashlib.sha256(image).hexdigest()
 
 

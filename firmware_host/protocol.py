@@ -82,7 +82,7 @@ class Field:
 
     @property
     def rows(self) -> int:
-        """Of three numbers each: 1 of a vector, 3 of a matrix, 0 of anything else."""
+        """Number of rows of three numbers each: 1 of a vector, 3 of a matrix, 0 of anything else."""
         return {"vector": 1, "matrix": 3}.get(self.kind.partition("_")[0], 0)
 
 

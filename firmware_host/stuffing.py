@@ -31,7 +31,7 @@ def unstuff_in_python(block: bytes) -> bytes | None:
 
 
 def unstuff_by_package(block: bytes) -> bytes | None:
-    """The same by `cobs`, for any `block`."""
+    """What was stuffed into `block`, of any length, by the package `cobs`; None when it is damaged."""
     try:
         body: bytes = cobs.decode(block)
     except cobs.DecodeError:

@@ -293,7 +293,7 @@ class Adis16465:
         self._next_change_s = self._next_update_s - _UPDATING_S
 
     def _user_bias(self, axis: int) -> int:
-        """In the 32-bit rate's counts (Linux, adis16475.c: calibbias)."""
+        """The user's bias of an axis in the 32-bit rate's counts (Linux, adis16475.c: calibbias)."""
         low, high = (self._registers.values[_XG_BIAS_LOW + 4 * axis + half] for half in (0, 2))
         return (high << 16 | low) - (1 << 32 if high >> 15 else 0)
 
@@ -301,7 +301,7 @@ class Adis16465:
         self._temperature = saturated(round(self._gyroscope.temperature_c(time_s) * 10)) & 0xFFFF
 
     def _shown(self, output: int) -> int:
-        """As the 32-bit register pair shows it: without averaging, the lower 16 bits are empty."""
+        """An output as the 32-bit register pair shows it: without averaging, the lower 16 bits are empty."""
         if self._registers.values[_DEC_RATE] or self._registers.values[_FILT_CTRL]:
             return self._counts[output]
         return saturated(self._counts[output] + 0x8000 >> 16) << 16

@@ -164,7 +164,7 @@ class Flash:
         self._start(offset, b"\xff" * PAGE_BYTES, _ERASE_TICKS)
 
     def _program(self, offset: int, value: int) -> None:
-        """Only what is erased can be programmed, except to zero."""
+        """Program a doubleword: only what is erased can be, except to zero."""
         if value and self._memory.data[offset : offset + DOUBLEWORD_BYTES] != b"\xff" * DOUBLEWORD_BYTES:
             self._status |= _PROGERR
             return

@@ -72,7 +72,7 @@ class Port:
         return self._mode.value >> 2 * pin & 3 == _INPUT
 
     def _read_levels(self) -> int:
-        """Of the pins that devices drive; the others' levels have no model and read 0."""
+        """The levels of the pins that devices drive; the others' levels have no model and read 0."""
         return sum(1 << pin for pin in range(16) if self._levels >> pin & 1 and self.is_input(pin))
 
     def _set_and_reset(self, value: int) -> None:

@@ -128,7 +128,7 @@ class Lsm9ds1:
         return 0xFF
 
     def foretell(self) -> bytes:
-        """Nothing: what is read decides what is shown next."""
+        """What the chip answers next: nothing is foretold, for what is read decides what is shown."""
         return b""
 
     # --- registers

@@ -96,7 +96,7 @@ class Lsm9ds1Magnetometer:
         return 0xFF
 
     def foretell(self) -> bytes:
-        """Nothing: what is read decides what is shown next."""
+        """What the magnetometer answers next: nothing is foretold, for what is read decides what is shown."""
         return b""
 
     # --- registers

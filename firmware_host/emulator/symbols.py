@@ -50,7 +50,7 @@ class Symbols:
         return name if address < self._starts[index] + max(size, 2) else None
 
     def where(self, address: int) -> str:
-        """For example `0x08000412 in function usart_init`."""
+        """Where in the image an address lies, as in `0x08000412 in function usart_init`."""
         name = self.function(address)
         place = f"in function {name}" if name else "outside every function of the image"
         return f"0x{address & ~1:08X} {place}"

@@ -79,7 +79,7 @@ class Triad:
         return felt
 
     def warmer_k(self, time_s: float) -> float:
-        """By how much the part is warmer than where its errors hold."""
+        """How much warmer the part is than where its errors hold."""
         return self.temperature_c(time_s) - self._errors.holds_at_c if self._warms else 0.0
 
     def read(self, time_s: float, felt: list[float], warmer_k: float) -> list[float]:
@@ -97,7 +97,7 @@ class Triad:
         return [value - b + scale * draw() for value, b in zip(felt, bias, strict=True)]
 
     def all_warmer_k(self, time_s: np.ndarray) -> np.ndarray | float:
-        """The same as `warmer_k`, (n,) or one number for all."""
+        """How much warmer the part is than where its errors hold, (n,) or one number for all times."""
         return np.array([self.warmer_k(t) for t in time_s.tolist()]) if self._warms else 0.0
 
     def readings(self, time_s: np.ndarray, felt: Sequence[np.ndarray], warmer_k: np.ndarray | float) -> np.ndarray:

@@ -46,7 +46,7 @@ class HeldOut:
 
     @property
     def rms_m_s2(self) -> float:
-        """Of all of them."""
+        """Root mean square of the attitudes' errors."""
         return float(np.sqrt(np.mean(self.error_m_s2**2)))
 
 
@@ -229,7 +229,7 @@ def _apart(
 
 
 def _dwells(dwells: Sequence[DwellReading], mounting: Array) -> Dwells:
-    """In the axes of the nominal mounting; a mean of rotations that hardly differ has shrunk by the encoders' steps."""
+    """The dwells in the nominal mounting's axes; the mean of rotations that hardly differ shrinks by encoder steps."""
     return Dwells(
         readings_m_s2=np.array([dwell.reading.mean for dwell in dwells]),
         variances_m2_s4=np.array([dwell.reading.variance for dwell in dwells]),
@@ -278,7 +278,7 @@ def _beside(solve: Callable[[], AccelerometerSolution]) -> TriaxialSolution | Fa
 
 
 def _alignment(gyroscope: SensorResult, solution: ImuSolution, mounting: Array) -> Alignment | None:
-    """Both F by the flange's axes; None where the vector model has no solution of the gyroscope."""
+    """How a gyroscope and its accelerometer are aligned, in the flange's axes; None without a vector solution."""
     vector = gyroscope.vector_model
     if isinstance(vector, Fault):
         return None

@@ -45,17 +45,17 @@ class Sheet:
 
     @property
     def even_s2_m(self) -> float:
-        """Of φ, as if it were all that the sensor is not linear by: over ± V the best line misses φ v² by φ V²/2."""
+        """Half-width of φ, if nothing else bends the sensor: the best line over ± V misses φ v² by φ V²/2."""
         return 0.02 * self.nonlinearity_percent / (self.over_g * STANDARD_GRAVITY_M_S2)
 
     @property
     def odd_s4_m2(self) -> float:
-        """Of χ likewise: the best line misses χ v³ by χ V³/4."""
+        """Half-width of χ, if nothing else bends the sensor: the best line misses χ v³ by χ V³/4."""
         return 0.04 * self.nonlinearity_percent / (self.over_g * STANDARD_GRAVITY_M_S2) ** 2
 
 
 def sheet_of(known: Uncertainty, name: str, part: str, range_m_s2: float) -> Sheet:
-    """Of the sensor of that name."""
+    """What is known of the accelerometer of the sensor `name`, as its data sheet or the configuration has it."""
 
     def of(what: OfSensor) -> float:
         return known.of(what, name, part)
@@ -83,7 +83,7 @@ class Piece:
 
 
 def pieces_of(name: str, recordings: Sequence[ObservedRun], dwells: Sequence[DwellReading]) -> list[Piece]:
-    """Of the sensor `name`: these dwells, then all sweeps."""
+    """The pieces that the sensor `name` is calibrated from: these dwells, then all sweeps."""
     timed, used = list(zip(recordings, since_first_s(recordings), strict=True)), {dwell.index for dwell in dwells}
     return [
         *(
@@ -102,14 +102,14 @@ def pieces_of(name: str, recordings: Sequence[ObservedRun], dwells: Sequence[Dwe
 
 
 def mean_temperature_c(pieces: Sequence[Piece]) -> float:
-    """Of their readings, that scale and bias are referred to: the one that `rig.analysis.when` says they hold at."""
+    """Mean temperature of the pieces' readings, which `rig.analysis.when` too says that scale and bias hold at."""
     return float(np.average([each.temperature_c for each in pieces], weights=[each.samples for each in pieces]))
 
 
 def errors_of(
     sheet: Sheet, pieces: Sequence[Piece], temperature_step_k: float, *, second_order: bool
 ) -> AccelerometerErrors:
-    """Of a sensor in these pieces, with a thermometer of such steps; no even part where that is looked for."""
+    """Errors of a sensor in these pieces, with a thermometer of such steps; no even part where that is looked for."""
     windows_s, samples = np.array([each.window_s for each in pieces]), np.array([each.samples for each in pieces])
     return AccelerometerErrors(
         even_s2_m=0.0 if second_order else sheet.even_s2_m / STANDARD,
@@ -133,7 +133,7 @@ def with_errors(
     *,
     second_order: bool,
 ) -> Movement:
-    """With what is known of the sensor and of the arm in these pieces of it."""
+    """The movement with what is known of the sensor's errors and of the arm's in these pieces of it."""
     own = errors_of(sheet, pieces, abs(sensor.temperature_c_per_count), second_order=second_order)
     turns = arm_turns([each.stood for each in pieces], arm, np.array(sensor.mounting))
     return replace(movement, own=own, arm_turns=turns)

@@ -30,7 +30,7 @@ class MeanRates:
     covariance_rad2_s2: Array
 
     def turned(self, matrix: Array) -> "MeanRates":
-        """The same in another frame, or corrected."""
+        """The mean rates in another frame, or corrected, by a matrix (3, 3)."""
         return MeanRates(self.rate_rad_s @ matrix.T, matrix @ self.covariance_rad2_s2 @ matrix.T)
 
 

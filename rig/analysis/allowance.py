@@ -34,7 +34,7 @@ STANDS_RAD = 1e-3  # what a joint that does not turn seems to
 
 @dataclass(frozen=True, slots=True)
 class Curve:
-    """Of a sensor: standard deviations of its `cube` and `square` at `full_scale_rad_s`, as shares of that.
+    """A sensor's nonlinearity: standard deviations of its `cube` and `square` at `full_scale_rad_s`, as shares of that.
 
     Where it is `free`, nothing is known of it, not even that it has no kink at zero.
     """
@@ -64,7 +64,7 @@ class Allowed:
 
 
 def allowed(surroundings: Surroundings, name: str, result: SensorResult) -> Allowed:
-    """By what the configuration states and the recording tells.
+    """What is allowed of a gyroscope and the arm, by what the configuration states and the recording tells.
 
     A solve that finds the curve, from several speeds, takes nothing of it as known. One of a single speed states one
     scale factor for either way, which an even part makes two: it excuses no more than what is stated of that alone.
@@ -91,7 +91,7 @@ def allowed_of(
     sensor: KnownSensor | None,
     at_s: Array,
 ) -> Allowed:
-    """The same `of` a sensor of that name, part and range (rad/s)."""
+    """What is allowed `of` a sensor of that name, part and range (rad/s)."""
     name, part, full_scale_rad_s = of
     steady = np.array([each.startswith(("twist", "zero")) for each in ANGLES])
     cube, square = (uncertainty.of(what, name, part) / 100 / np.sqrt(3) for what in CURVE)
@@ -107,7 +107,7 @@ def allowed_of(
 
 
 def allow(known: Allowed, pieces: Pieces, ways: Pieces, matrix: Array) -> Allowance:
-    """For a sensor of that F (3, 3).
+    """What the means of a sensor of that F (3, 3) may contradict each other by.
 
     What is even of its curve is left free on the ways, which are faster than sweeps: it is no change with time.
     """
@@ -145,7 +145,7 @@ def patterns(pieces: Pieces, matrix: Array, known: Allowed) -> Array:
 
 
 def _of_angles(pieces: Pieces, known: Allowed) -> Array:
-    """Of the arm's angles, and of those that do not come back to where they were: from sweep to sweep, way to way."""
+    """Patterns of the arm's angles, and of those that do not come back to where they were, for each sweep and way."""
     each = np.zeros((len(ANGLES), *pieces.means_rad_s.shape))
     again = []
     for place, (sweep, stretch) in enumerate(zip(pieces.sweep, pieces.stretches, strict=True)):
@@ -203,7 +203,7 @@ def _ends(stretch: Stretch) -> list[Array]:
 
 
 def _of_times(pieces: Pieces, jitter_s: float) -> Array:
-    """Of the times at which a sweep passes from one of its parts to the next: what one part gains the other loses."""
+    """Patterns of the times at which one part of a sweep ends and the next begins: what one gains the other loses."""
     edges = [
         (sweep, time_s)
         for sweep in np.unique(pieces.sweep[pieces.sweep > REST])
@@ -218,7 +218,7 @@ def _of_times(pieces: Pieces, jitter_s: float) -> Array:
 
 
 def _of_speeds(pieces: Pieces) -> list[Array]:
-    """Of sweeps whose ends lie between arm states that are far apart."""
+    """Patterns of sweeps whose ends lie between arm states that are far apart."""
     off = pieces.speed_std[:, None] * pieces.rates_rad_s
     return [np.where((pieces.sweep == sweep)[:, None], off, 0.0)[None] for sweep in np.unique(pieces.sweep)]
 
@@ -236,7 +236,7 @@ def _curved(stretches: Sequence[Stretch], matrix: Array, curve: Curve) -> Array:
 
 
 def _of_temperature(pieces: Pieces, matrix: Array, known: Allowed) -> list[Array]:
-    """Of one standard deviation of what warming does to bias and scale."""
+    """Patterns of one standard deviation of what warming does to bias and scale."""
     if known.sensor is None:
         return []
     inside, order = pieces.times_s.mean(axis=1), np.argsort(known.at_s)

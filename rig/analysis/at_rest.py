@@ -107,7 +107,7 @@ def _of(pieces: Sequence[tuple[Stream, slice]], quantity: Quantity) -> AtRest:
 
 
 def _told(times_s: Sequence[Array], readings: Sequence[Array], quantity: Quantity) -> AtRest:
-    """Of stretches at rest, each of (nᵢ,) times and (nᵢ, 3) readings."""
+    """What stretches at rest tell of the noise, each of (nᵢ,) times and (nᵢ, 3) readings."""
     if not readings:
         raise too_short("nothing stood still for longer than a few readings")
     if any(not np.ptp(each, axis=0).all() for each in readings if len(each) > FEWEST_TO_JUDGE):

@@ -36,12 +36,12 @@ class AttitudeAccount:
 
     @property
     def told(self) -> Telling:
-        """Of the model asked for."""
+        """What the attitudes tell of the model asked for."""
         return self.first if self.order == 1 else self.second
 
 
 def attitude_account(config: RigConfig, plan: Plan) -> AttitudeAccount | None:
-    """For the nominal arm, with noise as the parts' data sheets have it; None where nothing is asked of attitudes.
+    """What a plan's attitudes tell, for the nominal arm and its parts' noise; None where nothing is asked of attitudes.
 
     An attitude that is repeated has the same error of the arm every time, so only its noise is averaged.
     Raises Refused `rank_deficient`, `ill_conditioned`.

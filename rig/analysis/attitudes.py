@@ -139,7 +139,7 @@ def _of_rows(equations: Equations, method: Method, *, any_mounting: bool) -> InA
 def _of_placements(
     placements: Placements, quantity: Quantity, equations: Equations, method: Method, *, any_mounting: bool
 ) -> InAttitudes:
-    """By the method that allows for attitudes that are off, what placements do beside counts as well."""
+    """The calibration from placements; what these do beside counts too, if the method allows for wrong attitudes."""
     elsewhere, moving = placements.elsewhere, placements.left_out
     solution, laid = _solved(equations, method, moving), None
     if method == "attitude_weighted":
@@ -160,7 +160,7 @@ def _of_placements(
 
 
 def _solved(equations: Equations, method: Method, moving: int) -> TriaxialSolution:
-    """Where the rests are not enough, it is said that rows were left out."""
+    """The solution; where the rests are not enough, it is said that rows were left out."""
     try:
         return equations.solve(method)
     except Fault as fault:

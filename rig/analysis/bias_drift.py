@@ -78,7 +78,7 @@ class Stand:
 
 
 def bias_drifts(recordings: Sequence[ObservedRun], settings: RunSettings) -> Drifts:
-    """Of every sensor to calibrate, over all recordings of a run; repeats that were not finished are left out.
+    """Drift of every sensor to calibrate, over all recordings of a run; repeats that were not finished are left out.
 
     Raises Fault `not_all_attitudes` with fewer than two whole repeats, and as `solve_triaxial` for the first one.
     """
@@ -101,7 +101,7 @@ def bias_drifts(recordings: Sequence[ObservedRun], settings: RunSettings) -> Dri
 
 
 def _uncounted(drifts: Mapping[Quantity, BiasDrift]) -> dict[Quantity, BiasDrift]:
-    """As recordings of before are reckoned."""
+    """The drifts without degrees of freedom, as recordings of before are reckoned."""
     return {quantity: replace(drift, freedom=None, slope_freedom=None) for quantity, drift in drifts.items()}
 
 
@@ -118,7 +118,7 @@ def _whole(found: Mapping[int, Stand], table: Sequence[Sequence[int]]) -> list[l
 
 
 def _accelerations(recordings: Sequence[ObservedRun], name: str, sensor: RecordedSensor) -> dict[int, Stand]:
-    """By the dwell's index."""
+    """What the sensor's accelerometer read in each dwell, by the dwell's index."""
     mounting = np.array(sensor.mounting)
     return {
         dwell.index: Stand(
@@ -154,7 +154,7 @@ def _rates(recordings: Sequence[ObservedRun], name: str, sensor: RecordedSensor)
 
 
 def acceleration_drift(repeats: Sequence[Sequence[Stand]], site: Site, *, second_order: bool) -> BiasDrift:
-    """Of an accelerometer, from repeats of the same attitudes in the same order; the first one finds what is held.
+    """Drift of an accelerometer, from repeats of the same attitudes in the same order; the first finds what is held.
 
     Raises Fault as `solve_triaxial` and `bias_by_repeat` do.
     """
@@ -182,7 +182,7 @@ def acceleration_drift(repeats: Sequence[Sequence[Stand]], site: Site, *, second
 
 
 def rate_drift(repeats: Sequence[Sequence[Stand]], site: Site) -> BiasDrift:
-    """Of a gyroscope, whose scale and axes are held at their nominal values. Raises Fault as `bias_by_repeat` does."""
+    """Drift of a gyroscope, scale and axes held at their nominal values. Raises Fault as `bias_by_repeat` does."""
     means, variances, attitudes = _stacked(repeats)
     earth = np.zeros(3) if site.earth_rate_rad_s is None else np.array(site.earth_rate_rad_s)
 

@@ -196,7 +196,7 @@ def _solve_sensor(
 
 
 def found_earth_rate(earth_rate: EarthRate | Fault | None) -> EarthRate | None:
-    """None where it was not found, for whatever reason."""
+    """The Earth's rate that was found; None where it was not, for whatever reason."""
     return earth_rate if isinstance(earth_rate, EarthRate) else None
 
 
@@ -274,7 +274,7 @@ def or_fault(solve: Callable[[], Result]) -> Result | Fault:
 
 
 def _check_recordings(runs: Sequence[RunData]) -> None:
-    """The same recording given twice must not look like a run that repeats its sweeps."""
+    """Raises Fault `duplicated_observation`: a recording given twice is no run that repeats its sweeps."""
     for run, other in combinations(runs, 2):
         again = finished_sweeps(run) & finished_sweeps(other)
         if again and all(np.array_equal(samples, other.samples[name]) for name, samples in run.samples.items()):

@@ -47,7 +47,7 @@ class ClockComparison:
 
     @property
     def std(self) -> float:
-        """As a fraction."""
+        """Standard uncertainty of the comparison, as a fraction."""
         return float(np.hypot(self.noise_std, self.half_width / np.sqrt(3)))
 
 
@@ -61,7 +61,7 @@ class ClockDifference:
 
     @property
     def share(self) -> float:
-        """Of the limit; beyond one the clocks contradict each other."""
+        """Share of the limit that the difference takes; beyond one the clocks contradict each other."""
         return self.size / self.limit
 
 
@@ -78,7 +78,7 @@ class ClockCheck:
     half_width: float
 
     def differences(self) -> Iterator[ClockDifference]:
-        """Of every two: of two half-widths the sum, for all values within are equally likely."""
+        """Every two clocks that are compared; of two half-widths the sum, for all values within are alike likely."""
         known = [("controller", 0.0, self.half_width, 0.0)]
         known += [(SHORT[each.by], each.error, each.half_width, each.noise_std) for each in self.comparisons]
         for (one, error, width, noise), (other, its_error, its_width, its_noise) in combinations(known, 2):
@@ -94,7 +94,7 @@ class ClockCheck:
 
 @dataclass(frozen=True, slots=True)
 class Jitter:
-    """Of the times the arm's states are of: standard deviation in s, and its degrees of freedom."""
+    """Scatter of the times of the arm's states: standard deviation in s, and its degrees of freedom."""
 
     std_s: float
     freedom: float
@@ -117,7 +117,7 @@ def check_clock(recording: ObservedRun, known: Uncertainty, *, holds_every: bool
 
 
 def worst_differences(clocks: Iterable[ClockCheck]) -> list[ClockDifference]:
-    """Of every two clocks that some recording compares, that of the recording in which they agree least."""
+    """The difference of every two clocks that are compared, in the recording in which they agree least."""
     worst: dict[tuple[str, str], ClockDifference] = {}
     for found in (each for check in clocks for each in check.differences()):
         worst[found.clocks] = max(worst.get(found.clocks, found), found, key=lambda each: each.share)
@@ -125,7 +125,7 @@ def worst_differences(clocks: Iterable[ClockCheck]) -> list[ClockDifference]:
 
 
 def state_jitter(recordings: Sequence[ObservedRun]) -> Jitter:
-    """Of the times the arm's states are of, from how the joint angles of all sweeps of a run scatter.
+    """The jitter of the times of the arm's states, from how the joint angles of all sweeps of a run scatter.
 
     Differences of the sixth order: of what the servo does, slow beside the states, nothing is left in them. What is
     left are the times, and the encoder's steps. Neighbouring differences share states: n of them have the freedom of
@@ -148,7 +148,7 @@ def state_jitter(recordings: Sequence[ObservedRun]) -> Jitter:
 
 
 def _by_computer(recording: ObservedRun, known: Uncertainty) -> ClockComparison:
-    """By the times at which the states came."""
+    """The controller's clock by the computer's, from the times at which the states came."""
     motion = recording.motion
     host_s, arm_s = motion.host_time_s - motion.host_time_s[0], motion.time_s - motion.time_s[0]
     design = np.column_stack([np.ones_like(host_s), host_s])
@@ -162,7 +162,7 @@ def _by_computer(recording: ObservedRun, known: Uncertainty) -> ClockComparison:
 
 
 def _by_crystal(recording: ObservedRun, known: Uncertainty) -> ClockComparison | None:
-    """By the board's counter; None where no board was there, or by its own word no crystal holds it."""
+    """The controller's clock by the board's counter; None where no board was, or by its word no crystal holds it."""
     bases = [each.time_base for name, each in recording.sensors.items() if recording.run.sensors[name].on_board]
     if not bases or recording.run.provenance.board_follows_crystal is False:
         return None

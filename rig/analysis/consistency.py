@@ -78,7 +78,7 @@ class _Look:
 
     @property
     def means(self) -> Means:
-        """They too are means."""
+        """What the axes feel in the pieces, as means that a damage may change."""
         return Means(self.felt, self.pieces.times_s, self.pieces.sweep)
 
 

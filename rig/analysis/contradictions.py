@@ -54,7 +54,7 @@ def contradictions(
     *,
     false_alarms: float = FALSE_ALARMS,
 ) -> Contradictions:
-    """Of these sensors' results; none in recordings of before there was a site, which keep the verdicts they had.
+    """What contradicts itself in these sensors' results; nothing before there was a site: such verdicts stay.
 
     `surroundings` are those of the recordings, `false_alarms` is the share of undamaged runs that may fail. A sweep
     that is named is part of the name, `gyro.disturbed_sweep.3`, and of what the check means.
@@ -99,7 +99,7 @@ def in_reference(
     *,
     drifting: bool = False,
 ) -> Contradictions:
-    """The same of what gravity and the magnetic field calibrate, of recordings that hold all kinds of readings so.
+    """What contradicts itself in readings of gravity and field; nothing in recordings that hold only gyroscopes so.
 
     Dwell and sweep are named as a gyroscope's sweep is: `gyro.acceleration_disturbed_dwell.13`. The bias may change
     steadily where it is `drifting`.
@@ -124,7 +124,7 @@ def in_reference(
 
 
 def _rate(run: RunData, sensors: Sequence[str], false_alarms: float) -> float:
-    """Of false alarms for each statistic: all kinds of readings that are held against themselves share them."""
+    """Rate of false alarms for each statistic: all kinds of readings that are held against themselves share them."""
     kinds = len(sensors)
     if run.settings.holds_all_kinds:
         accelerometers = [name for name in run.settings.to_calibrate if run.sensors[name].has_acceleration]
@@ -133,7 +133,7 @@ def _rate(run: RunData, sensors: Sequence[str], false_alarms: float) -> float:
 
 
 def rate_of_each(kinds: int, *, by_model: bool, of_all: float = FALSE_ALARMS) -> float:
-    """The same where so many kinds of readings of all sensors are held against themselves."""
+    """Rate of false alarms for each statistic, where so many kinds of readings are held against themselves."""
     return of_all / ((SHARES + OF_THE_MODEL * by_model) * kinds)
 
 

@@ -26,7 +26,7 @@ def known_external(name: str | None) -> Chosen | None:
 
 
 def solve_external(data: ExternalData, estimator: Chosen | None) -> Estimate:
-    """By `estimator`; None takes "increments" where the body was turned from rest to rest, else "vector".
+    """Solves by `estimator`; None takes "increments" where the body was turned from rest to rest, else "vector".
 
     Raises Fault as the estimators do, and `no_turns`.
     """
@@ -55,7 +55,7 @@ def budget_of(solution: Estimate, data: ExternalData) -> Budget:
 
 
 def _noise_freedom(solution: Estimate, data: ExternalData) -> float:
-    """Of scale and bias the fewest: by how the vector model weighs the means, of others the fewest of any mean."""
+    """The noise's fewest degrees of freedom: by how the vector model weighs the means, else the fewest of any mean."""
     averages = [*(sweep.average for sweep in data.sweeps), *data.rests]
     freedom = np.array([np.broadcast_to(each.freedom, 3) for each in averages])
     if not isinstance(solution, VectorSolution):

@@ -111,7 +111,7 @@ def _split(whole: Array, parts: dict[str, Array], budget: Budget) -> Array:
 
 
 def _line(budget: Budget, name: str) -> float:
-    """Its freedom; of a line that is not there nothing comes."""
+    """Degrees of freedom of a budget's line; infinite where it is not there, for nothing comes of it."""
     found: Sequence[float] = [each.freedom for each in budget.contributors if each.name == name]
     return found[0] if found else np.inf
 

@@ -19,7 +19,7 @@ WITHIN_A_TURN = 3e-4  # of the speed: graduation and eccentricity of an encoder,
 
 @dataclass(frozen=True, slots=True)
 class Scatter:
-    """Of the pieces' means beside a bias that wanders: `variances_rad2_s2` (N, 3) each for itself, and what they have
+    """Scatter of means beside a bias that wanders: `variances_rad2_s2` (N, 3) each for itself, and what they have
     in common, `common_rad2_s2` (3 N, 3 N); `instability_rad_s` is that of the bias, as far as it is known."""
 
     variances_rad2_s2: Array
@@ -36,7 +36,7 @@ class HeldPieces:
     base: Array
 
     def explained(self, suspicions: Sequence[Array], beside: Sequence[Array]) -> list[float]:
-        """Of columns (3, N, k): see `Held`."""
+        """How much better columns (3, N, k) explain the means: see `Held`."""
         return [self._told(columns, beside)[0] for columns in suspicions]
 
     def judged(self, columns: Array | None, beside: Sequence[Array], rate: float) -> Statistic | None:
@@ -54,7 +54,7 @@ class HeldPieces:
         return float(np.max(most**2)), beyond_chance(rate / alone.shape[1])(1)
 
     def told_from(self, patterns: Array, suspected: Iterable[Suspected]) -> float:
-        """As `rig.analysis.suspicion.told_from`, of patterns (k, N, 3) and columns (3, N, c)."""
+        """The size from which on patterns (k, N, 3) are told by columns (3, N, c): see `rig.analysis.suspicion`."""
         whitened = ((whiten(self.white, columns), limit) for columns, limit in suspected)
         return told_from(basis(self.base), whiten(self.white, np.moveaxis(patterns, 0, -1).swapaxes(0, 1)), whitened)
 
@@ -78,7 +78,7 @@ class HeldPieces:
 
 
 def beyond_chance(rate: float) -> Callable[[int], float]:
-    """Of χ² with so many degrees of freedom, in a share `rate` of recordings."""
+    """The limit that χ² with so many degrees of freedom exceeds in a share `rate` of recordings."""
     from scipy.special import chdtri
 
     return lambda freedom: float(chdtri(freedom, rate))

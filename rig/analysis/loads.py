@@ -1,4 +1,4 @@
-"""With what rates the sweeps loaded each of a gyroscope's own axes: at these its scale factors were found."""
+"""The rates with which the sweeps loaded each of a gyroscope's own axes: at these its scale factors were found."""
 
 import numpy as np
 

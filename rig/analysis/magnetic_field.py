@@ -166,7 +166,7 @@ def _known_field(settings: RunSettings) -> tuple[Site, float]:
 
 
 def _drift(name: str, recordings: Sequence[ObservedRun], settings: RunSettings) -> FieldDrift | None:
-    """By the tests at home of all recordings; None where there is no second one. Raises Fault `field_drifts`."""
+    """Drift by the tests at home of all recordings; None where there is no second one. Raises Fault `field_drifts`."""
     tests = [test for run in recordings for test in field_tests(run, name, settings.observation, settings.home_q_rad)]
     if len(tests) < 2:
         return None

@@ -147,7 +147,7 @@ def calibrated(runs: Sequence[RunData], estimator: str = DEFAULT_ESTIMATOR, *, d
 
 
 def drifted(runs: Sequence[RunData], estimator: str = DEFAULT_ESTIMATOR) -> Outcome:
-    """As `calibrated`, of attitudes that were gone through again and again: the bias by repeat too, and judged.
+    """The outcome, as of `calibrated`, of attitudes gone through again and again: the bias by repeat too, and judged.
 
     Raises Fault as `calibrated` and `bias_drifts` do.
     """
@@ -188,7 +188,7 @@ def _decision_rule(settings: RunSettings) -> DecisionRule:
 
 
 def verified(outcome: Outcome, repeated: Sequence[RunData]) -> Outcome:
-    """The same with what `repeated`, the calibration's movement with calibrated readings, says of it.
+    """The outcome with what `repeated`, the calibration's movement with calibrated readings, says of it.
 
     Without such a recording the checks of the verification fail. Raises Fault as `observe_runs` and `verify` do.
     """

@@ -54,7 +54,7 @@ class Equations:
     def of_placements(
         placements: Placements, quantity: Quantity, known: KnownNorm, *, second_order: bool
     ) -> "Equations":
-        """Of a sensor that feels a constant reference."""
+        """The equations of a sensor that feels a constant reference."""
         return Equations(
             placements.read.means[quantity],
             placements.read.variances[quantity],
@@ -67,7 +67,7 @@ class Equations:
 
     @property
     def placed(self) -> Placed:
-        """The same, of a sensor that feels a constant reference of known size."""
+        """The readings as placed, of a sensor that feels a constant reference of known size."""
         std_rad = np.zeros(len(self.means)) if self.std_rad is None else self.std_rad
         nothing = np.zeros_like(self.means)
         return Placed(self.means, self.variances, self.attitudes, nothing, std_rad, norm_known=True)
@@ -88,7 +88,7 @@ class Equations:
         )
 
     def beside(self, method: Method, *others: Method) -> dict[Method, TriaxialSolution | Fault]:
-        """The same by all other methods."""
+        """The solutions by all other methods, or why there is none."""
         return {other: or_fault(partial(self.solve, other)) for other in others if other != method}
 
 

@@ -25,14 +25,14 @@ from rig.estimation.nonlinearity import distinct_speeds
 
 @dataclass(frozen=True, slots=True)
 class Told:
-    """By sensor: of gyroscopes where anything is swept, of accelerometers where attitudes are held."""
+    """What a plan tells by sensor: gyroscopes where anything is swept, accelerometers where attitudes are held."""
 
     rates: Mapping[str, tuple[ToldFrom, ...]]
     accelerations: Mapping[str, tuple[ToldFrom, ...]]
 
 
 def planned_told_from(config: RigConfig, plan: Plan) -> Told:
-    """Of all that is to be calibrated but magnetometers.
+    """What the plan will tell of all that is to be calibrated but magnetometers.
 
     For the nominal arm, and for a sensor as its data sheet has it, which nothing but its noise and its flicker makes
     wander.

@@ -42,7 +42,7 @@ def timed(plan: Plan) -> Iterator[Timed[Step]]:
 
 
 def planned_motion(plan: Plan) -> ArmMotion:
-    """Of the nominal arm, without vibration. Raises Fault `no_motion` where nothing moves."""
+    """The motion of the nominal arm, without vibration. Raises Fault `no_motion` where nothing moves."""
     time_s = np.arange(0.0, plan.duration_s + 2 * STANDING_S, 1 / STATE_RATE_HZ)
     states = np.zeros(len(time_s), ARM_STATE_DTYPE)
     states["time_s"] = time_s
@@ -58,10 +58,10 @@ def planned_motion(plan: Plan) -> ArmMotion:
 
 
 def timed_of(plan: Plan, kind: type[StepT]) -> list[Timed[StepT]]:
-    """Its sweeps alone, or its dwells."""
+    """The plan's steps of one kind, its sweeps alone or its dwells, with their times."""
     return [Timed(each.step, each.start_s, each.end_s) for each in timed(plan) if isinstance(each.step, kind)]
 
 
 def measured(plan: Plan) -> Iterator[Timed[Step]]:
-    """Its sweeps, rests and dwells."""
+    """What a plan measures: its sweeps, rests and dwells, with their times."""
     return (each for each in timed(plan) if isinstance(each.step, (Sweep, Rest, Dwell)))

@@ -23,7 +23,7 @@ class Planned:
     ways: Pieces
 
     def read_by(self, matrix: Array, noise_rad_s_sqrt_hz: float, rate_hz: float) -> "Planned":
-        """By a sensor of F (3, 3) that noise walks the angle of: its means over T have that over √T.
+        """The pieces read by a sensor of F (3, 3) that noise walks the angle of: its means over T have that over √T.
 
         Samples that are too far apart tell nothing of the ways.
         """
@@ -43,7 +43,7 @@ class _Part:
 
 
 def planned_pieces(plan: Plan, site: Site, extension_m: Array) -> Planned:
-    """Of the nominal arm, with sensors at `extension_m` (3,) from the flange. Raises Fault `no_motion`."""
+    """A plan's pieces on the nominal arm, sensors at `extension_m` (3,) from the flange. Raises Fault `no_motion`."""
     motion = planned_motion(plan)
     parts = list(_parts(plan, motion))
     ways = [_Part(REST - 1 - place, 0.0, way) for place, way in enumerate(_ways(plan, motion))]
@@ -69,7 +69,7 @@ def planned_pieces(plan: Plan, site: Site, extension_m: Array) -> Planned:
 
 
 def _parts(plan: Plan, motion: ArmMotion) -> Iterator[_Part]:
-    """As `rig.analysis.pieces` cuts a recording: the sweeps, then the rests."""
+    """A plan's parts, as `rig.analysis.pieces` cuts a recording: the sweeps, then the rests."""
     parts = max(1, min(BY_MODEL.parts, BY_MODEL.most // max(len(plan.sweeps), 1)))
     of_rest = max(1, parts // BY_MODEL.times_a_rest)
     steps = list(measured(plan))
@@ -87,7 +87,7 @@ def _cut(motion: ArmMotion, window_s: tuple[float, float], sweep: int, parts: in
 
 
 def _ways(plan: Plan, motion: ArmMotion) -> Iterator[Stretch]:
-    """Between all that is measured, before it and after."""
+    """The wrists' ways between all that is measured, before it and after."""
     steps = list(measured(plan))
     begins = [0.0, *(each.end_s for each in steps)]
     ends = [*(each.start_s for each in steps), float(motion.time_s[-1])]

@@ -101,7 +101,7 @@ def _began(step: Sweep) -> Array:
 
 
 def _reading(theta: Array, movement: Movement) -> Movement:
-    """With the readings that the model predicts."""
+    """The movement with the readings that the model predicts."""
     read = predicted(theta, movement)
     count = len(movement.dwells.readings_m_s2)
     return replace(

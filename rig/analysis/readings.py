@@ -34,7 +34,7 @@ HEAP = 10  # readings
 def judge_readings(
     counts: Sequence[NDArray[np.int64]], windows: Sequence[Window], rate: float, usual: Usual = np.median
 ) -> Statistics:
-    """By name of the check its statistic and limit, from all readings (n, 3) of each recording and from the windows.
+    """Every check's statistic and limit by its name, from all readings (n, 3) of each recording and from the windows.
 
     `rate` is that of false alarms for each, where it is not far smaller. The noise is the `usual` one of the windows,
     the median: one in which an axis stands still does not make it a sensor without noise.
@@ -141,7 +141,7 @@ def _skewness(windows: Sequence[Window], sure: float) -> tuple[float, float]:
 
 
 def _longest_run(counts: NDArray[np.int64]) -> int:
-    """Of equal readings of one axis."""
+    """How many equal readings of one axis follow each other, at most."""
     longest = 0
     for axis in counts.T:
         changes = np.flatnonzero(np.diff(axis))

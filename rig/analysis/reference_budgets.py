@@ -43,7 +43,7 @@ def accelerometer_budget(
     noise_freedom: Array | None = None,
     sheet: Sheet | None = None,
 ) -> Budget:
-    """Of the solution found from the `movement`; `lag_s` is how late the sensor's own filter may be.
+    """The budget of the solution found from the `movement`; `lag_s` is how late the sensor's own filter may be.
 
     `noise_freedom` (3 N + 9 M,) as in `Spread`: of the dwells' readings, then of the sweeps' harmonics. `sheet`
     is that by which the solution's `own` errors are known.
@@ -73,7 +73,7 @@ def magnetometer_budget(
     field_t: float,
     noise_freedom: Array | None = None,
 ) -> Budget:
-    """Of the solution found in attitudes (N, 3, 3), flange to base, with these variances (N, 3) of the means."""
+    """The budget of a solution found in attitudes (N, 3, 3), flange to base, with variances (N, 3) of the means."""
     alike, drift = tested
     error = solution.fit.attitude_error or AttitudeError(0.0, 0.0)
     theta = np.concatenate([solution.matrix.ravel(), solution.field_table_t, solution.bias_t])
@@ -99,7 +99,7 @@ def _spread(
     *,
     noise_freedom: Array | None,
 ) -> Spread:
-    """Of scale and bias, from the `response` (p, n) of all that was found; `left`: χ² of the residuals, its freedom."""
+    """Spread of scale and bias, from the `response` (p, n) of all found; `left`: residuals' χ², its freedom."""
     scale = 1 / np.linalg.norm(solution.matrix, axis=1)
     told = scale_and_bias(solution.matrix, scale, len(solution.covariance))
     return Spread(scale, told @ solution.covariance @ told.T, told @ response, noise, error, *left, noise_freedom)

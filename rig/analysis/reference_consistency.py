@@ -47,7 +47,7 @@ class HeldReadings:
     growth: Array
 
     def explained(self, suspicions: Sequence[Array], beside: Sequence[Array]) -> list[float]:
-        """With the arm as far off as it is beside the worst of them: see `Held`."""
+        """What suspicions explain with the arm as far off as it is beside the worst of them: see `Held`."""
         base = self._beside(beside)
         turned = [self.turn @ columns for columns in suspicions]
         std_rad = self._off(base)
@@ -86,7 +86,7 @@ class HeldReadings:
         return told_from(basis(base / size), self.turn @ damages / size, found)
 
     def _limit(self, base: Array, new: Array, std_rad: float, rate: float) -> float:
-        """Of what orthonormal columns explain beside `base`, in a share `rate` of recordings."""
+        """The limit of what orthonormal columns explain beside `base`, in a share `rate` of recordings."""
         from scipy.special import chdtri, fdtri
 
         count = new.shape[1]
@@ -117,11 +117,11 @@ class HeldReadings:
         return float(told @ told)
 
     def _freedom(self, base: Array, std_rad: float) -> float:
-        """Of δ²: how many readings tell it."""
+        """Degrees of freedom of δ²: how many readings tell it."""
         return 2 * information(self._apart(), std_rad, base) * std_rad**4
 
     def _share(self, base: Array, columns: Array, std_rad: float) -> float:
-        """Of δ in the variance along columns, from 0 to 1."""
+        """Share of δ in the variance along columns, from 0 to 1."""
         variance = 1 + std_rad**2 * self.growth
         known, _ = self._unexplained(base, std_rad)
         told = told_beside(known, columns / np.sqrt(variance)[:, None])
@@ -150,7 +150,7 @@ def would_tell(read: Read, rate: float, *, drifting: bool = False) -> dict[str, 
 
 
 def _told_from(held: HeldReadings, read: Read, rate: float) -> dict[str, float]:
-    """By what happens; nothing of what the model takes up."""
+    """The size from which each damage is told, by what happens; nothing of what the model takes up."""
     pieces = read.dwells + read.sweeps
     asked = {name: ([columns], rate) for name, columns in suspicions(read).items() if columns is not None}
     asked["disturbed_dwell"] = [of_piece(read, dwell) for dwell in range(read.dwells)], rate / pieces

@@ -92,7 +92,7 @@ def of_accelerometer(
 def of_magnetometer(
     name: str, recordings: Sequence[ObservedRun], result: MagnetometerResult, known: Uncertainty
 ) -> ReadInReference:
-    """The same: a magnetometer in attitudes is an accelerometer that nothing swept."""
+    """What a magnetometer read, as of an accelerometer that nothing swept."""
     solution, movement = result.solution, Movement(result.seen, NO_SWEEPS)
     timed = zip(recordings, since_first_s(recordings), strict=True)
     dwells = [dwell for each, since_s in timed for dwell in field_dwells(name, each, since_s)]

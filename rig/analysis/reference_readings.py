@@ -39,12 +39,12 @@ class Dwelt:
 
     @property
     def middle_s(self) -> float:
-        """By the controller's time."""
+        """Middle of the window by the controller's time, s."""
         return (self.window.start_s + self.window.end_s) / 2
 
 
 def acceleration_dwells(name: str, recording: ObservedRun, since_s: float = 0.0) -> list[Dwelt]:
-    """Of a sensor's accelerometer."""
+    """What a sensor's accelerometer read in each of its dwells."""
     stream = recording.stream(name)
     found = []
     for dwell in recording.sensors[name].dwells:
@@ -54,7 +54,7 @@ def acceleration_dwells(name: str, recording: ObservedRun, since_s: float = 0.0)
 
 
 def acceleration_sweeps(name: str, recording: ObservedRun) -> list[Read]:
-    """The same in its revolutions, each with its place among the recording's."""
+    """What a sensor's accelerometer read in its revolutions, each with its place among the recording's."""
     stream, found = recording.stream(name), []
     count = stream.sensor.sensitivity_m_s2_per_count
     for place, turn in enumerate(recording.sensors[name].revolutions):
@@ -66,7 +66,7 @@ def acceleration_sweeps(name: str, recording: ObservedRun) -> list[Read]:
 
 
 def field_dwells(name: str, recording: ObservedRun, since_s: float = 0.0) -> list[Dwelt]:
-    """Of a magnetometer."""
+    """What a magnetometer read in each of its dwells."""
     return [
         _dwelt(dwell, counts.astype(np.int64), time_s, recording, since_s)
         for dwell, counts, time_s in dwelt_field(recording, name)
@@ -82,7 +82,7 @@ def _dwelt(
 
 
 def resting(dwells: Sequence[Dwelt]) -> list[Read]:
-    """As rests: what of a reading its dwell's mean does not explain."""
+    """The dwells as rests: what of a reading its dwell's mean does not explain."""
     return [Read(-1, dwell.counts, dwell.counts - dwell.counts.mean(axis=0), np.zeros(3)) for dwell in dwells]
 
 

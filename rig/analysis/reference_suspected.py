@@ -41,7 +41,7 @@ class Read:
 
 
 def suspicions(read: Read) -> Suspicions:
-    """By name of the check (3 K, k): what each would add to the readings; None is anything at all."""
+    """What each suspicion would add, by name of the check (3 K, k), to the readings; None is anything at all."""
     s, f, time = felt(read.theta, read.movement), matrix(read.theta), _time(read)
     found: dict[str, Array | None] = {
         "bias_changed": bias_over_time(read),

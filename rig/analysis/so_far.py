@@ -24,7 +24,7 @@ from rig.observation.windows import finished_dwells, finished_sweeps
 
 @dataclass(frozen=True, slots=True)
 class SoFar:
-    """Of one sensor: each finished sweep's observation or the Fault it ends in, by the sweep's index.
+    """What a sensor's run tells yet: each finished sweep's observation or the Fault it ends in, by the sweep's index.
 
     `dwells` are the same of what its accelerometer read in each finished dwell; `gravity_m_s2` is the site's, None in
     recordings of before there was one. The `solution` is the vector model's, or the Fault that says what is missing

@@ -31,7 +31,7 @@ class Surroundings:
 
 
 def surroundings_of(recordings: Sequence[ObservedRun]) -> Surroundings | None:
-    """By the first recording's settings; None where those of before know no site.
+    """What surrounded the sensors, by the first recording's settings; None where those of before know no site.
 
     The clock is that of the longest motion, which tells it best: the controller's is one quartz in all recordings, and
     where it was another, or its computer's time was, the others tell. What was made before knows the longest alone.

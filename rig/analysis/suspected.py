@@ -91,7 +91,7 @@ DAMAGES = (
 
 
 def changes(pieces: Pieces, felt: Array) -> Suspicions:
-    """By name of the check (3, N, k): what another scale factor of each axis, or another mounting, with time adds."""
+    """What another scale factor of an axis, or another mounting, with time adds, by name of the check (3, N, k)."""
     time = in_time(pieces)
     for sweep in np.unique(pieces.sweep):  # what changes within a sweep is that sweep's own matter
         time[pieces.sweep == sweep] = time[pieces.sweep == sweep].mean()
@@ -100,7 +100,7 @@ def changes(pieces: Pieces, felt: Array) -> Suspicions:
 
 
 def differences(pieces: Pieces, felt: Array, whole: Array | None) -> dict[str, Array | None]:
-    """The same of what differs between directions, sweeps and rests.
+    """What a difference between directions, sweeps and rests adds, by name of the check (3, N, k).
 
     What else may differ is `whole` (3, N, k), each sweep from what the model says; None is anything at all, but of that
     the scatter within sweeps is made which the bias' wandering is found from.

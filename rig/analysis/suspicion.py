@@ -35,7 +35,7 @@ class Held(Protocol):
 
 
 def told_by(held: Held, suspicions: Suspicions, rate: float) -> dict[str, Statistic]:
-    """Of every suspicion that the model does not hold already; `rate` is that of false alarms for each."""
+    """Statistic of every suspicion that the model does not hold already; `rate` is that of false alarms for each."""
     judged = {name: held.judged(columns, (), rate) for name, columns in suspicions.items()}
     return {name: statistic for name, statistic in judged.items() if statistic is not None}
 

@@ -36,7 +36,7 @@ class ToldFrom:
 def of_gyroscope(
     sizes: Mapping[str, float], name: str, result: SensorResult, surroundings: Surroundings
 ) -> Iterator[ToldFrom]:
-    """Of the sensor of that name, whose checks tell what happens from these `sizes` on."""
+    """What may happen to the gyroscope `name`, which its checks tell from these `sizes` on."""
     explained = result.explained
     if explained is None:
         return
@@ -70,7 +70,7 @@ def _means(explained: Explained) -> Means:
 
 
 def _off_by(patterns: Array, explained: Explained, mounting: Array, unknown: Unknown) -> float | None:
-    """In U, of that of the patterns (k, N, 3) to which the solution responds most.
+    """How wrong a result is, in U, by that of the patterns (k, N, 3) to which the solution responds most.
 
     Solved anew: a bias that seems to wander because of it has a larger U too. None where it has no solution.
     """

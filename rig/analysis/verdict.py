@@ -215,14 +215,14 @@ def _name(sensor: str, quantity: str, what: str) -> str:
 
 
 def _spreads(budget: Budget) -> tuple[Spread, Spread]:
-    """Of scale factors and of biases; twice a standard uncertainty is taken for a normal distribution's."""
+    """The spreads of scale factors and of biases; twice a standard uncertainty is taken for a normal distribution's."""
     freedom = budget.freedom if budget.by_freedom else np.full(6, np.inf)
     of = budget.expanded, budget.coverage_factors, freedom
     return Spread(*(each[:3] for each in of)), Spread(*(each[3:] for each in of))
 
 
 def _twice(std: Array) -> Spread:
-    """Of what has no budget."""
+    """The spread of what has no budget: twice its standard deviation."""
     return Spread(COVERAGE_FACTOR * std, np.full(3, COVERAGE_FACTOR), np.full(3, np.inf))
 
 

@@ -35,7 +35,7 @@ STEPS = 48
 
 
 def with_ways(pieces: Pieces, name: str, recordings: Sequence[ObservedRun], explained: Explained) -> Pieces:
-    """The same pieces, and all ways on which only the wrists turned; their places count down from below `REST`.
+    """The pieces, and all ways on which only the wrists turned; their places count down from below `REST`.
 
     Their noise is that of the other pieces, for as long as they last, and what a vibration leaves of which the rests
     tell. (No lines are sought on a way: it is short, and the servo's own vibration grows faster and slower on it.)

@@ -48,7 +48,7 @@ class _Read:
 
 
 def of_gyroscope(recordings: Sequence[ObservedRun], name: str) -> Held:
-    """Of the sensor of that name: its sweeps, and sweeps and rests."""
+    """When a gyroscope's scale and bias were read: in its sweeps, and in sweeps and rests."""
     parts = [(each.sensors[name], since_s) for each, since_s in _on_one_clock(recordings)]
     turns = [_averaged(turn.average, since_s) for part, since_s in parts for turn in part.revolutions]
     rests = [_averaged(rest, since_s) for part, since_s in parts for rest in part.rests]
@@ -56,7 +56,7 @@ def of_gyroscope(recordings: Sequence[ObservedRun], name: str) -> Held:
 
 
 def of_accelerometer(recordings: Sequence[ObservedRun], name: str, dwells: Iterable[int]) -> When:
-    """Of the accelerometer of that name: the dwells of these indices, and its sweeps."""
+    """When an accelerometer was read: in the dwells of these indices, and its sweeps."""
     wanted, read = frozenset(dwells), []
     for each, since_s in _on_one_clock(recordings):
         part = each.sensors[name]
@@ -70,7 +70,7 @@ def of_accelerometer(recordings: Sequence[ObservedRun], name: str, dwells: Itera
 
 
 def of_magnetometer(recordings: Sequence[ObservedRun], dwells: Iterable[int]) -> When:
-    """Of a magnetometer, which has no thermometer: the dwells of these indices, as the last recording has them."""
+    """When a magnetometer, which has no thermometer, was read: in the last dwells of these indices."""
     wanted = frozenset(dwells)
     windows = {
         each.dwell.index: _moved(each.window, since_s)

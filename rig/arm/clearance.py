@@ -110,7 +110,7 @@ def _between(start_q_rad: Joints, target_q_rad: Joints) -> Array:
 
 
 def _ways(plan: Plan) -> Iterator[_Way]:
-    """That of each dwell and each motion; what is no way, or beyond the joints' limits, has a problem of its own."""
+    """The way of each dwell and each motion; what is no way, or beyond the joints' limits, has a problem of its own."""
     for before, step, after in zip((None, *plan.steps), plan.steps, (*plan.steps[1:], None), strict=False):
         if isinstance(step, Dwell):
             yield _Way(step.name, np.array([step.q_rad]), FOREARM_CLEARANCE_M, OTHER_ATTITUDES)

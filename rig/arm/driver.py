@@ -173,7 +173,7 @@ class Arm:
             deadline_s, reported_s = self.latest.time_s + takes_s, time.monotonic() + takes_s + REPORT_S
 
             def late() -> bool:
-                """By the controller's clock; the news that it has arrived travels by this machine's."""
+                """Whether it is late by the controller's clock; that it has arrived travels by this machine's."""
                 arrived = self._stands_at(motion) and time.monotonic() < reported_s
                 return self.latest.time_s > deadline_s and not arrived
 

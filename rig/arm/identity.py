@@ -36,7 +36,7 @@ OTHER_ARM = (
 
 
 def version_text(version: tuple[int, ...]) -> str:
-    """As the maker writes it, without the build."""
+    """The version as the maker writes it, without the build."""
     return ".".join(map(str, version[:3]))
 
 

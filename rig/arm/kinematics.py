@@ -65,7 +65,7 @@ def axis_errors(q_rad: ArrayLike, joint: int, arm: DenavitHartenberg = NOMINAL) 
     axis = to_flange @ frames[joint, :, 2]
 
     def turned(about: Array, link: int) -> Array:
-        """By a turn of all that lies beyond the joint `link`, the flange among it."""
+        """How the joint's axis turns with all that lies beyond the joint `link`, the flange among it."""
         return np.cross(axis, to_flange @ about) if joint <= link else np.zeros(3)
 
     changes = [turned(frames[link + 1][:, 0], link) for link in (WRIST_1, WRIST_2, WRIST_3)]
@@ -117,7 +117,7 @@ def _link(angle_rad: Array, a_m: float, d_m: float, alpha_rad: float) -> Array:
 
 
 def _clean(value: float) -> float:
-    """Of a quarter turn the sines are 0 and 1: π/2 is rounded."""
+    """The sine or cosine of a link: those of a quarter turn are 0 and 1, but π/2 is rounded."""
     return 0.0 if abs(value) < ROUNDING else float(value)
 
 

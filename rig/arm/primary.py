@@ -64,7 +64,7 @@ def read_account(host: str, timeout_s: float) -> Account:
 
 
 def _completed(account: Account, state: bytes) -> Account:
-    """With what a robot state says, if it can be."""
+    """The account with what a robot state says, as far as it can be so."""
     for kind, payload in _taken(bytearray(state)):
         if kind == KINEMATICS_INFO and (values := _numbers(KINEMATICS, payload)[6:30]):
             told = DenavitHartenberg(values[:6], values[6:12], values[12:18], values[18:])
@@ -77,7 +77,7 @@ def _completed(account: Account, state: bytes) -> Account:
 
 
 def _setup(payload: bytes) -> ArmSetup | None:
-    """None where it is too short, or no arm is made so."""
+    """The setup in a package of configuration data; None where it is too short, or no arm is made so."""
     if len(payload) < CONFIGURATION.size:
         return None
     values = CONFIGURATION.unpack_from(payload)
@@ -93,7 +93,7 @@ def _setup(payload: bytes) -> ArmSetup | None:
 
 
 def _numbers(layout: struct.Struct, payload: bytes) -> tuple[float, ...]:
-    """Of a payload, whole numbers before them; none when it is too short for them, or no arm is made so."""
+    """The numbers of a payload, whole ones first; none when it is too short for them, or no arm is made so."""
     values = layout.unpack_from(payload) if len(payload) >= layout.size else ()
     return values if all(isinstance(each, int) or abs(each) <= VALUE_MAX for each in values) else ()
 

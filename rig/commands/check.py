@@ -114,7 +114,7 @@ def _look_at_arm(found: "Configured") -> list[str]:
 
 
 def _claims_of_others(host: str) -> list[str]:
-    """That another rig has the arm; looking at it disturbs nobody, so it is claimed for no longer than this."""
+    """A problem if another rig has the arm; looking at it disturbs nobody, so it is claimed for no longer than this."""
     from rig.commands.claims import claimed_arm
 
     try:

@@ -204,7 +204,7 @@ def _selected(history: History, selection: Selection) -> list[Past]:
 
 
 def _run_folders(given: list[Path], *, unsolved: bool) -> Iterator[Path]:
-    """Those given, and those within them; what is no run folder comes as it is, for its own error."""
+    """The run folders given, and those within them; what is no run folder comes as it is, for its own error."""
     for folder in given:
         inner = {file.parent for file in folder.rglob(RESULT)}
         if unsolved:

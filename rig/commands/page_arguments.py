@@ -56,7 +56,7 @@ class OperatorsPage:
 
 
 def add_page(parser: argparse.ArgumentParser) -> None:
-    """Of `rig run` and `rig resume`."""
+    """Add the page's arguments of `rig run` and `rig resume`."""
     parser.add_argument("--page", action="store_true", help="show the run in a browser as well")
     parser.add_argument("--confirm-on-page", action="store_true", help="ask the operator there, not on the terminal")
     add_place(parser)
@@ -156,6 +156,6 @@ def stay_for_the_operator() -> None:
 
 
 def wait_for_interrupt() -> None:
-    """Until Ctrl-C, which is how it is meant to end."""
+    """Wait until Ctrl-C, which is how the command is meant to end."""
     with suppress(KeyboardInterrupt):
         threading.Event().wait()

@@ -79,7 +79,7 @@ def remember_certificate(folder: Path, result: str, certificate: "Issued", histo
 
 
 def print_beside(found: Sequence[Beside]) -> None:
-    """On stdout, for people."""
+    """Print on stdout, for people, how calibrations lie beside those of before."""
     if not found:
         return
     from rich.console import Console

@@ -117,7 +117,7 @@ class SiteSection(Section):
     @field_validator("base_up")
     @classmethod
     def a_direction(cls, value: Vector3) -> Vector3:
-        """Of any length."""
+        """The direction that is up, of any length but zero."""
         if not np.linalg.norm(value) > 1e-6:
             raise ValueError("must be a direction, such as [0, 0, 1]")
         return value

@@ -42,7 +42,7 @@ def read_layers(path: Path, overrides: Sequence[str] = ()) -> Layered:
 
 
 def put_together(text: str, path: Path | None, overrides: Sequence[str] = ()) -> Layered:
-    """The same from the file's text; text that is of no file (`path` None) cannot build on one. Raises `Unreadable`."""
+    """A file's text with what it builds on; text of no file (`path` None) can build on none. Raises `Unreadable`."""
     layers = list(_layers(text, path))
     document: dict[str, Any] = {}
     places: dict[Location, str] = {}

@@ -96,7 +96,7 @@ def parse(
     overrides: Sequence[str] = (),
     sections: Sections = STOCK_SECTIONS,
 ) -> Loaded:
-    """As `load`, from text, which cannot build on a file."""
+    """The configuration in a text, as `load` has it; it cannot build on a file."""
     try:
         layered = put_together(text, None, overrides)
     except Unreadable as error:
@@ -238,7 +238,7 @@ def _world_fits(config: RigConfig, world: WorldSection) -> Iterator[str]:
 
 
 def _is_loopback(host: str) -> bool:
-    """Not by how it begins: 127.example.org is a host somewhere else."""
+    """Whether a host is this machine; not by how it begins: 127.example.org is a host somewhere else."""
     try:
         return host == "localhost" or ipaddress.IPv4Address(host).is_loopback
     except ValueError:

@@ -84,7 +84,7 @@ class BoardSection(Section):
     @field_validator("port")
     @classmethod
     def an_address_has_host_and_port(cls, value: str) -> str:
-        """Of `socket://host:port`; the name of a serial port is the system's affair."""
+        """A port, `socket://host:port` with both; the name of a serial port is the system's affair."""
         return checked_port(value)
 
 
@@ -105,7 +105,7 @@ class ProcedureSection(Section):
 
     @property
     def accelerometer_order(self) -> AccelerometerOrder:
-        """Of the accelerometer's model that the attitudes must tell; 0 where they need not tell one."""
+        """Order of the accelerometer's model that the attitudes must tell; 0 where they need not tell one."""
         return 0
 
     @property

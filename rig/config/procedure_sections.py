@@ -93,12 +93,12 @@ class SixSweepsSection(ProcedureSection):
 
     @property
     def finds_earth_rate(self) -> bool:
-        """As the file says."""
+        """Whether the file asks for the Earth's rate."""
         return self.earth_rate == "find"
 
     @property
     def speeds(self) -> tuple[float, ...]:
-        """At which every sweep is made, °/s."""
+        """The speeds at which every sweep is made, °/s."""
         return self.speeds_deg_s or (self.speed_deg_s,)
 
     def problems(self, config: RigConfig) -> Iterator[str]:
@@ -128,7 +128,7 @@ class SixObservationSection(SixSweepsSection):
 
     @property
     def then_verify(self) -> bool:
-        """As the file says."""
+        """Whether the file asks for a verification after the calibration."""
         return self.verify
 
 
@@ -143,7 +143,7 @@ class VerifySection(SixSweepsSection):
 
     @property
     def needs_reference(self) -> bool:
-        """Always."""
+        """Whether a reference gyroscope is needed: always."""
         return True
 
 
@@ -209,7 +209,7 @@ class AttitudesSection(ProcedureSection):
 
     @property
     def accelerometer_order(self) -> AccelerometerOrder:
-        """As the file says."""
+        """Order of the accelerometer's model that the file asks for."""
         return 2 if self.second_order else 1
 
     def problems(self, config: RigConfig) -> Iterator[str]:
@@ -230,7 +230,7 @@ class StaticAttitudesSection(AttitudesSection):
 
 
 class BiasDriftSection(AttitudesSection):
-    """The same attitudes again and again, for hours: how the bias drifts. As set, ten hours like the second paper's."""
+    """Attitudes gone through again and again, for hours: how the bias drifts. As set, ten hours, as in TRIAX."""
 
     name: Literal["bias_drift"] = Field(default="bias_drift", description="this procedure")
     dwell_s: float = Field(default=200.0, ge=0.1, le=3600, description="standing still in each attitude")
@@ -249,7 +249,7 @@ class ImuSection(SixSweepsSection, AttitudesSection):
     """Sweeps, then attitudes: gyroscope and accelerometer in one run."""
 
     def problems(self, config: RigConfig) -> Iterator[str]:
-        """Of both."""
+        """The problems of the sweeps and of the attitudes."""
         yield from SixSweepsSection.problems(self, config)
         yield from AttitudesSection.problems(self, config)
 

@@ -43,7 +43,7 @@ def _check(status: os.stat_result, max_bytes: int) -> None:
 
 
 def _without_waiting(path: str, flags: int) -> int:
-    """For a pipe, that nobody may ever write into."""
+    """Opens a file without waiting: into a pipe nobody may ever write."""
     return os.open(path, flags | getattr(os, "O_NONBLOCK", 0))
 
 

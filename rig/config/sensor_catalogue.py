@@ -56,7 +56,7 @@ class Part:
 
     @property
     def acceleration_nonlinearity_percent(self) -> float:
-        """Of its accelerometer, as what follows."""
+        """The accelerometer's nonlinearity, as what follows is the accelerometer's."""
         return self.accelerometer.nonlinearity_percent
 
     @property

@@ -63,7 +63,7 @@ class OwnPortSection(Section):
     @field_validator("port")
     @classmethod
     def an_address_has_host_and_port(cls, value: str) -> str:
-        """As of the board."""
+        """A port as the board's: `socket://host:port` with both."""
         return checked_port(value)
 
 
@@ -162,7 +162,7 @@ class SensorSection(Section):
     @field_validator("rate_hz", "range_deg_s")
     @classmethod
     def the_part_has_it(cls, value: float, info: ValidationInfo) -> float:
-        """Only what the part can do, and never silently something else."""
+        """A rate or range that the part can do, never silently another one."""
         part = PARTS.get(info.data.get("part", ""))
         if part is None:
             return value
@@ -173,7 +173,7 @@ class SensorSection(Section):
     def a_range_of_its_accelerometer(
         cls, value: AccelerationSection | None, info: ValidationInfo
     ) -> AccelerationSection | None:
-        """As of its gyroscope; left out, the smallest: nothing on the arm is felt beyond 2 g."""
+        """A range that the part's accelerometer has; left out, the smallest: nothing on the arm is felt beyond 2 g."""
         part = PARTS.get(info.data.get("part", ""))
         if value is None or part is None:
             return value
@@ -238,19 +238,19 @@ class MagnetometerSection(Section):
     @field_validator("serial_number")
     @classmethod
     def as_any_other(cls, value: str) -> str:
-        """Of the same kind as a gyroscope's."""
+        """A serial number, checked as a gyroscope's is."""
         return checked_serial_number(value)
 
     @field_validator("rate_hz")
     @classmethod
     def a_rate_of_the_part(cls, value: float, info: ValidationInfo) -> float:
-        """Never silently another one."""
+        """A rate that the part has, never silently another one."""
         part = MAGNETOMETERS.get(info.data.get("part", ""))
         return value if part is None else nearest_rate(value, part.rates_hz, in_words(part.rates_hz))
 
     @field_validator("range_gauss")
     @classmethod
     def a_range_of_the_part(cls, value: float, info: ValidationInfo) -> float:
-        """As the rate."""
+        """A range that the part has, never silently another one."""
         part = MAGNETOMETERS.get(info.data.get("part", ""))
         return value if part is None else one_of(value, part.ranges_gauss)

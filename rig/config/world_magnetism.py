@@ -38,7 +38,7 @@ class SimulatedFieldSection(Section):
 
 
 class SimulatedMagnetometerSection(SimulatedFieldSection):
-    """The same of one on the board."""
+    """A simulated magnetometer on the board."""
 
     mounting_error_deg: Vector3 = Field(
         default=NOTHING, description="rotation vector by which it sits off its nominal mounting"

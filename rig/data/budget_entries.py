@@ -60,7 +60,7 @@ class BudgetEntry(Entry):
 
     @property
     def probabilities(self) -> tuple[float, ...]:
-        """With which each U covers the true value: of results of before by Student's t as well."""
+        """Probability with which each U covers the true value; of results of before by Student's t as well."""
         return self.coverage_probabilities or tuple(covered(self.factors, self.known).tolist())
 
 

@@ -11,7 +11,7 @@ class BiasEntry(Entry):
 
 
 class MoveEntry(Entry):
-    """Before `repeat`, counted from 1, the bias moved by `change`, known to `std`; most along `axis`."""
+    """A move of the bias before `repeat`, counted from 1, by `change`, known to `std`; most along `axis`."""
 
     repeat: int
     axis: str
@@ -32,7 +32,7 @@ class RepeatEntry(Entry):
 
 
 class SlopeEntry(Entry):
-    """Of the bias over temperature, per °C, in the range that was seen; holds nowhere else."""
+    """Slope of the bias over temperature, per °C, in the range that was seen; it holds nowhere else."""
 
     slope: Vector3
     std: Vector3

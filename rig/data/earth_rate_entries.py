@@ -28,5 +28,5 @@ class EarthRateEntry(Entry):
     freedom: float | None = None
 
     def freedoms(self, count: int) -> list[Freedom] | None:
-        """Of so many of its numbers; None where nobody counts."""
+        """Degrees of freedom of `count` of the entry's numbers; None where nobody counts."""
         return None if self.freedom is None else [self.freedom] * count

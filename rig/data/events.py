@@ -39,7 +39,7 @@ class RestStarted:
 
 @dataclass(frozen=True, slots=True)
 class RestFinished:
-    """It has stood still until now."""
+    """The arm has stood still until now."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -51,7 +51,7 @@ class DwellStarted:
 
 @dataclass(frozen=True, slots=True)
 class DwellFinished:
-    """It has been measured."""
+    """A dwell has been measured."""
 
     dwell: Dwell
 
@@ -180,7 +180,7 @@ def _check_sweep(sweep: Sweep) -> None:
 
 
 def _check_dwell(dwell: Dwell) -> None:
-    """The same of a dwell."""
+    """Raises ValueError for a dwell that cannot be."""
     if len(dwell.q_rad) != len(JOINT_NAMES) or not all(map(math.isfinite, (*dwell.q_rad, dwell.duration_s))):
         raise ValueError(f"there is no such dwell as {quote(dwell)}")
 

@@ -63,7 +63,7 @@ def extract(path: Path) -> Iterator[dict[str, Any] | NDArray[Any]]:
 
 
 def reason(error: Exception) -> str:
-    """In one line; HDF5 buries the system's words in several lines of its own."""
+    """Why a file cannot be read, in one line; HDF5 buries the system's words in several lines of its own."""
     text = " ".join(str(error).split())
     if cut := re.search(r"truncated file: eof = (\d+),.* stored_eof = (\d+)", text):
         return f"it is cut short: {cut[1]} of its {cut[2]} bytes are there"
@@ -116,7 +116,7 @@ def _refuse_endless(path: Path, unpacked: int) -> None:
 
 
 def _stored_bytes(path: Path) -> int:
-    """Without the file's holes, which take no room on the disk; where the system does not tell, its size."""
+    """Size of a file without its holes, which take no room on the disk; where the system does not tell, its size."""
     if not hasattr(os, "SEEK_DATA"):
         return path.stat().st_size
     stored = end = 0
@@ -131,7 +131,7 @@ def _stored_bytes(path: Path) -> int:
 
 
 def _stored_rows(dataset: Any) -> int:
-    """For how many rows the file has room, at most."""
+    """Number of rows that the file has room for, at most."""
     if dataset.chunks is None:
         return int(dataset.id.get_storage_size() // dataset.dtype.itemsize)
     return int(dataset.id.get_num_chunks() * dataset.chunks[0])

@@ -49,7 +49,7 @@ def empty(schema: str, texts: Mapping[str, str], described: Mapping[str, Mapping
 
 
 def sample_dtype(attributes: Mapping[str, Any]) -> np.dtype[Any]:
-    """Of the samples of a sensor that is described so."""
+    """The type of the samples of a sensor that is described so."""
     if is_magnetometer(attributes):
         return FIELD_SAMPLE_DTYPE
     return IMU_SAMPLE_DTYPE if "sensitivity_m_s2_per_count" in attributes else SAMPLE_DTYPE

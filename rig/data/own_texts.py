@@ -9,7 +9,7 @@ from pathlib import Path
 
 
 def note_own(*texts: str) -> None:
-    """These were run by this user. One that cannot be noted is not known later, and then asked about."""
+    """Note that this user has run these texts. One that cannot be noted is not known later, and then asked about."""
     with suppress(OSError):
         folder = _folder()
         folder.mkdir(mode=0o700, parents=True, exist_ok=True)

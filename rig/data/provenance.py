@@ -67,7 +67,7 @@ class Provenance:
         return ScriptIdentity(self.script or "", self.script_sha256 or "")
 
     def document(self) -> dict[str, Any]:
-        """As it fits into JSON; nothing of what is not known."""
+        """The provenance as it fits into JSON; nothing of what is not known."""
         stored = {name: entry.model_dump(mode="json") for name, entry in self.stored_calibrations.items()}
         document = {**asdict(self), "stored_calibrations": stored}
         unknown = {"script", "script_sha256", "script_installed"} if self.script_sha256 is None else set()
@@ -86,7 +86,7 @@ def provenance_of(
     script_installed: bool,
     follows_crystal: bool | None,
 ) -> Provenance:
-    """That of a recording which begins now; `stored` as in `Provenance`. Raises Refused as `used_kinematics` does."""
+    """Provenance of a recording that begins now; `stored` as in `Provenance`. Raises Refused as `used_kinematics`."""
     return Provenance(
         started_utc=datetime.now(UTC).isoformat(timespec="seconds"),
         rig_version=__version__,

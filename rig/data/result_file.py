@@ -176,7 +176,7 @@ class VectorEntry(Entry):
 
 
 class NonlinearityEntry(Entry):
-    """Of each axis: reading = (g + odd |g| g + even g²) / scale − bias, g the rate along it in rad/s."""
+    """Nonlinearity of each axis: reading = (g + odd |g| g + even g²) / scale − bias, g the rate along it in rad/s."""
 
     odd_per_rad_s: Vector3
     odd_std_per_rad_s: Vector3
@@ -402,7 +402,7 @@ def read_result(path: Path) -> ResultDocument:
 
 
 def passed_result(path: Path) -> ResultDocument:
-    """The same if its verdict is a pass. Raises Refused `no_result`, `not_a_result`, `verdict_failed`."""
+    """A result whose verdict is a pass. Raises Refused `no_result`, `not_a_result`, `verdict_failed`."""
     result = read_result(path)
     if result.verdict != "pass":
         failed = ", ".join(check.name for check in result.checks if not check.passed)

@@ -83,7 +83,7 @@ class RecordedSensor:
         return self.sensitivity_m_s2_per_count is not None
 
     def attributes(self) -> dict[str, Any]:
-        """As they stand in the file: what there is nothing of is left out."""
+        """The attributes as they stand in the file: what there is nothing of is left out."""
         return {name: value for name, value in asdict(self).items() if value is not None}
 
 
@@ -110,7 +110,7 @@ class RecordedMagnetometer:
         return "raw"
 
     def attributes(self) -> dict[str, Any]:
-        """As of a `RecordedSensor`."""
+        """The attributes as they stand in the file, as of a `RecordedSensor`."""
         return {name: value for name, value in asdict(self).items() if value is not None}
 
 
@@ -132,7 +132,7 @@ class RunData:
     magnetometers: dict[str, RecordedMagnetometer] = dataclasses.field(default_factory=dict)
 
     def judged_by(self, overrides: Sequence[str]) -> "RunData":
-        """The same recording under other settings: see `RunSettings.with_overrides`."""
+        """The recording under other settings: see `RunSettings.with_overrides`."""
         return replace(self, settings=self.settings.with_overrides(overrides)) if overrides else self
 
 
@@ -392,7 +392,7 @@ def _check_mounting(sensor: RecordedSensor | RecordedMagnetometer) -> None:
 
 
 def _whole_rows(rows: NDArray[Any]) -> NDArray[Any]:
-    """Without the end that never reached the disk: such rows are zeros, and a host time is never zero."""
+    """The rows without the end that never reached the disk: such are zeros, and a host time is never zero."""
     written = np.flatnonzero(rows["host_time_s"])
     count = int(written[-1]) + 1 if len(written) else 0
     return rows if count == len(rows) else rows[: max(count - 1, 0)]  # the last one may be torn

@@ -111,7 +111,7 @@ def resuming(folder: Path) -> str:
 
 
 def refuse_links(*places: Path) -> None:
-    """Nothing of the rig's is written through a link, or into a pipe, that somebody may have laid into a folder.
+    """Refuse to write through a link, or into a pipe, that somebody may have laid into a folder.
 
     Raises Refused `not_written_through` where one of the places is there and neither a regular file nor a folder.
     """

@@ -128,7 +128,7 @@ class Uncertainty:
     acceleration_bias_instability_ug: dict[str, Annotated[float, Field(ge=0)]] = field(default_factory=dict)
 
     def of(self, what: OfSensor, name: str, part: str) -> float:
-        """That of a sensor of that name and kind; what is known of the part where nothing is said of the sensor."""
+        """What is known of a sensor of that name; what is known of the part where nothing is said of the sensor."""
         said: dict[str, float] = getattr(self, what)
         of_part: float = getattr(PARTS[part], what)
         return said.get(name, of_part)
@@ -242,7 +242,7 @@ class RunSettings:
         return self.reckoning >= 2
 
     def with_overrides(self, overrides: Sequence[str]) -> "RunSettings":
-        """The same with other thresholds or limits, or reckoned otherwise: `limits.scale_std=0.001`, `reckoning=2`.
+        """The settings with other thresholds or limits, or reckoned otherwise: `limits.scale_std=0.001`, `reckoning=2`.
 
         Raises Refused `unknown_setting` or `wrong_setting`, which say what can be set.
         """
@@ -252,11 +252,11 @@ class RunSettings:
         return changed
 
     def document(self) -> dict[str, Any]:
-        """All of it as plain values, by key."""
+        """The settings as plain values, by key."""
         return {**asdict(self), "limits": self.limits.model_dump()}
 
     def to_json(self) -> str:
-        """As it stands in a run file."""
+        """The settings as they stand in a run file."""
         return json.dumps({"schema": SCHEMA, **self.document()}, allow_nan=False)
 
 
@@ -310,7 +310,7 @@ def _planned(dwells: "Sequence[Dwell]") -> tuple[PlannedDwell, ...]:
 
 
 def _site(section: "SiteSection") -> Site:
-    """With the Earth's rate in the frame of the base, where latitude and heading are known."""
+    """The site, with the Earth's rate in the frame of the base, where latitude and heading are known."""
     earth_rate: Vector3 | None = None
     if section.latitude_deg is not None and section.heading_deg is not None:
         up = np.array(section.up)
@@ -337,7 +337,7 @@ def _tesla(microtesla: float | None) -> float | None:
 
 
 def _uncertainty(config: "RigConfig") -> Uncertainty:
-    """As the file says; what it does not say of a sensor is its part's."""
+    """The uncertainties that the file states; what it does not say of a sensor is its part's."""
     said: dict[str, Any] = config.uncertainty.model_dump()
     of_sensors: dict[str, Any] = {
         what: {
@@ -350,7 +350,7 @@ def _uncertainty(config: "RigConfig") -> Uncertainty:
 
 
 def _overridden(settings: RunSettings, item: str) -> RunSettings:
-    """With one `section.key=value` laid over it."""
+    """The settings with one `section.key=value` laid over them."""
     path, _, value = item.partition("=")
     section, _, key = path.strip().partition(".")
     if path.strip() not in _settable():

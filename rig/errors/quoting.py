@@ -13,7 +13,7 @@ def printable(text: str) -> str:
 
 
 def printable_lines(text: str) -> str:
-    """The same for a message of several lines, which keeps them."""
+    """A message of several lines made printable, which keeps its lines."""
     return "\n".join(map(printable, text.split("\n")))
 
 

@@ -72,7 +72,7 @@ class Accumulator:
         speed_std_rad_s: float = 0.0,
         weight: float | None = None,
     ) -> Self:
-        """With one more revolution: mean reading (3,), variance of that mean (3,), mean speed 2π/T and its deviation.
+        """The sums with one more revolution: mean (3,), variance of that mean (3,), mean speed 2π/T and its deviation.
 
         The weight is the inverse variance of ω² − ‖m + b‖² for k = 1 and axes of equal noise, unless given (1 is what
         SIX uses).

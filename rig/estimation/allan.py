@@ -64,7 +64,7 @@ class Read:
 
 @dataclass(frozen=True, slots=True)
 class AllanAxis:
-    """Of one axis: N in the unit of the readings times √s, B in that unit; or the Fault that says why there is none."""
+    """Noise of one axis: N in the readings' unit times √s, B in that unit; or the Fault that says why there is none."""
 
     random_walk: Read | Fault
     bias_instability: Read | Fault
@@ -134,7 +134,7 @@ def _variance(phases: Sequence[Array], factor: int) -> Array:
 
 
 def _freedom(points: Sequence[int], factor: int, noise: Noise) -> float:
-    """Of all stretches together: independent of each other, each counts by its share of the pairs (Satterthwaite)."""
+    """Freedom of all stretches together: independent, each counts by its share of the pairs (Satterthwaite)."""
     reach = [n for n in points if n > 2 * factor]
     pairs = np.array([n - 2 * factor for n in reach], dtype=np.float64)
     own = np.array([equivalent_freedom(n, factor, noise) for n in reach])

@@ -172,7 +172,7 @@ def likeliest(lost: Callable[[float], float]) -> float:
 
 
 def _uncertainty(delta: float, fit: Array, turned: Array) -> float:
-    """By the expected information on δ²: half the trace of (P G)², G = E Eᵀ and P what the fit leaves, whitened."""
+    """Uncertainty by expected information on δ²: half the trace of (P G)², G = E Eᵀ, P what the fit leaves, white."""
     orthogonal = np.linalg.qr(fit)[0].reshape(*turned.shape[:2], -1)
     growth = turned @ np.swapaxes(turned, -1, -2)
     grown = growth @ orthogonal

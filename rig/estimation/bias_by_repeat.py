@@ -21,7 +21,7 @@ FALSE_ALARM = 0.02  # of a run whose bias is steady
 
 @dataclass(frozen=True, slots=True)
 class Move:
-    """Before repeat `repeat`, counted from 0, the bias moved by `change` (3,), known to `std` (3,)."""
+    """A move of the bias before repeat `repeat`, counted from 0, by `change` (3,), known to `std` (3,)."""
 
     repeat: int
     change: Array
@@ -114,7 +114,7 @@ def _excess(off: Array, variances: Array) -> Array:
 
 
 def _moves(bias: Array, std: Array, start: int, end: int, places: int) -> Iterator[Move]:
-    """Of the repeats from `start` to `end`, in a run that has so many `places` where the bias could have moved."""
+    """Moves of the bias from `start` to `end`, in a run that has so many `places` where it could have moved."""
     from scipy.special import ndtri
 
     sure = -float(ndtri(FALSE_ALARM / (2 * 3 * places)))

@@ -95,7 +95,7 @@ def flicker_covariance(windows_s: ArrayLike) -> Array:
 
 
 def _twice_integrated_logarithm(x: Array) -> Array:
-    """Of |x|: x² (2 ln |x| − 3) / 4."""
+    """The logarithm of |x| integrated twice: x² (2 ln |x| − 3) / 4."""
     squares = x**2
     logarithms = np.log(squares, out=np.zeros_like(squares), where=squares > 0)
     integrated: Array = squares * (logarithms - 3) / 4
@@ -138,7 +138,7 @@ def likeliest_bias_process(
     *,
     instability_rad_s: float = 0.0,
 ) -> BiasProcess:
-    """The same with the likeliest sizes, zero where they do not make the averages likelier by Akaike's price.
+    """The bias process of the likeliest sizes, zero where they do not make the averages likelier by Akaike's price.
 
     It holds no walk where noise alone would do: what is held against it is not excused by what is not there.
     """

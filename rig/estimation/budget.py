@@ -125,7 +125,7 @@ class Unknown:
 
 
 def uncounted(unknown: Unknown) -> Unknown:
-    """As recordings of before are reckoned: U is 2 u, and nobody counts by how many readings a scatter is known."""
+    """What is unknown, as recordings of before are reckoned: U is 2 u, and nobody counts degrees of freedom."""
     return replace(
         unknown, clock_freedom=np.inf, state_jitter_freedom=np.inf, earth_freedom=np.inf, counts_freedom=False
     )
@@ -204,7 +204,7 @@ def _contributors(explained: Explained, unknown: Unknown) -> Iterator[Contributo
 
 
 def _noise_freedom(explained: Explained) -> float:
-    """Of scale and bias the fewest, from those of the readings' variances (JCGM 100, G.4.1)."""
+    """The noise's fewest degrees of freedom, of scale and bias, by the readings' variances (JCGM 100, G.4.1)."""
     variances = explained.solution.response**2 * explained.seen.variances_rad2_s2
     freedom = np.broadcast_to(explained.seen.noise_freedom, variances.shape)
     parts, counted = (each.reshape(len(variances), -1).T for each in (variances, freedom))
@@ -217,7 +217,7 @@ def _found(name: str, source: str, covariance: Array, freedom: float = np.inf) -
 
 
 def _of_the_readings(explained: Explained) -> Iterator[Contributor]:
-    """Their noise, and a bias that does not stand still."""
+    """What the readings contribute: their noise, and a bias that does not stand still."""
     bias, (flicker, wandering) = explained.bias, _of_bias(explained)
     noise = explained.solution.covariance - flicker - wandering
     yield _found("noise", "scatter of the readings", noise, _noise_freedom(explained))

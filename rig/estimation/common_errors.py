@@ -103,7 +103,7 @@ def _gain(design: Array, effects: Array, noise: Array) -> tuple[Array, Array]:
 
 
 def _known_to(solution: VectorSolution, whole: Array, left: Array, noise: Array, speed_noise: Array) -> VectorSolution:
-    """With the covariances and the response of F, c, G and the errors found together.
+    """The solution with the covariances and the response of F, c, G and the errors found together.
 
     `whole` (3, p, 3, N) takes readings to the coefficients, `left` (3, p, P) is what they are off by for the errors.
     `noise` (3, N, N) is without what a wrong speed adds, `speed_noise` (N, 3), to all three axes at once.

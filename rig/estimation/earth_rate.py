@@ -76,22 +76,22 @@ class EarthRate:
 
     @property
     def norm_rad_s(self) -> float:
-        """Its size."""
+        """Size of the Earth's rate that was found."""
         return float(np.linalg.norm(self.rate_rad_s))
 
     @property
     def norm_std_rad_s(self) -> float:
-        """Of its size."""
+        """Standard deviation of the Earth rate's size."""
         return self._std(self.rate_rad_s / self.norm_rad_s)
 
     @property
     def latitude_rad(self) -> float:
-        """By the rate's angle to the vertical; with the vertical part held, by the size of the level part."""
+        """Latitude by the rate's angle to the vertical; with the vertical part held, by the size of the level part."""
         return float(np.arcsin(self.up @ self.rate_rad_s / self.norm_rad_s))
 
     @property
     def latitude_std_rad(self) -> float:
-        """Of it, without how well `up` is known: a base that leans counts as latitude."""
+        """Standard deviation of the latitude, without how well `up` is known: a base that leans counts as latitude."""
         latitude = self.latitude_rad
         slope = self.up - np.sin(latitude) * self.rate_rad_s / self.norm_rad_s
         return self._std(slope / (self.norm_rad_s * np.cos(latitude)))
@@ -107,7 +107,7 @@ class EarthRate:
 
     @property
     def heading_std_rad(self) -> float | None:
-        """Of it."""
+        """Standard deviation of the heading; None where the base's x axis points up or down."""
         across = self._level()
         if across is None:
             return None
@@ -236,7 +236,7 @@ def _check_told(seen: Seen, directions: Array, gravity: Array | None) -> None:
 
 
 def _told(seen: Seen, directions: Array, gravity: Array | None) -> tuple[refusals.Conditioning, int]:
-    """Of the design (3 N, 3 p + d) with every block of columns brought to one size, and how many it should tell."""
+    """Conditioning of the design (3 N, 3 p + d), all blocks of columns of one size, and how many it should tell."""
     sweeps = seen.turns_rad_s / (np.linalg.norm(seen.turns_rad_s) / len(seen.turns_rad_s) ** 0.5 or 1.0)
     pull = None if gravity is None else gravity / (np.linalg.norm(gravity) / len(gravity) ** 0.5)
     own = np.kron(design_matrix(sweeps, pull), np.eye(3))

@@ -56,7 +56,7 @@ class Seen:
 
     @property
     def speeds_rad_s(self) -> tuple[float, ...]:
-        """At which the sweeps were made, the slowest first; sweeps of one speed differ by the arm's timing only."""
+        """The speeds of the sweeps, the slowest first; sweeps of one speed differ by the arm's timing only."""
         speeds = np.linalg.norm(self.turns_rad_s, axis=1)
         return distinct_speeds(speeds[speeds > 0])
 

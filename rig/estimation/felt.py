@@ -67,7 +67,7 @@ class Sweeps:
     stations: NDArray[np.intp]
 
     def alone(self) -> "Sweeps":
-        """The same, each at a station of its own."""
+        """The sweeps, each at a station of its own."""
         return replace(self, stations=np.arange(len(self.stations)))
 
 
@@ -215,7 +215,7 @@ def effects(theta: Array, movement: Movement) -> Array:
 
 
 def turned(theta: Array, movement: Movement) -> Array:
-    """The same of dwells and stations each for itself."""
+    """How the readings change with small turns of dwells and stations, each for itself."""
     count, sweeps = len(movement.dwells.readings_m_s2), movement.sweeps
     gravity, s = of_gravity(theta[DELAY], movement), felt(theta, movement)
     stations, places = np.unique(sweeps.stations, return_inverse=True)

@@ -155,7 +155,7 @@ def solve_imu(
 
 
 def _check_attitudes(start: Array, movement: Movement, held: list[int], fit: Fit) -> None:
-    """All of them, and the dwell that fits worst where enough others are left to tell."""
+    """Raises Fault where attitudes are off: all, or the dwell that fits worst where enough others are left to tell."""
     off, readings = fit.std_rad, movement.readings().size
     said = f"the readings say that the attitudes are off by {1e3 * off:.2g} mrad each"
     if off > SUSPICIOUS_RAD and len(movement.dwells.readings_m_s2) and readings - 3 > fit.free.shape[1] + 3:

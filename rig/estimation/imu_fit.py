@@ -97,7 +97,7 @@ def _least_squares(theta: Array, movement: Movement, held: list[int], white: Arr
 def as_expected(
     fit: Fit, movement: Movement, own: AccelerometerErrors, held: list[int], attitude_std_rad: float | None
 ) -> tuple[Movement, Fit]:
-    """With the walk of the bias, the δ and the disturbances that are to be expected by what the fit leaves."""
+    """Movement and fit with the walk of the bias, the δ and the disturbances to be expected by what the fit leaves."""
     left = (movement.readings() - predicted(fit.theta, movement)).ravel()
     known, of_arm, alike = noise(fit.theta, movement), effects(fit.theta, movement), np.diag(movement.noise())
     scattered = Scattered(left, fit.jacobian, known, of_arm, walking(own, movement), alike)

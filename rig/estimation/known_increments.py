@@ -177,7 +177,7 @@ def _check_told(mixed: Mixed) -> None:
 
 
 def _conditioning(mixed: Mixed) -> refusals.Conditioning:
-    """With F and b brought to one size."""
+    """Conditioning of the design with F and b brought to one size."""
     told = mixed.design[:, :, : BIAS.stop].reshape(-1, BIAS.stop)
     sizes = [np.linalg.norm(told[:, each]) for each in (MATRIX, BIAS)]
     return refusals.conditioning(told / np.repeat(sizes, [9, 3]), BIAS.stop)

@@ -112,7 +112,7 @@ def solve_levenberg_marquardt(
 
 
 def _conditioning(unit_means: Array, noise: float) -> refusals.Conditioning:
-    """Of the design of Eq. (7) for readings counted from their mean, in their length; squares double the noise."""
+    """Conditioning of Eq. (7)'s design for readings less their mean, in their length; squares double the noise."""
     return refusals.conditioning(design(unit_means), 6, 2 * noise * float(np.sqrt(len(unit_means))))
 
 

@@ -29,7 +29,7 @@ def linear_start(movement: Movement, norm: float, up: Array) -> Array:
 
 
 def _linear(movement: Movement, readings: Array, norm: float, up: Array) -> Array:
-    """The same from readings (K, 3) without what the flange's own centripetal acceleration does to them."""
+    """The linear solution from readings (K, 3) without what the flange's own centripetal acceleration does to them."""
     x = np.zeros((*readings.shape, LEVER.stop))
     for axis in range(3):
         x[:, axis, 3 * axis : 3 * axis + 3] = readings
@@ -49,5 +49,5 @@ def _linear(movement: Movement, readings: Array, norm: float, up: Array) -> Arra
 
 
 def _rms(columns: Array) -> float:
-    """Of a block of columns, as one of them is on average."""
+    """Root mean square of a block of columns, as one of them is on average."""
     return float(np.sqrt(np.mean(columns**2))) if columns.size else 1.0

@@ -79,7 +79,7 @@ class Uniformity:
 
     @property
     def uniform(self) -> bool:
-        """As far as residuals show it."""
+        """Whether the field is uniform, as far as residuals show it."""
         return self.chi_square <= self.limit
 
 
@@ -126,7 +126,7 @@ class FieldDrift:
 
 
 def field_drift(means_t: ArrayLike, variances_t2: ArrayLike, repeatability_rad: float) -> FieldDrift:
-    """Of each reading (N, 3), N ≥ 2, from the first; the attitude comes back to `repeatability_rad` about each axis."""
+    """Drift of each reading (N, 3), N ≥ 2, from the first; attitudes repeat to `repeatability_rad` about each axis."""
     from scipy.special import chdtri
 
     m, v = (np.asarray(a, dtype=np.float64) for a in (means_t, variances_t2))

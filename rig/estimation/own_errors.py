@@ -48,7 +48,7 @@ class OwnError:
 def own_errors(
     known: KnownSensor, matrix: Array, turns_rad_s: Array, windows_s: Array, speeds_rad_s: tuple[float, ...]
 ) -> Iterator[OwnError]:
-    """Of a sensor of F (3, 3) on a flange that turned at `turns_rad_s` (N, 3), zero at rest, in `windows_s` (N, 2).
+    """Errors of a sensor of F (3, 3) on a flange turning at `turns_rad_s` (N, 3), zero at rest, in `windows_s` (N, 2).
 
     Swept at one speed, scale is what it is at that speed along an axis: one that turned obliquely was slower, and so
     its scale may differ. Several speeds tell the nonlinearity, whatever is known of it.

@@ -53,7 +53,7 @@ class _Linear:
     std_rad: Array
 
     def fit(self, delta: float, zeta: float) -> "_Fit":
-        """For given sizes: the step, its covariance by causes, and the restricted likelihood."""
+        """The fit for given sizes of the errors: the step, its covariance by causes, and the restricted likelihood."""
         spread = self.turned * np.hypot(self.std_rad, delta)[:, None, None]
         errors = {
             NOISE: np.eye(3) * self.variances[:, :, None],

@@ -60,7 +60,7 @@ def scale_warming(theta: Array, movement: Movement) -> Array:
 
 
 def _warmer_k(own: AccelerometerErrors, movement: Movement) -> tuple[Array, Array]:
-    """Both (K,)."""
+    """How much warmer each piece was as recorded, and what the thermometer's steps may hide of it, both (K,)."""
     return of_pieces(own.warmer_k, movement), of_pieces(own.unseen_k, movement)
 
 

@@ -230,7 +230,7 @@ class Conditioning:
 
 
 def conditioning(design: Array, needed: int, noise: float = 0.0) -> Conditioning:
-    """Of a design (n, p) whose columns are already in comparable units, of which `needed` directions must be told.
+    """Conditioning of a design (n, p) with columns in comparable units, of which `needed` directions must be told.
 
     Singular values at rounding, or within three times `noise` (the norm that measurement noise gives a design which is
     itself measured), do not count towards the rank. `weakest` is the column that dominates the direction least told.

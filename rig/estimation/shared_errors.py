@@ -27,7 +27,7 @@ class Apart:
 
 
 def apart(noise: Array, effects: Array) -> Apart:
-    """Of V (n, n) and E (n, P). Raises LinAlgError where V is not positive definite."""
+    """Readings of noise V (n, n) and errors E (n, P) made independent. Raises LinAlgError for a V not positive."""
     white = np.linalg.inv(np.linalg.cholesky(noise))
     growth, directions = np.linalg.eigh(white @ effects @ effects.T @ white.T)
     return Apart(directions.T @ white, np.maximum(growth, 0.0))
@@ -74,7 +74,7 @@ def with_uncertainty(readings: Apart, std_rad: float, jacobian: Array) -> Attitu
 
 
 def information(readings: Apart, std_rad: float, jacobian: Array) -> float:
-    """On δ²: half the trace of (P G)², G = E Eᵀ and P what the fit of J (n, q) leaves, whitened."""
+    """Information on δ²: half the trace of (P G)², G = E Eᵀ and P what the fit of J (n, q) leaves, whitened."""
     variance = 1 + std_rad**2 * readings.growth
     growth = readings.growth / variance
     orthogonal = np.linalg.qr((readings.turn @ jacobian) / np.sqrt(variance)[:, None])[0]

@@ -200,7 +200,7 @@ def _check_size(m: Array, norm: float) -> None:
 
 
 def _conditioning(scaled: Array, m: Array, v: Array, needed: int) -> refusals.Conditioning:
-    """Of the scaled X. Its readings are noisy, so directions that only noise tells do not count."""
+    """Conditioning of the scaled X. Its readings are noisy, so directions that only noise tells do not count."""
     noise = np.sqrt(v.max() / np.mean(m**2)) * (np.sqrt(len(m)) + np.sqrt(3))
     return refusals.conditioning(scaled, needed, float(noise))
 
@@ -213,7 +213,7 @@ def _errors_in_x(m: Array, v: Array, method: Method) -> tuple[str, ...]:
 
 
 def _check_attitudes(start: Array, placed: Placed, found: AttitudeWeighted) -> None:
-    """All of them, and the one that fits worst where enough others are left to tell."""
+    """Raises Fault where attitudes are off: all, or the one that fits worst where enough others are left to tell."""
     off = found.attitude_error.std_rad
     said = f"the readings say that the attitudes are off by {1e3 * off:.2g} mrad each"
     if off > SUSPICIOUS_RAD and 3 * (len(placed.readings) - 1) > len(start) + 3:

@@ -72,7 +72,7 @@ class Gyroscope:
 
 @dataclass(frozen=True, slots=True)
 class TurnedSolution:
-    """As `rig.estimation.vector_model.VectorSolution` has it; `budget` is what the covariance is made of.
+    """A solution as `rig.estimation.vector_model.VectorSolution` has it; `budget` is what the covariance is made of.
 
     `residuals_rad_s` (N, 3) are those of the means, then of the turns as mean rates; `widened` says how much more the
     turns contradict each other than was said of them, 1 at least.
@@ -113,7 +113,7 @@ class _Equations:
         return total
 
     def widened(self, by: float) -> "_Equations":
-        """With the errors of a turn so much larger."""
+        """The equations with the errors of a turn so much larger."""
         return replace(
             self, causes={name: by * each if name in (ENDS, AXES) else each for name, each in self.causes.items()}
         )
@@ -179,7 +179,7 @@ def solve_turned(
 
 
 def _equations(gyroscope: Gyroscope, turns: Sequence[Turn], means: Sequence[Mean], state: _State) -> list[_Equations]:
-    """Of the means, then of the turns, these as mean rates."""
+    """The equations of the means, then of the turns, these as mean rates."""
     windows_s = np.array([(turn.start_s, turn.end_s) for turn in turns])
     turned = increments(gyroscope.time_s, gyroscope.readings, state.matrix, state.offset, windows_s)
     return [
@@ -247,7 +247,7 @@ def _solve(equations: Sequence[_Equations]) -> tuple[Array, Array]:
 
 
 def _conditioning(equations: Sequence[_Equations]) -> refusals.Conditioning:
-    """Of the design with rates and offsets brought to one size. Raises Fault `rank_deficient`, `ill_conditioned`."""
+    """Conditioning of the design, rates and offsets of one size. Raises Fault `rank_deficient`, `ill_conditioned`."""
     design = np.vstack([each.design for each in equations])
     sizes = [np.linalg.norm(design[:, each]) for each in (slice(0, 9), slice(9, 12))]
     told = refusals.conditioning(design / np.repeat(sizes, [9, 3]), 12)
@@ -256,7 +256,7 @@ def _conditioning(equations: Sequence[_Equations]) -> refusals.Conditioning:
 
 
 def _widened(turns: Sequence[_Equations], covariance: Array) -> float:
-    """By how much the turns miss more than was said of them, as far as there are more of them than parameters."""
+    """How much more the turns miss than was said of them, as far as there are more of them than parameters."""
     chi_square, freedom = 0.0, 0.0
     for each in turns:
         weight = np.linalg.inv(each.covariance)

@@ -35,7 +35,7 @@ def enter(connection: Connection, run_id: int, issued: Issued, now_utc: str) -> 
 
 
 def of_run(connection: Connection, run_id: int) -> tuple[Issued, ...]:
-    """In the order they were entered, and so are the files of each."""
+    """Certificates of a run in the order they were entered, and so are the files of each."""
     asked = select(certificate).where(certificate.c.run_id == run_id).order_by(certificate.c.id)
     return tuple(
         Issued(row.number, row.title, row.issued, row.replaces, row.marks, _files(connection, row.id))

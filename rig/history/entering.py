@@ -48,7 +48,7 @@ def note_place(connection: Connection, run_id: int, finished: Finished) -> None:
 
 
 def now_utc() -> str:
-    """To the millisecond."""
+    """The time now, UTC to the millisecond."""
     return datetime.now(UTC).isoformat(timespec="milliseconds")
 
 

@@ -59,7 +59,7 @@ class Finished:
 
     @property
     def content_sha256(self) -> str:
-        """Of the result without the time it was computed: the same numbers again are no other result."""
+        """Checksum of the result without the time it was computed: the same numbers again are no other result."""
         return content_sha256(self.text)
 
 
@@ -100,7 +100,7 @@ def finished_run(folder: Path, document: ResultDocument | None = None) -> Finish
 
 
 def document_sha256(folder: Path, name: str) -> str | None:
-    """Of a file that a run leaves beside its recordings, of result.json that of what it says; None where there is none.
+    """Checksum of a file that a run leaves beside its recordings, of result.json that of what it says; None without it.
 
     Raises OSError, and UnfitFile for what is no file of a run.
     """

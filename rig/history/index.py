@@ -29,7 +29,7 @@ def run_row(document: ResultDocument) -> dict[str, str | bool]:
 
 
 def measurement_sha256(document: ResultDocument) -> str:
-    """Of what was measured: arm, board, configuration, time of its beginning."""
+    """Checksum of what was measured: arm, board, configuration, time of its beginning."""
     of = document.provenance
     said = (of.started_utc, of.arm_serial_number, of.board_unique_id, of.configuration_sha256)
     return hashlib.sha256("\n".join(said).encode()).hexdigest()
@@ -41,12 +41,12 @@ def fit(document: ResultDocument) -> bool:
 
 
 def utc(text: str) -> str:
-    """In one form, so that texts sort as times do."""
+    """A time in one form, UTC, so that texts sort as times do."""
     return datetime.fromisoformat(text).astimezone(UTC).isoformat(timespec="seconds")
 
 
 def unlike(document: ResultDocument, found: Sequence[Followed]) -> Iterator[str]:
-    """In what `found` differs from the calibrations that a result states, beyond a processor's rounding."""
+    """What in `found` differs from the calibrations that a result states, beyond a processor's rounding."""
     stated = {(each.sensor, each.quantity): each for each in followed(document)}
     beside = {(each.sensor, each.quantity): each for each in found}
     for sensor, quantity in sorted(stated.keys() ^ beside.keys()):

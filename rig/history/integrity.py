@@ -50,7 +50,7 @@ def examined(history: History, computer: str | None = None) -> Iterator[Found]:
 
 
 def _contradictions(run: Kept, pasts: Sequence[Past]) -> Iterator[str]:
-    """In what the rows of a run contradict its result, the first few."""
+    """What in the rows of a run contradicts its result, the first few."""
     try:
         if content_sha256(run.result) != run.content_sha256:
             yield "the result in the history is not what was entered"

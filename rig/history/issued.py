@@ -23,7 +23,7 @@ class Issued:
 
 
 def issued_certificate(certificate: Certificate, files: Mapping[str, bytes]) -> Issued:
-    """That certificate in these files, by name."""
+    """The certificate as it is entered: with the checksums of its files, by name."""
     return Issued(
         certificate.number,
         certificate.title,

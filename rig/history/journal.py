@@ -32,13 +32,13 @@ class Broken:
 
 
 def alone(connection: Connection) -> None:
-    """Until the end of its transaction, nobody else writes. An SQLite transaction that writes is alone anyway."""
+    """Keep others from writing until the end of the transaction. An SQLite transaction that writes is alone anyway."""
     if connection.dialect.name == "postgresql":
         connection.execute(text("SELECT pg_advisory_xact_lock(:lock)"), {"lock": LOCK})
 
 
 def note(connection: Connection, table: Table, *key: int | str) -> None:
-    """That the row with this primary key was entered, a run with all that belongs to it; `alone`."""
+    """Note that the row with this primary key was entered, a run with all that belongs to it; `alone`."""
     number = connection.scalar(select(func.coalesce(func.max(schema.journal.c.number), 0) + 1))
     line = {
         "number": number,

@@ -38,7 +38,7 @@ def _origin(document: ResultDocument) -> dict[str, object]:
 
 
 def _numbers_of(document: ResultDocument) -> dict[str, object]:
-    """As JSON, checks by their names: one that a later version adds moves no other."""
+    """The numbers of a result as JSON, checks by their names: one that a later version adds moves no other."""
     found: dict[str, object] = json.loads(document.text())
     checks = {check.name: [check.value, check.limit, check.uncertainty] for check in document.checks}
     return {**{name: each for name, each in found.items() if name != "provenance"}, "checks": checks}
@@ -66,7 +66,7 @@ def _differences(claimed: object, given: object, where: str, scale: float = 0.0)
 
 
 def _largest(numbers: object) -> float:
-    """Of the numbers in a list or a matrix."""
+    """The largest size of the numbers in a list or a matrix."""
     if isinstance(numbers, float | int):
         return abs(numbers)
     if isinstance(numbers, Sequence) and not isinstance(numbers, str):

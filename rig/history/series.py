@@ -136,7 +136,7 @@ def subjects(pasts: Iterable[Past]) -> dict[Subject, list[Past]]:
 
 
 def trends(pasts: Sequence[Past]) -> dict[str, Trend]:
-    """Of every parameter that the newest of one subject's calibrations has."""
+    """The trend of every parameter that the newest of one subject's calibrations has."""
     found = {}
     for name in pasts[-1].parameters if pasts else ():
         with_it = [each for each in pasts if name in each.parameters]
@@ -146,7 +146,7 @@ def trends(pasts: Sequence[Past]) -> dict[str, Trend]:
 
 
 def changes(before: Past, now: Past) -> tuple[Change, ...]:
-    """Of the parameters that both have."""
+    """The changes of the parameters that both calibrations have."""
     return tuple(
         Change(name, now.parameters[name].unit, before.parameters[name], now.parameters[name])
         for name in now.parameters
@@ -175,7 +175,7 @@ def rig_states(pasts: Sequence[Past]) -> list[RigState]:
 
 
 def effects(pasts: Sequence[Past]) -> dict[str, tuple[RigEffect, ...]]:
-    """By parameter of gyroscopes: what rigs differ in, from the sensors they share. Of scale factors as a fraction."""
+    """What rigs differ in, by parameter of gyroscopes, from the sensors they share. Of scale factors as a fraction."""
     series = [(name, past) for each in subjects(pasts).values() for past in each for name in past.parameters]
     found = {}
     for name in dict.fromkeys(name for name, past in series if past.quantity == "rate"):

@@ -71,7 +71,7 @@ class Past:
         return self.part, self.serial_number, self.quantity, self.full_scale, self.simulated
 
     def value(self, name: str) -> float:
-        """Of a parameter. Raises KeyError."""
+        """The value of the parameter `name`. Raises KeyError."""
         return self.parameters[name].value
 
 
@@ -166,7 +166,7 @@ class History:
             return run_id is not None
 
     def calibrations(self, selection: Selection = Selection()) -> list[Past]:
-        """In the order of time, the voided ones too. A result that a later one of the same run replaced is left out."""
+        """Calibrations in the order of time, voided ones too. One that a later one of its run replaced is left out."""
         question = select(*_COLUMNS).select_from(_ROWS).where(~_replaced()).order_by(*_IN_TIME)
         return self._pasts(_chosen(question, selection))
 

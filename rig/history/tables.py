@@ -71,7 +71,7 @@ def changes_table(title: str, changes: Iterable[Change]) -> Table:
 
 
 def parameters_table(past: Past) -> Table:
-    """Of one calibration."""
+    """The table of one calibration's parameters."""
     table = _table(
         f"calibration {past.id}: {title_of(past.subject)}", "parameter", "value ± U", "unit", "u of noise", "u of all"
     )

@@ -15,7 +15,7 @@ NEWER = "OLD.key = 'version' AND NEW.key = 'version' AND CAST(NEW.value AS INTEG
 
 
 def create_triggers(connection: Connection) -> None:
-    """On every table of a history, which has none yet."""
+    """Create the triggers on every table of a history, which has none yet."""
     statements = _postgresql() if connection.dialect.name == "postgresql" else _sqlite()
     for statement in statements:
         connection.exec_driver_sql(statement)

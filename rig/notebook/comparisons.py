@@ -38,7 +38,7 @@ class SensorComparison:
         return next(found for found in (self.after, self.before) if found is not None)
 
     def plot(self) -> "Plot":
-        """Both over time, and their difference."""
+        """A plot of sensor and reference over time, and of their difference."""
         from rig.notebook.plots import plot_comparison
 
         return plot_comparison(self.shown, self.sensor, self.reference)

@@ -30,7 +30,7 @@ class Plot:
     figure: "Figure"
 
     def save(self, path: str | Path) -> None:
-        """Into a file; its ending says which format."""
+        """Write the figure into a file; its ending says which format."""
         self.figure.savefig(path, dpi=DPI)
 
     def _repr_png_(self) -> bytes:

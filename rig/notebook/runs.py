@@ -71,7 +71,7 @@ class Readings:
         return plot_readings(*self.on_arm_clock(), sweeps, f"{self.name}, {self.sensor.mode} readings")
 
     def row(self) -> tuple[str, ...]:
-        """In words, under `HEADINGS`."""
+        """The sensor in words, under `HEADINGS`."""
         sensor = self.sensor
         return self.name, sensor.part, sensor.serial_number, f"{sensor.rate_hz:g}", str(len(self.samples)), sensor.mode
 

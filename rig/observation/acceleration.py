@@ -120,7 +120,7 @@ def dwell_reading(stream: Stream, motion: Motion, finished: Dwelt, settings: Obs
 
 
 def _standing(run: RunData, finished: Dwelt) -> Dwelt:
-    """Without its last readings, which may have felt the arm leave; recordings of before keep them."""
+    """The dwell without its last readings, which may have felt the arm leave; recordings of before keep them."""
     if not run.settings.leaves_dwells_early:
         return finished
     start_s, end_s = finished.window.start_s, finished.window.end_s

@@ -41,7 +41,7 @@ class Average:
 
     @property
     def duration_s(self) -> float:
-        """Of what was averaged."""
+        """Duration of what was averaged."""
         return self.end_s - self.start_s
 
     @property

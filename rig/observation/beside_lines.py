@@ -25,7 +25,7 @@ BRIEF = (1, 2)  # memories that know a colour, and nothing of what may be left o
 
 @dataclass(frozen=True, slots=True)
 class Noise:
-    """Of readings that nothing else explains: the `scatter` (3,) variance of one, what of it counts `in_a_mean` (3,)
+    """Noise of readings beside lines: the `scatter` (3,) variance of one, what of it counts `in_a_mean` (3,)
     over long, and with how many degrees of `freedom` (3,) that is known."""
 
     scatter: Array
@@ -34,7 +34,7 @@ class Noise:
 
 
 def mean_beside_lines(readings: Array, count: float, turning: Array, rate: Array) -> Mean:
-    """Of readings (n, 3) in steps of `count`, evenly spaced, over a whole turn.
+    """The mean of readings (n, 3) in steps of `count`, evenly spaced, over a whole turn.
 
     `turning` (n, k) comes and goes in a turn. `rate` (n,) is the arm's less its mean, as the encoders have it: they see
     not all that vibrates, and some that does not, so it counts only for what no line explains. What it has of the lines
@@ -58,7 +58,7 @@ def mean_beside_lines(readings: Array, count: float, turning: Array, rate: Array
 
 
 def rest_beside_lines(readings: Array, time_s: Array, window: Window, count: float) -> Mean:
-    """As `tapered_mean`, of which the weights leave nothing of a vibration, by the noise beside its lines."""
+    """The mean at rest as `tapered_mean`, whose weights leave nothing of a vibration, by the noise beside its lines."""
     left = readings - readings.mean(axis=0)
     shaking = swinging(left)
     columns = np.column_stack([np.ones(len(left)), shaking])
@@ -81,7 +81,7 @@ def swinging(residuals: Array) -> Array:
 
 
 def colour_left(residuals: Array) -> float:
-    """As `noise_left`, of residuals (n,) that may hold what is left of a line."""
+    """The factor of `noise_left`, of residuals (n,) that may hold what is left of a line."""
     return left_of(residuals, BRIEF).factor
 
 
@@ -91,7 +91,7 @@ def _columns(cycles: Array, count: int) -> Array:
 
 
 def noise_of(residuals: Array, taken: int, count: float, memories: Sequence[int]) -> Noise:
-    """Of residuals (n, 3) of readings in steps of `count`, from which so many columns were `taken`: see `left_of`."""
+    """The noise in residuals (n, 3) of readings in steps of `count`, less so many `taken` columns: see `left_of`."""
     scatter = np.maximum(np.sum(residuals**2, axis=0) / (len(residuals) - taken), count**2 / 12)
     left = [left_of(each, memories) for each in residuals.T]
     return Noise(

@@ -31,7 +31,7 @@ def widening(residuals: Array) -> float:
 
 
 def noise_left(residuals: Array) -> float:
-    """The same factor by an autoregressive model, smaller than 1 where most of the residuals is a vibration.
+    """Factor on the variance of a mean by an autoregressive model, below 1 where most of the residuals is a vibration.
 
     A mean over many periods has nearly nothing left of one, whatever its correlations add up to. What is left of the
     mean is the spectrum at zero: of an autoregression with coefficients a and innovations e, var(e) / (1 − Σ a)². Its

@@ -41,7 +41,7 @@ def inside(time_s: Array, window: Window) -> slice:
 
 
 def scatter_of(readings: Array) -> tuple[Array, Array, Array]:
-    """Of readings (n, 3) the variance of their mean, its degrees of freedom, and the standard deviation of one, (3,).
+    """Variance of the mean of readings (n, 3), its degrees of freedom, and the standard deviation of one, (3,) each.
 
     From the scatter about the mean; vibration counts as noise here, for no arm reports it.
     """
@@ -52,7 +52,7 @@ def scatter_of(readings: Array) -> tuple[Array, Array, Array]:
 
 
 def average_of(readings: Array, window: Window) -> Average:
-    """Of the readings (n, 3) that a window has; nothing tells their temperature."""
+    """The average of the readings (n, 3) that a window has; nothing tells their temperature."""
     variance, freedom, noise = scatter_of(readings)
     return Average(
         mean_rad_s=readings.mean(axis=0),

@@ -92,7 +92,7 @@ def field_readings(recording: ObservedRun, name: str, thresholds: ObservationThr
 
 
 def dwelt_field(recording: ObservedRun, name: str) -> Iterator[tuple[DwellReading, NDArray[Any], Array]]:
-    """Of the same dwells the readings as recorded (n, 3), and their times (n,) on the arm's clock."""
+    """The field's readings in each dwell as recorded (n, 3), and their times (n,) on the arm's clock."""
     other = beside(recording, name)
     if other is not None:
         time_s = _time_s(recording, name, other)

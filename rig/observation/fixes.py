@@ -175,7 +175,7 @@ def _without_the_thin(fixes: Fixes) -> Fixes:
 
 
 def _followed(turning: Turning, fixes: Fixes) -> tuple[NDArray[np.bool_], tuple[LeftOut, ...]]:
-    """Between which neighbours (N − 1,) the gyroscope can be followed, and why not between the others."""
+    """Whether the gyroscope can be followed between neighbours (N − 1,), and why not where it cannot."""
     count = len(fixes.placement)
     first_s = fixes.at_s[np.searchsorted(fixes.fix, np.arange(count))]
     last_s = fixes.at_s[np.searchsorted(fixes.fix, np.arange(count), side="right") - 1]
@@ -192,7 +192,7 @@ def _followed(turning: Turning, fixes: Fixes) -> tuple[NDArray[np.bool_], tuple[
 
 
 def _blind(turning: Turning) -> dict[str, NDArray[np.intp]]:
-    """By name, the steps from one reading to the next, by the first one's number, over which nothing can be said."""
+    """Steps from one reading to the next, by the first one's number, over which nothing can be said, by reason."""
     steps_s = np.diff(turning.time_s)
     readings = turning.readings_rad_s
     turned = np.linalg.norm(readings[:-1] - np.median(readings, axis=0), axis=1) * steps_s

@@ -100,7 +100,7 @@ def _strongest(left: Array, known: Array, stands_out: float) -> float | None:
 
 
 def _refined(cycles: Array, residuals: Array, held: int) -> Array:
-    """By what grows of a line a quarter of a cycle behind it: its phase. The first so many are held."""
+    """Lines refined by what grows of each a quarter of a cycle behind it: its phase. The first so many are held."""
     share = np.arange(len(residuals)) / len(residuals)
     for _ in range(PASSES):
         sizes = fitted(waves(cycles, share), residuals).reshape(len(cycles), WIDE, -1)

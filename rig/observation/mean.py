@@ -15,7 +15,7 @@ from rig.observation.windows import Window
 
 @dataclass(frozen=True, slots=True)
 class Mean:
-    """Of readings in any unit: mean (3,), variance (3,) of that mean, `noise` (3,) of one, and how many there were.
+    """Mean of readings in any unit: mean (3,), variance (3,) of that, `noise` (3,) of one, and how many there were.
 
     `freedom` (3,) are the variance's degrees of freedom: fewer than samples where these are not independent. `cycles`
     (k,): how often lines come in the readings that were taken out of the mean.
@@ -66,7 +66,7 @@ def even_mean(readings: Array, count: float, left: Callable[[Array], Left] = lef
 
 
 def mean_at_rest(readings: Array, time_s: Array, window: Window, count: float) -> tuple[Mean, Window]:
-    """Of readings (n, 3) in steps of `count`, at times (n,), and from when to when it is said to last.
+    """The mean of readings (n, 3) in steps of `count`, at times (n,), and from when to when it is said to last.
 
     Where the arm vibrates weights come and go, see `tapered_mean`: 2 mg at 14 Hz leave 10 µg in an even mean of three
     seconds. Such a mean lasts from where the weights have come half-way to where they have gone half-way: so long an
@@ -80,7 +80,7 @@ def mean_at_rest(readings: Array, time_s: Array, window: Window, count: float) -
 
 
 def tapered_mean(readings: Array, time_s: Array, window: Window, count: float) -> Mean:
-    """Of readings (n, 3) in steps of `count`, at times (n,): those in the middle of the window count most.
+    """The mean of readings (n, 3) in steps of `count`, at times (n,): those in the middle of the window count most.
 
     The variance is that of the noise without the vibration, which the weights leave nothing of.
     """

@@ -136,7 +136,7 @@ def nearest_axis(vector: Array) -> tuple[str, int]:
 
 
 def check_feeling(run: RunData, rests: Sequence[Average], dwells: Sequence[DwellReading]) -> None:
-    """Of recordings that say where the arm stood. Raises Fault `stuck_sensor`."""
+    """Raises Fault `stuck_sensor` where a sensor does not feel what the arm did, if the site is known."""
     if run.settings.site is None:
         return
     speeds = [finished.sweep.speed_rad_s for finished in swept(run)]
@@ -146,7 +146,7 @@ def check_feeling(run: RunData, rests: Sequence[Average], dwells: Sequence[Dwell
 
 
 def rests_of(run: RunData, stream: Stream, motion: Motion, superseded: Collection[int] = ()) -> tuple[Average, ...]:
-    """Those in which the arm stood still for long enough, without those beside a step in `superseded`."""
+    """The rests in which the arm stood still for long enough, without those beside a step in `superseded`."""
     found = (_rest(stream, motion, window, averaging_of(run.settings)) for window in rested(run, superseded))
     return tuple(rest for rest in found if rest is not None)
 

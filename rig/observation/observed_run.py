@@ -15,7 +15,7 @@ from rig.observation.windows import finished_dwells, finished_sweeps
 
 @dataclass(frozen=True, slots=True)
 class Delay:
-    """By how much one sensor's filter lags another's, s, and the standard deviation of that."""
+    """How much one sensor's filter lags another's, s, and the standard deviation of that."""
 
     delay_s: float
     std_s: float
@@ -34,7 +34,7 @@ class ObservedRun:
         return on_clock(self.run.samples[sensor], self.run.sensors[sensor], self.sensors[sensor].time_base)
 
     def delay(self, sensor: str, behind: str) -> Delay | None:
-        """By how much `sensor` lags the sensor `behind`; None where no one clock stamps the samples of both.
+        """How much `sensor` lags the sensor `behind`; None where no one clock stamps the samples of both.
 
         Where the board's does, what their time bases differ by is their filters' doing.
         """

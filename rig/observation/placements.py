@@ -25,7 +25,7 @@ TURNED_RAD = 0.02  # rows of one rest that are farther apart: it was turned abou
 
 @dataclass(frozen=True, slots=True)
 class Rested:
-    """Of rests `means` (N, 3) of every quantity, their `variances` (N, 3), and the `freedom` (N, 3) of these."""
+    """What rests tell: `means` (N, 3) of every quantity, their `variances` (N, 3), the `freedom` (N, 3) of these."""
 
     means: Mapping[Quantity, Array]
     variances: Mapping[Quantity, Array]
@@ -103,7 +103,7 @@ def _groups(rest: NDArray[np.intp], attitudes: Array) -> list[NDArray[np.intp]]:
 
 
 def _apart(one: Array, other: Array) -> float:
-    """By what angle two rotations (3, 3) differ, rad."""
+    """The angle by which two rotations (3, 3) differ, rad."""
     return float(np.arccos(np.clip((np.trace(one.T @ other) - 1) / 2, -1, 1)))
 
 
@@ -114,7 +114,7 @@ def _covered(time_s: Array, rest: Window, windows: Sequence[Window]) -> NDArray[
 
 
 def _read(readings: Mapping[Quantity, Array], cuts: Sequence[NDArray[np.intp]]) -> Rested:
-    """Of few samples, the noise of all that are long enough."""
+    """The means of the rests; of few samples, with the noise of all that are long enough."""
     means, variances, freedom = {}, {}, {}
     for quantity, each in readings.items():
         means[quantity] = np.array([each[cut].mean(axis=0) for cut in cuts]).reshape(-1, 3)

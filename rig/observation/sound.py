@@ -22,7 +22,7 @@ def sound_sweeps(run: RunData, settings: ObservationThresholds) -> frozenset[int
 
 
 def sound_dwells(run: RunData, settings: ObservationThresholds) -> frozenset[int]:
-    """The same of the dwells."""
+    """The finished dwells that are accepted for every sensor, and in which no reading is a spike."""
     return finished_dwells(run) & _sound(run, settings)
 
 
@@ -36,7 +36,7 @@ def _sound(run: RunData, settings: ObservationThresholds) -> frozenset[int]:
 
 
 def _sound_for(run: RunData, sensor: str, motion: Motion, settings: ObservationThresholds) -> frozenset[int]:
-    """Nothing of a sensor that once did not feel what the arm did: when it began nobody knows."""
+    """Sweeps and dwells that a sensor read soundly: none if it once did not feel the arm; since when nobody knows."""
     try:
         stream = on_the_arms_clock(run.samples[sensor], run.sensors[sensor], motion)
         readings = each_dwell(run, stream, motion, settings)

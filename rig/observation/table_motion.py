@@ -42,12 +42,12 @@ class TableMotion:
             raise _not_found("the table stands still in the whole file")
 
     def rate(self, time_s: Array, derivative: int = 0, /) -> Array:
-        """As of `KnownMotion`."""
+        """The table's rate (n, 3), or its derivative, as of `KnownMotion`."""
         rate: Array = self._rate(time_s, derivative)
         return rate
 
     def covered(self, time_s: Array) -> NDArray[np.bool_]:
-        """As of `KnownMotion`."""
+        """Whether the table's motion is known at times (n,), as of `KnownMotion`."""
         return closely_followed(self.time_s, self._close, time_s)
 
 

@@ -138,7 +138,7 @@ def _begun(board_time_s: Array, readings: Array, motion: KnownMotion) -> tuple[T
 
 
 def _seen_from(clock: TimeBase, reference_s: float) -> TimeBase:
-    """The same clock with its offset at another time."""
+    """The clock with its offset at another time."""
     offset_s = clock.offset_s + clock.drift * (reference_s - clock.reference_s)
     return replace(clock, offset_s=float(offset_s), reference_s=float(reference_s))
 

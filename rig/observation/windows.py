@@ -72,7 +72,7 @@ def finished_sweeps(run: RunData) -> frozenset[int]:
 
 
 def finished_dwells(run: RunData) -> frozenset[int]:
-    """The same of the dwells."""
+    """Indices of the dwells that were finished."""
     return frozenset(each.dwell.index for each in dwelt(run))
 
 

@@ -25,7 +25,7 @@ Handler = Callable[[Request], Awaitable[Response]]
 
 
 def application(broadcast: Broadcast, control: Control, door: Door, folder: Path, connections: Connections) -> Guard:
-    """Of a run in `folder`, behind its door."""
+    """The page's application for a run in `folder`, behind its door."""
 
     def acting(handler: Handler) -> Handler:
         async def allowed(request: Request) -> Response:

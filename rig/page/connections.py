@@ -20,7 +20,7 @@ Client = tuple[str, int]  # address and port
 
 
 class Connections:
-    """Of one server, all in its event loop."""
+    """The connections of one server, all in its event loop."""
 
     def __init__(self, request_s: float = REQUEST_S) -> None:
         self._request_s = request_s
@@ -39,7 +39,7 @@ class Connections:
         self._limit(client, transport)
 
     def lost(self, client: Client) -> None:
-        """It is gone, or as good as gone."""
+        """Forget a client that is gone, or as good as gone."""
         self._strangers.pop(client, None)
         self._known.pop(client, None)
         if (deadline := self._deadlines.pop(client, None)) is not None:

@@ -16,7 +16,7 @@ STOP_SIGNAL = getattr(signal, "SIGUSR1", signal.SIGINT)  # its own: SIGINT may b
 
 
 class Control:
-    """Between the server's thread and the run's, which is the main one."""
+    """What the page may do to a run, between the server's thread and the run's, which is the main one."""
 
     def __init__(self, *, may_answer: bool) -> None:
         self._may_answer = may_answer
@@ -29,7 +29,7 @@ class Control:
 
     @contextmanager
     def stoppable(self) -> Iterator[None]:
-        """In this block, which is the main thread's, `stop` ends in a KeyboardInterrupt."""
+        """A block of the main thread's in which `stop` ends in a KeyboardInterrupt."""
 
         def stopped(*_: Any) -> None:
             raise KeyboardInterrupt(STOPPED)

@@ -30,7 +30,7 @@ class Feed:
         self._sent = 0  # points that were in a frame
 
     def event(self, event: RunEvent) -> None:
-        """As of a Listener: changes what is shown, waits for nobody."""
+        """Take an event, as a Listener does: it changes what is shown, waits for nobody."""
         with self._lock:
             self._shown.take(event)
 
@@ -79,7 +79,7 @@ class Mailbox:
         self._news.set()
 
     def close(self) -> None:
-        """Nothing comes after what is in it."""
+        """Close the mailbox: nothing comes after what is in it."""
         self.closed = True
         self._news.set()
 
@@ -146,7 +146,7 @@ class Broadcast:
             await asyncio.sleep(FRAME_S / 4)
 
     async def frames(self, *, known: bool = True) -> AsyncGenerator[bytes, None]:
-        """For one browser: everything, then what changes."""
+        """The frames for one browser: everything, then what changes."""
         mailbox = Mailbox()
         self._mailboxes[mailbox] = known
         if self._closing:

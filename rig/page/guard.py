@@ -92,7 +92,7 @@ class Guard:
         self._headers = [(name.encode(), value.encode()) for name, value in headers.items()]
 
     async def __call__(self, scope: "Scope", receive: "Receive", send: "Send") -> None:
-        """As ASGI has it."""
+        """Answer a request, as ASGI has it, with the headers that guard the page."""
         if scope["type"] != "http":
             return
 

@@ -56,5 +56,5 @@ class History:
 
 
 def rounded(vector: tuple[float, ...] | None) -> list[float] | None:
-    """To six digits, which is more than a screen shows and less than a wire carries."""
+    """The vector to six digits, which is more than a screen shows and less than a wire carries."""
     return None if vector is None else [float(f"{component:.6g}") for component in vector]

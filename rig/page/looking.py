@@ -26,7 +26,7 @@ def look(folder: Path) -> dict[str, object]:
 
 
 def main() -> None:
-    """Until standard input ends."""
+    """Look at the folder at every line that comes, until standard input ends."""
     with suppress(OSError, AttributeError):
         os.nice(NICENESS)
     folder = Path(sys.argv[1])

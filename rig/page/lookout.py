@@ -30,7 +30,7 @@ class Lookout:
         self._raw = True
 
     def event(self, event: RunEvent) -> None:
-        """As of a Listener."""
+        """Take an event, as a Listener does: a finished step is looked at."""
         match event:
             case PhaseStarted(_, _, sensors):
                 self._raw = "calibrated" not in sensors.values()
@@ -40,7 +40,7 @@ class Lookout:
 
 @contextmanager
 def looking_out(folder: Path, feed: Feed) -> Iterator[Lookout]:
-    """For the length of the block; what is seen is shown by `feed`.
+    """A lookout for the length of the block; what it sees is shown by `feed`.
 
     A process that fails says so on stderr: the page goes without what it would see, and the run goes on.
     """

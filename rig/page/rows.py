@@ -71,7 +71,7 @@ def dwell_row(sensor: str, dwell: DwellReading, gravity_m_s2: float | None) -> R
 
 
 def look_of(found: Mapping[str, SoFar]) -> Look:
-    """Of a run that goes on."""
+    """What is known of a run that goes on."""
     observations = [_sweep(name, sweep, each) for name, one in found.items() for sweep, each in one.sweeps.items()]
     for name, one in found.items():
         observations += [_dwell(name, index, each, one.gravity_m_s2) for index, each in one.dwells.items()]
@@ -79,7 +79,7 @@ def look_of(found: Mapping[str, SoFar]) -> Look:
 
 
 def parameter_rows(result: ResultDocument) -> list[Row]:
-    """Of a run's result, kind by kind; U is what the result states, or twice its noise."""
+    """The rows of a run's result, kind by kind; U is what the result states, or twice its noise."""
     return [_row(each) for each in shown(result)]
 
 

@@ -13,7 +13,7 @@ from rig.plans.script_errors import script_errors
 
 
 class PhasePlanner(Protocol):
-    """As `Planner`, for the arm and the section of one configuration."""
+    """Makes the plan, as `Planner` does, for the arm and the section of one configuration."""
 
     def __call__(self, start_q_rad: Joints | None = None, done: Collection[int] = ()) -> Plan: ...
 

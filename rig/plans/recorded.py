@@ -38,7 +38,7 @@ class RecordedRun:
         return replace(self, corrected=(), alone=True)
 
     def judged_by(self, overrides: Sequence[str]) -> "RecordedRun":
-        """The same with other thresholds or limits, see `RunSettings.with_overrides`."""
+        """The run with other thresholds or limits, see `RunSettings.with_overrides`."""
         raw, corrected = (tuple(run.judged_by(overrides) for run in runs) for runs in (self.raw, self.corrected))
         return replace(self, raw=raw, corrected=corrected)
 

@@ -37,7 +37,7 @@ class ScriptFile:
 
     @property
     def sha256(self) -> str:
-        """Of the text, in hexadecimal."""
+        """Checksum of the script's text, in hexadecimal."""
         return self.identity.sha256
 
     @property

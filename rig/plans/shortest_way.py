@@ -32,7 +32,7 @@ def _nearest_neighbours(between_s: Array, first: int) -> list[int]:
 
 
 def _bettered(order: list[int], between_s: Array) -> list[int]:
-    """With the part between two ways turned about, over and over, wherever that gains most."""
+    """The order with the part between two ways turned about, over and over, wherever that gains most."""
     while True:
         here, there = np.array(order), np.roll(order, -1)
         ways = between_s[here, there]

@@ -167,7 +167,7 @@ def _sweep(
 
 @lru_cache(maxsize=64)
 def _axis(station: Station) -> tuple[float, float, float]:
-    """In the flange's frame, of a growing angle."""
+    """The joint's axis in the flange's frame, of a growing angle."""
     x, y, z = flange_axes(station.pose_q_rad)[:, station.joint].tolist()
     return x, y, z
 

@@ -24,7 +24,7 @@ SCHEMA = "rig.allan/1"
 
 
 def print_at_rest(found: Mapping[str, SensorAtRest], *, as_json: bool) -> None:
-    """On stdout: tables for people, JSON of schema "rig.allan/1" for machines."""
+    """Print what was found at rest on stdout: tables for people, JSON of schema "rig.allan/1" for machines."""
     if as_json:
         print(json.dumps(document(found), indent=2, allow_nan=False))
         return
@@ -40,7 +40,7 @@ def print_at_rest(found: Mapping[str, SensorAtRest], *, as_json: bool) -> None:
 
 
 def document(found: Mapping[str, SensorAtRest]) -> dict[str, Any]:
-    """In SI units, of schema "rig.allan/1"."""
+    """What was found at rest, in SI units, of schema "rig.allan/1"."""
     return {
         "schema": SCHEMA,
         "sensors": {

@@ -28,7 +28,7 @@ TOWARDS = {ACCELERATION: "up", FIELD: "the field"}
 
 @dataclass(frozen=True, slots=True)
 class HeldStill:
-    """Of N attitudes: (N, 3) what the model leaves, what it was expected to leave (one standard deviation), the noise.
+    """A sensor in N attitudes, (N, 3) each: what the model leaves, is expected to leave (one deviation), the noise.
 
     `towards` (N, 3): where the reference pointed, in the sensor's nominal axes.
     """
@@ -133,6 +133,6 @@ def _draw_sphere(axes: "Axes", held: HeldStill) -> None:
 
 
 def _lambert(unit: Array) -> tuple[Array, Array]:
-    """Of unit vectors (n, 3) in the half z ≥ 0, into the unit circle."""
+    """Lambert's projection of unit vectors (n, 3) in the half z ≥ 0, into the unit circle."""
     size = np.sqrt(1 / (1 + np.clip(unit[:, 2], 0, 1)))
     return unit[:, 0] * size, unit[:, 1] * size

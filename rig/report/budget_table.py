@@ -13,12 +13,12 @@ from rig.station.plain_text import plain
 
 
 def expanded_heading(budget: BudgetEntry | None) -> str:
-    """Of a column of U by a budget; without one it is two standard deviations."""
+    """The heading of a column of U by a budget; without one U is two standard deviations."""
     return heading_of((COVERAGE_FACTOR,) if budget is None else budget.factors)
 
 
 def heading_of(factors: Sequence[float]) -> str:
-    """Of a column of U: with its coverage factor, or with the largest where they differ as they are printed."""
+    """The heading of a column of U: with its coverage factor, or with the largest where they differ as printed."""
     printed = sorted({round(each, 2) for each in factors})
     return f"± U (k {'=' if len(printed) == 1 else '≤'} {printed[-1]:g})"
 
@@ -49,7 +49,7 @@ def budget_table(budget: BudgetEntry, scale: Sequence[float], bias: Unit) -> Tab
 
 
 def _named(line: Line) -> str:
-    """With what it was assumed to be; all that are negligible stand below the table."""
+    """The line's name with what it was assumed to be; all that are negligible stand below the table."""
     if not line.kind:
         return line.name.partition(":")[0]
     assumed = " ".join(line.assumed.split())  # a terminal shows blanks that do not break by their number

@@ -46,7 +46,7 @@ def magnetometer_lines(found: Found[MagnetometerEntry], _: Mapping[str, Array]) 
 
 
 def _prefix(name: str) -> str:
-    """Of a sensor's names in C."""
+    """What a sensor's names in C begin with."""
     return re.sub(r"^(?=[^a-z])", "sensor_", re.sub(r"[^a-z0-9]", "_", name.lower()))
 
 

@@ -14,14 +14,14 @@ from rig.report.expanded import expanded, factor_words
 
 
 def earth_rate_entry(found: EarthRate | Fault, *, counts_freedom: bool) -> EarthRateEntry | ErrorEntry:
-    """Or why it was not found."""
+    """The entry of the Earth's rate, or of why it was not found."""
     if isinstance(found, Fault):
         return ErrorEntry(error=str(found))
     return entry(EarthRateEntry, found, freedom=found.freedom if counts_freedom else None)
 
 
 def earth_rate_lines(found: EarthRateEntry | ErrorEntry | None) -> Iterator[str]:
-    """None says nothing: it was not looked for."""
+    """The Earth's rate in words; None says nothing: it was not looked for."""
     if found is None:
         return
     if isinstance(found, ErrorEntry):

@@ -85,7 +85,7 @@ def draw_errors(figure: "Figure", time_s: Array, turned: Array, error: Array) ->
 
 
 def _curve(time_s: Array, values: Array) -> tuple[Array, Array]:
-    """Without a line across what the arm's states do not cover."""
+    """A curve's points, without a line across what the arm's states do not cover."""
     times, values = envelope(time_s, values)
     gaps = np.flatnonzero(np.diff(times) > GAP_S) + 1
     return np.insert(times, gaps, np.nan), np.insert(values, gaps, np.nan)

@@ -35,5 +35,5 @@ def factor_words(freedom: Sequence[Freedom] | None) -> str:
 
 
 def flat(freedom: Sequence[Sequence[Freedom]] | None) -> list[Freedom] | None:
-    """Of a matrix, row by row."""
+    """Degrees of freedom of a matrix, row by row."""
     return None if freedom is None else [each for row in freedom for each in row]

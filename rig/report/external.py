@@ -44,7 +44,7 @@ class External:
 
     @property
     def vector(self) -> VectorEntry | None:
-        """The same solution with its matrix, of an estimator that finds one."""
+        """The solution with its matrix, of an estimator that finds one."""
         solution = self.solution
         return vector_entry(solution) if isinstance(solution, VectorSolution | TurnedSolution) else None
 

@@ -24,7 +24,7 @@ MARGINS = {"left": 0.06, "right": 0.985, "bottom": 0.065, "top": 0.915, "wspace"
 
 
 def write_figures(outcome: Outcome, document: ResultDocument, folder: Path) -> tuple[RunEvent, ...]:
-    """Those of all verifications of a run, if it has any."""
+    """Write the figures of all verifications of a run, if it has any."""
     return (draw_verifications(outcome.verifications.values(), folder),) if outcome.verifications else ()
 
 
@@ -61,7 +61,7 @@ def _write(verification: Verification, when: str, comparison: Comparison, folder
 
 
 def save(figure: "Figure", folder: Path, name: str) -> None:
-    """As PNG and as SVG."""
+    """Save a figure as PNG and as SVG."""
     with new_file(folder / f"{name}.png") as png, new_file(folder / f"{name}.svg") as svg:
         figure.savefig(png, format="png", dpi=110)
         figure.savefig(svg, format="svg", dpi=110, metadata={"Date": None})

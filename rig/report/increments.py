@@ -38,7 +38,7 @@ def increment_lines(found: InIncrements) -> Iterator[str]:
 
 
 def increment_entry(found: InIncrements) -> dict[str, Any]:
-    """The same for machines, beside matrix, scale, bias and covariance."""
+    """What rotation increments tell, for machines, beside matrix, scale, bias and covariance."""
     solution, earth = found.solution, found.solution.earth
     return {
         "estimator": "increments",

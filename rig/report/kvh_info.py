@@ -32,7 +32,7 @@ class KvhInfo:
 
 
 def print_kvh_info(found: KvhInfo, *, as_json: bool) -> None:
-    """On stdout: lines for people, JSON of schema "rig.kvh/1" for machines."""
+    """Print what the instrument says on stdout: lines for people, JSON of schema "rig.kvh/1" for machines."""
     if as_json:
         print(json.dumps({"schema": "rig.kvh/1", **asdict(found)}, indent=2))
         return

@@ -30,7 +30,7 @@ class Column:
 
     @property
     def axis(self) -> str:
-        """Its axis."""
+        """The axis that the column is of."""
         return "xyz"[self.place % 3]
 
 
@@ -48,7 +48,7 @@ class Line:
 
 @dataclass(frozen=True, slots=True)
 class PrintedBudget:
-    """Of one scale factor and of one bias: those of the axes with the largest U, of scale factors relative to them."""
+    """One scale factor's budget and one bias': of the axes with the largest U, scale factors' relative to them."""
 
     columns: tuple[Column, Column]
     lines: tuple[Line, ...]
@@ -72,13 +72,13 @@ def printed_budget(budget: BudgetEntry, scale: Sequence[float], bias: Unit) -> P
 
 
 def shown_places(budget: BudgetEntry, scale: Sequence[float]) -> tuple[int, int]:
-    """Of the scale factor and of the bias that the budget is printed for, among kx ky kz bx by bz."""
+    """Places of the scale factor and the bias that the budget is printed for, among kx ky kz bx by bz."""
     return int(np.argmax(np.divide(budget.expanded[:3], scale))), 3 + int(np.argmax(budget.expanded[3:]))
 
 
 @dataclass(frozen=True, slots=True)
 class _Size:
-    """In what a column's numbers are printed, so that they can be added up: times `factor`, with so many decimals."""
+    """The unit of a column's numbers, so printed that they can be added up: times `factor`, with so many decimals."""
 
     unit: str
     factor: float

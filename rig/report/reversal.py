@@ -17,13 +17,13 @@ from rig.station.plain_text import plain
 
 
 def reversal_document(found: Mapping[str, MagnetometerReversal]) -> ReversalDocument:
-    """In SI units."""
+    """What turning magnetometers over has told, in SI units."""
     entries = {name: _entry(each) for name, each in found.items()}
     return ReversalDocument.model_validate({"schema": "rig.reversal/1", "magnetometers": entries})
 
 
 def print_reversal(document: ReversalDocument, *, as_json: bool) -> None:
-    """On stdout: tables for people, JSON of schema "rig.reversal/1" for machines."""
+    """Print the reversals on stdout: tables for people, JSON of schema "rig.reversal/1" for machines."""
     if as_json:
         print(document.text())
         return

@@ -17,7 +17,7 @@ class Rounded:
 
     @property
     def value_text(self) -> str:
-        """With the sign of a bias below zero that typesetters use."""
+        """The value in print, with the minus sign that typesetters use."""
         return f"{self.value:f}".replace("-", "−")
 
     @property
@@ -60,7 +60,7 @@ def power_of_ten(exponent: int) -> str:
 
 
 def percent(share: float) -> str:
-    """Of the variance."""
+    """A share of the variance, in percent."""
     return "<\u00a00.1\u00a0%" if share < 0.001 else f"{100 * share:.1f}\u00a0%"
 
 

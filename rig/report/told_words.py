@@ -27,12 +27,12 @@ def told_lines(found: Sequence[ToldFromEntry]) -> Iterator[str]:
 
 
 def told_words(found: Sequence[ToldFromEntry]) -> str:
-    """All of it in one sentence."""
+    """All that would be told, and from what size on, in one sentence."""
     return "; ".join(f"{each.what}: {size_words(each.size, each.unit)}{_off_by(each)}" for each in found)
 
 
 def size_words(size: float | None, unit: str) -> str:
-    """With two significant digits."""
+    """A size in its unit with two significant digits; "never" without one."""
     if size is None:
         return "never"
     factor, shown = FACTORS.get(unit, (1.0, f" {unit}"))

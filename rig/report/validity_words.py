@@ -12,7 +12,7 @@ ALIKE = 0.005  # of a rate: what the arm's timing and a sensor that leans by 5°
 
 
 def when_words(found: WhenEntry) -> str:
-    """At what temperature, and over what time, a value is a mean."""
+    """The temperature at which, and the time over which, a value is a mean, in words."""
     began, ended = (datetime.fromisoformat(each) for each in (found.from_utc, found.to_utc))
     day = f"{began:%Y-%m-%d} "
     until = f"{ended:%H:%M:%S}" if ended.date() == began.date() else f"{ended:%Y-%m-%d %H:%M:%S}"
@@ -30,7 +30,7 @@ def speed_words(sensor: SensorEntry) -> str:
 
 
 def load_words(sensor: SensorEntry) -> str | None:
-    """With what rates its own axes were loaded, °/s; None where these are the speeds of the sweeps."""
+    """The rates with which a gyroscope's own axes were loaded, °/s; None where these are the speeds of the sweeps."""
     loads, speeds = sensor.loads_rad_s, sensor.speeds_rad_s
     if loads is None or not speeds:
         return None

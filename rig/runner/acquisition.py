@@ -57,7 +57,7 @@ class SensorCount:
 
     @property
     def seen(self) -> SensorSamples:
-        """As it is told."""
+        """What the page and the terminal are told of the sensor's samples."""
         if self.column == "field_counts":
             return SensorSamples(self.name, self.samples, self.lost, None, self.latest)
         return SensorSamples(

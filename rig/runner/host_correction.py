@@ -25,7 +25,7 @@ class HostCorrected:
 
     @property
     def sensors(self) -> dict[str, Recorded]:
-        """As of `SampleSource`: rates in the same counts, corrected, without accelerations; fields as they come."""
+        """Sensors as of `SampleSource`: rates in the same counts, corrected, no accelerations; fields as they come."""
         return {
             name: corrected(sensor, self.calibration, sensor.sensitivity_rad_s_per_count)
             if isinstance(sensor, RecordedSensor)
@@ -34,11 +34,11 @@ class HostCorrected:
         }
 
     def start(self) -> None:
-        """As of `SampleSource`."""
+        """Start the source's samples, as of `SampleSource`."""
         self.source.start()
 
     def check(self, clock_s: float | None = None) -> None:
-        """As of `SampleSource`."""
+        """Check the source, as of `SampleSource`."""
         self.source.check(clock_s)
 
 

@@ -51,7 +51,7 @@ class BoardCalibration:
                 self.note(BoardRecalled(name, sweep))
 
     def begin(self) -> None:
-        """Before the first sample: the host keeps what it sees, for the clock of the first sweep."""
+        """Make the host keep what it sees, from before the first sample, for the clock of the first sweep."""
         self.acquisition.keep()
 
     def keep(self, sweep: Sweep) -> None:
@@ -73,7 +73,7 @@ class BoardCalibration:
             self.note(BoardObserved(name, sweep.index, speed_rad_s, found))
 
     def solve(self) -> None:
-        """After the last sweep: the board's solution by either method."""
+        """Note the board's solution by either method, after the last sweep."""
         for name, (index, _) in self.sensors.items():
             for method in METHODS:
                 self.note(BoardSolved(name, self.board.solve(index, method)))

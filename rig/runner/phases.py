@@ -188,7 +188,7 @@ def _with_notes(what: str, error: BaseException) -> str:
 
 
 def _notes(error: BaseException | None) -> Iterator[str]:
-    """Those of what ended the run, and of what it interrupted: a second Ctrl-C comes while the first is handled."""
+    """The notes of what ended the run, and of what it interrupted: a second Ctrl-C comes while the first is handled."""
     while error is not None:
         yield from getattr(error, "__notes__", ())
         error = None if error.__suppress_context__ else error.__context__

@@ -46,7 +46,7 @@ class BoardSource:
 
     @property
     def sensors(self) -> Mapping[str, Recorded]:
-        """As of `SampleSource`."""
+        """The board's sensors by name, as of `SampleSource`."""
         return {
             **{name: sensor.described for name, sensor in self.set_up.items()},
             **{name: magnetometer.described for name, magnetometer in self.magnetometers.items()},
@@ -58,11 +58,11 @@ class BoardSource:
         return {name: sensor.stored for name, sensor in self.set_up.items() if sensor.stored is not None}
 
     def start(self) -> None:
-        """As of `SampleSource`; what is stored corrects."""
+        """Start the board's samples, as of `SampleSource`; what is stored corrects."""
         self.board.start([self.set_up[name].index for name in self.stored])
 
     def check(self, clock_s: float | None = None) -> None:
-        """As of `SampleSource`. Raises BoardError."""
+        """Check the board, as of `SampleSource`. Raises BoardError."""
         self.board.check(clock_s)
 
 
@@ -147,7 +147,7 @@ def _corrected(board: Board, name: str, section: SensorSection) -> BoardSensor:
 
 
 def corrected(sensor: RecordedSensor, calibration: Calibration, sensitivity_rad_s: float) -> RecordedSensor:
-    """The same sensor when its rates come corrected, in counts of that size and without accelerations."""
+    """The sensor when its rates come corrected, in counts of that size and without accelerations."""
     limit_rad_s = sensor.full_scale_counts * sensor.sensitivity_rad_s_per_count
     bias_rad_s = np.abs(calibration.bias_rad_s)
     # What a saturated reading becomes, at least: the other axes may read anything beside it.

@@ -268,7 +268,7 @@ class NotRemembered:
 
 @dataclass(frozen=True, slots=True)
 class Advice:
-    """After a failure: the data are kept in `folder`, from which the run goes on, or `repeats` its refused sweeps."""
+    """What to do after a failure: the data are in `folder`, from which the run goes on, or `repeats` refused sweeps."""
 
     folder: Path
     repeats: bool

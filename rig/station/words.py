@@ -62,7 +62,7 @@ def line(event: RunEvent) -> str | None:
 
 
 def _of_the_outcome(event: RunEvent) -> str | None:
-    """The same of what is told when nothing moves any more."""
+    """An event in words, of those told when nothing moves any more; None says nothing."""
     text: str | None
     match event:
         case CalibrationStored(sensor, part, serial_number, record):

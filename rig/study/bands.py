@@ -37,7 +37,7 @@ class _Condition:
 
 
 def _conditions() -> list[_Condition]:
-    """Both estimators on whole turns; Algorithm 1 once more with white vibration."""
+    """The conditions: both estimators on whole turns; Algorithm 1 once more with white vibration."""
     kinds: tuple[tuple[sim.Vibration, str], ...] = (
         ("whole_turns", "algorithm_1"),
         ("whole_turns", "levenberg_marquardt"),

@@ -71,7 +71,7 @@ RATIOS = np.round(np.concatenate([np.arange(0.02, 0.48, 0.02), np.arange(0.48, 0
 
 
 def study(settings: Settings) -> Report:
-    """Without noise, hence without random numbers: `settings` change nothing."""
+    """How the estimators converge without noise, hence without random numbers: `settings` change nothing."""
     rows = []
     for name, example in TABLE_I.items():
         for speed in (sim.FAST_RAD_S, example.speed_rad_s, sim.ARM_RAD_S):

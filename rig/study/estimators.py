@@ -87,7 +87,7 @@ def _gyroscope_rows(ratios: Array) -> Iterator[dict[str, Any]]:
 
 
 def _rate_table(runs: int, rng: np.random.Generator, _: int) -> dict[str, Array]:
-    """By estimator, (2, 15 or 18): mean squared error of each parameter over its bound, and itself."""
+    """Estimators on a rate table, (2, 15 or 18): mean squared error of each parameter over its bound, and itself."""
     turned = rt.attitudes(TABLE_POSES)
     found = {}
     rates = 0.5 * np.random.default_rng(TABLE_POSES).normal(size=(TABLE_POSES, 3))  # rad/s, the same in every run

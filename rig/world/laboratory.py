@@ -140,7 +140,7 @@ class Laboratory:
         return self.arm.tick_s
 
     def _element_of(self, name: str, sensor: SensorTruth) -> MotionAt:
-        """The same, of a sensor on the board, which can be broken."""
+        """What a sensor on the board feels, which can be broken."""
         return self._elements.setdefault(name, SensingElement(self._motion_of(sensor)))
 
     def _motion_of(self, sensor: SensorTruth) -> MotionAt:

@@ -47,7 +47,7 @@ class Dipole:
     moment_a_m2: Vector
 
     def at(self, place_m: Vector, frames: Frames) -> Vector:
-        """Its flux density in tesla at a place in the base frame; a place inside it counts as its surface, 1 mm off."""
+        """The iron's flux density in tesla at a place in the base frame; inside it that at its surface, 1 mm off."""
         rotation, origin = frames[self.carried_by]
         source, moment = _turned(rotation, self.place_m), _turned(rotation, self.moment_a_m2)
         x, y, z = (here - from_base - there for here, from_base, there in zip(place_m, origin, source, strict=True))

@@ -19,7 +19,7 @@ class Site:
 
 
 def site_of(section: SiteSection) -> Site:
-    """As the section has it."""
+    """The site as its section has it."""
     rate = EARTH_RATE_RAD_S if section.latitude_deg is not None else 0.0
     latitude = radians(section.latitude_deg or 0.0)
     return Site(

@@ -25,12 +25,12 @@ class RigEffect:
 
     @property
     def expanded(self) -> float:
-        """For 95 %."""
+        """Expanded uncertainty of the effect, for 95 %."""
         return self.coverage_factor * self.std
 
 
 def rig_effects(rigs: Sequence[str], sensors: Sequence[str], values: Array, std: Array) -> tuple[RigEffect, ...]:
-    """Of results (n,) with stds (n,), each by one of `rigs` (n) of one of `sensors` (n).
+    """The effects of rigs on results (n,) with stds (n,), each by one of `rigs` (n) of one of `sensors` (n).
 
     The two-way model value = sensor + rig + run, runs random (`random_effects.fit`). Within each group of rigs that
     sensors connect, the effects are relative to the rig with the most results; a rig that shares no sensor has none.

@@ -99,7 +99,7 @@ def reversal_rows(found: ReversalEntry) -> list[ReversalRow]:
 
 
 def drift_rows(found: DriftEntry) -> list[DriftRow]:
-    """In the drift's own unit, with U."""
+    """The rows of a drift, in its own unit, with U."""
     bias, std = (np.array([getattr(each.held, name) for each in found.repeats]) for name in ("bias", "std"))
     whole = np.hypot(std, found.common_std)  # what all repeats share is no part of a change
     changed, slope = largest_change_std(bias, std), found.over_temperature

@@ -55,7 +55,7 @@ class Block:
 
 @dataclass(frozen=True, slots=True)
 class Certificate:
-    """All of it. `marks` are what must stand across every page; without any it is a certificate to be signed.
+    """All that a certificate says. `marks` must stand across every page; without any it is one to be signed.
 
     `reversals` are what turning magnetometers over has told, by the magnetometer's name.
     """
@@ -109,7 +109,7 @@ class Certificate:
 
     @property
     def magnetometers(self) -> Mapping[str, MagnetometerEntry]:
-        """Those that were calibrated."""
+        """The magnetometers that were calibrated."""
         found = self.result.magnetometers.items()
         return {name: each for name, each in found if isinstance(each, MagnetometerEntry)}
 
@@ -207,7 +207,7 @@ def _title(result: ResultDocument, gyroscopes: Sequence[Gyroscope]) -> str:
 
 
 def _without_uncertainty(result: ResultDocument, gyroscopes: Sequence[Gyroscope]) -> Iterator[str]:
-    """Of recordings of before there was a budget, and of estimators that tell of noise alone."""
+    """Sensors of which noise alone is known: in recordings of before there was a budget, and by some estimators."""
     yield from (each.name for each in gyroscopes if not each.has_uncertainty)
     at_rest = {**result.accelerometers, **result.magnetometers}
     for name, each in at_rest.items():

@@ -110,7 +110,7 @@ def _measured(c: Certificate) -> Iterator[Measured]:
 
 
 def _keys(found: Iterable[Measured]) -> dict[tuple[str, str], str]:
-    """Of every item, by what it is and its name: items of a kind are numbered."""
+    """The key of every item, by what it is and its name: items of a kind are numbered."""
     keys: dict[tuple[str, str], str] = {}
     for each in found:
         of = each.item, each.sensor

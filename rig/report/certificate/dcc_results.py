@@ -69,7 +69,7 @@ def magnetometer(found: MagnetometerEntry, turned: ReversalEntry | None) -> Iter
 
 
 def _reversed(found: ReversalEntry) -> Iterator[Element]:
-    """Its own bias and the arm's field, with the covariance of both."""
+    """A turned magnetometer's own bias and the arm's field, with the covariance of both."""
     mixed = [axis for axis, held in zip(AXES, found.arm_field_in_bias, strict=True) if held]
     began = ", ".join(run.started_utc for run in found.runs)
     said = f"From runs of {began}, between which it was turned over. ± U"
@@ -87,7 +87,7 @@ def _reversed(found: ReversalEntry) -> Iterator[Element]:
 
 
 def bias_drift(found: DriftEntry) -> Iterator[Element]:
-    """Of each repeat, and over temperature where it could be told."""
+    """The bias of each repeat, and over temperature where it could be told."""
     unit = RATE if found.unit == "rad/s" else ACCELERATION
     labels = [str(number) for number in range(1, len(found.repeats) + 1)]
     for i, axis in enumerate(AXES):
@@ -171,14 +171,14 @@ def _told(found: Sequence[ToldFromEntry]) -> str:
 
 
 def _speed(sensor: SensorEntry) -> str:
-    """At what rates it was found."""
+    """The rates at which a gyroscope was calibrated, in words."""
     loads = load_words(sensor)
     along = "" if loads is None else f"; along the item's own axes the sweeps turned it by {loads} °/s"
     return f"At {speed_words(sensor)} °/s{along}. " if sensor.speeds_rad_s else ""
 
 
 def _expanded(budget: BudgetEntry) -> tuple[Expanded, Expanded]:
-    """Of scale factors and of biases."""
+    """The expanded uncertainties of scale factors and of biases."""
     of = budget.expanded, budget.factors, budget.probabilities
     return Expanded(*(each[:3] for each in of)), Expanded(*(each[3:] for each in of))
 

@@ -70,7 +70,7 @@ class Contributions:
 
 
 def residuals(sensor: SensorEntry) -> Residuals | None:
-    """None where the vector model has no solution, or its residuals are not those of the sweeps and rests here."""
+    """A gyroscope's residuals; None where the vector model has none, or they are of other sweeps and rests."""
     vector = sensor.vector_model
     averages: list[ObservationEntry | AverageEntry] = [*sensor.observations, *sensor.rests]
     if isinstance(vector, ErrorEntry) or len(vector.residuals_rad_s) != len(averages) or not averages:
@@ -96,7 +96,7 @@ def acceleration_residuals(found: AccelerometerEntry) -> Residuals:
 
 
 def field_residuals(found: MagnetometerEntry) -> Residuals:
-    """The same of a magnetometer."""
+    """A magnetometer's residuals, with what was expected of them."""
     left = np.array([each.residual_t for each in found.dwells])
     expected = [each.residual_std_t for each in found.dwells if each.residual_std_t is not None]
     if len(expected) == len(left):

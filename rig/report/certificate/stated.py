@@ -21,7 +21,7 @@ NOTHING = CertificateSection()
 
 @dataclass(frozen=True, slots=True)
 class Stated:
-    """None is "not stated": nothing is invented. `simulated` says that a simulated laboratory stood at the far end."""
+    """What the laboratory states; None is "not stated". `simulated` says that a simulated one stood at the far end."""
 
     site: SiteSection | None = None
     certificate: CertificateSection = NOTHING

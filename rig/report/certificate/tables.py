@@ -63,7 +63,7 @@ def pair(value: float, uncertainty: float) -> Pair:
 
 
 def axis_rows(sensor: SensorEntry) -> list[AxisRow]:
-    """With U of the budget; without one, with the standard deviation of the noise, which the page then calls so."""
+    """A gyroscope's axes with U of the budget; without one, with the noise's deviation, as the page then says."""
     spread, (_, factor) = _spread(sensor), degrees_of(sensor)
     return [
         AxisRow(
@@ -77,7 +77,7 @@ def axis_rows(sensor: SensorEntry) -> list[AxisRow]:
 
 
 def degrees_of(sensor: SensorEntry) -> tuple[str, float]:
-    """In which unit the biases are printed beside rad/s, and what takes rad/s there: hours where it is a fine one."""
+    """The unit that biases are printed in beside rad/s, and what takes rad/s there: hours where it is a fine one."""
     return ("°/s", DEG) if DEG * max(_spread(sensor)[3:]) >= FINE_DEG_S else ("°/h", 3600 * DEG)
 
 

@@ -20,17 +20,17 @@ def in_budget(budget: BudgetEntry | None, name: str) -> bool:
 
 
 def left_out_of_rates(sensor: SensorEntry) -> str:
-    """Of a gyroscope's U."""
+    """What a gyroscope's U leaves out."""
     return ", ".join(ALWAYS if sensor.nonlinearity is not None else ("nonlinearity at other speeds", *ALWAYS))
 
 
 def left_out_of_accelerations(found: AccelerometerEntry) -> str:
-    """Of an accelerometer's U."""
+    """What an accelerometer's U leaves out."""
     bent = "nonlinearity" if found.second_order_s2_m is None else "nonlinearity beyond the second order"
     bent = "nonlinearity beyond gravity's size" if in_budget(found.budget, "nonlinearity") else bent
     return ", ".join((bent, *ALWAYS))
 
 
 def left_out_of_fields() -> str:
-    """Of a magnetometer's U; what it reads of the arm is told beside its bias."""
+    """What a magnetometer's U leaves out; what it reads of the arm is told beside its bias."""
     return ", ".join(("nonlinearity", "iron magnetised since", *ALWAYS))

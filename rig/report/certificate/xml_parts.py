@@ -41,7 +41,7 @@ def words(name: str, text: str | date | None) -> Element:
 
 
 def text(name: str, said: str | None) -> Element:
-    """The same where the schema wants a text in a language."""
+    """An element with a text, where the schema wants it in a language."""
     content = dcc("content", lang="en")
     content.text = _plain(said)
     return dcc(name, content)
@@ -117,7 +117,7 @@ def _covariance(matrix: Sequence[Sequence[float]], units: Sequence[str]) -> Elem
 
 
 def product(first: str, second: str) -> str:
-    """Of two units as D-SI writes them, `\\one` among them."""
+    """The product of two units as D-SI writes them, `\\one` among them."""
     if r"\one" in (first, second):
         return second if first == r"\one" else first
     if first != second:

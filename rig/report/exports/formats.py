@@ -38,7 +38,7 @@ def writer_of_readings(name: str) -> "ReadingsWriter":
 
 
 def texts_of_calibrations(name: str) -> "CalibrationTexts":
-    """The same of calibrations."""
+    """What makes the texts of a format that takes calibrations."""
     found: CalibrationTexts = _named(OF_CALIBRATIONS[name])
     return found
 

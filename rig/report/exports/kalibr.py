@@ -16,7 +16,7 @@ from rig.report.exports.parameters import Exported, comments, exported
 
 
 def kalibr_files(result: ResultDocument) -> Mapping[str, str]:
-    """For each sensor `…_imu.yaml` (noise) and `…_intrinsics.yaml`."""
+    """Kalibr's files: for each sensor `…_imu.yaml` (noise) and `…_intrinsics.yaml`."""
     files = {}
     sensors = exported(result)
     names = plain_names(each.name for each in sensors)

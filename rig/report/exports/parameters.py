@@ -109,7 +109,7 @@ def _accelerometer(found: AccelerometerEntry) -> Triad:
 
 
 def _density(noises: Sequence[tuple[Sequence[float], int]], rate_hz: float) -> float | None:
-    """Of the axis with most noise: σ of one sample over √rate, as if it were white up to half the rate."""
+    """Noise density of the noisiest axis: σ of one sample over √rate, as if it were white up to half the rate."""
     if not noises:
         return None
     squares = np.average([np.square(noise) for noise, _ in noises], axis=0, weights=[count for _, count in noises])

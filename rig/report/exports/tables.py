@@ -34,7 +34,7 @@ class Table:
 
 
 def tables_of(recordings: Sequence[ObservedRun]) -> Iterator[Table]:
-    """Of each recording the arm, of each sensor its readings, its accelerations if it has any, and its sweeps; of each
+    """The tables of each recording: the arm, of each sensor readings, accelerations if any, and sweeps; of each
     magnetometer its readings.
     """
     for number, recording in enumerate(recordings, start=1):

@@ -50,7 +50,7 @@ def _shown(found: Found[DriftEntry]) -> Shown:
 
 
 def _followed(found: Found[DriftEntry], document: ResultDocument) -> Followed | None:
-    """Of results that say whose bias it is."""
+    """What is followed of a drift, in results that say whose bias it is."""
     entry, slope = found.entry, found.entry.over_temperature
     if entry.part is None or entry.serial_number is None or entry.full_scale is None:
         return None

@@ -20,7 +20,7 @@ def _found(document: ResultDocument) -> Iterator[Found[EarthRateEntry]]:
 
 
 def _shown(found: Found[EarthRateEntry]) -> Shown:
-    """Its parts in the axes of the arm's base."""
+    """The Earth's rate in the axes of the arm's base."""
     entry, unit = found.entry, RATE.drift
     widths = expanded(_stds(entry), entry.freedoms(3)).widths
     name = f"{found.sensor}: the Earth's rate in the arm's base"

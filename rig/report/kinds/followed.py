@@ -133,7 +133,7 @@ def parameters(
 
 
 def known(found: Sequence[Parameter]) -> tuple[Parameter, ...]:
-    """Those with an uncertainty: of another, nothing can be said over time."""
+    """The parameters with an uncertainty: of another, nothing can be said over time."""
     return tuple(each for each in found if each.std_statistical > 0)
 
 

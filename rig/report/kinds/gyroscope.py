@@ -91,7 +91,7 @@ def _measured(found: Found[SensorEntry], _: object) -> Measured | None:
 
 
 def _beside(sensor: SensorEntry) -> Iterator[str]:
-    """At what speeds it holds, what the other estimators make of it, and what the vector model says about the axes."""
+    """What stands beside a gyroscope's values: speeds, the other estimators, what the vector model says of the axes."""
     yield from _speeds(sensor)
     if sensor.scale_at is not None and sensor.bias_at is not None:
         yield f"scale: {when_words(sensor.scale_at)}"

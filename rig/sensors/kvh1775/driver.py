@@ -197,7 +197,7 @@ class Kvh1775:
 
     # -- the dialogue ----------------------------------------------------------------------------------------------
     def _configure(self) -> None:
-        """Into configuration mode, from whichever it is in."""
+        """Bring the instrument into configuration mode, from whichever it is in."""
         try:
             self._ask("=CONFIG,1", "CONFIG")
         except SensorError as error:

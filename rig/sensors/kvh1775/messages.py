@@ -176,7 +176,7 @@ def encode(
 
 
 def encode_one(name: Format, rotation: Sequence[float], acceleration_g: Sequence[float], **tail: float) -> bytes:
-    """The same of one message, without arrays; `tail` holds every other field of the format, and may hold more."""
+    """The bytes of one message, without arrays; `tail` holds every other field of the format, and may hold more."""
     packer, fields = _PACKERS[name]
     data = packer.pack(_HEADERS[name], *rotation, *acceleration_g, *[tail[field] for field in fields])
     return data + _crc(data.translate(_BITS_REVERSED))

@@ -44,7 +44,7 @@ class Wanted:
 
     @property
     def settings(self) -> Mapping[str, str]:
-        """By name, those that are corrected."""
+        """The settings that are corrected, by name."""
         return {
             "MSYNC": "IMU",
             "DR": f"{self.rate_hz:g}",

@@ -74,11 +74,11 @@ class Kvh1775Source:
         return {self._name: self._described, **field}
 
     def start(self) -> None:
-        """As of `SampleSource`."""
+        """Start the instrument's samples, as of `SampleSource`."""
         self._driver.start(self._wanted)
 
     def check(self, clock_s: float | None = None) -> None:
-        """As of `SampleSource`. Raises SensorError as `Kvh1775.check`, and `kvh_axis_invalid`."""
+        """Check the instrument, as of `SampleSource`. Raises SensorError as `Kvh1775.check`, and `kvh_axis_invalid`."""
         self._driver.check(clock_s)
 
     def close(self) -> None:
@@ -86,7 +86,7 @@ class Kvh1775Source:
         self._driver.close()
 
     def _take(self, messages: NDArray[Any], numbers: NDArray[Any], times_us: NDArray[Any], host_time_s: float) -> None:
-        """On the reader's thread: what is valid, as samples. Nothing says of the field whether it is."""
+        """Hand over what is valid, as samples, on the reader's thread. Nothing says of the field whether it is."""
         if self._field is not None:
             fields = self._field_reader.feed(messages, numbers, times_us, host_time_s)
             if len(fields):
@@ -178,7 +178,7 @@ def describe(section: SensorSection) -> RecordedSensor:
 
 
 def describe_field(name: str, section: SensorSection) -> RecordedMagnetometer | None:
-    """The same of its magnetometer; None where its messages have no field."""
+    """How a recording describes the instrument's magnetometer; None where its messages have no field."""
     if _line_of(section).message != "C":
         return None
     described = describe(section)
@@ -217,7 +217,7 @@ def look(name: str, section: SensorSection) -> Iterator[str | SensorError]:
 
 
 def sample_dtype(sensor: RecordedSensor) -> np.dtype[Any]:
-    """Of its samples."""
+    """The type of a sensor's samples."""
     return IMU_SAMPLE_DTYPE if sensor.has_acceleration else SAMPLE_DTYPE
 
 

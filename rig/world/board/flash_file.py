@@ -55,5 +55,5 @@ def _check(data: bytes) -> None:
 
 
 def _save(memory: FlashMemory, path: Path) -> None:
-    """In one go: whoever reads the file meets the old flash or the new one."""
+    """Save the flash in one go: whoever reads the file meets the old flash or the new one."""
     write_new(path, bytes(memory.data) + b"".join(struct.pack("<I", offset) for offset in sorted(memory.torn)))

@@ -12,7 +12,7 @@ from rig.world.site import Vector
 
 
 class MountedMagnetometer:
-    """One of them; `truth` are its errors.
+    """A magnetometer mounted on the flange; `truth` are its errors.
 
     It sits as `mounting` says, off by the rotation vector `mounting_error_deg`, `offset_mm` from the flange's centre.
     """

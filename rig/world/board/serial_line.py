@@ -37,14 +37,14 @@ class Device(Protocol):
 
     @property
     def baud_rate(self) -> float | None:
-        """None while it neither sends nor hears."""
+        """The device's baud rate; None while it neither sends nor hears."""
 
     def transmitted(self) -> bytes: ...
     def receive(self, data: bytes) -> None: ...
 
 
 class SerialLine:
-    """Between a device of the laboratory (None: it has no power) and the host's end.
+    """A line between a device of the laboratory (None: it has no power) and the host's end.
 
     `host_baud` is the host's baud rate where the transport does not tell (None: the same as the device's); a `silent`
     line loses everything both ways; of what the device sends, each bit is wrong with the probability `bit_error_rate`.

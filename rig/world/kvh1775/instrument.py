@@ -25,7 +25,7 @@ PERFECT = MagnetometerTruth()
 
 
 def no_field(time_s: float) -> Sequence[float]:
-    """As in a chamber that keeps it out."""
+    """No magnetic field, as in a chamber that keeps it out."""
     return 0.0, 0.0, 0.0
 
 
@@ -78,7 +78,7 @@ class Kvh1775:
 
     @property
     def baud_rate(self) -> float:
-        """Of both directions."""
+        """The baud rate of both directions."""
         return float(self._memory["BAUD"])
 
     def transmitted(self) -> bytes:
@@ -196,5 +196,5 @@ class Kvh1775:
 
 
 def _another(seed: np.random.SeedSequence) -> np.random.SeedSequence:
-    """For the magnetometer's noise, so that it leaves that of the other triads as it is."""
+    """A seed for the magnetometer's noise, so that it leaves that of the other triads as it is."""
     return np.random.SeedSequence(seed.entropy, spawn_key=(*seed.spawn_key, 1775))

@@ -63,7 +63,7 @@ class Mount:
 
 
 def mounts(config: RigConfig, world: WorldSection) -> dict[str, Mount]:
-    """By sensor name, each as its last user left it. Raises `Refused` `kvh_settings` for what it cannot be set to."""
+    """Instruments by sensor name, each as its last user left it. Raises `Refused` `kvh_settings` for what is none."""
     found = {}
     for name in sorted(world.sensors.keys() - config.on_board.keys()):
         try:

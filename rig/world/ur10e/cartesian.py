@@ -29,7 +29,7 @@ def _twist(q: Sequence[float] | Array, rotation: Array, position: Array, links: 
 
 
 def _length(twist: Array) -> float:
-    """Of a way, m."""
+    """The length of a way, m."""
     return max(hypot(*twist[:3]), LEVER_M * hypot(*twist[3:]))
 
 

@@ -16,7 +16,7 @@ Components = tuple[Any, Any, Any]  # x, y, z: floats, or arrays of one shape
 
 
 class Felt(NamedTuple):
-    """In the flange's axes, at its origin: rate (rad/s) and its change (rad/s²) against the stars, and specific force
+    """What the flange feels at its origin, in its axes: rate (rad/s) and its change (rad/s²) against the stars, force
     (m/s²)."""
 
     rate_rad_s: Components
@@ -27,7 +27,7 @@ class Felt(NamedTuple):
 def felt(
     q_rad: Sequence[float], qd_rad_s: Sequence[float], qdd_rad_s2: Sequence[float], links: Links, site: Site
 ) -> Felt:
-    """Of one instant: angles, speeds and accelerations of the six joints."""
+    """What the flange feels at one instant, from angles, speeds and accelerations of the six joints."""
     return felt_of_turns(turns_of(q_rad, links), qd_rad_s, qdd_rad_s2, links, site)
 
 
@@ -40,7 +40,7 @@ def turns_of(q_rad: Sequence[float], links: Sequence[Link]) -> list[tuple[float,
 def felt_of_turns(
     turns: Sequence[tuple[Any, Any]], qd_rad_s: Sequence[Any], qdd_rad_s2: Sequence[Any], links: Links, site: Site
 ) -> Felt:
-    """The same of cosine and sine of each joint's whole angle, its `theta_rad` included."""
+    """What the flange feels, from cosine and sine of each joint's whole angle, its `theta_rad` included."""
     return carried(base(site), turns, qd_rad_s, qdd_rad_s2, links)
 
 

@@ -50,7 +50,7 @@ class Errors:
 
 
 class JointErrors:
-    """Of all six joints. `step` remembers where they turn back and when they stop; `at` gives the true joints."""
+    """Errors of all six joints. `step` remembers where they turn back and when they stop; `at` has the true joints."""
 
     def __init__(self, errors: Errors, random: Random) -> None:
         self._errors = errors
@@ -109,7 +109,7 @@ class JointErrors:
     def _carried(
         self, q_rad: Joints, qd_rad_s: Joints, qdd_rad_s2: Joints
     ) -> tuple[list[float], list[float], list[float]]:
-        """The same without vibration and settling."""
+        """The true joints without vibration and settling."""
         angles, speeds, accelerations = list(q_rad), list(qd_rad_s), list(qdd_rad_s2)
         for joint, (e, speed) in enumerate(zip(q_rad, qd_rad_s, strict=True)):
             if self._placed[joint][0] != e or not self._known[joint]:  # most moves turn few joints
@@ -133,7 +133,7 @@ class JointErrors:
         )
 
     def _hysteresis(self, joint: int, e: float) -> tuple[float, float, float]:
-        """Its lag, rad, and the two derivatives by the encoder's angle."""
+        """The joint's lag, rad, and the two derivatives by the encoder's angle."""
         turned_at, lag = self._reversal[joint]
         end = 0.5 * self._errors.hysteresis_rad * self._direction[joint]
         left = (lag - end) * exp(-abs(e - turned_at) / REVERSAL_RAD)

@@ -102,7 +102,7 @@ class Motion:
 
     @property
     def still(self) -> bool:
-        """Nothing moved in the whole of the last tick, and of those in memory."""
+        """Whether nothing moved in the whole of the last tick, and of those in memory."""
         return not self._stirred
 
     @property
@@ -155,7 +155,7 @@ class Motion:
         return self._joints(tick.offset, tick.gain, target, velocity, fraction)
 
     def with_accelerations(self, time_s: float) -> tuple[Joints, Joints, Joints]:
-        """The same with the joints' accelerations, those of the ripple included."""
+        """The joints' angles, speeds and accelerations, those of the ripple included."""
         if self.still:
             return self.now.q_rad, ZERO, ZERO
         tick, fraction, target, velocity, acceleration = self._played(time_s)

@@ -45,7 +45,7 @@ class Load:
 def load(
     joints: tuple[Joints, Joints, Joints], payload_kg: float, payload_centre_m: tuple[float, ...], links: Links
 ) -> Load:
-    """Of joints at angles (rad) with speeds (rad/s) and accelerations (rad/s²), and a payload in the flange's axes."""
+    """Load of joints at angles (rad), speeds (rad/s), accelerations (rad/s²), with a payload in the flange's axes."""
     q, qd, qdd = (np.array(each) for each in joints)
     masses = np.array([*MASSES_KG, payload_kg])
     rotations, places = _frames(q, links)

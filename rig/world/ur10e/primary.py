@@ -130,7 +130,7 @@ def _cartesian(robot: Robot) -> bytes:
 
 
 def _denavit_hartenberg(links: Links) -> list[float]:
-    """Of all six links a, d and alpha, as both sub-packages hold them."""
+    """The Denavit–Hartenberg parameters of all six links, a, d and alpha, as both sub-packages hold them."""
     return [*(link.a_m for link in links), *(link.d_m for link in links), *(link.alpha_rad for link in links)]
 
 

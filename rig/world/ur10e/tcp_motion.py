@@ -30,7 +30,7 @@ class TcpMotion:
 
 @lru_cache(maxsize=4)  # several outputs and several clients ask for the same
 def tcp_motion(q_rad: Joints, qd_rad_s: Joints, qdd_rad_s2: Joints, links: Links) -> TcpMotion:
-    """Of joints with these angles, speeds and accelerations."""
+    """The tool's motion with joints at these angles, speeds and accelerations."""
     _, change, force = felt(q_rad, qd_rad_s, qdd_rad_s2, links, UPRIGHT)
     if not any(qd_rad_s) and not any(qdd_rad_s2):
         return TcpMotion(ZERO, ZERO, force)
@@ -52,7 +52,7 @@ def elbow(q_rad: Joints, qd_rad_s: Joints, links: Links) -> tuple[Vector, Vector
 
 
 def _velocity(q_rad: Joints, qd_rad_s: Joints, links: Links) -> Vector:
-    """Of the origin behind the last link, from the places a moment before and after."""
+    """The velocity of the origin behind the last link, from the places a moment before and after."""
     before, after = (
         flange_pose([a + sign * v * STEP_S for a, v in zip(q_rad, qd_rad_s, strict=True)], links)[:3]
         for sign in (-1, 1)

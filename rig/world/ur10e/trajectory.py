@@ -11,7 +11,7 @@ ROUNDING_S = 1e-9  # so many seconds before its end a trajectory counts as over
 
 @dataclass(frozen=True, slots=True)
 class Piece:
-    """For `duration_s`: starts at `q_rad` with `qd_rad_s` and keeps the acceleration `qdd_rad_s2` (six joints each)."""
+    """A stretch of `duration_s`: starts at `q_rad` with `qd_rad_s`, keeps `qdd_rad_s2` (six joints each)."""
 
     duration_s: float
     q_rad: Joints

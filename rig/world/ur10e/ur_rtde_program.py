@@ -28,7 +28,7 @@ Command = Callable[[], Steps]
 
 @dataclass(frozen=True, slots=True)
 class Speed:
-    """Of the joints, rad/s and rad/s²; `of_tool`: of the tool in the base's frame, m/s, rad/s and m/s²."""
+    """Speed the joints are to have, rad/s and rad/s²; `of_tool`: the tool in the base's frame, m/s, rad/s and m/s²."""
 
     speed: Joints
     acceleration: float

@@ -25,7 +25,7 @@ def questions(robot: Robot, registers: Registers) -> dict[int, Callable[[], None
         return registers.doubles(6, 6)
 
     def joints(nearest: Joints) -> Joints:
-        """That bring the tool to the asked pose."""
+        """The joints that bring the tool to the asked pose."""
         pose = registers.doubles(0, 6)
         finite([*pose, *nearest])
         return joints_for(robot.flange_for(pose), nearest, robot.links)

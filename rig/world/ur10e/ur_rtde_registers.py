@@ -6,7 +6,7 @@ from rig.world.ur10e.robot import Robot
 
 
 class Registers:
-    """Of one program: the first is number `offset` of the controller's."""
+    """The registers of one program: the first is number `offset` of the controller's."""
 
     def __init__(self, robot: Robot, offset: int) -> None:
         self._robot = robot
