@@ -98,7 +98,7 @@ class OutputRegisters:
                 self._output[2 * axis : 2 * axis + 2] = data[2 * axis : 2 * axis + 2]
 
     def read(self, index: int, *, block_update: bool) -> int:
-        """One byte."""
+        """One byte of the outputs."""
         axis, high = divmod(index, 2)
         value = self._output[index]
         if block_update:

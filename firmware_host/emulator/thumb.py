@@ -1,4 +1,4 @@
-"""Just enough of the Thumb instruction set to count instructions and to find those that Unicorn is too lenient with."""
+"""The Thumb instructions, as far as one must know them to count them and to find those Unicorn is too lenient with."""
 
 import struct
 from collections.abc import Iterator

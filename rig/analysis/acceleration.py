@@ -106,7 +106,7 @@ class AccelerometerResult:
 
     @property
     def lever_arm_std_m(self) -> Array | None:
-        """(3,) its standard deviations: a nominal mounting only renames the axes."""
+        """(3,) standard deviations of the lever arm: a nominal mounting only renames the axes."""
         if self.solution.lever_arm_m is None:
             return None
         std: Array = np.abs(np.array(self.sensor.mounting)).T @ np.sqrt(np.diag(self.solution.covariance)[LEVER])
@@ -260,7 +260,7 @@ def _swept(name: str, recordings: Sequence[ObservedRun]) -> list[SweptAccelerati
 
 
 def _noise_freedom(dwells: Sequence[DwellReading], swept: Sequence[SweptAcceleration]) -> Array:
-    """(3 N + 9 M,) of the readings of dwells, then of the harmonics of sweeps."""
+    """(3 N + 9 M,) degrees of freedom of the readings of dwells, then of the harmonics of sweeps."""
     still = [np.broadcast_to(dwell.reading.freedom, 3) for dwell in dwells]
     return np.concatenate([*still, *(np.full(9, float(each.harmonic.freedom)) for each in swept)])
 

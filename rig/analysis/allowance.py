@@ -224,7 +224,7 @@ def _of_speeds(pieces: Pieces) -> list[Array]:
 
 
 def _curved(stretches: Sequence[Stretch], matrix: Array, curve: Curve) -> Array:
-    """(6, N, 3) of one standard deviation, means of what was felt at each moment."""
+    """(6, N, 3) patterns of the curve's cube and square, one standard deviation each, from moment to moment."""
     found = []
     for stretch in stretches:
         edges = np.linspace(stretch.start_s, stretch.end_s, STEPS + 1)

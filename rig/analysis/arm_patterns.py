@@ -44,13 +44,13 @@ def arm_patterns(theta: Array, movement: Movement, stood: Sequence[Stood], known
 
 
 def arm_turns(stood: Sequence[Stood], arm: DenavitHartenberg, mounting: Array) -> Array:
-    """(18, 3 N + 10 M) of a `Movement`, for an arm that is off by δ = 1."""
+    """(18, 3 N + 10 M) `arm_turns` of a `Movement`, for an arm that is off by δ = 1."""
     turns: Array = ARM_SHARE * _shares()[:, None] * _all_turns(stood, arm, mounting)
     return turns
 
 
 def _shares() -> Array:
-    """(18,) of an error of the arm's, in each of its wrists'."""
+    """(18,) what an error of the arm's takes of each of its wrists' errors."""
     return np.tile(np.where(np.arange(ERRORS) < STEADY, 1.0, WAVE_SHARE), 3)
 
 
@@ -59,7 +59,7 @@ def _all_turns(stood: Sequence[Stood], arm: DenavitHartenberg, mounting: Array) 
 
 
 def _turns(stood: Stood, arm: DenavitHartenberg, mounting: Array) -> Array:
-    """(18, 3 or 10) of the errors that `effects` knows of a dwell or a sweep, by radian of each of the wrists'."""
+    """(18, 3 or 10) sizes of the errors that `effects` knows of a dwell or a sweep, by radian of each wrist's."""
     in_base = flange_errors(stood.q_rad, arm)
     in_flange = in_base @ (mounting @ flange_attitude(stood.q_rad, arm)).T
     if stood.wrist is None:

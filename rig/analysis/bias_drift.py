@@ -226,7 +226,7 @@ def _drift(
 
 
 def _noise_freedom(repeat: Sequence[Stand]) -> Array:
-    """(3,) of the mean over its attitudes."""
+    """(3,) degrees of freedom of a repeat's mean over its attitudes."""
     return effective_freedom([each.variance for each in repeat], [np.broadcast_to(each.freedom, 3) for each in repeat])
 
 

@@ -64,17 +64,17 @@ class SensorResult:
 
     @property
     def serial_number(self) -> str:
-        """The sensor's."""
+        """Serial number of the sensor that was calibrated."""
         return self.sensor.serial_number
 
     @property
     def scale(self) -> Array:
-        """(3,) by the chosen estimator: rate = scale × (reading + bias)."""
+        """(3,) scale factors by the chosen estimator: rate = scale × (reading + bias)."""
         return self.solution.scale
 
     @property
     def bias_rad_s(self) -> Array:
-        """(3,) by the chosen estimator."""
+        """(3,) biases by the chosen estimator."""
         return self.solution.bias_rad_s
 
     @property

@@ -34,7 +34,7 @@ class Reference:
 
     @property
     def correction_matrix(self) -> Array:
-        """(3, 3) K."""
+        """(3, 3) matrix K that corrects readings."""
         return np.diag(self.scale)
 
 

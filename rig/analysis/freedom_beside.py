@@ -27,7 +27,7 @@ NOISE, WANDERING, ATTITUDES = "noise", "bias instability", "arm's attitudes"
 
 
 def of_angles(result: SensorResult) -> Array | None:
-    """(6,) of a gyroscope's non-orthogonality, then of its mounting; None where nobody counts."""
+    """(6,) degrees of freedom of a gyroscope's non-orthogonality, then of its mounting; None where nobody counts."""
     explained, budget = result.explained, result.uncertainty
     if explained is None or budget is None or not budget.by_freedom:
         return None
@@ -39,7 +39,7 @@ def of_angles(result: SensorResult) -> Array | None:
 
 
 def of_sensitivity(result: SensorResult) -> Array | None:
-    """(3, 3) of what gravity adds to a gyroscope's readings; None where nobody counts or it was not found."""
+    """(3, 3) degrees of freedom of a gyroscope's sensitivity to gravity; None where nobody counts or without it."""
     explained, budget = result.explained, result.uncertainty
     if explained is None or budget is None or not budget.by_freedom:
         return None
@@ -52,13 +52,13 @@ def of_sensitivity(result: SensorResult) -> Array | None:
 
 
 def of_acceleration_angles(result: AccelerometerResult) -> Array | None:
-    """(3,) of an accelerometer's non-orthogonality; None where nobody counts."""
+    """(3,) degrees of freedom of an accelerometer's non-orthogonality; None where nobody counts."""
     turned = _to_angles(result.solution.matrix)[:3].reshape(3, 9)
     return _of_accelerometer(result, turned @ result.solution.response[F], result.non_orthogonality_std_rad)
 
 
 def of_second_order(result: AccelerometerResult) -> Array | None:
-    """(3,) of an accelerometer's φ; None where nobody counts or it was not looked for."""
+    """(3,) degrees of freedom of an accelerometer's φ; None where nobody counts or it was not looked for."""
     if result.solution.second_order_s2_m is None:
         return None
     std = np.sqrt(np.diag(result.solution.covariance)[SECOND])
@@ -66,7 +66,7 @@ def of_second_order(result: AccelerometerResult) -> Array | None:
 
 
 def of_field_angles(result: MagnetometerResult) -> Array | None:
-    """(3,) of a magnetometer's non-orthogonality; None where nobody counts."""
+    """(3,) degrees of freedom of a magnetometer's non-orthogonality; None where nobody counts."""
     if not result.budget.by_freedom:
         return None
     solution, seen = result.solution, result.seen
@@ -79,7 +79,7 @@ def of_field_angles(result: MagnetometerResult) -> Array | None:
 
 
 def of_reversal(reversal: MagnetometerReversal) -> tuple[Array, Array] | None:
-    """(3,) of the mean scale factors, (6,) of bias and arm's field; None where nobody counts.
+    """Degrees of freedom of the mean scale factors (3,), of bias and arm's field (6,); None where nobody counts.
 
     Of the latter the fewest of any run's bias: a sum of independent parts never has fewer than its scarcest.
     """
@@ -94,7 +94,7 @@ def of_reversal(reversal: MagnetometerReversal) -> tuple[Array, Array] | None:
 
 
 def _of_accelerometer(result: AccelerometerResult, response: Array, std: Array) -> Array | None:
-    """From the `response` (3, n) to the readings."""
+    """Degrees of freedom of an accelerometer's parameters, from their `response` (…, n) to the readings."""
     if result.budget is None or not result.budget.by_freedom:
         return None
     noise = np.einsum("qn,nm,qm->q", response, result.movement.noise(), response)
@@ -130,7 +130,7 @@ def _of_matrix(solution: VectorSolution) -> Array:
 
 
 def _walk(explained: Explained) -> Array:
-    """(3, p, p) that the wandering bias adds to the covariance of each axis' coefficients F, c (and G)."""
+    """(3, p, p) what the wandering bias adds to the covariance of each axis' coefficients F, c (and G)."""
     seen = explained.seen
     gravity = None if explained.solution.g_sensitivity is None else seen.pull_m_s2
     design = design_matrix(seen.rates_rad_s, gravity)

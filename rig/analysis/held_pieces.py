@@ -40,7 +40,7 @@ class HeldPieces:
         return [self._told(columns, beside)[0] for columns in suspicions]
 
     def judged(self, columns: Array | None, beside: Sequence[Array], rate: float) -> Statistic | None:
-        """See `Held`."""
+        """The statistic of what columns explain, with its limit: see `Held`."""
         value, freedom = self._told(columns, beside)
         return (value, beyond_chance(rate)(freedom)) if freedom else None
 
@@ -99,7 +99,7 @@ def tolerated(pieces: Pieces, felt: Array) -> Scatter:
 
 
 def covariance_of(pieces: Pieces, scatter: Scatter, bias: BiasProcess) -> Array:
-    """(3 N, 3 N) of the pieces' means, axis by axis: their scatter, and a bias that wanders."""
+    """(3 N, 3 N) covariance of the pieces' means, axis by axis: their scatter, and a bias that wanders."""
     each, count = np.arange(3), len(pieces.sweep)
     covariance = scatter.common_rad2_s2.reshape(3, count, 3, count).copy()
     noise = np.array([np.diag(each) for each in scatter.variances_rad2_s2.T])
@@ -129,5 +129,5 @@ def whitening(covariance: Array, least: float) -> Array:
 
 
 def whiten(white: Array, columns: Array) -> Array:
-    """(3 N, k) of columns (3, N, k)."""
+    """(3 N, k) columns (3, N, k) as `white` makes them."""
     return np.asarray(white @ columns.reshape(len(white), -1), dtype=np.float64)

@@ -140,7 +140,7 @@ def _calibrated(
 
 
 def _noise_freedom(dwells: Sequence[FieldReading]) -> Array:
-    """(3 N,)."""
+    """(3 N,) degrees of freedom of the readings' variances."""
     return np.concatenate([np.broadcast_to(dwell.reading.freedom, 3) for dwell in dwells])
 
 

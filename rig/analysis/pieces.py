@@ -68,7 +68,7 @@ class Window:
 
 @dataclass(frozen=True, slots=True)
 class Stretch:
-    """From when to when the arm made a motion, on the clock of its states.
+    """A stretch of time in which the arm made a motion, on the clock of its states.
 
     `unseen_rad` is what samples may miss of where a motion begins or ends.
     """

@@ -36,7 +36,7 @@ def noise_freedom(solution: TriaxialSolution, equations: Equations) -> float:
 
 
 def budget_by_causes(matrix: Array, causes: Mapping[str, Array], noise_freedom: float | None = None) -> Budget:
-    """From what each cause does to the covariance (p, p) of a reference model's parameters, F (3, 3) first.
+    """The budget by what each cause does to the covariance (p, p) of a reference model's parameters, F (3, 3) first.
 
     Sizes of errors that were found are uncertain themselves. Where their likelihood was integrated over, or the
     covariance widened as Student's t is, that is in u already (JCGM 101, 6.4.9) and no freedom is left to count:

@@ -130,7 +130,7 @@ def lag_pattern(movement: Movement, lag_s: float) -> Array:
 
 
 def drift_patterns(matrix: Array, attitudes: Array, drift: FieldDrift | None) -> tuple[Array, float]:
-    """(3, 3 N) of a field that changes evenly from the first attitude to the last, along each axis of the base.
+    """(3, 3 N) patterns of a field that changes evenly from the first attitude to the last, along the base's axes.
 
     By one standard uncertainty where its `drift` was tested, else by half of all that is possible; and how much, T.
     """

@@ -61,7 +61,7 @@ class ReferenceStatistics:
 def of_accelerometer(
     name: str, recordings: Sequence[ObservedRun], result: AccelerometerResult, known: Uncertainty
 ) -> ReadInReference:
-    """From all recordings of a run, in the order its solution was made from; `known` is of what no recording shows."""
+    """What an accelerometer read in a run, in the order of its solution; `known` is of what no recording shows."""
     timed = list(zip(recordings, since_first_s(recordings), strict=True))
     dwells = [dwell for each, since_s in timed for dwell in acceleration_dwells(name, each, since_s)]
     used = {dwell.index for dwell in result.dwells}
@@ -153,7 +153,7 @@ def reference_statistics(held: ReadInReference, rate: float, *, drifting: bool) 
 
 
 def _theta(matrix: Array, reference: Array, bias: Array) -> Array:
-    """(22,) as `rig.estimation.felt` orders it, of what dwells tell."""
+    """(22,) parameters that dwells tell, as `rig.estimation.felt` orders them."""
     theta = np.zeros(PARAMETERS)
     theta[: LEVER.start] = np.concatenate([matrix.ravel(), reference, bias])
     return theta

@@ -31,12 +31,12 @@ class Read:
 
     @property
     def dwells(self) -> int:
-        """N."""
+        """Number N of dwells."""
         return len(self.movement.dwells.readings_m_s2)
 
     @property
     def sweeps(self) -> int:
-        """M."""
+        """Number M of sweeps."""
         return len(self.movement.sweeps.speeds_rad_s)
 
 
@@ -70,7 +70,7 @@ def bias_over_time(read: Read) -> Array:
 
 
 def _time(read: Read) -> Array:
-    """(K,) of the middles, from −1 to 1."""
+    """(K,) times of the middles, from −1 to 1."""
     middle = of_pieces(read.times_s, read.movement)
     time: Array = (2 * middle - middle.max() - middle.min()) / np.ptp(middle)
     return time
@@ -89,7 +89,7 @@ def _in_dwells(read: Read) -> Array:
 
 
 def _along(read: Read) -> Array:
-    """(K, 3) of the reference, what each axis reads."""
+    """(K, 3) what each axis reads of the reference."""
     along: Array = felt(read.theta, read.movement) @ matrix(read.theta).T
     return along
 

@@ -81,7 +81,7 @@ def _reversal(runs: Sequence[AsMounted]) -> MagnetometerReversal:
 
 
 def _scale_std(results: Sequence[MagnetometerResult]) -> Array:
-    """(3,) of the mean of their scale factors: each run has its own, and all share how well the field is known."""
+    """(3,) standard deviations of mean scale factors: runs have their own, and share how well the field is known."""
     shared = results[0].budget.of(SIZE_OF_FIELD)[:3]
     own = [each.budget.std[:3] ** 2 - each.budget.of(SIZE_OF_FIELD)[:3] ** 2 for each in results]
     std: Array = np.sqrt(np.sum(own, axis=0) / len(results) ** 2 + shared**2)

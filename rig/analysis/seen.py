@@ -93,12 +93,12 @@ def arms_of(turns: Sequence[Observation], settings: RunSettings) -> Array:
 
 
 def _noise_freedom(averages: Sequence[Average]) -> Array:
-    """(N, 3)."""
+    """(N, 3) degrees of freedom of the averages' variances."""
     return np.array([np.broadcast_to(average.freedom, 3) for average in averages])
 
 
 def _axis_errors(turns: Sequence[Observation], rests: int, axis_deg: float) -> Array:
-    """(P, N, 3) as in `Seen`, for angles of the arm that may be off by `axis_deg` either way."""
+    """(P, N, 3) errors as in `Seen`, of the arm's angles, which may be off by `axis_deg` either way."""
     steady = np.array([name.startswith(("twist", "zero")) for name in AXIS_ERRORS])
     std = np.radians(axis_deg) / np.sqrt(3) * np.where(steady, 1.0, WAVE_SHARE)
     off = [std[:, None] * turn.speed_rad_s * turn.axis_errors for turn in turns if turn.axis_errors is not None]
@@ -106,7 +106,7 @@ def _axis_errors(turns: Sequence[Observation], rests: int, axis_deg: float) -> A
 
 
 def _return_errors(turns: Sequence[Observation], rests: int, known: Uncertainty) -> Array:
-    """(P, N, 3) as in `Seen`: joints that turn the axis of a sweep come back to it a little elsewhere every time."""
+    """(P, N, 3) errors as in `Seen`: joints that turn a sweep's axis come back a little elsewhere every time."""
     errors = np.array([turn.speed_rad_s * turn.axis_errors for turn in turns if turn.axis_errors is not None])
     leaning = np.radians(known.repeatability_deg) / np.sqrt(3) * np.swapaxes(errors[:, ZEROS], 0, 1)
     visits = np.array([np.isin(np.arange(len(turns)), visit) for visit in _visits(turns)])

@@ -52,7 +52,7 @@ class Damage:
 
 
 def _of_each_axis(columns: Array) -> Array:
-    """(3, N, 3) of columns (N, 3): what happens on one axis alone."""
+    """(3, N, 3) columns made of (N, 3): what happens on one axis alone."""
     return np.moveaxis(per_axis(columns), -1, 0).swapaxes(1, 2)
 
 
@@ -134,7 +134,7 @@ def jumps(pieces: Pieces) -> list[Array]:
 
 
 def in_time(pieces: Pieces) -> Array:
-    """(N,) of the pieces' middles, from −1 to 1."""
+    """(N,) times of the pieces' middles, from −1 to 1."""
     middle = pieces.times_s.mean(axis=1)
     time: Array = (2 * middle - middle.max() - middle.min()) / np.ptp(middle)
     return time
@@ -147,6 +147,6 @@ def each_axis(columns: Array) -> Array:
 
 
 def per_axis(columns: Array) -> Array:
-    """(3, N, 3) from (N, 3): each axis' own column, with a coefficient of its own."""
+    """(3, N, 3) columns made of (N, 3): each axis' own column, with a coefficient of its own."""
     stacked: Array = np.einsum("ij,ni->inj", np.eye(3), columns)
     return stacked

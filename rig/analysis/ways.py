@@ -88,7 +88,7 @@ def _ways(run: RunData, stream: Stream, motion: ArmMotion) -> Iterator[Stretch]:
 
 
 def moved(motion: ArmMotion, start_s: float, end_s: float) -> Stretch | None:
-    """From before the arm moves to when it stands again; None where it does not move between these times."""
+    """The stretch from before the arm moves to when it stands again; None where it does not move in this time."""
     inside = (motion.time_s >= start_s) & (motion.time_s <= end_s)
     moving = motion.time_s[inside][np.linalg.norm(motion.rate(motion.time_s[inside]), axis=1) > MIN_RATE_RAD_S]
     if not len(moving):

@@ -18,7 +18,7 @@ from rig.observation.windows import Window, dwelt
 
 @dataclass(frozen=True, slots=True)
 class When:
-    """From when to when, in UTC, and the `mean_utc` of the readings; of these the mean temperature and how it ranged.
+    """When readings were taken, in UTC, and their `mean_utc`; their mean temperature and how it ranged.
 
     No temperatures where no thermometer tells them.
     """

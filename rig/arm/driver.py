@@ -288,7 +288,7 @@ class Arm:
         return self.latest.at_rest and away_rad < ARRIVAL_RAD
 
     def _take(self, message: Message) -> None:
-        """Called by the link's reader thread with every message of the child."""
+        """Take a message of the child, each as it comes, on the link's reader thread."""
         match message:
             case Heartbeat():
                 self._silent_s = max(self._silent_s, message.silent_s)

@@ -90,7 +90,7 @@ def flange_errors(q_rad: ArrayLike, arm: DenavitHartenberg = NOMINAL) -> Array:
 
 
 def angle_waves(angle_rad: float) -> Array:
-    """(4,) as `WAVES` has them."""
+    """(4,) waves of an angle, as `WAVES` has them."""
     return np.array([np.cos(angle_rad), np.sin(angle_rad), np.cos(2 * angle_rad), np.sin(2 * angle_rad)])
 
 
@@ -175,7 +175,7 @@ def lengths_m(arm: DenavitHartenberg) -> Array:
 
 
 def _bends(frames: list[Array]) -> tuple[Array, Array, Array]:
-    """(…, 3) m each: shoulder, elbow and wrist 1, each beside the one before it.
+    """Shoulder, elbow and wrist 1, (…, 3) m, each beside the one before it.
 
     The axes of these three are parallel but for what the factory found, and meet hundreds of metres away: a calibrated
     arm's frames have their origins anywhere along them.
@@ -200,7 +200,7 @@ def _on_flange(frames: list[Array], point_m: ArrayLike) -> Array:
 
 
 def _distance(point: Array, start: Array, end: Array) -> Array:
-    """(…,) from points to the lines between starts and ends (…, 3)."""
+    """(…,) distances from points to the lines between starts and ends (…, 3)."""
     way = end - start
     along = np.sum((point - start) * way, axis=-1) / np.sum(way**2, axis=-1)
     nearest = start + np.clip(along, 0, 1)[..., None] * way

@@ -37,7 +37,7 @@ class Silence:
         self.ticks = self._all_ticks = 0
 
     def tick(self, unheard: bool = False) -> None:
-        """Once more nothing was heard, or not yet: call this at even intervals.
+        """Count that once more nothing was heard, or not yet: call this at even intervals.
 
         `unheard`: what it has said lies there, and whoever is to hear it has not come to it; that is not its silence.
         """

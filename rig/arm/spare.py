@@ -6,13 +6,13 @@ SPARE = 8  # the dashboard's socket, and what finding a host's address by its na
 
 
 class SpareDescriptors:
-    """Held from `keep` until `release`, which may be called again and from any thread."""
+    """Spare descriptors, held from `keep` until `release`, which may be called again and from any thread."""
 
     def __init__(self) -> None:
         self._held: list[int] = []
 
     def keep(self) -> None:
-        """Take them. Raises OSError when there are none left."""
+        """Take the descriptors. Raises OSError when there are none left."""
         try:
             while len(self._held) < SPARE:
                 self._held.append(os.open(os.devnull, os.O_RDONLY))

@@ -44,7 +44,7 @@ def claimed_arm(host: str) -> AbstractContextManager[None]:
 
 
 def claimed_board(port: str) -> AbstractContextManager[None]:
-    """The board. Raises Refused `board_claimed`."""
+    """A claim on the board at `port`. Raises Refused `board_claimed`."""
     return _claimed("board_claimed", f"port {_place(port)}", f"the board at {port}")
 
 

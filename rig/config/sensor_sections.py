@@ -144,7 +144,7 @@ class SensorSection(Section):
     @model_validator(mode="before")
     @classmethod
     def usual_of_the_part(cls, data: Any) -> Any:
-        """Left out, data rate and range are the part's usual ones."""
+        """The section with the part's usual data rate and range where they are left out."""
         if not isinstance(data, Mapping):
             return data
         name = data.get("part")

@@ -50,7 +50,7 @@ class BudgetEntry(Entry):
 
     @property
     def factors(self) -> tuple[float, ...]:
-        """k of each."""
+        """Coverage factor k of each parameter."""
         return self.coverage_factors or (self.coverage_factor,) * 6
 
     @property
@@ -65,7 +65,7 @@ class BudgetEntry(Entry):
 
 
 def expanded_uncertainties(budget: BudgetEntry | None, covariance: Sequence[Sequence[float]]) -> Sequence[float]:
-    """(6,) of scale and bias: U of the budget; without one, two standard deviations by the solution's covariance."""
+    """(6,) U of scale and bias, by the budget; without one, two standard deviations by the solution's covariance."""
     if budget is not None:
         return budget.expanded
     return [COVERAGE_FACTOR * covariance[i][i] ** 0.5 for i in range(len(covariance))]

@@ -47,7 +47,7 @@ def read_document(kind: type[Document], file: Path, limit_bytes: int, *, what: s
 
 
 def _adapter(kind: type[Any]) -> TypeAdapter[Any]:
-    """Made once: that takes a while."""
+    """The adapter of a type, made once: that takes a while."""
     if kind not in _adapters:
         _adapters[kind] = TypeAdapter(kind)
     return _adapters[kind]

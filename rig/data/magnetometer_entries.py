@@ -178,7 +178,7 @@ class ReversalDocument(Entry):
     magnetometers: dict[str, ReversalEntry]
 
     def text(self) -> str:
-        """The JSON."""
+        """The document as JSON."""
         return json.dumps(self.model_dump(by_alias=True), indent=2, allow_nan=False)
 
 

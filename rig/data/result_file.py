@@ -380,7 +380,7 @@ class ResultDocument(Entry):
     bias_drift: dict[SensorName, dict[str, DriftEntry]] = Field(default_factory=dict)
 
     def text(self) -> str:
-        """The JSON; what was left out stays out."""
+        """The result as JSON; what was left out stays out."""
         return json.dumps(self.model_dump(by_alias=True, exclude_unset=True), indent=2, allow_nan=False)
 
 

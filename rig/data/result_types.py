@@ -34,7 +34,7 @@ Utc = Annotated[str, AfterValidator(_iso)]
 
 
 class WhenEntry(Entry):
-    """From when to when readings were taken (UTC, by the arm controller's clock since the recording's start).
+    """When readings were taken, from when to when (UTC, by the arm controller's clock since the recording's start).
 
     `mean_utc` is the middle of the readings, `temperature_c` their mean by the sensor's own thermometer, which stayed
     between the two of `temperature_range_c`; null where it has none.

@@ -46,7 +46,7 @@ class AccelerometerErrors:
     turning_m_s2: float = 0.0
 
     def without(self, piece: int) -> "AccelerometerErrors":
-        """All but one dwell or sweep."""
+        """The errors in all but one dwell or sweep."""
         left = np.arange(len(self.warmer_k)) != piece
         return replace(
             self,

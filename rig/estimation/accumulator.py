@@ -140,7 +140,7 @@ class Accumulator:
         return rank, condition, int(np.argmax(weakest[:3] + weakest[3:]))
 
     def _covariance(self, scale: Array, bias: Array, centre: Array) -> Array:
-        """(6, 6), to first order in the means' errors e: δβ = (XᵀW X + XᵀW 1 ∂Γ/∂β)⁻¹ XᵀW e, then k and b from β.
+        """Covariance to first order in the means' errors e: δβ = (XᵀW X + XᵀW 1 ∂Γ/∂β)⁻¹ XᵀW e, then k and b from β.
 
         `bias` is that of readings counted from `centre`; moving the origin leaves the covariance alone.
         """

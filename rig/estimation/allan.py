@@ -142,7 +142,7 @@ def _freedom(points: Sequence[int], factor: int, noise: Noise) -> float:
 
 
 def _slopes(tau_s: Array, deviation: Array) -> Array:
-    """(T, 3) of log σ over log τ, between the neighbours of each τ; that of white noise where there is one τ."""
+    """(T, 3) slopes of log σ over log τ, between the neighbours of each τ; that of white noise where there is one τ."""
     if len(tau_s) < 2:
         return np.full(deviation.shape, -0.5)
     logarithm = np.log(np.maximum(deviation, np.finfo(np.float64).tiny))

@@ -60,7 +60,7 @@ class Placed:
     norm_known: bool
 
     def without(self, attitude: int) -> "Placed":
-        """All but one."""
+        """The readings in all attitudes but one."""
         left = np.arange(len(self.readings)) != attitude
         return Placed(
             self.readings[left],

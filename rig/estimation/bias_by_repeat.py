@@ -29,7 +29,7 @@ class Move:
 
     @property
     def axis(self) -> int:
-        """Along which it stands out most."""
+        """Index of the axis along which the move stands out most."""
         return int(np.argmax(np.abs(self.change) / self.std))
 
 
@@ -51,18 +51,18 @@ class BiasByRepeat:
 
     @property
     def largest_change(self) -> Array:
-        """(3,) between any two repeats."""
+        """(3,) largest change of the bias between any two repeats."""
         change: Array = np.ptp(self.bias, axis=0)
         return change
 
     @property
     def largest_change_std(self) -> Array:
-        """(3,) of that change: what the two repeats it lies between are known to."""
+        """(3,) standard deviations of the largest change: what the two repeats it lies between are known to."""
         return largest_change_std(self.bias, self.std)
 
 
 def largest_change_std(bias: Array, std: Array) -> Array:
-    """(3,) of the largest change between any two of biases (R, 3): what the two it lies between are known to."""
+    """(3,) standard deviations of the largest change of biases (R, 3): what the two it lies between are known to."""
     ends = np.stack([bias.argmin(axis=0), bias.argmax(axis=0)])
     found: Array = np.hypot(*np.take_along_axis(std, ends, axis=0))
     return found
@@ -103,7 +103,7 @@ def _left_over(off: Array) -> int:
 
 
 def _excess(off: Array, variances: Array) -> Array:
-    """(3,) by what is left when each attitude has an error of its own and each repeat a bias; 1 at least."""
+    """(3,) factors by what is left when each attitude has an error of its own and each repeat a bias; 1 at least."""
     left = off - off.mean(axis=0) - off.mean(axis=1, keepdims=True) + off.mean(axis=(0, 1))
     freedom = _left_over(off)
     if freedom == 0:

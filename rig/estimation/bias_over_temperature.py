@@ -35,7 +35,7 @@ class BiasOverTemperature:
 
 
 def bias_over_temperature(bias: Array, std: Array, temperature_c: Array, time_s: Array) -> BiasOverTemperature:
-    """From the bias of R repeats (R, 3), known to `std` (R, 3), their mean temperatures (R,) and times (R,).
+    """The slope of the bias of R repeats (R, 3), known to `std` (R, 3), their mean temperatures (R,) and times (R,).
 
     Deviations are as large as the residuals say, where these are larger. Raises Fault `too_few_observations`,
     `temperature_range_too_small`, `temperature_and_time_confounded`.

@@ -45,7 +45,7 @@ class BiasProcess:
         return not self.found and self.instability_rad_s == 0.0
 
     def covariance(self, windows_s: ArrayLike) -> Array:
-        """(N, N) that it adds to means over the windows (N, 2), about the mean bias over all the time they span."""
+        """(N, N) covariance that it adds to means over windows (N, 2), about the mean bias over all they span."""
         found = _added(self.walk_rad_s_sqrt_s**2, self.scatter_rad_s**2, walk_covariance(windows_s))
         return found if self.instability_rad_s == 0.0 else found + _flicker(self.instability_rad_s, windows_s)
 
@@ -182,19 +182,19 @@ def _bias_process(
 
 
 def _mean(sizes: Array, likelihood: Array) -> Array:
-    """(2,) of sizes (K, 2), of which zero is before as likely as all others together."""
+    """(2,) mean of sizes (K, 2), of which zero is before as likely as all others together."""
     belief = likelihood - np.log(STEPS) * np.count_nonzero(sizes, axis=1)
     weights = np.exp(belief - belief.max())
     return np.asarray(weights @ sizes / weights.sum(), dtype=np.float64)
 
 
 def _likeliest(sizes: Array, likelihood: Array) -> Array:
-    """(2,) of sizes (K, 2)."""
+    """(2,) likeliest of sizes (K, 2)."""
     return np.asarray(sizes[np.argmax(likelihood - PRICE * np.count_nonzero(sizes, axis=1))], dtype=np.float64)
 
 
 def _added(walk: Array | float, scatter: Array | float, unit: Array) -> Array:
-    """(…, N, N) for squared rates of the walk and squared scatters, both (…, 1, 1)."""
+    """(…, N, N) covariance for squared rates of the walk and squared scatters, both (…, 1, 1)."""
     covariance: Array = np.asarray(walk * unit + scatter * np.eye(len(unit)), dtype=np.float64)
     return covariance
 

@@ -14,7 +14,7 @@ from rig.estimation.sensor_axes import parameter_jacobian
 
 
 def six_observation_bound(scale: ArrayLike, rates_rad_s: ArrayLike, variances_rad2_s2: ArrayLike) -> Array:
-    """(6, 6) for kx ky kz bx by bz of g = K (m + b) when only ‖g‖ is known of each sweep: SIX, Eqs. (1)–(4).
+    """(6, 6) bound for kx ky kz bx by bz of g = K (m + b) when only ‖g‖ is known of each sweep: SIX, Eqs. (1)–(4).
 
     `scale` (3,); `rates_rad_s` (N, 3): true g in the sensor frame; `variances_rad2_s2` (N, 3) of the mean readings. The
     two unknown numbers of each sweep's direction use up two of its three readings; what is left tells ‖g‖², with the
@@ -28,7 +28,7 @@ def six_observation_bound(scale: ArrayLike, rates_rad_s: ArrayLike, variances_ra
 
 
 def vector_matrix_bound(rates_rad_s: ArrayLike, variances_rad2_s2: ArrayLike) -> Array:
-    """(12, 12) for the rows of F, then c, of the vector model m = F ω + c; the rates (N, 3) may be zero (rests)."""
+    """(12, 12) bound for the rows of F, then c, of the vector model m = F ω + c; rates (N, 3) may be zero (rests)."""
     rates, variances = (np.asarray(a, dtype=np.float64) for a in (rates_rad_s, variances_rad2_s2))
     design = np.concatenate([rates, np.ones((len(rates), 1))], axis=1)
     bound = np.zeros((12, 12))
@@ -39,7 +39,7 @@ def vector_matrix_bound(rates_rad_s: ArrayLike, variances_rad2_s2: ArrayLike) ->
 
 
 def vector_bound(matrix: ArrayLike, rates_rad_s: ArrayLike, variances_rad2_s2: ArrayLike) -> Array:
-    """(6, 6) for kx ky kz bx by bz when the rate is known as a vector; `matrix` (3, 3) is the true F."""
+    """(6, 6) bound for kx ky kz bx by bz when the rate is known as a vector; `matrix` (3, 3) is the true F."""
     f = np.asarray(matrix, dtype=np.float64)
     jacobian = parameter_jacobian(f, 1 / np.linalg.norm(f, axis=1))
     return jacobian @ vector_matrix_bound(rates_rad_s, variances_rad2_s2) @ jacobian.T
@@ -55,7 +55,7 @@ def triaxial_bound(
     known: ArrayLike | None = None,
     second_order: ArrayLike | None = None,
 ) -> Array:
-    """(15, 15), or (18, 18) with `second_order` φ (3,), for the rows of F, v_ref, b, φ: TRIAX, Eqs. (3), (10).
+    """Bound (15, 15), with `second_order` φ (3,) (18, 18), for the rows of F, v_ref, b, φ: TRIAX, Eqs. (3), (10).
 
     Shapes as in `solve_triaxial`, true values. Without `known` the size of `reference` is given to the estimator.
     """

@@ -58,7 +58,7 @@ class Budget:
 
     @property
     def covariance(self) -> Array:
-        """(6, 6) combined."""
+        """(6, 6) covariance of scale and bias, all contributors together."""
         combined: Array = np.sum([each.covariance for each in self.contributors], axis=0)
         return combined
 
@@ -75,7 +75,7 @@ class Budget:
 
     @property
     def coverage_factors(self) -> Array:
-        """(6,) k of each."""
+        """(6,) coverage factors k."""
         return coverage_factors(self.freedom) if self.by_freedom else np.full(6, COVERAGE_FACTOR)
 
     @property
@@ -92,7 +92,7 @@ class Budget:
 
     @property
     def shares(self) -> Array:
-        """(contributors, 6): of the variance."""
+        """(contributors, 6) shares of the variance."""
         shares: Array = np.array([each.std**2 for each in self.contributors]) / self.std**2
         return shares
 
@@ -212,7 +212,7 @@ def _noise_freedom(explained: Explained) -> float:
 
 
 def _found(name: str, source: str, covariance: Array, freedom: float = np.inf) -> Contributor:
-    """Type A."""
+    """A contributor that was found from the readings: type A."""
     return Contributor(name, "A", "normal", None, "", source, freedom, covariance)
 
 
@@ -230,7 +230,7 @@ def _of_the_readings(explained: Explained) -> Iterator[Contributor]:
 
 
 def _of_bias(explained: Explained) -> tuple[Array, Array]:
-    """(6, 6) that flicker of the bias adds to the solution's covariance, and what was found of its wandering beside."""
+    """(6, 6) what flicker of the bias adds to the solution's covariance, and what was found of its wandering beside."""
     bias, response, windows_s = explained.bias, explained.solution.response, explained.seen.windows_s
 
     def of(part: BiasProcess) -> Array:

@@ -93,7 +93,7 @@ def solve_with_common_errors(
 
 
 def _gain(design: Array, effects: Array, noise: Array) -> tuple[Array, Array]:
-    """(P, N, 3) that takes readings to the sizes of the errors, and the sizes' covariance (P, P)."""
+    """(P, N, 3) gain that takes readings to the sizes of the errors, and the sizes' covariance (P, P)."""
     weights = np.linalg.inv(noise)
     weighted = weights @ design
     blind = weights - weighted @ np.linalg.solve(design.T @ weighted, np.swapaxes(weighted, -1, -2))  # to F, c, G

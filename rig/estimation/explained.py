@@ -62,13 +62,13 @@ class Seen:
 
     @property
     def rates_rad_s(self) -> Array:
-        """(N, 3) of the flange against the stars."""
+        """(N, 3) rates of the flange against the stars."""
         rates: Array = self.turns_rad_s + self.attitudes @ self.earth_rate_rad_s
         return rates
 
     @property
     def acceleration_m_s2(self) -> Array:
-        """(N, 3) of where the sensor is taken to sit, in the flange's frame."""
+        """(N, 3) acceleration of where the sensor is taken to sit, in the flange's frame."""
         return np.zeros(self.turns_rad_s.shape) if self.arms_m is None else self.centripetal_m_s2(self.arms_m)
 
     @property
@@ -84,7 +84,7 @@ class Seen:
 
     @property
     def arm_errors_rad_s(self) -> Array:
-        """(P, N, 3) of both kinds of errors of its angles."""
+        """(P, N, 3) what both kinds of errors of the arm's angles add."""
         none = np.zeros((0, *self.means_rad_s.shape))
         return np.concatenate([none, *(e for e in (self.axis_errors_rad_s, self.return_errors_rad_s) if e is not None)])
 
@@ -95,7 +95,7 @@ class Seen:
         return tuple(own_errors(self.sensor, matrix, self.turns_rad_s, self.windows_s, self.speeds_rad_s))
 
     def own_patterns(self, matrix: Array) -> Array:
-        """(P, N, 3) of one standard deviation of each."""
+        """(P, N, 3) what one standard deviation of each of the sensor's own errors adds."""
         none = np.zeros((0, *self.means_rad_s.shape))
         return np.concatenate([none, *(each.patterns / np.sqrt(3) for each in self.own_errors(matrix))])
 
@@ -172,7 +172,7 @@ def _explain(seen: Seen, nominal_mounting: Array, gravity_m_s2: Array | None) ->
     arm_errors = seen.arm_errors_rad_s
 
     def of_arm_and_speeds(matrix: Array) -> Array:
-        """(P, N, 3) on the readings, of one standard deviation each."""
+        """(P, N, 3) effects on the readings, of one standard deviation each."""
         curved = [curvature(matrix, seen.rates_rad_s)] if several else []
         return np.concatenate([arm_errors @ matrix.T, *curved])
 

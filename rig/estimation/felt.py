@@ -101,7 +101,7 @@ class Movement:
     arm_turns: Array | None = None
 
     def without(self, dwell: int) -> "Movement":
-        """All but one dwell."""
+        """The movement with all but one dwell."""
         left = np.arange(len(self.dwells.readings_m_s2)) != dwell
         kept, places = self.dwells, np.arange(OWN_ERRORS * dwell, OWN_ERRORS * (dwell + 1))
         return replace(
@@ -112,7 +112,7 @@ class Movement:
         )
 
     def readings(self) -> Array:
-        """(K, 3) m/s²."""
+        """(K, 3) readings in dwells, then the harmonics of sweeps, m/s²."""
         return np.concatenate([self.dwells.readings_m_s2, self.sweeps.harmonics_m_s2.reshape(-1, 3)])
 
     def noise(self) -> Array:
@@ -146,13 +146,13 @@ def predicted(theta: Array, movement: Movement) -> Array:
 
 
 def felt(theta: Array, movement: Movement) -> Array:
-    """s (K, 3)."""
+    """s (K, 3), what is felt in dwells and sweeps."""
     s: Array = of_gravity(theta[DELAY], movement) @ theta[REFERENCE] + of_lever(movement) @ theta[LEVER]
     return s + of_arms(movement)
 
 
 def of_gravity(delay_s: float, movement: Movement) -> Array:
-    """(K, 3, 3) that takes v_ref to what is felt of it."""
+    """(K, 3, 3) what takes v_ref to what is felt of it."""
     sweeps = movement.sweeps
     to_flange = np.swapaxes(sweeps.attitudes, -1, -2)
     along = sweeps.axes_flange[:, :, None] * sweeps.axes_flange[:, None, :]
@@ -164,7 +164,7 @@ def of_gravity(delay_s: float, movement: Movement) -> Array:
 
 
 def of_lever(movement: Movement) -> Array:
-    """(K, 3, 3) that takes the lever arm to the centripetal acceleration: in the mean of a sweep alone."""
+    """(K, 3, 3) what takes the lever arm to the centripetal acceleration: in the mean of a sweep alone."""
     axes, speeds = movement.sweeps.axes_flange, movement.sweeps.speeds_rad_s
     whole = np.zeros((len(movement.dwells.readings_m_s2) + 3 * len(speeds), 3, 3))
     centripetal = axes[:, :, None] * axes[:, None, :] - np.eye(3)
@@ -173,7 +173,7 @@ def of_lever(movement: Movement) -> Array:
 
 
 def of_arms(movement: Movement) -> Array:
-    """(K, 3) m/s²: the centripetal acceleration of the flange itself."""
+    """(K, 3) centripetal acceleration of the flange itself, m/s²."""
     arms = np.zeros((len(movement.dwells.readings_m_s2) + 3 * len(movement.sweeps.arms_m), 3, 1))
     arms[len(movement.dwells.readings_m_s2) :: 3, :, 0] = movement.sweeps.arms_m
     acceleration: Array = (of_lever(movement) @ arms)[..., 0]

@@ -76,7 +76,7 @@ class ImuSolution:
 
     @property
     def theta(self) -> Array:
-        """(22,) as `rig.estimation.felt` orders it."""
+        """(22,) parameters as `rig.estimation.felt` orders them."""
         found = np.zeros(PARAMETERS)
         found[: LEVER.start] = np.concatenate([self.matrix.ravel(), self.reference_m_s2, self.bias_m_s2])
         if self.lever_arm_m is not None:

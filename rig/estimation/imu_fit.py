@@ -26,7 +26,7 @@ class Fit:
     iterations: int
 
     def covariance(self) -> Array:
-        """(22, 22) by the Fisher information."""
+        """(22, 22) covariance of θ by the Fisher information."""
         return np.asarray(self.free @ self._inverse() @ self.free.T, dtype=np.float64)
 
     def response(self) -> Array:
@@ -35,7 +35,7 @@ class Fit:
         return np.asarray(self.free @ self._inverse() @ (white @ self.jacobian).T @ white, dtype=np.float64)
 
     def _inverse(self) -> Array:
-        """(q, q) of the Fisher information."""
+        """(q, q) inverse of the Fisher information."""
         weighted = self.readings.white(self.std_rad) @ self.jacobian
         size = np.linalg.norm(weighted, axis=0)
         inverse: Array = np.linalg.inv((weighted / size).T @ (weighted / size)) / np.outer(size, size)
@@ -128,6 +128,6 @@ def free_ways(theta: Array, held: list[int]) -> Array:
 
 
 def sizes_of(columns: Array) -> Array:
-    """(q,) norms; 1 for a column of zeros."""
+    """(q,) norms of columns; 1 for a column of zeros."""
     sizes: Array = np.linalg.norm(columns, axis=0)
     return np.where(sizes > 0, sizes, 1.0)

@@ -146,7 +146,7 @@ def _in_block(taken: _Stretch, at_s: Array, inverse: Array) -> tuple[Array, Arra
 
 @dataclass(frozen=True, slots=True)
 class _Step:
-    """From readings on: rotation vectors φ (k, 3), S (k, 3, 12) in body coordinates of the start, rates reached."""
+    """Steps from readings on: rotation vectors φ (k, 3), S (k, 3, 12) in body coordinates of the start, rates then."""
 
     vectors: Array
     sensitivities: Array
@@ -154,7 +154,7 @@ class _Step:
 
 
 def _step(taken: _Stretch, start: NDArray[np.intp], part: Array, inverse: Array) -> _Step:
-    """From readings `start` (k,) a `part` (k,) of the way to the next.
+    """Steps from readings `start` (k,) a `part` (k,) of the way to the next.
 
     The attitude half-way stands for all of the step in S: that is the exponential's derivative to φ²/24.
     """

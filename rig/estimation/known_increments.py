@@ -86,7 +86,7 @@ class KnownIncrements:
 
 
 def solve_known_increments(time_s: Array, readings: Array, fixes: Fixes, start: Array) -> KnownIncrements:
-    """From readings (n, 3) in rad/s at times (n,), beginning at F = `start` (3, 3) and b = 0.
+    """Solve readings (n, 3) in rad/s at times (n,), beginning at F = `start` (3, 3) and b = 0.
 
     Raises Fault `rank_deficient`, `ill_conditioned`, `attitude_untrustworthy`, `wrong_unit`, `mirrored_axis`.
     """

@@ -85,7 +85,7 @@ class _Fit:
 
 
 def laid_down(theta: Array, placed: Placed, elsewhere: Array, elsewhere_variances: Array) -> LaidDown:
-    """From a solution θ (p,), by what it leaves, and the means (k, 3) of rests without an attitude."""
+    """What is laid down beside a solution θ (p,): by what that leaves, and means (k, 3) of rests without attitude."""
     whole = _with(theta, placed, elsewhere, elsewhere_variances)
     free = free_directions(theta, norm_known=whole.norm_known)
     linear = _Linear(

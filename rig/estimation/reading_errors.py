@@ -49,7 +49,7 @@ def bias_warming(movement: Movement) -> Array:
 
 
 def scale_warming(theta: Array, movement: Movement) -> Array:
-    """(6, 3 K) the same of κ."""
+    """(6, 3 K) patterns of κ of each axis, as those of β."""
     own = movement.own
     if own is None:
         return np.zeros((0, movement.readings().size))
@@ -90,7 +90,7 @@ def walking(own: AccelerometerErrors, movement: Movement) -> Array:
 
 
 def _of_bias(covariance: Array, movement: Movement) -> Array:
-    """(3 K, 3 K) of a bias whose means in dwells and sweeps (N + M,) vary together so, the axes each for itself."""
+    """(3 K, 3 K) covariance of a bias whose means in dwells and sweeps (N + M,) vary so, the axes each for itself."""
     steady = movement.constant() > 0
     whole = np.zeros((len(steady),) * 2)
     whole[np.ix_(steady, steady)] = covariance
@@ -105,13 +105,13 @@ def in_sweeps(movement: Movement) -> Array:
 
 
 def of_pieces(values: Array, movement: Movement) -> Array:
-    """(K,) of what dwells and sweeps (N + M,) have: mean, cosine and sine of a sweep the same."""
+    """(K,) values of dwells and sweeps (N + M,): mean, cosine and sine of a sweep the same."""
     dwells = len(movement.dwells.readings_m_s2)
     return np.concatenate([values[:dwells], np.repeat(values[dwells:], 3)])
 
 
 def per_axis(columns: Array) -> Array:
-    """(3 K, 3) from (K, 3): each axis' own column, with a coefficient of its own."""
+    """(3 K, 3) columns made of (K, 3): each axis' own column, with a coefficient of its own."""
     return np.asarray((columns[:, :, None] * np.eye(3)).reshape(-1, 3), dtype=np.float64)
 
 
@@ -127,7 +127,7 @@ def of_sensor(theta: Array, movement: Movement, change: Callable[[Array], Array]
 
 
 def _not_repeated(theta: Array, movement: Movement) -> Array:
-    """(3 K, 3 K) of the small turns by which each sweep is off for itself."""
+    """(3 K, 3 K) covariance of the small turns by which each sweep is off for itself."""
     sweeps = movement.sweeps
     if movement.repeatability_rad == 0.0:
         return np.zeros((movement.readings().size,) * 2)

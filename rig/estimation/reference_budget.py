@@ -49,7 +49,7 @@ class Spread:
         return float(effective_freedom(parts, self.noise_freedom[:, None]).min())
 
     def of(self, patterns: Array) -> Array:
-        """(6, 6) of independent patterns (k, n) of errors in the readings, each of one standard uncertainty."""
+        """(6, 6) covariance of independent patterns (k, n) of errors in readings, one standard uncertainty each."""
         effect = self.response @ patterns.T
         covariance: Array = effect @ effect.T
         return covariance
@@ -81,7 +81,7 @@ def scale_and_bias(matrix: Array, scale: Array, parameters: int) -> Array:
 
 
 def scale_and_bias_covariance(matrix: Array, scale: Array, covariance: Array) -> Array:
-    """(6, 6) from that of a reference model's parameters; b is part of the reading, a gyroscope's is added to it."""
+    """(6, 6) covariance of scale and bias from a reference model's; b is in the reading, a gyroscope's is added."""
     to_parameters = scale_and_bias(matrix, scale, len(covariance))
     found: Array = to_parameters @ covariance @ to_parameters.T
     return found

@@ -31,7 +31,7 @@ def residual_std_rad_s(explained: Explained) -> Array:
 
 
 def dwell_residual_std_m_s2(solution: ImuSolution, movement: Movement) -> Array:
-    """(N, 3) the same of an accelerometer's dwells, of a solution found from the `movement`."""
+    """(N, 3) standard deviations of what is left in an accelerometer's dwells, solved from the `movement`."""
     movement, theta = replace(movement, own=solution.own), solution.theta
     arm = solution.attitude_error.std_rad * felt.effects(theta, movement)
     fit = felt.jacobian(theta, movement) @ solution.response
@@ -39,7 +39,7 @@ def dwell_residual_std_m_s2(solution: ImuSolution, movement: Movement) -> Array:
 
 
 def attitude_residual_std(solution: TriaxialSolution, seen: Dwells) -> Array:
-    """(N, 3) the same of a sensor in attitudes alone, as `seen`, in the unit of its readings."""
+    """(N, 3) standard deviations of what is left in attitudes alone, as `seen`, in the readings' unit."""
     theta = np.concatenate([solution.matrix.ravel(), solution.reference, solution.bias])
     v_bar = np.zeros_like(seen.readings_m_s2)
     off_rad = 0.0 if solution.attitude_error is None else solution.attitude_error.std_rad
@@ -58,7 +58,7 @@ def _left(fit: Array, covariance: Array) -> Array:
 
 
 def _along_diagonal(blocks: Array) -> Array:
-    """(3 N, 3 N) of (N, 3, 3)."""
+    """(3 N, 3 N) blocks (N, 3, 3) along the diagonal."""
     whole = np.zeros((len(blocks), 3, len(blocks), 3))
     whole[np.arange(len(blocks)), :, np.arange(len(blocks))] = blocks
     return whole.reshape(3 * len(blocks), -1)

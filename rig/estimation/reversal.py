@@ -41,7 +41,7 @@ class Reversal:
 
 
 def separate(biases_t: Array, covariances_t2: Array, matrices: Array, mountings: Array) -> Reversal:
-    """From K ≥ 2 runs: biases (K, 3) with covariances (K, 3, 3), F and M (K, 3, 3).
+    """Sensor and arm told apart by K ≥ 2 runs: biases (K, 3) with covariances (K, 3, 3), F and M (K, 3, 3).
 
     Raises Refused `mounting_not_turned` where all mountings are one, Fault `reversal_contradicts` where the runs do not
     agree on what turning over leaves alone.

@@ -22,7 +22,7 @@ class Apart:
     growth: Array
 
     def white(self, std_rad: float) -> Array:
-        """(n, n) that leaves readings independent, each with standard deviation 1, for errors of the size δ."""
+        """(n, n) what leaves readings independent, each with standard deviation 1, for errors of the size δ."""
         return np.asarray(self.turn / np.sqrt(1 + std_rad**2 * self.growth)[:, None], dtype=np.float64)
 
 

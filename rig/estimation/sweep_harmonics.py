@@ -96,7 +96,7 @@ def first_harmonic(
 
 
 def _regression(columns: Array, readings: Array) -> tuple[Array, Array]:
-    """(p, n) that takes readings (n, 3) to the coefficients of `columns` (n, p), and what these leave, (n, 3)."""
+    """(p, n) what takes readings (n, 3) to the coefficients of `columns` (n, p), and what these leave, (n, 3)."""
     size = np.linalg.norm(columns, axis=0)
     size = np.where(size > 0, size, 1.0)
     inverse = np.linalg.pinv(columns / size, rcond=EMPTY) / size[:, None]

@@ -33,7 +33,7 @@ def alignment(
     gyroscope_covariance: ArrayLike,
     accelerometer_covariance: ArrayLike,
 ) -> Alignment:
-    """From F (3, 3) of both, and the covariances (9, 9) of their rows.
+    """How two triads are aligned, from F (3, 3) of both and the covariances (9, 9) of their rows.
 
     The two are taken to be independent: what an arm's error does to both alike is counted twice. Raises Fault
     `not_finite`, `mirrored_axis`; ValueError for a wrong shape.

@@ -37,7 +37,7 @@ NOISE, BIAS, ENDS, AXES = "noise", "bias from rest to rest", "ends of the turns"
 
 @dataclass(frozen=True, slots=True)
 class Turn:
-    """From rest to rest: from `start_s` to `end_s` about the unit `axis` (3,) of the body by `angle_rad`.
+    """A turn from rest to rest: from `start_s` to `end_s` about the unit `axis` (3,) of the body by `angle_rad`.
 
     `angle_std_rad`: how well the body came to where it was said to, about any axis; `axis_std_rad`: how far its axis
     may have leaned in the body.

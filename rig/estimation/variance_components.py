@@ -47,7 +47,7 @@ class Sizes:
     groups: tuple[float, ...]
 
     def logarithms(self) -> Array:
-        """(2 + groups,)."""
+        """(2 + groups,) logarithms of the sizes."""
         return np.asarray(np.log([self.scattered, self.walked, *self.groups]), dtype=np.float64)
 
 
@@ -119,7 +119,7 @@ class MixedModel:
         return freedom
 
     def likeliest(self, expected: Sizes, spread: Array | float = SPREAD, start: Sizes | None = None) -> Sizes:
-        """From sizes of about the right order, from which nothing strays farther than the data ask.
+        """The likeliest sizes, by some of about the right order, from which nothing strays farther than the data ask.
 
         `spread` of their logarithms is how well they are known before; `start` where the search begins, if not there.
         """

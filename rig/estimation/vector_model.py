@@ -254,7 +254,7 @@ def places(columns: int) -> tuple[NDArray[np.intp], NDArray[np.intp]]:
 
 
 def _all_variances(variances: Array, speed_noise: Array, shared: Array | None) -> Array:
-    """(N, 3) of each mean reading, whatever it comes from."""
+    """(N, 3) variances of each mean reading, whatever it comes from."""
     alike = 0.0 if shared is None else np.diag(shared)[:, None]
     everything: Array = variances + speed_noise**2 + alike
     return everything

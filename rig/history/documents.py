@@ -75,7 +75,7 @@ def history_csv(pasts: Sequence[Past]) -> str:
 
 
 def calibration_entry(past: Past) -> dict[str, Any]:
-    """One calibration."""
+    """A calibration of the history as a document."""
     return {
         "calibration": past.id,
         "run": past.run_id,

@@ -17,7 +17,7 @@ WRITES = "rig_writes"  # execution option of a connection that will write
 
 
 def engine_of(place: Place) -> Engine:
-    """Up to date and ready.
+    """The engine of a history, up to date and ready.
 
     Raises Refused as `bring_up_to_date`, `history_is_there`, `missing_extra`; SQLAlchemyError and OSError.
     """
@@ -40,7 +40,7 @@ def _bring_up_to_date(engine: Engine, label: str) -> None:
 
 
 def _of_file(file: Path, label: str) -> Engine:
-    """Looked at before it is opened to be written; where there is none, one with all its tables is put there."""
+    """The engine of a file, looked at before it is opened to be written; without one, one with all tables is made."""
     if not history_is_there(file):
         with made_whole(file) as beside:
             engine = _sqlite(beside)

@@ -43,7 +43,7 @@ def migrate_4_to_5(connection: Connection) -> None:
 
 
 def _add_coverage_factor(connection: Connection) -> None:
-    """Unless an earlier step has."""
+    """Add the coverage factor, unless an earlier step has."""
     columns = {column["name"] for column in inspect(connection).get_columns(schema.parameter.name)}
     if "coverage_factor" not in columns:
         connection.execute(text("ALTER TABLE parameter ADD COLUMN coverage_factor FLOAT"))

@@ -42,7 +42,7 @@ class Trend:
 
     @property
     def last(self) -> Parameter:
-        """The newest."""
+        """The newest of the parameter's values."""
         return self.parameters[-1]
 
     @property
@@ -52,12 +52,12 @@ class Trend:
 
     @property
     def days(self) -> Array:
-        """(n,) since the first."""
+        """(n,) days since the first."""
         return np.array([(time - self.times[0]).total_seconds() / DAY_S for time in self.times])
 
     @property
     def values(self) -> Array:
-        """(n,)"""
+        """(n,) values of the parameter."""
         return np.array([each.value for each in self.parameters])
 
     @property

@@ -126,7 +126,7 @@ def open_history(where: str | Place | None = None) -> Iterator["History"]:
 
 @dataclass(frozen=True, slots=True)
 class History:
-    """An open one."""
+    """An open history."""
 
     engine: Engine
 

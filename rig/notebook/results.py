@@ -46,22 +46,22 @@ class Calibration:
 
     @property
     def scale(self) -> Array:
-        """(3,)"""
+        """(3,) scale factors."""
         return np.array(self.entry.scale)
 
     @property
     def bias(self) -> Array:
-        """(3,) in the SI unit of what the sensor measures."""
+        """(3,) bias in the SI unit of what the sensor measures."""
         return np.array(bias_of(self.found.quantity, self.entry))
 
     @property
     def bias_rad_s(self) -> Array:
-        """(3,), of a gyroscope."""
+        """(3,) biases of a gyroscope."""
         return np.array(self.entry.bias_rad_s)
 
     @property
     def covariance(self) -> Array:
-        """(6, 6) in the order kx ky kz bx by bz."""
+        """(6, 6) covariance in the order kx ky kz bx by bz."""
         return np.array(self.entry.covariance)
 
     @property

@@ -86,7 +86,7 @@ def colour_left(residuals: Array) -> float:
 
 
 def _columns(cycles: Array, count: int) -> Array:
-    """(n, 8 k) of k lines in n readings."""
+    """(n, 8 k) columns of k lines in n readings."""
     return waves(cycles, np.arange(count) / count)
 
 

@@ -57,13 +57,13 @@ def field_samples(recording: ObservedRun, name: str) -> tuple[Array, Array] | No
 
 
 def _time_s(recording: ObservedRun, name: str, other: str) -> Array:
-    """(n,) on the arm's clock, by the time base of a sensor whose clock stamps the magnetometer's samples too."""
+    """(n,) times on the arm's clock, by the time base of a sensor whose clock stamps the magnetometer's samples too."""
     stamps_s = recording.run.samples[name]["board_time_us"] * 1e-6
     return recording.sensors[other].time_base.controller_time_s(stamps_s)
 
 
 def _field_t(recording: ObservedRun, name: str, samples: NDArray[Any]) -> Array:
-    """(n, 3) in tesla."""
+    """(n, 3) readings of the field in tesla."""
     field_t: Array = (
         samples["field_counts"].astype(np.float64) * recording.run.magnetometers[name].sensitivity_t_per_count
     )

@@ -53,7 +53,7 @@ def find_placements(
     attitudes: Array,
     std_rad: Array | None,
 ) -> Placements:
-    """From readings (n, 3) at rising times (n,) and a reference's rows.
+    """Placements found in readings (n, 3) at rising times (n,) by a reference's rows.
 
     Raises Fault `not_at_rest` where the body moves in every row.
     """
@@ -127,7 +127,7 @@ def _read(readings: Mapping[Quantity, Array], cuts: Sequence[NDArray[np.intp]]) 
 
 
 def _filled(variances: Array, counts: NDArray[np.intp], readings: Array) -> Array:
-    """(N, 3) with what too few samples do not tell, from the others or from how readings (n, 3) jump."""
+    """(N, 3) variances with what too few samples do not tell, from the others or from how readings (n, 3) jump."""
     unknown = np.isnan(variances[:, 0])
     if not unknown.any():
         return variances

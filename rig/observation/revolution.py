@@ -40,7 +40,7 @@ class Revolution:
 
     @property
     def duration_s(self) -> float:
-        """T."""
+        """Duration T of the revolution."""
         return self.end_s - self.start_s
 
     @property

@@ -32,7 +32,7 @@ def flank_s(duration_s: float) -> float:
 
 
 def weights(time_s: Array, start_s: float, end_s: float) -> Array:
-    """(n,) that add up to 1, of readings at times (n,) between start and end."""
+    """(n,) weights that add up to 1, of readings at times (n,) between start and end."""
     inside = np.clip(np.minimum(time_s - start_s, end_s - time_s) / flank_s(end_s - start_s), 0.0, 1.0)
     window = np.sin(np.pi / 2 * inside) ** 2
     shares: Array = window / np.sum(window)

@@ -81,7 +81,7 @@ def turned(
 
 
 def _between(sweep: Observation, lying: Sequence[Window]) -> Window | None:
-    """From the end of the rest before it to the beginning of the one after, where both are near."""
+    """The time from the end of the rest before a sweep to the beginning of the one after, where both are near."""
     start_s, end_s = sweep.average.start_s, sweep.average.end_s
     before = [rest for rest in lying if rest.start_s < start_s and rest.end_s >= start_s - REACH_S]
     after = [rest for rest in lying if rest.end_s > end_s and rest.start_s <= end_s + REACH_S]

@@ -21,7 +21,7 @@ Ending = TypeVar("Ending", bound=Event)
 
 @dataclass(frozen=True, slots=True)
 class Window:
-    """From one controller time to another, s."""
+    """A window from one controller time to another, s."""
 
     start_s: float
     end_s: float

@@ -43,7 +43,7 @@ def new_token() -> str:
 
 @dataclass(frozen=True, slots=True)
 class Door:
-    """Under which `hosts` (name:port) the server is known, the `token`, and whether it is needed even to look on.
+    """The page's door: under which `hosts` (name:port) it is known, the `token`, whether it is needed even to look on.
 
     `pass_to_look` opens the certificate and nothing else: it is for a cookie, and cookies know no port.
     """
@@ -84,7 +84,7 @@ def _same(given: str, wanted: str) -> bool:
 
 
 class Guard:
-    """Around the application: refuses what comes from elsewhere, and tells browsers what they may do with it."""
+    """A guard around the application: refuses what comes from elsewhere, tells browsers what they may do with it."""
 
     def __init__(self, app: "ASGIApp", door: Door, connections: Connections) -> None:
         self._app, self._door, self._connections = app, door, connections

@@ -23,7 +23,7 @@ def _length(order: list[int], between_s: Array) -> float:
 
 
 def _nearest_neighbours(between_s: Array, first: int) -> list[int]:
-    """From place 0 to `first`, then always to the nearest that is left."""
+    """The order from place 0 to `first`, then always to the nearest that is left."""
     order, left = [0, first], [place for place in range(1, len(between_s)) if place != first]
     while left:
         order.append(min(left, key=lambda place: float(between_s[order[-1], place])))

@@ -14,7 +14,7 @@ from rig.station.plain_text import plain
 
 
 def account_document(account: AttitudeAccount) -> dict[str, Any]:
-    """SI units; a condition number of attitudes that do not tell the model's second order is null."""
+    """What attitudes tell, in SI units; the condition number of those that do not tell the second order is null."""
     return {
         "count": account.count,
         "order": account.order,

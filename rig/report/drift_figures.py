@@ -43,7 +43,7 @@ def write_drift_figures(outcome: Outcome, document: ResultDocument, folder: Path
 
 
 def draw_drift(axes: "Axes", quantity: Quantity, drift: BiasDrift) -> None:
-    """Dots: scale and axes held. Crosses: everything found anew. A line before each repeat at which the bias moved."""
+    """Draw the bias by repeat: dots with scale and axes held, crosses all found anew, lines where it moved."""
     size = quantity.drift.size
     repeat = np.arange(1, len(drift.held.bias) + 1)
     again = [(number, found) for number, found in zip(repeat, drift.anew, strict=True) if isinstance(found, Anew)]

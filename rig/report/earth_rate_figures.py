@@ -70,7 +70,7 @@ def errors(recording: ObservedRun, sensor: str, explained: Explained, earth: Ear
 
 
 def draw_errors(figure: "Figure", time_s: Array, turned: Array, error: Array) -> None:
-    """Left as Fig. 2, right as Fig. 3, in °/s."""
+    """Draw the turned rate left as in Fig. 2, the error right as in Fig. 3, °/s."""
     left, right = figure.subplots(1, 2)
     for i, axis in enumerate("xyz"):
         left.plot(*_curve(time_s, np.degrees(turned[:, i])), lw=0.7, color=f"C{i}", label=axis)

@@ -102,7 +102,7 @@ class _Thinning:
 
 @dataclass(slots=True)
 class Acquisition:
-    """Fed by the reader threads of the sources and of the arm, read by the script's. `counts` by the sensor's name.
+    """What comes from the sources' and the arm's reader threads, read by the script's. `counts` by the sensor's name.
 
     What comes before there is a `recorder` is not kept. From the first `keep` on, all that came since the last
     `KEPT_PARTS` of them is also held in memory.
@@ -155,7 +155,7 @@ class Acquisition:
             self._thinning = None
 
     def keep(self) -> None:
-        """From now on hold what comes, as a part of its own; the oldest part goes when there are too many."""
+        """Hold what comes from now on, as a part of its own; the oldest part goes when there are too many."""
         with self._lock:
             self._kept.append(_Part(defaultdict(list), []))
 

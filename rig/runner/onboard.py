@@ -55,12 +55,12 @@ class BoardCalibration:
         self.acquisition.keep()
 
     def keep(self, sweep: Sweep) -> None:
-        """Just before a sweep: from now on board and host keep what they see."""
+        """Make board and host keep what they see, from just before a sweep."""
         self.acquisition.keep()
         self.board.keep([index for index, _ in self.sensors.values()], sweep.duration_s + KEEP_LONGER_S)
 
     def observe(self, sweep: Sweep) -> None:
-        """Just after it: the board averages the revolution. One that is not fit for it is noted and left out."""
+        """Make the board average the revolution, just after it. One that is not fit for it is noted and left out."""
         for name in self.sensors:
             try:
                 found, speed_rad_s = self._observe(name, sweep)

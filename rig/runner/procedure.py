@@ -134,7 +134,7 @@ class Rig:
             raise Refused("not_confirmed", "nobody agreed to the movement", "Run again and agree, or give --yes")
 
     def _refuse_moved(self) -> None:
-        """While the operator thought, somebody may have moved the arm: it would take another way than announced."""
+        """Refuse an arm that somebody moved while the operator thought: it would take another way than announced."""
         moved_rad = max(map(abs, travel(self.plan.start_q_rad, self.devices.turner.latest.q_rad)))
         if moved_rad > SAME_POSE_RAD:
             raise Refused(
@@ -265,7 +265,7 @@ class Rig:
         self.recording.check()
 
     def _watch(self, step: Step) -> None:
-        """Called many times a second while the arm is busy: look after board and recording, tell the operator."""
+        """Look, many times a second while the arm is busy, after board and recording, tell the operator."""
         self._check()
         state = self.devices.turner.latest
         within_s = min(state.time_s - self._step_started_s, step.duration_s)

@@ -63,7 +63,7 @@ class _Watched:
 
 @dataclass(slots=True)
 class Settling:
-    """Fed by the reader threads of the sources, asked by the script's."""
+    """What tells whether sensors have settled: fed by the sources' reader threads, asked by the script's."""
 
     _watched: dict[str, _Watched] = field(default_factory=dict)
     _lock: threading.Lock = field(default_factory=threading.Lock)

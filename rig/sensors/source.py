@@ -22,7 +22,7 @@ class SampleSource(Protocol):
         ...
 
     def start(self) -> None:
-        """From now on every sample is handed on, those of each sensor numbered from 0."""
+        """Start to hand every sample on, those of each sensor numbered from 0."""
         ...
 
     def check(self, clock_s: float | None = None) -> None:

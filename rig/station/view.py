@@ -39,7 +39,7 @@ class LiveView:
         self._samples = SamplesTaken(())
 
     def event(self, event: RunEvent) -> None:
-        """Show it: as a line, or in the panel."""
+        """Show an event: as a line, or in the panel."""
         match event:
             case SamplesTaken():
                 self._samples = event

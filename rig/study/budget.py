@@ -94,7 +94,7 @@ def study(settings: Settings) -> Report:
 
 
 def errors(effects: Effects, settings: Settings) -> Array:
-    """(draws, 2, 6) of scale and bias over their standard uncertainties, with and without the remedies."""
+    """(draws, 2, 6) errors of scale and bias over their standard uncertainties, with and without the remedies."""
     draws = settings.runs or DRAWS
     shares = [draws // BATCHES + (batch < draws % BATCHES) for batch in range(BATCHES)]
     return np.concatenate(in_parallel(partial(_batch, effects), [share for share in shares if share], settings))
@@ -177,7 +177,7 @@ def _one(effects: Effects, rng: np.random.Generator) -> Array:
 
 
 def _curved(along_rad_s: Array, effects: Effects, rng: np.random.Generator) -> Array:
-    """(N, 3) of rates along the axes what a sensor takes them for that is right at the speed of the sweeps."""
+    """(N, 3) what a sensor takes rates along its axes for, if it is right at the speed of the sweeps."""
     cube, square = effects.nonlinearity / np.array([[CUBE_MISSED], [SQUARE_MISSED]]) * rng.uniform(-1, 1, (2, 3))
     share, swept = along_rad_s / effects.full_scale_rad_s, effects.speed_rad_s / effects.full_scale_rad_s
     curve = cube * (share**2 - swept**2) + square * share

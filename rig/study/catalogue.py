@@ -16,7 +16,7 @@ class Entry:
     function: str
 
     def run(self, settings: Settings) -> Report:
-        """Compute it."""
+        """Compute the study."""
         module, name = self.function.split(":")
         study: Callable[[Settings], Report] = getattr(importlib.import_module(f"rig.study.{module}"), name)
         return study(settings)

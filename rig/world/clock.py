@@ -53,7 +53,7 @@ class Clock:
         return self._stop_at
 
     def pace(self, time_scale: float) -> None:
-        """From now on at most so many times as fast as wall time. Raises ValueError for what is no pace."""
+        """Go at most so many times as fast as wall time, from now on. Raises ValueError for what is no pace."""
         if not 0.0 < time_scale < float("inf"):
             raise ValueError(f"{time_scale} is no time scale")
         self.time_scale = time_scale

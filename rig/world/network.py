@@ -161,7 +161,7 @@ class Connection:
 
 
 class Listener:
-    """One port. `limit` bounds the clients at a time: further ones are hung up on at once.
+    """A port that listens. `limit` bounds the clients at a time: further ones are hung up on at once.
 
     A client may be `lag_s` of the world's time behind before the world waits for it. While the world has more to do, a
     port that `gathers` hands on several ticks' bytes in one go, as a USB adapter does: every packet wakes its reader.
@@ -226,7 +226,7 @@ class Listener:
         connection.greet()
 
     def set_silent(self, silent: bool) -> None:
-        """While silent nothing is sent and nothing read; the connections stay open."""
+        """Let a silent port send and read nothing; the connections stay open."""
         self.silent = silent
         for connection in self.connections:
             connection.watch()

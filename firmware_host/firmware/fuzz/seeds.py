@@ -23,7 +23,7 @@ def frame(name: str, *values: Any) -> bytes:
 
 
 def convert(sensors: int, times: int, period_us: int) -> bytes:
-    """So many conversions of the sensors in the mask."""
+    """An input that makes the sensors in the mask convert so many times."""
     return bytes((CONVERT, sensors, 7, times, period_us // 50))
 
 

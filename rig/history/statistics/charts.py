@@ -84,7 +84,7 @@ def beyond(deviation: Array, average: Array, limit: float | Array) -> Alarms:
 
 
 def _deviation(values: Array, std: Array, counted: Alarms) -> Array:
-    """(…) of the last result from those `counted` (…, i) before it, as the normal deviate of the same probability.
+    """(…) deviation of the last result from those `counted` (…, i) before it, as the normal deviate as probable.
 
     With equal stds it is (x − x̄)/(s √(1 + 1/n)) whatever they are; else weights hold the variance between runs as well
     (as in `random_effects.fit`).

@@ -25,7 +25,7 @@ class Fitted:
 
     @property
     def std(self) -> Array:
-        """(p,) of the coefficients."""
+        """(p,) standard deviations of the coefficients."""
         return np.sqrt(np.diag(self.covariance))
 
     @property

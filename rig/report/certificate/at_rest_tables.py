@@ -50,7 +50,7 @@ class DriftRow:
 
 
 def acceleration_rows(found: AccelerometerEntry) -> list[AxisRow]:
-    """± U; the bias in m/s² and in thousandths of the stated gravity."""
+    """An accelerometer's axes with U; the bias in m/s² and in thousandths of the stated gravity."""
     spread, milli = expanded_uncertainties(found.budget, found.covariance), 1000 / found.gravity_m_s2
     return [
         AxisRow(
@@ -73,7 +73,7 @@ def second_order_rows(found: AccelerometerEntry) -> list[tuple[str, Pair]]:
 
 
 def field_rows(found: MagnetometerEntry) -> list[FieldRow]:
-    """± U; the bias in µT."""
+    """A magnetometer's axes with U; the bias in µT."""
     spread = expanded_uncertainties(found.budget, found.covariance)
     return [
         FieldRow(axis, pair(found.scale[i], spread[i]), pair(MICRO * found.bias_t[i], MICRO * spread[3 + i]))

@@ -29,7 +29,7 @@ UNKNOWN_AIR = dcc(
 
 
 def digital_certificate(certificate: Certificate) -> bytes:
-    """XML.
+    """The digital calibration certificate as XML.
 
     Raises Refused `no_digital_certificate` where nothing was calibrated, an uncertainty or the country is not known.
     """

@@ -115,7 +115,7 @@ def _turned(matrix: Array, readings: Array, attitude_error_rad: float) -> Array:
 
 
 def biases_by_repeat(quantity: Quantity, found: DriftEntry) -> Residuals:
-    """Less their mean over the repeats."""
+    """The biases by repeat, less their mean over the repeats."""
     bias = np.array([each.held.bias for each in found.repeats])
     std = np.array([each.held.std for each in found.repeats])
     return _marked(bias - bias.mean(axis=0), std, quantity, OF_REPEATS, shown=FROM_MEAN)

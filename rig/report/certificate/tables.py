@@ -101,7 +101,7 @@ def check_row(check: CheckEntry) -> CheckRow:
 
 
 def verification_rows(found: VerificationEntry) -> Iterator[tuple[str, ...]]:
-    """Axis; RMS as found and as left; largest mean over a revolution as found and as left. All in rad/s."""
+    """A verification's axes: RMS as found and as left; largest mean over a revolution as found and as left; rad/s."""
     for i, axis in enumerate(AXES):
         yield (
             axis,

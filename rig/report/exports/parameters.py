@@ -41,7 +41,7 @@ class Triad:
 
     @property
     def scale(self) -> Array:
-        """(3, 3) diagonal: what one unit reads as."""
+        """(3, 3) diagonal matrix of what one unit reads as."""
         return np.diag(np.linalg.norm(self.matrix, axis=1))
 
     @property
@@ -53,7 +53,7 @@ class Triad:
 
 @dataclass(frozen=True, slots=True)
 class Exported:
-    """One sensor; `g_sensitivity` (3, 3) rad/s per m/s² is zero where it was not found."""
+    """What is exported of one sensor; `g_sensitivity` (3, 3) rad/s per m/s² is zero where it was not found."""
 
     name: str
     part: str

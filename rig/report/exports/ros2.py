@@ -81,7 +81,7 @@ def _messages(types: Mapping[str, Any], recording: ObservedRun, name: str, frame
 
 
 def _covariance(noises: Sequence[Array]) -> Array:
-    """(9,) of one sample, row by row; zeros, which ROS reads as not known, where nothing stood still."""
+    """(9,) covariance of one sample, row by row; zeros, which ROS reads as not known, where nothing stood still."""
     variance = np.mean(np.square(noises), axis=0) if noises else np.zeros(3)
     return np.diag(variance).ravel()
 

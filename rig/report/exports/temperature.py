@@ -37,7 +37,7 @@ def at_temperature(result: ResultDocument, drift: ResultDocument, temperature_c:
 def _change(
     drift: ResultDocument, name: str, quantity: Literal["rate", "acceleration"], from_c: float, to_c: float
 ) -> Array:
-    """(3,) by which the bias of the reading changes."""
+    """(3,) change of the reading's bias."""
     found = drift.bias_drift.get(name, {}).get(quantity)
     slope = None if found is None else found.over_temperature
     if not isinstance(slope, SlopeEntry):

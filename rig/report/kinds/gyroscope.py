@@ -116,7 +116,7 @@ def _beside(sensor: SensorEntry) -> Iterator[str]:
 
 
 def _speeds(sensor: SensorEntry) -> Iterator[str]:
-    """Where it is valid: one speed does not tell how far the sensor is from linear."""
+    """Where a calibration is valid, in words: one speed does not tell how far the sensor is from linear."""
     speeds, loads, found = speed_words(sensor), load_words(sensor), sensor.nonlinearity
     if loads is not None:
         yield f"along its own axes the sweeps turned it by {loads} °/s"

@@ -82,7 +82,7 @@ class Kvh1775:
 
     @property
     def port(self) -> str:
-        """Where it is."""
+        """The port that the instrument is at."""
         return self._port
 
     def correct(self, settings: dict[str, str]) -> None:
@@ -136,7 +136,7 @@ class Kvh1775:
         )
 
     def start(self, wanted: Wanted) -> None:
-        """From the next message on, everything goes to `on_messages`."""
+        """Start to hand everything to `on_messages`, from the next message on."""
         with self._news:
             self._counter = MessageCounter(1e6 / wanted.rate_hz, timed=wanted.message == "B")
             self._format = wanted.message.encode()

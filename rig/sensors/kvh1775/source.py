@@ -126,7 +126,7 @@ class Kvh1775Source:
             )
 
     def _temperatures(self, messages: NDArray[Any]) -> NDArray[np.int64]:
-        """(n,) in hundredths of a degree; format C says it in every fourth message, and `_UNKNOWN` before the first."""
+        """(n,) hundredths of a degree; format C says them in every fourth message, and `_UNKNOWN` before the first."""
         if self._wanted.message != "C":
             found: NDArray[np.int64] = messages["temperature"].astype(np.int64)
             return found

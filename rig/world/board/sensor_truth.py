@@ -17,7 +17,7 @@ from rig.world.ur10e.forward_kinematics import rotation_from_vector
 
 
 class SensorTruth:
-    """One sensor. `gyro`, `accelerometer`: their errors, the latter None where it is not read; `temperature_c`: the
+    """A sensor. `gyro`, `accelerometer`: their errors, the latter None where it is not read; `temperature_c`: the
     die's, of a part that gets power at the time `powered_s`.
     """
 

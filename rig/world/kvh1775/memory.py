@@ -55,7 +55,7 @@ class Memory:
 
     @property
     def axes(self) -> NDArray[np.float64]:
-        """(3, 3) by which rates and accelerations are multiplied: any matrix, not only rotations."""
+        """(3, 3) matrix by which rates and accelerations are multiplied: any matrix, not only rotations."""
         return _matrix(self["AXES"])
 
     def obey(self, command: str) -> str:

@@ -21,7 +21,7 @@ FORGOTTEN = 12.0  # settling times after which nothing is left of it
 
 @dataclass(frozen=True, slots=True)
 class Errors:
-    """Amplitudes. `hysteresis_rad`: between both directions; `vibration_rms_rad_s`: of each wrist's rate.
+    """Sizes of errors. `hysteresis_rad`: between both directions; `vibration_rms_rad_s`: of each wrist's rate.
 
     `vibration_rad_s`, `settling_rad_s`: angular frequencies.
     """

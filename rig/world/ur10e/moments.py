@@ -71,7 +71,7 @@ def _frames(q: Array, links: Links) -> tuple[Array, Array]:
 
 
 def _centres(q: Array, payload_centre_m: Sequence[float], links: Links) -> Array:
-    """(7, 3) of the links and of the payload, m."""
+    """(7, 3) centres of mass of the links and of the payload, m."""
     rotations, places = _frames(q, links)
     own = np.array([*CENTRES_M, payload_centre_m])
     carried = [*range(1, len(places)), len(places) - 1]  # the payload sits where the last link does

@@ -271,7 +271,7 @@ class Robot:
 
     @property
     def stopped_for_s(self) -> float:
-        """Since the last protective or emergency stop."""
+        """Seconds since the last protective or emergency stop."""
         return (self.tick - self._stopped_tick) * TICK_S
 
     def unlock_protective_stop(self) -> None:

@@ -99,7 +99,7 @@ def line(
 
 
 def change_speed(q_rad: Joints, from_rad_s: Joints, to_rad_s: Joints, acceleration_rad_s2: float) -> Trajectory:
-    """From one velocity to another, the joint that changes most at the acceleration; then on for ever, or at rest."""
+    """A change of velocity, the joint that changes most at the acceleration; then on for ever, or at rest."""
     change = tuple(b - a for a, b in zip(from_rad_s, to_rad_s, strict=True))
     ramp_s = max(abs(c) for c in change) / acceleration_rad_s2
     pieces = []
