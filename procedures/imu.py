@@ -13,19 +13,26 @@ from rig.procedure import Dwell, ImuSection, Procedure, Rest, Sweep, Transfer, V
 
 def imu(rig: Verbs) -> None:
     """The steps, in the order the plan has them (`rig plan CONFIG` prints it, and what the attitudes will tell)."""
-    rig.preflight()  # refuses unless limits, clearances, payload, modes and the speed slider are right; then asks
-    rig.start_sampling()  # from here on every sample and every arm state is in run.h5
+    # Refuses unless limits, clearances, payload, modes and the speed slider are right; then asks.
+    rig.preflight()
+    # From here on every sample and every arm state is in run.h5.
+    rig.start_sampling()
     for step in rig.plan.steps:
         match step:
             case Transfer():
-                rig.move(step)  # to where the next sweep begins, or to the next attitude
+                # To where the next sweep begins, or to the next attitude.
+                rig.move(step)
             case Sweep():
-                rig.sweep(step)  # one revolution at constant speed; the board averages it while the arm rests
+                # One revolution at constant speed; the board averages it while the arm rests.
+                rig.sweep(step)
             case Rest():
-                rig.rest(step)  # stand still
+                # Stand still: what the gyroscopes read now is their bias.
+                rig.rest(step)
             case Dwell():
-                rig.dwell(step)  # let the sensors settle, then stand still: the accelerometers' part
-    rig.solve_on_board()  # the gyroscopes' calibration by the board, to be held against the computer's
+                # Let the sensors settle, then stand still: the accelerometers' part.
+                rig.dwell(step)
+    # The gyroscopes' calibration by the board, to be held against the computer's.
+    rig.solve_on_board()
 
 
 PROCEDURE = Procedure(name="imu", section=ImuSection, plan=plan_imu, script=imu)

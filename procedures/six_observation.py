@@ -25,10 +25,13 @@ from rig.procedure import (
 
 def six_observation(rig: Verbs) -> None:
     """The steps, in the order the plan has them (`rig plan CONFIG` prints it)."""
-    rig.preflight()  # refuses unless limits, payload, modes and the speed slider are right; asks before anything moves
-    rig.start_sampling()  # from here on every sample and every arm state is in run.h5
+    # Refuses unless limits, payload, modes and the speed slider are right; asks before anything moves.
+    rig.preflight()
+    # From here on every sample and every arm state is in run.h5.
+    rig.start_sampling()
     movement(rig)
-    rig.solve_on_board()  # the board's own calibration, to be held against the computer's
+    # The board's own calibration, to be held against the computer's.
+    rig.solve_on_board()
 
 
 def movement(rig: Verbs) -> None:
@@ -36,12 +39,14 @@ def movement(rig: Verbs) -> None:
     for step in rig.plan.steps:
         match step:
             case Transfer():
-                rig.move(step)  # to where the next sweep begins
+                # To where the next sweep begins.
+                rig.move(step)
             case Sweep():
                 # Ramp up, one revolution at constant speed, ramp down; the board averages it while the arm rests.
                 rig.sweep(step)
             case Rest():
-                rig.rest(step)  # stand still
+                # Stand still: what the gyroscopes read now is their bias.
+                rig.rest(step)
 
 
 PROCEDURE = Procedure(
@@ -49,7 +54,8 @@ PROCEDURE = Procedure(
     section=SixObservationSection,
     plan=plan_six_observation,
     script=six_observation,
-    then="verify",  # if the configuration says `verify: true` and the calibration passes
+    # If the configuration says `verify: true` and the calibration passes.
+    then="verify",
 )
 
 if __name__ == "__main__":

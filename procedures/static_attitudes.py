@@ -23,16 +23,21 @@ from rig.procedure import (
 
 def static_attitudes(rig: Verbs) -> None:
     """The steps, in the order the plan has them (`rig plan CONFIG` prints it, and what the attitudes will tell)."""
-    rig.preflight()  # refuses unless limits, clearances, payload, modes and the speed slider are right; then asks
-    rig.start_sampling()  # from here on every sample and every arm state is in run.h5
+    # Refuses unless limits, clearances, payload, modes and the speed slider are right; then asks.
+    rig.preflight()
+    # From here on every sample and every arm state is in run.h5.
+    rig.start_sampling()
     for step in rig.plan.steps:
         match step:
             case Transfer():
-                rig.move(step)  # to the next attitude
+                # To the next attitude.
+                rig.move(step)
             case Dwell():
-                rig.dwell(step)  # let the sensors settle, then stand still
+                # Let the sensors settle, then stand still.
+                rig.dwell(step)
             case Rest():
-                rig.rest(step)  # at home, where a field that drifts shows (procedure.field_test_s)
+                # At home, where a field that drifts shows (procedure.field_test_s).
+                rig.rest(step)
 
 
 PROCEDURE = Procedure(

@@ -27,9 +27,11 @@ from rig.procedure import (
 
 
 def verify(rig: Verbs) -> None:
-    """The same steps as the calibration's, without solving anything."""
-    rig.preflight()  # refuses unless limits, payload, modes and the speed slider are right; asks before anything moves
-    rig.start_sampling()  # the gyroscopes send corrected rates, the reference its raw readings
+    """The steps of the calibration, without solving anything."""
+    # Refuses unless limits, payload, modes and the speed slider are right; asks before anything moves.
+    rig.preflight()
+    # The gyroscopes send corrected rates, the reference its raw readings.
+    rig.start_sampling()
     movement(rig)
 
 
