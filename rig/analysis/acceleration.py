@@ -15,9 +15,9 @@ from rig.data.run_file import RecordedSensor
 from rig.data.settings import PlannedDwell, RunSettings, Site
 from rig.errors import Fault
 from rig.estimation.accelerometer import AccelerometerSolution, solve_accelerometer, specific_force
+from rig.estimation.accelerometer_model import LEVER, NO_SWEEPS, SECOND, Dwells, Movement, Sweeps
 from rig.estimation.arrays import Array
 from rig.estimation.budget import Budget
-from rig.estimation.felt import LEVER, NO_SWEEPS, SECOND, Dwells, Movement, Sweeps
 from rig.estimation.imu import ImuSolution, solve_imu
 from rig.estimation.reference_budget import scale_and_bias_covariance
 from rig.estimation.reference_model import F

@@ -12,10 +12,10 @@ from rig.data.budget_entries import IN_U
 from rig.data.run_file import RecordedSensor
 from rig.data.settings import OfSensor, Uncertainty
 from rig.estimation.accelerometer_errors import AccelerometerErrors
+from rig.estimation.accelerometer_model import Movement
 from rig.estimation.arrays import Array
 from rig.estimation.budget import Contributor
 from rig.estimation.earth import MICRO_G_M_S2, STANDARD_GRAVITY_M_S2
-from rig.estimation.felt import Movement
 from rig.estimation.own_errors import from_their_mean, unseen_k
 from rig.estimation.reading_errors import bending, bias_warming, flickering, scale_warming, wandering
 from rig.estimation.reference_budget import Spread

@@ -7,8 +7,8 @@ import numpy as np
 
 from rig.analysis.seen import WAVE_SHARE
 from rig.arm.kinematics import WRIST_1, DenavitHartenberg, angle_waves, flange_attitude, flange_errors
+from rig.estimation.accelerometer_model import ARM_SHARE, OWN_ERRORS, SHARE, SHARED_ERRORS, TURNS, Movement, turned
 from rig.estimation.arrays import Array
-from rig.estimation.felt import ARM_SHARE, OWN_ERRORS, SHARE, SHARED_ERRORS, TURNS, Movement, turned
 
 ERRORS, STEADY = 6, 2  # of each wrist; of these, its twist and its zero; the others are waves of its angle
 

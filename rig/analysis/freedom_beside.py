@@ -12,12 +12,12 @@ from rig.analysis.acceleration import AccelerometerResult
 from rig.analysis.calibration import SensorResult
 from rig.analysis.magnetic_field import MagnetometerResult
 from rig.analysis.reversal import MagnetometerReversal
+from rig.estimation.accelerometer_model import SECOND
 from rig.estimation.arrays import Array
 from rig.estimation.attitude_error import AttitudeError
 from rig.estimation.budget import Budget
 from rig.estimation.coverage import effective_freedom
 from rig.estimation.explained import Explained
-from rig.estimation.felt import SECOND
 from rig.estimation.reference_budget import response_in_attitudes
 from rig.estimation.reference_model import F
 from rig.estimation.sensor_axes import angle_jacobian, nearest_rotation

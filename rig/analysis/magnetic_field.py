@@ -16,9 +16,9 @@ from rig.analysis.reference_budgets import magnetometer_budget
 from rig.data.run_file import RecordedMagnetometer
 from rig.data.settings import RunSettings, Site
 from rig.errors import Fault
+from rig.estimation.accelerometer_model import Dwells
 from rig.estimation.arrays import Array
 from rig.estimation.budget import Budget
-from rig.estimation.felt import Dwells
 from rig.estimation.magnetometer import (
     FieldDrift,
     MagnetometerSolution,

@@ -15,9 +15,9 @@ from rig.arm.motion import Dwell, Plan, Sweep
 from rig.config.sensor_catalogue import PARTS
 from rig.config.sensor_sections import SensorSection, mounting_matrix
 from rig.data.settings import RunSettings, Site, Uncertainty
+from rig.estimation.accelerometer_model import NO_SWEEPS, PARAMETERS, Dwells, Movement, Sweeps, predicted
 from rig.estimation.arrays import Array
 from rig.estimation.earth import MICRO_G_M_S2, STANDARD_GRAVITY_M_S2
-from rig.estimation.felt import NO_SWEEPS, PARAMETERS, Dwells, Movement, Sweeps, predicted
 from rig.estimation.reference_model import REFERENCE
 
 

@@ -7,11 +7,11 @@ import numpy as np
 
 from rig.analysis.accelerometer_errors import Sheet, of_its_own
 from rig.data.settings import Site
+from rig.estimation.accelerometer_model import Movement
 from rig.estimation.arrays import Array
 from rig.estimation.attitude_error import AttitudeError
 from rig.estimation.budget import NOT_GIVEN, Budget, Contributor
 from rig.estimation.earth import STANDARD_GRAVITY_M_S2
-from rig.estimation.felt import Movement
 from rig.estimation.imu import ImuSolution
 from rig.estimation.magnetometer import FieldDrift, MagnetometerSolution, Uniformity
 from rig.estimation.reference_budget import (

@@ -1,9 +1,9 @@
 """Whether what a recording tells of a sensor in a constant reference agrees with itself: dwells and sweeps, one model.
 
 An accelerometer's readings, or a magnetometer's, which are dwells alone, must be explained by the calibration that was
-found from them (`rig.estimation.felt`), to within their noise, an arm that is not quite where it says, and what is
-stated of the rest. How far the arm is off is found anew beside every suspicion, so that what is wrong does not excuse
-itself: a suspicion is told by how much likelier it makes the readings.
+found from them (`rig.estimation.accelerometer_model`), to within their noise, an arm that is not quite where it says,
+and what is stated of the rest. How far the arm is off is found anew beside every suspicion, so that what is wrong does
+not excuse itself: a suspicion is told by how much likelier it makes the readings.
 """
 
 from collections.abc import Sequence
@@ -13,8 +13,8 @@ import numpy as np
 
 from rig.analysis.reference_suspected import DAMAGES, Read, bias_over_time, of_piece, suspicions
 from rig.analysis.suspicion import Statistic, basis, told_beside, told_by, told_from, unlike_the_others
+from rig.estimation.accelerometer_model import effects, predicted
 from rig.estimation.arrays import Array
-from rig.estimation.felt import effects, predicted
 from rig.estimation.imu_fit import slopes
 from rig.estimation.reading_errors import noise
 from rig.estimation.shared_errors import Apart, apart, information, likeliest_error, more_likely

@@ -26,9 +26,9 @@ from rig.analysis.seen import since_first_s
 from rig.analysis.suspicion import Statistic
 from rig.arm.kinematics import WRIST_1
 from rig.data.settings import Uncertainty
+from rig.estimation.accelerometer_model import LEVER, NO_SWEEPS, PARAMETERS, Movement
 from rig.estimation.arrays import Array
 from rig.estimation.earth import MICRO_G_M_S2
-from rig.estimation.felt import LEVER, NO_SWEEPS, PARAMETERS, Movement
 from rig.observation.observed_run import ObservedRun
 
 DISTURBED_DWELL, DISTURBED_SWEEP = "disturbed_dwell", "disturbed_sweep"
@@ -153,7 +153,7 @@ def reference_statistics(held: ReadInReference, rate: float, *, drifting: bool) 
 
 
 def _theta(matrix: Array, reference: Array, bias: Array) -> Array:
-    """(22,) parameters that dwells tell, as `rig.estimation.felt` orders them."""
+    """(22,) parameters that dwells tell, as `rig.estimation.accelerometer_model` orders them."""
     theta = np.zeros(PARAMETERS)
     theta[: LEVER.start] = np.concatenate([matrix.ravel(), reference, bias])
     return theta

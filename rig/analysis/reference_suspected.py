@@ -9,8 +9,8 @@ from dataclasses import dataclass
 import numpy as np
 
 from rig.analysis.suspicion import Suspicions
+from rig.estimation.accelerometer_model import SECOND, Movement, cross, felt, jacobian
 from rig.estimation.arrays import Array
-from rig.estimation.felt import SECOND, Movement, cross, felt, jacobian
 from rig.estimation.reading_errors import in_sweeps, of_pieces, of_sensor, per_axis
 from rig.estimation.reference_model import REFERENCE, matrix
 

@@ -1,9 +1,9 @@
-"""An accelerometer calibrated on an arm from sweeps and attitudes together: the model of `rig.estimation.felt`.
+"""An accelerometer calibrated on an arm from sweeps and attitudes together.
 
-F, b, the direction of v_ref, the lever arm r, the delay τ and, where wanted, φ are found together, by weighted least
-squares; the weights allow for an arm that is not quite where it says. Each dwell is turned by small angles of its own,
-the points of a sweep by errors that they share, all of the common size δ: restricted likelihood over dwells and sweeps
-together finds it (`rig.estimation.shared_errors`).
+The model is that of `rig.estimation.accelerometer_model`. F, b, the direction of v_ref, the lever arm r, the delay τ
+and, where wanted, φ are found together, by weighted least squares; the weights allow for an arm that is not quite where
+it says. Each dwell is turned by small angles of its own, the points of a sweep by errors that they share, all of the
+common size δ: restricted likelihood over dwells and sweeps together finds it (`rig.estimation.shared_errors`).
 """
 
 from dataclasses import dataclass
@@ -13,9 +13,7 @@ from numpy.typing import ArrayLike
 
 from rig.estimation import refusals
 from rig.estimation.accelerometer_errors import AccelerometerErrors
-from rig.estimation.arrays import Array
-from rig.estimation.attitude_error import AttitudeError
-from rig.estimation.felt import (
+from rig.estimation.accelerometer_model import (
     DELAY,
     LEVER,
     NO_DWELLS,
@@ -30,6 +28,8 @@ from rig.estimation.felt import (
     predicted,
     turned,
 )
+from rig.estimation.arrays import Array
+from rig.estimation.attitude_error import AttitudeError
 from rig.estimation.imu_fit import Fit, as_expected, free_ways, held_still, most_likely, sizes_of
 from rig.estimation.linear_start import MAX_CONDITION, REMEDY, linear_start
 from rig.estimation.reference_model import BIAS, REFERENCE, matrix
@@ -46,8 +46,8 @@ class ImuSolution:
     - `matrix` F (3, 3), `bias_m_s2` b (3,), `reference_m_s2` v_ref (3,) in base coordinates.
     - `lever_arm_m` r (3,) in the flange's frame and `delay_s` τ, None without sweeps; `second_order_s2_m` φ (3,) or
       None.
-    - `covariance` (22, 22): the rows of F, v_ref, b, r, τ, φ (`rig.estimation.felt`); zero for what was held.
-      `response` (22, 3 K): how they change with the readings.
+    - `covariance` (22, 22): the rows of F, v_ref, b, r, τ, φ (`rig.estimation.accelerometer_model`); zero for what was
+      held. `response` (22, 3 K): how they change with the readings.
     - `attitude_error`: δ of the arm, about each axis.
     - `dwell_residuals_m_s2` (N, 3), `sweep_residuals_m_s2` (M, 3, 3): reading less model; `chi_square` of them, which
       left `freedom`.
@@ -76,7 +76,7 @@ class ImuSolution:
 
     @property
     def theta(self) -> Array:
-        """(22,) parameters as `rig.estimation.felt` orders them."""
+        """(22,) parameters as `rig.estimation.accelerometer_model` orders them."""
         found = np.zeros(PARAMETERS)
         found[: LEVER.start] = np.concatenate([self.matrix.ravel(), self.reference_m_s2, self.bias_m_s2])
         if self.lever_arm_m is not None:

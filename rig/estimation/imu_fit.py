@@ -1,14 +1,14 @@
-"""The most likely θ of an accelerometer on an arm (`rig.estimation.felt`), and how well the readings tell it."""
+"""The most likely θ of `rig.estimation.accelerometer_model`, and how well the readings tell it."""
 
 from dataclasses import dataclass, replace
 
 import numpy as np
 
 from rig.estimation.accelerometer_errors import AccelerometerErrors
+from rig.estimation.accelerometer_model import DELAY, LEVER, PARAMETERS, SECOND, Movement, effects, jacobian, predicted
 from rig.estimation.arrays import Array
 from rig.estimation.attitude_error import PASSES, SETTLED
 from rig.estimation.expected_sizes import Scattered, expected_disturbances, expected_sizes
-from rig.estimation.felt import DELAY, LEVER, PARAMETERS, SECOND, Movement, effects, jacobian, predicted
 from rig.estimation.reading_errors import in_sweeps, noise, walking
 from rig.estimation.reference_model import REFERENCE, STEP_LIMIT, STEP_TOLERANCE, free_directions
 from rig.estimation.shared_errors import Apart, apart, likeliest_error

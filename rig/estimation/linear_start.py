@@ -2,16 +2,16 @@
 
     F⁻¹ m − A v_ref − L (p + r) − b* = 0,   b* = F⁻¹ b
 
-A and L take v_ref and the lever arm to what is felt of them (`rig.estimation.felt`), without delay. L p is known, which
-would make the problem inhomogeneous with a scale of its own; it is a few percent of gravity, so F L p is taken from the
-readings with the F of a first solution that has left it out.
+A and L take v_ref and the lever arm to what is felt of them (`rig.estimation.accelerometer_model`), without delay. L p
+is known, which would make the problem inhomogeneous with a scale of its own; it is a few percent of gravity, so F L p
+is taken from the readings with the F of a first solution that has left it out.
 """
 
 import numpy as np
 
 from rig.estimation import refusals
+from rig.estimation.accelerometer_model import LEVER, PARAMETERS, Movement, of_arms, of_gravity, of_lever
 from rig.estimation.arrays import Array
-from rig.estimation.felt import LEVER, PARAMETERS, Movement, of_arms, of_gravity, of_lever
 from rig.estimation.reference_model import BIAS, REFERENCE, F, matrix
 from rig.estimation.stacked import null_vector, to_theta
 

@@ -10,9 +10,9 @@ from dataclasses import replace
 import numpy as np
 
 from rig.estimation.accelerometer_errors import AccelerometerErrors
+from rig.estimation.accelerometer_model import OWN_ERRORS, SHARE, SHARED_ERRORS, TURNS, Movement, felt, turned
 from rig.estimation.arrays import Array
 from rig.estimation.bias_process import flicker_covariance, walk_covariance
-from rig.estimation.felt import OWN_ERRORS, SHARE, SHARED_ERRORS, TURNS, Movement, felt, turned
 from rig.estimation.reference_model import matrix
 
 ANGLES = 72  # of a turn, over which what is not linear in the acceleration is averaged

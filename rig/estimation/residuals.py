@@ -4,10 +4,10 @@ from dataclasses import replace
 
 import numpy as np
 
-from rig.estimation import attitude_error, felt, reference_model
+from rig.estimation import accelerometer_model, attitude_error, reference_model
+from rig.estimation.accelerometer_model import Dwells, Movement
 from rig.estimation.arrays import Array
 from rig.estimation.explained import Explained
-from rig.estimation.felt import Dwells, Movement
 from rig.estimation.imu import ImuSolution
 from rig.estimation.reading_errors import noise
 from rig.estimation.reference_budget import response_in_attitudes
@@ -33,8 +33,8 @@ def residual_std_rad_s(explained: Explained) -> Array:
 def dwell_residual_std_m_s2(solution: ImuSolution, movement: Movement) -> Array:
     """(N, 3) standard deviations of what is left in an accelerometer's dwells, solved from the `movement`."""
     movement, theta = replace(movement, own=solution.own), solution.theta
-    arm = solution.attitude_error.std_rad * felt.effects(theta, movement)
-    fit = felt.jacobian(theta, movement) @ solution.response
+    arm = solution.attitude_error.std_rad * accelerometer_model.effects(theta, movement)
+    fit = accelerometer_model.jacobian(theta, movement) @ solution.response
     return _left(fit, noise(theta, movement) + arm @ arm.T)[: len(movement.dwells.readings_m_s2)]
 
 

@@ -16,7 +16,7 @@ from rig.data.accelerometer_entries import (
 from rig.data.quantity import ACCELERATION
 from rig.data.result_types import ErrorEntry
 from rig.errors import Fault
-from rig.estimation.felt import DELAY, SECOND
+from rig.estimation.accelerometer_model import DELAY, SECOND
 from rig.estimation.imu import MODEL
 from rig.estimation.residuals import dwell_residual_std_m_s2
 from rig.estimation.triads import Alignment

@@ -11,9 +11,9 @@ from rig.analysis.accelerometer_errors import Sheet, sheet_of
 from rig.analysis.reference_budgets import accelerometer_budget, magnetometer_budget
 from rig.config.attitude_sets import EIGHTEEN
 from rig.data.settings import Site
+from rig.estimation.accelerometer_model import Movement
 from rig.estimation.arrays import Array
 from rig.estimation.budget import Budget
-from rig.estimation.felt import Movement
 from rig.estimation.imu import solve_imu
 from rig.estimation.magnetometer import field_drift, solve_magnetometer, uniformity
 from rig.estimation.reference_budget import scale_and_bias_covariance

@@ -13,8 +13,8 @@ from rig.analysis.reference_consistency import reference_consistency
 from rig.analysis.reference_suspected import Read
 from rig.arm.kinematics import NOMINAL, flange_pose
 from rig.config.attitude_sets import EIGHTEEN
+from rig.estimation.accelerometer_model import DELAY, LEVER, NO_SWEEPS, Movement
 from rig.estimation.arrays import Array
-from rig.estimation.felt import DELAY, LEVER, NO_SWEEPS, Movement
 from rig.estimation.imu import solve_imu
 from support import drawn_accelerations
 from support.arm_attitudes import crooked_arm, joints_rad

@@ -12,8 +12,7 @@ from rig.arm.kinematics import flange_pose
 from rig.config.attitude_sets import EIGHTEEN
 from rig.errors import Fault
 from rig.estimation.accelerometer import solve_accelerometer
-from rig.estimation.arrays import Array
-from rig.estimation.felt import (
+from rig.estimation.accelerometer_model import (
     DELAY,
     LEVER,
     NO_DWELLS,
@@ -26,6 +25,7 @@ from rig.estimation.felt import (
     effects,
     predicted,
 )
+from rig.estimation.arrays import Array
 from rig.estimation.imu import ImuSolution, solve_imu
 from rig.estimation.imu_fit import covariance_bound, most_likely
 from rig.estimation.reference_model import BIAS

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from rig.errors import Fault
-from rig.estimation.felt import DELAY, LEVER, NO_DWELLS, Movement
+from rig.estimation.accelerometer_model import DELAY, LEVER, NO_DWELLS, Movement
 from rig.estimation.imu import solve_imu
 from rig.estimation.imu_fit import covariance_bound
 from rig.estimation.reference_model import BIAS, REFERENCE

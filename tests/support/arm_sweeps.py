@@ -1,7 +1,7 @@
 """Sweeps and dwells of a UR10e that carries an accelerometer: what it feels, from where its flange goes.
 
 The acceleration comes from second differences of the flange's way through the arm as it is; nothing is shared with the
-closed forms of `rig.estimation.felt`.
+closed forms of `rig.estimation.accelerometer_model`.
 """
 
 from collections.abc import Callable
@@ -15,8 +15,8 @@ from rig.arm.kinematics import flange_arm, flange_axes, flange_pose
 from rig.arm.motion import Sweep
 from rig.config.load import parse
 from rig.config.procedure_sections import SixSweepsSection
+from rig.estimation.accelerometer_model import Dwells, Sweeps
 from rig.estimation.arrays import Array
-from rig.estimation.felt import Dwells, Sweeps
 from rig.plans.six_sweeps import plan_six_observation
 from support.synthetic_run import CONFIG
 
@@ -39,7 +39,7 @@ class Truth:
     delay_s: float
 
     def theta(self) -> Array:
-        """(22,) as `rig.estimation.felt` orders it."""
+        """(22,) as `rig.estimation.accelerometer_model` orders it."""
         return np.concatenate(
             [self.matrix.ravel(), self.reference_m_s2, self.bias_m_s2, self.lever_arm_m, [self.delay_s], np.zeros(3)]
         )

@@ -14,11 +14,11 @@ from rig.arm.kinematics import NOMINAL, WRIST_1
 from rig.config.attitude_sets import EIGHTEEN
 from rig.config.sensor_catalogue import PARTS
 from rig.data.settings import Site
+from rig.estimation.accelerometer_model import Movement, felt
 from rig.estimation.arrays import Array
 from rig.estimation.bias_process import flicker_covariance
 from rig.estimation.budget import Budget
 from rig.estimation.earth import MICRO_G_M_S2
-from rig.estimation.felt import Movement, felt
 from rig.estimation.imu import ImuSolution, solve_imu
 from rig.estimation.reading_errors import of_pieces, of_sensor, per_axis
 from support.arm_attitudes import crooked_arm, joints_rad
