@@ -6,7 +6,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from rig.analysis.arm_patterns import Stood, arm_turns
-from rig.analysis.seen import since_first_s
+from rig.analysis.vector_inputs import since_first_s
 from rig.arm.kinematics import WRIST_1, DenavitHartenberg
 from rig.data.budget_entries import IN_U
 from rig.data.run_file import RecordedSensor

@@ -13,8 +13,8 @@ import numpy as np
 from rig.analysis.calibration import SensorResult, found_earth_rate
 from rig.analysis.consistency import Allowance
 from rig.analysis.pieces import REST, Pieces, Stretch
-from rig.analysis.seen import WAVE_SHARE, unknown_of
 from rig.analysis.surroundings import Surroundings
+from rig.analysis.vector_inputs import WAVE_SHARE, unknown_of
 from rig.arm.kinematics import AXIS_ERRORS, WAVES, WRIST_1, WRIST_2, WRIST_3, axis_errors, flange_axes
 from rig.data.settings import OfSensor, Uncertainty
 from rig.estimation.arrays import Array

@@ -5,7 +5,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from rig.analysis.seen import WAVE_SHARE
+from rig.analysis.vector_inputs import WAVE_SHARE
 from rig.arm.kinematics import WRIST_1, DenavitHartenberg, angle_waves, flange_attitude, flange_errors
 from rig.estimation.accelerometer_model import ARM_SHARE, OWN_ERRORS, SHARE, SHARED_ERRORS, TURNS, Movement, turned
 from rig.estimation.arrays import Array

@@ -10,7 +10,7 @@ from functools import partial
 import numpy as np
 
 from rig.analysis.calibration import or_fault
-from rig.analysis.seen import since_first_s
+from rig.analysis.vector_inputs import since_first_s
 from rig.data.quantity import ACCELERATION, RATE, Quantity
 from rig.data.run_file import RecordedSensor
 from rig.data.settings import RunSettings, Site

@@ -21,9 +21,9 @@ from rig.analysis.comparison import Reference, turns_of
 from rig.analysis.contradictions import contradictions, in_reference
 from rig.analysis.magnetic_field import MagnetometerResult, calibrate_magnetometers
 from rig.analysis.onboard_check import Agreement, agreement
-from rig.analysis.seen import arms_of
 from rig.analysis.surroundings import surroundings_of
 from rig.analysis.told_from import ToldFrom
+from rig.analysis.vector_inputs import arms_of
 from rig.analysis.verdict import (
     Check,
     acceleration_checks,

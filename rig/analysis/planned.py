@@ -11,9 +11,9 @@ from rig.analysis.consistency import would_tell
 from rig.analysis.contradictions import rate_of_each
 from rig.analysis.planned_pieces import Planned, planned_pieces
 from rig.analysis.planned_reference import planned_read
-from rig.analysis.seen import known_sensor
 from rig.analysis.suspected import DAMAGES
 from rig.analysis.told_from import ToldFrom, of_reference
+from rig.analysis.vector_inputs import known_sensor
 from rig.arm.motion import Plan
 from rig.config.models import RigConfig
 from rig.config.sensor_catalogue import PARTS

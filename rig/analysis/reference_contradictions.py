@@ -22,8 +22,8 @@ from rig.analysis.reference_readings import (
     resting,
 )
 from rig.analysis.reference_suspected import Read
-from rig.analysis.seen import since_first_s
 from rig.analysis.suspicion import Statistic
+from rig.analysis.vector_inputs import since_first_s
 from rig.arm.kinematics import WRIST_1
 from rig.data.settings import Uncertainty
 from rig.estimation.accelerometer_model import LEVER, NO_SWEEPS, PARAMETERS, Movement

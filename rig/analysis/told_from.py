@@ -8,9 +8,9 @@ import numpy as np
 from rig.analysis.calibration import SensorResult, found_earth_rate
 from rig.analysis.pieces import REST
 from rig.analysis.reference_suspected import DAMAGES as REFERENCE_DAMAGES
-from rig.analysis.seen import unknown_of
 from rig.analysis.surroundings import Surroundings
 from rig.analysis.suspected import DAMAGES, Means
+from rig.analysis.vector_inputs import unknown_of
 from rig.data.quantity import Quantity
 from rig.errors import Fault
 from rig.estimation.arrays import Array

@@ -12,7 +12,7 @@ from itertools import pairwise
 import numpy as np
 
 from rig.analysis.pieces import REST, Pieces, Stretch
-from rig.analysis.seen import since_first_s
+from rig.analysis.vector_inputs import since_first_s
 from rig.arm.kinematics import WRIST_1, flange_pose
 from rig.data.run_file import RunData
 from rig.estimation.arrays import Array

@@ -10,7 +10,7 @@ from datetime import datetime, timedelta
 
 import numpy as np
 
-from rig.analysis.seen import since_first_s
+from rig.analysis.vector_inputs import since_first_s
 from rig.observation.average import Average
 from rig.observation.observed_run import ObservedRun
 from rig.observation.windows import Window, dwelt

@@ -11,7 +11,7 @@ from functools import cache
 import numpy as np
 from scipy.spatial.transform import Rotation
 
-from rig.analysis.seen import WAVE_SHARE
+from rig.analysis.vector_inputs import WAVE_SHARE
 from rig.arm.kinematics import AXIS_ERRORS, axis_errors, flange_axes, flange_pose
 from rig.arm.motion import Sweep
 from rig.config.attitude_sets import EIGHTEEN
