@@ -11,7 +11,7 @@ from contextlib import suppress
 from dataclasses import asdict
 from pathlib import Path
 
-from rig.analysis.so_far import so_far
+from rig.analysis.partial_results import so_far
 from rig.data.run_file import read_run
 from rig.data.run_folder import recordings
 from rig.errors import RigError

@@ -6,7 +6,7 @@ from typing import Any
 
 import numpy as np
 
-from rig.analysis.so_far import SoFar
+from rig.analysis.partial_results import SoFar
 from rig.data.quantity import ACCELERATION, RATE, Unit
 from rig.data.result_file import ResultDocument
 from rig.errors import Fault

@@ -6,7 +6,7 @@ from itertools import pairwise
 import numpy as np
 import pytest
 
-from rig.analysis.so_far import so_far
+from rig.analysis.partial_results import so_far
 from rig.data.run_file import RunData
 from rig.estimation.vector_model import VectorSolution
 from rig.page.replay import Moment, moments

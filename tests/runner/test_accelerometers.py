@@ -15,7 +15,7 @@ import pytest
 import yaml
 
 from rig.analysis.outcome import calibrated
-from rig.analysis.so_far import so_far
+from rig.analysis.partial_results import so_far
 from rig.data.events import DwellFinished, DwellStarted
 from rig.data.run_file import RunData, read_run
 from rig.errors import Fault

@@ -5,7 +5,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from rig.analysis.so_far import so_far
+from rig.analysis.partial_results import so_far
 from rig.data.events import SweepFinished
 from rig.data.run_file import RunData
 from rig.errors import Fault
