@@ -23,9 +23,9 @@ from rig.observation.acceleration import DwellReading, dwell_readings
 from rig.observation.arm_beside_lines import turned_beside
 from rig.observation.average import Average, Stream, averaged, between, on_the_arms_clock
 from rig.observation.averaging import Averaging, Passing, averaging_of
-from rig.observation.feeling import check_dwells, check_other_way, check_rests
 from rig.observation.known_motion import Motion
 from rig.observation.revolution import Revolution, arm_states_lost, describe
+from rig.observation.stuck_check import check_dwells, check_other_way, check_rests
 from rig.observation.swept_acceleration import SweptAcceleration, swept_acceleration
 from rig.observation.timebase import TimeBase
 from rig.observation.windows import Finished, Window, rested, swept
