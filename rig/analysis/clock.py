@@ -13,7 +13,7 @@ import numpy as np
 
 from rig.arm.identity import calls_itself_simulated
 from rig.data.settings import Uncertainty
-from rig.observation.colour import widening
+from rig.observation.coloured_noise import widening
 from rig.observation.observed_run import ObservedRun
 from rig.observation.windows import swept
 

@@ -18,7 +18,7 @@ from rig.estimation.explained import Explained
 from rig.observation.arm_beside_lines import beside, means_of_parts, turned
 from rig.observation.arm_motion import ArmMotion
 from rig.observation.average import Average, Stream, between
-from rig.observation.colour import widening
+from rig.observation.coloured_noise import widening
 from rig.observation.lines import NONE, in_hertz, lines, swings, waves
 from rig.observation.mean import rounding_left
 from rig.observation.observe import Observation

@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 
 from rig.analysis.pieces import Window
 from rig.estimation.arrays import Array
-from rig.observation.colour import predicted
+from rig.observation.coloured_noise import predicted
 from rig.observation.sound import SPIKE
 
 Statistics = dict[str, tuple[float, float]]

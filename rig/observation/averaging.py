@@ -13,7 +13,7 @@ from numpy.typing import NDArray
 from rig.data.settings import RunSettings
 from rig.estimation.arrays import Array
 from rig.observation.beside_lines import FEWEST, colour_left, mean_beside_lines, rest_beside_lines, swinging
-from rig.observation.colour import left_by_correlations, noise_left
+from rig.observation.coloured_noise import left_by_correlations, noise_left
 from rig.observation.mean import Mean, even_mean, mean_at_rest, mean_of
 from rig.observation.windows import Window
 

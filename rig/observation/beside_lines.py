@@ -12,7 +12,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from rig.estimation.arrays import Array
-from rig.observation.colour import MEMORIES, left_of
+from rig.observation.coloured_noise import MEMORIES, left_of
 from rig.observation.lines import fitted, lines, waves
 from rig.observation.mean import Mean, rounding_left
 from rig.observation.tapered import weights

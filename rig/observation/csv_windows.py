@@ -8,7 +8,7 @@ import numpy as np
 from rig.errors import Fault, Refused
 from rig.estimation.arrays import Array
 from rig.observation.average import Average
-from rig.observation.colour import left_of, widening
+from rig.observation.coloured_noise import left_of, widening
 from rig.observation.windows import Window
 
 MIN_SAMPLES = 20

@@ -8,7 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from rig.estimation.arrays import Array
-from rig.observation.colour import Left, left_of
+from rig.observation.coloured_noise import Left, left_of
 from rig.observation.tapered import flank_s, freedom_at_zero, noise_at_zero, vibrates, weights
 from rig.observation.windows import Window
 

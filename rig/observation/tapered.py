@@ -9,7 +9,7 @@ worse, by n Σ w² where Σ w = 1: 4 % in variance in ten seconds, 10 % in the s
 import numpy as np
 
 from rig.estimation.arrays import Array
-from rig.observation.colour import noise_left
+from rig.observation.coloured_noise import noise_left
 
 FLANK_S = 0.5
 FLANK_SHARE = 0.125  # of the window, at most

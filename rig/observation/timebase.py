@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 
 from rig.errors import Fault
 from rig.estimation.arrays import Array
-from rig.observation.colour import widening
+from rig.observation.coloured_noise import widening
 from rig.observation.known_motion import KnownMotion, check_span, not_finite
 
 MIN_SAMPLES = 100

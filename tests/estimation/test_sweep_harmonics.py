@@ -11,7 +11,7 @@ from rig.estimation.imu import solve_imu
 from rig.estimation.imu_fit import covariance_bound
 from rig.estimation.reference_model import BIAS, REFERENCE
 from rig.estimation.sweep_harmonics import FirstHarmonic, first_harmonic
-from rig.observation.colour import noise_left
+from rig.observation.coloured_noise import noise_left
 from support.arm_attitudes import crooked_arm
 from support.arm_sweeps import (
     MICRO_G,

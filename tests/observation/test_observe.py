@@ -15,7 +15,7 @@ from rig.data.settings import ObservationThresholds
 from rig.errors import Fault, Refused
 from rig.estimation.arrays import Array
 from rig.observation.arm_motion import ArmMotion
-from rig.observation.colour import noise_left, widening
+from rig.observation.coloured_noise import noise_left, widening
 from rig.observation.observe import SensorObservations
 from rig.observation.observed_run import observe_run
 from rig.observation.timebase import TimeBase, estimate_time_base
