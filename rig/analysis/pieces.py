@@ -23,7 +23,7 @@ from rig.observation.lines import NONE, in_hertz, lines, swings, waves
 from rig.observation.mean import rounding_left
 from rig.observation.observe import Observation
 from rig.observation.observed_run import ObservedRun
-from rig.observation.tapered import noise_at_zero
+from rig.observation.tapered_weights import noise_at_zero
 
 FEWEST_SAMPLES = 20
 PREVAILS = 0.7  # of the residuals' variance, what is left in a long mean where the rest of them is a vibration

@@ -15,7 +15,7 @@ from rig.estimation.arrays import Array
 from rig.observation.coloured_noise import MEMORIES, left_of
 from rig.observation.lines import fitted, lines, waves
 from rig.observation.mean import Mean, rounding_left
-from rig.observation.tapered import weights
+from rig.observation.tapered_weights import weights
 from rig.observation.windows import Window
 
 FEWEST = 120  # readings, of which lines can be told from noise

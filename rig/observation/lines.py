@@ -7,7 +7,7 @@ and a half, several times what the noise of a good gyroscope does.
 import numpy as np
 
 from rig.estimation.arrays import Array
-from rig.observation.tapered import MAIN_LOBE, shaped
+from rig.observation.tapered_weights import MAIN_LOBE, shaped
 
 STANDS_OUT = 30.0  # over the median power: of noise one bin in 10⁹ does
 AROUND = 161  # bins, of which the median is taken

@@ -9,7 +9,7 @@ from numpy.typing import NDArray
 
 from rig.estimation.arrays import Array
 from rig.observation.coloured_noise import Left, left_of
-from rig.observation.tapered import flank_s, freedom_at_zero, noise_at_zero, vibrates, weights
+from rig.observation.tapered_weights import flank_s, freedom_at_zero, noise_at_zero, vibrates, weights
 from rig.observation.windows import Window
 
 

@@ -8,7 +8,7 @@ import pytest
 from rig.estimation.arrays import Array
 from rig.observation.coloured_noise import left_by_correlations, left_of
 from rig.observation.mean import mean_at_rest, mean_of
-from rig.observation.tapered import freedom_at_zero, noise_at_zero, vibrates
+from rig.observation.tapered_weights import freedom_at_zero, noise_at_zero, vibrates
 from rig.observation.windows import Window
 
 RATE_HZ = 238.0

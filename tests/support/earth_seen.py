@@ -19,7 +19,7 @@ from rig.estimation.arrays import Array
 from rig.estimation.earth_rate import DEG_H
 from rig.estimation.explained import Seen
 from rig.observation.mean import tapered_mean
-from rig.observation.tapered import flank_s
+from rig.observation.tapered_weights import flank_s
 from rig.observation.windows import Window
 from rig.study.rate_table import GYRO_BIAS_RAD_S, GYRO_MATRIX
 from support.arm_attitudes import crooked_arm, joints_rad

@@ -5,7 +5,7 @@ import pytest
 
 from rig.estimation.arrays import Array
 from rig.observation.mean import tapered_mean
-from rig.observation.tapered import flank_s, noise_at_zero, vibrates, weights
+from rig.observation.tapered_weights import flank_s, noise_at_zero, vibrates, weights
 from rig.observation.windows import Window
 
 RATE_HZ, NOISE_RAD_S = 250.0, 5.5e-5  # a KVH 1775's
