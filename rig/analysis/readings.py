@@ -13,7 +13,7 @@ from numpy.typing import NDArray
 from rig.analysis.pieces import Window
 from rig.estimation.arrays import Array
 from rig.observation.coloured_noise import predicted
-from rig.observation.sound import SPIKE
+from rig.observation.sound_steps import SPIKE
 
 Statistics = dict[str, tuple[float, float]]
 Usual = Callable[..., Any]  # `np.median`, `np.min`
