@@ -17,9 +17,9 @@ from rig.estimation.arrays import Array
 from rig.estimation.budget import Budget, budget
 from rig.estimation.earth_rate import EarthRate, find_earth_rate
 from rig.estimation.estimate import Estimate
-from rig.estimation.explained import Explained, Seen, explain
 from rig.estimation.levenberg_marquardt import LevenbergMarquardtSolution, solve_levenberg_marquardt
 from rig.estimation.refusals import check_duplicates
+from rig.estimation.vector_fit import Explained, Seen, explain
 from rig.estimation.vector_model import VectorSolution, solve_vector_model
 from rig.observation.average import Average
 from rig.observation.observe import Observation

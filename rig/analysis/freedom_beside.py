@@ -17,10 +17,10 @@ from rig.estimation.arrays import Array
 from rig.estimation.attitude_error import AttitudeError
 from rig.estimation.budget import Budget
 from rig.estimation.coverage import effective_freedom
-from rig.estimation.explained import Explained
 from rig.estimation.reference_budget import response_in_attitudes
 from rig.estimation.reference_model import F
 from rig.estimation.sensor_axes import angle_jacobian, nearest_rotation
+from rig.estimation.vector_fit import Explained
 from rig.estimation.vector_model import VectorSolution, design_matrix, regress
 
 NOISE, WANDERING, ATTITUDES = "noise", "bias instability", "arm's attitudes"

@@ -3,7 +3,7 @@
 import numpy as np
 
 from rig.estimation.arrays import Array
-from rig.estimation.explained import Explained
+from rig.estimation.vector_fit import Explained
 
 TELLS = 0.25  # of the largest load: what is smaller has less than a sixteenth of its weight in the scale factor
 

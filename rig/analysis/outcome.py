@@ -40,7 +40,7 @@ from rig.data.run_file import RunData
 from rig.data.settings import DecisionRule, RunSettings
 from rig.errors import Fault
 from rig.estimation.arrays import Array
-from rig.estimation.explained import centripetal_m_s2
+from rig.estimation.vector_fit import centripetal_m_s2
 from rig.estimation.vector_model import VectorSolution
 from rig.observation.observed_run import ObservedRun, observe_runs
 

@@ -14,7 +14,7 @@ from numpy.typing import NDArray
 from rig.analysis.calibration import SensorResult
 from rig.data.settings import Site
 from rig.estimation.arrays import Array
-from rig.estimation.explained import Explained
+from rig.estimation.vector_fit import Explained
 from rig.observation.arm_beside_lines import beside, means_of_parts, turned
 from rig.observation.arm_motion import ArmMotion
 from rig.observation.average import Average, Stream, between

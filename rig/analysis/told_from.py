@@ -15,7 +15,7 @@ from rig.data.quantity import Quantity
 from rig.errors import Fault
 from rig.estimation.arrays import Array
 from rig.estimation.budget import Unknown, budget
-from rig.estimation.explained import Explained, explain
+from rig.estimation.vector_fit import Explained, explain
 
 
 @dataclass(frozen=True, slots=True)

@@ -14,8 +14,8 @@ from rig.data.settings import RunSettings, Uncertainty
 from rig.estimation.arrays import Array
 from rig.estimation.budget import Unknown, uncounted
 from rig.estimation.earth_rate import EarthRate, Known
-from rig.estimation.explained import Seen
 from rig.estimation.own_errors import KnownSensor
+from rig.estimation.vector_fit import Seen
 from rig.observation.average import Average
 from rig.observation.observe import Observation
 from rig.observation.observed_run import ObservedRun

@@ -15,7 +15,7 @@ from rig.estimation.arrays import Array
 from rig.estimation.bias_process import BiasProcess
 from rig.estimation.coverage import COVERAGE_FACTOR, coverage_factors, effective_freedom
 from rig.estimation.earth import EARTH_RATE_RAD_S, STANDARD_GRAVITY_M_S2
-from rig.estimation.explained import Explained, Seen
+from rig.estimation.vector_fit import Explained, Seen
 
 CLOCK = "controller clock"
 NOT_GIVEN = "is not given"  # ends the source of what is assumed because the configuration does not say it

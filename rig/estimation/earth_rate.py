@@ -3,7 +3,7 @@
     m = F (ω + R ω_E) + c (+ G a) + B e
 
 R takes the arm's base frame into the flange's, ω_E (3,) is the Earth's rate in the base frame; F, c, G, e as in
-`rig.estimation.explained`. Rests in many attitudes tell the bias from what turns with the flange. So does a sweep: of
+`rig.estimation.vector_fit`. Rests in many attitudes tell the bias from what turns with the flange. So does a sweep: of
 the Earth's rate only what lies along its axis is left in the mean of a turn. So 15 parameters are found: F, c and ω_E.
 
 What an arm does wrong is among the e: its angles, as in `explained`, and how differently it stands each time, by which
@@ -29,8 +29,8 @@ from rig.estimation.arrays import Array
 from rig.estimation.bias_process import expected_bias_process
 from rig.estimation.common_errors import CommonErrors
 from rig.estimation.earth import EARTH_RATE_RAD_S
-from rig.estimation.explained import Seen, solver
 from rig.estimation.nonlinearity import curvature
+from rig.estimation.vector_fit import Seen, solver
 from rig.estimation.vector_model import MAX_CONDITION, VectorSolution, design_matrix, of_the_speed
 
 FREE_RAD_S = 100 * EARTH_RATE_RAD_S  # so large before that what the readings say is all that counts

@@ -7,11 +7,11 @@ import numpy as np
 from rig.estimation import accelerometer_model, attitude_error, reference_model
 from rig.estimation.accelerometer_model import Dwells, Movement
 from rig.estimation.arrays import Array
-from rig.estimation.explained import Explained
 from rig.estimation.imu import ImuSolution
 from rig.estimation.reading_errors import noise
 from rig.estimation.reference_budget import response_in_attitudes
 from rig.estimation.triaxial import TriaxialSolution
+from rig.estimation.vector_fit import Explained
 from rig.estimation.vector_model import design_matrix, of_the_speed, regress
 
 

@@ -12,7 +12,7 @@ from rig.data.budget_entries import (
 )
 from rig.estimation.budget import Budget
 from rig.estimation.coverage import covered
-from rig.estimation.explained import Explained
+from rig.estimation.vector_fit import Explained
 from rig.report.entry import entry
 
 HOUR_S = 3600.0

@@ -11,7 +11,7 @@ from rig.arm.kinematics import flange_attitude
 from rig.data.result_file import ResultDocument
 from rig.estimation.arrays import Array
 from rig.estimation.earth_rate import EarthRate
-from rig.estimation.explained import Explained
+from rig.estimation.vector_fit import Explained
 from rig.observation.observed_run import ObservedRun
 from rig.report.figures import envelope, save
 from rig.station.events import NotPlotted, Plotted, RunEvent

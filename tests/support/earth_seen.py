@@ -17,7 +17,7 @@ from rig.arm.motion import Sweep
 from rig.config.attitude_sets import EIGHTEEN
 from rig.estimation.arrays import Array
 from rig.estimation.earth_rate import DEG_H
-from rig.estimation.explained import Seen
+from rig.estimation.vector_fit import Seen
 from rig.observation.mean import tapered_mean
 from rig.observation.tapered_weights import flank_s
 from rig.observation.windows import Window
