@@ -11,7 +11,7 @@ from rig.estimation.arrays import Array
 from rig.estimation.budget import Budget, Contributor
 from rig.estimation.coverage import effective_freedom
 from rig.estimation.estimate import Estimate
-from rig.estimation.turned import BIAS, NOISE, TurnedSolution, solve_turned
+from rig.estimation.known_turns import BIAS, NOISE, TurnedSolution, solve_turned
 from rig.estimation.vector_model import VectorSolution
 from rig.observation.csv_import import ExternalData
 

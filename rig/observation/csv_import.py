@@ -9,7 +9,7 @@ whole turn: over that its mean speed is 2π/T all the same. It may say how well 
 body may have ended off where it was said to, and `axis_std_rad`, how far the axis may have leaned.
 
 A row with an angle at both ends of which the body lay still is solved by how far the gyroscope turned meanwhile
-(`rig.estimation.turned`): that is how a hand turns, or a servo that starts and stops.
+(`rig.estimation.known_turns`): that is how a hand turns, or a servo that starts and stops.
 
 Columns may stand in any order; the first row holds their names.
 """

@@ -10,7 +10,7 @@ import numpy as np
 
 from rig.data.quantity import RATE
 from rig.estimation.arrays import Array
-from rig.estimation.turned import Gyroscope, Mean, Turn
+from rig.estimation.known_turns import Gyroscope, Mean, Turn
 from rig.observation.average import Average
 from rig.observation.csv_windows import average_of, inside
 from rig.observation.observe import Observation, bias_drift

@@ -16,8 +16,8 @@ from rig.data.result_file import EstimateEntry, VectorEntry
 from rig.data.result_types import ErrorEntry
 from rig.estimation.budget import Budget
 from rig.estimation.estimate import Estimate
+from rig.estimation.known_turns import TurnedSolution
 from rig.estimation.six_observation import MODEL, PARAMETERS
-from rig.estimation.turned import TurnedSolution
 from rig.estimation.vector_model import VectorSolution
 from rig.observation.csv_import import ExternalData
 from rig.report.axes import matrix_lines, scale_and_bias_table

@@ -24,9 +24,9 @@ from rig.data.result_types import ErrorEntry, Role
 from rig.errors import Fault
 from rig.estimation import vector_model
 from rig.estimation.estimate import Estimate
+from rig.estimation.known_turns import TurnedSolution
 from rig.estimation.residuals import residual_std_rad_s
 from rig.estimation.six_observation import MODEL, PARAMETERS
-from rig.estimation.turned import TurnedSolution
 from rig.report.budget_entry import bias_process_entry, budget_entry
 from rig.report.earth_rate import earth_rate_entry
 from rig.report.entry import counted, entry
