@@ -105,9 +105,9 @@ def _uncounted(drifts: Mapping[Quantity, BiasDrift]) -> dict[Quantity, BiasDrift
     return {quantity: replace(drift, freedom=None, slope_freedom=None) for quantity, drift in drifts.items()}
 
 
-def _whole(found: Mapping[int, Stand], table: Sequence[Sequence[int]]) -> list[list[Stand]]:
+def _whole(stands: Mapping[int, Stand], table: Sequence[Sequence[int]]) -> list[list[Stand]]:
     """The whole repeats, attitudes in the same order."""
-    whole = [[found[index] for index in repeat] for repeat in table if found.keys() >= set(repeat)]
+    whole = [[stands[index] for index in repeat] for repeat in table if stands.keys() >= set(repeat)]
     if len(whole) < FEWEST_REPEATS:
         raise Fault(
             "not_all_attitudes",

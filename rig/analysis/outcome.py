@@ -176,10 +176,10 @@ def _in_attitudes(runs: Sequence[RunData], recordings: tuple[ObservedRun, ...], 
     )
 
 
-def _acceleration_checks(found: Mapping[str, AccelerometerResult], settings: RunSettings) -> tuple[Check, ...]:
+def _acceleration_checks(results: Mapping[str, AccelerometerResult], settings: RunSettings) -> tuple[Check, ...]:
     rule = _decision_rule(settings)
     return tuple(
-        check for name, result in found.items() for check in acceleration_checks(name, result, settings.limits, rule)
+        check for name, result in results.items() for check in acceleration_checks(name, result, settings.limits, rule)
     )
 
 

@@ -62,7 +62,7 @@ def _of_run(path: Path) -> "dict[str, SensorAtRest]":
     return at_rest(recorded)
 
 
-def _draw(found: "Mapping[str, SensorAtRest]", folder: Path) -> None:
+def _draw(sensors: "Mapping[str, SensorAtRest]", folder: Path) -> None:
     from rig.report.allan import draw_at_rest
     from rig.study.files import missing_extra
 
@@ -72,7 +72,7 @@ def _draw(found: "Mapping[str, SensorAtRest]", folder: Path) -> None:
         raise missing_extra(error, "study") from error
     try:
         folder.mkdir(parents=True, exist_ok=True)
-        for path in draw_at_rest(found, folder):
+        for path in draw_at_rest(sensors, folder):
             say(f"written: {path}", file=sys.stderr)
     except OSError as error:
         raise Refused("report_folder", f"{folder} cannot be written: {error}", "Choose another with --plot") from error

@@ -23,22 +23,22 @@ if TYPE_CHECKING:
     from rig.page.shown import About
 
 
-def carry_out(folder: Path, found: Configured, *, assume_yes: bool, as_json: bool, page: PageWish | None) -> int:
+def carry_out(folder: Path, configured: Configured, *, assume_yes: bool, as_json: bool, page: PageWish | None) -> int:
     """Run, or go on with, the phases in a run folder; on a `page` too if wanted. Returns 0 passed, 1 verdict failed."""
-    with operators_page(page, folder, lambda: _about(folder, found, page)) as shown:
+    with operators_page(page, folder, lambda: _about(folder, configured, page)) as shown:
         # Nobody stands beside a laboratory that this process starts itself, so there nobody need be asked.
-        on_terminal = always_yes if assume_yes or found.loaded.simulated else ask_operator
+        on_terminal = always_yes if assume_yes or configured.loaded.simulated else ask_operator
         answer = shown.answer if shown.answer is not None and not assume_yes else on_terminal
         with log(folder / "log.txt") as logged, view() as seen, ExitStack() as held:
             station = Stations((logged, seen, *shown.listeners), answer)
-            this = Run(folder, found.loaded, found.script, station)
+            this = Run(folder, configured.loaded, configured.script, station)
             with this.reported():
-                held.enter_context(claimed(found.loaded.config))
-                if found.loaded.simulated:
+                held.enter_context(claimed(configured.loaded.config))
+                if configured.loaded.simulated:
                     held.enter_context(simulated_laboratory(folder / CONFIG, folder / WORLD_LATE))
-            outcome = this.carry_out(found.phase)
+            outcome = this.carry_out(configured.phase)
             try:
-                entered, beside = remember(folder, found.loaded.config.history)
+                entered, beside = remember(folder, configured.loaded.config.history)
             except KeyboardInterrupt:
                 station.event(NotRemembered(folder, "interrupted"))
                 raise
@@ -52,10 +52,10 @@ def carry_out(folder: Path, found: Configured, *, assume_yes: bool, as_json: boo
     return 0 if outcome.passed else 1
 
 
-def _about(folder: Path, found: Configured, page: PageWish | None) -> "About":
+def _about(folder: Path, configured: Configured, page: PageWish | None) -> "About":
     from rig.page.shown import About
 
-    config = found.loaded.config
+    config = configured.loaded.config
     parts = {name: f"{each.part} {each.serial_number}" for name, each in config.sensors.items()}
     parts |= {name: f"{each.part} {each.serial_number}" for name, each in config.magnetometers.items()}
     return About(
@@ -63,5 +63,5 @@ def _about(folder: Path, found: Configured, page: PageWish | None) -> "About":
         procedure=config.procedure.name,
         may_answer=page is not None and page.may_answer,
         parts=parts,
-        simulated=found.loaded.simulated,
+        simulated=configured.loaded.simulated,
     )

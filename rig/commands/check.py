@@ -36,31 +36,27 @@ def run(options: Namespace) -> int:
     return 2 if missing else 0
 
 
-def _named(look_at: "Callable[[Configured], list[str]]", found: "Configured") -> list[str]:
+def _named(look_at: "Callable[[Configured], list[str]]", configured: "Configured") -> list[str]:
     """The problems found, including the one that ended the looking."""
     try:
-        return look_at(found)
+        return look_at(configured)
     except RigError as error:
         return [str(error)]
 
 
-def _look_at_board(found: "Configured") -> list[str]:
+def _look_at_board(configured: "Configured") -> list[str]:
     from firmware_host.client import Board
     from rig.board.identify import configured_board, find_sensor, refuse_other_firmware, refusing, stored_calibration
     from rig.commands.claims import claimed_board
 
-    config = found.loaded.config
+    config = configured.loaded.config
     missing: list[str] = []
     if not config.parts_on_board:
         return missing
-    configured = configured_board(config)
-    with (
-        refusing(),
-        claimed_board(configured.port),
-        Board(configured.port, configured.baud, lambda batch: None) as board,
-    ):
+    section = configured_board(config)
+    with refusing(), claimed_board(section.port), Board(section.port, section.baud, lambda batch: None) as board:
         identity = board.identity
-        say(f"board at {configured.port}: {identity.unique_id}, firmware {identity.firmware}")
+        say(f"board at {section.port}: {identity.unique_id}, firmware {identity.firmware}")
         try:
             refuse_other_firmware(identity)
         except RigError as error:
@@ -69,7 +65,7 @@ def _look_at_board(found: "Configured") -> list[str]:
             try:
                 info = find_sensor(identity, name, part)
                 say(f"sensor {name}: {info.part}, identity register 0x{info.who_am_i:02x}")
-                if found.phase.procedure.reads_corrected and name in config.to_calibrate:
+                if configured.phase.procedure.reads_corrected and name in config.to_calibrate:
                     stored = stored_calibration(board, name, config.to_calibrate[name])
                     say(f"sensor {name}: calibrated on {stored.calibration.written_utc:%Y-%m-%d}")
             except RigError as error:
@@ -77,14 +73,14 @@ def _look_at_board(found: "Configured") -> list[str]:
     return missing
 
 
-def _look_at_instruments(found: "Configured") -> list[str]:
+def _look_at_instruments(configured: "Configured") -> list[str]:
     """The sensors with a port of their own; nothing in their memories is changed."""
     from rig.commands.claims import claimed_sensor
     from rig.sensors.errors import SensorError
     from rig.sensors.registry import OWN_PORT
 
     missing = []
-    for name, section in found.loaded.config.sensors.items():
+    for name, section in configured.loaded.config.sensors.items():
         if section.serial is not None:
             try:
                 with claimed_sensor(name, section.serial.port):
@@ -98,18 +94,18 @@ def _look_at_instruments(found: "Configured") -> list[str]:
     return missing
 
 
-def _look_at_arm(found: "Configured") -> list[str]:
+def _look_at_arm(configured: "Configured") -> list[str]:
     from rig.arm.driver import look
     from rig.arm.identity import arm_words
     from rig.arm.preflight import preflight_problems
 
-    section = found.loaded.config.arm
+    section = configured.loaded.config.arm
     report = look(section.host)
     state = report.state
     angles = " ".join(f"{degrees(angle):.1f}" for angle in state.q_rad)
     say(f"arm at {report.host}: {arm_words(report)}")
     say(f"arm joints: {angles} °, speed slider {100 * state.target_speed_fraction:.0f} %")
-    problems = preflight_problems([found.phase.plan(state.q_rad)], section, report)
+    problems = preflight_problems([configured.phase.plan(state.q_rad)], section, report)
     return [*_claims_of_others(section.host), *map(str, problems)]
 
 

@@ -14,10 +14,10 @@ def add_history(parser: argparse.ArgumentParser) -> None:
     )
 
 
-def named_history(said: str | None) -> str | None:
+def named_history(given: str | None) -> str | None:
     """A file's name or a URL, None where nothing is said. Raises Refused as `load`."""
-    if said is None or not said.endswith((".yaml", ".yml")):
-        return said
+    if given is None or not given.endswith((".yaml", ".yml")):
+        return given
     from rig.config.load import load
 
-    return load(Path(said), sections=None).config.history.url
+    return load(Path(given), sections=None).config.history.url

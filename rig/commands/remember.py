@@ -78,16 +78,16 @@ def remember_certificate(folder: Path, result: str, certificate: "Issued", histo
     return f"{where.label} does not know this run; rig history import {folder} enters it{there}"
 
 
-def print_beside(found: Sequence[Beside]) -> None:
+def print_beside(calibrations: Sequence[Beside]) -> None:
     """Print on stdout, for people, how calibrations lie beside those of before."""
-    if not found:
+    if not calibrations:
         return
     from rich.console import Console
 
     from rig.history.tables import changes_table, title_of
 
     console = Console(highlight=False)
-    for each in found:
+    for each in calibrations:
         day = each.before.started_utc[:10]
         title = f"{title_of(each.now.subject)}: beside the last calibration, number {each.before.id} of {day}"
         console.print(changes_table(title, each.changes))

@@ -105,13 +105,13 @@ def solve_attitude_weighted(start: Array, placed: Placed) -> AttitudeWeighted:
     )
 
 
-def furthest_off(start: Array, placed: Placed, found: AttitudeWeighted) -> tuple[int, float, float]:
+def furthest_off(start: Array, placed: Placed, fit: AttitudeWeighted) -> tuple[int, float, float]:
     """The attitude that fits worst, by how much the others say it is off, rad, and how far off it may be.
 
     One that was not reached makes all look worse than they are, itself better.
     """
-    residuals = placed.readings - predicted(found.theta, placed.attitudes, placed.v_bar)
-    worst = int(np.argmax(np.sum(whitened(found.white, residuals) ** 2, axis=1)))
+    residuals = placed.readings - predicted(fit.theta, placed.attitudes, placed.v_bar)
+    worst = int(np.argmax(np.sum(whitened(fit.white, residuals) ** 2, axis=1)))
     rest = solve_attitude_weighted(start, placed.without(worst))
     missed = placed.readings[worst] - predicted(rest.theta, placed.attitudes, placed.v_bar)[worst]
     turned = effects(rest.theta, placed.attitudes, placed.v_bar)[worst]

@@ -243,14 +243,14 @@ def conditioning(design: Array, needed: int, noise: float = 0.0) -> Conditioning
     return Conditioning(int(np.sum(singular > floor)), condition, weakest)
 
 
-def check_conditioning(found: Conditioning, needed: int, limit: float, what: str, remedy: str) -> None:
+def check_conditioning(told: Conditioning, needed: int, limit: float, what: str, remedy: str) -> None:
     """Raises Fault `rank_deficient` below the `needed` rank, `ill_conditioned` above the `limit` of the condition."""
-    if found.rank < needed:
-        raise Fault("rank_deficient", f"the observations leave {what} undetermined ({found.rank} of {needed})", remedy)
-    if not found.condition <= limit:
+    if told.rank < needed:
+        raise Fault("rank_deficient", f"the observations leave {what} undetermined ({told.rank} of {needed})", remedy)
+    if not told.condition <= limit:
         raise Fault(
             "ill_conditioned",
-            f"the observations hardly tell {what} (condition {found.condition:.3g}, {limit:g} is the most)",
+            f"the observations hardly tell {what} (condition {told.condition:.3g}, {limit:g} is the most)",
             remedy,
         )
 

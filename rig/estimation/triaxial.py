@@ -212,12 +212,12 @@ def _errors_in_x(m: Array, v: Array, method: Method) -> tuple[str, ...]:
     return ("noise in the readings biases the published estimate; maximum_likelihood does not suffer from it",)
 
 
-def _check_attitudes(start: Array, placed: Placed, found: AttitudeWeighted) -> None:
+def _check_attitudes(start: Array, placed: Placed, fit: AttitudeWeighted) -> None:
     """Raises Fault where attitudes are off: all, or the one that fits worst where enough others are left to tell."""
-    off = found.attitude_error.std_rad
+    off = fit.attitude_error.std_rad
     said = f"the readings say that the attitudes are off by {1e3 * off:.2g} mrad each"
     if off > SUSPICIOUS_RAD and 3 * (len(placed.readings) - 1) > len(start) + 3:
-        worst, by, expected = furthest_off(start, placed, found)
+        worst, by, expected = furthest_off(start, placed, fit)
         if by > max(UNTRUSTWORTHY_RAD, ODD * expected):
             said = (
                 f"attitude {worst + 1} is off by {1e3 * by:.2g} mrad, say the others, which are by {1e3 * expected:.2g}"

@@ -52,21 +52,21 @@ def now_utc() -> str:
     return datetime.now(UTC).isoformat(timespec="milliseconds")
 
 
-def _enter_calibration(connection: Connection, run_id: int, each: Followed, *, check_standard: bool) -> None:
+def _enter_calibration(connection: Connection, run_id: int, calibration: Followed, *, check_standard: bool) -> None:
     row = {
         "run_id": run_id,
-        "sensor": each.sensor,
-        "quantity": each.quantity,
-        "part": each.part,
-        "serial_number": each.serial_number,
-        "full_scale": each.full_scale,
-        "estimator": each.estimator,
-        "temperature_c": each.temperature_c,
+        "sensor": calibration.sensor,
+        "quantity": calibration.quantity,
+        "part": calibration.part,
+        "serial_number": calibration.serial_number,
+        "full_scale": calibration.full_scale,
+        "estimator": calibration.estimator,
+        "temperature_c": calibration.temperature_c,
         "check_standard": check_standard,
     }
     number = _inserted(connection.execute(insert(schema.calibration).values(row)).inserted_primary_key)
     columns = [column.name for column in schema.parameter.c if column.name != "calibration_id"]
-    rows = [{"calibration_id": number, **{name: getattr(p, name) for name in columns}} for p in each.parameters]
+    rows = [{"calibration_id": number, **{name: getattr(p, name) for name in columns}} for p in calibration.parameters]
     if rows:
         connection.execute(insert(schema.parameter), rows)
 

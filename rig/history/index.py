@@ -45,10 +45,10 @@ def utc(text: str) -> str:
     return datetime.fromisoformat(text).astimezone(UTC).isoformat(timespec="seconds")
 
 
-def unlike(document: ResultDocument, found: Sequence[Followed]) -> Iterator[str]:
-    """What in `found` differs from the calibrations that a result states, beyond a processor's rounding."""
+def unlike(document: ResultDocument, recomputed: Sequence[Followed]) -> Iterator[str]:
+    """What in `recomputed` differs from the calibrations that a result states, beyond a processor's rounding."""
     stated = {(each.sensor, each.quantity): each for each in followed(document)}
-    beside = {(each.sensor, each.quantity): each for each in found}
+    beside = {(each.sensor, each.quantity): each for each in recomputed}
     for sensor, quantity in sorted(stated.keys() ^ beside.keys()):
         if quantity in QUANTITIES or (sensor, quantity) in beside:  # drift and Earth's rate were not followed before
             yield f"{quantity} of {sensor}, which only one of them has"
@@ -56,29 +56,29 @@ def unlike(document: ResultDocument, found: Sequence[Followed]) -> Iterator[str]
         yield from _differences(stated[key], beside[key])
 
 
-def _differences(stated: Followed, found: Followed) -> Iterator[str]:
+def _differences(stated: Followed, recomputed: Followed) -> Iterator[str]:
     for name in ("part", "serial_number", "estimator"):
-        if getattr(stated, name) != getattr(found, name):
-            yield f"{name} of {stated.sensor}: {getattr(found, name)}, stated {getattr(stated, name)}"
+        if getattr(stated, name) != getattr(recomputed, name):
+            yield f"{name} of {stated.sensor}: {getattr(recomputed, name)}, stated {getattr(stated, name)}"
     for name in ("full_scale", "temperature_c"):
-        if not _close(getattr(stated, name), getattr(found, name)):
-            yield f"{name} of {stated.sensor}: {getattr(found, name)}, stated {getattr(stated, name)}"
-    ours, theirs = ({each.name: each for each in of.parameters} for of in (stated, found))
+        if not _close(getattr(stated, name), getattr(recomputed, name)):
+            yield f"{name} of {stated.sensor}: {getattr(recomputed, name)}, stated {getattr(stated, name)}"
+    ours, theirs = ({each.name: each for each in of.parameters} for of in (stated, recomputed))
     for name in sorted(ours.keys() ^ theirs.keys()):
         yield f"{name} of {stated.sensor}, which only one of them has"
     for name in sorted(ours.keys() & theirs.keys()):
         yield from (f"{each} of {stated.sensor}" for each in _otherwise(ours[name], theirs[name]))
 
 
-def _otherwise(stated: Parameter, found: Parameter) -> Iterator[str]:
-    if not abs(stated.value - found.value) <= SAME * stated.std:
-        yield f"{stated.name} {found.value:.9g}, stated {stated.value:.9g},"
+def _otherwise(stated: Parameter, recomputed: Parameter) -> Iterator[str]:
+    if not abs(stated.value - recomputed.value) <= SAME * stated.std:
+        yield f"{stated.name} {recomputed.value:.9g}, stated {stated.value:.9g},"
     for name in ("std_statistical", "std_combined", "max_deviation", "coverage_factor"):
-        if not _close(getattr(stated, name), getattr(found, name)):
-            yield f"{name} {getattr(found, name)} of {stated.name}, stated {getattr(stated, name)},"
-    if stated.unit != found.unit:
+        if not _close(getattr(stated, name), getattr(recomputed, name)):
+            yield f"{name} {getattr(recomputed, name)} of {stated.name}, stated {getattr(stated, name)},"
+    if stated.unit != recomputed.unit:
         yield f"unit of {stated.name}"
 
 
-def _close(stated: float | None, found: float | None) -> bool:
-    return stated == found if stated is None or found is None else math.isclose(stated, found, rel_tol=SAME)
+def _close(stated: float | None, other: float | None) -> bool:
+    return stated == other if stated is None or other is None else math.isclose(stated, other, rel_tol=SAME)

@@ -21,12 +21,12 @@ MARGINS = {"left": 0.07, "right": 0.985, "bottom": 0.06, "top": 0.93, "wspace": 
 SHOWN = ("kx", "ky", "kz", "bx", "by", "bz")
 
 
-def draw_trends(found: Mapping[Subject, Mapping[str, Trend]], folder: Path) -> list[Path]:
+def draw_trends(subjects: Mapping[Subject, Mapping[str, Trend]], folder: Path) -> list[Path]:
     """`history_<serial number>_<quantity>` as PNG and SVG for each subject into `folder`, which is there."""
     from matplotlib.figure import Figure
 
     written, names = [], set[str]()
-    for subject, trends in found.items():
+    for subject, trends in subjects.items():
         (name,) = plain_names([f"history_{subject[1]}_{subject[2]}{'_simulated' * subject[4]}"]).values()
         while name in names:  # the same sensor at another range
             name += "_"

@@ -166,14 +166,14 @@ def solve(run: Run, estimator: str = DEFAULT_ESTIMATOR, **changes: float) -> Res
     )
 
 
-def _rows(found: Shown) -> Iterator[tuple[str, ...]]:
+def _rows(shown: Shown) -> Iterator[tuple[str, ...]]:
     """Axis by axis, with U, or with twice the standard deviations where no more is known."""
     for i, axis in enumerate("xyz"):
         scale = ("–", "–")
-        if found.scale is not None:
-            scale = f"{found.scale.values[i]:.6f}", f"{found.scale.expanded[i]:.6f}"
-        number, width = f"{found.numbers.values[i]:+.6f}", f"{found.numbers.expanded[i]:.6f}"
-        yield f"{found.name} {axis}", *scale, number, width, found.unit.name
+        if shown.scale is not None:
+            scale = f"{shown.scale.values[i]:.6f}", f"{shown.scale.expanded[i]:.6f}"
+        number, width = f"{shown.numbers.values[i]:+.6f}", f"{shown.numbers.expanded[i]:.6f}"
+        yield f"{shown.name} {axis}", *scale, number, width, shown.unit.name
 
 
 def _row(check: Check) -> tuple[str, ...]:

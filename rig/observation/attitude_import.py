@@ -121,16 +121,16 @@ class _Said:
         return _Said([self.windows[row] for row in rows], self.attitudes[rows], rates, std)
 
 
-def _placements(time_s: Array, readings: Mapping[Quantity, Array], said: _Said) -> Placements | Fault:
+def _placements(time_s: Array, readings: Mapping[Quantity, Array], fixes: _Said) -> Placements | Fault:
     """A gyroscope needs none."""
     try:
-        return find_placements(time_s, readings, said.windows, said.attitudes, said.std_rad)
+        return find_placements(time_s, readings, fixes.windows, fixes.attitudes, fixes.std_rad)
     except Fault as fault:
         return fault
 
 
-def _rows(time_s: Array, rate: Array, said: _Said) -> Rows:
-    cuts = [rate[inside(time_s, window)] for window in said.windows]
+def _rows(time_s: Array, rate: Array, fixes: _Said) -> Rows:
+    cuts = [rate[inside(time_s, window)] for window in fixes.windows]
     counts = np.array([len(cut) for cut in cuts])
     told = np.array([scatter_of(cut)[:2] for cut in cuts]) if counts.min() >= MIN_SAMPLES else None
     return Rows(
@@ -138,9 +138,9 @@ def _rows(time_s: Array, rate: Array, said: _Said) -> Rows:
         None if told is None else told[:, 0],
         None if told is None else told[:, 1],
         counts.astype(np.float64),
-        said.attitudes,
-        said.rates_rad_s,
-        said.std_rad,
+        fixes.attitudes,
+        fixes.rates_rad_s,
+        fixes.std_rad,
     )
 
 

@@ -86,16 +86,16 @@ def between(stream: Stream, start_s: float, end_s: float) -> slice:
     return slice(*np.searchsorted(stream.time_s, [start_s, end_s]).tolist())
 
 
-def averaged(stream: Stream, inside: slice, window: Window, found: Mean) -> Average:
-    """What was `found` of the samples inside, and over which window, with when and how warm it was."""
+def averaged(stream: Stream, inside: slice, window: Window, mean: Mean) -> Average:
+    """The `mean` of the samples inside, and the window it is over, with when and how warm it was."""
     return Average(
-        mean_rad_s=found.mean,
-        variance_rad2_s2=found.variance,
-        noise_rad_s=found.noise,
-        samples=found.samples,
+        mean_rad_s=mean.mean,
+        variance_rad2_s2=mean.variance,
+        noise_rad_s=mean.noise,
+        samples=mean.samples,
         start_s=window.start_s,
         end_s=window.end_s,
         temperature_c=stream.temperature_c(inside),
-        freedom=found.freedom,
-        lines_hz=in_hertz(found.cycles, stream.time_s[inside]),
+        freedom=mean.freedom,
+        lines_hz=in_hertz(mean.cycles, stream.time_s[inside]),
     )

@@ -70,12 +70,12 @@ def dwell_row(sensor: str, dwell: DwellReading, gravity_m_s2: float | None) -> R
     }
 
 
-def look_of(found: Mapping[str, SoFar]) -> Look:
+def look_of(sensors: Mapping[str, SoFar]) -> Look:
     """What is known of a run that goes on."""
-    observations = [_sweep(name, sweep, each) for name, one in found.items() for sweep, each in one.sweeps.items()]
-    for name, one in found.items():
+    observations = [_sweep(name, sweep, each) for name, one in sensors.items() for sweep, each in one.sweeps.items()]
+    for name, one in sensors.items():
         observations += [_dwell(name, index, each, one.gravity_m_s2) for index, each in one.dwells.items()]
-    return Look(observations, [_parameters_so_far(name, one) for name, one in found.items()])
+    return Look(observations, [_parameters_so_far(name, one) for name, one in sensors.items()])
 
 
 def parameter_rows(result: ResultDocument) -> list[Row]:
@@ -83,27 +83,27 @@ def parameter_rows(result: ResultDocument) -> list[Row]:
     return [_row(each) for each in shown(result)]
 
 
-def _sweep(sensor: str, sweep: int, found: Observation | Fault) -> Row:
-    if isinstance(found, Observation):
-        return observation_row(sensor, found)
-    return {"sensor": sensor, "sweep": sweep, "by": "host", "refused": str(found)}
+def _sweep(sensor: str, sweep: int, observation: Observation | Fault) -> Row:
+    if isinstance(observation, Observation):
+        return observation_row(sensor, observation)
+    return {"sensor": sensor, "sweep": sweep, "by": "host", "refused": str(observation)}
 
 
-def _dwell(sensor: str, index: int, found: DwellReading | Fault, gravity_m_s2: float | None) -> Row:
-    if isinstance(found, DwellReading):
-        return dwell_row(sensor, found, gravity_m_s2)
-    return {"sensor": beside(sensor, ACCELERATION), "sweep": index, "by": "host", "dwell": "", "refused": str(found)}
+def _dwell(sensor: str, index: int, reading: DwellReading | Fault, gravity_m_s2: float | None) -> Row:
+    if isinstance(reading, DwellReading):
+        return dwell_row(sensor, reading, gravity_m_s2)
+    return {"sensor": beside(sensor, ACCELERATION), "sweep": index, "by": "host", "dwell": "", "refused": str(reading)}
 
 
-def _parameters_so_far(name: str, found: SoFar) -> Row:
-    solution = found.solution
+def _parameters_so_far(name: str, partial: SoFar) -> Row:
+    solution = partial.solution
     if isinstance(solution, VectorSolution):
         u = (COVERAGE_FACTOR * np.sqrt(np.diag(solution.covariance))).tolist()
         bias, scale = Three(solution.bias_rad_s.tolist(), u[3:]), Three(solution.scale.tolist(), u[:3])
         return _row(Shown(name, RATE.bias, bias, combined=False, scale=scale))
-    if found.bias_rad_s is None:
+    if partial.bias_rad_s is None:
         return {**_row_of(name, RATE.bias, None, None, of=NOISE_ONLY), "missing": solution.what}
-    mean, std = found.bias_rad_s
+    mean, std = partial.bias_rad_s
     bias = Three(mean.tolist(), (COVERAGE_FACTOR * std).tolist())
     return {**_row_of(name, RATE.bias, bias, None, of=NOISE_ONLY), "missing": solution.what}
 

@@ -58,11 +58,11 @@ def accelerometer_entry(result: AccelerometerResult, **more: Any) -> Acceleromet
     )  # fmt: skip
 
 
-def _alignment(found: Alignment) -> AlignmentEntry:
+def _alignment(alignment: Alignment) -> AlignmentEntry:
     return entry(
-        AlignmentEntry, found,
-        rotation_rad=found.vector_rad,
-        std_rad=np.sqrt(np.diag(found.covariance_rad2)),
+        AlignmentEntry, alignment,
+        rotation_rad=alignment.vector_rad,
+        std_rad=np.sqrt(np.diag(alignment.covariance_rad2)),
     )  # fmt: skip
 
 
@@ -70,11 +70,11 @@ def _held_out(held: HeldOut) -> HeldOutEntry:
     return HeldOutEntry(dwells=len(held.dwells), rms_m_s2=held.rms_m_s2, max_m_s2=float(np.abs(held.error_m_s2).max()))
 
 
-def _beside(found: TriaxialSolution | Fault) -> InAttitudesEntry | ErrorEntry:
-    if isinstance(found, Fault):
-        return ErrorEntry(error=str(found))
+def _beside(solution: TriaxialSolution | Fault) -> InAttitudesEntry | ErrorEntry:
+    if isinstance(solution, Fault):
+        return ErrorEntry(error=str(solution))
     return entry(
-        InAttitudesEntry, found,
-        scale=1 / np.linalg.norm(found.matrix, axis=1),
-        bias_m_s2=found.bias,
+        InAttitudesEntry, solution,
+        scale=1 / np.linalg.norm(solution.matrix, axis=1),
+        bias_m_s2=solution.bias,
     )  # fmt: skip

@@ -23,13 +23,13 @@ if TYPE_CHECKING:
 SCHEMA = "rig.allan/1"
 
 
-def print_at_rest(found: Mapping[str, SensorAtRest], *, as_json: bool) -> None:
+def print_at_rest(sensors: Mapping[str, SensorAtRest], *, as_json: bool) -> None:
     """Print what was found at rest on stdout: tables for people, JSON of schema "rig.allan/1" for machines."""
     if as_json:
-        print(json.dumps(document(found), indent=2, allow_nan=False))
+        print(json.dumps(document(sensors), indent=2, allow_nan=False))
         return
     console = Console(highlight=False)
-    for name, each in found.items():
+    for name, each in sensors.items():
         for quantity, seen in each.quantities.items():
             if isinstance(seen, Fault):
                 console.print(plain(f"{name}, {quantity}: {seen}"))
@@ -39,7 +39,7 @@ def print_at_rest(found: Mapping[str, SensorAtRest], *, as_json: bool) -> None:
                 console.print(plain(line))
 
 
-def document(found: Mapping[str, SensorAtRest]) -> dict[str, Any]:
+def document(sensors: Mapping[str, SensorAtRest]) -> dict[str, Any]:
     """What was found at rest, in SI units, of schema "rig.allan/1"."""
     return {
         "schema": SCHEMA,
@@ -51,17 +51,17 @@ def document(found: Mapping[str, SensorAtRest]) -> dict[str, Any]:
                     for quantity, seen in each.quantities.items()
                 },
             }
-            for name, each in found.items()
+            for name, each in sensors.items()
         },
     }
 
 
-def draw_at_rest(found: Mapping[str, SensorAtRest], folder: Path) -> list[Path]:
+def draw_at_rest(sensors: Mapping[str, SensorAtRest], folder: Path) -> list[Path]:
     """`allan_<sensor>`, as PNG and SVG, into `folder`, of every sensor that has a curve. Needs matplotlib."""
     from matplotlib.figure import Figure
 
     written = []
-    for name, each in found.items():
+    for name, each in sensors.items():
         curves = {quantity: seen for quantity, seen in each.quantities.items() if isinstance(seen, AtRest)}
         if not curves:
             continue

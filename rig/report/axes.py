@@ -72,10 +72,10 @@ def decimals(uncertainties: Sequence[float], fewest: int = FEWEST_DECIMALS) -> i
     return max(fewest, 1 - math.floor(math.log10(smallest))) if smallest > 0 else fewest
 
 
-def skew_known(found: Skewed) -> str:
+def skew_known(skewed: Skewed) -> str:
     """U of the angles between the axes, the largest, in degrees, and what k is."""
-    widths = expanded(found.non_orthogonality_std_rad, found.non_orthogonality_freedom).widths
-    return f"{np.degrees(max(widths)):.2g}, {factor_words(found.non_orthogonality_freedom)}"
+    widths = expanded(skewed.non_orthogonality_std_rad, skewed.non_orthogonality_freedom).widths
+    return f"{np.degrees(max(widths)):.2g}, {factor_words(skewed.non_orthogonality_freedom)}"
 
 
 def matrix_lines(matrix: Array, covariance: Array, factor: float) -> Iterator[str]:

@@ -18,20 +18,20 @@ from rig.report.entry import entry
 HOUR_S = 3600.0
 
 
-def budget_entry(found: Budget) -> BudgetEntry:
+def budget_entry(budget: Budget) -> BudgetEntry:
     """The combined uncertainty and all it is made of."""
     lines = [
         entry(ContributorEntry, each, share=share, freedom=_finite(each.freedom))
-        for each, share in zip(found.contributors, found.shares, strict=True)
+        for each, share in zip(budget.contributors, budget.shares, strict=True)
     ]
-    factors = found.coverage_factors
+    factors = budget.coverage_factors
     return entry(
         BudgetEntry,
-        found,
+        budget,
         contributors=lines,
         coverage_factor=float(factors.max()),
-        freedom=[_finite(each) for each in found.freedom.tolist()],
-        coverage_probabilities=covered(factors, found.freedom),
+        freedom=[_finite(each) for each in budget.freedom.tolist()],
+        coverage_probabilities=covered(factors, budget.freedom),
     )
 
 

@@ -50,10 +50,10 @@ def drift_entry(quantity: Quantity, drift: BiasDrift, sensor: RecordedSensor) ->
     )
 
 
-def _anew(found: Anew | Fault) -> BiasEntry | ErrorEntry:
-    if isinstance(found, Fault):
-        return ErrorEntry(error=str(found))
-    return BiasEntry(bias=_vector(found.bias), std=_vector(found.std))
+def _anew(anew: Anew | Fault) -> BiasEntry | ErrorEntry:
+    if isinstance(anew, Fault):
+        return ErrorEntry(error=str(anew))
+    return BiasEntry(bias=_vector(anew.bias), std=_vector(anew.std))
 
 
 def _vector(values: Array) -> Vector3:

@@ -13,32 +13,32 @@ from rig.report.entry import entry
 from rig.report.expanded import expanded, factor_words
 
 
-def earth_rate_entry(found: EarthRate | Fault, *, counts_freedom: bool) -> EarthRateEntry | ErrorEntry:
+def earth_rate_entry(earth_rate: EarthRate | Fault, *, counts_freedom: bool) -> EarthRateEntry | ErrorEntry:
     """The entry of the Earth's rate, or of why it was not found."""
-    if isinstance(found, Fault):
-        return ErrorEntry(error=str(found))
-    return entry(EarthRateEntry, found, freedom=found.freedom if counts_freedom else None)
+    if isinstance(earth_rate, Fault):
+        return ErrorEntry(error=str(earth_rate))
+    return entry(EarthRateEntry, earth_rate, freedom=earth_rate.freedom if counts_freedom else None)
 
 
-def earth_rate_lines(found: EarthRateEntry | ErrorEntry | None) -> Iterator[str]:
+def earth_rate_lines(earth: EarthRateEntry | ErrorEntry | None) -> Iterator[str]:
     """The Earth's rate in words; None says nothing: it was not looked for."""
-    if found is None:
+    if earth is None:
         return
-    if isinstance(found, ErrorEntry):
-        yield f"Earth's rate not found: {found.error}"
+    if isinstance(earth, ErrorEntry):
+        yield f"Earth's rate not found: {earth.error}"
         return
-    (k,), words = expanded([1.0], found.freedoms(1)).factors, factor_words(found.freedoms(1))
-    rate = " ".join(f"{each:+.3f}" for each in np.divide(found.rate_rad_s, DEG_H))
-    std = k * np.sqrt(np.diag(found.covariance_rad2_s2)).max() / DEG_H
+    (k,), words = expanded([1.0], earth.freedoms(1)).factors, factor_words(earth.freedoms(1))
+    rate = " ".join(f"{each:+.3f}" for each in np.divide(earth.rate_rad_s, DEG_H))
+    std = k * np.sqrt(np.diag(earth.covariance_rad2_s2)).max() / DEG_H
     yield (
-        f"Earth's rate found: {found.norm_rad_s / DEG_H:.3f} deg/h (± {k * found.norm_std_rad_s / DEG_H:.3f}), "
+        f"Earth's rate found: {earth.norm_rad_s / DEG_H:.3f} deg/h (± {k * earth.norm_std_rad_s / DEG_H:.3f}), "
         f"{EARTH_RATE_RAD_S / DEG_H:.3f} is right; in the arm's base {rate} deg/h (± {std:.3f}), {words}"
     )
     where = [
-        f"latitude {np.degrees(found.latitude_rad):.2f}° (± {k * np.degrees(found.latitude_std_rad):.2f})"
-        + (", its vertical part as given" if found.vertical_held else "")
+        f"latitude {np.degrees(earth.latitude_rad):.2f}° (± {k * np.degrees(earth.latitude_std_rad):.2f})"
+        + (", its vertical part as given" if earth.vertical_held else "")
     ]
-    if found.heading_rad is not None and found.heading_std_rad is not None:
-        heading, off = np.degrees(found.heading_rad) % 360, k * np.degrees(found.heading_std_rad)
+    if earth.heading_rad is not None and earth.heading_std_rad is not None:
+        heading, off = np.degrees(earth.heading_rad) % 360, k * np.degrees(earth.heading_std_rad)
         where.append(f"the base's x axis points {heading:.2f}° from north over east (± {off:.2f})")
     yield "by that rate " + ", ".join(where)

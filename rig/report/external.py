@@ -56,42 +56,42 @@ class External:
         return ["increment" if sweep.sweep in by_angle else "mean" for sweep in self.data.sweeps]
 
 
-def print_external(found: External, *, as_json: bool) -> None:
+def print_external(external: External, *, as_json: bool) -> None:
     """The solution on stdout: tables for people, JSON of schema "rig.external/1" for machines."""
     if as_json:
-        print(json.dumps(_document(found), indent=2))
+        print(json.dumps(_document(external), indent=2))
     else:
-        _print(found, Console(highlight=False))
+        _print(external, Console(highlight=False))
 
 
-def _document(found: External) -> dict[str, object]:
+def _document(external: External) -> dict[str, object]:
     return {
         "schema": "rig.external/1",
-        "samples": str(found.samples),
-        "sweeps": str(found.sweeps),
+        "samples": str(external.samples),
+        "sweeps": str(external.sweeps),
         "model": MODEL,
-        **estimate_entry(found.solution).model_dump(),
+        **estimate_entry(external.solution).model_dump(),
         "covariance_order": list(PARAMETERS),
         "covariance_units": list(RATE.parameter_units),
-        "rests": len(found.data.rests),
-        "ways": found.ways,
-        "budget": budget_entry(found.budget).model_dump(),
-        "vector_model": None if found.vector is None else found.vector.model_dump(),
-        "six_observation": found.six_observation.model_dump(),
+        "rests": len(external.data.rests),
+        "ways": external.ways,
+        "budget": budget_entry(external.budget).model_dump(),
+        "vector_model": None if external.vector is None else external.vector.model_dump(),
+        "six_observation": external.six_observation.model_dump(),
     }
 
 
-def _print(found: External, console: Console) -> None:
-    estimate, vector, beside = estimate_entry(found.solution), found.vector, found.six_observation
-    budget = budget_entry(found.budget)
-    title = f"{found.samples}, {MODEL}, {estimate.estimator}"
+def _print(external: External, console: Console) -> None:
+    estimate, vector, beside = estimate_entry(external.solution), external.vector, external.six_observation
+    budget = budget_entry(external.budget)
+    title = f"{external.samples}, {MODEL}, {estimate.estimator}"
     console.print(_table(title, estimate, budget.expanded, heading=expanded_heading(budget)))
     console.print(budget_table(budget, estimate.scale, RATE.bias))
     if vector is not None:
         covariance = np.array(vector.matrix_covariance)[:9, :9]
         for line in matrix_lines(np.array(vector.matrix), covariance, max(budget.factors[:3])):
             console.print(plain(line))
-        for line in _how(found):
+        for line in _how(external):
             console.print(plain(line))
     if isinstance(beside, ErrorEntry):
         console.print(plain(f"six_observation: {beside.error}"))
@@ -105,9 +105,9 @@ def _table(title: str, estimate: EstimateEntry, expanded: Sequence[float], headi
     return scale_and_bias_table(title, RATE, estimate.scale, estimate.bias_rad_s, expanded, heading=heading)
 
 
-def _how(found: External) -> Iterator[str]:
+def _how(external: External) -> Iterator[str]:
     """How the rows were read, and what was taken as known of them."""
-    solution, data = found.solution, found.data
+    solution, data = external.solution, external.data
     if not isinstance(solution, TurnedSolution) or data.turned is None:
         yield "The axes of the sweeps are taken as given: an error of theirs is an error of F across its rows."
         return

@@ -31,23 +31,23 @@ class KvhInfo:
     problem: str | None = None
 
 
-def print_kvh_info(found: KvhInfo, *, as_json: bool) -> None:
+def print_kvh_info(info: KvhInfo, *, as_json: bool) -> None:
     """Print what the instrument says on stdout: lines for people, JSON of schema "rig.kvh/1" for machines."""
     if as_json:
-        print(json.dumps({"schema": "rig.kvh/1", **asdict(found)}, indent=2))
+        print(json.dumps({"schema": "rig.kvh/1", **asdict(info)}, indent=2))
         return
     console = Console(highlight=False)
     facts = {
-        found.sensor: f"KVH 1775 {found.serial_number} at {found.port}, {found.baud} Bd",
-        **found.settings,
-        "built-in test": found.built_in_test or "no result",
+        info.sensor: f"KVH 1775 {info.serial_number} at {info.port}, {info.baud} Bd",
+        **info.settings,
+        "built-in test": info.built_in_test or "no result",
     }
-    if found.messages:
-        unit = found.settings["ROTUNITS"].lower() + ("" if found.settings["ROTFMT"] == "DELTA" else "/s")
+    if info.messages:
+        unit = info.settings["ROTUNITS"].lower() + ("" if info.settings["ROTFMT"] == "DELTA" else "/s")
         facts |= {
-            "stream": f"{found.messages} messages, {found.lost} lost; status {found.status}",
-            "rotation": f"{_vector(found.rotation)} {unit}, the mean",
-            "acceleration": f"{_vector(found.acceleration_g)} g, the mean",
+            "stream": f"{info.messages} messages, {info.lost} lost; status {info.status}",
+            "rotation": f"{_vector(info.rotation)} {unit}, the mean",
+            "acceleration": f"{_vector(info.acceleration_g)} g, the mean",
         }
     for name, value in facts.items():
         console.print(plain(f"{name + ':':15}{value}"), soft_wrap=True)

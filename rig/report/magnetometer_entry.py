@@ -52,7 +52,7 @@ def magnetometer_entry(result: MagnetometerResult, **more: Any) -> MagnetometerE
     )  # fmt: skip
 
 
-def _beside(found: MagnetometerSolution | Fault) -> FieldSolutionEntry | ErrorEntry:
-    if isinstance(found, Fault):
-        return ErrorEntry(error=str(found))
-    return entry(FieldSolutionEntry, found, found.fit, scale=1 / np.linalg.norm(found.matrix, axis=1))
+def _beside(solution: MagnetometerSolution | Fault) -> FieldSolutionEntry | ErrorEntry:
+    if isinstance(solution, Fault):
+        return ErrorEntry(error=str(solution))
+    return entry(FieldSolutionEntry, solution, solution.fit, scale=1 / np.linalg.norm(solution.matrix, axis=1))

@@ -16,9 +16,9 @@ from rig.report.expanded import expanded
 from rig.station.plain_text import plain
 
 
-def reversal_document(found: Mapping[str, MagnetometerReversal]) -> ReversalDocument:
+def reversal_document(reversals: Mapping[str, MagnetometerReversal]) -> ReversalDocument:
     """What turning magnetometers over has told, in SI units."""
-    entries = {name: _entry(each) for name, each in found.items()}
+    entries = {name: _entry(each) for name, each in reversals.items()}
     return ReversalDocument.model_validate({"schema": "rig.reversal/1", "magnetometers": entries})
 
 
@@ -38,17 +38,17 @@ def print_reversal(document: ReversalDocument, *, as_json: bool) -> None:
             console.print(plain(line))
 
 
-def _lines(found: ReversalEntry) -> Iterator[str]:
-    mixed = [axis for axis, held in zip("xyz", found.arm_field_in_bias, strict=True) if held]
+def _lines(reversal: ReversalEntry) -> Iterator[str]:
+    mixed = [axis for axis, held in zip("xyz", reversal.arm_field_in_bias, strict=True) if held]
     if mixed:
         yield f"{' '.join(mixed)}: never turned over, so the arm's field is in the bias there, as mounted"
     else:
         yield "the sensor's own on all axes: the arm's field is told apart"
-    felt = triple(np.divide(found.arm_field_t, FIELD.bias.size), "+.3f")
-    field = max(expanded(found.arm_field_std_t, found.arm_field_freedom).widths) / FIELD.bias.size
+    felt = triple(np.divide(reversal.arm_field_t, FIELD.bias.size), "+.3f")
+    field = max(expanded(reversal.arm_field_std_t, reversal.arm_field_freedom).widths) / FIELD.bias.size
     yield f"arm's field in its axes in the first run: {felt} µT (± {field:.3f})"
-    yield f"the runs agree: χ² {found.chi_square:.1f}, at most {found.limit:.1f}"
-    for run in found.runs:
+    yield f"the runs agree: χ² {reversal.chi_square:.1f}, at most {reversal.limit:.1f}"
+    for run in reversal.runs:
         yield f"as mounted in {run.run}: b {triple(np.divide(run.bias_t, FIELD.bias.size), '+.3f')} µT"
 
 

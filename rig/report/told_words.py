@@ -10,25 +10,25 @@ from rig.report.entry import entry
 FACTORS = {"1": (100.0, " %"), "rad": (math.degrees(1), "°"), "T": (1e6, " µT")}  # by which a unit is shown
 
 
-def told_from(found: Sequence[ToldFrom]) -> dict[str, tuple[ToldFromEntry, ...]]:
+def told_from(damages: Sequence[ToldFrom]) -> dict[str, tuple[ToldFromEntry, ...]]:
     """The field of `result.json`, if there is anything to say."""
-    return {"told_from": told_from_entries(found)} if found else {}
+    return {"told_from": told_from_entries(damages)} if damages else {}
 
 
-def told_from_entries(found: Sequence[ToldFrom]) -> tuple[ToldFromEntry, ...]:
+def told_from_entries(damages: Sequence[ToldFrom]) -> tuple[ToldFromEntry, ...]:
     """What `result.json` has of it: a size that is never told is null."""
-    return tuple(entry(ToldFromEntry, each, size=each.size if math.isfinite(each.size) else None) for each in found)
+    return tuple(entry(ToldFromEntry, each, size=each.size if math.isfinite(each.size) else None) for each in damages)
 
 
-def told_lines(found: Sequence[ToldFromEntry]) -> Iterator[str]:
+def told_lines(damages: Sequence[ToldFromEntry]) -> Iterator[str]:
     """A line at the terminal, where anything is known of it."""
-    if found:
-        yield f"in this run it would be told from: {told_words(found)}"
+    if damages:
+        yield f"in this run it would be told from: {told_words(damages)}"
 
 
-def told_words(found: Sequence[ToldFromEntry]) -> str:
+def told_words(damages: Sequence[ToldFromEntry]) -> str:
     """All that would be told, and from what size on, in one sentence."""
-    return "; ".join(f"{each.what}: {size_words(each.size, each.unit)}{_off_by(each)}" for each in found)
+    return "; ".join(f"{each.what}: {size_words(each.size, each.unit)}{_off_by(each)}" for each in damages)
 
 
 def size_words(size: float | None, unit: str) -> str:
@@ -39,5 +39,5 @@ def size_words(size: float | None, unit: str) -> str:
     return f"{factor * size:#.2g}{shown}"
 
 
-def _off_by(found: ToldFromEntry) -> str:
-    return "" if found.off_by_expanded is None else f" ({found.off_by_expanded:.1f} U)"
+def _off_by(damage: ToldFromEntry) -> str:
+    return "" if damage.off_by_expanded is None else f" ({damage.off_by_expanded:.1f} U)"

@@ -11,17 +11,17 @@ DEG = math.degrees(1)
 ALIKE = 0.005  # of a rate: what the arm's timing and a sensor that leans by 5° make of one speed
 
 
-def when_words(found: WhenEntry) -> str:
+def when_words(when: WhenEntry) -> str:
     """The temperature at which, and the time over which, a value is a mean, in words."""
-    began, ended = (datetime.fromisoformat(each) for each in (found.from_utc, found.to_utc))
+    began, ended = (datetime.fromisoformat(each) for each in (when.from_utc, when.to_utc))
     day = f"{began:%Y-%m-%d} "
     until = f"{ended:%H:%M:%S}" if ended.date() == began.date() else f"{ended:%Y-%m-%d %H:%M:%S}"
     over = f"mean over {day}{began:%H:%M:%S} to {until} UTC"
-    if found.temperature_c is None or found.temperature_range_c is None:
+    if when.temperature_c is None or when.temperature_range_c is None:
         return over
-    low, high = (f"{each:.2f}" for each in found.temperature_range_c)
+    low, high = (f"{each:.2f}" for each in when.temperature_range_c)
     went = f"stayed at {low} °C" if low == high else f"was between {low} and {high} °C"
-    return f"at {found.temperature_c:.1f} °C, {over}, in which it {went}"
+    return f"at {when.temperature_c:.1f} °C, {over}, in which it {went}"
 
 
 def speed_words(sensor: SensorEntry) -> str:

@@ -5,7 +5,7 @@ from rig.data.result_types import WhenEntry
 from rig.report.entry import entry
 
 
-def when_entry(found: When) -> WhenEntry:
+def when_entry(when: When) -> WhenEntry:
     """Times to the second."""
-    times = {name: getattr(found, name).isoformat(timespec="seconds") for name in ("from_utc", "to_utc", "mean_utc")}
-    return entry(WhenEntry, found, **times)
+    times = {name: getattr(when, name).isoformat(timespec="seconds") for name in ("from_utc", "to_utc", "mean_utc")}
+    return entry(WhenEntry, when, **times)

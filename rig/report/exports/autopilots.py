@@ -93,42 +93,42 @@ def _each(form: str, values: Iterable[float]) -> Parameters:
         yield form.format(axis), float(value)
 
 
-def _ellipsoid(found: MagnetometerEntry) -> tuple[Array, Array]:
+def _ellipsoid(magnetometer: MagnetometerEntry) -> tuple[Array, Array]:
     """(3,) the diagonal and (3,) what is beside it: xy, xz, yz."""
-    matrix = symmetric(np.array(found.correction_matrix))
+    matrix = symmetric(np.array(magnetometer.correction_matrix))
     return np.diag(matrix), matrix[[0, 0, 1], [1, 2, 2]]
 
 
-def _px4_gyroscope(number: int, found: SensorEntry) -> Parameters:
-    yield from _each(f"CAL_GYRO{number}_{{}}OFF", np.negative(found.bias_rad_s))
+def _px4_gyroscope(number: int, gyroscope: SensorEntry) -> Parameters:
+    yield from _each(f"CAL_GYRO{number}_{{}}OFF", np.negative(gyroscope.bias_rad_s))
 
 
-def _px4_accelerometer(number: int, found: AccelerometerEntry) -> Parameters:
-    yield from _each(f"CAL_ACC{number}_{{}}OFF", found.bias_m_s2)
-    yield from _each(f"CAL_ACC{number}_{{}}SCALE", found.scale)
+def _px4_accelerometer(number: int, accelerometer: AccelerometerEntry) -> Parameters:
+    yield from _each(f"CAL_ACC{number}_{{}}OFF", accelerometer.bias_m_s2)
+    yield from _each(f"CAL_ACC{number}_{{}}SCALE", accelerometer.scale)
 
 
-def _px4_magnetometer(number: int, found: MagnetometerEntry) -> Parameters:
-    diagonal, beside = _ellipsoid(found)
-    yield from _each(f"CAL_MAG{number}_{{}}OFF", np.divide(found.bias_t, GAUSS_T))
+def _px4_magnetometer(number: int, magnetometer: MagnetometerEntry) -> Parameters:
+    diagonal, beside = _ellipsoid(magnetometer)
+    yield from _each(f"CAL_MAG{number}_{{}}OFF", np.divide(magnetometer.bias_t, GAUSS_T))
     yield from _each(f"CAL_MAG{number}_{{}}SCALE", diagonal)
     yield from _each(f"CAL_MAG{number}_{{}}ODIAG", beside)
 
 
-def _ardupilot_gyroscope(number: int, found: SensorEntry) -> Parameters:
+def _ardupilot_gyroscope(number: int, gyroscope: SensorEntry) -> Parameters:
     name = f"INS_GYR{number + 1}OFFS" if number else "INS_GYROFFS"
-    yield from _each(f"{name}_{{}}", np.negative(found.bias_rad_s))
-    yield f"INS_GYR{number + 1}_CALTEMP", found.temperature_c
+    yield from _each(f"{name}_{{}}", np.negative(gyroscope.bias_rad_s))
+    yield f"INS_GYR{number + 1}_CALTEMP", gyroscope.temperature_c
 
 
-def _ardupilot_accelerometer(number: int, found: AccelerometerEntry) -> Parameters:
-    yield from _each(f"INS_ACC{_nth(number)}OFFS_{{}}", found.bias_m_s2)
-    yield from _each(f"INS_ACC{_nth(number)}SCAL_{{}}", found.scale)
+def _ardupilot_accelerometer(number: int, accelerometer: AccelerometerEntry) -> Parameters:
+    yield from _each(f"INS_ACC{_nth(number)}OFFS_{{}}", accelerometer.bias_m_s2)
+    yield from _each(f"INS_ACC{_nth(number)}SCAL_{{}}", accelerometer.scale)
 
 
-def _ardupilot_magnetometer(number: int, found: MagnetometerEntry) -> Parameters:
-    diagonal, beside = _ellipsoid(found)
-    yield from _each(f"COMPASS_OFS{_nth(number)}_{{}}", np.divide(found.bias_t, -MILLIGAUSS_T))
+def _ardupilot_magnetometer(number: int, magnetometer: MagnetometerEntry) -> Parameters:
+    diagonal, beside = _ellipsoid(magnetometer)
+    yield from _each(f"COMPASS_OFS{_nth(number)}_{{}}", np.divide(magnetometer.bias_t, -MILLIGAUSS_T))
     yield from _each(f"COMPASS_DIA{_nth(number)}_{{}}", diagonal)
     yield from _each(f"COMPASS_ODI{_nth(number)}_{{}}", beside)
 

@@ -21,8 +21,8 @@ def imucal_files(result: ResultDocument) -> Mapping[str, str]:
     }
 
 
-def _document(result: ResultDocument, each: Exported) -> dict[str, object]:
-    acceleration, rates = each.accelerometer, each.gyroscope
+def _document(result: ResultDocument, sensor: Exported) -> dict[str, object]:
+    acceleration, rates = sensor.accelerometer, sensor.gyroscope
     return {
         "cal_type": "Turntable",
         "_format_version": FORMAT_VERSION,
@@ -30,23 +30,23 @@ def _document(result: ResultDocument, each: Exported) -> dict[str, object]:
         "gyr_unit": "rad/s",
         "from_acc_unit": "m/s^2",
         "from_gyr_unit": "rad/s",
-        "comment": ". ".join([*comments(result, each), *_convention(each)]),
+        "comment": ". ".join([*comments(result, sensor), *_convention(sensor)]),
         "K_a": (np.eye(3) if acceleration is None else acceleration.scale).tolist(),
         "R_a": (np.eye(3) if acceleration is None else acceleration.axes).tolist(),
         "b_a": (np.zeros(3) if acceleration is None else acceleration.offset).tolist(),
         "K_g": rates.scale.tolist(),
         "R_g": rates.axes.tolist(),
-        "K_ga": each.g_sensitivity.tolist(),
+        "K_ga": sensor.g_sensitivity.tolist(),
         "b_g": rates.offset.tolist(),
     }
 
 
-def _convention(each: Exported) -> list[str]:
+def _convention(sensor: Exported) -> list[str]:
     said = ["w = R_g^-1 K_g^-1 (m - K_ga a - b_g), in the right-angled frame nearest to the gyroscope's axes; b_g = -b"]
-    if each.accelerometer is None:
+    if sensor.accelerometer is None:
         said.append("No accelerometer was calibrated: K_a, R_a, b_a are those of an ideal one")
-    if not each.found_g_sensitivity:
+    if not sensor.found_g_sensitivity:
         said.append("The g-sensitivity was not found: K_ga is zero")
-    if each.second_order:
+    if sensor.second_order:
         said.append("Left out: the accelerometer's second order")
     return [*said, "Left out: uncertainties, temperature, nonlinearity; they are in result.json"]

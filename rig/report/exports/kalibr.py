@@ -34,16 +34,16 @@ def triangular(matrix: Array) -> tuple[Array, Array]:
     return r.T * signs + 0.0, (q * signs).T  # no −0.0
 
 
-def _noise(result: ResultDocument, each: Exported, topic: str) -> str:
+def _noise(result: ResultDocument, sensor: Exported, topic: str) -> str:
     known = {
         "rostopic": topic,
-        "update_rate": each.gyroscope.rate_hz,
-        "gyroscope_noise_density": each.gyroscope.density,
-        "accelerometer_noise_density": None if each.accelerometer is None else each.accelerometer.density,
+        "update_rate": sensor.gyroscope.rate_hz,
+        "gyroscope_noise_density": sensor.gyroscope.density,
+        "accelerometer_noise_density": None if sensor.accelerometer is None else sensor.accelerometer.density,
     }
     unknown = [name for name, value in known.items() if value is None]
     said = [
-        *comments(result, each),
+        *comments(result, sensor),
         "Noise densities in rad/s/sqrt(Hz), m/s^2/sqrt(Hz): of a sample at rest over the rate's root, worst axis.",
         "Lost: gyroscope_random_walk, accelerometer_random_walk, which take hours at rest; add your own.",
         *(f"Lost: {name}, which this run does not tell" for name in unknown),
@@ -51,29 +51,29 @@ def _noise(result: ResultDocument, each: Exported, topic: str) -> str:
     return _yaml(said, {name: value for name, value in known.items() if value is not None})
 
 
-def _intrinsics(result: ResultDocument, each: Exported, topic: str) -> str:
+def _intrinsics(result: ResultDocument, sensor: Exported, topic: str) -> str:
     imu: dict[str, object] = {"model": "scale-misalignment", "rostopic": topic}
     to_body = np.eye(3)
-    if each.accelerometer is not None:
-        scaled, to_body = triangular(each.accelerometer.matrix)
+    if sensor.accelerometer is not None:
+        scaled, to_body = triangular(sensor.accelerometer.matrix)
         imu["accelerometers"] = {"M": scaled.tolist()}
-    scaled, turned = triangular(each.gyroscope.matrix @ to_body.T)
-    in_body = each.g_sensitivity @ to_body.T
+    scaled, turned = triangular(sensor.gyroscope.matrix @ to_body.T)
+    in_body = sensor.g_sensitivity @ to_body.T
     imu["gyroscopes"] = {"M": scaled.tolist(), "A": (in_body @ turned.T).tolist(), "C_gyro_i": turned.tolist()}
     said = [
-        *comments(result, each),
+        *comments(result, sensor),
         "m = M C_gyro_i w + A C_gyro_i a + b: readings m in rad/s, w true, a in m/s^2. Kalibr keeps no bias here:",
-        f"b = -b of result.json = {each.gyroscope.offset.tolist()} rad/s",
+        f"b = -b of result.json = {sensor.gyroscope.offset.tolist()} rad/s",
     ]
-    if each.accelerometer is not None:
-        said.append(f"accelerometer: m = M a + b, b = {each.accelerometer.offset.tolist()} m/s^2")
-    if not each.found_g_sensitivity:
+    if sensor.accelerometer is not None:
+        said.append(f"accelerometer: m = M a + b, b = {sensor.accelerometer.offset.tolist()} m/s^2")
+    if not sensor.found_g_sensitivity:
         said.append("A is zero: the g-sensitivity was not found.")
     said.append("Lost: uncertainties, temperature, the accelerometer's second order and place.")
     return _yaml(said, {"imu0": imu})
 
 
-def _yaml(said: list[str], document: Mapping[str, object]) -> str:
-    heading = "".join(f"# {line}\n" for line in said)
+def _yaml(lines: list[str], document: Mapping[str, object]) -> str:
+    heading = "".join(f"# {line}\n" for line in lines)
     nested = any(isinstance(value, dict) for value in document.values())  # matrices are written a row a line
     return heading + yaml.safe_dump(document, sort_keys=False, default_flow_style=None if nested else False)

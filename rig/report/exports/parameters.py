@@ -102,10 +102,10 @@ def _exported(name: str, sensor: SensorEntry, beside: AccelerometerEntry | None)
     )
 
 
-def _accelerometer(found: AccelerometerEntry) -> Triad:
-    rate = sum(dwell.samples for dwell in found.dwells) / sum(dwell.duration_s for dwell in found.dwells)
-    density = _density([(dwell.noise_m_s2, dwell.samples) for dwell in found.dwells], rate)
-    return Triad(np.linalg.inv(np.array(found.correction_matrix)), np.array(found.bias_m_s2), rate, density)
+def _accelerometer(entry: AccelerometerEntry) -> Triad:
+    rate = sum(dwell.samples for dwell in entry.dwells) / sum(dwell.duration_s for dwell in entry.dwells)
+    density = _density([(dwell.noise_m_s2, dwell.samples) for dwell in entry.dwells], rate)
+    return Triad(np.linalg.inv(np.array(entry.correction_matrix)), np.array(entry.bias_m_s2), rate, density)
 
 
 def _density(noises: Sequence[tuple[Sequence[float], int]], rate_hz: float) -> float | None:
@@ -116,13 +116,13 @@ def _density(noises: Sequence[tuple[Sequence[float], int]], rate_hz: float) -> f
     return float(np.sqrt(squares.max() / rate_hz))
 
 
-def comments(result: ResultDocument, each: Exported) -> Iterator[str]:
+def comments(result: ResultDocument, sensor: Exported) -> Iterator[str]:
     """Whose calibration it is and when it was found."""
-    return origin(result, each.name, each, each.temperature_c)
+    return origin(result, sensor.name, sensor, sensor.temperature_c)
 
 
-def origin(result: ResultDocument, name: str, found: Named, temperature_c: float | None) -> Iterator[str]:
+def origin(result: ResultDocument, name: str, sensor: Named, temperature_c: float | None) -> Iterator[str]:
     """Whose calibration it is, when and how warm it was found, and by what."""
     made, warm = result.provenance, "" if temperature_c is None else f" at {temperature_c:.1f} degC,"
-    yield printable(f"{name}: {found.part} {found.serial_number},{warm} {made.started_utc}")
+    yield printable(f"{name}: {sensor.part} {sensor.serial_number},{warm} {made.started_utc}")
     yield printable(f"by calibration-rig {made.rig_version}, configuration {made.configuration_sha256[:16]}")

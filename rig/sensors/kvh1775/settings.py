@@ -59,28 +59,28 @@ class Wanted:
         }
 
 
-def corrections(found: Mapping[str, str], wanted: Wanted) -> dict[str, str]:
-    """What has to be set, by name, in order; `found` holds all `NAMES`."""
+def corrections(stored: Mapping[str, str], wanted: Wanted) -> dict[str, str]:
+    """What has to be set, by name, in order; `stored` holds all `NAMES`."""
     target = wanted.settings
-    return {name: target[name] for name in NAMES if name in target and not same(found[name], target[name])}
+    return {name: target[name] for name in NAMES if name in target and not same(stored[name], target[name])}
 
 
-def refusals(sensor: str, found: Mapping[str, str]) -> Iterable[SensorError]:
+def refusals(sensor: str, stored: Mapping[str, str]) -> Iterable[SensorError]:
     """What of the settings found only somebody who knows their purpose may change.
 
     `kvh_axes_not_identity`, `kvh_custom_filter`.
     """
-    if not same(found["AXES"], ",".join(str(value) for value in np.eye(3).ravel())):
+    if not same(stored["AXES"], ",".join(str(value) for value in np.eye(3).ravel())):
         yield SensorError(
             "kvh_axes_not_identity",
-            f"{sensor}: its memory holds axes {found['AXES']}, by which it multiplies every reading",
+            f"{sensor}: its memory holds axes {stored['AXES']}, by which it multiplies every reading",
             "If nobody needs them, set them back in its configuration mode: =AXES,1,0,0,0,1,0,0,0,1",
         )
     for triad, name in (("gyroscope", "FILTTYPE,G"), ("accelerometer", "FILTTYPE,A")):
-        if found[name] not in ("CHEBY", "BUTTER", "AVE"):
+        if stored[name] not in ("CHEBY", "BUTTER", "AVE"):
             yield SensorError(
                 "kvh_custom_filter",
-                f"{sensor}: the filter of its {triad} is {found[name]}, somebody's own",
+                f"{sensor}: the filter of its {triad} is {stored[name]}, somebody's own",
                 f"If nobody needs it, set it back in its configuration mode: ={name},{USUAL_FILTER}",
             )
 
