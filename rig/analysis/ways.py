@@ -38,7 +38,8 @@ def with_ways(pieces: Pieces, name: str, recordings: Sequence[ObservedRun], expl
     """The pieces, and all ways on which only the wrists turned; their places count down from below `REST`.
 
     Their noise is that of the other pieces, for as long as they last, and what a vibration leaves of which the rests
-    tell. (No lines are sought on a way: it is short, and the servo's own vibration grows faster and slower on it.)
+    beside either end tell. (No lines are sought on a way: it is short, and the servo's own vibration grows faster and
+    slower on it.)
     """
     found = [
         (way, stream, since_s, each.run.settings, site)
@@ -49,7 +50,6 @@ def with_ways(pieces: Pieces, name: str, recordings: Sequence[ObservedRun], expl
     ]
     if not found:
         return pieces
-    swing_rad2 = max(float(window.swing_rad2.sum()) for window in pieces.windows)  # along any axis of one that turns
     density = np.median(pieces.variances_rad2_s2 * np.diff(pieces.times_s), axis=0)
     means, rates, attitudes, pulls = [], [], [], []
     for way, stream, _, settings, site in found:
@@ -62,6 +62,7 @@ def with_ways(pieces: Pieces, name: str, recordings: Sequence[ObservedRun], expl
         pulls.append(pull_m_s2(way, site.down_m_s2, np.array(settings.extension_m)))
     times_s = np.array([(way.start_s + since_s, way.end_s + since_s) for way, _, since_s, *_ in found])
     lasting_s, count = np.diff(times_s), len(found)
+    swing_rad2 = _swings(pieces, name, recordings, times_s)
     return replace(
         pieces,
         sweep=np.concatenate([pieces.sweep, REST - 1 - np.arange(count)]),
@@ -75,6 +76,21 @@ def with_ways(pieces: Pieces, name: str, recordings: Sequence[ObservedRun], expl
         times_s=np.concatenate([pieces.times_s, times_s]),
         stretches=(*pieces.stretches, *(way for way, *_ in found)),
     )
+
+
+def _swings(pieces: Pieces, name: str, recordings: Sequence[ObservedRun], times_s: Array) -> Array:
+    """(M, 3) rad² by which what vibrates differs from the start to the end of M ways, by the rest nearest to either."""
+    rests_s = [
+        (rest.start_s + rest.end_s) / 2 + since_s
+        for each, since_s in zip(recordings, since_first_s(recordings), strict=True)
+        for rest in each.sensors[name].rests
+    ]
+    swings_rad2 = np.array([window.swing_rad2 for window in pieces.windows if window.sweep == REST])
+    if not rests_s:
+        return np.zeros((len(times_s), 3))
+    nearest = np.abs(times_s[:, :, None] - np.array(rests_s)).argmin(axis=2)
+    found: Array = swings_rad2[nearest].mean(axis=1)
+    return found
 
 
 def _ways(run: RunData, stream: Stream, motion: ArmMotion) -> Iterator[Stretch]:

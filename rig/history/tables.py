@@ -131,7 +131,7 @@ def effects_table(effects: Mapping[str, Sequence[RigEffect]]) -> Table:
 def title_of(subject: Subject) -> str:
     """What was calibrated, in words."""
     part, serial_number, quantity, full_scale, simulated = subject
-    unit = QUANTITIES[quantity].unit if quantity in QUANTITIES else ""
+    unit = next((each.unit for each in QUANTITIES.values() if each.name in quantity.split()), "")
     return f"{part} {serial_number}, {quantity}, ±{full_scale:.4g} {unit}" + (", simulated" if simulated else "")
 
 
