@@ -106,7 +106,7 @@ class Cortex:
         return bool(held_off) and number != NMI
 
     def return_from_exception(self) -> None:
-        """Inside a hook: undo `enter_pending`, after the core branched to a return code (EXC_RETURN), and go on where
+        """Undo `enter_pending` inside a hook, after the core branched to a return code (EXC_RETURN), and go on where
         it was, without the price of stopping and running anew.
         """
         at, base = self._left.read()

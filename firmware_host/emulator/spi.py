@@ -54,7 +54,7 @@ class Spi1:
 
     @property
     def busy(self) -> bool:
-        """Something is still on the bus."""
+        """Whether something is still on the bus."""
         return self.bus.free > self._timeline.now
 
     def _write_control(self, value: int) -> None:

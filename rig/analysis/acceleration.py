@@ -95,7 +95,7 @@ class AccelerometerResult:
 
     @property
     def bias_m_s2(self) -> Array:
-        """(3,) b."""
+        """(3,) bias b."""
         return self.solution.bias_m_s2
 
     @property

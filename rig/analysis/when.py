@@ -95,7 +95,7 @@ def _moved(window: Window, since_s: float) -> Window:
 
 
 def _when(recordings: Sequence[ObservedRun], read: Sequence[_Read]) -> When:
-    """Each window counts by its weight; a recording's wall time is that of its first state."""
+    """When readings were taken, each window by its weight; a recording's wall time is that of its first state."""
     began = datetime.fromisoformat(recordings[0].run.provenance.started_utc)
     first_s, weights = float(recordings[0].motion.time_s[0]), [each.weight for each in read]
 

@@ -215,7 +215,7 @@ class _Child:
             self._control.stopScript()
 
     def abandon(self) -> NoReturn:
-        """Nobody supervises any more: stop the arm, over the dashboard or else over the client, and leave."""
+        """Stop the arm that nobody supervises any more, over the dashboard or else over the client, and leave."""
         if self._holds_arm:
             # The client's own stop may wait for ever for a controller that is gone; the system's alarm ends that.
             signal.setitimer(signal.ITIMER_REAL, ABANDON_S)

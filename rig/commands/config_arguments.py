@@ -16,10 +16,10 @@ def add_set(parser: ArgumentParser, text: str, metavar: str = "PATH=VALUE") -> N
 
 
 def add_script(parser: ArgumentParser) -> None:
-    """`--script`."""
+    """Add the argument `--script`."""
     parser.add_argument("--script", type=Path, metavar="FILE", help="a procedure of your own, in place of the file's")
 
 
 def add_json(parser: ArgumentParser) -> None:
-    """`--json`."""
+    """Add the argument `--json`."""
     parser.add_argument("--json", action="store_true", help="for machines")

@@ -133,7 +133,7 @@ class SiteSection(Section):
 
     @property
     def up(self) -> Vector3:
-        """Unit vector."""
+        """Unit vector that points up, in the base's frame."""
         x, y, z = (np.array(self.base_up) / np.linalg.norm(self.base_up)).tolist()
         return x, y, z
 

@@ -198,7 +198,7 @@ class AttitudesSection(ProcedureSection):
     @field_validator("attitudes")
     @classmethod
     def each_once(cls, value: tuple[tuple[float, float, float], ...]) -> tuple[tuple[float, float, float], ...]:
-        """Twice the same tells nothing new of the arm's errors, which it makes twice as well."""
+        """Attitudes without a second one alike, which tells nothing new of the arm's errors: it makes them alike."""
         found: set[tuple[float, ...]] = set()
         for attitude in value:
             turned = tuple(np.mod(attitude, 360).tolist())

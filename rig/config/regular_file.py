@@ -25,7 +25,7 @@ def open_regular_file(path: Path, max_bytes: int, *, follow_links: bool = True) 
 
 
 def read_regular_file(path: Path, max_bytes: int, *, follow_links: bool = True) -> bytes:
-    """What is in it. Raises as `open_regular_file`."""
+    """The content of a regular file. Raises as `open_regular_file`."""
     with open_regular_file(path, max_bytes, follow_links=follow_links) as file:
         content = file.read(max_bytes + 1)
     if len(content) > max_bytes:  # it has grown meanwhile, or its size is not told (those of /proc say 0)

@@ -300,7 +300,7 @@ def settings_of(config: "RigConfig", plan: "Plan") -> RunSettings:
 
 
 def _planned(dwells: "Sequence[Dwell]") -> tuple[PlannedDwell, ...]:
-    """Each with how often its attitude was there before."""
+    """The planned dwells, each with how often its attitude was there before."""
     seen: Counter[tuple[float, ...]] = Counter()
     planned = []
     for dwell in dwells:

@@ -29,7 +29,7 @@ class Fault(RigError):
 
 @contextmanager
 def raised_as(kind: type[RigError]) -> Iterator[None]:
-    """Whoever finds a problem inside, the board or the recording, it is raised as `kind`; a refusal stays one."""
+    """Raise a problem found inside, by board or recording, as `kind`; a refusal stays one."""
     try:
         yield
     except ProblemError as error:

@@ -114,7 +114,7 @@ class _Settled:
 
 
 def _settle(recorded: Recorded, state: State, sizes: Sizes | None) -> _Settled:
-    """Gauss–Newton; the sizes are found anew while the parameters still move much."""
+    """Solve by Gauss–Newton; the sizes are found anew while the parameters still move much."""
     for iteration in range(1, PASSES + 1):
         there = seen(recorded, state)
         if iteration == 2:

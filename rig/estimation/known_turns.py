@@ -121,7 +121,7 @@ class _Equations:
 
 @dataclass(frozen=True, slots=True)
 class _State:
-    """m = F ω + c."""
+    """A state of the solution, m = F ω + c."""
 
     matrix: Array
     offset: Array

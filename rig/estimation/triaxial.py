@@ -194,7 +194,7 @@ def _check(m: Array, r: Array, v: Array, known: Known, parameters: int) -> None:
 
 
 def _check_size(m: Array, norm: float) -> None:
-    """Whatever the attitudes: readings are as large as the reference at least, and differ by no more than it."""
+    """Raises Fault `wrong_unit` for readings smaller than the reference, or that differ by more, in any attitudes."""
     size, spread = (float(np.sqrt(np.mean(np.sum(each**2, axis=1)))) for each in (m, m - m.mean(axis=0)))
     refusals.check_unit(np.full(3, norm / np.clip(norm, spread, size)))
 

@@ -191,5 +191,5 @@ def effects(pasts: Sequence[Past]) -> dict[str, tuple[RigEffect, ...]]:
 
 
 def time_of(past: Past) -> datetime:
-    """When it began."""
+    """When the run of a calibration began."""
     return datetime.fromisoformat(past.started_utc).astimezone(UTC)

@@ -17,7 +17,7 @@ PPM = 1e6
 
 
 def calibrations_table(pasts: Iterable[Past]) -> Table:
-    """One line each: what, when, by which rig, with which verdict."""
+    """The table of calibrations, one line each: what, when, by which rig, with which verdict."""
     table = _table("calibrations", "no", "started (UTC)", "sensor", "rig", "verdict", "")
     for each in pasts:
         started = each.started_utc.replace("T", " ")[:16]
@@ -58,7 +58,7 @@ def trend_lines(trends: Mapping[str, Trend]) -> Iterator[str]:
 
 
 def changes_table(title: str, changes: Iterable[Change]) -> Table:
-    """Each parameter beside the one before."""
+    """The table of changes: each parameter beside the one before."""
     table = _table(title, "parameter", "before ± U", "now ± U", "E_n")
     for each in changes:
         table.add_row(
@@ -136,7 +136,7 @@ def title_of(subject: Subject) -> str:
 
 
 def value_text(parameter: Parameter) -> str:
-    """y ± U."""
+    """A parameter's value ± U in print."""
     found = rounded(parameter.value, parameter.expanded)
     return f"{found.value_text} ± {found.uncertainty_text}"
 

@@ -55,7 +55,7 @@ class Readings:
 
     @property
     def samples(self) -> NDArray[Any]:
-        """(n,) SAMPLE_DTYPE: counts, board times and sequence numbers as the board sent them."""
+        """(n,) samples, SAMPLE_DTYPE: counts, board times and sequence numbers as the board sent them."""
         return np.concatenate([run.samples[self.name] for run in self.recordings])
 
     def to_dict(self) -> dict[str, Any]:

@@ -84,7 +84,7 @@ class Control:
 
 
 def _interrupt_the_main_thread() -> None:
-    """Out of whatever it waits for, where the system can do that."""
+    """Interrupt the main thread out of whatever it waits for, where the system can do that."""
     if hasattr(signal, "pthread_kill"):
         signal.pthread_kill(threading.main_thread().ident or 0, STOP_SIGNAL)
     else:

@@ -63,7 +63,7 @@ class Feed:
 
 
 class Mailbox:
-    """A browser's: room for one frame."""
+    """A browser's mailbox: room for one frame."""
 
     def __init__(self) -> None:
         self._frame: bytes | None = None

@@ -64,7 +64,7 @@ def write_attitude_figures(outcome: Outcome, document: ResultDocument, folder: P
 
 
 def draw(figure: "Figure", held: HeldStill) -> None:
-    """Left: reading less model by attitude, with what noise and the arm's error let expect. Right: the sphere."""
+    """Draw, left, reading less model by attitude, with what noise and the arm's error let expect; right, the sphere."""
     residuals, sphere = figure.subplots(1, 2, width_ratios=(3, 2))
     _draw_residuals(residuals, held)
     _draw_sphere(sphere, held)

@@ -14,7 +14,7 @@ ALWAYS = ("sensors", "verification")  # there of every run, if only to say that 
 
 
 def document_of(outcome: Outcome) -> ResultDocument:
-    """Plain numbers, texts and tuples, in SI units, of schema "rig.result/1"."""
+    """The result as plain numbers, texts and tuples, in SI units, of schema "rig.result/1"."""
     made = {kind.key: kind.entries(outcome) for kind in KINDS if not isinstance(kind.entries, Without)}
     found = {key: entries for key, entries in made.items() if entries or key in ALWAYS}
     clock = {} if outcome.clock is None else {"clock": clock_entry(outcome.clock)}

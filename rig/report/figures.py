@@ -68,7 +68,7 @@ def save(figure: "Figure", folder: Path, name: str) -> None:
 
 
 def draw_comparison(figure: "Figure", comparison: Comparison, sensor: str, reference: str) -> None:
-    """Rows x, y, z: readings on the left, their difference on the right, enlarged."""
+    """Draw in rows x, y, z readings on the left, their difference on the right, enlarged."""
     rows = figure.subplots(3, 2, sharex=True, sharey="col", width_ratios=(3, 2), gridspec_kw=MARGINS)
     since_s = comparison.time_s - comparison.time_s[0]
     error = comparison.reading_rad_s - comparison.reference_rad_s

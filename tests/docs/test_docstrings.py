@@ -11,7 +11,8 @@ POINTS_ELSEWHERE = (
     *("it", "its", "they", "them", "their", "this", "that", "these", "those", "both", "none", "nothing", "all but one"),
     *("the same", "as", "or", "and", "but", "also", "always", "never", "only", "not", "all of it", "all of them"),
     *("of", "by", "in", "into", "on", "at", "to", "for", "with", "without", "between", "until", "before", "after"),
-    *("since", "while", "unless", "under", "around", "along", "less", "just", "from now on", ".", ","),
+    *("out of", "inside", "since", "while", "unless", "under", "around", "along", "less", "just", "from now on"),
+    *(".", ","),
 )
 WITHOUT_SUBJECT = re.compile(rf"({'|'.join(map(re.escape, POINTS_ELSEWHERE))})(\W|$)|$", re.IGNORECASE)
 

@@ -25,10 +25,10 @@ SPREAD_MIN = 1e-12  # of a value's own size: what arithmetic leaves of equal val
 
 @dataclass(frozen=True, slots=True)
 class Chart:
-    """All (…, n). `deviation` is normal with std 1 in control, NaN of the first results; so is `ewma`, with `limit`.
+    """A control chart, all (…, n). `deviation` is normal with std 1 in control, NaN of the first results; so is `ewma`.
 
-    `alarm` says that either was beyond its limit. What raised an alarm is no part of what later results are held
-    against.
+    `limit` is that of `ewma`, `alarm` says that either was beyond its limit. What raised an alarm is no part of what
+    later results are held against.
     """
 
     deviation: Array

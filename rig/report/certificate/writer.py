@@ -14,7 +14,7 @@ PAGE = "certificate.html"
 
 
 def write_certificate(outcome: Outcome, document: ResultDocument, folder: Path) -> tuple[RunEvent, ...]:
-    """Whatever the verdict: what failed stands there too, across every page where it makes the measurement unfit."""
+    """Write the certificate, whatever the verdict: what failed stands there too, across every page of one unfit."""
     path = folder / PAGE
     write_new(path, certificate_page(certificate_of(document, stated_in(folder))))
     return (DocumentWritten(path),)

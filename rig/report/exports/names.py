@@ -4,7 +4,7 @@ from collections.abc import Iterable
 
 
 def plain_names(names: Iterable[str]) -> dict[str, str]:
-    """Each name with one of its own that begins with a letter."""
+    """Plain names by name: each begins with a letter and stands once."""
     found: dict[str, str] = {}
     for name in names:
         plain = "".join(c if c.isascii() and c.isalnum() else "_" for c in name)
