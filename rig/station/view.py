@@ -2,7 +2,7 @@
 
 import sys
 import time
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from contextlib import contextmanager
 from math import degrees
 
@@ -11,6 +11,7 @@ from rich.live import Live
 from rich.progress_bar import ProgressBar
 from rich.table import Table
 
+from rig.data.quantity import QUANTITIES
 from rig.errors.quoting import printable_lines
 from rig.station.events import Progress, RunEvent, SamplesTaken, SensorSamples
 from rig.station.plain_text import plain
@@ -65,17 +66,22 @@ def _panel(progress: Progress, samples: SamplesTaken) -> Table:
     table.add_row("progress", ProgressBar(total=1.0, completed=progress.fraction, width=40))
     table.add_row("arm speed", f"{degrees(progress.arm_speed_rad_s):6.2f} °/s")
     for sensor in samples.sensors:
-        table.add_row(plain(sensor.sensor), _readings(sensor))
+        for name, readings in _readings(sensor):
+            table.add_row(plain(name), readings)
     table.add_row("time", f"{progress.elapsed_s:5.1f} s gone, {progress.remaining_s:5.1f} s left")
     return table
 
 
-def _readings(sensor: SensorSamples) -> str:
-    if sensor.field_t is not None:
-        field = " ".join(f"{1e6 * component:+7.2f}" for component in sensor.field_t)
-        return f"{field} µT, {sensor.samples} samples, {sensor.lost} lost"
-    rates = "waiting" if sensor.rate_rad_s is None else " ".join(f"{degrees(r):+7.2f}" for r in sensor.rate_rad_s)
-    return f"{rates} °/s, {sensor.samples} samples, {sensor.lost} lost"
+def _readings(sensor: SensorSamples) -> list[tuple[str, str]]:
+    """The rows of a sensor, one for each quantity that it sends; the first says how many samples came."""
+    came, rows = f"{sensor.samples} samples, {sensor.lost} lost", list[tuple[str, str]]()
+    for quantity in QUANTITIES.values():
+        newest: Sequence[float] | None = getattr(sensor, quantity.named(quantity.name))
+        if newest is not None:
+            shown = " ".join(f"{component / quantity.reading.size:+7.2f}" for component in newest)
+            name, more = (f"{sensor.sensor}, {quantity.sensor}", "") if rows else (sensor.sensor, f", {came}")
+            rows.append((name, f"{shown} {quantity.reading.name}{more}"))
+    return rows or [(sensor.sensor, f"waiting, {came}")]
 
 
 @contextmanager

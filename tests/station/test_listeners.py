@@ -1,9 +1,13 @@
 """What is said of an event, who hears it, and that nobody who listens can end a run."""
 
+import io
 from pathlib import Path
 
 import pytest
+from rich.console import Console
+from rich.live import Live
 
+from rig.arm.motion import Rest
 from rig.errors import Fault
 from rig.station.events import (
     Advice,
@@ -16,6 +20,7 @@ from rig.station.events import (
     PhaseRecorded,
     PhaseSkipped,
     Plotted,
+    Progress,
     Prompt,
     RunEvent,
     RunFolderWritten,
@@ -26,6 +31,7 @@ from rig.station.events import (
 )
 from rig.station.log import log
 from rig.station.station import Stations, always_yes
+from rig.station.view import LiveView
 from rig.station.words import line, reason
 from support.full_disk import full_disk
 
@@ -138,3 +144,22 @@ def test_the_log_keeps_where_a_script_failed() -> None:
     failed = Fault("script_failed", "it broke", "Mend it")
     failed.__cause__ = ZeroDivisionError("by nothing")
     assert reason(Failed(failed)) == "script_failed: it broke. Mend it.\nZeroDivisionError: by nothing"
+
+
+def test_the_live_view_shows_every_quantity_that_a_sensor_sends() -> None:
+    """Rates, what the accelerometer beside feels, a field; who has sent nothing is waited for."""
+    imu = SensorSamples("imu", 100, 2, (0.0, 0.0, 1.0), acceleration_m_s2=(0.0, -9.81, 0.5))
+    compass = SensorSamples("compass", 9, 0, None, (2e-5, 0.0, -4e-5))
+    step = Rest(name="rest", duration_s=3.0)
+    progress = Progress(1, 4, step, 0.5, 1.5, 1.5, 0.0)
+    console = Console(width=100, file=io.StringIO(), record=True)
+    with Live(console=console, auto_refresh=False) as live:
+        seen = LiveView(live)
+        seen.event(SamplesTaken((imu, compass, SensorSamples("late", 0, 0, None))))
+        seen.event(progress)
+    rows = [row.split(maxsplit=1) for row in console.export_text().splitlines()]
+    shown = [" ".join(row) for row in rows if row]
+    assert any(row.startswith("imu ") and "+57.30 °/s, 100 samples, 2 lost" in row for row in shown)
+    assert any(row.startswith("imu, accelerometer") and "-9.81" in row and "m/s²" in row for row in shown)
+    assert any(row.startswith("compass ") and "-40.00 µT, 9 samples, 0 lost" in row for row in shown)
+    assert any(row.startswith("late ") and "waiting, 0 samples" in row for row in shown)
