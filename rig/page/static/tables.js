@@ -83,10 +83,13 @@ function dwells(rows) {
 
 const largest = (vector) => Math.max(...vector.map(Math.abs));
 
+/** As many decimals as the smallest U warrants, which is shown with two digits; five at least. */
+const warranted = (u) => (u ? Math.min(12, Math.max(5, ...u.filter((each) => each > 0).map((each) => 1 - Math.floor(Math.log10(each))))) : 5);
+
 export function parameters(rows) {
   fill("parameters", rows.flatMap((p) => {
     if (!p.scale && !p.bias) return [spanning(row([p.sensor, [p.missing ?? "", "words"]], "new-sensor"), 7)];
-    const digits = p.scale || p.missing ? 5 : 2;
+    const digits = p.scale || p.missing ? warranted(p.bias_u) : 2;
     const axes = [..."xyz"].map((axis, i) =>
       row([
         i === 0 ? p.sensor : "", axis,
