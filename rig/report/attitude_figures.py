@@ -2,6 +2,7 @@
 
 from collections.abc import Iterator
 from dataclasses import dataclass
+from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING
 
@@ -15,9 +16,8 @@ from rig.data.result_file import ResultDocument
 from rig.errors import Fault
 from rig.estimation.arrays import Array
 from rig.estimation.residuals import attitude_residual_std, dwell_residual_std_m_s2
-from rig.report.figures import save
-from rig.station.events import NotPlotted, Plotted, RunEvent
-from rig.study.style import style
+from rig.report.figures import Picture, write_pictures
+from rig.station.events import RunEvent
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
@@ -42,25 +42,18 @@ class HeldStill:
 
 def write_attitude_figures(outcome: Outcome, document: ResultDocument, folder: Path) -> tuple[RunEvent, ...]:
     """`accelerometer_<sensor>`, `magnetometer_<sensor>` of a run that has any, PNG and SVG; none without matplotlib."""
-    found = list(_held_still(outcome))
-    if not found:
-        return ()
-    try:
-        import matplotlib  # noqa: F401
-    except ImportError:
-        return (NotPlotted(),)
-    from matplotlib.figure import Figure
-
-    names = []
-    for sensor, each in found:
-        name = f"{each.quantity.sensor}_{sensor}"
-        with style():
-            figure = Figure(figsize=(10.0, 4.6), layout="constrained")
-            draw(figure, each)
-            figure.suptitle(f"{sensor}: {each.quantity.sensor} in {len(each.residuals)} attitudes")
-            save(figure, folder, name)
-        names.append(name)
-    return (Plotted(tuple(names)),)
+    return write_pictures(
+        [
+            Picture(
+                f"{held.quantity.sensor}_{sensor}",
+                f"{sensor}: {held.quantity.sensor} in {len(held.residuals)} attitudes",
+                (10.0, 4.6),
+                partial(draw, held=held),
+            )
+            for sensor, held in _held_still(outcome)
+        ],
+        folder,
+    )
 
 
 def draw(figure: "Figure", held: HeldStill) -> None:

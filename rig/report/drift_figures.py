@@ -1,5 +1,7 @@
 """Biases by repeat, drawn as in TRIAX, Figs. 4 and 6."""
 
+from collections.abc import Mapping
+from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING
 
@@ -11,35 +13,34 @@ from rig.data.quantity import Quantity
 from rig.data.result_file import ResultDocument
 from rig.report.entry import counted
 from rig.report.expanded import expanded, factor_words
-from rig.report.figures import save
-from rig.station.events import NotPlotted, Plotted, RunEvent
-from rig.study.style import style
+from rig.report.figures import Picture, write_pictures
+from rig.station.events import RunEvent
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
+    from matplotlib.figure import Figure
 
 
 def write_drift_figures(outcome: Outcome, document: ResultDocument, folder: Path) -> tuple[RunEvent, ...]:
     """`bias_drift_<sensor>` of every sensor whose bias was watched, as PNG and SVG; none without matplotlib."""
-    if not outcome.drifts:
-        return ()
-    try:
-        import matplotlib  # noqa: F401
-    except ImportError:
-        return (NotPlotted(),)
-    from matplotlib.figure import Figure
+    return write_pictures(
+        [
+            Picture(
+                f"bias_drift_{sensor}",
+                f"{sensor}: bias by repeat",
+                (5.5 * len(drifts), 4.6),
+                partial(_draw_all, drifts=drifts),
+            )
+            for sensor, drifts in outcome.drifts.items()
+        ],
+        folder,
+    )
 
-    names = []
-    for sensor, drifts in outcome.drifts.items():
-        with style():
-            figure = Figure(figsize=(5.5 * len(drifts), 4.6), layout="constrained")
-            panels = np.ravel(figure.subplots(1, len(drifts)))
-            for axes, (quantity, drift) in zip(panels, drifts.items(), strict=True):
-                draw_drift(axes, quantity, drift)
-            figure.suptitle(f"{sensor}: bias by repeat")
-            save(figure, folder, f"bias_drift_{sensor}")
-        names.append(f"bias_drift_{sensor}")
-    return (Plotted(tuple(names)),)
+
+def _draw_all(figure: "Figure", drifts: Mapping[Quantity, BiasDrift]) -> None:
+    panels = np.ravel(figure.subplots(1, len(drifts)))
+    for axes, (quantity, drift) in zip(panels, drifts.items(), strict=True):
+        draw_drift(axes, quantity, drift)
 
 
 def draw_drift(axes: "Axes", quantity: Quantity, drift: BiasDrift) -> None:

@@ -1,5 +1,6 @@
 """A gyroscope that has found the Earth's rate, drawn as in TRIAX, Figs. 2 and 3: how it was turned, what is left."""
 
+from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING
 
@@ -13,9 +14,8 @@ from rig.estimation.arrays import Array
 from rig.estimation.earth_rate import EarthRate
 from rig.estimation.vector_fit import Explained
 from rig.observation.observed_run import ObservedRun
-from rig.report.figures import envelope, save
-from rig.station.events import NotPlotted, Plotted, RunEvent
-from rig.study.style import style
+from rig.report.figures import Picture, envelope, write_pictures
+from rig.station.events import RunEvent
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
@@ -31,23 +31,22 @@ def write_earth_rate_figures(outcome: Outcome, document: ResultDocument, folder:
         for name, result in outcome.results.items()
         if result.explained is not None and (earth := found_earth_rate(result.earth)) is not None
     }
-    if not found:
-        return ()
-    try:
-        import matplotlib  # noqa: F401
-    except ImportError:
-        return (NotPlotted(),)
-    from matplotlib.figure import Figure
+    return write_pictures(
+        [
+            Picture(
+                f"earth_rate_{sensor}",
+                f"{sensor}: rate of the flange, and error of the calibrated gyroscope, at {RATE_HZ:g} Hz",
+                (11.0, 4.6),
+                partial(_draw, recording=outcome.recordings[0], sensor=sensor, explained=explained, earth=earth),
+            )
+            for sensor, (explained, earth) in found.items()
+        ],
+        folder,
+    )
 
-    names = []
-    for sensor, (explained, earth) in found.items():
-        with style():
-            figure = Figure(figsize=(11.0, 4.6), layout="constrained")
-            draw_errors(figure, *errors(outcome.recordings[0], sensor, explained, earth))
-            figure.suptitle(f"{sensor}: rate of the flange, and error of the calibrated gyroscope, at {RATE_HZ:g} Hz")
-            save(figure, folder, f"earth_rate_{sensor}")
-        names.append(f"earth_rate_{sensor}")
-    return (Plotted(tuple(names)),)
+
+def _draw(figure: "Figure", recording: ObservedRun, sensor: str, explained: Explained, earth: EarthRate) -> None:
+    draw_errors(figure, *errors(recording, sensor, explained, earth))
 
 
 def errors(recording: ObservedRun, sensor: str, explained: Explained, earth: EarthRate) -> tuple[Array, Array, Array]:

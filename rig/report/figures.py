@@ -1,8 +1,10 @@
 """A verification's plots, in the manner of SIX, Figs. 7–10: sensor and reference over time, before and after."""
 
-from collections.abc import Iterable
+from collections.abc import Callable, Iterable, Sequence
+from dataclasses import dataclass
+from functools import partial
 from pathlib import Path
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Literal
 
 import numpy as np
 
@@ -23,41 +25,54 @@ COLUMNS = 600  # about as many as a panel has pixels across
 MARGINS = {"left": 0.06, "right": 0.985, "bottom": 0.065, "top": 0.915, "wspace": 0.16, "hspace": 0.14}
 
 
-def write_figures(outcome: Outcome, document: ResultDocument, folder: Path) -> tuple[RunEvent, ...]:
-    """Write the figures of all verifications of a run, if it has any."""
-    return (draw_verifications(outcome.verifications.values(), folder),) if outcome.verifications else ()
+@dataclass(frozen=True, slots=True)
+class Picture:
+    """A figure for a run folder: its file's name, its heading, its width and height in inches, and what draws it."""
+
+    name: str
+    title: str
+    size: tuple[float, float]
+    draw: Callable[["Figure"], None]
+    layout: Literal["constrained"] | None = "constrained"
 
 
-def draw_verifications(verifications: Iterable[Verification], folder: Path) -> Plotted | NotPlotted:
-    """Draw `verification_<sensor>_before` (where there is one) and `…_after`, each as PNG and SVG, into `folder`.
-
-    Draws nothing where matplotlib, which an extra brings, is absent.
-    """
+def write_pictures(pictures: Sequence[Picture], folder: Path) -> tuple[RunEvent, ...]:
+    """Draw each as PNG and SVG into `folder`, and say so; without matplotlib, which an extra brings, draw nothing."""
+    if not pictures:
+        return ()
     try:
-        import matplotlib  # noqa: F401
+        from matplotlib.figure import Figure
     except ImportError:
-        return NotPlotted()
-    written = (
-        _write(verification, when, comparison, folder)
-        for verification in verifications
-        for when, comparison in (("before", verification.before), ("after", verification.after))
-        if comparison is not None
-    )
-    return Plotted(tuple(written))
+        return (NotPlotted(),)
+    for picture in pictures:
+        with style():
+            figure = Figure(figsize=picture.size, layout=picture.layout)
+            picture.draw(figure)
+            figure.suptitle(picture.title)
+            save(figure, folder, picture.name)
+    return (Plotted(tuple(picture.name for picture in pictures)),)
 
 
-def _write(verification: Verification, when: str, comparison: Comparison, folder: Path) -> str:
-    from matplotlib.figure import Figure
+def write_figures(outcome: Outcome, document: ResultDocument, folder: Path) -> tuple[RunEvent, ...]:
+    """Draw `verification_<sensor>_before` (where there is one) and `…_after` of every verification of a run."""
+    return draw_verifications(outcome.verifications.values(), folder)
 
-    name = f"verification_{verification.sensor}_{when}"
-    with style():
-        figure = Figure(figsize=(10.0, 7.5))
-        draw_comparison(figure, comparison, verification.sensor, verification.reference.name)
-        figure.suptitle(
-            f"{verification.sensor} {when} calibration, beside {verification.reference.name}; RMS of sweeps and rests"
+
+def draw_verifications(verifications: Iterable[Verification], folder: Path) -> tuple[RunEvent, ...]:
+    """Draw those of these verifications, each as PNG and SVG, into `folder`."""
+    pictures = [
+        Picture(
+            f"verification_{each.sensor}_{when}",
+            f"{each.sensor} {when} calibration, beside {each.reference.name}; RMS of sweeps and rests",
+            (10.0, 7.5),
+            partial(draw_comparison, comparison=comparison, sensor=each.sensor, reference=each.reference.name),
+            None,
         )
-        save(figure, folder, name)
-    return name
+        for each in verifications
+        for when, comparison in (("before", each.before), ("after", each.after))
+        if comparison is not None
+    ]
+    return write_pictures(pictures, folder)
 
 
 def save(figure: "Figure", folder: Path, name: str) -> None:

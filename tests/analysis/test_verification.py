@@ -333,11 +333,12 @@ def test_the_result_names_its_statistics_and_a_person_can_read_them() -> None:
 
 
 def test_plots_of_before_and_after_are_written(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    assert draw_verifications([FOUND], tmp_path) == Plotted(("verification_gyro_before", "verification_gyro_after"))
+    written = Plotted(("verification_gyro_before", "verification_gyro_after"))
+    assert draw_verifications([FOUND], tmp_path) == (written,)
     for when in ("before", "after"):
         name = f"verification_gyro_{when}"
         assert (tmp_path / f"{name}.png").read_bytes().startswith(b"\x89PNG")
         assert (tmp_path / f"{name}.svg").stat().st_size < 500_000
     monkeypatch.setitem(sys.modules, "matplotlib", None)
-    told = draw_verifications([FOUND], tmp_path)
+    (told,) = draw_verifications([FOUND], tmp_path)
     assert "pip install 'calibration-rig[study]'" in str(line(told))
