@@ -120,7 +120,7 @@ def _draw_sphere(axes: "Axes", held: HeldStill) -> None:
         axes.plot(centre + x, y, "o", ms=4)
         axes.text(centre, -1.25, "z upwards" if side > 0 else "z downwards", ha="center")
     of = TOWARDS[held.quantity]
-    axes.set_title(f"where {of} was in the sensor's axes, x to the right, y up the page", fontsize=8)
+    axes.set_title(f"where {of} was in the sensor's axes: x right, y up", fontsize=8)
     axes.set_aspect("equal")
     axes.set_axis_off()
 
