@@ -84,7 +84,7 @@ def kvh(seed: int) -> dict[str, Any]:
         "scale": rng.uniform(0.998, 1.002, 3).tolist(),
         "bias_rad_s": rng.uniform(-1e-5, 1e-5, 3).tolist(),
         "mounting_error_deg": _askew(rng, 0.5),
-        "non_orthogonality_deg": rng.normal(0, SQUARE_DEG["kvh1775"], 3).tolist(),
+        "non_orthogonality_deg": _leaning(rng, "kvh1775"),
         "offset_mm": _offset(rng),
         "bias_instability_rad_s": 2.4e-7 * float(rng.uniform(0.5, 1.5)),
         "nonlinearity_odd_per_rad_s": _odd(rng, "kvh1775", document["sensors"]["kvh"]),
@@ -173,7 +173,7 @@ def _sensor(rng: np.random.Generator, section: Mapping[str, Any], noise_rad_s: f
         "bias_rad_s": rng.uniform(-0.02, 0.02, 3).tolist(),
         "noise_rad_s": noise_rad_s,
         "mounting_error_deg": _askew(rng, ASKEW_DEG),
-        "non_orthogonality_deg": rng.normal(0, SQUARE_DEG.get(part, 0.2), 3).tolist(),
+        "non_orthogonality_deg": _leaning(rng, part),
         "offset_mm": _offset(rng),
         "start_temperature_c": 22 - float(rng.uniform(0, WARMER_K)),
         "warm_up_s": 300,
@@ -186,6 +186,13 @@ def _sensor(rng: np.random.Generator, section: Mapping[str, Any], noise_rad_s: f
         "nonlinearity_even_per_rad_s": _even(rng, part, section),
         **of_force,
     }
+
+
+def _leaning(rng: np.random.Generator, part: str) -> list[float]:
+    """No farther than the data sheet lets axes lean."""
+    most_deg = PARTS[part].non_orthogonality_deg
+    leaning: list[float] = np.clip(rng.normal(0, SQUARE_DEG.get(part, 0.2), 3), -most_deg, most_deg).tolist()
+    return leaning
 
 
 def _of_force(rng: np.random.Generator, part: str) -> list[list[float]]:
