@@ -11,7 +11,7 @@ from itertools import pairwise
 
 import numpy as np
 
-from rig.analysis.pieces import REST, Pieces, Stretch
+from rig.analysis.pieces import FEWEST_AT_REST, REST, Pieces, Stretch
 from rig.analysis.vector_inputs import since_first_s
 from rig.arm.kinematics import WRIST_1, flange_pose
 from rig.data.run_file import RunData
@@ -80,15 +80,21 @@ def with_ways(pieces: Pieces, name: str, recordings: Sequence[ObservedRun], expl
 
 def _swings(pieces: Pieces, name: str, recordings: Sequence[ObservedRun], times_s: Array) -> Array:
     """(M, 3) rad² by which what vibrates differs from the start to the end of M ways, by the rest nearest to either."""
-    rests_s = [
-        (rest.start_s + rest.end_s) / 2 + since_s
+    rests = [
+        (rest, since_s)
         for each, since_s in zip(recordings, since_first_s(recordings), strict=True)
         for rest in each.sensors[name].rests
     ]
-    swings_rad2 = np.array([window.swing_rad2 for window in pieces.windows if window.sweep == REST])
-    if not rests_s:
+    windows = [window for window in pieces.windows if window.sweep == REST]
+    told = [
+        ((rest.start_s + rest.end_s) / 2 + since_s, window.swing_rad2)
+        for (rest, since_s), window in zip(rests, windows, strict=True)
+        if rest.samples >= FEWEST_AT_REST  # fewer do not show what vibrates
+    ]
+    if not told:
         return np.zeros((len(times_s), 3))
-    nearest = np.abs(times_s[:, :, None] - np.array(rests_s)).argmin(axis=2)
+    rests_s, swings_rad2 = (np.array(each) for each in zip(*told, strict=True))
+    nearest = np.abs(times_s[:, :, None] - rests_s).argmin(axis=2)
     found: Array = swings_rad2[nearest].mean(axis=1)
     return found
 

@@ -1,5 +1,6 @@
 """A sensor's series as pictures: every calibration with U, the drift, and the chart below. Needs matplotlib."""
 
+import math
 from collections.abc import Mapping
 from pathlib import Path
 from typing import TYPE_CHECKING
@@ -11,6 +12,7 @@ from rig.history.statistics.charts import SHEWHART_LIMIT
 from rig.history.tables import title_of
 from rig.report.exports.names import plain_names
 from rig.report.figures import save
+from rig.report.kinds.followed import CHANGES, EARTH, SLOPES
 from rig.study.style import style
 
 if TYPE_CHECKING:
@@ -18,7 +20,8 @@ if TYPE_CHECKING:
 
 # Of the figure's width and height. Letting the layout find them takes as long as drawing does.
 MARGINS = {"left": 0.07, "right": 0.985, "bottom": 0.06, "top": 0.93, "wspace": 0.3, "hspace": 0.25}
-SHOWN = ("kx", "ky", "kz", "bx", "by", "bz")
+SHOWN = ("kx", "ky", "kz", "bx", "by", "bz", *CHANGES, *SLOPES, *EARTH[1:])
+ACROSS = 3
 
 
 def draw_trends(subjects: Mapping[Subject, Mapping[str, Trend]], folder: Path) -> list[Path]:
@@ -32,11 +35,14 @@ def draw_trends(subjects: Mapping[Subject, Mapping[str, Trend]], folder: Path) -
             name += "_"
         names.add(name)
         shown = [trends[each] for each in SHOWN if each in trends]
+        if not shown:
+            continue
         with style():
-            figure = Figure(figsize=(4.6 * 3, 2.6 * len(shown) / 3 * 2))
-            rows = figure.subplots(2 * (len(shown) // 3), 3, sharex=True, squeeze=False, gridspec_kw=MARGINS)
+            down = 2 * math.ceil(len(shown) / ACROSS)
+            figure = Figure(figsize=(4.6 * ACROSS, 2.6 * down))
+            rows = figure.subplots(down, ACROSS, sharex=True, squeeze=False, gridspec_kw=MARGINS)
             for i, trend in enumerate(shown):
-                row, column = 2 * (i // 3), i % 3
+                row, column = 2 * (i // ACROSS), i % ACROSS
                 _draw_values(rows[row, column], trend)
                 _draw_chart(rows[row + 1, column], trend)
             figure.suptitle(f"{title_of(subject)}; bars are U, the band holds the line with 95 %")

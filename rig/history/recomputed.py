@@ -4,6 +4,7 @@ import json
 from collections.abc import Iterator, Mapping, Sequence
 
 from rig.config.limits import Kind
+from rig.data.quantity import QUANTITIES
 from rig.data.result_file import CheckEntry, ResultDocument
 from rig.history.index import SAME, unlike
 from rig.report.kinds.registry import followed
@@ -25,7 +26,9 @@ def not_given(claimed: ResultDocument, given: ResultDocument) -> list[str]:
     checks = {check.name: _said(check) for check in given.checks}
     rows += [check.name for check in claimed.checks if checks.get(check.name) != _said(check)]
     numbers = _differences(_numbers_of(claimed), _numbers_of(given), "")
-    return [*rows, *unlike(claimed, followed(given)), *numbers]
+    there = {(each.sensor, each.quantity) for each in followed(claimed)}
+    found = [each for each in followed(given) if each.quantity in QUANTITIES or (each.sensor, each.quantity) in there]
+    return [*rows, *unlike(claimed, found), *numbers]
 
 
 def _said(check: CheckEntry) -> tuple[bool, str, Kind]:

@@ -50,7 +50,8 @@ def trend_lines(trends: Mapping[str, Trend]) -> Iterator[str]:
     fewest = min(trend.count for trend in trends.values())
     if fewest < FEWEST:
         yield f"drift, spread, chart and recall need {FEWEST} calibrations; there are {fewest}"
-    if all(trend.last.std_combined is None for trend in trends.values()):
+    calibrated = [trend.last for name, trend in trends.items() if name[0] in "kb"]
+    if calibrated and all(parameter.std_combined is None for parameter in calibrated):
         yield "U is that of noise alone: no result of this sensor has a budget"
     for trend in trends.values():
         if trend.chart is not None and trend.chart.out_of_control:

@@ -49,8 +49,8 @@ def calibration_header(document: ResultDocument, g_sensitivity: Mapping[str, Arr
     function. Names are those of the sensors, with everything that C does not allow written as `_`.
     """
     lines = [
-        "/* Gyroscope calibration, g = M (m + b): rate_rad_s = matrix * (reading_rad_s + bias_rad_s).",
-        " * M is diag(scale), or the whole matrix, which also brings the axes to right angles.",
+        "/* Calibrations. Of gyroscopes g = M (m + b): rate_rad_s = matrix * (reading_rad_s + bias_rad_s), where",
+        " * M is diag(scale), or the whole matrix, which also brings the axes to right angles. Of others M (m - b).",
         f" * Verdict: {document.verdict}. Solved {document.provenance.solved_utc}. */",
         "#ifndef CALIBRATION_H",
         "#define CALIBRATION_H",

@@ -14,6 +14,7 @@ from firmware_host.samples import IMU_SAMPLE_DTYPE
 from rig.cli import main
 from rig.data.magnetometer_entries import MagnetometerEntry
 from rig.data.result_file import ResultDocument, VectorEntry, read_result
+from rig.data.result_types import ErrorEntry
 from rig.errors import Refused
 from rig.estimation.arrays import Array
 from rig.observation.observed_run import ObservedRun, observe_runs
@@ -168,6 +169,23 @@ def test_autopilots_correct_a_magnetometer_to_the_size_that_the_result_makes_it(
     for field_t in (1e-4 * gauss, 1e-7 * milli):
         assert np.linalg.norm(field_t) == pytest.approx(np.linalg.norm(right))
         assert np.linalg.norm(field_t - right) < 0.02 * np.linalg.norm(right)  # it is turned by what axes lean
+
+
+def test_a_file_without_gyroscopes_leaves_their_calibration_at_boot_alone() -> None:
+    document = read_result(RECORDINGS / "rig.settings-6" / "magnetometer")
+    text = ardupilot_files(document)["ardupilot.param"]
+    assert "COMPASS_OFS_X" in text and "INS_GYR" not in text.replace("# ", "")
+
+
+def test_sensors_keep_their_numbers_when_one_before_them_was_not_calibrated(sensed: ResultDocument) -> None:
+    field = read_result(RECORDINGS / "rig.settings-6" / "magnetometer").magnetometers["compass"]
+    fields = {"inner": ErrorEntry(error="no field"), "outer": field}
+    two = {"sensors": dict.fromkeys(("a", "b"), sensed.sensors["gyro"]), "magnetometers": fields}
+    document = sensed.model_copy(update={**two, "accelerometers": {"b": sensed.accelerometers["gyro"]}})
+    px4, ardupilot = px4_files(document)["px4.params"], ardupilot_files(document)["ardupilot.param"]
+    assert "CAL_ACC1_XOFF" in px4 and "CAL_ACC0" not in px4 and "INS_ACC2OFFS_X" in ardupilot
+    assert "CAL_MAG1_XOFF" in px4 and "CAL_MAG0" not in px4 and "COMPASS_OFS2_X" in ardupilot
+    assert "# not calibrated: magnetometer inner" in px4
 
 
 def parameters_of(document: ResultDocument) -> tuple[Callable[[str], Array], Callable[[str], Array]]:

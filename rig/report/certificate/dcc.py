@@ -121,9 +121,11 @@ def _keys(found: Iterable[Measured]) -> dict[tuple[str, str], str]:
 def _items(c: Certificate) -> Iterator[Element]:
     measured = list(_measured(c))
     for (item, sensor), key in _keys(measured).items():
-        found = next(each for each in measured if (each.item, each.sensor) == (item, sensor))
-        serial = found.serial_number or c.provenance.sensor_serial_numbers.get(sensor, UNSAID)
-        yield _item(key, f"{item} {sensor}", found.part or UNSAID, serial, c)
+        of_it = sorted((each for each in measured if each.sensor == sensor), key=lambda each: each.item != item)
+        part = next((each.part for each in of_it if each.part), UNSAID)
+        serial = next((each.serial_number for each in of_it if each.serial_number), None)
+        serial = serial or c.provenance.sensor_serial_numbers.get(sensor, UNSAID)
+        yield _item(key, f"{item} {sensor}", part, serial, c)
 
 
 def _item(key: str, name: str, part: str, serial: str, c: Certificate) -> Element:

@@ -15,6 +15,7 @@ from rig.data.accelerometer_entries import AccelerometerEntry
 from rig.data.magnetometer_entries import MagnetometerEntry
 from rig.data.result_file import ResultDocument, SensorEntry
 from rig.errors import Refused
+from rig.errors.quoting import printable
 from rig.estimation.arrays import Array
 from rig.report.exports.parameters import origin
 
@@ -26,6 +27,11 @@ HEADING = (
     "# in the right-angled axes in which it is symmetric.",
     "# Lost: scale factors and axes of gyroscopes, axes of accelerometers, g-sensitivity, second order, uncertainties;",
     "# there is no parameter for them.",
+)
+OF_ARDUPILOT = (
+    "# Magnetic fields are in milligauss, and a compass' offset is added.",
+    "# ArduPilot corrects what it has turned by the compass's and the board's orientation, and by its driver: these",
+    "# hold where nothing is turned. COMPASS_SCALE, where there is one, must be 0 or 1.",
 )
 AXES = "XYZ"
 Parameters = Iterator[tuple[str, float]]
@@ -40,21 +46,29 @@ class Autopilot:
     magnetometer: Callable[[int, MagnetometerEntry], Parameters]
 
     def lines(self, result: ResultDocument, form: Callable[[str, float], str]) -> Iterator[str]:
-        """A line for each parameter, and comments whose it is. Raises Refused `nothing_to_export`."""
-        gyroscopes = [(name, each) for name, each in result.sensors.items() if each.role == "calibrate"]
-        fields = [(name, each) for name, each in result.magnetometers.items() if isinstance(each, MagnetometerEntry)]
-        if not (gyroscopes or result.accelerometers or fields):
+        """A line for each parameter, and comments whose it is. Raises Refused `nothing_to_export`.
+
+        Sensors keep the number that their place in the configuration gives them, and an accelerometer its gyroscope's.
+        """
+        gyroscopes = [name for name, each in result.sensors.items() if each.role == "calibrate"]
+        places = {name: i for i, name in enumerate(dict.fromkeys([*gyroscopes, *result.accelerometers]))}
+        fields = [(i, *each) for i, each in enumerate(result.magnetometers.items())]
+        found = [(i, name, each) for i, name, each in fields if isinstance(each, MagnetometerEntry)]
+        if not (places or found):
             raise Refused("nothing_to_export", "the run calibrated no sensor", "Give a run that calibrates one")
+        sensors = {name: result.sensors[name] for name in gyroscopes}
         sections: list[tuple[Iterator[str], Parameters]] = [
-            *((origin(result, name, g, g.temperature_c), self.gyroscope(i, g))
-              for i, (name, g) in enumerate(gyroscopes)),
-            *((origin(result, name, a, a.temperature_c), self.accelerometer(i, a))
-              for i, (name, a) in enumerate(result.accelerometers.items())),
-            *((origin(result, name, m, None), self.magnetometer(i, m)) for i, (name, m) in enumerate(fields)),
+            *((origin(result, name, each, each.temperature_c), self.gyroscope(places[name], each))
+              for name, each in sensors.items()),
+            *((origin(result, name, each, each.temperature_c), self.accelerometer(places[name], each))
+              for name, each in result.accelerometers.items()),
+            *((origin(result, name, each, None), self.magnetometer(i, each)) for i, name, each in found),
         ]  # fmt: skip
         for said, parameters in sections:
             yield from (f"# {line}" for line in said)
             yield from (form(name, value) for name, value in parameters)
+        left_out = [name for _, name, each in fields if not isinstance(each, MagnetometerEntry)]
+        yield from (f"# not calibrated: magnetometer {printable(name)}" for name in left_out)
 
 
 def px4_files(result: ResultDocument) -> Mapping[str, str]:
@@ -70,13 +84,9 @@ def px4_files(result: ResultDocument) -> Mapping[str, str]:
 
 def ardupilot_files(result: ResultDocument) -> Mapping[str, str]:
     """`ardupilot.param`: name, value."""
-    lines = [
-        *HEADING,
-        "# Magnetic fields are in milligauss, and a compass' offset is added.",
-        "# Without INS_GYR_CAL 0 ArduPilot finds offsets of its own at each boot.",
-        "INS_GYR_CAL,0",
-        *ARDUPILOT.lines(result, lambda name, value: f"{name},{value!r}"),
-    ]
+    lines = [*HEADING, *OF_ARDUPILOT, *ARDUPILOT.lines(result, lambda name, value: f"{name},{value!r}")]
+    if any(line.startswith("INS_GYR") for line in lines):
+        lines += ["# Without this ArduPilot finds offsets of gyroscopes of its own at each boot.", "INS_GYR_CAL,0"]
     return {"ardupilot.param": "\n".join(lines) + "\n"}
 
 

@@ -6,30 +6,39 @@ import numpy as np
 
 from rig.data.earth_rate_entries import EarthRateEntry
 from rig.data.quantity import RATE
-from rig.data.result_file import ResultDocument
+from rig.data.result_file import ResultDocument, SensorEntry
 from rig.report.certificate import dcc_results
 from rig.report.expanded import expanded
 from rig.report.kinds.followed import EARTH, Followed, known, parameters
+from rig.report.kinds.gyroscope import temperatures_c
 from rig.report.kinds.kind import Found, Measured, ResultKind, Shown, Three, Without
 
 
-def _found(document: ResultDocument) -> Iterator[Found[EarthRateEntry]]:
+def _found(document: ResultDocument) -> Iterator[Found[SensorEntry]]:
+    """Every sensor that has found it."""
     for name, sensor in document.sensors.items():
         if isinstance(sensor.earth_rate, EarthRateEntry):
-            yield Found(name, RATE, sensor.earth_rate)
+            yield Found(name, RATE, sensor)
 
 
-def _shown(found: Found[EarthRateEntry]) -> Shown:
+def _of(found: Found[SensorEntry]) -> EarthRateEntry:
+    rate = found.entry.earth_rate
+    if not isinstance(rate, EarthRateEntry):
+        raise TypeError(f"{found.sensor} has not found the Earth's rate")
+    return rate
+
+
+def _shown(found: Found[SensorEntry]) -> Shown:
     """The Earth's rate in the axes of the arm's base."""
-    entry, unit = found.entry, RATE.drift
+    entry, unit = _of(found), RATE.drift
     widths = expanded(_stds(entry), entry.freedoms(3)).widths
     name = f"{found.sensor}: the Earth's rate in the arm's base"
     rates, known_to = ([each / unit.size for each in values] for values in (entry.rate_rad_s, widths))
     return Shown(name, unit, Three(rates, known_to), combined=True)
 
 
-def _followed(found: Found[EarthRateEntry], document: ResultDocument) -> Followed:
-    entry, sensor = found.entry, document.sensors[found.sensor]
+def _followed(found: Found[SensorEntry], _: object) -> Followed:
+    entry, sensor = _of(found), found.entry
     values, stds = (entry.norm_rad_s, *entry.rate_rad_s), (entry.norm_std_rad_s, *_stds(entry))
     return Followed(
         found.sensor,
@@ -43,9 +52,14 @@ def _followed(found: Found[EarthRateEntry], document: ResultDocument) -> Followe
     )
 
 
-def _measured(found: Found[EarthRateEntry], _: object) -> Measured:
-    name, results = f"the Earth's rate found by gyroscope {found.sensor}", dcc_results.earth_rate(found.entry)
-    return Measured("gyroscope", found.sensor, None, None, name, results)
+def _measured(found: Found[SensorEntry], _: object) -> Measured | None:
+    """The item is its gyroscope, as warm as that was; a reference is none."""
+    sensor = found.entry
+    if sensor.role == "reference":
+        return None
+    name, results = f"the Earth's rate found by gyroscope {found.sensor}", dcc_results.earth_rate(_of(found))
+    warm = temperatures_c(sensor)
+    return Measured("gyroscope", found.sensor, sensor.part, sensor.serial_number, name, results, warm)
 
 
 def _stds(found: EarthRateEntry) -> list[float]:

@@ -79,15 +79,20 @@ def _followed(found: Found[SensorEntry], document: ResultDocument) -> Followed:
 
 
 def _measured(found: Found[SensorEntry], _: object) -> Measured | None:
-    """How warm it was by what of it was read: scale factors come from the sweeps alone. Nothing of a reference."""
+    """The item's results; nothing of a reference."""
     sensor = found.entry
     if sensor.role == "reference":
         return None
-    warm: dict[str, float | None] = {"": sensor.temperature_c}
-    if sensor.scale_at is not None and sensor.bias_at is not None:
-        warm = {" at the scale factors": sensor.scale_at.temperature_c, " at the biases": sensor.bias_at.temperature_c}
     name, results = f"calibration of gyroscope {found.sensor}", dcc_results.gyroscope(sensor)
+    warm = temperatures_c(sensor)
     return Measured("gyroscope", found.sensor, sensor.part, sensor.serial_number, name, results, warm)
+
+
+def temperatures_c(sensor: SensorEntry) -> dict[str, float | None]:
+    """How warm a gyroscope was, by what of it was read then: scale factors come from the sweeps alone."""
+    if sensor.scale_at is None or sensor.bias_at is None:
+        return {"": sensor.temperature_c}
+    return {" at the scale factors": sensor.scale_at.temperature_c, " at the biases": sensor.bias_at.temperature_c}
 
 
 def _beside(sensor: SensorEntry) -> Iterator[str]:
