@@ -41,9 +41,11 @@ def write_pictures(pictures: Sequence[Picture], folder: Path) -> tuple[RunEvent,
     if not pictures:
         return ()
     try:
-        from matplotlib.figure import Figure
+        import matplotlib  # noqa: F401
     except ImportError:
         return (NotPlotted(),)
+    from matplotlib.figure import Figure
+
     for picture in pictures:
         with style():
             figure = Figure(figsize=picture.size, layout=picture.layout)
