@@ -66,26 +66,27 @@ def draw(figure: "Figure", held: HeldStill) -> None:
 def of_accelerometer(result: AccelerometerResult) -> HeldStill:
     """What an accelerometer's plots are made of."""
     solution = result.solution
-    up = np.array([dwell.attitude @ solution.reference_m_s2 for dwell in result.dwells])
-    return HeldStill(
-        ACCELERATION,
-        solution.dwell_residuals_m_s2,
-        dwell_residual_std_m_s2(solution, result.movement),
-        np.sqrt([dwell.reading.variance for dwell in result.dwells]),
-        up @ np.array(result.sensor.mounting).T,
-    )
+    expected = dwell_residual_std_m_s2(solution, result.movement)
+    return _held(ACCELERATION, result, solution.dwell_residuals_m_s2, expected, solution.reference_m_s2)
 
 
 def of_magnetometer(result: MagnetometerResult) -> HeldStill:
     """What a magnetometer's plots are made of."""
     fit = result.solution.fit
-    field = np.array([dwell.attitude @ result.solution.field_table_t for dwell in result.dwells])
+    return _held(FIELD, result, fit.residuals, attitude_residual_std(fit, result.seen), result.solution.field_table_t)
+
+
+def _held(
+    quantity: Quantity,
+    result: AccelerometerResult | MagnetometerResult,
+    residuals: Array,
+    expected: Array,
+    reference: Array,
+) -> HeldStill:
+    """The dwells of a result beside what its model leaves; `reference` (3,) is in the base's frame."""
+    towards = np.array([dwell.attitude @ reference for dwell in result.dwells]) @ np.array(result.sensor.mounting).T
     return HeldStill(
-        FIELD,
-        fit.residuals,
-        attitude_residual_std(fit, result.seen),
-        np.sqrt([dwell.reading.variance for dwell in result.dwells]),
-        field @ np.array(result.sensor.mounting).T,
+        quantity, residuals, expected, np.sqrt([dwell.reading.variance for dwell in result.dwells]), towards
     )
 
 

@@ -4,7 +4,7 @@ Numbers stand in full here; the page rounds them. What the laboratory has not st
 which PTB's rules want to be one of ISO 3166-1.
 """
 
-from collections.abc import Iterable, Iterator
+from collections.abc import Iterable, Iterator, Sequence
 from typing import Final
 from xml.etree.ElementTree import Element, tostring
 
@@ -48,10 +48,11 @@ def digital_certificate(certificate: Certificate) -> bytes:
             "the laboratory's country is not stated",
             "State site.country, by --set site.country=DE if need be",
         )
+    measured = list(_measured(certificate))
     root = dcc(
         "digitalCalibrationCertificate",
-        _administrative(certificate),
-        dcc("measurementResults", *_results(certificate)),
+        _administrative(certificate, measured),
+        dcc("measurementResults", *_results(certificate, measured)),
         schemaVersion=SCHEMA_VERSION,
     )
     place = f"{NAMESPACE} {NAMESPACE}/v{SCHEMA_VERSION}/dcc.xsd"
@@ -59,12 +60,12 @@ def digital_certificate(certificate: Certificate) -> bytes:
     return bytes(tostring(root, encoding="utf-8", xml_declaration=True))
 
 
-def _administrative(c: Certificate) -> Element:
+def _administrative(c: Certificate, measured: Sequence[Measured]) -> Element:
     return dcc(
         "administrativeData",
         dcc("dccSoftware", _software(c)),
         _core(c),
-        dcc("items", *_items(c)),
+        dcc("items", *_items(c, measured)),
         dcc("calibrationLaboratory", _contact("contact", c.stated.where.laboratory, c.stated.where.address)),
         dcc("respPersons", dcc("respPerson", dcc("person", text("name", c.stated.certificate.authorised_by)),
                                words("mainSigner", "true"))),
@@ -118,8 +119,7 @@ def _keys(found: Iterable[Measured]) -> dict[tuple[str, str], str]:
     return keys
 
 
-def _items(c: Certificate) -> Iterator[Element]:
-    measured = list(_measured(c))
+def _items(c: Certificate, measured: Sequence[Measured]) -> Iterator[Element]:
     for (item, sensor), key in _keys(measured).items():
         of_it = sorted((each for each in measured if each.sensor == sensor), key=lambda each: each.item != item)
         part = next((each.part for each in of_it if each.part), UNSAID)
@@ -187,8 +187,7 @@ def _conformity(check: CheckEntry, rule: str) -> Element:
     )
 
 
-def _results(c: Certificate) -> Iterator[Element]:
-    measured = list(_measured(c))
+def _results(c: Certificate, measured: Sequence[Measured]) -> Iterator[Element]:
     keys = _keys(measured)
     return (_result(c, keys[each.item, each.sensor], each) for each in measured)
 
