@@ -72,7 +72,7 @@ def allowed(surroundings: Surroundings, name: str, result: SensorResult) -> Allo
     sensor, explained = result.sensor, result.explained
     return allowed_of(
         surroundings.uncertainty,
-        (name, sensor.part, sensor.range_rad_s),
+        (name, sensor.part, sensor.range_rad_s or 0.0),
         finds_curve=explained is not None and explained.nonlinearity is not None,
         jitter_s=surroundings.state_jitter_s,
         earth_rad_s=_earth(surroundings, name, sensor.part, found_earth_rate(result.earth)),

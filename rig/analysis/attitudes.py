@@ -1,6 +1,6 @@
 """From readings in known attitudes to calibrations: gyroscope, accelerometer and magnetometer, as TRIAX has them."""
 
-from collections.abc import Mapping
+from collections.abc import Iterator, Mapping
 from dataclasses import dataclass, replace
 from functools import partial
 from typing import Literal, get_args
@@ -12,19 +12,21 @@ from rig.analysis.increments import InIncrements, solve_turning
 from rig.analysis.placed_budget import budget_by_causes, noise_freedom
 from rig.analysis.placed_equations import Equations
 from rig.data.quantity import ACCELERATION, RATE, Quantity
+from rig.data.settings import Elsewhere, Site
 from rig.errors import Fault
+from rig.estimation.accelerometer_model import Dwells
 from rig.estimation.arrays import Array
 from rig.estimation.budget import Budget
 from rig.estimation.earth_rate import check_earth_seen
-from rig.estimation.known_increments import KnownIncrements
 from rig.estimation.placement import NOISE, LaidDown, laid_down
-from rig.estimation.reference_budget import scale_and_bias_covariance
 from rig.estimation.reference_model import BIAS, REFERENCE, F, KnownNorm
 from rig.estimation.refusals import check_axes
 from rig.estimation.triaxial import EqualWeights, Method, TriaxialSolution
 from rig.observation.attitude_import import PlacedReadings
 from rig.observation.fixes import Turning
+from rig.observation.mean import Mean
 from rig.observation.placements import Placements
+from rig.observation.windows import Window
 
 Chosen = Method | Literal["increments"]
 METHODS: tuple[Method, ...] = (*get_args(EqualWeights), "attitude_weighted")
@@ -32,35 +34,31 @@ CHOICES: tuple[Chosen, ...] = ("increments", *METHODS)
 SEEN = 3.0  # standard deviations that the largest second-order term must have
 TOO_LITTLE = ("too_few_observations", "rank_deficient", "ill_conditioned")
 NOT_SEEN = "Leave out --second-order: it would triple the uncertainty of the bias for nothing; or dwell longer"
-UPWARDS = dict(zip(("+x", "+y", "+z", "-x", "-y", "-z"), np.concatenate([np.eye(3), -np.eye(3)]), strict=True))
+
+
+def known_size(site: Site, quantity: Quantity) -> KnownNorm:
+    """What is known of gravity or the field at a place. Raises Fault `field_strength_unknown`."""
+    up = np.array(site.up)
+    if quantity == ACCELERATION:
+        return KnownNorm(site.gravity_m_s2, up)
+    if site.magnetic_field_t is None:
+        raise Fault(
+            "field_strength_unknown",
+            "the size of the magnetic field is not given, and the scale of a magnetometer is relative to it",
+            "Give --field-t, in tesla, as a reference magnetometer measured it where the sensor was",
+        )
+    return KnownNorm(site.magnetic_field_t, up if site.magnetic_field_upwards else -up)
 
 
 @dataclass(frozen=True, slots=True)
-class Surrounding:
-    """What is known of the place: the size of gravity, that of the magnetic field or None, and the table's upward axis.
+class Placement:
+    """A placement, by its `index`: the mean `reading`; `attitude` (3, 3) takes a vector of the table into the body."""
 
-    `field_upwards` where the field rises from the ground, as it does south of the magnetic equator. `any_mounting`
-    where the sensor's axes need not point along those of the body whose attitudes are given.
-    """
-
-    gravity_m_s2: float
-    field_t: float | None
-    up: str
-    field_upwards: bool = False
-    any_mounting: bool = False
-
-    def known(self, quantity: Quantity) -> KnownNorm:
-        """What is known of gravity or the field. Raises Fault `field_strength_unknown`."""
-        up = UPWARDS[self.up]
-        if quantity == ACCELERATION:
-            return KnownNorm(self.gravity_m_s2, up)
-        if self.field_t is None:
-            raise Fault(
-                "field_strength_unknown",
-                "the size of the magnetic field is not given, and the scale of a magnetometer is relative to it",
-                "Give --field-t, in tesla, as a reference magnetometer measured it where the sensor was",
-            )
-        return KnownNorm(self.field_t, up if self.field_upwards else -up)
+    index: int
+    name: str
+    reading: Mean
+    attitude: Array
+    window: Window
 
 
 @dataclass(frozen=True, slots=True)
@@ -69,7 +67,7 @@ class InAttitudes:
 
     `reference_fault` says why what was found as the reference, a gyroscope's Earth's rate, is not it. Of a body that
     was laid down, `laid` is how its placements differ, told by `elsewhere` rests without an attitude too, and `moving`
-    how many rows were left out for its movement.
+    how many rows were left out for its movement; `dwells` are the placements, `seen` what was read in them.
     `budget` is what the uncertainty of the chosen method is made of.
     """
 
@@ -80,35 +78,31 @@ class InAttitudes:
     laid: LaidDown | None = None
     elsewhere: int = 0
     moving: int = 0
+    dwells: tuple[Placement, ...] = ()
+    seen: Dwells | None = None
 
 
 Result = InAttitudes | InIncrements
 
 
 def solve_placed(
-    placed: PlacedReadings,
-    surrounding: Surrounding,
-    method: Chosen | None,
-    *,
-    second_order: bool,
-    exact_rates: bool = False,
-    window_s: float | None = None,
+    placed: PlacedReadings, site: Site, asked: Elsewhere, method: Chosen | None, *, second_order: bool
 ) -> dict[Quantity, Result | Fault]:
     """Every quantity that was recorded, by `method`; None chooses the one that suits it.
 
     That is "attitude_weighted", and for a gyroscope "increments" (over windows of `window_s`), or with `exact_rates`
     "maximum_likelihood".
     """
-    any_mounting = surrounding.any_mounting
+    any_mounting, exact_rates = asked.any_mounting, asked.exact_rates
 
     def of_rate(turning: Turning) -> Result:
-        asked = method or ("maximum_likelihood" if exact_rates else "increments")
-        if asked != "increments":
-            return _of_rows(Equations.of_rows(placed, exact_rates=exact_rates), asked, any_mounting=any_mounting)
-        return solve_turning(turning, window_s, any_mounting=any_mounting)
+        chosen = method or ("maximum_likelihood" if exact_rates else "increments")
+        if chosen != "increments":
+            return _of_rows(Equations.of_rows(placed, exact_rates=exact_rates), chosen, any_mounting=any_mounting)
+        return solve_turning(turning, asked.window_s, any_mounting=any_mounting)
 
     def of_reference(quantity: Quantity, placements: Placements | Fault) -> Result:
-        known = surrounding.known(quantity)
+        known = known_size(site, quantity)
         if isinstance(placements, Fault):
             raise placements
         chosen = "attitude_weighted" if method is None or method == "increments" else method
@@ -155,8 +149,22 @@ def _of_placements(
     _check_mounting(solution.matrix, any_mounting=any_mounting)
     causes = {NOISE: solution.covariance} if laid is None else laid.causes
     budget = budget_by_causes(solution.matrix, causes, noise_freedom(solution, equations))
-    others = equations.beside(method, *METHODS)
-    return InAttitudes(solution, others, budget, None, laid, len(elsewhere.means[quantity]), moving)
+    return InAttitudes(
+        solution,
+        equations.beside(method, *METHODS),
+        budget,
+        laid=laid,
+        elsewhere=len(elsewhere.windows),
+        moving=moving,
+        dwells=tuple(_dwells(placements, quantity)),
+        seen=Dwells(equations.means, equations.variances, equations.attitudes),
+    )
+
+
+def _dwells(placements: Placements, quantity: Quantity) -> Iterator[Placement]:
+    read = placements.read
+    for number, (attitude, window) in enumerate(zip(placements.attitudes, read.windows, strict=True)):
+        yield Placement(number, f"placement {number + 1}", read.mean(quantity, number), attitude.T, window)
 
 
 def _solved(equations: Equations, method: Method, moving: int) -> TriaxialSolution:
@@ -204,9 +212,3 @@ def check_seen(second_order: Array, std: Array, remedy: str) -> None:
         raise Fault(
             "second_order_not_seen", f"no second-order term is beyond {largest:.1f} of its standard deviations", remedy
         )
-
-
-def in_unit(solution: TriaxialSolution | KnownIncrements) -> tuple[Array, Array]:
-    """Scale factors 1/‖row of F‖ (3,), and the standard deviations of them and of the bias (6,)."""
-    scale = 1 / np.linalg.norm(solution.matrix, axis=1)
-    return scale, np.sqrt(np.diag(scale_and_bias_covariance(solution.matrix, scale, solution.covariance)))

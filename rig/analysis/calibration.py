@@ -10,6 +10,7 @@ import numpy as np
 from rig.analysis.correction import Correction, CorrectionKind, diagonal_correction, matrix_correction
 from rig.analysis.surroundings import Surroundings
 from rig.analysis.vector_inputs import known_of, see, unknown_of
+from rig.data.motion_file import Item
 from rig.data.run_file import RecordedSensor, RunData
 from rig.errors import Fault, Refused
 from rig.estimation.accumulator import Accumulator, SixObservationEstimator, Solution
@@ -17,6 +18,7 @@ from rig.estimation.arrays import Array
 from rig.estimation.budget import Budget, budget
 from rig.estimation.earth_rate import EarthRate, find_earth_rate
 from rig.estimation.estimate import Estimate
+from rig.estimation.known_turns import TurnedSolution
 from rig.estimation.levenberg_marquardt import LevenbergMarquardtSolution, solve_levenberg_marquardt
 from rig.estimation.refusals import check_duplicates
 from rig.estimation.vector_fit import Explained, Seen, explain
@@ -49,12 +51,12 @@ class SensorResult:
     the sensor found of the Earth's rate, or the Fault for which it did not, None where it was not to.
     """
 
-    sensor: RecordedSensor
+    sensor: RecordedSensor | Item
     solution: Estimate
-    vector_model: VectorSolution | Fault
+    vector_model: VectorSolution | TurnedSolution | Fault
     explained: Explained | None
     uncertainty: Budget | None
-    six_observation: Solution
+    six_observation: Solution | Fault
     algorithm_1: Solution | Fault
     observations: tuple[Observation, ...]
     rests: tuple[Average, ...]
@@ -88,9 +90,11 @@ class SensorResult:
         return self.corrected_by.matrix
 
     @property
-    def temperature_c(self) -> float:
-        """Mean over the samples of all sweeps."""
+    def temperature_c(self) -> float | None:
+        """Mean over the samples of all sweeps; None where no thermometer told it."""
         averages = [observation.average for observation in self.observations]
+        if not averages or np.isnan([average.temperature_c for average in averages]).any():
+            return None
         return float(np.average([a.temperature_c for a in averages], weights=[a.samples for a in averages]))
 
 

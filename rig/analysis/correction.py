@@ -13,6 +13,7 @@ from typing import Literal
 import numpy as np
 
 from rig.estimation.arrays import Array
+from rig.estimation.known_turns import TurnedSolution
 from rig.estimation.vector_model import VectorSolution
 
 CorrectionKind = Literal["matrix", "diagonal"]
@@ -31,6 +32,6 @@ def diagonal_correction(scale: Array) -> Correction:
     return Correction("diagonal", np.diag(scale))
 
 
-def matrix_correction(solution: VectorSolution) -> Correction:
+def matrix_correction(solution: VectorSolution | TurnedSolution) -> Correction:
     """M = R F⁻¹: the rates in the right-angled frame nearest to the sensor's axes."""
     return Correction("matrix", solution.mounting @ np.linalg.inv(solution.matrix))

@@ -19,6 +19,7 @@ from rig.analysis.calibration import (
 from rig.analysis.clock import ClockCheck
 from rig.analysis.comparison import Reference, turns_of
 from rig.analysis.contradictions import contradictions, in_reference
+from rig.analysis.elsewhere import OfSensor, checks_elsewhere, solved_elsewhere
 from rig.analysis.magnetic_field import MagnetometerResult, calibrate_magnetometers
 from rig.analysis.onboard_check import Agreement, agreement
 from rig.analysis.surroundings import surroundings_of
@@ -34,6 +35,7 @@ from rig.analysis.verdict import (
     verification_checks,
 )
 from rig.analysis.verification import Verification, verify
+from rig.data.motion_file import ReadElsewhere
 from rig.data.provenance import Provenance
 from rig.data.result_file import StoredCalibrationEntry
 from rig.data.run_file import RunData
@@ -67,6 +69,7 @@ class Outcome:
     the `magnetometers`, which no limit of scale and bias judges.
     `drifts` are there where attitudes were repeated to watch the bias. `told_from` says of gyroscopes what may happen
     in the run and from what size on the checks tell it, `told_from_in_reference` of accelerometers and magnetometers.
+    `elsewhere` is what readings gave whose motion is a file: gyroscopes are in `results` too.
     """
 
     settings: RunSettings
@@ -82,6 +85,7 @@ class Outcome:
     drifts: Drifts = field(default_factory=dict)
     told_from: Mapping[str, tuple[ToldFrom, ...]] = field(default_factory=dict)
     told_from_in_reference: Mapping[str, tuple[ToldFrom, ...]] = field(default_factory=dict)
+    elsewhere: Mapping[str, OfSensor] = field(default_factory=dict)
 
     @property
     def verdict(self) -> Literal["pass", "fail"]:
@@ -101,6 +105,8 @@ def calibrated(runs: Sequence[RunData], estimator: str = DEFAULT_ESTIMATOR, *, d
     recordings do not hold what they should.
     """
     settings = runs[0].settings
+    if (read := runs[0].elsewhere) is not None:
+        return _elsewhere(runs, read, estimator)
     chosen = known_estimator(estimator)
     recordings = observe_recordings(runs)
     if not recordings:
@@ -143,6 +149,20 @@ def calibrated(runs: Sequence[RunData], estimator: str = DEFAULT_ESTIMATOR, *, d
         magnetometers=magnetometers,
         told_from=among_rates.told_from,
         told_from_in_reference=among_dwells.told_from,
+    )
+
+
+def _elsewhere(runs: Sequence[RunData], read: ReadElsewhere, estimator: str) -> Outcome:
+    """What readings from elsewhere amount to; the usual estimator stands for the one that was asked for."""
+    settings, name = runs[0].settings, read.item.name
+    asked = None if settings.elsewhere is None else settings.elsewhere.estimator
+    found = solved_elsewhere(read, settings, asked if estimator == DEFAULT_ESTIMATOR else estimator)
+    return Outcome(
+        settings=settings,
+        provenance=_origin(runs),
+        checks=tuple(checks_elsewhere(name, found)),
+        results={} if found.gyroscope is None else {name: found.gyroscope},
+        elsewhere={name: found},
     )
 
 

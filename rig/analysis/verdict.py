@@ -12,7 +12,7 @@ from rig.analysis.acceleration import AccelerometerResult
 from rig.analysis.bias_drift import BiasDrift
 from rig.analysis.clock import PPM, ClockCheck, worst_differences
 from rig.analysis.verification import Verification
-from rig.config.limits import Limits, Parameter
+from rig.config.limits import Limits, Parameter, limit_of
 from rig.data.meaning import Meaning
 from rig.data.quantity import Quantity
 from rig.data.settings import DecisionRule
@@ -72,12 +72,12 @@ class _Held:
 
     sensor: str
     quantity: str
-    limits: Limits
+    limits: Limits | None
     rule: DecisionRule = "simple"
 
     def check(self, what: str, value: float | None) -> Check:
         """The check of one limit."""
-        row, limit = self.limits.of(self.quantity, what)
+        row, limit = limit_of(self.limits, self.quantity, what)
         means = Meaning(row.kind, self.sensor, self.quantity, row.parameter)
         return Check(_name(self.sensor, self.quantity, what), value, limit, row.unit, means)
 
@@ -127,7 +127,7 @@ def fitness(
 
 def judge(
     solutions: Mapping[str, Estimate],
-    limits: Limits,
+    limits: Limits | None,
     budgets: Mapping[str, Budget] = MappingProxyType({}),
     rule: DecisionRule = "simple",
 ) -> tuple[Check, ...]:
@@ -145,7 +145,7 @@ def judge(
     return tuple(checks)
 
 
-def verification_checks(sensor: str, verification: Verification | None, limits: Limits) -> tuple[Check, ...]:
+def verification_checks(sensor: str, verification: Verification | None, limits: Limits | None) -> tuple[Check, ...]:
     """Calibrated readings against the reference: the worst axis, and the worst mean over a revolution.
 
     The reference in its turn is held against the arm, by the limit of those means: it may be the one that is wrong.
@@ -156,11 +156,11 @@ def verification_checks(sensor: str, verification: Verification | None, limits: 
         rms = _largest(verification.after.movement.rms_rad_s)
         mean = _largest(np.array([turn.error_rad_s for turn in verification.after.revolutions]))
         known = verification.reference_error_rad_s
-    held = _Held(sensor, "rate", limits)
+    held, (_, largest) = _Held(sensor, "rate", limits), limit_of(limits, "rate", "verification_mean")
     return (
         held.check("verification_rms", rms),
         held.check("verification_mean", mean),
-        fitness(sensor, "rate", "verification_reference", known, limits.verification_mean_rad_s, unit="rad/s"),
+        fitness(sensor, "rate", "verification_reference", known, largest, unit="rad/s"),
     )
 
 
@@ -177,7 +177,7 @@ def clock_checks(clocks: Sequence[ClockCheck]) -> tuple[Check, ...]:
 
 
 def acceleration_checks(
-    sensor: str, result: AccelerometerResult, limits: Limits, rule: DecisionRule = "simple"
+    sensor: str, result: AccelerometerResult, limits: Limits | None, rule: DecisionRule = "simple"
 ) -> tuple[Check, ...]:
     """An accelerometer's scale and bias, their standard deviations, gravity's size in attitudes that were held out.
 
@@ -191,7 +191,7 @@ def acceleration_checks(
 
 
 def drift_checks(
-    sensor: str, drifts: Mapping[Quantity, BiasDrift], limits: Limits, rule: DecisionRule = "simple"
+    sensor: str, drifts: Mapping[Quantity, BiasDrift], limits: Limits | None, rule: DecisionRule = "simple"
 ) -> tuple[Check, ...]:
     """The largest change of a bias between any two repeats."""
     checks = []

@@ -10,6 +10,7 @@ from firmware_host.client import Board, Calibration, StoredCalibration
 from firmware_host.errors import BoardError
 from rig.board.identify import configured_board, find_sensor
 from rig.config.models import RigConfig
+from rig.errors import Refused
 from rig.estimation.arrays import Array
 
 
@@ -19,7 +20,7 @@ class Solved(Protocol):
     @property
     def serial_number(self) -> str: ...
     @property
-    def temperature_c(self) -> float: ...
+    def temperature_c(self) -> float | None: ...
     @property
     def scale(self) -> Array | Sequence[float]: ...
     @property
@@ -48,7 +49,13 @@ def store_calibrations(config: RigConfig, results: Mapping[str, Solved]) -> Iter
 
 
 def calibration_of(solved: Solved) -> Calibration:
-    """A sensor's solution as the board keeps it, dated now."""
+    """A sensor's solution as the board keeps it, dated now. Raises Refused `not_in_result` without a temperature."""
+    if solved.temperature_c is None:
+        raise Refused(
+            "not_in_result",
+            f"of the calibration of {solved.serial_number} it is not known how warm the sensor was",
+            "Calibrate it where its thermometer is read",
+        )
     matrix = np.diag(solved.scale) if solved.correction_matrix is None else np.array(solved.correction_matrix)
     x, y, z = ((float(row[0]), float(row[1]), float(row[2])) for row in matrix)
     bx, by, bz = map(float, solved.bias_rad_s)

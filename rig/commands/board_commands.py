@@ -159,6 +159,12 @@ def _result_of(place: _Place, result: ResultDocument, path: Path) -> Calibration
             f"{path} has no calibration for sensors.{place.name}",
             f"It has: {', '.join(result.sensors) or 'none'}; choose one with --sensor",
         )
+    if entry.range_rad_s is None:
+        raise Refused(
+            "not_in_result",
+            f"{path} does not say in which range {place.name} was read: its readings were recorded elsewhere",
+            "Calibrate it on the board that is to keep its calibration",
+        )
     calibration, range_deg_s = f"{path}: the calibration of {place.name}", degrees(entry.range_rad_s)
     refuse_other_sensor(calibration, entry.part, entry.serial_number, range_deg_s, place.section)
     return calibration_of(entry)

@@ -4,7 +4,7 @@ import argparse
 from pathlib import Path
 
 
-def add_history(parser: argparse.ArgumentParser) -> None:
+def add_history(parser: argparse._ActionsContainer) -> None:
     """`--history PLACE`."""
     parser.add_argument(
         "--history",

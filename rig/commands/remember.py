@@ -3,7 +3,7 @@
 A run never fails because of the history: it says so, and goes on.
 """
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING
@@ -35,12 +35,24 @@ class Beside:
 
 def remember(folder: Path, section: "HistorySection") -> tuple[RunEvent | None, tuple[Beside, ...]]:
     """Enter the run in `folder`; what to tell of it, and its calibrations beside the ones before."""
+    from rig.history.place import chosen_place
+
+    return _remembered(folder, lambda: chosen_place(section))
+
+
+def remember_own(folder: Path, named: str | None) -> tuple[RunEvent | None, tuple[Beside, ...]]:
+    """Enter the run in `folder` in the user's own history, or in the one that is `named`; returns as `remember`."""
+    from rig.history.place import own_place
+
+    return _remembered(folder, lambda: own_place(named))
+
+
+def _remembered(folder: Path, chosen: Callable[[], "Place | None"]) -> tuple[RunEvent | None, tuple[Beside, ...]]:
     label = "the history"
     try:
         from rig.history.finished import finished_run
-        from rig.history.place import chosen_place
 
-        where = chosen_place(section)
+        where = chosen()
         if where is None:
             return None, ()
         label = where.label

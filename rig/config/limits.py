@@ -102,12 +102,6 @@ class Limits(BaseModel):
         default=None, description="change of an accelerometer's bias between any two repeats; `bias_drift` needs it"
     )
 
-    def of(self, quantity: str, what: str) -> tuple[Limit, float | None]:
-        """The row of that name, and the limit itself, None where none is set. Raises KeyError without such a row."""
-        key = _KEYS[quantity, what]
-        limit: float | None = getattr(self, key)
-        return LIMITS[key], limit
-
     def lacking(self, need: Need) -> list[str]:
         """The paths in a configuration of the limits that are needed so and not set."""
         return [f"limits.{key}" for key, row in LIMITS.items() if row.needed_by == need and getattr(self, key) is None]
@@ -117,6 +111,13 @@ LIMITS: Mapping[str, Limit] = {
     key: row for key, field in Limits.model_fields.items() for row in field.metadata if isinstance(row, Limit)
 }
 _KEYS: Mapping[tuple[str, str], str] = {(row.quantity, row.what): key for key, row in LIMITS.items()}
+
+
+def limit_of(limits: Limits | None, quantity: str, what: str) -> tuple[Limit, float | None]:
+    """The row of that name, and the limit itself, None where none is set. Raises KeyError without such a row."""
+    key = _KEYS[quantity, what]
+    limit: float | None = getattr(limits, key, None)
+    return LIMITS[key], limit
 
 
 class LimitsSection(Limits, extra="forbid"):

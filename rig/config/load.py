@@ -14,7 +14,7 @@ import yaml
 from pydantic import BaseModel, ValidationError
 
 from rig.config.layers import BASE, Layered, Places, put_together, read_layers
-from rig.config.models import ProcedureSection, RigConfig, SensorsConfig
+from rig.config.models import ProcedureSection, RigConfig, SensorsConfig, StatementConfig
 from rig.config.procedure_sections import DEFAULT_PROCEDURE, STOCK_SECTIONS
 from rig.config.world_models import WorldSection
 from rig.config.yaml_text import Location, Unreadable, dotted
@@ -81,6 +81,18 @@ def load_sensors(path: str | Path, overrides: Sequence[str] = ()) -> tuple[Senso
     if layered.problems or config is None:
         raise ConfigurationRefused(str(path), [*layered.problems, *problems])
     return config, None
+
+
+def load_statement(overrides: Sequence[str]) -> StatementConfig:
+    """What `path.to.key=value` say of site and certificate by themselves. Raises `ConfigurationRefused` as `load`."""
+    try:
+        layered = put_together("{}", None, overrides)
+    except Unreadable as error:
+        raise ConfigurationRefused("--set", [str(error)]) from None
+    config, problems = _validate(StatementConfig, layered.document, (), layered.places)
+    if layered.problems or config is None:
+        raise ConfigurationRefused("--set", [*layered.problems, *problems])
+    return config
 
 
 def _layered(path: str | Path, overrides: Sequence[str]) -> Layered:

@@ -126,6 +126,13 @@ class OutputSection(Section):
     )
 
 
+class StatementConfig(Section):
+    """What a laboratory states of itself and of an order."""
+
+    site: SiteSection = SiteSection()
+    certificate: CertificateSection = CertificateSection()
+
+
 class SensorsConfig(Section):
     """What who only reads sensors needs of a configuration: how they are turned and judged may be left out."""
 

@@ -1,14 +1,14 @@
 """What `result.json` says of accelerometers."""
 
-from typing import Literal
-
 from rig.data.budget_entries import BudgetEntry
 from rig.data.result_types import (
     Entry,
     ErrorEntry,
     Freedom3,
+    LaidDownEntry,
     Matrix3,
     Matrix6,
+    Method,
     PositiveVector3,
     Role,
     ToldFromEntry,
@@ -44,7 +44,7 @@ class DwellEntry(Entry):
     residual_m_s2: Vector3
     samples: int
     duration_s: float
-    temperature_c: float
+    temperature_c: float | None = None
     residual_std_m_s2: Vector3 | None = None
 
 
@@ -78,16 +78,17 @@ class AccelerometerEntry(Entry):
     - `found_at`: when scale and bias were read, and how warm it was then; `temperature_c` is that
       temperature, in results of before the mean over the dwells.
     - `…_freedom`: degrees of freedom of the standard deviations of that name, null where they have no end.
+    - `laid_down`: where a file told the attitudes, and no arm held them; nobody told its range and its temperature then.
     - `correction_matrix` is M of s = M (a − b), first order: in the frame of the gyroscope's corrected rates (whole
       matrix) where there is an `alignment`, else in the right-angled frame nearest to the accelerometer's own axes.
     """
 
     part: str
     serial_number: str
-    range_m_s2: float
+    range_m_s2: float | None = None
     role: Role
     model: str
-    estimator: Literal["attitude_weighted"]
+    estimator: Method
     gravity_m_s2: float
     scale: PositiveVector3
     bias_m_s2: Vector3
@@ -100,8 +101,8 @@ class AccelerometerEntry(Entry):
     second_order_s2_m: Vector3 | None
     second_order_std_s2_m: Vector3 | None
     reference_m_s2: Vector3
-    attitude_error_rad: float
-    attitude_error_std_rad: float
+    attitude_error_rad: float | None
+    attitude_error_std_rad: float | None
     lever_arm_m: Vector3 | None
     lever_arm_std_m: Vector3 | None
     delay_s: float | None
@@ -111,7 +112,7 @@ class AccelerometerEntry(Entry):
     sweeps: int
     rank: int
     condition: float
-    temperature_c: float
+    temperature_c: float | None
     correction_matrix: Matrix3
     beside: dict[str, InAttitudesEntry | ErrorEntry]
     held_out: HeldOutEntry | None
@@ -122,3 +123,4 @@ class AccelerometerEntry(Entry):
     non_orthogonality_freedom: Freedom3 | None = None
     second_order_freedom: Freedom3 | None = None
     told_from: tuple[ToldFromEntry, ...] = ()
+    laid_down: LaidDownEntry | None = None

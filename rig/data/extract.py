@@ -2,7 +2,8 @@
 
 The HDF5 library does not come back from some damaged files, and nothing in a process can end it then, no signal
 either. So a file is read where it can be ended from outside, and only what proved whole reaches the rig: a line of JSON
-(schema, texts, descriptions of the sensors), then the arrays in NumPy's format: each sensor's samples, arm, events.
+(schema, texts, descriptions of the sensors), then the arrays in NumPy's format: each sensor's samples, arm, events, and
+the tables of readings from elsewhere.
 What is of another shape ends in one line on stderr and exit status 1, an output that takes no more in NO_ROOM.
 """
 
@@ -19,11 +20,12 @@ import numpy as np
 from numpy.typing import NDArray
 
 from rig.arm.state import ARM_STATE_DTYPE
-from rig.data.layout import EVENTS_DTYPE, SCHEMA, TEXTS, sample_dtype
+from rig.data.layout import EVENTS_DTYPE, SCHEMA, SCHEMA_ELSEWHERE, TABLES, TEXTS, sample_dtype, table_dtype
 
 OPEN_FOR_WRITING = 0x01  # of the superblock's consistency flags
 NO_ROOM = 2
 MAX_SENSORS = 64
+MAX_COLUMNS = 32
 MAX_UNPACKED = 20  # times what lies on the disk: readings with noise come to a fifth of that, zeros to a thousandth
 LONGEST_TEXT, LONGEST_ATTRIBUTE = 1_000_000, 1000  # characters: configurations have 65,536 at most; numbers
 MAX_UNWRITTEN_ROWS = 100_000  # announced and not there: what a kill leaves of one flush, and more
@@ -41,7 +43,8 @@ def extract(path: Path) -> Iterator[dict[str, Any] | NDArray[Any]]:
         schema = _text(file, "schema")
         if schema not in TEXTS:
             raise ValueError(f"its schema is {schema!r:.60}, not {SCHEMA!r}")
-        sensors = _member(file, "samples", h5py.Group)
+        elsewhere = schema == SCHEMA_ELSEWHERE
+        sensors = {} if elsewhere else _member(file, "samples", h5py.Group)
         if len(sensors) > MAX_SENSORS:
             raise ValueError(f"it announces {len(sensors)} sensors")
         samples = {name: _member(sensors, name, h5py.Dataset) for name in sensors}
@@ -50,6 +53,9 @@ def extract(path: Path) -> Iterator[dict[str, Any] | NDArray[Any]]:
             "arm": (_member(file, "arm", h5py.Dataset), ARM_STATE_DTYPE),
             "events": (_member(file, "events", h5py.Dataset), EVENTS_DTYPE),
         }
+        for name in TABLES if elsewhere else ():
+            table = _member(file, name, h5py.Dataset)
+            rows[name] = table, table_dtype((table.dtype.names or ())[:MAX_COLUMNS])
         for name, (dataset, dtype) in rows.items():
             _check(dataset, name, dtype)
         _refuse_endless(path, sum(int(dataset.nbytes) for dataset, _ in rows.values()))

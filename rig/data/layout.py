@@ -1,13 +1,15 @@
-"""How a run lies in HDF5 (schema "rig.run/2").
+"""How a run lies in HDF5 (schema "rig.run/2", "rig.run/3" where the readings come from elsewhere).
 
 `/samples/<sensor>` (SAMPLE_DTYPE, IMU_SAMPLE_DTYPE where accelerations were recorded, FIELD_SAMPLE_DTYPE of a
 magnetometer; the sensor's description as attributes), `/arm` (ARM_STATE_DTYPE), `/events` (bytes: SWMR forbids data of
 variable length, so an event is a line of JSON); `schema`, `config` (YAML), `settings` and `provenance` (JSON) as
-attributes of the file. Schema "rig.run/1" lacks `settings`.
+attributes of the file. Schema "rig.run/1" lacks `settings`. Schema "rig.run/3" has no `/samples` and no `/arm`, but the
+tables `/readings` and `/motion` (a float column each, by name; `rig.data.motion_file`) and `elsewhere` (JSON: whose
+readings, and what the motion tells).
 """
 
-from collections.abc import Mapping
-from dataclasses import dataclass
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
 
@@ -20,7 +22,13 @@ from rig.config.written_file import PART
 
 SCHEMA = "rig.run/2"
 SCHEMA_BEFORE = "rig.run/1"
-TEXTS = {SCHEMA: ("config", "settings", "provenance"), SCHEMA_BEFORE: ("config", "provenance")}
+SCHEMA_ELSEWHERE = "rig.run/3"
+TABLES = ("readings", "motion")
+TEXTS = {
+    SCHEMA_ELSEWHERE: ("config", "settings", "provenance", "elsewhere"),
+    SCHEMA: ("config", "settings", "provenance"),
+    SCHEMA_BEFORE: ("config", "provenance"),
+}
 EVENTS_DTYPE = np.dtype("u1")
 CHUNK_ROWS = 1024
 CHUNK_BYTES = 65536
@@ -31,7 +39,8 @@ class Contents:
     """What a run file holds, as it stands there: nothing of it is judged yet.
 
     `texts` are the attributes named in `TEXTS`, `described` the attributes of each sensor; `samples` (n,) by sensor, of
-    its `sample_dtype`, `arm` (n,) ARM_STATE_DTYPE, `events` (n,) bytes.
+    its `sample_dtype`, `arm` (n,) ARM_STATE_DTYPE, `events` (n,) bytes; `tables` (n,) by the names of `TABLES`, of
+    readings from elsewhere alone.
     """
 
     schema: str
@@ -40,6 +49,7 @@ class Contents:
     samples: Mapping[str, NDArray[Any]]
     arm: NDArray[Any]
     events: NDArray[Any]
+    tables: Mapping[str, NDArray[Any]] = field(default_factory=dict)
 
 
 def empty(schema: str, texts: Mapping[str, str], described: Mapping[str, Mapping[str, Any]]) -> Contents:
@@ -60,6 +70,19 @@ def is_magnetometer(attributes: Mapping[str, Any]) -> bool:
     return "sensitivity_t_per_count" in attributes
 
 
+def table_of(columns: Mapping[str, NDArray[np.float64]]) -> NDArray[Any]:
+    """(n,) rows of float columns."""
+    table = np.empty(len(next(iter(columns.values()))), table_dtype(tuple(columns)))
+    for name, column in columns.items():
+        table[name] = column
+    return table
+
+
+def table_dtype(names: Sequence[str]) -> np.dtype[Any]:
+    """The type of the rows of a table with these columns."""
+    return np.dtype([(name, "<f8") for name in names])
+
+
 def lay_out(path: Path, contents: Contents, *, swmr: bool) -> None:
     """Write a whole run file beside its place and move it there, so that a kill leaves all or nothing.
 
@@ -73,6 +96,8 @@ def lay_out(path: Path, contents: Contents, *, swmr: bool) -> None:
         file.attrs.update(schema=contents.schema, **contents.texts)
         _dataset(file, "arm", contents.arm, CHUNK_ROWS)
         _dataset(file, "events", contents.events, CHUNK_BYTES)
+        for name, rows in contents.tables.items():
+            _dataset(file, name, rows, CHUNK_ROWS)
         for name, rows in contents.samples.items():
             _dataset(file, f"samples/{name}", rows, CHUNK_ROWS).attrs.update(contents.described[name])
     whole.replace(path)

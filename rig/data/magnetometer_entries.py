@@ -12,8 +12,10 @@ from rig.data.result_types import (
     Entry,
     ErrorEntry,
     Freedom3,
+    LaidDownEntry,
     Matrix3,
     Matrix6,
+    Method,
     PositiveVector3,
     ToldFromEntry,
     Vector3,
@@ -91,14 +93,15 @@ class MagnetometerEntry(Entry):
     - `told_from`: what may happen while it is recorded, and from what size on that contradicts itself.
     - `found_at`: when scale and bias were read; `non_orthogonality_freedom`: degrees of freedom of these standard
       deviations, null where they have no end.
+    - `laid_down`: where a file told the attitudes, and no arm held them; nobody told its range then.
     - `correction_matrix` is M of B = M (m − b), in the right-angled frame nearest to the magnetometer's own axes.
     """
 
     part: str
     serial_number: str
-    range_t: float
+    range_t: float | None = None
     model: str
-    estimator: Literal["attitude_weighted"]
+    estimator: Method
     arm_field_in_bias: bool = True
     extension_m: Vector3 = (0.0, 0.0, 0.0)
     uniformity: UniformityEntry | None = None
@@ -114,7 +117,7 @@ class MagnetometerEntry(Entry):
     non_orthogonality_rad: Vector3
     non_orthogonality_std_rad: Vector3
     field_base_t: Vector3
-    attitude_error_rad: float
+    attitude_error_rad: float | None
     attitude_error_std_rad: float | None
     dwells: tuple[FieldDwellEntry, ...]
     rank: int
@@ -127,6 +130,7 @@ class MagnetometerEntry(Entry):
     found_at: WhenEntry | None = None
     non_orthogonality_freedom: Freedom3 | None = None
     told_from: tuple[ToldFromEntry, ...] = ()
+    laid_down: LaidDownEntry | None = None
 
 
 class AsMountedEntry(Entry):

@@ -16,10 +16,13 @@ from rig.arm.preflight import used_kinematics
 from rig.arm.state import ArmReport
 from rig.config.load import Loaded
 from rig.data.checked import checked
-from rig.data.result_file import StoredCalibrationEntry
+from rig.data.motion_file import Item
+from rig.data.result_file import FileEntry, StoredCalibrationEntry
 from rig.data.run_folder import ScriptIdentity
 
 NO_BOARD = "none"  # where every sensor has a port of its own
+NO_ARM = "none"  # of readings recorded elsewhere
+OF_FILES = ("readings_file", "motion_file")
 PACKAGES = ("ur-rtde", "numpy", "h5py", "pyserial")
 
 
@@ -33,7 +36,7 @@ class Provenance:
     with; None where it was not told. `arm_maker` and `arm_model` are those of the arm that was found; older recordings
     do not say (None): any arm was taken for a UR10e. `board_follows_crystal` is the board's own word on its clock, None
     where there is no board and in older recordings. Files of schema "rig.run/1" do not name the script; that was an
-    installed one.
+    installed one. `readings_file` and `motion_file` are those of readings recorded elsewhere, with no arm and no board.
     """
 
     started_utc: str
@@ -55,6 +58,8 @@ class Provenance:
     arm_maker: str | None = None
     arm_model: str | None = None
     board_follows_crystal: bool | None = None
+    readings_file: FileEntry | None = None
+    motion_file: FileEntry | None = None
 
     @property
     def kinematics(self) -> DenavitHartenberg:
@@ -69,11 +74,37 @@ class Provenance:
     def document(self) -> dict[str, Any]:
         """The provenance as it fits into JSON; nothing of what is not known."""
         stored = {name: entry.model_dump(mode="json") for name, entry in self.stored_calibrations.items()}
-        document = {**asdict(self), "stored_calibrations": stored}
+        files = {name: each.model_dump() for name in OF_FILES if (each := getattr(self, name)) is not None}
+        document = {**asdict(self), "stored_calibrations": stored, **files}
         unknown = {"script", "script_sha256", "script_installed"} if self.script_sha256 is None else set()
-        optional = ("arm_kinematics", "tcp_offset", "arm_maker", "arm_model", "board_follows_crystal")
+        optional = ("arm_kinematics", "tcp_offset", "arm_maker", "arm_model", "board_follows_crystal", *OF_FILES)
         unknown |= {name for name in optional if document[name] is None}
         return {key: value for key, value in document.items() if key not in unknown}
+
+
+def provenance_of_files(readings: FileEntry, motion: FileEntry, item: Item, began: datetime) -> Provenance:
+    """Provenance of an item's readings recorded elsewhere, which `began` then: no arm and no board is known."""
+    return Provenance(
+        started_utc=began.astimezone(UTC).isoformat(timespec="seconds"),
+        **_program(),
+        configuration_sha256=hashlib.sha256(b"").hexdigest(),
+        arm_serial_number=NO_ARM,
+        arm_software=NO_ARM,
+        board_unique_id=NO_BOARD,
+        firmware_version=NO_BOARD,
+        sensor_serial_numbers={item.name: item.serial_number},
+        readings_file=readings,
+        motion_file=motion,
+    )
+
+
+def _program() -> dict[str, Any]:
+    """What reckons."""
+    return {
+        "rig_version": __version__,
+        "python_version": platform.python_version(),
+        "package_versions": {name: version(name) for name in PACKAGES},
+    }
 
 
 def provenance_of(
@@ -89,9 +120,7 @@ def provenance_of(
     """Provenance of a recording that begins now; `stored` as in `Provenance`. Raises Refused as `used_kinematics`."""
     return Provenance(
         started_utc=datetime.now(UTC).isoformat(timespec="seconds"),
-        rig_version=__version__,
-        python_version=platform.python_version(),
-        package_versions={name: version(name) for name in PACKAGES},
+        **_program(),
         configuration_sha256=hashlib.sha256(loaded.rig_text.encode()).hexdigest(),
         arm_serial_number=arm.serial_number,
         arm_software=arm.polyscope,

@@ -13,6 +13,7 @@ from rig.config.limits import Kind, Parameter
 from rig.config.section import SensorName
 from rig.config.written_file import write_new
 from rig.data.accelerometer_entries import AccelerometerEntry
+from rig.data.attitude_entries import InAttitudesRatesEntry, TurnedEntry
 from rig.data.budget_entries import BiasProcessEntry, BudgetEntry, ClockEntry
 from rig.data.checked import read_document
 from rig.data.drift_entries import DriftEntry
@@ -101,8 +102,18 @@ class KinematicsEntry(Entry):
     alpha_rad: Vector6
 
 
+class FileEntry(Entry):
+    """A file that was read: what it was called, and its SHA-256 in hexadecimal."""
+
+    name: str
+    sha256: str
+
+
 class ProvenanceEntry(Entry):
-    """What was measured with what, and when. Later versions may add to it."""
+    """What was measured with what, and when. Later versions may add to it.
+
+    `readings_file` and `motion_file` of readings recorded elsewhere; no arm and no board are named then.
+    """
 
     model_config = ConfigDict(frozen=True, extra="allow")
     __pydantic_extra__: dict[str, JsonValue] = Field(init=False)
@@ -126,6 +137,8 @@ class ProvenanceEntry(Entry):
     arm_maker: str | None = None
     arm_model: str | None = None
     board_follows_crystal: bool | None = None
+    readings_file: FileEntry | None = None
+    motion_file: FileEntry | None = None
 
 
 class EstimateEntry(Entry):
@@ -192,15 +205,15 @@ class AverageEntry(Entry):
     noise_rad_s: Vector3
     samples: int
     duration_s: float
-    temperature_c: float
+    temperature_c: float | None = None
 
 
 class ObservationEntry(Entry):
-    """One revolution of a joint and the mean reading over it."""
+    """One revolution and the mean reading over it; of a joint, where an arm made it."""
 
     sweep: int
-    joint: str
-    direction: str
+    joint: str | None = None
+    direction: str | None = None
     axis: Literal["x", "y", "z"]
     sign: Literal[1, -1]
     axis_flange: Vector3
@@ -212,7 +225,7 @@ class ObservationEntry(Entry):
     noise_rad_s: Vector3
     samples: int
     duration_s: float
-    temperature_c: float
+    temperature_c: float | None = None
 
 
 class TimeBaseEntry(Entry):
@@ -263,11 +276,13 @@ class SensorEntry(Entry):
     - A reference has no `board`: the board solves only for the sensors that are to be calibrated.
     - `earth_rate` is there where it was to be found, or says why it was not.
     - `told_from`: what may happen while it is recorded, and from what size on that contradicts itself.
+    - `in_attitudes` is there where a file told the attitudes, and no arm turned it; what nobody told, as its range and
+      its temperature, is null then. `turned` is there where sweeps of a file were solved by how far the body turned.
     """
 
     part: str
     serial_number: str
-    range_rad_s: Positive
+    range_rad_s: Positive | None = None
     role: Role
     model: str
     estimator: str
@@ -280,7 +295,7 @@ class SensorEntry(Entry):
     condition: float
     covariance_order: tuple[str, ...]
     covariance_units: tuple[str, ...]
-    temperature_c: float
+    temperature_c: float | None
     observations: tuple[ObservationEntry, ...]
     rests: tuple[AverageEntry, ...]
     time_bases: tuple[TimeBaseEntry, ...]
@@ -300,6 +315,8 @@ class SensorEntry(Entry):
     bias_at: WhenEntry | None = None
     loads_rad_s: tuple[Vector2, Vector2, Vector2] | None = None
     told_from: tuple[ToldFromEntry, ...] = ()
+    in_attitudes: InAttitudesRatesEntry | None = None
+    turned: TurnedEntry | None = None
 
 
 class RotationEntry(Entry):
@@ -365,6 +382,7 @@ class ResultDocument(Entry):
     It is also empty where no sweeps were made, `accelerometers` where none were calibrated, `magnetometers` where none
     were recorded; one that was recorded and not calibrated says why.
     `bias_drift` holds the biases by repeat of a run of that procedure, by sensor, then by "rate" and "acceleration".
+    `unsolved` says of readings from elsewhere why a quantity has no solution, by sensor, then by the quantity's name.
     A sensor's name becomes that of files: what a configuration does not take for one is none here either.
     """
 
@@ -378,6 +396,7 @@ class ResultDocument(Entry):
     accelerometers: dict[SensorName, AccelerometerEntry] = Field(default_factory=dict)
     magnetometers: dict[SensorName, MagnetometerEntry | ErrorEntry] = Field(default_factory=dict)
     bias_drift: dict[SensorName, dict[str, DriftEntry]] = Field(default_factory=dict)
+    unsolved: dict[SensorName, dict[str, ErrorEntry]] = Field(default_factory=dict)
 
     def text(self) -> str:
         """The result as JSON; what was left out stays out."""

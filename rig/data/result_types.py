@@ -16,6 +16,7 @@ Matrix6 = Annotated[tuple[Vector6, ...], Field(min_length=6, max_length=6)]
 Freedom = float | None
 Freedom3 = tuple[Freedom, Freedom, Freedom]
 Role = Literal["calibrate", "reference"]
+Method = Literal["attitude_weighted", "maximum_likelihood", "as_published"]
 
 
 class Entry(BaseModel):
@@ -45,6 +46,20 @@ class WhenEntry(Entry):
     mean_utc: Utc
     temperature_c: float | None
     temperature_range_c: tuple[float, float] | None
+
+
+class LaidDownEntry(Entry):
+    """How a body was laid down in attitudes that a file tells, in the unit of the readings.
+
+    `placement_std` is by how much a placement was found to change each reading beside its attitude, null where the
+    method does not ask; `rests_elsewhere` rests without an attitude have told of it too. `rows_left_out` of the
+    file's rows were none, for the body moved in them.
+    """
+
+    placement_std: float | None
+    placement_uncertainty: float | None
+    rests_elsewhere: int
+    rows_left_out: int
 
 
 class ToldFromEntry(Entry):

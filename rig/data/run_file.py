@@ -30,7 +30,19 @@ from rig.config.sensor_catalogue import has_own_port
 from rig.data.checked import Finite, Positive, checked
 from rig.data.events import Event, Recorded, from_lines, to_line
 from rig.data.extract import NO_ROOM, reason
-from rig.data.layout import EVENTS_DTYPE, SCHEMA, Contents, append, empty, is_magnetometer, lay_out
+from rig.data.layout import (
+    EVENTS_DTYPE,
+    SCHEMA,
+    SCHEMA_ELSEWHERE,
+    TABLES,
+    Contents,
+    append,
+    empty,
+    is_magnetometer,
+    lay_out,
+    table_of,
+)
+from rig.data.motion_file import MOTIONS, SAMPLES, ReadElsewhere, ToldElsewhere
 from rig.data.provenance import Provenance
 from rig.data.settings import RunSettings, settings_from_json
 from rig.data.settings_of_run_1 import settings_of_configuration
@@ -119,7 +131,8 @@ class RunData:
     """A run file in memory: `samples` (n,) by name of a sensor, SAMPLE_DTYPE or IMU_SAMPLE_DTYPE, or of one of the
     `magnetometers`, FIELD_SAMPLE_DTYPE; `arm` (n,) ARM_STATE_DTYPE; events in order.
 
-    `settings` say what it is judged by; `config` is the configuration's text, for people.
+    `settings` say what it is judged by; `config` is the configuration's text, for people. Readings from `elsewhere` have
+    neither samples of the rig's own nor an arm.
     """
 
     config: str
@@ -130,6 +143,7 @@ class RunData:
     arm: NDArray[Any]
     events: tuple[Recorded, ...]
     magnetometers: dict[str, RecordedMagnetometer] = dataclasses.field(default_factory=dict)
+    elsewhere: ReadElsewhere | None = None
 
     def judged_by(self, overrides: Sequence[str]) -> "RunData":
         """The recording under other settings: see `RunSettings.with_overrides`."""
@@ -284,9 +298,21 @@ def read_run(path: Path, timeout_s: float | None = None) -> RunData:
                 for name, attributes in contents.described.items()
                 if is_magnetometer(attributes)
             },
+            elsewhere=_elsewhere(contents) if contents.tables else None,
         )
     except (ValueError, RecursionError) as error:
         raise _not_a_run_file(path, str(error)) from None
+
+
+def write_elsewhere(path: Path, run: RunData) -> None:
+    """A new run file of readings from elsewhere. Raises OSError."""
+    read = run.elsewhere
+    assert read is not None, "of readings from elsewhere"
+    provenance = json.dumps(run.provenance.document())
+    texts = {"config": run.config, "settings": run.settings.to_json(), "provenance": provenance}
+    texts["elsewhere"] = json.dumps(asdict(ToldElsewhere(read.item, read.tells)))
+    tables = {"readings": table_of(read.readings), "motion": table_of(read.motion)}
+    lay_out(path, replace(empty(SCHEMA_ELSEWHERE, texts, {}), tables=tables), swmr=False)
 
 
 def make_plain(path: Path) -> None:
@@ -326,7 +352,9 @@ def _contents(path: Path, timeout_s: float | None) -> Contents:
         out.seek(0)
         header = json.loads(out.readline())
         samples = {name: np.load(out) for name in header["described"]}
-        return Contents(**header, samples=samples, arm=np.load(out), events=np.load(out))
+        arm, events = np.load(out), np.load(out)
+        tables = {name: np.load(out) for name in (TABLES if header["schema"] == SCHEMA_ELSEWHERE else ())}
+        return Contents(**header, samples=samples, arm=arm, events=events, tables=tables)
 
 
 def _awaited(reading: "subprocess.Popen[bytes]", timeout_s: float) -> bytes:
@@ -361,14 +389,27 @@ def _no_room(path: Path, why: str) -> Refused:
 
 
 def _settings(contents: Contents) -> RunSettings:
-    if contents.schema == SCHEMA:
+    if contents.schema in (SCHEMA, SCHEMA_ELSEWHERE):
         settings = settings_from_json(contents.texts["settings"])
     else:
         settings = settings_of_configuration(contents.texts["config"])
+    if (settings.elsewhere is None) != (contents.schema != SCHEMA_ELSEWHERE):
+        raise ValueError("its settings are those of other readings")
+    if settings.elsewhere is not None:
+        return settings
     named = (*settings.to_calibrate, *([settings.reference.name] if settings.reference else []))
     if missing := [name for name in named if name not in contents.described]:
         raise ValueError(f"it holds no samples of {', '.join(missing)}, a sensor of its settings")
     return settings
+
+
+def _elsewhere(contents: Contents) -> ReadElsewhere:
+    tables = [contents.tables[each] for each in TABLES]
+    readings, motion = ({name: rows[name] for name in rows.dtype.names or ()} for rows in tables)
+    told = checked(ToldElsewhere, json.loads(contents.texts["elsewhere"]), "elsewhere")
+    SAMPLES.check(readings)
+    MOTIONS[told.tells].check(motion)
+    return ReadElsewhere(told.item, readings, told.tells, motion)
 
 
 def _sensor(attributes: Mapping[str, Any]) -> RecordedSensor:

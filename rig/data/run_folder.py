@@ -54,6 +54,17 @@ def new_folder(out: Path | None, loaded: Loaded, script: str, identity: ScriptId
     return folder
 
 
+def empty_folder(folder: Path) -> Path:
+    """A folder of that name with nothing in it, made if it is not there. Raises Refused `run_folder`."""
+    try:
+        folder.mkdir(parents=True, exist_ok=True)
+        if any(folder.iterdir()):
+            raise Refused("run_folder", f"{folder} is not empty", "Choose another with --out")
+    except OSError as error:
+        raise Refused("run_folder", f"{folder} cannot be written: {error}", "Choose another with --out") from error
+    return folder
+
+
 def _write_all(folder: Path, texts: Mapping[str, str]) -> None:
     """All of these new files or, on a full disk, none: half of a configuration would be resumed from."""
     begun: list[Path] = []

@@ -135,6 +135,23 @@ class Uncertainty:
 
 
 @dataclass(frozen=True, slots=True)
+class Elsewhere:
+    """How readings are solved that were recorded elsewhere, whose motion a file tells (`rig.data.motion_file`).
+
+    - `any_mounting`: the sensor's axes need not lie along those of the body whose attitudes are given.
+    - `find_clock`: the attitudes are on a clock of their own; `exact_rates`: their rates are exact, as a rate table's
+      are; `window_s`: over which attitudes are averaged for a gyroscope's increments, None for what suits.
+    - `estimator`: the one that was asked for, None for the one that suits each quantity.
+    """
+
+    any_mounting: bool = False
+    find_clock: bool = False
+    exact_rates: bool = False
+    window_s: Positive | None = None
+    estimator: str | None = None
+
+
+@dataclass(frozen=True, slots=True)
 class PlannedSweep:
     """A sweep the whole procedure has: its place in the plan, its joint, "cw" or "ccw", its speed."""
 
@@ -166,16 +183,16 @@ class RunSettings:
     that the Earth's rate is to be found from what the gyroscopes read, not taken from the site. `extension_m` is where
     the extension ends on which the sensors sit, in the flange's frame. `reckoning` numbers the way of solving and
     checking, so that a recording keeps its numbers when a better one comes: 1, all of before; 2, what
-    docs/uncertainty.md says of today.
+    docs/uncertainty.md says of today. Readings from `elsewhere` have no arm, so no home, and no limits.
     """
 
     procedure: str
     then_verify: bool
     observation: ObservationThresholds
-    limits: Limits
+    limits: Limits | None
     to_calibrate: Annotated[tuple[str, ...], Field(min_length=1)]
     reference: KnownReference | None
-    home_q_rad: Annotated[tuple[Finite, ...], Field(min_length=6, max_length=6)]
+    home_q_rad: Annotated[tuple[Finite, ...], Field(min_length=6, max_length=6)] | tuple[()]
     planned_sweeps: tuple[PlannedSweep, ...]
     matrix_corrected: tuple[str, ...] = ()
     site: Site | None = None
@@ -185,6 +202,7 @@ class RunSettings:
     finds_earth_rate: bool = False
     extension_m: Vector3 = (0.0, 0.0, 0.0)
     reckoning: Annotated[int, Field(ge=1, le=RECKONING)] = 1
+    elsewhere: Elsewhere | None = None
 
     @property
     def checked_by_model(self) -> bool:
@@ -253,7 +271,10 @@ class RunSettings:
 
     def document(self) -> dict[str, Any]:
         """The settings as plain values, by key."""
-        return {**asdict(self), "limits": self.limits.model_dump()}
+        document = {**asdict(self), "limits": None if self.limits is None else self.limits.model_dump()}
+        if self.elsewhere is None:
+            del document["elsewhere"]
+        return document
 
     def to_json(self) -> str:
         """The settings as they stand in a run file."""
@@ -360,6 +381,8 @@ def _overridden(settings: RunSettings, item: str) -> RunSettings:
             f"Set one of {', '.join(_settable())}",
         )
     document = settings.document()
+    if document.get(section, ()) is None:
+        raise Refused("unknown_setting", "readings as CSV come without limits", "Leave out --set limits")
     (document[section] if key else document)[key or section] = value.strip()
     try:
         return checked(RunSettings, document, "settings")

@@ -75,7 +75,8 @@ class TurnedSolution:
     """A solution as `rig.estimation.vector_model.VectorSolution` has it; `budget` is what the covariance is made of.
 
     `residuals_rad_s` (N, 3) are those of the means, then of the turns as mean rates; `widened` says how much more the
-    turns contradict each other than was said of them, 1 at least.
+    turns contradict each other than was said of them, 1 at least. `estimator` is another's name where readings in
+    attitudes are told as turns are.
     """
 
     scale: Array
@@ -96,7 +97,7 @@ class TurnedSolution:
     warnings: tuple[str, ...] = ()
     g_sensitivity: None = None
     g_sensitivity_covariance: None = None
-    estimator: Literal["increments"] = "increments"
+    estimator: str = "increments"
 
 
 @dataclass(frozen=True, slots=True)

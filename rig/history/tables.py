@@ -133,7 +133,8 @@ def title_of(subject: Subject) -> str:
     """What was calibrated, in words."""
     part, serial_number, quantity, full_scale, simulated = subject
     unit = next((each.unit for each in QUANTITIES.values() if each.name in quantity.split()), "")
-    return f"{part} {serial_number}, {quantity}, ±{full_scale:.4g} {unit}" + (", simulated" if simulated else "")
+    of = f"±{full_scale:.4g} {unit}" if full_scale else "range not stated"
+    return f"{part} {serial_number}, {quantity}, {of}" + (", simulated" if simulated else "")
 
 
 def value_text(parameter: Parameter) -> str:

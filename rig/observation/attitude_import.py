@@ -22,10 +22,11 @@ from pathlib import Path
 import numpy as np
 from numpy.typing import NDArray
 
+from rig.data.motion_file import MOTIONS
 from rig.data.quantity import RATE, Quantity
 from rig.errors import Fault, Refused
 from rig.estimation.arrays import Array
-from rig.observation.csv_samples import read_samples
+from rig.observation.csv_samples import Samples
 from rig.observation.csv_table import read_columns
 from rig.observation.csv_windows import MIN_SAMPLES, check_complete, inside, overlapping, scatter_of
 from rig.observation.fixes import Turning
@@ -34,7 +35,6 @@ from rig.observation.table_motion import TableMotion
 from rig.observation.timebase import TimeBase, estimate_time_base
 from rig.observation.windows import Window
 
-PLACE_COLUMNS = ("start_s", "end_s", "qw", "qx", "qy", "qz")
 RATE_COLUMNS = ("rate_x_rad_s", "rate_y_rad_s", "rate_z_rad_s")
 STD_COLUMN = "attitude_std_rad"
 ATTITUDES_MB = 32  # an hour's table at 50 Hz
@@ -73,15 +73,21 @@ class PlacedReadings:
     clock: TimeBase | None = None
 
 
-def read_placed(samples_path: Path, attitudes_path: Path, *, find_clock: bool = False) -> PlacedReadings:
-    """Read and average both files. With `find_clock` each has its own clock; rows that no sample covers are left out.
+def read_attitudes(path: Path) -> dict[str, Array]:
+    """The columns (N,) of a file of attitudes.
 
-    Raises Refused `no_file`, `wrong_columns`, `wrong_unit`, `not_a_number`, `time_not_increasing`, `bad_quaternion`,
+    Raises Refused `no_file`, `wrong_columns`, `wrong_unit`, `not_a_number`.
+    """
+    return read_columns(path, MOTIONS["attitudes"], ATTITUDES_MB)
+
+
+def placed_by(samples: Samples, table: Mapping[str, Array], *, find_clock: bool = False) -> PlacedReadings:
+    """Samples averaged in attitudes, given by the columns of their file.
+
+    With `find_clock` each has its own clock; rows that no sample covers are left out. Raises Refused `bad_quaternion`,
     `bad_attitude_row`, `overlapping_attitudes`; Fault `lost_samples`, `too_few_observations`, and with `find_clock` as
     `TableMotion` and `estimate_time_base`.
     """
-    samples = read_samples(samples_path)
-    table = read_columns(attitudes_path, PLACE_COLUMNS, (), ATTITUDES_MB, (RATE_COLUMNS, (STD_COLUMN,)))
     time_s, readings = samples.time_s, samples.readings
     rates = np.column_stack([table[name] for name in RATE_COLUMNS]) if RATE_COLUMNS[0] in table else None
     said = _Said(_windows(table), _rotations(table), rates, _stated(table))

@@ -14,26 +14,26 @@ A row with an angle at both ends of which the body lay still is solved by how fa
 Columns may stand in any order; the first row holds their names.
 """
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
 
 import numpy as np
 
+from rig.data.motion_file import MOTIONS
 from rig.data.quantity import RATE
 from rig.errors import Fault, Refused
 from rig.estimation.arrays import Array
 from rig.estimation.refusals import check_reading_ratio
 from rig.observation.average import Average
-from rig.observation.csv_samples import read_samples
+from rig.observation.csv_samples import Samples
 from rig.observation.csv_table import read_columns
 from rig.observation.csv_windows import average_of, check_complete, check_times, inside, overlapping
 from rig.observation.observe import Observation, nearest_axis
 from rig.observation.turns import Known, TurnedData, turned
 from rig.observation.windows import Window
 
-SWEEP_COLUMNS = ("start_s", "end_s", "axis_x", "axis_y", "axis_z")
-MOTION_COLUMNS = ("speed_rad_s", "angle_rad")
+AXIS_COLUMNS = ("axis_x", "axis_y", "axis_z")
 STD_COLUMNS = ("angle_std_rad", "axis_std_rad")
 MIN_DURATION_S = 1e-3  # so many samples need longer at any rate
 SWEEPS_MB = 1  # some ten thousand sweeps
@@ -48,18 +48,20 @@ class ExternalData:
     turned: TurnedData | None = None
 
 
-def read(samples_path: Path, sweeps_path: Path) -> ExternalData:
-    """Read and average both files.
+def read_sweeps(path: Path) -> dict[str, Array]:
+    """The columns (k,) of a file of sweeps. Raises Refused `no_file`, `wrong_columns`, `wrong_unit`, `not_a_number`."""
+    return read_columns(path, MOTIONS["sweeps"], SWEEPS_MB)
 
-    Raises Refused `no_file`, `wrong_columns`, `wrong_unit`, `not_a_number`, `time_not_increasing`, `bad_sweep`,
-    `overlapping_sweeps`; Fault as `average` does.
+
+def averaged(samples: Samples, sweeps: Mapping[str, Array]) -> ExternalData:
+    """Samples, a gyroscope's among them, averaged over sweeps, given by the columns of their file.
+
+    Raises Refused `time_not_increasing`, `bad_sweep`, `overlapping_sweeps`; Fault as `average` does.
     """
-    samples = read_samples(samples_path, [RATE])
-    sweeps = read_columns(sweeps_path, SWEEP_COLUMNS, MOTION_COLUMNS, SWEEPS_MB, [(name,) for name in STD_COLUMNS])
     found = average(
         np.column_stack([samples.time_s, samples.readings[RATE]]),
         np.column_stack([sweeps["start_s"], sweeps["end_s"], _speeds(sweeps)]),
-        np.column_stack([sweeps[name] for name in SWEEP_COLUMNS[2:]]),
+        np.column_stack([sweeps[name] for name in AXIS_COLUMNS]),
     )
     if "angle_rad" not in sweeps:
         return found
@@ -98,12 +100,12 @@ def average(samples: Array, sweeps: Array, axes: Array) -> ExternalData:
     return ExternalData(tuple(turns), tuple(rests))
 
 
-def _speeds(sweeps: dict[str, Array]) -> Array:
+def _speeds(sweeps: Mapping[str, Array]) -> Array:
     """Mean speeds (k,), from whichever of the two columns there is. Raises Refused `bad_sweep`."""
     durations = sweeps["end_s"] - sweeps["start_s"]
     by_angle = "angle_rad" in sweeps
     motion = sweeps["angle_rad" if by_angle else "speed_rad_s"]
-    norms = np.linalg.norm(np.column_stack([sweeps[name] for name in SWEEP_COLUMNS[2:]]), axis=1)
+    norms = np.linalg.norm(np.column_stack([sweeps[name] for name in AXIS_COLUMNS]), axis=1)
     for row, (duration, moved, norm) in enumerate(zip(durations, motion, norms, strict=True), start=1):
         what = None
         if duration <= 0:

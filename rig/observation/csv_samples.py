@@ -7,18 +7,18 @@ their names. One recording serves every command: each uses the quantities it kno
 """
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 
 import numpy as np
 
+from rig.data.motion_file import SAMPLES, TIME, Columns
 from rig.data.quantity import QUANTITIES, Quantity
 from rig.errors import Refused
 from rig.estimation.arrays import Array
 from rig.observation.csv_table import read_columns
 from rig.observation.csv_windows import check_times
 
-TIME, TEMPERATURE = "time_s", "temperature_c"
 SAMPLES_MB = 256  # an hour at 1 kHz
 
 
@@ -35,13 +35,17 @@ def read_samples(path: Path, needed: Sequence[Quantity] = ()) -> Samples:
 
     Raises Refused `no_file`, `wrong_columns`, `wrong_unit`, `not_a_number`, `time_not_increasing`.
     """
-    required = (TIME, *(name for quantity in needed for name in quantity.columns))
-    others = [each.columns for each in QUANTITIES.values() if each not in needed]
-    table = read_columns(path, required, (), SAMPLES_MB, (*others, (TEMPERATURE,)))
+    of_needed = (name for quantity in needed for name in quantity.columns)
+    table = read_columns(path, replace(SAMPLES, needed=(*SAMPLES.needed, *of_needed)), SAMPLES_MB)
+    return samples_in(table, str(path))
+
+
+def samples_in(table: Columns, where: str) -> Samples:
+    """The readings that columns (n,) hold, `where` they stand. Raises Refused `wrong_columns`, `time_not_increasing`."""
     given = [each for each in QUANTITIES.values() if each.columns[0] in table]
     if not given:
         known = ", or ".join(" ".join(each.columns) for each in QUANTITIES.values())
-        raise Refused("wrong_columns", f"{path} holds no readings", f"Its first row must name time_s and {known}")
+        raise Refused("wrong_columns", f"{where} holds no readings", f"Its first row must name time_s and {known}")
     check_times(table[TIME])
     readings = {quantity: np.column_stack([table[name] for name in quantity.columns]) for quantity in given}
     return Samples(table[TIME], readings)

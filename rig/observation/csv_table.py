@@ -9,6 +9,7 @@ from pathlib import Path
 import numpy as np
 
 from rig.config.regular_file import UnfitFile, open_regular_file
+from rig.data.motion_file import Header
 from rig.errors import Refused
 from rig.errors.quoting import quote, shorten
 from rig.estimation.arrays import Array
@@ -17,21 +18,14 @@ LONGEST_LINE = 10_000  # characters: of a hundred columns, where there are at mo
 LARGEST_NUMBER = 1e12  # either sign, in any SI unit: what is beyond is a mistake, and its square might overflow
 
 
-def read_columns(
-    path: Path,
-    columns: Sequence[str],
-    alternatives: Sequence[str],
-    largest_mb: int,
-    optional: Sequence[Sequence[str]] = (),
-) -> dict[str, Array]:
-    """The columns of a file by name: all of `columns`, and exactly one of `alternatives` if there are any.
+def read_columns(path: Path, header: Header, largest_mb: int) -> dict[str, Array]:
+    """The columns of a file by name, those of its header; of each group of optional ones all, or none.
 
-    Of each group of `optional` ones all, or none. The first row holds the names. Raises Refused `no_file`,
-    `wrong_columns`, `wrong_unit`, `not_a_number`.
+    The first row holds the names. Raises Refused `no_file`, `wrong_columns`, `wrong_unit`, `not_a_number`.
     """
     rows = _rows(path, largest_mb)
     names = [name.strip() for name in next(rows, [])]
-    _check_columns(path, names, columns, alternatives, optional)
+    _check_columns(path, names, header.needed, header.one_of, header.optional)
     values = array("d")
     for line, row in enumerate(rows, start=2):
         numbers = _numbers(row)

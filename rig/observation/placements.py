@@ -16,6 +16,7 @@ from rig.errors import Fault
 from rig.estimation.arrays import Array
 from rig.estimation.sensor_axes import nearest_rotation
 from rig.observation.csv_windows import MIN_SAMPLES, inside, scatter_of
+from rig.observation.mean import Mean
 from rig.observation.rests import BLOCK_S, find_rests
 from rig.observation.windows import Window
 
@@ -25,11 +26,22 @@ TURNED_RAD = 0.02  # rows of one rest that are farther apart: it was turned abou
 
 @dataclass(frozen=True, slots=True)
 class Rested:
-    """What rests tell: `means` (N, 3) of every quantity, their `variances` (N, 3), the `freedom` (N, 3) of these."""
+    """What N rests tell: `means` (N, 3) of every quantity, their `variances` (N, 3), the `freedom` (N, 3) of these.
+
+    `windows` from the first to the last of the `samples` (N,) that each has.
+    """
 
     means: Mapping[Quantity, Array]
     variances: Mapping[Quantity, Array]
     freedom: Mapping[Quantity, Array]
+    windows: tuple[Window, ...]
+    samples: tuple[int, ...]
+
+    def mean(self, quantity: Quantity, rest: int) -> Mean:
+        """What was read in one of them."""
+        variance, samples = self.variances[quantity][rest], self.samples[rest]
+        noise = np.sqrt(variance * samples)
+        return Mean(self.means[quantity][rest], variance, noise, samples, self.freedom[quantity][rest])
 
 
 @dataclass(frozen=True, slots=True)
@@ -70,10 +82,10 @@ def find_placements(
     named = {int(each) for each in rest}
     others = [inside(time_s, each) for number, each in enumerate(rests) if number not in named]
     return Placements(
-        _read(readings, covered),
+        _read(time_s, readings, covered),
         np.array([nearest_rotation(attitudes[group].mean(axis=0)) for group in groups]),
         None if std_rad is None else np.array([np.sqrt(np.mean(std_rad[group] ** 2)) for group in groups]),
-        _read(readings, [np.arange(each.start, each.stop) for each in others]),
+        _read(time_s, readings, [np.arange(each.start, each.stop) for each in others]),
         int((rest < 0).sum()),
     )
 
@@ -113,7 +125,7 @@ def _covered(time_s: Array, rest: Window, windows: Sequence[Window]) -> NDArray[
     return np.unique(np.concatenate([np.arange(each.start, each.stop) for each in cuts]))
 
 
-def _read(readings: Mapping[Quantity, Array], cuts: Sequence[NDArray[np.intp]]) -> Rested:
+def _read(time_s: Array, readings: Mapping[Quantity, Array], cuts: Sequence[NDArray[np.intp]]) -> Rested:
     """The means of the rests; of few samples, with the noise of all that are long enough."""
     means, variances, freedom = {}, {}, {}
     for quantity, each in readings.items():
@@ -123,7 +135,8 @@ def _read(readings: Mapping[Quantity, Array], cuts: Sequence[NDArray[np.intp]]) 
         variances[quantity] = _filled(told, np.array([len(cut) for cut in cuts]), each)
         fewest = len(each) - 1.0 if np.isnan(counted).all() else np.nanmin(counted)
         freedom[quantity] = np.where(np.isnan(counted), fewest, counted)
-    return Rested(means, variances, freedom)
+    windows = tuple(Window(float(time_s[cut[0]]), float(time_s[cut[-1]])) for cut in cuts)
+    return Rested(means, variances, freedom, windows, tuple(map(len, cuts)))
 
 
 def _filled(variances: Array, counts: NDArray[np.intp], readings: Array) -> Array:

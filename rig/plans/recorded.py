@@ -80,7 +80,7 @@ def judged(run: RecordedRun, estimator: str) -> Outcome:
 def left_out(run: RecordedRun) -> str | None:
     """What is not in the solution of a run, as a sentence: the analysis of a script that is not executed here."""
     for each in (*run.raw, *run.corrected):
-        if _script_of(run, each) is None and not _by_installed(each):
+        if each.elsewhere is None and _script_of(run, each) is None and not _by_installed(each):
             return (
                 f"recorded by the script {each.provenance.script}, which no run of yours on this computer was begun "
                 "with: it is not executed, and what it adds to the analysis is left out (--script FILE names it)"

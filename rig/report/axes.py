@@ -11,8 +11,8 @@ from rig.data.quantity import Quantity
 from rig.data.result_types import Freedom
 from rig.estimation.arrays import Array
 from rig.estimation.sensor_axes import angle_jacobian, nearest_rotation, non_orthogonality
-from rig.observation.acceleration import DwellReading
-from rig.observation.field import FieldReading
+from rig.observation.mean import Mean
+from rig.observation.windows import Window
 from rig.report.entry import EntryT, entry
 from rig.report.expanded import expanded, factor_words
 from rig.station.plain_text import plain
@@ -25,6 +25,15 @@ class Skewed(Protocol):
     def non_orthogonality_std_rad(self) -> Sequence[float]: ...
     @property
     def non_orthogonality_freedom(self) -> Sequence[Freedom] | None: ...
+
+
+class Dwelled(Protocol):
+    """What was read in an attitude."""
+
+    @property
+    def reading(self) -> Mean: ...
+    @property
+    def window(self) -> Window: ...
 
 
 FEWEST_DECIMALS = 5
@@ -96,9 +105,7 @@ def matrix_lines(matrix: Array, covariance: Array, factor: float) -> Iterator[st
     yield f"non-orthogonality yz zx xy: {told} mrad (U, k = {factor:.3g})"
 
 
-def dwell_entry(
-    kind: type[EntryT], quantity: Quantity, dwell: DwellReading | FieldReading, residual: Array, residual_std: Array
-) -> EntryT:
+def dwell_entry(kind: type[EntryT], quantity: Quantity, dwell: Dwelled, residual: Array, residual_std: Array) -> EntryT:
     """A dwell as an entry whose names end with the unit of its readings.
 
     `residual` (3,) is what the model leaves, `residual_std` (3,) what it is expected to leave.

@@ -29,7 +29,7 @@ def accelerometer_lines(found: Found[AccelerometerEntry], _: Mapping[str, Array]
     entry = found.entry
     axes = "its own axes" if entry.alignment is None else "the gyroscope beside it"
     left_out = "" if entry.second_order_s2_m is None else "\n * The second order that result.json has is left out."
-    about = f"{entry.part}, serial number {entry.serial_number}, at {entry.temperature_c:.1f} °C"
+    about = f"{entry.part}, serial number {entry.serial_number}{_warm(entry.temperature_c)}"
     return _subtracting(found, entry.bias_m_s2, entry.correction_matrix, "force_m_s2", (
         f"/* Accelerometer of {_comment(about)}: s = M (a - b), specific force: at rest it points up.",
         f" * In the right-angled frame of {axes}, relative to gravity, {entry.gravity_m_s2:g} m/s^2.{left_out} */",
@@ -45,13 +45,17 @@ def magnetometer_lines(found: Found[MagnetometerEntry], _: Mapping[str, Array]) 
     ))  # fmt: skip
 
 
+def _warm(temperature_c: float | None) -> str:
+    return "" if temperature_c is None else f", at {temperature_c:.1f} °C"
+
+
 def _prefix(name: str) -> str:
     """What a sensor's names in C begin with."""
     return re.sub(r"^(?=[^a-z])", "sensor_", re.sub(r"[^a-z0-9]", "_", name.lower()))
 
 
 def _correction(prefix: str, sensor: SensorEntry) -> Iterator[str]:
-    about = f"{sensor.part}, serial number {sensor.serial_number}, at {sensor.temperature_c:.1f} °C"
+    about = f"{sensor.part}, serial number {sensor.serial_number}{_warm(sensor.temperature_c)}"
     whole = sensor.correction_matrix
     yield from (
         "",

@@ -6,6 +6,7 @@ from rig.analysis.outcome import Origin, Outcome
 from rig.analysis.verdict import Check
 from rig.data.result_file import SCHEMA, CheckEntry, ProvenanceEntry, ResultDocument
 from rig.report.budget_entry import clock_entry
+from rig.report.elsewhere_entries import unsolved
 from rig.report.entry import entry
 from rig.report.kinds.kind import Without
 from rig.report.kinds.registry import KINDS
@@ -26,6 +27,7 @@ def document_of(outcome: Outcome) -> ResultDocument:
             "provenance": _provenance(outcome.provenance),
             **clock,
             **found,
+            **({"unsolved": faults} if (faults := unsolved(outcome)) else {}),
         }
     )
 

@@ -27,6 +27,7 @@ from rig.estimation.estimate import Estimate
 from rig.estimation.known_turns import TurnedSolution
 from rig.estimation.residuals import residual_std_rad_s
 from rig.estimation.six_observation import MODEL, PARAMETERS
+from rig.observation.average import Average
 from rig.report.budget_entry import bias_process_entry, budget_entry
 from rig.report.earth_rate import earth_rate_entry
 from rig.report.entry import counted, entry
@@ -47,16 +48,24 @@ def sensor_entry(
         observations_used=solution.observations,
         covariance_order=PARAMETERS,
         covariance_units=RATE.parameter_units,
-        observations=[entry(ObservationEntry, turn, turn.average, joint=turn.joint_name) for turn in turns],
-        rests=[entry(AverageEntry, each) for each in result.rests],
+        observations=[
+            entry(ObservationEntry, turn, turn.average, joint=turn.joint_name, temperature_c=_warm(turn.average))
+            for turn in turns
+        ],
+        rests=[entry(AverageEntry, each, temperature_c=_warm(each)) for each in result.rests],
         time_bases=[entry(TimeBaseEntry, each, reference_board_s=each.reference_s) for each in result.time_bases],
         vector_model=_vector_or_error(result),
-        six_observation=estimate_entry(result.six_observation),
+        six_observation=entry_or_error(result.six_observation),
         algorithm_1=entry_or_error(result.algorithm_1),
         **({} if agreed is None else {"board": _board(agreed)}),
         **_uncertain(result),
         **more,
     )  # fmt: skip
+
+
+def _warm(average: Average) -> float | None:
+    """How warm it was; None where no thermometer was read."""
+    return None if np.isnan(average.temperature_c) else average.temperature_c
 
 
 def _uncertain(result: SensorResult) -> dict[str, Any]:

@@ -13,7 +13,7 @@ from rig.data.accelerometer_entries import AccelerometerEntry
 from rig.data.budget_entries import BudgetEntry
 from rig.data.drift_entries import DriftEntry
 from rig.data.magnetometer_entries import MagnetometerEntry, ReversalEntry
-from rig.data.result_file import CheckEntry, ProvenanceEntry, ResultDocument, SensorEntry, VerificationEntry
+from rig.data.result_file import CheckEntry, FileEntry, ProvenanceEntry, ResultDocument, SensorEntry, VerificationEntry
 from rig.data.result_types import ErrorEntry
 from rig.errors import Refused
 from rig.report.certificate.stated import Stated
@@ -79,9 +79,16 @@ class Certificate:
     reversals: Mapping[str, ReversalEntry]
 
     @property
+    def elsewhere(self) -> bool:
+        """Whether the readings were recorded elsewhere, and a file tells the motion."""
+        return self.provenance.motion_file is not None
+
+    @property
     def arm(self) -> str:
         """What turned the items, by what was found of it."""
         found = self.provenance
+        if found.motion_file is not None:
+            return f"whatever the file {_named(found.motion_file)} tells the motion of"
         if found.arm_model is None:
             return "robot arm whose model was not recorded; it was taken for a Universal Robots UR10e"
         return f"robot arm {found.arm_maker} {found.arm_model}"
@@ -89,6 +96,8 @@ class Certificate:
     @property
     def procedure(self) -> str:
         """The script that moved the arm, and its hash."""
+        if self.provenance.readings_file is not None:
+            return f"readings of the file {_named(self.provenance.readings_file)}"
         said = self.provenance.model_dump()
         name, sha256 = said.get("script"), said.get("script_sha256")
         if name is None or sha256 is None:
@@ -186,6 +195,10 @@ def certificate_of(
     )
 
 
+def _named(file: FileEntry) -> str:
+    return f"{file.name}, SHA-256 {file.sha256}"
+
+
 def is_simulated(result: ResultDocument, stated: Stated) -> bool:
     """Whether a simulated laboratory was measured in, by the configuration or by what the controller calls itself."""
     return stated.simulated or calls_itself_simulated(result.provenance.arm_software)
@@ -279,6 +292,8 @@ def _deviations(result: ResultDocument) -> Iterator[str]:
             yield f"{name}, magnetometer, was recorded and not calibrated: {magnetometer.error}"
         else:
             yield from (f"{name}, magnetometer: {warning}" for warning in magnetometer.warnings)
+    for name, faults in result.unsolved.items():
+        yield from (f"{name}, {what}, was recorded and not calibrated: {each.error}" for what, each in faults.items())
     if not provenance.model_dump().get("script_installed", True):
         yield f"The movement was that of a script of the laboratory's own, {provenance.model_dump().get('script')}."
 

@@ -9,7 +9,7 @@ from typing import Final
 from xml.etree.ElementTree import Element, tostring
 
 from rig.config.sensor_catalogue import has_own_port
-from rig.data.result_file import CheckEntry
+from rig.data.result_file import CheckEntry, ProvenanceEntry
 from rig.errors import Refused
 from rig.report.certificate.content import Certificate
 from rig.report.certificate.tables import kind
@@ -136,7 +136,7 @@ def _item(key: str, name: str, part: str, serial: str, c: Certificate) -> Elemen
         text("description", " ".join([*(f"{mark}." for mark in c.marks), condition])),
         words("model", kind(part)),
         dcc("identifications", _identified("manufacturer", serial, "serial number"),
-            None if has_own_port(part) else _identified("other", c.provenance.board_unique_id, "board it is on")),
+            None if c.elsewhere or has_own_port(part) else _identified("other", c.provenance.board_unique_id, "board it is on")),
         id=key,
     )  # fmt: skip
 
@@ -151,7 +151,8 @@ def _statements(c: Certificate) -> Iterator[Element]:
     time = c.stated.where.time_reference
     chain = f"The unit of time hangs on {time}." if c.traceable else "No metrological traceability is claimed."
     if c.gyroscopes:
-        yield _chain("gyroscopes", f"{chain} Angles are whole turns, 2π by closure of the circle.", c.traceable)
+        angles = "as a file states them" if c.elsewhere else "whole turns, 2π by closure of the circle"
+        yield _chain("gyroscopes", f"{chain} Angles are {angles}.", c.traceable)
     if c.accelerometers:
         origin = c.stated.where.gravity_reference or "not stated"
         said = f"Gravity is stated by the laboratory, its origin: {origin}. {_claimed(c.traceable_gravity)}"
@@ -205,7 +206,7 @@ def _result(c: Certificate, item: str, found: Measured) -> Element:
     return dcc(
         "measurementResult",
         text("name", found.name),
-        dcc("usedMethods", dcc("usedMethod", text("name", "whole turns and attitudes at rest on a robot arm"),
+        dcc("usedMethods", dcc("usedMethod", text("name", _method(c)),
                                text("description", f"{DESCRIBED}; {c.procedure}"),
                                words("norm", "JCGM 100:2008"))),
         dcc("usedSoftware", _software(c)),
@@ -214,6 +215,12 @@ def _result(c: Certificate, item: str, found: Measured) -> Element:
         dcc("results", *found.results),
         refId=item,
     )  # fmt: skip
+
+
+def _method(c: Certificate) -> str:
+    if c.elsewhere:
+        return "readings recorded elsewhere, of a motion that a file tells"
+    return "whole turns and attitudes at rest on a robot arm"
 
 
 def _arm(c: Certificate) -> Element:
@@ -225,8 +232,14 @@ def _arm(c: Certificate) -> Element:
         text("name", c.arm),
         dcc("manufacturer", text("name", found.arm_maker)) if known else None,
         words("model", found.arm_model) if known else None,
-        dcc("identifications", _identified("manufacturer", found.arm_serial_number, "serial number")),
+        dcc("identifications", _identity(found)),
     )
+
+
+def _identity(found: ProvenanceEntry) -> Element:
+    if found.motion_file is not None:
+        return _identified("other", found.motion_file.sha256, "SHA-256 of the file")
+    return _identified("manufacturer", found.arm_serial_number, "serial number")
 
 
 def _condition(name: str, value: float | None, unit: str) -> Part:

@@ -106,10 +106,10 @@ def field_residuals(found: MagnetometerEntry) -> Residuals:
     return _marked(left, np.hypot(std, turned), FIELD, OF_ATTITUDES)
 
 
-def _turned(matrix: Array, readings: Array, attitude_error_rad: float) -> Array:
+def _turned(matrix: Array, readings: Array, attitude_error_rad: float | None) -> Array:
     """(n, 3) what readings (n, 3), the bias taken out, change by for attitudes off by that about each axis."""
     reference = readings @ np.linalg.inv(matrix).T  # in the sensor's own frame
-    turns = attitude_error_rad * np.cross(np.eye(3)[None], reference[:, None])  # (n, 3 axes, 3)
+    turns = (attitude_error_rad or 0.0) * np.cross(np.eye(3)[None], reference[:, None])  # (n, 3 axes, 3)
     found: Array = np.linalg.norm(turns @ matrix.T, axis=1)
     return found
 

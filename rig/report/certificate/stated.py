@@ -5,7 +5,7 @@ from dataclasses import dataclass
 from pathlib import Path
 
 from rig.config.judging_sections import CertificateSection, SiteSection
-from rig.config.load import Loaded, load
+from rig.config.load import Loaded, load, load_statement
 from rig.data.run_folder import CONFIG
 from rig.errors import Refused
 from rig.errors.quoting import quote
@@ -34,7 +34,7 @@ class Stated:
 
 
 def stated_in(folder: Path, overrides: Sequence[str] = ()) -> Stated:
-    """What the run folder's configuration says, `overrides` laid over it; nothing where it keeps none.
+    """What the run folder's configuration says, `overrides` laid over it; these alone where it keeps none.
 
     Raises Refused `unknown_setting` for an override of what was measured, and as `load`.
     """
@@ -47,7 +47,10 @@ def stated_in(folder: Path, overrides: Sequence[str] = ()) -> Stated:
                 "Set a key of certificate, or one of site that the result does not depend on",
             )
     path = folder / CONFIG
-    return of_configuration(load(path, overrides, sections=None)) if path.exists() else Stated()
+    if path.exists():
+        return of_configuration(load(path, overrides, sections=None))
+    stated = load_statement(overrides)
+    return Stated(stated.site, stated.certificate)
 
 
 def of_configuration(loaded: Loaded) -> Stated:

@@ -13,15 +13,19 @@ ALWAYS = (
     "ageing and transport",
 )
 
+# Of a motion that a file tells.
+OF_THE_FILE = ("the scale of the file's angles and of its time",)
+
 
 def in_budget(budget: BudgetEntry | None, name: str) -> bool:
     """Whether a line of that name is in it."""
     return budget is not None and any(name in line.name for line in budget.contributors)
 
 
-def left_out_of_rates(sensor: SensorEntry) -> str:
-    """What a gyroscope's U leaves out."""
-    return ", ".join(ALWAYS if sensor.nonlinearity is not None else ("nonlinearity at other speeds", *ALWAYS))
+def left_out_of_rates(sensor: SensorEntry, *, elsewhere: bool) -> str:
+    """What a gyroscope's U leaves out; where a file tells the motion, errors of it that the readings do not show."""
+    bent = ALWAYS if sensor.nonlinearity is not None else ("nonlinearity at other speeds", *ALWAYS)
+    return ", ".join(("what gravity adds to it", *OF_THE_FILE, *bent) if elsewhere else bent)
 
 
 def left_out_of_accelerations(found: AccelerometerEntry) -> str:

@@ -128,7 +128,8 @@ def _px4_magnetometer(number: int, magnetometer: MagnetometerEntry) -> Parameter
 def _ardupilot_gyroscope(number: int, gyroscope: SensorEntry) -> Parameters:
     name = f"INS_GYR{number + 1}OFFS" if number else "INS_GYROFFS"
     yield from _each(f"{name}_{{}}", np.negative(gyroscope.bias_rad_s))
-    yield f"INS_GYR{number + 1}_CALTEMP", gyroscope.temperature_c
+    if gyroscope.temperature_c is not None:
+        yield f"INS_GYR{number + 1}_CALTEMP", gyroscope.temperature_c
 
 
 def _ardupilot_accelerometer(number: int, accelerometer: AccelerometerEntry) -> Parameters:

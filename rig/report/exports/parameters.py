@@ -14,8 +14,8 @@ from typing import Protocol
 
 import numpy as np
 
-from rig.data.accelerometer_entries import AccelerometerEntry
-from rig.data.result_file import ResultDocument, SensorEntry, VectorEntry
+from rig.data.accelerometer_entries import AccelerometerEntry, DwellEntry
+from rig.data.result_file import ObservationEntry, ResultDocument, SensorEntry, VectorEntry
 from rig.errors import Refused
 from rig.errors.quoting import printable
 from rig.estimation.arrays import Array
@@ -32,11 +32,14 @@ class Named(Protocol):
 
 @dataclass(frozen=True, slots=True)
 class Triad:
-    """Reading (3,) = `matrix` (3, 3) · true + `offset` (3,); `density` of white noise, unit/√Hz, None if unknown."""
+    """Reading (3,) = `matrix` (3, 3) · true + `offset` (3,); `density` of white noise, unit/√Hz.
+
+    Rate and density are None where the result does not tell them.
+    """
 
     matrix: Array
     offset: Array
-    rate_hz: float
+    rate_hz: float | None
     density: float | None
 
     @property
@@ -58,7 +61,7 @@ class Exported:
     name: str
     part: str
     serial_number: str
-    temperature_c: float
+    temperature_c: float | None
     gyroscope: Triad
     g_sensitivity: Array
     found_g_sensitivity: bool
@@ -87,8 +90,7 @@ def _exported(name: str, sensor: SensorEntry, beside: AccelerometerEntry | None)
         if vector.g_sensitivity_rad_s_per_m_s2 is not None:  # of gravity, which points down where force points up
             sensitivity = -np.array(vector.g_sensitivity_rad_s_per_m_s2) @ to_sensor.T
     rests = [(rest.noise_rad_s, rest.samples) for rest in sensor.rests]
-    turns = sensor.observations
-    rate = sum(turn.samples for turn in turns) / sum(turn.duration_s for turn in turns)
+    rate = _rate_hz(sensor.observations)
     return Exported(
         name=name,
         part=sensor.part,
@@ -103,14 +105,20 @@ def _exported(name: str, sensor: SensorEntry, beside: AccelerometerEntry | None)
 
 
 def _accelerometer(entry: AccelerometerEntry) -> Triad:
-    rate = sum(dwell.samples for dwell in entry.dwells) / sum(dwell.duration_s for dwell in entry.dwells)
+    rate = _rate_hz(entry.dwells)
     density = _density([(dwell.noise_m_s2, dwell.samples) for dwell in entry.dwells], rate)
     return Triad(np.linalg.inv(np.array(entry.correction_matrix)), np.array(entry.bias_m_s2), rate, density)
 
 
-def _density(noises: Sequence[tuple[Sequence[float], int]], rate_hz: float) -> float | None:
+def _rate_hz(means: Sequence[ObservationEntry | DwellEntry]) -> float | None:
+    """How often readings came, by what was averaged; None of attitudes that a file told."""
+    lasted_s = sum(each.duration_s for each in means)
+    return sum(each.samples for each in means) / lasted_s if lasted_s > 0 else None
+
+
+def _density(noises: Sequence[tuple[Sequence[float], int]], rate_hz: float | None) -> float | None:
     """Noise density of the noisiest axis: σ of one sample over √rate, as if it were white up to half the rate."""
-    if not noises:
+    if not noises or rate_hz is None:
         return None
     squares = np.average([np.square(noise) for noise, _ in noises], axis=0, weights=[count for _, count in noises])
     return float(np.sqrt(squares.max() / rate_hz))

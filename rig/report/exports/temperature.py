@@ -35,9 +35,15 @@ def at_temperature(result: ResultDocument, drift: ResultDocument, temperature_c:
 
 
 def _change(
-    drift: ResultDocument, name: str, quantity: Literal["rate", "acceleration"], from_c: float, to_c: float
+    drift: ResultDocument, name: str, quantity: Literal["rate", "acceleration"], from_c: float | None, to_c: float
 ) -> Array:
     """(3,) change of the reading's bias."""
+    if from_c is None:
+        raise Refused(
+            "temperature_slope_unknown",
+            f"the result does not say how warm {name} was",
+            "Leave out --temperature-c; calibrate it where its thermometer is read",
+        )
     found = drift.bias_drift.get(name, {}).get(quantity)
     slope = None if found is None else found.over_temperature
     if not isinstance(slope, SlopeEntry):

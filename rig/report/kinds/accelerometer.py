@@ -15,15 +15,16 @@ from rig.report.axes import skew_known, triple
 from rig.report.budget_table import assumed_lines
 from rig.report.c_functions import accelerometer_lines
 from rig.report.certificate import dcc_results
+from rig.report.elsewhere_entries import accelerometers_elsewhere
 from rig.report.expanded import expanded, factor_words
-from rig.report.kinds.triad import Words, triad_kind
+from rig.report.kinds.triad import Words, attitude_lines, triad_kind
 from rig.report.told_words import told_from, told_lines
 from rig.report.validity_words import when_words
 from rig.report.when_entry import when_entry
 
 
 def _entries(outcome: Outcome) -> dict[str, AccelerometerEntry]:
-    return {
+    return accelerometers_elsewhere(outcome) | {
         name: accelerometer_entry(
             result,
             found_at=when_entry(of_accelerometer(outcome.recordings, name, (dwell.index for dwell in result.dwells))),
@@ -35,7 +36,8 @@ def _entries(outcome: Outcome) -> dict[str, AccelerometerEntry]:
 
 def _lines(found: AccelerometerEntry) -> Iterator[str]:
     """What stands below the table."""
-    yield f"relative to gravity, {found.gravity_m_s2:.6g} m/s²; {len(found.dwells)} attitudes, {found.sweeps} sweeps"
+    swept = "" if found.laid_down is not None else f", {found.sweeps} sweeps"
+    yield f"relative to gravity, {found.gravity_m_s2:.6g} m/s²; {len(found.dwells)} attitudes{swept}"
     if found.found_at is not None:
         yield f"scale and bias: {when_words(found.found_at)}"
     if found.budget is not None and any(line.name == NONLINEARITY for line in found.budget.contributors):
@@ -44,8 +46,7 @@ def _lines(found: AccelerometerEntry) -> Iterator[str]:
     yield from told_lines(found.told_from)
     skew = triple(np.degrees(found.non_orthogonality_rad), "+.4f")
     yield f"non-orthogonality yz zx xy: {skew} ° (± {skew_known(found)})"
-    off, known = 1e3 * found.attitude_error_rad, 2e3 * found.attitude_error_std_rad
-    yield f"attitude error found: {off:.2f} mrad about each axis (± {known:.2f})"
+    yield from attitude_lines(found, ACCELERATION)
     if found.second_order_s2_m is not None and found.second_order_std_s2_m is not None:
         terms = triple(found.second_order_s2_m, "+.2e")
         widths = expanded(found.second_order_std_s2_m, found.second_order_freedom).widths

@@ -63,7 +63,7 @@ class Parameter:
 class Followed:
     """What one sensor's result in a run is followed by, under the name of a `quantity`.
 
-    `full_scale` is in the unit of its biases, None where the result does not say it.
+    `full_scale` is in the unit of its biases, 0 where the result does not say it.
     """
 
     sensor: str

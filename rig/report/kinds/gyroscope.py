@@ -1,23 +1,25 @@
 """Gyroscopes: scale, bias, axes and g-sensitivity from whole turns (SIX, TRIAX)."""
 
-from collections.abc import Iterator
+from collections.abc import Iterable, Iterator
 
 import numpy as np
 from rich.table import Table
 
 from rig.analysis.outcome import Outcome
 from rig.analysis.when import of_gyroscope
+from rig.data.attitude_entries import InAttitudesRatesEntry
 from rig.data.quantity import RATE
-from rig.data.result_file import BoardEntry, ResultDocument, SensorEntry, VectorEntry
-from rig.data.result_types import ErrorEntry
-from rig.report.axes import decimals, skew_known, triple
+from rig.data.result_file import BoardEntry, ResultDocument, SensorEntry, TimeBaseEntry, VectorEntry
+from rig.data.result_types import ErrorEntry, Role
+from rig.report.axes import decimals, matrix_lines, skew_known, triple
 from rig.report.c_functions import gyroscope_lines
 from rig.report.certificate import dcc_results
 from rig.report.earth_rate import earth_rate_lines
+from rig.report.elsewhere_entries import rates_in_attitudes, turned
 from rig.report.expanded import flat
 from rig.report.kinds.followed import ANGLES, SENSITIVITIES, Followed, known, parameters, scale_and_bias
 from rig.report.kinds.kind import Found, Measured, ResultKind, Shown, Without
-from rig.report.kinds.triad import shown_of, tables
+from rig.report.kinds.triad import item_words, shown_of, tables, unsolved_lines
 from rig.report.sensor_entry import sensor_entry
 from rig.report.told_words import told_from, told_lines
 from rig.report.validity_words import load_words, speed_words, when_words
@@ -28,10 +30,16 @@ def _entries(outcome: Outcome) -> dict[str, SensorEntry]:
     """The entry is there of every run, empty where no sweeps were made."""
     made = {}
     for name, result in outcome.results.items():
+        role: Role = "calibrate" if name in outcome.settings.to_calibrate else "reference"
+        if (elsewhere := outcome.elsewhere.get(name)) is not None:
+            made[name] = sensor_entry(
+                result, role, in_attitudes=rates_in_attitudes(elsewhere), turned=turned(elsewhere)
+            )
+            continue
         held, agreed = of_gyroscope(outcome.recordings, name), outcome.onboard.get(name)
         made[name] = sensor_entry(
             result,
-            "calibrate" if name in outcome.settings.to_calibrate else "reference",
+            role,
             agreed,
             scale_at=when_entry(held.scale),
             bias_at=when_entry(held.bias),
@@ -46,7 +54,7 @@ def _found(document: ResultDocument) -> Iterator[Found[SensorEntry]]:
 
 def _printed(found: Found[SensorEntry]) -> Iterator[Table | str]:
     sensor, reference = found.entry, " (known)" if found.entry.role == "reference" else ""
-    title = f"{found.sensor}{reference}: {sensor.part} {sensor.serial_number}, {sensor.model}, {sensor.estimator}"
+    title = f"{found.sensor}{reference}: {item_words(sensor)}, {sensor.model}, {sensor.estimator}"
     yield from tables(title, RATE, sensor)
     yield from _beside(sensor)
 
@@ -71,7 +79,7 @@ def _followed(found: Found[SensorEntry], document: ResultDocument) -> Followed:
         RATE.name,
         entry.part,
         entry.serial_number,
-        entry.range_rad_s,
+        entry.range_rad_s or 0.0,
         entry.estimator,
         entry.temperature_c,
         known(followed),
@@ -102,12 +110,14 @@ def _beside(sensor: SensorEntry) -> Iterator[str]:
         yield f"scale: {when_words(sensor.scale_at)}"
         yield f"bias: {when_words(sensor.bias_at)}"
     yield from told_lines(sensor.told_from)
+    yield from _in_attitudes(sensor.in_attitudes, sensor.time_bases)
+    yield from _turned(sensor)
     yield from earth_rate_lines(sensor.earth_rate)
     vector = sensor.vector_model
     std = [sensor.covariance[i][i] ** 0.5 for i in range(6)]
     scale, bias = f".{decimals(std[:3])}f", f"+.{decimals(std[3:])}f"
     others = {"vector_model": vector, "six_observation": sensor.six_observation, "algorithm_1": sensor.algorithm_1}
-    for name, other in others.items():
+    for name, other in others.items() if sensor.in_attitudes is None else ():
         if isinstance(other, ErrorEntry):
             yield f"{name}: {other.error}"
         elif other.estimator != sensor.estimator:
@@ -115,9 +125,63 @@ def _beside(sensor: SensorEntry) -> Iterator[str]:
     if sensor.board is not None:
         yield from _on_the_board(sensor.board)
     if not isinstance(vector, ErrorEntry):
-        skew = triple(np.degrees(vector.non_orthogonality_rad), "+.3f")
-        yield f"non-orthogonality yz zx xy: {skew} ° (± {skew_known(vector)})"
+        if sensor.range_rad_s is None and sensor.budget is not None:  # of readings from elsewhere F is what is wanted
+            covariance = np.array(vector.matrix_covariance)[:9, :9]
+            yield from matrix_lines(np.array(vector.matrix), covariance, max(sensor.budget.factors[:3]))
+        else:
+            skew = triple(np.degrees(vector.non_orthogonality_rad), "+.3f")
+            yield f"non-orthogonality yz zx xy: {skew} ° (± {skew_known(vector)})"
         yield from (f"warning: {warning}" for warning in vector.warnings)
+
+
+def _turned(sensor: SensorEntry) -> Iterator[str]:
+    """How sweeps of a file were read, and what was taken as known of them."""
+    if (found := sensor.turned) is None:
+        return
+    rows, sweeps = ", ".join(map(str, found.rows)), len(sensor.observations)
+    yield f"by the angle turned from rest to rest: {len(found.rows)} of {sweeps} sweeps (rows {rows})"
+    yield (
+        f"a turn ends within {1e3 * found.angle_std_rad:.1f} mrad of what is said of it, its axis leans by "
+        f"{1e3 * found.axis_std_rad:.0f} mrad (one standard deviation: angle_std_rad, axis_std_rad)"
+    )
+    if found.widened > 1:
+        yield f"the turns contradict each other by more, and count as {found.widened:.2g} times as uncertain"
+
+
+def _in_attitudes(found: InAttitudesRatesEntry | None, clocks: Iterable[TimeBaseEntry]) -> Iterator[str]:
+    """What attitudes of a file told beside scale and bias."""
+    if found is None:
+        return
+    for clock in clocks:
+        yield (
+            f"the samples' clock on the table's: {clock.offset_s:+.4f} s (± {2e3 * clock.offset_std_s:.2g} ms), "
+            f"{1e6 * clock.drift:+.1f} ppm (± {2e6 * clock.drift_std:.2g}) at {clock.reference_board_s:.1f} s of theirs"
+        )
+    if found.earth_rate_rad_s is None:
+        yield f"Earth's rate: {found.earth_rate_error}; its size, whichever way it points, is in the uncertainty"
+    else:
+        yield f"Earth's rate in table coordinates: {triple(found.earth_rate_rad_s, '+.6g')} rad/s"
+    if (way := found.followed) is not None:
+        yield (
+            f"increments: {way.increments} between attitudes, means over windows of {way.window_s:.3g} s; residuals "
+            f"{1e3 * way.residual_rms_rad:.3g} mrad"
+        )
+        yield (
+            f"found beside: attitudes off by {1e3 * way.fix_std_rad:.2g} mrad a window, angle random walk "
+            f"{way.random_walk_rad_sqrt_s:.2g} rad/√s; from one stretch of the recording to another F differs by "
+            f"{way.matrix_scatter:.1e}, b by {way.bias_scatter_rad_s:.1e} rad/s"
+        )
+        late_ms, known_ms = 1e3 * way.clock_s, 2e3 * way.clock_std_s
+        yield f"the attitudes' clock is {late_ms:+.2f} ± {known_ms:.2g} ms off the samples', which is allowed for"
+        for each in way.left_out:
+            yield f"left out: {each.error}: {each.count} increments, the first at {each.first_s:.2f} s"
+        if way.set_aside:
+            yield f"left out: attitude_untrustworthy: {way.set_aside} increments that contradict all others"
+    for method, other in found.beside.items():
+        if isinstance(other, ErrorEntry):
+            yield f"{method}: {other.error}"
+        else:
+            yield f"{method}: k {triple(other.scale, '.6g')}, b {triple(other.bias_rad_s, '+.6g')} rad/s"
 
 
 def _speeds(sensor: SensorEntry) -> Iterator[str]:
@@ -157,6 +221,7 @@ GYROSCOPE = ResultKind(
     shown=_shown,
     followed=_followed,
     header=gyroscope_lines,
+    unsolved=lambda document: unsolved_lines(document, RATE),
     figures=Without("its residuals are on the certificate and in the notebook"),
     block="gyroscope.html.j2:gyroscope",
     measured=_measured,

@@ -14,7 +14,8 @@ from rig.report.axes import skew_known, triple
 from rig.report.budget_table import assumed_lines
 from rig.report.c_functions import magnetometer_lines
 from rig.report.certificate import dcc_results
-from rig.report.kinds.triad import Words, triad_kind
+from rig.report.elsewhere_entries import magnetometers_elsewhere
+from rig.report.kinds.triad import Words, attitude_lines, triad_kind
 from rig.report.magnetometer_entry import magnetometer_entry
 from rig.report.told_words import told_from, told_lines
 from rig.report.validity_words import when_words
@@ -25,7 +26,7 @@ FAR_ENOUGH_M = 0.3  # from the flange: a housing of 0.2 A m² is 0.4 to 1.2 µT 
 
 
 def _entries(outcome: Outcome) -> dict[str, MagnetometerEntry | ErrorEntry]:
-    return {
+    return magnetometers_elsewhere(outcome) | {
         name: ErrorEntry(error=str(result))
         if isinstance(result, Fault)
         else magnetometer_entry(
@@ -45,13 +46,15 @@ def _lines(found: MagnetometerEntry) -> Iterator[str]:
     yield from assumed_lines(found.budget)
     yield from told_lines(found.told_from)
     yield "iron and currents that turn with it are part of what is found"
-    yield "the arm's own field is in the bias; runs with the sensor turned over tell it apart: rig reversal"
-    yield from _tests(found)
-    yield f"field in the arm's base: {triple(np.multiply(MICROTESLA, found.field_base_t), '+.3f')} µT"
+    base = "table's axes"
+    if found.arm_field_in_bias:
+        base = "arm's base"
+        yield "the arm's own field is in the bias; runs with the sensor turned over tell it apart: rig reversal"
+        yield from _tests(found)
+    yield f"field in the {base}: {triple(np.multiply(MICROTESLA, found.field_base_t), '+.3f')} µT"
     skew = triple(np.degrees(found.non_orthogonality_rad), "+.4f")
     yield f"non-orthogonality yz zx xy: {skew} ° (± {skew_known(found)})"
-    known = "" if found.attitude_error_std_rad is None else f" (± {2e3 * found.attitude_error_std_rad:.2f})"
-    yield f"attitude error found: {1e3 * found.attitude_error_rad:.2f} mrad about each axis{known}"
+    yield from attitude_lines(found, FIELD)
     for method, other in found.beside.items():
         if isinstance(other, ErrorEntry):
             yield f"{method}: {other.error}"

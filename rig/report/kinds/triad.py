@@ -10,6 +10,7 @@ from rich.table import Table
 from rig.analysis.outcome import Outcome
 from rig.data.budget_entries import expanded_uncertainties
 from rig.data.magnetometer_entries import ReversalEntry
+from rig.data.motion_file import NOT_STATED
 from rig.data.quantity import Quantity
 from rig.data.result_file import ResultDocument
 from rig.data.result_types import ErrorEntry
@@ -60,7 +61,7 @@ def followed_of(found: Found[Any], document: ResultDocument, temperature_c: floa
         *scale_and_bias(found.sensor, quantity, entry, bias_of(quantity, entry), document),
         *parameters(ANGLES, entry.non_orthogonality_rad, stds, freedom, "rad"),
     ]
-    full_scale: float = getattr(entry, quantity.named("range"))
+    full_scale: float = getattr(entry, quantity.named("range")) or 0.0
     of = entry.part, entry.serial_number, full_scale, entry.estimator, temperature_c
     return Followed(found.sensor, quantity.name, *of, known(followed))
 
@@ -73,6 +74,37 @@ def tables(title: str, quantity: Quantity, entry: Calibrated) -> Iterator[Table]
     )
     if budget is not None:
         yield budget_table(budget, entry.scale, quantity.bias)
+
+
+def item_words(entry: Any) -> str:
+    """Part and serial number, as far as anybody said."""
+    told = [each for each in (entry.part, entry.serial_number) if each != NOT_STATED]
+    return " ".join(told) or "part and serial number not stated"
+
+
+def attitude_lines(found: Any, quantity: Quantity) -> Iterator[str]:
+    """How far attitudes were found to be off, and where a file told them what laying down did and what was left out."""
+    if found.attitude_error_rad is not None:
+        known = "" if found.attitude_error_std_rad is None else f" (± {2e3 * found.attitude_error_std_rad:.2f})"
+        yield f"attitude error found: {1e3 * found.attitude_error_rad:.2f} mrad about each axis{known}"
+    laid, unit = found.laid_down, quantity.unit
+    if laid is None:
+        return
+    if laid.placement_std is not None:
+        told = f"{laid.placement_std:.2g} ± {2 * laid.placement_uncertainty:.2g} {unit}"
+        beside = f", {laid.rests_elsewhere} rests beside the rows have told of it" if laid.rests_elsewhere else ""
+        yield f"a placement found to change each reading by {told} beside its attitude{beside}"
+        if laid.placement_uncertainty > laid.placement_std / 2:
+            yield "which is hardly told: lay it down in the same attitudes again, and the uncertainty becomes smaller"
+    if laid.rows_left_out:
+        yield f"left out: not_at_rest: {laid.rows_left_out} rows in which the body moves"
+
+
+def unsolved_lines(document: ResultDocument, quantity: Quantity) -> Iterator[str]:
+    """Why readings from elsewhere told nothing of a quantity."""
+    for name, faults in document.unsolved.items():
+        if (fault := faults.get(quantity.name)) is not None:
+            yield f"{name}, {quantity.sensor}, not calibrated: {fault.error}"
 
 
 def triad_kind(
@@ -95,10 +127,11 @@ def triad_kind(
         for name, each in of_all.items():
             if isinstance(each, ErrorEntry):
                 yield f"{beside(name, quantity)}, not calibrated: {each.error}"
+        yield from unsolved_lines(document, quantity)
 
     def printed(each: Found[Any]) -> Iterator[Table | str]:
         entry = each.entry
-        title = f"{beside(each.sensor, quantity)}{words.title}: {entry.part} {entry.serial_number}"
+        title = f"{beside(each.sensor, quantity)}{words.title}: {item_words(entry)}"
         yield from tables(f"{title}, {words.model(entry)}, {entry.estimator}", quantity, entry)
         yield from words.lines(entry)
 

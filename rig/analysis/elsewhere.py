@@ -1,0 +1,256 @@
+"""Readings that were recorded elsewhere, whose motion a file tells: what a run amounts to, and how it is judged. Pure."""
+
+from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import dataclass, replace
+from typing import Literal
+
+import numpy as np
+
+from rig.analysis.attitudes import InAttitudes, Result, known_method, solve_placed
+from rig.analysis.calibration import (
+    ESTIMATORS,
+    Estimator,
+    SensorResult,
+    estimator_among,
+    or_fault,
+    solve_observations,
+    solve_six_observation,
+    solve_vector,
+)
+from rig.analysis.correction import diagonal_correction, matrix_correction
+from rig.analysis.increments import InIncrements
+from rig.analysis.verdict import Check
+from rig.data.meaning import Meaning
+from rig.data.motion_file import Item, ReadElsewhere
+from rig.data.quantity import RATE, Quantity
+from rig.data.settings import RunSettings
+from rig.errors import Fault, Refused
+from rig.estimation import known_turns, triaxial
+from rig.estimation.arrays import Array
+from rig.estimation.budget import Budget, Contributor
+from rig.estimation.coverage import effective_freedom
+from rig.estimation.estimate import Estimate
+from rig.estimation.known_turns import BIAS, NOISE, TurnedSolution, solve_turned
+from rig.estimation.reference_budget import scale_and_bias_covariance
+from rig.estimation.reference_model import BIAS as OFFSET
+from rig.estimation.reference_model import F
+from rig.estimation.sensor_axes import angle_jacobian, nearest_rotation, non_orthogonality
+from rig.estimation.triaxial import UNTRUSTWORTHY_RAD
+from rig.estimation.vector_model import VectorSolution
+from rig.observation.attitude_import import placed_by
+from rig.observation.csv_import import ExternalData, averaged
+from rig.observation.csv_samples import Samples, samples_in
+from rig.observation.timebase import TimeBase
+from rig.observation.turns import TurnedData
+
+BySweeps = Estimator | Literal["increments"]
+BY_SWEEPS: tuple[BySweeps, ...] = (*ESTIMATORS, "increments")
+FROM_READINGS = "scatter of the readings"
+OTHER_SIGN = np.diag([1.0, 1.0, 1.0, -1.0, -1.0, -1.0])  # of a bias: m = F ω + b there, g = K (m + b) of gyroscopes
+NO_PUBLISHED = Fault("not_solved", "the attitudes tell no sweeps", "Give sweeps in six directions")
+
+
+@dataclass(frozen=True, slots=True)
+class OfSensor:
+    """What the readings of an `item` gave: its `gyroscope`, what `rates` in attitudes told, what was found `at_rest`.
+
+    `unsolved` says why of other quantities that were recorded; `turned` are the turns it was solved by, from rest to
+    rest.
+    """
+
+    item: Item
+    gyroscope: SensorResult | None
+    rates: Result | None
+    at_rest: Mapping[Quantity, InAttitudes]
+    unsolved: Mapping[Quantity, Fault]
+    turned: TurnedData | None = None
+
+
+def solved_elsewhere(read: ReadElsewhere, settings: RunSettings, estimator: str | None) -> OfSensor:
+    """What readings gave of whose motion a file tells; `estimator` None takes what suits.
+
+    Raises Refused `unknown_estimator`; Fault as the observers do, and where no quantity has a solution what the
+    estimator does, or of several `nothing_solved` with every reason.
+    """
+    found = _by_sweeps(read, estimator) if read.tells == "sweeps" else _by_attitudes(read, settings, estimator)
+    if found.gyroscope is None and not found.at_rest:
+        raise _nothing_solved(found.unsolved)
+    return found
+
+
+def checks_elsewhere(name: str, found: OfSensor) -> Iterator[Check]:
+    """What the solves refuse beyond: equations that do not tell the parameters apart, attitudes not to be believed.
+
+    No configuration states limits of anything else.
+    """
+    if (gyroscope := found.gyroscope) is not None:
+        largest = triaxial.MAX_CONDITION if found.rates is not None else known_turns.MAX_CONDITION
+        yield _fit(name, RATE, "condition", gyroscope.solution.condition, largest, "1")
+    for quantity, result in found.at_rest.items():
+        yield _fit(name, quantity, "condition", result.solution.condition, triaxial.MAX_CONDITION, "1")
+        if (error := result.solution.attitude_error) is not None:
+            yield _fit(name, quantity, "attitude_error", error.std_rad, UNTRUSTWORTHY_RAD, "rad")
+
+
+def _by_sweeps(read: ReadElsewhere, name: str | None) -> OfSensor:
+    chosen = None if name is None else estimator_among(BY_SWEEPS, name)
+    data = averaged(_samples(read), read.motion)
+    solution = solve_swept(data, chosen)
+    vector = solution if isinstance(solution, VectorSolution | TurnedSolution) else or_fault(lambda: _vector(data))
+    gyroscope = SensorResult(
+        sensor=read.item,
+        solution=solution,
+        vector_model=vector,
+        explained=None,
+        uncertainty=budget_of(solution, data),
+        # Three sweeps may do for the vector model, not for the six observations.
+        six_observation=or_fault(lambda: solve_six_observation(data.sweeps, "newton")),
+        algorithm_1=or_fault(lambda: solve_six_observation(data.sweeps, "algorithm_1")),
+        observations=data.sweeps,
+        rests=data.rests,
+        time_bases=(),
+        corrected_by=(
+            matrix_correction(solution)
+            if isinstance(solution, VectorSolution | TurnedSolution)
+            else diagonal_correction(solution.scale)
+        ),
+    )
+    by_turns = data.turned if isinstance(solution, TurnedSolution) else None
+    return OfSensor(read.item, gyroscope, None, {}, {}, by_turns)
+
+
+def solve_swept(data: ExternalData, estimator: BySweeps | None) -> Estimate:
+    """Solves by `estimator`; None takes "increments" where the body was turned from rest to rest, else "vector".
+
+    Raises Fault as the estimators do, and `no_turns`.
+    """
+    if estimator is None:
+        estimator = "vector" if data.turned is None else "increments"
+    if estimator != "increments":
+        return solve_observations(data.sweeps, estimator, data.rests)
+    if data.turned is None:
+        raise Fault(
+            "no_turns",
+            "no row of the sweeps has an angle and begins and ends at rest",
+            "Let the body lie still for a second before and after each turn, and give angle_rad; or use vector",
+        )
+    start, turned = _vector(data), data.turned
+    return solve_turned(turned.gyroscope, turned.turns, turned.means, start.matrix, start.bias_rad_s)
+
+
+def budget_of(solution: Estimate, data: ExternalData) -> Budget:
+    """What its covariance is made of: of means nothing but their scatter."""
+    if data.turned is None or not isinstance(solution, TurnedSolution):
+        freedom = _noise_freedom(solution, data)
+        return Budget((Contributor(NOISE, "A", "normal", None, "", FROM_READINGS, freedom, solution.covariance),))
+    known = {NOISE: float(data.turned.noise_freedom), BIAS: float(data.turned.bias_freedom)}
+    lines = solution.budget.contributors
+    return Budget(tuple(replace(line, freedom=known.get(line.name, line.freedom)) for line in lines))
+
+
+def _noise_freedom(solution: Estimate, data: ExternalData) -> float:
+    """The noise's fewest degrees of freedom: by how the vector model weighs the means, else the fewest of any mean."""
+    averages = [*(sweep.average for sweep in data.sweeps), *data.rests]
+    freedom = np.array([np.broadcast_to(each.freedom, 3) for each in averages])
+    if not isinstance(solution, VectorSolution):
+        return float(freedom.min())
+    parts: Array = solution.response**2 * np.array([each.variance_rad2_s2 for each in averages])
+    return float(effective_freedom(parts.reshape(6, -1).T, freedom.reshape(-1, 1)).min())
+
+
+def _vector(data: ExternalData) -> VectorSolution:
+    return solve_vector(data.sweeps, data.rests)
+
+
+def _by_attitudes(read: ReadElsewhere, settings: RunSettings, name: str | None) -> OfSensor:
+    method, site, asked = known_method(name), settings.site, settings.elsewhere
+    if site is None or asked is None:
+        raise Refused("no_site", "the recording does not say where it was made", "Make it anew from the two files")
+    placed = placed_by(_samples(read), read.motion, find_clock=asked.find_clock)
+    found = solve_placed(placed, site, asked, method, second_order=settings.second_order)
+    clock, rates = placed.clock, found.get(RATE)
+    return OfSensor(
+        read.item,
+        gyroscope=None if rates is None or isinstance(rates, Fault) else _gyroscope(read.item, rates, clock),
+        rates=None if isinstance(rates, Fault) else rates,
+        at_rest={each: result for each, result in found.items() if each != RATE and isinstance(result, InAttitudes)},
+        unsolved={each: result for each, result in found.items() if isinstance(result, Fault)},
+    )
+
+
+def _samples(read: ReadElsewhere) -> Samples:
+    return samples_in(read.readings, "the recording")
+
+
+def _gyroscope(item: Item, found: Result, clock: TimeBase | None) -> SensorResult:
+    """A gyroscope in attitudes as one that was swept is described."""
+    solution = _as_swept(found)
+    return SensorResult(
+        sensor=item,
+        solution=solution,
+        vector_model=solution,
+        explained=None,
+        uncertainty=solution.budget,
+        six_observation=NO_PUBLISHED,
+        algorithm_1=NO_PUBLISHED,
+        observations=(),
+        rests=(),
+        time_bases=() if clock is None else (clock,),
+        corrected_by=matrix_correction(solution),
+    )
+
+
+def _as_swept(found: Result) -> TurnedSolution:
+    """F and b of m = F ω + b as g = K (m + b) has them, with what the covariance is made of."""
+    solution, matrix = found.solution, found.solution.matrix
+    scale = 1 / np.linalg.norm(matrix, axis=1)
+    axes = scale[:, None] * matrix
+    mounting = nearest_rotation(axes)
+    to_angles = angle_jacobian(axes, scale, mounting)
+    of_matrix = np.r_[F, OFFSET]
+    lines = tuple(
+        replace(line, covariance=OTHER_SIGN @ line.covariance @ OTHER_SIGN) for line in found.budget.contributors
+    )
+    if isinstance(found, InIncrements):
+        observations, rank = len(found.solution.residuals_rad), 12
+        warnings: tuple[str, ...] = ()
+        residuals, estimator = np.zeros((0, 3)), "increments"
+    else:
+        of_rows = found.solution
+        observations, rank, warnings = of_rows.observations, of_rows.rank, of_rows.warnings
+        residuals, estimator = of_rows.residuals, str(of_rows.method)
+    return TurnedSolution(
+        scale=scale,
+        bias_rad_s=-solution.bias,
+        covariance=OTHER_SIGN @ scale_and_bias_covariance(matrix, scale, solution.covariance) @ OTHER_SIGN,
+        matrix=matrix,
+        matrix_covariance=solution.covariance[np.ix_(of_matrix, of_matrix)],
+        non_orthogonality_rad=non_orthogonality(axes),
+        mounting=mounting,
+        angles_covariance_rad2=to_angles @ solution.covariance[F, F] @ to_angles.T,
+        residuals_rad_s=residuals,
+        widened=1.0,
+        budget=Budget(lines),
+        observations=observations,
+        rank=rank,
+        condition=solution.condition,
+        iterations=solution.iterations,
+        warnings=warnings,
+        estimator=estimator,
+    )
+
+
+def _fit(sensor: str, quantity: Quantity, what: str, value: float, limit: float, unit: str) -> Check:
+    called = f"{sensor}.{what}" if quantity == RATE else f"{sensor}.{quantity}_{what}"
+    return Check(called, value, limit, unit, Meaning("fitness", sensor, quantity.name))
+
+
+def _nothing_solved(unsolved: Mapping[Quantity, Fault]) -> Fault | Refused:
+    """Every reason, each with its own remedy; the only one as it is."""
+    faults: Sequence[Fault] = list(unsolved.values())
+    if len(faults) == 1:
+        return faults[0]
+    reasons = "; ".join(f"{quantity}: {str(fault).rstrip('.')}" for quantity, fault in unsolved.items())
+    return Refused(
+        "nothing_solved", f"no sensor has a solution: {reasons}", "Do what is said of the sensor that is wanted"
+    )

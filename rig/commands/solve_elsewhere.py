@@ -1,0 +1,159 @@
+"""`rig solve SAMPLES.csv --sweeps|--attitudes FILE`: readings made elsewhere go the way of a run."""
+
+import sys
+from argparse import ArgumentParser, Namespace
+from datetime import UTC, datetime
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+from rig.commands.named_history import add_history, named_history
+from rig.data.motion_file import NOT_STATED
+from rig.errors import Refused, raised_as
+from rig.estimation.earth import STANDARD_GRAVITY_M_S2
+from rig.station.plain_text import say
+
+if TYPE_CHECKING:
+    from rig.analysis.outcome import Outcome
+    from rig.commands.remember import Beside
+    from rig.data.run_file import RunData
+
+AXES = ("+x", "-x", "+y", "-y", "+z", "-z")
+
+
+def add(solve: ArgumentParser) -> None:
+    """The arguments of readings that were made elsewhere."""
+    group = solve.add_argument_group("with --sweeps or --attitudes")
+    group.add_argument("--out", type=Path, metavar="DIR", help="a new run folder for result, certificate, pictures")
+    add_history(group)
+    group.add_argument("--name", default="imu", metavar="NAME", help="what the sensor is called (default: imu)")
+    group.add_argument("--part", default=NOT_STATED, metavar="PART", help="which part it is")
+    group.add_argument("--serial-number", default=NOT_STATED, metavar="NUMBER", help="a history needs it")
+    group.add_argument(
+        "--recorded",
+        type=datetime.fromisoformat,
+        metavar="TIME",
+        help="when the readings were made (2026-11-25T08:30, UTC); left out, when their file was last written",
+    )
+    place = solve.add_argument_group("with --attitudes")
+    place.add_argument(
+        "--gravity-m-s2",
+        type=float,
+        default=STANDARD_GRAVITY_M_S2,
+        metavar="G",
+        help="size of gravity at the place (default: the standard 9.80665); scale factors are relative to it",
+    )
+    place.add_argument(
+        "--up", default="+z", choices=AXES, help="axis of the table that points upwards, roughly (default: +z)"
+    )
+    place.add_argument("--field-t", type=float, metavar="B", help="size of the magnetic field, for a magnetometer")
+    place.add_argument("--field-upwards", action="store_true", help="the magnetic field rises from the ground")
+    place.add_argument("--any-mounting", action="store_true", help="the sensor's axes need not lie along the body's")
+    place.add_argument(
+        "--find-clock",
+        action="store_true",
+        help="the attitudes are on a clock of their own: find it by the turning that both files show",
+    )
+    place.add_argument(
+        "--exact-rates",
+        action="store_true",
+        help="the attitudes' rates are exact, as a rate table's are: solve the gyroscope by them, not by increments",
+    )
+    place.add_argument(
+        "--window-s",
+        type=float,
+        metavar="SECONDS",
+        help="over which attitudes are averaged for a gyroscope's increments (default: 1, less for short recordings)",
+    )
+    place.add_argument("--second-order", action="store_true", help="find the accelerometer's second-order terms too")
+
+
+def run(options: Namespace) -> int:
+    """Solve the two files and print the result; with `--out` a run folder too, entered in the history.
+
+    Returns 0, or 1 where a check of the solves failed. Raises Refused `bad_option`, `run_folder`, as
+    `recorded_in_files`, `not_through` a link, and whatever the solve finds wrong.
+    """
+    from rig.analysis.outcome import calibrated
+    from rig.commands.remember import print_beside
+    from rig.report.document import document_of
+    from rig.report.table import print_outcome
+
+    with raised_as(Refused):  # nothing runs here: whatever is wrong with the data, no arm had to be stopped for it
+        recording = _recording(options)
+        outcome = calibrated([recording])
+    beside = () if options.out is None else _kept(options, recording, outcome)
+    print_outcome(document_of(outcome), as_json=options.json)
+    if not options.json:
+        print_beside(beside)
+    return 0 if outcome.passed else 1
+
+
+def _recording(options: Namespace) -> "RunData":
+    import numpy as np
+
+    from rig.data.checked import checked
+    from rig.data.motion_file import Item
+    from rig.data.settings import Elsewhere, Site
+    from rig.observation.from_files import Files, recorded_in_files
+
+    for name in ("gravity_m_s2", "field_t", "window_s"):
+        value: float | None = getattr(options, name)
+        if value is not None and not 0 < value < float("inf"):
+            option = f"--{name.replace('_', '-')}"
+            raise Refused("bad_option", f"{option} is {value:g}", "Give its size, in SI units")
+    sign, axis = options.up
+    x, y, z = ((1.0 if sign == "+" else -1.0) * np.eye(3)["xyz".index(axis)]).tolist()
+    item = {"name": options.name, "part": options.part, "serial_number": options.serial_number}
+    try:
+        told = checked(Item, item, "sensor")
+    except ValueError as error:
+        raise Refused("bad_option", str(error), "Give names of letters and digits, of 40 characters at most") from None
+    recorded: datetime | None = options.recorded
+    if recorded is not None and recorded.tzinfo is None:
+        recorded = recorded.replace(tzinfo=UTC)
+    by_sweeps = options.sweeps is not None
+    motion: Path = options.sweeps if by_sweeps else options.attitudes
+    return recorded_in_files(
+        Files(options.run, motion, "sweeps" if by_sweeps else "attitudes", told, recorded),
+        Site(
+            up=(x, y, z),
+            gravity_m_s2=options.gravity_m_s2,
+            earth_rate_rad_s=None,
+            magnetic_field_t=options.field_t,
+            magnetic_field_upwards=options.field_upwards,
+        ),
+        Elsewhere(
+            any_mounting=options.any_mounting,
+            find_clock=options.find_clock,
+            exact_rates=options.exact_rates,
+            window_s=options.window_s,
+            estimator=options.estimator,
+        ),
+        second_order=options.second_order,
+    )
+
+
+def _kept(options: Namespace, recording: "RunData", outcome: "Outcome") -> "tuple[Beside, ...]":
+    """Write the run folder and enter it in the history; its calibrations beside the ones before."""
+    from rig.commands.remember import remember_own
+    from rig.data.run_file import write_elsewhere
+    from rig.data.run_folder import empty_folder, next_recording
+    from rig.report.writers import write_outcome
+    from rig.station.events import RunFolderWritten
+    from rig.station.view import PlainView
+
+    folder, tell = empty_folder(options.out), PlainView().event
+    try:
+        write_elsewhere(next_recording(folder, "raw"), recording)
+        for event in write_outcome(folder, outcome):
+            tell(event)
+    except OSError as error:
+        raise Refused("run_folder", f"{folder} cannot be written: {error}", "Choose another with --out") from error
+    tell(RunFolderWritten(folder))
+    if options.serial_number == NOT_STATED:
+        say("rig: entered in no history: nobody said whose readings these are (--serial-number)", sys.stderr)
+        return ()
+    entered, beside = remember_own(folder, named_history(options.history))
+    if entered is not None:
+        tell(entered)
+    return beside

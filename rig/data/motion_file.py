@@ -1,0 +1,90 @@
+"""Readings that were recorded elsewhere, and how they were moved, as a file of whoever turned the sensor tells it."""
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+from types import MappingProxyType
+from typing import Annotated, Final, Literal
+
+import numpy as np
+from numpy.typing import NDArray
+from pydantic import Field
+
+from rig.config.section import SensorName
+from rig.data.quantity import QUANTITIES
+
+Told = Literal["sweeps", "attitudes"]
+Columns = Mapping[str, NDArray[np.float64]]
+
+NOT_STATED: Final = "not stated"
+ItemWord = Annotated[str, Field(min_length=1, max_length=40)]
+TIME, TEMPERATURE = "time_s", "temperature_c"
+
+
+@dataclass(frozen=True, slots=True)
+class Header:
+    """The columns of a file: those `needed`, those of which there is `one_of`, groups of others that may be there."""
+
+    needed: tuple[str, ...]
+    one_of: tuple[str, ...] = ()
+    optional: tuple[tuple[str, ...], ...] = ()
+
+    def check(self, columns: Columns) -> None:
+        """Raises ValueError for columns that are no such file's."""
+        known = {*self.needed, *self.one_of, *(name for group in self.optional for name in group)}
+        missing = [name for name in self.needed if name not in columns]
+        if missing or columns.keys() - known or (self.one_of and not columns.keys() & set(self.one_of)):
+            raise ValueError(f"its columns are {', '.join(columns)}")
+
+
+SAMPLES: Final = Header((TIME,), (), (*(each.columns for each in QUANTITIES.values()), (TEMPERATURE,)))
+MOTIONS: Final[Mapping[Told, Header]] = MappingProxyType(
+    {
+        "sweeps": Header(
+            ("start_s", "end_s", "axis_x", "axis_y", "axis_z"),
+            ("speed_rad_s", "angle_rad"),
+            (("angle_std_rad",), ("axis_std_rad",)),
+        ),
+        "attitudes": Header(
+            ("start_s", "end_s", "qw", "qx", "qy", "qz"),
+            (),
+            (("rate_x_rad_s", "rate_y_rad_s", "rate_z_rad_s"), ("attitude_std_rad",)),
+        ),
+    }
+)
+
+
+@dataclass(frozen=True, slots=True)
+class Item:
+    """The sensor that was read, as far as anybody said."""
+
+    name: SensorName
+    part: ItemWord = NOT_STATED
+    serial_number: ItemWord = NOT_STATED
+
+    @property
+    def range_rad_s(self) -> None:
+        """Nobody said in which range it was read."""
+        return
+
+    @property
+    def mounting(self) -> NDArray[np.float64]:
+        """(3, 3) how it sits on the body that is moved: the file tells the motion in the sensor's own axes, or nearly."""
+        return np.eye(3)
+
+
+@dataclass(frozen=True, slots=True)
+class ReadElsewhere:
+    """The `readings` (n,) of an item, and the rows (N,) of sweeps or of attitudes that tell its `motion`, by column."""
+
+    item: Item
+    readings: Columns
+    tells: Told
+    motion: Columns
+
+
+@dataclass(frozen=True, slots=True)
+class ToldElsewhere:
+    """What a run file says of readings from elsewhere beside their tables."""
+
+    item: Item
+    tells: Told

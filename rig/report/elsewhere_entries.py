@@ -1,0 +1,194 @@
+"""Entries of `result.json` for readings recorded elsewhere: what attitudes of a file told."""
+
+from collections.abc import Mapping
+from typing import Any
+
+import numpy as np
+
+from rig.analysis.attitudes import InAttitudes, Result
+from rig.analysis.elsewhere import OfSensor
+from rig.analysis.increments import InIncrements
+from rig.analysis.outcome import Outcome
+from rig.data.accelerometer_entries import AccelerometerEntry, DwellEntry, InAttitudesEntry
+from rig.data.attitude_entries import BesideEntry, FollowedEntry, InAttitudesRatesEntry, LeftOutEntry, TurnedEntry
+from rig.data.magnetometer_entries import FieldDwellEntry, FieldSolutionEntry, MagnetometerEntry
+from rig.data.motion_file import Item
+from rig.data.quantity import ACCELERATION, FIELD, Quantity
+from rig.data.result_types import ErrorEntry, LaidDownEntry
+from rig.data.settings import Site
+from rig.errors import Fault
+from rig.estimation import accelerometer, magnetometer
+from rig.estimation.reference_budget import scale_and_bias_covariance
+from rig.estimation.reference_model import F
+from rig.estimation.residuals import attitude_residual_std
+from rig.estimation.sensor_axes import angle_jacobian, nearest_rotation, non_orthogonality
+from rig.estimation.triaxial import TriaxialSolution
+from rig.report.axes import PARAMETERS, dwell_entry
+from rig.report.budget_entry import budget_entry
+from rig.report.entry import entry
+
+
+def accelerometers_elsewhere(outcome: Outcome) -> dict[str, AccelerometerEntry]:
+    """The accelerometers that were calibrated in attitudes of a file."""
+    return {
+        name: _at_rest(AccelerometerEntry, ACCELERATION, item, result,
+            role="calibrate",
+            model=accelerometer.MODEL,
+            gravity_m_s2=site.gravity_m_s2,
+            second_order_s2_m=result.solution.second_order,
+            second_order_std_s2_m=_second_order_std(result.solution),
+            reference_m_s2=result.solution.reference,
+            lever_arm_m=None, lever_arm_std_m=None, delay_s=None, delay_std_s=None, alignment=None, held_out=None,
+            sweeps=0,
+            temperature_c=None,
+            dwells=_dwells(DwellEntry, ACCELERATION, result),
+            beside=_beside(InAttitudesEntry, ACCELERATION, result),
+        )
+        for name, item, site, result in _placed(outcome, ACCELERATION)
+    }  # fmt: skip
+
+
+def magnetometers_elsewhere(outcome: Outcome) -> dict[str, MagnetometerEntry]:
+    """The magnetometers that were calibrated in attitudes of a file."""
+    return {
+        name: _at_rest(MagnetometerEntry, FIELD, item, result,
+            model=magnetometer.MODEL,
+            arm_field_in_bias=False,
+            field_t=site.magnetic_field_t,
+            field_base_t=result.solution.reference,
+            hard_iron_t=np.linalg.solve(result.solution.matrix, result.solution.bias),
+            dwells=_dwells(FieldDwellEntry, FIELD, result),
+            beside=_beside(FieldSolutionEntry, FIELD, result),
+        )
+        for name, item, site, result in _placed(outcome, FIELD)
+    }  # fmt: skip
+
+
+def unsolved(outcome: Outcome) -> dict[str, dict[str, ErrorEntry]]:
+    """Why quantities that were recorded have no solution, by sensor; those without any left out."""
+    told = {
+        name: {quantity.name: ErrorEntry(error=str(fault)) for quantity, fault in found.unsolved.items()}
+        for name, found in outcome.elsewhere.items()
+    }
+    return {name: faults for name, faults in told.items() if faults}
+
+
+def rates_in_attitudes(found: OfSensor) -> InAttitudesRatesEntry | None:
+    """What attitudes tell of a gyroscope beside scale and bias; None where it was swept."""
+    if found.rates is None:
+        return None
+    earth = _earth_rate(found.rates)
+    return InAttitudesRatesEntry.model_validate(
+        {
+            "earth_rate_rad_s": None if isinstance(earth, Fault) else earth.tolist(),
+            "earth_rate_error": str(earth) if isinstance(earth, Fault) else None,
+            "followed": _followed(found.rates) if isinstance(found.rates, InIncrements) else None,
+            "beside": {} if isinstance(found.rates, InIncrements) else _rates_beside(found.rates),
+        }
+    )
+
+
+def turned(found: OfSensor) -> TurnedEntry | None:
+    """What the turns were taken for that a gyroscope was solved by; None where means of sweeps or attitudes told it."""
+    if found.turned is None or found.gyroscope is None:
+        return None
+    turns = found.turned.turns
+    return TurnedEntry(
+        rows=found.turned.rows,
+        angle_std_rad=max(turn.angle_std_rad for turn in turns),
+        axis_std_rad=max(turn.axis_std_rad for turn in turns),
+        widened=getattr(found.gyroscope.solution, "widened", 1.0),
+    )
+
+
+def _earth_rate(found: Result) -> Any:
+    """(3,) rad/s in the axes of the table, or the Fault for which it is not known."""
+    if isinstance(found, InIncrements):
+        earth = found.solution.earth
+        return earth if isinstance(earth, Fault) else earth.rate_rad_s
+    return found.solution.reference if found.reference_fault is None else found.reference_fault
+
+
+def _followed(found: InIncrements) -> FollowedEntry:
+    residuals = found.solution.residuals_rad
+    return entry(
+        FollowedEntry, found.solution, found,
+        increments=len(residuals),
+        residual_rms_rad=float(np.sqrt(np.mean(residuals**2))),
+        left_out=[LeftOutEntry(error=each.name, count=each.count, first_s=each.first_s) for each in found.left_out],
+    )  # fmt: skip
+
+
+def _rates_beside(found: InAttitudes) -> dict[str, BesideEntry | ErrorEntry]:
+    return {
+        method: ErrorEntry(error=str(other))
+        if isinstance(other, Fault)
+        else entry(BesideEntry, other, scale=_scale(other), bias_rad_s=-other.bias)
+        for method, other in found.beside.items()
+    }
+
+
+def _placed(outcome: Outcome, quantity: Quantity) -> list[tuple[str, Item, Site, InAttitudes]]:
+    site = outcome.settings.site
+    return [
+        (name, found.item, site, found.at_rest[quantity])
+        for name, found in outcome.elsewhere.items()
+        if site is not None and quantity in found.at_rest
+    ]
+
+
+def _at_rest(kind: Any, quantity: Quantity, item: Item, found: InAttitudes, **own: Any) -> Any:
+    """What the entries of accelerometers and magnetometers share, each in the unit of its quantity."""
+    solution, error, laid = found.solution, found.solution.attitude_error, found.laid
+    scale = _scale(solution)
+    axes = solution.matrix * scale[:, None]
+    angles = angle_jacobian(axes, scale, nearest_rotation(axes))
+    return entry(
+        kind, solution,
+        part=item.part,
+        serial_number=item.serial_number,
+        estimator=solution.method,
+        scale=scale,
+        covariance=scale_and_bias_covariance(solution.matrix, scale, solution.covariance),
+        covariance_order=PARAMETERS,
+        covariance_units=quantity.parameter_units,
+        covariance_combined=found.budget.covariance,
+        budget=budget_entry(found.budget),
+        non_orthogonality_rad=non_orthogonality(axes),
+        non_orthogonality_std_rad=np.sqrt(np.diag(angles @ solution.covariance[F, F] @ angles.T))[:3],
+        attitude_error_rad=None if error is None else error.std_rad,
+        attitude_error_std_rad=error.uncertainty_rad if error is not None and np.isfinite(error.uncertainty_rad) else None,
+        correction_matrix=nearest_rotation(axes) @ np.linalg.inv(solution.matrix),
+        laid_down=LaidDownEntry(
+            placement_std=None if laid is None else laid.placement_std,
+            placement_uncertainty=None if laid is None else laid.placement_uncertainty,
+            rests_elsewhere=found.elsewhere,
+            rows_left_out=found.moving,
+        ),
+        **{quantity.named("bias"): solution.bias},
+        **own,
+    )  # fmt: skip
+
+
+def _dwells(kind: Any, quantity: Quantity, found: InAttitudes) -> list[Any]:
+    assert found.seen is not None, "of placements"
+    expected = attitude_residual_std(found.solution, found.seen)
+    rows = zip(found.dwells, found.solution.residuals, expected, strict=True)
+    return [dwell_entry(kind, quantity, *each) for each in rows]
+
+
+def _beside(kind: Any, quantity: Quantity, found: InAttitudes) -> Mapping[str, Any]:
+    return {
+        method: ErrorEntry(error=str(other))
+        if isinstance(other, Fault)
+        else entry(kind, other, scale=_scale(other), **{quantity.named("bias"): other.bias})
+        for method, other in found.beside.items()
+    }
+
+
+def _second_order_std(solution: TriaxialSolution) -> Any:
+    return None if solution.second_order is None else np.sqrt(np.diag(solution.covariance)[15:18])
+
+
+def _scale(solution: TriaxialSolution) -> Any:
+    return 1 / np.linalg.norm(solution.matrix, axis=1)
