@@ -1,4 +1,4 @@
-"""Readings that were recorded elsewhere, whose motion a file tells: what a run amounts to, and how it is judged. Pure."""
+"""Readings recorded elsewhere, whose motion a file tells: what they give, and by what that is judged. Pure."""
 
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
@@ -85,11 +85,11 @@ def checks_elsewhere(name: str, found: OfSensor) -> Iterator[Check]:
     """
     if (gyroscope := found.gyroscope) is not None:
         largest = triaxial.MAX_CONDITION if found.rates is not None else known_turns.MAX_CONDITION
-        yield _fit(name, RATE, "condition", gyroscope.solution.condition, largest, "1")
+        yield _fit(name, RATE, "condition", gyroscope.solution.condition, largest)
     for quantity, result in found.at_rest.items():
-        yield _fit(name, quantity, "condition", result.solution.condition, triaxial.MAX_CONDITION, "1")
+        yield _fit(name, quantity, "condition", result.solution.condition, triaxial.MAX_CONDITION)
         if (error := result.solution.attitude_error) is not None:
-            yield _fit(name, quantity, "attitude_error", error.std_rad, UNTRUSTWORTHY_RAD, "rad")
+            yield _fit(name, quantity, "attitude_error", error.std_rad, UNTRUSTWORTHY_RAD, unit="rad")
 
 
 def _by_sweeps(read: ReadElsewhere, name: str | None) -> OfSensor:
@@ -240,7 +240,7 @@ def _as_swept(found: Result) -> TurnedSolution:
     )
 
 
-def _fit(sensor: str, quantity: Quantity, what: str, value: float, limit: float, unit: str) -> Check:
+def _fit(sensor: str, quantity: Quantity, what: str, value: float, limit: float, *, unit: str = "1") -> Check:
     called = f"{sensor}.{what}" if quantity == RATE else f"{sensor}.{quantity}_{what}"
     return Check(called, value, limit, unit, Meaning("fitness", sensor, quantity.name))
 

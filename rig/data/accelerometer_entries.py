@@ -78,7 +78,7 @@ class AccelerometerEntry(Entry):
     - `found_at`: when scale and bias were read, and how warm it was then; `temperature_c` is that
       temperature, in results of before the mean over the dwells.
     - `…_freedom`: degrees of freedom of the standard deviations of that name, null where they have no end.
-    - `laid_down`: where a file told the attitudes, and no arm held them; nobody told its range and its temperature then.
+    - `laid_down`: where a file told the attitudes, and no arm held them; nobody told range and temperature then.
     - `correction_matrix` is M of s = M (a − b), first order: in the frame of the gyroscope's corrected rates (whole
       matrix) where there is an `alignment`, else in the right-angled frame nearest to the accelerometer's own axes.
     """

@@ -68,7 +68,7 @@ class Item:
 
     @property
     def mounting(self) -> NDArray[np.float64]:
-        """(3, 3) how it sits on the body that is moved: the file tells the motion in the sensor's own axes, or nearly."""
+        """(3, 3) how it sits on the body that is moved: what the file tells is taken for the sensor's own axes."""
         return np.eye(3)
 
 

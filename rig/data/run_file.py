@@ -131,8 +131,8 @@ class RunData:
     """A run file in memory: `samples` (n,) by name of a sensor, SAMPLE_DTYPE or IMU_SAMPLE_DTYPE, or of one of the
     `magnetometers`, FIELD_SAMPLE_DTYPE; `arm` (n,) ARM_STATE_DTYPE; events in order.
 
-    `settings` say what it is judged by; `config` is the configuration's text, for people. Readings from `elsewhere` have
-    neither samples of the rig's own nor an arm.
+    `settings` say what it is judged by; `config` is the configuration's text, for people. Readings from `elsewhere`
+    have neither samples of the rig's own nor an arm.
     """
 
     config: str

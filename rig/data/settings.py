@@ -287,7 +287,10 @@ def settings_from_json(text: str) -> RunSettings:
     schema = document.get("schema") if isinstance(document, dict) else None
     if schema not in SCHEMAS:
         raise ValueError(f"the schema of its settings is {quote(schema)}, not {SCHEMA!r}")
-    return checked(RunSettings, document, "settings")
+    settings = checked(RunSettings, document, "settings")
+    if settings.elsewhere is None and (settings.limits is None or not settings.home_q_rad):
+        raise ValueError("its settings have no limits or no home_q_rad, which those of a run have")
+    return settings
 
 
 def settings_of(config: "RigConfig", plan: "Plan") -> RunSettings:

@@ -41,7 +41,7 @@ def read_samples(path: Path, needed: Sequence[Quantity] = ()) -> Samples:
 
 
 def samples_in(table: Columns, where: str) -> Samples:
-    """The readings that columns (n,) hold, `where` they stand. Raises Refused `wrong_columns`, `time_not_increasing`."""
+    """The readings of columns (n,), said to stand `where`. Raises Refused `wrong_columns`, `time_not_increasing`."""
     given = [each for each in QUANTITIES.values() if each.columns[0] in table]
     if not given:
         known = ", or ".join(" ".join(each.columns) for each in QUANTITIES.values())

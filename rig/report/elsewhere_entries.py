@@ -157,7 +157,8 @@ def _at_rest(kind: Any, quantity: Quantity, item: Item, found: InAttitudes, **ow
         non_orthogonality_rad=non_orthogonality(axes),
         non_orthogonality_std_rad=np.sqrt(np.diag(angles @ solution.covariance[F, F] @ angles.T))[:3],
         attitude_error_rad=None if error is None else error.std_rad,
-        attitude_error_std_rad=error.uncertainty_rad if error is not None and np.isfinite(error.uncertainty_rad) else None,
+        attitude_error_std_rad=error.uncertainty_rad if error is not None and np.isfinite(error.uncertainty_rad)
+        else None,
         correction_matrix=nearest_rotation(axes) @ np.linalg.inv(solution.matrix),
         laid_down=LaidDownEntry(
             placement_std=None if laid is None else laid.placement_std,

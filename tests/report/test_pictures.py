@@ -5,21 +5,19 @@ import pytest
 
 from rig.analysis.calibration import DEFAULT_ESTIMATOR
 from rig.data.magnetometer_entries import MagnetometerEntry
-from rig.data.quantity import RATE
+from rig.data.quantity import ACCELERATION, FIELD, RATE
 from rig.data.result_file import ResultDocument, VectorEntry, read_result
 from rig.plans.recorded import judged, open_run
 from rig.report.certificate.page import certificate_page
 from rig.report.certificate.plots import (
     EXPECTED,
-    EXPECTED_OF_ACCELERATIONS,
-    EXPECTED_OF_FIELDS,
+    EXPECTED_IN_ATTITUDES,
     HEIGHT,
     OF_ATTITUDES,
     OF_SAMPLES,
     Residuals,
-    acceleration_residuals,
+    attitude_residuals,
     contributions,
-    field_residuals,
     residuals,
 )
 from rig.report.document import document_of
@@ -59,12 +57,12 @@ def test_bars_of_attitudes_hold_the_arm_s_error_across_gravity_and_noise_alone_a
     one = found.dwells[0].model_copy(
         update={"mean_m_s2": (9.81 + 0.3, -0.2, 0.1), "mean_std_m_s2": (noise, noise, noise)}
     )
-    picture = acceleration_residuals(found.model_copy(update={"dwells": (one,)}))
+    picture = attitude_residuals(ACCELERATION, found.model_copy(update={"dwells": (one,)}))
     assert picture.of == OF_ATTITUDES and picture.unit == "mm/s²"
     across = 2e3 * np.hypot(noise, 9.81 * off)
     np.testing.assert_allclose(bars(picture), [[2e3 * noise, across, across]], atol=0.02 * across)
     field = magnetometer()
-    assert field_residuals(field).of == OF_ATTITUDES
+    assert attitude_residuals(FIELD, field).of == OF_ATTITUDES
 
 
 def test_bars_of_attitudes_are_what_the_solve_expects_of_them_where_it_says_so() -> None:
@@ -72,11 +70,11 @@ def test_bars_of_attitudes_are_what_the_solve_expects_of_them_where_it_says_so()
     (acceleration,), (field,) = document.accelerometers.values(), document.magnetometers.values()
     assert isinstance(field, MagnetometerEntry)
     pictures = (
-        (acceleration_residuals(acceleration), [each.residual_std_m_s2 for each in acceleration.dwells]),
-        (field_residuals(field), [each.residual_std_t for each in field.dwells]),
+        (attitude_residuals(ACCELERATION, acceleration), [each.residual_std_m_s2 for each in acceleration.dwells]),
+        (attitude_residuals(FIELD, field), [each.residual_std_t for each in field.dwells]),
     )
     for picture, expected in pictures:
-        assert picture.of in (EXPECTED_OF_ACCELERATIONS, EXPECTED_OF_FIELDS)
+        assert picture.of in (EXPECTED_IN_ATTITUDES[ACCELERATION], EXPECTED_IN_ATTITUDES[FIELD])
         told = 2 * np.array(expected, dtype=np.float64)
         drawn = bars(picture)
         np.testing.assert_allclose(drawn * (told.max() / drawn.max()), told, atol=0.02 * told.max())
@@ -88,7 +86,7 @@ def test_frozen_attitudes_agree_with_their_bars() -> None:
     for name, kind in (("imu", "accelerometers"), ("magnetometer", "magnetometers")):
         document = read_result(RECORDINGS / "rig.settings-6" / name)
         for found in getattr(document, kind).values():
-            picture = (acceleration_residuals if kind == "accelerometers" else field_residuals)(found)
+            picture = attitude_residuals(ACCELERATION if kind == "accelerometers" else FIELD, found)
             assert picture.within >= 0.85 * len(picture.points)
 
 

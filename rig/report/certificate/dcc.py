@@ -136,7 +136,8 @@ def _item(key: str, name: str, part: str, serial: str, c: Certificate) -> Elemen
         text("description", " ".join([*(f"{mark}." for mark in c.marks), condition])),
         words("model", kind(part)),
         dcc("identifications", _identified("manufacturer", serial, "serial number"),
-            None if c.elsewhere or has_own_port(part) else _identified("other", c.provenance.board_unique_id, "board it is on")),
+            None if c.elsewhere or has_own_port(part)
+            else _identified("other", c.provenance.board_unique_id, "board it is on")),
         id=key,
     )  # fmt: skip
 

@@ -2,6 +2,7 @@
 
 from collections.abc import Sequence
 from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
 
@@ -20,8 +21,11 @@ WIDTH, LEFT, RIGHT = 340.0, 42.0, 8.0
 TOP, HEIGHT = 18.0, 104.0
 NAMES, ROW, DECADES = 106.0, 13.0, 4
 EXPECTED = "what noise, a wandering bias and the ends of turns are expected to leave"
-EXPECTED_OF_ACCELERATIONS = "what noise, the arm's attitudes and a sensor within its data sheet are expected to leave"
-EXPECTED_OF_FIELDS = "what noise and the arm's attitudes are expected to leave"
+EXPECTED_IN_ATTITUDES = {
+    ACCELERATION: "what noise, the arm's attitudes and a sensor within its data sheet are expected to leave",
+    FIELD: "what noise and the arm's attitudes are expected to leave",
+}
+EXPECTED_OF_FILES = "what noise and the file's attitudes are expected to leave"
 OF_SAMPLES = "the samples' scatter over the root of their number, which holds vibration that a mean leaves out"
 OF_ATTITUDES = "noise and of the arm's attitudes"
 OF_REPEATS = "what differs between repeats"
@@ -84,26 +88,20 @@ def residuals(sensor: SensorEntry) -> Residuals | None:
     return _marked(left, std, RATE, OF_SAMPLES, split=split)
 
 
-def acceleration_residuals(found: AccelerometerEntry) -> Residuals:
-    """What the model leaves of each attitude."""
-    left = np.array([each.residual_m_s2 for each in found.dwells])
-    expected = [each.residual_std_m_s2 for each in found.dwells if each.residual_std_m_s2 is not None]
-    if len(expected) == len(left):
-        return _marked(left, np.array(expected), ACCELERATION, EXPECTED_OF_ACCELERATIONS)
-    std, mean = np.array([(each.mean_std_m_s2, each.mean_m_s2) for each in found.dwells]).swapaxes(0, 1)
-    turned = _turned(np.array(found.matrix), mean - np.array(found.bias_m_s2), found.attitude_error_rad)
-    return _marked(left, np.hypot(std, turned), ACCELERATION, OF_ATTITUDES)
+def attitude_residuals(quantity: Quantity, found: AccelerometerEntry | MagnetometerEntry) -> Residuals:
+    """What the model leaves of each attitude, with what was expected of that."""
 
+    def of(dwell: object, what: str) -> Any:
+        return getattr(dwell, quantity.named(what))
 
-def field_residuals(found: MagnetometerEntry) -> Residuals:
-    """A magnetometer's residuals, with what was expected of them."""
-    left = np.array([each.residual_t for each in found.dwells])
-    expected = [each.residual_std_t for each in found.dwells if each.residual_std_t is not None]
+    left = np.array([of(dwell, "residual") for dwell in found.dwells])
+    expected = [told for dwell in found.dwells if (told := of(dwell, "residual_std")) is not None]
     if len(expected) == len(left):
-        return _marked(left, np.array(expected), FIELD, EXPECTED_OF_FIELDS)
-    std, mean = np.array([(each.mean_std_t, each.mean_t) for each in found.dwells]).swapaxes(0, 1)
-    turned = _turned(np.array(found.matrix), mean - np.array(found.bias_t), found.attitude_error_rad)
-    return _marked(left, np.hypot(std, turned), FIELD, OF_ATTITUDES)
+        what = EXPECTED_OF_FILES if found.laid_down is not None else EXPECTED_IN_ATTITUDES[quantity]
+        return _marked(left, np.array(expected), quantity, what)
+    std, mean = (np.array([of(dwell, name) for dwell in found.dwells]) for name in ("mean_std", "mean"))
+    turned = _turned(np.array(found.matrix), mean - np.array(of(found, "bias")), found.attitude_error_rad)
+    return _marked(left, np.hypot(std, turned), quantity, OF_ATTITUDES)
 
 
 def _turned(matrix: Array, readings: Array, attitude_error_rad: float | None) -> Array:

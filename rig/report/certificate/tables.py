@@ -7,6 +7,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from rig.data.earth_rate_entries import EarthRateEntry
+from rig.data.motion_file import NOT_STATED
 from rig.data.result_file import CheckEntry, SensorEntry, VectorEntry, VerificationEntry
 from rig.report.expanded import expanded
 from rig.report.rounding import percent, rounded
@@ -51,7 +52,7 @@ class CheckRow:
 
 def kind(part: str) -> str:
     """What the maker calls it."""
-    return part.removesuffix("_magnetometer").upper()
+    return part if part == NOT_STATED else part.removesuffix("_magnetometer").upper()
 
 
 def pair(value: float, uncertainty: float) -> Pair:

@@ -45,7 +45,7 @@ def _followed(found: Found[SensorEntry], _: object) -> Followed:
         "Earth's rate",
         sensor.part,
         sensor.serial_number,
-        sensor.range_rad_s,
+        sensor.range_rad_s or 0.0,
         sensor.estimator,
         sensor.temperature_c,
         known([*parameters(EARTH, values, stds, entry.freedoms(4), RATE.unit)]),
