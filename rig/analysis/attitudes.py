@@ -8,9 +8,11 @@ from typing import Literal, get_args
 import numpy as np
 
 from rig.analysis.calibration import estimator_among, or_fault
+from rig.analysis.check import Check
 from rig.analysis.increments import InIncrements, solve_turning
 from rig.analysis.placed_budget import budget_by_causes, noise_freedom
 from rig.analysis.placed_equations import Equations
+from rig.data.installed_kinds import installed_kinds
 from rig.data.quantity import ACCELERATION, RATE, Quantity
 from rig.data.settings import Elsewhere, Site
 from rig.errors import Fault
@@ -82,12 +84,20 @@ class InAttitudes:
     seen: Dwells | None = None
 
 
+@dataclass(frozen=True, slots=True)
+class OfKind:
+    """What the solver of an installed kind of sensor found, and the checks that say whether it is fit for use."""
+
+    found: object
+    checks: tuple[Check, ...] = ()
+
+
 Result = InAttitudes | InIncrements
 
 
 def solve_placed(
     placed: PlacedReadings, site: Site, asked: Elsewhere, method: Chosen | None, *, second_order: bool
-) -> dict[Quantity, Result | Fault]:
+) -> dict[Quantity, Result | OfKind | Fault]:
     """Every quantity that was recorded, by `method`; None chooses the one that suits it.
 
     That is "attitude_weighted", and for a gyroscope "increments" (over windows of `window_s`), or with `exact_rates`
@@ -101,7 +111,12 @@ def solve_placed(
             return _of_rows(Equations.of_rows(placed, exact_rates=exact_rates), chosen, any_mounting=any_mounting)
         return solve_turning(turning, asked.window_s, any_mounting=any_mounting)
 
-    def of_reference(quantity: Quantity, placements: Placements | Fault) -> Result:
+    solvers = {kind.quantity: kind.solve for kind in installed_kinds()}
+
+    def of_reference(quantity: Quantity, placements: Placements | Fault) -> Result | OfKind:
+        if quantity in solvers and not isinstance(placements, Fault):
+            of_kind: OfKind = solvers[quantity](placements, site)
+            return of_kind
         known = known_size(site, quantity)
         if isinstance(placements, Fault):
             raise placements
@@ -109,7 +124,7 @@ def solve_placed(
         equations = Equations.of_placements(placements, quantity, known, second_order=second_order)
         return _of_placements(placements, quantity, equations, chosen, any_mounting=any_mounting)
 
-    found: dict[Quantity, Result | Fault] = {}
+    found: dict[Quantity, Result | OfKind | Fault] = {}
     for quantity in placed.quantities:
         if quantity == RATE and placed.turning is not None:
             found[quantity] = or_fault(partial(of_rate, placed.turning))

@@ -8,6 +8,7 @@ import numpy as np
 from rig.analysis.acceleration import AccelerometerResult
 from rig.analysis.allowance import allow, allowed
 from rig.analysis.calibration import SensorResult, observe_recordings, solve_observed
+from rig.analysis.check import Check
 from rig.analysis.consistency import consistency
 from rig.analysis.leaning import leaning_deg
 from rig.analysis.magnetic_field import MagnetometerResult
@@ -21,7 +22,7 @@ from rig.analysis.reference_contradictions import (
 )
 from rig.analysis.surroundings import Surroundings, surroundings_of
 from rig.analysis.told_from import ToldFrom, of_gyroscope, of_reference
-from rig.analysis.verdict import Check, fitness
+from rig.analysis.verdict import fitness
 from rig.analysis.ways import with_ways
 from rig.data.quantity import ACCELERATION, FIELD, Quantity
 from rig.data.run_file import RunData

@@ -1,12 +1,12 @@
 """Readings recorded elsewhere, whose motion a file tells: what they give, and by what that is judged. Pure."""
 
 from collections.abc import Iterator, Mapping, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 from typing import Literal
 
 import numpy as np
 
-from rig.analysis.attitudes import InAttitudes, Result, known_method, solve_placed
+from rig.analysis.attitudes import InAttitudes, OfKind, Result, known_method, solve_placed
 from rig.analysis.calibration import (
     ESTIMATORS,
     Estimator,
@@ -17,9 +17,9 @@ from rig.analysis.calibration import (
     solve_six_observation,
     solve_vector,
 )
+from rig.analysis.check import Check
 from rig.analysis.correction import diagonal_correction, matrix_correction
 from rig.analysis.increments import InIncrements
-from rig.analysis.verdict import Check
 from rig.data.meaning import Meaning
 from rig.data.motion_file import Item, ReadElsewhere
 from rig.data.quantity import RATE, Quantity
@@ -55,7 +55,7 @@ class OfSensor:
     """What the readings of an `item` gave: its `gyroscope`, what `rates` in attitudes told, what was found `at_rest`.
 
     `unsolved` says why of other quantities that were recorded; `turned` are the turns it was solved by, from rest to
-    rest.
+    rest; `of_kinds` is what solvers of installed kinds of sensors found.
     """
 
     item: Item
@@ -64,6 +64,7 @@ class OfSensor:
     at_rest: Mapping[Quantity, InAttitudes]
     unsolved: Mapping[Quantity, Fault]
     turned: TurnedData | None = None
+    of_kinds: Mapping[Quantity, OfKind] = field(default_factory=dict)
 
 
 def solved_elsewhere(read: ReadElsewhere, settings: RunSettings, estimator: str | None) -> OfSensor:
@@ -73,7 +74,7 @@ def solved_elsewhere(read: ReadElsewhere, settings: RunSettings, estimator: str 
     estimator does, or of several `nothing_solved` with every reason.
     """
     found = _by_sweeps(read, estimator) if read.tells == "sweeps" else _by_attitudes(read, settings, estimator)
-    if found.gyroscope is None and not found.at_rest:
+    if found.gyroscope is None and not found.at_rest and not found.of_kinds:
         raise _nothing_solved(found.unsolved)
     return found
 
@@ -90,6 +91,8 @@ def checks_elsewhere(name: str, found: OfSensor) -> Iterator[Check]:
         yield _fit(name, quantity, "condition", result.solution.condition, triaxial.MAX_CONDITION)
         if (error := result.solution.attitude_error) is not None:
             yield _fit(name, quantity, "attitude_error", error.std_rad, UNTRUSTWORTHY_RAD, unit="rad")
+    for of_kind in found.of_kinds.values():
+        yield from of_kind.checks
 
 
 def _by_sweeps(read: ReadElsewhere, name: str | None) -> OfSensor:
@@ -168,13 +171,15 @@ def _by_attitudes(read: ReadElsewhere, settings: RunSettings, name: str | None) 
         raise Refused("no_site", "the recording does not say where it was made", "Make it anew from the two files")
     placed = placed_by(_samples(read), read.motion, find_clock=asked.find_clock)
     found = solve_placed(placed, site, asked, method, second_order=settings.second_order)
-    clock, rates = placed.clock, found.get(RATE)
+    rates = found.get(RATE)
+    told = rates if isinstance(rates, InAttitudes | InIncrements) else None
     return OfSensor(
         read.item,
-        gyroscope=None if rates is None or isinstance(rates, Fault) else _gyroscope(read.item, rates, clock),
-        rates=None if isinstance(rates, Fault) else rates,
+        gyroscope=None if told is None else _gyroscope(read.item, told, placed.clock),
+        rates=told,
         at_rest={each: result for each, result in found.items() if each != RATE and isinstance(result, InAttitudes)},
         unsolved={each: result for each, result in found.items() if isinstance(result, Fault)},
+        of_kinds={each: result for each, result in found.items() if isinstance(result, OfKind)},
     )
 
 

@@ -16,6 +16,7 @@ from rig.analysis.calibration import (
     observe_recordings,
     solve_observed,
 )
+from rig.analysis.check import Check
 from rig.analysis.clock import ClockCheck
 from rig.analysis.comparison import Reference, turns_of
 from rig.analysis.contradictions import contradictions, in_reference
@@ -26,7 +27,6 @@ from rig.analysis.surroundings import surroundings_of
 from rig.analysis.told_from import ToldFrom
 from rig.analysis.vector_inputs import arms_of
 from rig.analysis.verdict import (
-    Check,
     acceleration_checks,
     clock_checks,
     drift_checks,

@@ -1,6 +1,5 @@
 """Passed or failed: every limit beside what was measured. A measurement or a limit that is missing fails."""
 
-import math
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 from types import MappingProxyType
@@ -10,6 +9,7 @@ import numpy as np
 
 from rig.analysis.acceleration import AccelerometerResult
 from rig.analysis.bias_drift import BiasDrift
+from rig.analysis.check import Check
 from rig.analysis.clock import PPM, ClockCheck, worst_differences
 from rig.analysis.verification import Verification
 from rig.config.limits import Limits, Parameter, limit_of
@@ -18,43 +18,8 @@ from rig.data.quantity import Quantity
 from rig.data.settings import DecisionRule
 from rig.estimation.arrays import Array
 from rig.estimation.budget import Budget
-from rig.estimation.coverage import COVERAGE_FACTOR, beyond, coverage_factors
+from rig.estimation.coverage import COVERAGE_FACTOR, coverage_factors
 from rig.estimation.estimate import Estimate
-
-
-@dataclass(frozen=True, slots=True)
-class Check:
-    """One limit: it passes when `value` is a number not above `limit` less `guard`. `unit` belongs to all of them.
-
-    What it `means` is said by whoever makes it: `name` is for people, and nothing is read out of how it is spelt.
-    `value` is None where nothing was measured, `limit` where none was set, `uncertainty` where the value has none. It
-    is the expanded one, by `coverage_factor` and so many degrees of `freedom`. The `guard` is that uncertainty where
-    the decision rule is the guard band (ILAC-G8, 4.2).
-    """
-
-    name: str
-    value: float | None
-    limit: float | None
-    unit: str
-    means: Meaning
-    uncertainty: float | None = None
-    guard: float = 0.0
-    coverage_factor: float = COVERAGE_FACTOR
-    freedom: float = math.inf
-
-    @property
-    def passed(self) -> bool:
-        """False for a measurement that is missing or not a number, and without a limit."""
-        if self.value is None or self.limit is None:
-            return False
-        return math.isfinite(self.value) and self.value <= self.limit - self.guard
-
-    @property
-    def false_acceptance(self) -> float | None:
-        """The probability that what passed is beyond the limit all the same; None where nothing passed."""
-        if self.value is None or self.limit is None or not self.uncertainty or not self.passed:
-            return None
-        return float(beyond((self.limit - self.value) * self.coverage_factor / self.uncertainty, self.freedom))
 
 
 @dataclass(frozen=True, slots=True)

@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 from pydantic import Field
 
 from rig.config.section import SensorName
-from rig.data.quantity import QUANTITIES
+from rig.data.quantity import quantities
 
 Told = Literal["sweeps", "attitudes"]
 Columns = Mapping[str, NDArray[np.float64]]
@@ -36,7 +36,11 @@ class Header:
             raise ValueError(f"its columns are {', '.join(columns)}")
 
 
-SAMPLES: Final = Header((TIME,), (), (*(each.columns for each in QUANTITIES.values()), (TEMPERATURE,)))
+def samples_header() -> Header:
+    """The columns of readings, of whatever quantities."""
+    return Header((TIME,), (), (*(each.columns for each in quantities().values()), (TEMPERATURE,)))
+
+
 MOTIONS: Final[Mapping[Told, Header]] = MappingProxyType(
     {
         "sweeps": Header(

@@ -1,10 +1,12 @@
 """What sensors measure: every name, unit and size that is written or shown of a quantity, in one table.
 
-A quantity's names in files end with its `suffix`: `bias_m_s2`, `x_m_s2`. A new quantity is a row here.
+A quantity's names in files end with its `suffix`: `bias_m_s2`, `x_m_s2`. A new quantity is a row here, or comes with a
+kind of sensor that somebody has installed.
 """
 
 from collections.abc import Mapping
 from dataclasses import dataclass
+from functools import cache
 from math import pi
 from types import MappingProxyType
 from typing import Final
@@ -25,7 +27,7 @@ class Unit:
 
 @dataclass(frozen=True, slots=True)
 class Quantity:
-    """One vector quantity that a sensor of three axes measures.
+    """One quantity that a sensor measures along its axes.
 
     - `sensor` is what measures it. `unit` is that of SI, `suffix` the same in names.
     - `reading` is the unit of a reading on a screen, `bias` that of a bias with at least so many `decimals`, `drift`
@@ -33,6 +35,7 @@ class Quantity:
     - `walk` is what its white noise is called, `walk_suffix` the SI unit of that in names, `walk_unit` a shown one.
     - `steady` is how far the means of two neighbouring seconds may be apart at rest, beside their noise: no bias moves
       so fast, but a hand does, and half a degree of tilt is more. A field within a room changes by a tenth of that.
+    - `axes`: the letters of the axes that it is measured along.
     """
 
     name: str
@@ -48,6 +51,7 @@ class Quantity:
     walk_suffix: str
     walk_unit: Unit
     steady: float
+    axes: str = "xyz"
 
     def __str__(self) -> str:
         return self.name
@@ -58,13 +62,13 @@ class Quantity:
 
     @property
     def columns(self) -> tuple[str, ...]:
-        """The columns x, y, z of its readings in a table."""
-        return tuple(self.named(axis) for axis in "xyz")
+        """The columns of its readings in a table, one for each axis."""
+        return tuple(self.named(axis) for axis in self.axes)
 
     @property
     def parameter_units(self) -> tuple[str, ...]:
-        """The units of three scale factors and three biases."""
-        return ("1", "1", "1", self.unit, self.unit, self.unit)
+        """The units of the scale factors, then of the biases."""
+        return ("1",) * len(self.axes) + (self.unit,) * len(self.axes)
 
 
 RATE: Final = Quantity(
@@ -112,4 +116,13 @@ FIELD: Final = Quantity(
     walk_unit=Unit("nT √s", 1e-9),
     steady=2e-6,
 )
-QUANTITIES: Final[Mapping[str, Quantity]] = MappingProxyType({each.name: each for each in (RATE, ACCELERATION, FIELD)})
+OF_THE_RIG: Final = (RATE, ACCELERATION, FIELD)
+
+
+@cache
+def quantities() -> Mapping[str, Quantity]:
+    """Every quantity by its name, those of installed kinds of sensors too (`rig.data.installed_kinds`)."""
+    from rig.data.installed_kinds import installed_kinds
+
+    every = (*OF_THE_RIG, *(kind.quantity for kind in installed_kinds()))
+    return MappingProxyType({each.name: each for each in every})

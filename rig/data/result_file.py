@@ -383,6 +383,7 @@ class ResultDocument(Entry):
     were recorded; one that was recorded and not calibrated says why.
     `bias_drift` holds the biases by repeat of a run of that procedure, by sensor, then by "rate" and "acceleration".
     `unsolved` says of readings from elsewhere why a quantity has no solution, by sensor, then by the quantity's name.
+    `others` are results of kinds that packages add, by the kind's key: what stands there only the package knows.
     A sensor's name becomes that of files: what a configuration does not take for one is none here either.
     """
 
@@ -397,6 +398,7 @@ class ResultDocument(Entry):
     magnetometers: dict[SensorName, MagnetometerEntry | ErrorEntry] = Field(default_factory=dict)
     bias_drift: dict[SensorName, dict[str, DriftEntry]] = Field(default_factory=dict)
     unsolved: dict[SensorName, dict[str, ErrorEntry]] = Field(default_factory=dict)
+    others: dict[str, dict[SensorName, JsonValue]] = Field(default_factory=dict)
 
     def text(self) -> str:
         """The result as JSON; what was left out stays out."""

@@ -42,7 +42,7 @@ from rig.data.layout import (
     lay_out,
     table_of,
 )
-from rig.data.motion_file import MOTIONS, SAMPLES, ReadElsewhere, ToldElsewhere
+from rig.data.motion_file import MOTIONS, ReadElsewhere, ToldElsewhere, samples_header
 from rig.data.provenance import Provenance
 from rig.data.settings import RunSettings, settings_from_json
 from rig.data.settings_of_run_1 import settings_of_configuration
@@ -407,7 +407,7 @@ def _elsewhere(contents: Contents) -> ReadElsewhere:
     tables = [contents.tables[each] for each in TABLES]
     readings, motion = ({name: rows[name] for name in rows.dtype.names or ()} for rows in tables)
     told = checked(ToldElsewhere, json.loads(contents.texts["elsewhere"]), "elsewhere")
-    SAMPLES.check(readings)
+    samples_header().check(readings)
     MOTIONS[told.tells].check(motion)
     return ReadElsewhere(told.item, readings, told.tells, motion)
 

@@ -4,7 +4,7 @@ import json
 from collections.abc import Iterator, Mapping, Sequence
 
 from rig.config.limits import Kind
-from rig.data.quantity import QUANTITIES
+from rig.data.quantity import quantities
 from rig.data.result_file import CheckEntry, ResultDocument
 from rig.history.index import SAME, unlike
 from rig.report.kinds.registry import followed
@@ -27,7 +27,7 @@ def not_given(claimed: ResultDocument, given: ResultDocument) -> list[str]:
     rows += [check.name for check in claimed.checks if checks.get(check.name) != _said(check)]
     numbers = _differences(_numbers_of(claimed), _numbers_of(given), "")
     there = {(each.sensor, each.quantity) for each in followed(claimed)}
-    found = [each for each in followed(given) if each.quantity in QUANTITIES or (each.sensor, each.quantity) in there]
+    found = [each for each in followed(given) if each.quantity in quantities() or (each.sensor, each.quantity) in there]
     return [*rows, *unlike(claimed, found), *numbers]
 
 

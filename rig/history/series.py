@@ -7,7 +7,7 @@ from functools import cached_property
 
 import numpy as np
 
-from rig.data.quantity import QUANTITIES
+from rig.data.quantity import quantities
 from rig.estimation.arrays import Array
 from rig.history.statistics.agreement import normalised_error
 from rig.history.statistics.charts import FEWEST, Chart, chart, merged
@@ -157,7 +157,7 @@ def changes(before: Past, now: Past) -> tuple[Change, ...]:
 
 def rig_states(pasts: Sequence[Past]) -> list[RigState]:
     """Every rig that has check standards; a sensor is one if it was ever called one."""
-    found = subjects([past for past in pasts if past.quantity in QUANTITIES])  # what drifts or turns is no standard
+    found = subjects([past for past in pasts if past.quantity in quantities()])  # what drifts or turns is no standard
     standards = {subject: each for subject, each in found.items() if any(past.check_standard for past in each)}
     states = []
     for rig in dict.fromkeys(past.rig for each in standards.values() for past in each):

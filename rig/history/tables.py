@@ -4,7 +4,7 @@ from collections.abc import Iterable, Iterator, Mapping, Sequence
 
 from rich.table import Table
 
-from rig.data.quantity import QUANTITIES
+from rig.data.quantity import quantities
 from rig.history.series import YEAR_DAYS, Change, RigState, Subject, Trend
 from rig.history.statistics.charts import FEWEST
 from rig.history.statistics.rig_effects import RigEffect
@@ -132,7 +132,7 @@ def effects_table(effects: Mapping[str, Sequence[RigEffect]]) -> Table:
 def title_of(subject: Subject) -> str:
     """What was calibrated, in words."""
     part, serial_number, quantity, full_scale, simulated = subject
-    unit = next((each.unit for each in QUANTITIES.values() if each.name in quantity.split()), "")
+    unit = next((each.unit for each in quantities().values() if each.name in quantity.split()), "")
     of = f"±{full_scale:.4g} {unit}" if full_scale else "range not stated"
     return f"{part} {serial_number}, {quantity}, {of}" + (", simulated" if simulated else "")
 

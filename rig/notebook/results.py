@@ -8,8 +8,8 @@ from typing import TYPE_CHECKING, Any, Literal
 import numpy as np
 
 from rig.analysis.calibration import DEFAULT_ESTIMATOR
+from rig.analysis.check import Check
 from rig.analysis.outcome import Outcome
-from rig.analysis.verdict import Check
 from rig.data.result_file import ResultDocument
 from rig.data.settings import setting
 from rig.estimation.arrays import Array
@@ -18,7 +18,7 @@ from rig.notebook.runs import NoSuchSensor, Run
 from rig.plans.recorded import judged
 from rig.report.document import document_of
 from rig.report.kinds.kind import Found, Shown, Without
-from rig.report.kinds.registry import KINDS, shown
+from rig.report.kinds.registry import kinds, shown
 from rig.report.kinds.triad import bias_of
 
 if TYPE_CHECKING:
@@ -103,7 +103,7 @@ class Result(Mapping[str, Calibration]):
     def _calibrations(self) -> dict[str, Calibration]:
         found = (
             Calibration(shown.name, each, shown)
-            for kind in KINDS
+            for kind in kinds()
             if not isinstance(kind.shown, Without)
             for each in kind.found(self.document)
             if (shown := kind.shown(each)).scale is not None
@@ -168,7 +168,7 @@ def solve(run: Run, estimator: str = DEFAULT_ESTIMATOR, **changes: float) -> Res
 
 def _rows(shown: Shown) -> Iterator[tuple[str, ...]]:
     """Axis by axis, with U, or with twice the standard deviations where no more is known."""
-    for i, axis in enumerate("xyz"):
+    for i, axis in enumerate("xyz"[: len(shown.numbers.values)]):
         scale = ("–", "–")
         if shown.scale is not None:
             scale = f"{shown.scale.values[i]:.6f}", f"{shown.scale.expanded[i]:.6f}"

@@ -12,8 +12,8 @@ from pathlib import Path
 
 import numpy as np
 
-from rig.data.motion_file import SAMPLES, TIME, Columns
-from rig.data.quantity import QUANTITIES, Quantity
+from rig.data.motion_file import TIME, Columns, samples_header
+from rig.data.quantity import Quantity, quantities
 from rig.errors import Refused
 from rig.estimation.arrays import Array
 from rig.observation.csv_table import read_columns
@@ -36,15 +36,16 @@ def read_samples(path: Path, needed: Sequence[Quantity] = ()) -> Samples:
     Raises Refused `no_file`, `wrong_columns`, `wrong_unit`, `not_a_number`, `time_not_increasing`.
     """
     of_needed = (name for quantity in needed for name in quantity.columns)
-    table = read_columns(path, replace(SAMPLES, needed=(*SAMPLES.needed, *of_needed)), SAMPLES_MB)
+    header = samples_header()
+    table = read_columns(path, replace(header, needed=(*header.needed, *of_needed)), SAMPLES_MB)
     return samples_in(table, str(path))
 
 
 def samples_in(table: Columns, where: str) -> Samples:
     """The readings of columns (n,), said to stand `where`. Raises Refused `wrong_columns`, `time_not_increasing`."""
-    given = [each for each in QUANTITIES.values() if each.columns[0] in table]
+    given = [each for each in quantities().values() if each.columns[0] in table]
     if not given:
-        known = ", or ".join(" ".join(each.columns) for each in QUANTITIES.values())
+        known = ", or ".join(" ".join(each.columns) for each in quantities().values())
         raise Refused("wrong_columns", f"{where} holds no readings", f"Its first row must name time_s and {known}")
     check_times(table[TIME])
     readings = {quantity: np.column_stack([table[name] for name in quantity.columns]) for quantity in given}

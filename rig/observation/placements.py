@@ -20,7 +20,6 @@ from rig.observation.mean import Mean
 from rig.observation.rests import BLOCK_S, find_rests
 from rig.observation.windows import Window
 
-UNTOLD = (np.full(3, np.nan), np.full(3, np.nan))  # variances and their freedom, of too few samples
 TURNED_RAD = 0.02  # rows of one rest that are farther apart: it was turned about what it feels
 
 
@@ -129,9 +128,11 @@ def _read(time_s: Array, readings: Mapping[Quantity, Array], cuts: Sequence[NDAr
     """The means of the rests; of few samples, with the noise of all that are long enough."""
     means, variances, freedom = {}, {}, {}
     for quantity, each in readings.items():
-        means[quantity] = np.array([each[cut].mean(axis=0) for cut in cuts]).reshape(-1, 3)
-        found = [scatter_of(each[cut])[:2] if len(cut) >= MIN_SAMPLES else UNTOLD for cut in cuts]
-        told, counted = np.array(found).reshape(-1, 2, 3).swapaxes(0, 1)
+        axes = each.shape[1]
+        untold = (np.full(axes, np.nan), np.full(axes, np.nan))  # variances and their freedom, of too few samples
+        means[quantity] = np.array([each[cut].mean(axis=0) for cut in cuts]).reshape(-1, axes)
+        found = [scatter_of(each[cut])[:2] if len(cut) >= MIN_SAMPLES else untold for cut in cuts]
+        told, counted = np.array(found).reshape(-1, 2, axes).swapaxes(0, 1)
         variances[quantity] = _filled(told, np.array([len(cut) for cut in cuts]), each)
         fewest = len(each) - 1.0 if np.isnan(counted).all() else np.nanmin(counted)
         freedom[quantity] = np.where(np.isnan(counted), fewest, counted)

@@ -12,7 +12,7 @@ from collections.abc import Mapping
 import numpy as np
 from numpy.typing import NDArray
 
-from rig.data.quantity import QUANTITIES, RATE, Quantity
+from rig.data.quantity import RATE, Quantity, quantities
 from rig.estimation.arrays import Array
 from rig.observation.steadiness import BEYOND
 from rig.observation.windows import Window
@@ -25,14 +25,14 @@ GAP = 2.5  # intervals
 
 def find_rests(time_s: Array, readings: Mapping[Quantity, Array]) -> tuple[Window, ...]:
     """Rests of two blocks and longer, by readings (n, 3) of one quantity or several at rising times (n,)."""
-    quantity = next(each for each in QUANTITIES.values() if each in readings)
+    quantity = next(each for each in quantities().values() if each in readings)
     interval_s = float(np.median(np.diff(time_s)))
     width = max(FEWEST, int(np.ceil(BLOCK_S / interval_s)))
     count = len(time_s) // width
     if count < 2:
         return ()
     times = time_s[: count * width].reshape(count, width)
-    blocks = readings[quantity][: count * width].reshape(count, width, 3)
+    blocks = readings[quantity][: count * width].reshape(count, width, -1)
     means, scatter = blocks.mean(axis=1), blocks.std(axis=1)
     noise = np.maximum(np.quantile(scatter, QUIETEST, axis=0), COUNTS * quantity.steady)
     apart = quantity.steady + BEYOND * noise * np.sqrt(2 / width)

@@ -7,8 +7,8 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from rig.analysis.check import Check
 from rig.analysis.partial_results import so_far
-from rig.analysis.verdict import Check
 from rig.arm.motion import Dwell, Plan, Rest, Step, Sweep
 from rig.arm.state import ARM_STATE_DTYPE, ArmState
 from rig.data.events import DwellFinished, DwellStarted, RestFinished, RestStarted, SweepFinished, SweepStarted

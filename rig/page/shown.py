@@ -8,7 +8,7 @@ from rig.arm.kinematics import NOMINAL, DenavitHartenberg
 from rig.arm.motion import Dwell, Rest, Step, Sweep
 from rig.arm.state import JOINT_NAMES, ArmReport, ArmState, RobotMode, RuntimeState, SafetyMode
 from rig.data.events import BoardNotObserved, BoardObserved
-from rig.data.quantity import QUANTITIES
+from rig.data.quantity import quantities
 from rig.data.result_file import read_result
 from rig.data.run_folder import RESULT
 from rig.errors import RigError
@@ -43,7 +43,6 @@ from rig.station.events import (
 from rig.station.words import line
 
 LINES = 40  # of what was said last
-READINGS = {each.named(each.name): each.reading.size for each in QUANTITIES.values()}
 ENDINGS = (VerdictReached, Failed, Interrupted, Crashed)
 
 
@@ -204,8 +203,8 @@ class Shown:
                 "lost": sensor.lost,
                 "temperature_c": sensor.temperature_c,
             }
-            for quantity, size in READINGS.items():
-                if (vector := getattr(sensor, quantity)) is not None:
+            for quantity, size in ((each.named(each.name), each.reading.size) for each in quantities().values()):
+                if (vector := getattr(sensor, quantity, None)) is not None:
                     values[f"{sensor.sensor}.{quantity}"] = tuple(component / size for component in vector)
             rows.append(row)
         self._values = values

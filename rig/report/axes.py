@@ -54,17 +54,17 @@ def scale_and_bias_table(
     *,
     heading: str,
 ) -> Table:
-    """Scale factor and bias (SI) of each axis, ± their expanded uncertainties (6,), which are headed so.
+    """Scale factor and bias (SI) of each axis, ± their expanded uncertainties, which are headed so.
 
     With as many decimals as the smallest uncertainty warrants.
     """
-    unit, size = quantity.bias.name, quantity.bias.size
+    unit, size, axes = quantity.bias.name, quantity.bias.size, len(scale)
     table = Table(title=plain(title, "table.title"), title_justify="left")
     for each in ("axis", "scale factor", heading, f"bias {unit}", f"± U {unit}"):
         table.add_column(each, justify="left" if each == "axis" else "right")
-    biases, widths = ([float(each) / size for each in values] for values in (bias, expanded[3:]))
-    of_scale, of_bias = decimals(expanded[:3]), decimals(widths, quantity.decimals)
-    for i, axis in enumerate("xyz"):
+    biases, widths = ([float(each) / size for each in values] for values in (bias, expanded[axes:]))
+    of_scale, of_bias = decimals(expanded[:axes]), decimals(widths, quantity.decimals)
+    for i, axis in enumerate(quantity.axes):
         table.add_row(
             axis,
             f"{scale[i]:.{of_scale}f}",

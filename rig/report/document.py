@@ -1,23 +1,25 @@
 """The typed outcome of a run as the document of `result.json`."""
 
 from dataclasses import asdict
+from typing import Any
 
+from rig.analysis.check import Check
 from rig.analysis.outcome import Origin, Outcome
-from rig.analysis.verdict import Check
 from rig.data.result_file import SCHEMA, CheckEntry, ProvenanceEntry, ResultDocument
 from rig.report.budget_entry import clock_entry
 from rig.report.elsewhere_entries import unsolved
 from rig.report.entry import entry
 from rig.report.kinds.kind import Without
-from rig.report.kinds.registry import KINDS
+from rig.report.kinds.registry import kinds
 
 ALWAYS = ("sensors", "verification")  # there of every run, if only to say that there are none
 
 
 def document_of(outcome: Outcome) -> ResultDocument:
     """The result as plain numbers, texts and tuples, in SI units, of schema "rig.result/1"."""
-    made = {kind.key: kind.entries(outcome) for kind in KINDS if not isinstance(kind.entries, Without)}
-    found = {key: entries for key, entries in made.items() if entries or key in ALWAYS}
+    made = {kind.key: kind.entries(outcome) for kind in kinds() if not isinstance(kind.entries, Without)}
+    found: dict[str, object] = {key: entries for key, entries in made.items() if entries or key in ALWAYS}
+    others = {key: _plain(found.pop(key)) for key in list(found) if key not in ResultDocument.model_fields}
     clock = {} if outcome.clock is None else {"clock": clock_entry(outcome.clock)}
     return ResultDocument.model_validate(
         {
@@ -28,8 +30,14 @@ def document_of(outcome: Outcome) -> ResultDocument:
             **clock,
             **found,
             **({"unsolved": faults} if (faults := unsolved(outcome)) else {}),
+            **({"others": others} if others else {}),
         }
     )
+
+
+def _plain(entries: Any) -> dict[str, Any]:
+    """Entries of a kind that a package adds, as JSON has them."""
+    return {name: each.model_dump(mode="json") for name, each in entries.items()}
 
 
 def _check(check: Check) -> CheckEntry:

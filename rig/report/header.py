@@ -11,7 +11,7 @@ from rig.data.result_file import ResultDocument
 from rig.estimation.arrays import Array
 from rig.estimation.vector_model import VectorSolution
 from rig.report.kinds.kind import said
-from rig.report.kinds.registry import KINDS
+from rig.report.kinds.registry import kinds
 from rig.station.events import DocumentWritten, RunEvent
 
 NOTHING: Mapping[str, Array] = MappingProxyType({})
@@ -60,6 +60,6 @@ def calibration_header(document: ResultDocument, g_sensitivity: Mapping[str, Arr
 
 
 def _calibrations(document: ResultDocument, sensed: Mapping[str, Array]) -> Iterator[str]:
-    for kind in KINDS:
+    for kind in kinds():
         for found in kind.found(document):
             yield from said(kind.header, found, sensed)

@@ -7,7 +7,7 @@ from rich.table import Table
 
 from rig.data.result_file import CheckEntry, ResultDocument
 from rig.report.kinds.kind import said
-from rig.report.kinds.registry import KINDS
+from rig.report.kinds.registry import kinds
 from rig.station.plain_text import plain
 
 
@@ -21,7 +21,7 @@ def print_outcome(document: ResultDocument, *, as_json: bool) -> None:
 
 def print_result(result: ResultDocument, console: Console) -> None:
     """Print what was found of each sensor with its uncertainty, kind by kind, then checks and verdict."""
-    for kind in KINDS:
+    for kind in kinds():
         for found in kind.found(result):
             for each in said(kind.printed, found):
                 console.print(plain(each) if isinstance(each, str) else each)

@@ -10,15 +10,11 @@ from rig.data.result_file import ResultDocument, write_result
 from rig.data.run_folder import RESULT
 from rig.report.document import document_of
 from rig.report.kinds.kind import Without
-from rig.report.kinds.registry import KINDS
+from rig.report.kinds.registry import kinds
 from rig.station.events import DocumentWritten, RunEvent
 
-# `module:function`, imported when a run has ended: pictures by the kinds of results, then the others.
-WRITERS: Sequence[str] = (
-    *dict.fromkeys(kind.figures for kind in KINDS if not isinstance(kind.figures, Without)),
-    "rig.report.header:write_header",
-    "rig.report.certificate.writer:write_certificate",
-)
+# `module:function`, imported when a run has ended.
+WRITERS: Sequence[str] = ("rig.report.header:write_header", "rig.report.certificate.writer:write_certificate")
 
 
 class Writer(Protocol):
@@ -33,7 +29,8 @@ class Writer(Protocol):
 def write_outcome(folder: Path, outcome: Outcome) -> Iterator[RunEvent]:
     """All documents, then `result.json`, which ends the run; yields what to tell of them."""
     document = document_of(outcome)
-    for name in WRITERS:
+    pictures = dict.fromkeys(kind.figures for kind in kinds() if not isinstance(kind.figures, Without))
+    for name in (*pictures, *WRITERS):
         yield from _writer(name)(outcome, document, folder)
     write_result(document, folder)
     yield DocumentWritten(folder / RESULT)

@@ -8,7 +8,7 @@ from dataclasses import dataclass
 from pathlib import Path
 
 from firmware_host.client import BoardIdentity
-from rig.analysis.verdict import Check
+from rig.analysis.check import Check
 from rig.arm.motion import Plan, Step
 from rig.arm.state import ArmReport, ArmState
 from rig.data.events import Event

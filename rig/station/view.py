@@ -11,7 +11,7 @@ from rich.live import Live
 from rich.progress_bar import ProgressBar
 from rich.table import Table
 
-from rig.data.quantity import QUANTITIES
+from rig.data.quantity import quantities
 from rig.errors.quoting import printable_lines
 from rig.station.events import Progress, RunEvent, SamplesTaken, SensorSamples
 from rig.station.plain_text import plain
@@ -75,8 +75,8 @@ def _panel(progress: Progress, samples: SamplesTaken) -> Table:
 def _readings(sensor: SensorSamples) -> list[tuple[str, str]]:
     """The rows of a sensor, one for each quantity that it sends; the first says how many samples came."""
     came, rows = f"{sensor.samples} samples, {sensor.lost} lost", list[tuple[str, str]]()
-    for quantity in QUANTITIES.values():
-        newest: Sequence[float] | None = getattr(sensor, quantity.named(quantity.name))
+    for quantity in quantities().values():
+        newest: Sequence[float] | None = getattr(sensor, quantity.named(quantity.name), None)
         if newest is not None:
             shown = " ".join(f"{component / quantity.reading.size:+7.2f}" for component in newest)
             name, more = (f"{sensor.sensor}, {quantity.sensor}", "") if rows else (sensor.sensor, f", {came}")

@@ -9,7 +9,14 @@ import pytest
 
 from rig.analysis.acceleration import AccelerometerResult
 from rig.analysis.bias_drift import BiasDrift
-from rig.analysis.verdict import Check, acceleration_checks, drift_checks, judge, verdict, verification_checks
+from rig.analysis.check import Check
+from rig.analysis.verdict import (
+    acceleration_checks,
+    drift_checks,
+    judge,
+    verdict,
+    verification_checks,
+)
 from rig.config.limits import Limits
 from rig.data.meaning import Meaning
 from rig.data.quantity import RATE

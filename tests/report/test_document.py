@@ -8,8 +8,8 @@ from dataclasses import replace
 import pytest
 from rich.console import Console
 
+from rig.analysis.check import Check
 from rig.analysis.outcome import Outcome, calibrated
-from rig.analysis.verdict import Check
 from rig.arm.kinematics import NOMINAL
 from rig.data.meaning import Meaning
 from rig.data.result_file import CheckEntry

@@ -3,9 +3,9 @@
 from collections.abc import Sequence
 
 from rig.analysis.calibration import SensorResult, observe_recordings, solve_observed
+from rig.analysis.check import Check
 from rig.analysis.contradictions import FALSE_ALARMS, OF_THE_MODEL, SHARES, contradictions
 from rig.analysis.surroundings import Surroundings, surroundings_of
-from rig.analysis.verdict import Check
 from rig.data.run_file import RunData
 from rig.observation.observed_run import ObservedRun
 

@@ -10,9 +10,9 @@ from scipy.spatial.transform import Rotation
 
 from rig.analysis.acceleration import calibrate_accelerometers
 from rig.analysis.calibration import observe_recordings
+from rig.analysis.check import Check
 from rig.analysis.contradictions import in_reference
 from rig.analysis.magnetic_field import calibrate_magnetometers
-from rig.analysis.verdict import Check
 from rig.data.run_file import RunData
 from rig.errors import Fault
 from rig.estimation.arrays import Array

@@ -5,7 +5,8 @@ from collections.abc import Iterator
 from pathlib import Path
 
 from firmware_host.answers import BoardObservation
-from rig.analysis.verdict import Check, fitness
+from rig.analysis.check import Check
+from rig.analysis.verdict import fitness
 from rig.arm.motion import Plan, Sweep, Transfer, travel
 from rig.arm.state import ArmReport, ArmState, Joints, RobotMode, RuntimeState, SafetyMode
 from rig.commands.configured import configured

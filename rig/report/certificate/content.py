@@ -18,7 +18,7 @@ from rig.data.result_types import ErrorEntry
 from rig.errors import Refused
 from rig.report.certificate.stated import Stated
 from rig.report.kinds.kind import Found, Without
-from rig.report.kinds.registry import KINDS
+from rig.report.kinds.registry import kinds, shown
 
 
 @dataclass(frozen=True, slots=True)
@@ -133,7 +133,7 @@ class Certificate:
         """What the page prints of each sensor, one after the other; of a reference nothing."""
         blocks = [
             Block(kind.block, found)
-            for kind in KINDS
+            for kind in kinds()
             if not isinstance(kind.block, Without)
             for found in kind.found(self.result)
             if getattr(found.entry, "role", "calibrate") == "calibrate"
@@ -144,7 +144,7 @@ class Certificate:
     @property
     def calibrates(self) -> bool:
         """Whether anything was calibrated, and not verified alone."""
-        return bool(self.gyroscopes or self.accelerometers or self.magnetometers)
+        return _calibrates(self.result)
 
     @property
     def without_uncertainty(self) -> tuple[str, ...]:
@@ -212,9 +212,13 @@ def _number(result: ResultDocument, stated: Stated, reversals: Mapping[str, Reve
     return f"RIG-{day:%Y%m%d}-{hashlib.sha256(said.encode()).hexdigest()[:12].upper()}"
 
 
+def _calibrates(result: ResultDocument) -> bool:
+    """Whether scale factors were found of anything."""
+    return any(each.scale is not None for each in shown(result))
+
+
 def _title(result: ResultDocument, gyroscopes: Sequence[Gyroscope]) -> str:
-    found = any(isinstance(each, MagnetometerEntry) for each in result.magnetometers.values())
-    if not gyroscopes and not result.accelerometers and not found:
+    if not _calibrates(result):
         return "Verification report"
     return "Calibration record" if any(_without_uncertainty(result, gyroscopes)) else "Calibration certificate"
 

@@ -16,7 +16,7 @@ from rig.report.certificate.tables import kind
 from rig.report.certificate.xml_parts import DCC as NAMESPACE
 from rig.report.certificate.xml_parts import UNSAID, XSI, Part, dcc, real, text, words
 from rig.report.kinds.kind import Measured, Without
-from rig.report.kinds.registry import KINDS
+from rig.report.kinds.registry import kinds
 
 DCC: Final = "certificate.xml"
 SCHEMA_VERSION = "3.2.1"
@@ -105,7 +105,7 @@ def _contact(name: str, who: str | None, address: str | None) -> Element:
 
 def _measured(c: Certificate) -> Iterator[Measured]:
     """Everything that was measured, kind by kind."""
-    for each in KINDS:
+    for each in kinds():
         if not isinstance(each.measured, Without):
             yield from filter(None, (each.measured(found, c.reversals) for found in each.found(c.result)))
 

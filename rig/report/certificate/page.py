@@ -6,11 +6,12 @@ from typing import TYPE_CHECKING
 
 from rig.config.sensor_catalogue import has_own_port
 from rig.data.provenance import NO_BOARD
-from rig.data.quantity import QUANTITIES
+from rig.data.quantity import quantities
 from rig.report import expanded, printed_budget, rounding, told_words, validity_words
 from rig.report.certificate import at_rest_tables, coverage_words, plots, tables, validity
 from rig.report.certificate.content import Certificate
 from rig.report.certificate.tables import DEG, JOINT_FACTOR
+from rig.report.kinds.registry import kinds
 
 if TYPE_CHECKING:
     from jinja2 import Template
@@ -32,11 +33,11 @@ def certificate_page(certificate: Certificate) -> str:
 def _template() -> "Template":
     from jinja2 import Environment, FileSystemLoader, StrictUndefined
 
-    loader = FileSystemLoader(Path(__file__).parent)
+    loader = FileSystemLoader([Path(__file__).parent, *(kind.templates for kind in kinds() if kind.templates)])
     environment = Environment(
         loader=loader, autoescape=True, undefined=StrictUndefined, trim_blocks=True, lstrip_blocks=True
     )
-    environment.globals |= {"has_own_port": has_own_port, "no_board": NO_BOARD, "quantities": QUANTITIES}
+    environment.globals |= {"has_own_port": has_own_port, "no_board": NO_BOARD, "quantities": quantities()}
     for module in MODULES:
         environment.globals |= {name: value for name, value in vars(module).items() if callable(value)}
     return environment.get_template(TEMPLATE)

@@ -7,7 +7,7 @@ from rich.table import Table
 
 from rig.analysis.outcome import Outcome
 from rig.data.drift_entries import DriftEntry
-from rig.data.quantity import QUANTITIES, RATE, Quantity
+from rig.data.quantity import RATE, Quantity, quantities
 from rig.data.result_file import ResultDocument
 from rig.data.result_types import ErrorEntry
 from rig.estimation.bias_by_repeat import largest_change_std
@@ -32,7 +32,7 @@ def _entries(outcome: Outcome) -> Mapping[str, Mapping[str, DriftEntry]]:
 
 def _found(document: ResultDocument) -> Iterator[Found[DriftEntry]]:
     for name, drifts in document.bias_drift.items():
-        yield from (Found(name, QUANTITIES[quantity], entry) for quantity, entry in drifts.items())
+        yield from (Found(name, quantities()[quantity], entry) for quantity, entry in drifts.items())
 
 
 def _printed(found: Found[DriftEntry]) -> Iterator[Table | str]:

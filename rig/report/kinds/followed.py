@@ -102,15 +102,16 @@ def is_scale(name: str) -> bool:
 def scale_and_bias(
     sensor: str, quantity: Quantity, entry: Calibrated, bias: Sequence[float], document: ResultDocument
 ) -> Iterator[Parameter]:
-    """The six parameters, and the mean scale factor by their covariance, with the largest k of theirs."""
-    mean = np.array([1 / 3, 1 / 3, 1 / 3, 0, 0, 0])
+    """Scale and bias of each axis, and the mean scale factor by their covariance, with the largest k of theirs."""
+    axes, each_alone = len(entry.scale), np.eye(2 * len(entry.scale))
+    mean = each_alone[:axes].mean(axis=0)
     values, combined = np.array([*entry.scale, *bias]), entry.covariance_combined
-    factors = np.full(6, COVERAGE_FACTOR) if entry.budget is None else np.array(entry.budget.factors)
+    factors = np.full(2 * axes, COVERAGE_FACTOR) if entry.budget is None else np.array(entry.budget.factors)
     limits = {check.means: check.limit for check in document.checks}
     scale_limit, bias_limit = (limits.get(Meaning("conformity", sensor, quantity.name, of)) for of in ("scale", "bias"))
     rows: list[tuple[str, Array, str, float | None]] = [("k", mean, "1", None)]
-    rows += [(f"k{axis}", np.eye(6)[i], "1", scale_limit) for i, axis in enumerate("xyz")]
-    rows += [(f"b{axis}", np.eye(6)[3 + i], quantity.unit, bias_limit) for i, axis in enumerate("xyz")]
+    rows += [(f"k{axis}", each_alone[i], "1", scale_limit) for i, axis in enumerate(quantity.axes)]
+    rows += [(f"b{axis}", each_alone[axes + i], quantity.unit, bias_limit) for i, axis in enumerate(quantity.axes)]
     for name, row, unit, limit in rows:
         yield Parameter(
             name,

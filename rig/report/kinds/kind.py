@@ -2,6 +2,7 @@
 
 from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field
+from pathlib import Path
 from typing import Generic, TypeVar
 from xml.etree.ElementTree import Element
 
@@ -37,7 +38,7 @@ class Found(Generic[EntryT]):
 
 @dataclass(frozen=True, slots=True)
 class Three:
-    """Values x, y, z and their expanded uncertainties."""
+    """Values x, y, z, of fewer axes fewer, and their expanded uncertainties."""
 
     values: Sequence[float]
     expanded: Sequence[float]
@@ -84,7 +85,8 @@ class ResultKind(Generic[EntryT]):
     - `shown` makes the row of the page and of the notebook, `followed` what a history keeps.
     - `figures` names the writer of its pictures in a run folder (`module:function`), `header` makes the lines of
       `calibration.h`, by the g-sensitivities (3, 3) of the gyroscopes that have one.
-    - `block` names the macro of the certificate's page (`template:macro`, in rig/report/certificate) that prints one.
+    - `block` names the macro of the certificate's page (`template:macro`) that prints one; the template lies in
+      `templates`, None where it is the rig's own.
     - `measured` is what the digital certificate says of one, with what turning it over has told, by sensor.
     """
 
@@ -99,6 +101,7 @@ class ResultKind(Generic[EntryT]):
     figures: str | Without
     block: str | Without
     measured: Callable[[Found[EntryT], Mapping[str, ReversalEntry]], Measured | None] | Without
+    templates: Path | None = None
     unsolved: Callable[[ResultDocument], Iterable[str]] = lambda _: ()
 
 

@@ -49,8 +49,9 @@ def beside(sensor: str, quantity: Quantity) -> str:
 def shown_of(name: str, quantity: Quantity, entry: Calibrated) -> Shown:
     """The row of page and notebook."""
     expanded, size = expanded_uncertainties(entry.budget, entry.covariance), quantity.bias.size
-    bias = Three([each / size for each in bias_of(quantity, entry)], [each / size for each in expanded[3:]])
-    return Shown(name, quantity.bias, bias, entry.budget is not None, Three(entry.scale, expanded[:3]))
+    axes = len(entry.scale)
+    bias = Three([each / size for each in bias_of(quantity, entry)], [each / size for each in expanded[axes:]])
+    return Shown(name, quantity.bias, bias, entry.budget is not None, Three(entry.scale, expanded[:axes]))
 
 
 def followed_of(found: Found[Any], document: ResultDocument, temperature_c: float | None) -> Followed:

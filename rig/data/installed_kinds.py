@@ -1,0 +1,42 @@
+"""Kinds of sensors that a package adds, through the entry-point group `rig.kinds`."""
+
+from functools import cache
+from importlib.metadata import entry_points
+from typing import Any, Protocol
+
+from rig.data.quantity import Quantity
+from rig.errors import Refused
+
+GROUP = "rig.kinds"
+
+
+class InstalledKind(Protocol):
+    """What a package says of a kind of sensor: each room takes what is its own, and knows nothing of the others.
+
+    - `quantity` is what it measures: its row of the table.
+    - `solve` takes placements at rest and the site (`rig.analysis.attitudes.solve_placed`) and returns what is found.
+    - `result` is the kind of result (`rig.report.kinds.kind.ResultKind`), which shows that everywhere.
+    """
+
+    @property
+    def quantity(self) -> Quantity: ...
+    @property
+    def solve(self) -> Any: ...
+    @property
+    def result(self) -> Any: ...
+
+
+@cache
+def installed_kinds() -> tuple[InstalledKind, ...]:
+    """The kinds of the packages installed here. Raises Refused `kind_not_loaded`."""
+    found = []
+    for entry in entry_points(group=GROUP):
+        try:
+            found.append(entry.load())
+        except (ImportError, AttributeError) as error:
+            raise Refused(
+                "kind_not_loaded",
+                f"the kind of sensor {entry.name} is installed but cannot be loaded ({error})",
+                f"Install the package of {entry.value} again, or remove it",
+            ) from error
+    return tuple(found)

@@ -1,0 +1,165 @@
+"""A kind of sensor that the rig does not know: a two-axis inclinometer, as somebody's package adds it.
+
+φ = a m + c along x and y, φ the angle by which the axis rises above the horizontal: k = 1/a … in the rig's words
+m = φ / k + b.
+"""
+
+from collections.abc import Iterator, Mapping
+from dataclasses import dataclass
+from pathlib import Path
+from types import SimpleNamespace
+from typing import Any
+from xml.etree.ElementTree import Element
+
+import numpy as np
+from rich.table import Table
+
+from rig.analysis.attitudes import OfKind
+from rig.analysis.check import Check
+from rig.analysis.outcome import Outcome
+from rig.data.meaning import Meaning
+from rig.data.quantity import Quantity, Unit
+from rig.data.result_file import ResultDocument
+from rig.data.result_types import Entry
+from rig.data.settings import Site
+from rig.errors import Fault
+from rig.estimation.arrays import Array
+from rig.observation.placements import Placements
+from rig.report.certificate.xml_parts import dcc, real_list, text
+from rig.report.expanded import expanded
+from rig.report.kinds.followed import Followed, known, scale_and_bias
+from rig.report.kinds.kind import Found, Measured, ResultKind, Shown, Without
+from rig.report.kinds.triad import beside, shown_of, tables
+
+KEY, FEWEST = "inclinometers", 4
+DEGREE = np.pi / 180
+INCLINATION = Quantity(
+    name="inclination",
+    sensor="inclinometer",
+    unit="rad",
+    suffix="rad",
+    reading=Unit("°", DEGREE),
+    bias=Unit("mrad", 1e-3),
+    decimals=3,
+    drift=Unit("µrad", 1e-6),
+    residuals=(Unit("mrad", 1e-3),),
+    walk="white noise",
+    walk_suffix="rad_sqrt_s",
+    walk_unit=Unit("µrad √s", 1e-6),
+    steady=1e-3,
+    axes="xy",
+)
+
+
+@dataclass(frozen=True)
+class Solution:
+    """Scale (2,), bias (2,), their covariance (4, 4), residuals (N, 2) in rad."""
+
+    scale: Array
+    bias_rad: Array
+    covariance: Array
+    residuals_rad: Array
+
+
+class InclinometerEntry(Entry):
+    """An inclinometer's calibration m = φ / k + b."""
+
+    part: str
+    serial_number: str
+    estimator: str
+    scale: tuple[float, float]
+    bias_rad: tuple[float, float]
+    covariance: tuple[tuple[float, ...], ...]
+    covariance_combined: None = None
+    budget: None = None
+    residuals_rad: tuple[tuple[float, float], ...]
+
+
+def solve(placements: Placements, site: Site) -> OfKind:
+    """Lines through the readings over the angles of rise, axis by axis, weighted by the readings' variances."""
+    read = placements.read
+    up = placements.attitudes.swapaxes(1, 2) @ np.array(site.up)
+    rise, means, variances = np.arcsin(up[:, :2]), read.means[INCLINATION], read.variances[INCLINATION]
+    if len(means) < FEWEST:
+        raise Fault("too_few_observations", f"{len(means)} attitudes do not tell two lines", "Lay it down more often")
+    found = [_line(*each) for each in zip(rise.T, means.T, variances.T, strict=True)]
+    scale, bias = (np.array([1 / line[0][0] for line in found]), np.array([line[0][1] for line in found]))
+    covariance = np.zeros((4, 4))
+    for i, ((slope, _), spread) in enumerate(found):
+        turn = np.diag([-1 / slope**2, 1.0])
+        covariance[np.ix_((i, 2 + i), (i, 2 + i))] = turn @ spread @ turn
+    left = means - (rise / scale + bias)
+    held = Check("imu.inclination_residuals", float(np.abs(left).max()), 0.01, "rad",
+                 Meaning("fitness", "imu", INCLINATION.name))  # fmt: skip
+    return OfKind(Solution(scale, bias, covariance, left), (held,))
+
+
+def _line(rise: Array, means: Array, variances: Array) -> tuple[Array, Array]:
+    design = np.column_stack([rise, np.ones(len(rise))]) / np.sqrt(variances)[:, None]
+    spread = np.linalg.inv(design.T @ design)
+    line: Array = spread @ design.T @ (means / np.sqrt(variances))
+    return line, np.asarray(spread, dtype=np.float64)
+
+
+def _entries(outcome: Outcome) -> dict[str, InclinometerEntry]:
+    made = {}
+    for name, sensor in outcome.elsewhere.items():
+        of_kind = sensor.of_kinds.get(INCLINATION)
+        if of_kind is not None and isinstance(of_kind.found, Solution):
+            found = {key: np.asarray(value).tolist() for key, value in vars(of_kind.found).items()}
+            made[name] = InclinometerEntry(
+                part=sensor.item.part, serial_number=sensor.item.serial_number, estimator="lines", **found
+            )
+    return made
+
+
+def _found(document: ResultDocument) -> Iterator[Found[InclinometerEntry]]:
+    for name, entry in document.others.get(KEY, {}).items():
+        yield Found(name, INCLINATION, InclinometerEntry.model_validate(entry))
+
+
+def _printed(found: Found[InclinometerEntry]) -> Iterator[Table | str]:
+    yield from tables(f"{found.sensor}: inclinometer, m = φ / k + b", INCLINATION, found.entry)
+
+
+def _shown(found: Found[InclinometerEntry]) -> Shown:
+    return shown_of(beside(found.sensor, INCLINATION), INCLINATION, found.entry)
+
+
+def _followed(found: Found[InclinometerEntry], document: ResultDocument) -> Followed:
+    entry = found.entry
+    rows = list(scale_and_bias(found.sensor, INCLINATION, entry, entry.bias_rad, document))
+    of = entry.part, entry.serial_number, 0.0, entry.estimator, None
+    return Followed(found.sensor, INCLINATION.name, *of, known(rows))
+
+
+def _header(found: Found[InclinometerEntry], _: Mapping[str, Array]) -> Iterator[str]:
+    x, y = found.entry.scale
+    yield f"static const float {found.sensor}_inclination_scale[2] = {{{x}f, {y}f}};"
+
+
+def _measured(found: Found[InclinometerEntry], _: Any) -> Measured:
+    entry, spread = found.entry, [found.entry.covariance[i][i] ** 0.5 for i in range(2)]
+    listed = real_list("xy", entry.scale, [r"\one"], expanded=expanded(spread, None))
+    result: Element = dcc("result", text("name", "scale factor"), dcc("data", listed))
+    name = "calibration of inclinometer"
+    return Measured("inclinometer", found.sensor, entry.part, entry.serial_number, name, [result])
+
+
+RESULT = ResultKind(
+    name="inclinometer",
+    key=KEY,
+    entries=_entries,
+    found=_found,
+    printed=_printed,
+    shown=_shown,
+    followed=_followed,
+    header=_header,
+    figures=Without("two lines are told by their residuals, which are in the result"),
+    block="inclinometer.html.j2:inclinometer",
+    templates=Path(__file__).parent,
+    measured=_measured,
+)
+
+
+KIND = SimpleNamespace(quantity=INCLINATION, solve=solve, result=RESULT)  # what the entry point names
