@@ -1,7 +1,6 @@
 """The certificate as one HTML page: self-contained, for screens light and dark, for paper and for screen readers."""
 
 from functools import cache
-from pathlib import Path
 from typing import TYPE_CHECKING
 
 from rig.config.sensor_catalogue import has_own_port
@@ -11,6 +10,7 @@ from rig.report import expanded, printed_budget, rounding, told_words, validity_
 from rig.report.certificate import at_rest_tables, coverage_words, plots, tables, validity
 from rig.report.certificate.content import Certificate
 from rig.report.certificate.tables import DEG, JOINT_FACTOR
+from rig.report.kinds.kind import OWN_TEMPLATES
 from rig.report.kinds.registry import kinds
 
 if TYPE_CHECKING:
@@ -33,7 +33,7 @@ def certificate_page(certificate: Certificate) -> str:
 def _template() -> "Template":
     from jinja2 import Environment, FileSystemLoader, StrictUndefined
 
-    loader = FileSystemLoader([Path(__file__).parent, *(kind.templates for kind in kinds() if kind.templates)])
+    loader = FileSystemLoader(list(dict.fromkeys([OWN_TEMPLATES, *(kind.templates for kind in kinds())])))
     environment = Environment(
         loader=loader, autoescape=True, undefined=StrictUndefined, trim_blocks=True, lstrip_blocks=True
     )

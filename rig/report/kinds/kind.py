@@ -18,6 +18,7 @@ from rig.report.kinds.followed import Followed
 
 EntryT = TypeVar("EntryT", bound=Entry)
 SaidT = TypeVar("SaidT")
+OWN_TEMPLATES = Path(__file__).parents[1] / "certificate"
 
 
 @dataclass(frozen=True, slots=True)
@@ -86,7 +87,7 @@ class ResultKind(Generic[EntryT]):
     - `figures` names the writer of its pictures in a run folder (`module:function`), `header` makes the lines of
       `calibration.h`, by the g-sensitivities (3, 3) of the gyroscopes that have one.
     - `block` names the macro of the certificate's page (`template:macro`) that prints one; the template lies in
-      `templates`, None where it is the rig's own.
+      `templates`.
     - `measured` is what the digital certificate says of one, with what turning it over has told, by sensor.
     """
 
@@ -101,7 +102,7 @@ class ResultKind(Generic[EntryT]):
     figures: str | Without
     block: str | Without
     measured: Callable[[Found[EntryT], Mapping[str, ReversalEntry]], Measured | None] | Without
-    templates: Path | None = None
+    templates: Path = OWN_TEMPLATES
     unsolved: Callable[[ResultDocument], Iterable[str]] = lambda _: ()
 
 
