@@ -47,7 +47,7 @@ BySweeps = Estimator | Literal["increments"]
 BY_SWEEPS: tuple[BySweeps, ...] = (*ESTIMATORS, "increments")
 FROM_READINGS = "scatter of the readings"
 OTHER_SIGN = np.diag([1.0, 1.0, 1.0, -1.0, -1.0, -1.0])  # of a bias: m = F ω + b there, g = K (m + b) of gyroscopes
-NO_PUBLISHED = Fault("not_solved", "the attitudes tell no sweeps", "Give sweeps in six directions")
+NO_SWEEPS = Fault("too_few_observations", "attitudes tell no sweeps", "Give sweeps in six directions")
 
 
 @dataclass(frozen=True, slots=True)
@@ -196,8 +196,8 @@ def _gyroscope(item: Item, found: Result, clock: TimeBase | None) -> SensorResul
         vector_model=solution,
         explained=None,
         uncertainty=solution.budget,
-        six_observation=NO_PUBLISHED,
-        algorithm_1=NO_PUBLISHED,
+        six_observation=NO_SWEEPS,
+        algorithm_1=NO_SWEEPS,
         observations=(),
         rests=(),
         time_bases=() if clock is None else (clock,),
