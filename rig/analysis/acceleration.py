@@ -22,7 +22,7 @@ from rig.estimation.imu import ImuSolution, solve_imu
 from rig.estimation.reference_budget import scale_and_bias_covariance
 from rig.estimation.reference_model import F
 from rig.estimation.refusals import check_axes
-from rig.estimation.sensor_axes import angle_jacobian, nearest_rotation, non_orthogonality
+from rig.estimation.sensor_axes import SensorAxes, nearest_rotation
 from rig.estimation.triads import Alignment, alignment
 from rig.estimation.triaxial import Method, TriaxialSolution
 from rig.observation.acceleration import DwellReading
@@ -88,9 +88,7 @@ class AccelerometerResult:
         In the right-angled frame nearest to the gyroscope's axes, where that is known: corrected rates and
         accelerations are in one frame then. Else in that nearest to the accelerometer's own.
         """
-        matrix: Array = nearest_rotation(self.solution.matrix * self.scale[:, None]) @ np.linalg.inv(
-            self.solution.matrix
-        )
+        matrix = SensorAxes.of(self.solution.matrix).correction_matrix
         return matrix if self.alignment is None else self.alignment.rotation.T @ matrix
 
     @property
@@ -161,7 +159,7 @@ def _calibrated(
         movement = with_errors(movement, pieces, sensor, sheet, arm, second_order=settings.second_order)
     weighted = _beside(partial(solve, method="attitude_weighted"))
     if not isinstance(weighted, Fault):
-        check_axes(_axes(weighted.matrix), np.eye(3))
+        check_axes(SensorAxes.of(weighted.matrix).axes, np.eye(3))
     elif movement.own is None:
         raise weighted  # one attitude is off alone; what it is with a sensor that bends, `solve_imu` says
     solution = solve_imu(
@@ -174,18 +172,17 @@ def _calibrated(
         own=movement.own,
         arm_turns=movement.arm_turns,
     )
-    check_axes(_axes(solution.matrix), np.eye(3))
+    axes = SensorAxes.of(solution.matrix)
+    check_axes(axes.axes, np.eye(3))
     if solution.second_order_s2_m is not None:
         check_seen(solution.second_order_s2_m, np.sqrt(np.diag(solution.covariance)[SECOND]), NOT_SEEN)
-    scale, axes = 1 / np.linalg.norm(solution.matrix, axis=1), _axes(solution.matrix)
-    angles = angle_jacobian(axes, scale, nearest_rotation(axes))
     return AccelerometerResult(
         sensor=sensor,
         gravity_m_s2=site.gravity_m_s2,
         movement=movement,
         solution=solution,
-        scale=scale,
-        covariance=scale_and_bias_covariance(solution.matrix, scale, solution.covariance),
+        scale=axes.scale,
+        covariance=scale_and_bias_covariance(solution.matrix, axes.scale, solution.covariance),
         budget=None
         if settings.uncertainty is None
         else accelerometer_budget(
@@ -196,8 +193,8 @@ def _calibrated(
             sheet=sheet,
             noise_freedom=_noise_freedom(used, _swept(name, recordings)) if settings.counts_freedom else None,
         ),
-        non_orthogonality_rad=non_orthogonality(axes),
-        non_orthogonality_std_rad=np.sqrt(np.diag(angles @ solution.covariance[F, F] @ angles.T))[:3],
+        non_orthogonality_rad=axes.non_orthogonality_rad,
+        non_orthogonality_std_rad=axes.non_orthogonality_std_rad(solution.covariance[F, F]),
         alignment=None if gyroscope is None else _alignment(gyroscope, solution, mounting),
         beside={"attitude_weighted": weighted, **{each: _beside(partial(solve, method=each)) for each in BESIDE[1:]}},
         dwells=used,
@@ -205,11 +202,6 @@ def _calibrated(
         held_out=_held_out(left_out, solution, site.gravity_m_s2) if left_out else None,
         temperature_c=temperature_c,
     )
-
-
-def _axes(matrix: Array) -> Array:
-    """(3, 3) unit vectors, the rows of F."""
-    return np.asarray(matrix / np.linalg.norm(matrix, axis=1, keepdims=True), dtype=np.float64)
 
 
 def _apart(

@@ -34,7 +34,7 @@ from rig.estimation.known_turns import BIAS, NOISE, TurnedSolution, solve_turned
 from rig.estimation.reference_budget import scale_and_bias_covariance
 from rig.estimation.reference_model import BIAS as OFFSET
 from rig.estimation.reference_model import F
-from rig.estimation.sensor_axes import angle_jacobian, nearest_rotation, non_orthogonality
+from rig.estimation.sensor_axes import SensorAxes
 from rig.estimation.triaxial import UNTRUSTWORTHY_RAD
 from rig.estimation.vector_model import VectorSolution
 from rig.observation.attitude_import import placed_by
@@ -208,10 +208,7 @@ def _gyroscope(item: Item, found: Result, clock: TimeBase | None) -> SensorResul
 def _as_swept(found: Result) -> TurnedSolution:
     """F and b of m = F ω + b as g = K (m + b) has them, with what the covariance is made of."""
     solution, matrix = found.solution, found.solution.matrix
-    scale = 1 / np.linalg.norm(matrix, axis=1)
-    axes = scale[:, None] * matrix
-    mounting = nearest_rotation(axes)
-    to_angles = angle_jacobian(axes, scale, mounting)
+    axes = SensorAxes.of(matrix)
     of_matrix = np.r_[F, OFFSET]
     lines = tuple(
         replace(line, covariance=OTHER_SIGN @ line.covariance @ OTHER_SIGN) for line in found.budget.contributors
@@ -225,14 +222,14 @@ def _as_swept(found: Result) -> TurnedSolution:
         observations, rank, warnings = of_rows.observations, of_rows.rank, of_rows.warnings
         residuals, estimator = of_rows.residuals, str(of_rows.method)
     return TurnedSolution(
-        scale=scale,
+        scale=axes.scale,
         bias_rad_s=-solution.bias,
-        covariance=OTHER_SIGN @ scale_and_bias_covariance(matrix, scale, solution.covariance) @ OTHER_SIGN,
+        covariance=OTHER_SIGN @ scale_and_bias_covariance(matrix, axes.scale, solution.covariance) @ OTHER_SIGN,
         matrix=matrix,
         matrix_covariance=solution.covariance[np.ix_(of_matrix, of_matrix)],
-        non_orthogonality_rad=non_orthogonality(axes),
-        mounting=mounting,
-        angles_covariance_rad2=to_angles @ solution.covariance[F, F] @ to_angles.T,
+        non_orthogonality_rad=axes.non_orthogonality_rad,
+        mounting=axes.mounting,
+        angles_covariance_rad2=axes.angles_covariance_rad2(solution.covariance[F, F]),
         residuals_rad_s=residuals,
         widened=1.0,
         budget=Budget(lines),

@@ -19,7 +19,7 @@ from rig.estimation.budget import Budget
 from rig.estimation.coverage import effective_freedom
 from rig.estimation.reference_budget import response_in_attitudes
 from rig.estimation.reference_model import F
-from rig.estimation.sensor_axes import angle_jacobian, nearest_rotation
+from rig.estimation.sensor_axes import SensorAxes
 from rig.estimation.vector_fit import Explained
 from rig.estimation.vector_model import VectorSolution, design_matrix, regress
 
@@ -32,7 +32,7 @@ def of_angles(result: SensorResult) -> Array | None:
     if explained is None or budget is None or not budget.by_freedom:
         return None
     solution = explained.solution
-    turned = _to_angles(solution.matrix, solution.mounting)
+    turned = _to_angles(solution.matrix)
     readings = np.einsum("aij,ijkl,akl->a", turned, _of_matrix(solution), turned)
     walk = np.einsum("aij,ijl,ail->a", turned, _walk(explained)[:, :3, :3], turned)
     return _split(np.diag(solution.angles_covariance_rad2), {NOISE: readings - walk, WANDERING: walk}, budget)
@@ -116,12 +116,9 @@ def _line(budget: Budget, name: str) -> float:
     return found[0] if found else np.inf
 
 
-def _to_angles(matrix: Array, rotation: Array | None = None) -> Array:
+def _to_angles(matrix: Array) -> Array:
     """(6, 3, 3) derivative of angles between the axes and of their mounting with respect to F."""
-    scale = 1 / np.linalg.norm(matrix, axis=1)
-    axes = matrix * scale[:, None]
-    found = angle_jacobian(axes, scale, nearest_rotation(axes) if rotation is None else rotation)
-    return found.reshape(6, 3, 3)
+    return SensorAxes.of(matrix).to_angles.reshape(6, 3, 3)
 
 
 def _of_matrix(solution: VectorSolution) -> Array:

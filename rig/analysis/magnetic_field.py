@@ -30,7 +30,7 @@ from rig.estimation.magnetometer import (
 from rig.estimation.reference_budget import scale_and_bias_covariance
 from rig.estimation.reference_model import F
 from rig.estimation.refusals import check_axes
-from rig.estimation.sensor_axes import angle_jacobian, nearest_rotation, non_orthogonality
+from rig.estimation.sensor_axes import SensorAxes, nearest_rotation
 from rig.estimation.triaxial import UNTRUSTWORTHY_RAD, Method
 from rig.observation.field import FieldReading, beside, field_readings, field_tests
 from rig.observation.observed_run import ObservedRun
@@ -69,9 +69,7 @@ class MagnetometerResult:
     @property
     def correction_matrix(self) -> Array:
         """(3, 3) M of B = M (m − b), in the right-angled frame nearest to the magnetometer's own axes."""
-        axes = self.solution.matrix * self.scale[:, None]
-        matrix: Array = nearest_rotation(axes) @ np.linalg.inv(self.solution.matrix)
-        return matrix
+        return SensorAxes.of(self.solution.matrix).correction_matrix
 
 
 def calibrate_magnetometers(
@@ -106,13 +104,11 @@ def _calibrated(
     variances = np.array([dwell.reading.variance for dwell in dwells])
     solve = partial(solve_magnetometer, means, attitudes, variances, field_t=field_t, side=upwards)
     solution = _solved(solve)
-    scale = 1 / np.linalg.norm(solution.matrix, axis=1)
-    axes = solution.matrix * scale[:, None]
-    check_axes(axes, np.eye(3))
+    axes = SensorAxes.of(solution.matrix)
+    check_axes(axes.axes, np.eye(3))
     alike = uniformity(solution, means, attitudes, variances, _attitude_error_rad(name, recordings, accelerometers))
     if not alike.uniform:
         raise Fault("field_not_uniform", _not_alike(alike, solution), ELSEWHERE)
-    angles = angle_jacobian(axes, scale, nearest_rotation(axes))
     return MagnetometerResult(
         sensor=sensor,
         field_t=field_t,
@@ -120,8 +116,8 @@ def _calibrated(
         solution=solution,
         uniformity=alike,
         drift=drift,
-        scale=scale,
-        covariance=scale_and_bias_covariance(solution.matrix, scale, solution.covariance),
+        scale=axes.scale,
+        covariance=scale_and_bias_covariance(solution.matrix, axes.scale, solution.covariance),
         budget=magnetometer_budget(
             solution,
             attitudes,
@@ -131,8 +127,8 @@ def _calibrated(
             field_t=field_t,
             noise_freedom=_noise_freedom(dwells) if settings.counts_freedom else None,
         ),
-        non_orthogonality_rad=non_orthogonality(axes),
-        non_orthogonality_std_rad=np.sqrt(np.diag(angles @ solution.covariance[F, F] @ angles.T))[:3],
+        non_orthogonality_rad=axes.non_orthogonality_rad,
+        non_orthogonality_std_rad=axes.non_orthogonality_std_rad(solution.covariance[F, F]),
         beside={method: or_fault(partial(solve, method=method)) for method in BESIDE},
         dwells=dwells,
         seen=Dwells(means, variances, attitudes),

@@ -26,7 +26,7 @@ from rig.estimation import refusals
 from rig.estimation.arrays import Array
 from rig.estimation.budget import Budget, Contributor
 from rig.estimation.increments import increments
-from rig.estimation.sensor_axes import angle_jacobian, nearest_rotation, non_orthogonality, parameter_jacobian
+from rig.estimation.sensor_axes import SensorAxes, parameter_jacobian
 
 PASSES, SETTLED = 20, 1e-3  # of the standard uncertainty
 FARTHEST_RAD = 0.02  # that a turn may end off what was said of it: beyond, it was another turn
@@ -155,20 +155,18 @@ def solve_turned(
     state = state.moved(step)
     refusals.check_unit(1 / np.linalg.norm(state.matrix, axis=1))
     refusals.check_handedness(state.matrix)
-    scale = 1 / np.linalg.norm(state.matrix, axis=1)
-    axes = scale[:, None] * state.matrix
-    mounting = nearest_rotation(axes)
-    to_parameters, to_angles = parameter_jacobian(state.matrix, scale), angle_jacobian(axes, scale, mounting)
+    axes = SensorAxes.of(state.matrix)
+    to_parameters = parameter_jacobian(state.matrix, axes.scale)
     told = _conditioning(equations)
     return TurnedSolution(
-        scale=scale,
+        scale=axes.scale,
         bias_rad_s=-state.offset,
         covariance=to_parameters @ covariance @ to_parameters.T,
         matrix=state.matrix,
         matrix_covariance=covariance,
-        non_orthogonality_rad=non_orthogonality(axes),
-        mounting=mounting,
-        angles_covariance_rad2=to_angles @ covariance[:9, :9] @ to_angles.T,
+        non_orthogonality_rad=axes.non_orthogonality_rad,
+        mounting=axes.mounting,
+        angles_covariance_rad2=axes.angles_covariance_rad2(covariance[:9, :9]),
         residuals_rad_s=np.array([(each.observed - each.design @ step)[:3] for each in equations]),
         widened=widened,
         budget=_budget(equations, to_parameters @ covariance),

@@ -3,6 +3,8 @@
 Row F_i = a_i / k_i, with a_i the unit vector of sensor axis i in the flange frame.
 """
 
+from dataclasses import dataclass
+
 import numpy as np
 
 from rig.estimation.arrays import Array
@@ -10,6 +12,48 @@ from rig.estimation.arrays import Array
 # The pairs y z, z x, x y; the angle of each is that about the third axis.
 FIRST, SECOND = np.array([1, 2, 0]), np.array([2, 0, 1])
 PAIR = np.arange(3)
+
+
+@dataclass(frozen=True, slots=True)
+class SensorAxes:
+    """The axes that F has: `scale` factors (3,), unit vectors (3, 3), one a row, the rotation (3, 3) nearest to these."""
+
+    scale: Array
+    axes: Array
+    mounting: Array
+
+    @staticmethod
+    def of(matrix: Array) -> "SensorAxes":
+        """The axes of `matrix` F (3, 3)."""
+        scale = 1 / np.linalg.norm(matrix, axis=1)
+        axes = scale[:, None] * matrix
+        return SensorAxes(scale, axes, nearest_rotation(axes))
+
+    @property
+    def non_orthogonality_rad(self) -> Array:
+        """(3,) as `non_orthogonality` has it."""
+        return non_orthogonality(self.axes)
+
+    @property
+    def to_angles(self) -> Array:
+        """(6, 9) as `angle_jacobian` has it."""
+        return angle_jacobian(self.axes, self.scale, self.mounting)
+
+    @property
+    def correction_matrix(self) -> Array:
+        """(3, 3) what takes a reading, its offset taken out, to the right-angled frame nearest to the axes."""
+        matrix: Array = self.mounting @ np.linalg.inv(self.axes / self.scale[:, None])
+        return matrix
+
+    def angles_covariance_rad2(self, of_matrix: Array) -> Array:
+        """(6, 6) of the non-orthogonality and of the mounting, by the covariance (9, 9) of F, row by row."""
+        covariance: Array = self.to_angles @ of_matrix @ self.to_angles.T
+        return covariance
+
+    def non_orthogonality_std_rad(self, of_matrix: Array) -> Array:
+        """(3,) standard deviations, by the covariance (9, 9) of F."""
+        std: Array = np.sqrt(np.diag(self.angles_covariance_rad2(of_matrix)))[:3]
+        return std
 
 
 def non_orthogonality(axes: Array) -> Array:

@@ -11,7 +11,7 @@ from numpy.typing import ArrayLike
 
 from rig.estimation.arrays import Array
 from rig.estimation.refusals import check_finite, check_handedness, require_shape
-from rig.estimation.sensor_axes import angle_jacobian, nearest_rotation
+from rig.estimation.sensor_axes import SensorAxes
 
 
 @dataclass(frozen=True, slots=True)
@@ -57,8 +57,5 @@ def _frame(matrix: ArrayLike, covariance: ArrayLike) -> tuple[Array, Array]:
     require_shape("covariance", of_rows, (9, 9))
     check_finite(matrix=f, covariance=of_rows)
     check_handedness(f)
-    scale = 1 / np.linalg.norm(f, axis=1)
-    axes = scale[:, None] * f
-    rotation = nearest_rotation(axes)
-    turns = angle_jacobian(axes, scale, rotation)[3:]
-    return rotation, turns @ of_rows @ turns.T
+    axes = SensorAxes.of(f)
+    return axes.mounting, axes.angles_covariance_rad2(of_rows)[3:, 3:]

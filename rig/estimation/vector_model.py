@@ -33,7 +33,7 @@ from rig.estimation.refusals import (
     inconsistency,
     require_shape,
 )
-from rig.estimation.sensor_axes import angle_jacobian, nearest_rotation, non_orthogonality, parameter_jacobian
+from rig.estimation.sensor_axes import SensorAxes, parameter_jacobian
 
 MODEL = "m = F ω − b, k_i = 1/‖F_i‖"
 MATRIX_PARAMETERS = (*(f"f{i}{j}" for i in "xyz" for j in "xyz"), "cx", "cy", "cz")
@@ -135,25 +135,22 @@ def solve_vector_model(
     raw = _raw_covariance(inverse, variances, speed_noise, shared)
 
     matrix = coefficients[:3].T
-    scale = 1 / np.linalg.norm(matrix, axis=1)
-    check_unit(scale)
-    axes = scale[:, None] * matrix
-    check_axes(axes, None if nominal_mounting is None else np.asarray(nominal_mounting, dtype=np.float64))
+    axes = SensorAxes.of(matrix)
+    check_unit(axes.scale)
+    check_axes(axes.axes, None if nominal_mounting is None else np.asarray(nominal_mounting, dtype=np.float64))
     of_matrix, of_gravity = places(columns)
     matrix_covariance = raw[of_matrix[:, None], of_matrix]
-    to_parameters = parameter_jacobian(matrix, scale)
-    mounting = nearest_rotation(axes)
-    to_angles = angle_jacobian(axes, scale, mounting)
+    to_parameters = parameter_jacobian(matrix, axes.scale)
     residuals = means - design @ coefficients
     return VectorSolution(
-        scale=scale,
+        scale=axes.scale,
         bias_rad_s=-coefficients[3],
         covariance=to_parameters @ matrix_covariance @ to_parameters.T,
         matrix=matrix,
         matrix_covariance=matrix_covariance,
-        non_orthogonality_rad=non_orthogonality(axes),
-        mounting=mounting,
-        angles_covariance_rad2=to_angles @ matrix_covariance[:9, :9] @ to_angles.T,
+        non_orthogonality_rad=axes.non_orthogonality_rad,
+        mounting=axes.mounting,
+        angles_covariance_rad2=axes.angles_covariance_rad2(matrix_covariance[:9, :9]),
         g_sensitivity=coefficients[4:].T if columns > 4 else None,
         g_sensitivity_covariance=raw[of_gravity[:, None], of_gravity] if columns > 4 else None,
         response=_response(to_parameters, inverse),

@@ -10,7 +10,7 @@ from rich.table import Table
 from rig.data.quantity import Quantity
 from rig.data.result_types import Freedom
 from rig.estimation.arrays import Array
-from rig.estimation.sensor_axes import angle_jacobian, nearest_rotation, non_orthogonality
+from rig.estimation.sensor_axes import SensorAxes
 from rig.observation.mean import Mean
 from rig.observation.windows import Window
 from rig.report.entry import EntryT, entry
@@ -96,11 +96,9 @@ def matrix_lines(matrix: Array, covariance: Array, factor: float) -> Iterator[st
     for axis, row, known in zip("xyz", matrix.tolist(), spread.tolist(), strict=True):
         elements = (f"{element:+.6f} ± {each:.1e}" for element, each in zip(row, known, strict=True))
         yield f"F {axis}: " + "  ".join(elements)
-    scale = 1 / np.linalg.norm(matrix, axis=1)
-    axes = matrix * scale[:, None]
-    turned = angle_jacobian(axes, scale, nearest_rotation(axes))[:3]
-    angles_std = np.sqrt(np.diag(turned @ covariance @ turned.T))
-    angles = zip(1e3 * non_orthogonality(axes), 1e3 * factor * angles_std, strict=True)
+    axes = SensorAxes.of(matrix)
+    stds = axes.non_orthogonality_std_rad(covariance)
+    angles = zip(1e3 * axes.non_orthogonality_rad, 1e3 * factor * stds, strict=True)
     told = "  ".join(f"{angle:+.3f} ± {known:.2g}" for angle, known in angles)
     yield f"non-orthogonality yz zx xy: {told} mrad (U, k = {factor:.3g})"
 

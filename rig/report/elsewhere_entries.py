@@ -21,7 +21,7 @@ from rig.estimation import accelerometer, magnetometer
 from rig.estimation.reference_budget import scale_and_bias_covariance
 from rig.estimation.reference_model import F
 from rig.estimation.residuals import attitude_residual_std
-from rig.estimation.sensor_axes import angle_jacobian, nearest_rotation, non_orthogonality
+from rig.estimation.sensor_axes import SensorAxes
 from rig.estimation.triaxial import TriaxialSolution
 from rig.report.axes import PARAMETERS, dwell_entry
 from rig.report.budget_entry import budget_entry
@@ -140,26 +140,24 @@ def _placed(outcome: Outcome, quantity: Quantity) -> list[tuple[str, Item, Site,
 def _at_rest(kind: Any, quantity: Quantity, item: Item, found: InAttitudes, **own: Any) -> Any:
     """What the entries of accelerometers and magnetometers share, each in the unit of its quantity."""
     solution, error, laid = found.solution, found.solution.attitude_error, found.laid
-    scale = _scale(solution)
-    axes = solution.matrix * scale[:, None]
-    angles = angle_jacobian(axes, scale, nearest_rotation(axes))
+    axes = SensorAxes.of(solution.matrix)
     return entry(
         kind, solution,
         part=item.part,
         serial_number=item.serial_number,
         estimator=solution.method,
-        scale=scale,
-        covariance=scale_and_bias_covariance(solution.matrix, scale, solution.covariance),
+        scale=axes.scale,
+        covariance=scale_and_bias_covariance(solution.matrix, axes.scale, solution.covariance),
         covariance_order=PARAMETERS,
         covariance_units=quantity.parameter_units,
         covariance_combined=found.budget.covariance,
         budget=budget_entry(found.budget),
-        non_orthogonality_rad=non_orthogonality(axes),
-        non_orthogonality_std_rad=np.sqrt(np.diag(angles @ solution.covariance[F, F] @ angles.T))[:3],
+        non_orthogonality_rad=axes.non_orthogonality_rad,
+        non_orthogonality_std_rad=axes.non_orthogonality_std_rad(solution.covariance[F, F]),
         attitude_error_rad=None if error is None else error.std_rad,
         attitude_error_std_rad=error.uncertainty_rad if error is not None and np.isfinite(error.uncertainty_rad)
         else None,
-        correction_matrix=nearest_rotation(axes) @ np.linalg.inv(solution.matrix),
+        correction_matrix=axes.correction_matrix,
         laid_down=LaidDownEntry(
             placement_std=None if laid is None else laid.placement_std,
             placement_uncertainty=None if laid is None else laid.placement_uncertainty,
