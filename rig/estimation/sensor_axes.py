@@ -16,7 +16,7 @@ PAIR = np.arange(3)
 
 @dataclass(frozen=True, slots=True)
 class SensorAxes:
-    """The axes that F has: `scale` factors (3,), unit vectors (3, 3), one a row, the rotation (3, 3) nearest to these."""
+    """The axes that F has: `scale` factors (3,), unit vectors (3, 3), one a row, the rotation (3, 3) next to these."""
 
     scale: Array
     axes: Array
