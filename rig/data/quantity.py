@@ -62,9 +62,42 @@ class Quantity:
         return tuple(self.named(axis) for axis in "xyz")
 
     @property
+    def shape(self) -> tuple[int, ...]:
+        """The shape of one reading."""
+        return (3,)
+
+    @property
     def parameter_units(self) -> tuple[str, ...]:
         """The units of three scale factors and three biases."""
         return ("1", "1", "1", self.unit, self.unit, self.unit)
+
+
+@dataclass(frozen=True, slots=True)
+class Scalar:
+    """One quantity without axes, which is recorded, shown and exported, and never calibrated.
+
+    `sensor` is what measures it, `unit` that of its values, `suffix` the same in names, `reading` the one on a screen.
+    """
+
+    name: str
+    sensor: str
+    unit: str
+    suffix: str
+    reading: Unit
+
+    def named(self, what: str) -> str:
+        """The name in a file of `what` in this quantity's unit: `pressure_pa`."""
+        return f"{what}_{self.suffix}"
+
+    @property
+    def columns(self) -> tuple[str, ...]:
+        """The one column of its readings in a table."""
+        return (self.named(self.name),)
+
+    @property
+    def shape(self) -> tuple[int, ...]:
+        """The shape of one reading."""
+        return ()
 
 
 RATE: Final = Quantity(
@@ -113,3 +146,8 @@ FIELD: Final = Quantity(
     steady=2e-6,
 )
 QUANTITIES: Final[Mapping[str, Quantity]] = MappingProxyType({each.name: each for each in (RATE, ACCELERATION, FIELD)})
+TEMPERATURE: Final = Scalar("temperature", "thermometer", "°C", "c", Unit("°C", 1.0))
+PRESSURE: Final = Scalar("pressure", "barometer", "Pa", "pa", Unit("hPa", 100.0))
+MEASURED: Final[Mapping[str, Quantity | Scalar]] = MappingProxyType(
+    {**QUANTITIES, **{each.name: each for each in (TEMPERATURE, PRESSURE)}}
+)
