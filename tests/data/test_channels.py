@@ -1,5 +1,6 @@
 """A source says in the recording what its samples hold: a scalar is recorded, shown and exported like any other."""
 
+import io
 import json
 from dataclasses import replace
 from pathlib import Path
@@ -7,7 +8,10 @@ from pathlib import Path
 import h5py
 import numpy as np
 import pytest
+from rich.console import Console
+from rich.live import Live
 
+from rig.arm.motion import Rest
 from rig.data.channel import Channel
 from rig.data.quantity import PRESSURE, RATE
 from rig.data.recorded_sensor import RecordedSensor
@@ -17,8 +21,8 @@ from rig.observation.observed_run import observe_run
 from rig.page.shown import About, Shown
 from rig.report.exports.formats import writer_of_readings
 from rig.runner.acquisition import Acquisition
-from rig.station.events import SamplesTaken
-from rig.station.view import _readings as rows_of
+from rig.station.events import Progress, SamplesTaken
+from rig.station.view import LiveView
 from support.synthetic_run import Setup, synthetic_run
 
 PRESSURE_PA = 96_480.0
@@ -77,10 +81,14 @@ def test_a_scalar_is_shown_while_it_comes_on_the_terminal_and_on_the_page() -> N
     acquisition.expect("barometer", BAROMETER)
     acquisition.on_samples("barometer", run.samples["barometer"])
     (seen,) = acquisition.samples()
-    ((name, shown),) = rows_of(seen)
-    assert name == "barometer" and shown.split() == f"+964.80 hPa, {seen.samples} samples, 0 lost".split()
+    console = Console(width=100, file=io.StringIO(), record=True)
+    with Live(console=console, auto_refresh=False) as live:
+        view = LiveView(live)
+        view.event(SamplesTaken((seen,)))
+        view.event(Progress(1, 4, Rest("rest", 3.0), 0.5, 1.5, 1.5, 0.0))
+    assert f"+964.80 hPa, {seen.samples} samples, 0 lost" in console.export_text()
     page = Shown(About("run", "six_observation"))
-    page.event(SamplesTaken((seen,)))
+    page.take(SamplesTaken((seen,)))
     assert page.sections["sensors"][0]["units"] == {"pressure_pa": ["pressure", "hPa"]}
 
 
