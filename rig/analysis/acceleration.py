@@ -11,7 +11,8 @@ from rig.analysis.accelerometer_errors import mean_temperature_c, pieces_of, she
 from rig.analysis.attitudes import check_seen
 from rig.analysis.calibration import SensorResult, or_fault
 from rig.analysis.reference_budgets import accelerometer_budget
-from rig.data.run_file import RecordedSensor
+from rig.data.quantity import ACCELERATION
+from rig.data.recorded_sensor import RecordedSensor
 from rig.data.settings import PlannedDwell, RunSettings, Site
 from rig.errors import Fault
 from rig.estimation.accelerometer import AccelerometerSolution, solve_accelerometer, specific_force
@@ -125,7 +126,7 @@ def calibrate_accelerometers(
     return {
         name: _calibrated(name, recordings, settings, settings.site, gyroscopes.get(name))
         for name in settings.to_calibrate
-        if described[name].has_acceleration
+        if described[name].measures(ACCELERATION)
     }
 
 
@@ -152,8 +153,9 @@ def _calibrated(
     )
     movement, sheet = Movement(seen, sweeps, _repeatability_rad(settings)), None
     temperature_c = float(np.mean([dwell.temperature_c for dwell in used]))
-    if settings.knows_accelerometers and settings.uncertainty is not None and sensor.range_m_s2 is not None:
-        sheet = sheet_of(settings.uncertainty, name, sensor.part, sensor.range_m_s2)
+    end_of_scale = sensor.channel(ACCELERATION).range
+    if settings.knows_accelerometers and settings.uncertainty is not None and end_of_scale is not None:
+        sheet = sheet_of(settings.uncertainty, name, sensor.part, end_of_scale)
         pieces = pieces_of(name, recordings, used)
         arm, temperature_c = recordings[0].motion.kinematics, mean_temperature_c(pieces)
         movement = with_errors(movement, pieces, sensor, sheet, arm, second_order=settings.second_order)

@@ -9,7 +9,8 @@ from rig.analysis.arm_patterns import Stood, arm_turns
 from rig.analysis.vector_inputs import since_first_s
 from rig.arm.kinematics import WRIST_1, DenavitHartenberg
 from rig.data.budget_entries import IN_U
-from rig.data.run_file import RecordedSensor
+from rig.data.quantity import TEMPERATURE
+from rig.data.recorded_sensor import RecordedSensor
 from rig.data.settings import OfSensor, Uncertainty
 from rig.estimation.accelerometer_errors import AccelerometerErrors
 from rig.estimation.accelerometer_model import Movement
@@ -134,7 +135,7 @@ def with_errors(
     second_order: bool,
 ) -> Movement:
     """The movement with what is known of the sensor's errors and of the arm's in these pieces of it."""
-    own = errors_of(sheet, pieces, abs(sensor.temperature_c_per_count), second_order=second_order)
+    own = errors_of(sheet, pieces, sensor.channel(TEMPERATURE).resolution, second_order=second_order)
     turns = arm_turns([each.stood for each in pieces], arm, np.array(sensor.mounting))
     return replace(movement, own=own, arm_turns=turns)
 

@@ -8,8 +8,9 @@ from itertools import pairwise
 import numpy as np
 
 from rig.analysis.calibration import or_fault
-from rig.data.quantity import ACCELERATION, RATE, Quantity
-from rig.data.run_file import RecordedSensor, RunData
+from rig.data.quantity import ACCELERATION, RATE, TEMPERATURE, Quantity
+from rig.data.recorded_sensor import RecordedSensor
+from rig.data.run_file import RunData
 from rig.errors import Fault
 from rig.estimation.allan import AllanAxis, AllanCurve, allan_curve, read_axis, too_short
 from rig.estimation.arrays import Array
@@ -56,12 +57,12 @@ def at_rest(runs: Sequence[RunData]) -> dict[str, SensorAtRest]:
     """
     motions = [motion_of(run) for run in runs]
     found = {}
-    for name, sensor in runs[0].sensors.items():
+    for name, sensor in runs[0].measuring(RATE).items():
         pieces = []
         for run, motion in zip(runs, motions, strict=True):
             stream = on_the_arms_clock(run.samples[name], sensor, motion)
             pieces += [(stream, inside) for inside in _stretches(run, stream, motion)]
-        quantities = [RATE, ACCELERATION] if sensor.has_acceleration else [RATE]
+        quantities = [RATE, ACCELERATION] if sensor.measures(ACCELERATION) else [RATE]
         found[name] = SensorAtRest(sensor, {each: or_fault(partial(_of, pieces, each)) for each in quantities})
     return found
 
@@ -134,6 +135,5 @@ def _readings(stream: Stream, inside: slice, quantity: Quantity) -> Array:
 
 
 def _temperatures(stream: Stream, inside: slice) -> tuple[float, float]:
-    counts = stream.raw["temperature_counts"][inside].astype(np.float64)
-    degrees = counts * stream.sensor.temperature_c_per_count + stream.sensor.temperature_offset_c
+    degrees = stream.sensor.channel(TEMPERATURE).values(stream.raw[inside])
     return float(degrees.min()), float(degrees.max())

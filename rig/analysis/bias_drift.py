@@ -12,7 +12,7 @@ import numpy as np
 from rig.analysis.calibration import or_fault
 from rig.analysis.vector_inputs import since_first_s
 from rig.data.quantity import ACCELERATION, RATE, Quantity
-from rig.data.run_file import RecordedSensor
+from rig.data.recorded_sensor import RecordedSensor
 from rig.data.settings import RunSettings, Site
 from rig.errors import Fault
 from rig.estimation.arrays import Array
@@ -94,7 +94,7 @@ def bias_drifts(recordings: Sequence[ObservedRun], settings: RunSettings) -> Dri
     for name in settings.to_calibrate:
         sensor = recordings[0].run.sensors[name]
         drifts[name] = {RATE: rate_drift(_whole(_rates(recordings, name, sensor), table), site)}
-        if sensor.has_acceleration:
+        if sensor.measures(ACCELERATION):
             accelerations = _whole(_accelerations(recordings, name, sensor), table)
             drifts[name][ACCELERATION] = acceleration_drift(accelerations, site, second_order=settings.second_order)
     return drifts if settings.counts_freedom else {name: _uncounted(each) for name, each in drifts.items()}

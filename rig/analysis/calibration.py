@@ -11,7 +11,8 @@ from rig.analysis.correction import Correction, CorrectionKind, diagonal_correct
 from rig.analysis.surroundings import Surroundings
 from rig.analysis.vector_inputs import known_of, see, unknown_of
 from rig.data.motion_file import Item
-from rig.data.run_file import RecordedSensor, RunData
+from rig.data.recorded_sensor import RecordedSensor
+from rig.data.run_file import RunData
 from rig.errors import Fault, Refused
 from rig.estimation.accumulator import Accumulator, SixObservationEstimator, Solution
 from rig.estimation.arrays import Array

@@ -24,7 +24,7 @@ from rig.analysis.surroundings import Surroundings, surroundings_of
 from rig.analysis.told_from import ToldFrom, of_gyroscope, of_reference
 from rig.analysis.verdict import fitness
 from rig.analysis.ways import with_ways
-from rig.data.quantity import ACCELERATION, FIELD, Quantity
+from rig.data.quantity import ACCELERATION, FIELD, RATE, Quantity
 from rig.data.run_file import RunData
 from rig.errors import Fault, RigError
 from rig.observation.observed_run import ObservedRun
@@ -77,7 +77,8 @@ def contradictions(
             known = allowed(surroundings, name, results[name])
             allowance = allow(known, pieces, with_ways(pieces, name, recordings, explained), explained.solution.matrix)
         found = consistency(pieces, explained.solution.matrix, rate, allowance)
-        counts = [recording.run.samples[name]["counts"].astype(np.int64) for recording in recordings]
+        gyroscope = recordings[0].run.sensors[name].channel(RATE)
+        counts = [gyroscope.counts(recording.run.samples[name]).astype(np.int64) for recording in recordings]
         named = {results[name].observations[place].sweep: each for place, each in found.disturbed.items()}
         sweeps = [fitness(name, "rate", f"{DISTURBED}.{sweep}", *named[sweep], sweep=sweep) for sweep in sorted(named)]
         checks += sweeps or [fitness(name, "rate", DISTURBED, *found.sweep)]
@@ -128,8 +129,8 @@ def _rate(run: RunData, sensors: Sequence[str], false_alarms: float) -> float:
     """Rate of false alarms for each statistic: all kinds of readings that are held against themselves share them."""
     kinds = len(sensors)
     if run.settings.holds_all_kinds:
-        accelerometers = [name for name in run.settings.to_calibrate if run.sensors[name].has_acceleration]
-        kinds += len(accelerometers) + len(run.magnetometers)
+        accelerometers = run.measuring(ACCELERATION).keys() & run.settings.to_calibrate
+        kinds += len(accelerometers) + len(run.measuring(FIELD))
     return rate_of_each(kinds, by_model=run.settings.checked_by_model, of_all=false_alarms)
 
 

@@ -13,7 +13,8 @@ import numpy as np
 from rig.analysis.acceleration import AccelerometerResult
 from rig.analysis.calibration import or_fault
 from rig.analysis.reference_budgets import magnetometer_budget
-from rig.data.run_file import RecordedMagnetometer
+from rig.data.quantity import FIELD
+from rig.data.recorded_sensor import RecordedSensor
 from rig.data.settings import RunSettings, Site
 from rig.errors import Fault
 from rig.estimation.accelerometer_model import Dwells
@@ -51,7 +52,7 @@ class MagnetometerResult:
     the Fault each ends in.
     """
 
-    sensor: RecordedMagnetometer
+    sensor: RecordedSensor
     field_t: float
     extension_m: tuple[float, float, float]
     solution: MagnetometerSolution
@@ -83,13 +84,13 @@ def calibrate_magnetometers(
     """
     return {
         name: or_fault(partial(_calibrated, name, sensor, recordings, settings, accelerometers))
-        for name, sensor in recordings[0].run.magnetometers.items()
+        for name, sensor in recordings[0].run.measuring(FIELD).items()
     }
 
 
 def _calibrated(
     name: str,
-    sensor: RecordedMagnetometer,
+    sensor: RecordedSensor,
     recordings: Sequence[ObservedRun],
     settings: RunSettings,
     accelerometers: Mapping[str, AccelerometerResult],

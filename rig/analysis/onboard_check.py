@@ -15,6 +15,7 @@ from numpy.typing import NDArray
 from rig.analysis.check import Check
 from rig.analysis.verdict import fitness
 from rig.data.events import BoardNotObserved, BoardObserved, BoardRecalled, BoardSolved, OfTheBoard
+from rig.data.quantity import RATE
 from rig.data.run_file import RunData
 from rig.errors import Fault
 from rig.estimation.accumulator import Accumulator
@@ -119,12 +120,13 @@ def _observation(run: RunData, seen: BoardObserved) -> _Observation:
     samples, observed = run.samples[seen.sensor], seen.observation
     times_us = samples["board_time_us"]
     used = slice(*np.searchsorted(times_us, [observed.start_us, observed.end_us]).tolist())
-    counts, missing = samples["counts"][used], observed.samples - (used.stop - used.start)
+    missing = observed.samples - (used.stop - used.start)
     if 0 < missing <= _lost(samples["sequence"][max(used.start - 1, 0) : used.stop + 1]):
         return _Observation(np.array(observed.mean_rad_s), seen.speed_rad_s, averaged=False)
+    gyroscope = run.sensors[seen.sensor].channel(RATE)
+    counts = gyroscope.counts(samples)[used]
     mean = counts.mean(axis=0) if missing == 0 and len(counts) else np.full(3, np.nan)
-    mean_rad_s = np.asarray(mean * run.sensors[seen.sensor].sensitivity_rad_s_per_count)
-    return _Observation(mean_rad_s, seen.speed_rad_s, averaged=True)
+    return _Observation(gyroscope.in_unit(mean), seen.speed_rad_s, averaged=True)
 
 
 def _of(run: RunData, sensor: str) -> Iterator[OfTheBoard]:

@@ -37,6 +37,7 @@ from rig.analysis.verdict import (
 from rig.analysis.verification import Verification, verify
 from rig.data.motion_file import ReadElsewhere
 from rig.data.provenance import Provenance
+from rig.data.quantity import RATE
 from rig.data.result_file import StoredCalibrationEntry
 from rig.data.run_file import RunData
 from rig.data.settings import DecisionRule, RunSettings
@@ -118,7 +119,7 @@ def calibrated(runs: Sequence[RunData], estimator: str = DEFAULT_ESTIMATOR, *, d
     if not settings.planned_sweeps:
         return _in_attitudes(runs, recordings, drifting=drifting)
     surroundings = surroundings_of(recordings)
-    results = solve_observed(runs[0].sensors, recordings, chosen, surroundings, settings.matrix_corrected)
+    results = solve_observed(runs[0].measuring(RATE), recordings, chosen, surroundings, settings.matrix_corrected)
     accelerometers = calibrate_accelerometers(recordings, settings, results)
     magnetometers = calibrate_magnetometers(recordings, settings, accelerometers)
     among_rates = contradictions(recordings, results, settings.to_calibrate, surroundings)

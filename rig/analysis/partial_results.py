@@ -10,6 +10,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from rig.analysis.calibration import solve_vector
+from rig.data.quantity import ACCELERATION, RATE
 from rig.data.run_file import RunData
 from rig.errors import Fault
 from rig.estimation.arrays import Array
@@ -53,7 +54,7 @@ def so_far(runs: Sequence[RunData]) -> dict[str, SoFar]:
             motion = motion_of(run)
         except Fault:
             continue  # nothing has moved yet
-        for name in run.sensors:
+        for name in run.measuring(RATE):
             turned, dwelt, rested = _seen(run, name, motion)
             sweeps.setdefault(name, {}).update(turned)
             dwells.setdefault(name, {}).update(dwelt)
@@ -76,7 +77,7 @@ def _seen(run: RunData, name: str, motion: Motion) -> Seen:
     try:
         stream = on_the_arms_clock(run.samples[name], sensor, motion)
     except Fault as fault:  # of the sensor as a whole: its clock is not found
-        dwelt = finished_dwells(run) if sensor.has_acceleration else ()
+        dwelt = finished_dwells(run) if sensor.measures(ACCELERATION) else ()
         return dict.fromkeys(finished_sweeps(run), fault), dict.fromkeys(dwelt, fault), ()
     turned, rests = _observed(run, name, stream, motion)
     return turned, each_dwell(run, stream, motion, run.settings.observation), rests

@@ -12,6 +12,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from rig.analysis.calibration import SensorResult
+from rig.data.quantity import RATE
 from rig.data.settings import Site
 from rig.estimation.arrays import Array
 from rig.estimation.vector_fit import Explained
@@ -223,7 +224,8 @@ def _cut(
             left = left - along @ np.linalg.lstsq(along, left, rcond=None)[0]
             if known.all():
                 rates = turned(motion, average.start_s, average.end_s, in_hertz(cycles, time_s), parts)
-    count = stream.sensor.sensitivity_rad_s_per_count
+    gyroscope = stream.sensor.channel(RATE)
+    count = gyroscope.unit_per_count
     scatter = np.maximum(np.sum(left**2, axis=0) / max(len(left) - len(enough) - taken, 1), count**2 / 12)
     if finds_lines and turn is not None:  # what the encoders miss of a ripple is no noise of a part's
         noise = (average.variance_rad2_s2 - average.drift_rad2_s2) * average.samples
@@ -249,5 +251,5 @@ def _cut(
                 stretch=Stretch(motion, float(ends[each]), float(ends[each + 1])),
             )
         )
-    seen = stream.raw["counts"][inside].astype(np.int64)
+    seen = gyroscope.counts(stream.raw)[inside].astype(np.int64)
     return Window(sweep, seen, residual / count, np.sqrt(np.mean(shaken**2, axis=0)) / count, swing_rad2), pieces

@@ -25,6 +25,7 @@ from rig.analysis.reference_suspected import Read
 from rig.analysis.suspicion import Statistic
 from rig.analysis.vector_inputs import since_first_s
 from rig.arm.kinematics import WRIST_1
+from rig.data.quantity import ACCELERATION, FIELD
 from rig.data.settings import Uncertainty
 from rig.estimation.accelerometer_model import LEVER, NO_SWEEPS, PARAMETERS, Movement
 from rig.estimation.arrays import Array
@@ -68,13 +69,13 @@ def of_accelerometer(
     pieces = [_Piece.of_dwell(dwell) for dwell in dwells if dwell.index in used]
     pieces += [piece for each, since_s in timed for piece in _swept(name, each, since_s)]
     solution, movement, theta = result.solution, result.movement, result.solution.theta
-    sensor = result.sensor
+    sensor, channel = result.sensor, result.sensor.channel(ACCELERATION)
     flicker_m_s2 = MICRO_G_M_S2 * known.of("acceleration_bias_instability_ug", name, sensor.part)
     lag = lag_pattern(movement, 1e-3 * known.acceleration_lag_ms) / np.sqrt(3)
     off_rad = solution.attitude_error.std_rad
     arm = Known(recordings[0].motion.kinematics, known.axis_deg, np.array(sensor.mounting), off_rad)
     return ReadInReference(
-        counts=[recording.run.samples[name]["acceleration_counts"].astype(np.int64) for recording in recordings],
+        counts=[channel.counts(recording.run.samples[name]).astype(np.int64) for recording in recordings],
         dwells=dwells,
         sweeps=[sweep for each in recordings for sweep in acceleration_sweeps(name, each)],
         read=Read(
@@ -85,7 +86,7 @@ def of_accelerometer(
             second_order=solution.second_order_s2_m is not None,
         ),
         pieces=[each.name for each in pieces],
-        flicker_counts=flicker_m_s2 / (sensor.sensitivity_m_s2_per_count or np.inf),
+        flicker_counts=flicker_m_s2 / channel.unit_per_count,
     )
 
 
@@ -94,6 +95,7 @@ def of_magnetometer(
 ) -> ReadInReference:
     """What a magnetometer read, as of an accelerometer that nothing swept."""
     solution, movement = result.solution, Movement(result.seen, NO_SWEEPS)
+    channel = result.sensor.channel(FIELD)
     timed = zip(recordings, since_first_s(recordings), strict=True)
     dwells = [dwell for each, since_s in timed for dwell in field_dwells(name, each, since_s)]
     pieces = [_Piece.of_dwell(dwell) for dwell in dwells]
@@ -103,7 +105,7 @@ def of_magnetometer(
     arm = Known(recordings[0].motion.kinematics, known.axis_deg, np.array(result.sensor.mounting), off_rad)
     of_arm = arm_patterns(theta, movement, [each.stood for each in pieces], arm)
     return ReadInReference(
-        counts=[recording.run.samples[name]["field_counts"].astype(np.int64) for recording in recordings],
+        counts=[channel.counts(recording.run.samples[name]).astype(np.int64) for recording in recordings],
         dwells=dwells,
         sweeps=(),
         read=Read(

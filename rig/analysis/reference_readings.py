@@ -12,6 +12,7 @@ from numpy.typing import NDArray
 
 from rig.analysis.pieces import Window as Read
 from rig.analysis.suspicion import Statistic
+from rig.data.quantity import ACCELERATION
 from rig.estimation.arrays import Array
 from rig.observation.acceleration import DwellReading
 from rig.observation.average import Stream, between
@@ -56,9 +57,9 @@ def acceleration_dwells(name: str, recording: ObservedRun, since_s: float = 0.0)
 def acceleration_sweeps(name: str, recording: ObservedRun) -> list[Read]:
     """What a sensor's accelerometer read in its revolutions, each with its place among the recording's."""
     stream, found = recording.stream(name), []
-    count = stream.sensor.sensitivity_m_s2_per_count
     for place, turn in enumerate(recording.sensors[name].revolutions):
-        if turn.acceleration is not None and count is not None:
+        if turn.acceleration is not None:
+            count = stream.sensor.channel(ACCELERATION).unit_per_count
             inside, wave = between(stream, turn.average.start_s, turn.average.end_s), turn.acceleration.harmonic
             counts = _counts(stream, inside)
             found.append(Read(place, counts, wave.residuals_m_s2 / count, wave.vibration_m_s2 / count))
@@ -112,5 +113,5 @@ def _apart(dwell: Dwelt, flicker_counts: float) -> float:
 
 
 def _counts(stream: Stream, inside: slice) -> NDArray[np.int64]:
-    counts: NDArray[np.int64] = stream.raw["acceleration_counts"][inside].astype(np.int64)
+    counts: NDArray[np.int64] = stream.sensor.channel(ACCELERATION).counts(stream.raw)[inside].astype(np.int64)
     return counts

@@ -9,7 +9,8 @@ import numpy as np
 from rig.analysis.clock import PPM
 from rig.analysis.surroundings import Surroundings
 from rig.arm.kinematics import AXIS_ERRORS
-from rig.data.run_file import RecordedSensor
+from rig.data.quantity import TEMPERATURE
+from rig.data.recorded_sensor import RecordedSensor
 from rig.data.settings import RunSettings, Uncertainty
 from rig.estimation.arrays import Array
 from rig.estimation.budget import Unknown, uncounted
@@ -67,7 +68,7 @@ def _sensor_of(
 ) -> KnownSensor:
     temperature_c = np.array([average.temperature_c for average in averages])
     of = name, sensor.part, sensor.range_rad_s
-    return known_sensor(surroundings.uncertainty, of, temperature_c, abs(sensor.temperature_c_per_count))
+    return known_sensor(surroundings.uncertainty, of, temperature_c, sensor.channel(TEMPERATURE).resolution)
 
 
 def known_sensor(

@@ -14,6 +14,7 @@ import numpy as np
 from rig.analysis.pieces import FEWEST_AT_REST, REST, Pieces, Stretch
 from rig.analysis.vector_inputs import since_first_s
 from rig.arm.kinematics import WRIST_1, flange_pose
+from rig.data.quantity import RATE
 from rig.data.run_file import RunData
 from rig.estimation.arrays import Array
 from rig.estimation.vector_fit import Explained
@@ -138,7 +139,7 @@ def _moved(start_s: float, end_s: float, stream: Stream, motion: ArmMotion) -> I
     way = Stretch(motion, float(time_s[0]) - step_s / 2, float(time_s[-1]) + step_s / 2, unseen_rad)
     whole = len(time_s) >= (1 - LOST) * (way.end_s - way.start_s) * stream.sensor.rate_hz
     ends = np.linalg.norm(motion.rate(np.array([way.start_s, way.end_s])), axis=1)
-    in_range = np.abs(stream.raw["counts"][samples].astype(np.int64)).max(initial=0) < stream.sensor.full_scale_counts
+    in_range = not stream.sensor.channel(RATE).saturated(stream.raw[samples]).any()
     stands = ends.max() < 2 * MIN_RATE_RAD_S
     if by_the_wrists(way) and whole and in_range and stands and motion.covered(time_s).all():
         yield way

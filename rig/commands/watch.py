@@ -85,7 +85,6 @@ def _about(folder: Path, runs: "list[RunData]") -> "About":
     parts: dict[str, str] = {}
     for run in runs:
         parts |= {name: f"{each.part} {each.serial_number}" for name, each in run.sensors.items()}
-        parts |= {name: f"{each.part} {each.serial_number}" for name, each in run.magnetometers.items()}
     made_with = runs[0].provenance
     simulated = calls_itself_simulated(made_with.arm_software)
     arm = {"model": made_with.arm_model, "serial_number": made_with.arm_serial_number}

@@ -20,7 +20,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from rig.arm.state import ARM_STATE_DTYPE
-from rig.data.layout import EVENTS_DTYPE, SCHEMA, SCHEMA_ELSEWHERE, TABLES, TEXTS, sample_dtype, table_dtype
+from rig.data.layout import EVENTS_DTYPE, SCHEMA, SCHEMA_ELSEWHERE, TABLES, TEXTS, recorded_sensor, table_dtype
 
 OPEN_FOR_WRITING = 0x01  # of the superblock's consistency flags
 NO_ROOM = 2
@@ -44,12 +44,14 @@ def extract(path: Path) -> Iterator[dict[str, Any] | NDArray[Any]]:
         if schema not in TEXTS:
             raise ValueError(f"its schema is {schema!r:.60}, not {SCHEMA!r}")
         elsewhere = schema == SCHEMA_ELSEWHERE
-        sensors = {} if elsewhere else _member(file, "samples", h5py.Group)
-        if len(sensors) > MAX_SENSORS:
-            raise ValueError(f"it announces {len(sensors)} sensors")
-        samples = {name: _member(sensors, name, h5py.Dataset) for name in sensors}
+        group = {} if elsewhere else _member(file, "samples", h5py.Group)
+        if len(group) > MAX_SENSORS:
+            raise ValueError(f"it announces {len(group)} sensors")
+        samples = {name: _member(group, name, h5py.Dataset) for name in group}
+        described = {name: _attributes(dataset) for name, dataset in samples.items()}
+        sensors = {name: recorded_sensor(schema, name, attributes) for name, attributes in described.items()}
         rows = {
-            **{f"samples/{name}": (each, sample_dtype(each.attrs)) for name, each in samples.items()},
+            **{f"samples/{name}": (each, sensors[name].sample_dtype) for name, each in samples.items()},
             "arm": (_member(file, "arm", h5py.Dataset), ARM_STATE_DTYPE),
             "events": (_member(file, "events", h5py.Dataset), EVENTS_DTYPE),
         }
@@ -62,7 +64,7 @@ def extract(path: Path) -> Iterator[dict[str, Any] | NDArray[Any]]:
         yield {
             "schema": schema,
             "texts": {name: _text(file, name) for name in TEXTS[schema]},
-            "described": {name: _attributes(dataset) for name, dataset in samples.items()},
+            "described": described,
         }
         for dataset, _ in rows.values():
             yield dataset[:]

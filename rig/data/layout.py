@@ -1,13 +1,15 @@
-"""How a run lies in HDF5 (schema "rig.run/2", "rig.run/3" where the readings come from elsewhere).
+"""How a run lies in HDF5 (schema "rig.run/3").
 
-`/samples/<sensor>` (SAMPLE_DTYPE, IMU_SAMPLE_DTYPE where accelerations were recorded, FIELD_SAMPLE_DTYPE of a
-magnetometer; the sensor's description as attributes), `/arm` (ARM_STATE_DTYPE), `/events` (bytes: SWMR forbids data of
-variable length, so an event is a line of JSON); `schema`, `config` (YAML), `settings` and `provenance` (JSON) as
-attributes of the file. Schema "rig.run/1" lacks `settings`. Schema "rig.run/3" has no `/samples` and no `/arm`, but the
-tables `/readings` and `/motion` (a float column each, by name; `rig.data.motion_file`) and `elsewhere` (JSON: whose
-readings, and what the motion tells).
+`/samples/<sensor>` (its stamps and a column for each of its channels; the sensor's description as attributes, with the
+`channels` in JSON), `/arm` (ARM_STATE_DTYPE), `/events` (bytes: SWMR forbids data of variable length, so an event is a
+line of JSON); `schema`, `config` (YAML), `settings` and `provenance` (JSON) as attributes of the file. Schema
+"rig.run/2" has attributes of fixed names in place of `channels`, and "rig.run/1" lacks `settings` as well.
+
+Readings from elsewhere (schema "rig.files/1") have no `/samples`, but the tables `/readings` and `/motion` (a float
+column each, by name; `rig.data.motion_file`) and `elsewhere` (JSON: whose readings, and what the motion tells).
 """
 
+import json
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
@@ -16,18 +18,19 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from firmware_host.samples import FIELD_SAMPLE_DTYPE, IMU_SAMPLE_DTYPE, SAMPLE_DTYPE
 from rig.arm.state import ARM_STATE_DTYPE
 from rig.config.written_file import PART
+from rig.data.recorded_sensor import RecordedSensor, sensor_of
+from rig.data.sensor_of_run_2 import described_in_channels
 
-SCHEMA = "rig.run/2"
-SCHEMA_BEFORE = "rig.run/1"
-SCHEMA_ELSEWHERE = "rig.run/3"
+SCHEMA = "rig.run/3"
+SCHEMA_ELSEWHERE = "rig.files/1"
 TABLES = ("readings", "motion")
 TEXTS = {
-    SCHEMA_ELSEWHERE: ("config", "settings", "provenance", "elsewhere"),
     SCHEMA: ("config", "settings", "provenance"),
-    SCHEMA_BEFORE: ("config", "provenance"),
+    SCHEMA_ELSEWHERE: ("config", "settings", "provenance", "elsewhere"),
+    "rig.run/2": ("config", "settings", "provenance"),
+    "rig.run/1": ("config", "provenance"),
 }
 EVENTS_DTYPE = np.dtype("u1")
 CHUNK_ROWS = 1024
@@ -39,8 +42,8 @@ class Contents:
     """What a run file holds, as it stands there: nothing of it is judged yet.
 
     `texts` are the attributes named in `TEXTS`, `described` the attributes of each sensor; `samples` (n,) by sensor, of
-    its `sample_dtype`, `arm` (n,) ARM_STATE_DTYPE, `events` (n,) bytes; `tables` (n,) by the names of `TABLES`, of
-    readings from elsewhere alone.
+    its type, `arm` (n,) ARM_STATE_DTYPE, `events` (n,) bytes; `tables` (n,) by the names of `TABLES`, of readings from
+    elsewhere alone.
     """
 
     schema: str
@@ -52,22 +55,21 @@ class Contents:
     tables: Mapping[str, NDArray[Any]] = field(default_factory=dict)
 
 
-def empty(schema: str, texts: Mapping[str, str], described: Mapping[str, Mapping[str, Any]]) -> Contents:
-    """The contents of a run that begins."""
-    samples = {name: np.empty(0, sample_dtype(attributes)) for name, attributes in described.items()}
-    return Contents(schema, texts, described, samples, np.empty(0, ARM_STATE_DTYPE), np.empty(0, EVENTS_DTYPE))
+def empty(texts: Mapping[str, str], sensors: Mapping[str, RecordedSensor]) -> Contents:
+    """The contents of a run of these sensors that begins."""
+    described = {name: sensor.attributes() for name, sensor in sensors.items()}
+    samples = {name: np.empty(0, sensor.sample_dtype) for name, sensor in sensors.items()}
+    return Contents(SCHEMA, texts, described, samples, np.empty(0, ARM_STATE_DTYPE), np.empty(0, EVENTS_DTYPE))
 
 
-def sample_dtype(attributes: Mapping[str, Any]) -> np.dtype[Any]:
-    """The type of the samples of a sensor that is described so."""
-    if is_magnetometer(attributes):
-        return FIELD_SAMPLE_DTYPE
-    return IMU_SAMPLE_DTYPE if "sensitivity_m_s2_per_count" in attributes else SAMPLE_DTYPE
-
-
-def is_magnetometer(attributes: Mapping[str, Any]) -> bool:
-    """Whether a sensor that is described so measures a field."""
-    return "sensitivity_t_per_count" in attributes
+def recorded_sensor(schema: str, name: str, attributes: Mapping[str, Any]) -> RecordedSensor:
+    """The sensor that the attributes of its samples describe in a file of that schema. Raises ValueError."""
+    if schema != SCHEMA:
+        return sensor_of(described_in_channels(name, attributes))
+    channels = attributes.get("channels")
+    if not isinstance(channels, str):
+        raise ValueError(f"the channels of {name} are not a text")
+    return sensor_of({**attributes, "channels": json.loads(channels)})
 
 
 def table_of(columns: Mapping[str, NDArray[np.float64]]) -> NDArray[Any]:

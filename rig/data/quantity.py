@@ -66,9 +66,42 @@ class Quantity:
         return tuple(self.named(axis) for axis in self.axes)
 
     @property
+    def shape(self) -> tuple[int, ...]:
+        """The shape of one reading."""
+        return (len(self.axes),)
+
+    @property
     def parameter_units(self) -> tuple[str, ...]:
         """The units of the scale factors, then of the biases."""
         return ("1",) * len(self.axes) + (self.unit,) * len(self.axes)
+
+
+@dataclass(frozen=True, slots=True)
+class Scalar:
+    """One quantity without axes, which is recorded, shown and exported, and never calibrated.
+
+    `sensor` is what measures it, `unit` that of its values, `suffix` the same in names, `reading` the one on a screen.
+    """
+
+    name: str
+    sensor: str
+    unit: str
+    suffix: str
+    reading: Unit
+
+    def named(self, what: str) -> str:
+        """The name in a file of `what` in this quantity's unit: `pressure_pa`."""
+        return f"{what}_{self.suffix}"
+
+    @property
+    def columns(self) -> tuple[str, ...]:
+        """The one column of its readings in a table."""
+        return (self.named(self.name),)
+
+    @property
+    def shape(self) -> tuple[int, ...]:
+        """The shape of one reading."""
+        return ()
 
 
 RATE: Final = Quantity(
@@ -117,6 +150,8 @@ FIELD: Final = Quantity(
     steady=2e-6,
 )
 OF_THE_RIG: Final = (RATE, ACCELERATION, FIELD)
+TEMPERATURE: Final = Scalar("temperature", "thermometer", "°C", "c", Unit("°C", 1.0))
+PRESSURE: Final = Scalar("pressure", "barometer", "Pa", "pa", Unit("hPa", 100.0))
 
 
 @cache
@@ -126,3 +161,9 @@ def quantities() -> Mapping[str, Quantity]:
 
     every = (*OF_THE_RIG, *(kind.quantity for kind in installed_kinds()))
     return MappingProxyType({each.name: each for each in every})
+
+
+@cache
+def measured() -> Mapping[str, Quantity | Scalar]:
+    """Everything that a channel may be of, by its name: quantities, and what has no axes."""
+    return MappingProxyType({**quantities(), **{each.name: each for each in (TEMPERATURE, PRESSURE)}})

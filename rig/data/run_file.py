@@ -5,7 +5,6 @@ attributes exist before that mode begins, afterwards rows are only appended, and
 anything that points to it. What lies where is said in `rig.data.layout`.
 """
 
-import dataclasses
 import json
 import os
 import subprocess
@@ -17,37 +16,35 @@ from collections.abc import Mapping, Sequence
 from dataclasses import asdict, dataclass, replace
 from pathlib import Path
 from types import TracebackType
-from typing import Annotated, Any, Literal, Self
+from typing import Any, Self
 
 import numpy as np
 from numpy.typing import NDArray
-from pydantic import Field
 
 from rig.arm.silence import Silence
 from rig.arm.state import ARM_STATE_DTYPE, ArmState
 from rig.config.section import SensorName
-from rig.config.sensor_catalogue import has_own_port
-from rig.data.checked import Finite, Positive, checked
+from rig.data.checked import checked
 from rig.data.events import Event, Recorded, from_lines, to_line
 from rig.data.extract import NO_ROOM, reason
 from rig.data.layout import (
     EVENTS_DTYPE,
-    SCHEMA,
     SCHEMA_ELSEWHERE,
     TABLES,
     Contents,
     append,
     empty,
-    is_magnetometer,
     lay_out,
+    recorded_sensor,
     table_of,
 )
 from rig.data.motion_file import MOTIONS, ReadElsewhere, ToldElsewhere, samples_header
 from rig.data.provenance import Provenance
+from rig.data.quantity import RATE, Quantity, Scalar
+from rig.data.recorded_sensor import RecordedSensor
 from rig.data.settings import RunSettings, settings_from_json
 from rig.data.settings_of_run_1 import settings_of_configuration
 from rig.errors import Fault, Refused
-from rig.errors.quoting import quote
 
 FLUSH_PERIOD_S = 0.25  # half of what is promised, so that a slow flush still keeps the promise
 READ_TIMEOUT_S, READ_BYTES_PER_S = 20.0, 5e6  # for a file of no size, and more for each byte
@@ -55,81 +52,9 @@ READ_TICK_S = 0.1
 READ_SPARED = 6  # … and at most so many times that, when the reading process gets no processor
 
 
-MOUNTING_TOLERANCE = 1e-6
-
-Axis = Annotated[tuple[Finite, ...], Field(min_length=3, max_length=3)]
-
-
-@dataclass(frozen=True, slots=True)
-class RecordedSensor:
-    """What a reader of the file must know about one sensor.
-
-    rate in rad/s = counts × `sensitivity_rad_s_per_count`; temperature in °C = counts × `temperature_c_per_count` +
-    `temperature_offset_c`. `full_scale_counts` is the largest number the part reports: a reading there is saturated.
-    `mounting` (3 rows of 3) is the nominal rotation from the flange frame to the sensor's. `mode` is "calibrated" when
-    the board corrected the readings before it sent them. Where its accelerations were recorded as well: acceleration in
-    m/s² = counts × `sensitivity_m_s2_per_count`, of the same full scale, which is `range_m_s2`.
-    """
-
-    part: str
-    serial_number: str
-    rate_hz: Positive
-    range_rad_s: Positive
-    sensitivity_rad_s_per_count: Positive
-    full_scale_counts: Annotated[int, Field(gt=0)]
-    temperature_c_per_count: Finite
-    temperature_offset_c: Finite
-    mounting: Annotated[tuple[Axis, ...], Field(min_length=3, max_length=3)]
-    mode: Literal["raw", "calibrated"] = "raw"  # files of before there were two modes say nothing
-    range_m_s2: Positive | None = None
-    sensitivity_m_s2_per_count: Positive | None = None
-
-    @property
-    def on_board(self) -> bool:
-        """Whether the board read it, and stamped its samples with the board's clock."""
-        return not has_own_port(self.part)
-
-    @property
-    def has_acceleration(self) -> bool:
-        """Whether its samples hold accelerations."""
-        return self.sensitivity_m_s2_per_count is not None
-
-    def attributes(self) -> dict[str, Any]:
-        """The attributes as they stand in the file: what there is nothing of is left out."""
-        return {name: value for name, value in asdict(self).items() if value is not None}
-
-
-@dataclass(frozen=True, slots=True)
-class RecordedMagnetometer:
-    """What a reader of the file must know about one magnetometer: field in tesla = counts × `sensitivity_t_per_count`.
-
-    `full_scale_counts` and `mounting` as of a `RecordedSensor`. `within` names the sensor it is in, whose clock stamps
-    its samples; None where it is on the board.
-    """
-
-    part: str
-    serial_number: str
-    rate_hz: Positive
-    range_t: Positive
-    sensitivity_t_per_count: Positive
-    full_scale_counts: Annotated[int, Field(gt=0)]
-    mounting: Annotated[tuple[Axis, ...], Field(min_length=3, max_length=3)]
-    within: str | None = None
-
-    @property
-    def mode(self) -> Literal["raw"]:
-        """The board corrects no field."""
-        return "raw"
-
-    def attributes(self) -> dict[str, Any]:
-        """The attributes as they stand in the file, as of a `RecordedSensor`."""
-        return {name: value for name, value in asdict(self).items() if value is not None}
-
-
 @dataclass(frozen=True, slots=True)
 class RunData:
-    """A run file in memory: `samples` (n,) by name of a sensor, SAMPLE_DTYPE or IMU_SAMPLE_DTYPE, or of one of the
-    `magnetometers`, FIELD_SAMPLE_DTYPE; `arm` (n,) ARM_STATE_DTYPE; events in order.
+    """A run file in memory: `samples` (n,) by name of a sensor, `arm` (n,) ARM_STATE_DTYPE, events in order.
 
     `settings` say what it is judged by; `config` is the configuration's text, for people. Readings from `elsewhere`
     have neither samples of the rig's own nor an arm.
@@ -142,8 +67,11 @@ class RunData:
     samples: dict[str, NDArray[Any]]
     arm: NDArray[Any]
     events: tuple[Recorded, ...]
-    magnetometers: dict[str, RecordedMagnetometer] = dataclasses.field(default_factory=dict)
     elsewhere: ReadElsewhere | None = None
+
+    def measuring(self, quantity: Quantity | Scalar) -> dict[str, RecordedSensor]:
+        """The sensors whose samples hold that quantity, by name."""
+        return {name: sensor for name, sensor in self.sensors.items() if sensor.measures(quantity)}
 
     def judged_by(self, overrides: Sequence[str]) -> "RunData":
         """The recording under other settings: see `RunSettings.with_overrides`."""
@@ -166,7 +94,7 @@ class RunRecorder:
         config: str,
         settings: RunSettings,
         provenance: Provenance,
-        sensors: Mapping[str, RecordedSensor | RecordedMagnetometer],
+        sensors: Mapping[str, RecordedSensor],
     ) -> None:
         import h5py
 
@@ -181,8 +109,7 @@ class RunRecorder:
             if path.exists():
                 raise FileExistsError(f"{path.name} is there already")
             texts = {"config": config, "settings": settings.to_json(), "provenance": json.dumps(provenance.document())}
-            described = {name: sensor.attributes() for name, sensor in sensors.items()}
-            lay_out(path, empty(SCHEMA, texts, described), swmr=True)
+            lay_out(path, empty(texts, sensors), swmr=True)
             self._file = h5py.File(path, "r+", libver="latest")
             self._file.swmr_mode = True
             self._descriptor: int = self._file.id.get_vfd_handle()
@@ -281,23 +208,15 @@ def read_run(path: Path, timeout_s: float | None = None) -> RunData:
     contents = _contents(path, timeout_s)
     try:
         checked(_Named, {"sensors": [*contents.described]}, "samples")
+        sensors = {name: recorded_sensor(contents.schema, name, each) for name, each in contents.described.items()}
         return RunData(
             config=contents.texts["config"],
-            settings=_settings(contents),
+            settings=_settings(contents, sensors),
             provenance=checked(Provenance, json.loads(contents.texts["provenance"]), "provenance"),
-            sensors={
-                name: _sensor(attributes)
-                for name, attributes in contents.described.items()
-                if not is_magnetometer(attributes)
-            },
+            sensors=sensors,
             samples={name: _whole_rows(rows) for name, rows in contents.samples.items()},
             arm=_whole_rows(contents.arm),
             events=tuple(from_lines(contents.events.tobytes())),
-            magnetometers={
-                name: _magnetometer(attributes)
-                for name, attributes in contents.described.items()
-                if is_magnetometer(attributes)
-            },
             elsewhere=_elsewhere(contents) if contents.tables else None,
         )
     except (ValueError, RecursionError) as error:
@@ -312,7 +231,7 @@ def write_elsewhere(path: Path, run: RunData) -> None:
     texts = {"config": run.config, "settings": run.settings.to_json(), "provenance": provenance}
     texts["elsewhere"] = json.dumps(asdict(ToldElsewhere(read.item, read.tells)))
     tables = {"readings": table_of(read.readings), "motion": table_of(read.motion)}
-    lay_out(path, replace(empty(SCHEMA_ELSEWHERE, texts, {}), tables=tables), swmr=False)
+    lay_out(path, replace(empty(texts, {}), schema=SCHEMA_ELSEWHERE, tables=tables), swmr=False)
 
 
 def make_plain(path: Path) -> None:
@@ -388,8 +307,8 @@ def _no_room(path: Path, why: str) -> Refused:
     )
 
 
-def _settings(contents: Contents) -> RunSettings:
-    if contents.schema in (SCHEMA, SCHEMA_ELSEWHERE):
+def _settings(contents: Contents, sensors: Mapping[str, RecordedSensor]) -> RunSettings:
+    if "settings" in contents.texts:
         settings = settings_from_json(contents.texts["settings"])
     else:
         settings = settings_of_configuration(contents.texts["config"])
@@ -398,7 +317,7 @@ def _settings(contents: Contents) -> RunSettings:
     if settings.elsewhere is not None:
         return settings
     named = (*settings.to_calibrate, *([settings.reference.name] if settings.reference else []))
-    if missing := [name for name in named if name not in contents.described]:
+    if missing := [name for name in named if name not in sensors or not sensors[name].measures(RATE)]:
         raise ValueError(f"it holds no samples of {', '.join(missing)}, a sensor of its settings")
     return settings
 
@@ -410,26 +329,6 @@ def _elsewhere(contents: Contents) -> ReadElsewhere:
     samples_header().check(readings)
     MOTIONS[told.tells].check(motion)
     return ReadElsewhere(told.item, readings, told.tells, motion)
-
-
-def _sensor(attributes: Mapping[str, Any]) -> RecordedSensor:
-    sensor = checked(RecordedSensor, attributes, "sensor")
-    _check_mounting(sensor)
-    return sensor
-
-
-def _magnetometer(attributes: Mapping[str, Any]) -> RecordedMagnetometer:
-    magnetometer = checked(RecordedMagnetometer, attributes, "magnetometer")
-    _check_mounting(magnetometer)
-    return magnetometer
-
-
-def _check_mounting(sensor: RecordedSensor | RecordedMagnetometer) -> None:
-    mounting = np.array(sensor.mounting)
-    # No element of a rotation exceeds one; the squares of much larger ones would overflow.
-    small = np.abs(mounting).max() < 2
-    if not (small and np.allclose(mounting @ mounting.T, np.eye(3), atol=MOUNTING_TOLERANCE)):
-        raise ValueError(f"the mounting of {sensor.part} is no rotation: {quote(sensor.mounting)}")
 
 
 def _whole_rows(rows: NDArray[Any]) -> NDArray[Any]:

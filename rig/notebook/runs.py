@@ -12,7 +12,9 @@ from numpy.typing import NDArray
 from rig.analysis.calibration import DEFAULT_ESTIMATOR
 from rig.analysis.outcome import Outcome
 from rig.data.provenance import Provenance
-from rig.data.run_file import RecordedSensor, RunData
+from rig.data.quantity import RATE
+from rig.data.recorded_sensor import RecordedSensor
+from rig.data.run_file import RunData
 from rig.data.settings import RunSettings
 from rig.errors import Refused
 from rig.estimation.arrays import Array
@@ -133,7 +135,7 @@ class Run(Mapping[str, Readings]):
     @cached_property
     def _readings(self) -> Mapping[str, Readings]:
         recordings = self.recorded.movement
-        return {name: Readings(name, sensor, recordings) for name, sensor in recordings[0].sensors.items()}
+        return {name: Readings(name, sensor, recordings) for name, sensor in recordings[0].measuring(RATE).items()}
 
     def __getitem__(self, name: str) -> Readings:
         if name not in self._readings:

@@ -7,6 +7,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from rig.data.quantity import ACCELERATION
 from rig.data.run_file import RunData
 from rig.data.settings import ObservationThresholds
 from rig.errors import Fault
@@ -52,7 +53,7 @@ def each_dwell(
     run: RunData, stream: Stream, motion: Motion, settings: ObservationThresholds
 ) -> dict[int, DwellReading | Fault]:
     """Every finished dwell's reading, or why there is none, by its index; nothing of a sensor without accelerations."""
-    if not stream.sensor.has_acceleration:
+    if not stream.sensor.measures(ACCELERATION):
         return {}
     found: dict[int, DwellReading | Fault] = {}
     for each in dwelt(run):
@@ -65,10 +66,7 @@ def each_dwell(
 
 def accelerations(stream: Stream, inside: slice) -> Array:
     """(n, 3) m/s² of the samples inside."""
-    sensitivity = stream.sensor.sensitivity_m_s2_per_count
-    assert sensitivity is not None, "asked of a sensor with accelerations only"
-    readings: Array = stream.raw["acceleration_counts"][inside] * sensitivity
-    return readings
+    return stream.sensor.channel(ACCELERATION).values(stream.raw[inside])
 
 
 def check_acceleration(stream: Stream, inside: slice, where: str, *, turning: bool = False) -> None:
@@ -76,15 +74,15 @@ def check_acceleration(stream: Stream, inside: slice, where: str, *, turning: bo
 
     While it is `turning` one axis alone that repeats one reading is stuck, too.
     """
-    counts = stream.raw["acceleration_counts"][inside].astype(np.int64)
-    saturated = np.any(np.abs(counts) >= stream.sensor.full_scale_counts, axis=1)
+    channel, samples = stream.sensor.channel(ACCELERATION), stream.raw[inside]
+    counts, saturated = channel.counts(samples), channel.saturated(samples)
     if saturated.any():
         raise Fault(
             "saturation",
             f"in {where} {int(saturated.sum())} accelerations stand at the end of the sensor's range",
             "Choose a wider acceleration.range_g",
         )
-    changing = np.ptp(counts, axis=0).astype(np.bool_) if len(counts) else np.ones(3, dtype=np.bool_)
+    changing = np.any(counts != counts[0], axis=0) if len(counts) else np.ones(3, dtype=np.bool_)
     if not (changing.all() if turning else changing.any()) and _is_noisy(stream):
         raise Fault(
             "stuck_sensor",
@@ -95,7 +93,7 @@ def check_acceleration(stream: Stream, inside: slice, where: str, *, turning: bo
 
 def _is_noisy(stream: Stream) -> bool:
     """Whether neighbouring samples differ as a rule: without noise they may well be alike."""
-    steps = np.abs(np.diff(stream.raw["acceleration_counts"], axis=0))
+    steps = np.abs(np.diff(stream.sensor.channel(ACCELERATION).counts(stream.raw), axis=0))
     return bool(len(steps)) and np.median(steps, axis=0).min() >= 1
 
 
@@ -107,7 +105,7 @@ def dwell_reading(stream: Stream, motion: Motion, finished: Dwelt, settings: Obs
     _check_standing(motion, window, where)
     check_complete(stream.raw[inside], where, settings)
     check_acceleration(stream, inside, where)
-    count = stream.sensor.sensitivity_m_s2_per_count or 0.0
+    count = stream.sensor.channel(ACCELERATION).resolution
     reading, _ = mean_at_rest(accelerations(stream, inside), stream.time_s[inside], window, count)
     return DwellReading(
         index=dwell.index,

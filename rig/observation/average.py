@@ -7,7 +7,8 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from rig.data.run_file import RecordedSensor
+from rig.data.quantity import RATE, TEMPERATURE
+from rig.data.recorded_sensor import RecordedSensor
 from rig.estimation.arrays import Array
 from rig.observation.known_motion import KnownMotion
 from rig.observation.lines import in_hertz
@@ -64,20 +65,20 @@ class Stream:
 
     def temperature_c(self, inside: slice) -> float:
         """The mean of the samples inside."""
-        counts = float(self.raw["temperature_counts"][inside].mean())
-        return counts * self.sensor.temperature_c_per_count + self.sensor.temperature_offset_c
+        thermometer = self.sensor.channel(TEMPERATURE)
+        return float(thermometer.in_unit(float(thermometer.counts(self.raw)[inside].mean())))
 
 
 def on_the_arms_clock(raw: NDArray[Any], sensor: RecordedSensor, motion: KnownMotion) -> Stream:
-    """Samples (n,) SAMPLE_DTYPE in rad/s at the controller's times. Raises Fault as `estimate_time_base` does."""
-    readings = raw["counts"] * sensor.sensitivity_rad_s_per_count
+    """Samples (n,) of a gyroscope in rad/s at the controller's times. Raises Fault as `estimate_time_base` does."""
+    readings = sensor.channel(RATE).values(raw)
     return on_clock(raw, sensor, estimate_time_base(raw["board_time_us"] * 1e-6, readings, motion))
 
 
 def on_clock(raw: NDArray[Any], sensor: RecordedSensor, clock: TimeBase) -> Stream:
-    """Samples (n,) SAMPLE_DTYPE in rad/s at the controller's times, by a board's clock that is known."""
+    """Samples (n,) of a gyroscope in rad/s at the controller's times, by a board's clock that is known."""
     board_time_s = raw["board_time_us"] * 1e-6
-    readings = raw["counts"] * sensor.sensitivity_rad_s_per_count
+    readings = sensor.channel(RATE).values(raw)
     return Stream(sensor, clock, clock.controller_time_s(board_time_s), board_time_s, readings, raw)
 
 

@@ -7,6 +7,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from rig.data.quantity import FIELD
 from rig.data.settings import ObservationThresholds
 from rig.errors import Fault
 from rig.estimation.arrays import Array
@@ -36,38 +37,7 @@ def beside(recording: ObservedRun, name: str) -> str | None:
     None where there is none.
     """
     dwelt = (sensor for sensor, found in recording.sensors.items() if found.dwells)
-    return next((sensor for sensor in dwelt if _stamps(recording, sensor, name)), None)
-
-
-def _stamps(recording: ObservedRun, sensor: str, magnetometer: str) -> bool:
-    """Whether the clock of `sensor` stamps the samples of the magnetometer too."""
-    within = recording.run.magnetometers[magnetometer].within
-    return recording.run.sensors[sensor].on_board if within is None else sensor == within
-
-
-def field_samples(recording: ObservedRun, name: str) -> tuple[Array, Array] | None:
-    """Times (n,) on the arm's clock and fields (n, 3) in tesla of all samples of a magnetometer, in its own axes.
-
-    By the time base of a sensor whose clock stamps them too; None where there is no such sensor.
-    """
-    other = next((sensor for sensor in recording.sensors if _stamps(recording, sensor, name)), None)
-    if other is None:
-        return None
-    return _time_s(recording, name, other), _field_t(recording, name, recording.run.samples[name])
-
-
-def _time_s(recording: ObservedRun, name: str, other: str) -> Array:
-    """(n,) times on the arm's clock, by the time base of a sensor whose clock stamps the magnetometer's samples too."""
-    stamps_s = recording.run.samples[name]["board_time_us"] * 1e-6
-    return recording.sensors[other].time_base.controller_time_s(stamps_s)
-
-
-def _field_t(recording: ObservedRun, name: str, samples: NDArray[Any]) -> Array:
-    """(n, 3) readings of the field in tesla."""
-    field_t: Array = (
-        samples["field_counts"].astype(np.float64) * recording.run.magnetometers[name].sensitivity_t_per_count
-    )
-    return field_t
+    return next((sensor for sensor in dwelt if recording.one_clock(sensor, name)), None)
 
 
 def field_readings(recording: ObservedRun, name: str, thresholds: ObservationThresholds) -> tuple[FieldReading, ...]:
@@ -95,10 +65,10 @@ def dwelt_field(recording: ObservedRun, name: str) -> Iterator[tuple[DwellReadin
     """The field's readings in each dwell as recorded (n, 3), and their times (n,) on the arm's clock."""
     other = beside(recording, name)
     if other is not None:
-        time_s = _time_s(recording, name, other)
+        time_s, channel = recording.time_s(name, other), recording.run.sensors[name].channel(FIELD)
         for dwell in recording.sensors[other].dwells:
             inside = slice(*np.searchsorted(time_s, [dwell.window.start_s, dwell.window.end_s]).tolist())
-            yield dwell, recording.run.samples[name]["field_counts"][inside], time_s[inside]
+            yield dwell, channel.counts(recording.run.samples[name])[inside], time_s[inside]
 
 
 def field_tests(
@@ -126,23 +96,23 @@ def _at_home(recording: ObservedRun, rest: Window, home_q_rad: Sequence[float]) 
 
 
 def _mean(recording: ObservedRun, name: str, window: Window, what: str, thresholds: ObservationThresholds) -> Mean:
-    magnetometer = recording.run.magnetometers[name]
+    channel = recording.run.sensors[name].channel(FIELD)
     where = f"{what} of {name}"
     inside = _inside(recording, name, window)
     check_complete(inside, where, thresholds)
-    if np.any(np.abs(inside["field_counts"].astype(np.int64)) >= magnetometer.full_scale_counts):
+    if channel.saturated(inside).any():
         raise Fault(
             "saturation",
             f"in {where} the field is beyond the magnetometer's range",
             "Choose a wider range_gauss, or take away the iron beside it",
         )
-    return even_mean(_field_t(recording, name, inside), magnetometer.sensitivity_t_per_count)
+    return even_mean(channel.values(inside), channel.resolution)
 
 
 def _inside(recording: ObservedRun, name: str, window: Window) -> NDArray[Any]:
     """The samples (n,) in it."""
     other = beside(recording, name)
     assert other is not None, "asked for only where there is one"
-    ends = np.searchsorted(_time_s(recording, name, other), [window.start_s, window.end_s])
+    ends = np.searchsorted(recording.time_s(name, other), [window.start_s, window.end_s])
     inside: NDArray[Any] = recording.run.samples[name][slice(*ends.tolist())]
     return inside

@@ -14,6 +14,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from rig.arm.motion import Sweep
+from rig.data.quantity import ACCELERATION, RATE
 from rig.data.run_file import RunData
 from rig.data.settings import ObservationThresholds
 from rig.errors import Fault
@@ -105,7 +106,8 @@ def observe_sensor(
                 check_feeling(run, rests, ())
                 check_other_way(finished.sweep, [each.joint_name for each in revolutions], fault)
             raise
-    dwells = tuple(dwell_readings(run, stream, motion, settings, superseded)) if stream.sensor.has_acceleration else ()
+    felt = stream.sensor.measures(ACCELERATION)
+    dwells = tuple(dwell_readings(run, stream, motion, settings, superseded)) if felt else ()
     check_feeling(run, rests, dwells)
     drift = bias_drift(rests)
     return SensorObservations(
@@ -164,7 +166,7 @@ def _revolution(
     turn = motion.turn(finished.sweep, finished.window, settings)
     averaging = averaging_of(run.settings)
     seen = _observation(stream, motion, finished.sweep, turn, settings, averaging=averaging)
-    if stream.sensor.has_acceleration and run.settings.planned_dwells:
+    if stream.sensor.measures(ACCELERATION) and run.settings.planned_dwells:
         return replace(seen, acceleration=swept_acceleration(stream, motion, finished.sweep, turn, averaging))
     return seen
 
@@ -218,7 +220,7 @@ def _observation(
         covered,
         np.array(waves).T,
     )
-    found = averaging.turned(stream.readings_rad_s[inside], stream.sensor.sensitivity_rad_s_per_count, passing)
+    found = averaging.turned(stream.readings_rad_s[inside], stream.sensor.channel(RATE).resolution, passing)
     average = _placed(averaged(stream, inside, Window(turn.start_s, turn.end_s), found), motion)
     expected = np.array(stream.sensor.mounting) @ turn.axis_flange
     turned = average.mean_rad_s - stream.clock.zero_rate_rad_s
@@ -250,7 +252,7 @@ def _rest(stream: Stream, motion: Motion, window: Window, averaging: Averaging) 
     inside = between(stream, still.start_s, still.end_s)
     if inside.stop - inside.start < MIN_REST_SAMPLES:
         return None
-    count = stream.sensor.sensitivity_rad_s_per_count
+    count = stream.sensor.channel(RATE).resolution
     found, lasting = averaging.rested(stream.readings_rad_s[inside], stream.time_s[inside], still, count)
     return _placed(averaged(stream, inside, lasting, found), motion)
 
@@ -276,8 +278,7 @@ def _lost(stream: Stream, inside: slice, where: str, settings: ObservationThresh
 
 
 def _check_saturation(stream: Stream, inside: slice, where: str) -> None:
-    full = stream.sensor.full_scale_counts
-    saturated = np.any(np.abs(stream.raw["counts"][inside].astype(np.int64)) >= full, axis=1)
+    saturated = stream.sensor.channel(RATE).saturated(stream.raw[inside])
     if saturated.any():
         raise Fault(
             "saturation",
@@ -288,9 +289,10 @@ def _check_saturation(stream: Stream, inside: slice, where: str) -> None:
 
 def _check_stuck(stream: Stream, inside: slice, where: str) -> None:
     """A sensor with noise above one count does not repeat itself on all axes many times in a row."""
-    if np.median(np.abs(np.diff(stream.raw["counts"], axis=0)), axis=0).min() < 1:
+    counts = stream.sensor.channel(RATE).counts(stream.raw)
+    if np.median(np.abs(np.diff(counts, axis=0)), axis=0).min() < 1:
         return
-    changes = np.flatnonzero(np.any(np.diff(stream.raw["counts"][inside], axis=0), axis=1))
+    changes = np.flatnonzero(np.any(np.diff(counts[inside], axis=0), axis=1))
     longest = int(np.max(np.diff(changes, prepend=-1, append=inside.stop - inside.start - 1)))
     if longest > STUCK_REPEATS:
         raise Fault(

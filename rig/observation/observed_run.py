@@ -5,8 +5,10 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from rig.data.quantity import RATE
 from rig.data.run_file import RunData
 from rig.data.settings import ObservationThresholds
+from rig.estimation.arrays import Array
 from rig.observation.arm_motion import ArmMotion, motion_of
 from rig.observation.average import Stream, on_clock
 from rig.observation.observe import SensorObservations, observe_sensor
@@ -33,6 +35,25 @@ class ObservedRun:
         """A sensor's samples in rad/s on the arm's clock."""
         return on_clock(self.run.samples[sensor], self.run.sensors[sensor], self.sensors[sensor].time_base)
 
+    def one_clock(self, sensor: str, other: str) -> bool:
+        """Whether one clock stamps the samples of both."""
+        return self.run.sensors[sensor].clock == self.run.sensors[other].clock
+
+    def time_s(self, sensor: str, beside: str | None = None) -> Array:
+        """Times (n,) of all samples of any sensor on the arm's clock.
+
+        By the time base of the gyroscope `beside`; left out, by the sensor's own or that of the first gyroscope on the
+        same clock. Where there is none, by when samples came to the computer, as the arm's states did: to milliseconds.
+        """
+        samples = self.run.samples[sensor]
+        stamps_s: Array = samples["board_time_us"] * 1e-6
+        known = (beside, sensor) if beside else (sensor, *self.sensors)
+        base = next((each for each in known if each in self.sensors and self.one_clock(sensor, each)), None)
+        if base is not None:
+            return self.sensors[base].time_base.controller_time_s(stamps_s)
+        came_s = np.interp(samples["host_time_s"], self.run.arm["host_time_s"], self.run.arm["time_s"])
+        return stamps_s + np.median(came_s - stamps_s) if len(stamps_s) else stamps_s
+
     def delay(self, sensor: str, behind: str) -> Delay | None:
         """How much `sensor` lags the sensor `behind`; None where no one clock stamps the samples of both.
 
@@ -47,9 +68,9 @@ class ObservedRun:
 
 
 def observe_run(run: RunData, thresholds: ObservationThresholds, superseded: Collection[int] = ()) -> ObservedRun:
-    """Observe every sensor of a recording; raises Fault as `motion_of` and `observe_sensor` do."""
+    """Observe every gyroscope of a recording; raises Fault as `motion_of` and `observe_sensor` do."""
     motion = motion_of(run)
-    sensors = {name: observe_sensor(run, name, motion, thresholds, superseded) for name in run.sensors}
+    sensors = {name: observe_sensor(run, name, motion, thresholds, superseded) for name in run.measuring(RATE)}
     return ObservedRun(run, motion, sensors)
 
 

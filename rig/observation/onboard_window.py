@@ -8,7 +8,8 @@ from numpy.typing import NDArray
 from rig.arm.kinematics import NOMINAL, DenavitHartenberg
 from rig.arm.motion import Sweep
 from rig.data.events import BoardObserved
-from rig.data.run_file import RecordedSensor, RunData
+from rig.data.recorded_sensor import RecordedSensor
+from rig.data.run_file import RunData
 from rig.data.settings import ObservationThresholds
 from rig.observation.arm_motion import ArmMotion
 from rig.observation.average import on_the_arms_clock

@@ -2,6 +2,7 @@
 
 import numpy as np
 
+from rig.data.quantity import RATE
 from rig.data.run_file import RunData
 from rig.data.settings import ObservationThresholds
 from rig.errors import Fault
@@ -31,7 +32,7 @@ def _sound(run: RunData, settings: ObservationThresholds) -> frozenset[int]:
         motion = motion_of(run)
     except Fault:
         return frozenset()
-    sound = (_sound_for(run, sensor, motion, settings) for sensor in run.sensors)
+    sound = (_sound_for(run, sensor, motion, settings) for sensor in run.measuring(RATE))
     return frozenset.intersection(*sound)
 
 
@@ -55,7 +56,8 @@ def _sound_for(run: RunData, sensor: str, motion: Motion, settings: ObservationT
 
 def _spiky(stream: Stream, window: Window) -> bool:
     """Whether a reading at a constant rate is a spike: the verdict would fail by it, whatever the mean."""
-    counts = stream.raw["counts"][between(stream, window.start_s, window.end_s)].astype(np.float64)
+    inside = between(stream, window.start_s, window.end_s)
+    counts = stream.sensor.channel(RATE).counts(stream.raw)[inside].astype(np.float64)
     if not len(counts):
         return False
     off = np.abs(counts - np.median(counts, axis=0))

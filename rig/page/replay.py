@@ -5,7 +5,6 @@ from dataclasses import dataclass, replace
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
 from rig.analysis.check import Check
 from rig.analysis.partial_results import so_far
@@ -13,7 +12,7 @@ from rig.arm.motion import Dwell, Plan, Rest, Step, Sweep
 from rig.arm.state import ARM_STATE_DTYPE, ArmState
 from rig.data.events import DwellFinished, DwellStarted, RestFinished, RestStarted, SweepFinished, SweepStarted
 from rig.data.result_file import ResultDocument
-from rig.data.run_file import RecordedMagnetometer, RecordedSensor, RunData
+from rig.data.run_file import RunData
 from rig.page.rows import Look, look_of
 from rig.station.events import (
     ArmSeen,
@@ -25,7 +24,6 @@ from rig.station.events import (
     SensorSamples,
     StepFinished,
     StepStarted,
-    Vector,
     VerdictReached,
 )
 
@@ -60,10 +58,9 @@ def moments(run: RunData) -> Iterator[Moment]:
     steps = _steps(run, ended_s)
     plan = Plan(tuple(each.step for each in steps), tuple(run.arm["q_rad"][0].tolist()), run.settings.home_q_rad)
     modes: dict[str, str] = {name: sensor.mode for name, sensor in run.sensors.items()}
-    modes |= {name: sensor.mode for name, sensor in run.magnetometers.items()}
     raw = "calibrated" not in modes.values()
     yield Moment(0.0, PhaseStarted(run.settings.procedure, plan, modes))
-    samples = {name: _Samples(run, name) for name in (*run.sensors, *run.magnetometers)}
+    samples = {name: _Samples(run, name) for name in run.sensors}
 
     def seen(host_time_s: float) -> tuple[SensorSamples, ...]:
         return tuple(each.until(host_time_s) for each in samples.values())
@@ -161,30 +158,11 @@ class _Samples:
 
     def __init__(self, run: RunData, name: str) -> None:
         self._name, self._samples = name, run.samples[name]
-        self._sensor = run.magnetometers.get(name) or run.sensors[name]
+        self._sensor = run.sensors[name]
 
     def until(self, host_time_s: float) -> SensorSamples:
         count = int(np.searchsorted(self._samples["host_time_s"], host_time_s, side="right"))
         newest = self._samples[max(0, count - NEWEST) : count]
         if count == 0:
-            return SensorSamples(self._name, 0, 0, None)
-        lost = int(newest["sequence"][-1]) + 1 - count
-        if isinstance(self._sensor, RecordedMagnetometer):
-            field_t = _mean(newest["field_counts"], self._sensor.sensitivity_t_per_count)
-            return SensorSamples(self._name, count, lost, None, field_t)
-        return self._of_gyroscope(self._sensor, newest, SensorSamples(self._name, count, lost, None))
-
-    def _of_gyroscope(self, sensor: RecordedSensor, newest: NDArray[Any], seen: SensorSamples) -> SensorSamples:
-        temperature = float(newest["temperature_counts"][-1]) * sensor.temperature_c_per_count
-        acceleration = sensor.sensitivity_m_s2_per_count
-        return replace(
-            seen,
-            rate_rad_s=_mean(newest["counts"], sensor.sensitivity_rad_s_per_count),
-            acceleration_m_s2=None if acceleration is None else _mean(newest["acceleration_counts"], acceleration),
-            temperature_c=temperature + sensor.temperature_offset_c,
-        )
-
-
-def _mean(counts: NDArray[Any], sensitivity: float) -> Vector:
-    x, y, z = (counts.mean(axis=0) * sensitivity).tolist()
-    return x, y, z
+            return SensorSamples(self._name, 0, 0, {})
+        return SensorSamples(self._name, count, int(newest["sequence"][-1]) + 1 - count, self._sensor.means(newest))

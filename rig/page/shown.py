@@ -8,7 +8,7 @@ from rig.arm.kinematics import NOMINAL, DenavitHartenberg
 from rig.arm.motion import Dwell, Rest, Step, Sweep
 from rig.arm.state import JOINT_NAMES, ArmReport, ArmState, RobotMode, RuntimeState, SafetyMode
 from rig.data.events import BoardNotObserved, BoardObserved
-from rig.data.quantity import quantities
+from rig.data.quantity import TEMPERATURE, measured
 from rig.data.result_file import read_result
 from rig.data.run_folder import RESULT
 from rig.errors import RigError
@@ -201,11 +201,13 @@ class Shown:
                 "mode": self._modes.get(sensor.sensor, "raw"),
                 "samples": sensor.samples,
                 "lost": sensor.lost,
-                "temperature_c": sensor.temperature_c,
+                "temperature_c": next(iter(sensor.latest.get(TEMPERATURE.name, ())), None),
+                "units": {},
             }
-            for quantity, size in ((each.named(each.name), each.reading.size) for each in quantities().values()):
-                if (vector := getattr(sensor, quantity, None)) is not None:
-                    values[f"{sensor.sensor}.{quantity}"] = tuple(component / size for component in vector)
+            for of in (measured()[name] for name in sensor.latest if name != TEMPERATURE.name):
+                line, shown = of.named(of.name), of.reading
+                values[f"{sensor.sensor}.{line}"] = tuple(each / shown.size for each in sensor.latest[of.name])
+                row["units"][line] = [of.name, shown.name]
             rows.append(row)
         self._values = values
         self.put("sensors", rows)

@@ -33,6 +33,7 @@ def accelerometer_entry(result: AccelerometerResult, **more: Any) -> Acceleromet
     return entry(
         AccelerometerEntry, result, result.sensor, solution,
         role="calibrate",
+        range_m_s2=result.sensor.channel(ACCELERATION).range,
         model=MODEL,
         estimator="attitude_weighted",
         covariance_combined=None if result.budget is None else result.budget.covariance,

@@ -2,9 +2,9 @@
 
 from rig.analysis.bias_drift import Anew, BiasDrift
 from rig.data.drift_entries import BiasEntry, DriftEntry, MoveEntry, RepeatEntry, SlopeEntry
-from rig.data.quantity import RATE, Quantity
+from rig.data.quantity import Quantity
+from rig.data.recorded_sensor import RecordedSensor
 from rig.data.result_types import ErrorEntry, Vector3
-from rig.data.run_file import RecordedSensor
 from rig.errors import Fault
 from rig.estimation.arrays import Array
 from rig.estimation.bias_by_repeat import FALSE_ALARM
@@ -46,7 +46,7 @@ def drift_entry(quantity: Quantity, drift: BiasDrift, sensor: RecordedSensor) ->
         freedom=counted(drift.freedom),
         part=sensor.part,
         serial_number=sensor.serial_number,
-        full_scale=sensor.range_rad_s if quantity == RATE else sensor.range_m_s2,
+        full_scale=sensor.channel(quantity).range,
     )
 
 

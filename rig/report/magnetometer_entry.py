@@ -31,6 +31,7 @@ def magnetometer_entry(result: MagnetometerResult, **more: Any) -> MagnetometerE
     return entry(
         MagnetometerEntry, result, result.sensor, solution, solution.fit,
         model=MODEL,
+        range_t=result.sensor.channel(FIELD).range,
         estimator=ESTIMATOR,
         covariance_combined=result.budget.covariance,
         budget=budget_entry(result.budget),

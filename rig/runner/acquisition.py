@@ -2,19 +2,20 @@
 
 import threading
 from collections import defaultdict, deque
-from collections.abc import Iterator
+from collections.abc import Iterator, Mapping
 from contextlib import contextmanager
 from dataclasses import dataclass, field
-from typing import Any, Literal
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
-from firmware_host.samples import SAMPLE_DTYPE
 from rig.arm.state import ArmState
-from rig.data.run_file import RecordedMagnetometer, RecordedSensor, RunRecorder
+from rig.data.quantity import RATE
+from rig.data.recorded_sensor import RecordedSensor
+from rig.data.run_file import RunRecorder
 from rig.runner.settling import Settling
-from rig.station.events import SensorSamples, Vector
+from rig.station.events import SensorSamples
 
 KEPT_PARTS = 3
 REACHES_BACK_S = 300.0  # before a sweep, of what its clock is found by: more tells no more, and takes longer
@@ -26,53 +27,29 @@ STANDING_S = 0.25  # between those recorded after: an arm that stands needs no m
 class SensorCount:
     """What one sensor has delivered so far. `lost` counts the gaps in its sequence numbers.
 
-    `sensitivity` is rad/s per count, or of a magnetometer, whose samples have another `column`, tesla. Of a `gyroscope`
-    the rest of a sample is told as well.
+    `latest` are the mean readings of the newest samples, by quantity.
     """
 
     name: str
-    sensitivity: float
-    column: Literal["counts", "field_counts"] = "counts"
+    sensor: RecordedSensor
     samples: int = 0
     lost: int = 0
-    latest: Vector | None = None
-    gyroscope: RecordedSensor | None = None
-    acceleration_m_s2: Vector | None = None
-    temperature_c: float | None = None
+    latest: Mapping[str, tuple[float, ...]] = field(default_factory=dict)
     _next_sequence: int = 0
 
     def add(self, samples: NDArray[Any]) -> None:
-        """Count samples (n,); their mean becomes the `latest` reading."""
+        """Count samples (n,); their means become the `latest` readings."""
         sequence = samples["sequence"]
         last = int(sequence[-1])
         self.lost += last + 1 - self._next_sequence - len(sequence)
         self._next_sequence = last + 1
         self.samples += len(sequence)
-        self.latest = _mean(samples[self.column], self.sensitivity)
-        if (sensor := self.gyroscope) is not None:
-            counts = int(samples["temperature_counts"][-1])
-            self.temperature_c = counts * sensor.temperature_c_per_count + sensor.temperature_offset_c
-            if sensor.sensitivity_m_s2_per_count is not None:
-                self.acceleration_m_s2 = _mean(samples["acceleration_counts"], sensor.sensitivity_m_s2_per_count)
+        self.latest = self.sensor.means(samples)
 
     @property
     def seen(self) -> SensorSamples:
         """What the page and the terminal are told of the sensor's samples."""
-        if self.column == "field_counts":
-            return SensorSamples(self.name, self.samples, self.lost, None, self.latest)
-        return SensorSamples(
-            self.name,
-            self.samples,
-            self.lost,
-            self.latest,
-            acceleration_m_s2=self.acceleration_m_s2,
-            temperature_c=self.temperature_c,
-        )
-
-
-def _mean(counts: NDArray[Any], sensitivity: float) -> Vector:
-    x, y, z = (counts.mean(axis=0) * sensitivity).tolist()
-    return x, y, z
+        return SensorSamples(self.name, self.samples, self.lost, self.latest)
 
 
 @dataclass(frozen=True, slots=True)
@@ -115,12 +92,10 @@ class Acquisition:
     _lock: threading.Lock = field(default_factory=threading.Lock)
     _thinning: "_Thinning | None" = None
 
-    def expect(self, name: str, sensor: RecordedSensor | RecordedMagnetometer) -> None:
-        """Count the samples of a sensor, before its stream begins; a field tells nothing of whether the arm settled."""
-        if isinstance(sensor, RecordedMagnetometer):
-            self.counts[name] = SensorCount(name, sensor.sensitivity_t_per_count, "field_counts")
-        else:
-            self.counts[name] = SensorCount(name, sensor.sensitivity_rad_s_per_count, gyroscope=sensor)
+    def expect(self, name: str, sensor: RecordedSensor) -> None:
+        """Count the samples of a sensor, before its stream begins; only rates tell whether the arm settled."""
+        self.counts[name] = SensorCount(name, sensor)
+        if sensor.measures(RATE):
             self.settling.expect(name, sensor)
 
     def on_samples(self, sensor: str, samples: NDArray[Any]) -> None:
@@ -169,7 +144,7 @@ class Acquisition:
             batches = [batch for part in self._kept for batch in part.batches[sensor]]
             states = [state for part in self._kept for state in part.states]
             new = len(self._kept[-1].states) if self._kept else 0
-        samples = np.concatenate(batches or [np.empty(0, SAMPLE_DTYPE)])
+        samples = np.concatenate(batches or [np.empty(0, self.counts[sensor].sensor.sample_dtype)])
         if not new or not len(samples):
             return samples, states, new
         from_s = states[-new].time_s - REACHES_BACK_S

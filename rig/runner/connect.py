@@ -15,6 +15,7 @@ from rig.board.identify import configured_board, refusing
 from rig.board.store import Solved, calibration_of
 from rig.config.load import Loaded
 from rig.data.provenance import provenance_of
+from rig.data.recorded_sensor import RecordedSensor
 from rig.data.run_file import RunRecorder
 from rig.data.run_folder import refuse_links
 from rig.data.settings import RunSettings
@@ -28,7 +29,7 @@ from rig.runner.procedure import Devices, Recording, Rig
 from rig.runner.resumption import Resumption
 from rig.runner.sensors import BoardSource, board_source
 from rig.sensors.registry import OWN_PORT
-from rig.sensors.source import OnSamples, Recorded, SampleSource
+from rig.sensors.source import OnSamples, SampleSource
 from rig.station.events import ArmConnected, BoardConnected, RunResumed, SensorConnected
 from rig.station.station import Station
 
@@ -98,8 +99,7 @@ class Connector:
             calibration = self._calibration(name) if calibrated and name in config.to_calibrate else None
             on_samples: OnSamples = acquisition.on_samples
             if calibration is not None:
-                per_count = kind.describe(section).sensitivity_rad_s_per_count
-                on_samples = correcting(calibration, per_count, on_samples)
+                on_samples = correcting(name, kind.describe(name, section), calibration, on_samples)
             with refusing():
                 source = stack.enter_context(kind.connect(name, section, on_samples))
             self.station.event(
@@ -131,7 +131,7 @@ class Connector:
         self,
         stack: ExitStack,
         board: BoardSource | None,
-        described: Mapping[str, Recorded],
+        described: Mapping[str, RecordedSensor],
         report: ArmReport,
     ) -> Recording:
         with refusing():

@@ -10,10 +10,10 @@ import numpy as np
 from numpy.typing import NDArray
 
 from firmware_host.client import Calibration
-from firmware_host.samples import FIELD_SAMPLE_DTYPE, SAMPLE_DTYPE
-from rig.data.run_file import RecordedSensor
+from rig.data.quantity import RATE
+from rig.data.recorded_sensor import RecordedSensor
 from rig.runner.sensors import corrected
-from rig.sensors.source import OnSamples, Recorded, SampleSource
+from rig.sensors.source import OnSamples, SampleSource
 
 
 @dataclass(frozen=True, slots=True)
@@ -24,11 +24,11 @@ class HostCorrected:
     calibration: Calibration
 
     @property
-    def sensors(self) -> dict[str, Recorded]:
+    def sensors(self) -> dict[str, RecordedSensor]:
         """Sensors as of `SampleSource`: rates in the same counts, corrected, no accelerations; fields as they come."""
         return {
-            name: corrected(sensor, self.calibration, sensor.sensitivity_rad_s_per_count)
-            if isinstance(sensor, RecordedSensor)
+            name: corrected(sensor, self.calibration, sensor.channel(RATE).unit_per_count)
+            if sensor.measures(RATE)
             else sensor
             for name, sensor in self.source.sensors.items()
         }
@@ -42,18 +42,21 @@ class HostCorrected:
         self.source.check(clock_s)
 
 
-def correcting(calibration: Calibration, sensitivity_rad_s: float, on_samples: OnSamples) -> OnSamples:
-    """Hands on M (m + b) for every reading m of a rate, in counts of `sensitivity_rad_s`; a field as it is."""
-    matrix, bias = np.array(calibration.matrix), np.array(calibration.bias_rad_s) / sensitivity_rad_s
+def correcting(name: str, raw: RecordedSensor, calibration: Calibration, on_samples: OnSamples) -> OnSamples:
+    """Hands on M (m + b) for every reading m of the rates of the sensor `name`, and another's as they are."""
+    per_count = raw.channel(RATE).unit_per_count
+    described = corrected(raw, calibration, per_count)
+    matrix, bias = np.array(calibration.matrix), np.array(calibration.bias_rad_s) / per_count
+    rate, dtype = described.channel(RATE).column, described.sample_dtype
 
     def take(sensor: str, samples: NDArray[Any]) -> None:
-        if samples.dtype == FIELD_SAMPLE_DTYPE:
+        if sensor != name:
             on_samples(sensor, samples)
             return
-        rates = np.zeros(len(samples), SAMPLE_DTYPE)
-        for field in SAMPLE_DTYPE.names or ():
+        rates = np.zeros(len(samples), dtype)
+        for field in dtype.names or ():
             rates[field] = samples[field]
-        rates["counts"] = np.rint((samples["counts"] + bias) @ matrix.T)
+        rates[rate] = np.rint((samples[rate] + bias) @ matrix.T)
         on_samples(sensor, rates)
 
     return take

@@ -17,7 +17,8 @@ from rig.arm.kinematics import DenavitHartenberg
 from rig.arm.motion import Sweep
 from rig.arm.state import ARM_STATE_DTYPE
 from rig.data.events import BoardNotObserved, BoardObserved, BoardRecalled, BoardSolved, Event
-from rig.data.run_file import RecordedSensor, RunData
+from rig.data.recorded_sensor import RecordedSensor
+from rig.data.run_file import RunData
 from rig.data.settings import ObservationThresholds
 from rig.errors import Fault
 from rig.observation.onboard_window import observed_before, revolution_on_the_board

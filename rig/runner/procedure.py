@@ -25,7 +25,8 @@ from rig.data.events import (
     SweepFinished,
     SweepStarted,
 )
-from rig.data.run_file import RecordedMagnetometer, RecordedSensor, RunRecorder
+from rig.data.recorded_sensor import RecordedSensor
+from rig.data.run_file import RunRecorder
 from rig.errors import Fault, Refused
 from rig.plans.phase import Phase
 from rig.runner.acquisition import Acquisition
@@ -73,7 +74,7 @@ class Recording:
     """
 
     recorder: RunRecorder
-    sensors: Mapping[str, RecordedSensor | RecordedMagnetometer]
+    sensors: Mapping[str, RecordedSensor]
     station: Station
     kinematics: DenavitHartenberg
 

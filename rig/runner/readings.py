@@ -13,13 +13,13 @@ from numpy.typing import NDArray
 
 from rig.board.identify import refusing
 from rig.config.models import SensorsConfig
-from rig.data.quantity import ACCELERATION, FIELD, RATE
-from rig.data.run_file import RecordedMagnetometer
+from rig.data.quantity import TEMPERATURE
+from rig.data.recorded_sensor import RecordedSensor
 from rig.errors import Fault, Refused
 from rig.runner.acquisition import SensorCount
 from rig.runner.sensors import board_source
 from rig.sensors.registry import OWN_PORT
-from rig.sensors.source import OnSamples, Recorded, SampleSource
+from rig.sensors.source import OnSamples, SampleSource
 from rig.station.events import SensorSamples
 
 LOOK_S = 0.05
@@ -43,22 +43,16 @@ def connected(config: SensorsConfig, on_samples: OnSamples) -> Iterator[tuple[Sa
 class ReadingsFile:
     """A sensor's readings in SI units, a row each, by the clock that stamped them."""
 
-    def __init__(self, path: Path, name: str, sensor: Recorded) -> None:
+    def __init__(self, path: Path, name: str, sensor: RecordedSensor) -> None:
         """Raises OSError, and FileExistsError where there is such a file."""
         self.path = path
-        self._scales: list[tuple[str, float]]
-        if isinstance(sensor, RecordedMagnetometer):
-            self._scales, quantities = [("field_counts", sensor.sensitivity_t_per_count)], [FIELD.columns]
-            self._count = SensorCount(name, sensor.sensitivity_t_per_count, "field_counts")
-        else:
-            self._scales, quantities = [("counts", sensor.sensitivity_rad_s_per_count)], [RATE.columns]
-            self._count = SensorCount(name, sensor.sensitivity_rad_s_per_count)
-            if sensor.sensitivity_m_s2_per_count is not None:
-                self._scales.append(("acceleration_counts", sensor.sensitivity_m_s2_per_count))
-                quantities.append(ACCELERATION.columns)
+        # Temperature has never been a column here.
+        self._channels = [each for each in sensor.channels if each.quantity != TEMPERATURE.name]
+        columns = [column for each in self._channels for column in each.measures.columns]
+        self._count = SensorCount(name, sensor)
         self._file: TextIO = path.open("x", encoding="utf-8", newline="\n")
-        self._file.write(",".join(["time_s", *(name for names in quantities for name in names)]) + "\n")
-        self._format = ",".join(["%.6f", *["%.9g"] * 3 * len(quantities)])
+        self._file.write(",".join(["time_s", *columns]) + "\n")
+        self._format = ",".join(["%.6f", *["%.9g"] * len(columns)])
         self._began_s: float | None = None
         self.lasts_s = 0.0  # from the first reading to the last, by their clock
 
@@ -82,7 +76,7 @@ class ReadingsFile:
             self._began_s = float(time_s[0])
         self.lasts_s = float(time_s[-1]) - self._began_s
         self._count.add(samples)
-        rows = np.column_stack([time_s, *(samples[column] * scale for column, scale in self._scales)])
+        rows = np.column_stack([time_s, *(each.values(samples) for each in self._channels)])
         np.savetxt(self._file, rows, self._format)
         self._file.flush()
 
@@ -120,7 +114,7 @@ def record_readings(config: SensorsConfig, folder: Path, duration_s: float) -> M
         return {file.path: file.seen for file in files.values()}
 
 
-def _new_file(folder: Path, name: str, sensor: Recorded) -> ReadingsFile:
+def _new_file(folder: Path, name: str, sensor: RecordedSensor) -> ReadingsFile:
     try:
         folder.mkdir(parents=True, exist_ok=True)
         return ReadingsFile(folder / f"{name}.csv", name, sensor)

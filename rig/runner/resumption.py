@@ -5,7 +5,8 @@ from dataclasses import dataclass
 
 from rig.analysis.contradictions import disturbed_sweeps
 from rig.data.provenance import Provenance
-from rig.data.run_file import RecordedMagnetometer, RecordedSensor, RunData
+from rig.data.recorded_sensor import RecordedSensor
+from rig.data.run_file import RunData
 from rig.data.settings import RunSettings
 from rig.errors import Refused
 from rig.observation.onboard_window import observed_sweeps
@@ -22,9 +23,7 @@ class Resumption:
     earlier: Sequence[RunData] = ()
     done: frozenset[int] = frozenset()
 
-    def refuse_other_instruments(
-        self, provenance: Provenance, sensors: Mapping[str, RecordedSensor | RecordedMagnetometer]
-    ) -> None:
+    def refuse_other_instruments(self, provenance: Provenance, sensors: Mapping[str, RecordedSensor]) -> None:
         """Readings of two boards, or at two settings, are not one calibration.
 
         Raises Refused `another_board`, `another_arm`, `another_sensor`.
@@ -41,7 +40,7 @@ class Resumption:
                         f"the run was begun with the {what} {before}, this is {now}",
                         f"Connect the {what} the run was begun with, or start a new run with `rig run`",
                     )
-            if {**run.sensors, **run.magnetometers} != sensors:
+            if run.sensors != sensors:
                 raise Refused(
                     "another_sensor",
                     "the sensors are not those of the recording, or set up differently",

@@ -11,9 +11,11 @@ from firmware_host.client import Board, Calibration, SampleBatch, StoredCalibrat
 from firmware_host.protocol import CALIBRATED_RAD_S, FULL_SCALE_COUNTS
 from rig.board.identify import configured_board, find_sensor, refuse_other_firmware, stored_calibration
 from rig.config.models import SensorsConfig
-from rig.config.sensor_sections import MagnetometerSection, SensorSection, mounting_matrix
-from rig.data.run_file import RecordedMagnetometer, RecordedSensor
-from rig.sensors.source import OnSamples, Recorded
+from rig.config.sensor_sections import MagnetometerSection, SensorSection
+from rig.data.channel import Channel, of_thermometer, of_three_axes
+from rig.data.quantity import ACCELERATION, FIELD, RATE, TEMPERATURE
+from rig.data.recorded_sensor import RecordedSensor, recorded_mounting
+from rig.sensors.source import OnSamples
 
 
 @dataclass(frozen=True, slots=True)
@@ -29,28 +31,16 @@ class BoardSensor:
 
 
 @dataclass(frozen=True, slots=True)
-class BoardMagnetometer:
-    """A magnetometer that is set up, as a `BoardSensor` is."""
-
-    index: int
-    described: RecordedMagnetometer
-
-
-@dataclass(frozen=True, slots=True)
 class BoardSource:
     """The board with its sensors set up, by name. What it streams is handed on by the sensors' names."""
 
     board: Board
     set_up: Mapping[str, BoardSensor]
-    magnetometers: Mapping[str, BoardMagnetometer]
 
     @property
-    def sensors(self) -> Mapping[str, Recorded]:
+    def sensors(self) -> Mapping[str, RecordedSensor]:
         """The board's sensors by name, as of `SampleSource`."""
-        return {
-            **{name: sensor.described for name, sensor in self.set_up.items()},
-            **{name: magnetometer.described for name, magnetometer in self.magnetometers.items()},
-        }
+        return {name: sensor.described for name, sensor in self.set_up.items()}
 
     @property
     def stored(self) -> Mapping[str, StoredCalibration]:
@@ -81,10 +71,8 @@ def board_source(config: SensorsConfig, on_samples: OnSamples, *, calibrated: bo
     with Board(section.port, section.baud, on_batch) as board:
         refuse_other_firmware(board.identity)
         set_up = set_up_sensors(board, config, calibrated=calibrated)
-        magnetometers = set_up_magnetometers(board, config)
         names.update({sensor.index: name for name, sensor in set_up.items()})
-        names.update({magnetometer.index: name for name, magnetometer in magnetometers.items()})
-        yield BoardSource(board, set_up, magnetometers)
+        yield BoardSource(board, set_up)
 
 
 def set_up_sensors(board: Board, config: SensorsConfig, *, calibrated: bool) -> Mapping[str, BoardSensor]:
@@ -92,52 +80,38 @@ def set_up_sensors(board: Board, config: SensorsConfig, *, calibrated: bool) -> 
 
     Raises Refused as `find_sensor` and `stored_calibration`.
     """
-    return {
+    gyroscopes = {
         name: _corrected(board, name, section)
         if calibrated and name in config.to_calibrate
         else _raw(board, name, section)
         for name, section in config.on_board.items()
     }
+    return gyroscopes | {name: _magnetometer(board, name, each) for name, each in config.magnetometers.items()}
 
 
-def set_up_magnetometers(board: Board, config: SensorsConfig) -> Mapping[str, BoardMagnetometer]:
-    """Every configured magnetometer by its name. Raises Refused as `find_sensor`."""
-    return {name: _magnetometer(board, name, section) for name, section in config.magnetometers.items()}
-
-
-def _magnetometer(board: Board, name: str, section: MagnetometerSection) -> BoardMagnetometer:
+def _magnetometer(board: Board, name: str, section: MagnetometerSection) -> BoardSensor:
     info = find_sensor(board.identity, name, section)
     setup = board.configure_magnetometer(info.index, section.rate_hz, section.range_gauss)
-    described = RecordedMagnetometer(
-        part=section.part,
-        serial_number=section.serial_number,
-        rate_hz=setup.rate_hz,
-        range_t=setup.range_t,
-        sensitivity_t_per_count=setup.sensitivity_t,
-        full_scale_counts=FULL_SCALE_COUNTS,
-        mounting=tuple(tuple(row) for row in mounting_matrix(section.mounting).tolist()),
-    )
-    return BoardMagnetometer(info.index, described)
+    field = of_three_axes(FIELD, setup.sensitivity_t, FULL_SCALE_COUNTS, setup.range_t)
+    return BoardSensor(info.index, _described(section, setup.rate_hz, field))
+
+
+def _described(section: SensorSection | MagnetometerSection, rate_hz: float, *channels: Channel) -> RecordedSensor:
+    mounting = recorded_mounting(section.mounting)
+    return RecordedSensor(section.part, section.serial_number, rate_hz, channels, mounting)
 
 
 def _raw(board: Board, name: str, section: SensorSection) -> BoardSensor:
     info = find_sensor(board.identity, name, section)
     range_g = 0.0 if section.acceleration is None else section.acceleration.range_g or 0.0
     setup = board.configure(info.index, section.rate_hz, section.range_deg_s, range_g)
-    described = RecordedSensor(
-        part=section.part,
-        serial_number=section.serial_number,
-        rate_hz=setup.rate_hz,
-        range_rad_s=radians(setup.range_deg_s),
-        sensitivity_rad_s_per_count=setup.sensitivity_rad_s,
-        full_scale_counts=FULL_SCALE_COUNTS,
-        temperature_c_per_count=setup.temperature_scale_c,
-        temperature_offset_c=setup.temperature_offset_c,
-        mounting=tuple(tuple(row) for row in mounting_matrix(section.mounting).tolist()),
-        range_m_s2=setup.range_m_s2 or None,
-        sensitivity_m_s2_per_count=setup.sensitivity_m_s2 or None,
-    )
-    return BoardSensor(info.index, described)
+    channels = [
+        of_three_axes(RATE, setup.sensitivity_rad_s, FULL_SCALE_COUNTS, radians(setup.range_deg_s)),
+        of_thermometer(setup.temperature_scale_c, setup.temperature_offset_c),
+    ]
+    if setup.sensitivity_m_s2:
+        channels.append(of_three_axes(ACCELERATION, setup.sensitivity_m_s2, FULL_SCALE_COUNTS, setup.range_m_s2))
+    return BoardSensor(info.index, _described(section, setup.rate_hz, *channels))
 
 
 def _corrected(board: Board, name: str, section: SensorSection) -> BoardSensor:
@@ -148,17 +122,14 @@ def _corrected(board: Board, name: str, section: SensorSection) -> BoardSensor:
 
 def corrected(sensor: RecordedSensor, calibration: Calibration, sensitivity_rad_s: float) -> RecordedSensor:
     """The sensor when its rates come corrected, in counts of that size and without accelerations."""
-    limit_rad_s = sensor.full_scale_counts * sensor.sensitivity_rad_s_per_count
+    raw = sensor.channel(RATE)
+    assert raw.full_scale_counts is not None, "every driver states it"
+    limit_rad_s = raw.full_scale_counts * raw.unit_per_count
     bias_rad_s = np.abs(calibration.bias_rad_s)
     # What a saturated reading becomes, at least: the other axes may read anything beside it.
     on_axis, beside = np.diag(np.diag(calibration.matrix)), np.abs(calibration.matrix)
     np.fill_diagonal(beside, 0.0)
     lowest_rad_s = float(np.min(on_axis @ (limit_rad_s - bias_rad_s) - beside @ (limit_rad_s + bias_rad_s)))
-    return replace(
-        sensor,
-        sensitivity_rad_s_per_count=sensitivity_rad_s,
-        full_scale_counts=int(lowest_rad_s / sensitivity_rad_s),
-        mode="calibrated",
-        range_m_s2=None,
-        sensitivity_m_s2_per_count=None,
-    )
+    full_scale = int(lowest_rad_s / sensitivity_rad_s)
+    rate = replace(raw, unit_per_count=sensitivity_rad_s, full_scale_counts=full_scale)
+    return replace(sensor, mode="calibrated", channels=(rate, sensor.channel(TEMPERATURE)))

@@ -11,7 +11,8 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from rig.data.run_file import RecordedSensor
+from rig.data.quantity import ACCELERATION, RATE
+from rig.data.recorded_sensor import RecordedSensor
 from rig.estimation.arrays import Array
 
 SPAN_S = 0.5  # of readings that are looked at, all of them after the motion
@@ -71,7 +72,7 @@ class Settling:
     def expect(self, name: str, sensor: RecordedSensor) -> None:
         """Watch a sensor: its accelerations where it sends them, else its rates."""
         enough = max(2, round(SPAN_S * sensor.rate_hz))
-        of = "acceleration_counts" if sensor.has_acceleration else "counts"
+        of = sensor.channel(ACCELERATION if sensor.measures(ACCELERATION) else RATE).column
         self._watched[name] = _Watched(name, of, enough, deque(maxlen=2 * enough))
 
     def add(self, sensor: str, samples: NDArray[Any]) -> None:

@@ -7,7 +7,7 @@ from types import MappingProxyType
 from typing import Protocol
 
 from rig.config.sensor_sections import SensorSection
-from rig.data.run_file import RecordedSensor
+from rig.data.recorded_sensor import RecordedSensor
 from rig.sensors.errors import SensorError
 from rig.sensors.kvh1775.source import describe, kvh1775, look
 from rig.sensors.source import OnSamples, SampleSource
@@ -31,7 +31,7 @@ class Kind:
     """
 
     connect: Callable[[str, SensorSection, OnSamples], AbstractContextManager[Instrument]]
-    describe: Callable[[SensorSection], RecordedSensor]
+    describe: Callable[[str, SensorSection], RecordedSensor]
     look: Callable[[str, SensorSection], Iterator[str | SensorError]]
 
 

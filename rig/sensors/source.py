@@ -5,11 +5,9 @@ from typing import Any, Protocol
 
 from numpy.typing import NDArray
 
-from rig.data.run_file import RecordedMagnetometer, RecordedSensor
+from rig.data.recorded_sensor import RecordedSensor
 
-Recorded = RecordedSensor | RecordedMagnetometer
-
-# A sensor's name, and samples (n,) SAMPLE_DTYPE, IMU_SAMPLE_DTYPE or FIELD_SAMPLE_DTYPE; called on the source's thread.
+# A sensor's name, and samples (n,) of the type its description says; called on the source's thread.
 OnSamples = Callable[[str, NDArray[Any]], None]
 
 
@@ -17,7 +15,7 @@ class SampleSource(Protocol):
     """Connected and set up, and silent until `start`. Errors are ProblemErrors, by name."""
 
     @property
-    def sensors(self) -> Mapping[str, Recorded]:
+    def sensors(self) -> Mapping[str, RecordedSensor]:
         """What it streams, by the sensors' names."""
         ...
 

@@ -116,19 +116,15 @@ class Progress:
 
 @dataclass(frozen=True, slots=True)
 class SensorSamples:
-    """What one sensor has delivered so far: samples, gaps in their numbers, the newest mean reading.
+    """What one sensor has delivered so far: samples, gaps in their numbers, the newest mean readings by quantity.
 
-    That is a rate in rad/s, or of a magnetometer a field in tesla. Acceleration and temperature are there where the
-    sensor sends them.
+    A reading has a number for each axis, or one, in the quantity's unit (`rig.data.quantity.measured`).
     """
 
     sensor: str
     samples: int
     lost: int
-    rate_rad_s: Vector | None
-    field_t: Vector | None = None
-    acceleration_m_s2: Vector | None = None
-    temperature_c: float | None = None
+    latest: Mapping[str, tuple[float, ...]]
 
 
 @dataclass(frozen=True, slots=True)

@@ -2,7 +2,7 @@
 
 import sys
 import time
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterator
 from contextlib import contextmanager
 from math import degrees
 
@@ -11,7 +11,7 @@ from rich.live import Live
 from rich.progress_bar import ProgressBar
 from rich.table import Table
 
-from rig.data.quantity import quantities
+from rig.data.quantity import TEMPERATURE, measured
 from rig.errors.quoting import printable_lines
 from rig.station.events import Progress, RunEvent, SamplesTaken, SensorSamples
 from rig.station.plain_text import plain
@@ -75,12 +75,12 @@ def _panel(progress: Progress, samples: SamplesTaken) -> Table:
 def _readings(sensor: SensorSamples) -> list[tuple[str, str]]:
     """The rows of a sensor, one for each quantity that it sends; the first says how many samples came."""
     came, rows = f"{sensor.samples} samples, {sensor.lost} lost", list[tuple[str, str]]()
-    for quantity in quantities().values():
-        newest: Sequence[float] | None = getattr(sensor, quantity.named(quantity.name), None)
-        if newest is not None:
-            shown = " ".join(f"{component / quantity.reading.size:+7.2f}" for component in newest)
-            name, more = (f"{sensor.sensor}, {quantity.sensor}", "") if rows else (sensor.sensor, f", {came}")
-            rows.append((name, f"{shown} {quantity.reading.name}{more}"))
+    for quantity, newest in sensor.latest.items():
+        of = measured()[quantity]
+        if of != TEMPERATURE:  # beside another quantity it is no news
+            shown = " ".join(f"{component / of.reading.size:+7.2f}" for component in newest)
+            name, more = (f"{sensor.sensor}, {of.sensor}", "") if rows else (sensor.sensor, f", {came}")
+            rows.append((name, f"{shown} {of.reading.name}{more}"))
     return rows or [(sensor.sensor, f"waiting, {came}")]
 
 

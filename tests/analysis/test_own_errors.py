@@ -9,6 +9,7 @@ import pytest
 from rig.analysis.calibration import SensorResult
 from rig.analysis.outcome import calibrated
 from rig.config.sensor_catalogue import PARTS
+from rig.data.quantity import RATE, TEMPERATURE
 from rig.data.run_file import RunData
 from rig.estimation.arrays import Array
 from rig.estimation.budget import Budget
@@ -122,7 +123,7 @@ def test_a_ramp_that_a_step_of_the_thermometer_hides_is_no_walk_of_the_bias() ->
 def _ramping(run: RunData, change_rad_s: float) -> RunData:
     """With a bias that changes evenly by so much from the first sample to the last."""
     samples = run.samples["gyro"].copy()
-    count = run.sensors["gyro"].sensitivity_rad_s_per_count
+    count = run.sensors["gyro"].channel(RATE).unit_per_count
     samples["counts"] += np.round(change_rad_s / count * np.linspace(-0.5, 0.5, len(samples)))[:, None].astype(np.int16)
     return replace(run, samples={"gyro": samples})
 
@@ -132,8 +133,8 @@ def _warmed(run: RunData, steps: int, bias_rad_s_per_k: float) -> RunData:
     sensor, samples = run.sensors["gyro"], run.samples["gyro"].copy()
     wave = np.sin(2 * np.pi * np.linspace(0, 1.5, len(samples)))
     samples["temperature_counts"] += np.round(steps * (1 + wave) / 2).astype(np.int16)
-    kelvin = steps * wave / 2 * sensor.temperature_c_per_count
-    samples["counts"] += np.round(bias_rad_s_per_k * kelvin / sensor.sensitivity_rad_s_per_count).astype(np.int32)[
+    kelvin = steps * wave / 2 * sensor.channel(TEMPERATURE).unit_per_count
+    samples["counts"] += np.round(bias_rad_s_per_k * kelvin / sensor.channel(RATE).unit_per_count).astype(np.int32)[
         :, None
     ]
     return replace(run, samples={"gyro": samples})

@@ -10,6 +10,7 @@ from scipy.spatial.transform import Rotation
 from rig.analysis.accelerometer_errors import Sheet, sheet_of
 from rig.analysis.reference_budgets import accelerometer_budget, magnetometer_budget
 from rig.config.attitude_sets import EIGHTEEN
+from rig.data.quantity import ACCELERATION
 from rig.data.settings import Site
 from rig.estimation.accelerometer_model import Movement
 from rig.estimation.arrays import Array
@@ -173,14 +174,15 @@ def test_a_quiet_sensor_s_flicker_and_what_its_thermometer_hides_are_in_its_budg
 def test_a_sheet_is_what_the_recording_says_and_the_part_s_where_it_says_nothing() -> None:
     recording = open_run(RECORDINGS / "rig.settings-7" / "imu").movement[0]
     known, sensor = recording.settings.uncertainty, recording.sensors["gyro"]
-    assert known is not None
-    assert sheet_of(known, "gyro", sensor.part, sensor.range_m_s2 or 0.0) == Sheet(0.5, 2.0, 1.5, 260, 30)
+    range_m_s2 = sensor.channel(ACCELERATION).range
+    assert known is not None and range_m_s2 is not None
+    assert sheet_of(known, "gyro", sensor.part, range_m_s2) == Sheet(0.5, 2.0, 1.5, 260, 30)
     said = replace(
         known, acceleration_nonlinearity_percent={"gyro": 0.1}, acceleration_nonlinear_over_g={"gyro": 1.0},
         acceleration_bias_mg_k={"gyro": 0.2}, acceleration_scale_ppm_k={"gyro": 30.0},
         acceleration_bias_instability_ug={"gyro": 4.0},
     )  # fmt: skip
-    assert sheet_of(said, "gyro", sensor.part, sensor.range_m_s2 or 0.0) == Sheet(0.1, 1.0, 0.2, 30.0, 4.0)
+    assert sheet_of(said, "gyro", sensor.part, range_m_s2) == Sheet(0.1, 1.0, 0.2, 30.0, 4.0)
 
 
 @pytest.mark.parametrize(

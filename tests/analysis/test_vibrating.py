@@ -5,6 +5,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
+from rig.data.quantity import RATE
 from rig.data.run_file import RunData
 from rig.estimation.arrays import Array
 from rig.observation.lines import lines, swings, waves
@@ -19,7 +20,7 @@ def shaken(run: RunData, hertz: tuple[float, ...], rms_rad_s: float) -> RunData:
     for place, each in enumerate(hertz):
         wave = np.sqrt(2) * rms_rad_s * np.sin(2 * np.pi * each * time_s + place)
         along = np.roll([1.0, 0.6, -0.4], place)
-        counts = np.round(wave[:, None] * along / ADIS16465.sensitivity_rad_s_per_count)
+        counts = np.round(wave[:, None] * along / ADIS16465.channel(RATE).unit_per_count)
         samples["counts"] += counts.astype(samples["counts"].dtype)
     return replace(run, samples={"gyro": samples})
 

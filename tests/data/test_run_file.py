@@ -20,6 +20,7 @@ from firmware_host.samples import FIELD_SAMPLE_DTYPE, SAMPLE_DTYPE
 from rig.arm.motion import Sweep
 from rig.arm.state import ARM_STATE_DTYPE, ArmState
 from rig.config.limits import Limits
+from rig.data.channel import of_thermometer, of_three_axes
 from rig.data.events import (
     BoardNotObserved,
     BoardObserved,
@@ -31,7 +32,9 @@ from rig.data.events import (
     SweepFinished,
     SweepStarted,
 )
-from rig.data.run_file import RecordedMagnetometer, RecordedSensor, RunRecorder, make_plain, read_run
+from rig.data.quantity import FIELD, RATE
+from rig.data.recorded_sensor import RecordedSensor
+from rig.data.run_file import RunRecorder, make_plain, read_run
 from rig.data.settings import ObservationThresholds, PlannedSweep, RunSettings
 from rig.errors import Fault, Refused
 from support.paths import ROOT
@@ -42,11 +45,7 @@ SENSOR = RecordedSensor(
     part="lsm9ds1",
     serial_number="LSM9DS1-001",
     rate_hz=238.0,
-    range_rad_s=4.276,
-    sensitivity_rad_s_per_count=1.527e-4,
-    full_scale_counts=32767,
-    temperature_c_per_count=0.0625,
-    temperature_offset_c=25.0,
+    channels=(of_three_axes(RATE, 1.527e-4, 32767, 4.276), of_thermometer(0.0625, 25.0)),
     mounting=((0.0, 1.0, 0.0), (-1.0, 0.0, 0.0), (0.0, 0.0, 1.0)),
 )
 SETTINGS = RunSettings(
@@ -110,7 +109,8 @@ def some_samples(first: int, count: int) -> np.ndarray[Any, Any]:
 def test_a_magnetometer_comes_back_beside_the_gyroscopes(tmp_path: Path) -> None:
     """Equal in all that is known of it: a run that is gone on with asks whether it is the same."""
     path = tmp_path / "run.h5"
-    compass = RecordedMagnetometer("lsm9ds1_magnetometer", "M1", 80.0, 4e-4, 1.4e-8, 32767, SENSOR.mounting)
+    field = of_three_axes(FIELD, 1.4e-8, 32767, 4e-4)
+    compass = RecordedSensor("lsm9ds1_magnetometer", "M1", 80.0, (field,), SENSOR.mounting)
     samples = np.zeros(300, FIELD_SAMPLE_DTYPE)
     samples["sequence"] = np.arange(300)
     samples["host_time_s"] = time.monotonic()
@@ -121,7 +121,7 @@ def test_a_magnetometer_comes_back_beside_the_gyroscopes(tmp_path: Path) -> None
         recording.add_samples("compass", samples)
         recording.add_samples("gyro", some_samples(0, 10))
     run = read_run(path)
-    assert run.sensors == {"gyro": SENSOR} and run.magnetometers == {"compass": compass}
+    assert run.sensors == {"gyro": SENSOR, "compass": compass} and run.measuring(FIELD) == {"compass": compass}
     np.testing.assert_array_equal(run.samples["compass"], samples)
 
 
@@ -155,7 +155,7 @@ def test_everything_comes_back_as_it_was_added(tmp_path: Path) -> None:
     assert {other.controller_time_s for other in others} == {states[-1].time_s}  # the arm's time when it happened
     assert finished.controller_time_s == 123.5
     with h5py.File(path, "r") as file:  # any HDF5 tool opens it
-        assert file.attrs["schema"] == "rig.run/2"
+        assert file.attrs["schema"] == "rig.run/3"
 
 
 def test_a_run_can_be_read_while_it_is_written(tmp_path: Path) -> None:

@@ -10,6 +10,7 @@ from numpy.typing import NDArray
 
 from rig.arm.state import ARM_STATE_DTYPE
 from rig.data.events import Event, SweepFinished, SweepStarted
+from rig.data.quantity import RATE
 from rig.data.run_file import RunData
 from rig.data.settings import ObservationThresholds
 from rig.errors import Fault, Refused
@@ -21,6 +22,7 @@ from rig.observation.observed_run import observe_run
 from rig.observation.timebase import TimeBase, estimate_time_base
 from rig.observation.windows import swept
 from rig.report.sensor_entry import sensor_entry
+from support.recorded import with_channel
 from support.solving import solve_runs
 from support.synthetic_run import (
     BIAS_RAD_S,
@@ -111,7 +113,7 @@ def test_a_board_that_was_heard_late_is_not_taken_for_an_earlier_sweep(joint: st
     sensor, samples = USUAL.sensors["gyro"], USUAL.samples["gyro"]
     board_s = samples["board_time_us"] * 1e-6
     heard = np.abs(board_s * (1 + Setup().drift) + Setup().boot_s - begun - 10) < 12.5
-    readings_rad_s = samples["counts"][heard] * sensor.sensitivity_rad_s_per_count
+    readings_rad_s = samples["counts"][heard] * sensor.channel(RATE).unit_per_count
     clock = estimate_time_base(board_s[heard], readings_rad_s, ArmMotion(USUAL.arm))
     assert abs(clock_errors(Setup(), clock)[0]) < 4 * clock.offset_std_s
 
@@ -130,7 +132,7 @@ def test_a_single_sweep_tells_the_clock_whatever_the_bias(bias_rad_s: float) -> 
         begun_s = board_s * (1 + setup.drift) + setup.boot_s - start_s
         heard = (begun_s > -1) & (begun_s < end_s - start_s + 0.1)
         arm = run.arm[(run.arm["time_s"] > start_s - 1) & (run.arm["time_s"] < end_s + 0.1)]
-        readings_rad_s = samples["counts"][heard] * sensor.sensitivity_rad_s_per_count
+        readings_rad_s = samples["counts"][heard] * sensor.channel(RATE).unit_per_count
         clock = estimate_time_base(board_s[heard], readings_rad_s, ArmMotion(arm))
         assert abs(clock_errors(setup, clock)[0]) < 4 * clock.offset_std_s < 1e-3
 
@@ -389,7 +391,7 @@ def still(run: RunData) -> RunData:
 
 def scaled(run: RunData, factor: float) -> RunData:
     sensor = run.sensors["gyro"]
-    changed = replace(sensor, sensitivity_rad_s_per_count=sensor.sensitivity_rad_s_per_count * factor)
+    changed = with_channel(sensor, unit_per_count=sensor.channel(RATE).unit_per_count * factor)
     return replace(run, sensors={"gyro": changed})
 
 

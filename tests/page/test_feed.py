@@ -51,7 +51,7 @@ def test_the_arm_is_named_as_it_was_found() -> None:
 def test_a_minute_is_kept_and_no_more() -> None:
     feed = fed()
     for number in range(3 * POINTS):
-        feed.event(SamplesTaken((SensorSamples("gyro", number, 0, (0.0, 0.0, math.nan)),)))
+        feed.event(SamplesTaken((SensorSamples("gyro", number, 0, {"rate": (0.0, 0.0, math.nan)}),)))
         feed.event(ArmSeen(state(number * STEP_S * 1.01, (0.0,) * 6, (0.0,) * 6), 0))
     _, whole = read(feed.whole())
     assert len(whole["points"]["time_s"]) == POINTS and whole["points"]["first"] == 2 * POINTS

@@ -115,7 +115,7 @@ def test_no_state_is_without_a_picture() -> None:
 
 
 def test_every_state_of_a_run_has_its_word_and_its_sign(driver: Chrome, tmp_path: Path) -> None:
-    plan, recorded = planned(), PhaseRecorded((SensorSamples("gyro", 14280, 0, (0.0, 0.0, 0.0)),), 0)
+    plan, recorded = planned(), PhaseRecorded((SensorSamples("gyro", 14280, 0, {"rate": (0.0, 0.0, 0.0)}),), 0)
     connected, *until_asked = before_it_moves(plan)
     before: dict[str, list[RunEvent]] = {
         "connecting": [],

@@ -9,6 +9,7 @@ import pytest
 from rig.analysis.calibration import DEFAULT_ESTIMATOR
 from rig.config.sensor_catalogue import has_own_port
 from rig.data.layout import TEXTS
+from rig.data.quantity import ACCELERATION, FIELD
 from rig.data.result_file import ResultDocument, read_result
 from rig.data.settings import SCHEMAS
 from rig.plans.recorded import RecordedRun, judged, open_run
@@ -23,7 +24,7 @@ KINDS: dict[str, Callable[[RecordedRun], bool]] = {
     "sweeps alone": lambda run: bool(run.raw) and not run.raw[0].settings.planned_dwells,
     "dwells alone": lambda run: not run.movement[0].settings.planned_sweeps,
     "accelerometers beside sweeps": lambda run: bool(run.movement[0].settings.planned_sweeps) and _accelerates(run),
-    "a magnetometer": lambda run: bool(run.movement[0].magnetometers),
+    "a magnetometer": lambda run: bool(run.movement[0].measuring(FIELD)),
     "a sensor with a port of its own": lambda run: any(has_own_port(s.part) for s in run.movement[0].sensors.values()),
     "several speeds": lambda run: len({sweep.speed_rad_s for sweep in run.movement[0].settings.planned_sweeps}) > 1,
     "resumed": lambda run: len(run.raw) > 1,
@@ -34,7 +35,7 @@ KINDS: dict[str, Callable[[RecordedRun], bool]] = {
 
 
 def _accelerates(run: RecordedRun) -> bool:
-    return any(sensor.has_acceleration for sensor in run.movement[0].sensors.values())
+    return bool(run.movement[0].measuring(ACCELERATION))
 
 
 @cache

@@ -12,7 +12,9 @@ import yaml
 
 from firmware_host.samples import IMU_SAMPLE_DTYPE
 from rig.cli import main
+from rig.data.channel import of_three_axes
 from rig.data.magnetometer_entries import MagnetometerEntry
+from rig.data.quantity import ACCELERATION
 from rig.data.result_file import ResultDocument, VectorEntry, read_result
 from rig.data.result_types import ErrorEntry
 from rig.errors import Refused
@@ -296,7 +298,8 @@ def with_accelerations(observed: ObservedRun) -> ObservedRun:
     for name in old.dtype.names or ():
         samples[name] = old[name]
     samples["acceleration_counts"] = (1, 2, 3)
-    sensor = replace(observed.run.sensors["gyro"], range_m_s2=20.0, sensitivity_m_s2_per_count=0.25)
+    sensor = observed.run.sensors["gyro"]
+    sensor = replace(sensor, channels=(*sensor.channels, of_three_axes(ACCELERATION, 0.25, 32767, 20.0)))
     return replace(observed, run=replace(observed.run, samples={"gyro": samples}, sensors={"gyro": sensor}))
 
 

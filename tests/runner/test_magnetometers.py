@@ -13,6 +13,7 @@ import yaml
 from firmware_host.samples import FIELD_SAMPLE_DTYPE
 from rig.analysis.outcome import calibrated
 from rig.cli import main
+from rig.data.quantity import FIELD, RATE
 from rig.data.run_file import RunData, read_run
 from rig.errors import Fault
 from support.commands import configuration, rig, rig_here
@@ -83,9 +84,9 @@ def test_the_field_is_recorded_beside_the_rates_and_nothing_is_lost(
     finished: tuple[Path, dict[str, Any], str],
 ) -> None:
     run = recorded(finished[0])
-    assert set(run.magnetometers) == {"compass"} and "compass" not in run.sensors
-    compass, samples = run.magnetometers["compass"], run.samples["compass"]
-    assert compass.rate_hz == 80 and compass.range_t == pytest.approx(4e-4)
+    assert set(run.measuring(FIELD)) == {"compass"} and "compass" not in run.measuring(RATE)
+    compass, samples = run.sensors["compass"], run.samples["compass"]
+    assert compass.rate_hz == 80 and compass.channel(FIELD).range == pytest.approx(4e-4)
     assert samples.dtype == FIELD_SAMPLE_DTYPE
     assert samples["sequence"].tolist() == list(range(len(samples)))
     assert np.diff(samples["board_time_us"].astype(float)).mean() == pytest.approx(12_500, rel=1e-3)
@@ -99,7 +100,7 @@ def test_the_field_is_exported_as_it_was_read_on_the_arms_clock(
     table = np.genfromtxt(tmp_path / "compass.csv", delimiter=",", names=True)
     assert table.dtype.names == ("time_s", "x_t", "y_t", "z_t")
     run = recorded(finished[0])
-    read_t = run.samples["compass"]["field_counts"] * run.magnetometers["compass"].sensitivity_t_per_count
+    read_t = run.sensors["compass"].channel(FIELD).values(run.samples["compass"])
     np.testing.assert_array_equal(np.column_stack([table[axis] for axis in ("x_t", "y_t", "z_t")]), read_t)
     arm_s = run.arm["time_s"]
     assert arm_s[0] - 1 < table["time_s"][0] and table["time_s"][-1] < arm_s[-1] + 1

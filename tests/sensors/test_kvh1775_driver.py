@@ -10,7 +10,8 @@ import numpy as np
 import pytest
 from numpy.typing import NDArray
 
-from rig.data.run_file import RecordedMagnetometer, RecordedSensor
+from rig.data.quantity import ACCELERATION, FIELD, RATE, TEMPERATURE
+from rig.data.recorded_sensor import RecordedSensor
 from rig.sensors.errors import SensorError
 from rig.sensors.kvh1775.driver import Kvh1775
 from rig.sensors.kvh1775.source import Kvh1775Source, kvh1775, look
@@ -79,16 +80,15 @@ def test_samples_are_what_the_instrument_feels(message: str, rotation: str) -> N
             samples = collected.wait(source, 300)
             described = source.sensors["kvh"]
     assert isinstance(described, RecordedSensor)
-    rate = samples["counts"] * described.sensitivity_rad_s_per_count
-    assert described.sensitivity_m_s2_per_count is not None
-    force = samples["acceleration_counts"] * described.sensitivity_m_s2_per_count
+    rate = described.channel(RATE).values(samples)
+    force = described.channel(ACCELERATION).values(samples)
     assert rate.mean(axis=0) == pytest.approx(TURNING[:3], abs=3e-6)
     assert rate[2:].std(axis=0) == pytest.approx([1e-5] * 3, rel=0.3)
     assert force.mean(axis=0) == pytest.approx(np.array(TURNING[3:]) * 9.80665, abs=3e-3)
     assert samples["sequence"].tolist() == list(range(len(samples))), "300 are more than two rounds of 128"
     steps_us = np.diff(samples["board_time_us"].astype(np.int64))
     assert set(steps_us.tolist()) <= {3999, 4000, 4001}
-    assert (samples["temperature_counts"] * described.temperature_c_per_count == 22.0).all()
+    assert (described.channel(TEMPERATURE).values(samples) == 22.0).all()
 
 
 FIELD_T = (2.1e-5, -0.4e-5, -4.2e-5)
@@ -103,10 +103,10 @@ def test_format_c_has_its_magnetometer_as_a_sensor_of_its_own() -> None:
         wire.order(lambda kvh: setattr(kvh.faults, "lose", 5))  # in two readings at least
         collected.wait(source, 400)
         described = source.sensors["kvh_field"]
-    assert isinstance(described, RecordedMagnetometer)
-    assert (described.within, described.rate_hz, described.serial_number) == ("kvh", 62.5, SERIAL_NUMBER)
+    assert isinstance(described, RecordedSensor)
+    assert (described.clock, described.rate_hz, described.serial_number) == ("kvh", 62.5, SERIAL_NUMBER)
     samples = np.concatenate(collected.fields)
-    read_t = samples["field_counts"] * described.sensitivity_t_per_count
+    read_t = described.channel(FIELD).values(samples)
     assert read_t == pytest.approx(np.tile(FIELD_T, (len(samples), 1)), abs=1e-11), "whole ones, each axis in its place"
     steps = np.diff(samples["sequence"].astype(np.int64))
     assert samples["sequence"][0] == 0 and np.count_nonzero(steps > 1) == 1 and steps.max() in (2, 3)
@@ -258,7 +258,7 @@ def test_bit_errors_cost_messages_and_nothing_else() -> None:
         described = source.sensors["kvh"]
     assert isinstance(described, RecordedSensor)
     assert len(samples) < samples["sequence"][-1] + 1
-    rate = samples["counts"] * described.sensitivity_rad_s_per_count
+    rate = described.channel(RATE).values(samples)
     assert np.abs(rate - TURNING[:3]).max() < 1e-4
 
 

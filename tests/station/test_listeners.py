@@ -35,7 +35,7 @@ from rig.station.view import LiveView
 from rig.station.words import line, reason
 from support.full_disk import full_disk
 
-SAMPLES = (SensorSamples("gyro", 100, 2, (0.0, 0.0, 1.0)), SensorSamples("reference", 50, 1, None))
+SAMPLES = (SensorSamples("gyro", 100, 2, {"rate": (0.0, 0.0, 1.0)}), SensorSamples("reference", 50, 1, {}))
 
 
 class Everything:
@@ -148,14 +148,14 @@ def test_the_log_keeps_where_a_script_failed() -> None:
 
 def test_the_live_view_shows_every_quantity_that_a_sensor_sends() -> None:
     """Rates, what the accelerometer beside feels, a field; who has sent nothing is waited for."""
-    imu = SensorSamples("imu", 100, 2, (0.0, 0.0, 1.0), acceleration_m_s2=(0.0, -9.81, 0.5))
-    compass = SensorSamples("compass", 9, 0, None, (2e-5, 0.0, -4e-5))
+    imu = SensorSamples("imu", 100, 2, {"rate": (0.0, 0.0, 1.0), "acceleration": (0.0, -9.81, 0.5)})
+    compass = SensorSamples("compass", 9, 0, {"field": (2e-5, 0.0, -4e-5)})
     step = Rest(name="rest", duration_s=3.0)
     progress = Progress(1, 4, step, 0.5, 1.5, 1.5, 0.0)
     console = Console(width=100, file=io.StringIO(), record=True)
     with Live(console=console, auto_refresh=False) as live:
         seen = LiveView(live)
-        seen.event(SamplesTaken((imu, compass, SensorSamples("late", 0, 0, None))))
+        seen.event(SamplesTaken((imu, compass, SensorSamples("late", 0, 0, {}))))
         seen.event(progress)
     rows = [row.split(maxsplit=1) for row in console.export_text().splitlines()]
     shown = [" ".join(row) for row in rows if row]

@@ -13,6 +13,7 @@ from rig.analysis.calibration import observe_recordings
 from rig.analysis.check import Check
 from rig.analysis.contradictions import in_reference
 from rig.analysis.magnetic_field import calibrate_magnetometers
+from rig.data.quantity import ACCELERATION, FIELD
 from rig.data.run_file import RunData
 from rig.errors import Fault
 from rig.estimation.arrays import Array
@@ -75,7 +76,7 @@ class Readings:
 
     def recording(self) -> RunData:
         samples = self.run.samples[self.sensor].copy()
-        samples[COUNTS["field" if self.sensor in self.run.magnetometers else "acceleration"]] = self.counts
+        samples[COUNTS["field" if self.sensor in self.run.measuring(FIELD) else "acceleration"]] = self.counts
         return replace(self.run, samples={**self.run.samples, self.sensor: samples})
 
 
@@ -93,15 +94,15 @@ def readings_of(folder: str, sensor: str) -> Readings:
     """An undamaged recording's."""
     run = recorded(folder)
     observed = observe_recordings([run])[0]
-    magnetometer = run.magnetometers.get(sensor)
+    magnetometer = run.measuring(FIELD).get(sensor)
     if magnetometer is not None:
         clock = next(iter(observed.sensors.values())).time_base
         samples = run.samples[sensor]
         time_s = clock.controller_time_s(samples["board_time_us"] * 1e-6)
-        counts, count = samples[COUNTS["field"]], magnetometer.sensitivity_t_per_count
+        counts, count = samples[COUNTS["field"]], magnetometer.channel(FIELD).unit_per_count
         return Readings(run, sensor, counts.astype(np.int64), time_s, count)
     stream = observed.stream(sensor)
-    per_count = stream.sensor.sensitivity_m_s2_per_count
+    per_count = stream.sensor.channel(ACCELERATION).unit_per_count
     assert per_count is not None
     counts = stream.raw[COUNTS["acceleration"]]
     return Readings(run, sensor, counts.astype(np.int64), stream.time_s, per_count)

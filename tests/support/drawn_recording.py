@@ -13,7 +13,10 @@ from scipy.interpolate import CubicSpline
 from rig.arm.kinematics import NOMINAL, DenavitHartenberg, flange_attitude, flange_pose, flange_rate
 from rig.arm.motion import Sweep, Transfer
 from rig.config.sensor_catalogue import PARTS
-from rig.data.run_file import RecordedSensor, RunData
+from rig.data.channel import of_thermometer, of_three_axes
+from rig.data.quantity import RATE
+from rig.data.recorded_sensor import RecordedSensor
+from rig.data.run_file import RunData
 from rig.data.settings import OF_SENSORS, Uncertainty
 from rig.estimation.arrays import Array
 from rig.estimation.earth import EARTH_RATE_RAD_S, STANDARD_GRAVITY_M_S2
@@ -41,30 +44,31 @@ ADIS16465 = replace(
     part="adis16465",
     serial_number="ADIS16465-001",
     rate_hz=200.0,
-    range_rad_s=float(np.radians(500)),
-    sensitivity_rad_s_per_count=float(np.radians(0.025)) / 2**10,  # of its 32 bits, but for the last six
-    full_scale_counts=500 * 40 * 2**10,
+    channels=(  # of its 32 bits, but for the last six
+        of_three_axes(RATE, float(np.radians(0.025)) / 2**10, 500 * 40 * 2**10, float(np.radians(500))),
+        of_thermometer(1 / 16, 25.0),
+    ),
 )
 MPU9250 = replace(
     SENSOR,
     part="mpu9250",
     serial_number="MPU9250-001",
     rate_hz=200.0,
-    range_rad_s=float(np.radians(250)),
-    sensitivity_rad_s_per_count=float(np.radians(250)) / 2**15,
-    temperature_c_per_count=1 / 333.87,
-    temperature_offset_c=21.0,
+    channels=(
+        of_three_axes(RATE, float(np.radians(250)) / 2**15, 32767, float(np.radians(250))),
+        of_thermometer(1 / 333.87, 21.0),
+    ),
 )
 KVH1775 = replace(
     SENSOR,
     part="kvh1775",
     serial_number="1775-0042",
     rate_hz=250.0,
-    range_rad_s=float(np.radians(490)),
-    sensitivity_rad_s_per_count=float(np.radians(490)) / 2**30,
-    full_scale_counts=2**30,
-    temperature_c_per_count=0.01,
-    temperature_offset_c=0.0,
+    channels=(
+        of_three_axes(RATE, float(np.radians(490)) / 2**30, 2**30, float(np.radians(490))),
+        of_thermometer(0.01, 0.0),
+    ),
+    clock="gyro",
 )
 KINDS = {
     "noisy LSM9DS1": Kind(SENSOR, 0.035, 4.8e-5, 1e-5),
@@ -121,13 +125,14 @@ def drawn(seed: int, kind: Kind, setup: Setup | None = None) -> Drawn:
 def damaged(seen: Drawn, kind: Kind, by_rad_s: Array) -> RunData:
     """With so much (n, 3) added to the readings."""
     samples = seen.run.samples["gyro"].copy()
-    samples["counts"] += np.round(by_rad_s / kind.sensor.sensitivity_rad_s_per_count).astype(samples["counts"].dtype)
+    samples["counts"] += np.round(by_rad_s / kind.sensor.channel(RATE).unit_per_count).astype(samples["counts"].dtype)
     return replace(seen.run, samples={"gyro": samples})
 
 
 def _counts(read: Array, kind: Kind) -> Array:
-    full = kind.sensor.full_scale_counts
-    counts: Array = np.clip(np.round(read / kind.sensor.sensitivity_rad_s_per_count), -full, full)
+    full = kind.sensor.channel(RATE).full_scale_counts
+    assert full is not None
+    counts: Array = np.clip(np.round(read / kind.sensor.channel(RATE).unit_per_count), -full, full)
     return counts
 
 

@@ -15,9 +15,12 @@ from rig.arm.motion import Dwell, Plan, Rest, Step, Sweep, Transfer
 from rig.arm.state import ARM_STATE_DTYPE
 from rig.config.load import parse
 from rig.config.procedure_sections import SixSweepsSection
+from rig.data.channel import of_thermometer, of_three_axes
 from rig.data.events import Event, Recorded, RestFinished, RestStarted, SweepFinished, SweepStarted
 from rig.data.provenance import Provenance
-from rig.data.run_file import RecordedSensor, RunData
+from rig.data.quantity import RATE
+from rig.data.recorded_sensor import RecordedSensor
+from rig.data.run_file import RunData
 from rig.data.settings import settings_of
 from rig.estimation.arrays import Array
 from rig.plans.six_sweeps import plan_six_observation
@@ -219,11 +222,7 @@ SENSOR = RecordedSensor(
     part="lsm9ds1",
     serial_number="LSM9DS1-001",
     rate_hz=238.0,
-    range_rad_s=float(np.radians(245)),
-    sensitivity_rad_s_per_count=SENSITIVITY,
-    full_scale_counts=32767,
-    temperature_c_per_count=1 / 16,
-    temperature_offset_c=25.0,
+    channels=(of_three_axes(RATE, SENSITIVITY, 32767, float(np.radians(245))), of_thermometer(1 / 16, 25.0)),
     mounting=((1.0, 0.0, 0.0), (0.0, 1.0, 0.0), (0.0, 0.0, 1.0)),
 )
 

@@ -7,6 +7,7 @@ import numpy as np
 from rig.analysis.alignment import Calibration
 from rig.data.run_file import RunData
 from rig.estimation.arrays import Array
+from support.recorded import with_channel
 from support.synthetic_run import (
     BIAS_RAD_S,
     SCALE,
@@ -70,7 +71,6 @@ def recording(
     if stored is not None:
         raw = samples["gyro"]["counts"] * SENSITIVITY
         samples["gyro"]["counts"] = np.round(1e6 * (raw + stored.bias_rad_s) @ stored.correction_matrix.T)
-        sensors["gyro"] = replace(
-            sensors["gyro"], mode="calibrated", sensitivity_rad_s_per_count=1e-6, full_scale_counts=2**31 - 1
-        )
+        corrected = with_channel(sensors["gyro"], unit_per_count=1e-6, full_scale_counts=2**31 - 1)
+        sensors["gyro"] = replace(corrected, mode="calibrated")
     return replace(run, sensors=sensors, samples=samples)

@@ -136,10 +136,9 @@ def _samples(name: str, time_s: float, sweep: Sweep | None, lost: int) -> Sensor
         speed * along + bias + wave for along, bias, wave in zip(axis, (0.01, -0.02, 0.005), ripple, strict=True)
     )
     ax, ay, az = (9.8 * math.sin(0.2 * time_s) + 30 * ripple[0], 9.8 * math.cos(0.2 * time_s), 0.4 + 20 * ripple[1])
-    acceleration = (ax, ay, az) if name == "reference" else None
-    return SensorSamples(
-        name, round(238 * time_s) + 1, lost, (x, y, z), acceleration_m_s2=acceleration, temperature_c=23.4
-    )
+    acceleration = {"acceleration": (ax, ay, az)} if name == "reference" else {}
+    latest = {"rate": (x, y, z), "temperature": (23.4,), **acceleration}
+    return SensorSamples(name, round(238 * time_s) + 1, lost, latest)
 
 
 def _observed(sweep: Sweep) -> RunEvent:

@@ -179,16 +179,17 @@ function inOrder(one, other) {
 function draw(name, values) {
   const id = `plot-${name.replaceAll(/[^A-Za-z0-9_-]/g, "-")}`;
   const [sensor, quantity] = [name.slice(0, name.lastIndexOf(".")), name.slice(name.lastIndexOf(".") + 1)];
-  const [title, unit, digits] = UNITS[quantity];
-  if (!$(id)) $("readings").append(panel(id, sensor, title, unit));
   const about = shown.sensors?.find((each) => each.name === sensor);
+  const [title, unit, digits] = UNITS[quantity] ?? [...(about?.units?.[quantity] ?? [quantity, ""]), 2];
+  if (!$(id)) $("readings").append(panel(id, sensor, title, unit));
   $(`${id}-about`).textContent = [about?.part, about?.mode === "calibrated" ? "corrected by the board" : ""].filter(Boolean).join(" · ");
   const last = values.findLast((value) => value);
   const canvas = $(`${id}-canvas`);
-  for (const [i, axis] of [..."xyz"].entries()) {
-    $(`${id}-${axis}`).textContent = `${axis} ${last ? signed(last[i], digits).padStart(digits + 4, "\u2007") : "–"}`;
+  const axes = last?.length === 1 ? [["x", ""]] : [..."xyz"].map((axis) => [axis, `${axis} `]); // what has no axes has no letter
+  for (const [i, [axis, letter]] of axes.entries()) {
+    $(`${id}-${axis}`).textContent = `${letter}${last ? signed(last[i], digits).padStart(digits + 4, "\u2007") : "–"}`;
   }
-  if (last) canvas.setAttribute("aria-label", `${sensor}, ${title} over the last minute; now ${[..."xyz"].map((axis, i) => `${axis} ${last[i].toFixed(digits)}`).join(", ")} ${unit}`);
+  if (last) canvas.setAttribute("aria-label", `${sensor}, ${title} over the last minute; now ${axes.map(([, letter], i) => `${letter}${last[i].toFixed(digits)}`).join(", ")} ${unit}`);
   plot(canvas, points.times, values);
 }
 

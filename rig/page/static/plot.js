@@ -63,7 +63,7 @@ export function plot(canvas, times, values) {
 
 /** The letters at the right end, moved apart where they would cover each other. */
 function letters(pen, paint, last, up, width, height) {
-  if (!last) return;
+  if (!last || last.length === 1) return;
   const places = [..."xyz"].map((axis, i) => ({ axis, at: up(last[i]) })).sort((a, b) => a.at - b.at);
   for (let i = 1; i < 3; i += 1) places[i].at = Math.max(places[i].at, places[i - 1].at + 16);
   const over = Math.max(0, places[2].at - (height - BOTTOM));

@@ -7,6 +7,7 @@ from typing import Any, Final
 
 import numpy as np
 
+from rig.data.quantity import ACCELERATION, RATE
 from rig.errors import Refused
 from rig.estimation.arrays import Array
 from rig.observation.acceleration import accelerations
@@ -40,7 +41,7 @@ def write_bag(recordings: Sequence[ObservedRun], folder: Path) -> list[Path]:
     message = store.types["sensor_msgs/msg/Imu"].__msgtype__
     with Writer(path, version=FORMAT) as bag:
         bag.set_custom_data("convention", SAID)
-        for name, plain in plain_names(recordings[0].run.sensors).items():
+        for name, plain in plain_names(recordings[0].run.measuring(RATE)).items():
             connection = bag.add_connection(f"/{plain}/imu", message, typestore=store)
             for recording in recordings:
                 for stamp, imu in _messages(store.types, recording, name, plain):
@@ -55,14 +56,11 @@ def _messages(types: Mapping[str, Any], recording: ObservedRun, name: str, frame
     )
     vector, quaternion = types["geometry_msgs/msg/Vector3"], types["geometry_msgs/msg/Quaternion"]
     stream, seen = recording.stream(name), recording.sensors[name]
-    felt = (
-        accelerations(stream, slice(None)) if stream.sensor.has_acceleration else np.zeros_like(stream.readings_rad_s)
-    )
+    feels = stream.sensor.measures(ACCELERATION)
+    felt = accelerations(stream, slice(None)) if feels else np.zeros_like(stream.readings_rad_s)
     unknown = np.array([-1.0, *[0.0] * 8])
     of_rate = _covariance([rest.noise_rad_s for rest in seen.rests])
-    of_force = (
-        _covariance([dwell.reading.noise for dwell in seen.dwells]) if stream.sensor.has_acceleration else unknown
-    )
+    of_force = _covariance([dwell.reading.noise for dwell in seen.dwells]) if feels else unknown
     nobody = quaternion(x=0.0, y=0.0, z=0.0, w=1.0)
     for stamp, rate, force in zip(_stamps(recording, stream.time_s), stream.readings_rad_s, felt, strict=True):
         at = time(sec=stamp // NANO, nanosec=stamp % NANO)

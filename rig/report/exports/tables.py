@@ -11,11 +11,9 @@ from pathlib import Path
 import numpy as np
 
 from rig.config.written_file import new_file, write_new
-from rig.data.quantity import ACCELERATION, FIELD, RATE
+from rig.data.quantity import ACCELERATION, RATE
+from rig.data.recorded_sensor import RecordedSensor
 from rig.estimation.arrays import Array
-from rig.observation.acceleration import accelerations
-from rig.observation.average import Stream
-from rig.observation.field import field_samples
 from rig.observation.observed_run import ObservedRun
 from rig.report.exports.names import plain_names
 from rig.study.files import missing_extra
@@ -34,34 +32,32 @@ class Table:
 
 
 def tables_of(recordings: Sequence[ObservedRun]) -> Iterator[Table]:
-    """The tables of each recording: the arm, of each sensor readings, accelerations if any, and sweeps; of each
-    magnetometer its readings.
-    """
+    """The tables of each recording: the arm, of each sensor its readings, of each gyroscope its sweeps as well."""
     for number, recording in enumerate(recordings, start=1):
         after = "" if number == 1 else f"-{number}"
         yield Table(f"arm{after}", recording.motion.table(), f"Joint angles and rates, base to wrist 3. {CLOCK} {LOST}")
         for name, sensor in recording.run.sensors.items():
-            stream = recording.stream(name)
-            whose = f"{name}, {sensor.part} {sensor.serial_number}, {sensor.mode} readings in the sensor's own axes."
-            yield Table(f"{name}{after}", _readings(stream), f"{whose} {CLOCK} {LOST}")
-            if sensor.has_acceleration:
-                columns = {"time_s": stream.time_s, **_split(ACCELERATION.columns, accelerations(stream, slice(None)))}
-                yield Table(f"{name}_acceleration{after}", columns, f"{whose} Upwards at rest. {CLOCK} {LOST}")
-            turned = "Whole turns about a unit vector in the flange's frame; those of angle 0 are rests."
-            yield Table(f"{name}_sweeps{after}", _sweeps(recording, name), f"{turned} {CLOCK} {LOST}")
-        for name, magnetometer in recording.run.magnetometers.items():
-            found = field_samples(recording, name)
-            if found is not None:
-                part = f"{magnetometer.part} {magnetometer.serial_number}"
-                whose = f"{name}, {part}, raw readings in tesla in the magnetometer's own axes."
-                columns = {"time_s": found[0], **_split(FIELD.columns, found[1])}
-                yield Table(f"{name}{after}", columns, f"{whose} {CLOCK} {LOST}")
+            yield from _readings(recording, name, sensor, after)
+            if sensor.measures(RATE):
+                turned = "Whole turns about a unit vector in the flange's frame; those of angle 0 are rests."
+                yield Table(f"{name}_sweeps{after}", _sweeps(recording, name), f"{turned} {CLOCK} {LOST}")
 
 
-def _readings(stream: Stream) -> dict[str, Array]:
-    sensor = stream.sensor
-    temperature = stream.raw["temperature_counts"] * sensor.temperature_c_per_count + sensor.temperature_offset_c
-    return {"time_s": stream.time_s, **_split(RATE.columns, stream.readings_rad_s), "temperature_c": temperature}
+def _readings(recording: ObservedRun, name: str, sensor: RecordedSensor, after: str) -> Iterator[Table]:
+    """A sensor's channels in one table, but for accelerations beside rates."""
+    time_s = recording.time_s(name)
+    beside = [each for each in sensor.channels if sensor.measures(RATE) and each.quantity == ACCELERATION.name]
+    own = [each for each in sensor.channels if each not in beside]
+    whose = f"{name}, {sensor.part} {sensor.serial_number}, {sensor.mode} readings"
+    if any(each.measures.shape for each in sensor.channels):
+        whose += " in the sensor's own axes"
+    for table, channels, said in (("", own, ""), ("_acceleration", beside, "Upwards at rest. ")):
+        if channels:
+            columns = {"time_s": time_s}
+            for each in channels:
+                values = each.values(recording.run.samples[name])
+                columns |= _split(each.measures.columns, values.reshape(len(time_s), -1))
+            yield Table(f"{name}{table}{after}", columns, f"{whose}. {said}{CLOCK} {LOST}")
 
 
 def _sweeps(recording: ObservedRun, name: str) -> dict[str, Array]:

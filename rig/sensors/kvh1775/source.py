@@ -8,16 +8,17 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from firmware_host.samples import IMU_SAMPLE_DTYPE, SAMPLE_DTYPE
 from rig.config.sensor_catalogue import PARTS
-from rig.config.sensor_sections import OwnPortSection, SensorSection, field_name, mounting_matrix
-from rig.data.run_file import RecordedMagnetometer, RecordedSensor
+from rig.config.sensor_sections import OwnPortSection, SensorSection, field_name
+from rig.data.channel import of_thermometer, of_three_axes
+from rig.data.quantity import ACCELERATION, FIELD, RATE
+from rig.data.recorded_sensor import RecordedSensor, recorded_mounting
 from rig.estimation.earth import STANDARD_GRAVITY_M_S2
 from rig.sensors.errors import SensorError
 from rig.sensors.kvh1775.driver import Kvh1775
 from rig.sensors.kvh1775.field import MESSAGES_EACH, FieldReader
 from rig.sensors.kvh1775.settings import Wanted, corrections, refusals
-from rig.sensors.source import OnSamples, Recorded
+from rig.sensors.source import OnSamples
 
 # The instrument sends single-precision floats; a sample holds whole numbers. This many stand for its full scale: far
 # finer than a float near it, and half of what 32 bits hold.
@@ -40,7 +41,7 @@ class Kvh1775Source:
         self._name, self._on_samples = name, on_samples
         line = _line_of(section)
         self._wanted = wanted_of(section)
-        self._described = describe(section)
+        self._described = describe(name, section)
         self._valid = GYROSCOPE_VALID | (ACCELEROMETER_VALID if section.acceleration is not None else 0)
         self._invalid_in_a_row = 0
         self._temperature_counts = _UNKNOWN
@@ -68,7 +69,7 @@ class Kvh1775Source:
         return self._corrected
 
     @property
-    def sensors(self) -> Mapping[str, Recorded]:
+    def sensors(self) -> Mapping[str, RecordedSensor]:
         """The one there is, and its magnetometer in format C."""
         field = {} if self._field is None else {self._field_name: self._field}
         return {self._name: self._described, **field}
@@ -98,7 +99,7 @@ class Kvh1775Source:
         valid &= temperature_counts != _UNKNOWN
         if not valid.any():
             return
-        samples = np.zeros(int(valid.sum()), sample_dtype(self._described))
+        samples = np.zeros(int(valid.sum()), self._described.sample_dtype)
         if self._first is None:
             self._first = int(numbers[valid][0])
         samples["sequence"] = numbers[valid] - self._first
@@ -108,10 +109,10 @@ class Kvh1775Source:
         rate_rad_s = messages["rotation"][valid].astype(np.float64)
         if self._wanted.rotation == "delta":
             rate_rad_s *= self._wanted.rate_hz  # its own seconds, in which it counts its intervals
-        samples["counts"] = _counts(rate_rad_s, self._described.sensitivity_rad_s_per_count)
-        if self._described.sensitivity_m_s2_per_count is not None:
+        samples["counts"] = _counts(rate_rad_s, self._described.channel(RATE).unit_per_count)
+        if self._described.measures(ACCELERATION):
             force_m_s2 = messages["acceleration_g"][valid].astype(np.float64) * STANDARD_GRAVITY_M_S2
-            samples["acceleration_counts"] = _counts(force_m_s2, self._described.sensitivity_m_s2_per_count)
+            samples["acceleration_counts"] = _counts(force_m_s2, self._described.channel(ACCELERATION).unit_per_count)
         self._on_samples(self._name, samples)
 
     def _watch(self, messages: NDArray[Any], valid: NDArray[np.bool_]) -> None:
@@ -156,41 +157,38 @@ def judge(driver: Kvh1775, name: str, section: SensorSection) -> Iterator[Sensor
     yield from refusals(f"sensors.{name}", driver.settings)
 
 
-def describe(section: SensorSection) -> RecordedSensor:
+def describe(name: str, section: SensorSection) -> RecordedSensor:
     """What a reader of its samples must know."""
     range_rad_s = radians(section.range_deg_s)
-    range_m_s2 = None
+    channels = [
+        of_three_axes(RATE, range_rad_s / FULL_SCALE_COUNTS, FULL_SCALE_COUNTS, range_rad_s),
+        of_thermometer(DEGREES_PER_COUNT, 0.0),
+    ]
     if section.acceleration is not None:
         range_m_s2 = (section.acceleration.range_g or PARTS[section.part].ranges_g[0]) * STANDARD_GRAVITY_M_S2
+        channels.append(of_three_axes(ACCELERATION, range_m_s2 / FULL_SCALE_COUNTS, FULL_SCALE_COUNTS, range_m_s2))
     return RecordedSensor(
         part=section.part,
         serial_number=section.serial_number,
         rate_hz=section.rate_hz,
-        range_rad_s=range_rad_s,
-        sensitivity_rad_s_per_count=range_rad_s / FULL_SCALE_COUNTS,
-        full_scale_counts=FULL_SCALE_COUNTS,
-        temperature_c_per_count=DEGREES_PER_COUNT,
-        temperature_offset_c=0.0,
-        mounting=tuple(tuple(row) for row in mounting_matrix(section.mounting).tolist()),
-        range_m_s2=range_m_s2,
-        sensitivity_m_s2_per_count=None if range_m_s2 is None else range_m_s2 / FULL_SCALE_COUNTS,
+        channels=tuple(channels),
+        mounting=recorded_mounting(section.mounting),
+        clock=name,
     )
 
 
-def describe_field(name: str, section: SensorSection) -> RecordedMagnetometer | None:
+def describe_field(name: str, section: SensorSection) -> RecordedSensor | None:
     """How a recording describes the instrument's magnetometer; None where its messages have no field."""
     if _line_of(section).message != "C":
         return None
-    described = describe(section)
-    return RecordedMagnetometer(
+    t_per_count = FIELD_FULL_SCALE_T / FULL_SCALE_COUNTS
+    return RecordedSensor(
         part="kvh1775_magnetometer",
         serial_number=section.serial_number,
         rate_hz=section.rate_hz / MESSAGES_EACH,
-        range_t=FIELD_FULL_SCALE_T,
-        sensitivity_t_per_count=FIELD_FULL_SCALE_T / FULL_SCALE_COUNTS,
-        full_scale_counts=FULL_SCALE_COUNTS,
-        mounting=described.mounting,
-        within=name,
+        channels=(of_three_axes(FIELD, t_per_count, FULL_SCALE_COUNTS, FIELD_FULL_SCALE_T),),
+        mounting=recorded_mounting(section.mounting),
+        clock=name,
     )
 
 
@@ -214,11 +212,6 @@ def look(name: str, section: SensorSection) -> Iterator[str | SensorError]:
         yield from judge(driver, name, section)
         driver.run()
         yield f"built-in test: {driver.test().values.hex(' ')}"
-
-
-def sample_dtype(sensor: RecordedSensor) -> np.dtype[Any]:
-    """The type of a sensor's samples."""
-    return IMU_SAMPLE_DTYPE if sensor.has_acceleration else SAMPLE_DTYPE
 
 
 def _counts(values: NDArray[np.float64], per_count: float) -> NDArray[np.float64]:

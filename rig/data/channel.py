@@ -1,0 +1,93 @@
+"""What a source delivers of one quantity: the column of its samples, and how the numbers there become readings. Pure.
+
+A sample is its three stamps and a column for each channel, so the channels say what type the samples are of.
+"""
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from typing import Annotated, Any, Final, Literal
+
+import numpy as np
+from numpy.typing import NDArray
+from pydantic import Field
+
+from firmware_host.samples import STAMPS
+from rig.data.checked import Finite, Positive
+from rig.data.quantity import RATE, TEMPERATURE, Quantity, Scalar, measured
+from rig.estimation.arrays import Array
+
+ColumnName = Annotated[str, Field(pattern="^[a-z][a-z0-9_]{0,39}$")]
+MAX_CHANNELS: Final = 16
+
+
+@dataclass(frozen=True, slots=True)
+class Channel:
+    """One quantity of a sensor: reading = number in the `column` × `unit_per_count` + `offset`, in the quantity's unit.
+
+    `quantity` is a name in `measured()`, `type` NumPy's of a number. Numbers of `full_scale_counts` and more are
+    saturated, None where nothing tells; `range` is the nominal end of scale in the unit, None where it is not known.
+    """
+
+    quantity: str
+    column: ColumnName
+    type: Literal["<i2", "<i4", "<f8"]
+    unit_per_count: Positive
+    offset: Finite = 0.0
+    full_scale_counts: Annotated[int, Field(gt=0)] | None = None
+    range: Positive | None = None
+
+    @property
+    def measures(self) -> Quantity | Scalar:
+        """The row of the quantity."""
+        return measured()[self.quantity]
+
+    @property
+    def resolution(self) -> float:
+        """The step between neighbouring readings in the quantity's unit; 0 of numbers that are no counts."""
+        return 0.0 if self.type == "<f8" else self.unit_per_count
+
+    def counts(self, samples: NDArray[Any]) -> NDArray[Any]:
+        """The numbers (n,) or (n, 3) in samples (n,), as they were recorded."""
+        counts: NDArray[Any] = samples[self.column]
+        return counts
+
+    def in_unit(self, counts: NDArray[Any] | float) -> Array:
+        """Numbers of the column, of any shape, in the quantity's unit."""
+        found: Array = np.asarray(counts * self.unit_per_count + self.offset, dtype=np.float64)
+        return found
+
+    def values(self, samples: NDArray[Any]) -> Array:
+        """The readings (n,) or (n, 3) in samples (n,), in the quantity's unit."""
+        return self.in_unit(self.counts(samples))
+
+    def mean(self, samples: NDArray[Any]) -> tuple[float, ...]:
+        """The mean reading of samples (n,): one number, or one for each axis."""
+        return tuple(self.in_unit(self.counts(samples).mean(axis=0)).reshape(-1).tolist())
+
+    def saturated(self, samples: NDArray[Any]) -> NDArray[np.bool_]:
+        """Which of samples (n,) hold a number at the end of the scale, (n,)."""
+        if self.full_scale_counts is None:
+            return np.zeros(len(samples), dtype=np.bool_)
+        counts = self.counts(samples)
+        wide = counts.astype(np.int64) if counts.dtype.kind == "i" else counts  # the least i4 has no positive
+        beyond = np.abs(wide) >= self.full_scale_counts
+        found: NDArray[np.bool_] = beyond.reshape(len(samples), -1).any(axis=1)
+        return found
+
+
+def of_three_axes(
+    quantity: Quantity, unit_per_count: float, full_scale_counts: int, end_of_scale: float | None
+) -> Channel:
+    """The channel of a sensor of three axes as the board and the KVH 1775 deliver it."""
+    column = "counts" if quantity == RATE else f"{quantity.name}_counts"
+    return Channel(quantity.name, column, "<i4", unit_per_count, 0.0, full_scale_counts, end_of_scale)
+
+
+def of_thermometer(c_per_count: float, offset_c: float) -> Channel:
+    """The channel of the thermometer in such a sensor."""
+    return Channel(TEMPERATURE.name, "temperature_counts", "<i2", c_per_count, offset_c)
+
+
+def sample_dtype(channels: Sequence[Channel]) -> np.dtype[Any]:
+    """The type of samples of these channels. Raises ValueError where two of them, or a stamp, share a column."""
+    return np.dtype([*STAMPS, *((each.column, each.type, each.measures.shape) for each in channels)])

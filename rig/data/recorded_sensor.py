@@ -1,0 +1,108 @@
+"""What a reader of a recording must know about one sensor: what it is, how it sits, and what its samples hold."""
+
+import json
+from collections.abc import Mapping
+from dataclasses import asdict, dataclass
+from typing import Annotated, Any, Literal
+
+import numpy as np
+from numpy.typing import NDArray
+from pydantic import Field
+
+from rig.config.sensor_sections import MountingSection, mounting_matrix
+from rig.data.channel import MAX_CHANNELS, Channel, sample_dtype
+from rig.data.checked import Finite, Positive, checked
+from rig.data.quantity import RATE, TEMPERATURE, Quantity, Scalar, measured
+from rig.errors.quoting import quote
+
+MOUNTING_TOLERANCE = 1e-6
+
+Axis = Annotated[tuple[Finite, ...], Field(min_length=3, max_length=3)]
+Mounting = Annotated[tuple[Axis, ...], Field(min_length=3, max_length=3)]
+AS_THE_FLANGE: Mounting = ((1.0, 0.0, 0.0), (0.0, 1.0, 0.0), (0.0, 0.0, 1.0))
+
+
+@dataclass(frozen=True, slots=True)
+class RecordedSensor:
+    """A sensor and its `channels`, whose columns stand in its samples in their order.
+
+    `mounting` (3 rows of 3) is the nominal rotation from the flange frame to the sensor's; what has no axes leaves it.
+    `mode` is "calibrated" when the rates were corrected before they were recorded. `clock` names the sensor whose clock
+    stamps the samples: itself, or the one it is in; None where the board's does.
+    """
+
+    part: str
+    serial_number: str
+    rate_hz: Positive
+    channels: Annotated[tuple[Channel, ...], Field(min_length=1, max_length=MAX_CHANNELS)]
+    mounting: Mounting = AS_THE_FLANGE
+    mode: Literal["raw", "calibrated"] = "raw"  # files of before there were two modes say nothing
+    clock: str | None = None
+
+    @property
+    def on_board(self) -> bool:
+        """Whether the board read it, and stamped its samples with the board's clock."""
+        return self.clock is None
+
+    @property
+    def sample_dtype(self) -> np.dtype[Any]:
+        """The type of its samples."""
+        return sample_dtype(self.channels)
+
+    @property
+    def range_rad_s(self) -> float:
+        """The nominal end of scale of its rates, which every gyroscope states."""
+        known = self.channel(RATE).range
+        assert known is not None, "a gyroscope that does not state it is not read"
+        return known
+
+    def measures(self, quantity: Quantity | Scalar) -> bool:
+        """Whether its samples hold that quantity."""
+        return any(each.quantity == quantity.name for each in self.channels)
+
+    def channel(self, quantity: Quantity | Scalar) -> Channel:
+        """The channel of a quantity it measures. Raises KeyError of another."""
+        for each in self.channels:
+            if each.quantity == quantity.name:
+                return each
+        raise KeyError(quantity.name)
+
+    def means(self, samples: NDArray[Any]) -> dict[str, tuple[float, ...]]:
+        """The mean reading of each channel in samples (n,), by the name of the quantity."""
+        return {each.quantity: each.mean(samples) for each in self.channels}
+
+    def attributes(self) -> dict[str, Any]:
+        """The attributes as they stand in a run file: the channels as a list in JSON, without what there is none of."""
+        document = {name: value for name, value in asdict(self).items() if value is not None}
+        channels = [{name: value for name, value in each.items() if value is not None} for each in document["channels"]]
+        return {**document, "channels": json.dumps(channels)}
+
+
+def recorded_mounting(section: MountingSection) -> Mounting:
+    """The mounting that a configuration states, as it is recorded."""
+    return tuple(tuple(row) for row in mounting_matrix(section).tolist())
+
+
+def sensor_of(document: Mapping[str, Any]) -> RecordedSensor:
+    """The sensor of a description in plain values.
+
+    Raises ValueError naming what is wrong: a value, a quantity nobody knows or that comes twice, columns of one name, a
+    mounting that is no rotation, a gyroscope without range or thermometer.
+    """
+    sensor = checked(RecordedSensor, document, "sensor")
+    quantities = [each.quantity for each in sensor.channels]
+    for quantity in quantities:
+        if quantity not in measured() or quantities.count(quantity) > 1:
+            known = ", ".join(measured())
+            raise ValueError(f"the {sensor.part} measures {quote(quantity)}, which is not one of {known}")
+                f"the {sensor.part} measures {quote(quantity)}, which is not one of {', '.join(measured())}"
+            )
+    _ = sensor.sample_dtype
+    if sensor.measures(RATE) and (sensor.channel(RATE).range is None or not sensor.measures(TEMPERATURE)):
+        raise ValueError(f"the gyroscope {sensor.part} states no range or no temperature")
+    mounting = np.array(sensor.mounting)
+    # No element of a rotation exceeds one; the squares of much larger ones would overflow.
+    small = np.abs(mounting).max() < 2
+    if not (small and np.allclose(mounting @ mounting.T, np.eye(3), atol=MOUNTING_TOLERANCE)):
+        raise ValueError(f"the mounting of {sensor.part} is no rotation: {quote(sensor.mounting)}")
+    return sensor

@@ -1,0 +1,112 @@
+"""A source says in the recording what its samples hold: a scalar is recorded, shown and exported like any other."""
+
+import io
+import json
+from dataclasses import replace
+from pathlib import Path
+
+import h5py
+import numpy as np
+import pytest
+from rich.console import Console
+from rich.live import Live
+
+from rig.arm.motion import Rest
+from rig.data.channel import Channel
+from rig.data.quantity import PRESSURE, RATE
+from rig.data.recorded_sensor import RecordedSensor
+from rig.data.run_file import RunData, RunRecorder, read_run
+from rig.errors import Refused
+from rig.observation.observed_run import observe_run
+from rig.page.shown import About, Shown
+from rig.report.exports.formats import writer_of_readings
+from rig.runner.acquisition import Acquisition
+from rig.station.events import Progress, SamplesTaken
+from rig.station.view import LiveView
+from support.synthetic_run import Setup, synthetic_run
+
+PRESSURE_PA = 96_480.0
+BAROMETER = RecordedSensor(
+    "toy_barometer", "B1", 10.0, (Channel(PRESSURE.name, "pressure", "<f8", 1.0),), clock="barometer"
+)
+IN_COUNTS = replace(BAROMETER, channels=(Channel(PRESSURE.name, "pressure_counts", "<i4", 0.5, 80_000.0, 40_000),))
+
+
+def beside_a_gyroscope(barometer: RecordedSensor) -> RunData:
+    """A recording with a barometer that has a clock of its own, whose samples came when the arm's states did."""
+    run = synthetic_run(Setup())
+    samples = np.zeros(len(run.arm) // 12, barometer.sample_dtype)
+    samples["sequence"] = np.arange(len(samples))
+    samples["host_time_s"] = run.arm["host_time_s"][::12][: len(samples)]
+    samples["board_time_us"] = np.round((samples["host_time_s"] - samples["host_time_s"][0] + 7.0) * 1e6)
+    channel = barometer.channel(PRESSURE)
+    samples[channel.column] = (PRESSURE_PA - channel.offset) / channel.unit_per_count
+    return replace(
+        run,
+        sensors={**run.sensors, "barometer": barometer},
+        samples={**run.samples, "barometer": samples},
+    )
+
+
+def recorded(run: RunData, path: Path) -> Path:
+    with RunRecorder(
+        path, config=run.config, settings=run.settings, provenance=run.provenance, sensors=run.sensors
+    ) as recorder:
+        for name, samples in run.samples.items():
+            recorder.add_samples(name, samples)
+    return path
+
+
+@pytest.mark.parametrize("barometer", [BAROMETER, IN_COUNTS], ids=["in pascals", "in counts"])
+def test_a_scalar_comes_back_as_it_was_recorded_and_is_no_gyroscope(barometer: RecordedSensor, tmp_path: Path) -> None:
+    run = beside_a_gyroscope(barometer)
+    found = read_run(recorded(run, tmp_path / "run.h5"))
+    assert found.sensors == run.sensors and list(found.measuring(RATE)) == ["gyro"]
+    np.testing.assert_array_equal(found.samples["barometer"], run.samples["barometer"])
+    assert barometer.channel(PRESSURE).values(found.samples["barometer"]) == pytest.approx(PRESSURE_PA)
+
+
+def test_a_scalar_is_exported_in_its_unit_on_the_arms_clock(tmp_path: Path) -> None:
+    run = beside_a_gyroscope(IN_COUNTS)
+    writer_of_readings("csv")([observe_run(run, run.settings.observation)], tmp_path)
+    header = (tmp_path / "barometer.csv").read_text(encoding="utf-8").splitlines()[0]
+    time_s, pressure_pa = np.loadtxt(tmp_path / "barometer.csv", delimiter=",", skiprows=1).T
+    assert header == "time_s,pressure_pa" and pressure_pa == pytest.approx(PRESSURE_PA)
+    assert time_s == pytest.approx(run.arm["time_s"][::12][: len(time_s)], abs=1e-3)
+    assert not (tmp_path / "barometer_sweeps.csv").exists()
+
+
+def test_a_scalar_is_shown_while_it_comes_on_the_terminal_and_on_the_page() -> None:
+    run, acquisition = beside_a_gyroscope(BAROMETER), Acquisition()
+    acquisition.expect("barometer", BAROMETER)
+    acquisition.on_samples("barometer", run.samples["barometer"])
+    (seen,) = acquisition.samples()
+    console = Console(width=100, file=io.StringIO(), record=True)
+    with Live(console=console, auto_refresh=False) as live:
+        view = LiveView(live)
+        view.event(SamplesTaken((seen,)))
+        view.event(Progress(1, 4, Rest("rest", 3.0), 0.5, 1.5, 1.5, 0.0))
+    assert f"+964.80 hPa, {seen.samples} samples, 0 lost" in console.export_text()
+    page = Shown(About("run", "six_observation"))
+    page.take(SamplesTaken((seen,)))
+    assert page.sections["sensors"][0]["units"] == {"pressure_pa": ["pressure", "hPa"]}
+
+
+@pytest.mark.parametrize(
+    ("change", "complaint"),
+    [
+        ({"quantity": "phlogiston"}, "phlogiston"),
+        ({"type": "O"}, "type"),
+        ({"column": "host_time_s"}, "host_time_s"),
+        ({"type": "<i4"}, "samples/barometer holds"),
+        ({"unit_per_count": 0.0}, "unit_per_count"),
+    ],
+)
+def test_a_channel_that_cannot_be_is_refused(change: dict[str, object], complaint: str, tmp_path: Path) -> None:
+    path = recorded(beside_a_gyroscope(BAROMETER), tmp_path / "run.h5")
+    with h5py.File(path, "r+") as file:
+        attributes = file["samples/barometer"].attrs
+        (channel,) = json.loads(attributes["channels"])
+        attributes["channels"] = json.dumps([channel | change])
+    with pytest.raises(Refused, match=complaint):
+        read_run(path)
