@@ -91,12 +91,10 @@ def sensor_of(document: Mapping[str, Any]) -> RecordedSensor:
     """
     sensor = checked(RecordedSensor, document, "sensor")
     quantities = [each.quantity for each in sensor.channels]
+    known = ", ".join(measured())
     for quantity in quantities:
         if quantity not in measured() or quantities.count(quantity) > 1:
-            known = ", ".join(measured())
             raise ValueError(f"the {sensor.part} measures {quote(quantity)}, which is not one of {known}")
-                f"the {sensor.part} measures {quote(quantity)}, which is not one of {', '.join(measured())}"
-            )
     _ = sensor.sample_dtype
     if sensor.measures(RATE) and (sensor.channel(RATE).range is None or not sensor.measures(TEMPERATURE)):
         raise ValueError(f"the gyroscope {sensor.part} states no range or no temperature")
