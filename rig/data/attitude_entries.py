@@ -61,10 +61,12 @@ class InAttitudesRatesEntry(Entry):
 
     `earth_rate_rad_s` is the Earth's rate in the axes of the table, or `earth_rate_error` why it was not found.
     `followed` where it was found by how far the body turned between attitudes, null where by rates that were exact.
-    `beside` are the other methods.
+    `beside` are the other methods. `covariance` is that of F row by row, the Earth's rate and c of m = F ω + c.
     """
 
     earth_rate_rad_s: Vector3 | None
     earth_rate_error: str | None
     followed: FollowedEntry | None
     beside: dict[str, BesideEntry | ErrorEntry]
+    covariance: tuple[tuple[float, ...], ...]
+    covariance_order: tuple[str, ...]

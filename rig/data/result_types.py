@@ -53,13 +53,15 @@ class LaidDownEntry(Entry):
 
     `placement_std` is by how much a placement was found to change each reading beside its attitude, null where the
     method does not ask; `rests_elsewhere` rests without an attitude have told of it too. `rows_left_out` of the
-    file's rows were none, for the body moved in them.
+    file's rows were none, for the body moved in them. `covariance` is that of all that was found, in its order.
     """
 
     placement_std: float | None
     placement_uncertainty: float | None
     rests_elsewhere: int
     rows_left_out: int
+    covariance: tuple[tuple[float, ...], ...]
+    covariance_order: tuple[str, ...]
 
 
 class ToldFromEntry(Entry):

@@ -28,6 +28,12 @@ from rig.report.budget_entry import budget_entry
 from rig.report.entry import entry
 
 
+ORDER = (
+    *(f"f{i}{j}" for i in "xyz" for j in "xyz"),
+    *(f"{name}_{axis}" for name in ("reference", "bias", "phi") for axis in "xyz"),
+)
+
+
 def accelerometers_elsewhere(outcome: Outcome) -> dict[str, AccelerometerEntry]:
     """The accelerometers that were calibrated in attitudes of a file."""
     return {
@@ -83,6 +89,8 @@ def rates_in_attitudes(found: OfSensor) -> InAttitudesRatesEntry | None:
             "earth_rate_rad_s": None if isinstance(earth, Fault) else earth.tolist(),
             "earth_rate_error": str(earth) if isinstance(earth, Fault) else None,
             "followed": _followed(found.rates) if isinstance(found.rates, InIncrements) else None,
+            "covariance": found.rates.solution.covariance.tolist(),
+            "covariance_order": ORDER[:15],
             "beside": {} if isinstance(found.rates, InIncrements) else _rates_beside(found.rates),
         }
     )
@@ -163,6 +171,8 @@ def _at_rest(kind: Any, quantity: Quantity, item: Item, found: InAttitudes, **ow
             placement_uncertainty=None if laid is None else laid.placement_uncertainty,
             rests_elsewhere=found.elsewhere,
             rows_left_out=found.moving,
+            covariance=solution.covariance.tolist(),
+            covariance_order=ORDER[: len(solution.covariance)],
         ),
         **{quantity.named("bias"): solution.bias},
         **own,

@@ -45,14 +45,22 @@ def solved(capsys: pytest.CaptureFixture[str], files: Sequence[Path], *options: 
     """Values and standard deviations of every quantity."""
     assert main([*solve(files, *options), "--json"]) == 0, capsys.readouterr().err
     document = json.loads(capsys.readouterr().out)
-    assert document["schema"] == "rig.attitudes/1"
+    assert document["schema"] == "rig.result/1"
+    parts = {}
+    for rate in document["sensors"].values():
+        earth = rate["in_attitudes"]["earth_rate_rad_s"]
+        told = [rate["vector_model"]["matrix"], earth, np.negative(rate["bias_rad_s"]), []]
+        parts["rate"] = told, rate["in_attitudes"]
+    for at_rest in document.get("accelerometers", {}).values():
+        told = [at_rest["matrix"], at_rest["reference_m_s2"], at_rest["bias_m_s2"], at_rest["second_order_s2_m"] or []]
+        parts["acceleration"] = told, at_rest["laid_down"]
+    for at_rest in document.get("magnetometers", {}).values():
+        parts["field"] = [at_rest["matrix"], at_rest["field_base_t"], at_rest["bias_t"], []], at_rest["laid_down"]
     found = {}
-    for quantity, entry in document["quantities"].items():
-        if "error" in entry:
-            continue
-        parts = [np.ravel(entry["matrix"]), entry["reference_table"], entry["bias"], entry["second_order"] or []]
-        found[quantity] = {"theta": np.concatenate(parts), "std": np.sqrt(np.diag(entry["covariance"]))}
-        assert len(entry["covariance_order"]) == len(entry["covariance"])
+    for quantity, (told, known) in parts.items():
+        theta = np.concatenate([np.ravel(each) for each in told])
+        found[quantity] = {"theta": theta, "std": np.sqrt(np.diag(known["covariance"]))}
+        assert len(known["covariance_order"]) == len(known["covariance"]) == len(theta)
     return found
 
 
@@ -104,12 +112,13 @@ def test_the_clock_of_a_table_is_found_by_the_turning_both_saw(
     files = on_another_clock(tmp_path, late_s=-731.25, fast=4e-4)
     assert main([*solve(files, "--find-clock"), "--json"]) == 0
     found = json.loads(capsys.readouterr().out)
-    clock, rate = found["clock"], found["quantities"]["rate"]
-    read_s = clock["reference_s"]
+    rate = found["sensors"]["imu"]
+    (clock,) = rate["time_bases"]
+    read_s = clock["reference_board_s"]
     off_s = read_s + clock["offset_s"] - (read_s + 731.25) / (1 + 4e-4)
     assert abs(off_s) < 4 * clock["offset_std_s"] < 1e-3
     assert abs(clock["drift"] + 4e-4) < 4 * clock["drift_std"] + 4e-7
-    assert np.allclose(rate["matrix"], GYRO_MATRIX, atol=1e-4)
+    assert np.allclose(rate["vector_model"]["matrix"], GYRO_MATRIX, atol=1e-4)
     assert main(solve(files, "--find-clock")) == 0
     assert "the samples' clock on the table's: +731." in capsys.readouterr().out
 
@@ -122,8 +131,8 @@ def test_the_papers_gyroscope_is_found_without_its_rates(capsys: pytest.CaptureF
 def test_quaternions_alone_tell_the_clock_and_the_sensor(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
     files = on_another_clock(tmp_path, late_s=12.5, fast=0.0, rates=False)
     assert main([*solve(files, "--find-clock"), "--json"]) == 0
-    rate = json.loads(capsys.readouterr().out)["quantities"]["rate"]
-    std = np.sqrt(np.diag(rate["covariance"]))
+    rate = json.loads(capsys.readouterr().out)["sensors"]["imu"]["vector_model"]
+    std = np.sqrt(np.diag(rate["matrix_covariance"]))
     assert (np.abs(np.ravel(rate["matrix"]) - np.ravel(GYRO_MATRIX)) < 4 * std[:9]).all()
 
 
@@ -143,8 +152,8 @@ def test_any_estimator_can_be_asked_for(estimator: str, capsys: pytest.CaptureFi
 def test_people_read_what_was_found_and_what_was_not(capsys: pytest.CaptureFixture[str]) -> None:
     assert main(solve(example(STILL), *PLACE)) == 0
     said = " ".join(capsys.readouterr().out.split())
-    assert "attitude error found:" in said and "as_published: scale" in said
-    assert "field: field_strength_unknown:" in said
+    assert "attitude error found:" in said and "as_published, attitudes alone: k" in said
+    assert "imu, magnetometer, not calibrated: field_strength_unknown:" in said
 
 
 def read(path: Path) -> Table:

@@ -11,12 +11,11 @@ import numpy as np
 import pytest
 from scipy.spatial.transform import Rotation
 
-from rig.analysis.attitudes import in_unit
 from rig.analysis.increments import InIncrements, solve_turning
 from rig.cli import main
 from rig.errors import Fault
 from rig.estimation.arrays import Array
-from rig.estimation.reference_budget import scale_and_bias
+from rig.estimation.reference_budget import scale_and_bias_covariance
 from rig.observation.fixes import Turning
 from support.followed_body import EARTH_RAD_S, Followed, World, follow, write
 from support.real import recording
@@ -47,9 +46,16 @@ def solved(followed: Followed, window_s: float | None = None) -> InIncrements:
     return solve_turning(turning(followed), window_s, any_mounting=False)
 
 
+def in_unit(found: InIncrements) -> tuple[Array, Array]:
+    """Scale factors (3,), and the standard deviations of scale and bias (6,)."""
+    matrix = found.solution.matrix
+    scale = 1 / np.linalg.norm(matrix, axis=1)
+    return scale, np.sqrt(np.diag(scale_and_bias_covariance(matrix, scale, found.solution.covariance)))
+
+
 def off(found: InIncrements, followed: Followed) -> Array:
     """(6,) errors of scale and bias in standard uncertainties."""
-    scale, std = in_unit(found.solution)
+    scale, std = in_unit(found)
     truth = 1 / np.linalg.norm(followed.matrix, axis=1)
     return np.concatenate([scale - truth, found.solution.bias - followed.bias]) / std
 
@@ -68,7 +74,7 @@ def before_cameras() -> Turning:
 @pytest.mark.parametrize("window_s", [None, 1.0, 2.0, 3.0, 4.0])
 def test_real_cameras_tell_the_same_scale_whatever_the_window(window_s: float | None) -> None:
     found = solve_turning(before_cameras(), window_s, any_mounting=False)
-    scale, std = in_unit(found.solution)
+    scale, std = in_unit(found)
     assert (np.abs(scale - BY_INTEGRAL) < 2 * 2 * std[:3]).all(), (scale, 2 * std)
     assert (2 * std[:3] < 2e-3).all(), "and it says something"
     assert found.solution.clock_s == pytest.approx(4.1e-3, abs=3e-4)  # as --find-clock finds it
@@ -101,7 +107,7 @@ def test_the_noise_of_a_references_rates_does_no_harm(tmp_path: Path, capsys: py
 
     def away(*options: str) -> Array:
         rate = document(capsys, files, *options)
-        std = scale_std(rate)
+        std = np.sqrt(np.diag(rate["covariance"]))[:3]
         return np.asarray(np.abs(np.array(rate["scale"]) - truth) / std)
 
     assert (away() < 3).all()
@@ -114,8 +120,8 @@ def test_the_earths_rate_is_told_only_where_it_is_seen(tmp_path: Path, capsys: p
     files = write(tmp_path, followed, noisy)
     for options in ([], ["--exact-rates"]):
         rate = document(capsys, files, *options)
-        assert rate["reference_table"] is None
-        assert rate["reference_error"].startswith("earth_rate_not_observable")
+        assert rate["in_attitudes"]["earth_rate_rad_s"] is None
+        assert rate["in_attitudes"]["earth_rate_error"].startswith("earth_rate_not_observable")
         assert main(command(files, *options)) == 0
         said = " ".join(capsys.readouterr().out.split())
         assert "Earth's rate: earth_rate_not_observable" in said and "Earth's rate in table" not in said
@@ -163,7 +169,8 @@ def test_a_gap_in_the_samples_costs_its_windows_alone(tmp_path: Path, capsys: py
     spoilt = (followed.time_s > 10) & (followed.time_s < 10.5)
     files = write(tmp_path, replace(followed, time_s=followed.time_s[~spoilt], readings=followed.readings[~spoilt]))
     rate = document(capsys, files)
-    assert rate["left_out"][0]["error"] == "lost_samples" and rate["left_out"][0]["count"] <= 3
+    (left_out,) = rate["in_attitudes"]["followed"]["left_out"]
+    assert left_out["error"] == "lost_samples" and left_out["count"] <= 3
     assert main(command(files)) == 0
     assert "left out: lost_samples:" in " ".join(capsys.readouterr().out.split())
 
@@ -278,11 +285,5 @@ def command(files: list[Path], *options: str) -> list[str]:
 def document(capsys: pytest.CaptureFixture[str], files: list[Path], *options: str) -> dict[str, Any]:
     """What is said of the gyroscope for machines."""
     assert main([*command(files, *options), "--json"]) == 0
-    rate: dict[str, Any] = json.loads(capsys.readouterr().out)["quantities"]["rate"]
+    rate: dict[str, Any] = json.loads(capsys.readouterr().out)["sensors"]["imu"]
     return rate
-
-
-def scale_std(rate: dict[str, Any]) -> Array:
-    matrix, scale = np.array(rate["matrix"]), np.array(rate["scale"])
-    jacobian = scale_and_bias(matrix, scale, 15)[:3]
-    return np.asarray(np.sqrt(np.diag(jacobian @ np.array(rate["covariance"]) @ jacobian.T)))

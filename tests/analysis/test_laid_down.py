@@ -9,7 +9,6 @@ import pytest
 
 from rig.cli import main
 from rig.estimation.arrays import Array
-from rig.estimation.reference_budget import scale_and_bias
 from support.laid_down import GRAVITY_M_S2, Box, Laid, lay_down, write
 from support.real import recording, unpacked
 
@@ -25,20 +24,19 @@ BOXES = {
 def solved(capsys: pytest.CaptureFixture[str], *files: Path, gravity_m_s2: float = GRAVITY_M_S2) -> dict[str, Any]:
     arguments = [str(files[0]), "--attitudes", str(files[1]), "--gravity-m-s2", str(gravity_m_s2)]
     assert main(["solve", *arguments, "--json"]) == 0
-    found: dict[str, Any] = json.loads(capsys.readouterr().out)["quantities"]["acceleration"]
+    found: dict[str, Any] = json.loads(capsys.readouterr().out)["accelerometers"]["imu"]
     return found
 
 
 def expanded(found: dict[str, Any]) -> Array:
     """(6,) U (k = 2) of scale and bias."""
-    jacobian = scale_and_bias(np.array(found["matrix"]), np.array(found["scale"]), 15)
-    return np.asarray(2 * np.sqrt(np.diag(jacobian @ found["covariance"] @ jacobian.T)))
+    return np.asarray(2 * np.sqrt(np.diag(found["covariance"])))
 
 
 def off(found: dict[str, Any], laid: Laid) -> Array:
     """(6,) errors of scale and bias in standard uncertainties."""
     truth = np.concatenate([1 / np.linalg.norm(laid.matrix, axis=1), laid.bias])
-    return np.asarray(2 * (np.concatenate([found["scale"], found["bias"]]) - truth) / expanded(found))
+    return np.asarray(2 * (np.concatenate([found["scale"], found["bias_m_s2"]]) - truth) / expanded(found))
 
 
 @pytest.mark.proof
@@ -89,7 +87,7 @@ def test_rows_in_which_the_body_moves_are_left_out(tmp_path: Path, capsys: pytes
     rows = np.column_stack([starts_s, starts_s + 0.05, laid.rows[row, 2:]])
     dense = Laid(laid.time_s, laid.readings, rows, laid.matrix, laid.bias)
     found = solved(capsys, *write(tmp_path, dense))
-    assert found["observations_used"] == 18 and found["rows_left_out"] > 100
+    assert len(found["dwells"]) == 18 and found["laid_down"]["rows_left_out"] > 100
     assert (np.abs(off(found, laid)) < 3.5).all()
     assert main(["solve", str(tmp_path / "samples.csv"), "--attitudes", str(tmp_path / "attitudes.csv")]) == 0
     assert "left out: not_at_rest: " in " ".join(capsys.readouterr().out.split())
@@ -107,5 +105,5 @@ def test_too_few_rests_among_many_rows_are_named(tmp_path: Path, capsys: pytest.
     """A hand before cameras that rested twice: fast rows are not taken for gravity."""
     files = unpacked("broad", "samples.csv", tmp_path), unpacked("broad", "attitudes.csv", tmp_path)
     assert main(["solve", *map(str, (files[0], "--attitudes", files[1], "--json"))]) == 0
-    error = json.loads(capsys.readouterr().out)["quantities"]["acceleration"]["error"]
+    error = json.loads(capsys.readouterr().out)["unsolved"]["imu"]["acceleration"]["error"]
     assert error.startswith("too_few_observations") and "rows in which the body moves are left out" in error

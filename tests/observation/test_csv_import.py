@@ -10,8 +10,9 @@ import pytest
 
 from rig.cli import main
 from rig.errors import Fault, Refused, RigError
-from rig.observation.csv_import import ExternalData, read
+from rig.observation.csv_import import ExternalData
 from support.paths import DOCS
+from support.sweeps_as_files import averaged_files
 
 EXAMPLES = DOCS / "examples"
 SCALE = np.array([1.1771, 1.1554, 1.1440])  # what the example was made with
@@ -30,7 +31,7 @@ def read_with(
     samples: Callable[[list[str]], list[str]] = list,
     sweeps: Callable[[list[str]], list[str]] = list,
 ) -> ExternalData:
-    return read(edited(folder, "samples.csv", samples), edited(folder, "sweeps.csv", sweeps))
+    return averaged_files(edited(folder, "samples.csv", samples), edited(folder, "sweeps.csv", sweeps))
 
 
 def scaled(factor: float, columns: slice) -> Callable[[list[str]], list[str]]:
@@ -50,7 +51,7 @@ def scaled(factor: float, columns: slice) -> Callable[[list[str]], list[str]]:
 def test_the_example_is_solved_within_its_uncertainty(capsys: pytest.CaptureFixture[str]) -> None:
     arguments = ["solve", str(EXAMPLES / "samples.csv"), "--sweeps", str(EXAMPLES / "sweeps.csv"), "--json"]
     assert main(arguments) == 0
-    result = json.loads(capsys.readouterr().out)
+    result = json.loads(capsys.readouterr().out)["sensors"]["imu"]
     assert result["model"] == "g = K (m + b)"
     assert (result["estimator"], result["six_observation"]["estimator"]) == ("vector", "newton")
     for estimate in (result, result["six_observation"]):
@@ -134,9 +135,9 @@ def test_only_regular_files_of_a_sensible_size_are_opened(tmp_path: Path) -> Non
     sweeps = EXAMPLES / "sweeps.csv"
     for path, why in ((pipe, "no regular file"), (endless, "no regular file"), (huge, "longer than 256000000 bytes")):
         with pytest.raises(Refused, match=f"no_file: .*{why}"):
-            read(path, sweeps)
+            averaged_files(path, sweeps)
     with pytest.raises(Refused, match=r"no_file: .*no regular file"):
-        read(EXAMPLES / "samples.csv", pipe)
+        averaged_files(EXAMPLES / "samples.csv", pipe)
 
 
 def test_what_a_message_quotes_is_short_and_harmless(tmp_path: Path) -> None:
@@ -160,7 +161,7 @@ def test_a_missing_direction_leaves_the_vector_model_alone(tmp_path: Path, capsy
     sweeps = edited(tmp_path, "sweeps.csv", lambda lines: [line for line in lines if ",0,-1,0," not in line])
     arguments = ["solve", str(EXAMPLES / "samples.csv"), "--sweeps", str(sweeps)]
     assert main([*arguments, "--json"]) == 0
-    assert "too_few_observations" in json.loads(capsys.readouterr().out)["six_observation"]["error"]
+    assert "too_few_observations" in json.loads(capsys.readouterr().out)["sensors"]["imu"]["six_observation"]["error"]
     assert main([*arguments, "--estimator", "newton"]) == 2
     assert "too_few_observations" in capsys.readouterr().err
 
@@ -199,7 +200,7 @@ def test_people_see_uncertainties_with_one_coverage_factor_and_the_angles_betwee
 ) -> None:
     files = [str(EXAMPLES / "samples.csv"), "--sweeps", str(EXAMPLES / "sweeps.csv")]
     assert main(["solve", *files, "--json"]) == 0
-    found = json.loads(capsys.readouterr().out)
+    found = json.loads(capsys.readouterr().out)["sensors"]["imu"]
     assert main(["solve", *files]) == 0
     printed = capsys.readouterr().out
     scale_x = next(line for line in printed.splitlines() if "scale" not in line and " x " in line)
