@@ -1,6 +1,6 @@
 """Readings that were recorded elsewhere, and how they were moved, as a file of whoever turned the sensor tells it."""
 
-from collections.abc import Mapping
+from collections.abc import Collection, Mapping
 from dataclasses import dataclass
 from types import MappingProxyType
 from typing import Annotated, Final, Literal
@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 from pydantic import Field
 
 from rig.config.section import SensorName
-from rig.data.quantity import quantities
+from rig.data.quantity import Quantity, quantities
 
 Told = Literal["sweeps", "attitudes"]
 Columns = Mapping[str, NDArray[np.float64]]
@@ -36,9 +36,11 @@ class Header:
             raise ValueError(f"its columns are {', '.join(columns)}")
 
 
-def samples_header() -> Header:
-    """The columns of readings, of whatever quantities."""
-    return Header((TIME,), (), (*(each.columns for each in quantities().values()), (TEMPERATURE,)))
+def samples_header(needed: Collection[Quantity] = ()) -> Header:
+    """The columns of readings, of the quantities `needed` and of whatever others."""
+    columns = (TIME, *(name for quantity in needed for name in quantity.columns))
+    others = (each.columns for each in quantities().values() if each not in needed)
+    return Header(columns, (), (*others, (TEMPERATURE,)))
 
 
 MOTIONS: Final[Mapping[Told, Header]] = MappingProxyType(

@@ -7,7 +7,7 @@ their names. One recording serves every command: each uses the quantities it kno
 """
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from pathlib import Path
 
 import numpy as np
@@ -35,9 +35,7 @@ def read_samples(path: Path, needed: Sequence[Quantity] = ()) -> Samples:
 
     Raises Refused `no_file`, `wrong_columns`, `wrong_unit`, `not_a_number`, `time_not_increasing`.
     """
-    of_needed = (name for quantity in needed for name in quantity.columns)
-    header = samples_header()
-    table = read_columns(path, replace(header, needed=(*header.needed, *of_needed)), SAMPLES_MB)
+    table = read_columns(path, samples_header(needed), SAMPLES_MB)
     return samples_in(table, str(path))
 
 

@@ -27,7 +27,6 @@ from rig.report.axes import PARAMETERS, dwell_entry
 from rig.report.budget_entry import budget_entry
 from rig.report.entry import entry
 
-
 ORDER = (
     *(f"f{i}{j}" for i in "xyz" for j in "xyz"),
     *(f"{name}_{axis}" for name in ("reference", "bias", "phi") for axis in "xyz"),

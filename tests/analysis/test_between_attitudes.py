@@ -15,6 +15,7 @@ from rig.analysis.increments import InIncrements, solve_turning
 from rig.cli import main
 from rig.errors import Fault
 from rig.estimation.arrays import Array
+from rig.estimation.known_increments import KnownIncrements
 from rig.estimation.reference_budget import scale_and_bias_covariance
 from rig.observation.fixes import Turning
 from support.followed_body import EARTH_RAD_S, Followed, World, follow, write
@@ -46,16 +47,16 @@ def solved(followed: Followed, window_s: float | None = None) -> InIncrements:
     return solve_turning(turning(followed), window_s, any_mounting=False)
 
 
-def in_unit(found: InIncrements) -> tuple[Array, Array]:
+def in_unit(found: KnownIncrements) -> tuple[Array, Array]:
     """Scale factors (3,), and the standard deviations of scale and bias (6,)."""
-    matrix = found.solution.matrix
+    matrix = found.matrix
     scale = 1 / np.linalg.norm(matrix, axis=1)
-    return scale, np.sqrt(np.diag(scale_and_bias_covariance(matrix, scale, found.solution.covariance)))
+    return scale, np.sqrt(np.diag(scale_and_bias_covariance(matrix, scale, found.covariance)))
 
 
 def off(found: InIncrements, followed: Followed) -> Array:
     """(6,) errors of scale and bias in standard uncertainties."""
-    scale, std = in_unit(found)
+    scale, std = in_unit(found.solution)
     truth = 1 / np.linalg.norm(followed.matrix, axis=1)
     return np.concatenate([scale - truth, found.solution.bias - followed.bias]) / std
 
@@ -74,7 +75,7 @@ def before_cameras() -> Turning:
 @pytest.mark.parametrize("window_s", [None, 1.0, 2.0, 3.0, 4.0])
 def test_real_cameras_tell_the_same_scale_whatever_the_window(window_s: float | None) -> None:
     found = solve_turning(before_cameras(), window_s, any_mounting=False)
-    scale, std = in_unit(found)
+    scale, std = in_unit(found.solution)
     assert (np.abs(scale - BY_INTEGRAL) < 2 * 2 * std[:3]).all(), (scale, 2 * std)
     assert (2 * std[:3] < 2e-3).all(), "and it says something"
     assert found.solution.clock_s == pytest.approx(4.1e-3, abs=3e-4)  # as --find-clock finds it

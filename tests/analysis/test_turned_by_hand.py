@@ -14,8 +14,8 @@ from rig.cli import main
 from rig.errors import Fault
 from rig.estimation.arrays import Array
 from rig.estimation.estimate import Estimate
-from support.sweeps_as_files import averaged_files
 from support.real import recording, unpacked
+from support.sweeps_as_files import averaged_files
 from support.turned_body import Hand, Session, turn, write
 
 THREE = np.eye(3)

@@ -60,7 +60,8 @@ def test_an_accelerometer_s_scale_and_bias_are_those_at_the_temperature_that_is_
     run = open_run(RECORDINGS / "rig.settings-7" / "imu").movement[0]
     result = calibrated([warming(run)])
     entry, found = document_of(result).accelerometers["gyro"], result.accelerometers["gyro"]
-    assert entry.found_at is not None and entry.temperature_c == pytest.approx(entry.found_at.temperature_c)
+    assert entry.found_at is not None and entry.temperature_c is not None
+    assert entry.temperature_c == pytest.approx(entry.found_at.temperature_c)
     dwells_c, own = [dwell.temperature_c for dwell in found.dwells], found.movement.own
     assert own is not None and abs(entry.temperature_c - float(np.mean(dwells_c))) > 0.1
     np.testing.assert_allclose(own.warmer_k[: len(dwells_c)], np.subtract(dwells_c, entry.temperature_c))

@@ -79,8 +79,10 @@ def test_a_text_that_never_was_a_configuration_is_refused(text: str) -> None:
 def test_thresholds_and_limits_can_be_changed_for_another_judgement() -> None:
     changed = settings().with_overrides(["observation.max_lost_fraction=0.01", "limits.scale_std = 1e-3"])
     assert changed.observation.max_lost_fraction == 0.01
-    assert changed.limits.scale_std == 0.001
-    assert changed.limits.bias_rad_s == settings().limits.bias_rad_s
+    limits, before = changed.limits, settings().limits
+    assert limits is not None and before is not None
+    assert limits.scale_std == 0.001
+    assert limits.bias_rad_s == before.bias_rad_s
 
 
 def test_a_recording_of_before_can_be_reckoned_as_of_today() -> None:

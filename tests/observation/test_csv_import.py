@@ -62,7 +62,7 @@ def test_the_example_is_solved_within_its_uncertainty(capsys: pytest.CaptureFixt
 
 
 def test_the_example_holds_six_turns_and_six_rests() -> None:
-    data = read(EXAMPLES / "samples.csv", EXAMPLES / "sweeps.csv")
+    data = averaged_files(EXAMPLES / "samples.csv", EXAMPLES / "sweeps.csv")
     assert [(turn.axis, turn.sign) for turn in data.sweeps] == [
         ("z", -1),
         ("z", 1),

@@ -3,7 +3,7 @@
 import json
 import math
 import re
-from collections.abc import Callable, Iterator
+from collections.abc import Iterator
 from pathlib import Path
 from typing import Any
 from xml.etree.ElementTree import fromstring
@@ -12,10 +12,8 @@ import numpy as np
 import pytest
 from lxml import html
 
-from rig.analysis.attitudes import Surrounding
 from rig.analysis.calibration import DEFAULT_ESTIMATOR
-from rig.commands.solve_attitudes import solve_attitudes
-from rig.commands.solve_csv import solve_sweeps
+from rig.cli import main
 from rig.config.judging_sections import SiteSection
 from rig.data.accelerometer_entries import AccelerometerEntry
 from rig.data.budget_entries import BudgetEntry
@@ -60,20 +58,21 @@ def of_the_terminal(document: ResultDocument) -> list[BudgetEntry]:
     return [each.budget for each in kinds if not isinstance(each, ErrorEntry) and each.budget is not None]
 
 
-def elsewhere(samples: str, table: str, estimator: str | None) -> Callable[[bool], int]:
-    """`rig solve` of an example's readings, as a table or for machines."""
-    files = DOCS / "examples" / samples, DOCS / "examples" / table
+def elsewhere(samples: str, table: str, estimator: str | None) -> list[str]:
+    """The arguments of `rig solve` for an example's readings."""
+    files = [str(DOCS / "examples" / name) for name in (samples, table)]
+    asked = [] if estimator is None else ["--estimator", estimator]
     if table == "sweeps.csv":
-        return lambda as_json: solve_sweeps(*files, estimator, as_json=as_json)
-    options = {"second_order": False, "find_clock": False, "exact_rates": estimator is not None, "window_s": None}
-    surrounding = Surrounding(9.80061, 47.98e-6, "-z")
-    return lambda as_json: solve_attitudes(*files, estimator, surrounding, as_json=as_json, **options)  # type: ignore[arg-type]
+        return [files[0], "--sweeps", files[1], *asked]
+    exact = [] if estimator is None else ["--exact-rates"]
+    place = ["--gravity-m-s2", "9.80061", "--field-t", "47.98e-6", "--up=-z"]
+    return [files[0], "--attitudes", files[1], *place, *asked, *exact]
 
 
 def budgets_in(found: dict[str, Any]) -> list[BudgetEntry]:
-    """Of a document of `rig solve`."""
-    of = found["quantities"].values() if "quantities" in found else [found]
-    return [BudgetEntry.model_validate(each["budget"]) for each in of]
+    """Of a document of `rig solve`, kind by kind."""
+    kinds = (found["sensors"], found.get("accelerometers", {}), found.get("magnetometers", {}))
+    return [BudgetEntry.model_validate(each["budget"]) for of in kinds for each in of.values()]
 
 
 def named(folder: Path) -> str:
@@ -171,10 +170,10 @@ def test_a_budget_of_readings_made_elsewhere_adds_up_and_every_scatter_is_counte
     monkeypatch: pytest.MonkeyPatch,
 ) -> None:
     monkeypatch.setenv("COLUMNS", "400")
-    solve = elsewhere(samples, table, estimator)
-    solve(False)
+    arguments = elsewhere(samples, table, estimator)
+    assert main(["solve", *arguments]) == 0
     tables = at_the_terminal(capsys.readouterr().out)
-    solve(True)
+    assert main(["solve", *arguments, "--json"]) == 0
     stated = budgets_in(json.loads(capsys.readouterr().out))
     assert len(tables) == len(stated) > 0
     for rows, budget in zip(tables, stated, strict=True):

@@ -59,6 +59,7 @@ def test_bars_of_attitudes_hold_the_arm_s_error_across_gravity_and_noise_alone_a
     )
     picture = attitude_residuals(ACCELERATION, found.model_copy(update={"dwells": (one,)}))
     assert picture.of == OF_ATTITUDES and picture.unit == "mm/s²"
+    assert off is not None
     across = 2e3 * np.hypot(noise, 9.81 * off)
     np.testing.assert_allclose(bars(picture), [[2e3 * noise, across, across]], atol=0.02 * across)
     field = magnetometer()

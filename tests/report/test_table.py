@@ -9,7 +9,7 @@ import pytest
 from rich.console import Console
 
 from firmware_host.answers import Calibration, StoredCalibration
-from rig.commands.solve_csv import solve_sweeps
+from rig.cli import main
 from rig.data.result_file import CheckEntry, ResultDocument
 from rig.report.board_info import print_stored
 from rig.report.table import print_outcome, print_result
@@ -64,5 +64,8 @@ def test_a_path_is_no_markup(tmp_path: Path, capsys: pytest.CaptureFixture[str])
     folder = tmp_path / "[/nope]"
     folder.mkdir(parents=True)
     samples, sweeps = (Path(shutil.copy(DOCS / "examples" / name, folder)) for name in ("samples.csv", "sweeps.csv"))
-    assert solve_sweeps(samples, sweeps, "vector", as_json=False) == 0
-    assert "[/nope]" in capsys.readouterr().out.replace("\n", "")
+    assert main(["solve", str(samples), "--sweeps", str(sweeps), "--out", str(folder / "run")]) == 0
+    said = capsys.readouterr()
+    assert "[/nope]" in said.err.replace("\n", "")
+    assert main(["solve", str(folder / "none.csv"), "--sweeps", str(sweeps)]) == 2
+    assert "[/nope]" in capsys.readouterr().err.replace("\n", "")
