@@ -31,27 +31,27 @@ class SensorAxes:
 
     @property
     def non_orthogonality_rad(self) -> Array:
-        """(3,) as `non_orthogonality` has it."""
+        """The non-orthogonality (3,) of the axes."""
         return non_orthogonality(self.axes)
 
     @property
     def to_angles(self) -> Array:
-        """(6, 9) as `angle_jacobian` has it."""
+        """The derivative (6, 9) of angles and mounting with respect to F, row by row."""
         return angle_jacobian(self.axes, self.scale, self.mounting)
 
     @property
     def correction_matrix(self) -> Array:
-        """(3, 3) what takes a reading, its offset taken out, to the right-angled frame nearest to the axes."""
+        """The matrix (3, 3) that takes a reading less its offset to the right-angled frame nearest to the axes."""
         matrix: Array = self.mounting @ np.linalg.inv(self.axes / self.scale[:, None])
         return matrix
 
     def angles_covariance_rad2(self, of_matrix: Array) -> Array:
-        """(6, 6) of the non-orthogonality and of the mounting, by the covariance (9, 9) of F, row by row."""
+        """The covariance (6, 6) of non-orthogonality and mounting, by that of F (9, 9), row by row."""
         covariance: Array = self.to_angles @ of_matrix @ self.to_angles.T
         return covariance
 
     def non_orthogonality_std_rad(self, of_matrix: Array) -> Array:
-        """(3,) standard deviations, by the covariance (9, 9) of F."""
+        """The standard deviations (3,) of the non-orthogonality, by the covariance (9, 9) of F."""
         std: Array = np.sqrt(np.diag(self.angles_covariance_rad2(of_matrix)))[:3]
         return std
 

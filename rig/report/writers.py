@@ -14,7 +14,10 @@ from rig.report.kinds.registry import kinds
 from rig.station.events import DocumentWritten, RunEvent
 
 # `module:function`, imported when a run has ended.
-WRITERS: Sequence[str] = ("rig.report.header:write_header", "rig.report.certificate.writer:write_certificate")
+WRITERS: Sequence[str] = (
+    "rig.report.header:write_header",
+    "rig.report.certificate.writer:write_certificate",
+)
 
 
 class Writer(Protocol):
