@@ -49,6 +49,8 @@ def stated_in(folder: Path, overrides: Sequence[str] = ()) -> Stated:
     path = folder / CONFIG
     if path.exists():
         return of_configuration(load(path, overrides, sections=None))
+    if not overrides:
+        return Stated()
     stated = load_statement(overrides)
     return Stated(stated.site, stated.certificate)
 
