@@ -8,8 +8,8 @@ from typing import Literal, get_args
 import numpy as np
 
 from rig.analysis.calibration import estimator_among, or_fault
-from rig.analysis.check import Check
 from rig.analysis.increments import InIncrements, solve_turning
+from rig.analysis.of_kinds import OfKind
 from rig.analysis.placed_budget import budget_by_causes, noise_freedom
 from rig.analysis.placed_equations import Equations
 from rig.data.installed_kinds import installed_kinds
@@ -84,21 +84,13 @@ class InAttitudes:
     seen: Dwells | None = None
 
 
-@dataclass(frozen=True, slots=True)
-class OfKind:
-    """What the solver of an installed kind of sensor found, and the checks that say whether it is fit for use."""
-
-    found: object
-    checks: tuple[Check, ...] = ()
-
-
 Result = InAttitudes | InIncrements
 
 
 def solve_placed(
-    placed: PlacedReadings, site: Site, asked: Elsewhere, method: Chosen | None, *, second_order: bool
+    name: str, placed: PlacedReadings, site: Site, asked: Elsewhere, method: Chosen | None, *, second_order: bool
 ) -> dict[Quantity, Result | OfKind | Fault]:
-    """Every quantity that was recorded, by `method`; None chooses the one that suits it.
+    """Every quantity that was recorded of a sensor of that name, by `method`; None chooses the one that suits it.
 
     That is "attitude_weighted", and for a gyroscope "increments" (over windows of `window_s`), or with `exact_rates`
     "maximum_likelihood".
@@ -115,7 +107,7 @@ def solve_placed(
 
     def of_reference(quantity: Quantity, placements: Placements | Fault) -> Result | OfKind:
         if quantity in solvers and not isinstance(placements, Fault):
-            of_kind: OfKind = solvers[quantity](placements, site)
+            of_kind: OfKind = solvers[quantity](name, placements, site)
             return of_kind
         known = known_size(site, quantity)
         if isinstance(placements, Fault):

@@ -1,12 +1,12 @@
 """Readings recorded elsewhere, whose motion a file tells: what they give, and by what that is judged. Pure."""
 
 from collections.abc import Iterator, Mapping, Sequence
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass, replace
 from typing import Literal
 
 import numpy as np
 
-from rig.analysis.attitudes import InAttitudes, OfKind, Result, known_method, solve_placed
+from rig.analysis.attitudes import InAttitudes, Result, known_method, solve_placed
 from rig.analysis.calibration import (
     ESTIMATORS,
     Estimator,
@@ -20,6 +20,7 @@ from rig.analysis.calibration import (
 from rig.analysis.check import Check
 from rig.analysis.correction import diagonal_correction, matrix_correction
 from rig.analysis.increments import InIncrements
+from rig.analysis.of_kinds import KindFound, OfKind
 from rig.data.meaning import Meaning
 from rig.data.motion_file import Item, ReadElsewhere
 from rig.data.quantity import RATE, Quantity
@@ -64,7 +65,7 @@ class OfSensor:
     at_rest: Mapping[Quantity, InAttitudes]
     unsolved: Mapping[Quantity, Fault]
     turned: TurnedData | None = None
-    of_kinds: Mapping[Quantity, OfKind] = field(default_factory=dict)
+    of_kinds: tuple[KindFound, ...] = ()
 
 
 def solved_elsewhere(read: ReadElsewhere, settings: RunSettings, estimator: str | None) -> OfSensor:
@@ -91,8 +92,6 @@ def checks_elsewhere(name: str, found: OfSensor) -> Iterator[Check]:
         yield _fit(name, quantity, "condition", result.solution.condition, triaxial.MAX_CONDITION)
         if (error := result.solution.attitude_error) is not None:
             yield _fit(name, quantity, "attitude_error", error.std_rad, UNTRUSTWORTHY_RAD, unit="rad")
-    for of_kind in found.of_kinds.values():
-        yield from of_kind.checks
 
 
 def _by_sweeps(read: ReadElsewhere, name: str | None) -> OfSensor:
@@ -170,7 +169,7 @@ def _by_attitudes(read: ReadElsewhere, settings: RunSettings, name: str | None) 
     if site is None or asked is None:
         raise Refused("no_site", "the recording does not say where it was made", "Make it anew from the two files")
     placed = placed_by(_samples(read), read.motion, find_clock=asked.find_clock)
-    found = solve_placed(placed, site, asked, method, second_order=settings.second_order)
+    found = solve_placed(read.item.name, placed, site, asked, method, second_order=settings.second_order)
     rates = found.get(RATE)
     told = rates if isinstance(rates, InAttitudes | InIncrements) else None
     return OfSensor(
@@ -179,7 +178,11 @@ def _by_attitudes(read: ReadElsewhere, settings: RunSettings, name: str | None) 
         rates=told,
         at_rest={each: result for each, result in found.items() if each != RATE and isinstance(result, InAttitudes)},
         unsolved={each: result for each, result in found.items() if isinstance(result, Fault)},
-        of_kinds={each: result for each, result in found.items() if isinstance(result, OfKind)},
+        of_kinds=tuple(
+            KindFound(read.item.name, read.item, each, result)
+            for each, result in found.items()
+            if isinstance(result, OfKind)
+        ),
     )
 
 

@@ -22,6 +22,7 @@ from rig.analysis.comparison import Reference, turns_of
 from rig.analysis.contradictions import contradictions, in_reference
 from rig.analysis.elsewhere import OfSensor, checks_elsewhere, solved_elsewhere
 from rig.analysis.magnetic_field import MagnetometerResult, calibrate_magnetometers
+from rig.analysis.of_kinds import KindFound, kinds_on_arm
 from rig.analysis.onboard_check import Agreement, agreement
 from rig.analysis.surroundings import surroundings_of
 from rig.analysis.told_from import ToldFrom
@@ -70,7 +71,8 @@ class Outcome:
     the `magnetometers`, which no limit of scale and bias judges.
     `drifts` are there where attitudes were repeated to watch the bias. `told_from` says of gyroscopes what may happen
     in the run and from what size on the checks tell it, `told_from_in_reference` of accelerometers and magnetometers.
-    `elsewhere` is what readings gave whose motion is a file: gyroscopes are in `results` too.
+    `elsewhere` is what readings gave whose motion is a file: gyroscopes are in `results` too. `of_kinds` is what the
+    solvers of installed kinds of sensors found.
     """
 
     settings: RunSettings
@@ -87,6 +89,7 @@ class Outcome:
     told_from: Mapping[str, tuple[ToldFrom, ...]] = field(default_factory=dict)
     told_from_in_reference: Mapping[str, tuple[ToldFrom, ...]] = field(default_factory=dict)
     elsewhere: Mapping[str, OfSensor] = field(default_factory=dict)
+    of_kinds: tuple[KindFound, ...] = ()
 
     @property
     def verdict(self) -> Literal["pass", "fail"]:
@@ -122,6 +125,7 @@ def calibrated(runs: Sequence[RunData], estimator: str = DEFAULT_ESTIMATOR, *, d
     results = solve_observed(runs[0].measuring(RATE), recordings, chosen, surroundings, settings.matrix_corrected)
     accelerometers = calibrate_accelerometers(recordings, settings, results)
     magnetometers = calibrate_magnetometers(recordings, settings, accelerometers)
+    of_kinds = kinds_on_arm(recordings, settings)
     among_rates = contradictions(recordings, results, settings.to_calibrate, surroundings)
     among_dwells = in_reference(recordings, accelerometers, magnetometers, drifting=drifting)
     onboard = {name: agreement(runs, name) for name in settings.to_calibrate if runs[0].sensors[name].on_board}
@@ -143,7 +147,9 @@ def calibrated(runs: Sequence[RunData], estimator: str = DEFAULT_ESTIMATOR, *, d
             *clock_checks(surroundings.clocks if surroundings is not None else ()),
             *_acceleration_checks(accelerometers, settings),
             *among_dwells.checks,
+            *(check for each in of_kinds for check in each.checks),
         ),
+        of_kinds=of_kinds,
         provenance=_origin(runs),
         clock=None if surroundings is None else surroundings.clock,
         accelerometers=accelerometers,
@@ -161,9 +167,10 @@ def _elsewhere(runs: Sequence[RunData], read: ReadElsewhere, estimator: str) -> 
     return Outcome(
         settings=settings,
         provenance=_origin(runs),
-        checks=tuple(checks_elsewhere(name, found)),
+        checks=(*checks_elsewhere(name, found), *(check for each in found.of_kinds for check in each.checks)),
         results={} if found.gyroscope is None else {name: found.gyroscope},
         elsewhere={name: found},
+        of_kinds=found.of_kinds,
     )
 
 
@@ -185,7 +192,9 @@ def _in_attitudes(runs: Sequence[RunData], recordings: tuple[ObservedRun, ...], 
     found = calibrate_accelerometers(recordings, settings)
     magnetometers = calibrate_magnetometers(recordings, settings, found)
     among_dwells = in_reference(recordings, found, magnetometers, drifting=drifting)
-    checks = (*_acceleration_checks(found, settings), *among_dwells.checks)
+    of_kinds = kinds_on_arm(recordings, settings)
+    more = (check for each in of_kinds for check in each.checks)
+    checks = (*_acceleration_checks(found, settings), *among_dwells.checks, *more)
     return Outcome(
         settings=settings,
         provenance=_origin(runs),
@@ -194,6 +203,7 @@ def _in_attitudes(runs: Sequence[RunData], recordings: tuple[ObservedRun, ...], 
         accelerometers=found,
         magnetometers=magnetometers,
         told_from_in_reference=among_dwells.told_from,
+        of_kinds=of_kinds,
     )
 
 

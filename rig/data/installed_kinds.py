@@ -14,7 +14,8 @@ class InstalledKind(Protocol):
     """What a package says of a kind of sensor: each room takes what is its own, and knows nothing of the others.
 
     - `quantity` is what it measures: its row of the table.
-    - `solve` takes placements at rest and the site (`rig.analysis.attitudes.solve_placed`) and returns what is found.
+    - `solve` takes the sensor's name, its placements at rest and the site, and returns what is found
+      (`rig.analysis.of_kinds`).
     - `result` is the kind of result (`rig.report.kinds.kind.ResultKind`), which shows that everywhere.
     """
 

@@ -46,7 +46,7 @@ def dwell_readings(
     """
     for each in dwelt(run):
         if each.dwell.index not in superseded:
-            yield dwell_reading(stream, motion, _standing(run, each), settings)
+            yield dwell_reading(stream, motion, without_leaving(run, each), settings)
 
 
 def each_dwell(
@@ -58,7 +58,7 @@ def each_dwell(
     found: dict[int, DwellReading | Fault] = {}
     for each in dwelt(run):
         try:
-            found[each.dwell.index] = dwell_reading(stream, motion, _standing(run, each), settings)
+            found[each.dwell.index] = dwell_reading(stream, motion, without_leaving(run, each), settings)
         except Fault as fault:
             found[each.dwell.index] = fault
     return found
@@ -117,7 +117,7 @@ def dwell_reading(stream: Stream, motion: Motion, finished: Dwelt, settings: Obs
     )
 
 
-def _standing(run: RunData, finished: Dwelt) -> Dwelt:
+def without_leaving(run: RunData, finished: Dwelt) -> Dwelt:
     """The dwell without its last readings, which may have felt the arm leave; recordings of before keep them."""
     if not run.settings.leaves_dwells_early:
         return finished

@@ -71,11 +71,12 @@ def magnetometers_elsewhere(outcome: Outcome) -> dict[str, MagnetometerEntry]:
 
 def unsolved(outcome: Outcome) -> dict[str, dict[str, ErrorEntry]]:
     """Why quantities that were recorded have no solution, by sensor; those without any left out."""
-    told = {
-        name: {quantity.name: ErrorEntry(error=str(fault)) for quantity, fault in found.unsolved.items()}
-        for name, found in outcome.elsewhere.items()
-    }
-    return {name: faults for name, faults in told.items() if faults}
+    told: dict[str, dict[str, ErrorEntry]] = {}
+    faults = [(name, *each) for name, found in outcome.elsewhere.items() for each in found.unsolved.items()]
+    faults += [(each.name, each.quantity, each.found) for each in outcome.of_kinds if isinstance(each.found, Fault)]
+    for name, quantity, fault in faults:
+        told.setdefault(name, {})[quantity.name] = ErrorEntry(error=str(fault))
+    return told
 
 
 def rates_in_attitudes(found: OfSensor) -> InAttitudesRatesEntry | None:

@@ -92,3 +92,19 @@ def test_without_the_package_its_result_is_left_alone(tmp_path: Path, installed:
         capture_output=True, text=True, timeout=240, check=False, cwd=ROOT, env=without,
     )  # fmt: skip
     assert done.returncode == 2 and "not_a_run_file" in done.stderr, done.stderr
+
+
+@pytest.mark.slow
+def test_an_inclinometer_on_the_arm_is_solved_from_the_dwells(tmp_path: Path, installed: dict[str, str]) -> None:
+    """Beside a gyroscope and its accelerometer, as a source with a channel of its own would record it."""
+    ran(installed, "-m", "support.inclined_run", str(tmp_path))
+    result = json.loads(ran(installed, "-m", "rig", "solve", str(tmp_path), "--json"))
+    entry = result["others"]["inclinometers"]["tilt"]
+    std = np.sqrt(np.diag(entry["covariance"]))
+    assert (np.abs(np.array(entry["scale"] + entry["bias_rad"]) - [*SCALE, *BIAS_RAD]) < 5 * std + 1e-4).all()
+    assert entry["part"] == "tilt2" and {"gyro"} == set(result["accelerometers"])
+    checks = {check["name"]: check["passed"] for check in result["checks"]}
+    assert checks["tilt.inclination_residuals"]
+    ran(installed, "-m", "rig", "export", str(tmp_path), "--format", "csv", "--out", str(tmp_path / "csv"))
+    header, *rows = (tmp_path / "csv" / "tilt.csv").read_text(encoding="utf-8").splitlines()
+    assert header == "time_s,x_rad,y_rad" and len(rows) > 1000

@@ -14,8 +14,8 @@ from xml.etree.ElementTree import Element
 import numpy as np
 from rich.table import Table
 
-from rig.analysis.attitudes import OfKind
 from rig.analysis.check import Check
+from rig.analysis.of_kinds import OfKind
 from rig.analysis.outcome import Outcome
 from rig.data.meaning import Meaning
 from rig.data.quantity import Quantity, Unit
@@ -75,7 +75,7 @@ class InclinometerEntry(Entry):
     residuals_rad: tuple[tuple[float, float], ...]
 
 
-def solve(placements: Placements, site: Site) -> OfKind:
+def solve(name: str, placements: Placements, site: Site) -> OfKind:
     """Lines through the readings over the angles of rise, axis by axis, weighted by the readings' variances."""
     read = placements.read
     up = placements.attitudes.swapaxes(1, 2) @ np.array(site.up)
@@ -89,8 +89,8 @@ def solve(placements: Placements, site: Site) -> OfKind:
         turn = np.diag([-1 / slope**2, 1.0])
         covariance[np.ix_((i, 2 + i), (i, 2 + i))] = turn @ spread @ turn
     left = means - (rise / scale + bias)
-    held = Check("imu.inclination_residuals", float(np.abs(left).max()), 0.01, "rad",
-                 Meaning("fitness", "imu", INCLINATION.name))  # fmt: skip
+    held = Check(f"{name}.inclination_residuals", float(np.abs(left).max()), 0.01, "rad",
+                 Meaning("fitness", name, INCLINATION.name))  # fmt: skip
     return OfKind(Solution(scale, bias, covariance, left), (held,))
 
 
@@ -103,13 +103,11 @@ def _line(rise: Array, means: Array, variances: Array) -> tuple[Array, Array]:
 
 def _entries(outcome: Outcome) -> dict[str, InclinometerEntry]:
     made = {}
-    for name, sensor in outcome.elsewhere.items():
-        of_kind = sensor.of_kinds.get(INCLINATION)
-        if of_kind is not None and isinstance(of_kind.found, Solution):
-            found = {key: np.asarray(value).tolist() for key, value in vars(of_kind.found).items()}
-            made[name] = InclinometerEntry(
-                part=sensor.item.part, serial_number=sensor.item.serial_number, estimator="lines", **found
-            )
+    for each in outcome.of_kinds:
+        if each.quantity == INCLINATION and isinstance(each.found, OfKind) and isinstance(each.found.found, Solution):
+            found = {key: np.asarray(value).tolist() for key, value in vars(each.found.found).items()}
+            of = each.sensor.part, each.sensor.serial_number
+            made[each.name] = InclinometerEntry(part=of[0], serial_number=of[1], estimator="lines", **found)
     return made
 
 

@@ -1,0 +1,60 @@
+"""Kinds of sensors that packages add, by their own solvers: from an arm's dwells or a file's attitudes. Pure."""
+
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass
+from functools import partial
+
+from rig.analysis.calibration import or_fault
+from rig.analysis.check import Check
+from rig.data.installed_kinds import InstalledKind, installed_kinds
+from rig.data.motion_file import Item
+from rig.data.quantity import Quantity
+from rig.data.recorded_sensor import RecordedSensor
+from rig.data.settings import RunSettings, Site
+from rig.errors import Fault
+from rig.observation.observed_run import ObservedRun
+from rig.observation.placed_on_arm import placements_on_arm
+
+
+@dataclass(frozen=True, slots=True)
+class OfKind:
+    """What the solver of an installed kind of sensor found, and the checks that say whether it is fit for use."""
+
+    found: object
+    checks: tuple[Check, ...] = ()
+
+
+@dataclass(frozen=True, slots=True)
+class KindFound:
+    """What was `found` of a `sensor` by its name, or the Fault for which nothing was."""
+
+    name: str
+    sensor: RecordedSensor | Item
+    quantity: Quantity
+    found: OfKind | Fault
+
+    @property
+    def checks(self) -> tuple[Check, ...]:
+        """The solver's checks; none where nothing was found."""
+        return () if isinstance(self.found, Fault) else self.found.checks
+
+
+def kinds_on_arm(recordings: Sequence[ObservedRun], settings: RunSettings) -> tuple[KindFound, ...]:
+    """Every sensor of an installed kind that was recorded, in the order of the kinds."""
+    return tuple(_on_arm(recordings, settings))
+
+
+def _on_arm(recordings: Sequence[ObservedRun], settings: RunSettings) -> Iterator[KindFound]:
+    if settings.site is None:
+        return
+    for kind in installed_kinds():
+        for name, sensor in recordings[0].run.measuring(kind.quantity).items():
+            solve = partial(_solved, kind, name, recordings, settings, settings.site)
+            yield KindFound(name, sensor, kind.quantity, or_fault(solve))
+
+
+def _solved(
+    kind: InstalledKind, name: str, recordings: Sequence[ObservedRun], settings: RunSettings, site: Site
+) -> OfKind:
+    found: OfKind = kind.solve(name, placements_on_arm(recordings, name, kind.quantity, settings.observation), site)
+    return found

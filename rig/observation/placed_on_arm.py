@@ -1,0 +1,69 @@
+"""What any sensor read in the dwells of an arm, as placements: for kinds of sensors that packages add. Pure."""
+
+from collections.abc import Sequence
+
+import numpy as np
+
+from rig.data.quantity import Quantity
+from rig.data.settings import ObservationThresholds
+from rig.errors import Fault
+from rig.estimation.arrays import Array
+from rig.estimation.sensor_axes import nearest_rotation
+from rig.observation.acceleration import check_complete, without_leaving
+from rig.observation.mean import Mean, even_mean
+from rig.observation.observed_run import ObservedRun
+from rig.observation.placements import Placements, Rested
+from rig.observation.windows import Dwelt, Window, dwelt
+
+NO_REST = Rested({}, {}, {}, (), ())
+
+
+def placements_on_arm(
+    recordings: Sequence[ObservedRun], name: str, quantity: Quantity, thresholds: ObservationThresholds
+) -> Placements:
+    """The dwells that a sensor was read in; one that several recordings hold counts in the last.
+
+    Raises Fault `no_attitudes`, `lost_samples`, `saturation`.
+    """
+    found: dict[int, tuple[Window, Mean, Array]] = {}
+    for recording in recordings:
+        for finished in dwelt(recording.run):
+            stood = without_leaving(recording.run, finished)
+            mean = _mean(recording, name, quantity, stood, thresholds)
+            found[stood.dwell.index] = stood.window, mean, _attitude(recording, name, stood.window)
+    if not found:
+        raise Fault(
+            "no_attitudes",
+            f"recorded only: without attitudes {name} is not calibrated",
+            "Use the procedure static_attitudes or imu, which hold attitudes",
+        )
+    windows, means, attitudes = zip(*found.values(), strict=True)
+    freedom = np.array([np.broadcast_to(mean.freedom, mean.mean.shape) for mean in means])
+    read = Rested(
+        {quantity: np.array([mean.mean for mean in means])},
+        {quantity: np.array([mean.variance for mean in means])},
+        {quantity: freedom},
+        windows,
+        tuple(mean.samples for mean in means),
+    )
+    return Placements(read, np.array(attitudes), None, NO_REST, 0)
+
+
+def _mean(
+    recording: ObservedRun, name: str, quantity: Quantity, each: Dwelt, thresholds: ObservationThresholds
+) -> Mean:
+    where = f"dwell {each.dwell.index} ({each.dwell.name}) of {name}"
+    channel, time_s = recording.run.sensors[name].channel(quantity), recording.time_s(name)
+    inside = slice(*np.searchsorted(time_s, [each.window.start_s, each.window.end_s]).tolist())
+    samples = recording.run.samples[name][inside]
+    check_complete(samples, where, thresholds)
+    if channel.saturated(samples).any():
+        raise Fault("saturation", f"in {where} the {quantity} is beyond the sensor's range", "Choose a wider range")
+    return even_mean(channel.values(samples), channel.resolution)
+
+
+def _attitude(recording: ObservedRun, name: str, window: Window) -> Array:
+    """(3, 3) the rotation from the sensor's nominal axes into the arm's base."""
+    to_flange = nearest_rotation(recording.motion.attitude(window.start_s, window.end_s))
+    attitude: Array = (np.array(recording.run.sensors[name].mounting) @ to_flange).T
+    return attitude
