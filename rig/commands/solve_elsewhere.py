@@ -71,13 +71,15 @@ def run(options: Namespace) -> int:
     """Solve the two files and print the result; with `--out` a run folder too, entered in the history.
 
     Returns 0, or 1 where a check of the solves failed. Raises Refused `bad_option`, `run_folder`, as
-    `recorded_in_files`, `not_through` a link, and whatever the solve finds wrong.
+    `recorded_in_files`, and whatever the solve finds wrong.
     """
     from rig.analysis.outcome import calibrated
     from rig.commands.remember import print_beside
     from rig.report.document import document_of
     from rig.report.table import print_outcome
 
+    if options.history is not None and options.out is None:
+        raise Refused("bad_option", "--history is for what is kept", "Give --out, which keeps the run")
     with raised_as(Refused):  # nothing runs here: whatever is wrong with the data, no arm had to be stopped for it
         recording = _recording(options)
         outcome = calibrated([recording])
