@@ -57,11 +57,13 @@ def plot_residuals(results: Mapping[str, SensorResult]) -> Plot:
     sensors = {
         name: (found, found.vector_model)
         for name, found in results.items()
-        if not isinstance(found.vector_model, Fault)
+        if not isinstance(found.vector_model, Fault) and (found.observations or found.rests)
     }
     if not sensors:
         raise Refused(
-            "nothing_to_plot", "the vector model has no solution here", "Read in the result why, sensor by sensor"
+            "nothing_to_plot",
+            "no sweeps were solved by the vector model here",
+            "Read in the result why, sensor by sensor",
         )
     figure = _figure(10, 3 * len(sensors))
     panels = figure.subplots(len(sensors), sharex=True, squeeze=False)[:, 0]

@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from rig.analysis.acceleration import AccelerometerResult
+from rig.analysis.attitudes import InAttitudes
 from rig.analysis.magnetic_field import MagnetometerResult
 from rig.analysis.outcome import Outcome
 from rig.data.quantity import ACCELERATION, FIELD, Quantity
@@ -76,6 +77,17 @@ def of_magnetometer(result: MagnetometerResult) -> HeldStill:
     return _held(FIELD, result, fit.residuals, attitude_residual_std(fit, result.seen), result.solution.field_table_t)
 
 
+def of_file(quantity: Quantity, result: InAttitudes) -> HeldStill:
+    """What the plots of a sensor in attitudes of a file are made of."""
+    solution = result.solution
+    expected = (
+        np.zeros_like(solution.residuals) if result.seen is None else attitude_residual_std(solution, result.seen)
+    )
+    towards = np.array([dwell.attitude @ solution.reference for dwell in result.dwells])
+    noise = np.sqrt([dwell.reading.variance for dwell in result.dwells])
+    return HeldStill(quantity, solution.residuals, expected, noise, towards)
+
+
 def _held(
     quantity: Quantity,
     result: AccelerometerResult | MagnetometerResult,
@@ -95,6 +107,8 @@ def _held_still(outcome: Outcome) -> Iterator[tuple[str, HeldStill]]:
     for name, found in outcome.magnetometers.items():
         if not isinstance(found, Fault):
             yield name, of_magnetometer(found)
+    for name, sensor in outcome.elsewhere.items():
+        yield from ((name, of_file(quantity, result)) for quantity, result in sensor.at_rest.items())
 
 
 def _draw_residuals(axes: "Axes", held: HeldStill) -> None:

@@ -12,6 +12,7 @@ import pytest
 import rig
 from rig.cli import main
 from rig.data.result_file import read_result
+from rig.errors import Refused
 from rig.report.certificate.content import certificate_of
 from rig.report.certificate.stated import Stated
 from support.certified import read
@@ -70,6 +71,18 @@ def test_the_folder_holds_a_certificate_with_its_clauses(kept: tuple[Example, Pa
     assert "2026-11-20" in page.under["7.8.2.1i"]
     assert example.samples in page.under["7.8.2.1f"] and "robot arm" not in text and "UR10e" not in text
     assert "No metrological traceability is claimed" in " ".join(page.under["7.8.4.1c"].split())
+
+
+def test_attitudes_are_drawn_and_sweeps_in_the_notebook(kept: tuple[Example, Path]) -> None:
+    example, folder = kept
+    for kind in example.kinds.values():
+        assert (folder / "run" / f"{kind}_imu.svg").exists() == (kind != "gyroscope")
+    result = rig.solve(rig.load(folder / "run"))
+    if example.samples == "samples.csv":
+        result.plot().save(folder / "residuals.png")
+    else:
+        with pytest.raises(Refused, match="nothing_to_plot"):
+            result.plot()
 
 
 def test_its_digital_certificate_is_valid(kept: tuple[Example, Path], capsys: pytest.CaptureFixture[str]) -> None:
