@@ -7,7 +7,6 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 from rig.commands.named_history import add_history, named_history
-from rig.data.motion_file import NOT_STATED
 from rig.errors import Refused, raised_as
 from rig.estimation.earth import STANDARD_GRAVITY_M_S2
 from rig.station.plain_text import say
@@ -26,8 +25,8 @@ def add(solve: ArgumentParser) -> None:
     group.add_argument("--out", type=Path, metavar="DIR", help="a new run folder for result, certificate, pictures")
     add_history(group)
     group.add_argument("--name", default="imu", metavar="NAME", help="what the sensor is called (default: imu)")
-    group.add_argument("--part", default=NOT_STATED, metavar="PART", help="which part it is")
-    group.add_argument("--serial-number", default=NOT_STATED, metavar="NUMBER", help="a history needs it")
+    group.add_argument("--part", metavar="PART", help="which part it is")
+    group.add_argument("--serial-number", metavar="NUMBER", help="a history needs it")
     group.add_argument(
         "--recorded",
         type=datetime.fromisoformat,
@@ -107,7 +106,7 @@ def _recording(options: Namespace) -> "RunData":
     x, y, z = ((1.0 if sign == "+" else -1.0) * np.eye(3)["xyz".index(axis)]).tolist()
     item = {"name": options.name, "part": options.part, "serial_number": options.serial_number}
     try:
-        told = checked(Item, item, "sensor")
+        told = checked(Item, {key: value for key, value in item.items() if value is not None}, "sensor")
     except ValueError as error:
         raise Refused("bad_option", str(error), "Give names of letters and digits, of 40 characters at most") from None
     recorded: datetime | None = options.recorded
@@ -152,7 +151,7 @@ def _kept(options: Namespace, recording: "RunData", outcome: "Outcome") -> "tupl
     except OSError as error:
         raise Refused("run_folder", f"{folder} cannot be written: {error}", "Choose another with --out") from error
     tell(RunFolderWritten(folder))
-    if options.serial_number == NOT_STATED:
+    if options.serial_number is None:
         say("rig: entered in no history: nobody said whose readings these are (--serial-number)", sys.stderr)
         return ()
     entered, beside = remember_own(folder, named_history(options.history))

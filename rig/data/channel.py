@@ -13,7 +13,8 @@ from pydantic import Field
 
 from firmware_host.samples import STAMPS
 from rig.data.checked import Finite, Positive
-from rig.data.quantity import RATE, TEMPERATURE, Quantity, Scalar, measured
+from rig.data.installed_kinds import measured
+from rig.data.quantity import RATE, TEMPERATURE, Quantity, Scalar
 from rig.estimation.arrays import Array
 
 ColumnName = Annotated[str, Field(pattern="^[a-z][a-z0-9_]{0,39}$")]

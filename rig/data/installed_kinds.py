@@ -1,10 +1,12 @@
-"""Kinds of sensors that a package adds, through the entry-point group `rig.kinds`."""
+"""Kinds of sensors that a package adds, through the entry-point group `rig.kinds`, and all quantities with theirs."""
 
+from collections.abc import Mapping
 from functools import cache
 from importlib.metadata import entry_points
+from types import MappingProxyType
 from typing import Any, Protocol
 
-from rig.data.quantity import Quantity
+from rig.data.quantity import OF_THE_RIG, SCALARS, Quantity, Scalar
 from rig.errors import Refused
 
 GROUP = "rig.kinds"
@@ -41,3 +43,16 @@ def installed_kinds() -> tuple[InstalledKind, ...]:
                 f"Install the package of {entry.value} again, or remove it",
             ) from error
     return tuple(found)
+
+
+@cache
+def quantities() -> Mapping[str, Quantity]:
+    """Every quantity by its name, those of installed kinds of sensors too."""
+    every = (*OF_THE_RIG, *(kind.quantity for kind in installed_kinds()))
+    return MappingProxyType({each.name: each for each in every})
+
+
+@cache
+def measured() -> Mapping[str, Quantity | Scalar]:
+    """Everything that a channel may be of, by its name: quantities, and what has no axes."""
+    return MappingProxyType({**quantities(), **{each.name: each for each in SCALARS}})

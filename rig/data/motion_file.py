@@ -10,7 +10,8 @@ from numpy.typing import NDArray
 from pydantic import Field
 
 from rig.config.section import SensorName
-from rig.data.quantity import Quantity, quantities
+from rig.data.installed_kinds import quantities
+from rig.data.quantity import Quantity
 
 Told = Literal["sweeps", "attitudes"]
 Columns = Mapping[str, NDArray[np.float64]]

@@ -1,14 +1,11 @@
 """What sensors measure: every name, unit and size that is written or shown of a quantity, in one table.
 
 A quantity's names in files end with its `suffix`: `bias_m_s2`, `x_m_s2`. A new quantity is a row here, or comes with a
-kind of sensor that somebody has installed.
+kind of sensor that somebody has installed (`rig.data.installed_kinds`).
 """
 
-from collections.abc import Mapping
 from dataclasses import dataclass
-from functools import cache
 from math import pi
-from types import MappingProxyType
 from typing import Final
 
 from rig.estimation.earth import MICRO_G_M_S2
@@ -152,18 +149,4 @@ FIELD: Final = Quantity(
 OF_THE_RIG: Final = (RATE, ACCELERATION, FIELD)
 TEMPERATURE: Final = Scalar("temperature", "thermometer", "°C", "c", Unit("°C", 1.0))
 PRESSURE: Final = Scalar("pressure", "barometer", "Pa", "pa", Unit("hPa", 100.0))
-
-
-@cache
-def quantities() -> Mapping[str, Quantity]:
-    """Every quantity by its name, those of installed kinds of sensors too (`rig.data.installed_kinds`)."""
-    from rig.data.installed_kinds import installed_kinds
-
-    every = (*OF_THE_RIG, *(kind.quantity for kind in installed_kinds()))
-    return MappingProxyType({each.name: each for each in every})
-
-
-@cache
-def measured() -> Mapping[str, Quantity | Scalar]:
-    """Everything that a channel may be of, by its name: quantities, and what has no axes."""
-    return MappingProxyType({**quantities(), **{each.name: each for each in (TEMPERATURE, PRESSURE)}})
+SCALARS: Final = (TEMPERATURE, PRESSURE)

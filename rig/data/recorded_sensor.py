@@ -12,7 +12,8 @@ from pydantic import Field
 from rig.config.sensor_sections import MountingSection, mounting_matrix
 from rig.data.channel import MAX_CHANNELS, Channel, sample_dtype
 from rig.data.checked import Finite, Positive, checked
-from rig.data.quantity import RATE, TEMPERATURE, Quantity, Scalar, measured
+from rig.data.installed_kinds import measured
+from rig.data.quantity import RATE, TEMPERATURE, Quantity, Scalar
 from rig.errors.quoting import quote
 
 MOUNTING_TOLERANCE = 1e-6

@@ -5,7 +5,7 @@ import math
 from collections.abc import Iterator, Sequence
 from datetime import UTC, datetime
 
-from rig.data.quantity import quantities
+from rig.data.installed_kinds import quantities
 from rig.data.result_file import ResultDocument
 from rig.report.kinds.followed import Followed, Parameter
 from rig.report.kinds.registry import followed

@@ -4,7 +4,7 @@ import json
 from collections.abc import Iterator, Mapping, Sequence
 
 from rig.config.limits import Kind
-from rig.data.quantity import quantities
+from rig.data.installed_kinds import quantities
 from rig.data.result_file import CheckEntry, ResultDocument
 from rig.history.index import SAME, unlike
 from rig.report.kinds.registry import followed

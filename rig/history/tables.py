@@ -4,7 +4,7 @@ from collections.abc import Iterable, Iterator, Mapping, Sequence
 
 from rich.table import Table
 
-from rig.data.quantity import quantities
+from rig.data.installed_kinds import quantities
 from rig.history.series import YEAR_DAYS, Change, RigState, Subject, Trend
 from rig.history.statistics.charts import FEWEST
 from rig.history.statistics.rig_effects import RigEffect

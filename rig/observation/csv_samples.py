@@ -12,8 +12,9 @@ from pathlib import Path
 
 import numpy as np
 
+from rig.data.installed_kinds import quantities
 from rig.data.motion_file import TIME, Columns, samples_header
-from rig.data.quantity import Quantity, quantities
+from rig.data.quantity import Quantity
 from rig.errors import Refused
 from rig.estimation.arrays import Array
 from rig.observation.csv_table import read_columns

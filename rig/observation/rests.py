@@ -12,7 +12,8 @@ from collections.abc import Mapping
 import numpy as np
 from numpy.typing import NDArray
 
-from rig.data.quantity import RATE, Quantity, quantities
+from rig.data.installed_kinds import quantities
+from rig.data.quantity import RATE, Quantity
 from rig.estimation.arrays import Array
 from rig.observation.steadiness import BEYOND
 from rig.observation.windows import Window

@@ -8,7 +8,8 @@ from rig.arm.kinematics import NOMINAL, DenavitHartenberg
 from rig.arm.motion import Dwell, Rest, Step, Sweep
 from rig.arm.state import JOINT_NAMES, ArmReport, ArmState, RobotMode, RuntimeState, SafetyMode
 from rig.data.events import BoardNotObserved, BoardObserved
-from rig.data.quantity import TEMPERATURE, measured
+from rig.data.installed_kinds import measured
+from rig.data.quantity import TEMPERATURE
 from rig.data.result_file import read_result
 from rig.data.run_folder import RESULT
 from rig.errors import RigError

@@ -118,7 +118,7 @@ class Progress:
 class SensorSamples:
     """What one sensor has delivered so far: samples, gaps in their numbers, the newest mean readings by quantity.
 
-    A reading has a number for each axis, or one, in the quantity's unit (`rig.data.quantity.measured`).
+    A reading has a number for each axis, or one, in the quantity's unit (`rig.data.installed_kinds.measured`).
     """
 
     sensor: str

@@ -11,7 +11,8 @@ from rich.live import Live
 from rich.progress_bar import ProgressBar
 from rich.table import Table
 
-from rig.data.quantity import TEMPERATURE, measured
+from rig.data.installed_kinds import measured
+from rig.data.quantity import TEMPERATURE
 from rig.errors.quoting import printable_lines
 from rig.station.events import Progress, RunEvent, SamplesTaken, SensorSamples
 from rig.station.plain_text import plain

@@ -54,12 +54,17 @@ GOOD = {"ADIS16465": 0, "quiet LSM9DS1": 1}
 @pytest.mark.proof
 @pytest.mark.parametrize("name", DAMAGES)
 def test_the_least_damage_that_matters_is_told(name: str, thorough: bool) -> None:
+    """In 95 of 100 recordings, as what is stated of a size is."""
     *sizes, damage = DAMAGES[name]
+    seeds = range(20 if thorough else 1)
     for kind, place in GOOD.items():
-        for seed in range(20 if thorough else 1):
+        passed = []
+        for seed in seeds:
             seen = drawn(500 + seed, KINDS[kind])
             run = damaged(seen, KINDS[kind], damage(seen, float(sizes[place])))
-            assert failed(checked(run)), (kind, seed)
+            passed += [] if failed(checked(run)) else [seed]
+        print(f"{kind}: {len(passed)} of {len(seeds)} passed {passed}")
+        assert len(passed) <= 0.05 * len(seeds), (kind, passed)
 
 
 @pytest.mark.slow

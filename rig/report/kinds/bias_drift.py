@@ -7,7 +7,8 @@ from rich.table import Table
 
 from rig.analysis.outcome import Outcome
 from rig.data.drift_entries import DriftEntry
-from rig.data.quantity import RATE, Quantity, quantities
+from rig.data.installed_kinds import quantities
+from rig.data.quantity import RATE, Quantity
 from rig.data.result_file import ResultDocument
 from rig.data.result_types import ErrorEntry
 from rig.estimation.bias_by_repeat import largest_change_std
