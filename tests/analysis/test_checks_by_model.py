@@ -43,7 +43,7 @@ DAMAGES: dict[str, tuple[float, float, Callable[[Drawn, float], Array]]] = {
     "gain of y half-way": (1e-3, 2.5e-3, lambda seen, by: by * later(seen) * seen.felt_rad_s * [0, 1, 0]),
     "gain of z half-way": (1e-3, 2.5e-3, lambda seen, by: by * later(seen) * seen.felt_rad_s * [0, 0, 1]),
     "mounting half-way, °": (0.02, 0.075, lambda seen, by: later(seen) * (seen.felt_rad_s @ turned(by))),
-    "cw against ccw": (5e-4, 5.3e-4, lambda seen, by: by * np.maximum(seen.felt_rad_s, 0.0)),
+    "cw against ccw": (5e-4, 6.3e-4, lambda seen, by: by * np.maximum(seen.felt_rad_s, 0.0)),
     "offset of one sweep, rad/s": (4e-4, 8e-4, lambda seen, by: by * sweep_2(seen) * DIRECTION),
     "gain of one sweep": (6e-4, 1e-3, lambda seen, by: by * sweep_2(seen) * seen.felt_rad_s),
 }
