@@ -16,6 +16,7 @@ from rig.data.quantity import Quantity
 Told = Literal["sweeps", "attitudes"]
 Columns = Mapping[str, NDArray[np.float64]]
 
+LARGEST_NUMBER = 1e12  # either sign, in any SI unit: what is beyond is a mistake, and its square might overflow
 NOT_STATED: Final = "not stated"
 ItemWord = Annotated[str, Field(min_length=1, max_length=40)]
 TIME, TEMPERATURE = "time_s", "temperature_c"
@@ -30,11 +31,16 @@ class Header:
     optional: tuple[tuple[str, ...], ...] = ()
 
     def check(self, columns: Columns) -> None:
-        """Raises ValueError for columns that are no such file's."""
-        known = {*self.needed, *self.one_of, *(name for group in self.optional for name in group)}
-        missing = [name for name in self.needed if name not in columns]
-        if missing or columns.keys() - known or (self.one_of and not columns.keys() & set(self.one_of)):
+        """Raises ValueError for columns, or numbers, that are no such file's."""
+        there = columns.keys()
+        groups = [group for group in self.optional if there & set(group)]
+        known = {*self.needed, *self.one_of, *(name for group in groups for name in group)}
+        wanted = known - set(self.one_of)
+        if wanted - there or there - known or len(there & set(self.one_of)) != min(len(self.one_of), 1):
             raise ValueError(f"its columns are {', '.join(columns)}")
+        for name, column in columns.items():
+            if not (np.abs(column) < LARGEST_NUMBER).all():
+                raise ValueError(f"a number of its {name} is none, or none that could be measured")
 
 
 def samples_header(needed: Collection[Quantity] = ()) -> Header:

@@ -9,13 +9,12 @@ from pathlib import Path
 import numpy as np
 
 from rig.config.regular_file import UnfitFile, open_regular_file
-from rig.data.motion_file import Header
+from rig.data.motion_file import LARGEST_NUMBER, Header
 from rig.errors import Refused
 from rig.errors.quoting import quote, shorten
 from rig.estimation.arrays import Array
 
 LONGEST_LINE = 10_000  # characters: of a hundred columns, where there are at most twenty
-LARGEST_NUMBER = 1e12  # either sign, in any SI unit: what is beyond is a mistake, and its square might overflow
 
 
 def read_columns(path: Path, header: Header, largest_mb: int) -> dict[str, Array]:

@@ -175,6 +175,15 @@ def told_otherwise(file: h5py.File) -> None:
     file.attrs["elsewhere"] = json.dumps({"item": {"name": "../x"}, "tells": "sweeps"})
 
 
+def spoilt(table: str, name: str, value: float) -> Callable[[h5py.File], None]:
+    def change(file: h5py.File) -> None:
+        rows = file[table][:]
+        rows[name][3] = value
+        file[table][:] = rows
+
+    return change
+
+
 def of_an_arm(file: h5py.File) -> None:
     settings = json.loads(file.attrs["settings"])
     del settings["elsewhere"]
@@ -184,6 +193,10 @@ def of_an_arm(file: h5py.File) -> None:
 DAMAGE: dict[str, Callable[[h5py.File], None]] = {
     "no time": columns_of("readings", lambda name: name != "time_s"),
     "no axis": columns_of("motion", lambda name: name != "axis_x"),
+    "two of three axes": columns_of("readings", lambda name: name != "y_rad_s"),
+    "neither speed nor angle": columns_of("motion", lambda name: name not in {"speed_rad_s", "angle_rad"}),
+    "not a number": spoilt("readings", "x_rad_s", float("nan")),
+    "an endless sweep": spoilt("motion", "end_s", float("inf")),
     "single precision": of_another_type,
     "a name that is a path": told_otherwise,
     "settings of an arm": of_an_arm,
