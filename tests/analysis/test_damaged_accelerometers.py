@@ -17,6 +17,8 @@ from support.drawn_accelerations import (
     told_of,
 )
 
+pytestmark = pytest.mark.slow
+
 PARTS = ("lsm9ds1", "mpu9250", "adis16465", "kvh1775")
 RATE = 1e-3 / 14  # of false alarms for each check: docs/method.md
 SMALLEST, LARGEST, STEP = 1e-6, 1.0, 1.2

@@ -17,6 +17,8 @@ from rig.estimation.nonlinearity import SQUARE_MISSED
 from rig.estimation.own_errors import KnownSensor, own_errors
 from support.synthetic_run import Setup, synthetic_run
 
+pytestmark = pytest.mark.slow
+
 PER_RAD_S = PARTS["lsm9ds1"].nonlinearity_percent / 100 / np.radians(245)
 SIX_AXES = (("axes", "6"),)
 ODD = Setup(noise_rad_s=3e-4, odd_per_rad_s=PER_RAD_S, procedure=SIX_AXES)

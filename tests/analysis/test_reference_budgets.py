@@ -35,6 +35,8 @@ SITE = Site(
     gravity_expanded_m_s2=GRAVITY_U,
     magnetic_field_expanded_t=FIELD_U,
 )
+
+pytestmark = pytest.mark.slow
 JOINTS = joints_rad(EIGHTEEN)
 NOISE_T, TEST_NOISE_T = 3e-8, 2e-8  # of a mean
 Session = tuple[Array, Budget, Array]  # error over u (6,), the budget, error over the solution's own spread (6,)

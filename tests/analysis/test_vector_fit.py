@@ -66,6 +66,7 @@ def test_six_axes_tell_them_apart() -> None:
     assert std < 0.01
 
 
+@pytest.mark.slow
 def test_six_axes_leave_scale_and_bias_as_well_known() -> None:
     assert np.abs(off(SIX)).max() < 4
 

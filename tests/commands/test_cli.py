@@ -45,6 +45,7 @@ def test_a_terminal_without_special_characters_gets_the_plan_too() -> None:
     assert done.returncode == 0 and "sweep wrist_3 cw" in done.stdout, done.stderr
 
 
+@pytest.mark.slow
 def test_a_narrow_terminal_gets_every_step() -> None:
     done = shell(PLAN, COLUMNS="60")
     assert done.returncode == 0
@@ -98,6 +99,7 @@ def test_help_comes_at_once_whatever_the_command() -> None:
     assert not HEAVY & {*asked.stderr.split()}
 
 
+@pytest.mark.slow
 def test_a_plan_says_what_its_checks_will_tell() -> None:
     document = json.loads(shell(f"{PLAN} --json").stdout)
     told = {each["what"]: each for each in document["told_from"]["gyro"]}

@@ -34,6 +34,7 @@ def status(url: str, method: str, path: str, **headers: str) -> int:
     return answer.status
 
 
+@pytest.mark.slow
 def test_half_requests_hold_few_descriptors_and_the_page_answers_all_the_same(tmp_path: Path) -> None:
     with ExitStack() as held:
         url = held.enter_context(page(tmp_path))
@@ -53,6 +54,7 @@ def test_an_address_that_opens_many_loses_its_own_and_no_others(tmp_path: Path) 
         assert alive(other)
 
 
+@pytest.mark.slow
 def test_a_stream_with_the_token_outlives_any_number_of_strangers(tmp_path: Path) -> None:
     with ExitStack() as held:
         url = held.enter_context(page(tmp_path))
