@@ -25,6 +25,7 @@ MAX_DRIFT = 0.03  # an oscillator that no crystal holds is within 2 %
 MAX_DRIFT_LONG_RUN = 1e-3  # one that a crystal holds is within 600 ppm
 MAX_DRIFT_STEPS = 20  # to either side
 FINE_STEPS = 400  # each may be nearly as long as the last where the arm vibrates and little of it turns
+SLOW_STEPS, LEAP_STEPS, FARTHEST = 300, 20, 100.0  # then, and so often, what is left is gone at once, at most so far
 
 
 @dataclass(frozen=True, slots=True)
@@ -208,11 +209,22 @@ def _explained(board: Array, seen: NDArray[np.bool_], arm: Array, lag: int) -> f
 
 
 def _settled(clock: TimeBase, board_time_s: Array, readings: Array, motion: KnownMotion) -> TimeBase:
-    for _ in range(FINE_STEPS):
-        before, clock = clock.offset_s, _refined(clock, board_time_s, readings, motion)
-        if abs(clock.offset_s - before) < 1e-3 * clock.offset_std_s:
+    moved = np.zeros(2)
+    for number in range(1, FINE_STEPS + 1):
+        before, last = clock, moved
+        clock = _refined(clock, board_time_s, readings, motion)
+        moved = np.array([clock.offset_s - before.offset_s, clock.drift - before.drift])
+        if abs(moved[0]) < 1e-3 * clock.offset_std_s:
             return clock
+        if number >= SLOW_STEPS and number % LEAP_STEPS == 0:
+            further = moved * _left_to_go(float(moved[0] / last[0]))
+            clock = replace(clock, offset_s=clock.offset_s + further[0], drift=clock.drift + further[1])
     raise _not_found("the fit of the board's clock does not settle")
+
+
+def _left_to_go(ratio: float) -> float:
+    """How many times the last step is still to go where each is shorter by that ratio (Aitken's Δ²); else 0."""
+    return min(ratio / (1 - ratio), FARTHEST) if 0 < ratio < 1 else 0.0
 
 
 def _refined(clock: TimeBase, board_time_s: Array, readings: Array, motion: KnownMotion) -> TimeBase:
