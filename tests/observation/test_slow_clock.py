@@ -1,7 +1,7 @@
 """The clock of a board whose fit takes ever smaller steps: an MPU-9250 on an arm that vibrates, in a slow axis' sweep.
 
-`slow_clock.npz` has its readings and the arm's states as a simulated world recorded them: after 400 steps the fit had not
-settled, each being 0.985 of the one before, and a sound run was refused.
+`slow_clock.npz` has its readings and the arm's states as a simulated world recorded them: after 400 steps the fit had
+not settled, each being 0.985 of the one before, and a sound run was refused.
 """
 
 import numpy as np
