@@ -18,7 +18,7 @@ Columns = Mapping[str, NDArray[np.float64]]
 
 LARGEST_NUMBER = 1e12  # either sign, in any SI unit: what is beyond is a mistake, and its square might overflow
 NOT_STATED: Final = "not stated"
-ItemWord = Annotated[str, Field(min_length=1, max_length=40)]
+ItemWord = Annotated[str, Field(pattern="^[ -~]{1,40}$")]  # plain ASCII, as of sensors on a board
 TIME, TEMPERATURE = "time_s", "temperature_c"
 
 
