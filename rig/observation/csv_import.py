@@ -36,6 +36,7 @@ from rig.observation.windows import Window
 AXIS_COLUMNS = ("axis_x", "axis_y", "axis_z")
 STD_COLUMNS = ("angle_std_rad", "axis_std_rad")
 MIN_DURATION_S = 1e-3  # so many samples need longer at any rate
+LEAST_MOTION = 1e-9  # rad or rad/s: no sweep, and its square might be 0
 SWEEPS_MB = 1  # some ten thousand sweeps
 
 
@@ -114,6 +115,8 @@ def _speeds(sweeps: Mapping[str, Array]) -> Array:
             what = f"lasts {duration:g} s, which is no time to sweep"
         elif moved < 0:
             what = "turns by less than nothing"
+        elif 0 < moved < LEAST_MOTION:
+            what = f"turns by {moved:.0e}, which is nothing, and a rest has 0"
         elif moved > 0 and abs(norm - 1) > 1e-3:
             what = f"has an axis of length {norm:.3g}"
         elif any(sweeps[name][row - 1] <= 0 for name in STD_COLUMNS if name in sweeps and moved > 0):
