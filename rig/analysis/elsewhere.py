@@ -21,7 +21,7 @@ from rig.analysis.check import Check
 from rig.analysis.correction import diagonal_correction, matrix_correction
 from rig.analysis.increments import InIncrements
 from rig.analysis.of_kinds import KindFound, OfKind
-from rig.data.meaning import Meaning
+from rig.analysis.verdict import fitness
 from rig.data.motion_file import Item, ReadElsewhere
 from rig.data.quantity import RATE, Quantity
 from rig.data.settings import RunSettings
@@ -87,11 +87,11 @@ def checks_elsewhere(name: str, found: OfSensor) -> Iterator[Check]:
     """
     if (gyroscope := found.gyroscope) is not None:
         largest = triaxial.MAX_CONDITION if found.rates is not None else known_turns.MAX_CONDITION
-        yield _fit(name, RATE, "condition", gyroscope.solution.condition, largest)
+        yield fitness(name, RATE.name, "condition", gyroscope.solution.condition, largest)
     for quantity, result in found.at_rest.items():
-        yield _fit(name, quantity, "condition", result.solution.condition, triaxial.MAX_CONDITION)
+        yield fitness(name, quantity.name, "condition", result.solution.condition, triaxial.MAX_CONDITION)
         if (error := result.solution.attitude_error) is not None:
-            yield _fit(name, quantity, "attitude_error", error.std_rad, UNTRUSTWORTHY_RAD, unit="rad")
+            yield fitness(name, quantity.name, "attitude_error", error.std_rad, UNTRUSTWORTHY_RAD, unit="rad")
 
 
 def _by_sweeps(read: ReadElsewhere, name: str | None) -> OfSensor:
@@ -243,11 +243,6 @@ def _as_swept(found: Result) -> TurnedSolution:
         warnings=warnings,
         estimator=estimator,
     )
-
-
-def _fit(sensor: str, quantity: Quantity, what: str, value: float, limit: float, *, unit: str = "1") -> Check:
-    called = f"{sensor}.{what}" if quantity == RATE else f"{sensor}.{quantity}_{what}"
-    return Check(called, value, limit, unit, Meaning("fitness", sensor, quantity.name))
 
 
 def _nothing_solved(unsolved: Mapping[Quantity, Fault]) -> Fault | Refused:

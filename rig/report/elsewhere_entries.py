@@ -19,7 +19,7 @@ from rig.data.settings import Site
 from rig.errors import Fault
 from rig.estimation import accelerometer, magnetometer
 from rig.estimation.reference_budget import scale_and_bias_covariance
-from rig.estimation.reference_model import F
+from rig.estimation.reference_model import SECOND, F
 from rig.estimation.residuals import attitude_residual_std
 from rig.estimation.sensor_axes import SensorAxes
 from rig.estimation.triaxial import TriaxialSolution
@@ -196,7 +196,7 @@ def _beside(kind: Any, quantity: Quantity, found: InAttitudes) -> Mapping[str, A
 
 
 def _second_order_std(solution: TriaxialSolution) -> Any:
-    return None if solution.second_order is None else np.sqrt(np.diag(solution.covariance)[15:18])
+    return None if solution.second_order is None else np.sqrt(np.diag(solution.covariance)[SECOND])
 
 
 def _scale(solution: TriaxialSolution) -> Any:
