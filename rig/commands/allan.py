@@ -49,7 +49,8 @@ def _of_log(path: Path) -> "dict[str, SensorAtRest]":
 
 
 def _of_run(path: Path) -> "dict[str, SensorAtRest]":
-    from rig.analysis.at_rest import at_rest
+    from rig.analysis.at_rest import at_rest, log_at_rest
+    from rig.observation.csv_samples import samples_in
     from rig.plans.recorded import open_run
 
     recorded = open_run(path).raw
@@ -59,6 +60,8 @@ def _of_run(path: Path) -> "dict[str, SensorAtRest]":
             f"{path} holds only readings that the board has corrected",
             "Give the recording of a calibration, or of `bias_drift`",
         )
+    if (read := recorded[0].elsewhere) is not None:
+        return {read.item.name: log_at_rest(samples_in(read.readings, str(path)))}
     return at_rest(recorded)
 
 

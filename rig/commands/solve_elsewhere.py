@@ -26,7 +26,7 @@ def add(solve: ArgumentParser) -> None:
     add_history(group)
     group.add_argument("--name", default="imu", metavar="NAME", help="what the sensor is called (default: imu)")
     group.add_argument("--part", metavar="PART", help="which part it is")
-    group.add_argument("--serial-number", metavar="NUMBER", help="a history needs it")
+    group.add_argument("--serial-number", metavar="NUMBER", help="which specimen it is; a history needs it")
     group.add_argument(
         "--recorded",
         type=datetime.fromisoformat,
@@ -104,9 +104,10 @@ def _recording(options: Namespace) -> "RunData":
             raise Refused("bad_option", f"{option} is {value:g}", "Give its size, in SI units")
     sign, axis = options.up
     x, y, z = ((1.0 if sign == "+" else -1.0) * np.eye(3)["xyz".index(axis)]).tolist()
-    item = {"name": options.name, "part": options.part, "serial_number": options.serial_number}
+    said = {"name": options.name, "part": options.part, "serial_number": options.serial_number}
+    item = {key: word for key, word in said.items() if word is not None}
     try:
-        told = checked(Item, {key: value for key, value in item.items() if value is not None}, "sensor")
+        told = checked(Item, item, "sensor")
     except ValueError as error:
         raise Refused("bad_option", str(error), "Give names of letters and digits, of 40 characters at most") from None
     recorded: datetime | None = options.recorded

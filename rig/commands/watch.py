@@ -42,12 +42,13 @@ def _speed(text: str) -> float:
 def run(options: Namespace) -> int:
     """Replay every recording in a run folder, `--speed` times as fast as it was; the page stays until Ctrl-C.
 
-    Returns 0. Raises Refused `no_run`, `page_address`, and as `read_run`, `check_arms_times` and `read_result` do.
+    Returns 0. Raises Refused `no_run`, `page_address`, and as `read_run`, `refuse_elsewhere`, `check_arms_times` and
+    `read_result` do.
     """
     from rig.data.result_file import read_result
     from rig.data.run_file import read_run
     from rig.data.run_folder import RESULT, recordings
-    from rig.observation.arm_motion import check_arms_times
+    from rig.observation.arm_motion import check_arms_times, refuse_elsewhere
     from rig.page.control import Control
     from rig.page.feed import Feed
     from rig.page.replay import moments
@@ -61,6 +62,7 @@ def run(options: Namespace) -> int:
         raise Refused("no_run", f"{folder} holds no recording", "Give the folder of a run")
     with raised_as(Refused):  # nothing runs here
         for run in runs:
+            refuse_elsewhere(run)
             check_arms_times(run.arm)
     result = read_result(folder / RESULT) if (folder / RESULT).exists() else None
     feed = Feed(Shown(_about(folder, runs)))

@@ -59,12 +59,14 @@ class TurnedEntry(Entry):
 class InAttitudesRatesEntry(Entry):
     """What attitudes tell of a gyroscope beside scale and bias.
 
-    `earth_rate_rad_s` is the Earth's rate in the axes of the table, or `earth_rate_error` why it was not found.
+    `earth_rate_rad_s` is the Earth's rate in the axes of the table, with its standard deviations, or `earth_rate_error`
+    why it was not found.
     `followed` where it was found by how far the body turned between attitudes, null where by rates that were exact.
     `beside` are the other methods. `covariance` is that of F row by row, the Earth's rate and c of m = F ω + c.
     """
 
     earth_rate_rad_s: Vector3 | None
+    earth_rate_std_rad_s: Vector3 | None = None
     earth_rate_error: str | None
     followed: FollowedEntry | None
     beside: dict[str, BesideEntry | ErrorEntry]

@@ -3,15 +3,17 @@
 from collections.abc import Collection, Mapping
 from dataclasses import dataclass
 from types import MappingProxyType
-from typing import Annotated, Final, Literal
+from typing import Annotated, Any, Final, Literal
 
 import numpy as np
 from numpy.typing import NDArray
 from pydantic import Field
 
 from rig.config.section import SensorName
-from rig.data.installed_kinds import quantities
-from rig.data.quantity import Quantity
+from rig.data.channel import Channel, sample_dtype
+from rig.data.installed_kinds import measured, quantities
+from rig.data.quantity import TEMPERATURE, Quantity
+from rig.data.recorded_sensor import RecordedSensor
 
 Told = Literal["sweeps", "attitudes"]
 Columns = Mapping[str, NDArray[np.float64]]
@@ -19,7 +21,7 @@ Columns = Mapping[str, NDArray[np.float64]]
 LARGEST_NUMBER = 1e12  # either sign, in any SI unit: what is beyond is a mistake, and its square might overflow
 NOT_STATED: Final = "not stated"
 ItemWord = Annotated[str, Field(pattern="^[ -~]{1,40}$")]  # plain ASCII, as of sensors on a board
-TIME, TEMPERATURE = "time_s", "temperature_c"
+TIME = "time_s"
 
 
 @dataclass(frozen=True, slots=True)
@@ -47,7 +49,7 @@ def samples_header(needed: Collection[Quantity] = ()) -> Header:
     """The columns of readings, of the quantities `needed` and of whatever others."""
     columns = (TIME, *(name for quantity in needed for name in quantity.columns))
     others = (each.columns for each in quantities().values() if each not in needed)
-    return Header(columns, (), (*others, (TEMPERATURE,)))
+    return Header(columns, (), (*others, TEMPERATURE.columns))
 
 
 MOTIONS: Final[Mapping[Told, Header]] = MappingProxyType(
@@ -93,6 +95,34 @@ class ReadElsewhere:
     readings: Columns
     tells: Told
     motion: Columns
+
+    @property
+    def sensor(self) -> RecordedSensor:
+        """The item as a recorded sensor, whose samples hold readings and no counts, on a clock of their own."""
+        given = [each for each in measured().values() if each.columns[0] in self.readings]
+        time_s = self.readings[TIME]
+        span_s = float(np.ptp(time_s)) if len(time_s) else 0.0
+        return RecordedSensor(
+            part=self.item.part,
+            serial_number=self.item.serial_number,
+            rate_hz=(len(time_s) - 1) / span_s if span_s > 0 else 0.0,
+            channels=tuple(Channel(each.name, each.name, "<f8", 1.0) for each in given),
+            clock=self.item.name,
+        )
+
+    @property
+    def samples(self) -> NDArray[Any]:
+        """The readings (n,) as samples of `sensor`, stamped by their file's clock."""
+        time_s = self.readings[TIME]
+        channels = self.sensor.channels
+        samples = np.zeros(len(time_s), sample_dtype(channels))
+        samples["sequence"] = np.arange(len(time_s))
+        samples["board_time_us"] = np.rint(1e6 * (time_s - time_s.min(initial=0.0)))
+        samples["host_time_s"] = time_s
+        for each in channels:
+            columns = [self.readings[name] for name in each.measures.columns]
+            samples[each.column] = np.column_stack(columns) if each.measures.shape else columns[0]
+        return samples
 
 
 @dataclass(frozen=True, slots=True)

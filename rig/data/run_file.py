@@ -57,7 +57,7 @@ class RunData:
     """A run file in memory: `samples` (n,) by name of a sensor, `arm` (n,) ARM_STATE_DTYPE, events in order.
 
     `settings` say what it is judged by; `config` is the configuration's text, for people. Readings from `elsewhere`
-    have neither samples of the rig's own nor an arm.
+    have no arm; their samples are those of a sensor on a clock of its own.
     """
 
     config: str
@@ -208,16 +208,20 @@ def read_run(path: Path, timeout_s: float | None = None) -> RunData:
     contents = _contents(path, timeout_s)
     try:
         checked(_Named, {"sensors": [*contents.described]}, "samples")
+        elsewhere = _elsewhere(contents) if contents.tables else None
         sensors = {name: recorded_sensor(contents.schema, name, each) for name, each in contents.described.items()}
+        samples = {name: _whole_rows(rows) for name, rows in contents.samples.items()}
+        if elsewhere is not None:
+            sensors, samples = {elsewhere.item.name: elsewhere.sensor}, {elsewhere.item.name: elsewhere.samples}
         return RunData(
             config=contents.texts["config"],
             settings=_settings(contents, sensors),
             provenance=checked(Provenance, json.loads(contents.texts["provenance"]), "provenance"),
             sensors=sensors,
-            samples={name: _whole_rows(rows) for name, rows in contents.samples.items()},
+            samples=samples,
             arm=_whole_rows(contents.arm),
             events=tuple(from_lines(contents.events.tobytes())),
-            elsewhere=_elsewhere(contents) if contents.tables else None,
+            elsewhere=elsewhere,
         )
     except (ValueError, RecursionError) as error:
         raise _not_a_run_file(path, str(error)) from None

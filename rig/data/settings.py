@@ -383,9 +383,9 @@ def _overridden(settings: RunSettings, item: str) -> RunSettings:
             f"a recording has no setting {quote(path.strip())} that could be changed",
             f"Set one of {', '.join(_settable())}",
         )
+    if settings.elsewhere is not None and key:
+        raise Refused("unknown_setting", "no threshold and no limit judges readings of files", f"Leave out {section}")
     document = settings.document()
-    if document.get(section, ()) is None:
-        raise Refused("unknown_setting", "readings as CSV come without limits", "Leave out --set limits")
     (document[section] if key else document)[key or section] = value.strip()
     try:
         return checked(RunSettings, document, "settings")

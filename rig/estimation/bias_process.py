@@ -46,7 +46,8 @@ class BiasProcess:
 
     def covariance(self, windows_s: ArrayLike) -> Array:
         """(N, N) covariance that it adds to means over windows (N, 2), about the mean bias over all they span."""
-        found = _added(self.walk_rad_s_sqrt_s**2, self.scatter_rad_s**2, walk_covariance(windows_s))
+        walked = self.walk_rad_s_sqrt_s**2 * walk_covariance(windows_s)
+        found: Array = walked + self.scatter_rad_s**2 * np.eye(len(walked))
         return found if self.instability_rad_s == 0.0 else found + _flicker(self.instability_rad_s, windows_s)
 
     def wandered_rad_s(self, duration_s: float) -> float:
@@ -173,10 +174,8 @@ def _bias_process(
     likelihood = np.zeros(len(squares))
     for axis in range(3):
         own = np.diag(variances[:, axis]) + flicker
-        noise = (own if shared is None else own + shared[axis]) + _added(
-            squares[:, :1, None], squares[:, 1:, None], unit
-        )
-        likelihood += _restricted_likelihood(z, means[:, axis], noise)
+        walking = (own if shared is None else own + shared[axis]) + walks[:, None, None] * unit
+        likelihood += _restricted_likelihood(z, means[:, axis], walking, grid).ravel()
     walk, scatter = chosen(np.sqrt(squares), likelihood).tolist()
     return BiasProcess(walk, scatter, freedom, known)
 
@@ -193,19 +192,17 @@ def _likeliest(sizes: Array, likelihood: Array) -> Array:
     return np.asarray(sizes[np.argmax(likelihood - PRICE * np.count_nonzero(sizes, axis=1))], dtype=np.float64)
 
 
-def _added(walk: Array | float, scatter: Array | float, unit: Array) -> Array:
-    """(…, N, N) covariance for squared rates of the walk and squared scatters, both (…, 1, 1)."""
-    covariance: Array = np.asarray(walk * unit + scatter * np.eye(len(unit)), dtype=np.float64)
-    return covariance
+def _restricted_likelihood(design: Array, means: Array, noise: Array, scatters: Array) -> Array:
+    """(K, L) logarithms, up to a constant, for noise covariances (K, N, N), each with L squared scatters beside it.
 
-
-def _restricted_likelihood(design: Array, means: Array, noise: Array) -> Array:
-    """(K,) logarithms, up to a constant, for noise covariances (K, N, N)."""
-    right = np.broadcast_to(np.column_stack([design, means]), (*noise.shape[:-2], len(means), design.shape[1] + 1))
-    solved = np.linalg.solve(noise, right)
-    inner = np.swapaxes(right, -1, -2) @ solved  # [ZᵀV⁻¹Z, ZᵀV⁻¹m; ·, mᵀV⁻¹m]
+    A scatter adds to every eigenvalue alike, so each covariance is taken apart but once.
+    """
+    values, vectors = np.linalg.eigh(noise)
+    right = np.swapaxes(vectors, -1, -2) @ np.column_stack([design, means])  # (K, N, p + 1)
+    sizes = values[:, None, :] + scatters[:, None]
+    inner = np.swapaxes(right, -1, -2)[:, None] @ (right[:, None] / sizes[..., None])  # [ZᵀV⁻¹Z, ZᵀV⁻¹m; ·, mᵀV⁻¹m]
     parameters, rest = inner[..., :-1, :-1], inner[..., :-1, -1]
     explained = np.sum(rest * np.linalg.solve(parameters, rest[..., None])[..., 0], axis=-1)
-    sizes = np.linalg.slogdet(noise)[1] + np.linalg.slogdet(parameters)[1]
-    likelihood: Array = -0.5 * (sizes + inner[..., -1, -1] - explained)
+    determinants = np.log(sizes).sum(axis=-1) + np.linalg.slogdet(parameters)[1]
+    likelihood: Array = -0.5 * (determinants + inner[..., -1, -1] - explained)
     return likelihood

@@ -55,6 +55,12 @@ class EarthSeen:
     rate_rad_s: Array
     covariance_rad2_s2: Array
 
+    @property
+    def std_rad_s(self) -> Array:
+        """Standard deviations (3,)."""
+        std: Array = np.sqrt(np.diag(self.covariance_rad2_s2))
+        return std
+
 
 @dataclass(frozen=True, slots=True)
 class KnownIncrements:

@@ -41,7 +41,10 @@ class Readings:
     recordings: Sequence[RunData]
 
     def on_arm_clock(self) -> tuple[Array, Array]:
-        """Controller times (n,) in s and readings (n, 3) in rad/s. Raises Fault as `estimate_time_base` does."""
+        """Controller times (n,) in s and readings (n, 3) in rad/s; of readings from files, their file's times.
+
+        Raises Fault as `estimate_time_base` does.
+        """
         return self._on_arm_clock
 
     @cached_property
@@ -49,6 +52,9 @@ class Readings:
         from rig.observation.arm_motion import motion_of
         from rig.observation.average import on_the_arms_clock
 
+        if any(run.elsewhere is not None for run in self.recordings):
+            samples = self.samples
+            return samples["host_time_s"], self.sensor.channel(RATE).values(samples)
         streams = [on_the_arms_clock(run.samples[self.name], self.sensor, motion_of(run)) for run in self.recordings]
         return (
             np.concatenate([stream.time_s for stream in streams]),

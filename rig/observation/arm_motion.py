@@ -11,7 +11,7 @@ from rig.arm.motion import Sweep
 from rig.arm.state import JOINT_NAMES
 from rig.data.run_file import RunData
 from rig.data.settings import ObservationThresholds
-from rig.errors import Fault
+from rig.errors import Fault, Refused
 from rig.estimation.arrays import Array
 from rig.observation.known_motion import check_span, closely_followed, not_finite
 from rig.observation.revolution import MAX_STATE_STEP_S, Revolution, find_revolution
@@ -118,8 +118,19 @@ class ArmMotion:
 
 
 def motion_of(run: RunData) -> ArmMotion:
-    """The arm of a recording. Raises Fault `no_motion`, `not_finite`, `impossible_times`."""
+    """The arm of a recording. Raises as `refuse_elsewhere`; Fault `no_motion`, `not_finite`, `impossible_times`."""
+    refuse_elsewhere(run)
     return ArmMotion(run.arm, run.provenance.kinematics)
+
+
+def refuse_elsewhere(run: RunData) -> None:
+    """Nobody asks readings from elsewhere what an arm did. Raises Refused `recorded_elsewhere`."""
+    if run.elsewhere is not None:
+        raise Refused(
+            "recorded_elsewhere",
+            "no arm turned the sensor: its readings are those of a file, and another file tells the motion",
+            "Give the recording of an arm, or, where readings do, the file itself",
+        )
 
 
 def check_arms_times(states: NDArray[Any]) -> None:

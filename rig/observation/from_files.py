@@ -43,6 +43,7 @@ def recorded_in_files(files: Files, site: Site, asked: Elsewhere, *, second_orde
         for i, name in enumerate(quantity.columns)
     }
     began = files.recorded or datetime.fromtimestamp(files.readings.stat().st_mtime, UTC)
+    read_elsewhere = ReadElsewhere(files.item, columns, files.tells, read(files.motion))
     return RunData(
         config="",
         settings=RunSettings(
@@ -60,11 +61,11 @@ def recorded_in_files(files: Files, site: Site, asked: Elsewhere, *, second_orde
             elsewhere=asked,
         ),
         provenance=provenance_of_files(_named(files.readings), _named(files.motion), files.item, began),
-        sensors={},
-        samples={},
+        sensors={files.item.name: read_elsewhere.sensor},
+        samples={files.item.name: read_elsewhere.samples},
         arm=np.empty(0, ARM_STATE_DTYPE),
         events=(),
-        elsewhere=ReadElsewhere(files.item, columns, files.tells, read(files.motion)),
+        elsewhere=read_elsewhere,
     )
 
 

@@ -9,7 +9,7 @@ from rig.data.quantity import RATE
 from rig.data.run_file import RunData
 from rig.data.settings import ObservationThresholds
 from rig.estimation.arrays import Array
-from rig.observation.arm_motion import ArmMotion, motion_of
+from rig.observation.arm_motion import ArmMotion, motion_of, refuse_elsewhere
 from rig.observation.average import Stream, on_clock
 from rig.observation.observe import SensorObservations, observe_sensor
 from rig.observation.windows import finished_dwells, finished_sweeps
@@ -77,8 +77,10 @@ def observe_run(run: RunData, thresholds: ObservationThresholds, superseded: Col
 def observe_runs(runs: Sequence[RunData]) -> tuple[ObservedRun, ...]:
     """Every recording of one run that adds a finished sweep or dwell; one that several hold counts in the last one.
 
-    The thresholds are those of the first recording. Raises Fault as `observe_run` does.
+    The thresholds are those of the first recording. Raises as `refuse_elsewhere`; Fault as `observe_run` does.
     """
+    for run in runs:
+        refuse_elsewhere(run)
     return tuple(
         observe_run(run, runs[0].settings.observation, _repeated(runs[place + 1 :]))
         for place, run in enumerate(runs)

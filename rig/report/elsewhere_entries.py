@@ -18,8 +18,9 @@ from rig.data.result_types import ErrorEntry, LaidDownEntry
 from rig.data.settings import Site
 from rig.errors import Fault
 from rig.estimation import accelerometer, magnetometer
+from rig.estimation.known_increments import EarthSeen
 from rig.estimation.reference_budget import scale_and_bias_covariance
-from rig.estimation.reference_model import SECOND, F
+from rig.estimation.reference_model import REFERENCE, SECOND, F
 from rig.estimation.residuals import attitude_residual_std
 from rig.estimation.sensor_axes import SensorAxes
 from rig.estimation.triaxial import TriaxialSolution
@@ -86,7 +87,8 @@ def rates_in_attitudes(found: OfSensor) -> InAttitudesRatesEntry | None:
     earth = _earth_rate(found.rates)
     return InAttitudesRatesEntry.model_validate(
         {
-            "earth_rate_rad_s": None if isinstance(earth, Fault) else earth.tolist(),
+            "earth_rate_rad_s": None if isinstance(earth, Fault) else earth.rate_rad_s.tolist(),
+            "earth_rate_std_rad_s": None if isinstance(earth, Fault) else earth.std_rad_s.tolist(),
             "earth_rate_error": str(earth) if isinstance(earth, Fault) else None,
             "followed": _followed(found.rates) if isinstance(found.rates, InIncrements) else None,
             "covariance": found.rates.solution.covariance.tolist(),
@@ -109,12 +111,13 @@ def turned(found: OfSensor) -> TurnedEntry | None:
     )
 
 
-def _earth_rate(found: Result) -> Any:
-    """(3,) rad/s in the axes of the table, or the Fault for which it is not known."""
+def _earth_rate(found: Result) -> EarthSeen | Fault:
+    """The Earth's rate in the axes of the table, or the Fault for which it is not known."""
     if isinstance(found, InIncrements):
-        earth = found.solution.earth
-        return earth if isinstance(earth, Fault) else earth.rate_rad_s
-    return found.solution.reference if found.reference_fault is None else found.reference_fault
+        return found.solution.earth
+    if found.reference_fault is not None:
+        return found.reference_fault
+    return EarthSeen(found.solution.reference, found.solution.covariance[REFERENCE, REFERENCE])
 
 
 def _followed(found: InIncrements) -> FollowedEntry:

@@ -77,7 +77,13 @@ def test_attitudes_are_drawn_and_sweeps_in_the_notebook(kept: tuple[Example, Pat
     example, folder = kept
     for kind in example.kinds.values():
         assert (folder / "run" / f"{kind}_imu.svg").exists() == (kind != "gyroscope")
-    result = rig.solve(rig.load(folder / "run"))
+    run = rig.load(folder / "run")
+    if "rate" in example.kinds:
+        read = np.genfromtxt(EXAMPLES / example.samples, delimiter=",", names=True)
+        time_s, rates = run["imu"].on_arm_clock()
+        np.testing.assert_array_equal(time_s, read["time_s"])
+        np.testing.assert_array_equal(rates[:, 0], read["x_rad_s"])
+    result = rig.solve(run)
     if example.samples == "samples.csv":
         result.plot().save(folder / "residuals.png")
     else:
@@ -129,15 +135,32 @@ def test_it_is_exported_or_refused_by_name(
     status = main(["export", str(folder / "run"), "--format", name, "--out", str(tmp_path / "out")])
     told = name in {"px4", "ardupilot"} or (name != "csv" and "rate" in example.kinds)
     assert status == (0 if told else 2)
-    assert told or "rig: nothing_to_export: " in capsys.readouterr().err
+    why = "recorded_elsewhere" if name == "csv" else "nothing_to_export"
+    assert told or f"rig: {why}: " in capsys.readouterr().err
 
 
-@pytest.mark.parametrize("command", ["allan", "resume"])
-def test_what_needs_an_arm_is_refused_by_name(
-    command: str, kept: tuple[Example, Path], capsys: pytest.CaptureFixture[str]
+@pytest.mark.parametrize(
+    ("command", "error"),
+    [
+        ("watch", "recorded_elsewhere"),
+        ("reversal", "recorded_elsewhere"),
+        ("solve --set observation.max_lost_fraction=0.5", "unknown_setting"),
+        ("resume", "no_run"),
+    ],
+)
+def test_what_needs_an_arm_says_that_there_is_none(
+    command: str, error: str, kept: tuple[Example, Path], capsys: pytest.CaptureFixture[str]
 ) -> None:
-    assert main([command, str(kept[1] / "run")]) in {2, 3}
-    assert capsys.readouterr().err.startswith("rig: no_")
+    name, *options = command.split()
+    assert main([name, str(kept[1] / "run"), *options]) == 2
+    assert capsys.readouterr().err.startswith(f"rig: {error}")
+
+
+def test_how_a_sensor_of_files_drifts_is_read_off_its_own_readings(
+    kept: tuple[Example, Path], capsys: pytest.CaptureFixture[str]
+) -> None:
+    assert main(["allan", str(kept[1] / "run")]) == 2
+    assert capsys.readouterr().err.startswith("rig: not_at_rest: ")
 
 
 def sweeps(*more: str) -> list[str]:

@@ -137,6 +137,8 @@ def _beside(sensor: SensorEntry) -> Iterator[str]:
 def _turned(sensor: SensorEntry) -> Iterator[str]:
     """How sweeps of a file were read, and what was taken as known of them."""
     if (found := sensor.turned) is None:
+        if sensor.range_rad_s is None and sensor.in_attitudes is None:
+            yield "the axes of the sweeps are taken as given: an error of theirs is an error of F across its rows"
         return
     rows, sweeps = ", ".join(map(str, found.rows)), len(sensor.observations)
     yield f"by the angle turned from rest to rest: {len(found.rows)} of {sweeps} sweeps (rows {rows})"
@@ -157,10 +159,11 @@ def _in_attitudes(found: InAttitudesRatesEntry | None, clocks: Iterable[TimeBase
             f"the samples' clock on the table's: {clock.offset_s:+.4f} s (± {2e3 * clock.offset_std_s:.2g} ms), "
             f"{1e6 * clock.drift:+.1f} ppm (± {2e6 * clock.drift_std:.2g}) at {clock.reference_board_s:.1f} s of theirs"
         )
-    if found.earth_rate_rad_s is None:
+    if found.earth_rate_rad_s is None or found.earth_rate_std_rad_s is None:
         yield f"Earth's rate: {found.earth_rate_error}; its size, whichever way it points, is in the uncertainty"
     else:
-        yield f"Earth's rate in table coordinates: {triple(found.earth_rate_rad_s, '+.6g')} rad/s"
+        rate, known = triple(found.earth_rate_rad_s, "+.3e"), 2 * max(found.earth_rate_std_rad_s)
+        yield f"Earth's rate in table coordinates: {rate} rad/s (± {known:.1e}, k = 2)"
     if (way := found.followed) is not None:
         yield (
             f"increments: {way.increments} between attitudes, means over windows of {way.window_s:.3g} s; residuals "
