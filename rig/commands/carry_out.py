@@ -8,10 +8,10 @@ from rig.commands.claims import claimed
 from rig.commands.configured import Configured
 from rig.commands.laboratory import simulated_laboratory
 from rig.commands.page_arguments import PageWish, operators_page
-from rig.commands.remember import print_beside, remember
+from rig.commands.remember import remember, since_lines
+from rig.commands.show import print_ending
 from rig.data.run_folder import CONFIG, WORLD_LATE
 from rig.report.document import document_of
-from rig.report.table import print_outcome
 from rig.runner.phases import Run
 from rig.station.confirm import ask_operator
 from rig.station.events import NotRemembered, RunFolderWritten
@@ -45,9 +45,11 @@ def carry_out(folder: Path, configured: Configured, *, assume_yes: bool, as_json
             if entered is not None:
                 station.event(entered)
             station.event(RunFolderWritten(folder))
-        print_outcome(document_of(outcome), as_json=as_json)
-        if not as_json:
-            print_beside(beside)
+        result = document_of(outcome)
+        if as_json:
+            print(result.text())
+        else:
+            print_ending(folder, result, since_lines(beside))
         shown.stay()
     return 0 if outcome.passed else 1
 

@@ -90,19 +90,25 @@ def remember_certificate(folder: Path, result: str, certificate: "Issued", histo
     return f"{where.label} does not know this run; rig history import {folder} enters it{there}"
 
 
-def print_beside(calibrations: Sequence[Beside]) -> None:
-    """Print on stdout, for people, how calibrations lie beside those of before."""
-    if not calibrations:
-        return
-    from rich.console import Console
-
-    from rig.history.tables import changes_table, title_of
-
-    console = Console(highlight=False)
-    for each in calibrations:
-        day = each.before.started_utc[:10]
-        title = f"{title_of(each.now.subject)}: beside the last calibration, number {each.before.id} of {day}"
-        console.print(changes_table(title, each.changes))
+def since_lines(calibrations: Sequence[Beside]) -> tuple[str, ...]:
+    """How calibrations lie beside those of before, in words: each that changed beyond U, then the others together."""
+    changed = [each for each in calibrations if any(change.beyond for change in each.changes)]
+    several = len(calibrations) > 1
+    same = [each for each in calibrations if each not in changed]
+    lines = []
+    for each in changed:
+        beyond = [change for change in each.changes if change.beyond]
+        names = ", ".join(change.name for change in beyond)
+        largest = max(change.normalised_error for change in beyond)
+        since = f"since calibration {each.before.id} of {each.before.started_utc[:10]}"
+        of = "" if each.now.quantity == "rate" else f", {each.now.quantity}"
+        whose = f"{each.now.serial_number}{of}: " if several else ""
+        lines.append(f"{whose}{since} changed beyond U: {names} (E_n {largest:.1f})")
+    if same:
+        before = ", ".join(str(each.before.id) for each in same)
+        whose = "" if not changed else " of the other sensors"
+        lines.append(f"nothing changed beyond U since the last calibration{whose} (number {before} of the history)")
+    return tuple(lines)
 
 
 def _entered(where: "Place", run: "Finished") -> "tuple[int, tuple[Beside, ...]]":

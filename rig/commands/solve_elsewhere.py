@@ -73,7 +73,8 @@ def run(options: Namespace) -> int:
     `recorded_in_files`, and whatever the solve finds wrong.
     """
     from rig.analysis.outcome import calibrated
-    from rig.commands.remember import print_beside
+    from rig.commands.remember import since_lines
+    from rig.commands.show import print_ending
     from rig.report.document import document_of
     from rig.report.table import print_outcome
 
@@ -83,9 +84,11 @@ def run(options: Namespace) -> int:
         recording = _recording(options)
         outcome = calibrated([recording])
     beside = () if options.out is None else _kept(options, recording, outcome)
-    print_outcome(document_of(outcome), as_json=options.json)
-    if not options.json:
-        print_beside(beside)
+    result = document_of(outcome)
+    if options.json or options.out is None:
+        print_outcome(result, as_json=options.json)
+    else:
+        print_ending(options.out, result, since_lines(beside))
     return 0 if outcome.passed else 1
 
 

@@ -203,7 +203,8 @@ def test_a_run_enters_itself_and_is_held_against_the_last(place: str, capsys: py
     done = subprocess.run(list(map(str, command)), capture_output=True, text=True, timeout=200, check=False)
     assert done.returncode == 0, done.stderr
     printed = " ".join(done.stdout.split())
-    assert "beside the last calibration, number 1 of " in printed and "beyond U" in printed
+    assert "since calibration 1 of " in printed and "changed beyond U: " in printed
+    assert done.stdout.splitlines()[-1].startswith("verdict: ")
     log = (folder / "run" / "log.txt").read_text(encoding="utf-8")
     assert f"entered in {place} as run 2; changed beyond U: LSM9DS1-CI" in log
     assert "0 entered, 1 there already" in told(capsys, "import", folder / "run")

@@ -63,13 +63,14 @@ Finished = tuple[Path, dict[str, Any], dict[str, Any], str]
 
 
 def finished(folder: Path, procedure: dict[str, Any]) -> Finished:
-    """The run folder, result.json, the truth of the part, and what was printed."""
+    """The run folder, result.json, the truth of the part, and everything `rig show` prints."""
     config = configuration(folder, LABORATORY, procedure)
     out = folder / "run"
     done = rig("run", config, "--out", out)
     assert done.returncode == 0, done.stdout + done.stderr
     world = yaml.safe_load(config.read_text(encoding="utf-8"))["world"]["sensors"]["gyro"]
-    return out, json.loads((out / "result.json").read_text(encoding="utf-8")), world, done.stdout
+    shown = rig_here("show", out, "--all").stdout
+    return out, json.loads((out / "result.json").read_text(encoding="utf-8")), world, shown
 
 
 @pytest.fixture(scope="module")

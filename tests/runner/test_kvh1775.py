@@ -186,7 +186,8 @@ def earth_run(folder: Path, changes: dict[str, Any]) -> dict[str, Any]:
     path.write_text(yaml.safe_dump(document), encoding="utf-8")
     done = rig("run", path, "--out", folder / "run", timeout_s=800)
     assert done.returncode == 0, done.stderr + done.stdout
-    assert "Earth's rate found: 1" in done.stdout
+    assert "the Earth's rate in the arm's base, °/h" in done.stdout
+    assert "Earth's rate found: 1" in rig("show", folder / "run", "--all").stdout
     assert (folder / "run" / "earth_rate_kvh.png").stat().st_size > 10_000
     result: dict[str, Any] = json.loads((folder / "run" / "result.json").read_text(encoding="utf-8"))
     return result

@@ -66,14 +66,15 @@ pytestmark = [pytest.mark.slow, pytest.mark.timeout(300)]
 
 @pytest.fixture(scope="module")
 def finished(tmp_path_factory: pytest.TempPathFactory) -> tuple[Path, dict[str, Any], str]:
-    """The run folder, result.json, and what was printed on a wide terminal."""
+    """The run folder, result.json, and everything that `rig show` prints on a wide terminal."""
     folder = tmp_path_factory.mktemp("compass")
     out = folder / "run"
     with pytest.MonkeyPatch.context() as wide:
         wide.setenv("COLUMNS", "200")
         done = rig("run", configuration(folder, LABORATORY, ATTITUDES), "--out", out)
+        shown = rig_here("show", out, "--all").stdout
     assert done.returncode == 0, done.stdout + done.stderr
-    return out, json.loads((out / "result.json").read_text(encoding="utf-8")), done.stdout
+    return out, json.loads((out / "result.json").read_text(encoding="utf-8")), shown
 
 
 def recorded(out: Path) -> RunData:

@@ -8,10 +8,11 @@ from rich.table import Table
 from rig.analysis.outcome import Outcome
 from rig.analysis.when import of_gyroscope
 from rig.data.attitude_entries import InAttitudesRatesEntry
+from rig.data.budget_entries import expanded_uncertainties
 from rig.data.quantity import RATE
-from rig.data.result_file import BoardEntry, ResultDocument, SensorEntry, TimeBaseEntry, VectorEntry
+from rig.data.result_file import BoardEntry, EstimateEntry, ResultDocument, SensorEntry, TimeBaseEntry, VectorEntry
 from rig.data.result_types import ErrorEntry, Role
-from rig.report.axes import decimals, matrix_lines, skew_known, triple
+from rig.report.axes import PARAMETERS, decimals, matrix_lines, skew_known, triple
 from rig.report.c_functions import gyroscope_lines
 from rig.report.certificate import dcc_results
 from rig.report.earth_rate import earth_rate_lines
@@ -122,6 +123,7 @@ def _beside(sensor: SensorEntry) -> Iterator[str]:
             yield f"{name}: {other.error}"
         elif other.estimator != sensor.estimator:
             yield f"{name}: k {triple(other.scale, scale)}, b {triple(other.bias_rad_s, bias)} rad/s"
+            yield from _differs(sensor, other)
     if sensor.board is not None:
         yield from _on_the_board(sensor.board)
     if not isinstance(vector, ErrorEntry):
@@ -132,6 +134,19 @@ def _beside(sensor: SensorEntry) -> Iterator[str]:
             skew = triple(np.degrees(vector.non_orthogonality_rad), "+.3f")
             yield f"non-orthogonality yz zx xy: {skew} ° (± {skew_known(vector)})"
         yield from (f"warning: {warning}" for warning in vector.warnings)
+
+
+def _differs(sensor: SensorEntry, other: EstimateEntry | VectorEntry) -> Iterator[str]:
+    """Which of two estimators to believe, where they differ by more than U."""
+    expanded = expanded_uncertainties(sensor.budget, sensor.covariance)
+    values, others = ((*each.scale, *each.bias_rad_s) for each in (sensor, other))
+    off = np.abs(np.subtract(others, values)) / np.array(expanded)
+    worst = int(np.argmax(off))
+    if off[worst] > 1 and sensor.estimator == "vector":
+        yield (
+            f"  {PARAMETERS[worst]} differs by {off[worst]:.1f} U: believe the values of the table; this method knows "
+            "the speed alone, and leaves out gravity, the Earth's rate and how the axes lie"
+        )
 
 
 def _turned(sensor: SensorEntry) -> Iterator[str]:

@@ -1,0 +1,66 @@
+"""`rig explain`: what a check, an error or a limit is, and where to look."""
+
+from argparse import ArgumentParser, Namespace
+from collections.abc import Iterator
+from difflib import get_close_matches
+
+from rig.errors import Refused
+from rig.errors.quoting import shorten
+from rig.station.plain_text import say
+
+
+def add(parser: ArgumentParser) -> None:
+    """The arguments of `rig explain`."""
+    parser.add_argument("name", metavar="NAME", help="a check (gyro.scale_changed), an error (wrong_axis) or a limit")
+
+
+def run(options: Namespace) -> int:
+    """Print what the name means. Returns 0. Raises Refused `nothing_known`."""
+    name: str = options.name.strip()
+    lines = [*_check(name), *_limit(name), *_error(name)]
+    if not lines:
+        alike = get_close_matches(name, _names(), cutoff=0.5)
+        known = f"Did you mean {' or '.join(alike)}?" if alike else "Give a name as it was printed"
+        raise Refused("nothing_known", f"there is no check, error or limit called {shorten(name)}", known)
+    for line in lines:
+        say(line)
+    return 0
+
+
+def _check(name: str) -> Iterator[str]:
+    from rig.report.check_words import words_of_name
+
+    if (words := words_of_name(name)) is not None:
+        yield f"{words.name}: a check of the verdict. It fails when {words.means}."
+        yield f"What to do: {words.remedy.replace('`', '')}"
+        yield "More: docs/checks.md, docs/method.md"
+
+
+def _limit(name: str) -> Iterator[str]:
+    from rig.config.limits import LIMITS, Limits
+
+    key = name.removeprefix("limits.")
+    if key in LIMITS:
+        row = LIMITS[key]
+        of = "a property of the sensor" if row.kind == "conformity" else "how good the measurement is"
+        unit = "" if row.unit == "1" else f", in {row.unit}"
+        yield f"limits.{key}: a limit that holds {of}: {Limits.model_fields[key].description}{unit}."
+        yield "More: docs/configuration.md"
+
+
+def _error(name: str) -> Iterator[str]:
+    from rig.errors.catalogue import catalogue
+
+    for entry in catalogue():
+        if entry.name == name:
+            yield f"{entry.name}: an error. It occurs when {entry.when}."
+            yield f"What to do: {entry.remedy}."
+            yield "More: docs/errors.md"
+
+
+def _names() -> list[str]:
+    from rig.config.limits import LIMITS
+    from rig.errors.catalogue import catalogue
+    from rig.report.check_words import check_words
+
+    return [*check_words(), *LIMITS, *(entry.name for entry in catalogue())]

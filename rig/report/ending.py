@@ -1,0 +1,200 @@
+"""What a run amounts to, in few lines: each sensor's values ± U, what failed or nearly did, where the rest is. Pure."""
+
+import shlex
+import textwrap
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+from rig.data.result_file import CheckEntry, ResultDocument, SensorEntry
+from rig.report.check_words import what_failed, words_of
+from rig.report.kinds.kind import Shown, Three, Without
+from rig.report.kinds.registry import kinds
+from rig.report.rounding import rounded
+from rig.report.validity_words import speed_words
+
+NEAR = 0.9  # of its limit, from where on a check that passed is named
+MOST_NEAR = 2
+ONE_SENSOR, MANY = 12, 25  # lines at most, of one sensor and of six
+INDENT = "  "
+UNBROKEN = "\N{NO-BREAK SPACE}"
+
+
+@dataclass(frozen=True, slots=True)
+class _Item:
+    """What was calibrated, what it is called, and its values."""
+
+    kind: str
+    label: str
+    entry: Any
+    shown: Shown
+
+
+def ending(
+    result: ResultDocument, *, folder: Path | None, certificate: Path | None, since: Sequence[str], width: int
+) -> Iterator[str]:
+    """The lines of the end of a run, the verdict last; none is longer than `width`, but for paths and commands.
+
+    `since` says how it compares with the last calibrations; `folder` is where everything else is, if that is kept.
+    """
+    items = [*_items(result)]
+    values = [*(_one(items[0], width) if len(items) == 1 else _several(items, width))]
+    unsolved = [line for kind in kinds() for line in kind.unsolved(result)]
+    said = [*unsolved, *_near(result), *since]
+    summary = _wrapped("; ".join([*_what_the_values_are(items), _passed(result)]), width)
+    below = [*summary, *(line for each in said for line in _wrapped(each, width))]
+    if certificate is not None:
+        below.append(f"certificate: {certificate}")
+    if folder is not None:
+        below.append(f"everything: rig show {shlex.quote(str(folder))}")
+    yield from values
+    yield from _failed(result, folder, width, (ONE_SENSOR if len(items) == 1 else MANY) - len(values) - len(below) - 1)
+    yield from below
+    yield f"verdict: {result.verdict.upper()}"
+
+
+def _items(result: ResultDocument) -> Iterator[_Item]:
+    """What has values of its own: a reference is known already."""
+    for kind in kinds():
+        for found in kind.found(result):
+            entry: Any = found.entry
+            if isinstance(kind.shown, Without) or getattr(entry, "role", None) == "reference":
+                continue
+            serial = getattr(entry, "serial_number", None)
+            label = found.sensor if serial is None else f"{found.sensor} {serial}"
+            yield _Item(kind.name, label, entry, kind.shown(found))
+
+
+def _one(item: _Item, width: int) -> Iterator[str]:
+    """One sensor's values, an axis a line."""
+    shown, part = item.shown, getattr(item.entry, "part", None)
+    columns = [[_heading(item), *_plus_minus(shown.numbers)]]
+    if shown.scale is not None:
+        columns.insert(0, ["scale factor", *_plus_minus(shown.scale)])
+    widths = [max(map(len, column)) for column in columns]
+    heading, *axes = (
+        "".join(f"   {cell:>{size}}" for cell, size in zip(cells, widths, strict=True))
+        for cells in zip(*columns, strict=True)
+    )
+    title = f"{item.kind} {item.label}" + ("" if part is None else f", {part}")
+    first = len(title) if len(title) + len(heading) <= width else len(INDENT) + 1
+    yield from [f"{title}{heading}"] if first == len(title) else [title, f"{'':{first}}{heading}"]
+    for axis, cells in zip("xyz", axes, strict=False):
+        yield f"{INDENT}{axis:{first - len(INDENT)}}{cells}"
+
+
+def _several(items: Sequence[_Item], width: int) -> Iterator[str]:
+    """Many sensors' values, kind by kind, a line each; two where the screen is narrow."""
+    blocks: dict[str, list[tuple[str, Three]]] = {}
+    for item in items:
+        scaled = item.shown.scale is not None
+        if item.shown.scale is not None:
+            blocks.setdefault(f"{item.kind}, scale factor", []).append((item.label, item.shown.scale))
+        heading = f"{item.kind}, {_heading(item)}" if scaled else _heading(item)
+        blocks.setdefault(heading, []).append((item.label, item.shown.numbers))
+    table: list[tuple[str, Sequence[str]]] = []
+    for heading, rows in blocks.items():
+        table.append((heading, [*"xyz"[: len(rows[0][1].values)], "± U"]))
+        table += [(f"{INDENT}{label}", _with_largest(three)) for label, three in rows]
+    name = max(len(label) for label, _ in table)
+    number = max(len(cell) for _, cells in table for cell in cells)
+    columns = max(len(cells) for _, cells in table)
+    gap = next((gap for gap in (3, 2, 1) if name + (number + gap) * columns <= width), 2)
+    number += gap
+    wide = name + number * columns <= width
+    for label, cells in table:
+        numbers = "".join(f"{cell:>{number}}" for cell in cells)
+        yield from [f"{label:{name}}{numbers}"] if wide else [label, f"{INDENT}{numbers}"]
+
+
+def _heading(item: _Item) -> str:
+    """What the numbers beside the scale factors are, with their unit."""
+    if item.shown.scale is not None:
+        return f"bias, {item.shown.unit.name}"
+    return f"{item.shown.name.partition(': ')[2] or item.kind}, {item.shown.unit.name}"
+
+
+def _plus_minus(three: Three) -> list[str]:
+    return [_text(value, u) for value, u in zip(three.values, three.expanded, strict=True)]
+
+
+def _text(value: float, expanded: float) -> str:
+    if not expanded > 0:
+        return f"{value:.6g}"
+    found = rounded(value, expanded)
+    return f"{found.value:f} ± {found.uncertainty:f}"
+
+
+def _with_largest(three: Three) -> list[str]:
+    """The values, and the largest of their U."""
+    largest = max(three.expanded)
+    if not largest > 0:
+        return [*(f"{value:.6g}" for value in three.values), "0"]
+    found = [rounded(value, largest) for value in three.values]
+    return [*(f"{each.value:f}" for each in found), f"{found[0].uncertainty:f}"]
+
+
+def _what_the_values_are(items: Sequence[_Item]) -> Iterator[str]:
+    if not items:
+        return
+    combined = all(item.shown.combined for item in items)
+    yield "± U, about 95 %" if combined else "± two standard deviations of the noise alone"
+    gyroscopes = [item.entry for item in items if isinstance(item.entry, SensorEntry)]
+    speeds = {speeds for each in gyroscopes if (speeds := speed_words(each))}
+    if len(speeds) == 1:
+        yield f"{'gyroscopes ' if len(items) > 1 else ''}at {speeds.pop()} °/s"
+    if len(items) == 1 and gyroscopes:
+        yield gyroscopes[0].model
+
+
+def _passed(result: ResultDocument) -> str:
+    passed = sum(each.passed for each in result.checks)
+    return f"{passed} of {len(result.checks)} checks passed"
+
+
+def _failed(result: ResultDocument, folder: Path | None, width: int, room: int) -> Iterator[str]:
+    """What failed, farthest beyond its limit first, with what to do: one in any case, more while there is room."""
+    failed = sorted((each for each in result.checks if not each.passed), key=_over, reverse=True)
+    for number, check in enumerate(failed):
+        words = what_failed(check, folder)
+        lines = [*_wrapped(f"FAILED {_measured(check)}" + ("" if words is None else f": {words}"), width)]
+        more = number < len(failed) - 1
+        if number > 0 and len(lines) + more > room:
+            run = "RUN" if folder is None else shlex.quote(str(folder))
+            yield f"and {len(failed) - number} more checks failed: rig show {run} --checks"
+            return
+        yield from lines
+        room -= len(lines)
+
+
+def _near(result: ResultDocument) -> Iterator[str]:
+    """What passed, and came near its limit."""
+    near = sorted((each for each in result.checks if each.passed and _over(each) >= NEAR), key=_over, reverse=True)
+    for check in near[:MOST_NEAR]:
+        words = words_of(check)
+        yield f"near its limit: {_measured(check)}" + ("" if words is None else f" (beyond it: {words.means})")
+
+
+def _measured(check: CheckEntry) -> str:
+    unit = "" if check.unit == "1" else f" {check.unit}"
+    value = "not measured" if check.value is None else f"{check.value:.3g}{unit}"
+    return f"{check.name}: {value}, " + (
+        "no limit is set" if check.limit is None else f"allowed {check.limit:.3g}{unit}"
+    )
+
+
+def _over(check: CheckEntry) -> float:
+    """The value over what its limit leaves; infinite where there is nothing to divide."""
+    if check.value is None or check.limit is None:
+        return float("inf")
+    if check.value == 0:
+        return 0.0
+    return check.value / check.limit if check.limit > 0 else float("inf")
+
+
+def _wrapped(text: str, width: int) -> Iterator[str]:
+    """The text in lines; a command, which stands between backticks, is not broken."""
+    whole = "".join(part.replace(" ", UNBROKEN) if i % 2 else part for i, part in enumerate(text.split("`")))
+    for line in textwrap.wrap(whole, width, subsequent_indent=INDENT, break_long_words=False, break_on_hyphens=False):
+        yield line.replace(UNBROKEN, " ")

@@ -1,0 +1,160 @@
+"""The end of a run fits a screen, says what matters in words, and its last line is the verdict."""
+
+from pathlib import Path
+
+import pytest
+
+from rig.cli import main
+from rig.data.result_file import CheckEntry, ResultDocument, read_result
+from rig.report.check_words import check_words, words_of
+from rig.report.checks_page import page
+from rig.report.ending import ending
+from support.paths import DOCS, FIXTURES
+
+FROZEN = sorted(path.parent for path in (FIXTURES.parent / "recordings").glob("*/*/result.json"))
+RUN = Path("runs/2026-11-25T10-00-00Z-imu")
+SINCE = ("since calibration 1 of 2026-11-23 changed beyond U: kx, ky (E_n 2.4)", "else nothing changed beyond U")
+COPYABLE = ("certificate: ", "everything: ")
+
+
+def ended(result: ResultDocument, width: int = 80) -> list[str]:
+    since = SINCE if len(result.sensors) > 2 else SINCE[:1]
+    return [*ending(result, folder=RUN, certificate=RUN / "certificate.html", since=since, width=width)]
+
+
+def of_three_parts() -> ResultDocument:
+    """Three gyroscopes and three accelerometers, with every check of each."""
+    one = read_result(FIXTURES.parent / "recordings" / "rig.settings-7" / "imu")
+    names = ("lsm9ds1", "mpu9250", "adis16465")
+    checks = [
+        check.model_copy(update={"sensor": name, "name": check.name.replace("gyro.", f"{name}.")})
+        for name in names
+        for check in one.checks
+    ]
+    serials = {name: {"serial_number": f"{name.upper()}-001"} for name in names}
+    return one.model_copy(
+        update={
+            "checks": tuple(checks),
+            "sensors": {name: one.sensors["gyro"].model_copy(update=serial) for name, serial in serials.items()},
+            "accelerometers": {
+                name: one.accelerometers["gyro"].model_copy(update=serial) for name, serial in serials.items()
+            },
+        }
+    )
+
+
+def failed(result: ResultDocument, *names: str) -> ResultDocument:
+    """The result with checks of these names far beyond their limits."""
+    checks = [
+        each.model_copy(update={"passed": False, "value": 3 * (each.limit or 1)}) if each.name in names else each
+        for each in result.checks
+    ]
+    return result.model_copy(update={"checks": tuple(checks), "verdict": "fail"})
+
+
+ONE = read_result(FIXTURES.parent / "recordings" / "rig.settings-6" / "verified")
+ALL = [check.name for check in of_three_parts().checks]
+
+
+@pytest.mark.parametrize("result", [ONE, failed(ONE, "gyro.scale_deviation")], ids=["passed", "failed"])
+def test_one_sensor_ends_in_twelve_lines(result: ResultDocument) -> None:
+    assert len(ended(result)) <= 12
+
+
+@pytest.mark.parametrize("names", [[], ALL[:1], ALL[:40]], ids=["passed", "one failed", "forty failed"])
+def test_six_sensors_end_in_a_screen(names: list[str]) -> None:
+    lines = ended(failed(of_three_parts(), *names))
+    assert len(lines) <= 25 and any("more checks failed: rig show" in line or len(names) < 2 for line in lines)
+
+
+@pytest.mark.parametrize("width", [60, 80, 120])
+@pytest.mark.parametrize("folder", FROZEN, ids=lambda folder: f"{folder.parent.name}-{folder.name}")
+def test_every_result_fits_the_width_and_ends_with_its_verdict(folder: Path, width: int) -> None:
+    result = read_result(folder)
+    for lines in (ended(result, width), ended(failed(result, *(each.name for each in result.checks)), width)):
+        assert max(len(line) for line in lines if not line.startswith(COPYABLE) and "rig " not in line) <= width
+        assert lines[-1] in {"verdict: PASS", "verdict: FAIL"}
+        assert f"everything: rig show {RUN}" in lines
+        assert not any("verdict" in line for line in lines[:-1])
+
+
+def test_what_failed_is_said_in_words_with_a_command_that_can_be_copied() -> None:
+    text = " ".join(" ".join(ended(failed(ONE, "gyro.scale_deviation"))).split())
+    assert "FAILED gyro.scale_deviation: 0.9, allowed 0.3" in text
+    assert f"rig solve {RUN} --set limits.scale_deviation=VALUE" in text
+    text = " ".join(" ".join(ended(failed(ONE, "gyro.disturbed_sweep"))).split())
+    assert "one sweep contradicts the others" in text and f"rig resume {RUN}" in text
+
+
+def test_what_came_near_its_limit_is_named() -> None:
+    checks = [
+        each.model_copy(update={"value": 0.95 * each.limit}) if each.name == "gyro.bias" and each.limit else each
+        for each in ONE.checks
+    ]
+    text = " ".join(ended(ONE.model_copy(update={"checks": tuple(checks)})))
+    assert "near its limit: gyro.bias" in text
+
+
+def test_a_reference_is_no_result_of_the_run() -> None:
+    text = "\n".join(ended(read_result(FIXTURES / "verified")))
+    assert "reference" not in text.partition("checks passed")[0]
+
+
+@pytest.mark.parametrize("folder", FROZEN, ids=lambda folder: f"{folder.parent.name}-{folder.name}")
+def test_every_check_is_explained(folder: Path) -> None:
+    assert [each.name for each in read_result(folder).checks if words_of(each) is None] == []
+
+
+def test_the_page_of_checks_is_made_of_the_table() -> None:
+    assert (DOCS / "checks.md").read_text(encoding="utf-8") == page()
+    assert list(check_words()) == sorted(check_words())
+
+
+@pytest.mark.parametrize(
+    ("name", "said"),
+    [
+        ("gyro.acceleration_scale_changed", "the scale factors changed as the run went on"),
+        ("gyro.disturbed_sweep.3", "rig resume RUN"),
+        ("clocks_agree.controller_and_crystal", "two clocks differ"),
+        ("wrong_axis", "an error"),
+        ("limits.bias_rad_s", "magnitude of a bias, in rad/s"),
+    ],
+)
+def test_a_name_is_explained(name: str, said: str, capsys: pytest.CaptureFixture[str]) -> None:
+    assert main(["explain", name]) == 0
+    assert said in capsys.readouterr().out
+
+
+def test_a_name_that_nobody_knows_is_answered_with_those_like_it(capsys: pytest.CaptureFixture[str]) -> None:
+    assert main(["explain", "scle_changed"]) == 2
+    assert "Did you mean scale_changed" in capsys.readouterr().err
+
+
+def shown(capsys: pytest.CaptureFixture[str], *options: str) -> str:
+    assert main(["show", str(FIXTURES / "verified"), *options]) == 0
+    return capsys.readouterr().out
+
+
+def test_a_finished_run_is_shown_as_it_ended_or_in_full(capsys: pytest.CaptureFixture[str]) -> None:
+    short, budget, checks = (shown(capsys, *each) for each in ([], ["--budget"], ["--checks"]))
+    assert short.splitlines()[0].startswith("gyroscope gyro ") and len(short.splitlines()) <= 12
+    assert "non-orthogonality" in budget and "checks of gyro" not in budget
+    assert "checks of gyro" in checks and "non-orthogonality yz" not in checks
+    assert shown(capsys, "--all").count("\n") > budget.count("\n") + checks.count("\n") - 4
+    assert all(each.splitlines()[-1] == "verdict: PASS" for each in (short, budget, checks))
+    assert "reference (known)" in budget and "reference (known)" not in shown(capsys, "--sensor", "gyro")
+    assert main(["show", str(FIXTURES / "verified"), "--sensor", "nobody"]) == 2
+    assert "Choose one of: gyro, reference" in capsys.readouterr().err
+
+
+def test_checks_that_failed_stand_first_and_rounding_is_not_printed(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    rounding = CheckEntry(name="gyro.board_scale", value=3.6e-20, limit=1e-4, unit="1", passed=True, sensor="gyro")
+    broken = CheckEntry(name="gyro.spikes", value=9.5, limit=8.0, unit="1", passed=False, sensor="gyro")
+    result = ONE.model_copy(update={"checks": (rounding, broken), "verdict": "fail"})
+    (tmp_path / "result.json").write_text(result.text(), encoding="utf-8")
+    assert main(["show", str(tmp_path), "--checks"]) == 0
+    rows = capsys.readouterr().out.splitlines()
+    at = {name: next(i for i, row in enumerate(rows) if name in row) for name in ("spikes", "board_scale")}
+    assert at["spikes"] < at["board_scale"] and "e-20" not in "".join(rows)
