@@ -41,7 +41,8 @@ def ending(
     items = [*_items(result)]
     values = [*(_one(items[0], width) if len(items) == 1 else _several(items, width))]
     unsolved = [line for kind in kinds() for line in kind.unsolved(result)]
-    said = [*unsolved, *_near(result), *since]
+    in_short = [line for kind in kinds() for found in kind.found(result) for line in kind.in_short(found)]
+    said = [*in_short, *unsolved, *_near(result), *since]
     summary = _wrapped("; ".join([*_what_the_values_are(items), _passed(result)]), width)
     below = [*summary, *(line for each in said for line in _wrapped(each, width))]
     if certificate is not None:

@@ -56,7 +56,15 @@ ONE = read_result(FIXTURES.parent / "recordings" / "rig.settings-6" / "verified"
 ALL = [check.name for check in of_three_parts().checks]
 
 
-@pytest.mark.parametrize("result", [ONE, failed(ONE, "gyro.scale_deviation")], ids=["passed", "failed"])
+@pytest.mark.parametrize(
+    "result",
+    [
+        ONE,
+        failed(ONE, "gyro.verification_rms"),
+        failed(ONE.model_copy(update={"verification": {}}), "gyro.scale_deviation"),  # what failed is not verified
+    ],
+    ids=["passed", "verification failed", "calibration failed"],
+)
 def test_one_sensor_ends_in_twelve_lines(result: ResultDocument) -> None:
     assert len(ended(result)) <= 12
 
@@ -98,6 +106,7 @@ def test_what_came_near_its_limit_is_named() -> None:
 def test_a_reference_is_no_result_of_the_run() -> None:
     text = "\n".join(ended(read_result(FIXTURES / "verified")))
     assert "reference" not in text.partition("checks passed")[0]
+    assert "gyro against reference: RMS at most 0." in text and " rad/s before, 0." in text
 
 
 @pytest.mark.parametrize("folder", FROZEN, ids=lambda folder: f"{folder.parent.name}-{folder.name}")

@@ -83,6 +83,7 @@ class ResultKind(Generic[EntryT]):
     - `name` is what people call it; `key` is its place in `result.json`, and `entries` makes what stands there: nothing
       where a run has none. `found` finds it there again.
     - `printed` makes what the terminal shows of one: tables and lines; `unsolved` says of all why they were not found.
+      `in_short` is what a run ends with of one that has no row.
     - `shown` makes the row of the page and of the notebook, `followed` what a history keeps.
     - `figures` names the writer of its pictures in a run folder (`module:function`), `header` makes the lines of
       `calibration.h`, by the g-sensitivities (3, 3) of the gyroscopes that have one.
@@ -104,6 +105,7 @@ class ResultKind(Generic[EntryT]):
     measured: Callable[[Found[EntryT], Mapping[str, ReversalEntry]], Measured | None] | Without
     templates: Path = OWN_TEMPLATES
     unsolved: Callable[[ResultDocument], Iterable[str]] = lambda _: ()
+    in_short: Callable[[Found[EntryT]], Iterable[str]] = lambda _: ()
 
 
 def said(outlet: Callable[..., Iterable[SaidT]] | Without, *about: object) -> Iterable[SaidT]:

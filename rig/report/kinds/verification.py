@@ -26,6 +26,12 @@ def _printed(found: Found[VerificationEntry]) -> Iterator[Table | str]:
     yield from verification_lines(found.entry)
 
 
+def _in_short(found: Found[VerificationEntry]) -> Iterator[str]:
+    before, after = found.entry.before, max(found.entry.after.movement.rms_rad_s)
+    until = "" if before is None else f"{max(before.movement.rms_rad_s):.4f} rad/s before, "
+    yield f"{found.sensor} against {found.entry.reference}: RMS at most {until}{after:.4f} rad/s after"
+
+
 def _measured(found: Found[VerificationEntry], _: object) -> Measured:
     name, results = f"verification of gyroscope {found.sensor}", dcc_results.verification(found.entry)
     return Measured("gyroscope", found.sensor, None, None, name, results)
@@ -44,4 +50,5 @@ VERIFICATION = ResultKind(
     figures="rig.report.figures:write_figures",
     block=Without("it stands in the block of its gyroscope, or alone where nothing was calibrated"),
     measured=_measured,
+    in_short=_in_short,
 )
