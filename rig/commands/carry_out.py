@@ -8,6 +8,7 @@ from rig.commands.claims import claimed
 from rig.commands.configured import Configured
 from rig.commands.laboratory import simulated_laboratory
 from rig.commands.page_arguments import PageWish, operators_page
+from rig.commands.recall import remembered
 from rig.commands.remember import remember, since_lines
 from rig.commands.show import print_ending
 from rig.data.run_folder import CONFIG, WORLD_LATE
@@ -23,15 +24,27 @@ if TYPE_CHECKING:
     from rig.page.shown import About
 
 
-def carry_out(folder: Path, configured: Configured, *, assume_yes: bool, as_json: bool, page: PageWish | None) -> int:
-    """Run, or go on with, the phases in a run folder; on a `page` too if wanted. Returns 0 passed, 1 verdict failed."""
+def carry_out(
+    folder: Path,
+    configured: Configured,
+    *,
+    assume_yes: bool,
+    moved: frozenset[str],
+    as_json: bool,
+    page: PageWish | None,
+) -> int:
+    """Run, or go on with, the phases in a run folder; on a `page` too if wanted. Returns 0 passed, 1 verdict failed.
+
+    `moved` are serial numbers of sensors that are stated to be on another board than before.
+    """
     with operators_page(page, folder, lambda: _about(folder, configured, page)) as shown:
         # Nobody stands beside a laboratory that this process starts itself, so there nobody need be asked.
         on_terminal = always_yes if assume_yes or configured.loaded.simulated else ask_operator
         answer = shown.answer if shown.answer is not None and not assume_yes else on_terminal
         with log(folder / "log.txt") as logged, view() as seen, ExitStack() as held:
-            station = Stations((logged, seen, *shown.listeners), answer)
-            this = Run(folder, configured.loaded, configured.script, station)
+            station = Stations((logged, seen, *shown.listeners), answer, attended=answer is not always_yes)
+            memory = remembered(configured.loaded.config, moved)
+            this = Run(folder, configured.loaded, configured.script, station, memory)
             with this.reported():
                 held.enter_context(claimed(configured.loaded.config))
                 if configured.loaded.simulated:

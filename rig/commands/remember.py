@@ -59,7 +59,7 @@ def _remembered(folder: Path, chosen: Callable[[], "Place | None"]) -> tuple[Run
         run = finished_run(folder)
         entered, beside = answer_of(lambda: _entered(where, run), ANSWER_S)
     except Exception as error:  # whatever it is, the run is finished and its result is written
-        return NotRemembered(folder, f"{label}: {_why(error)}"), ()
+        return NotRemembered(folder, f"{label}: {why(error)}"), ()
     beyond = tuple(
         f"{b.now.serial_number} {c.name} (E_n {c.normalised_error:.1f})" for b in beside for c in b.changes if c.beyond
     )
@@ -82,7 +82,7 @@ def remember_certificate(folder: Path, result: str, certificate: "Issued", histo
             return None
         known = answer_of(lambda: _certified(where, content_sha256(result), certificate), ANSWER_S)
     except Exception as error:  # whatever it is, the certificate is written
-        return _why(error)
+        return why(error)
     if known:
         return None
     named = None if loaded is None or history is not None else loaded.config.history.url
@@ -128,7 +128,8 @@ def _certified(place: "Place", content_sha256: str, certificate: "Issued") -> bo
         return history.certify(content_sha256, certificate)
 
 
-def _why(error: Exception) -> str:
+def why(error: Exception) -> str:
+    """Why a history was of no use, in a few words."""
     if isinstance(error, RigError):
         return error.what
     if isinstance(error, TimeoutError):

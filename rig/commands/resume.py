@@ -54,4 +54,5 @@ def run(options: Namespace) -> int:
     refuse_foreign_addresses(folder, load(folder / CONFIG, sections=None), options.connect)
     named = None if options.script is None else load_script(options.script)
     found = configured(folder / CONFIG, script=kept_script(folder, script_identity(folder), named))
-    return carry_out(folder, found, assume_yes=options.yes, as_json=options.json, page=page)
+    moved = frozenset(options.other_board)
+    return carry_out(folder, found, assume_yes=options.yes, moved=moved, as_json=options.json, page=page)

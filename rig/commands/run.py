@@ -19,6 +19,13 @@ def add(parser: ArgumentParser, *, script: bool = True) -> None:
 def add_outcome(parser: ArgumentParser) -> None:
     """The arguments of `rig run` and `rig resume` alike."""
     parser.add_argument("--yes", action="store_true", help="do not ask before the arm moves")
+    parser.add_argument(
+        "--other-board",
+        action="append",
+        default=[],
+        metavar="SERIAL",
+        help="the sensor of this serial number is on another board than when it was last calibrated, and that is right",
+    )
     parser.add_argument("--json", action="store_true", help="print result.json instead of tables")
     add_page(parser)
 
@@ -34,4 +41,5 @@ def run(options: Namespace) -> int:
     found = configured(options.config, options.overrides, options.script)
     folder = new_folder(options.out, found.loaded, found.script.text, found.script.identity)
     note_own(found.loaded.text, found.script.text)
-    return carry_out(folder, found, assume_yes=options.yes, as_json=options.json, page=page)
+    moved = frozenset(options.other_board)
+    return carry_out(folder, found, assume_yes=options.yes, moved=moved, as_json=options.json, page=page)

@@ -82,6 +82,7 @@ def calibration_entry(past: Past) -> dict[str, Any]:
         "started_utc": past.started_utc,
         "rig": past.rig,
         "arm_serial_number": past.arm_serial_number,
+        "board_unique_id": past.board_unique_id,
         "sensor": past.sensor,
         **subject_entry(past.subject),
         "estimator": past.estimator,

@@ -49,6 +49,7 @@ class Past:
     started_utc: str
     rig: str
     arm_serial_number: str
+    board_unique_id: str
     verdict: str
     fit: bool
     simulated: bool
@@ -250,6 +251,7 @@ _COLUMNS = (
     _RUN.started_utc,
     _RUN.rig,
     _RUN.arm_serial_number,
+    _RUN.board_unique_id,
     _RUN.verdict,
     _RUN.fit,
     _RUN.simulated,

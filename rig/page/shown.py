@@ -134,10 +134,10 @@ class Shown:
                 self._state("connected", f"Before the first motion of {procedure}")
             case PreflightPassed():
                 self._state("ready", "Pre-flight passed: plan and arm are within limits")
-            case Prompt(announcement, to_do):
+            case Prompt(announcement, to_do, to_tick):
                 self._prompts += 1
-                asked = {"number": self._prompts, "announcement": list(announcement), "to_do": to_do}
-                self.put("prompt", asked)
+                asked = {"announcement": list(announcement), "to_do": to_do, "to_tick": to_tick}
+                self.put("prompt", {"number": self._prompts, **asked})
                 self._state("asking", "The operator is asked")
             case Answered(agreed):
                 self.put("prompt", None)

@@ -1,5 +1,6 @@
 """What an operator must know before agreeing to a movement. Pure."""
 
+from collections.abc import Iterable
 from math import degrees
 
 from rig.arm.motion import Plan
@@ -8,16 +9,18 @@ from rig.arm.state import JOINT_NAMES, ArmReport
 from rig.station.events import Prompt
 
 
-def announcement(plan: Plan, report: ArmReport, repeated: Plan | None) -> Prompt:
+def announcement(plan: Plan, report: ArmReport, repeated: Plan | None, mounted: Iterable[str]) -> Prompt:
     """The question before the first motion, which depends on where the arm stands.
 
-    `repeated` is the movement that follows without another question if the calibration passes.
+    `repeated` is the movement that follows without another question if the calibration passes; `mounted` says, in
+    lines, which sensors are turned.
     """
     way = way_to_home(plan, report.state.q_rad)
     turns = ", ".join(
         f"{name} {degrees(angle):+.0f}°" for name, angle in zip(JOINT_NAMES, way, strict=True) if abs(angle) > 0.01
     )
     lines = [
+        *mounted,
         f"The arm at {report.host} will move for {plan.duration_s:.0f} s.",
         f"First it goes home: {turns or 'it is there already'}.",
     ]

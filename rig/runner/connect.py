@@ -7,7 +7,7 @@ from pathlib import Path
 
 from firmware_host.client import Calibration
 from rig.arm.driver import Arm
-from rig.arm.identity import identity_problems
+from rig.arm.identity import calls_itself_simulated, identity_problems
 from rig.arm.preflight import refuse
 from rig.arm.state import ArmReport
 from rig.board.crystal import follows_crystal
@@ -24,6 +24,7 @@ from rig.plans.phase import Phase
 from rig.plans.script_file import ScriptFile
 from rig.runner.acquisition import Acquisition
 from rig.runner.host_correction import HostCorrected, correcting
+from rig.runner.mounted import Memory, mounted
 from rig.runner.onboard import BoardCalibration
 from rig.runner.procedure import Devices, Recording, Rig
 from rig.runner.resumption import Resumption
@@ -38,7 +39,7 @@ from rig.station.station import Station
 class Connector:
     """Opens one phase of a run: what is to be done, by which configuration and script, recorded where, told to whom.
 
-    `found` are the calibrations of the phase before, by sensor name.
+    `found` are the calibrations of the phase before, by sensor name; `memory` is what is known of earlier runs.
     """
 
     phase: Phase
@@ -49,6 +50,7 @@ class Connector:
     station: Station
     resumed: Resumption
     found: Mapping[str, Solved] = field(default_factory=dict)
+    memory: Memory = field(default_factory=Memory)
 
     @contextmanager
     def open(self) -> Iterator[Rig]:
@@ -73,8 +75,11 @@ class Connector:
             arm, report = self._connect_arm(stack, acquisition)
             recording = self._record(stack, board, described, report)
             acquisition.recorder = recording.recorder
+            simulated = self.loaded.simulated or calls_itself_simulated(report.polyscope)
+            on_board = None if board is None else board.board.identity.unique_id
+            carried = mounted(described, on_board, self.memory, simulated=simulated)
             yield Rig(
-                devices=Devices(arm, report, self.loaded.config.arm, sources, acquisition),
+                devices=Devices(arm, report, self.loaded.config.arm, sources, acquisition, carried),
                 plan=self.phase.plan(report.state.q_rad, self.resumed.done),
                 whole_plan=whole_plan,
                 recording=recording,

@@ -7,7 +7,7 @@ were kept, the command to go on with.
 import traceback
 from collections.abc import Iterator, Mapping
 from contextlib import contextmanager
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 from pathlib import Path
 
 from rig.analysis.calibration import DEFAULT_ESTIMATOR, SensorResult
@@ -24,6 +24,7 @@ from rig.plans.script_errors import ENDING
 from rig.plans.script_file import ScriptFile, installed_script
 from rig.report.writers import write_outcome
 from rig.runner.connect import Connector
+from rig.runner.mounted import Memory
 from rig.runner.resumption import Resumption, resumption
 from rig.station.events import (
     Advice,
@@ -44,12 +45,16 @@ from rig.station.station import Station
 
 @dataclass(frozen=True, slots=True)
 class Run:
-    """A run; the laboratory, if it is a simulated one, is there already. `script` is that of its first phase."""
+    """A run; the laboratory, if it is a simulated one, is there already. `script` is that of its first phase.
+
+    `memory` is what is known of its sensors from before.
+    """
 
     folder: Path
     loaded: Loaded
     script: ScriptFile
     station: Station
+    memory: Memory = field(default_factory=Memory)
 
     def carry_out(self, phase: Phase) -> Outcome:
         """Carry out `phase` and what follows it; writes the outcome into the folder and returns it."""
@@ -82,7 +87,8 @@ class Run:
         own = phase.procedure is self.script.procedure
         script = self.script if own else installed_script(phase.procedure.name)
         settings = self._settings(phase)
-        connector = Connector(phase, self.loaded, settings, script, path, self.station, resumed, found or {})
+        told = self.station, resumed, found or {}, self.memory
+        connector = Connector(phase, self.loaded, settings, script, path, *told)
         with self.reported(self._mended, moved=moved), connector.open() as rig:
             self.station.event(PhaseStarted(phase.procedure.name, rig.plan, rig.readings()))
             phase.procedure.script(rig)

@@ -31,6 +31,7 @@ from rig.errors import Fault, Refused
 from rig.plans.phase import Phase
 from rig.runner.acquisition import Acquisition
 from rig.runner.announcement import announcement
+from rig.runner.mounted import Mounted, ask_of_other_boards
 from rig.runner.onboard import BoardCalibration
 from rig.runner.turner import Turner
 from rig.sensors.source import SampleSource
@@ -57,7 +58,7 @@ class Devices:
     """What is connected.
 
     `turner` turns the sensors; `report` is how it stood, `arm` how it is configured; `sources` are where samples come
-    from.
+    from, those of the sensors that are `mounted`.
     """
 
     turner: Turner
@@ -65,6 +66,7 @@ class Devices:
     arm: ArmSection
     sources: tuple[SampleSource, ...]
     acquisition: Acquisition
+    mounted: Mounted
 
 
 @dataclass(frozen=True, slots=True)
@@ -130,8 +132,10 @@ class Rig:
         self._motions = iter(self.plan.motions)
 
     def _agree(self) -> None:
-        prompt = announcement(self.plan, self.devices.report, self.whole_plan if self.phase.follows else None)
-        if not self.recording.station.ask(prompt):
+        devices, station = self.devices, self.recording.station
+        ask_of_other_boards(devices.mounted, station)
+        repeated = self.whole_plan if self.phase.follows else None
+        if not station.ask(announcement(self.plan, devices.report, repeated, devices.mounted.lines())):
             raise Refused("not_confirmed", "nobody agreed to the movement", "Run again and agree, or give --yes")
 
     def _refuse_moved(self) -> None:

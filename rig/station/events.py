@@ -74,10 +74,15 @@ class PreflightPassed:
 
 @dataclass(frozen=True, slots=True)
 class Prompt:
-    """The operator is told `announcement` and asked to agree `to_do` it."""
+    """The operator is told `announcement` and asked to agree `to_do` it, which a page has them tick first.
+
+    What is `for_a_person` is not agreed to beforehand: nobody but somebody who is asked can say yes to it.
+    """
 
     announcement: tuple[str, ...]
     to_do: str = "start"
+    to_tick: str = "I have looked: nobody and nothing is within the arm's reach"
+    for_a_person: bool = False
 
 
 @dataclass(frozen=True, slots=True)

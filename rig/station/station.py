@@ -23,10 +23,11 @@ class Station(Protocol):
 
 @dataclass(slots=True)
 class Stations:
-    """Several listeners, and one who answers."""
+    """Several listeners, and one who answers; not `attended`, everything was agreed to beforehand."""
 
     listeners: Sequence[Listener]
     answer: Callable[[Sequence[str], str], bool]
+    attended: bool = True
 
     def event(self, event: RunEvent) -> None:
         """Tell everyone, in order. Who raises is dropped, and the others are told of that."""
@@ -44,7 +45,8 @@ class Stations:
     def ask(self, prompt: Prompt) -> bool:
         """Whether the operator agrees; everyone hears the question and the answer."""
         self.event(prompt)
-        agreed = self.answer(prompt.announcement, prompt.to_do)
+        can_be_answered = self.attended or not prompt.for_a_person
+        agreed = can_be_answered and self.answer(prompt.announcement, prompt.to_do)
         self.event(Answered(agreed))
         return agreed
 

@@ -17,7 +17,7 @@ from rig.commands.remember import remember
 from rig.config.judging_sections import HistorySection
 from rig.history.store import open_history
 from rig.station.events import NotRemembered, Remembered
-from support.commands import configuration
+from support.commands import configuration, rig
 from support.kept_rows import forge
 from support.past_runs import FIRST, finished
 from support.paths import CONFIGS, FIXTURES
@@ -195,11 +195,16 @@ def test_a_run_goes_on_whatever_becomes_of_the_history(tmp_path: Path, monkeypat
 
 @pytest.mark.slow
 def test_a_run_enters_itself_and_is_held_against_the_last(place: str, capsys: pytest.CaptureFixture[str]) -> None:
-    """The last calibration of the same simulated sensor was half a year ago, and another."""
+    """The last calibration of the same simulated sensor was half a year ago, and another, on another board."""
     told(capsys, "import", FIXTURES / "calibration")
     folder = Path(place).parent
-    changed = {"world": {"sensors": {"gyro": {"bias_rad_s": [0.2, 0.1, -0.1]}}}, "limits": {"bias_rad_s": 1}}
-    command = [sys.executable, "-m", "rig", "run", configuration(folder, changed), "--out", folder / "run"]
+    other = {"sensors": {"gyro": {"bias_rad_s": [0.2, 0.1, -0.1]}}, "board": {"unique_id": "f" * 24}}
+    config = configuration(folder, {"world": other, "limits": {"bias_rad_s": 1}})
+    refused = rig("run", config, "--out", folder / "refused", "--yes")
+    assert refused.returncode == 2 and "rig: other_board: lsm9ds1 LSM9DS1-CI was last calibrated" in refused.stderr
+    assert f"{'f' * 24}. Correct sensors.gyro.serial_number; or, where" in " ".join(refused.stderr.split())
+    assert "done: " not in (folder / "refused" / "log.txt").read_text(encoding="utf-8")
+    command = [sys.executable, "-m", "rig", "run", config, "--out", folder / "run", "--other-board", "LSM9DS1-CI"]
     done = subprocess.run(list(map(str, command)), capture_output=True, text=True, timeout=200, check=False)
     assert done.returncode == 0, done.stderr
     printed = " ".join(done.stdout.split())

@@ -87,6 +87,7 @@ function prompt(asked) {
   if (!asked) return;
   const here = shown.about.may_answer && token !== "";
   $("prompt-words").replaceChildren(...asked.announcement.map((text) => Object.assign(document.createElement("li"), { textContent: text })));
+  $("prompt-tick").textContent = asked.to_tick;
   $("yes").textContent = asked.to_do.charAt(0).toUpperCase() + asked.to_do.slice(1);
   $("prompt-answer").hidden = !here;
   $("prompt-elsewhere").hidden = here;
