@@ -32,6 +32,7 @@ from rig.history.tables import (
     trends_table,
 )
 from rig.station.plain_text import plain, say
+from rig.station.words import calibrations_in_words
 from rig.study.files import missing_extra
 
 DISAGREE = 1
@@ -134,7 +135,8 @@ def imported(options: Namespace) -> int:
                 say(f"{folder}: {error}", sys.stderr)
                 continue
             new, known = new + entered.new, known + (not entered.new)
-            say(f"{folder}: {'entered' if entered.new else 'there already'}, run {entered.run_id}")
+            numbers = calibrations_in_words([each.id for each in history.of_run(entered.run_id)])
+            say(f"{folder}: {'entered' if entered.new else 'there already'} as {numbers}")
             if entered.new and run.certificate is None and (folder / PAGE).exists():
                 said = f"its {PAGE} is not what this version writes of its result, and was not entered"
                 say(f"{folder}: {said}; rig report writes it anew", sys.stderr)

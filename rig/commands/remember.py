@@ -22,6 +22,7 @@ if TYPE_CHECKING:
 
 
 ANSWER_S = 4.0  # docs/how-to/shared-history.md promises five until the verdict
+MOST_SAID = 3  # changes of a sensor in words; its table has them all
 
 
 @dataclass(frozen=True, slots=True)
@@ -51,19 +52,18 @@ def _remembered(folder: Path, chosen: Callable[[], "Place | None"]) -> tuple[Run
     label = "the history"
     try:
         from rig.history.finished import finished_run
+        from rig.history.place import own_place
 
         where = chosen()
         if where is None:
             return None, ()
         label = where.label
         run = finished_run(folder)
-        entered, beside = answer_of(lambda: _entered(where, run), ANSWER_S)
+        numbers, beside = answer_of(lambda: _entered(where, run), ANSWER_S)
     except Exception as error:  # whatever it is, the run is finished and its result is written
         return NotRemembered(folder, f"{label}: {why(error)}"), ()
-    beyond = tuple(
-        f"{b.now.serial_number} {c.name} (E_n {c.normalised_error:.1f})" for b in beside for c in b.changes if c.beyond
-    )
-    return Remembered(label, entered, beyond), beside
+    beyond = tuple(said for each in beside if (said := _changed(each)) is not None)
+    return Remembered(label, numbers, beyond, usual=where == own_place(None)), beside
 
 
 def remember_certificate(folder: Path, result: str, certificate: "Issued", history: str | None = None) -> str | None:
@@ -92,31 +92,46 @@ def remember_certificate(folder: Path, result: str, certificate: "Issued", histo
 
 def since_lines(calibrations: Sequence[Beside]) -> tuple[str, ...]:
     """How calibrations lie beside those of before, in words: each that changed beyond U, then the others together."""
+    from rig.history.change_words import change_in_short
+
     changed = [each for each in calibrations if any(change.beyond for change in each.changes)]
-    several = len(calibrations) > 1
     same = [each for each in calibrations if each not in changed]
     lines = []
     for each in changed:
-        beyond = [change for change in each.changes if change.beyond]
-        names = ", ".join(change.name for change in beyond)
-        largest = max(change.normalised_error for change in beyond)
-        since = f"since calibration {each.before.id} of {each.before.started_utc[:10]}"
+        beyond = sorted((c for c in each.changes if c.beyond), key=lambda c: -c.normalised_error)
         of = "" if each.now.quantity == "rate" else f", {each.now.quantity}"
-        whose = f"{each.now.serial_number}{of}: " if several else ""
-        lines.append(f"{whose}{since} changed beyond U: {names} (E_n {largest:.1f})")
+        whose = f"{each.now.serial_number}{of} " if len(calibrations) > 1 else ""
+        more = f"; {len(beyond) - 1} more" if len(beyond) > 1 else ""
+        since = f"since {each.before.started_utc[:10]} (no. {each.before.id})"
+        lines.append(f"{whose}{since}: {change_in_short(beyond[0])}{more}")
     if same:
         before = ", ".join(str(each.before.id) for each in same)
-        whose = "" if not changed else " of the other sensors"
-        lines.append(f"nothing changed beyond U since the last calibration{whose} (number {before} of the history)")
+        whose = " of the other sensors" if changed else ""
+        lines.append(f"nothing changed beyond U since the last calibration{whose} (no. {before})")
     return tuple(lines)
 
 
-def _entered(where: "Place", run: "Finished") -> "tuple[int, tuple[Beside, ...]]":
+def _changed(beside: Beside) -> str | None:
+    """What changed beyond U, the largest in words; None where nothing did."""
+    from rig.history.change_words import change_sentences
+
+    said = change_sentences(beside.changes)
+    if not said:
+        return None
+    before, now = beside.before, beside.now
+    more = (
+        f"; {len(said) - MOST_SAID} more by rig history compare {before.id} {now.id}" if len(said) > MOST_SAID else ""
+    )
+    of = f"{now.part} {now.serial_number}, {now.quantity}, since calibration {before.id} of {before.started_utc[:10]}"
+    return f"changed beyond U: {of}: {'; '.join(said[:MOST_SAID])}{more}"
+
+
+def _entered(where: "Place", run: "Finished") -> "tuple[tuple[int, ...], tuple[Beside, ...]]":
     from rig.history.store import open_history
 
     with open_history(where) as history:
         run_id = history.enter(run).run_id
-        return run_id, tuple(_beside(history, run_id))
+        return tuple(each.id for each in history.of_run(run_id)), tuple(_beside(history, run_id))
 
 
 def _certified(place: "Place", content_sha256: str, certificate: "Issued") -> bool:

@@ -15,6 +15,7 @@ from rig.history.finished import content_sha256, document_sha256, recording_of
 from rig.history.index import run_row, unlike
 from rig.history.store import History, Kept, Past
 from rig.report.kinds.followed import Followed
+from rig.station.words import calibrations_in_words
 
 State = Literal["ok", "changed", "missing", "elsewhere"]
 MOST_TOLD = 3
@@ -44,8 +45,10 @@ def examined(history: History, computer: str | None = None) -> Iterator[Found]:
         yield Found(each.what, each.state, each.why)
     documents = _documents_by_folder(history)
     for run in history.kept():
-        why = "; ".join(_contradictions(run, history.of_run(run.run_id)))
-        yield Found(f"run {run.run_id}", "changed" if why else "ok", why)
+        pasts = history.of_run(run.run_id)
+        why = "; ".join(_contradictions(run, pasts))
+        numbers = calibrations_in_words([each.id for each in pasts])
+        yield Found(f"run {run.run_id}, {numbers}", "changed" if why else "ok", why)
         yield from _files(run, here, documents)
 
 

@@ -252,11 +252,16 @@ class RunFolderWritten:
 
 @dataclass(frozen=True, slots=True)
 class Remembered:
-    """The run stands in `history` under this number; `beyond` are the changes since the last calibration beyond U."""
+    """The run stands in `history` as the calibrations of these `numbers`, by which `rig history` finds them.
+
+    `usual` is whether the command looks there by itself; `beyond` says in words what changed beyond U since the last
+    calibration of the same sensor, a line for each that has changed.
+    """
 
     history: str
-    number: int
+    numbers: tuple[int, ...]
     beyond: tuple[str, ...]
+    usual: bool = True
 
 
 @dataclass(frozen=True, slots=True)

@@ -1,6 +1,7 @@
 """The line an event is worth, for a terminal and for the log."""
 
 import shlex
+from collections.abc import Sequence
 from traceback import format_exception
 
 from rig.arm.identity import arm_words
@@ -73,9 +74,8 @@ def _of_the_outcome(event: RunEvent) -> str | None:
             text = f"plotted: {', '.join(names)} (.png, .svg)"
         case NotPlotted():
             text = "no plots: they need matplotlib, install the extra with pip install 'calibration-rig[study]'"
-        case Remembered(history, number, beyond):
-            changed = f"; changed beyond U: {', '.join(beyond)}" if beyond else ""
-            text = f"entered in {history} as run {number}{changed}"
+        case Remembered(history, numbers, beyond, usual):
+            text = "\n".join([_entered(history, numbers, usual=usual), *beyond])
         case NotRemembered(folder, why):
             later = f"rig history import {shlex.quote(str(folder))}"
             text = f"not entered in the history, which does not matter to the run ({why}); later: {later}"
@@ -89,6 +89,25 @@ def _of_the_outcome(event: RunEvent) -> str | None:
         case _:
             text = None
     return text
+
+
+def calibrations_in_words(numbers: Sequence[int]) -> str:
+    """Calibrations of a history by their numbers: "calibration 8", "calibrations 8 to 10", "calibrations 8, 11"."""
+    match list(numbers):
+        case []:
+            return "a run without calibrations"
+        case [number]:
+            return f"calibration {number}"
+        case [first, *_, last] if last - first == len(numbers) - 1:
+            return f"calibrations {first} to {last}"
+        case several:
+            return f"calibrations {', '.join(map(str, several))}"
+
+
+def _entered(history: str, numbers: Sequence[int], *, usual: bool) -> str:
+    there = "" if usual else f" --history {shlex.quote(history)}"
+    shown = f" (rig history show {numbers[0]}{there})" if numbers else ""
+    return f"entered in {history} as {calibrations_in_words(numbers)}{shown}"
 
 
 def reason(event: RunEvent) -> str | None:

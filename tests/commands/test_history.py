@@ -17,6 +17,7 @@ from rig.commands.remember import remember
 from rig.config.judging_sections import HistorySection
 from rig.history.store import open_history
 from rig.station.events import NotRemembered, Remembered
+from rig.station.words import line
 from support.commands import configuration, rig
 from support.kept_rows import forge
 from support.past_runs import FIRST, finished
@@ -88,7 +89,7 @@ def test_one_flipped_byte_of_a_recording_is_named(place: str, capsys: pytest.Cap
 
 def test_a_result_that_was_changed_in_the_database_is_named(year: str, capsys: pytest.CaptureFixture[str]) -> None:
     forge(year, "UPDATE run SET result = replace(result, '\"pass\"', '\"fail\"') WHERE id = 3")
-    assert "changed: run 3: " in told(capsys, "verify", status=1)
+    assert "changed: run 3, calibration 3: " in told(capsys, "verify", status=1)
 
 
 def test_trends_are_told_for_people_and_for_machines(year: str, capsys: pytest.CaptureFixture[str]) -> None:
@@ -188,7 +189,11 @@ def test_a_run_goes_on_whatever_becomes_of_the_history(tmp_path: Path, monkeypat
     event, _ = remember(tmp_path / "nothing", HistorySection())
     assert isinstance(event, NotRemembered)
     event, _ = remember(FIXTURES / "verified", HistorySection())
-    assert isinstance(event, Remembered) and event.number == 1
+    assert isinstance(event, Remembered) and event.numbers == (1, 2) and event.usual
+    named = str(tmp_path / "named.sqlite")
+    monkeypatch.setenv("RIG_HISTORY", "")
+    event, _ = remember(FIXTURES / "verified", HistorySection(url=named))
+    assert event is not None and (line(event) or "").endswith(f"(rig history show 1 --history {named})")
     monkeypatch.delenv("RIG_HISTORY")
     assert remember(FIXTURES / "verified", HistorySection(off=True)) == (None, ())
 
@@ -208,9 +213,11 @@ def test_a_run_enters_itself_and_is_held_against_the_last(place: str, capsys: py
     done = subprocess.run(list(map(str, command)), capture_output=True, text=True, timeout=200, check=False)
     assert done.returncode == 0, done.stderr
     printed = " ".join(done.stdout.split())
-    assert "since calibration 1 of " in printed and "changed beyond U: " in printed
+    assert "(no. 1): bias of x changed by +" in printed
     assert done.stdout.splitlines()[-1].startswith("verdict: ")
     log = (folder / "run" / "log.txt").read_text(encoding="utf-8")
-    assert f"entered in {place} as run 2; changed beyond U: LSM9DS1-CI" in log
+    assert f"entered in {place} as calibration 2 (rig history show 2)" in log
+    assert "changed beyond U: lsm9ds1 LSM9DS1-CI, rate, since calibration 1 of " in done.stderr
+    assert "the bias of x changed by +" in done.stderr
     assert "0 entered, 1 there already" in told(capsys, "import", folder / "run")
     assert "0 changed, 0 missing" in told(capsys, "verify")

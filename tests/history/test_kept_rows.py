@@ -152,7 +152,10 @@ def test_a_result_that_was_changed_with_its_own_hash_is_named(tmp_path: Path) ->
     forge(file, "UPDATE run SET result = ?, content_sha256 = ?", values=(other, content_sha256(other)))
     with open_history(file) as history:
         found = "\n".join(f"{each.what}: {each.why}" for each in examined(history) if each.wrong)
-    assert "run [1]: its rows are not those entered" in found and "run 1: k 1, stated 1.00333333, of gyro" in found
+    assert (
+        "run [1]: its rows are not those entered" in found
+        and "run 1, calibration 1: k 1, stated 1.00333333, of gyro" in found
+    )
 
 
 def test_a_run_that_was_deleted_with_all_its_rows_is_named(tmp_path: Path) -> None:

@@ -13,7 +13,7 @@ from support.paths import DOCS, FIXTURES
 
 FROZEN = sorted(path.parent for path in (FIXTURES.parent / "recordings").glob("*/*/result.json"))
 RUN = Path("runs/2026-11-25T10-00-00Z-imu")
-SINCE = ("since calibration 1 of 2026-11-23 changed beyond U: kx, ky (E_n 2.4)", "else nothing changed beyond U")
+SINCE = ("since 2026-11-23 (no. 1): scale factor of x changed by +0.4 %, 12 U; 3 more", "else nothing changed")
 COPYABLE = ("certificate: ", "everything: ")
 
 

@@ -1,0 +1,75 @@
+"""What has changed since another calibration of the same sensor, in sentences. Pure."""
+
+from collections.abc import Iterable
+from math import pi
+
+from rig.data.installed_kinds import quantities
+from rig.history.series import Change
+from rig.report.kinds.followed import ANGLES, is_scale
+from rig.report.rounding import figures
+
+PERCENT, PPM = 1e-2, 1e-6
+DEGREE_RAD = pi / 180
+
+
+def change_sentences(changes: Iterable[Change]) -> tuple[str, ...]:
+    """What changed beyond U, a sentence each without its full stop, the largest change for its U first.
+
+    Nothing where all that changed is explained by the uncertainties of both calibrations.
+    """
+    beyond = sorted((each for each in changes if each.beyond), key=lambda each: -each.normalised_error)
+    return tuple(map(change_sentence, beyond))
+
+
+def change_sentence(change: Change) -> str:
+    """The change of one parameter: what it is, by how much it changed, how many times the U of a change that is."""
+    times = change.normalised_error
+    many = f"{times:.1f}" if times < 10 else f"{times:.0f}"
+    return f"{name_in_words(change.name)} changed by {_size(change)}, {many} times the U of such a change"
+
+
+def change_in_short(change: Change) -> str:
+    """The change of one parameter in as few words as a line has room for; U is that of such a change."""
+    name = name_in_words(change.name).removeprefix("the ")
+    return f"{name} changed by {_size(change)}, {change.normalised_error:.2g} U"
+
+
+def name_in_words(name: str) -> str:
+    """A parameter of the history in words, as they stand within a sentence; a name that is not known stays."""
+    if name in ANGLES:
+        return f"the angle between {name[-2]} and {name[-1]}"
+    words = {
+        "k": ("the mean scale factor", "the scale factor of {}"),
+        "b": ("", "the bias of {}"),
+        "d": ("", "the change between repeats of the bias of {}"),
+        "s": ("", "the slope over temperature of the bias of {}"),
+        "e": ("the Earth's rate", "the Earth's rate along {}"),
+    }
+    alone, of_axis = words.get(name[:1], ("", ""))
+    if len(name) == 1 and alone:
+        return alone
+    if len(name) == 2 and of_axis:
+        return of_axis.format(name[1])
+    if len(name) == 3 and name[0] == "g":
+        return f"what an acceleration along {name[2]} adds to the rate of {name[1]}"
+    return name
+
+
+def _size(change: Change) -> str:
+    """The size of a change with its sign: of a scale factor as a share, of others in the unit that a screen shows."""
+    difference = change.now.value - change.before.value
+    if is_scale(change.name):
+        share = difference / change.before.value
+        size, unit = (PERCENT, "%") if abs(share) >= PERCENT / 100 else (PPM, "ppm")
+        return f"{_signed(share / size)} {unit}"
+    if change.unit == "rad":
+        return f"{_signed(difference / DEGREE_RAD)}°"
+    shown = next((each.reading for each in quantities().values() if each.unit == change.unit), None)
+    if shown is not None:
+        return f"{_signed(difference / shown.size)} {shown.name}"
+    return _signed(difference) + ("" if change.unit == "1" else f" {change.unit}")
+
+
+def _signed(value: float) -> str:
+    """Three figures at most, and always a sign."""
+    return f"{'−' if value < 0 else '+'}{figures(abs(value))}"
