@@ -23,15 +23,13 @@ def change_sentences(changes: Iterable[Change]) -> tuple[str, ...]:
 
 def change_sentence(change: Change) -> str:
     """The change of one parameter: what it is, by how much it changed, how many times the U of a change that is."""
-    times = change.normalised_error
-    many = f"{times:.1f}" if times < 10 else f"{times:.0f}"
-    return f"{name_in_words(change.name)} changed by {_size(change)}, {many} times the U of such a change"
+    return f"{name_in_words(change.name)} changed by {_size(change)}, {_times(change)} times the U of such a change"
 
 
 def change_in_short(change: Change) -> str:
     """The change of one parameter in as few words as a line has room for; U is that of such a change."""
     name = name_in_words(change.name).removeprefix("the ")
-    return f"{name} changed by {_size(change)}, {change.normalised_error:.2g} U"
+    return f"{name} changed by {_size(change)}, {_times(change)} U"
 
 
 def name_in_words(name: str) -> str:
@@ -53,6 +51,10 @@ def name_in_words(name: str) -> str:
     if len(name) == 3 and name[0] == "g":
         return f"what an acceleration along {name[2]} adds to the rate of {name[1]}"
     return name
+
+
+def _times(change: Change) -> str:
+    return f"{change.normalised_error:.{1 if change.normalised_error < 10 else 0}f}"
 
 
 def _size(change: Change) -> str:
