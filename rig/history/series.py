@@ -148,11 +148,12 @@ def trends(pasts: Sequence[Past]) -> dict[str, Trend]:
 
 def changes(before: Past, now: Past) -> tuple[Change, ...]:
     """The changes of the parameters that both calibrations have."""
-    return tuple(
-        Change(name, now.parameters[name].unit, before.parameters[name], now.parameters[name])
-        for name in now.parameters
-        if name in before.parameters
-    )
+    return changed(before.parameters, now.parameters)
+
+
+def changed(before: Mapping[str, Parameter], now: Mapping[str, Parameter]) -> tuple[Change, ...]:
+    """The changes of what both have, in the order of `now`; parameters by their names."""
+    return tuple(Change(name, now[name].unit, before[name], now[name]) for name in now if name in before)
 
 
 def rig_states(pasts: Sequence[Past]) -> list[RigState]:

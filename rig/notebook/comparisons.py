@@ -10,6 +10,7 @@ from rig.analysis.alignment import RelativeRotation
 from rig.analysis.comparison import Comparison, Reference
 from rig.analysis.comparison import compare as compare_readings
 from rig.analysis.verification import relative_mounting
+from rig.data.quantity import RATE
 from rig.errors import Refused
 from rig.notebook.html import table
 from rig.notebook.runs import Run
@@ -74,10 +75,13 @@ def compare(run: Run, sensor: str, reference: str) -> SensorComparison:
     """Compare two sensors of a run sample by sample, the one corrected by what is known of it.
 
     The reference's calibration is the turntable's where the run names one, else this run's own. Raises Refused
-    `no_such_sensor`; Fault as `rig.analysis.comparison.compare` does.
+    `no_such_sensor`, `nothing_to_compare`; Fault as `rig.analysis.comparison.compare` does.
     """
     for name in (sensor, reference):
-        run[name]  # refused by name
+        if RATE.name not in run[name].quantities:
+            raise Refused(
+                "nothing_to_compare", f"the sensor {name} measures no rates", "Give the names of two gyroscopes"
+            )
     calibration = run.calibration
     before = calibration.recordings if calibration is not None else ()
     raw = before or run.corrected

@@ -8,13 +8,14 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from rig.analysis.calibration import SensorResult
 from rig.analysis.comparison import Comparison
-from rig.errors import Fault, Refused
+from rig.data.result_file import SensorEntry, VectorEntry
+from rig.errors import Refused
 from rig.estimation.arrays import Array
 from rig.estimation.coverage import COVERAGE_FACTOR
 from rig.observation.windows import Window
 from rig.report.figures import draw_comparison
+from rig.study.files import missing_extra
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
@@ -39,45 +40,46 @@ class Plot:
         return picture.getvalue()
 
 
-def plot_readings(time_s: Array, rate_rad_s: Array, sweeps: Iterable[Window], title: str) -> Plot:
-    """Three axes (n, 3) over the arm's time (n,), the sweeps shaded."""
+def plot_readings(time_s: Array, values: Mapping[str, Array], sweeps: Iterable[Window], title: str) -> Plot:
+    """Values (n,) of each axis over the arm's time (n,), the sweeps shaded; the title says what in which unit."""
     figure = _figure(10, 3.5)
     axes = figure.subplots()
+    begin_s = float(time_s[0]) if len(time_s) else 0.0
     for window in sweeps:
-        axes.axvspan(window.start_s - time_s[0], window.end_s - time_s[0], color="0.92", lw=0)
-    for i, axis in enumerate("xyz"):
-        axes.plot(time_s - time_s[0], rate_rad_s[:, i], lw=0.7, label=axis)
-    axes.set(xlabel="time s", ylabel="reading rad/s")
+        axes.axvspan(window.start_s - begin_s, window.end_s - begin_s, color="0.92", lw=0)
+    for axis, column in values.items():
+        axes.plot(time_s - begin_s, column, lw=0.7, label=axis)
+    axes.set(xlabel="time s")
     _finish(axes, title)
     return Plot(figure)
 
 
-def plot_residuals(results: Mapping[str, SensorResult]) -> Plot:
-    """Reading less vector model of every sweep and rest, with the standard deviation of each mean."""
-    sensors = {
-        name: (found, found.vector_model)
-        for name, found in results.items()
-        if not isinstance(found.vector_model, Fault) and (found.observations or found.rests)
+def plot_residuals(sensors: Mapping[str, SensorEntry]) -> Plot:
+    """Reading less vector model of every sweep and rest, with U of each mean. Raises Refused `nothing_to_plot`."""
+    solved = {
+        name: (found, model)
+        for name, found in sensors.items()
+        if isinstance(model := found.vector_model, VectorEntry) and (found.observations or found.rests)
     }
-    if not sensors:
+    if not solved:
         raise Refused(
             "nothing_to_plot",
             "no sweeps were solved by the vector model here",
             "Read in the result why, sensor by sensor",
         )
-    figure = _figure(10, 3 * len(sensors))
-    panels = figure.subplots(len(sensors), sharex=True, squeeze=False)[:, 0]
-    for axes, (name, (found, model)) in zip(panels, sensors.items(), strict=True):
-        averages = [*(observation.average for observation in found.observations), *found.rests]
-        expanded = COVERAGE_FACTOR * np.sqrt([average.variance_rad2_s2 for average in averages])
+    figure = _figure(10, 3 * len(solved))
+    panels = figure.subplots(len(solved), sharex=True, squeeze=False)[:, 0]
+    for axes, (name, (found, model)) in zip(panels, solved.items(), strict=True):
+        expanded = COVERAGE_FACTOR * np.array([each.mean_std_rad_s for each in (*found.observations, *found.rests)])
+        residuals = np.array(model.residuals_rad_s)
         for i, axis in enumerate("xyz"):
-            places = np.arange(len(averages)) + (i - 1) * 0.15
-            axes.errorbar(places, model.residuals_rad_s[:, i], expanded[:, i], fmt="o", ms=3, lw=0.8, label=axis)
+            places = np.arange(len(expanded)) + (i - 1) * 0.15
+            axes.errorbar(places, residuals[:, i], expanded[:, i], fmt="o", ms=3, lw=0.8, label=axis)
         axes.axhline(0, color="0.5", lw=0.8)
         axes.set(ylabel="residual rad/s")
         axes.set_xticks(
-            range(len(averages)),
-            [f"{o.joint_name} {o.direction}" for o in found.observations] + ["rest"] * len(found.rests),
+            range(len(expanded)),
+            [f"{o.joint} {o.direction}" for o in found.observations] + ["rest"] * len(found.rests),
             rotation=60,
             ha="right",
         )
@@ -102,7 +104,5 @@ def _figure(width: float, height: float) -> "Figure":
     try:
         from matplotlib.figure import Figure
     except ImportError as error:
-        raise Refused(
-            "missing_extra", f"plots need {error.name}", "Install it with pip install 'calibration-rig[study]'"
-        ) from error
+        raise missing_extra(error, "study") from error
     return Figure(figsize=(width, height), layout="constrained")

@@ -1,103 +1,34 @@
 """A run's result: each sensor's calibration with its uncertainty, the checks, the verdict."""
 
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Iterator, Mapping
 from dataclasses import dataclass
 from functools import cached_property
+from pathlib import Path
 from typing import TYPE_CHECKING, Any, Literal
 
-import numpy as np
-
 from rig.analysis.calibration import DEFAULT_ESTIMATOR
-from rig.analysis.check import Check
-from rig.analysis.outcome import Outcome
-from rig.data.result_file import ResultDocument
+from rig.data.result_file import CheckEntry, ResultDocument, read_result
 from rig.data.settings import setting
-from rig.estimation.arrays import Array
+from rig.notebook.calibrations import HEADINGS, U_TEXT, Calibration, rows
 from rig.notebook.html import table
 from rig.notebook.runs import NoSuchSensor, Run
 from rig.plans.recorded import judged
 from rig.report.document import document_of
-from rig.report.kinds.kind import Found, Shown, Without
+from rig.report.kinds.kind import Without
 from rig.report.kinds.registry import kinds, shown
-from rig.report.kinds.triad import bias_of
 
 if TYPE_CHECKING:
     from rig.notebook.plots import Plot
-
-
-HEADINGS = ("axis", "scale factor", "± U (about 95 %)", "bias", "± U", "unit")
-
-
-@dataclass(frozen=True, eq=False)
-class Calibration:
-    """Scale factors and biases of one sensor; of a gyroscope rate = `scale` × (reading + `bias`).
-
-    `entry` is all that `result.json` has of it.
-    """
-
-    name: str
-    found: Found[Any]
-    shown: Shown
-
-    @property
-    def entry(self) -> Any:
-        """What `result.json` says of it."""
-        return self.found.entry
-
-    @property
-    def scale(self) -> Array:
-        """(3,) scale factors."""
-        return np.array(self.entry.scale)
-
-    @property
-    def bias(self) -> Array:
-        """(3,) bias in the SI unit of what the sensor measures."""
-        return np.array(bias_of(self.found.quantity, self.entry))
-
-    @property
-    def bias_rad_s(self) -> Array:
-        """(3,) biases of a gyroscope."""
-        return np.array(self.entry.bias_rad_s)
-
-    @property
-    def covariance(self) -> Array:
-        """(6, 6) covariance in the order kx ky kz bx by bz."""
-        return np.array(self.entry.covariance)
-
-    @property
-    def std(self) -> Array:
-        """(6,) standard deviations, in the order of the covariance."""
-        return np.asarray(np.sqrt(np.diag(self.covariance)), dtype=np.float64)
-
-    def to_dict(self) -> dict[str, Any]:
-        """What `result.json` says of it: plain numbers, lists and texts."""
-        made: dict[str, Any] = self.entry.model_dump(mode="json", exclude_unset=True)
-        return made
-
-    def __repr__(self) -> str:
-        scale, bias = (" ".join(f"{each:{form}}" for each in values) for values, form in self._forms())
-        return f"<{self.name} by {self.entry.estimator}: scale {scale}, bias {bias} {self.shown.unit.name}>"
-
-    def _forms(self) -> tuple[tuple[Sequence[float], str], tuple[Sequence[float], str]]:
-        return (self.entry.scale, ".5f"), (self.shown.numbers.values, "+.5f")
-
-    def _repr_html_(self) -> str:
-        return table(f"{self.entry.part} {self.entry.serial_number}", HEADINGS, _rows(self.shown))
 
 
 @dataclass(frozen=True, eq=False)
 class Result(Mapping[str, Calibration]):
     """What a run amounts to: `result["gyro"]` is a sensor's calibration, `result["gyro, accelerometer"]` one beside it.
 
-    Where a sensor has but one, its own name finds it.
+    Where a sensor has but one, its own name finds it. `document` is the whole, as `result.json` has it.
     """
 
-    outcome: Outcome
-
-    @cached_property
-    def document(self) -> ResultDocument:
-        """The result as `result.json` has it."""
-        return document_of(self.outcome)
+    document: ResultDocument
 
     @cached_property
     def _calibrations(self) -> dict[str, Calibration]:
@@ -113,22 +44,25 @@ class Result(Mapping[str, Calibration]):
     @property
     def verdict(self) -> Literal["pass", "fail"]:
         """What the checks together say."""
-        return self.outcome.verdict
+        return self.document.verdict
 
     @property
-    def checks(self) -> tuple[Check, ...]:
+    def checks(self) -> tuple[CheckEntry, ...]:
         """Every limit beside what was measured."""
-        return self.outcome.checks
+        return self.document.checks
 
     def to_dict(self) -> dict[str, Any]:
         """The result as `result.json` has it: plain numbers, lists and texts."""
         return self.document.model_dump(mode="json", by_alias=True, exclude_unset=True)
 
     def plot(self) -> "Plot":
-        """What each sweep and rest leaves unexplained, sensor by sensor."""
+        """A plot of what each sweep and rest leaves unexplained, gyroscope by gyroscope, with U of each mean.
+
+        Raises Refused `nothing_to_plot`, `missing_extra`.
+        """
         from rig.notebook.plots import plot_residuals
 
-        return plot_residuals(self.outcome.results)
+        return plot_residuals(self.document.sensors)
 
     def __getitem__(self, name: str) -> Calibration:
         known = self._calibrations
@@ -148,9 +82,8 @@ class Result(Mapping[str, Calibration]):
         return f"<result: {self.verdict}, {', '.join(map(repr, self.values()))}>"
 
     def _repr_html_(self) -> str:
-        calibrated = table(
-            f"verdict: {self.verdict}", HEADINGS, [row for each in shown(self.document) for row in _rows(each)]
-        )
+        found = [row for each in shown(self.document) for row in rows(each)]
+        calibrated = table(f"verdict: {self.verdict}; {U_TEXT}", HEADINGS, found)
         checks = table("checks", ("check", "value", "limit", "unit", ""), map(_row, self.checks))
         return calibrated + checks
 
@@ -161,22 +94,19 @@ def solve(run: Run, estimator: str = DEFAULT_ESTIMATOR, **changes: float) -> Res
     `changes` are thresholds or limits to judge it by instead of the recorded ones: `max_lost_fraction=0.01`. Raises
     Fault and Refused by name as `rig solve` does; `unknown_setting` says what can be changed.
     """
-    return Result(
-        judged(run.recorded.judged_by([f"{setting(key)}={value!r}" for key, value in changes.items()]), estimator)
-    )
+    overrides = [f"{setting(key)}={value!r}" for key, value in changes.items()]
+    return Result(document_of(judged(run.recorded.judged_by(overrides), estimator)))
 
 
-def _rows(shown: Shown) -> Iterator[tuple[str, ...]]:
-    """Axis by axis, with U, or with twice the standard deviations where no more is known."""
-    for i, axis in enumerate("xyz"[: len(shown.numbers.values)]):
-        scale = ("–", "–")
-        if shown.scale is not None:
-            scale = f"{shown.scale.values[i]:.6f}", f"{shown.scale.expanded[i]:.6f}"
-        number, width = f"{shown.numbers.values[i]:+.6f}", f"{shown.numbers.expanded[i]:.6f}"
-        yield f"{shown.name} {axis}", *scale, number, width, shown.unit.name
+def load_result(path: str | Path) -> Result:
+    """Load the `result.json` of a run folder, or at `path` itself: what was found then, without solving again.
+
+    Raises Refused `no_result`, `not_a_result`.
+    """
+    return Result(read_result(Path(path)))
 
 
-def _row(check: Check) -> tuple[str, ...]:
+def _row(check: CheckEntry) -> tuple[str, ...]:
     value = "not measured" if check.value is None else f"{check.value:.4g}"
     limit = "not set" if check.limit is None else f"{check.limit:.4g}"
     return check.name, value, limit, check.unit, "ok" if check.passed else "FAILED"

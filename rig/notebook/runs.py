@@ -1,94 +1,19 @@
-"""A run as it was recorded: its sensors' readings in rad/s on the arm's clock."""
+"""A run as it was recorded: its sensors' readings, and what the rig made of them."""
 
-from collections.abc import Iterator, Mapping, Sequence
-from dataclasses import asdict, dataclass
+from collections.abc import Iterator, Mapping
+from dataclasses import dataclass
 from functools import cached_property
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
-
-import numpy as np
-from numpy.typing import NDArray
+from typing import Any
 
 from rig.analysis.calibration import DEFAULT_ESTIMATOR
 from rig.analysis.outcome import Outcome
 from rig.data.provenance import Provenance
-from rig.data.quantity import RATE
-from rig.data.recorded_sensor import RecordedSensor
-from rig.data.run_file import RunData
 from rig.data.settings import RunSettings
-from rig.errors import Refused
-from rig.estimation.arrays import Array
 from rig.notebook.html import table
+from rig.notebook.readings import HEADINGS, NoSuchSensor, Readings
 from rig.observation.observed_run import ObservedRun, observe_runs
 from rig.plans.recorded import RecordedRun, judged, open_run
-
-if TYPE_CHECKING:
-    from rig.notebook.plots import Plot
-
-HEADINGS = ("sensor", "part", "serial number", "Hz", "samples", "readings")
-
-
-class NoSuchSensor(Refused, KeyError):
-    """There is no sensor of that name; a KeyError as well, so that `name in run` and `run.get(name)` work."""
-
-
-@dataclass(frozen=True, eq=False)
-class Readings:
-    """One sensor's readings in all recordings of a movement, in the order they were made."""
-
-    name: str
-    sensor: RecordedSensor
-    recordings: Sequence[RunData]
-
-    def on_arm_clock(self) -> tuple[Array, Array]:
-        """Controller times (n,) in s and readings (n, 3) in rad/s; of readings from files, their file's times.
-
-        Raises Fault as `estimate_time_base` does.
-        """
-        return self._on_arm_clock
-
-    @cached_property
-    def _on_arm_clock(self) -> tuple[Array, Array]:
-        from rig.observation.arm_motion import motion_of
-        from rig.observation.average import on_the_arms_clock
-
-        if any(run.elsewhere is not None for run in self.recordings):
-            samples = self.samples
-            return samples["host_time_s"], self.sensor.channel(RATE).values(samples)
-        streams = [on_the_arms_clock(run.samples[self.name], self.sensor, motion_of(run)) for run in self.recordings]
-        return (
-            np.concatenate([stream.time_s for stream in streams]),
-            np.concatenate([stream.readings_rad_s for stream in streams]),
-        )
-
-    @property
-    def samples(self) -> NDArray[Any]:
-        """(n,) samples, SAMPLE_DTYPE: counts, board times and sequence numbers as the board sent them."""
-        return np.concatenate([run.samples[self.name] for run in self.recordings])
-
-    def to_dict(self) -> dict[str, Any]:
-        """What is known of the sensor, as plain numbers and texts; not the samples."""
-        return {"name": self.name, **asdict(self.sensor), "samples": len(self.samples)}
-
-    def plot(self) -> "Plot":
-        """The three axes over time, the sweeps shaded."""
-        from rig.notebook.plots import plot_readings
-        from rig.observation.windows import swept
-
-        sweeps = [finished.window for run in self.recordings for finished in swept(run)]
-        return plot_readings(*self.on_arm_clock(), sweeps, f"{self.name}, {self.sensor.mode} readings")
-
-    def row(self) -> tuple[str, ...]:
-        """The sensor in words, under `HEADINGS`."""
-        sensor = self.sensor
-        return self.name, sensor.part, sensor.serial_number, f"{sensor.rate_hz:g}", str(len(self.samples)), sensor.mode
-
-    def __repr__(self) -> str:
-        name, part, serial_number, rate_hz, samples, mode = self.row()
-        return f"<{name}: {part} {serial_number}, {samples} samples at {rate_hz} Hz, {mode}>"
-
-    def _repr_html_(self) -> str:
-        return table(self.name, HEADINGS, [self.row()])
 
 
 @dataclass(frozen=True, eq=False)
@@ -141,12 +66,12 @@ class Run(Mapping[str, Readings]):
     @cached_property
     def _readings(self) -> Mapping[str, Readings]:
         recordings = self.recorded.movement
-        return {name: Readings(name, sensor, recordings) for name, sensor in recordings[0].measuring(RATE).items()}
+        return {name: Readings(name, sensor, recordings) for name, sensor in recordings[0].sensors.items()}
 
     def __getitem__(self, name: str) -> Readings:
         if name not in self._readings:
-            known = ", ".join(self._readings)
-            raise NoSuchSensor("no_such_sensor", f"{self.path} holds no sensor {name}", f"Choose one of: {known}")
+            known = f"Choose one of: {', '.join(self._readings)}" if self._readings else "Give a run that an arm made"
+            raise NoSuchSensor("no_such_sensor", f"{self.path} holds no samples of a sensor {name}", known)
         return self._readings[name]
 
     def __iter__(self) -> Iterator[str]:

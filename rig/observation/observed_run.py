@@ -12,6 +12,7 @@ from rig.estimation.arrays import Array
 from rig.observation.arm_motion import ArmMotion, motion_of, refuse_elsewhere
 from rig.observation.average import Stream, on_clock
 from rig.observation.observe import SensorObservations, observe_sensor
+from rig.observation.timebase import TimeBase
 from rig.observation.windows import finished_dwells, finished_sweeps
 
 
@@ -37,7 +38,7 @@ class ObservedRun:
 
     def one_clock(self, sensor: str, other: str) -> bool:
         """Whether one clock stamps the samples of both."""
-        return self.run.sensors[sensor].clock == self.run.sensors[other].clock
+        return one_clock(self.run, sensor, other)
 
     def time_s(self, sensor: str, beside: str | None = None) -> Array:
         """Times (n,) of all samples of any sensor on the arm's clock.
@@ -45,14 +46,8 @@ class ObservedRun:
         By the time base of the gyroscope `beside`; left out, by the sensor's own or that of the first gyroscope on the
         same clock. Where there is none, by when samples came to the computer, as the arm's states did: to milliseconds.
         """
-        samples = self.run.samples[sensor]
-        stamps_s: Array = samples["board_time_us"] * 1e-6
-        known = (beside, sensor) if beside else (sensor, *self.sensors)
-        base = next((each for each in known if each in self.sensors and self.one_clock(sensor, each)), None)
-        if base is not None:
-            return self.sensors[base].time_base.controller_time_s(stamps_s)
-        came_s = np.interp(samples["host_time_s"], self.run.arm["host_time_s"], self.run.arm["time_s"])
-        return stamps_s + np.median(came_s - stamps_s) if len(stamps_s) else stamps_s
+        bases = {name: seen.time_base for name, seen in self.sensors.items()}
+        return times_s(self.run, sensor, bases, beside)
 
     def delay(self, sensor: str, behind: str) -> Delay | None:
         """How much `sensor` lags the sensor `behind`; None where no one clock stamps the samples of both.
@@ -65,6 +60,26 @@ class ObservedRun:
         middle = np.array([known.reference_s])
         delay_s = float(known.controller_time_s(middle)[0] - late.controller_time_s(middle)[0])
         return Delay(delay_s, float(np.hypot(known.offset_std_s, late.offset_std_s)))
+
+
+def one_clock(run: RunData, sensor: str, other: str) -> bool:
+    """Whether one clock stamps the samples of both sensors of a recording."""
+    return run.sensors[sensor].clock == run.sensors[other].clock
+
+
+def times_s(run: RunData, sensor: str, bases: Mapping[str, TimeBase], beside: str | None = None) -> Array:
+    """Times (n,) of all samples of a sensor on the arm's clock, by what is known of the gyroscopes' `bases`.
+
+    Which of them, `ObservedRun.time_s` says.
+    """
+    samples = run.samples[sensor]
+    stamps_s: Array = samples["board_time_us"] * 1e-6
+    known = (beside, sensor) if beside else (sensor, *bases)
+    base = next((each for each in known if each in bases and one_clock(run, sensor, each)), None)
+    if base is not None:
+        return bases[base].controller_time_s(stamps_s)
+    came_s = np.interp(samples["host_time_s"], run.arm["host_time_s"], run.arm["time_s"])
+    return stamps_s + np.median(came_s - stamps_s) if len(stamps_s) else stamps_s
 
 
 def observe_run(run: RunData, thresholds: ObservationThresholds, superseded: Collection[int] = ()) -> ObservedRun:

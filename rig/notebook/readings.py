@@ -1,0 +1,202 @@
+"""Readings of one sensor in SI units on the arm's clock: rates, accelerations, fields, whatever it measures."""
+
+from collections.abc import Mapping, Sequence
+from dataclasses import asdict, dataclass
+from functools import cached_property
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from rig.data.quantity import ACCELERATION, FIELD, RATE, TEMPERATURE, Quantity, Scalar
+from rig.data.recorded_sensor import RecordedSensor
+from rig.data.run_file import RunData
+from rig.errors import Refused
+from rig.estimation.arrays import Array
+from rig.notebook.frames import frame
+from rig.notebook.html import table
+from rig.observation.arm_motion import motion_of
+from rig.observation.average import on_the_arms_clock
+from rig.observation.observed_run import one_clock, times_s
+from rig.observation.windows import Finished, Window, swept
+
+if TYPE_CHECKING:
+    from pandas import DataFrame
+
+    from rig.notebook.plots import Plot
+
+HEADINGS = ("sensor", "part", "serial number", "measures", "Hz", "samples", "readings")
+
+
+class NoSuchSensor(Refused, KeyError):
+    """There is no sensor of that name; a KeyError as well, so that `name in run` and `run.get(name)` work."""
+
+
+@dataclass(frozen=True, eq=False)
+class Signal:
+    """What a sensor has read of one quantity, in its SI unit.
+
+    `time_s` (n,) is on the arm's clock; `values` are (n, 3), of a temperature or a pressure (n,). `sweeps` are the
+    windows in which the arm swept.
+    """
+
+    name: str
+    quantity: Quantity | Scalar
+    time_s: Array
+    values: Array
+    sweeps: Sequence[Window]
+
+    @property
+    def unit(self) -> str:
+        """The unit of the values."""
+        return self.quantity.unit
+
+    def columns(self) -> dict[str, Array]:
+        """Columns (n,) by name and unit: `x_rad_s`, `y_rad_s`, `z_rad_s`."""
+        values = self.values.reshape(len(self.time_s), -1)
+        return {name: values[:, i] for i, name in enumerate(self.quantity.columns)}
+
+    def to_frame(self) -> "DataFrame":
+        """The columns as a pandas table over `time_s`. Raises Refused `missing_extra`."""
+        return frame(self.columns(), self.time_s.tolist(), "time_s")
+
+    def plot(self) -> "Plot":
+        """A plot of the values over time, the sweeps shaded. Raises Refused `missing_extra`."""
+        from rig.notebook.plots import plot_readings
+
+        letters = getattr(self.quantity, "axes", ("",))
+        named = dict(zip(letters, self.columns().values(), strict=True))
+        return plot_readings(self.time_s, named, self.sweeps, f"{self.name}, {self.quantity.name} {self.unit}")
+
+    def __repr__(self) -> str:
+        return f"<{self.name}, {self.quantity.name}: {len(self.time_s)} readings in {self.unit}>"
+
+
+@dataclass(frozen=True, eq=False)
+class Readings:
+    """One sensor's readings in all recordings of a movement, in the order they were made.
+
+    `rate`, `acceleration`, `field` and `temperature` are its signals, as far as it measures them; `signal` finds others.
+    """
+
+    name: str
+    sensor: RecordedSensor
+    recordings: Sequence[RunData]
+
+    @property
+    def quantities(self) -> tuple[str, ...]:
+        """The names of what it measures; the first is what `on_arm_clock` and `plot` show."""
+        names = [each.quantity for each in self.sensor.channels]
+        return tuple(sorted(names, key=lambda name: name != RATE.name))
+
+    @property
+    def rate(self) -> Signal:
+        """The turn rates in rad/s of a gyroscope."""
+        return self.signal(RATE.name)
+
+    @property
+    def acceleration(self) -> Signal:
+        """The specific forces in m/s² of an accelerometer; at rest they point up."""
+        return self.signal(ACCELERATION.name)
+
+    @property
+    def field(self) -> Signal:
+        """The magnetic fields in T of a magnetometer."""
+        return self.signal(FIELD.name)
+
+    @property
+    def temperature(self) -> Signal:
+        """The temperatures in °C of its own thermometer."""
+        return self.signal(TEMPERATURE.name)
+
+    def signal(self, quantity: str) -> Signal:
+        """The readings of the quantity of that name. Raises Refused `no_such_quantity`; Fault as `on_arm_clock` does."""
+        channel = next((each for each in self.sensor.channels if each.quantity == quantity), None)
+        if channel is None:
+            raise Refused(
+                "no_such_quantity",
+                f"the sensor {self.name} does not measure {quantity}",
+                f"It measures {', '.join(self.quantities)}",
+            )
+        values = np.concatenate([channel.values(run.samples[self.name]) for run in self.recordings])
+        return Signal(self.name, channel.measures, self._time_s, values, self._windows)
+
+    def on_arm_clock(self) -> tuple[Array, Array]:
+        """Controller times (n,) in s and readings (n, 3) in SI: of a gyroscope in rad/s, else of what it measures.
+
+        Raises Fault as `estimate_time_base` does.
+        """
+        signal = self.signal(self.quantities[0])
+        return signal.time_s, signal.values
+
+    @property
+    def samples(self) -> NDArray[Any]:
+        """(n,) samples, SAMPLE_DTYPE: counts, board times and sequence numbers as the board sent them."""
+        return np.concatenate([run.samples[self.name] for run in self.recordings])
+
+    def to_frame(self, sweep: int | None = None) -> "DataFrame":
+        """All that it measures as a pandas table over `time_s`, SI units in the names; of one `sweep` alone if wanted.
+
+        Sweeps are numbered as in `result.json`; where one was repeated, the last counts. Raises Refused
+        `missing_extra`, `no_such_sweep`; Fault as `on_arm_clock` does.
+        """
+        columns: dict[str, Array] = {}
+        for quantity in self.quantities:
+            columns |= self.signal(quantity).columns()
+        inside = np.ones(len(self._time_s), dtype=np.bool_)
+        if sweep is not None:
+            window = self._window(sweep)
+            inside = (self._time_s >= window.start_s) & (self._time_s <= window.end_s)
+        times = self._time_s[inside].tolist()
+        return frame({name: column[inside] for name, column in columns.items()}, times, "time_s")
+
+    def to_dict(self) -> dict[str, Any]:
+        """What is known of the sensor, as plain numbers and texts; not the samples."""
+        return {"name": self.name, **asdict(self.sensor), "samples": len(self.samples)}
+
+    def plot(self) -> "Plot":
+        """A plot of the three axes over time, the sweeps shaded. Raises Refused `missing_extra`."""
+        return self.signal(self.quantities[0]).plot()
+
+    def row(self) -> tuple[str, ...]:
+        """The sensor in words, under `HEADINGS`."""
+        sensor, measures = self.sensor, ", ".join(self.quantities)
+        rate = f"{sensor.rate_hz:g}"
+        return self.name, sensor.part, sensor.serial_number, measures, rate, str(len(self.samples)), sensor.mode
+
+    @cached_property
+    def _time_s(self) -> Array:
+        """Times (n,) of all samples, found once; of readings from files, their file's."""
+        if any(run.elsewhere is not None for run in self.recordings):
+            times_of_file: Array = self.samples["host_time_s"]
+            return times_of_file
+        return np.concatenate([times_s(run, self.name, self._bases(run)) for run in self.recordings])
+
+    def _bases(self, run: RunData) -> Mapping[str, Any]:
+        """The clock by the sensor's own rates, else by those of the first gyroscope on its clock; {} without any."""
+        gyroscopes = run.measuring(RATE)
+        others = (each for each in gyroscopes if one_clock(run, self.name, each))
+        by = self.name if self.name in gyroscopes else next(others, None)
+        return {} if by is None else {by: on_the_arms_clock(run.samples[by], gyroscopes[by], motion_of(run)).clock}
+
+    @cached_property
+    def _swept(self) -> Sequence[Finished]:
+        return [finished for run in self.recordings for finished in swept(run)]
+
+    @property
+    def _windows(self) -> Sequence[Window]:
+        return [finished.window for finished in self._swept]
+
+    def _window(self, sweep: int) -> Window:
+        found = {finished.sweep.index: finished.window for finished in self._swept}
+        if sweep not in found:
+            known = f"Choose one of: {', '.join(map(str, sorted(found)))}" if found else "Leave the sweep out"
+            raise Refused("no_such_sweep", f"no sweep {sweep} was finished in this recording", known)
+        return found[sweep]
+
+    def __repr__(self) -> str:
+        name, part, serial_number, measures, rate_hz, samples, mode = self.row()
+        return f"<{name}: {part} {serial_number}, {measures}, {samples} samples at {rate_hz} Hz, {mode}>"
+
+    def _repr_html_(self) -> str:
+        return table(self.name, HEADINGS, [self.row()])
