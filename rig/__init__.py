@@ -5,50 +5,77 @@ In a notebook:
     import rig
     run = rig.load("runs/2026-11-21T10-00-00Z-six_observation")   # a run folder or a run.h5
     t, rate = run["gyro"].on_arm_clock()                          # (n,) s, (n, 3) rad/s
-    result = rig.solve(run)
-    result["gyro"].scale, result["gyro"].std
-    result.plot()
-    rig.compare(run, "gyro", "reference").plot()
+    run["gyro"].to_frame(sweep=3)                                 # pandas, SI units in the names
+    result = rig.solve(run)                                       # or rig.load_result(run.path)
+    result["gyro"].scale, result["gyro"].scale_expanded           # ± U
+    result["gyro"].apply(readings)                                # (n, 3) rad/s of one's own
+    rig.changes(rig.load("runs/of_last_year"), run)               # E_n
+    rig.calibrations("LSM9DS1-001").to_frame()                    # all of a sensor, out of the history
 
-These names are the public ones; where they are made may change. To import them loads no arm driver.
+docs/how-to/notebook.md goes through all of it. These names are the public ones; where they are made may change. To
+import them loads no arm driver. What is refused raises `Refused`, what fails `Fault`: `error.name` finds it in
+docs/errors.md.
 """
 
 from typing import TYPE_CHECKING, Any
 
 if TYPE_CHECKING:
+    from rig.commands.from_python import check, export, plan, run, write_certificate
     from rig.errors import Fault, Refused
     from rig.history.store import open_history
+    from rig.notebook.calibrations import Calibration
     from rig.notebook.comparisons import SensorComparison, compare
-    from rig.notebook.results import Calibration, Result, solve
-    from rig.notebook.runs import Readings, Run, load
+    from rig.notebook.history import Calibrations, Changes, SensorChanges, calibrations, changes
+    from rig.notebook.readings import Readings, Signal
+    from rig.notebook.results import Result, load_result, solve
+    from rig.notebook.runs import Run, load
+    from rig.report.plan_table import Planned
 
 __version__ = "0.1.0"
 __all__ = [
     "Calibration",
+    "Calibrations",
+    "Changes",
     "Fault",
+    "Planned",
     "Readings",
     "Refused",
     "Result",
     "Run",
+    "SensorChanges",
     "SensorComparison",
+    "Signal",
     "__version__",
+    "calibrations",
+    "changes",
+    "check",
     "compare",
+    "export",
     "load",
+    "load_result",
     "open_history",
+    "plan",
+    "run",
     "solve",
+    "write_certificate",
 ]
 
 _PLACES = {
+    **dict.fromkeys(("check", "export", "plan", "run", "write_certificate"), "rig.commands.from_python"),
     **dict.fromkeys(("Fault", "Refused"), "rig.errors"),
     "open_history": "rig.history.store",
+    "Calibration": "rig.notebook.calibrations",
     **dict.fromkeys(("SensorComparison", "compare"), "rig.notebook.comparisons"),
-    **dict.fromkeys(("Calibration", "Result", "solve"), "rig.notebook.results"),
-    **dict.fromkeys(("Readings", "Run", "load"), "rig.notebook.runs"),
+    **dict.fromkeys(("Calibrations", "Changes", "SensorChanges", "calibrations", "changes"), "rig.notebook.history"),
+    **dict.fromkeys(("Readings", "Signal"), "rig.notebook.readings"),
+    **dict.fromkeys(("Result", "load_result", "solve"), "rig.notebook.results"),
+    **dict.fromkeys(("Run", "load"), "rig.notebook.runs"),
+    "Planned": "rig.report.plan_table",
 }
 
 
 def __getattr__(name: str) -> Any:
-    """The public functions, each imported when it is first asked for: the command line starts without them."""
+    """The public names, each imported when it is first asked for: the command line starts without them."""
     if name not in _PLACES:
         raise AttributeError(f"module {__name__!r} has no attribute {name!r}")
     from importlib import import_module

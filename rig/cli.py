@@ -2,13 +2,13 @@
 
 import argparse
 import os
-import signal
 import sys
 from collections.abc import Callable, Sequence
 from importlib import import_module
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING
 
 from rig import __version__
+from rig.commands.endings import end_by_interrupt, ignore_endings
 from rig.commands.standard_streams import keep_streams_usable
 from rig.errors import Fault, RigError
 from rig.errors.quoting import printable_lines
@@ -44,14 +44,6 @@ _COMMANDS = {
     "world": "only the simulated laboratory, in the foreground, for any client",
 }
 FAULT, INTERRUPTED = Fault.exit_status, 130
-# Every way to end a command from outside. Left alone, a closed terminal, Ctrl-\ and Ctrl-Z would end or suspend this
-# process while the arm goes on moving.
-_ENDING_SIGNALS = tuple(
-    getattr(signal, name)
-    for name in ("SIGINT", "SIGTERM", "SIGHUP", "SIGQUIT", "SIGTSTP")
-    if hasattr(signal, name)  # Windows has the first two
-)
-_HANGING_UP = getattr(signal, "SIGHUP", None)
 
 
 def main(arguments: Sequence[str] | None = None) -> int:
@@ -69,11 +61,7 @@ def main(arguments: Sequence[str] | None = None) -> int:
 def guarded(command: Callable[[], int]) -> int:
     """Run a command; turn every named error into one message on stderr and its exit status."""
     keep_streams_usable()
-    for number in _ENDING_SIGNALS:
-        # A script's `&` starts programs that ignore Ctrl-C: an arm must stop by it all the same. That a run is to
-        # outlive its terminal is said by ignoring SIGHUP alone (nohup).
-        if number != _HANGING_UP or signal.getsignal(number) != signal.SIG_IGN:
-            signal.signal(number, _interrupt)
+    end_by_interrupt()
     try:
         status = command()
         sys.stdout.flush()
@@ -81,8 +69,7 @@ def guarded(command: Callable[[], int]) -> int:
     except RigError as error:
         return _ended(str(error), error.exit_status)
     except KeyboardInterrupt as interrupt:
-        for number in _ENDING_SIGNALS:
-            signal.signal(number, signal.SIG_IGN)  # all is stopped: an impatient second one has nothing left to end
+        ignore_endings()  # all is stopped: an impatient second one has nothing left to end
         return _ended(str(interrupt) or "interrupted", INTERRUPTED)
     except OSError as error:
         return _ended(str(Fault("system", f"the system refused ({error})", "Mend that, then try again")), FAULT)
@@ -99,10 +86,6 @@ def guarded(command: Callable[[], int]) -> int:
 def _ended(text: str, status: int) -> int:
     print(f"rig: {printable_lines(text)}", file=sys.stderr)
     return status
-
-
-def _interrupt(*_: Any) -> None:
-    raise KeyboardInterrupt
 
 
 def _parser(meant: str | None) -> argparse.ArgumentParser:

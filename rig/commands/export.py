@@ -29,11 +29,17 @@ def add(parser: ArgumentParser) -> None:
 
 
 def run(options: Namespace) -> int:
+    """Write the files as `files` does; returns 0."""
+    files(options)
+    return 0
+
+
+def files(options: Namespace) -> list[Path]:
     """Readings of the first movement, or the calibrations of a run that passed, into `--out`.
 
     `--at-temperature`: a temperature in °C, and the run of `bias_drift` that tells how to get there.
-    Returns 0. Raises Refused `report_folder`, `bad_option`, `missing_extra`, as `refuse_links` does, of readings as
-    `open_run` and `observe_runs`, of calibrations as `passed_result`, `at_temperature` and `exported`.
+    Returns the files. Raises Refused `report_folder`, `bad_option`, `missing_extra`, as `refuse_links` does, of readings
+    as `open_run` and `observe_runs`, of calibrations as `passed_result`, `at_temperature` and `exported`.
     """
     from rig.observation.observed_run import observe_runs
     from rig.plans.recorded import open_run
@@ -60,7 +66,7 @@ def run(options: Namespace) -> int:
         raise Refused("report_folder", f"{folder} cannot be written: {error}", "Choose another with --out") from error
     for path in written:
         say(str(path))
-    return 0
+    return written
 
 
 def _made(folder: Path, *, own: bool) -> None:

@@ -1,8 +1,12 @@
 """`rig plan`: the dry run. Connects to nothing."""
 
 from argparse import ArgumentParser, Namespace
+from typing import TYPE_CHECKING
 
 from rig.commands.config_arguments import add_config, add_json, add_script
+
+if TYPE_CHECKING:
+    from rig.report.plan_table import Planned
 
 
 def add(parser: ArgumentParser) -> None:
@@ -13,7 +17,15 @@ def add(parser: ArgumentParser) -> None:
 
 
 def run(options: Namespace) -> int:
-    """Print the plan from the home pose, what its attitudes will tell, and which damage its checks; returns 0.
+    """Print the plan as `planned` has it; returns 0."""
+    from rig.report.plan_table import print_plan
+
+    print_plan(planned(options), as_json=options.json)
+    return 0
+
+
+def planned(options: Namespace) -> "Planned":
+    """The plan from the home pose, what its attitudes will tell, and which damage its checks.
 
     Raises `Refused` when a motion breaks a limit, and when the attitudes do not tell enough.
     """
@@ -22,12 +34,11 @@ def run(options: Namespace) -> int:
     from rig.arm.carried import carried_by
     from rig.arm.preflight import plan_problems, refuse
     from rig.commands.configured import configured
-    from rig.report.plan_table import print_plan
+    from rig.report.plan_table import Planned
 
     found = configured(options.config, options.overrides, options.script)
     steps = found.phase.plan()
     config = found.loaded.config
     refuse(plan_problems(steps, carried_by(config.arm)))
     account, told_from = attitude_account(config, steps), planned_told_from(config, steps)
-    print_plan(steps, account, told_from, repeated=found.phase.follows is not None, as_json=options.json)
-    return 0
+    return Planned(steps, account, told_from, repeated=found.phase.follows is not None)

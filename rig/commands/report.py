@@ -33,10 +33,16 @@ def add(parser: ArgumentParser) -> None:
 
 
 def run(options: Namespace) -> int:
+    """Write the certificate as `documents` does; returns 0."""
+    documents(options)
+    return 0
+
+
+def documents(options: Namespace) -> list[Path]:
     """Certificate of a run folder or its result.json: HTML, and with `--dcc` and `--pdf` in these forms, into `--out`.
 
     `--reversal` is what `rig reversal` wrote of its magnetometers; `--history` where it is noted, the user's own
-    history by default, and never one that the folder names. Returns 0. Raises Refused `report_folder`, and as
+    history by default, and never one that the folder names. Returns the files. Raises Refused `report_folder`, and as
     `read_result`, `read_reversal`, `refuse_links`, `certificate_of`, `stated_in`, `digital_certificate` and `pdf_of`.
     """
     from rig.commands.remember import remember_certificate
@@ -77,7 +83,7 @@ def run(options: Namespace) -> int:
     missed = remember_certificate(file.parent, file.read_text(encoding="utf-8"), issued, named_history(options.history))
     if missed is not None:
         say(f"rig: the certificate is in no history: {missed}", sys.stderr)
-    return 0
+    return [folder / name for name in written]
 
 
 def _digital(certificate: "Certificate", *, wanted: bool) -> dict[str, bytes]:

@@ -2,9 +2,13 @@
 
 from argparse import ArgumentParser, Namespace
 from pathlib import Path
+from typing import TYPE_CHECKING
 
 from rig.commands.config_arguments import add_config, add_script
 from rig.commands.page_arguments import add_page, wish
+
+if TYPE_CHECKING:
+    from rig.commands.configured import Configured
 
 
 def add(parser: ArgumentParser, *, script: bool = True) -> None:
@@ -34,6 +38,14 @@ def run(options: Namespace) -> int:
     """Run the procedure in a new run folder; on a page too if wanted. Returns 0 passed, 1 verdict failed."""
     page = wish(options)
     from rig.commands.carry_out import carry_out
+
+    folder, found = begun(options)
+    moved = frozenset(options.other_board)
+    return carry_out(folder, found, assume_yes=options.yes, moved=moved, as_json=options.json, page=page)
+
+
+def begun(options: Namespace) -> "tuple[Path, Configured]":
+    """A new run folder, and what is to be run in it. Raises Refused as `configured` and `new_folder`."""
     from rig.commands.configured import configured
     from rig.data.own_texts import note_own
     from rig.data.run_folder import new_folder
@@ -41,5 +53,4 @@ def run(options: Namespace) -> int:
     found = configured(options.config, options.overrides, options.script)
     folder = new_folder(options.out, found.loaded, found.script.text, found.script.identity)
     note_own(found.loaded.text, found.script.text)
-    moved = frozenset(options.other_board)
-    return carry_out(folder, found, assume_yes=options.yes, moved=moved, as_json=options.json, page=page)
+    return folder, found

@@ -86,7 +86,7 @@ class Calibration:
 
     @property
     def correction_matrix(self) -> Array:
-        """(3, 3) matrix M by which `apply`, board and C header correct; diag(K) where the axes are not corrected."""
+        """(3, 3) matrix M by which `apply` and `calibration.h` correct; diag(K) where the axes are not corrected."""
         whole = getattr(self.entry, "correction_matrix", None)
         return np.diag(self.scale) if whole is None else np.array(whole)
 

@@ -72,7 +72,7 @@ class SensorChanges:
 
     @property
     def beyond(self) -> tuple[Change, ...]:
-        """Those that are more than the uncertainties of both explain."""
+        """The changes that are more than the uncertainties of both explain."""
         return tuple(each for each in self.changes if each.beyond)
 
     def to_frame(self) -> "DataFrame":

@@ -3,7 +3,7 @@
 import json
 import math
 from collections.abc import Mapping, Sequence
-from dataclasses import asdict
+from dataclasses import asdict, dataclass
 from typing import Any
 
 from rich.box import SIMPLE
@@ -20,10 +20,41 @@ from rig.report.told_words import size_words, told_from_entries
 from rig.station.plain_text import plain
 
 
-def plan_document(plan: Plan, account: AttitudeAccount | None, told: Told, *, repeated: bool) -> dict[str, Any]:
-    """The plan for machines: SI units, every field of every step; `repeated` if it is done once more, to verify."""
+@dataclass(frozen=True, eq=False)
+class Planned:
+    """A plan, what its attitudes tell if it has any, and from what sizes on its checks tell that something happened.
+
+    It is `repeated` if it is done once more, to verify.
+    """
+
+    plan: Plan
+    account: AttitudeAccount | None
+    told: Told
+    repeated: bool
+
+    @property
+    def steps(self) -> Sequence[Step]:
+        """The motions, rests and dwells in their order; angles in rad, speeds in rad/s, times in s."""
+        return self.plan.steps
+
+    @property
+    def duration_s(self) -> float:
+        """How long the movement takes, without settling and without what repeats it."""
+        return self.plan.duration_s
+
+    def to_dict(self) -> dict[str, Any]:
+        """The plan as `rig plan --json` says it: plain numbers, lists and texts in SI units."""
+        return plan_document(self)
+
+    def __repr__(self) -> str:
+        return f"<plan: {_measured(self.plan)}{len(self.plan.motions)} motions, {self.duration_s:.1f} s>"
+
+
+def plan_document(planned: Planned) -> dict[str, Any]:
+    """The plan for machines: SI units, every field of every step."""
+    plan, account, told = planned.plan, planned.account, planned.told
     steps = [{"kind": type(step).__name__.lower(), **asdict(step)} for step in plan.steps]
-    document = {"schema": "rig.plan/1", "duration_s": plan.duration_s, "repeated": repeated, "steps": steps}
+    document = {"schema": "rig.plan/1", "duration_s": plan.duration_s, "repeated": planned.repeated, "steps": steps}
     if account is not None:
         document |= {"settling_s": plan.settling_s, "attitudes": account_document(account)}
     for key, by_sensor in (("told_from", told.rates), ("acceleration_told_from", told.accelerations)):
@@ -33,11 +64,12 @@ def plan_document(plan: Plan, account: AttitudeAccount | None, told: Told, *, re
     return document
 
 
-def print_plan(plan: Plan, account: AttitudeAccount | None, told: Told, *, repeated: bool, as_json: bool) -> None:
+def print_plan(planned: Planned, *, as_json: bool) -> None:
     """The plan on stdout: a table in degrees for people, JSON in SI units for machines."""
     if as_json:
-        print(json.dumps(plan_document(plan, account, told, repeated=repeated), indent=2, allow_nan=False))
+        print(json.dumps(plan_document(planned), indent=2, allow_nan=False))
         return
+    plan, account, told = planned.plan, planned.account, planned.told
     console = Console(highlight=False)
     table = Table(title="plan, from the home pose", title_justify="left", box=SIMPLE)
     for heading in ("at s", "step", "for s", "joints °", "°/s", "°/s²"):
@@ -48,15 +80,13 @@ def print_plan(plan: Plan, account: AttitudeAccount | None, told: Told, *, repea
         table.add_row(f"{at_s:.1f}", name, f"{step.duration_s:.2f}", *_motion(step))
         at_s += step.duration_s
     console.print(table)
-    measured = f"{len(plan.sweeps)} sweeps, " if plan.sweeps or not plan.dwells else ""
-    measured += f"{len(plan.dwells)} dwells, " if plan.dwells else ""
-    console.print(f"{measured}{len(plan.motions)} motions, {plan.duration_s:.1f} s; all within limits")
+    console.print(f"{_measured(plan)}{len(plan.motions)} motions, {plan.duration_s:.1f} s; all within limits")
     if plan.dwells:
         whole_s = plan.duration_s + plan.settling_s
         console.print(
             f"Before each dwell the sensors may take {plan.dwells[0].settle_s:g} s to settle: {whole_s:.1f} s at most"
         )
-    if repeated:
+    if planned.repeated:
         console.print(f"If the calibration passes, the same once more to verify it: {2 * plan.duration_s:.1f} s in all")
     if account is not None:
         print_account(console, account)
@@ -67,6 +97,12 @@ def print_plan(plan: Plan, account: AttitudeAccount | None, told: Told, *, repea
     for what, by_sensor in (("to gyroscopes", told.rates), ("to accelerometers", told.accelerations)):
         if by_sensor:
             console.print(_told_table(what, by_sensor))
+
+
+def _measured(plan: Plan) -> str:
+    """How many sweeps and dwells, before what else there is to count."""
+    sweeps = f"{len(plan.sweeps)} sweeps, " if plan.sweeps or not plan.dwells else ""
+    return sweeps + (f"{len(plan.dwells)} dwells, " if plan.dwells else "")
 
 
 def _told_table(what: str, by_sensor: Mapping[str, Sequence[ToldFrom]]) -> Table:

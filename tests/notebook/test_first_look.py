@@ -16,8 +16,11 @@ def test_the_notebook_runs_and_shows_tables_and_pictures() -> None:
     NotebookClient(notebook, timeout=100, resources={"metadata": {"path": NOTEBOOK.parent}}).execute()
     shown = [output.get("data", {}) for cell in notebook.cells if cell.cell_type == "code" for output in cell.outputs]
     assert sum("image/png" in data for data in shown) == 3
-    assert sum("text/html" in data for data in shown) == 4
+    assert sum(data.get("text/html", "").startswith("<table>") for data in shown) == 5
+    assert sum("dataframe" in data.get("text/html", "") for data in shown) == 1
     assert any("verdict: pass" in data.get("text/html", "") for data in shown)
+    said = str([cell.get("outputs") for cell in notebook.cells])
+    assert all(words in said for words in ("wrong_unit: ", "°/s", "all within limits", "certificate.html"))
 
 
 def test_no_output_is_kept_in_the_notebook() -> None:
