@@ -1,5 +1,6 @@
 """One run from its configuration to its verdict, in its folder and its laboratory: `rig run` and `rig resume`."""
 
+import shlex
 from contextlib import ExitStack
 from pathlib import Path
 from typing import TYPE_CHECKING
@@ -21,7 +22,7 @@ from rig.station.station import Stations, always_yes
 from rig.station.view import view
 
 if TYPE_CHECKING:
-    from rig.page.shown import About
+    from rig.page.about import About
 
 
 def carry_out(
@@ -68,7 +69,7 @@ def carry_out(
 
 
 def _about(folder: Path, configured: Configured, page: PageWish | None) -> "About":
-    from rig.page.shown import About
+    from rig.page.about import About
 
     config = configured.loaded.config
     parts = {name: f"{each.part} {each.serial_number}" for name, each in config.sensors.items()}
@@ -79,4 +80,12 @@ def _about(folder: Path, configured: Configured, page: PageWish | None) -> "Abou
         may_answer=page is not None and page.may_answer,
         parts=parts,
         simulated=configured.loaded.simulated,
+        storing=_storing(folder, configured),
     )
+
+
+def _storing(folder: Path, configured: Configured) -> str | None:
+    """The command that stores the run's calibration on the board; a simulated one forgets it with the command's end."""
+    if configured.loaded.simulated or not configured.loaded.config.parts_on_board:
+        return None
+    return f"rig board calibration write {shlex.quote(str(folder / CONFIG))} {shlex.quote(str(folder))}"

@@ -17,8 +17,9 @@ from rig.station.confirm import ask_operator
 from rig.station.plain_text import say
 
 if TYPE_CHECKING:
+    from rig.page.about import About
     from rig.page.serving import Address
-    from rig.page.shown import About
+    from rig.station.events import RunEvent
     from rig.station.station import Listener
 
 Answer = Callable[[Sequence[str], str], bool]
@@ -137,7 +138,6 @@ def operators_page(wanted: PageWish | None, folder: Path, about: "Callable[[], A
     with ExitStack() as stack:
         url = stack.enter_context(serving(feed, control, folder, wanted.address()))
         lookout = stack.enter_context(looking_out(folder, feed))
-        say(f"page: {url}", sys.stderr)
         stack.enter_context(control.stoppable())
 
         def asked(announcement: Sequence[str], to_do: str) -> bool:
@@ -145,7 +145,22 @@ def operators_page(wanted: PageWish | None, folder: Path, about: "Callable[[], A
             agreed = control.ask(announcement, to_do)
             return ask_operator(announcement, to_do) if agreed is None else agreed
 
-        yield OperatorsPage((feed, lookout), asked if wanted.may_answer else None, stay_for_the_operator)
+        yield OperatorsPage((feed, lookout, _Address(url)), asked if wanted.may_answer else None, stay_for_the_operator)
+
+
+class _Address:
+    """A listener that says where the page is once it stays: most refusals end a run before, and the page with it."""
+
+    def __init__(self, url: str) -> None:
+        self._url: str | None = url
+
+    def event(self, event: "RunEvent") -> None:
+        """Take an event, as a Listener does."""
+        from rig.station.events import PreflightPassed, Prompt
+
+        if self._url is not None and isinstance(event, PreflightPassed | Prompt):
+            say(f"page: {self._url}", sys.stderr)
+            self._url = None
 
 
 def stay_for_the_operator() -> None:

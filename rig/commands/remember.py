@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING
 
 from rig.commands.waiting import answer_of
 from rig.errors import RigError
-from rig.station.events import NotRemembered, Remembered, RunEvent
+from rig.station.events import NotRemembered, Remembered, RunEvent, Since
 
 if TYPE_CHECKING:
     from rig.config.judging_sections import HistorySection
@@ -63,7 +63,7 @@ def _remembered(folder: Path, chosen: Callable[[], "Place | None"]) -> tuple[Run
     except Exception as error:  # whatever it is, the run is finished and its result is written
         return NotRemembered(folder, f"{label}: {why(error)}"), ()
     beyond = tuple(said for each in beside if (said := _changed(each)) is not None)
-    return Remembered(label, numbers, beyond, usual=where == own_place(None)), beside
+    return Remembered(label, numbers, beyond, tuple(map(_since, beside)), usual=where == own_place(None)), beside
 
 
 def remember_certificate(folder: Path, result: str, certificate: "Issued", history: str | None = None) -> str | None:
@@ -150,6 +150,17 @@ def why(error: Exception) -> str:
     if isinstance(error, TimeoutError):
         return f"it has not answered within {ANSWER_S:g} s"
     return f"{type(error).__name__}: {error}"
+
+
+def _since(each: Beside) -> Since:
+    return Since(
+        each.now.sensor,
+        each.now.quantity,
+        each.before.id,
+        each.before.started_utc[:10],
+        {change.name: (change.before.value, change.before.expanded) for change in each.changes},
+        {change.name: change.normalised_error for change in each.changes},
+    )
 
 
 def _beside(history: "History", run_id: int) -> "list[Beside]":

@@ -16,9 +16,9 @@ from rig.station.plain_text import say
 if TYPE_CHECKING:
     from rig.data.result_file import ResultDocument
     from rig.data.run_file import RunData
+    from rig.page.about import About
     from rig.page.feed import Feed
     from rig.page.replay import Moment
-    from rig.page.shown import About
     from rig.station.events import RunEvent
 
 LOG_TAIL = 3  # lines of the log that say how a run without a result ended
@@ -82,7 +82,7 @@ def run(options: Namespace) -> int:
 
 def _about(folder: Path, runs: "list[RunData]") -> "About":
     from rig.arm.identity import calls_itself_simulated
-    from rig.page.shown import About
+    from rig.page.about import About
 
     parts: dict[str, str] = {}
     for run in runs:

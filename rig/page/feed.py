@@ -8,15 +8,16 @@ by then gets none; once it reads again, it gets everything at once as it is by t
 import asyncio
 import json
 import threading
+import time
 from collections.abc import AsyncGenerator
 from typing import Any
 
 from rig.page.rows import Look
 from rig.page.shown import Shown
-from rig.station.events import RunEvent
+from rig.station.events import ArmConnected, ArmSeen, RunEvent
 
 FRAME_S = 0.1
-SIGN_OF_LIFE_S = 5.0  # without news
+SIGN_OF_LIFE_S = 0.8  # without news: a browser that hears nothing for 2 s says so
 CLIENTS = 32  # browsers at a time that have the token
 STRANGERS = 16  # … and that have none
 
@@ -28,11 +29,18 @@ class Feed:
         self._shown = shown
         self._lock = threading.Lock()
         self._sent = 0  # points that were in a frame
+        self._seen_s: float | None = None  # when the arm was seen last, with the readings
+        self._seen_at = ""  # … by this computer's clock, for people
 
     def event(self, event: RunEvent) -> None:
         """Take an event, as a Listener does: it changes what is shown, waits for nobody."""
         with self._lock:
+            before = self._shown.ended
             self._shown.take(event)
+            if isinstance(event, ArmSeen | ArmConnected):
+                self._seen_s, self._seen_at = time.monotonic(), _clock()
+            if self._shown.ended and not before:
+                self._shown.put("ended", {"at": _clock(), "seen_at": self._seen_at})
 
     def look(self, look: Look) -> None:
         """What the recording amounts to so far, from any thread."""
@@ -47,7 +55,9 @@ class Feed:
     def whole(self) -> bytes:
         """Everything, for a browser that has nothing yet."""
         with self._lock:
-            return _frame("all", {**self._shown.sections, "points": self._shown.history.since(0)})
+            age_s = None if self._seen_s is None else round(time.monotonic() - self._seen_s, 1)
+            points = self._shown.history.since(0)
+            return _frame("all", {**self._shown.sections, "points": points, "age_s": age_s})
 
     def news(self) -> bytes | None:
         """What has changed since the last time, None if nothing has."""
@@ -160,6 +170,10 @@ class Broadcast:
                     return
         finally:
             self._mailboxes.pop(mailbox, None)
+
+
+def _clock() -> str:
+    return time.strftime("%H:%M:%S")
 
 
 def _frame(name: str, document: dict[str, Any]) -> bytes:

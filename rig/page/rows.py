@@ -1,6 +1,6 @@
 """Rows of the page's tables: observations and parameters, of a run that goes on and of one with its result."""
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any
 
@@ -10,6 +10,7 @@ from rig.analysis.partial_results import SoFar
 from rig.data.quantity import ACCELERATION, RATE, Unit
 from rig.data.result_file import ResultDocument
 from rig.errors import Fault
+from rig.estimation.arrays import Array
 from rig.estimation.coverage import COVERAGE_FACTOR
 from rig.estimation.vector_model import VectorSolution
 from rig.observation.acceleration import DwellReading
@@ -32,7 +33,7 @@ class Look:
 
 
 def observation_row(sensor: str, observation: Observation) -> Row:
-    """A revolution the host has averaged: what the sensor read along the turn stands beside 2π/T."""
+    """A revolution the host has averaged: what one axis read stands beside the part of 2π/T that is along it."""
     average = observation.average
     return {
         "sensor": sensor,
@@ -43,12 +44,18 @@ def observation_row(sensor: str, observation: Observation) -> Row:
         "axis": observation.axis,
         "sign": observation.sign,
         "speed_rad_s": float(observation.speed_rad_s),
+        "along": along(observation.axis_flange),
         "mean_rad_s": rounded(tuple(average.mean_rad_s.tolist())),
         "std_rad_s": float(average.mean_std_rad_s["xyz".index(observation.axis)]),
         "samples": average.samples,
         "lost": observation.lost,
         "refused": None,
     }
+
+
+def along(axis_flange: Sequence[float] | Array) -> float:
+    """The part of a turn about a unit vector (3,) that the nearest axis feels, of a sensor mounted along the flange."""
+    return float(np.max(np.abs(axis_flange)))
 
 
 def dwell_row(sensor: str, dwell: DwellReading, gravity_m_s2: float | None) -> Row:

@@ -1,20 +1,21 @@
 """What the page shows, made of a run's events. No thread, no clock, and of files only the result that is told of."""
 
-from dataclasses import asdict, dataclass, field
+from dataclasses import asdict
 from typing import Any
 
-from rig.arm.identity import model_found
-from rig.arm.kinematics import NOMINAL, DenavitHartenberg
+from rig.analysis.check import Check
+from rig.arm.kinematics import NOMINAL
 from rig.arm.motion import Dwell, Rest, Step, Sweep
-from rig.arm.state import JOINT_NAMES, ArmReport, ArmState, RobotMode, RuntimeState, SafetyMode
 from rig.data.events import BoardNotObserved, BoardObserved
 from rig.data.installed_kinds import measured
 from rig.data.quantity import TEMPERATURE
 from rig.data.result_file import read_result
 from rig.data.run_folder import RESULT
-from rig.errors import RigError
+from rig.page.about import About
+from rig.page.arm import connected, geometry, stance
 from rig.page.history import History, rounded
-from rig.page.rows import Look, dwell_row, observation_row, parameter_rows
+from rig.page.outcome import after_fault, after_verdict, outcome_rows, since_rows
+from rig.page.rows import Look, along, dwell_row, observation_row, parameter_rows
 from rig.report.certificate.writer import PAGE as CERTIFICATE
 from rig.station.events import (
     Advice,
@@ -22,6 +23,7 @@ from rig.station.events import (
     ArmConnected,
     ArmSeen,
     AttitudeRead,
+    CalibrationStored,
     Checked,
     Crashed,
     DocumentWritten,
@@ -33,8 +35,8 @@ from rig.station.events import (
     PreflightPassed,
     Progress,
     Prompt,
+    Remembered,
     RunEvent,
-    RunFolderWritten,
     SamplesTaken,
     SensorSamples,
     StepFinished,
@@ -47,20 +49,6 @@ LINES = 40  # of what was said last
 ENDINGS = (VerdictReached, Failed, Interrupted, Crashed)
 
 
-@dataclass(frozen=True, slots=True)
-class About:
-    """What is known before anything has happened: the run's folder, whether it is replayed, whether the page may answer
-    the operator's questions, each sensor's part and serial number; of a recorded run what it says of its `arm`."""
-
-    folder: str
-    procedure: str
-    replayed: bool = False
-    may_answer: bool = False
-    parts: dict[str, str] = field(default_factory=dict)
-    simulated: bool = False
-    arm: dict[str, str | None] = field(default_factory=dict)
-
-
 class Shown:
     """The page's `sections` by name, each of plain numbers and texts, and the `changed` ones since somebody looked."""
 
@@ -69,7 +57,7 @@ class Shown:
             "about": asdict(about),
             "state": {"kind": "connecting", "text": "Connecting to arm and board"},
             "step": None,
-            "arm": {**_geometry(NOMINAL), **about.arm},
+            "arm": {**geometry(NOMINAL), **about.arm},
             "sensors": [],
             "prompt": None,
             "observations": [],
@@ -77,14 +65,21 @@ class Shown:
             "checks": [],
             "lines": [],
             "certificate": False,
+            "outcome": [],
+            "since": None,
+            "next": None,
+            "ended": None,
         }
         self.history = History()
         self.changed: set[str] = set(self.sections)
-        self._parts = about.parts
+        self._about, self._parts = about, about.parts
+        self._checks: list[Check] = []
+        self._stored = False
         self._modes: dict[str, str] = {}
         self._values: dict[str, tuple[float, ...]] = {}
+        self._fresh = False
         self._seen: dict[tuple[str, int], dict[str, Any]] = {}
-        self._turns: dict[int, dict[str, str]] = {}
+        self._turns: dict[int, dict[str, Any]] = {}
         self._prompts = 0
         self._solved = False
         self.ended = False
@@ -99,9 +94,12 @@ class Shown:
         match event:
             case SamplesTaken(sensors):
                 self._samples(sensors)
+                self._fresh = True
             case ArmSeen(state, missed_states):
-                self.put("arm", {**self.sections["arm"], **_stance(state), "missed": missed_states})
-                self.history.add(state.time_s, self._values)
+                self.put("arm", {**self.sections["arm"], **stance(state), "missed": missed_states})
+                if self._fresh:  # the arm is seen once more when it was let go, and no sample came with that
+                    self.history.add(state.time_s, self._values)
+                self._fresh = False
             case Progress():
                 self.put("step", _progress(event))
             case _:
@@ -120,12 +118,10 @@ class Shown:
         """What happens once."""
         match event:
             case ArmConnected(report):
-                self.put("arm", {**self.sections["arm"], **_arm(report)})
+                self.put("arm", {**self.sections["arm"], **connected(report)})
             case PhaseStarted(procedure, plan, sensors):
                 self._modes = sensors
-                self._turns = {
-                    sweep.index: {"joint": sweep.joint_name, "direction": sweep.direction} for sweep in plan.sweeps
-                }
+                self._turns = {each.index: _turn(each) for each in plan.sweeps}
                 self.history.clear()
                 self._values = {}
                 self.put("sensors", [])
@@ -164,6 +160,7 @@ class Shown:
         """What is told when nothing moves any more."""
         match event:
             case Checked(check):
+                self._checks.append(check)
                 row = {
                     name: getattr(check, name) for name in ("name", "value", "limit", "unit", "uncertainty", "passed")
                 }
@@ -172,19 +169,26 @@ class Shown:
                 held = sum(check["passed"] for check in self.sections["checks"])
                 text = f"{held} of {len(self.sections['checks'])} checks passed"
                 self._state("passed" if passed else "failed", text)
+                self.put("next", after_verdict(self._about, self._checks, passed=passed, stored=self._stored))
+            case CalibrationStored():
+                self._stored = True
+            case Remembered(since=since):
+                self.put("since", since_rows(since))
             case DocumentWritten(path) if path.name == CERTIFICATE:
                 self.put("certificate", True)
             case DocumentWritten(path) if path.name == RESULT:
-                self.put("parameters", parameter_rows(read_result(path)))
+                result = read_result(path)
+                self.put("parameters", parameter_rows(result))
+                self.put("outcome", outcome_rows(result, self._parts))
                 self._solved = True
             case Failed(error):
-                self._state("refused" if error.exit_status == 2 else "fault", _words(error))
+                self._state("refused" if error.exit_status == 2 else "fault", str(error))
             case Interrupted(text):
                 self._state("stopped", text)
             case Crashed(traceback):
                 self._state("fault", f"A defect of the program: {traceback.strip().splitlines()[-1]}")
-            case Advice() | RunFolderWritten():
-                pass  # their lines say it
+            case Advice(folder, repeats):
+                self.put("next", after_fault(folder, repeats=repeats))
         if isinstance(event, ENDINGS):
             self.ended = True
             self.put("prompt", None)
@@ -228,8 +232,8 @@ def _row(made: ObservationMade | AttitudeRead) -> dict[str, Any]:
     return dwell_row(made.sensor, made.reading, made.gravity_m_s2)
 
 
-def _words(error: RigError) -> str:
-    return str(error)
+def _turn(sweep: Sweep) -> dict[str, Any]:
+    return {"joint": sweep.joint_name, "direction": sweep.direction, "along": along(sweep.axis_flange)}
 
 
 def _kind(step: Step) -> str:
@@ -247,36 +251,3 @@ def _progress(progress: Progress) -> dict[str, Any]:
         "elapsed_s": round(progress.elapsed_s, 2),
         "remaining_s": round(progress.remaining_s, 2),
     }
-
-
-def _geometry(arm: DenavitHartenberg) -> dict[str, Any]:
-    return {"geometry": asdict(arm), "joints": list(JOINT_NAMES), "q_rad": None, "missed": 0}
-
-
-def _arm(report: ArmReport) -> dict[str, Any]:
-    known = {
-        "model": model_found(report),
-        "serial_number": report.serial_number,
-        "host": report.host,
-        "polyscope": report.polyscope,
-    }
-    return {**_geometry(report.kinematics or NOMINAL), **known, **_stance(report.state)}
-
-
-def _stance(state: ArmState) -> dict[str, Any]:
-    return {
-        "q_rad": rounded(state.q_rad),
-        "qd_rad_s": rounded(state.qd_rad_s),
-        "slider": round(state.target_speed_fraction, 3),
-        "scaling": round(state.speed_scaling, 3),
-        "mode": _named(RobotMode, state.robot_mode),
-        "safety": _named(SafetyMode, state.safety_mode),
-        "program": _named(RuntimeState, state.runtime_state),
-    }
-
-
-def _named(names: Any, number: int) -> str:
-    try:
-        return str(names(number).name).lower().replace("_", " ")
-    except ValueError:
-        return f"number {number}"

@@ -31,7 +31,7 @@ from rig.runner.resumption import Resumption
 from rig.runner.sensors import BoardSource, board_source
 from rig.sensors.registry import OWN_PORT
 from rig.sensors.source import OnSamples, SampleSource
-from rig.station.events import ArmConnected, BoardConnected, RunResumed, SensorConnected
+from rig.station.events import ArmConnected, ArmSeen, BoardConnected, RunResumed, SensorConnected
 from rig.station.station import Station
 
 
@@ -126,11 +126,17 @@ class Connector:
         section = self.loaded.config.arm
         log = self.path.with_name("arm_client.log")
         refuse_links(log)
+        let_go = stack.enter_context(ExitStack())  # closed after the arm
         arm = stack.enter_context(Arm(section.host, acquisition.on_state, section.state_rate_hz, log))
+        let_go.callback(self._last_seen, arm)
         report = arm.report()
         self.station.event(ArmConnected(report))
         refuse(identity_problems(section, report))
         return arm, report
+
+    def _last_seen(self, arm: Arm) -> None:
+        """Tell how the arm was left: whoever looks on has last seen it move."""
+        self.station.event(ArmSeen(arm.latest, arm.missed_states))
 
     def _record(
         self,

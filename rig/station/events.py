@@ -136,7 +136,7 @@ class SensorSamples:
 class ArmSeen:
     """How the arm stands by its newest state, and how many states it sent that were missed (None: nobody counted).
 
-    Comes with every `Progress`.
+    Comes with every `Progress`, and once more when the arm was let go.
     """
 
     state: ArmState
@@ -251,16 +251,33 @@ class RunFolderWritten:
 
 
 @dataclass(frozen=True, slots=True)
+class Since:
+    """What the calibration before, its number and day, found of the `quantity` of a `sensor`, by parameter (`kx`).
+
+    `before` has values with their U, in SI units; `normalised_error` is E_n of the changes since.
+    """
+
+    sensor: str
+    quantity: str
+    number: int
+    day: str
+    before: Mapping[str, tuple[float, float]]
+    normalised_error: Mapping[str, float]
+
+
+@dataclass(frozen=True, slots=True)
 class Remembered:
     """The run stands in `history` as the calibrations of these `numbers`, by which `rig history` finds them.
 
     `usual` is whether the command looks there by itself; `beyond` says in words what changed beyond U since the last
-    calibration of the same sensor, a line for each that has changed.
+    calibration of the same sensor, a line for each that has changed. `since` are the calibrations before of the sensors
+    that had any.
     """
 
     history: str
     numbers: tuple[int, ...]
     beyond: tuple[str, ...]
+    since: tuple[Since, ...] = ()
     usual: bool = True
 
 

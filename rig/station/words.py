@@ -74,7 +74,7 @@ def _of_the_outcome(event: RunEvent) -> str | None:
             text = f"plotted: {', '.join(names)} (.png, .svg)"
         case NotPlotted():
             text = "no plots: they need matplotlib, install the extra with pip install 'calibration-rig[study]'"
-        case Remembered(history, numbers, beyond, usual):
+        case Remembered(history, numbers, beyond, usual=usual):
             text = "\n".join([_entered(history, numbers, usual=usual), *beyond])
         case NotRemembered(folder, why):
             later = f"rig history import {shlex.quote(str(folder))}"

@@ -18,7 +18,8 @@ from rig.data.recorded_sensor import RecordedSensor
 from rig.data.run_file import RunData, RunRecorder, read_run
 from rig.errors import Refused
 from rig.observation.observed_run import observe_run
-from rig.page.shown import About, Shown
+from rig.page.about import About
+from rig.page.shown import Shown
 from rig.report.exports.formats import writer_of_readings
 from rig.runner.acquisition import Acquisition
 from rig.station.events import Progress, SamplesTaken

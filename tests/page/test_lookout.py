@@ -7,9 +7,10 @@ from pathlib import Path
 import pytest
 
 from rig.arm.motion import Sweep
+from rig.page.about import About
 from rig.page.feed import Feed
 from rig.page.lookout import looking_out
-from rig.page.shown import About, Shown
+from rig.page.shown import Shown
 from rig.station.events import StepFinished
 from support.told_runs import moving, planned
 from support.waiting import wait_for

@@ -2,13 +2,10 @@
 
 import re
 import socket
-from collections.abc import Callable, Iterable, Iterator
-from contextlib import contextmanager
-from dataclasses import replace
+from collections.abc import Callable, Iterable
 from functools import partial
 from importlib import resources
 from pathlib import Path
-from typing import Any
 
 import pytest
 from selenium.webdriver import Chrome
@@ -22,7 +19,8 @@ from rig.page.shown import Shown
 from rig.station.events import Answered, Crashed, Failed, Interrupted, PhaseRecorded, Prompt, RunEvent, SensorSamples
 from support import told_runs
 from support.browser import TABLET, asked_hosts, kind, needs_browser, picture, set_theme, severe, text, until
-from support.told_runs import ABOUT, before_it_moves, judged, look, moving, planned
+from support.told_page import showing
+from support.told_runs import ABOUT, before_it_moves, judged, moving, planned
 
 pytestmark = [pytest.mark.slow, needs_browser, pytest.mark.usefixtures("nothing_severe_and_nothing_from_elsewhere")]
 
@@ -53,35 +51,6 @@ while (texts.nextNode()) {
 }
 return found.sort((a, b) => a[0] - b[0])[0];
 """
-
-
-class Telling:
-    """Events for a page in a browser, and the words it must show then."""
-
-    def __init__(self, driver: Chrome, feed: Feed) -> None:
-        self._driver, self._feed = driver, feed
-
-    def __call__(self, *events: Any) -> None:
-        for event in events:
-            self._feed.event(event)
-
-    def look(self, sweeps: int) -> None:
-        self._feed.look(look(planned(), sweeps))
-
-    def word(self, expected: str) -> None:
-        until(
-            lambda: text(self._driver, "state-word") == expected, f"{expected}, not {text(self._driver, 'state-word')}"
-        )
-        assert text(self._driver, "sign")
-
-
-@contextmanager
-def showing(driver: Chrome, folder: Path, *, token: bool = True, may_answer: bool = True) -> Iterator[Telling]:
-    """A page that has been loaded and told nothing yet."""
-    feed = Feed(Shown(replace(ABOUT, may_answer=may_answer)))
-    with serving(feed, Control(may_answer=may_answer), folder, Address(port=0)) as url:
-        driver.get(url if token else url.split("#")[0])
-        yield Telling(driver, feed)
 
 
 def legible(driver: Chrome) -> None:

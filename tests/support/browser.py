@@ -61,6 +61,17 @@ def set_theme(driver: Chrome, *, dark: bool) -> None:
     driver.execute_cdp_cmd("Emulation.setEmulatedMedia", {"features": wish})
 
 
+@contextmanager
+def screen(driver: Chrome, width: int, height: int) -> Iterator[None]:
+    """A window whose page has just so many CSS pixels."""
+    metrics = {"width": width, "height": height, "deviceScaleFactor": 1, "mobile": False}
+    driver.execute_cdp_cmd("Emulation.setDeviceMetricsOverride", metrics)
+    try:
+        yield
+    finally:
+        driver.execute_cdp_cmd("Emulation.clearDeviceMetricsOverride", {})
+
+
 def picture(driver: Chrome, name: str, *, whole: bool = False) -> Path:
     """What the window shows, or the `whole` page, as build/page/NAME.png."""
     PICTURES.mkdir(parents=True, exist_ok=True)
@@ -69,12 +80,8 @@ def picture(driver: Chrome, name: str, *, whole: bool = False) -> Path:
         driver.save_screenshot(str(path))
         return path
     width, height = driver.execute_script("return [innerWidth, document.documentElement.scrollHeight]")
-    metrics = {"width": width, "height": height, "deviceScaleFactor": 1, "mobile": False}
-    driver.execute_cdp_cmd("Emulation.setDeviceMetricsOverride", metrics)
-    try:
+    with screen(driver, width, height):
         driver.save_screenshot(str(path))
-    finally:
-        driver.execute_cdp_cmd("Emulation.clearDeviceMetricsOverride", {})
     return path
 
 

@@ -12,8 +12,8 @@ from rig.arm.state import ArmReport, ArmState, Joints, RobotMode, RuntimeState, 
 from rig.commands.configured import configured
 from rig.data.events import BoardNotObserved, BoardObserved
 from rig.data.meaning import Meaning
+from rig.page.about import About
 from rig.page.rows import Look
-from rig.page.shown import About
 from rig.station.events import (
     ArmConnected,
     ArmSeen,

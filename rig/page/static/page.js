@@ -1,8 +1,10 @@
 // The page: keeps what the rig tells and shows it. It decides nothing.
 
+import { ENDED, age, hear, linked as lineIs, take as aged } from "./age.js";
 import { act, follow, token } from "./stream.js";
 import { drawArm, signed } from "./arm.js";
 import { plot } from "./plot.js";
+import { outcome } from "./outcome.js";
 import * as tables from "./tables.js";
 import { colours, fresh } from "./drawing.js";
 
@@ -10,7 +12,6 @@ const $ = (id) => document.getElementById(id);
 const shown = {};
 const points = { first: 0, times: [], lines: {} };
 const SHOWN_POINTS = 600;
-const ENDED = ["passed", "failed", "refused", "fault", "stopped"];
 const WORDS = {
   connecting: ["Connecting", "…"], connected: ["Connected", "…"], ready: ["Ready", "■"], asking: ["Your answer is needed", "?"],
   moving: ["Moving", "➜"], measuring: ["Measuring", "◉"], resting: ["Resting", "‖"], judging: ["Solving", "Σ"],
@@ -20,29 +21,30 @@ const UNITS = { rate_rad_s: ["rate", "°/s", 2], acceleration_m_s2: ["accelerati
 
 const SHOW = {
   about(about) {
-    $("procedure").textContent = about.procedure.replaceAll("_", " ");
+    $("procedure").textContent = about.procedure;
+    $("parts").textContent = [...new Set(Object.values(about.parts))].join(" · ");
     $("folder").textContent = about.folder;
     const tags = [about.replayed && "replay", about.simulated && "simulated"].filter(Boolean);
     $("tags").replaceChildren(...tags.map((text) => Object.assign(document.createElement("span"), { className: "tag", textContent: text })));
   },
-  state({ kind, text }) {
-    const [word, sign] = WORDS[kind] ?? [kind, ""];
+  state({ kind }) {
     document.body.dataset.kind = kind;
-    $("sign").textContent = sign;
-    if ($("state-word").textContent !== word) $("state-word").textContent = word;
-    $("state-text").textContent = text;
-    document.title = `${word} · ${shown.about?.procedure.replaceAll("_", " ") ?? "calibration rig"}`;
+    if (shown.step) SHOW.step(shown.step);
     buttons();
+    tell();
   },
+  ended: tell,
   step(step) {
     if (!step) return;
+    const over = ENDED.includes(shown.state?.kind);
+    const number = step.number ? `tep ${step.number} of ${step.count}` : `${step.count} steps`;
     $("left").textContent = clock(step.remaining_s);
-    $("step-number").textContent = step.number ? `Step ${step.number} of ${step.count}` : `${step.count} steps`;
-    $("step-name").textContent = step.number ? step.name.replaceAll("_", " ") : "";
+    $("step-number").textContent = !step.number ? number : over ? `It ended in s${number}` : `S${number}`;
+    $("step-name").textContent = step.number && !["moving", "measuring", "resting"].includes(shown.state?.kind) ? step.name : "";
     const done = step.count ? (Math.max(0, step.number - 1) + (step.number ? step.fraction : 0)) / step.count : 0;
     const bar = $("bar");
     bar.setAttribute("aria-valuenow", Math.round(100 * done));
-    bar.setAttribute("aria-valuetext", `step ${step.number} of ${step.count}, ${clock(step.remaining_s)} left`);
+    bar.setAttribute("aria-valuetext", `step ${step.number} of ${step.count}, ${over ? "ended" : `${clock(step.remaining_s)} left`}`);
     drawBar(step);
   },
   arm(arm) {
@@ -50,23 +52,34 @@ const SHOW = {
     $("missed").textContent = arm.missed ?? "not recorded";
     $("missed").className = arm.missed ? "odd-number" : "";
     if (!arm.q_rad) return;
+    const known = arm.let_go || !past; // of one that moved when it was seen last, nobody knows what it does now
     const fast = Math.max(...arm.qd_rad_s.map(Math.abs)) * 180 / Math.PI;
-    const normal = (value, usual) => [value, value !== usual];
+    const normal = (value, usual) => (known ? [value, value !== usual] : ["–", false]);
+    const share = (value) => (known ? [`${Math.round(100 * value)} %`, value < 0.995] : ["–", false]);
     facts([
-      ["speed", [`${fast.toFixed(1)} °/s`, false]], ["slider", [`${Math.round(100 * arm.slider)} %`, arm.slider < 0.995]],
-      ["scaling", [`${Math.round(100 * arm.scaling)} %`, arm.scaling < 0.995]], ["mode", normal(arm.mode, "running")],
-      ["safety", normal(arm.safety, "normal")], ["program", [arm.program, arm.program === "paused"]],
+      ["speed", [known ? `${fast.toFixed(1)} °/s` : "–", false]], ["slider", share(arm.slider)],
+      ["scaling", share(arm.scaling)], ["mode", normal(arm.mode, "running")],
+      ["safety", normal(arm.safety, "normal")], ["program", [known ? arm.program : "–", arm.program === "paused"]],
     ]);
-    tables.joints(arm);
-    drawArm($("arm"), arm);
+    tables.joints(arm, known);
+    drawArm($("arm"), known ? arm : { ...arm, qd_rad_s: arm.q_rad.map(() => 0) });
   },
   sensors: tables.samples,
   observations: tables.observations,
   parameters: tables.parameters,
-  checks: tables.checks,
+  checks(rows) {
+    tables.checks(rows);
+    failed(rows.filter((check) => !check.passed));
+  },
   prompt,
-  certificate(there) {
-    $("certificate").hidden = !there;
+  certificate: light,
+  outcome: found,
+  since: found,
+  next(step) {
+    $("next").hidden = !step?.command;
+    if (!step) return;
+    $("next-words").textContent = step.words;
+    $("next-command").textContent = step.command;
   },
   lines(lines) { // only what is new is added, for that is what a screen reader reads out
     const list = $("lines");
@@ -79,6 +92,19 @@ const SHOW = {
     list.scrollTop = list.scrollHeight;
   },
 };
+
+const MENTIONED = 3; // failed checks in the first screen; the table has all
+
+function failed(checks) {
+  const more = checks.length > MENTIONED ? [`and ${checks.length - MENTIONED} more, below`] : [];
+  const said = checks.slice(0, MENTIONED).map((c) => `✗ ${c.name} ${tables.plain(c.value)}, allowed ${tables.plain(c.limit)}${c.unit === "1" ? "" : ` ${c.unit}`}`);
+  $("failed").replaceChildren(...[...said, ...more].map((text) => Object.assign(document.createElement("li"), { textContent: text })));
+}
+
+function found() {
+  outcome($("found"), shown.outcome ?? [], shown.since);
+  $("key").hidden = !shown.outcome?.length;
+}
 
 function prompt(asked) {
   const box = $("prompt");
@@ -131,11 +157,42 @@ function drawBar({ number, count, fraction }) {
   }
 }
 
+const ending = () => (!line.up ? "the run is over, and this is how it ended" : shown.ended && !shown.about?.replayed ? `the run ended at ${shown.ended.at}` : "the run is over");
+
+let past = ""; // how old readings and arm are, in words; "" while they are of now
+
+/** Who says in large what the run does: the rig, or, when the rig is silent, nobody. */
+function tell() {
+  const { lost, over, words } = age(shown);
+  const kind = shown.state?.kind;
+  if (shown.state) {
+    const [word, sign] = lost ? ["No news", "⚠"] : WORDS[kind] ?? [kind, ""];
+    const step = shown.step?.number && !over ? `, step ${shown.step.number} of ${shown.step.count}` : "";
+    const text = lost ? `Heard last: ${WORDS[kind]?.[0] ?? kind}, ${shown.state.text}${step}` : shown.state.text;
+    for (const [id, said] of [["state-word", word], ["sign", sign], ["state-text", text]]) if ($(id).textContent !== said) $(id).textContent = said;
+    document.title = `${word} · ${shown.about?.procedure ?? "calibration rig"}`;
+  }
+  document.body.dataset.lost = lost ? "yes" : "no";
+  $("stale").hidden = !lost;
+  $("stale-for").textContent = lost ? ` for ${lost} s` : "";
+  light();
+  const was = past;
+  past = lost && !words ? `${lost} s ago` : words;
+  if (past === was) return;
+  document.body.dataset.past = past ? "yes" : "no";
+  for (const each of document.querySelectorAll(".age")) each.textContent = past;
+  if (!past === !was) return;
+  if (shown.arm) SHOW.arm(shown.arm);
+  redraw();
+}
+
 function take(name, news) {
+  aged(name, news);
   if (name === "all") Object.assign(points, { first: news.points.first, times: [], lines: {} });
   add(news.points);
   delete news.points;
   Object.assign(shown, news);
+  tell();
   for (const [section, value] of Object.entries(news)) if (value !== undefined) SHOW[section]?.(value);
   if ("about" in news) buttons();
   redraw();
@@ -190,8 +247,8 @@ function draw(name, values) {
   for (const [i, [axis, letter]] of axes.entries()) {
     $(`${id}-${axis}`).textContent = `${letter}${last ? signed(last[i], digits).padStart(digits + 4, "\u2007") : "–"}`;
   }
-  if (last) canvas.setAttribute("aria-label", `${sensor}, ${title} over the last minute; now ${axes.map(([, letter], i) => `${letter}${last[i].toFixed(digits)}`).join(", ")} ${unit}`);
-  plot(canvas, points.times, values);
+  if (last) canvas.setAttribute("aria-label", `${sensor}, ${title} over the last minute; ${past || "now"} ${axes.map(([, letter], i) => `${letter}${last[i].toFixed(digits)}`).join(", ")} ${unit}`);
+  plot(canvas, points.times, values, past ? "last" : "now");
 }
 
 function panel(id, sensor, title, unit) {
@@ -201,7 +258,7 @@ function panel(id, sensor, title, unit) {
     return made;
   };
   const now = make("span", { className: "now" }, ...[..."xyz"].map((axis) => make("span", { id: `${id}-${axis}`, className: axis })), make("span", { className: "unit", textContent: unit }));
-  const head = make("h2", {}, make("span", { textContent: `${sensor}, ${title}` }), make("small", { id: `${id}-about` }), now);
+  const head = make("h2", {}, make("span", { textContent: `${sensor}, ${title}` }), make("small", { id: `${id}-about` }), make("small", { className: "age", textContent: past }), now);
   const canvas = make("canvas", { id: `${id}-canvas` });
   canvas.setAttribute("role", "img");
   return make("section", { id, className: "plot" }, head, canvas);
@@ -217,20 +274,29 @@ function say(text) {
   $("said").textContent = text ?? "";
 }
 
+let line = { up: false, why: "connecting" };
+
 function linked(up, why) {
-  const over = ENDED.includes(document.body.dataset.kind);
-  $("link").dataset.up = document.body.dataset.up = up || over ? "yes" : "no";
-  $("link-words").textContent = up ? "connected" : over ? "the run is over, and this is how it ended" : why ?? "no connection: what stands here is old";
+  line = { up, why: up ? "connected" : why ?? "no connection: what stands here is old" };
+  lineIs(up);
   if (!up && !shown.state) { // nothing has been shown that could be old
     $("sign").textContent = "⚠";
     $("state-word").textContent = "Not shown";
     $("state-text").textContent = why ?? "the rig does not answer";
   }
-  if (!up && over) {
-    $("certificate").hidden = true;
-    $("link").dataset.up = "over";
-  } else if (up && shown.certificate) $("certificate").hidden = false;
   if (up) $("halt").disabled = false;
+  tell();
+}
+
+/** What is said of the line to the rig, in the header. */
+function light() {
+  const { lost, over } = age(shown);
+  $("link").dataset.up = over ? "over" : line.up && !lost ? "yes" : "no";
+  const words = over ? ending() : lost && line.up ? "no news" : line.why;
+  if ($("link-words").textContent !== words) $("link-words").textContent = words;
+  $("certificate").hidden = !shown.certificate || (over && !line.up); // which is served from there
+  $("papers-path").textContent = shown.certificate ? `${shown.about?.folder}/certificate.html` : "";
+  $("outcome").hidden = !over;
 }
 
 $("halt").addEventListener("click", async () => {
@@ -259,4 +325,5 @@ system.addEventListener("change", paint);
 window.addEventListener("resize", paint);
 paint();
 window.addEventListener("hashchange", () => window.location.reload()); // another run's token, in the same window
-follow(take, linked, () => ENDED.includes(document.body.dataset.kind));
+setInterval(tell, 250);
+follow(take, linked, hear, () => ENDED.includes(document.body.dataset.kind));

@@ -6,8 +6,8 @@ const SPAN_S = 60;
 const DASHES = { x: [], y: [9, 4], z: [2, 3] };
 const LEFT = 62, RIGHT = 26, TOP = 10, BOTTOM = 24;
 
-/** Draw `values` ([x, y, z] or null) at `times` (s), the newest at the right edge. */
-export function plot(canvas, times, values) {
+/** Draw `values` ([x, y, z] or null) at `times` (s), the newest at the right edge, which is called `newest`. */
+export function plot(canvas, times, values, newest) {
   const { pen, width, height } = fresh(canvas);
   const paint = colours();
   const now = times.length ? times[times.length - 1] : 0;
@@ -32,7 +32,7 @@ export function plot(canvas, times, values) {
     pen.strokeStyle = paint.faint;
     line(pen, [at, TOP], [at, height - BOTTOM]);
     pen.textAlign = ago === 0 ? "right" : "center";
-    pen.fillText(ago === 0 ? "now" : `−${ago} s`, at, height - 6);
+    pen.fillText(ago === 0 ? newest : `−${ago} s`, at, height - 6);
   }
 
   pen.save();

@@ -1,6 +1,6 @@
 // The stream of what is shown, read by fetch because EventSource can carry no token; and requests that act.
 
-const SILENT_MS = 15000; // the server says something every 5 s
+const SILENT_MS = 15000; // the server says something every second; after so long the line is made anew
 const WHY = {
   403: "the address lacks its token: take the one the terminal shows",
   503: "too many browsers look on: close one, or take the address the terminal shows",
@@ -9,8 +9,9 @@ const WHY = {
 export const token = window.location.hash.slice(1);
 const headers = token ? { Authorization: `Bearer ${token}` } : {};
 
-/** Hand every event to `take(name, document)` and say to `linked(up, why)` whether the line is up, until the run is `over()`. */
-export async function follow(take, linked, over) {
+/** Hand every event to `take(name, document)`, tell `hear()` of every sign of life, say to `linked(up, why)` whether the line
+ * is up, until the run is `over()`. */
+export async function follow(take, linked, hear, over) {
   while (!over()) {
     const silence = new AbortController();
     let timer = null;
@@ -25,7 +26,7 @@ export async function follow(take, linked, over) {
       status = answer.status;
       if (answer.ok) {
         linked(true);
-        await read(answer.body, take, heard);
+        await read(answer.body, take, () => { heard(); hear(); });
       }
     } catch {
       // The line is down: said below, tried again.

@@ -17,14 +17,21 @@ function row(cells, kind = "") {
   return tr;
 }
 
+const MANY = 12; // rows, more of which are shown on demand
+
 function fill(id, rows) {
   const body = document.querySelector(`#${id} tbody`) ?? document.getElementById(id);
+  const panel = body.closest("details");
+  if (panel && !panel.dataset.folded && rows.length > MANY) {
+    panel.open = false; // once: whoever opens it again wants to see it
+    panel.dataset.folded = "yes";
+  }
   body.replaceChildren(...rows);
 }
 
 export const minus = (text) => text.replace("-", "−");
 const fixed = (value, digits) => (typeof value === "number" ? minus(value.toFixed(digits)) : "–");
-const plain = (value) => (typeof value === "number" ? minus(String(Number(value.toPrecision(4)))) : "–");
+export const plain = (value) => (typeof value === "number" ? minus(String(Number(value.toPrecision(4)))) : "–");
 const count = (value) => (typeof value === "number" ? value.toLocaleString("en").replaceAll(",", "\u202f") : "–");
 
 export function samples(sensors) {
@@ -32,13 +39,13 @@ export function samples(sensors) {
     row([s.name, count(s.samples), [count(s.lost) + (s.lost ? " ⚠" : ""), s.lost ? "odd-number" : ""], fixed(s.temperature_c, 1)])));
 }
 
-export function joints(arm) {
-  if (!arm.q_rad) return;
+/** Angles and, where they are `known`, speeds. */
+export function joints(arm, known) {
   const fastest = Math.max(...arm.qd_rad_s.map(Math.abs));
   fill("joints", arm.joints.map((name, i) => {
-    const turning = fastest > 0.02 && Math.abs(arm.qd_rad_s[i]) === fastest;
+    const turning = known && fastest > 0.02 && Math.abs(arm.qd_rad_s[i]) === fastest;
     return row(
-      [(turning ? "▸ " : "") + name.replace("_", " "), minus(((arm.q_rad[i] * 180) / Math.PI).toFixed(1)), signed((arm.qd_rad_s[i] * 180) / Math.PI, 1)],
+      [(turning ? "▸ " : "") + name, minus(((arm.q_rad[i] * 180) / Math.PI).toFixed(1)), known ? signed((arm.qd_rad_s[i] * 180) / Math.PI, 1) : "–"],
       turning ? "turning" : "",
     );
   }));
@@ -51,7 +58,7 @@ export function observations(rows) {
   const turns = rows.filter((each) => each.dwell === undefined);
   fill("observations", turns.map((o, i) => {
     const turn = sweeps.get(o.sweep);
-    const words = turn?.joint ? `${turn.joint.replace("_", " ")} ${turn.direction}` : "";
+    const words = turn?.joint ? `${turn.joint} ${turn.direction}` : "";
     const kind = i && turns[i - 1].sweep !== o.sweep ? "new-sensor" : "";
     if (o.refused) {
       const tr = row([o.sweep, [o.sensor, "words"], [words, "words"], [`✗ refused: ${o.refused}`, "words bad"]], kind);
@@ -59,10 +66,11 @@ export function observations(rows) {
       return tr;
     }
     const along = o.axis ? o.sign * o.mean_rad_s["xyz".indexOf(o.axis)] : largest(o.mean_rad_s);
+    const expected = o.along && o.speed_rad_s * o.along; // of an oblique turn an axis feels a part
     const spread = o.std_rad_s ? ` ± ${(2 * o.std_rad_s).toFixed(5)}` : "";
     return row([
       o.sweep, [o.sensor, "words"], [words + (o.axis ? `, ${o.sign > 0 ? "+" : "−"}${o.axis}` : ""), "words"],
-      minus(along.toFixed(5)) + spread, fixed(o.speed_rad_s, 5), fixed(along / o.speed_rad_s, 5),
+      minus(along.toFixed(5)) + spread, fixed(expected, 5), fixed(expected && along / expected, 5),
       count(o.samples), [count(o.lost), o.lost ? "odd-number" : ""], o.by,
     ], kind);
   }));
@@ -107,6 +115,8 @@ function spanning(tr, columns) {
 }
 
 export function checks(rows) {
-  fill("checks", rows.map((c) =>
+  const held = rows.filter((c) => c.passed).length;
+  document.getElementById("checks-held").textContent = rows.length ? `${held} of ${rows.length} passed` : "";
+  fill("checks", [...rows].sort((a, b) => a.passed - b.passed).map((c) =>
     row([c.name, plain(c.value) + (c.uncertainty ? ` ± ${plain(c.uncertainty)}` : ""), plain(c.limit), c.unit, c.passed ? ["✓ passed", "good"] : ["✗ failed", "bad"]])));
 }
