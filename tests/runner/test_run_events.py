@@ -9,6 +9,7 @@ from pathlib import Path
 import pytest
 
 from rig.arm.motion import Sweep
+from rig.arm.state import RuntimeState
 from rig.commands.configured import configured
 from rig.data.events import BoardObserved, BoardSolved, RestFinished, RestStarted, SweepFinished, SweepStarted
 from rig.runner.phases import Run
@@ -138,6 +139,15 @@ def test_every_sensors_samples_are_counted(events: list[RunEvent]) -> None:
         assert isinstance(recorded, PhaseRecorded) and recorded.sensors[0].samples >= taken[-1].sensors[0].samples
 
 
+def test_the_arm_is_seen_once_more_when_it_was_let_go(events: list[RunEvent]) -> None:
+    """After what was recorded, or whoever looks on is left with an arm whose program plays."""
+    ends = [place for place, event in enumerate(events) if isinstance(event, PhaseRecorded)]
+    for end in ends:
+        seen = events[end + 1]
+        assert isinstance(seen, ArmSeen)
+        assert seen.state.at_rest and seen.state.runtime_state == RuntimeState.STOPPED
+
+
 def test_the_observations_come_as_they_are_made(events: list[RunEvent]) -> None:
     calibration, verification = phases(events)
     place: StepStarted | None = None
@@ -164,6 +174,7 @@ def test_the_hosts_own_observations_come_when_the_calibration_is_judged(events: 
 IMPORTS = """
 import sys
 from pathlib import Path
+from rig.arm.state import RuntimeState
 from rig.commands.configured import configured
 from rig.runner.phases import Run
 from rig.station.events import PhaseRecorded, PreflightPassed

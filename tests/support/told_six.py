@@ -18,7 +18,7 @@ PARTS = {
     "adis16465": "adis16465 ADIS16465-00042",
 }
 SIX = replace(ABOUT, folder="runs/2026-11-22T16-00-00Z-imu", procedure="imu", parts=PARTS)
-IMU = FIXTURES / "recordings" / "rig.settings-6" / "imu"
+IMU = FIXTURES.parent / "recordings" / "rig.settings-6" / "imu"
 
 
 def six_moving(until_s: float) -> Iterator[RunEvent]:
@@ -34,9 +34,7 @@ def six_found() -> ResultDocument:
     """What a recording of one of them gave, of all."""
     one = read_result(IMU)
     checks = tuple(
-        each.model_copy(update={"name": each.name.replace("gyro", name), "means": replace(each.means, sensor=name)})
-        for name in PARTS
-        for each in one.checks
+        each.model_copy(update={"name": each.name.replace("gyro", name)}) for name in PARTS for each in one.checks
     )
     return one.model_copy(
         update={

@@ -37,7 +37,7 @@ export function drawArm(canvas, arm) {
   if (fastest !== null) {
     const { at } = see(frames[fastest].origin);
     const degrees = (arm.qd_rad_s[fastest] * 180) / Math.PI;
-    label(pen, paint, at, `${arm.joints[fastest].replace("_", " ")} ${signed(degrees)} °/s`, width);
+    label(pen, paint, at, `${arm.joints[fastest]} ${signed(degrees)} °/s`, width);
   }
 }
 

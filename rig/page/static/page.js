@@ -228,10 +228,11 @@ function redraw() {
   });
 }
 
-/** By sensor, then rate before acceleration before field. */
+/** By sensor as the rig has them, then rate before acceleration before field. */
 function inOrder(one, other) {
-  const [a, b] = [one, other].map((name) => [name.slice(0, name.lastIndexOf(".")), Object.keys(UNITS).indexOf(name.slice(name.lastIndexOf(".") + 1))]);
-  return a[0] === b[0] ? a[1] - b[1] : a[0] < b[0] ? -1 : 1;
+  const order = (shown.sensors ?? []).map((each) => each.name);
+  const [a, b] = [one, other].map((name) => [order.indexOf(name.slice(0, name.lastIndexOf("."))), Object.keys(UNITS).indexOf(name.slice(name.lastIndexOf(".") + 1))]);
+  return a[0] - b[0] || a[1] - b[1];
 }
 
 function draw(name, values) {
