@@ -7,6 +7,8 @@
 # make lock    pins what `make demo` installs anew, by version and hash (requirements/demo.txt)
 # make sbom    what is installed, as a CycloneDX bill of materials: build/sbom.json
 # make figures the pictures in docs/results.md, by the studies and the experiments
+# make docs    the documentation as a site with a search: build/docs/index.html; a broken link is an error
+# make drawings the drawings in docs/drawings: wiring, axes, a sweep
 # What the machine itself lacks for one of them, requirements/system.sh installs on Debian, or names.
 
 VENV := .venv
@@ -14,7 +16,7 @@ BIN := $(VENV)/bin
 LONG := $(addprefix benchmarks/, faults.py long_life.py damaged_frames.py)
 STUDIES := normal extreme speed convergence sine averaging estimators misalignment budget kvh-gyro kvh-accelerometer
 
-.PHONY: demo system check fast test whole proof lint firmware bench lock sbom figures clean
+.PHONY: demo system check fast test whole proof lint firmware bench lock sbom figures docs drawings clean
 .DELETE_ON_ERROR:
 
 demo: $(VENV)/demo.installed
@@ -71,6 +73,13 @@ figures: $(VENV)/dev.installed
 	  $(BIN)/rig run configs/kvh1775_$${run%%:*}.yaml --out build/kvh1775_$${run%%:*} || exit 1; \
 	  cp build/kvh1775_$${run%%:*}/$${run##*:}_kvh.png docs/figures/kvh1775-$${run%%:*}.png; done
 
+docs: $(VENV)/docs.installed
+	$(BIN)/sphinx-build --fail-on-warning --keep-going --quiet -d build/doctrees -c docs . build/docs
+	@echo "build/docs/index.html"
+
+drawings: $(VENV)/demo.installed
+	$(BIN)/python docs/drawings/draw.py
+
 firmware: $(VENV)/demo.installed
 	$(MAKE) -C firmware_host/firmware
 	$(BIN)/python -m firmware_host.footprint
@@ -104,6 +113,10 @@ $(VENV)/demo.installed: pyproject.toml requirements/demo.txt | $(BIN)/python
 	$(BIN)/python -m pip install --quiet --disable-pip-version-check --no-deps --no-build-isolation --editable .
 	@touch $@
 
+$(VENV)/docs.installed: pyproject.toml | $(BIN)/python
+	$(BIN)/python -m pip install --quiet --disable-pip-version-check --editable '.[docs]'
+	@touch $@
+
 $(VENV)/dev.installed: pyproject.toml | $(BIN)/python
 	$(BIN)/python -m pip install --quiet --disable-pip-version-check --editable '.[dev]'
-	@touch $@ $(VENV)/demo.installed
+	@touch $@ $(VENV)/demo.installed $(VENV)/docs.installed
