@@ -57,9 +57,7 @@ class Calibrations(Sequence[Past]):
 
     def _repr_html_(self) -> str:
         headings = ("number", "started (UTC)", "sensor", "rig", "verdict")
-        rows = [
-            (str(past.id), past.started_utc, title_of(past.subject), past.rig, past.verdict) for past in self.pasts
-        ]
+        rows = [(str(past.id), past.started_utc, title_of(past.subject), past.rig, past.verdict) for past in self.pasts]
         return table("calibrations", headings, rows)
 
 

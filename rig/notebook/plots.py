@@ -70,7 +70,11 @@ def plot_residuals(sensors: Mapping[str, SensorEntry]) -> Plot:
     figure = _figure(10, 3 * len(solved))
     panels = figure.subplots(len(solved), sharex=True, squeeze=False)[:, 0]
     for axes, (name, (found, model)) in zip(panels, solved.items(), strict=True):
-        expanded = COVERAGE_FACTOR * np.array([each.mean_std_rad_s for each in (*found.observations, *found.rests)])
+        averages = [
+            *(each.mean_std_rad_s for each in found.observations),
+            *(each.mean_std_rad_s for each in found.rests),
+        ]
+        expanded = COVERAGE_FACTOR * np.array(averages)
         residuals = np.array(model.residuals_rad_s)
         for i, axis in enumerate("xyz"):
             places = np.arange(len(expanded)) + (i - 1) * 0.15

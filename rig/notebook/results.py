@@ -11,7 +11,8 @@ from rig.data.result_file import CheckEntry, ResultDocument, read_result
 from rig.data.settings import setting
 from rig.notebook.calibrations import HEADINGS, U_TEXT, Calibration, rows
 from rig.notebook.html import table
-from rig.notebook.runs import NoSuchSensor, Run
+from rig.notebook.readings import NoSuchSensor
+from rig.notebook.runs import Run
 from rig.plans.recorded import judged
 from rig.report.document import document_of
 from rig.report.kinds.kind import Without

@@ -27,9 +27,13 @@ def test_every_check_that_the_method_explains_says_what_to_do() -> None:
     first_cell = re.compile(r"^\| (`[^|]+) \|.*\| .+ \|$", re.MULTILINE)
     page = (DOCS / "how-to" / "failed.md").read_text(encoding="utf-8")
     answered = [name for cell in first_cell.findall(page) for name in re.findall(r"`(\w+)`", cell)]
-    explained = (DOCS / "method.md").read_text(encoding="utf-8").split("## What contradicts itself")[1].split("\n## ")[0]
+    explained = (
+        (DOCS / "method.md").read_text(encoding="utf-8").split("## What contradicts itself")[1].split("\n## ")[0]
+    )
     tables = explained.split("| check | what is added |")[1:]
-    checks = {name for table in tables for name in re.findall(r"^\| .*?`…?(\w+)`", table.split("\n\n")[0], re.MULTILINE)}
+    checks = {
+        name for table in tables for name in re.findall(r"^\| .*?`…?(\w+)`", table.split("\n\n")[0], re.MULTILINE)
+    }
     assert len(checks) > 20
     assert checks | {limit.what for limit in LIMITS.values()} <= set(answered)
     assert len(answered) == len(set(answered))

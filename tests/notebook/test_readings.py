@@ -63,9 +63,7 @@ def test_two_sensors_that_are_no_gyroscopes_are_not_compared(magnetic: rig.Run) 
         rig.compare(magnetic, name, name)
 
 
-def test_a_table_without_pandas_says_which_extra_it_needs(
-    imu: rig.Readings, monkeypatch: pytest.MonkeyPatch
-) -> None:
+def test_a_table_without_pandas_says_which_extra_it_needs(imu: rig.Readings, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setitem(sys.modules, "pandas", None)
     with pytest.raises(Refused, match=r"missing_extra: .*pandas.*\[pandas\]"):
         imu.to_frame()

@@ -17,11 +17,12 @@ import pytest
 from rig.commands.page_arguments import PageWish, add_page, wish
 from rig.commands.watch import last_words
 from rig.errors import Refused
+from rig.page.about import About
 from rig.page.control import STOPPED, Control
 from rig.page.feed import Feed
 from rig.page.guard import Door
 from rig.page.serving import Address, serving
-from rig.page.shown import About, Shown
+from rig.page.shown import Shown
 from rig.station.events import Prompt
 
 TOKEN = "a-token-of-two-and-twenty"
