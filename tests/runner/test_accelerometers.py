@@ -19,8 +19,8 @@ from rig.analysis.partial_results import so_far
 from rig.data.events import DwellFinished, DwellStarted
 from rig.data.run_file import RunData, read_run
 from rig.errors import Fault
-from rig.page.rows import look_of
 from rig.page.about import About
+from rig.page.rows import look_of
 from rig.page.shown import Shown
 from rig.runner.phases import observations_of
 from support.commands import configuration, rig, rig_here, wait_for_log
