@@ -38,8 +38,8 @@ def files(options: Namespace) -> list[Path]:
     """Readings of the first movement, or the calibrations of a run that passed, into `--out`.
 
     `--at-temperature`: a temperature in °C, and the run of `bias_drift` that tells how to get there.
-    Returns the files. Raises Refused `report_folder`, `bad_option`, `missing_extra`, as `refuse_links` does, of readings
-    as `open_run` and `observe_runs`, of calibrations as `passed_result`, `at_temperature` and `exported`.
+    Returns the files. Raises Refused `report_folder`, `bad_option`, `missing_extra`, as `refuse_links` does, of
+    readings as `open_run` and `observe_runs`, of calibrations as `passed_result`, `at_temperature` and `exported`.
     """
     from rig.observation.observed_run import observe_runs
     from rig.plans.recorded import open_run

@@ -1,5 +1,6 @@
 """The commands that plan, look, move and write, as functions for Python: what they say, ask and refuse is the same."""
 
+import multiprocessing
 import threading
 from argparse import ArgumentParser, Namespace
 from collections.abc import Callable, Mapping, Sequence
@@ -58,13 +59,21 @@ def run(
 
     The arm moves only if the operator at the terminal types yes, or if the caller says that by `yes=True`; a notebook
     has no terminal. Ctrl-C stops the arm and keeps the data. `out` is the run folder, by default a new one; `changes`
-    and `script` are as in `plan`; `other_boards` are serial numbers of sensors that were moved to another board. Returns the run; its verdict is `rig.load_result(run.path).verdict`. Raises Refused
-    where nothing has moved (`not_confirmed` without agreement), Fault where the arm was stopped, KeyboardInterrupt.
+    and `script` are as in `plan`; `other_boards` are serial numbers of sensors that were moved to another board.
+    Returns the run; its verdict is `rig.load_result(run.path).verdict`. Raises Refused where nothing has moved
+    (`not_confirmed` without agreement), Fault where the arm was stopped, KeyboardInterrupt. In a script the call
+    stands below `if __name__ == "__main__":`, for the arm's process reads the script as well.
     """
     from rig.commands.carry_out import carry_out
     from rig.commands.endings import ending_by_interrupt
     from rig.commands.run import begun
 
+    if multiprocessing.parent_process() is not None:
+        raise Refused(
+            "no_main_guard",
+            "the process that talks to the arm has read the script that calls rig.run, and comes to that call itself",
+            'Put the call below a line  if __name__ == "__main__":',
+        )
     if threading.current_thread() is not threading.main_thread():
         raise Refused("not_main_thread", "only the main thread hears Ctrl-C, which stops the arm", "Call it from there")
     words = [*_changed(changes), *_script(script), *([] if out is None else ["--out", str(out)])]

@@ -69,8 +69,8 @@ def _refuse_other_units(found: Array, quantity: Quantity, limit: float | None, w
         reaches = f"its range is ±{limit:.4g}" if limit is not None else f"no such sensor reads more than {most:g}"
         raise Refused(
             "wrong_unit",
-            f"the readings for {whose} reach {largest:.4g}, and {reaches} {quantity.unit}: they look like {instead}, or "
-            "like counts",
+            f"the readings for {whose} reach {largest:.4g}, and {reaches} {quantity.unit}: they look like {instead}, "
+            "or like counts",
             mend,
         )
     sizes = np.linalg.norm(found[~np.isnan(found).any(axis=1)], axis=1)

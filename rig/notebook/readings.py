@@ -76,7 +76,7 @@ class Signal:
 class Readings:
     """One sensor's readings in all recordings of a movement, in the order they were made.
 
-    `rate`, `acceleration`, `field` and `temperature` are its signals, as far as it measures them; `signal` finds others.
+    `rate`, `acceleration`, `field` and `temperature` are its signals, as far as it measures them; `signal` finds more.
     """
 
     name: str
@@ -110,7 +110,10 @@ class Readings:
         return self.signal(TEMPERATURE.name)
 
     def signal(self, quantity: str) -> Signal:
-        """The readings of the quantity of that name. Raises Refused `no_such_quantity`; Fault as `on_arm_clock` does."""
+        """The readings of the quantity of that name.
+
+        Raises Refused `no_such_quantity`; Fault as `on_arm_clock` does.
+        """
         channel = next((each for each in self.sensor.channels if each.quantity == quantity), None)
         if channel is None:
             raise Refused(

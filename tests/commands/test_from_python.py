@@ -32,7 +32,7 @@ def test_a_plan_is_that_of_the_command(capsys: pytest.CaptureFixture[str]) -> No
 def test_an_error_in_the_file_or_in_a_change_is_refused_by_name() -> None:
     with pytest.raises(Refused, match="speed_deg_s"):
         rig.plan(DEMO, {"procedure.speed_deg_s": "fast"})
-    with pytest.raises(Refused, match="bad_option: procedure.speed_deg_s"):
+    with pytest.raises(Refused, match=r"bad_option: procedure\.speed_deg_s"):
         rig.plan(DEMO, {"procedure.speed_deg_s": object()})
 
 

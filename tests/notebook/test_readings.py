@@ -15,7 +15,7 @@ RECORDINGS = ROOT / "tests" / "fixtures" / "recordings"
 
 @pytest.fixture(scope="module")
 def imu() -> rig.Readings:
-    return rig.load(RECORDINGS / "rig.settings-7" / "imu")["lsm9ds1"]
+    return rig.load(RECORDINGS / "rig.settings-7" / "imu")["gyro"]
 
 
 @pytest.fixture(scope="module")
@@ -59,7 +59,7 @@ def test_what_was_not_measured_is_refused_by_name(imu: rig.Readings) -> None:
 
 def test_two_sensors_that_are_no_gyroscopes_are_not_compared(magnetic: rig.Run) -> None:
     name = next(name for name in magnetic if "rate" not in magnetic[name].quantities)
-    with pytest.raises(Refused, match="nothing_to_compare: .*measures no rates"):
+    with pytest.raises(Refused, match=r"nothing_to_compare: .*measures no rates"):
         rig.compare(magnetic, name, name)
 
 
