@@ -9,20 +9,23 @@ from rig.config.yaml_text import DEPTH_MAX, Location, Unreadable, first_control_
 from rig.errors.quoting import quote, shorten
 
 BASE = "base"
+SET = "--set"
 FILES_MAX = 8  # one on another
 
-Places = Mapping[Location, str]  # where each key stands, in words: "line 3", "demo.yaml, line 3"
+Places = Mapping[Location, str]  # where each key stands, in words: "line 3", "demo.yaml, line 3", "--set"
 
 
 @dataclass(frozen=True, slots=True)
 class Layered:
     """All that is said: the `document`, the `places` of its keys, and the `problems` found while putting it together.
 
+    `written` are the letters of every value that YAML takes for something else than text.
     `text` is what was written, when one file says everything; None when the document was made of more.
     """
 
     document: dict[str, Any]
     places: Places
+    written: Mapping[Location, str]
     problems: tuple[str, ...]
     text: str | None
 
@@ -33,6 +36,7 @@ class _Layer:
 
     data: dict[str, Any]
     places: Places
+    written: Mapping[Location, str]
     problems: tuple[str, ...]
 
 
@@ -46,14 +50,16 @@ def put_together(text: str, path: Path | None, overrides: Sequence[str] = ()) ->
     layers = list(_layers(text, path))
     document: dict[str, Any] = {}
     places: dict[Location, str] = {}
+    written: dict[Location, str] = {}
     problems: list[str] = []
     for layer in reversed(layers):
         document = merge(document, layer.data)
         places |= layer.places
+        written |= layer.written
         problems += layer.problems
     for item in overrides:
-        problems += _override(document, places, item)
-    return Layered(document, places, tuple(problems), None if overrides or len(layers) > 1 else text)
+        problems += _override(document, places, written, item)
+    return Layered(document, places, written, tuple(problems), None if overrides or len(layers) > 1 else text)
 
 
 def merge(base: Mapping[str, Any], over: Mapping[str, Any]) -> dict[str, Any]:
@@ -105,15 +111,20 @@ def _layer(text: str, name: str) -> _Layer:
         raise Unreadable(f"{name}: {error}" if name else str(error)) from None
     prefix = f"{name}, " if name else ""
     places = {location: f"{prefix}line {line}" for location, line in document.lines.items()}
-    return _Layer(document.data, places, tuple(f"{name}: {it}" if name else it for it in document.problems))
+    return _Layer(
+        document.data, places, document.written, tuple(f"{name}: {it}" if name else it for it in document.problems)
+    )
 
 
-def _override(document: dict[str, Any], places: dict[Location, str], item: str) -> Iterator[str]:
+def _override(
+    document: dict[str, Any], places: dict[Location, str], written: dict[Location, str], item: str
+) -> Iterator[str]:
     """Apply one `a.b.c=value` in place; yields a problem instead when it cannot be applied."""
     path, equals, value = item.partition("=")
-    what = f"--set {shorten(item)}"
+    path = path.strip()
+    what = f"{SET} {shorten(item)}"
     if not path or not equals or not value.strip():
-        yield f"{what}: must be path=value, for example procedure.speed_deg_s=30"
+        yield f"{what}: must be path=value, for example {_example(item)}"
         return
     if first_control_character(path) is not None:
         yield f"{what}: holds a control character"
@@ -132,7 +143,9 @@ def _override(document: dict[str, Any], places: dict[Location, str], item: str) 
         return
     yield from (f"{what}: {problem}" for problem in said.problems)
     section = document
-    for parent in parents:
+    for depth, parent in enumerate(parents, start=1):
+        if parent not in section:
+            places[location[:depth]] = SET
         below = section.setdefault(parent, {})
         if not isinstance(below, dict):
             yield f"{what}: {shorten(parent)} is not a section"
@@ -140,9 +153,15 @@ def _override(document: dict[str, Any], places: dict[Location, str], item: str) 
         section = below
     if said.data is None and last in section:
         del section[last]
-        places.pop(location, None)
     else:
         section[last] = said.data
-    # What the override says stands in no line; only the key it was given to does.
-    for place in [place for place in places if place[: len(location)] == location and place != location]:
+    for place in [place for place in places if place[: len(location)] == location]:
         del places[place]
+    places |= {(*location, *below): SET for below in ((), *said.lines)}
+    written |= {(*location, *below): letters for below, letters in said.written.items()}
+
+
+def _example(item: str) -> str:
+    """What is meant by `a.b:value`, else any."""
+    path, colon, value = item.partition(":")
+    return f"{path.strip()}={value.strip()}" if colon and value.strip() else "procedure.speed_deg_s=30"

@@ -13,7 +13,8 @@ from urllib.parse import urlsplit
 import yaml
 from pydantic import BaseModel, ValidationError
 
-from rig.config.layers import BASE, Layered, Places, put_together, read_layers
+from rig.config.as_written import take_text_as_written
+from rig.config.layers import BASE, SET, Layered, Places, put_together, read_layers
 from rig.config.models import ProcedureSection, RigConfig, SensorsConfig, StatementConfig
 from rig.config.procedure_sections import DEFAULT_PROCEDURE, STOCK_SECTIONS
 from rig.config.world_models import WorldSection
@@ -48,7 +49,8 @@ class ConfigurationRefused(Refused):
 
     def __init__(self, source: str, problems: Sequence[str]) -> None:
         count = "1 error" if len(problems) == 1 else f"{len(problems)} errors"
-        remedy = "Mend the file and run again; nothing has moved"
+        what = "command line" if all(f"{SET} " in each or f"({SET})" in each for each in problems) else "file"
+        remedy = f"Mend the {what} and run again; nothing has moved"
         super().__init__("configuration", f"{printable(source)} has {count}", remedy)
         self.problems = tuple(printable(problem) for problem in problems)
 
@@ -77,7 +79,7 @@ def load_sensors(path: str | Path, overrides: Sequence[str] = ()) -> tuple[Senso
     if "world" in layered.document:
         loaded = _validated(layered, str(path), None)
         return loaded.config, loaded.text
-    config, problems = _validate(SensorsConfig, layered.document, (), layered.places)
+    config, problems = _validate(SensorsConfig, layered.document, (), layered)
     if layered.problems or config is None:
         raise ConfigurationRefused(str(path), [*layered.problems, *problems])
     return config, None
@@ -89,7 +91,7 @@ def load_statement(overrides: Sequence[str]) -> StatementConfig:
         layered = put_together("{}", None, overrides)
     except Unreadable as error:
         raise ConfigurationRefused("--set", [str(error)]) from None
-    config, problems = _validate(StatementConfig, layered.document, (), layered.places)
+    config, problems = _validate(StatementConfig, layered.document, (), layered)
     if layered.problems or config is None:
         raise ConfigurationRefused("--set", [*layered.problems, *problems])
     return config
@@ -117,13 +119,13 @@ def parse(
 
 
 def _validated(layered: Layered, source: str, sections: Sections) -> Loaded:
-    document, places = layered.document, layered.places
+    document = layered.document
     rig_part = {key: value for key, value in document.items() if key != "world"}
-    config, rig_problems = _validate_rig(rig_part, sections, places)
+    config, rig_problems = _validate_rig(rig_part, sections, layered)
     world: WorldSection | None = None
     world_problems: list[str] = []
     if "world" in document:
-        world, world_problems = _validate(WorldSection, document["world"], ("world",), places)
+        world, world_problems = _validate(WorldSection, document["world"], ("world",), layered)
     problems = [*layered.problems, *rig_problems, *world_problems]
     if config is not None and world is not None:
         problems += _world_fits(config, world)
@@ -143,58 +145,76 @@ def _dump(document: Mapping[str, Any]) -> str:
 
 
 def _validate_rig(
-    document: Mapping[str, Any], sections: Sections, places: Places
+    document: Mapping[str, Any], sections: Sections, layered: Layered
 ) -> tuple[RigConfig | None, list[str]]:
     """The rig's part: the procedure by the section its name chooses, and the rest."""
-    procedure, problems = _validate_procedure(document.get("procedure", {}), sections, places)
+    procedure, problems = _validate_procedure(document.get("procedure", {}), sections, layered)
     rest = {**document, "procedure": procedure or ProcedureSection(name="")}
-    config, rest_problems = _validate(RigConfig, rest, (), places)
+    config, rest_problems = _validate(RigConfig, rest, (), layered)
     if procedure is None or config is None:
         return None, rest_problems + problems
     problems = [f"(file): {problem}" for problem in procedure.problems(config)]
     return (None if problems else config), problems
 
 
-def _validate_procedure(data: Any, sections: Sections, places: Places) -> tuple[ProcedureSection | None, list[str]]:
+def _validate_procedure(data: Any, sections: Sections, layered: Layered) -> tuple[ProcedureSection | None, list[str]]:
     """A name that is not known is one problem; the other keys are then judged as those of the nearest name."""
     name = data.get("name", DEFAULT_PROCEDURE) if isinstance(data, dict) else DEFAULT_PROCEDURE
     if sections is None:
         return ProcedureSection(name=str(name)), []
     if isinstance(name, str) and name in sections:
-        return _validate(sections[name], data, ("procedure",), places)
+        return _validate(sections[name], data, ("procedure",), layered)
     place = ("procedure", "name")
-    problems = [_where(place, places) + _not_allowed(name, list(sections))]
+    problems = [_where(place, layered.places) + _not_allowed(name, list(sections))]
     nearest = difflib.get_close_matches(str(name)[:100], list(sections), n=1)
     if nearest:
-        problems += _validate(sections[nearest[0]], {**data, "name": nearest[0]}, ("procedure",), places)[1]
+        problems += _validate(sections[nearest[0]], {**data, "name": nearest[0]}, ("procedure",), layered)[1]
     return None, problems
 
 
-def _validate(model: type[Model], data: Any, prefix: Location, places: Places) -> tuple[Model | None, list[str]]:
+def _validate(model: type[Model], data: Any, prefix: Location, layered: Layered) -> tuple[Model | None, list[str]]:
+    take_text_as_written(model, data, prefix, layered.written)
     try:
         return model.model_validate(data), []
     except ValidationError as error:
         # A list whose only item is wrong is also reported as too short: the first report is the useful one.
         items = [item for item in error.errors() if item["type"] != "too_short" or not item["input"]]
-        return None, [_explain(model, item, prefix, places) for item in items]
+        return None, [_explain(model, item, prefix, layered) for item in items]
 
 
-def _explain(model: type[BaseModel], item: Any, prefix: Location, places: Places) -> str:
+def _explain(model: type[BaseModel], item: Any, prefix: Location, layered: Layered) -> str:
     """One validation error as: path (line): what is wrong, what is allowed, nearest spelling."""
     location: Location = item["loc"]
-    where = _where((*prefix, *location), places)
+    where = _where((*prefix, *location), layered.places)
     kind, value = item["type"], item["input"]
     if kind == "extra_forbidden":
         allowed = [*_keys_at(model, location[:-1]), *(["world", BASE] if not prefix and len(location) == 1 else [])]
         return f"{where}: unknown key{_nearest(str(location[-1]), allowed)}; allowed: {', '.join(allowed)}"
     if kind == "missing":
-        return f"{where}: missing"
+        return f"{where}: missing{_made_by_override((*prefix, *location[:-1]), layered)}"
     if kind == "literal_error":
         allowed = [word.strip("'") for word in item["ctx"]["expected"].replace(" or ", ", ").split(", ")]
         return where + _not_allowed(value, allowed)
+    if kind == "tuple_type":
+        return f"{where}: {quote(value)}: must be a list in brackets, as [a, b, c]"
+    if kind in ("model_type", "dict_type"):
+        return f"{where}: {quote(value)}: must be a section, with the keys {', '.join(_keys_at(model, location))}"
     message = item["msg"].removeprefix("Value error, ")
     shown = "" if isinstance(value, dict) else f"{quote(value)}: "
     return f"{where}: {shown}{message[0].lower()}{message[1:]}"
+
+
+def _made_by_override(section: Location, layered: Layered) -> str:
+    """What else there is, where a section stands in no file: a misspelt `--set sensors.NAME.…` has made it."""
+    if layered.places.get(section) != SET:
+        return ""
+    beside = layered.document
+    for part in section[:-1]:
+        beside = beside[part]
+    others = [str(key) for key in beside if key != section[-1] and layered.places.get((*section[:-1], key)) != SET]
+    if not others or not section[:-1]:
+        return ""
+    return f"; {dotted(section)} is said by --set alone, the file has {', '.join(others)}"
 
 
 def _where(place: Location, places: Places) -> str:

@@ -24,7 +24,13 @@ NUMBER_MAX_CHARACTERS = 40
 
 NUMBERS = ("tag:yaml.org,2002:int", "tag:yaml.org,2002:float")
 TEXT = "tag:yaml.org,2002:str"
+NOTHING = "tag:yaml.org,2002:null"
 MERGE = "tag:yaml.org,2002:merge"
+OTHER_FILES = {  # what is given for a configuration by mistake, and where it belongs
+    ".py": "a Python script, no configuration; a procedure of your own is run by `rig run CONFIG --script FILE.py`",
+    ".h5": "a recording, no configuration; it is solved by `rig solve FILE.h5`",
+    ".csv": "a table of readings, no configuration; it is solved by `rig solve FILE.csv`",
+}
 UNSEEN = frozenset({"Cc", "Cf", "Cs", "Zl", "Zp"})  # control, format, half a pair, breaks of lines and paragraphs
 
 
@@ -38,10 +44,14 @@ class Unreadable(Exception):
 
 @dataclass(frozen=True, slots=True)
 class Document:
-    """What a text says: `data` as YAML reads it, the `lines` of its keys, and the `problems` of its keys and words."""
+    """What a text says: `data` as YAML reads it, the `lines` of its keys, and the `problems` of its keys and words.
+
+    `written` are the letters of every value that YAML takes for something else than text: a number, a date, a truth.
+    """
 
     data: Any
     lines: Mapping[Location, int]
+    written: Mapping[Location, str]
     problems: tuple[str, ...]
 
 
@@ -52,6 +62,8 @@ def first_control_character(text: str) -> str | None:
 
 def read_file(path: Path) -> str:
     """The text of a regular file of reasonable size. Raises `Unreadable`."""
+    if path.suffix in OTHER_FILES and path.is_file():
+        raise Unreadable(f"is {OTHER_FILES[path.suffix]}")
     try:
         content = read_regular_file(path, SIZE_MAX_BYTES)
     except UnfitFile as unfit:
@@ -75,8 +87,9 @@ def read_yaml(text: str) -> Document:
         loader = _Loader(text)
         node = loader.get_single_node()
         lines: dict[Location, int] = {}
-        problems = tuple(_survey(node, (), lines))
-        return Document(None if node is None else loader.construct_document(node), lines, problems)
+        written: dict[Location, str] = {}
+        problems = tuple(_survey(node, (), lines, written))
+        return Document(None if node is None else loader.construct_document(node), lines, written, problems)
     except yaml.MarkedYAMLError as error:
         mark = error.problem_mark or error.context_mark
         why = ", ".join(part for part in (error.context, error.problem) if part)
@@ -132,8 +145,12 @@ def _refusal(why: str, mark: Any) -> yaml.MarkedYAMLError:
     return yaml.MarkedYAMLError(problem=why, problem_mark=mark)
 
 
-def _survey(node: yaml.Node | None, location: Location, lines: dict[Location, int]) -> Iterator[str]:
-    """Notes the line of every key; yields keys that are no words or stand twice (YAML would keep the last)."""
+def _survey(
+    node: yaml.Node | None, location: Location, lines: dict[Location, int], written: dict[Location, str]
+) -> Iterator[str]:
+    """Notes the line of every key, and what is `written` where it is no text; yields keys that are no words or stand
+    twice (YAML would keep the last).
+    """
     if isinstance(node, yaml.MappingNode):
         for key, value in node.value:
             line = key.start_mark.line + 1
@@ -145,11 +162,13 @@ def _survey(node: yaml.Node | None, location: Location, lines: dict[Location, in
                 yield f"{dotted(place)}: given twice, on lines {lines[place]} and {line}"
             lines[place] = line
             yield from _visible(key, place)
-            yield from _survey(value, place, lines)
+            yield from _survey(value, place, lines, written)
     elif isinstance(node, yaml.SequenceNode):
         for index, value in enumerate(node.value):
-            yield from _survey(value, (*location, index), lines)
+            yield from _survey(value, (*location, index), lines, written)
     elif isinstance(node, yaml.ScalarNode):
+        if node.tag not in (TEXT, NOTHING):
+            written[location] = node.value
         yield from _visible(node, location)
 
 

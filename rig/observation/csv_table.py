@@ -4,6 +4,7 @@ import csv
 from array import array
 from collections.abc import Iterator, Sequence
 from io import TextIOWrapper
+from itertools import chain
 from pathlib import Path
 
 import numpy as np
@@ -20,7 +21,8 @@ LONGEST_LINE = 10_000  # characters: of a hundred columns, where there are at mo
 def read_columns(path: Path, header: Header, largest_mb: int) -> dict[str, Array]:
     """The columns of a file by name, those of its header; of each group of optional ones all, or none.
 
-    The first row holds the names. Raises Refused `no_file`, `wrong_columns`, `wrong_unit`, `not_a_number`.
+    The first row holds the names. If it divides them by semicolons, as spreadsheets do where decimals have a comma, all
+    rows do. Raises Refused `no_file`, `wrong_columns`, `wrong_unit`, `not_a_number`.
     """
     rows = _rows(path, largest_mb)
     names = [name.strip() for name in next(rows, [])]
@@ -46,7 +48,13 @@ def _rows(path: Path, largest_mb: int) -> Iterator[list[str]]:
             open_regular_file(path, largest_mb * 1_000_000) as file,
             TextIOWrapper(file, encoding="utf-8-sig", newline="") as text,
         ):
-            yield from csv.reader(_lines(text))
+            lines = _lines(text)
+            first = next(lines, "")
+            if ";" in first and "," not in first:
+                for row in csv.reader(chain([first], lines), delimiter=";"):
+                    yield [cell.replace(",", ".") for cell in row]
+            else:
+                yield from csv.reader(chain([first], lines))
     except (UnfitFile, OSError, ValueError, csv.Error) as error:
         raise _unreadable(path, str(error)) from error
 

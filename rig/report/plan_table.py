@@ -13,6 +13,7 @@ from rich.table import Table
 from rig.analysis.attitude_account import AttitudeAccount
 from rig.analysis.planned import Told
 from rig.analysis.told_from import ToldFrom
+from rig.arm.doubts import LONG_S, doubts, duration_words
 from rig.arm.motion import SAME_PLACE_RAD, Dwell, Plan, Rest, Step, Sweep
 from rig.arm.state import JOINT_NAMES
 from rig.report.attitude_account import account_document, print_account
@@ -54,7 +55,13 @@ def plan_document(planned: Planned) -> dict[str, Any]:
     """The plan for machines: SI units, every field of every step."""
     plan, account, told = planned.plan, planned.account, planned.told
     steps = [{"kind": type(step).__name__.lower(), **asdict(step)} for step in plan.steps]
-    document = {"schema": "rig.plan/1", "duration_s": plan.duration_s, "repeated": planned.repeated, "steps": steps}
+    document: dict[str, Any] = {
+        "schema": "rig.plan/1",
+        "duration_s": plan.duration_s,
+        "repeated": planned.repeated,
+        "doubts": doubts(plan),
+        "steps": steps,
+    }
     if account is not None:
         document |= {"settling_s": plan.settling_s, "attitudes": account_document(account)}
     for key, by_sensor in (("told_from", told.rates), ("acceleration_told_from", told.accelerations)):
@@ -80,7 +87,8 @@ def print_plan(planned: Planned, *, as_json: bool) -> None:
         table.add_row(f"{at_s:.1f}", name, f"{step.duration_s:.2f}", *_motion(step))
         at_s += step.duration_s
     console.print(table)
-    console.print(f"{_measured(plan)}{len(plan.motions)} motions, {plan.duration_s:.1f} s; all within limits")
+    long = f" ({duration_words(plan.duration_s)})" if plan.duration_s >= LONG_S else ""
+    console.print(f"{_measured(plan)}{len(plan.motions)} motions, {plan.duration_s:.1f} s{long}; all within limits")
     if plan.dwells:
         whole_s = plan.duration_s + plan.settling_s
         console.print(
@@ -88,6 +96,8 @@ def print_plan(planned: Planned, *, as_json: bool) -> None:
         )
     if planned.repeated:
         console.print(f"If the calibration passes, the same once more to verify it: {2 * plan.duration_s:.1f} s in all")
+    for doubt in doubts(plan):
+        console.print(f"Note: {doubt}")
     if account is not None:
         print_account(console, account)
     if told.rates or told.accelerations:

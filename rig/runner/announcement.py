@@ -3,6 +3,7 @@
 from collections.abc import Iterable
 from math import degrees
 
+from rig.arm.doubts import doubts, duration_words
 from rig.arm.motion import Plan
 from rig.arm.preflight import way_to_home
 from rig.arm.state import JOINT_NAMES, ArmReport
@@ -21,7 +22,7 @@ def announcement(plan: Plan, report: ArmReport, repeated: Plan | None, mounted: 
     )
     lines = [
         *mounted,
-        f"The arm at {report.host} will move for {plan.duration_s:.0f} s.",
+        f"The arm at {report.host} will move for {duration_words(plan.duration_s)}.",
         f"First it goes home: {turns or 'it is there already'}.",
     ]
     if plan.sweeps:
@@ -33,6 +34,7 @@ def announcement(plan: Plan, report: ArmReport, repeated: Plan | None, mounted: 
             "If the calibration passes, the board stores it in the place of what it had, and without another "
             f"question {len(repeated.sweeps)} sweeps follow to verify it, for {repeated.duration_s:.0f} s."
         )
+    lines += doubts(plan)
     lines.append(
         "Nobody and nothing may be within its reach; the sensor's cable needs slack for a whole turn either way."
     )

@@ -155,7 +155,7 @@ def test_a_misspelt_base_is_recognised(folder: Path) -> None:
 def test_an_override_of_null_leaves_out_too() -> None:
     loaded = load(DEMO, ["world=null", "arm.host=10.0.0.2", "sensors.gyro.range_deg_s=null"])
     assert not loaded.simulated and loaded.config.sensors["gyro"].range_deg_s == 245
-    with pytest.raises(ConfigurationRefused, match=r"limits\.condition: missing"):
+    with pytest.raises(ConfigurationRefused, match=r"limits\.condition \(--set\): missing"):
         load(DEMO, ["limits.condition=null"])
 
 

@@ -58,19 +58,19 @@ def test_without_a_name_it_is_the_six_sweeps(procedure: str) -> None:
 def test_a_name_not_known_is_one_error_beside_those_of_the_nearest_procedure() -> None:
     found = problems_of("procedure={name: six_obsrvation, speed_deg: 60}", "limits.condition=-1")
     assert len(found) == 3
-    assert found[0].startswith("limits.condition (line 32): -1: ")
+    assert found[0].startswith("limits.condition (--set): -1: ")
     assert found[1] == (
-        "procedure.name: 'six_obsrvation' is not allowed, did you mean six_observation?; "
+        "procedure.name (--set): 'six_obsrvation' is not allowed, did you mean six_observation?; "
         "allowed: six_observation, verify, static_attitudes, imu, bias_drift, nod"
     )
-    assert found[2].startswith("procedure.speed_deg: unknown key, did you mean speed_deg_s?")
+    assert found[2].startswith("procedure.speed_deg (--set): unknown key, did you mean speed_deg_s?")
 
 
 @pytest.mark.parametrize("name", ["[1]", "3", "{}", "zzz"])
 def test_a_name_that_is_none_is_refused(name: str) -> None:
     (found,) = problems_of(f"procedure.name={name}")
     assert (
-        found.startswith("procedure.name (line 20): ")
+        found.startswith("procedure.name (--set): ")
         and "allowed: six_observation, verify, static_attitudes, imu, bias_drift, nod" in found
     )
 
@@ -78,13 +78,13 @@ def test_a_name_that_is_none_is_refused(name: str) -> None:
 @pytest.mark.parametrize("section", ["3", "[]", "fast"])
 def test_a_section_that_is_no_section_is_refused(section: str) -> None:
     (found,) = problems_of(f"procedure={section}")
-    assert found.startswith("procedure (line 19): ")
+    assert found.startswith("procedure (--set): ")
 
 
 def test_keys_of_another_procedure_are_unknown() -> None:
     missing, unknown = problems_of("procedure={name: nod, speed_deg_s: 60}")
     assert missing == "procedure.nods: missing"
-    assert unknown == "procedure.speed_deg_s: unknown key; allowed: name, nods"
+    assert unknown == "procedure.speed_deg_s (--set): unknown key; allowed: name, nods"
 
 
 def test_a_section_judges_the_rest_of_the_file() -> None:

@@ -209,3 +209,11 @@ def test_people_see_uncertainties_with_one_coverage_factor_and_the_angles_betwee
     assert factor > 2 and f"± U (k = {factor:.2f})" in printed and "1σ" not in printed
     skew, known = (1e3 * found["vector_model"][f"non_orthogonality_{each}"][0] for each in ("rad", "std_rad"))
     assert f"non-orthogonality yz zx xy: {skew:+.3f} ± {factor * known:.2g}" in printed
+
+
+def test_files_of_a_spreadsheet_whose_decimals_have_a_comma_are_read_alike(tmp_path: Path) -> None:
+    def as_there(lines: list[str]) -> list[str]:
+        return [line.replace(",", ";").replace(".", ",") for line in lines]
+
+    usual, there = read_with(tmp_path), read_with(tmp_path, samples=as_there, sweeps=as_there)
+    assert repr(there) == repr(usual)

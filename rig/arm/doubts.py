@@ -1,0 +1,32 @@
+"""What a plan holds that may be done and is hardly meant. Pure: said before the operator agrees, never refused."""
+
+import math
+
+from rig.arm.motion import Plan, Transfer
+
+# °/s. What is slower may be a speed in rad/s: no joint of the arm turns by more of these.
+SLOW_DEG_S = math.pi
+LONG_S = 600.0  # from then on one thinks in minutes
+
+
+def doubts(plan: Plan) -> list[str]:
+    """Speeds below `SLOW_DEG_S`, a sentence for each key of the configuration that says one."""
+    transfers = [step for step in plan.steps if isinstance(step, Transfer)]  # of which the first is made at leisure
+    found = {
+        "procedure.speed_deg_s": min((sweep.speed_rad_s for sweep in plan.sweeps), default=math.inf),
+        "arm.transfer_speed_deg_s": max((transfer.speed_rad_s for transfer in transfers), default=math.inf),
+    }
+    return [
+        f"{key} is {math.degrees(speed):.4g}, which is slow: is {math.degrees(speed):.4g} rad/s meant? "
+        f"That is {math.degrees(math.degrees(speed)):.0f} °/s."
+        for key, speed in found.items()
+        if math.degrees(speed) < SLOW_DEG_S
+    ]
+
+
+def duration_words(duration_s: float) -> str:
+    """`66 s`, `5 h 36 min`: how long something takes, as one says it."""
+    if duration_s < LONG_S:
+        return f"{duration_s:.0f} s"
+    hours, minutes = divmod(round(duration_s / 60), 60)
+    return f"{hours} h {minutes} min" if hours else f"{minutes} min"
