@@ -9,6 +9,7 @@ from math import degrees
 from pathlib import Path
 
 from firmware_host.client import Board, Calibration, StoredCalibration
+from rig.board.crystal import follows_crystal
 from rig.board.identify import (
     changing,
     configured_board,
@@ -22,6 +23,7 @@ from rig.board.identify import (
 from rig.board.store import calibration_of, store
 from rig.commands.claims import claimed_board
 from rig.commands.laboratory import simulated_laboratory, written
+from rig.commands.own_address import own_address
 from rig.config.load import load
 from rig.config.models import RigConfig
 from rig.config.sensor_sections import SensorSection
@@ -50,6 +52,7 @@ def info(options: Namespace) -> int:
             for sensor in board.identity.sensors
         ]
         names: dict[str, str] = {section.part: name for name, section in config.parts_on_board.items()}
+        follows_crystal(board)  # of a board that has just started one waits for the crystal
         status = board.status()
         sensors = tuple(
             BoardSensor(sensor, names.get(configured_part(sensor.part)), counts, stored)
@@ -116,8 +119,10 @@ def erase(options: Namespace) -> int:
 def _connected(options: Namespace) -> Iterator[tuple[RigConfig, Board]]:
     """The board of a configuration, in its simulated laboratory if it has one."""
     loaded = load(options.config, options.overrides, sections=None)
-    section = configured_board(loaded.config)
     with ExitStack() as stack:
+        if moved := stack.enter_context(own_address(loaded.config, simulated=loaded.simulated)):
+            loaded = load(options.config, [*options.overrides, *moved], sections=None)
+        section = configured_board(loaded.config)
         if loaded.simulated:
             stack.enter_context(simulated_laboratory(stack.enter_context(written(loaded.text))))
             kept = loaded.flash_file

@@ -12,7 +12,7 @@ from rig.commands.page_arguments import PageWish, operators_page
 from rig.commands.recall import remembered
 from rig.commands.remember import remember, since_lines
 from rig.commands.show import print_ending
-from rig.data.run_folder import CONFIG, WORLD_LATE
+from rig.data.run_folder import CONFIG, LOG, WORLD_LATE
 from rig.report.document import document_of
 from rig.runner.phases import Run
 from rig.station.confirm import ask_operator
@@ -42,7 +42,7 @@ def carry_out(
         # Nobody stands beside a laboratory that this process starts itself, so there nobody need be asked.
         on_terminal = always_yes if assume_yes or configured.loaded.simulated else ask_operator
         answer = shown.answer if shown.answer is not None and not assume_yes else on_terminal
-        with log(folder / "log.txt") as logged, view() as seen, ExitStack() as held:
+        with log(folder / LOG) as logged, view() as seen, ExitStack() as held:
             station = Stations((logged, seen, *shown.listeners), answer, attended=answer is not always_yes)
             memory = remembered(configured.loaded.config, moved)
             this = Run(folder, configured.loaded, configured.script, station, memory)

@@ -1,100 +1,122 @@
 """`rig check`: connect and look. Receives only, so nothing moves and no program on the arm is stopped."""
 
+import json
 import sys
 from argparse import ArgumentParser, Namespace
 from collections.abc import Callable
-from contextlib import nullcontext
+from contextlib import ExitStack
 from math import degrees
 from typing import TYPE_CHECKING
 
-from rig.commands.config_arguments import add_config, add_script
+from rig.commands.config_arguments import add_config, add_json, add_script
 from rig.commands.laboratory import simulated_laboratory, written
-from rig.errors import Refused, RigError
+from rig.errors import Problem, Refused, RigError
 from rig.station.plain_text import say
 
 if TYPE_CHECKING:
     from rig.commands.configured import Configured
+
+Tell = Callable[[str], None]
 
 
 def add(parser: ArgumentParser) -> None:
     """The arguments of `rig check`."""
     add_config(parser)
     add_script(parser)
+    add_json(parser)
 
 
 def run(options: Namespace) -> int:
-    """Look at the board and the arm; print what is there and what is missing. 0 when a run could start, else 2."""
+    """Look at the board and the arm; print what is there and what is missing. 0 when a run could start, else 2.
+
+    With `--json` all of it at the end, of schema "rig.check/1".
+    """
+    seen: list[str] = []
+    tell = seen.append if options.json else say
     from rig.commands.configured import configured
+    from rig.commands.own_address import own_address
 
     found = configured(options.config, options.overrides, options.script)
-    with written(found.loaded.text) as used, simulated_laboratory(used) if found.loaded.simulated else nullcontext():
+    with ExitStack() as stack:
+        if found.loaded.simulated:
+            if moved := stack.enter_context(own_address(found.loaded.config, simulated=True)):
+                found = configured(options.config, [*options.overrides, *moved], options.script and found.script)
+            stack.enter_context(simulated_laboratory(stack.enter_context(written(found.loaded.text))))
         looks = [_look_at_board, _look_at_instruments, _look_at_arm]
-        missing = [problem for look_at in looks for problem in _named(look_at, found)]
+        missing = [problem for look_at in looks for problem in _named(look_at, found, tell)]
+    if options.json:
+        problems = [problem._asdict() for problem in missing]
+        document = {"schema": "rig.check/1", "ready": not missing, "seen": seen, "missing": problems}
+        print(json.dumps(document, indent=2))
+        return 2 if missing else 0
     for problem in missing:
         say(f"missing: {problem}", file=sys.stderr)
     say(f"not ready: {len(missing)} to mend" if missing else "ready")
     return 2 if missing else 0
 
 
-def _named(look_at: "Callable[[Configured], list[str]]", configured: "Configured") -> list[str]:
+def _named(
+    look_at: "Callable[[Configured, Tell], list[Problem]]", configured: "Configured", tell: Tell
+) -> list[Problem]:
     """The problems found, including the one that ended the looking."""
     try:
-        return look_at(configured)
+        return look_at(configured, tell)
     except RigError as error:
-        return [str(error)]
+        return [error.problem]
 
 
-def _look_at_board(configured: "Configured") -> list[str]:
+def _look_at_board(configured: "Configured", tell: Tell) -> list[Problem]:
     from firmware_host.client import Board
     from rig.board.identify import configured_board, find_sensor, refuse_other_firmware, refusing, stored_calibration
     from rig.commands.claims import claimed_board
 
     config = configured.loaded.config
-    missing: list[str] = []
+    missing: list[Problem] = []
     if not config.parts_on_board:
         return missing
     section = configured_board(config)
     with refusing(), claimed_board(section.port), Board(section.port, section.baud, lambda batch: None) as board:
         identity = board.identity
-        say(f"board at {section.port}: {identity.unique_id}, firmware {identity.firmware}")
+        tell(f"board at {section.port}: {identity.unique_id}, firmware {identity.firmware}")
         try:
             refuse_other_firmware(identity)
         except RigError as error:
-            missing.append(str(error))
+            missing.append(error.problem)
         for name, part in config.parts_on_board.items():
             try:
                 info = find_sensor(identity, name, part)
-                say(f"sensor {name}: {info.part}, identity register 0x{info.who_am_i:02x}")
+                tell(f"sensor {name}: {info.part}, identity register 0x{info.who_am_i:02x}")
                 if configured.phase.procedure.reads_corrected and name in config.to_calibrate:
                     stored = stored_calibration(board, name, config.to_calibrate[name])
-                    say(f"sensor {name}: calibrated on {stored.calibration.written_utc:%Y-%m-%d}")
+                    tell(f"sensor {name}: calibrated on {stored.calibration.written_utc:%Y-%m-%d}")
             except RigError as error:
-                missing.append(str(error))
+                missing.append(error.problem)
     return missing
 
 
-def _look_at_instruments(configured: "Configured") -> list[str]:
+def _look_at_instruments(configured: "Configured", tell: Tell) -> list[Problem]:
     """The sensors with a port of their own; nothing in their memories is changed."""
     from rig.commands.claims import claimed_sensor
     from rig.sensors.errors import SensorError
     from rig.sensors.registry import OWN_PORT
 
-    missing = []
+    missing: list[Problem] = []
     for name, section in configured.loaded.config.sensors.items():
         if section.serial is not None:
             try:
                 with claimed_sensor(name, section.serial.port):
                     for seen in OWN_PORT[section.part].look(name, section):
                         if isinstance(seen, str):
-                            say(f"sensor {name}: {seen}")
+                            tell(f"sensor {name}: {seen}")
                         else:
-                            missing.append(str(seen))
+                            missing.append(seen.problem)
             except (Refused, SensorError) as error:
-                missing.append(str(error))
+                missing.append(error.problem)
     return missing
 
 
-def _look_at_arm(configured: "Configured") -> list[str]:
+def _look_at_arm(configured: "Configured", tell: Tell) -> list[Problem]:
+    from rig.arm.doubts import doubts
     from rig.arm.driver import look
     from rig.arm.identity import arm_words
     from rig.arm.preflight import preflight_problems
@@ -103,13 +125,15 @@ def _look_at_arm(configured: "Configured") -> list[str]:
     report = look(section.host)
     state = report.state
     angles = " ".join(f"{degrees(angle):.1f}" for angle in state.q_rad)
-    say(f"arm at {report.host}: {arm_words(report)}")
-    say(f"arm joints: {angles} °, speed slider {100 * state.target_speed_fraction:.0f} %")
-    problems = preflight_problems([configured.phase.plan(state.q_rad)], section, report)
-    return [*_claims_of_others(section.host), *map(str, problems)]
+    tell(f"arm at {report.host}: {arm_words(report)}")
+    tell(f"arm joints: {angles} °, speed slider {100 * state.target_speed_fraction:.0f} %")
+    plan = configured.phase.plan(state.q_rad)
+    for doubt in doubts(plan):
+        tell(f"note: {doubt}")
+    return [*_claims_of_others(section.host), *preflight_problems([plan], section, report)]
 
 
-def _claims_of_others(host: str) -> list[str]:
+def _claims_of_others(host: str) -> list[Problem]:
     """A problem if another rig has the arm; looking at it disturbs nobody, so it is claimed for no longer than this."""
     from rig.commands.claims import claimed_arm
 
@@ -117,4 +141,4 @@ def _claims_of_others(host: str) -> list[str]:
         with claimed_arm(host):
             return []
     except Refused as refused:
-        return [str(refused)]
+        return [refused.problem]

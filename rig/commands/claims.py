@@ -43,6 +43,11 @@ def claimed_arm(host: str) -> AbstractContextManager[None]:
     return _claimed("arm_claimed", f"arm {_address(host)}", f"the arm at {host}")
 
 
+def claimed_laboratory(host: str) -> AbstractContextManager[None]:
+    """The address of a simulated laboratory, from before its world is there. Raises Refused `arm_claimed`."""
+    return _claimed("arm_claimed", f"laboratory {_address(host)}", f"the simulated laboratory at {host}")
+
+
 def claimed_board(port: str) -> AbstractContextManager[None]:
     """A claim on the board at `port`. Raises Refused `board_claimed`."""
     return _claimed("board_claimed", f"port {_place(port)}", f"the board at {port}")

@@ -79,8 +79,7 @@ def run(
     words = [*_changed(changes), *_script(script), *([] if out is None else ["--out", str(out)])]
     words += [word for serial_number in other_boards for word in ("--other-board", serial_number)]
     options = _options("run", words, config)
-    with ending_by_interrupt():
-        folder, found = begun(options)
+    with ending_by_interrupt(), begun(options) as (folder, found):
         moved = frozenset(options.other_board)
         carry_out(folder, found, assume_yes=yes, moved=moved, as_json=False, page=None)
     return load(folder)

@@ -35,6 +35,7 @@ def add(parser: ArgumentParser) -> None:
 
 def run(options: Namespace) -> int:
     """Print what is at the port, or every KVH 1775 of the configuration, that is given; 2 if one has a problem."""
+    from rig.commands.own_address import own_address
     from rig.config.load import load
     from rig.report.kvh_info import print_kvh_info
 
@@ -43,6 +44,8 @@ def run(options: Namespace) -> int:
         places = {target: (target, baud or 921600)}
         if Path(target).is_file():
             loaded = load(target, options.overrides, sections=None)
+            if moved := stack.enter_context(own_address(loaded.config, simulated=loaded.simulated)):
+                loaded = load(target, [*options.overrides, *moved], sections=None)
             places = {
                 name: (section.serial.port, baud or section.serial.baud)
                 for name, section in loaded.config.sensors.items()

@@ -1,5 +1,7 @@
 """`rig record`: the readings of the sensors alone, while something else turns them. No arm is connected to."""
 
+import shlex
+import sys
 from argparse import ArgumentParser, Namespace
 from contextlib import ExitStack
 from pathlib import Path
@@ -26,13 +28,18 @@ def run(options: Namespace) -> int:
     """
     if not 0 < options.duration_s < float("inf"):
         raise Refused("bad_option", f"--duration-s is {options.duration_s:g}", "Give a time above 0, in seconds")
+    from rig.commands.own_address import own_address
     from rig.config.load import load_sensors
     from rig.runner.readings import record_readings
 
     config, simulated = load_sensors(options.config, options.overrides)
     with ExitStack() as stack:
         if simulated is not None:
+            if moved := stack.enter_context(own_address(config, simulated=True)):
+                config, simulated = load_sensors(options.config, [*options.overrides, *moved])
+            assert simulated is not None
             stack.enter_context(simulated_laboratory(stack.enter_context(written(simulated))))
         for path, seen in record_readings(config, options.out, options.duration_s).items():
             say(f"{path}: {seen.samples} samples, {seen.lost} lost")
+    say(f"If they lay still: rig allan {shlex.quote(str(options.out))}", file=sys.stderr)
     return 0

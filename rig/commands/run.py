@@ -1,6 +1,8 @@
 """`rig run`: the procedure a configuration names, or one in a script of its own."""
 
 from argparse import ArgumentParser, Namespace
+from collections.abc import Iterator
+from contextlib import contextmanager
 from pathlib import Path
 from typing import TYPE_CHECKING
 
@@ -39,18 +41,33 @@ def run(options: Namespace) -> int:
     page = wish(options)
     from rig.commands.carry_out import carry_out
 
-    folder, found = begun(options)
-    moved = frozenset(options.other_board)
-    return carry_out(folder, found, assume_yes=options.yes, moved=moved, as_json=options.json, page=page)
+    with begun(options) as (folder, found):
+        moved = frozenset(options.other_board)
+        return carry_out(folder, found, assume_yes=options.yes, moved=moved, as_json=options.json, page=page)
 
 
-def begun(options: Namespace) -> "tuple[Path, Configured]":
-    """A new run folder, and what is to be run in it. Raises Refused as `configured` and `new_folder`."""
+@contextmanager
+def begun(options: Namespace) -> "Iterator[tuple[Path, Configured]]":
+    """A new run folder, and what is to be run in it; a simulated laboratory has an address of its own meanwhile.
+
+    Of a run that nobody agreed to no folder is left: the same command can be given again. Raises Refused as
+    `configured` and `new_folder`.
+    """
     from rig.commands.configured import configured
+    from rig.commands.own_address import own_address
     from rig.data.own_texts import note_own
-    from rig.data.run_folder import new_folder
+    from rig.data.run_folder import discard, new_folder
+    from rig.errors import Refused
 
     found = configured(options.config, options.overrides, options.script)
-    folder = new_folder(options.out, found.loaded, found.script.text, found.script.identity)
-    note_own(found.loaded.text, found.script.text)
-    return folder, found
+    with own_address(found.loaded.config, simulated=found.loaded.simulated) as another:
+        if another:
+            found = configured(options.config, [*options.overrides, *another], options.script and found.script)
+        folder = new_folder(options.out, found.loaded, found.script.text, found.script.identity)
+        note_own(found.loaded.text, found.script.text)
+        try:
+            yield folder, found
+        except Refused as refused:
+            if refused.name == "not_confirmed":
+                discard(folder)
+            raise

@@ -124,8 +124,10 @@ def _ending(folder: Path, result: "ResultDocument | None") -> "Iterator[RunEvent
 
 def last_words(folder: Path) -> str:
     """How the log of a run without a result ends."""
+    from rig.data.run_folder import LOG
+
     try:
-        log = read_regular_file(folder / "log.txt", LARGEST_LOG, follow_links=False)
+        log = read_regular_file(folder / LOG, LARGEST_LOG, follow_links=False)
     except (OSError, UnfitFile):
         log = b""
     lines = log.decode("utf-8", errors="replace").splitlines()

@@ -17,6 +17,7 @@ from rig.errors import Refused
 CONFIG, SCRIPT, RESULT = "config.yaml", "script.py", "result.json"
 SCRIPT_IDENTITY = "script.json"
 WORLD_LATE = "world_late.txt"  # what held steps of the simulated laboratory that came late
+LOG, ARM_LOG = "log.txt", "arm_client.log"
 IDENTITY_MAX_BYTES = 10_000
 _BEGINNINGS = {"raw": "run", "calibrated": "verify"}  # of the names of recordings, by what is streamed
 
@@ -52,6 +53,15 @@ def new_folder(out: Path | None, loaded: Loaded, script: str, identity: ScriptId
             "run_folder", f"{folder} is not empty", f"Choose another with --out, or go on with: {resuming(folder)}"
         )
     return folder
+
+
+def discard(folder: Path) -> None:
+    """Remove a new run folder in which nothing was measured; it stays where somebody has laid something else there."""
+    begun = [folder / name for name in (CONFIG, SCRIPT, SCRIPT_IDENTITY, WORLD_LATE, LOG, ARM_LOG)]
+    with suppress(OSError):
+        for path in [*begun, *(file for readings in _BEGINNINGS for file in recordings(folder, readings))]:
+            path.unlink(missing_ok=True)
+        folder.rmdir()
 
 
 def empty_folder(folder: Path) -> Path:

@@ -17,7 +17,7 @@ from rig.config.load import Loaded
 from rig.data.provenance import provenance_of
 from rig.data.recorded_sensor import RecordedSensor
 from rig.data.run_file import RunRecorder
-from rig.data.run_folder import refuse_links
+from rig.data.run_folder import ARM_LOG, refuse_links
 from rig.data.settings import RunSettings
 from rig.errors import Refused
 from rig.plans.phase import Phase
@@ -124,7 +124,7 @@ class Connector:
 
     def _connect_arm(self, stack: ExitStack, acquisition: Acquisition) -> tuple[Arm, ArmReport]:
         section = self.loaded.config.arm
-        log = self.path.with_name("arm_client.log")
+        log = self.path.with_name(ARM_LOG)
         refuse_links(log)
         let_go = stack.enter_context(ExitStack())  # closed after the arm
         arm = stack.enter_context(Arm(section.host, acquisition.on_state, section.state_rate_hz, log))

@@ -8,13 +8,13 @@ from rig.errors.quoting import printable_lines
 
 
 def ask_operator(announcement: Sequence[str], to_do: str = "start") -> bool:
-    """Show what will be done and wait for a yes; where there is no terminal, there is nobody to say it."""
+    """Show what will be done and wait for yes or y; where there is no terminal, there is nobody to say it."""
     for line in announcement:
         print(printable_lines(line), file=sys.stderr)
     if not sys.stdin.isatty():
         return False
     print(f"Type yes to {to_do}: ", end="", file=sys.stderr, flush=True)
-    return sys.stdin.readline().strip().lower() == "yes"
+    return sys.stdin.readline().strip().lower() in ("yes", "y")
 
 
 def agreed_or_refused(announcement: Sequence[str], to_do: str, assume_yes: bool) -> None:

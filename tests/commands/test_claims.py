@@ -1,5 +1,6 @@
 """Two rigs on one computer: what one works with the other is refused by name, until the first has ended, however."""
 
+import json
 import os
 import pty
 import re
@@ -14,6 +15,7 @@ import pytest
 import yaml
 
 from rig.commands.claims import claimed_arm, claimed_board, claimed_sensor
+from rig.commands.own_address import own_address
 from rig.config.load import load
 from rig.data.run_folder import ScriptIdentity, new_folder
 from rig.errors import Refused
@@ -68,6 +70,27 @@ def test_an_arm_and_a_port_are_known_by_every_name_they_have(tmp_path: Path) -> 
             claimed_sensor("kvh", str(device)).__enter__()
 
 
+def test_a_second_simulated_laboratory_moves_to_an_address_of_its_own() -> None:
+    host = fresh_host()
+    here = load(DEMO, [f"arm.host={host}", f"board.port=socket://{host}:7321"]).config
+    with own_address(here, simulated=True) as first, own_address(here, simulated=True) as second:
+        assert first == [] and len(second) == 2
+        moved = load(DEMO, second).config
+        assert moved.board is not None and moved.board.port == f"socket://{moved.arm.host}:7321"
+        assert moved.arm.host not in (host, load(DEMO).config.arm.host)
+    with arm_held_elsewhere(host), own_address(here, simulated=True) as moved_away:
+        assert moved_away != []
+    with own_address(here, simulated=True) as again:
+        assert again == [], "what has ended takes no address"
+
+
+def test_hardware_is_where_its_configuration_says() -> None:
+    host = fresh_host()
+    config = load(DEMO, [f"arm.host={host}"]).config
+    with arm_held_elsewhere(host), own_address(config, simulated=False) as moved:
+        assert moved == []
+
+
 def test_runs_that_begin_in_one_second_have_a_folder_each(tmp_path: Path) -> None:
     loaded = load(DEMO, [f"output.folder={tmp_path}"])
     folders = {new_folder(None, loaded, "", ScriptIdentity("", "")) for _ in range(5)}
@@ -96,6 +119,8 @@ def test_a_second_rig_has_neither_the_arm_nor_the_board_until_the_first_has_ende
             assert refused.returncode == 2, refused.stderr
             assert f"rig: {name}: " in refused.stderr and f"process {first.pid}: " in refused.stderr
             assert f"{name}: " in (tmp_path / str(number) / "log.txt").read_text(encoding="utf-8")
+        told = json.loads(rig("check", config, "--json").stdout)
+        assert not told["ready"] and {each["name"] for each in told["missing"]} >= {"arm_claimed", "board_claimed"}
         looked = rig("check", config)
         assert looked.returncode == 2
         assert "missing: arm_claimed: " in looked.stderr and "missing: board_claimed: " in looked.stderr
@@ -105,3 +130,5 @@ def test_a_second_rig_has_neither_the_arm_nor_the_board_until_the_first_has_ende
     os.close(operator)
     looked = rig("check", config)
     assert looked.returncode == 0 and looked.stdout.endswith("ready\n"), looked.stderr
+    told = json.loads(rig("check", config, "--json").stdout)
+    assert told["ready"] and not told["missing"] and looked.stdout.splitlines()[:-1] == told["seen"]

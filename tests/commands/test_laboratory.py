@@ -14,7 +14,9 @@ from support.worlds import World
 
 
 @pytest.mark.slow
-def test_a_laboratory_whose_port_is_taken_is_refused_by_the_worlds_own_words(world: World) -> None:
+def test_a_laboratory_whose_port_is_taken_is_refused_by_the_worlds_own_words_and_a_command_moves_its_own(
+    world: World,
+) -> None:
     running = world()
     with (
         pytest.raises(Refused, match=f"port_in_use: .*cannot listen on {running.host}:29999"),
@@ -23,8 +25,9 @@ def test_a_laboratory_whose_port_is_taken_is_refused_by_the_worlds_own_words(wor
         pass
     command = [sys.executable, "-m", "rig", "check", str(running.config_path)]
     done = subprocess.run(command, capture_output=True, text=True, timeout=240, check=False)
-    assert done.returncode == 2 and done.stderr.startswith("rig: port_in_use: "), done
-    assert done.stderr.count("\n") == 1
+    assert done.returncode == 0 and done.stdout.endswith("ready\n"), done
+    assert f"another one is at {running.host}, so this one is at 127.0." in done.stderr
+    assert running.host not in done.stdout
 
 
 def test_a_laboratory_that_breaks_before_it_is_ready_says_how_it_ended(

@@ -307,6 +307,7 @@ def test_nothing_moves_when_nobody_agrees(start: Start) -> None:
     status, errors = rig.end()
     assert status == 2
     assert "First it goes home" in errors and "rig: not_confirmed: " in errors
+    assert not rig.out.exists(), "the same command can be given again"
     assert rig.world.state()["q_rad"][5] == pytest.approx(0, abs=1e-6)
 
 

@@ -39,7 +39,7 @@ def test_an_arm_that_was_moved_between_the_halves_goes_on_only_if_somebody_agree
         os.close(terminal)
         read_until(b"Type yes to start")
         assert b"without another question 6 sweeps follow to verify it, for " in said
-        os.write(operator, b"yes\n")
+        os.write(operator, b"y\n")
         read_until(b"stored on the board: gyro")
         with socket.create_connection((handle.host, 30002)) as pendant:
             pendant.sendall(NUDGE)

@@ -1,0 +1,64 @@
+"""A simulated laboratory has a loopback address to itself: where another has the one of the file, it moves."""
+
+import os
+import socket
+import sys
+from collections.abc import Iterator
+from contextlib import ExitStack, contextmanager
+from urllib.parse import urlsplit
+
+from rig.commands.claims import claimed_arm, claimed_laboratory
+from rig.config.models import SensorsConfig
+from rig.errors import Refused
+from rig.station.plain_text import say
+
+ARM_PORT = 30004  # one of those at which every controller listens, whoever has started it
+CANDIDATES = 250
+
+
+@contextmanager
+def own_address(config: SensorsConfig, *, simulated: bool) -> Iterator[list[str]]:
+    """What to override of a configuration so that its laboratory is nobody else's, for the length of the `with` block.
+
+    Nothing where its address is free, or it is real. Nor where none of many is: whoever needs it then says so.
+    """
+    if not simulated or config.arm is None:
+        yield []
+        return
+    host = config.arm.host
+    with ExitStack() as held:
+        own = next((each for each in (host, *_others()) if _take(each, held)), host)
+        if own != host:
+            say(f"simulated laboratory: another one is at {host}, so this one is at {own}", file=sys.stderr)
+        yield [] if own == host else list(_moved(config, own))
+
+
+def _others() -> Iterator[str]:
+    """Loopback addresses, other ones for every process first."""
+    process = os.getpid()
+    for number in range(CANDIDATES):
+        yield f"127.0.{1 + process // CANDIDATES % CANDIDATES}.{2 + (process + number) % CANDIDATES}"
+
+
+def _take(host: str, held: ExitStack) -> bool:
+    """Take an address if it is free: no rig works there, no laboratory is being set up there, nothing listens."""
+    with ExitStack() as claims, socket.socket() as probe:
+        try:
+            claims.enter_context(claimed_laboratory(host))
+            with claimed_arm(host):
+                probe.setsockopt(socket.SOL_SOCKET, socket.SO_REUSEADDR, 1)
+                probe.bind((host, ARM_PORT))
+                probe.listen()
+        except (Refused, OSError):
+            return False
+        held.push(claims.pop_all())
+    return True
+
+
+def _moved(config: SensorsConfig, host: str) -> Iterator[str]:
+    """Every address of the configuration, at another host."""
+    ports = {} if config.board is None else {"board.port": config.board.port}
+    ports |= {f"sensors.{name}.serial.port": each.serial.port for name, each in config.sensors.items() if each.serial}
+    yield f"arm.host={host}"
+    for key, port in ports.items():
+        yield f"{key}=socket://{host}:{urlsplit(port).port}"
