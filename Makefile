@@ -1,4 +1,5 @@
 # make demo    calibrate a gyroscope on a simulated robot arm, on a bare machine with Python
+# make all-extras  what the optional parts of the commands need: pictures, PDF, parquet, ROS 2, shared history, debug probe
 # make check   lint, types, import layers and the fast tests
 # make test    everything CI checks: lint, types, import layers, all tests
 # make proof   statistical acceptance over all seeds, which takes longer than anybody waits for a change
@@ -16,11 +17,14 @@ BIN := $(VENV)/bin
 LONG := $(addprefix benchmarks/, faults.py long_life.py damaged_frames.py)
 STUDIES := normal extreme speed convergence sine averaging estimators misalignment budget kvh-gyro kvh-accelerometer
 
-.PHONY: demo system check fast test whole proof lint firmware bench lock sbom figures docs drawings clean
+.PHONY: demo all-extras system check fast test whole proof lint firmware bench lock sbom figures docs drawings clean
 .DELETE_ON_ERROR:
 
 demo: $(VENV)/demo.installed
 	$(BIN)/rig run configs/demo.yaml
+	@echo "make all-extras installs what else the commands can use: pictures, PDF, parquet, ROS 2, shared history, debug probe" >&2
+
+all-extras: $(VENV)/all.installed
 
 # Tests run two at a time: every simulated laboratory has a loopback address of its own. As many threads as that for linear
 # algebra would only be in each other's way.
@@ -109,6 +113,7 @@ $(BIN)/python:
 
 # From the lock file: the same versions, byte for byte, whenever it is. `dev` takes the newest that pyproject.toml allows.
 $(VENV)/demo.installed: pyproject.toml requirements/demo.txt | $(BIN)/python
+	@echo "make: installing the program into $(VENV), about a minute; only the first time" >&2
 	$(BIN)/python -m pip install --quiet --disable-pip-version-check --require-hashes --requirement requirements/demo.txt
 	$(BIN)/python -m pip install --quiet --disable-pip-version-check --no-deps --no-build-isolation --editable .
 	@touch $@
@@ -117,6 +122,12 @@ $(VENV)/docs.installed: pyproject.toml | $(BIN)/python
 	$(BIN)/python -m pip install --quiet --disable-pip-version-check --editable '.[docs]'
 	@touch $@
 
+$(VENV)/all.installed: pyproject.toml | $(VENV)/demo.installed
+	@echo "make: installing all optional parts into $(VENV), about a minute; only the first time" >&2
+	$(BIN)/python -m pip install --quiet --disable-pip-version-check --editable '.[all]'
+	@touch $@
+
 $(VENV)/dev.installed: pyproject.toml | $(BIN)/python
+	@echo "make: installing the program and all that its tests need into $(VENV), about two minutes; only the first time" >&2
 	$(BIN)/python -m pip install --quiet --disable-pip-version-check --editable '.[dev]'
-	@touch $@ $(VENV)/demo.installed $(VENV)/docs.installed
+	@touch $@ $(VENV)/demo.installed $(VENV)/all.installed $(VENV)/docs.installed

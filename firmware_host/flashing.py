@@ -15,6 +15,7 @@ from pathlib import Path
 from typing import Any
 
 from firmware_host.errors import BoardError
+from firmware_host.installation import install_command
 from firmware_host.protocol import FIRMWARE_VERSION
 
 HERE = Path(__file__).parent
@@ -87,7 +88,7 @@ def find_probe(probe_id: str | None = None) -> Any:
         raise BoardError(
             "flash_extra_missing",
             f"the library for debug probes is not installed ({error})",
-            "Install it with `pip install 'calibration-rig[flash]'`, or copy to the board's drive with --drive",
+            f"Install it: {install_command('flash')}, or copy to the board's drive with --drive",
         ) from error
     with contextlib.chdir(HERE):
         probes = ConnectHelper.get_all_connected_probes(blocking=False, unique_id=probe_id)

@@ -2,7 +2,7 @@
 
 import sys
 from argparse import ArgumentParser, Namespace
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING
 
@@ -19,7 +19,10 @@ CSV = ".csv"
 def add(parser: ArgumentParser) -> None:
     """The arguments of `rig allan`."""
     parser.add_argument(
-        "run", type=Path, metavar="RECORDING", help="a run folder, its run.h5, or a log of a sensor at rest as CSV"
+        "run",
+        type=Path,
+        metavar="RECORDING",
+        help="a run folder, its run.h5, a log of a sensor at rest as CSV, or what `rig record` wrote",
     )
     parser.add_argument("--plot", type=Path, metavar="DIR", help="draw the curves into this folder")
     add_json(parser)
@@ -34,18 +37,26 @@ def run(options: Namespace) -> int:
     from rig.report.allan import print_at_rest
 
     with raised_as(Refused):  # nothing runs here
-        found = _of_log(options.run) if options.run.suffix.lower() == CSV else _of_run(options.run)
+        logs = _logs(options.run)
+        found = _of_logs(logs) if logs else _of_run(options.run)
     print_at_rest(found, as_json=options.json)
     if options.plot is not None:
         _draw(found, options.plot)
     return 0
 
 
-def _of_log(path: Path) -> "dict[str, SensorAtRest]":
+def _logs(path: Path) -> list[Path]:
+    """A log, or those in a folder that `rig record` wrote; none of a run."""
+    if path.is_dir() and not any(path.glob("*.h5")):
+        return sorted(path.glob(f"*{CSV}"))
+    return [path] if path.suffix.lower() == CSV else []
+
+
+def _of_logs(paths: Sequence[Path]) -> "dict[str, SensorAtRest]":
     from rig.analysis.at_rest import log_at_rest
     from rig.observation.csv_samples import read_samples
 
-    return {path.stem: log_at_rest(read_samples(path))}
+    return {path.stem: log_at_rest(read_samples(path)) for path in paths}
 
 
 def _of_run(path: Path) -> "dict[str, SensorAtRest]":
@@ -66,8 +77,8 @@ def _of_run(path: Path) -> "dict[str, SensorAtRest]":
 
 
 def _draw(sensors: "Mapping[str, SensorAtRest]", folder: Path) -> None:
+    from rig.errors.extras import missing_extra
     from rig.report.allan import draw_at_rest
-    from rig.study.files import missing_extra
 
     try:
         import matplotlib  # noqa: F401

@@ -51,11 +51,12 @@ def files(options: Namespace) -> list[Path]:
     folder: Path = out or (run if run.is_dir() else run.parent) / "export" / name
     try:
         if name in OF_READINGS:
+            write = writer_of_readings(name)
             recordings = observe_runs(open_run(run).movement)
             if not recordings:
                 raise Refused("nothing_to_export", "no sweep or dwell was finished", "Resume the run")
             _made(folder, own=out is not None)
-            written = writer_of_readings(name)(recordings, folder)
+            written = write(recordings, folder)
         else:
             texts = texts_of_calibrations(name)(_calibration(run, moved))
             _made(folder, own=out is not None)

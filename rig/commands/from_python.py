@@ -105,7 +105,10 @@ def write_certificate(
     words = [*_changed(changes), *(["--pdf"] if pdf else []), *(["--dcc"] if dcc else [])]
     words += [] if out is None else ["--out", str(out)]
     words += [] if history is None else ["--history", history]
-    return documents(_options("report", words, _folder(of)))
+    files, left_out = documents(_options("report", words, _folder(of)))
+    for error in left_out:
+        raise error
+    return files
 
 
 def export(of: Run | str | Path, format: str, *, out: str | Path | None = None) -> list[Path]:

@@ -13,6 +13,7 @@ from rig.commands.named_history import named_history
 from rig.config.regular_file import UnfitFile
 from rig.data.run_folder import RESULT, recordings
 from rig.errors import Refused, RigError
+from rig.errors.extras import missing_extra
 from rig.history.documents import change_entry, history_csv, history_document, rigs_document
 from rig.history.finished import PAGE, Finished, finished_run
 from rig.history.integrity import MOST_TOLD, examined
@@ -33,7 +34,6 @@ from rig.history.tables import (
 )
 from rig.station.plain_text import plain, say
 from rig.station.words import calibrations_in_words
-from rig.study.files import missing_extra
 
 DISAGREE = 1
 

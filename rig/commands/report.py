@@ -3,16 +3,12 @@
 import sys
 from argparse import ArgumentParser, Namespace
 from pathlib import Path
-from typing import TYPE_CHECKING
 
 from rig.commands.config_arguments import add_set
 from rig.commands.named_history import add_history, named_history
 from rig.config.written_file import write_new
 from rig.errors import Refused
 from rig.station.plain_text import say
-
-if TYPE_CHECKING:
-    from rig.report.certificate.content import Certificate
 
 
 def add(parser: ArgumentParser) -> None:
@@ -33,17 +29,20 @@ def add(parser: ArgumentParser) -> None:
 
 
 def run(options: Namespace) -> int:
-    """Write the certificate as `documents` does; returns 0."""
-    documents(options)
-    return 0
+    """Write the certificate as `documents` does; returns 0, or 2 where a form that was asked for could not be made."""
+    _, left_out = documents(options)
+    for error in left_out:
+        say(f"rig: left out: {error}", sys.stderr)
+    return Refused.exit_status if left_out else 0
 
 
-def documents(options: Namespace) -> list[Path]:
+def documents(options: Namespace) -> tuple[list[Path], list[Refused]]:
     """Certificate of a run folder or its result.json: HTML, and with `--dcc` and `--pdf` in these forms, into `--out`.
 
     `--reversal` is what `rig reversal` wrote of its magnetometers; `--history` where it is noted, the user's own
-    history by default, and never one that the folder names. Returns the files. Raises Refused `report_folder`, and as
-    `read_result`, `read_reversal`, `refuse_links`, `certificate_of`, `stated_in`, `digital_certificate` and `pdf_of`.
+    history by default, and never one that the folder names. Returns the files, and why forms that were asked for could
+    not be made. Raises Refused `report_folder`, and as `read_result`, `read_reversal`, `refuse_links`, `certificate_of`
+    and `stated_in`.
     """
     from rig.commands.remember import remember_certificate
     from rig.data.magnetometer_entries import read_reversal
@@ -51,6 +50,7 @@ def documents(options: Namespace) -> list[Path]:
     from rig.data.run_folder import RESULT, refuse_links
     from rig.history.issued import issued_certificate
     from rig.report.certificate.content import certificate_of
+    from rig.report.certificate.dcc import DCC, digital_certificate
     from rig.report.certificate.page import certificate_page
     from rig.report.certificate.stated import stated_in
     from rig.report.certificate.writer import PAGE
@@ -60,7 +60,16 @@ def documents(options: Namespace) -> list[Path]:
     turned = {} if options.reversal is None else read_reversal(options.reversal).magnetometers
     certificate = certificate_of(result, stated_in(file.parent, options.overrides), turned)
     written: dict[str, bytes] = {PAGE: certificate_page(certificate).encode()}
-    digital = _digital(certificate, wanted=options.dcc) if options.dcc or options.pdf else {}
+    left_out: list[Refused] = []
+    digital: dict[str, bytes] = {}
+    if options.dcc or options.pdf:
+        try:
+            digital = {DCC: digital_certificate(certificate)}
+        except Refused as error:
+            if options.dcc:
+                left_out.append(error)
+            else:
+                say(f"rig: no digital certificate is attached: {error.what}", sys.stderr)
     if options.dcc:
         written |= digital
     folder: Path = options.out or file.parent
@@ -73,8 +82,11 @@ def documents(options: Namespace) -> list[Path]:
             from rig.report.certificate.pdf import PDF, pdf_of
 
             refuse_links(folder / PDF)
-            written[PDF] = pdf_of(written[PAGE].decode(), {RESULT: file.read_bytes(), **digital})
-            write_new(folder / PDF, written[PDF])
+            try:
+                written[PDF] = pdf_of(written[PAGE].decode(), {RESULT: file.read_bytes(), **digital})
+                write_new(folder / PDF, written[PDF])
+            except Refused as error:
+                left_out.append(error)
     except OSError as error:
         raise Refused("report_folder", f"{folder} cannot be written: {error}", "Choose another with --out") from error
     for name in written:
@@ -83,17 +95,4 @@ def documents(options: Namespace) -> list[Path]:
     missed = remember_certificate(file.parent, file.read_text(encoding="utf-8"), issued, named_history(options.history))
     if missed is not None:
         say(f"rig: the certificate is in no history: {missed}", sys.stderr)
-    return [folder / name for name in written]
-
-
-def _digital(certificate: "Certificate", *, wanted: bool) -> dict[str, bytes]:
-    """The digital certificate by its file's name; one that is only to be attached may be missing, which is told."""
-    from rig.report.certificate.dcc import DCC, digital_certificate
-
-    try:
-        return {DCC: digital_certificate(certificate)}
-    except Refused as error:
-        if wanted:
-            raise
-        say(f"rig: no digital certificate is attached: {error.what}", sys.stderr)
-        return {}
+    return [folder / name for name in written], left_out

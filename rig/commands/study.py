@@ -50,8 +50,9 @@ def _run(options: Namespace) -> int:
     Raises Refused `unknown_study`, `bad_option`, `missing_extra`, `study_folder`, and as `refuse_links`.
     """
     from rig.data.run_folder import refuse_links
+    from rig.errors.extras import missing_extra
     from rig.study.catalogue import find
-    from rig.study.files import missing_extra, write
+    from rig.study.files import write
     from rig.study.report import Settings
 
     entry = find(options.name)
@@ -77,7 +78,7 @@ def _run(options: Namespace) -> int:
 @contextmanager
 def _cluster(address: str) -> Iterator[None]:
     """Everything joblib does inside goes to the Dask scheduler at `address`."""
-    from rig.study.files import missing_extra
+    from rig.errors.extras import missing_extra
 
     try:
         from distributed import Client

@@ -5,12 +5,12 @@ from typing import Any
 
 from sqlalchemy import URL, Connection, Engine, create_engine, event
 
+from rig.errors.extras import missing_extra
 from rig.history.libpq import connect_arguments
 from rig.history.migrations import bring_up_to_date, version_of
 from rig.history.place import Place
 from rig.history.schema import VERSION
 from rig.history.sqlite_file import history_is_there, made_whole
-from rig.study.files import missing_extra
 
 WAIT_S = 30  # for others who write; for nobody so long, since an entry takes milliseconds
 WRITES = "rig_writes"  # execution option of a connection that will write

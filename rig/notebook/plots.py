@@ -11,6 +11,7 @@ import numpy as np
 from rig.analysis.comparison import Comparison
 from rig.data.result_file import SensorEntry, VectorEntry
 from rig.errors import Refused
+from rig.errors.extras import missing_extra
 from rig.estimation.arrays import Array
 from rig.estimation.coverage import COVERAGE_FACTOR
 from rig.observation.windows import Window

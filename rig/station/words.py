@@ -4,6 +4,8 @@ import shlex
 from collections.abc import Sequence
 from traceback import format_exception
 
+from firmware_host.installation import install_command
+from rig.arm.doubts import doubts
 from rig.arm.identity import arm_words
 from rig.data.run_folder import resuming
 from rig.station.events import (
@@ -49,7 +51,7 @@ def line(event: RunEvent) -> str | None:
             text = (
                 f"pre-flight: arm {report.serial_number} at {report.host} is ready; "
                 f"{len(plan.motions)} motions within limits, {plan.duration_s:.0f} s"
-            )
+            ) + "".join(f"; {doubt}" for doubt in doubts(plan))
         case SamplingStarted():
             text = "sampling: every sensor delivers"
         case StepFinished(_, _, step, took_s):
@@ -73,7 +75,7 @@ def _of_the_outcome(event: RunEvent) -> str | None:
         case Plotted(names):
             text = f"plotted: {', '.join(names)} (.png, .svg)"
         case NotPlotted():
-            text = "no plots: they need matplotlib, install the extra with pip install 'calibration-rig[study]'"
+            text = f"no plots: they need matplotlib. Install it: {install_command('study')}"
         case Remembered(history, numbers, beyond, usual=usual):
             text = "\n".join([_entered(history, numbers, usual=usual), *beyond])
         case NotRemembered(folder, why):

@@ -8,6 +8,7 @@ from typing import Any, Literal
 import numpy as np
 
 from rig.errors import Refused
+from rig.errors.extras import missing_extra
 from rig.study.report import Columns, Finding, Report, table
 from rig.study.style import style
 
@@ -36,15 +37,6 @@ def write(report: Report, folder: Path, name: str, table_format: Format) -> tupl
     _write_csv(_findings(report.findings), paths[1])
     _write_plots(report, paths[2:])
     return paths
-
-
-def missing_extra(error: ImportError, extra: str) -> Refused:
-    """The error for a library that only an optional extra brings."""
-    return Refused(
-        "missing_extra",
-        f"the library {error.name} is not installed",
-        f"Install the extra: pip install 'calibration-rig[{extra}]'",
-    )
 
 
 def _findings(findings: Sequence[Finding]) -> Columns:

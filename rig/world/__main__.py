@@ -9,6 +9,7 @@ import json
 import sys
 from pathlib import Path
 
+from firmware_host.installation import install_command
 from rig.config.load import load
 from rig.errors import Refused
 
@@ -29,7 +30,7 @@ def main(arguments: list[str] | None = None) -> int:
             raise Refused(
                 "no_emulator",
                 f"the simulated laboratory needs the package {error.name}, which is not installed",
-                "Install the optional extra: pip install 'calibration-rig[world]'",
+                f"Install it: {install_command('world')}",
             ) from error
         serve(loaded, options.until_eof, options.late)
     except Refused as error:

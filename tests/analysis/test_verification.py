@@ -9,6 +9,7 @@ import numpy as np
 import pytest
 from rich.console import Console
 
+from firmware_host.installation import install_command
 from rig.analysis.comparison import Reference
 from rig.analysis.verdict import verdict, verification_checks
 from rig.analysis.verification import Verification, verify
@@ -341,4 +342,4 @@ def test_plots_of_before_and_after_are_written(tmp_path: Path, monkeypatch: pyte
         assert (tmp_path / f"{name}.svg").stat().st_size < 500_000
     monkeypatch.setitem(sys.modules, "matplotlib", None)
     (told,) = draw_verifications([FOUND], tmp_path)
-    assert "pip install 'calibration-rig[study]'" in str(line(told))
+    assert install_command("study") in str(line(told))

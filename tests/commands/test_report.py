@@ -1,6 +1,7 @@
 """`rig report`: the certificate of a run folder as page, as PDF with its data inside, as digital certificate."""
 
 import subprocess
+import sys
 from pathlib import Path
 
 import pytest
@@ -84,9 +85,21 @@ def test_a_folder_that_cannot_be_written_is_named(run: Path, capsys: pytest.Capt
 
 
 def test_without_weasyprint_the_page_can_be_printed(monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> None:
-    monkeypatch.setitem(__import__("sys").modules, "weasyprint", None)
+    monkeypatch.setitem(sys.modules, "weasyprint", None)
     with pytest.raises(Refused, match="no_weasyprint"):
         pdf.pdf_of("", {})
+
+
+def test_what_cannot_be_made_is_told_and_the_rest_is_written(
+    run: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    (run / "config.yaml").unlink()  # with it the country is gone
+    monkeypatch.setitem(sys.modules, "weasyprint", None)
+    assert main(["report", str(run), "--pdf", "--dcc"]) == 2
+    said = capsys.readouterr()
+    assert said.out.split() == [str(run / "certificate.html")] and (run / "certificate.html").exists()
+    assert "left out: no_digital_certificate" in said.err and "--set site.country=DE" in said.err
+    assert "left out: no_weasyprint" in said.err and "pip install" in said.err
 
 
 def told(*command: str | Path) -> str:

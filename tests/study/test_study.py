@@ -9,6 +9,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
+from firmware_host.installation import install_command
 from rig.cli import main
 from rig.study import simulation as sim
 from rig.study.catalogue import STUDIES, find
@@ -214,4 +215,4 @@ def test_a_missing_library_is_named_with_its_extra(
 ) -> None:
     monkeypatch.setitem(sys.modules, "matplotlib", None)
     assert main(["study", "speed"]) == 2
-    assert "pip install 'calibration-rig[study]'" in capsys.readouterr().err
+    assert install_command("study") in capsys.readouterr().err

@@ -2,6 +2,7 @@
 
 from collections.abc import Mapping
 
+from firmware_host.installation import install_command
 from rig.errors import Refused
 
 PDF = "certificate.pdf"
@@ -16,7 +17,7 @@ def pdf_of(page: str, attachments: Mapping[str, bytes]) -> bytes:
         raise Refused(
             "no_weasyprint",
             f"a PDF is made by WeasyPrint, which cannot be loaded ({str(error).splitlines()[0]})",
-            "Install calibration-rig[pdf] and Pango (Debian: libpangoft2-1.0-0), or print certificate.html",
+            f"Install it: {install_command('pdf')}, and Pango (Debian: libpangoft2-1.0-0), or print certificate.html",
         ) from None
     enclosed = [
         Attachment(string=content, name=name, description=DESCRIBED[name], relationship="Source")

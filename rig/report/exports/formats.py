@@ -28,11 +28,21 @@ OF_CALIBRATIONS: Final[Mapping[str, str]] = {
     "ardupilot": "rig.report.exports.autopilots:ardupilot_files",
     "kalibr": "rig.report.exports.kalibr:kalibr_files",
 }
+# What an optional part of the program brings: (library, part).
+EXTRAS: Final = {"parquet": ("pyarrow", "parquet"), "ros2": ("rosbags", "ros2")}
 FORMATS: Final = (*OF_READINGS, *OF_CALIBRATIONS)
 
 
 def writer_of_readings(name: str) -> "ReadingsWriter":
-    """Loads what it needs, which may be an extra's."""
+    """Loads what it needs, which may be an extra's. Raises Refused `missing_extra`."""
+    if name in EXTRAS:
+        library, extra = EXTRAS[name]
+        try:
+            importlib.import_module(library)
+        except ImportError as error:
+            from rig.errors.extras import missing_extra
+
+            raise missing_extra(error, extra) from error
     found: ReadingsWriter = _named(OF_READINGS[name])
     return found
 

@@ -13,7 +13,6 @@ from rig.estimation.arrays import Array
 from rig.observation.acceleration import accelerations
 from rig.observation.observed_run import ObservedRun
 from rig.report.exports.names import plain_names
-from rig.study.files import missing_extra
 
 BAG = "bag"
 FORMAT: Final = 9  # of ROS 2 Jazzy and later
@@ -28,12 +27,10 @@ SAID = (
 
 
 def write_bag(recordings: Sequence[ObservedRun], folder: Path) -> list[Path]:
-    """The folder `bag`, which must not be there. Raises Refused `missing_extra`, `report_folder`."""
-    try:
-        from rosbags.rosbag2 import Writer
-        from rosbags.typesys import Stores, get_typestore
-    except ImportError as error:
-        raise missing_extra(error, "ros2") from error
+    """The folder `bag`, which must not be there. Raises Refused `report_folder`."""
+    from rosbags.rosbag2 import Writer
+    from rosbags.typesys import Stores, get_typestore
+
     path = folder / BAG
     if path.exists():
         raise Refused("report_folder", f"{path} is there already", "Choose another with --out")

@@ -16,7 +16,6 @@ from rig.data.recorded_sensor import RecordedSensor
 from rig.estimation.arrays import Array
 from rig.observation.observed_run import ObservedRun
 from rig.report.exports.names import plain_names
-from rig.study.files import missing_extra
 
 CLOCK = "Times are seconds of the arm controller's clock."
 LOST = "Not here: counts, the board's and the computer's times, events, settings; they are in run.h5."
@@ -88,12 +87,10 @@ def write_csv(recordings: Sequence[ObservedRun], folder: Path) -> list[Path]:
 
 
 def write_parquet(recordings: Sequence[ObservedRun], folder: Path) -> list[Path]:
-    """A file for each table, its meaning as metadata `convention`. Raises Refused `missing_extra`."""
-    try:
-        import pyarrow
-        import pyarrow.parquet
-    except ImportError as error:
-        raise missing_extra(error, "parquet") from error
+    """A file for each table, its meaning as metadata `convention`."""
+    import pyarrow
+    import pyarrow.parquet
+
     written = []
     for table in tables_of(recordings):
         path = folder / f"{table.name}.parquet"
