@@ -9,7 +9,7 @@ from typing import Any
 from firmware_host import protocol
 from firmware_host.errors import BoardError
 from firmware_host.frames import Frame, FrameReader, encode
-from firmware_host.serial_port import READ_TIMEOUT_S, SerialPort
+from firmware_host.serial_port import READ_TIMEOUT_S, SerialPort, why_closed
 
 _ATTEMPTS = 4  # times a request is sent before the board counts as gone; each waits twice as long as the one before
 
@@ -56,7 +56,7 @@ class BoardLink:
         except OSError as error:
             raise BoardError(
                 "no_port",
-                f"the port {port} does not open: {error}",
+                f"the port {port} does not open: {why_closed(port, error)}",
                 "Check board.port and the cable, and that no other program has the port",
             ) from error
         self._reader = threading.Thread(target=self._read, name=f"board {port}", daemon=True)

@@ -1,11 +1,24 @@
 """A serial port or `socket://host:port`, by pyserial: bytes, and OSError for all that goes wrong."""
 
+import os
 import time
 
 import serial
 
 READ_TIMEOUT_S = 0.005  # the delay of every read: bytes come a few at a time, and each of them would wake the reader
 _READ_SIZE = 65536
+
+
+def why_closed(port: str, error: OSError) -> str:
+    """Why `port` does not open, as the end of a sentence: in the system's words once, and which ports there are."""
+    cause = next((each for each in (error, error.__context__) if isinstance(each, OSError) and each.errno), None)
+    why = str(error) if cause is None or cause.errno is None else os.strerror(cause.errno)
+    if "://" in port:
+        return why
+    from serial.tools import list_ports
+
+    there = [f"{each.device} ({each.description})" for each in list_ports.comports()]
+    return f"{why}; this computer has {', '.join(there) or 'no serial port'}"
 
 
 class SerialPort:

@@ -43,6 +43,28 @@ _COMMANDS = {
     "kvh": "look at a KVH 1775",
     "world": "only the simulated laboratory, in the foreground, for any client",
 }
+_AT_ONCE = {  # what a command that begins by loading libraries for a second says before
+    "run": "reading the configuration",
+    "plan": "reading the configuration",
+    "check": "reading the configuration",
+    "resume": "reading the run",
+    "solve": "reading the recording",
+    "allan": "reading the recording",
+    "report": "reading the result",
+    "export": "reading the run",
+    "history": "opening the history",
+    "study": "loading the studies",
+}
+FIRST_STEPS = """\
+Calibrates inertial sensors on a robot arm. What one does first:
+
+  rig plan configs/demo.yaml    what the arm will do, and how long; connects to nothing
+  rig run configs/demo.yaml     a calibration; this one in a simulated laboratory
+  rig check CONFIG              what is there and what is missing, before a run on hardware; nothing moves
+  rig report RUN                the certificate of a finished run
+  rig history                   every calibration so far
+
+rig --help names all commands, rig COMMAND --help what each takes. Step by step: docs/README.md."""
 FAULT, INTERRUPTED = Fault.exit_status, 130
 
 
@@ -54,8 +76,22 @@ def main(arguments: Sequence[str] | None = None) -> int:
 
         words = with_usual_command(words)
     meant = next((word for word in words if not word.startswith("-")), None)
-    options = _parser(meant).parse_args(words)
-    return guarded(lambda: options.command(options))
+    if not words:
+        print(FIRST_STEPS)
+        return 0
+    parser = _parser(meant)
+    options, not_understood = parser.parse_known_args(words)
+    if not_understood:
+        hint = "--set takes one word without blanks, as in --set procedure.speed_deg_s=30; " if "--set" in words else ""
+        parser.error(f"{hint}unrecognized arguments: {' '.join(not_understood)}")
+    return guarded(lambda: _begun(meant, options.command, options))
+
+
+def _begun(name: str | None, command: Callable[[argparse.Namespace], int], options: argparse.Namespace) -> int:
+    """Carry out a command; on a terminal there is a sign of life before what it needs is loaded."""
+    if name in _AT_ONCE and sys.stderr.isatty():
+        print(f"{_AT_ONCE[name]} …", file=sys.stderr, flush=True)
+    return command(options)
 
 
 def guarded(command: Callable[[], int]) -> int:

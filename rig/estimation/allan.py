@@ -31,6 +31,8 @@ INSTABILITY_KNOWN = 0.2
 FLICKER = float(np.sqrt(2 * np.log(2) / np.pi))  # 0.664: least σ over bias instability
 BEYOND = 3.0  # standard deviations by which the least σ must exceed what white noise alone gives there
 FEWEST = 3  # readings of a stretch
+ENOUGH_S = 40.0  # random walk is known to `RANDOM_WALK_KNOWN` from then on, where the noise is white
+ENOUGH_FOR_A_FLOOR_S = 600.0  # few gyroscopes have their least deviation sooner
 
 
 @dataclass(frozen=True, slots=True)
@@ -38,6 +40,7 @@ class AllanCurve:
     """Overlapping Allan deviation: `tau_s` (T,), `deviation`, `low`, `high` (T, 3) in the unit of the readings.
 
     `low` and `high` bound the truth with the probability 95 %; `freedom` (T, 3) are the equivalent degrees of freedom.
+    `total_s` is how long was recorded in all.
     """
 
     tau_s: Array
@@ -45,6 +48,7 @@ class AllanCurve:
     low: Array
     high: Array
     freedom: Array
+    total_s: float
 
     @property
     def relative_std(self) -> Array:
@@ -95,7 +99,7 @@ def allan_curve(stretches: Sequence[Array], interval_s: float) -> AllanCurve:
         ]
     )
     low, high = _bounds(deviation, freedom)
-    return AllanCurve(tau_s, deviation, low, high, freedom)
+    return AllanCurve(tau_s, deviation, low, high, freedom, interval_s * sum(map(len, used)))
 
 
 def read_axis(curve: AllanCurve, axis: int) -> AllanAxis:
@@ -104,9 +108,9 @@ def read_axis(curve: AllanCurve, axis: int) -> AllanAxis:
     return AllanAxis(walk, _instability(curve, axis, walk))
 
 
-def too_short(what: str) -> Fault:
-    """The error for what a longer recording would tell."""
-    return Fault("recording_too_short", what, "Record longer at rest; long dwells tell more than many short ones")
+def too_short(what: str, enough_s: float = ENOUGH_S) -> Fault:
+    """The error for what a longer recording would tell, one of about `enough_s`."""
+    return Fault("recording_too_short", what, f"Record at rest for {enough_s:.0f} s or more, in one stretch")
 
 
 def equivalent_freedom(points: int, factor: int, noise: Noise) -> float:
@@ -173,8 +177,10 @@ def _random_walk(curve: AllanCurve, axis: int) -> Read | Fault:
     if abs(tau_s - RANDOM_WALK_TAU_S) > RANDOM_WALK_TAU_S / 2:
         return too_short(f"no stretch reaches {RANDOM_WALK_TAU_S:g} s, where random walk is read")
     if known > RANDOM_WALK_KNOWN:
+        worst = float(curve.relative_std[at].max())  # one sentence for all axes
         return too_short(
-            f"random walk would be known to {100 * known:.0f} %, {100 * RANDOM_WALK_KNOWN:.0f} % is the most"
+            f"random walk would be known to {100 * worst:.0f} %, {100 * RANDOM_WALK_KNOWN:.0f} % is the most",
+            max(ENOUGH_S, curve.total_s * (worst / RANDOM_WALK_KNOWN) ** 2),
         )
     # To either side by about two, so that the slope does not hang on one point.
     below, above = (int(np.argmin(np.abs(np.log(curve.tau_s / (tau_s * by))))) for by in (0.5, 2.0))
@@ -198,7 +204,7 @@ def _instability(curve: AllanCurve, axis: int, walk: Read | Fault) -> Read | Fau
     known = curve.relative_std[:, axis]
     usable = np.flatnonzero(known <= INSTABILITY_KNOWN)
     if not len(usable):
-        return too_short(f"no point of the curve is known to {100 * INSTABILITY_KNOWN:.0f} %")
+        return too_short(f"no point of the curve is known to {100 * INSTABILITY_KNOWN:.0f} %", ENOUGH_FOR_A_FLOOR_S)
     last = int(usable[-1])
     least = int(usable[np.argmin(curve.deviation[usable, axis])])
     tau_s, deviation = float(curve.tau_s[least]), float(curve.deviation[least, axis])
@@ -212,6 +218,7 @@ def _instability(curve: AllanCurve, axis: int, walk: Read | Fault) -> Read | Fau
     if least == last or deviation < by_noise * (1 + BEYOND * known[least]):
         return too_short(
             f"the deviation still falls at {curve.tau_s[last]:.3g} s, the longest known to "
-            f"{100 * INSTABILITY_KNOWN:.0f} %"
+            f"{100 * INSTABILITY_KNOWN:.0f} %",
+            max(ENOUGH_FOR_A_FLOOR_S, 2 * curve.total_s),
         )
     return Read(deviation / FLICKER, deviation / FLICKER * float(known[least]), tau_s)

@@ -94,7 +94,7 @@ def _table(title: str, quantity: Quantity, seen: AtRest) -> Table:
 
 def _cells(told: Read | Fault, size: float) -> tuple[str, str]:
     if isinstance(told, Fault):
-        return told.name, ""
+        return "–", ""  # why, stands once below
     return f"{told.value / size:.4g}", f"{2 * told.std / size:.1g}"
 
 
@@ -103,8 +103,9 @@ def _lines(seen: AtRest) -> Iterator[str]:
     lasting = f"{seen.total_s:.4g} s in all, the longest {seen.longest_s:.4g} s"
     yield f"{seen.stretches} stretches at rest, {lasting}{felt}; U with k = 2"
     for what in ("random_walk", "bias_instability"):
-        said = {str(told) for axis in seen.axes if isinstance(told := getattr(axis, what), Fault)}
-        yield from (f"{what.replace('_', ' ')}: {text}" for text in sorted(said))
+        faults = [told for axis in seen.axes if isinstance(told := getattr(axis, what), Fault)]
+        said = {fault.name: fault for fault in faults}  # of each name once: the axes differ by numbers alone
+        yield from (f"{what.replace('_', ' ')}: {fault}" for _, fault in sorted(said.items()))
 
 
 def _entry(quantity: Quantity, seen: AtRest) -> dict[str, Any]:

@@ -13,6 +13,8 @@ from firmware_host.answers import BoardIdentity, BoardStatus, SensorCounts, Sens
 from firmware_host.protocol import FIRMWARE_VERSION
 from rig.station.plain_text import plain
 
+NOBODY = (0x00, 0xFF)  # what a bus reads where nothing drives it
+
 
 @dataclass(frozen=True, slots=True)
 class BoardSensor:
@@ -89,7 +91,9 @@ def _print_info(board: BoardInfo) -> None:
         "firmware": f"{identity.firmware}, protocol {identity.protocol}"
         + ("" if flashed else f"; this program comes with {FIRMWARE_VERSION}: `rig board flash`"),
         "up": f"{health.uptime_s:.1f} s, last started by: {health.reset_cause}",
-        "clock": "follows the crystal" if health.clock_locked else "NOT locked to the crystal: time stamps drift",
+        "clock": "follows the crystal"
+        if health.clock_locked
+        else "NOT locked to the crystal: time stamps drift (docs/board.md, Clock)",
         "link": f"{health.rx_errors} damaged requests, {health.tx_overruns} frames without room, "
         f"{health.frames_lost} lost on the way, {health.frames_repeated} came twice",
         "sensor bus": f"{health.bus_errors} failed reads",
@@ -105,8 +109,8 @@ def _print_info(board: BoardInfo) -> None:
         table.add_row(
             plain(sensor.info.part),
             sensor.info.quantity,
-            "yes" if sensor.info.present else "no",
-            f"0x{sensor.info.who_am_i:02x}",
+            "yes" if sensor.info.present else "not fitted",
+            "" if sensor.info.who_am_i in NOBODY and not sensor.info.present else f"0x{sensor.info.who_am_i:02x}",
             plain(sensor.configured_as or ""),
             plain(
                 "none"

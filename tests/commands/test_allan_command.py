@@ -11,6 +11,7 @@ from rig.cli import main
 from rig.data.events import to_line
 from rig.data.layout import EVENTS_DTYPE, SCHEMA, Contents, lay_out
 from rig.data.run_file import RunData
+from support.commands import rig_here
 from support.real import unpacked
 from support.synthetic_run import Setup, synthetic_run
 
@@ -41,7 +42,8 @@ def test_people_see_random_walk_and_why_there_is_no_bias_instability(
     assert main(["allan", str(run)]) == 0
     printed = capsys.readouterr().out
     assert "angle random walk °/√h" in printed and "6 stretches at rest" in printed
-    assert "bias instability: recording_too_short" in printed
+    assert printed.count("recording_too_short") == 1, "once for all axes"
+    assert "bias instability: recording_too_short" in printed and "Record at rest for 600 s or more" in printed
 
 
 def test_machines_get_the_curves_in_si_units(run: Path, capsys: pytest.CaptureFixture[str]) -> None:
@@ -133,3 +135,20 @@ def test_the_still_part_of_a_recording_by_hand_has_a_curve(tmp_path: Path, capsy
     (tmp_path / "held.csv").write_text("\n".join([lines[0], *held]) + "\n", encoding="utf-8")
     assert main(["allan", str(tmp_path / "held.csv"), "--json"]) == 0
     assert len(json.loads(capsys.readouterr().out)["sensors"]["held"]["rate"]["tau_s"]) > 5
+
+
+def test_what_rig_record_wrote_of_several_sensors_is_taken_as_it_lies(
+    still: dict[str, np.ndarray], tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    for name in ("desk", "shelf"):
+        log(tmp_path / f"{name}.csv", still)
+    assert main(["allan", str(tmp_path), "--json"]) == 0
+    assert list(json.loads(capsys.readouterr().out)["sensors"]) == ["desk", "shelf"]
+
+
+def test_a_minute_too_few_is_told_in_seconds(still: dict[str, np.ndarray], tmp_path: Path) -> None:
+    begun = {name: column[:1200] for name, column in still.items()}
+    done = rig_here("allan", log(tmp_path / "desk.csv", begun))
+    assert done.returncode == 0
+    assert done.stdout.count("random walk: recording_too_short") == 2, "of each quantity once"
+    assert "Record at rest for 4" in done.stdout, done

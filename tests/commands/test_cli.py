@@ -45,6 +45,27 @@ def test_a_terminal_without_special_characters_gets_the_plan_too() -> None:
     assert done.returncode == 0 and "sweep wrist_3 cw" in done.stdout, done.stderr
 
 
+def test_the_bare_command_shows_what_one_does_first_and_where_help_is() -> None:
+    done = shell(f"{sys.executable} -m rig")
+    assert done.returncode == 0 and done.stderr == ""
+    for command in ("rig plan", "rig run", "rig check", "rig report", "rig history", "rig --help"):
+        assert command in done.stdout
+
+
+def test_blanks_about_the_equals_sign_are_told_as_what_is_wrong() -> None:
+    done = shell(f"{PLAN} --set procedure.speed_deg_s = 30")
+    assert done.returncode == 2 and "--set takes one word without blanks" in done.stderr, done
+
+
+def test_on_a_terminal_there_is_a_sign_of_life_at_once() -> None:
+    operator, terminal = os.openpty()
+    with subprocess.Popen([*PLAN.split(), "--set", "no=1"], stdout=subprocess.DEVNULL, stderr=terminal) as process:
+        os.close(terminal)
+        assert os.read(operator, 4096).decode().startswith("reading the configuration")
+        assert process.wait(60) == 2
+    os.close(operator)
+
+
 @pytest.mark.slow
 def test_a_narrow_terminal_gets_every_step() -> None:
     done = shell(PLAN, COLUMNS="60")

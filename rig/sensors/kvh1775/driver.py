@@ -13,7 +13,7 @@ from typing import Any, Self
 
 from numpy.typing import NDArray
 
-from firmware_host.serial_port import READ_TIMEOUT_S, SerialPort
+from firmware_host.serial_port import READ_TIMEOUT_S, SerialPort, why_closed
 from rig.sensors.errors import SensorError
 from rig.sensors.kvh1775.counting import MessageCounter
 from rig.sensors.kvh1775.messages import BuiltInTest, MessageReader
@@ -59,7 +59,7 @@ class Kvh1775:
         except OSError as error:
             raise SensorError(
                 "no_port",
-                f"sensors.{sensor}: the port {port} does not open: {error}",
+                f"sensors.{sensor}: the port {port} does not open: {why_closed(port, error)}",
                 "Check serial.port and the cable, and that no other program has the port",
             ) from error
         self._reader = threading.Thread(target=self._read, name=f"kvh1775 {port}", daemon=True)

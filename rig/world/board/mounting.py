@@ -3,6 +3,7 @@
 from collections.abc import Callable, Collection
 from functools import cache, partial
 from importlib import resources
+from typing import assert_never
 
 import numpy as np
 
@@ -110,3 +111,5 @@ def _sensor(
             )
         case "kvh1775":
             raise ValueError("a KVH 1775 is on no board")
+        case unmodelled:  # a new part: the type checker says so too
+            assert_never(unmodelled)
