@@ -61,13 +61,14 @@ def mounting() -> Drawing:
     for number, (title, words, given) in enumerate(places):
         centre = (160.0 + 320 * number, 270.0)
         drawing.words((centre[0], 32), title, size=17, anchor="middle", bold=True)
+        if given is None:
+            connector = seen(centre, (0, -106, 0), 1)
+            drawing.dot(connector, 9, "#555555")
+            drawing.words((connector[0] - 14, connector[1] - 8), "tool connector", "#555555", 13, "end")
         disc(drawing, centre, 95, 40)
         if given is None:
             drawing.words((centre[0], 56), words, size=13, anchor="middle")
             triad(drawing, centre, np.eye(3), 130)
-            connector = seen(centre, (0, -112, -20), 1)
-            drawing.words((connector[0], connector[1] - 4), "tool connector", "#555555", 12, "middle")
-            drawing.dot((connector[0], connector[1] + 6), 6, "#555555")
             continue
         section = MountingSection.model_validate(given)
         axes = mounting_matrix(section)

@@ -43,7 +43,7 @@ def sweep() -> Drawing:
         drawing.line([*line, at(resting[1], 0)], BLUE, 3)
         drawing.words((at(sum(resting) / 2, 0)[0], zero - 34), f"rest, {rest_s:g} s", anchor="middle", bold=True)
         drawing.words((at(sum(resting) / 2, 0)[0], zero + 44), "shows the bias", anchor="middle")
-        drawing.words((at(start, 0)[0] + 4, zero + (20 if sign > 0 else -10)), "ramp", size=12, anchor="end")
+        drawing.words((at(start, 0)[0] + 4, zero + (18 if sign > 0 else -8)), "ramp", size=12)
         start = resting[1]
     drawing.arrow((left - 20, zero), (left + per_s * start + 40, zero), "#777777", 1.5)
     drawing.arrow((left - 20, zero + high + 30), (left - 20, zero - high - 50), "#777777", 1.5)

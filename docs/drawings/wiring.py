@@ -55,10 +55,10 @@ def wiring(part: str) -> Drawing:
             if not to:
                 continue
             end, colour, name = at + side * WIRE, colour_of(pin), to.replace(", ", " + ")
-            width = 16 + 8.2 * len(name)
+            width = 22 + 9.2 * len(name)
             drawing.line([(at, y), (end, y)], colour, 3)
             drawing.box(end if side > 0 else end - width, y - 12, width, 24, "#ffffff", colour)
-            drawing.words((end + side * 8, y + 5), name, colour, anchor="start" if side > 0 else "end", bold=True)
+            drawing.words((end + side * width / 2, y + 5), name, colour, anchor="middle", bold=True)
             if pin in SELECTS:
                 drawing.words((at + side * WIRE / 2, y - 5), "10 kΩ to 3V3", SELECT, 11, "middle")
     x = 60.0
