@@ -1,6 +1,6 @@
 """Build the documentation as a site: `make docs` writes it to build/docs, and takes no broken link.
 
-The source folder is the repository, so that a page may link to whatever lies in it, as it does where the repository is read.
+The source folder is the repository: a page may link to whatever lies in it, as where the repository is read.
 """
 
 import re

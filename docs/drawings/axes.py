@@ -3,11 +3,11 @@
 from collections.abc import Sequence
 
 import numpy as np
+from svg import Drawing, Point
 
 from rig.arm.kinematics import flange_attitude
 from rig.config.models import ArmSection
 from rig.config.sensor_sections import MountingSection, mounting_matrix
-from svg import Drawing, Point
 
 RED, GREEN, BLUE = "#c62828", "#2e7d32", "#1565c0"  # x, y, z
 NAMES = ("x", "y", "z")
@@ -22,7 +22,9 @@ def seen(origin: Point, vector: Vector, size: float) -> Point:
     return origin[0] + float(right), origin[1] + float(down)
 
 
-def triad(drawing: Drawing, origin: Point, axes: np.ndarray, size: float, prefix: str = "", width: float = 3) -> None:
+def triad(
+    drawing: Drawing, origin: Point, axes: np.ndarray, size: float, *, prefix: str = "", width: float = 3
+) -> None:
     """Three arrows, the rows of `axes` in the flange's frame, each with its name at the end."""
     for axis, name, colour in zip(axes, NAMES, (RED, GREEN, BLUE), strict=True):
         drawing.arrow(origin, seen(origin, axis, size), colour, width)
@@ -41,7 +43,10 @@ def disc(drawing: Drawing, centre: Point, radius: float, below: float) -> None:
     """The flange: a short cylinder whose face looks along +z."""
     ring = [(radius * np.cos(a), radius * np.sin(a)) for a in np.linspace(0, 2 * np.pi, 73)]
     drawing.shape([seen(centre, (x, y, -below), 1) for x, y in ring], "#c7cfd8")
-    left, right = min(ring, key=lambda r: seen(centre, (*r, 0), 1)[0]), max(ring, key=lambda r: seen(centre, (*r, 0), 1)[0])
+    left, right = (
+        min(ring, key=lambda r: seen(centre, (*r, 0), 1)[0]),
+        max(ring, key=lambda r: seen(centre, (*r, 0), 1)[0]),
+    )
     edge = [seen(centre, (*left, 0), 1), seen(centre, (*left, -below), 1)]
     edge += [seen(centre, (*right, -below), 1), seen(centre, (*right, 0), 1)]
     drawing.shape(edge, "#c7cfd8", "#c7cfd8")
@@ -55,8 +60,16 @@ def mounting() -> Drawing:
     drawing = Drawing(960, 430, "The flange's axes and two mountings")
     places = (
         ("the flange", "its z axis points out of the arm", None),
-        ("the board lies flat, turned", "sensor x along flange +y, y along −x, z along +z", dict(x="+y", y="-x", z="+z")),
-        ("the board stands upright", "sensor x along flange +z, y along +y, z along −x", dict(x="+z", y="+y", z="-x")),
+        (
+            "the board lies flat, turned",
+            "sensor x along flange +y, y along −x, z along +z",
+            {"x": "+y", "y": "-x", "z": "+z"},
+        ),
+        (
+            "the board stands upright",
+            "sensor x along flange +z, y along +y, z along −x",
+            {"x": "+z", "y": "+y", "z": "-x"},
+        ),
     )
     for number, (title, words, given) in enumerate(places):
         centre = (160.0 + 320 * number, 270.0)
@@ -101,7 +114,10 @@ def home() -> Drawing:
     drawing.line(links[3:], "#9aa7b4", 18)
     for joint in links[1:5]:
         drawing.dot(joint, 8, "#5a6774")
-    for name, place in (("base", (at(0, 0)[0] + 60, at(0, 0)[1] + 5)), ("elbow", (at(0, 0.7934)[0] + 26, at(0, 0.7934)[1]))):
+    for name, place in (
+        ("base", (at(0, 0)[0] + 60, at(0, 0)[1] + 5)),
+        ("elbow", (at(0, 0.7934)[0] + 26, at(0, 0.7934)[1])),
+    ):
         drawing.words(place, name)
     drawing.words((links[3][0] + 6, links[3][1] - 26), "wrists", anchor="middle")
     flange = links[-1]

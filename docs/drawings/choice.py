@@ -4,10 +4,25 @@ from svg import Drawing
 
 BLUE, GREEN = "#1565c0", "#2e7d32"
 WAYS = (  # question, answer if yes in two lines, the page
-    ("Is it an LSM9DS1, MPU-9250 or ADIS16465,", "and do you have the arm?", "wire it to our board", "how-to/first-calibration.md"),
+    (
+        "Is it an LSM9DS1, MPU-9250 or ADIS16465,",
+        "and do you have the arm?",
+        "wire it to our board",
+        "how-to/first-calibration.md",
+    ),
     ("Is it a KVH 1775,", "and do you have the arm?", "its own serial port", "kvh1775.md"),
-    ("Does something measure or set its attitude:", "a rate table, cameras, the faces of a cube?", "readings + attitudes as CSV", "how-to/known-attitudes.md"),
-    ("Can you turn it by known angles: a turntable,", "a servo, by hand against a stop?", "readings + sweeps as CSV", "how-to/data-recorded-elsewhere.md"),
+    (
+        "Does something measure or set its attitude:",
+        "a rate table, cameras, the faces of a cube?",
+        "readings + attitudes as CSV",
+        "how-to/known-attitudes.md",
+    ),
+    (
+        "Can you turn it by known angles: a turntable,",
+        "a servo, by hand against a stop?",
+        "readings + sweeps as CSV",
+        "how-to/data-recorded-elsewhere.md",
+    ),
 )
 
 

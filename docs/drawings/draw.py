@@ -1,4 +1,4 @@
-"""Draw the pictures of wiring, axes and motion that the pages show: `make drawings`, or `python docs/drawings/draw.py`."""
+"""Draw the pictures of wiring, axes and motion that the pages show: `make drawings`."""
 
 import sys
 from pathlib import Path

@@ -32,7 +32,7 @@ class Drawing:
         path = " ".join(f"{x:.1f},{y:.1f}" for x, y in points)
         self._parts.append(f'<polygon points="{path}" fill="{fill}" stroke="{colour}" stroke-width="1.5"/>')
 
-    def box(self, x: float, y: float, width: float, height: float, fill: str, colour: str = "#222222") -> None:
+    def box(self, x: float, y: float, width: float, height: float, fill: str, *, colour: str = "#222222") -> None:
         self._parts.append(
             f'<rect x="{x:.1f}" y="{y:.1f}" width="{width:.1f}" height="{height:.1f}" rx="4" fill="{fill}" '
             f'stroke="{colour}" stroke-width="1.5"/>'
@@ -42,7 +42,14 @@ class Drawing:
         self._parts.append(f'<circle cx="{at[0]:.1f}" cy="{at[1]:.1f}" r="{radius:g}" fill="{fill}"/>')
 
     def words(
-        self, at: Point, text: str, colour: str = "#222222", size: float = 14, anchor: str = "start", bold: bool = False
+        self,
+        at: Point,
+        text: str,
+        colour: str = "#222222",
+        size: float = 14,
+        anchor: str = "start",
+        *,
+        bold: bool = False,
     ) -> None:
         weight = ' font-weight="bold"' if bold else ""
         self._parts.append(
@@ -56,7 +63,10 @@ class Drawing:
         ux, uy = dx / length, dy / length
         neck = (end[0] - HEAD * ux, end[1] - HEAD * uy)
         self.line([start, neck], colour, width)
-        sides = [(neck[0] - 0.5 * HEAD * uy, neck[1] + 0.5 * HEAD * ux), (neck[0] + 0.5 * HEAD * uy, neck[1] - 0.5 * HEAD * ux)]
+        sides = [
+            (neck[0] - 0.5 * HEAD * uy, neck[1] + 0.5 * HEAD * ux),
+            (neck[0] + 0.5 * HEAD * uy, neck[1] - 0.5 * HEAD * ux),
+        ]
         self.shape([end, *sides], colour, colour)
 
     def text(self) -> str:

@@ -3,10 +3,10 @@
 from pathlib import Path
 
 import numpy as np
+from svg import Drawing, Point
 
 from rig.config.load import load
 from rig.procedure import Rest, SixSweepsSection, Sweep, plan_six_observation
-from svg import Drawing, Point
 
 DEMO = Path(__file__).parents[2] / "configs" / "demo.yaml"
 BLUE, SHADE, REST = "#1565c0", "#dbe8f6", "#f3ead7"
@@ -24,7 +24,9 @@ def sweep() -> Drawing:
     speed = np.degrees(out.speed_rad_s)
     left, per_s, zero, high = 110.0, 42.0, 230.0, 110.0
     drawing = Drawing(960, 430, "A sweep, a rest, and back")
-    drawing.words((480, 30), f"one wrist: a sweep, a rest, and back, at {speed:g} °/s", size=18, anchor="middle", bold=True)
+    drawing.words(
+        (480, 30), f"one wrist: a sweep, a rest, and back, at {speed:g} °/s", size=18, anchor="middle", bold=True
+    )
 
     def at(time_s: float, sign: float) -> Point:
         return left + per_s * time_s, zero - high * sign
@@ -38,7 +40,9 @@ def sweep() -> Drawing:
         drawing.words((middle[0], middle[1] + 12), "all readings here are averaged", anchor="middle")
         drawing.words((middle[0], middle[1] + 30), f"mean speed 2π/T, T = {turn_s:g} s", anchor="middle")
         resting = (start + leg.duration_s, start + leg.duration_s + rest_s)
-        drawing.shape([at(resting[0], 0.22), at(resting[1], 0.22), at(resting[1], -0.22), at(resting[0], -0.22)], REST, REST)
+        drawing.shape(
+            [at(resting[0], 0.22), at(resting[1], 0.22), at(resting[1], -0.22), at(resting[0], -0.22)], REST, REST
+        )
         line = [at(start, 0), at(start + ramp_s, sign), at(start + leg.duration_s - ramp_s, sign), at(resting[0], 0)]
         drawing.line([*line, at(resting[1], 0)], BLUE, 3)
         drawing.words((at(sum(resting) / 2, 0)[0], zero - 34), f"rest, {rest_s:g} s", anchor="middle", bold=True)
@@ -52,6 +56,9 @@ def sweep() -> Drawing:
     drawing.words((left - 26, zero + high + 5), f"−{speed:g}", anchor="end")
     drawing.words((left - 10, zero - high - 40), "speed of the joint, °/s", "#555555")
     drawing.words((left + per_s * start + 40, zero + 22), "time", "#555555", anchor="end")
-    notes = "The ramps lie outside the revolution. Three wrists, each there and back: six sweeps, six rests, about a minute."
+    notes = (
+        "The ramps lie outside the revolution. "
+        "Three wrists, each there and back: six sweeps, six rests, about a minute."
+    )
     drawing.words((480, 410), notes, anchor="middle")
     return drawing

@@ -1,4 +1,4 @@
-"""How each part is wired to the Nucleo-L432KC, drawn from the table in docs/board.md, which tests hold to the firmware."""
+"""How each part is wired to the Nucleo-L432KC, drawn from the table in docs/board.md that tests hold to the firmware."""
 
 from pathlib import Path
 
@@ -10,7 +10,14 @@ CN3 = ("D1", "D0", "NRST", "GND", "D2", "D3", "D4", "D5", "D6", "D7", "D8", "D9"
 CN4 = ("VIN", "GND", "NRST", "5V", "A7", "A6", "A5", "A4", "A3", "A2", "A1", "A0", "AREF", "3V3", "D13")
 PITCH, TOP, LEFT, RIGHT, WIRE = 30, 70, 320, 460, 100
 SUPPLY, GROUND, CLOCK, DATA, SELECT, READY = "#c62828", "#222222", "#1565c0", "#2e7d32", "#c25e00", "#7b1fa2"
-MEANING = ((SUPPLY, "3.3 V"), (GROUND, "ground"), (CLOCK, "clock"), (DATA, "data"), (SELECT, "select"), (READY, "data ready"))
+MEANING = (
+    (SUPPLY, "3.3 V"),
+    (GROUND, "ground"),
+    (CLOCK, "clock"),
+    (DATA, "data"),
+    (SELECT, "select"),
+    (READY, "data ready"),
+)
 SELECTS, CLOCKS, DATAS = ("D10", "D6", "D3", "A3"), ("D13",), ("D11", "D12")
 
 

@@ -209,8 +209,8 @@ def _made_by_override(section: Location, layered: Layered) -> str:
     if layered.places.get(section) != SET:
         return ""
     beside = layered.document
-    for part in section[:-1]:
-        beside = beside[part]
+    for part in map(str, section[:-1]):
+        beside = beside[str(part)]
     others = [str(key) for key in beside if key != section[-1] and layered.places.get((*section[:-1], key)) != SET]
     if not others or not section[:-1]:
         return ""

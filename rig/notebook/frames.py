@@ -3,7 +3,7 @@
 from collections.abc import Mapping, Sequence
 from typing import TYPE_CHECKING, Any
 
-from rig.study.files import missing_extra
+from rig.errors.extras import missing_extra
 
 if TYPE_CHECKING:
     from pandas import DataFrame

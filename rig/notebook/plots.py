@@ -16,7 +16,6 @@ from rig.estimation.arrays import Array
 from rig.estimation.coverage import COVERAGE_FACTOR
 from rig.observation.windows import Window
 from rig.report.figures import draw_comparison
-from rig.study.files import missing_extra
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
