@@ -1,4 +1,4 @@
-"""How each part is wired to the Nucleo-L432KC, drawn from the table in docs/board.md that tests hold to the firmware."""
+"""How each part is wired to the Nucleo-L432KC, from the table in docs/board.md that tests hold to the firmware."""
 
 from pathlib import Path
 
