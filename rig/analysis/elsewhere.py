@@ -91,7 +91,8 @@ def checks_elsewhere(name: str, found: OfSensor) -> Iterator[Check]:
     for quantity, result in found.at_rest.items():
         yield fitness(name, quantity.name, "condition", result.solution.condition, triaxial.MAX_CONDITION)
         if (error := result.solution.attitude_error) is not None:
-            yield fitness(name, quantity.name, "attitude_error", error.std_rad, UNTRUSTWORTHY_RAD, unit="rad")
+            at_least = max(error.std_rad - 2 * error.uncertainty_rad, 0.0)  # a few placements tell it badly
+            yield fitness(name, quantity.name, "attitude_error", at_least, UNTRUSTWORTHY_RAD, unit="rad")
 
 
 def _by_sweeps(read: ReadElsewhere, name: str | None) -> OfSensor:

@@ -7,6 +7,7 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
+from rig.data.motion_file import NOT_STATED
 from rig.data.result_file import CheckEntry, ResultDocument, SensorEntry
 from rig.report.check_words import what_failed, words_of
 from rig.report.kinds.kind import Shown, Three, Without
@@ -63,7 +64,7 @@ def _items(result: ResultDocument) -> Iterator[_Item]:
             if isinstance(kind.shown, Without) or getattr(entry, "role", None) == "reference":
                 continue
             serial = getattr(entry, "serial_number", None)
-            label = found.sensor if serial is None else f"{found.sensor} {serial}"
+            label = found.sensor if serial in (None, NOT_STATED) else f"{found.sensor} {serial}"
             yield _Item(kind.name, label, entry, kind.shown(found))
 
 
@@ -78,7 +79,7 @@ def _one(item: _Item, width: int) -> Iterator[str]:
         "".join(f"   {cell:>{size}}" for cell, size in zip(cells, widths, strict=True))
         for cells in zip(*columns, strict=True)
     )
-    title = f"{item.kind} {item.label}" + ("" if part is None else f", {part}")
+    title = f"{item.kind} {item.label}" + ("" if part in (None, NOT_STATED) else f", {part}")
     first = len(title) if len(title) + len(heading) <= width else len(INDENT) + 1
     yield from [f"{title}{heading}"] if first == len(title) else [title, f"{'':{first}}{heading}"]
     for axis, cells in zip("xyz", axes, strict=False):
