@@ -73,8 +73,8 @@ def after_verdict(about: About, checks: Sequence[Check], *, passed: bool, stored
     if passed and about.storing and not stored:
         return _next("Store the calibration on the board", about.storing)
     if passed:
-        serial = next((part.split()[-1] for part in about.parts.values() if part), None)
-        return _next("What became of it over time", f"rig history {serial}") if serial else _next("", "")
+        serial = next((part.partition(" ")[2] for part in about.parts.values()), "")
+        return _next("What became of it over time", f"rig history {shlex.quote(serial)}" if serial else "rig history")
     failed = [check for check in checks if not check.passed]
     sweeps = sorted({check.means.sweep for check in failed if check.means.sweep is not None})
     if sweeps:

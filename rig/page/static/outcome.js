@@ -1,7 +1,7 @@
 // What was found: a row for each sensor, its values ± U, a picture of them, and what they were the time before.
 
 const SVG = "http://www.w3.org/2000/svg";
-const WIDE = 96, LANE = 11; // of a picture, in CSS pixels; a lane for each axis
+const WIDE = 84, LANE = 11; // of a picture, in CSS pixels; a lane for each axis
 const LETTERS = "xyz";
 
 function make(tag, fields = {}, ...children) {
@@ -48,13 +48,13 @@ function triad(what, found, unit, past, kind) {
 }
 
 function table(row, past) {
-  const heading = (of, unit) => (row[of] ? [`${of === "scale" ? "scale factor" : row.scale ? "bias" : "value"} ± U${unit}`, "", "before", "E_n"] : []);
+  const heading = (of, unit) => (row[of] ? [`${of === "scale" ? "scale factor" : row.scale ? "bias" : "value"} ± U${unit}`, "", ...(past?.[of] ? ["before", "E_n"] : [])] : []);
   const cells = (of, i) => {
     const [found, then] = [row[of], past?.[of]];
     if (!found) return [];
     return [make("td", { textContent: `${found.texts[i]} ± ${found.u[i]}` }), make("td", {}, picture(found, then, [i])),
-      make("td", { textContent: then ? then.values[i].toFixed(decimals(found.texts[i])).replace("-", "−") : "–" }),
-      make("td", { textContent: then ? then.normalised_error[i].toFixed(1) : "–", className: then?.normalised_error[i] > 1 ? "bad" : "" })];
+      ...(then ? [make("td", { textContent: then.values[i].toFixed(decimals(found.texts[i])).replace("-", "−") }),
+        make("td", { textContent: then.normalised_error[i].toFixed(1), className: then.normalised_error[i] > 1 ? "bad" : "" })] : [])];
   };
   const head = ["axis", ...heading("scale", ""), ...heading("bias", `, ${row.unit}`)].map((text) => make("th", { scope: "col", textContent: text }));
   const body = row.bias.values.map((_, i) => make("tr", {}, make("th", { scope: "row", textContent: LETTERS[i] ?? "" }), ...cells("scale", i), ...cells("bias", i)));
