@@ -54,7 +54,7 @@ def listed(options: Namespace) -> int:
         console = Console(highlight=False)
         console.print(calibrations_table(pasts))
         for subject, each in found.items() if selection.serial_number is not None else ():
-            console.print(trends_table(subject, each.values()))
+            console.print(trends_table(subject, list(each.values())))
             for line in trend_lines(each):
                 console.print(plain(line))
     return 0

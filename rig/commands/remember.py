@@ -119,9 +119,8 @@ def _changed(beside: Beside) -> str | None:
     if not said:
         return None
     before, now = beside.before, beside.now
-    more = (
-        f"; {len(said) - MOST_SAID} more by rig history compare {before.id} {now.id}" if len(said) > MOST_SAID else ""
-    )
+    left = len(said) - MOST_SAID
+    more = f"; {left} more by rig history compare {before.id} {now.id}" if left > 0 else ""
     of = f"{now.part} {now.serial_number}, {now.quantity}, since calibration {before.id} of {before.started_utc[:10]}"
     return f"changed beyond U: {of}: {'; '.join(said[:MOST_SAID])}{more}"
 

@@ -8,6 +8,7 @@ from functools import cached_property
 import numpy as np
 
 from rig.data.installed_kinds import quantities
+from rig.data.provenance import NO_ARM
 from rig.estimation.arrays import Array
 from rig.history.statistics.agreement import normalised_error
 from rig.history.statistics.charts import FEWEST, Chart, chart, merged
@@ -18,6 +19,7 @@ from rig.history.store import Past
 from rig.report.kinds.followed import Parameter, is_scale, nominal
 
 YEAR_DAYS = 365.25
+DRIFT_DAYS = 10.0  # from the first result to the last: what less says of a year is its scatter
 DAY_S = 86400.0
 
 Subject = tuple[str, str, str, float, bool]
@@ -73,8 +75,8 @@ class Trend:
 
     @cached_property
     def line(self) -> Fitted | None:
-        """Value at the first result, and change per day; None too where all are of one moment."""
-        if not self.enough or np.ptp(self.days) == 0:
+        """Value at the first result, and change per day; None too where they are of less than `DRIFT_DAYS`."""
+        if not self.enough or np.ptp(self.days) < DRIFT_DAYS:
             return None
         return fit(np.stack([np.ones(self.count), self.days], axis=1), self.values, self.std)
 
@@ -158,7 +160,8 @@ def changed(before: Mapping[str, Parameter], now: Mapping[str, Parameter]) -> tu
 
 def rig_states(pasts: Sequence[Past]) -> list[RigState]:
     """Every rig that has check standards; a sensor is one if it was ever called one."""
-    found = subjects([past for past in pasts if past.quantity in quantities()])  # what drifts or turns is no standard
+    # What drifts or turns is no standard, and readings from files tell of no rig.
+    found = subjects([past for past in pasts if past.quantity in quantities() and past.rig != NO_ARM])
     standards = {subject: each for subject, each in found.items() if any(past.check_standard for past in each)}
     states = []
     for rig in dict.fromkeys(past.rig for each in standards.values() for past in each):
@@ -178,7 +181,8 @@ def rig_states(pasts: Sequence[Past]) -> list[RigState]:
 
 def effects(pasts: Sequence[Past]) -> dict[str, tuple[RigEffect, ...]]:
     """What rigs differ in, by parameter of gyroscopes, from the sensors they share. Of scale factors as a fraction."""
-    series = [(name, past) for each in subjects(pasts).values() for past in each for name in past.parameters]
+    by_rigs = subjects(past for past in pasts if past.rig != NO_ARM)
+    series = [(name, past) for each in by_rigs.values() for past in each for name in past.parameters]
     found = {}
     for name in dict.fromkeys(name for name, past in series if past.quantity == "rate"):
         having = [past for of, past in series if of == name and past.quantity == "rate"]

@@ -2,45 +2,49 @@
 
 from collections.abc import Iterable, Iterator, Mapping, Sequence
 
-from rich.table import Table
-
 from rig.data.installed_kinds import quantities
-from rig.history.series import YEAR_DAYS, Change, RigState, Subject, Trend
-from rig.history.statistics.charts import FEWEST
+from rig.data.provenance import NO_ARM, NO_BOARD
+from rig.history.fitting_table import Column, FittingTable
+from rig.history.series import DRIFT_DAYS, YEAR_DAYS, Change, RigState, Subject, Trend
+from rig.history.spark import picture
+from rig.history.statistics.charts import FEWEST, Chart
 from rig.history.statistics.rig_effects import RigEffect
 from rig.history.store import Kept, Past
 from rig.report.kinds.followed import Parameter, is_scale
-from rig.report.rounding import rounded
-from rig.station.plain_text import plain
+from rig.report.rounding import figures, rounded
 
 PPM = 1e6
 
 
-def calibrations_table(pasts: Iterable[Past]) -> Table:
+def calibrations_table(pasts: Sequence[Past]) -> FittingTable:
     """The table of calibrations, one line each: what, when, by which rig, with which verdict."""
-    table = _table("calibrations", "no", "started (UTC)", "sensor", "rig", "verdict", "")
-    for each in pasts:
-        started = each.started_utc.replace("T", " ")[:16]
-        sensor = f"{each.part} {each.serial_number}" + ("" if each.quantity == "rate" else f", {each.quantity}")
-        table.add_row(str(each.id), started, plain(sensor), plain(each.rig), each.verdict, plain(_notes(each)))
-    return table
+    started = [each.started_utc.replace("T", " ")[:16] for each in pasts]
+    columns = (
+        Column("number", [str(each.id) for each in pasts], number=True),
+        Column("started (UTC)", started, rank=4, shorter=[each[:10] for each in started]),
+        Column("part", [each.part for each in pasts], rank=6),
+        Column("serial number", [each.serial_number for each in pasts]),
+        Column("quantity", [each.quantity for each in pasts]),
+        Column("rig", [rig_in_words(each) for each in pasts], rank=5),
+        Column("verdict", [each.verdict if each.voided is None else f"{each.verdict}, void" for each in pasts]),
+        Column("notes", [_notes(each) for each in pasts], rank=3, wraps=True),
+    )
+    return FittingTable("calibrations", columns)
 
 
-def trends_table(subject: Subject, trends: Iterable[Trend]) -> Table:
-    """What each parameter is now, its drift, its spread, its chart, and until when it will stay within its limit."""
-    headings = ("parameter", "last ± U", "runs", "drift a year ± U", "spread", "chart", "recall")
-    table = _table(title_of(subject), *headings)
-    for trend in trends:
-        table.add_row(
-            plain(trend.name if trend.unit == "1" else f"{trend.name} {trend.unit}"),
-            value_text(trend.last),
-            str(trend.count),
-            _drift(trend),
-            "" if trend.mean is None else f"{trend.mean.between_std:.2g}",
-            _chart_text(trend),
-            "" if trend.recall is None else trend.recall.isoformat(),
-        )
-    return table
+def trends_table(subject: Subject, trends: Sequence[Trend]) -> FittingTable:
+    """What each parameter was and is now, its drift, spread and chart, and until when it stays within its limit."""
+    columns = (
+        Column("parameter", [_with_unit(each.name, each.unit) for each in trends]),
+        Column("trend", [picture(each) for each in trends], rank=1),
+        Column("last ± U", [value_text(each.last) for each in trends], number=True),
+        Column("runs", [str(each.count) for each in trends], rank=6, number=True),
+        Column("drift a year ± U", [_drift(each) for each in trends], rank=2, number=True),
+        Column("spread", ["" if each.mean is None else figures(each.mean.between_std) for each in trends], rank=5),
+        Column("chart", [_chart_words(each.chart) for each in trends], rank=3),
+        Column("recall", ["" if each.recall is None else each.recall.isoformat() for each in trends], rank=4),
+    )
+    return FittingTable(title_of(subject), columns)
 
 
 def trend_lines(trends: Mapping[str, Trend]) -> Iterator[str]:
@@ -48,42 +52,51 @@ def trend_lines(trends: Mapping[str, Trend]) -> Iterator[str]:
     if not trends:
         return
     fewest = min(trend.count for trend in trends.values())
+    yield "trend: oldest to newest, from the lowest value − U to the highest + U"
+    if "k" in trends:
+        yield "k: the mean of the scale factors; what is wrong with a clock moves it most"
     if fewest < FEWEST:
         yield f"drift, spread, chart and recall need {FEWEST} calibrations; there are {fewest}"
+    elif all(trend.line is None for trend in trends.values()):
+        yield f"drift and recall need {DRIFT_DAYS:g} days from the first calibration to the last"
     calibrated = [trend.last for name, trend in trends.items() if name[0] in "kb"]
     if calibrated and all(parameter.std_combined is None for parameter in calibrated):
         yield "U is that of noise alone: no result of this sensor has a budget"
     for trend in trends.values():
         if trend.chart is not None and trend.chart.out_of_control:
-            yield f"{trend.name}: the newest is out of control, {_chart_text(trend)}"
+            chart = trend.chart
+            ewma = f"EWMA {_signed(chart.ewma[-1], 2)} of ±{chart.limit[-1]:.2f}"
+            yield f"{trend.name}: the newest is out of control, {ewma}, newest {_signed(chart.deviation[-1], 1)} σ"
 
 
-def changes_table(title: str, changes: Iterable[Change]) -> Table:
+def changes_table(title: str, changes: Sequence[Change]) -> FittingTable:
     """The table of changes: each parameter beside the one before."""
-    table = _table(title, "parameter", "before ± U", "now ± U", "E_n")
-    for each in changes:
-        table.add_row(
-            plain(each.name if each.unit == "1" else f"{each.name} {each.unit}"),
-            value_text(each.before),
-            value_text(each.now),
-            f"{'beyond U ' if each.beyond else ''}{each.normalised_error:.2f}",
-        )
-    return table
-
-
-def parameters_table(past: Past) -> Table:
-    """The table of one calibration's parameters."""
-    table = _table(
-        f"calibration {past.id}: {title_of(past.subject)}", "parameter", "value ± U", "unit", "u of noise", "u of all"
+    columns = (
+        Column("parameter", [_with_unit(each.name, each.unit) for each in changes]),
+        Column("before ± U", [value_text(each.before) for each in changes], rank=1, number=True),
+        Column("now ± U", [value_text(each.now) for each in changes], number=True),
+        Column("E_n", [f"{'beyond U ' * each.beyond}{each.normalised_error:.2f}" for each in changes], number=True),
     )
-    for each in past.parameters.values():
-        combined = "not known" if each.std_combined is None else f"{each.std_combined:.3g}"
-        table.add_row(each.name, value_text(each), plain(each.unit), f"{each.std_statistical:.3g}", combined)
-    return table
+    return FittingTable(title, columns)
+
+
+def parameters_table(past: Past) -> FittingTable:
+    """The table of one calibration's parameters."""
+    found = past.parameters.values()
+    combined = ["not known" if each.std_combined is None else figures(each.std_combined) for each in found]
+    columns = (
+        Column("parameter", [_with_unit(each.name, each.unit) for each in found]),
+        Column("value ± U", [value_text(each) for each in found], number=True),
+        Column("u of noise", [figures(each.std_statistical) for each in found], rank=2),
+        Column("u of all", combined, rank=1),
+    )
+    return FittingTable(f"calibration {past.id}: {title_of(past.subject)}", columns)
 
 
 def run_lines(past: Past, kept: Kept) -> Iterator[str]:
-    """Who ran the rig, what was noted, and the certificates, with what makes one invalid."""
+    """Who ran the rig, on which board the sensor was, what was noted, and the certificates, with what voids one."""
+    if past.board_unique_id != NO_BOARD:
+        yield f"board: {past.board_unique_id}"
     if past.operator is not None:
         yield f"operator: {past.operator}"
     if past.note is not None:
@@ -97,36 +110,30 @@ def run_lines(past: Past, kept: Kept) -> Iterator[str]:
         yield from (f"{name} of it: SHA-256 {sha256}" for name, sha256 in each.files)
 
 
-def states_table(states: Iterable[RigState]) -> Table:
+def states_table(states: Iterable[RigState]) -> FittingTable:
     """What check standards say of rigs."""
-    table = _table("rigs by their check standards", "rig", "check standards", "parameter", "results", "chart")
-    for state in states:
-        for name, chart in state.charts.items():
-            said = "OUT OF CONTROL" if chart.out_of_control else "in control"
-            if chart.alarm.any() and not chart.out_of_control:
-                said = f"in control; {int(chart.alarm.sum())} alarms before"
-            standards = plain(", ".join(state.standards))
-            table.add_row(plain(state.rig), standards, name, str(chart.deviation.shape[-1]), said)
-    return table
+    rows = [(state, name, chart) for state in states for name, chart in state.charts.items()]
+    columns = (
+        Column("rig", [state.rig for state, *_ in rows]),
+        Column("check standards", [", ".join(state.standards) for state, *_ in rows], rank=2, wraps=True, least=16),
+        Column("parameter", [name for _, name, _ in rows]),
+        Column("results", [str(chart.deviation.shape[-1]) for *_, chart in rows], rank=1, number=True),
+        Column("chart", [_chart_words(chart) for *_, chart in rows]),
+    )
+    return FittingTable("rigs by their check standards", columns)
 
 
-def effects_table(effects: Mapping[str, Sequence[RigEffect]]) -> Table:
+def effects_table(effects: Mapping[str, Sequence[RigEffect]]) -> FittingTable:
     """What rigs differ in."""
-    headings = ("parameter", "rig", "finds more than", "by ± U", "unit", "shared sensors")
-    table = _table("effects of rigs, told apart from those of sensors", *headings)
-    for name, each in effects.items():
-        for effect in each:
-            size, unit = (PPM, "ppm") if is_scale(name) else (1.0, "rad/s" if name[0] == "b" else "")
-            found = rounded(effect.value * size, effect.expanded * size)
-            table.add_row(
-                name,
-                plain(effect.rig),
-                plain(effect.reference),
-                f"{found.value_text} ± {found.uncertainty_text}" + (" *" if _certain(effect) else ""),
-                unit,
-                str(effect.sensors),
-            )
-    return table
+    rows = [(name, effect) for name, each in effects.items() for effect in each]
+    columns = (
+        Column("parameter", [name for name, _ in rows]),
+        Column("rig", [effect.rig for _, effect in rows]),
+        Column("finds more than", [effect.reference for _, effect in rows]),
+        Column("by ± U", [_effect(name, effect) for name, effect in rows], number=True),
+        Column("shared sensors", [str(effect.sensors) for _, effect in rows], rank=1, number=True),
+    )
+    return FittingTable("effects of rigs, told apart from those of sensors", columns)
 
 
 def title_of(subject: Subject) -> str:
@@ -143,12 +150,13 @@ def value_text(parameter: Parameter) -> str:
     return f"{found.value_text} ± {found.uncertainty_text}"
 
 
-def _table(title: str, *headings: str) -> Table:
-    table = Table(title=plain(title, "table.title"), title_justify="left")
-    for heading in headings:
-        number = "±" in heading or heading in ("no", "runs", "E_n")
-        table.add_column(heading, justify="right" if number else "left", no_wrap=number or "UTC" in heading)
-    return table
+def rig_in_words(past: Past) -> str:
+    """The rig's name, or what there was in its place."""
+    return "readings from files" if past.rig == NO_ARM else past.rig
+
+
+def _with_unit(name: str, unit: str) -> str:
+    return name if unit == "1" else f"{name} {unit}"
 
 
 def _notes(past: Past) -> str:
@@ -167,15 +175,21 @@ def _drift(trend: Trend) -> str:
     return f"{found.value_text} ± {found.uncertainty_text}" + (" *" if trend.drifts else "")
 
 
-def _chart_text(trend: Trend) -> str:
-    if trend.chart is None:
+def _chart_words(chart: Chart | None) -> str:
+    if chart is None:
         return ""
-    if trend.chart.out_of_control:
-        found = trend.chart
-        return f"EWMA {found.ewma[-1]:+.2f} of ±{found.limit[-1]:.2f}, newest {found.deviation[-1]:+.1f} σ"
-    alarms = int(trend.chart.alarm.sum())
-    return f"in control; {alarms} alarms before" if alarms else "in control"
+    if chart.out_of_control:
+        return "OUT OF CONTROL"
+    alarms = int(chart.alarm.sum())
+    return f"in control; {alarms} alarm{'s' * (alarms > 1)} before" if alarms else "in control"
 
 
-def _certain(effect: RigEffect) -> bool:
-    return abs(effect.value) > effect.expanded
+def _signed(value: float, decimals: int) -> str:
+    return f"{value:+.{decimals}f}".replace("-", "−")
+
+
+def _effect(name: str, effect: RigEffect) -> str:
+    size, unit = (PPM, " ppm") if is_scale(name) else (1.0, " rad/s" if name[0] == "b" else "")
+    found = rounded(effect.value * size, effect.expanded * size)
+    certain = " *" if abs(effect.value) > effect.expanded else ""
+    return f"{found.value_text} ± {found.uncertainty_text}{unit}{certain}"

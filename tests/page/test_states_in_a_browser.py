@@ -211,6 +211,7 @@ def test_an_address_of_this_computer_without_its_token_shows_nothing_and_says_so
         assert [("403" in entry, "/events" in entry) for entry in severe(driver)] == [(True, True)]  # it asks but once
         driver.get(url)
         until(lambda: text(driver, "state-word") == "Your answer is needed", "the question")
+        assert text(driver, "prompt-tick") == Prompt(ANNOUNCED).to_tick
         assert asked_hosts(driver) == {host}
 
 

@@ -1,0 +1,23 @@
+"""A series as a picture in one line of a terminal. Pure."""
+
+import numpy as np
+
+from rig.history.series import Trend
+
+BLOCKS = "▁▂▃▄▅▆▇█"
+PLAIN = str.maketrans(BLOCKS, "__..--''")  # where a terminal has no blocks
+MOST = 16  # of the newest results
+
+
+def picture(trend: Trend) -> str:
+    """A block for each of the newest results, as high as the value lies from the lowest value − U to the highest + U.
+
+    So a row of equal blocks has changed by less than its U, and one that climbs by more. Empty for a single result.
+    """
+    newest = trend.parameters[-MOST:]
+    if len(newest) < 2:
+        return ""
+    values, widths = (np.array([getattr(each, of) for each in newest]) for of in ("value", "expanded"))
+    low, high = (values - widths).min(), (values + widths).max()
+    heights = (values - low) / (high - low)
+    return "".join(BLOCKS[min(int(height * len(BLOCKS)), len(BLOCKS) - 1)] for height in heights)
