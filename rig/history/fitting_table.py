@@ -1,7 +1,7 @@
 """A table that fits the terminal: it leaves out columns, and cuts no name and no number."""
 
 from collections.abc import Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 
 from rich.cells import cell_len
 from rich.console import Console, ConsoleOptions, RenderResult
@@ -17,15 +17,15 @@ STROKES, ROUND_A_CELL = 1, 3  # what the frame adds: a stroke, and to each cell 
 class Column:
     """A column with its `heading`. Of those that do not fit, the one of the highest `rank` goes first; 0 stays.
 
-    In place of the cells may stand the `shorter` ones where there is little room. One that `wraps` may use several
-    lines for what it says, and is then `least` cells wide.
+    Where there is little room a `shorter` one takes its place first. One that `wraps` may use several lines for what it
+    says, and is then `least` cells wide.
     """
 
     heading: str
     cells: Sequence[str]
     rank: int = 0
     number: bool = False
-    shorter: Sequence[str] | None = None
+    shorter: "Column | None" = None
     wraps: bool = False
     least: int = 12
 
@@ -56,7 +56,7 @@ class FittingTable:
             if first.shorter is None:
                 shown.remove(first)
             else:
-                shown[shown.index(first)] = replace(first, cells=first.shorter, shorter=None, rank=0)
+                shown[shown.index(first)] = first.shorter
         return shown
 
     def __rich_console__(self, console: Console, options: ConsoleOptions) -> RenderResult:

@@ -19,11 +19,12 @@ PPM = 1e6
 def calibrations_table(pasts: Sequence[Past]) -> FittingTable:
     """The table of calibrations, one line each: what, when, by which rig, with which verdict."""
     started = [each.started_utc.replace("T", " ")[:16] for each in pasts]
+    day = Column("day", [each[:10] for each in started], rank=2)
     columns = (
         Column("number", [str(each.id) for each in pasts], number=True),
-        Column("started (UTC)", started, rank=4, shorter=[each[:10] for each in started]),
+        Column("started (UTC)", started, rank=4, shorter=day),
         Column("part", [each.part for each in pasts], rank=6),
-        Column("serial number", [each.serial_number for each in pasts]),
+        Column("serial", [each.serial_number for each in pasts]),
         Column("quantity", [each.quantity for each in pasts]),
         Column("rig", [rig_in_words(each) for each in pasts], rank=5),
         Column("verdict", [each.verdict if each.voided is None else f"{each.verdict}, void" for each in pasts]),
@@ -40,7 +41,7 @@ def trends_table(subject: Subject, trends: Sequence[Trend]) -> FittingTable:
         Column("last ± U", [value_text(each.last) for each in trends], number=True),
         Column("runs", [str(each.count) for each in trends], rank=6, number=True),
         Column("drift a year ± U", [_drift(each) for each in trends], rank=2, number=True),
-        Column("spread", ["" if each.mean is None else figures(each.mean.between_std) for each in trends], rank=5),
+        Column("spread", [_spread(each) for each in trends], rank=5, number=True),
         Column("chart", [_chart_words(each.chart) for each in trends], rank=3),
         Column("recall", ["" if each.recall is None else each.recall.isoformat() for each in trends], rank=4),
     )
@@ -87,8 +88,8 @@ def parameters_table(past: Past) -> FittingTable:
     columns = (
         Column("parameter", [_with_unit(each.name, each.unit) for each in found]),
         Column("value ± U", [value_text(each) for each in found], number=True),
-        Column("u of noise", [figures(each.std_statistical) for each in found], rank=2),
-        Column("u of all", combined, rank=1),
+        Column("u of noise", [figures(each.std_statistical) for each in found], rank=2, number=True),
+        Column("u of all", combined, rank=1, number=True),
     )
     return FittingTable(f"calibration {past.id}: {title_of(past.subject)}", columns)
 
@@ -173,6 +174,10 @@ def _drift(trend: Trend) -> str:
         trend.line.coverage_factor * float(trend.line.std[1]) * YEAR_DAYS,
     )
     return f"{found.value_text} ± {found.uncertainty_text}" + (" *" if trend.drifts else "")
+
+
+def _spread(trend: Trend) -> str:
+    return "" if trend.mean is None else figures(trend.mean.between_std)
 
 
 def _chart_words(chart: Chart | None) -> str:
