@@ -12,6 +12,7 @@ from rig.commands.endings import end_by_interrupt, ignore_endings
 from rig.commands.standard_streams import keep_streams_usable
 from rig.errors import Fault, RigError
 from rig.errors.quoting import printable_lines
+from rig.station.plain_text import say_on_terminal
 
 if TYPE_CHECKING:
     from rig.plans.registry import AnyProcedure
@@ -88,9 +89,9 @@ def main(arguments: Sequence[str] | None = None) -> int:
 
 
 def _begun(name: str | None, command: Callable[[argparse.Namespace], int], options: argparse.Namespace) -> int:
-    """Carry out a command; on a terminal there is a sign of life before what it needs is loaded."""
-    if name in _AT_ONCE and sys.stderr.isatty():
-        print(f"{_AT_ONCE[name]} …", file=sys.stderr, flush=True)
+    """Carry out a command; there is a sign of life before what it needs is loaded."""
+    if name in _AT_ONCE:
+        say_on_terminal(_AT_ONCE[name])
     return command(options)
 
 

@@ -6,7 +6,6 @@ from rig.arm.motion import Plan, Transfer
 
 # °/s. What is slower may be a speed in rad/s: no joint of the arm turns by more of these.
 SLOW_DEG_S = math.pi
-LONG_S = 600.0  # from then on one thinks in minutes
 
 
 def doubts(plan: Plan) -> list[str]:
@@ -22,11 +21,3 @@ def doubts(plan: Plan) -> list[str]:
         for key, speed in found.items()
         if math.degrees(speed) < SLOW_DEG_S
     ]
-
-
-def duration_words(duration_s: float) -> str:
-    """`66 s`, `5 h 36 min`: how long something takes, as one says it."""
-    if duration_s < LONG_S:
-        return f"{duration_s:.0f} s"
-    hours, minutes = divmod(round(duration_s / 60), 60)
-    return f"{hours} h {minutes} min" if hours else f"{minutes} min"

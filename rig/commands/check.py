@@ -32,7 +32,7 @@ def run(options: Namespace) -> int:
     With `--json` all of it at the end, of schema "rig.check/1".
     """
     seen: list[str] = []
-    tell = seen.append if options.json else say
+    tell: Tell = seen.append if options.json else say
     from rig.commands.configured import configured
     from rig.commands.own_address import own_address
 

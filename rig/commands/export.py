@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING
 from rig.config.written_file import write_new
 from rig.errors import Refused
 from rig.report.exports.formats import FORMATS, OF_READINGS, texts_of_calibrations, writer_of_readings
-from rig.station.plain_text import say
+from rig.station.plain_text import say, say_on_terminal
 
 if TYPE_CHECKING:
     from rig.data.result_file import ResultDocument
@@ -52,6 +52,7 @@ def files(options: Namespace) -> list[Path]:
     try:
         if name in OF_READINGS:
             write = writer_of_readings(name)
+            say_on_terminal("finding the time base")
             recordings = observe_runs(open_run(run).movement)
             if not recordings:
                 raise Refused("nothing_to_export", "no sweep or dwell was finished", "Resume the run")

@@ -8,7 +8,7 @@ from rig.commands.config_arguments import add_set
 from rig.commands.named_history import add_history, named_history
 from rig.config.written_file import write_new
 from rig.errors import Refused
-from rig.station.plain_text import say
+from rig.station.plain_text import say, say_on_terminal
 
 
 def add(parser: ArgumentParser) -> None:
@@ -82,6 +82,7 @@ def documents(options: Namespace) -> tuple[list[Path], list[Refused]]:
             from rig.report.certificate.pdf import PDF, pdf_of
 
             refuse_links(folder / PDF)
+            say_on_terminal("drawing the PDF")
             try:
                 written[PDF] = pdf_of(written[PAGE].decode(), {RESULT: file.read_bytes(), **digital})
                 write_new(folder / PDF, written[PDF])

@@ -1,5 +1,6 @@
 """`rig run`: the procedure a configuration names, or one in a script of its own."""
 
+import sys
 from argparse import ArgumentParser, Namespace
 from collections.abc import Iterator
 from contextlib import contextmanager
@@ -8,6 +9,7 @@ from typing import TYPE_CHECKING
 
 from rig.commands.config_arguments import add_config, add_script
 from rig.commands.page_arguments import add_page, wish
+from rig.station.plain_text import say
 
 if TYPE_CHECKING:
     from rig.commands.configured import Configured
@@ -64,6 +66,7 @@ def begun(options: Namespace) -> "Iterator[tuple[Path, Configured]]":
         if another:
             found = configured(options.config, [*options.overrides, *another], options.script and found.script)
         folder = new_folder(options.out, found.loaded, found.script.text, found.script.identity)
+        say(f"run folder: {folder}", sys.stderr)
         note_own(found.loaded.text, found.script.text)
         try:
             yield folder, found

@@ -7,7 +7,7 @@ from pathlib import Path
 from rig.commands import solve_elsewhere
 from rig.commands.config_arguments import add_json, add_set
 from rig.errors import Refused
-from rig.station.plain_text import say
+from rig.station.plain_text import say, say_on_terminal
 
 
 def add(solve: ArgumentParser) -> None:
@@ -60,6 +60,7 @@ def _recording(options: Namespace) -> int:
     from rig.report.table import print_outcome
 
     run = open_run(options.run, options.script).judged_by(options.overrides)
+    say_on_terminal("solving")
     outcome = judged(run, options.estimator or DEFAULT_ESTIMATOR)
     if (said := left_out(run)) is not None:
         say(said, sys.stderr)

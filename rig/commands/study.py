@@ -1,17 +1,21 @@
 """`rig study`: lists the studies, or runs one with a progress bar and writes what it found."""
 
 import sys
+import time
 from argparse import ArgumentParser, Namespace
 from collections.abc import Iterable, Iterator
 from contextlib import contextmanager, nullcontext
+from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from rig.errors import Refused
-from rig.station.plain_text import say
+from rig.station.plain_text import duration_words, say
 
 if TYPE_CHECKING:
     from rig.study.report import Finding
+
+WORTH_TELLING_S = 5.0
 
 
 def add(parser: ArgumentParser) -> None:
@@ -65,9 +69,14 @@ def _run(options: Namespace) -> int:
         import matplotlib  # noqa: F401
     except ImportError as error:
         raise missing_extra(error, "study") from error
+    if options.format == "parquet":
+        try:
+            import pyarrow  # noqa: F401  # now, not when all is computed
+        except ImportError as error:
+            raise missing_extra(error, "parquet") from error
     refuse_links(*options.out.glob("*"))
     with _cluster(options.dask) if options.dask else nullcontext():
-        report = entry.run(Settings(options.seed, options.runs, options.jobs, _bar))
+        report = entry.run(Settings(options.seed, options.runs, options.jobs, partial(_bar, options.jobs or 1)))
     paths = write(report, options.out, options.name, options.format)
     _print_findings(options.name, report.findings)
     for path in paths:
@@ -96,12 +105,18 @@ def _cluster(address: str) -> Iterator[None]:
         yield
 
 
-def _bar(results: Iterable[Any], total: int) -> Iterable[Any]:
+def _bar(jobs: int, results: Iterable[Any], total: int) -> Iterable[Any]:
+    """How long it takes is told by the first piece; a terminal has a bar besides."""
     from rich.console import Console
     from rich.progress import track
 
-    console = Console(stderr=True)
-    return track(results, total=total, description="study", console=console, disable=not console.is_terminal)
+    console, began_s = Console(stderr=True), time.monotonic()
+    shown = track(results, total=total, description="study", console=console, disable=not console.is_terminal)
+    for number, result in enumerate(shown):
+        left_s = (time.monotonic() - began_s) * (total - 1) / jobs
+        if number == 0 and left_s > WORTH_TELLING_S:
+            console.print(f"{total} pieces, about {duration_words(left_s)} to go")
+        yield result
 
 
 def _print_findings(name: str, findings: "tuple[Finding, ...]") -> None:

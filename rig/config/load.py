@@ -208,9 +208,9 @@ def _made_by_override(section: Location, layered: Layered) -> str:
     """What else there is, where a section stands in no file: a misspelt `--set sensors.NAME.…` has made it."""
     if layered.places.get(section) != SET:
         return ""
-    beside = layered.document
-    for part in map(str, section[:-1]):
-        beside = beside[str(part)]
+    beside: Any = layered.document
+    for part in section[:-1]:
+        beside = beside[part]
     others = [str(key) for key in beside if key != section[-1] and layered.places.get((*section[:-1], key)) != SET]
     if not others or not section[:-1]:
         return ""

@@ -13,12 +13,12 @@ from rich.table import Table
 from rig.analysis.attitude_account import AttitudeAccount
 from rig.analysis.planned import Told
 from rig.analysis.told_from import ToldFrom
-from rig.arm.doubts import LONG_S, doubts, duration_words
+from rig.arm.doubts import doubts
 from rig.arm.motion import SAME_PLACE_RAD, Dwell, Plan, Rest, Step, Sweep
 from rig.arm.state import JOINT_NAMES
 from rig.report.attitude_account import account_document, print_account
 from rig.report.told_words import size_words, told_from_entries
-from rig.station.plain_text import plain
+from rig.station.plain_text import LONG_S, duration_words, plain
 
 
 @dataclass(frozen=True, eq=False)

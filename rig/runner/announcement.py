@@ -3,11 +3,12 @@
 from collections.abc import Iterable
 from math import degrees
 
-from rig.arm.doubts import doubts, duration_words
+from rig.arm.doubts import doubts
 from rig.arm.motion import Plan
 from rig.arm.preflight import way_to_home
 from rig.arm.state import JOINT_NAMES, ArmReport
 from rig.station.events import Prompt
+from rig.station.plain_text import duration_words
 
 
 def announcement(plan: Plan, report: ArmReport, repeated: Plan | None, mounted: Iterable[str]) -> Prompt:

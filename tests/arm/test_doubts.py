@@ -1,8 +1,6 @@
 """A speed that was written in rad/s is asked about before the arm moves; it is not refused."""
 
-import pytest
-
-from rig.arm.doubts import doubts, duration_words
+from rig.arm.doubts import doubts
 from rig.config.load import load
 from rig.plans.phase import first_phase
 from rig.plans.registry import installed
@@ -27,8 +25,3 @@ def test_a_sweep_in_radians_a_second_is_asked_about_with_what_it_would_be_in_deg
 def test_so_is_a_transfer_though_the_first_way_home_is_always_slower_than_the_others() -> None:
     (doubt,) = doubts_of("arm.transfer_speed_deg_s=2.09")
     assert doubt.startswith("arm.transfer_speed_deg_s is 2.09, which is slow: is 2.09 rad/s meant? That is 120 °/s.")
-
-
-@pytest.mark.parametrize(("seconds", "words"), [(66.4, "66 s"), (725, "12 min"), (20_160, "5 h 36 min")])
-def test_a_long_time_is_told_in_hours_and_minutes(seconds: float, words: str) -> None:
-    assert duration_words(seconds) == words

@@ -245,6 +245,8 @@ def test_a_laboratory_of_its_own_is_started_for_the_command(world: World, tmp_pa
     handle.stop()
     done = rig("info", handle.config_path)
     assert done.returncode == 0 and "gyro" in done.stdout, done
+    assert "follows the crystal" in done.stdout and "not fitted" in done.stdout, "a demonstration has no alarm"
+    assert "0xff" not in done.stdout and "NOT" not in done.stdout
     assert "its board's memory too, unless world.board.flash_file" in done.stderr
     file = tmp_path / "flash.bin"
     done = rig("info", handle.config_path, "--set", f"world.board.flash_file={file}")

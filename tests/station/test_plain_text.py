@@ -14,7 +14,7 @@ from rig.cli import main
 from rig.errors.quoting import printable, printable_lines
 from rig.station.events import RunFolderWritten
 from rig.station.log import log
-from rig.station.plain_text import plain, say
+from rig.station.plain_text import duration_words, plain, say
 from rig.station.view import LiveView, PlainView
 from support.paths import ROOT
 
@@ -75,3 +75,8 @@ def test_what_is_printed_as_it_stands_is_written_in_the_source_or_json(room: str
 def test_an_error_names_a_hostile_path_without_obeying_it(capsys: pytest.CaptureFixture[str]) -> None:
     assert main(["solve", HOSTILE]) == 2
     assert SHOWN in (said := capsys.readouterr().err) and "\x1b" not in said
+
+
+@pytest.mark.parametrize(("seconds", "words"), [(66.4, "66 s"), (725, "12 min"), (20_160, "5 h 36 min")])
+def test_a_long_time_is_told_in_hours_and_minutes(seconds: float, words: str) -> None:
+    assert duration_words(seconds) == words
