@@ -197,7 +197,9 @@ def _explain(model: type[BaseModel], item: Any, prefix: Location, layered: Layer
         return where + _not_allowed(value, allowed)
     if kind == "tuple_type":
         return f"{where}: {quote(value)}: must be a list in brackets, as [a, b, c]"
-    if kind in ("model_type", "dict_type"):
+    if kind == "dict_type":
+        return f"{where}: {quote(value)}: must be a section that holds others by their names"
+    if kind == "model_type":
         return f"{where}: {quote(value)}: must be a section, with the keys {', '.join(_keys_at(model, location))}"
     message = item["msg"].removeprefix("Value error, ")
     shown = "" if isinstance(value, dict) else f"{quote(value)}: "

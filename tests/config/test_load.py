@@ -288,6 +288,8 @@ def test_a_serial_number_is_what_was_written(written: str, by_override: bool) ->
 def test_a_value_that_was_given_by_an_override_is_refused_as_that() -> None:
     with pytest.raises(ConfigurationRefused) as caught:
         parse(demo_text(), overrides=["procedure.speed_deg_s=fast", "arm.home_deg=1", "sensors.lsm9ds1.role=calibrate"])
+    for section in ("sensors=3", "sensors.gyro=lsm9ds1"):
+        assert "must be a section" in problems_of(demo_text(), section)[0]
     told = str(caught.value)
     assert "procedure.speed_deg_s (--set): 'fast': " in told
     assert "arm.home_deg (--set): 1: must be a list in brackets" in told
