@@ -70,11 +70,8 @@ def plot_residuals(sensors: Mapping[str, SensorEntry]) -> Plot:
     figure = _figure(10, 3 * len(solved))
     panels = figure.subplots(len(solved), sharex=True, squeeze=False)[:, 0]
     for axes, (name, (found, model)) in zip(panels, solved.items(), strict=True):
-        averages = [
-            *(each.mean_std_rad_s for each in found.observations),
-            *(each.mean_std_rad_s for each in found.rests),
-        ]
-        expanded = COVERAGE_FACTOR * np.array(averages)
+        stds = [turn.mean_std_rad_s for turn in found.observations] + [rest.mean_std_rad_s for rest in found.rests]
+        expanded = COVERAGE_FACTOR * np.array(stds)
         residuals = np.array(model.residuals_rad_s)
         for i, axis in enumerate("xyz"):
             places = np.arange(len(expanded)) + (i - 1) * 0.15
