@@ -68,10 +68,10 @@ def run(
     from rig.commands.endings import ending_by_interrupt
     from rig.commands.run import begun
 
-    if multiprocessing.parent_process() is not None:
+    if multiprocessing.current_process().name != "MainProcess":
         raise Refused(
             "no_main_guard",
-            "the process that talks to the arm has read the script that calls rig.run, and comes to that call itself",
+            "the process that talks to the arm, or another child, has read the script that calls rig.run and come to it",
             'Put the call below a line  if __name__ == "__main__":',
         )
     if threading.current_thread() is not threading.main_thread():
