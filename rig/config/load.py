@@ -182,6 +182,12 @@ def _validate(model: type[Model], data: Any, prefix: Location, layered: Layered)
         return None, [_explain(model, item, prefix, layered) for item in items]
 
 
+SHAPES = {
+    "tuple_type": "a list in brackets, as [a, b, c]",
+    "dict_type": "a section that holds others by their names",
+}
+
+
 def _explain(model: type[BaseModel], item: Any, prefix: Location, layered: Layered) -> str:
     """One validation error as: path (line): what is wrong, what is allowed, nearest spelling."""
     location: Location = item["loc"]
@@ -195,10 +201,8 @@ def _explain(model: type[BaseModel], item: Any, prefix: Location, layered: Layer
     if kind == "literal_error":
         allowed = [word.strip("'") for word in item["ctx"]["expected"].replace(" or ", ", ").split(", ")]
         return where + _not_allowed(value, allowed)
-    if kind == "tuple_type":
-        return f"{where}: {quote(value)}: must be a list in brackets, as [a, b, c]"
-    if kind == "dict_type":
-        return f"{where}: {quote(value)}: must be a section that holds others by their names"
+    if kind in SHAPES:
+        return f"{where}: {quote(value)}: must be {SHAPES[kind]}"
     if kind == "model_type":
         return f"{where}: {quote(value)}: must be a section, with the keys {', '.join(_keys_at(model, location))}"
     message = item["msg"].removeprefix("Value error, ")
