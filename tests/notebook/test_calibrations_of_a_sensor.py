@@ -67,5 +67,5 @@ def test_a_run_is_solved_to_be_compared() -> None:
 
 def test_runs_without_a_sensor_in_common_are_not_compared() -> None:
     other = rig.load_result(ROOT / "tests" / "fixtures" / "recordings" / "rig.settings-6" / "kvh1775")
-    with pytest.raises(Refused, match="not_comparable: the first is of LSM9DS1"):
+    with pytest.raises(Refused, match="not_comparable: the first is of lsm9ds1"):
         rig.changes(rig.load_result(FIXTURES / "verified"), other)
