@@ -4,7 +4,7 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 
 from rich.cells import cell_len
-from rich.console import Console, ConsoleOptions, RenderResult
+from rich.console import Console, ConsoleOptions, JustifyMethod, RenderResult
 from rich.table import Table
 
 from rig.history.spark import PLAIN
@@ -65,7 +65,7 @@ class FittingTable:
         fits = _needed(columns) <= options.max_width  # else it is folded: nothing is ever cut
         table = Table(title=plain(self.title, "table.title"), title_justify="left")
         for each in columns:
-            side = "right" if each.number else "left"
+            side: JustifyMethod = "right" if each.number else "left"
             table.add_column(each.heading, justify=side, no_wrap=fits and not each.wraps, overflow="fold")
         for row in zip(*(each.cells for each in columns), strict=True):
             table.add_row(*(plain(each.translate(PLAIN) if options.ascii_only else each) for each in row))

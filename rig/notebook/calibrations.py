@@ -95,8 +95,8 @@ class Calibration:
 
         A gyroscope's are g = M (m + b), M = K where only scale factors are corrected; an accelerometer's and a
         magnetometer's M (m − b). They come out in the frame that `result.json` says of its `correction_matrix`, as by
-        the functions of `calibration.h`. A row with a NaN becomes NaN. Raises Refused `not_readings` for counts and for another shape,
-        `wrong_unit` for numbers that this sensor cannot read in its SI unit, such as °/s, g or µT.
+        the functions of `calibration.h`. A row with a NaN becomes NaN. Raises Refused `not_readings` for counts and for
+        another shape, `wrong_unit` for numbers that this sensor cannot read in its SI unit, such as °/s, g or µT.
         """
         limit = getattr(self.entry, self.quantity.named("range"), None)
         found = own_readings(readings, self.quantity, limit, f"the {self.quantity.sensor} {self.name}")

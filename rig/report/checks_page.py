@@ -3,7 +3,7 @@
 from rig.report.check_words import check_words
 
 
-def page() -> str:
+def page_text() -> str:
     """The table as Markdown."""
     lines = [
         "# Checks of the verdict",
@@ -24,4 +24,4 @@ def page() -> str:
 
 
 if __name__ == "__main__":
-    print(page(), end="")
+    print(page_text(), end="")

@@ -7,7 +7,7 @@ import pytest
 from rig.cli import main
 from rig.data.result_file import CheckEntry, ResultDocument, read_result
 from rig.report.check_words import check_words, words_of
-from rig.report.checks_page import page
+from rig.report.checks_page import page_text
 from rig.report.ending import ending
 from support.paths import DOCS, FIXTURES
 
@@ -115,7 +115,7 @@ def test_every_check_is_explained(folder: Path) -> None:
 
 
 def test_the_page_of_checks_is_made_of_the_table() -> None:
-    assert (DOCS / "checks.md").read_text(encoding="utf-8") == page()
+    assert (DOCS / "checks.md").read_text(encoding="utf-8") == page_text()
     assert list(check_words()) == sorted(check_words())
 
 
