@@ -27,9 +27,9 @@ def triad(
 ) -> None:
     """Three arrows, the rows of `axes` in the flange's frame, each with its name at the end."""
     for axis, name, colour in zip(axes, NAMES, (RED, GREEN, BLUE), strict=True):
-        drawing.arrow(origin, seen(origin, axis, size), colour, width)
+        drawing.arrow(origin, seen(origin, axis, size), colour)
         at = seen(origin, axis, size + 16)
-        drawing.words((at[0], at[1] + 5), prefix + name, colour, 15, "middle", bold=True)
+        drawing.words((at[0], at[1] + 5), name, colour, 15, "middle", bold=True)
 
 
 def plate(drawing: Drawing, centre: Point, sides: tuple[Vector, Vector], fill: str) -> None:
@@ -77,7 +77,7 @@ def mounting() -> Drawing:
         if given is None:
             connector = seen(centre, (0, -106, 0), 1)
             drawing.dot(connector, 9, "#555555")
-            drawing.words((connector[0] - 14, connector[1] - 8), "tool connector", "#555555", 13, "end")
+            drawing.words((connector[0] - 4, connector[1] - 16), "tool connector", "#555555", 13, "middle")
         disc(drawing, centre, 95, 40)
         if given is None:
             drawing.words((centre[0], 56), words, size=13, anchor="middle")

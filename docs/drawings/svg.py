@@ -32,7 +32,7 @@ class Drawing:
         path = " ".join(f"{x:.1f},{y:.1f}" for x, y in points)
         self._parts.append(f'<polygon points="{path}" fill="{fill}" stroke="{colour}" stroke-width="1.5"/>')
 
-    def box(self, x: float, y: float, width: float, height: float, fill: str, colour: str = "#222222") -> None:
+    def box(self, x: float, y: float, width: float, height: float, fill: str, *, colour: str = "#222222") -> None:
         self._parts.append(
             f'<rect x="{x:.1f}" y="{y:.1f}" width="{width:.1f}" height="{height:.1f}" rx="4" fill="{fill}" '
             f'stroke="{colour}" stroke-width="1.5"/>'

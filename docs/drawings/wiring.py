@@ -64,7 +64,7 @@ def wiring(part: str) -> Drawing:
             end, colour, name = at + side * WIRE, colour_of(pin), to.replace(", ", " + ")
             width = 22 + 9.2 * len(name)
             drawing.line([(at, y), (end, y)], colour, 3)
-            drawing.box(end if side > 0 else end - width, y - 12, width, 24, "#ffffff", colour)
+            drawing.box(end if side > 0 else end - width, y - 12, width, 24, "#ffffff", colour=colour)
             drawing.words((end + side * width / 2, y + 5), name, colour, anchor="middle", bold=True)
             if pin in SELECTS:
                 drawing.words((at + side * WIRE / 2, y - 5), "10 kΩ to 3V3", SELECT, 11, "middle")
