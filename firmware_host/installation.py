@@ -22,7 +22,10 @@ def _source() -> tuple[bool, str]:
     from importlib.metadata import PackageNotFoundError, distribution
 
     try:
-        said = json.loads(distribution(NAME).read_text("direct_url.json") or "{}")
+        found = distribution(NAME)
+        if Path(str(found.locate_file(""))).resolve() == SOURCE:  # what building leaves beside the sources
+            return True, str(SOURCE)
+        said = json.loads(found.read_text("direct_url.json") or "{}")
     except PackageNotFoundError:  # run from a folder of sources that is not installed
         return True, str(SOURCE)
     except ValueError:

@@ -13,7 +13,7 @@ from firmware_host.answers import BoardIdentity, BoardStatus, SensorCounts, Sens
 from firmware_host.protocol import FIRMWARE_VERSION
 from rig.station.plain_text import plain
 
-NOBODY = (0x00, 0xFF)  # what a bus reads where nothing drives it
+NOBODY = (0x00, 0xFF, 0xFFFF)  # what a bus reads where nobody answers, of one byte and of two
 
 
 @dataclass(frozen=True, slots=True)

@@ -156,8 +156,12 @@ def _passed(result: ResultDocument) -> str:
 
 
 def _failed(result: ResultDocument, folder: Path | None, width: int, room: int) -> Iterator[str]:
-    """What failed, farthest beyond its limit first, with what to do: one in any case, more while there is room."""
+    """What failed, farthest beyond its limit first, with what to do: one in any case, more while there is room.
+
+    What was not measured comes last: mostly because something else had failed before.
+    """
     failed = sorted((each for each in result.checks if not each.passed), key=_over, reverse=True)
+    failed.sort(key=lambda each: each.value is None)
     for number, check in enumerate(failed):
         words = what_failed(check, folder)
         lines = [*_wrapped(f"FAILED {_measured(check)}" + ("" if words is None else f": {words}"), width)]

@@ -26,7 +26,13 @@ def printed(folder: Path, said: dict[str, Any] | None) -> list[str]:
     path = os.pathsep.join([str(folder), str(ROOT)])
     command = [sys.executable, "-c", SHOWN]
     done = subprocess.run(
-        command, capture_output=True, text=True, timeout=60, check=True, env={**os.environ, "PYTHONPATH": path}
+        command,
+        cwd=folder,
+        capture_output=True,
+        text=True,
+        timeout=60,
+        check=True,
+        env={**os.environ, "PYTHONPATH": path},
     )
     return shlex.split(done.stdout)
 

@@ -64,7 +64,9 @@ def test_an_inclinometer_of_somebodys_package_is_shown_everywhere(tmp_path: Path
     run, history = str(tmp_path / "run"), str(tmp_path / "history.sqlite")
     keeping = ["--out", run, "--history", history, "--serial-number", "I-1", "--part", "tilt2"]
     said = ran(installed, "-m", "rig", "solve", *files(tmp_path), *keeping)
-    assert "imu: inclinometer, m = φ / k + b" in said and "imu.inclination_residuals" in said and "PASS" in said
+    assert said.startswith("inclinometer imu I-1, tilt2") and said.splitlines()[-1] == "verdict: PASS"
+    whole = ran(installed, "-m", "rig", "show", run, "--all")
+    assert "imu: inclinometer, m = φ / k + b" in whole and "inclination_residuals" in whole
     result = json.loads((tmp_path / "run" / "result.json").read_text(encoding="utf-8"))
     entry = result["others"]["inclinometers"]["imu"]
     std = np.sqrt(np.diag(entry["covariance"]))
