@@ -297,7 +297,8 @@ function light() {
   if ($("link-words").textContent !== words) $("link-words").textContent = words;
   $("certificate").hidden = !shown.certificate || (over && !line.up); // which is served from there
   $("papers-path").textContent = shown.certificate ? `${shown.about?.folder}/certificate.html` : "";
-  $("outcome").hidden = !over;
+  const any = shown.outcome?.length || shown.certificate || $("failed").children.length || !$("next").hidden;
+  $("outcome").hidden = !over || !any;
 }
 
 $("halt").addEventListener("click", async () => {
