@@ -11,7 +11,7 @@ from selenium.webdriver.common.keys import Keys
 from rig.data.run_folder import RESULT
 from rig.errors import Fault
 from rig.station.events import DocumentWritten, Failed, Prompt
-from support.browser import kind, needs_browser, picture, screen, text, until
+from support.browser import kind, legible, needs_browser, picture, screen, set_theme, text, until
 from support.told_page import Telling, showing
 from support.told_runs import before_it_moves, judged, look, moving, planned
 from support.told_six import IMU, PARTS, SIX, six_found, six_judged, six_moving
@@ -74,6 +74,9 @@ def test_six_sensors_are_measured_and_judged_without_scrolling(
         until(lambda: "E_n" in text(driver, "found"), "the comparison")
         picture(driver, f"six-passed-{name}")
         assert below(driver, AFTER, 11) == []
+        for dark in (False, True):
+            set_theme(driver, dark=dark)
+            legible(driver)
 
 
 @pytest.mark.parametrize("size", SIZES)

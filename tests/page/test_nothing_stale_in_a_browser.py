@@ -15,7 +15,7 @@ from selenium.webdriver import Chrome
 from rig.arm.state import RuntimeState
 from rig.errors import Fault
 from rig.station.events import ArmSeen, Failed, Interrupted, PhaseRecorded, RunEvent, SensorSamples
-from support.browser import kind, needs_browser, picture, severe, text, until
+from support.browser import kind, legible, needs_browser, picture, severe, text, until
 from support.paths import ROOT
 from support.told_page import showing
 from support.told_runs import before_it_moves, judged, moving, planned
@@ -103,6 +103,7 @@ def test_after_the_end_no_text_says_that_it_goes_on(driver: Chrome, tmp_path: Pa
         speed, program = facts(driver)["speed"], facts(driver)["program"]
         assert (speed, program) == (("–", "–") if how == "arm lost" else ("0.0 °/s", "stopped"))
         picture(driver, f"over-{how.replace(' ', '-')}")
+        legible(driver)
         driver.refresh()  # who comes later is told the same
         until(lambda: "as at " in text(driver, "readings"), "when that was")
         consistent(driver)
@@ -192,3 +193,4 @@ def untrusted(driver: Chrome) -> None:
     assert text(driver, "state-word") == "No news" and facts(driver)["speed"] == "–"
     assert text(driver, "state-text").startswith("Heard last: ")
     picture(driver, "no-news")
+    legible(driver)

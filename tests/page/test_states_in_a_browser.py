@@ -18,7 +18,7 @@ from rig.page.serving import Address, serving
 from rig.page.shown import Shown
 from rig.station.events import Answered, Crashed, Failed, Interrupted, PhaseRecorded, Prompt, RunEvent, SensorSamples
 from support import told_runs
-from support.browser import TABLET, asked_hosts, kind, needs_browser, picture, set_theme, severe, text, until
+from support.browser import TABLET, asked_hosts, kind, legible, needs_browser, picture, set_theme, severe, text, until
 from support.told_page import showing
 from support.told_runs import ABOUT, before_it_moves, judged, moving, planned
 
@@ -28,35 +28,6 @@ ANNOUNCED = (
     "The arm at 127.0.0.2 will move for 66 s.",
     "Nobody and nothing may be within its reach; the sensor's cable needs slack for a whole turn either way.",
 )
-LEGIBLE = 4.5  # of contrast, WCAG 2.2, success criterion 1.4.3
-# Of every text the worst contrast with what is behind it, and the text.
-CONTRAST = """
-const channel = (c) => (c /= 255) <= 0.04045 ? c / 12.92 : ((c + 0.055) / 1.055) ** 2.4;
-const light = ([r, g, b]) => 0.2126 * channel(r) + 0.7152 * channel(g) + 0.0722 * channel(b);
-const parts = (colour) => colour.match(/[\\d.]+/g).map(Number);
-const behind = (element) => {
-  for (let e = element; e; e = e.parentElement) {
-    const [r, g, b, a = 1] = parts(getComputedStyle(e).backgroundColor);
-    if (a > 0) return [r, g, b];
-  }
-};
-const found = [];
-const texts = document.createTreeWalker(document.body, NodeFilter.SHOW_TEXT);
-while (texts.nextNode()) {
-  const element = texts.currentNode.parentElement;
-  const hidden = !element.checkVisibility() || element.closest(":disabled, noscript, .skip");
-  if (hidden || !texts.currentNode.textContent.trim()) continue;
-  const [one, other] = [light(parts(getComputedStyle(element).color)), light(behind(element))];
-  found.push([(Math.max(one, other) + 0.05) / (Math.min(one, other) + 0.05), texts.currentNode.textContent]);
-}
-return found.sort((a, b) => a[0] - b[0])[0];
-"""
-
-
-def legible(driver: Chrome) -> None:
-    """Every text shown stands out from what is behind it."""
-    contrast, words = driver.execute_script(CONTRAST)
-    assert contrast >= LEGIBLE, words
 
 
 def in_state(driver: Chrome, state: str) -> bool:

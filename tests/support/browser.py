@@ -21,6 +21,30 @@ PICTURES = ROOT / "build" / "page"
 CHROMIUM, DRIVER = shutil.which("chromium"), shutil.which("chromedriver")
 TABLET = (1280, 800)
 
+LEGIBLE = 4.5  # of contrast, WCAG 2.2, success criterion 1.4.3
+# Of every text the worst contrast with what is behind it, and the text.
+CONTRAST = """
+const channel = (c) => (c /= 255) <= 0.04045 ? c / 12.92 : ((c + 0.055) / 1.055) ** 2.4;
+const light = ([r, g, b]) => 0.2126 * channel(r) + 0.7152 * channel(g) + 0.0722 * channel(b);
+const parts = (colour) => colour.match(/[\\d.]+/g).map(Number);
+const behind = (element) => {
+  for (let e = element; e; e = e.parentElement) {
+    const [r, g, b, a = 1] = parts(getComputedStyle(e).backgroundColor);
+    if (a > 0) return [r, g, b];
+  }
+};
+const found = [];
+const texts = document.createTreeWalker(document.body, NodeFilter.SHOW_TEXT);
+while (texts.nextNode()) {
+  const element = texts.currentNode.parentElement;
+  const hidden = !element.checkVisibility() || element.closest(":disabled, noscript, .skip");
+  if (hidden || !texts.currentNode.textContent.trim()) continue;
+  const [one, other] = [light(parts(getComputedStyle(element).color)), light(behind(element))];
+  found.push([(Math.max(one, other) + 0.05) / (Math.min(one, other) + 0.05), texts.currentNode.textContent]);
+}
+return found.sort((a, b) => a[0] - b[0])[0];
+"""
+
 # A machine without the browser may skip these tests; CI may not.
 needs_browser = pytest.mark.skipif(
     not (CHROMIUM and DRIVER) and os.environ.get("CI") != "true", reason="needs chromium and chromium-driver"
@@ -83,6 +107,12 @@ def picture(driver: Chrome, name: str, *, whole: bool = False) -> Path:
     with screen(driver, width, height):
         driver.save_screenshot(str(path))
     return path
+
+
+def legible(driver: Chrome) -> None:
+    """Every text shown stands out from what is behind it."""
+    contrast, words = driver.execute_script(CONTRAST)
+    assert contrast >= LEGIBLE, words
 
 
 def text(driver: Chrome, element: str) -> str:
