@@ -64,6 +64,8 @@ def nothing_severe_and_nothing_from_elsewhere(driver: "Chrome") -> Iterator[None
     """What is asked of every page, whatever it shows."""
     from support.browser import TABLET, asked_hosts, severe
 
+    driver.get("about:blank")  # a page of before may still ask for a server that is gone
+    severe(driver)
     driver.set_window_size(*TABLET)
     yield
     assert severe(driver) == [] and asked_hosts(driver) <= {"127.0.0.1"}
