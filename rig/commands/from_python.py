@@ -106,8 +106,8 @@ def write_certificate(
     words += [] if out is None else ["--out", str(out)]
     words += [] if history is None else ["--history", history]
     files, left_out = documents(_options("report", words, _folder(of)))
-    for error in left_out:
-        raise error
+    if left_out:
+        raise left_out[0]
     return files
 
 

@@ -92,13 +92,12 @@ def remember_certificate(folder: Path, result: str, certificate: "Issued", histo
 
 def since_lines(calibrations: Sequence[Beside]) -> tuple[str, ...]:
     """How calibrations lie beside those of before, in words: each that changed beyond U, then the others together."""
-    from rig.history.change_words import change_in_short
+    from rig.history.change_words import beyond_u, change_in_short
 
-    changed = [each for each in calibrations if any(change.beyond for change in each.changes)]
-    same = [each for each in calibrations if each not in changed]
+    changed = [(each, beyond) for each in calibrations if (beyond := beyond_u(each.changes))]
+    same = [each for each in calibrations if not beyond_u(each.changes)]
     lines = []
-    for each in changed:
-        beyond = sorted((c for c in each.changes if c.beyond), key=lambda c: -c.normalised_error)
+    for each, beyond in changed:
         of = "" if each.now.quantity == "rate" else f", {each.now.quantity}"
         whose = f"{each.now.serial_number}{of} " if len(calibrations) > 1 else ""
         more = f"; {len(beyond) - 1} more" if len(beyond) > 1 else ""

@@ -17,8 +17,12 @@ def change_sentences(changes: Iterable[Change]) -> tuple[str, ...]:
 
     Nothing where all that changed is explained by the uncertainties of both calibrations.
     """
-    beyond = sorted((each for each in changes if each.beyond), key=lambda each: -each.normalised_error)
-    return tuple(map(change_sentence, beyond))
+    return tuple(map(change_sentence, beyond_u(changes)))
+
+
+def beyond_u(changes: Iterable[Change]) -> list[Change]:
+    """Those that are more than the uncertainties of both calibrations explain, the largest for its U first."""
+    return sorted((each for each in changes if each.beyond), key=lambda each: -each.normalised_error)
 
 
 def change_sentence(change: Change) -> str:
