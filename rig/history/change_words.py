@@ -21,7 +21,7 @@ def change_sentences(changes: Iterable[Change]) -> tuple[str, ...]:
 
 
 def beyond_u(changes: Iterable[Change]) -> list[Change]:
-    """Those that are more than the uncertainties of both calibrations explain, the largest for its U first."""
+    """The changes that are more than the uncertainties of both calibrations explain, the largest for its U first."""
     return sorted((each for each in changes if each.beyond), key=lambda each: -each.normalised_error)
 
 
