@@ -9,8 +9,6 @@ from rig.cli import run_script  # first: it keeps linear algebra to one thread
 
 # isort: split
 from rig.analysis.outcome import Outcome, calibrated, drifted, verified, verified_alone
-from rig.arm.motion import Dwell, Plan, Rest, Step, Sweep, Transfer, trapezoid_duration, travel
-from rig.arm.state import Joints
 from rig.config.models import ArmSection, ProcedureSection, RigConfig
 from rig.config.procedure_sections import (
     AttitudesSection,
@@ -23,6 +21,8 @@ from rig.config.procedure_sections import (
 )
 from rig.data.run_file import RunData
 from rig.errors import Refused
+from rig.motion.state import Joints
+from rig.motion.steps import Dwell, Plan, Rest, Step, Sweep, Transfer, trapezoid_duration, travel
 from rig.plans.imu import plan_imu
 from rig.plans.registry import Procedure
 from rig.plans.six_sweeps import plan_six_observation

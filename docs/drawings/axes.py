@@ -5,9 +5,9 @@ from collections.abc import Sequence
 import numpy as np
 from svg import Drawing, Point
 
-from rig.arm.kinematics import flange_attitude
 from rig.config.models import ArmSection
 from rig.config.sensor_sections import MountingSection, mounting_matrix
+from rig.motion.geometry import flange_attitude
 
 RED, GREEN, BLUE = "#c62828", "#2e7d32", "#1565c0"  # x, y, z
 NAMES = ("x", "y", "z")

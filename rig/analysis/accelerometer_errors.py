@@ -7,7 +7,6 @@ import numpy as np
 
 from rig.analysis.arm_patterns import Stood, arm_turns
 from rig.analysis.vector_inputs import since_first_s
-from rig.arm.kinematics import WRIST_1, DenavitHartenberg
 from rig.data.budget_entries import IN_U
 from rig.data.quantity import TEMPERATURE
 from rig.data.recorded_sensor import RecordedSensor
@@ -20,6 +19,7 @@ from rig.estimation.earth import MICRO_G_M_S2, STANDARD_GRAVITY_M_S2
 from rig.estimation.own_errors import from_their_mean, unseen_k
 from rig.estimation.reading_errors import bending, bias_warming, flickering, scale_warming, wandering
 from rig.estimation.reference_budget import Spread
+from rig.motion.geometry import WRIST_1, DenavitHartenberg
 from rig.observation.acceleration import DwellReading
 from rig.observation.average import Average
 from rig.observation.observed_run import ObservedRun

@@ -15,13 +15,13 @@ from rig.analysis.consistency import Allowance
 from rig.analysis.pieces import REST, Pieces, Stretch
 from rig.analysis.surroundings import Surroundings
 from rig.analysis.vector_inputs import WAVE_SHARE, unknown_of
-from rig.arm.kinematics import AXIS_ERRORS, WAVES, WRIST_1, WRIST_2, WRIST_3, axis_errors, flange_axes
 from rig.data.settings import OfSensor, Uncertainty
 from rig.estimation.arrays import Array
 from rig.estimation.earth import EARTH_RATE_RAD_S
 from rig.estimation.earth_rate import EarthRate
 from rig.estimation.nonlinearity import CUBE_MISSED, bending, curvature
 from rig.estimation.own_errors import KnownSensor, own_errors
+from rig.motion.geometry import AXIS_ERRORS, WAVES, WRIST_1, WRIST_2, WRIST_3, axis_errors, flange_axes
 
 ANGLES = (*AXIS_ERRORS, *(f"{wave} of wrist_1" for wave in WAVES))  # those of wrist 1 turn no axis, but its own speed
 WAVES_OF = {WRIST_1: ANGLES.index("cos of wrist_1"), WRIST_2: ANGLES.index("cos of wrist_2"),

@@ -6,9 +6,9 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from rig.analysis.vector_inputs import WAVE_SHARE
-from rig.arm.kinematics import WRIST_1, DenavitHartenberg, angle_waves, flange_attitude, flange_errors
 from rig.estimation.accelerometer_model import ARM_SHARE, OWN_ERRORS, SHARE, SHARED_ERRORS, TURNS, Movement, turned
 from rig.estimation.arrays import Array
+from rig.motion.geometry import WRIST_1, DenavitHartenberg, angle_waves, flange_attitude, flange_errors
 
 ERRORS, STEADY = 6, 2  # of each wrist; of these, its twist and its zero; the others are waves of its angle
 

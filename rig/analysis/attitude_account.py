@@ -6,15 +6,15 @@ from math import radians
 
 import numpy as np
 
-from rig.arm.kinematics import flange_attitude
-from rig.arm.motion import Dwell, Plan
-from rig.arm.state import Joints
 from rig.config.models import RigConfig
 from rig.config.sensor_catalogue import PARTS
 from rig.errors import Refused
 from rig.estimation.arrays import Array
 from rig.estimation.attitude_design import Expected, Order, Telling, expected, g_efficiency, telling
 from rig.estimation.earth import MICRO_G_M_S2
+from rig.motion.geometry import flange_attitude
+from rig.motion.state import Joints
+from rig.motion.steps import Dwell, Plan
 
 MAX_CONDITION = 100.0  # the worst of a thousand random tens has 19; beyond, noise decides more than the attitudes do
 

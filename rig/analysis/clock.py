@@ -11,7 +11,7 @@ from math import comb
 
 import numpy as np
 
-from rig.arm.identity import calls_itself_simulated
+from rig.data.provenance import calls_itself_simulated
 from rig.data.settings import Uncertainty
 from rig.observation.coloured_noise import widening
 from rig.observation.observed_run import ObservedRun

@@ -14,13 +14,13 @@ from rig.analysis.planned_reference import planned_read
 from rig.analysis.suspected import DAMAGES
 from rig.analysis.told_from import ToldFrom, of_reference
 from rig.analysis.vector_inputs import known_sensor
-from rig.arm.motion import Plan
 from rig.config.models import RigConfig
 from rig.config.sensor_catalogue import PARTS
 from rig.config.sensor_sections import SensorSection, mounting_matrix
 from rig.data.quantity import ACCELERATION
 from rig.data.settings import RunSettings, Site, Uncertainty, settings_of
 from rig.estimation.nonlinearity import distinct_speeds
+from rig.motion.steps import Plan
 
 
 @dataclass(frozen=True, slots=True)

@@ -6,8 +6,8 @@ from typing import Generic, TypeVar
 
 import numpy as np
 
-from rig.arm.motion import Dwell, Plan, Rest, Step, Sweep, Transfer, progress
-from rig.arm.state import ARM_STATE_DTYPE
+from rig.motion.state import ARM_STATE_DTYPE
+from rig.motion.steps import Dwell, Plan, Rest, Step, Sweep, Transfer, progress
 from rig.observation.arm_motion import ArmMotion
 
 STATE_RATE_HZ = 125.0

@@ -9,9 +9,9 @@ import numpy as np
 from rig.analysis.pieces import BY_MODEL, REST, Pieces, Stretch
 from rig.analysis.planned_motion import measured, planned_motion
 from rig.analysis.ways import SPARSE_S, STEPS, by_the_wrists, moved, pull_m_s2
-from rig.arm.motion import Plan, Sweep
 from rig.data.settings import Site
 from rig.estimation.arrays import Array
+from rig.motion.steps import Plan, Sweep
 from rig.observation.arm_motion import ArmMotion
 
 

@@ -10,8 +10,6 @@ from rig.analysis.arm_patterns import Known, Stood, arm_patterns, arm_turns
 from rig.analysis.planned_motion import Timed, timed_of
 from rig.analysis.reference_budgets import lag_pattern
 from rig.analysis.reference_suspected import Read
-from rig.arm.kinematics import NOMINAL, WRIST_1, flange_arm, flange_attitude
-from rig.arm.motion import Dwell, Plan, Sweep
 from rig.config.sensor_catalogue import PARTS
 from rig.config.sensor_sections import SensorSection, mounting_matrix
 from rig.data.settings import RunSettings, Site, Uncertainty
@@ -19,6 +17,8 @@ from rig.estimation.accelerometer_model import NO_SWEEPS, PARAMETERS, Dwells, Mo
 from rig.estimation.arrays import Array
 from rig.estimation.earth import MICRO_G_M_S2, STANDARD_GRAVITY_M_S2
 from rig.estimation.reference_model import REFERENCE
+from rig.motion.geometry import NOMINAL, WRIST_1, flange_arm, flange_attitude
+from rig.motion.steps import Dwell, Plan, Sweep
 
 
 def planned_read(

@@ -24,12 +24,12 @@ from rig.analysis.reference_readings import (
 from rig.analysis.reference_suspected import Read
 from rig.analysis.suspicion import Statistic
 from rig.analysis.vector_inputs import since_first_s
-from rig.arm.kinematics import WRIST_1
 from rig.data.quantity import ACCELERATION, FIELD
 from rig.data.settings import Uncertainty
 from rig.estimation.accelerometer_model import LEVER, NO_SWEEPS, PARAMETERS, Movement
 from rig.estimation.arrays import Array
 from rig.estimation.earth import MICRO_G_M_S2
+from rig.motion.geometry import WRIST_1
 from rig.observation.observed_run import ObservedRun
 
 DISTURBED_DWELL, DISTURBED_SWEEP = "disturbed_dwell", "disturbed_sweep"

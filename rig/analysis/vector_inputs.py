@@ -8,7 +8,6 @@ import numpy as np
 
 from rig.analysis.clock import PPM
 from rig.analysis.surroundings import Surroundings
-from rig.arm.kinematics import AXIS_ERRORS
 from rig.data.quantity import TEMPERATURE
 from rig.data.recorded_sensor import RecordedSensor
 from rig.data.settings import RunSettings, Uncertainty
@@ -17,6 +16,7 @@ from rig.estimation.budget import Unknown, uncounted
 from rig.estimation.earth_rate import EarthRate, Known
 from rig.estimation.own_errors import KnownSensor
 from rig.estimation.vector_fit import Seen
+from rig.motion.geometry import AXIS_ERRORS
 from rig.observation.average import Average
 from rig.observation.observe import Observation
 from rig.observation.observed_run import ObservedRun

@@ -13,11 +13,11 @@ import numpy as np
 
 from rig.analysis.pieces import FEWEST_AT_REST, REST, Pieces, Stretch
 from rig.analysis.vector_inputs import since_first_s
-from rig.arm.kinematics import WRIST_1, flange_pose
 from rig.data.quantity import RATE
 from rig.data.run_file import RunData
 from rig.estimation.arrays import Array
 from rig.estimation.vector_fit import Explained
+from rig.motion.geometry import WRIST_1, flange_pose
 from rig.observation.arm_beside_lines import turned
 from rig.observation.arm_motion import MIN_RATE_RAD_S, ArmMotion
 from rig.observation.average import Stream, between

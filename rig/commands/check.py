@@ -116,10 +116,10 @@ def _look_at_instruments(configured: "Configured", tell: Tell) -> list[Problem]:
 
 
 def _look_at_arm(configured: "Configured", tell: Tell) -> list[Problem]:
-    from rig.arm.doubts import doubts
-    from rig.arm.driver import look
-    from rig.arm.identity import arm_words
-    from rig.arm.preflight import preflight_problems
+    from rig.motion.doubts import doubts
+    from rig.turners.ur.driver import look
+    from rig.turners.ur.identity import arm_words
+    from rig.turners.ur.preflight import preflight_problems
 
     section = configured.loaded.config.arm
     report = look(section.host)

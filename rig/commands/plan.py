@@ -31,9 +31,10 @@ def planned(options: Namespace) -> "Planned":
     """
     from rig.analysis.attitude_account import attitude_account
     from rig.analysis.planned import planned_told_from
-    from rig.arm.carried import carried_by
-    from rig.arm.preflight import plan_problems, refuse
     from rig.commands.configured import configured
+    from rig.errors import refuse
+    from rig.motion.carried import carried_by
+    from rig.motion.preflight import plan_problems
     from rig.report.plan_table import Planned
 
     found = configured(options.config, options.overrides, options.script)

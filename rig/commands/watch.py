@@ -81,7 +81,7 @@ def run(options: Namespace) -> int:
 
 
 def _about(folder: Path, runs: "list[RunData]") -> "About":
-    from rig.arm.identity import calls_itself_simulated
+    from rig.data.provenance import calls_itself_simulated
     from rig.page.about import About
 
     parts: dict[str, str] = {}

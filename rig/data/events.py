@@ -10,10 +10,10 @@ from dataclasses import asdict, dataclass
 from typing import Any
 
 from firmware_host.answers import BoardObservation, BoardSolution
-from rig.arm.motion import Dwell, Sweep
-from rig.arm.state import JOINT_NAMES
 from rig.data.checked import Finite, checked
 from rig.errors.quoting import quote
+from rig.motion.state import JOINT_NAMES
+from rig.motion.steps import Dwell, Sweep
 
 LARGEST_INTEGER = 2**63 - 1
 

@@ -19,8 +19,8 @@ from typing import Any, NoReturn
 import numpy as np
 from numpy.typing import NDArray
 
-from rig.arm.state import ARM_STATE_DTYPE
 from rig.data.layout import EVENTS_DTYPE, SCHEMA, SCHEMA_ELSEWHERE, TABLES, TEXTS, recorded_sensor, table_dtype
+from rig.motion.state import ARM_STATE_DTYPE
 
 OPEN_FOR_WRITING = 0x01  # of the superblock's consistency flags
 NO_ROOM = 2

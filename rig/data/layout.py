@@ -18,10 +18,10 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from rig.arm.state import ARM_STATE_DTYPE
 from rig.config.written_file import PART
 from rig.data.recorded_sensor import RecordedSensor, sensor_of
 from rig.data.sensor_of_run_2 import described_in_channels
+from rig.motion.state import ARM_STATE_DTYPE
 
 SCHEMA = "rig.run/3"
 SCHEMA_ELSEWHERE = "rig.files/1"

@@ -10,19 +10,18 @@ from typing import Any
 
 from firmware_host.answers import BoardIdentity, StoredCalibration
 from rig import __version__
-from rig.arm.identity import MAKER, model_found
-from rig.arm.kinematics import NOMINAL, DenavitHartenberg, Pose
-from rig.arm.preflight import used_kinematics
-from rig.arm.state import ArmReport
 from rig.config.load import Loaded
 from rig.data.checked import checked
 from rig.data.motion_file import Item
 from rig.data.result_file import FileEntry, StoredCalibrationEntry
 from rig.data.run_folder import ScriptIdentity
+from rig.motion.geometry import NOMINAL, DenavitHartenberg, Pose
+from rig.motion.state import ArmReport, Made
 
 NO_BOARD = "none"  # where every sensor has a port of its own
 NO_ARM = "none"  # of readings recorded elsewhere
 OF_FILES = ("readings_file", "motion_file")
+SIMULATED = "(simulated)"  # so ends the version of a controller that is none
 PACKAGES = ("ur-rtde", "numpy", "h5py", "pyserial")
 
 
@@ -82,6 +81,11 @@ class Provenance:
         return {key: value for key, value in document.items() if key not in unknown}
 
 
+def calls_itself_simulated(software: str) -> bool:
+    """Whether a controller that says its version so drives no arm: its seconds are as long as it likes."""
+    return software.endswith(SIMULATED)
+
+
 def provenance_of_files(readings: FileEntry, motion: FileEntry, item: Item, began: datetime) -> Provenance:
     """Provenance of an item's readings recorded elsewhere, which `began` then: no arm and no board is known."""
     return Provenance(
@@ -111,13 +115,14 @@ def provenance_of(
     loaded: Loaded,
     board: BoardIdentity | None,
     arm: ArmReport,
+    made: Made,
+    *,
     stored: Mapping[str, StoredCalibration],
     script: ScriptIdentity,
-    *,
     script_installed: bool,
     follows_crystal: bool | None,
 ) -> Provenance:
-    """Provenance of a recording that begins now; `stored` as in `Provenance`. Raises Refused as `used_kinematics`."""
+    """Provenance of a recording that begins now with an arm `made` so; `stored` as in `Provenance`."""
     return Provenance(
         started_utc=datetime.now(UTC).isoformat(timespec="seconds"),
         **_program(),
@@ -133,9 +138,9 @@ def provenance_of(
         script=script.name,
         script_sha256=script.sha256,
         script_installed=script_installed,
-        arm_kinematics=used_kinematics(loaded.config.arm, arm),
+        arm_kinematics=made.kinematics,
         tcp_offset=arm.tcp_offset,
-        arm_maker=MAKER,
-        arm_model=model_found(arm),
+        arm_maker=made.maker,
+        arm_model=made.model,
         board_follows_crystal=follows_crystal,
     )

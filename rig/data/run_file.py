@@ -21,8 +21,6 @@ from typing import Any, Self
 import numpy as np
 from numpy.typing import NDArray
 
-from rig.arm.silence import Silence
-from rig.arm.state import ARM_STATE_DTYPE, ArmState
 from rig.config.section import SensorName
 from rig.data.checked import checked
 from rig.data.events import Event, Recorded, from_lines, to_line
@@ -44,7 +42,9 @@ from rig.data.quantity import RATE, Quantity, Scalar
 from rig.data.recorded_sensor import RecordedSensor
 from rig.data.settings import RunSettings, settings_from_json
 from rig.data.settings_of_run_1 import settings_of_configuration
+from rig.data.silence import Silence
 from rig.errors import Fault, Refused
+from rig.motion.state import ARM_STATE_DTYPE, ArmState
 
 FLUSH_PERIOD_S = 0.25  # half of what is promised, so that a slow flush still keeps the promise
 READ_TIMEOUT_S, READ_BYTES_PER_S = 20.0, 5e6  # for a file of no size, and more for each byte

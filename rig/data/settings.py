@@ -22,9 +22,9 @@ from rig.errors.quoting import quote
 from rig.estimation.earth import EARTH_RATE_RAD_S
 
 if TYPE_CHECKING:
-    from rig.arm.motion import Dwell, Plan
     from rig.config.judging_sections import SiteSection
     from rig.config.models import RigConfig
+    from rig.motion.steps import Dwell, Plan
 
 SCHEMA = "rig.settings/7"
 # The first knows no site, the second no dwells, the third no magnetic field, the fourth no Earth's rate to be found,
@@ -295,7 +295,7 @@ def settings_from_json(text: str) -> RunSettings:
 
 def settings_of(config: "RigConfig", plan: "Plan") -> RunSettings:
     """The settings of a new run; `plan` is that of the whole procedure."""
-    from rig.arm.carried import carried_by
+    from rig.motion.carried import carried_by
 
     reference = None
     if config.reference is not None:

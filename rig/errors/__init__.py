@@ -3,12 +3,12 @@
 `catalogue` has every name in one table, from which docs/errors.md is made.
 """
 
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from contextlib import contextmanager
 
 from firmware_host.problem import Problem, ProblemError
 
-__all__ = ["Fault", "Problem", "ProblemError", "Refused", "RigError", "raised_as"]
+__all__ = ["Fault", "Problem", "ProblemError", "Refused", "RigError", "raised_as", "refuse"]
 
 
 class RigError(ProblemError):
@@ -36,3 +36,12 @@ def raised_as(kind: type[RigError]) -> Iterator[None]:
         if isinstance(error, (kind, Refused)):
             raise
         raise kind.of(error.problem) from error
+
+
+def refuse(problems: Sequence[Problem]) -> None:
+    """Raise `Refused` when there are problems: named after the first, with all of them and their remedies."""
+    if not problems:
+        return
+    *others, last = problems
+    also = "".join(f"{problem.what} ({problem.name}): {problem.remedy}. " for problem in others)
+    raise Refused(problems[0].name, also + last.what, last.remedy)

@@ -7,10 +7,10 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
-from rig.arm.identity import calls_itself_simulated
 from rig.config.judging_sections import HistorySection
 from rig.config.load import Loaded, load
 from rig.config.regular_file import UnfitFile, open_regular_file, read_regular_file
+from rig.data.provenance import calls_itself_simulated
 from rig.data.result_file import SIZE_MAX_BYTES, ResultDocument, read_result
 from rig.data.run_folder import CONFIG, RESULT, SCRIPT, SCRIPT_IDENTITY, recordings
 from rig.errors import Refused

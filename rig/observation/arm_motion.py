@@ -6,13 +6,13 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from rig.arm.kinematics import NOMINAL, DenavitHartenberg, axis_errors, flange_arm, flange_attitude, flange_rate
-from rig.arm.motion import Sweep
-from rig.arm.state import JOINT_NAMES
 from rig.data.run_file import RunData
 from rig.data.settings import ObservationThresholds
 from rig.errors import Fault, Refused
 from rig.estimation.arrays import Array
+from rig.motion.geometry import NOMINAL, DenavitHartenberg, axis_errors, flange_arm, flange_attitude, flange_rate
+from rig.motion.state import JOINT_NAMES
+from rig.motion.steps import Sweep
 from rig.observation.known_motion import check_span, closely_followed, not_finite
 from rig.observation.revolution import MAX_STATE_STEP_S, Revolution, find_revolution
 from rig.observation.windows import Window

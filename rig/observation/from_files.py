@@ -8,13 +8,13 @@ from pathlib import Path
 
 import numpy as np
 
-from rig.arm.state import ARM_STATE_DTYPE
 from rig.data.motion_file import Columns, Item, ReadElsewhere, Told
 from rig.data.provenance import provenance_of_files
 from rig.data.quantity import RATE
 from rig.data.result_file import FileEntry
 from rig.data.run_file import RunData
 from rig.data.settings import RECKONING, Elsewhere, ObservationThresholds, RunSettings, Site
+from rig.motion.state import ARM_STATE_DTYPE
 from rig.observation.attitude_import import read_attitudes
 from rig.observation.csv_import import read_sweeps
 from rig.observation.csv_samples import read_samples

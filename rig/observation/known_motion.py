@@ -5,10 +5,10 @@ from typing import Protocol
 import numpy as np
 from numpy.typing import NDArray
 
-from rig.arm.motion import Sweep
 from rig.data.settings import ObservationThresholds
 from rig.errors import Fault
 from rig.estimation.arrays import Array
+from rig.motion.steps import Sweep
 from rig.observation.revolution import Revolution
 from rig.observation.windows import Window
 

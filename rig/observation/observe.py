@@ -13,13 +13,13 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from rig.arm.motion import Sweep
 from rig.data.quantity import ACCELERATION, RATE
 from rig.data.run_file import RunData
 from rig.data.settings import ObservationThresholds
 from rig.errors import Fault
 from rig.estimation.arrays import Array
 from rig.estimation.refusals import check_reading_ratio
+from rig.motion.steps import Sweep
 from rig.observation.acceleration import DwellReading, dwell_readings
 from rig.observation.arm_beside_lines import turned_beside
 from rig.observation.average import Average, Stream, averaged, between, on_the_arms_clock
@@ -48,7 +48,7 @@ class Observation:
     What turned the sensor is not known (None) of data recorded elsewhere.
     `axis` ("x", "y", "z") and `sign` name the sensor axis nominally along the turn; `axis_flange` (3,) is the unit
     vector of the turn in the flange frame by the measured joints, `axis_errors` (13, 3) how the arm's own errors change
-    it, per radian (`rig.arm.kinematics.AXIS_ERRORS`); `arm_m` (3,) is a way from the joint's axis to the flange's
+    it, per radian (`rig.motion.geometry.AXIS_ERRORS`); `arm_m` (3,) is a way from the joint's axis to the flange's
     origin, in the flange's frame. `speed_std_rad_s` comes from arm states too far apart to tell the turn's ends
     exactly; `lost` samples are missing from the average. `acceleration` is what the accelerometer beside it read, where
     one is to be calibrated.

@@ -5,12 +5,12 @@ from typing import Any
 
 from numpy.typing import NDArray
 
-from rig.arm.kinematics import NOMINAL, DenavitHartenberg
-from rig.arm.motion import Sweep
 from rig.data.events import BoardObserved
 from rig.data.recorded_sensor import RecordedSensor
 from rig.data.run_file import RunData
 from rig.data.settings import ObservationThresholds
+from rig.motion.geometry import NOMINAL, DenavitHartenberg
+from rig.motion.steps import Sweep
 from rig.observation.arm_motion import ArmMotion
 from rig.observation.average import on_the_arms_clock
 from rig.observation.windows import Window, finished_sweeps

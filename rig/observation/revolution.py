@@ -6,10 +6,10 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from rig.arm.motion import Sweep
 from rig.data.settings import ObservationThresholds
 from rig.errors import Fault
 from rig.estimation.arrays import Array
+from rig.motion.steps import Sweep
 
 MAX_STATE_STEP_S = 0.02  # between arm states that still show the servo's vibration
 SMOOTHING_S = 0.05  # of the joint's rate before it is judged constant or not
@@ -24,7 +24,7 @@ class Revolution:
 
     `duration_std_s` is what interpolating between arm states leaves uncertain; `axis_flange` (3,) is the unit vector of
     the turn in the flange frame by the measured joints, `axis_errors` (13, 3) how the arm's own errors change it, per
-    radian (`rig.arm.kinematics.AXIS_ERRORS`). Where it began, `attitude` (3, 3) takes a vector of the arm's base frame
+    radian (`rig.motion.geometry.AXIS_ERRORS`). Where it began, `attitude` (3, 3) takes a vector of the arm's base frame
     into the flange's; `arm_m` (3,) is a way from the joint's axis to the flange's origin, in the flange's frame;
     `station` names the joint, from 0 at the base, and the pose it turned in.
     """

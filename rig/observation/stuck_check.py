@@ -5,9 +5,9 @@ from itertools import pairwise
 
 import numpy as np
 
-from rig.arm.motion import Sweep
 from rig.data.settings import Site
 from rig.errors import Fault
+from rig.motion.steps import Sweep
 from rig.observation.acceleration import DwellReading
 from rig.observation.average import Average
 

@@ -2,9 +2,9 @@
 
 from dataclasses import dataclass
 
-from rig.arm.motion import Sweep
 from rig.estimation.arrays import Array
 from rig.estimation.sweep_harmonics import FirstHarmonic, first_harmonic
+from rig.motion.steps import Sweep
 from rig.observation.acceleration import accelerations, check_acceleration
 from rig.observation.average import Stream, between
 from rig.observation.averaging import Averaging

@@ -4,7 +4,6 @@ from collections.abc import Collection, Iterator
 from dataclasses import dataclass
 from typing import TypeVar
 
-from rig.arm.motion import Dwell, Sweep
 from rig.data.events import (
     DwellFinished,
     DwellStarted,
@@ -15,6 +14,7 @@ from rig.data.events import (
     SweepStarted,
 )
 from rig.data.run_file import RunData
+from rig.motion.steps import Dwell, Sweep
 
 Ending = TypeVar("Ending", bound=Event)
 

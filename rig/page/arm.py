@@ -3,10 +3,10 @@
 from dataclasses import asdict
 from typing import Any
 
-from rig.arm.identity import model_found
-from rig.arm.kinematics import NOMINAL, DenavitHartenberg
-from rig.arm.state import JOINT_NAMES, ArmReport, ArmState, RobotMode, RuntimeState, SafetyMode
+from rig.motion.geometry import NOMINAL, DenavitHartenberg
+from rig.motion.state import JOINT_NAMES, ArmReport, ArmState, RobotMode, RuntimeState, SafetyMode
 from rig.page.history import rounded
+from rig.turners.ur.identity import model_found
 
 
 def geometry(arm: DenavitHartenberg) -> dict[str, Any]:

@@ -10,7 +10,7 @@ from contextlib import contextmanager, suppress
 from pathlib import Path
 from typing import TextIO
 
-from rig.arm.motion import Dwell, Rest, Sweep
+from rig.motion.steps import Dwell, Rest, Sweep
 from rig.page.feed import Feed
 from rig.page.rows import Look
 from rig.station.events import PhaseStarted, RunEvent, StepFinished

@@ -8,11 +8,11 @@ import numpy as np
 
 from rig.analysis.check import Check
 from rig.analysis.partial_results import so_far
-from rig.arm.motion import Dwell, Plan, Rest, Step, Sweep
-from rig.arm.state import ARM_STATE_DTYPE, ArmState
 from rig.data.events import DwellFinished, DwellStarted, RestFinished, RestStarted, SweepFinished, SweepStarted
 from rig.data.result_file import ResultDocument
 from rig.data.run_file import RunData
+from rig.motion.state import ARM_STATE_DTYPE, ArmState
+from rig.motion.steps import Dwell, Plan, Rest, Step, Sweep
 from rig.page.rows import Look, look_of
 from rig.station.events import (
     ArmSeen,

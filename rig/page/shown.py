@@ -4,13 +4,13 @@ from dataclasses import asdict
 from typing import Any
 
 from rig.analysis.check import Check
-from rig.arm.kinematics import NOMINAL
-from rig.arm.motion import Dwell, Rest, Step, Sweep
 from rig.data.events import BoardNotObserved, BoardObserved
 from rig.data.installed_kinds import measured
 from rig.data.quantity import TEMPERATURE
 from rig.data.result_file import read_result
 from rig.data.run_folder import RESULT
+from rig.motion.geometry import NOMINAL
+from rig.motion.steps import Dwell, Rest, Step, Sweep
 from rig.page.about import About
 from rig.page.arm import connected, geometry, stance
 from rig.page.history import History, rounded

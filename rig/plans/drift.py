@@ -5,10 +5,10 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from rig.arm.kinematics import flange_attitude
-from rig.arm.motion import Dwell, Rest, Step, Sweep, Transfer
-from rig.arm.state import Joints
 from rig.config.section import Vector3
+from rig.motion.geometry import flange_attitude
+from rig.motion.state import Joints
+from rig.motion.steps import Dwell, Rest, Step, Sweep, Transfer
 
 NEGLIGIBLE = 1e-6  # of the largest singular value: what attitudes do not tell is left alone
 

@@ -3,10 +3,10 @@
 from collections.abc import Collection
 from dataclasses import replace
 
-from rig.arm.motion import Plan
-from rig.arm.state import Joints
 from rig.config.models import ArmSection
 from rig.config.procedure_sections import ImuSection
+from rig.motion.state import Joints
+from rig.motion.steps import Plan
 from rig.plans.six_sweeps import plan_six_observation
 from rig.plans.static_attitudes import dwells
 

@@ -5,9 +5,9 @@ from dataclasses import dataclass
 from typing import Protocol
 
 from rig.analysis.attitude_account import refuse_untelling
-from rig.arm.motion import Plan
-from rig.arm.state import Joints
 from rig.config.models import RigConfig
+from rig.motion.state import Joints
+from rig.motion.steps import Plan
 from rig.plans.registry import AnyProcedure, Procedures
 from rig.plans.script_errors import script_errors
 

@@ -11,11 +11,11 @@ from importlib.metadata import entry_points
 from typing import Any, Generic, Literal, Protocol, TypeVar
 
 from rig.analysis.outcome import Outcome, calibrated
-from rig.arm.motion import Plan
-from rig.arm.state import Joints
 from rig.config.models import ArmSection, ProcedureSection
 from rig.data.run_file import RunData
 from rig.errors import Refused
+from rig.motion.state import Joints
+from rig.motion.steps import Plan
 from rig.plans.verbs import Script
 
 GROUP = "rig.procedures"

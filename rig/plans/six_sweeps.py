@@ -8,15 +8,15 @@ from itertools import permutations, product
 
 import numpy as np
 
-from rig.arm.carried import carried_by
-from rig.arm.clearance import keeps_clear
-from rig.arm.kinematics import flange_axes
-from rig.arm.motion import Plan, Rest, Step, Sweep, trapezoid_duration
-from rig.arm.state import JOINT_NAMES, Joints
 from rig.config.models import ArmSection
 from rig.config.procedure_sections import SixSweepsSection, Wrist
 from rig.config.section import Direction
 from rig.errors import Refused
+from rig.motion.carried import carried_by
+from rig.motion.geometry import flange_axes
+from rig.motion.keep_out import keeps_clear
+from rig.motion.state import JOINT_NAMES, Joints
+from rig.motion.steps import Plan, Rest, Step, Sweep, trapezoid_duration
 from rig.plans.drift import drift_effect
 from rig.plans.ways import approach, in_radians, transfer
 
@@ -60,7 +60,7 @@ def plan_six_observation(
     `start_q_rad` is where the arm stands (home when None); from there the plan goes home first, slowly, and it ends
     at home.
     `done` holds the indices of sweeps to leave out: those an interrupted run has finished.
-    Limits are not judged here: see `rig.arm.preflight`.
+    Limits are not judged here: see `rig.motion.preflight`.
     Raises Refused `axes_do_not_span`.
     """
     home = in_radians(arm.home_deg)

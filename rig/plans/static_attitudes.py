@@ -6,10 +6,10 @@ from functools import lru_cache
 
 import numpy as np
 
-from rig.arm.motion import Dwell, Plan, Rest, Step, trapezoid_duration
-from rig.arm.state import Joints
 from rig.config.models import ArmSection
 from rig.config.procedure_sections import AttitudesSection
+from rig.motion.state import Joints
+from rig.motion.steps import Dwell, Plan, Rest, Step, trapezoid_duration
 from rig.plans.shortest_way import shortest_way
 from rig.plans.ways import approach, in_radians, transfer
 
@@ -24,7 +24,7 @@ def plan_static_attitudes(
 
     `start_q_rad` is where the arm stands (home when None); from there the plan goes home first, slowly.
     `done` holds the indices of dwells to leave out: those an interrupted run has finished.
-    Limits and clearances are not judged here: see `rig.arm.preflight`; nor what the attitudes tell: see
+    Limits and clearances are not judged here: see `rig.motion.preflight`; nor what the attitudes tell: see
     `rig.analysis.attitude_account`.
     """
     home = in_radians(arm.home_deg)

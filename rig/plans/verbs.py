@@ -3,7 +3,7 @@
 from collections.abc import Callable
 from typing import Protocol
 
-from rig.arm.motion import Dwell, Plan, Rest, Sweep, Transfer
+from rig.motion.steps import Dwell, Plan, Rest, Sweep, Transfer
 
 
 class Verbs(Protocol):

@@ -3,8 +3,8 @@
 import math
 from collections.abc import Iterable
 
-from rig.arm.motion import SAME_PLACE_RAD, Transfer, trapezoid_duration, travel
-from rig.arm.state import Joints
+from rig.motion.state import Joints
+from rig.motion.steps import SAME_PLACE_RAD, Transfer, trapezoid_duration, travel
 
 # The first motion may swing the large joints from wherever somebody left the arm, so it is made at leisure.
 APPROACH_SPEED_RAD_S = math.radians(30)

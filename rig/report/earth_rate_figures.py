@@ -8,11 +8,11 @@ import numpy as np
 
 from rig.analysis.calibration import found_earth_rate
 from rig.analysis.outcome import Outcome
-from rig.arm.kinematics import flange_attitude
 from rig.data.result_file import ResultDocument
 from rig.estimation.arrays import Array
 from rig.estimation.earth_rate import EarthRate
 from rig.estimation.vector_fit import Explained
+from rig.motion.geometry import flange_attitude
 from rig.observation.observed_run import ObservedRun
 from rig.report.figures import Picture, envelope, write_pictures
 from rig.station.events import RunEvent

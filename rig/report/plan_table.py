@@ -13,9 +13,9 @@ from rich.table import Table
 from rig.analysis.attitude_account import AttitudeAccount
 from rig.analysis.planned import Told
 from rig.analysis.told_from import ToldFrom
-from rig.arm.doubts import doubts
-from rig.arm.motion import SAME_PLACE_RAD, Dwell, Plan, Rest, Step, Sweep
-from rig.arm.state import JOINT_NAMES
+from rig.motion.doubts import doubts
+from rig.motion.state import JOINT_NAMES
+from rig.motion.steps import SAME_PLACE_RAD, Dwell, Plan, Rest, Step, Sweep
 from rig.report.attitude_account import account_document, print_account
 from rig.report.told_words import size_words, told_from_entries
 from rig.station.plain_text import LONG_S, duration_words, plain

@@ -10,10 +10,10 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from rig.arm.state import ArmState
 from rig.data.quantity import RATE
 from rig.data.recorded_sensor import RecordedSensor
 from rig.data.run_file import RunRecorder
+from rig.motion.state import ArmState
 from rig.runner.settling import Settling
 from rig.station.events import SensorSamples
 

@@ -3,10 +3,10 @@
 from collections.abc import Iterable
 from math import degrees
 
-from rig.arm.doubts import doubts
-from rig.arm.motion import Plan
-from rig.arm.preflight import way_to_home
-from rig.arm.state import JOINT_NAMES, ArmReport
+from rig.motion.doubts import doubts
+from rig.motion.preflight import way_to_home
+from rig.motion.state import JOINT_NAMES, ArmReport
+from rig.motion.steps import Plan
 from rig.station.events import Prompt
 from rig.station.plain_text import duration_words
 

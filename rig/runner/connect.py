@@ -6,20 +6,17 @@ from dataclasses import dataclass, field
 from pathlib import Path
 
 from firmware_host.client import Calibration
-from rig.arm.driver import Arm
-from rig.arm.identity import calls_itself_simulated, identity_problems
-from rig.arm.preflight import refuse
-from rig.arm.state import ArmReport
 from rig.board.crystal import follows_crystal
 from rig.board.identify import configured_board, refusing
 from rig.board.store import Solved, calibration_of
 from rig.config.load import Loaded
-from rig.data.provenance import provenance_of
+from rig.data.provenance import calls_itself_simulated, provenance_of
 from rig.data.recorded_sensor import RecordedSensor
 from rig.data.run_file import RunRecorder
 from rig.data.run_folder import ARM_LOG, refuse_links
 from rig.data.settings import RunSettings
-from rig.errors import Refused
+from rig.errors import Refused, refuse
+from rig.motion.state import ArmReport
 from rig.plans.phase import Phase
 from rig.plans.script_file import ScriptFile
 from rig.runner.acquisition import Acquisition
@@ -33,6 +30,9 @@ from rig.sensors.registry import OWN_PORT
 from rig.sensors.source import OnSamples, SampleSource
 from rig.station.events import ArmConnected, ArmSeen, BoardConnected, RunResumed, SensorConnected
 from rig.station.station import Station
+from rig.turners.ur.driver import Arm
+from rig.turners.ur.identity import identity_problems
+from rig.turners.ur.preflight import made
 
 
 @dataclass(frozen=True, slots=True)
@@ -151,8 +151,9 @@ class Connector:
             self.loaded,
             None if board is None else board.board.identity,
             report,
-            {} if board is None else board.stored,
-            self.script.identity,
+            made(self.loaded.config.arm, report),
+            stored={} if board is None else board.stored,
+            script=self.script.identity,
             script_installed=self.script.is_installed,
             follows_crystal=crystal,
         )

@@ -13,14 +13,14 @@ import numpy as np
 from firmware_host.client import Board, BoardObservation
 from firmware_host.errors import BoardError
 from firmware_host.protocol import METHODS
-from rig.arm.kinematics import DenavitHartenberg
-from rig.arm.motion import Sweep
-from rig.arm.state import ARM_STATE_DTYPE
 from rig.data.events import BoardNotObserved, BoardObserved, BoardRecalled, BoardSolved, Event
 from rig.data.recorded_sensor import RecordedSensor
 from rig.data.run_file import RunData
 from rig.data.settings import ObservationThresholds
 from rig.errors import Fault
+from rig.motion.geometry import DenavitHartenberg
+from rig.motion.state import ARM_STATE_DTYPE
+from rig.motion.steps import Sweep
 from rig.observation.onboard_window import observed_before, revolution_on_the_board
 from rig.runner.acquisition import Acquisition
 

@@ -10,11 +10,6 @@ from contextlib import contextmanager
 from dataclasses import dataclass
 from math import degrees, radians
 
-from rig.arm.carried import carried_by
-from rig.arm.kinematics import DenavitHartenberg
-from rig.arm.motion import Dwell, Motion, Plan, Rest, Step, Sweep, Transfer, travel
-from rig.arm.preflight import preflight_problems, refuse, way_to_home
-from rig.arm.state import ArmReport
 from rig.config.models import ArmSection
 from rig.data.events import (
     DwellFinished,
@@ -27,13 +22,17 @@ from rig.data.events import (
 )
 from rig.data.recorded_sensor import RecordedSensor
 from rig.data.run_file import RunRecorder
-from rig.errors import Fault, Refused
+from rig.errors import Fault, Refused, refuse
+from rig.motion.carried import carried_by
+from rig.motion.geometry import DenavitHartenberg
+from rig.motion.preflight import way_to_home
+from rig.motion.state import ArmReport
+from rig.motion.steps import Dwell, Motion, Plan, Rest, Step, Sweep, Transfer, travel
 from rig.plans.phase import Phase
 from rig.runner.acquisition import Acquisition
 from rig.runner.announcement import announcement
 from rig.runner.mounted import Mounted, ask_of_other_boards
 from rig.runner.onboard import BoardCalibration
-from rig.runner.turner import Turner
 from rig.sensors.source import SampleSource
 from rig.station.events import (
     ArmSeen,
@@ -46,6 +45,8 @@ from rig.station.events import (
     StepStarted,
 )
 from rig.station.station import Station
+from rig.turners.turner import Turner
+from rig.turners.ur.preflight import preflight_problems
 
 FIRST_SAMPLE_TIMEOUT_S = 2.0
 SETTLING_LOOK_S = 0.05  # between two questions whether the sensors have settled

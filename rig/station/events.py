@@ -9,10 +9,10 @@ from pathlib import Path
 
 from firmware_host.client import BoardIdentity
 from rig.analysis.check import Check
-from rig.arm.motion import Plan, Step
-from rig.arm.state import ArmReport, ArmState
 from rig.data.events import Event
 from rig.errors import RigError
+from rig.motion.state import ArmReport, ArmState
+from rig.motion.steps import Plan, Step
 from rig.observation.acceleration import DwellReading
 from rig.observation.observe import Observation
 

@@ -5,9 +5,8 @@ from collections.abc import Sequence
 from traceback import format_exception
 
 from firmware_host.installation import install_command
-from rig.arm.doubts import doubts
-from rig.arm.identity import arm_words
 from rig.data.run_folder import resuming
+from rig.motion.doubts import doubts
 from rig.station.events import (
     Advice,
     ArmConnected,
@@ -31,6 +30,7 @@ from rig.station.events import (
     SensorConnected,
     StepFinished,
 )
+from rig.turners.ur.identity import arm_words
 
 
 def line(event: RunEvent) -> str | None:

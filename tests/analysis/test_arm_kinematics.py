@@ -6,9 +6,9 @@ from math import pi
 import numpy as np
 
 from rig.analysis.calibration import observe_recordings, solve_observed
-from rig.arm.kinematics import NOMINAL
 from rig.estimation.arrays import Array
 from rig.estimation.vector_model import VectorSolution
+from rig.motion.geometry import NOMINAL
 from support.synthetic_run import Setup, synthetic_run
 
 # The twists of a real arm's wrists (ur_calibration, doc/algorithm.rst), and joint zeros of the same size.

@@ -6,9 +6,9 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from rig.arm.kinematics import NOMINAL
 from rig.data.settings import RunSettings
 from rig.estimation.arrays import Array
+from rig.motion.geometry import NOMINAL
 from rig.observation.windows import swept
 from support.checked_runs import checked, failed
 from support.drawn_recording import KINDS, Drawn, damaged, drawn

@@ -7,10 +7,10 @@ from scipy.stats import kstest
 from rig.analysis.arm_patterns import Known, Stood, arm_patterns
 from rig.analysis.reference_budgets import UNTESTED_DRIFT_T, drift_patterns
 from rig.analysis.reference_suspected import Read
-from rig.arm.kinematics import NOMINAL, flange_pose
 from rig.config.attitude_sets import MAGNETIC
 from rig.estimation.accelerometer_model import LEVER, NO_SWEEPS, PARAMETERS, Dwells, Movement
 from rig.estimation.magnetometer import solve_magnetometer
+from rig.motion.geometry import NOMINAL, flange_pose
 from support.arm_attitudes import crooked_arm, joints_rad
 from support.reference_p_values import p_values
 

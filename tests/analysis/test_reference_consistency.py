@@ -11,11 +11,11 @@ from scipy.stats import kstest
 from rig.analysis.arm_patterns import Known, Stood, arm_patterns
 from rig.analysis.reference_consistency import reference_consistency
 from rig.analysis.reference_suspected import Read
-from rig.arm.kinematics import NOMINAL, flange_pose
 from rig.config.attitude_sets import EIGHTEEN
 from rig.estimation.accelerometer_model import DELAY, LEVER, NO_SWEEPS, Movement
 from rig.estimation.arrays import Array
 from rig.estimation.imu import solve_imu
+from rig.motion.geometry import NOMINAL, flange_pose
 from support import drawn_accelerations
 from support.arm_attitudes import crooked_arm, joints_rad
 from support.arm_sweeps import Truth, joints_at, planned, recorded_dwells, recorded_sweeps

@@ -9,9 +9,9 @@ import pytest
 
 from rig.analysis.calibration import SensorResult
 from rig.analysis.outcome import calibrated
-from rig.arm.kinematics import NOMINAL, DenavitHartenberg
 from rig.estimation.arrays import Array
 from rig.estimation.vector_model import VectorSolution
+from rig.motion.geometry import NOMINAL, DenavitHartenberg
 from support.synthetic_run import Setup, synthetic_run, truth
 
 

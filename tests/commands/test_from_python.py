@@ -10,9 +10,9 @@ from pathlib import Path
 import pytest
 
 import rig
-from rig.arm.motion import Rest
 from rig.cli import main
 from rig.errors import Refused
+from rig.motion.steps import Rest
 from support.paths import CONFIGS, DEMO, FIXTURES
 from support.worlds import World, hardware
 

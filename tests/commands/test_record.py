@@ -10,13 +10,13 @@ import pytest
 import yaml
 from scipy.spatial.transform import Rotation
 
-from rig.arm.carried import Carried
-from rig.arm.driver import Arm
-from rig.arm.kinematics import flange_attitude, flange_rate
-from rig.arm.motion import Transfer, trapezoid_duration, travel
-from rig.arm.state import ArmState, Joints
 from rig.cli import main
 from rig.commands.laboratory import simulated_laboratory
+from rig.motion.carried import Carried
+from rig.motion.geometry import flange_attitude, flange_rate
+from rig.motion.state import ArmState, Joints
+from rig.motion.steps import Transfer, trapezoid_duration, travel
+from rig.turners.ur.driver import Arm
 from support.commands import rig_here
 from support.ideal import ideal_document
 from support.paths import CONFIGS

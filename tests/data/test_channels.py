@@ -11,12 +11,12 @@ import pytest
 from rich.console import Console
 from rich.live import Live
 
-from rig.arm.motion import Rest
 from rig.data.channel import Channel
 from rig.data.quantity import PRESSURE, RATE
 from rig.data.recorded_sensor import RecordedSensor
 from rig.data.run_file import RunData, RunRecorder, read_run
 from rig.errors import Refused
+from rig.motion.steps import Rest
 from rig.observation.observed_run import observe_run
 from rig.page.about import About
 from rig.page.shown import Shown

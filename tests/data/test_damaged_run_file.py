@@ -16,8 +16,8 @@ import numpy as np
 import pytest
 
 from rig.analysis.outcome import calibrated
-from rig.arm.silence import crowding
 from rig.data.run_file import read_run
+from rig.data.silence import crowding
 from rig.errors import Fault, Refused
 from support.full_disk import full_disk
 from support.paths import FIXTURES

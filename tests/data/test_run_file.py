@@ -17,8 +17,6 @@ import pytest
 
 from firmware_host.answers import BoardObservation, BoardSolution
 from firmware_host.samples import FIELD_SAMPLE_DTYPE, SAMPLE_DTYPE
-from rig.arm.motion import Sweep
-from rig.arm.state import ARM_STATE_DTYPE, ArmState
 from rig.config.limits import Limits
 from rig.data.channel import of_thermometer, of_three_axes
 from rig.data.events import (
@@ -37,6 +35,8 @@ from rig.data.recorded_sensor import RecordedSensor
 from rig.data.run_file import RunRecorder, make_plain, read_run
 from rig.data.settings import ObservationThresholds, PlannedSweep, RunSettings
 from rig.errors import Fault, Refused
+from rig.motion.state import ARM_STATE_DTYPE, ArmState
+from rig.motion.steps import Sweep
 from support.paths import ROOT
 from support.results import VERIFIED
 from support.synthetic_run import PROVENANCE as SYNTHETIC

@@ -5,13 +5,13 @@ from dataclasses import replace
 
 import pytest
 
-from rig.arm.motion import Plan
 from rig.config.load import load, parse
 from rig.config.procedure_sections import SixSweepsSection
 from rig.config.sensor_catalogue import PARTS
 from rig.data.settings import OF_SENSORS, RunSettings, settings_from_json, settings_of
 from rig.data.settings_of_run_1 import settings_of_configuration
 from rig.errors import Refused
+from rig.motion.steps import Plan
 from rig.plans.six_sweeps import plan_six_observation
 from support.paths import CONFIGS, FIXTURES
 

@@ -2,8 +2,8 @@
 
 import pytest
 
-from rig.arm import child, child_link, driver, stopping
 from rig.data import run_file
+from rig.turners.ur import child, child_link, driver, stopping
 from support.house_picture import PAGE, drawn
 
 SAID = [

@@ -3,14 +3,14 @@
 import numpy as np
 import pytest
 
-from rig.arm.kinematics import axis_errors
-from rig.arm.motion import Sweep
 from rig.config.models import ArmSection
 from rig.config.procedure_sections import SixObservationSection
 from rig.estimation.arrays import Array
 from rig.estimation.common_errors import solve_with_common_errors
 from rig.estimation.sensor_axes import non_orthogonality
 from rig.estimation.vector_model import solve_vector_model
+from rig.motion.geometry import axis_errors
+from rig.motion.steps import Sweep
 from rig.plans.six_sweeps import plan_six_observation
 
 AXIS_STD_RAD = 1e-3

@@ -8,7 +8,6 @@ import numpy as np
 import pytest
 from scipy.spatial.transform import Rotation
 
-from rig.arm.kinematics import flange_pose
 from rig.config.attitude_sets import EIGHTEEN
 from rig.errors import Fault
 from rig.estimation.accelerometer import solve_accelerometer
@@ -30,6 +29,7 @@ from rig.estimation.imu import ImuSolution, solve_imu
 from rig.estimation.imu_fit import covariance_bound, most_likely
 from rig.estimation.reference_model import BIAS
 from rig.estimation.sensor_axes import non_orthogonality
+from rig.motion.geometry import flange_pose
 from support.arm_attitudes import crooked_arm, joints_rad
 from support.arm_sweeps import (
     DWELL_S,

@@ -2,11 +2,11 @@
 
 import numpy as np
 
-from rig.arm.kinematics import flange_pose
 from rig.config.attitude_sets import EIGHTEEN
 from rig.estimation.accelerometer_model import DELAY, Dwells
 from rig.estimation.arrays import Array
 from rig.estimation.imu import solve_imu
+from rig.motion.geometry import flange_pose
 from rig.world.site import Site
 from rig.world.ur10e.flange_motion import felt_of_turns, moved
 from rig.world.ur10e.links import links

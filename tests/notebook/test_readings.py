@@ -74,7 +74,8 @@ def test_nothing_loads_pandas_before_a_table_is_asked_for() -> None:
         "import sys, rig\n"
         "for name in rig.__all__: assert getattr(rig, name).__doc__ or name == '__version__', name\n"
         f"result = rig.load_result({str(FIXTURES / 'verified')!r}); result['gyro'].apply([[0.1, 0.2, 0.3]])\n"
-        "print([name for name in ('pandas', 'matplotlib', 'rtde_control', 'rig.arm.driver') if name in sys.modules])"
+        "print([name for name in ('pandas', 'matplotlib', 'rtde_control', 'rig.turners.ur.driver')"
+        " if name in sys.modules])"
     )
     done = subprocess.run([sys.executable, "-c", program], capture_output=True, text=True, timeout=60, check=True)
     assert done.stdout.strip() == "[]"

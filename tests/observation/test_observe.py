@@ -8,13 +8,13 @@ import numpy as np
 import pytest
 from numpy.typing import NDArray
 
-from rig.arm.state import ARM_STATE_DTYPE
 from rig.data.events import Event, SweepFinished, SweepStarted
 from rig.data.quantity import RATE
 from rig.data.run_file import RunData
 from rig.data.settings import ObservationThresholds
 from rig.errors import Fault, Refused
 from rig.estimation.arrays import Array
+from rig.motion.state import ARM_STATE_DTYPE
 from rig.observation.arm_motion import ArmMotion
 from rig.observation.coloured_noise import noise_left, widening
 from rig.observation.observe import SensorObservations

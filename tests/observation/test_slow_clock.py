@@ -7,8 +7,8 @@ not settled, each being 0.985 of the one before, and a sound run was refused.
 import numpy as np
 import pytest
 
-from rig.arm.kinematics import DenavitHartenberg
-from rig.arm.state import ARM_STATE_DTYPE
+from rig.motion.geometry import DenavitHartenberg
+from rig.motion.state import ARM_STATE_DTYPE
 from rig.observation.arm_motion import ArmMotion
 from rig.observation.timebase import estimate_time_base
 from support.paths import ROOT

@@ -14,7 +14,7 @@ from urllib.parse import urlsplit
 
 import pytest
 
-from rig.arm.state import REST_SPEED_RAD_S
+from rig.motion.state import REST_SPEED_RAD_S
 from support.commands import configuration, wait_for_log
 from support.crowd import soon
 from support.flood import flooded

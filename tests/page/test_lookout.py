@@ -6,7 +6,7 @@ from pathlib import Path
 
 import pytest
 
-from rig.arm.motion import Sweep
+from rig.motion.steps import Sweep
 from rig.page.about import About
 from rig.page.feed import Feed
 from rig.page.lookout import looking_out

@@ -12,8 +12,8 @@ from pathlib import Path
 import pytest
 from selenium.webdriver import Chrome
 
-from rig.arm.state import RuntimeState
 from rig.errors import Fault
+from rig.motion.state import RuntimeState
 from rig.station.events import ArmSeen, Failed, Interrupted, PhaseRecorded, RunEvent, SensorSamples
 from support.browser import kind, legible, needs_browser, picture, severe, text, until
 from support.paths import ROOT

@@ -18,8 +18,8 @@ from selenium.webdriver import Chrome
 from selenium.webdriver.common.by import By
 from selenium.webdriver.common.keys import Keys
 
-from rig.arm.state import REST_SPEED_RAD_S
 from rig.data.run_file import read_run
+from rig.motion.state import REST_SPEED_RAD_S
 from support.browser import kind, needs_browser, picture, text, until
 from support.commands import configuration, rig
 from support.worlds import World, hardware

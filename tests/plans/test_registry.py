@@ -11,10 +11,10 @@ import pytest
 import yaml
 
 from procedures import six_observation, verify
-from rig.arm.motion import Plan
 from rig.config.load import load
 from rig.config.procedure_sections import STOCK_SECTIONS
 from rig.errors import Refused
+from rig.motion.steps import Plan
 from rig.plans.phase import first_phase
 from rig.plans.registry import installed, sections
 from rig.plans.script_file import installed_script, load_script

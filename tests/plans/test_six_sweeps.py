@@ -5,13 +5,13 @@ import math
 import numpy as np
 import pytest
 
-from rig.arm.carried import Carried
-from rig.arm.kinematics import flange_axes, flange_pose, flange_rate
-from rig.arm.motion import Plan, Rest, Sweep, Transfer, trapezoid_duration, travel
-from rig.arm.preflight import plan_problems
 from rig.config.models import ArmSection
 from rig.config.procedure_sections import SixObservationSection
 from rig.errors import Refused
+from rig.motion.carried import Carried
+from rig.motion.geometry import flange_axes, flange_pose, flange_rate
+from rig.motion.preflight import plan_problems
+from rig.motion.steps import Plan, Rest, Sweep, Transfer, trapezoid_duration, travel
 from rig.plans.drift import drift_effect
 from rig.plans.six_sweeps import plan_six_observation
 

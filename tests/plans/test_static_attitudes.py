@@ -7,15 +7,15 @@ import numpy as np
 import pytest
 from pydantic import ValidationError
 
-from rig.arm.carried import Carried
-from rig.arm.motion import Dwell, Plan, Rest, Sweep, Transfer, trapezoid_duration
-from rig.arm.preflight import plan_problems
 from rig.config.attitude_sets import EIGHTEEN, FACES
 from rig.config.load import load
 from rig.config.models import ArmSection
 from rig.config.procedure_sections import ImuSection, StaticAttitudesSection
 from rig.errors import Refused
 from rig.estimation.arrays import Array
+from rig.motion.carried import Carried
+from rig.motion.preflight import plan_problems
+from rig.motion.steps import Dwell, Plan, Rest, Sweep, Transfer, trapezoid_duration
 from rig.plans.imu import plan_imu
 from rig.plans.phase import first_phase
 from rig.plans.registry import installed

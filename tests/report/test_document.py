@@ -10,10 +10,10 @@ from rich.console import Console
 
 from rig.analysis.check import Check
 from rig.analysis.outcome import Outcome, calibrated
-from rig.arm.kinematics import NOMINAL
 from rig.data.meaning import Meaning
 from rig.data.result_file import CheckEntry
 from rig.data.run_file import read_run
+from rig.motion.geometry import NOMINAL
 from rig.report.document import document_of
 from rig.report.entry import entry
 from rig.report.table import print_result

@@ -3,8 +3,8 @@
 import numpy as np
 
 from firmware_host.samples import SAMPLE_DTYPE
-from rig.arm.state import ArmState
 from rig.data.recorded_sensor import RecordedSensor
+from rig.motion.state import ArmState
 from rig.runner.acquisition import REACHES_BACK_S, Acquisition
 from support.synthetic_run import SENSOR
 

@@ -5,8 +5,8 @@ from pathlib import Path
 
 import pytest
 
-from rig.arm.motion import Rest
 from rig.commands.configured import configured
+from rig.motion.steps import Rest
 from rig.plans.verbs import Verbs
 from rig.runner.phases import Run
 from rig.station.events import ListenerDropped, Progress, RunEvent, VerdictReached

@@ -8,10 +8,10 @@ from pathlib import Path
 
 import pytest
 
-from rig.arm.motion import Sweep
-from rig.arm.state import RuntimeState
 from rig.commands.configured import configured
 from rig.data.events import BoardObserved, BoardSolved, RestFinished, RestStarted, SweepFinished, SweepStarted
+from rig.motion.state import RuntimeState
+from rig.motion.steps import Sweep
 from rig.runner.phases import Run
 from rig.station.events import (
     Answered,
@@ -174,7 +174,7 @@ def test_the_hosts_own_observations_come_when_the_calibration_is_judged(events: 
 IMPORTS = """
 import sys
 from pathlib import Path
-from rig.arm.state import RuntimeState
+from rig.motion.state import RuntimeState
 from rig.commands.configured import configured
 from rig.runner.phases import Run
 from rig.station.events import PhaseRecorded, PreflightPassed

@@ -21,7 +21,7 @@ from rig.data.run_file import read_run
 from support.fault_matrix.setups import SETUPS
 from support.worlds import World, WorldHandle, fresh_host, hardware, merge
 
-# The driver names each of these faults in tests/arm/test_driver.py as well: a few whole runs are enough for a change.
+# The driver names each of these faults as well (tests/turners/ur/test_driver.py): a few whole runs are enough.
 THOROUGH = [pytest.mark.proof, pytest.mark.thorough]
 pytestmark = pytest.mark.slow
 

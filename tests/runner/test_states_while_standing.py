@@ -2,8 +2,8 @@
 
 from pathlib import Path
 
-from rig.arm.state import ArmState
 from rig.data.run_file import RunRecorder, read_run
+from rig.motion.state import ArmState
 from rig.runner.acquisition import STANDING_S, WHOLE_S, Acquisition
 from support.synthetic_run import PROVENANCE, SENSOR, Setup, synthetic_run
 

@@ -7,8 +7,8 @@ import pytest
 from rich.console import Console
 from rich.live import Live
 
-from rig.arm.motion import Rest
 from rig.errors import Fault
+from rig.motion.steps import Rest
 from rig.station.events import (
     Advice,
     Answered,

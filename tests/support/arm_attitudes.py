@@ -5,9 +5,9 @@ from dataclasses import replace
 
 import numpy as np
 
-from rig.arm.kinematics import NOMINAL, flange_attitude, flange_pose
 from rig.config.attitude_sets import WristAngles
 from rig.estimation.arrays import Array
+from rig.motion.geometry import NOMINAL, flange_attitude, flange_pose
 
 
 def joints_rad(wrists_deg: tuple[WristAngles, ...]) -> Array:

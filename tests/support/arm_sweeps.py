@@ -11,12 +11,12 @@ from functools import cache
 import numpy as np
 from scipy.interpolate import CubicSpline
 
-from rig.arm.kinematics import flange_arm, flange_axes, flange_pose
-from rig.arm.motion import Sweep
 from rig.config.load import parse
 from rig.config.procedure_sections import SixSweepsSection
 from rig.estimation.accelerometer_model import Dwells, Sweeps
 from rig.estimation.arrays import Array
+from rig.motion.geometry import flange_arm, flange_axes, flange_pose
+from rig.motion.steps import Sweep
 from rig.plans.six_sweeps import plan_six_observation
 from support.synthetic_run import CONFIG
 

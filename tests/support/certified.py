@@ -11,7 +11,6 @@ from typing import Any, TypeVar
 import numpy as np
 
 from rig.analysis.outcome import calibrated
-from rig.arm.kinematics import NOMINAL
 from rig.config.judging_sections import CertificateSection, SiteSection
 from rig.data.accelerometer_entries import AccelerometerEntry
 from rig.data.budget_entries import ClockComparisonEntry
@@ -22,6 +21,7 @@ from rig.data.result_file import ResultDocument, VectorEntry
 from rig.data.result_types import Matrix3, Vector3
 from rig.estimation.attitude_error import AttitudeError
 from rig.estimation.reference_budget import KnownSize, Spread, reference_budget
+from rig.motion.geometry import NOMINAL
 from rig.report.budget_entry import budget_entry
 from rig.report.certificate.content import Certificate, certificate_of
 from rig.report.certificate.page import certificate_page

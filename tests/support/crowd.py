@@ -5,7 +5,7 @@ import time
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 
-from rig.arm.silence import crowding
+from rig.data.silence import crowding
 from support.waiting import wait_for
 
 LOOK_S = 0.02

@@ -13,7 +13,7 @@ from contextlib import suppress
 from dataclasses import dataclass
 from random import Random
 
-from rig.arm import dashboard, primary, state_stream
+from rig.turners.ur import dashboard, primary, state_stream
 from rig.world.laboratory import Laboratory
 from rig.world.network import Session
 from rig.world.section import world_section

@@ -10,7 +10,6 @@ from rig.analysis.arm_patterns import Known, Stood, arm_patterns, arm_turns
 from rig.analysis.reference_budgets import accelerometer_budget
 from rig.analysis.reference_consistency import reference_consistency
 from rig.analysis.reference_suspected import Read
-from rig.arm.kinematics import NOMINAL, WRIST_1
 from rig.config.attitude_sets import EIGHTEEN
 from rig.config.sensor_catalogue import PARTS
 from rig.data.settings import Site
@@ -21,6 +20,7 @@ from rig.estimation.budget import Budget
 from rig.estimation.earth import MICRO_G_M_S2
 from rig.estimation.imu import ImuSolution, solve_imu
 from rig.estimation.reading_errors import of_pieces, of_sensor, per_axis
+from rig.motion.geometry import NOMINAL, WRIST_1
 from support.arm_attitudes import crooked_arm, joints_rad
 from support.arm_sweeps import DWELL_S, Truth, joints_at, planned, recorded_dwells, recorded_sweeps
 

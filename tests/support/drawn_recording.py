@@ -10,8 +10,6 @@ from typing import Any
 import numpy as np
 from scipy.interpolate import CubicSpline
 
-from rig.arm.kinematics import NOMINAL, DenavitHartenberg, flange_attitude, flange_pose, flange_rate
-from rig.arm.motion import Sweep, Transfer
 from rig.config.sensor_catalogue import PARTS
 from rig.data.channel import of_thermometer, of_three_axes
 from rig.data.quantity import RATE
@@ -21,6 +19,8 @@ from rig.data.settings import OF_SENSORS, Uncertainty
 from rig.estimation.arrays import Array
 from rig.estimation.earth import EARTH_RATE_RAD_S, STANDARD_GRAVITY_M_S2
 from rig.estimation.nonlinearity import CUBE_MISSED
+from rig.motion.geometry import NOMINAL, DenavitHartenberg, flange_attitude, flange_pose, flange_rate
+from rig.motion.steps import Sweep, Transfer
 from support.synthetic_run import SENSOR, Motion, Setup, rotation, run_data, sample_times
 
 WRISTS = (3, 4, 5)

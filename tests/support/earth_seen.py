@@ -12,12 +12,12 @@ import numpy as np
 from scipy.spatial.transform import Rotation
 
 from rig.analysis.vector_inputs import WAVE_SHARE
-from rig.arm.kinematics import AXIS_ERRORS, axis_errors, flange_axes, flange_pose
-from rig.arm.motion import Sweep
 from rig.config.attitude_sets import EIGHTEEN
 from rig.estimation.arrays import Array
 from rig.estimation.earth_rate import DEG_H
 from rig.estimation.vector_fit import Seen
+from rig.motion.geometry import AXIS_ERRORS, axis_errors, flange_axes, flange_pose
+from rig.motion.steps import Sweep
 from rig.observation.mean import tapered_mean
 from rig.observation.tapered_weights import flank_s
 from rig.observation.windows import Window

@@ -10,9 +10,6 @@ import numpy as np
 
 from firmware_host.emulator.accelerometer import STANDARD_GRAVITY_M_S2
 from firmware_host.samples import SAMPLE_DTYPE
-from rig.arm.kinematics import NOMINAL, DenavitHartenberg, flange_rate
-from rig.arm.motion import Dwell, Plan, Rest, Step, Sweep, Transfer
-from rig.arm.state import ARM_STATE_DTYPE
 from rig.config.load import parse
 from rig.config.procedure_sections import SixSweepsSection
 from rig.data.channel import of_thermometer, of_three_axes
@@ -23,6 +20,9 @@ from rig.data.recorded_sensor import RecordedSensor
 from rig.data.run_file import RunData
 from rig.data.settings import settings_of
 from rig.estimation.arrays import Array
+from rig.motion.geometry import NOMINAL, DenavitHartenberg, flange_rate
+from rig.motion.state import ARM_STATE_DTYPE
+from rig.motion.steps import Dwell, Plan, Rest, Step, Sweep, Transfer
 from rig.plans.six_sweeps import plan_six_observation
 from rig.world.site import Site
 from rig.world.ur10e.flange_motion import felt_of_turns, moved

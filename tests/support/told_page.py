@@ -13,7 +13,7 @@ from typing import Any
 
 from selenium.webdriver import Chrome
 
-from rig.arm.state import RuntimeState
+from rig.motion.state import RuntimeState
 from rig.page.about import About
 from rig.page.control import Control
 from rig.page.feed import Feed

@@ -7,11 +7,11 @@ from pathlib import Path
 from firmware_host.answers import BoardObservation
 from rig.analysis.check import Check
 from rig.analysis.verdict import fitness
-from rig.arm.motion import Plan, Sweep, Transfer, travel
-from rig.arm.state import ArmReport, ArmState, Joints, RobotMode, RuntimeState, SafetyMode
 from rig.commands.configured import configured
 from rig.data.events import BoardNotObserved, BoardObserved
 from rig.data.meaning import Meaning
+from rig.motion.state import ArmReport, ArmState, Joints, RobotMode, RuntimeState, SafetyMode
+from rig.motion.steps import Plan, Sweep, Transfer, travel
 from rig.page.about import About
 from rig.page.rows import Look
 from rig.station.events import (

@@ -11,9 +11,9 @@ from itertools import pairwise
 
 import pytest
 
-from rig.arm.carried import Carried
-from rig.arm.driver import Arm
-from rig.arm.motion import Transfer, trapezoid_duration
+from rig.motion.carried import Carried
+from rig.motion.steps import Transfer, trapezoid_duration
+from rig.turners.ur.driver import Arm
 from rig.world import network
 from rig.world.clock import DIALOGUE_S, TICK_S, Clock
 from rig.world.process import ARM_LAG_S

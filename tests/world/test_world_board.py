@@ -15,10 +15,10 @@ from firmware_host.client import Board, SampleBatch
 from firmware_host.emulator.flash_memory import DOUBLEWORD_BYTES, PAGE_BYTES, STORE_OFFSET
 from firmware_host.errors import BoardError
 from firmware_host.frames import FrameReader, encode
-from rig.arm.kinematics import flange_rate
 from rig.config.load import Loaded
 from rig.config.sensor_sections import mounting_matrix
 from rig.errors import Refused
+from rig.motion.geometry import flange_rate
 from rig.world.board.flash_file import flash_of
 from rig.world.board.mounting import firmware
 from rig.world.board.serial_line import misread

@@ -8,7 +8,7 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from rig.arm import kinematics as rig_kinematics
+from rig.motion import geometry as rig_kinematics
 from rig.world.clock import TICK_S, Clock
 from rig.world.ur10e import forward_kinematics
 from rig.world.ur10e.joint_motion import Motion

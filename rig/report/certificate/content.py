@@ -8,11 +8,11 @@ from types import MappingProxyType
 from typing import Any
 
 from rig.analysis.clock import BY_COMPUTER
-from rig.arm.identity import calls_itself_simulated
 from rig.data.accelerometer_entries import AccelerometerEntry
 from rig.data.budget_entries import BudgetEntry
 from rig.data.drift_entries import DriftEntry
 from rig.data.magnetometer_entries import MagnetometerEntry, ReversalEntry
+from rig.data.provenance import calls_itself_simulated
 from rig.data.result_file import CheckEntry, FileEntry, ProvenanceEntry, ResultDocument, SensorEntry, VerificationEntry
 from rig.data.result_types import ErrorEntry
 from rig.errors import Refused

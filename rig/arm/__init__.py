@@ -1,1 +1,0 @@
-"""The arm: the real `ur_rtde` client in a supervised child process, kinematics, pre-flight, the stop."""

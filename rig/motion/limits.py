@@ -1,0 +1,92 @@
+"""Limits of position, speed and acceleration, joint by joint: those of the arm, and those of its controller. Pure."""
+
+import math
+
+import numpy as np
+
+from rig.config.ur10e_limits import ACCELERATION_LIMIT_RAD_S2, JOINT_LIMIT_RAD, SPEED_LIMIT_RAD_S
+from rig.errors import Problem
+from rig.estimation.arrays import Array
+from rig.motion.state import JOINT_NAMES, JointLimits, Joints
+from rig.motion.steps import Motion, travel
+
+OURS, THEIRS = "the limit", "the controller's limit"
+WIDER = ", or widen that limit in the arm's safety settings"
+ROUNDING = 1e-6  # of a limit
+
+
+def motion_problems(motion: Motion, told: JointLimits | None) -> list[Problem]:
+    """What takes a joint too far or too fast, by the data sheet or by what the controller told: the narrower counts."""
+    return [
+        *_position_problems(motion, told),
+        *_speed_problems(motion, None if told is None else told.speed_rad_s),
+        *_acceleration_problems(motion, None if told is None else told.acceleration_rad_s2),
+    ]
+
+
+def _position_problems(motion: Motion, told: JointLimits | None) -> list[Problem]:
+    problems = []
+    for joint, name in enumerate(JOINT_NAMES):
+        least, _ = _narrower(JOINT_LIMIT_RAD, None if told is None else -told.least_rad[joint])
+        greatest, _ = _narrower(JOINT_LIMIT_RAD, None if told is None else told.greatest_rad[joint])
+        low, high = sorted((motion.start_q_rad[joint], motion.target_q_rad[joint]))
+        if low < -least or high > greatest:
+            narrow = min(least, greatest) < JOINT_LIMIT_RAD
+            beyond = f"{math.degrees(-least):.1f}° to {math.degrees(greatest):.1f}°, the controller's limits"
+            problems.append(
+                Problem(
+                    "joint_limit",
+                    f"{motion.name} takes {name} from {math.degrees(low):.1f}° to {math.degrees(high):.1f}°, beyond "
+                    f"{beyond if narrow else '±360°'}",
+                    "Raise procedure.acceleration_deg_s2, lower procedure.speed_deg_s, or bring arm.home_deg near 0"
+                    f"{WIDER if narrow else ''}",
+                )
+            )
+    return problems
+
+
+def _speed_problems(motion: Motion, told_rad_s: Joints | None) -> list[Problem]:
+    problems = []
+    for joint, speed in enumerate(motion.speed_rad_s * _shares(motion)):
+        limit, whose = _narrower(SPEED_LIMIT_RAD_S[joint], None if told_rad_s is None else told_rad_s[joint])
+        if speed > limit:
+            problems.append(
+                Problem(
+                    "joint_speed",
+                    f"{motion.name} turns {JOINT_NAMES[joint]} at {math.degrees(speed):.1f}°/s, "
+                    f"{whose} is {math.degrees(limit):.1f}°/s",
+                    f"Lower procedure.speed_deg_s or arm.transfer_speed_deg_s{WIDER if whose == THEIRS else ''}",
+                )
+            )
+    return problems
+
+
+def _acceleration_problems(motion: Motion, told_rad_s2: Joints | None) -> list[Problem]:
+    problems = []
+    for joint, acceleration in enumerate(motion.acceleration_rad_s2 * _shares(motion)):
+        limit, whose = _narrower(ACCELERATION_LIMIT_RAD_S2, None if told_rad_s2 is None else told_rad_s2[joint])
+        if acceleration > limit:
+            problems.append(
+                Problem(
+                    "joint_acceleration",
+                    f"{motion.name} accelerates {JOINT_NAMES[joint]} with {math.degrees(acceleration):.0f}°/s², "
+                    f"{whose} is {math.degrees(limit):.0f}°/s²",
+                    "Lower procedure.acceleration_deg_s2",
+                )
+            )
+    return problems
+
+
+def _shares(motion: Motion) -> Array:
+    """(6,) how far each joint goes, over the one that goes farthest: by so much it is slower."""
+    way = np.abs(travel(motion.start_q_rad, motion.target_q_rad))
+    shares: Array = way / way.max()
+    return shares
+
+
+def _narrower(ours: float, told: float | None) -> tuple[float, str]:
+    """The narrower of the arm's limit by its data sheet and the one its controller tells, and whose that is.
+
+    The same number rounded differently is the same.
+    """
+    return (ours, OURS) if told is None or told >= ours * (1 - ROUNDING) else (told, THEIRS)

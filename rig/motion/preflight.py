@@ -1,0 +1,76 @@
+"""Pre-flight of a plan: what is wrong with it by itself, whoever is to drive it. Pure: a plan in, problems out."""
+
+import math
+
+from rig.config.ur10e_limits import PAYLOAD_LIMIT_KG
+from rig.errors import Problem
+from rig.motion.carried import Carried
+from rig.motion.geometry import NOMINAL, DenavitHartenberg
+from rig.motion.keep_out import clearance_problems
+from rig.motion.limits import motion_problems
+from rig.motion.state import JointLimits, Joints
+from rig.motion.steps import SAME_PLACE_RAD, Motion, Plan, travel
+
+
+def plan_problems(
+    plan: Plan,
+    carried: Carried,
+    *,
+    arm: DenavitHartenberg = NOMINAL,
+    told: JointLimits | None = None,
+) -> list[Problem]:
+    """What is wrong with the plan itself: steps that are none, limits of position, speed, acceleration and payload.
+
+    And what brings the flange or what it carries too near the arm. `told` are the controller's own limits, which count
+    where they are narrower; the lengths are those of `arm`.
+    """
+    problems = step_problems(plan)
+    problems += [problem for motion in plan.motions if _travels(motion) for problem in motion_problems(motion, told)]
+    problems += clearance_problems(plan, carried, arm)
+    if not 0 <= carried.payload_kg <= PAYLOAD_LIMIT_KG:
+        problems.append(
+            Problem(
+                "payload_too_heavy",
+                f"the payload of {carried.payload_kg:g} kg is outside 0 to {PAYLOAD_LIMIT_KG:g} kg",
+                "Weigh the fixture and correct arm.payload_kg",
+            )
+        )
+    return list(dict.fromkeys(problems))
+
+
+def step_problems(plan: Plan) -> list[Problem]:
+    """Steps that cannot be made: every one must take time, and every motion must lead somewhere, at some speed."""
+    problems = [
+        Problem(
+            "no_duration",
+            f"{step.name} is planned to take {step.duration_s:g} s",
+            "Leave it out of the plan, or give it a duration above 0",
+        )
+        for step in plan.steps
+        if not 0 < step.duration_s < math.inf
+    ]
+    problems += [
+        Problem("no_travel", f"{motion.name} leads nowhere", "Leave it out of the plan, or let it move a joint")
+        for motion in plan.motions
+        if not _travels(motion)
+    ]
+    problems += [
+        Problem(
+            "no_speed",
+            f"{motion.name} is planned with {motion.speed_rad_s:g} rad/s and {motion.acceleration_rad_s2:g} rad/s²",
+            "Give it a speed and an acceleration above 0",
+        )
+        for motion in plan.motions
+        if not (0 < motion.speed_rad_s < math.inf and 0 < motion.acceleration_rad_s2 < math.inf)
+    ]
+    return problems
+
+
+def way_to_home(plan: Plan, q_rad: Joints) -> Joints:
+    """(6,) rad: how far each joint will turn in the first motion, from where the arm stands to the plan's home pose."""
+    return travel(q_rad, plan.home_q_rad)
+
+
+def _travels(motion: Motion) -> bool:
+    way = travel(motion.start_q_rad, motion.target_q_rad)
+    return all(map(math.isfinite, way)) and max(map(abs, way)) > SAME_PLACE_RAD

@@ -1,0 +1,393 @@
+"""The arm as the procedure sees it: supervised moves and rests, a stream of states, and a stop that always works."""
+
+import threading
+import time
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager, suppress
+from pathlib import Path
+from types import TracebackType
+from typing import Self
+
+from rig.errors import Fault, Problem, Refused, RigError
+from rig.motion.carried import Carried
+from rig.motion.state import ArmReport, ArmState, RuntimeState
+from rig.motion.steps import Motion, travel
+from rig.turners.ur.child_link import ChildLink
+from rig.turners.ur.condition import program_interruption, readiness
+from rig.turners.ur.dashboard import Dashboard
+from rig.turners.ur.identity import series_problem
+from rig.turners.ur.messages import Connected, Failed, Heartbeat, Message, Move, MoveFinished, TakeControl
+from rig.turners.ur.primary import Account, read_account
+from rig.turners.ur.state_stream import NotSpoken, StateStream
+from rig.turners.ur.stopping import StopOutcome, Stopper
+
+WATCH_S = 0.02  # the caller's watch is called at least this often
+ARRIVAL_RAD = 0.01  # the joint servo's ripple and lag stay below this
+START_S = 5.0  # a move begins within this (wall time), or not at all
+LOOK_S = 2.0  # for whoever answers where no dashboard does
+LOOK_HZ = 125.0
+LAST_STOP_S = 0.8  # … and so long once more when no state has confirmed the stop
+ANSWER_S = 5.0  # the dashboard has so long to answer while nothing moves
+SLOWNESS = 1.1  # a move may take this much longer than planned …
+SLOWNESS_S = 1.0  # … plus this, in the controller's time
+REPORT_S = 5.0  # … and to tell so, in wall time, once the arm stands where it should
+INTERRUPTION_S = 0.05  # a stopped program waits so long for the safety bits that explain it
+SILENCE_S = 0.8  # a controller that was silent for so long may have lost the client, whatever it does afterwards
+REASON_S = 0.2  # a refused move waits so long (wall time) for a state that explains it
+NOT_HELD = StopOutcome(True, "the arm was not under control")
+
+
+def _nothing() -> None:
+    """Watch nothing but the arm."""
+
+
+class Arm:
+    """The arm at `host`; a context manager that starts receiving on entry and leaves the arm stopped.
+
+    `on_state` gets every state in order, from a thread of this class. `state_rate_hz` is in the controller's time.
+    `client_log` takes what the `ur_rtde` client itself prints. All methods raise `Fault` by name when the arm or its
+    driver fails: the arm is then stopped already. `Refused` means that nothing has moved.
+    """
+
+    def __init__(
+        self,
+        host: str,
+        on_state: Callable[[ArmState], None] = lambda state: None,
+        state_rate_hz: float = 125.0,
+        client_log: Path | None = None,
+    ) -> None:
+        self._host = host
+        self._on_state = on_state
+        self._period_s = 1 / state_rate_hz
+        self._link = ChildLink(host, state_rate_hz, client_log, self._take, self._fail)
+        self._stopper = Stopper(host, self._link.send, self._seen_at_rest)
+        self._changed = threading.Condition()  # notified when anything below changes
+        self._latest: ArmState | None = None
+        self._connected: Connected | None = None
+        self._answer: Message | None = None
+        self._problem: Problem | None = None
+        self._doing = "the preparation"
+        self._holds_arm = False  # a program of ours may run, so a stop is ours to make
+        self._supervising = False
+        self._interruption: tuple[Problem, float] | None = None  # and the time stamp of the state that showed it first
+        self._silent_s = 0.0  # the longest silence of the controller since the last move ended
+        self.missed_states = 0  # gaps in the stream, counted in states
+
+    # Looking ------------------------------------------------------------------------------------------------------
+
+    def start(self) -> None:
+        """Connect and receive; moves nothing and stops no program. Raises `Refused` when no arm answers."""
+        try:
+            Dashboard(self._host, timeout_s=LOOK_S).close()
+        except OSError as error:
+            raise Refused.of(_no_dashboard(self._host, error)) from error
+        with self._link.patience():
+            self._link.start()
+            self._wait(lambda: self._latest is not None or self._answer is not None)
+        if isinstance(self._answer, Failed):
+            raise Refused.of(self._answer.problem)
+
+    @property
+    def latest(self) -> ArmState:
+        """The newest state."""
+        if self._latest is None:
+            raise RuntimeError("start() comes first")
+        return self._latest
+
+    def report(self) -> ArmReport:
+        """What the arm says about itself, for pre-flight."""
+        if self._connected is None:
+            raise RuntimeError("start() comes first")
+        self.check()
+        try:
+            with Dashboard(self._host, ANSWER_S) as dashboard:
+                account = _account(self._host)
+                return ArmReport(
+                    host=self._host,
+                    version=self._connected.version,
+                    polyscope=dashboard.polyscope(),
+                    serial_number=dashboard.serial_number(),
+                    remote_control=dashboard.in_remote_control(),
+                    program_running=dashboard.program_running(),
+                    payload_kg=self._connected.payload_kg,
+                    payload_centre_m=self._connected.payload_centre_m,
+                    state=self.latest,
+                    kinematics=account.kinematics,
+                    tcp_offset=account.tcp_offset,
+                    setup=account.setup,
+                    called=dashboard.robot_model(),
+                )
+        except OSError as error:
+            raise Refused.of(_silent_dashboard(self._host, error)) from error
+
+    def check(self) -> None:
+        """Raise what a supervising thread has met. The arm is stopped by then, if it was ours to stop."""
+        if self._problem is None and not self._stopper.begun:
+            return
+        problem = self._problem or Problem("arm_stopped", "the arm was stopped on request", "Start again when ready")
+        if not self._holds_arm:
+            raise Refused.of(problem)
+        outcome = self.stop()
+        remedy = f"{outcome.remedy}. {problem.remedy}" if outcome.remedy else problem.remedy
+        raise Fault.of(problem._replace(what=f"{problem.what}; {outcome.what}", remedy=remedy))
+
+    # Moving -------------------------------------------------------------------------------------------------------
+
+    def take_control(self, carried: Carried) -> None:
+        """Upload the control script and set the payload. Raises `Refused` by name.
+
+        The client would end a program that runs, so a running program is refused here.
+        """
+        self.check()
+        problem = readiness(self.latest)
+        if problem is None and self.latest.runtime_state != RuntimeState.STOPPED:
+            problem = Problem("program_running", f"a program runs on the arm at {self._host}", "Stop it on the pendant")
+        if problem is not None:
+            raise Refused.of(problem)
+        self._stopper.descriptors.keep()
+        with self._stopping_on_error(), self._link.patience():
+            self._holds_arm = True
+            self._request(TakeControl(carried))
+            self._wait(lambda: self._answer is not None)
+            if isinstance(self._answer, Failed):
+                self._holds_arm = False
+                raise Refused.of(self._answer.problem)
+            self._wait(lambda: self.latest.runtime_state == RuntimeState.PLAYING)
+            self._supervising = True
+        self._silent_s = 0.0  # there was no client yet to lose
+
+    def move(self, motion: Motion, watch: Callable[[], None] = _nothing) -> None:
+        """Make one movement and return when the arm has arrived and stands still.
+
+        `watch` is called before and then at least every 20 ms; what it raises stops the arm and goes on to the caller.
+        """
+        with self._stopping_on_error():
+            watch()
+            self._doing = motion.name
+            self._request(Move(motion.target_q_rad, motion.speed_rad_s, motion.acceleration_rad_s2))
+            asked_s = time.monotonic()
+            self._wait(lambda: self._answer is not None or time.monotonic() > asked_s + START_S, watch)
+            if self._answer is None:
+                self._fail(self._unbegun(_not_started(motion)))
+            takes_s = motion.duration_s * SLOWNESS + SLOWNESS_S
+            deadline_s, reported_s = self.latest.time_s + takes_s, time.monotonic() + takes_s + REPORT_S
+
+            def late() -> bool:
+                """Whether it is late by the controller's clock; that it has arrived travels by this machine's."""
+                arrived = self._stands_at(motion) and time.monotonic() < reported_s
+                return self.latest.time_s > deadline_s and not arrived
+
+            self._wait(lambda: self._has_ended(motion) or late(), watch)
+            if isinstance(self._answer, Failed):
+                self._wait_for_reason()
+                self._fail(self._unbegun(self._answer.problem))
+            elif not self._has_ended(motion):
+                self._fail(
+                    Problem(
+                        "arm_slower_than_planned",
+                        f"{motion.name} did not end within {takes_s:.1f} s, planned were {motion.duration_s:.1f} s",
+                        "Look for a speed limit in the safety settings or a program that slows the arm down",
+                    )
+                )
+            self.check()
+            self._silent_s = 0.0
+
+    def rest(self, duration_s: float, watch: Callable[[], None] = _nothing) -> None:
+        """Stand still for a time of the controller's clock; `watch` as in `move`."""
+        with self._stopping_on_error():
+            self._doing = "a rest"
+            end_s = self.latest.time_s + duration_s
+            self._wait(lambda: self.latest.time_s >= end_s, watch)
+
+    def stop(self) -> StopOutcome:
+        """Stop the arm and tell what is known about it; takes less than 1 s.
+
+        May be called at any time, again and again, from any thread; a second Ctrl-C does not undo it and is raised when
+        it has ended. Afterwards the control script has ended and this object moves the arm no more.
+        """
+        if not self._holds_arm:
+            return NOT_HELD
+        return self._stopper.outcome()
+
+    def close(self) -> None:
+        """Stop the arm if it was under control, and end the child process."""
+        try:
+            outcome = self.stop()
+        finally:
+            self._link.close()
+            self._stopper.descriptors.release()
+        if self._holds_arm and (self._problem is not None or not outcome.at_rest):
+            # A client that had lost the arm and found it again may have started its program anew, behind that stop.
+            with suppress(OSError), Dashboard(self._host, LAST_STOP_S) as dashboard:
+                dashboard.stop_program()
+
+    def __enter__(self) -> Self:
+        try:
+            self.start()
+        except BaseException:
+            self.close()
+            raise
+        return self
+
+    def __exit__(
+        self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
+    ) -> None:
+        told = self._problem is not None and isinstance(error, RigError)  # the arm's own problems tell of the stop
+        if error is not None and not told:
+            try:
+                outcome = self.stop()
+            except KeyboardInterrupt:  # one more, on the way out; the stop has ended by now
+                outcome = self.stop()
+            error.add_note(". ".join(filter(None, (outcome.what, outcome.remedy))))
+        self.close()
+
+    # Inside -------------------------------------------------------------------------------------------------------
+
+    @contextmanager
+    def _stopping_on_error(self) -> Iterator[None]:
+        try:
+            yield
+        except BaseException:
+            self.stop()
+            raise
+
+    def _request(self, request: TakeControl | Move) -> None:
+        self.check()
+        self._answer = None
+        self._link.send(request)
+
+    def _wait(self, done: Callable[[], bool], watch: Callable[[], None] = _nothing) -> None:
+        """Block until `done`, looking at the arm's faults and the caller's watch all the time."""
+        finished = False
+        while not finished:
+            with self._changed:
+                self._changed.wait_for(lambda: self._problem is not None or done(), WATCH_S)
+                finished = done()
+            self.check()
+            watch()
+
+    def _wait_for_reason(self) -> None:
+        with self._changed:
+            self._changed.wait_for(lambda: self._problem is not None, REASON_S)
+
+    def _unbegun(self, problem: Problem) -> Problem:
+        """Why a move was not begun: the controller refused it, or had lost the client in a silence."""
+        if self._silent_s <= SILENCE_S:
+            return problem
+        what = f"the arm at {self._host} was silent for {self._silent_s:.1f} s, and {problem.what}"
+        return Problem("arm_link_lost", what, "Look at the arm and its network cable, then start again")
+
+    def _has_ended(self, motion: Motion) -> bool:
+        if isinstance(self._answer, Failed):
+            return True
+        return isinstance(self._answer, MoveFinished) and self._stands_at(motion)
+
+    def _stands_at(self, motion: Motion) -> bool:
+        """Whether the arm is at rest where the motion ends."""
+        away_rad = max(map(abs, travel(self.latest.q_rad, motion.target_q_rad)))
+        return self.latest.at_rest and away_rad < ARRIVAL_RAD
+
+    def _take(self, message: Message) -> None:
+        """Take a message of the child, each as it comes, on the link's reader thread."""
+        match message:
+            case Heartbeat():
+                self._silent_s = max(self._silent_s, message.silent_s)
+                for state in message.states:
+                    self._take_state(state)
+            case Connected():
+                self._connected = message
+            case _:
+                self._answer = message
+        with self._changed:
+            self._changed.notify_all()
+
+    def _take_state(self, state: ArmState) -> None:
+        if self._latest is not None:
+            self.missed_states += max(0, round((state.time_s - self._latest.time_s) / self._period_s) - 1)
+        self._latest = state
+        try:
+            self._on_state(state)
+        except RigError as error:
+            self._fail(error.problem)
+        except Exception as error:
+            self._fail(Problem("arm_state_not_taken", f"an arm state could not be passed on ({error})", "See the log"))
+        if self._supervising and (problem := self._judge(state)):
+            self._fail(problem._replace(what=f"{problem.what} during {self._doing}"))
+
+    def _judge(self, state: ArmState) -> Problem | None:
+        """Why the arm cannot go on. The safety bits that explain a stopped program may come a packet later than it.
+
+        What interrupts our program ends it: one that runs again a moment later is somebody else's.
+        """
+        if self._interruption is None and (interruption := program_interruption(state)) is not None:
+            self._interruption = interruption, state.time_s
+        if problem := readiness(state):
+            return problem
+        if self._interruption is not None and state.time_s - self._interruption[1] >= INTERRUPTION_S:
+            return self._interruption[0]
+        return None
+
+    def _fail(self, problem: Problem) -> None:
+        """Keep the first problem and stop the arm; nothing is a problem after a stop on request."""
+        with self._changed:
+            if self._problem is not None or self._stopper.begun:
+                return
+            self._problem = problem
+            self._changed.notify_all()
+        if self._holds_arm:
+            self._stopper.begin()
+
+    def _seen_at_rest(self, since_s: float, timeout_s: float) -> bool:
+        def at_rest() -> bool:
+            state = self.latest
+            return state.host_time_s > since_s and state.at_rest and state.runtime_state == RuntimeState.STOPPED
+
+        with self._changed:
+            self._changed.wait_for(lambda: at_rest() or self._link.ended, timeout_s)
+            return at_rest()
+
+
+def _not_started(motion: Motion) -> Problem:
+    return Problem(
+        "move_refused",
+        f"{motion.name} was not begun within {START_S:g} s",
+        "Read the pendant's log, then start again",
+    )
+
+
+def _no_dashboard(host: str, error: OSError) -> Problem:
+    """What is there instead, for whoever looks for the mistake: no arm, or one that has no dashboard."""
+    try:
+        with StateStream(host, LOOK_HZ, LOOK_S) as states:
+            version = states.version
+    except NotSpoken as answer:
+        version = answer.version
+    except OSError:
+        return Problem(
+            "no_arm",
+            f"no arm answers at {host} ({error})",
+            "Check arm.host in the configuration, the network cable, and that the arm is switched on",
+        )
+    return series_problem(host, version) or _silent_dashboard(host, error)
+
+
+def _silent_dashboard(host: str, error: OSError) -> Problem:
+    return Problem(
+        "no_dashboard",
+        f"the dashboard server at {host} does not answer ({error})",
+        "Enable the dashboard server in the arm's security settings",
+    )
+
+
+def _account(host: str) -> Account:
+    """What the controller tells; nothing without its primary interface."""
+    try:
+        return read_account(host, ANSWER_S)
+    except OSError:
+        return Account()
+
+
+def look(host: str) -> ArmReport:
+    """Look at the arm: receive and ask only; nothing moves and no program is stopped. Raises `Refused` by name."""
+    with Arm(host) as arm:
+        return arm.report()

@@ -1,0 +1,90 @@
+"""What parent and child say to each other over the pipe: small frozen values, pickled."""
+
+from dataclasses import dataclass
+
+from rig.errors import Problem
+from rig.motion.carried import Carried
+from rig.motion.state import ArmState, Joints
+
+# Parent to child ---------------------------------------------------------------------------------------------------
+
+
+@dataclass(frozen=True, slots=True)
+class TakeControl:
+    """Upload the control script and set the payload. Answered by `ControlTaken` or `Failed`."""
+
+    carried: Carried
+
+
+@dataclass(frozen=True, slots=True)
+class Move:
+    """Start a joint-space movement. Answered by `MoveStarted` and `MoveFinished`, or by `Failed`."""
+
+    target_q_rad: Joints
+    speed_rad_s: float
+    acceleration_rad_s2: float
+
+
+@dataclass(frozen=True, slots=True)
+class Stop:
+    """Brake at once and end the control script; served while a movement runs. Not answered: the states show it."""
+
+    deceleration_rad_s2: float
+
+
+@dataclass(frozen=True, slots=True)
+class Alive:
+    """The parent still runs; when these stop coming, the child stops the arm itself. Not answered."""
+
+
+Request = TakeControl | Move | Stop | Alive
+
+# Child to parent ---------------------------------------------------------------------------------------------------
+
+
+@dataclass(frozen=True, slots=True)
+class Connected:
+    """The controller sends states. The payload is what it reckons with; None when it does not tell.
+
+    `version` is its software's: major, minor, bugfix, build.
+    """
+
+    version: tuple[int, ...]
+    payload_kg: float | None
+    payload_centre_m: tuple[float, float, float] | None
+
+
+@dataclass(frozen=True, slots=True)
+class Heartbeat:
+    """The child lives; `states` are those that came since the last heartbeat, oldest first.
+
+    For at least `silent_s` nothing at all has come from the controller: see `StateStream`.
+    """
+
+    states: tuple[ArmState, ...]
+    silent_s: float = 0.0
+
+
+@dataclass(frozen=True, slots=True)
+class ControlTaken:
+    """The control script runs and the payload is set."""
+
+
+@dataclass(frozen=True, slots=True)
+class MoveStarted:
+    """The controller has taken the movement on."""
+
+
+@dataclass(frozen=True, slots=True)
+class MoveFinished:
+    """The controller reports the end of the movement."""
+
+
+@dataclass(frozen=True, slots=True)
+class Failed:
+    """The request, or the connection, failed."""
+
+    problem: Problem
+
+
+Message = Connected | Heartbeat | ControlTaken | MoveStarted | MoveFinished | Failed

@@ -1,0 +1,603 @@
+"""The arm driver with the real client against the simulated controller: moves, states, stops, faults by name."""
+
+import math
+import multiprocessing
+import os
+import resource
+import signal
+import socket
+import subprocess
+import sys
+import threading
+import time
+from collections.abc import Callable
+from contextlib import ExitStack, suppress
+from dataclasses import replace
+from itertools import pairwise
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+
+from rig.config.models import ArmSection
+from rig.config.procedure_sections import SixObservationSection
+from rig.errors import Fault, Refused
+from rig.motion.carried import Carried
+from rig.motion.preflight import plan_problems
+from rig.motion.state import ARM_STATE_DTYPE, ArmState, Joints
+from rig.motion.steps import Transfer, trapezoid_duration
+from rig.plans.six_sweeps import plan_six_observation
+from rig.turners.ur.child_link import FROZEN_TICKS, TICK_S
+from rig.turners.ur.driver import Arm, look
+from rig.turners.ur.preflight import arm_problems
+from support.arm_relay import relay
+from support.crowd import soon, watched_crowd
+from support.rtde_reader import RtdeReader
+from support.waiting import wait_for
+from support.worlds import World, WorldHandle
+
+pytestmark = pytest.mark.slow
+
+PAYLOAD = Carried(0.35, (0.0, 0.0, 0.025))
+WRIST_3 = 5
+
+
+@pytest.fixture
+def laboratory(world: World) -> WorldHandle:
+    return world({"world": {"time_scale": 4}})
+
+
+def turn(start: Joints, angle_rad: float) -> Transfer:
+    """A move of wrist 3 alone at 1 rad/s."""
+    target = (*start[:WRIST_3], start[WRIST_3] + angle_rad)
+    return Transfer("test move", start, target, 1.0, 2.0, trapezoid_duration(abs(angle_rad), 1.0, 2.0))
+
+
+def stands(world: WorldHandle) -> bool:
+    state = world.state()
+    return not state["moving"] and state["runtime_state"] == "STOPPED"
+
+
+def upload(world: WorldHandle, program: bytes) -> None:
+    with socket.create_connection((world.host, 30002)) as client:
+        client.sendall(program)
+
+
+class AtSpeed:
+    """A watch that acts once, when the arm has reached its speed."""
+
+    def __init__(self, arm: Arm, act: Callable[[], object]) -> None:
+        self._arm, self._act, self.acted_s = arm, act, math.inf
+
+    def __call__(self) -> None:
+        if math.isinf(self.acted_s) and abs(self._arm.latest.qd_rad_s[WRIST_3]) > 0.8:
+            self.acted_s = time.monotonic()
+            self._act()
+
+
+def test_a_look_moves_nothing_and_stops_no_program(laboratory: WorldHandle) -> None:
+    with Arm(laboratory.host) as other:
+        other.take_control(PAYLOAD)
+        report = look(laboratory.host)
+        assert report.program_running
+        assert report.remote_control
+        assert report.payload_kg == pytest.approx(PAYLOAD.payload_kg)
+        assert report.serial_number.isdigit()
+        with Arm(laboratory.host) as second, pytest.raises(Refused) as refused:
+            second.take_control(PAYLOAD)
+        assert refused.value.name == "program_running"
+        assert laboratory.state()["program_running"]
+    assert stands(laboratory)
+
+
+def test_no_arm_at_the_address_is_refused_by_name() -> None:
+    with pytest.raises(Refused) as refused:
+        look("127.0.3.250")
+    assert refused.value.name == "no_arm"
+
+
+def test_an_arm_that_sends_no_states_is_refused_by_name() -> None:
+    def greet(listener: socket.socket) -> None:
+        client, _ = listener.accept()
+        client.sendall(b"Connected: Universal Robots Dashboard Server\n")
+        client.close()
+
+    with socket.create_server(("127.0.3.251", 29999)) as dashboard:
+        greeter = threading.Thread(target=greet, args=(dashboard,))
+        greeter.start()
+        with pytest.raises(Refused) as refused:
+            look("127.0.3.251")
+        greeter.join()
+    assert refused.value.name == "no_arm_states"
+
+
+def test_moves_arrive_in_time_and_states_come_without_gaps(world: World) -> None:
+    laboratory = world({"world": {"time_scale": 1}})
+    states: list[ArmState] = []
+    with Arm(laboratory.host, states.append, state_rate_hz=500) as arm:
+        arm.take_control(PAYLOAD)
+        assert laboratory.state()["payload_kg"] == pytest.approx(PAYLOAD.payload_kg)
+        out = turn(arm.latest.q_rad, 1.0)
+        began_s = arm.latest.time_s
+        arm.move(out)
+        arm.rest(0.2)
+        arm.move(turn(out.target_q_rad, -1.0))
+        took_s = arm.latest.time_s - began_s
+        np.testing.assert_allclose(laboratory.state()["q_rad"], out.start_q_rad, atol=1e-4)
+        outcome = arm.stop()
+        assert outcome.at_rest
+        assert arm.stop() == outcome
+    planned_s = 2 * out.duration_s + 0.2
+    assert planned_s - 0.02 <= took_s <= planned_s + 3 * 0.05  # three hand-overs
+    assert arm.missed_states == 0
+    times_s = [state.time_s for state in states]
+    np.testing.assert_allclose(np.diff(times_s), 1 / 500, atol=1e-9)
+    record = np.array([state.to_record() for state in states], ARM_STATE_DTYPE)
+    assert np.ptp(record["q_rad"][:, WRIST_3]) == pytest.approx(1.0, abs=1e-3)
+    assert np.all(np.diff(record["time_s"]) > 0)
+    assert np.all(np.diff(record["host_time_s"]) > 0)
+
+
+def test_a_planned_sweep_turns_a_whole_revolution_at_its_speed(laboratory: WorldHandle) -> None:
+    report = look(laboratory.host)
+    procedure = SixObservationSection(speed_deg_s=120, acceleration_deg_s2=400)
+    plan = plan_six_observation(ArmSection(host=laboratory.host, payload_kg=0.35), procedure, report.state.q_rad)
+    assert plan_problems(plan, PAYLOAD) + arm_problems(plan, report) == []
+    states: list[ArmState] = []
+    sweep = plan.sweeps[0]
+    with Arm(laboratory.host, states.append) as arm:
+        arm.take_control(PAYLOAD)
+        for motion in plan.motions[: plan.motions.index(sweep) + 1]:
+            began_s = arm.latest.time_s
+            arm.move(motion)
+    low, high = sweep.revolution_rad
+    inside = [s for s in states if s.time_s > began_s and low < s.q_rad[sweep.joint] < high]
+    turned_rad = inside[-1].q_rad[sweep.joint] - inside[0].q_rad[sweep.joint]
+    assert turned_rad == pytest.approx(-2 * math.pi, abs=0.1)
+    assert turned_rad / (inside[-1].time_s - inside[0].time_s) == pytest.approx(-sweep.speed_rad_s, rel=0.01)
+
+
+@pytest.mark.parametrize(
+    ("name", "order"),
+    [
+        ("protective_stop", {"do": "protective_stop"}),
+        ("emergency_stop", {"do": "emergency_stop"}),
+        ("arm_not_running", {"do": "power_off"}),
+        ("arm_paused", {"do": "pause"}),
+        ("program_stopped", {"do": "stop_program"}),
+        ("speed_slider", {"do": "speed_slider", "fraction": 0.5}),
+        ("arm_link_lost", {"do": "close_arm"}),
+        ("arm_link_lost", {"do": "silence_arm", "duration_s": 4.0}),
+        ("arm_link_lost", {"do": "hold"}),  # the controller's time stands still
+    ],
+)
+def test_a_fault_during_a_move_is_named_and_the_arm_stands_still(
+    laboratory: WorldHandle, name: str, order: dict[str, Any]
+) -> None:
+    with Arm(laboratory.host) as arm:
+        arm.take_control(PAYLOAD)
+        watch = AtSpeed(arm, lambda: laboratory.control(order))
+        with watched_crowd() as crowd, pytest.raises(Fault) as fault:
+            arm.move(turn(arm.latest.q_rad, 6.0), watch)
+        assert time.monotonic() - watch.acted_s < crowd.stretched(2.0)
+        assert fault.value.name == name
+        assert "test move" in fault.value.what or "127." in fault.value.what
+        assert fault.value.remedy
+        laboratory.control({"do": "run"})
+        soon(lambda: stands(laboratory), "rest", 3.0)
+
+
+def test_somebody_elses_program_in_place_of_ours_is_noticed_and_stopped(laboratory: WorldHandle) -> None:
+    """It runs a moment later: the states show ours stopped for 20 ms."""
+    nudge = b"def nudge():\n movej([0.0, -1.57, 1.57, -1.57, -1.57, -6.0], a=2, v=1)\nend\n"
+    with Arm(laboratory.host) as arm:
+        arm.take_control(PAYLOAD)
+        with pytest.raises(Fault) as fault:
+            arm.move(turn(arm.latest.q_rad, 6.0), AtSpeed(arm, lambda: upload(laboratory, nudge)))
+        assert fault.value.name == "program_stopped"
+        assert stands(laboratory) and laboratory.state()["q_rad"][WRIST_3] > -3.0
+
+
+def test_a_program_that_a_reconnecting_client_leaves_behind_is_stopped(laboratory: WorldHandle) -> None:
+    """No state confirms the stop, and the client's own program runs again before the client is ended."""
+    with Arm(laboratory.host) as arm:
+        arm.take_control(PAYLOAD)
+        with pytest.raises(Fault):
+            arm.move(turn(arm.latest.q_rad, 6.0), AtSpeed(arm, lambda: laboratory.control({"do": "hold"})))
+        laboratory.control({"do": "run"})
+        wait_for(lambda: not laboratory.state()["program_running"], "the end of the program")
+        upload(laboratory, b"def rtde_control():\nend\n")
+        wait_for(lambda: laboratory.state()["program_running"], "the program")
+    wait_for(lambda: not laboratory.state()["program_running"], "the end of the program")
+
+
+def test_one_that_it_leaves_behind_a_stop_that_was_seen_is_stopped_too(laboratory: WorldHandle) -> None:
+    with Arm(laboratory.host) as arm:
+        arm.take_control(PAYLOAD)
+        with pytest.raises(Fault) as fault:
+            arm.move(turn(arm.latest.q_rad, 6.0), AtSpeed(arm, lambda: laboratory.control({"do": "stop_program"})))
+        assert "at rest" in fault.value.what
+        upload(laboratory, b"def rtde_control():\n while True:\n  sync()\n end\nend\n")
+        wait_for(lambda: laboratory.state()["program_running"], "the program")
+    wait_for(lambda: not laboratory.state()["program_running"], "the end of the program")
+
+
+@pytest.mark.parametrize(("name", "kind"), [("arm_driver_died", "SIGKILL"), ("arm_driver_hung", "SIGSTOP")])
+def test_a_child_that_dies_or_hangs_mid_move_leaves_a_standing_arm_within_a_second(
+    laboratory: WorldHandle, name: str, kind: str
+) -> None:
+    others = set(multiprocessing.active_children())
+    with Arm(laboratory.host) as arm:
+        arm.take_control(PAYLOAD)
+        (child,) = set(multiprocessing.active_children()) - others
+        assert child.pid is not None
+        stood_s: list[float] = []
+
+        def end_child_and_await_the_stop() -> None:
+            os.kill(child.pid or 0, getattr(signal, kind))
+            killed_s = time.monotonic()
+            wait_for(lambda: stands(laboratory), "rest")
+            stood_s.append(time.monotonic() - killed_s)
+
+        with watched_crowd() as crowd, pytest.raises(Fault) as fault:
+            arm.move(turn(arm.latest.q_rad, 6.0), AtSpeed(arm, end_child_and_await_the_stop))
+        assert fault.value.name == name
+        assert "the controller says that its program has ended" in fault.value.what
+        assert "Look at the arm" in fault.value.remedy and "emergency stop" not in fault.value.remedy
+        assert stood_s[0] < crowd.stretched(1.0)
+
+
+def test_a_hung_child_is_answered_by_a_stop_also_when_no_descriptor_is_left(laboratory: WorldHandle) -> None:
+    others = set(multiprocessing.active_children())
+    with Arm(laboratory.host) as arm, ExitStack() as used:
+        arm.take_control(PAYLOAD)
+        (child,) = set(multiprocessing.active_children()) - others
+
+        def use_up_and_hang_the_child() -> None:
+            with suppress(OSError):
+                while True:
+                    used.enter_context(Path(os.devnull).open("rb"))
+            os.kill(child.pid or 0, signal.SIGSTOP)
+
+        limits = resource.getrlimit(resource.RLIMIT_NOFILE)
+        resource.setrlimit(resource.RLIMIT_NOFILE, (256, limits[1]))
+        used.callback(resource.setrlimit, resource.RLIMIT_NOFILE, limits)
+        with pytest.raises(Fault) as fault:
+            arm.move(turn(arm.latest.q_rad, 6.0), AtSpeed(arm, use_up_and_hang_the_child))
+        assert fault.value.name == "arm_driver_hung" and "its program has ended" in fault.value.what
+        soon(lambda: stands(laboratory), "rest", 1.0)
+
+
+@pytest.mark.parametrize("where", ["move", "rest"])
+def test_ctrl_c_stops_the_arm_at_once_and_goes_on_to_the_caller(laboratory: WorldHandle, where: str) -> None:
+    with Arm(laboratory.host) as arm:
+        arm.take_control(PAYLOAD)
+        interrupted_s = 0.0
+
+        def interrupt() -> None:
+            nonlocal interrupted_s
+            interrupted_s = time.monotonic()
+            os.kill(os.getpid(), signal.SIGINT)
+
+        with watched_crowd() as crowd, pytest.raises(KeyboardInterrupt):
+            if where == "move":
+                arm.move(turn(arm.latest.q_rad, 6.0), AtSpeed(arm, interrupt))
+            else:
+                arm.rest(60.0, interrupt)
+        assert time.monotonic() - interrupted_s < crowd.stretched(1.0)
+        assert stands(laboratory)
+        assert arm.stop().at_rest
+        with pytest.raises(Fault) as fault:
+            arm.move(turn(arm.latest.q_rad, 1.0))
+        assert fault.value.name == "arm_stopped"
+
+
+def test_three_ctrl_c_at_once_end_with_how_the_arm_was_left(world: World) -> None:
+    laboratory = world({"world": {"time_scale": 1}})  # braking takes longer than the three
+
+    def interrupt() -> None:
+        os.kill(os.getpid(), signal.SIGINT)
+
+    def interrupt_thrice() -> None:
+        for delay_s in (0.03, 0.06):
+            threading.Timer(delay_s, interrupt).start()
+        interrupt()
+
+    with pytest.raises(KeyboardInterrupt) as interrupted, Arm(laboratory.host) as arm:
+        arm.take_control(PAYLOAD)
+        arm.move(turn(arm.latest.q_rad, 6.0), AtSpeed(arm, interrupt_thrice))
+    assert interrupted.value.__notes__ == ["the arm is stopped and at rest"]
+    assert stands(laboratory)
+
+
+def test_an_error_of_the_watch_stops_the_arm_and_is_kept(laboratory: WorldHandle) -> None:
+    def complain() -> None:
+        raise Fault("board_link_lost", "the board is gone", "plug it in")
+
+    with Arm(laboratory.host) as arm:
+        arm.take_control(PAYLOAD)
+        with pytest.raises(Fault) as fault:
+            arm.move(turn(arm.latest.q_rad, 6.0), AtSpeed(arm, complain))
+        assert fault.value.name == "board_link_lost"
+        assert stands(laboratory)
+
+
+def test_what_the_watch_knows_already_keeps_the_arm_from_moving(laboratory: WorldHandle) -> None:
+    def complain() -> None:
+        raise Fault("board_link_lost", "the board is gone", "plug it in")
+
+    states: list[ArmState] = []
+    with Arm(laboratory.host, states.append) as arm:
+        arm.take_control(PAYLOAD)
+        with pytest.raises(Fault):
+            arm.move(turn(arm.latest.q_rad, 6.0), complain)
+    assert states and not any(map(any, (state.qd_rad_s for state in states)))
+
+
+def test_a_state_that_cannot_be_passed_on_stops_the_arm(laboratory: WorldHandle) -> None:
+    def full(state: ArmState) -> None:
+        if abs(state.qd_rad_s[WRIST_3]) > 0.8:
+            raise OSError("no space left on device")
+
+    with Arm(laboratory.host, full) as arm:
+        arm.take_control(PAYLOAD)
+        with pytest.raises(Fault) as fault:
+            arm.move(turn(arm.latest.q_rad, 6.0))
+        assert "no space left on device" in fault.value.what
+        assert stands(laboratory)
+
+
+def outside_address() -> str | None:
+    """Of this computer, as others know it."""
+    with socket.socket(socket.AF_INET, socket.SOCK_DGRAM) as any_way, suppress(OSError):
+        any_way.connect(("192.0.2.1", 9))
+        address = str(any_way.getsockname()[0])
+        return None if address.startswith("127.") else address
+    return None
+
+
+@pytest.mark.skipif(outside_address() is None, reason="nobody else could reach this computer")
+def test_an_arm_elsewhere_that_falls_silent_is_missed_at_once_on_a_crowded_computer(
+    laboratory: WorldHandle, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr(os, "getloadavg", lambda: (100.0, 100.0, 100.0))
+    with relay(laboratory.host, outside_address()) as wire:
+        with Arm(wire.host) as arm:
+            arm.take_control(PAYLOAD)
+            cut = AtSpeed(arm, wire.stalled.set)
+            with pytest.raises(Fault) as fault:
+                arm.move(turn(arm.latest.q_rad, 6.0), cut)
+            assert time.monotonic() - cut.acted_s < 3.0, "as long as a crowd here excuses a controller here"
+        wire.stalled.clear()
+    assert fault.value.name == "arm_link_lost"
+
+
+def test_a_program_that_comes_late_to_the_states_does_not_take_its_driver_for_hung(
+    laboratory: WorldHandle, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """The driver's heartbeats lie in the pipe meanwhile: whoever reads them is held up."""
+    monkeypatch.setattr("rig.data.silence.crowding", lambda: 1.0)
+    held_up = iter([1.0])
+
+    def take(state: ArmState) -> None:
+        if abs(state.qd_rad_s[WRIST_3]) > 0.8:
+            time.sleep(next(held_up, 0.0))
+
+    with Arm(laboratory.host, take) as arm:
+        arm.take_control(PAYLOAD)
+        arm.move(turn(arm.latest.q_rad, 6.0))
+        assert next(held_up, None) is None, "nothing was held up"
+        assert arm.missed_states == 0
+
+
+def test_a_program_that_takes_no_more_states_is_noticed(world: World, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr("rig.data.silence.crowding", lambda: 1.0)
+    laboratory = world({"world": {"time_scale": 1}})
+    stuck = threading.Event()
+
+    def take(state: ArmState) -> None:
+        if abs(state.qd_rad_s[WRIST_3]) > 0.8:
+            stuck.wait(30.0)
+
+    with Arm(laboratory.host, take) as arm:
+        arm.take_control(PAYLOAD)
+        try:
+            with pytest.raises(Fault) as fault:
+                arm.move(turn(arm.latest.q_rad, 6.0))
+            assert fault.value.name == "arm_driver_hung"
+            assert laboratory.state()["q_rad"][WRIST_3] < 5.0, "the arm went on to the end of its way"
+        finally:
+            stuck.set()
+
+
+@pytest.mark.proof
+@pytest.mark.skipif(sys.platform != "linux" or os.geteuid() != 0, reason="only root takes a processor away, on Linux")
+def test_a_controller_on_this_machine_that_gets_no_processor_is_no_lost_link(
+    laboratory: WorldHandle, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """As where a virtual machine's host takes one of its processors away, without a crowd on the others."""
+    monkeypatch.setattr("rig.data.silence.crowding", lambda: 1.0)
+    states: list[ArmState] = []
+    controller, processors = laboratory.process.pid, os.sched_getaffinity(0)
+    taken = {max(processors)}
+
+    def hold_up() -> None:
+        with subprocess.Popen([sys.executable, "-c", "while True: pass"]) as greedy:
+            os.sched_setaffinity(greedy.pid, taken)
+            os.sched_setaffinity(controller, taken)
+            os.sched_setscheduler(greedy.pid, os.SCHED_FIFO, os.sched_param(1))  # leaves the others 5 %, once a second
+            time.sleep(2.0)
+            greedy.kill()
+        os.sched_setaffinity(controller, processors)
+
+    with Arm(laboratory.host, states.append) as arm:
+        arm.take_control(PAYLOAD)
+        arm.move(turn(arm.latest.q_rad, 6.0), AtSpeed(arm, hold_up))
+        assert arm.missed_states == 0
+    held_s = max(after.host_time_s - before.host_time_s for before, after in pairwise(states))
+    assert held_s > TICK_S * (FROZEN_TICKS + 1), "it was not held up"
+
+
+@pytest.mark.skipif(sys.platform != "linux", reason="only Linux tells what another program has not read")
+def test_a_slow_reader_beside_and_a_controller_held_up_for_a_moment_are_no_lost_link(
+    laboratory: WorldHandle, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """Neither is one alone. As in a busy moment: a part of the rig reads late, the laboratory gets no turn."""
+    monkeypatch.setattr("rig.data.silence.crowding", lambda: 1.0)
+    beside = RtdeReader(laboratory.host)
+    read_until_s = math.inf
+
+    def read() -> None:
+        with suppress(OSError):
+            while time.monotonic() < read_until_s:
+                beside.newest_s()
+
+    reading = threading.Thread(target=read)
+    reading.start()
+    with Arm(laboratory.host) as arm:
+        arm.take_control(PAYLOAD)
+        arm.rest(12.0)  # in which the other reader earns patience
+
+        def hold_up() -> None:
+            nonlocal read_until_s
+            read_until_s = 0.0
+            reading.join()
+            time.sleep(0.6)
+            os.kill(laboratory.process.pid, signal.SIGSTOP)
+            time.sleep(0.5)
+            os.kill(laboratory.process.pid, signal.SIGCONT)
+
+        arm.move(turn(arm.latest.q_rad, 6.0), AtSpeed(arm, hold_up))
+    beside.close()
+
+
+def test_a_controller_that_was_silent_before_a_move_has_not_refused_it(
+    laboratory: WorldHandle, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr("rig.data.silence.crowding", lambda: 5.0)  # so crowded that 3 s of silence are excused
+    with Arm(laboratory.host) as arm:
+        arm.take_control(PAYLOAD)
+        laboratory.control({"do": "silence_arm", "duration_s": 3.0})
+        with pytest.raises(Fault) as fault:
+            arm.move(turn(arm.latest.q_rad, 1.0))
+    assert fault.value.name == "arm_link_lost", fault.value
+
+
+def test_an_arm_slower_than_planned_is_stopped(laboratory: WorldHandle) -> None:
+    with Arm(laboratory.host) as arm:
+        arm.take_control(PAYLOAD)
+        move = turn(arm.latest.q_rad, 6.0)
+        hurried = Transfer(move.name, move.start_q_rad, move.target_q_rad, 1.0, 2.0, duration_s=1.0)
+        with pytest.raises(Fault) as fault:
+            arm.move(hurried)
+        assert fault.value.name == "arm_slower_than_planned"
+        assert stands(laboratory)
+
+
+def test_a_dashboard_that_is_gone_too_is_said_honestly(laboratory: WorldHandle) -> None:
+    with Arm(laboratory.host) as arm:
+        arm.take_control(PAYLOAD)
+        cut = AtSpeed(arm, lambda: laboratory.control({"do": "close_arm", "listen": False}))
+        with watched_crowd() as crowd, pytest.raises(Fault) as fault:
+            arm.move(turn(arm.latest.q_rad, 6.0), cut)
+        assert time.monotonic() - cut.acted_s < crowd.stretched(2.0)
+    assert fault.value.name == "arm_link_lost"
+    assert "dashboard did not take the stop" in fault.value.what
+    assert "press the emergency stop" in fault.value.remedy
+
+
+def test_a_speed_the_client_refuses_is_named(laboratory: WorldHandle) -> None:
+    with Arm(laboratory.host) as arm:
+        arm.take_control(PAYLOAD)
+        with pytest.raises(Fault) as fault:
+            arm.move(replace(turn(arm.latest.q_rad, 1.0), speed_rad_s=4.0))
+        assert fault.value.name == "move_refused"
+        assert stands(laboratory)
+
+
+def test_a_move_beyond_the_limits_is_refused_by_the_controller_and_named(laboratory: WorldHandle) -> None:
+    with Arm(laboratory.host) as arm:
+        arm.take_control(PAYLOAD)
+        with pytest.raises(Fault) as fault:
+            arm.move(turn(arm.latest.q_rad, 7.0))
+        assert fault.value.name == "program_stopped"
+
+
+@pytest.mark.parametrize(
+    ("name", "orders"),
+    [
+        ("not_in_remote_control", [{"do": "remote_control", "on": False}]),
+        ("registers_in_use", [{"do": "register_in_use"}]),
+        ("protective_stop", [{"do": "protective_stop"}]),
+        ("emergency_stop", [{"do": "emergency_stop"}]),
+        ("speed_slider", [{"do": "speed_slider", "fraction": 0.5}]),
+    ],
+)
+def test_control_is_refused_by_name_before_anything_moves(
+    laboratory: WorldHandle, name: str, orders: list[dict[str, Any]]
+) -> None:
+    for order in orders:
+        laboratory.control(order)
+    with Arm(laboratory.host) as arm:
+        with pytest.raises(Refused) as refused:
+            arm.take_control(PAYLOAD)
+        assert refused.value.name == name
+        assert refused.value.remedy
+    assert not laboratory.state()["program_running"]
+
+
+def test_a_payload_the_controller_does_not_take_is_refused(laboratory: WorldHandle) -> None:
+    with Arm(laboratory.host) as arm, pytest.raises(Refused) as refused:
+        arm.take_control(replace(PAYLOAD, payload_kg=20.0))
+    assert refused.value.name == "payload_not_set"
+    assert "20 kg" in refused.value.what
+    assert stands(laboratory)
+
+
+def test_a_speed_slider_below_full_is_refused_in_preflight(laboratory: WorldHandle) -> None:
+    laboratory.control({"do": "speed_slider", "fraction": 0.5})
+    report = look(laboratory.host)
+    plan = plan_six_observation(ArmSection(host=laboratory.host, payload_kg=0.35), SixObservationSection())
+    (problem,) = arm_problems(plan, report)
+    assert problem.name == "speed_slider"
+    assert "50 %" in problem.what
+
+
+PARENT = """
+import sys
+from rig.motion.carried import Carried
+from rig.turners.ur.driver import Arm
+from rig.motion.steps import Transfer
+
+if __name__ == "__main__":
+    with Arm(sys.argv[1]) as arm:
+        arm.take_control(Carried(0.35, (0.0, 0.0, 0.025)))
+        here = arm.latest.q_rad
+        print("moving", flush=True)
+        arm.move(Transfer("test move", here, (*here[:5], here[5] + 6.0), 1.0, 2.0, 6.5))
+"""
+
+
+@pytest.mark.parametrize("kind", ["SIGKILL", "SIGTERM", "SIGINT", "SIGINT twice"])
+def test_the_arm_is_stopped_when_the_program_itself_dies(laboratory: WorldHandle, tmp_path: Path, kind: str) -> None:
+    script = tmp_path / "parent.py"
+    script.write_text(PARENT)
+    with subprocess.Popen(
+        [sys.executable, str(script), laboratory.host],
+        stdout=subprocess.PIPE,
+        stderr=subprocess.DEVNULL,
+        start_new_session=True,
+    ) as parent:
+        assert parent.stdout is not None
+        assert parent.stdout.readline() == b"moving\n"
+        wait_for(lambda: laboratory.state()["moving"], "motion")
+        if kind.startswith("SIGINT"):  # Ctrl-C in a terminal reaches the whole group
+            os.killpg(parent.pid, signal.SIGINT)
+            if kind.endswith("twice"):
+                time.sleep(0.02)  # while the stop is under way
+                os.killpg(parent.pid, signal.SIGINT)
+        else:
+            parent.send_signal(getattr(signal, kind))
+        soon(lambda: stands(laboratory), "rest", 1.0)
+        parent.wait(10.0)
