@@ -14,7 +14,7 @@ SAID = [
     f"after {child_link.SPARED * child_link.SILENT_TICKS * child_link.TICK_S:g} s at the latest",
     f"a program that hangs after {child.PARENT_SPARED * child.PARENT_TICKS * child.TICK_S:g} s",
     f"{child_link.FROZEN_TICKS} ticks of heartbeats without a new state",
-    f"Of one elsewhere {child_link.LINK_S:g} s are enough",
+    f"For a controller elsewhere {child_link.LINK_S:g} s are enough",
     f"patient for {child_link.PATIENT_TICKS * child_link.TICK_S:g} s",
     f"at least every {1000 * driver.WATCH_S:g} ms",
     f"more than {driver.SLOWNESS:g} times as long",
