@@ -19,59 +19,71 @@ MIN_LEVEL = 0.1  # sine of the angle between the vertical and what a heading is 
 
 
 class ObservationSection(Section):
-    """What an averaged revolution must satisfy to be used."""
+    """What an averaged revolution must fulfil, so that it is used."""
 
     max_lost_fraction: float = Field(
-        default=0.001, ge=0, lt=1, description="share of a sweep's samples that may be missing", json_schema_extra=RATIO
+        default=0.001,
+        ge=0,
+        lt=1,
+        description="fraction of a sweep's samples that may be missing",
+        json_schema_extra=RATIO,
     )
     max_speed_deviation: float = Field(
         default=0.25,
         gt=0,
         lt=1,
-        description="how far the joint's rate, smoothed over 50 ms, may lie from its mean, as a share of it",
+        description="how much the joint's rate, smoothed over 50 ms, may differ from its mean, as a fraction of "
+        "the mean",
         json_schema_extra=RATIO,
     )
     max_axis_deviation_deg: float = Field(
         default=20.0,
         gt=0,
         lt=45,
-        description="how far the measured rotation may lie from the nominal axis of the sensor",
+        description="angle that is allowed between the measured rotation and the nominal axis of the sensor",
     )
 
 
 class SiteSection(Section):
-    """Where the arm stands. With latitude and heading the Earth's rate is taken out; the words are for certificates."""
+    """Where the arm stands. With latitude and heading the Earth's rate is taken out. The texts are for certificates."""
 
     laboratory: Words | None = Field(default=None, description="the laboratory's name, for certificates")
-    address: Words | None = Field(default=None, description="its address, in one line")
+    address: Words | None = Field(default=None, description="the laboratory's address, in one line")
     country: Annotated[str, Field(pattern="^[A-Z]{2}$")] | None = Field(
         default=None,
-        description="the country it is in, for digital certificates",
+        description="the laboratory's country, for digital certificates",
         json_schema_extra={"allowed": "two capital letters (ISO 3166-1)"},
     )
     place: Words | None = Field(
-        default=None, description="where the arm stands: site, room; left out, a certificate does not state it"
+        default=None, description="where the arm stands: site, room; if left out, a certificate does not state it"
     )
     time_reference: Words | None = Field(
         default=None,
-        description="what disciplines this computer's clock, such as `NTP, ptbtime1.ptb.de`; without it a certificate "
-        "calls no time traceable",
+        description="the time server that corrects this computer's clock, such as `NTP, ptbtime1.ptb.de`; without "
+        "it a certificate does not call the time traceable",
     )
-    ambient_temperature_c: float | None = Field(default=None, ge=-50, le=100, description="of the air, as you measured")
+    ambient_temperature_c: float | None = Field(
+        default=None, ge=-50, le=100, description="temperature of the air, as you measured it"
+    )
     ambient_humidity_percent: float | None = Field(
-        default=None, ge=0, le=100, description="relative, of the air", json_schema_extra={"unit": "%"}
+        default=None,
+        ge=0,
+        le=100,
+        description="relative humidity of the air, as you measured it",
+        json_schema_extra={"unit": "%"},
     )
     latitude_deg: float | None = Field(
         default=None,
         ge=-90,
         le=90,
-        description="north is positive; with heading_deg, or alone where the Earth's rate is found",
+        description="latitude, north is positive; give it together with heading_deg, or alone if the Earth's rate "
+        "is to be found",
     )
     heading_deg: float | None = Field(
         default=None,
         ge=-360,
         le=360,
-        description="where the x axis of the arm's base points: 0 north, 90 east; with latitude_deg",
+        description="direction of the x axis of the arm's base: 0 north, 90 east; give it together with latitude_deg",
     )
     gravity_m_s2: float = Field(
         default=9.80665, gt=9.7, lt=9.9, description="acceleration of free fall", json_schema_extra={"unit": "m/s²"}
@@ -80,22 +92,22 @@ class SiteSection(Section):
         default=None,
         gt=0,
         le=0.1,
-        description="expanded uncertainty (k = 2) of gravity_m_s2; left out, a half-width of 0.0005 is taken, of "
-        "0.03 where gravity_m_s2 is the standard value",
+        description="expanded uncertainty (k = 2) of gravity_m_s2; if left out, a half-width of 0.0005 is used, "
+        "or of 0.03 if gravity_m_s2 is the standard value",
         json_schema_extra={"unit": "m/s²"},
     )
     magnetic_field_ut: float | None = Field(
         default=None,
         ge=1,
         le=1000,
-        description="size of the magnetic field where the magnetometer stands, as a reference there measured it: its "
-        "scale factors are relative to it; without it a magnetometer is recorded, not calibrated",
+        description="size of the magnetic field at the magnetometer's place, measured there with a reference; the "
+        "scale factors are relative to it; without it a magnetometer is recorded but not calibrated",
     )
     magnetic_field_uncertainty_ut: float | None = Field(
         default=None,
         gt=0,
         le=100,
-        description="expanded uncertainty (k = 2) of magnetic_field_ut; left out, a half-width of 1 % is taken",
+        description="expanded uncertainty (k = 2) of magnetic_field_ut; if left out, a half-width of 1 % is used",
     )
     gravity_reference: Words | None = Field(
         default=None,
@@ -103,14 +115,15 @@ class SiteSection(Section):
         "certificates",
     )
     magnetic_field_reference: Words | None = Field(
-        default=None, description="with what magnetic_field_ut was measured; for certificates"
+        default=None, description="instrument with which magnetic_field_ut was measured; for certificates"
     )
     magnetic_field_upwards: bool = Field(
-        default=False, description="whether that field rises from the ground, as it does south of the magnetic equator"
+        default=False,
+        description="whether this field points out of the ground, as it does south of the magnetic equator",
     )
     base_up: Vector3 = Field(
         default=(0.0, 0.0, 1.0),
-        description="upwards in the frame of the arm's base; 0 0 −1 under a ceiling",
+        description="direction of up in the frame of the arm's base; 0 0 −1 if the arm hangs from a ceiling",
         json_schema_extra=RATIO,
     )
 
@@ -139,151 +152,159 @@ class SiteSection(Section):
 
 
 class UncertaintySection(Section):
-    """How far off may be what no recording shows. Half-widths: every value within is equally likely."""
+    """Sizes of errors that no recording shows. They are half-widths: every value within is equally likely."""
 
     controller_clock_ppm: Positive = Field(
-        default=50.0, description="the arm controller's clock, about which its maker says nothing"
+        default=50.0, description="error of the arm controller's clock, which its maker does not state"
     )
     computer_clock_ppm: Positive = Field(
-        default=1.0, description="this computer's clock over a run, disciplined by a time server; 50 without one"
+        default=1.0,
+        description="error of this computer's clock during a run if a time server corrects it; set "
+        "50 without a time server",
     )
-    crystal_ppm: Positive = Field(default=20.0, description="the board's 32768 Hz crystal at room temperature")
+    crystal_ppm: Positive = Field(default=20.0, description="error of the board's 32768 Hz crystal at room temperature")
     axis_deg: float = Field(
         default=0.06,
         ge=0,
         le=5,
-        description="direction of each wrist's axis by the kinematics that are used: 1 mrad, as of calibrated arms of "
-        "this size (Slamani, Nubiola and Bonev, 2012)",
+        description="error of the direction of each wrist's axis in the kinematics that are used; the usual value "
+        "is 1 mrad, as for calibrated arms of this size (Slamani, Nubiola and Bonev, 2012)",
     )
     repeatability_deg: float = Field(
         default=0.005,
         ge=0,
         le=5,
-        description="how differently the arm stands when it comes back: 87 µrad, as of an arm of this size (Slamani, "
-        "Nubiola and Bonev, 2012)",
+        description="how much the arm's angle differs when it comes back to the same place; the usual value is 87 "
+        "µrad, as for an arm of this size (Slamani, Nubiola and Bonev, 2012)",
     )
     sensor_offset_mm: float = Field(
         default=50.0,
         ge=0,
         le=1000,
-        description="how far the sensor sits from the flange's centre, or from the end of `arm.extension_mm`, along "
-        "each axis, either way",
+        description="how far the sensor may be from the flange's centre, or from the end of `arm.extension_mm`, "
+        "along each axis, in either direction",
     )
     acceleration_lag_ms: float = Field(
         default=5.0,
         ge=0,
         le=100,
-        description="by how much an accelerometer's own filter may delay its readings: it makes the wave of a sweep "
-        "smaller by half the square of what the arm turns in that time",
+        description="delay of an accelerometer's own filter, at most; it makes the wave of a sweep smaller by "
+        "half the square of the angle (in rad) that the arm turns in this time",
         json_schema_extra={"unit": "ms"},
     )
     g_sensitivity_deg_s_g: float | None = Field(
         default=None,
         ge=0,
-        description="change of a reading for 1 g, where attitudes do not tell it; left out, what is known of the part",
+        description="change of a reading for 1 g, if attitudes do not determine it; if left out, the part's value",
         json_schema_extra={"unit": "°/s/g"},
     )
     nonlinearity_percent: float | None = Field(
         default=None,
         ge=0,
-        description="how far a gyroscope may be off the best straight line, in per cent of full scale, by what is odd "
-        "of its curve and by what is even of it, where not several speeds tell it; left out, what is known of the part",
+        description="largest distance of a gyroscope's curve from the best straight line, in per cent of full "
+        "scale, for the odd part of the curve and for the even part; used if there is only one speed; "
+        "if left out, the part's value",
         json_schema_extra={"unit": "%"},
     )
     asymmetry_percent: float | None = Field(
         default=None,
         ge=0,
-        description="what is even of a gyroscope's curve, in per cent of full scale, that one scale factor for both "
-        "ways may leave out: more of it fails `cw_against_ccw`; left out, what is known of the part",
+        description="even part of a gyroscope's curve, in per cent of full scale, that is allowed although one "
+        "scale factor is stated for both directions; more of it fails the check `cw_against_ccw`; if "
+        "left out, the part's value",
         json_schema_extra={"unit": "%"},
     )
     bias_deg_s_k: float | None = Field(
         default=None,
         ge=0,
-        description="change of a gyroscope's bias for 1 K; left out, what is known of the part",
+        description="change of a gyroscope's bias for 1 K; if left out, the part's value",
         json_schema_extra={"unit": "°/s/K"},
     )
     scale_ppm_k: float | None = Field(
         default=None,
         ge=0,
-        description="change of a gyroscope's scale factor for 1 K; left out, what is known of the part",
+        description="change of a gyroscope's scale factor for 1 K; if left out, the part's value",
         json_schema_extra={"unit": "ppm/K"},
     )
     bias_instability_deg_h: float | None = Field(
         default=None,
         ge=0,
-        description="the least Allan deviation of a gyroscope at rest, its in-run bias stability: by how much its bias "
-        "wanders however long it is averaged; left out, what is known of the part",
+        description="smallest Allan deviation of a gyroscope at rest (in-run bias stability): how much its bias "
+        "wanders, even with the longest average; if left out, the part's value",
         json_schema_extra={"unit": "°/h"},
     )
     non_orthogonality_deg: float | None = Field(
         default=None,
         ge=0,
-        description="how far from 90° two axes of a gyroscope may stand; left out, what is known of the part",
+        description="how much the angle between two axes of a gyroscope may differ from 90°; if left out, the "
+        "part's value",
     )
     acceleration_nonlinearity_percent: float | None = Field(
         default=None,
         ge=0,
-        description="how far an accelerometer may be off the best straight line, in per cent of "
-        "`acceleration_nonlinear_over_g`; left out, what is known of the part",
+        description="largest distance of an accelerometer's curve from the best straight line, in per cent of "
+        "`acceleration_nonlinear_over_g`; if left out, the part's value",
         json_schema_extra={"unit": "%"},
     )
     acceleration_nonlinear_over_g: float | None = Field(
         default=None,
         ge=0,
-        description="over what acceleration either way that is stated, 0 for the range that is set; left out, what is "
-        "known of the part",
+        description="acceleration in either direction for which this nonlinearity is stated; 0 means the range "
+        "that is set; if left out, the part's value",
         json_schema_extra={"unit": "g"},
     )
     acceleration_bias_mg_k: float | None = Field(
         default=None,
         ge=0,
-        description="change of an accelerometer's bias for 1 K; left out, what is known of the part",
+        description="change of an accelerometer's bias for 1 K; if left out, the part's value",
         json_schema_extra={"unit": "mg/K"},
     )
     acceleration_scale_ppm_k: float | None = Field(
         default=None,
         ge=0,
-        description="change of an accelerometer's scale factor for 1 K; left out, what is known of the part",
+        description="change of an accelerometer's scale factor for 1 K; if left out, the part's value",
         json_schema_extra={"unit": "ppm/K"},
     )
     acceleration_bias_instability_ug: float | None = Field(
         default=None,
         ge=0,
-        description="the least Allan deviation of an accelerometer at rest; left out, what is known of the part",
+        description="smallest Allan deviation of an accelerometer at rest; if left out, the part's value",
         json_schema_extra={"unit": "µg"},
     )
     decision_rule: Literal["simple", "guard_band"] = Field(
         default="simple",
-        description="what a limit is held against: `simple`, the value; `guard_band`, the value and its expanded "
-        "uncertainty, so that at most one in forty is accepted wrongly",
+        description="what is compared with a limit: `simple`, the value alone; `guard_band`, the value together "
+        "with its expanded uncertainty, so that at most one in forty is accepted wrongly",
     )
 
 
 class CertificateSection(Section):
-    """What a certificate says of the order and of who answers for it. Left out, it reads "not stated"."""
+    """What a certificate says about the order and about the responsible person. What is left out reads "not stated"."""
 
     customer: Words | None = Field(default=None, description="the customer's name")
     customer_address: Words | None = Field(default=None, description="the customer's address, in one line")
     received: date | None = Field(
-        default=None, description="when the item was received", json_schema_extra={"allowed": "date, as 2026-11-20"}
+        default=None,
+        description="the day on which the item was received",
+        json_schema_extra={"allowed": "date, as 2026-11-20"},
     )
-    condition: Words | None = Field(default=None, description="the item's condition, as received")
+    condition: Words | None = Field(default=None, description="the item's condition when it was received")
     authorised_by: Words | None = Field(
-        default=None, description="who authorises the certificate; left out, there is a line to sign on"
+        default=None,
+        description="who authorises the certificate; if left out, the certificate has a line for a signature",
     )
     replaces: Words | None = Field(
         default=None, description="the number of the certificate that this one amends and replaces"
     )
     issued: date | None = Field(
         default=None,
-        description="when it is issued; left out, the day the result was computed",
+        description="the day on which the certificate is issued; if left out, the day on which the result was computed",
         json_schema_extra={"allowed": "date, as 2026-11-20"},
     )
 
 
 class HistorySection(Section):
-    """Where finished runs are remembered. Left out, in a file of whoever runs the rig (`RIG_HISTORY` names another)."""
+    """Where finished runs are remembered. If left out: in a file of the user (`RIG_HISTORY` names another)."""
 
     url: str | None = Field(
         default=None,
@@ -292,14 +313,17 @@ class HistorySection(Section):
         description="an SQLite file on a disk of this computer, or `postgresql://user@host/name` of a database that "
         "several rigs share; no password, which belongs in `~/.pgpass`",
     )
-    off: bool = Field(default=False, description="remember nothing")
+    off: bool = Field(default=False, description="`true`: this run is not entered into the history")
     rig: Words | None = Field(
-        default=None, description="what this rig is called there; left out, by its arm's serial number"
+        default=None, description="name of this rig in the history; if left out, the serial number of its arm"
     )
-    operator: Words | None = Field(default=None, description="who runs the rig, as the history is to have it")
-    note: Words | None = Field(default=None, description="what the history is to say of this run beside its numbers")
+    operator: Words | None = Field(default=None, description="name of the operator, for the history")
+    note: Words | None = Field(default=None, description="a note about this run, for the history")
     check_standards: tuple[Words, ...] = Field(
-        default=(), max_length=100, description="serial numbers of sensors that are calibrated to watch the rig itself"
+        default=(),
+        max_length=100,
+        description="serial numbers of the check standards: sensors that are "
+        "calibrated again and again in order to watch the rig itself",
     )
 
     @field_validator("url")

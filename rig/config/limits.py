@@ -41,65 +41,75 @@ class Limits(BaseModel):
     model_config = ConfigDict(frozen=True, allow_inf_nan=False)
 
     scale_deviation: Annotated[Positive, Limit("rate", "scale_deviation", "1", "conformity", "scale")] = Field(
-        description="of a scale factor from 1, |k − 1|", json_schema_extra=RATIO
+        description="largest difference of a scale factor from 1, |k − 1|", json_schema_extra=RATIO
     )
     scale_std: Annotated[Positive, Limit("rate", "scale_std", "1", "fitness", "scale")] = Field(
-        description="standard deviation of a scale factor", json_schema_extra=RATIO
+        description="largest standard uncertainty of a scale factor", json_schema_extra=RATIO
     )
     bias_rad_s: Annotated[Positive, Limit("rate", "bias", "rad/s", "conformity", "bias")] = Field(
-        description="magnitude of a bias"
+        description="largest magnitude of a bias"
     )
     bias_std_rad_s: Annotated[Positive, Limit("rate", "bias_std", "rad/s", "fitness", "bias")] = Field(
-        description="standard deviation of a bias"
+        description="largest standard uncertainty of a bias"
     )
     condition: Annotated[Positive, Limit("rate", "condition", "1", "fitness")] = Field(
-        description="condition number of the equations: how well the sweeps tell the parameters apart",
+        description="largest condition number of the equations: how well the sweeps separate the parameters (1 is "
+        "best)",
         json_schema_extra=RATIO,
     )
     verification_rms_rad_s: Annotated[
         Positive | None, Limit("rate", "verification_rms", "rad/s", "conformity", needed_by="verification")
     ] = Field(
         default=None,
-        description="RMS of the calibrated reading less the reference's, sample by sample; a verification needs it",
+        description="RMS of the difference between the corrected reading and the reference's, sample by sample; a "
+        "verification needs this limit",
     )
     verification_mean_rad_s: Annotated[
         Positive | None, Limit("rate", "verification_mean", "rad/s", "conformity", needed_by="verification")
     ] = Field(
         default=None,
-        description="the same difference averaged over each revolution, and the reference's from the arm; a "
-        "verification needs it",
+        description="the same difference, averaged over each revolution; also the difference between the "
+        "reference and the arm; a verification needs this limit",
     )
     acceleration_scale_deviation: Annotated[
         Positive | None, Limit("acceleration", "scale_deviation", "1", "conformity", "scale", "accelerometer")
     ] = Field(
         default=None,
-        description="of an accelerometer's scale factor from 1; a calibration of one needs it",
+        description="largest difference of an accelerometer's scale factor from 1; the calibration of an "
+        "accelerometer needs this limit",
         json_schema_extra=RATIO,
     )
     acceleration_scale_std: Annotated[
         Positive | None, Limit("acceleration", "scale_std", "1", "fitness", "scale", "accelerometer")
     ] = Field(
-        default=None, description="standard deviation of such a scale factor; needed too", json_schema_extra=RATIO
+        default=None,
+        description="largest standard uncertainty of an accelerometer's scale factor; needed too",
+        json_schema_extra=RATIO,
     )
     acceleration_bias_m_s2: Annotated[
         Positive | None, Limit("acceleration", "bias", "m/s²", "conformity", "bias", "accelerometer")
-    ] = Field(default=None, description="magnitude of an accelerometer's bias; needed too")
+    ] = Field(default=None, description="largest magnitude of an accelerometer's bias; needed too")
     acceleration_bias_std_m_s2: Annotated[
         Positive | None, Limit("acceleration", "bias_std", "m/s²", "fitness", "bias", "accelerometer")
-    ] = Field(default=None, description="standard deviation of such a bias; needed too")
+    ] = Field(default=None, description="largest standard uncertainty of an accelerometer's bias; needed too")
     acceleration_verification_m_s2: Annotated[
         Positive | None, Limit("acceleration", "verification", "m/s²", "conformity", needed_by="repeated attitudes")
     ] = Field(
         default=None,
-        description="how far the size of a calibrated acceleration at rest may be from gravity's; needed with repeats",
+        description="largest difference between the size of a corrected acceleration at rest and gravity; needed "
+        "with repeats",
     )
     bias_drift_rad_s: Annotated[
         Positive | None, Limit("rate", "bias_drift", "rad/s", "conformity", "bias_drift", "bias drift")
-    ] = Field(default=None, description="change of a gyroscope's bias between any two repeats; `bias_drift` needs it")
+    ] = Field(
+        default=None,
+        description="largest change of a gyroscope's bias between any two repeats; `bias_drift` needs this limit",
+    )
     acceleration_bias_drift_m_s2: Annotated[
         Positive | None, Limit("acceleration", "bias_drift", "m/s²", "conformity", "bias_drift", "bias drift")
     ] = Field(
-        default=None, description="change of an accelerometer's bias between any two repeats; `bias_drift` needs it"
+        default=None,
+        description="largest change of an accelerometer's bias between any two repeats; `bias_drift` needs this limit",
     )
 
     def lacking(self, need: Need) -> list[str]:
@@ -121,4 +131,4 @@ def limit_of(limits: Limits | None, quantity: str, what: str) -> tuple[Limit, fl
 
 
 class LimitsSection(Limits, extra="forbid"):
-    """The verdict's limits, for every sensor that is calibrated. There are no usual ones: state them all."""
+    """The limits of the verdict, for every sensor that is calibrated. They have no defaults: state them all."""

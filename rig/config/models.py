@@ -40,26 +40,26 @@ class ArmSection(Section):
         ge=0, le=PAYLOAD_LIMIT_KG, description="mass of all that the flange carries: fixture, board, cable"
     )
     payload_centre_mm: tuple[Offset, Offset, Offset] = Field(
-        default=(0.0, 0.0, 0.0), description="its centre of mass, x y z in the flange's frame"
+        default=(0.0, 0.0, 0.0), description="centre of mass of all this, x y z in the flange's frame"
     )
     extension_mm: tuple[Offset, Offset, Offset] = Field(
         default=(0.0, 0.0, 0.0),
-        description="end of a non-magnetic extension on which the sensors sit, x y z in the flange's frame; it and all "
-        "between it and the flange keep clear of the arm",
+        description="end of a non-magnetic extension on which the sensors are mounted, x y z in the flange's "
+        "frame; the plan keeps it, and everything between it and the flange, away from the arm",
     )
     home_deg: tuple[JointAngle, JointAngle, JointAngle, JointAngle, JointAngle, JointAngle] = Field(
         default=(0.0, -90.0, 90.0, -90.0, -90.0, 0.0),
-        description="joint angles, base to wrist 3, of the pose around which everything turns; wrist 2 near ±90°, or "
-        "the wrists' axes do not span space",
+        description="joint angles, base to wrist 3, of the home pose, around which the wrists turn; wrist 2 must be "
+        "near ±90°, so that the axes of the three wrists point in three different directions",
     )
     transfer_speed_deg_s: float = Field(
-        default=120.0, ge=0.1, le=SPEED_LIMIT_DEG_S, description="speed of the ways between sweeps"
+        default=120.0, ge=0.1, le=SPEED_LIMIT_DEG_S, description="speed of the movements between sweeps"
     )
-    state_rate_hz: float = Field(default=125.0, ge=125, le=500, description="how often the arm tells its state")
+    state_rate_hz: float = Field(default=125.0, ge=125, le=500, description="how many states the arm sends per second")
     kinematics: Literal["controller", "nominal"] = Field(
         default="controller",
-        description="whose account of the arm's geometry is used: `controller`, as the factory has measured this arm; "
-        "`nominal`, that of every UR10e, once the controller has said that it drives one",
+        description="where the arm's geometry comes from: `controller`, as the factory measured this arm; "
+        "`nominal`, the drawing of every UR10e (the controller must still say that it drives one)",
     )
 
     @field_validator("host")
@@ -70,7 +70,7 @@ class ArmSection(Section):
 
 
 class BoardSection(Section):
-    """The microcontroller board; left out where every sensor has a port of its own."""
+    """The microcontroller board. Leave it out if every sensor has a port of its own."""
 
     port: str = Field(
         min_length=1,
@@ -122,7 +122,7 @@ class OutputSection(Section):
     """Where results go."""
 
     folder: str = Field(
-        default="runs", min_length=1, max_length=1000, description="where each run gets a folder of its own"
+        default="runs", min_length=1, max_length=1000, description="folder in which each run gets a folder of its own"
     )
 
 

@@ -36,23 +36,25 @@ class SixSweepsSection(ProcedureSection):
 
     axes: Literal[3, 6] = Field(
         default=3,
-        description="how many axes are swept: `3`, one of each wrist; `6`, three more of wrist 1 with wrists 2 and 3 "
-        "turned, which tells the sensor's own angles from the arm's",
+        description="how many axes are swept: `3`, one for each wrist; `6`, also three more of wrist 1 with "
+        "wrists 2 and 3 turned, which separates the sensor's own angles from the arm's",
         json_schema_extra=RATIO,
     )
     order: tuple[Wrist, ...] | None = Field(
         default=None,
         min_length=1,
-        description="which wrist turns after which, each once; left out, the order in which a steady drift of the bias "
-        "does least harm",
+        description="order in which the wrists turn, each once; if left out, the order in which a steady drift of "
+        "the bias causes the smallest error",
     )
     directions: tuple[Direction, ...] | None = Field(
         default=None,
         min_length=1,
-        description="which way each wrist turns first, and then; left out, the ways in which a steady drift of the "
-        "bias does least harm",
+        description="direction in which each wrist turns first, and then second; if left out, the directions in "
+        "which a steady drift of the bias causes the smallest error",
     )
-    repeats: int = Field(default=1, ge=1, le=100, description="how often all of it is done", json_schema_extra=RATIO)
+    repeats: int = Field(
+        default=1, ge=1, le=100, description="how many times the whole procedure is done", json_schema_extra=RATIO
+    )
     speed_deg_s: Speed = Field(
         default=60.0,
         description=f"constant speed of a sweep; every sensor's range must be at least {SPEED_TO_RANGE} times as large",
@@ -61,18 +63,18 @@ class SixSweepsSection(ProcedureSection):
         default=None,
         min_length=1,
         max_length=8,
-        description="several speeds instead of `speed_deg_s`: every sweep is made at each, which tells how nonlinear "
-        "the sensor is",
+        description="several speeds in place of `speed_deg_s`: every sweep is made at each speed, which shows the "
+        "nonlinearity of the sensor",
     )
     acceleration_deg_s2: float = Field(
         default=240.0,
         ge=0.1,
         le=ACCELERATION_LIMIT_DEG_S2,
-        description="of every motion; a sweep's ramps lie outside the revolution it is averaged over",
+        description="acceleration of every motion; the ramps of a sweep are outside the revolution that is averaged",
     )
-    rest_s: float = Field(default=3.0, ge=0, le=3600, description="standing still after each sweep")
+    rest_s: float = Field(default=3.0, ge=0, le=3600, description="time of standing still after each sweep")
     margin_deg: float = Field(
-        default=2.0, gt=0, le=90, description="constant speed before the revolution begins, and after it ends"
+        default=2.0, gt=0, le=90, description="angle of constant speed before the revolution begins, and after it ends"
     )
 
     @model_validator(mode="after")
@@ -87,8 +89,9 @@ class SixSweepsSection(ProcedureSection):
 
     earth_rate: Literal["known", "find"] = Field(
         default="known",
-        description="`known`: taken out where `site` gives latitude and heading, else part of the uncertainty; `find`: "
-        "found from the readings of a gyroscope that is good enough, which needs rests in many attitudes (`imu`)",
+        description="`known`: taken out if `site` gives latitude and heading, else part of the uncertainty; "
+        "`find`: found from the readings of a gyroscope that is good enough; this needs rests in many "
+        "attitudes (`imu`)",
     )
 
     @property
@@ -117,13 +120,13 @@ class SixSweepsSection(ProcedureSection):
 
 
 class SixObservationSection(SixSweepsSection):
-    """Six sweeps that calibrate, and on demand the same once more to verify."""
+    """Six sweeps that calibrate; with `verify` the same movement again, to verify."""
 
     name: Literal["six_observation"] = Field(default="six_observation", description="this procedure")
     verify: bool = Field(
         default=False,
-        description="store a calibration that passed on the board, then repeat the movement with the board's corrected "
-        "readings and compare them with the reference's",
+        description="if the calibration passes, store it on the board, then repeat the movement with readings "
+        "that the board corrects, and compare them with the reference's",
     )
 
     @property
@@ -133,12 +136,12 @@ class SixObservationSection(SixSweepsSection):
 
 
 class VerifySection(SixSweepsSection):
-    """Six sweeps with calibrated readings, compared with a reference's."""
+    """Six sweeps with corrected readings, which are compared with a reference's."""
 
     name: Literal["verify"] = Field(default="verify", description="this procedure")
     verify: bool = Field(
         default=False,
-        description="means nothing here; allowed so that the file of a calibration serves its verification too",
+        description="no effect here; allowed, so that one file can be used for a calibration and for its verification",
     )
 
     @property
@@ -164,9 +167,10 @@ class AttitudesSection(ProcedureSection):
             default=SETS["eighteen"],
             min_length=1,
             max_length=100,
-            description="`eighteen`, best for an arm whose attitudes are good to 1 mrad; `faces`, twelve that are best "
-            "for exact ones; `magnetic`, the eighteen and eight more for magnetometers; or a list of your own, each "
-            "the angles of wrists 1, 2 and 3; base, shoulder and elbow stay as in `arm.home_deg`",
+            description="`eighteen`: the best for an arm whose attitudes are good to 1 mrad; `faces`: twelve that "
+            "are the best for exact attitudes; `magnetic`: the eighteen, and eight more for "
+            "magnetometers; or a list of your own, with the angles of wrists 1, 2 and 3 for each "
+            "attitude; base, shoulder and elbow stay as in `arm.home_deg`",
             json_schema_extra={
                 "unit": "°",
                 "allowed": f"{', '.join(f'`{name}`' for name in SETS)} or a list of 3 numbers each",
@@ -174,25 +178,30 @@ class AttitudesSection(ProcedureSection):
             },
         )
     )
-    dwell_s: float = Field(default=3.0, ge=0.1, le=3600, description="standing still in each attitude")
+    dwell_s: float = Field(default=3.0, ge=0.1, le=3600, description="time of standing still in each attitude")
     settle_s: float = Field(
-        default=5.0, gt=0, le=5, description="how long the sensors may take to settle before, or the run ends"
+        default=5.0,
+        gt=0,
+        le=5,
+        description="how long the sensors may take to settle before; if they take longer, the run ends",
     )
     second_order: bool = Field(
         default=False,
-        description="whether the attitudes must tell an accelerometer's second-order terms too, which triples the "
-        "uncertainty of its bias",
+        description="whether the attitudes must also determine an accelerometer's second-order terms; this "
+        "triples the uncertainty of its bias",
     )
     field_test_s: float = Field(
         default=0.0,
         ge=0,
         le=600,
-        description="standing still at home before the attitudes and after them, which shows whether the magnetic "
-        "field drifted; `0`: not at all",
+        description="time of standing still at home before the attitudes and after them, which shows whether the "
+        "magnetic field drifted; `0`: no such test",
     )
-    repeats: int = Field(default=1, ge=1, le=100, description="how often all of it is done", json_schema_extra=RATIO)
+    repeats: int = Field(
+        default=1, ge=1, le=100, description="how many times the whole procedure is done", json_schema_extra=RATIO
+    )
     acceleration_deg_s2: float = Field(
-        default=240.0, ge=0.1, le=ACCELERATION_LIMIT_DEG_S2, description="of every motion"
+        default=240.0, ge=0.1, le=ACCELERATION_LIMIT_DEG_S2, description="acceleration of every motion"
     )
 
     @field_validator("attitudes")
@@ -224,18 +233,23 @@ class AttitudesSection(ProcedureSection):
 
 
 class StaticAttitudesSection(AttitudesSection):
-    """The arm stands still in attitudes that tell an accelerometer's scale, angles and bias."""
+    """The arm stands still in attitudes that determine an accelerometer's scale, angles and bias."""
 
     name: Literal["static_attitudes"] = Field(default="static_attitudes", description="this procedure")
 
 
 class BiasDriftSection(AttitudesSection):
-    """Attitudes gone through again and again, for hours: how the bias drifts. As set, ten hours, as in TRIAX."""
+    """The arm goes through the attitudes again and again, for hours: how the bias drifts. By default ten hours, as in
+    TRIAX."""
 
     name: Literal["bias_drift"] = Field(default="bias_drift", description="this procedure")
-    dwell_s: float = Field(default=200.0, ge=0.1, le=3600, description="standing still in each attitude")
+    dwell_s: float = Field(default=200.0, ge=0.1, le=3600, description="time of standing still in each attitude")
     repeats: int = Field(
-        default=10, ge=2, le=100, description="how often all attitudes are gone through", json_schema_extra=RATIO
+        default=10,
+        ge=2,
+        le=100,
+        description="how many times the arm goes through all attitudes",
+        json_schema_extra=RATIO,
     )
 
     def problems(self, config: RigConfig) -> Iterator[str]:
@@ -256,8 +270,8 @@ class ImuSection(SixSweepsSection, AttitudesSection):
     name: Literal["imu"] = Field(default="imu", description="this procedure")
     axes: Literal[3, 6] = Field(
         default=6,
-        description="how many axes are swept: `3`, one of each wrist; `6`, three more of wrist 1 with wrists 2 and 3 "
-        "turned, which tells the sensor's own angles from the arm's",
+        description="how many axes are swept: `3`, one for each wrist; `6`, also three more of wrist 1 with "
+        "wrists 2 and 3 turned, which separates the sensor's own angles from the arm's",
         json_schema_extra=RATIO,
     )
 

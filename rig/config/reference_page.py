@@ -45,37 +45,39 @@ Generated from the models in [`rig/config/`](../rig/config) by
 `python -m rig.config.reference_page > docs/configuration.md`: change the models, not this page.
 
 One YAML file is one repeatable calibration: the rig, its sensors, the procedure, the verdict's limits. Every quantity
-has its unit in its key. A file is judged whole before anything is connected: every error is told at once, with its
-path, its line, what is allowed and, for a misspelling, the nearest key (error `configuration`, exit status 2). A key
-that this page does not name is an error.
+has its unit in its key. The rig checks the whole file before it connects to anything, and reports all errors at once.
+Each error has its path, its line, what is allowed and, for a misspelling, the nearest key (error `configuration`, exit
+status 2). A key that is not on this page is an error. Words: [glossary](glossary.md).
 
 ## Building on another file
 
-`base:` names a file that says the rest, by a path relative to the file it stands in. This is the whole of
-[repeat_lsm9ds1.yaml](../configs/repeat_lsm9ds1.yaml):
+A file can build on another one, its base, and state only what differs. `base:` names that file, by a path relative to
+the file that contains the line. The following is the complete [repeat_lsm9ds1.yaml](../configs/repeat_lsm9ds1.yaml):
 
 ```yaml
 {REPEAT}```
 
-- Sections merge key by key; lists and single values replace what the base says.
-- `null` leaves out what the base says: `world: null` takes the simulated laboratory away, `range_deg_s: null` goes back
-  to the usual range. Where the base says nothing, `null` is an error like any other wrong value.
-- A base may have a base itself, up to {layers.FILES_MAX} files one on another; a circle is refused.
-- An error names the file and the line it comes from: `arm.payload_kg (demo.yaml, line 4)`.
-- The run folder's `config.yaml` holds everything put together and needs no base: a run can be resumed where the files
-  it was made of are not.
+- Sections are merged key by key. Lists and single values replace those of the base.
+- `null` deletes a key of the base. `world: null` takes the simulated laboratory away, so the rig uses hardware.
+  `range_deg_s: null` returns to the usual range. If the base does not have the key, `null` is an error like any other
+  wrong value.
+- A base may have a base itself, up to {layers.FILES_MAX} files in all. A circle is refused.
+- An error names its file and its line: `arm.payload_kg (demo.yaml, line 4)`.
+- The run folder's `config.yaml` contains everything together and needs no base. So a run can be resumed on a computer
+  that does not have the original files.
 
 ## Changing a value for one run
 
-`--set path.to.key=value`, as often as needed, with the value in YAML: `--set procedure.speed_deg_s=30`,
-`--set 'sensors.gyro.mounting={{x: +y, y: -x, z: +z}}'`. It replaces what the file says at that place, whole sections
-too; `null` leaves it out. What is set so stands in the run folder's `config.yaml`.
+Use `--set path.to.key=value`, once or several times, with the value in YAML: `--set procedure.speed_deg_s=30`,
+`--set 'sensors.gyro.mounting={{x: +y, y: -x, z: +z}}'`. It replaces what the file says at that
+place; this may be a whole section. `null` deletes it. The run folder's `config.yaml` contains the new value.
 
-## What a file may hold
+## What a file may contain
 
-Plain YAML in UTF-8, in a regular file of at most {yaml_text.SIZE_MAX_BYTES // 1024} KiB: at most {yaml_text.NODES_MAX}
-keys and values, an alias counted as all it stands for, and {yaml_text.DEPTH_MAX} sections or lists within one another.
-Keys are words. Tags (`!!…`) and control characters are refused, and so is a key that stands twice.
+Plain YAML in UTF-8, in a regular file of at most {yaml_text.SIZE_MAX_BYTES // 1024} KiB. It may have at most
+{yaml_text.NODES_MAX} keys and values (an alias counts as everything that it replaces), and at most
+{yaml_text.DEPTH_MAX} sections or lists inside each other. Keys are words. Tags (`!!…`), control characters and a key
+that is there twice are refused.
 """
 
 
@@ -88,8 +90,8 @@ def _keys() -> Iterator[str]:
     yield from (
         "## Keys",
         "",
-        "`arm`, `sensors` and `limits` must be there, and `board` where a sensor is on it; the other sections may be "
-        "left out.",
+        "`arm`, `sensors` and `limits` are required; `board` is required if a sensor is on it. The other sections may",
+        "be left out. The last column says what holds when a key is left out.",
         "",
     )
     schema = RigConfig.model_json_schema()
@@ -105,9 +107,9 @@ def _procedures() -> Iterator[str]:
     yield from (
         "### `procedure`",
         "",
-        f"`name` says which procedure is run, `{DEFAULT_PROCEDURE}` when it is left out, and with it which keys this "
-        "section has.",
-        "A procedure of one's own brings its own section.",
+        f"`name` says which procedure is run; if it is left out, this is `{DEFAULT_PROCEDURE}`. The keys of this "
+        "section depend on it.",
+        "[A procedure of your own](how-to/own-procedure.md) has its own section.",
         "",
     )
     for name, section in STOCK_SECTIONS.items():
@@ -138,11 +140,11 @@ def _world() -> Iterator[str]:
         "## The simulated laboratory",
         "",
         "With a `world:` section a simulated UR10e, an emulated board and simulated KVH 1775s answer at `arm.host`,",
-        "`board.port` and `sensors.<name>.serial.port`, on this machine only: the host must be a loopback address",
-        "(127.x.y.z), a port `socket://host:port`. Where another laboratory has that address already, the one of a",
-        "command moves to a free one and says so; only `rig world` stays.",
-        "Without one the rig connects to what is there. Only the laboratory uses what stands here: neither a recording",
-        "nor a result holds it.",
+        "`board.port` and `sensors.<name>.serial.port`. They answer on this computer only: the host must be a loopback",
+        "address (127.x.y.z), and a port must be `socket://host:port`. If another simulated laboratory already has",
+        "this address, a command takes a free one and says so; only `rig world` never changes the address.",
+        "Without a `world:` section the rig connects to the real arm and board. Only the simulated laboratory uses the",
+        "values of this section. They are in no recording and no result.",
         "",
     )
     yield from _section("world", schema, schema["$defs"])

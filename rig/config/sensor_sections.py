@@ -45,19 +45,19 @@ class OwnPortSection(Section):
     )
     baud: Literal[9600, 19200, 38400, 57600, 115200, 460800, 576000, 921600, 4147200] = Field(
         default=921600,
-        description="speed the sensor's line is set to; the rig changes it on neither side",
+        description="speed to which the sensor is set; the rig does not change it in the sensor",
         json_schema_extra={"unit": "Bd"},
     )
     message: Literal["A", "B", "C"] = Field(
         default="B",
-        description="format of its messages: `B` has the sensor's own microseconds, by which lost messages are counted "
-        "beyond doubt; `A` and `C` have none, and `C` has its magnetic field, recorded as the magnetometer "
-        "`<sensor>_field`",
+        description="format of its messages: `B` contains the sensor's own microseconds, which show without doubt "
+        "how many messages were lost; `A` and `C` do not contain them; `C` contains the magnetic "
+        "field, recorded as the magnetometer `<sensor>_field`",
     )
     rotation: Literal["delta", "rate"] = Field(
         default="delta",
-        description="`delta`: the angle turned through since the message before, in which nothing is aliased; `rate`: "
-        "the rate as the sensor's own filter leaves it",
+        description="`delta`: the angle since the message before, without aliasing; `rate`: the rate after the "
+        "sensor's own filter",
     )
 
     @field_validator("port")
@@ -68,11 +68,11 @@ class OwnPortSection(Section):
 
 
 class MountingSection(Section):
-    """Which flange axis each sensor axis points along, nominally: a right-handed frame. It need not be exact."""
+    """The flange axis along which each sensor axis points, as a right-handed frame. A few degrees off do not matter."""
 
     x: AxisName = Field(default="+x", description="the flange axis along which the sensor's x axis points")
-    y: AxisName = Field(default="+y", description="the same of its y axis")
-    z: AxisName = Field(default="+z", description="the same of its z axis")
+    y: AxisName = Field(default="+y", description="the flange axis along which the sensor's y axis points")
+    z: AxisName = Field(default="+z", description="the flange axis along which the sensor's z axis points")
 
     @model_validator(mode="after")
     def right_handed(self) -> Self:
@@ -83,7 +83,7 @@ class MountingSection(Section):
 
 
 class TurntableSection(Section):
-    """A reference's own calibration, found before: rate = scale · (reading + bias_rad_s)."""
+    """The reference's own calibration from before: rate = scale · (reading + bias_rad_s)."""
 
     scale: tuple[Positive, Positive, Positive] = Field(
         default=(1.0, 1.0, 1.0), description="scale factor of each axis", json_schema_extra=RATIO
@@ -92,11 +92,11 @@ class TurntableSection(Section):
 
 
 class AccelerationSection(Section):
-    """The part's accelerometer; without this section it is not read. It is calibrated where attitudes are held."""
+    """The part's accelerometer. Without this section it is not read. Procedures with attitudes calibrate it."""
 
     range_g: float | None = Field(
         default=None,
-        description="its full scale, one of the part's; left out, the smallest it has",
+        description="full scale of the accelerometer, one of the part's ranges; if left out, the smallest",
         json_schema_extra={"unit": "g"},
     )
 
@@ -106,15 +106,17 @@ class SensorSection(Section):
 
     part: Literal["lsm9ds1", "mpu9250", "adis16465", "kvh1775"] = Field(description="which gyroscope it is")
     serial_number: str = Field(
-        description="which specimen it is; kept on the board and in every result; a `kvh1775` is asked for its own",
+        description="serial number of this sensor; stored on the board and in every result; a `kvh1775` reports "
+        "its own, and another number is refused",
         json_schema_extra={"allowed": f"1 to {SERIAL_NUMBER_MAX} plain ASCII characters"},
     )
     role: Literal["calibrate", "reference"] = Field(
         default="calibrate",
-        description="what it is here for; at most one sensor is the reference others are compared with",
+        description="purpose of the sensor: it is calibrated, or it is the reference with which the others are "
+        "compared; at most one is the reference",
     )
     rate_hz: float = Field(
-        description="samples a second, one of the part's rates; 333.33 stands for 1000/3", json_schema_extra=OF_THE_PART
+        description="samples per second, one of the part's rates; 333.33 means 1000/3", json_schema_extra=OF_THE_PART
     )
     range_deg_s: float = Field(
         description="full scale, one of the part's ranges; at least 1.5 times the fastest sweep",
@@ -123,8 +125,8 @@ class SensorSection(Section):
     mounting: MountingSection = Field(default=MountingSection(), description="how it sits on the flange")
     correction: Literal["matrix", "diagonal"] = Field(
         default="diagonal",
-        description="what the board and `calibration.h` correct readings by: each axis for itself, as in the paper, or "
-        "the whole matrix, which also brings the axes to right angles",
+        description="how the board and `calibration.h` correct readings: `diagonal`, each axis alone, as in the "
+        "paper; `matrix`, with the whole matrix, which also brings the axes to right angles",
     )
     turntable: TurntableSection = Field(
         default=TurntableSection(), description="its own calibration, of a reference only; left out, it reads true"
@@ -220,12 +222,12 @@ class MagnetometerSection(Section):
 
     part: Literal["lsm9ds1_magnetometer"] = Field(description="which magnetometer it is")
     serial_number: str = Field(
-        description="which specimen it is; in every result",
+        description="serial number of this sensor; in every result",
         json_schema_extra={"allowed": f"1 to {SERIAL_NUMBER_MAX} plain ASCII characters"},
     )
     rate_hz: float = Field(
         default=MAGNETOMETERS["lsm9ds1_magnetometer"].default_rate_hz,
-        description="samples a second, one of the part's rates",
+        description="samples per second, one of the part's rates",
         json_schema_extra={"allowed": in_words(MAGNETOMETERS["lsm9ds1_magnetometer"].rates_hz)},
     )
     range_gauss: float = Field(

@@ -10,26 +10,27 @@ NOTHING: Vector3 = (0.0, 0.0, 0.0)
 
 
 class IronSection(Section):
-    """Iron, a motor or a brake of the arm as a magnetic dipole, under a name of its own."""
+    """Iron, a motor or a brake of the arm as a magnetic dipole, under a name of your choice."""
 
     carried_by: Literal["base", "shoulder", "upper_arm", "forearm", "wrist_1", "wrist_2", "wrist_3"] = Field(
         description="the link it is fixed to and moves with, by the joint that carries that; the housing of joint "
         "wrist 3 is carried by `wrist_2`, the flange by `wrist_3`"
     )
-    place_mm: Vector3 = Field(default=NOTHING, description="where in that link's frame, of Denavit and Hartenberg")
-    moment_a_m2: Vector3 = Field(description="its moment, in that frame", json_schema_extra={"unit": "A m²"})
+    place_mm: Vector3 = Field(default=NOTHING, description="place in the frame of that link (Denavit and Hartenberg)")
+    moment_a_m2: Vector3 = Field(description="magnetic moment, in that frame", json_schema_extra={"unit": "A m²"})
 
 
 class SimulatedFieldSection(Section):
-    """The truth of one simulated magnetometer, m = F B + b of the magnetic field B where it is."""
+    """The truth of one simulated magnetometer: m = F B + b, with the magnetic field B at its place."""
 
     scale: Vector3 = Field(
         default=(1.0, 1.0, 1.0),
-        description="scale factor of each axis: what the length of a row of F is 1 over",
+        description="scale factor of each axis: 1 divided by the length of a row of F",
         json_schema_extra=RATIO,
     )
     bias_ut: Vector3 = Field(
-        default=NOTHING, description="bias b of each axis, part of the reading: its own, and iron that turns with it"
+        default=NOTHING,
+        description="bias b of each axis, part of the reading: the sensor's own, and that of iron that turns with it",
     )
     noise_ut: float = Field(default=0.3, ge=0, description="standard deviation of a sample's noise")
     non_orthogonality_deg: Vector3 = Field(
@@ -41,10 +42,10 @@ class SimulatedMagnetometerSection(SimulatedFieldSection):
     """A simulated magnetometer on the board."""
 
     mounting_error_deg: Vector3 = Field(
-        default=NOTHING, description="rotation vector by which it sits off its nominal mounting"
+        default=NOTHING, description="rotation of the sensor from its nominal mounting, as a rotation vector"
     )
     offset_mm: Vector3 | None = Field(
         default=None,
-        description="where it sits, x y z from the flange's centre in the flange's frame; left out, at the end of "
-        "`arm.extension_mm`",
+        description="place of the sensor, x y z from the flange's centre in the flange's frame; if left out, the "
+        "end of `arm.extension_mm`",
     )
