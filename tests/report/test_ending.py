@@ -122,7 +122,7 @@ def test_the_page_of_checks_is_made_of_the_table() -> None:
 @pytest.mark.parametrize(
     ("name", "said"),
     [
-        ("gyro.acceleration_scale_changed", "the scale factors changed as the run went on"),
+        ("gyro.acceleration_scale_changed", "the scale factors changed during the run"),
         ("gyro.disturbed_sweep.3", "rig resume RUN"),
         ("clocks_agree.controller_and_crystal", "two clocks differ"),
         ("wrong_axis", "an error"),
