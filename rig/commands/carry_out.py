@@ -11,9 +11,9 @@ from rig.commands.laboratory import simulated_laboratory
 from rig.commands.page_arguments import PageWish, operators_page
 from rig.commands.recall import remembered
 from rig.commands.remember import remember, since_lines
-from rig.commands.show import print_ending
 from rig.data.run_folder import CONFIG, LOG, WORLD_LATE
 from rig.report.document import document_of
+from rig.report.table import print_kept
 from rig.runner.phases import Run
 from rig.station.confirm import ask_operator
 from rig.station.events import NotRemembered, RunFolderWritten
@@ -59,11 +59,7 @@ def carry_out(
             if entered is not None:
                 station.event(entered)
             station.event(RunFolderWritten(folder))
-        result = document_of(outcome)
-        if as_json:
-            print(result.text())
-        else:
-            print_ending(folder, result, since_lines(beside))
+        print_kept(folder, document_of(outcome), since_lines(beside), as_json=as_json)
         shown.stay()
     return 0 if outcome.passed else 1
 

@@ -1,6 +1,6 @@
 """Arguments of several commands: the configuration, changes to it, a script in place of the procedure it names."""
 
-from argparse import ArgumentParser
+from argparse import ArgumentParser, _ActionsContainer
 from pathlib import Path
 
 
@@ -20,6 +20,6 @@ def add_script(parser: ArgumentParser) -> None:
     parser.add_argument("--script", type=Path, metavar="FILE", help="a procedure of your own, in place of the file's")
 
 
-def add_json(parser: ArgumentParser) -> None:
+def add_json(parser: _ActionsContainer) -> None:
     """Add the argument `--json`."""
     parser.add_argument("--json", action="store_true", help="for machines")

@@ -7,8 +7,6 @@ from typing import TYPE_CHECKING
 from rig.errors import Refused
 
 if TYPE_CHECKING:
-    from collections.abc import Sequence
-
     from rig.data.result_file import ResultDocument
 
 
@@ -30,7 +28,7 @@ def run(options: Namespace) -> int:
     from rich.console import Console
 
     from rig.data.result_file import read_result
-    from rig.report.table import print_checks, print_values, print_verdict
+    from rig.report.table import print_checks, print_kept, print_values, print_verdict
 
     result, sensor = read_result(options.run), options.sensor
     if sensor is not None and sensor not in (names := _sensors(result)):
@@ -43,26 +41,8 @@ def run(options: Namespace) -> int:
     if options.budget or options.all or options.checks or sensor is not None:
         print_verdict(result, console)
     else:
-        print_ending(options.run, result)
+        print_kept(options.run if options.run.is_dir() else options.run.parent, result)
     return 0
-
-
-def print_ending(place: Path, result: "ResultDocument", since: "Sequence[str]" = ()) -> None:
-    """Print on stdout what a run amounts to that lies at a `place`, in few lines; `since` are those of the history."""
-    from rich.console import Console
-
-    from rig.report.certificate.writer import PAGE
-    from rig.report.ending import ending
-    from rig.report.table import print_verdict
-    from rig.station.plain_text import plain
-
-    folder = place if place.is_dir() else place.parent
-    certificate = folder / PAGE if (folder / PAGE).is_file() else None
-    console = Console(highlight=False)
-    *lines, _ = ending(result, folder=folder, certificate=certificate, since=since, width=console.width)
-    for line in lines:
-        console.print(plain(line), soft_wrap=True)
-    print_verdict(result, console)
 
 
 def _sensors(result: "ResultDocument") -> list[str]:

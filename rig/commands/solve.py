@@ -30,7 +30,9 @@ def add(solve: ArgumentParser) -> None:
     solve.add_argument(
         "--script", type=Path, metavar="FILE", help="the script it was recorded by, where that is another's; executed"
     )
-    add_json(solve)
+    shown = solve.add_mutually_exclusive_group()
+    add_json(shown)
+    shown.add_argument("--all", action="store_true", help="every table: values, budgets, checks")
     solve_elsewhere.add(solve)
 
 
@@ -64,5 +66,6 @@ def _recording(options: Namespace) -> int:
     outcome = judged(run, options.estimator or DEFAULT_ESTIMATOR)
     if (said := left_out(run)) is not None:
         say(said, sys.stderr)
-    print_outcome(document_of(outcome), as_json=options.json)
+    folder = options.run if options.run.is_dir() else options.run.parent
+    print_outcome(document_of(outcome), as_json=options.json, whole=options.all, folder=folder)
     return 0 if outcome.passed else 1

@@ -74,9 +74,8 @@ def run(options: Namespace) -> int:
     """
     from rig.analysis.outcome import calibrated
     from rig.commands.remember import since_lines
-    from rig.commands.show import print_ending
     from rig.report.document import document_of
-    from rig.report.table import print_outcome
+    from rig.report.table import print_kept, print_outcome
 
     if options.history is not None and options.out is None:
         raise Refused("bad_option", "--history is for what is kept", "Give --out, which keeps the run")
@@ -85,10 +84,10 @@ def run(options: Namespace) -> int:
         outcome = calibrated([recording])
     beside = () if options.out is None else _kept(options, recording, outcome)
     result = document_of(outcome)
-    if options.json or options.out is None:
-        print_outcome(result, as_json=options.json)
+    if options.out is None or options.all:
+        print_outcome(result, as_json=options.json, whole=options.all)
     else:
-        print_ending(options.out, result, since_lines(beside))
+        print_kept(options.out, result, since_lines(beside), as_json=options.json)
     return 0 if outcome.passed else 1
 
 

@@ -1,6 +1,5 @@
 """What a run amounts to, in few lines: each sensor's values ± U, what failed or nearly did, where the rest is. Pure."""
 
-import shlex
 import textwrap
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
@@ -33,11 +32,18 @@ class _Item:
 
 
 def ending(
-    result: ResultDocument, *, folder: Path | None, certificate: Path | None, since: Sequence[str], width: int
+    result: ResultDocument,
+    *,
+    folder: Path | None,
+    everything: str,
+    certificate: Path | None,
+    since: Sequence[str],
+    width: int,
 ) -> Iterator[str]:
     """The lines of the end of a run, the verdict last; none is longer than `width`, but for paths and commands.
 
-    `since` says how it compares with the last calibrations; `folder` is where everything else is, if that is kept.
+    `since` says how it compares with the last calibrations; `folder` is the run's, if there is one, of which what to do
+    is said; `everything` is how all the rest is printed.
     """
     items = [*_items(result)]
     values = [*(_one(items[0], width) if len(items) == 1 else _several(items, width))]
@@ -48,10 +54,10 @@ def ending(
     below = [*summary, *(line for each in said for line in _wrapped(each, width))]
     if certificate is not None:
         below.append(f"certificate: {certificate}")
-    if folder is not None:
-        below.append(f"everything: rig show {shlex.quote(str(folder))}")
+    below.append(f"everything: {everything}")
+    room = (ONE_SENSOR if len(items) == 1 else MANY) - len(values) - len(below) - 1
     yield from values
-    yield from _failed(result, folder, width, (ONE_SENSOR if len(items) == 1 else MANY) - len(values) - len(below) - 1)
+    yield from _failed(result, folder, width, room)
     yield from below
     yield f"verdict: {result.verdict.upper()}"
 
@@ -167,8 +173,7 @@ def _failed(result: ResultDocument, folder: Path | None, width: int, room: int) 
         lines = [*_wrapped(f"FAILED {_measured(check)}" + ("" if words is None else f": {words}"), width)]
         more = number < len(failed) - 1
         if number > 0 and len(lines) + more > room:
-            run = "RUN" if folder is None else shlex.quote(str(folder))
-            yield f"and {len(failed) - number} more checks failed: rig show {run} --checks"
+            yield f"and {len(failed) - number} more checks failed"
             return
         yield from lines
         room -= len(lines)

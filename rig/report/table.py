@@ -1,24 +1,59 @@
 """The result as a person reads it in the terminal: whole, or what of it is asked for."""
 
+import shlex
 from collections.abc import Sequence
+from pathlib import Path
 
 from rich.console import Console
 from rich.table import Table
 
 from rig.data.result_file import CheckEntry, ResultDocument
+from rig.report.certificate.writer import PAGE
+from rig.report.ending import ending
 from rig.report.kinds.kind import said
 from rig.report.kinds.registry import kinds
 from rig.station.plain_text import plain
 
 ROUNDING = 1e-12
+ALL_OF_IT = "the same command with --all"
 
 
-def print_outcome(document: ResultDocument, *, as_json: bool) -> None:
-    """The document on stdout: tables for people, JSON for machines."""
+def print_outcome(document: ResultDocument, *, as_json: bool, whole: bool = False, folder: Path | None = None) -> None:
+    """Print what was solved and is not kept: the document for machines, else its ending or, as a `whole`, all tables.
+
+    `folder` is that of the run it was recorded in, which what to do is said of.
+    """
+    console = Console(highlight=False)
     if as_json:
         print(document.text())
+    elif whole:
+        print_result(document, console)
     else:
-        print_result(document, Console(highlight=False))
+        lines = ending(document, folder=folder, everything=ALL_OF_IT, certificate=None, since=(), width=console.width)
+        _print_ending([*lines], document, console)
+
+
+def print_kept(folder: Path, document: ResultDocument, since: Sequence[str] = (), *, as_json: bool = False) -> None:
+    """Print what the finished run in a `folder` amounts to; `since` says how it compares with the last calibrations."""
+    if as_json:
+        print(document.text())
+        return
+    console, certificate = Console(highlight=False), folder / PAGE
+    lines = ending(
+        document,
+        folder=folder,
+        everything=f"rig show {shlex.quote(str(folder))} --all",
+        certificate=certificate if certificate.is_file() else None,
+        since=since,
+        width=console.width,
+    )
+    _print_ending([*lines], document, console)
+
+
+def _print_ending(lines: Sequence[str], document: ResultDocument, console: Console) -> None:
+    for line in lines[:-1]:
+        console.print(plain(line), soft_wrap=True)
+    print_verdict(document, console)
 
 
 def print_result(result: ResultDocument, console: Console) -> None:

@@ -119,7 +119,7 @@ def test_the_clock_of_a_table_is_found_by_the_turning_both_saw(
     assert abs(off_s) < 4 * clock["offset_std_s"] < 1e-3
     assert abs(clock["drift"] + 4e-4) < 4 * clock["drift_std"] + 4e-7
     assert np.allclose(rate["vector_model"]["matrix"], GYRO_MATRIX, atol=1e-4)
-    assert main(solve(files, "--find-clock")) == 0
+    assert main(solve(files, "--find-clock", "--all")) == 0
     assert "the samples' clock on the table's: +731." in capsys.readouterr().out
 
 
@@ -150,7 +150,7 @@ def test_any_estimator_can_be_asked_for(estimator: str, capsys: pytest.CaptureFi
 
 
 def test_people_read_what_was_found_and_what_was_not(capsys: pytest.CaptureFixture[str]) -> None:
-    assert main(solve(example(STILL), *PLACE)) == 0
+    assert main(solve(example(STILL), *PLACE, "--all")) == 0
     said = " ".join(capsys.readouterr().out.split())
     assert "attitude error found:" in said and "as_published, attitudes alone: k" in said
     assert "imu, magnetometer, not calibrated: field_strength_unknown:" in said

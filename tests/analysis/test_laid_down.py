@@ -64,7 +64,7 @@ def test_real_faces_laid_down_again_are_within_what_was_stated(
     for again in ([1.00326, 0.99757, 0.97713], [1.00373, 0.99757, 0.97713], [1.00370, 0.99757, 0.97713]):
         assert (np.abs(scale - again) < known).all()
     assert (known < 1e-3).all(), "and it says something"
-    assert main(["solve", *map(str, (files[0], "--attitudes", files[1]))]) == 0
+    assert main(["solve", *map(str, (files[0], "--attitudes", files[1], "--all"))]) == 0
     said = " ".join(capsys.readouterr().out.split())
     assert "7 rests beside the rows have told of it" in said and "uncertainty budget" in said
 
@@ -75,7 +75,8 @@ def test_six_rests_and_no_more_hardly_tell_what_a_placement_does(
     laid = lay_down(Box(), 1)
     known, alone = (expanded(solved(capsys, *write(tmp_path, each))) for each in (lay_down(Box(rounds=3), 1), laid))
     assert (alone[:3] > 2 * known[:3]).all()
-    assert main(["solve", *map(str, (tmp_path / "samples.csv", "--attitudes", tmp_path / "attitudes.csv"))]) == 0
+    files = tmp_path / "samples.csv", tmp_path / "attitudes.csv"
+    assert main(["solve", str(files[0]), "--attitudes", str(files[1]), "--all"]) == 0
     assert "lay it down in the same attitudes again" in " ".join(capsys.readouterr().out.split())
 
 
@@ -89,7 +90,8 @@ def test_rows_in_which_the_body_moves_are_left_out(tmp_path: Path, capsys: pytes
     found = solved(capsys, *write(tmp_path, dense))
     assert len(found["dwells"]) == 18 and found["laid_down"]["rows_left_out"] > 100
     assert (np.abs(off(found, laid)) < 3.5).all()
-    assert main(["solve", str(tmp_path / "samples.csv"), "--attitudes", str(tmp_path / "attitudes.csv")]) == 0
+    files = tmp_path / "samples.csv", tmp_path / "attitudes.csv"
+    assert main(["solve", str(files[0]), "--attitudes", str(files[1]), "--all"]) == 0
     assert "left out: not_at_rest: " in " ".join(capsys.readouterr().out.split())
 
 

@@ -82,7 +82,7 @@ def test_real_turns_by_hand_tell_as_much_as_they_can(
     assert freedom["bias from rest to rest"] >= 3 and freedom["noise"] > 1000
     by_means = document(capsys, *files, "--estimator", "vector")
     assert (2 * np.sqrt(np.diag(by_means["covariance"]))[:3] > 0.1).all(), "how it was before"
-    assert main(["solve", *map(str, files)]) == 0
+    assert main(["solve", *map(str, files), "--all"]) == 0
     said = " ".join(capsys.readouterr().out.split())
     assert "by the angle turned from rest to rest: 3 of 3 sweeps (rows 7, 8, 9)" in said
     assert "ends of the turns" in said and "axes of the turns" in said

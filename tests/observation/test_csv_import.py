@@ -201,7 +201,7 @@ def test_people_see_uncertainties_with_one_coverage_factor_and_the_angles_betwee
     files = [str(EXAMPLES / "samples.csv"), "--sweeps", str(EXAMPLES / "sweeps.csv")]
     assert main(["solve", *files, "--json"]) == 0
     found = json.loads(capsys.readouterr().out)["sensors"]["imu"]
-    assert main(["solve", *files]) == 0
+    assert main(["solve", *files, "--all"]) == 0
     printed = capsys.readouterr().out
     scale_x = next(line for line in printed.splitlines() if "scale" not in line and " x " in line)
     factor = found["budget"]["coverage_factor"]

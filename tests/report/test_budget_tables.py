@@ -140,7 +140,7 @@ def test_the_terminal_shows_the_budgets_of_the_certificate(
     document = read_result(folder)
     calibrated = {name: each for name, each in document.sensors.items() if each.role == "calibrate"}
     document = document.model_copy(update={"sensors": calibrated})
-    print_outcome(document, as_json=False)
+    print_outcome(document, as_json=False, whole=True)
     shown = capsys.readouterr().out
     assert "\\x" not in shown
     tables, numbers = at_the_terminal(shown), slice(-4, None)
@@ -171,7 +171,7 @@ def test_a_budget_of_readings_made_elsewhere_adds_up_and_every_scatter_is_counte
 ) -> None:
     monkeypatch.setenv("COLUMNS", "400")
     arguments = elsewhere(samples, table, estimator)
-    assert main(["solve", *arguments]) == 0
+    assert main(["solve", *arguments, "--all"]) == 0
     tables = at_the_terminal(capsys.readouterr().out)
     assert main(["solve", *arguments, "--json"]) == 0
     stated = budgets_in(json.loads(capsys.readouterr().out))

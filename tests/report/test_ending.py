@@ -19,7 +19,8 @@ COPYABLE = ("certificate: ", "everything: ")
 
 def ended(result: ResultDocument, width: int = 80) -> list[str]:
     since = SINCE if len(result.sensors) > 2 else SINCE[:1]
-    return [*ending(result, folder=RUN, certificate=RUN / "certificate.html", since=since, width=width)]
+    everything, certificate = f"rig show {RUN} --all", RUN / "certificate.html"
+    return [*ending(result, folder=RUN, everything=everything, certificate=certificate, since=since, width=width)]
 
 
 def of_three_parts() -> ResultDocument:
@@ -72,7 +73,7 @@ def test_one_sensor_ends_in_twelve_lines(result: ResultDocument) -> None:
 @pytest.mark.parametrize("names", [[], ALL[:1], ALL[:40]], ids=["passed", "one failed", "forty failed"])
 def test_six_sensors_end_in_a_screen(names: list[str]) -> None:
     lines = ended(failed(of_three_parts(), *names))
-    assert len(lines) <= 25 and any("more checks failed: rig show" in line or len(names) < 2 for line in lines)
+    assert len(lines) <= 25 and any("more checks failed" in line or len(names) < 2 for line in lines)
 
 
 @pytest.mark.parametrize("width", [60, 80, 120])
@@ -82,7 +83,7 @@ def test_every_result_fits_the_width_and_ends_with_its_verdict(folder: Path, wid
     for lines in (ended(result, width), ended(failed(result, *(each.name for each in result.checks)), width)):
         assert max(len(line) for line in lines if not line.startswith(COPYABLE) and "rig " not in line) <= width
         assert lines[-1] in {"verdict: PASS", "verdict: FAIL"}
-        assert f"everything: rig show {RUN}" in lines
+        assert f"everything: rig show {RUN} --all" in lines
         assert not any("verdict" in line for line in lines[:-1])
 
 
@@ -154,6 +155,20 @@ def test_a_finished_run_is_shown_as_it_ended_or_in_full(capsys: pytest.CaptureFi
     assert "reference (known)" in budget and "reference (known)" not in shown(capsys, "--sensor", "gyro")
     assert main(["show", str(FIXTURES / "verified"), "--sensor", "nobody"]) == 2
     assert "Choose one of: gyro, reference" in capsys.readouterr().err
+
+
+def test_a_recording_that_is_solved_again_ends_as_a_run_does(capsys: pytest.CaptureFixture[str]) -> None:
+    again = ["solve", str(FIXTURES / "verified")]
+    assert main(again) == 0
+    lines = capsys.readouterr().out.splitlines()
+    assert lines[0].startswith("gyroscope gyro ") and len(lines) <= 12 and lines[-1] == "verdict: PASS"
+    assert "everything: the same command with --all" in lines
+    assert main([*again, "--all"]) == 0
+    whole = capsys.readouterr().out
+    assert "checks of gyro" in whole and "non-orthogonality" in whole and whole.splitlines()[-1] == "verdict: PASS"
+    assert main([*again, "--set", "limits.scale_deviation=0.01"]) == 1
+    said = " ".join(capsys.readouterr().out.split())
+    assert f"rig solve {FIXTURES / 'verified'} --set limits.scale_deviation=VALUE" in said
 
 
 def test_checks_that_failed_stand_first_and_rounding_is_not_printed(

@@ -44,7 +44,7 @@ def test_a_serial_number_is_no_markup_and_no_command_to_the_terminal(capsys: pyt
     document = result_document({HOSTILE: sensor})
     text = " ".join(shown(document).split())  # a title is as wide as its table
     assert text.count(SHOWN) == 3
-    print_outcome(document, as_json=False)
+    print_outcome(document, as_json=False, whole=True)
     print_outcome(document, as_json=True)
     assert "\x1b" not in text + capsys.readouterr().out
 

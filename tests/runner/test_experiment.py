@@ -103,7 +103,7 @@ def test_gravitys_share_of_what_is_left_is_told(finished: Finished) -> None:
     gravity = np.array([turn["gravity_rad_s"][2] for turn in upright])
     print(f"along the axis {along}, without gravity {along - gravity} rad/s")
     assert np.abs(along - gravity).max() < np.abs(along).min() / 2
-    shown = rig_here("solve", out)
+    shown = rig_here("solve", out, "--all")
     assert "of which gravity" in shown.stdout
 
 
