@@ -8,6 +8,7 @@ from typing import Literal, TypeVar, get_args
 import numpy as np
 
 from rig.analysis.correction import Correction, CorrectionKind, diagonal_correction, matrix_correction
+from rig.analysis.outcome import DEFAULT_ESTIMATOR
 from rig.analysis.surroundings import Surroundings
 from rig.analysis.vector_inputs import known_of, see, unknown_of
 from rig.data.motion_file import Item
@@ -32,7 +33,6 @@ from rig.observation.windows import finished_sweeps
 
 Estimator = Literal["vector", "newton", "algorithm_1", "levenberg_marquardt"]
 ESTIMATORS: tuple[Estimator, ...] = get_args(Estimator)
-DEFAULT_ESTIMATOR: Estimator = "vector"
 
 Result = TypeVar("Result")
 Choice = TypeVar("Choice", bound=str)

@@ -1,60 +1,41 @@
-"""The outcome of a run: solved, verified, judged. The documents made of it are `rig.report`'s."""
+"""The outcome of a run: solved, verified, judged. The documents made of it are `rig.report`'s.
+
+Procedures name what is here, and whoever plans one reads it: so what solves is loaded when there is something to solve.
+"""
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, field, replace
-from datetime import UTC, datetime
-from typing import Literal
+from dataclasses import dataclass, field
+from datetime import datetime
+from typing import TYPE_CHECKING, Final, Literal
 
-import numpy as np
+if TYPE_CHECKING:
+    from rig.analysis.acceleration import AccelerometerResult
+    from rig.analysis.bias_drift import Drifts
+    from rig.analysis.calibration import SensorResult
+    from rig.analysis.check import Check
+    from rig.analysis.clock import ClockCheck
+    from rig.analysis.elsewhere import OfSensor
+    from rig.analysis.magnetic_field import MagnetometerResult
+    from rig.analysis.of_kinds import KindFound
+    from rig.analysis.onboard_check import Agreement
+    from rig.analysis.told_from import ToldFrom
+    from rig.analysis.verification import Verification
+    from rig.data.provenance import Provenance
+    from rig.data.result_file import StoredCalibrationEntry
+    from rig.data.run_file import RunData
+    from rig.data.settings import RunSettings
+    from rig.errors import Fault
+    from rig.observation.observed_run import ObservedRun
 
-from rig.analysis.acceleration import AccelerometerResult, calibrate_accelerometers
-from rig.analysis.bias_drift import Drifts, bias_drifts
-from rig.analysis.calibration import (
-    DEFAULT_ESTIMATOR,
-    SensorResult,
-    known_estimator,
-    observe_recordings,
-    solve_observed,
-)
-from rig.analysis.check import Check
-from rig.analysis.clock import ClockCheck
-from rig.analysis.comparison import Reference, turns_of
-from rig.analysis.contradictions import contradictions, in_reference
-from rig.analysis.elsewhere import OfSensor, checks_elsewhere, solved_elsewhere
-from rig.analysis.magnetic_field import MagnetometerResult, calibrate_magnetometers
-from rig.analysis.of_kinds import KindFound, kinds_on_arm
-from rig.analysis.onboard_check import Agreement, agreement
-from rig.analysis.surroundings import surroundings_of
-from rig.analysis.told_from import ToldFrom
-from rig.analysis.vector_inputs import arms_of
-from rig.analysis.verdict import (
-    acceleration_checks,
-    clock_checks,
-    drift_checks,
-    judge,
-    verdict,
-    verification_checks,
-)
-from rig.analysis.verification import Verification, verify
-from rig.data.motion_file import ReadElsewhere
-from rig.data.provenance import Provenance
-from rig.data.quantity import RATE
-from rig.data.result_file import StoredCalibrationEntry
-from rig.data.run_file import RunData
-from rig.data.settings import DecisionRule, RunSettings
-from rig.errors import Fault
-from rig.estimation.arrays import Array
-from rig.estimation.vector_fit import centripetal_m_s2
-from rig.estimation.vector_model import VectorSolution
-from rig.observation.observed_run import ObservedRun, observe_runs
+DEFAULT_ESTIMATOR: Final = "vector"
 
 
 @dataclass(frozen=True, slots=True)
 class Origin:
     """What was measured with what, and when: `recorded` is that of the run's first recording."""
 
-    recorded: Provenance
-    stored_calibrations: Mapping[str, StoredCalibrationEntry]
+    recorded: "Provenance"
+    stored_calibrations: "Mapping[str, StoredCalibrationEntry]"
     resumed_utc: tuple[str, ...]
     verified_utc: tuple[str, ...]
     solved_utc: datetime
@@ -75,25 +56,27 @@ class Outcome:
     solvers of installed kinds of sensors found.
     """
 
-    settings: RunSettings
+    settings: "RunSettings"
     provenance: Origin
-    recordings: tuple[ObservedRun, ...] = ()
-    checks: tuple[Check, ...] = ()
-    results: Mapping[str, SensorResult] = field(default_factory=dict)
-    onboard: Mapping[str, Agreement] = field(default_factory=dict)
-    verifications: Mapping[str, Verification] = field(default_factory=dict)
-    clock: ClockCheck | None = None
-    accelerometers: Mapping[str, AccelerometerResult] = field(default_factory=dict)
-    magnetometers: Mapping[str, MagnetometerResult | Fault] = field(default_factory=dict)
-    drifts: Drifts = field(default_factory=dict)
-    told_from: Mapping[str, tuple[ToldFrom, ...]] = field(default_factory=dict)
-    told_from_in_reference: Mapping[str, tuple[ToldFrom, ...]] = field(default_factory=dict)
-    elsewhere: Mapping[str, OfSensor] = field(default_factory=dict)
-    of_kinds: tuple[KindFound, ...] = ()
+    recordings: "tuple[ObservedRun, ...]" = ()
+    checks: "tuple[Check, ...]" = ()
+    results: "Mapping[str, SensorResult]" = field(default_factory=dict)
+    onboard: "Mapping[str, Agreement]" = field(default_factory=dict)
+    verifications: "Mapping[str, Verification]" = field(default_factory=dict)
+    clock: "ClockCheck | None" = None
+    accelerometers: "Mapping[str, AccelerometerResult]" = field(default_factory=dict)
+    magnetometers: "Mapping[str, MagnetometerResult | Fault]" = field(default_factory=dict)
+    drifts: "Drifts" = field(default_factory=dict)
+    told_from: "Mapping[str, tuple[ToldFrom, ...]]" = field(default_factory=dict)
+    told_from_in_reference: "Mapping[str, tuple[ToldFrom, ...]]" = field(default_factory=dict)
+    elsewhere: "Mapping[str, OfSensor]" = field(default_factory=dict)
+    of_kinds: "tuple[KindFound, ...]" = ()
 
     @property
     def verdict(self) -> Literal["pass", "fail"]:
         """ "pass" when there are checks and all of them passed."""
+        from rig.analysis.verdict import verdict
+
         return verdict(self.checks)
 
     @property
@@ -102,198 +85,42 @@ class Outcome:
         return self.verdict == "pass"
 
 
-def calibrated(runs: Sequence[RunData], estimator: str = DEFAULT_ESTIMATOR, *, drifting: bool = False) -> Outcome:
+def calibrated(runs: "Sequence[RunData]", estimator: str = DEFAULT_ESTIMATOR, *, drifting: bool = False) -> Outcome:
     """Solve and judge the recordings of a calibration, at least one: the same for a run that just ended and from files.
 
     Where biases may be `drifting`, that they do contradicts nothing. Raises Fault or Refused by name when the
     recordings do not hold what they should.
     """
-    settings = runs[0].settings
-    if (read := runs[0].elsewhere) is not None:
-        return _elsewhere(runs, read, estimator)
-    chosen = known_estimator(estimator)
-    recordings = observe_recordings(runs)
-    if not recordings:
-        raise Fault(
-            "too_few_observations",
-            "no finished sweep is recorded, and a calibration needs sweeps in six directions, or dwells in attitudes",
-            "Record the movement; resume the run if it was interrupted",
-        )
-    if not settings.planned_sweeps:
-        return _in_attitudes(runs, recordings, drifting=drifting)
-    surroundings = surroundings_of(recordings)
-    results = solve_observed(runs[0].measuring(RATE), recordings, chosen, surroundings, settings.matrix_corrected)
-    accelerometers = calibrate_accelerometers(recordings, settings, results)
-    magnetometers = calibrate_magnetometers(recordings, settings, accelerometers)
-    of_kinds = kinds_on_arm(recordings, settings)
-    among_rates = contradictions(recordings, results, settings.to_calibrate, surroundings)
-    among_dwells = in_reference(recordings, accelerometers, magnetometers, drifting=drifting)
-    onboard = {name: agreement(runs, name) for name in settings.to_calibrate if runs[0].sensors[name].on_board}
-    checks = judge(
-        {name: results[name].solution for name in settings.to_calibrate},
-        settings.limits,
-        {name: result.uncertainty for name, result in results.items() if result.uncertainty is not None},
-        _decision_rule(settings),
-    )
-    return Outcome(
-        recordings=recordings,
-        settings=settings,
-        results=results,
-        onboard=onboard,
-        checks=(
-            *checks,
-            *(check for name, agreed in onboard.items() for check in agreed.checks(name)),
-            *among_rates.checks,
-            *clock_checks(surroundings.clocks if surroundings is not None else ()),
-            *_acceleration_checks(accelerometers, settings),
-            *among_dwells.checks,
-            *(check for each in of_kinds for check in each.checks),
-        ),
-        of_kinds=of_kinds,
-        provenance=_origin(runs),
-        clock=None if surroundings is None else surroundings.clock,
-        accelerometers=accelerometers,
-        magnetometers=magnetometers,
-        told_from=among_rates.told_from,
-        told_from_in_reference=among_dwells.told_from,
-    )
+    from rig.analysis import judging
+
+    return judging.calibrated(runs, estimator, drifting=drifting)
 
 
-def _elsewhere(runs: Sequence[RunData], read: ReadElsewhere, estimator: str) -> Outcome:
-    """What readings from elsewhere amount to; the usual estimator stands for the one that was asked for."""
-    settings, name = runs[0].settings, read.item.name
-    asked = None if settings.elsewhere is None else settings.elsewhere.estimator
-    found = solved_elsewhere(read, settings, asked if estimator == DEFAULT_ESTIMATOR else estimator)
-    return Outcome(
-        settings=settings,
-        provenance=_origin(runs),
-        checks=(*checks_elsewhere(name, found), *(check for each in found.of_kinds for check in each.checks)),
-        results={} if found.gyroscope is None else {name: found.gyroscope},
-        elsewhere={name: found},
-        of_kinds=found.of_kinds,
-    )
-
-
-def drifted(runs: Sequence[RunData], estimator: str = DEFAULT_ESTIMATOR) -> Outcome:
+def drifted(runs: "Sequence[RunData]", estimator: str = DEFAULT_ESTIMATOR) -> Outcome:
     """The outcome, as of `calibrated`, of attitudes gone through again and again: the bias by repeat too, and judged.
 
     Raises Fault as `calibrated` and `bias_drifts` do.
     """
-    outcome = calibrated(runs, estimator, drifting=True)
-    settings = outcome.settings
-    found, rule = bias_drifts(outcome.recordings, settings), _decision_rule(settings)
-    checks = [check for name, each in found.items() for check in drift_checks(name, each, settings.limits, rule)]
-    return replace(outcome, drifts=found, checks=(*outcome.checks, *checks))
+    from rig.analysis import judging
+
+    return judging.drifted(runs, estimator)
 
 
-def _in_attitudes(runs: Sequence[RunData], recordings: tuple[ObservedRun, ...], *, drifting: bool) -> Outcome:
-    """Accelerometers alone: no sweep was planned, from which a gyroscope could be calibrated."""
-    settings = runs[0].settings
-    found = calibrate_accelerometers(recordings, settings)
-    magnetometers = calibrate_magnetometers(recordings, settings, found)
-    among_dwells = in_reference(recordings, found, magnetometers, drifting=drifting)
-    of_kinds = kinds_on_arm(recordings, settings)
-    more = (check for each in of_kinds for check in each.checks)
-    checks = (*_acceleration_checks(found, settings), *among_dwells.checks, *more)
-    return Outcome(
-        settings=settings,
-        provenance=_origin(runs),
-        recordings=recordings,
-        checks=checks,
-        accelerometers=found,
-        magnetometers=magnetometers,
-        told_from_in_reference=among_dwells.told_from,
-        of_kinds=of_kinds,
-    )
-
-
-def _acceleration_checks(results: Mapping[str, AccelerometerResult], settings: RunSettings) -> tuple[Check, ...]:
-    rule = _decision_rule(settings)
-    return tuple(
-        check for name, result in results.items() for check in acceleration_checks(name, result, settings.limits, rule)
-    )
-
-
-def _decision_rule(settings: RunSettings) -> DecisionRule:
-    return "simple" if settings.uncertainty is None else settings.uncertainty.decision_rule
-
-
-def verified(outcome: Outcome, repeated: Sequence[RunData]) -> Outcome:
+def verified(outcome: Outcome, repeated: "Sequence[RunData]") -> Outcome:
     """The outcome with what `repeated`, the calibration's movement with calibrated readings, says of it.
 
     Without such a recording the checks of the verification fail. Raises Fault as `observe_runs` and `verify` do.
     """
-    settings = outcome.settings
-    known = settings.reference
-    found: dict[str, Verification | None] = dict.fromkeys(settings.to_calibrate)
-    if repeated and known is not None:
-        after = observe_runs(repeated)
-        reference = Reference(known.name, np.array(known.scale), np.array(known.bias_rad_s))
-        found = {
-            name: verify(
-                name,
-                reference,
-                after,
-                outcome.recordings,
-                outcome.results.get(name),
-                gravity_rad_s=_gravity_left(outcome.results, (name, reference), after, settings),
-            )
-            for name in settings.to_calibrate
-        }
-    checks = [check for name, each in found.items() for check in verification_checks(name, each, settings.limits)]
-    return replace(
-        outcome,
-        verifications={name: each for name, each in found.items() if each is not None},
-        checks=(*outcome.checks, *checks),
-        provenance=replace(
-            outcome.provenance,
-            stored_calibrations=(repeated[-1] if repeated else outcome).provenance.stored_calibrations,
-            verified_utc=tuple(run.provenance.started_utc for run in repeated),
-        ),
-    )
+    from rig.analysis import judging
+
+    return judging.verified(outcome, repeated)
 
 
-def _gravity_left(
-    results: Mapping[str, SensorResult],
-    pair: tuple[str, Reference],
-    after: Sequence[ObservedRun],
-    settings: RunSettings,
-) -> tuple[Array, Array] | None:
-    """(N, 3) what gravity adds to the corrected readings of sensor and reference, neither of which knows where down is.
-
-    With what their circling adds, which is felt as gravity is. None where the calibration did not find it.
-    """
-    name, reference = pair
-    corrections = {name: results[name].correction_matrix} if name in results else {}
-    corrections[reference.name] = reference.correction_matrix
-    left = []
-    for each, matrix in corrections.items():
-        solution = results[each].vector_model if each in results else None
-        if settings.site is None or not isinstance(solution, VectorSolution) or solution.g_sensitivity is None:
-            return None
-        turns = turns_of(each, after)
-        attitudes = np.array([turn.average.attitude for turn in turns], dtype=np.float64)
-        turned = np.array([turn.speed_rad_s * turn.axis_flange for turn in turns])
-        pull = attitudes @ settings.site.down_m_s2 - centripetal_m_s2(turned, arms_of(turns, settings))
-        left.append(pull @ (matrix @ solution.g_sensitivity).T)
-    of_sensor, of_reference = left
-    return of_sensor, of_reference
-
-
-def verified_alone(repeated: Sequence[RunData]) -> Outcome:
+def verified_alone(repeated: "Sequence[RunData]") -> Outcome:
     """What recordings of calibrated readings, at least one, say of the calibrations the board had stored before.
 
     Raises Fault as `verified` does.
     """
-    nothing_calibrated = Outcome(settings=repeated[0].settings, provenance=_origin(repeated[:1]))
-    return verified(nothing_calibrated, repeated)
+    from rig.analysis import judging
 
-
-def _origin(runs: Sequence[RunData]) -> Origin:
-    return Origin(
-        recorded=runs[0].provenance,
-        stored_calibrations=runs[-1].provenance.stored_calibrations,
-        resumed_utc=tuple(run.provenance.started_utc for run in runs[1:]),
-        verified_utc=(),
-        solved_utc=datetime.now(UTC),
-    )
+    return judging.verified_alone(repeated)

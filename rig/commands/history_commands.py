@@ -229,7 +229,7 @@ def _finished(folder: Path, history: History, *, solve: bool) -> Finished:
                 f"{folder} has a {RESULT} and no recording that gives it",
                 "Import the folder with its recordings",
             )
-    from rig.analysis.calibration import DEFAULT_ESTIMATOR
+    from rig.analysis.outcome import DEFAULT_ESTIMATOR
     from rig.plans.recorded import judged, open_run
     from rig.report.document import document_of
 

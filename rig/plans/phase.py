@@ -4,7 +4,6 @@ from collections.abc import Collection
 from dataclasses import dataclass
 from typing import Protocol
 
-from rig.analysis.attitude_account import refuse_untelling
 from rig.config.models import RigConfig
 from rig.motion.state import Joints
 from rig.motion.steps import Plan
@@ -45,6 +44,8 @@ def first_phase(procedure: AnyProcedure, config: RigConfig, procedures: Procedur
             if not isinstance(made, Plan):
                 raise TypeError(f"its planner gives {type(made).__name__}, no Plan")
         if not done:
+            from rig.analysis.attitude_account import refuse_untelling
+
             refuse_untelling(config, made)
         return made
 
