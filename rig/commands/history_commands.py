@@ -16,9 +16,7 @@ from rig.errors import Refused, RigError
 from rig.errors.extras import missing_extra
 from rig.history.documents import change_entry, history_csv, history_document, rigs_document
 from rig.history.finished import PAGE, Finished, finished_run
-from rig.history.integrity import MOST_TOLD, examined
 from rig.history.place import own_place, place
-from rig.history.recomputed import not_given
 from rig.history.series import changes, effects, rig_states, subjects, trends
 from rig.history.store import History, Past, Selection, open_history
 from rig.history.tables import (
@@ -33,7 +31,6 @@ from rig.history.tables import (
     trends_table,
 )
 from rig.station.plain_text import plain, say
-from rig.station.words import calibrations_in_words
 
 DISAGREE = 1
 
@@ -124,6 +121,8 @@ def rigs(options: Namespace) -> int:
 
 def imported(options: Namespace) -> int:
     """Enter runs as their recordings give them; tells of each what became of it. Returns 1 when one was refused."""
+    from rig.station.words import calibrations_in_words
+
     new = known = refused = 0
     with opened(options) as history:
         for folder in _run_folders(options.folders, unsolved=options.solve):
@@ -146,6 +145,8 @@ def imported(options: Namespace) -> int:
 
 def verify(options: Namespace) -> int:
     """Hold rows against their journal and results, files against hashes; names what is wrong. Returns 1 then."""
+    from rig.history.integrity import examined
+
     counts = {"ok": 0, "changed": 0, "missing": 0, "elsewhere": 0}
     with opened(options) as history:
         for found in examined(history):
@@ -230,6 +231,8 @@ def _finished(folder: Path, history: History, *, solve: bool) -> Finished:
                 "Import the folder with its recordings",
             )
     from rig.analysis.outcome import DEFAULT_ESTIMATOR
+    from rig.history.integrity import MOST_TOLD
+    from rig.history.recomputed import not_given
     from rig.plans.recorded import judged, open_run
     from rig.report.document import document_of
 

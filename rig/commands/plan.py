@@ -25,12 +25,10 @@ def run(options: Namespace) -> int:
 
 
 def planned(options: Namespace) -> "Planned":
-    """The plan from the home pose, what its attitudes will tell, and which damage its checks.
+    """The plan from the home pose.
 
     Raises `Refused` when a motion breaks a limit, and when the attitudes do not tell enough.
     """
-    from rig.analysis.attitude_account import attitude_account
-    from rig.analysis.planned import planned_told_from
     from rig.commands.configured import configured
     from rig.errors import refuse
     from rig.motion.carried import carried_by
@@ -41,5 +39,4 @@ def planned(options: Namespace) -> "Planned":
     steps = found.phase.plan()
     config = found.loaded.config
     refuse(plan_problems(steps, carried_by(config.arm)))
-    account, told_from = attitude_account(config, steps), planned_told_from(config, steps)
-    return Planned(steps, account, told_from, repeated=found.phase.follows is not None)
+    return Planned(steps, config, repeated=found.phase.follows is not None)

@@ -5,7 +5,7 @@ from typing import TYPE_CHECKING
 from rig.commands.remember import ANSWER_S, why
 from rig.commands.waiting import answer_of
 from rig.config.models import RigConfig
-from rig.data.provenance import NO_BOARD
+from rig.data.absent import NO_BOARD
 from rig.runner.mounted import CalibratedBefore, Memory
 
 if TYPE_CHECKING:

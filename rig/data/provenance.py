@@ -11,6 +11,7 @@ from typing import Any
 from firmware_host.answers import BoardIdentity, StoredCalibration
 from rig import __version__
 from rig.config.load import Loaded
+from rig.data.absent import NO_ARM, NO_BOARD
 from rig.data.checked import checked
 from rig.data.motion_file import Item
 from rig.data.result_file import FileEntry, StoredCalibrationEntry
@@ -18,8 +19,6 @@ from rig.data.run_folder import ScriptIdentity
 from rig.motion.geometry import NOMINAL, DenavitHartenberg, Pose
 from rig.motion.state import ArmReport, Made
 
-NO_BOARD = "none"  # where every sensor has a port of its own
-NO_ARM = "none"  # of readings recorded elsewhere
 OF_FILES = ("readings_file", "motion_file")
 SIMULATED = "(simulated)"  # so ends the version of a controller that is none
 PACKAGES = ("ur-rtde", "numpy", "h5py", "pyserial")

@@ -3,16 +3,19 @@
 import itertools
 import json
 import shlex
-from collections.abc import Mapping
-from contextlib import suppress
+from collections.abc import Iterator, Mapping
+from contextlib import contextmanager, suppress
 from dataclasses import asdict, dataclass
 from datetime import UTC, datetime
 from pathlib import Path
+from typing import TYPE_CHECKING
 
-from rig.config.load import Loaded
 from rig.config.regular_file import UnfitFile, read_regular_file
 from rig.data.checked import checked
 from rig.errors import Refused
+
+if TYPE_CHECKING:
+    from rig.config.load import Loaded
 
 CONFIG, SCRIPT, RESULT = "config.yaml", "script.py", "result.json"
 SCRIPT_IDENTITY = "script.json"
@@ -30,28 +33,16 @@ class ScriptIdentity:
     sha256: str
 
 
-def new_folder(out: Path | None, loaded: Loaded, script: str, identity: ScriptIdentity) -> Path:
+def new_folder(out: Path | None, loaded: "Loaded", script: str, identity: ScriptIdentity) -> Path:
     """A run folder with the configuration as used, the script's text and what is known of it, nothing else.
 
     Raises Refused `run_folder`.
     """
     parent = Path(loaded.config.output.folder)
-    try:
+    with _written(out or parent):
         folder = out or _of_its_own(parent, loaded.config.procedure.name)
-        folder.mkdir(parents=True, exist_ok=True)
-        empty = not any(folder.iterdir())
-        if empty:
-            _write_all(
-                folder, {SCRIPT: script, SCRIPT_IDENTITY: json.dumps(asdict(identity)) + "\n", CONFIG: loaded.text}
-            )
-    except OSError as error:
-        raise Refused(
-            "run_folder", f"{out or parent} cannot be written: {error}", "Choose another with --out"
-        ) from error
-    if not empty:
-        raise Refused(
-            "run_folder", f"{folder} is not empty", f"Choose another with --out, or go on with: {resuming(folder)}"
-        )
+        empty_folder(folder, or_else=f", or go on with: {resuming(folder)}")
+        _write_all(folder, {SCRIPT: script, SCRIPT_IDENTITY: json.dumps(asdict(identity)) + "\n", CONFIG: loaded.text})
     return folder
 
 
@@ -64,15 +55,25 @@ def discard(folder: Path) -> None:
         folder.rmdir()
 
 
-def empty_folder(folder: Path) -> Path:
-    """A folder of that name with nothing in it, made if it is not there. Raises Refused `run_folder`."""
-    try:
+def empty_folder(folder: Path, *, or_else: str = "") -> Path:
+    """A folder of that name with nothing in it, made if it is not there; `or_else` is what else to do if it has.
+
+    Raises Refused `run_folder`.
+    """
+    with _written(folder):
         folder.mkdir(parents=True, exist_ok=True)
         if any(folder.iterdir()):
-            raise Refused("run_folder", f"{folder} is not empty", "Choose another with --out")
+            raise Refused("run_folder", f"{folder} is not empty", f"Choose another with --out{or_else}")
+    return folder
+
+
+@contextmanager
+def _written(folder: Path) -> Iterator[None]:
+    """Raises Refused `run_folder` where the system refuses to write there."""
+    try:
+        yield
     except OSError as error:
         raise Refused("run_folder", f"{folder} cannot be written: {error}", "Choose another with --out") from error
-    return folder
 
 
 def _write_all(folder: Path, texts: Mapping[str, str]) -> None:

@@ -1,19 +1,22 @@
 """The rows of a run, within somebody's transaction."""
 
 from datetime import UTC, datetime
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 from sqlalchemy import Connection, Row, insert, select
 
 from rig.history import journal, schema
 from rig.history.finished import Finished
-from rig.history.index import run_row
-from rig.report.kinds.followed import Followed
-from rig.report.kinds.registry import followed
+
+if TYPE_CHECKING:
+    from rig.report.kinds.followed import Followed
 
 
 def enter_run(connection: Connection, finished: Finished, content_sha256: str) -> int:
     """Add a run with all that belongs to it; its number."""
+    from rig.history.index import run_row
+    from rig.report.kinds.registry import followed
+
     row = {
         **run_row(finished.document),
         "content_sha256": content_sha256,
@@ -52,7 +55,7 @@ def now_utc() -> str:
     return datetime.now(UTC).isoformat(timespec="milliseconds")
 
 
-def _enter_calibration(connection: Connection, run_id: int, calibration: Followed, *, check_standard: bool) -> None:
+def _enter_calibration(connection: Connection, run_id: int, calibration: "Followed", *, check_standard: bool) -> None:
     row = {
         "run_id": run_id,
         "sensor": calibration.sensor,

@@ -5,19 +5,17 @@ import json
 import platform
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
-from rig.config.judging_sections import HistorySection
-from rig.config.load import Loaded, load
 from rig.config.regular_file import UnfitFile, open_regular_file, read_regular_file
-from rig.data.provenance import calls_itself_simulated
-from rig.data.result_file import SIZE_MAX_BYTES, ResultDocument, read_result
 from rig.data.run_folder import CONFIG, RESULT, SCRIPT, SCRIPT_IDENTITY, recordings
 from rig.errors import Refused
 from rig.history.issued import Issued, issued_certificate
-from rig.report.certificate.content import certificate_of
-from rig.report.certificate.page import certificate_page
-from rig.report.certificate.stated import Stated, of_configuration
+
+if TYPE_CHECKING:
+    from rig.config.load import Loaded
+    from rig.data.result_file import ResultDocument
+    from rig.report.certificate.stated import Stated
 
 PAGE, HEADER = "certificate.html", "calibration.h"
 DOCUMENTS = (RESULT, CONFIG, SCRIPT, SCRIPT_IDENTITY, HEADER)
@@ -45,7 +43,7 @@ class Finished:
     """
 
     text: str
-    document: ResultDocument
+    document: "ResultDocument"
     rig: str
     check_standards: tuple[str, ...]
     simulated: bool
@@ -63,11 +61,16 @@ class Finished:
         return content_sha256(self.text)
 
 
-def finished_run(folder: Path, document: ResultDocument | None = None) -> Finished:
+def finished_run(folder: Path, document: "ResultDocument | None" = None) -> Finished:
     """The run in `folder`, with its result.json or, in place of it, the `document` that was computed from it.
 
     Raises Refused as `read_result`; OSError when a recording cannot be read.
     """
+    from rig.config.judging_sections import HistorySection
+    from rig.data.provenance import calls_itself_simulated
+    from rig.data.result_file import SIZE_MAX_BYTES, read_result
+    from rig.report.certificate.stated import Stated, of_configuration
+
     if document is None:
         document = read_result(folder)
         text = read_regular_file(folder / RESULT, SIZE_MAX_BYTES)
@@ -139,20 +142,22 @@ def content_sha256(text: str) -> str:
     return hashlib.sha256(said.encode()).hexdigest()
 
 
-def configured_in(folder: Path) -> Loaded | None:
+def configured_in(folder: Path) -> "Loaded | None":
     """The folder's configuration.
 
     None where there is none, or where it is of before some key was renamed: a result is entered all the same.
     """
     if not (folder / CONFIG).exists():
         return None
+    from rig.config.load import load
+
     try:
         return load(folder / CONFIG, sections=None)
     except Refused:
         return None
 
 
-def _certificate(folder: Path, document: ResultDocument, stated: Stated) -> Issued | None:
+def _certificate(folder: Path, document: "ResultDocument", stated: "Stated") -> Issued | None:
     """The page in the folder, if it is to the letter the certificate of this result: its number alone proves nothing.
 
     An amended one was entered when it was made.
@@ -161,5 +166,8 @@ def _certificate(folder: Path, document: ResultDocument, stated: Stated) -> Issu
         page = read_regular_file(folder / PAGE, PAGE_MAX_BYTES)
     except (UnfitFile, OSError):
         return None
+    from rig.report.certificate.content import certificate_of
+    from rig.report.certificate.page import certificate_page
+
     certificate = certificate_of(document, stated)
     return issued_certificate(certificate, {PAGE: page}) if certificate_page(certificate).encode() == page else None

@@ -3,8 +3,10 @@
 import hashlib
 from collections.abc import Mapping
 from dataclasses import dataclass
+from typing import TYPE_CHECKING
 
-from rig.report.certificate.content import Certificate
+if TYPE_CHECKING:
+    from rig.report.certificate.content import Certificate
 
 
 @dataclass(frozen=True, slots=True)
@@ -22,7 +24,7 @@ class Issued:
     files: tuple[tuple[str, str], ...] = ()
 
 
-def issued_certificate(certificate: Certificate, files: Mapping[str, bytes]) -> Issued:
+def issued_certificate(certificate: "Certificate", files: Mapping[str, bytes]) -> Issued:
     """The certificate as it is entered: with the checksums of its files, by name."""
     return Issued(
         certificate.number,

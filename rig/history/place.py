@@ -7,11 +7,12 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 from rig.config.history_address import history_url
-from rig.config.judging_sections import HistorySection
 from rig.errors import Refused
 
 if TYPE_CHECKING:
     from sqlalchemy import URL
+
+    from rig.config.judging_sections import HistorySection
 
 ENVIRONMENT = "RIG_HISTORY"
 OFF = "off"
@@ -26,7 +27,7 @@ class Place:
     where: "Path | URL"
 
 
-def chosen_place(section: HistorySection, environment: Mapping[str, str] = os.environ) -> Place | None:
+def chosen_place(section: "HistorySection", environment: Mapping[str, str] = os.environ) -> Place | None:
     """Where a run is entered: by the environment's `RIG_HISTORY`, else by its configuration; None for nowhere.
 
     `section` is of a configuration that the user has named or knows, never of a folder that came from somewhere.

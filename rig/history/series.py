@@ -7,8 +7,8 @@ from functools import cached_property
 
 import numpy as np
 
+from rig.data.absent import NO_ARM
 from rig.data.installed_kinds import quantities
-from rig.data.provenance import NO_ARM
 from rig.estimation.arrays import Array
 from rig.history.statistics.agreement import normalised_error
 from rig.history.statistics.charts import FEWEST, Chart, chart, merged

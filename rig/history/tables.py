@@ -2,8 +2,8 @@
 
 from collections.abc import Iterable, Iterator, Mapping, Sequence
 
+from rig.data.absent import NO_ARM, NO_BOARD
 from rig.data.installed_kinds import quantities
-from rig.data.provenance import NO_ARM, NO_BOARD
 from rig.history.fitting_table import Column, FittingTable
 from rig.history.series import DRIFT_DAYS, YEAR_DAYS, Change, RigState, Subject, Trend
 from rig.history.spark import picture
@@ -11,7 +11,7 @@ from rig.history.statistics.charts import FEWEST, Chart
 from rig.history.statistics.rig_effects import RigEffect
 from rig.history.store import Kept, Past
 from rig.report.kinds.followed import Parameter, is_scale
-from rig.report.rounding import figures, rounded
+from rig.report.rounding import figures, plus_minus
 
 PPM = 1e6
 
@@ -147,8 +147,7 @@ def title_of(subject: Subject) -> str:
 
 def value_text(parameter: Parameter) -> str:
     """A parameter's value ± U in print."""
-    found = rounded(parameter.value, parameter.expanded)
-    return f"{found.value_text} ± {found.uncertainty_text}"
+    return plus_minus(parameter.value, parameter.expanded)
 
 
 def rig_in_words(past: Past) -> str:
@@ -169,11 +168,9 @@ def _notes(past: Past) -> str:
 def _drift(trend: Trend) -> str:
     if trend.line is None:
         return ""
-    found = rounded(
-        float(trend.line.coefficients[1]) * YEAR_DAYS,
-        trend.line.coverage_factor * float(trend.line.std[1]) * YEAR_DAYS,
-    )
-    return f"{found.value_text} ± {found.uncertainty_text}" + (" *" if trend.drifts else "")
+    a_year = float(trend.line.coefficients[1]) * YEAR_DAYS
+    expanded = trend.line.coverage_factor * float(trend.line.std[1]) * YEAR_DAYS
+    return plus_minus(a_year, expanded) + (" *" if trend.drifts else "")
 
 
 def _spread(trend: Trend) -> str:
@@ -195,6 +192,5 @@ def _signed(value: float, decimals: int) -> str:
 
 def _effect(name: str, effect: RigEffect) -> str:
     size, unit = (PPM, " ppm") if is_scale(name) else (1.0, " rad/s" if name[0] == "b" else "")
-    found = rounded(effect.value * size, effect.expanded * size)
     certain = " *" if abs(effect.value) > effect.expanded else ""
-    return f"{found.value_text} ± {found.uncertainty_text}{unit}{certain}"
+    return f"{plus_minus(effect.value * size, effect.expanded * size)}{unit}{certain}"

@@ -4,34 +4,46 @@ import json
 import math
 from collections.abc import Mapping, Sequence
 from dataclasses import asdict, dataclass
-from typing import Any
+from functools import cached_property
+from typing import TYPE_CHECKING, Any
 
 from rich.box import SIMPLE
 from rich.console import Console
 from rich.table import Table
 
-from rig.analysis.attitude_account import AttitudeAccount
-from rig.analysis.planned import Told
-from rig.analysis.told_from import ToldFrom
+from rig.config.models import RigConfig
 from rig.motion.doubts import doubts
 from rig.motion.state import JOINT_NAMES
 from rig.motion.steps import SAME_PLACE_RAD, Dwell, Plan, Rest, Step, Sweep
-from rig.report.attitude_account import account_document, print_account
-from rig.report.told_words import size_words, told_from_entries
 from rig.station.plain_text import LONG_S, duration_words, plain
+
+if TYPE_CHECKING:
+    from rig.analysis.attitude_account import AttitudeAccount
+    from rig.analysis.planned import Told
+    from rig.analysis.told_from import ToldFrom
 
 
 @dataclass(frozen=True, eq=False)
 class Planned:
-    """A plan, what its attitudes tell if it has any, and from what sizes on its checks tell that something happened.
-
-    It is `repeated` if it is done once more, to verify.
-    """
+    """A plan by its configuration, `repeated` if it is done once more, to verify; what it tells is found when asked."""
 
     plan: Plan
-    account: AttitudeAccount | None
-    told: Told
+    config: RigConfig
     repeated: bool
+
+    @cached_property
+    def account(self) -> "AttitudeAccount | None":
+        """What the attitudes tell, None where nothing is asked of them. Raises Refused as `attitude_account`."""
+        from rig.analysis.attitude_account import attitude_account
+
+        return attitude_account(self.config, self.plan)
+
+    @cached_property
+    def told(self) -> "Told":
+        """From what sizes on the checks tell that something happened."""
+        from rig.analysis.planned import planned_told_from
+
+        return planned_told_from(self.config, self.plan)
 
     @property
     def steps(self) -> Sequence[Step]:
@@ -53,6 +65,9 @@ class Planned:
 
 def plan_document(planned: Planned) -> dict[str, Any]:
     """The plan for machines: SI units, every field of every step."""
+    from rig.report.attitude_account import account_document
+    from rig.report.told_words import told_from_entries
+
     plan, account, told = planned.plan, planned.account, planned.told
     steps = [{"kind": type(step).__name__.lower(), **asdict(step)} for step in plan.steps]
     document: dict[str, Any] = {
@@ -76,8 +91,14 @@ def print_plan(planned: Planned, *, as_json: bool) -> None:
     if as_json:
         print(json.dumps(plan_document(planned), indent=2, allow_nan=False))
         return
-    plan, account, told = planned.plan, planned.account, planned.told
     console = Console(highlight=False)
+    _print_steps(planned, console)
+    _print_told(planned, console)  # which takes longer to find than the steps
+
+
+def _print_steps(planned: Planned, console: Console) -> None:
+    """Every step, how long it all takes, and what is doubtful about it."""
+    plan = planned.plan
     table = Table(title="plan, from the home pose", title_justify="left", box=SIMPLE)
     for heading in ("at s", "step", "for s", "joints °", "°/s", "°/s²"):
         table.add_column(heading, justify="left" if heading in ("step", "joints °") else "right", no_wrap=True)
@@ -98,6 +119,13 @@ def print_plan(planned: Planned, *, as_json: bool) -> None:
         console.print(f"If the calibration passes, the same once more to verify it: {2 * plan.duration_s:.1f} s in all")
     for doubt in doubts(plan):
         console.print(f"Note: {doubt}")
+
+
+def _print_told(planned: Planned, console: Console) -> None:
+    """What the attitudes tell of accelerometers, and the checks of damage."""
+    from rig.report.attitude_account import print_account
+
+    account, told = planned.account, planned.told
     if account is not None:
         print_account(console, account)
     if told.rates or told.accelerations:
@@ -115,8 +143,10 @@ def _measured(plan: Plan) -> str:
     return sweeps + (f"{len(plan.dwells)} dwells, " if plan.dwells else "")
 
 
-def _told_table(what: str, by_sensor: Mapping[str, Sequence[ToldFrom]]) -> Table:
+def _told_table(what: str, by_sensor: "Mapping[str, Sequence[ToldFrom]]") -> Table:
     """A row for each thing that may happen, a column for each sensor."""
+    from rig.report.told_words import size_words, told_from_entries
+
     table = Table(box=SIMPLE)
     table.add_column(f"what happens {what}")
     for name in by_sensor:

@@ -4,6 +4,7 @@ from dataclasses import dataclass
 from decimal import ROUND_HALF_UP, Context, Decimal
 
 DIGITS = 2  # significant, of an uncertainty
+NO_U = "–"
 RAISED = str.maketrans("-0123456789", "⁻⁰¹²³⁴⁵⁶⁷⁸⁹")
 WIDE = Context(prec=1000)  # a value may have any size beside its uncertainty
 
@@ -38,6 +39,21 @@ def rounded(value: float, uncertainty: float) -> Rounded:
     if _to(wide, last).adjusted() > wide.adjusted():  # 0.0996 is 0.10
         last += 1
     return Rounded(_to(exact, last), _to(wide, last))
+
+
+def in_print(value: float, uncertainty: float) -> tuple[str, str]:
+    """The texts of a value and its U; six digits and a dash where there is no U that is a positive number."""
+    try:
+        found = rounded(float(value), float(uncertainty))
+    except ValueError:
+        return f"{value:.6g}".replace("-", "−"), NO_U
+    return found.value_text, found.uncertainty_text
+
+
+def plus_minus(value: float, uncertainty: float) -> str:
+    """A value ± U in print, the value alone where there is no U."""
+    said, known = in_print(value, uncertainty)
+    return said if known == NO_U else f"{said} ± {known}"
 
 
 def small(value: float) -> str:

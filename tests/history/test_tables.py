@@ -9,7 +9,7 @@ from pathlib import Path
 import pytest
 from rich.console import Console
 
-from rig.data.provenance import NO_ARM
+from rig.data.absent import NO_ARM
 from rig.history.fitting_table import Column, FittingTable
 from rig.history.series import Trend, changes, rig_states, subjects, trends
 from rig.history.store import History, Past, open_history

@@ -10,7 +10,6 @@ from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy import special
 
 from rig.estimation.arrays import Array
 
@@ -102,6 +101,8 @@ def _deviation(values: Array, std: Array, counted: Alarms) -> Array:
     scatter = (weights * (before - mean[..., None]) ** 2).sum(axis=-1) / (count - 1)
     spread = np.sqrt(scatter * (std[..., -1] ** 2 + between + 1 / total))
     student = (newest - mean) / np.maximum(spread, SPREAD_MIN * np.maximum(np.abs(mean), np.finfo(float).tiny))
+    from scipy import special
+
     tail = np.maximum(special.stdtr(count - 1, -np.abs(student)), np.finfo(float).tiny)
     deviation: Array = -np.sign(student) * special.ndtri(tail)
     return deviation

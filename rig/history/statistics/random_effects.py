@@ -3,7 +3,6 @@
 from dataclasses import dataclass
 
 import numpy as np
-from scipy.special import stdtr, stdtrit
 
 from rig.estimation.arrays import Array
 
@@ -31,10 +30,14 @@ class Fitted:
     @property
     def coverage_factor(self) -> float:
         """Student's, for 95 %."""
+        from scipy.special import stdtrit
+
         return float(stdtrit(self.freedom, (1 + CONFIDENCE) / 2))
 
     def p_value(self, index: int) -> float:
         """How likely a coefficient as far from 0 is where the true one is 0."""
+        from scipy.special import stdtr
+
         return float(2 * stdtr(self.freedom, -abs(self.coefficients[index]) / self.std[index]))
 
     def at(self, row: Array) -> tuple[Array, Array]:

@@ -4,8 +4,6 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
-from scipy.sparse import coo_array
-from scipy.sparse.csgraph import connected_components
 
 from rig.estimation.arrays import Array
 from rig.history.statistics.random_effects import fit
@@ -65,6 +63,9 @@ def _connected(rigs: Sequence[str], sensors: Sequence[str]) -> list[set[str]]:
     nodes = len(rig_names) + len(sensor_names)
     rows = [rig_names.index(rig) for rig in rigs]
     columns = [len(rig_names) + sensor_names.index(sensor) for sensor in sensors]
+    from scipy.sparse import coo_array
+    from scipy.sparse.csgraph import connected_components
+
     graph = coo_array((np.ones(len(rows)), (rows, columns)), shape=(nodes, nodes))
     _, labels = connected_components(graph, directed=False)
     groups: dict[int, set[str]] = {}

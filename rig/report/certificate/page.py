@@ -4,8 +4,8 @@ from functools import cache
 from typing import TYPE_CHECKING
 
 from rig.config.sensor_catalogue import has_own_port
+from rig.data.absent import NO_BOARD
 from rig.data.installed_kinds import quantities
-from rig.data.provenance import NO_BOARD
 from rig.report import expanded, printed_budget, rounding, told_words, validity_words
 from rig.report.certificate import at_rest_tables, coverage_words, plots, tables, validity
 from rig.report.certificate.content import Certificate

@@ -8,18 +8,18 @@ axes of the base. The mean is one of its own because a gyroscope's only standard
 
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
-from typing import Protocol
+from typing import TYPE_CHECKING, Protocol
 
 import numpy as np
 
-from rig.data.budget_entries import BudgetEntry
-from rig.data.meaning import Meaning
-from rig.data.quantity import Quantity
-from rig.data.result_file import ResultDocument
-from rig.data.result_types import Freedom
 from rig.estimation.arrays import Array
 from rig.estimation.coverage import COVERAGE_FACTOR
-from rig.report.expanded import expanded
+
+if TYPE_CHECKING:
+    from rig.data.budget_entries import BudgetEntry
+    from rig.data.quantity import Quantity
+    from rig.data.result_file import ResultDocument
+    from rig.data.result_types import Freedom
 
 ANGLES = ("nonorth_yz", "nonorth_zx", "nonorth_xy")
 SENSITIVITIES = tuple(f"g{row}{column}" for row in "xyz" for column in "xyz")
@@ -86,7 +86,7 @@ class Calibrated(Protocol):
     @property
     def covariance_combined(self) -> Sequence[Sequence[float]] | None: ...
     @property
-    def budget(self) -> BudgetEntry | None: ...
+    def budget(self) -> "BudgetEntry | None": ...
 
 
 def nominal(name: str) -> float:
@@ -100,9 +100,11 @@ def is_scale(name: str) -> bool:
 
 
 def scale_and_bias(
-    sensor: str, quantity: Quantity, entry: Calibrated, bias: Sequence[float], document: ResultDocument
+    sensor: str, quantity: "Quantity", entry: Calibrated, bias: Sequence[float], document: "ResultDocument"
 ) -> Iterator[Parameter]:
     """Scale and bias of each axis, and the mean scale factor by their covariance, with the largest k of theirs."""
+    from rig.data.meaning import Meaning
+
     axes, each_alone = len(entry.scale), np.eye(2 * len(entry.scale))
     mean = each_alone[:axes].mean(axis=0)
     values, combined = np.array([*entry.scale, *bias]), entry.covariance_combined
@@ -125,9 +127,11 @@ def scale_and_bias(
 
 
 def parameters(
-    names: Sequence[str], values: Sequence[float], stds: Sequence[float], freedom: Sequence[Freedom] | None, unit: str
+    names: Sequence[str], values: Sequence[float], stds: Sequence[float], freedom: "Sequence[Freedom] | None", unit: str
 ) -> Iterator[Parameter]:
     """Others by their standard deviations and the degrees of freedom of these."""
+    from rig.report.expanded import expanded
+
     factors = expanded([1.0] * len(names), freedom).factors
     for name, value, std, factor in zip(names, values, stds, factors, strict=True):
         yield Parameter(name, value, std, None, unit, coverage_factor=None if factor == COVERAGE_FACTOR else factor)
