@@ -6,6 +6,7 @@ import numpy as np
 
 from rig.analysis.inverted import solved_in
 from rig.analysis.placed_budget import budget_by_causes
+from rig.estimation.arrays import scale_of
 from rig.estimation.budget import Budget
 from rig.estimation.known_increments import KnownIncrements, solve_known_increments
 from rig.estimation.refusals import check_axes, check_unit
@@ -44,7 +45,7 @@ def solve_turning(turning: Turning, window_s: float | None, *, any_mounting: boo
 
 def _solved(turning: Turning, window_s: float | None) -> InIncrements:
     start = rough_matrix(turning)
-    check_unit(1 / np.linalg.norm(start, axis=1))
+    check_unit(scale_of(start))
     gathered = gather(turning, window_s)
     solution = solve_known_increments(turning.time_s, turning.readings_rad_s, gathered.fixes, start)
     return InIncrements(solution, gathered.window_s, gathered.left_out)

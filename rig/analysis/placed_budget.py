@@ -8,7 +8,7 @@ import numpy as np
 from rig.analysis.placed_equations import Equations
 from rig.data.budget_entries import IN_U
 from rig.estimation import known_increments, placement
-from rig.estimation.arrays import Array
+from rig.estimation.arrays import Array, scale_of
 from rig.estimation.budget import Budget, Contributor
 from rig.estimation.coverage import effective_freedom
 from rig.estimation.reference_budget import response_in_attitudes, scale_and_bias, scale_and_bias_covariance
@@ -30,7 +30,7 @@ def noise_freedom(solution: TriaxialSolution, equations: Equations) -> float:
     error = solution.attitude_error
     off_rad = 0.0 if error is None else error.std_rad
     response = response_in_attitudes(theta, equations.attitudes, equations.variances, off_rad)
-    told = scale_and_bias(solution.matrix, 1 / np.linalg.norm(solution.matrix, axis=1), len(theta)) @ response
+    told = scale_and_bias(solution.matrix, scale_of(solution.matrix), len(theta)) @ response
     parts = (told**2 * equations.variances.ravel()).T
     return float(effective_freedom(parts, equations.freedom.reshape(-1, 1)).min())
 
@@ -42,7 +42,7 @@ def budget_by_causes(matrix: Array, causes: Mapping[str, Array], noise_freedom: 
     covariance widened as Student's t is, that is in u already (JCGM 101, 6.4.9) and no freedom is left to count:
     so it is of the noise too, where no `noise_freedom` is given.
     """
-    scale = 1 / np.linalg.norm(matrix, axis=1)
+    scale = scale_of(matrix)
     lines = []
     for name, each in causes.items():
         kind, source = SOURCES[name]

@@ -6,9 +6,10 @@ from typing import Final
 import numpy as np
 
 from rig.analysis.accelerometer_errors import Sheet, of_its_own
+from rig.data.quantity import FIELD
 from rig.data.settings import Site
 from rig.estimation.accelerometer_model import Movement
-from rig.estimation.arrays import Array
+from rig.estimation.arrays import Array, scale_of
 from rig.estimation.attitude_error import AttitudeError
 from rig.estimation.budget import NOT_GIVEN, Budget, Contributor
 from rig.estimation.earth import STANDARD_GRAVITY_M_S2
@@ -31,7 +32,6 @@ UNSTATED_FIELD: Final = 0.01  # of the field: an ordinary fluxgate
 UNTESTED_DRIFT_T: Final = 1e-7  # in a run: a magnetic storm, a lift some floors away
 TESTED_AXES: Final = 3  # of one change of the field, by which its standard deviation is known
 SIZE_OF_FIELD: Final = "size of the field"
-MICROTESLA: Final = 1e6
 
 
 def accelerometer_budget(
@@ -100,7 +100,7 @@ def _spread(
     noise_freedom: Array | None,
 ) -> Spread:
     """Spread of scale and bias, from the `response` (p, n) of all found; `left`: residuals' χ², its freedom."""
-    scale = 1 / np.linalg.norm(solution.matrix, axis=1)
+    scale = scale_of(solution.matrix)
     told = scale_and_bias(solution.matrix, scale, len(solution.covariance))
     return Spread(scale, told @ solution.covariance @ told.T, told @ response, noise, error, *left, noise_freedom)
 
@@ -114,7 +114,7 @@ def _gravity(site: Site) -> KnownSize:
 
 
 def _field(site: Site, field_t: float) -> KnownSize:
-    size_ut, said = MICROTESLA * field_t, "site.magnetic_field_uncertainty_ut"
+    size_ut, said = field_t / FIELD.bias.size, "site.magnetic_field_uncertainty_ut"
     if site.magnetic_field_expanded_t is not None:
         relative = site.magnetic_field_expanded_t / field_t
         return KnownSize(SIZE_OF_FIELD, relative, True, size_ut, "µT", said)
@@ -150,6 +150,6 @@ def _drifting(spread: Spread, matrix: Array, attitudes: Array, drift: FieldDrift
     patterns, change_t = drift_patterns(matrix, attitudes, drift)
     if drift is None:
         said = f"procedure.field_test_s {NOT_GIVEN}"
-        return assumed("drift of the field", MICROTESLA * change_t, "µT", said, spread.of(patterns))
+        return assumed("drift of the field", change_t / FIELD.bias.size, "µT", said, spread.of(patterns))
     freedom = float(TESTED_AXES) if spread.noise_freedom is not None else np.inf
     return Contributor("drift of the field", "A", "normal", None, "", "tests at home", freedom, spread.of(patterns))

@@ -22,9 +22,8 @@ from rig.board.identify import (
 )
 from rig.board.store import calibration_of, store
 from rig.commands.claims import claimed_board
-from rig.commands.laboratory import simulated_laboratory, written
-from rig.commands.own_address import own_address
-from rig.config.load import load
+from rig.commands.laboratory import simulated_laboratory
+from rig.commands.own_address import loaded_here
 from rig.config.models import RigConfig
 from rig.config.sensor_sections import SensorSection
 from rig.data.result_file import ResultDocument, passed_result
@@ -118,13 +117,11 @@ def erase(options: Namespace) -> int:
 @contextmanager
 def _connected(options: Namespace) -> Iterator[tuple[RigConfig, Board]]:
     """The board of a configuration, in its simulated laboratory if it has one."""
-    loaded = load(options.config, options.overrides, sections=None)
     with ExitStack() as stack:
-        if moved := stack.enter_context(own_address(loaded.config, simulated=loaded.simulated)):
-            loaded = load(options.config, [*options.overrides, *moved], sections=None)
+        loaded = stack.enter_context(loaded_here(options.config, options.overrides))
         section = configured_board(loaded.config)
         if loaded.simulated:
-            stack.enter_context(simulated_laboratory(stack.enter_context(written(loaded.text))))
+            stack.enter_context(simulated_laboratory(loaded.text))
             kept = loaded.flash_file
             memory = f"is kept in {kept}" if kept else "too, unless world.board.flash_file names a file that keeps it"
             say(f"simulated laboratory: it lasts as long as this command, its board's memory {memory}", file=sys.stderr)

@@ -49,7 +49,7 @@ def carry_out(
             with this.reported():
                 held.enter_context(claimed(configured.loaded.config))
                 if configured.loaded.simulated:
-                    held.enter_context(simulated_laboratory(folder / CONFIG, folder / WORLD_LATE))
+                    held.enter_context(simulated_laboratory(configured.loaded.text, folder / WORLD_LATE))
             outcome = this.carry_out(configured.phase)
             try:
                 entered, beside = remember(folder, configured.loaded.config.history)

@@ -9,7 +9,7 @@ from math import degrees
 from typing import TYPE_CHECKING
 
 from rig.commands.config_arguments import add_config, add_json, add_script
-from rig.commands.laboratory import simulated_laboratory, written
+from rig.commands.laboratory import simulated_laboratory
 from rig.errors import Problem, Refused, RigError
 from rig.station.plain_text import say
 
@@ -33,15 +33,12 @@ def run(options: Namespace) -> int:
     """
     seen: list[str] = []
     tell: Tell = seen.append if options.json else say
-    from rig.commands.configured import configured
-    from rig.commands.own_address import own_address
+    from rig.commands.configured import configured_here
 
-    found = configured(options.config, options.overrides, options.script)
     with ExitStack() as stack:
+        found = stack.enter_context(configured_here(options.config, options.overrides, options.script))
         if found.loaded.simulated:
-            if moved := stack.enter_context(own_address(found.loaded.config, simulated=True)):
-                found = configured(options.config, [*options.overrides, *moved], options.script and found.script)
-            stack.enter_context(simulated_laboratory(stack.enter_context(written(found.loaded.text))))
+            stack.enter_context(simulated_laboratory(found.loaded.text))
         looks = [_look_at_board, _look_at_instruments, _look_at_arm]
         missing = [problem for look_at in looks for problem in _named(look_at, found, tell)]
     if options.json:

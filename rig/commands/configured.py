@@ -1,10 +1,11 @@
 """The configuration and the procedure a command is about: the one the file names, or one in a file of its own."""
 
-from collections.abc import Sequence
-from contextlib import nullcontext
+from collections.abc import Iterator, Sequence
+from contextlib import contextmanager, nullcontext
 from dataclasses import dataclass
 from pathlib import Path
 
+from rig.commands.own_address import own_address
 from rig.config.load import Loaded, load
 from rig.plans.phase import Phase, first_phase
 from rig.plans.registry import Procedures, installed, sections
@@ -38,3 +39,13 @@ def configured(config_path: Path, overrides: Sequence[str] = (), script: ScriptF
     if script is None:
         script = installed_script(loaded.config.procedure.name)
     return Configured(loaded, script, first_phase(script.procedure, loaded.config, procedures))
+
+
+@contextmanager
+def configured_here(
+    config_path: Path, overrides: Sequence[str] = (), script: ScriptFile | Path | None = None
+) -> Iterator[Configured]:
+    """What `configured` has, its simulated laboratory at an address of its own for the length of the `with` block."""
+    found = configured(config_path, overrides, script)
+    with own_address(found.loaded.config, simulated=found.loaded.simulated) as moved:
+        yield configured(config_path, [*overrides, *moved], script and found.script) if moved else found

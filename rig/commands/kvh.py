@@ -8,7 +8,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any, cast
 
 from rig.commands.config_arguments import add_json, add_set
-from rig.commands.laboratory import simulated_laboratory, written
+from rig.commands.laboratory import simulated_laboratory
 from rig.errors import Refused, raised_as
 from rig.station.plain_text import say
 
@@ -35,17 +35,14 @@ def add(parser: ArgumentParser) -> None:
 
 def run(options: Namespace) -> int:
     """Print what is at the port, or every KVH 1775 of the configuration, that is given; 2 if one has a problem."""
-    from rig.commands.own_address import own_address
-    from rig.config.load import load
+    from rig.commands.own_address import loaded_here
     from rig.report.kvh_info import print_kvh_info
 
     target, baud = options.target, options.baud
     with ExitStack() as stack:
         places = {target: (target, baud or 921600)}
         if Path(target).is_file():
-            loaded = load(target, options.overrides, sections=None)
-            if moved := stack.enter_context(own_address(loaded.config, simulated=loaded.simulated)):
-                loaded = load(target, [*options.overrides, *moved], sections=None)
+            loaded = stack.enter_context(loaded_here(Path(target), options.overrides))
             places = {
                 name: (section.serial.port, baud or section.serial.baud)
                 for name, section in loaded.config.sensors.items()
@@ -54,7 +51,7 @@ def run(options: Namespace) -> int:
             if not places:
                 raise Refused("no_kvh_section", f"{target} has no KVH 1775", "Give a port, or another configuration")
             if loaded.simulated:
-                stack.enter_context(simulated_laboratory(stack.enter_context(written(loaded.text))))
+                stack.enter_context(simulated_laboratory(loaded.text))
         problems = []
         for name, (port, speed) in places.items():
             found = _look(name, port, speed)

@@ -14,18 +14,22 @@ STOP_TIMEOUT_S = 5.0
 
 
 @contextmanager
-def simulated_laboratory(config_path: Path, late: Path | None = None) -> Iterator[None]:
-    """Run the world of `config_path` for the length of the `with` block.
+def simulated_laboratory(config_text: str, late: Path | None = None) -> Iterator[None]:
+    """Run the world of a configuration, given as its text, for the length of the `with` block.
 
     Should steps of it come late, it writes to the file `late` what held them; to stderr where it is None.
 
     The world ends when its standard input closes, so it cannot outlive this process, however this process ends.
     Raises Refused: what the world refused, or `world_not_ready` when it ends without a word of its own.
     """
-    command = [sys.executable, "-P", "-m", "rig.world", str(config_path), "--until-eof"]
-    command += [] if late is None else ["--late", str(late)]
-    # A session of its own: Ctrl-C in the terminal must stop the arm first, not the laboratory under it.
-    with subprocess.Popen(command, stdin=subprocess.PIPE, stdout=subprocess.PIPE, start_new_session=True) as process:
+    command = [sys.executable, "-P", "-m", "rig.world", "--until-eof", *([] if late is None else ["--late", str(late)])]
+    with (
+        written(config_text) as path,
+        # A session of its own: Ctrl-C in the terminal must stop the arm first, not the laboratory under it.
+        subprocess.Popen(
+            [*command, str(path)], stdin=subprocess.PIPE, stdout=subprocess.PIPE, start_new_session=True
+        ) as process,
+    ):
         kept_open, answers = filter(None, (process.stdin, process.stdout))
         try:
             answer = json.loads(answers.readline() or "{}")
@@ -34,7 +38,7 @@ def simulated_laboratory(config_path: Path, late: Path | None = None) -> Iterato
             if not answer.get("ready"):
                 raise Refused(
                     "world_not_ready",
-                    f"the simulated laboratory of {config_path} ended with status {process.wait()} before it was ready",
+                    f"the simulated laboratory ended with status {process.wait()} before it was ready",
                     "What it said stands above; `rig world CONFIG` runs it alone",
                 )
             yield

@@ -3,11 +3,13 @@
 import os
 import socket
 import sys
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from contextlib import ExitStack, contextmanager
+from pathlib import Path
 from urllib.parse import urlsplit
 
 from rig.commands.claims import claimed_arm, claimed_laboratory
+from rig.config.load import Loaded, load
 from rig.config.models import SensorsConfig
 from rig.errors import Refused
 from rig.station.plain_text import say
@@ -31,6 +33,14 @@ def own_address(config: SensorsConfig, *, simulated: bool) -> Iterator[list[str]
         if own != host:
             say(f"simulated laboratory: another one is at {host}, so this one is at {own}", file=sys.stderr)
         yield [] if own == host else list(_moved(config, own))
+
+
+@contextmanager
+def loaded_here(path: Path, overrides: Sequence[str]) -> Iterator[Loaded]:
+    """A configuration, its laboratory at an address of its own, without its procedure. Raises Refused as `load`."""
+    loaded = load(path, overrides, sections=None)
+    with own_address(loaded.config, simulated=loaded.simulated) as moved:
+        yield load(path, [*overrides, *moved], sections=None) if moved else loaded
 
 
 def _others() -> Iterator[str]:

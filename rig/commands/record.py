@@ -7,7 +7,7 @@ from contextlib import ExitStack
 from pathlib import Path
 
 from rig.commands.config_arguments import add_config
-from rig.commands.laboratory import simulated_laboratory, written
+from rig.commands.laboratory import simulated_laboratory
 from rig.errors import Refused
 from rig.station.plain_text import say
 
@@ -38,7 +38,7 @@ def run(options: Namespace) -> int:
             if moved := stack.enter_context(own_address(config, simulated=True)):
                 config, simulated = load_sensors(options.config, [*options.overrides, *moved])
             assert simulated is not None
-            stack.enter_context(simulated_laboratory(stack.enter_context(written(simulated))))
+            stack.enter_context(simulated_laboratory(simulated))
         for path, seen in record_readings(config, options.out, options.duration_s).items():
             say(f"{path}: {seen.samples} samples, {seen.lost} lost")
     say(f"If they lay still: rig allan {shlex.quote(str(options.out))}", file=sys.stderr)

@@ -22,7 +22,6 @@ if TYPE_CHECKING:
 
 
 ANSWER_S = 4.0  # docs/how-to/shared-history.md promises five until the verdict
-MOST_SAID = 3  # changes of a sensor in words; its table has them all
 
 
 @dataclass(frozen=True, slots=True)
@@ -62,8 +61,7 @@ def _remembered(folder: Path, chosen: Callable[[], "Place | None"]) -> tuple[Run
         numbers, beside = answer_of(lambda: _entered(where, run), ANSWER_S)
     except Exception as error:  # whatever it is, the run is finished and its result is written
         return NotRemembered(folder, f"{label}: {why(error)}"), ()
-    beyond = tuple(said for each in beside if (said := _changed(each)) is not None)
-    return Remembered(label, numbers, beyond, tuple(map(_since, beside)), usual=where == own_place(None)), beside
+    return Remembered(label, numbers, tuple(map(_since, beside)), usual=where == own_place(None)), beside
 
 
 def remember_certificate(folder: Path, result: str, certificate: "Issued", history: str | None = None) -> str | None:
@@ -100,7 +98,8 @@ def since_lines(calibrations: Sequence[Beside]) -> tuple[str, ...]:
     for each, beyond in changed:
         of = "" if each.now.quantity == "rate" else f", {each.now.quantity}"
         whose = f"{each.now.serial_number}{of} " if len(calibrations) > 1 else ""
-        more = f"; {len(beyond) - 1} more" if len(beyond) > 1 else ""
+        compare = f"`rig history compare {each.before.id} {each.now.id}`"
+        more = f"; {len(beyond) - 1} more: {compare}" if len(beyond) > 1 else ""
         since = f"since {each.before.started_utc[:10]} (no. {each.before.id})"
         lines.append(f"{whose}{since}: {change_in_short(beyond[0])}{more}")
     if same:
@@ -108,20 +107,6 @@ def since_lines(calibrations: Sequence[Beside]) -> tuple[str, ...]:
         whose = " of the other sensors" if changed else ""
         lines.append(f"nothing changed beyond U since the last calibration{whose} (no. {before})")
     return tuple(lines)
-
-
-def _changed(beside: Beside) -> str | None:
-    """What changed beyond U, the largest in words; None where nothing did."""
-    from rig.history.change_words import change_sentences
-
-    said = change_sentences(beside.changes)
-    if not said:
-        return None
-    before, now = beside.before, beside.now
-    left = len(said) - MOST_SAID
-    more = f"; {left} more by rig history compare {before.id} {now.id}" if left > 0 else ""
-    of = f"{now.part} {now.serial_number}, {now.quantity}, since calibration {before.id} of {before.started_utc[:10]}"
-    return f"changed beyond U: {of}: {'; '.join(said[:MOST_SAID])}{more}"
 
 
 def _entered(where: "Place", run: "Finished") -> "tuple[tuple[int, ...], tuple[Beside, ...]]":

@@ -32,7 +32,7 @@ def run(options: Namespace) -> int:
     """
     page = wish(options)
     from rig.commands.carry_out import carry_out
-    from rig.commands.configured import configured
+    from rig.commands.configured import configured_here
     from rig.commands.consent import refuse_foreign_addresses
     from rig.config.load import load
     from rig.data.result_file import read_result
@@ -53,6 +53,6 @@ def run(options: Namespace) -> int:
     refuse_links(*folder.iterdir())
     refuse_foreign_addresses(folder, load(folder / CONFIG, sections=None), options.connect)
     named = None if options.script is None else load_script(options.script)
-    found = configured(folder / CONFIG, script=kept_script(folder, script_identity(folder), named))
-    moved = frozenset(options.other_board)
-    return carry_out(folder, found, assume_yes=options.yes, moved=moved, as_json=options.json, page=page)
+    script, moved = kept_script(folder, script_identity(folder), named), frozenset(options.other_board)
+    with configured_here(folder / CONFIG, script=script) as found:
+        return carry_out(folder, found, assume_yes=options.yes, moved=moved, as_json=options.json, page=page)

@@ -55,16 +55,12 @@ def begun(options: Namespace) -> "Iterator[tuple[Path, Configured]]":
     Of a run that nobody agreed to no folder is left: the same command can be given again. Raises Refused as
     `configured` and `new_folder`.
     """
-    from rig.commands.configured import configured
-    from rig.commands.own_address import own_address
+    from rig.commands.configured import configured_here
     from rig.data.own_texts import note_own
     from rig.data.run_folder import discard, new_folder
     from rig.errors import Refused
 
-    found = configured(options.config, options.overrides, options.script)
-    with own_address(found.loaded.config, simulated=found.loaded.simulated) as another:
-        if another:
-            found = configured(options.config, [*options.overrides, *another], options.script and found.script)
+    with configured_here(options.config, options.overrides, options.script) as found:
         folder = new_folder(options.out, found.loaded, found.script.text, found.script.identity)
         say(f"run folder: {folder}", sys.stderr)
         note_own(found.loaded.text, found.script.text)

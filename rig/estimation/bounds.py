@@ -7,7 +7,7 @@ has to leave open (directions of turning, mounting) is in it as a nuisance. `eff
 import numpy as np
 from numpy.typing import ArrayLike
 
-from rig.estimation.arrays import Array
+from rig.estimation.arrays import Array, scale_of
 from rig.estimation.levenberg_marquardt import squared_rate_jacobian, squared_rate_variance
 from rig.estimation.reference_model import covariance_bound, whitening
 from rig.estimation.sensor_axes import parameter_jacobian
@@ -41,7 +41,7 @@ def vector_matrix_bound(rates_rad_s: ArrayLike, variances_rad2_s2: ArrayLike) ->
 def vector_bound(matrix: ArrayLike, rates_rad_s: ArrayLike, variances_rad2_s2: ArrayLike) -> Array:
     """(6, 6) bound for kx ky kz bx by bz when the rate is known as a vector; `matrix` (3, 3) is the true F."""
     f = np.asarray(matrix, dtype=np.float64)
-    jacobian = parameter_jacobian(f, 1 / np.linalg.norm(f, axis=1))
+    jacobian = parameter_jacobian(f, scale_of(f))
     return jacobian @ vector_matrix_bound(rates_rad_s, variances_rad2_s2) @ jacobian.T
 
 

@@ -28,7 +28,7 @@ from rig.estimation.accelerometer_model import (
     predicted,
     turned,
 )
-from rig.estimation.arrays import Array
+from rig.estimation.arrays import Array, scale_of
 from rig.estimation.attitude_error import AttitudeError
 from rig.estimation.imu_fit import Fit, as_expected, free_ways, held_still, most_likely, sizes_of
 from rig.estimation.linear_start import MAX_CONDITION, REMEDY, linear_start
@@ -125,7 +125,7 @@ def solve_imu(
         if attitude_std_rad is None:
             _check_attitudes(start, movement, held, fit)
     f = matrix(fit.theta)
-    refusals.check_unit(1 / np.linalg.norm(f, axis=1))
+    refusals.check_unit(scale_of(f))
     refusals.check_handedness(f)
     residuals = movement.readings() - predicted(fit.theta, movement)
     white = fit.readings.white(fit.std_rad) @ residuals.ravel()

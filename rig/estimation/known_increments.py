@@ -15,7 +15,7 @@ from numpy.typing import NDArray
 
 from rig.errors import Fault
 from rig.estimation import refusals
-from rig.estimation.arrays import Array
+from rig.estimation.arrays import Array, scale_of
 from rig.estimation.attitude_drift import (
     BIAS,
     CLOCK,
@@ -203,7 +203,7 @@ def _check(given: Fixes, left: Fixes, settled: _Settled) -> None:
     worst = float(np.sqrt(np.diag(settled.solved.covariance)[MATRIX].max()))
     if worst > UNTOLD:
         raise Fault("ill_conditioned", f"an element of F is known to {worst:.2g} only", REMEDY)
-    refusals.check_unit(1 / np.linalg.norm(settled.state.matrix, axis=1))
+    refusals.check_unit(scale_of(settled.state.matrix))
     refusals.check_handedness(settled.state.matrix)
 
 

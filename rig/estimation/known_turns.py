@@ -23,7 +23,7 @@ import numpy as np
 
 from rig.errors import Fault
 from rig.estimation import refusals
-from rig.estimation.arrays import Array
+from rig.estimation.arrays import Array, scale_of
 from rig.estimation.budget import Budget, Contributor
 from rig.estimation.increments import increments
 from rig.estimation.sensor_axes import SensorAxes, parameter_jacobian
@@ -153,7 +153,7 @@ def solve_turned(
     equations = [each.widened(widened) for each in equations]
     step, covariance = _solve(equations)
     state = state.moved(step)
-    refusals.check_unit(1 / np.linalg.norm(state.matrix, axis=1))
+    refusals.check_unit(scale_of(state.matrix))
     refusals.check_handedness(state.matrix)
     axes = SensorAxes.of(state.matrix)
     to_parameters = parameter_jacobian(state.matrix, axes.scale)

@@ -7,7 +7,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from rig.estimation.arrays import Array
+from rig.estimation.arrays import Array, scale_of
 
 # The pairs y z, z x, x y; the angle of each is that about the third axis.
 FIRST, SECOND = np.array([1, 2, 0]), np.array([2, 0, 1])
@@ -25,7 +25,7 @@ class SensorAxes:
     @staticmethod
     def of(matrix: Array) -> "SensorAxes":
         """The axes of `matrix` F (3, 3)."""
-        scale = 1 / np.linalg.norm(matrix, axis=1)
+        scale = scale_of(matrix)
         axes = scale[:, None] * matrix
         return SensorAxes(scale, axes, nearest_rotation(axes))
 

@@ -22,7 +22,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from rig.estimation import refusals
-from rig.estimation.arrays import Array
+from rig.estimation.arrays import Array, scale_of
 from rig.estimation.attitude_error import AttitudeError, AttitudeWeighted, Placed, furthest_off, solve_attitude_weighted
 from rig.estimation.reference_model import (
     BIAS,
@@ -133,7 +133,7 @@ def solve_triaxial(
             theta, covariance, iterations = found.theta, found.covariance, found.iterations
             attitude_error, white = found.attitude_error, found.white
     f = theta[F].reshape(3, 3)
-    refusals.check_unit(1 / np.linalg.norm(f, axis=1))
+    refusals.check_unit(scale_of(f))
     refusals.check_handedness(f)
     residuals = m - predicted(theta, r, v_bar)
     return TriaxialSolution(

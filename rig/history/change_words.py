@@ -12,22 +12,9 @@ PERCENT, PPM = 1e-2, 1e-6
 DEGREE_RAD = pi / 180
 
 
-def change_sentences(changes: Iterable[Change]) -> tuple[str, ...]:
-    """What changed beyond U, a sentence each without its full stop, the largest change for its U first.
-
-    Nothing where all that changed is explained by the uncertainties of both calibrations.
-    """
-    return tuple(map(change_sentence, beyond_u(changes)))
-
-
 def beyond_u(changes: Iterable[Change]) -> list[Change]:
     """The changes that are more than the uncertainties of both calibrations explain, the largest for its U first."""
     return sorted((each for each in changes if each.beyond), key=lambda each: -each.normalised_error)
-
-
-def change_sentence(change: Change) -> str:
-    """The change of one parameter: what it is, by how much it changed, how many times the U of a change that is."""
-    return f"{name_in_words(change.name)} changed by {_size(change)}, {_times(change)} times the U of such a change"
 
 
 def change_in_short(change: Change) -> str:

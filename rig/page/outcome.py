@@ -15,7 +15,7 @@ from rig.page.about import About
 from rig.report.kinds.kind import Three
 from rig.report.kinds.registry import shown
 from rig.report.kinds.triad import beside
-from rig.report.rounding import rounded
+from rig.report.rounding import in_print
 from rig.station.events import Since
 
 Row = dict[str, Any]
@@ -100,7 +100,7 @@ def _name(sensor: str, quantity: Quantity) -> str:
 
 
 def _numbers(found: Three, nominal: float, limit: float | None) -> Row:
-    texts = [_texts(value, u) for value, u in zip(found.values, found.expanded, strict=True)]
+    texts = [in_print(value, u) for value, u in zip(found.values, found.expanded, strict=True)]
     return {
         "values": [float(value) for value in found.values],
         "expanded": [float(u) for u in found.expanded],
@@ -109,11 +109,3 @@ def _numbers(found: Three, nominal: float, limit: float | None) -> Row:
         "nominal": nominal,
         "limit": limit,
     }
-
-
-def _texts(value: float, expanded: float) -> tuple[str, str]:
-    try:
-        each = rounded(float(value), float(expanded))
-    except ValueError:  # without a U that is a number
-        return f"{value:.5g}".replace("-", "−"), "–"
-    return each.value_text, each.uncertainty_text

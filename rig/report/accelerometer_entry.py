@@ -17,6 +17,7 @@ from rig.data.quantity import ACCELERATION
 from rig.data.result_types import ErrorEntry
 from rig.errors import Fault
 from rig.estimation.accelerometer_model import DELAY, SECOND
+from rig.estimation.arrays import scale_of
 from rig.estimation.imu import MODEL
 from rig.estimation.residuals import dwell_residual_std_m_s2
 from rig.estimation.triads import Alignment
@@ -76,6 +77,6 @@ def _beside(solution: TriaxialSolution | Fault) -> InAttitudesEntry | ErrorEntry
         return ErrorEntry(error=str(solution))
     return entry(
         InAttitudesEntry, solution,
-        scale=1 / np.linalg.norm(solution.matrix, axis=1),
+        scale=scale_of(solution.matrix),
         bias_m_s2=solution.bias,
     )  # fmt: skip

@@ -18,6 +18,7 @@ from rig.data.result_types import ErrorEntry, LaidDownEntry
 from rig.data.settings import Site
 from rig.errors import Fault
 from rig.estimation import accelerometer, magnetometer
+from rig.estimation.arrays import scale_of
 from rig.estimation.known_increments import EarthSeen
 from rig.estimation.reference_budget import scale_and_bias_covariance
 from rig.estimation.reference_model import REFERENCE, SECOND, F
@@ -203,4 +204,4 @@ def _second_order_std(solution: TriaxialSolution) -> Any:
 
 
 def _scale(solution: TriaxialSolution) -> Any:
-    return 1 / np.linalg.norm(solution.matrix, axis=1)
+    return scale_of(solution.matrix)

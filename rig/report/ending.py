@@ -7,12 +7,11 @@ from pathlib import Path
 from typing import Any
 
 from rig.data.motion_file import NOT_STATED
-from rig.data.result_file import CheckEntry, ResultDocument, SensorEntry
+from rig.data.result_file import CheckEntry, ResultDocument
 from rig.report.check_words import what_failed, words_of
 from rig.report.kinds.kind import Shown, Three, Without
 from rig.report.kinds.registry import kinds
-from rig.report.rounding import rounded
-from rig.report.validity_words import speed_words
+from rig.report.rounding import in_print, plus_minus
 
 NEAR = 0.9  # of its limit, from where on a check that passed is named
 MOST_NEAR = 2
@@ -124,23 +123,13 @@ def _heading(item: _Item) -> str:
 
 
 def _plus_minus(three: Three) -> list[str]:
-    return [_text(value, u) for value, u in zip(three.values, three.expanded, strict=True)]
-
-
-def _text(value: float, expanded: float) -> str:
-    if not expanded > 0:
-        return f"{value:.6g}"
-    found = rounded(value, expanded)
-    return f"{found.value:f} ± {found.uncertainty:f}"
+    return [plus_minus(value, u) for value, u in zip(three.values, three.expanded, strict=True)]
 
 
 def _with_largest(three: Three) -> list[str]:
     """The values, and the largest of their U."""
-    largest = max(three.expanded)
-    if not largest > 0:
-        return [*(f"{value:.6g}" for value in three.values), "0"]
-    found = [rounded(value, largest) for value in three.values]
-    return [*(f"{each.value:f}" for each in found), f"{found[0].uncertainty:f}"]
+    found = [in_print(value, max(three.expanded)) for value in three.values]
+    return [*(value for value, _ in found), found[0][1]]
 
 
 def _what_the_values_are(items: Sequence[_Item]) -> Iterator[str]:
@@ -148,12 +137,12 @@ def _what_the_values_are(items: Sequence[_Item]) -> Iterator[str]:
         return
     combined = all(item.shown.combined for item in items)
     yield "± U, about 95 %" if combined else "± two standard deviations of the noise alone"
-    gyroscopes = [item.entry for item in items if isinstance(item.entry, SensorEntry)]
-    speeds = {speeds for each in gyroscopes if (speeds := speed_words(each))}
-    if len(speeds) == 1:
-        yield f"{'gyroscopes ' if len(items) > 1 else ''}at {speeds.pop()} °/s"
-    if len(items) == 1 and gyroscopes:
-        yield gyroscopes[0].model
+    held = {(item.kind, item.shown.held_at) for item in items if item.shown.held_at}
+    if len(held) == 1:
+        (kind, held_at) = held.pop()
+        yield f"{kind}s {held_at}" if len(items) > 1 else held_at
+    if len(items) == 1 and items[0].shown.model:
+        yield items[0].shown.model
 
 
 def _passed(result: ResultDocument) -> str:

@@ -16,6 +16,7 @@ from rig.data.magnetometer_entries import (
 from rig.data.quantity import FIELD
 from rig.data.result_types import ErrorEntry
 from rig.errors import Fault
+from rig.estimation.arrays import scale_of
 from rig.estimation.magnetometer import MODEL, MagnetometerSolution
 from rig.estimation.residuals import attitude_residual_std
 from rig.report.axes import PARAMETERS, dwell_entry
@@ -56,4 +57,4 @@ def magnetometer_entry(result: MagnetometerResult, **more: Any) -> MagnetometerE
 def _beside(solution: MagnetometerSolution | Fault) -> FieldSolutionEntry | ErrorEntry:
     if isinstance(solution, Fault):
         return ErrorEntry(error=str(solution))
-    return entry(FieldSolutionEntry, solution, solution.fit, scale=1 / np.linalg.norm(solution.matrix, axis=1))
+    return entry(FieldSolutionEntry, solution, solution.fit, scale=scale_of(solution.matrix))

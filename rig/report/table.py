@@ -1,6 +1,7 @@
 """The result as a person reads it in the terminal: whole, or what of it is asked for."""
 
 import shlex
+import sys
 from collections.abc import Sequence
 from pathlib import Path
 
@@ -12,7 +13,7 @@ from rig.report.certificate.writer import PAGE
 from rig.report.ending import ending
 from rig.report.kinds.kind import said
 from rig.report.kinds.registry import kinds
-from rig.station.plain_text import plain
+from rig.station.plain_text import plain, say
 
 ROUNDING = 1e-12
 ALL_OF_IT = "the same command with --all"
@@ -37,6 +38,8 @@ def print_kept(folder: Path, document: ResultDocument, since: Sequence[str] = ()
     """Print what the finished run in a `folder` amounts to; `since` says how it compares with the last calibrations."""
     if as_json:
         print(document.text())
+        for line in since:  # which no ending says then
+            say(line.replace("`", ""), sys.stderr)
         return
     console, certificate = Console(highlight=False), folder / PAGE
     lines = ending(

@@ -34,6 +34,7 @@ from rig.runner.announcement import announcement
 from rig.runner.mounted import Mounted, ask_of_other_boards
 from rig.runner.onboard import BoardCalibration
 from rig.sensors.source import SampleSource
+from rig.station.confirm import NOT_AGREED
 from rig.station.events import (
     ArmSeen,
     PhaseRecorded,
@@ -137,7 +138,11 @@ class Rig:
         ask_of_other_boards(devices.mounted, station)
         repeated = self.whole_plan if self.phase.follows else None
         if not station.ask(announcement(self.plan, devices.report, repeated, devices.mounted.lines())):
-            raise Refused("not_confirmed", "nobody agreed to the movement", "Run again and agree, or give --yes")
+            raise Refused(
+                "not_confirmed",
+                "nobody agreed to the movement",
+                NOT_AGREED,
+            )
 
     def _refuse_moved(self) -> None:
         """Refuse an arm that somebody moved while the operator thought: it would take another way than announced."""

@@ -6,6 +6,8 @@ from collections.abc import Sequence
 from rig.errors import Refused
 from rig.errors.quoting import printable_lines
 
+NOT_AGREED = "Run again and agree, or agree before: --yes, in Python yes=True"
+
 
 def ask_operator(announcement: Sequence[str], to_do: str = "start") -> bool:
     """Show what will be done and wait for yes or y; where there is no terminal, there is nobody to say it."""
@@ -20,4 +22,4 @@ def ask_operator(announcement: Sequence[str], to_do: str = "start") -> bool:
 def agreed_or_refused(announcement: Sequence[str], to_do: str, assume_yes: bool) -> None:
     """Go on only if the operator agrees. Raises Refused `not_confirmed`."""
     if not assume_yes and not ask_operator(announcement, to_do):
-        raise Refused("not_confirmed", "nobody agreed to the change", "Run again and agree, or give --yes")
+        raise Refused("not_confirmed", "nobody agreed to the change", NOT_AGREED)

@@ -269,14 +269,12 @@ class Since:
 class Remembered:
     """The run stands in `history` as the calibrations of these `numbers`, by which `rig history` finds them.
 
-    `usual` is whether the command looks there by itself; `beyond` says in words what changed beyond U since the last
-    calibration of the same sensor, a line for each that has changed. `since` are the calibrations before of the sensors
-    that had any.
+    `usual` is whether the command looks there by itself. `since` are the calibrations before of the sensors that had
+    any.
     """
 
     history: str
     numbers: tuple[int, ...]
-    beyond: tuple[str, ...]
     since: tuple[Since, ...] = ()
     usual: bool = True
 

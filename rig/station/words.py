@@ -76,8 +76,8 @@ def _of_the_outcome(event: RunEvent) -> str | None:
             text = f"plotted: {', '.join(names)} (.png, .svg)"
         case NotPlotted():
             text = f"no plots: they need matplotlib. Install it: {install_command('study')}"
-        case Remembered(history, numbers, beyond, usual=usual):
-            text = "\n".join([_entered(history, numbers, usual=usual), *beyond])
+        case Remembered(history, numbers, usual=usual):
+            text = _entered(history, numbers, usual=usual)
         case NotRemembered(folder, why):
             later = f"rig history import {shlex.quote(str(folder))}"
             text = f"not entered in the history, which does not matter to the run ({why}); later: {later}"

@@ -2,7 +2,7 @@
 
 import pytest
 
-from rig.history.change_words import change_sentences, name_in_words
+from rig.history.change_words import beyond_u, change_in_short, name_in_words
 from rig.history.series import Change
 from rig.report.kinds.followed import Parameter
 
@@ -12,35 +12,32 @@ def change(name: str, before: float, now: float, u: float, unit: str = "1") -> C
     return Change(name, unit, Parameter(name, before, u, None, unit), Parameter(name, now, u, None, unit))
 
 
+def said(*changes: Change) -> list[str]:
+    return [change_in_short(each) for each in beyond_u(changes)]
+
+
 def test_a_scale_factor_changes_by_a_share_of_itself() -> None:
-    (said,) = change_sentences([change("kx", 1.0, 1.004, 0.004 / 12 / 8**0.5)])
-    assert said == "the scale factor of x changed by +0.4 %, 12 times the U of such a change"
-    (small,) = change_sentences([change("k", 1.0, 0.99996, 4e-5 / 2.5 / 8**0.5)])
-    assert small == "the mean scale factor changed by −40 ppm, 2.5 times the U of such a change"
+    large, small = change("kx", 1.0, 1.004, 0.004 / 12 / 8**0.5), change("k", 1.0, 0.99996, 4e-5 / 2.5 / 8**0.5)
+    assert said(large) == ["scale factor of x changed by +0.4 %, 12 U"]
+    assert said(small) == ["mean scale factor changed by −40 ppm, 2.5 U"]
 
 
 def test_others_change_in_the_unit_of_a_screen() -> None:
-    said = change_sentences(
-        [
-            change("by", 0.01, 0.01 - 0.0017453, 1e-5, "rad/s"),
-            change("nonorth_xy", 0.0, 0.0017453, 1e-4, "rad"),
-            change("gxy", 0.0, 0.5, 0.1, "rad/s/(m/s²)"),
-        ]
+    changes = (
+        change("by", 0.01, 0.01 - 0.0017453, 1e-5, "rad/s"),
+        change("nonorth_xy", 0.0, 0.0017453, 1e-4, "rad"),
+        change("gxy", 0.0, 0.5, 0.1, "rad/s/(m/s²)"),
     )
-    assert said == (
-        "the bias of y changed by −0.1 °/s, 62 times the U of such a change",
-        "the angle between x and y changed by +0.1°, 6.2 times the U of such a change",
-        "what an acceleration along y adds to the rate of x changed by +0.5 rad/s/(m/s²), "
-        "1.8 times the U of such a change",
-    )
+    assert said(*changes) == [
+        "bias of y changed by −0.1 °/s, 62 U",
+        "angle between x and y changed by +0.1°, 6.2 U",
+        "what an acceleration along y adds to the rate of x changed by +0.5 rad/s/(m/s²), 1.8 U",
+    ]
 
 
 def test_what_the_uncertainties_explain_is_not_told_and_the_largest_comes_first() -> None:
     changes = [change("kx", 1.0, 1.001, 1e-3), change("ky", 1.0, 1.01, 1e-3), change("kz", 1.0, 1.02, 1e-3)]
-    assert [each.split(" changed")[0] for each in change_sentences(changes)] == [
-        "the scale factor of z",
-        "the scale factor of y",
-    ]
+    assert [each.split(" changed")[0] for each in said(*changes)] == ["scale factor of z", "scale factor of y"]
 
 
 @pytest.mark.parametrize(

@@ -1,6 +1,7 @@
 """Gyroscopes: scale, bias, axes and g-sensitivity from whole turns (SIX, TRIAX)."""
 
 from collections.abc import Iterable, Iterator
+from dataclasses import replace
 
 import numpy as np
 from rich.table import Table
@@ -61,7 +62,9 @@ def _printed(found: Found[SensorEntry]) -> Iterator[Table | str]:
 
 
 def _shown(found: Found[SensorEntry]) -> Shown:
-    return shown_of(found.sensor, RATE, found.entry)
+    speeds = speed_words(found.entry)
+    held_at = f"at {speeds} °/s" if speeds else ""
+    return replace(shown_of(found.sensor, RATE, found.entry), held_at=held_at, model=found.entry.model)
 
 
 def _followed(found: Found[SensorEntry], document: ResultDocument) -> Followed:

@@ -49,7 +49,8 @@ class Three:
 class Shown:
     """Three numbers as page and notebook show them, in `unit`; where there are any, scale factors beside.
 
-    `combined` tells whether U holds all that is known, else it is two standard deviations of noise.
+    `combined` tells whether U holds all that is known, else it is two standard deviations of noise. `held_at` says at
+    what the numbers hold ("at ±60.0 °/s") and `model` what they are of ("g = K (m + b)"), where a run's end says that.
     """
 
     name: str
@@ -57,6 +58,8 @@ class Shown:
     numbers: Three
     combined: bool
     scale: Three | None = None
+    held_at: str = ""
+    model: str = ""
 
 
 @dataclass(frozen=True, slots=True)

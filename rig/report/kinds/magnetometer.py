@@ -21,7 +21,6 @@ from rig.report.told_words import told_from, told_lines
 from rig.report.validity_words import when_words
 from rig.report.when_entry import when_entry
 
-MICROTESLA = 1e6
 FAR_ENOUGH_M = 0.3  # from the flange: a housing of 0.2 A m² is 0.4 to 1.2 µT at 20 to 40 cm
 
 
@@ -40,7 +39,8 @@ def _entries(outcome: Outcome) -> dict[str, MagnetometerEntry | ErrorEntry]:
 
 def _lines(found: MagnetometerEntry) -> Iterator[str]:
     """What stands below the table."""
-    yield f"relative to a field of {MICROTESLA * found.field_t:g} µT; {len(found.dwells)} attitudes; no limit judges it"
+    field_ut = found.field_t / FIELD.bias.size
+    yield f"relative to a field of {field_ut:g} µT; {len(found.dwells)} attitudes; no limit judges it"
     if found.found_at is not None:
         yield f"scale and bias: {when_words(found.found_at)}; its temperature was not measured"
     yield from assumed_lines(found.budget)
@@ -51,7 +51,7 @@ def _lines(found: MagnetometerEntry) -> Iterator[str]:
         base = "arm's base"
         yield "the arm's own field is in the bias; runs with the sensor turned over tell it apart: rig reversal"
         yield from _tests(found)
-    yield f"field in the {base}: {triple(np.multiply(MICROTESLA, found.field_base_t), '+.3f')} µT"
+    yield f"field in the {base}: {triple(np.divide(found.field_base_t, FIELD.bias.size), '+.3f')} µT"
     skew = triple(np.degrees(found.non_orthogonality_rad), "+.4f")
     yield f"non-orthogonality yz zx xy: {skew} ° (± {skew_known(found)})"
     yield from attitude_lines(found, FIELD)
@@ -59,7 +59,7 @@ def _lines(found: MagnetometerEntry) -> Iterator[str]:
         if isinstance(other, ErrorEntry):
             yield f"{method}: {other.error}"
         else:
-            bias = triple(np.multiply(MICROTESLA, other.bias_t), "+.3f")
+            bias = triple(np.divide(other.bias_t, FIELD.bias.size), "+.3f")
             yield f"{method}: k {triple(other.scale, '.6f')}, b {bias} µT"
     yield from (f"warning: {warning}" for warning in found.warnings)
 
@@ -69,8 +69,8 @@ def _tests(found: MagnetometerEntry) -> Iterator[str]:
     if (alike := found.uniformity) is not None:
         yield f"uniform field: χ² of the residuals {alike.chi_square:.1f}, at most {alike.limit:.1f}"
     if (drift := found.drift) is not None:
-        change, std = np.linalg.norm(drift.change_t), np.linalg.norm(drift.std_t)
-        yield f"at home before and after: changed by {MICROTESLA * change:.3f} µT (± {2 * MICROTESLA * std:.3f})"
+        change, std = (np.linalg.norm(each) / FIELD.bias.size for each in (drift.change_t, drift.std_t))
+        yield f"at home before and after: changed by {change:.3f} µT (± {2 * std:.3f})"
     else:
         yield "no field test at home before and after: a field that drifts is not noticed (procedure.field_test_s)"
     away_m = float(np.linalg.norm(found.extension_m))
