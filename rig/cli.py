@@ -35,7 +35,7 @@ _COMMANDS = {
     "allan": "random walk and bias instability, by the Allan deviation of what was recorded at rest",
     "reversal": "a magnetometer's own bias, from runs between which it was turned over",
     "show": "what a finished run amounts to: values, budgets, checks",
-    "explain": "what a check, an error or a limit is, and what to do",
+    "explain": "what a check, an error, a limit or a word means, and what to do",
     "report": "the certificate of a finished run: HTML, PDF, digital certificate",
     "export": "what was calibrated and recorded, in the files of other programs",
     "history": "what the laboratory remembers: calibrations, trends, check standards",

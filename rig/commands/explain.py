@@ -1,4 +1,4 @@
-"""`rig explain`: what a check, an error or a limit is, and where to look."""
+"""`rig explain`: what a check, an error, a limit or a word is, and where to look."""
 
 from argparse import ArgumentParser, Namespace
 from collections.abc import Iterator
@@ -11,17 +11,18 @@ from rig.station.plain_text import say
 
 def add(parser: ArgumentParser) -> None:
     """The arguments of `rig explain`."""
-    parser.add_argument("name", metavar="NAME", help="a check (gyro.scale_changed), an error (wrong_axis) or a limit")
+    what = "a check (gyro.scale_changed), an error (wrong_axis), a limit, or a word (E_n, sweep, scale factor)"
+    parser.add_argument("name", nargs="+", metavar="NAME", help=what)
 
 
 def run(options: Namespace) -> int:
     """Print what the name means. Returns 0. Raises Refused `nothing_known`."""
-    name: str = options.name.strip()
-    lines = [*_check(name), *_limit(name), *_error(name)]
+    name = " ".join(options.name).strip()
+    lines = [*_check(name), *_limit(name), *_error(name), *_word(name)]
     if not lines:
         alike = get_close_matches(name, _names(), cutoff=0.5)
         known = f"Did you mean {' or '.join(alike)}?" if alike else "Give a name as it was printed"
-        raise Refused("nothing_known", f"there is no check, error or limit called {shorten(name)}", known)
+        raise Refused("nothing_known", f"there is no check, error, limit or word called {shorten(name)}", known)
     for line in lines:
         say(line)
     return 0
@@ -58,9 +59,21 @@ def _error(name: str) -> Iterator[str]:
             yield "More: docs/errors.md"
 
 
+def _word(name: str) -> Iterator[str]:
+    from rig.report.glossary import words_called
+
+    found = [*words_called(name)]
+    for word in found:
+        yield f"{word.names}: {word.plain}"
+    if found:
+        yield "More: docs/glossary.md"
+
+
 def _names() -> list[str]:
     from rig.config.limits import LIMITS
     from rig.errors.catalogue import catalogue
     from rig.report.check_words import check_words
+    from rig.report.glossary import glossary
 
-    return [*check_words(), *LIMITS, *(entry.name for entry in catalogue())]
+    words = (name for word in glossary() for name in word.each)
+    return [*check_words(), *LIMITS, *(entry.name for entry in catalogue()), *words]

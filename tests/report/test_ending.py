@@ -9,6 +9,7 @@ from rig.data.result_file import CheckEntry, ResultDocument, read_result
 from rig.report.check_words import check_words, words_of
 from rig.report.checks_page import page_text
 from rig.report.ending import ending
+from rig.report.glossary_page import page_text as glossary_text
 from support.paths import DOCS, FIXTURES
 
 FROZEN = sorted(path.parent for path in (FIXTURES.parent / "recordings").glob("*/*/result.json"))
@@ -128,11 +129,26 @@ def test_the_page_of_checks_is_made_of_the_table() -> None:
         ("clocks_agree.controller_and_crystal", "two clocks differ"),
         ("wrong_axis", "an error"),
         ("limits.bias_rad_s", "magnitude of a bias, in rad/s"),
+        ("U", "expanded uncertainty, U: u times the coverage factor"),
+        ("u", "standard uncertainty, u: the uncertainty as one standard deviation"),
+        ("k", "coverage factor, k = 2: the factor between u and U"),
+        ("E_n", "Above 1 something has changed"),
+        ("scale factor", "the factor that makes a reading right"),
+        ("budget", "the list of everything that contributes"),
+        ("Sweep", "one joint turning through one revolution"),
+        ("revolution", "its mean rate is 2π/T"),
+        ("bias", "a check of the verdict"),
+        ("bias", "what is added to a reading before the scale factor"),
     ],
 )
 def test_a_name_is_explained(name: str, said: str, capsys: pytest.CaptureFixture[str]) -> None:
-    assert main(["explain", name]) == 0
+    assert main(["explain", *name.split()]) == 0
     assert said in capsys.readouterr().out
+
+
+def test_the_glossary_of_the_pages_is_that_of_the_terminal() -> None:
+    again = "again: python -m rig.report.glossary_page > docs/glossary.md"
+    assert (DOCS / "glossary.md").read_text(encoding="utf-8") == glossary_text(), again
 
 
 def test_a_name_that_nobody_knows_is_answered_with_those_like_it(capsys: pytest.CaptureFixture[str]) -> None:

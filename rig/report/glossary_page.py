@@ -1,0 +1,36 @@
+"""Prints the words for people, docs/glossary.md: `python -m rig.report.glossary_page > docs/glossary.md`."""
+
+from collections.abc import Iterator
+
+from rig.report.glossary import glossary
+
+SECTIONS = {
+    "field": ("Words of the field", "what it means"),
+    "project": ("Words of this project", "what it means here"),
+}
+
+
+def page_text() -> str:
+    """The table as Markdown, in two sections."""
+    lines = [
+        "# Glossary",
+        "",
+        "Generated from [`rig/report/glossary.txt`](../rig/report/glossary.txt) by",
+        "`python -m rig.report.glossary_page > docs/glossary.md`: change the table, not this page.",
+        "",
+        "Words that the pages, the terminal and the certificate use. For people of other fields, and for readers whose",
+        "second language is English. `rig explain WORD` says what stands here.",
+    ]
+    for whose, (title, heading) in SECTIONS.items():
+        lines += ["", f"## {title}", "", f"| word | {heading} |", "| --- | --- |", *_rows(whose)]
+    return "\n".join(lines) + "\n"
+
+
+def _rows(whose: str) -> Iterator[str]:
+    for word in glossary():
+        if word.whose == whose:
+            yield f"| {word.names} | {word.means.replace('|', chr(92) + '|')} |"
+
+
+if __name__ == "__main__":
+    print(page_text(), end="")
