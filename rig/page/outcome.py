@@ -81,9 +81,9 @@ def after_verdict(about: About, checks: Sequence[Check], *, passed: bool, stored
         which = "sweep " + ", ".join(map(str, sweeps))
         return _next(f"Look who touched arm or cable in {which}, and repeat that alone", resuming(Path(about.folder)))
     if all(check.means.kind == "conformity" for check in failed):
-        return _next("The measurement is sound and the part beyond its limits. All of it", f"rig solve {folder}")
+        return _next("The measurement is sound and the part beyond its limits. All of it", f"rig show {folder} --all")
     config = shlex.quote(str(Path(about.folder) / CONFIG))
-    return _next("Look for the cause, then measure again", f"rig run {config}")
+    return _next(f"Look for the cause (rig show {folder} --checks), then measure again", f"rig run {config}")
 
 
 def after_fault(folder: Path, *, repeats: bool) -> Row:

@@ -6,7 +6,7 @@ from typing import Any
 from rig.analysis.check import Check
 from rig.data.events import BoardNotObserved, BoardObserved
 from rig.data.installed_kinds import measured
-from rig.data.quantity import TEMPERATURE
+from rig.data.quantity import TEMPERATURE, Quantity
 from rig.data.result_file import read_result
 from rig.data.run_folder import RESULT
 from rig.motion.geometry import NOMINAL
@@ -210,7 +210,7 @@ class Shown:
                 "units": {},
             }
             for of in (measured()[name] for name in sensor.latest if name != TEMPERATURE.name):
-                line, shown = of.named(of.name), of.reading
+                line, shown = of.named(of.name), of.bias if isinstance(of, Quantity) else of.reading  # as its bias is
                 values[f"{sensor.sensor}.{line}"] = tuple(each / shown.size for each in sensor.latest[of.name])
                 row["units"][line] = [of.name, shown.name]
             rows.append(row)

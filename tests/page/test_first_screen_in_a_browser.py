@@ -11,7 +11,7 @@ from selenium.webdriver.common.keys import Keys
 from rig.data.run_folder import RESULT
 from rig.errors import Fault
 from rig.station.events import DocumentWritten, Failed, Prompt
-from support.browser import kind, legible, needs_browser, picture, screen, set_theme, text, until
+from support.browser import TABLET, kind, legible, needs_browser, picture, screen, set_theme, text, until
 from support.told_page import Telling, showing
 from support.told_runs import before_it_moves, judged, look, moving, planned
 from support.told_six import IMU, PARTS, SIX, six_found, six_judged, six_moving
@@ -116,10 +116,27 @@ def test_a_run_that_failed_says_what_failed_and_what_to_do(driver: Chrome, tmp_p
     until(lambda: kind(driver) == "failed", "the verdict")
     assert text(driver, "failed").splitlines() == ["✗ lsm9ds1.scale_deviation 0.177, allowed 0.1"]
     assert "the part beyond its limits" in text(driver, "next-words")
-    assert text(driver, "next-command") == f"rig solve {SIX.folder}"
+    assert text(driver, "next-command") == f"rig show {SIX.folder} --all"
     first = driver.find_element(By.CSS_SELECTOR, "#checks tbody tr")
     assert "✗ failed" in (first.get_attribute("textContent") or "")
     picture(driver, "six-failed")
+
+
+def test_of_a_run_of_six_that_failed_the_first_screen_has_the_verdict_and_what_failed(
+    driver: Chrome, tmp_path: Path, six: Telling
+) -> None:
+    with screen(driver, *TABLET):
+        six(*six_judged(tmp_path, broken=("scale_deviation", "bias", "residuals")))
+        until(lambda: kind(driver) == "failed" and "E_n" in text(driver, "found"), "the verdict and the comparison")
+        picture(driver, "six-failed-1280x800")
+        assert below(driver, f"{AFTER}, #failed li", 15) == []
+        said = text(driver, "failed").splitlines()
+        assert len(said) == 4 and said[-1] == "and 6 more, below"
+        assert all(each.startswith("✗ ") and ", allowed " in each for each in said[:-1])
+        assert text(driver, "state-word") == "FAIL"
+        for dark in (False, True):
+            set_theme(driver, dark=dark)
+            legible(driver)
 
 
 def test_nothing_is_wider_than_a_telephone(driver: Chrome, tmp_path: Path, six: Telling) -> None:

@@ -42,7 +42,7 @@ def test_what_was_before_stands_beside_the_row_of_its_sensor_in_that_rows_unit()
 @pytest.mark.parametrize(
     ("checks", "command"),
     [
-        ([CONFORMING], "rig solve 'a run'"),
+        ([CONFORMING], "rig show 'a run' --all"),
         ([CONFORMING, UNFIT], "rig run 'a run/config.yaml'"),
         ([UNFIT, DISTURBED], "rig resume 'a run'"),
     ],

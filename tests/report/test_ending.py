@@ -10,9 +10,10 @@ from rig.report.check_words import check_words, words_of
 from rig.report.checks_page import page_text
 from rig.report.ending import ending
 from rig.report.glossary_page import page_text as glossary_text
+from support.ended_runs import ONE, RECORDINGS, failed, of_three_parts
 from support.paths import DOCS, FIXTURES
 
-FROZEN = sorted(path.parent for path in (FIXTURES.parent / "recordings").glob("*/*/result.json"))
+FROZEN = sorted(path.parent for path in RECORDINGS.glob("*/*/result.json"))
 RUN = Path("runs/2026-11-25T10-00-00Z-imu")
 SINCE = ("since 2026-11-23 (no. 1): scale factor of x changed by +0.4 %, 12 U; 3 more", "else nothing changed")
 COPYABLE = ("certificate: ", "everything: ")
@@ -24,37 +25,6 @@ def ended(result: ResultDocument, width: int = 80) -> list[str]:
     return [*ending(result, folder=RUN, everything=everything, certificate=certificate, since=since, width=width)]
 
 
-def of_three_parts() -> ResultDocument:
-    """Three gyroscopes and three accelerometers, with every check of each."""
-    one = read_result(FIXTURES.parent / "recordings" / "rig.settings-7" / "imu")
-    names = ("lsm9ds1", "mpu9250", "adis16465")
-    checks = [
-        check.model_copy(update={"sensor": name, "name": check.name.replace("gyro.", f"{name}.")})
-        for name in names
-        for check in one.checks
-    ]
-    serials = {name: {"serial_number": f"{name.upper()}-001"} for name in names}
-    return one.model_copy(
-        update={
-            "checks": tuple(checks),
-            "sensors": {name: one.sensors["gyro"].model_copy(update=serial) for name, serial in serials.items()},
-            "accelerometers": {
-                name: one.accelerometers["gyro"].model_copy(update=serial) for name, serial in serials.items()
-            },
-        }
-    )
-
-
-def failed(result: ResultDocument, *names: str) -> ResultDocument:
-    """The result with checks of these names far beyond their limits."""
-    checks = [
-        each.model_copy(update={"passed": False, "value": 3 * (each.limit or 1)}) if each.name in names else each
-        for each in result.checks
-    ]
-    return result.model_copy(update={"checks": tuple(checks), "verdict": "fail"})
-
-
-ONE = read_result(FIXTURES.parent / "recordings" / "rig.settings-6" / "verified")
 ALL = [check.name for check in of_three_parts().checks]
 
 

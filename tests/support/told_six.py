@@ -1,6 +1,6 @@
 """A run of three boards' worth of sensors that nobody made: three gyroscopes, and an accelerometer beside each."""
 
-from collections.abc import Iterator
+from collections.abc import Collection, Iterator
 from dataclasses import replace
 from pathlib import Path
 
@@ -45,8 +45,11 @@ def six_found() -> ResultDocument:
     )
 
 
-def six_judged(folder: Path, *, passed: bool = True) -> Iterator[RunEvent]:
-    """From the result to what the history says of it: one sensor has changed, two are there for the first time."""
+def six_judged(folder: Path, *, passed: bool = True, broken: Collection[str] = ()) -> Iterator[RunEvent]:
+    """From the result to what the history says of it: one sensor has changed, two are there for the first time.
+
+    The checks of these names are `broken` of each of the three boards.
+    """
     found = six_found()
     write_result(found, folder)
     (folder / "certificate.html").write_text("<title>Certificate</title>", encoding="utf-8")
@@ -57,7 +60,10 @@ def six_judged(folder: Path, *, passed: bool = True) -> Iterator[RunEvent]:
     if not passed:
         limit = found.checks[0]
         yield Checked(Check(limit.name, 0.177, 0.1, "1", limit.means, 0.0012))
-    yield VerdictReached(passed)
+    for each in found.checks:
+        if each.name.partition(".")[2] in broken and each.limit is not None:
+            yield Checked(Check(each.name, 3 * each.limit, each.limit, each.unit, each.means))
+    yield VerdictReached(passed and not broken)
     yield Remembered("the history", (12, 13), tuple(_since(found)))
 
 

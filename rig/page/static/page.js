@@ -2,22 +2,20 @@
 
 import { ENDED, age, hear, linked as lineIs, take as aged } from "./age.js";
 import { act, follow, token } from "./stream.js";
-import { drawArm, signed } from "./arm.js";
-import { plot } from "./plot.js";
+import { drawArm } from "./arm.js";
 import { outcome } from "./outcome.js";
+import { prompt } from "./prompt.js";
+import * as readings from "./readings.js";
 import * as tables from "./tables.js";
 import { colours, fresh } from "./drawing.js";
 
 const $ = (id) => document.getElementById(id);
 const shown = {};
-const points = { first: 0, times: [], lines: {} };
-const SHOWN_POINTS = 600;
 const WORDS = {
   connecting: ["Connecting", "…"], connected: ["Connected", "…"], ready: ["Ready", "■"], asking: ["Your answer is needed", "?"],
   moving: ["Moving", "➜"], measuring: ["Measuring", "◉"], resting: ["Resting", "‖"], judging: ["Solving", "Σ"],
   passed: ["PASS", "✓"], failed: ["FAIL", "✗"], refused: ["Refused", "⊘"], fault: ["Fault", "⚠"], stopped: ["Stopped", "■"],
 };
-const UNITS = { rate_rad_s: ["rate", "°/s", 2], acceleration_m_s2: ["acceleration", "m/s²", 3], field_t: ["magnetic field", "µT", 1] };
 
 const SHOW = {
   about(about) {
@@ -71,7 +69,7 @@ const SHOW = {
     tables.checks(rows);
     failed(rows.filter((check) => !check.passed));
   },
-  prompt,
+  prompt: (asked) => prompt(asked, shown.about.may_answer),
   certificate: light,
   outcome: found,
   since: found,
@@ -104,27 +102,6 @@ function failed(checks) {
 function found() {
   outcome($("found"), shown.outcome ?? [], shown.since);
   $("key").hidden = !shown.outcome?.length;
-}
-
-function prompt(asked) {
-  const box = $("prompt");
-  const before = Number(box.dataset.number || 0);
-  box.hidden = !asked;
-  if (!asked) return;
-  const here = shown.about.may_answer && token !== "";
-  $("prompt-words").replaceChildren(...asked.announcement.map((text) => Object.assign(document.createElement("li"), { textContent: text })));
-  $("prompt-tick").textContent = asked.to_tick;
-  $("yes").textContent = asked.to_do.charAt(0).toUpperCase() + asked.to_do.slice(1);
-  $("prompt-answer").hidden = !here;
-  $("prompt-elsewhere").hidden = here;
-  $("prompt-elsewhere").textContent = shown.about.may_answer
-    ? "This address lacks its token, so it is answered on a page that has it." : "It is answered at the terminal, not here.";
-  if (asked.number !== before) {
-    box.dataset.number = asked.number;
-    $("clear").checked = false;
-    $("yes").disabled = true;
-    $("prompt-title").focus();
-  }
 }
 
 function facts(pairs) {
@@ -186,83 +163,17 @@ function tell() {
   redraw();
 }
 
+const redraw = () => readings.redraw(shown.sensors, past);
+
 function take(name, news) {
   aged(name, news);
-  if (name === "all") Object.assign(points, { first: news.points.first, times: [], lines: {} });
-  add(news.points);
+  readings.add(name, news.points);
   delete news.points;
   Object.assign(shown, news);
   tell();
   for (const [section, value] of Object.entries(news)) if (value !== undefined) SHOW[section]?.(value);
   if ("about" in news) buttons();
   redraw();
-}
-
-/** Points are counted, so that none is taken twice; what the rig has forgotten is forgotten here. */
-function add(news) {
-  const end = points.first + points.times.length;
-  const skip = Math.max(0, end - news.from);
-  if (news.from > end) Object.assign(points, { first: news.from, times: [], lines: {} });
-  const before = points.times.length;
-  const times = news.time_s.slice(skip);
-  points.times.push(...times);
-  for (const name of new Set([...Object.keys(points.lines), ...Object.keys(news.lines)])) {
-    const line = (points.lines[name] ??= new Array(before).fill(null));
-    line.push(...(news.lines[name]?.slice(skip) ?? new Array(times.length).fill(null)));
-  }
-  const drop = Math.max(news.first - points.first, points.times.length - SHOWN_POINTS, 0);
-  if (drop > 0) {
-    points.times.splice(0, drop);
-    for (const line of Object.values(points.lines)) line.splice(0, drop);
-    points.first += drop;
-  }
-}
-
-let due = false;
-function redraw() {
-  if (due) return;
-  due = true;
-  requestAnimationFrame(() => {
-    due = false;
-    for (const name of Object.keys(points.lines).sort(inOrder)) draw(name, points.lines[name]);
-  });
-}
-
-/** By sensor as the rig has them, then rate before acceleration before field. */
-function inOrder(one, other) {
-  const order = (shown.sensors ?? []).map((each) => each.name);
-  const [a, b] = [one, other].map((name) => [order.indexOf(name.slice(0, name.lastIndexOf("."))), Object.keys(UNITS).indexOf(name.slice(name.lastIndexOf(".") + 1))]);
-  return a[0] - b[0] || a[1] - b[1];
-}
-
-function draw(name, values) {
-  const id = `plot-${name.replaceAll(/[^A-Za-z0-9_-]/g, "-")}`;
-  const [sensor, quantity] = [name.slice(0, name.lastIndexOf(".")), name.slice(name.lastIndexOf(".") + 1)];
-  const about = shown.sensors?.find((each) => each.name === sensor);
-  const [title, unit, digits] = UNITS[quantity] ?? [...(about?.units?.[quantity] ?? [quantity, ""]), 2];
-  if (!$(id)) $("readings").append(panel(id, sensor, title, unit));
-  $(`${id}-about`).textContent = [about?.part, about?.mode === "calibrated" ? "corrected by the board" : ""].filter(Boolean).join(" · ");
-  const last = values.findLast((value) => value);
-  const canvas = $(`${id}-canvas`);
-  const axes = last?.length === 1 ? [["x", ""]] : [..."xyz"].map((axis) => [axis, `${axis} `]); // what has no axes has no letter
-  for (const [i, [axis, letter]] of axes.entries()) {
-    $(`${id}-${axis}`).textContent = `${letter}${last ? signed(last[i], digits).padStart(digits + 4, "\u2007") : "–"}`;
-  }
-  if (last) canvas.setAttribute("aria-label", `${sensor}, ${title} over the last minute; ${past || "now"} ${axes.map(([, letter], i) => `${letter}${last[i].toFixed(digits)}`).join(", ")} ${unit}`);
-  plot(canvas, points.times, values, past ? "last" : "now");
-}
-
-function panel(id, sensor, title, unit) {
-  const make = (tag, fields, ...children) => {
-    const made = Object.assign(document.createElement(tag), fields);
-    made.append(...children);
-    return made;
-  };
-  const now = make("span", { className: "now" }, ...[..."xyz"].map((axis) => make("span", { id: `${id}-${axis}`, className: axis })), make("span", { className: "unit", textContent: unit }));
-  const head = make("h2", {}, make("span", { textContent: `${sensor}, ${title}` }), make("small", { id: `${id}-about` }), make("small", { className: "age", textContent: past }), now);
-  const canvas = make("canvas", { id: `${id}-canvas` });
-  canvas.setAttribute("role", "img");
-  return make("section", { id, className: "plot" }, head, canvas);
 }
 
 function buttons() {
@@ -306,7 +217,6 @@ $("halt").addEventListener("click", async () => {
   say(await act("stop"));
   setTimeout(() => { $("halt").disabled = false; }, 3000);
 });
-$("clear").addEventListener("change", () => { $("yes").disabled = !$("clear").checked; });
 for (const [id, agreed] of [["yes", true], ["no", false]]) {
   $(id).addEventListener("click", async () => say(await act("answer", { number: shown.prompt.number, agreed })));
 }

@@ -1,0 +1,29 @@
+// The question before anything moves: what is asked, and whether it may be answered on this page.
+
+import { token } from "./stream.js";
+
+const $ = (id) => document.getElementById(id);
+
+/** Show what is asked, nothing when nothing is; a rig that `mayAnswer` here takes an answer from a page with its token. */
+export function prompt(asked, mayAnswer) {
+  const box = $("prompt");
+  const before = Number(box.dataset.number || 0);
+  box.hidden = !asked;
+  if (!asked) return;
+  const here = mayAnswer && token !== "";
+  $("prompt-words").replaceChildren(...asked.announcement.map((text) => Object.assign(document.createElement("li"), { textContent: text })));
+  $("prompt-tick").textContent = asked.to_tick;
+  $("yes").textContent = asked.to_do.charAt(0).toUpperCase() + asked.to_do.slice(1);
+  $("prompt-answer").hidden = !here;
+  $("prompt-elsewhere").hidden = here;
+  $("prompt-elsewhere").textContent = mayAnswer
+    ? "This address lacks its token, so it is answered on a page that has it." : "It is answered at the terminal, not here.";
+  if (asked.number !== before) {
+    box.dataset.number = asked.number;
+    $("clear").checked = false;
+    $("yes").disabled = true;
+    $("prompt-title").focus();
+  }
+}
+
+$("clear").addEventListener("change", () => { $("yes").disabled = !$("clear").checked; });

@@ -1,0 +1,37 @@
+"""Results of runs that nobody made, for how runs end: of one sensor and of six, with checks that failed."""
+
+from rig.data.result_file import ResultDocument, read_result
+from support.paths import FIXTURES
+
+RECORDINGS = FIXTURES.parent / "recordings"
+ONE = read_result(RECORDINGS / "rig.settings-6" / "verified")
+
+
+def of_three_parts() -> ResultDocument:
+    """Three gyroscopes and three accelerometers, with every check of each."""
+    one = read_result(RECORDINGS / "rig.settings-7" / "imu")
+    names = ("lsm9ds1", "mpu9250", "adis16465")
+    checks = [
+        check.model_copy(update={"sensor": name, "name": check.name.replace("gyro.", f"{name}.")})
+        for name in names
+        for check in one.checks
+    ]
+    serials = {name: {"serial_number": f"{name.upper()}-001"} for name in names}
+    return one.model_copy(
+        update={
+            "checks": tuple(checks),
+            "sensors": {name: one.sensors["gyro"].model_copy(update=serial) for name, serial in serials.items()},
+            "accelerometers": {
+                name: one.accelerometers["gyro"].model_copy(update=serial) for name, serial in serials.items()
+            },
+        }
+    )
+
+
+def failed(result: ResultDocument, *names: str) -> ResultDocument:
+    """The result with checks of these names far beyond their limits."""
+    checks = [
+        each.model_copy(update={"passed": False, "value": 3 * (each.limit or 1)}) if each.name in names else each
+        for each in result.checks
+    ]
+    return result.model_copy(update={"checks": tuple(checks), "verdict": "fail"})
