@@ -35,7 +35,7 @@ def run(options: Namespace) -> int:
 
 
 def _listed() -> int:
-    """Print the names of the studies and what each shows."""
+    """Print the names of the studies, what each shows, and how long it takes."""
     from rich.console import Console
     from rich.table import Table
 
@@ -43,8 +43,10 @@ def _listed() -> int:
 
     listed = Table(box=None, show_header=False)
     for name, entry in STUDIES.items():
-        listed.add_row(name, entry.summary)
-    Console().print(listed)
+        listed.add_row(name, entry.summary, f"about {duration_words(entry.core_s)}")
+    console = Console()
+    console.print(listed)
+    console.print("on one core; --jobs N has N of them work, --runs N takes fewer runs than the paper")
     return 0
 
 
@@ -75,6 +77,8 @@ def _run(options: Namespace) -> int:
         except ImportError as error:
             raise missing_extra(error, "parquet") from error
     refuse_links(*options.out.glob("*"))
+    if options.runs is None and options.dask is None:
+        say(f"study {options.name}: about {duration_words(entry.core_s / (options.jobs or 1))}", file=sys.stderr)
     with _cluster(options.dask) if options.dask else nullcontext():
         report = entry.run(Settings(options.seed, options.runs, options.jobs, partial(_bar, options.jobs or 1)))
     paths = write(report, options.out, options.name, options.format)

@@ -10,10 +10,14 @@ from rig.study.report import Report, Settings
 
 @dataclass(frozen=True, slots=True)
 class Entry:
-    """A study: what it shows, and the function `module:name` that makes it."""
+    """A study: what it shows, the function `module:name` that makes it, and the processor time that takes, s.
+
+    That of one core of the machine on which `python benchmarks/studies.py` was run last.
+    """
 
     summary: str
     function: str
+    core_s: float
 
     def run(self, settings: Settings) -> Report:
         """Compute the study."""

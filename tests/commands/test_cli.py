@@ -120,6 +120,37 @@ def test_help_comes_at_once_whatever_the_command() -> None:
     assert not HEAVY & {*asked.stderr.split()}
 
 
+FIRST_LINE = """
+import os, sys
+from rig.cli import main
+
+class First:
+    def write(self, text):
+        if text.strip():
+            os.write(1, " ".join(sys.modules).encode())
+            os._exit(0)
+    def flush(self):
+        pass
+    def __getattr__(self, name):
+        return getattr(sys.__stdout__, name)
+
+sys.stdout = sys.stderr = First()
+main(sys.argv[1:])
+"""
+LATER = {"h5py", "jinja2", "scipy", "serial", "rig.analysis.judging", "rig.analysis.planned", "rig.runner.phases"}
+LATER |= {"rig.report.certificate.page", "rig.report.kinds.registry"}
+
+
+@pytest.mark.parametrize("command", [f"plan {CONFIG}", f"run {CONFIG} --out RUN", "history"])
+def test_what_solves_and_reports_is_loaded_after_the_first_line(command: str, tmp_path: Path) -> None:
+    words = [sys.executable, "-c", FIRST_LINE, *command.replace("RUN", str(tmp_path / "run")).split()]
+    environment = {**os.environ, "RIG_HISTORY": str(tmp_path / "history.sqlite")}
+    asked = subprocess.run(words, capture_output=True, text=True, check=True, env=environment)
+    loaded = {*asked.stdout.split()}
+    assert "rig.cli" in loaded and not LATER & loaded
+    assert command != "history" or "rig.config.load" not in loaded
+
+
 @pytest.mark.slow
 def test_a_plan_says_what_its_checks_will_tell() -> None:
     document = json.loads(shell(f"{PLAN} --json").stdout)
