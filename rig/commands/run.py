@@ -41,9 +41,9 @@ def add_outcome(parser: ArgumentParser) -> None:
 def run(options: Namespace) -> int:
     """Run the procedure in a new run folder; on a page too if wanted. Returns 0 passed, 1 verdict failed."""
     page = wish(options)
-    from rig.commands.carry_out import carry_out
-
     with begun(options) as (folder, found):
+        from rig.commands.carry_out import carry_out  # which takes longer than all before, so the folder is said first
+
         moved = frozenset(options.other_board)
         return carry_out(folder, found, assume_yes=options.yes, moved=moved, as_json=options.json, page=page)
 
