@@ -6,13 +6,14 @@ from dataclasses import dataclass
 from functools import cache
 from pathlib import Path
 
+WHOSE = ("field", "machine", "project")
 TABLE = Path(__file__).with_name("glossary.txt")
 LINK = re.compile(r"\[([^]]+)\]\(([^)#]+)[^)]*\)")
 
 
 @dataclass(frozen=True, slots=True)
 class Word:
-    """Names that mean one thing, whose they are ("field" or "project"), and what they mean, in Markdown of docs/."""
+    """Names that mean one thing, whose they are (one of `WHOSE`), and what they mean, in Markdown of docs/."""
 
     whose: str
     names: str
@@ -37,7 +38,7 @@ def glossary() -> tuple[Word, ...]:
         if line.startswith("#"):
             continue
         cells = line.split(" | ")
-        if len(cells) != 3 or cells[0] not in ("field", "project"):
+        if len(cells) != 3 or cells[0] not in WHOSE:
             raise ValueError(f"{TABLE.name}, line {number}: not `whose | names | what it means`")
         found.append(Word(*cells))
     return tuple(found)

@@ -6,12 +6,13 @@ from rig.report.glossary import glossary
 
 SECTIONS = {
     "field": ("Words of the field", "what it means"),
+    "machine": ("Words of the arm, the board and computers", "what it means"),
     "project": ("Words of this project", "what it means here"),
 }
 
 
 def page_text() -> str:
-    """The table as Markdown, in two sections."""
+    """The table as Markdown, in three sections."""
     lines = [
         "# Glossary",
         "",
